@@ -1,0 +1,182 @@
+//! The one door to files, and what compiling a description carries along.
+
+use std::path::{Path, PathBuf};
+
+use crate::error::{Diagnostic, Severity};
+
+/// Where a scene's files come from: a folder, memory, a browser.
+pub trait Assets: Sync {
+    /// The bytes of `path` (with `/` between folders, relative to the scene's folder), at most `limit` of them.
+    ///
+    /// # Errors
+    /// What went wrong and what to do, in words, without the path.
+    fn read(&self, path: &str, limit: u64) -> Result<Vec<u8>, AssetError>;
+}
+
+/// Why a file could not be had.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum AssetError {
+    /// There is no such file.
+    #[error("no such file")]
+    NotFound,
+    /// The file is not in the scene's folder.
+    #[error("lies outside the scene's folder")]
+    Outside,
+    /// The file is too large.
+    #[error("is {size} bytes, the limit is {limit}")]
+    TooLarge {
+        /// Its size in bytes.
+        size: u64,
+        /// The limit in bytes.
+        limit: u64,
+    },
+    /// The system's own words.
+    #[error("{0}")]
+    Io(String),
+}
+
+/// No files at all: for scenes that name none.
+pub struct NoAssets;
+
+impl Assets for NoAssets {
+    fn read(&self, _path: &str, _limit: u64) -> Result<Vec<u8>, AssetError> {
+        Err(AssetError::NotFound)
+    }
+}
+
+/// Files in memory, by path.
+#[derive(Default)]
+pub struct MemoryAssets {
+    /// Path and bytes.
+    pub files: std::collections::BTreeMap<String, Vec<u8>>,
+}
+
+impl Assets for MemoryAssets {
+    fn read(&self, path: &str, limit: u64) -> Result<Vec<u8>, AssetError> {
+        let bytes = self.files.get(path).ok_or(AssetError::NotFound)?;
+        let size = bytes.len() as u64;
+        if size > limit { Err(AssetError::TooLarge { size, limit }) } else { Ok(bytes.clone()) }
+    }
+}
+
+/// The files of one folder and those below it, and of further folders that were allowed. Links are followed; where they
+/// lead must be inside as well.
+pub struct FolderAssets {
+    root: PathBuf,
+    allowed: Vec<PathBuf>,
+}
+
+impl FolderAssets {
+    /// The folder `root`, and every folder of `allow`.
+    ///
+    /// # Errors
+    /// The system's error for a folder that cannot be resolved, with its path.
+    pub fn new(root: &Path, allow: &[PathBuf]) -> Result<Self, (PathBuf, std::io::Error)> {
+        let canonical = |p: &Path| {
+            let p = if p.as_os_str().is_empty() { Path::new(".") } else { p };
+            p.canonicalize().map_err(|e| (p.to_path_buf(), e))
+        };
+        let root = canonical(root)?;
+        let mut allowed = vec![root.clone()];
+        for dir in allow {
+            allowed.push(canonical(dir)?);
+        }
+        Ok(Self { root, allowed })
+    }
+}
+
+impl Assets for FolderAssets {
+    fn read(&self, path: &str, limit: u64) -> Result<Vec<u8>, AssetError> {
+        use std::io::Read;
+        let io = |e: std::io::Error| match e.kind() {
+            std::io::ErrorKind::NotFound => AssetError::NotFound,
+            _ => AssetError::Io(e.to_string()),
+        };
+        // An absolute `path` replaces the root in `join`; it is held to the same folders
+        let real = match self.root.join(path).canonicalize() {
+            Ok(real) => real,
+            // Say nothing about files elsewhere, not even whether they exist
+            Err(e) => {
+                return Err(if leaves(path) { AssetError::Outside } else { io(e) });
+            }
+        };
+        if !self.allowed.iter().any(|dir| real.starts_with(dir)) {
+            return Err(AssetError::Outside);
+        }
+        let meta = std::fs::metadata(&real).map_err(io)?;
+        if !meta.is_file() {
+            return Err(AssetError::Io("is not a plain file".into()));
+        }
+        if meta.len() > limit {
+            return Err(AssetError::TooLarge { size: meta.len(), limit });
+        }
+        // The file may grow while it is read: the limit holds all the same
+        let mut bytes = Vec::with_capacity(meta.len() as usize);
+        std::fs::File::open(&real).map_err(io)?.take(limit + 1).read_to_end(&mut bytes).map_err(io)?;
+        let size = bytes.len() as u64;
+        if size > limit { Err(AssetError::TooLarge { size, limit }) } else { Ok(bytes) }
+    }
+}
+
+/// Whether a path, by its words alone, leads out of the folder it starts in.
+fn leaves(path: &str) -> bool {
+    let mut depth = 0i32;
+    for part in Path::new(path).components() {
+        match part {
+            std::path::Component::Normal(_) => depth += 1,
+            std::path::Component::CurDir => {}
+            std::path::Component::ParentDir => depth -= 1,
+            _ => return true,
+        }
+        if depth < 0 {
+            return true;
+        }
+    }
+    false
+}
+
+/// Collects the faults of a description while it is compiled. Every check answers with a usable value, so that one
+/// fault does not hide the next.
+#[derive(Default)]
+pub(crate) struct CompileContext {
+    path: String,
+    faults: Vec<Diagnostic>,
+}
+
+impl CompileContext {
+    /// Runs `f` with `part` added to the path of every fault: `light.spot[2]`.
+    pub(crate) fn within<R>(&mut self, part: &str, f: impl FnOnce(&mut Self) -> R) -> R {
+        let length = self.path.len();
+        if !self.path.is_empty() {
+            self.path.push('.');
+        }
+        self.path.push_str(part);
+        let result = f(self);
+        self.path.truncate(length);
+        result
+    }
+
+    /// Records an error at `field` of the current path (empty: at the path itself).
+    pub(crate) fn error(&mut self, field: &str, message: impl Into<String>, hint: Option<&str>) {
+        self.push(Severity::Error, field, message.into(), hint);
+    }
+
+    /// Records a warning.
+    pub(crate) fn warning(&mut self, field: &str, message: impl Into<String>, hint: Option<&str>) {
+        self.push(Severity::Warning, field, message.into(), hint);
+    }
+
+    fn push(&mut self, severity: Severity, field: &str, message: String, hint: Option<&str>) {
+        let mut path = self.path.clone();
+        if !path.is_empty() && !field.is_empty() {
+            path.push('.');
+        }
+        path.push_str(field);
+        self.faults.push(Diagnostic { severity, place: None, path, message, hint: hint.map(str::to_owned) });
+    }
+
+    /// All faults so far, in the order found.
+    pub(crate) fn into_faults(self) -> Vec<Diagnostic> {
+        self.faults
+    }
+}

@@ -1,0 +1,75 @@
+//! A scene as it may be said, in text or in code: nothing resolved, nothing checked.
+
+use crate::camera::CameraDesc;
+use crate::describe::{ColorDesc, table, words};
+use crate::light::LightDesc;
+use crate::material::MaterialDesc;
+use crate::shape::ShapeDesc;
+use crate::texture::TextureDesc;
+
+words! {
+    /// How linear light becomes the numbers of an 8- or 16-bit picture.
+    pub enum DisplayEncoding {
+        /// The sRGB curve (IEC 61966-2-1).
+        Srgb = "srgb",
+        /// The power 1 / `gamma`.
+        Gamma = "gamma",
+        /// As it is.
+        Linear = "linear",
+    }
+}
+
+table! {
+    /// The picture: `[render]`.
+    ///
+    /// ```toml
+    /// [render]
+    /// width = 1024
+    /// height = 1024
+    /// antialiasing = 4
+    /// ```
+    pub struct RenderDesc {
+        /// Pixels across, 1 to 65536; at most 134217728 pixels in all.
+        pub width: u32 = 1024,
+        /// Pixels down, 1 to 65536.
+        pub height: u32 = 1024,
+        /// n of the n x n camera rays in each pixel, 1 to 64; 4 is "4X".
+        pub antialiasing: u32 = 4,
+        /// Points sampled on each area light that does not say its own, 1 to 1048576.
+        pub samples: u32 = 400,
+        /// The camera's name, where there are several; without it, the first.
+        pub camera: Option<String> = None,
+        /// What no surface covers.
+        pub background: ColorDesc = ColorDesc::BLACK,
+        /// Leaves what no surface covers transparent, instead of `background`.
+        pub transparent: bool = false,
+        /// Light from everywhere: added once, times each material's `ambient`.
+        pub ambient: ColorDesc = ColorDesc::BLACK,
+        /// How linear light becomes the numbers of an 8- or 16-bit picture.
+        pub display: DisplayEncoding = DisplayEncoding::Srgb,
+        /// The gamma of `display = "gamma"`, greater than 0.
+        pub gamma: f64 = 2.2,
+        /// In stops: 8- and 16-bit pictures are multiplied by 2^exposure, from -64 to 64.
+        pub exposure: f64 = 0.0,
+    }
+}
+
+/// A whole scene, as text says it or as code builds it.
+///
+/// Names are unique within cameras, within materials and within textures, whatever their kind.
+/// Shapes and lights are given ids in scene order: kinds in the order of their enums, then the order of these lists.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SceneDesc {
+    /// `[render]`
+    pub render: RenderDesc,
+    /// `[camera]` (its name is empty) or `[camera.NAME]`, in the order of the text.
+    pub cameras: Vec<(String, CameraDesc)>,
+    /// `[texture.KIND.NAME]`
+    pub textures: Vec<(String, TextureDesc)>,
+    /// `[material.KIND.NAME]`
+    pub materials: Vec<(String, MaterialDesc)>,
+    /// `[[sphere]]`, `[[parallelogram]]`
+    pub shapes: Vec<ShapeDesc>,
+    /// `[[light.KIND]]`
+    pub lights: Vec<LightDesc>,
+}

@@ -1,0 +1,5 @@
+//! Scenes: described, read, compiled.
+
+mod description;
+
+pub use description::{DisplayEncoding, RenderDesc, SceneDesc};
