@@ -68,3 +68,14 @@ impl Mul<f32> for Rgb {
         Rgb::new(self.r * s, self.g * s, self.b * s)
     }
 }
+
+/// The sRGB curve, from stored 0 to 1 to linear.
+pub(crate) fn srgb_to_linear(stored: f64) -> f64 {
+    if stored <= 0.04045 { stored / 12.92 } else { pxfm::f_pow((stored + 0.055) / 1.055, 2.4) }
+}
+
+// STUB
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Encoding { Srgb, Gamma(f64), Linear }
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Display { pub encoding: Encoding, pub exposure: f64 }

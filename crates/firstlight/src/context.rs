@@ -2,7 +2,10 @@
 
 use std::path::{Path, PathBuf};
 
+use crate::color::Rgb;
+use crate::describe::ColorDesc;
 use crate::error::{Diagnostic, Severity};
+use crate::math::{DVec3, Vec3, vec3};
 
 /// Where a scene's files come from: a folder, memory, a browser.
 pub trait Assets: Sync {
@@ -175,8 +178,112 @@ impl CompileContext {
         self.faults.push(Diagnostic { severity, place: None, path, message, hint: hint.map(str::to_owned) });
     }
 
+    /// Runs `f` with an empty path, for a fault that belongs elsewhere.
+    pub(crate) fn outside<R>(&mut self, f: impl FnOnce(&mut Self) -> R) -> R {
+        let path = std::mem::take(&mut self.path);
+        let result = f(self);
+        self.path = path;
+        result
+    }
+
     /// All faults so far, in the order found.
-    pub(crate) fn into_faults(self) -> Vec<Diagnostic> {
-        self.faults
+    pub(crate) fn take_faults(&mut self) -> Vec<Diagnostic> {
+        std::mem::take(&mut self.faults)
+    }
+}
+
+/// The checks that descriptions share. Each answers with the number as it is computed with.
+impl CompileContext {
+    fn finite(&mut self, field: &str, v: &[f64]) -> bool {
+        let fine = v.iter().all(|x| (*x as f32).is_finite());
+        if !fine {
+            let message = format!("{} is not finite in 32 bits", show(v));
+            self.error(field, message, Some("give numbers between -3.4e38 and 3.4e38"));
+        }
+        fine
+    }
+
+    /// A point of the world: finite, and near enough for its square to be finite as well.
+    pub(crate) fn point(&mut self, field: &str, v: [f64; 3]) -> Vec3 {
+        if self.finite(field, &v) && v.iter().any(|x| x.abs() > MAX_COORDINATE) {
+            let message = format!("{} is outside -1e9 to 1e9", show(&v));
+            self.error(field, message, Some("use a larger unit of length"));
+        }
+        vec3(v)
+    }
+
+    /// A vector that has a length.
+    pub(crate) fn edge(&mut self, field: &str, v: [f64; 3]) -> bool {
+        let before = self.faults.len();
+        self.point(field, v);
+        if self.faults.len() == before && !(DVec3::from(v).length() >= MIN_LENGTH) {
+            self.error(field, format!("{} has no length", show(&v)), Some("give a vector longer than 1e-9"));
+        }
+        self.faults.len() == before
+    }
+
+    /// A number in (0, max].
+    pub(crate) fn positive(&mut self, field: &str, v: f64, hint: &str) -> f32 {
+        if !(MIN_LENGTH..=MAX_COORDINATE).contains(&v) {
+            self.error(field, format!("{v} is outside (0, 1e9]"), Some(hint));
+        }
+        v as f32
+    }
+
+    /// A number from `low` to `high`, both allowed.
+    pub(crate) fn between(&mut self, field: &str, v: f64, low: f64, high: f64, hint: Option<&str>) -> f64 {
+        if !(v >= low && v <= high) {
+            self.error(field, format!("{v} is outside [{low}, {high}]"), hint);
+        }
+        v
+    }
+
+    /// A whole number from `low` to `high`, both allowed.
+    pub(crate) fn count(&mut self, field: &str, v: u32, low: u32, high: u32, hint: Option<&str>) -> u32 {
+        if v < low || v > high {
+            self.error(field, format!("{v} is outside {low} to {high}"), hint);
+        }
+        v
+    }
+
+    /// A colour: finite, no channel below 0.
+    pub(crate) fn color(&mut self, field: &str, c: ColorDesc) -> Rgb {
+        if self.finite(field, &c.linear) && c.linear.iter().any(|x| *x < 0.0) {
+            let message = format!("{} has a channel below 0", show(&c.linear));
+            self.error(field, message, Some("light and reflectance are 0 or more"));
+        }
+        let [r, g, b] = c.linear.map(|x| x as f32);
+        Rgb::new(r, g, b)
+    }
+
+    /// How strong a light is: 0 or more.
+    pub(crate) fn strength(&mut self, v: f64) -> f64 {
+        if !(0.0..=MAX_STRENGTH).contains(&v) {
+            self.error("strength", format!("{v} is outside [0, 1e15]"), Some("a light cannot take light away"));
+        }
+        v
+    }
+
+    /// How many faults there are so far.
+    pub(crate) fn fault_count(&self) -> usize {
+        self.faults.len()
+    }
+
+    /// Whether there are errors so far.
+    pub(crate) fn has_errors(&self) -> bool {
+        self.faults.iter().any(|f| f.severity == Severity::Error)
+    }
+}
+
+/// Squares, and products of two squares, of world coordinates stay finite.
+const MAX_COORDINATE: f64 = 1e9;
+const MIN_LENGTH: f64 = 1e-9;
+const MAX_STRENGTH: f64 = 1e15;
+
+/// A value as the user would write it.
+pub(crate) fn show(v: &[f64]) -> String {
+    match v {
+        [x] => x.to_string(),
+        _ => format!("[{}]", v.iter().map(f64::to_string).collect::<Vec<_>>().join(", ")),
     }
 }

@@ -30,6 +30,7 @@ macro_rules! words {
         pub enum $name {
             $( $(#[doc = $vdoc])* $variant, )*
         }
+        impl $name { pub const fn name(self) -> &'static str { match self { $(Self::$variant => $word,)* } } }
     };
 }
 
@@ -39,3 +40,6 @@ pub(crate) use words;
 mod value;
 
 pub use value::{ColorDesc, ColorParam, FilePath, NumberParam, ParamDesc};
+
+// STUB
+pub(crate) fn nearest<'a>(_: &str, _: impl Iterator<Item = &'a str>) -> Option<&'a str> { None }

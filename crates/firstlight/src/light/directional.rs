@@ -1,7 +1,10 @@
 //! Directional lights.
 
-use super::Falloff;
+use super::{Falloff, Light, LightKind, scaled};
+use crate::color::Rgb;
+use crate::context::CompileContext;
 use crate::describe::{ColorDesc, table};
+use crate::math::{DVec3, Vec3};
 
 table! {
     /// Light from infinitely far away, all of it in one direction: the sun on a clear day.
@@ -26,5 +29,25 @@ table! {
         pub falloff: Falloff = Falloff::Physical,
         /// Whether its light can be blocked.
         pub shadows: bool = true,
+    }
+}
+
+/// A directional light, ready to shine.
+#[derive(Clone, Copy, Debug)]
+pub struct Directional {
+    /// Unit, from any surface to the light.
+    pub to_light: Vec3,
+}
+
+impl DirectionalDesc {
+    pub(crate) fn compile(&self, cx: &mut CompileContext) -> Light {
+        cx.edge("direction", self.direction);
+        let to_light = -DVec3::from(self.direction).normalize_or_zero();
+        Light {
+            kind: LightKind::Directional(Directional { to_light: to_light.as_vec3() }),
+            scale: scaled(cx, self.color, self.strength, self.falloff.factor()),
+            radiance: Rgb::BLACK,
+            shadows: self.shadows,
+        }
     }
 }

@@ -6,13 +6,18 @@ mod rectangle;
 mod samples;
 mod spot;
 
-use crate::describe::words;
+use crate::color::Rgb;
+use crate::context::CompileContext;
+use crate::describe::{ColorDesc, words};
+use crate::math::Vec3;
 
-pub use directional::DirectionalDesc;
-pub use point::PointDesc;
-pub use rectangle::RectangleDesc;
+pub use directional::{Directional, DirectionalDesc};
+pub use point::{Point, PointDesc};
+pub use rectangle::{Rectangle, RectangleDesc};
 pub use samples::SampleSet;
-pub use spot::SpotDesc;
+pub use spot::{Spot, SpotDesc};
+
+pub(crate) use rectangle::MAX_SAMPLES;
 
 words! {
     /// How light weakens on its way.
@@ -47,4 +52,145 @@ pub enum LightDesc {
     Spot(SpotDesc),
     /// `[[light.rectangle]]`
     Rectangle(RectangleDesc),
+}
+
+impl LightDesc {
+    /// The kinds, in scene order.
+    pub const KINDS: &'static [&'static str] = &["point", "directional", "spot", "rectangle"];
+
+    /// Its kind, one of [`KINDS`](Self::KINDS).
+    pub fn kind(&self) -> &'static str {
+        match self {
+            LightDesc::Point(_) => "point",
+            LightDesc::Directional(_) => "directional",
+            LightDesc::Spot(_) => "spot",
+            LightDesc::Rectangle(_) => "rectangle",
+        }
+    }
+
+    /// Its name, if it has one.
+    pub fn name(&self) -> Option<String> {
+        match self {
+            LightDesc::Point(light) => light.name.clone(),
+            LightDesc::Directional(light) => light.name.clone(),
+            LightDesc::Spot(light) => light.name.clone(),
+            LightDesc::Rectangle(light) => light.name.clone(),
+        }
+    }
+}
+
+/// A light, ready to shine.
+#[derive(Clone, Debug)]
+pub struct Light {
+    /// Its place and shape.
+    pub kind: LightKind,
+    /// What each sample's weight is multiplied with: `color` x `strength`, over the number of samples, and over pi where
+    /// the light is physical, so that it meets materials that give pi x BRDF x cosine.
+    pub scale: Rgb,
+    /// What the camera sees of it: `color` x `strength`.
+    pub radiance: Rgb,
+    /// Whether its light can be blocked.
+    pub shadows: bool,
+}
+
+/// The place and shape of a light.
+#[derive(Clone, Debug)]
+pub enum LightKind {
+    /// `[[light.point]]`
+    Point(Point),
+    /// `[[light.directional]]`
+    Directional(Directional),
+    /// `[[light.spot]]`
+    Spot(Spot),
+    /// `[[light.rectangle]]`
+    Rectangle(Rectangle),
+}
+
+/// The way from a surface to one point of a light.
+#[derive(Clone, Copy, Debug)]
+pub struct Towards {
+    /// From the surface to the light's point, in metres; or unit, towards a light infinitely far away.
+    pub l: Vec3,
+    /// Whether `l` ends at the light.
+    pub finite: bool,
+}
+
+/// One point of a light, seen from a surface.
+#[derive(Clone, Copy, Debug)]
+pub struct LightSample {
+    /// 1 / |l|.
+    pub inverse_distance: f32,
+    /// How much arrives, before [`Light::scale`]; 0 or more.
+    pub weight: f32,
+}
+
+/// Light points nearer than the root of this, in metres, are at the surface's own point and send nothing.
+pub(crate) const MIN_DISTANCE2: f32 = 1e-30;
+
+impl Light {
+    /// How many points of it are sampled, 1 or more.
+    #[inline(always)]
+    pub fn samples(&self) -> usize {
+        match &self.kind {
+            LightKind::Rectangle(rectangle) => rectangle.samples(),
+            LightKind::Point(_) | LightKind::Directional(_) | LightKind::Spot(_) => 1,
+        }
+    }
+
+    /// The way from `p` to sample `k`.
+    #[inline(always)]
+    pub fn towards(&self, k: usize, p: Vec3) -> Towards {
+        let to = |q: Vec3| Towards { l: q - p, finite: true };
+        match &self.kind {
+            LightKind::Point(point) => to(point.position),
+            LightKind::Spot(spot) => to(spot.position),
+            LightKind::Rectangle(rectangle) => to(rectangle.point(k)),
+            LightKind::Directional(directional) => Towards { l: directional.to_light, finite: false },
+        }
+    }
+
+    /// How much arrives along the way `l` from a sample to a surface. `None` where the two are the same point.
+    #[inline(always)]
+    pub fn sample(&self, l: Vec3) -> Option<LightSample> {
+        let distance2 = l.dot(l);
+        if !(distance2 >= MIN_DISTANCE2) {
+            return None;
+        }
+        let inverse_distance = 1.0 / distance2.sqrt();
+        let weight = match &self.kind {
+            LightKind::Point(point) => point.weight(inverse_distance),
+            LightKind::Directional(_) => 1.0,
+            LightKind::Spot(spot) => spot.weight(l, inverse_distance),
+            LightKind::Rectangle(rectangle) => rectangle.weight(l, inverse_distance),
+        };
+        Some(LightSample { inverse_distance, weight })
+    }
+
+    /// Points whose hull holds the whole light; none where it is infinitely far away.
+    pub(crate) fn hull(&self) -> &[Vec3] {
+        match &self.kind {
+            LightKind::Point(point) => std::slice::from_ref(&point.position),
+            LightKind::Spot(spot) => std::slice::from_ref(&spot.position),
+            LightKind::Rectangle(rectangle) => &rectangle.shape.corners,
+            LightKind::Directional(_) => &[],
+        }
+    }
+}
+
+/// `color` x `strength`, checked; `factor` is what the kind of light makes of it.
+fn scaled(cx: &mut CompileContext, color: ColorDesc, strength: f64, factor: f64) -> Rgb {
+    cx.color("color", color);
+    let strength = cx.strength(strength);
+    let [r, g, b] = color.linear.map(|c| (c * strength * factor) as f32);
+    Rgb::new(r, g, b)
+}
+
+impl Falloff {
+    /// Irradiance over pi where it is physical, the plain number where not.
+    fn factor(self) -> f64 {
+        match self {
+            Falloff::Physical => std::f64::consts::FRAC_1_PI,
+            Falloff::Constant => 1.0,
+        }
+    }
 }

@@ -1,7 +1,10 @@
 //! Point lights.
 
-use super::Falloff;
+use super::{Falloff, Light, LightKind, scaled};
+use crate::color::Rgb;
+use crate::context::CompileContext;
 use crate::describe::{ColorDesc, table};
+use crate::math::Vec3;
 
 table! {
     /// Light from one point, the same in every direction.
@@ -26,5 +29,34 @@ table! {
         pub falloff: Falloff = Falloff::Physical,
         /// Whether its light can be blocked.
         pub shadows: bool = true,
+    }
+}
+
+/// A point light, ready to shine.
+#[derive(Clone, Copy, Debug)]
+pub struct Point {
+    /// Where it is.
+    pub position: Vec3,
+    /// Whether light weakens with the square of the distance.
+    pub physical: bool,
+}
+
+impl PointDesc {
+    pub(crate) fn compile(&self, cx: &mut CompileContext) -> Light {
+        let position = cx.point("position", self.position);
+        Light {
+            kind: LightKind::Point(Point { position, physical: self.falloff == Falloff::Physical }),
+            scale: scaled(cx, self.color, self.strength, self.falloff.factor()),
+            radiance: Rgb::BLACK,
+            shadows: self.shadows,
+        }
+    }
+}
+
+impl Point {
+    /// 1 / d^2, or 1.
+    #[inline(always)]
+    pub(crate) fn weight(&self, inverse_distance: f32) -> f32 {
+        if self.physical { inverse_distance * inverse_distance } else { 1.0 }
     }
 }

@@ -1,7 +1,12 @@
 //! Rectangle lights.
 
-use super::{EmitSides, Falloff, SampleSet};
+use fearless_simd::{f32x16, prelude::*};
+
+use super::{EmitSides, Falloff, Light, LightKind, SampleSet, scaled};
+use crate::context::{CompileContext, show};
 use crate::describe::{ColorDesc, table};
+use crate::math::{DVec3, LANES, Vec3, Vec3x16};
+use crate::shape::Parallelogram;
 
 table! {
     /// A rectangle that shines: soft shadows.
@@ -45,5 +50,158 @@ table! {
         pub set: SampleSet = SampleSet::Sobol,
         /// The seed of the sets `uniform` and `stratified`.
         pub seed: u32 = 0,
+    }
+}
+
+/// A rectangle light, ready to shine.
+#[derive(Clone, Debug)]
+pub struct Rectangle {
+    /// What the camera sees, and what stands in the way of other lights if it blocks.
+    pub shape: Parallelogram,
+    /// The sampled points.
+    points: PointBlocks,
+    /// Whether the side behind emits as well.
+    pub both_sides: bool,
+    /// Whether light weakens with the square of the distance and the cosine at the light.
+    pub physical: bool,
+    /// Whether the camera sees it.
+    pub visible: bool,
+    /// Whether it stops the light of others.
+    pub blocks: bool,
+}
+
+/// Sides that are farther from a right angle than this sine are not those of a rectangle.
+const MAX_SKEW: f64 = 1e-5;
+
+/// The largest number of points on one light.
+pub(crate) const MAX_SAMPLES: u32 = 1 << 20;
+
+impl RectangleDesc {
+    /// `samples` is the scene's default number of points.
+    pub(crate) fn compile(&self, cx: &mut CompileContext, samples: u32) -> Light {
+        cx.point("center", self.center);
+        let (e0, e1) = (DVec3::from(self.e0), DVec3::from(self.e1));
+        let edges_fine = cx.edge("e0", self.e0) & cx.edge("e1", self.e1);
+        if edges_fine && !(e0.dot(e1).abs() <= MAX_SKEW * e0.length() * e1.length()) {
+            let message = format!("{} is not perpendicular to e0 = {}", show(&self.e1), show(&self.e0));
+            cx.error("e1", message, Some("the sides of a rectangle meet at right angles"));
+        }
+        let count = match self.samples {
+            Some(own) => cx.count("samples", own, 1, MAX_SAMPLES, Some("points on this light")),
+            None => samples,
+        };
+        if let Err(hint) = self.set.allows(count) {
+            let field = if self.samples.is_some() { "samples" } else { "set" };
+            let message = format!("{count} points cannot be laid out as \"{}\"", self.set.name());
+            cx.error(field, message, Some(&hint));
+        }
+        let corner = DVec3::from(self.center) - (e0 + e1) * 0.5;
+        let points = match cx.has_errors() {
+            true => Vec::new(),
+            false => self.set.points(count, self.seed),
+        };
+        let points = points.iter().map(|[a, b]| (corner + e0 * *a + e1 * *b).as_vec3());
+        // Physical: each point stands for its share of the area
+        let area = match self.falloff {
+            Falloff::Physical => e0.cross(e1).length(),
+            Falloff::Constant => 1.0,
+        };
+        let both_sides = match (self.sides, self.falloff) {
+            (Some(sides), _) => sides == EmitSides::Both,
+            (None, falloff) => falloff == Falloff::Constant,
+        };
+        Light {
+            kind: LightKind::Rectangle(Rectangle {
+                shape: Parallelogram::new(corner, e0, e1, 1.0, !both_sides),
+                points: PointBlocks::new(points),
+                both_sides,
+                physical: self.falloff == Falloff::Physical,
+                visible: self.visible,
+                blocks: self.blocks,
+            }),
+            scale: scaled(cx, self.color, self.strength, self.falloff.factor() * area / count.max(1) as f64),
+            radiance: scaled(cx, self.color, self.strength, 1.0),
+            shadows: self.shadows,
+        }
+    }
+}
+
+impl Rectangle {
+    /// How many points are sampled.
+    #[inline(always)]
+    pub fn samples(&self) -> usize {
+        self.points.len
+    }
+
+    /// Sampled point `k`, world space.
+    #[inline(always)]
+    pub fn point(&self, k: usize) -> Vec3 {
+        let block = &self.points.blocks[k / LANES];
+        let lane = k % LANES;
+        Vec3::new(block.x[lane], block.y[lane], block.z[lane])
+    }
+
+    /// The sampled points, sixteen at a time.
+    #[inline(always)]
+    pub(crate) fn blocks(&self) -> &[PointBlock] {
+        &self.points.blocks
+    }
+
+    /// 1 where the light emits towards the surface under `constant`; the cosine at the light over d^2 under `physical`.
+    /// `l` points to the light.
+    #[inline(always)]
+    pub(crate) fn weight(&self, l: Vec3, inverse_distance: f32) -> f32 {
+        let side = -self.shape.n.dot(l);
+        let side = if self.both_sides { side.abs() } else { side };
+        if !self.physical {
+            return if self.both_sides || side > 0.0 { 1.0 } else { 0.0 };
+        }
+        let cos = side * inverse_distance;
+        if cos > 0.0 { cos * (inverse_distance * inverse_distance) } else { 0.0 }
+    }
+
+    /// [`weight`](Self::weight) in sixteen lanes: the same bits.
+    #[inline(always)]
+    pub(crate) fn weight_lanes<S: Simd>(&self, l: Vec3x16<S>, inverse_distance: f32x16<S>) -> f32x16<S> {
+        let simd = inverse_distance.token();
+        let (zero, one) = (simd.splat_f32x16(0.0), simd.splat_f32x16(1.0));
+        if !self.physical && self.both_sides {
+            return one;
+        }
+        let side = -Vec3x16::splat(simd, self.shape.n).dot(l);
+        let side = if self.both_sides { side.abs() } else { side };
+        if !self.physical {
+            return side.simd_gt(zero).select(one, zero);
+        }
+        let cos = side * inverse_distance;
+        cos.simd_gt(zero).select(cos * (inverse_distance * inverse_distance), zero)
+    }
+}
+
+/// Points in blocks of sixteen, coordinate by coordinate, as lanes want them.
+#[derive(Clone, Debug)]
+pub(crate) struct PointBlocks {
+    len: usize,
+    blocks: Vec<PointBlock>,
+}
+
+/// Sixteen points. Where there is none, every coordinate is NaN: it is above no horizon and sends no light.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct PointBlock {
+    pub x: [f32; LANES],
+    pub y: [f32; LANES],
+    pub z: [f32; LANES],
+}
+
+impl PointBlocks {
+    fn new(points: impl ExactSizeIterator<Item = Vec3>) -> Self {
+        let len = points.len();
+        let empty = PointBlock { x: [f32::NAN; LANES], y: [f32::NAN; LANES], z: [f32::NAN; LANES] };
+        let mut blocks = vec![empty; len.div_ceil(LANES)];
+        for (k, q) in points.enumerate() {
+            let (block, lane) = (&mut blocks[k / LANES], k % LANES);
+            (block.x[lane], block.y[lane], block.z[lane]) = (q.x, q.y, q.z);
+        }
+        PointBlocks { len, blocks }
     }
 }

@@ -15,3 +15,134 @@ words! {
         Uniform = "uniform",
     }
 }
+
+impl SampleSet {
+    /// Whether `count` points can be laid out so; if not, which numbers can.
+    pub(crate) fn allows(self, count: u32) -> Result<(), String> {
+        let side = count.isqrt();
+        match self {
+            SampleSet::Sobol | SampleSet::Uniform => Ok(()),
+            SampleSet::Grid | SampleSet::Stratified if side * side == count => Ok(()),
+            SampleSet::Grid | SampleSet::Stratified => {
+                Err(format!("give a square number, such as {} or {}", side * side, (side + 1) * (side + 1)))
+            }
+        }
+    }
+
+    /// `count` points of the unit square.
+    pub(crate) fn points(self, count: u32, seed: u32) -> Vec<[f64; 2]> {
+        let side = count.isqrt().max(1);
+        let cell = |k: u32, [x, y]: [f64; 2]| {
+            [((k % side) as f64 + x) / side as f64, ((k / side) as f64 + y) / side as f64]
+        };
+        (0..count)
+            .map(|k| match self {
+                SampleSet::Sobol => sobol(k),
+                SampleSet::Grid => cell(k, [0.5, 0.5]),
+                SampleSet::Stratified => cell(k, random(k, seed)),
+                SampleSet::Uniform => random(k, seed),
+            })
+            .collect()
+    }
+}
+
+/// Point `k` of the Sobol' (0, 2)-sequence, both coordinates scrambled in Owen's way under fixed seeds: the first 2^m
+/// points are stratified in every way that the square can be cut into 2^m equal boxes of binary sides.
+///
+/// Source: Burley, "Practical hash-based Owen scrambling", JCGT 9(4), 2020, section 3.
+fn sobol(k: u32) -> [f64; 2] {
+    // The radical inverse is the first dimension; Sobol's second direction numbers make the other
+    let (x, y) = (k.reverse_bits(), sobol_second(k));
+    [unit(owen(x, SCRAMBLE[0])), unit(owen(y, SCRAMBLE[1]))]
+}
+
+/// The scramble of the sequence: part of the definition of every picture with an area light.
+const SCRAMBLE: [u32; 2] = [0x5be0_cd19, 0x1f83_d9ab];
+
+/// The second dimension of Sobol's sequence, as a binary fraction.
+fn sobol_second(index: u32) -> u32 {
+    let (mut result, mut direction, mut rest) = (0, 1u32 << 31, index);
+    while rest > 0 {
+        if rest & 1 == 1 {
+            result ^= direction;
+        }
+        direction ^= direction >> 1;
+        rest >>= 1;
+    }
+    result
+}
+
+/// Owen's scramble of a binary fraction: each bit is turned or not by a hash of the bits above it.
+fn owen(fraction: u32, seed: u32) -> u32 {
+    // The hash of Laine and Karras carries from low bits to high ones, so it runs on the mirrored number
+    let mut v = fraction.reverse_bits();
+    v ^= v.wrapping_mul(0x3d20_adea);
+    v = v.wrapping_add(seed);
+    v = v.wrapping_mul((seed >> 16) | 1);
+    v ^= v.wrapping_mul(0x0552_6c56);
+    v ^= v.wrapping_mul(0x53a2_2864);
+    v.reverse_bits()
+}
+
+/// Point `k` of a seeded random set.
+fn random(k: u32, seed: u32) -> [f64; 2] {
+    let h = mix(((seed as u64) << 32) | k as u64);
+    [unit(h as u32), unit((h >> 32) as u32)]
+}
+
+/// A bijection of 64-bit numbers without visible pattern: the finalizer of SplitMix64 (Steele, Lea, Flood, "Fast
+/// splittable pseudorandom number generators", OOPSLA 2014).
+fn mix(k: u64) -> u64 {
+    let mut z = k.wrapping_add(1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+    z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    z ^ (z >> 31)
+}
+
+/// A binary fraction as a number in (0, 1): the middle of the interval its bits stand for.
+fn unit(fraction: u32) -> f64 {
+    (fraction as f64 + 0.5) / 4_294_967_296.0
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sobol_is_stratified_in_every_way() {
+        for m in [4u32, 6, 10] {
+            let n = 1u32 << m;
+            for shape in 0..=m {
+                let (columns, rows) = (1usize << shape, 1usize << (m - shape));
+                let mut seen = vec![false; n as usize];
+                for [x, y] in SampleSet::Sobol.points(n, 0) {
+                    let cell = (x * columns as f64) as usize * rows + (y * rows as f64) as usize;
+                    assert!(!seen[cell], "two of {n} points in one cell of {columns} x {rows}");
+                    seen[cell] = true;
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn the_first_points_do_not_depend_on_how_many_follow() {
+        assert_eq!(SampleSet::Sobol.points(1000, 0)[..400], SampleSet::Sobol.points(400, 9)[..]);
+    }
+
+    #[test]
+    fn every_set_fills_the_square() {
+        for set in [SampleSet::Sobol, SampleSet::Grid, SampleSet::Stratified, SampleSet::Uniform] {
+            let points = set.points(400, 7);
+            assert_eq!(points.len(), 400);
+            assert!(points.iter().flatten().all(|x| *x > 0.0 && *x < 1.0));
+            let mean = points.iter().map(|p| p[0] + p[1]).sum::<f64>() / 800.0;
+            assert!((mean - 0.5).abs() < 0.03, "{set:?}: {mean}");
+        }
+    }
+
+    #[test]
+    fn grids_need_square_numbers() {
+        assert!(SampleSet::Grid.allows(400).is_ok() && SampleSet::Sobol.allows(401).is_ok());
+        assert_eq!(SampleSet::Grid.allows(401), Err("give a square number, such as 400 or 441".into()));
+    }
+}

@@ -1,7 +1,12 @@
 //! Spot lights.
 
-use super::Falloff;
+use pxfm::f_cos;
+
+use super::{Falloff, Light, LightKind, scaled};
+use crate::color::Rgb;
+use crate::context::{CompileContext, show};
 use crate::describe::{ColorDesc, table};
+use crate::math::{DVec3, Vec3};
 
 table! {
     /// Light from one point into a cone, with a soft rim between two angles.
@@ -37,5 +42,75 @@ table! {
         pub falloff: Falloff = Falloff::Physical,
         /// Whether its light can be blocked.
         pub shadows: bool = true,
+    }
+}
+
+/// A spot light, ready to shine.
+#[derive(Clone, Copy, Debug)]
+pub struct Spot {
+    /// Where it is.
+    pub position: Vec3,
+    /// Unit, the middle of the cone, away from the light.
+    pub axis: Vec3,
+    /// The cosine of half the cone's full angle.
+    pub cos_outer: f32,
+    /// 1 / (cos inner - cos outer); infinite for a hard rim.
+    pub inverse_fade: f32,
+    /// Whether light weakens with the square of the distance.
+    pub physical: bool,
+}
+
+impl SpotDesc {
+    pub(crate) fn compile(&self, cx: &mut CompileContext) -> Light {
+        let position = cx.point("position", self.position);
+        cx.point("look_at", self.look_at);
+        let axis = DVec3::from(self.look_at) - DVec3::from(self.position);
+        if !(axis.length() >= 1e-9) {
+            let message =
+                format!("{} is the light's position {}: the cone has no axis", show(&self.look_at), show(&self.position));
+            cx.error("look_at", message, Some("move one of them"));
+        }
+        let hint = "the cone is the full angle, not half";
+        if !(self.cone_deg > 0.0 && self.cone_deg <= 180.0) {
+            cx.error("cone_deg", format!("{} is outside (0, 180]", self.cone_deg), Some(hint));
+        }
+        let inner = self.inner_cone_deg.unwrap_or(self.cone_deg);
+        if !(inner >= 0.0 && inner <= self.cone_deg) {
+            let message = format!("{inner} is outside [0, {}], the cone itself", self.cone_deg);
+            cx.error("inner_cone_deg", message, Some("full strength ends inside the cone; both are full angles"));
+        }
+        let half_cos = |deg: f64| f_cos(deg * 0.5 * std::f64::consts::PI / 180.0);
+        let (cos_outer, cos_inner) = (half_cos(self.cone_deg) as f32, half_cos(inner) as f32);
+        Light {
+            kind: LightKind::Spot(Spot {
+                position,
+                axis: axis.normalize_or_zero().as_vec3(),
+                cos_outer,
+                inverse_fade: 1.0 / (cos_inner - cos_outer),
+                physical: self.falloff == Falloff::Physical,
+            }),
+            scale: scaled(cx, self.color, self.strength, self.falloff.factor()),
+            radiance: Rgb::BLACK,
+            shadows: self.shadows,
+        }
+    }
+}
+
+impl Spot {
+    /// The cone's fade, times 1 / d^2 where it is physical. `l` points to the light.
+    #[inline(always)]
+    pub(crate) fn weight(&self, l: Vec3, inverse_distance: f32) -> f32 {
+        let inside = -self.axis.dot(l) * inverse_distance - self.cos_outer;
+        // A hard rim has an infinite slope: the product is infinite inside and no number on the rim itself
+        let fade = inside * self.inverse_fade;
+        let fade = if !(inside > 0.0) {
+            0.0
+        } else if fade < 1.0 {
+            fade
+        } else {
+            1.0
+        };
+        let cone = fade * fade;
+        if self.physical { cone * (inverse_distance * inverse_distance) } else { cone }
     }
 }

@@ -1,6 +1,9 @@
 //! Blinn's variant of Phong's reflection model.
 
+use fearless_simd::{f32x16, prelude::*};
+
 use crate::describe::{ColorParam, NumberParam, table};
+use crate::math::Exponent;
 
 table! {
     /// Blinn-Phong: f = diffuse max(n.wi, 0) + specular max(n.h, 0)^shininess, h = normalize(wi + wo); the specular term is 0
@@ -23,5 +26,46 @@ table! {
         pub ambient: Option<ColorParam> = None,
         /// The highlight's exponent, 0 to 1000000: the larger, the smaller the highlight.
         pub shininess: NumberParam = NumberParam::constant(16.0),
+    }
+}
+
+/// max(n.h, 0)^shininess with h = normalize(wi + wo).
+///
+/// |wi + wo|^2 = 2 + 2 wi.wo, so (n.h)^2 = (n.wi + n.wo)^2 / (2 + 2 wi.wo), and (n.h)^s is that to the power s / 2: no
+/// square root, and for an even whole exponent no logarithm.
+#[derive(Clone, Copy, Debug)]
+pub struct BlinnPhongLobe {
+    half_exponent: Exponent,
+}
+
+impl BlinnPhongLobe {
+    /// `shininess`: 0 or more.
+    pub(crate) fn new(shininess: f32) -> Self {
+        BlinnPhongLobe { half_exponent: Exponent::new(shininess * 0.5) }
+    }
+
+    /// From the cosines n.wi > 0, n.wo >= 0 and wi.wo. Never negative, never NaN.
+    #[inline(always)]
+    pub fn eval(&self, cos_i: f32, cos_o: f32, cos_io: f32) -> f32 {
+        let sum = cos_i + cos_o;
+        let length2 = 2.0 + 2.0 * cos_io;
+        // Opposite directions have no half vector
+        if !(length2 > 0.0) {
+            return 0.0;
+        }
+        let base = (sum * sum) / length2;
+        self.half_exponent.pow(if base < 1.0 { base } else { 1.0 })
+    }
+
+    /// [`eval`](Self::eval) in sixteen lanes: the same bits.
+    #[inline(always)]
+    pub(crate) fn eval_lanes<S: Simd>(&self, cos_i: f32x16<S>, cos_o: f32, cos_io: f32x16<S>) -> f32x16<S> {
+        let simd = cos_i.token();
+        let (zero, one) = (simd.splat_f32x16(0.0), simd.splat_f32x16(1.0));
+        let sum = cos_i + cos_o;
+        let length2 = cos_io * 2.0 + 2.0;
+        let base = (sum * sum) / length2;
+        let base = base.simd_lt(one).select(base, one);
+        length2.simd_gt(zero).select(self.half_exponent.pow_lanes(base), zero)
     }
 }

@@ -3,8 +3,14 @@
 mod blinn_phong;
 mod phong;
 
-pub use blinn_phong::BlinnPhongDesc;
-pub use phong::PhongDesc;
+use fearless_simd::{f32x16, prelude::*};
+
+pub use blinn_phong::{BlinnPhongDesc, BlinnPhongLobe};
+pub use phong::{PhongDesc, PhongLobe};
+
+use crate::color::Rgb;
+use crate::shape::SurfaceInteraction;
+use crate::texture::{Param, Texture};
 
 /// A material as a scene may say it.
 #[derive(Clone, Debug, PartialEq)]
@@ -13,4 +19,112 @@ pub enum MaterialDesc {
     Phong(PhongDesc),
     /// `[material.blinn-phong.NAME]`
     BlinnPhong(BlinnPhongDesc),
+}
+
+impl MaterialDesc {
+    /// `phong` or `blinn-phong`.
+    pub fn kind(&self) -> &'static str {
+        match self {
+            MaterialDesc::Phong(_) => "phong",
+            MaterialDesc::BlinnPhong(_) => "blinn-phong",
+        }
+    }
+}
+
+/// The shape of a highlight.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum LobeKind {
+    /// Around the mirror direction.
+    Phong,
+    /// Around the half vector.
+    BlinnPhong,
+}
+
+/// A material, its parameters still to be looked up.
+#[derive(Clone, Copy, Debug)]
+pub struct Material {
+    /// Reflected in all directions.
+    pub diffuse: Param<Rgb>,
+    /// The strength of the highlight.
+    pub specular: Param<Rgb>,
+    /// The answer to the scene's ambient light; the diffuse colour where it is `None`.
+    pub ambient: Option<Param<Rgb>>,
+    /// The highlight's exponent.
+    pub shininess: Param<f32>,
+    /// The highlight's shape.
+    pub lobe: LobeKind,
+}
+
+/// The largest exponent of a highlight.
+pub(crate) const MAX_SHININESS: f32 = 1e6;
+
+impl Material {
+    /// The material in numbers at one surface.
+    #[inline]
+    pub fn bsdf(&self, si: &SurfaceInteraction, textures: &[Texture]) -> Bsdf {
+        let diffuse = self.diffuse.color(si, textures);
+        // The same texture in both is looked up once: config 11 has it so everywhere
+        let specular = match (self.specular.texture, self.diffuse.texture) {
+            (Some(s), Some(d)) if s == d && self.specular.factor == self.diffuse.factor => diffuse,
+            _ => self.specular.color(si, textures),
+        };
+        let lobe = if specular.is_black() {
+            Lobe::None
+        } else {
+            let shininess = self.shininess.number(si, textures).clamp(0.0, MAX_SHININESS);
+            match self.lobe {
+                LobeKind::Phong => Lobe::Phong(PhongLobe::new(shininess)),
+                LobeKind::BlinnPhong => Lobe::BlinnPhong(BlinnPhongLobe::new(shininess)),
+            }
+        };
+        let ambient = self.ambient.map_or(diffuse, |a| a.color(si, textures));
+        Bsdf { diffuse, specular, ambient, lobe }
+    }
+}
+
+/// A material in numbers, at one surface. Light arriving from `wi` leaves towards `wo` as
+/// f = diffuse x `Lobes::diffuse` + specular x `Lobes::specular`, which is pi x BRDF x cosine.
+#[derive(Clone, Copy, Debug)]
+pub struct Bsdf {
+    /// Linear colour of the diffuse part.
+    pub diffuse: Rgb,
+    /// Linear colour of the highlight.
+    pub specular: Rgb,
+    /// Linear colour of the answer to ambient light.
+    pub ambient: Rgb,
+    /// The highlight.
+    pub lobe: Lobe,
+}
+
+/// A highlight in numbers.
+#[derive(Clone, Copy, Debug)]
+pub enum Lobe {
+    /// No highlight.
+    None,
+    /// Around the mirror direction.
+    Phong(PhongLobe),
+    /// Around the half vector.
+    BlinnPhong(BlinnPhongLobe),
+}
+
+impl Lobe {
+    /// The highlight, before its colour, from the cosines n.wi > 0, n.wo >= 0 and wi.wo. Never negative, never NaN.
+    #[inline(always)]
+    pub fn eval(&self, cos_i: f32, cos_o: f32, cos_io: f32) -> f32 {
+        match self {
+            Lobe::None => 0.0,
+            Lobe::Phong(lobe) => lobe.eval(cos_i, cos_o, cos_io),
+            Lobe::BlinnPhong(lobe) => lobe.eval(cos_i, cos_o, cos_io),
+        }
+    }
+
+    /// [`eval`](Self::eval) in sixteen lanes: the same bits.
+    #[inline(always)]
+    pub(crate) fn eval_lanes<S: Simd>(&self, cos_i: f32x16<S>, cos_o: f32, cos_io: f32x16<S>) -> f32x16<S> {
+        match self {
+            Lobe::None => cos_i.token().splat_f32x16(0.0),
+            Lobe::Phong(lobe) => lobe.eval_lanes(cos_i, cos_o, cos_io),
+            Lobe::BlinnPhong(lobe) => lobe.eval_lanes(cos_i, cos_o, cos_io),
+        }
+    }
 }

@@ -1,6 +1,9 @@
 //! Phong's reflection model.
 
+use fearless_simd::{f32x16, prelude::*};
+
 use crate::describe::{ColorParam, NumberParam, table};
+use crate::math::Exponent;
 
 table! {
     /// Phong: f = diffuse max(n.wi, 0) + specular max(r.wo, 0)^shininess, r = 2 (n.wi) n - wi; the specular term is 0
@@ -23,5 +26,33 @@ table! {
         pub ambient: Option<ColorParam> = None,
         /// The highlight's exponent, 0 to 1000000: the larger, the smaller the highlight.
         pub shininess: NumberParam = NumberParam::constant(16.0),
+    }
+}
+
+/// max(r.wo, 0)^shininess with r = 2 (n.wi) n - wi, so that r.wo = 2 (n.wi) (n.wo) - wi.wo.
+#[derive(Clone, Copy, Debug)]
+pub struct PhongLobe {
+    exponent: Exponent,
+}
+
+impl PhongLobe {
+    /// `shininess`: 0 or more.
+    pub(crate) fn new(shininess: f32) -> Self {
+        PhongLobe { exponent: Exponent::new(shininess) }
+    }
+
+    /// From the cosines n.wi > 0, n.wo and wi.wo. Never negative, never NaN.
+    #[inline(always)]
+    pub fn eval(&self, cos_i: f32, cos_o: f32, cos_io: f32) -> f32 {
+        let base = (2.0 * cos_i) * cos_o - cos_io;
+        self.exponent.pow(if base > 0.0 { base } else { 0.0 })
+    }
+
+    /// [`eval`](Self::eval) in sixteen lanes: the same bits.
+    #[inline(always)]
+    pub(crate) fn eval_lanes<S: Simd>(&self, cos_i: f32x16<S>, cos_o: f32, cos_io: f32x16<S>) -> f32x16<S> {
+        let zero = cos_i.token().splat_f32x16(0.0);
+        let base = (cos_i * 2.0) * cos_o - cos_io;
+        self.exponent.pow_lanes(base.simd_gt(zero).select(base, zero))
     }
 }

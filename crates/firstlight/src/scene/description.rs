@@ -73,3 +73,6 @@ pub struct SceneDesc {
     /// `[[light.KIND]]`
     pub lights: Vec<LightDesc>,
 }
+
+// STUB
+impl SceneDesc { pub fn to_json(&self) -> String { format!("{self:?}") } }

@@ -1,10 +1,19 @@
 //! Shapes: what a ray can hit.
+//!
+//! Each shape is a room: what a scene may say of it, how a ray meets it, its texture coordinates, and how it stands in
+//! the way of light.
 
 mod parallelogram;
 mod sphere;
+mod surface;
 
-pub use parallelogram::ParallelogramDesc;
-pub use sphere::{SphereDesc, SphereUv};
+pub use parallelogram::{Parallelogram, ParallelogramDesc};
+pub use sphere::{Sphere, SphereDesc, SphereUv};
+pub use surface::{Footprint, RayDifferential, SurfaceInteraction, UvEdge};
+
+pub(crate) use parallelogram::{ParallelogramShadow, PlaneSide};
+pub(crate) use sphere::SphereShadow;
+pub(crate) use surface::ShapePoint;
 
 /// A shape as a scene may say it.
 #[derive(Clone, Debug, PartialEq)]

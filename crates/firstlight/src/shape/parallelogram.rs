@@ -1,6 +1,11 @@
 //! Parallelograms.
 
+use fearless_simd::{f32x16, mask32x16, prelude::*};
+
+use super::surface::{Footprint, RayDifferential, ShapePoint, UvEdge};
+use crate::context::{CompileContext, show};
 use crate::describe::table;
+use crate::math::{DVec3, ErrorBound, Ray, UNIT_ROUNDOFF, Vec2, Vec3, Vec3x16};
 
 table! {
     /// A flat shape with a corner and two edges of any length and angle. The texture coordinate of
@@ -30,5 +35,244 @@ table! {
         /// Whether camera rays pass through from behind, the side the normal points away from. Light is blocked
         /// from both sides all the same.
         pub single_sided: bool = false,
+    }
+}
+
+/// A parallelogram, ready to be hit.
+#[derive(Clone, Copy, Debug)]
+pub struct Parallelogram {
+    /// The corner of u = v = 0.
+    pub p: Vec3,
+    /// Unit normal of the front.
+    pub n: Vec3,
+    /// u of a point x of the plane is (x - p) . u_axis.
+    pub u_axis: Vec3,
+    /// v of a point x of the plane is (x - p) . v_axis.
+    pub v_axis: Vec3,
+    /// |e0| + |e1|, along each axis.
+    reach: Vec3,
+    /// The four corners, around.
+    pub corners: [Vec3; 4],
+    /// Whether camera rays pass through from behind.
+    pub single_sided: bool,
+}
+
+/// Edges whose angle has a smaller sine than this have no area.
+const MIN_SINE: f64 = 1e-6;
+
+impl ParallelogramDesc {
+    pub(crate) fn compile(&self, cx: &mut CompileContext) -> Parallelogram {
+        cx.point("p", self.p);
+        let edges_fine = cx.edge("e0", self.e0) & cx.edge("e1", self.e1);
+        let (e0, e1) = (DVec3::from(self.e0), DVec3::from(self.e1));
+        if edges_fine && !(e0.cross(e1).length() > MIN_SINE * e0.length() * e1.length()) {
+            let message = format!("{} is parallel to e0 = {}: there is no area between them", show(&self.e1), show(&self.e0));
+            cx.error("e1", message, Some("give edges that point in different directions"));
+        }
+        let sign = if self.flip { -1.0 } else { 1.0 };
+        Parallelogram::new(self.p.into(), e0, e1, sign, self.single_sided)
+    }
+}
+
+impl Parallelogram {
+    /// From a corner and two edges; the normal is `sign` e0 x e1.
+    pub(crate) fn new(p: DVec3, e0: DVec3, e1: DVec3, sign: f64, single_sided: bool) -> Self {
+        // The dual basis: u_axis . e0 = 1, u_axis . e1 = 0, and the other way round
+        let cross = e0.cross(e1);
+        let area2 = cross.length_squared();
+        let corners = [p, p + e0, p + e0 + e1, p + e1].map(|q| q.as_vec3());
+        Parallelogram {
+            p: p.as_vec3(),
+            n: (cross.normalize_or_zero() * sign).as_vec3(),
+            u_axis: (e1.cross(cross) / area2).as_vec3(),
+            v_axis: (cross.cross(e0) / area2).as_vec3(),
+            reach: (e0.abs() + e1.abs()).as_vec3(),
+            corners,
+            single_sided,
+        }
+    }
+
+    /// How far u or v can be wrong for a ray that starts `from` away from the corner. Two shapes that share an edge
+    /// overlap by this much, so that no ray slips between them.
+    #[inline(always)]
+    fn slack(&self, from: Vec3, axis: Vec3) -> f32 {
+        (from.abs() + self.reach).dot(axis.abs()) * (8.0 * UNIT_ROUNDOFF)
+    }
+
+    /// The t > 0 at which the ray meets the parallelogram, if it does.
+    #[inline(always)]
+    pub(crate) fn intersect(&self, ray: &Ray) -> Option<f32> {
+        let from = ray.o - self.p;
+        let cos = self.n.dot(ray.d);
+        if self.single_sided && cos >= 0.0 {
+            return None;
+        }
+        let t = -self.n.dot(from) / cos;
+        if !(t > 0.0 && t < f32::INFINITY) {
+            return None;
+        }
+        let hit = from + ray.d * t;
+        let inside = |axis: Vec3| {
+            let (w, slack) = (hit.dot(axis), self.slack(from, axis));
+            w >= -slack && w <= 1.0 + slack
+        };
+        (inside(self.u_axis) && inside(self.v_axis)).then_some(t)
+    }
+
+    /// The point that `ray` meets at `t`, with its texture coordinate and the footprint of the ray.
+    #[inline(always)]
+    pub(crate) fn point(&self, ray: &Ray, t: f32, differential: &RayDifferential) -> ShapePoint {
+        // Onto the plane: what is left of the distance to it does not grow with the camera's
+        let hit = ray.o + ray.d * t - self.p;
+        let hit = hit - self.n * self.n.dot(hit);
+        let p = self.p + hit;
+        let uv = Vec2::new(hit.dot(self.u_axis), hit.dot(self.v_axis)).clamp(Vec2::ZERO, Vec2::ONE);
+        let steps = differential.on_plane(ray.d, t, self.n, f32::MAX.sqrt() * 0.5);
+        let [dx, dy] = steps.map(|dp| Vec2::new(dp.dot(self.u_axis), dp.dot(self.v_axis)));
+        ShapePoint {
+            p,
+            error: ErrorBound::along(ray, t),
+            normal: self.n,
+            uv,
+            footprint: Footprint { dx, dy, edges: [UvEdge::Bounded; 2] },
+        }
+    }
+
+    /// Where the hull of `points` lies. In f64, where the rounding is far below what [`ParallelogramShadow::blocks`]
+    /// allows itself, so that the answer is a proof for every point of the hull.
+    pub(crate) fn side_of(&self, points: &[Vec3]) -> PlaneSide {
+        let n = self.n.as_dvec3();
+        let heights = points.iter().map(|q| n.dot(q.as_dvec3() - self.p.as_dvec3()));
+        if heights.clone().all(|s| s >= 0.0) {
+            PlaneSide::Front
+        } else if heights.clone().all(|s| s <= 0.0) {
+            PlaneSide::Back
+        } else {
+            PlaneSide::Both
+        }
+    }
+
+    /// What this parallelogram needs to know of a point that asks for light.
+    #[inline(always)]
+    pub(crate) fn shadow(&self, p: Vec3, error: ErrorBound) -> ParallelogramShadow {
+        let from = p - self.p;
+        let s = self.n.dot(from);
+        let sign = if s < 0.0 { -1.0 } else { 1.0 };
+        let abs_n = self.n.abs();
+        // How far s can be wrong
+        let margin =
+            error.along_axis(abs_n) + abs_n.dot(from.abs() + p.abs() + self.p.abs()) * (4.0 * UNIT_ROUNDOFF);
+        ParallelogramShadow {
+            n: self.n * sign,
+            front: s >= 0.0,
+            height: s * sign,
+            margin,
+            abs_n: abs_n * (4.0 * UNIT_ROUNDOFF),
+            u: Axis::new(from, self.u_axis, self.slack(from, self.u_axis)),
+            v: Axis::new(from, self.v_axis, self.slack(from, self.v_axis)),
+        }
+    }
+}
+
+/// Where a light lies, seen from the plane of a parallelogram.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum PlaneSide {
+    /// All of it in front, or in the plane.
+    Front,
+    /// All of it behind, or in the plane.
+    Back,
+    /// On both sides, or not known.
+    Both,
+}
+
+/// A parallelogram as an obstacle to light, seen from one point.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct ParallelogramShadow {
+    /// The normal on the point's side.
+    n: Vec3,
+    /// Whether the point is in front.
+    front: bool,
+    /// How far the point is from the plane, 0 or more.
+    height: f32,
+    /// How far `height` can be wrong.
+    margin: f32,
+    /// How far n.l can be wrong, for each length along an axis.
+    abs_n: Vec3,
+    u: Axis,
+    v: Axis,
+}
+
+/// One texture coordinate, as the sides of the parallelogram need it.
+#[derive(Clone, Copy, Debug)]
+struct Axis {
+    axis: Vec3,
+    /// The coordinate of the point below.
+    origin: f32,
+    /// From where to where a hit counts.
+    low: f32,
+    high: f32,
+}
+
+impl Axis {
+    #[inline(always)]
+    fn new(from: Vec3, axis: Vec3, slack: f32) -> Self {
+        Axis { axis, origin: from.dot(axis), low: -slack, high: 1.0 + slack }
+    }
+
+    /// Whether the coordinate where the plane is crossed lies on the shape. It is origin + (l.axis) height / descent:
+    /// everything times `descent`, there is no division.
+    #[inline(always)]
+    fn contains(&self, l: Vec3, height: f32, descent: f32) -> bool {
+        let w = self.origin * descent + l.dot(self.axis) * height;
+        w >= self.low * descent && w <= self.high * descent
+    }
+
+    #[inline(always)]
+    fn contains_lanes<S: Simd>(&self, l: Vec3x16<S>, height: f32, descent: f32x16<S>) -> mask32x16<S> {
+        let axis = Vec3x16::splat(descent.token(), self.axis);
+        let w = descent * self.origin + l.dot(axis) * height;
+        w.simd_ge(descent * self.low) & w.simd_le(descent * self.high)
+    }
+}
+
+impl ParallelogramShadow {
+    /// Whether nothing can be blocked: the point lies on the plane, or point and light are on one side of it.
+    #[inline(always)]
+    pub fn is_one_sided(&self, light: PlaneSide) -> bool {
+        self.height <= self.margin
+            || match light {
+                PlaneSide::Front => self.front,
+                PlaneSide::Back => !self.front,
+                PlaneSide::Both => false,
+            }
+    }
+
+    /// Whether the parallelogram stands between the point and the end of `l` (finite), or anywhere along it (not finite).
+    /// Point and end have to be on different sides of the plane, by more than their errors.
+    #[inline(always)]
+    pub fn blocks(&self, l: Vec3, finite: bool) -> bool {
+        let descent = -self.n.dot(l);
+        let beyond = descent - self.height;
+        let crosses = if finite { beyond > self.margin + self.abs_n.dot(l.abs()) } else { descent > 0.0 };
+        self.height > self.margin
+            && crosses
+            && self.u.contains(l, self.height, descent)
+            && self.v.contains(l, self.height, descent)
+    }
+
+    /// [`blocks`](Self::blocks) for sixteen finite `l`: the same answers.
+    #[inline(always)]
+    pub fn blocks_lanes<S: Simd>(&self, l: Vec3x16<S>) -> mask32x16<S> {
+        let simd = l.x.token();
+        if !(self.height > self.margin) {
+            return simd.splat_mask32x16(false);
+        }
+        let descent = -Vec3x16::splat(simd, self.n).dot(l);
+        let beyond = descent - self.height;
+        let wrong = l.abs().dot(Vec3x16::splat(simd, self.abs_n));
+        let crosses = beyond.simd_gt(simd.splat_f32x16(self.margin) + wrong);
+        crosses
+            & self.u.contains_lanes(l, self.height, descent)
+            & self.v.contains_lanes(l, self.height, descent)
     }
 }

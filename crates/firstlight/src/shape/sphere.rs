@@ -1,6 +1,14 @@
 //! Spheres.
 
+use std::f32::consts::FRAC_1_PI;
+
+use fearless_simd::{f32x16, mask32x16, prelude::*};
+use pxfm::f_atan2f;
+
+use super::surface::{Footprint, RayDifferential, ShapePoint, UvEdge};
+use crate::context::CompileContext;
 use crate::describe::{table, words};
+use crate::math::{ErrorBound, Ray, UNIT_ROUNDOFF, Vec2, Vec3, Vec3x16};
 
 words! {
     /// How a point of a sphere becomes a texture coordinate. `n` is the outward unit normal at the point.
@@ -36,3 +44,236 @@ table! {
         pub single_sided: bool = false,
     }
 }
+
+/// A sphere, ready to be hit.
+#[derive(Clone, Copy, Debug)]
+pub struct Sphere {
+    /// Centre.
+    pub c: Vec3,
+    /// Radius, greater than 0.
+    pub r: f32,
+    /// How a point becomes a texture coordinate.
+    pub uv: SphereUv,
+    /// Whether camera rays pass through its inside.
+    pub single_sided: bool,
+}
+
+impl SphereDesc {
+    pub(crate) fn compile(&self, cx: &mut CompileContext) -> Sphere {
+        let c = cx.point("center", self.center);
+        let r = cx.positive("radius", self.radius, "the radius is in metres");
+        Sphere { c, r, uv: self.uv, single_sided: self.single_sided }
+    }
+}
+
+impl Sphere {
+    /// The smallest t > 0 at which the ray meets the sphere, if it does.
+    ///
+    /// Nearest root of |o + t d - c|^2 = r^2 without cancellation: the distance from the centre to the ray is compared
+    /// with r, and the smaller root comes from the product of both.
+    /// Source: Haines, Gunther, Akenine-Moller, "Precision improvements for ray/sphere intersection", Ray Tracing Gems,
+    /// chapter 7, 2019.
+    #[inline(always)]
+    pub(crate) fn intersect(&self, ray: &Ray) -> Option<f32> {
+        let f = ray.o - self.c;
+        let b = -f.dot(ray.d);
+        let nearest = f + ray.d * b;
+        let discriminant = self.r * self.r - nearest.dot(nearest);
+        if !(discriminant >= 0.0) {
+            return None;
+        }
+        let root = discriminant.sqrt();
+        let product = f.dot(f) - self.r * self.r;
+        let q = if b > 0.0 { b + root } else { b - root };
+        let (enter, leave) = if b > 0.0 { (product / q, q) } else { (q, product / q) };
+        if enter > 0.0 {
+            Some(enter)
+        } else if leave > 0.0 && !self.single_sided {
+            Some(leave)
+        } else {
+            None
+        }
+    }
+
+    /// The point of the sphere that `ray` meets at `t`, with its texture coordinate and the footprint of the ray.
+    #[inline(always)]
+    pub(crate) fn point(&self, ray: &Ray, t: f32, differential: &RayDifferential) -> ShapePoint {
+        // From the centre outwards: the point lies on the sphere however far away the camera is
+        let n = (ray.o + ray.d * t - self.c).normalize();
+        let p = self.c + n * self.r;
+        let [dpx, dpy] = differential.on_plane(ray.d, t, n, self.r);
+        let (uv, dx, dy) = match self.uv {
+            SphereUv::Equirectangular => equirectangular(n, dpx / self.r, dpy / self.r),
+            SphereUv::Angles => angles(n, dpx / self.r, dpy / self.r),
+        };
+        let edges = match self.uv {
+            SphereUv::Equirectangular => [UvEdge::Periodic, UvEdge::Bounded],
+            SphereUv::Angles => [UvEdge::Bounded, UvEdge::Bounded],
+        };
+        ShapePoint {
+            p,
+            error: ErrorBound::around(self.c, self.r),
+            normal: n,
+            uv,
+            footprint: Footprint { dx, dy, edges },
+        }
+    }
+
+    /// What this sphere needs to know of a point that asks for light.
+    #[inline(always)]
+    pub(crate) fn shadow(&self, p: Vec3, error: ErrorBound) -> SphereShadow {
+        let f = p - self.c;
+        let ff = f.dot(f);
+        let r2 = self.r * self.r;
+        let cc = ff - r2;
+        // How far f can be wrong, and with it |f|^2 - r^2
+        let df = error.0 + (f.abs() + self.c.abs()) * (2.0 * UNIT_ROUNDOFF);
+        let margin = 2.0 * f.abs().dot(df) + (ff + r2) * (4.0 * UNIT_ROUNDOFF);
+        let side = if cc > margin {
+            if ff > FAR * r2 { Side::Far } else { Side::Outside }
+        } else if cc < -margin {
+            Side::Inside
+        } else {
+            Side::On
+        };
+        SphereShadow { f, cc, r2, ff, df, side }
+    }
+}
+
+/// Beyond this many squared radii, b^2 - a (|f|^2 - r^2) has lost too many digits.
+const FAR: f32 = 256.0;
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Side {
+    /// The point is inside: what ends outside is blocked.
+    Inside,
+    /// The point is on the sphere: only the far side can block.
+    On,
+    /// The point is outside.
+    Outside,
+    /// The point is outside, and many radii away.
+    Far,
+}
+
+/// A sphere as an obstacle to light, seen from one point.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct SphereShadow {
+    /// From the centre to the point.
+    f: Vec3,
+    /// |f|^2 - r^2.
+    cc: f32,
+    r2: f32,
+    ff: f32,
+    /// How far `f` can be wrong.
+    df: Vec3,
+    side: Side,
+}
+
+impl SphereShadow {
+    /// Whether the sphere cannot hide any light that arrives on the side `n` (unit) of the point: because the point lies
+    /// on its outside, and it is convex; or because all of it is below the point's horizon, by more than the rounding of
+    /// [`blocks`](Self::blocks), which is below 2e-4 r near the sphere and below 1e-6 |f| far from it.
+    #[inline(always)]
+    pub fn is_below(&self, n: Vec3) -> bool {
+        if self.side == Side::On {
+            // `n` is the outward normal, to within what `blocks` allows `f` to be wrong
+            return (self.f - n * self.ff.sqrt()).abs().cmple(self.df * 0.5).all();
+        }
+        let height = self.f.dot(n);
+        let r = self.r2.sqrt();
+        height > r + (r * 4e-4 + self.ff.sqrt() * 1e-5)
+    }
+
+    /// Whether the sphere stands between the point and the end of `l` (finite), or anywhere along it (not finite).
+    ///
+    /// With a = l.l and b = -f.l, the line comes nearest to the centre at t = b/a and meets the sphere where
+    /// a t^2 - 2 b t + cc = 0. From outside, the nearer root is below 1 if the end is inside, or if 0 < b < a.
+    #[inline(always)]
+    pub fn blocks(&self, l: Vec3, finite: bool) -> bool {
+        let a = l.dot(l);
+        let b = -self.f.dot(l);
+        // |q - c|^2 - r^2 at the end q of l, and how far it can be wrong
+        let end = (a - (b + b)) + self.cc;
+        let slack = (a + self.ff) * END_SLACK;
+        match self.side {
+            Side::Inside => !finite || end > slack,
+            Side::On => {
+                let wrong = l.abs().dot(self.df + self.f.abs() * (4.0 * UNIT_ROUNDOFF));
+                b > wrong && (!finite || end > slack)
+            }
+            Side::Outside | Side::Far => {
+                let discriminant = if self.side == Side::Far {
+                    // a r^2 - |l x f|^2 does not cancel
+                    let cross = l.cross(self.f);
+                    a * self.r2 - cross.dot(cross)
+                } else {
+                    b * b - a * self.cc
+                };
+                (discriminant >= 0.0 && b > 0.0 && (!finite || b < a)) || (finite && end < -slack)
+            }
+        }
+    }
+
+    /// [`blocks`](Self::blocks) for sixteen finite `l`, whose squared lengths are `a`: the same answers.
+    #[inline(always)]
+    pub fn blocks_lanes<S: Simd>(&self, l: Vec3x16<S>, a: f32x16<S>) -> mask32x16<S> {
+        let simd = a.token();
+        let zero = simd.splat_f32x16(0.0);
+        let f = Vec3x16::splat(simd, self.f);
+        let b = -f.dot(l);
+        let end = (a - (b + b)) + self.cc;
+        let slack = (a + self.ff) * END_SLACK;
+        match self.side {
+            Side::Inside => end.simd_gt(slack),
+            Side::On => {
+                let df = Vec3x16::splat(simd, self.df + self.f.abs() * (4.0 * UNIT_ROUNDOFF));
+                let wrong = l.abs().dot(df);
+                b.simd_gt(wrong) & end.simd_gt(slack)
+            }
+            Side::Outside | Side::Far => {
+                let discriminant = if self.side == Side::Far {
+                    let cross = l.cross(f);
+                    a * self.r2 - cross.dot(cross)
+                } else {
+                    b * b - a * self.cc
+                };
+                (discriminant.simd_ge(zero) & b.simd_gt(zero) & b.simd_lt(a)) | end.simd_lt(-slack)
+            }
+        }
+    }
+}
+
+/// The relative error allowed to |q - c|^2 - r^2 at the end of a shadow ray.
+const END_SLACK: f32 = 8.0 * UNIT_ROUNDOFF;
+
+/// Steps in uv are no longer than this: once around.
+const MAX_STEP: f32 = 1.0;
+
+fn bounded(step: Vec2) -> Vec2 {
+    step.clamp(Vec2::splat(-MAX_STEP), Vec2::splat(MAX_STEP))
+}
+
+/// u = 1/2 + atan2(-n.z, n.x) / 2 pi, v = 1/2 + asin(n.y) / pi, and the steps that `dnx`, `dny` make in them.
+fn equirectangular(n: Vec3, dnx: Vec3, dny: Vec3) -> (Vec2, Vec2, Vec2) {
+    let ring2 = (n.x * n.x + n.z * n.z).max(POLE);
+    let ring = ring2.sqrt();
+    // The arc sine loses its digits near 1, this does not
+    let uv = Vec2::new(0.5 + f_atan2f(-n.z, n.x) * (0.5 * FRAC_1_PI), 0.5 + f_atan2f(n.y, ring) * FRAC_1_PI);
+    let step = |dn: Vec3| {
+        bounded(Vec2::new((n.z * dn.x - n.x * dn.z) / ring2 * (0.5 * FRAC_1_PI), dn.y / ring * FRAC_1_PI))
+    };
+    (uv, step(dnx), step(dny))
+}
+
+/// u = angle(n, +x) / pi, v = angle(n, +y) / pi, and the steps that `dnx`, `dny` make in them.
+fn angles(n: Vec3, dnx: Vec3, dny: Vec3) -> (Vec2, Vec2, Vec2) {
+    let from_x = (n.y * n.y + n.z * n.z).max(POLE).sqrt();
+    let from_y = (n.x * n.x + n.z * n.z).max(POLE).sqrt();
+    // The arc cosine loses its digits near 1, this does not
+    let uv = Vec2::new(f_atan2f(from_x, n.x), f_atan2f(from_y, n.y)) * FRAC_1_PI;
+    let step = |dn: Vec3| bounded(Vec2::new(-dn.x / from_x, -dn.y / from_y) * FRAC_1_PI);
+    (uv, step(dnx), step(dny))
+}
+
+/// Keeps the squared distance from a pole above 0.
+const POLE: f32 = 1e-24;

@@ -1,6 +1,12 @@
 //! The checkerboard, exact over the footprint.
 
+use glam::DVec2;
+
+use crate::color::Rgb;
+use crate::context::CompileContext;
 use crate::describe::{ColorDesc, table};
+use crate::math::Vec2;
+use crate::shape::{Footprint, UvEdge};
 
 table! {
     /// Squares of two colours, `counts[0]` across u in 0..1 and `counts[1]` across v in 0..1: the first colour where
@@ -17,5 +23,242 @@ table! {
         pub counts: [u32; 2] = [8, 8],
         /// The first colour, that of the square at (0, 0), and the second.
         pub colors: [ColorDesc; 2] = [ColorDesc::WHITE, ColorDesc::BLACK],
+    }
+}
+
+/// A checkerboard, ready to be looked up.
+#[derive(Clone, Debug)]
+pub struct Checkerboard {
+    counts: [u32; 2],
+    colors: [Rgb; 2],
+}
+
+impl CheckerboardDesc {
+    pub(crate) fn compile(&self, cx: &mut CompileContext) -> Checkerboard {
+        for (i, count) in self.counts.iter().enumerate() {
+            cx.count(&format!("counts[{i}]"), *count, 1, MAX_COUNT, Some("squares along that axis"));
+        }
+        let colors = [0, 1].map(|i| cx.color(&format!("colors[{i}]"), self.colors[i]));
+        Checkerboard { counts: self.counts, colors }
+    }
+}
+
+const MAX_COUNT: u32 = 65536;
+
+/// An edge of the footprint that crosses more lines than this is not followed: the board is gray there, to within the
+/// inverse of this number.
+const MAX_CROSSINGS: f64 = 4096.0;
+
+/// A footprint whose area is smaller than this fraction of its sides' squares is a line.
+const MIN_AREA: f64 = 1e-9;
+
+impl Checkerboard {
+    /// The mean colour over the footprint around `uv`.
+    pub fn color(&self, uv: Vec2, footprint: &Footprint) -> Rgb {
+        let mean = self.mean(uv, footprint) as f32;
+        self.colors[0] * (0.5 * (1.0 + mean)) + self.colors[1] * (0.5 * (1.0 - mean))
+    }
+
+    /// The mean over the footprint of +1 on the first colour's squares and -1 on the second's. In f64: the integral is
+    /// a small difference of larger numbers where the footprint is thin.
+    fn mean(&self, uv: Vec2, footprint: &Footprint) -> f64 {
+        // Count in squares: the lines of the board are the whole numbers
+        let scale = DVec2::new(self.counts[0] as f64, self.counts[1] as f64);
+        let waves = [0, 1].map(|i| Wave::new(self.counts[i], footprint.edges[i]));
+        let center = uv.as_dvec2() * scale;
+        let (a, b) = (footprint.dx.as_dvec2() * scale, footprint.dy.as_dvec2() * scale);
+        // All in one square: from near, nearly always
+        let reach = (a.abs() + b.abs()) * 0.5;
+        let (low, high) = ((center - reach).floor(), (center + reach).floor());
+        if low == high {
+            return waves[0].sign(center.x) * waves[1].sign(center.y);
+        }
+        if !(reach.max_element() < MAX_CROSSINGS) {
+            return 0.0;
+        }
+        let area = a.perp_dot(b);
+        if area.abs() > MIN_AREA * (a.length_squared() + b.length_squared()) {
+            mean_over_parallelogram(&waves, center, a, b, area)
+        } else {
+            mean_over_line(&waves, center, if a.length_squared() > b.length_squared() { a } else { b })
+        }
+    }
+}
+
+/// The mean over the parallelogram around `c` with sides `a` and `b` of w0(x) w1(y), by Green's theorem: the integral
+/// over an area of w0(x) w1(y) is that along its outline of W0(x) w1(y) dy, where W0 is the integral of w0. Between two
+/// lines of the board w1 is constant and W0 straight, so each piece of the outline is exact.
+fn mean_over_parallelogram(waves: &[Wave; 2], c: DVec2, a: DVec2, b: DVec2, area: f64) -> f64 {
+    let corner = [-a - b, a - b, a + b, b - a].map(|d| c + d * 0.5);
+    let mut integral = 0.0;
+    for i in 0..4 {
+        let (from, to) = (corner[i], corner[(i + 1) % 4]);
+        for_each_piece(from, to, |p, q| {
+            let middle = waves[1].sign((p.y + q.y) * 0.5);
+            integral += (waves[0].integral(p.x) + waves[0].integral(q.x)) * 0.5 * middle * (q.y - p.y);
+        });
+    }
+    (integral / area).clamp(-1.0, 1.0)
+}
+
+/// The mean along the line of length `a` around `c`.
+fn mean_over_line(waves: &[Wave; 2], c: DVec2, a: DVec2) -> f64 {
+    let length = a.length();
+    let mut integral = 0.0;
+    for_each_piece(c - a * 0.5, c + a * 0.5, |p, q| {
+        let middle = (p + q) * 0.5;
+        integral += waves[0].sign(middle.x) * waves[1].sign(middle.y) * (q - p).length();
+    });
+    (integral / length).clamp(-1.0, 1.0)
+}
+
+/// Cuts the line from `from` to `to` where it crosses a line of the board.
+fn for_each_piece(from: DVec2, to: DVec2, mut piece: impl FnMut(DVec2, DVec2)) {
+    let along = to - from;
+    // The k-th whole number ahead on an axis, as a parameter of the line
+    let parameter = |axis: usize, k: f64| {
+        if along[axis] == 0.0 {
+            return f64::INFINITY;
+        }
+        let first = if along[axis] > 0.0 { from[axis].floor() + 1.0 } else { from[axis].ceil() - 1.0 };
+        (first + k * along[axis].signum() - from[axis]) / along[axis]
+    };
+    let (mut kx, mut ky, mut start) = (0.0, 0.0, from);
+    loop {
+        let (tx, ty) = (parameter(0, kx), parameter(1, ky));
+        let t = tx.min(ty);
+        if !(t < 1.0) {
+            piece(start, to);
+            return;
+        }
+        let end = from + along * t;
+        piece(start, end);
+        start = end;
+        if tx <= ty {
+            kx += 1.0;
+        }
+        if ty <= tx {
+            ky += 1.0;
+        }
+    }
+}
+
+/// The wave that is +1 on even squares and -1 on odd ones, and what it does beyond the shape.
+#[derive(Clone, Copy)]
+struct Wave {
+    count: f64,
+    edge: UvEdge,
+}
+
+impl Wave {
+    fn new(count: u32, edge: UvEdge) -> Self {
+        Wave { count: count as f64, edge }
+    }
+
+    /// +1 or -1: the square that holds `x`.
+    fn sign(&self, x: f64) -> f64 {
+        let square = match self.edge {
+            UvEdge::Bounded => x.floor().clamp(0.0, self.count - 1.0),
+            UvEdge::Periodic => x.floor().rem_euclid(self.count),
+        };
+        if square.rem_euclid(2.0) == 0.0 { 1.0 } else { -1.0 }
+    }
+
+    /// The integral of the wave from 0 to `x`.
+    fn integral(&self, x: f64) -> f64 {
+        match self.edge {
+            // The outermost squares go on for ever
+            UvEdge::Bounded if x < 0.0 => x,
+            UvEdge::Bounded if x > self.count => {
+                triangle(self.count) + (x - self.count) * self.sign(self.count)
+            }
+            UvEdge::Bounded => triangle(x),
+            // An odd count leaves one square over in each round
+            UvEdge::Periodic => {
+                let round = (x / self.count).floor();
+                round * triangle(self.count) + triangle(x - round * self.count)
+            }
+        }
+    }
+}
+
+/// The integral from 0 to `x` of the wave without edges: 0 at even numbers, 1 at odd ones, straight between.
+fn triangle(x: f64) -> f64 {
+    let phase = x - 2.0 * (x * 0.5).floor();
+    if phase <= 1.0 { phase } else { 2.0 - phase }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn footprint(dx: Vec2, dy: Vec2, edge: UvEdge) -> Footprint {
+        Footprint { dx, dy, edges: [edge; 2] }
+    }
+
+    fn board(n: u32) -> Checkerboard {
+        Checkerboard { counts: [n, n], colors: [Rgb::WHITE, Rgb::BLACK] }
+    }
+
+    /// The mean over 512 x 512 points of the footprint.
+    fn by_counting(n: u32, uv: Vec2, f: &Footprint) -> f64 {
+        let steps = 512;
+        let mut sum = 0.0;
+        for i in 0..steps {
+            for j in 0..steps {
+                let at = |k: i32| ((k as f64) + 0.5) / steps as f64 - 0.5;
+                let p = uv.as_dvec2() + f.dx.as_dvec2() * at(i) + f.dy.as_dvec2() * at(j);
+                let square = |x: f64| match f.edges[0] {
+                    UvEdge::Bounded => (x * n as f64).floor().clamp(0.0, n as f64 - 1.0),
+                    UvEdge::Periodic => ((x - x.floor()) * n as f64).floor(),
+                };
+                sum += if (square(p.x) + square(p.y)).rem_euclid(2.0) == 0.0 { 1.0 } else { -1.0 };
+            }
+        }
+        sum / (steps * steps) as f64
+    }
+
+    #[test]
+    fn the_mean_is_that_of_many_points() {
+        for edge in [UvEdge::Bounded, UvEdge::Periodic] {
+            for n in 1..=9 {
+                for (k, size) in [0.02, 0.3, 1.7].into_iter().enumerate() {
+                    let f = footprint(Vec2::new(size, 0.3 * size), Vec2::new(-0.2 * size, 0.8 * size), edge);
+                    for uv in [Vec2::new(0.01, 0.99), Vec2::new(0.5, 0.333), Vec2::new(0.9 + 0.01 * k as f32, 0.2)] {
+                        let (exact, counted) = (board(n).mean(uv, &f), by_counting(n, uv, &f));
+                        assert!((exact - counted).abs() < 0.01, "{n} {edge:?} {uv} {size}: {exact} {counted}");
+                    }
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn one_square_is_one_colour_everywhere() {
+        let f = footprint(Vec2::new(0.3, 0.1), Vec2::new(0.0, 0.4), UvEdge::Bounded);
+        for uv in [Vec2::ZERO, Vec2::ONE, Vec2::new(1.0, 0.0), Vec2::new(0.5, 0.999)] {
+            assert_eq!(board(1).color(uv, &f), Rgb::WHITE);
+        }
+    }
+
+    #[test]
+    fn thin_and_hostile_footprints_are_finite() {
+        let vs = [0.0, 1e-30, 1e-7, 0.4, 3.0, 1e6, 1e30, f32::INFINITY, f32::NAN];
+        for x in vs {
+            for y in vs {
+                let f = footprint(Vec2::new(x, y), Vec2::new(y, -x * 0.5), UvEdge::Periodic);
+                let c = board(5).color(Vec2::new(0.3, 0.6), &f);
+                assert!((0.0..=1.0).contains(&c.r), "{x} {y}: {c:?}");
+            }
+        }
+        // A line across four squares, two of each colour
+        let line = footprint(Vec2::new(1.0, 0.0), Vec2::ZERO, UvEdge::Bounded);
+        assert_eq!(board(4).mean(Vec2::new(0.5, 0.1), &line), 0.0);
+    }
+
+    #[test]
+    fn from_far_it_is_gray() {
+        let f = footprint(Vec2::new(40.0, 1.0), Vec2::new(-2.0, 30.0), UvEdge::Periodic);
+        assert!(board(8).mean(Vec2::new(0.4, 0.7), &f).abs() < 0.01);
     }
 }

@@ -3,8 +3,12 @@
 mod checkerboard;
 mod image;
 
-pub use checkerboard::CheckerboardDesc;
-pub use image::{Filter, ImageTextureDesc, TextureSpace, Wrap};
+pub use checkerboard::{Checkerboard, CheckerboardDesc};
+pub use image::{Filter, ImageTexture, ImageTextureDesc, TextureSpace, Wrap};
+
+use crate::color::Rgb;
+use crate::ids::TextureId;
+use crate::shape::SurfaceInteraction;
 
 /// A texture as a scene may say it.
 #[derive(Clone, Debug, PartialEq)]
@@ -13,4 +17,65 @@ pub enum TextureDesc {
     Checkerboard(CheckerboardDesc),
     /// `[texture.image.NAME]`
     Image(ImageTextureDesc),
+}
+
+impl TextureDesc {
+    /// `checkerboard` or `image`.
+    pub fn kind(&self) -> &'static str {
+        match self {
+            TextureDesc::Checkerboard(_) => "checkerboard",
+            TextureDesc::Image(_) => "image",
+        }
+    }
+}
+
+/// A texture, ready to be looked up.
+#[derive(Clone, Debug)]
+pub enum Texture {
+    /// `[texture.checkerboard.NAME]`
+    Checkerboard(Checkerboard),
+    /// `[texture.image.NAME]`
+    Image(ImageTexture),
+}
+
+impl Texture {
+    /// The colour at a surface, linear Rec. 709.
+    #[inline]
+    pub fn color(&self, si: &SurfaceInteraction) -> Rgb {
+        match self {
+            Texture::Checkerboard(board) => board.color(si.uv, &si.footprint),
+            Texture::Image(image) => image.color(si.uv),
+        }
+    }
+}
+
+/// A parameter of a material: the same everywhere, or a texture times a factor. `Param<Rgb>` is colour, `Param<f32>` data.
+#[derive(Clone, Copy, Debug)]
+pub struct Param<T> {
+    /// The texture, if one drives it.
+    pub texture: Option<TextureId>,
+    /// The constant, or the texture's factor.
+    pub factor: T,
+}
+
+impl Param<Rgb> {
+    /// The colour at a surface.
+    #[inline]
+    pub fn color(&self, si: &SurfaceInteraction, textures: &[Texture]) -> Rgb {
+        match self.texture {
+            None => self.factor,
+            Some(id) => textures[id.index()].color(si) * self.factor,
+        }
+    }
+}
+
+impl Param<f32> {
+    /// The number at a surface: the texture's red channel times the factor.
+    #[inline]
+    pub fn number(&self, si: &SurfaceInteraction, textures: &[Texture]) -> f32 {
+        match self.texture {
+            None => self.factor,
+            Some(id) => textures[id.index()].color(si).r * self.factor,
+        }
+    }
 }

@@ -1,0 +1,43 @@
+//! Sixteen vectors at a time.
+
+use fearless_simd::{f32x16, prelude::*};
+
+use super::Vec3;
+
+/// Sixteen vectors, coordinate by coordinate.
+#[derive(Clone, Copy)]
+pub struct Vec3x16<S: Simd> {
+    pub x: f32x16<S>,
+    pub y: f32x16<S>,
+    pub z: f32x16<S>,
+}
+
+impl<S: Simd> Vec3x16<S> {
+    /// `v` in every lane.
+    #[inline(always)]
+    pub fn splat(simd: S, v: Vec3) -> Self {
+        Self { x: simd.splat_f32x16(v.x), y: simd.splat_f32x16(v.y), z: simd.splat_f32x16(v.z) }
+    }
+
+    /// The scalar product, summed in the order of `Vec3::dot`.
+    #[inline(always)]
+    pub fn dot(self, o: Self) -> f32x16<S> {
+        (self.x * o.x) + (self.y * o.y) + (self.z * o.z)
+    }
+
+    /// The vector product, computed in the order of `Vec3::cross`.
+    #[inline(always)]
+    pub fn cross(self, o: Self) -> Self {
+        Self {
+            x: self.y * o.z - o.y * self.z,
+            y: self.z * o.x - o.z * self.x,
+            z: self.x * o.y - o.x * self.y,
+        }
+    }
+
+    /// Each coordinate without its sign.
+    #[inline(always)]
+    pub fn abs(self) -> Self {
+        Self { x: self.x.abs(), y: self.y.abs(), z: self.z.abs() }
+    }
+}

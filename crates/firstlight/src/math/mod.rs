@@ -1,0 +1,25 @@
+//! Numbers: vectors, rays, powers, and the contract's order of sums.
+//!
+//! Everything here gives the same bits on every machine: + - x / and square root only, or `pxfm`.
+
+mod lanes;
+mod pow;
+mod ray;
+mod sum;
+
+pub(crate) use lanes::Vec3x16;
+pub(crate) use pow::Exponent;
+pub use ray::Ray;
+pub(crate) use ray::{ErrorBound, ShadowRay};
+pub(crate) use sum::{LANES, LaneSum};
+
+pub use glam::{DVec3, Vec2, Vec3};
+
+/// Half the distance between 1 and the next `f32`: the relative error of one rounded operation.
+pub(crate) const UNIT_ROUNDOFF: f32 = f32::EPSILON * 0.5;
+
+/// A description's numbers as they are computed with.
+#[inline]
+pub(crate) fn vec3(v: [f64; 3]) -> Vec3 {
+    Vec3::new(v[0] as f32, v[1] as f32, v[2] as f32)
+}

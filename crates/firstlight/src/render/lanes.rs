@@ -1,0 +1,141 @@
+//! The fast renderer: sixteen light samples at once, and only the shapes that can stand in the way.
+//!
+//! The same numbers as [`Plain`](super::plain::Plain), operation by operation. A shape is left out where it is proved
+//! that it could not have answered "blocked": a flat one that has the point and all of the light on one side of its
+//! plane, the sphere the point itself lies on the outside of, a sphere that is wholly below the point's horizon.
+
+use fearless_simd::{f32x16, prelude::*};
+
+use super::Counts;
+use super::pixel::{Lighting, LobeSums};
+use super::plain::Plain;
+use crate::light::{LightKind, MIN_DISTANCE2, Rectangle};
+use crate::material::Lobe;
+use crate::math::{LANES, LaneSum, Vec3x16};
+use crate::scene::Scene;
+use crate::shape::{ParallelogramShadow, SphereShadow, SurfaceInteraction};
+
+/// Light, sixteen samples at a time.
+pub(crate) struct Lanes<S: Simd> {
+    simd: S,
+    /// Spheres that can stand between the surface looked around from and any light.
+    spheres: Vec<SphereShadow>,
+    /// All that is flat, as seen from that surface, by the index that tells on which side of it each light lies.
+    flats: Vec<ParallelogramShadow>,
+    /// Those of `flats` that can stand in the way of the light at hand.
+    between: Vec<ParallelogramShadow>,
+}
+
+impl<S: Simd> Lanes<S> {
+    #[inline(always)]
+    pub fn new(simd: S) -> Self {
+        Lanes { simd, spheres: Vec::new(), flats: Vec::new(), between: Vec::new() }
+    }
+}
+
+/// The sums over the points of a rectangle light that nothing in `spheres` and `flats` hides.
+#[inline(always)]
+fn gather_rectangle<S: Simd>(
+    simd: S,
+    rectangle: &Rectangle,
+    si: &SurfaceInteraction,
+    lobe: &Lobe,
+    spheres: &[SphereShadow],
+    flats: &[ParallelogramShadow],
+) -> LobeSums {
+    let splat = |v: f32| simd.splat_f32x16(v);
+    let zero = splat(0.0);
+    let p = Vec3x16::splat(simd, si.p);
+    let (ng, ns, wo) = (Vec3x16::splat(simd, si.ng), Vec3x16::splat(simd, si.ns), Vec3x16::splat(simd, si.wo));
+    let is_flat = si.ng == si.ns;
+    let cos_o = si.ns.dot(si.wo);
+    let (mut diffuse, mut specular) = (zero, zero);
+    for block in rectangle.blocks() {
+        let l = Vec3x16 {
+            x: f32x16::simd_from(simd, block.x) - p.x,
+            y: f32x16::simd_from(simd, block.y) - p.y,
+            z: f32x16::simd_from(simd, block.z) - p.z,
+        };
+        // Above the horizon, and not the surface's own point
+        let height = ns.dot(l);
+        let distance2 = l.dot(l);
+        let mut lit = height.simd_gt(zero) & distance2.simd_ge(splat(MIN_DISTANCE2));
+        if !is_flat {
+            lit &= ng.dot(l).simd_gt(zero);
+        }
+        // Not hidden
+        for sphere in spheres {
+            lit &= !sphere.blocks_lanes(l, distance2);
+        }
+        for flat in flats {
+            lit &= !flat.blocks_lanes(l);
+        }
+        if lit.all_false() {
+            continue;
+        }
+        // How much is sent this way, and what the surface makes of it
+        let inverse_distance = splat(1.0) / distance2.sqrt();
+        let weight = rectangle.weight_lanes(l, inverse_distance);
+        let cos_i = height * inverse_distance;
+        let cos_io = wo.dot(l) * inverse_distance;
+        diffuse += lit.select(cos_i * weight, zero);
+        if !matches!(lobe, Lobe::None) {
+            specular += lit.select(lobe.eval_lanes(cos_i, cos_o, cos_io) * weight, zero);
+        }
+    }
+    LobeSums { diffuse: partials(diffuse), specular: partials(specular) }
+}
+
+#[inline(always)]
+fn partials<S: Simd>(v: f32x16<S>) -> LaneSum {
+    let mut partials = [0.0; LANES];
+    v.store_slice(&mut partials);
+    LaneSum::from_partials(partials)
+}
+
+impl<S: Simd> Lighting for Lanes<S> {
+    #[inline(always)]
+    fn look_around(&mut self, scene: &Scene, si: &SurfaceInteraction) {
+        self.spheres.clear();
+        for sphere in &scene.spheres {
+            let shadow = sphere.shadow(si.p, si.error);
+            if !shadow.is_below(si.ng) {
+                self.spheres.push(shadow);
+            }
+        }
+        self.flats.clear();
+        self.flats.extend(scene.flat_occluders.iter().map(|flat| flat.shadow(si.p, si.error)));
+    }
+
+    #[inline(always)]
+    fn gather(
+        &mut self,
+        scene: &Scene,
+        index: usize,
+        si: &SurfaceInteraction,
+        lobe: &Lobe,
+        counts: &mut Counts,
+    ) -> LobeSums {
+        let light = &scene.lights[index];
+        // A single sample fills no lanes
+        let LightKind::Rectangle(rectangle) = &light.kind else {
+            return Plain.gather(scene, index, si, lobe, counts);
+        };
+        let samples = rectangle.samples() as u64;
+        counts.shadow_rays += samples;
+        if !light.shadows {
+            counts.shadow_rays_skipped += samples;
+            return gather_rectangle(self.simd, rectangle, si, lobe, &[], &[]);
+        }
+        self.between.clear();
+        for (flat, side) in self.flats.iter().zip(&scene.light_sides[index]) {
+            if !flat.is_one_sided(*side) {
+                self.between.push(*flat);
+            }
+        }
+        if self.spheres.is_empty() && self.between.is_empty() {
+            counts.shadow_rays_skipped += samples;
+        }
+        gather_rectangle(self.simd, rectangle, si, lobe, &self.spheres, &self.between)
+    }
+}

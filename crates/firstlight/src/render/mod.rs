@@ -1,0 +1,216 @@
+//! From scene to film.
+//!
+//! Two renderers of the same bits over one scene: [`plain`](plain/index.html) is the specification, one sample at a
+//! time; the fast one decides sixteen light samples at once and asks only the shapes that can stand in the way. They
+//! share the way from pixel to surface and from light to film; what differs is how the light of one source is summed at
+//! one surface, the trait [`Lighting`].
+
+mod film;
+mod lanes;
+mod pixel;
+mod plain;
+mod simd;
+mod tile;
+
+use std::num::NonZeroUsize;
+use std::ops::ControlFlow;
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+
+use fearless_simd::{Simd, dispatch};
+use rayon::prelude::*;
+
+pub use film::Film;
+pub use simd::SimdLevel;
+
+use crate::image::{Receipt, Window};
+use crate::scene::Scene;
+use film::FilmTile;
+use lanes::Lanes;
+use pixel::{Lighting, PixelSum};
+use plain::Plain;
+use tile::Tile;
+
+/// A caller's wishes. None of them changes a bit of the picture, but `crop`, which chooses its part.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RenderSettings {
+    /// Threads to render with; all processors if `None`.
+    pub threads: Option<NonZeroUsize>,
+    /// Side of the square tiles that threads take turns at, in pixels, [`MIN_TILE`](Self::MIN_TILE) to
+    /// [`MAX_TILE`](Self::MAX_TILE).
+    pub tile_size: u32,
+    /// The instruction set.
+    pub simd: SimdLevel,
+    /// The part of the film to render; all of it if `None`.
+    pub crop: Option<Window>,
+    /// Renders with the plain code that is the specification.
+    pub reference: bool,
+}
+
+impl RenderSettings {
+    /// The smallest tile.
+    pub const MIN_TILE: u32 = 8;
+    /// The largest tile.
+    pub const MAX_TILE: u32 = 64;
+
+    /// Whether these settings fit the scene and the machine.
+    ///
+    /// # Errors
+    /// What does not fit, with the value and what is allowed.
+    pub fn check(&self, scene: &Scene) -> Result<(), String> {
+        let (min, max) = (Self::MIN_TILE, Self::MAX_TILE);
+        if !(min..=max).contains(&self.tile_size) {
+            return Err(format!("tile size {} is outside {min} to {max}", self.tile_size));
+        }
+        if !self.simd.is_available() {
+            let names: Vec<_> = SimdLevel::available().iter().map(|level| level.name()).collect();
+            return Err(format!("this processor has no {}; it has {}", self.simd.name(), names.join(", ")));
+        }
+        if let Some(w) = self.crop {
+            let fits = |start: u32, length: u32, all: u32| length > 0 && start as u64 + length as u64 <= all as u64;
+            if !(fits(w.x, w.width, scene.width) && fits(w.y, w.height, scene.height)) {
+                return Err(format!(
+                    "the part {},{},{},{} (x, y, width, height) does not lie inside the picture of {} x {} pixels",
+                    w.x, w.y, w.width, w.height, scene.width, scene.height
+                ));
+            }
+        }
+        Ok(())
+    }
+}
+
+impl Default for RenderSettings {
+    fn default() -> Self {
+        RenderSettings { threads: None, tile_size: 16, simd: SimdLevel::Auto, crop: None, reference: false }
+    }
+}
+
+/// What a render did.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct RenderStats {
+    /// Rays from the camera.
+    pub camera_rays: u64,
+    /// Pairs of a lit point and a point of a light that were decided.
+    pub shadow_rays: u64,
+    /// Those of them that took no ray: nothing could stand between, or the light casts no shadows.
+    pub shadow_rays_skipped: u64,
+    /// The instruction set; `Fallback` for the plain renderer.
+    pub simd: SimdLevel,
+    /// Threads.
+    pub threads: usize,
+}
+
+/// Counts of one tile.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Counts {
+    pub camera_rays: u64,
+    pub shadow_rays: u64,
+    pub shadow_rays_skipped: u64,
+}
+
+/// Renders `scene`. `progress(done, all)`, in pixels, is called after each tile from the thread that rendered it; on
+/// `Break` the render stops, without a film.
+///
+/// # Panics
+/// If the settings do not fit, see [`RenderSettings::check`].
+pub fn render(
+    scene: &Scene,
+    settings: &RenderSettings,
+    progress: &(dyn Fn(u64, u64) -> ControlFlow<()> + Sync),
+) -> ControlFlow<(), (Film, RenderStats)> {
+    if let Err(fault) = settings.check(scene) {
+        panic!("{fault}");
+    }
+    let whole = Window { x: 0, y: 0, width: scene.width, height: scene.height };
+    let window = settings.crop.unwrap_or(whole);
+    let film = Mutex::new(Film::new([scene.width, scene.height], window));
+    let tiles = Tile::cover(window, settings.tile_size);
+    let all = window.width as u64 * window.height as u64;
+    let (done, stop) = (AtomicU64::new(0), AtomicBool::new(false));
+    let totals = [const { AtomicU64::new(0) }; 3];
+    let level = settings.simd.resolve();
+    let render_one = |tile: &Tile| {
+        if stop.load(Ordering::Relaxed) {
+            return;
+        }
+        let (film_tile, counts) = if settings.reference {
+            render_tile(scene, tile, &mut Plain)
+        } else {
+            dispatch!(level.token(), simd => render_tile_in_lanes(simd, scene, tile))
+        };
+        film.lock().expect("no thread panics while it holds the film").merge(&film_tile);
+        for (total, count) in totals.iter().zip([counts.camera_rays, counts.shadow_rays, counts.shadow_rays_skipped]) {
+            total.fetch_add(count, Ordering::Relaxed);
+        }
+        let pixels = tile.width as u64 * tile.height as u64;
+        let now = done.fetch_add(pixels, Ordering::Relaxed) + pixels;
+        if progress(now, all).is_break() {
+            stop.store(true, Ordering::Relaxed);
+        }
+    };
+    let threads = settings.threads.map_or_else(available_threads, NonZeroUsize::get);
+    match rayon::ThreadPoolBuilder::new().num_threads(threads).build() {
+        Ok(pool) => pool.install(|| tiles.par_iter().for_each(render_one)),
+        // A system that gives no threads still has this one
+        Err(_) => tiles.iter().for_each(render_one),
+    }
+    if stop.into_inner() {
+        return ControlFlow::Break(());
+    }
+    let [camera_rays, shadow_rays, shadow_rays_skipped] = totals.map(AtomicU64::into_inner);
+    let simd = if settings.reference { SimdLevel::Fallback } else { level };
+    let stats = RenderStats { camera_rays, shadow_rays, shadow_rays_skipped, simd, threads };
+    ControlFlow::Continue((film.into_inner().expect("no thread panics while it holds the film"), stats))
+}
+
+fn available_threads() -> usize {
+    std::thread::available_parallelism().map_or(1, NonZeroUsize::get)
+}
+
+/// One dispatch per tile: everything below is compiled once for each instruction set.
+#[inline(always)]
+fn render_tile_in_lanes<S: Simd>(simd: S, scene: &Scene, tile: &Tile) -> (FilmTile, Counts) {
+    render_tile(scene, tile, &mut Lanes::new(simd))
+}
+
+/// Renders one tile: n x n camera rays a pixel, row by row, and at each surface all lights in scene order.
+#[inline(always)]
+fn render_tile(scene: &Scene, tile: &Tile, lighting: &mut impl Lighting) -> (FilmTile, Counts) {
+    let mut film = FilmTile::new(tile);
+    let mut counts = Counts::default();
+    let mut pixel = PixelSum::new(scene);
+    for y in 0..tile.height {
+        for x in 0..tile.width {
+            pixel.clear();
+            pixel.sample(scene, tile.x + x, tile.y + y, lighting, &mut counts);
+            film.set(x, y, pixel.color(scene));
+        }
+    }
+    (film, counts)
+}
+
+impl Scene {
+    /// What a picture of this scene says of itself: all that decides its pixels.
+    pub fn receipt(&self, settings: &RenderSettings) -> Receipt {
+        let mut entries = vec![
+            ("version", env!("CARGO_PKG_VERSION").to_owned()),
+            ("scene_hash", self.hash.clone()),
+            ("width", self.width.to_string()),
+            ("height", self.height.to_string()),
+            ("antialiasing", self.antialiasing.to_string()),
+            ("camera", self.summary.camera.clone()),
+            ("light_samples", {
+                let counts: Vec<String> = self.lights.iter().map(|light| light.samples().to_string()).collect();
+                counts.join(" ")
+            }),
+            ("color_space", "linear Rec. 709, alpha premultiplied, before display encoding".to_owned()),
+        ];
+        if let Some(w) = settings.crop {
+            entries.push(("crop", format!("{},{},{},{}", w.x, w.y, w.width, w.height)));
+        }
+        if settings.reference {
+            entries.push(("renderer", "reference".to_owned()));
+        }
+        Receipt { entries: entries.into_iter().map(|(key, value)| (key.to_owned(), value)).collect() }
+    }
+}

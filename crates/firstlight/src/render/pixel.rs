@@ -1,0 +1,115 @@
+//! One pixel: its camera rays, what they see, and how that becomes a colour.
+
+use super::Counts;
+use crate::color::Rgb;
+use crate::material::{Bsdf, Lobe};
+use crate::math::LaneSum;
+use crate::scene::{CameraHit, Scene};
+use crate::shape::SurfaceInteraction;
+
+/// How the light of one source is summed at one surface: the only thing in which the renderers differ.
+pub(crate) trait Lighting {
+    /// Looks around from a surface, once for all lights.
+    fn look_around(&mut self, scene: &Scene, si: &SurfaceInteraction);
+
+    /// The sums over the points of light `index`, in the contract's order, of the weight times the cosine and of the
+    /// weight times the highlight, hidden points being 0. `si` is the surface last looked around from.
+    fn gather(
+        &mut self,
+        scene: &Scene,
+        index: usize,
+        si: &SurfaceInteraction,
+        lobe: &Lobe,
+        counts: &mut Counts,
+    ) -> LobeSums;
+}
+
+/// What arrives from one light, before all colours.
+pub(crate) struct LobeSums {
+    pub diffuse: LaneSum,
+    pub specular: LaneSum,
+}
+
+/// What a pixel's camera rays add up to, term by term: a picture is the sum of these in one fixed order.
+pub(crate) struct PixelSum {
+    background: u32,
+    emission: Rgb,
+    ambient: Rgb,
+    /// Diffuse and specular of each light, in scene order.
+    lights: Vec<[Rgb; 2]>,
+}
+
+impl PixelSum {
+    pub fn new(scene: &Scene) -> Self {
+        let lights = vec![[Rgb::BLACK; 2]; scene.lights.len()];
+        PixelSum { background: 0, emission: Rgb::BLACK, ambient: Rgb::BLACK, lights }
+    }
+
+    pub fn clear(&mut self) {
+        self.background = 0;
+        self.emission = Rgb::BLACK;
+        self.ambient = Rgb::BLACK;
+        self.lights.fill([Rgb::BLACK; 2]);
+    }
+
+    /// Sends the n x n camera rays of pixel (`i`, `j`), row by row, and adds what they see.
+    #[inline(always)]
+    pub fn sample(&mut self, scene: &Scene, i: u32, j: u32, lighting: &mut impl Lighting, counts: &mut Counts) {
+        let n = scene.antialiasing;
+        let step = 1.0 / n as f32;
+        for row in 0..n {
+            for column in 0..n {
+                // The middle of the sub-pixel
+                let x = i as f32 + (column as f32 + 0.5) / n as f32;
+                let y = j as f32 + (row as f32 + 0.5) / n as f32;
+                let (ray, differential) = scene.camera.ray(x, y, step);
+                counts.camera_rays += 1;
+                match scene.look(&ray, &differential) {
+                    CameraHit::Background => self.background += 1,
+                    CameraHit::Emission(color) => self.emission += color,
+                    CameraHit::Surface(si) => {
+                        // Look the material's textures up
+                        let bsdf = scene.materials[si.material.index()].bsdf(&si, &scene.textures);
+                        self.ambient += scene.ambient * bsdf.ambient;
+                        self.add_lights(scene, &si, &bsdf, lighting, counts);
+                    }
+                }
+            }
+        }
+    }
+
+    /// Adds what each light sends.
+    #[inline(always)]
+    fn add_lights(
+        &mut self,
+        scene: &Scene,
+        si: &SurfaceInteraction,
+        bsdf: &Bsdf,
+        lighting: &mut impl Lighting,
+        counts: &mut Counts,
+    ) {
+        lighting.look_around(scene, si);
+        for (index, light) in scene.lights.iter().enumerate() {
+            let sums = lighting.gather(scene, index, si, &bsdf.lobe, counts);
+            self.lights[index][0] += light.scale * bsdf.diffuse * sums.diffuse.total();
+            self.lights[index][1] += light.scale * bsdf.specular * sums.specular.total();
+        }
+    }
+
+    /// The mean, as film: red, green, blue premultiplied, alpha.
+    #[inline(always)]
+    pub fn color(&self, scene: &Scene) -> [f32; 4] {
+        let rays = (scene.antialiasing * scene.antialiasing) as f32;
+        let uncovered = self.background as f32 / rays;
+        let mean = |sum: Rgb| Rgb::new(sum.r / rays, sum.g / rays, sum.b / rays);
+        let mut color = if scene.transparent { Rgb::BLACK } else { scene.background * uncovered };
+        color += mean(self.emission);
+        color += mean(self.ambient);
+        for [diffuse, specular] in &self.lights {
+            color += mean(*diffuse);
+            color += mean(*specular);
+        }
+        let alpha = if scene.transparent { 1.0 - uncovered } else { 1.0 };
+        [color.r, color.g, color.b, alpha]
+    }
+}

@@ -1,0 +1,506 @@
+//! From description to scene: names become ids, units become those of computing, and every fault is found.
+
+use std::collections::HashMap;
+use std::sync::Arc;
+
+use super::{DisplayEncoding, Scene, SceneDesc, SceneSummary};
+use crate::camera::Camera;
+use crate::color::{Display, Encoding, Rgb};
+use crate::context::{AssetError, Assets, CompileContext};
+use crate::describe::{ColorParam, NumberParam};
+use crate::error::{Diagnostic, SceneError, Severity};
+use crate::ids::{MaterialId, TextureId};
+use crate::image::{TexelData, Texels, TexelLimits};
+use crate::light::{Light, LightDesc, LightKind, MAX_SAMPLES};
+use crate::material::{LobeKind, MAX_SHININESS, Material, MaterialDesc};
+use crate::math::Vec3;
+use crate::shape::{Parallelogram, ShapeDesc, Sphere};
+use crate::texture::{Param, Texture, TextureDesc, TextureSpace};
+
+/// How strict compiling is.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct CompileOptions {
+    /// Warnings are errors.
+    pub strict: bool,
+}
+
+/// A scene, and what is odd about it.
+#[derive(Clone, Debug)]
+pub struct Compiled {
+    /// Ready to be rendered.
+    pub scene: Scene,
+    /// What was put up with: missing and damaged textures.
+    pub warnings: Vec<Diagnostic>,
+}
+
+/// The most pixels of a picture.
+const MAX_PIXELS: u64 = 1 << 27;
+const MAX_SIDE: u32 = 65536;
+const MAX_ANTIALIASING: u32 = 64;
+/// The largest picture file read as a texture, in bytes.
+const MAX_TEXTURE_FILE: u64 = 1 << 30;
+
+impl SceneDesc {
+    /// Checks everything and makes the scene.
+    ///
+    /// # Errors
+    /// Every fault at once, each with the path of its value.
+    pub fn compile(&self, assets: &dyn Assets, options: &CompileOptions) -> Result<Compiled, SceneError> {
+        let (scene, mut faults) = self.compile_or_faults(assets);
+        if options.strict {
+            faults.iter_mut().for_each(|fault| fault.severity = Severity::Error);
+        }
+        match scene {
+            Some(scene) if faults.iter().all(|f| f.severity == Severity::Warning) => {
+                Ok(Compiled { scene, warnings: faults })
+            }
+            _ => Err(SceneError { faults }),
+        }
+    }
+
+    /// The scene, if there are no errors, and all errors and warnings.
+    pub(crate) fn compile_or_faults(&self, assets: &dyn Assets) -> (Option<Scene>, Vec<Diagnostic>) {
+        let mut cx = CompileContext::default();
+        let cx = &mut cx;
+        let picture = self.compile_render(cx);
+        let camera = self.compile_camera(cx, picture.width, picture.height);
+        let mut textures = Textures::new(self, assets);
+        textures.check(cx);
+        let materials = self.compile_materials(cx, &mut textures);
+        let shapes = self.compile_shapes(cx);
+        let lights = self.compile_lights(cx);
+        if cx.has_errors() {
+            return (None, cx.take_faults());
+        }
+        let flat_occluders: Vec<_> = shapes.parallelograms.iter().copied().chain(blocking(&lights)).collect();
+        let light_sides = lights.iter().map(|light| sides(light, &flat_occluders)).collect();
+        let summary = self.summary(&shapes, &lights, &textures);
+        let scene = Scene {
+            width: picture.width,
+            height: picture.height,
+            antialiasing: picture.antialiasing,
+            camera,
+            background: picture.background,
+            transparent: self.render.transparent,
+            ambient: picture.ambient,
+            display: picture.display,
+            spheres: shapes.spheres,
+            parallelograms: shapes.parallelograms,
+            lights,
+            materials,
+            shape_materials: shapes.materials,
+            flat_occluders,
+            light_sides,
+            hash: self.hash(&textures),
+            textures: textures.compiled,
+            summary,
+        };
+        (Some(scene), cx.take_faults())
+    }
+
+    fn compile_render(&self, cx: &mut CompileContext) -> Picture {
+        cx.within("render", |cx| {
+            let render = &self.render;
+            let width = cx.count("width", render.width, 1, MAX_SIDE, Some("pixels across"));
+            let height = cx.count("height", render.height, 1, MAX_SIDE, Some("pixels down"));
+            if width <= MAX_SIDE && height <= MAX_SIDE && width as u64 * height as u64 > MAX_PIXELS {
+                let message = format!(
+                    "{width} x {height} is {} pixels, the limit is {MAX_PIXELS}",
+                    width as u64 * height as u64
+                );
+                cx.error("width", message, Some("render it in parts, each with its own camera"));
+            }
+            let hint = "n of the n x n camera rays in each pixel";
+            let antialiasing = cx.count("antialiasing", render.antialiasing, 1, MAX_ANTIALIASING, Some(hint));
+            cx.count("samples", render.samples, 1, MAX_SAMPLES, Some("points on each area light"));
+            let gamma = cx.between("gamma", render.gamma, 0.1, 10.0, Some("2.2 is usual"));
+            let exposure = cx.between("exposure", render.exposure, -64.0, 64.0, Some("in stops: each doubles"));
+            let encoding = match render.display {
+                DisplayEncoding::Srgb => Encoding::Srgb,
+                DisplayEncoding::Gamma => Encoding::Gamma(gamma),
+                DisplayEncoding::Linear => Encoding::Linear,
+            };
+            Picture {
+                width,
+                height,
+                antialiasing,
+                background: cx.color("background", render.background),
+                ambient: cx.color("ambient", render.ambient),
+                display: Display { encoding, exposure },
+            }
+        })
+    }
+
+    /// Checks every camera and answers with the chosen one.
+    fn compile_camera(&self, cx: &mut CompileContext, width: u32, height: u32) -> Camera {
+        let mut chosen = None;
+        for (i, (name, camera)) in self.cameras.iter().enumerate() {
+            let path = if name.is_empty() { "camera".to_owned() } else { format!("camera.{name}") };
+            let compiled = cx.within(&path, |cx| camera.compile(cx, width.max(1), height.max(1)));
+            if self.chosen_camera() == Some(i) {
+                chosen = Some(compiled);
+            }
+        }
+        if self.cameras.is_empty() {
+            cx.error("camera", "there is none", Some("add [camera] with position and look_at"));
+        } else if chosen.is_none() {
+            let wanted = self.render.camera.as_deref().unwrap_or_default();
+            let names: Vec<&str> = self.cameras.iter().map(|(name, _)| name.as_str()).collect();
+            let message = unknown("camera", wanted, &names);
+            cx.error("render.camera", message, None);
+        }
+        // Never used when there was a fault
+        let placeholder = || crate::camera::CameraDesc {
+            position: [0.0, 0.0, 1.0],
+            look_at: [0.0; 3],
+            up: [0.0, 1.0, 0.0],
+            fov_y_deg: None,
+            focal_length_mm: None,
+            sensor_height_mm: None,
+        };
+        Camera::Pinhole(chosen.unwrap_or_else(|| placeholder().compile(&mut CompileContext::default(), 1, 1)))
+    }
+
+    fn chosen_camera(&self) -> Option<usize> {
+        match &self.render.camera {
+            Some(wanted) => self.cameras.iter().position(|(name, _)| name == wanted),
+            None => (!self.cameras.is_empty()).then_some(0),
+        }
+    }
+
+    fn compile_materials(&self, cx: &mut CompileContext, textures: &mut Textures) -> Vec<Material> {
+        check_unique(cx, "material", self.materials.iter().map(|(name, m)| (m.kind(), name.as_str())));
+        let mut materials = Vec::with_capacity(self.materials.len() + 1);
+        for (name, desc) in &self.materials {
+            let path = format!("material.{}.{name}", desc.kind());
+            materials.push(cx.within(&path, |cx| {
+                let (diffuse, specular, ambient, shininess, lobe) = match desc {
+                    MaterialDesc::Phong(m) => (&m.diffuse, &m.specular, &m.ambient, &m.shininess, LobeKind::Phong),
+                    MaterialDesc::BlinnPhong(m) => {
+                        (&m.diffuse, &m.specular, &m.ambient, &m.shininess, LobeKind::BlinnPhong)
+                    }
+                };
+                Material {
+                    diffuse: textures.color_param(cx, "diffuse", diffuse),
+                    specular: textures.color_param(cx, "specular", specular),
+                    ambient: ambient.as_ref().map(|a| textures.color_param(cx, "ambient", a)),
+                    shininess: textures.number_param(cx, "shininess", shininess, 0.0, MAX_SHININESS as f64),
+                    lobe,
+                }
+            }));
+        }
+        // The last one is for shapes that name none
+        materials.push(Material {
+            diffuse: Param { texture: None, factor: Rgb::gray(0.8) },
+            specular: Param { texture: None, factor: Rgb::BLACK },
+            ambient: None,
+            shininess: Param { texture: None, factor: 1.0 },
+            lobe: LobeKind::Phong,
+        });
+        materials
+    }
+
+    fn compile_shapes(&self, cx: &mut CompileContext) -> Shapes {
+        let names: Vec<&str> = self.materials.iter().map(|(name, _)| name.as_str()).collect();
+        let material = |cx: &mut CompileContext, wanted: &Option<String>| match wanted {
+            None => MaterialId(names.len() as u32),
+            Some(wanted) => {
+                let found = names.iter().position(|name| name == wanted);
+                if found.is_none() {
+                    cx.error("material", unknown("material", wanted, &names), None);
+                }
+                MaterialId(found.unwrap_or(0) as u32)
+            }
+        };
+        // Scene order: kind by kind, in each the order of the text
+        let mut shapes = Shapes::default();
+        for shape in &self.shapes {
+            if let ShapeDesc::Sphere(desc) = shape {
+                cx.within(&format!("sphere[{}]", shapes.spheres.len()), |cx| {
+                    shapes.spheres.push(desc.compile(cx));
+                    shapes.materials.push(material(cx, &desc.material));
+                });
+            }
+        }
+        for shape in &self.shapes {
+            if let ShapeDesc::Parallelogram(desc) = shape {
+                cx.within(&format!("parallelogram[{}]", shapes.parallelograms.len()), |cx| {
+                    shapes.parallelograms.push(desc.compile(cx));
+                    shapes.materials.push(material(cx, &desc.material));
+                });
+            }
+        }
+        shapes
+    }
+
+    fn compile_lights(&self, cx: &mut CompileContext) -> Vec<Light> {
+        let samples = self.render.samples;
+        let mut lights = Vec::with_capacity(self.lights.len());
+        // Scene order: kind by kind, in each the order of the text
+        for kind in LightDesc::KINDS {
+            for (i, desc) in self.lights.iter().filter(|light| light.kind() == *kind).enumerate() {
+                let light = cx.within(&format!("light.{kind}[{i}]"), |cx| match desc {
+                    LightDesc::Point(point) => point.compile(cx),
+                    LightDesc::Directional(directional) => directional.compile(cx),
+                    LightDesc::Spot(spot) => spot.compile(cx),
+                    LightDesc::Rectangle(rectangle) => rectangle.compile(cx, samples),
+                });
+                lights.push(light);
+            }
+        }
+        lights
+    }
+
+    fn summary(&self, shapes: &Shapes, lights: &[Light], textures: &Textures) -> SceneSummary {
+        let mut bounds: Option<[Vec3; 2]> = None;
+        let mut cover = |low: Vec3, high: Vec3| {
+            bounds = Some(bounds.map_or([low, high], |[a, b]| [a.min(low), b.max(high)]));
+        };
+        for sphere in &shapes.spheres {
+            cover(sphere.c - Vec3::splat(sphere.r), sphere.c + Vec3::splat(sphere.r));
+        }
+        for corner in shapes.parallelograms.iter().flat_map(|p| p.corners) {
+            cover(corner, corner);
+        }
+        let mut described = Vec::new();
+        for kind in LightDesc::KINDS {
+            described.extend(self.lights.iter().filter(|light| light.kind() == *kind));
+        }
+        SceneSummary {
+            spheres: shapes.spheres.len(),
+            parallelograms: shapes.parallelograms.len(),
+            lights: described.iter().zip(lights).map(|(d, l)| (d.kind(), d.name(), l.samples())).collect(),
+            materials: self.materials.iter().map(|(name, m)| (name.clone(), m.kind())).collect(),
+            textures: textures.sizes(),
+            texture_bytes: textures.bytes(),
+            bounds: bounds.map(|b| b.map(|v| v.to_array())),
+            camera: self.chosen_camera().map(|i| self.cameras[i].0.clone()).unwrap_or_default(),
+        }
+    }
+
+    /// BLAKE3 of all that decides the picture.
+    fn hash(&self, textures: &Textures) -> String {
+        let mut hasher = blake3::Hasher::new();
+        hasher.update(self.to_json().as_bytes());
+        for (file, hash) in textures.file_hashes() {
+            hasher.update(file.as_bytes()).update(&[0]).update(&hash);
+        }
+        hasher.finalize().to_hex().to_string()
+    }
+}
+
+/// `[render]`, checked.
+struct Picture {
+    width: u32,
+    height: u32,
+    antialiasing: u32,
+    background: Rgb,
+    ambient: Rgb,
+    display: Display,
+}
+
+/// The shapes, kind by kind, and the material of each in the same order.
+#[derive(Default)]
+struct Shapes {
+    spheres: Vec<Sphere>,
+    parallelograms: Vec<Parallelogram>,
+    materials: Vec<MaterialId>,
+}
+
+/// The shapes of the lights that stand in the way of others.
+fn blocking(lights: &[Light]) -> impl Iterator<Item = Parallelogram> + '_ {
+    lights.iter().filter_map(|light| match &light.kind {
+        LightKind::Rectangle(rectangle) if rectangle.blocks => Some(rectangle.shape),
+        _ => None,
+    })
+}
+
+/// On which side of each flat shape a light lies.
+fn sides(light: &Light, flats: &[Parallelogram]) -> Vec<crate::shape::PlaneSide> {
+    flats
+        .iter()
+        .map(|flat| match light.hull() {
+            [] => crate::shape::PlaneSide::Both,
+            hull => flat.side_of(hull),
+        })
+        .collect()
+}
+
+/// `no camera is called "tpo"; did you mean "top"?`
+fn unknown(what: &str, wanted: &str, names: &[&str]) -> String {
+    let nearest = crate::describe::nearest(wanted, names.iter().copied());
+    match nearest {
+        Some(name) => format!("no {what} is called {wanted:?}; did you mean {name:?}?"),
+        None if names.is_empty() => format!("no {what} is called {wanted:?}; the scene has none"),
+        None => {
+            let list: Vec<String> = names.iter().take(8).map(|name| format!("{name:?}")).collect();
+            let more = if names.len() > 8 { ", ..." } else { "" };
+            format!("no {what} is called {wanted:?}; there are {}{more}", list.join(", "))
+        }
+    }
+}
+
+/// Names belong to one thing each, whatever its kind.
+fn check_unique<'a>(
+    cx: &mut CompileContext,
+    family: &str,
+    names: impl Iterator<Item = (&'static str, &'a str)>,
+) {
+    let mut seen = HashMap::new();
+    for (kind, name) in names {
+        if let Some(first) = seen.insert(name, kind) {
+            let message = format!("{name:?} is the name of another {family} already, {family}.{first}.{name}");
+            cx.error(&format!("{family}.{kind}.{name}"), message, Some("rename one of them"));
+        }
+    }
+}
+
+/// The textures of a scene while its materials ask for them.
+struct Textures<'a> {
+    desc: &'a SceneDesc,
+    assets: &'a dyn Assets,
+    /// Each texture as it was asked for: colour and data read the same file differently.
+    ids: HashMap<(usize, TextureSpace), TextureId>,
+    files: HashMap<&'a str, (Arc<Texels>, [u8; 32])>,
+    compiled: Vec<Texture>,
+}
+
+impl<'a> Textures<'a> {
+    fn new(desc: &'a SceneDesc, assets: &'a dyn Assets) -> Self {
+        Textures { desc, assets, ids: HashMap::new(), files: HashMap::new(), compiled: Vec::new() }
+    }
+
+    /// Finds the faults of all textures, used or not.
+    fn check(&self, cx: &mut CompileContext) {
+        check_unique(cx, "texture", self.desc.textures.iter().map(|(name, t)| (t.kind(), name.as_str())));
+        for (name, desc) in &self.desc.textures {
+            cx.within(&format!("texture.{}.{name}", desc.kind()), |cx| match desc {
+                TextureDesc::Checkerboard(board) => drop(board.compile(cx)),
+                TextureDesc::Image(image) => drop(image.compile(cx, Arc::new(placeholder()), TextureSpace::Raw)),
+            });
+        }
+    }
+
+    fn color_param(&mut self, cx: &mut CompileContext, field: &str, param: &ColorParam) -> Param<Rgb> {
+        let factor = cx.color(&factor_path(field, &param.texture), param.factor);
+        Param { texture: self.resolve(cx, field, &param.texture, TextureSpace::Srgb), factor }
+    }
+
+    fn number_param(
+        &mut self,
+        cx: &mut CompileContext,
+        field: &str,
+        param: &NumberParam,
+        low: f64,
+        high: f64,
+    ) -> Param<f32> {
+        let factor = cx.between(&factor_path(field, &param.texture), param.factor, low, high, None);
+        Param { texture: self.resolve(cx, field, &param.texture, TextureSpace::Raw), factor: factor as f32 }
+    }
+
+    /// The texture called `name`, read as `space` where it does not say itself.
+    fn resolve(
+        &mut self,
+        cx: &mut CompileContext,
+        field: &str,
+        name: &Option<String>,
+        space: TextureSpace,
+    ) -> Option<TextureId> {
+        let name = name.as_ref()?;
+        let textures = &self.desc.textures;
+        let Some(index) = textures.iter().position(|(other, _)| other == name) else {
+            let names: Vec<&str> = textures.iter().map(|(name, _)| name.as_str()).collect();
+            cx.error(&format!("{field}.texture"), unknown("texture", name, &names), None);
+            return None;
+        };
+        if let Some(id) = self.ids.get(&(index, space)) {
+            return Some(*id);
+        }
+        // Faults of the texture itself were found by `check`
+        let silent = &mut CompileContext::default();
+        let texture = match &textures[index].1 {
+            TextureDesc::Checkerboard(board) => Texture::Checkerboard(board.compile(silent)),
+            TextureDesc::Image(image) => {
+                let texels = self.load(cx, index, &image.file.0);
+                Texture::Image(image.compile(silent, texels, space))
+            }
+        };
+        let id = TextureId(self.compiled.len() as u32);
+        self.compiled.push(texture);
+        self.ids.insert((index, space), id);
+        Some(id)
+    }
+
+    /// The texels of `file`; a loud placeholder where they cannot be had.
+    fn load(&mut self, cx: &mut CompileContext, index: usize, file: &'a str) -> Arc<Texels> {
+        if let Some((texels, _)) = self.files.get(file) {
+            return texels.clone();
+        }
+        let name = &self.desc.textures[index].0;
+        let read = self.assets.read(file, MAX_TEXTURE_FILE);
+        let (texels, hash) = match &read {
+            Ok(bytes) => match crate::image::decode(bytes, &TexelLimits::default()) {
+                Ok(texels) => (texels, *blake3::hash(bytes).as_bytes()),
+                Err(error) => {
+                    let message = format!("{file:?} cannot be read as a picture: {error}");
+                    let hint = "magenta and black stand in for it; give a PNG or JPEG file";
+                    cx.outside(|cx| cx.warning(&format!("texture.image.{name}.file"), message, Some(hint)));
+                    (placeholder(), [0; 32])
+                }
+            },
+            Err(error) => {
+                let path = format!("texture.image.{name}.file");
+                let message = format!("{file:?}: {error}");
+                match error {
+                    // Not a texture that happens to be missing, but one that may not be read
+                    AssetError::Outside => {
+                        let hint = "copy it there, or allow its folder with --allow-dir";
+                        cx.outside(|cx| cx.error(&path, message, Some(hint)));
+                    }
+                    _ => {
+                        let hint = "magenta and black stand in for it; files are looked for beside the text that names them";
+                        cx.outside(|cx| cx.warning(&path, message, Some(hint)));
+                    }
+                }
+                (placeholder(), [0; 32])
+            }
+        };
+        let texels = Arc::new(texels);
+        self.files.insert(file, (texels.clone(), hash));
+        texels
+    }
+
+    fn sizes(&self) -> Vec<(String, &'static str, Option<[u32; 2]>)> {
+        let size = |desc: &TextureDesc| match desc {
+            TextureDesc::Checkerboard(board) => Some(board.counts),
+            TextureDesc::Image(image) => self.files.get(image.file.0.as_str()).map(|(t, _)| [t.width, t.height]),
+        };
+        self.desc.textures.iter().map(|(name, desc)| (name.clone(), desc.kind(), size(desc))).collect()
+    }
+
+    fn bytes(&self) -> u64 {
+        let size = |texels: &Texels| match &texels.data {
+            TexelData::Rgb8(data) => size_of_val(data.as_slice()),
+            TexelData::Rgb16(data) => size_of_val(data.as_slice()),
+        };
+        self.files.values().map(|(texels, _)| size(texels) as u64).sum()
+    }
+
+    /// Each file that was read with the hash of its bytes, in the order of names.
+    fn file_hashes(&self) -> Vec<(&'a str, [u8; 32])> {
+        let mut hashes: Vec<_> = self.files.iter().map(|(file, (_, hash))| (*file, *hash)).collect();
+        hashes.sort_unstable();
+        hashes
+    }
+}
+
+/// Where the number of a parameter stands: a constant is the field itself.
+fn factor_path(field: &str, texture: &Option<String>) -> String {
+    if texture.is_some() { format!("{field}.factor") } else { field.to_owned() }
+}
+
+/// What stands in for a picture that cannot be had: magenta and black, not to be overlooked.
+fn placeholder() -> Texels {
+    let (magenta, black) = ([255, 0, 255], [0, 0, 0]);
+    Texels { width: 2, height: 2, data: TexelData::Rgb8(vec![magenta, black, black, magenta]) }
+}

@@ -1,0 +1,104 @@
+//! The surface at a hit, as materials and lights need it.
+
+use crate::ids::{MaterialId, SurfaceId};
+use crate::math::{ErrorBound, ShadowRay, Vec2, Vec3};
+
+/// What lies beyond 0 and 1 of a texture coordinate.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum UvEdge {
+    /// Nothing: the shape ends there.
+    Bounded,
+    /// The other end of the shape: it closes on itself.
+    Periodic,
+}
+
+/// The patch of texture that a camera ray stands for: the parallelogram around `uv` with these sides.
+#[derive(Clone, Copy, Debug)]
+pub struct Footprint {
+    /// The step in uv from one ray of the grid to the next to the right.
+    pub dx: Vec2,
+    /// The step in uv from one ray of the grid to the next below.
+    pub dy: Vec2,
+    /// What lies beyond 0 and 1 of u and of v.
+    pub edges: [UvEdge; 2],
+}
+
+/// A point of a shape, before it is turned to the viewer.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct ShapePoint {
+    /// On the surface, world space.
+    pub p: Vec3,
+    /// How sure we are of `p`.
+    pub error: ErrorBound,
+    /// Unit normal of the front.
+    pub normal: Vec3,
+    /// Texture coordinate.
+    pub uv: Vec2,
+    /// See [`Footprint`].
+    pub footprint: Footprint,
+}
+
+/// A surface seen from one side.
+#[derive(Clone, Copy, Debug)]
+pub struct SurfaceInteraction {
+    /// The point, world space.
+    pub p: Vec3,
+    /// How sure we are of `p`.
+    pub(crate) error: ErrorBound,
+    /// Geometric normal: unit, on the viewer's side.
+    pub ng: Vec3,
+    /// Shading normal: unit, turned together with `ng`.
+    pub ns: Vec3,
+    /// To the viewer, unit.
+    pub wo: Vec3,
+    /// Texture coordinate, 0 to 1 on the shape.
+    pub uv: Vec2,
+    /// The patch of texture that the camera ray stands for.
+    pub footprint: Footprint,
+    /// What was hit.
+    pub surface: SurfaceId,
+    /// Its material.
+    pub material: MaterialId,
+}
+
+impl SurfaceInteraction {
+    /// A ray from here along `l`, up to `t_max` times its length.
+    #[inline(always)]
+    pub(crate) fn shadow_ray(&self, l: Vec3, t_max: f32) -> ShadowRay {
+        ShadowRay { p: self.p, error: self.error, l, t_max }
+    }
+}
+
+/// How a camera ray changes from one ray of the grid to the next: the change of its unnormalised direction, over that
+/// direction's length.
+#[derive(Clone, Copy, Debug)]
+pub struct RayDifferential {
+    /// To the ray on the right.
+    pub dx: Vec3,
+    /// To the ray below.
+    pub dy: Vec3,
+}
+
+impl RayDifferential {
+    /// The steps, on the plane through the hit with normal `n`, from the point `t d` to where the neighbours meet it:
+    /// dp = t (dD - d (n.dD) / (n.d)).
+    ///
+    /// Source: Igehy, "Tracing ray differentials", SIGGRAPH 1999, eq. 10 to 12. Edge-on the step is as long as `limit`.
+    #[inline(always)]
+    pub(crate) fn on_plane(&self, d: Vec3, t: f32, n: Vec3, limit: f32) -> [Vec3; 2] {
+        let cos = n.dot(d);
+        [self.dx, self.dy].map(|dd| {
+            let step = (dd - d * (n.dot(dd) / cos)) * t;
+            let length2 = step.length_squared();
+            // Also where the division gave infinity or no number
+            if length2 <= limit * limit {
+                step
+            } else if length2.is_finite() {
+                step * (limit / length2.sqrt())
+            } else {
+                // Edge-on: along the line of sight, as far as allowed
+                (d - n * cos) * limit
+            }
+        })
+    }
+}
