@@ -22,6 +22,8 @@ pub use ids::{LightId, MaterialId, SurfaceId, TextureId};
 pub use image::{Image, Receipt, Window};
 pub use light::{DirectionalDesc, EmitSides, Falloff, LightDesc, PointDesc, RectangleDesc, SampleSet, SpotDesc};
 pub use material::{BlinnPhongDesc, MaterialDesc, PhongDesc};
+pub use scene::{Builtin, Parsed, builtin_scenes, reference, schema};
+pub use scene::{CompileOptions, Compiled, Scene};
 pub use scene::{DisplayEncoding, RenderDesc, SceneDesc};
 pub use shape::{ParallelogramDesc, ShapeDesc, SphereDesc, SphereUv};
 pub use texture::{CheckerboardDesc, Filter, ImageTextureDesc, TextureDesc, TextureSpace, Wrap};

@@ -148,7 +148,7 @@ pub(crate) use words;
 pub(crate) mod info;
 pub(crate) mod node;
 pub(crate) mod read;
-mod value;
+pub(crate) mod value;
 pub(crate) mod write;
 
 pub(crate) use info::{Choice, FieldInfo};

@@ -63,6 +63,8 @@ pub(crate) struct Fault {
     pub path: String,
     pub message: String,
     pub hint: Option<String>,
+    /// A second place that belongs to it: file and range.
+    pub other: Option<(usize, Span)>,
 }
 
 /// The faults of all texts of a scene.
@@ -125,8 +127,19 @@ impl<'a> Reader<'a> {
 
     /// Records a fault at the current path.
     pub(crate) fn error(&mut self, span: Span, message: impl Into<String>, hint: Option<String>) {
+        self.conflict(span, message, hint, None);
+    }
+
+    /// Records a fault at the current path that has to do with a second place.
+    pub(crate) fn conflict(
+        &mut self,
+        span: Span,
+        message: impl Into<String>,
+        hint: Option<String>,
+        other: Option<(usize, Span)>,
+    ) {
         let (file, path) = (self.file, self.path.clone());
-        self.faults.push(Fault { file, span, path, message: message.into(), hint });
+        self.faults.push(Fault { file, span, path, message: message.into(), hint, other });
     }
 
     /// Marks the value at the current path as a stand-in.
