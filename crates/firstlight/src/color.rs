@@ -76,6 +76,13 @@ pub(crate) fn srgb_to_linear(stored: f64) -> f64 {
 
 // STUB
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Encoding { Srgb, Gamma(f64), Linear }
+pub enum Encoding {
+    Srgb,
+    Gamma(f64),
+    Linear,
+}
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Display { pub encoding: Encoding, pub exposure: f64 }
+pub struct Display {
+    pub encoding: Encoding,
+    pub exposure: f64,
+}

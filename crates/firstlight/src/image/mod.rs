@@ -50,4 +50,6 @@ pub(crate) enum TexelData {
 // STUB
 #[derive(Default)]
 pub(crate) struct TexelLimits;
-pub(crate) fn decode(_: &[u8], _: &TexelLimits) -> Result<Texels, String> { Err("stub".into()) }
+pub(crate) fn decode(_: &[u8], _: &TexelLimits) -> Result<Texels, String> {
+    Err("stub".into())
+}

@@ -5,7 +5,7 @@ use fearless_simd::Level;
 use crate::describe::words;
 
 words! {
-    /// The vector instructions the fast renderer uses. All give the same bits.
+    /// The vector instructions the fast renderer uses, the slowest first. All give the same bits.
     pub enum SimdLevel {
         /// The best this processor has.
         Auto = "auto",
@@ -25,17 +25,6 @@ words! {
 }
 
 impl SimdLevel {
-    /// Every level, the slowest first.
-    pub const ALL: &'static [SimdLevel] = &[
-        SimdLevel::Auto,
-        SimdLevel::Fallback,
-        SimdLevel::Sse2,
-        SimdLevel::Sse42,
-        SimdLevel::Avx2,
-        SimdLevel::Avx512,
-        SimdLevel::Neon,
-    ];
-
     /// Whether this processor has it.
     pub fn is_available(self) -> bool {
         self.try_token().is_some()

@@ -138,8 +138,7 @@ impl ImageTexture {
 
     /// The texel in column `i`, row `j`, which may lie beyond the picture.
     fn texel(&self, i: i64, j: i64) -> Rgb {
-        let (Some(i), Some(j)) =
-            (self.wrap[0].index(i, self.texels.width), self.wrap[1].index(j, self.texels.height))
+        let (Some(i), Some(j)) = (self.wrap[0].index(i, self.texels.width), self.wrap[1].index(j, self.texels.height))
         else {
             return self.border;
         };
