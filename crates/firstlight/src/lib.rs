@@ -14,7 +14,7 @@ mod shape;
 mod texture;
 
 pub use camera::CameraDesc;
-pub use color::Rgb;
+pub use color::{Display, Encoding, Rgb};
 pub use context::{AssetError, Assets, FolderAssets, MemoryAssets, NoAssets};
 pub use describe::{ColorDesc, ColorParam, FilePath, NumberParam, ParamDesc};
 pub use error::{Diagnostic, Place, SceneError, Severity};

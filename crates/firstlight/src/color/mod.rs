@@ -1,5 +1,11 @@
 //! Colour: linear Rec. 709 everywhere inside; sRGB and gamma only at the edges.
 
+mod display;
+mod quantize;
+
+pub use display::{Display, Encoding};
+pub(crate) use quantize::Quantizer;
+
 use std::ops::{Add, AddAssign, Mul};
 
 /// Linear Rec. 709, scene-referred: no upper bound, not display-encoded.
