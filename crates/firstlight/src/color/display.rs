@@ -18,8 +18,7 @@ impl Encoding {
     ///
     /// Source: IEC 61966-2-1:1999, section 5.2 (sRGB).
     pub fn encode(self, linear: f64) -> f64 {
-        // NaN fails this comparison too
-        if !(linear > 0.0) {
+        if linear.is_nan() || linear <= 0.0 {
             return 0.0;
         }
         if linear >= 1.0 {
@@ -37,7 +36,7 @@ impl Encoding {
     ///
     /// Source: IEC 61966-2-1:1999, section 5.2 (sRGB).
     pub fn decode(self, encoded: f64) -> f64 {
-        if !(encoded > 0.0) {
+        if encoded.is_nan() || encoded <= 0.0 {
             return 0.0;
         }
         if encoded >= 1.0 {

@@ -10,6 +10,8 @@ use super::{Display, Encoding};
 
 /// Everything above the codes of one display and depth.
 pub(crate) struct Quantizer {
+    display: Display,
+    largest: u32,
     /// `thresholds[k - 1]`: the bits of the smallest positive f32 with code k or more; never falling.
     thresholds: Vec<u32>,
     /// `below[i]`: how many thresholds are at or below the first number of bucket `first + i`. One more at the end.
@@ -49,14 +51,28 @@ impl Quantizer {
         let last = thresholds[largest as usize - 1] >> shift;
         let below =
             (first..=last + 1).map(|bucket| thresholds.partition_point(|&t| t <= bucket << shift) as u16).collect();
-        Self { thresholds, below, first, shift }
+        Self { display: *display, largest, thresholds, below, first, shift }
+    }
+
+    /// As [`Quantizer::new`], for about `count` values: without thresholds where finding them would take longer than it
+    /// saves.
+    pub(crate) fn for_count(display: &Display, largest: u32, count: usize) -> Self {
+        if count as u64 > 4 * u64::from(largest) {
+            return Self::new(display, largest);
+        }
+        Self { display: *display, largest, thresholds: Vec::new(), below: Vec::new(), first: 0, shift: 16 }
+    }
+
+    /// The code, 0 to `largest`, of a number from 0 to 1 that is not encoded, such as alpha. NaN is 0.
+    #[inline]
+    pub(crate) fn linear(x: f32, largest: u32) -> u16 {
+        (f64::from(x).clamp(0.0, 1.0) * f64::from(largest)).round() as u16
     }
 
     /// The code of a linear value: exactly [`definition`].
     #[inline]
     pub(crate) fn code(&self, linear: f32) -> u16 {
-        // NaN fails this comparison too
-        if !(linear > 0.0) {
+        if linear.is_nan() || linear <= 0.0 {
             return 0;
         }
         let bits = linear.to_bits();
@@ -66,7 +82,12 @@ impl Quantizer {
         }
         let i = (bucket - self.first) as usize;
         let Some(&[mut low, mut high]) = self.below.get(i..).and_then(|rest| rest.first_chunk()) else {
-            return self.thresholds.len() as u16;
+            // Beyond the last threshold, or there are none
+            return if self.below.is_empty() {
+                definition(&self.display, self.largest, linear)
+            } else {
+                self.largest as u16
+            };
         };
         // Search among the thresholds inside the bucket
         while low < high {
