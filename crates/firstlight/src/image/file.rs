@@ -232,3 +232,226 @@ fn write_direct(to: &Path, bytes: &[u8]) -> io::Result<()> {
 fn refused(path: &Path, source: io::Error) -> ImageError {
     ImageError::Write { path: path.to_path_buf(), source }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The names in a folder.
+    fn names(folder: &Path) -> Vec<String> {
+        let entries = fs::read_dir(folder).unwrap();
+        let mut names: Vec<String> = entries.map(|e| e.unwrap().file_name().into_string().unwrap()).collect();
+        names.sort();
+        names
+    }
+
+    fn words(path: &Path) -> String {
+        let checked = PendingFile::new(path).unwrap_err().to_string();
+        let written = write_whole(path, b"new").unwrap_err().to_string();
+        assert_eq!(checked, written);
+        written
+    }
+
+    #[test]
+    fn makes_and_replaces() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.png");
+        assert_eq!(write_whole(&path, b"one").unwrap(), Written::Whole);
+        assert_eq!(fs::read(&path).unwrap(), b"one");
+        assert_eq!(write_whole(&path, b"").unwrap(), Written::Whole);
+        assert_eq!(fs::read(&path).unwrap(), b"");
+        assert_eq!(names(folder.path()), ["a.png"]);
+    }
+
+    #[test]
+    fn checking_leaves_nothing_and_keeps_the_old_file() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.png");
+        fs::write(&path, b"old").unwrap();
+        let pending = PendingFile::new(&path).unwrap();
+        let other = PendingFile::new(&folder.path().join("b.png")).unwrap();
+        assert_eq!(names(folder.path()), ["a.png"]);
+        // Staged files are there, but not under their names; dropped ones go
+        let staged = pending.clone().stage(b"new").unwrap();
+        assert_eq!(names(folder.path()).len(), 2);
+        assert_eq!(fs::read(&path).unwrap(), b"old");
+        drop(staged);
+        assert_eq!(names(folder.path()), ["a.png"]);
+        assert_eq!(fs::read(&path).unwrap(), b"old");
+        let staged = [pending.stage(b"new").unwrap(), other.stage(b"b").unwrap()];
+        for file in staged {
+            file.commit().unwrap();
+        }
+        assert_eq!(names(folder.path()), ["a.png", "b.png"]);
+        assert_eq!(fs::read(&path).unwrap(), b"new");
+    }
+
+    #[test]
+    fn what_cannot_be_a_file_is_said() {
+        let folder = tempfile::tempdir().unwrap();
+        let at = |name: &str| folder.path().join(name);
+        let missing = at("none/a.png");
+        assert_eq!(
+            words(&missing),
+            format!("{}: there is no folder {}; create it first", missing.display(), at("none").display())
+        );
+        for name in [folder.path().to_path_buf(), at("a.png/"), at(".."), PathBuf::new(), PathBuf::from("/")] {
+            assert!(words(&name).ends_with(": is a folder, not a file; add a file's name"), "{name:?}");
+        }
+        fs::write(at("file"), b"old").unwrap();
+        assert!(words(&at("file/a.png")).contains("cannot be written"));
+        let long = words(&at(&"n".repeat(300)));
+        assert!(long.contains("cannot be written") && long.ends_with("choose a shorter or simpler name"), "{long}");
+        assert_eq!(names(folder.path()), ["file"]);
+    }
+
+    #[test]
+    fn a_folder_that_goes_away_is_an_error_with_the_path() {
+        let folder = tempfile::tempdir().unwrap();
+        let inner = folder.path().join("inner");
+        fs::create_dir(&inner).unwrap();
+        let pending = PendingFile::new(&inner.join("a.png")).unwrap();
+        fs::remove_dir(&inner).unwrap();
+        assert!(matches!(pending.commit(b"new"), Err(ImageError::NoFolder { .. })));
+        // A folder that has taken the name in the meantime stays
+        let pending = PendingFile::new(&inner).unwrap();
+        let staged = pending.stage(b"new").unwrap();
+        fs::create_dir(&inner).unwrap();
+        assert!(matches!(staged.commit(), Err(ImageError::Write { .. })));
+        assert_eq!(names(folder.path()), ["inner"]);
+    }
+
+    #[cfg(unix)]
+    mod unix {
+        use super::*;
+        use std::os::unix::fs::{MetadataExt, PermissionsExt, symlink};
+
+        fn mode(path: &Path) -> u32 {
+            fs::metadata(path).unwrap().mode() & 0o7777
+        }
+
+        fn set_mode(path: &Path, mode: u32) {
+            fs::set_permissions(path, Permissions::from_mode(mode)).unwrap();
+        }
+
+        #[test]
+        fn permissions_are_those_of_a_new_file_or_of_the_old() {
+            let folder = tempfile::tempdir().unwrap();
+            let (path, plain) = (folder.path().join("a.png"), folder.path().join("plain"));
+            fs::write(&plain, b"").unwrap();
+            write_whole(&path, b"1").unwrap();
+            assert_eq!(mode(&path), mode(&plain));
+            set_mode(&path, 0o640);
+            write_whole(&path, b"2").unwrap();
+            assert_eq!(mode(&path), 0o640);
+            // A protected file is left alone
+            set_mode(&path, 0o444);
+            assert!(words(&path).ends_with("is read-only; make it writable, or choose another name"));
+            assert_eq!(fs::read(&path).unwrap(), b"2");
+        }
+
+        #[test]
+        fn links_stay_and_what_they_point_to_is_replaced() {
+            let folder = tempfile::tempdir().unwrap();
+            let at = |name: &str| folder.path().join(name);
+            fs::create_dir(at("real")).unwrap();
+            fs::write(at("real/a.png"), b"old").unwrap();
+            // A link to a link, both relative to their own folders
+            symlink("../real/a.png", at("real/second")).unwrap();
+            symlink("real/second", at("first")).unwrap();
+            assert_eq!(write_whole(&at("first"), b"new").unwrap(), Written::Whole);
+            assert_eq!(fs::read(at("real/a.png")).unwrap(), b"new");
+            assert!(fs::symlink_metadata(at("first")).unwrap().is_symlink());
+            assert!(fs::symlink_metadata(at("real/second")).unwrap().is_symlink());
+            // A link to nothing
+            symlink("real/b.png", at("dangling")).unwrap();
+            write_whole(&at("dangling"), b"b").unwrap();
+            assert_eq!(fs::read(at("real/b.png")).unwrap(), b"b");
+            assert_eq!(names(&at("real")), ["a.png", "b.png", "second"]);
+            // A link into nowhere, a link to a folder, and one that leads in a circle
+            symlink("none/b.png", at("nowhere")).unwrap();
+            assert!(words(&at("nowhere")).contains("there is no folder"));
+            symlink("real", at("folder")).unwrap();
+            assert!(words(&at("folder")).contains("is a folder"));
+            symlink("circle", at("circle")).unwrap();
+            assert!(words(&at("circle")).contains("cannot be written"));
+        }
+
+        #[test]
+        fn a_folder_that_may_not_be_written_to() {
+            let folder = tempfile::tempdir().unwrap();
+            let path = folder.path().join("a.png");
+            fs::write(&path, b"old").unwrap();
+            set_mode(folder.path(), 0o555);
+            // Nothing stops the system's administrator
+            if fs::write(folder.path().join("probe"), b"").is_err() {
+                assert!(words(&path).ends_with("choose a folder that you may write to, or change its permissions"));
+                assert_eq!(fs::read(&path).unwrap(), b"old");
+            }
+            set_mode(folder.path(), 0o755);
+        }
+
+        #[test]
+        fn a_device_is_written_to() {
+            let path = Path::new("/dev/null");
+            PendingFile::new(path).unwrap();
+            assert_eq!(write_whole(path, b"bytes").unwrap(), Written::Direct);
+            // Still a device
+            assert!(!fs::metadata(path).unwrap().is_file());
+        }
+
+        #[cfg(target_os = "linux")]
+        #[test]
+        fn a_full_disk_is_said() {
+            let path = Path::new("/dev/full");
+            let pending = PendingFile::new(path).unwrap();
+            let fault = pending.commit(b"bytes").unwrap_err().to_string();
+            assert!(fault.starts_with("/dev/full: cannot be written: "), "{fault}");
+            assert!(fault.ends_with("; free some space, or write elsewhere"), "{fault}");
+        }
+
+        #[cfg(target_os = "linux")]
+        #[test]
+        fn a_file_that_a_process_has_open_is_appended_to() {
+            use std::os::fd::AsRawFd;
+            let folder = tempfile::tempdir().unwrap();
+            let path = folder.path().join("log");
+            let mut open = fs::File::create(&path).unwrap();
+            open.write_all(b"before ").unwrap();
+            let standing_for_it = PathBuf::from(format!("/dev/fd/{}", open.as_raw_fd()));
+            assert_eq!(write_whole(&standing_for_it, b"after").unwrap(), Written::Direct);
+            assert_eq!(fs::read(&path).unwrap(), b"before after");
+        }
+
+        #[test]
+        fn a_socket_gets_the_bytes() {
+            use std::io::Read;
+            let folder = tempfile::tempdir().unwrap();
+            let path = folder.path().join("socket");
+            let listener = std::os::unix::net::UnixListener::bind(&path).unwrap();
+            let reader = std::thread::spawn(move || {
+                let mut bytes = Vec::new();
+                listener.accept().unwrap().0.read_to_end(&mut bytes).unwrap();
+                bytes
+            });
+            assert_eq!(write_whole(&path, b"bytes").unwrap(), Written::Direct);
+            assert_eq!(reader.join().unwrap(), b"bytes");
+        }
+
+        #[test]
+        fn a_pipe_gets_the_bytes() {
+            let folder = tempfile::tempdir().unwrap();
+            let path = folder.path().join("pipe");
+            if !std::process::Command::new("mkfifo").arg(&path).status().is_ok_and(|s| s.success()) {
+                return; // no such program here
+            }
+            // Checking it waits for nobody
+            let pending = PendingFile::new(&path).unwrap();
+            let from = path.clone();
+            let reader = std::thread::spawn(move || fs::read(from).unwrap());
+            assert_eq!(pending.commit(b"bytes").unwrap(), Written::Direct);
+            assert_eq!(reader.join().unwrap(), b"bytes");
+            assert_eq!(names(folder.path()), ["pipe"]);
+        }
+    }
+}
