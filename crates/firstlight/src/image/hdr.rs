@@ -39,8 +39,8 @@ pub(super) fn encode(picture: &Image, receipt: &Receipt) -> Vec<u8> {
 /// What is below 0 and NaN become 0; what is above 255/256 x 2^127 becomes that.
 fn shared_exponent(color: [f32; 3]) -> [u8; 4] {
     const LARGEST: f64 = 255.0 / 256.0 * (1u128 << 127) as f64;
-    // `max` and `min` leave NaN out
-    let color = color.map(|c| f64::from(c).max(0.0).min(LARGEST));
+    // NaN is not above 0
+    let color = color.map(|c| if c > 0.0 { f64::from(c).min(LARGEST) } else { 0.0 });
     let most = color[0].max(color[1]).max(color[2]);
     // Below what exponent 1 can hold, which is 2^-128
     if most < 1e-38 {
