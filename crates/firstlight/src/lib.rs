@@ -21,7 +21,9 @@ pub use context::{AssetError, Assets, FolderAssets, MemoryAssets, NoAssets};
 pub use describe::{ColorDesc, ColorParam, FilePath, NumberParam, ParamDesc};
 pub use error::{Diagnostic, Place, SceneError, Severity};
 pub use ids::{LightId, MaterialId, SurfaceId, TextureId};
-pub use image::{Image, Receipt, Window};
+pub use image::{
+    Format, Image, ImageError, PendingFile, Receipt, StagedFile, StoredImage, Window, Written, write_whole,
+};
 pub use light::{DirectionalDesc, EmitSides, Falloff, LightDesc, PointDesc, RectangleDesc, SampleSet, SpotDesc};
 pub use material::{BlinnPhongDesc, MaterialDesc, PhongDesc};
 pub use math::{Ray, Vec2, Vec3};

@@ -1,5 +1,6 @@
 //! The values a field of the scene text can have, beyond plain numbers, words and arrays.
 
+use crate::color::Encoding;
 use serde_json::{Value as Json, json};
 
 use super::node::{Data, Node, quoted};
@@ -44,16 +45,12 @@ impl From<f64> for ColorDesc {
     }
 }
 
-/// The linear value of an sRGB byte: IEC 61966-2-1, in f64.
-fn srgb_to_linear(byte: u8) -> f64 {
-    let v = f64::from(byte) / 255.0;
-    if v <= 0.04045 { v / 12.92 } else { pxfm::f_pow((v + 0.055) / 1.055, 2.4) }
-}
-
 /// The colour of `#rrggbb`.
 fn from_hex(text: &str) -> Option<ColorDesc> {
     let digits = text.strip_prefix('#').filter(|d| d.len() == 6 && d.bytes().all(|b| b.is_ascii_hexdigit()))?;
-    let channel = |i: usize| u8::from_str_radix(&digits[i..i + 2], 16).map(srgb_to_linear).ok();
+    let channel = |i: usize| {
+        u8::from_str_radix(&digits[i..i + 2], 16).ok().map(|byte| Encoding::Srgb.decode(f64::from(byte) / 255.0))
+    };
     Some(ColorDesc::linear(channel(0)?, channel(2)?, channel(4)?))
 }
 

@@ -10,7 +10,7 @@ use crate::context::{AssetError, Assets, CompileContext};
 use crate::describe::{ColorParam, NumberParam};
 use crate::error::{Diagnostic, SceneError, Severity};
 use crate::ids::{MaterialId, TextureId};
-use crate::image::{TexelData, TexelLimits, Texels};
+use crate::image::read::{Limits, TexelData, Texels, decode};
 use crate::light::{Light, LightDesc, LightKind, MAX_SAMPLES};
 use crate::material::{LobeKind, MAX_SHININESS, Material, MaterialDesc};
 use crate::math::Vec3;
@@ -433,7 +433,7 @@ impl<'a> Textures<'a> {
         let name = &self.desc.textures[index].0;
         let read = self.assets.read(file, MAX_TEXTURE_FILE);
         let (texels, hash) = match &read {
-            Ok(bytes) => match crate::image::decode(bytes, &TexelLimits::default()) {
+            Ok(bytes) => match decode(bytes, &Limits::default()) {
                 Ok(texels) => (texels, *blake3::hash(bytes).as_bytes()),
                 Err(error) => {
                     let message = format!("{file:?} cannot be read as a picture: {error}");

@@ -1,5 +1,11 @@
 //! Colour: linear Rec. 709 everywhere inside; sRGB and gamma only at the edges.
 
+mod display;
+mod quantize;
+
+pub use display::{Display, Encoding};
+pub(crate) use quantize::Quantizer;
+
 use std::ops::{Add, AddAssign, Mul};
 
 /// Linear Rec. 709, scene-referred: no upper bound, not display-encoded.
@@ -67,22 +73,4 @@ impl Mul<f32> for Rgb {
     fn mul(self, s: f32) -> Rgb {
         Rgb::new(self.r * s, self.g * s, self.b * s)
     }
-}
-
-/// The sRGB curve, from stored 0 to 1 to linear.
-pub(crate) fn srgb_to_linear(stored: f64) -> f64 {
-    if stored <= 0.04045 { stored / 12.92 } else { pxfm::f_pow((stored + 0.055) / 1.055, 2.4) }
-}
-
-// STUB
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Encoding {
-    Srgb,
-    Gamma(f64),
-    Linear,
-}
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Display {
-    pub encoding: Encoding,
-    pub exposure: f64,
 }
