@@ -61,9 +61,9 @@ e1 = [0, 0, 2]
 falloff = \"constant\"
 ";
 
-/// A course file for 30 x 20 pixels.
+/// A course file for 30 x 30 pixels.
 pub const COURSE: &str = "\
-output_resolution 30 20
+output_resolution 30
 output_file course.png
 camera_id 2
 

@@ -133,10 +133,10 @@ fn a_course_file_names_its_output() {
     folder.put("config.txt", COURSE);
     folder.run("render config.txt").done().says(&["wrote course.png"]);
     assert_eq!(folder.names(), ["config.txt", "course.png"]);
-    assert_eq!(size_of(&folder.path("course.png")), (30, 20));
+    assert_eq!(size_of(&folder.path("course.png")), (30, 30));
     // -o and other options win over it
     folder.run("render config.txt -o other.png --width 15 --threads 1").done();
-    assert_eq!(size_of(&folder.path("other.png")), (15, 10));
+    assert_eq!(size_of(&folder.path("other.png")), (15, 15));
     assert_eq!(folder.names(), ["config.txt", "course.png", "other.png"]);
     // From standard input as well
     folder.run_with_input("render - --bits 16", COURSE.as_bytes()).done().says(&["wrote course.png"]);
