@@ -2,7 +2,6 @@
 
 mod camera;
 mod color;
-#[allow(dead_code)]
 mod context;
 mod describe;
 mod error;
@@ -37,9 +36,3 @@ pub use shape::{
     Footprint, ParallelogramDesc, RayDifferential, ShapeDesc, SphereDesc, SphereUv, SurfaceInteraction, UvEdge,
 };
 pub use texture::{CheckerboardDesc, Filter, ImageTextureDesc, TextureDesc, TextureSpace, Wrap};
-
-mod stubs;
-pub use stubs::{
-    Builtin, CompileOptions, Compiled, Display, Encoding, Film, Format, ImageError, Parsed, PendingFile, RenderSettings,
-    RenderStats, Scene, SceneSummary, SimdLevel, StagedFile, Written, builtin_scenes, render, schema,
-};
