@@ -103,9 +103,9 @@ pub struct RenderArgs {
     /// Bits of each channel of PNG files: 8 or 16 [default: 8]
     #[arg(long, value_name = "BITS", help_heading = "Output")]
     pub bits: Option<Bits>,
-    /// The format of `-o -` [default: png]
+    /// The format of -o - and of names without an ending, such as /dev/null [default: png for -]
     #[arg(long, value_name = "FORMAT", help_heading = "Output")]
-    pub format: Option<StdoutFormat>,
+    pub format: Option<NamedFormat>,
     /// Stops of exposure of 8- and 16-bit pictures, -64 to 64: they are multiplied by 2^EV [default: the scene's]
     #[arg(long, value_name = "EV", allow_negative_numbers = true, value_parser = exposure, help_heading = "Output")]
     pub exposure: Option<f64>,
@@ -197,9 +197,9 @@ pub enum Bits {
     Sixteen,
 }
 
-/// What can go to standard output.
+/// A format by its name, where no ending says it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub enum StdoutFormat {
+pub enum NamedFormat {
     /// 8 or 16 bits, display-encoded
     Png,
     /// The film itself, in 32-bit floats

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use firstlight::{Format, ImageError, PendingFile, StagedFile, Written};
 
-use crate::args::{Bits, StdoutFormat};
+use crate::args::{Bits, NamedFormat};
 use crate::report::{Failure, say};
 
 /// A place for bytes.
@@ -126,7 +126,7 @@ fn aside(path: &Path, written: Written) -> String {
 ///
 /// # Errors
 /// An ending that is no picture's, something named twice, an option that applies to nothing.
-pub fn resolve(paths: &[PathBuf], bits: Option<Bits>, format: Option<StdoutFormat>) -> Result<Vec<Output>, Failure> {
+pub fn resolve(paths: &[PathBuf], bits: Option<Bits>, format: Option<NamedFormat>) -> Result<Vec<Output>, Failure> {
     let usage = |message: String| Err(Failure::Usage(message));
     let mut outputs: Vec<Output> = Vec::new();
     let mut seen: Vec<PathBuf> = Vec::new();
@@ -138,13 +138,12 @@ pub fn resolve(paths: &[PathBuf], bits: Option<Bits>, format: Option<StdoutForma
         }
         seen.push(full);
         let kind = match (&target, format) {
+            (Target::Stdout, format) => format.map_or(Format::Png8, format_of),
+            (Target::File(path), Some(format)) if path.extension().is_none() => format_of(format),
             (Target::File(path), _) => match Format::from_path(path) {
                 Ok(kind) => kind,
                 Err(e) => return usage(e.to_string()),
             },
-            (Target::Stdout, None | Some(StdoutFormat::Png)) => Format::Png8,
-            (Target::Stdout, Some(StdoutFormat::Exr)) => Format::Exr,
-            (Target::Stdout, Some(StdoutFormat::Hdr)) => Format::Hdr,
         };
         outputs.push(Output { target, format: with_bits(kind, bits) });
     }
@@ -153,14 +152,23 @@ pub fn resolve(paths: &[PathBuf], bits: Option<Bits>, format: Option<StdoutForma
     if to_stdout && io::stdout().is_terminal() {
         return usage("-o - would write a picture to the terminal; send standard output to a file or program".into());
     }
-    if format.is_some() && !to_stdout {
-        return usage("--format is for -o - only; the ending of a file says its format".into());
+    let without_ending = paths.iter().any(|path| path.extension().is_none());
+    if format.is_some() && !without_ending {
+        return usage("--format is for -o - and names without an ending; the ending of a file says its format".into());
     }
     let png = |output: &Output| matches!(output.format, Format::Png8 | Format::Png16);
     if bits.is_some() && !outputs.is_empty() && !outputs.iter().any(png) {
         return usage("--bits is for PNG only, and no output is one".into());
     }
     Ok(outputs)
+}
+
+fn format_of(format: NamedFormat) -> Format {
+    match format {
+        NamedFormat::Png => Format::Png8,
+        NamedFormat::Exr => Format::Exr,
+        NamedFormat::Hdr => Format::Hdr,
+    }
 }
 
 /// The format with the bits asked for; only PNG has a choice.

@@ -24,7 +24,7 @@ impl Long {
         } else {
             Command::new(program)
         };
-        let line = "render config11 --width 2048 --aa 16 --samples 4096 --tile-size 8 --threads 1 -o old.png -o new.exr \
+        let line = "render config11 --width 2048 --aa 4 --samples 4096 --tile-size 8 --threads 1 -o old.png -o new.exr \
                     --stats=stats.json";
         command.args(line.split_whitespace()).current_dir(folder.path("")).stdin(Stdio::null()).stderr(Stdio::piped());
         let mut child = command.spawn().unwrap();
@@ -90,7 +90,9 @@ fn killed_it_leaves_the_old_file() {
 fn waiting_for_a_scene_it_ends_at_once() {
     use std::os::unix::process::ExitStatusExt;
     let folder = Folder::new();
-    let mut child = folder.command(["render", "-"]).stdin(Stdio::piped()).spawn().unwrap();
+    let mut child = folder.command(["render", "-"]).stdin(Stdio::piped()).stderr(Stdio::null()).spawn().unwrap();
+    // Held open, so that it goes on waiting
+    let _stdin = child.stdin.take();
     std::thread::sleep(std::time::Duration::from_millis(300));
     Command::new("kill").args(["-TERM", &child.id().to_string()]).status().unwrap();
     let status = child.wait().unwrap();
