@@ -262,7 +262,7 @@ mod tests {
         for gamma in [1e-300, 1e-3, 1e3, 1e300] {
             let display = Display { encoding: Encoding::Gamma(gamma), exposure: 0.5 };
             let quantizer = Quantizer::new(&display, 65535);
-            for x in [0.0, 1e-40, 1e-3, 0.5, 0.7071, 0.7072, 0.999, 1.0, 2.0, f32::INFINITY] {
+            for x in [0.0, 1e-40, 1e-3, 0.5, 0.706, 0.708, 0.999, 1.0, 2.0, f32::INFINITY] {
                 agrees(&quantizer, &display, 65535, x);
             }
         }
