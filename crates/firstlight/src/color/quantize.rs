@@ -3,23 +3,37 @@
 //! The definition is [`definition`]: round to nearest of the largest code times [`Display::encode`]. It costs a power for
 //! each number. Since it never falls as x grows, code k is the number of thresholds at or below x, where threshold k is
 //! the smallest f32 whose code is k or more. So the thresholds are found once, from the definition itself, and a
-//! number is then a table look-up by its leading bits (which say how many thresholds lie below its bucket) and a search
-//! among the thresholds inside the bucket: none or one for 8 bits and usual curves.
+//! number is then a table look-up by its leading bits, which say how many thresholds lie below its bucket, and a search
+//! among the thresholds inside the bucket: none or one for 8 bits and usual curves, a few for 16.
+
+use rayon::prelude::*;
 
 use super::Display;
 
-/// Everything above the codes of one display and depth.
+/// The codes of one display and depth.
 pub(crate) struct Quantizer {
     display: Display,
     largest: u32,
-    /// `thresholds[k - 1]`: the bits of the smallest positive f32 with code k or more; never falling.
+    /// `thresholds[k - 1]`: the bits of the smallest positive f32 with code k or more; never falling. None of them if
+    /// the definition itself is to be used.
     thresholds: Vec<u32>,
-    /// `below[i]`: how many thresholds are at or below the first number of bucket `first + i`. One more at the end.
-    below: Vec<u16>,
-    /// The bucket of the first threshold.
+    /// From one below the first threshold to one beyond the last.
+    buckets: Vec<Bucket>,
+    /// The leading bits of the numbers in the first bucket.
     first: u32,
-    /// A bucket is the bits of a number without this many at the end.
+    /// The leading bits of a number are its bits without this many at the end.
     shift: u32,
+}
+
+/// The numbers that share their leading bits.
+#[derive(Clone, Copy)]
+struct Bucket {
+    /// The first threshold inside; larger than any number's bits if there is none.
+    threshold: u32,
+    /// How many thresholds are below it.
+    below: u16,
+    /// How many thresholds are inside.
+    inside: u16,
 }
 
 /// The bits of positive infinity: the last that a number can have here.
@@ -36,7 +50,9 @@ impl Quantizer {
     pub(crate) fn new(display: &Display, largest: u32) -> Self {
         debug_assert!(display.fault().is_none() && (1..=65535).contains(&largest));
         // Find each threshold, starting where the inverse curve says that it is
-        let thresholds: Vec<u32> = (1..=largest)
+        let thresholds: Vec<u32> = (1..largest + 1)
+            .into_par_iter()
+            .with_min_len(64)
             .map(|k| {
                 let edge = display.encoding.decode((f64::from(k) - 0.5) / f64::from(largest)) / display.factor();
                 smallest((edge as f32).to_bits(), |bits| {
@@ -45,13 +61,22 @@ impl Quantizer {
             })
             .collect();
         debug_assert!(thresholds.is_sorted());
-        // Count the thresholds below each bucket; 128 buckets an octave for 8 bits, 2048 for 16
-        let shift = if largest <= 255 { 16 } else { 12 };
-        let first = thresholds[0] >> shift;
+        // Count the thresholds in each bucket; 256 buckets an octave for 8 bits, 2048 for 16
+        let shift = if largest <= 255 { 15 } else { 12 };
+        let first = (thresholds[0] >> shift).saturating_sub(1);
         let last = thresholds[largest as usize - 1] >> shift;
-        let below =
-            (first..=last + 1).map(|bucket| thresholds.partition_point(|&t| t <= bucket << shift) as u16).collect();
-        Self { display: *display, largest, thresholds, below, first, shift }
+        let mut below = 0;
+        let mut buckets = Vec::with_capacity((last - first) as usize + 2);
+        for leading in first..=last + 1 {
+            let inside = thresholds[below..].partition_point(|&t| t >> shift == leading);
+            buckets.push(Bucket {
+                threshold: if inside > 0 { thresholds[below] } else { u32::MAX },
+                below: below as u16,
+                inside: inside as u16,
+            });
+            below += inside;
+        }
+        Self { display: *display, largest, thresholds, buckets, first, shift }
     }
 
     /// As [`Quantizer::new`], for about `count` values: without thresholds where finding them would take longer than it
@@ -60,7 +85,7 @@ impl Quantizer {
         if count as u64 > 4 * u64::from(largest) {
             return Self::new(display, largest);
         }
-        Self { display: *display, largest, thresholds: Vec::new(), below: Vec::new(), first: 0, shift: 16 }
+        Self { display: *display, largest, thresholds: Vec::new(), buckets: Vec::new(), first: 0, shift: 0 }
     }
 
     /// The code, 0 to `largest`, of a number from 0 to 1 that is not encoded, such as alpha. NaN is 0.
@@ -72,33 +97,38 @@ impl Quantizer {
     /// The code of a linear value: exactly [`definition`].
     #[inline]
     pub(crate) fn code(&self, linear: f32) -> u16 {
-        if linear.is_nan() || linear <= 0.0 {
-            return 0;
-        }
-        let bits = linear.to_bits();
-        let bucket = bits >> self.shift;
-        if bucket < self.first {
-            return 0;
-        }
-        let i = (bucket - self.first) as usize;
-        let Some(&[mut low, mut high]) = self.below.get(i..).and_then(|rest| rest.first_chunk()) else {
-            // Beyond the last threshold, or there are none
-            return if self.below.is_empty() {
-                definition(&self.display, self.largest, linear)
-            } else {
-                self.largest as u16
-            };
+        // NaN is not above 0
+        let bits = if linear > 0.0 { linear.to_bits() } else { 0 };
+        // Numbers before the first bucket share its code, numbers beyond the last that of the last
+        let i = (bits >> self.shift).saturating_sub(self.first) as usize;
+        let Some(bucket) = self.buckets.get(i).or(self.buckets.last()) else {
+            return definition(&self.display, self.largest, linear);
         };
-        // Search among the thresholds inside the bucket
-        while low < high {
-            let middle = low + (high - low) / 2;
-            if self.thresholds[usize::from(middle)] <= bits {
-                low = middle + 1;
-            } else {
-                high = middle;
-            }
+        if bucket.inside > 1 {
+            return self.among(bits, bucket);
         }
-        low
+        bucket.below + u16::from(bits >= bucket.threshold)
+    }
+
+    /// The code of a number in a bucket of several thresholds.
+    #[inline]
+    fn among(&self, bits: u32, bucket: &Bucket) -> u16 {
+        let inside = &self.thresholds[usize::from(bucket.below)..][..usize::from(bucket.inside)];
+        if inside.len() > 64 {
+            return bucket.below + inside.partition_point(|&t| t <= bits) as u16;
+        }
+        // They lie nearly evenly: begin where the number would be among even ones
+        let trailing = bits & ((1 << self.shift) - 1);
+        let mut k = (trailing as usize * inside.len()) >> self.shift;
+        // The first of them lies anywhere in its step; mostly this settles it, without a jump to be guessed
+        k += usize::from(inside[k] <= bits);
+        while k < inside.len() && inside[k] <= bits {
+            k += 1;
+        }
+        while k > 0 && inside[k - 1] > bits {
+            k -= 1;
+        }
+        bucket.below + k as u16
     }
 }
 
@@ -226,7 +256,7 @@ mod tests {
         for gamma in [1e-300, 1e-3, 1e3, 1e300] {
             let display = Display { encoding: Encoding::Gamma(gamma), exposure: 0.5 };
             let quantizer = Quantizer::new(&display, 65535);
-            for x in [0.0, 1e-40, 1e-3, 0.5, 0.7071, 0.7072, 0.999, 1.0, 2.0, f32::INFINITY] {
+            for x in [0.0, 1e-40, 1e-3, 0.5, 0.706, 0.708, 0.999, 1.0, 2.0, f32::INFINITY] {
                 agrees(&quantizer, &display, 65535, x);
             }
         }

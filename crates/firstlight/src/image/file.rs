@@ -35,15 +35,18 @@ pub struct PendingFile {
 /// A file whose bytes are on the disk, but not yet under its name. Dropping it leaves things as they were.
 #[derive(Debug)]
 pub struct StagedFile<'a> {
+    /// As it was named.
     path: PathBuf,
-    target: Target,
-    contents: Contents<'a>,
+    rest: Rest<'a>,
 }
 
+/// What is left to do.
 #[derive(Debug)]
-enum Contents<'a> {
-    Temporary(NamedTempFile),
-    Bytes(&'a [u8]),
+enum Rest<'a> {
+    /// Rename it to this.
+    Rename(NamedTempFile, PathBuf),
+    /// Write these to this.
+    Write(&'a [u8], PathBuf),
 }
 
 /// Where the bytes go in the end.
@@ -102,24 +105,23 @@ impl PendingFile {
     /// Those of [`write_whole`].
     pub fn stage(self, bytes: &[u8]) -> Result<StagedFile<'_>, ImageError> {
         let Self { path, absolute } = self;
-        let target = resolve(&path, &absolute)?;
-        let contents = match &target {
-            Target::Direct(_) => Contents::Bytes(bytes),
+        let rest = match resolve(&path, &absolute)? {
+            Target::Direct(to) => Rest::Write(bytes, to),
             Target::Name(name, permissions) => {
                 let fill = || {
-                    let mut file = temporary(name)?;
+                    let mut file = temporary(&name)?;
                     file.write_all(bytes)?;
                     if let Some(permissions) = permissions {
-                        file.as_file().set_permissions(permissions.clone())?;
+                        file.as_file().set_permissions(permissions)?;
                     }
                     // Without this a crash of the machine may keep the new name and lose the contents
                     file.as_file().sync_data()?;
                     Ok(file)
                 };
-                Contents::Temporary(fill().map_err(|e| refused(&path, e))?)
+                Rest::Rename(fill().map_err(|e| refused(&path, e))?, name)
             }
         };
-        Ok(StagedFile { path, target, contents })
+        Ok(StagedFile { path, rest })
     }
 
     /// Writes the file, as [`write_whole`] does.
@@ -137,18 +139,17 @@ impl StagedFile<'_> {
     /// # Errors
     /// Those of [`write_whole`].
     pub fn commit(self) -> Result<Written, ImageError> {
-        let Self { path, target, contents } = self;
-        match (target, contents) {
-            (Target::Name(name, _), Contents::Temporary(file)) => {
+        let Self { path, rest } = self;
+        match rest {
+            Rest::Rename(file, name) => {
                 // On failure the error holds the temporary file, and dropping it removes it
                 file.persist(name).map_err(|e| refused(&path, e.error))?;
                 Ok(Written::Whole)
             }
-            (Target::Name(to, _) | Target::Direct(to), Contents::Bytes(bytes)) => {
+            Rest::Write(bytes, to) => {
                 write_direct(&to, bytes).map_err(|e| refused(&path, e))?;
                 Ok(Written::Direct)
             }
-            (Target::Direct(_), Contents::Temporary(_)) => unreachable!("`stage` makes no temporary file for it"),
         }
     }
 }

@@ -36,29 +36,37 @@ pub(super) fn encode(
 
 /// The samples, rows from the top, 16 bits with the high byte first.
 fn quantize(picture: &Image, depth: Depth, display: &Display, alpha: bool) -> Vec<u8> {
-    let width = picture.window.width as usize;
-    let channels = if alpha { 4 } else { 3 };
-    let (largest, bytes) = match depth {
-        Depth::Eight => (255, 1),
-        Depth::Sixteen => (65535, 2),
+    let largest = match depth {
+        Depth::Eight => 255,
+        Depth::Sixteen => 65535,
     };
     let color = Quantizer::for_count(display, largest, picture.pixels.len().saturating_mul(3));
-    let mut samples = vec![0; picture.pixels.len() * channels * bytes];
-    let rows = samples.par_chunks_mut(width * channels * bytes).zip(picture.pixels.par_chunks(width));
-    rows.for_each(|(row, pixels)| {
-        for (out, pixel) in row.chunks_exact_mut(channels * bytes).zip(pixels) {
-            let [r, g, b, a] = straight(*pixel);
-            let a = Quantizer::linear(a, largest);
-            let codes = [color.code(r), color.code(g), color.code(b), a];
-            match depth {
-                Depth::Eight => out.iter_mut().zip(codes).for_each(|(o, c)| *o = c as u8),
-                Depth::Sixteen => {
-                    out.chunks_exact_mut(2).zip(codes).for_each(|(o, c)| o.copy_from_slice(&c.to_be_bytes()));
-                }
-            }
+    let rgb = |[r, g, b, _]: [f32; 4]| [color.code(r), color.code(g), color.code(b)];
+    let rgba = |pixel| {
+        let [r, g, b, a] = straight(pixel);
+        [color.code(r), color.code(g), color.code(b), Quantizer::linear(a, largest)]
+    };
+    match (depth, alpha) {
+        (Depth::Eight, false) => each(picture, |p| rgb(p).map(|code| code as u8)),
+        (Depth::Eight, true) => each(picture, |p| rgba(p).map(|code| code as u8)),
+        (Depth::Sixteen, false) => each(picture, |p| rgb(p).map(u16::to_be_bytes)).into_flattened(),
+        (Depth::Sixteen, true) => each(picture, |p| rgba(p).map(u16::to_be_bytes)).into_flattened(),
+    }
+}
+
+/// What `samples` makes of each pixel, one after another; rows in parallel.
+fn each<T: Copy + Default + Send, const N: usize>(
+    picture: &Image,
+    samples: impl Fn([f32; 4]) -> [T; N] + Sync,
+) -> Vec<T> {
+    let width = picture.window.width as usize;
+    let mut all = vec![[T::default(); N]; picture.pixels.len()];
+    all.par_chunks_mut(width).zip(picture.pixels.par_chunks(width)).for_each(|(row, pixels)| {
+        for (out, pixel) in row.iter_mut().zip(pixels) {
+            *out = samples(*pixel);
         }
     });
-    samples
+    all.into_flattened()
 }
 
 /// Divides the colour by alpha. What covers nothing is black; an alpha above 1 counts as 1.
