@@ -28,11 +28,7 @@ pub(crate) struct FieldInfo {
 }
 
 impl FieldInfo {
-    pub(crate) fn of<T: Value>(
-        name: &'static str,
-        doc: &'static [&'static str],
-        default: Option<Written>,
-    ) -> Self {
+    pub(crate) fn of<T: Value>(name: &'static str, doc: &'static [&'static str], default: Option<Written>) -> Self {
         let mut schema = T::schema();
         if let Some(range) = range(&sentence(doc)) {
             // Ranges are of plain numbers; those of an array hold for each element

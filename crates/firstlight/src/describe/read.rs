@@ -174,7 +174,13 @@ impl<'a> Reader<'a> {
         let Some(entries) = node.entries() else {
             self.wrong_type(node, "a table", None);
             self.poison();
-            return T::read(&mut Fields { entries: &[], span: node.span, silent: true, meant: Vec::new(), reader: self });
+            return T::read(&mut Fields {
+                entries: &[],
+                span: node.span,
+                silent: true,
+                meant: Vec::new(),
+                reader: self,
+            });
         };
         let meant = self.unknown_keys(entries, T::FIELDS, what);
         T::read(&mut Fields { entries, span: node.span, silent: false, meant, reader: self })
@@ -286,7 +292,11 @@ impl Value for f64 {
         };
         let shown = reader.show(node);
         if value.is_infinite() && !shown.contains("inf") {
-            reader.error(node.span, format!("{shown} is too large for a number"), Some(format!("at most {:e}", f64::MAX)));
+            reader.error(
+                node.span,
+                format!("{shown} is too large for a number"),
+                Some(format!("at most {:e}", f64::MAX)),
+            );
             return None;
         }
         Some(value)
@@ -324,8 +334,12 @@ impl Value for u32 {
             reader.error(node.span, format!("{shown} is not a whole number"), None);
             return None;
         }
-        if !(0.0..=f64::from(u32::MAX)).contains(&value) {
-            reader.error(node.span, format!("{shown} is outside 0 to {}", u32::MAX), None);
+        if value < 0.0 {
+            reader.error(node.span, format!("{shown} is less than 0"), None);
+            return None;
+        }
+        if value > f64::from(u32::MAX) {
+            reader.error(node.span, format!("{shown} is too large"), Some(format!("at most {}", u32::MAX)));
             return None;
         }
         Some(value as u32)

@@ -75,7 +75,8 @@ impl Written {
             Written::Text(v) => json_string(v),
             Written::List(v) => format!("[{}]", v.iter().map(Self::to_json).collect::<Vec<_>>().join(", ")),
             Written::Table(v) => {
-                let pairs: Vec<String> = v.iter().map(|(k, v)| format!("{}: {}", json_string(k), v.to_json())).collect();
+                let pairs: Vec<String> =
+                    v.iter().map(|(k, v)| format!("{}: {}", json_string(k), v.to_json())).collect();
                 format!("{{ {} }}", pairs.join(", "))
             }
         }

@@ -181,7 +181,7 @@ impl Loader<'_> {
         let (text, not_utf8) = decode(bytes);
         self.sources.files.push(SourceFile {
             name: name.to_owned(),
-            text: text.clone(),
+            text: String::new(),
             root: Node::empty(),
             bases: Vec::new(),
             rank: 0,
@@ -215,6 +215,7 @@ impl Loader<'_> {
             self.content(file, &text, folder, syntax, &mut root);
             self.sources.files[file].root = root;
         }
+        self.sources.files[file].text = text;
         self.sources.files[file].rank = self.finished;
         self.finished += 1;
         self.chain.pop();
@@ -266,13 +267,15 @@ impl Loader<'_> {
                 fault(format!("{shown} is one more than the {MAX_FILES} files a scene can have"), None, None);
                 continue;
             }
-            let bytes = match self.assets.read(&path, MAX_BYTES - self.bytes) {
+            let bytes = match self.assets.read(&path, MAX_BYTES.saturating_sub(self.bytes)) {
                 Ok(bytes) => bytes,
                 Err(error) => {
                     let hint = match error {
                         AssetError::NotFound => "file names are relative to the text that includes them".to_owned(),
                         AssetError::Outside => "move it into the folder of the scene, or allow its folder".to_owned(),
-                        AssetError::TooLarge { .. } => format!("all texts of a scene together have at most {MAX_BYTES} bytes"),
+                        AssetError::TooLarge { .. } => {
+                            format!("all texts of a scene together have at most {MAX_BYTES} bytes")
+                        }
                         AssetError::Io(_) => "a scene includes plain files that can be read".to_owned(),
                     };
                     let colon = if matches!(error, AssetError::NotFound | AssetError::Io(_)) { ":" } else { "" };
@@ -288,7 +291,7 @@ impl Loader<'_> {
     /// Reads the tables of one text.
     fn content(&mut self, file: usize, text: &str, folder: &str, syntax: Syntax, root: &mut Node) {
         let mut reader = Reader::new(file, text, folder, &mut self.faults);
-        let mut bases = Vec::new();
+        let mut arrays = Arrays { counts: &mut self.counts, bases: Vec::new(), syntax };
         let Data::Table(entries) = &mut root.data else {
             reader.wrong_type(root, "a scene: an object with render, camera, sphere and so on", None);
             self.incomplete = true;
@@ -298,11 +301,9 @@ impl Loader<'_> {
             let (key, span) = (entry.key.as_str(), entry.key_span);
             let node = &mut entry.value;
             if let Some(kind) = ShapeDesc::KINDS.iter().position(|k| *k == key) {
+                let shapes = &mut self.desc.shapes;
                 reader.within(key, |r| {
-                    let first = array(r, &mut self.counts, &mut bases, key, key, node, syntax, |r, node| {
-                        self.desc.shapes.push(ShapeDesc::read(kind, node, r));
-                    });
-                    debug_assert!(first <= self.desc.shapes.len());
+                    arrays.read(r, key, key, node, |r, node| shapes.push(ShapeDesc::read(kind, node, r)));
                 });
                 continue;
             }
@@ -319,19 +320,27 @@ impl Loader<'_> {
                         self.desc.render = r.table::<RenderDesc>(node, "[render]");
                     }
                 }),
-                "camera" => reader.within("camera", |r| cameras(r, file, node, &mut self.names, &mut self.desc.cameras)),
+                "camera" => {
+                    reader.within("camera", |r| cameras(r, file, node, &mut self.names, &mut self.desc.cameras))
+                }
                 "light" => reader.within("light", |r| {
                     for (kind, name, node) in kinds::<LightDesc>(r, node, &mut self.incomplete) {
-                        let path = format!("light.{name}");
-                        r.within(name, |r| {
-                            array(r, &mut self.counts, &mut bases, &path, name, node, syntax, |r, node| {
-                                self.desc.lights.push(LightDesc::read(kind.unwrap_or(0), node, r));
-                            });
-                        });
+                        let lights = &mut self.desc.lights;
+                        let mut read = |r: &mut Reader<'_>, node: &Node| {
+                            lights.push(LightDesc::read(kind.unwrap_or(0), node, r));
+                        };
+                        r.within(name, |r| arrays.read(r, &format!("light.{name}"), name, node, &mut read));
                     }
                 }),
                 "material" => reader.within("material", |r| {
-                    named::<MaterialDesc>(r, file, node, &mut self.names, &mut self.desc.materials, &mut self.incomplete);
+                    named::<MaterialDesc>(
+                        r,
+                        file,
+                        node,
+                        &mut self.names,
+                        &mut self.desc.materials,
+                        &mut self.incomplete,
+                    );
                 }),
                 "texture" => reader.within("texture", |r| {
                     named::<TextureDesc>(r, file, node, &mut self.names, &mut self.desc.textures, &mut self.incomplete);
@@ -346,49 +355,53 @@ impl Loader<'_> {
                     } else if TextureDesc::KINDS.contains(&key) {
                         format!("textures are written [texture.{key}.NAME]")
                     } else {
-                        let near = nearest(key, TOP).map(|near| format!("did you mean \"{near}\"? ")).unwrap_or_default();
+                        let near =
+                            nearest(key, TOP).map(|near| format!("did you mean \"{near}\"? ")).unwrap_or_default();
                         format!("{near}a scene takes {}", TOP.join(", "))
                     };
                     reader.within(&node::shortened(key), |r| r.error(span, "unknown key", Some(hint)));
                 }
             }
         }
-        self.sources.files[file].bases = bases;
+        self.sources.files[file].bases = arrays.bases;
     }
 }
 
-/// Reads an array of tables at `path`; elements count from the number there already is of them.
-#[allow(clippy::too_many_arguments, reason = "one step of `Loader::content`, called twice")]
-fn array(
-    reader: &mut Reader<'_>,
-    counts: &mut HashMap<String, usize>,
-    bases: &mut Vec<(String, usize)>,
-    path: &str,
-    what: &str,
-    node: &Node,
+/// The arrays of tables of one text, whose elements count on from those of the texts before.
+struct Arrays<'a> {
+    /// How many there are of each so far.
+    counts: &'a mut HashMap<String, usize>,
+    /// With how many each began in this text.
+    bases: Vec<(String, usize)>,
     syntax: Syntax,
-    mut read: impl FnMut(&mut Reader<'_>, &Node),
-) -> usize {
-    let count = counts.entry(path.to_owned()).or_insert(0);
-    let base = *count;
-    bases.push((path.to_owned(), base));
-    match node.elements() {
-        Some(elements) => {
-            for element in elements {
-                reader.at(*count, |r| read(r, element));
-                *count += 1;
-            }
-        }
-        None => {
-            let hint = match syntax {
-                Syntax::Toml => format!("write [[{path}]] for each {what}"),
-                Syntax::Json => format!("write \"{what}\": [{{ ... }}], one object for each"),
+}
+
+impl Arrays<'_> {
+    /// Reads the array `key` at `path`, each element by `read`.
+    fn read(
+        &mut self,
+        reader: &mut Reader<'_>,
+        path: &str,
+        key: &str,
+        node: &Node,
+        mut read: impl FnMut(&mut Reader<'_>, &Node),
+    ) {
+        let count = self.counts.entry(path.to_owned()).or_insert(0);
+        self.bases.push((path.to_owned(), *count));
+        let Some(elements) = node.elements() else {
+            let hint = match self.syntax {
+                Syntax::Toml => format!("write [[{path}]] for each {key}"),
+                Syntax::Json => format!("write \"{key}\": [{{ ... }}], one object for each"),
             };
             reader.wrong_type(node, "an array of tables", Some(hint));
             reader.poison();
+            return;
+        };
+        for element in elements {
+            reader.at(*count, |r| read(r, element));
+            *count += 1;
         }
     }
-    base
 }
 
 /// The kinds in `[light]`, `[material]` or `[texture]`; `None` for one that is unknown, of named things only.
@@ -407,7 +420,8 @@ fn kinds<'n, F: Family>(
     for entry in entries {
         let kind = F::KINDS.iter().position(|k| *k == entry.key);
         if kind.is_none() {
-            let near = nearest(&entry.key, F::KINDS).map(|near| format!("did you mean \"{near}\"? ")).unwrap_or_default();
+            let near =
+                nearest(&entry.key, F::KINDS).map(|near| format!("did you mean \"{near}\"? ")).unwrap_or_default();
             let hint = format!("{near}kinds of {} are {}", F::WORD, F::KINDS.join(", "));
             let message = format!("unknown kind of {}", F::WORD);
             reader.within(&node::shortened(&entry.key), |r| r.error(entry.key_span, message, Some(hint)));
