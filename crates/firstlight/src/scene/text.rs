@@ -80,7 +80,10 @@ impl Parsed {
             Err(error) => {
                 let text = self.positions.iter().copied().zip(self.faults.iter().cloned());
                 let mut all: Vec<(Position, Diagnostic)> = text.chain(self.sources.locate(error.faults)).collect();
-                all.retain(|(_, fault)| fault.severity == Severity::Error);
+                // Warnings are for scenes that render
+                if all.iter().any(|(_, fault)| fault.severity == Severity::Error) {
+                    all.retain(|(_, fault)| fault.severity == Severity::Error);
+                }
                 all.sort_by_key(|(position, _)| *position);
                 Err(SceneError { faults: all.into_iter().map(|(_, fault)| fault).collect() })
             }
@@ -552,5 +555,88 @@ pub(super) fn decode(bytes: &[u8]) -> (String, Option<(Span, String)>) {
             let text = String::from_utf8_lossy(bytes).into_owned();
             (text, Some((Span { start: at, end: at + 1 }, message)))
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::context::{MemoryAssets, NoAssets};
+
+    fn faultless(name: &str, text: &str, assets: &MemoryAssets) -> SceneDesc {
+        let parsed = SceneDesc::parse(name, text.as_bytes(), assets);
+        assert_eq!(parsed.faults(), []);
+        parsed.desc
+    }
+
+    #[test]
+    fn every_form_of_a_number_is_read() {
+        let numbers = [
+            ("1", 1.0),
+            ("-1_000", -1000.0),
+            ("+0.5", 0.5),
+            ("1_0.2_5e-1", 1.025),
+            ("0xff", 255.0),
+            ("0o17", 15.0),
+            ("0b11", 3.0),
+            ("1e308", 1e308),
+            ("123456789012345678901234567890", 1.2345678901234568e29),
+            ("inf", f64::INFINITY),
+            ("-inf", f64::NEG_INFINITY),
+        ];
+        for (text, value) in numbers {
+            let desc = faultless("s.toml", &format!("[render]\nexposure = {text}\n"), &MemoryAssets::default());
+            assert_eq!(desc.render.exposure, value, "{text}");
+        }
+        let desc =
+            faultless("s.json", "{ \"render\": { \"width\": 64.0, \"exposure\": -1.5e1 } }", &MemoryAssets::default());
+        assert_eq!((desc.render.width, desc.render.exposure), (64, -15.0));
+    }
+
+    #[test]
+    fn included_texts_come_first_and_files_start_at_the_scene() {
+        let mut assets = MemoryAssets::default();
+        let mut add = |path: &str, text: &str| assets.files.insert(path.into(), text.into());
+        add("parts/a.toml", "include = [\"deep/b.json\"]\n[[sphere]]\ncenter = [2, 0, 0]\nradius = 1\n");
+        add(
+            "parts/deep/b.json",
+            "{ \"sphere\": [{ \"center\": [1, 0, 0], \"radius\": 1 }],\n\
+             \"texture\": { \"image\": { \"b\": { \"file\": \"../b.png\" } } } }",
+        );
+        let text = "include = [\"parts/a.toml\"]\n[[parallelogram]]\np = [0, 0, 0]\ne0 = [1, 0, 0]\ne1 = [0, 1, 0]\n\
+                    [[sphere]]\ncenter = [3, 0, 0]\nradius = 1\n[texture.image.own]\nfile = \"../own.png\"\n";
+        let desc = faultless("folder/scene.toml", text, &assets);
+        let centers: Vec<f64> = desc
+            .shapes
+            .iter()
+            .filter_map(|s| if let ShapeDesc::Sphere(s) = s { Some(s.center[0]) } else { None })
+            .collect();
+        assert_eq!(centers, [1.0, 2.0, 3.0]);
+        assert!(matches!(desc.shapes.last(), Some(ShapeDesc::Parallelogram(_))));
+        let files: Vec<(&str, &str)> = desc
+            .textures
+            .iter()
+            .filter_map(
+                |(n, t)| if let TextureDesc::Image(t) = t { Some((n.as_str(), t.file.0.as_str())) } else { None },
+            )
+            .collect();
+        assert_eq!(files, [("b", "parts/b.png"), ("own", "../own.png")]);
+    }
+
+    #[test]
+    fn cameras_keep_the_order_of_the_text() {
+        let text = "[camera.z]\nposition = [0, 0, 1]\n[camera.a]\nposition = [0, 0, 2]\n";
+        let names = |desc: SceneDesc| desc.cameras.into_iter().map(|(name, _)| name).collect::<Vec<_>>();
+        assert_eq!(names(faultless("s.toml", text, &MemoryAssets::default())), ["z", "a"]);
+        let one = "camera = { position = [0, 0, 1] }";
+        assert_eq!(names(faultless("s.toml", one, &MemoryAssets::default())), [""]);
+    }
+
+    #[test]
+    fn faults_of_text_and_meaning_keep_the_description_usable() {
+        let text = b"[[sphere]]\nradius = 1\n[[sphere]]\ncenter = [1, 0, 0]\nradius = 2\n";
+        let parsed = SceneDesc::parse("s.toml", text, &NoAssets);
+        assert_eq!((parsed.faults().len(), parsed.desc.shapes.len()), (1, 2));
+        assert!(parsed.compile(&NoAssets, &CompileOptions::default()).is_err());
     }
 }
