@@ -206,14 +206,26 @@ fn string_end(bytes: &[u8], start: usize, syntax: Syntax) -> usize {
 fn parse_toml(text: &str) -> Result<Node, Vec<SyntaxFault>> {
     let (table, errors) = DeTable::parse_recoverable(text);
     if !errors.is_empty() {
-        return Err(errors
+        let mut faults: Vec<SyntaxFault> = errors
             .iter()
-            .map(|e| SyntaxFault {
-                span: e.span().map(Span::from).unwrap_or_default(),
-                message: format!("not TOML: {}", e.message()),
-                hint: None,
+            .map(|e| {
+                let span: Span = e.span().map(Span::from).unwrap_or_default();
+                if e.message() == "duplicate key" {
+                    let key = text.get(span.start..span.end).unwrap_or_default();
+                    return twice(span, key.trim_matches(['"', '\'']));
+                }
+                SyntaxFault { span, message: format!("not TOML: {}", e.message()), hint: None }
             })
-            .collect());
+            .collect();
+        // One slip makes the parser stumble over every word that follows it on the line: tell the first
+        faults.sort_by_key(|f| f.span.start);
+        let mut told = None;
+        faults.retain(|f| {
+            let start = f.span.start.min(text.len());
+            let line = text.as_bytes()[..start].iter().rposition(|b| *b == b'\n');
+            told.replace(line) != Some(line)
+        });
+        return Err(faults);
     }
     Ok(Node { span: Span::default(), data: toml_table(table.into_inner()) })
 }
@@ -300,11 +312,7 @@ fn json_node(value: ast::Value<'_>) -> Result<Node, SyntaxFault> {
                 };
                 let key_span = Span { start: key_range.start, end: key_range.end };
                 if !seen.insert(key.clone()) {
-                    return Err(SyntaxFault {
-                        span: key_span,
-                        message: format!("the key {} is there twice in one object", quoted(&key)),
-                        hint: Some("keep one of them".into()),
-                    });
+                    return Err(twice(key_span, &key));
                 }
                 let mut value = json_node(property.value)?;
                 // A table stands where its key is: its braces may be pages apart
@@ -333,6 +341,11 @@ fn ast_range(value: &ast::Value<'_>) -> Span {
         ast::Value::NullKeyword(v) => v.range,
     };
     Span { start: range.start, end: range.end }
+}
+
+fn twice(span: Span, key: &str) -> SyntaxFault {
+    let message = format!("{} is said twice", quoted(key));
+    SyntaxFault { span, message, hint: Some("keep one of them".into()) }
 }
 
 fn lower_first(text: &str) -> String {

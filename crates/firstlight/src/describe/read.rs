@@ -290,8 +290,9 @@ impl Value for f64 {
             reader.wrong_type(node, &Self::words(), None);
             return None;
         };
-        let shown = reader.show(node);
-        if value.is_infinite() && !shown.contains("inf") {
+        // `inf` in the text is left to compiling, which refuses it with all that is not finite
+        if value.is_infinite() && !reader.show(node).contains("inf") {
+            let shown = reader.show(node);
             reader.error(
                 node.span,
                 format!("{shown} is too large for a number"),
@@ -329,16 +330,17 @@ impl Value for u32 {
             reader.wrong_type(node, &Self::words(), None);
             return None;
         };
-        let shown = reader.show(node);
-        if value.is_finite() && value.fract() != 0.0 || value.is_nan() {
-            reader.error(node.span, format!("{shown} is not a whole number"), None);
-            return None;
-        }
-        if !(0.0..=f64::from(u32::MAX)).contains(&value) {
-            reader.error(node.span, format!("{shown} is outside 0 to {}", u32::MAX), None);
-            return None;
-        }
-        Some(value as u32)
+        let (fault, hint) = if value.is_nan() || value.is_finite() && value.fract() != 0.0 {
+            ("is not a whole number", None)
+        } else if value < 0.0 {
+            ("is less than 0", None)
+        } else if value > f64::from(u32::MAX) {
+            ("is too large", Some(format!("at most {}", u32::MAX)))
+        } else {
+            return Some(value as u32);
+        };
+        reader.error(node.span, format!("{} {fault}", reader.show(node)), hint);
+        None
     }
 
     fn write(&self) -> Written {

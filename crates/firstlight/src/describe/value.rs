@@ -195,9 +195,10 @@ impl<T: Factor> Value for ParamDesc<T> {
         let Some(entries) = node.entries() else {
             return T::read(node, reader).map(Self::constant);
         };
-        reader.unknown_keys(entries, &["texture", "factor"], "a textured value");
+        let meant = reader.unknown_keys(entries, &["texture", "factor"], "a textured value");
         let texture = match node.get("texture") {
             Some(name) => reader.within("texture", |r| String::read(name, r)),
+            None if meant.contains(&"texture") => None,
             None => {
                 let hint = "write `texture = \"NAME\"`, or the value without a table";
                 reader.error(node.span, "\"texture\" is missing", Some(hint.into()));

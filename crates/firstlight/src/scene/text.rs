@@ -79,7 +79,10 @@ impl Parsed {
             Err(error) => {
                 let text = self.positions.iter().copied().zip(self.faults.iter().cloned());
                 let mut all: Vec<(Position, Diagnostic)> = text.chain(self.sources.locate(error.faults)).collect();
-                all.retain(|(_, fault)| fault.severity == Severity::Error);
+                // Warnings are for scenes that render
+                if all.iter().any(|(_, fault)| fault.severity == Severity::Error) {
+                    all.retain(|(_, fault)| fault.severity == Severity::Error);
+                }
                 all.sort_by_key(|(position, _)| *position);
                 Err(SceneError { faults: all.into_iter().map(|(_, fault)| fault).collect() })
             }
@@ -180,7 +183,7 @@ impl Loader<'_> {
         let (text, not_utf8) = decode(bytes);
         self.sources.files.push(SourceFile {
             name: name.to_owned(),
-            text: text.clone(),
+            text: String::new(),
             root: Node::empty(),
             bases: Vec::new(),
             rank: 0,
@@ -214,6 +217,7 @@ impl Loader<'_> {
             self.content(file, &text, folder, syntax, &mut root);
             self.sources.files[file].root = root;
         }
+        self.sources.files[file].text = text;
         self.sources.files[file].rank = self.finished;
         self.finished += 1;
         self.chain.pop();
@@ -265,7 +269,7 @@ impl Loader<'_> {
                 fault(format!("{shown} is one more than the {MAX_FILES} files a scene can have"), None, None);
                 continue;
             }
-            let bytes = match self.assets.read(&path, MAX_BYTES - self.bytes) {
+            let bytes = match self.assets.read(&path, MAX_BYTES.saturating_sub(self.bytes)) {
                 Ok(bytes) => bytes,
                 Err(error) => {
                     let hint = match error {
@@ -289,7 +293,7 @@ impl Loader<'_> {
     /// Reads the tables of one text.
     fn content(&mut self, file: usize, text: &str, folder: &str, syntax: Syntax, root: &mut Node) {
         let mut reader = Reader::new(file, text, folder, &mut self.faults);
-        let mut bases = Vec::new();
+        let mut arrays = Arrays { counts: &mut self.counts, bases: Vec::new(), syntax };
         let Data::Table(entries) = &mut root.data else {
             reader.wrong_type(root, "a scene: an object with render, camera, sphere and so on", None);
             self.incomplete = true;
@@ -299,11 +303,9 @@ impl Loader<'_> {
             let (key, span) = (entry.key.as_str(), entry.key_span);
             let node = &mut entry.value;
             if let Some(kind) = ShapeDesc::KINDS.iter().position(|k| *k == key) {
+                let shapes = &mut self.desc.shapes;
                 reader.within(key, |r| {
-                    let first = array(r, &mut self.counts, &mut bases, key, key, node, syntax, |r, node| {
-                        self.desc.shapes.push(ShapeDesc::read(kind, node, r));
-                    });
-                    debug_assert!(first <= self.desc.shapes.len());
+                    arrays.read(r, key, key, node, |r, node| shapes.push(ShapeDesc::read(kind, node, r)));
                 });
                 continue;
             }
@@ -325,12 +327,11 @@ impl Loader<'_> {
                 }
                 "light" => reader.within("light", |r| {
                     for (kind, name, node) in kinds::<LightDesc>(r, node, &mut self.incomplete) {
-                        let path = format!("light.{name}");
-                        r.within(name, |r| {
-                            array(r, &mut self.counts, &mut bases, &path, name, node, syntax, |r, node| {
-                                self.desc.lights.push(LightDesc::read(kind.unwrap_or(0), node, r));
-                            });
-                        });
+                        let lights = &mut self.desc.lights;
+                        let mut read = |r: &mut Reader<'_>, node: &Node| {
+                            lights.push(LightDesc::read(kind.unwrap_or(0), node, r));
+                        };
+                        r.within(name, |r| arrays.read(r, &format!("light.{name}"), name, node, &mut read));
                     }
                 }),
                 "material" => reader.within("material", |r| {
@@ -364,42 +365,45 @@ impl Loader<'_> {
                 }
             }
         }
-        self.sources.files[file].bases = bases;
+        self.sources.files[file].bases = arrays.bases;
     }
 }
 
-/// Reads an array of tables at `path`; elements count from the number there already is of them.
-#[allow(clippy::too_many_arguments, reason = "one step of `Loader::content`, called twice")]
-fn array(
-    reader: &mut Reader<'_>,
-    counts: &mut HashMap<String, usize>,
-    bases: &mut Vec<(String, usize)>,
-    path: &str,
-    what: &str,
-    node: &Node,
+/// The arrays of tables of one text, whose elements count on from those of the texts before.
+struct Arrays<'a> {
+    /// How many there are of each so far.
+    counts: &'a mut HashMap<String, usize>,
+    /// With how many each began in this text.
+    bases: Vec<(String, usize)>,
     syntax: Syntax,
-    mut read: impl FnMut(&mut Reader<'_>, &Node),
-) -> usize {
-    let count = counts.entry(path.to_owned()).or_insert(0);
-    let base = *count;
-    bases.push((path.to_owned(), base));
-    match node.elements() {
-        Some(elements) => {
-            for element in elements {
-                reader.at(*count, |r| read(r, element));
-                *count += 1;
-            }
-        }
-        None => {
-            let hint = match syntax {
-                Syntax::Toml => format!("write [[{path}]] for each {what}"),
-                Syntax::Json => format!("write \"{what}\": [{{ ... }}], one object for each"),
+}
+
+impl Arrays<'_> {
+    /// Reads the array `key` at `path`, each element by `read`.
+    fn read(
+        &mut self,
+        reader: &mut Reader<'_>,
+        path: &str,
+        key: &str,
+        node: &Node,
+        mut read: impl FnMut(&mut Reader<'_>, &Node),
+    ) {
+        let count = self.counts.entry(path.to_owned()).or_insert(0);
+        self.bases.push((path.to_owned(), *count));
+        let Some(elements) = node.elements() else {
+            let hint = match self.syntax {
+                Syntax::Toml => format!("write [[{path}]] for each {key}"),
+                Syntax::Json => format!("write \"{key}\": [{{ ... }}], one object for each"),
             };
             reader.wrong_type(node, "an array of tables", Some(hint));
             reader.poison();
+            return;
+        };
+        for element in elements {
+            reader.at(*count, |r| read(r, element));
+            *count += 1;
         }
     }
-    base
 }
 
 /// The kinds in `[light]`, `[material]` or `[texture]`; `None` for one that is unknown, of named things only.
@@ -550,5 +554,88 @@ pub(super) fn decode(bytes: &[u8]) -> (String, Option<(Span, String)>) {
             let text = String::from_utf8_lossy(bytes).into_owned();
             (text, Some((Span { start: at, end: at + 1 }, message)))
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::context::{MemoryAssets, NoAssets};
+
+    fn faultless(name: &str, text: &str, assets: &MemoryAssets) -> SceneDesc {
+        let parsed = SceneDesc::parse(name, text.as_bytes(), assets);
+        assert_eq!(parsed.faults(), []);
+        parsed.desc
+    }
+
+    #[test]
+    fn every_form_of_a_number_is_read() {
+        let numbers = [
+            ("1", 1.0),
+            ("-1_000", -1000.0),
+            ("+0.5", 0.5),
+            ("1_0.2_5e-1", 1.025),
+            ("0xff", 255.0),
+            ("0o17", 15.0),
+            ("0b11", 3.0),
+            ("1e308", 1e308),
+            ("123456789012345678901234567890", 1.2345678901234568e29),
+            ("inf", f64::INFINITY),
+            ("-inf", f64::NEG_INFINITY),
+        ];
+        for (text, value) in numbers {
+            let desc = faultless("s.toml", &format!("[render]\nexposure = {text}\n"), &MemoryAssets::default());
+            assert_eq!(desc.render.exposure, value, "{text}");
+        }
+        let desc =
+            faultless("s.json", "{ \"render\": { \"width\": 64.0, \"exposure\": -1.5e1 } }", &MemoryAssets::default());
+        assert_eq!((desc.render.width, desc.render.exposure), (64, -15.0));
+    }
+
+    #[test]
+    fn included_texts_come_first_and_files_start_at_the_scene() {
+        let mut assets = MemoryAssets::default();
+        let mut add = |path: &str, text: &str| assets.files.insert(path.into(), text.into());
+        add("parts/a.toml", "include = [\"deep/b.json\"]\n[[sphere]]\ncenter = [2, 0, 0]\nradius = 1\n");
+        add(
+            "parts/deep/b.json",
+            "{ \"sphere\": [{ \"center\": [1, 0, 0], \"radius\": 1 }],\n\
+             \"texture\": { \"image\": { \"b\": { \"file\": \"../b.png\" } } } }",
+        );
+        let text = "include = [\"parts/a.toml\"]\n[[parallelogram]]\np = [0, 0, 0]\ne0 = [1, 0, 0]\ne1 = [0, 1, 0]\n\
+                    [[sphere]]\ncenter = [3, 0, 0]\nradius = 1\n[texture.image.own]\nfile = \"../own.png\"\n";
+        let desc = faultless("folder/scene.toml", text, &assets);
+        let centers: Vec<f64> = desc
+            .shapes
+            .iter()
+            .filter_map(|s| if let ShapeDesc::Sphere(s) = s { Some(s.center[0]) } else { None })
+            .collect();
+        assert_eq!(centers, [1.0, 2.0, 3.0]);
+        assert!(matches!(desc.shapes.last(), Some(ShapeDesc::Parallelogram(_))));
+        let files: Vec<(&str, &str)> = desc
+            .textures
+            .iter()
+            .filter_map(
+                |(n, t)| if let TextureDesc::Image(t) = t { Some((n.as_str(), t.file.0.as_str())) } else { None },
+            )
+            .collect();
+        assert_eq!(files, [("b", "parts/b.png"), ("own", "../own.png")]);
+    }
+
+    #[test]
+    fn cameras_keep_the_order_of_the_text() {
+        let text = "[camera.z]\nposition = [0, 0, 1]\n[camera.a]\nposition = [0, 0, 2]\n";
+        let names = |desc: SceneDesc| desc.cameras.into_iter().map(|(name, _)| name).collect::<Vec<_>>();
+        assert_eq!(names(faultless("s.toml", text, &MemoryAssets::default())), ["z", "a"]);
+        let one = "camera = { position = [0, 0, 1] }";
+        assert_eq!(names(faultless("s.toml", one, &MemoryAssets::default())), [""]);
+    }
+
+    #[test]
+    fn faults_of_text_and_meaning_keep_the_description_usable() {
+        let text = b"[[sphere]]\nradius = 1\n[[sphere]]\ncenter = [1, 0, 0]\nradius = 2\n";
+        let parsed = SceneDesc::parse("s.toml", text, &NoAssets);
+        assert_eq!((parsed.faults().len(), parsed.desc.shapes.len()), (1, 2));
+        assert!(parsed.compile(&NoAssets, &CompileOptions::default()).is_err());
     }
 }

@@ -205,3 +205,108 @@ fn walk<'p>(file: &SourceFile, path: &'p str) -> (&'p str, String, Span) {
     }
     (left, walked, node.span)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::context::{MemoryAssets, NoAssets};
+    use crate::scene::SceneDesc;
+
+    fn compiled(path: &str) -> Diagnostic {
+        let (message, path) = ("wrong".to_owned(), path.to_owned());
+        Diagnostic { severity: Severity::Error, place: None, path, message, hint: None }
+    }
+
+    fn attached(name: &str, text: &str, assets: &MemoryAssets, paths: &[&str]) -> Vec<String> {
+        let parsed = SceneDesc::parse(name, text.as_bytes(), assets);
+        let faults = parsed.sources.attach(paths.iter().map(|path| compiled(path)).collect());
+        faults.iter().map(ToString::to_string).collect()
+    }
+
+    #[test]
+    fn faults_of_compiling_find_their_places() {
+        let text = "include = [\"a.json\"]\n[camera.side]\nposition = [0, 0, 1]\n[[sphere]]\ncenter = [0, 0, 0]\nradius = 0\n\
+                    [[light.spot]]\nposition = [0, 0, 0]\n[material.phong.\"a.b[0]\"]\ndiffuse = -1\n";
+        let mut assets = MemoryAssets::default();
+        let json = "{\n \"sphere\": [{ \"center\": [0, 0, 0],\n \"radius\": -1 }],\n \"material\": { \"phong\": { \"a\": {} } } }";
+        assets.files.insert("a.json".into(), json.into());
+        let paths = [
+            "sphere[1].radius",
+            "sphere[1].uv",
+            "sphere[0].center[2]",
+            "sphere[0].radius",
+            "light.spot[0].cone_deg",
+            "camera.side.position",
+            "render.width",
+            "material.phong.a.b[0].diffuse",
+            "material.phong.a.specular",
+        ];
+        assert_eq!(
+            attached("s.toml", text, &assets, &paths),
+            [
+                "a.json:2:32: sphere[0].center[2]: wrong",
+                "a.json:3:12: sphere[0].radius: wrong",
+                "a.json:4:27: material.phong.a.specular: wrong",
+                "s.toml:1:1: render.width: wrong",
+                "s.toml:3:12: camera.side.position: wrong",
+                "s.toml:4:1: sphere[1].uv: wrong",
+                "s.toml:6:10: sphere[1].radius: wrong",
+                "s.toml:7:1: light.spot[0].cone_deg: wrong",
+                "s.toml:10:11: material.phong.\"a.b[0]\".diffuse: wrong",
+            ]
+        );
+    }
+
+    #[test]
+    fn faults_of_stand_ins_are_not_told() {
+        let text = "[camera]\nposition = 3\nfov_y_deg = 400\n[[sphere]]\ncenter = [0, \"1\", 2]\nradius = 0\n\
+                    [[light.spot]]\ncone_deg = true\nstrength = -1\n";
+        let paths = [
+            "camera.position",
+            "camera.look_at",
+            "camera.fov_y_deg",
+            "sphere[0].center",
+            "sphere[0].center[1]",
+            "sphere[0].radius",
+            "light.spot[0].position",
+            "light.spot[0].look_at",
+            "light.spot[0].inner_cone_deg",
+            "light.spot[0].strength",
+        ];
+        let told = attached("s.toml", text, &MemoryAssets::default(), &paths);
+        assert_eq!(
+            told,
+            [
+                "s.toml:3:13: camera.fov_y_deg: wrong",
+                "s.toml:6:10: sphere[0].radius: wrong",
+                "s.toml:9:12: light.spot[0].strength: wrong",
+            ]
+        );
+    }
+
+    #[test]
+    fn a_course_file_has_places_too() {
+        let text = "output_resolution 64\narea_light_resolution 3\n";
+        let told = attached("c.txt", text, &MemoryAssets::default(), &["light.rectangle[0].samples", "render.height"]);
+        assert_eq!(told, ["c.txt:1:19: render.height: wrong", "c.txt:2:23: light.rectangle[0].samples: wrong"]);
+    }
+
+    #[test]
+    fn no_path_breaks_the_walk() {
+        let parsed = SceneDesc::parse("s.toml", b"[[sphere]]\n\n[material.phong.\"\"]", &NoAssets);
+        for path in [
+            "",
+            ".",
+            "[",
+            "]",
+            "[0]",
+            "sphere[",
+            "sphere[99999999999999999999]",
+            "sphere[-1]",
+            "sphere[0]x",
+            "material.phong.",
+        ] {
+            assert_eq!(parsed.sources.attach(vec![compiled(path)]).len(), 1, "{path}");
+        }
+    }
+}
