@@ -178,7 +178,7 @@ mod tests {
 
     #[test]
     fn lanes_give_the_bits_of_plain_numbers() {
-        for level in [Level::new(), Level::baseline()] {
+        for level in [Level::new(), Level::fallback()] {
             for y in [0.0, 0.3, 1.0, 8.0, 11.0, 60.0, 17.25, 1e5 + 0.5] {
                 let e = Exponent::new(y);
                 for chunk in bases().chunks_exact(16) {
