@@ -227,6 +227,7 @@ def sample(s, k):
         cos_h=cos_h,
         above=above,
         hidden=hidden,
+        lit=lit,
         diffuse=cos_i if lit else 0.0,
         specular=max(cos_h, 0.0) ** s["shininess"] if lit else 0.0,
     )
@@ -263,3 +264,153 @@ def pixel(i, j):
 
 def encode(linear):
     return 255 * min(max(linear, 0.0), 1.0) ** (1 / GAMMA)
+
+
+# ---------------------------------------------------------------------------------------------- the page
+
+PIXEL = (330, 846)
+COLUMN, ROW = 1, 1  # the sub-sample that the page follows
+SHADOWED = (800, 620)  # the second pixel: half in the shadow of a sphere
+
+
+def number(x, digits=4):
+    """As the page writes it: minus signs as hyphens, no -0."""
+    return f"{x + 0.0:.{digits}f}".replace("-0." + "0" * digits, "0." + "0" * digits)
+
+
+def vector(v, digits=4):
+    return "(" + ", ".join(number(x, digits) for x in v) + ")"
+
+
+def facts():
+    """Every number of the page, as (what it is, how the page writes it)."""
+    i, j = PIXEL
+    x, y = i + (COLUMN + 0.5) / N, j + (ROW + 0.5) / N
+    yield "place on the film", f"({x}, {y})"
+
+    film_x, film_y, towards, d = camera_ray(x, y)
+    yield "tan(fov/2)", number(math.tan(FOV / 2), 6)
+    yield "film x", number(film_x)
+    yield "film y", number(film_y)
+    yield "length of the direction", number(length(towards))
+    yield "d", vector(d)
+
+    for name, centre, radius, *_ in SPHERES:
+        b, discriminant, roots = sphere_roots(EYE, d, centre, radius)
+        yield f"{name}: b", number(b, 3)
+        yield f"{name}: discriminant", number(discriminant, 3)
+        for t in roots or ():
+            yield f"{name}: t", number(t, 3)
+    for wall in WALLS:
+        t, uv = wall_meets(EYE, d, wall)
+        yield f"{wall[0]}: t", number(t, 3)
+        if t > 0:
+            yield f"{wall[0]}: uv", f"({number(uv[0], 3)}, {number(uv[1], 3)})"
+
+    s = look(x, y)
+    name, _, _, counts, *_ = SPHERES[s["what"][1]]
+    yield "surface", name
+    yield "t", number(s["t"])
+    yield "p", vector(s["p"])
+    yield "n", vector(s["n"])
+    yield "wo", vector(s["wo"])
+    yield "n.wo", number(dot(s["n"], s["wo"]))
+    yield "u", number(s["uv"][0])
+    yield "v", number(s["uv"][1])
+    yield "angle to x", number(math.degrees(s["uv"][0] * math.pi), 2)
+    yield "angle to y", number(math.degrees(s["uv"][1] * math.pi), 2)
+    yield "u n", number(s["uv"][0] * counts, 3)
+    yield "v n", number(s["uv"][1] * counts, 3)
+    yield "square", f"({s['squares'][0]}, {s['squares'][1]})"
+    yield "texel", f"({s['texel'][0]}, {s['texel'][1]}, {s['texel'][2]})"
+
+    for k in (0, 2):
+        q = sample(s, k)
+        yield f"point {k}: place on the light", f"({number(sobol(k)[0])}, {number(sobol(k)[1])})"
+        yield f"point {k}: q", vector(q["q"])
+        yield f"point {k}: l", vector(q["l"])
+        yield f"point {k}: distance", number(q["distance"])
+        yield f"point {k}: wi", vector(q["wi"])
+        yield f"point {k}: n.wi", number(q["cos_i"])
+        assert q["lit"] == (k == 0)
+        if q["lit"]:
+            yield f"point {k}: h", vector(q["h"])
+            yield f"point {k}: n.h", number(q["cos_h"])
+            yield f"point {k}: (n.h)^s", number(q["specular"], 6)
+            # The shadow ray against the other spheres: how near it passes
+            for other, centre, radius, *_ in SPHERES:
+                f = sub(s["p"], centre)
+                t = -dot(f, q["l"]) / dot(q["l"], q["l"])
+                if other == name:
+                    yield f"shadow, {other}: b", number(-dot(f, q["l"]), 3)
+                else:
+                    yield f"shadow, {other}: t", number(t, 3)
+                    yield f"shadow, {other}: distance", number(length(add(f, mul(q["l"], t))), 3)
+            for wall in WALLS:
+                yield f"shadow, {wall[0]}: t", number(wall_meets(s["p"], q["l"], wall)[0], 3)
+
+    diffuse, specular, below, hidden = shade(s)
+    assert not hidden
+    yield "points below the horizon", str(below)
+    yield "points that count", str(SAMPLES - below)
+    yield "mean of n.wi", number(diffuse, 5)
+    yield "mean of (n.h)^s", number(specular, 6)
+    green = AMBIENT * s["texel"][1], s["texel"][1] * diffuse, s["texel"][1] * specular
+    yield "green of the sub-sample: ambient", number(green[0], 5)
+    yield "green of the sub-sample: diffuse", number(green[1], 5)
+    yield "green of the sub-sample: highlight", number(green[2], 5)
+    yield "green of the sub-sample", number(sum(green), 5)
+
+    for row in range(N):
+        means = [shade(look(i + (c + 0.5) / N, j + (row + 0.5) / N))[0] for c in range(N)]
+        yield f"row {row} of the pixel", " | ".join(number(m, 4) for m in means)
+
+    ambient, diffuse, specular, total = pixel(i, j)
+    for c, channel in enumerate(("red", "green", "blue")):
+        yield f"{channel}: ambient", number(ambient[c], 5)
+        yield f"{channel}: diffuse", number(diffuse[c], 5)
+        yield f"{channel}: highlight", number(specular[c], 5)
+        yield f"{channel}: film", number(total[c], 5)
+        yield f"{channel}: encoded", number(encode(total[c]), 2)
+    yield "the pixel's bytes", "(" + ", ".join(str(math.floor(encode(c) + 0.5)) for c in total) + ")"
+    yield "as a colour", "#" + "".join(f"{math.floor(encode(c) + 0.5):02x}" for c in total)
+
+    # The second pixel, one sub-sample of it
+    i, j = SHADOWED
+    s = look(i + (COLUMN + 0.5) / N, j + (ROW + 0.5) / N)
+    assert s["what"] == ("wall", 0)
+    diffuse, _, below, hidden = shade(s)
+    yield "second pixel: p", vector(s["p"], 3)
+    yield "second pixel: below the horizon", str(below)
+    ((by, count),) = hidden.items()
+    yield "second pixel: hidden by", by
+    yield "second pixel: hidden", str(count)
+    yield "second pixel: lit", str(SAMPLES - count - below)
+    yield "second pixel: mean of n.wi", number(diffuse, 4)
+    yield "second pixel: without the shadow", number(unshadowed(s), 4)
+
+
+def unshadowed(s):
+    return sum(max(sample(s, k)["cos_i"], 0.0) for k in range(SAMPLES)) / SAMPLES
+
+
+def main():
+    found = list(facts())
+    if sys.argv[1:] == []:
+        width = max(len(what) for what, _ in found)
+        for what, text in found:
+            print(f"{what:{width}}  {text}")
+        return 0
+    if sys.argv[1:] != ["--check"]:
+        print(__doc__.strip(), file=sys.stderr)
+        return 2
+    page = (pathlib.Path(__file__).parent / "src" / "walk.md").read_text(encoding="utf-8")
+    missing = [(what, text) for what, text in found if text not in page]
+    for what, text in missing:
+        print(f"docs/src/walk.md does not say {text} ({what})", file=sys.stderr)
+    print(f"{len(found) - len(missing)} of {len(found)} numbers stand in docs/src/walk.md")
+    return 1 if missing else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
