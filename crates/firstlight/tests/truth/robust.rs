@@ -371,6 +371,27 @@ fn a_light_in_the_plane_of_a_ceiling_is_not_blocked_by_it() {
 }
 
 #[test]
+fn shapes_in_one_plane_do_not_shadow_each_other() {
+    // A large square, tilted, far from its corners and from the origin, and small ones in its plane
+    let mut random = Random::new(16);
+    for i in 0..100 {
+        let n = random.direction();
+        let [a, b] = across(n);
+        let half = random.scale(1.0, 1e5);
+        let middle = random.vector(random.clone().scale(1e-3, 1e3));
+        let mut scene = empty(8, 8, 1)
+            .with_camera(camera(add(middle, add(mul(n, 3.0), mul(a, random.between(0.0, 10.0)))), middle, 60.0))
+            .with_parallelogram(parallelogram(sub(middle, mul(add(a, b), half)), mul(a, 2.0 * half), mul(b, 2.0 * half)));
+        for _ in 0..3 {
+            let at = add(middle, add(mul(a, random.between(-2.0, 2.0)), mul(b, random.between(-2.0, 2.0))));
+            scene = scene.with_parallelogram(square(at, n, random.scale(0.1, 10.0)));
+        }
+        // Lights on either side of the plane
+        assert_unshadowed(&scene.lit_by(&lights_around(&mut random, middle, 4.0)), &format!("plane {i}"));
+    }
+}
+
+#[test]
 fn a_light_that_touches_the_floor_lights_it() {
     // A wall that shines, standing on the floor, and one that cuts through it; close to it the floor sees half of a
     // hemisphere of radiance 1 from a plane at a right angle: E tends to pi / 2
@@ -393,7 +414,7 @@ fn a_light_that_touches_the_floor_lights_it() {
 fn wall_joints_have_no_dark_dots() {
     // The joints of side walls with floor and ceiling lie exactly on the diagonals of the picture
     for (size, antialiasing) in [(256u32, 1), (192, 1), (128, 4)] {
-        let film = shoot(&config11(size, antialiasing, 36));
+        let film = shoot(&config11(size, antialiasing, 256));
         let at = |x: u32, y: u32| film.pixels[(y * size + x) as usize];
         let last = size - 1;
         for k in 0..size * 135 / 1024 {
@@ -406,9 +427,9 @@ fn wall_joints_have_no_dark_dots() {
                 if antialiasing == 1 {
                     // The joint belongs to the side wall, the lower id, and is as bright as the wall beside it
                     assert!(here[1 - channel] == 0.0 && here[2] == 0.0, "{what}");
-                    assert!(here[channel] > 0.94 * next.min(after) && here[channel] < 1.06 * next.max(after), "{what}");
+                    assert!(here[channel] > 0.9 * next.min(after) && here[channel] < 1.1 * next.max(after), "{what}");
                 } else {
-                    // Five eighths of the wall and three of floor or ceiling, which are gray and darker
+                    // Five eighths of the wall and three of floor or ceiling
                     assert!(here[channel] > 0.6 * next.min(after), "{what}");
                 }
             }
