@@ -141,7 +141,7 @@ impl Parallelogram {
         let [dx, dy] = steps.map(|dp| Vec2::new(dp.dot(self.u_axis), dp.dot(self.v_axis)));
         ShapePoint {
             p,
-            error: ErrorBound::along(ray, t),
+            error: ErrorBound::along(ray, t, hit),
             normal: self.n,
             uv,
             footprint: Footprint { dx, dy, edges: [UvEdge::Bounded; 2] },
