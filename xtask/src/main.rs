@@ -1,1 +1,95 @@
-fn main() {}
+//! The project's own commands: `cargo xtask COMMAND`.
+
+mod bench;
+mod generate;
+mod pictures;
+mod test;
+mod verify;
+
+use std::path::{Path, PathBuf};
+use std::process::{Command, ExitCode};
+
+use clap::{Parser, Subcommand};
+
+/// The project's own commands.
+#[derive(Parser)]
+#[command(name = "cargo xtask")]
+struct Args {
+    #[command(subcommand)]
+    command: Task,
+}
+
+#[derive(Subcommand)]
+enum Task {
+    /// Runs every check and every test; needs Rust and nothing else.
+    Test,
+    /// Writes what is made from the code: the scene format reference and the JSON Schema.
+    Generate {
+        /// Changes nothing; fails if a file is not up to date.
+        #[arg(long)]
+        check: bool,
+    },
+    /// Renders the pictures of the book: the built-in scenes and the gallery.
+    Pictures {
+        /// Only those whose name contains this.
+        filter: Option<String>,
+    },
+    /// Measures config 11 and writes a page under docs/benchmarks.
+    Bench(bench::Options),
+    /// Runs the tests that take long: more scenes, more rays.
+    Verify {
+        /// Random scenes for the comparison of the renderers.
+        #[arg(long, default_value_t = 5000)]
+        scenes: u32,
+    },
+}
+
+/// What a command ends with: nothing, or what went wrong.
+type Outcome = Result<(), String>;
+
+fn main() -> ExitCode {
+    let outcome = match Args::parse().command {
+        Task::Test => test::run(),
+        Task::Generate { check } => generate::run(check),
+        Task::Pictures { filter } => pictures::run(filter.as_deref()),
+        Task::Bench(options) => bench::run(&options),
+        Task::Verify { scenes } => verify::run(scenes),
+    };
+    match outcome {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(fault) => {
+            eprintln!("xtask: {fault}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+/// The repository's root.
+fn root() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).parent().map(Path::to_path_buf).unwrap_or_default()
+}
+
+/// The cargo that runs us.
+fn cargo() -> Command {
+    let mut command = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
+    command.current_dir(root());
+    command
+}
+
+/// Runs a command to its end, its output shown.
+fn run(command: &mut Command) -> Outcome {
+    let words: Vec<_> = std::iter::once(command.get_program()).chain(command.get_args()).collect();
+    let line = words.join(" ".as_ref()).to_string_lossy().into_owned();
+    eprintln!("\n$ {line}");
+    let status = command.status().map_err(|e| format!("{line}: {e}"))?;
+    if status.success() { Ok(()) } else { Err(format!("{line}: {status}")) }
+}
+
+/// Writes a file and makes its folder.
+fn write(path: &Path, bytes: &[u8]) -> Outcome {
+    let fault = |e: std::io::Error| format!("{}: {e}", path.display());
+    if let Some(folder) = path.parent() {
+        std::fs::create_dir_all(folder).map_err(fault)?;
+    }
+    std::fs::write(path, bytes).map_err(fault)
+}

@@ -222,10 +222,10 @@ impl CompileContext {
         self.faults.len() == before
     }
 
-    /// A number in (0, max].
+    /// A length: from the shortest to the longest that can be computed with.
     pub(crate) fn positive(&mut self, field: &str, v: f64, hint: &str) -> f32 {
         if !(MIN_LENGTH..=MAX_COORDINATE).contains(&v) {
-            self.error(field, format!("{v} is outside (0, 1e9]"), Some(hint));
+            self.error(field, format!("{v} is outside [1e-9, 1e9]"), Some(hint));
         }
         v as f32
     }

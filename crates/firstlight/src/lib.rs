@@ -21,11 +21,18 @@ pub use context::{AssetError, Assets, FolderAssets, MemoryAssets, NoAssets};
 pub use describe::{ColorDesc, ColorParam, FilePath, NumberParam, ParamDesc};
 pub use error::{Diagnostic, Place, SceneError, Severity};
 pub use ids::{LightId, MaterialId, SurfaceId, TextureId};
-pub use image::{Image, Receipt, Window};
+pub use image::{
+    Format, Image, ImageError, PendingFile, Receipt, StagedFile, StoredImage, Window, Written, write_whole,
+};
 pub use light::{DirectionalDesc, EmitSides, Falloff, LightDesc, PointDesc, RectangleDesc, SampleSet, SpotDesc};
 pub use material::{BlinnPhongDesc, MaterialDesc, PhongDesc};
 pub use math::{Ray, Vec2, Vec3};
 pub use render::{Film, RenderSettings, RenderStats, SimdLevel, render};
-pub use scene::{CameraHit, CompileOptions, Compiled, Hit, Scene, SceneSummary, DisplayEncoding, RenderDesc, SceneDesc};
-pub use shape::{Footprint, RayDifferential, SurfaceInteraction, UvEdge, ParallelogramDesc, ShapeDesc, SphereDesc, SphereUv};
+pub use scene::{Builtin, Parsed, builtin_scenes, reference, schema};
+pub use scene::{
+    CameraHit, CompileOptions, Compiled, DisplayEncoding, Hit, RenderDesc, Scene, SceneDesc, SceneSummary,
+};
+pub use shape::{
+    Footprint, ParallelogramDesc, RayDifferential, ShapeDesc, SphereDesc, SphereUv, SurfaceInteraction, UvEdge,
+};
 pub use texture::{CheckerboardDesc, Filter, ImageTextureDesc, TextureDesc, TextureSpace, Wrap};

@@ -99,7 +99,11 @@ impl CameraDesc {
         let radians = std::f64::consts::PI / 180.0;
         match (self.fov_y_deg, self.focal_length_mm) {
             (Some(_), Some(focal)) => {
-                cx.error("focal_length_mm", format!("{focal} and fov_y_deg say the same twice"), Some("keep one of them"));
+                cx.error(
+                    "focal_length_mm",
+                    format!("{focal} and fov_y_deg say the same twice"),
+                    Some("keep one of them"),
+                );
             }
             (Some(fov), None) => {
                 if !(0.001..=179.99).contains(&fov) {

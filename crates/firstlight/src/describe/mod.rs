@@ -1,8 +1,54 @@
 //! What a scene may say, once: the [`table!`] macro makes a `*Desc` struct, its reader, its writer, its JSON Schema and
 //! its page of the reference from one list of documented fields.
+//!
+//! A field with `= default` may be left out of the text, and is left out by the writer while it has that value; a field
+//! without is required, and is an argument of `new`. A table whose fields all have defaults implements `Default`.
+//!
+//! - [`node`]: TOML and JSON as one tree that knows where everything stands;
+//! - [`read`]: from the tree to values, collecting every fault;
+//! - [`write`](mod@write): from values to text;
+//! - [`family!`]: the enum of all kinds of a family, lights say;
+//! - [`info`]: what the fields are, for the schema and the reference.
 
 /// Declares a table of the scene text. See the module's documentation.
 macro_rules! table {
+    // A field's value: read from the text, or what stands for it
+    (@read $fields:ident, $field:ident) => { $fields.required(stringify!($field)) };
+    (@read $fields:ident, $field:ident, $default:expr) => { $fields.optional(stringify!($field), || $default) };
+
+    (@is_default $table:ident, $field:ident) => { false };
+    (@is_default $table:ident, $field:ident, $default:expr) => { $table.$field == $default };
+
+    (@default $ty:ty) => { None };
+    (@default $ty:ty, $default:expr) => {{
+        let default: $ty = $default;
+        Some($crate::describe::Value::write(&default))
+    }};
+
+    // Sort the fields into the arguments of `new` and the ones with a default
+    (@new $name:ident [$($args:tt)*] [$($inits:tt)*] $field:ident : $ty:ty = $default:expr, $($rest:tt)*) => {
+        $crate::describe::table!(@new $name [$($args)*] [$($inits)* $field: $default,] $($rest)*);
+    };
+    (@new $name:ident [$($args:tt)*] [$($inits:tt)*] $field:ident : $ty:ty, $($rest:tt)*) => {
+        $crate::describe::table!(@new $name [$($args)* $field: $ty,] [$($inits)* $field: $field,] $($rest)*);
+    };
+    (@new $name:ident [] [$($field:ident : $value:expr,)*]) => {
+        impl Default for $name {
+            fn default() -> Self {
+                Self { $($field: $value,)* }
+            }
+        }
+    };
+    (@new $name:ident [$($arg:ident : $ty:ty,)+] [$($field:ident : $value:expr,)*]) => {
+        impl $name {
+            /// With its required fields; all others have their defaults.
+            #[allow(clippy::redundant_field_names, reason = "one macro writes arguments and defaults alike")]
+            pub fn new($($arg: $ty),+) -> Self {
+                Self { $($field: $value,)* }
+            }
+        }
+    };
+
     (
         $(#[doc = $doc:literal])*
         pub struct $name:ident {
@@ -13,6 +59,37 @@ macro_rules! table {
         #[derive(Clone, Debug, PartialEq)]
         pub struct $name {
             $( $(#[doc = $fdoc])* pub $field: $ty, )*
+        }
+
+        $crate::describe::table!(@new $name [] [] $( $field : $ty $(= $default)?, )*);
+
+        impl $crate::describe::Table for $name {
+            const DOC: &'static [&'static str] = &[$($doc),*];
+            const FIELDS: &'static [&'static str] = &[$(stringify!($field)),*];
+
+            fn read(fields: &mut $crate::describe::Fields<'_, '_, '_>) -> Self {
+                Self { $( $field: $crate::describe::table!(@read fields, $field $(, $default)?), )* }
+            }
+
+            fn write(&self) -> Vec<(&'static str, $crate::describe::Written)> {
+                let mut written = Vec::new();
+                $(
+                    if !($crate::describe::table!(@is_default self, $field $(, $default)?)) {
+                        written.push((stringify!($field), $crate::describe::Value::write(&self.$field)));
+                    }
+                )*
+                written
+            }
+
+            fn info() -> Vec<$crate::describe::FieldInfo> {
+                vec![$(
+                    $crate::describe::FieldInfo::of::<$ty>(
+                        stringify!($field),
+                        &[$($fdoc),*],
+                        $crate::describe::table!(@default $ty $(, $default)?),
+                    ),
+                )*]
+            }
         }
     };
 }
@@ -30,16 +107,54 @@ macro_rules! words {
         pub enum $name {
             $( $(#[doc = $vdoc])* $variant, )*
         }
-        impl $name { pub const fn name(self) -> &'static str { match self { $(Self::$variant => $word,)* } } }
+
+        impl $name {
+            /// Every one of them, in the order of the reference.
+            pub const ALL: &'static [Self] = &[$(Self::$variant),*];
+
+            /// The word for it in scene text.
+            pub fn name(self) -> &'static str {
+                match self {
+                    $( Self::$variant => $word, )*
+                }
+            }
+
+            /// The one of that name, `None` if there is none.
+            pub fn from_name(name: &str) -> Option<Self> {
+                match name {
+                    $( $word => Some(Self::$variant), )*
+                    _ => None,
+                }
+            }
+        }
+
+        impl $crate::describe::Words for $name {
+            const CHOICES: &'static [$crate::describe::Choice] =
+                &[$( $crate::describe::Choice { word: $word, doc: &[$($vdoc),*] } ),*];
+
+            fn of_word(word: &str) -> Option<Self> {
+                Self::from_name(word)
+            }
+
+            fn word(&self) -> &'static str {
+                self.name()
+            }
+        }
     };
 }
 
 pub(crate) use table;
 pub(crate) use words;
 
-mod value;
+pub(crate) mod family;
+pub(crate) mod info;
+pub(crate) mod node;
+pub(crate) mod read;
+pub(crate) mod value;
+pub(crate) mod write;
 
+pub(crate) use family::{Family, TableInfo, family};
+pub(crate) use info::{Choice, FieldInfo};
+pub(crate) use read::{Fields, Table, Value, Words, nearest};
 pub use value::{ColorDesc, ColorParam, FilePath, NumberParam, ParamDesc};
-
-// STUB
-pub(crate) fn nearest<'a>(_: &str, _: impl Iterator<Item = &'a str>) -> Option<&'a str> { None }
+pub(crate) use write::Written;

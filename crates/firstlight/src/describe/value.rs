@@ -1,4 +1,11 @@
-//! The values a field of the scene text can have.
+//! The values a field of the scene text can have, beyond plain numbers, words and arrays.
+
+use crate::color::Encoding;
+use serde_json::{Value as Json, json};
+
+use super::node::{Data, Node, quoted};
+use super::read::{Reader, Value};
+use super::write::Written;
 
 /// A colour: linear Rec. 709. In text `[r, g, b]` is linear, `"#rrggbb"` sRGB, and a number is that much gray (linear).
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -21,6 +28,77 @@ impl ColorDesc {
     /// The same linear value in all channels.
     pub const fn gray(v: f64) -> Self {
         Self::linear(v, v, v)
+    }
+}
+
+impl From<[f64; 3]> for ColorDesc {
+    /// Linear red, green, blue.
+    fn from([r, g, b]: [f64; 3]) -> Self {
+        Self::linear(r, g, b)
+    }
+}
+
+impl From<f64> for ColorDesc {
+    /// Linear gray.
+    fn from(v: f64) -> Self {
+        Self::gray(v)
+    }
+}
+
+/// The colour of `#rrggbb`.
+fn from_hex(text: &str) -> Option<ColorDesc> {
+    let digits = text.strip_prefix('#').filter(|d| d.len() == 6 && d.bytes().all(|b| b.is_ascii_hexdigit()))?;
+    let channel = |i: usize| {
+        u8::from_str_radix(&digits[i..i + 2], 16).ok().map(|byte| Encoding::Srgb.decode(f64::from(byte) / 255.0))
+    };
+    Some(ColorDesc::linear(channel(0)?, channel(2)?, channel(4)?))
+}
+
+impl Value for ColorDesc {
+    fn words() -> String {
+        "a colour ([r, g, b], \"#rrggbb\" or a gray)".into()
+    }
+
+    fn plural() -> String {
+        "colours ([r, g, b], \"#rrggbb\" or a gray)".into()
+    }
+
+    fn schema() -> Json {
+        json!({ "anyOf": [
+            { "type": "array", "items": { "type": "number", "minimum": 0 }, "minItems": 3, "maxItems": 3 },
+            { "type": "string", "pattern": "^#[0-9a-fA-F]{6}$" },
+            { "type": "number", "minimum": 0 },
+        ] })
+    }
+
+    fn placeholder() -> Self {
+        Self::BLACK
+    }
+
+    fn read(node: &Node, reader: &mut Reader<'_>) -> Option<Self> {
+        match &node.data {
+            Data::Array(elements) if elements.len() == 3 => <[f64; 3]>::read(node, reader).map(Self::from),
+            Data::Number(_) => f64::read(node, reader).map(Self::gray),
+            Data::String(text) => {
+                let color = from_hex(text);
+                if color.is_none() {
+                    let message = format!("{} is not a colour", quoted(text));
+                    let hint = "a string colour is \"#\" and 6 hexadecimal digits, as \"#ff8000\"; \
+                                a linear one is [r, g, b]";
+                    reader.error(node.span, message, Some(hint.into()));
+                }
+                color
+            }
+            _ => {
+                reader.wrong_type(node, &Self::words(), None);
+                None
+            }
+        }
+    }
+
+    fn write(&self) -> Written {
+        let [r, g, b] = self.linear;
+        if r == g && g == b { r.write() } else { self.linear.write() }
     }
 }
 
@@ -64,7 +142,183 @@ impl NumberParam {
     }
 }
 
+impl<T> From<T> for ParamDesc<T> {
+    fn from(value: T) -> Self {
+        Self::constant(value)
+    }
+}
+
+impl From<[f64; 3]> for ColorParam {
+    /// Linear red, green, blue, the same everywhere.
+    fn from(linear: [f64; 3]) -> Self {
+        Self::constant(linear.into())
+    }
+}
+
+/// What a texture can drive, and the factor that leaves a texture as it is.
+trait Factor: Value {
+    const ONE: Self;
+}
+
+impl Factor for f64 {
+    const ONE: Self = 1.0;
+}
+
+impl Factor for ColorDesc {
+    const ONE: Self = ColorDesc::WHITE;
+}
+
+impl<T: Factor> Value for ParamDesc<T> {
+    fn words() -> String {
+        format!("{} or {{ texture = \"NAME\", factor = ... }}", T::words())
+    }
+
+    fn plural() -> String {
+        format!("{} or {{ texture = \"NAME\", factor = ... }}", T::plural())
+    }
+
+    fn schema() -> Json {
+        let textured = json!({
+            "type": "object",
+            "properties": { "texture": { "type": "string" }, "factor": T::schema() },
+            "required": ["texture"],
+            "additionalProperties": false,
+        });
+        json!({ "anyOf": [T::schema(), textured] })
+    }
+
+    fn placeholder() -> Self {
+        Self::constant(T::placeholder())
+    }
+
+    fn read(node: &Node, reader: &mut Reader<'_>) -> Option<Self> {
+        let Some(entries) = node.entries() else {
+            return T::read(node, reader).map(Self::constant);
+        };
+        let meant = reader.unknown_keys(entries, &["texture", "factor"], "a textured value");
+        let texture = match node.get("texture") {
+            Some(name) => reader.within("texture", |r| String::read(name, r)),
+            None if meant.contains(&"texture") => None,
+            None => {
+                let hint = "write `texture = \"NAME\"`, or the value without a table";
+                reader.error(node.span, "\"texture\" is missing", Some(hint.into()));
+                None
+            }
+        };
+        let factor = match node.get("factor") {
+            Some(factor) => reader.within("factor", |r| T::read(factor, r)),
+            None => Some(T::ONE),
+        };
+        Some(Self { texture: Some(texture?), factor: factor? })
+    }
+
+    fn write(&self) -> Written {
+        match &self.texture {
+            None => self.factor.write(),
+            Some(name) => {
+                let mut fields = vec![("texture", name.write())];
+                if self.factor != T::ONE {
+                    fields.push(("factor", self.factor.write()));
+                }
+                Written::Table(fields)
+            }
+        }
+    }
+}
+
 /// A file a scene names: with `/` between folders, relative to the scene's folder. In an included text it is written
 /// relative to that text's own folder.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub struct FilePath(pub String);
+
+impl From<&str> for FilePath {
+    fn from(path: &str) -> Self {
+        Self(path.to_owned())
+    }
+}
+
+impl From<String> for FilePath {
+    fn from(path: String) -> Self {
+        Self(path)
+    }
+}
+
+/// A path written in a text of `folder`, relative to the folder that `folder` is relative to; by its words alone, so
+/// that `a/../b` is `b` even where `a` is a link.
+pub(crate) fn join_path(folder: &str, path: &str) -> String {
+    if folder.is_empty() || std::path::Path::new(path).has_root() {
+        return path.to_owned();
+    }
+    normalized(&format!("{folder}/{path}"))
+}
+
+/// Without `.`, and without `..` after a folder.
+pub(crate) fn normalized(path: &str) -> String {
+    let mut parts: Vec<&str> = Vec::new();
+    for part in path.split('/') {
+        match part {
+            "." => {}
+            "" if !parts.is_empty() => {}
+            ".." if parts.last().is_some_and(|last| !matches!(*last, ".." | "")) => {
+                parts.pop();
+            }
+            part => parts.push(part),
+        }
+    }
+    parts.join("/")
+}
+
+impl Value for FilePath {
+    fn words() -> String {
+        "a file (a string)".into()
+    }
+
+    fn plural() -> String {
+        "files (strings)".into()
+    }
+
+    fn schema() -> Json {
+        json!({ "type": "string" })
+    }
+
+    fn placeholder() -> Self {
+        Self(String::new())
+    }
+
+    fn read(node: &Node, reader: &mut Reader<'_>) -> Option<Self> {
+        let path = String::read(node, reader)?;
+        Some(Self(join_path(reader.folder(), &path)))
+    }
+
+    fn write(&self) -> Written {
+        self.0.write()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn hex_colours_are_srgb() {
+        assert_eq!(from_hex("#ffffff"), Some(ColorDesc::WHITE));
+        assert_eq!(from_hex("#000000"), Some(ColorDesc::BLACK));
+        // 188 of 255 is half of the light, the well-known middle of black and white
+        let half = from_hex("#bcbcbc").expect("is a colour").linear[0];
+        assert!((half - 0.502886).abs() < 1e-6, "{half}");
+        assert_eq!(from_hex("#0a0A0a").expect("is a colour").linear[0], 10.0 / 255.0 / 12.92);
+        for bad in ["", "#", "ffffff", "#fff", "#ggffff", "#fffffff", "#\u{e4}\u{e4}\u{e4}", "red"] {
+            assert_eq!(from_hex(bad), None, "{bad}");
+        }
+    }
+
+    #[test]
+    fn included_paths_start_at_the_scene() {
+        assert_eq!(join_path("", "a/../b.png"), "a/../b.png");
+        assert_eq!(join_path("parts", "b.png"), "parts/b.png");
+        assert_eq!(join_path("parts", "../b.png"), "b.png");
+        assert_eq!(join_path("parts", "../../b.png"), "../b.png");
+        assert_eq!(join_path("parts/x", "./y//b.png"), "parts/x/y/b.png");
+        assert_eq!(join_path("parts", "/etc/b.png"), "/etc/b.png");
+    }
+}

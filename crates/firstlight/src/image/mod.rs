@@ -1,4 +1,24 @@
 //! Pictures in memory and in files.
+//!
+//! Owns the encoders (one file each), writing files whole, and decoding the pictures that textures are made of.
+//! Before it stands the film; after it, only the disk.
+
+mod error;
+#[cfg(feature = "exr")]
+mod exr;
+mod file;
+mod format;
+mod hdr;
+mod png;
+pub(crate) mod read;
+mod stored;
+
+pub use error::ImageError;
+pub use file::{PendingFile, StagedFile, Written, write_whole};
+pub use format::Format;
+pub use stored::StoredImage;
+
+use crate::color::Display;
 
 /// The part of a film that a picture shows, in pixels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -26,28 +46,187 @@ pub struct Image {
 
 /// What a picture file says of itself: keys and values, in order. Only what decides pixels: no clock, host, thread
 /// count or absolute path.
+///
+/// A key is 1 to 64 of the letters a to z and A to Z, digits, `_`, `.` and `-`, and appears once. A value is any text
+/// without the character NUL.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Receipt {
     /// Key and value, `("scene_hash", "9f1c...")`.
     pub entries: Vec<(String, String)>,
 }
 
-/// The texels of a picture as it is stored.
-#[derive(Clone, Debug)]
-pub(crate) struct Texels {
-    pub width: u32,
-    pub height: u32,
-    pub data: TexelData,
+/// What made a file, as it says of itself.
+const SOFTWARE: &str = concat!("firstlight ", env!("CARGO_PKG_VERSION"));
+
+/// Before a receipt's key, where it stands among the names of others.
+const PREFIX: &str = "firstlight:";
+
+impl Image {
+    /// The bytes of a picture file. The same picture and receipt give the same bytes, always.
+    ///
+    /// 8- and 16-bit formats store straight alpha, encoded for `display`; without alpha if every pixel has alpha 1.
+    /// The others store the film as it is, and `display` has no part in them. NaN is stored as 0 and infinity as the
+    /// largest number, except in EXR, which has both.
+    ///
+    /// # Errors
+    /// A picture whose window is empty, or outside its film, or which has not as many pixels as the window says; a
+    /// display or receipt outside what it may be; a format that this build does not have.
+    pub fn encode(&self, format: Format, display: &Display, receipt: &Receipt) -> Result<Vec<u8>, ImageError> {
+        self.check()?;
+        receipt.check()?;
+        match format {
+            Format::Png8 => png::encode(self, png::Depth::Eight, display, receipt),
+            Format::Png16 => png::encode(self, png::Depth::Sixteen, display, receipt),
+            #[cfg(feature = "exr")]
+            Format::Exr => exr::encode(self, receipt),
+            #[cfg(not(feature = "exr"))]
+            Format::Exr => Err(ImageError::WithoutExr),
+            Format::Hdr => Ok(hdr::encode(self, receipt)),
+        }
+    }
+
+    /// Whether the picture is whole.
+    fn check(&self) -> Result<(), ImageError> {
+        let Window { x, y, width, height } = self.window;
+        let [w, h] = self.film;
+        let inside = |first: u32, length: u32, all: u32| first.checked_add(length).is_some_and(|end| end <= all);
+        if width == 0 || height == 0 || !inside(x, width, w) || !inside(y, height, h) {
+            let fault = format!("the window {width} x {height} at ({x}, {y}) is empty or outside the film {w} x {h}");
+            return Err(ImageError::Picture(fault));
+        }
+        if self.pixels.len() as u64 != u64::from(width) * u64::from(height) {
+            let fault = format!("{} pixels do not fill the window {width} x {height}", self.pixels.len());
+            return Err(ImageError::Picture(fault));
+        }
+        Ok(())
+    }
+
+    /// Whether every pixel has alpha 1, so that a file needs none.
+    fn is_opaque(&self) -> bool {
+        self.pixels.iter().all(|p| p[3] == 1.0)
+    }
 }
 
-/// Red, green, blue; row 0 on top.
-#[derive(Clone, Debug)]
-pub(crate) enum TexelData {
-    Rgb8(Vec<[u8; 3]>),
-    Rgb16(Vec<[u16; 3]>),
+impl Receipt {
+    /// Whether every format can hold it.
+    fn check(&self) -> Result<(), ImageError> {
+        let mut seen = std::collections::BTreeSet::new();
+        for (key, value) in &self.entries {
+            let legal = |c: u8| c.is_ascii_alphanumeric() || b"_.-".contains(&c);
+            if !(1..=64).contains(&key.len()) || !key.bytes().all(legal) {
+                return Err(ImageError::Receipt {
+                    key: key.clone(),
+                    fault: "is not a key: 1 to 64 letters, digits, _ . or - are",
+                });
+            }
+            if !seen.insert(key) {
+                return Err(ImageError::Receipt { key: key.clone(), fault: "appears twice; keys are unique" });
+            }
+            if value.contains('\0') {
+                return Err(ImageError::Receipt {
+                    key: key.clone(),
+                    fault: "has a value with the character NUL, which no file can hold",
+                });
+            }
+            // PNG counts in 31 bits, EXR as well; both with room for the key
+            if value.len() > 1 << 30 {
+                return Err(ImageError::Receipt { key: key.clone(), fault: "has a value of more than 2^30 bytes" });
+            }
+        }
+        Ok(())
+    }
 }
 
-// STUB
-#[derive(Default)]
-pub(crate) struct TexelLimits;
-pub(crate) fn decode(_: &[u8], _: &TexelLimits) -> Result<Texels, String> { Err("stub".into()) }
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A picture that is its whole film.
+    pub(crate) fn whole(width: u32, height: u32, pixel: impl Fn(u32, u32) -> [f32; 4]) -> Image {
+        let pixels = (0..height).flat_map(|y| (0..width).map(move |x| (x, y))).map(|(x, y)| pixel(x, y)).collect();
+        Image { film: [width, height], window: Window { x: 0, y: 0, width, height }, pixels }
+    }
+
+    pub(crate) fn receipt() -> Receipt {
+        let entry = |k: &str, v: &str| (k.to_owned(), v.to_owned());
+        Receipt {
+            entries: vec![
+                entry("scene_hash", "9f1c"),
+                entry("names", "Würfel, \"Kugel\"\nback\\slash = 1"),
+                entry("camera.fov_y_deg", "45"),
+                entry("empty", ""),
+                entry("a-key-that-is-much-longer-than-the-thirty-one-bytes-of-old-exr", "x"),
+            ],
+        }
+    }
+
+    const FORMATS: [Format; 4] = [Format::Png8, Format::Png16, Format::Exr, Format::Hdr];
+
+    fn built(format: Format) -> bool {
+        format != Format::Exr || cfg!(feature = "exr")
+    }
+
+    #[test]
+    fn pictures_that_are_not_whole_are_refused() {
+        let good = whole(3, 2, |_, _| [0.0; 4]);
+        let mut short = good.clone();
+        short.pixels.pop();
+        let mut outside = good.clone();
+        outside.window.x = 1;
+        let mut far = good.clone();
+        far.window.y = u32::MAX;
+        let empty = Image { film: [3, 2], window: Window { x: 0, y: 0, width: 0, height: 2 }, pixels: Vec::new() };
+        for format in FORMATS {
+            for bad in [&short, &outside, &far, &empty] {
+                let result = bad.encode(format, &Display::default(), &Receipt::default());
+                assert!(matches!(result, Err(ImageError::Picture(_))));
+            }
+        }
+    }
+
+    #[test]
+    fn receipts_that_no_file_can_hold_are_refused() {
+        let picture = whole(1, 1, |_, _| [0.0; 4]);
+        let long = "k".repeat(65);
+        for (key, value) in [("", ""), ("a b", ""), ("ä", ""), (long.as_str(), ""), ("k", "a\0b")] {
+            let receipt = Receipt { entries: vec![(key.into(), value.into())] };
+            let result = picture.encode(Format::Png8, &Display::default(), &receipt);
+            assert!(matches!(result, Err(ImageError::Receipt { .. })), "{key}");
+        }
+        let twice = Receipt { entries: vec![("k".into(), "1".into()), ("k".into(), "2".into())] };
+        let fault = picture.encode(Format::Hdr, &Display::default(), &twice).unwrap_err().to_string();
+        assert_eq!(fault, "receipt key \"k\" appears twice; keys are unique");
+    }
+
+    #[test]
+    fn the_same_picture_gives_the_same_bytes_and_its_receipt_comes_back() {
+        let picture = whole(13, 9, |x, y| [x as f32 / 12.0, y as f32 / 8.0, 0.25, if x == y { 0.5 } else { 1.0 }]);
+        for format in FORMATS.into_iter().filter(|&f| built(f)) {
+            let bytes = picture.encode(format, &Display::default(), &receipt()).unwrap();
+            for _ in 0..5 {
+                assert!(picture.encode(format, &Display::default(), &receipt()).unwrap() == bytes, "{format:?}");
+            }
+            let stored = StoredImage::read(&bytes).unwrap();
+            assert_eq!(stored.format, format);
+            assert_eq!(stored.receipt, receipt(), "{format:?}");
+            assert_eq!((stored.film, stored.window), (picture.film, picture.window));
+        }
+    }
+
+    #[test]
+    fn no_number_breaks_an_encoder() {
+        let odd = [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, -1.0, 0.0, -0.0, 1e-45, 1e-38, f32::MAX, 0.5];
+        let picture = whole(10, 10, |x, y| [odd[x as usize], odd[y as usize], 0.5, odd[(x + y) as usize % 10]]);
+        let display = Display::default();
+        for format in FORMATS.into_iter().filter(|&f| built(f)) {
+            let bytes = picture.encode(format, &display, &Receipt::default()).unwrap();
+            let stored = StoredImage::read(&bytes).unwrap();
+            if format == Format::Exr {
+                let bits = |p: &[[f32; 4]]| p.iter().flatten().map(|x| x.to_bits()).collect::<Vec<_>>();
+                assert!(bits(&stored.pixels) == bits(&picture.pixels));
+            } else {
+                assert!(stored.pixels.iter().flatten().all(|x| x.is_finite() && *x >= 0.0));
+            }
+        }
+    }
+}

@@ -8,7 +8,7 @@ mod spot;
 
 use crate::color::Rgb;
 use crate::context::CompileContext;
-use crate::describe::{ColorDesc, words};
+use crate::describe::{ColorDesc, family, words};
 use crate::math::Vec3;
 
 pub use directional::{Directional, DirectionalDesc};
@@ -41,33 +41,21 @@ words! {
     }
 }
 
-/// A light as a scene may say it.
-#[derive(Clone, Debug, PartialEq)]
-pub enum LightDesc {
-    /// `[[light.point]]`
-    Point(PointDesc),
-    /// `[[light.directional]]`
-    Directional(DirectionalDesc),
-    /// `[[light.spot]]`
-    Spot(SpotDesc),
-    /// `[[light.rectangle]]`
-    Rectangle(RectangleDesc),
+family! {
+    /// A light as a scene may say it.
+    pub enum LightDesc: "light" {
+        /// `[[light.point]]`
+        Point(PointDesc) = "point",
+        /// `[[light.directional]]`
+        Directional(DirectionalDesc) = "directional",
+        /// `[[light.spot]]`
+        Spot(SpotDesc) = "spot",
+        /// `[[light.rectangle]]`
+        Rectangle(RectangleDesc) = "rectangle",
+    }
 }
 
 impl LightDesc {
-    /// The kinds, in scene order.
-    pub const KINDS: &'static [&'static str] = &["point", "directional", "spot", "rectangle"];
-
-    /// Its kind, one of [`KINDS`](Self::KINDS).
-    pub fn kind(&self) -> &'static str {
-        match self {
-            LightDesc::Point(_) => "point",
-            LightDesc::Directional(_) => "directional",
-            LightDesc::Spot(_) => "spot",
-            LightDesc::Rectangle(_) => "rectangle",
-        }
-    }
-
     /// Its name, if it has one.
     pub fn name(&self) -> Option<String> {
         match self {

@@ -32,9 +32,8 @@ impl SampleSet {
     /// `count` points of the unit square.
     pub(crate) fn points(self, count: u32, seed: u32) -> Vec<[f64; 2]> {
         let side = count.isqrt().max(1);
-        let cell = |k: u32, [x, y]: [f64; 2]| {
-            [((k % side) as f64 + x) / side as f64, ((k / side) as f64 + y) / side as f64]
-        };
+        let cell =
+            |k: u32, [x, y]: [f64; 2]| [((k % side) as f64 + x) / side as f64, ((k / side) as f64 + y) / side as f64];
         (0..count)
             .map(|k| match self {
                 SampleSet::Sobol => sobol(k),

@@ -66,8 +66,11 @@ impl SpotDesc {
         cx.point("look_at", self.look_at);
         let axis = DVec3::from(self.look_at) - DVec3::from(self.position);
         if !(axis.length() >= 1e-9) {
-            let message =
-                format!("{} is the light's position {}: the cone has no axis", show(&self.look_at), show(&self.position));
+            let message = format!(
+                "{} is the light's position {}: the cone has no axis",
+                show(&self.look_at),
+                show(&self.position)
+            );
             cx.error("look_at", message, Some("move one of them"));
         }
         let hint = "the cone is the full angle, not half";

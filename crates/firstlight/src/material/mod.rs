@@ -9,25 +9,17 @@ pub use blinn_phong::{BlinnPhongDesc, BlinnPhongLobe};
 pub use phong::{PhongDesc, PhongLobe};
 
 use crate::color::Rgb;
+use crate::describe::family;
 use crate::shape::SurfaceInteraction;
 use crate::texture::{Param, Texture};
 
-/// A material as a scene may say it.
-#[derive(Clone, Debug, PartialEq)]
-pub enum MaterialDesc {
-    /// `[material.phong.NAME]`
-    Phong(PhongDesc),
-    /// `[material.blinn-phong.NAME]`
-    BlinnPhong(BlinnPhongDesc),
-}
-
-impl MaterialDesc {
-    /// `phong` or `blinn-phong`.
-    pub fn kind(&self) -> &'static str {
-        match self {
-            MaterialDesc::Phong(_) => "phong",
-            MaterialDesc::BlinnPhong(_) => "blinn-phong",
-        }
+family! {
+    /// A material as a scene may say it.
+    pub enum MaterialDesc: "material" {
+        /// `[material.phong.NAME]`
+        Phong(PhongDesc) = "phong",
+        /// `[material.blinn-phong.NAME]`
+        BlinnPhong(BlinnPhongDesc) = "blinn-phong",
     }
 }
 

@@ -28,11 +28,7 @@ impl<S: Simd> Vec3x16<S> {
     /// The vector product, computed in the order of `Vec3::cross`.
     #[inline(always)]
     pub fn cross(self, o: Self) -> Self {
-        Self {
-            x: self.y * o.z - o.y * self.z,
-            y: self.z * o.x - o.z * self.x,
-            z: self.x * o.y - o.x * self.y,
-        }
+        Self { x: self.y * o.z - o.y * self.z, y: self.z * o.x - o.z * self.x, z: self.x * o.y - o.x * self.y }
     }
 
     /// Each coordinate without its sign.

@@ -4,7 +4,7 @@
 //! that it could not have answered "blocked": a flat one that has the point and all of the light on one side of its
 //! plane, the sphere the point itself lies on the outside of, a sphere that is wholly below the point's horizon.
 
-use fearless_simd::{f32x16, prelude::*};
+use fearless_simd::{Level, dispatch, f32x16, prelude::*};
 
 use super::Counts;
 use super::pixel::{Lighting, LobeSums};
@@ -16,8 +16,8 @@ use crate::scene::Scene;
 use crate::shape::{ParallelogramShadow, SphereShadow, SurfaceInteraction};
 
 /// Light, sixteen samples at a time.
-pub(crate) struct Lanes<S: Simd> {
-    simd: S,
+pub(crate) struct Lanes {
+    level: Level,
     /// Spheres that can stand between the surface looked around from and any light.
     spheres: Vec<SphereShadow>,
     /// All that is flat, as seen from that surface, by the index that tells on which side of it each light lies.
@@ -26,10 +26,9 @@ pub(crate) struct Lanes<S: Simd> {
     between: Vec<ParallelogramShadow>,
 }
 
-impl<S: Simd> Lanes<S> {
-    #[inline(always)]
-    pub fn new(simd: S) -> Self {
-        Lanes { simd, spheres: Vec::new(), flats: Vec::new(), between: Vec::new() }
+impl Lanes {
+    pub fn new(level: Level) -> Self {
+        Lanes { level, spheres: Vec::new(), flats: Vec::new(), between: Vec::new() }
     }
 }
 
@@ -93,8 +92,7 @@ fn partials<S: Simd>(v: f32x16<S>) -> LaneSum {
     LaneSum::from_partials(partials)
 }
 
-impl<S: Simd> Lighting for Lanes<S> {
-    #[inline(always)]
+impl Lighting for Lanes {
     fn look_around(&mut self, scene: &Scene, si: &SurfaceInteraction) {
         self.spheres.clear();
         for sphere in &scene.spheres {
@@ -107,7 +105,6 @@ impl<S: Simd> Lighting for Lanes<S> {
         self.flats.extend(scene.flat_occluders.iter().map(|flat| flat.shadow(si.p, si.error)));
     }
 
-    #[inline(always)]
     fn gather(
         &mut self,
         scene: &Scene,
@@ -121,21 +118,19 @@ impl<S: Simd> Lighting for Lanes<S> {
         let LightKind::Rectangle(rectangle) = &light.kind else {
             return Plain.gather(scene, index, si, lobe, counts);
         };
-        let samples = rectangle.samples() as u64;
-        counts.shadow_rays += samples;
-        if !light.shadows {
-            counts.shadow_rays_skipped += samples;
-            return gather_rectangle(self.simd, rectangle, si, lobe, &[], &[]);
-        }
         self.between.clear();
         for (flat, side) in self.flats.iter().zip(&scene.light_sides[index]) {
             if !flat.is_one_sided(*side) {
                 self.between.push(*flat);
             }
         }
-        if self.spheres.is_empty() && self.between.is_empty() {
+        let (spheres, flats) = if light.shadows { (&self.spheres[..], &self.between[..]) } else { (&[][..], &[][..]) };
+        let samples = rectangle.samples() as u64;
+        counts.shadow_rays += samples;
+        if spheres.is_empty() && flats.is_empty() {
             counts.shadow_rays_skipped += samples;
         }
-        gather_rectangle(self.simd, rectangle, si, lobe, &self.spheres, &self.between)
+        // One dispatch for all samples of a light: what is below is compiled for each instruction set, the rest once
+        dispatch!(self.level, simd => gather_rectangle(simd, rectangle, si, lobe, spheres, flats))
     }
 }

@@ -17,7 +17,6 @@ use std::ops::ControlFlow;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
-use fearless_simd::{Simd, dispatch};
 use rayon::prelude::*;
 
 pub use film::Film;
@@ -136,7 +135,7 @@ pub fn render(
         let (film_tile, counts) = if settings.reference {
             render_tile(scene, tile, &mut Plain)
         } else {
-            dispatch!(level.token(), simd => render_tile_in_lanes(simd, scene, tile))
+            render_tile(scene, tile, &mut Lanes::new(level.token()))
         };
         film.lock().expect("no thread panics while it holds the film").merge(&film_tile);
         for (total, count) in totals.iter().zip([counts.camera_rays, counts.shadow_rays, counts.shadow_rays_skipped]) {
@@ -167,14 +166,7 @@ fn available_threads() -> usize {
     std::thread::available_parallelism().map_or(1, NonZeroUsize::get)
 }
 
-/// One dispatch per tile: everything below is compiled once for each instruction set.
-#[inline(always)]
-fn render_tile_in_lanes<S: Simd>(simd: S, scene: &Scene, tile: &Tile) -> (FilmTile, Counts) {
-    render_tile(scene, tile, &mut Lanes::new(simd))
-}
-
 /// Renders one tile: n x n camera rays a pixel, row by row, and at each surface all lights in scene order.
-#[inline(always)]
 fn render_tile(scene: &Scene, tile: &Tile, lighting: &mut impl Lighting) -> (FilmTile, Counts) {
     let mut film = FilmTile::new(tile);
     let mut counts = Counts::default();

@@ -53,7 +53,6 @@ impl PixelSum {
     }
 
     /// Sends the n x n camera rays of pixel (`i`, `j`), row by row, and adds what they see.
-    #[inline(always)]
     pub fn sample(&mut self, scene: &Scene, i: u32, j: u32, lighting: &mut impl Lighting, counts: &mut Counts) {
         let n = scene.antialiasing;
         let step = 1.0 / n as f32;
@@ -79,7 +78,6 @@ impl PixelSum {
     }
 
     /// Adds what each light sends.
-    #[inline(always)]
     fn add_lights(
         &mut self,
         scene: &Scene,
@@ -97,7 +95,6 @@ impl PixelSum {
     }
 
     /// The mean, as film: red, green, blue premultiplied, alpha.
-    #[inline(always)]
     pub fn color(&self, scene: &Scene) -> [f32; 4] {
         let rays = (scene.antialiasing * scene.antialiasing) as f32;
         let uncovered = self.background as f32 / rays;

@@ -1,7 +1,7 @@
 //! The plain renderer: one light sample at a time, every shape asked. It is the specification; `--reference` runs it.
 
 use super::Counts;
-use super::pixel::{LobeSums, Lighting};
+use super::pixel::{Lighting, LobeSums};
 use crate::material::Lobe;
 use crate::math::LaneSum;
 use crate::scene::Scene;

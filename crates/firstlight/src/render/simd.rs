@@ -5,11 +5,11 @@ use fearless_simd::Level;
 use crate::describe::words;
 
 words! {
-    /// The vector instructions the fast renderer uses. All give the same bits.
+    /// The vector instructions the fast renderer uses, the slowest first. All give the same bits.
     pub enum SimdLevel {
         /// The best this processor has.
         Auto = "auto",
-        /// None: plain numbers.
+        /// None: plain numbers, on processors that have none of the others.
         Fallback = "fallback",
         /// x86-64's own, 4 lanes.
         Sse2 = "sse2",
@@ -25,17 +25,6 @@ words! {
 }
 
 impl SimdLevel {
-    /// Every level, the slowest first.
-    pub const ALL: &'static [SimdLevel] = &[
-        SimdLevel::Auto,
-        SimdLevel::Fallback,
-        SimdLevel::Sse2,
-        SimdLevel::Sse42,
-        SimdLevel::Avx2,
-        SimdLevel::Avx512,
-        SimdLevel::Neon,
-    ];
-
     /// Whether this processor has it.
     pub fn is_available(self) -> bool {
         self.try_token().is_some()
@@ -56,7 +45,7 @@ impl SimdLevel {
 
     /// The proof that the processor has it, which `dispatch!` asks for.
     pub(crate) fn token(self) -> Level {
-        self.try_token().unwrap_or(Level::fallback())
+        self.try_token().unwrap_or(Level::baseline())
     }
 
     #[cfg(target_arch = "x86_64")]
@@ -64,12 +53,11 @@ impl SimdLevel {
         let detected = Level::new();
         match self {
             SimdLevel::Auto => Some(detected),
-            SimdLevel::Fallback => Some(Level::fallback()),
+            SimdLevel::Fallback | SimdLevel::Neon => None,
             SimdLevel::Sse2 => detected.as_sse2().map(Level::Sse2),
             SimdLevel::Sse42 => detected.as_sse4_2().map(Level::Sse4_2),
             SimdLevel::Avx2 => detected.as_avx2().map(Level::Avx2),
             SimdLevel::Avx512 => detected.as_avx512().map(Level::Avx512),
-            SimdLevel::Neon => None,
         }
     }
 
@@ -78,7 +66,6 @@ impl SimdLevel {
         let detected = Level::new();
         match self {
             SimdLevel::Auto => Some(detected),
-            SimdLevel::Fallback => Some(Level::fallback()),
             SimdLevel::Neon => detected.as_neon().map(Level::Neon),
             _ => None,
         }
@@ -86,6 +73,6 @@ impl SimdLevel {
 
     #[cfg(not(any(target_arch = "x86_64", target_arch = "aarch64")))]
     fn try_token(self) -> Option<Level> {
-        matches!(self, SimdLevel::Auto | SimdLevel::Fallback).then(Level::fallback)
+        matches!(self, SimdLevel::Auto | SimdLevel::Fallback).then(Level::baseline)
     }
 }

@@ -10,7 +10,7 @@ use crate::context::{AssetError, Assets, CompileContext};
 use crate::describe::{ColorParam, NumberParam};
 use crate::error::{Diagnostic, SceneError, Severity};
 use crate::ids::{MaterialId, TextureId};
-use crate::image::{TexelData, Texels, TexelLimits};
+use crate::image::read::{Limits, TexelData, Texels, decode};
 use crate::light::{Light, LightDesc, LightKind, MAX_SAMPLES};
 use crate::material::{LobeKind, MAX_SHININESS, Material, MaterialDesc};
 use crate::math::Vec3;
@@ -104,10 +104,8 @@ impl SceneDesc {
             let width = cx.count("width", render.width, 1, MAX_SIDE, Some("pixels across"));
             let height = cx.count("height", render.height, 1, MAX_SIDE, Some("pixels down"));
             if width <= MAX_SIDE && height <= MAX_SIDE && width as u64 * height as u64 > MAX_PIXELS {
-                let message = format!(
-                    "{width} x {height} is {} pixels, the limit is {MAX_PIXELS}",
-                    width as u64 * height as u64
-                );
+                let message =
+                    format!("{width} x {height} is {} pixels, the limit is {MAX_PIXELS}", width as u64 * height as u64);
                 cx.error("width", message, Some("render it in parts, each with its own camera"));
             }
             let hint = "n of the n x n camera rays in each pixel";
@@ -328,7 +326,7 @@ fn sides(light: &Light, flats: &[Parallelogram]) -> Vec<crate::shape::PlaneSide>
 
 /// `no camera is called "tpo"; did you mean "top"?`
 fn unknown(what: &str, wanted: &str, names: &[&str]) -> String {
-    let nearest = crate::describe::nearest(wanted, names.iter().copied());
+    let nearest = crate::describe::nearest(wanted, names);
     match nearest {
         Some(name) => format!("no {what} is called {wanted:?}; did you mean {name:?}?"),
         None if names.is_empty() => format!("no {what} is called {wanted:?}; the scene has none"),
@@ -341,11 +339,7 @@ fn unknown(what: &str, wanted: &str, names: &[&str]) -> String {
 }
 
 /// Names belong to one thing each, whatever its kind.
-fn check_unique<'a>(
-    cx: &mut CompileContext,
-    family: &str,
-    names: impl Iterator<Item = (&'static str, &'a str)>,
-) {
+fn check_unique<'a>(cx: &mut CompileContext, family: &str, names: impl Iterator<Item = (&'static str, &'a str)>) {
     let mut seen = HashMap::new();
     for (kind, name) in names {
         if let Some(first) = seen.insert(name, kind) {
@@ -439,7 +433,7 @@ impl<'a> Textures<'a> {
         let name = &self.desc.textures[index].0;
         let read = self.assets.read(file, MAX_TEXTURE_FILE);
         let (texels, hash) = match &read {
-            Ok(bytes) => match crate::image::decode(bytes, &TexelLimits::default()) {
+            Ok(bytes) => match decode(bytes, &Limits::default()) {
                 Ok(texels) => (texels, *blake3::hash(bytes).as_bytes()),
                 Err(error) => {
                     let message = format!("{file:?} cannot be read as a picture: {error}");
@@ -458,7 +452,8 @@ impl<'a> Textures<'a> {
                         cx.outside(|cx| cx.error(&path, message, Some(hint)));
                     }
                     _ => {
-                        let hint = "magenta and black stand in for it; files are looked for beside the text that names them";
+                        let hint =
+                            "magenta and black stand in for it; files are looked for beside the text that names them";
                         cx.outside(|cx| cx.warning(&path, message, Some(hint)));
                     }
                 }

@@ -58,7 +58,7 @@ table! {
 ///
 /// Names are unique within cameras, within materials and within textures, whatever their kind.
 /// Shapes and lights are given ids in scene order: kinds in the order of their enums, then the order of these lists.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct SceneDesc {
     /// `[render]`
     pub render: RenderDesc,
@@ -73,6 +73,3 @@ pub struct SceneDesc {
     /// `[[light.KIND]]`
     pub lights: Vec<LightDesc>,
 }
-
-// STUB
-impl SceneDesc { pub fn to_json(&self) -> String { format!("{self:?}") } }

@@ -1,11 +1,16 @@
 //! Scenes: described, read, compiled.
 
+mod builtin;
 mod compile;
+mod course;
 mod description;
+mod text;
 mod trace;
 
+pub use builtin::{Builtin, builtin_scenes};
 pub use compile::{CompileOptions, Compiled};
 pub use description::{DisplayEncoding, RenderDesc, SceneDesc};
+pub use text::{Parsed, reference, schema};
 pub use trace::{CameraHit, Hit};
 
 use crate::camera::Camera;

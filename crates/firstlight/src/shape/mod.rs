@@ -15,11 +15,14 @@ pub(crate) use parallelogram::{ParallelogramShadow, PlaneSide};
 pub(crate) use sphere::SphereShadow;
 pub(crate) use surface::ShapePoint;
 
-/// A shape as a scene may say it.
-#[derive(Clone, Debug, PartialEq)]
-pub enum ShapeDesc {
-    /// `[[sphere]]`
-    Sphere(SphereDesc),
-    /// `[[parallelogram]]`
-    Parallelogram(ParallelogramDesc),
+use crate::describe::family;
+
+family! {
+    /// A shape as a scene may say it.
+    pub enum ShapeDesc: "shape" {
+        /// `[[sphere]]`
+        Sphere(SphereDesc) = "sphere",
+        /// `[[parallelogram]]`
+        Parallelogram(ParallelogramDesc) = "parallelogram",
+    }
 }

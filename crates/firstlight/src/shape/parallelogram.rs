@@ -69,7 +69,8 @@ impl ParallelogramDesc {
         let edges_fine = cx.edge("e0", self.e0) & cx.edge("e1", self.e1);
         let (e0, e1) = (DVec3::from(self.e0), DVec3::from(self.e1));
         if edges_fine && !(e0.cross(e1).length() > MIN_SINE * e0.length() * e1.length()) {
-            let message = format!("{} is parallel to e0 = {}: there is no area between them", show(&self.e1), show(&self.e0));
+            let message =
+                format!("{} is parallel to e0 = {}: there is no area between them", show(&self.e1), show(&self.e0));
             cx.error("e1", message, Some("give edges that point in different directions"));
         }
         let sign = if self.flip { -1.0 } else { 1.0 };
@@ -171,8 +172,7 @@ impl Parallelogram {
         let sign = if s < 0.0 { -1.0 } else { 1.0 };
         let abs_n = self.n.abs();
         // How far s can be wrong
-        let margin =
-            error.along_axis(abs_n) + abs_n.dot(from.abs() + p.abs() + self.p.abs()) * (4.0 * UNIT_ROUNDOFF);
+        let margin = error.along_axis(abs_n) + abs_n.dot(from.abs() + p.abs() + self.p.abs()) * (4.0 * UNIT_ROUNDOFF);
         ParallelogramShadow {
             n: self.n * sign,
             front: s >= 0.0,
@@ -282,8 +282,6 @@ impl ParallelogramShadow {
         let beyond = descent - self.height;
         let wrong = l.abs().dot(Vec3x16::splat(simd, self.abs_n));
         let crosses = beyond.simd_gt(simd.splat_f32x16(self.margin) + wrong);
-        crosses
-            & self.u.contains_lanes(l, self.height, descent)
-            & self.v.contains_lanes(l, self.height, descent)
+        crosses & self.u.contains_lanes(l, self.height, descent) & self.v.contains_lanes(l, self.height, descent)
     }
 }

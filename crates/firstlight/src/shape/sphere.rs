@@ -259,9 +259,8 @@ fn equirectangular(n: Vec3, dnx: Vec3, dny: Vec3) -> (Vec2, Vec2, Vec2) {
     let ring = ring2.sqrt();
     // The arc sine loses its digits near 1, this does not
     let uv = Vec2::new(0.5 + f_atan2f(-n.z, n.x) * (0.5 * FRAC_1_PI), 0.5 + f_atan2f(n.y, ring) * FRAC_1_PI);
-    let step = |dn: Vec3| {
-        bounded(Vec2::new((n.z * dn.x - n.x * dn.z) / ring2 * (0.5 * FRAC_1_PI), dn.y / ring * FRAC_1_PI))
-    };
+    let step =
+        |dn: Vec3| bounded(Vec2::new((n.z * dn.x - n.x * dn.z) / ring2 * (0.5 * FRAC_1_PI), dn.y / ring * FRAC_1_PI));
     (uv, step(dnx), step(dny))
 }
 

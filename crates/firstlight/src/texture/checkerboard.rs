@@ -169,9 +169,7 @@ impl Wave {
         match self.edge {
             // The outermost squares go on for ever
             UvEdge::Bounded if x < 0.0 => x,
-            UvEdge::Bounded if x > self.count => {
-                triangle(self.count) + (x - self.count) * self.sign(self.count)
-            }
+            UvEdge::Bounded if x > self.count => triangle(self.count) + (x - self.count) * self.sign(self.count),
             UvEdge::Bounded => triangle(x),
             // An odd count leaves one square over in each round
             UvEdge::Periodic => {

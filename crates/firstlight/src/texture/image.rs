@@ -4,10 +4,10 @@ use std::sync::Arc;
 
 use glam::DVec2;
 
-use crate::color::Rgb;
+use crate::color::{Encoding, Rgb};
 use crate::context::CompileContext;
 use crate::describe::{ColorDesc, FilePath, table, words};
-use crate::image::{TexelData, Texels};
+use crate::image::read::{TexelData, Texels};
 use crate::math::Vec2;
 
 words! {
@@ -99,7 +99,7 @@ impl ImageTextureDesc {
         let decode = (0..steps).map(|i| {
             let stored = i as f64 / (steps - 1) as f64;
             (match space {
-                TextureSpace::Srgb => crate::color::srgb_to_linear(stored),
+                TextureSpace::Srgb => Encoding::Srgb.decode(stored),
                 TextureSpace::Raw => stored,
             }) as f32
         });
@@ -138,8 +138,7 @@ impl ImageTexture {
 
     /// The texel in column `i`, row `j`, which may lie beyond the picture.
     fn texel(&self, i: i64, j: i64) -> Rgb {
-        let (Some(i), Some(j)) =
-            (self.wrap[0].index(i, self.texels.width), self.wrap[1].index(j, self.texels.height))
+        let (Some(i), Some(j)) = (self.wrap[0].index(i, self.texels.width), self.wrap[1].index(j, self.texels.height))
         else {
             return self.border;
         };

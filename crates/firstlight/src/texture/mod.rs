@@ -7,25 +7,17 @@ pub use checkerboard::{Checkerboard, CheckerboardDesc};
 pub use image::{Filter, ImageTexture, ImageTextureDesc, TextureSpace, Wrap};
 
 use crate::color::Rgb;
+use crate::describe::family;
 use crate::ids::TextureId;
 use crate::shape::SurfaceInteraction;
 
-/// A texture as a scene may say it.
-#[derive(Clone, Debug, PartialEq)]
-pub enum TextureDesc {
-    /// `[texture.checkerboard.NAME]`
-    Checkerboard(CheckerboardDesc),
-    /// `[texture.image.NAME]`
-    Image(ImageTextureDesc),
-}
-
-impl TextureDesc {
-    /// `checkerboard` or `image`.
-    pub fn kind(&self) -> &'static str {
-        match self {
-            TextureDesc::Checkerboard(_) => "checkerboard",
-            TextureDesc::Image(_) => "image",
-        }
+family! {
+    /// A texture as a scene may say it.
+    pub enum TextureDesc: "texture" {
+        /// `[texture.checkerboard.NAME]`
+        Checkerboard(CheckerboardDesc) = "checkerboard",
+        /// `[texture.image.NAME]`
+        Image(ImageTextureDesc) = "image",
     }
 }
 

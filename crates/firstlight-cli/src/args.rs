@@ -1,0 +1,278 @@
+//! The command line as it is written. What it means, together with a scene, is decided in each command's own file.
+
+use std::path::PathBuf;
+
+use clap::{Args, Parser, Subcommand, ValueEnum, ValueHint, value_parser};
+use firstlight::{SimdLevel, Window};
+
+/// Renders the direct light of a scene: camera ray, first surface, every light. No noise, the same bits every time
+#[derive(Debug, Parser)]
+#[command(name = "firstlight", version, arg_required_else_help = true, max_term_width = 100)]
+#[command(after_help = EXIT_CODES)]
+#[command(disable_help_subcommand = true, args_override_self = false)]
+pub struct Cli {
+    /// What to do
+    #[command(subcommand)]
+    pub command: Command,
+}
+
+const EXIT_CODES: &str = "\
+Exit codes:
+  0    done
+  1    could not be done: the scene, a file or the disk
+  2    wrong usage
+  130  interrupted; no output is left
+
+Environment:
+  NO_COLOR  when set and not empty: no colours on the terminal";
+
+/// The commands.
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// Renders a scene to picture files
+    #[command(after_help = RENDER_EXAMPLES)]
+    Render(Box<RenderArgs>),
+    /// Reads and compiles a scene and says `ok`, or every fault in it
+    Check(CheckArgs),
+    /// Says what a scene holds
+    Info(InfoArgs),
+    /// Lists the scenes that are built in, or prints the text of one
+    Scenes(ScenesArgs),
+    /// Prints the JSON Schema of scene files, for completion in editors
+    Schema,
+    /// Prints a completion script for a shell
+    Completions(CompletionsArgs),
+    /// Prints the manual as roff, one page for each command: `firstlight man | man -l -`
+    Man,
+}
+
+const RENDER_EXAMPLES: &str = "\
+Examples:
+  firstlight render
+      the built-in scene config11, to config11.png
+  firstlight render room.toml -o room.png -o room.exr
+      one rendering, two files
+  firstlight render room.toml --width 320 --aa 1 --samples 16
+      a quick look, in the scene's own aspect ratio
+  firstlight render room.toml --crop 400,300,64,64 -o detail.png
+      the same pixels as in the whole picture, only fewer of them
+  firstlight render config23 -o - | magick - config23.jpg
+      to another program
+  generate-scene | firstlight render - -o scene.png
+      from another program
+  firstlight render room.toml --stats=room.json --quiet
+      what it took, for another program to read";
+
+/// Where a scene comes from.
+#[derive(Args, Debug)]
+pub struct SceneArgs {
+    /// A scene file (.toml, .json, or a course file .txt), the name of a built-in scene such as config23 (see `firstlight
+    /// scenes`; a file of such a name is ./config23), or - for standard input
+    #[arg(value_name = "SCENE", value_hint = ValueHint::FilePath)]
+    pub scene: PathBuf,
+    #[command(flatten)]
+    pub reading: ReadingArgs,
+}
+
+/// How a scene is read.
+#[derive(Args, Debug)]
+pub struct ReadingArgs {
+    /// Makes warnings errors: a missing or damaged texture, for one [default: a warning and a placeholder]
+    #[arg(long)]
+    pub strict: bool,
+    /// Lets the scene read files of this folder and below, besides its own folder; may be given several times [default:
+    /// none]
+    #[arg(long = "allow-dir", value_name = "DIR", value_hint = ValueHint::DirPath)]
+    pub allow_dir: Vec<PathBuf>,
+}
+
+/// `firstlight render`
+#[derive(Args, Debug)]
+pub struct RenderArgs {
+    /// A scene file (.toml, .json, or a course file .txt), the name of a built-in scene such as config23 (see `firstlight
+    /// scenes`; a file of such a name is ./config23), or - for standard input
+    #[arg(value_name = "SCENE", value_hint = ValueHint::FilePath, default_value = "config11")]
+    pub scene: PathBuf,
+    #[command(flatten)]
+    pub reading: ReadingArgs,
+
+    /// A picture to write: its ending, .png, .exr or .hdr, says the format; - is standard output. May be given several
+    /// times [default: the scene's name with .png, or a course file's output_file, in the working folder]
+    #[arg(short, long = "output", value_name = "FILE", value_hint = ValueHint::FilePath, help_heading = "Output")]
+    pub output: Vec<PathBuf>,
+    /// Bits of each channel of PNG files: 8 or 16 [default: 8]
+    #[arg(long, value_name = "BITS", help_heading = "Output")]
+    pub bits: Option<Bits>,
+    /// The format of -o - and of names without an ending, such as /dev/null [default: png for -]
+    #[arg(long, value_name = "FORMAT", help_heading = "Output")]
+    pub format: Option<NamedFormat>,
+    /// Stops of exposure of 8- and 16-bit pictures, -64 to 64: they are multiplied by 2^EV [default: the scene's]
+    #[arg(long, value_name = "EV", allow_negative_numbers = true, value_parser = exposure, help_heading = "Output")]
+    pub exposure: Option<f64>,
+
+    /// Pixels across, 1 to 65536; without --height, the height follows in the scene's aspect ratio [default: the scene's]
+    #[arg(long, value_name = "PIXELS", value_parser = value_parser!(u32).range(1..=65536), help_heading = "Picture")]
+    pub width: Option<u32>,
+    /// Pixels down, 1 to 65536; without --width, the width follows in the scene's aspect ratio [default: the scene's]
+    #[arg(long, value_name = "PIXELS", value_parser = value_parser!(u32).range(1..=65536), help_heading = "Picture")]
+    pub height: Option<u32>,
+    /// Renders only this part of the picture, in pixels from its top left corner [default: all of it]
+    #[arg(long, value_name = "X,Y,WIDTH,HEIGHT", value_parser = crop, allow_hyphen_values = true, help_heading = "Picture")]
+    pub crop: Option<Window>,
+    /// The camera to render from, where the scene names several [default: the scene's]
+    #[arg(long, value_name = "NAME", help_heading = "Picture")]
+    pub camera: Option<String>,
+
+    /// Antialiasing by N x N camera rays in each pixel, 1 to 64; 4 is "4X" [default: the scene's]
+    #[arg(long, value_name = "N", value_parser = value_parser!(u32).range(1..=64), help_heading = "Quality")]
+    pub aa: Option<u32>,
+    /// Points sampled on every area light, 1 to 1048576 [default: the scene's]
+    #[arg(long, value_name = "N", value_parser = value_parser!(u32).range(1..=1_048_576), help_heading = "Quality")]
+    pub samples: Option<u32>,
+    /// Renders by the plainest code there is: the same bytes, slowly
+    #[arg(long, help_heading = "Quality")]
+    pub reference: bool,
+
+    /// Threads to render with, 1 to 1024; the picture is the same for any number [default: one for each processor, or a
+    /// course file's num_threads]
+    #[arg(long, value_name = "N", value_parser = value_parser!(u16).range(1..=1024), help_heading = "Work")]
+    pub threads: Option<u16>,
+    /// Pixels along a tile's edge, 8 to 64; the picture is the same for any number [default: 16]
+    #[arg(long, value_name = "PIXELS", value_parser = value_parser!(u32).range(8..=64), help_heading = "Work")]
+    pub tile_size: Option<u32>,
+    /// The processor's vector instructions to use; the picture is the same for any of them [default: auto]
+    #[arg(long, value_name = "LEVEL", value_parser = SimdParser, help_heading = "Work")]
+    pub simd: Option<SimdLevel>,
+
+    /// Says at the end what each stage took, in seconds, rays and bytes: a table on standard error, or JSON in a file (- is
+    /// standard output)
+    #[arg(long, value_name = "FILE.json", require_equals = true, value_hint = ValueHint::FilePath)]
+    #[arg(help_heading = "Messages")]
+    pub stats: Option<Option<PathBuf>>,
+    /// Says nothing but errors, warnings, and --stats where asked for
+    #[arg(short, long, help_heading = "Messages")]
+    pub quiet: bool,
+}
+
+/// `firstlight check`
+#[derive(Args, Debug)]
+pub struct CheckArgs {
+    #[command(flatten)]
+    pub scene: SceneArgs,
+}
+
+/// `firstlight info`
+#[derive(Args, Debug)]
+pub struct InfoArgs {
+    #[command(flatten)]
+    pub scene: SceneArgs,
+    /// As JSON, for another program to read
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// `firstlight scenes`
+#[derive(Args, Debug)]
+pub struct ScenesArgs {
+    /// The scene whose text to print [default: the list of all]
+    pub name: Option<String>,
+}
+
+/// `firstlight completions`
+#[derive(Args, Debug)]
+pub struct CompletionsArgs {
+    /// The shell
+    #[arg(value_name = "SHELL")]
+    pub shell: clap_complete::Shell,
+}
+
+/// Bits of a PNG channel.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Bits {
+    /// 256 steps
+    #[value(name = "8")]
+    Eight,
+    /// 65536 steps
+    #[value(name = "16")]
+    Sixteen,
+}
+
+/// A format by its name, where no ending says it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum NamedFormat {
+    /// 8 or 16 bits, display-encoded
+    Png,
+    /// The film itself, in 32-bit floats
+    Exr,
+    /// The film itself, in Radiance's shared exponents
+    Hdr,
+}
+
+/// Reads an exposure in stops.
+fn exposure(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(ev) if (-64.0..=64.0).contains(&ev) => Ok(ev),
+        _ => Err("a number of stops from -64 to 64 is needed".into()),
+    }
+}
+
+/// Reads `X,Y,WIDTH,HEIGHT`. Whether the film is that large is seen once the scene is known.
+fn crop(text: &str) -> Result<Window, String> {
+    let wanted = "four whole numbers X,Y,WIDTH,HEIGHT are needed, in pixels, WIDTH and HEIGHT at least 1";
+    let numbers: Vec<u32> = text.split(',').map(|n| n.trim().parse()).collect::<Result<_, _>>().map_err(|_| wanted)?;
+    match numbers[..] {
+        [x, y, width, height] if width > 0 && height > 0 => Ok(Window { x, y, width, height }),
+        _ => Err(wanted.into()),
+    }
+}
+
+/// Reads the name of a SIMD level; completions and help list them all, whatever this machine has.
+#[derive(Clone)]
+struct SimdParser;
+
+impl clap::builder::TypedValueParser for SimdParser {
+    type Value = SimdLevel;
+
+    fn parse_ref(
+        &self,
+        cmd: &clap::Command,
+        arg: Option<&clap::Arg>,
+        value: &std::ffi::OsStr,
+    ) -> Result<SimdLevel, clap::Error> {
+        let names = clap::builder::PossibleValuesParser::new(SimdLevel::ALL.iter().map(|level| level.name()));
+        let name = names.parse_ref(cmd, arg, value)?;
+        SimdLevel::from_name(&name).ok_or_else(|| clap::Error::new(clap::error::ErrorKind::InvalidValue))
+    }
+
+    fn possible_values(&self) -> Option<Box<dyn Iterator<Item = clap::builder::PossibleValue> + '_>> {
+        Some(Box::new(SimdLevel::ALL.iter().map(|level| clap::builder::PossibleValue::new(level.name()))))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use clap::CommandFactory;
+
+    use super::*;
+
+    #[test]
+    fn the_command_line_is_consistent() {
+        Cli::command().debug_assert();
+    }
+
+    #[test]
+    fn a_crop_is_four_numbers_with_some_pixels() {
+        assert_eq!(crop("1,2,3,4"), Ok(Window { x: 1, y: 2, width: 3, height: 4 }));
+        for bad in ["", "1,2,3", "1,2,3,4,5", "1,2,0,4", "1,2,3,0", "-1,2,3,4", "1,2,3,x", "1.5,0,1,1"] {
+            assert!(crop(bad).is_err(), "{bad}");
+        }
+    }
+
+    #[test]
+    fn an_exposure_is_finite_and_in_range() {
+        assert_eq!(exposure("-1.5"), Ok(-1.5));
+        for bad in ["", "nan", "inf", "65", "-64.1", "1,5"] {
+            assert!(exposure(bad).is_err(), "{bad}");
+        }
+    }
+}

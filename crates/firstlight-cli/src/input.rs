@@ -1,0 +1,101 @@
+//! Where a scene comes from: a file, standard input, or the program itself.
+
+use std::fs::File;
+use std::io::{self, Read};
+use std::path::{Path, PathBuf};
+
+use firstlight::{Assets, CompileOptions, Compiled, FolderAssets, NoAssets, Parsed, SceneDesc, builtin_scenes};
+
+use crate::args::ReadingArgs;
+use crate::report::Failure;
+
+/// No scene text is longer, in bytes. Meshes and pictures are files of their own.
+const TEXT_LIMIT: u64 = 64 << 20;
+
+/// A scene that was read, and what is needed to compile it.
+pub struct Input {
+    /// What messages call it: the path as written, the built-in name, `<stdin>` or `<stdin>.json`.
+    pub name: String,
+    /// What its pictures are called, without an ending.
+    pub stem: PathBuf,
+    /// The description, and the faults of its text.
+    pub parsed: Parsed,
+    assets: Box<dyn Assets>,
+    strict: bool,
+}
+
+/// Reads the scene that `scene` names.
+///
+/// # Errors
+/// Its text cannot be had. Faults inside the text are kept for [`Input::compile`].
+pub fn read(scene: &Path, reading: &ReadingArgs) -> Result<Input, Failure> {
+    let (name, stem, text, folder) = if scene == "-" {
+        let text = read_limited(io::stdin().lock()).map_err(|why| Failure::Work(format!("standard input: {why}")))?;
+        // A name tells JSON from TOML; no TOML begins with a brace
+        let json = text.trim_ascii_start().starts_with(b"{");
+        let name = if json { "<stdin>.json" } else { "<stdin>" };
+        (name.to_owned(), PathBuf::from("scene"), text, Some(PathBuf::new()))
+    } else if let Some(builtin) = builtin_scenes().iter().find(|builtin| scene == builtin.name) {
+        (builtin.name.to_owned(), PathBuf::from(builtin.name), builtin.text.as_bytes().to_vec(), None)
+    } else {
+        let name = scene.display().to_string();
+        let text = read_file(scene).map_err(|why| Failure::Work(format!("{name}: {why}")))?;
+        let stem = scene.file_stem().map_or_else(|| PathBuf::from("scene"), PathBuf::from);
+        (name, stem, text, Some(scene.parent().map(Path::to_path_buf).unwrap_or_default()))
+    };
+
+    // A scene reads its own folder; a built-in scene has none
+    let allowed = |folder: &Path| {
+        FolderAssets::new(folder, &reading.allow_dir)
+            .map_err(|(path, e)| Failure::Work(format!("--allow-dir: {}: {e}", path.display())))
+    };
+    let assets: Box<dyn Assets> = match folder {
+        Some(folder) => Box::new(allowed(&folder)?),
+        None => Box::new(NoAssets),
+    };
+
+    let parsed = SceneDesc::parse(&name, &text, assets.as_ref());
+    Ok(Input { name, stem, parsed, assets, strict: reading.strict })
+}
+
+impl Input {
+    /// Compiles the description as it is now.
+    ///
+    /// # Errors
+    /// Every fault of text and meaning.
+    pub fn compile(&self) -> Result<Compiled, Failure> {
+        let options = CompileOptions { strict: self.strict };
+        self.parsed.compile(self.assets.as_ref(), &options).map_err(|e| Failure::Scene(e.faults))
+    }
+}
+
+fn read_file(path: &Path) -> Result<Vec<u8>, String> {
+    match File::open(path) {
+        Err(e) if e.kind() == io::ErrorKind::NotFound => {
+            let names: Vec<&str> = builtin_scenes().iter().map(|builtin| builtin.name).collect();
+            Err(format!("no such file, and no built-in scene; built in are {}", names.join(", ")))
+        }
+        Err(e) => Err(e.to_string()),
+        Ok(file) if file.metadata().is_ok_and(|meta| meta.is_dir()) => Err("is a folder; name a scene file".into()),
+        Ok(file) => read_limited(file),
+    }
+}
+
+fn read_limited(from: impl Read) -> Result<Vec<u8>, String> {
+    let mut text = Vec::new();
+    from.take(TEXT_LIMIT + 1).read_to_end(&mut text).map_err(|e| e.to_string())?;
+    if text.len() as u64 > TEXT_LIMIT {
+        return Err(format!("is longer than {TEXT_LIMIT} bytes, the limit for scene text"));
+    }
+    Ok(text)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn endless_text_is_refused() {
+        assert!(read_limited(io::repeat(b' ')).is_err_and(|e| e.contains("67108864")));
+    }
+}

@@ -1,0 +1,118 @@
+//! How far a render is: a bar on a terminal, a line now and then elsewhere.
+
+use std::io::{self, IsTerminal};
+use std::sync::Mutex;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::{Duration, Instant};
+
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+
+use crate::report::say;
+
+/// Between two lines.
+const PAUSE: Duration = Duration::from_secs(2);
+/// A render that takes less is not worth a line.
+const WORTH_A_LINE: Duration = Duration::from_secs(1);
+
+/// Tells standard error how far a render is.
+pub struct Progress {
+    started: Instant,
+    /// Pixels; calls from several threads may come out of order, and a bar that goes back frightens.
+    most: AtomicU64,
+    kind: Kind,
+}
+
+enum Kind {
+    Silent,
+    Bar(ProgressBar),
+    /// When the last line was said.
+    Lines(Mutex<Instant>),
+}
+
+impl Progress {
+    /// Begins now, for `all` pixels.
+    pub fn begin(all: u64, quiet: bool) -> Self {
+        let started = Instant::now();
+        let kind = if quiet {
+            Kind::Silent
+        } else if io::stderr().is_terminal() {
+            let bar = ProgressBar::with_draw_target(Some(all), ProgressDrawTarget::stderr());
+            let style = ProgressStyle::with_template("rendering {wide_bar} {percent:>3} %  {eta} left");
+            bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
+            // The time left goes on while a slow tile is at work
+            bar.enable_steady_tick(Duration::from_millis(250));
+            Kind::Bar(bar)
+        } else {
+            Kind::Lines(Mutex::new(started))
+        };
+        Self { started, most: AtomicU64::new(0), kind }
+    }
+
+    /// `done` of `all` pixels are there. For any thread, often.
+    pub fn update(&self, done: u64, all: u64) {
+        let done = self.most.fetch_max(done, Ordering::Relaxed).max(done);
+        match &self.kind {
+            Kind::Silent => {}
+            Kind::Bar(bar) => bar.set_position(done),
+            Kind::Lines(last) => {
+                // Who finds it taken goes on rendering
+                let Ok(mut last) = last.try_lock() else { return };
+                if last.elapsed() >= PAUSE && done < all {
+                    *last = Instant::now();
+                    say(format_args!("{}", line(done, all, self.started.elapsed())));
+                }
+            }
+        }
+    }
+
+    /// The render is over. `size`: columns and rows, if it was not stopped.
+    pub fn finish(self, size: Option<(u32, u32)>) {
+        match self.kind {
+            Kind::Silent => {}
+            Kind::Bar(bar) => bar.finish_and_clear(),
+            Kind::Lines(_) => {
+                let took = self.started.elapsed();
+                if let Some((width, height)) = size.filter(|_| took >= WORTH_A_LINE) {
+                    say(format_args!("rendered {width} x {height} pixels in {}", words(took)));
+                }
+            }
+        }
+    }
+}
+
+/// `rendered 40 %, about 12 s left`
+fn line(done: u64, all: u64, took: Duration) -> String {
+    let left = took.as_secs_f64() * all.saturating_sub(done) as f64 / done.max(1) as f64;
+    let left = Duration::try_from_secs_f64(left).unwrap_or(Duration::MAX);
+    format!("rendered {} %, about {} left", done.saturating_mul(100) / all.max(1), words(left))
+}
+
+/// `0.4 s`, `12 s`, `3 min 20 s`, `2 h 5 min`
+pub fn words(time: Duration) -> String {
+    let seconds = time.as_secs();
+    match seconds {
+        0..10 => format!("{:.1} s", time.as_secs_f64()),
+        10..60 => format!("{seconds} s"),
+        60..3600 => format!("{} min {} s", seconds / 60, seconds % 60),
+        _ => format!("{} h {} min", seconds / 3600, seconds / 60 % 60),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn times_are_said_in_words() {
+        let say = |ms| words(Duration::from_millis(ms));
+        assert_eq!([say(420), say(12_900), say(200_000), say(7_500_000)], ["0.4 s", "12 s", "3 min 20 s", "2 h 5 min"]);
+    }
+
+    #[test]
+    fn a_line_says_how_much_and_how_long() {
+        assert_eq!(line(40, 100, Duration::from_secs(8)), "rendered 40 %, about 12 s left");
+        // Nothing done yet, or more than there is: still a line
+        assert!(line(0, 100, Duration::from_secs(8)).starts_with("rendered 0 %"));
+        assert!(line(u64::MAX, 0, Duration::MAX).starts_with("rendered"));
+    }
+}

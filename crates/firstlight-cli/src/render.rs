@@ -1,0 +1,322 @@
+//! `firstlight render`: from a scene to picture files.
+
+use std::num::NonZeroUsize;
+use std::ops::ControlFlow;
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+
+use firstlight::{Format, LightDesc, RenderSettings, SampleSet, SceneDesc, SimdLevel, Window};
+
+use crate::args::{Bits, RenderArgs};
+use crate::input::{self, Input};
+use crate::interrupt::Watch;
+use crate::output::{self, Output, Ready, Staged, Target};
+use crate::progress::Progress;
+use crate::report::{Failure, say, show_diagnostics};
+use crate::stats::Stats;
+
+/// No film has more pixels.
+const PIXEL_LIMIT: u64 = 1 << 27;
+/// Nor more on one side.
+const SIDE_LIMIT: u64 = 1 << 16;
+
+/// The arguments, understood as far as they can be without the scene.
+struct Plan<'a> {
+    scene: &'a Path,
+    /// Empty: the one that the scene says.
+    outputs: Vec<Output>,
+    bits: Option<Bits>,
+    stats: StatsPlan,
+    settings: RenderSettings,
+    overrides: Overrides<'a>,
+    quiet: bool,
+}
+
+/// Where the numbers go.
+enum StatsPlan {
+    Nowhere,
+    Table,
+    Json(Target),
+}
+
+/// What the command line says in place of the scene.
+struct Overrides<'a> {
+    width: Option<u32>,
+    height: Option<u32>,
+    antialiasing: Option<u32>,
+    samples: Option<u32>,
+    camera: Option<&'a str>,
+    exposure: Option<f64>,
+}
+
+/// Renders.
+///
+/// # Errors
+/// Wrong usage; a scene that cannot be had or has faults; an output that cannot be written; an interruption.
+pub fn run(args: &RenderArgs) -> Result<(), Failure> {
+    // Understand the arguments, read the scene, bring both together
+    let plan = Plan::resolve(args)?;
+    let (input, parse) = timed(|| input::read(plan.scene, &args.reading));
+    let mut input = input?;
+    let (outputs, settings) = plan.join(&mut input)?;
+
+    // See whether the outputs can be written before any work is done for them; this may make a file for a moment
+    let watch = Watch::begin();
+    let ready: Vec<Ready> = outputs.iter().map(|output| output.target.ready()).collect::<Result<_, _>>()?;
+    let stats_file = match &plan.stats {
+        StatsPlan::Json(target) => Some(target.ready()?),
+        StatsPlan::Nowhere | StatsPlan::Table => None,
+    };
+    watch.check()?;
+    drop(watch);
+
+    // Compile
+    let (compiled, compile) = timed(|| input.compile());
+    let compiled = compiled?;
+    show_diagnostics(&compiled.warnings);
+    let scene = &compiled.scene;
+    settings.check(scene).map_err(Failure::Usage)?;
+
+    // Render, until somebody asks to stop
+    let watch = Watch::begin();
+    let window = settings.crop.unwrap_or(Window { x: 0, y: 0, width: scene.width(), height: scene.height() });
+    let progress = Progress::begin(u64::from(window.width) * u64::from(window.height), plan.quiet);
+    let (rendered, render) = timed(|| {
+        firstlight::render(scene, &settings, &|done, all| {
+            progress.update(done, all);
+            watch.flow()
+        })
+    });
+    let ControlFlow::Continue((film, rays)) = rendered else {
+        progress.finish(None);
+        return Err(Failure::Interrupted);
+    };
+    progress.finish(Some((window.width, window.height)));
+
+    // Encode all pictures and bring them to the disk, then let them appear: files first, a reader of standard output may
+    // be gone
+    let (written, write) = timed(|| {
+        let (image, receipt) = (film.develop(), scene.receipt(&settings));
+        let encode = |output: &Output| image.encode(output.format, &scene.display(), &receipt);
+        let bytes: Vec<Vec<u8>> =
+            outputs.iter().map(encode).collect::<Result<_, _>>().map_err(|e| Failure::Work(e.to_string()))?;
+        watch.check()?;
+        let stage = ready.into_iter().zip(&bytes).map(|(ready, bytes)| ready.stage(bytes));
+        let mut staged: Vec<Staged> = stage.collect::<Result<_, _>>()?;
+        watch.check()?;
+        staged.sort_by_key(Staged::is_stdout);
+        staged.into_iter().try_for_each(|staged| staged.commit(plan.quiet))
+    });
+    written?;
+
+    // Say what it took
+    let (width, height) = (window.width, window.height);
+    let stats = Stats { scene: input.name, width, height, parse, compile, render, write, rays };
+    if let StatsPlan::Table = plan.stats {
+        say(format_args!("{}", stats.to_table()));
+    }
+    if let Some(ready) = stats_file {
+        ready.stage(stats.to_json().as_bytes())?.commit(plan.quiet)?;
+    }
+    Ok(())
+}
+
+fn timed<T>(f: impl FnOnce() -> T) -> (T, Duration) {
+    let started = Instant::now();
+    let result = f();
+    (result, started.elapsed())
+}
+
+impl<'a> Plan<'a> {
+    fn resolve(args: &'a RenderArgs) -> Result<Self, Failure> {
+        let outputs = output::resolve(&args.output, args.bits, args.format)?;
+
+        let stats = match &args.stats {
+            None => StatsPlan::Nowhere,
+            Some(None) => StatsPlan::Table,
+            Some(Some(path)) => StatsPlan::Json(Target::of(path)),
+        };
+        if let StatsPlan::Json(target) = &stats
+            && outputs.iter().any(|output| output.target == *target)
+        {
+            return Err(Failure::Usage("--stats and -o name the same output; give each its own".into()));
+        }
+
+        let simd = args.simd.unwrap_or(SimdLevel::Auto);
+        if !simd.is_available() {
+            let names: Vec<&str> = SimdLevel::available().iter().map(|level| level.name()).collect();
+            let (name, names) = (simd.name(), names.join(", "));
+            return Err(Failure::Usage(format!("--simd {name} is not to be had on this processor; it has {names}")));
+        }
+
+        let mut settings = RenderSettings::default();
+        settings.simd = simd;
+        settings.threads = args.threads.and_then(|n| NonZeroUsize::new(n.into()));
+        settings.tile_size = args.tile_size.unwrap_or(settings.tile_size);
+        settings.crop = args.crop;
+        settings.reference = args.reference;
+
+        let overrides = Overrides {
+            width: args.width,
+            height: args.height,
+            antialiasing: args.aa,
+            samples: args.samples,
+            camera: args.camera.as_deref(),
+            exposure: args.exposure,
+        };
+        Ok(Self { scene: &args.scene, outputs, bits: args.bits, stats, settings, overrides, quiet: args.quiet })
+    }
+
+    /// Brings the plan and the scene together: the description takes the overrides, and what the plan leaves open
+    /// is decided.
+    fn join(&self, input: &mut Input) -> Result<(Vec<Output>, RenderSettings), Failure> {
+        // A text with faults may lack what the options refer to: say the faults, not what follows from them
+        if input.parsed.faults().iter().any(|fault| fault.severity == firstlight::Severity::Error) {
+            input.compile()?;
+        }
+        self.overrides.apply(&mut input.parsed.desc)?;
+
+        let mut settings = self.settings.clone();
+        if settings.threads.is_none() {
+            // A course file's wish, held to what --threads allows
+            let threads = input.parsed.threads.map(|n| n.min(1024) as usize);
+            settings.threads = threads.and_then(NonZeroUsize::new);
+        }
+        let (width, height) = (input.parsed.desc.render.width, input.parsed.desc.render.height);
+        if let Some(crop) = settings.crop
+            && !inside(crop, width, height)
+        {
+            let Window { x, y, width: w, height: h } = crop;
+            return Err(Failure::Usage(format!(
+                "--crop {x},{y},{w},{h} is not inside the picture, which is {width} x {height} pixels"
+            )));
+        }
+
+        let outputs = if self.outputs.is_empty() { vec![self.default_output(input)?] } else { self.outputs.clone() };
+        Ok((outputs, settings))
+    }
+
+    /// A course file's `output_file`, else the scene's name with `.png`, in the working folder.
+    fn default_output(&self, input: &Input) -> Result<Output, Failure> {
+        let (path, format) = match &input.parsed.output {
+            Some(path) => {
+                let format = Format::from_path(Path::new(path)).map_err(|e| {
+                    Failure::Work(format!("{}: output_file {path:?}: {e}; -o names another", input.name))
+                })?;
+                (PathBuf::from(path), format)
+            }
+            None => {
+                let mut name = input.stem.clone().into_os_string();
+                name.push(".png");
+                (PathBuf::from(name), Format::Png8)
+            }
+        };
+        Ok(Output { target: Target::File(path), format: output::with_bits(format, self.bits) })
+    }
+}
+
+fn inside(crop: Window, width: u32, height: u32) -> bool {
+    let end = |start: u32, length: u32| u64::from(start) + u64::from(length);
+    end(crop.x, crop.width) <= u64::from(width) && end(crop.y, crop.height) <= u64::from(height)
+}
+
+impl Overrides<'_> {
+    fn apply(&self, desc: &mut SceneDesc) -> Result<(), Failure> {
+        let render = &mut desc.render;
+        let (width, height) = film_size((self.width, self.height), (render.width, render.height))?;
+        (render.width, render.height) = (width, height);
+        render.antialiasing = self.antialiasing.unwrap_or(render.antialiasing);
+        render.exposure = self.exposure.unwrap_or(render.exposure);
+        if let Some(name) = self.camera {
+            if !desc.cameras.iter().any(|(known, _)| known == name) {
+                return Err(Failure::Usage(no_such_camera(name, desc)));
+            }
+            render.camera = Some(name.to_owned());
+        }
+        if let Some(samples) = self.samples {
+            render.samples = samples;
+            for light in &mut desc.lights {
+                set_samples(light, samples)?;
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Has `samples` points of the light sampled, if it has an area.
+fn set_samples(light: &mut LightDesc, samples: u32) -> Result<(), Failure> {
+    let LightDesc::Rectangle(light) = light else { return Ok(()) };
+    let side = samples.isqrt();
+    if matches!(light.set, SampleSet::Grid | SampleSet::Stratified) && side * side != samples {
+        let (below, above) = (side * side, (side + 1) * (side + 1));
+        return Err(Failure::Usage(format!(
+            "--samples {samples}: a light of this scene samples m x m cells; the nearest such numbers are {below} and {above}"
+        )));
+    }
+    light.samples = Some(samples);
+    Ok(())
+}
+
+fn no_such_camera(name: &str, desc: &SceneDesc) -> String {
+    let names: Vec<&str> = desc.cameras.iter().map(|(name, _)| name.as_str()).filter(|name| !name.is_empty()).collect();
+    match names[..] {
+        [] => format!("--camera {name}: the scene names no cameras; leave the option out"),
+        _ => format!("--camera {name}: the scene has no such camera; it has {}", names.join(", ")),
+    }
+}
+
+/// Columns and rows: as asked, and one alone keeps the scene's aspect ratio, to the nearest pixel.
+fn film_size(asked: (Option<u32>, Option<u32>), scene: (u32, u32)) -> Result<(u32, u32), Failure> {
+    let (scene_width, scene_height) = (u64::from(scene.0), u64::from(scene.1));
+    // The scene's own numbers are judged with the scene, a size of 0 among them
+    if asked == (None, None) || scene_width == 0 || scene_height == 0 {
+        return Ok(scene);
+    }
+    let scaled = |n: u64, times: u64, over: u64| ((2 * n * times + over) / (2 * over)).max(1);
+    let (width, height) = match (asked.0.map(u64::from), asked.1.map(u64::from)) {
+        (Some(width), Some(height)) => (width, height),
+        (Some(width), None) => (width, scaled(width, scene_height, scene_width)),
+        (None, Some(height)) => (scaled(height, scene_width, scene_height), height),
+        (None, None) => (scene_width, scene_height),
+    };
+    if width > SIDE_LIMIT || height > SIDE_LIMIT || width * height > PIXEL_LIMIT {
+        return Err(Failure::Usage(format!(
+            "--width and --height make a picture of {width} x {height} pixels; at most {SIDE_LIMIT} on a side and \
+             {PIXEL_LIMIT} in all are possible"
+        )));
+    }
+    Ok((width as u32, height as u32))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn one_side_alone_keeps_the_aspect_ratio() {
+        let size = |width, height| film_size((width, height), (300, 200)).ok();
+        assert_eq!(size(None, None), Some((300, 200)));
+        assert_eq!(size(Some(30), None), Some((30, 20)));
+        assert_eq!(size(None, Some(21)), Some((32, 21))); // 31.5
+        assert_eq!(size(Some(1), None), Some((1, 1))); // 0.67
+        assert_eq!(size(Some(7), Some(9)), Some((7, 9)));
+        assert_eq!(film_size((None, Some(1)), (1, 65536)).ok(), Some((1, 1)));
+    }
+
+    #[test]
+    fn a_film_has_its_limits() {
+        assert_eq!(film_size((Some(1), None), (1, 65536)).ok(), Some((1, 65536)));
+        assert!(film_size((Some(2), None), (1, 65536)).is_err());
+        assert!(film_size((Some(65536), Some(2048)), (1, 1)).is_ok());
+        assert!(film_size((Some(65536), Some(2049)), (1, 1)).is_err());
+        // Nothing asked: the scene's own sizes are not judged here
+        assert_eq!(film_size((None, None), (0, 7)).ok(), Some((0, 7)));
+    }
+
+    #[test]
+    fn a_crop_may_touch_the_edges() {
+        let crop = |x, y, width, height| inside(Window { x, y, width, height }, 10, 20);
+        assert!(crop(0, 0, 10, 20) && crop(9, 19, 1, 1));
+        assert!(!crop(0, 0, 11, 1) && !crop(10, 0, 1, 1) && !crop(0, 20, 1, 1) && !crop(u32::MAX, 0, u32::MAX, 1));
+    }
+}

@@ -1,0 +1,114 @@
+//! What a render took: a table for people, JSON for programs.
+
+use std::time::Duration;
+
+use firstlight::RenderStats;
+use serde_json::json;
+
+/// The numbers of one run of `firstlight render`.
+pub struct Stats {
+    /// What messages call the scene.
+    pub scene: String,
+    /// Pixels across, of what was rendered.
+    pub width: u32,
+    /// Pixels down.
+    pub height: u32,
+    /// Reading the scene's text.
+    pub parse: Duration,
+    /// Checking it, reading its textures, building what rays need.
+    pub compile: Duration,
+    /// Rays and shading.
+    pub render: Duration,
+    /// Encoding and writing the pictures.
+    pub write: Duration,
+    /// What the renderer counted.
+    pub rays: RenderStats,
+}
+
+impl Stats {
+    /// Millions of camera and shadow rays settled in each second of rendering, those without tracing included; 0 where
+    /// no time passed.
+    fn mrays_per_s(&self) -> f64 {
+        let seconds = self.render.as_secs_f64();
+        let rays = self.rays.camera_rays as f64 + self.rays.shadow_rays as f64;
+        if seconds > 0.0 { rays / seconds / 1e6 } else { 0.0 }
+    }
+
+    /// Pretty-printed, with a newline at the end. Times in seconds.
+    pub fn to_json(&self) -> String {
+        let value = json!({
+            "version": env!("CARGO_PKG_VERSION"),
+            "scene": self.scene,
+            "width": self.width,
+            "height": self.height,
+            "parse_s": self.parse.as_secs_f64(),
+            "compile_s": self.compile.as_secs_f64(),
+            "render_s": self.render.as_secs_f64(),
+            "write_s": self.write.as_secs_f64(),
+            "camera_rays": self.rays.camera_rays,
+            "shadow_rays": self.rays.shadow_rays,
+            "shadow_rays_skipped": self.rays.shadow_rays_skipped,
+            "mrays_per_s": self.mrays_per_s(),
+            "peak_memory_bytes": peak_memory(),
+            "simd": self.rays.simd.name(),
+            "threads": self.rays.threads,
+        });
+        format!("{value:#}\n")
+    }
+
+    /// One line for each stage and number, without a newline at the end.
+    pub fn to_table(&self) -> String {
+        let seconds = |time: Duration| format!("{:.3} s", time.as_secs_f64());
+        let picture = format!("{} x {} pixels", self.width, self.height);
+        let how = format!("{}, {} thread{}", self.rays.simd.name(), self.rays.threads, plural(self.rays.threads));
+        let mut rows = vec![
+            ("parse", seconds(self.parse), String::new()),
+            ("compile", seconds(self.compile), String::new()),
+            ("render", seconds(self.render), format!("{picture}, {how}")),
+            ("write", seconds(self.write), String::new()),
+            ("camera rays", self.rays.camera_rays.to_string(), String::new()),
+            (
+                "shadow rays",
+                self.rays.shadow_rays.to_string(),
+                format!("{} of them settled without tracing", self.rays.shadow_rays_skipped),
+            ),
+            ("rays a second", format!("{:.1} million", self.mrays_per_s()), String::new()),
+        ];
+        if let Some(bytes) = peak_memory() {
+            rows.push(("memory, at most", format!("{:.1} MiB", bytes as f64 / f64::from(1 << 20)), String::new()));
+        }
+        let (names, values) = (width(rows.iter().map(|r| r.0)), width(rows.iter().map(|r| r.1.as_str())));
+        let line = |(name, value, note): &(&str, String, String)| {
+            format!("{name:names$}  {value:>values$}  {note}").trim_end().to_owned()
+        };
+        rows.iter().map(line).collect::<Vec<_>>().join("\n")
+    }
+}
+
+fn plural(n: usize) -> &'static str {
+    if n == 1 { "" } else { "s" }
+}
+
+fn width<'a>(texts: impl Iterator<Item = &'a str>) -> usize {
+    texts.map(str::len).max().unwrap_or(0)
+}
+
+/// The most memory this process has held so far, in bytes. `None` where the system does not say (it does on Linux).
+fn peak_memory() -> Option<u64> {
+    if !cfg!(target_os = "linux") {
+        return None;
+    }
+    let status = std::fs::read_to_string("/proc/self/status").ok()?;
+    let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;
+    let kib: u64 = line.trim().strip_suffix("kB")?.trim().parse().ok()?;
+    Some(kib * 1024)
+}
+
+#[cfg(test)]
+mod tests {
+    #[test]
+    #[cfg(target_os = "linux")]
+    fn memory_is_known_on_linux() {
+        assert!(super::peak_memory().is_some_and(|bytes| bytes > 100_000));
+    }
+}

@@ -1,0 +1,152 @@
+//! What the options do to a picture, and what they must not do.
+
+use crate::common::{COURSE, Folder, Picture, QUICK, SCENE, size_of};
+
+#[test]
+fn without_a_scene_it_renders_config11() {
+    let folder = Folder::new();
+    folder.run(&format!("render {}", QUICK.join(" "))).done().says(&["wrote config11.png"]);
+    assert_eq!(folder.names(), ["config11.png"]);
+    assert_eq!(size_of(&folder.path("config11.png")), (24, 24));
+}
+
+#[test]
+fn the_picture_is_called_like_the_scene() {
+    let folder = Folder::with_scene();
+    std::fs::create_dir(folder.path("below")).unwrap();
+    folder.put("below/a.room.toml", SCENE);
+    folder.run("render scene.toml").done();
+    folder.run("render below/a.room.toml").done();
+    folder.run(&format!("render config23 {}", QUICK.join(" "))).done();
+    assert_eq!(folder.names(), ["a.room.png", "below", "config23.png", "scene.png", "scene.toml"]);
+}
+
+#[test]
+fn one_side_alone_keeps_the_aspect_ratio() {
+    let folder = Folder::with_scene();
+    let size = |options| Picture::decode(&folder.png(options)).size();
+    assert_eq!(size(""), (36, 24));
+    assert_eq!(size("--width 18"), (18, 12));
+    assert_eq!(size("--height 12"), (18, 12));
+    assert_eq!(size("--width 1"), (1, 1));
+    assert_eq!(size("--width 5 --height 7"), (5, 7));
+}
+
+#[test]
+fn quality_options_change_the_picture() {
+    let folder = Folder::with_scene();
+    let plain = folder.png("");
+    for option in ["--aa 3", "--samples 3", "--exposure -1.5", "--exposure=2", "--camera side"] {
+        assert!(folder.png(option) != plain, "{option} changes nothing");
+    }
+    for option in ["--aa 2", "--samples 16", "--exposure 0", "--camera front", "--strict", "--allow-dir ."] {
+        assert!(folder.png(option) == plain, "{option} is what the scene says, and changes something");
+    }
+}
+
+#[test]
+fn how_the_work_is_done_changes_no_byte() {
+    let folder = Folder::with_scene();
+    let plain = folder.png("");
+    let options = [
+        "--threads 1",
+        "--threads 2",
+        "--threads 7",
+        "--tile-size 8",
+        "--tile-size 64",
+        "--simd auto",
+        "--simd fallback",
+        "--reference",
+        "--reference --threads 3 --tile-size 9",
+        "--quiet",
+        "--stats",
+    ];
+    for option in options {
+        assert!(folder.png(option) == plain, "{option} changes the picture");
+    }
+}
+
+#[test]
+fn every_level_is_known_and_those_of_this_processor_give_the_same_bytes() {
+    let folder = Folder::with_scene();
+    let plain = folder.png("");
+    for level in ["auto", "fallback", "sse2", "sse4.2", "avx2", "avx512", "neon"] {
+        let ran = folder.run(&format!("render scene.toml --simd {level} -o level.png"));
+        match ran.code {
+            Some(0) => assert!(folder.get("level.png") == plain, "{level}"),
+            _ => drop(ran.exits(2).says(&[level, "fallback"])),
+        }
+    }
+}
+
+#[test]
+fn a_crop_is_a_part_of_the_whole() {
+    let folder = Folder::with_scene();
+    let whole = Picture::decode(&folder.png(""));
+    for (x, y, width, height) in [(0, 0, 36, 24), (5, 3, 17, 9), (35, 23, 1, 1), (0, 10, 36, 1)] {
+        let part = Picture::decode(&folder.png(&format!("--crop {x},{y},{width},{height}")));
+        assert_eq!(part.size(), (width, height));
+        assert!(part.data == whole.part(x, y, width, height), "{x},{y},{width},{height}");
+    }
+}
+
+#[test]
+fn png_has_8_bits_or_16() {
+    let folder = Folder::with_scene();
+    let bits = |options| Picture::decode(&folder.png(options)).bits;
+    assert_eq!([bits(""), bits("--bits 8"), bits("--bits 16")], [8, 8, 16]);
+}
+
+#[test]
+fn several_outputs_come_from_one_rendering() {
+    let folder = Folder::with_scene();
+    let ran = folder.run("render scene.toml -o a.png -o b.exr --output c.HDR -o - --format exr --bits 16").done();
+    assert_eq!(folder.names(), ["a.png", "b.exr", "c.HDR", "scene.toml"]);
+    assert_eq!(Picture::decode(&folder.get("a.png")).bits, 16);
+    assert!(folder.get("b.exr").starts_with(&[0x76, 0x2f, 0x31, 0x01]));
+    assert!(folder.get("c.HDR").starts_with(b"#?RADIANCE"));
+    assert!(ran.stdout == folder.get("b.exr"), "the same film, the same bytes");
+    ran.says(&["wrote a.png", "wrote b.exr", "wrote c.HDR"]);
+}
+
+#[test]
+fn standard_output_takes_every_format() {
+    let folder = Folder::with_scene();
+    let stdout = |options: &str| folder.run(&format!("render scene.toml -o - {options}")).done().stdout;
+    assert!(stdout("") == folder.png(""));
+    assert!(stdout("--format png --bits 16") == folder.png("--bits 16"));
+    assert!(stdout("--format exr").starts_with(&[0x76, 0x2f, 0x31, 0x01]));
+    assert!(stdout("--format hdr").starts_with(b"#?RADIANCE"));
+    assert_eq!(folder.names(), ["scene.toml"]);
+}
+
+#[test]
+fn a_scene_comes_from_standard_input() {
+    let folder = Folder::with_scene();
+    folder.run_with_input("render -", SCENE.as_bytes()).done().says(&["wrote scene.png"]);
+    assert!(folder.get("scene.png") == folder.png(""));
+}
+
+#[test]
+fn a_course_file_names_its_output() {
+    let folder = Folder::new();
+    folder.put("config.txt", COURSE);
+    folder.run("render config.txt").done().says(&["wrote course.png"]);
+    assert_eq!(folder.names(), ["config.txt", "course.png"]);
+    assert_eq!(size_of(&folder.path("course.png")), (30, 30));
+    // -o and other options win over it
+    folder.run("render config.txt -o other.png --width 15 --threads 1").done();
+    assert_eq!(size_of(&folder.path("other.png")), (15, 15));
+    assert_eq!(folder.names(), ["config.txt", "course.png", "other.png"]);
+    // From standard input as well
+    folder.run_with_input("render - --bits 16", COURSE.as_bytes()).done().says(&["wrote course.png"]);
+    assert_eq!(Picture::decode(&folder.get("course.png")).bits, 16);
+}
+
+#[test]
+fn a_course_file_without_output_is_called_like_itself() {
+    let folder = Folder::new();
+    folder.put("mine.txt", COURSE.replace("output_file course.png\n", ""));
+    folder.run("render mine.txt").done();
+    assert_eq!(folder.names(), ["mine.png", "mine.txt"]);
+}

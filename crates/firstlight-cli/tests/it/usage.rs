@@ -1,0 +1,89 @@
+//! Wrong usage: exit code 2, what is allowed, and no file.
+
+use crate::common::{Folder, SCENE};
+
+/// The words after `firstlight`, and what must be said.
+#[rustfmt::skip]
+const BAD: &[(&str, &[&str])] = &[
+    ("", &["Usage: firstlight"]),
+    ("rendr scene.toml", &["rendr", "render"]),
+    ("--loud", &["--loud"]),
+    ("render scene.toml other.toml", &["other.toml"]),
+    ("render scene.toml --widht 3", &["--widht", "--width"]),
+    ("render scene.toml --width", &["--width"]),
+    ("render scene.toml --width 0", &["--width", "0", "1..=65536"]),
+    ("render scene.toml --width 65537", &["--width", "65537", "1..=65536"]),
+    ("render scene.toml --width 1.5", &["--width", "1.5"]),
+    ("render scene.toml --height 0", &["--height", "1..=65536"]),
+    ("render scene.toml --height -3", &["-3"]),
+    ("render scene.toml --width 65536", &["65536 x 43691", "134217728"]),
+    ("render scene.toml --width 65536 --height 65536", &["134217728"]),
+    ("render scene.toml --aa 0", &["--aa", "1..=64"]),
+    ("render scene.toml --aa 65", &["--aa", "1..=64"]),
+    ("render scene.toml --samples 0", &["--samples", "1..=1048576"]),
+    ("render scene.toml --samples 1048577", &["--samples", "1..=1048576"]),
+    ("render scene.toml --samples many", &["--samples", "many"]),
+    ("render scene.toml --threads 0", &["--threads", "1..=1024"]),
+    ("render scene.toml --threads 1025", &["--threads", "1..=1024"]),
+    ("render scene.toml --tile-size 7", &["--tile-size", "8..=64"]),
+    ("render scene.toml --tile-size 65", &["--tile-size", "8..=64"]),
+    ("render scene.toml --exposure 65", &["--exposure", "-64 to 64"]),
+    ("render scene.toml --exposure nan", &["--exposure", "-64 to 64"]),
+    ("render scene.toml --crop 1,2,3", &["--crop", "X,Y,WIDTH,HEIGHT"]),
+    ("render scene.toml --crop 0,0,0,5", &["--crop", "at least 1"]),
+    ("render scene.toml --crop -1,0,5,5", &["-1,0,5,5"]),
+    ("render scene.toml --crop 30,0,7,5", &["--crop 30,0,7,5", "36 x 24"]),
+    ("render scene.toml --crop 4294967295,0,4294967295,1", &["--crop", "36 x 24"]),
+    ("render scene.toml --crop 30,0,6,5 --width 18", &["--crop", "18 x 12"]),
+    ("render scene.toml --camera back", &["back", "front, side"]),
+    ("render config11 --camera back", &["back", "no cameras"]),
+    ("render scene.toml --simd mmx", &["mmx", "auto", "fallback", "avx2"]),
+    ("render scene.toml --bits 12", &["12", "8", "16"]),
+    ("render scene.toml --bits 16 -o a.exr", &["--bits", "PNG"]),
+    ("render scene.toml --format jpg -o -", &["jpg", "png", "exr", "hdr"]),
+    ("render scene.toml --format exr", &["--format", "-o -"]),
+    ("render scene.toml --format exr -o a.exr", &["--format", "-o -"]),
+    ("render scene.toml -o a.jpg", &["a.jpg", ".png", ".exr", ".hdr"]),
+    ("render scene.toml -o a", &["a", ".png", ".exr", ".hdr"]),
+    ("render scene.toml -o .png", &[".png"]),
+    ("render scene.toml -o", &["--output"]),
+    ("render scene.toml -o a.png -o a.png", &["a.png", "twice"]),
+    ("render scene.toml -o a.png -o ./a.png", &["a.png", "twice"]),
+    ("render scene.toml -o - -o -", &["twice"]),
+    ("render scene.toml -o - --stats=-", &["--stats", "-o"]),
+    ("render scene.toml --quiet --quiet", &["--quiet"]),
+    ("render scene.toml --allow-dir", &["--allow-dir"]),
+    ("check", &["SCENE"]),
+    ("check scene.toml --json", &["--json"]),
+    ("info", &["SCENE"]),
+    ("scenes config99", &["config99", "config11"]),
+    ("completions tcsh", &["tcsh", "bash", "zsh", "fish", "elvish", "powershell"]),
+    ("completions", &["SHELL"]),
+    ("schema scene.toml", &["scene.toml"]),
+];
+
+#[test]
+fn wrong_usage_is_exit_code_2_and_says_what_is_allowed() {
+    let folder = Folder::with_scene();
+    for (line, parts) in BAD {
+        println!("firstlight {line}");
+        let ran = folder.run(line).exits(2).says(parts);
+        assert!(ran.stdout.is_empty(), "{line} answers");
+        assert_eq!(folder.names(), ["scene.toml"], "{line} leaves a file");
+    }
+}
+
+#[test]
+fn a_grid_of_samples_is_square() {
+    let folder = Folder::new();
+    folder.put("scene.toml", format!("{SCENE}set = \"grid\"\n"));
+    folder.run("render scene.toml --samples 12 -o a.png").exits(2).says(&["--samples 12", "9 and 16"]);
+    folder.run("render scene.toml --samples 9 -o a.png").done();
+}
+
+#[test]
+fn faults_of_the_scene_come_before_what_follows_from_them() {
+    let folder = Folder::new();
+    folder.put("scene.toml", "[camera.front]\ncolour = 3\n");
+    folder.run("render scene.toml --camera back").exits(1).says(&["scene.toml:2:", "colour"]);
+}

@@ -1,0 +1,156 @@
+//! Display encodings: how linear light becomes the numbers of an 8- or 16-bit picture, and back.
+//!
+//! The functions here are the definition, in f64; [`super::Quantizer`] does the same for many pixels at once.
+
+/// How linear light becomes the numbers of an 8- or 16-bit picture.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Encoding {
+    /// The sRGB curve.
+    Srgb,
+    /// The power 1 / gamma; the gamma is finite and greater than 0.
+    Gamma(f64),
+    /// As it is.
+    Linear,
+}
+
+impl Encoding {
+    /// The encoded value, 0 to 1, of a linear one. What is below 0 and NaN become 0, what is above 1 becomes 1.
+    ///
+    /// Source: IEC 61966-2-1:1999, section 5.2 (sRGB).
+    pub fn encode(self, linear: f64) -> f64 {
+        if linear.is_nan() || linear <= 0.0 {
+            return 0.0;
+        }
+        if linear >= 1.0 {
+            return 1.0;
+        }
+        match self {
+            Encoding::Srgb if linear <= 0.0031308 => 12.92 * linear,
+            Encoding::Srgb => 1.055 * pxfm::f_pow(linear, 1.0 / 2.4) - 0.055,
+            Encoding::Gamma(gamma) => pxfm::f_pow(linear, 1.0 / gamma),
+            Encoding::Linear => linear,
+        }
+    }
+
+    /// The linear value, 0 to 1, of an encoded one. What is below 0 and NaN become 0, what is above 1 becomes 1.
+    ///
+    /// Source: IEC 61966-2-1:1999, section 5.2 (sRGB).
+    pub fn decode(self, encoded: f64) -> f64 {
+        if encoded.is_nan() || encoded <= 0.0 {
+            return 0.0;
+        }
+        if encoded >= 1.0 {
+            return 1.0;
+        }
+        match self {
+            Encoding::Srgb if encoded <= 0.04045 => encoded / 12.92,
+            Encoding::Srgb => pxfm::f_pow((encoded + 0.055) / 1.055, 2.4),
+            Encoding::Gamma(gamma) => pxfm::f_pow(encoded, gamma),
+            Encoding::Linear => encoded,
+        }
+    }
+}
+
+/// What is done to linear light before it is stored in an 8- or 16-bit picture. Other files hold the film as it is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Display {
+    /// The curve.
+    pub encoding: Encoding,
+    /// In stops, -64 to 64: light is multiplied by 2^exposure first.
+    pub exposure: f64,
+}
+
+impl Default for Display {
+    /// sRGB, exposure 0.
+    fn default() -> Self {
+        Self { encoding: Encoding::Srgb, exposure: 0.0 }
+    }
+}
+
+impl Display {
+    /// The encoded value, 0 to 1, of a linear one.
+    pub fn encode(&self, linear: f32) -> f64 {
+        self.encoding.encode(f64::from(linear) * self.factor())
+    }
+
+    /// 2^exposure; exact for whole stops.
+    pub fn factor(&self) -> f64 {
+        let stops = self.exposure;
+        if stops == stops.trunc() && stops.abs() <= 1000.0 {
+            f64::from_bits(((1023 + stops as i64) as u64) << 52)
+        } else {
+            pxfm::f_exp2(stops)
+        }
+    }
+
+    /// What is wrong with the numbers, with what is allowed; None if nothing is.
+    pub(crate) fn fault(&self) -> Option<String> {
+        match self.encoding {
+            Encoding::Gamma(gamma) if !(gamma > 0.0 && gamma.is_finite()) => {
+                return Some(format!("gamma {gamma} is not a finite number greater than 0"));
+            }
+            _ => {}
+        }
+        // `contains` is false for NaN
+        let allowed = (-64.0..=64.0).contains(&self.exposure);
+        (!allowed).then(|| format!("exposure {} is outside [-64, 64] stops", self.exposure))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn srgb_known_values() {
+        // IEC 61966-2-1: middle values known from its tables and from the ends of its two pieces
+        let srgb = Encoding::Srgb;
+        assert_eq!(srgb.encode(0.0), 0.0);
+        assert_eq!(srgb.encode(1.0), 1.0);
+        assert_eq!((srgb.encode(0.5) * 255.0).round(), 188.0);
+        assert_eq!((srgb.encode(0.18) * 255.0).round(), 118.0);
+        assert!((srgb.decode(0.5) - 0.214_041_14).abs() < 1e-8);
+        assert!((srgb.encode(0.0031308) - 0.04045).abs() < 1e-7);
+    }
+
+    #[test]
+    fn decode_undoes_encode() {
+        for encoding in [Encoding::Srgb, Encoding::Gamma(2.2), Encoding::Gamma(0.7), Encoding::Linear] {
+            for i in 0..=1000 {
+                let x = f64::from(i) / 1000.0;
+                // At its join the sRGB curve is off by 3e-8
+                assert!((encoding.decode(encoding.encode(x)) - x).abs() < 1e-8, "{encoding:?} {x}");
+            }
+        }
+    }
+
+    #[test]
+    fn odd_numbers_have_a_meaning() {
+        for encoding in [Encoding::Srgb, Encoding::Gamma(2.2), Encoding::Linear] {
+            for (x, y) in [(f64::NAN, 0.0), (-1.0, 0.0), (f64::NEG_INFINITY, 0.0), (f64::INFINITY, 1.0), (7.0, 1.0)] {
+                assert_eq!(encoding.encode(x), y);
+                assert_eq!(encoding.decode(x), y);
+            }
+        }
+    }
+
+    #[test]
+    fn whole_stops_are_exact() {
+        let at = |exposure| Display { encoding: Encoding::Linear, exposure };
+        assert_eq!(at(0.0).factor(), 1.0);
+        assert_eq!(at(-3.0).factor(), 0.125);
+        assert_eq!(at(64.0).factor(), 18_446_744_073_709_551_616.0);
+        assert!((at(0.5).factor() - std::f64::consts::SQRT_2).abs() < 1e-15);
+        assert_eq!(at(-1.0).encode(0.5), 0.25);
+    }
+
+    #[test]
+    fn faults_name_the_value() {
+        let fault = |encoding, exposure| Display { encoding, exposure }.fault();
+        assert_eq!(fault(Encoding::Srgb, 64.0), None);
+        assert_eq!(fault(Encoding::Srgb, f64::NAN).unwrap(), "exposure NaN is outside [-64, 64] stops");
+        assert_eq!(fault(Encoding::Srgb, -65.0).unwrap(), "exposure -65 is outside [-64, 64] stops");
+        assert_eq!(fault(Encoding::Gamma(0.0), 0.0).unwrap(), "gamma 0 is not a finite number greater than 0");
+        assert!(fault(Encoding::Gamma(f64::INFINITY), 0.0).is_some());
+    }
+}

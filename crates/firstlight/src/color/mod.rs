@@ -1,0 +1,76 @@
+//! Colour: linear Rec. 709 everywhere inside; sRGB and gamma only at the edges.
+
+mod display;
+mod quantize;
+
+pub use display::{Display, Encoding};
+pub(crate) use quantize::Quantizer;
+
+use std::ops::{Add, AddAssign, Mul};
+
+/// Linear Rec. 709, scene-referred: no upper bound, not display-encoded.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Rgb {
+    /// Red.
+    pub r: f32,
+    /// Green.
+    pub g: f32,
+    /// Blue.
+    pub b: f32,
+}
+
+impl Rgb {
+    /// No light.
+    pub const BLACK: Rgb = Rgb::new(0.0, 0.0, 0.0);
+    /// 1 in every channel.
+    pub const WHITE: Rgb = Rgb::new(1.0, 1.0, 1.0);
+
+    /// From the three channels.
+    #[inline(always)]
+    pub const fn new(r: f32, g: f32, b: f32) -> Self {
+        Self { r, g, b }
+    }
+
+    /// The same value in all channels.
+    #[inline(always)]
+    pub const fn gray(v: f32) -> Self {
+        Self::new(v, v, v)
+    }
+
+    /// Whether every channel is exactly 0.
+    #[inline(always)]
+    pub fn is_black(self) -> bool {
+        self.r == 0.0 && self.g == 0.0 && self.b == 0.0
+    }
+}
+
+impl Add for Rgb {
+    type Output = Rgb;
+    #[inline(always)]
+    fn add(self, o: Rgb) -> Rgb {
+        Rgb::new(self.r + o.r, self.g + o.g, self.b + o.b)
+    }
+}
+
+impl AddAssign for Rgb {
+    #[inline(always)]
+    fn add_assign(&mut self, o: Rgb) {
+        *self = *self + o;
+    }
+}
+
+impl Mul for Rgb {
+    type Output = Rgb;
+    #[inline(always)]
+    fn mul(self, o: Rgb) -> Rgb {
+        Rgb::new(self.r * o.r, self.g * o.g, self.b * o.b)
+    }
+}
+
+impl Mul<f32> for Rgb {
+    type Output = Rgb;
+    #[inline(always)]
+    fn mul(self, s: f32) -> Rgb {
+        Rgb::new(self.r * s, self.g * s, self.b * s)
+    }
+}

@@ -1,0 +1,113 @@
+//! From values to text: what a table writes, as TOML and as JSON.
+
+/// A value on its way to text.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) enum Written {
+    /// Nothing: the key is left out.
+    Absent,
+    Number(f64),
+    Bool(bool),
+    Text(String),
+    List(Vec<Written>),
+    /// An inline table.
+    Table(Vec<(&'static str, Written)>),
+}
+
+/// The shortest decimal that reads back to the same bits; whole numbers without a point.
+fn number(v: f64) -> String {
+    let whole = v.fract() == 0.0 && v.abs() < 1e15 && !(v == 0.0 && v.is_sign_negative());
+    if whole { format!("{v:.0}") } else { format!("{v:?}") }
+}
+
+/// A key as TOML writes it: bare where that is possible, else in quotes.
+pub(crate) fn key(name: &str) -> String {
+    let bare = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '-';
+    if !name.is_empty() && name.chars().all(bare) { name.to_owned() } else { toml_string(name) }
+}
+
+fn toml_string(text: &str) -> String {
+    let mut out = String::with_capacity(text.len() + 2);
+    out.push('"');
+    for c in text.chars() {
+        match c {
+            '"' => out.push_str("\\\""),
+            '\\' => out.push_str("\\\\"),
+            '\n' => out.push_str("\\n"),
+            '\r' => out.push_str("\\r"),
+            '\t' => out.push_str("\\t"),
+            c if c.is_control() => out.push_str(&format!("\\u{:04X}", u32::from(c))),
+            c => out.push(c),
+        }
+    }
+    out.push('"');
+    out
+}
+
+/// A string as JSON writes it.
+pub(crate) fn json_string(text: &str) -> String {
+    serde_json::Value::from(text).to_string()
+}
+
+impl Written {
+    /// On one line, as TOML.
+    pub(crate) fn to_toml(&self) -> String {
+        match self {
+            Written::Absent => String::new(),
+            Written::Number(v) if v.is_nan() => "nan".into(),
+            Written::Number(v) => number(*v),
+            Written::Bool(v) => v.to_string(),
+            Written::Text(v) => toml_string(v),
+            Written::List(v) => format!("[{}]", v.iter().map(Self::to_toml).collect::<Vec<_>>().join(", ")),
+            Written::Table(v) => {
+                let pairs: Vec<String> = v.iter().map(|(k, v)| format!("{} = {}", key(k), v.to_toml())).collect();
+                format!("{{ {} }}", pairs.join(", "))
+            }
+        }
+    }
+
+    /// On one line, as JSON, which has no words for numbers that are not finite: they become `null`.
+    pub(crate) fn to_json(&self) -> String {
+        match self {
+            Written::Absent => "null".into(),
+            Written::Number(v) if !v.is_finite() => "null".into(),
+            Written::Number(v) => number(*v),
+            Written::Bool(v) => v.to_string(),
+            Written::Text(v) => json_string(v),
+            Written::List(v) => format!("[{}]", v.iter().map(Self::to_json).collect::<Vec<_>>().join(", ")),
+            Written::Table(v) => {
+                let pairs: Vec<String> =
+                    v.iter().map(|(k, v)| format!("{}: {}", json_string(k), v.to_json())).collect();
+                format!("{{ {} }}", pairs.join(", "))
+            }
+        }
+    }
+
+    /// As a tree, for the defaults of the JSON Schema.
+    pub(crate) fn to_json_value(&self) -> serde_json::Value {
+        serde_json::from_str(&self.to_json()).expect("what to_json writes is JSON")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_read_back_to_the_same_bits() {
+        for v in [0.0, -0.0, 1.0, -6.0, 5.9, 1e15, 1e16, 1e300, f64::MAX, f64::MIN_POSITIVE, 5e-324, 0.1 + 0.2] {
+            let text = number(v);
+            assert_eq!(text.parse::<f64>().map(f64::to_bits), Ok(v.to_bits()), "{text}");
+            let root = toml::de::DeValue::parse(&text).expect("is TOML");
+            assert!(root.get_ref().is_float() || root.get_ref().is_integer(), "{text}");
+        }
+        assert_eq!(number(-6.0), "-6");
+    }
+
+    #[test]
+    fn keys_are_bare_where_they_can_be() {
+        assert_eq!(key("blinn-phong_2"), "blinn-phong_2");
+        assert_eq!(key(""), "\"\"");
+        assert_eq!(key("a.b"), "\"a.b\"");
+        assert_eq!(key("a\u{7f}\"\n"), "\"a\\u007F\\\"\\n\"");
+    }
+}

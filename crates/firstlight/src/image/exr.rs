@@ -1,0 +1,214 @@
+//! OpenEXR files: the film as it is, in 32-bit floats.
+//!
+//! Channels R, G, B, and A unless every alpha is 1; premultiplied, as the format wants. The data window is the picture's
+//! window, the display window the whole film. Rec. 709 chromaticities. The receipt is in string attributes
+//! `firstlight:KEY`, UTF-8, the program in `software`. Lossless ZIP in blocks of 16 rows.
+
+use std::io::Cursor;
+use std::ops::Range;
+
+use ::exr as codec;
+use codec::block::chunk::Chunk;
+use codec::block::writer::ChunksWriter;
+use codec::block::{UncompressedBlock, enumerate_ordered_header_block_indices};
+use codec::error::Error;
+use codec::math::Vec2;
+use codec::meta::attribute::{
+    AttributeValue, ChannelDescription, Chromaticities, IntegerBounds, LineOrder, SampleType, Text,
+};
+use codec::meta::header::Header;
+use codec::meta::{BlockDescription, attribute::Text as Name};
+use codec::prelude::{Compression, SmallVec};
+use rayon::prelude::*;
+
+use super::{Image, ImageError, PREFIX, Receipt, SOFTWARE};
+
+/// The bytes of an EXR file. The picture and the receipt have been checked.
+pub(super) fn encode(picture: &Image, receipt: &Receipt) -> Result<Vec<u8>, ImageError> {
+    let fault = |e: Error| ImageError::Encode { format: "EXR", reason: e.to_string() };
+    let header = header(picture, receipt);
+    let width = picture.window.width as usize;
+    // In the file channels stand by name; these are their places in a pixel
+    let places: &[usize] = if header.channels.list.len() == 4 { &[3, 2, 1, 0] } else { &[2, 1, 0] };
+    // Compress all blocks of rows at once
+    let headers: SmallVec<[Header; 3]> = SmallVec::from_elem(header, 1);
+    let blocks: Vec<_> = enumerate_ordered_header_block_indices(&headers).collect();
+    let chunks: Vec<(usize, Chunk)> = blocks
+        .into_par_iter()
+        .map(|(i, index)| {
+            let rows = index.pixel_position.y()..index.pixel_position.y() + index.pixel_size.y();
+            let data = planes(&picture.pixels[rows.start * width..rows.end * width], width, places);
+            Ok((i, UncompressedBlock { index, data }.compress_to_chunk(&headers)?))
+        })
+        .collect::<Result<_, Error>>()
+        .map_err(fault)?;
+    let mut bytes = Cursor::new(Vec::new());
+    codec::block::write(&mut bytes, headers, true, |_, writer| {
+        chunks.into_iter().try_for_each(|(i, chunk)| writer.write_chunk(i, chunk))
+    })
+    .map_err(fault)?;
+    let mut bytes = bytes.into_inner();
+    order_attributes(&mut bytes, receipt);
+    Ok(bytes)
+}
+
+/// Everything that the file says before its pixels.
+fn header(picture: &Image, receipt: &Receipt) -> Header {
+    let window = picture.window;
+    let size = Vec2(window.width as usize, window.height as usize);
+    let names: &[&str] = if picture.is_opaque() { &["B", "G", "R"] } else { &["A", "B", "G", "R"] };
+    let channels = names.iter().map(|n| ChannelDescription::named(*n, SampleType::F32)).collect();
+    let mut header = Header::new(Name::from(""), size, channels).with_encoding(
+        Compression::ZIP16,
+        BlockDescription::ScanLines,
+        LineOrder::Increasing,
+    );
+    header.shared_attributes.display_window =
+        IntegerBounds::from_dimensions(Vec2(picture.film[0] as usize, picture.film[1] as usize));
+    header.shared_attributes.chromaticities = Some(Chromaticities {
+        red: Vec2(0.64, 0.33),
+        green: Vec2(0.3, 0.6),
+        blue: Vec2(0.15, 0.06),
+        white: Vec2(0.3127, 0.329),
+    });
+    let own = &mut header.own_attributes;
+    own.layer_name = None;
+    own.layer_position = Vec2(window.x as i32, window.y as i32);
+    own.software_name = Some(Text::from(SOFTWARE));
+    for (key, value) in &receipt.entries {
+        let text = Text::from_bytes_unchecked(value.as_bytes().into());
+        own.other.insert(Text::from(format!("{PREFIX}{key}").as_str()), AttributeValue::Text(text));
+    }
+    header
+}
+
+/// One row after another, and in each one channel after another.
+fn planes(pixels: &[[f32; 4]], width: usize, places: &[usize]) -> Vec<u8> {
+    let mut data = Vec::with_capacity(pixels.len() * places.len() * 4);
+    for row in pixels.chunks_exact(width) {
+        for &place in places {
+            data.extend(row.iter().flat_map(|p| p[place].to_ne_bytes()));
+        }
+    }
+    data
+}
+
+/// One attribute of a header: its name, its type, where its value stands, and where all of it stands.
+pub(super) struct Attribute<'a> {
+    pub(super) name: &'a [u8],
+    pub(super) kind: &'a [u8],
+    pub(super) value: Range<usize>,
+    all: Range<usize>,
+}
+
+/// The attributes of the first header, in the order of the file; as many as are whole.
+pub(super) fn attributes(bytes: &[u8]) -> Vec<Attribute<'_>> {
+    let mut found = Vec::new();
+    // After the magic number and the version
+    let mut at = 8;
+    // Each is a name and a type, both ended by 0, the length of the value, and the value; an empty name ends them
+    let word = |at: usize| {
+        let rest = bytes.get(at..)?;
+        Some(&rest[..rest.iter().position(|&b| b == 0)?])
+    };
+    while let Some(name) = word(at).filter(|name| !name.is_empty()) {
+        let Some(kind) = word(at + name.len() + 1) else { break };
+        let start = at + name.len() + kind.len() + 2;
+        let Some(length) = bytes.get(start..).and_then(|rest| rest.first_chunk::<4>()) else { break };
+        let end = (start + 4).saturating_add(u32::from_le_bytes(*length) as usize);
+        if end > bytes.len() {
+            break;
+        }
+        found.push(Attribute { name, kind, value: start + 4..end, all: at..end });
+        at = end;
+    }
+    found
+}
+
+/// Puts the receipt behind all other attributes, in its own order. The library keeps them in a hash map, whose order is
+/// another on every run. The header stays as long as it was.
+fn order_attributes(bytes: &mut [u8], receipt: &Receipt) {
+    let rank = |a: &Attribute| {
+        let key = a.name.strip_prefix(PREFIX.as_bytes())?;
+        receipt.entries.iter().position(|(k, _)| k.as_bytes() == key)
+    };
+    let mut list = attributes(bytes);
+    let Some(all) = list.first().zip(list.last()).map(|(a, b)| a.all.start..b.all.end) else { return };
+    // `None`, all others, comes first, and the sort is stable
+    list.sort_by_cached_key(rank);
+    let ordered: Vec<u8> = list.iter().flat_map(|a| &bytes[a.all.clone()]).copied().collect();
+    bytes[all].copy_from_slice(&ordered);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::Image;
+    use super::super::tests::{receipt, whole};
+    use super::super::{Format, Window};
+    use super::*;
+    use crate::color::Display;
+    use codec::prelude::{FlatImage, FlatSamples, ReadChannels, ReadLayers, read};
+
+    fn read_back(bytes: &[u8]) -> FlatImage {
+        let reader = read().no_deep_data().largest_resolution_level().all_channels().all_layers().all_attributes();
+        reader.from_buffered(Cursor::new(bytes)).unwrap()
+    }
+
+    fn encoded(picture: &Image, receipt: &Receipt) -> Vec<u8> {
+        picture.encode(Format::Exr, &Display::default(), receipt).unwrap()
+    }
+
+    #[test]
+    fn windows_channels_and_numbers() {
+        let mut picture = whole(5, 37, |x, y| [x as f32, y as f32 * 1e-9, 1.0 / 3.0, 0.25]);
+        picture.film = [100, 80];
+        picture.window.x = 11;
+        picture.window.y = 43;
+        let file = read_back(&encoded(&picture, &Receipt::default()));
+        assert_eq!(file.attributes.display_window, IntegerBounds::new((0, 0), (100, 80)));
+        assert_eq!(file.attributes.chromaticities.unwrap().red, Vec2(0.64, 0.33));
+        let layer = &file.layer_data[0];
+        assert_eq!((layer.attributes.layer_position, layer.size), (Vec2(11, 43), Vec2(5, 37)));
+        assert_eq!(layer.attributes.software_name.as_ref().unwrap().to_string(), SOFTWARE);
+        assert_eq!(layer.attributes.capture_date, None);
+        for (channel, (name, place)) in layer.channel_data.list.iter().zip([("A", 3), ("B", 2), ("G", 1), ("R", 0)]) {
+            assert_eq!(channel.name.to_string(), name);
+            let FlatSamples::F32(data) = &channel.sample_data else { panic!("not f32") };
+            assert!(data.iter().zip(&picture.pixels).all(|(d, p)| d.to_bits() == p[place].to_bits()));
+        }
+    }
+
+    #[test]
+    fn opaque_pictures_have_no_alpha() {
+        let file = read_back(&encoded(&whole(2, 2, |_, _| [2.0, 0.0, 0.0, 1.0]), &Receipt::default()));
+        let names: Vec<_> = file.layer_data[0].channel_data.list.iter().map(|c| c.name.to_string()).collect();
+        assert_eq!(names, ["B", "G", "R"]);
+    }
+
+    #[test]
+    fn the_receipt_is_in_attributes_in_its_order() {
+        let bytes = encoded(&whole(2, 2, |_, _| [0.5; 4]), &receipt());
+        let file = read_back(&bytes);
+        for (key, value) in receipt().entries {
+            let name = Text::from(format!("firstlight:{key}").as_str());
+            let AttributeValue::Text(text) = &file.layer_data[0].attributes.other[&name] else { panic!("{key}") };
+            assert_eq!(text.bytes(), value.as_bytes());
+        }
+        let names: Vec<_> = attributes(&bytes).iter().map(|a| String::from_utf8_lossy(a.name).into_owned()).collect();
+        let last: Vec<_> = receipt().entries.iter().map(|(k, _)| format!("firstlight:{k}")).collect();
+        assert_eq!(names[names.len() - last.len()..], last);
+        // The walk ends where the header does
+        assert_eq!(bytes[attributes(&bytes).last().unwrap().all.end], 0);
+    }
+
+    #[test]
+    fn the_largest_window_position_is_held() {
+        let picture = Image {
+            film: [65536; 2],
+            window: Window { x: 65535, y: 65535, width: 1, height: 1 },
+            pixels: vec![[1.0; 4]],
+        };
+        let file = read_back(&encoded(&picture, &Receipt::default()));
+        assert_eq!(file.layer_data[0].attributes.layer_position, Vec2(65535, 65535));
+    }
+}

@@ -1,0 +1,228 @@
+//! PNG files, 8 and 16 bits a channel.
+//!
+//! Straight alpha, as the format wants: colour is divided by alpha while it is still linear, then encoded. RGB if every
+//! alpha is 1, otherwise RGBA. The encoding is said with an sRGB chunk, or with gAMA and cHRM; the receipt is in iTXt
+//! chunks `firstlight:KEY`, the program in a tEXt chunk `Software`.
+
+use ::png as codec;
+use codec::text_metadata::{ITXtChunk, TEXtChunk};
+use rayon::prelude::*;
+
+use super::{Image, ImageError, PREFIX, Receipt, SOFTWARE};
+use crate::color::{Display, Encoding, Quantizer};
+
+/// Bits a channel.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Depth {
+    Eight,
+    Sixteen,
+}
+
+/// The bytes of a PNG file. The picture and the receipt have been checked.
+pub(super) fn encode(
+    picture: &Image,
+    depth: Depth,
+    display: &Display,
+    receipt: &Receipt,
+) -> Result<Vec<u8>, ImageError> {
+    if let Some(fault) = display.fault() {
+        return Err(ImageError::Display(fault));
+    }
+    let alpha = !picture.is_opaque();
+    let samples = quantize(picture, depth, display, alpha);
+    write(picture, depth, alpha, display.encoding, receipt, &samples)
+        .map_err(|e| ImageError::Encode { format: "PNG", reason: e.to_string() })
+}
+
+/// The samples, rows from the top, 16 bits with the high byte first.
+fn quantize(picture: &Image, depth: Depth, display: &Display, alpha: bool) -> Vec<u8> {
+    let largest = match depth {
+        Depth::Eight => 255,
+        Depth::Sixteen => 65535,
+    };
+    let color = Quantizer::for_count(display, largest, picture.pixels.len().saturating_mul(3));
+    let rgb = |[r, g, b, _]: [f32; 4]| [color.code(r), color.code(g), color.code(b)];
+    let rgba = |pixel| {
+        let [r, g, b, a] = straight(pixel);
+        [color.code(r), color.code(g), color.code(b), Quantizer::linear(a, largest)]
+    };
+    match (depth, alpha) {
+        (Depth::Eight, false) => each(picture, |p| rgb(p).map(|code| code as u8)),
+        (Depth::Eight, true) => each(picture, |p| rgba(p).map(|code| code as u8)),
+        (Depth::Sixteen, false) => each(picture, |p| rgb(p).map(u16::to_be_bytes)).into_flattened(),
+        (Depth::Sixteen, true) => each(picture, |p| rgba(p).map(u16::to_be_bytes)).into_flattened(),
+    }
+}
+
+/// What `samples` makes of each pixel, one after another; rows in parallel.
+fn each<T: Copy + Default + Send, const N: usize>(
+    picture: &Image,
+    samples: impl Fn([f32; 4]) -> [T; N] + Sync,
+) -> Vec<T> {
+    let width = picture.window.width as usize;
+    let mut all = vec![[T::default(); N]; picture.pixels.len()];
+    all.par_chunks_mut(width).zip(picture.pixels.par_chunks(width)).for_each(|(row, pixels)| {
+        for (out, pixel) in row.iter_mut().zip(pixels) {
+            *out = samples(*pixel);
+        }
+    });
+    all.into_flattened()
+}
+
+/// Divides the colour by alpha. What covers nothing is black; an alpha above 1 counts as 1.
+fn straight([r, g, b, a]: [f32; 4]) -> [f32; 4] {
+    if a > 0.0 && a < 1.0 {
+        [r / a, g / a, b / a, a]
+    } else if a >= 1.0 {
+        [r, g, b, 1.0]
+    } else {
+        [0.0; 4]
+    }
+}
+
+fn write(
+    picture: &Image,
+    depth: Depth,
+    alpha: bool,
+    encoding: Encoding,
+    receipt: &Receipt,
+    samples: &[u8],
+) -> Result<Vec<u8>, codec::EncodingError> {
+    let mut bytes = Vec::new();
+    let mut encoder = codec::Encoder::new(&mut bytes, picture.window.width, picture.window.height);
+    encoder.set_color(if alpha { codec::ColorType::Rgba } else { codec::ColorType::Rgb });
+    encoder.set_depth(match depth {
+        Depth::Eight => codec::BitDepth::Eight,
+        Depth::Sixteen => codec::BitDepth::Sixteen,
+    });
+    // Thirteen times as fast as the default
+    encoder.set_compression(codec::Compression::Fast);
+    // Say what the numbers mean
+    match encoding {
+        Encoding::Srgb => encoder.set_source_srgb(codec::SrgbRenderingIntent::RelativeColorimetric),
+        Encoding::Gamma(gamma) => set_gamma(&mut encoder, gamma),
+        Encoding::Linear => set_gamma(&mut encoder, 1.0),
+    }
+    let mut writer = encoder.write_header()?;
+    writer.write_text_chunk(&TEXtChunk::new("Software", SOFTWARE))?;
+    for (key, value) in &receipt.entries {
+        writer.write_text_chunk(&ITXtChunk::new(format!("{PREFIX}{key}"), value.as_str()))?;
+    }
+    writer.write_image_data(samples)?;
+    writer.finish()?;
+    Ok(bytes)
+}
+
+/// The gAMA chunk holds 100000 / gamma and cHRM the primaries of Rec. 709. A gamma that gAMA cannot hold goes unsaid.
+fn set_gamma(encoder: &mut codec::Encoder<'_, &mut Vec<u8>>, gamma: f64) {
+    let scaled = (100_000.0 / gamma).round();
+    if (1.0..=2_147_483_647.0).contains(&scaled) {
+        encoder.set_source_gamma(codec::ScaledFloat::from_scaled(scaled as u32));
+        let at = |x, y| (codec::ScaledFloat::from_scaled(x), codec::ScaledFloat::from_scaled(y));
+        encoder.set_source_chromaticities(codec::SourceChromaticities {
+            white: at(31270, 32900),
+            red: at(64000, 33000),
+            green: at(30000, 60000),
+            blue: at(15000, 6000),
+        });
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::tests::{receipt, whole};
+    use super::super::{Format, Window};
+    use super::*;
+
+    fn decode(bytes: &[u8]) -> (codec::Info<'static>, Vec<u8>) {
+        let mut reader = codec::Decoder::new(std::io::Cursor::new(bytes)).read_info().unwrap();
+        let mut samples = vec![0; reader.output_buffer_size().unwrap()];
+        reader.next_frame(&mut samples).unwrap();
+        reader.finish().unwrap();
+        (reader.info().clone(), samples)
+    }
+
+    fn encoded(picture: &Image, format: Format, encoding: Encoding, exposure: f64) -> (codec::Info<'static>, Vec<u8>) {
+        decode(&picture.encode(format, &Display { encoding, exposure }, &Receipt::default()).unwrap())
+    }
+
+    #[test]
+    fn opaque_pictures_are_rgb() {
+        let picture = whole(2, 1, |x, _| if x == 0 { [0.0, 0.5, 1.0, 1.0] } else { [f32::NAN, 0.18, 9.0, 1.0] });
+        let (info, samples) = encoded(&picture, Format::Png8, Encoding::Srgb, 0.0);
+        assert_eq!((info.width, info.height), (2, 1));
+        assert_eq!((info.color_type, info.bit_depth), (codec::ColorType::Rgb, codec::BitDepth::Eight));
+        assert_eq!(samples, [0, 188, 255, 0, 118, 255]);
+        assert!(info.srgb.is_some() && info.gama_chunk.is_none());
+        // One stop darker, linear, 16 bits: 65535 / 4 = 16383.75
+        let (info, samples) = encoded(&picture, Format::Png16, Encoding::Linear, -1.0);
+        assert_eq!((info.color_type, info.bit_depth), (codec::ColorType::Rgb, codec::BitDepth::Sixteen));
+        assert_eq!(samples[..6], [0, 0, 0x40, 0x00, 0x80, 0x00]);
+        assert_eq!(info.gama_chunk.unwrap().into_scaled(), 100_000);
+        assert!(info.srgb.is_none() && info.chrm_chunk.is_some());
+    }
+
+    #[test]
+    fn alpha_is_straight() {
+        // Colour 0.5 under alpha 0.5, an opaque pixel, one that covers nothing, and one that glows without covering
+        let pixels = [[0.25, 0.25, 0.0, 0.5], [0.5, 0.5, 0.5, 1.0], [0.0; 4], [1.0, 1.0, 1.0, 0.0]];
+        let picture = whole(4, 1, |x, _| pixels[x as usize]);
+        let (info, samples) = encoded(&picture, Format::Png8, Encoding::Srgb, 0.0);
+        assert_eq!(info.color_type, codec::ColorType::Rgba);
+        // Alpha is never encoded: 255 / 2 = 127.5, rounded up
+        assert_eq!(samples, [188, 188, 0, 128, 188, 188, 188, 255, 0, 0, 0, 0, 0, 0, 0, 0]);
+        let (_, samples) = encoded(&picture, Format::Png16, Encoding::Linear, 0.0);
+        assert_eq!(samples[..8], [0x80, 0, 0x80, 0, 0, 0, 0x80, 0]);
+    }
+
+    #[test]
+    fn gamma_is_said() {
+        let picture = whole(1, 1, |_, _| [0.5, 0.5, 0.5, 1.0]);
+        let (info, samples) = encoded(&picture, Format::Png8, Encoding::Gamma(2.2), 0.0);
+        assert_eq!(samples, [186; 3]);
+        assert_eq!(info.gama_chunk.unwrap().into_scaled(), 45455);
+        // What gAMA cannot hold
+        for gamma in [1e-300, 1e300] {
+            let (info, _) = encoded(&picture, Format::Png8, Encoding::Gamma(gamma), 0.0);
+            assert!(info.gama_chunk.is_none() && info.srgb.is_none());
+        }
+    }
+
+    #[test]
+    fn text_chunks_are_there() {
+        let picture = whole(1, 1, |_, _| [0.5; 4]);
+        let (info, _) = decode(&picture.encode(Format::Png8, &Display::default(), &receipt()).unwrap());
+        let software = &info.uncompressed_latin1_text[0];
+        assert_eq!((software.keyword.as_str(), software.text.as_str()), ("Software", SOFTWARE));
+        let found: Vec<_> = info.utf8_text.iter().map(|t| (t.keyword.clone(), t.get_text().unwrap())).collect();
+        let expected: Vec<_> = receipt().entries.into_iter().map(|(k, v)| (format!("firstlight:{k}"), v)).collect();
+        assert_eq!(found, expected);
+    }
+
+    #[test]
+    fn a_window_is_the_picture() {
+        let mut picture = whole(3, 2, |_, _| [0.0; 4]);
+        picture.film = [100, 50];
+        picture.window = Window { x: 97, y: 48, width: 3, height: 2 };
+        let (info, _) = encoded(&picture, Format::Png8, Encoding::Srgb, 0.0);
+        assert_eq!((info.width, info.height), (3, 2));
+    }
+
+    #[test]
+    fn small_and_large_pictures_agree() {
+        // 16 bits go by the formula in a small picture, by a table in a large one
+        let small = whole(64, 1, |x, _| [x as f32 / 63.0, 0.3, 0.7, 1.0]);
+        let large = whole(64, 1024, |x, _| [x as f32 / 63.0, 0.3, 0.7, 1.0]);
+        let (_, a) = encoded(&small, Format::Png16, Encoding::Srgb, 0.0);
+        let (_, b) = encoded(&large, Format::Png16, Encoding::Srgb, 0.0);
+        assert!(b.chunks(a.len()).all(|row| row == a));
+    }
+
+    #[test]
+    fn a_broken_display_is_an_error() {
+        let picture = whole(1, 1, |_, _| [0.5; 4]);
+        let display = Display { encoding: Encoding::Gamma(-1.0), exposure: 0.0 };
+        let fault = picture.encode(Format::Png8, &display, &Receipt::default()).unwrap_err().to_string();
+        assert_eq!(fault, "gamma -1 is not a finite number greater than 0");
+    }
+}

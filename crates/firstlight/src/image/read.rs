@@ -1,0 +1,352 @@
+//! Decoding the pictures that textures are made of: PNG and JPEG, from files that nobody vouches for.
+//!
+//! Only the numbers of the picture count. Colour profiles and gamma chunks are ignored, as glTF demands (glTF 2.0,
+//! "Images"). So is the orientation that a camera wrote into EXIF: uv was made for the texels as they are stored, and a
+//! turned texture would slip off them. Alpha is dropped and colour left as it stands, straight. Of an animation the first
+//! picture is taken.
+//!
+//! Memory is bounded by the length of the file, whatever its header says: no PNG expands more than 1032 times (the limit
+//! of deflate), and a JPEG spends at least one bit on every 16 x 16 texels.
+
+use std::io::Cursor;
+
+use ::image as codec;
+use ::png;
+use codec::ImageDecoder;
+
+use super::ImageError;
+
+/// How large a picture may be.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Limits {
+    /// Texels on each side.
+    pub(crate) side: u32,
+    /// Texels in all.
+    pub(crate) texels: u64,
+}
+
+impl Default for Limits {
+    /// 32768 a side, 2^28 in all.
+    fn default() -> Self {
+        Self { side: 32768, texels: 1 << 28 }
+    }
+}
+
+/// A decoded picture: rows from the top, each from the left.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) struct Texels {
+    pub(crate) width: u32,
+    pub(crate) height: u32,
+    /// `width` x `height` of them.
+    pub(crate) data: TexelData,
+}
+
+/// Red, green, blue, as the file has them: encoded as the file's maker chose. Gray is three times the same number, and
+/// 1, 2 and 4 bits are scaled to 8.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(crate) enum TexelData {
+    Rgb8(Vec<[u8; 3]>),
+    Rgb16(Vec<[u16; 3]>),
+}
+
+/// Decodes a PNG or JPEG file; which of them, its first bytes say.
+///
+/// # Errors
+/// [`ImageError::UnknownKind`], [`ImageError::TooLarge`] before anything is decoded, and [`ImageError::Damaged`].
+pub(crate) fn decode(bytes: &[u8], limits: &Limits) -> Result<Texels, ImageError> {
+    if bytes.starts_with(b"\x89PNG\r\n\x1a\n") {
+        decode_png(bytes, limits)
+    } else if bytes.starts_with(&[0xff, 0xd8, 0xff]) {
+        decode_jpeg(bytes, limits)
+    } else {
+        Err(ImageError::UnknownKind { expected: "PNG or JPEG" })
+    }
+}
+
+/// Checks a size, from a file's header, before anything is made of it.
+pub(super) fn check_size(width: u32, height: u32, limits: &Limits) -> Result<(), ImageError> {
+    let texels = u64::from(width) * u64::from(height);
+    if width.max(height) > limits.side || texels > limits.texels {
+        return Err(ImageError::TooLarge { width, height, side: limits.side, texels: limits.texels });
+    }
+    Ok(())
+}
+
+const SHORT: &str = "it is too short for its size";
+
+fn decode_png(bytes: &[u8], limits: &Limits) -> Result<Texels, ImageError> {
+    let damaged = |reason: String| ImageError::Damaged { format: "PNG", reason };
+    let fault = |e: png::DecodingError| damaged(e.to_string());
+    let mut decoder = png::Decoder::new(Cursor::new(bytes));
+    decoder.set_ignore_text_chunk(true);
+    decoder.set_ignore_iccp_chunk(true);
+    // Check the size
+    let info = decoder.read_header_info().map_err(fault)?;
+    let (width, height, interlaced) = (info.width, info.height, info.interlaced);
+    check_size(width, height, limits)?;
+    if info.raw_bytes() as u64 > 1032 * bytes.len() as u64 {
+        return Err(damaged(SHORT.into()));
+    }
+    // Decode: palettes to colours, few bits to 8
+    decoder.set_transformations(png::Transformations::EXPAND);
+    let mut reader = decoder.read_info().map_err(fault)?;
+    let (color, depth) = reader.output_color_type();
+    let mut texels = match depth {
+        png::BitDepth::Sixteen => TexelData::Rgb16(Vec::new()),
+        _ => TexelData::Rgb8(Vec::new()),
+    };
+    let channels = color.samples();
+    if interlaced {
+        let size = reader.output_buffer_size().ok_or_else(|| damaged(SHORT.into()))?;
+        let mut samples = vec![0; size];
+        reader.next_frame(&mut samples).map_err(fault)?;
+        texels.extend(&samples, channels);
+    } else {
+        for _ in 0..height {
+            let row = reader.next_row().map_err(fault)?.ok_or_else(|| damaged("rows are missing".into()))?;
+            texels.extend(row.data(), channels);
+        }
+    }
+    texels.finish(width, height).ok_or_else(|| damaged("rows are missing".into()))
+}
+
+fn decode_jpeg(bytes: &[u8], limits: &Limits) -> Result<Texels, ImageError> {
+    let damaged = |reason: String| ImageError::Damaged { format: "JPEG", reason };
+    let fault = |e: codec::ImageError| damaged(e.to_string());
+    let decoder = codec::codecs::jpeg::JpegDecoder::new(Cursor::new(bytes)).map_err(fault)?;
+    // Check the size
+    let (width, height) = decoder.dimensions();
+    check_size(width, height, limits)?;
+    if u64::from(width) * u64::from(height) > 16 * 16 * 8 * bytes.len() as u64 {
+        return Err(damaged(SHORT.into()));
+    }
+    // The decoder makes up what is missing at the end: see for ourselves whether the end is there
+    let last = |marker: u8| bytes.windows(2).rposition(|w| w == [0xff, marker]);
+    if last(0xd9) < last(0xda) {
+        return Err(damaged("it ends early".into()));
+    }
+    // Decode
+    let channels = usize::from(decoder.color_type().channel_count());
+    let size = usize::try_from(decoder.total_bytes()).map_err(|e| damaged(e.to_string()))?;
+    let mut samples = vec![0; size];
+    decoder.read_image(&mut samples).map_err(fault)?;
+    let mut texels = TexelData::Rgb8(Vec::new());
+    texels.extend(&samples, channels);
+    texels.finish(width, height).ok_or_else(|| damaged("rows are missing".into()))
+}
+
+impl TexelData {
+    /// Adds samples of so many channels: 1 and 2 are gray, 2 and 4 have alpha. 16 bits have the high byte first.
+    fn extend(&mut self, samples: &[u8], channels: usize) {
+        fn rgb<T: Copy>(s: &[T]) -> [T; 3] {
+            if s.len() < 3 { [s[0]; 3] } else { [s[0], s[1], s[2]] }
+        }
+        match self {
+            TexelData::Rgb8(texels) => texels.extend(samples.chunks_exact(channels).map(rgb)),
+            TexelData::Rgb16(texels) => texels.extend(samples.chunks_exact(2 * channels).map(|s| {
+                let at = |i: usize| u16::from_be_bytes([s[2 * i], s[2 * i + 1]]);
+                if channels < 3 { [at(0); 3] } else { [at(0), at(1), at(2)] }
+            })),
+        }
+    }
+
+    /// None if the texels do not fill the size.
+    fn finish(self, width: u32, height: u32) -> Option<Texels> {
+        let count = match &self {
+            TexelData::Rgb8(texels) => texels.len(),
+            TexelData::Rgb16(texels) => texels.len(),
+        };
+        (count as u64 == u64::from(width) * u64::from(height)).then_some(Texels { width, height, data: self })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::path::Path;
+
+    fn data(name: &str) -> Vec<u8> {
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/images");
+        std::fs::read(folder.join(name)).unwrap()
+    }
+
+    fn rgb8(name: &str) -> (u32, u32, Vec<[u8; 3]>) {
+        let texels = decode(&data(name), &Limits::default()).unwrap();
+        match texels.data {
+            TexelData::Rgb8(data) => (texels.width, texels.height, data),
+            TexelData::Rgb16(_) => panic!("{name} has 16 bits"),
+        }
+    }
+
+    fn rgb16(name: &str) -> Vec<[u16; 3]> {
+        match decode(&data(name), &Limits::default()).unwrap().data {
+            TexelData::Rgb16(data) => data,
+            TexelData::Rgb8(_) => panic!("{name} has 8 bits"),
+        }
+    }
+
+    const FILES: [&str; 13] = [
+        "basi2c08.png",
+        "basn0g01.png",
+        "basn0g16.png",
+        "basn2c08.png",
+        "basn2c16.png",
+        "basn3p04.png",
+        "basn3p08.png",
+        "basn4a08.png",
+        "basn6a16.png",
+        "g10n2c08.png",
+        "s07i3p02.png",
+        "tbbn3p08.png",
+        "exif_portrait_2.jpg",
+    ];
+
+    #[test]
+    fn every_kind_of_png_agrees_with_the_image_crate() {
+        for name in FILES.iter().filter(|n| n.ends_with(".png")) {
+            let expected = codec::load_from_memory(&data(name)).unwrap();
+            let texels = decode(&data(name), &Limits::default()).unwrap();
+            assert_eq!((texels.width, texels.height), (expected.width(), expected.height()), "{name}");
+            match texels.data {
+                TexelData::Rgb8(got) => assert!(got.as_flattened() == expected.into_rgb8().into_raw(), "{name}"),
+                TexelData::Rgb16(got) => assert!(got.as_flattened() == expected.into_rgb16().into_raw(), "{name}"),
+            }
+        }
+    }
+
+    #[test]
+    fn few_bits_are_scaled_to_eight_and_many_kept() {
+        let (width, height, texels) = rgb8("basn0g01.png");
+        assert_eq!((width, height), (32, 32));
+        assert!(texels.iter().all(|t| *t == [0; 3] || *t == [255; 3]));
+        assert!(texels.contains(&[0; 3]) && texels.contains(&[255; 3]));
+        assert!(rgb16("basn0g16.png").iter().all(|t| t[0] == t[1] && t[1] == t[2]));
+        assert!(rgb16("basn6a16.png").iter().any(|t| t[0] != t[1]));
+    }
+
+    #[test]
+    fn interlacing_and_gamma_chunks_change_nothing() {
+        assert_eq!(rgb8("basi2c08.png"), rgb8("basn2c08.png"));
+        // The same picture with another gamma chunk; its numbers are what counts
+        assert_eq!((rgb8("g10n2c08.png").0, rgb8("s07i3p02.png").0), (32, 7));
+    }
+
+    #[test]
+    fn jpeg_and_its_orientation() {
+        let (width, height, texels) = rgb8("bricks-color.jpeg");
+        assert_eq!(texels.len() as u32, width * height);
+        let (_, _, png) = rgb8("bricks-color.png");
+        let error: f64 =
+            texels.as_flattened().iter().zip(png.as_flattened()).map(|(a, b)| f64::from(a.abs_diff(*b))).sum();
+        assert!(error / (texels.len() as f64) < 30.0, "{}", error / texels.len() as f64);
+        // Stored lying on its side; EXIF would turn it
+        let mut decoder = codec::codecs::jpeg::JpegDecoder::new(Cursor::new(data("exif_portrait_2.jpg"))).unwrap();
+        assert_ne!(decoder.orientation().unwrap(), codec::metadata::Orientation::NoTransforms);
+        let (width, height, _) = rgb8("exif_portrait_2.jpg");
+        assert_eq!((width, height), decoder.dimensions());
+    }
+
+    #[test]
+    fn progressive_jpeg() {
+        let (width, height, texels) = rgb8("progressive_cat.jpg");
+        assert_eq!(texels.len() as u32, width * height);
+    }
+
+    /// A PNG header that claims a size, with nothing behind it but a few empty bytes.
+    fn claims(width: u32, height: u32) -> Vec<u8> {
+        let mut bytes = Vec::new();
+        let mut encoder = png::Encoder::new(&mut bytes, width, height);
+        encoder.set_color(png::ColorType::Rgba);
+        encoder.write_header().unwrap();
+        bytes
+    }
+
+    #[test]
+    fn sizes_are_checked_before_decoding() {
+        let words = |bytes: &[u8]| decode(bytes, &Limits::default()).unwrap_err().to_string();
+        assert_eq!(
+            words(&claims(32769, 1)),
+            "is 32769 x 1, the limits are 32768 a side and 268435456 in all; make it smaller"
+        );
+        assert!(words(&claims(32768, 8193)).starts_with("is 32768 x 8193, the limits are"));
+        assert!(words(&claims(32768, 8192)).contains("too short for its size"));
+        let small = Limits { side: 31, texels: 1 << 20 };
+        assert!(matches!(decode(&data("basn2c08.png"), &small), Err(ImageError::TooLarge { .. })));
+        assert!(matches!(decode(&data("bricks-color.jpeg"), &small), Err(ImageError::TooLarge { .. })));
+        // The same claim in a JPEG: the height and width stand behind the frame's marker
+        let mut jpeg = data("progressive_cat.jpg");
+        let frame = jpeg.windows(2).position(|w| w == [0xff, 0xc2]).unwrap();
+        jpeg[frame + 5..frame + 9].copy_from_slice(&[0x40, 0, 0x40, 0]);
+        assert!(words(&jpeg).contains("too short for its size"));
+    }
+
+    #[test]
+    fn other_files_are_named_as_such() {
+        for bytes in [&b""[..], b"\x89PNG", b"GIF89a", b"RIFF....WEBP", b"\xff\xd8"] {
+            let words = decode(bytes, &Limits::default()).unwrap_err().to_string();
+            assert_eq!(words, "is not a PNG or JPEG file; convert it to one");
+        }
+    }
+
+    #[test]
+    fn a_file_cut_short_is_an_error_or_whole() {
+        for name in FILES.into_iter().chain(["progressive_cat.jpg", "bricks-color.jpeg"]) {
+            let bytes = data(name);
+            let whole = decode(&bytes, &Limits::default()).unwrap();
+            for length in 0..bytes.len() {
+                if let Ok(texels) = decode(&bytes[..length], &Limits::default()) {
+                    assert!(texels == whole, "{name} cut to {length}");
+                    // A PNG is whole without its last checksums and its end chunk
+                    assert!(bytes.len() - length <= 24, "{name} cut to {length}");
+                }
+            }
+        }
+    }
+
+    /// Makes the checksums of a PNG's chunks right again, so that damage gets past them.
+    fn repair(bytes: &mut [u8]) {
+        let mut at = 8;
+        while let Some(head) = bytes.get(at..at + 8) {
+            let end = at + 8 + u32::from_be_bytes(head[..4].try_into().unwrap()) as usize;
+            if end + 4 > bytes.len() {
+                return;
+            }
+            let mut sum = u32::MAX;
+            for &byte in &bytes[at + 4..end] {
+                sum ^= u32::from(byte);
+                for _ in 0..8 {
+                    sum = (sum >> 1) ^ (0xedb8_8320 & (sum & 1).wrapping_neg());
+                }
+            }
+            bytes[end..end + 4].copy_from_slice(&(!sum).to_be_bytes());
+            at = end + 4;
+        }
+    }
+
+    #[test]
+    fn damaged_files_do_no_harm() {
+        let mut state = 0x2545_f491_4f6c_dd1d_u64;
+        let mut random = |below: usize| {
+            state ^= state << 13;
+            state ^= state >> 7;
+            state ^= state << 17;
+            (state % below as u64) as usize
+        };
+        for name in FILES.into_iter().chain(["progressive_cat.jpg", "bricks-color.jpeg"]) {
+            let bytes = data(name);
+            for round in 0..2000 {
+                let mut damaged = bytes.clone();
+                for _ in 0..=random(4) {
+                    let at = random(damaged.len());
+                    damaged[at] ^= 1 << random(8);
+                }
+                if round % 2 == 0 && name.ends_with(".png") {
+                    repair(&mut damaged);
+                }
+                if let Ok(texels) = decode(&damaged, &Limits::default()) {
+                    assert!(texels.width <= 32768 && texels.height <= 32768);
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,132 @@
+//! Every case of `scenes/invalid`: the exact words of its diagnostics, one to a line.
+//!
+//! A case is a text (`.toml`, `.json`, `.txt`), or a folder (`.dir`) whose text is called `scene`, with `.expected` beside
+//! it. All are compiled strictly. `FIRSTLIGHT_BLESS=1` writes the expectations, and the run still fails.
+
+use std::fmt::Write;
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+
+use firstlight::{CompileOptions, FolderAssets, NoAssets, SceneDesc};
+
+fn folder() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes/invalid")
+}
+
+/// The text of a case: itself, or the `scene` in a folder.
+fn text_of(case: &Path) -> PathBuf {
+    if !case.is_dir() {
+        return case.to_path_buf();
+    }
+    let mut names = ["scene.toml", "scene.json", "scene"].iter().map(|name| case.join(name));
+    names.find(|path| path.is_file()).unwrap_or_else(|| panic!("{} has no scene", case.display()))
+}
+
+/// What is said of a scene's file, strictly.
+fn diagnostics(path: &Path) -> String {
+    let assets = FolderAssets::new(path.parent().unwrap(), &[]).unwrap();
+    let name = path.file_name().unwrap().to_str().unwrap();
+    let parsed = SceneDesc::parse(name, &std::fs::read(path).unwrap(), &assets);
+    match parsed.compile(&assets, &CompileOptions { strict: true }) {
+        Ok(_) => String::new(),
+        Err(error) => format!("{error}\n"),
+    }
+}
+
+#[test]
+fn every_invalid_scene_is_refused_in_these_words() {
+    let mut cases: Vec<PathBuf> = std::fs::read_dir(folder()).unwrap().map(|entry| entry.unwrap().path()).collect();
+    cases.retain(|path| path.extension().is_some_and(|e| e == "toml" || e == "json" || e == "txt" || e == "dir"));
+    cases.sort();
+    assert!(cases.len() >= 45, "{} cases", cases.len());
+    let mut wrong = String::new();
+    for case in cases {
+        let expectation = case.with_extension("expected");
+        let actual = diagnostics(&text_of(&case));
+        let expected = std::fs::read_to_string(&expectation).unwrap_or_default();
+        if actual.is_empty() || actual != expected {
+            let name = case.file_name().unwrap().to_string_lossy();
+            writeln!(wrong, "== {name}\n-- expected\n{expected}-- actual\n{actual}").unwrap();
+            if std::env::var_os("FIRSTLIGHT_BLESS").is_some() && !actual.is_empty() {
+                std::fs::write(&expectation, &actual).unwrap();
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "\n{wrong}FIRSTLIGHT_BLESS=1 writes what is said now");
+}
+
+/// The words for a text that is too hostile to be kept as a file, and that they come soon.
+fn soon(name: &str, text: &[u8]) -> String {
+    let start = Instant::now();
+    let parsed = SceneDesc::parse(name, text, &NoAssets);
+    let Err(error) = parsed.compile(&NoAssets, &CompileOptions::default()) else { panic!("{name} is refused") };
+    assert!(start.elapsed() < Duration::from_secs(10), "{name} took {:?}", start.elapsed());
+    error.to_string()
+}
+
+#[test]
+fn a_hundred_megabytes_of_brackets_are_refused_at_once() {
+    let text = vec![b'['; 100_000_000];
+    for name in ["scene.toml", "scene.json", "scene.txt"] {
+        let words = soon(name, &text);
+        assert_eq!(words, format!("{name}:1:1: the text has 100000000 bytes, the limit is 67108864"));
+    }
+}
+
+#[test]
+fn brackets_within_the_size_limit_are_refused_at_once() {
+    let text = vec![b'['; 60_000_000];
+    for name in ["scene.toml", "scene.json"] {
+        let words = soon(name, &text);
+        assert!(words.starts_with(&format!("{name}:1:65: more than 64 tables or arrays within each other")), "{words}");
+    }
+}
+
+#[test]
+fn floods_are_refused_soon() {
+    let millions = |part: &str| part.repeat(60_000_000 / part.len()).into_bytes();
+    for (name, text) in [
+        ("scene.toml", millions("\n")),
+        ("scene.toml", millions("a\n")),
+        ("scene.toml", [b"a = [".to_vec(), millions("0,"), b"]".to_vec()].concat()),
+        ("scene.toml", millions("a b ")),
+        ("scene.toml", millions("\"a\"")),
+        ("scene.json", [b"[".to_vec(), millions("0,"), b"0]".to_vec()].concat()),
+    ] {
+        let words = soon(name, &text);
+        assert!(words.contains("more than 16777216 words, numbers and marks in one text"), "{words}");
+    }
+    // Long, but few tokens: as many faults as are told, their number, and that there is no camera
+    let text: String = (0..200_000).map(|i| format!("key_{i} = 1\n")).collect();
+    let words = soon("scene.toml", text.as_bytes());
+    assert_eq!(words.lines().count(), 258);
+    assert!(words.ends_with("199744 more faults are not listed"), "{words}");
+}
+
+#[test]
+fn one_very_long_line_is_shown_in_part() {
+    let text = format!("a = {}\nb = \"{}\"\n", "0".repeat(1_000_000), "x".repeat(30_000_000));
+    let parsed = SceneDesc::parse("scene.toml", text.as_bytes(), &NoAssets);
+    for fault in parsed.faults() {
+        let place = fault.place.as_ref().unwrap();
+        assert!(place.excerpt.chars().count() <= 160 && place.offset + place.width <= 160, "{place:?}");
+    }
+    assert!(!parsed.faults().is_empty());
+}
+
+#[test]
+fn places_hold_line_column_and_excerpt() {
+    let text = "[camera]\nposition = [0, 0, 10]\n[[sphere]]\nname = \"\u{e4}\u{f6}\"\nradius = \"\u{fc}\" # \u{e4}\n";
+    let parsed = SceneDesc::parse("scene.toml", text.as_bytes(), &NoAssets);
+    let [center, radius] = parsed.faults() else { panic!("{:?}", parsed.faults()) };
+    let place = center.place.as_ref().unwrap();
+    assert_eq!((place.line, place.column, place.offset, place.width), (3, 1, 0, 10));
+    assert_eq!(place.excerpt, "[[sphere]]");
+    let place = radius.place.as_ref().unwrap();
+    assert_eq!((place.line, place.column, place.offset, place.width), (5, 10, 9, 3));
+    assert_eq!(place.excerpt, "radius = \"\u{fc}\" # \u{e4}");
+    // A mark of byte order and line ends of Windows change no column
+    let windows = format!("\u{feff}{}", text.replace('\n', "\r\n"));
+    let again = SceneDesc::parse("scene.toml", windows.as_bytes(), &NoAssets);
+    assert_eq!(parsed.faults(), again.faults());
+}

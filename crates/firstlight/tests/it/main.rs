@@ -1,0 +1,7 @@
+//! What the library promises, from outside.
+
+mod course;
+mod fuzz_corpus;
+mod invalid;
+mod reference;
+mod roundtrip;

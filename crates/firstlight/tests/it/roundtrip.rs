@@ -1,0 +1,304 @@
+//! Text of a description reads back to an equal one.
+
+use firstlight::*;
+use proptest::collection::{hash_map, vec};
+use proptest::prelude::*;
+use proptest::sample::select;
+
+/// Strings that a writer could get wrong.
+fn text() -> impl Strategy<Value = String> {
+    prop_oneof![
+        any::<String>(),
+        "[a-z_-]{0,8}",
+        select(vec![
+            "",
+            " ",
+            ".",
+            "a.b",
+            "a[0].b",
+            "\"",
+            "\\",
+            "'''",
+            "\"\"\"",
+            "\n",
+            "\r\n",
+            "\t",
+            "\0",
+            "\u{7f}",
+            "\u{feff}",
+            "\u{2028}",
+            "#",
+            "# no comment",
+            "true",
+            "1",
+            "nan",
+            "\u{1f534}",
+            "${x}",
+            "</script>",
+            "\u{85}",
+        ])
+        .prop_map(str::to_owned),
+    ]
+}
+
+fn number() -> impl Strategy<Value = f64> {
+    prop_oneof![
+        -10.0..10.0,
+        any::<i32>().prop_map(f64::from),
+        any::<f64>().prop_filter("is finite", |v| v.is_finite()),
+        select(vec![
+            0.0,
+            -0.0,
+            f64::MAX,
+            f64::MIN,
+            f64::MIN_POSITIVE,
+            5e-324,
+            1e15,
+            1e16,
+            1e21,
+            1e-7,
+            9007199254740993.0
+        ]),
+    ]
+}
+
+fn vector() -> impl Strategy<Value = [f64; 3]> {
+    [number(), number(), number()]
+}
+
+fn color() -> impl Strategy<Value = ColorDesc> {
+    prop_oneof![number().prop_map(ColorDesc::gray), vector().prop_map(ColorDesc::from)]
+}
+
+fn color_param() -> impl Strategy<Value = ColorParam> {
+    (proptest::option::of(text()), color()).prop_map(|(texture, factor)| ColorParam { texture, factor })
+}
+
+fn number_param() -> impl Strategy<Value = NumberParam> {
+    (proptest::option::of(text()), number()).prop_map(|(texture, factor)| NumberParam { texture, factor })
+}
+
+fn maybe<T: std::fmt::Debug + Clone>(strategy: impl Strategy<Value = T>) -> impl Strategy<Value = Option<T>> {
+    proptest::option::of(strategy)
+}
+
+prop_compose! {
+    fn render()(
+        size in [any::<u32>(), any::<u32>(), any::<u32>(), any::<u32>()], camera in maybe(text()),
+        colors in [color(), color()], transparent: bool, display in select(DisplayEncoding::ALL),
+        gamma in number(), exposure in number(),
+    ) -> RenderDesc {
+        RenderDesc {
+            width: size[0], height: size[1], antialiasing: size[2], samples: size[3], camera, background: colors[0],
+            transparent, ambient: colors[1], display, gamma, exposure,
+        }
+    }
+}
+
+prop_compose! {
+    fn camera()(
+        position in vector(), look_at in vector(), up in vector(), fov in [maybe(number()), maybe(number()), maybe(number())],
+    ) -> CameraDesc {
+        let [fov_y_deg, focal_length_mm, sensor_height_mm] = fov;
+        CameraDesc { look_at, up, fov_y_deg, focal_length_mm, sensor_height_mm, ..CameraDesc::new(position) }
+    }
+}
+
+fn shape() -> impl Strategy<Value = ShapeDesc> {
+    let sphere = (maybe(text()), vector(), number(), select(SphereUv::ALL), maybe(text()), any::<bool>()).prop_map(
+        |(name, center, radius, uv, material, single_sided)| {
+            ShapeDesc::Sphere(SphereDesc { name, uv, material, single_sided, ..SphereDesc::new(center, radius) })
+        },
+    );
+    let parallelogram = (maybe(text()), [vector(), vector(), vector()], maybe(text()), any::<[bool; 2]>()).prop_map(
+        |(name, [p, e0, e1], material, [flip, single_sided])| {
+            let new = ParallelogramDesc::new(p, e0, e1);
+            ShapeDesc::Parallelogram(ParallelogramDesc { name, flip, material, single_sided, ..new })
+        },
+    );
+    prop_oneof![sphere, parallelogram]
+}
+
+fn light() -> impl Strategy<Value = LightDesc> {
+    let common = || (maybe(text()), color(), number(), select(Falloff::ALL), any::<bool>());
+    let point = (vector(), common()).prop_map(|(position, (name, color, strength, falloff, shadows))| {
+        LightDesc::Point(PointDesc { name, position, color, strength, falloff, shadows })
+    });
+    let directional = (vector(), common()).prop_map(|(direction, (name, color, strength, falloff, shadows))| {
+        LightDesc::Directional(DirectionalDesc { name, direction, color, strength, falloff, shadows })
+    });
+    let spot = ([vector(), vector()], number(), maybe(number()), common()).prop_map(
+        |([position, look_at], cone_deg, inner_cone_deg, (name, color, strength, falloff, shadows))| {
+            let new = SpotDesc { look_at, cone_deg, inner_cone_deg, ..SpotDesc::new(position) };
+            LightDesc::Spot(SpotDesc { name, color, strength, falloff, shadows, ..new })
+        },
+    );
+    let rectangle = (
+        [vector(), vector(), vector()],
+        maybe(select(EmitSides::ALL)),
+        any::<[bool; 2]>(),
+        maybe(any::<u32>()),
+        select(SampleSet::ALL),
+        any::<u32>(),
+        common(),
+    )
+        .prop_map(|([center, e0, e1], sides, [visible, blocks], samples, set, seed, common)| {
+            let (name, color, strength, falloff, shadows) = common;
+            let new =
+                RectangleDesc { sides, visible, blocks, samples, set, seed, ..RectangleDesc::new(center, e0, e1) };
+            LightDesc::Rectangle(RectangleDesc { name, color, strength, falloff, shadows, ..new })
+        });
+    prop_oneof![point, directional, spot, rectangle]
+}
+
+fn material() -> impl Strategy<Value = MaterialDesc> {
+    (any::<bool>(), color_param(), color_param(), maybe(color_param()), number_param()).prop_map(
+        |(blinn, diffuse, specular, ambient, shininess)| match blinn {
+            true => MaterialDesc::BlinnPhong(BlinnPhongDesc { diffuse, specular, ambient, shininess }),
+            false => MaterialDesc::Phong(PhongDesc { diffuse, specular, ambient, shininess }),
+        },
+    )
+}
+
+fn texture() -> impl Strategy<Value = TextureDesc> {
+    let checkerboard = (any::<[u32; 2]>(), [color(), color()])
+        .prop_map(|(counts, colors)| TextureDesc::Checkerboard(CheckerboardDesc { counts, colors }));
+    let image = (
+        text(),
+        [select(Wrap::ALL), select(Wrap::ALL)],
+        select(Filter::ALL),
+        maybe(select(TextureSpace::ALL)),
+        color(),
+        [[number(), number()], [number(), number()]],
+    )
+        .prop_map(|(file, wrap, filter, space, border, [scale, offset])| {
+            let new = ImageTextureDesc::new(file.into());
+            TextureDesc::Image(ImageTextureDesc { wrap, filter, space, border, scale, offset, ..new })
+        });
+    prop_oneof![checkerboard, image]
+}
+
+prop_compose! {
+    fn scene()(
+        render in prop_oneof![Just(RenderDesc::default()), render()],
+        cameras in prop_oneof![
+            camera().prop_map(|c| vec![(String::new(), c)]),
+            hash_map(text(), camera(), 0..4).prop_map(|m| m.into_iter().collect()),
+        ],
+        textures in hash_map(text(), texture(), 0..4), materials in hash_map(text(), material(), 0..4),
+        shapes in vec(shape(), 0..6), lights in vec(light(), 0..6),
+    ) -> SceneDesc {
+        let mut desc = SceneDesc {
+            render, cameras, textures: textures.into_iter().collect(), materials: materials.into_iter().collect(),
+            shapes, lights,
+        };
+        desc.sort();
+        desc
+    }
+}
+
+fn assert_reads_back(desc: &SceneDesc, name: &str, text: &str) {
+    let parsed = SceneDesc::parse(name, text.as_bytes(), &NoAssets);
+    assert_eq!(parsed.faults(), [], "{text}");
+    assert_eq!(parsed.desc, *desc, "{text}");
+}
+
+proptest! {
+    #[test]
+    fn text_reads_back_to_an_equal_description(desc in scene()) {
+        assert_reads_back(&desc, "scene.toml", &desc.to_toml());
+        assert_reads_back(&desc, "scene.json", &desc.to_json());
+    }
+
+    #[test]
+    fn no_text_can_break_the_reader(text: Vec<u8>, words in vec(select(FRAGMENTS), 0..40)) {
+        let words = words.concat();
+        for name in ["a.toml", "a.json", "a.txt", "a"] {
+            for text in [text.as_slice(), words.as_bytes()] {
+                let parsed = SceneDesc::parse(name, text, &NoAssets);
+                if parsed.faults().is_empty() && parsed.output.is_none() {
+                    assert_reads_back(&parsed.desc, "scene.toml", &parsed.desc.to_toml());
+                }
+            }
+        }
+    }
+}
+
+/// Pieces of scene text that meet by chance.
+const FRAGMENTS: &[&str] = &[
+    "[[sphere]]\n",
+    "[camera]\n",
+    "[camera.a]\n",
+    "[render]\n",
+    "[material.phong.a]\n",
+    "[[light.spot]]\n",
+    "include = ",
+    "[\"a.toml\"]\n",
+    "center = ",
+    "radius = ",
+    "[0, 1, 2]\n",
+    "1\n",
+    "\"#ff0000\"\n",
+    "[",
+    "]",
+    "{",
+    "}",
+    "\"",
+    "'",
+    "=",
+    ",",
+    ":",
+    ".",
+    "\n",
+    " ",
+    "a",
+    "\"sphere\"",
+    "\"light\"",
+    "null",
+    "true",
+    "1e999",
+    "nan",
+    "-",
+    "\u{e4}",
+    "\\u0041",
+    "\"\"\"",
+    "#",
+    "camera_id 1\n",
+    "num_samples ",
+    "{}",
+    "[]",
+    "\"center\": [0, 0, 0]",
+    "{\"radius\": 1}",
+    "diffuse = { texture = \"a\" }\n",
+];
+
+#[test]
+fn lists_come_back_in_scene_order() {
+    let light = LightDesc::Point(PointDesc::new([0.0; 3]));
+    let quad = ShapeDesc::Parallelogram(ParallelogramDesc::new([0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]));
+    let ball =
+        |x: f64| ShapeDesc::Sphere(SphereDesc { material: Some("red".into()), ..SphereDesc::new([x, 0.0, 0.0], 1.0) });
+    let mut desc = SceneDesc { shapes: vec![ball(2.0), quad, ball(1.0)], lights: vec![light], ..SceneDesc::default() };
+    let (toml, json) = (desc.to_toml(), desc.to_json());
+    desc.sort();
+    assert_eq!(desc.shapes[1], ball(1.0));
+    assert_reads_back(&desc, "scene.toml", &toml);
+    assert_reads_back(&desc, "scene.json", &json);
+}
+
+#[test]
+fn an_infinite_number_reads_back_from_toml() {
+    let sphere = SphereDesc::new([f64::INFINITY, f64::NEG_INFINITY, 0.0], 1.0);
+    let desc = SceneDesc { shapes: vec![ShapeDesc::Sphere(sphere)], ..SceneDesc::default() };
+    assert_reads_back(&desc, "scene.toml", &desc.to_toml());
+    assert!(!SceneDesc::parse("scene.json", desc.to_json().as_bytes(), &NoAssets).faults().is_empty());
+}
+
+#[test]
+fn built_in_scenes_read_back() {
+    for scene in builtin_scenes() {
+        let desc = SceneDesc::parse("scene.toml", scene.text.as_bytes(), &NoAssets).desc;
+        assert_reads_back(&desc, "scene.toml", &desc.to_toml());
+        assert_reads_back(&desc, "scene.json", &desc.to_json());
+    }
+}

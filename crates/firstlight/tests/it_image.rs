@@ -1,0 +1,102 @@
+//! Pictures from outside: what a caller of the library can rely on.
+
+use std::path::Path;
+use std::process::{Command, Stdio};
+
+use firstlight::{Display, Encoding, Format, Image, Receipt, StoredImage, Window, Written, write_whole};
+
+fn picture(width: u32, height: u32) -> Image {
+    let pixel = |i: u32| [(i % width) as f32 / width as f32, 0.5, (i / width) as f32 / height as f32, 1.0];
+    Image {
+        film: [width, height],
+        window: Window { x: 0, y: 0, width, height },
+        pixels: (0..width * height).map(pixel).collect(),
+    }
+}
+
+#[test]
+fn the_numbers_of_a_png_are_the_definition() {
+    let picture = picture(67, 41);
+    for encoding in [Encoding::Srgb, Encoding::Gamma(2.2), Encoding::Linear] {
+        for exposure in [0.0, -1.5] {
+            let display = Display { encoding, exposure };
+            for (format, largest) in [(Format::Png8, 255.0), (Format::Png16, 65535.0)] {
+                let bytes = picture.encode(format, &display, &Receipt::default()).unwrap();
+                let stored = StoredImage::read(&bytes).unwrap();
+                for (number, linear) in stored.pixels.iter().zip(&picture.pixels) {
+                    for channel in 0..3 {
+                        let expected = (display.encode(linear[channel]) * largest).round();
+                        assert_eq!((f64::from(number[channel]) * largest).round(), expected);
+                    }
+                }
+            }
+        }
+    }
+}
+
+#[cfg(feature = "exr")]
+#[test]
+fn an_exr_holds_the_film_to_the_bit() {
+    let mut picture = picture(23, 50);
+    picture.film = [640, 480];
+    (picture.window.x, picture.window.y) = (600, 430);
+    let receipt = Receipt { entries: vec![("scene_hash".into(), "9f1c".into())] };
+    let bytes = picture.encode(Format::Exr, &Display { encoding: Encoding::Srgb, exposure: 3.0 }, &receipt).unwrap();
+    let stored = StoredImage::read(&bytes).unwrap();
+    assert_eq!((stored.film, stored.window, stored.receipt), (picture.film, picture.window, receipt));
+    assert!(stored.pixels == picture.pixels);
+}
+
+#[test]
+fn the_bytes_do_not_depend_on_the_number_of_threads() {
+    let picture = picture(300, 200);
+    let receipt = Receipt { entries: (0..9).map(|i| (format!("key{i}"), format!("{i}"))).collect() };
+    let formats = [Format::Png8, Format::Png16, Format::Hdr].into_iter();
+    for format in formats.chain(cfg!(feature = "exr").then_some(Format::Exr)) {
+        let with = |threads: usize| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            pool.install(|| picture.encode(format, &Display::default(), &receipt).unwrap())
+        };
+        assert!(with(1) == with(7), "{format:?}");
+    }
+}
+
+/// What the writer below writes in turn: two files of different lengths, each of one byte.
+const SIZES: [(u8, usize); 2] = [(b'a', 3_000_000), (b'b', 2_000_000)];
+
+fn is_whole(bytes: &[u8]) -> bool {
+    SIZES.iter().any(|&(byte, size)| bytes.len() == size && bytes.iter().all(|&b| b == byte))
+}
+
+/// The process that is killed by the next test: writes until then.
+#[test]
+#[ignore = "started by another test"]
+fn writer() {
+    let Some(path) = std::env::var_os("FIRSTLIGHT_TEST_TARGET") else { return };
+    for (byte, size) in SIZES.into_iter().cycle() {
+        assert_eq!(write_whole(Path::new(&path), &vec![byte; size]).unwrap(), Written::Whole);
+    }
+}
+
+#[test]
+fn a_writer_killed_at_any_time_leaves_a_whole_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let target = folder.path().join("picture.png");
+    write_whole(&target, &vec![SIZES[0].0; SIZES[0].1]).unwrap();
+    for round in 0..6 {
+        let mut child = Command::new(std::env::current_exe().unwrap())
+            .args(["--exact", "writer", "--ignored"])
+            .env("FIRSTLIGHT_TEST_TARGET", &target)
+            .stdout(Stdio::null())
+            .spawn()
+            .unwrap();
+        // Whoever looks meanwhile sees whole files only
+        for _ in 0..10 + 3 * round {
+            assert!(is_whole(&std::fs::read(&target).unwrap()));
+            std::thread::sleep(std::time::Duration::from_millis(3));
+        }
+        child.kill().unwrap();
+        child.wait().unwrap();
+        assert!(is_whole(&std::fs::read(&target).unwrap()));
+    }
+}

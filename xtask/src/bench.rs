@@ -1,0 +1,198 @@
+//! `cargo xtask bench`: config 11, each way against the plain renderer, in turns.
+
+use std::fmt::Write as _;
+use std::num::NonZeroUsize;
+use std::ops::ControlFlow;
+use std::path::PathBuf;
+use std::process::Command;
+use std::time::Instant;
+
+use firstlight::{CompileOptions, NoAssets, RenderSettings, Scene, SceneDesc, SimdLevel, builtin_scenes, render};
+use serde_json::json;
+
+use crate::{Outcome, cargo, root, run as run_to_end, write};
+
+/// What to measure, and where to write it.
+#[derive(clap::Args)]
+pub struct Options {
+    /// Rounds: each runs every way once, one after the other.
+    #[arg(long, default_value_t = 3)]
+    rounds: usize,
+    /// Width and height of the picture.
+    #[arg(long, default_value_t = 1024)]
+    size: u32,
+    /// Antialiasing.
+    #[arg(long, default_value_t = 4)]
+    aa: u32,
+    /// Points on the light.
+    #[arg(long, default_value_t = 400)]
+    samples: u32,
+    /// The folder under docs/benchmarks, usually the date and the machine.
+    #[arg(long)]
+    name: Option<String>,
+}
+
+/// One way of rendering the picture.
+struct Way {
+    name: String,
+    settings: RenderSettings,
+    seconds: Vec<f64>,
+}
+
+pub fn run(options: &Options) -> Outcome {
+    let scene = config11(options)?;
+    let mut ways = ways();
+    let mut samples = 0;
+    for round in 1..=options.rounds {
+        for way in &mut ways {
+            let start = Instant::now();
+            let ControlFlow::Continue((_, stats)) = render(&scene, &way.settings, &|_, _| ControlFlow::Continue(()))
+            else {
+                return Err("stopped".into());
+            };
+            let seconds = start.elapsed().as_secs_f64();
+            samples = samples.max(stats.shadow_rays);
+            eprintln!("round {round}: {:30} {seconds:8.3} s", way.name);
+            way.seconds.push(seconds);
+        }
+    }
+    let program = program(options)?;
+    let page = page(options, &ways, samples, &program);
+    println!("{page}");
+    if let Some(name) = &options.name {
+        let folder = root().join("docs/benchmarks").join(name);
+        write(&folder.join("README.md"), page.as_bytes())?;
+        let runs: Vec<_> = ways.iter().map(|w| json!({ "way": w.name, "seconds": w.seconds })).collect();
+        let data = json!({
+            "width": options.size, "height": options.size, "antialiasing": options.aa, "samples": options.samples,
+            "decided_samples": samples, "runs": runs, "small_picture_s": program.small, "peak_memory_bytes": program.memory,
+            "commit": commit(), "processor": processor(),
+        });
+        let text = serde_json::to_string_pretty(&data).map_err(|e| e.to_string())?;
+        write(&folder.join("config11.json"), format!("{text}\n").as_bytes())?;
+    }
+    Ok(())
+}
+
+fn config11(options: &Options) -> Result<Scene, String> {
+    let builtin = builtin_scenes().iter().find(|b| b.name == "config11").ok_or("there is no config11")?;
+    let mut parsed = SceneDesc::parse("config11.toml", builtin.text.as_bytes(), &NoAssets);
+    let render = &mut parsed.desc.render;
+    (render.width, render.height, render.antialiasing, render.samples) =
+        (options.size, options.size, options.aa, options.samples);
+    Ok(parsed.compile(&NoAssets, &CompileOptions::default()).map_err(|e| e.to_string())?.scene)
+}
+
+/// The plain renderer, every instruction set on one thread, and the best on two and on all.
+fn ways() -> Vec<Way> {
+    let way = |name: String, simd: SimdLevel, threads: usize, reference: bool| Way {
+        name,
+        settings: RenderSettings { threads: NonZeroUsize::new(threads), simd, reference, ..Default::default() },
+        seconds: Vec::new(),
+    };
+    let mut ways = vec![way("plain, 1 thread".into(), SimdLevel::Auto, 1, true)];
+    for level in SimdLevel::available() {
+        ways.push(way(format!("{}, 1 thread", level.name()), level, 1, false));
+    }
+    let best = SimdLevel::Auto.resolve();
+    ways.push(way(format!("{}, 2 threads", best.name()), best, 2, false));
+    ways
+}
+
+/// What the whole program takes.
+struct Program {
+    /// Process start to file, 64 x 64 pixels, in seconds: one for each run.
+    small: Vec<f64>,
+    /// Of the whole picture, in bytes.
+    memory: u64,
+}
+
+fn program(options: &Options) -> Result<Program, String> {
+    run_to_end(cargo().args(["build", "--release", "--quiet", "--bin", "firstlight"]))?;
+    let program = root().join("target/release/firstlight");
+    let folder = std::env::temp_dir().join(format!("firstlight-bench-{}", std::process::id()));
+    std::fs::create_dir_all(&folder).map_err(|e| e.to_string())?;
+    let render = |size: u32, more: &[&str]| -> Outcome {
+        let mut command = Command::new(&program);
+        let size = size.to_string();
+        command.args(["render", "config11", "--quiet", "--width", &size, "--height", &size, "-o"]);
+        command.arg(folder.join("picture.png")).args(more);
+        let status = command.status().map_err(|e| e.to_string())?;
+        if status.success() { Ok(()) } else { Err(format!("{}: {status}", program.display())) }
+    };
+    let mut small = Vec::new();
+    for _ in 0..21 {
+        let start = Instant::now();
+        render(64, &[])?;
+        small.push(start.elapsed().as_secs_f64());
+    }
+    let stats: PathBuf = folder.join("stats.json");
+    // Memory does not depend on the number of samples
+    render(options.size, &["--samples", "1", &format!("--stats={}", stats.display())])?;
+    let text = std::fs::read_to_string(&stats).map_err(|e| e.to_string())?;
+    let stats: serde_json::Value = serde_json::from_str(&text).map_err(|e| e.to_string())?;
+    std::fs::remove_dir_all(&folder).map_err(|e| e.to_string())?;
+    Ok(Program { small, memory: stats["peak_memory_bytes"].as_u64().unwrap_or(0) })
+}
+
+fn page(options: &Options, ways: &[Way], samples: u64, program: &Program) -> String {
+    let mut page = String::new();
+    let Options { rounds, size, aa, samples: n, .. } = options;
+    let plain = median(&ways[0].seconds);
+    let _ = writeln!(page, "# Config 11, every shadow ray decided\n");
+    let _ = writeln!(
+        page,
+        "{size} x {size} pixels, {aa} x {aa} camera rays in each, {n} points on the light: {:.3} thousand million light \
+         samples. Medians of {rounds} rounds; in each round every way ran once, one after the other, in one process. \
+         Times are of the render stage.\n",
+        samples as f64 / 1e9
+    );
+    let _ = writeln!(page, "- processor: {}", processor());
+    let _ = writeln!(page, "- commit: {}", commit());
+    let mut command = format!("cargo xtask bench --rounds {rounds} --size {size} --aa {aa} --samples {n}");
+    if let Some(name) = &options.name {
+        let _ = write!(command, " --name {name}");
+    }
+    let _ = writeln!(page, "- command: `{command}`\n");
+    let _ = writeln!(page, "| way | seconds | least to most | million samples a second | times the plain renderer |");
+    let _ = writeln!(page, "|---|---|---|---|---|");
+    for way in ways {
+        let seconds = median(&way.seconds);
+        let (least, most) = way.seconds.iter().fold((f64::MAX, 0.0f64), |(a, b), s| (a.min(*s), b.max(*s)));
+        let rate = samples as f64 / seconds / 1e6;
+        let ratio = plain / seconds;
+        let _ = writeln!(page, "| {} | {seconds:.2} | {least:.2} to {most:.2} | {rate:.0} | {ratio:.1} |", way.name);
+    }
+    if let [.., one, two] = ways {
+        let _ = writeln!(page, "\nTwo threads: {:.2} times one.", median(&one.seconds) / median(&two.seconds));
+    }
+    let _ = writeln!(
+        page,
+        "\n`firstlight render config11 --width 64 --height 64`, process start to file: {:.1} ms (median of {}).\n\
+         Peak memory of the whole picture: {:.1} MB.",
+        median(&program.small) * 1e3,
+        program.small.len(),
+        program.memory as f64 / 1e6
+    );
+    page
+}
+
+fn median(seconds: &[f64]) -> f64 {
+    let mut sorted = seconds.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    let half = sorted.len() / 2;
+    if sorted.len() % 2 == 1 { sorted[half] } else { (sorted[half - 1] + sorted[half]) * 0.5 }
+}
+
+fn processor() -> String {
+    let cores = std::thread::available_parallelism().map_or(1, NonZeroUsize::get);
+    let text = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
+    let model = text.lines().find_map(|line| line.strip_prefix("model name")?.split_once(':').map(|(_, m)| m.trim()));
+    let best = SimdLevel::Auto.resolve().name();
+    format!("{}, {cores} cores, {best}", model.unwrap_or(std::env::consts::ARCH))
+}
+
+fn commit() -> String {
+    let output = Command::new("git").args(["describe", "--always", "--dirty"]).current_dir(root()).output();
+    output.map(|o| String::from_utf8_lossy(&o.stdout).trim().to_owned()).unwrap_or_default()
+}

@@ -1,0 +1,45 @@
+//! `cargo xtask test`: every check, then every test, so that the test runner has the last word.
+
+use crate::{Outcome, cargo, generate, root, run as run_to_end};
+
+/// The book's builder, put under `target/tools` where the machine has none.
+const MDBOOK: &str = "0.5.4";
+
+fn build_book() -> Outcome {
+    let tools = root().join("target/tools");
+    let program = tools.join("bin/mdbook");
+    if !program.exists() {
+        let version = format!("mdbook@{MDBOOK}");
+        run_to_end(
+            cargo()
+                .args(["install", "--quiet", "--locked", "--no-default-features", "--root"])
+                .arg(&tools)
+                .arg(version),
+        )?;
+    }
+    let mut command = std::process::Command::new(program);
+    // A warning of the book's builder is a broken page
+    let output = command.arg("build").arg(root().join("docs")).output().map_err(|e| format!("mdbook: {e}"))?;
+    let said = String::from_utf8_lossy(&output.stderr);
+    eprintln!("\n$ mdbook build docs\n{said}");
+    if output.status.success() && !said.contains("WARN") && !said.contains("ERROR") {
+        Ok(())
+    } else {
+        Err("mdbook build docs: not without warnings".into())
+    }
+}
+
+pub fn run() -> Outcome {
+    run_command(&["fmt", "--all", "--check"])?;
+    generate::run(true)?;
+    build_book()?;
+    run_command(&["clippy", "--workspace", "--all-targets", "--quiet", "--", "-D", "warnings"])?;
+    run_to_end(cargo().env("RUSTDOCFLAGS", "-D warnings").args(["doc", "--workspace", "--no-deps", "--quiet"]))?;
+    // The library alone, without what can be left out
+    run_command(&["check", "--package", "firstlight", "--no-default-features", "--quiet"])?;
+    run_command(&["test", "--workspace", "--no-fail-fast"])
+}
+
+fn run_command(args: &[&str]) -> Outcome {
+    run_to_end(cargo().args(args))
+}
