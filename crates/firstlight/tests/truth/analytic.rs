@@ -34,7 +34,7 @@ fn irradiance(p: V, n: V, lights: &[LightDesc]) -> f64 {
 #[test]
 fn a_point_light_follows_the_inverse_square() {
     let mut random = Random::new(1);
-    for _ in 0..100 {
+    for _ in 0..times(100) {
         let n = random.direction();
         let to_light = random.direction();
         let cos = dot(n, to_light);
@@ -415,7 +415,7 @@ fn nothing_outside_a_closed_box_is_lit() {
         assert!(probe(&scene, middle, inside(0.9, 0.3, 0.5))[0] > 100.0);
         // From outside, at points of the shell that lie behind edges, corners and walls as the light sees them
         let light = inside(0.4, 0.55, 0.6);
-        for k in 0..400 {
+        for k in 0..times(400) as usize {
             let mut at = [0.0; 3].map(|_: f64| random.unit());
             // On a wall, on an edge, on a corner
             for axis in 0..[1, 2, 2, 3][k % 4] {

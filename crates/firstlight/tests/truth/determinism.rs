@@ -123,7 +123,7 @@ fn reduced(mut desc: SceneDesc) -> SceneDesc {
 
 #[test]
 fn plain_and_fast_agree_on_random_scenes() {
-    let count = std::env::var("FIRSTLIGHT_SCENES").ok().and_then(|n| n.parse().ok()).unwrap_or(200);
+    let count = times(200);
     let mut lit = 0;
     for seed in 0..count {
         let desc = random::scene(seed);
@@ -132,5 +132,5 @@ fn plain_and_fast_agree_on_random_scenes() {
         }
         lit += usize::from(shoot(&desc).pixels.iter().any(|p| p[0] + p[1] + p[2] > 0.0));
     }
-    assert!(lit * 10 > count as usize * 6, "only {lit} of {count} scenes show anything");
+    assert!(lit as u64 * 10 > count * 6, "only {lit} of {count} scenes show anything");
 }

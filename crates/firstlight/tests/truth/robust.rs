@@ -58,7 +58,7 @@ fn size_and_place(random: &mut Random) -> (f64, V) {
 fn a_sphere_does_not_shadow_its_lit_side() {
     let mut random = Random::new(10);
     let mut lit = 0;
-    for i in 0..300 {
+    for i in 0..times(300) {
         let (r, c) = size_and_place(&mut random);
         let at = random.direction();
         // From just above the surface to many radii away
@@ -78,7 +78,7 @@ fn a_sphere_does_not_shadow_its_lit_side() {
 fn a_parallelogram_does_not_shadow_itself() {
     let mut random = Random::new(11);
     let mut lit = 0;
-    for i in 0..300 {
+    for i in 0..times(300) {
         let (size, p) = size_and_place(&mut random);
         let e0 = mul(random.direction(), size);
         let e1 = mul(add(unit(e0), mul(random.direction(), random.scale(0.05, 2.0))), size);
@@ -98,7 +98,7 @@ fn a_parallelogram_does_not_shadow_itself() {
 #[test]
 fn inside_a_sphere_light_stays_inside() {
     let mut random = Random::new(12);
-    for i in 0..100 {
+    for i in 0..times(100) {
         let r = random.scale(1e-6, 1e6);
         let c = random.vector(r);
         let eye = add(c, mul(random.direction(), r * random.unit() * 0.9));
@@ -340,7 +340,7 @@ fn shapes_without_size_are_refused() {
 #[test]
 fn a_light_in_the_plane_of_a_ceiling_is_not_blocked_by_it() {
     let mut random = Random::new(13);
-    for i in 0..60 {
+    for i in 0..times(60) {
         // A floor and a ceiling of any tilt, `h` apart, and a light in the ceiling
         let n = if i == 0 { [0.0, 1.0, 0.0] } else { random.direction() };
         let [a, b] = if i == 0 { [[1.0, 0.0, 0.0], [0.0, 0.0, 1.0]] } else { across(n) };
@@ -374,7 +374,7 @@ fn a_light_in_the_plane_of_a_ceiling_is_not_blocked_by_it() {
 fn shapes_in_one_plane_do_not_shadow_each_other() {
     // A large square, tilted, far from its corners and from the origin, and small ones in its plane
     let mut random = Random::new(16);
-    for i in 0..100 {
+    for i in 0..times(100) {
         let n = random.direction();
         let [a, b] = across(n);
         let half = random.scale(1.0, 1e5);
@@ -441,7 +441,7 @@ fn wall_joints_have_no_dark_dots() {
 fn shadows_of_turned_shapes_fall_where_they_should() {
     // A pane lit from a point: the shadow on a plane behind it is its central projection
     let mut random = Random::new(14);
-    for i in 0..40 {
+    for i in 0..times(40) {
         let [center, light] = [random.vector(0.5), mul(random.direction(), 6.0)];
         let n = unit(light);
         let e0 = mul(random.direction(), random.between(0.5, 2.0));
@@ -474,7 +474,7 @@ fn shadows_of_turned_shapes_fall_where_they_should() {
 fn a_camera_next_to_a_sphere_sees_past_it() {
     // A ray that only just misses or hits, aimed at the tangent circle from any distance
     let mut random = Random::new(15);
-    for _ in 0..300 {
+    for _ in 0..times(300) {
         let (r, c) = (random.scale(1e-3, 1e3), random.vector(10.0));
         let d = r * (1.0 + random.scale(1e-2, 1e2));
         let eye = add(c, mul(random.direction(), d));

@@ -4,10 +4,10 @@ use std::num::NonZeroUsize;
 use std::ops::ControlFlow;
 
 use firstlight::{
-    BlinnPhongDesc, CameraDesc, CheckerboardDesc, ColorDesc, ColorParam, CompileOptions, DirectionalDesc, DisplayEncoding,
-    Falloff, Image, LightDesc, MaterialDesc, NoAssets, NumberParam, ParallelogramDesc, PhongDesc, PointDesc,
-    RectangleDesc, RenderDesc, RenderSettings, SampleSet, Scene, SceneDesc, ShapeDesc, SphereDesc, SphereUv, SpotDesc,
-    TextureDesc,
+    BlinnPhongDesc, CameraDesc, CheckerboardDesc, ColorDesc, ColorParam, CompileOptions, DirectionalDesc,
+    DisplayEncoding, Image, LightDesc, MaterialDesc, NoAssets, NumberParam, ParallelogramDesc, PhongDesc, PointDesc,
+    RectangleDesc, RenderDesc, RenderSettings, SampleSet, Scene, SceneDesc, ShapeDesc, SphereDesc, SpotDesc,
+    TextureDesc, builtin_scenes,
 };
 
 /// A point or a direction, as descriptions have them.
@@ -53,6 +53,12 @@ pub fn radians(deg: f64) -> f64 {
     deg * std::f64::consts::PI / 180.0
 }
 
+/// How often a test repeats what it does `usually` times, when `FIRSTLIGHT_SCENES` asks for more than its usual 200.
+pub fn times(usually: u64) -> u64 {
+    let wanted = std::env::var("FIRSTLIGHT_SCENES").ok().and_then(|n| n.parse().ok()).unwrap_or(200);
+    usually * wanted.max(200) / 200
+}
+
 /// No shapes, no lights, no camera yet.
 pub fn empty(width: u32, height: u32, antialiasing: u32) -> SceneDesc {
     SceneDesc {
@@ -61,13 +67,8 @@ pub fn empty(width: u32, height: u32, antialiasing: u32) -> SceneDesc {
             height,
             antialiasing,
             samples: 64,
-            camera: None,
-            background: ColorDesc::BLACK,
-            transparent: false,
-            ambient: ColorDesc::BLACK,
             display: DisplayEncoding::Linear,
-            gamma: 2.2,
-            exposure: 0.0,
+            ..RenderDesc::default()
         },
         cameras: Vec::new(),
         textures: Vec::new(),
@@ -83,15 +84,15 @@ pub fn camera(position: V, look_at: V, fov_y_deg: f64) -> CameraDesc {
 }
 
 pub fn camera_up(position: V, look_at: V, up: V, fov_y_deg: f64) -> CameraDesc {
-    CameraDesc { position, look_at, up, fov_y_deg: Some(fov_y_deg), focal_length_mm: None, sensor_height_mm: None }
+    CameraDesc { look_at, up, fov_y_deg: Some(fov_y_deg), ..CameraDesc::new(position) }
 }
 
 pub fn sphere(center: V, radius: f64) -> SphereDesc {
-    SphereDesc { name: None, center, radius, uv: SphereUv::Equirectangular, material: None, single_sided: false }
+    SphereDesc::new(center, radius)
 }
 
 pub fn parallelogram(p: V, e0: V, e1: V) -> ParallelogramDesc {
-    ParallelogramDesc { name: None, p, e0, e1, flip: false, material: None, single_sided: false }
+    ParallelogramDesc::new(p, e0, e1)
 }
 
 /// A square with sides of length 2 `half` around `center`.
@@ -102,45 +103,20 @@ pub fn square(center: V, normal: V, half: f64) -> ParallelogramDesc {
 }
 
 pub fn point(position: V, strength: f64) -> PointDesc {
-    PointDesc { name: None, position, color: ColorDesc::WHITE, strength, falloff: Falloff::Physical, shadows: true }
+    PointDesc { strength, ..PointDesc::new(position) }
 }
 
 pub fn directional(direction: V, strength: f64) -> DirectionalDesc {
-    DirectionalDesc { name: None, direction, color: ColorDesc::WHITE, strength, falloff: Falloff::Physical, shadows: true }
+    DirectionalDesc { strength, ..DirectionalDesc::new(direction) }
 }
 
 pub fn spot(position: V, look_at: V, cone_deg: f64, inner_cone_deg: Option<f64>, strength: f64) -> SpotDesc {
-    SpotDesc {
-        name: None,
-        position,
-        look_at,
-        cone_deg,
-        inner_cone_deg,
-        color: ColorDesc::WHITE,
-        strength,
-        falloff: Falloff::Physical,
-        shadows: true,
-    }
+    SpotDesc { look_at, cone_deg, inner_cone_deg, strength, ..SpotDesc::new(position) }
 }
 
 /// Physical, strength 1, invisible, with `samples` points of `set`.
 pub fn rectangle(center: V, e0: V, e1: V, set: SampleSet, samples: u32) -> RectangleDesc {
-    RectangleDesc {
-        name: None,
-        center,
-        e0,
-        e1,
-        color: ColorDesc::WHITE,
-        strength: 1.0,
-        falloff: Falloff::Physical,
-        sides: None,
-        visible: false,
-        blocks: false,
-        shadows: true,
-        samples: Some(samples),
-        set,
-        seed: 0,
-    }
+    RectangleDesc { visible: false, samples: Some(samples), set, ..RectangleDesc::new(center, e0, e1) }
 }
 
 pub fn matte(diffuse: f64) -> MaterialDesc {
@@ -148,17 +124,30 @@ pub fn matte(diffuse: f64) -> MaterialDesc {
 }
 
 pub fn phong(diffuse: ColorParam, specular: ColorParam, shininess: f64) -> MaterialDesc {
-    MaterialDesc::Phong(PhongDesc { diffuse, specular, ambient: None, shininess: NumberParam::constant(shininess) })
+    let shininess = NumberParam::constant(shininess);
+    MaterialDesc::Phong(PhongDesc { diffuse, specular, shininess, ..PhongDesc::default() })
 }
 
 pub fn blinn_phong(diffuse: ColorParam, specular: ColorParam, shininess: f64) -> MaterialDesc {
     let shininess = NumberParam::constant(shininess);
-    MaterialDesc::BlinnPhong(BlinnPhongDesc { diffuse, specular, ambient: None, shininess })
+    MaterialDesc::BlinnPhong(BlinnPhongDesc { diffuse, specular, shininess, ..BlinnPhongDesc::default() })
 }
 
 pub fn checkerboard(counts: [u32; 2], colors: [V; 2]) -> TextureDesc {
     let colors = colors.map(|[r, g, b]| ColorDesc::linear(r, g, b));
     TextureDesc::Checkerboard(CheckerboardDesc { counts, colors })
+}
+
+/// The built-in config 11, a room with four spheres under a square light, at another size.
+pub fn config11(size: u32, antialiasing: u32, samples: u32) -> SceneDesc {
+    let Some(builtin) = builtin_scenes().iter().find(|builtin| builtin.name == "config11") else {
+        panic!("config11 comes with the library");
+    };
+    let parsed = SceneDesc::parse("config11.toml", builtin.text.as_bytes(), &NoAssets);
+    assert!(parsed.faults().is_empty());
+    let mut scene = parsed.desc;
+    scene.render = RenderDesc { width: size, height: size, antialiasing, samples, ..scene.render };
+    scene
 }
 
 /// Adds to a scene, in the order of the text.
@@ -331,50 +320,4 @@ impl Random {
             }
         }
     }
-}
-
-/// One of the sixteen numbers of config 11's spheres: centre, radius, colours, squares, shininess.
-type Ball = (V, f64, [V; 2], u32, f64);
-
-const BALLS: [Ball; 4] = [
-    ([3.0, 1.0, -7.0], 1.5, [[0.0, 0.0, 1.0], [1.0, 1.0, 1.0]], 4, 22.0),
-    ([2.0, -3.2, -5.0], 1.0, [[0.2, 0.5, 0.0], [0.9, 0.0, 0.4]], 4, 40.0),
-    ([-4.0, 2.0, -5.0], 1.8, [[1.0, 1.0, 1.0], [0.0, 0.0, 0.0]], 8, 120.0),
-    ([-2.0, -4.5, -8.0], 2.0, [[0.3, 1.0, 0.4], [0.3, 0.7, 0.2]], 4, 16.0),
-];
-
-/// The corner, the edges, whether the normal is turned, and the colour of config 11's walls: back, left, right, floor,
-/// ceiling.
-const WALLS: [(V, V, V, bool, V); 5] = [
-    ([-10.0, -10.0, -10.0], [20.0, 0.0, 0.0], [0.0, 20.0, 0.0], false, [0.7, 0.7, 0.7]),
-    ([-6.0, -7.0, -11.0], [0.0, 0.0, 20.0], [0.0, 20.0, 0.0], true, [1.0, 0.0, 0.0]),
-    ([6.0, -7.0, -11.0], [0.0, 0.0, 20.0], [0.0, 20.0, 0.0], false, [0.0, 1.0, 0.0]),
-    ([-7.0, -6.0, -11.0], [20.0, 0.0, 0.0], [0.0, 0.0, 20.0], true, [0.7, 0.7, 0.7]),
-    ([-7.0, 6.0, -11.0], [20.0, 0.0, 0.0], [0.0, 0.0, 20.0], false, [0.7, 0.7, 0.7]),
-];
-
-/// Config 11: a room with four spheres under a square light.
-pub fn config11(size: u32, antialiasing: u32, samples: u32) -> SceneDesc {
-    let mut scene = empty(size, size, antialiasing).with_camera(camera_up([0.0, 0.0, 10.0], [0.0; 3], [0.0, 1.0, 0.0], 45.0));
-    scene.render.ambient = ColorDesc::gray(0.1);
-    for (i, (center, radius, colors, n, shininess)) in BALLS.into_iter().enumerate() {
-        let name = format!("ball {i}");
-        let color = ColorParam::texture(name.clone());
-        scene = scene
-            .with_texture(&name, checkerboard([n, n], colors))
-            .with_material(&name, blinn_phong(color.clone(), color, shininess))
-            .with_sphere(SphereDesc { uv: SphereUv::Angles, material: Some(name), ..sphere(center, radius) });
-    }
-    for (i, (p, e0, e1, flip, [r, g, b])) in WALLS.into_iter().enumerate() {
-        let name = format!("wall {i}");
-        let color = ColorParam::constant(ColorDesc::linear(r, g, b));
-        scene = scene
-            .with_material(&name, blinn_phong(color.clone(), color, 16.0))
-            .with_parallelogram(ParallelogramDesc { flip, material: Some(name), ..parallelogram(p, e0, e1) });
-    }
-    scene.with_light(LightDesc::Rectangle(RectangleDesc {
-        falloff: Falloff::Constant,
-        visible: true,
-        ..rectangle([0.0, 5.9, -6.0], [2.0, 0.0, 0.0], [0.0, 0.0, 2.0], SampleSet::Sobol, samples)
-    }))
 }
