@@ -138,8 +138,9 @@ impl Pinhole {
     /// to the right and down.
     #[inline(always)]
     pub fn ray(&self, x: f32, y: f32, step: f32) -> (Ray, RayDifferential) {
-        let film_x = (2.0 * x / self.size.x - 1.0) * self.half_width;
-        let film_y = (1.0 - 2.0 * y / self.size.y) * self.half_height;
+        // 2 x / W - 1 and 1 - 2 y / H, with one rounding each: places that mirror each other on the film have rays that do
+        let film_x = (2.0 * x - self.size.x) / self.size.x * self.half_width;
+        let film_y = (self.size.y - 2.0 * y) / self.size.y * self.half_height;
         let towards = self.right * film_x + self.up * film_y + self.forward;
         let length = towards.length();
         let differential = RayDifferential {

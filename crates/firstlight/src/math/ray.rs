@@ -19,12 +19,13 @@ pub struct Ray {
 pub struct ErrorBound(pub Vec3);
 
 impl ErrorBound {
-    /// Of a point found as `o + t d` and then moved onto its surface: the rounding of the sum and of the products, with
-    /// room to spare. Standard model of floating-point error: Higham, "Accuracy and Stability of Numerical Algorithms",
-    /// section 3.1.
+    /// Of a point found as `o + t d`, and then moved onto the plane through a corner that is `from_corner` away: the
+    /// rounding of the sums and of the products, and that of the plane's normal, which moves the plane the more the
+    /// farther the corner is; with room to spare. Standard model of floating-point error: Higham, "Accuracy and Stability
+    /// of Numerical Algorithms", section 3.1.
     #[inline(always)]
-    pub fn along(ray: &Ray, t: f32) -> Self {
-        ErrorBound((ray.o.abs() + (ray.d * t).abs()) * (8.0 * UNIT_ROUNDOFF))
+    pub fn along(ray: &Ray, t: f32, from_corner: Vec3) -> Self {
+        ErrorBound((ray.o.abs() + (ray.d * t).abs() + from_corner.abs()) * (8.0 * UNIT_ROUNDOFF))
     }
 
     /// Of a point found as `c + r n`, n unit.

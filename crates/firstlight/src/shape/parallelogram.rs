@@ -43,6 +43,9 @@ table! {
 pub struct Parallelogram {
     /// The corner of u = v = 0.
     pub p: Vec3,
+    /// What the rounding of `p` left over. Far from the origin it is longer than the slack at the edges: without it,
+    /// walls that share a corner in the description would gape.
+    p_rest: Vec3,
     /// Unit normal of the front.
     pub n: Vec3,
     /// u of a point x of the plane is (x - p) . u_axis.
@@ -84,6 +87,7 @@ impl Parallelogram {
         let corners = [p, p + e0, p + e0 + e1, p + e1].map(|q| q.as_vec3());
         Parallelogram {
             p: p.as_vec3(),
+            p_rest: (p - p.as_vec3().as_dvec3()).as_vec3(),
             n: (cross.normalize_or_zero() * sign).as_vec3(),
             u_axis: (e1.cross(cross) / area2).as_vec3(),
             v_axis: (cross.cross(e0) / area2).as_vec3(),
@@ -91,6 +95,12 @@ impl Parallelogram {
             corners,
             single_sided,
         }
+    }
+
+    /// The way from the corner to `x`.
+    #[inline(always)]
+    fn from_corner(&self, x: Vec3) -> Vec3 {
+        (x - self.p) - self.p_rest
     }
 
     /// How far u or v can be wrong for a ray that starts `from` away from the corner. Two shapes that share an edge
@@ -103,7 +113,7 @@ impl Parallelogram {
     /// The t > 0 at which the ray meets the parallelogram, if it does.
     #[inline(always)]
     pub(crate) fn intersect(&self, ray: &Ray) -> Option<f32> {
-        let from = ray.o - self.p;
+        let from = self.from_corner(ray.o);
         let cos = self.n.dot(ray.d);
         if self.single_sided && cos >= 0.0 {
             return None;
@@ -124,15 +134,15 @@ impl Parallelogram {
     #[inline(always)]
     pub(crate) fn point(&self, ray: &Ray, t: f32, differential: &RayDifferential) -> ShapePoint {
         // Onto the plane: what is left of the distance to it does not grow with the camera's
-        let hit = ray.o + ray.d * t - self.p;
+        let hit = self.from_corner(ray.o) + ray.d * t;
         let hit = hit - self.n * self.n.dot(hit);
-        let p = self.p + hit;
+        let p = self.p + (self.p_rest + hit);
         let uv = Vec2::new(hit.dot(self.u_axis), hit.dot(self.v_axis)).clamp(Vec2::ZERO, Vec2::ONE);
         let steps = differential.on_plane(ray.d, t, self.n, f32::MAX.sqrt() * 0.5);
         let [dx, dy] = steps.map(|dp| Vec2::new(dp.dot(self.u_axis), dp.dot(self.v_axis)));
         ShapePoint {
             p,
-            error: ErrorBound::along(ray, t),
+            error: ErrorBound::along(ray, t, hit),
             normal: self.n,
             uv,
             footprint: Footprint { dx, dy, edges: [UvEdge::Bounded; 2] },
@@ -143,7 +153,8 @@ impl Parallelogram {
     /// allows itself, so that the answer is a proof for every point of the hull.
     pub(crate) fn side_of(&self, points: &[Vec3]) -> PlaneSide {
         let n = self.n.as_dvec3();
-        let heights = points.iter().map(|q| n.dot(q.as_dvec3() - self.p.as_dvec3()));
+        let corner = self.p.as_dvec3() + self.p_rest.as_dvec3();
+        let heights = points.iter().map(|q| n.dot(q.as_dvec3() - corner));
         if heights.clone().all(|s| s >= 0.0) {
             PlaneSide::Front
         } else if heights.clone().all(|s| s <= 0.0) {
@@ -156,7 +167,7 @@ impl Parallelogram {
     /// What this parallelogram needs to know of a point that asks for light.
     #[inline(always)]
     pub(crate) fn shadow(&self, p: Vec3, error: ErrorBound) -> ParallelogramShadow {
-        let from = p - self.p;
+        let from = self.from_corner(p);
         let s = self.n.dot(from);
         let sign = if s < 0.0 { -1.0 } else { 1.0 };
         let abs_n = self.n.abs();

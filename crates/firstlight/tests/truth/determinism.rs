@@ -1,0 +1,136 @@
+//! Same bits: whatever the threads, the tiles, the instruction set and the renderer, every picture is the same to the last
+//! bit. `FIRSTLIGHT_SCENES` is the number of random scenes, 200 unless said.
+
+use std::num::NonZeroUsize;
+
+use firstlight::{Image, RenderSettings, Scene, SceneDesc, SimdLevel, Window};
+
+use crate::random;
+use crate::scenes::*;
+
+/// Pictures that use everything, small ones.
+fn scenes() -> Vec<SceneDesc> {
+    let mut scenes = vec![config11(50, 2, 33)];
+    scenes[0].render.height = 41;
+    scenes.extend((0..6).map(|seed| {
+        let mut scene = random::scene(1_000_000 + seed);
+        (scene.render.width, scene.render.height) = (45, 37);
+        scene
+    }));
+    scenes
+}
+
+fn with(settings: RenderSettings, scene: &Scene) -> Vec<[u32; 4]> {
+    bits(&picture(scene, &settings))
+}
+
+#[test]
+fn threads_and_tiles_do_not_matter() {
+    for desc in scenes() {
+        let scene = compile(&desc);
+        let expected = with(one_thread(), &scene);
+        for threads in [1, 2, 7] {
+            for tile_size in [8, 16, 23, 64] {
+                let threads = NonZeroUsize::new(threads);
+                let got = with(RenderSettings { threads, tile_size, ..RenderSettings::default() }, &scene);
+                assert!(got == expected, "{threads:?} threads, tiles of {tile_size}: {desc:#?}");
+            }
+        }
+        assert!(with(RenderSettings::default(), &scene) == expected, "default settings: {desc:#?}");
+    }
+}
+
+#[test]
+fn instruction_sets_do_not_matter() {
+    let levels = SimdLevel::available();
+    assert!(!levels.is_empty());
+    for desc in scenes() {
+        let scene = compile(&desc);
+        let expected = with(RenderSettings { reference: true, ..one_thread() }, &scene);
+        for simd in &levels {
+            let got = with(RenderSettings { simd: *simd, ..one_thread() }, &scene);
+            assert!(got == expected, "{}: {desc:#?}", simd.name());
+        }
+    }
+}
+
+#[test]
+fn a_crop_is_a_part_of_the_whole() {
+    for desc in scenes() {
+        let scene = compile(&desc);
+        let whole = picture(&scene, &one_thread());
+        let (width, height) = (scene.width(), scene.height());
+        for window in [
+            Window { x: 0, y: 0, width: 1, height: 1 },
+            Window { x: 3, y: 5, width: 20, height: 17 },
+            Window { x: width - 9, y: 0, width: 9, height },
+            Window { x: 0, y: height - 1, width, height: 1 },
+        ] {
+            for reference in [false, true] {
+                let settings = RenderSettings { crop: Some(window), tile_size: 8, reference, ..one_thread() };
+                let part = picture(&scene, &settings);
+                assert_eq!(part.window, window);
+                for y in 0..window.height {
+                    for x in 0..window.width {
+                        let of_whole = whole.pixels[((window.y + y) * width + window.x + x) as usize];
+                        let of_part = part.pixels[(y * window.width + x) as usize];
+                        assert_eq!(of_whole.map(f32::to_bits), of_part.map(f32::to_bits), "{x}, {y} of {window:?}");
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// What is wrong with the pictures of a scene, if anything is.
+fn fault(desc: &SceneDesc) -> Option<String> {
+    let scene = compile(desc);
+    let plain = picture(&scene, &RenderSettings { reference: true, ..one_thread() });
+    let describe = |name: &str, film: &Image| {
+        let wrong = |p: &[f32; 4]| p.iter().any(|c| !c.is_finite() || *c < 0.0) || p[3] > 1.0;
+        film.pixels.iter().position(wrong).map(|i| format!("{name}: pixel {i} is {:?}", film.pixels[i]))
+    };
+    if let Some(fault) = describe("plain", &plain) {
+        return Some(fault);
+    }
+    for simd in [SimdLevel::Auto, SimdLevel::available()[0]] {
+        let fast = picture(&scene, &RenderSettings { simd, ..one_thread() });
+        let differs = (0..plain.pixels.len()).find(|i| plain.pixels[*i].map(f32::to_bits) != fast.pixels[*i].map(f32::to_bits));
+        if let Some(i) = differs {
+            return Some(format!("pixel {i}: plain {:?}, {} {:?}", plain.pixels[i], simd.name(), fast.pixels[i]));
+        }
+    }
+    None
+}
+
+/// The smallest scene with a fault that is left when shapes and lights are taken out one by one.
+fn reduced(mut desc: SceneDesc) -> SceneDesc {
+    loop {
+        let smaller = (0..desc.shapes.len() + desc.lights.len()).find_map(|i| {
+            let mut without = desc.clone();
+            match i.checked_sub(desc.shapes.len()) {
+                None => drop(without.shapes.remove(i)),
+                Some(light) => drop(without.lights.remove(light)),
+            }
+            fault(&without).is_some().then_some(without)
+        });
+        match smaller {
+            Some(smaller) => desc = smaller,
+            None => return desc,
+        }
+    }
+}
+
+#[test]
+fn plain_and_fast_agree_on_random_scenes() {
+    let count = times(200);
+    let mut lit = 0;
+    for seed in 0..count {
+        let desc = random::scene(seed);
+        if let Some(fault) = fault(&desc) {
+            panic!("seed {seed}: {fault}\n{:#?}", reduced(desc));
+        }
+        lit += usize::from(shoot(&desc).pixels.iter().any(|p| p[0] + p[1] + p[2] > 0.0));
+    }
+    assert!(lit as u64 * 10 > count * 6, "only {lit} of {count} scenes show anything");
+}

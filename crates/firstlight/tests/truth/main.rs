@@ -1,0 +1,10 @@
+//! Is the light right? Pictures against what can be known without a renderer: closed forms, symmetry, proofs, another
+//! program's picture. Everything here goes through the public interface.
+
+mod analytic;
+mod checker;
+mod determinism;
+mod known;
+mod random;
+mod robust;
+mod scenes;

@@ -1,0 +1,323 @@
+//! How these tests build scenes and look at them: the only file that knows how descriptions are made.
+
+use std::num::NonZeroUsize;
+use std::ops::ControlFlow;
+
+use firstlight::{
+    BlinnPhongDesc, CameraDesc, CheckerboardDesc, ColorDesc, ColorParam, CompileOptions, DirectionalDesc,
+    DisplayEncoding, Image, LightDesc, MaterialDesc, NoAssets, NumberParam, ParallelogramDesc, PhongDesc, PointDesc,
+    RectangleDesc, RenderDesc, RenderSettings, SampleSet, Scene, SceneDesc, ShapeDesc, SphereDesc, SpotDesc,
+    TextureDesc, builtin_scenes,
+};
+
+/// A point or a direction, as descriptions have them.
+pub type V = [f64; 3];
+
+pub fn add(a: V, b: V) -> V {
+    [a[0] + b[0], a[1] + b[1], a[2] + b[2]]
+}
+
+pub fn sub(a: V, b: V) -> V {
+    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
+}
+
+pub fn mul(a: V, s: f64) -> V {
+    a.map(|x| x * s)
+}
+
+pub fn dot(a: V, b: V) -> f64 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+pub fn cross(a: V, b: V) -> V {
+    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+}
+
+pub fn length(a: V) -> f64 {
+    dot(a, a).sqrt()
+}
+
+pub fn unit(a: V) -> V {
+    mul(a, 1.0 / length(a))
+}
+
+/// Two unit vectors at right angles to `n` and to each other.
+pub fn across(n: V) -> [V; 2] {
+    let helper = if n[0].abs() < 0.6 * length(n) { [1.0, 0.0, 0.0] } else { [0.0, 1.0, 0.0] };
+    let a = unit(cross(n, helper));
+    [a, unit(cross(n, a))]
+}
+
+/// `deg` in radians.
+pub fn radians(deg: f64) -> f64 {
+    deg * std::f64::consts::PI / 180.0
+}
+
+/// How often a test repeats what it does `usually` times, when `FIRSTLIGHT_SCENES` asks for more than its usual 200.
+pub fn times(usually: u64) -> u64 {
+    let wanted = std::env::var("FIRSTLIGHT_SCENES").ok().and_then(|n| n.parse().ok()).unwrap_or(200);
+    usually * wanted.max(200) / 200
+}
+
+/// No shapes, no lights, no camera yet.
+pub fn empty(width: u32, height: u32, antialiasing: u32) -> SceneDesc {
+    SceneDesc {
+        render: RenderDesc {
+            width,
+            height,
+            antialiasing,
+            samples: 64,
+            display: DisplayEncoding::Linear,
+            ..RenderDesc::default()
+        },
+        cameras: Vec::new(),
+        textures: Vec::new(),
+        materials: Vec::new(),
+        shapes: Vec::new(),
+        lights: Vec::new(),
+    }
+}
+
+/// A camera whose `up` is any direction that will do.
+pub fn camera(position: V, look_at: V, fov_y_deg: f64) -> CameraDesc {
+    camera_up(position, look_at, across(sub(look_at, position))[1], fov_y_deg)
+}
+
+pub fn camera_up(position: V, look_at: V, up: V, fov_y_deg: f64) -> CameraDesc {
+    CameraDesc { look_at, up, fov_y_deg: Some(fov_y_deg), ..CameraDesc::new(position) }
+}
+
+pub fn sphere(center: V, radius: f64) -> SphereDesc {
+    SphereDesc::new(center, radius)
+}
+
+pub fn parallelogram(p: V, e0: V, e1: V) -> ParallelogramDesc {
+    ParallelogramDesc::new(p, e0, e1)
+}
+
+/// A square with sides of length 2 `half` around `center`.
+pub fn square(center: V, normal: V, half: f64) -> ParallelogramDesc {
+    let [a, b] = across(normal);
+    let p = sub(center, mul(add(a, b), half));
+    parallelogram(p, mul(a, 2.0 * half), mul(b, 2.0 * half))
+}
+
+pub fn point(position: V, strength: f64) -> PointDesc {
+    PointDesc { strength, ..PointDesc::new(position) }
+}
+
+pub fn directional(direction: V, strength: f64) -> DirectionalDesc {
+    DirectionalDesc { strength, ..DirectionalDesc::new(direction) }
+}
+
+pub fn spot(position: V, look_at: V, cone_deg: f64, inner_cone_deg: Option<f64>, strength: f64) -> SpotDesc {
+    SpotDesc { look_at, cone_deg, inner_cone_deg, strength, ..SpotDesc::new(position) }
+}
+
+/// Physical, strength 1, invisible, with `samples` points of `set`.
+pub fn rectangle(center: V, e0: V, e1: V, set: SampleSet, samples: u32) -> RectangleDesc {
+    RectangleDesc { visible: false, samples: Some(samples), set, ..RectangleDesc::new(center, e0, e1) }
+}
+
+pub fn matte(diffuse: f64) -> MaterialDesc {
+    phong(ColorParam::gray(diffuse), ColorParam::gray(0.0), 16.0)
+}
+
+pub fn phong(diffuse: ColorParam, specular: ColorParam, shininess: f64) -> MaterialDesc {
+    let shininess = NumberParam::constant(shininess);
+    MaterialDesc::Phong(PhongDesc { diffuse, specular, shininess, ..PhongDesc::default() })
+}
+
+pub fn blinn_phong(diffuse: ColorParam, specular: ColorParam, shininess: f64) -> MaterialDesc {
+    let shininess = NumberParam::constant(shininess);
+    MaterialDesc::BlinnPhong(BlinnPhongDesc { diffuse, specular, shininess, ..BlinnPhongDesc::default() })
+}
+
+pub fn checkerboard(counts: [u32; 2], colors: [V; 2]) -> TextureDesc {
+    let colors = colors.map(|[r, g, b]| ColorDesc::linear(r, g, b));
+    TextureDesc::Checkerboard(CheckerboardDesc { counts, colors })
+}
+
+/// The built-in config 11, a room with four spheres under a square light, at another size.
+pub fn config11(size: u32, antialiasing: u32, samples: u32) -> SceneDesc {
+    let Some(builtin) = builtin_scenes().iter().find(|builtin| builtin.name == "config11") else {
+        panic!("config11 comes with the library");
+    };
+    let parsed = SceneDesc::parse("config11.toml", builtin.text.as_bytes(), &NoAssets);
+    assert!(parsed.faults().is_empty());
+    let mut scene = parsed.desc;
+    scene.render = RenderDesc { width: size, height: size, antialiasing, samples, ..scene.render };
+    scene
+}
+
+/// Adds to a scene, in the order of the text.
+pub trait Build: Sized {
+    fn with_camera(self, camera: CameraDesc) -> Self;
+    fn with_material(self, name: &str, material: MaterialDesc) -> Self;
+    fn with_texture(self, name: &str, texture: TextureDesc) -> Self;
+    fn with_sphere(self, sphere: SphereDesc) -> Self;
+    fn with_parallelogram(self, parallelogram: ParallelogramDesc) -> Self;
+    fn with_light(self, light: LightDesc) -> Self;
+    /// The same scene under other lights.
+    fn lit_by(self, lights: &[LightDesc]) -> Self;
+    /// The same scene, every light shining through everything.
+    fn without_shadows(self) -> Self;
+}
+
+impl Build for SceneDesc {
+    fn with_camera(mut self, camera: CameraDesc) -> Self {
+        self.cameras = vec![(String::new(), camera)];
+        self
+    }
+
+    fn with_material(mut self, name: &str, material: MaterialDesc) -> Self {
+        self.materials.push((name.to_owned(), material));
+        self
+    }
+
+    fn with_texture(mut self, name: &str, texture: TextureDesc) -> Self {
+        self.textures.push((name.to_owned(), texture));
+        self
+    }
+
+    fn with_sphere(mut self, sphere: SphereDesc) -> Self {
+        self.shapes.push(ShapeDesc::Sphere(sphere));
+        self
+    }
+
+    fn with_parallelogram(mut self, parallelogram: ParallelogramDesc) -> Self {
+        self.shapes.push(ShapeDesc::Parallelogram(parallelogram));
+        self
+    }
+
+    fn with_light(mut self, light: LightDesc) -> Self {
+        self.lights.push(light);
+        self
+    }
+
+    fn lit_by(mut self, lights: &[LightDesc]) -> Self {
+        self.lights = lights.to_vec();
+        self
+    }
+
+    fn without_shadows(mut self) -> Self {
+        for light in &mut self.lights {
+            match light {
+                LightDesc::Point(light) => light.shadows = false,
+                LightDesc::Directional(light) => light.shadows = false,
+                LightDesc::Spot(light) => light.shadows = false,
+                LightDesc::Rectangle(light) => light.shadows = false,
+                #[allow(unreachable_patterns)]
+                _ => unreachable!("no test here uses another light"),
+            }
+        }
+        self
+    }
+}
+
+/// Ready to be rendered.
+#[track_caller]
+pub fn compile(desc: &SceneDesc) -> Scene {
+    match desc.compile(&NoAssets, &CompileOptions::default()) {
+        Ok(compiled) => compiled.scene,
+        Err(error) => panic!("{error}\nin {desc:#?}"),
+    }
+}
+
+/// One thread, the fast renderer.
+pub fn one_thread() -> RenderSettings {
+    RenderSettings { threads: NonZeroUsize::new(1), ..RenderSettings::default() }
+}
+
+/// The picture under the settings.
+pub fn picture(scene: &Scene, settings: &RenderSettings) -> Image {
+    match render_all(scene, settings) {
+        ControlFlow::Continue(image) => image,
+        ControlFlow::Break(()) => unreachable!("nobody stops it"),
+    }
+}
+
+fn render_all(scene: &Scene, settings: &RenderSettings) -> ControlFlow<(), Image> {
+    let (film, _) = firstlight::render(scene, settings, &|_, _| ControlFlow::Continue(()))?;
+    ControlFlow::Continue(film.develop())
+}
+
+/// The picture of a description, one thread.
+#[track_caller]
+pub fn shoot(desc: &SceneDesc) -> Image {
+    picture(&compile(desc), &one_thread())
+}
+
+/// Red, green and blue of what `desc` shows at `p`, seen from `from`: one camera ray, aimed.
+#[track_caller]
+pub fn probe(desc: &SceneDesc, from: V, p: V) -> [f32; 3] {
+    let mut desc = desc.clone().with_camera(camera(from, p, 0.01));
+    (desc.render.width, desc.render.height, desc.render.antialiasing) = (1, 1, 1);
+    let [r, g, b, _] = shoot(&desc).pixels[0];
+    [r, g, b]
+}
+
+/// The bits of a picture.
+pub fn bits(image: &Image) -> Vec<[u32; 4]> {
+    image.pixels.iter().map(|p| p.map(f32::to_bits)).collect()
+}
+
+/// A repeatable stream of random numbers: SplitMix64.
+#[derive(Clone)]
+pub struct Random(u64);
+
+impl Random {
+    pub fn new(seed: u64) -> Self {
+        Random(seed.wrapping_mul(0x2545_f491_4f6c_dd1d) ^ 0x6a09_e667_f3bc_c909)
+    }
+
+    pub fn bits(&mut self) -> u64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let z = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        z ^ (z >> 31)
+    }
+
+    /// From 0 up to 1.
+    pub fn unit(&mut self) -> f64 {
+        (self.bits() >> 11) as f64 / (1u64 << 53) as f64
+    }
+
+    pub fn between(&mut self, low: f64, high: f64) -> f64 {
+        low + (high - low) * self.unit()
+    }
+
+    /// From `low` to `high`, each factor as likely as the next.
+    pub fn scale(&mut self, low: f64, high: f64) -> f64 {
+        pxfm::f_exp(self.between(pxfm::f_log(low), pxfm::f_log(high)))
+    }
+
+    /// A whole number below `n`.
+    pub fn below(&mut self, n: u32) -> u32 {
+        (self.bits() % n as u64) as u32
+    }
+
+    pub fn chance(&mut self, p: f64) -> bool {
+        self.unit() < p
+    }
+
+    pub fn pick<T: Copy>(&mut self, from: &[T]) -> T {
+        from[self.below(from.len() as u32) as usize]
+    }
+
+    /// Each coordinate from -`reach` to `reach`.
+    pub fn vector(&mut self, reach: f64) -> V {
+        [0; 3].map(|_| self.between(-reach, reach))
+    }
+
+    /// A unit vector, every direction as likely.
+    pub fn direction(&mut self) -> V {
+        loop {
+            let v = self.vector(1.0);
+            let l = length(v);
+            if l > 0.1 && l <= 1.0 {
+                return mul(v, 1.0 / l);
+            }
+        }
+    }
+}
