@@ -12,7 +12,11 @@ const ROUNDING: f64 = 2e-6;
 
 #[track_caller]
 fn assert_close(is: f32, should: f64, relative: f64) {
-    assert!((is as f64 - should).abs() <= relative * should.abs(), "{is} is not {should}: off by {:e}", is as f64 / should - 1.0);
+    assert!(
+        (is as f64 - should).abs() <= relative * should.abs(),
+        "{is} is not {should}: off by {:e}",
+        is as f64 / should - 1.0
+    );
 }
 
 /// A white matte square around `p`, facing `n`.
@@ -53,7 +57,11 @@ fn a_point_light_follows_the_inverse_square() {
 fn a_constant_point_light_knows_no_distance() {
     for d in [0.1, 1.0, 1e4] {
         let light = firstlight::PointDesc { falloff: Falloff::Constant, ..point([0.6 * d, 0.8 * d, 0.0], 0.5) };
-        let film = probe(&white([0.0; 3], [0.0, 1.0, 0.0], 1e-2).with_light(LightDesc::Point(light)), [0.0, 0.01, 0.0], [0.0; 3]);
+        let film = probe(
+            &white([0.0; 3], [0.0, 1.0, 0.0], 1e-2).with_light(LightDesc::Point(light)),
+            [0.0, 0.01, 0.0],
+            [0.0; 3],
+        );
         assert_close(film[0], 0.5 * 0.8, ROUNDING);
     }
 }
@@ -64,7 +72,11 @@ fn a_directional_light_is_lux_times_the_cosine() {
     for _ in 0..60 {
         let (n, direction, lux) = (random.direction(), random.direction(), random.scale(0.01, 1e5));
         let cos = -dot(n, direction);
-        let e = irradiance([3.0, -2.0, 1.0], n, &[LightDesc::Directional(directional(mul(direction, random.scale(1e-3, 1e3)), lux))]);
+        let e = irradiance(
+            [3.0, -2.0, 1.0],
+            n,
+            &[LightDesc::Directional(directional(mul(direction, random.scale(1e-3, 1e3)), lux))],
+        );
         if cos <= 0.0 {
             assert_eq!(e, 0.0, "light from behind");
         } else {
@@ -76,8 +88,14 @@ fn a_directional_light_is_lux_times_the_cosine() {
 #[test]
 fn reflected_is_the_diffuse_fraction_in_each_channel() {
     let scene = empty(1, 1, 1)
-        .with_material("tinted", phong(ColorParam::constant(ColorDesc::linear(0.7, 0.2, 0.05)), ColorParam::gray(0.0), 1.0))
-        .with_parallelogram(firstlight::ParallelogramDesc { material: Some("tinted".into()), ..square([0.0; 3], [0.0, 1.0, 0.0], 1.0) })
+        .with_material(
+            "tinted",
+            phong(ColorParam::constant(ColorDesc::linear(0.7, 0.2, 0.05)), ColorParam::gray(0.0), 1.0),
+        )
+        .with_parallelogram(firstlight::ParallelogramDesc {
+            material: Some("tinted".into()),
+            ..square([0.0; 3], [0.0, 1.0, 0.0], 1.0)
+        })
         .with_light(LightDesc::Directional(firstlight::DirectionalDesc {
             color: ColorDesc::linear(1.0, 0.5, 3.0),
             ..directional([0.0, -1.0, 0.0], 10.0)
@@ -280,7 +298,10 @@ fn still_life(specular: f64) -> SceneDesc {
         .with_camera(camera([0.0, 2.5, 4.0], [0.0, 0.5, 0.0], 45.0))
         .with_material("glossy", blinn_phong(ColorParam::gray(0.6), ColorParam::gray(specular), 20.0))
         .with_sphere(firstlight::SphereDesc { material: name(), ..sphere([0.3, 0.8, 0.0], 0.7) })
-        .with_parallelogram(firstlight::ParallelogramDesc { material: name(), ..square([0.0; 3], [0.0, 1.0, 0.0], 4.0) })
+        .with_parallelogram(firstlight::ParallelogramDesc {
+            material: name(),
+            ..square([0.0; 3], [0.0, 1.0, 0.0], 4.0)
+        })
 }
 
 fn every_light() -> Vec<LightDesc> {
@@ -438,7 +459,8 @@ fn nothing_outside_a_closed_box_is_lit() {
             let Some(hit) = compiled.intersect(&ray) else { panic!("the shell is closed") };
             let Some(wall) = (hit.surface.0 as usize).checked_sub(1) else { continue };
             let (a, b) = (e[(wall / 2 + 1) % 3], e[(wall / 2 + 2) % 3]);
-            let outward = mul(cross(a, b), dot(cross(a, b), e[wall / 2]).signum() * if wall % 2 == 1 { 1.0 } else { -1.0 });
+            let outward =
+                mul(cross(a, b), dot(cross(a, b), e[wall / 2]).signum() * if wall % 2 == 1 { 1.0 } else { -1.0 });
             if dot(outward, ray.d.to_array().map(f64::from)) > 0.0 {
                 let uv = compiled.surface(&ray, &hit, &differential).uv.to_array();
                 let to_edge = uv.map(|w| w.min(1.0 - w)).into_iter().fold(1.0, f32::min);
@@ -457,7 +479,8 @@ fn a_knife_edge_hides_half_of_a_light() {
         let p = [t, 0.0, 0.0];
         let scene = |blade: Option<&firstlight::ParallelogramDesc>| {
             let mut scene = white(p, [0.0, 1.0, 0.0], 0.01).with_light(LightDesc::Rectangle(light.clone()));
-            scene.lights[0] = LightDesc::Rectangle(firstlight::RectangleDesc { e0: light.e0, e1: light.e1, ..light.clone() });
+            scene.lights[0] =
+                LightDesc::Rectangle(firstlight::RectangleDesc { e0: light.e0, e1: light.e1, ..light.clone() });
             if let Some(blade) = blade {
                 scene = scene.with_parallelogram(blade.clone());
             }

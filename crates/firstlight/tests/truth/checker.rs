@@ -35,7 +35,14 @@ impl Eye {
         let forward = unit(sub(camera.look_at, camera.position));
         let right = unit(cross(forward, camera.up));
         let half = f_tan(radians(camera.fov_y_deg.expect("these tests give it")) / 2.0);
-        Eye { position: camera.position, right, up: cross(right, forward), forward, size: [width as f64, height as f64], half }
+        Eye {
+            position: camera.position,
+            right,
+            up: cross(right, forward),
+            forward,
+            size: [width as f64, height as f64],
+            half,
+        }
     }
 
     fn direction(&self, x: f64, y: f64) -> V {
@@ -74,7 +81,13 @@ fn places(i: u32, j: u32) -> impl Iterator<Item = (f64, f64)> {
 /// Compares each pixel whose surroundings show one square with that square's colour; answers how many there were, and
 /// checks that all others lie between the two colours.
 #[track_caller]
-fn compare(scene: &SceneDesc, counts: [u32; 2], seam: bool, uv_at: impl Fn(V, V) -> Option<[f64; 2]>, what: &str) -> usize {
+fn compare(
+    scene: &SceneDesc,
+    counts: [u32; 2],
+    seam: bool,
+    uv_at: impl Fn(V, V) -> Option<[f64; 2]>,
+    what: &str,
+) -> usize {
     let (width, height) = (scene.render.width, scene.render.height);
     let eye = Eye::new(&scene.cameras[0].1, width, height);
     let film = shoot(scene);
@@ -114,7 +127,9 @@ fn sphere_normal(o: V, d: V, c: V, r: f64) -> Option<V> {
 
 fn sphere_uv(uv: SphereUv, n: V) -> [f64; 2] {
     match uv {
-        SphereUv::Equirectangular => [0.5 + f_atan2(-n[2], n[0]) / (2.0 * PI), 0.5 + f_asin(n[1].clamp(-1.0, 1.0)) / PI],
+        SphereUv::Equirectangular => {
+            [0.5 + f_atan2(-n[2], n[0]) / (2.0 * PI), 0.5 + f_asin(n[1].clamp(-1.0, 1.0)) / PI]
+        }
         SphereUv::Angles => [f_acos(n[0].clamp(-1.0, 1.0)) / PI, f_acos(n[1].clamp(-1.0, 1.0)) / PI],
     }
 }
@@ -188,9 +203,9 @@ fn parallelograms_have_no_line_but_at_the_squares_edges() {
             ([0.0, -0.6, -1.3], [0.0, -0.2, -1.0], 90.0),
             ([8.0, 30.0, -9.0], [0.4, -0.3, 0.0], 12.0),
         ] {
-            let scene = board(40, 40, counts, COLORS).with_camera(camera(eye, look_at, fov)).with_parallelogram(
-                ParallelogramDesc { material: Some("board".into()), ..parallelogram(p, e0, e1) },
-            );
+            let scene = board(40, 40, counts, COLORS)
+                .with_camera(camera(eye, look_at, fov))
+                .with_parallelogram(ParallelogramDesc { material: Some("board".into()), ..parallelogram(p, e0, e1) });
             let uv_at = |o, d| plane_uv(o, d, p, e0, e1);
             plain += compare(&scene, counts, false, uv_at, &format!("from {eye:?}"));
         }
@@ -252,7 +267,10 @@ fn the_mean_over_whole_squares_is_kept() {
                 // An odd board has one square more of the first colour
                 let n2 = (n * n) as f64;
                 let should = if n % 2 == 0 { 0.5 } else { (n2 + 1.0) / (2.0 * n2) };
-                assert!((mean - should).abs() < 2e-5, "{n} squares on {width} x {height} x {antialiasing}: {mean}, not {should}");
+                assert!(
+                    (mean - should).abs() < 2e-5,
+                    "{n} squares on {width} x {height} x {antialiasing}: {mean}, not {should}"
+                );
             }
         }
     }

@@ -95,7 +95,8 @@ fn fault(desc: &SceneDesc) -> Option<String> {
     }
     for simd in [SimdLevel::Auto, SimdLevel::available()[0]] {
         let fast = picture(&scene, &RenderSettings { simd, ..one_thread() });
-        let differs = (0..plain.pixels.len()).find(|i| plain.pixels[*i].map(f32::to_bits) != fast.pixels[*i].map(f32::to_bits));
+        let differs =
+            (0..plain.pixels.len()).find(|i| plain.pixels[*i].map(f32::to_bits) != fast.pixels[*i].map(f32::to_bits));
         if let Some(i) = differs {
             return Some(format!("pixel {i}: plain {:?}, {} {:?}", plain.pixels[i], simd.name(), fast.pixels[i]));
         }

@@ -13,7 +13,7 @@ pub fn scene(seed: u64) -> SceneDesc {
     let mut random = Random::new(seed);
     let random = &mut random;
     let unit_length = match random.below(4) {
-        0 => random.scale(1e-6, 1e6),
+        0 => random.scale(1e-5, 1e5),
         _ => 1.0,
     };
     let origin = if random.chance(0.15) { mul(random.direction(), 1000.0 * unit_length) } else { [0.0; 3] };
@@ -173,7 +173,9 @@ impl Place {
             },
             _ => {}
         }
-        if length(cross(unit(desc.e0), unit(desc.e1))) < 1e-4 {
+        // What is too thin or too short for a description
+        let shortest = length(desc.e0).min(length(desc.e1));
+        if shortest < 1e-8 || length(cross(unit(desc.e0), unit(desc.e1))) < 1e-4 {
             (desc.e0, desc.e1) = ([self.unit, 0.0, 0.0], [0.0, 0.0, self.unit]);
         }
         desc
@@ -199,13 +201,19 @@ impl Place {
         let at = touching.unwrap_or_else(|| self.point(random, 5.0));
         let (color, shadows) = (color(random), random.chance(0.85));
         let falloff = random.pick(&[Falloff::Physical, Falloff::Constant]);
-        let strength = random.scale(0.1, 100.0) * if falloff == Falloff::Physical { self.unit * self.unit } else { 1.0 };
+        let strength =
+            random.scale(0.1, 100.0) * if falloff == Falloff::Physical { self.unit * self.unit } else { 1.0 };
         match random.below(6) {
             0 => LightDesc::Point(firstlight::PointDesc { color, falloff, shadows, ..point(at, strength) }),
             1 => {
                 let any = random.direction();
                 let direction = random.pick(&[[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], any, any]);
-                LightDesc::Directional(firstlight::DirectionalDesc { color, falloff, shadows, ..directional(direction, 2.0) })
+                LightDesc::Directional(firstlight::DirectionalDesc {
+                    color,
+                    falloff,
+                    shadows,
+                    ..directional(direction, 2.0)
+                })
             }
             2 => {
                 let cone = random.between(5.0, 180.0);
@@ -216,7 +224,13 @@ impl Place {
             }
             _ => {
                 let ([e0, e1], center) = self.rectangle_frame(random, scene, at);
-                let set = random.pick(&[SampleSet::Sobol, SampleSet::Sobol, SampleSet::Uniform, SampleSet::Grid, SampleSet::Stratified]);
+                let set = random.pick(&[
+                    SampleSet::Sobol,
+                    SampleSet::Sobol,
+                    SampleSet::Uniform,
+                    SampleSet::Grid,
+                    SampleSet::Stratified,
+                ]);
                 let samples = match set {
                     SampleSet::Sobol | SampleSet::Uniform => random.chance(0.5).then(|| 1 + random.below(70)),
                     SampleSet::Grid | SampleSet::Stratified => {

@@ -4,8 +4,8 @@
 use std::f64::consts::PI;
 
 use firstlight::{
-    ColorParam, CompileOptions, Falloff, LightDesc, NoAssets, ParallelogramDesc, PointDesc, RectangleDesc, RenderSettings,
-    SampleSet, SceneDesc, SphereDesc, SphereUv,
+    ColorParam, CompileOptions, Falloff, LightDesc, NoAssets, ParallelogramDesc, PointDesc, RectangleDesc,
+    RenderSettings, SampleSet, SceneDesc, SphereDesc, SphereUv,
 };
 use pxfm::{f_asin, f_cos, f_sin, f_tan};
 
@@ -179,7 +179,9 @@ fn one_sided_shapes_are_seen_from_one_side_and_block_from_both() {
 #[test]
 fn silhouettes_are_circles_at_every_size() {
     // Radius, distance; an f32 direction is known to 1e-7, so the far ones have rough rims
-    for (r, d) in [(1.0, 1.0001), (1.0, 3.0), (1e-4, 2e-4), (1e-4, 0.1), (1.0, 1e4), (1e4, 1e8), (1e-6, 1e-3), (5e7, 1e8)] {
+    for (r, d) in
+        [(1.0, 1.0001), (1.0, 3.0), (1e-4, 2e-4), (1e-4, 0.1), (1.0, 1e4), (1e4, 1e8), (1e-6, 1e-3), (5e7, 1e8)]
+    {
         let at = unit([0.3, -0.5, 0.8]);
         let eye = mul(at, d);
         // The circle has a radius of about 20 of 64 pixels
@@ -246,7 +248,9 @@ fn tiny_and_far_spheres_have_their_shadow() {
 #[test]
 fn poles_and_seams_are_finite() {
     for uv in [SphereUv::Equirectangular, SphereUv::Angles] {
-        for at in [[0.0, 1.0, 0.0], [0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, 0.0, -1.0]] {
+        for at in
+            [[0.0, 1.0, 0.0], [0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, 0.0, -1.0]]
+        {
             for (distance, fov) in [(4.0, 40.0), (1.01, 90.0), (1e3, 0.2), (0.3, 120.0)] {
                 // An odd size: the middle ray ends exactly at the pole
                 let texture = ColorParam::texture("board");
@@ -255,7 +259,10 @@ fn poles_and_seams_are_finite() {
                     .with_texture("board", checkerboard([7, 5], [[1.0, 0.8, 0.6], [0.1, 0.2, 0.3]]))
                     .with_material("board", phong(texture.clone(), texture, 9.0))
                     .with_sphere(SphereDesc { uv, material: Some("board".into()), ..sphere([0.0; 3], 1.0) })
-                    .with_light(LightDesc::Point(PointDesc { falloff: Falloff::Constant, ..point(mul(at, distance), 1.0) }));
+                    .with_light(LightDesc::Point(PointDesc {
+                        falloff: Falloff::Constant,
+                        ..point(mul(at, distance), 1.0)
+                    }));
                 let mut ambient = scene.clone().lit_by(&[]);
                 ambient.render.ambient = firstlight::ColorDesc::WHITE;
                 for (i, p) in shoot(&scene).pixels.iter().enumerate() {
@@ -279,7 +286,11 @@ fn texture_coordinates_follow_skewed_edges() {
             let mut scene = empty(1, 1, 1)
                 .with_texture("board", checkerboard([5, 3], [[1.0; 3], [0.0; 3]]))
                 .with_material("board", phong(ColorParam::texture("board"), ColorParam::gray(0.0), 1.0))
-                .with_parallelogram(ParallelogramDesc { flip, material: Some("board".into()), ..parallelogram(p, e0, e1) });
+                .with_parallelogram(ParallelogramDesc {
+                    flip,
+                    material: Some("board".into()),
+                    ..parallelogram(p, e0, e1)
+                });
             scene.render.ambient = firstlight::ColorDesc::WHITE;
             for i in 0..5 {
                 for j in 0..3 {
@@ -381,7 +392,11 @@ fn shapes_in_one_plane_do_not_shadow_each_other() {
         let middle = random.vector(random.clone().scale(1e-3, 1e3));
         let mut scene = empty(8, 8, 1)
             .with_camera(camera(add(middle, add(mul(n, 3.0), mul(a, random.between(0.0, 10.0)))), middle, 60.0))
-            .with_parallelogram(parallelogram(sub(middle, mul(add(a, b), half)), mul(a, 2.0 * half), mul(b, 2.0 * half)));
+            .with_parallelogram(parallelogram(
+                sub(middle, mul(add(a, b), half)),
+                mul(a, 2.0 * half),
+                mul(b, 2.0 * half),
+            ));
         for _ in 0..3 {
             let at = add(middle, add(mul(a, random.between(-2.0, 2.0)), mul(b, random.between(-2.0, 2.0))));
             scene = scene.with_parallelogram(square(at, n, random.scale(0.1, 10.0)));
