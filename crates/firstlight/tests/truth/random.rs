@@ -53,6 +53,33 @@ pub fn scene(seed: u64) -> SceneDesc {
     scene.with_camera(camera)
 }
 
+/// Balls almost sunk in a floor, and ones that just touch it from below, under lights that graze it: what of a ball is
+/// above the horizon decides.
+pub fn grazing(seed: u64) -> SceneDesc {
+    let mut random = Random::new(seed ^ 0x5eed);
+    let random = &mut random;
+    let n = random.direction();
+    let [a, b] = across(n);
+    let middle = if random.chance(0.3) { random.vector(100.0) } else { [0.0; 3] };
+    let on_floor = |random: &mut Random, reach: f64| {
+        add(middle, add(mul(a, random.between(-reach, reach)), mul(b, random.between(-reach, reach))))
+    };
+    let mut scene = empty(12, 12, 1).with_parallelogram(square(middle, n, 20.0));
+    for _ in 0..3 {
+        let r = random.scale(0.3, 30.0);
+        let depth = r * (1.0 - random.pick(&[1.0, 1.0, -1.0]) * random.scale(1e-6, 0.05));
+        scene = scene.with_sphere(sphere(sub(on_floor(random, 2.0), mul(n, depth)), r));
+    }
+    for _ in 0..3 {
+        let at = add(on_floor(random, 4.0), mul(n, random.scale(1e-4, 0.5)));
+        let sides = [mul(a, random.scale(0.1, 2.0)), mul(b, random.scale(0.1, 2.0))];
+        let light = rectangle(at, sides[0], sides[1], SampleSet::Sobol, 1 + random.below(60));
+        scene = scene.with_light(LightDesc::Rectangle(RectangleDesc { falloff: Falloff::Constant, ..light }));
+    }
+    let eye = add(on_floor(random, 2.0), mul(n, random.between(0.5, 4.0)));
+    scene.with_camera(camera(eye, on_floor(random, 1.0), 70.0))
+}
+
 fn color(random: &mut Random) -> ColorDesc {
     match random.below(4) {
         0 => ColorDesc::gray(random.unit()),
