@@ -1,4 +1,50 @@
 //! Direct light, without noise, with the same bits on every machine.
+//!
+//! A ray from the camera, the first surface it meets, rays from there to every light: that, and nothing after it.
+//! A scene is said as text or built in code ([`SceneDesc`]), checked and made ready ([`Scene`]), rendered ([`render`])
+//! and developed into a picture ([`Image`]).
+//!
+//! ```
+//! use std::ops::ControlFlow;
+//!
+//! use firstlight::{CompileOptions, Format, NoAssets, RenderSettings, SceneDesc, render};
+//!
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! let text = r#"
+//!     [render]
+//!     width = 32
+//!     height = 24
+//!     [camera]
+//!     position = [0, 0, 5]
+//!     [[sphere]]
+//!     center = [0, 0, 0]
+//!     radius = 1
+//!     [[light.directional]]
+//!     direction = [-1, -1, -1]
+//! "#;
+//! // Every fault of the text comes at once, with its place
+//! let parsed = SceneDesc::parse("ball.toml", text.as_bytes(), &NoAssets);
+//! let scene = parsed.compile(&NoAssets, &CompileOptions::default())?.scene;
+//! // From here on nothing can fail
+//! let settings = RenderSettings::default();
+//! let ControlFlow::Continue((film, stats)) = render(&scene, &settings, &|_, _| ControlFlow::Continue(())) else {
+//!     unreachable!("the progress function never stops it");
+//! };
+//! assert_eq!(stats.camera_rays, 32 * 24 * 16);
+//! let image = film.develop();
+//! // Linear Rec. 709, red, green, blue, alpha: the middle of the ball is lit, the corner is not
+//! assert!(image.pixels[12 * 32 + 16][0] > 0.1);
+//! assert_eq!(image.pixels[0], [0.0, 0.0, 0.0, 1.0]);
+//! let png = image.encode(Format::Png8, &scene.display(), &scene.receipt(&settings))?;
+//! assert!(png.starts_with(b"\x89PNG"));
+//! # Ok(())
+//! # }
+//! ```
+//!
+//! - What a scene may say: [`SceneDesc`] and the `*Desc` types; [`reference()`] writes the manual of the text.
+//! - What a ray sees, without a picture: [`Scene::intersect`] and [`Scene::look`].
+//! - Where files come from: [`Assets`].
+//! - Faults, as data: [`SceneError`], [`Diagnostic`], [`ImageError`]. The library never prints and never exits.
 
 mod camera;
 mod color;

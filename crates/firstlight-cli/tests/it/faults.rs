@@ -22,8 +22,12 @@ fn all_faults_come_at_once_with_place_excerpt_and_count() {
 #[test]
 fn faults_of_standard_input_have_a_place_too() {
     let folder = Folder::new();
-    folder.run_with_input("check -", b"[render]\ncolour = 3\n").exits(1).says(&["<stdin>:2:", "colour", "1 error\n"]);
-    let json = b"\n{\"render\": {\n\"colour\": 3}}\n";
+    folder.run_with_input("check -", b"[camera]\nposition = [0, 0, 9]\n[render]\ncolour = 3\n").exits(1).says(&[
+        "<stdin>:4:",
+        "colour",
+        "1 error\n",
+    ]);
+    let json = b"\n{\"camera\": {\"position\": [0, 0, 9]}, \"render\": {\n\"colour\": 3}}\n";
     folder.run_with_input("check -", json).exits(1).says(&["<stdin>.json:3:", "colour", "1 error\n"]);
 }
 

@@ -200,9 +200,6 @@ impl Scene {
         if let Some(w) = settings.crop {
             entries.push(("crop", format!("{},{},{},{}", w.x, w.y, w.width, w.height)));
         }
-        if settings.reference {
-            entries.push(("renderer", "reference".to_owned()));
-        }
         Receipt { entries: entries.into_iter().map(|(key, value)| (key.to_owned(), value)).collect() }
     }
 }

@@ -9,7 +9,7 @@ words! {
     pub enum SimdLevel {
         /// The best this processor has.
         Auto = "auto",
-        /// None: plain numbers, on processors that have none of the others.
+        /// None: plain numbers.
         Fallback = "fallback",
         /// x86-64's own, 4 lanes.
         Sse2 = "sse2",
@@ -53,7 +53,8 @@ impl SimdLevel {
         let detected = Level::new();
         match self {
             SimdLevel::Auto => Some(detected),
-            SimdLevel::Fallback | SimdLevel::Neon => None,
+            SimdLevel::Fallback => Some(Level::fallback()),
+            SimdLevel::Neon => None,
             SimdLevel::Sse2 => detected.as_sse2().map(Level::Sse2),
             SimdLevel::Sse42 => detected.as_sse4_2().map(Level::Sse4_2),
             SimdLevel::Avx2 => detected.as_avx2().map(Level::Avx2),
@@ -66,6 +67,7 @@ impl SimdLevel {
         let detected = Level::new();
         match self {
             SimdLevel::Auto => Some(detected),
+            SimdLevel::Fallback => Some(Level::fallback()),
             SimdLevel::Neon => detected.as_neon().map(Level::Neon),
             _ => None,
         }
@@ -73,6 +75,6 @@ impl SimdLevel {
 
     #[cfg(not(any(target_arch = "x86_64", target_arch = "aarch64")))]
     fn try_token(self) -> Option<Level> {
-        matches!(self, SimdLevel::Auto | SimdLevel::Fallback).then(Level::baseline)
+        matches!(self, SimdLevel::Auto | SimdLevel::Fallback).then(Level::fallback)
     }
 }

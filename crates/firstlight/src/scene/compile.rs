@@ -3,8 +3,8 @@
 use std::collections::HashMap;
 use std::sync::Arc;
 
-use super::{DisplayEncoding, Scene, SceneDesc, SceneSummary};
-use crate::camera::Camera;
+use super::{DisplayEncoding, RenderDesc, Scene, SceneDesc, SceneSummary};
+use crate::camera::{Camera, CameraDesc};
 use crate::color::{Display, Encoding, Rgb};
 use crate::context::{AssetError, Assets, CompileContext};
 use crate::describe::{ColorParam, NumberParam};
@@ -148,15 +148,8 @@ impl SceneDesc {
             cx.error("render.camera", message, None);
         }
         // Never used when there was a fault
-        let placeholder = || crate::camera::CameraDesc {
-            position: [0.0, 0.0, 1.0],
-            look_at: [0.0; 3],
-            up: [0.0, 1.0, 0.0],
-            fov_y_deg: None,
-            focal_length_mm: None,
-            sensor_height_mm: None,
-        };
-        Camera::Pinhole(chosen.unwrap_or_else(|| placeholder().compile(&mut CompileContext::default(), 1, 1)))
+        let placeholder = || CameraDesc::new([0.0, 0.0, 1.0]).compile(&mut CompileContext::default(), 1, 1);
+        Camera::Pinhole(chosen.unwrap_or_else(placeholder))
     }
 
     fn chosen_camera(&self) -> Option<usize> {
@@ -276,10 +269,18 @@ impl SceneDesc {
         }
     }
 
-    /// BLAKE3 of all that decides the picture.
+    /// BLAKE3 of all that decides the picture. What follows from a default is hashed as if it were said.
     fn hash(&self, textures: &Textures) -> String {
+        let mut said = self.clone();
+        said.render.camera = self.chosen_camera().map(|i| self.cameras[i].0.clone());
+        for light in &mut said.lights {
+            if let LightDesc::Rectangle(rectangle) = light {
+                rectangle.samples.get_or_insert(self.render.samples);
+            }
+        }
+        said.render.samples = RenderDesc::default().samples;
         let mut hasher = blake3::Hasher::new();
-        hasher.update(self.to_json().as_bytes());
+        hasher.update(said.to_json().as_bytes());
         for (file, hash) in textures.file_hashes() {
             hasher.update(file.as_bytes()).update(&[0]).update(&hash);
         }

@@ -2,6 +2,7 @@
 
 mod course;
 mod fuzz_corpus;
+mod golden;
 mod invalid;
 mod reference;
 mod roundtrip;

@@ -1,0 +1,142 @@
+//! Every case of `scenes/golden/FAMILY/CASE`: the same bits as when it was last looked at. And the gallery: every scene of
+//! it renders, and both renderers agree.
+//!
+//! A case is a folder with `scene.toml` and `expected.exr`. In the family `config` the scene is the built-in one of the
+//! folder's name. `FIRSTLIGHT_BLESS=1` writes the expectations, and the run still fails; what differs is left beside the
+//! test program as `actual.exr` and `difference.exr`.
+
+use std::ops::ControlFlow;
+use std::path::{Path, PathBuf};
+
+use firstlight::{
+    Assets, CompileOptions, FolderAssets, Format, Image, NoAssets, RenderSettings, SceneDesc, StoredImage,
+    builtin_scenes, render,
+};
+
+fn scenes() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes")
+}
+
+/// The folders in a folder, in the order of their names.
+fn folders(path: &Path) -> Vec<PathBuf> {
+    let mut found: Vec<_> =
+        std::fs::read_dir(path).unwrap().map(|e| e.unwrap().path()).filter(|p| p.is_dir()).collect();
+    found.sort();
+    found
+}
+
+fn name(path: &Path) -> String {
+    path.file_name().unwrap().to_string_lossy().into_owned()
+}
+
+/// The picture of a scene; `size` and `aa` replace its own.
+fn picture(text: &[u8], assets: &dyn Assets, size: Option<[u32; 2]>, aa: Option<u32>, reference: bool) -> Image {
+    let mut parsed = SceneDesc::parse("scene.toml", text, assets);
+    let settings = &mut parsed.desc.render;
+    if let Some([width, height]) = size {
+        (settings.width, settings.height) = (width, height);
+    }
+    settings.antialiasing = aa.unwrap_or(settings.antialiasing);
+    let scene = parsed.compile(assets, &CompileOptions { strict: true }).unwrap_or_else(|e| panic!("{e}")).scene;
+    let settings = RenderSettings { reference, ..RenderSettings::default() };
+    match render(&scene, &settings, &|_, _| ControlFlow::Continue(())) {
+        ControlFlow::Continue((film, _)) => film.develop(),
+        ControlFlow::Break(()) => unreachable!("nothing stops this render"),
+    }
+}
+
+/// The pixels that differ in a bit.
+fn differences(a: &[[f32; 4]], b: &[[f32; 4]]) -> usize {
+    assert_eq!(a.len(), b.len());
+    a.iter().zip(b).filter(|(a, b)| a.map(f32::to_bits) != b.map(f32::to_bits)).count()
+}
+
+fn exr(image: &Image) -> Vec<u8> {
+    image.encode(Format::Exr, &Default::default(), &Default::default()).unwrap()
+}
+
+/// Leaves the three pictures where they can be looked at.
+fn leave(case: &str, expected: &[[f32; 4]], actual: &Image) -> PathBuf {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("golden").join(case);
+    std::fs::create_dir_all(&folder).unwrap();
+    let with = |pixels: Vec<[f32; 4]>| Image { pixels, ..actual.clone() };
+    let difference = expected.iter().zip(&actual.pixels).map(|(e, a)| {
+        let d = |i: usize| (a[i] - e[i]).abs();
+        [d(0), d(1), d(2), 1.0]
+    });
+    std::fs::write(folder.join("expected.exr"), exr(&with(expected.to_vec()))).unwrap();
+    std::fs::write(folder.join("difference.exr"), exr(&with(difference.collect()))).unwrap();
+    std::fs::write(folder.join("actual.exr"), exr(actual)).unwrap();
+    folder
+}
+
+#[test]
+#[cfg(feature = "exr")]
+fn every_golden_scene_has_its_bits() {
+    let mut wrong = Vec::new();
+    let mut count = 0;
+    for family in folders(&scenes().join("golden")) {
+        for case in folders(&family) {
+            count += 1;
+            let title = format!("{}/{}", name(&family), name(&case));
+            let actual = if name(&family) == "config" {
+                let builtin = builtin_scenes().iter().find(|b| b.name == name(&case)).expect("a built-in scene");
+                picture(builtin.text.as_bytes(), &NoAssets, Some([96, 96]), None, false)
+            } else {
+                let text = std::fs::read(case.join("scene.toml")).unwrap();
+                picture(&text, &FolderAssets::new(&case, &[]).unwrap(), None, None, false)
+            };
+            let path = case.join("expected.exr");
+            let expected = std::fs::read(&path).ok().map(|bytes| StoredImage::read(&bytes).unwrap().pixels);
+            let wrong_pixels = match &expected {
+                Some(pixels) if pixels.len() == actual.pixels.len() => differences(pixels, &actual.pixels),
+                _ => actual.pixels.len(),
+            };
+            if wrong_pixels == 0 {
+                continue;
+            }
+            let left = expected.filter(|e| e.len() == actual.pixels.len()).map(|e| leave(&title, &e, &actual));
+            wrong.push(format!(
+                "{title}: {wrong_pixels} pixels differ{}",
+                match left {
+                    Some(folder) => format!("; see {}", folder.display()),
+                    None => " from none of that size".to_owned(),
+                }
+            ));
+            if std::env::var_os("FIRSTLIGHT_BLESS").is_some() {
+                std::fs::write(&path, exr(&actual)).unwrap();
+            }
+        }
+    }
+    assert!(count >= 20, "{count} cases");
+    assert!(wrong.is_empty(), "\n{}\nFIRSTLIGHT_BLESS=1 takes the new pictures", wrong.join("\n"));
+}
+
+#[test]
+fn every_scene_of_the_gallery_renders_and_the_renderers_agree() {
+    let folder = scenes().join("gallery");
+    let assets = FolderAssets::new(&folder, &[]).unwrap();
+    let mut count = 0;
+    for entry in std::fs::read_dir(&folder).unwrap() {
+        let path = entry.unwrap().path();
+        if path.extension().is_some_and(|e| e == "toml") {
+            count += 1;
+            let text = std::fs::read(&path).unwrap();
+            assert!(text.starts_with(b"#:schema "), "{}: an editor finds no schema", path.display());
+            let [fast, plain] = [false, true].map(|r| picture(&text, &assets, Some([48, 36]), Some(2), r));
+            assert_eq!(differences(&fast.pixels, &plain.pixels), 0, "{}", path.display());
+            assert!(fast.pixels.iter().flatten().all(|c| c.is_finite() && *c >= 0.0), "{}", path.display());
+            assert!(fast.pixels.iter().any(|p| p[0] > 0.05), "{}: all dark", path.display());
+        }
+    }
+    assert!(count >= 8, "{count} scenes");
+}
+
+#[test]
+fn the_built_in_scenes_are_the_same_in_both_renderers() {
+    for builtin in builtin_scenes() {
+        let [fast, plain] =
+            [false, true].map(|r| picture(builtin.text.as_bytes(), &NoAssets, Some([40, 40]), Some(2), r));
+        assert_eq!(differences(&fast.pixels, &plain.pixels), 0, "{}", builtin.name);
+    }
+}
