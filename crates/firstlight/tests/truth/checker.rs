@@ -225,7 +225,7 @@ fn compare_means(scene: &SceneDesc, counts: [u32; 2], uv_at: impl Fn(V, V) -> Op
         let first = (0..1024u32).map(|s| {
             let at = |s: u32| (s as f64 + 0.5) / 32.0;
             let [u, v] = uv_at(eye.position, eye.direction(i as f64 + at(s % 32), j as f64 + at(s / 32)))?;
-            Some((square_of(u, counts[0]) + square_of(v, counts[1])) % 2 == 0)
+            Some((square_of(u, counts[0]) + square_of(v, counts[1])).is_multiple_of(2))
         });
         let Some(first) = first.collect::<Option<Vec<_>>>() else { continue };
         let share = first.iter().filter(|first| **first).count() as f64 / 1024.0;
