@@ -29,10 +29,21 @@ fn build_book() -> Outcome {
     }
 }
 
+/// The numbers of the page that walks through config 11, from a script that shares no code with the renderer.
+fn check_walk() -> Outcome {
+    let mut python = std::process::Command::new("python3");
+    if python.arg("--version").output().is_err() {
+        eprintln!("\nno python3: docs/walk.py --check is left out");
+        return Ok(());
+    }
+    run_to_end(std::process::Command::new("python3").current_dir(root()).args(["docs/walk.py", "--check"]))
+}
+
 pub fn run() -> Outcome {
     run_command(&["fmt", "--all", "--check"])?;
     generate::run(true)?;
     build_book()?;
+    check_walk()?;
     run_command(&["clippy", "--workspace", "--all-targets", "--quiet", "--", "-D", "warnings"])?;
     run_to_end(cargo().env("RUSTDOCFLAGS", "-D warnings").args(["doc", "--workspace", "--no-deps", "--quiet"]))?;
     // The library alone, without what can be left out

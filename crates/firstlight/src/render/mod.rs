@@ -22,6 +22,7 @@ use rayon::prelude::*;
 pub use film::Film;
 pub use simd::SimdLevel;
 
+use crate::color::{Display, Encoding};
 use crate::image::{Receipt, Window};
 use crate::scene::Scene;
 use film::FilmTile;
@@ -191,15 +192,31 @@ impl Scene {
             ("height", self.height.to_string()),
             ("antialiasing", self.antialiasing.to_string()),
             ("camera", self.summary.camera.clone()),
+            ("world_from_camera", numbers(self.camera.world_from_camera())),
+            ("film_half_size", numbers(self.camera.film_half_size())),
             ("light_samples", {
                 let counts: Vec<String> = self.lights.iter().map(|light| light.samples().to_string()).collect();
                 counts.join(" ")
             }),
             ("color_space", "linear Rec. 709, alpha premultiplied, before display encoding".to_owned()),
+            ("display", {
+                let Display { encoding, exposure } = self.display;
+                let encoding = match encoding {
+                    Encoding::Srgb => "srgb".to_owned(),
+                    Encoding::Gamma(gamma) => format!("gamma {gamma}"),
+                    Encoding::Linear => "linear".to_owned(),
+                };
+                format!("{encoding}, exposure {exposure}; 8- and 16-bit files only")
+            }),
         ];
         if let Some(w) = settings.crop {
             entries.push(("crop", format!("{},{},{},{}", w.x, w.y, w.width, w.height)));
         }
         Receipt { entries: entries.into_iter().map(|(key, value)| (key.to_owned(), value)).collect() }
     }
+}
+
+/// Numbers as text that reads back to the same bits.
+fn numbers(values: impl IntoIterator<Item = f32>) -> String {
+    values.into_iter().map(|v| v.to_string()).collect::<Vec<_>>().join(" ")
 }
