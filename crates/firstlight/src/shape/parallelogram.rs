@@ -99,7 +99,7 @@ impl Parallelogram {
 
     /// The way from the corner to `x`.
     #[inline(always)]
-    fn from_corner(&self, x: Vec3) -> Vec3 {
+    fn local(&self, x: Vec3) -> Vec3 {
         (x - self.p) - self.p_rest
     }
 
@@ -113,7 +113,7 @@ impl Parallelogram {
     /// The t > 0 at which the ray meets the parallelogram, if it does.
     #[inline(always)]
     pub(crate) fn intersect(&self, ray: &Ray) -> Option<f32> {
-        let from = self.from_corner(ray.o);
+        let from = self.local(ray.o);
         let cos = self.n.dot(ray.d);
         if self.single_sided && cos >= 0.0 {
             return None;
@@ -134,7 +134,7 @@ impl Parallelogram {
     #[inline(always)]
     pub(crate) fn point(&self, ray: &Ray, t: f32, differential: &RayDifferential) -> ShapePoint {
         // Onto the plane: what is left of the distance to it does not grow with the camera's
-        let hit = self.from_corner(ray.o) + ray.d * t;
+        let hit = self.local(ray.o) + ray.d * t;
         let hit = hit - self.n * self.n.dot(hit);
         let p = self.p + (self.p_rest + hit);
         let uv = Vec2::new(hit.dot(self.u_axis), hit.dot(self.v_axis)).clamp(Vec2::ZERO, Vec2::ONE);
@@ -167,7 +167,7 @@ impl Parallelogram {
     /// What this parallelogram needs to know of a point that asks for light.
     #[inline(always)]
     pub(crate) fn shadow(&self, p: Vec3, error: ErrorBound) -> ParallelogramShadow {
-        let from = self.from_corner(p);
+        let from = self.local(p);
         let s = self.n.dot(from);
         let sign = if s < 0.0 { -1.0 } else { 1.0 };
         let abs_n = self.n.abs();

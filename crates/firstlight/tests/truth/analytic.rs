@@ -320,7 +320,7 @@ fn lights_add() {
         let lights = every_light();
         for i in 0..lights.len() {
             for j in 0..i {
-                let [a, b] = [&lights[i], &lights[j]].map(|l| shoot(&scene.clone().lit_by(&[l.clone()])));
+                let [a, b] = [&lights[i], &lights[j]].map(|l| shoot(&scene.clone().lit_by(std::slice::from_ref(l))));
                 let both = shoot(&scene.clone().lit_by(&[lights[i].clone(), lights[j].clone()]));
                 for ((a, b), both) in a.pixels.iter().zip(&b.pixels).zip(&both.pixels) {
                     let sum = a[0] + b[0];

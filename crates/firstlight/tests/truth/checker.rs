@@ -213,6 +213,55 @@ fn parallelograms_have_no_line_but_at_the_squares_edges() {
     }
 }
 
+/// Compares every pixel whose rays all meet the shape with the mean over 32 x 32 of them.
+#[track_caller]
+fn compare_means(scene: &SceneDesc, counts: [u32; 2], uv_at: impl Fn(V, V) -> Option<[f64; 2]>, what: &str) {
+    let (width, height) = (scene.render.width, scene.render.height);
+    let eye = Eye::new(&scene.cameras[0].1, width, height);
+    let film = shoot(scene);
+    let (mut compared, mut mixed) = (0, 0);
+    for (k, p) in film.pixels.iter().enumerate() {
+        let (i, j) = (k as u32 % width, k as u32 / width);
+        let first = (0..1024u32).map(|s| {
+            let at = |s: u32| (s as f64 + 0.5) / 32.0;
+            let [u, v] = uv_at(eye.position, eye.direction(i as f64 + at(s % 32), j as f64 + at(s / 32)))?;
+            Some((square_of(u, counts[0]) + square_of(v, counts[1])).is_multiple_of(2))
+        });
+        let Some(first) = first.collect::<Option<Vec<_>>>() else { continue };
+        let share = first.iter().filter(|first| **first).count() as f64 / 1024.0;
+        compared += 1;
+        mixed += usize::from(share > 0.05 && share < 0.95);
+        let should = COLORS[0][0] * share + COLORS[1][0] * (1.0 - share);
+        // An edge along a column of places is known to 1/32 of the pixel; the footprint is straight, the sphere is not
+        let allowed = 0.05 * (COLORS[0][0] - COLORS[1][0]).abs();
+        assert!((p[0] as f64 - should).abs() < allowed, "{} at {i}, {j} is not {should}: {what}", p[0]);
+    }
+    assert!(compared > 300 && mixed > 10, "{mixed} mixed pixels of {compared}: {what}");
+}
+
+#[test]
+fn the_squares_edges_are_the_mean_over_the_pixel() {
+    for n in [2, 4, 5] {
+        // The seam at u = 0 and 1 lies at -x; there it is an edge for even counts only
+        for (uv, eye, look_at) in [
+            (SphereUv::Equirectangular, [-1.5, 0.35, 0.1], [-1.0, 0.3, 0.05]),
+            (SphereUv::Equirectangular, [0.9, 0.6, 1.2], [0.6, 0.3, 0.7]),
+            (SphereUv::Angles, [0.3, 0.4, 1.5], [0.25, 0.25, 0.9]),
+        ] {
+            let scene = board(24, 24, [n, n + 1], COLORS)
+                .with_camera(camera(eye, look_at, 50.0))
+                .with_sphere(SphereDesc { uv, material: Some("board".into()), ..sphere([0.0; 3], 1.0) });
+            let uv_at = |o, d| sphere_normal(o, d, [0.0; 3], 1.0).map(|n| sphere_uv(uv, n));
+            compare_means(&scene, [n, n + 1], uv_at, &format!("{uv:?} from {eye:?}, {n}"));
+        }
+        let (p, e0, e1) = ([-1.0, -0.3, -1.2], [2.0, 0.3, 0.1], [0.8, -0.2, 2.1]);
+        let scene = board(24, 24, [n, n + 1], COLORS)
+            .with_camera(camera([1.2, 1.0, 1.5], [0.4, -0.3, 0.0], 25.0))
+            .with_parallelogram(ParallelogramDesc { material: Some("board".into()), ..parallelogram(p, e0, e1) });
+        compare_means(&scene, [n, n + 1], |o, d| plane_uv(o, d, p, e0, e1), &format!("parallelogram, {n}"));
+    }
+}
+
 #[test]
 fn a_board_to_the_horizon_is_gray() {
     // A square kilometre and more of squares of 1 m, seen from 1.6 m above

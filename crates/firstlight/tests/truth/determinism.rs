@@ -122,16 +122,25 @@ fn reduced(mut desc: SceneDesc) -> SceneDesc {
     }
 }
 
-#[test]
-fn plain_and_fast_agree_on_random_scenes() {
-    let count = times(200);
+/// Checks scenes 0 to `count`; most of them have to show something.
+fn compare(count: u64, scene: impl Fn(u64) -> SceneDesc) {
     let mut lit = 0;
     for seed in 0..count {
-        let desc = random::scene(seed);
+        let desc = scene(seed);
         if let Some(fault) = fault(&desc) {
             panic!("seed {seed}: {fault}\n{:#?}", reduced(desc));
         }
-        lit += usize::from(shoot(&desc).pixels.iter().any(|p| p[0] + p[1] + p[2] > 0.0));
+        lit += u64::from(shoot(&desc).pixels.iter().any(|p| p[0] + p[1] + p[2] > 0.0));
     }
-    assert!(lit as u64 * 10 > count * 6, "only {lit} of {count} scenes show anything");
+    assert!(lit * 10 > count * 6, "only {lit} of {count} scenes show anything");
+}
+
+#[test]
+fn plain_and_fast_agree_on_random_scenes() {
+    compare(times(200), random::scene);
+}
+
+#[test]
+fn plain_and_fast_agree_under_grazing_light() {
+    compare(times(200), random::grazing);
 }

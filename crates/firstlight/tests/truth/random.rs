@@ -13,7 +13,7 @@ pub fn scene(seed: u64) -> SceneDesc {
     let mut random = Random::new(seed);
     let random = &mut random;
     let unit_length = match random.below(4) {
-        0 => random.scale(1e-6, 1e6),
+        0 => random.scale(1e-5, 1e5),
         _ => 1.0,
     };
     let origin = if random.chance(0.15) { mul(random.direction(), 1000.0 * unit_length) } else { [0.0; 3] };
@@ -51,6 +51,33 @@ pub fn scene(seed: u64) -> SceneDesc {
     }
     let camera = place.camera(random, &scene);
     scene.with_camera(camera)
+}
+
+/// Balls almost sunk in a floor, and ones that just touch it from below, under lights that graze it: what of a ball is
+/// above the horizon decides.
+pub fn grazing(seed: u64) -> SceneDesc {
+    let mut random = Random::new(seed ^ 0x5eed);
+    let random = &mut random;
+    let n = random.direction();
+    let [a, b] = across(n);
+    let middle = if random.chance(0.3) { random.vector(100.0) } else { [0.0; 3] };
+    let on_floor = |random: &mut Random, reach: f64| {
+        add(middle, add(mul(a, random.between(-reach, reach)), mul(b, random.between(-reach, reach))))
+    };
+    let mut scene = empty(12, 12, 1).with_parallelogram(square(middle, n, 20.0));
+    for _ in 0..3 {
+        let r = random.scale(0.3, 30.0);
+        let depth = r * (1.0 - random.pick(&[1.0, 1.0, -1.0]) * random.scale(1e-6, 0.05));
+        scene = scene.with_sphere(sphere(sub(on_floor(random, 2.0), mul(n, depth)), r));
+    }
+    for _ in 0..3 {
+        let at = add(on_floor(random, 4.0), mul(n, random.scale(1e-4, 0.5)));
+        let sides = [mul(a, random.scale(0.1, 2.0)), mul(b, random.scale(0.1, 2.0))];
+        let light = rectangle(at, sides[0], sides[1], SampleSet::Sobol, 1 + random.below(60));
+        scene = scene.with_light(LightDesc::Rectangle(RectangleDesc { falloff: Falloff::Constant, ..light }));
+    }
+    let eye = add(on_floor(random, 2.0), mul(n, random.between(0.5, 4.0)));
+    scene.with_camera(camera(eye, on_floor(random, 1.0), 70.0))
 }
 
 fn color(random: &mut Random) -> ColorDesc {
@@ -173,7 +200,9 @@ impl Place {
             },
             _ => {}
         }
-        if length(cross(unit(desc.e0), unit(desc.e1))) < 1e-4 {
+        // What is too thin or too short for a description
+        let shortest = length(desc.e0).min(length(desc.e1));
+        if shortest < 1e-8 || length(cross(unit(desc.e0), unit(desc.e1))) < 1e-4 {
             (desc.e0, desc.e1) = ([self.unit, 0.0, 0.0], [0.0, 0.0, self.unit]);
         }
         desc

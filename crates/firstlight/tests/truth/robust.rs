@@ -86,6 +86,9 @@ fn a_parallelogram_does_not_shadow_itself() {
         let eye = add(middle, mul(random.direction(), size * random.scale(0.02, 5.0)));
         let inside = add(p, add(mul(e0, random.unit()), mul(e1, random.unit())));
         let reach = size * random.scale(0.1, 6.0);
+        if length(sub(eye, inside)) < 2e-9 {
+            continue;
+        }
         let scene = empty(6, 6, 1)
             .with_camera(camera(eye, inside, random.scale(0.5, 90.0)))
             .with_parallelogram(parallelogram(p, e0, e1))
@@ -117,10 +120,12 @@ fn inside_a_sphere_light_stays_inside() {
         for p in central.pixels {
             assert!((p[0] as f64 * PI - 1.0).abs() < 3e-6, "{p:?} in sphere {i}");
         }
-        // Light from outside does not come in
+        // Light from outside does not come in. Where it grazes the wall to within rounding, the wall cannot tell that from
+        // its own starting point: a cosine of 3e-6 at most, of light that is up to 6 here
         let reach = r * random.scale(1.3, 10.0);
-        let dark = shoot(&scene.lit_by(&lights_around(&mut random, c, reach)));
-        assert!(dark.pixels.iter().all(|p| p[0] == 0.0), "light comes in through the wall of sphere {i}");
+        let scene = scene.lit_by(&lights_around(&mut random, c, reach));
+        let brightest = shoot(&scene).pixels.iter().map(|p| p[0]).fold(0.0, f32::max);
+        assert!(brightest < 2e-5, "light comes in through the wall of sphere {i}: {brightest}\n{scene:#?}");
     }
 }
 
