@@ -20,7 +20,7 @@ fn assert_close(is: f32, should: f64, relative: f64) {
 }
 
 /// A white matte square around `p`, facing `n`.
-fn white(p: V, n: V, half: f64) -> SceneDesc {
+pub(crate) fn white(p: V, n: V, half: f64) -> SceneDesc {
     empty(1, 1, 1)
         .with_material("white", matte(1.0))
         .with_parallelogram(firstlight::ParallelogramDesc { material: Some("white".into()), ..square(p, n, half) })
@@ -28,7 +28,7 @@ fn white(p: V, n: V, half: f64) -> SceneDesc {
 
 /// What arrives at `p` on a surface facing `n`, in lux: the film is E / pi for white.
 #[track_caller]
-fn irradiance(p: V, n: V, lights: &[LightDesc]) -> f64 {
+pub(crate) fn irradiance(p: V, n: V, lights: &[LightDesc]) -> f64 {
     let scene = white(p, n, 1e-2).lit_by(lights);
     // Close by and off the normal: nothing but the light decides the answer
     let from = add(p, add(mul(unit(n), 5e-3), mul(across(n)[0], 2e-3)));
@@ -148,7 +148,7 @@ fn a_spot_without_an_inner_cone_has_a_hard_rim() {
 
 /// The irradiance from a polygon of radiance 1 at `p` on a surface facing `n`, counterclockwise or not; clipped at the
 /// horizon. Source: Lambert, "Photometria", 1760.
-fn lambert(polygon: &[V], p: V, n: V) -> f64 {
+pub(crate) fn lambert(polygon: &[V], p: V, n: V) -> f64 {
     let v: Vec<V> = polygon.iter().map(|q| sub(*q, p)).collect();
     let mut above = Vec::new();
     for i in 0..v.len() {
@@ -172,7 +172,7 @@ fn lambert(polygon: &[V], p: V, n: V) -> f64 {
     sum.abs() / 2.0
 }
 
-fn corners(center: V, e0: V, e1: V) -> [V; 4] {
+pub(crate) fn corners(center: V, e0: V, e1: V) -> [V; 4] {
     let c = sub(center, mul(add(e0, e1), 0.5));
     [c, add(c, e0), add(add(c, e0), e1), add(c, e1)]
 }
@@ -262,6 +262,20 @@ fn a_constant_rectangle_is_the_mean_over_its_area() {
     }
 }
 
+/// Where, between `dark` and `bright`, the light begins.
+pub(crate) fn first(mut dark: f64, mut bright: f64, lit: impl Fn(f64) -> bool) -> f64 {
+    assert!(lit(bright) && !lit(dark));
+    for _ in 0..22 {
+        let middle = (dark + bright) / 2.0;
+        if lit(middle) {
+            bright = middle;
+        } else {
+            dark = middle;
+        }
+    }
+    bright
+}
+
 #[test]
 fn the_hard_shadow_of_a_sphere_has_its_radius() {
     let scene = white([0.0; 3], [0.0, 1.0, 0.0], 5.0)
@@ -277,17 +291,8 @@ fn the_hard_shadow_of_a_sphere_has_its_radius() {
             let p = mul(along, r);
             probe(&scene, add(p, [0.0, 0.5, 0.0]), p)[0] > 0.0
         };
-        assert!(lit(1.7) && !lit(1.4));
-        let (mut dark, mut bright) = (1.4, 1.7);
-        for _ in 0..22 {
-            let middle = (dark + bright) / 2.0;
-            if lit(middle) {
-                bright = middle;
-            } else {
-                dark = middle;
-            }
-        }
-        assert!((bright - truth).abs() < 1e-5, "{bright} along {deg} degrees");
+        let radius = first(1.4, 1.7, lit);
+        assert!((radius - truth).abs() < 1e-5, "{radius} along {deg} degrees");
     }
 }
 

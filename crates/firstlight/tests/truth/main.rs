@@ -4,6 +4,7 @@
 mod analytic;
 mod checker;
 mod determinism;
+mod deviations;
 mod known;
 mod random;
 mod robust;
