@@ -28,9 +28,9 @@ fn rows() -> Vec<Row> {
     let mut rows = Vec::new();
     let floor = |light| irradiance([0.0; 3], UP, &[light]);
     // Points and directions
-    let aslant = |d: f64| LightDesc::Point(point([0.6 * d, 0.8 * d, 0.0], 5.0));
-    rows.push(row("point light, 5 cd, 2 m away, 53° above: I cos / d²", 5.0 * 0.8 / 4.0, floor(aslant(2.0)), 2e-6));
-    rows.push(row("the same, 20 m away: a hundredth", 0.01, floor(aslant(20.0)), 2e-6));
+    let aslant = |d: f64| LightDesc::Point(point([0.6 * d, 0.8 * d, 0.0], 10.0));
+    rows.push(row("point light, 10 cd, 2 m away, 53° above: I cos / d²", 10.0 * 0.8 / 4.0, floor(aslant(2.0)), 2e-6));
+    rows.push(row("the same, 20 m away: a hundredth", 0.02, floor(aslant(20.0)), 2e-6));
     let sun = LightDesc::Directional(directional([-0.6, -0.8, 0.0], 3.0));
     rows.push(row("directional light, 3 lx, 53° above: E cos", 2.4, floor(sun), 2e-6));
     let angle = 12.0;
