@@ -144,7 +144,17 @@ fn leaves(path: &str) -> bool {
 pub(crate) struct CompileContext {
     path: String,
     faults: Vec<Diagnostic>,
+    /// Errors, whether told or not.
+    errors: usize,
+    /// Faults that are not told.
+    omitted: usize,
 }
+
+/// Faults that are told; of more, the number.
+const MAX_FAULTS: usize = 256;
+
+/// Names that are searched for the one that was meant.
+const MAX_NAMES_COMPARED: usize = 1000;
 
 impl CompileContext {
     /// Runs `f` with `part` added to the path of every fault: `light.spot[2]`.
@@ -169,7 +179,32 @@ impl CompileContext {
         self.push(Severity::Warning, field, message.into(), hint);
     }
 
+    /// Records that nothing is called `wanted`: `no camera is called "tpo"; did you mean "top"?`
+    pub(crate) fn unknown(&mut self, field: &str, what: &str, wanted: &str, names: &[&str]) {
+        // Looking for the nearest of many names takes its time, and many faults of this kind come together
+        let nearest = if names.len() <= MAX_NAMES_COMPARED && self.faults.len() < MAX_FAULTS {
+            crate::describe::nearest(wanted, names)
+        } else {
+            None
+        };
+        let message = match nearest {
+            Some(name) => format!("no {what} is called {wanted:?}; did you mean {name:?}?"),
+            None if names.is_empty() => format!("no {what} is called {wanted:?}; the scene has none"),
+            None => {
+                let list: Vec<String> = names.iter().take(8).map(|name| format!("{name:?}")).collect();
+                let more = if names.len() > 8 { ", ..." } else { "" };
+                format!("no {what} is called {wanted:?}; there are {}{more}", list.join(", "))
+            }
+        };
+        self.error(field, message, None);
+    }
+
     fn push(&mut self, severity: Severity, field: &str, message: String, hint: Option<&str>) {
+        self.errors += usize::from(severity == Severity::Error);
+        if self.faults.len() >= MAX_FAULTS {
+            self.omitted += 1;
+            return;
+        }
         let mut path = self.path.clone();
         if !path.is_empty() && !field.is_empty() {
             path.push('.');
@@ -188,6 +223,11 @@ impl CompileContext {
 
     /// All faults so far, in the order found.
     pub(crate) fn take_faults(&mut self) -> Vec<Diagnostic> {
+        if self.omitted > 0 {
+            let severity = if self.has_errors() { Severity::Error } else { Severity::Warning };
+            let message = format!("{} more faults are not listed", self.omitted);
+            self.faults.push(Diagnostic { severity, place: None, path: String::new(), message, hint: None });
+        }
         std::mem::take(&mut self.faults)
     }
 }
@@ -206,7 +246,7 @@ impl CompileContext {
     /// A point of the world: finite, and near enough for its square to be finite as well.
     pub(crate) fn point(&mut self, field: &str, v: [f64; 3]) -> Vec3 {
         if self.finite(field, &v) && v.iter().any(|x| x.abs() > MAX_COORDINATE) {
-            let message = format!("{} is outside -1e9 to 1e9", show(&v));
+            let message = format!("{} is outside -2.5e8 to 2.5e8", show(&v));
             self.error(field, message, Some("use a larger unit of length"));
         }
         vec3(v)
@@ -214,20 +254,20 @@ impl CompileContext {
 
     /// A vector that has a length.
     pub(crate) fn edge(&mut self, field: &str, v: [f64; 3]) -> bool {
-        let before = self.faults.len();
+        let before = self.fault_count();
         self.point(field, v);
-        if self.faults.len() == before && !(DVec3::from(v).length() >= MIN_LENGTH) {
+        if self.fault_count() == before && !(DVec3::from(v).length() >= MIN_LENGTH) {
             self.error(field, format!("{} has no length", show(&v)), Some("give a vector longer than 1e-9"));
         }
-        self.faults.len() == before
+        self.fault_count() == before
     }
 
     /// A length: from the shortest to the longest that can be computed with.
-    pub(crate) fn positive(&mut self, field: &str, v: f64, hint: &str) -> f32 {
+    pub(crate) fn positive(&mut self, field: &str, v: f64, hint: &str) -> f64 {
         if !(MIN_LENGTH..=MAX_COORDINATE).contains(&v) {
-            self.error(field, format!("{v} is outside [1e-9, 1e9]"), Some(hint));
+            self.error(field, format!("{v} is outside [1e-9, 2.5e8]"), Some(hint));
         }
-        v as f32
+        v
     }
 
     /// A number from `low` to `high`, both allowed.
@@ -248,9 +288,14 @@ impl CompileContext {
 
     /// A colour: finite, no channel below 0.
     pub(crate) fn color(&mut self, field: &str, c: ColorDesc) -> Rgb {
-        if self.finite(field, &c.linear) && c.linear.iter().any(|x| *x < 0.0) {
-            let message = format!("{} has a channel below 0", show(&c.linear));
-            self.error(field, message, Some("light and reflectance are 0 or more"));
+        if self.finite(field, &c.linear) {
+            if c.linear.iter().any(|x| *x < 0.0) {
+                let message = format!("{} has a channel below 0", show(&c.linear));
+                self.error(field, message, Some("light and reflectance are 0 or more"));
+            } else if c.linear.iter().any(|x| *x > MAX_COLOR) {
+                let message = format!("{} has a channel above 1e6", show(&c.linear));
+                self.error(field, message, Some("a light has its strength for what a colour cannot say"));
+            }
         }
         let [r, g, b] = c.linear.map(|x| x as f32);
         Rgb::new(r, g, b)
@@ -266,19 +311,20 @@ impl CompileContext {
 
     /// How many faults there are so far.
     pub(crate) fn fault_count(&self) -> usize {
-        self.faults.len()
+        self.faults.len() + self.omitted
     }
 
     /// Whether there are errors so far.
     pub(crate) fn has_errors(&self) -> bool {
-        self.faults.iter().any(|f| f.severity == Severity::Error)
+        self.errors > 0
     }
 }
 
-/// Squares, and products of two squares, of world coordinates stay finite.
-const MAX_COORDINATE: f64 = 1e9;
+/// Squares of products of two differences of world coordinates stay finite, also at the far ends of shapes.
+const MAX_COORDINATE: f64 = 2.5e8;
 const MIN_LENGTH: f64 = 1e-9;
 const MAX_STRENGTH: f64 = 1e15;
+const MAX_COLOR: f64 = 1e6;
 
 /// A value as the user would write it.
 pub(crate) fn show(v: &[f64]) -> String {

@@ -153,25 +153,25 @@ impl Light {
         };
         Some(LightSample { inverse_distance, weight })
     }
-
-    /// Points whose hull holds the whole light; none where it is infinitely far away.
-    pub(crate) fn hull(&self) -> &[Vec3] {
-        match &self.kind {
-            LightKind::Point(point) => std::slice::from_ref(&point.position),
-            LightKind::Spot(spot) => std::slice::from_ref(&spot.position),
-            LightKind::Rectangle(rectangle) => &rectangle.shape.corners,
-            LightKind::Directional(_) => &[],
-        }
-    }
 }
 
 /// `color` x `strength`, checked; `factor` is what the kind of light makes of it.
 fn scaled(cx: &mut CompileContext, color: ColorDesc, strength: f64, factor: f64) -> Rgb {
+    let fine = cx.fault_count();
     cx.color("color", color);
-    let strength = cx.strength(strength);
-    let [r, g, b] = color.linear.map(|c| (c * strength * factor) as f32);
+    cx.strength(strength);
+    let scaled = color.linear.map(|c| c * strength * factor);
+    // What a material makes of it has to be a number still
+    if cx.fault_count() == fine && !scaled.iter().all(|c| *c <= MAX_LIGHT) {
+        let message = format!("{strength} is too much for a light of this colour and size: together they pass 1e30");
+        cx.error("strength", message, Some("use a weaker light and raise the exposure"));
+    }
+    let [r, g, b] = scaled.map(|c| c as f32);
     Rgb::new(r, g, b)
 }
+
+/// The most light that one channel of one light sends, in the unit it is computed with.
+const MAX_LIGHT: f64 = 1e30;
 
 impl Falloff {
     /// Irradiance over pi where it is physical, the plain number where not.

@@ -58,6 +58,8 @@ table! {
 pub struct Rectangle {
     /// What the camera sees, and what stands in the way of other lights if it blocks.
     pub shape: Parallelogram,
+    /// Unit normal of the front.
+    pub n: Vec3,
     /// The sampled points.
     points: PointBlocks,
     /// Whether the side behind emits as well.
@@ -95,25 +97,28 @@ impl RectangleDesc {
             let message = format!("{count} points cannot be laid out as \"{}\"", self.set.name());
             cx.error(field, message, Some(&hint));
         }
-        let corner = DVec3::from(self.center) - (e0 + e1) * 0.5;
-        let points = match cx.has_errors() {
-            true => Vec::new(),
-            false => self.set.points(count, self.seed),
+        let both_sides = match (self.sides, self.falloff) {
+            (Some(sides), _) => sides == EmitSides::Both,
+            (None, falloff) => falloff == Falloff::Constant,
         };
-        let points = points.iter().map(|[a, b]| (corner + e0 * *a + e1 * *b).as_vec3());
+        let corner = DVec3::from(self.center) - (e0 + e1) * 0.5;
+        let shape = Parallelogram::new(corner, e0, e1, 1.0, !both_sides);
+        // A description with faults makes no scene: spare the work
+        let made = if cx.has_errors() { 0 } else { count };
+        let points = (0..made).map(|k| {
+            let [a, b] = self.set.point(k, count, self.seed);
+            (corner + e0 * a + e1 * b).as_vec3()
+        });
         // Physical: each point stands for its share of the area
         let area = match self.falloff {
             Falloff::Physical => e0.cross(e1).length(),
             Falloff::Constant => 1.0,
         };
-        let both_sides = match (self.sides, self.falloff) {
-            (Some(sides), _) => sides == EmitSides::Both,
-            (None, falloff) => falloff == Falloff::Constant,
-        };
         Light {
             kind: LightKind::Rectangle(Rectangle {
-                shape: Parallelogram::new(corner, e0, e1, 1.0, !both_sides),
                 points: PointBlocks::new(points),
+                n: shape.n.as_vec3(),
+                shape,
                 both_sides,
                 physical: self.falloff == Falloff::Physical,
                 visible: self.visible,
@@ -151,7 +156,7 @@ impl Rectangle {
     /// `l` points to the light.
     #[inline(always)]
     pub(crate) fn weight(&self, l: Vec3, inverse_distance: f32) -> f32 {
-        let side = -self.shape.n.dot(l);
+        let side = -self.n.dot(l);
         let side = if self.both_sides { side.abs() } else { side };
         if !self.physical {
             return if self.both_sides || side > 0.0 { 1.0 } else { 0.0 };
@@ -168,7 +173,7 @@ impl Rectangle {
         if !self.physical && self.both_sides {
             return one;
         }
-        let side = -Vec3x16::splat(simd, self.shape.n).dot(l);
+        let side = -Vec3x16::splat(simd, self.n).dot(l);
         let side = if self.both_sides { side.abs() } else { side };
         if !self.physical {
             return side.simd_gt(zero).select(one, zero);

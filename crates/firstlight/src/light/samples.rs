@@ -29,19 +29,16 @@ impl SampleSet {
         }
     }
 
-    /// `count` points of the unit square.
-    pub(crate) fn points(self, count: u32, seed: u32) -> Vec<[f64; 2]> {
+    /// Point `k` of a set of `count` points of the unit square.
+    pub(crate) fn point(self, k: u32, count: u32, seed: u32) -> [f64; 2] {
         let side = count.isqrt().max(1);
-        let cell =
-            |k: u32, [x, y]: [f64; 2]| [((k % side) as f64 + x) / side as f64, ((k / side) as f64 + y) / side as f64];
-        (0..count)
-            .map(|k| match self {
-                SampleSet::Sobol => sobol(k),
-                SampleSet::Grid => cell(k, [0.5, 0.5]),
-                SampleSet::Stratified => cell(k, random(k, seed)),
-                SampleSet::Uniform => random(k, seed),
-            })
-            .collect()
+        let in_cell = |[x, y]: [f64; 2]| [((k % side) as f64 + x) / side as f64, ((k / side) as f64 + y) / side as f64];
+        match self {
+            SampleSet::Sobol => sobol(k),
+            SampleSet::Grid => in_cell([0.5, 0.5]),
+            SampleSet::Stratified => in_cell(random(k, seed)),
+            SampleSet::Uniform => random(k, seed),
+        }
     }
 }
 
@@ -106,6 +103,12 @@ fn unit(fraction: u32) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    impl SampleSet {
+        fn points(self, count: u32, seed: u32) -> Vec<[f64; 2]> {
+            (0..count).map(|k| self.point(k, count, seed)).collect()
+        }
+    }
 
     #[test]
     fn sobol_is_stratified_in_every_way() {

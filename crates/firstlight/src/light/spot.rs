@@ -1,6 +1,6 @@
 //! Spot lights.
 
-use pxfm::f_cos;
+use pxfm::f_sin;
 
 use super::{Falloff, Light, LightKind, scaled};
 use crate::color::Rgb;
@@ -52,8 +52,8 @@ pub struct Spot {
     pub position: Vec3,
     /// Unit, the middle of the cone, away from the light.
     pub axis: Vec3,
-    /// The cosine of half the cone's full angle.
-    pub cos_outer: f32,
+    /// 1 - cos of half the cone's full angle. Cosines near 1 have no digits left for a narrow cone, this has.
+    pub outer: f32,
     /// 1 / (cos inner - cos outer); infinite for a hard rim.
     pub inverse_fade: f32,
     /// Whether light weakens with the square of the distance.
@@ -82,14 +82,18 @@ impl SpotDesc {
             let message = format!("{inner} is outside [0, {}], the cone itself", self.cone_deg);
             cx.error("inner_cone_deg", message, Some("full strength ends inside the cone; both are full angles"));
         }
-        let half_cos = |deg: f64| f_cos(deg * 0.5 * std::f64::consts::PI / 180.0);
-        let (cos_outer, cos_inner) = (half_cos(self.cone_deg) as f32, half_cos(inner) as f32);
+        // 1 - cos(a / 2) = 2 sin^2(a / 4)
+        let one_minus_cos = |deg: f64| {
+            let sin = f_sin(deg * 0.25 * std::f64::consts::PI / 180.0);
+            2.0 * sin * sin
+        };
+        let (outer, inner) = (one_minus_cos(self.cone_deg), one_minus_cos(inner));
         Light {
             kind: LightKind::Spot(Spot {
                 position,
                 axis: axis.normalize_or_zero().as_vec3(),
-                cos_outer,
-                inverse_fade: 1.0 / (cos_inner - cos_outer),
+                outer: outer as f32,
+                inverse_fade: (1.0 / (outer - inner)) as f32,
                 physical: self.falloff == Falloff::Physical,
             }),
             scale: scaled(cx, self.color, self.strength, self.falloff.factor()),
@@ -103,7 +107,10 @@ impl Spot {
     /// The cone's fade, times 1 / d^2 where it is physical. `l` points to the light.
     #[inline(always)]
     pub(crate) fn weight(&self, l: Vec3, inverse_distance: f32) -> f32 {
-        let inside = -self.axis.dot(l) * inverse_distance - self.cos_outer;
+        // cos t - cos outer, t being the angle from the axis: 1 - cos t is half the square of the way between two unit
+        // vectors
+        let between = self.axis + l * inverse_distance;
+        let inside = self.outer - 0.5 * between.dot(between);
         // A hard rim has an infinite slope: the product is infinite inside and no number on the rim itself
         let fade = inside * self.inverse_fade;
         let fade = if !(inside > 0.0) {

@@ -45,14 +45,17 @@ impl PhongLobe {
     #[inline(always)]
     pub fn eval(&self, cos_i: f32, cos_o: f32, cos_io: f32) -> f32 {
         let base = (2.0 * cos_i) * cos_o - cos_io;
+        // Rounding must not lift a highlight above its own maximum
+        let base = if base < 1.0 { base } else { 1.0 };
         self.exponent.pow(if base > 0.0 { base } else { 0.0 })
     }
 
     /// [`eval`](Self::eval) in sixteen lanes: the same bits.
     #[inline(always)]
     pub(crate) fn eval_lanes<S: Simd>(&self, cos_i: f32x16<S>, cos_o: f32, cos_io: f32x16<S>) -> f32x16<S> {
-        let zero = cos_i.token().splat_f32x16(0.0);
+        let (zero, one) = (cos_i.token().splat_f32x16(0.0), cos_i.token().splat_f32x16(1.0));
         let base = (cos_i * 2.0) * cos_o - cos_io;
+        let base = base.simd_lt(one).select(base, one);
         self.exponent.pow_lanes(base.simd_gt(zero).select(base, zero))
     }
 }

@@ -1,6 +1,6 @@
 //! Rays, and how sure we are of where they start.
 
-use super::{UNIT_ROUNDOFF, Vec3};
+use super::{DVec3, UNIT_ROUNDOFF, Vec3};
 
 /// A camera ray: the points `o + t d`, 0 < t.
 #[derive(Clone, Copy, Debug)]
@@ -19,25 +19,11 @@ pub struct Ray {
 pub struct ErrorBound(pub Vec3);
 
 impl ErrorBound {
-    /// Of a point found as `o + t d`, and then moved onto the plane through a corner that is `from_corner` away: the
-    /// rounding of the sums and of the products, and that of the plane's normal, which moves the plane the more the
-    /// farther the corner is; with room to spare. Standard model of floating-point error: Higham, "Accuracy and Stability
-    /// of Numerical Algorithms", section 3.1.
+    /// Of a point that was found in f64 from terms of these absolute values, and then rounded to `p`. Nearly always the last
+    /// rounding alone: it grows neither with the distance of the camera nor with the size of the shape.
     #[inline(always)]
-    pub fn along(ray: &Ray, t: f32, from_corner: Vec3) -> Self {
-        ErrorBound((ray.o.abs() + (ray.d * t).abs() + from_corner.abs()) * (8.0 * UNIT_ROUNDOFF))
-    }
-
-    /// Of a point found as `c + r n`, n unit.
-    #[inline(always)]
-    pub fn around(c: Vec3, r: f32) -> Self {
-        ErrorBound((c.abs() + Vec3::splat(r)) * (8.0 * UNIT_ROUNDOFF))
-    }
-
-    /// The bound along a direction of any length, given as absolute values.
-    #[inline(always)]
-    pub fn along_axis(self, abs_axis: Vec3) -> f32 {
-        abs_axis.dot(self.0)
+    pub fn of_rounded(p: Vec3, terms: DVec3) -> Self {
+        ErrorBound(p.abs() * (4.0 * UNIT_ROUNDOFF) + (terms * (8.0 * f64::EPSILON)).as_vec3())
     }
 }
 

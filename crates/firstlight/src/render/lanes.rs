@@ -13,7 +13,7 @@ use crate::light::{LightKind, MIN_DISTANCE2, Rectangle};
 use crate::material::Lobe;
 use crate::math::{LANES, LaneSum, Vec3x16};
 use crate::scene::Scene;
-use crate::shape::{ParallelogramShadow, SphereShadow, SurfaceInteraction};
+use crate::shape::{ParallelogramShadow, PlaneSide, SphereShadow, SurfaceInteraction};
 
 /// Light, sixteen samples at a time.
 pub(crate) struct Lanes {
@@ -119,8 +119,9 @@ impl Lighting for Lanes {
             return Plain.gather(scene, index, si, lobe, counts);
         };
         self.between.clear();
-        for (flat, side) in self.flats.iter().zip(&scene.light_sides[index]) {
-            if !flat.is_one_sided(*side) {
+        let sides = &scene.light_sides[index];
+        for (i, flat) in self.flats.iter().enumerate() {
+            if !flat.is_one_sided(sides.get(i).copied().unwrap_or(PlaneSide::Both)) {
                 self.between.push(*flat);
             }
         }

@@ -106,10 +106,15 @@ pub(crate) struct Counts {
     pub camera_rays: u64,
     pub shadow_rays: u64,
     pub shadow_rays_skipped: u64,
+    /// Shadow rays after which the caller is asked whether to go on.
+    next_question: u64,
 }
 
-/// Renders `scene`. `progress(done, all)`, in pixels, is called after each tile from the thread that rendered it; on
-/// `Break` the render stops, without a film.
+/// Shadow rays between two questions: some hundredths of a second of the fast renderer, some tenths of the plain one.
+const QUESTION_EVERY: u64 = 1 << 23;
+
+/// Renders `scene`. `progress(done, all)`, in pixels, is called after each tile from the thread that rendered it, and now
+/// and then within one that takes long; on `Break` the render stops, without a film.
 ///
 /// # Panics
 /// If the settings do not fit, see [`RenderSettings::check`].
@@ -133,11 +138,19 @@ pub fn render(
         if stop.load(Ordering::Relaxed) {
             return;
         }
-        let (film_tile, counts) = if settings.reference {
-            render_tile(scene, tile, &mut Plain)
-        } else {
-            render_tile(scene, tile, &mut Lanes::new(level.token()))
+        // A tile can take minutes: ask in between as well
+        let go_on = || {
+            if progress(done.load(Ordering::Relaxed), all).is_break() {
+                stop.store(true, Ordering::Relaxed);
+            }
+            if stop.load(Ordering::Relaxed) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
         };
+        let rendered = if settings.reference {
+            render_tile(scene, tile, &mut Plain, &go_on)
+        } else {
+            render_tile(scene, tile, &mut Lanes::new(level.token()), &go_on)
+        };
+        let ControlFlow::Continue((film_tile, counts)) = rendered else { return };
         film.lock().expect("no thread panics while it holds the film").merge(&film_tile);
         for (total, count) in totals.iter().zip([counts.camera_rays, counts.shadow_rays, counts.shadow_rays_skipped]) {
             total.fetch_add(count, Ordering::Relaxed);
@@ -168,18 +181,24 @@ fn available_threads() -> usize {
 }
 
 /// Renders one tile: n x n camera rays a pixel, row by row, and at each surface all lights in scene order.
-fn render_tile(scene: &Scene, tile: &Tile, lighting: &mut impl Lighting) -> (FilmTile, Counts) {
+/// `go_on` is asked now and then.
+fn render_tile(
+    scene: &Scene,
+    tile: &Tile,
+    lighting: &mut impl Lighting,
+    go_on: &impl Fn() -> ControlFlow<()>,
+) -> ControlFlow<(), (FilmTile, Counts)> {
     let mut film = FilmTile::new(tile);
     let mut counts = Counts::default();
     let mut pixel = PixelSum::new(scene);
     for y in 0..tile.height {
         for x in 0..tile.width {
             pixel.clear();
-            pixel.sample(scene, tile.x + x, tile.y + y, lighting, &mut counts);
+            pixel.sample(scene, tile.x + x, tile.y + y, lighting, &mut counts, go_on)?;
             film.set(x, y, pixel.color(scene));
         }
     }
-    (film, counts)
+    ControlFlow::Continue((film, counts))
 }
 
 impl Scene {
@@ -209,6 +228,9 @@ impl Scene {
                 format!("{encoding}, exposure {exposure}; 8- and 16-bit files only")
             }),
         ];
+        if !self.placeholders.is_empty() {
+            entries.push(("placeholders", self.placeholders.join(" ")));
+        }
         if let Some(w) = settings.crop {
             entries.push(("crop", format!("{},{},{},{}", w.x, w.y, w.width, w.height)));
         }

@@ -1,6 +1,8 @@
 //! One pixel: its camera rays, what they see, and how that becomes a colour.
 
-use super::Counts;
+use std::ops::ControlFlow;
+
+use super::{Counts, QUESTION_EVERY};
 use crate::color::Rgb;
 use crate::material::{Bsdf, Lobe};
 use crate::math::LaneSum;
@@ -53,7 +55,15 @@ impl PixelSum {
     }
 
     /// Sends the n x n camera rays of pixel (`i`, `j`), row by row, and adds what they see.
-    pub fn sample(&mut self, scene: &Scene, i: u32, j: u32, lighting: &mut impl Lighting, counts: &mut Counts) {
+    pub fn sample(
+        &mut self,
+        scene: &Scene,
+        i: u32,
+        j: u32,
+        lighting: &mut impl Lighting,
+        counts: &mut Counts,
+        go_on: &impl Fn() -> ControlFlow<()>,
+    ) -> ControlFlow<()> {
         let n = scene.antialiasing;
         let step = 1.0 / n as f32;
         for row in 0..n {
@@ -63,6 +73,10 @@ impl PixelSum {
                 let y = j as f32 + (row as f32 + 0.5) / n as f32;
                 let (ray, differential) = scene.camera.ray(x, y, step);
                 counts.camera_rays += 1;
+                if counts.shadow_rays >= counts.next_question {
+                    counts.next_question = counts.shadow_rays + QUESTION_EVERY;
+                    go_on()?;
+                }
                 match scene.look(&ray, &differential) {
                     CameraHit::Background => self.background += 1,
                     CameraHit::Emission(color) => self.emission += color,
@@ -75,6 +89,7 @@ impl PixelSum {
                 }
             }
         }
+        ControlFlow::Continue(())
     }
 
     /// Adds what each light sends.

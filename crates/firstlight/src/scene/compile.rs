@@ -13,8 +13,8 @@ use crate::ids::{MaterialId, TextureId};
 use crate::image::read::{Limits, TexelData, Texels, decode};
 use crate::light::{Light, LightDesc, LightKind, MAX_SAMPLES};
 use crate::material::{LobeKind, MAX_SHININESS, Material, MaterialDesc};
-use crate::math::Vec3;
-use crate::shape::{Parallelogram, ShapeDesc, Sphere};
+use crate::math::{DVec3, Vec3};
+use crate::shape::{Parallelogram, PlaneSide, ShapeDesc, Sphere};
 use crate::texture::{Param, Texture, TextureDesc, TextureSpace};
 
 /// How strict compiling is.
@@ -73,7 +73,7 @@ impl SceneDesc {
             return (None, cx.take_faults());
         }
         let flat_occluders: Vec<_> = shapes.parallelograms.iter().copied().chain(blocking(&lights)).collect();
-        let light_sides = lights.iter().map(|light| sides(light, &flat_occluders)).collect();
+        let light_sides = sides(&lights, &flat_occluders);
         let summary = self.summary(&shapes, &lights, &textures);
         let scene = Scene {
             width: picture.width,
@@ -92,6 +92,7 @@ impl SceneDesc {
             flat_occluders,
             light_sides,
             hash: self.hash(&textures),
+            placeholders: textures.placeholders,
             textures: textures.compiled,
             summary,
         };
@@ -131,11 +132,11 @@ impl SceneDesc {
 
     /// Checks every camera and answers with the chosen one.
     fn compile_camera(&self, cx: &mut CompileContext, width: u32, height: u32) -> Camera {
-        let mut chosen = None;
+        let (mut chosen, wanted) = (None, self.chosen_camera());
         for (i, (name, camera)) in self.cameras.iter().enumerate() {
             let path = if name.is_empty() { "camera".to_owned() } else { format!("camera.{name}") };
             let compiled = cx.within(&path, |cx| camera.compile(cx, width.max(1), height.max(1)));
-            if self.chosen_camera() == Some(i) {
+            if wanted == Some(i) {
                 chosen = Some(compiled);
             }
         }
@@ -144,8 +145,7 @@ impl SceneDesc {
         } else if chosen.is_none() {
             let wanted = self.render.camera.as_deref().unwrap_or_default();
             let names: Vec<&str> = self.cameras.iter().map(|(name, _)| name.as_str()).collect();
-            let message = unknown("camera", wanted, &names);
-            cx.error("render.camera", message, None);
+            cx.unknown("render.camera", "camera", wanted, &names);
         }
         // Never used when there was a fault
         let placeholder = || CameraDesc::new([0.0, 0.0, 1.0]).compile(&mut CompileContext::default(), 1, 1);
@@ -193,14 +193,15 @@ impl SceneDesc {
 
     fn compile_shapes(&self, cx: &mut CompileContext) -> Shapes {
         let names: Vec<&str> = self.materials.iter().map(|(name, _)| name.as_str()).collect();
+        let ids: HashMap<&str, u32> = names.iter().enumerate().rev().map(|(id, name)| (*name, id as u32)).collect();
         let material = |cx: &mut CompileContext, wanted: &Option<String>| match wanted {
             None => MaterialId(names.len() as u32),
             Some(wanted) => {
-                let found = names.iter().position(|name| name == wanted);
+                let found = ids.get(wanted.as_str());
                 if found.is_none() {
-                    cx.error("material", unknown("material", wanted, &names), None);
+                    cx.unknown("material", "material", wanted, &names);
                 }
-                MaterialId(found.unwrap_or(0) as u32)
+                MaterialId(found.copied().unwrap_or(0))
             }
         };
         // Scene order: kind by kind, in each the order of the text
@@ -226,6 +227,15 @@ impl SceneDesc {
 
     fn compile_lights(&self, cx: &mut CompileContext) -> Vec<Light> {
         let samples = self.render.samples;
+        let points = self.lights.iter().map(|light| match light {
+            LightDesc::Rectangle(rectangle) => rectangle.samples.unwrap_or(samples) as u64,
+            LightDesc::Point(_) | LightDesc::Directional(_) | LightDesc::Spot(_) => 0,
+        });
+        let points: u64 = points.sum();
+        if points > MAX_LIGHT_POINTS {
+            let message = format!("the area lights have {points} points together, the limit is {MAX_LIGHT_POINTS}");
+            cx.error("light", message, Some("give them fewer samples"));
+        }
         let mut lights = Vec::with_capacity(self.lights.len());
         // Scene order: kind by kind, in each the order of the text
         for kind in LightDesc::KINDS {
@@ -248,7 +258,8 @@ impl SceneDesc {
             bounds = Some(bounds.map_or([low, high], |[a, b]| [a.min(low), b.max(high)]));
         };
         for sphere in &shapes.spheres {
-            cover(sphere.c - Vec3::splat(sphere.r), sphere.c + Vec3::splat(sphere.r));
+            let r = DVec3::splat(sphere.r);
+            cover((sphere.c - r).as_vec3(), (sphere.c + r).as_vec3());
         }
         for corner in shapes.parallelograms.iter().flat_map(|p| p.corners) {
             cover(corner, corner);
@@ -314,30 +325,25 @@ fn blocking(lights: &[Light]) -> impl Iterator<Item = Parallelogram> + '_ {
     })
 }
 
-/// On which side of each flat shape a light lies.
-fn sides(light: &Light, flats: &[Parallelogram]) -> Vec<crate::shape::PlaneSide> {
-    flats
-        .iter()
-        .map(|flat| match light.hull() {
-            [] => crate::shape::PlaneSide::Both,
-            hull => flat.side_of(hull),
-        })
-        .collect()
+/// On which side of each flat shape a light lies. Nothing for a light of one point, which is asked about directly, nor
+/// beyond [`MAX_SIDES`]: where nothing is known, the light counts as lying on both sides.
+fn sides(lights: &[Light], flats: &[Parallelogram]) -> Vec<Vec<PlaneSide>> {
+    let rectangles = lights.iter().filter(|light| matches!(light.kind, LightKind::Rectangle(_))).count();
+    let known = rectangles * flats.len() <= MAX_SIDES;
+    let of_light = |light: &Light| match &light.kind {
+        LightKind::Rectangle(rectangle) if known => {
+            flats.iter().map(|flat| flat.side_of(&rectangle.shape.corners)).collect()
+        }
+        _ => Vec::new(),
+    };
+    lights.iter().map(of_light).collect()
 }
 
-/// `no camera is called "tpo"; did you mean "top"?`
-fn unknown(what: &str, wanted: &str, names: &[&str]) -> String {
-    let nearest = crate::describe::nearest(wanted, names);
-    match nearest {
-        Some(name) => format!("no {what} is called {wanted:?}; did you mean {name:?}?"),
-        None if names.is_empty() => format!("no {what} is called {wanted:?}; the scene has none"),
-        None => {
-            let list: Vec<String> = names.iter().take(8).map(|name| format!("{name:?}")).collect();
-            let more = if names.len() > 8 { ", ..." } else { "" };
-            format!("no {what} is called {wanted:?}; there are {}{more}", list.join(", "))
-        }
-    }
-}
+/// Pairs of a light and a flat shape whose sides are kept.
+const MAX_SIDES: usize = 1 << 24;
+
+/// The most points of all area lights together: 12 bytes each.
+const MAX_LIGHT_POINTS: u64 = 1 << 24;
 
 /// Names belong to one thing each, whatever its kind.
 fn check_unique<'a>(cx: &mut CompileContext, family: &str, names: impl Iterator<Item = (&'static str, &'a str)>) {
@@ -354,15 +360,28 @@ fn check_unique<'a>(cx: &mut CompileContext, family: &str, names: impl Iterator<
 struct Textures<'a> {
     desc: &'a SceneDesc,
     assets: &'a dyn Assets,
+    /// Which texture a name means.
+    names: HashMap<&'a str, usize>,
     /// Each texture as it was asked for: colour and data read the same file differently.
     ids: HashMap<(usize, TextureSpace), TextureId>,
     files: HashMap<&'a str, (Arc<Texels>, [u8; 32])>,
     compiled: Vec<Texture>,
+    /// The files that something stands in for.
+    placeholders: Vec<String>,
 }
 
 impl<'a> Textures<'a> {
     fn new(desc: &'a SceneDesc, assets: &'a dyn Assets) -> Self {
-        Textures { desc, assets, ids: HashMap::new(), files: HashMap::new(), compiled: Vec::new() }
+        let names = desc.textures.iter().enumerate().rev().map(|(index, (name, _))| (name.as_str(), index)).collect();
+        Textures {
+            desc,
+            assets,
+            names,
+            placeholders: Vec::new(),
+            ids: HashMap::new(),
+            files: HashMap::new(),
+            compiled: Vec::new(),
+        }
     }
 
     /// Finds the faults of all textures, used or not.
@@ -403,9 +422,9 @@ impl<'a> Textures<'a> {
     ) -> Option<TextureId> {
         let name = name.as_ref()?;
         let textures = &self.desc.textures;
-        let Some(index) = textures.iter().position(|(other, _)| other == name) else {
+        let Some(index) = self.names.get(name.as_str()).copied() else {
             let names: Vec<&str> = textures.iter().map(|(name, _)| name.as_str()).collect();
-            cx.error(&format!("{field}.texture"), unknown("texture", name, &names), None);
+            cx.unknown(&format!("{field}.texture"), "texture", name, &names);
             return None;
         };
         if let Some(id) = self.ids.get(&(index, space)) {
@@ -434,7 +453,7 @@ impl<'a> Textures<'a> {
         let name = &self.desc.textures[index].0;
         let read = self.assets.read(file, MAX_TEXTURE_FILE);
         let (texels, hash) = match &read {
-            Ok(bytes) => match decode(bytes, &Limits::default()) {
+            Ok(bytes) => match decode(bytes, &self.limits()) {
                 Ok(texels) => (texels, *blake3::hash(bytes).as_bytes()),
                 Err(error) => {
                     let message = format!("{file:?} cannot be read as a picture: {error}");
@@ -461,9 +480,19 @@ impl<'a> Textures<'a> {
                 (placeholder(), [0; 32])
             }
         };
+        if hash == [0; 32] {
+            self.placeholders.push(file.to_owned());
+        }
         let texels = Arc::new(texels);
         self.files.insert(file, (texels.clone(), hash));
         texels
+    }
+
+    /// What is left of the texels that one scene may have.
+    fn limits(&self) -> Limits {
+        let used: u64 = self.files.values().map(|(t, _)| t.width as u64 * t.height as u64).sum();
+        let whole = Limits::default();
+        Limits { texels: whole.texels.saturating_sub(used), ..whole }
     }
 
     fn sizes(&self) -> Vec<(String, &'static str, Option<[u32; 2]>)> {

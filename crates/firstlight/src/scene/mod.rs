@@ -44,9 +44,11 @@ pub struct Scene {
     pub(crate) shape_materials: Vec<MaterialId>,
     /// All that is flat and stands in the way of light: the parallelograms, then the rectangle lights that block.
     pub(crate) flat_occluders: Vec<Parallelogram>,
-    /// For each light, on which side of each flat occluder it lies.
+    /// For each rectangle light, on which side of each flat occluder it lies; where nothing is known, both.
     pub(crate) light_sides: Vec<Vec<PlaneSide>>,
     pub(crate) hash: String,
+    /// The texture files that something stands in for.
+    pub(crate) placeholders: Vec<String>,
     pub(crate) summary: SceneSummary,
 }
 

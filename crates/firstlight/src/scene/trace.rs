@@ -10,8 +10,8 @@ use crate::shape::{RayDifferential, ShapePoint, SurfaceInteraction};
 /// The first surface on a ray.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Hit {
-    /// Where: the ray's `o + t d`, t > 0.
-    pub t: f32,
+    /// Where: the ray's `o + t d`, t > 0. In f64: what is first on a ray is not left to rounding.
+    pub t: f64,
     /// What.
     pub surface: SurfaceId,
 }
@@ -32,7 +32,7 @@ impl Scene {
     #[inline(always)]
     pub fn intersect(&self, ray: &Ray) -> Option<Hit> {
         let mut nearest: Option<Hit> = None;
-        let mut meet = |t: Option<f32>, id: usize| {
+        let mut meet = |t: Option<f64>, id: usize| {
             if let Some(t) = t
                 && nearest.is_none_or(|hit| t < hit.t)
             {

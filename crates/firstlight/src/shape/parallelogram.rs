@@ -1,6 +1,7 @@
 //! Parallelograms.
 
 use fearless_simd::{f32x16, mask32x16, prelude::*};
+use glam::DVec2;
 
 use super::surface::{Footprint, RayDifferential, ShapePoint, UvEdge};
 use crate::context::{CompileContext, show};
@@ -38,22 +39,19 @@ table! {
     }
 }
 
-/// A parallelogram, ready to be hit.
+/// A parallelogram, ready to be hit. In f64, as it was described: shapes that share an edge or a plane still do.
 #[derive(Clone, Copy, Debug)]
 pub struct Parallelogram {
     /// The corner of u = v = 0.
-    pub p: Vec3,
-    /// What the rounding of `p` left over. Far from the origin it is longer than the slack at the edges: without it,
-    /// walls that share a corner in the description would gape.
-    p_rest: Vec3,
+    pub p: DVec3,
     /// Unit normal of the front.
-    pub n: Vec3,
+    pub n: DVec3,
     /// u of a point x of the plane is (x - p) . u_axis.
-    pub u_axis: Vec3,
+    pub u_axis: DVec3,
     /// v of a point x of the plane is (x - p) . v_axis.
-    pub v_axis: Vec3,
+    pub v_axis: DVec3,
     /// |e0| + |e1|, along each axis.
-    reach: Vec3,
+    reach: DVec3,
     /// The four corners, around.
     pub corners: [Vec3; 4],
     /// Whether camera rays pass through from behind.
@@ -86,45 +84,39 @@ impl Parallelogram {
         let area2 = cross.length_squared();
         let corners = [p, p + e0, p + e0 + e1, p + e1].map(|q| q.as_vec3());
         Parallelogram {
-            p: p.as_vec3(),
-            p_rest: (p - p.as_vec3().as_dvec3()).as_vec3(),
-            n: (cross.normalize_or_zero() * sign).as_vec3(),
-            u_axis: (e1.cross(cross) / area2).as_vec3(),
-            v_axis: (cross.cross(e0) / area2).as_vec3(),
-            reach: (e0.abs() + e1.abs()).as_vec3(),
+            p,
+            n: cross.normalize_or_zero() * sign,
+            u_axis: e1.cross(cross) / area2,
+            v_axis: cross.cross(e0) / area2,
+            reach: e0.abs() + e1.abs(),
             corners,
             single_sided,
         }
     }
 
-    /// The way from the corner to `x`.
+    /// How far u or v can be wrong for a ray that starts `from` away from the corner, computed with `roundoff`. Two
+    /// shapes that share an edge overlap by this much, so that no ray slips between them.
     #[inline(always)]
-    fn local(&self, x: Vec3) -> Vec3 {
-        (x - self.p) - self.p_rest
+    fn slack(&self, from: DVec3, axis: DVec3, roundoff: f64) -> f64 {
+        (from.abs() + self.reach).dot(axis.abs()) * (8.0 * roundoff)
     }
 
-    /// How far u or v can be wrong for a ray that starts `from` away from the corner. Two shapes that share an edge
-    /// overlap by this much, so that no ray slips between them.
+    /// The t > 0 at which the ray meets the parallelogram, if it does. In f64: what is first on a ray is not left to
+    /// rounding where walls meet.
     #[inline(always)]
-    fn slack(&self, from: Vec3, axis: Vec3) -> f32 {
-        (from.abs() + self.reach).dot(axis.abs()) * (8.0 * UNIT_ROUNDOFF)
-    }
-
-    /// The t > 0 at which the ray meets the parallelogram, if it does.
-    #[inline(always)]
-    pub(crate) fn intersect(&self, ray: &Ray) -> Option<f32> {
-        let from = self.local(ray.o);
-        let cos = self.n.dot(ray.d);
+    pub(crate) fn intersect(&self, ray: &Ray) -> Option<f64> {
+        let (from, d) = (ray.o.as_dvec3() - self.p, ray.d.as_dvec3());
+        let cos = self.n.dot(d);
         if self.single_sided && cos >= 0.0 {
             return None;
         }
         let t = -self.n.dot(from) / cos;
-        if !(t > 0.0 && t < f32::INFINITY) {
+        if !(t > 0.0 && t < f64::INFINITY) {
             return None;
         }
-        let hit = from + ray.d * t;
-        let inside = |axis: Vec3| {
-            let (w, slack) = (hit.dot(axis), self.slack(from, axis));
+        let hit = from + d * t;
+        let inside = |axis: DVec3| {
+            let (w, slack) = (hit.dot(axis), self.slack(from, axis, f64::EPSILON));
             w >= -slack && w <= 1.0 + slack
         };
         (inside(self.u_axis) && inside(self.v_axis)).then_some(t)
@@ -132,19 +124,19 @@ impl Parallelogram {
 
     /// The point that `ray` meets at `t`, with its texture coordinate and the footprint of the ray.
     #[inline(always)]
-    pub(crate) fn point(&self, ray: &Ray, t: f32, differential: &RayDifferential) -> ShapePoint {
-        // Onto the plane: what is left of the distance to it does not grow with the camera's
-        let hit = self.local(ray.o) + ray.d * t;
-        let hit = hit - self.n * self.n.dot(hit);
-        let p = self.p + (self.p_rest + hit);
-        let uv = Vec2::new(hit.dot(self.u_axis), hit.dot(self.v_axis)).clamp(Vec2::ZERO, Vec2::ONE);
-        let steps = differential.on_plane(ray.d, t, self.n, f32::MAX.sqrt() * 0.5);
-        let [dx, dy] = steps.map(|dp| Vec2::new(dp.dot(self.u_axis), dp.dot(self.v_axis)));
+    pub(crate) fn point(&self, ray: &Ray, t: f64, differential: &RayDifferential) -> ShapePoint {
+        let (o, way) = (ray.o.as_dvec3(), ray.d.as_dvec3() * t);
+        let p = (o + way).as_vec3();
+        let hit = o - self.p + way;
+        let uv = DVec2::new(hit.dot(self.u_axis), hit.dot(self.v_axis)).clamp(DVec2::ZERO, DVec2::ONE);
+        let (n, u_axis, v_axis) = (self.n.as_vec3(), self.u_axis.as_vec3(), self.v_axis.as_vec3());
+        let steps = differential.on_plane(ray.d, t as f32, n, f32::MAX.sqrt() * 0.5);
+        let [dx, dy] = steps.map(|dp| Vec2::new(dp.dot(u_axis), dp.dot(v_axis)));
         ShapePoint {
             p,
-            error: ErrorBound::along(ray, t, hit),
-            normal: self.n,
-            uv,
+            error: ErrorBound::of_rounded(p, o.abs() + way.abs() + self.p.abs()),
+            normal: n,
+            uv: uv.as_vec2(),
             footprint: Footprint { dx, dy, edges: [UvEdge::Bounded; 2] },
         }
     }
@@ -152,9 +144,7 @@ impl Parallelogram {
     /// Where the hull of `points` lies. In f64, where the rounding is far below what [`ParallelogramShadow::blocks`]
     /// allows itself, so that the answer is a proof for every point of the hull.
     pub(crate) fn side_of(&self, points: &[Vec3]) -> PlaneSide {
-        let n = self.n.as_dvec3();
-        let corner = self.p.as_dvec3() + self.p_rest.as_dvec3();
-        let heights = points.iter().map(|q| n.dot(q.as_dvec3() - corner));
+        let heights = points.iter().map(|q| self.n.dot(q.as_dvec3() - self.p));
         if heights.clone().all(|s| s >= 0.0) {
             PlaneSide::Front
         } else if heights.clone().all(|s| s <= 0.0) {
@@ -167,20 +157,19 @@ impl Parallelogram {
     /// What this parallelogram needs to know of a point that asks for light.
     #[inline(always)]
     pub(crate) fn shadow(&self, p: Vec3, error: ErrorBound) -> ParallelogramShadow {
-        let from = self.local(p);
+        // In f64, so that the side the point is on is wrong by the point's own rounding only
+        let from = p.as_dvec3() - self.p;
         let s = self.n.dot(from);
-        let sign = if s < 0.0 { -1.0 } else { 1.0 };
-        let abs_n = self.n.abs();
-        // How far s can be wrong
-        let margin = error.along_axis(abs_n) + abs_n.dot(from.abs() + p.abs() + self.p.abs()) * (4.0 * UNIT_ROUNDOFF);
+        let n = if s < 0.0 { -self.n } else { self.n }.as_vec3();
+        let axis = |axis: DVec3| Axis::new(from, axis, self.slack(from, axis, UNIT_ROUNDOFF as f64));
         ParallelogramShadow {
-            n: self.n * sign,
+            n,
             front: s >= 0.0,
-            height: s * sign,
-            margin,
-            abs_n: abs_n * (4.0 * UNIT_ROUNDOFF),
-            u: Axis::new(from, self.u_axis, self.slack(from, self.u_axis)),
-            v: Axis::new(from, self.v_axis, self.slack(from, self.v_axis)),
+            height: s.abs() as f32,
+            margin: n.abs().dot(error.0),
+            abs_n: n.abs() * (10.0 * UNIT_ROUNDOFF),
+            u: axis(self.u_axis),
+            v: axis(self.v_axis),
         }
     }
 }
@@ -207,7 +196,8 @@ pub(crate) struct ParallelogramShadow {
     height: f32,
     /// How far `height` can be wrong.
     margin: f32,
-    /// How far n.l can be wrong, for each length along an axis.
+    /// How far n.l can be wrong, for each length along an axis: the rounding of n, of l, of the end of l, of the products
+    /// and of their sum.
     abs_n: Vec3,
     u: Axis,
     v: Axis,
@@ -226,8 +216,8 @@ struct Axis {
 
 impl Axis {
     #[inline(always)]
-    fn new(from: Vec3, axis: Vec3, slack: f32) -> Self {
-        Axis { axis, origin: from.dot(axis), low: -slack, high: 1.0 + slack }
+    fn new(from: DVec3, axis: DVec3, slack: f64) -> Self {
+        Axis { axis: axis.as_vec3(), origin: from.dot(axis) as f32, low: -slack as f32, high: (1.0 + slack) as f32 }
     }
 
     /// Whether the coordinate where the plane is crossed lies on the shape. It is origin + (l.axis) height / descent:

@@ -8,7 +8,7 @@ use pxfm::f_atan2f;
 use super::surface::{Footprint, RayDifferential, ShapePoint, UvEdge};
 use crate::context::CompileContext;
 use crate::describe::{table, words};
-use crate::math::{ErrorBound, Ray, UNIT_ROUNDOFF, Vec2, Vec3, Vec3x16};
+use crate::math::{DVec3, ErrorBound, Ray, UNIT_ROUNDOFF, Vec2, Vec3, Vec3x16};
 
 words! {
     /// How a point of a sphere becomes a texture coordinate. `n` is the outward unit normal at the point.
@@ -49,9 +49,9 @@ table! {
 #[derive(Clone, Copy, Debug)]
 pub struct Sphere {
     /// Centre.
-    pub c: Vec3,
+    pub c: DVec3,
     /// Radius, greater than 0.
-    pub r: f32,
+    pub r: f64,
     /// How a point becomes a texture coordinate.
     pub uv: SphereUv,
     /// Whether camera rays pass through its inside.
@@ -60,9 +60,9 @@ pub struct Sphere {
 
 impl SphereDesc {
     pub(crate) fn compile(&self, cx: &mut CompileContext) -> Sphere {
-        let c = cx.point("center", self.center);
+        cx.point("center", self.center);
         let r = cx.positive("radius", self.radius, "the radius is in metres");
-        Sphere { c, r, uv: self.uv, single_sided: self.single_sided }
+        Sphere { c: self.center.into(), r, uv: self.uv, single_sided: self.single_sided }
     }
 }
 
@@ -70,14 +70,15 @@ impl Sphere {
     /// The smallest t > 0 at which the ray meets the sphere, if it does.
     ///
     /// Nearest root of |o + t d - c|^2 = r^2 without cancellation: the distance from the centre to the ray is compared
-    /// with r, and the smaller root comes from the product of both.
+    /// with r, and the smaller root comes from the product of both. In f64: what is first on a ray is not left to
+    /// rounding, and the eye may be a metre above a planet.
     /// Source: Haines, Gunther, Akenine-Moller, "Precision improvements for ray/sphere intersection", Ray Tracing Gems,
     /// chapter 7, 2019.
     #[inline(always)]
-    pub(crate) fn intersect(&self, ray: &Ray) -> Option<f32> {
-        let f = ray.o - self.c;
-        let b = -f.dot(ray.d);
-        let nearest = f + ray.d * b;
+    pub(crate) fn intersect(&self, ray: &Ray) -> Option<f64> {
+        let (f, d) = (ray.o.as_dvec3() - self.c, ray.d.as_dvec3());
+        let b = -f.dot(d);
+        let nearest = f + d * b;
         let discriminant = self.r * self.r - nearest.dot(nearest);
         if !(discriminant >= 0.0) {
             return None;
@@ -97,38 +98,32 @@ impl Sphere {
 
     /// The point of the sphere that `ray` meets at `t`, with its texture coordinate and the footprint of the ray.
     #[inline(always)]
-    pub(crate) fn point(&self, ray: &Ray, t: f32, differential: &RayDifferential) -> ShapePoint {
+    pub(crate) fn point(&self, ray: &Ray, t: f64, differential: &RayDifferential) -> ShapePoint {
         // From the centre outwards: the point lies on the sphere however far away the camera is
-        let n = (ray.o + ray.d * t - self.c).normalize();
-        let p = self.c + n * self.r;
-        let [dpx, dpy] = differential.on_plane(ray.d, t, n, self.r);
+        let outwards = (ray.o.as_dvec3() - self.c + ray.d.as_dvec3() * t).normalize_or(DVec3::Y);
+        let p = (self.c + outwards * self.r).as_vec3();
+        let (n, r) = (outwards.as_vec3(), self.r as f32);
+        let [dpx, dpy] = differential.on_plane(ray.d, t as f32, n, r);
         let (uv, dx, dy) = match self.uv {
-            SphereUv::Equirectangular => equirectangular(n, dpx / self.r, dpy / self.r),
-            SphereUv::Angles => angles(n, dpx / self.r, dpy / self.r),
+            SphereUv::Equirectangular => equirectangular(n, dpx / r, dpy / r),
+            SphereUv::Angles => angles(n, dpx / r, dpy / r),
         };
         let edges = match self.uv {
             SphereUv::Equirectangular => [UvEdge::Periodic, UvEdge::Bounded],
             SphereUv::Angles => [UvEdge::Bounded, UvEdge::Bounded],
         };
-        ShapePoint {
-            p,
-            error: ErrorBound::around(self.c, self.r),
-            normal: n,
-            uv,
-            footprint: Footprint { dx, dy, edges },
-        }
+        let error = ErrorBound::of_rounded(p, self.c.abs() + DVec3::splat(self.r));
+        ShapePoint { p, error, normal: n, uv, footprint: Footprint { dx, dy, edges } }
     }
 
     /// What this sphere needs to know of a point that asks for light.
     #[inline(always)]
     pub(crate) fn shadow(&self, p: Vec3, error: ErrorBound) -> SphereShadow {
-        let f = p - self.c;
-        let ff = f.dot(f);
-        let r2 = self.r * self.r;
+        // In f64, so that the side the point is on is wrong by the point's own rounding only
+        let f = p.as_dvec3() - self.c;
+        let (ff, r2) = (f.dot(f), self.r * self.r);
         let cc = ff - r2;
-        // How far f can be wrong, and with it |f|^2 - r^2
-        let df = error.0 + (f.abs() + self.c.abs()) * (2.0 * UNIT_ROUNDOFF);
-        let margin = 2.0 * f.abs().dot(df) + (ff + r2) * (4.0 * UNIT_ROUNDOFF);
+        let margin = 2.0 * f.abs().dot(error.0.as_dvec3());
         let side = if cc > margin {
             if ff > FAR * r2 { Side::Far } else { Side::Outside }
         } else if cc < -margin {
@@ -136,12 +131,14 @@ impl Sphere {
         } else {
             Side::On
         };
-        SphereShadow { f, cc, r2, ff, df, side }
+        let f = f.as_vec3();
+        let df = error.0 + f.abs() * (16.0 * UNIT_ROUNDOFF);
+        SphereShadow { f, cc: cc as f32, r2: r2 as f32, ff: ff as f32, df, side }
     }
 }
 
 /// Beyond this many squared radii, b^2 - a (|f|^2 - r^2) has lost too many digits.
-const FAR: f32 = 256.0;
+const FAR: f64 = 256.0;
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Side {
@@ -164,7 +161,7 @@ pub(crate) struct SphereShadow {
     cc: f32,
     r2: f32,
     ff: f32,
-    /// How far `f` can be wrong.
+    /// How far `f` can be wrong: the rounding of the point and its own, and that of its product with `l`.
     df: Vec3,
     side: Side,
 }
@@ -177,7 +174,7 @@ impl SphereShadow {
     pub fn is_below(&self, n: Vec3) -> bool {
         if self.side == Side::On {
             // `n` is the outward normal, to within what `blocks` allows `f` to be wrong
-            return (self.f - n * self.ff.sqrt()).abs().cmple(self.df * 0.5).all();
+            return (self.f - n * self.ff.sqrt()).abs().cmple(self.df * 0.25).all();
         }
         let height = self.f.dot(n);
         let r = self.r2.sqrt();
@@ -197,10 +194,7 @@ impl SphereShadow {
         let slack = (a + self.ff) * END_SLACK;
         match self.side {
             Side::Inside => !finite || end > slack,
-            Side::On => {
-                let wrong = l.abs().dot(self.df + self.f.abs() * (4.0 * UNIT_ROUNDOFF));
-                b > wrong && (!finite || end > slack)
-            }
+            Side::On => b > l.abs().dot(self.df) && (!finite || end > slack),
             Side::Outside | Side::Far => {
                 let discriminant = if self.side == Side::Far {
                     // a r^2 - |l x f|^2 does not cancel
@@ -226,8 +220,7 @@ impl SphereShadow {
         match self.side {
             Side::Inside => end.simd_gt(slack),
             Side::On => {
-                let df = Vec3x16::splat(simd, self.df + self.f.abs() * (4.0 * UNIT_ROUNDOFF));
-                let wrong = l.abs().dot(df);
+                let wrong = l.abs().dot(Vec3x16::splat(simd, self.df));
                 b.simd_gt(wrong) & end.simd_gt(slack)
             }
             Side::Outside | Side::Far => {
@@ -244,7 +237,7 @@ impl SphereShadow {
 }
 
 /// The relative error allowed to |q - c|^2 - r^2 at the end of a shadow ray.
-const END_SLACK: f32 = 8.0 * UNIT_ROUNDOFF;
+const END_SLACK: f32 = 16.0 * UNIT_ROUNDOFF;
 
 /// Steps in uv are no longer than this: once around.
 const MAX_STEP: f32 = 1.0;

@@ -47,7 +47,7 @@ const MAX_COUNT: u32 = 65536;
 
 /// An edge of the footprint that crosses more lines than this is not followed: the board is gray there, to within the
 /// inverse of this number.
-const MAX_CROSSINGS: f64 = 4096.0;
+const MAX_CROSSINGS: f64 = 1024.0;
 
 /// A footprint whose area is smaller than this fraction of its sides' squares is a line.
 const MIN_AREA: f64 = 1e-9;
