@@ -191,7 +191,8 @@ impl CompileContext {
             Some(name) => format!("no {what} is called {wanted:?}; did you mean {name:?}?"),
             None if names.is_empty() => format!("no {what} is called {wanted:?}; the scene has none"),
             None => {
-                let list: Vec<String> = names.iter().take(8).map(|name| format!("{name:?}")).collect();
+                let list: Vec<String> =
+                    names.iter().filter(|name| !name.is_empty()).take(8).map(|name| format!("{name:?}")).collect();
                 let more = if names.len() > 8 { ", ..." } else { "" };
                 format!("no {what} is called {wanted:?}; there are {}{more}", list.join(", "))
             }
@@ -297,8 +298,7 @@ impl CompileContext {
                 self.error(field, message, Some("a light has its strength for what a colour cannot say"));
             }
         }
-        let [r, g, b] = c.linear.map(|x| x as f32);
-        Rgb::new(r, g, b)
+        c.into()
     }
 
     /// How strong a light is: 0 or more.

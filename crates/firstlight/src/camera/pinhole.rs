@@ -23,13 +23,13 @@ table! {
         pub position: [f64; 3],
         /// The point seen at the middle of the picture; not `position` itself.
         pub look_at: [f64; 3] = [0.0, 0.0, 0.0],
-        /// The direction that is up in the picture, of any length; not parallel to the line of sight.
+        /// The direction that is up in the picture, of any length above 1e-9; not parallel to the line of sight.
         pub up: [f64; 3] = [0.0, 1.0, 0.0],
-        /// The vertical field of view: the full angle, in degrees, in (0, 180).
+        /// The vertical field of view: the full angle, in degrees, 0.001 to 179.99.
         pub fov_y_deg: Option<f64> = None,
-        /// Focal length in millimetres, instead of `fov_y_deg`: fov = 2 atan(sensor height / (2 focal length)).
+        /// Focal length in millimetres, 0.01 to 1000000, instead of `fov_y_deg`: fov = 2 atan(sensor height / (2 focal length)).
         pub focal_length_mm: Option<f64> = None,
-        /// The height of the sensor in millimetres, for `focal_length_mm`.
+        /// The height of the sensor in millimetres, 0.01 to 10000, for `focal_length_mm`; 24 unless said.
         pub sensor_height_mm: Option<f64> = None,
     }
 }

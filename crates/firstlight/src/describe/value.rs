@@ -1,6 +1,6 @@
 //! The values a field of the scene text can have, beyond plain numbers, words and arrays.
 
-use crate::color::Encoding;
+use crate::color::{Encoding, Rgb};
 use serde_json::{Value as Json, json};
 
 use super::node::{Data, Node, quoted};
@@ -35,6 +35,13 @@ impl From<[f64; 3]> for ColorDesc {
     /// Linear red, green, blue.
     fn from([r, g, b]: [f64; 3]) -> Self {
         Self::linear(r, g, b)
+    }
+}
+
+impl From<ColorDesc> for Rgb {
+    fn from(color: ColorDesc) -> Self {
+        let [r, g, b] = color.linear.map(|x| x as f32);
+        Rgb::new(r, g, b)
     }
 }
 

@@ -19,11 +19,11 @@ table! {
     pub struct DirectionalDesc {
         /// What reports call it.
         pub name: Option<String> = None,
-        /// The way the light travels, of any length but 0.
+        /// The way the light travels, of any length above 1e-9.
         pub direction: [f64; 3],
         /// Linear colour; channels of 0 or more.
         pub color: ColorDesc = ColorDesc::WHITE,
-        /// Lux (physical), or a plain factor (constant); 0 or more.
+        /// Lux (physical), or a plain factor (constant); 0 to 1e15.
         pub strength: f64 = 1.0,
         /// How light weakens on its way.
         pub falloff: Falloff = Falloff::Physical,

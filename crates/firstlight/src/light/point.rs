@@ -23,7 +23,7 @@ table! {
         pub position: [f64; 3],
         /// Linear colour; channels of 0 or more.
         pub color: ColorDesc = ColorDesc::WHITE,
-        /// Candela (physical), or a plain factor (constant); 0 or more.
+        /// Candela (physical), or a plain factor (constant); 0 to 1e15.
         pub strength: f64 = 1.0,
         /// How light weakens on its way.
         pub falloff: Falloff = Falloff::Physical,

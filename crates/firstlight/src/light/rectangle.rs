@@ -3,6 +3,7 @@
 use fearless_simd::{f32x16, prelude::*};
 
 use super::{EmitSides, Falloff, Light, LightKind, SampleSet, scaled};
+use crate::color::Rgb;
 use crate::context::{CompileContext, show};
 use crate::describe::{ColorDesc, table};
 use crate::math::{DVec3, LANES, Vec3, Vec3x16};
@@ -32,7 +33,7 @@ table! {
         pub e1: [f64; 3],
         /// Linear colour; channels of 0 or more.
         pub color: ColorDesc = ColorDesc::WHITE,
-        /// Radiance (physical), or a plain factor (constant); 0 or more.
+        /// Radiance (physical), or a plain factor (constant); 0 to 1e15.
         pub strength: f64 = 1.0,
         /// How light weakens on its way.
         pub falloff: Falloff = Falloff::Physical,
@@ -125,7 +126,7 @@ impl RectangleDesc {
                 blocks: self.blocks,
             }),
             scale: scaled(cx, self.color, self.strength, self.falloff.factor() * area / count.max(1) as f64),
-            radiance: scaled(cx, self.color, self.strength, 1.0),
+            radiance: Rgb::from(self.color) * self.strength as f32,
             shadows: self.shadows,
         }
     }

@@ -36,7 +36,7 @@ table! {
         pub inner_cone_deg: Option<f64> = None,
         /// Linear colour; channels of 0 or more.
         pub color: ColorDesc = ColorDesc::WHITE,
-        /// Candela on the axis (physical), or a plain factor (constant); 0 or more.
+        /// Candela on the axis (physical), or a plain factor (constant); 0 to 1e15.
         pub strength: f64 = 1.0,
         /// How light weakens on its way.
         pub falloff: Falloff = Falloff::Physical,

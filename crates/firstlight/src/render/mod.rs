@@ -66,6 +66,15 @@ impl RenderSettings {
             let names: Vec<_> = SimdLevel::available().iter().map(|level| level.name()).collect();
             return Err(format!("this processor has no {}; it has {}", self.simd.name(), names.join(", ")));
         }
+        let window = self.crop.unwrap_or(Window { x: 0, y: 0, width: scene.width, height: scene.height });
+        let bytes = window.width as usize * window.height as usize * size_of::<[f32; 4]>();
+        // Room for the film, and for the file that is made of it
+        if Vec::<u8>::new().try_reserve_exact(bytes + bytes / 2).is_err() {
+            return Err(format!(
+                "{} x {} pixels take {bytes} bytes and half as much again, more than there is; render parts with a crop",
+                window.width, window.height
+            ));
+        }
         if let Some(w) = self.crop {
             let fits = |start: u32, length: u32, all: u32| length > 0 && start as u64 + length as u64 <= all as u64;
             if !(fits(w.x, w.width, scene.width) && fits(w.y, w.height, scene.height)) {

@@ -67,6 +67,7 @@ impl SceneDesc {
         let mut textures = Textures::new(self, assets);
         textures.check(cx);
         let materials = self.compile_materials(cx, &mut textures);
+        textures.check_unused(cx);
         let shapes = self.compile_shapes(cx);
         let lights = self.compile_lights(cx);
         if cx.has_errors() {
@@ -395,6 +396,19 @@ impl<'a> Textures<'a> {
         }
     }
 
+    /// Finds the faults of the files that no material asked for, without keeping them.
+    fn check_unused(&mut self, cx: &mut CompileContext) {
+        for (index, (_, desc)) in self.desc.textures.iter().enumerate() {
+            if let TextureDesc::Image(image) = desc
+                && !self.files.contains_key(image.file.0.as_str())
+            {
+                self.load(cx, index, &image.file.0);
+                self.files.remove(image.file.0.as_str());
+                self.placeholders.retain(|file| *file != image.file.0);
+            }
+        }
+    }
+
     fn color_param(&mut self, cx: &mut CompileContext, field: &str, param: &ColorParam) -> Param<Rgb> {
         let factor = cx.color(&factor_path(field, &param.texture), param.factor);
         Param { texture: self.resolve(cx, field, &param.texture, TextureSpace::Srgb), factor }
@@ -457,7 +471,7 @@ impl<'a> Textures<'a> {
                 Ok(texels) => (texels, *blake3::hash(bytes).as_bytes()),
                 Err(error) => {
                     let message = format!("{file:?} cannot be read as a picture: {error}");
-                    let hint = "magenta and black stand in for it; give a PNG or JPEG file";
+                    let hint = "magenta and black stand in for it, unless compiled strictly";
                     cx.outside(|cx| cx.warning(&format!("texture.image.{name}.file"), message, Some(hint)));
                     (placeholder(), [0; 32])
                 }
@@ -472,8 +486,8 @@ impl<'a> Textures<'a> {
                         cx.outside(|cx| cx.error(&path, message, Some(hint)));
                     }
                     _ => {
-                        let hint =
-                            "magenta and black stand in for it; files are looked for beside the text that names them";
+                        let hint = "it is looked for beside the text that names it; magenta and black stand in for it, \
+                                    unless compiled strictly";
                         cx.outside(|cx| cx.warning(&path, message, Some(hint)));
                     }
                 }

@@ -47,7 +47,7 @@ table! {
         pub ambient: ColorDesc = ColorDesc::BLACK,
         /// How linear light becomes the numbers of an 8- or 16-bit picture.
         pub display: DisplayEncoding = DisplayEncoding::Srgb,
-        /// The gamma of `display = "gamma"`, greater than 0.
+        /// The gamma of `display = "gamma"`, 0.1 to 10.
         pub gamma: f64 = 2.2,
         /// In stops: 8- and 16-bit pictures are multiplied by 2^exposure, from -64 to 64.
         pub exposure: f64 = 0.0,

@@ -32,9 +32,9 @@ table! {
     pub struct SphereDesc {
         /// What reports and id files call it.
         pub name: Option<String> = None,
-        /// Centre, in metres, world space.
+        /// Centre, in metres, world space; coordinates from -2.5e8 to 2.5e8, as everywhere.
         pub center: [f64; 3],
-        /// Radius in metres, greater than 0.
+        /// Radius in metres, 1e-9 to 2.5e8.
         pub radius: f64,
         /// How a point becomes a texture coordinate.
         pub uv: SphereUv = SphereUv::Equirectangular,

@@ -64,7 +64,7 @@ table! {
         pub space: Option<TextureSpace> = None,
         /// The colour beyond the edges under `border`.
         pub border: ColorDesc = ColorDesc::BLACK,
-        /// The picture's coordinate is uv x scale + offset.
+        /// The picture's coordinate is uv x scale + offset; each number from -1e6 to 1e6.
         pub scale: [f64; 2] = [1.0, 1.0],
         /// See `scale`.
         pub offset: [f64; 2] = [0.0, 0.0],

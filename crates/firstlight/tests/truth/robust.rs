@@ -514,3 +514,102 @@ fn a_camera_next_to_a_sphere_sees_past_it() {
         }
     }
 }
+
+#[test]
+fn a_shadow_does_not_depend_on_where_the_camera_stands() {
+    // A plate 4 mm above a floor, under a high sun, seen from 10 m and from 7 km
+    let scene = |eye: V, fov| {
+        empty(32, 32, 1)
+            .with_camera(camera(eye, [0.0; 3], fov))
+            .with_parallelogram(square([0.0; 3], [0.0, 1.0, 0.0], 20.0))
+            .with_parallelogram(square([0.0, 0.004, 0.0], [0.0, 1.0, 0.0], 0.05))
+            .with_light(LightDesc::Directional(directional([0.7, -0.1, 0.0], 1.0)))
+    };
+    let dark = |film: firstlight::Image| film.pixels.iter().filter(|p| p[0] == 0.0).count();
+    let near = dark(shoot(&scene([0.0, 7.0, 7.0], 2.0)));
+    let far = dark(shoot(&scene([0.0, 5000.0, 5000.0], 2.0 * 9.9 / 7071.0)));
+    assert!(near > 5 && near.abs_diff(far) <= 3 + near / 4, "{near} dark pixels from near, {far} from far");
+}
+
+#[test]
+fn a_ball_on_a_planet_has_its_shadow() {
+    for r in [1e4, 1e6, 6.4e6, 1e8] {
+        let scene = empty(1, 1, 1)
+            .with_sphere(sphere([0.0, -r, 0.0], r))
+            .with_sphere(sphere([0.0, 0.5, 0.0], 0.5))
+            .with_light(LightDesc::Directional(directional([1.0, -1.0, 0.0], 1.0)));
+        // The ball's shadow reaches from under it to (1.2, 0, 0)
+        let at = |x: f64| probe(&scene, [x, 0.7, 1.5], [x, 0.0, 0.0])[0];
+        assert_eq!(at(0.7), 0.0, "planet of {r}");
+        assert!(at(2.0) > 0.1 && at(-1.5) > 0.1, "planet of {r}");
+    }
+}
+
+#[test]
+fn a_planet_is_seen_from_a_man_s_height() {
+    let r = 6.4e6;
+    let scene = empty(1, 1, 1)
+        .with_sphere(sphere([0.0, -r, 0.0], r))
+        .with_light(LightDesc::Point(PointDesc { falloff: Falloff::Constant, ..point([0.0, 1.7, 0.0], 1.0) }))
+        .with_parallelogram(square([0.0, 0.01, -3.0], [0.0, 1.0, 0.0], 0.5));
+    // The square lies on the ground, a centimetre above it, and hides it
+    let scene = compile(&scene.with_camera(camera([0.0, 1.7, 0.0], [0.0, 0.0, -3.0], 45.0)));
+    let (ray, differential) = scene.camera().ray(0.5, 0.5, 1.0);
+    match scene.look(&ray, &differential) {
+        firstlight::CameraHit::Surface(si) => assert!((si.p.y - 0.01).abs() < 1e-6, "{}", si.p),
+        other => panic!("{other:?}"),
+    }
+}
+
+#[test]
+fn narrow_spots_fade_and_highlights_keep_below_their_maximum() {
+    let spot_at = |x: f64| {
+        let light = LightDesc::Spot(spot([0.0, 10.0, 0.0], [0.0; 3], 0.06, Some(0.0), 100.0));
+        let scene = empty(1, 1, 1).with_parallelogram(square([0.0; 3], [0.0, 1.0, 0.0], 1.0)).with_light(light);
+        probe(&scene, [0.5, 1.0, 0.0], [x, 0.0, 0.0])[0] as f64
+    };
+    let full = spot_at(0.0);
+    for k in 0..10 {
+        // Half the cone is 5.236 mm wide; cosines of small angles make the fade a parabola, squared
+        let x = k as f64 * 5e-4;
+        let share = x / (10.0 * radians(0.03));
+        let fade = 1.0 - share * share;
+        assert!((spot_at(x) / full - fade * fade).abs() < 0.02, "{} is not {} at {x}", spot_at(x) / full, fade * fade);
+    }
+    let glossy = phong(ColorParam::gray(0.0), ColorParam::gray(1.0), 1e6);
+    let scene = empty(48, 48, 1)
+        .with_material("glossy", glossy)
+        .with_camera(camera([0.0, 0.0, 3.0], [0.0; 3], 1.0))
+        .with_sphere(SphereDesc { material: Some("glossy".into()), ..sphere([0.0; 3], 1.0) })
+        .with_light(LightDesc::Point(PointDesc { falloff: Falloff::Constant, ..point([0.0, 0.0, 3.0], 1.0) }));
+    assert!(shoot(&scene).pixels.iter().all(|p| p[0] <= 1.0));
+}
+
+#[test]
+fn the_strongest_light_allowed_gives_numbers() {
+    let light = |strength, color| {
+        let color = firstlight::ColorDesc::linear(color, 0.0, color);
+        LightDesc::Point(PointDesc { color, falloff: Falloff::Constant, ..point([0.0, 1.0, 0.0], strength) })
+    };
+    let scene = |light| {
+        empty(1, 1, 1)
+            .with_material(
+                "red",
+                phong(ColorParam::constant(firstlight::ColorDesc::linear(1e6, 0.0, 0.0)), ColorParam::gray(0.0), 1.0),
+            )
+            .with_parallelogram(ParallelogramDesc {
+                material: Some("red".into()),
+                ..square([0.0; 3], [0.0, 1.0, 0.0], 1.0)
+            })
+            .with_light(light)
+    };
+    let seen = probe(&scene(light(1e15, 1e6)), [0.1, 0.5, 0.0], [0.0; 3]);
+    assert!(seen.iter().all(|c| !c.is_nan()) && seen[0] > 1e26, "{seen:?}");
+    let refused = scene(light(1e15, 1e7)).compile(&firstlight::NoAssets, &Default::default());
+    assert!(
+        refused
+            .unwrap_err()
+            .to_string()
+            .contains("light.point[0].color: [10000000, 0, 10000000] has a channel above 1e6")
+    );
+}
