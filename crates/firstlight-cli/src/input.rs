@@ -58,6 +58,12 @@ pub fn read(scene: &Path, reading: &ReadingArgs) -> Result<Input, Failure> {
     Ok(Input { name, stem, parsed, assets, strict: reading.strict })
 }
 
+/// The file that `scene` names; none for standard input and built-in scenes.
+pub fn file_of(scene: &Path) -> Option<&Path> {
+    let is_file = scene != "-" && !builtin_scenes().iter().any(|builtin| scene == builtin.name);
+    is_file.then_some(scene)
+}
+
 impl Input {
     /// Compiles the description as it is now.
     ///
