@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use firstlight::{Assets, CompileOptions, Compiled, FolderAssets, NoAssets, Parsed, SceneDesc, builtin_scenes};
 
 use crate::args::ReadingArgs;
-use crate::report::Failure;
+use crate::report::{Failure, shown};
 
 /// No scene text is longer, in bytes. Meshes and pictures are files of their own.
 const TEXT_LIMIT: u64 = 64 << 20;
@@ -39,7 +39,7 @@ pub fn read(scene: &Path, reading: &ReadingArgs) -> Result<Input, Failure> {
         (builtin.name.to_owned(), PathBuf::from(builtin.name), builtin.text.as_bytes().to_vec(), None)
     } else {
         let name = scene.display().to_string();
-        let text = read_file(scene).map_err(|why| Failure::Work(format!("{name}: {why}")))?;
+        let text = read_file(scene).map_err(|why| Failure::Work(format!("{}: {why}", shown(scene))))?;
         let stem = scene.file_stem().map_or_else(|| PathBuf::from("scene"), PathBuf::from);
         (name, stem, text, Some(scene.parent().map(Path::to_path_buf).unwrap_or_default()))
     };
@@ -47,7 +47,7 @@ pub fn read(scene: &Path, reading: &ReadingArgs) -> Result<Input, Failure> {
     // A scene reads its own folder; a built-in scene has none
     let allowed = |folder: &Path| {
         FolderAssets::new(folder, &reading.allow_dir)
-            .map_err(|(path, e)| Failure::Work(format!("--allow-dir: {}: {e}", path.display())))
+            .map_err(|(path, e)| Failure::Work(format!("--allow-dir: {}: {e}", shown(&path))))
     };
     let assets: Box<dyn Assets> = match folder {
         Some(folder) => Box::new(allowed(&folder)?),

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use firstlight::{Format, ImageError, PendingFile, StagedFile, Written};
 
 use crate::args::{Bits, NamedFormat};
-use crate::report::{Failure, say};
+use crate::report::{Failure, say, shown};
 
 /// A place for bytes.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -49,7 +49,7 @@ impl Target {
     fn name(&self) -> String {
         match self {
             Target::Stdout => "-".into(),
-            Target::File(path) => path.display().to_string(),
+            Target::File(path) => shown(path),
         }
     }
 
@@ -113,7 +113,7 @@ impl Staged<'_> {
             Staged::File(path, file) => {
                 let written = file.commit().map_err(failed)?;
                 if !quiet {
-                    say(format_args!("wrote {}{}", path.display(), aside(&path, written)));
+                    say(format_args!("wrote {}{}", shown(&path), aside(&path, written)));
                 }
                 Ok(())
             }
@@ -133,7 +133,7 @@ fn aside(path: &Path, written: Written) -> String {
     }
     let is_link = fs::symlink_metadata(path).is_ok_and(|meta| meta.is_symlink());
     match path.canonicalize() {
-        Ok(real) if is_link => format!(", a link: {} was replaced", real.display()),
+        Ok(real) if is_link => format!(", a link: {} was replaced", shown(&real)),
         _ => String::new(),
     }
 }

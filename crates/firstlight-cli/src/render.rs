@@ -12,7 +12,7 @@ use crate::input::{self, Input};
 use crate::interrupt::Watch;
 use crate::output::{self, Output, Ready, Staged, Target};
 use crate::progress::Progress;
-use crate::report::{Failure, say, show_diagnostics};
+use crate::report::{Failure, say, show_diagnostics, shown};
 use crate::stats::Stats;
 
 /// No film has more pixels.
@@ -227,7 +227,7 @@ fn stats_target(path: &Path) -> Result<Target, Failure> {
     let target = Target::of(path);
     let is_json = path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("json"));
     if target != Target::Stdout && !is_json {
-        let name = path.display();
+        let name = shown(path);
         return Err(Failure::Usage(format!("--stats={name}: the file's name must end in .json; - is standard output")));
     }
     Ok(target)

@@ -27,6 +27,7 @@ fn nothing_is_written_over_something_else_of_the_same_run() {
     let folder = Folder::with_scene();
     fs::create_dir(folder.path("sub")).unwrap();
     folder.put("data.json", "{}");
+    folder.put("text.png", crate::common::SCENE);
     for (line, said) in [
         ("scene.toml --stats=scene.toml", "must end in .json"),
         ("scene.toml --stats=scene.png", "must end in .json"),
@@ -34,6 +35,8 @@ fn nothing_is_written_over_something_else_of_the_same_run() {
         ("scene.toml -o z.png --stats=./z.png", "must end in .json"),
         ("data.json --stats=data.json", "scene's own file"),
         ("data.json --stats=sub/../data.json", "scene's own file"),
+        ("text.png", "scene's own file"),
+        ("text.png -o sub/../text.png", "scene's own file"),
         ("scene.toml -o z.png -o sub/../z.png", "twice"),
         ("scene.toml -o z.png -o sub/.././z.png", "twice"),
     ] {
@@ -41,7 +44,8 @@ fn nothing_is_written_over_something_else_of_the_same_run() {
     }
     assert_eq!(folder.get("scene.toml"), crate::common::SCENE.as_bytes());
     assert_eq!(folder.get("data.json"), b"{}");
-    assert_eq!(folder.names(), ["data.json", "scene.toml", "sub"]);
+    assert_eq!(folder.get("text.png"), crate::common::SCENE.as_bytes());
+    assert_eq!(folder.names(), ["data.json", "scene.toml", "sub", "text.png"]);
 }
 
 #[test]
@@ -77,6 +81,21 @@ fn a_course_file_with_an_unknown_ending_says_which_are_known() {
     let folder = Folder::new();
     folder.put("course.txt", crate::common::COURSE.replace("course.png", "course.bmp"));
     folder.run("render course.txt").exits(1).says(&["course.bmp", ".png", "-o"]);
+}
+
+#[test]
+#[cfg(unix)]
+fn a_course_file_cannot_send_control_characters() {
+    let folder = Folder::new();
+    folder.put("course.txt", crate::common::COURSE.replace("course.png", "\u{1b}[31ma.png"));
+    let ran = folder.run("render course.txt").done().says(&["wrote \u{fffd}[31ma.png"]);
+    assert!(!ran.stderr.contains('\u{1b}'), "{:?}", ran.stderr);
+    // A link's line names two paths
+    fs::remove_file(folder.path("\u{1b}[31ma.png")).unwrap();
+    folder.put("\u{1b}b.png", "");
+    std::os::unix::fs::symlink("\u{1b}b.png", folder.path("\u{1b}[31ma.png")).unwrap();
+    let ran = folder.run("render course.txt").done().says(&["a link", "b.png was replaced"]);
+    assert!(!ran.stderr.contains('\u{1b}'), "{:?}", ran.stderr);
 }
 
 #[test]
