@@ -152,6 +152,9 @@ pub fn resolve(paths: &[PathBuf], bits: Option<Bits>, format: Option<NamedFormat
             (Target::File(path), Some(format)) if path.extension().is_none() => format_of(format),
             (Target::File(path), _) => match Format::from_path(path) {
                 Ok(kind) => kind,
+                Err(e) if path.extension().is_none() => {
+                    return usage(format!("{e}, or say the format with --format png, exr or hdr"));
+                }
                 Err(e) => return usage(e.to_string()),
             },
         };

@@ -143,7 +143,7 @@ fn a_device_is_written_to_directly_and_says_so() {
     assert_eq!(folder.names(), ["null.png", "scene.toml"]);
     assert!(fs::symlink_metadata(folder.path("null.png")).unwrap().is_symlink());
     // Without an ending the format must be said
-    folder.run("render scene.toml -o /dev/null").exits(2).says(&["/dev/null", ".png"]);
+    folder.run("render scene.toml -o /dev/null").exits(2).says(&["/dev/null", ".png", "--format png"]);
     folder.run("render scene.toml -o /dev/null --format exr").done().says(&["wrote /dev/null directly"]);
 }
 

@@ -51,7 +51,7 @@ const BAD: &[(&str, &[&str])] = &[
     ("render scene.toml --format exr", &["--format", "-o -"]),
     ("render scene.toml --format exr -o a.exr", &["--format", "-o -"]),
     ("render scene.toml -o a.jpg", &["a.jpg", ".png", ".exr", ".hdr"]),
-    ("render scene.toml -o a", &["a", ".png", ".exr", ".hdr"]),
+    ("render scene.toml -o a", &["a", ".png", ".exr", ".hdr", "--format"]),
     ("render scene.toml -o .png", &[".png"]),
     ("render scene.toml -o", &["--output"]),
     ("render scene.toml -o a.png -o a.png", &["a.png", "twice"]),
