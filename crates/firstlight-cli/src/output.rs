@@ -176,6 +176,19 @@ pub fn resolve(paths: &[PathBuf], bits: Option<Bits>, format: Option<NamedFormat
     Ok(outputs)
 }
 
+/// The format of a course file's `output_file`.
+///
+/// # Errors
+/// An ending that is no picture's.
+pub fn format_of_course(course: &str, path: &Path) -> Result<Format, Failure> {
+    Format::from_path(path).map_err(|e| {
+        // The library's words begin with the path
+        let (name, why) = (path.display().to_string(), e.to_string());
+        let why = why.strip_prefix(&format!("{name}: ")).unwrap_or(&why);
+        Failure::Work(format!("{course}: output_file {name}: {why}; or name another output with -o"))
+    })
+}
+
 /// Sees that nothing would be written over something else of the same run: the scene's text, a picture, the numbers.
 ///
 /// # Errors

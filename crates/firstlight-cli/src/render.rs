@@ -207,10 +207,9 @@ impl<'a> Plan<'a> {
     fn default_output(&self, input: &Input) -> Result<Output, Failure> {
         let (path, format) = match &input.parsed.output {
             Some(path) => {
-                let format = Format::from_path(Path::new(path)).map_err(|e| {
-                    Failure::Work(format!("{}: output_file {path:?}: {e}; -o names another", input.name))
-                })?;
-                (PathBuf::from(path), format)
+                let path = PathBuf::from(path);
+                let format = output::format_of_course(&input.name, &path)?;
+                (path, format)
             }
             None => {
                 let mut name = input.stem.clone().into_os_string();

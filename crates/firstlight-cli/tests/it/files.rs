@@ -80,7 +80,12 @@ fn a_protected_file_is_found_before_rendering() {
 fn a_course_file_with_an_unknown_ending_says_which_are_known() {
     let folder = Folder::new();
     folder.put("course.txt", crate::common::COURSE.replace("course.png", "course.bmp"));
-    folder.run("render course.txt").exits(1).says(&["course.bmp", ".png", "-o"]);
+    for command in ["render", "check"] {
+        let ran = folder.run(&format!("{command} course.txt")).exits(1).says(&["output_file", ".png", "-o"]);
+        assert_eq!(ran.stderr.matches("course.bmp").count(), 1, "{}", ran.stderr);
+        assert!(ran.stdout.is_empty());
+    }
+    folder.run("render course.txt -o a.png").done();
 }
 
 #[test]
