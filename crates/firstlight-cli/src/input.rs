@@ -31,8 +31,9 @@ pub struct Input {
 pub fn read(scene: &Path, reading: &ReadingArgs) -> Result<Input, Failure> {
     let (name, stem, text, folder) = if scene == "-" {
         let text = read_limited(io::stdin().lock()).map_err(|why| Failure::Work(format!("standard input: {why}")))?;
-        // A name tells JSON from TOML; no TOML begins with a brace
-        let json = text.trim_ascii_start().starts_with(b"{");
+        // A name tells JSON from TOML; no TOML begins with a brace. A byte order mark is no part of the text
+        let marked = text.strip_prefix(b"\xef\xbb\xbf").unwrap_or(&text);
+        let json = marked.trim_ascii_start().starts_with(b"{");
         let name = if json { "<stdin>.json" } else { "<stdin>" };
         (name.to_owned(), PathBuf::from("scene"), text, Some(PathBuf::new()))
     } else if let Some(builtin) = builtin_scenes().iter().find(|builtin| scene == builtin.name) {

@@ -29,6 +29,8 @@ fn faults_of_standard_input_have_a_place_too() {
     ]);
     let json = b"\n{\"camera\": {\"position\": [0, 0, 9]}, \"render\": {\n\"colour\": 3}}\n";
     folder.run_with_input("check -", json).exits(1).says(&["<stdin>.json:3:", "colour", "1 error\n"]);
+    let marked = [b"\xef\xbb\xbf", json.as_slice()].concat();
+    folder.run_with_input("check -", &marked).exits(1).says(&["<stdin>.json:3:", "colour", "1 error\n"]);
 }
 
 #[test]
