@@ -8,6 +8,7 @@ use firstlight::{Assets, CompileOptions, Compiled, FolderAssets, NoAssets, Parse
 
 use crate::args::ReadingArgs;
 use crate::report::{Failure, shown};
+use crate::scenes;
 
 /// No scene text is longer, in bytes. Meshes and pictures are files of their own.
 const TEXT_LIMIT: u64 = 64 << 20;
@@ -79,8 +80,12 @@ impl Input {
 fn read_file(path: &Path) -> Result<Vec<u8>, String> {
     match File::open(path) {
         Err(e) if e.kind() == io::ErrorKind::NotFound => {
-            let names: Vec<&str> = builtin_scenes().iter().map(|builtin| builtin.name).collect();
-            Err(format!("no such file, and no built-in scene; built in are {}", names.join(", ")))
+            // A name with an ending or a folder is a file's; any other may be a built-in scene's, mistyped
+            if path.extension().is_some() || path.components().count() != 1 {
+                return Err("no such file".into());
+            }
+            let (near, names) = scenes::near_and_all(&path.to_string_lossy());
+            Err(format!("no such file, and no built-in scene; {near}built in are {names}"))
         }
         Err(e) => Err(e.to_string()),
         Ok(file) if file.metadata().is_ok_and(|meta| meta.is_dir()) => Err("is a folder; name a scene file".into()),

@@ -57,6 +57,16 @@ fn a_scene_that_is_not_there_says_what_is() {
         folder.run(&format!("{command} config99")).exits(1).says(&["config99", "no such file", "config11"]);
         folder.run(&format!("{command} .")).exits(1).says(&["folder"]);
     }
+    for command in ["render", "check", "info"] {
+        let meant = ["no such file", "did you mean \"config11\"?", "config33"];
+        folder.run(&format!("{command} conifg11")).exits(1).says(&meant);
+        // What is a file's name for certain is no mistyped scene
+        for name in ["./config11", "nofile.toml", "folder/conifg11", "/config11"] {
+            let ran = folder.run(&format!("{command} {name}")).exits(1).says(&[name, "no such file"]);
+            assert!(!ran.stderr.contains("built"), "{}", ran.stderr);
+        }
+    }
+    folder.run("scenes conifg22").exits(2).says(&["did you mean \"config22\"?"]);
     assert!(folder.names().is_empty());
 }
 
