@@ -42,7 +42,11 @@ fn edits(from: &str, to: &str) -> usize {
     let mut row: Vec<usize> = (0..=to.chars().count()).collect();
     for (i, a) in from.chars().enumerate() {
         let (mut left, mut diagonal) = (i + 1, i);
-        for (b, above) in to.chars().zip(row.iter_mut().skip(1)) {
+        let mut places = row.iter_mut();
+        if let Some(first) = places.next() {
+            *first = left;
+        }
+        for (b, above) in to.chars().zip(places) {
             let change = diagonal + usize::from(a != b);
             diagonal = *above;
             left = change.min(left + 1).min(diagonal + 1);
