@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use clap::{Args, Parser, Subcommand, ValueEnum, ValueHint, value_parser};
+use clap::{Args, Parser, Subcommand, ValueEnum, ValueHint};
 use firstlight::{SimdLevel, Window};
 
 /// Renders the direct light of a scene: camera ray, first surface, every light. No noise, the same bits every time
@@ -111,23 +111,23 @@ pub struct RenderArgs {
     pub exposure: Option<f64>,
 
     /// Pixels across, 1 to 65536; without --height, the height follows in the scene's aspect ratio [default: the scene's]
-    #[arg(long, value_name = "PIXELS", value_parser = value_parser!(u32).range(1..=65536), help_heading = "Picture")]
+    #[arg(long, value_name = "PIXELS", value_parser = whole::<u32>(1, 65536), help_heading = "Picture")]
     pub width: Option<u32>,
     /// Pixels down, 1 to 65536; without --width, the width follows in the scene's aspect ratio [default: the scene's]
-    #[arg(long, value_name = "PIXELS", value_parser = value_parser!(u32).range(1..=65536), help_heading = "Picture")]
+    #[arg(long, value_name = "PIXELS", value_parser = whole::<u32>(1, 65536), help_heading = "Picture")]
     pub height: Option<u32>,
     /// Renders only this part of the picture, in pixels from its top left corner [default: all of it]
     #[arg(long, value_name = "X,Y,WIDTH,HEIGHT", value_parser = crop, allow_hyphen_values = true, help_heading = "Picture")]
     pub crop: Option<Window>,
     /// The camera to render from, where the scene names several [default: the scene's]
-    #[arg(long, value_name = "NAME", help_heading = "Picture")]
+    #[arg(long, value_name = "NAME", value_parser = camera, help_heading = "Picture")]
     pub camera: Option<String>,
 
     /// Antialiasing by N x N camera rays in each pixel, 1 to 64; 4 is "4X" [default: the scene's]
-    #[arg(long, value_name = "N", value_parser = value_parser!(u32).range(1..=64), help_heading = "Quality")]
+    #[arg(long, value_name = "N", value_parser = whole::<u32>(1, 64), help_heading = "Quality")]
     pub aa: Option<u32>,
     /// Points sampled on every area light, 1 to 1048576 [default: the scene's]
-    #[arg(long, value_name = "N", value_parser = value_parser!(u32).range(1..=1_048_576), help_heading = "Quality")]
+    #[arg(long, value_name = "N", value_parser = samples, help_heading = "Quality")]
     pub samples: Option<u32>,
     /// Renders by the plainest code there is: the same bytes, slowly
     #[arg(long, help_heading = "Quality")]
@@ -135,10 +135,10 @@ pub struct RenderArgs {
 
     /// Threads to render with, 1 to 1024; the picture is the same for any number [default: one for each processor, or a
     /// course file's num_threads]
-    #[arg(long, value_name = "N", value_parser = value_parser!(u16).range(1..=1024), help_heading = "Work")]
+    #[arg(long, value_name = "N", value_parser = whole::<u16>(1, 1024), help_heading = "Work")]
     pub threads: Option<u16>,
     /// Pixels along a tile's edge, 8 to 64; the picture is the same for any number [default: 16]
-    #[arg(long, value_name = "PIXELS", value_parser = value_parser!(u32).range(8..=64), help_heading = "Work")]
+    #[arg(long, value_name = "PIXELS", value_parser = whole::<u32>(8, 64), help_heading = "Work")]
     pub tile_size: Option<u32>,
     /// The processor's vector instructions to use; the picture is the same for any of them [default: auto]
     #[arg(long, value_name = "LEVEL", value_parser = SimdParser, help_heading = "Work")]
@@ -206,6 +206,30 @@ pub enum NamedFormat {
     Exr,
     /// The film itself, in Radiance's shared exponents
     Hdr,
+}
+
+/// Reads whole numbers from `least` to `most`.
+fn whole<T>(least: T, most: T) -> impl Fn(&str) -> Result<T, String> + Clone + Send + Sync + 'static
+where
+    T: std::str::FromStr + PartialOrd + std::fmt::Display + Copy + Send + Sync + 'static,
+{
+    move |text| match text.parse::<T>() {
+        Ok(n) if least <= n && n <= most => Ok(n),
+        _ => Err(format!("a whole number from {least} to {most} is needed")),
+    }
+}
+
+/// Reads the number of samples.
+fn samples(text: &str) -> Result<u32, String> {
+    whole(1, 1_048_576)(text).map_err(|needed| {
+        let exact = text.eq_ignore_ascii_case("exact");
+        format!("{needed}{}", if exact { "; exact integration is not there yet" } else { "" })
+    })
+}
+
+/// Reads the name of a camera; one without a name cannot be asked for.
+fn camera(name: &str) -> Result<String, String> {
+    if name.is_empty() { Err("the name of a camera of the scene is needed".into()) } else { Ok(name.to_owned()) }
 }
 
 /// Reads an exposure in stops.

@@ -1,8 +1,10 @@
 //! `firstlight check`: whether a scene can be rendered.
 
+use std::path::Path;
+
 use crate::args::CheckArgs;
-use crate::input;
 use crate::report::{Failure, answer, show_diagnostics};
+use crate::{input, output};
 
 /// Reads and compiles, and says `ok` or every fault.
 ///
@@ -12,5 +14,9 @@ pub fn run(args: &CheckArgs) -> Result<(), Failure> {
     let input = input::read(&args.scene.scene, &args.scene.reading)?;
     let compiled = input.compile()?;
     show_diagnostics(&compiled.warnings);
+    // As much of the output as the text alone says
+    if let Some(path) = &input.parsed.output {
+        output::format_of_course(&input.name, Path::new(path))?;
+    }
     answer("ok\n")
 }

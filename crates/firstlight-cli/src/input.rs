@@ -7,7 +7,8 @@ use std::path::{Path, PathBuf};
 use firstlight::{Assets, CompileOptions, Compiled, FolderAssets, NoAssets, Parsed, SceneDesc, builtin_scenes};
 
 use crate::args::ReadingArgs;
-use crate::report::Failure;
+use crate::report::{Failure, shown};
+use crate::scenes;
 
 /// No scene text is longer, in bytes. Meshes and pictures are files of their own.
 const TEXT_LIMIT: u64 = 64 << 20;
@@ -31,15 +32,16 @@ pub struct Input {
 pub fn read(scene: &Path, reading: &ReadingArgs) -> Result<Input, Failure> {
     let (name, stem, text, folder) = if scene == "-" {
         let text = read_limited(io::stdin().lock()).map_err(|why| Failure::Work(format!("standard input: {why}")))?;
-        // A name tells JSON from TOML; no TOML begins with a brace
-        let json = text.trim_ascii_start().starts_with(b"{");
+        // A name tells JSON from TOML; no TOML begins with a brace. A byte order mark is no part of the text
+        let marked = text.strip_prefix(b"\xef\xbb\xbf").unwrap_or(&text);
+        let json = marked.trim_ascii_start().starts_with(b"{");
         let name = if json { "<stdin>.json" } else { "<stdin>" };
         (name.to_owned(), PathBuf::from("scene"), text, Some(PathBuf::new()))
     } else if let Some(builtin) = builtin_scenes().iter().find(|builtin| scene == builtin.name) {
         (builtin.name.to_owned(), PathBuf::from(builtin.name), builtin.text.as_bytes().to_vec(), None)
     } else {
         let name = scene.display().to_string();
-        let text = read_file(scene).map_err(|why| Failure::Work(format!("{name}: {why}")))?;
+        let text = read_file(scene).map_err(|why| Failure::Work(format!("{}: {why}", shown(scene))))?;
         let stem = scene.file_stem().map_or_else(|| PathBuf::from("scene"), PathBuf::from);
         (name, stem, text, Some(scene.parent().map(Path::to_path_buf).unwrap_or_default()))
     };
@@ -47,7 +49,7 @@ pub fn read(scene: &Path, reading: &ReadingArgs) -> Result<Input, Failure> {
     // A scene reads its own folder; a built-in scene has none
     let allowed = |folder: &Path| {
         FolderAssets::new(folder, &reading.allow_dir)
-            .map_err(|(path, e)| Failure::Work(format!("--allow-dir: {}: {e}", path.display())))
+            .map_err(|(path, e)| Failure::Work(format!("--allow-dir: {}: {e}", shown(&path))))
     };
     let assets: Box<dyn Assets> = match folder {
         Some(folder) => Box::new(allowed(&folder)?),
@@ -56,6 +58,12 @@ pub fn read(scene: &Path, reading: &ReadingArgs) -> Result<Input, Failure> {
 
     let parsed = SceneDesc::parse(&name, &text, assets.as_ref());
     Ok(Input { name, stem, parsed, assets, strict: reading.strict })
+}
+
+/// The file that `scene` names; none for standard input and built-in scenes.
+pub fn file_of(scene: &Path) -> Option<&Path> {
+    let is_file = scene != "-" && !builtin_scenes().iter().any(|builtin| scene == builtin.name);
+    is_file.then_some(scene)
 }
 
 impl Input {
@@ -72,8 +80,12 @@ impl Input {
 fn read_file(path: &Path) -> Result<Vec<u8>, String> {
     match File::open(path) {
         Err(e) if e.kind() == io::ErrorKind::NotFound => {
-            let names: Vec<&str> = builtin_scenes().iter().map(|builtin| builtin.name).collect();
-            Err(format!("no such file, and no built-in scene; built in are {}", names.join(", ")))
+            // A name with an ending or a folder is a file's; any other may be a built-in scene's, mistyped
+            if path.extension().is_some() || path.components().count() != 1 {
+                return Err("no such file".into());
+            }
+            let (near, names) = scenes::near_and_all(&path.to_string_lossy());
+            Err(format!("no such file, and no built-in scene; {near}built in are {names}"))
         }
         Err(e) => Err(e.to_string()),
         Ok(file) if file.metadata().is_ok_and(|meta| meta.is_dir()) => Err("is a folder; name a scene file".into()),

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use firstlight::{Format, ImageError, PendingFile, StagedFile, Written};
 
 use crate::args::{Bits, NamedFormat};
-use crate::report::{Failure, say};
+use crate::report::{Failure, say, shown};
 
 /// A place for bytes.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -43,6 +43,22 @@ impl Target {
     /// What `path` means: `-` is standard output.
     pub fn of(path: &Path) -> Self {
         if path == "-" { Target::Stdout } else { Target::File(path.to_path_buf()) }
+    }
+
+    /// What messages call it.
+    fn name(&self) -> String {
+        match self {
+            Target::Stdout => "-".into(),
+            Target::File(path) => shown(path),
+        }
+    }
+
+    /// The same for every name of one file.
+    fn real(&self) -> Self {
+        match self {
+            Target::Stdout => Target::Stdout,
+            Target::File(path) => Target::File(real(path)),
+        }
     }
 
     /// Sees, before any work is done, whether something can be written there.
@@ -97,7 +113,7 @@ impl Staged<'_> {
             Staged::File(path, file) => {
                 let written = file.commit().map_err(failed)?;
                 if !quiet {
-                    say(format_args!("wrote {}{}", path.display(), aside(&path, written)));
+                    say(format_args!("wrote {}{}", shown(&path), aside(&path, written)));
                 }
                 Ok(())
             }
@@ -117,7 +133,7 @@ fn aside(path: &Path, written: Written) -> String {
     }
     let is_link = fs::symlink_metadata(path).is_ok_and(|meta| meta.is_symlink());
     match path.canonicalize() {
-        Ok(real) if is_link => format!(", a link: {} was replaced", real.display()),
+        Ok(real) if is_link => format!(", a link: {} was replaced", shown(&real)),
         _ => String::new(),
     }
 }
@@ -129,19 +145,16 @@ fn aside(path: &Path, written: Written) -> String {
 pub fn resolve(paths: &[PathBuf], bits: Option<Bits>, format: Option<NamedFormat>) -> Result<Vec<Output>, Failure> {
     let usage = |message: String| Err(Failure::Usage(message));
     let mut outputs: Vec<Output> = Vec::new();
-    let mut seen: Vec<PathBuf> = Vec::new();
     for path in paths {
         let target = Target::of(path);
-        let full = std::path::absolute(path).unwrap_or_else(|_| path.clone());
-        if seen.contains(&full) {
-            return usage(format!("-o {} is given twice", path.display()));
-        }
-        seen.push(full);
         let kind = match (&target, format) {
             (Target::Stdout, format) => format.map_or(Format::Png8, format_of),
             (Target::File(path), Some(format)) if path.extension().is_none() => format_of(format),
             (Target::File(path), _) => match Format::from_path(path) {
                 Ok(kind) => kind,
+                Err(e) if path.extension().is_none() => {
+                    return usage(format!("{e}, or say the format with --format png, exr or hdr"));
+                }
                 Err(e) => return usage(e.to_string()),
             },
         };
@@ -161,6 +174,65 @@ pub fn resolve(paths: &[PathBuf], bits: Option<Bits>, format: Option<NamedFormat
         return usage("--bits is for PNG only, and no output is one".into());
     }
     Ok(outputs)
+}
+
+/// The format of a course file's `output_file`.
+///
+/// # Errors
+/// An ending that is no picture's.
+pub fn format_of_course(course: &str, path: &Path) -> Result<Format, Failure> {
+    Format::from_path(path).map_err(|e| {
+        // The library's words begin with the path
+        let (name, why) = (path.display().to_string(), e.to_string());
+        let why = why.strip_prefix(&format!("{name}: ")).unwrap_or(&why);
+        Failure::Work(format!("{course}: output_file {name}: {why}; or name another output with -o"))
+    })
+}
+
+/// Sees that nothing would be written over something else of the same run: the scene's text, a picture, the numbers.
+///
+/// # Errors
+/// Two of them are one file, under whatever names.
+pub fn refuse_clashes(scene: Option<&Path>, outputs: &[Output], stats: Option<&Target>) -> Result<(), Failure> {
+    let usage = |message: String| Err(Failure::Usage(message));
+    let scene = scene.map(real);
+    let mut seen: Vec<Target> = Vec::new();
+    for output in outputs {
+        let (name, place) = (output.target.name(), output.target.real());
+        if scene.as_ref().is_some_and(|scene| place == Target::File(scene.clone())) {
+            return usage(format!("the picture {name} would replace the scene's own file; name another with -o"));
+        }
+        if seen.contains(&place) {
+            return usage(format!("-o {name} is given twice, perhaps under two names for one file"));
+        }
+        seen.push(place);
+    }
+    let Some(stats) = stats else { return Ok(()) };
+    let (name, place) = (stats.name(), stats.real());
+    if scene.is_some_and(|scene| place == Target::File(scene)) {
+        return usage(format!("--stats={name} would replace the scene's own file; name another"));
+    }
+    if seen.contains(&place) {
+        return usage(format!("--stats={name} and -o name the same output; give each its own"));
+    }
+    Ok(())
+}
+
+/// The file that a path means, whether there is one yet or not: links are followed, `.` and `..` resolved.
+fn real(path: &Path) -> PathBuf {
+    let mut path = std::path::absolute(path).unwrap_or_else(|_| path.to_path_buf());
+    // A link may lead to a file that is yet to be made; as many links in a row as Linux follows
+    for _ in 0..40 {
+        if let Ok(real) = path.canonicalize() {
+            return real;
+        }
+        let Ok(next) = fs::read_link(&path) else { break };
+        path = path.parent().map(|folder| folder.join(&next)).unwrap_or(next);
+    }
+    match (path.parent().map(Path::canonicalize), path.file_name()) {
+        (Some(Ok(folder)), Some(name)) => folder.join(name),
+        _ => path,
+    }
 }
 
 fn format_of(format: NamedFormat) -> Format {

@@ -12,7 +12,7 @@ use crate::input::{self, Input};
 use crate::interrupt::Watch;
 use crate::output::{self, Output, Ready, Staged, Target};
 use crate::progress::Progress;
-use crate::report::{Failure, say, show_diagnostics};
+use crate::report::{Failure, say, show_diagnostics, shown};
 use crate::stats::Stats;
 
 /// No film has more pixels.
@@ -39,6 +39,16 @@ enum StatsPlan {
     Json(Target),
 }
 
+impl StatsPlan {
+    /// Where JSON goes.
+    fn target(&self) -> Option<&Target> {
+        match self {
+            StatsPlan::Json(target) => Some(target),
+            StatsPlan::Nowhere | StatsPlan::Table => None,
+        }
+    }
+}
+
 /// What the command line says in place of the scene.
 struct Overrides<'a> {
     width: Option<u32>,
@@ -63,10 +73,7 @@ pub fn run(args: &RenderArgs) -> Result<(), Failure> {
     // See whether the outputs can be written before any work is done for them; this may make a file for a moment
     let watch = Watch::begin();
     let ready: Vec<Ready> = outputs.iter().map(|output| output.target.ready()).collect::<Result<_, _>>()?;
-    let stats_file = match &plan.stats {
-        StatsPlan::Json(target) => Some(target.ready()?),
-        StatsPlan::Nowhere | StatsPlan::Table => None,
-    };
+    let stats_file = plan.stats.target().map(Target::ready).transpose()?;
     watch.check()?;
     drop(watch);
 
@@ -134,13 +141,9 @@ impl<'a> Plan<'a> {
         let stats = match &args.stats {
             None => StatsPlan::Nowhere,
             Some(None) => StatsPlan::Table,
-            Some(Some(path)) => StatsPlan::Json(Target::of(path)),
+            Some(Some(path)) => StatsPlan::Json(stats_target(path)?),
         };
-        if let StatsPlan::Json(target) = &stats
-            && outputs.iter().any(|output| output.target == *target)
-        {
-            return Err(Failure::Usage("--stats and -o name the same output; give each its own".into()));
-        }
+        output::refuse_clashes(input::file_of(&args.scene), &outputs, stats.target())?;
 
         let simd = args.simd.unwrap_or(SimdLevel::Auto);
         if !simd.is_available() {
@@ -192,7 +195,11 @@ impl<'a> Plan<'a> {
             )));
         }
 
-        let outputs = if self.outputs.is_empty() { vec![self.default_output(input)?] } else { self.outputs.clone() };
+        if !self.outputs.is_empty() {
+            return Ok((self.outputs.clone(), settings));
+        }
+        let outputs = vec![self.default_output(input)?];
+        output::refuse_clashes(input::file_of(self.scene), &outputs, self.stats.target())?;
         Ok((outputs, settings))
     }
 
@@ -200,10 +207,9 @@ impl<'a> Plan<'a> {
     fn default_output(&self, input: &Input) -> Result<Output, Failure> {
         let (path, format) = match &input.parsed.output {
             Some(path) => {
-                let format = Format::from_path(Path::new(path)).map_err(|e| {
-                    Failure::Work(format!("{}: output_file {path:?}: {e}; -o names another", input.name))
-                })?;
-                (PathBuf::from(path), format)
+                let path = PathBuf::from(path);
+                let format = output::format_of_course(&input.name, &path)?;
+                (path, format)
             }
             None => {
                 let mut name = input.stem.clone().into_os_string();
@@ -213,6 +219,17 @@ impl<'a> Plan<'a> {
         };
         Ok(Output { target: Target::File(path), format: output::with_bits(format, self.bits) })
     }
+}
+
+/// A file for the numbers is a `.json`, so that no slip of the hand writes them over a scene or a picture.
+fn stats_target(path: &Path) -> Result<Target, Failure> {
+    let target = Target::of(path);
+    let is_json = path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("json"));
+    if target != Target::Stdout && !is_json {
+        let name = shown(path);
+        return Err(Failure::Usage(format!("--stats={name}: the file's name must end in .json; - is standard output")));
+    }
+    Ok(target)
 }
 
 fn inside(crop: Window, width: u32, height: u32) -> bool {

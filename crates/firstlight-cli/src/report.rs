@@ -3,6 +3,7 @@
 
 use std::fmt;
 use std::io::{self, IsTerminal, Write};
+use std::path::Path;
 use std::process::ExitCode;
 
 use firstlight::{Diagnostic, Place, Severity};
@@ -150,6 +151,11 @@ fn shown_width(place: &Place, excerpt: &str) -> usize {
 /// The text without control characters, one for one: a scene cannot move the cursor of whoever reads its faults.
 fn clean(text: &str) -> String {
     text.chars().map(|c| if c.is_control() && c != '\t' && c != '\n' { '\u{fffd}' } else { c }).collect()
+}
+
+/// A path as messages show it: on one line, without control characters.
+pub fn shown(path: &Path) -> String {
+    path.display().to_string().chars().map(|c| if c.is_control() { '\u{fffd}' } else { c }).collect()
 }
 
 /// A diagnostic as `miette` wants it.

@@ -29,6 +29,8 @@ fn faults_of_standard_input_have_a_place_too() {
     ]);
     let json = b"\n{\"camera\": {\"position\": [0, 0, 9]}, \"render\": {\n\"colour\": 3}}\n";
     folder.run_with_input("check -", json).exits(1).says(&["<stdin>.json:3:", "colour", "1 error\n"]);
+    let marked = [b"\xef\xbb\xbf", json.as_slice()].concat();
+    folder.run_with_input("check -", &marked).exits(1).says(&["<stdin>.json:3:", "colour", "1 error\n"]);
 }
 
 #[test]
@@ -55,6 +57,16 @@ fn a_scene_that_is_not_there_says_what_is() {
         folder.run(&format!("{command} config99")).exits(1).says(&["config99", "no such file", "config11"]);
         folder.run(&format!("{command} .")).exits(1).says(&["folder"]);
     }
+    for command in ["render", "check", "info"] {
+        let meant = ["no such file", "did you mean \"config11\"?", "config33"];
+        folder.run(&format!("{command} conifg11")).exits(1).says(&meant);
+        // What is a file's name for certain is no mistyped scene
+        for name in ["./config11", "nofile.toml", "folder/conifg11", "/config11"] {
+            let ran = folder.run(&format!("{command} {name}")).exits(1).says(&[name, "no such file"]);
+            assert!(!ran.stderr.contains("built"), "{}", ran.stderr);
+        }
+    }
+    folder.run("scenes conifg22").exits(2).says(&["did you mean \"config22\"?"]);
     assert!(folder.names().is_empty());
 }
 

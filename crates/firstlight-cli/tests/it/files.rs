@@ -8,16 +8,61 @@ use crate::common::{Folder, size_of};
 fn an_output_that_cannot_be_is_found_before_rendering() {
     let folder = Folder::with_scene();
     fs::create_dir(folder.path("folder.png")).unwrap();
+    fs::create_dir(folder.path("folder.json")).unwrap();
     let long = "--width 4096 --aa 64"; // hours, if it began
     for (output, said) in
         [("nowhere/a.png", "there is no folder"), ("folder.png", "is a folder"), ("scene.toml/a.png", "scene.toml")]
     {
         folder.run(&format!("render scene.toml {long} -o good.png -o {output}")).exits(1).says(&[output, said]);
-        folder.run(&format!("render scene.toml {long} --stats={output}")).exits(1).says(&[output, said]);
+        let stats = output.replace(".png", ".json");
+        folder.run(&format!("render scene.toml {long} --stats={stats}")).exits(1).says(&[&stats, said]);
     }
     #[cfg(target_os = "linux")]
     folder.run(&format!("render scene.toml {long} -o /sys/a.png")).exits(1).says(&["/sys/a.png"]);
-    assert_eq!(folder.names(), ["folder.png", "scene.toml"]);
+    assert_eq!(folder.names(), ["folder.json", "folder.png", "scene.toml"]);
+}
+
+#[test]
+fn nothing_is_written_over_something_else_of_the_same_run() {
+    let folder = Folder::with_scene();
+    fs::create_dir(folder.path("sub")).unwrap();
+    folder.put("data.json", "{}");
+    folder.put("text.png", crate::common::SCENE);
+    for (line, said) in [
+        ("scene.toml --stats=scene.toml", "must end in .json"),
+        ("scene.toml --stats=scene.png", "must end in .json"),
+        ("scene.toml --stats=numbers", "must end in .json"),
+        ("scene.toml -o z.png --stats=./z.png", "must end in .json"),
+        ("data.json --stats=data.json", "scene's own file"),
+        ("data.json --stats=sub/../data.json", "scene's own file"),
+        ("text.png", "scene's own file"),
+        ("text.png -o sub/../text.png", "scene's own file"),
+        ("scene.toml -o z.png -o sub/../z.png", "twice"),
+        ("scene.toml -o z.png -o sub/.././z.png", "twice"),
+    ] {
+        folder.run(&format!("render {line}")).exits(2).says(&[said]);
+    }
+    assert_eq!(folder.get("scene.toml"), crate::common::SCENE.as_bytes());
+    assert_eq!(folder.get("data.json"), b"{}");
+    assert_eq!(folder.get("text.png"), crate::common::SCENE.as_bytes());
+    assert_eq!(folder.names(), ["data.json", "scene.toml", "sub", "text.png"]);
+}
+
+#[test]
+#[cfg(unix)]
+fn a_link_and_its_target_are_one_file() {
+    use std::os::unix::fs::symlink;
+    let folder = Folder::with_scene();
+    symlink("scene.png", folder.path("numbers.json")).unwrap(); // the default output, which is not there yet
+    symlink("scene.toml", folder.path("link.json")).unwrap();
+    symlink("z.png", folder.path("link.png")).unwrap();
+    folder.run("render scene.toml --stats=numbers.json").exits(2).says(&["same output"]);
+    folder.run("render scene.toml --stats=link.json").exits(2).says(&["scene's own file"]);
+    folder.run("render scene.toml -o z.png -o link.png").exits(2).says(&["twice"]);
+    folder.put("z.png", "old");
+    folder.run("render scene.toml -o z.png -o link.png").exits(2).says(&["twice"]);
+    assert_eq!(folder.get("z.png"), b"old");
+    assert_eq!(folder.get("scene.toml"), crate::common::SCENE.as_bytes());
 }
 
 #[test]
@@ -35,7 +80,27 @@ fn a_protected_file_is_found_before_rendering() {
 fn a_course_file_with_an_unknown_ending_says_which_are_known() {
     let folder = Folder::new();
     folder.put("course.txt", crate::common::COURSE.replace("course.png", "course.bmp"));
-    folder.run("render course.txt").exits(1).says(&["course.bmp", ".png", "-o"]);
+    for command in ["render", "check"] {
+        let ran = folder.run(&format!("{command} course.txt")).exits(1).says(&["output_file", ".png", "-o"]);
+        assert_eq!(ran.stderr.matches("course.bmp").count(), 1, "{}", ran.stderr);
+        assert!(ran.stdout.is_empty());
+    }
+    folder.run("render course.txt -o a.png").done();
+}
+
+#[test]
+#[cfg(unix)]
+fn a_course_file_cannot_send_control_characters() {
+    let folder = Folder::new();
+    folder.put("course.txt", crate::common::COURSE.replace("course.png", "\u{1b}[31ma.png"));
+    let ran = folder.run("render course.txt").done().says(&["wrote \u{fffd}[31ma.png"]);
+    assert!(!ran.stderr.contains('\u{1b}'), "{:?}", ran.stderr);
+    // A link's line names two paths
+    fs::remove_file(folder.path("\u{1b}[31ma.png")).unwrap();
+    folder.put("\u{1b}b.png", "");
+    std::os::unix::fs::symlink("\u{1b}b.png", folder.path("\u{1b}[31ma.png")).unwrap();
+    let ran = folder.run("render course.txt").done().says(&["a link", "b.png was replaced"]);
+    assert!(!ran.stderr.contains('\u{1b}'), "{:?}", ran.stderr);
 }
 
 #[test]
@@ -83,7 +148,7 @@ fn a_device_is_written_to_directly_and_says_so() {
     assert_eq!(folder.names(), ["null.png", "scene.toml"]);
     assert!(fs::symlink_metadata(folder.path("null.png")).unwrap().is_symlink());
     // Without an ending the format must be said
-    folder.run("render scene.toml -o /dev/null").exits(2).says(&["/dev/null", ".png"]);
+    folder.run("render scene.toml -o /dev/null").exits(2).says(&["/dev/null", ".png", "--format png"]);
     folder.run("render scene.toml -o /dev/null --format exr").done().says(&["wrote /dev/null directly"]);
 }
 
