@@ -43,14 +43,16 @@ fn assert_unshadowed(scene: &SceneDesc, what: &str) -> usize {
     fast.pixels.iter().filter(|p| p[0] > 0.0).count()
 }
 
-/// A size from 1e-8 to 1e8, and a place: near the origin as far as the size goes, or a million away.
+/// A size from 1e-8 to 2.5e7, and a place: up to a few sizes from the origin, so up to 1e8, or a million away.
 fn size_and_place(random: &mut Random) -> (f64, V) {
     if random.chance(0.3) {
         // 1e6 is known to 0.03: nothing smaller than a few metres has a shape there
         (random.scale(1.0, 1e5), mul(random.direction(), 1e6))
     } else {
-        let size = random.scale(1e-8, 1e8);
-        (size, random.vector(size))
+        // Lights and cameras stand up to six sizes away, and no coordinate may pass 2.5e8
+        let size = random.scale(1e-8, 2.5e7);
+        let reach = size * random.pick(&[1.0, 3.0]);
+        (size, random.vector(reach))
     }
 }
 
