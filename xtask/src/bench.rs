@@ -139,7 +139,7 @@ fn page(options: &Options, ways: &[Way], samples: u64, program: &Program) -> Str
     let mut page = String::new();
     let Options { rounds, size, aa, samples: n, .. } = options;
     let plain = median(&ways[0].seconds);
-    let _ = writeln!(page, "# Config 11, every shadow ray decided\n");
+    let _ = writeln!(page, "## Config 11, every shadow ray decided\n");
     let _ = writeln!(
         page,
         "{size} x {size} pixels, {aa} x {aa} camera rays in each, {n} points on the light: {:.3} thousand million light \
