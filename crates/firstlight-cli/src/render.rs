@@ -83,6 +83,7 @@ pub fn run(args: &RenderArgs) -> Result<(), Failure> {
     show_diagnostics(&compiled.warnings);
     let scene = &compiled.scene;
     settings.check(scene).map_err(Failure::Usage)?;
+    settings.check_memory(scene).map_err(Failure::Work)?;
 
     // Render, until somebody asks to stop
     let watch = Watch::begin();

@@ -66,15 +66,6 @@ impl RenderSettings {
             let names: Vec<_> = SimdLevel::available().iter().map(|level| level.name()).collect();
             return Err(format!("this processor has no {}; it has {}", self.simd.name(), names.join(", ")));
         }
-        let window = self.crop.unwrap_or(Window { x: 0, y: 0, width: scene.width, height: scene.height });
-        let bytes = window.width as usize * window.height as usize * size_of::<[f32; 4]>();
-        // Room for the film, and for the file that is made of it
-        if Vec::<u8>::new().try_reserve_exact(bytes + bytes / 2).is_err() {
-            return Err(format!(
-                "{} x {} pixels take {bytes} bytes and half as much again, more than there is; render parts with a crop",
-                window.width, window.height
-            ));
-        }
         if let Some(w) = self.crop {
             let fits = |start: u32, length: u32, all: u32| length > 0 && start as u64 + length as u64 <= all as u64;
             if !(fits(w.x, w.width, scene.width) && fits(w.y, w.height, scene.height)) {
@@ -85,6 +76,28 @@ impl RenderSettings {
             }
         }
         Ok(())
+    }
+
+    /// Whether there is memory for the film, and for the file that is made of it. For settings that [`check`](Self::check)
+    /// has passed.
+    ///
+    /// # Errors
+    /// How much it takes, and what to do.
+    pub fn check_memory(&self, scene: &Scene) -> Result<(), String> {
+        let window = self.window(scene);
+        let film = window.width as usize * window.height as usize * size_of::<[f32; 4]>();
+        Vec::<u8>::new().try_reserve_exact(film + film / 2).map_err(|_| {
+            let Window { width, height, .. } = window;
+            format!(
+                "{width} x {height} pixels take {} bytes, more than there is; render parts with a crop",
+                film + film / 2
+            )
+        })
+    }
+
+    /// The part of the film to render.
+    fn window(&self, scene: &Scene) -> Window {
+        self.crop.unwrap_or(Window { x: 0, y: 0, width: scene.width, height: scene.height })
     }
 }
 
@@ -135,8 +148,7 @@ pub fn render(
     if let Err(fault) = settings.check(scene) {
         panic!("{fault}");
     }
-    let whole = Window { x: 0, y: 0, width: scene.width, height: scene.height };
-    let window = settings.crop.unwrap_or(whole);
+    let window = settings.window(scene);
     let film = Mutex::new(Film::new([scene.width, scene.height], window));
     let tiles = Tile::cover(window, settings.tile_size);
     let all = window.width as u64 * window.height as u64;

@@ -144,3 +144,14 @@ fn plain_and_fast_agree_on_random_scenes() {
 fn plain_and_fast_agree_under_grazing_light() {
     compare(times(200), random::grazing);
 }
+
+#[test]
+fn a_crop_outside_the_film_is_refused_whatever_its_size() {
+    let scene = compile(&config11(16, 1, 1));
+    let most = u32::MAX;
+    for [x, y, width, height] in [[0, 0, most, most], [most, 0, 1, 1], [0, most, 1, most], [0, 0, 0, 4], [8, 8, 9, 8]] {
+        let crop = Some(firstlight::Window { x, y, width, height });
+        let refused = RenderSettings { crop, ..RenderSettings::default() }.check(&scene);
+        assert!(refused.unwrap_err().contains("does not lie inside"), "{x},{y},{width},{height}");
+    }
+}
