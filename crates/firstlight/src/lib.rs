@@ -46,6 +46,7 @@
 //! - Where files come from: [`Assets`].
 //! - Faults, as data: [`SceneError`], [`Diagnostic`], [`ImageError`]. The library never prints and never exits.
 
+mod accel;
 mod camera;
 mod color;
 mod context;

@@ -6,6 +6,7 @@
 mod parallelogram;
 mod sphere;
 mod surface;
+mod triangles;
 
 pub use parallelogram::{Parallelogram, ParallelogramDesc};
 pub use sphere::{Sphere, SphereDesc, SphereUv};

@@ -1,0 +1,191 @@
+//! The ways through the tree.
+
+use fearless_simd::{f32x8, prelude::*};
+
+use super::beam::Beam;
+use super::node::{LEAF, Node, Tree};
+use super::ray::Slabs;
+
+/// Entries of the stack that lives in the frame; deeper trees, which nothing but malice makes, take one from the heap.
+const STACK: usize = 96;
+
+/// The children of a node that a ray meets: a bit for each, and where it enters them.
+#[inline(always)]
+fn meet<S: Simd>(simd: S, node: &Node, slabs: &Slabs, t_max: f32) -> (u32, f32x8<S>) {
+    let [near_x, near_y, near_z] = slabs.side.map(|side| side & 1);
+    let near = |axis: usize, side: usize| {
+        f32x8::load_array_ref(simd, &node.planes[axis][side]).mul_add(slabs.rd[axis], slabs.near[axis])
+    };
+    let far = |axis: usize, side: usize| {
+        f32x8::load_array_ref(simd, &node.planes[axis][side ^ 1]).mul_add(slabs.rd[axis], slabs.far[axis])
+    };
+    let enter = near(0, near_x).max(near(1, near_y)).max(near(2, near_z).max(0.0));
+    let leave = far(0, near_x).min(far(1, near_y)).min(far(2, near_z).min(t_max));
+    (enter.simd_le(leave).to_bitmask() as u32, enter)
+}
+
+/// An entry of the stack: the nearer, the smaller.
+#[inline(always)]
+fn entry(t: f32, child: u32) -> u64 {
+    u64::from(t.to_bits()) << 32 | u64::from(child)
+}
+
+impl Tree {
+    /// Asks the leaves on a ray, the nearest first; `leaf` may make `t_max` smaller.
+    #[inline(always)]
+    pub fn closest<S: Simd>(&self, simd: S, slabs: &Slabs, t_max: &mut f32, mut leaf: impl FnMut(u32, &mut f32)) {
+        if self.nodes.is_empty() || !(*t_max >= 0.0) {
+            return;
+        }
+        let mut frame = [0; STACK];
+        let mut heap = Vec::new();
+        let stack = if self.stack <= STACK {
+            &mut frame[..]
+        } else {
+            heap.resize(self.stack, 0);
+            &mut heap[..]
+        };
+        let mut len = 0;
+        let mut child = 0;
+        loop {
+            // Down to a leaf, nearest child first
+            'down: while child & LEAF == 0 {
+                let node = &self.nodes[child as usize];
+                let (mut mask, enter) = meet(simd, node, slabs, *t_max);
+                if mask == 0 {
+                    // Up, past what has become too far
+                    while len > 0 {
+                        len -= 1;
+                        let top = stack[len];
+                        if f32::from_bits((top >> 32) as u32) <= *t_max {
+                            child = top as u32;
+                            continue 'down;
+                        }
+                    }
+                    return;
+                }
+                let place = mask.trailing_zeros() as usize & 7;
+                mask &= mask - 1;
+                if mask == 0 {
+                    child = node.children[place];
+                    continue;
+                }
+                // Sort those met onto the stack, the nearest on top, and take it
+                let enter = enter.to_array();
+                let base = len;
+                stack[len] = entry(enter[place], node.children[place]);
+                len += 1;
+                while mask != 0 {
+                    let place = mask.trailing_zeros() as usize & 7;
+                    mask &= mask - 1;
+                    let new = entry(enter[place], node.children[place]);
+                    let mut at = len;
+                    while at > base && stack[at - 1] < new {
+                        stack[at] = stack[at - 1];
+                        at -= 1;
+                    }
+                    stack[at] = new;
+                    len += 1;
+                }
+                len -= 1;
+                child = stack[len] as u32;
+            }
+            leaf(child & !LEAF, t_max);
+            loop {
+                if len == 0 {
+                    return;
+                }
+                len -= 1;
+                let top = stack[len];
+                if f32::from_bits((top >> 32) as u32) <= *t_max {
+                    child = top as u32;
+                    break;
+                }
+            }
+        }
+    }
+
+    /// Asks the leaves on a ray until one says yes.
+    #[inline(always)]
+    pub fn any<S: Simd>(&self, simd: S, slabs: &Slabs, t_max: f32, mut leaf: impl FnMut(u32) -> bool) -> bool {
+        if self.nodes.is_empty() || !(t_max >= 0.0) {
+            return false;
+        }
+        let mut frame = [0u32; STACK];
+        let mut heap = Vec::new();
+        let stack = if self.stack <= STACK {
+            &mut frame[..]
+        } else {
+            heap.resize(self.stack, 0);
+            &mut heap[..]
+        };
+        let mut len = 1;
+        while len > 0 {
+            len -= 1;
+            let child = stack[len];
+            if child & LEAF != 0 {
+                if leaf(child & !LEAF) {
+                    return true;
+                }
+                continue;
+            }
+            let node = &self.nodes[child as usize];
+            let (mut mask, _) = meet(simd, node, slabs, t_max);
+            while mask != 0 {
+                let place = mask.trailing_zeros() as usize & 7;
+                mask &= mask - 1;
+                stack[len] = node.children[place];
+                len += 1;
+            }
+        }
+        false
+    }
+
+    /// Asks the leaves that a beam of rays may meet, the nearest first. `leaf` may lessen how far along the beam is of
+    /// interest; at minus infinity it ends.
+    #[inline(always)]
+    pub fn beam<S: Simd>(&self, simd: S, beam: &Beam, mut leaf: impl FnMut(u32, &mut f32)) {
+        let mut z_max = beam.z_max;
+        if self.nodes.is_empty() || !(z_max >= 0.0) {
+            return;
+        }
+        let mut frame = [0; STACK];
+        let mut heap = Vec::new();
+        let stack = if self.stack <= STACK {
+            &mut frame[..]
+        } else {
+            heap.resize(self.stack, 0);
+            &mut heap[..]
+        };
+        // The root, at 0
+        let mut len = 1;
+        while len > 0 {
+            len -= 1;
+            let top = stack[len];
+            if f32::from_bits((top >> 32) as u32) > z_max {
+                continue;
+            }
+            let child = top as u32;
+            if child & LEAF != 0 {
+                leaf(child & !LEAF, &mut z_max);
+                continue;
+            }
+            let node = &self.nodes[child as usize];
+            let (mut mask, enter) = beam.meet(simd, node, z_max);
+            let enter = enter.to_array();
+            let base = len;
+            while mask != 0 {
+                let place = mask.trailing_zeros() as usize & 7;
+                mask &= mask - 1;
+                let new = entry(enter[place], node.children[place]);
+                let mut at = len;
+                while at > base && stack[at - 1] < new {
+                    stack[at] = stack[at - 1];
+                    at -= 1;
+                }
+                stack[at] = new;
+                len += 1;
+            }
+        }
+    }
+}

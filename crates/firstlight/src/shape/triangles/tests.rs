@@ -1,0 +1,232 @@
+//! The tree against asking every triangle, and closed meshes against rays through their seams.
+
+use super::*;
+use crate::render::SimdLevel;
+
+/// Numbers that look random.
+struct Random(u64);
+
+impl Random {
+    fn next(&mut self) -> u32 {
+        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        let x = (self.0 >> 32) as u32;
+        x ^ (x >> 15)
+    }
+
+    /// From -1 to 1.
+    fn signed(&mut self) -> f32 {
+        (self.next() & 0xff_ffff) as f32 / 8_388_608.0 - 1.0
+    }
+
+    fn vector(&mut self) -> Vec3 {
+        Vec3::new(self.signed(), self.signed(), self.signed())
+    }
+}
+
+struct Mesh {
+    positions: Vec<[f32; 3]>,
+    triangles: Vec<[u32; 3]>,
+}
+
+impl Mesh {
+    fn tree(&self) -> TriangleTree {
+        TriangleTree::build(&self.positions, &self.triangles)
+    }
+
+    fn map(mut self, f: impl Fn(Vec3) -> Vec3) -> Self {
+        for p in &mut self.positions {
+            *p = f(Vec3::from_array(*p)).to_array();
+        }
+        self
+    }
+
+    /// Triangles of about this size, and of these proportions, anywhere in a cube.
+    fn soup(count: u32, size: Vec3, random: &mut Random) -> Self {
+        let mut mesh = Mesh { positions: Vec::new(), triangles: Vec::new() };
+        for i in 0..count {
+            let center = random.vector();
+            for _ in 0..3 {
+                mesh.positions.push((center + random.vector() * size).to_array());
+            }
+            mesh.triangles.push([3 * i, 3 * i + 1, 3 * i + 2]);
+        }
+        mesh
+    }
+
+    /// A closed sphere of radius 1 around the origin: `n` rings of `n`, without sines.
+    fn sphere(n: u32) -> Self {
+        let around = |i: u32, n: u32| {
+            // On a square, then on the circle
+            let s = 4.0 * i as f32 / n as f32;
+            let (x, y) = match s as u32 {
+                0 => (1.0 - s, s),
+                1 => (1.0 - s, 2.0 - s),
+                2 => (s - 3.0, 2.0 - s),
+                _ => (s - 3.0, s - 4.0),
+            };
+            let length = (x * x + y * y).sqrt();
+            (x / length, y / length)
+        };
+        let mut mesh = Mesh { positions: vec![[0.0, 1.0, 0.0]], triangles: Vec::new() };
+        for ring in 1..n {
+            let (cos, sin) = around(ring, 2 * n);
+            for i in 0..n {
+                let (x, z) = around(i, n);
+                mesh.positions.push([x * sin, cos, z * sin]);
+            }
+        }
+        let last = mesh.positions.len() as u32;
+        mesh.positions.push([0.0, -1.0, 0.0]);
+        let at = |ring: u32, i: u32| match ring {
+            0 => 0,
+            ring if ring == n => last,
+            ring => 1 + (ring - 1) * n + i % n,
+        };
+        for ring in 0..n {
+            for i in 0..n {
+                let (a, b, c, d) = (at(ring, i), at(ring, i + 1), at(ring + 1, i), at(ring + 1, i + 1));
+                mesh.triangles.extend(
+                    [[a, b, c], [b, d, c]].into_iter().filter(|t| t[0] != t[1] && t[1] != t[2] && t[0] != t[2]),
+                );
+            }
+        }
+        mesh
+    }
+
+    /// Squares in a plane, cut in two, which axis-parallel rays meet on their seams.
+    fn grid(n: u32) -> Self {
+        let mut mesh = Mesh { positions: Vec::new(), triangles: Vec::new() };
+        for j in 0..=n {
+            for i in 0..=n {
+                mesh.positions.push([i as f32 - n as f32 / 2.0, 0.0, j as f32 - n as f32 / 2.0]);
+            }
+        }
+        for j in 0..n {
+            for i in 0..n {
+                let a = j * (n + 1) + i;
+                mesh.triangles.extend([[a, a + n + 1, a + 1], [a + 1, a + n + 1, a + n + 2]]);
+            }
+        }
+        mesh
+    }
+}
+
+/// All ways of asking, on every processor level, against every triangle in turn. Rays come in tiles of 64.
+fn check(mesh: &Mesh, tiles: &[RayTile], t_max: f32) -> usize {
+    let tree = mesh.tree();
+    let mut hits = 0;
+    let filters: [&(dyn Fn(u32) -> bool + Sync); 2] = [&|_| true, &|triangle| triangle % 3 != 1];
+    for (rays, filter) in tiles.iter().flat_map(|tile| filters.map(|filter| (tile, filter))) {
+        let filter = &|triangle| filter(triangle);
+        let expected: Vec<_> = (0..64).map(|i| tree.brute_force(&rays.ray(i), t_max, filter)).collect();
+        hits += expected.iter().flatten().count();
+        for level in SimdLevel::available() {
+            let level = level.token();
+            let mut found = TileHits::new(t_max);
+            let mask = tree.tile_at(level, rays, u64::MAX, 7, &mut found, filter);
+            for (i, expected) in expected.iter().enumerate() {
+                let ray = rays.ray(i);
+                assert_eq!(tree.closest_at(level, &ray, t_max, filter), *expected, "closest, {ray:?}");
+                assert_eq!(tree.any_at(level, &ray, t_max, filter), expected.is_some(), "any, {ray:?}");
+                assert_eq!(found.get(i), *expected, "tile, {ray:?}");
+                assert_eq!(mask >> i & 1 == 1, expected.is_some());
+            }
+            for block in 0..4 {
+                let mut packet = RayPacket16::ZERO;
+                let mut want = 0;
+                for i in 0..16 {
+                    packet.set(i, rays.o(16 * block + i), rays.d(16 * block + i));
+                    want |= u16::from(expected[16 * block + i].is_some()) << i;
+                }
+                assert_eq!(tree.any16_at(level, &packet, &[t_max; 16], 0xffff, filter), want, "any16, {block}");
+                assert_eq!(tree.any16_at(level, &packet, &[t_max; 16], 0x0ff0, filter), want & 0x0ff0);
+            }
+        }
+    }
+    hits
+}
+
+/// Rays of all kinds around a place: from one point, to one point, parallel, along axes, anyhow.
+fn tiles(count: usize, center: Vec3, size: f32, random: &mut Random) -> Vec<RayTile> {
+    let mut tiles = Vec::new();
+    for kind in 0..count {
+        let mut tile = RayTile::ZERO;
+        let (a, b) = (random.vector() * 3.0, random.vector() * 0.5);
+        let spread = [0.01, 0.1, 1.0][kind % 3];
+        for i in 0..64 {
+            let c = random.vector() * spread;
+            let (o, d) = match kind % 7 {
+                0 | 1 => (a, b + c - a),
+                2 => (a + c, b - a - c),
+                3 => (a + c, b - a),
+                4 => (Vec3::new((a.x * 4.0).round() * 0.25, a.y, i as f32 * 0.25 - 8.0), Vec3::NEG_Y * a.y.signum()),
+                5 => (a + c, Vec3::new(c.x, 1e-20, 0.0)),
+                _ => (random.vector() * 2.0, random.vector()),
+            };
+            tile.set(i, center + o * size, d * size);
+        }
+        tiles.push(tile);
+    }
+    // And some that meet nothing
+    if let Some(tile) = tiles.last_mut() {
+        tile.set(3, Vec3::ZERO, Vec3::ZERO);
+        tile.set(4, Vec3::NAN, Vec3::X);
+        tile.set(5, Vec3::ZERO, Vec3::new(f32::INFINITY, 1.0, 1.0));
+        tile.set(6, Vec3::ZERO, Vec3::new(f32::NAN, 1.0, 1.0));
+    }
+    tiles
+}
+
+const FAR: Vec3 = Vec3::new(148_376.0, 1234.0, -223_423.0);
+
+#[test]
+fn every_way_of_asking_equals_brute_force() {
+    let mut random = Random(1);
+    let random = &mut random;
+    let meshes = [
+        Mesh::soup(1000, Vec3::splat(0.1), random),
+        Mesh::soup(60, Vec3::splat(2.0), random),
+        Mesh::soup(700, Vec3::new(1.0, 1e-4, 1e-4), random),
+        Mesh::soup(500, Vec3::new(1.0, 1e-7, 0.0), random),
+        Mesh::sphere(20),
+        Mesh::grid(24),
+    ];
+    for (i, mesh) in meshes.into_iter().enumerate() {
+        let tiles = tiles(35, Vec3::ZERO, 1.0, random);
+        let hits = check(&mesh, &tiles, f32::INFINITY);
+        assert!(hits > 50 || i == 2 || i == 3, "mesh {i}: {hits}");
+        check(&mesh, &tiles[..14], 0.75);
+    }
+}
+
+#[test]
+fn scale_and_place_do_not_matter() {
+    let mut random = Random(2);
+    for (center, size) in [(FAR, 1.0), (Vec3::ZERO, 1e-6), (Vec3::ZERO, 1e6), (FAR, 1000.0)] {
+        for mesh in [Mesh::soup(600, Vec3::splat(0.2), &mut random), Mesh::sphere(16)] {
+            let mesh = mesh.map(|p| center + p * size);
+            let hits = check(&mesh, &tiles(14, center, size, &mut random), f32::INFINITY);
+            assert!(hits > 50, "{hits}");
+        }
+    }
+}
+
+#[test]
+fn what_has_no_area_or_no_place_is_left_out() {
+    let mut random = Random(3);
+    let mut mesh = Mesh::soup(50, Vec3::splat(0.5), &mut random);
+    mesh.positions[0] = [f32::NAN, 0.0, 0.0];
+    mesh.positions[4] = [0.0, f32::INFINITY, 0.0];
+    mesh.positions[8] = mesh.positions[7];
+    (mesh.positions[9], mesh.positions[10], mesh.positions[11]) = ([0.0; 3], [1.0; 3], [3.0; 3]);
+    mesh.triangles[4] = [12, 13, 10_000];
+    let tree = mesh.tree();
+    assert_eq!(tree.len(), 45);
+    check(&mesh, &tiles(14, Vec3::ZERO, 1.0, &mut random), f32::INFINITY);
+    let empty = TriangleTree::build(&[], &[]);
+    assert_eq!((empty.len(), empty.bounds()), (0, Aabb::EMPTY));
+    assert_eq!(empty.closest_at(Level::new(), &TraceRay::new(Vec3::ZERO, Vec3::X), 1.0, &|_| true), None);
+    let one = Mesh { positions: vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]], triangles: vec![[0, 1, 2]] };
+    let hit = one.tree().closest_at(Level::new(), &TraceRay::new(Vec3::new(0.25, 0.5, 2.0), -Vec3::Z), 2.0, &|_| true);
+    assert_eq!(hit, Some(TriangleHit { t: 2.0, u: 0.25, v: 0.5, triangle: 0 }));
+}
