@@ -47,6 +47,8 @@
 //! - Faults, as data: [`SceneError`], [`Diagnostic`], [`ImageError`]. The library never prints and never exits.
 
 mod accel;
+#[doc(hidden)]
+pub mod bench;
 mod camera;
 mod color;
 mod context;

@@ -15,6 +15,7 @@ pub use surface::{Footprint, RayDifferential, SurfaceInteraction, UvEdge};
 pub(crate) use parallelogram::{ParallelogramShadow, PlaneSide};
 pub(crate) use sphere::SphereShadow;
 pub(crate) use surface::ShapePoint;
+pub(crate) use triangles::{TileHits, TriangleTree};
 
 use crate::describe::family;
 
