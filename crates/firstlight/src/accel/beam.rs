@@ -51,27 +51,28 @@ pub(crate) fn axes(kz: usize) -> [usize; 3] {
 #[inline(always)]
 pub(crate) fn groups<S: Simd, const N: usize>(simd: S, rays: &Rays<N>, active: u64) -> [u64; 6] {
     let mut groups = [0; 6];
-    let splat = |v: f32| simd.splat_f32x16(v);
     for block in 0..N / 16 {
         let active = active >> (16 * block) & 0xffff;
         if active == 0 {
             continue;
         }
-        let [ox, oy, oz] = rays.block(simd, &rays.o, block);
+        let o = rays.block(simd, &rays.o, block);
         let [dx, dy, dz] = rays.block(simd, &rays.d, block);
         let (ax, ay, az) = (dx.abs(), dy.abs(), dz.abs());
         // A NaN anywhere makes a comparison false
-        let near = |o: f32x16<S>| o.abs().simd_le(splat(MAX_COORDINATE));
-        let small = |d: f32x16<S>| d.simd_le(splat(MAX_DIRECTION));
-        let large = |d: f32x16<S>| d.simd_ge(splat(MIN_DIRECTION));
-        let valid = near(ox) & near(oy) & near(oz) & small(ax) & small(ay) & small(az);
-        let valid = valid & (large(ax) | large(ay) | large(az));
+        let valid = o[0].abs().simd_le(MAX_COORDINATE)
+            & o[1].abs().simd_le(MAX_COORDINATE)
+            & o[2].abs().simd_le(MAX_COORDINATE)
+            & ax.simd_le(MAX_DIRECTION)
+            & ay.simd_le(MAX_DIRECTION)
+            & az.simd_le(MAX_DIRECTION)
+            & (ax.simd_ge(MIN_DIRECTION) | ay.simd_ge(MIN_DIRECTION) | az.simd_ge(MIN_DIRECTION));
         let valid = valid.to_bitmask() & active;
         let along_x = (ax.simd_ge(ay) & ax.simd_ge(az)).to_bitmask();
         let along_y = ay.simd_ge(az).to_bitmask() & !along_x;
-        let along_z = !along_x & !along_y;
-        for (axis, (along, d)) in [(along_x, dx), (along_y, dy), (along_z, dz)].into_iter().enumerate() {
-            let negative = d.simd_lt(splat(0.0)).to_bitmask();
+        let along_z = 0xffff & !along_x & !along_y;
+        let negatives = [dx.simd_lt(0.0).to_bitmask(), dy.simd_lt(0.0).to_bitmask(), dz.simd_lt(0.0).to_bitmask()];
+        for (axis, (along, negative)) in [along_x, along_y, along_z].into_iter().zip(negatives).enumerate() {
             groups[2 * axis] |= (valid & along & !negative) << (16 * block);
             groups[2 * axis + 1] |= (valid & along & negative) << (16 * block);
         }
@@ -79,43 +80,73 @@ pub(crate) fn groups<S: Simd, const N: usize>(simd: S, rays: &Rays<N>, active: u
     groups
 }
 
+/// Sixteen of many numbers.
+#[inline(always)]
+fn sixteen<S: Simd, const N: usize>(simd: S, of: &[f32; N], block: usize) -> f32x16<S> {
+    f32x16::from_slice(simd, &of[16 * block..16 * block + 16])
+}
+
+/// The largest distance from the centre along any axis.
+#[inline(always)]
+fn reach<S: Simd>(o: [f32x16<S>; 3], center: Vec3) -> f32x16<S> {
+    (o[0] - center.x).abs().max((o[1] - center.y).abs()).max((o[2] - center.z).abs())
+}
+
+/// The reciprocal, as [`TraceRay`](super::TraceRay) has it.
+#[inline(always)]
+fn reciprocal<S: Simd>(simd: S, d: f32x16<S>, least: f32x16<S>) -> f32x16<S> {
+    simd.splat_f32x16(1.0) / d.abs().simd_lt(least).select(least.copysign(d), d)
+}
+
 impl<const N: usize> Rays<N> {
     /// Sixteen of the rays' coordinates.
     #[inline(always)]
     fn block<S: Simd>(&self, simd: S, of: &[[f32; N]; 3], block: usize) -> [f32x16<S>; 3] {
-        let load = |axis: usize| f32x16::from_slice(simd, &of[axis][16 * block..16 * block + 16]);
-        [load(0), load(1), load(2)]
+        [sixteen(simd, &of[0], block), sixteen(simd, &of[1], block), sixteen(simd, &of[2], block)]
     }
 
     /// Sixteen of the rays, which share their largest axis, ready for triangles.
     #[inline(always)]
     pub fn lanes<S: Simd>(&self, simd: S, block: usize, [kx, ky, kz]: [usize; 3], center: Vec3, half: f32) -> Lanes<S> {
-        let splat = |v: f32| simd.splat_f32x16(v);
         let o = self.block(simd, &self.o, block);
         let d = self.block(simd, &self.d, block);
-        let least = d[kz].abs() * splat(SMALLEST);
-        let reciprocal = |d: f32x16<S>| {
-            let d = d.abs().simd_lt(least).select(least.copysign(d), d);
-            splat(1.0) / d
-        };
-        let rd = [reciprocal(d[kx]), reciprocal(d[ky]), reciprocal(d[kz])];
-        let away = |axis: usize| (o[axis] - splat(center[axis])).abs();
-        let reach = away(0).max(away(1)).max(away(2)) + splat(half);
-        let pad = reach * splat(OWN_PAD);
+        let least = d[kz].abs() * SMALLEST;
+        let rd =
+            [reciprocal(simd, d[kx], least), reciprocal(simd, d[ky], least), reciprocal(simd, d[kz], least)];
+        let pad = (reach(o, center) + half) * OWN_PAD;
         Lanes {
             o: [o[kx], o[ky], o[kz]],
-            shear: [d[kx] / d[kz], d[ky] / d[kz], splat(1.0) / d[kz]],
+            shear: [d[kx] / d[kz], d[ky] / d[kz], simd.splat_f32x16(1.0) / d[kz]],
             rd,
             own: [rd[0].abs() * pad, rd[1].abs() * pad, rd[2].abs() * pad],
         }
     }
 }
 
-/// The least and the largest of those lanes that a mask names.
-#[inline(always)]
-fn range<S: Simd>(simd: S, (least, largest): &mut (f32, f32), mask: mask32x16<S>, v: f32x16<S>) {
-    *least = least.min(mask.select(v, simd.splat_f32x16(f32::INFINITY)).reduce_min());
-    *largest = largest.max(mask.select(v, simd.splat_f32x16(f32::NEG_INFINITY)).reduce_max());
+/// The least and the largest of many numbers, lane by lane.
+#[derive(Clone, Copy)]
+struct Range<S: Simd> {
+    least: f32x16<S>,
+    largest: f32x16<S>,
+}
+
+impl<S: Simd> Range<S> {
+    #[inline(always)]
+    fn new(simd: S) -> Self {
+        Range { least: simd.splat_f32x16(f32::INFINITY), largest: simd.splat_f32x16(f32::NEG_INFINITY) }
+    }
+
+    /// Those lanes that the mask names.
+    #[inline(always)]
+    fn add(&mut self, mask: mask32x16<S>, v: f32x16<S>) {
+        self.least = mask.select(v.min(self.least), self.least);
+        self.largest = mask.select(v.max(self.largest), self.largest);
+    }
+
+    #[inline(always)]
+    fn get(&self) -> (f32, f32) {
+        (self.least.reduce_min(), self.largest.reduce_max())
+    }
 }
 
 impl Beam {
@@ -134,45 +165,40 @@ impl Beam {
         let kz = which / 2;
         let sign = if which % 2 == 0 { 1.0 } else { -1.0 };
         let [kx, ky, kz] = axes(kz);
-        let splat = |v: f32| simd.splat_f32x16(v);
-        const NONE: (f32, f32) = (f32::INFINITY, f32::NEG_INFINITY);
         // Where the rays start and end along z, and how far all that is from the centre
-        let (mut starts, mut ends, mut reach) = (NONE, NONE, NONE);
+        let (mut starts, mut ends, mut far) = (Range::new(simd), Range::new(simd), Range::new(simd));
         for block in 0..N / 16 {
             let mask = mask32x16::from_bitmask(simd, group >> (16 * block) & 0xffff);
             let o = rays.block(simd, &rays.o, block);
-            let d = rays.block(simd, &rays.d, block);
-            let away = |axis: usize| (o[axis] - splat(center[axis])).abs();
-            range(simd, &mut reach, mask, away(0).max(away(1)).max(away(2)));
-            let z = (o[kz] - splat(center[kz])) * splat(sign);
-            range(simd, &mut starts, mask, z);
-            let t = f32x16::from_slice(simd, &t_max[16 * block..16 * block + 16]);
-            range(simd, &mut ends, mask, z + d[kz].abs() * t);
+            far.add(mask, reach(o, center));
+            let z = (o[kz] - center[kz]) * sign;
+            starts.add(mask, z);
+            ends.add(mask, z + sixteen(simd, &rays.d[kz], block).abs() * sixteen(simd, t_max, block));
         }
-        let (z_start, z_end) = (starts.0, ends.1);
-        let reach = reach.1 + half;
+        let (z_start, z_end) = (starts.get().0, ends.get().1);
+        let reach = far.get().1 + half;
         let z_length = z_end - z_start;
-        // What lies behind the tree is of no interest, and would widen what rounding asks for
-        let (mut first, mut last, mut slopes) = ([NONE; 2], [NONE; 2], [NONE; 2]);
+        // Where they are there, and their slopes
+        let mut first = [Range::new(simd); 2];
+        let mut last = [Range::new(simd); 2];
+        let mut slopes = [Range::new(simd); 2];
         for block in 0..N / 16 {
             let mask = mask32x16::from_bitmask(simd, group >> (16 * block) & 0xffff);
-            let o = rays.block(simd, &rays.o, block);
-            let d = rays.block(simd, &rays.d, block);
-            let z = (o[kz] - splat(center[kz])) * splat(sign);
-            let r = splat(1.0) / d[kz].abs();
+            let z = (sixteen(simd, &rays.o[kz], block) - center[kz]) * sign;
+            let r = simd.splat_f32x16(1.0) / sixteen(simd, &rays.d[kz], block).abs();
             for (i, k) in [kx, ky].into_iter().enumerate() {
-                let x = o[k] - splat(center[k]);
-                let slope = d[k] * r;
-                range(simd, &mut slopes[i], mask, slope);
-                range(simd, &mut first[i], mask, x + slope * (splat(z_start) - z));
-                range(simd, &mut last[i], mask, x + slope * (splat(z_end) - z));
+                let x = sixteen(simd, &rays.o[k], block) - center[k];
+                let slope = sixteen(simd, &rays.d[k], block) * r;
+                slopes[i].add(mask, slope);
+                first[i].add(mask, x + slope * (-z + z_start));
+                last[i].add(mask, x + slope * (-z + z_end));
             }
         }
         let mut pad = reach * BEAM_PAD;
         let line = Line { a: 0.0, b: 0.0 };
         let (mut lower, mut upper) = ([line; 2], [line; 2]);
         for i in 0..2 {
-            let (slope, first, last) = (slopes[i], first[i], last[i]);
+            let (slope, first, last) = (slopes[i].get(), first[i].get(), last[i].get());
             if z_length < MAX_COORDINATE && last.1 - last.0 < first.1 - first.0 {
                 lower[i] = Line { a: last.0 - slope.1 * z_length, b: slope.1 };
                 upper[i] = Line { a: last.1 - slope.0 * z_length, b: slope.0 };
@@ -202,18 +228,14 @@ impl Beam {
     /// How far the rays in `group` reach now, at most.
     #[inline(always)]
     pub fn z_max<S: Simd, const N: usize>(&self, simd: S, rays: &Rays<N>, t_max: &[f32; N], group: u64) -> f32 {
-        let splat = |v: f32| simd.splat_f32x16(v);
         let kz = self.axes[2];
-        let mut ends = (f32::INFINITY, f32::NEG_INFINITY);
+        let mut ends = Range::new(simd);
         for block in 0..N / 16 {
             let mask = mask32x16::from_bitmask(simd, group >> (16 * block) & 0xffff);
-            let o = f32x16::from_slice(simd, &rays.o[kz][16 * block..16 * block + 16]);
-            let d = f32x16::from_slice(simd, &rays.d[kz][16 * block..16 * block + 16]);
-            let t = f32x16::from_slice(simd, &t_max[16 * block..16 * block + 16]);
-            let z = (o - splat(self.center)) * splat(self.sign) + splat(self.start);
-            range(simd, &mut ends, mask, z + d.abs() * t);
+            let z = (sixteen(simd, &rays.o[kz], block) - self.center) * self.sign + self.start;
+            ends.add(mask, z + sixteen(simd, &rays.d[kz], block).abs() * sixteen(simd, t_max, block));
         }
-        ends.1 + self.pad
+        ends.get().1 + self.pad
     }
 
     /// The children of a node that the beam meets: a bit for each, and where along the beam they begin.
@@ -222,17 +244,18 @@ impl Beam {
         let [kx, ky, kz] = self.axes;
         assert!(kx < 3 && ky < 3 && kz < 3, "axes are axes");
         let side = self.side & 1;
-        let splat = |v: f32| simd.splat_f32x8(v);
-        let plane = |axis: usize, side: usize| f32x8::load_array_ref(simd, &node.planes[axis][side]);
-        let enter = plane(kz, side).mul_add(self.sign, self.start - self.pad).max(0.0);
-        let leave = plane(kz, side ^ 1).mul_add(self.sign, self.start + self.pad).min(z_max);
+        let planes = &node.planes;
+        let near = f32x8::load_array_ref(simd, &planes[kz][side]);
+        let far = f32x8::load_array_ref(simd, &planes[kz][side ^ 1]);
+        let enter = near.mul_add(self.sign, self.start - self.pad).max(0.0);
+        let leave = far.mul_add(self.sign, self.start + self.pad).min(z_max);
         let mut met = enter.simd_le(leave);
         for (i, k) in [kx, ky].into_iter().enumerate() {
             let (lower, upper) = (self.lower[i], self.upper[i]);
             let z = if lower.b >= 0.0 { enter } else { leave };
-            met &= z.mul_add(lower.b, splat(lower.a)).simd_le(plane(k, 1));
+            met &= z.mul_add(lower.b, lower.a).simd_le(f32x8::load_array_ref(simd, &planes[k][1]));
             let z = if upper.b >= 0.0 { leave } else { enter };
-            met &= z.mul_add(upper.b, splat(upper.a)).simd_ge(plane(k, 0));
+            met &= z.mul_add(upper.b, upper.a).simd_ge(f32x8::load_array_ref(simd, &planes[k][0]));
         }
         (met.to_bitmask() as u32, enter)
     }

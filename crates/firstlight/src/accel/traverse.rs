@@ -9,18 +9,23 @@ use super::ray::Slabs;
 /// Entries of the stack that lives in the frame; deeper trees, which nothing but malice makes, take one from the heap.
 const STACK: usize = 96;
 
+/// Where a ray crosses planes. Closures would do, were they always inlined: out of line they lose the instruction set.
+#[inline(always)]
+fn cross<S: Simd>(simd: S, planes: &[f32; 8], rd: f32, plus: f32) -> f32x8<S> {
+    f32x8::load_array_ref(simd, planes).mul_add(rd, plus)
+}
+
 /// The children of a node that a ray meets: a bit for each, and where it enters them.
 #[inline(always)]
 fn meet<S: Simd>(simd: S, node: &Node, slabs: &Slabs, t_max: f32) -> (u32, f32x8<S>) {
-    let [near_x, near_y, near_z] = slabs.side.map(|side| side & 1);
-    let near = |axis: usize, side: usize| {
-        f32x8::load_array_ref(simd, &node.planes[axis][side]).mul_add(slabs.rd[axis], slabs.near[axis])
-    };
-    let far = |axis: usize, side: usize| {
-        f32x8::load_array_ref(simd, &node.planes[axis][side ^ 1]).mul_add(slabs.rd[axis], slabs.far[axis])
-    };
-    let enter = near(0, near_x).max(near(1, near_y)).max(near(2, near_z).max(0.0));
-    let leave = far(0, near_x).min(far(1, near_y)).min(far(2, near_z).min(t_max));
+    let [x, y, z] = slabs.side.map(|side| side & 1);
+    let planes = &node.planes;
+    let enter = cross(simd, &planes[0][x], slabs.rd[0], slabs.near[0])
+        .max(cross(simd, &planes[1][y], slabs.rd[1], slabs.near[1]))
+        .max(cross(simd, &planes[2][z], slabs.rd[2], slabs.near[2]).max(0.0));
+    let leave = cross(simd, &planes[0][x ^ 1], slabs.rd[0], slabs.far[0])
+        .min(cross(simd, &planes[1][y ^ 1], slabs.rd[1], slabs.far[1]))
+        .min(cross(simd, &planes[2][z ^ 1], slabs.rd[2], slabs.far[2]).min(t_max));
     (enter.simd_le(leave).to_bitmask() as u32, enter)
 }
 

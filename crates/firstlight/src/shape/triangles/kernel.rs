@@ -83,17 +83,23 @@ pub(super) struct Crossings<S: Simd> {
     pub det: f32x16<S>,
 }
 
+/// A vertex as the rays see it; z is not yet divided by their length along it.
+#[inline(always)]
+fn shear<S: Simd>(simd: S, rays: &Lanes<S>, v: [f32; 3]) -> (f32x16<S>, f32x16<S>, f32x16<S>) {
+    let z = simd.splat_f32x16(v[2]) - rays.o[2];
+    let x = (simd.splat_f32x16(v[0]) - rays.o[0]) - rays.shear[0] * z;
+    let y = (simd.splat_f32x16(v[1]) - rays.o[1]) - rays.shear[1] * z;
+    (x, y, z)
+}
+
 /// [`intersect`] for sixteen rays; the coordinates of the triangle are along kx, ky, kz.
 #[inline(always)]
 pub(super) fn intersect_lanes<S: Simd>(simd: S, rays: &Lanes<S>, triangle: [[f32; 3]; 3]) -> Option<Crossings<S>> {
-    let splat = |v: f32| simd.splat_f32x16(v);
-    let zero = splat(0.0);
-    let [sx, sy, sz] = rays.shear;
-    let shear = |v: [f32; 3]| {
-        let z = splat(v[2]) - rays.o[2];
-        ((splat(v[0]) - rays.o[0]) - sx * z, (splat(v[1]) - rays.o[1]) - sy * z, z)
-    };
-    let ((ax, ay, az), (bx, by, bz), (cx, cy, cz)) = (shear(triangle[0]), shear(triangle[1]), shear(triangle[2]));
+    let zero = simd.splat_f32x16(0.0);
+    let sz = rays.shear[2];
+    let (ax, ay, az) = shear(simd, rays, triangle[0]);
+    let (bx, by, bz) = shear(simd, rays, triangle[1]);
+    let (cx, cy, cz) = shear(simd, rays, triangle[2]);
     let (u, v, w) = (cx * by - cy * bx, ax * cy - ay * cx, bx * ay - by * ax);
     let inside = u.min(v).min(w).simd_ge(zero) | u.max(v).max(w).simd_le(zero);
     if inside.all_false() {
@@ -104,10 +110,10 @@ pub(super) fn intersect_lanes<S: Simd>(simd: S, rays: &Lanes<S>, triangle: [[f32
     let (az, bz, cz) = (sz * az, sz * bz, sz * cz);
     let t = ((u * az + v * bz) + w * cz) / det;
     // Not before the triangle's own box
-    let (mut enter, mut leave) = (splat(f32::NEG_INFINITY), splat(f32::INFINITY));
+    let (mut enter, mut leave) = (simd.splat_f32x16(f32::NEG_INFINITY), simd.splat_f32x16(f32::INFINITY));
     for axis in 0..3 {
-        let [a, b, c] = triangle.map(|v| v[axis]);
-        let (lo, hi) = (splat(a.min(b).min(c)), splat(a.max(b).max(c)));
+        let [a, b, c] = [triangle[0][axis], triangle[1][axis], triangle[2][axis]];
+        let (lo, hi) = (simd.splat_f32x16(a.min(b).min(c)), simd.splat_f32x16(a.max(b).max(c)));
         let rd = rays.rd[axis];
         let negative = rd.simd_lt(zero);
         let (near, far) = (negative.select(hi, lo), negative.select(lo, hi));

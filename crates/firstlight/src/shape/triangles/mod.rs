@@ -172,23 +172,14 @@ impl TriangleTree {
     fn candidates<S: Simd>(&self, simd: S, ray: &TraceRay, pack: &Pack) -> u32 {
         let [kx, ky, kz] = ray.axes;
         assert!(kx < 3 && ky < 3 && kz < 3, "axes are axes");
-        let splat = |v: f32| simd.splat_f32x4(v);
         let o = ray.o.to_array();
-        let (ox, oy, oz) = (splat(o[kx]), splat(o[ky]), splat(o[kz]));
-        let (sx, sy) = (splat(ray.shear[0]), splat(ray.shear[1]));
-        let shear = |vertex: &[[f32; PACK]; 3]| {
-            let z = f32x4::load_array_ref(simd, &vertex[kz]) - oz;
-            (
-                (f32x4::load_array_ref(simd, &vertex[kx]) - ox) - sx * z,
-                (f32x4::load_array_ref(simd, &vertex[ky]) - oy) - sy * z,
-            )
-        };
-        let (ax, ay) = shear(&pack.vertices[0]);
-        let (bx, by) = shear(&pack.vertices[1]);
-        let (cx, cy) = shear(&pack.vertices[2]);
+        let (o, s) = ([o[kx], o[ky], o[kz]], [ray.shear[0], ray.shear[1]]);
+        let [a, b, c] = &pack.vertices;
+        let (ax, ay) = shear(simd, &a[kx], &a[ky], &a[kz], o, s);
+        let (bx, by) = shear(simd, &b[kx], &b[ky], &b[kz], o, s);
+        let (cx, cy) = shear(simd, &c[kx], &c[ky], &c[kz], o, s);
         let (u, v, w) = (cx * by - cy * bx, ax * cy - ay * cx, bx * ay - by * ax);
-        let zero = splat(0.0);
-        (u.min(v).min(w).simd_ge(zero) | u.max(v).max(w).simd_le(zero)).to_bitmask() as u32
+        (u.min(v).min(w).simd_ge(0.0) | u.max(v).max(w).simd_le(0.0)).to_bitmask() as u32
     }
 
     /// The first triangle on a ray, 0 < t <= `t_max`, among those that `filter` lets count.
@@ -349,8 +340,13 @@ impl TriangleTree {
         filter: &impl Fn(u32) -> bool,
     ) -> u64 {
         let beam = Beam::new(simd, rays, &hits.t, group, which, self.tree.center, self.tree.half);
-        let lanes = |block| rays.lanes(simd, block, beam.axes, self.tree.center, self.tree.half);
-        let lanes = [lanes(0), lanes(1), lanes(2), lanes(3)];
+        let (center, half) = (self.tree.center, self.tree.half);
+        let lanes = [
+            rays.lanes(simd, 0, beam.axes, center, half),
+            rays.lanes(simd, 1, beam.axes, center, half),
+            rays.lanes(simd, 2, beam.axes, center, half),
+            rays.lanes(simd, 3, beam.axes, center, half),
+        ];
         let zero = simd.splat_f32x16(0.0);
         let mut found = 0;
         self.tree.beam(simd, &beam, |leaf, z_max| {
@@ -462,6 +458,20 @@ impl TriangleTree {
     ) -> u64 {
         dispatch!(level, simd => self.tile(simd, rays, active, surface, hits, filter))
     }
+}
+
+/// One vertex of all triangles of a leaf, as the triangle test of a ray from `o` sees it.
+#[inline(always)]
+fn shear<S: Simd>(
+    simd: S,
+    x: &[f32; PACK],
+    y: &[f32; PACK],
+    z: &[f32; PACK],
+    o: [f32; 3],
+    s: [f32; 2],
+) -> (f32x4<S>, f32x4<S>) {
+    let z = f32x4::load_array_ref(simd, z) - o[2];
+    ((f32x4::load_array_ref(simd, x) - o[0]) - z * s[0], (f32x4::load_array_ref(simd, y) - o[1]) - z * s[1])
 }
 
 /// A triangle's coordinates along kx, ky, kz.
