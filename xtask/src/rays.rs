@@ -244,7 +244,8 @@ fn shadow_rays(scene: &Scene, camera: &[RayBits], hits: &[HitBits]) -> Vec<RayBi
 fn compile(folder: &Path) -> Result<PathBuf, String> {
     let program = folder.join("embree");
     let source = root().join("xtask/embree/embree.cc");
-    let output = Command::new("c++").args(["-O3", "-march=native", "-o"]).arg(&program).arg(source).arg("-lembree3").output();
+    let output =
+        Command::new("c++").args(["-O3", "-march=native", "-o"]).arg(&program).arg(source).arg("-lembree3").output();
     let output = output.map_err(|e| format!("c++: {e}"))?;
     let words = String::from_utf8_lossy(&output.stderr);
     if output.status.success() { Ok(program) } else { Err(words.lines().next().unwrap_or("c++ failed").to_owned()) }
@@ -497,7 +498,10 @@ fn page(options: &Options, rows: &[Row]) -> String {
         let _ = write!(command, " --name {name}");
     }
     let _ = writeln!(page, "- command: `{command}`\n");
-    let _ = writeln!(page, "| scene | what | unit | firstlight | Embree, robust | times | Embree, fast | times | other hits |");
+    let _ = writeln!(
+        page,
+        "| scene | what | unit | firstlight | Embree, robust | times | Embree, fast | times | other hits |"
+    );
     let _ = writeln!(page, "|---|---|---|---|---|---|---|---|---|");
     for row in rows {
         let ours = median(&row.ours);

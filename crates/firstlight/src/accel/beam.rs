@@ -8,8 +8,10 @@
 
 use fearless_simd::{f32x8, f32x16, mask32x16, prelude::*};
 
-use super::node::Node;
-use super::ray::{BEAM_PAD, Lanes, MAX_COORDINATE, MAX_DIRECTION, MIN_DIRECTION, OWN_PAD, Rays, SMALLEST};
+use super::node::{Node, WIDTH};
+use super::ray::{
+    BEAM_PAD, LaneSlabs, Lanes, MAX_COORDINATE, MAX_DIRECTION, MIN_DIRECTION, NODE_PAD, OWN_PAD, Rays, SMALLEST,
+};
 use crate::math::Vec3;
 
 /// A line that bounds rays on one side: x = a + b z.
@@ -111,8 +113,7 @@ impl<const N: usize> Rays<N> {
         let o = self.block(simd, &self.o, block);
         let d = self.block(simd, &self.d, block);
         let least = d[kz].abs() * SMALLEST;
-        let rd =
-            [reciprocal(simd, d[kx], least), reciprocal(simd, d[ky], least), reciprocal(simd, d[kz], least)];
+        let rd = [reciprocal(simd, d[kx], least), reciprocal(simd, d[ky], least), reciprocal(simd, d[kz], least)];
         let pad = (reach(o, center) + half) * OWN_PAD;
         Lanes {
             o: [o[kx], o[ky], o[kz]],
@@ -121,6 +122,48 @@ impl<const N: usize> Rays<N> {
             own: [rd[0].abs() * pad, rd[1].abs() * pad, rd[2].abs() * pad],
         }
     }
+}
+
+impl<S: Simd> LaneSlabs<S> {
+    /// Of rays as far as `t_max`.
+    #[inline(always)]
+    pub fn new(simd: S, lanes: &Lanes<S>, [kx, ky, kz]: [usize; 3], center: Vec3, t_max: f32x16<S>) -> Self {
+        let (x_lo, x_hi) = plus(simd, lanes.o[0] - center[kx], lanes.rd[0], lanes.own[0]);
+        let (y_lo, y_hi) = plus(simd, lanes.o[1] - center[ky], lanes.rd[1], lanes.own[1]);
+        let (z_lo, z_hi) = plus(simd, lanes.o[2] - center[kz], lanes.rd[2], lanes.own[2]);
+        LaneSlabs { rd: lanes.rd, lo: [x_lo, y_lo, z_lo], hi: [x_hi, y_hi, z_hi], t_max }
+    }
+
+    /// Which rays meet a child of a node.
+    #[inline(always)]
+    pub fn meet(&self, simd: S, node: &Node, place: usize, [kx, ky, kz]: [usize; 3]) -> u64 {
+        assert!(kx < 3 && ky < 3 && kz < 3, "axes are axes");
+        let (near_x, far_x) = self.between(simd, 0, &node.planes[kx], place);
+        let (near_y, far_y) = self.between(simd, 1, &node.planes[ky], place);
+        let (near_z, far_z) = self.between(simd, 2, &node.planes[kz], place);
+        let enter = near_x.max(near_y).max(near_z.max(0.0));
+        let leave = far_x.min(far_y).min(far_z.min(self.t_max));
+        enter.simd_le(leave).to_bitmask()
+    }
+
+    /// When the rays are between two planes.
+    #[inline(always)]
+    fn between(&self, simd: S, axis: usize, planes: &[[f32; WIDTH]; 2], place: usize) -> (f32x16<S>, f32x16<S>) {
+        let place = place % WIDTH;
+        let lo = simd.splat_f32x16(planes[0][place]).mul_add(self.rd[axis], self.lo[axis]);
+        let hi = simd.splat_f32x16(planes[1][place]).mul_add(self.rd[axis], self.hi[axis]);
+        (lo.min(hi), lo.max(hi))
+    }
+}
+
+/// What is added to low and high planes times `rd`, padded by twice the own pad.
+#[inline(always)]
+fn plus<S: Simd>(simd: S, o: f32x16<S>, rd: f32x16<S>, own: f32x16<S>) -> (f32x16<S>, f32x16<S>) {
+    let to = -o * rd;
+    let pad = own * (NODE_PAD / OWN_PAD);
+    let (less, more) = (to - pad, to + pad);
+    let negative = rd.simd_lt(simd.splat_f32x16(0.0));
+    (negative.select(more, less), negative.select(less, more))
 }
 
 /// The least and the largest of many numbers, lane by lane.

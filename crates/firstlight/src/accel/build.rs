@@ -407,16 +407,16 @@ impl Gather {
         let mut open = [0; WIDTH];
         (open[0], open[1]) = (index + 1, first);
         let mut len = 2;
+        let area = |i: &u32| self.binary[*i as usize].bounds.area();
         while len < WIDTH {
             let inner = open[..len].iter().enumerate().filter(|(_, i)| self.binary[**i as usize].count == 0);
-            let area = |i: &u32| self.binary[*i as usize].bounds.area();
             let Some((place, &largest)) = inner.max_by(|a, b| area(a.1).total_cmp(&area(b.1))) else { break };
-            // Both halves stay where the whole was: the order is that of the primitives
-            open.copy_within(place + 1..len, place + 2);
             open[place] = largest + 1;
-            open[place + 1] = self.binary[largest as usize].first;
+            open[len] = self.binary[largest as usize].first;
             len += 1;
         }
+        // In the order of the primitives, that what is near in space is near in memory
+        open[..len].sort();
         let node = self.nodes.len();
         self.nodes.push(Node::EMPTY);
         let mut stack = 0;
@@ -462,8 +462,7 @@ impl Join {
             let Some((place, _)) = largest else { break };
             let Top::Split(halves, _) = open.remove(place) else { break };
             let [a, b] = *halves;
-            open.insert(place, b);
-            open.insert(place, a);
+            open.splice(place..place, [a, b]);
         }
         let node = self.nodes.len();
         self.nodes.push(Node::EMPTY);

@@ -18,7 +18,7 @@ use fearless_simd::{Level, dispatch, prelude::*};
 pub(crate) use beam::{Beam, groups};
 pub(crate) use build::{Built, Leaf, build};
 pub(crate) use node::Tree;
-pub(crate) use ray::{Lanes, RayPacket16, RayTile, Slabs, TraceRay};
+pub(crate) use ray::{LaneSlabs, Lanes, RayPacket16, RayTile, Slabs, TraceRay};
 
 use node::{LEAF, WIDTH};
 

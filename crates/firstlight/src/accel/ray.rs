@@ -166,3 +166,16 @@ pub(crate) struct Lanes<S: Simd> {
     /// [`OWN_PAD`] along kx, ky, kz, in units of t.
     pub own: [f32x16<S>; 3],
 }
+
+/// Sixteen rays with one largest axis, ready for boxes: what [`Slabs`] holds, but the planes are low and high ones.
+#[derive(Clone, Copy)]
+pub(crate) struct LaneSlabs<S: Simd> {
+    /// The reciprocal direction along kx, ky, kz.
+    pub rd: [f32x16<S>; 3],
+    /// Added to a low plane times `rd`.
+    pub lo: [f32x16<S>; 3],
+    /// Added to a high plane times `rd`.
+    pub hi: [f32x16<S>; 3],
+    /// As far as each ray asks.
+    pub t_max: f32x16<S>,
+}

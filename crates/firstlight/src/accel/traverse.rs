@@ -4,10 +4,12 @@ use fearless_simd::{f32x8, prelude::*};
 
 use super::beam::Beam;
 use super::node::{LEAF, Node, Tree};
-use super::ray::Slabs;
+use super::ray::{LaneSlabs, Slabs};
 
 /// Entries of the stack that lives in the frame; deeper trees, which nothing but malice makes, take one from the heap.
 const STACK: usize = 96;
+/// Rays of a packet that are quicker one by one.
+const FEW: u32 = 2;
 
 /// Where a ray crosses planes. Closures would do, were they always inlined: out of line they lose the instruction set.
 #[inline(always)]
@@ -112,7 +114,20 @@ impl Tree {
 
     /// Asks the leaves on a ray until one says yes.
     #[inline(always)]
-    pub fn any<S: Simd>(&self, simd: S, slabs: &Slabs, t_max: f32, mut leaf: impl FnMut(u32) -> bool) -> bool {
+    pub fn any<S: Simd>(&self, simd: S, slabs: &Slabs, t_max: f32, leaf: impl FnMut(u32) -> bool) -> bool {
+        self.any_below(simd, 0, slabs, t_max, leaf)
+    }
+
+    /// Asks the leaves on a ray at or below a child of a node until one says yes.
+    #[inline(always)]
+    pub fn any_below<S: Simd>(
+        &self,
+        simd: S,
+        child: u32,
+        slabs: &Slabs,
+        t_max: f32,
+        mut leaf: impl FnMut(u32) -> bool,
+    ) -> bool {
         if self.nodes.is_empty() || !(t_max >= 0.0) {
             return false;
         }
@@ -124,26 +139,41 @@ impl Tree {
             heap.resize(self.stack, 0);
             &mut heap[..]
         };
-        let mut len = 1;
-        while len > 0 {
-            len -= 1;
-            let child = stack[len];
+        let mut child = child;
+        let mut len = 0;
+        loop {
             if child & LEAF != 0 {
                 if leaf(child & !LEAF) {
                     return true;
                 }
-                continue;
+            } else {
+                let node = &self.nodes[child as usize];
+                let (mut mask, enter) = meet(simd, node, slabs, t_max);
+                if mask != 0 {
+                    // On with the nearest, the others in any order
+                    let mut place = mask.trailing_zeros() as usize & 7;
+                    mask &= mask - 1;
+                    if mask != 0 {
+                        let enter = enter.to_array();
+                        while mask != 0 {
+                            let other = mask.trailing_zeros() as usize & 7;
+                            mask &= mask - 1;
+                            let nearer = enter[other] < enter[place];
+                            stack[len] = node.children[if nearer { place } else { other }];
+                            place = if nearer { other } else { place };
+                            len += 1;
+                        }
+                    }
+                    child = node.children[place];
+                    continue;
+                }
             }
-            let node = &self.nodes[child as usize];
-            let (mut mask, _) = meet(simd, node, slabs, t_max);
-            while mask != 0 {
-                let place = mask.trailing_zeros() as usize & 7;
-                mask &= mask - 1;
-                stack[len] = node.children[place];
-                len += 1;
+            if len == 0 {
+                return false;
             }
+            len -= 1;
+            child = stack[len];
         }
-        false
     }
 
     /// Asks the leaves that a beam of rays may meet, the nearest first. `leaf` may lessen how far along the beam is of
@@ -192,5 +222,61 @@ impl Tree {
                 len += 1;
             }
         }
+    }
+
+    /// Asks the leaves that any of sixteen rays meet, until all of `asking` are done. `leaf` hears which rays ask a leaf, `few` which
+    /// few rays, one by one, a child of a node and all below it; both say which are done. Returns all that are.
+    #[inline(always)]
+    pub fn packet<S: Simd>(
+        &self,
+        simd: S,
+        beam: &Beam,
+        slabs: &LaneSlabs<S>,
+        mut asking: u64,
+        mut leaf: impl FnMut(u32, u64) -> u64,
+        mut few: impl FnMut(u32, u64) -> u64,
+    ) -> u64 {
+        let all = asking;
+        if self.nodes.is_empty() {
+            return 0;
+        }
+        let mut frame = [0; STACK];
+        let mut heap = Vec::new();
+        let stack = if self.stack <= STACK {
+            &mut frame[..]
+        } else {
+            heap.resize(self.stack, 0);
+            &mut heap[..]
+        };
+        stack[0] = asking << 32;
+        let mut len = 1;
+        while len > 0 {
+            len -= 1;
+            let child = stack[len] as u32;
+            let active = stack[len] >> 32 & asking;
+            if active == 0 {
+                continue;
+            }
+            if active.count_ones() <= FEW {
+                asking &= !few(child, active);
+                continue;
+            }
+            if child & LEAF != 0 {
+                asking &= !leaf(child & !LEAF, active);
+                continue;
+            }
+            let node = &self.nodes[child as usize];
+            let (mut mask, _) = beam.meet(simd, node, beam.z_max);
+            while mask != 0 {
+                let place = mask.trailing_zeros() as usize & 7;
+                mask &= mask - 1;
+                let active = slabs.meet(simd, node, place, beam.axes) & active;
+                if active != 0 {
+                    stack[len] = active << 32 | u64::from(node.children[place]);
+                    len += 1;
+                }
+            }
+        }
+        all & !asking
     }
 }

@@ -13,7 +13,7 @@ mod tests;
 
 use fearless_simd::{Level, dispatch, f32x4, f32x16, prelude::*};
 
-use crate::accel::{Aabb, Beam, Built, RayPacket16, RayTile, Slabs, TraceRay, Tree, build, groups};
+use crate::accel::{Aabb, Beam, Built, LaneSlabs, RayPacket16, RayTile, Slabs, TraceRay, Tree, build, groups};
 use crate::math::{DVec3, Vec3};
 use kernel::{Crossings, intersect, intersect_lanes};
 
@@ -197,22 +197,28 @@ impl TriangleTree {
         let slabs = self.slabs(ray);
         let mut best = TriangleHit { t: t_max, u: 0.0, v: 0.0, triangle: NONE };
         let mut t_max = t_max;
-        self.tree.closest(simd, &slabs, &mut t_max, |leaf, t_max| {
-            let pack = &self.packs[leaf as usize];
-            let mut mask = self.candidates(simd, ray, pack);
-            while mask != 0 {
-                let place = mask.trailing_zeros() as usize % PACK;
-                mask &= mask - 1;
-                let triangle = pack.ids[place];
-                if let Some(hit) = intersect(ray, &slabs, &pack.triangle(place)) {
-                    let better = hit.t < best.t || hit.t == best.t && triangle < best.triangle;
-                    if better && hit.t > 0.0 && filter(triangle) {
-                        best = TriangleHit { t: hit.t, u: hit.u, v: hit.v, triangle };
-                        *t_max = hit.t;
+        self.tree.closest(
+            simd,
+            &slabs,
+            &mut t_max,
+            #[inline(always)]
+            |leaf, t_max| {
+                let pack = &self.packs[leaf as usize];
+                let mut mask = self.candidates(simd, ray, pack);
+                while mask != 0 {
+                    let place = mask.trailing_zeros() as usize % PACK;
+                    mask &= mask - 1;
+                    let triangle = pack.ids[place];
+                    if let Some(hit) = intersect(ray, &slabs, &pack.triangle(place)) {
+                        let better = hit.t < best.t || hit.t == best.t && triangle < best.triangle;
+                        if better && hit.t > 0.0 && filter(triangle) {
+                            best = TriangleHit { t: hit.t, u: hit.u, v: hit.v, triangle };
+                            *t_max = hit.t;
+                        }
                     }
                 }
-            }
-        });
+            },
+        );
         (best.triangle != NONE).then_some(best)
     }
 
@@ -222,23 +228,42 @@ impl TriangleTree {
         if !ray.is_valid {
             return false;
         }
-        let slabs = self.slabs(ray);
-        self.tree.any(simd, &slabs, t_max, |leaf| {
-            let pack = &self.packs[leaf as usize];
-            let mut mask = self.candidates(simd, ray, pack);
-            while mask != 0 {
-                let place = mask.trailing_zeros() as usize % PACK;
-                mask &= mask - 1;
-                if let Some(hit) = intersect(ray, &slabs, &pack.triangle(place))
-                    && hit.t > 0.0
-                    && hit.t <= t_max
-                    && filter(pack.ids[place])
-                {
-                    return true;
+        self.any_below(simd, 0, ray, &self.slabs(ray), t_max, filter)
+    }
+
+    #[inline(always)]
+    fn any_below<S: Simd>(
+        &self,
+        simd: S,
+        child: u32,
+        ray: &TraceRay,
+        slabs: &Slabs,
+        t_max: f32,
+        filter: &impl Fn(u32) -> bool,
+    ) -> bool {
+        self.tree.any_below(
+            simd,
+            child,
+            slabs,
+            t_max,
+            #[inline(always)]
+            |leaf| {
+                let pack = &self.packs[leaf as usize];
+                let mut mask = self.candidates(simd, ray, pack);
+                while mask != 0 {
+                    let place = mask.trailing_zeros() as usize % PACK;
+                    mask &= mask - 1;
+                    if let Some(hit) = intersect(ray, slabs, &pack.triangle(place))
+                        && hit.t > 0.0
+                        && hit.t <= t_max
+                        && filter(pack.ids[place])
+                    {
+                        return true;
+                    }
                 }
-            }
-            false
-        })
+                false
+            },
+        )
     }
 
     /// Which of the rays in `active` meet any triangle that `filter` lets count, 0 < t <= `t_max` of each.
@@ -265,34 +290,51 @@ impl TriangleTree {
             let beam = Beam::new(simd, rays, t_max, group, which, self.tree.center, self.tree.half);
             let lanes = rays.lanes(simd, 0, beam.axes, self.tree.center, self.tree.half);
             let reach = f32x16::load_array_ref(simd, t_max);
+            let slabs = LaneSlabs::new(simd, &lanes, beam.axes, self.tree.center, reach);
             let zero = simd.splat_f32x16(0.0);
-            let mut asking = group;
-            self.tree.beam(simd, &beam, |leaf, z_max| {
-                let pack = &self.packs[leaf as usize];
-                for place in 0..PACK {
-                    let id = pack.ids[place];
-                    if id == NONE {
-                        break;
-                    }
-                    let Some(met) = intersect_lanes(simd, &lanes, along(pack, place, beam.axes)) else { continue };
-                    let mut hit = (met.mask & met.t.simd_gt(zero) & met.t.simd_le(reach)).to_bitmask();
-                    for lane in bits(met.unsure & asking) {
-                        let ray = rays.ray(lane);
-                        let met = intersect(&ray, &self.slabs(&ray), &pack.triangle(place));
-                        let is_hit = met.is_some_and(|met| met.t > 0.0 && met.t <= t_max[lane]);
-                        hit = hit & !(1 << lane) | u64::from(is_hit) << lane;
-                    }
-                    hit &= asking;
-                    if hit != 0 && filter(id) {
-                        done |= hit as u16;
-                        asking &= !hit;
-                        if asking == 0 {
-                            *z_max = f32::NEG_INFINITY;
-                            return;
+            done |= self.tree.packet(
+                simd,
+                &beam,
+                &slabs,
+                group,
+                #[inline(always)]
+                |leaf: u32, asking: u64| {
+                    let pack = &self.packs[leaf as usize];
+                    let mut done = 0;
+                    for place in 0..PACK {
+                        let id = pack.ids[place];
+                        if id == NONE {
+                            break;
+                        }
+                        let Some(met) = intersect_lanes(simd, &lanes, along(pack, place, beam.axes)) else { continue };
+                        let mut hit = (met.mask & met.t.simd_gt(zero) & met.t.simd_le(reach)).to_bitmask();
+                        for lane in bits(met.unsure & asking) {
+                            let ray = rays.ray(lane);
+                            let met = intersect(&ray, &self.slabs(&ray), &pack.triangle(place));
+                            let is_hit = met.is_some_and(|met| met.t > 0.0 && met.t <= t_max[lane]);
+                            hit = hit & !(1 << lane) | u64::from(is_hit) << lane;
+                        }
+                        hit &= asking & !done;
+                        if hit != 0 && filter(id) {
+                            done |= hit;
+                            if asking == done {
+                                break;
+                            }
                         }
                     }
-                }
-            });
+                    done
+                },
+                #[inline(always)]
+                |child: u32, asking: u64| {
+                    let mut done = 0;
+                    for lane in bits(asking) {
+                        let ray = rays.ray(lane);
+                        let is_hit = self.any_below(simd, child, &ray, &self.slabs(&ray), t_max[lane], filter);
+                        done |= u64::from(is_hit) << lane;
+                    }
+                    done
+                },
+            ) as u16;
         }
         done
     }
@@ -349,52 +391,61 @@ impl TriangleTree {
         ];
         let zero = simd.splat_f32x16(0.0);
         let mut found = 0;
-        self.tree.beam(simd, &beam, |leaf, z_max| {
-            let pack = &self.packs[leaf as usize];
-            let mut changed = false;
-            for place in 0..PACK {
-                let id = pack.ids[place];
-                if id == NONE {
-                    break;
-                }
-                let triangle = along(pack, place, beam.axes);
-                for (block, lanes) in lanes.iter().enumerate() {
-                    let active = group >> (16 * block) & 0xffff;
-                    let Some(met) = intersect_lanes(simd, lanes, triangle) else { continue };
-                    let Crossings { mask, unsure, t, v, w, det } = met;
-                    let run = 16 * block..16 * block + 16;
-                    let best = f32x16::from_slice(simd, &hits.t[run]);
-                    let mut near = (mask & t.simd_gt(zero) & t.simd_le(best)).to_bitmask() & active & !unsure;
-                    if near | (unsure & active) == 0 || !filter(id) {
-                        continue;
+        self.tree.beam(
+            simd,
+            &beam,
+            #[inline(always)]
+            |leaf, z_max| {
+                let pack = &self.packs[leaf as usize];
+                let mut changed = false;
+                for place in 0..PACK {
+                    let id = pack.ids[place];
+                    if id == NONE {
+                        break;
                     }
-                    let (t, v, w, det) = (t.to_array(), v.to_array(), w.to_array(), det.to_array());
-                    while near != 0 {
-                        let lane = near.trailing_zeros() as usize % 16;
-                        near &= near - 1;
-                        let hit =
-                            TriangleHit { t: t[lane], u: v[lane] / det[lane], v: w[lane] / det[lane], triangle: id };
-                        let better = hits.offer(16 * block + lane, &hit, surface);
-                        found |= u64::from(better) << (16 * block + lane);
-                        changed |= better;
-                    }
-                    for lane in bits(unsure & active) {
-                        let ray = rays.ray(16 * block + lane);
-                        if let Some(met) = intersect(&ray, &self.slabs(&ray), &pack.triangle(place))
-                            && met.t > 0.0
-                        {
-                            let hit = TriangleHit { t: met.t, u: met.u, v: met.v, triangle: id };
+                    let triangle = along(pack, place, beam.axes);
+                    for (block, lanes) in lanes.iter().enumerate() {
+                        let active = group >> (16 * block) & 0xffff;
+                        let Some(met) = intersect_lanes(simd, lanes, triangle) else { continue };
+                        let Crossings { mask, unsure, t, v, w, det } = met;
+                        let run = 16 * block..16 * block + 16;
+                        let best = f32x16::from_slice(simd, &hits.t[run]);
+                        let mut near = (mask & t.simd_gt(zero) & t.simd_le(best)).to_bitmask() & active & !unsure;
+                        if near | (unsure & active) == 0 || !filter(id) {
+                            continue;
+                        }
+                        let (t, v, w, det) = (t.to_array(), v.to_array(), w.to_array(), det.to_array());
+                        while near != 0 {
+                            let lane = near.trailing_zeros() as usize % 16;
+                            near &= near - 1;
+                            let hit = TriangleHit {
+                                t: t[lane],
+                                u: v[lane] / det[lane],
+                                v: w[lane] / det[lane],
+                                triangle: id,
+                            };
                             let better = hits.offer(16 * block + lane, &hit, surface);
                             found |= u64::from(better) << (16 * block + lane);
                             changed |= better;
                         }
+                        for lane in bits(unsure & active) {
+                            let ray = rays.ray(16 * block + lane);
+                            if let Some(met) = intersect(&ray, &self.slabs(&ray), &pack.triangle(place))
+                                && met.t > 0.0
+                            {
+                                let hit = TriangleHit { t: met.t, u: met.u, v: met.v, triangle: id };
+                                let better = hits.offer(16 * block + lane, &hit, surface);
+                                found |= u64::from(better) << (16 * block + lane);
+                                changed |= better;
+                            }
+                        }
                     }
                 }
-            }
-            if changed {
-                *z_max = beam.z_max(simd, rays, &hits.t, group);
-            }
-        });
+                if changed {
+                    *z_max = beam.z_max(simd, rays, &hits.t, group);
+                }
+            },
+        );
         found
     }
 
