@@ -10,7 +10,7 @@ use fearless_simd::{f32x8, f32x16, mask32x16, prelude::*};
 
 use super::node::{Node, WIDTH};
 use super::ray::{
-    BEAM_PAD, LaneSlabs, Lanes, MAX_COORDINATE, MAX_DIRECTION, MIN_DIRECTION, NODE_PAD, OWN_PAD, Rays, SMALLEST,
+    BEAM_PAD, LaneSlabs, Lanes, MAX_COORDINATE, MAX_DIRECTION, MIN_DIRECTION, NODE_PAD, OWN_PAD, RayTile, Rays, SMALLEST,
 };
 use crate::math::Vec3;
 
@@ -22,7 +22,7 @@ struct Line {
 }
 
 /// The hull of many rays.
-#[derive(Clone, Debug)]
+#[derive(Clone, Copy, Debug)]
 pub(crate) struct Beam {
     /// kx, ky, kz: the rays run along kz.
     pub axes: [usize; 3],
@@ -205,20 +205,61 @@ impl Beam {
         center: Vec3,
         half: f32,
     ) -> Beam {
+        Beam::starting(simd, rays, t_max, group, which, center, half, f32::INFINITY)
+    }
+
+    /// The hulls of those of the rays that are in each block of sixteen, with one measure of z.
+    #[inline(always)]
+    pub fn blocks<S: Simd>(
+        &self,
+        simd: S,
+        rays: &RayTile,
+        t_max: &[f32; 64],
+        group: u64,
+        center: Vec3,
+        half: f32,
+    ) -> [Beam; 4] {
+        let mut beams = [*self; 4];
+        let which = 2 * self.axes[2] + self.side;
+        for (block, beam) in beams.iter_mut().enumerate() {
+            let part = group & 0xffff << (16 * block);
+            if part != 0 && part != group {
+                *beam = Beam::starting(simd, rays, t_max, part, which, center, half, -self.start);
+            }
+        }
+        beams
+    }
+
+    #[inline(always)]
+    #[expect(clippy::too_many_arguments, reason = "they are what `new` has, and one more")]
+    fn starting<S: Simd, const N: usize>(
+        simd: S,
+        rays: &Rays<N>,
+        t_max: &[f32; N],
+        group: u64,
+        which: usize,
+        center: Vec3,
+        half: f32,
+        z_start: f32,
+    ) -> Beam {
         let kz = which / 2;
         let sign = if which % 2 == 0 { 1.0 } else { -1.0 };
         let [kx, ky, kz] = axes(kz);
         // Where the rays start and end along z, and how far all that is from the centre
         let (mut starts, mut ends, mut far) = (Range::new(simd), Range::new(simd), Range::new(simd));
         for block in 0..N / 16 {
-            let mask = mask32x16::from_bitmask(simd, group >> (16 * block) & 0xffff);
+            let mask = group >> (16 * block) & 0xffff;
+            if mask == 0 {
+                continue;
+            }
+            let mask = mask32x16::from_bitmask(simd, mask);
             let o = rays.block(simd, &rays.o, block);
             far.add(mask, reach(o, center));
             let z = (o[kz] - center[kz]) * sign;
             starts.add(mask, z);
             ends.add(mask, z + sixteen(simd, &rays.d[kz], block).abs() * sixteen(simd, t_max, block));
         }
-        let (z_start, z_end) = (starts.get().0, ends.get().1);
+        let (z_start, z_end) = (starts.get().0.min(z_start), ends.get().1);
         let reach = far.get().1 + half;
         let z_length = z_end - z_start;
         // Where they are there, and their slopes
@@ -226,7 +267,11 @@ impl Beam {
         let mut last = [Range::new(simd); 2];
         let mut slopes = [Range::new(simd); 2];
         for block in 0..N / 16 {
-            let mask = mask32x16::from_bitmask(simd, group >> (16 * block) & 0xffff);
+            let mask = group >> (16 * block) & 0xffff;
+            if mask == 0 {
+                continue;
+            }
+            let mask = mask32x16::from_bitmask(simd, mask);
             let z = (sixteen(simd, &rays.o[kz], block) - center[kz]) * sign;
             let r = simd.splat_f32x16(1.0) / sixteen(simd, &rays.d[kz], block).abs();
             for (i, k) in [kx, ky].into_iter().enumerate() {
@@ -274,7 +319,11 @@ impl Beam {
         let kz = self.axes[2];
         let mut ends = Range::new(simd);
         for block in 0..N / 16 {
-            let mask = mask32x16::from_bitmask(simd, group >> (16 * block) & 0xffff);
+            let mask = group >> (16 * block) & 0xffff;
+            if mask == 0 {
+                continue;
+            }
+            let mask = mask32x16::from_bitmask(simd, mask);
             let z = (sixteen(simd, &rays.o[kz], block) - self.center) * self.sign + self.start;
             ends.add(mask, z + sixteen(simd, &rays.d[kz], block).abs() * sixteen(simd, t_max, block));
         }

@@ -11,7 +11,7 @@
 //! The tree is the same for every number of threads: where it is cut into tasks depends on the number of primitives
 //! alone, bins are joined by minimum, maximum and whole numbers, and the tasks' results are joined in their order.
 
-use glam::{UVec4, Vec4, Vec4Swizzles};
+use glam::{BVec4A, UVec4, Vec4, Vec4Swizzles};
 use rayon::prelude::*;
 
 use super::Aabb;
@@ -129,35 +129,40 @@ pub(crate) struct Built {
     pub leaves: Vec<Leaf>,
 }
 
-/// Builds the tree over those of `count` boxes that are finite and not inside out, with at most `leaf` of them in a leaf.
-pub(crate) fn build(count: usize, boxes: impl Fn(usize) -> Aabb + Sync, leaf: usize) -> Built {
+/// Builds the tree over those of `count` boxes that are sound, with at most 2 to the power of `leaf_bits` of them in a leaf.
+pub(crate) fn build(count: usize, boxes: impl Fn(usize) -> Aabb + Sync, leaf_bits: u32) -> Built {
     assert!(count < LEAF as usize, "ids fit 31 bits");
-    // Find the middle of all
-    let bounds = (0..count)
-        .into_par_iter()
-        .with_min_len(1 << 14)
-        .map(|i| boxes(i))
-        .filter(Aabb::is_sound)
-        .reduce(|| Aabb::EMPTY, Aabb::union);
-    if !bounds.is_sound() {
+    // Collect the primitives, and find the middle of all
+    let prim = |i: usize| {
+        let Aabb { min, max } = boxes(i);
+        Prim { lo: min.extend(f32::from_bits(i as u32)), hi: max.extend(0.0) }
+    };
+    let is_sound = |prim: &Prim| Aabb { min: prim.lo.xyz(), max: prim.hi.xyz() }.is_sound();
+    let mut prims: Vec<Prim> = (0..count).into_par_iter().with_min_len(1 << 14).map(prim).collect();
+    if !prims.par_iter().with_min_len(1 << 14).all(is_sound) {
+        prims.retain(is_sound);
+    }
+    if prims.is_empty() {
         let tree = Tree { nodes: Vec::new(), center: Vec3::ZERO, half: 0.0, bounds: Aabb::EMPTY, stack: 0 };
         return Built { tree, order: Vec::new(), leaves: Vec::new() };
     }
+    let all = prims.par_chunks(1 << 14).map(bounds_of).reduce(|| Bounds::EMPTY, Bounds::join);
+    let bounds = Aabb { min: all.lo.xyz(), max: all.hi.xyz() };
     let center = (bounds.min + bounds.max) * 0.5;
-    // Collect the primitives, seen from there
-    let prim = |i: usize| {
-        let Aabb { min, max } = boxes(i);
-        Prim { lo: (min - center).extend(f32::from_bits(i as u32)), hi: (max - center).extend(0.0) }
+    // See them from there
+    let away = center.extend(0.0);
+    let move_all = |prims: &mut [Prim]| {
+        for prim in prims {
+            let id = prim.lo.w;
+            (prim.lo, prim.hi) = (prim.lo - away, prim.hi - away);
+            prim.lo.w = id;
+        }
     };
-    let all_sound = (0..count).into_par_iter().with_min_len(1 << 14).all(|i| boxes(i).is_sound());
-    let mut prims: Vec<Prim> = if all_sound {
-        (0..count).into_par_iter().with_min_len(1 << 14).map(prim).collect()
-    } else {
-        (0..count).filter(|i| boxes(*i).is_sound()).map(prim).collect()
-    };
+    prims.par_chunks_mut(1 << 14).for_each(move_all);
+    let centers = prims.par_chunks(1 << 14).map(centers_of).reduce(|| Bounds::EMPTY, Bounds::join);
     // Cut and gather, in tasks
-    let settings = Settings { leaf: leaf.max(1), task: (prims.len() / TASKS).max(MIN_TASK) };
-    let top = settings.top(&mut prims, 0, 0);
+    let settings = Settings { leaf: 1 << leaf_bits, leaf_bits, task: (prims.len() / TASKS).max(MIN_TASK) };
+    let top = settings.top(&mut prims, centers, 0, 0);
     let order: Vec<u32> = prims.par_iter().with_min_len(1 << 14).map(Prim::id).collect();
     drop(prims);
     // Join what the tasks made
@@ -183,6 +188,8 @@ pub(crate) fn build(count: usize, boxes: impl Fn(usize) -> Aabb + Sync, leaf: us
 struct Settings {
     /// The most primitives in a leaf.
     leaf: usize,
+    /// The same, as a power of two.
+    leaf_bits: u32,
     /// The most primitives in a task.
     task: usize,
 }
@@ -267,8 +274,8 @@ impl Bins {
     }
 
     /// The cheapest cut, if there is one that leaves something on both sides. Whole leaves are what costs.
-    fn best(&self, binning: &Binning, leaf: usize) -> Option<Cut> {
-        let leaves = |count: u32| count.div_ceil(leaf as u32) as f32;
+    fn best(&self, binning: &Binning, leaf_bits: u32) -> Option<Cut> {
+        let leaves = |count: u32| ((count + (1 << leaf_bits) - 1) >> leaf_bits) as f32;
         let mut best = None;
         let mut least = f32::INFINITY;
         for axis in 0..3 {
@@ -301,90 +308,121 @@ impl Bins {
     }
 }
 
-/// The box of the boxes, and the box of the centres.
-fn bounds_of(prims: &[Prim]) -> (Bounds, Bounds) {
-    let (mut bounds, mut centers) = (Bounds::EMPTY, Bounds::EMPTY);
+/// The box around the boxes.
+fn bounds_of(prims: &[Prim]) -> Bounds {
+    let mut bounds = Bounds::EMPTY;
     for prim in prims {
         bounds.add(prim.lo, prim.hi);
-        centers.add(prim.center(), prim.center());
     }
-    (bounds, centers)
+    bounds
 }
 
-/// Brings those left of the cut to the front and says how many they are.
-fn partition(prims: &mut [Prim], cut: &Cut) -> usize {
-    let mut left = 0;
+/// The box around the centres.
+fn centers_of(prims: &[Prim]) -> Bounds {
+    let mut centers = Bounds::EMPTY;
+    for prim in prims {
+        centers.add(prim.center(), prim.center());
+    }
+    centers
+}
+
+/// Brings those left of the cut to the front, and says how many they are and where the centres on both sides are.
+fn partition(prims: &mut [Prim], cut: &Cut) -> (usize, Bounds, Bounds) {
+    let mut count = 0;
+    let (mut left, mut right) = (Bounds::EMPTY, Bounds::EMPTY);
+    let (lo, scale) = (cut.binning.lo[cut.axis], cut.binning.scale[cut.axis]);
     for i in 0..prims.len() {
         let prim = prims[i];
-        let is_left = cut.binning.of(&prim)[cut.axis] < cut.bin;
+        let center = prim.center();
+        let bin = ((center[cut.axis] - lo) * scale + ROUNDER).to_bits() & (BINS as u32 - 1);
+        let is_left = bin < cut.bin;
         // No branch: which side it is cannot be foreseen
-        prims[i] = prims[left];
-        prims[left] = prim;
-        left += usize::from(is_left);
+        prims[i] = prims[count];
+        prims[count] = prim;
+        count += usize::from(is_left);
+        let mask = BVec4A::splat(is_left);
+        left.add(Vec4::select(mask, center, Vec4::INFINITY), Vec4::select(mask, center, Vec4::NEG_INFINITY));
+        right.add(Vec4::select(mask, Vec4::INFINITY, center), Vec4::select(mask, Vec4::NEG_INFINITY, center));
     }
-    left
+    (count, left, right)
+}
+
+/// Halves by count.
+fn halve(prims: &[Prim]) -> (usize, Bounds, Bounds) {
+    let (left, right) = prims.split_at(prims.len() / 2);
+    (left.len(), centers_of(left), centers_of(right))
 }
 
 impl Settings {
     /// The tree above the tasks, and the tasks.
-    fn top(&self, prims: &mut [Prim], base: u32, depth: usize) -> Top {
+    fn top(&self, prims: &mut [Prim], centers: Bounds, base: u32, depth: usize) -> Top {
         if prims.len() <= self.task {
-            return Top::Part(self.part(prims, base, depth));
+            return Top::Part(self.part(prims, centers, base, depth));
         }
-        let chunk = PARALLEL / 4;
-        let (bounds, centers) = if prims.len() >= PARALLEL {
-            prims
-                .par_chunks(chunk)
-                .map(bounds_of)
-                .reduce(|| (Bounds::EMPTY, Bounds::EMPTY), |a, b| (a.0.join(b.0), a.1.join(b.1)))
-        } else {
-            bounds_of(prims)
-        };
         let binning = Binning::new(centers, prims.len());
         let bins = if prims.len() >= PARALLEL {
-            let parts: Vec<Bins> = prims.par_chunks(chunk * 4).map(|prims| Bins::of(prims, &binning)).collect();
+            let parts: Vec<Bins> = prims.par_chunks(PARALLEL).map(|prims| Bins::of(prims, &binning)).collect();
             parts.iter().skip(1).fold(parts[0].clone(), Bins::join)
         } else {
             Bins::of(prims, &binning)
         };
-        let cut = if depth < MAX_DEPTH { bins.best(&binning, self.leaf) } else { None };
-        let left = cut.map_or(prims.len() / 2, |cut| partition(prims, &cut));
+        let cut = if depth < MAX_DEPTH { bins.best(&binning, self.leaf_bits) } else { None };
+        let (left, l_centers, r_centers) = match cut {
+            Some(cut) => partition(prims, &cut),
+            None => halve(prims),
+        };
         let (l, r) = prims.split_at_mut(left);
-        let (a, b) = rayon::join(|| self.top(l, base, depth + 1), || self.top(r, base + left as u32, depth + 1));
+        let (a, b) = rayon::join(
+            || self.top(l, l_centers, base, depth + 1),
+            || self.top(r, r_centers, base + left as u32, depth + 1),
+        );
+        let bounds = a.bounds().join(b.bounds());
         Top::Split(Box::new([a, b]), bounds)
     }
 
     /// A task: its binary tree, gathered into nodes.
-    fn part(&self, prims: &mut [Prim], base: u32, depth: usize) -> Part {
+    fn part(&self, prims: &mut [Prim], centers: Bounds, base: u32, depth: usize) -> Part {
         let mut binary = Vec::with_capacity(prims.len());
         let mut bins = Bins { bounds: [[Bounds::EMPTY; BINS]; 3], counts: [[0; BINS]; 3] };
-        self.cut(prims, base, depth, &mut binary, &mut bins);
+        let bounds = self.cut(prims, centers, base, depth, &mut binary, &mut bins);
         let mut gather = Gather { binary, nodes: Vec::new(), leaves: Vec::new() };
-        let bounds = gather.binary[0].bounds;
         let (root, stack) = gather.take(0);
         Part { bounds, nodes: gather.nodes, leaves: gather.leaves, root, stack }
     }
 
-    fn cut(&self, prims: &mut [Prim], base: u32, depth: usize, binary: &mut Vec<Binary>, bins: &mut Bins) {
-        let (bounds, centers) = bounds_of(prims);
+    fn cut(
+        &self,
+        prims: &mut [Prim],
+        centers: Bounds,
+        base: u32,
+        depth: usize,
+        binary: &mut Vec<Binary>,
+        bins: &mut Bins,
+    ) -> Bounds {
         let place = binary.len();
         if prims.len() <= self.leaf {
+            let bounds = bounds_of(prims);
             binary.push(Binary { bounds, first: base, count: prims.len() as u32 });
-            return;
+            return bounds;
         }
-        binary.push(Binary { bounds, first: 0, count: 0 });
+        binary.push(Binary { bounds: Bounds::EMPTY, first: 0, count: 0 });
         let mut cut = None;
         if depth < MAX_DEPTH {
             let binning = Binning::new(centers, prims.len());
             bins.clear(binning.bins);
             bins.fill(prims, &binning);
-            cut = bins.best(&binning, self.leaf);
+            cut = bins.best(&binning, self.leaf_bits);
         }
-        let left = cut.map_or(prims.len() / 2, |cut| partition(prims, &cut));
+        let (left, l_centers, r_centers) = match cut {
+            Some(cut) => partition(prims, &cut),
+            None => halve(prims),
+        };
         let (l, r) = prims.split_at_mut(left);
-        self.cut(l, base, depth + 1, binary, bins);
+        let l_bounds = self.cut(l, l_centers, base, depth + 1, binary, bins);
         binary[place].first = binary.len() as u32;
-        self.cut(r, base + left as u32, depth + 1, binary, bins);
+        let r_bounds = self.cut(r, r_centers, base + left as u32, depth + 1, binary, bins);
+        binary[place].bounds = l_bounds.join(r_bounds);
+        binary[place].bounds
     }
 }
 

@@ -17,10 +17,10 @@ use fearless_simd::{Level, dispatch, prelude::*};
 
 pub(crate) use beam::{Beam, groups};
 pub(crate) use build::{Built, Leaf, build};
-pub(crate) use node::Tree;
+pub(crate) use node::{LEAF, Tree};
 pub(crate) use ray::{LaneSlabs, Lanes, RayPacket16, RayTile, Slabs, TraceRay};
 
-use node::{LEAF, WIDTH};
+use node::WIDTH;
 
 use crate::math::Vec3;
 
@@ -66,7 +66,7 @@ pub(crate) struct Bvh {
 impl Bvh {
     /// Builds the tree. Boxes that are not sound are left out; the others keep their index as their id.
     pub fn build(boxes: &[Aabb]) -> Bvh {
-        let Built { mut tree, order, leaves } = build(boxes.len(), |i| boxes[i], 1);
+        let Built { mut tree, order, leaves } = build(boxes.len(), |i| boxes[i], 0);
         // Let leaves say the id at once
         for node in &mut tree.nodes {
             for place in 0..WIDTH {

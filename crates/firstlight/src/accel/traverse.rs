@@ -10,6 +10,8 @@ use super::ray::{LaneSlabs, Slabs};
 const STACK: usize = 96;
 /// Rays of a packet that are quicker one by one.
 const FEW: u32 = 2;
+/// Leaves after which a tile is looked at in blocks: it is worth it where triangles are small.
+const MANY_LEAVES: u32 = 8;
 
 /// Where a ray crosses planes. Closures would do, were they always inlined: out of line they lose the instruction set.
 #[inline(always)]
@@ -115,7 +117,7 @@ impl Tree {
     /// Asks the leaves on a ray until one says yes.
     #[inline(always)]
     pub fn any<S: Simd>(&self, simd: S, slabs: &Slabs, t_max: f32, leaf: impl FnMut(u32) -> bool) -> bool {
-        self.any_below(simd, 0, slabs, t_max, leaf)
+        self.any_below(simd, 0, slabs, t_max, leaf, |_| ())
     }
 
     /// Asks the leaves on a ray at or below a child of a node until one says yes.
@@ -127,6 +129,7 @@ impl Tree {
         slabs: &Slabs,
         t_max: f32,
         mut leaf: impl FnMut(u32) -> bool,
+        touch: impl Fn(u32),
     ) -> bool {
         if self.nodes.is_empty() || !(t_max >= 0.0) {
             return false;
@@ -160,6 +163,7 @@ impl Tree {
                             mask &= mask - 1;
                             let nearer = enter[other] < enter[place];
                             stack[len] = node.children[if nearer { place } else { other }];
+                            touch(stack[len]);
                             place = if nearer { other } else { place };
                             len += 1;
                         }
@@ -278,5 +282,95 @@ impl Tree {
             }
         }
         all & !asking
+    }
+
+    /// Asks the leaves that four blocks of rays may meet, the nearest first. `leaf` hears which blocks ask, and may lessen how
+    /// far along the beams is of interest to each. The beam around all does at first; where there are many leaves, `split`
+    /// gives one for each block. `touch` hears of leaves that will be asked later.
+    #[inline(always)]
+    pub fn blocks<S: Simd>(
+        &self,
+        simd: S,
+        beam: &Beam,
+        active: u64,
+        split: impl Fn() -> [Beam; 4],
+        mut leaf: impl FnMut(u32, u64, &mut [f32; 4]),
+        touch: impl Fn(u32),
+    ) {
+        let mut z_max = [beam.z_max; 4];
+        let mut beams = [*beam; 4];
+        let mut leaves = 0;
+        if self.nodes.is_empty() {
+            return;
+        }
+        let mut frame = [0; STACK];
+        let mut heap = Vec::new();
+        let stack = if self.stack <= STACK {
+            &mut frame[..]
+        } else {
+            heap.resize(self.stack, 0);
+            &mut heap[..]
+        };
+        // The root, at 0. Blocks are in the lowest bits of z
+        stack[0] = (active & 15) << 32;
+        let mut len = 1;
+        while len > 0 {
+            len -= 1;
+            let top = stack[len];
+            let child = top as u32;
+            let z = f32::from_bits((top >> 32) as u32 & !15);
+            // Blocks that have found something nearer ask no more
+            let mut active = 0;
+            for (block, z_max) in z_max.iter().enumerate() {
+                active |= u64::from(z <= *z_max) << block;
+            }
+            active &= top >> 32 & 15;
+            if active == 0 {
+                continue;
+            }
+            if child & LEAF != 0 {
+                leaf(child & !LEAF, active, &mut z_max);
+                leaves += 1;
+                if leaves == MANY_LEAVES {
+                    beams = split();
+                }
+                continue;
+            }
+            let node = &self.nodes[child as usize];
+            let mut masks = [0; 4];
+            let mut enter = simd.splat_f32x8(f32::INFINITY);
+            if leaves < MANY_LEAVES {
+                let (mask, z) = beam.meet(simd, node, z_max[0].max(z_max[1]).max(z_max[2].max(z_max[3])));
+                (masks, enter) = ([mask; 4], z);
+            }
+            for block in 0..4 {
+                if leaves >= MANY_LEAVES && active >> block & 1 == 1 {
+                    let (mask, z) = beams[block].meet(simd, node, z_max[block]);
+                    masks[block] = mask;
+                    enter = enter.min(z);
+                }
+            }
+            let mut mask = masks[0] | masks[1] | masks[2] | masks[3];
+            let enter = enter.to_array();
+            let base = len;
+            while mask != 0 {
+                let place = mask.trailing_zeros() as usize & 7;
+                mask &= mask - 1;
+                let blocks = (masks[0] >> place & 1)
+                    | (masks[1] >> place & 1) << 1
+                    | (masks[2] >> place & 1) << 2
+                    | (masks[3] >> place & 1) << 3;
+                let blocks = blocks & active as u32;
+                touch(node.children[place]);
+                let new = u64::from(enter[place].to_bits() & !15 | blocks) << 32 | u64::from(node.children[place]);
+                let mut at = len;
+                while at > base && stack[at - 1] < new {
+                    stack[at] = stack[at - 1];
+                    at -= 1;
+                }
+                stack[at] = new;
+                len += 1;
+            }
+        }
     }
 }

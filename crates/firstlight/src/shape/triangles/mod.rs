@@ -13,7 +13,7 @@ mod tests;
 
 use fearless_simd::{Level, dispatch, f32x4, f32x16, prelude::*};
 
-use crate::accel::{Aabb, Beam, Built, LaneSlabs, RayPacket16, RayTile, Slabs, TraceRay, Tree, build, groups};
+use crate::accel::{Aabb, Beam, Built, LEAF, LaneSlabs, RayPacket16, RayTile, Slabs, TraceRay, Tree, build, groups};
 use crate::math::{DVec3, Vec3};
 use kernel::{Crossings, intersect, intersect_lanes};
 
@@ -128,7 +128,7 @@ impl TriangleTree {
             }
             None => Aabb::EMPTY,
         };
-        let Built { tree, order, leaves } = build(triangles.len(), bounds, PACK);
+        let Built { tree, order, leaves } = build(triangles.len(), bounds, PACK.ilog2());
         let pack = |leaf: &crate::accel::Leaf| {
             let mut pack = Pack { vertices: [[[f32::NAN; PACK]; 3]; 3], ids: [NONE; PACK] };
             let run = &order[leaf.first as usize..(leaf.first + leaf.count) as usize];
@@ -165,6 +165,16 @@ impl TriangleTree {
     #[inline(always)]
     fn slabs(&self, ray: &TraceRay) -> Slabs {
         Slabs::new(ray, self.tree.center, self.tree.half)
+    }
+
+    /// Asks the memory for a node or leaf that will be looked at soon. All that safe code can do is to load a word of it.
+    #[inline(always)]
+    fn touch(&self, child: u32) {
+        if let Some(pack) = self.packs.get((child ^ LEAF) as usize) {
+            std::hint::black_box(pack.vertices[1][1][0]);
+        } else if let Some(node) = self.tree.nodes.get(child as usize) {
+            std::hint::black_box(node.planes[1][0][0]);
+        }
     }
 
     /// The triangles of a leaf that a ray may meet: a bit for each. The last word has [`intersect`].
@@ -263,6 +273,8 @@ impl TriangleTree {
                 }
                 false
             },
+            #[inline(always)]
+            |child| self.touch(child),
         )
     }
 
@@ -381,8 +393,13 @@ impl TriangleTree {
         hits: &mut TileHits,
         filter: &impl Fn(u32) -> bool,
     ) -> u64 {
-        let beam = Beam::new(simd, rays, &hits.t, group, which, self.tree.center, self.tree.half);
         let (center, half) = (self.tree.center, self.tree.half);
+        let beam = Beam::new(simd, rays, &hits.t, group, which, center, half);
+        let t_max = hits.t;
+        let active = u64::from(group & 0xffff != 0)
+            | u64::from(group >> 16 & 0xffff != 0) << 1
+            | u64::from(group >> 32 & 0xffff != 0) << 2
+            | u64::from(group >> 48 != 0) << 3;
         let lanes = [
             rays.lanes(simd, 0, beam.axes, center, half),
             rays.lanes(simd, 1, beam.axes, center, half),
@@ -391,42 +408,42 @@ impl TriangleTree {
         ];
         let zero = simd.splat_f32x16(0.0);
         let mut found = 0;
-        self.tree.beam(
+        self.tree.blocks(
             simd,
             &beam,
+            active,
             #[inline(always)]
-            |leaf, z_max| {
+            || beam.blocks(simd, rays, &t_max, group, center, half),
+            #[inline(always)]
+            |leaf, blocks, z_max| {
                 let pack = &self.packs[leaf as usize];
-                let mut changed = false;
+                let mut changed = 0;
                 for place in 0..PACK {
                     let id = pack.ids[place];
                     if id == NONE {
                         break;
                     }
                     let triangle = along(pack, place, beam.axes);
-                    for (block, lanes) in lanes.iter().enumerate() {
-                        let active = group >> (16 * block) & 0xffff;
-                        let Some(met) = intersect_lanes(simd, lanes, triangle) else { continue };
+                    let mut rest = blocks;
+                    while rest != 0 {
+                        let block = rest.trailing_zeros() as usize & 3;
+                        rest &= rest - 1;
+                        let Some(met) = intersect_lanes(simd, &lanes[block], triangle) else { continue };
                         let Crossings { mask, unsure, t, v, w, det } = met;
-                        let run = 16 * block..16 * block + 16;
-                        let best = f32x16::from_slice(simd, &hits.t[run]);
+                        let active = group >> (16 * block) & 0xffff;
+                        let best = f32x16::from_slice(simd, &hits.t[16 * block..16 * block + 16]);
                         let mut near = (mask & t.simd_gt(zero) & t.simd_le(best)).to_bitmask() & active & !unsure;
                         if near | (unsure & active) == 0 || !filter(id) {
                             continue;
                         }
                         let (t, v, w, det) = (t.to_array(), v.to_array(), w.to_array(), det.to_array());
+                        let mut better = 0;
                         while near != 0 {
-                            let lane = near.trailing_zeros() as usize % 16;
+                            let lane = near.trailing_zeros() as usize & 15;
                             near &= near - 1;
-                            let hit = TriangleHit {
-                                t: t[lane],
-                                u: v[lane] / det[lane],
-                                v: w[lane] / det[lane],
-                                triangle: id,
-                            };
-                            let better = hits.offer(16 * block + lane, &hit, surface);
-                            found |= u64::from(better) << (16 * block + lane);
-                            changed |= better;
+                            let (u, v) = (v[lane] / det[lane], w[lane] / det[lane]);
+                            let hit = TriangleHit { t: t[lane], u, v, triangle: id };
+                            better |= u64::from(hits.offer(16 * block + lane, &hit, surface)) << lane;
                         }
                         for lane in bits(unsure & active) {
                             let ray = rays.ray(16 * block + lane);
@@ -434,17 +451,19 @@ impl TriangleTree {
                                 && met.t > 0.0
                             {
                                 let hit = TriangleHit { t: met.t, u: met.u, v: met.v, triangle: id };
-                                let better = hits.offer(16 * block + lane, &hit, surface);
-                                found |= u64::from(better) << (16 * block + lane);
-                                changed |= better;
+                                better |= u64::from(hits.offer(16 * block + lane, &hit, surface)) << lane;
                             }
                         }
+                        found |= better << (16 * block);
+                        changed |= u64::from(better != 0) << block;
                     }
                 }
-                if changed {
-                    *z_max = beam.z_max(simd, rays, &hits.t, group);
+                for block in bits(changed) {
+                    z_max[block & 3] = beam.z_max(simd, rays, &hits.t, group & 0xffff << (16 * block));
                 }
             },
+            #[inline(always)]
+            |child| self.touch(child),
         );
         found
     }
