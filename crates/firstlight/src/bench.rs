@@ -1,18 +1,6 @@
 //! What the project's own benchmark of rays asks of the library's insides. Not for others: it changes without notice.
 
-use fearless_simd::{Level, Simd};
-
-macro_rules! dispatch {
-    ($l:expr, $simd:ident => $op:expr) => {
-        match $l {
-            Level::Avx512($simd) => $simd.vectorize(
-                #[inline(always)]
-                || $op,
-            ),
-            _ => unreachable!(),
-        }
-    };
-}
+use fearless_simd::{Level, Simd, dispatch};
 
 use crate::accel::{Aabb, Bvh, RayPacket16, RayTile, TraceRay};
 use crate::math::Vec3;

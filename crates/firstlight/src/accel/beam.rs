@@ -10,7 +10,8 @@ use fearless_simd::{f32x8, f32x16, mask32x16, prelude::*};
 
 use super::node::{Node, WIDTH};
 use super::ray::{
-    BEAM_PAD, LaneSlabs, Lanes, MAX_COORDINATE, MAX_DIRECTION, MIN_DIRECTION, NODE_PAD, OWN_PAD, RayTile, Rays, SMALLEST,
+    BEAM_PAD, LaneSlabs, Lanes, MAX_COORDINATE, MAX_DIRECTION, MIN_DIRECTION, NODE_PAD, OWN_PAD, RayTile, Rays,
+    SMALLEST,
 };
 use crate::math::Vec3;
 
@@ -243,7 +244,7 @@ impl Beam {
         z_start: f32,
     ) -> Beam {
         let kz = which / 2;
-        let sign = if which % 2 == 0 { 1.0 } else { -1.0 };
+        let sign = if which & 1 == 0 { 1.0 } else { -1.0 };
         let [kx, ky, kz] = axes(kz);
         // Where the rays start and end along z, and how far all that is from the centre
         let (mut starts, mut ends, mut far) = (Range::new(simd), Range::new(simd), Range::new(simd));

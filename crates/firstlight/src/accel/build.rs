@@ -291,13 +291,13 @@ impl Bins {
                 right[bin] = if count == 0 { f32::INFINITY } else { bounds.area() * leaves(count) };
             }
             let (mut bounds, mut count) = (Bounds::EMPTY, 0);
-            for bin in 1..binning.bins {
+            for (bin, right) in right.iter().enumerate().take(binning.bins).skip(1) {
                 bounds = bounds.join(self.bounds[axis][bin - 1]);
                 count += self.counts[axis][bin - 1];
                 if count == 0 {
                     continue;
                 }
-                let cost = bounds.area() * leaves(count) + right[bin];
+                let cost = bounds.area() * leaves(count) + right;
                 if cost < least {
                     least = cost;
                     best = Some(Cut { binning: *binning, axis, bin: bin as u32 });

@@ -166,3 +166,89 @@ impl Bvh {
         dispatch!(level, simd => self.any(simd, ray, t_max, leaf))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::render::SimdLevel;
+
+    /// Whether a ray meets a box, exactly enough.
+    fn meets(bounds: &Aabb, ray: &TraceRay, t_max: f32) -> bool {
+        let (o, d) = (ray.o.as_dvec3(), ray.d.as_dvec3());
+        let (a, b) = ((bounds.min.as_dvec3() - o) / d, (bounds.max.as_dvec3() - o) / d);
+        a.min(b).max_element().max(0.0) <= a.max(b).min_element().min(f64::from(t_max))
+    }
+
+    #[test]
+    fn every_box_on_a_ray_is_asked() {
+        let mut state = 1u32;
+        let mut random = || {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            (state >> 8) as f32 / 8_388_608.0 - 1.0
+        };
+        let mut boxes: Vec<_> = (0..1000)
+            .map(|_| {
+                let min = Vec3::new(random(), random(), random());
+                Aabb { min, max: min + Vec3::new(random(), random(), random()).abs() * 0.1 }
+            })
+            .collect();
+        boxes[7] = Aabb::EMPTY;
+        boxes[8].max.x = f32::NAN;
+        let bvh = Bvh::build(&boxes);
+        for kind in 0..40 {
+            let from = Vec3::new(random(), random(), random()) * 3.0;
+            let t_max = [f32::INFINITY, 0.9][kind % 2];
+            let mut tile = RayTile::ZERO;
+            let mut packet = RayPacket16::ZERO;
+            for i in 0..64 {
+                let to = Vec3::new(random(), random(), random()) * [0.05, 1.0][kind / 2 % 2];
+                tile.set(i, from, to - from);
+                packet.set(i % 16, from, to - from);
+            }
+            let ray = tile.ray(0);
+            for level in SimdLevel::available() {
+                let level = level.token();
+                let (mut one, mut any) = (vec![0; 1000], vec![0; 1000]);
+                bvh.closest_at(level, &ray, &mut t_max.clone(), |id, _| one[id as usize] += 1);
+                assert!(!bvh.any_at(level, &ray, t_max, |id| {
+                    any[id as usize] += 1;
+                    false
+                }));
+                for (id, bounds) in boxes.iter().enumerate() {
+                    let least = i32::from(bounds.is_sound() && meets(bounds, &ray, t_max));
+                    let most = i32::from(bounds.is_sound());
+                    assert!((least..=most).contains(&one[id]) && (least..=most).contains(&any[id]));
+                }
+            }
+            let (mut many, mut sixteen) = (vec![false; 1000], vec![false; 1000]);
+            dispatch!(Level::new(), simd => {
+                bvh.tile(simd, &tile, &mut [t_max; 64], u64::MAX, |id, _, _| many[id as usize] = true);
+                bvh.any16(simd, &packet, &[t_max; 16], 0xffff, |id, _| {
+                    sixteen[id as usize] = true;
+                    0
+                });
+            });
+            for (id, bounds) in boxes.iter().enumerate().filter(|(_, bounds)| bounds.is_sound()) {
+                assert!(many[id] || !(0..64).any(|i| meets(bounds, &tile.ray(i), t_max)));
+                assert!(sixteen[id] || !(0..16).any(|i| meets(bounds, &packet.ray(i), t_max)));
+            }
+        }
+    }
+
+    #[test]
+    fn the_nearest_box_is_asked_first_and_far_ones_not_at_all() {
+        let boxes: Vec<_> = (0..100)
+            .map(|i| Aabb { min: Vec3::new(i as f32, -1.0, -1.0), max: Vec3::new(i as f32 + 0.5, 1.0, 1.0) })
+            .collect();
+        let bvh = Bvh::build(&boxes);
+        let mut asked = Vec::new();
+        let ray = TraceRay::new(Vec3::new(-1.0, 0.1, 0.2), Vec3::X);
+        bvh.closest_at(Level::new(), &ray, &mut f32::INFINITY.clone(), |id, t_max| {
+            asked.push(id);
+            *t_max = t_max.min(3.75);
+        });
+        assert_eq!(asked, [0, 1, 2]);
+        assert_eq!(bvh.bounds(), Aabb { min: Vec3::new(0.0, -1.0, -1.0), max: Vec3::new(99.5, 1.0, 1.0) });
+        assert!(bvh.bytes() > 0);
+    }
+}

@@ -117,7 +117,7 @@ impl Tree {
     /// Asks the leaves on a ray until one says yes.
     #[inline(always)]
     pub fn any<S: Simd>(&self, simd: S, slabs: &Slabs, t_max: f32, leaf: impl FnMut(u32) -> bool) -> bool {
-        self.any_below(simd, 0, slabs, t_max, leaf, |_| ())
+        self.any_below(simd, 0, slabs, t_max, leaf)
     }
 
     /// Asks the leaves on a ray at or below a child of a node until one says yes.
@@ -129,7 +129,6 @@ impl Tree {
         slabs: &Slabs,
         t_max: f32,
         mut leaf: impl FnMut(u32) -> bool,
-        touch: impl Fn(u32),
     ) -> bool {
         if self.nodes.is_empty() || !(t_max >= 0.0) {
             return false;
@@ -163,7 +162,6 @@ impl Tree {
                             mask &= mask - 1;
                             let nearer = enter[other] < enter[place];
                             stack[len] = node.children[if nearer { place } else { other }];
-                            touch(stack[len]);
                             place = if nearer { other } else { place };
                             len += 1;
                         }

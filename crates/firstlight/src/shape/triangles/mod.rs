@@ -23,6 +23,8 @@ const PACK: usize = 4;
 const NONE: u32 = u32::MAX;
 /// Fewer rays than this go one by one.
 const FEW: u32 = 4;
+/// Processors with fewer lanes than this take packets and tiles ray by ray. The same answers, and half the code to compile.
+const WIDE: usize = 8;
 
 /// The triangles of a leaf, coordinate by coordinate.
 #[derive(Clone)]
@@ -171,9 +173,9 @@ impl TriangleTree {
     #[inline(always)]
     fn touch(&self, child: u32) {
         if let Some(pack) = self.packs.get((child ^ LEAF) as usize) {
-            std::hint::black_box(pack.vertices[1][1][0]);
+            std::hint::black_box((pack.vertices[0][0][0], pack.vertices[2][0][0]));
         } else if let Some(node) = self.tree.nodes.get(child as usize) {
-            std::hint::black_box(node.planes[1][0][0]);
+            std::hint::black_box((node.planes[0][1][0], node.planes[2][1][0]));
         }
     }
 
@@ -273,8 +275,6 @@ impl TriangleTree {
                 }
                 false
             },
-            #[inline(always)]
-            |child| self.touch(child),
         )
     }
 
@@ -289,6 +289,12 @@ impl TriangleTree {
         filter: &impl Fn(u32) -> bool,
     ) -> u16 {
         let mut done = 0;
+        if S::f32s::LEN < WIDE {
+            for place in bits(u64::from(active)) {
+                done |= u16::from(self.any(simd, &rays.ray(place), t_max[place], filter)) << place;
+            }
+            return done;
+        }
         for (which, group) in groups(simd, rays, u64::from(active)).into_iter().enumerate() {
             if group == 0 {
                 continue;
@@ -364,6 +370,14 @@ impl TriangleTree {
         filter: &impl Fn(u32) -> bool,
     ) -> u64 {
         let mut found = 0;
+        if S::f32s::LEN < WIDE {
+            for place in bits(active) {
+                if let Some(hit) = self.closest(simd, &rays.ray(place), hits.t[place], filter) {
+                    found |= u64::from(hits.offer(place, &hit, surface)) << place;
+                }
+            }
+            return found;
+        }
         for (which, group) in groups(simd, rays, active).into_iter().enumerate() {
             if group == 0 {
                 continue;

@@ -3,6 +3,15 @@
 use super::*;
 use crate::render::SimdLevel;
 
+/// One type of filter for all tests: each has its own code for each processor level.
+type Filter = fn(u32) -> bool;
+
+const ALL: &Filter = &((|_| true) as Filter);
+
+fn some(triangle: u32) -> bool {
+    triangle % 3 != 1
+}
+
 /// Numbers that look random.
 struct Random(u64);
 
@@ -115,9 +124,8 @@ impl Mesh {
 fn check(mesh: &Mesh, tiles: &[RayTile], t_max: f32) -> usize {
     let tree = mesh.tree();
     let mut hits = 0;
-    let filters: [&(dyn Fn(u32) -> bool + Sync); 2] = [&|_| true, &|triangle| triangle % 3 != 1];
+    let filters: [&Filter; 2] = [ALL, &(some as Filter)];
     for (rays, filter) in tiles.iter().flat_map(|tile| filters.map(|filter| (tile, filter))) {
-        let filter = &|triangle| filter(triangle);
         let expected: Vec<_> = (0..64).map(|i| tree.brute_force(&rays.ray(i), t_max, filter)).collect();
         hits += expected.iter().flatten().count();
         for level in SimdLevel::available() {
@@ -177,6 +185,20 @@ fn tiles(count: usize, center: Vec3, size: f32, random: &mut Random) -> Vec<RayT
     tiles
 }
 
+/// Rays to points of triangles, corners and edges among them, from one point or from many.
+fn aimed(mesh: &Mesh, from_one: bool, random: &mut Random) -> RayTile {
+    let mut tile = RayTile::ZERO;
+    let from = random.vector() * 3.0;
+    for i in 0..64 {
+        let triangle = mesh.triangles[random.next() as usize % mesh.triangles.len()];
+        let [a, b, c] = triangle.map(|v| Vec3::from_array(mesh.positions[v as usize]));
+        let (u, v) = [(random.signed() * 0.2 + 0.3, 0.3), (0.5, 0.5), (0.0, 1.0), (0.25, 0.0)][i % 4];
+        let o = if from_one { from } else { random.vector() * 2.0 };
+        tile.set(i, o, a + (b - a) * u + (c - a) * v - o);
+    }
+    tile
+}
+
 const FAR: Vec3 = Vec3::new(148_376.0, 1234.0, -223_423.0);
 
 #[test]
@@ -192,9 +214,10 @@ fn every_way_of_asking_equals_brute_force() {
         Mesh::grid(24),
     ];
     for (i, mesh) in meshes.into_iter().enumerate() {
-        let tiles = tiles(35, Vec3::ZERO, 1.0, random);
+        let mut tiles = tiles(28, Vec3::ZERO, 1.0, random);
+        tiles.extend((0..8).map(|i| aimed(&mesh, i % 2 == 0, random)));
         let hits = check(&mesh, &tiles, f32::INFINITY);
-        assert!(hits > 50 || i == 2 || i == 3, "mesh {i}: {hits}");
+        assert!(hits > 100, "mesh {i}: {hits}");
         check(&mesh, &tiles[..14], 0.75);
     }
 }
@@ -225,8 +248,81 @@ fn what_has_no_area_or_no_place_is_left_out() {
     check(&mesh, &tiles(14, Vec3::ZERO, 1.0, &mut random), f32::INFINITY);
     let empty = TriangleTree::build(&[], &[]);
     assert_eq!((empty.len(), empty.bounds()), (0, Aabb::EMPTY));
-    assert_eq!(empty.closest_at(Level::new(), &TraceRay::new(Vec3::ZERO, Vec3::X), 1.0, &|_| true), None);
+    assert_eq!(empty.closest_at(Level::new(), &TraceRay::new(Vec3::ZERO, Vec3::X), 1.0, ALL), None);
     let one = Mesh { positions: vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]], triangles: vec![[0, 1, 2]] };
-    let hit = one.tree().closest_at(Level::new(), &TraceRay::new(Vec3::new(0.25, 0.5, 2.0), -Vec3::Z), 2.0, &|_| true);
+    let hit = one.tree().closest_at(Level::new(), &TraceRay::new(Vec3::new(0.25, 0.5, 2.0), -Vec3::Z), 2.0, ALL);
     assert_eq!(hit, Some(TriangleHit { t: 2.0, u: 0.25, v: 0.5, triangle: 0 }));
+}
+
+#[test]
+fn a_closed_mesh_has_no_holes() {
+    let sphere = Mesh::sphere(200);
+    let middle = |a: Vec3, b: Vec3| (a + b) * 0.5;
+    let places = [(Vec3::ZERO, 1.0), (FAR, 1.0), (Vec3::ZERO, 1e-6), (Vec3::ZERO, 1e6)];
+    for (round, (center, size)) in places.into_iter().enumerate() {
+        let mesh = Mesh { positions: sphere.positions.clone(), triangles: sphere.triangles.clone() };
+        let mesh = mesh.map(|p| center + p * size);
+        let tree = mesh.tree();
+        let corner = |v: u32| Vec3::from_array(mesh.positions[v as usize]);
+        // Each vertex, and the middle of each edge, from inside and from outside
+        let mut targets: Vec<Vec3> = mesh.positions.iter().map(|p| Vec3::from_array(*p)).collect();
+        targets.extend(mesh.triangles.iter().map(|t| middle(corner(t[0]), corner(t[1]))));
+        targets.extend(mesh.triangles.iter().map(|t| middle(corner(t[1]), corner(t[2]))));
+        let mut random = Random(round as u64);
+        // And anywhere
+        targets.extend((0..250_000).map(|_| center + random.vector() * (0.5 * size)));
+        let inside = center + Vec3::new(0.11, -0.07, 0.05) * size;
+        let outside = center + Vec3::new(1.3, 2.1, -1.7) * size;
+        for (targets, o) in targets.chunks(64).flat_map(|targets| [(targets, inside), (targets, outside)]) {
+            let mut tile = RayTile::ZERO;
+            for i in 0..64 {
+                tile.set(i, o, targets[i % targets.len()] - o);
+            }
+            let mut found = TileHits::new(f32::INFINITY);
+            let missed = !tree.tile_at(Level::new(), &tile, u64::MAX, 0, &mut found, ALL);
+            for i in bits(missed) {
+                // From outside, rays to the outline may pass by
+                let (from, d) = (o - center, tile.d(i));
+                let across = from.cross(d).length() / d.length();
+                assert!(o == outside && across > 0.97 * size, "{:?} from {o}: {across}", tile.ray(i));
+                assert_eq!(tree.closest_at(Level::new(), &tile.ray(i), f32::INFINITY, ALL), None);
+            }
+        }
+    }
+}
+
+#[test]
+fn the_tree_does_not_depend_on_the_number_of_threads() {
+    let mut random = Random(5);
+    let mesh = Mesh::soup(100_000, Vec3::splat(0.02), &mut random);
+    let fingerprint = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads can be had");
+        let tree = pool.install(|| mesh.tree());
+        let mut hasher = blake3::Hasher::new();
+        for node in &tree.tree.nodes {
+            for plane in node.planes.iter().flatten().flatten() {
+                hasher.update(&plane.to_ne_bytes());
+            }
+            for child in node.children {
+                hasher.update(&child.to_ne_bytes());
+            }
+        }
+        for id in tree.packs.iter().flat_map(|pack| pack.ids) {
+            hasher.update(&id.to_ne_bytes());
+        }
+        hasher.finalize()
+    };
+    assert!(fingerprint(1) == fingerprint(2) && fingerprint(1) == fingerprint(8));
+}
+
+#[test]
+fn a_million_triangles_in_one_place() {
+    let mesh =
+        Mesh { positions: vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]], triangles: vec![[0, 1, 2]; 1_000_000] };
+    let tree = mesh.tree();
+    let ray = TraceRay::new(Vec3::new(0.25, 0.25, 1.0), -Vec3::Z);
+    let hit = tree.closest_at(Level::new(), &ray, f32::INFINITY, ALL);
+    assert_eq!(hit, Some(TriangleHit { t: 1.0, u: 0.25, v: 0.25, triangle: 0 }));
+    assert!(tree.any_at(Level::new(), &ray, f32::INFINITY, ALL));
+    assert!(tree.bytes() < 80_000_000, "{}", tree.bytes());
 }
