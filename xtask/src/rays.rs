@@ -494,6 +494,10 @@ fn page(options: &Options, rows: &[Row]) -> String {
     if options.quick {
         command.push_str(" --quick");
     }
+    if let Some(scene) = &options.scene {
+        let _ = write!(command, " --scene '{scene}'");
+    }
+    let _ = write!(command, " --rounds {}", options.rounds);
     if let Some(name) = &options.name {
         let _ = write!(command, " --name {name}");
     }

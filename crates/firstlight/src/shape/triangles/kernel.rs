@@ -111,8 +111,8 @@ pub(super) fn intersect_lanes<S: Simd>(simd: S, rays: &Lanes<S>, triangle: [[f32
     let t = ((u * az + v * bz) + w * cz) / det;
     // Not before the triangle's own box
     let (mut enter, mut leave) = (simd.splat_f32x16(f32::NEG_INFINITY), simd.splat_f32x16(f32::INFINITY));
-    for axis in 0..3 {
-        let [a, b, c] = [triangle[0][axis], triangle[1][axis], triangle[2][axis]];
+    let [a, b, c] = triangle;
+    for (axis, ((a, b), c)) in a.into_iter().zip(b).zip(c).enumerate() {
         let (lo, hi) = (simd.splat_f32x16(a.min(b).min(c)), simd.splat_f32x16(a.max(b).max(c)));
         let rd = rays.rd[axis];
         let negative = rd.simd_lt(zero);

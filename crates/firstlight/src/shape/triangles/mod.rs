@@ -137,9 +137,9 @@ impl TriangleTree {
             for (place, &id) in run.iter().enumerate() {
                 pack.ids[place] = id;
                 for (corner, &index) in triangles[id as usize].iter().enumerate() {
-                    for axis in 0..3 {
-                        pack.vertices[corner][axis][place] = positions[index as usize][axis];
-                    }
+                    let [x, y, z] = positions[index as usize];
+                    let [xs, ys, zs] = &mut pack.vertices[corner];
+                    (xs[place], ys[place], zs[place]) = (x, y, z);
                 }
             }
             pack
