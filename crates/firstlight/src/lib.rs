@@ -53,6 +53,7 @@ mod describe;
 mod error;
 mod ids;
 mod image;
+mod import;
 mod light;
 mod material;
 mod math;
@@ -70,6 +71,7 @@ pub use ids::{LightId, MaterialId, SurfaceId, TextureId};
 pub use image::{
     Format, Image, ImageError, PendingFile, Receipt, StagedFile, StoredImage, Window, Written, write_whole,
 };
+pub use import::{ImportError, MeshData, MeshFormat, MeshPart, MeshPlace, read_mesh};
 pub use light::{DirectionalDesc, EmitSides, Falloff, LightDesc, PointDesc, RectangleDesc, SampleSet, SpotDesc};
 pub use material::{BlinnPhongDesc, MaterialDesc, PhongDesc};
 pub use math::{Ray, Vec2, Vec3};
