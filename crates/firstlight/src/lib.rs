@@ -71,7 +71,7 @@ pub use ids::{LightId, MaterialId, SurfaceId, TextureId};
 pub use image::{
     Format, Image, ImageError, PendingFile, Receipt, StagedFile, StoredImage, Window, Written, write_whole,
 };
-pub use import::{ImportError, MeshData, MeshFormat, MeshPart, MeshPlace, read_mesh};
+pub use import::{ImportError, MeshData, MeshFormat, MeshPart, MeshPlace, MeshReport, read_mesh};
 pub use light::{DirectionalDesc, EmitSides, Falloff, LightDesc, PointDesc, RectangleDesc, SampleSet, SpotDesc};
 pub use material::{BlinnPhongDesc, MaterialDesc, PhongDesc};
 pub use math::{Ray, Vec2, Vec3};

@@ -17,6 +17,8 @@ mod error;
 mod obj;
 mod ply;
 mod polygon;
+mod report;
+mod smooth;
 mod stl;
 mod text;
 mod weld;
@@ -26,6 +28,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 use error::Fault;
 pub use error::{ImportError, MeshPlace};
+pub use report::MeshReport;
 
 /// Vertices and triangles are counted in 32 bits, with one number to spare for "none".
 const MAX_COUNT: u64 = (1 << 32) - 2;

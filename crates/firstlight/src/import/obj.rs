@@ -1,7 +1,8 @@
 //! Wavefront OBJ: polygons, with their texture coordinates, normals, materials, groups and smoothing.
 //!
 //! Read: `v` (three numbers; red, green, blue after them, as linear numbers; a single weight is ignored), `vt`, `vn`, `f` in all
-//! forms with indices from 1 or, negative, from the last, `o`, `g`, `s`, `usemtl`, the names of `mtllib`; `\` at the end of a line goes
+//! forms with indices from 1 or, negative, from the last (those of texture coordinates or normals are left out if the file has
+//! none at all), `o`, `g`, `s`, `usemtl`, the names of `mtllib`; `\` at the end of a line goes
 //! on with the next, `#` begins a comment. An index may point to what comes later. `l` and `p` are left out; free-form curves
 //! and surfaces and all other statements are not understood. Notes count them.
 //!
@@ -363,12 +364,18 @@ fn join(parts: &mut [Piece]) -> Result<Known, Fault> {
 }
 
 /// Makes all indices count from 1 in the whole file, and checks that they are in range.
+/// Texture coordinates and normals of files that have none are left out.
 fn resolve(file: &[u8], pieces: &[Range<usize>], parts: &mut [Piece], counts: &[[usize; 3]]) -> Result<(), Fault> {
     let all_counts = counts.last().copied().unwrap_or_default();
     let resolve = |(part, before): (&mut Piece, &[usize; 3])| {
         for (n, corner) in part.corners.iter_mut().enumerate() {
             for (kind, index) in corner.iter_mut().enumerate().filter(|(_, index)| **index != NONE) {
                 let value = i64::from(*index);
+                // A list that is not there at all: as if the corner did not name it
+                if all_counts[kind] == 0 && kind > 0 {
+                    *index = NONE;
+                    continue;
+                }
                 let absolute = if value < 0 { value - RELATIVE + before[kind] as i64 + 1 } else { value };
                 if absolute < 1 || absolute > all_counts[kind] as i64 {
                     return Some((n, kind, absolute));
@@ -420,6 +427,13 @@ fn build(mut parts: Vec<Piece>, known: Known) -> Result<MeshData, Fault> {
     let corners: usize = parts.iter().map(|p| p.corners.len()).sum();
     if corners as u64 > MAX_COUNT {
         return Err(Fault::TooMany { what: "corners of faces", count: corners as u64, limit: MAX_COUNT });
+    }
+    // Something else altogether
+    let known_statements = corners > 0 || !known.positions.is_empty() || parts.iter().any(|p| !p.events.is_empty());
+    if let (false, Some(part)) = (known_statements, parts.iter().find(|p| !p.unknown.is_empty())) {
+        let word = part.unknown.keys().next().expect("not empty");
+        let message = format!("{} and no statement of an OBJ file", shown(word));
+        return Err(Fault::text(0, message, "an OBJ file has lines that begin with v and f"));
     }
     // Names, materials and groups
     attributes(&parts, &mut mesh);

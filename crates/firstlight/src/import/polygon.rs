@@ -257,7 +257,9 @@ mod tests {
         for turn in 0..4 {
             let mut points = dart;
             points.rotate_left(turn);
-            for place in [|p: [f32; 2]| [p[0], p[1], 1.0], |p| [1.0, p[0], p[1]], |p| [p[1], 0.0, p[0]]] {
+            let places: [fn([f32; 2]) -> [f32; 3]; 3] =
+                [|p| [p[0], p[1], 1.0], |p| [1.0, p[0], p[1]], |p| [p[1], 0.0, p[0]]];
+            for place in places {
                 let (triangles, areas) = split(&points, place);
                 assert_eq!(triangles.len(), 2);
                 assert!(areas.iter().all(|&a| a > 0.0), "{triangles:?}");

@@ -7,8 +7,8 @@
 //! **Which of the two kinds a file is**, its first word does not tell: many binary files begin with `solid`. In this order:
 //!
 //! 1. 84 bytes and 50 for each facet counted at byte 80: binary.
-//! 2. It begins with `solid` in any case, after blanks or none, and `facet` or `endsolid` is among its first 1024 bytes after
-//!    that line, or nothing follows: text.
+//! 2. It begins with `solid` in any case, after blanks or none, no byte of its first 1024 is zero, and `facet` or `endsolid` is
+//!    among the 1024 bytes after that line, or nothing follows: text.
 //! 3. At least 84 bytes: binary, and its count is wrong. More bytes than counted: the rest is ignored, with a note. A count
 //!    of 0 or 2^32 - 1, and whole facets: it was not known when the header was written, and the length decides, with a
 //!    note. Fewer bytes than counted: an error.
@@ -73,7 +73,8 @@ fn counted(file: &[u8]) -> Option<u64> {
 
 fn is_text(file: &[u8]) -> bool {
     let mut text = start(file);
-    if !text.word().eq_ignore_ascii_case(b"solid") {
+    // Text has no zero bytes; the header of a binary file nearly always has
+    if !text.word().eq_ignore_ascii_case(b"solid") || file[..file.len().min(1024)].contains(&0) {
         return false;
     }
     text.rest_of_line();

@@ -488,11 +488,17 @@ fn read_text(file: &[u8], header: &Header, plan: &Plan, progress: &Progress) -> 
     match read_lines(file, header, plan, progress) {
         Ok(body) => Ok(body),
         Err(Fault::Stopped) => Err(Fault::Stopped),
-        Err(lines) => read_stream(file, header, plan).map_err(|stream| {
-            // The earlier fault is the likelier cause; an empty line alone is none
+        Err(lines) => {
+            // An empty line alone is no fault
             let empty = lines.offset().is_none_or(|at| file.get(at).is_none_or(|b| b.is_ascii_whitespace()));
-            if !empty && lines.offset() < stream.offset() { lines } else { stream }
-        }),
+            match read_stream(file, header, plan) {
+                // Numbers left over: a row had too few or too many
+                Ok(body) if !empty && !file[body.end..].trim_ascii().is_empty() => Err(lines),
+                // The earlier fault is the likelier cause
+                Err(stream) if !empty && lines.offset() < stream.offset() => Err(lines),
+                other => other,
+            }
+        }
     }
 }
 
