@@ -23,7 +23,7 @@ use rayon::prelude::*;
 
 use super::error::WRITE_ANEW;
 use super::polygon::{self, Counts};
-use super::text::{Cursor, pieces};
+use super::text::{Cursor, is_blank, is_line_end, pieces};
 use super::weld::weld;
 use super::{Fault, MAX_COUNT, MeshData, Progress, all};
 use crate::color::Encoding as ColorEncoding;
@@ -490,7 +490,7 @@ fn read_text(file: &[u8], header: &Header, plan: &Plan, progress: &Progress) -> 
         Err(Fault::Stopped) => Err(Fault::Stopped),
         Err(lines) => {
             // An empty line alone is no fault
-            let empty = lines.offset().is_none_or(|at| file.get(at).is_none_or(|b| b.is_ascii_whitespace()));
+            let empty = lines.offset().is_none_or(|at| is_empty_line(file, at));
             match read_stream(file, header, plan) {
                 // Numbers left over: a row had too few or too many
                 Ok(body) if !empty && !file[body.end..].trim_ascii().is_empty() => Err(lines),
@@ -500,6 +500,12 @@ fn read_text(file: &[u8], header: &Header, plan: &Plan, progress: &Progress) -> 
             }
         }
     }
+}
+
+/// Whether nothing but blanks stands on the line up to a byte, and there is its end.
+fn is_empty_line(file: &[u8], at: usize) -> bool {
+    let before = file[..at].iter().rev().find(|&&b| !is_blank(b));
+    file.get(at).is_none_or(|&b| is_line_end(b)) && before.is_none_or(|&b| is_line_end(b))
 }
 
 /// Reads text with one row to a line, on all threads.
