@@ -147,7 +147,12 @@ impl<'a> Piece<'a> {
                 }
                 b"f" | b"fo" => self.face(&mut text)?,
                 b"" => {}
-                word if word[0] == b'#' => {}
+                // A comment ends with its line, also where a Windows path is the last word of it
+                word if word[0] == b'#' => {
+                    text.rest_of_line();
+                    text.pass_line_end();
+                    continue;
+                }
                 b"usemtl" => self.events.push((self.faces, Event::Material(rest(&mut text)))),
                 b"o" => self.events.push((self.faces, Event::Object(rest(&mut text)))),
                 b"g" => self.events.push((self.faces, Event::Group(rest(&mut text)))),
@@ -403,7 +408,13 @@ fn place_of(bytes: &[u8], start: usize, wanted: usize) -> usize {
     let mut seen = 0;
     while !text.at_end() {
         skip_blanks(&mut text);
-        if let b"f" | b"fo" = text.word() {
+        let word = text.word();
+        if word.starts_with(b"#") {
+            text.rest_of_line();
+            text.pass_line_end();
+            continue;
+        }
+        if let b"f" | b"fo" = word {
             loop {
                 skip_blanks(&mut text);
                 if text.at_line_end() || text.peek() == Some(b'#') {

@@ -37,77 +37,66 @@ impl MeshData {
         let least_cosine =
             if crease_deg >= 180.0 { f64::NEG_INFINITY } else { pxfm::f_cos(crease_deg.max(0.0).to_radians()) - 1e-12 };
         // Faces, places, and the corners at each place in the order of the triangles
-        let faces: Vec<DVec3> = self.triangles.par_iter().map(|t| unit_normal(&self.positions, t)).collect();
-        let triangles = &self.triangles;
-        let positions = &self.positions;
-        let places = weld(corners, |i| {
-            let p = positions[triangles[i / 3][i % 3] as usize].map(|x| (x + 0.0).to_bits());
-            [p[0], p[1], p[2], 0]
+        let (triangles, positions) = (&self.triangles, &self.positions);
+        let faces: Vec<DVec3> = triangles.par_iter().map(|t| unit_normal(positions, t)).collect();
+        let places = weld(positions.len(), |i| {
+            let [x, y, z] = positions[i].map(|x| (x + 0.0).to_bits());
+            [x, y, z, 0]
         });
-        let (starts, at_place) = gather(&places.vertex, places.first.len());
         let around = Around { mesh: self, faces: &faces, place: &places.vertex, least_cosine };
-        // The normal of each corner, and which corners of a place share it
-        let blocks: Vec<Vec<(u32, u32, [f32; 3])>> = (0..places.first.len().div_ceil(BLOCK))
+        let (starts, at_place) = gather(triangles, &places.vertex, places.first.len());
+        // The normals at each place, and the vertices that are needed for them
+        let blocks: Vec<Normals> = (0..places.first.len().div_ceil(BLOCK))
             .into_par_iter()
             .map(|block| {
                 let mut room = Room::default();
-                let mut found = Vec::new();
+                let mut normals = Normals::default();
                 for place in block * BLOCK..((block + 1) * BLOCK).min(places.first.len()) {
                     let corners = &at_place[starts[place] as usize..starts[place + 1] as usize];
-                    around.normals(corners, &mut room, &mut found);
+                    around.normals(corners, &mut room, &mut normals);
                 }
-                found
+                normals
             })
             .collect();
-        let mut of_corner = vec![(0u32, [0.0f32; 3]); corners];
-        for (corner, leader, normal) in blocks.into_iter().flatten() {
-            of_corner[corner as usize] = (leader, normal);
-        }
-        self.split(&of_corner);
-    }
-
-    /// Gives each vertex its normal, and a copy of it to each other group of corners that use it.
-    fn split(&mut self, of_corner: &[(u32, [f32; 3])]) {
-        let triangles = &self.triangles;
-        // A vertex is parted where its corners have different leaders
-        let welded = weld(of_corner.len(), |i| [triangles[i / 3][i % 3], of_corner[i].0, 0, 0]);
         let old = self.positions.len();
-        let mut taken = vec![false; old];
-        let mut number = Vec::with_capacity(welded.first.len());
-        let mut source: Vec<u32> = Vec::new();
-        let mut normals = vec![[0.0; 3]; old];
-        for &corner in &welded.first {
-            let corner = corner as usize;
-            let vertex = triangles[corner / 3][corner % 3];
-            if std::mem::replace(&mut taken[vertex as usize], true) {
-                number.push((old + source.len()) as u32);
-                source.push(vertex);
-                normals.push(of_corner[corner].1);
-            } else {
-                number.push(vertex);
-                normals[vertex as usize] = of_corner[corner].1;
-            }
-        }
-        if (old + source.len()) as u64 > super::MAX_COUNT {
+        let count = old + blocks.iter().map(|b| b.new.len()).sum::<usize>();
+        if count as u64 > super::MAX_COUNT {
             return;
         }
-        fn copy<T: Copy>(list: &mut Vec<T>, source: &[u32]) {
-            if !list.is_empty() {
-                list.reserve_exact(source.len());
-                for &vertex in source {
-                    list.push(list[vertex as usize]);
-                }
+        // Put the normals into their places, and new vertices after the old ones
+        let mut normals = vec![[0.0; 3]; old];
+        let mut sources: Vec<u32> = Vec::with_capacity(count - old);
+        normals.reserve_exact(count - old);
+        for block in blocks {
+            let base = (old + sources.len()) as u32;
+            for (vertex, normal) in block.kept {
+                normals[vertex as usize] = normal;
+            }
+            for (corner, new) in block.moved {
+                self.triangles[corner as usize / 3][corner as usize % 3] = base + new;
+            }
+            for (vertex, normal) in block.new {
+                sources.push(vertex);
+                normals.push(normal);
             }
         }
-        copy(&mut self.positions, &source);
-        copy(&mut self.colors, &source);
-        copy(&mut self.radii, &source);
+        copy(&mut self.positions, &sources);
+        copy(&mut self.colors, &sources);
+        copy(&mut self.radii, &sources);
         for set in &mut self.uvs {
-            copy(set, &source);
+            copy(set, &sources);
         }
         self.normals = normals;
-        let numbers = |i: usize| number[welded.vertex[i] as usize];
-        self.triangles.par_iter_mut().enumerate().for_each(|(i, t)| *t = [0, 1, 2].map(|k| numbers(3 * i + k)));
+    }
+}
+
+/// Adds copies of some entries to a list per vertex that is there.
+fn copy<T: Copy>(list: &mut Vec<T>, sources: &[u32]) {
+    if !list.is_empty() {
+        list.reserve_exact(sources.len());
+        for &vertex in sources {
+            list.push(list[vertex as usize]);
+        }
     }
 }
 
@@ -121,22 +110,33 @@ fn unit_normal(positions: &[[f32; 3]], triangle: &[u32; 3]) -> DVec3 {
 }
 
 /// For each place, its corners in order: starts of the lists, and the lists one after another.
-fn gather(place: &[u32], places: usize) -> (Vec<u32>, Vec<u32>) {
+fn gather(triangles: &[[u32; 3]], place: &[u32], places: usize) -> (Vec<u32>, Vec<u32>) {
     let mut starts = vec![0u32; places + 1];
-    for &p in place {
-        starts[p as usize + 1] += 1;
+    for &vertex in triangles.as_flattened() {
+        starts[place[vertex as usize] as usize + 1] += 1;
     }
     for i in 0..places {
         starts[i + 1] += starts[i];
     }
     let mut next = starts.clone();
-    let mut corners = vec![0u32; place.len()];
-    for (corner, &p) in place.iter().enumerate() {
-        let at = &mut next[p as usize];
+    let mut corners = vec![0u32; 3 * triangles.len()];
+    for (corner, &vertex) in triangles.as_flattened().iter().enumerate() {
+        let at = &mut next[place[vertex as usize] as usize];
         corners[*at as usize] = corner as u32;
         *at += 1;
     }
     (starts, corners)
+}
+
+/// The normals of some places.
+#[derive(Default)]
+struct Normals {
+    /// Vertices, each with its normal.
+    kept: Vec<(u32, [f32; 3])>,
+    /// The vertices that new ones are copies of, each with the new one's normal.
+    new: Vec<(u32, [f32; 3])>,
+    /// Corners, each with the number of the new vertex that it gets.
+    moved: Vec<(u32, u32)>,
 }
 
 /// Room for one place at a time.
@@ -146,25 +146,33 @@ struct Room {
     edges: Vec<(u32, u32)>,
     leader: Vec<u32>,
     sums: Vec<DVec3>,
+    /// Vertex, leader, corner.
+    uses: Vec<(u32, u32, u32)>,
 }
 
 /// What is needed to look around a place.
 struct Around<'a> {
     mesh: &'a MeshData,
     faces: &'a [DVec3],
+    /// Of each vertex.
     place: &'a [u32],
     least_cosine: f64,
 }
 
 impl Around<'_> {
-    /// Adds, for each corner at a place, the first corner that shares its normal, and the normal.
-    fn normals(&self, corners: &[u32], room: &mut Room, found: &mut Vec<(u32, u32, [f32; 3])>) {
+    fn vertex(&self, corner: u32) -> u32 {
+        self.mesh.triangles.as_flattened()[corner as usize]
+    }
+
+    /// Adds the normals at a place, from its corners.
+    fn normals(&self, corners: &[u32], room: &mut Room, normals: &mut Normals) {
         // The edges at this place, by their other ends
         room.edges.clear();
         for (i, &corner) in corners.iter().enumerate() {
             let first = corner / 3 * 3;
             for step in [1, 2] {
-                room.edges.push((self.place[(first + (corner - first + step) % 3) as usize], i as u32));
+                let other = self.vertex(first + (corner - first + step) % 3);
+                room.edges.push((self.place[other as usize], i as u32));
             }
         }
         room.edges.sort_unstable();
@@ -187,14 +195,28 @@ impl Around<'_> {
             let leader = leader_of(&mut room.leader, i as u32);
             room.sums[leader as usize] += self.faces[corner as usize / 3] * self.angle(corner);
         }
+        // Each vertex keeps the normal of its first group; corners of other groups get a new vertex
+        room.uses.clear();
         for (i, &corner) in corners.iter().enumerate() {
-            let leader = leader_of(&mut room.leader, i as u32) as usize;
-            let sum = room.sums[leader];
+            room.uses.push((self.vertex(corner), leader_of(&mut room.leader, i as u32), corner));
+        }
+        room.uses.sort_unstable();
+        let mut last_vertex = None;
+        for group in room.uses.chunk_by(|a, b| (a.0, a.1) == (b.0, b.1)) {
+            let (vertex, leader, _) = group[0];
+            let sum = room.sums[leader as usize];
             let length = sum.length();
-            // Faces that cancel out have their own normals
-            let normal = if length > 1e-9 { sum / length } else { self.faces[corners[leader] as usize / 3] };
+            // Faces that cancel out have the normal of the first
+            let first = self.faces[corners[leader as usize] as usize / 3];
+            let normal = if length > 1e-9 { sum / length } else { first };
             let normal = [normal.x as f32, normal.y as f32, normal.z as f32];
-            found.push((corner, corners[leader], normal));
+            if last_vertex.replace(vertex) != Some(vertex) {
+                normals.kept.push((vertex, normal));
+            } else {
+                let new = normals.new.len() as u32;
+                normals.new.push((vertex, normal));
+                normals.moved.extend(group.iter().map(|&(_, _, corner)| (corner, new)));
+            }
         }
     }
 
