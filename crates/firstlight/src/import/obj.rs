@@ -609,3 +609,75 @@ fn named(object: &[u8], group: &[u8], triangles: Range<usize>) -> MeshPart {
     let triangles = triangles.start as u32..triangles.end as u32;
     MeshPart { object: text_of(object), group: text_of(group), triangles }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::ops::ControlFlow;
+
+    use super::super::MeshFormat;
+    use super::*;
+
+    fn read(text: &str) -> MeshData {
+        MeshFormat::Obj.read("a.obj", text.as_bytes(), &|_, _| ControlFlow::Continue(())).unwrap()
+    }
+
+    const SQUARE: &str = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n";
+
+    #[test]
+    fn corners_of_all_forms() {
+        let mesh = read(&format!("{SQUARE}vt 0 0\nvt 1\nvn 0 0 1\nf 1/1/1 2/2/1 -2/1/-1\nf 1/1/1 -2/-2/1 4/2/1\n"));
+        assert_eq!(mesh.triangles, [[0, 1, 2], [0, 2, 3]]);
+        assert_eq!(mesh.uvs, [[[0.0, 0.0], [1.0, 0.0], [0.0, 0.0], [1.0, 0.0]]]);
+        assert_eq!(mesh.normals, [[0.0, 0.0, 1.0]; 4]);
+        // Some corners say none
+        let mesh = read(&format!("{SQUARE}vt 5 6\nvn 0 0 1\nf 1//1 2//1 3/1\n"));
+        assert_eq!(mesh.uvs, [[[0.0; 2], [0.0; 2], [5.0, 6.0]]]);
+        assert_eq!(mesh.normals[2], [0.0; 3]);
+        assert_eq!(mesh.notes.len(), 2);
+        // An index may come before what it points to
+        assert_eq!(read(&format!("f 1 2 3\n{SQUARE}")).triangles, [[0, 1, 2]]);
+    }
+
+    #[test]
+    fn corners_with_the_same_index_for_all_are_the_vertices_of_the_file() {
+        let mesh = read(&format!("{SQUARE}v 9 9 9\nf 4 3 2 1\n"));
+        assert_eq!((mesh.positions.len(), mesh.triangles), (5, vec![[3, 2, 1], [3, 1, 0]]));
+        let mesh = read(&format!("{SQUARE}vn 0 0 1\nvn 0 0 2\nvn 0 0 3\nvn 0 0 4\nf 4//4 3//3 2//2\n"));
+        assert_eq!((mesh.positions.len(), mesh.normals[3]), (4, [0.0, 0.0, 4.0]));
+    }
+
+    #[test]
+    fn colors_weights_and_lines_that_go_on() {
+        let mesh = read("v 0 0 0 1 0.5 0\nv 1 0 0 2\nv 1 \\\n 1 \\\r\n 0\nf 1 2 \\\n3 # 4 5\n# a path\\\nf 3 2 1\n");
+        assert_eq!(mesh.colors, [[1.0, 0.5, 0.0, 1.0], [1.0; 4], [1.0; 4]]);
+        assert_eq!(mesh.triangles, [[0, 1, 2], [2, 1, 0]]);
+    }
+
+    #[test]
+    fn materials_parts_and_smoothing() {
+        let text =
+            "mtllib a.mtl b c.mtl\nf 1 2 3\no cup\ng inside top\nusemtl gold\ns 3\nf 1 2 3 4\ng\ns off\nf 1 2 3\n";
+        let mesh = read(&format!("{text}o\nusemtl red\nusemtl gold\nf 1 2 3\n{SQUARE}"));
+        assert_eq!(mesh.materials, ["", "gold"]);
+        assert_eq!(mesh.face_materials, [0, 1, 1, 1, 1]);
+        assert_eq!(mesh.smoothing, [0, 3, 3, 0, 0]);
+        assert_eq!(mesh.material_files, ["a.mtl b c.mtl"]);
+        let parts: Vec<_> =
+            mesh.parts.iter().map(|p| (p.object.as_str(), p.group.as_str(), p.triangles.clone())).collect();
+        assert_eq!(parts, [("", "", 0..1), ("cup", "inside top", 1..3), ("cup", "", 3..4), ("", "", 4..5)]);
+    }
+
+    #[test]
+    fn what_is_not_understood_is_noted() {
+        let mesh = read(&format!("{SQUARE}l 1 2\np 1\ncstype bezier\nf 1 2 3\nwhat 1\nf 1 2\nend\n"));
+        assert_eq!(
+            mesh.notes,
+            [
+                "2 lines and points (l, p) are left out",
+                "free-form curves and surfaces are not read",
+                "statements that are not understood: `cstype` (1), `end` (1), `what` (1)",
+                "1 faces of less than 3 corners are left out",
+            ]
+        );
+    }
+}

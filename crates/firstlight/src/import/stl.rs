@@ -268,3 +268,80 @@ fn missing(text: &Cursor, at: usize, needed: &str) -> Fault {
     let hint = "a facet is `facet normal x y z outer loop`, three times `vertex x y z`, `endloop endfacet`";
     Fault::text(at, format!("{} where {needed} is needed", shown(word)), hint)
 }
+
+#[cfg(test)]
+mod tests {
+    use std::ops::ControlFlow;
+
+    use super::super::{ImportError, MeshFormat};
+    use super::*;
+
+    fn read(bytes: &[u8]) -> Result<MeshData, ImportError> {
+        MeshFormat::Stl.read("a.stl", bytes, &|_, _| ControlFlow::Continue(()))
+    }
+
+    /// `held` facets, of which the header counts `counted`, and bytes after them.
+    fn binary(start: &[u8], counted: u32, held: u32, after: usize) -> Vec<u8> {
+        let mut bytes = start.to_vec();
+        bytes.resize(80, b' ');
+        bytes.extend(counted.to_le_bytes());
+        for i in 0..held {
+            let corners = [[0.0, 0.0, i as f32], [1.0, 0.0, 0.0], [-0.0, 1.0, 0.0]];
+            bytes.extend([0; 12]);
+            bytes.extend(corners.as_flattened().iter().flat_map(|x| x.to_le_bytes()));
+            bytes.extend([7, 7]);
+        }
+        bytes.resize(bytes.len() + after, 0);
+        bytes
+    }
+
+    #[test]
+    fn a_binary_file_may_begin_with_solid() {
+        for start in ["solid facet normal", "SOLID", "", "\nsolid"] {
+            let mesh = read(&binary(start.as_bytes(), 2, 2, 0)).unwrap();
+            assert_eq!(mesh.triangles, [[0, 1, 2], [3, 1, 2]], "{start}");
+            assert_eq!(mesh.positions[2], [0.0, 1.0, 0.0]);
+            assert!(mesh.positions[2][0].is_sign_positive() && mesh.notes.is_empty());
+        }
+    }
+
+    #[test]
+    fn counts_that_differ_from_the_length() {
+        let facets =
+            |counted, held, after| read(&binary(b"solid", counted, held, after)).map(|m| (m.triangles.len(), m.notes));
+        assert_eq!(facets(1, 2, 0).unwrap(), (1, vec!["50 bytes after the last of 1 facets are ignored".into()]));
+        assert_eq!(facets(2, 2, 3).unwrap(), (2, vec!["3 bytes after the last of 2 facets are ignored".into()]));
+        for unknown in [0, u32::MAX] {
+            let note = format!("the header counts {unknown} facets, the file has 2: all are read");
+            assert_eq!(facets(unknown, 2, 0).unwrap(), (2, vec![note]));
+        }
+        assert_eq!(facets(0, 0, 0).unwrap(), (0, vec![]));
+        assert!(facets(3, 2, 0).is_err() && facets(u32::MAX, 2, 1).is_err());
+    }
+
+    const FACET_TEXT: &str = "facet normal 0 0 1 outer loop vertex 0 0 0 vertex 1 0 0 vertex 0 1 0 endloop endfacet ";
+
+    #[test]
+    fn text_of_any_case_on_any_lines() {
+        for text in [
+            format!("solid {FACET_TEXT}endsolid"),
+            format!("SOLID\r{}\rENDSOLID", FACET_TEXT.to_uppercase().replace(' ', "\r\r")),
+            format!("\u{feff} \tSolid\n{}\nendsolid name of it", FACET_TEXT.replace(' ', " \t\r\n ")),
+        ] {
+            let mesh = read(text.as_bytes()).unwrap();
+            assert_eq!((mesh.triangles.as_slice(), mesh.parts.len()), (&[[0, 1, 2]][..], 0), "{text}");
+            assert!(mesh.notes.is_empty());
+        }
+        assert_eq!(read(b"solid nothing\nendsolid nothing\n").unwrap().triangles.len(), 0);
+    }
+
+    #[test]
+    fn several_solids_are_parts() {
+        let text = format!("solid a b\n{FACET_TEXT}\n{FACET_TEXT}\nendsolid a b\nsolid facet\n{FACET_TEXT}\n");
+        let mesh = read(text.as_bytes()).unwrap();
+        let parts: Vec<_> = mesh.parts.iter().map(|p| (p.object.as_str(), p.triangles.clone())).collect();
+        assert_eq!(parts, [("a b", 0..2), ("facet", 2..3)]);
+        assert_eq!(mesh.notes, ["the text ends without `endsolid`"]);
+        assert_eq!(mesh.positions.len(), 3);
+    }
+}
