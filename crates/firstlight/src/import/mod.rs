@@ -133,7 +133,8 @@ impl MeshFormat {
 ///
 /// `name` tells the kind by its ending ([`MeshFormat::detect`]) and stands in errors; no file is opened. `progress` is told
 /// the bytes read and those there are, from any thread, and may stop the work. Polygons become triangles: those that are fans
-/// from their first corner so, others by cutting ears, and those of more than 512 corners always as fans.
+/// from their first corner so, others by cutting ears; concave ones of very many corners, or very many of more than 64, as fans
+/// all the same, with a note.
 ///
 /// # Errors
 /// [`ImportError`], with the place in the file.

@@ -3,13 +3,20 @@
 //! A polygon is laid onto the axis plane that its own plane (Newell's method) is nearest to. Where all triangles of the fan
 //! from its first corner turn the same way, the fan is taken; that is so for every convex polygon. Otherwise ears are cut off,
 //! always the first in order (G. H. Meisters 1975, "Polygons have ears"). Which corners are ears is remembered, so that
-//! cutting takes quadratic time, not cubic; and polygons of more than [`MAX_EARS`] corners are fans whatever their shape,
-//! so that no file can make it long.
+//! cutting takes quadratic time, not cubic.
+//!
+//! So that no file can make it long, ears are cut of every polygon of up to [`ALWAYS`] corners, and of those of up to
+//! [`MAX_EARS`] as long as the squares of the sizes of larger ones, in the order of the file, are below a bound that grows with
+//! the number of corners; the others become fans, and are counted.
 
 use rayon::prelude::*;
 
 /// The largest polygon whose ears are cut.
-pub(super) const MAX_EARS: usize = 512;
+const MAX_EARS: usize = 4096;
+/// Polygons of so many corners cost little, however many there are.
+const ALWAYS: usize = 64;
+/// The sum of squares of sizes above [`ALWAYS`] that is cut in any case: one of 4096 corners, or 64 of 512.
+const BUDGET: u64 = 1 << 24;
 
 /// What was done to the polygons of a file, for its notes.
 #[derive(Clone, Copy, Default)]
@@ -33,7 +40,8 @@ impl Counts {
         }
         if self.large > 0 {
             notes.push(format!(
-                "{} concave polygons of more than {MAX_EARS} corners are split as fans and may look wrong",
+                "{} concave polygons of more than {ALWAYS} corners are split as fans and may look wrong: \
+                 there are too many, or one has more than {MAX_EARS}",
                 self.large
             ));
         }
@@ -47,25 +55,31 @@ pub(super) fn triangles_of(corners: u32) -> usize {
 
 /// Triangles of polygons that lie one after another, as numbers of corners. `position`: of a corner.
 pub(super) fn triangulate(sizes: &[u32], position: impl Fn(usize) -> [f32; 3] + Sync) -> (Vec<[u32; 3]>, Counts) {
-    // Where each block of polygons begins
     const BLOCK: usize = 4096;
-    let mut start = 0usize;
-    let blocks: Vec<(usize, &[u32])> = sizes
+    let corners: u64 = sizes.iter().map(|&s| u64::from(s)).sum();
+    let budget = BUDGET + ALWAYS as u64 * corners;
+    let cost = |size: u32| if size as usize > ALWAYS { u64::from(size).saturating_mul(size.into()) } else { 0 };
+    // Where each block of polygons begins, and what those before it cost
+    let (mut start, mut spent) = (0usize, 0u64);
+    let blocks: Vec<(usize, u64, &[u32])> = sizes
         .chunks(BLOCK)
         .map(|block| {
-            let begin = start;
+            let begin = (start, spent, block);
             start += block.iter().map(|&s| s as usize).sum::<usize>();
-            (begin, block)
+            spent = block.iter().fold(spent, |spent, &size| spent.saturating_add(cost(size)));
+            begin
         })
         .collect();
     let parts: Vec<(Vec<[u32; 3]>, Counts)> = blocks
         .into_par_iter()
-        .map(|(mut start, block)| {
+        .map(|(mut start, mut spent, block)| {
             let mut triangles = Vec::with_capacity(block.iter().map(|&s| triangles_of(s)).sum());
             let mut counts = Counts::default();
             let mut work = Ears::default();
             for &size in block {
-                work.polygon(start, size as usize, &position, &mut triangles, &mut counts);
+                spent = spent.saturating_add(cost(size));
+                let cut = (size as usize) <= ALWAYS || (size as usize <= MAX_EARS && spent <= budget);
+                work.polygon(start, size as usize, cut, &position, &mut triangles, &mut counts);
                 start += size as usize;
             }
             (triangles, counts)
@@ -97,18 +111,19 @@ struct Ears {
 }
 
 impl Ears {
-    /// Adds the triangles of one polygon.
+    /// Adds the triangles of one polygon; `cut`: whether its ears may be cut.
     fn polygon(
         &mut self,
         start: usize,
         size: usize,
+        cut: bool,
         position: &impl Fn(usize) -> [f32; 3],
         triangles: &mut Vec<[u32; 3]>,
         counts: &mut Counts,
     ) {
         counts.small += u64::from(size < 3);
         if size > 3 && !self.is_fan(start, size, position) {
-            if size <= MAX_EARS {
+            if cut {
                 self.cut(start as u32, triangles);
                 return;
             }
