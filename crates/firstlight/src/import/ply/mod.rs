@@ -21,7 +21,7 @@ mod source;
 
 use rayon::prelude::*;
 
-use super::error::WRITE_ANEW;
+use super::error::{WRITE_ANEW, shown};
 use super::polygon::{self, Counts};
 use super::text::{Cursor, is_blank, is_line_end, pieces};
 use super::weld::weld;
@@ -163,22 +163,22 @@ struct Plan {
 
 impl Plan {
     fn new(header: &Header, file: usize) -> Result<Self, Fault> {
-        // No element can have more rows than there are bytes for
+        // No element can have more rows than there are bytes for; the last row of a text needs nothing after it
         let left = (file - header.body) as u64;
-        let mut all = 0u64;
+        let mut room = left + u64::from(header.encoding == Encoding::Ascii);
         for element in &header.elements {
             let least = element.least_row(header.encoding);
-            all = all.saturating_add(element.count.saturating_mul(least));
-            // The last row of a text needs nothing after it
-            let spare = u64::from(header.encoding == Encoding::Ascii);
-            if all > left + spare {
-                let name = String::from_utf8_lossy(&element.name[..element.name.len().min(40)]).into_owned();
-                let room = (left + spare).saturating_sub(all - element.count.saturating_mul(least).min(all)) / least;
-                let message = format!(
-                    "element {name}: {} are claimed, but the {left} bytes after the header hold at most {room}",
-                    element.count
-                );
-                return Err(Fault::text(element.at, message, WRITE_ANEW));
+            match element.count.checked_mul(least).and_then(|bytes| room.checked_sub(bytes)) {
+                Some(rest) => room = rest,
+                None => {
+                    let message = format!(
+                        "element {}: {} are claimed, but the {left} bytes after the header have room for {} at most",
+                        shown(element.name),
+                        element.count,
+                        room / least
+                    );
+                    return Err(Fault::text(element.at, message, WRITE_ANEW));
+                }
             }
         }
         let Some(at) = header.elements.iter().position(|e| e.name == b"vertex") else {
