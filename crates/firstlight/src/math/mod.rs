@@ -2,15 +2,22 @@
 //!
 //! Everything here gives the same bits on every machine: + - x / and square root only, or `pxfm`.
 
+#[cfg_attr(not(test), allow(dead_code))]
+mod frame;
 mod lanes;
 mod pow;
+#[cfg_attr(not(test), allow(dead_code))]
 mod ray;
+#[cfg_attr(not(test), allow(dead_code))]
+mod roots;
 mod sum;
 
+pub(crate) use frame::Frame;
 pub(crate) use lanes::Vec3x16;
 pub(crate) use pow::Exponent;
 pub use ray::Ray;
-pub(crate) use ray::{ErrorBound, ShadowRay};
+pub(crate) use ray::{DRay, ErrorBound, ShadowRay};
+pub(crate) use roots::{bracketed, depressed_cubic};
 pub(crate) use sum::{LANES, LaneSum};
 
 pub use glam::{DVec3, Vec2, Vec3};

@@ -10,6 +10,8 @@ pub enum UvEdge {
     Bounded,
     /// The other end of the shape: it closes on itself.
     Periodic,
+    /// More of the shape: it has no end, and 0 and 1 are places like any other.
+    Unbounded,
 }
 
 /// The patch of texture that a camera ray stands for: the parallelogram around `uv` with these sides.

@@ -1,0 +1,63 @@
+//! The ball of radius 1 around the origin: what a transformed sphere is in its own space.
+
+use std::f64::consts::PI;
+
+use glam::DVec2;
+use pxfm::f_atan2;
+
+use super::solid::{Chord, SolidHit, SolidPoint};
+use super::sphere::SphereUv;
+use super::surface::UvEdge;
+use crate::math::{DRay, DVec3};
+
+/// The unit sphere, ready to be hit.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Ball {
+    /// How a point becomes a texture coordinate.
+    pub uv: SphereUv,
+}
+
+impl Ball {
+    /// Both roots around the point of the ray that is nearest to the centre, where nothing cancels.
+    #[inline(always)]
+    pub fn intersect(&self, ray: &DRay, t_min: f64, t_max: f64, single_sided: bool) -> Option<SolidHit> {
+        let (near, shift) = ray.nearest_to(DVec3::ZERO);
+        let distance = near.o.length();
+        let half2 = (1.0 - distance) * (1.0 + distance) / near.d.length_squared();
+        if !(half2 >= 0.0) {
+            return None;
+        }
+        let half = half2.sqrt();
+        let at = |t| SolidHit { t, part: 0 };
+        Chord { enter: at(-half), leave: at(half) }.first(shift, t_min, t_max, single_sided)
+    }
+
+    pub fn point(&self, ray: &DRay, hit: &SolidHit) -> SolidPoint {
+        let n = ray.at(hit.t).normalize_or(DVec3::Y);
+        let (uv, dpdu, dpdv, edges) = match self.uv {
+            SphereUv::Equirectangular => {
+                let ring = (n.x * n.x + n.z * n.z).sqrt();
+                let (around, up) = (f_atan2(-n.z, n.x), f_atan2(n.y, ring));
+                // East, and north
+                let out = DVec2::new(n.x, n.z).normalize_or(DVec2::X);
+                let north = DVec3::new(-n.y * out.x, ring, -n.y * out.y);
+                let uv = DVec2::new(0.5 + around / (2.0 * PI), 0.5 + up / PI);
+                (uv, DVec3::new(n.z, 0.0, -n.x) * (2.0 * PI), north * PI, [UvEdge::Periodic, UvEdge::Bounded])
+            }
+            SphereUv::Angles => {
+                let (from_x, from_y) = (n.y.hypot(n.z), (n.x * n.x + n.z * n.z).sqrt());
+                let uv = DVec2::new(f_atan2(from_x, n.x), f_atan2(from_y, n.y)) / PI;
+                // With n.x = cos(pi u) and n.y = cos(pi v), n.z is what is left: v stays while n.x and n.z change
+                let over_z = |w: f64| if n.z == 0.0 { 0.0 } else { w / n.z };
+                let dpdu = DVec3::new(-1.0, 0.0, over_z(n.x)) * (from_x * PI);
+                let dpdv = DVec3::new(0.0, -1.0, over_z(n.y)) * (from_y * PI);
+                (uv, dpdu, dpdv, [UvEdge::Bounded; 2])
+            }
+        };
+        SolidPoint { p: n, normal: n, uv, dpdu, dpdv, edges, terms: DVec3::ONE }
+    }
+
+    pub fn bounds(&self) -> Option<[DVec3; 2]> {
+        Some([DVec3::NEG_ONE, DVec3::ONE])
+    }
+}

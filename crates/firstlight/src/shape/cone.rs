@@ -1,0 +1,52 @@
+//! Cones and cut-off cones.
+
+use super::frustum::Frustum;
+use super::solid::Solid;
+use crate::context::CompileContext;
+use crate::describe::table;
+
+table! {
+    /// A round cone, or a part of one between two radii, closed by caps or open.
+    ///
+    /// On the mantle u runs around the axis, to the right as seen from outside with `p1` above, and v from 0 at `p0` to 1
+    /// at `p1`. u is 1/2 towards +x, or towards +y where the axis is within 26 degrees of the x axis. On the caps u is that
+    /// of the mantle where they meet, and v runs from 0 at the rim to 1 at the centre.
+    ///
+    /// ```toml
+    /// [[cone]]
+    /// p0 = [0, 0, 0]
+    /// p1 = [0, 2, 0]
+    /// radius0 = 1
+    /// material = "spire"
+    /// ```
+    pub struct ConeDesc {
+        /// One end of the axis, in metres, world space: the middle of the base.
+        pub p0: [f64; 3],
+        /// The other end of the axis: the tip, where `radius1` is 0; not `p0` itself.
+        pub p1: [f64; 3],
+        /// The radius at `p0` in metres, 0 or more, at most 2.5e8.
+        pub radius0: f64,
+        /// The radius at `p1` in metres, 0 or more, at most 2.5e8; not 0 where `radius0` is.
+        pub radius1: f64 = 0.0,
+        /// Whether the ends are closed.
+        pub capped: bool = true,
+        /// What reports and id files call it.
+        pub name: Option<String> = None,
+        /// The name of a material; without it, matte gray 0.8.
+        pub material: Option<String> = None,
+        /// Whether camera rays pass through its inside. Light is blocked from both sides all the same.
+        pub single_sided: bool = false,
+    }
+}
+
+impl ConeDesc {
+    pub(crate) fn compile(&self, cx: &mut CompileContext) -> Solid {
+        let hint = "the radii are in metres; at the tip of a cone it is 0";
+        if self.radius0 == 0.0 && self.radius1 == 0.0 {
+            cx.error("radius1", "0, and radius0 is 0 as well: a cone has one tip", Some("give one end a radius"));
+        }
+        let mut radius = |field, r| if r == 0.0 { r } else { cx.positive(field, r, hint) };
+        let radii = [radius("radius0", self.radius0), radius("radius1", self.radius1)];
+        Solid::Frustum(Frustum::compile(cx, self.p0, self.p1, radii, self.capped))
+    }
+}

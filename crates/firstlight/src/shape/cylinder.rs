@@ -1,0 +1,45 @@
+//! Cylinders.
+
+use super::frustum::Frustum;
+use super::solid::Solid;
+use crate::context::CompileContext;
+use crate::describe::table;
+
+table! {
+    /// A round cylinder from one end of its axis to the other, closed by two caps, or open like a tube.
+    ///
+    /// On the mantle u runs around the axis, to the right as seen from outside with `p1` above, and v from 0 at `p0` to 1
+    /// at `p1`. u is 1/2 towards +x, or towards +y where the axis is within 26 degrees of the x axis. On the caps u is that
+    /// of the mantle where they meet, and v runs from 0 at the rim to 1 at the centre.
+    ///
+    /// ```toml
+    /// [[cylinder]]
+    /// p0 = [0, 0, 0]
+    /// p1 = [0, 2, 0]
+    /// radius = 0.5
+    /// material = "pillar"
+    /// ```
+    pub struct CylinderDesc {
+        /// One end of the axis, in metres, world space.
+        pub p0: [f64; 3],
+        /// The other end of the axis; not `p0` itself.
+        pub p1: [f64; 3],
+        /// Radius in metres, 1e-9 to 2.5e8.
+        pub radius: f64,
+        /// Whether the two ends are closed.
+        pub capped: bool = true,
+        /// What reports and id files call it.
+        pub name: Option<String> = None,
+        /// The name of a material; without it, matte gray 0.8.
+        pub material: Option<String> = None,
+        /// Whether camera rays pass through its inside. Light is blocked from both sides all the same.
+        pub single_sided: bool = false,
+    }
+}
+
+impl CylinderDesc {
+    pub(crate) fn compile(&self, cx: &mut CompileContext) -> Solid {
+        let radius = cx.positive("radius", self.radius, "the radius is in metres");
+        Solid::Frustum(Frustum::compile(cx, self.p0, self.p1, [radius; 2], self.capped))
+    }
+}

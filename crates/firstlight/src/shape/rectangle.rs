@@ -1,0 +1,64 @@
+//! Rectangles by their middle.
+
+use super::parallelogram::Parallelogram;
+use crate::context::{CompileContext, show};
+use crate::describe::table;
+use crate::math::{DVec3, Frame};
+
+table! {
+    /// A flat rectangle around a centre. The texture coordinate runs from 0 to 1 to the right and up, as seen from the
+    /// side the normal points to.
+    ///
+    /// ```toml
+    /// [[rectangle]]
+    /// center = [0, 1, -2]
+    /// size = [4, 2]
+    /// normal = [0, 0, 1]
+    /// material = "poster"
+    /// ```
+    pub struct RectangleDesc {
+        /// Centre, in metres, world space.
+        pub center: [f64; 3],
+        /// Width and height in metres, along u and v, 1e-9 to 2.5e8 each.
+        pub size: [f64; 2],
+        /// The direction its front faces, of any length above 1e-9.
+        pub normal: [f64; 3] = [0.0, 1.0, 0.0],
+        /// The direction of v, made perpendicular to `normal`; not parallel to it. Without it +y; of a rectangle that
+        /// faces straight up -z, straight down +z.
+        pub up: Option<[f64; 3]> = None,
+        /// What reports and id files call it.
+        pub name: Option<String> = None,
+        /// The name of a material; without it, matte gray 0.8.
+        pub material: Option<String> = None,
+        /// Whether camera rays pass through from behind, the side the normal points away from. Light is blocked
+        /// from both sides all the same.
+        pub single_sided: bool = false,
+    }
+}
+
+impl RectangleDesc {
+    pub(crate) fn compile(&self, cx: &mut CompileContext) -> Parallelogram {
+        cx.point("center", self.center);
+        for (i, size) in self.size.iter().enumerate() {
+            cx.positive(&format!("size[{i}]"), *size, "width and height are in metres");
+        }
+        let frame = facing(cx, self.normal, self.up);
+        let (e0, e1) = (frame.x * self.size[0], frame.y * self.size[1]);
+        Parallelogram::new(DVec3::from(self.center) - (e0 + e1) * 0.5, e0, e1, 1.0, self.single_sided)
+    }
+}
+
+/// The frame of what is flat, from its `normal` and `up`.
+pub(super) fn facing(cx: &mut CompileContext, normal: [f64; 3], up: Option<[f64; 3]>) -> Frame {
+    let mut fine = cx.edge("normal", normal);
+    if let Some(up) = up {
+        fine &= cx.edge("up", up);
+    }
+    let unit = DVec3::from(normal).normalize_or(DVec3::Y);
+    let frame = Frame::facing(unit, up.map(DVec3::from));
+    if let (true, None, Some(up)) = (fine, frame, up) {
+        let message = format!("{} is parallel to the normal {}", show(&up), show(&normal));
+        cx.error("up", message, Some("give a direction that lies in the surface, or leave it out"));
+    }
+    frame.unwrap_or(Frame::around(unit))
+}
