@@ -61,3 +61,53 @@ impl Ball {
         Some([DVec3::NEG_ONE, DVec3::ONE])
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::check::{Known, never};
+    use super::super::solid::Solid;
+    use super::*;
+
+    #[test]
+    fn it_keeps_what_solids_promise() {
+        for uv in [SphereUv::Equirectangular, SphereUv::Angles] {
+            let distance = |p: DVec3| p.length() - 1.0;
+            let known = Known { solid: Solid::Ball(Ball { uv }), distance: &distance, center: DVec3::ZERO, size: 1.0 };
+            known.meets_rays(10_000);
+            known.is_left_by_rays(10_000, &never);
+            if uv == SphereUv::Equirectangular {
+                known.derivatives_hold(4000);
+            }
+            let rims = |x: f64| DVec3::new(2.0 * x - 1.0, (1.0 - (2.0 * x - 1.0) * (2.0 * x - 1.0)).sqrt(), 0.0);
+            known.is_closed(10_000, &rims, &|x| DVec3::splat(0.5 - x));
+            let ends = |x: f64| {
+                [DVec3::X, DVec3::Y, DVec3::Z][(x * 6.0) as usize / 2]
+                    * if (x * 6.0) as u32 % 2 == 0 { 1.0 } else { -1.0 }
+            };
+            known.bounds_are_tight(4000, &ends);
+        }
+    }
+
+    #[test]
+    fn texture_coordinates_are_those_of_a_sphere() {
+        use super::super::sphere::Sphere;
+        use crate::math::{Ray, Vec3};
+        use crate::shape::RayDifferential;
+        for uv in [SphereUv::Equirectangular, SphereUv::Angles] {
+            let (sphere, ball) = (Sphere { c: DVec3::ZERO, r: 1.0, uv, single_sided: false }, Ball { uv });
+            for i in 0..1000 {
+                let k = i as f32;
+                let o = Vec3::new(3.0 - 0.006 * k, 2.5 - 0.005 * k, 4.0);
+                let d = (Vec3::new(0.3 - 0.0006 * k, 0.2, 0.0) - o).normalize();
+                let (ray, deep) = (Ray { o, d }, DRay { o: o.as_dvec3(), d: d.as_dvec3() });
+                let hit = ball.intersect(&deep, 0.0, f64::INFINITY, false).expect("it is ahead");
+                let t = sphere.intersect(&ray).expect("it is ahead");
+                assert!((t - hit.t).abs() < 1e-6);
+                let still = RayDifferential { dx: Vec3::ZERO, dy: Vec3::ZERO };
+                let (a, b) = (sphere.point(&ray, t, &still), ball.point(&deep, &hit));
+                assert!((a.uv.as_dvec2() - b.uv).length() < 1e-5, "{:?} {:?}", a.uv, b.uv);
+                assert!((a.p.as_dvec3() - b.p).length() < 1e-6);
+            }
+        }
+    }
+}

@@ -50,3 +50,20 @@ impl ConeDesc {
         Solid::Frustum(Frustum::compile(cx, self.p0, self.p1, radii, self.capped))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::check::faults;
+    use super::*;
+
+    #[test]
+    fn faults_are_told() {
+        let nothing = ConeDesc::new([0.0; 3], [0.0, 1.0, 0.0], 0.0);
+        assert_eq!(faults(|cx| nothing.compile(cx))[0].0, "radius1");
+        let negative = ConeDesc { radius1: -0.5, ..ConeDesc::new([0.0; 3], [0.0, 1.0, 0.0], 1.0) };
+        let found = faults(|cx| negative.compile(cx));
+        assert!(found[0].0 == "radius1" && found[0].1.contains("-0.5"), "{found:?}");
+        let flat = ConeDesc::new([0.0; 3], [0.0; 3], 1.0);
+        assert_eq!(faults(|cx| flat.compile(cx))[0].0, "p1");
+    }
+}

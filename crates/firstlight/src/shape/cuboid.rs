@@ -90,3 +90,102 @@ impl Cuboid {
         Some([self.low, self.high])
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::check::{Known, Random, faults, made, never};
+    use super::*;
+
+    fn cuboid(center: DVec3, size: DVec3) -> Solid {
+        made(|cx| BoxDesc { size: size.into(), ..BoxDesc::new(center.into()) }.compile(cx))
+    }
+
+    /// The distance to a box is that to its nearest side, edge or corner.
+    fn distance(p: DVec3, center: DVec3, size: DVec3) -> f64 {
+        let q = (p - center).abs() - size * 0.5;
+        q.max(DVec3::ZERO).length() + q.max_element().min(0.0)
+    }
+
+    #[test]
+    fn it_keeps_what_solids_promise() {
+        let mut random = Random::new(1);
+        for center in [DVec3::ZERO, DVec3::new(148376.0, 1234.0, -223423.0)] {
+            for scale in [1e-3, 1.0, 1e6] {
+                let size = (DVec3::ONE + random.in_ball() * 0.7) * scale;
+                let reach = 0.5 * size.length();
+                let distance = |p| distance(p, center, size);
+                let known = Known { solid: cuboid(center, size), distance: &distance, center, size: reach };
+                let corner = |x: f64, i: u32| if (x * 8.0) as u32 >> i & 1 == 1 { 0.5 } else { -0.5 };
+                let rims = |x: f64| {
+                    // A place on one of the edges
+                    let mut edge = DVec3::new(corner(x, 0), corner(x, 1), corner(x, 2));
+                    edge[(x * 1000.0) as usize % 3] = (x * 8.0).fract() - 0.5;
+                    center + size * edge
+                };
+                let inside = |x: f64| center + size * (0.45 - 0.9 * x);
+                known.is_closed(20_000, &rims, &inside);
+                known.bounds_are_tight(4000, &rims);
+                if center.length() < 1e4 * scale {
+                    known.meets_rays(10_000);
+                    known.derivatives_hold(4000);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn rays_leave_it() {
+        let mut random = Random::new(2);
+        for _ in 0..500 {
+            let scale = random.magnitude(1e-6, 1e6);
+            let center = random.in_ball() * random.magnitude(1e-8, 1e8);
+            let size = (DVec3::ONE + random.in_ball() * 0.9) * scale;
+            let known = Known { solid: cuboid(center, size), distance: &|_| 0.0, center, size: size.length() };
+            known.is_left_by_rays(50, &never);
+        }
+    }
+
+    #[test]
+    fn each_face_is_upright() {
+        let solid = cuboid(DVec3::ZERO, DVec3::splat(2.0));
+        let looks = [
+            // From where, to the right and up of the middle as seen from there
+            (DVec3::Z, DVec3::X, DVec3::Y),
+            (DVec3::NEG_Z, DVec3::NEG_X, DVec3::Y),
+            (DVec3::X, DVec3::NEG_Z, DVec3::Y),
+            (DVec3::NEG_X, DVec3::Z, DVec3::Y),
+            (DVec3::Y, DVec3::X, DVec3::NEG_Z),
+            (DVec3::NEG_Y, DVec3::X, DVec3::Z),
+        ];
+        for (from, right, up) in looks {
+            let ray = DRay { o: from * 5.0 + right * 0.5 - up * 0.75, d: -from };
+            let hit = solid.intersect(&ray, 0.0, 10.0, true).expect("it is ahead");
+            let point = solid.point(&ray, &hit);
+            assert_eq!(hit.t, 4.0);
+            assert_eq!((point.normal, point.uv), (from, DVec2::new(0.75, 0.125)));
+            assert_eq!((point.dpdu, point.dpdv), (right * 2.0, up * 2.0));
+        }
+    }
+
+    #[test]
+    fn boxes_side_by_side_have_no_gap() {
+        let mut random = Random::new(3);
+        for place in [0.1, 148376.3] {
+            let (a, b) = (cuboid(DVec3::splat(place), DVec3::ONE), cuboid(DVec3::splat(place) + DVec3::X, DVec3::ONE));
+            let edge = DVec3::splat(place) + DVec3::new(0.5, 0.0, 0.0);
+            for _ in 0..50_000 {
+                let o =
+                    edge + DVec3::new(random.between(-3.0, 3.0), random.between(2.0, 3.0), random.between(-0.2, 0.2));
+                let ray = DRay { o, d: edge + DVec3::Z * random.between(-0.4, 0.4) - o };
+                assert!(a.blocks(&ray, 0.0, 2.0) || b.blocks(&ray, 0.0, 2.0), "{ray:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_side_without_length_is_a_fault() {
+        let desc = BoxDesc { size: [1.0, 0.0, f64::NAN], ..BoxDesc::new([0.0; 3]) };
+        let found = faults(|cx| desc.compile(cx));
+        assert_eq!(found.iter().map(|f| f.0.as_str()).collect::<Vec<_>>(), ["size[1]", "size[2]"]);
+    }
+}

@@ -43,3 +43,20 @@ impl CylinderDesc {
         Solid::Frustum(Frustum::compile(cx, self.p0, self.p1, [radius; 2], self.capped))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::check::faults;
+    use super::*;
+
+    #[test]
+    fn faults_are_told() {
+        let here = CylinderDesc::new([1.0, 2.0, 3.0], [1.0, 2.0, 3.0], 1.0);
+        let found = faults(|cx| here.compile(cx));
+        assert!(found[0].0 == "p1" && found[0].1.contains("[1, 2, 3] is p0"), "{found:?}");
+        let thin = CylinderDesc::new([0.0; 3], [0.0, 1.0, 0.0], 0.0);
+        assert_eq!(faults(|cx| thin.compile(cx))[0].0, "radius");
+        let far = CylinderDesc::new([0.0; 3], [0.0, 1e30, 0.0], 1.0);
+        assert_eq!(faults(|cx| far.compile(cx))[0].0, "p1");
+    }
+}

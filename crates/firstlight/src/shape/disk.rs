@@ -123,3 +123,90 @@ pub(super) fn ring_point(p: DVec2, radius: f64, inner: f64) -> RingPoint {
         dpdv: outwards * (inner - radius),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::check::{Known, Random, faults, made, never};
+    use super::*;
+
+    fn disk(center: DVec3, normal: DVec3, radius: f64, inner_radius: f64) -> Solid {
+        let desc = DiskDesc { normal: normal.into(), inner_radius, ..DiskDesc::new(center.into(), radius) };
+        made(|cx| desc.compile(cx))
+    }
+
+    #[test]
+    fn rays_meet_it_where_the_formula_says() {
+        let mut random = Random::new(1);
+        let mut hits = 0;
+        for _ in 0..20_000 {
+            let (radius, normal) = (random.magnitude(1e-3, 1e5), random.direction());
+            let center = random.in_ball() * (10.0 * radius);
+            let inner = radius * random.between(-0.5, 0.9).max(0.0);
+            let solid = disk(center, normal, radius, inner);
+            let o = center + random.direction() * (radius * random.magnitude(0.1, 100.0));
+            let ray = DRay { o, d: (center + random.in_ball() * radius * 1.2 - o).normalize() };
+            let cos = normal.dot(ray.d);
+            let t = normal.dot(center - ray.o) / cos;
+            let distance = (ray.at(t) - center).length() / radius;
+            let unsure = 1e-12 / cos.abs();
+            let hit = solid.intersect(&ray, 0.0, f64::INFINITY, false);
+            let ring = inner / radius;
+            if t <= 0.0 || distance > 1.0 + unsure || distance < ring - unsure {
+                assert!(hit.is_none(), "{ray:?} {solid:?}");
+            } else if distance < 1.0 - unsure && distance > ring + unsure {
+                hits += 1;
+                let hit = hit.expect("it lies ahead");
+                assert!((hit.t - t).abs() * cos.abs() < 1e-11 * radius, "{hit:?} {t}");
+                let single_sided = solid.intersect(&ray, 0.0, f64::INFINITY, true);
+                assert_eq!(single_sided.is_some(), cos < 0.0);
+                let p = solid.point(&ray, &hit);
+                let v = (1.0 - distance) / (1.0 - ring);
+                assert!((p.uv.y - v).abs() < 10.0 * unsure / (1.0 - ring) && (0.0..=1.0).contains(&p.uv.x));
+                assert!((p.p - center).dot(normal).abs() < 1e-15 * p.terms.length());
+            }
+        }
+        assert!(hits > 4000, "{hits}");
+    }
+
+    #[test]
+    fn u_runs_around_and_v_inwards() {
+        let solid = disk(DVec3::ZERO, DVec3::Y, 2.0, 1.0);
+        let at = |x: f64, z: f64| {
+            let ray = DRay { o: DVec3::new(x, 1.0, z), d: DVec3::NEG_Y };
+            solid.intersect(&ray, 0.0, 2.0, true).map(|hit| solid.point(&ray, &hit).uv)
+        };
+        assert_eq!(at(2.0, 0.0), Some(DVec2::new(0.5, 0.0)));
+        assert_eq!(at(0.0, -1.5), Some(DVec2::new(0.75, 0.5)));
+        assert_eq!(at(0.0, 1.0), Some(DVec2::new(0.25, 1.0)));
+        assert_eq!(at(0.5, 0.0), None);
+    }
+
+    #[test]
+    fn derivatives_and_bounds_hold_and_rays_leave_it() {
+        let mut random = Random::new(3);
+        for _ in 0..200 {
+            let size = random.magnitude(1e-6, 1e6);
+            let center = random.in_ball() * random.magnitude(1e-8, 1e8);
+            let normal = random.direction();
+            let solid = disk(center, normal, size, size * 0.3);
+            let known = Known { solid, distance: &|_| 0.0, center, size };
+            known.is_left_by_rays(40, &never);
+            if center.length() < 10.0 * size {
+                known.derivatives_hold(500);
+                let side = normal.any_orthonormal_vector();
+                known.bounds_are_tight(4000, &|x| {
+                    let (sin, cos) = pxfm::f_sincos(x * 2.0 * PI);
+                    center + (side * cos + normal.cross(side) * sin) * size
+                });
+            }
+        }
+    }
+
+    #[test]
+    fn a_hole_as_large_as_the_disk_is_a_fault() {
+        let desc = DiskDesc { inner_radius: 1.0, ..DiskDesc::new([0.0; 3], 1.0) };
+        let found = faults(|cx| desc.compile(cx));
+        assert!(found[0].0 == "inner_radius" && found[0].1.contains("1 is outside [0, 1)"), "{found:?}");
+        assert_eq!(faults(|cx| DiskDesc::new([0.0; 3], -1.0).compile(cx))[0].0, "radius");
+    }
+}

@@ -5,6 +5,8 @@
 
 #[cfg_attr(not(test), allow(dead_code))]
 mod ball;
+#[cfg(test)]
+mod check;
 #[cfg_attr(not(test), allow(dead_code))]
 mod cone;
 #[cfg_attr(not(test), allow(dead_code))]

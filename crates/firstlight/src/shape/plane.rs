@@ -90,3 +90,76 @@ impl Plane {
         None
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::check::{Known, Random, faults, made, never};
+    use super::*;
+
+    fn plane(point: DVec3, normal: DVec3) -> Solid {
+        let desc = PlaneDesc { point: point.into(), normal: normal.into(), ..PlaneDesc::default() };
+        made(|cx| desc.compile(cx))
+    }
+
+    #[test]
+    fn rays_meet_it_where_the_formula_says() {
+        let mut random = Random::new(1);
+        for _ in 0..10_000 {
+            let (point, normal) = (random.in_ball() * random.magnitude(1e-3, 1e6), random.direction());
+            let solid = plane(point, normal * random.magnitude(1e-3, 1e3));
+            let size = point.length().max(1.0);
+            let ray = DRay { o: random.in_ball() * size, d: random.direction() };
+            let t = normal.dot(point - ray.o) / normal.dot(ray.d);
+            let hit = solid.intersect(&ray, 0.0, f64::INFINITY, false);
+            if t > 0.0 && t < 1e5 * size {
+                let hit = hit.expect("it lies ahead");
+                assert!((hit.t - t).abs() <= 1e-14 * size * (1.0 + t / size) / normal.dot(ray.d).abs(), "{hit:?} {t}");
+                let single_sided = solid.intersect(&ray, 0.0, f64::INFINITY, true);
+                assert_eq!(single_sided.is_some(), normal.dot(ray.d) < 0.0);
+                // The point has forgotten the length of the ray, and uv leads back to it
+                let p = solid.point(&ray, &hit);
+                assert!((p.p - point).dot(normal).abs() <= 1e-15 * p.terms.length());
+                assert!((point + p.dpdu * p.uv.x + p.dpdv * p.uv.y - p.p).length() <= 1e-15 * p.terms.length());
+            } else if t < 0.0 {
+                assert!(hit.is_none());
+            }
+        }
+    }
+
+    #[test]
+    fn the_ground_is_measured_in_metres() {
+        let solid = plane(DVec3::new(1.0, 2.0, 3.0), DVec3::Y);
+        let ray = DRay { o: DVec3::new(3.5, 10.0, 2.0), d: DVec3::NEG_Y };
+        let p = solid.point(&ray, &solid.intersect(&ray, 0.0, f64::INFINITY, false).expect("it lies below"));
+        assert_eq!((p.uv.x, p.uv.y, p.normal), (2.5, 1.0, DVec3::Y));
+        assert_eq!((p.dpdu, p.dpdv), (DVec3::X, DVec3::NEG_Z));
+        assert!(solid.bounds().is_none());
+        // A ray along it meets nothing, also one that lies in it
+        for y in [2.0, 3.0] {
+            assert!(!solid.blocks(&DRay { o: DVec3::new(0.0, y, 0.0), d: DVec3::X }, 0.0, f64::INFINITY));
+        }
+    }
+
+    #[test]
+    fn rays_leave_it() {
+        let mut random = Random::new(2);
+        for _ in 0..300 {
+            let center = random.in_ball() * random.magnitude(1e-8, 1e8);
+            let solid = plane(center, random.direction());
+            let size = random.magnitude(1e-8, 1e8);
+            Known { solid, distance: &|_| 0.0, center, size }.is_left_by_rays(40, &never);
+        }
+    }
+
+    #[test]
+    fn up_along_the_normal_is_a_fault() {
+        let desc = PlaneDesc { up: Some([0.0, -2.0, 0.0]), ..PlaneDesc::default() };
+        let found = faults(|cx| desc.compile(cx));
+        assert!(
+            found[0].0 == "up" && found[0].1.contains("[0, -2, 0] is parallel to the normal [0, 1, 0]"),
+            "{found:?}"
+        );
+        let desc = PlaneDesc { normal: [0.0; 3], ..PlaneDesc::default() };
+        assert_eq!(faults(|cx| desc.compile(cx))[0].0, "normal");
+    }
+}

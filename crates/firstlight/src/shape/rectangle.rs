@@ -62,3 +62,48 @@ pub(super) fn facing(cx: &mut CompileContext, normal: [f64; 3], up: Option<[f64;
     }
     frame.unwrap_or(Frame::around(unit))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::check::{faults, made};
+    use super::*;
+    use crate::math::Vec3;
+
+    #[test]
+    fn it_is_the_parallelogram_around_the_centre() {
+        let of = |normal| {
+            let desc = RectangleDesc { normal, ..RectangleDesc::new([1.0, 2.0, 3.0], [4.0, 2.0]) };
+            made(|cx| desc.compile(cx))
+        };
+        // Facing the viewer: u to the right, v up
+        let wall = of([0.0, 0.0, 5.0]);
+        assert_eq!((wall.n, wall.p), (DVec3::Z, DVec3::new(-1.0, 1.0, 3.0)));
+        assert_eq!((wall.u_axis, wall.v_axis), (DVec3::X * 0.25, DVec3::Y * 0.5));
+        assert_eq!(wall.corners[2], Vec3::new(3.0, 3.0, 3.0));
+        let floor = of([0.0, 1.0, 0.0]);
+        assert_eq!((floor.n, floor.u_axis, floor.v_axis), (DVec3::Y, DVec3::X * 0.25, DVec3::NEG_Z * 0.5));
+        assert_eq!(floor.p, DVec3::new(-1.0, 2.0, 4.0));
+    }
+
+    #[test]
+    fn up_is_made_perpendicular() {
+        let desc = RectangleDesc {
+            normal: [0.0, 0.0, 1.0],
+            up: Some([3.0, 0.0, 7.0]),
+            ..RectangleDesc::new([0.0; 3], [1.0, 1.0])
+        };
+        let turned = made(|cx| desc.compile(cx));
+        assert_eq!((turned.v_axis, turned.u_axis, turned.n), (DVec3::X, DVec3::NEG_Y, DVec3::Z));
+    }
+
+    #[test]
+    fn faults_are_told() {
+        let flat = RectangleDesc::new([0.0; 3], [1.0, 0.0]);
+        assert_eq!(faults(|cx| flat.compile(cx))[0].0, "size[1]");
+        let parallel = RectangleDesc { up: Some([0.0, 1.0, 0.0]), ..RectangleDesc::new([0.0; 3], [1.0, 1.0]) };
+        let found = faults(|cx| parallel.compile(cx));
+        assert!(found.len() == 1 && found[0].0 == "up", "{found:?}");
+        let no_up = RectangleDesc { up: Some([0.0; 3]), ..parallel };
+        assert!(faults(|cx| no_up.compile(cx))[0].1.contains("has no length"));
+    }
+}

@@ -156,3 +156,151 @@ impl Torus {
         Some([self.center - reach, self.center + reach])
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::check::{Known, Random, faults, made};
+    use super::*;
+
+    fn torus(center: DVec3, axis: DVec3, major: f64, minor: f64) -> Solid {
+        made(|cx| TorusDesc { axis: axis.into(), ..TorusDesc::new(center.into(), major, minor) }.compile(cx))
+    }
+
+    fn distance(p: DVec3, axis: DVec3, major: f64, minor: f64) -> f64 {
+        let z = p.dot(axis);
+        DVec2::new((p - axis * z).length() - major, z).length() - minor
+    }
+
+    #[test]
+    fn it_keeps_what_solids_promise() {
+        let mut random = Random::new(1);
+        for round in 0..24 {
+            let center = if round % 4 == 3 { DVec3::new(148376.0, 1234.0, -223423.0) } else { DVec3::ZERO };
+            let scale = [1e-3, 1.0, 1e6][round % 3];
+            let axis = random.direction();
+            // Thin ones, fat ones, and ones without a hole
+            let (major, minor) = (scale, scale * [0.01, 0.3, 0.9, 1.0, 1.7][round % 5]);
+            let distance = |p| distance(p - center, axis, major, minor);
+            let size = major + minor;
+            let known = Known { solid: torus(center, axis, major, minor), distance: &distance, center, size };
+            let side = axis.any_orthonormal_vector();
+            let around = |x: f64| {
+                let (sin, cos) = pxfm::f_sincos(x * 2.0 * PI);
+                side * cos + axis.cross(side) * sin
+            };
+            // Its highest circle, where rays along it touch, and its innermost one
+            let rims = |x: f64| {
+                let hole = if minor < major { major - minor } else { major + minor };
+                center + if x < 0.5 { around(2.0 * x) * major + axis * minor } else { around(2.0 * x) * hole }
+            };
+            known.is_closed(5000, &rims, &|x| center + around(x) * major);
+            if center.length() < 1e3 * scale {
+                known.meets_rays(4000);
+                known.derivatives_hold(4000);
+                known.bounds_are_tight(8000, &|x| {
+                    // It is a ball moved along the circle
+                    let i = (x * 6.0) as usize;
+                    let pole = [DVec3::X, DVec3::Y, DVec3::Z][i / 2] * if i % 2 == 0 { minor } else { -minor };
+                    center + around(x * 6.0) * major + pole
+                });
+            }
+        }
+    }
+
+    #[test]
+    fn all_four_crossings_are_found() {
+        let (axis, mut random) = (DVec3::Y, Random::new(2));
+        let mut four = 0;
+        for _ in 0..20_000 {
+            let minor = random.magnitude(1e-4, 0.9);
+            let solid = torus(DVec3::ZERO, axis, 1.0, minor);
+            // From one side through the tube, or just past it
+            let o =
+                DVec3::new(random.between(-3.0, -2.5), random.between(-0.5, 0.5) * minor, random.between(-0.3, 0.3));
+            let target = DVec3::new(random.between(0.5, 1.5), minor * random.between(-1.05, 1.05), 0.0);
+            let ray = DRay { o, d: (target - o).normalize() };
+            let mut found = Vec::new();
+            let mut after = 0.0;
+            while let Some(hit) = solid.intersect(&ray, after, f64::INFINITY, false) {
+                found.push(hit.t);
+                after = hit.t;
+            }
+            // By small steps along the ray
+            let (steps, mut expected) = (3000, 0);
+            let mut inside = false;
+            let mut shallow = f64::INFINITY;
+            for i in 0..=steps {
+                let d = distance(ray.at(6.0 * i as f64 / steps as f64), axis, 1.0, minor);
+                shallow = if (d < 0.0) != inside { f64::INFINITY } else { shallow.min(d.abs()) };
+                expected += usize::from((d < 0.0) != inside);
+                inside = d < 0.0;
+            }
+            assert!(found.len() % 2 == 0 && found.len() >= expected, "{ray:?} {minor}: {found:?} {expected}");
+            for t in &found {
+                assert!(distance(ray.at(*t), axis, 1.0, minor).abs() < 1e-14);
+            }
+            four += usize::from(found.len() == 4);
+        }
+        assert!(four > 2000, "{four}");
+    }
+
+    #[test]
+    fn grazing_rays_are_decided_to_the_last_digits() {
+        let mut random = Random::new(3);
+        for _ in 0..10_000 {
+            let minor = random.magnitude(1e-4, 0.9);
+            let solid = torus(DVec3::ZERO, DVec3::Y, 1.0, minor);
+            // Across the top of the tube, a little below and a little above; tangent to the outermost circle
+            let gap = minor * random.magnitude(1e-12, 1e-3);
+            let rays = |sign: f64| {
+                [
+                    DRay { o: DVec3::new(0.0, minor + sign * gap, 4.0), d: DVec3::NEG_Z },
+                    DRay { o: DVec3::new(1.0 + minor + sign * gap, 0.0, 4.0), d: DVec3::NEG_Z },
+                    DRay { o: DVec3::new(1.0 + minor + sign * gap, 4.0, 0.0), d: DVec3::NEG_Y },
+                ]
+            };
+            for ray in rays(1.0) {
+                assert!(!solid.blocks(&ray, 0.0, f64::INFINITY), "{ray:?} {minor} {gap}");
+            }
+            if gap > 1e-14 {
+                for ray in rays(-1.0) {
+                    assert!(solid.blocks(&ray, 0.0, f64::INFINITY), "{ray:?} {minor} {gap}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn rays_leave_it() {
+        let mut random = Random::new(4);
+        for _ in 0..400 {
+            let (scale, center) = (random.magnitude(1e-6, 1e6), random.in_ball() * random.magnitude(1e-8, 1e8));
+            let minor = random.magnitude(0.1, 0.8);
+            let solid = torus(center, random.direction(), scale, minor * scale);
+            let known = Known { solid, distance: &|_| 0.0, center, size: (1.0 + minor) * scale };
+            // Around the hole the surface curves towards the ray, no more than a circle of that radius
+            known.is_left_by_rays(50, &|cos| 0.9 * cos * (1.0 - minor) / (1.0 + minor));
+        }
+    }
+
+    #[test]
+    fn the_texture_stands_upright() {
+        let solid = torus(DVec3::ZERO, DVec3::Y, 2.0, 0.5);
+        let look = |o: [f64; 3], d: [f64; 3]| {
+            let ray = DRay { o: o.into(), d: d.into() };
+            let hit = solid.intersect(&ray, 0.0, f64::INFINITY, true).expect("it is ahead");
+            solid.point(&ray, &hit)
+        };
+        let outside = look([9.0, 0.0, 0.0], [-1.0, 0.0, 0.0]);
+        assert!((outside.uv - DVec2::new(0.5, 0.5)).length() < 1e-15 && (outside.p.x - 2.5).abs() < 1e-15);
+        assert!(outside.dpdu.normalize().dot(DVec3::NEG_Z) > 0.9999 && outside.dpdv.normalize().dot(DVec3::Y) > 0.9999);
+        let top = look([0.0, 9.0, 2.0], [0.0, -1.0, 0.0]);
+        assert!((top.uv - DVec2::new(0.25, 0.75)).length() < 1e-9 && (top.normal - DVec3::Y).length() < 1e-7);
+    }
+
+    #[test]
+    fn radii_are_checked() {
+        let found = faults(|cx| TorusDesc::new([0.0; 3], 0.0, -1.0).compile(cx));
+        assert_eq!(found.iter().map(|f| f.0.as_str()).collect::<Vec<_>>(), ["major_radius", "minor_radius"]);
+    }
+}
