@@ -80,10 +80,7 @@ mod tests {
             }
             let rims = |x: f64| DVec3::new(2.0 * x - 1.0, (1.0 - (2.0 * x - 1.0) * (2.0 * x - 1.0)).sqrt(), 0.0);
             known.is_closed(10_000, &rims, &|x| DVec3::splat(0.5 - x));
-            let ends = |x: f64| {
-                [DVec3::X, DVec3::Y, DVec3::Z][(x * 6.0) as usize / 2]
-                    * if (x * 6.0) as u32 % 2 == 0 { 1.0 } else { -1.0 }
-            };
+            let ends = |x: f64| [DVec3::X, DVec3::Y, DVec3::Z][(x * 3.0) as usize] * (x * 30.0 % 2.0 - 1.0).signum();
             known.bounds_are_tight(4000, &ends);
         }
     }

@@ -118,9 +118,8 @@ impl Torus {
         let at = |s: f64| self.distance(o + d * s, d);
         let mut start = low;
         let mut inside = false;
-        for i in 0..=count {
-            let end = if i < count { turns[i] } else { high };
-            let ends_inside = i < count && at(end).0 < 0.0;
+        let ends = turns[..count].iter().map(|s| (*s, at(*s).0 < 0.0)).chain([(high, false)]);
+        for (end, ends_inside) in ends {
             if ends_inside != inside {
                 let t = bracketed(start, end, inside, at) / speed + shift;
                 // Leaving it is to see it from behind
@@ -200,7 +199,7 @@ mod tests {
                 known.bounds_are_tight(8000, &|x| {
                     // It is a ball moved along the circle
                     let i = (x * 6.0) as usize;
-                    let pole = [DVec3::X, DVec3::Y, DVec3::Z][i / 2] * if i % 2 == 0 { minor } else { -minor };
+                    let pole = [DVec3::X, DVec3::Y, DVec3::Z][i / 2] * if i.is_multiple_of(2) { minor } else { -minor };
                     center + around(x * 6.0) * major + pole
                 });
             }
