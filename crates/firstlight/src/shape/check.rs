@@ -157,6 +157,14 @@ impl Known<'_> {
             let off = (self.distance)(ray.at(hit.t)).abs();
             assert!(off <= rounding, "{hit:?} of {ray:?} is {off} from the surface of {:?}", self.solid);
             self.point_is_right(&ray, &hit);
+            // From behind it is not there, if it is to be seen from one side only
+            let cos = self.solid.point(&ray, &hit).normal.dot(ray.d) / ray.d.length();
+            let single_sided = self.solid.intersect(&ray, 0.0, f64::INFINITY, true);
+            if cos < -1e-3 {
+                assert_eq!(single_sided, Some(hit));
+            } else if cos > 1e-3 {
+                assert!(single_sided.is_none_or(|next| next.t > hit.t));
+            }
             // The same with the ends of the interval around it, and without
             let around = |low: f64, high: f64| self.solid.intersect(&ray, low, high, false);
             assert_eq!(around(0.0, hit.t), None);
@@ -215,6 +223,9 @@ impl Known<'_> {
             }
             let wrong = (a.dpdu * uv.x + a.dpdv * uv.y - step).length();
             assert!(wrong < 1e-2 * step.length() + 1e-9 * self.size, "{a:?} {b:?}: {wrong} of {}", step.length());
+            let counted = a.uv_step(step);
+            let wrong = ((counted - uv) * DVec2::new(a.dpdu.length(), a.dpdv.length())).length();
+            assert!(wrong < 5e-2 * step.length() + 1e-9 * self.size, "{a:?}: {counted} is not {uv}");
             compared += 1;
         }
         assert!(compared > rays / 500, "only {compared} of {rays} compared");

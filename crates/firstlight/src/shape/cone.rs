@@ -24,9 +24,9 @@ table! {
         pub p0: [f64; 3],
         /// The other end of the axis: the tip, where `radius1` is 0; not `p0` itself.
         pub p1: [f64; 3],
-        /// The radius at `p0` in metres, 0 or more, at most 2.5e8.
+        /// The radius at `p0` in metres, 0 to 2.5e8.
         pub radius0: f64,
-        /// The radius at `p1` in metres, 0 or more, at most 2.5e8; not 0 where `radius0` is.
+        /// The radius at `p1` in metres, 0 to 2.5e8; not 0 where `radius0` is.
         pub radius1: f64 = 0.0,
         /// Whether the ends are closed.
         pub capped: bool = true,
@@ -39,14 +39,20 @@ table! {
     }
 }
 
+/// The radius of the wider end, in metres, is from here
+const MIN_RADIUS: f64 = 1e-9;
+/// to here.
+const MAX_RADIUS: f64 = 2.5e8;
+
 impl ConeDesc {
     pub(crate) fn compile(&self, cx: &mut CompileContext) -> Solid {
-        let hint = "the radii are in metres; at the tip of a cone it is 0";
-        if self.radius0 == 0.0 && self.radius1 == 0.0 {
-            cx.error("radius1", "0, and radius0 is 0 as well: a cone has one tip", Some("give one end a radius"));
+        let hint = Some("the radii are in metres; at the tip of a cone it is 0");
+        let radii = [("radius0", self.radius0), ("radius1", self.radius1)];
+        let radii = radii.map(|(field, radius)| cx.between(field, radius, 0.0, MAX_RADIUS, hint));
+        if radii.iter().all(|radius| (0.0..MIN_RADIUS).contains(radius)) {
+            let message = format!("{}, and radius0 is {}: there is nothing around the axis", radii[1], radii[0]);
+            cx.error("radius1", message, Some("give one end a radius of 1e-9 or more"));
         }
-        let mut radius = |field, r| if r == 0.0 { r } else { cx.positive(field, r, hint) };
-        let radii = [radius("radius0", self.radius0), radius("radius1", self.radius1)];
         Solid::Frustum(Frustum::compile(cx, self.p0, self.p1, radii, self.capped))
     }
 }

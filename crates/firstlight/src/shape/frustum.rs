@@ -25,6 +25,8 @@ pub(crate) struct Frustum {
     slope: f64,
     /// Whether the ends are closed.
     pub capped: bool,
+    /// What the ends are: the caps, or where there is an apex, the mantle.
+    caps: [u8; 2],
 }
 
 /// The round side.
@@ -56,6 +58,7 @@ impl Frustum {
             radii,
             slope: (radii[1] - radii[0]) / height,
             capped,
+            caps: [if radii[0] > 0.0 { CAP0 } else { MANTLE }, if radii[1] > 0.0 { CAP1 } else { MANTLE }],
         }
     }
 
@@ -74,7 +77,8 @@ impl Frustum {
         let mantle = self.mantle(o, d);
         if self.capped {
             let mut chord = Chord::LINE;
-            chord.cut_slab(o.z, d.z, 0.0, self.height, CAP0, CAP1);
+            let [cap0, cap1] = self.caps;
+            chord.cut_slab(o.z, d.z, 0.0, self.height, cap0, cap1);
             chord.cut(mantle.enter, mantle.leave);
             return chord.first(shift, t_min, t_max, single_sided);
         }
@@ -370,7 +374,9 @@ mod tests {
         let solid = made.solid(true);
         // Onto the tip from above, along the mantle from outside and in it, level with the tip
         let hits = |o: [f64; 3], d: [f64; 3]| solid.intersect(&DRay { o: o.into(), d: d.into() }, 0.0, 100.0, false);
-        assert_eq!(hits([0.0, 5.0, 0.0], [0.0, -1.0, 0.0]).map(|hit| hit.t), Some(4.0));
+        assert_eq!(hits([0.0, 5.0, 0.0], [0.0, -1.0, 0.0]), Some(SolidHit { t: 4.0, part: MANTLE }));
+        let tip = DRay { o: DVec3::Y * 5.0, d: DVec3::NEG_Y };
+        assert_eq!(solid.point(&tip, &SolidHit { t: 4.0, part: MANTLE }).uv, DVec2::new(0.5, 1.0));
         assert!(hits([0.0, 1.5, 0.0], [1.0, -1.0, 0.0]).is_none());
         assert!(hits([-1.0, 2.0, 0.0], [1.0, -1.0, 0.0]).is_some());
         assert!(hits([-5.0, 1.0 + 1e-12, 0.0], [1.0, 0.0, 0.0]).is_none());

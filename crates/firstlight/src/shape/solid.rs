@@ -51,6 +51,24 @@ pub(crate) struct SolidPoint {
     pub terms: DVec3,
 }
 
+impl SolidPoint {
+    /// The change of uv with a step `dp` along the surface. What lies off the surface is left out; once around is the most
+    /// that a step makes of a coordinate with an end.
+    pub fn uv_step(&self, dp: DVec3) -> DVec2 {
+        let across = self.dpdu.cross(self.dpdv);
+        let area2 = across.length_squared();
+        let step = if area2 > 0.0 {
+            DVec2::new(dp.cross(self.dpdv).dot(across), self.dpdu.cross(dp).dot(across)) / area2
+        } else {
+            // One of them has no length: a step there is once around
+            let along = |way: DVec3| if way == DVec3::ZERO { 1.0 } else { dp.dot(way) / way.length_squared() };
+            DVec2::new(along(self.dpdu), along(self.dpdv))
+        };
+        let limit = |step: f64, edge| if edge == UvEdge::Unbounded { step } else { step.clamp(-1.0, 1.0) };
+        DVec2::new(limit(step.x, self.edges[0]), limit(step.y, self.edges[1]))
+    }
+}
+
 /// One expression for every kind.
 macro_rules! each {
     ($solid:expr, $shape:ident => $answer:expr) => {
@@ -172,4 +190,30 @@ impl Chord {
 pub(crate) fn turn(x: f64, y: f64) -> f64 {
     use std::f64::consts::PI;
     0.5 + pxfm::f_atan2(y, x) / (2.0 * PI)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn steps_in_uv_are_bounded_where_u_has_no_meaning() {
+        let mut point = SolidPoint {
+            p: DVec3::ZERO,
+            normal: DVec3::Z,
+            uv: DVec2::ZERO,
+            dpdu: DVec3::X * 4.0,
+            dpdv: DVec3::new(1.0, 2.0, 0.0),
+            edges: [UvEdge::Periodic, UvEdge::Bounded],
+            terms: DVec3::ZERO,
+        };
+        // Skewed, and with a part along the normal
+        assert_eq!(point.uv_step(DVec3::new(0.5, 1.0, 9.0)), DVec2::new(0.0, 0.5));
+        assert_eq!(point.uv_step(DVec3::new(1.0, 0.0, 0.0)), DVec2::new(0.25, 0.0));
+        assert_eq!(point.uv_step(DVec3::new(100.0, -100.0, 0.0)), DVec2::new(1.0, -1.0));
+        point.dpdu = DVec3::ZERO;
+        assert_eq!(point.uv_step(DVec3::new(0.2, 0.4, 0.0)), DVec2::new(1.0, 0.2));
+        point.dpdu = DVec3::X * 1e-200;
+        assert!(point.uv_step(DVec3::new(0.2, 0.4, 0.0)).is_finite());
+    }
 }
