@@ -38,6 +38,8 @@ table! {
 pub(crate) struct Cuboid {
     low: DVec3,
     high: DVec3,
+    /// What lies between; far from the origin the difference of the two may round to 0.
+    size: DVec3,
 }
 
 impl BoxDesc {
@@ -46,8 +48,8 @@ impl BoxDesc {
         for (i, size) in self.size.iter().enumerate() {
             cx.positive(&format!("size[{i}]"), *size, "the lengths along x, y and z are in metres");
         }
-        let (center, half) = (DVec3::from(self.center), DVec3::from(self.size) * 0.5);
-        Solid::Cuboid(Cuboid { low: center - half, high: center + half })
+        let (center, size) = (DVec3::from(self.center), DVec3::from(self.size));
+        Solid::Cuboid(Cuboid { low: center - size * 0.5, high: center + size * 0.5, size })
     }
 }
 
@@ -70,17 +72,16 @@ impl Cuboid {
         normal[axis] = if positive { 1.0 } else { -1.0 };
         // As on a rectangle that faces the same way
         let face = Frame::facing(normal, None).unwrap_or(Frame::around(normal));
-        let size = self.high - self.low;
         let along = |way: DVec3| {
             let from = if way.element_sum() > 0.0 { p - self.low } else { p - self.high };
-            from.dot(way) / size.dot(way.abs())
+            from.dot(way) / self.size.dot(way.abs())
         };
         SolidPoint {
             p,
             normal,
-            uv: DVec2::new(along(face.x), along(face.y)),
-            dpdu: face.x * size,
-            dpdv: face.y * size,
+            uv: DVec2::new(along(face.x), along(face.y)).clamp(DVec2::ZERO, DVec2::ONE),
+            dpdu: face.x * self.size,
+            dpdv: face.y * self.size,
             edges: [UvEdge::Bounded; 2],
             terms: self.low.abs().max(self.high.abs()),
         }

@@ -216,4 +216,77 @@ mod tests {
         point.dpdu = DVec3::X * 1e-200;
         assert!(point.uv_step(DVec3::new(0.2, 0.4, 0.0)).is_finite());
     }
+
+    #[test]
+    fn whatever_compiles_answers_with_numbers() {
+        use super::super::check::{Random, made};
+        use super::super::{BoxDesc, ConeDesc, DiskDesc, SphereUv, TorusDesc};
+        let mut random = Random::new(1);
+        let mut hits = 0;
+        for i in 0..20_000 {
+            // Any two sizes that a scene may say, anywhere
+            let mut length = || random.magnitude(1.01e-9, 2.4e8);
+            let (a, b, c) = (length(), length(), length());
+            let at = random.in_ball() * random.magnitude(1e-9, 2.4e8);
+            let axis = random.direction();
+            let solid = match i % 6 {
+                0 => made(|cx| DiskDesc { normal: axis.into(), ..DiskDesc::new(at.into(), a) }.compile(cx)),
+                1 => made(|cx| BoxDesc { size: [a, b, c], ..BoxDesc::new(at.into()) }.compile(cx)),
+                2 => made(|cx| TorusDesc { axis: axis.into(), ..TorusDesc::new(at.into(), a, b) }.compile(cx)),
+                3 => Solid::Ball(Ball { uv: SphereUv::Angles }),
+                _ => {
+                    let tip = at + axis * c.max(at.length() * 1e-6);
+                    let tip = tip.clamp(DVec3::splat(-2.5e8), DVec3::splat(2.5e8));
+                    if (tip - at).length() < 1e-9 {
+                        continue;
+                    }
+                    let radius1 = if i % 3 == 0 { 0.0 } else { b };
+                    let cone = ConeDesc { radius1, capped: i % 2 == 0, ..ConeDesc::new(at.into(), tip.into(), a) };
+                    made(|cx| cone.compile(cx))
+                }
+            };
+            let [low, high] = solid.bounds().expect("it has an end");
+            for _ in 0..8 {
+                let o = (low + high) * 0.5 + random.direction() * random.magnitude(1e-9, 4e8);
+                let inside = low + (high - low) * DVec3::new(random.unit(), random.unit(), random.unit());
+                let d = if random.unit() < 0.2 { random.direction() } else { inside - o };
+                let ray = DRay { o, d };
+                let Some(hit) = solid.intersect(&ray, 0.0, f64::INFINITY, false) else { continue };
+                hits += 1;
+                let point = solid.point(&ray, &hit);
+                assert!(hit.t > 0.0 && hit.t.is_finite(), "{solid:?} {ray:?} {hit:?}");
+                let fine = point.p.is_finite() && point.dpdu.is_finite() && point.dpdv.is_finite();
+                assert!(fine && (point.normal.length() - 1.0).abs() < 1e-9, "{solid:?} {ray:?} {point:?}");
+                assert!(point.uv.clamp(DVec2::ZERO, DVec2::ONE) == point.uv, "{solid:?} {ray:?} {point:?}");
+                assert!(point.uv_step(random.in_ball()).is_finite());
+            }
+        }
+        assert!(hits > 10_000, "{hits}");
+    }
+
+    #[test]
+    fn no_description_breaks_compiling() {
+        use super::super::check::faults;
+        use super::super::{BoxDesc, ConeDesc, CylinderDesc, DiskDesc, PlaneDesc, RectangleDesc, TorusDesc};
+        let numbers = [0.0, -1.0, 1e-300, 1e30, 1e308, f64::INFINITY, f64::NAN];
+        for x in numbers {
+            for y in numbers {
+                let (v, w) = ([x, y, 0.0], [y, 1.0, x]);
+                let plane = PlaneDesc { point: v, normal: w, up: Some([x; 3]), ..PlaneDesc::default() };
+                let disk = DiskDesc { normal: v, inner_radius: y, ..DiskDesc::new(w, x) };
+                let rectangle = RectangleDesc { normal: w, up: Some([y; 3]), ..RectangleDesc::new(v, [x, y]) };
+                let cuboid = BoxDesc { size: v, ..BoxDesc::new(w) };
+                let cone = ConeDesc { radius1: y, ..ConeDesc::new(v, w, x) };
+                let torus = TorusDesc { axis: v, ..TorusDesc::new(w, x, y) };
+                let found = faults(|cx| plane.compile(cx));
+                assert!(!found.is_empty() || x.abs() <= 1.0 && y.abs() <= 1.0);
+                assert!(!faults(|cx| disk.compile(cx)).is_empty());
+                assert!(!faults(|cx| rectangle.compile(cx)).is_empty());
+                assert!(!faults(|cx| cuboid.compile(cx)).is_empty());
+                assert!(!faults(|cx| cone.compile(cx)).is_empty());
+                assert!(!faults(|cx| torus.compile(cx)).is_empty());
+                assert!(!faults(|cx| CylinderDesc::new(v, w, x).compile(cx)).is_empty());
+            }
+        }
+    }
 }
