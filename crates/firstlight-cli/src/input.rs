@@ -72,7 +72,7 @@ impl Input {
     /// # Errors
     /// Every fault of text and meaning.
     pub fn compile(&self) -> Result<Compiled, Failure> {
-        let options = CompileOptions { strict: self.strict };
+        let options = CompileOptions { strict: self.strict, ..CompileOptions::default() };
         self.parsed.compile(self.assets.as_ref(), &options).map_err(|e| Failure::Scene(e.faults))
     }
 }

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use crate::color::Rgb;
 use crate::describe::ColorDesc;
 use crate::error::{Diagnostic, Severity};
-use crate::math::{DVec3, Vec3, vec3};
+use crate::math::{DAffine3, DVec3, Vec3, vec3};
 
 /// Where a scene's files come from: a folder, memory, a browser.
 pub trait Assets: Sync {
@@ -142,6 +142,8 @@ fn leaves(path: &str) -> bool {
 /// fault does not hide the next.
 #[derive(Default)]
 pub(crate) struct CompileContext {
+    /// The moment that is compiled, in seconds.
+    pub(crate) time: f64,
     path: String,
     faults: Vec<Diagnostic>,
     /// Errors, whether told or not.
@@ -157,6 +159,11 @@ const MAX_FAULTS: usize = 256;
 const MAX_NAMES_COMPARED: usize = 1000;
 
 impl CompileContext {
+    /// For the moment `time`, in seconds.
+    pub(crate) fn at_time(time: f64) -> Self {
+        Self { time, ..Self::default() }
+    }
+
     /// Runs `f` with `part` added to the path of every fault: `light.spot[2]`.
     pub(crate) fn within<R>(&mut self, part: &str, f: impl FnOnce(&mut Self) -> R) -> R {
         let length = self.path.len();
@@ -251,6 +258,17 @@ impl CompileContext {
             self.error(field, message, Some("use a larger unit of length"));
         }
         vec3(v)
+    }
+
+    /// A point that a transform moves, in world space; a fault where it is moved too far.
+    pub(crate) fn moved_point(&mut self, world_from_object: DAffine3, p: DVec3) -> DVec3 {
+        let moved = world_from_object.transform_point3(p);
+        if !moved.to_array().iter().all(|x| x.abs() <= MAX_COORDINATE) {
+            let (from, to) = (show(&p.to_array()), show(&moved.to_array()));
+            let message = format!("it moves {from} to {to}, outside -2.5e8 to 2.5e8");
+            self.error("transform", message, Some("use a larger unit of length"));
+        }
+        moved
     }
 
     /// A vector that has a length.

@@ -60,11 +60,12 @@ mod render;
 mod scene;
 mod shape;
 mod texture;
+mod transform;
 
 pub use camera::{Camera, CameraDesc, Pinhole};
 pub use color::{Display, Encoding, Rgb};
 pub use context::{AssetError, Assets, FolderAssets, MemoryAssets, NoAssets};
-pub use describe::{ColorDesc, ColorParam, FilePath, NumberParam, ParamDesc};
+pub use describe::{ColorDesc, ColorParam, FilePath, NumberParam, ParamDesc, ScaleDesc};
 pub use error::{Diagnostic, Place, SceneError, Severity};
 pub use ids::{LightId, MaterialId, SurfaceId, TextureId};
 pub use image::{
@@ -82,3 +83,4 @@ pub use shape::{
     Footprint, ParallelogramDesc, RayDifferential, ShapeDesc, SphereDesc, SphereUv, SurfaceInteraction, UvEdge,
 };
 pub use texture::{CheckerboardDesc, Filter, ImageTextureDesc, TextureDesc, TextureSpace, Wrap};
+pub use transform::{Interpolation, TransformDesc, TransformKeyDesc};

@@ -13,7 +13,7 @@ pub use ray::Ray;
 pub(crate) use ray::{ErrorBound, ShadowRay};
 pub(crate) use sum::{LANES, LaneSum};
 
-pub use glam::{DVec3, Vec2, Vec3};
+pub use glam::{DAffine3, DMat3, DQuat, DVec3, Vec2, Vec3};
 
 /// Half the distance between 1 and the next `f32`: the relative error of one rounded operation.
 pub(crate) const UNIT_ROUNDOFF: f32 = f32::EPSILON * 0.5;

@@ -16,12 +16,15 @@ use crate::material::{LobeKind, MAX_SHININESS, Material, MaterialDesc};
 use crate::math::{DVec3, Vec3};
 use crate::shape::{Parallelogram, PlaneSide, ShapeDesc, Sphere};
 use crate::texture::{Param, Texture, TextureDesc, TextureSpace};
+use crate::transform::MAX_TIME;
 
-/// How strict compiling is.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+/// How strict compiling is, and which moment is compiled.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct CompileOptions {
     /// Warnings are errors.
     pub strict: bool,
+    /// In seconds, from -1e9 to 1e9: where the scene has keys, it is compiled as it is at this time.
+    pub time: f64,
 }
 
 /// A scene, and what is odd about it.
@@ -46,7 +49,7 @@ impl SceneDesc {
     /// # Errors
     /// Every fault at once, each with the path of its value.
     pub fn compile(&self, assets: &dyn Assets, options: &CompileOptions) -> Result<Compiled, SceneError> {
-        let (scene, mut faults) = self.compile_or_faults(assets);
+        let (scene, mut faults) = self.compile_or_faults(assets, options.time);
         if options.strict {
             faults.iter_mut().for_each(|fault| fault.severity = Severity::Error);
         }
@@ -59,9 +62,10 @@ impl SceneDesc {
     }
 
     /// The scene, if there are no errors, and all errors and warnings.
-    pub(crate) fn compile_or_faults(&self, assets: &dyn Assets) -> (Option<Scene>, Vec<Diagnostic>) {
-        let mut cx = CompileContext::default();
+    pub(crate) fn compile_or_faults(&self, assets: &dyn Assets, time: f64) -> (Option<Scene>, Vec<Diagnostic>) {
+        let mut cx = CompileContext::at_time(time);
         let cx = &mut cx;
+        cx.between("time", time, -MAX_TIME, MAX_TIME, Some("the moment to compile, in seconds"));
         let picture = self.compile_render(cx);
         let camera = self.compile_camera(cx, picture.width, picture.height);
         let mut textures = Textures::new(self, assets);

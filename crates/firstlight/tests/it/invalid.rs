@@ -27,7 +27,7 @@ fn diagnostics(path: &Path) -> String {
     let assets = FolderAssets::new(path.parent().unwrap(), &[]).unwrap();
     let name = path.file_name().unwrap().to_str().unwrap();
     let parsed = SceneDesc::parse(name, &std::fs::read(path).unwrap(), &assets);
-    match parsed.compile(&assets, &CompileOptions { strict: true }) {
+    match parsed.compile(&assets, &CompileOptions { strict: true, ..CompileOptions::default() }) {
         Ok(_) => String::new(),
         Err(error) => format!("{error}\n"),
     }

@@ -119,11 +119,42 @@ fn shape() -> impl Strategy<Value = ShapeDesc> {
     prop_oneof![sphere, parallelogram]
 }
 
+fn scale() -> impl Strategy<Value = ScaleDesc> {
+    prop_oneof![number().prop_map(ScaleDesc::from), vector().prop_map(ScaleDesc::from)]
+}
+
+fn key() -> impl Strategy<Value = TransformKeyDesc> {
+    let quaternion = [number(), number(), number(), number()];
+    (number(), maybe(vector()), maybe(vector()), maybe(vector()), maybe(number()), maybe(quaternion), maybe(scale()))
+        .prop_map(|(time, translate, rotate_deg, rotate_axis, angle_deg, quaternion, scale)| TransformKeyDesc {
+            time,
+            translate,
+            rotate_deg,
+            rotate_axis,
+            angle_deg,
+            quaternion,
+            scale,
+        })
+}
+
+fn transform() -> impl Strategy<Value = TransformDesc> {
+    let turn = (vector(), maybe(vector()), maybe(number()), maybe([number(), number(), number(), number()]));
+    let matrix = maybe(vec(number(), 12).prop_map(|m| m.try_into().unwrap()));
+    (vector(), turn, scale(), matrix, vec(key(), 0..4), select(Interpolation::ALL)).prop_map(
+        |(translate, (rotate_deg, rotate_axis, angle_deg, quaternion), scale, matrix, keys, interpolation)| {
+            let turned = TransformDesc { rotate_deg, rotate_axis, angle_deg, quaternion, ..TransformDesc::default() };
+            TransformDesc { translate, scale, matrix, keys, interpolation, ..turned }
+        },
+    )
+}
+
 fn light() -> impl Strategy<Value = LightDesc> {
     let common = || (maybe(text()), color(), number(), select(Falloff::ALL), any::<bool>());
-    let point = (vector(), common()).prop_map(|(position, (name, color, strength, falloff, shadows))| {
-        LightDesc::Point(PointDesc { name, position, color, strength, falloff, shadows })
-    });
+    let point = (vector(), maybe(transform().prop_map(Box::new)), common()).prop_map(
+        |(position, transform, (name, color, strength, falloff, shadows))| {
+            LightDesc::Point(PointDesc { name, position, transform, color, strength, falloff, shadows })
+        },
+    );
     let directional = (vector(), common()).prop_map(|(direction, (name, color, strength, falloff, shadows))| {
         LightDesc::Directional(DirectionalDesc { name, direction, color, strength, falloff, shadows })
     });

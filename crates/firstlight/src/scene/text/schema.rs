@@ -14,10 +14,13 @@ use crate::texture::TextureDesc;
 pub fn schema() -> String {
     let mut defs = Map::new();
     let mut reference = |prefix: &str, table: TableInfo| -> (String, Json) {
-        let name = if prefix.is_empty() { table.kind.to_owned() } else { format!("{prefix}.{}", table.kind) };
+        let name = if prefix.is_empty() { table.kind.clone() } else { format!("{prefix}.{}", table.kind) };
         let to = json!({ "$ref": format!("#/$defs/{name}") });
+        for inner in table.fields.into_iter().flat_map(|field| field.tables) {
+            defs.insert(inner.kind, inner.schema);
+        }
         defs.insert(name, table.schema);
-        (table.kind.to_owned(), to)
+        (table.kind, to)
     };
 
     let mut properties = Map::new();
