@@ -144,6 +144,8 @@ fn leaves(path: &str) -> bool {
 pub(crate) struct CompileContext {
     /// The moment that is compiled, in seconds.
     pub(crate) time: f64,
+    /// Whether anything has keys, so that the time decides the picture.
+    pub(crate) keyed: bool,
     path: String,
     faults: Vec<Diagnostic>,
     /// Errors, whether told or not.
@@ -267,6 +269,17 @@ impl CompileContext {
             let (from, to) = (show(&p.to_array()), show(&moved.to_array()));
             let message = format!("it moves {from} to {to}, outside -2.5e8 to 2.5e8");
             self.error("transform", message, Some("use a larger unit of length"));
+        }
+        moved
+    }
+
+    /// A vector that a transform turns and scales, in world space; a fault where that leaves it no length, or too much.
+    pub(crate) fn moved_edge(&mut self, world_from_object: DAffine3, field: &str, v: DVec3) -> DVec3 {
+        let moved = world_from_object.transform_vector3(v);
+        let too_far = moved.to_array().iter().any(|x| !(x.abs() <= MAX_COORDINATE));
+        if too_far || !(moved.length() >= MIN_LENGTH) {
+            let message = format!("it makes {} of {field}, of a length outside [1e-9, 2.5e8]", show(&moved.to_array()));
+            self.error("transform", message, Some("choose another scale"));
         }
         moved
     }

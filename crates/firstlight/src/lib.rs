@@ -62,7 +62,7 @@ mod shape;
 mod texture;
 mod transform;
 
-pub use camera::{Camera, CameraDesc, Pinhole};
+pub use camera::{Camera, CameraDesc, FilmPlane, Frame, Orthographic, Pinhole, Projection};
 pub use color::{Display, Encoding, Rgb};
 pub use context::{AssetError, Assets, FolderAssets, MemoryAssets, NoAssets};
 pub use describe::{ColorDesc, ColorParam, FilePath, NumberParam, ParamDesc, ScaleDesc};

@@ -22,6 +22,7 @@ use rayon::prelude::*;
 pub use film::Film;
 pub use simd::SimdLevel;
 
+use crate::camera::Projection;
 use crate::color::{Display, Encoding};
 use crate::image::{Receipt, Window};
 use crate::scene::Scene;
@@ -249,6 +250,15 @@ impl Scene {
                 format!("{encoding}, exposure {exposure}; 8- and 16-bit files only")
             }),
         ];
+        if let Some(time) = self.time {
+            entries.push(("time", time.to_string()));
+        }
+        if self.camera.projection() != Projection::Perspective {
+            entries.push(("projection", self.camera.projection().name().to_owned()));
+        }
+        if self.camera.film_shift() != [0.0; 2] {
+            entries.push(("film_shift", numbers(self.camera.film_shift())));
+        }
         if !self.placeholders.is_empty() {
             entries.push(("placeholders", self.placeholders.join(" ")));
         }

@@ -40,6 +40,8 @@ pub struct Compiled {
 const MAX_PIXELS: u64 = 1 << 27;
 const MAX_SIDE: u32 = 65536;
 const MAX_ANTIALIASING: u32 = 64;
+const MIN_FPS: f64 = 0.001;
+const MAX_FPS: f64 = 1e6;
 /// The largest picture file read as a texture, in bytes.
 const MAX_TEXTURE_FILE: u64 = 1 << 30;
 
@@ -97,6 +99,7 @@ impl SceneDesc {
             flat_occluders,
             light_sides,
             hash: self.hash(&textures),
+            time: cx.keyed.then_some(time),
             placeholders: textures.placeholders,
             textures: textures.compiled,
             summary,
@@ -119,6 +122,7 @@ impl SceneDesc {
             cx.count("samples", render.samples, 1, MAX_SAMPLES, Some("points on each area light"));
             let gamma = cx.between("gamma", render.gamma, 0.1, 10.0, Some("2.2 is usual"));
             let exposure = cx.between("exposure", render.exposure, -64.0, 64.0, Some("in stops: each doubles"));
+            cx.between("fps", render.fps, MIN_FPS, MAX_FPS, Some("frames in a second"));
             let encoding = match render.display {
                 DisplayEncoding::Srgb => Encoding::Srgb,
                 DisplayEncoding::Gamma => Encoding::Gamma(gamma),
@@ -154,7 +158,7 @@ impl SceneDesc {
         }
         // Never used when there was a fault
         let placeholder = || CameraDesc::new([0.0, 0.0, 1.0]).compile(&mut CompileContext::default(), 1, 1);
-        Camera::Pinhole(chosen.unwrap_or_else(placeholder))
+        chosen.unwrap_or_else(placeholder)
     }
 
     fn chosen_camera(&self) -> Option<usize> {
@@ -295,6 +299,7 @@ impl SceneDesc {
             }
         }
         said.render.samples = RenderDesc::default().samples;
+        said.render.fps = RenderDesc::default().fps;
         let mut hasher = blake3::Hasher::new();
         hasher.update(said.to_json().as_bytes());
         for (file, hash) in textures.file_hashes() {

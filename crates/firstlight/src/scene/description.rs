@@ -51,6 +51,9 @@ table! {
         pub gamma: f64 = 2.2,
         /// In stops: 8- and 16-bit pictures are multiplied by 2^exposure, from -64 to 64.
         pub exposure: f64 = 0.0,
+        /// Frames in a second, 0.001 to 1000000: frame number n of `--frames` is the moment n / fps. Without keys it is of no
+        /// account.
+        pub fps: f64 = 24.0,
     }
 }
 

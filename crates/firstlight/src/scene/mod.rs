@@ -47,6 +47,8 @@ pub struct Scene {
     /// For each rectangle light, on which side of each flat occluder it lies; where nothing is known, both.
     pub(crate) light_sides: Vec<Vec<PlaneSide>>,
     pub(crate) hash: String,
+    /// The moment, in seconds, if anything of the scene changes with time.
+    pub(crate) time: Option<f64>,
     /// The texture files that something stands in for.
     pub(crate) placeholders: Vec<String>,
     pub(crate) summary: SceneSummary,
@@ -100,7 +102,13 @@ impl Scene {
         &self.camera
     }
 
-    /// 64 hexadecimal digits: BLAKE3 of the description, its settings and the files it names.
+    /// The moment that was compiled, in seconds; `None` if nothing in the scene changes with time.
+    pub fn time(&self) -> Option<f64> {
+        self.time
+    }
+
+    /// 64 hexadecimal digits: BLAKE3 of the description, its settings and the files it names. The same at all times: what
+    /// moves is told apart by [`time`](Self::time).
     pub fn hash(&self) -> &str {
         &self.hash
     }

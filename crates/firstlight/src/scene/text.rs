@@ -18,10 +18,10 @@ use super::course;
 use super::description::{RenderDesc, SceneDesc};
 use crate::camera::CameraDesc;
 use crate::context::{AssetError, Assets};
-use crate::describe::Family;
 use crate::describe::node::{self, Data, Node, Span, Syntax, quoted};
 use crate::describe::read::{Fault, Faults, Reader, nearest};
 use crate::describe::value::{join_path, normalized};
+use crate::describe::{Family, Table};
 use crate::error::{Diagnostic, SceneError, Severity};
 use crate::light::LightDesc;
 use crate::material::MaterialDesc;
@@ -517,9 +517,15 @@ fn cameras(
         }
         return;
     }
-    // Tables among values: two ways of saying cameras in one
+    // Tables among values: two ways of saying cameras in one, but for those that a camera has of its own
     if let Data::Table(entries) = &mut node.data {
+        let own = |entry: &node::Entry| {
+            CameraDesc::info().iter().any(|field| field.name == entry.key && !field.tables.is_empty())
+        };
         entries.retain(|entry| {
+            if is_table(&entry.value) && own(entry) {
+                return true;
+            }
             if is_table(&entry.value) {
                 let hint = "give the camera without a name one, as [camera.NAME]";
                 reader.within(&entry.key, |r| {

@@ -70,25 +70,30 @@ impl SurfaceInteraction {
 }
 
 /// How a camera ray changes from one ray of the grid to the next: the change of its unnormalised direction, over that
-/// direction's length.
+/// direction's length, and the change of its origin.
 #[derive(Clone, Copy, Debug)]
 pub struct RayDifferential {
-    /// To the ray on the right.
+    /// Of the direction, to the ray on the right.
     pub dx: Vec3,
-    /// To the ray below.
+    /// Of the direction, to the ray below.
     pub dy: Vec3,
+    /// Of the origin, to the ray on the right; 0 where all rays come from one eye.
+    pub origin_dx: Vec3,
+    /// Of the origin, to the ray below.
+    pub origin_dy: Vec3,
 }
 
 impl RayDifferential {
     /// The steps, on the plane through the hit with normal `n`, from the point `t d` to where the neighbours meet it:
-    /// dp = t (dD - d (n.dD) / (n.d)).
+    /// dp = dO + t dD - d (n.(dO + t dD)) / (n.d).
     ///
     /// Source: Igehy, "Tracing ray differentials", SIGGRAPH 1999, eq. 10 to 12. Edge-on the step is as long as `limit`.
     #[inline(always)]
     pub(crate) fn on_plane(&self, d: Vec3, t: f32, n: Vec3, limit: f32) -> [Vec3; 2] {
         let cos = n.dot(d);
-        [self.dx, self.dy].map(|dd| {
-            let step = (dd - d * (n.dot(dd) / cos)) * t;
+        let along_plane = |v: Vec3| v - d * (n.dot(v) / cos);
+        [(self.dx, self.origin_dx), (self.dy, self.origin_dy)].map(|(dd, origin)| {
+            let step = along_plane(dd) * t + along_plane(origin);
             let length2 = step.length_squared();
             // Also where the division gave infinity or no number
             if length2 <= limit * limit {

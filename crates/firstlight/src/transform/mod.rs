@@ -106,6 +106,7 @@ impl TransformDesc {
         let rotation = turn.compile(cx);
         check_scale(cx, self.scale);
         // What the keys say
+        cx.keyed |= !self.keys.is_empty();
         let keyed = Keyed::compile(cx, &self.keys);
         let twice = [
             ("translate", self.translate != [0.0; 3], keyed.translate.first().map(|key| key.index)),

@@ -86,21 +86,25 @@ prop_compose! {
     fn render()(
         size in [any::<u32>(), any::<u32>(), any::<u32>(), any::<u32>()], camera in maybe(text()),
         colors in [color(), color()], transparent: bool, display in select(DisplayEncoding::ALL),
-        gamma in number(), exposure in number(),
+        gamma in number(), exposure in number(), fps in number(),
     ) -> RenderDesc {
         RenderDesc {
             width: size[0], height: size[1], antialiasing: size[2], samples: size[3], camera, background: colors[0],
-            transparent, ambient: colors[1], display, gamma, exposure,
+            transparent, ambient: colors[1], display, gamma, exposure, fps,
         }
     }
 }
 
 prop_compose! {
     fn camera()(
-        position in vector(), look_at in vector(), up in vector(), fov in [maybe(number()), maybe(number()), maybe(number())],
+        position in vector(), look_at in vector(), up in vector(), projection in select(Projection::ALL),
+        sizes in [maybe(number()), maybe(number()), maybe(number()), maybe(number())], shift in [number(), number()],
+        transform in moved(),
     ) -> CameraDesc {
-        let [fov_y_deg, focal_length_mm, sensor_height_mm] = fov;
-        CameraDesc { look_at, up, fov_y_deg, focal_length_mm, sensor_height_mm, ..CameraDesc::new(position) }
+        let [fov_y_deg, focal_length_mm, sensor_height_mm, height] = sizes;
+        CameraDesc {
+            position, look_at, up, projection, fov_y_deg, focal_length_mm, sensor_height_mm, height, shift, transform,
+        }
     }
 }
 
@@ -148,24 +152,30 @@ fn transform() -> impl Strategy<Value = TransformDesc> {
     )
 }
 
+/// On the heap: these are large, and a scene has many.
+fn moved() -> BoxedStrategy<Option<Box<TransformDesc>>> {
+    maybe(transform().prop_map(Box::new)).boxed()
+}
+
 fn light() -> impl Strategy<Value = LightDesc> {
     let common = || (maybe(text()), color(), number(), select(Falloff::ALL), any::<bool>());
-    let point = (vector(), maybe(transform().prop_map(Box::new)), common()).prop_map(
-        |(position, transform, (name, color, strength, falloff, shadows))| {
+    let point =
+        (vector(), moved(), common()).prop_map(|(position, transform, (name, color, strength, falloff, shadows))| {
             LightDesc::Point(PointDesc { name, position, transform, color, strength, falloff, shadows })
-        },
-    );
-    let directional = (vector(), common()).prop_map(|(direction, (name, color, strength, falloff, shadows))| {
-        LightDesc::Directional(DirectionalDesc { name, direction, color, strength, falloff, shadows })
-    });
-    let spot = ([vector(), vector()], number(), maybe(number()), common()).prop_map(
-        |([position, look_at], cone_deg, inner_cone_deg, (name, color, strength, falloff, shadows))| {
-            let new = SpotDesc { look_at, cone_deg, inner_cone_deg, ..SpotDesc::new(position) };
+        });
+    let directional =
+        (vector(), moved(), common()).prop_map(|(direction, transform, (name, color, strength, falloff, shadows))| {
+            LightDesc::Directional(DirectionalDesc { name, direction, transform, color, strength, falloff, shadows })
+        });
+    let spot = ([vector(), vector()], moved(), number(), maybe(number()), common()).prop_map(
+        |([position, look_at], transform, cone_deg, inner_cone_deg, (name, color, strength, falloff, shadows))| {
+            let new = SpotDesc { look_at, transform, cone_deg, inner_cone_deg, ..SpotDesc::new(position) };
             LightDesc::Spot(SpotDesc { name, color, strength, falloff, shadows, ..new })
         },
     );
     let rectangle = (
         [vector(), vector(), vector()],
+        moved(),
         maybe(select(EmitSides::ALL)),
         any::<[bool; 2]>(),
         maybe(any::<u32>()),
@@ -173,13 +183,21 @@ fn light() -> impl Strategy<Value = LightDesc> {
         any::<u32>(),
         common(),
     )
-        .prop_map(|([center, e0, e1], sides, [visible, blocks], samples, set, seed, common)| {
+        .prop_map(|([center, e0, e1], transform, sides, [visible, blocks], samples, set, seed, common)| {
             let (name, color, strength, falloff, shadows) = common;
-            let new =
-                RectangleDesc { sides, visible, blocks, samples, set, seed, ..RectangleDesc::new(center, e0, e1) };
+            let new = RectangleDesc {
+                transform,
+                sides,
+                visible,
+                blocks,
+                samples,
+                set,
+                seed,
+                ..RectangleDesc::new(center, e0, e1)
+            };
             LightDesc::Rectangle(RectangleDesc { name, color, strength, falloff, shadows, ..new })
         });
-    prop_oneof![point, directional, spot, rectangle]
+    prop_oneof![point.boxed(), directional.boxed(), spot.boxed(), rectangle.boxed()]
 }
 
 fn material() -> impl Strategy<Value = MaterialDesc> {
@@ -213,8 +231,8 @@ prop_compose! {
     fn scene()(
         render in prop_oneof![Just(RenderDesc::default()), render()],
         cameras in prop_oneof![
-            camera().prop_map(|c| vec![(String::new(), c)]),
-            hash_map(text(), camera(), 0..4).prop_map(|m| m.into_iter().collect()),
+            camera().prop_map(|c| vec![(String::new(), c)]).boxed(),
+            hash_map(text(), camera(), 0..4).prop_map(|m| m.into_iter().collect()).boxed(),
         ],
         textures in hash_map(text(), texture(), 0..4), materials in hash_map(text(), material(), 0..4),
         shapes in vec(shape(), 0..6), lights in vec(light(), 0..6),

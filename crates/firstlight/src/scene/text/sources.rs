@@ -41,7 +41,7 @@ pub(crate) type Position = (usize, usize);
 /// Fields that are checked together: when one is a stand-in, what compiling says of the others is noise.
 const RELATED: &[&[&str]] = &[
     &["position", "look_at", "up"],
-    &["fov_y_deg", "focal_length_mm", "sensor_height_mm"],
+    &["projection", "height", "fov_y_deg", "focal_length_mm", "sensor_height_mm"],
     &["width", "height"],
     &["display", "gamma"],
     &["e0", "e1"],
