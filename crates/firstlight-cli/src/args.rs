@@ -60,6 +60,8 @@ Examples:
       to another program
   generate-scene | firstlight render - -o scene.png
       from another program
+  firstlight render room.toml --frames 0..47 -o turn_###.exr
+      two seconds at 24 frames in each, turn_000.exr to turn_047.exr
   firstlight render room.toml --stats=room.json --quiet
       what it took, for another program to read";
 
@@ -123,6 +125,15 @@ pub struct RenderArgs {
     #[arg(long, value_name = "NAME", value_parser = camera, help_heading = "Picture")]
     pub camera: Option<String>,
 
+    /// The moment to render, in seconds, where the scene has keys [default: 0]
+    #[arg(long, value_name = "SECONDS", value_parser = time, allow_negative_numbers = true, help_heading = "Time")]
+    pub time: Option<f64>,
+    /// Renders every frame from A to B, both included; frame n is the moment n / fps, with the scene's fps. Each is a file
+    /// of its own: name.png becomes name.0001.png, and the last row of # in a name says where the number stands and with
+    /// how many digits at least
+    #[arg(long, value_name = "A..B", value_parser = frames, conflicts_with = "time", help_heading = "Time")]
+    pub frames: Option<Frames>,
+
     /// Antialiasing by N x N camera rays in each pixel, 1 to 64; 4 is "4X" [default: the scene's]
     #[arg(long, value_name = "N", value_parser = whole::<u32>(1, 64), help_heading = "Quality")]
     pub aa: Option<u32>,
@@ -166,6 +177,9 @@ pub struct CheckArgs {
 pub struct InfoArgs {
     #[command(flatten)]
     pub scene: SceneArgs,
+    /// The moment to look at, in seconds, where the scene has keys [default: 0]
+    #[arg(long, value_name = "SECONDS", value_parser = time, allow_negative_numbers = true)]
+    pub time: Option<f64>,
     /// As JSON, for another program to read
     #[arg(long)]
     pub json: bool,
@@ -240,6 +254,42 @@ fn exposure(text: &str) -> Result<f64, String> {
     }
 }
 
+/// Reads a moment in seconds.
+fn time(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(time) if (-1e9..=1e9).contains(&time) => Ok(time),
+        _ => Err("a number of seconds from -1e9 to 1e9 is needed".into()),
+    }
+}
+
+/// The numbers of frames, both ends included.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Frames {
+    /// The first.
+    pub first: u32,
+    /// The last, not before the first.
+    pub last: u32,
+}
+
+/// No frame has a larger number.
+const MAX_FRAME: u32 = 9_999_999;
+/// Nor are there more in one run.
+const MAX_FRAMES: u32 = 100_000;
+
+/// Reads `A..B`, or one number alone.
+fn frames(text: &str) -> Result<Frames, String> {
+    let (first, last) = text.split_once("..").unwrap_or((text, text));
+    let number = |part: &str| part.trim().parse::<u32>().ok().filter(|n| *n <= MAX_FRAME);
+    match (number(first), number(last)) {
+        (Some(first), Some(last)) if first <= last && last - first >= MAX_FRAMES => {
+            Err(format!("at most {MAX_FRAMES} frames can be rendered in one run"))
+        }
+        (Some(first), Some(last)) if first <= last => Ok(Frames { first, last }),
+        (Some(first), Some(last)) => Err(format!("the last frame, {last}, comes before the first, {first}")),
+        _ => Err(format!("two whole numbers A..B from 0 to {MAX_FRAME} are needed, as 0..47; both are rendered")),
+    }
+}
+
 /// Reads `X,Y,WIDTH,HEIGHT`. Whether the film is that large is seen once the scene is known.
 fn crop(text: &str) -> Result<Window, String> {
     let wanted = "four whole numbers X,Y,WIDTH,HEIGHT are needed, in pixels, WIDTH and HEIGHT at least 1";
@@ -290,6 +340,30 @@ mod tests {
         for bad in ["", "1,2,3", "1,2,3,4,5", "1,2,0,4", "1,2,3,0", "-1,2,3,4", "1,2,3,x", "1.5,0,1,1"] {
             assert!(crop(bad).is_err(), "{bad}");
         }
+    }
+
+    #[test]
+    fn frames_are_two_numbers_in_their_order() {
+        assert_eq!(frames("0..47"), Ok(Frames { first: 0, last: 47 }));
+        assert_eq!(frames("7..7"), frames("7"));
+        for bad in [
+            "",
+            "..",
+            "1..",
+            "..2",
+            "2..1",
+            "-1..2",
+            "1..2..3",
+            "1...2",
+            "1..=2",
+            "0..10000000",
+            "0..100000",
+            "a..b",
+            "1.5..2",
+        ] {
+            assert!(frames(bad).is_err(), "{bad}");
+        }
+        assert!(time("-0.5").is_ok() && time("inf").is_err() && time("nan").is_err() && time("2e9").is_err());
     }
 
     #[test]

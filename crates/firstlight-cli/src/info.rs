@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use firstlight::{DisplayEncoding, Scene, SceneDesc};
+use firstlight::{DisplayEncoding, Frame, Projection, Scene, SceneDesc};
 use serde_json::{Value, json};
 
 use crate::args::InfoArgs;
@@ -15,7 +15,7 @@ use crate::report::{Failure, answer, show_diagnostics};
 /// The scene cannot be had, or has faults.
 pub fn run(args: &InfoArgs) -> Result<(), Failure> {
     let input = input::read(&args.scene.scene, &args.scene.reading)?;
-    let compiled = input.compile()?;
+    let compiled = input.compile(args.time.unwrap_or(0.0))?;
     show_diagnostics(&compiled.warnings);
     let info = gather(&input.name, &input.parsed.desc, &compiled.scene);
     answer(&if args.json { format!("{info:#}\n") } else { text(&info) })
@@ -40,7 +40,8 @@ fn gather(name: &str, desc: &SceneDesc, scene: &Scene) -> Value {
             "transparent": render.transparent,
             "display": display,
         },
-        "camera": camera(desc),
+        "time": scene.time(),
+        "camera": camera(desc, scene),
         "cameras": desc.cameras.iter().map(|(name, _)| name).collect::<Vec<_>>(),
         "shapes": { "sphere": summary.spheres, "parallelogram": summary.parallelograms },
         "lights": list_of(&summary.lights, |(kind, name, samples)| {
@@ -63,18 +64,31 @@ fn shortest(n: f32) -> f64 {
 }
 
 /// The camera that renders, or null where there is none.
-fn camera(desc: &SceneDesc) -> Value {
+fn camera(desc: &SceneDesc, scene: &Scene) -> Value {
     let named = |name: &String| desc.cameras.iter().find(|(known, _)| known == name);
     let chosen = desc.render.camera.as_ref().map_or(desc.cameras.first(), named);
     chosen.map_or(Value::Null, |(name, camera)| {
         let mut value =
             json!({ "name": name, "position": camera.position, "look_at": camera.look_at, "up": camera.up });
-        match camera.focal_length_mm {
-            Some(length) => {
+        if camera.transform.is_some() {
+            // Where that has brought it
+            let Frame { position, forward, up, .. } = scene.camera().frame();
+            let list = |v: &firstlight::Vec3| json!(v.to_array().map(shortest));
+            value = json!({ "name": name, "position": list(position), "forward": list(forward), "up": list(up) });
+        }
+        match (camera.projection, camera.focal_length_mm) {
+            (Projection::Orthographic, _) => {
+                value["projection"] = json!(camera.projection.name());
+                value["height"] = json!(camera.height);
+            }
+            (Projection::Perspective, Some(length)) => {
                 value["focal_length_mm"] = json!(length);
                 value["sensor_height_mm"] = json!(camera.sensor_height_mm.unwrap_or(24.0));
             }
-            None => value["fov_y_deg"] = json!(camera.fov_y_deg.unwrap_or(45.0)),
+            (Projection::Perspective, None) => value["fov_y_deg"] = json!(camera.fov_y_deg.unwrap_or(45.0)),
+        }
+        if camera.shift != [0.0; 2] {
+            value["shift"] = json!(camera.shift);
         }
         value
     })
@@ -93,6 +107,9 @@ fn text(info: &Value) -> String {
     line("hash", word(&info["hash"]));
     line("picture", format!("{} x {} pixels, {n} x {n} camera rays in each", picture["width"], picture["height"]));
     line("display", pairs(&picture["display"]));
+    if let Some(time) = info["time"].as_f64() {
+        line("time", format!("{time} s; the scene changes with time"));
+    }
     match &info["camera"] {
         Value::Null => line("camera", "none".into()),
         camera => line("camera", pairs(camera)),

@@ -1,10 +1,14 @@
 //! Where a scene comes from: a file, standard input, or the program itself.
 
+use std::collections::HashMap;
 use std::fs::File;
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
+use std::sync::Mutex;
 
-use firstlight::{Assets, CompileOptions, Compiled, FolderAssets, NoAssets, Parsed, SceneDesc, builtin_scenes};
+use firstlight::{
+    AssetError, Assets, CompileOptions, Compiled, FolderAssets, NoAssets, Parsed, SceneDesc, builtin_scenes,
+};
 
 use crate::args::ReadingArgs;
 use crate::report::{Failure, shown};
@@ -21,8 +25,29 @@ pub struct Input {
     pub stem: PathBuf,
     /// The description, and the faults of its text.
     pub parsed: Parsed,
-    assets: Box<dyn Assets>,
+    assets: Remembered,
     strict: bool,
+}
+
+/// Files that are kept once they were read.
+struct Remembered {
+    assets: Box<dyn Assets>,
+    files: Mutex<HashMap<String, Result<Vec<u8>, AssetError>>>,
+    /// Whether they will be asked for again.
+    again: bool,
+}
+
+impl Assets for Remembered {
+    fn read(&self, path: &str, limit: u64) -> Result<Vec<u8>, AssetError> {
+        let Some(mut files) = self.files.lock().ok().filter(|_| self.again) else {
+            return self.assets.read(path, limit);
+        };
+        let read = files.entry(path.to_owned()).or_insert_with(|| self.assets.read(path, limit));
+        match read {
+            Ok(bytes) if bytes.len() as u64 > limit => Err(AssetError::TooLarge { size: bytes.len() as u64, limit }),
+            read => read.clone(),
+        }
+    }
 }
 
 /// Reads the scene that `scene` names.
@@ -57,6 +82,7 @@ pub fn read(scene: &Path, reading: &ReadingArgs) -> Result<Input, Failure> {
     };
 
     let parsed = SceneDesc::parse(&name, &text, assets.as_ref());
+    let assets = Remembered { assets, files: Mutex::default(), again: false };
     Ok(Input { name, stem, parsed, assets, strict: reading.strict })
 }
 
@@ -67,13 +93,19 @@ pub fn file_of(scene: &Path) -> Option<&Path> {
 }
 
 impl Input {
-    /// Compiles the description as it is now.
+    /// Keeps the scene's files in memory, for it will be compiled more than once.
+    pub fn remember_files(&mut self) {
+        self.assets.again = true;
+    }
+
+    /// Compiles the description as it is now, at `time` in seconds. Files are read the first time only: a scene has the same
+    /// textures in all its frames.
     ///
     /// # Errors
     /// Every fault of text and meaning.
-    pub fn compile(&self) -> Result<Compiled, Failure> {
-        let options = CompileOptions { strict: self.strict, ..CompileOptions::default() };
-        self.parsed.compile(self.assets.as_ref(), &options).map_err(|e| Failure::Scene(e.faults))
+    pub fn compile(&self, time: f64) -> Result<Compiled, Failure> {
+        let options = CompileOptions { strict: self.strict, time };
+        self.parsed.compile(&self.assets, &options).map_err(|e| Failure::Scene(e.faults))
     }
 }
 
