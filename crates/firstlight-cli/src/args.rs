@@ -130,7 +130,7 @@ pub struct RenderArgs {
     pub time: Option<f64>,
     /// Renders every frame from A to B, both included; frame n is the moment n / fps, with the scene's fps. Each is a file
     /// of its own: name.png becomes name.0001.png, and the last row of # in a name says where the number stands and with
-    /// how many digits at least
+    /// how many digits at least [default: one picture, of the moment that --time says]
     #[arg(long, value_name = "A..B", value_parser = frames, conflicts_with = "time", help_heading = "Time")]
     pub frames: Option<Frames>,
 

@@ -2,6 +2,7 @@
 //! program's picture. Everything here goes through the public interface.
 
 mod analytic;
+mod cameras;
 mod checker;
 mod determinism;
 mod deviations;
