@@ -21,7 +21,7 @@ Exit codes:
   0    done
   1    could not be done: the scene, a file or the disk
   2    wrong usage
-  130  interrupted; no output is left
+  130  interrupted; no output is left, but the frames that were done
 
 Environment:
   NO_COLOR  when set and not empty: no colours on the terminal";

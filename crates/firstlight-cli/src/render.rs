@@ -278,6 +278,14 @@ impl<'a> Plan<'a> {
         let Some(Frames { first, last }) = self.frames else {
             return Ok(vec![Moment { time: self.time, outputs: outputs.to_vec() }]);
         };
+        for output in outputs {
+            if let Target::File(path) = &output.target
+                && path.metadata().is_ok_and(|meta| !meta.is_file() && !meta.is_dir())
+            {
+                let path = shown(path);
+                return Err(Failure::Usage(format!("--frames writes a file for each frame, and {path} is not one")));
+            }
+        }
         // Compiling refuses a rate that is none
         let fps = Some(input.parsed.desc.render.fps).filter(|fps| *fps > 0.0).unwrap_or(1.0);
         let mut seen = HashSet::new();

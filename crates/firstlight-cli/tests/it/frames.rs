@@ -53,6 +53,8 @@ fn frames_and_outputs_that_cannot_be_are_wrong_usage() {
     let folder = moving();
     for (options, words) in [
         ("--frames 0..1 -o -", "--frames writes a file for each frame, and -o - is not one"),
+        #[cfg(unix)]
+        ("--frames 0..1 -o /dev/null --format png", "and /dev/null is not one"),
         ("--frames 0..1 --time 1 -o a.png", "cannot be used with"),
         ("--frames 2..1 -o a.png", "the last frame, 1, comes before the first, 2"),
         ("--frames=-1..1 -o a.png", "two whole numbers A..B from 0 to 9999999 are needed"),

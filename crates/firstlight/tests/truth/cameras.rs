@@ -8,8 +8,7 @@ use firstlight::*;
 fn film(text: &str, crop: Option<Window>) -> Image {
     let parsed = SceneDesc::parse("scene.toml", text.as_bytes(), &NoAssets);
     let scene = parsed.compile(&NoAssets, &CompileOptions::default()).unwrap_or_else(|e| panic!("{e}")).scene;
-    let mut settings = RenderSettings::default();
-    settings.crop = crop;
+    let settings = RenderSettings { crop, ..RenderSettings::default() };
     match render(&scene, &settings, &|_, _| ControlFlow::Continue(())) {
         ControlFlow::Continue((film, _)) => film.develop(),
         ControlFlow::Break(()) => unreachable!("nothing stops this render"),
