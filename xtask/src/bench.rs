@@ -177,14 +177,14 @@ fn page(options: &Options, ways: &[Way], samples: u64, program: &Program) -> Str
     page
 }
 
-fn median(seconds: &[f64]) -> f64 {
+pub(crate) fn median(seconds: &[f64]) -> f64 {
     let mut sorted = seconds.to_vec();
     sorted.sort_by(f64::total_cmp);
     let half = sorted.len() / 2;
     if sorted.len() % 2 == 1 { sorted[half] } else { (sorted[half - 1] + sorted[half]) * 0.5 }
 }
 
-fn processor() -> String {
+pub(crate) fn processor() -> String {
     let cores = std::thread::available_parallelism().map_or(1, NonZeroUsize::get);
     let text = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
     let model = text.lines().find_map(|line| line.strip_prefix("model name")?.split_once(':').map(|(_, m)| m.trim()));
@@ -192,7 +192,7 @@ fn processor() -> String {
     format!("{}, {cores} cores, {best}", model.unwrap_or(std::env::consts::ARCH))
 }
 
-fn commit() -> String {
+pub(crate) fn commit() -> String {
     let output = Command::new("git").args(["describe", "--always", "--dirty"]).current_dir(root()).output();
     output.map(|o| String::from_utf8_lossy(&o.stdout).trim().to_owned()).unwrap_or_default()
 }

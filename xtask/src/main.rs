@@ -2,7 +2,9 @@
 
 mod bench;
 mod generate;
+mod models;
 mod pictures;
+mod rays;
 mod test;
 mod verify;
 
@@ -36,6 +38,11 @@ enum Task {
     },
     /// Measures config 11 and writes a page under docs/benchmarks.
     Bench(bench::Options),
+    /// Measures rays through meshes, against Embree where it is installed, and writes a page under docs/benchmarks.
+    Rays(rays::Options),
+    /// Measures whole processes from a mesh file to a picture, against F3D and Mitsuba where a Python has them, and writes a
+    /// page under docs/benchmarks.
+    Models(models::Options),
     /// Runs the tests that take long: more scenes, more rays.
     Verify {
         /// Random scenes for the comparison of the renderers.
@@ -53,6 +60,8 @@ fn main() -> ExitCode {
         Task::Generate { check } => generate::run(check),
         Task::Pictures { filter } => pictures::run(filter.as_deref()),
         Task::Bench(options) => bench::run(&options),
+        Task::Rays(options) => rays::run(&options),
+        Task::Models(options) => models::run(&options),
         Task::Verify { scenes } => verify::run(scenes),
     };
     match outcome {

@@ -41,7 +41,9 @@ fn picture(name: &str, text: &[u8], assets: &dyn Assets, size: Option<u32>) -> O
     if let Some(size) = size {
         (parsed.desc.render.width, parsed.desc.render.height) = (size, size);
     }
-    let compiled = parsed.compile(assets, &CompileOptions { strict: true }).map_err(|e| e.to_string())?;
+    let compiled = parsed
+        .compile(assets, &CompileOptions { strict: true, ..CompileOptions::default() })
+        .map_err(|e| e.to_string())?;
     let (scene, settings) = (&compiled.scene, RenderSettings::default());
     let ControlFlow::Continue((film, _)) = render(scene, &settings, &|_, _| ControlFlow::Continue(())) else {
         return Err("stopped".into());

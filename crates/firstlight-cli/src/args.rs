@@ -21,7 +21,7 @@ Exit codes:
   0    done
   1    could not be done: the scene, a file or the disk
   2    wrong usage
-  130  interrupted; no output is left
+  130  interrupted; no output is left, but the frames that were done
 
 Environment:
   NO_COLOR  when set and not empty: no colours on the terminal";
@@ -52,6 +52,8 @@ Examples:
       the built-in scene config11, to config11.png
   firstlight render room.toml -o room.png -o room.exr
       one rendering, two files
+  firstlight render bunny.ply --smooth 40
+      a model by itself: a camera and a light are found for it
   firstlight render room.toml --width 320 --aa 1 --samples 16
       a quick look, in the scene's own aspect ratio
   firstlight render room.toml --crop 400,300,64,64 -o detail.png
@@ -60,13 +62,15 @@ Examples:
       to another program
   generate-scene | firstlight render - -o scene.png
       from another program
+  firstlight render room.toml --frames 0..47 -o turn_###.exr
+      two seconds at 24 frames in each, turn_000.exr to turn_047.exr
   firstlight render room.toml --stats=room.json --quiet
       what it took, for another program to read";
 
 /// Where a scene comes from.
 #[derive(Args, Debug)]
 pub struct SceneArgs {
-    /// A scene file (.toml, .json, or a course file .txt), the name of a built-in scene such as config23 (see `firstlight
+    /// A scene file (.toml, .json, or a course file .txt), a model (.ply, .stl, .obj), the name of a built-in scene such as config23 (see `firstlight
     /// scenes`; a file of such a name is ./config23), or - for standard input
     #[arg(value_name = "SCENE", value_hint = ValueHint::FilePath)]
     pub scene: PathBuf,
@@ -84,12 +88,36 @@ pub struct ReadingArgs {
     /// none]
     #[arg(long = "allow-dir", value_name = "DIR", value_hint = ValueHint::DirPath)]
     pub allow_dir: Vec<PathBuf>,
+    /// Makes the normals of a model smooth where its faces meet at less than DEGREES, 0 to 180 [default: its own normals; flat
+    /// if it has none]
+    #[arg(long, value_name = "DEGREES", value_parser = angle, help_heading = "Models (.ply, .stl, .obj)")]
+    pub smooth: Option<f64>,
+    /// The axis of a model that points upwards [default: y]
+    #[arg(long, value_name = "AXIS", help_heading = "Models (.ply, .stl, .obj)")]
+    pub up: Option<Axis>,
+}
+
+/// An axis of a model.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Axis {
+    /// as in glTF and most models for the screen
+    Y,
+    /// as in most scans and CAD programs
+    Z,
+}
+
+/// Reads an angle in degrees.
+fn angle(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(angle) if (0.0..=180.0).contains(&angle) => Ok(angle),
+        _ => Err("an angle is a number of degrees, 0 to 180".into()),
+    }
 }
 
 /// `firstlight render`
 #[derive(Args, Debug)]
 pub struct RenderArgs {
-    /// A scene file (.toml, .json, or a course file .txt), the name of a built-in scene such as config23 (see `firstlight
+    /// A scene file (.toml, .json, or a course file .txt), a model (.ply, .stl, .obj), the name of a built-in scene such as config23 (see `firstlight
     /// scenes`; a file of such a name is ./config23), or - for standard input
     #[arg(value_name = "SCENE", value_hint = ValueHint::FilePath, default_value = "config11")]
     pub scene: PathBuf,
@@ -122,6 +150,15 @@ pub struct RenderArgs {
     /// The camera to render from, where the scene names several [default: the scene's]
     #[arg(long, value_name = "NAME", value_parser = camera, help_heading = "Picture")]
     pub camera: Option<String>,
+
+    /// The moment to render, in seconds, where the scene has keys [default: 0]
+    #[arg(long, value_name = "SECONDS", value_parser = time, allow_negative_numbers = true, help_heading = "Time")]
+    pub time: Option<f64>,
+    /// Renders every frame from A to B, both included; frame n is the moment n / fps, with the scene's fps. Each is a file
+    /// of its own: name.png becomes name.0001.png, and the last row of # in a name says where the number stands and with
+    /// how many digits at least [default: one picture, of the moment that --time says]
+    #[arg(long, value_name = "A..B", value_parser = frames, conflicts_with = "time", help_heading = "Time")]
+    pub frames: Option<Frames>,
 
     /// Antialiasing by N x N camera rays in each pixel, 1 to 64; 4 is "4X" [default: the scene's]
     #[arg(long, value_name = "N", value_parser = whole::<u32>(1, 64), help_heading = "Quality")]
@@ -166,6 +203,9 @@ pub struct CheckArgs {
 pub struct InfoArgs {
     #[command(flatten)]
     pub scene: SceneArgs,
+    /// The moment to look at, in seconds, where the scene has keys [default: 0]
+    #[arg(long, value_name = "SECONDS", value_parser = time, allow_negative_numbers = true)]
+    pub time: Option<f64>,
     /// As JSON, for another program to read
     #[arg(long)]
     pub json: bool,
@@ -240,6 +280,42 @@ fn exposure(text: &str) -> Result<f64, String> {
     }
 }
 
+/// Reads a moment in seconds.
+fn time(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(time) if (-1e9..=1e9).contains(&time) => Ok(time),
+        _ => Err("a number of seconds from -1e9 to 1e9 is needed".into()),
+    }
+}
+
+/// The numbers of frames, both ends included.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Frames {
+    /// The first.
+    pub first: u32,
+    /// The last, not before the first.
+    pub last: u32,
+}
+
+/// No frame has a larger number.
+const MAX_FRAME: u32 = 9_999_999;
+/// Nor are there more in one run.
+const MAX_FRAMES: u32 = 100_000;
+
+/// Reads `A..B`, or one number alone.
+fn frames(text: &str) -> Result<Frames, String> {
+    let (first, last) = text.split_once("..").unwrap_or((text, text));
+    let number = |part: &str| part.trim().parse::<u32>().ok().filter(|n| *n <= MAX_FRAME);
+    match (number(first), number(last)) {
+        (Some(first), Some(last)) if first <= last && last - first >= MAX_FRAMES => {
+            Err(format!("at most {MAX_FRAMES} frames can be rendered in one run"))
+        }
+        (Some(first), Some(last)) if first <= last => Ok(Frames { first, last }),
+        (Some(first), Some(last)) => Err(format!("the last frame, {last}, comes before the first, {first}")),
+        _ => Err(format!("two whole numbers A..B from 0 to {MAX_FRAME} are needed, as 0..47; both are rendered")),
+    }
+}
+
 /// Reads `X,Y,WIDTH,HEIGHT`. Whether the film is that large is seen once the scene is known.
 fn crop(text: &str) -> Result<Window, String> {
     let wanted = "four whole numbers X,Y,WIDTH,HEIGHT are needed, in pixels, WIDTH and HEIGHT at least 1";
@@ -290,6 +366,30 @@ mod tests {
         for bad in ["", "1,2,3", "1,2,3,4,5", "1,2,0,4", "1,2,3,0", "-1,2,3,4", "1,2,3,x", "1.5,0,1,1"] {
             assert!(crop(bad).is_err(), "{bad}");
         }
+    }
+
+    #[test]
+    fn frames_are_two_numbers_in_their_order() {
+        assert_eq!(frames("0..47"), Ok(Frames { first: 0, last: 47 }));
+        assert_eq!(frames("7..7"), frames("7"));
+        for bad in [
+            "",
+            "..",
+            "1..",
+            "..2",
+            "2..1",
+            "-1..2",
+            "1..2..3",
+            "1...2",
+            "1..=2",
+            "0..10000000",
+            "0..100000",
+            "a..b",
+            "1.5..2",
+        ] {
+            assert!(frames(bad).is_err(), "{bad}");
+        }
+        assert!(time("-0.5").is_ok() && time("inf").is_err() && time("nan").is_err() && time("2e9").is_err());
     }
 
     #[test]

@@ -12,7 +12,7 @@ use crate::{input, output};
 /// The scene cannot be had, or has faults.
 pub fn run(args: &CheckArgs) -> Result<(), Failure> {
     let input = input::read(&args.scene.scene, &args.scene.reading)?;
-    let compiled = input.compile()?;
+    let compiled = input.compile(0.0, false)?;
     show_diagnostics(&compiled.warnings);
     // As much of the output as the text alone says
     if let Some(path) = &input.parsed.output {

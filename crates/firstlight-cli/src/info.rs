@@ -1,12 +1,13 @@
 //! `firstlight info`: what a scene holds.
 
 use std::fmt::Write;
+use std::ops::ControlFlow;
 
-use firstlight::{DisplayEncoding, Scene, SceneDesc};
-use serde_json::{Value, json};
+use firstlight::{DisplayEncoding, Frame, Projection, Scene, SceneDesc, read_mesh};
+use serde_json::{Map, Value, json};
 
 use crate::args::InfoArgs;
-use crate::input;
+use crate::input::{self, Input};
 use crate::report::{Failure, answer, show_diagnostics};
 
 /// Says what a scene holds.
@@ -15,10 +16,94 @@ use crate::report::{Failure, answer, show_diagnostics};
 /// The scene cannot be had, or has faults.
 pub fn run(args: &InfoArgs) -> Result<(), Failure> {
     let input = input::read(&args.scene.scene, &args.scene.reading)?;
-    let compiled = input.compile()?;
+    if input.is_model {
+        return answer_model(&input, args);
+    }
+    let compiled = input.compile(args.time.unwrap_or(0.0), false)?;
     show_diagnostics(&compiled.warnings);
     let info = gather(&input.name, &input.parsed.desc, &compiled.scene);
     answer(&if args.json { format!("{info:#}\n") } else { text(&info) })
+}
+
+/// Says what a model holds.
+fn answer_model(input: &Input, args: &InfoArgs) -> Result<(), Failure> {
+    if args.time.is_some() {
+        return Err(Failure::Usage(format!("--time has no meaning for a model, and {} is one", input.name)));
+    }
+    let bytes = input.model_bytes()?;
+    let mesh = read_mesh(&input.name, &bytes, &|_, _| ControlFlow::Continue(()))
+        .map_err(|error| Failure::Work(error.to_string()))?;
+    let report = mesh.report();
+    let parts = list_of(
+        &mesh.parts,
+        |part| json!({ "object": part.object, "group": part.group, "triangles": part.triangles.len() }),
+    );
+    let info = json!({
+        "model": input.name,
+        "file_bytes": bytes.len(),
+        "vertices": report.vertices,
+        "positions": report.positions,
+        "triangles": report.triangles,
+        "bounds": report.bounds.map(|[min, max]| json!({ "min": min.map(shortest), "max": max.map(shortest) })),
+        "closed": report.is_closed(),
+        "boundary_edges": report.boundary_edges,
+        "non_manifold_edges": report.non_manifold_edges,
+        "turned_edges": report.turned_edges,
+        "degenerate_triangles": report.degenerate_triangles,
+        "duplicate_triangles": report.duplicate_triangles,
+        "non_finite_triangles": report.non_finite_triangles,
+        "non_finite_vertices": report.non_finite_vertices,
+        "unused_vertices": report.unused_vertices,
+        "normals": report.has_normals,
+        "bad_normals": report.bad_normals,
+        "uv_sets": report.uv_sets,
+        "colors": report.has_colors,
+        "radii": !mesh.radii.is_empty(),
+        "parts": parts,
+        "materials": mesh.materials,
+        "material_files": mesh.material_files,
+        "notes": mesh.notes,
+        "memory_bytes": report.bytes,
+    });
+    answer(&if args.json { format!("{info:#}\n") } else { model_text(&info) })
+}
+
+/// The same for people.
+fn model_text(info: &Value) -> String {
+    let mut text = String::new();
+    let mut line = |name: &str, value: String| {
+        // A String takes every write
+        let _ = writeln!(text, "{name:<10} {value}");
+    };
+    let yes = |value: &Value, yes: &str, no: &str| (if *value == true { yes } else { no }).to_owned();
+    line("model", word(&info["model"]));
+    line("file", format!("{} bytes", info["file_bytes"]));
+    line("vertices", format!("{}, at {} positions", info["vertices"], info["positions"]));
+    line("triangles", info["triangles"].to_string());
+    match &info["bounds"] {
+        Value::Null => line("bounds", "none: there are no finite vertices".into()),
+        bounds => line("bounds", pairs(bounds)),
+    }
+    let open = ["boundary_edges", "non_manifold_edges", "turned_edges"].map(|key| info[key].to_string());
+    let edges = format!("{} on a boundary, {} of more than two faces, {} turned", open[0], open[1], open[2]);
+    line("surface", yes(&info["closed"], "closed", "not closed"));
+    line("edges", edges);
+    let faces =
+        ["degenerate_triangles", "duplicate_triangles", "non_finite_triangles"].map(|key| info[key].to_string());
+    line("faces", format!("{} without area, {} twice, {} not finite", faces[0], faces[1], faces[2]));
+    line("", format!("{} vertices not finite, {} unused", info["non_finite_vertices"], info["unused_vertices"]));
+    let bad = info["bad_normals"].as_u64().filter(|bad| *bad > 0).map(|bad| format!(", {bad} of no direction"));
+    line("normals", yes(&info["normals"], "given", "none: flat, unless smoothed") + &bad.unwrap_or_default());
+    line("uv", format!("{} sets", info["uv_sets"]));
+    line("colors", yes(&info["colors"], "given", "none"));
+    line("ids", "1 surface; a triangle's number is that of the file".into());
+    for group in ["parts", "materials", "material_files", "notes"] {
+        for thing in info[group].as_array().into_iter().flatten() {
+            line(group, word(thing));
+        }
+    }
+    line("in memory", format!("{} bytes, without the tree", info["memory_bytes"]));
+    text
 }
 
 /// Everything there is to say, as JSON; the text is made from it.
@@ -40,9 +125,17 @@ fn gather(name: &str, desc: &SceneDesc, scene: &Scene) -> Value {
             "transparent": render.transparent,
             "display": display,
         },
-        "camera": camera(desc),
+        "time": scene.time(),
+        "camera": camera(desc, scene),
         "cameras": desc.cameras.iter().map(|(name, _)| name).collect::<Vec<_>>(),
-        "shapes": { "sphere": summary.spheres, "parallelogram": summary.parallelograms },
+        "shapes": summary.shapes.iter().map(|(kind, count)| ((*kind).to_owned(), json!(count))).collect::<Map<_, _>>(),
+        "groups": list_of(&summary.groups, |(name, shapes)| json!({ "name": name, "shapes": shapes })),
+        "surfaces": summary.surfaces,
+        "placed": summary.placed,
+        "triangles": summary.triangles,
+        "points": summary.points,
+        "geometry_bytes": summary.geometry_bytes[0],
+        "tree_bytes": summary.geometry_bytes[1],
         "lights": list_of(&summary.lights, |(kind, name, samples)| {
             json!({ "kind": kind, "name": name, "samples": samples })
         }),
@@ -63,18 +156,31 @@ fn shortest(n: f32) -> f64 {
 }
 
 /// The camera that renders, or null where there is none.
-fn camera(desc: &SceneDesc) -> Value {
+fn camera(desc: &SceneDesc, scene: &Scene) -> Value {
     let named = |name: &String| desc.cameras.iter().find(|(known, _)| known == name);
     let chosen = desc.render.camera.as_ref().map_or(desc.cameras.first(), named);
     chosen.map_or(Value::Null, |(name, camera)| {
         let mut value =
             json!({ "name": name, "position": camera.position, "look_at": camera.look_at, "up": camera.up });
-        match camera.focal_length_mm {
-            Some(length) => {
+        if camera.transform.is_some() {
+            // Where that has brought it
+            let Frame { position, forward, up, .. } = scene.camera().frame();
+            let list = |v: &firstlight::Vec3| json!(v.to_array().map(shortest));
+            value = json!({ "name": name, "position": list(position), "forward": list(forward), "up": list(up) });
+        }
+        match (camera.projection, camera.focal_length_mm) {
+            (Projection::Orthographic, _) => {
+                value["projection"] = json!(camera.projection.name());
+                value["height"] = json!(camera.height);
+            }
+            (Projection::Perspective, Some(length)) => {
                 value["focal_length_mm"] = json!(length);
                 value["sensor_height_mm"] = json!(camera.sensor_height_mm.unwrap_or(24.0));
             }
-            None => value["fov_y_deg"] = json!(camera.fov_y_deg.unwrap_or(45.0)),
+            (Projection::Perspective, None) => value["fov_y_deg"] = json!(camera.fov_y_deg.unwrap_or(45.0)),
+        }
+        if camera.shift != [0.0; 2] {
+            value["shift"] = json!(camera.shift);
         }
         value
     })
@@ -93,6 +199,9 @@ fn text(info: &Value) -> String {
     line("hash", word(&info["hash"]));
     line("picture", format!("{} x {} pixels, {n} x {n} camera rays in each", picture["width"], picture["height"]));
     line("display", pairs(&picture["display"]));
+    if let Some(time) = info["time"].as_f64() {
+        line("time", format!("{time} s; the scene changes with time"));
+    }
     match &info["camera"] {
         Value::Null => line("camera", "none".into()),
         camera => line("camera", pairs(camera)),
@@ -101,7 +210,17 @@ fn text(info: &Value) -> String {
     if others > 0 {
         line("", format!("and {others} more: --camera chooses from {}", list(&info["cameras"])));
     }
-    line("shapes", pairs(&info["shapes"]));
+    match pairs(&info["shapes"]) {
+        shapes if shapes.is_empty() => line("shapes", "none".into()),
+        shapes => line("shapes", shapes),
+    }
+    for group in info["groups"].as_array().into_iter().flatten() {
+        line("group", pairs(group));
+    }
+    line("surfaces", format!("{} ids of shapes, {} things placed", info["surfaces"], info["placed"]));
+    if info["triangles"] != 0 || info["points"] != 0 {
+        line("geometry", format!("{} triangles, {} points", info["triangles"], info["points"]));
+    }
     for group in ["lights", "materials", "textures"] {
         let things = info[group].as_array().map(Vec::as_slice).unwrap_or_default();
         line(group, things.len().to_string());
@@ -109,7 +228,8 @@ fn text(info: &Value) -> String {
             line("", pairs(thing));
         }
     }
-    line("in memory", format!("{} bytes of textures", info["texture_bytes"]));
+    let (textures, geometry, trees) = (&info["texture_bytes"], &info["geometry_bytes"], &info["tree_bytes"]);
+    line("in memory", format!("{textures} bytes of textures, {geometry} of meshes and points, {trees} of trees"));
     match &info["bounds"] {
         Value::Null => line("bounds", "none: there are no shapes".into()),
         bounds => line("bounds", pairs(bounds)),

@@ -1,12 +1,18 @@
 //! Where a scene comes from: a file, standard input, or the program itself.
 
+use std::collections::HashMap;
 use std::fs::File;
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
+use std::sync::Mutex;
 
-use firstlight::{Assets, CompileOptions, Compiled, FolderAssets, NoAssets, Parsed, SceneDesc, builtin_scenes};
+use firstlight::{
+    AssetError, Assets, CompileOptions, Compiled, FolderAssets, ModelSettings, NoAssets, Parsed, SceneDesc, UpAxis,
+    builtin_scenes, is_point_set,
+};
 
-use crate::args::ReadingArgs;
+use crate::args::{Axis, ReadingArgs};
+use crate::progress::loading;
 use crate::report::{Failure, shown};
 use crate::scenes;
 
@@ -21,8 +27,31 @@ pub struct Input {
     pub stem: PathBuf,
     /// The description, and the faults of its text.
     pub parsed: Parsed,
-    assets: Box<dyn Assets>,
+    /// Whether it is a model by itself, for which a camera and a light are found.
+    pub is_model: bool,
+    assets: Remembered,
     strict: bool,
+}
+
+/// Files that are kept once they were read.
+struct Remembered {
+    assets: Box<dyn Assets>,
+    files: Mutex<HashMap<String, Result<Vec<u8>, AssetError>>>,
+    /// Whether they will be asked for again.
+    again: bool,
+}
+
+impl Assets for Remembered {
+    fn read(&self, path: &str, limit: u64) -> Result<Vec<u8>, AssetError> {
+        let Some(mut files) = self.files.lock().ok().filter(|_| self.again) else {
+            return self.assets.read(path, limit);
+        };
+        let read = files.entry(path.to_owned()).or_insert_with(|| self.assets.read(path, limit));
+        match read {
+            Ok(bytes) if bytes.len() as u64 > limit => Err(AssetError::TooLarge { size: bytes.len() as u64, limit }),
+            read => read.clone(),
+        }
+    }
 }
 
 /// Reads the scene that `scene` names.
@@ -30,6 +59,15 @@ pub struct Input {
 /// # Errors
 /// Its text cannot be had. Faults inside the text are kept for [`Input::compile`].
 pub fn read(scene: &Path, reading: &ReadingArgs) -> Result<Input, Failure> {
+    if is_model(scene) {
+        return read_model(scene, reading);
+    }
+    for (option, said) in [("--smooth", reading.smooth.is_some()), ("--up", reading.up.is_some())] {
+        if said {
+            let scene = shown(scene);
+            return Err(Failure::Usage(format!("{option} is for models, and {scene} is none (.ply, .stl, .obj)")));
+        }
+    }
     let (name, stem, text, folder) = if scene == "-" {
         let text = read_limited(io::stdin().lock()).map_err(|why| Failure::Work(format!("standard input: {why}")))?;
         // A name tells JSON from TOML; no TOML begins with a brace. A byte order mark is no part of the text
@@ -57,7 +95,44 @@ pub fn read(scene: &Path, reading: &ReadingArgs) -> Result<Input, Failure> {
     };
 
     let parsed = SceneDesc::parse(&name, &text, assets.as_ref());
-    Ok(Input { name, stem, parsed, assets, strict: reading.strict })
+    let assets = Remembered { assets, files: Mutex::default(), again: false };
+    Ok(Input { name, stem, parsed, is_model: false, assets, strict: reading.strict })
+}
+
+/// Whether `scene` names a model, by its ending.
+fn is_model(scene: &Path) -> bool {
+    let ending = scene.extension().map(|ending| ending.to_string_lossy().to_ascii_lowercase());
+    matches!(ending.as_deref(), Some("ply" | "stl" | "obj"))
+}
+
+/// A scene around a model.
+fn read_model(path: &Path, reading: &ReadingArgs) -> Result<Input, Failure> {
+    let work = |why: String| Failure::Work(format!("{}: {why}", shown(path)));
+    // Enough of it to tell points from faces
+    let mut head = Vec::new();
+    match File::open(path) {
+        Err(e) if e.kind() == io::ErrorKind::NotFound => return Err(work("no such file".into())),
+        Err(e) => return Err(work(e.to_string())),
+        Ok(file) if file.metadata().is_ok_and(|meta| meta.is_dir()) => return Err(work("is a folder".into())),
+        Ok(file) => file.take(1 << 16).read_to_end(&mut head).map_err(|e| work(e.to_string()))?,
+    };
+    let folder = path.parent().map(Path::to_path_buf).unwrap_or_default();
+    let assets = FolderAssets::new(&folder, &reading.allow_dir)
+        .map_err(|(path, e)| Failure::Work(format!("--allow-dir: {}: {e}", shown(&path))))?;
+    let settings = ModelSettings {
+        smooth_deg: reading.smooth,
+        up: if reading.up == Some(Axis::Z) { UpAxis::Z } else { UpAxis::Y },
+        points: is_point_set(&head),
+    };
+    let file = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    Ok(Input {
+        name: path.display().to_string(),
+        stem: path.file_stem().map_or_else(|| PathBuf::from("model"), PathBuf::from),
+        parsed: SceneDesc::of_model(&file, &settings).into(),
+        is_model: true,
+        assets: Remembered { assets: Box::new(assets), files: Mutex::default(), again: false },
+        strict: reading.strict,
+    })
 }
 
 /// The file that `scene` names; none for standard input and built-in scenes.
@@ -67,13 +142,29 @@ pub fn file_of(scene: &Path) -> Option<&Path> {
 }
 
 impl Input {
-    /// Compiles the description as it is now.
+    /// The bytes of the model's own file.
+    ///
+    /// # Errors
+    /// It cannot be read any more.
+    pub fn model_bytes(&self) -> Result<Vec<u8>, Failure> {
+        let file = Path::new(&self.name).file_name().unwrap_or_default().to_string_lossy().into_owned();
+        self.assets.read(&file, u64::MAX).map_err(|why| Failure::Work(format!("{}: {why}", self.name)))
+    }
+
+    /// Keeps the scene's files in memory, for it will be compiled more than once.
+    pub fn remember_files(&mut self) {
+        self.assets.again = true;
+    }
+
+    /// Compiles the description as it is now, at `time` in seconds. Files are read the first time only: a scene has the same
+    /// textures in all its frames. What takes its time is told, unless `quiet`.
     ///
     /// # Errors
     /// Every fault of text and meaning.
-    pub fn compile(&self) -> Result<Compiled, Failure> {
-        let options = CompileOptions { strict: self.strict };
-        self.parsed.compile(self.assets.as_ref(), &options).map_err(|e| Failure::Scene(e.faults))
+    pub fn compile(&self, time: f64, quiet: bool) -> Result<Compiled, Failure> {
+        let progress = (!quiet).then(loading);
+        let options = CompileOptions { strict: self.strict, time, complete: self.is_model, progress };
+        self.parsed.compile(&self.assets, &options).map_err(|e| Failure::Scene(e.faults))
     }
 }
 

@@ -126,6 +126,36 @@ fn failed(e: ImageError) -> Failure {
     Failure::Work(e.to_string())
 }
 
+impl Output {
+    /// Where the frame of that number goes.
+    pub fn of_frame(&self, frame: u32) -> Output {
+        let target = match &self.target {
+            Target::Stdout => Target::Stdout,
+            Target::File(path) => Target::File(with_frame(path, frame)),
+        };
+        Output { target, format: self.format }
+    }
+}
+
+/// The path with the number of a frame in its name: in place of the last row of `#`, with at least as many digits, else
+/// before the ending with at least four.
+fn with_frame(path: &Path, frame: u32) -> PathBuf {
+    let name = path.file_name().unwrap_or_default();
+    if let Some(name) = name.to_str()
+        && let Some(end) = name.rfind('#').map(|last| last + 1)
+    {
+        let start = name[..end].trim_end_matches('#').len();
+        return path.with_file_name(format!("{}{frame:0width$}{}", &name[..start], &name[end..], width = end - start));
+    }
+    let mut numbered = path.file_stem().unwrap_or_default().to_os_string();
+    numbered.push(format!(".{frame:04}"));
+    if let Some(ending) = path.extension() {
+        numbered.push(".");
+        numbered.push(ending);
+    }
+    path.with_file_name(numbered)
+}
+
 /// What else there is to say of a file that was written: nothing, for a plain file.
 fn aside(path: &Path, written: Written) -> String {
     if written == Written::Direct {
@@ -249,5 +279,26 @@ pub fn with_bits(format: Format, bits: Option<Bits>) -> Format {
         (Format::Png8, Some(Bits::Sixteen)) => Format::Png16,
         (Format::Png16, Some(Bits::Eight)) => Format::Png8,
         (format, _) => format,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_frame_has_its_number_in_its_name() {
+        for (path, frame, expected) in [
+            ("a.png", 1, "a.0001.png"),
+            ("b/a.tar.png", 12345, "b/a.tar.12345.png"),
+            ("out", 7, "out.0007"),
+            ("a_###.exr", 7, "a_007.exr"),
+            ("a_#.exr", 123, "a_123.exr"),
+            ("#a##b.png", 5, "#a05b.png"),
+            ("x#/a.png", 0, "x#/a.0000.png"),
+            ("a.##", 3, "a.03"),
+        ] {
+            assert_eq!(with_frame(Path::new(path), frame), Path::new(expected), "{path}");
+        }
     }
 }

@@ -1,13 +1,41 @@
 //! How far a render is: a bar on a terminal, a line now and then elsewhere.
 
 use std::io::{self, IsTerminal};
-use std::sync::Mutex;
 use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
+use firstlight::{CompileStage, OnCompile};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
 use crate::report::say;
+
+/// Tells standard error what is read and built, where that takes more than a moment.
+pub fn loading() -> OnCompile {
+    let last = Mutex::new(Instant::now());
+    OnCompile(Arc::new(move |stage| {
+        // Who finds it taken goes on working
+        let Ok(mut last) = last.try_lock() else { return };
+        match stage {
+            CompileStage::Reading { file, done, total } if last.elapsed() >= WORTH_A_LINE && done < total => {
+                say(format_args!("reading {}: {} %", printable(file), done.saturating_mul(100) / total.max(1)));
+            }
+            CompileStage::Building { triangles } if triangles >= MANY_TRIANGLES => {
+                say(format_args!("building the tree of {triangles} triangles"));
+            }
+            _ => return,
+        }
+        *last = Instant::now();
+    }))
+}
+
+/// So many triangles take a second.
+const MANY_TRIANGLES: u64 = 4_000_000;
+
+/// A name that cannot disturb a terminal.
+fn printable(name: &str) -> String {
+    name.chars().map(|c| if c.is_control() { '\u{fffd}' } else { c }).collect()
+}
 
 /// Between two lines.
 const PAUSE: Duration = Duration::from_secs(2);
@@ -17,6 +45,11 @@ const WORTH_A_LINE: Duration = Duration::from_secs(1);
 /// Tells standard error how far a render is.
 pub struct Progress {
     started: Instant,
+    /// Pixels of one frame.
+    frame: u64,
+    frames: u64,
+    /// Pixels of the frames before this one.
+    before: AtomicU64,
     /// Pixels; calls from several threads may come out of order, and a bar that goes back frightens.
     most: AtomicU64,
     kind: Kind,
@@ -30,14 +63,14 @@ enum Kind {
 }
 
 impl Progress {
-    /// Begins now, for `all` pixels.
-    pub fn begin(all: u64, quiet: bool) -> Self {
+    /// Begins now, for `frames` pictures of `frame` pixels each.
+    pub fn begin(frame: u64, frames: u64, quiet: bool) -> Self {
         let started = Instant::now();
         let kind = if quiet {
             Kind::Silent
         } else if io::stderr().is_terminal() {
-            let bar = ProgressBar::with_draw_target(Some(all), ProgressDrawTarget::stderr());
-            let style = ProgressStyle::with_template("rendering {wide_bar} {percent:>3} %  {eta} left");
+            let bar = ProgressBar::with_draw_target(Some(frame * frames), ProgressDrawTarget::stderr());
+            let style = ProgressStyle::with_template("rendering {msg}{wide_bar} {percent:>3} %  {eta} left");
             bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
             // The time left goes on while a slow tile is at work
             bar.enable_steady_tick(Duration::from_millis(250));
@@ -45,11 +78,21 @@ impl Progress {
         } else {
             Kind::Lines(Mutex::new(started))
         };
-        Self { started, most: AtomicU64::new(0), kind }
+        Self { started, frame, frames, before: AtomicU64::new(0), most: AtomicU64::new(0), kind }
     }
 
-    /// `done` of `all` pixels are there. For any thread, often.
-    pub fn update(&self, done: u64, all: u64) {
+    /// Frame `index` of all, counted from 0, is next.
+    pub fn frame(&self, index: u64) {
+        self.before.store(index * self.frame, Ordering::Relaxed);
+        if let (Kind::Bar(bar), 2..) = (&self.kind, self.frames) {
+            bar.set_message(format!("{} of {} ", index + 1, self.frames));
+        }
+    }
+
+    /// `done` pixels of this frame are there. For any thread, often.
+    pub fn update(&self, done: u64) {
+        let all = self.frame * self.frames;
+        let done = self.before.load(Ordering::Relaxed) + done;
         let done = self.most.fetch_max(done, Ordering::Relaxed).max(done);
         match &self.kind {
             Kind::Silent => {}
@@ -65,17 +108,34 @@ impl Progress {
         }
     }
 
-    /// The render is over. `size`: columns and rows, if it was not stopped.
-    pub fn finish(self, size: Option<(u32, u32)>) {
-        match self.kind {
+    /// Runs `f`, which may say something, without the bar in its way.
+    pub fn aside<R>(&self, f: impl FnOnce() -> R) -> R {
+        match &self.kind {
+            Kind::Bar(bar) => bar.suspend(f),
+            Kind::Silent | Kind::Lines(_) => f(),
+        }
+    }
+
+    /// All pictures of that many columns and rows are there.
+    pub fn finish(&self, width: u32, height: u32) {
+        let took = self.started.elapsed();
+        match &self.kind {
             Kind::Silent => {}
             Kind::Bar(bar) => bar.finish_and_clear(),
+            Kind::Lines(_) if took < WORTH_A_LINE => {}
             Kind::Lines(_) => {
-                let took = self.started.elapsed();
-                if let Some((width, height)) = size.filter(|_| took >= WORTH_A_LINE) {
-                    say(format_args!("rendered {width} x {height} pixels in {}", words(took)));
-                }
+                let frames = if self.frames > 1 { format!("{} frames of ", self.frames) } else { String::new() };
+                say(format_args!("rendered {frames}{width} x {height} pixels in {}", words(took)));
             }
+        }
+    }
+}
+
+/// However it ends, no bar stays behind.
+impl Drop for Progress {
+    fn drop(&mut self) {
+        if let Kind::Bar(bar) = &self.kind {
+            bar.finish_and_clear();
         }
     }
 }

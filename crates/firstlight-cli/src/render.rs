@@ -1,13 +1,14 @@
 //! `firstlight render`: from a scene to picture files.
 
+use std::collections::HashSet;
 use std::num::NonZeroUsize;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-use firstlight::{Format, LightDesc, RenderSettings, SampleSet, SceneDesc, SimdLevel, Window};
+use firstlight::{Diagnostic, Format, LightDesc, RenderSettings, RenderStats, SampleSet, SceneDesc, SimdLevel, Window};
 
-use crate::args::{Bits, RenderArgs};
+use crate::args::{Bits, Frames, RenderArgs};
 use crate::input::{self, Input};
 use crate::interrupt::Watch;
 use crate::output::{self, Output, Ready, Staged, Target};
@@ -29,6 +30,8 @@ struct Plan<'a> {
     stats: StatsPlan,
     settings: RenderSettings,
     overrides: Overrides<'a>,
+    time: f64,
+    frames: Option<Frames>,
     quiet: bool,
 }
 
@@ -69,57 +72,44 @@ pub fn run(args: &RenderArgs) -> Result<(), Failure> {
     let (input, parse) = timed(|| input::read(plan.scene, &args.reading));
     let mut input = input?;
     let (outputs, settings) = plan.join(&mut input)?;
+    let moments = plan.moments(&input, &outputs)?;
+    if moments.len() > 1 {
+        input.remember_files();
+    }
 
-    // See whether the outputs can be written before any work is done for them; this may make a file for a moment
+    // See whether the numbers can be written, and the picture or the first of them, before any work is done for them; this
+    // may make a file for a moment
     let watch = Watch::begin();
-    let ready: Vec<Ready> = outputs.iter().map(|output| output.target.ready()).collect::<Result<_, _>>()?;
+    let mut ready = Some(moments[0].ready()?);
     let stats_file = plan.stats.target().map(Target::ready).transpose()?;
     watch.check()?;
     drop(watch);
 
-    // Compile
-    let (compiled, compile) = timed(|| input.compile());
-    let compiled = compiled?;
-    show_diagnostics(&compiled.warnings);
-    let scene = &compiled.scene;
-    settings.check(scene).map_err(Failure::Usage)?;
-    settings.check_memory(scene).map_err(Failure::Work)?;
-
-    // Render, until somebody asks to stop
-    let watch = Watch::begin();
-    let window = settings.crop.unwrap_or(Window { x: 0, y: 0, width: scene.width(), height: scene.height() });
-    let progress = Progress::begin(u64::from(window.width) * u64::from(window.height), plan.quiet);
-    let (rendered, render) = timed(|| {
-        firstlight::render(scene, &settings, &|done, all| {
-            progress.update(done, all);
-            watch.flow()
-        })
-    });
-    let ControlFlow::Continue((film, rays)) = rendered else {
-        progress.finish(None);
-        return Err(Failure::Interrupted);
-    };
-    progress.finish(Some((window.width, window.height)));
-
-    // Encode all pictures and bring them to the disk, then let them appear: files first, a reader of standard output may
-    // be gone
-    let (written, write) = timed(|| {
-        let (image, receipt) = (film.develop(), scene.receipt(&settings));
-        let encode = |output: &Output| image.encode(output.format, &scene.display(), &receipt);
-        let bytes: Vec<Vec<u8>> =
-            outputs.iter().map(encode).collect::<Result<_, _>>().map_err(|e| Failure::Work(e.to_string()))?;
-        watch.check()?;
-        let stage = ready.into_iter().zip(&bytes).map(|(ready, bytes)| ready.stage(bytes));
-        let mut staged: Vec<Staged> = stage.collect::<Result<_, _>>()?;
-        watch.check()?;
-        staged.sort_by_key(Staged::is_stdout);
-        staged.into_iter().try_for_each(|staged| staged.commit(plan.quiet))
-    });
-    written?;
+    // One moment after the other
+    let render = &input.parsed.desc.render;
+    let (x, y, width, height) = (0, 0, render.width, render.height);
+    let window = settings.crop.unwrap_or(Window { x, y, width, height });
+    let mut run = Run { plan: &plan, input: &input, settings: &settings, progress: None, warned: Vec::new() };
+    let mut took: Option<Took> = None;
+    for (index, moment) in moments.iter().enumerate() {
+        let done = match ready.take() {
+            Some(ready) => run.render(index, &moments, window, ready),
+            None => moment.ready().and_then(|ready| run.render(index, &moments, window, ready)),
+        };
+        let done = done.map_err(|failure| match failure {
+            Failure::Interrupted if index > 0 => Failure::InterruptedAfter { done: index, all: moments.len() },
+            failure => failure,
+        })?;
+        took = Some(match took {
+            Some(before) => before.and(done),
+            None => done,
+        });
+    }
 
     // Say what it took
-    let (width, height) = (window.width, window.height);
-    let stats = Stats { scene: input.name, width, height, parse, compile, render, write, rays };
+    let Some(Took { compile, render, write, rays }) = took else { return Ok(()) };
+    let (width, height, frames) = (window.width, window.height, moments.len());
+    let stats = Stats { scene: input.name, width, height, frames, parse, compile, render, write, rays };
     if let StatsPlan::Table = plan.stats {
         say(format_args!("{}", stats.to_table()));
     }
@@ -127,6 +117,111 @@ pub fn run(args: &RenderArgs) -> Result<(), Failure> {
         ready.stage(stats.to_json().as_bytes())?.commit(plan.quiet)?;
     }
     Ok(())
+}
+
+/// A moment to render, and where its pictures go.
+struct Moment {
+    /// In seconds.
+    time: f64,
+    outputs: Vec<Output>,
+}
+
+impl Moment {
+    fn ready(&self) -> Result<Vec<Ready>, Failure> {
+        self.outputs.iter().map(|output| output.target.ready()).collect()
+    }
+}
+
+/// What one moment took, or several.
+struct Took {
+    compile: Duration,
+    render: Duration,
+    write: Duration,
+    rays: RenderStats,
+}
+
+impl Took {
+    fn and(self, other: Took) -> Took {
+        let mut rays = other.rays;
+        rays.camera_rays += self.rays.camera_rays;
+        rays.shadow_rays += self.rays.shadow_rays;
+        rays.shadow_rays_skipped += self.rays.shadow_rays_skipped;
+        Took {
+            compile: self.compile + other.compile,
+            render: self.render + other.render,
+            write: self.write + other.write,
+            rays,
+        }
+    }
+}
+
+/// The rendering of one moment after the other.
+struct Run<'a> {
+    plan: &'a Plan<'a>,
+    input: &'a Input,
+    settings: &'a RenderSettings,
+    /// Once there is something to render.
+    progress: Option<Progress>,
+    /// What has been said already.
+    warned: Vec<Diagnostic>,
+}
+
+impl Run<'_> {
+    /// Compiles, renders and writes one of the moments.
+    fn render(&mut self, index: usize, moments: &[Moment], window: Window, ready: Vec<Ready>) -> Result<Took, Failure> {
+        let (plan, settings, moment) = (self.plan, self.settings, &moments[index]);
+
+        // Compile
+        let (compiled, compile) = timed(|| self.input.compile(moment.time, plan.quiet));
+        let mut compiled = compiled?;
+        compiled.warnings.retain(|warning| !self.warned.contains(warning));
+        if !compiled.warnings.is_empty() {
+            let show = || show_diagnostics(&compiled.warnings);
+            self.progress.as_ref().map_or_else(show, |progress| progress.aside(show));
+            self.warned.append(&mut compiled.warnings);
+        }
+        let scene = &compiled.scene;
+        settings.check(scene).map_err(Failure::Usage)?;
+        settings.check_memory(scene).map_err(Failure::Work)?;
+
+        // Render, until somebody asks to stop
+        let watch = Watch::begin();
+        let pixels = u64::from(window.width) * u64::from(window.height);
+        let begin = || Progress::begin(pixels, moments.len() as u64, plan.quiet);
+        let progress = &*self.progress.get_or_insert_with(begin);
+        progress.frame(index as u64);
+        let (rendered, render) = timed(|| {
+            firstlight::render(scene, settings, &|done, _| {
+                progress.update(done);
+                watch.flow()
+            })
+        });
+        let ControlFlow::Continue((film, rays)) = rendered else { return Err(Failure::Interrupted) };
+        if index + 1 == moments.len() {
+            progress.finish(window.width, window.height);
+        }
+
+        // Encode all pictures and bring them to the disk, then let them appear: files first, a reader of standard output
+        // may be gone
+        let (written, write) = timed(|| {
+            let (image, receipt) = (film.develop(), scene.receipt(settings));
+            let encode = |output: &Output| image.encode(output.format, &scene.display(), &receipt);
+            let bytes: Vec<Vec<u8>> = moment
+                .outputs
+                .iter()
+                .map(encode)
+                .collect::<Result<_, _>>()
+                .map_err(|e| Failure::Work(e.to_string()))?;
+            watch.check()?;
+            let stage = ready.into_iter().zip(&bytes).map(|(ready, bytes)| ready.stage(bytes));
+            let mut staged: Vec<Staged> = stage.collect::<Result<_, _>>()?;
+            watch.check()?;
+            staged.sort_by_key(Staged::is_stdout);
+            progress.aside(|| staged.into_iter().try_for_each(|staged| staged.commit(plan.quiet)))
+        });
+        written?;
+        Ok(Took { compile, render, write, rays })
+    }
 }
 
 fn timed<T>(f: impl FnOnce() -> T) -> (T, Duration) {
@@ -153,6 +248,12 @@ impl<'a> Plan<'a> {
             return Err(Failure::Usage(format!("--simd {name} is not to be had on this processor; it has {names}")));
         }
 
+        if args.frames.is_some() && outputs.iter().any(|output| output.target == Target::Stdout) {
+            let message =
+                "--frames writes a file for each frame, and -o - is not one; name files, or give --time instead";
+            return Err(Failure::Usage(message.into()));
+        }
+
         let mut settings = RenderSettings::default();
         settings.simd = simd;
         settings.threads = args.threads.and_then(|n| NonZeroUsize::new(n.into()));
@@ -168,7 +269,41 @@ impl<'a> Plan<'a> {
             camera: args.camera.as_deref(),
             exposure: args.exposure,
         };
-        Ok(Self { scene: &args.scene, outputs, bits: args.bits, stats, settings, overrides, quiet: args.quiet })
+        let (scene, bits, frames, quiet) = (args.scene.as_path(), args.bits, args.frames, args.quiet);
+        Ok(Self { scene, outputs, bits, stats, settings, overrides, time: args.time.unwrap_or(0.0), frames, quiet })
+    }
+
+    /// The moments to render, each with its own files.
+    fn moments(&self, input: &Input, outputs: &[Output]) -> Result<Vec<Moment>, Failure> {
+        let Some(Frames { first, last }) = self.frames else {
+            return Ok(vec![Moment { time: self.time, outputs: outputs.to_vec() }]);
+        };
+        for output in outputs {
+            if let Target::File(path) = &output.target
+                && path.metadata().is_ok_and(|meta| !meta.is_file() && !meta.is_dir())
+            {
+                let path = shown(path);
+                return Err(Failure::Usage(format!("--frames writes a file for each frame, and {path} is not one")));
+            }
+        }
+        // Compiling refuses a rate that is none
+        let fps = Some(input.parsed.desc.render.fps).filter(|fps| *fps > 0.0).unwrap_or(1.0);
+        let mut seen = HashSet::new();
+        let mut moments = Vec::new();
+        for frame in first..=last {
+            let outputs: Vec<Output> = outputs.iter().map(|output| output.of_frame(frame)).collect();
+            output::refuse_clashes(input::file_of(self.scene), &outputs, self.stats.target())?;
+            for output in &outputs {
+                if let Target::File(path) = &output.target
+                    && !seen.insert(path.clone())
+                {
+                    let path = shown(path);
+                    return Err(Failure::Usage(format!("two frames would be {path}; give the files other names")));
+                }
+            }
+            moments.push(Moment { time: f64::from(frame) / fps, outputs });
+        }
+        Ok(moments)
     }
 
     /// Brings the plan and the scene together: the description takes the overrides, and what the plan leaves open
@@ -176,7 +311,7 @@ impl<'a> Plan<'a> {
     fn join(&self, input: &mut Input) -> Result<(Vec<Output>, RenderSettings), Failure> {
         // A text with faults may lack what the options refer to: say the faults, not what follows from them
         if input.parsed.faults().iter().any(|fault| fault.severity == firstlight::Severity::Error) {
-            input.compile()?;
+            input.compile(self.time, self.quiet)?;
         }
         self.overrides.apply(&mut input.parsed.desc)?;
 

@@ -23,6 +23,13 @@ pub enum Failure {
     Scene(Vec<Diagnostic>),
     /// Stopped by Ctrl-C or by another program: exit code 130.
     Interrupted,
+    /// The same, after some of the frames: exit code 130.
+    InterruptedAfter {
+        /// Frames whose files are there.
+        done: usize,
+        /// Frames that were asked for.
+        all: usize,
+    },
 }
 
 impl Failure {
@@ -31,7 +38,7 @@ impl Failure {
         ExitCode::from(match self {
             Failure::Work(_) | Failure::Scene(_) => 1,
             Failure::Usage(_) => 2,
-            Failure::Interrupted => 130,
+            Failure::Interrupted | Failure::InterruptedAfter { .. } => 130,
         })
     }
 
@@ -48,6 +55,9 @@ impl Failure {
                 say(format_args!("{}", count(faults)));
             }
             Failure::Interrupted => say(format_args!("interrupted; nothing was written")),
+            Failure::InterruptedAfter { done, all } => {
+                say(format_args!("interrupted; {done} of {all} frames were written, each of them whole"));
+            }
         }
     }
 }

@@ -13,6 +13,8 @@ pub struct Stats {
     pub width: u32,
     /// Pixels down.
     pub height: u32,
+    /// How many pictures of that size.
+    pub frames: usize,
     /// Reading the scene's text.
     pub parse: Duration,
     /// Checking it, reading its textures, building what rays need.
@@ -41,6 +43,7 @@ impl Stats {
             "scene": self.scene,
             "width": self.width,
             "height": self.height,
+            "frames": self.frames,
             "parse_s": self.parse.as_secs_f64(),
             "compile_s": self.compile.as_secs_f64(),
             "render_s": self.render.as_secs_f64(),
@@ -59,7 +62,8 @@ impl Stats {
     /// One line for each stage and number, without a newline at the end.
     pub fn to_table(&self) -> String {
         let seconds = |time: Duration| format!("{:.3} s", time.as_secs_f64());
-        let picture = format!("{} x {} pixels", self.width, self.height);
+        let frames = if self.frames > 1 { format!("{} frames of ", self.frames) } else { String::new() };
+        let picture = format!("{frames}{} x {} pixels", self.width, self.height);
         let how = format!("{}, {} thread{}", self.rays.simd.name(), self.rays.threads, plural(self.rays.threads));
         let mut rows = vec![
             ("parse", seconds(self.parse), String::new()),

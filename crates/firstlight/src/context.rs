@@ -1,11 +1,12 @@
 //! The one door to files, and what compiling a description carries along.
 
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use crate::color::Rgb;
 use crate::describe::ColorDesc;
 use crate::error::{Diagnostic, Severity};
-use crate::math::{DVec3, Vec3, vec3};
+use crate::math::{DAffine3, DVec3, Vec3, vec3};
 
 /// Where a scene's files come from: a folder, memory, a browser.
 pub trait Assets: Sync {
@@ -115,7 +116,7 @@ impl Assets for FolderAssets {
         }
         // The file may grow while it is read: the limit holds all the same
         let mut bytes = Vec::with_capacity(meta.len() as usize);
-        std::fs::File::open(&real).map_err(io)?.take(limit + 1).read_to_end(&mut bytes).map_err(io)?;
+        std::fs::File::open(&real).map_err(io)?.take(limit.saturating_add(1)).read_to_end(&mut bytes).map_err(io)?;
         let size = bytes.len() as u64;
         if size > limit { Err(AssetError::TooLarge { size, limit }) } else { Ok(bytes) }
     }
@@ -138,10 +139,51 @@ fn leaves(path: &str) -> bool {
     false
 }
 
+/// What compiling is doing.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum CompileStage<'a> {
+    /// Reading a mesh or point set.
+    Reading {
+        /// The file, as the scene names it.
+        file: &'a str,
+        /// Bytes so far.
+        done: u64,
+        /// Bytes in all.
+        total: u64,
+    },
+    /// Building the tree over the triangles of one space.
+    Building {
+        /// How many there are.
+        triangles: u64,
+    },
+}
+
+/// A function that is told what compiling is doing, from any thread.
+#[derive(Clone)]
+pub struct OnCompile(pub Arc<dyn Fn(CompileStage<'_>) + Send + Sync>);
+
+impl std::fmt::Debug for OnCompile {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str("OnCompile")
+    }
+}
+
+impl PartialEq for OnCompile {
+    fn eq(&self, other: &Self) -> bool {
+        Arc::ptr_eq(&self.0, &other.0)
+    }
+}
+
 /// Collects the faults of a description while it is compiled. Every check answers with a usable value, so that one
 /// fault does not hide the next.
 #[derive(Default)]
 pub(crate) struct CompileContext {
+    /// The moment that is compiled, in seconds.
+    pub(crate) time: f64,
+    /// Who wants to know what is being done.
+    pub(crate) progress: Option<OnCompile>,
+    /// Whether anything has keys, so that the time decides the picture.
+    pub(crate) keyed: bool,
     path: String,
     faults: Vec<Diagnostic>,
     /// Errors, whether told or not.
@@ -157,6 +199,11 @@ const MAX_FAULTS: usize = 256;
 const MAX_NAMES_COMPARED: usize = 1000;
 
 impl CompileContext {
+    /// For the moment `time`, in seconds.
+    pub(crate) fn at_time(time: f64) -> Self {
+        Self { time, ..Self::default() }
+    }
+
     /// Runs `f` with `part` added to the path of every fault: `light.spot[2]`.
     pub(crate) fn within<R>(&mut self, part: &str, f: impl FnOnce(&mut Self) -> R) -> R {
         let length = self.path.len();
@@ -253,6 +300,28 @@ impl CompileContext {
         vec3(v)
     }
 
+    /// A point that a transform moves, in world space; a fault where it is moved too far.
+    pub(crate) fn moved_point(&mut self, world_from_object: DAffine3, p: DVec3) -> DVec3 {
+        let moved = world_from_object.transform_point3(p);
+        if !moved.to_array().iter().all(|x| x.abs() <= MAX_COORDINATE) {
+            let (from, to) = (show(&p.to_array()), show(&moved.to_array()));
+            let message = format!("it moves {from} to {to}, outside -2.5e8 to 2.5e8");
+            self.error("transform", message, Some("use a larger unit of length"));
+        }
+        moved
+    }
+
+    /// A vector that a transform turns and scales, in world space; a fault where that leaves it no length, or too much.
+    pub(crate) fn moved_edge(&mut self, world_from_object: DAffine3, field: &str, v: DVec3) -> DVec3 {
+        let moved = world_from_object.transform_vector3(v);
+        let too_far = moved.to_array().iter().any(|x| !(x.abs() <= MAX_COORDINATE));
+        if too_far || !(moved.length() >= MIN_LENGTH) {
+            let message = format!("it makes {} of {field}, of a length outside [1e-9, 2.5e8]", show(&moved.to_array()));
+            self.error("transform", message, Some("choose another scale"));
+        }
+        moved
+    }
+
     /// A vector that has a length.
     pub(crate) fn edge(&mut self, field: &str, v: [f64; 3]) -> bool {
         let before = self.fault_count();
@@ -312,6 +381,18 @@ impl CompileContext {
     /// How many faults there are so far.
     pub(crate) fn fault_count(&self) -> usize {
         self.faults.len() + self.omitted
+    }
+
+    /// Says what is being done.
+    pub(crate) fn tell(&self, stage: CompileStage<'_>) {
+        if let Some(OnCompile(progress)) = &self.progress {
+            progress(stage);
+        }
+    }
+
+    /// How many errors there are so far.
+    pub(crate) fn error_count(&self) -> usize {
+        self.errors
     }
 
     /// Whether there are errors so far.

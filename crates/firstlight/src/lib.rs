@@ -46,6 +46,9 @@
 //! - Where files come from: [`Assets`].
 //! - Faults, as data: [`SceneError`], [`Diagnostic`], [`ImageError`]. The library never prints and never exits.
 
+mod accel;
+#[doc(hidden)]
+pub mod bench;
 mod camera;
 mod color;
 mod context;
@@ -53,6 +56,7 @@ mod describe;
 mod error;
 mod ids;
 mod image;
+mod import;
 mod light;
 mod material;
 mod math;
@@ -60,25 +64,31 @@ mod render;
 mod scene;
 mod shape;
 mod texture;
+mod transform;
 
-pub use camera::{Camera, CameraDesc, Pinhole};
+pub use camera::{Camera, CameraDesc, FilmPlane, Frame, Orthographic, Pinhole, Projection};
 pub use color::{Display, Encoding, Rgb};
-pub use context::{AssetError, Assets, FolderAssets, MemoryAssets, NoAssets};
-pub use describe::{ColorDesc, ColorParam, FilePath, NumberParam, ParamDesc};
+pub use context::{AssetError, Assets, CompileStage, FolderAssets, MemoryAssets, NoAssets, OnCompile};
+pub use describe::{ColorDesc, ColorParam, FilePath, NumberParam, ParamDesc, ScaleDesc};
 pub use error::{Diagnostic, Place, SceneError, Severity};
 pub use ids::{LightId, MaterialId, SurfaceId, TextureId};
 pub use image::{
     Format, Image, ImageError, PendingFile, Receipt, StagedFile, StoredImage, Window, Written, write_whole,
 };
+pub use import::{ImportError, MeshData, MeshFormat, MeshPart, MeshPlace, MeshReport, is_point_set, read_mesh};
 pub use light::{DirectionalDesc, EmitSides, Falloff, LightDesc, PointDesc, RectangleDesc, SampleSet, SpotDesc};
 pub use material::{BlinnPhongDesc, MaterialDesc, PhongDesc};
 pub use math::{Ray, Vec2, Vec3};
 pub use render::{Film, RenderSettings, RenderStats, SimdLevel, render};
 pub use scene::{Builtin, Parsed, builtin_scenes, reference, schema};
 pub use scene::{
-    CameraHit, CompileOptions, Compiled, DisplayEncoding, Hit, RenderDesc, Scene, SceneDesc, SceneSummary,
+    CameraHit, CompileOptions, Compiled, DisplayEncoding, Hit, ModelSettings, RenderDesc, Scene, SceneDesc,
+    SceneSummary, UpAxis,
 };
+pub use shape::RectangleDesc as RectangleShapeDesc;
 pub use shape::{
-    Footprint, ParallelogramDesc, RayDifferential, ShapeDesc, SphereDesc, SphereUv, SurfaceInteraction, UvEdge,
+    BoxDesc, ConeDesc, CylinderDesc, DiskDesc, Footprint, GroupDesc, InstanceDesc, MeshDesc, ParallelogramDesc,
+    PlaneDesc, PointSetDesc, RayDifferential, ShapeDesc, SphereDesc, SphereUv, SurfaceInteraction, TorusDesc, UvEdge,
 };
 pub use texture::{CheckerboardDesc, Filter, ImageTextureDesc, TextureDesc, TextureSpace, Wrap};
+pub use transform::{Interpolation, TransformDesc, TransformKeyDesc};

@@ -4,6 +4,7 @@ mod answers;
 mod common;
 mod faults;
 mod files;
+mod frames;
 mod pictures;
 #[cfg(unix)]
 mod signals;

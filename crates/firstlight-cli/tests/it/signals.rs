@@ -76,6 +76,26 @@ fn interrupted_twice_it_ends_at_once() {
 }
 
 #[test]
+fn interrupted_between_frames_it_leaves_whole_ones() {
+    let folder = Folder::new();
+    let line = "render config11 --width 256 --aa 2 --samples 64 --threads 1 --frames 0..9999 -o f.png";
+    let mut child = folder.command(line.split_whitespace()).stderr(Stdio::piped()).spawn().unwrap();
+    let mut stderr = BufReader::new(child.stderr.take().unwrap());
+    let mut said = String::new();
+    while !said.contains("wrote f.0001.png") {
+        assert!(stderr.read_line(&mut said).unwrap() > 0, "{said}");
+    }
+    Command::new("kill").args(["-TERM", &child.id().to_string()]).status().unwrap();
+    assert_eq!(child.wait().unwrap().code(), Some(130));
+    // Two of them at least; each under its name, and nothing beside them
+    let names = folder.names();
+    assert!(names.len() >= 2 && names.iter().all(|name| name.starts_with("f.0")), "{names:?}");
+    for name in &names {
+        assert_eq!(crate::common::size_of(&folder.path(name)), (256, 256), "{name}");
+    }
+}
+
+#[test]
 fn killed_it_leaves_the_old_file() {
     let folder = Folder::new();
     let long = Long::begin(&folder);

@@ -1,17 +1,88 @@
 //! Cameras: from a place on the film to a ray.
 
+mod film;
+mod frame;
+mod orthographic;
 mod pinhole;
 
-pub use pinhole::{CameraDesc, Pinhole};
+pub use film::FilmPlane;
+pub use frame::Frame;
+pub use orthographic::Orthographic;
+pub use pinhole::Pinhole;
 
+use crate::context::CompileContext;
+use crate::describe::{table, words};
 use crate::math::Ray;
 use crate::shape::RayDifferential;
+use crate::transform::TransformDesc;
+
+words! {
+    /// How a camera sees.
+    pub enum Projection {
+        /// From one point, the eye: what is farther away is smaller.
+        Perspective = "perspective",
+        /// Along parallel rays, from the whole of a film: everything keeps its size. The film, `height` metres high, stands
+        /// upright in the scene with its middle at `position`; what is behind it is not seen.
+        Orthographic = "orthographic",
+    }
+}
+
+table! {
+    /// A camera: `[camera]`, or several as `[camera.NAME]`, of which `render.camera` or `--camera` names one.
+    ///
+    /// What a perspective camera sees is `fov_y_deg`, or `focal_length_mm` with `sensor_height_mm`; with neither it is 45
+    /// degrees. What an orthographic camera sees is `height` metres.
+    ///
+    /// ```toml
+    /// [camera]
+    /// position = [0, 0, 10]
+    /// look_at = [0, 0, 0]
+    /// fov_y_deg = 45
+    /// ```
+    pub struct CameraDesc {
+        /// The eye, in metres, world space.
+        pub position: [f64; 3],
+        /// The point seen at the middle of the picture; not `position` itself.
+        pub look_at: [f64; 3] = [0.0, 0.0, 0.0],
+        /// The direction that is up in the picture, of any length above 1e-9; not parallel to the line of sight.
+        pub up: [f64; 3] = [0.0, 1.0, 0.0],
+        /// How it sees.
+        pub projection: Projection = Projection::Perspective,
+        /// The vertical field of view: the full angle, in degrees, 0.001 to 179.99.
+        pub fov_y_deg: Option<f64> = None,
+        /// Focal length in millimetres, 0.01 to 1000000, instead of `fov_y_deg`: fov = 2 atan(sensor height / (2 focal length)).
+        pub focal_length_mm: Option<f64> = None,
+        /// The height of the sensor in millimetres, 0.01 to 10000, for `focal_length_mm`; 24 unless said.
+        pub sensor_height_mm: Option<f64> = None,
+        /// From the lower edge of an orthographic picture to the upper, in metres, 1e-9 to 2.5e8. An orthographic camera
+        /// needs it, and no other takes it.
+        pub height: Option<f64> = None,
+        /// Moves the film without turning the camera, in widths and heights of it, each from -100 to 100: with positive
+        /// numbers the picture shows more of what is on the right, and above. Upright lines stay upright.
+        pub shift: [f64; 2] = [0.0, 0.0],
+        /// Where it is moved; it moves `position`, `look_at` and `up`. What it sees stays as large, whatever the scale, and
+        /// is never mirrored.
+        pub transform: Option<Box<TransformDesc>> = None,
+    }
+}
 
 /// A camera, ready to look.
 #[derive(Clone, Copy, Debug)]
 pub enum Camera {
-    /// `[camera]`
+    /// `projection = "perspective"`
     Pinhole(Pinhole),
+    /// `projection = "orthographic"`
+    Orthographic(Orthographic),
+}
+
+impl CameraDesc {
+    /// For a film of `width` x `height` pixels.
+    pub(crate) fn compile(&self, cx: &mut CompileContext, width: u32, height: u32) -> Camera {
+        match self.projection {
+            Projection::Perspective => Camera::Pinhole(Pinhole::compile(self, cx, width, height)),
+            Projection::Orthographic => Camera::Orthographic(Orthographic::compile(self, cx, width, height)),
+        }
+    }
 }
 
 impl Camera {
@@ -21,18 +92,154 @@ impl Camera {
     pub fn ray(&self, x: f32, y: f32, step: f32) -> (Ray, RayDifferential) {
         match self {
             Camera::Pinhole(pinhole) => pinhole.ray(x, y, step),
+            Camera::Orthographic(orthographic) => orthographic.ray(x, y, step),
+        }
+    }
+
+    /// How it sees.
+    pub fn projection(&self) -> Projection {
+        match self {
+            Camera::Pinhole(_) => Projection::Perspective,
+            Camera::Orthographic(_) => Projection::Orthographic,
+        }
+    }
+
+    /// Where it is, and which way it is turned.
+    pub fn frame(&self) -> &Frame {
+        match self {
+            Camera::Pinhole(pinhole) => &pinhole.frame,
+            Camera::Orthographic(orthographic) => &orthographic.frame,
+        }
+    }
+
+    fn film(&self) -> &FilmPlane {
+        match self {
+            Camera::Pinhole(pinhole) => &pinhole.film,
+            Camera::Orthographic(orthographic) => &orthographic.film,
         }
     }
 
     /// The matrix from camera to world space, row by row: the camera looks along its -z, y is up in the picture.
     pub fn world_from_camera(&self) -> [f32; 16] {
-        let Camera::Pinhole(Pinhole { right: r, up: u, forward: f, position: p, .. }) = self;
+        let Frame { right: r, up: u, forward: f, position: p } = self.frame();
         [r.x, u.x, -f.x, p.x, r.y, u.y, -f.y, p.y, r.z, u.z, -f.z, p.z, 0.0, 0.0, 0.0, 1.0]
     }
 
-    /// Half the width and half the height of the film at distance 1 from the eye: tangents of half the fields of view.
+    /// Half the width and half the height of the film: at distance 1 from the eye (tangents of half the fields of view), or
+    /// in metres where the camera is orthographic.
     pub fn film_half_size(&self) -> [f32; 2] {
-        let Camera::Pinhole(pinhole) = self;
-        [pinhole.half_width, pinhole.half_height]
+        self.film().half.to_array()
+    }
+
+    /// How far the film's middle is to the right of the line of sight and above it, in widths and heights of the film.
+    pub fn film_shift(&self) -> [f32; 2] {
+        self.film().shift.to_array()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::describe::ScaleDesc;
+    use crate::math::{DVec3, Vec3};
+
+    fn compiled(desc: &CameraDesc, width: u32, height: u32) -> Camera {
+        let cx = &mut CompileContext::default();
+        let camera = desc.compile(cx, width, height);
+        assert_eq!(cx.take_faults(), []);
+        camera
+    }
+
+    fn orthographic(height: f64) -> CameraDesc {
+        CameraDesc { projection: Projection::Orthographic, height: Some(height), ..CameraDesc::new([0.0, 0.0, 10.0]) }
+    }
+
+    #[test]
+    fn orthographic_rays_are_parallel_and_start_on_the_film() {
+        let camera = compiled(&orthographic(4.0), 200, 100);
+        for (x, y, o) in
+            [(100.0, 50.0, [0.0, 0.0, 10.0]), (0.0, 0.0, [-4.0, 2.0, 10.0]), (150.0, 75.0, [2.0, -1.0, 10.0])]
+        {
+            let (ray, differential) = camera.ray(x, y, 0.5);
+            assert_eq!((ray.o, ray.d), (o.into(), Vec3::NEG_Z));
+            assert_eq!((differential.dx, differential.dy), (Vec3::ZERO, Vec3::ZERO));
+            // Half a pixel is 0.02 m
+            assert_eq!(differential.origin_dx, Vec3::X * 0.02);
+            assert_eq!(differential.origin_dy, Vec3::Y * -0.02);
+        }
+        assert_eq!(camera.film_half_size(), [4.0, 2.0]);
+    }
+
+    #[test]
+    fn differentials_are_the_steps_between_neighbours_on_a_plane() {
+        // A plane askew before each camera: where the ray and its neighbours meet it
+        let n = DVec3::new(0.3, -0.5, 0.8).normalize();
+        let meet = |camera: &Camera, x: f32, y: f32| {
+            let (ray, _) = camera.ray(x, y, 1.0);
+            let (o, d) = (ray.o.as_dvec3(), ray.d.as_dvec3());
+            let t = -n.dot(o) / n.dot(d);
+            (o + d * t, t)
+        };
+        let shifted = CameraDesc { shift: [0.3, -0.2], ..orthographic(3.0) };
+        let pinhole = CameraDesc { shift: [0.3, -0.2], ..CameraDesc::new([1.0, 2.0, 10.0]) };
+        for desc in [orthographic(3.0), shifted, CameraDesc::new([1.0, 2.0, 10.0]), pinhole] {
+            let camera = compiled(&desc, 640, 480);
+            let (x, y) = (200.0, 100.0);
+            let (p, t) = meet(&camera, x, y);
+            let (ray, differential) = camera.ray(x, y, 1.0);
+            let [dx, dy] = differential.on_plane(ray.d, t as f32, n.as_vec3(), 1e9);
+            for (step, neighbour) in [(dx, meet(&camera, x + 1.0, y).0), (dy, meet(&camera, x, y + 1.0).0)] {
+                let exact = neighbour - p;
+                // The differential is the first order: a pixel's width off by about as little as a pixel is wide
+                assert!((step.as_dvec3() - exact).length() < 3e-3 * exact.length(), "{desc:?}: {step} {exact}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_shift_is_a_part_of_a_larger_film() {
+        // The right upper quarter of a film of twice the size, bit by bit; 12 mm and 24 mm high at the same focal length
+        let of = |sensor, shift| CameraDesc {
+            focal_length_mm: Some(20.0),
+            sensor_height_mm: Some(sensor),
+            shift,
+            ..CameraDesc::new([1.0, 2.0, 10.0])
+        };
+        let whole = compiled(&of(24.0, [0.0, 0.0]), 128, 96);
+        let quarter = compiled(&of(12.0, [0.5, 0.5]), 64, 48);
+        let (large, small) = (
+            compiled(&orthographic(4.0), 128, 96),
+            compiled(&CameraDesc { shift: [0.5, 0.5], ..orthographic(2.0) }, 64, 48),
+        );
+        for (whole, part) in [(whole, quarter), (large, small)] {
+            for (x, y) in [(0.0, 0.0), (3.25, 40.5), (63.5, 47.5), (64.0, 48.0)] {
+                let (a, b) = (whole.ray(x + 64.0, y, 0.25), part.ray(x, y, 0.25));
+                assert_eq!((a.0.o, a.0.d), (b.0.o, b.0.d));
+                assert_eq!((a.1.dx, a.1.dy, a.1.origin_dx), (b.1.dx, b.1.dy, b.1.origin_dx));
+            }
+        }
+        // More of the right and of what is above
+        assert!(quarter.ray(32.0, 24.0, 1.0).0.d.dot(whole.frame().right) > 0.0);
+        assert!(quarter.ray(32.0, 24.0, 1.0).0.d.dot(whole.frame().up) > 0.0);
+    }
+
+    #[test]
+    fn a_transform_moves_the_camera_and_keeps_right_angles() {
+        let moved = |scale: ScaleDesc| CameraDesc {
+            transform: Some(Box::new(TransformDesc {
+                rotate_deg: [0.0, 90.0, 0.0],
+                translate: [0.0, 5.0, 0.0],
+                scale,
+                ..TransformDesc::default()
+            })),
+            ..CameraDesc::new([0.0, 0.0, 10.0])
+        };
+        let camera = compiled(&moved(1.0.into()), 100, 100);
+        let Frame { position, right, up, forward } = *camera.frame();
+        assert_eq!((position, forward), (Vec3::new(10.0, 5.0, 0.0), Vec3::NEG_X));
+        assert_eq!((right, up), (Vec3::NEG_Z, Vec3::Y));
+        // Stretched and mirrored: the directions stay those of a frame
+        let Frame { right, up, forward, .. } = *compiled(&moved([-1.0, 3.0, 2.0].into()), 100, 100).frame();
+        assert_eq!(right.cross(up), -forward);
     }
 }

@@ -5,8 +5,9 @@ use super::read::Reader;
 use super::{FieldInfo, Table, Written, info};
 
 /// A table as the schema and the reference show it.
+#[derive(Clone, Debug)]
 pub(crate) struct TableInfo {
-    pub kind: &'static str,
+    pub kind: String,
     /// The lines of its doc comment.
     pub doc: &'static [&'static str],
     pub fields: Vec<FieldInfo>,
@@ -14,8 +15,8 @@ pub(crate) struct TableInfo {
 }
 
 impl TableInfo {
-    pub(crate) fn of<T: Table>(kind: &'static str) -> Self {
-        Self { kind, doc: T::DOC, fields: T::info(), schema: info::table_schema::<T>() }
+    pub(crate) fn of<T: Table>(kind: impl Into<String>) -> Self {
+        Self { kind: kind.into(), doc: T::DOC, fields: T::info(), schema: info::table_schema::<T>() }
     }
 }
 

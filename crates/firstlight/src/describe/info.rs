@@ -2,6 +2,7 @@
 
 use serde_json::{Map, Value as Json, json};
 
+use super::TableInfo;
 use super::read::{Table, Value};
 use super::write::Written;
 
@@ -14,7 +15,7 @@ pub(crate) struct Choice {
 }
 
 /// One field of a table.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(crate) struct FieldInfo {
     pub name: &'static str,
     /// The lines of its doc comment.
@@ -25,6 +26,8 @@ pub(crate) struct FieldInfo {
     pub default: Option<Written>,
     pub schema: Json,
     pub choices: &'static [Choice],
+    /// The tables it holds, and those within them.
+    pub tables: Vec<TableInfo>,
 }
 
 impl FieldInfo {
@@ -39,8 +42,33 @@ impl FieldInfo {
                 }
             }
         }
-        Self { name, doc, words: T::words(), default, schema, choices: T::choices() }
+        Self { name, doc, words: T::words(), default, schema, choices: T::choices(), tables: T::tables() }
     }
+}
+
+/// What the table that a field holds is called: `transform` for a `TransformDesc`, `transform_key` for a
+/// `TransformKeyDesc`.
+pub(crate) fn inner_name<T: Table>() -> String {
+    let mut name = String::new();
+    for (i, c) in T::NAME.strip_suffix("Desc").unwrap_or(T::NAME).chars().enumerate() {
+        if c.is_ascii_uppercase() && i > 0 {
+            name.push('_');
+        }
+        name.push(c.to_ascii_lowercase());
+    }
+    name
+}
+
+/// The schema of a table that a field holds: it is defined once, for all fields.
+pub(crate) fn link_to<T: Table>() -> Json {
+    json!({ "$ref": format!("#/$defs/{}", inner_name::<T>()) })
+}
+
+/// A table that a field holds, and those within it.
+pub(crate) fn tables_of<T: Table>() -> Vec<TableInfo> {
+    let own = TableInfo::of::<T>(inner_name::<T>());
+    let inner: Vec<TableInfo> = own.fields.iter().flat_map(|field| field.tables.clone()).collect();
+    std::iter::once(own).chain(inner).collect()
 }
 
 /// The lines of a doc comment as one paragraph.

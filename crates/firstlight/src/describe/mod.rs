@@ -4,6 +4,9 @@
 //! A field with `= default` may be left out of the text, and is left out by the writer while it has that value; a field
 //! without is required, and is an argument of `new`. A table whose fields all have defaults implements `Default`.
 //!
+//! A table is itself a value: `transform: Option<TransformDesc> = None` is a field that holds a table, `keys: Vec<KeyDesc>`
+//! one that holds any number of them.
+//!
 //! - [`node`]: TOML and JSON as one tree that knows where everything stands;
 //! - [`read`]: from the tree to values, collecting every fault;
 //! - [`write`](mod@write): from values to text;
@@ -16,8 +19,11 @@ macro_rules! table {
     (@read $fields:ident, $field:ident) => { $fields.required(stringify!($field)) };
     (@read $fields:ident, $field:ident, $default:expr) => { $fields.optional(stringify!($field), || $default) };
 
-    (@is_default $table:ident, $field:ident) => { false };
-    (@is_default $table:ident, $field:ident, $default:expr) => { $table.$field == $default };
+    (@is_default $table:ident, $field:ident: $ty:ty) => { false };
+    (@is_default $table:ident, $field:ident: $ty:ty, $default:expr) => {{
+        let default: $ty = $default;
+        $table.$field == default
+    }};
 
     (@default $ty:ty) => { None };
     (@default $ty:ty, $default:expr) => {{
@@ -64,6 +70,7 @@ macro_rules! table {
         $crate::describe::table!(@new $name [] [] $( $field : $ty $(= $default)?, )*);
 
         impl $crate::describe::Table for $name {
+            const NAME: &'static str = stringify!($name);
             const DOC: &'static [&'static str] = &[$($doc),*];
             const FIELDS: &'static [&'static str] = &[$(stringify!($field)),*];
 
@@ -74,7 +81,7 @@ macro_rules! table {
             fn write(&self) -> Vec<(&'static str, $crate::describe::Written)> {
                 let mut written = Vec::new();
                 $(
-                    if !($crate::describe::table!(@is_default self, $field $(, $default)?)) {
+                    if !($crate::describe::table!(@is_default self, $field: $ty $(, $default)?)) {
                         written.push((stringify!($field), $crate::describe::Value::write(&self.$field)));
                     }
                 )*
@@ -89,6 +96,73 @@ macro_rules! table {
                         $crate::describe::table!(@default $ty $(, $default)?),
                     ),
                 )*]
+            }
+        }
+
+        impl $crate::describe::Value for $name {
+            fn words() -> String {
+                "a table".into()
+            }
+
+            fn plural() -> String {
+                "tables".into()
+            }
+
+            fn schema() -> serde_json::Value {
+                $crate::describe::info::link_to::<Self>()
+            }
+
+            fn tables() -> Vec<$crate::describe::TableInfo> {
+                $crate::describe::info::tables_of::<Self>()
+            }
+
+            fn placeholder() -> Self {
+                $crate::describe::read::stand_in()
+            }
+
+            fn read(
+                node: &$crate::describe::node::Node,
+                reader: &mut $crate::describe::read::Reader<'_>,
+            ) -> Option<Self> {
+                reader.inner_table(node)
+            }
+
+            fn write(&self) -> $crate::describe::Written {
+                $crate::describe::Written::Table($crate::describe::Table::write(self))
+            }
+        }
+
+        // For fields of large tables that few have: `Option<Box<TransformDesc>>`
+        impl $crate::describe::Value for Box<$name> {
+            fn words() -> String {
+                <$name as $crate::describe::Value>::words()
+            }
+
+            fn plural() -> String {
+                <$name as $crate::describe::Value>::plural()
+            }
+
+            fn schema() -> serde_json::Value {
+                <$name as $crate::describe::Value>::schema()
+            }
+
+            fn tables() -> Vec<$crate::describe::TableInfo> {
+                <$name as $crate::describe::Value>::tables()
+            }
+
+            fn placeholder() -> Self {
+                Box::new($crate::describe::read::stand_in())
+            }
+
+            fn read(
+                node: &$crate::describe::node::Node,
+                reader: &mut $crate::describe::read::Reader<'_>,
+            ) -> Option<Self> {
+                reader.inner_table(node).map(Box::new)
+            }
+
+            fn write(&self) -> $crate::describe::Written {
+                $crate::describe::Value::write(&**self)
             }
         }
     };
@@ -156,5 +230,5 @@ pub(crate) mod write;
 pub(crate) use family::{Family, TableInfo, family};
 pub(crate) use info::{Choice, FieldInfo};
 pub(crate) use read::{Fields, Table, Value, Words, nearest};
-pub use value::{ColorDesc, ColorParam, FilePath, NumberParam, ParamDesc};
+pub use value::{ColorDesc, ColorParam, FilePath, NumberParam, ParamDesc, ScaleDesc};
 pub(crate) use write::Written;

@@ -7,7 +7,8 @@ use std::collections::BTreeSet;
 
 use serde_json::{Value as Json, json};
 
-use super::info::{Choice, FieldInfo};
+use super::TableInfo;
+use super::info::{Choice, FieldInfo, inner_name};
 use super::node::{Data, Entry, Node, Span, quoted, shortened};
 use super::write::{Written, key};
 
@@ -23,6 +24,10 @@ pub(crate) trait Value: Sized + PartialEq {
     fn choices() -> &'static [Choice] {
         &[]
     }
+    /// The tables it holds, if it is a table or an array of them: itself and those within.
+    fn tables() -> Vec<TableInfo> {
+        Vec::new()
+    }
     /// What stands for a required one that could not be read.
     fn placeholder() -> Self;
     /// Reads one; `None` when it is none, and then the fault is recorded.
@@ -33,6 +38,8 @@ pub(crate) trait Value: Sized + PartialEq {
 
 /// A table of the scene text; made by the `table!` macro.
 pub(crate) trait Table: Sized {
+    /// The name of its type.
+    const NAME: &'static str;
     /// The lines of its doc comment.
     const DOC: &'static [&'static str];
     /// The names of its fields.
@@ -186,6 +193,17 @@ impl<'a> Reader<'a> {
         T::read(&mut Fields { entries, span: node.span, silent: false, meant, reader: self })
     }
 
+    /// Reads a table that is the value of a field; `None` when `node` is none.
+    pub(crate) fn inner_table<T: Table>(&mut self, node: &Node) -> Option<T> {
+        if node.entries().is_none() {
+            self.wrong_type(node, "a table", None);
+            return None;
+        }
+        let name = inner_name::<T>().replace('_', " ");
+        let article = if name.starts_with(['a', 'e', 'i', 'o', 'u']) { "an" } else { "a" };
+        Some(self.table(node, &format!("{article} {name}")))
+    }
+
     /// Records every key that is not in `known`; answers with the known ones that were probably meant.
     pub(crate) fn unknown_keys(
         &mut self,
@@ -207,6 +225,13 @@ impl<'a> Reader<'a> {
         }
         meant
     }
+}
+
+/// A table of which nothing could be read.
+pub(crate) fn stand_in<T: Table>() -> T {
+    let faults = &mut Faults::default();
+    let reader = &mut Reader::new(0, "", "", faults);
+    T::read(&mut Fields { entries: &[], span: Span::default(), silent: true, meant: Vec::new(), reader })
 }
 
 /// The fields of one table of the text.
@@ -429,6 +454,10 @@ impl<T: Value> Value for Option<T> {
         T::choices()
     }
 
+    fn tables() -> Vec<TableInfo> {
+        T::tables()
+    }
+
     fn placeholder() -> Self {
         None
     }
@@ -459,6 +488,10 @@ impl<T: Value, const N: usize> Value for [T; N] {
         T::choices()
     }
 
+    fn tables() -> Vec<TableInfo> {
+        T::tables()
+    }
+
     fn placeholder() -> Self {
         std::array::from_fn(|_| T::placeholder())
     }
@@ -471,15 +504,56 @@ impl<T: Value, const N: usize> Value for [T; N] {
                 return None;
             }
         };
-        // Read all before giving up: every fault is told
-        let values: Vec<Option<T>> =
-            elements.iter().enumerate().map(|(i, e)| reader.at(i, |r| T::read(e, r))).collect();
-        values.into_iter().collect::<Option<Vec<T>>>()?.try_into().ok()
+        all_elements(elements, reader)?.try_into().ok()
     }
 
     fn write(&self) -> Written {
         Written::List(self.iter().map(T::write).collect())
     }
+}
+
+impl<T: Value> Value for Vec<T> {
+    fn words() -> String {
+        format!("an array of {}", T::plural())
+    }
+
+    fn plural() -> String {
+        format!("arrays of {}", T::plural())
+    }
+
+    fn schema() -> Json {
+        json!({ "type": "array", "items": T::schema() })
+    }
+
+    fn choices() -> &'static [Choice] {
+        T::choices()
+    }
+
+    fn tables() -> Vec<TableInfo> {
+        T::tables()
+    }
+
+    fn placeholder() -> Self {
+        Vec::new()
+    }
+
+    fn read(node: &Node, reader: &mut Reader<'_>) -> Option<Self> {
+        let Some(elements) = node.elements() else {
+            reader.wrong_type(node, &Self::words(), None);
+            return None;
+        };
+        all_elements(elements, reader)
+    }
+
+    fn write(&self) -> Written {
+        Written::List(self.iter().map(T::write).collect())
+    }
+}
+
+/// Reads every element before giving up: every fault is told.
+fn all_elements<T: Value>(elements: &[Node], reader: &mut Reader<'_>) -> Option<Vec<T>> {
+    let values: Vec<Option<T>> = elements.iter().enumerate().map(|(i, e)| reader.at(i, |r| T::read(e, r))).collect();
+    values.into_iter().collect()
 }
 
 impl<T: Words> Value for T {

@@ -109,6 +109,68 @@ impl Value for ColorDesc {
     }
 }
 
+/// A scale along the three axes. In text `[x, y, z]`, or one number for all three.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ScaleDesc {
+    /// Along x, y and z; a negative one mirrors.
+    pub xyz: [f64; 3],
+}
+
+impl ScaleDesc {
+    /// As large as before.
+    pub const ONE: ScaleDesc = ScaleDesc { xyz: [1.0; 3] };
+}
+
+impl From<f64> for ScaleDesc {
+    /// The same along all three axes.
+    fn from(scale: f64) -> Self {
+        Self { xyz: [scale; 3] }
+    }
+}
+
+impl From<[f64; 3]> for ScaleDesc {
+    /// Along x, y and z.
+    fn from(xyz: [f64; 3]) -> Self {
+        Self { xyz }
+    }
+}
+
+impl Value for ScaleDesc {
+    fn words() -> String {
+        "a number or [x, y, z]".into()
+    }
+
+    fn plural() -> String {
+        "numbers or [x, y, z]".into()
+    }
+
+    fn schema() -> Json {
+        json!({ "anyOf": [f64::schema(), <[f64; 3]>::schema()] })
+    }
+
+    fn placeholder() -> Self {
+        Self::ONE
+    }
+
+    fn read(node: &Node, reader: &mut Reader<'_>) -> Option<Self> {
+        match &node.data {
+            Data::Number(_) => f64::read(node, reader).map(Self::from),
+            Data::Array(elements) if elements.len() == 3 => <[f64; 3]>::read(node, reader).map(Self::from),
+            _ => {
+                reader.wrong_type(node, &Self::words(), None);
+                None
+            }
+        }
+    }
+
+    fn write(&self) -> Written {
+        let [x, y, z] = self.xyz;
+        // By their bits: -0 is 0, but is written differently
+        let same = x.to_bits() == y.to_bits() && y.to_bits() == z.to_bits();
+        if same { x.write() } else { self.xyz.write() }
+    }
+}
+
 /// A parameter that a texture can drive: a constant, or `{ texture = "NAME", factor = ... }`, the texture times a factor.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ParamDesc<T> {

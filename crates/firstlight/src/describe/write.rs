@@ -60,6 +60,9 @@ impl Written {
             Written::List(v) => format!("[{}]", v.iter().map(Self::to_toml).collect::<Vec<_>>().join(", ")),
             Written::Table(v) => {
                 let pairs: Vec<String> = v.iter().map(|(k, v)| format!("{} = {}", key(k), v.to_toml())).collect();
+                if pairs.is_empty() {
+                    return "{}".into();
+                }
                 format!("{{ {} }}", pairs.join(", "))
             }
         }
@@ -77,6 +80,9 @@ impl Written {
             Written::Table(v) => {
                 let pairs: Vec<String> =
                     v.iter().map(|(k, v)| format!("{}: {}", json_string(k), v.to_json())).collect();
+                if pairs.is_empty() {
+                    return "{}".into();
+                }
                 format!("{{ {} }}", pairs.join(", "))
             }
         }

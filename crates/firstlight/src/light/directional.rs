@@ -5,6 +5,7 @@ use crate::color::Rgb;
 use crate::context::CompileContext;
 use crate::describe::{ColorDesc, table};
 use crate::math::{DVec3, Vec3};
+use crate::transform::TransformDesc;
 
 table! {
     /// Light from infinitely far away, all of it in one direction: the sun on a clear day.
@@ -21,6 +22,8 @@ table! {
         pub name: Option<String> = None,
         /// The way the light travels, of any length above 1e-9.
         pub direction: [f64; 3],
+        /// Where it is moved; it turns `direction`.
+        pub transform: Option<Box<TransformDesc>> = None,
         /// Linear colour; channels of 0 or more.
         pub color: ColorDesc = ColorDesc::WHITE,
         /// Lux (physical), or a plain factor (constant); 0 to 1e15.
@@ -42,7 +45,11 @@ pub struct Directional {
 impl DirectionalDesc {
     pub(crate) fn compile(&self, cx: &mut CompileContext) -> Light {
         cx.edge("direction", self.direction);
-        let to_light = -DVec3::from(self.direction).normalize_or_zero();
+        let mut direction = DVec3::from(self.direction);
+        if let Some(world_from_object) = TransformDesc::compile_field(self.transform.as_deref(), cx) {
+            direction = cx.moved_edge(world_from_object, "direction", direction);
+        }
+        let to_light = -direction.normalize_or_zero();
         Light {
             kind: LightKind::Directional(Directional { to_light: to_light.as_vec3() }),
             scale: scaled(cx, self.color, self.strength, self.falloff.factor()),

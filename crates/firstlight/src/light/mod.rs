@@ -10,6 +10,7 @@ use crate::color::Rgb;
 use crate::context::CompileContext;
 use crate::describe::{ColorDesc, family, words};
 use crate::math::Vec3;
+use crate::transform::TransformDesc;
 
 pub use directional::{Directional, DirectionalDesc};
 pub use point::{Point, PointDesc};
@@ -83,6 +84,7 @@ pub struct Light {
 
 /// The place and shape of a light.
 #[derive(Clone, Debug)]
+#[allow(clippy::large_enum_variant, reason = "lights are few, and asked for often")]
 pub enum LightKind {
     /// `[[light.point]]`
     Point(Point),
@@ -152,6 +154,15 @@ impl Light {
             LightKind::Rectangle(rectangle) => rectangle.weight(l, inverse_distance),
         };
         Some(LightSample { inverse_distance, weight })
+    }
+}
+
+/// A point of a light's description in world space.
+fn moved_point(cx: &mut CompileContext, field: &str, p: [f64; 3], transform: Option<&TransformDesc>) -> Vec3 {
+    let position = cx.point(field, p);
+    match TransformDesc::compile_field(transform, cx) {
+        Some(world_from_object) => cx.moved_point(world_from_object, p.into()).as_vec3(),
+        None => position,
     }
 }
 

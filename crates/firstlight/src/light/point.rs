@@ -1,10 +1,11 @@
 //! Point lights.
 
-use super::{Falloff, Light, LightKind, scaled};
+use super::{Falloff, Light, LightKind, moved_point, scaled};
 use crate::color::Rgb;
 use crate::context::CompileContext;
 use crate::describe::{ColorDesc, table};
 use crate::math::Vec3;
+use crate::transform::TransformDesc;
 
 table! {
     /// Light from one point, the same in every direction.
@@ -21,6 +22,8 @@ table! {
         pub name: Option<String> = None,
         /// In metres, world space.
         pub position: [f64; 3],
+        /// Where it is moved; it moves `position`.
+        pub transform: Option<Box<TransformDesc>> = None,
         /// Linear colour; channels of 0 or more.
         pub color: ColorDesc = ColorDesc::WHITE,
         /// Candela (physical), or a plain factor (constant); 0 to 1e15.
@@ -43,7 +46,7 @@ pub struct Point {
 
 impl PointDesc {
     pub(crate) fn compile(&self, cx: &mut CompileContext) -> Light {
-        let position = cx.point("position", self.position);
+        let position = moved_point(cx, "position", self.position, self.transform.as_deref());
         Light {
             kind: LightKind::Point(Point { position, physical: self.falloff == Falloff::Physical }),
             scale: scaled(cx, self.color, self.strength, self.falloff.factor()),

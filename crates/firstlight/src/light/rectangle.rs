@@ -8,6 +8,7 @@ use crate::context::{CompileContext, show};
 use crate::describe::{ColorDesc, table};
 use crate::math::{DVec3, LANES, Vec3, Vec3x16};
 use crate::shape::Parallelogram;
+use crate::transform::TransformDesc;
 
 table! {
     /// A rectangle that shines: soft shadows.
@@ -31,6 +32,9 @@ table! {
         pub e0: [f64; 3],
         /// The other side, full length, in metres; perpendicular to `e0`. The front is where e0 x e1 points.
         pub e1: [f64; 3],
+        /// Where it is moved; it moves `center` and both sides, which may make a parallelogram of it. Mirrored, it keeps its
+        /// front.
+        pub transform: Option<Box<TransformDesc>> = None,
         /// Linear colour; channels of 0 or more.
         pub color: ColorDesc = ColorDesc::WHITE,
         /// Radiance (physical), or a plain factor (constant); 0 to 1e15.
@@ -76,6 +80,9 @@ pub struct Rectangle {
 /// Sides that are farther from a right angle than this sine are not those of a rectangle.
 const MAX_SKEW: f64 = 1e-5;
 
+/// Sides that a transform leaves at an angle of a smaller sine than this have no area.
+const MIN_SINE: f64 = 1e-6;
+
 /// The largest number of points on one light.
 pub(crate) const MAX_SAMPLES: u32 = 1 << 20;
 
@@ -83,11 +90,24 @@ impl RectangleDesc {
     /// `samples` is the scene's default number of points.
     pub(crate) fn compile(&self, cx: &mut CompileContext, samples: u32) -> Light {
         cx.point("center", self.center);
-        let (e0, e1) = (DVec3::from(self.e0), DVec3::from(self.e1));
+        let mut center = DVec3::from(self.center);
+        let (mut e0, mut e1) = (DVec3::from(self.e0), DVec3::from(self.e1));
         let edges_fine = cx.edge("e0", self.e0) & cx.edge("e1", self.e1);
         if edges_fine && !(e0.dot(e1).abs() <= MAX_SKEW * e0.length() * e1.length()) {
             let message = format!("{} is not perpendicular to e0 = {}", show(&self.e1), show(&self.e0));
             cx.error("e1", message, Some("the sides of a rectangle meet at right angles"));
+        }
+        let mut front = 1.0;
+        if let Some(world_from_object) = TransformDesc::compile_field(self.transform.as_deref(), cx) {
+            center = cx.moved_point(world_from_object, center);
+            e0 = cx.moved_edge(world_from_object, "e0", e0);
+            e1 = cx.moved_edge(world_from_object, "e1", e1);
+            front = world_from_object.matrix3.determinant().signum();
+            if edges_fine && !(e0.cross(e1).length() > MIN_SINE * e0.length() * e1.length()) {
+                let (e0, e1) = (show(&e0.to_array()), show(&e1.to_array()));
+                let message = format!("it makes {e0} of e0 and {e1} of e1: there is no area between them");
+                cx.error("transform", message, Some("choose another transform"));
+            }
         }
         let count = match self.samples {
             Some(own) => cx.count("samples", own, 1, MAX_SAMPLES, Some("points on this light")),
@@ -102,8 +122,8 @@ impl RectangleDesc {
             (Some(sides), _) => sides == EmitSides::Both,
             (None, falloff) => falloff == Falloff::Constant,
         };
-        let corner = DVec3::from(self.center) - (e0 + e1) * 0.5;
-        let shape = Parallelogram::new(corner, e0, e1, 1.0, !both_sides);
+        let corner = center - (e0 + e1) * 0.5;
+        let shape = Parallelogram::new(corner, e0, e1, front, !both_sides);
         // A description with faults makes no scene: spare the work
         let made = if cx.has_errors() { 0 } else { count };
         let points = (0..made).map(|k| {

@@ -7,6 +7,7 @@ use crate::color::Rgb;
 use crate::context::{CompileContext, show};
 use crate::describe::{ColorDesc, table};
 use crate::math::{DVec3, Vec3};
+use crate::transform::TransformDesc;
 
 table! {
     /// Light from one point into a cone, with a soft rim between two angles.
@@ -29,6 +30,8 @@ table! {
         pub position: [f64; 3],
         /// The point at the middle of the cone; not `position` itself.
         pub look_at: [f64; 3] = [0.0, 0.0, 0.0],
+        /// Where it is moved; it moves `position` and `look_at`. The cone stays as wide, whatever the scale.
+        pub transform: Option<Box<TransformDesc>> = None,
         /// Where the light ends: the cone's full angle in degrees, in (0, 180].
         pub cone_deg: f64 = 60.0,
         /// Where the light begins to fade: a full angle in degrees, from 0 to `cone_deg`; without it, `cone_deg` itself
@@ -62,14 +65,19 @@ pub struct Spot {
 
 impl SpotDesc {
     pub(crate) fn compile(&self, cx: &mut CompileContext) -> Light {
-        let position = cx.point("position", self.position);
+        let mut position = cx.point("position", self.position);
         cx.point("look_at", self.look_at);
-        let axis = DVec3::from(self.look_at) - DVec3::from(self.position);
+        let (mut from, mut to) = (DVec3::from(self.position), DVec3::from(self.look_at));
+        if let Some(world_from_object) = TransformDesc::compile_field(self.transform.as_deref(), cx) {
+            (from, to) = (cx.moved_point(world_from_object, from), cx.moved_point(world_from_object, to));
+            position = from.as_vec3();
+        }
+        let axis = to - from;
         if !(axis.length() >= 1e-9) {
             let message = format!(
                 "{} is the light's position {}: the cone has no axis",
-                show(&self.look_at),
-                show(&self.position)
+                show(&to.to_array()),
+                show(&from.to_array())
             );
             cx.error("look_at", message, Some("move one of them"));
         }

@@ -54,11 +54,11 @@ impl Material {
     /// The material in numbers at one surface.
     #[inline]
     pub fn bsdf(&self, si: &SurfaceInteraction, textures: &[Texture]) -> Bsdf {
-        let diffuse = self.diffuse.color(si, textures);
+        let diffuse = self.diffuse.color(si, textures) * si.color;
         // The same texture in both is looked up once: config 11 has it so everywhere
         let specular = match (self.specular.texture, self.diffuse.texture) {
             (Some(s), Some(d)) if s == d && self.specular.factor == self.diffuse.factor => diffuse,
-            _ => self.specular.color(si, textures),
+            _ => self.specular.color(si, textures) * si.color,
         };
         let lobe = if specular.is_black() {
             Lobe::None
@@ -69,7 +69,7 @@ impl Material {
                 LobeKind::BlinnPhong => Lobe::BlinnPhong(BlinnPhongLobe::new(shininess)),
             }
         };
-        let ambient = self.ambient.map_or(diffuse, |a| a.color(si, textures));
+        let ambient = self.ambient.map_or(diffuse, |a| a.color(si, textures) * si.color);
         Bsdf { diffuse, specular, ambient, lobe }
     }
 }

@@ -2,18 +2,22 @@
 //!
 //! Everything here gives the same bits on every machine: + - x / and square root only, or `pxfm`.
 
+mod frame;
 mod lanes;
 mod pow;
 mod ray;
+mod roots;
 mod sum;
 
+pub(crate) use frame::Frame;
 pub(crate) use lanes::Vec3x16;
 pub(crate) use pow::Exponent;
 pub use ray::Ray;
-pub(crate) use ray::{ErrorBound, ShadowRay};
+pub(crate) use ray::{DRay, ErrorBound, ShadowRay};
+pub(crate) use roots::{bracketed, depressed_cubic};
 pub(crate) use sum::{LANES, LaneSum};
 
-pub use glam::{DVec3, Vec2, Vec3};
+pub use glam::{DAffine3, DMat3, DQuat, DVec3, Vec2, Vec3};
 
 /// Half the distance between 1 and the next `f32`: the relative error of one rounded operation.
 pub(crate) const UNIT_ROUNDOFF: f32 = f32::EPSILON * 0.5;

@@ -11,6 +11,31 @@ pub struct Ray {
     pub d: Vec3,
 }
 
+/// The points `o + t d`, in f64, in world space or in the space of a shape. `d` is of any length except 0, so that `t` means
+/// the same in both.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct DRay {
+    pub o: DVec3,
+    pub d: DVec3,
+}
+
+impl DRay {
+    /// The point at `t`.
+    #[inline(always)]
+    pub fn at(&self, t: f64) -> DVec3 {
+        self.o + self.d * t
+    }
+
+    /// The same ray, counted from its point nearest to `center`, with `center` as the origin of space; and the `t` of that
+    /// point. What is computed from it loses nothing to the distance of `o`.
+    #[inline(always)]
+    pub fn nearest_to(&self, center: DVec3) -> (DRay, f64) {
+        let f = self.o - center;
+        let shift = -f.dot(self.d) / self.d.length_squared();
+        (DRay { o: f + self.d * shift, d: self.d }, shift)
+    }
+}
+
 /// A bound on how far a computed point can be from the surface it stands for, along each axis, in metres.
 ///
 /// A surface nearer to a point than this cannot be told from the one the point lies on, so it cannot shadow the point.
@@ -25,6 +50,17 @@ impl ErrorBound {
     pub fn of_rounded(p: Vec3, terms: DVec3) -> Self {
         ErrorBound(p.abs() * (4.0 * UNIT_ROUNDOFF) + (terms * (8.0 * f64::EPSILON)).as_vec3())
     }
+
+    /// Where a ray that leaves `p` on the side of the unit normal `ng` starts: `p`, lifted until the whole box of the bound
+    /// is below the plane through the new point. What the surface curves away from cannot be hit again from there.
+    ///
+    /// The lift is the least that does it: the reach of the box along the normal.
+    /// Source: Pharr, Jakob, Humphreys, "Physically Based Rendering", 4th edition, 6.8.6.
+    #[inline(always)]
+    pub fn offset(self, p: Vec3, ng: Vec3) -> DVec3 {
+        let n = ng.as_dvec3();
+        p.as_dvec3() + n * n.abs().dot(self.0.as_dvec3())
+    }
 }
 
 /// A ray from a surface towards a light: the points `p + t l`, 0 < t < t_max.
@@ -34,8 +70,30 @@ pub struct ShadowRay {
     pub p: Vec3,
     /// How sure we are of `p`.
     pub error: ErrorBound,
+    /// Where it starts for what cannot tell one side of a surface from the other by the bound: [`ErrorBound::offset`].
+    pub start: Vec3,
     /// Towards the light, of any length.
     pub l: Vec3,
     /// 1 where `l` reaches the light, infinite where the light is infinitely far away.
     pub t_max: f32,
+}
+
+impl ShadowRay {
+    /// Whether the light is at the end of `l`.
+    #[inline(always)]
+    pub fn is_finite(&self) -> bool {
+        self.t_max == 1.0
+    }
+
+    /// Where the way ends for what has no bound of its own at the light: short of a light that lies on a surface, by the
+    /// rounding of both ends.
+    #[inline(always)]
+    pub fn end(&self) -> f32 {
+        if !self.is_finite() {
+            return f32::INFINITY;
+        }
+        let (o, l) = (self.start.abs(), self.l.abs());
+        let length = l.x + l.y + l.z;
+        1.0 - (o.x + o.y + o.z + length) / length * (32.0 * UNIT_ROUNDOFF)
+    }
 }

@@ -4,15 +4,16 @@
 //! that it could not have answered "blocked": a flat one that has the point and all of the light on one side of its
 //! plane, the sphere the point itself lies on the outside of, a sphere that is wholly below the point's horizon.
 
-use fearless_simd::{Level, dispatch, f32x16, prelude::*};
+use fearless_simd::{Level, dispatch, f32x16, mask32x16, prelude::*};
 
 use super::Counts;
 use super::pixel::{Lighting, LobeSums};
 use super::plain::Plain;
+use crate::accel::RayPacket16;
 use crate::light::{LightKind, MIN_DISTANCE2, Rectangle};
 use crate::material::Lobe;
-use crate::math::{LANES, LaneSum, Vec3x16};
-use crate::scene::Scene;
+use crate::math::{LANES, LaneSum, ShadowRay, Vec3, Vec3x16};
+use crate::scene::{Geometry, Scene, ShadowRays};
 use crate::shape::{ParallelogramShadow, PlaneSide, SphereShadow, SurfaceInteraction};
 
 /// Light, sixteen samples at a time.
@@ -32,15 +33,22 @@ impl Lanes {
     }
 }
 
-/// The sums over the points of a rectangle light that nothing in `spheres` and `flats` hides.
+/// What can stand in the way of one light, seen from one surface.
+struct Obstacles<'a> {
+    spheres: &'a [SphereShadow],
+    flats: &'a [ParallelogramShadow],
+    /// All that lies in trees.
+    trees: Option<&'a Geometry>,
+}
+
+/// The sums over the points of a rectangle light that none of the `obstacles` hides.
 #[inline(always)]
 fn gather_rectangle<S: Simd>(
     simd: S,
     rectangle: &Rectangle,
     si: &SurfaceInteraction,
     lobe: &Lobe,
-    spheres: &[SphereShadow],
-    flats: &[ParallelogramShadow],
+    obstacles: &Obstacles,
 ) -> LobeSums {
     let splat = |v: f32| simd.splat_f32x16(v);
     let zero = splat(0.0);
@@ -48,6 +56,7 @@ fn gather_rectangle<S: Simd>(
     let (ng, ns, wo) = (Vec3x16::splat(simd, si.ng), Vec3x16::splat(simd, si.ns), Vec3x16::splat(simd, si.wo));
     let is_flat = si.ng == si.ns;
     let cos_o = si.ns.dot(si.wo);
+    let shadow = si.shadow_ray(Vec3::ZERO, 1.0);
     let (mut diffuse, mut specular) = (zero, zero);
     for block in rectangle.blocks() {
         let l = Vec3x16 {
@@ -63,14 +72,20 @@ fn gather_rectangle<S: Simd>(
             lit &= ng.dot(l).simd_gt(zero);
         }
         // Not hidden
-        for sphere in spheres {
+        for sphere in obstacles.spheres {
             lit &= !sphere.blocks_lanes(l, distance2);
         }
-        for flat in flats {
+        for flat in obstacles.flats {
             lit &= !flat.blocks_lanes(l);
         }
         if lit.all_false() {
             continue;
+        }
+        if let Some(geometry) = obstacles.trees {
+            lit &= !hidden_by_trees(simd, geometry, &shadow, l, lit.to_bitmask() as u16);
+            if lit.all_false() {
+                continue;
+            }
         }
         // How much is sent this way, and what the surface makes of it
         let inverse_distance = splat(1.0) / distance2.sqrt();
@@ -85,6 +100,20 @@ fn gather_rectangle<S: Simd>(
     LobeSums { diffuse: partials(diffuse), specular: partials(specular) }
 }
 
+/// Which of the lanes in `active` something in the trees hides: `ray` says where they start, `l` where they lead.
+#[inline(always)]
+fn hidden_by_trees<S: Simd>(simd: S, geometry: &Geometry, ray: &ShadowRay, l: Vec3x16<S>, active: u16) -> mask32x16<S> {
+    let mut shadows = ShadowRays { from: *ray, rays: RayPacket16::ZERO, t_end: [0.0; LANES] };
+    for (axis, l) in [l.x, l.y, l.z].into_iter().enumerate() {
+        shadows.rays.o[axis] = [ray.start[axis]; LANES];
+        l.store_slice(&mut shadows.rays.d[axis]);
+    }
+    for (lane, end) in shadows.t_end.iter_mut().enumerate() {
+        *end = ShadowRay { l: shadows.rays.d(lane), ..*ray }.end();
+    }
+    mask32x16::from_bitmask(simd, geometry.are_blocked(simd.level(), &shadows, active) as u64)
+}
+
 #[inline(always)]
 fn partials<S: Simd>(v: f32x16<S>) -> LaneSum {
     let mut partials = [0.0; LANES];
@@ -95,14 +124,14 @@ fn partials<S: Simd>(v: f32x16<S>) -> LaneSum {
 impl Lighting for Lanes {
     fn look_around(&mut self, scene: &Scene, si: &SurfaceInteraction) {
         self.spheres.clear();
-        for sphere in &scene.spheres {
+        for sphere in &scene.obstacles {
             let shadow = sphere.shadow(si.p, si.error);
             if !shadow.is_below(si.ng) {
                 self.spheres.push(shadow);
             }
         }
         self.flats.clear();
-        self.flats.extend(scene.flat_occluders.iter().map(|flat| flat.shadow(si.p, si.error)));
+        self.flats.extend(scene.flat_obstacles.iter().map(|flat| flat.shadow(si.p, si.error)));
     }
 
     fn gather(
@@ -125,13 +154,18 @@ impl Lighting for Lanes {
                 self.between.push(*flat);
             }
         }
-        let (spheres, flats) = if light.shadows { (&self.spheres[..], &self.between[..]) } else { (&[][..], &[][..]) };
+        let trees = scene.geometry.has_trees().then_some(&*scene.geometry);
+        let obstacles = if light.shadows && si.receives_shadow {
+            Obstacles { spheres: &self.spheres, flats: &self.between, trees }
+        } else {
+            Obstacles { spheres: &[], flats: &[], trees: None }
+        };
         let samples = rectangle.samples() as u64;
         counts.shadow_rays += samples;
-        if spheres.is_empty() && flats.is_empty() {
+        if obstacles.spheres.is_empty() && obstacles.flats.is_empty() && obstacles.trees.is_none() {
             counts.shadow_rays_skipped += samples;
         }
         // One dispatch for all samples of a light: what is below is compiled for each instruction set, the rest once
-        dispatch!(self.level, simd => gather_rectangle(simd, rectangle, si, lobe, spheres, flats))
+        dispatch!(self.level, simd => gather_rectangle(simd, rectangle, si, lobe, &obstacles))
     }
 }

@@ -6,6 +6,7 @@
 //! one surface, the trait [`Lighting`].
 
 mod film;
+mod hits;
 mod lanes;
 mod pixel;
 mod plain;
@@ -22,10 +23,13 @@ use rayon::prelude::*;
 pub use film::Film;
 pub use simd::SimdLevel;
 
+use crate::camera::Projection;
 use crate::color::{Display, Encoding};
 use crate::image::{Receipt, Window};
+use crate::math::Ray;
 use crate::scene::Scene;
 use film::FilmTile;
+use hits::PixelHits;
 use lanes::Lanes;
 use pixel::{Lighting, PixelSum};
 use plain::Plain;
@@ -167,9 +171,11 @@ pub fn render(
             if stop.load(Ordering::Relaxed) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
         };
         let rendered = if settings.reference {
-            render_tile(scene, tile, &mut Plain, &go_on)
+            render_tile(scene, tile, &mut Plain, None, &go_on)
         } else {
-            render_tile(scene, tile, &mut Lanes::new(level.token()), &go_on)
+            let token = level.token();
+            let hits = scene.geometry.has_trees().then(|| PixelHits::new(token, scene.antialiasing));
+            render_tile(scene, tile, &mut Lanes::new(token), hits, &go_on)
         };
         let ControlFlow::Continue((film_tile, counts)) = rendered else { return };
         film.lock().expect("no thread panics while it holds the film").merge(&film_tile);
@@ -201,22 +207,35 @@ fn available_threads() -> usize {
     std::thread::available_parallelism().map_or(1, NonZeroUsize::get)
 }
 
-/// Renders one tile: n x n camera rays a pixel, row by row, and at each surface all lights in scene order.
-/// `go_on` is asked now and then.
+/// Renders one tile: n x n camera rays a pixel, row by row, and at each surface all lights in scene order. With `hits` the
+/// camera rays of neighbouring pixels are traced together. `go_on` is asked now and then.
 fn render_tile(
     scene: &Scene,
     tile: &Tile,
     lighting: &mut impl Lighting,
+    mut hits: Option<PixelHits>,
     go_on: &impl Fn() -> ControlFlow<()>,
 ) -> ControlFlow<(), (FilmTile, Counts)> {
     let mut film = FilmTile::new(tile);
     let mut counts = Counts::default();
     let mut pixel = PixelSum::new(scene);
-    for y in 0..tile.height {
-        for x in 0..tile.width {
-            pixel.clear();
-            pixel.sample(scene, tile.x + x, tile.y + y, lighting, &mut counts, go_on)?;
-            film.set(x, y, pixel.color(scene));
+    let side = hits.as_ref().map_or(1, PixelHits::side);
+    for top in (0..tile.height).step_by(side as usize) {
+        for left in (0..tile.width).step_by(side as usize) {
+            let (w, h) = ((tile.width - left).min(side), (tile.height - top).min(side));
+            if let Some(hits) = &mut hits {
+                hits.trace(scene, tile.x + left, tile.y + top, w, h);
+            }
+            for (y, x) in (0..h).flat_map(|y| (0..w).map(move |x| (y, x))) {
+                let hit = |column: u32, row: u32, ray: &Ray| match &hits {
+                    Some(hits) => hits.get(scene.antialiasing, x, y, column, row),
+                    None => scene.intersect(ray),
+                };
+                pixel.clear();
+                let at = [tile.x + left + x, tile.y + top + y];
+                pixel.sample(scene, at, lighting, hit, &mut counts, go_on)?;
+                film.set(left + x, top + y, pixel.color(scene));
+            }
         }
     }
     ControlFlow::Continue((film, counts))
@@ -249,6 +268,15 @@ impl Scene {
                 format!("{encoding}, exposure {exposure}; 8- and 16-bit files only")
             }),
         ];
+        if let Some(time) = self.time {
+            entries.push(("time", time.to_string()));
+        }
+        if self.camera.projection() != Projection::Perspective {
+            entries.push(("projection", self.camera.projection().name().to_owned()));
+        }
+        if self.camera.film_shift() != [0.0; 2] {
+            entries.push(("film_shift", numbers(self.camera.film_shift())));
+        }
         if !self.placeholders.is_empty() {
             entries.push(("placeholders", self.placeholders.join(" ")));
         }

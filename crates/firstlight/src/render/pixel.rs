@@ -2,11 +2,12 @@
 
 use std::ops::ControlFlow;
 
+use super::hits::camera_ray;
 use super::{Counts, QUESTION_EVERY};
 use crate::color::Rgb;
 use crate::material::{Bsdf, Lobe};
-use crate::math::LaneSum;
-use crate::scene::{CameraHit, Scene};
+use crate::math::{LaneSum, Ray};
+use crate::scene::{CameraHit, Hit, Scene};
 use crate::shape::SurfaceInteraction;
 
 /// How the light of one source is summed at one surface: the only thing in which the renderers differ.
@@ -54,30 +55,27 @@ impl PixelSum {
         self.lights.fill([Rgb::BLACK; 2]);
     }
 
-    /// Sends the n x n camera rays of pixel (`i`, `j`), row by row, and adds what they see.
+    /// Sends the n x n camera rays of pixel (`i`, `j`), row by row, and adds what they see. `hit` says what the ray of a
+    /// column and a row ends at.
     pub fn sample(
         &mut self,
         scene: &Scene,
-        i: u32,
-        j: u32,
+        [i, j]: [u32; 2],
         lighting: &mut impl Lighting,
+        hit: impl Fn(u32, u32, &Ray) -> Option<Hit>,
         counts: &mut Counts,
         go_on: &impl Fn() -> ControlFlow<()>,
     ) -> ControlFlow<()> {
         let n = scene.antialiasing;
-        let step = 1.0 / n as f32;
         for row in 0..n {
             for column in 0..n {
-                // The middle of the sub-pixel
-                let x = i as f32 + (column as f32 + 0.5) / n as f32;
-                let y = j as f32 + (row as f32 + 0.5) / n as f32;
-                let (ray, differential) = scene.camera.ray(x, y, step);
+                let (ray, differential) = camera_ray(scene, i * n + column, j * n + row);
                 counts.camera_rays += 1;
                 if counts.shadow_rays >= counts.next_question {
                     counts.next_question = counts.shadow_rays + QUESTION_EVERY;
                     go_on()?;
                 }
-                match scene.look(&ray, &differential) {
+                match scene.see(&ray, hit(column, row, &ray), &differential) {
                     CameraHit::Background => self.background += 1,
                     CameraHit::Emission(color) => self.emission += color,
                     CameraHit::Surface(si) => {

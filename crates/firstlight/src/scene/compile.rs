@@ -3,25 +3,35 @@
 use std::collections::HashMap;
 use std::sync::Arc;
 
+use fearless_simd::Level;
+
+use super::geometry::Geometry;
+use super::place::compile_shapes;
 use super::{DisplayEncoding, RenderDesc, Scene, SceneDesc, SceneSummary};
 use crate::camera::{Camera, CameraDesc};
 use crate::color::{Display, Encoding, Rgb};
-use crate::context::{AssetError, Assets, CompileContext};
-use crate::describe::{ColorParam, NumberParam};
+use crate::context::{AssetError, Assets, CompileContext, OnCompile};
+use crate::describe::{ColorParam, Family, NumberParam};
 use crate::error::{Diagnostic, SceneError, Severity};
-use crate::ids::{MaterialId, TextureId};
+use crate::ids::TextureId;
 use crate::image::read::{Limits, TexelData, Texels, decode};
 use crate::light::{Light, LightDesc, LightKind, MAX_SAMPLES};
 use crate::material::{LobeKind, MAX_SHININESS, Material, MaterialDesc};
-use crate::math::{DVec3, Vec3};
-use crate::shape::{Parallelogram, PlaneSide, ShapeDesc, Sphere};
+use crate::shape::{Parallelogram, PlaneSide, ShapeDesc};
 use crate::texture::{Param, Texture, TextureDesc, TextureSpace};
+use crate::transform::MAX_TIME;
 
-/// How strict compiling is.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+/// How strict compiling is, and which moment is compiled.
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct CompileOptions {
     /// Warnings are errors.
     pub strict: bool,
+    /// A scene without a camera is given one that sees all of it, a scene without lights is given one.
+    pub complete: bool,
+    /// Told what is being done, for scenes that take their time.
+    pub progress: Option<OnCompile>,
+    /// In seconds, from -1e9 to 1e9: where the scene has keys, it is compiled as it is at this time.
+    pub time: f64,
 }
 
 /// A scene, and what is odd about it.
@@ -37,6 +47,8 @@ pub struct Compiled {
 const MAX_PIXELS: u64 = 1 << 27;
 const MAX_SIDE: u32 = 65536;
 const MAX_ANTIALIASING: u32 = 64;
+const MIN_FPS: f64 = 0.001;
+const MAX_FPS: f64 = 1e6;
 /// The largest picture file read as a texture, in bytes.
 const MAX_TEXTURE_FILE: u64 = 1 << 30;
 
@@ -46,7 +58,7 @@ impl SceneDesc {
     /// # Errors
     /// Every fault at once, each with the path of its value.
     pub fn compile(&self, assets: &dyn Assets, options: &CompileOptions) -> Result<Compiled, SceneError> {
-        let (scene, mut faults) = self.compile_or_faults(assets);
+        let (scene, mut faults) = self.compile_or_faults(assets, options);
         if options.strict {
             faults.iter_mut().for_each(|fault| fault.severity = Severity::Error);
         }
@@ -59,23 +71,34 @@ impl SceneDesc {
     }
 
     /// The scene, if there are no errors, and all errors and warnings.
-    pub(crate) fn compile_or_faults(&self, assets: &dyn Assets) -> (Option<Scene>, Vec<Diagnostic>) {
-        let mut cx = CompileContext::default();
+    pub(crate) fn compile_or_faults(
+        &self,
+        assets: &dyn Assets,
+        options: &CompileOptions,
+    ) -> (Option<Scene>, Vec<Diagnostic>) {
+        let time = options.time;
+        let mut cx = CompileContext::at_time(time);
+        cx.progress = options.progress.clone();
         let cx = &mut cx;
+        cx.between("time", time, -MAX_TIME, MAX_TIME, Some("the moment to compile, in seconds"));
         let picture = self.compile_render(cx);
-        let camera = self.compile_camera(cx, picture.width, picture.height);
         let mut textures = Textures::new(self, assets);
         textures.check(cx);
         let materials = self.compile_materials(cx, &mut textures);
         textures.check_unused(cx);
-        let shapes = self.compile_shapes(cx);
-        let lights = self.compile_lights(cx);
-        if cx.has_errors() {
+        let mut files = Vec::new();
+        let geometry = compile_shapes(self, cx, assets, &mut files);
+        let completed = options.complete.then(|| self.completed(geometry.as_ref().and_then(Geometry::bounds)));
+        let desc = completed.as_ref().unwrap_or(self);
+        let camera = desc.compile_camera(cx, picture.width, picture.height);
+        let lights = desc.compile_lights(cx);
+        let (Some(geometry), false) = (geometry, cx.has_errors()) else {
             return (None, cx.take_faults());
-        }
-        let flat_occluders: Vec<_> = shapes.parallelograms.iter().copied().chain(blocking(&lights)).collect();
-        let light_sides = sides(&lights, &flat_occluders);
-        let summary = self.summary(&shapes, &lights, &textures);
+        };
+        let (obstacles, flats) = geometry.listed_obstacles();
+        let flat_obstacles: Vec<_> = flats.into_iter().chain(blocking(&lights)).collect();
+        let light_sides = sides(&lights, &flat_obstacles);
+        let summary = self.summary(desc, &geometry, &lights, &textures);
         let scene = Scene {
             width: picture.width,
             height: picture.height,
@@ -85,14 +108,15 @@ impl SceneDesc {
             transparent: self.render.transparent,
             ambient: picture.ambient,
             display: picture.display,
-            spheres: shapes.spheres,
-            parallelograms: shapes.parallelograms,
+            geometry: Arc::new(geometry),
             lights,
             materials,
-            shape_materials: shapes.materials,
-            flat_occluders,
+            obstacles,
+            flat_obstacles,
             light_sides,
-            hash: self.hash(&textures),
+            level: Level::new(),
+            hash: self.hash(&textures, &files, options.complete),
+            time: cx.keyed.then_some(time),
             placeholders: textures.placeholders,
             textures: textures.compiled,
             summary,
@@ -115,6 +139,7 @@ impl SceneDesc {
             cx.count("samples", render.samples, 1, MAX_SAMPLES, Some("points on each area light"));
             let gamma = cx.between("gamma", render.gamma, 0.1, 10.0, Some("2.2 is usual"));
             let exposure = cx.between("exposure", render.exposure, -64.0, 64.0, Some("in stops: each doubles"));
+            cx.between("fps", render.fps, MIN_FPS, MAX_FPS, Some("frames in a second"));
             let encoding = match render.display {
                 DisplayEncoding::Srgb => Encoding::Srgb,
                 DisplayEncoding::Gamma => Encoding::Gamma(gamma),
@@ -150,7 +175,7 @@ impl SceneDesc {
         }
         // Never used when there was a fault
         let placeholder = || CameraDesc::new([0.0, 0.0, 1.0]).compile(&mut CompileContext::default(), 1, 1);
-        Camera::Pinhole(chosen.unwrap_or_else(placeholder))
+        chosen.unwrap_or_else(placeholder)
     }
 
     fn chosen_camera(&self) -> Option<usize> {
@@ -192,40 +217,6 @@ impl SceneDesc {
         materials
     }
 
-    fn compile_shapes(&self, cx: &mut CompileContext) -> Shapes {
-        let names: Vec<&str> = self.materials.iter().map(|(name, _)| name.as_str()).collect();
-        let ids: HashMap<&str, u32> = names.iter().enumerate().rev().map(|(id, name)| (*name, id as u32)).collect();
-        let material = |cx: &mut CompileContext, wanted: &Option<String>| match wanted {
-            None => MaterialId(names.len() as u32),
-            Some(wanted) => {
-                let found = ids.get(wanted.as_str());
-                if found.is_none() {
-                    cx.unknown("material", "material", wanted, &names);
-                }
-                MaterialId(found.copied().unwrap_or(0))
-            }
-        };
-        // Scene order: kind by kind, in each the order of the text
-        let mut shapes = Shapes::default();
-        for shape in &self.shapes {
-            if let ShapeDesc::Sphere(desc) = shape {
-                cx.within(&format!("sphere[{}]", shapes.spheres.len()), |cx| {
-                    shapes.spheres.push(desc.compile(cx));
-                    shapes.materials.push(material(cx, &desc.material));
-                });
-            }
-        }
-        for shape in &self.shapes {
-            if let ShapeDesc::Parallelogram(desc) = shape {
-                cx.within(&format!("parallelogram[{}]", shapes.parallelograms.len()), |cx| {
-                    shapes.parallelograms.push(desc.compile(cx));
-                    shapes.materials.push(material(cx, &desc.material));
-                });
-            }
-        }
-        shapes
-    }
-
     fn compile_lights(&self, cx: &mut CompileContext) -> Vec<Light> {
         let samples = self.render.samples;
         let points = self.lights.iter().map(|light| match light {
@@ -253,36 +244,38 @@ impl SceneDesc {
         lights
     }
 
-    fn summary(&self, shapes: &Shapes, lights: &[Light], textures: &Textures) -> SceneSummary {
-        let mut bounds: Option<[Vec3; 2]> = None;
-        let mut cover = |low: Vec3, high: Vec3| {
-            bounds = Some(bounds.map_or([low, high], |[a, b]| [a.min(low), b.max(high)]));
-        };
-        for sphere in &shapes.spheres {
-            let r = DVec3::splat(sphere.r);
-            cover((sphere.c - r).as_vec3(), (sphere.c + r).as_vec3());
-        }
-        for corner in shapes.parallelograms.iter().flat_map(|p| p.corners) {
-            cover(corner, corner);
-        }
+    fn summary(
+        &self,
+        completed: &SceneDesc,
+        geometry: &Geometry,
+        lights: &[Light],
+        textures: &Textures,
+    ) -> SceneSummary {
+        let kinds = ShapeDesc::KINDS.iter().enumerate();
+        let count = |kind: usize| self.shapes.iter().filter(|shape| shape.kind_index() == kind).count();
         let mut described = Vec::new();
         for kind in LightDesc::KINDS {
-            described.extend(self.lights.iter().filter(|light| light.kind() == *kind));
+            described.extend(completed.lights.iter().filter(|light| light.kind() == *kind));
         }
         SceneSummary {
-            spheres: shapes.spheres.len(),
-            parallelograms: shapes.parallelograms.len(),
+            shapes: kinds.map(|(kind, word)| (*word, count(kind))).filter(|(_, count)| *count > 0).collect(),
+            groups: self.groups.iter().map(|(name, group)| (name.clone(), group.shapes.len())).collect(),
+            surfaces: geometry.surfaces.len(),
+            placed: geometry.placed.len(),
+            triangles: geometry.all_meshes().map(|mesh| mesh.triangles.len() as u64).sum(),
+            points: geometry.point_sets.iter().map(|points| points.len() as u64).sum(),
+            geometry_bytes: geometry.bytes(),
             lights: described.iter().zip(lights).map(|(d, l)| (d.kind(), d.name(), l.samples())).collect(),
             materials: self.materials.iter().map(|(name, m)| (name.clone(), m.kind())).collect(),
             textures: textures.sizes(),
             texture_bytes: textures.bytes(),
-            bounds: bounds.map(|b| b.map(|v| v.to_array())),
+            bounds: geometry.bounds().map(|b| b.map(|v| v.as_vec3().to_array())),
             camera: self.chosen_camera().map(|i| self.cameras[i].0.clone()).unwrap_or_default(),
         }
     }
 
     /// BLAKE3 of all that decides the picture. What follows from a default is hashed as if it were said.
-    fn hash(&self, textures: &Textures) -> String {
+    fn hash(&self, textures: &Textures, meshes: &[(String, [u8; 32])], complete: bool) -> String {
         let mut said = self.clone();
         said.render.camera = self.chosen_camera().map(|i| self.cameras[i].0.clone());
         for light in &mut said.lights {
@@ -291,10 +284,17 @@ impl SceneDesc {
             }
         }
         said.render.samples = RenderDesc::default().samples;
+        said.render.fps = RenderDesc::default().fps;
         let mut hasher = blake3::Hasher::new();
         hasher.update(said.to_json().as_bytes());
         for (file, hash) in textures.file_hashes() {
             hasher.update(file.as_bytes()).update(&[0]).update(&hash);
+        }
+        if complete {
+            hasher.update(b"complete");
+        }
+        for (file, hash) in meshes {
+            hasher.update(file.as_bytes()).update(&[0]).update(hash);
         }
         hasher.finalize().to_hex().to_string()
     }
@@ -308,14 +308,6 @@ struct Picture {
     background: Rgb,
     ambient: Rgb,
     display: Display,
-}
-
-/// The shapes, kind by kind, and the material of each in the same order.
-#[derive(Default)]
-struct Shapes {
-    spheres: Vec<Sphere>,
-    parallelograms: Vec<Parallelogram>,
-    materials: Vec<MaterialId>,
 }
 
 /// The shapes of the lights that stand in the way of others.

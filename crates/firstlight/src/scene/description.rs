@@ -4,7 +4,7 @@ use crate::camera::CameraDesc;
 use crate::describe::{ColorDesc, table, words};
 use crate::light::LightDesc;
 use crate::material::MaterialDesc;
-use crate::shape::ShapeDesc;
+use crate::shape::{GroupDesc, ShapeDesc};
 use crate::texture::TextureDesc;
 
 words! {
@@ -51,6 +51,9 @@ table! {
         pub gamma: f64 = 2.2,
         /// In stops: 8- and 16-bit pictures are multiplied by 2^exposure, from -64 to 64.
         pub exposure: f64 = 0.0,
+        /// Frames in a second, 0.001 to 1000000: frame number n of `--frames` is the moment n / fps. Without keys it is of no
+        /// account.
+        pub fps: f64 = 24.0,
     }
 }
 
@@ -68,8 +71,10 @@ pub struct SceneDesc {
     pub textures: Vec<(String, TextureDesc)>,
     /// `[material.KIND.NAME]`
     pub materials: Vec<(String, MaterialDesc)>,
-    /// `[[sphere]]`, `[[parallelogram]]`
+    /// `[[sphere]]`, `[[mesh]]` and so on.
     pub shapes: Vec<ShapeDesc>,
+    /// `[group.NAME]`, in the order of the text.
+    pub groups: Vec<(String, GroupDesc)>,
     /// `[[light.KIND]]`
     pub lights: Vec<LightDesc>,
 }

@@ -4,26 +4,38 @@ mod builtin;
 mod compile;
 mod course;
 mod description;
+mod geometry;
+mod model;
+mod place;
 mod text;
 mod trace;
+mod trees;
 
 pub use builtin::{Builtin, builtin_scenes};
 pub use compile::{CompileOptions, Compiled};
 pub use description::{DisplayEncoding, RenderDesc, SceneDesc};
+pub use model::{ModelSettings, UpAxis};
 pub use text::{Parsed, reference, schema};
 pub use trace::{CameraHit, Hit};
 
+use std::sync::Arc;
+
+use fearless_simd::Level;
+
 use crate::camera::Camera;
 use crate::color::{Display, Rgb};
-use crate::ids::MaterialId;
+use crate::ids::SurfaceId;
 use crate::light::Light;
 use crate::material::Material;
 use crate::shape::{Parallelogram, PlaneSide, Sphere};
+
 use crate::texture::Texture;
+pub(crate) use geometry::{Geometry, Nearest};
+pub(crate) use trees::ShadowRays;
 
 /// A scene, ready to be rendered: flat lists and ids. Between here and the image nothing can fail.
 ///
-/// Surfaces are numbered in scene order: spheres, parallelograms, then all lights.
+/// Surfaces are numbered in scene order: shapes kind by kind, what instances place after them, then all lights.
 #[derive(Clone, Debug)]
 pub struct Scene {
     pub(crate) width: u32,
@@ -35,18 +47,21 @@ pub struct Scene {
     pub(crate) transparent: bool,
     pub(crate) ambient: Rgb,
     pub(crate) display: Display,
-    pub(crate) spheres: Vec<Sphere>,
-    pub(crate) parallelograms: Vec<Parallelogram>,
+    pub(crate) geometry: Arc<Geometry>,
     pub(crate) lights: Vec<Light>,
     pub(crate) materials: Vec<Material>,
     pub(crate) textures: Vec<Texture>,
-    /// The material of each shape, by surface id.
-    pub(crate) shape_materials: Vec<MaterialId>,
-    /// All that is flat and stands in the way of light: the parallelograms, then the rectangle lights that block.
-    pub(crate) flat_occluders: Vec<Parallelogram>,
-    /// For each rectangle light, on which side of each flat occluder it lies; where nothing is known, both.
+    /// The listed spheres that stand in the way of light.
+    pub(crate) obstacles: Vec<Sphere>,
+    /// All that is flat, listed and in the way of light: parallelograms, then the rectangle lights that block.
+    pub(crate) flat_obstacles: Vec<Parallelogram>,
+    /// For each rectangle light, on which side of each flat obstacle it lies; where nothing is known, both.
     pub(crate) light_sides: Vec<Vec<PlaneSide>>,
+    /// The best instruction set of this processor: for rays that are asked for one at a time.
+    pub(crate) level: Level,
     pub(crate) hash: String,
+    /// The moment, in seconds, if anything of the scene changes with time.
+    pub(crate) time: Option<f64>,
     /// The texture files that something stands in for.
     pub(crate) placeholders: Vec<String>,
     pub(crate) summary: SceneSummary,
@@ -55,10 +70,20 @@ pub struct Scene {
 /// What a scene holds, for people.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SceneSummary {
-    /// Spheres.
-    pub spheres: usize,
-    /// Parallelograms.
-    pub parallelograms: usize,
+    /// How many of each kind of shape are described, outside of groups; only kinds that there are.
+    pub shapes: Vec<(&'static str, usize)>,
+    /// The names of the groups, and how many shapes each describes.
+    pub groups: Vec<(String, usize)>,
+    /// What can be hit: the ids of shapes, instances counted by what they hold.
+    pub surfaces: usize,
+    /// Things that have a place of their own in the upper tree.
+    pub placed: usize,
+    /// Triangles of all meshes, each counted once however often it is placed.
+    pub triangles: u64,
+    /// Spheres of all point sets.
+    pub points: u64,
+    /// Bytes of meshes and point sets without their trees, and of all trees.
+    pub geometry_bytes: [u64; 2],
     /// Kind, name if it has one, and number of sampled points of each light, in scene order.
     pub lights: Vec<(&'static str, Option<String>, usize)>,
     /// Name and kind of each material, in the order of the text.
@@ -100,7 +125,24 @@ impl Scene {
         &self.camera
     }
 
-    /// 64 hexadecimal digits: BLAKE3 of the description, its settings and the files it names.
+    /// How many things can be hit: shapes, those that instances place, and lights. Ids count from 0.
+    pub fn surfaces(&self) -> usize {
+        self.geometry.surfaces.len() + self.lights.len()
+    }
+
+    /// What the scene calls a shape: the names of the instances around it and its own, with `/` between. `None` without
+    /// any, and for lights.
+    pub fn surface_name(&self, id: SurfaceId) -> Option<&str> {
+        self.geometry.surfaces.get(id.index())?.name.as_deref()
+    }
+
+    /// The moment that was compiled, in seconds; `None` if nothing in the scene changes with time.
+    pub fn time(&self) -> Option<f64> {
+        self.time
+    }
+
+    /// 64 hexadecimal digits: BLAKE3 of the description, its settings and the files it names. The same at all times: what
+    /// moves is told apart by [`time`](Self::time).
     pub fn hash(&self) -> &str {
         &self.hash
     }

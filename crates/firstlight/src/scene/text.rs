@@ -18,15 +18,16 @@ use super::course;
 use super::description::{RenderDesc, SceneDesc};
 use crate::camera::CameraDesc;
 use crate::context::{AssetError, Assets};
-use crate::describe::Family;
 use crate::describe::node::{self, Data, Node, Span, Syntax, quoted};
 use crate::describe::read::{Fault, Faults, Reader, nearest};
 use crate::describe::value::{join_path, normalized};
+use crate::describe::write::key;
+use crate::describe::{Family, Table};
 use crate::error::{Diagnostic, SceneError, Severity};
 use crate::light::LightDesc;
 use crate::material::MaterialDesc;
 use crate::scene::compile::{CompileOptions, Compiled};
-use crate::shape::ShapeDesc;
+use crate::shape::{GroupDesc, ShapeDesc};
 use crate::texture::TextureDesc;
 
 /// Most bytes of all texts of a scene together: 64 MiB.
@@ -37,7 +38,12 @@ const MAX_INCLUDE_DEPTH: usize = 32;
 const MAX_FILES: usize = 1024;
 
 /// The keys of a scene's top level.
-const TOP: &[&str] = &["include", "render", "camera", "texture", "material", "sphere", "parallelogram", "light"];
+const BEFORE_SHAPES: &[&str] = &["include", "render", "camera", "texture", "material"];
+const AFTER_SHAPES: &[&str] = &["group", "light"];
+
+fn top() -> Vec<&'static str> {
+    [BEFORE_SHAPES, ShapeDesc::KINDS, AFTER_SHAPES].concat()
+}
 
 /// A description as it was read, with the faults of its text and the places of its values.
 #[derive(Debug)]
@@ -53,6 +59,13 @@ pub struct Parsed {
     sources: Sources,
     /// A whole text or a group of named things is missing, so that compiling would complain without reason.
     incomplete: bool,
+}
+
+impl From<SceneDesc> for Parsed {
+    /// A description that was made in code: its faults have no places.
+    fn from(desc: SceneDesc) -> Self {
+        Self::new(desc, Sources::default(), Faults::default(), false)
+    }
 }
 
 impl Parsed {
@@ -129,6 +142,9 @@ impl SceneDesc {
         self.textures.sort_by_key(|(_, texture)| texture.kind_index());
         self.materials.sort_by_key(|(_, material)| material.kind_index());
         self.shapes.sort_by_key(Family::kind_index);
+        for (_, group) in &mut self.groups {
+            group.shapes.sort_by_key(Family::kind_index);
+        }
         self.lights.sort_by_key(Family::kind_index);
     }
 }
@@ -325,6 +341,10 @@ impl Loader<'_> {
                 "camera" => {
                     reader.within("camera", |r| cameras(r, file, node, &mut self.names, &mut self.desc.cameras))
                 }
+                "group" => reader.within("group", |r| {
+                    let (names, groups) = (&mut self.names, &mut self.desc.groups);
+                    read_groups(r, file, node, &mut arrays, names, groups, &mut self.incomplete);
+                }),
                 "light" => reader.within("light", |r| {
                     for (kind, name, node) in kinds::<LightDesc>(r, node, &mut self.incomplete) {
                         let lights = &mut self.desc.lights;
@@ -357,9 +377,10 @@ impl Loader<'_> {
                     } else if TextureDesc::KINDS.contains(&key) {
                         format!("textures are written [texture.{key}.NAME]")
                     } else {
+                        let top = top();
                         let near =
-                            nearest(key, TOP).map(|near| format!("did you mean \"{near}\"? ")).unwrap_or_default();
-                        format!("{near}a scene takes {}", TOP.join(", "))
+                            nearest(key, &top).map(|near| format!("did you mean \"{near}\"? ")).unwrap_or_default();
+                        format!("{near}a scene takes {}", top.join(", "))
                     };
                     reader.within(&node::shortened(key), |r| r.error(span, "unknown key", Some(hint)));
                 }
@@ -403,6 +424,66 @@ impl Arrays<'_> {
             reader.at(*count, |r| read(r, element));
             *count += 1;
         }
+    }
+}
+
+/// Reads `[group.NAME]`: tables of arrays of shapes.
+fn read_groups(
+    reader: &mut Reader<'_>,
+    file: usize,
+    node: &Node,
+    arrays: &mut Arrays<'_>,
+    names: &mut HashMap<(&'static str, String), (usize, Span)>,
+    groups: &mut Vec<(String, GroupDesc)>,
+    incomplete: &mut bool,
+) {
+    let Some(entries) = node.entries() else {
+        let hint = "write [[group.NAME.KIND]] for each shape of a group";
+        reader.wrong_type(node, "a table of groups by name", Some(hint.into()));
+        reader.poison();
+        *incomplete = true;
+        return;
+    };
+    for entry in entries {
+        let name = &entry.key;
+        reader.within(name, |r| {
+            let span = entry.value.span;
+            if let Some(other) = names.get(&("group", name.clone())) {
+                let message = format!("the name {} is taken", quoted(name));
+                r.conflict(span, message, Some("each group is described in one place".into()), Some(*other));
+                return;
+            }
+            names.insert(("group", name.clone()), (file, span));
+            let mut group = GroupDesc::default();
+            match entry.value.entries() {
+                None => {
+                    let hint = format!("write [[group.{}.KIND]] for each shape of the group", key(name));
+                    r.wrong_type(&entry.value, "a table of shapes by kind", Some(hint));
+                    r.poison();
+                }
+                Some(kinds) => {
+                    for of_kind in kinds {
+                        let kind = ShapeDesc::KINDS.iter().position(|k| *k == of_kind.key);
+                        r.within(&of_kind.key, |r| match kind {
+                            Some(kind) => {
+                                let path = format!("group.{}.{}", key(name), of_kind.key);
+                                arrays.read(r, &path, &of_kind.key, &of_kind.value, |r, node| {
+                                    group.shapes.push(ShapeDesc::read(kind, node, r));
+                                });
+                            }
+                            None => {
+                                let near = nearest(&of_kind.key, ShapeDesc::KINDS)
+                                    .map(|near| format!("did you mean \"{near}\"? "))
+                                    .unwrap_or_default();
+                                let hint = format!("{near}a group takes {}", ShapeDesc::KINDS.join(", "));
+                                r.error(of_kind.key_span, "unknown key", Some(hint));
+                            }
+                        });
+                    }
+                }
+            }
+            groups.push((name.clone(), group));
+        });
     }
 }
 
@@ -517,9 +598,15 @@ fn cameras(
         }
         return;
     }
-    // Tables among values: two ways of saying cameras in one
+    // Tables among values: two ways of saying cameras in one, but for those that a camera has of its own
     if let Data::Table(entries) = &mut node.data {
+        let own = |entry: &node::Entry| {
+            CameraDesc::info().iter().any(|field| field.name == entry.key && !field.tables.is_empty())
+        };
         entries.retain(|entry| {
+            if is_table(&entry.value) && own(entry) {
+                return true;
+            }
             if is_table(&entry.value) {
                 let hint = "give the camera without a name one, as [camera.NAME]";
                 reader.within(&entry.key, |r| {

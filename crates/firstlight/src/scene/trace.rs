@@ -1,20 +1,16 @@
 //! What a ray sees, and whether light gets through.
 
+use fearless_simd::Level;
+
 use super::Scene;
+use super::geometry::{At, Nearest};
 use crate::color::Rgb;
 use crate::ids::SurfaceId;
 use crate::light::LightKind;
 use crate::math::{Ray, ShadowRay};
 use crate::shape::{RayDifferential, ShapePoint, SurfaceInteraction};
 
-/// The first surface on a ray.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Hit {
-    /// Where: the ray's `o + t d`, t > 0. In f64: what is first on a ray is not left to rounding.
-    pub t: f64,
-    /// What.
-    pub surface: SurfaceId,
-}
+pub use super::geometry::Hit;
 
 /// What a camera ray ends at.
 #[derive(Clone, Copy, Debug)]
@@ -28,43 +24,60 @@ pub enum CameraHit {
 }
 
 impl Scene {
-    /// The first surface on a ray; of several at the same distance, the one with the lowest id.
+    /// The first surface on a ray that a camera can see; of several at the same distance, the one with the lowest id.
     #[inline(always)]
     pub fn intersect(&self, ray: &Ray) -> Option<Hit> {
-        let mut nearest: Option<Hit> = None;
-        let mut meet = |t: Option<f64>, id: usize| {
-            if let Some(t) = t
-                && nearest.is_none_or(|hit| t < hit.t)
-            {
-                nearest = Some(Hit { t, surface: SurfaceId(id as u32) });
+        self.intersect_at(self.level, ray)
+    }
+
+    /// [`intersect`](Self::intersect) with an instruction set: the same answer.
+    #[inline(always)]
+    pub(crate) fn intersect_at(&self, level: Level, ray: &Ray) -> Option<Hit> {
+        let mut nearest = Nearest::default();
+        self.meet_listed(ray, &mut nearest);
+        if self.geometry.has_trees() {
+            self.geometry.meet_trees(level, ray, &mut nearest);
+        }
+        nearest.0
+    }
+
+    /// The shapes that lie in lists, and the lights.
+    #[inline(always)]
+    pub(crate) fn meet_listed(&self, ray: &Ray, nearest: &mut Nearest) {
+        if self.geometry.listed {
+            for (i, sphere) in self.geometry.spheres.iter().enumerate() {
+                if sphere.seen
+                    && let Some(t) = sphere.shape.intersect(ray)
+                {
+                    nearest.offer(t, sphere.surface, At::Sphere(i as u32));
+                }
             }
-        };
-        let mut id = 0;
-        for sphere in &self.spheres {
-            meet(sphere.intersect(ray), id);
-            id += 1;
+            for (i, flat) in self.geometry.parallelograms.iter().enumerate() {
+                if flat.seen
+                    && let Some(t) = flat.shape.intersect(ray)
+                {
+                    nearest.offer(t, flat.surface, At::Parallelogram(i as u32));
+                }
+            }
         }
-        for parallelogram in &self.parallelograms {
-            meet(parallelogram.intersect(ray), id);
-            id += 1;
-        }
-        for light in &self.lights {
+        let first_light = self.geometry.surfaces.len();
+        for (i, light) in self.lights.iter().enumerate() {
             if let LightKind::Rectangle(rectangle) = &light.kind
                 && rectangle.visible
+                && let Some(t) = rectangle.shape.intersect(ray)
             {
-                meet(rectangle.shape.intersect(ray), id);
+                nearest.offer(t, SurfaceId((first_light + i) as u32), At::Light);
             }
-            id += 1;
         }
-        nearest
     }
 
     /// Whether anything stands between a surface and a light. Any hit will do, so the order is of no account.
     #[inline]
     pub fn occluded(&self, ray: &ShadowRay) -> bool {
         let finite = ray.t_max == 1.0;
-        self.spheres.iter().any(|sphere| sphere.shadow(ray.p, ray.error).blocks(ray.l, finite))
-            || self.flat_occluders.iter().any(|flat| flat.shadow(ray.p, ray.error).blocks(ray.l, finite))
+        self.obstacles.iter().any(|sphere| sphere.shadow(ray.p, ray.error).blocks(ray.l, finite))
+            || self.flat_obstacles.iter().any(|flat| flat.shadow(ray.p, ray.error).blocks(ray.l, finite))
+            || self.geometry.has_trees() && self.geometry.is_blocked(self.level, ray)
     }
 
     /// The surface at a hit, turned to the viewer. `differential` is that of the camera ray.
@@ -73,23 +86,29 @@ impl Scene {
     /// If the hit is a light's: a light has no material.
     #[inline(always)]
     pub fn surface(&self, ray: &Ray, hit: &Hit, differential: &RayDifferential) -> SurfaceInteraction {
-        let id = hit.surface.index();
-        let ShapePoint { p, error, normal, uv, footprint } = match id.checked_sub(self.spheres.len()) {
-            None => self.spheres[id].point(ray, hit.t, differential),
-            Some(i) => self.parallelograms[i].point(ray, hit.t, differential),
-        };
+        let surface = &self.geometry.surfaces[hit.surface.index()];
+        let point = self.geometry.point(ray, hit, differential);
+        let ShapePoint { p, error, normal, shading, uv, footprint, tangents, color } = point;
         let wo = -ray.d;
-        let ng = if normal.dot(wo) < 0.0 { -normal } else { normal };
-        let material = self.shape_materials[id];
-        SurfaceInteraction { p, error, ng, ns: ng, wo, uv, footprint, surface: hit.surface, material }
+        let (ng, ns) = if normal.dot(wo) < 0.0 { (-normal, -shading) } else { (normal, shading) };
+        let material = surface.material.unwrap_or_else(|| self.geometry.face_material(hit));
+        let receives_shadow = surface.receives_shadow;
+        let surface = hit.surface;
+        SurfaceInteraction { p, error, ng, ns, wo, uv, footprint, tangents, color, surface, material, receives_shadow }
     }
 
     /// What a camera ray ends at.
     #[inline(always)]
     pub fn look(&self, ray: &Ray, differential: &RayDifferential) -> CameraHit {
-        match self.intersect(ray) {
+        self.see(ray, self.intersect(ray), differential)
+    }
+
+    /// What the camera sees of a hit.
+    #[inline(always)]
+    pub(crate) fn see(&self, ray: &Ray, hit: Option<Hit>, differential: &RayDifferential) -> CameraHit {
+        match hit {
             None => CameraHit::Background,
-            Some(hit) => match hit.surface.index().checked_sub(self.shape_materials.len()) {
+            Some(hit) => match hit.surface.index().checked_sub(self.geometry.surfaces.len()) {
                 Some(light) => CameraHit::Emission(self.lights[light].radiance),
                 None => CameraHit::Surface(self.surface(ray, &hit, differential)),
             },

@@ -3,17 +3,51 @@
 //! Each shape is a room: what a scene may say of it, how a ray meets it, its texture coordinates, and how it stands in
 //! the way of light.
 
+mod ball;
+#[cfg(test)]
+mod check;
+mod common;
+mod cone;
+mod cuboid;
+mod cylinder;
+mod disk;
+mod frustum;
+mod group;
+mod mesh;
 mod parallelogram;
+mod placement;
+mod plane;
+mod point_set;
+mod rectangle;
+mod solid;
 mod sphere;
 mod surface;
+mod torus;
+mod triangles;
 
+pub use cone::ConeDesc;
+pub use cuboid::BoxDesc;
+pub use cylinder::CylinderDesc;
+pub use disk::DiskDesc;
+pub use group::{GroupDesc, InstanceDesc};
+pub use mesh::MeshDesc;
 pub use parallelogram::{Parallelogram, ParallelogramDesc};
+pub use plane::PlaneDesc;
+pub use point_set::PointSetDesc;
+pub use rectangle::RectangleDesc;
 pub use sphere::{Sphere, SphereDesc, SphereUv};
 pub use surface::{Footprint, RayDifferential, SurfaceInteraction, UvEdge};
+pub use torus::TorusDesc;
 
+pub(crate) use common::Common;
+pub(crate) use mesh::{Mesh, MeshBuilder, MeshSource, TrianglePoint};
 pub(crate) use parallelogram::{ParallelogramShadow, PlaneSide};
+pub(crate) use placement::Placement;
+pub(crate) use point_set::PointSet;
+pub(crate) use solid::{Solid, SolidHit};
 pub(crate) use sphere::SphereShadow;
 pub(crate) use surface::ShapePoint;
+pub(crate) use triangles::{TileHits, TriangleTree, every};
 
 use crate::describe::family;
 
@@ -24,5 +58,45 @@ family! {
         Sphere(SphereDesc) = "sphere",
         /// `[[parallelogram]]`
         Parallelogram(ParallelogramDesc) = "parallelogram",
+        /// `[[plane]]`
+        Plane(PlaneDesc) = "plane",
+        /// `[[disk]]`
+        Disk(DiskDesc) = "disk",
+        /// `[[rectangle]]`
+        Rectangle(RectangleDesc) = "rectangle",
+        /// `[[box]]`
+        Box(BoxDesc) = "box",
+        /// `[[cylinder]]`
+        Cylinder(CylinderDesc) = "cylinder",
+        /// `[[cone]]`
+        Cone(ConeDesc) = "cone",
+        /// `[[torus]]`
+        Torus(TorusDesc) = "torus",
+        /// `[[mesh]]`
+        Mesh(MeshDesc) = "mesh",
+        /// `[[point_set]]`
+        PointSet(PointSetDesc) = "point_set",
+        /// `[[instance]]`
+        Instance(InstanceDesc) = "instance",
+    }
+}
+
+impl ShapeDesc {
+    /// What it says that every shape can say.
+    pub(crate) fn common(&self) -> Common<'_> {
+        match self {
+            ShapeDesc::Sphere(desc) => desc.common(),
+            ShapeDesc::Parallelogram(desc) => desc.common(),
+            ShapeDesc::Plane(desc) => desc.common(),
+            ShapeDesc::Disk(desc) => desc.common(),
+            ShapeDesc::Rectangle(desc) => desc.common(),
+            ShapeDesc::Box(desc) => desc.common(),
+            ShapeDesc::Cylinder(desc) => desc.common(),
+            ShapeDesc::Cone(desc) => desc.common(),
+            ShapeDesc::Torus(desc) => desc.common(),
+            ShapeDesc::Mesh(desc) => desc.common(),
+            ShapeDesc::PointSet(desc) => desc.common(),
+            ShapeDesc::Instance(desc) => desc.common(),
+        }
     }
 }

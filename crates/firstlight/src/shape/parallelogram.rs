@@ -1,14 +1,15 @@
 //! Parallelograms.
 
 use fearless_simd::{f32x16, mask32x16, prelude::*};
-use glam::DVec2;
+use glam::{DAffine3, DVec2};
 
+use super::common::shape_table;
 use super::surface::{Footprint, RayDifferential, ShapePoint, UvEdge};
+use crate::color::Rgb;
 use crate::context::{CompileContext, show};
-use crate::describe::table;
 use crate::math::{DVec3, ErrorBound, Ray, UNIT_ROUNDOFF, Vec2, Vec3, Vec3x16};
 
-table! {
+shape_table! {
     /// A flat shape with a corner and two edges of any length and angle. The texture coordinate of
     /// `p + u e0 + v e1` is (u, v). The normal is e0 x e1.
     ///
@@ -21,8 +22,6 @@ table! {
     /// material = "floor"
     /// ```
     pub struct ParallelogramDesc {
-        /// What reports and id files call it.
-        pub name: Option<String> = None,
         /// A corner, in metres, world space.
         pub p: [f64; 3],
         /// The first edge from the corner, in metres: the direction of u.
@@ -31,11 +30,6 @@ table! {
         pub e1: [f64; 3],
         /// Turns the normal around; the texture stays as it is.
         pub flip: bool = false,
-        /// The name of a material; without it, matte gray 0.8.
-        pub material: Option<String> = None,
-        /// Whether camera rays pass through from behind, the side the normal points away from. Light is blocked
-        /// from both sides all the same.
-        pub single_sided: bool = false,
     }
 }
 
@@ -50,6 +44,8 @@ pub struct Parallelogram {
     pub u_axis: DVec3,
     /// v of a point x of the plane is (x - p) . v_axis.
     pub v_axis: DVec3,
+    /// e0 and e1.
+    edges: [DVec3; 2],
     /// |e0| + |e1|, along each axis.
     reach: DVec3,
     /// The four corners, around.
@@ -88,6 +84,7 @@ impl Parallelogram {
             n: cross.normalize_or_zero() * sign,
             u_axis: e1.cross(cross) / area2,
             v_axis: cross.cross(e0) / area2,
+            edges: [e0, e1],
             reach: e0.abs() + e1.abs(),
             corners,
             single_sided,
@@ -136,9 +133,31 @@ impl Parallelogram {
             p,
             error: ErrorBound::of_rounded(p, o.abs() + way.abs() + self.p.abs()),
             normal: n,
+            shading: n,
             uv: uv.as_vec2(),
             footprint: Footprint { dx, dy, edges: [UvEdge::Bounded; 2] },
+            tangents: self.edges.map(|e| e.as_vec3()),
+            color: Rgb::WHITE,
         }
+    }
+
+    /// The smallest box around it.
+    pub(crate) fn bounds(&self) -> [DVec3; 2] {
+        let [e0, e1] = self.edges;
+        let low = e0.min(DVec3::ZERO) + e1.min(DVec3::ZERO);
+        let high = e0.max(DVec3::ZERO) + e1.max(DVec3::ZERO);
+        [self.p + low, self.p + high]
+    }
+
+    /// Moved. The front stays the front, mirrored or not.
+    pub(crate) fn moved(&self, world: &DAffine3) -> Self {
+        if *world == DAffine3::IDENTITY {
+            return *self;
+        }
+        let [e0, e1] = self.edges;
+        let sign = (self.n.dot(e0.cross(e1)) * world.matrix3.determinant()).signum();
+        let p = world.transform_point3(self.p);
+        Self::new(p, world.matrix3 * e0, world.matrix3 * e1, sign, self.single_sided)
     }
 
     /// Where the hull of `points` lies. In f64, where the rounding is far below what [`ParallelogramShadow::blocks`]

@@ -3,11 +3,15 @@
 use std::f32::consts::FRAC_1_PI;
 
 use fearless_simd::{f32x16, mask32x16, prelude::*};
+use glam::{DAffine3, DMat3};
 use pxfm::f_atan2f;
 
+use super::ball::{Ball, ball_tangents};
+use super::common::shape_table;
 use super::surface::{Footprint, RayDifferential, ShapePoint, UvEdge};
+use crate::color::Rgb;
 use crate::context::CompileContext;
-use crate::describe::{table, words};
+use crate::describe::words;
 use crate::math::{DVec3, ErrorBound, Ray, UNIT_ROUNDOFF, Vec2, Vec3, Vec3x16};
 
 words! {
@@ -20,7 +24,7 @@ words! {
     }
 }
 
-table! {
+shape_table! {
     /// A sphere, seen from outside and from inside.
     ///
     /// ```toml
@@ -30,18 +34,12 @@ table! {
     /// material = "red"
     /// ```
     pub struct SphereDesc {
-        /// What reports and id files call it.
-        pub name: Option<String> = None,
         /// Centre, in metres, world space; coordinates from -2.5e8 to 2.5e8, as everywhere.
         pub center: [f64; 3],
         /// Radius in metres, 1e-9 to 2.5e8.
         pub radius: f64,
         /// How a point becomes a texture coordinate.
         pub uv: SphereUv = SphereUv::Equirectangular,
-        /// The name of a material; without it, matte gray 0.8.
-        pub material: Option<String> = None,
-        /// Whether camera rays pass through its inside. Light is blocked from both sides all the same.
-        pub single_sided: bool = false,
     }
 }
 
@@ -113,7 +111,32 @@ impl Sphere {
             SphereUv::Angles => [UvEdge::Bounded, UvEdge::Bounded],
         };
         let error = ErrorBound::of_rounded(p, self.c.abs() + DVec3::splat(self.r));
-        ShapePoint { p, error, normal: n, uv, footprint: Footprint { dx, dy, edges } }
+        let tangents = ball_tangents(self.uv, outwards).map(|d| (d * self.r).as_vec3());
+        let footprint = Footprint { dx, dy, edges };
+        ShapePoint { p, error, normal: n, shading: n, uv, footprint, tangents, color: Rgb::WHITE }
+    }
+
+    /// The smallest box around it.
+    pub(crate) fn bounds(&self) -> [DVec3; 2] {
+        [self.c - self.r, self.c + self.r]
+    }
+
+    /// Moved and scaled; `None` where it is turned, which turns its texture, or is no sphere any more.
+    pub(crate) fn moved(&self, world: &DAffine3) -> Option<Self> {
+        let m = &world.matrix3;
+        let scale = m.x_axis.x;
+        let same = scale > 0.0 && *m == DMat3::from_diagonal(DVec3::splat(scale));
+        same.then(|| Sphere { c: world.transform_point3(self.c), r: self.r * scale, ..*self })
+    }
+
+    /// The ball of radius 1 that [`world_from_ball`](Self::world_from_ball) makes this sphere of.
+    pub(crate) fn ball(&self) -> Ball {
+        Ball { uv: self.uv }
+    }
+
+    /// From the space of [`ball`](Self::ball).
+    pub(crate) fn world_from_ball(&self) -> DAffine3 {
+        DAffine3 { matrix3: DMat3::from_diagonal(DVec3::splat(self.r)), translation: self.c }
     }
 
     /// What this sphere needs to know of a point that asks for light.
@@ -247,7 +270,7 @@ fn bounded(step: Vec2) -> Vec2 {
 }
 
 /// u = 1/2 + atan2(-n.z, n.x) / 2 pi, v = 1/2 + asin(n.y) / pi, and the steps that `dnx`, `dny` make in them.
-fn equirectangular(n: Vec3, dnx: Vec3, dny: Vec3) -> (Vec2, Vec2, Vec2) {
+pub(super) fn equirectangular(n: Vec3, dnx: Vec3, dny: Vec3) -> (Vec2, Vec2, Vec2) {
     let ring2 = (n.x * n.x + n.z * n.z).max(POLE);
     let ring = ring2.sqrt();
     // The arc sine loses its digits near 1, this does not

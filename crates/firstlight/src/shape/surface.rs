@@ -1,5 +1,6 @@
 //! The surface at a hit, as materials and lights need it.
 
+use crate::color::Rgb;
 use crate::ids::{MaterialId, SurfaceId};
 use crate::math::{ErrorBound, ShadowRay, Vec2, Vec3};
 
@@ -10,6 +11,8 @@ pub enum UvEdge {
     Bounded,
     /// The other end of the shape: it closes on itself.
     Periodic,
+    /// More of the shape: it has no end, and 0 and 1 are places like any other.
+    Unbounded,
 }
 
 /// The patch of texture that a camera ray stands for: the parallelogram around `uv` with these sides.
@@ -32,10 +35,16 @@ pub(crate) struct ShapePoint {
     pub error: ErrorBound,
     /// Unit normal of the front.
     pub normal: Vec3,
+    /// Unit normal that light sees, on the same side.
+    pub shading: Vec3,
     /// Texture coordinate.
     pub uv: Vec2,
     /// See [`Footprint`].
     pub footprint: Footprint,
+    /// How the point moves with u, and with v: metres for 1.
+    pub tangents: [Vec3; 2],
+    /// Multiplies the colours of the material.
+    pub color: Rgb,
 }
 
 /// A surface seen from one side.
@@ -55,40 +64,51 @@ pub struct SurfaceInteraction {
     pub uv: Vec2,
     /// The patch of texture that the camera ray stands for.
     pub footprint: Footprint,
+    /// How the point moves with u, and with v: metres for 1. Not orthogonal, and no length where uv has no direction.
+    pub tangents: [Vec3; 2],
+    /// Multiplies the colours of the material: linear Rec. 709.
+    pub color: Rgb,
     /// What was hit.
     pub surface: SurfaceId,
     /// Its material.
     pub material: MaterialId,
+    /// Whether other things, and itself, can take its light away.
+    pub receives_shadow: bool,
 }
 
 impl SurfaceInteraction {
     /// A ray from here along `l`, up to `t_max` times its length.
     #[inline(always)]
     pub(crate) fn shadow_ray(&self, l: Vec3, t_max: f32) -> ShadowRay {
-        ShadowRay { p: self.p, error: self.error, l, t_max }
+        ShadowRay { p: self.p, error: self.error, start: self.error.offset(self.p, self.ng).as_vec3(), l, t_max }
     }
 }
 
 /// How a camera ray changes from one ray of the grid to the next: the change of its unnormalised direction, over that
-/// direction's length.
+/// direction's length, and the change of its origin.
 #[derive(Clone, Copy, Debug)]
 pub struct RayDifferential {
-    /// To the ray on the right.
+    /// Of the direction, to the ray on the right.
     pub dx: Vec3,
-    /// To the ray below.
+    /// Of the direction, to the ray below.
     pub dy: Vec3,
+    /// Of the origin, to the ray on the right; 0 where all rays come from one eye.
+    pub origin_dx: Vec3,
+    /// Of the origin, to the ray below.
+    pub origin_dy: Vec3,
 }
 
 impl RayDifferential {
     /// The steps, on the plane through the hit with normal `n`, from the point `t d` to where the neighbours meet it:
-    /// dp = t (dD - d (n.dD) / (n.d)).
+    /// dp = dO + t dD - d (n.(dO + t dD)) / (n.d).
     ///
     /// Source: Igehy, "Tracing ray differentials", SIGGRAPH 1999, eq. 10 to 12. Edge-on the step is as long as `limit`.
     #[inline(always)]
     pub(crate) fn on_plane(&self, d: Vec3, t: f32, n: Vec3, limit: f32) -> [Vec3; 2] {
         let cos = n.dot(d);
-        [self.dx, self.dy].map(|dd| {
-            let step = (dd - d * (n.dot(dd) / cos)) * t;
+        let along_plane = |v: Vec3| v - d * (n.dot(v) / cos);
+        [(self.dx, self.origin_dx), (self.dy, self.origin_dy)].map(|(dd, origin)| {
+            let step = along_plane(dd) * t + along_plane(origin);
             let length2 = step.length_squared();
             // Also where the division gave infinity or no number
             if length2 <= limit * limit {

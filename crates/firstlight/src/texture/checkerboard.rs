@@ -10,7 +10,7 @@ use crate::shape::{Footprint, UvEdge};
 
 table! {
     /// Squares of two colours, `counts[0]` across u in 0..1 and `counts[1]` across v in 0..1: the first colour where
-    /// floor(u n) + floor(v m) is even. A function, not an image: its value is the area mean over the pixel's
+    /// floor(u n) + floor(v m) is even. On a plane without end u and v are metres, and the squares go on. A function, not an image: its value is the area mean over the pixel's
     /// footprint, so its edges are sharp from near and gray from far, for every count.
     ///
     /// ```toml
@@ -160,6 +160,7 @@ impl Wave {
         let square = match self.edge {
             UvEdge::Bounded => x.floor().clamp(0.0, self.count - 1.0),
             UvEdge::Periodic => x.floor().rem_euclid(self.count),
+            UvEdge::Unbounded => x.floor(),
         };
         if square.rem_euclid(2.0) == 0.0 { 1.0 } else { -1.0 }
     }
@@ -170,7 +171,7 @@ impl Wave {
             // The outermost squares go on for ever
             UvEdge::Bounded if x < 0.0 => x,
             UvEdge::Bounded if x > self.count => triangle(self.count) + (x - self.count) * self.sign(self.count),
-            UvEdge::Bounded => triangle(x),
+            UvEdge::Bounded | UvEdge::Unbounded => triangle(x),
             // An odd count leaves one square over in each round
             UvEdge::Periodic => {
                 let round = (x / self.count).floor();
@@ -209,6 +210,7 @@ mod tests {
                 let square = |x: f64| match f.edges[0] {
                     UvEdge::Bounded => (x * n as f64).floor().clamp(0.0, n as f64 - 1.0),
                     UvEdge::Periodic => ((x - x.floor()) * n as f64).floor(),
+                    UvEdge::Unbounded => (x * n as f64).floor(),
                 };
                 sum += if (square(p.x) + square(p.y)).rem_euclid(2.0) == 0.0 { 1.0 } else { -1.0 };
             }
@@ -218,7 +220,7 @@ mod tests {
 
     #[test]
     fn the_mean_is_that_of_many_points() {
-        for edge in [UvEdge::Bounded, UvEdge::Periodic] {
+        for edge in [UvEdge::Bounded, UvEdge::Periodic, UvEdge::Unbounded] {
             for n in 1..=9 {
                 for (k, size) in [0.02, 0.3, 1.7].into_iter().enumerate() {
                     let f = footprint(Vec2::new(size, 0.3 * size), Vec2::new(-0.2 * size, 0.8 * size), edge);

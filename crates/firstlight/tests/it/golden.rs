@@ -37,7 +37,10 @@ fn picture(text: &[u8], assets: &dyn Assets, size: Option<[u32; 2]>, aa: Option<
         (settings.width, settings.height) = (width, height);
     }
     settings.antialiasing = aa.unwrap_or(settings.antialiasing);
-    let scene = parsed.compile(assets, &CompileOptions { strict: true }).unwrap_or_else(|e| panic!("{e}")).scene;
+    let scene = parsed
+        .compile(assets, &CompileOptions { strict: true, ..CompileOptions::default() })
+        .unwrap_or_else(|e| panic!("{e}"))
+        .scene;
     let settings = RenderSettings { reference, ..RenderSettings::default() };
     match render(&scene, &settings, &|_, _| ControlFlow::Continue(())) {
         ControlFlow::Continue((film, _)) => film.develop(),

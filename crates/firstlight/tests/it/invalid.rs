@@ -27,7 +27,7 @@ fn diagnostics(path: &Path) -> String {
     let assets = FolderAssets::new(path.parent().unwrap(), &[]).unwrap();
     let name = path.file_name().unwrap().to_str().unwrap();
     let parsed = SceneDesc::parse(name, &std::fs::read(path).unwrap(), &assets);
-    match parsed.compile(&assets, &CompileOptions { strict: true }) {
+    match parsed.compile(&assets, &CompileOptions { strict: true, ..CompileOptions::default() }) {
         Ok(_) => String::new(),
         Err(error) => format!("{error}\n"),
     }
@@ -129,4 +129,16 @@ fn places_hold_line_column_and_excerpt() {
     let windows = format!("\u{feff}{}", text.replace('\n', "\r\n"));
     let again = SceneDesc::parse("scene.toml", windows.as_bytes(), &NoAssets);
     assert_eq!(parsed.faults(), again.faults());
+}
+
+#[test]
+fn a_hundred_thousand_groups_within_each_other_are_refused_soon() {
+    let mut text = "[camera]\nposition = [0, 0, 5]\n".to_owned();
+    for i in 0..100_000 {
+        writeln!(text, "[[group.g{i}.instance]]\nof = \"g{}\"", i + 1).unwrap();
+    }
+    text.push_str("[[group.g100000.sphere]]\ncenter = [0, 0, 0]\nradius = 1\n");
+    let words = soon("scene.toml", text.as_bytes());
+    assert!(words.ends_with("groups are more than 32 deep; place some of them directly"), "{words}");
+    assert_eq!(words.lines().count(), 1, "{words}");
 }

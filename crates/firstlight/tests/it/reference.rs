@@ -107,10 +107,14 @@ fn the_schema_refuses_what_the_reader_refuses() {
         r#"{ "light": { "spot": [{ "position": [0, 0, 0], "cone_deg": 190 }] } }"#,
         r#"{ "material": { "phong": { "red": { "diffuse": "reddish" } } } }"#,
         r#"{ "material": { "pong": {} } }"#,
+        r#"{ "light": { "point": [{ "position": [0, 0, 0], "transform": [] }] } }"#,
+        r#"{ "light": { "point": [{ "position": [0, 0, 0], "transform": { "turn": 1 } }] } }"#,
+        r#"{ "light": { "point": [{ "position": [0, 0, 0], "transform": { "keys": [{ "scale": 1 }] } }] } }"#,
     ] {
         assert!(check(text).is_some(), "{text}");
     }
     for text in [
+        r##"{ "light": { "point": [{ "position": [0, 0, 0], "transform": { "scale": 2, "keys": [{ "time": 1, "rotate_deg": [0, 1e9, 0] }] } }] } }"##,
         r##"{ "$schema": "x", "include": ["a.toml"], "camera": { "a": { "position": [0, 0, 1] }, "b": { "position": [0, 0, 1] } } }"##,
         r##"{ "material": { "phong": { "red": { "diffuse": { "texture": "t", "factor": "#ff0000" }, "shininess": 3 } } } }"##,
     ] {
@@ -129,8 +133,19 @@ fn every_example_of_the_reference_is_read() {
         assert_eq!(check(&parsed.desc.to_json()), None, "{text}");
         examples += 1;
     }
-    assert_eq!(examples, 12, "one for each table");
-    for word in ["`cone_deg`", "`\"equirectangular\"`", "output_resolution", "## Light: `[[light.rectangle]]`"] {
+    assert_eq!(examples, 24, "one for each table");
+    let titles: Vec<&str> = page.lines().filter(|line| line.starts_with("## ")).collect();
+    for (i, title) in titles.iter().enumerate() {
+        assert!(!titles[..i].contains(title), "{title} is there twice");
+    }
+    for word in [
+        "`cone_deg`",
+        "`\"equirectangular\"`",
+        "output_resolution",
+        "## Light: `[[light.rectangle]]`",
+        "## Table: transform key",
+        "| [a table](#table-transform) |",
+    ] {
         assert!(page.contains(word), "{word}");
     }
 }

@@ -86,55 +86,163 @@ prop_compose! {
     fn render()(
         size in [any::<u32>(), any::<u32>(), any::<u32>(), any::<u32>()], camera in maybe(text()),
         colors in [color(), color()], transparent: bool, display in select(DisplayEncoding::ALL),
-        gamma in number(), exposure in number(),
+        gamma in number(), exposure in number(), fps in number(),
     ) -> RenderDesc {
         RenderDesc {
             width: size[0], height: size[1], antialiasing: size[2], samples: size[3], camera, background: colors[0],
-            transparent, ambient: colors[1], display, gamma, exposure,
+            transparent, ambient: colors[1], display, gamma, exposure, fps,
         }
     }
 }
 
 prop_compose! {
     fn camera()(
-        position in vector(), look_at in vector(), up in vector(), fov in [maybe(number()), maybe(number()), maybe(number())],
+        position in vector(), look_at in vector(), up in vector(), projection in select(Projection::ALL),
+        sizes in [maybe(number()), maybe(number()), maybe(number()), maybe(number())], shift in [number(), number()],
+        transform in moved(),
     ) -> CameraDesc {
-        let [fov_y_deg, focal_length_mm, sensor_height_mm] = fov;
-        CameraDesc { look_at, up, fov_y_deg, focal_length_mm, sensor_height_mm, ..CameraDesc::new(position) }
+        let [fov_y_deg, focal_length_mm, sensor_height_mm, height] = sizes;
+        CameraDesc {
+            position, look_at, up, projection, fov_y_deg, focal_length_mm, sensor_height_mm, height, shift, transform,
+        }
     }
 }
 
+/// A shape's own fields with what all shapes can say.
+macro_rules! with_common {
+    ($variant:ident, $own:expr) => {
+        ($own, maybe(text()), maybe(text()), maybe(transform()), any::<[bool; 4]>())
+            .prop_map(|(own, name, material, transform, flags)| {
+                let [visible, casts_shadow, receives_shadow, single_sided] = flags;
+                let mut desc = own;
+                (desc.name, desc.material, desc.transform) = (name, material, transform.map(Box::new));
+                (desc.visible, desc.casts_shadow) = (visible, casts_shadow);
+                (desc.receives_shadow, desc.single_sided) = (receives_shadow, single_sided);
+                ShapeDesc::$variant(desc)
+            })
+            .boxed()
+    };
+}
+
+fn several(strategy: impl Strategy<Value = [f64; 3]>) -> impl Strategy<Value = Vec<[f64; 3]>> {
+    vec(strategy, 0..3)
+}
+
+fn mesh() -> impl Strategy<Value = MeshDesc> {
+    let lists = (several(vector()), vec(any::<[u32; 3]>(), 0..3), several(vector()), vec([number(), number()], 0..3));
+    let faces = (several(vector()), vec(text(), 0..3), vec(any::<u32>(), 0..3));
+    (maybe(text()), lists, any::<u32>(), faces, maybe(number())).prop_map(
+        |(file, (positions, triangles, normals, uvs), uv_set, (colors, materials, face_materials), smooth_deg)| {
+            let file = file.map(FilePath::from);
+            let lists = MeshDesc { positions, triangles, normals, uvs, ..MeshDesc::default() };
+            MeshDesc { file, uv_set, colors, materials, face_materials, smooth_deg, ..lists }
+        },
+    )
+}
+
+fn point_set() -> impl Strategy<Value = PointSetDesc> {
+    (maybe(text()), several(vector()), vec(number(), 0..3), several(vector()), number()).prop_map(
+        |(file, positions, radii, colors, radius)| {
+            let file = file.map(FilePath::from);
+            PointSetDesc { file, positions, radii, colors, radius, ..PointSetDesc::default() }
+        },
+    )
+}
+
 fn shape() -> impl Strategy<Value = ShapeDesc> {
-    let sphere = (maybe(text()), vector(), number(), select(SphereUv::ALL), maybe(text()), any::<bool>()).prop_map(
-        |(name, center, radius, uv, material, single_sided)| {
-            ShapeDesc::Sphere(SphereDesc { name, uv, material, single_sided, ..SphereDesc::new(center, radius) })
+    let sphere = (vector(), number(), select(SphereUv::ALL))
+        .prop_map(|(center, radius, uv)| SphereDesc { uv, ..SphereDesc::new(center, radius) });
+    let parallelogram = ([vector(), vector(), vector()], any::<bool>())
+        .prop_map(|([p, e0, e1], flip)| ParallelogramDesc { flip, ..ParallelogramDesc::new(p, e0, e1) });
+    let plane = ([vector(), vector()], maybe(vector())).prop_map(|([point, normal], up)| PlaneDesc {
+        point,
+        normal,
+        up,
+        ..PlaneDesc::default()
+    });
+    let disk = ([vector(), vector()], [number(), number()]).prop_map(|([center, normal], [radius, inner_radius])| {
+        DiskDesc { normal, inner_radius, ..DiskDesc::new(center, radius) }
+    });
+    let rectangle =
+        ([vector(), vector()], [number(), number()], maybe(vector())).prop_map(|([center, normal], size, up)| {
+            RectangleShapeDesc { normal, up, ..RectangleShapeDesc::new(center, size) }
+        });
+    let cuboid = [vector(), vector()].prop_map(|[center, size]| BoxDesc { size, ..BoxDesc::new(center) });
+    let cylinder = ([vector(), vector()], number(), any::<bool>())
+        .prop_map(|([p0, p1], radius, capped)| CylinderDesc { capped, ..CylinderDesc::new(p0, p1, radius) });
+    let cone = ([vector(), vector()], [number(), number()], any::<bool>())
+        .prop_map(|([p0, p1], [r0, r1], capped)| ConeDesc { radius1: r1, capped, ..ConeDesc::new(p0, p1, r0) });
+    let torus = ([vector(), vector()], [number(), number()])
+        .prop_map(|([center, axis], [major, minor])| TorusDesc { axis, ..TorusDesc::new(center, major, minor) });
+    prop_oneof![
+        with_common!(Sphere, sphere),
+        with_common!(Parallelogram, parallelogram),
+        with_common!(Plane, plane),
+        with_common!(Disk, disk),
+        with_common!(Rectangle, rectangle),
+        with_common!(Box, cuboid),
+        with_common!(Cylinder, cylinder),
+        with_common!(Cone, cone),
+        with_common!(Torus, torus),
+        with_common!(Mesh, mesh()),
+        with_common!(PointSet, point_set()),
+        with_common!(Instance, text().prop_map(InstanceDesc::new)),
+    ]
+}
+
+fn scale() -> impl Strategy<Value = ScaleDesc> {
+    prop_oneof![number().prop_map(ScaleDesc::from), vector().prop_map(ScaleDesc::from)]
+}
+
+fn key() -> impl Strategy<Value = TransformKeyDesc> {
+    let quaternion = [number(), number(), number(), number()];
+    (number(), maybe(vector()), maybe(vector()), maybe(vector()), maybe(number()), maybe(quaternion), maybe(scale()))
+        .prop_map(|(time, translate, rotate_deg, rotate_axis, angle_deg, quaternion, scale)| TransformKeyDesc {
+            time,
+            translate,
+            rotate_deg,
+            rotate_axis,
+            angle_deg,
+            quaternion,
+            scale,
+        })
+}
+
+fn transform() -> impl Strategy<Value = TransformDesc> {
+    let turn = (vector(), maybe(vector()), maybe(number()), maybe([number(), number(), number(), number()]));
+    let matrix = maybe(vec(number(), 12).prop_map(|m| m.try_into().unwrap()));
+    (vector(), turn, scale(), matrix, vec(key(), 0..4), select(Interpolation::ALL)).prop_map(
+        |(translate, (rotate_deg, rotate_axis, angle_deg, quaternion), scale, matrix, keys, interpolation)| {
+            let turned = TransformDesc { rotate_deg, rotate_axis, angle_deg, quaternion, ..TransformDesc::default() };
+            TransformDesc { translate, scale, matrix, keys, interpolation, ..turned }
         },
-    );
-    let parallelogram = (maybe(text()), [vector(), vector(), vector()], maybe(text()), any::<[bool; 2]>()).prop_map(
-        |(name, [p, e0, e1], material, [flip, single_sided])| {
-            let new = ParallelogramDesc::new(p, e0, e1);
-            ShapeDesc::Parallelogram(ParallelogramDesc { name, flip, material, single_sided, ..new })
-        },
-    );
-    prop_oneof![sphere, parallelogram]
+    )
+}
+
+/// On the heap: these are large, and a scene has many.
+fn moved() -> BoxedStrategy<Option<Box<TransformDesc>>> {
+    maybe(transform().prop_map(Box::new)).boxed()
 }
 
 fn light() -> impl Strategy<Value = LightDesc> {
     let common = || (maybe(text()), color(), number(), select(Falloff::ALL), any::<bool>());
-    let point = (vector(), common()).prop_map(|(position, (name, color, strength, falloff, shadows))| {
-        LightDesc::Point(PointDesc { name, position, color, strength, falloff, shadows })
-    });
-    let directional = (vector(), common()).prop_map(|(direction, (name, color, strength, falloff, shadows))| {
-        LightDesc::Directional(DirectionalDesc { name, direction, color, strength, falloff, shadows })
-    });
-    let spot = ([vector(), vector()], number(), maybe(number()), common()).prop_map(
-        |([position, look_at], cone_deg, inner_cone_deg, (name, color, strength, falloff, shadows))| {
-            let new = SpotDesc { look_at, cone_deg, inner_cone_deg, ..SpotDesc::new(position) };
+    let point =
+        (vector(), moved(), common()).prop_map(|(position, transform, (name, color, strength, falloff, shadows))| {
+            LightDesc::Point(PointDesc { name, position, transform, color, strength, falloff, shadows })
+        });
+    let directional =
+        (vector(), moved(), common()).prop_map(|(direction, transform, (name, color, strength, falloff, shadows))| {
+            LightDesc::Directional(DirectionalDesc { name, direction, transform, color, strength, falloff, shadows })
+        });
+    let spot = ([vector(), vector()], moved(), number(), maybe(number()), common()).prop_map(
+        |([position, look_at], transform, cone_deg, inner_cone_deg, (name, color, strength, falloff, shadows))| {
+            let new = SpotDesc { look_at, transform, cone_deg, inner_cone_deg, ..SpotDesc::new(position) };
             LightDesc::Spot(SpotDesc { name, color, strength, falloff, shadows, ..new })
         },
     );
     let rectangle = (
         [vector(), vector(), vector()],
+        moved(),
         maybe(select(EmitSides::ALL)),
         any::<[bool; 2]>(),
         maybe(any::<u32>()),
@@ -142,13 +250,21 @@ fn light() -> impl Strategy<Value = LightDesc> {
         any::<u32>(),
         common(),
     )
-        .prop_map(|([center, e0, e1], sides, [visible, blocks], samples, set, seed, common)| {
+        .prop_map(|([center, e0, e1], transform, sides, [visible, blocks], samples, set, seed, common)| {
             let (name, color, strength, falloff, shadows) = common;
-            let new =
-                RectangleDesc { sides, visible, blocks, samples, set, seed, ..RectangleDesc::new(center, e0, e1) };
+            let new = RectangleDesc {
+                transform,
+                sides,
+                visible,
+                blocks,
+                samples,
+                set,
+                seed,
+                ..RectangleDesc::new(center, e0, e1)
+            };
             LightDesc::Rectangle(RectangleDesc { name, color, strength, falloff, shadows, ..new })
         });
-    prop_oneof![point, directional, spot, rectangle]
+    prop_oneof![point.boxed(), directional.boxed(), spot.boxed(), rectangle.boxed()]
 }
 
 fn material() -> impl Strategy<Value = MaterialDesc> {
@@ -182,15 +298,15 @@ prop_compose! {
     fn scene()(
         render in prop_oneof![Just(RenderDesc::default()), render()],
         cameras in prop_oneof![
-            camera().prop_map(|c| vec![(String::new(), c)]),
-            hash_map(text(), camera(), 0..4).prop_map(|m| m.into_iter().collect()),
+            camera().prop_map(|c| vec![(String::new(), c)]).boxed(),
+            hash_map(text(), camera(), 0..4).prop_map(|m| m.into_iter().collect()).boxed(),
         ],
         textures in hash_map(text(), texture(), 0..4), materials in hash_map(text(), material(), 0..4),
-        shapes in vec(shape(), 0..6), lights in vec(light(), 0..6),
+        shapes in vec(shape(), 0..6), groups in hash_map(text(), vec(shape(), 1..4), 0..3), lights in vec(light(), 0..6),
     ) -> SceneDesc {
         let mut desc = SceneDesc {
             render, cameras, textures: textures.into_iter().collect(), materials: materials.into_iter().collect(),
-            shapes, lights,
+            shapes, groups: groups.into_iter().map(|(name, shapes)| (name, GroupDesc { shapes })).collect(), lights,
         };
         desc.sort();
         desc
@@ -232,6 +348,12 @@ const FRAGMENTS: &[&str] = &[
     "[render]\n",
     "[material.phong.a]\n",
     "[[light.spot]]\n",
+    "[[group.a.box]]\n",
+    "[group.a]\n",
+    "[[instance]]\n",
+    "[[mesh]]\n",
+    "of = \"a\"\n",
+    "triangles = ",
     "include = ",
     "[\"a.toml\"]\n",
     "center = ",

@@ -3,7 +3,7 @@
 
 use std::num::NonZeroUsize;
 
-use firstlight::{Image, RenderSettings, Scene, SceneDesc, SimdLevel, Window};
+use firstlight::{Image, LightDesc, RenderSettings, SampleSet, Scene, SceneDesc, ShapeDesc, SimdLevel, Window};
 
 use crate::random;
 use crate::scenes::*;
@@ -17,7 +17,29 @@ fn scenes() -> Vec<SceneDesc> {
         (scene.render.width, scene.render.height) = (45, 37);
         scene
     }));
+    scenes.push(meshes());
     scenes
+}
+
+/// Some thousand triangles in the world, and some thousand more by instances within instances, under an area light.
+fn meshes() -> SceneDesc {
+    let random = &mut Random::new(77);
+    let world = ball_mesh(1.2, 40, 0.05, true, random);
+    let inner = ball_mesh(0.4, 24, 0.1, false, random);
+    assert!(world.triangles.len() + inner.triangles.len() > 4000);
+    let ring = (0..5)
+        .map(|i| moved(instance("ball"), [i as f64 * 0.8 - 1.6, 0.0, 0.0], [0.0, 40.0 * i as f64, 0.0], [1.0; 3]));
+    let light = rectangle([0.5, 5.0, 1.0], [1.5, 0.0, 0.0], [0.0, 0.0, 1.5], SampleSet::Sobol, 33);
+    empty(70, 50, 2)
+        .with_camera(camera([1.0, 2.5, 6.0], [0.0; 3], 50.0))
+        .with_parallelogram(square([0.0, -1.3, 0.0], [0.0, 1.0, 0.0], 6.0))
+        .with_group("ball", vec![ShapeDesc::Mesh(inner)])
+        .with_group("ring", ring.collect())
+        .with_shape(ShapeDesc::Mesh(world))
+        .with_shape(moved(instance("ring"), [0.0, -0.6, 2.0], [0.0; 3], [1.0; 3]))
+        .with_shape(moved(instance("ring"), [0.0, 1.2, -1.0], [0.0, 30.0, 20.0], [-0.8, 0.6, 0.8]))
+        .with_light(LightDesc::Rectangle(firstlight::RectangleDesc { strength: 10.0, ..light }))
+        .with_light(LightDesc::Point(point([-3.0, 3.0, 3.0], 10.0)))
 }
 
 fn with(settings: RenderSettings, scene: &Scene) -> Vec<[u32; 4]> {
@@ -29,7 +51,7 @@ fn threads_and_tiles_do_not_matter() {
     for desc in scenes() {
         let scene = compile(&desc);
         let expected = with(one_thread(), &scene);
-        for threads in [1, 2, 7] {
+        for threads in [1, 2, 8] {
             for tile_size in [8, 16, 23, 64] {
                 let threads = NonZeroUsize::new(threads);
                 let got = with(RenderSettings { threads, tile_size, ..RenderSettings::default() }, &scene);
@@ -93,8 +115,11 @@ fn fault(desc: &SceneDesc) -> Option<String> {
     if let Some(fault) = describe("plain", &plain) {
         return Some(fault);
     }
-    for simd in [SimdLevel::Auto, SimdLevel::available()[0]] {
-        let fast = picture(&scene, &RenderSettings { simd, ..one_thread() });
+    for (simd, threads, tile_size) in
+        [(SimdLevel::Auto, 1, 16), (SimdLevel::available()[0], 1, 16), (SimdLevel::Auto, 2, 8)]
+    {
+        let threads = NonZeroUsize::new(threads);
+        let fast = picture(&scene, &RenderSettings { simd, threads, tile_size, ..RenderSettings::default() });
         let differs =
             (0..plain.pixels.len()).find(|i| plain.pixels[*i].map(f32::to_bits) != fast.pixels[*i].map(f32::to_bits));
         if let Some(i) = differs {
@@ -104,17 +129,26 @@ fn fault(desc: &SceneDesc) -> Option<String> {
     None
 }
 
-/// The smallest scene with a fault that is left when shapes and lights are taken out one by one.
+/// The smallest scene with a fault that is left when shapes and lights are taken out one by one, those of groups too.
 fn reduced(mut desc: SceneDesc) -> SceneDesc {
-    loop {
-        let smaller = (0..desc.shapes.len() + desc.lights.len()).find_map(|i| {
-            let mut without = desc.clone();
-            match i.checked_sub(desc.shapes.len()) {
-                None => drop(without.shapes.remove(i)),
-                Some(light) => drop(without.lights.remove(light)),
+    /// Without the `i`th of them all.
+    fn without(desc: &SceneDesc, mut i: usize) -> Option<SceneDesc> {
+        let mut without = desc.clone();
+        let groups = without.groups.iter_mut().map(|(_, group)| &mut group.shapes);
+        for shapes in std::iter::once(&mut without.shapes).chain(groups) {
+            if i < shapes.len() {
+                shapes.remove(i);
+                return Some(without);
             }
-            fault(&without).is_some().then_some(without)
-        });
+            i -= shapes.len();
+        }
+        (i < without.lights.len()).then(|| {
+            without.lights.remove(i);
+            without
+        })
+    }
+    loop {
+        let smaller = (0..).map_while(|i| without(&desc, i)).find(|smaller| fault(smaller).is_some());
         match smaller {
             Some(smaller) => desc = smaller,
             None => return desc,

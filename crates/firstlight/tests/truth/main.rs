@@ -2,9 +2,11 @@
 //! program's picture. Everything here goes through the public interface.
 
 mod analytic;
+mod cameras;
 mod checker;
 mod determinism;
 mod deviations;
+mod geometry;
 mod known;
 mod random;
 mod robust;

@@ -1,14 +1,15 @@
 //! Random scenes, the same for the same seed: the harder for a renderer, the better.
 
 use firstlight::{
-    ColorDesc, ColorParam, EmitSides, Falloff, LightDesc, MaterialDesc, ParallelogramDesc, RectangleDesc, SampleSet,
-    SceneDesc, ShapeDesc, SphereDesc, SphereUv,
+    BoxDesc, ColorDesc, ColorParam, ConeDesc, CylinderDesc, DiskDesc, EmitSides, Falloff, LightDesc, MaterialDesc,
+    MeshDesc, ParallelogramDesc, PlaneDesc, PointSetDesc, Projection, RectangleDesc, RectangleShapeDesc, SampleSet,
+    SceneDesc, ShapeDesc, SphereDesc, SphereUv, TorusDesc,
 };
 
 use crate::scenes::*;
 
 /// Scene number `seed`: a small picture of shapes that are huge and tiny, that overlap, touch and lie in one plane, under
-/// lights of every kind that touch and cut them.
+/// lights of every kind that touch and cut them. Every other one has shapes of all kinds, meshes and instances.
 pub fn scene(seed: u64) -> SceneDesc {
     let mut random = Random::new(seed);
     let random = &mut random;
@@ -44,6 +45,9 @@ pub fn scene(seed: u64) -> SceneDesc {
     for _ in 0..random.below(6) {
         let parallelogram = place.parallelogram(random, &scene);
         scene = scene.with_parallelogram(parallelogram);
+    }
+    if seed % 2 == 1 {
+        scene = place.furnish(random, scene);
     }
     for _ in 0..1 + random.below(4) {
         let light = place.light(random, &scene);
@@ -218,9 +222,157 @@ impl Place {
             ShapeDesc::Parallelogram(flat) => {
                 add(flat.p, add(mul(flat.e0, random.between(-0.2, 1.2)), mul(flat.e1, random.unit())))
             }
-            #[allow(unreachable_patterns)]
-            _ => unreachable!("no test here uses another shape"),
+            // Somewhere near
+            _ => self.point(random, 1.5),
         })
+    }
+
+    /// Adds shapes of all kinds, by themselves and in groups.
+    fn furnish(&self, random: &mut Random, mut scene: SceneDesc) -> SceneDesc {
+        for _ in 0..random.below(6) {
+            let shape = self.dressed(random, &scene);
+            scene = scene.with_shape(shape);
+        }
+        // Each group may hold instances of those before
+        let local = Place { unit: self.unit, origin: [0.0; 3] };
+        let groups = random.below(4);
+        for i in 0..groups {
+            let mut shapes: Vec<_> = (0..1 + random.below(3)).map(|_| local.dressed(random, &scene)).collect();
+            for _ in 0..random.below(3).min(i * 2) {
+                shapes.push(local.instance(random, &scene, i));
+            }
+            scene = scene.with_group(&format!("group {i}"), shapes);
+        }
+        for _ in 0..random.below(5).min(groups * 4) {
+            let instance = self.instance(random, &scene, groups);
+            scene = scene.with_shape(instance);
+        }
+        // Sometimes more than are listed
+        if random.chance(0.1) {
+            for _ in 0..50 {
+                let ball = self.sphere(random, &scene);
+                scene = scene.with_sphere(ball);
+            }
+        }
+        scene
+    }
+
+    /// An instance of one of the first groups.
+    fn instance(&self, random: &mut Random, scene: &SceneDesc, groups: u32) -> ShapeDesc {
+        let shape = self.placed(random, instance(&format!("group {}", random.clone().below(groups))));
+        self.flagged(random, scene, shape, 0.3)
+    }
+
+    /// Scaled, mirrored, turned, moved.
+    fn placed(&self, random: &mut Random, shape: ShapeDesc) -> ShapeDesc {
+        let quarter = random.chance(0.5);
+        let turn = random.vector(180.0).map(|deg| if quarter { (deg / 90.0).round() * 90.0 } else { deg });
+        let scale = match random.below(4) {
+            0 => [1.0; 3],
+            1 => [random.scale(0.3, 2.0); 3],
+            2 => [0; 3].map(|_| random.pick(&[-1.0, 1.0, 0.5])),
+            _ => [0; 3].map(|_| random.scale(0.3, 2.0) * random.pick(&[1.0, 1.0, -1.0])),
+        };
+        moved(shape, self.point(random, 2.5), turn, scale)
+    }
+
+    /// With a material, and now and then a flag.
+    fn flagged(&self, random: &mut Random, scene: &SceneDesc, mut shape: ShapeDesc, named: f64) -> ShapeDesc {
+        let common = common(&mut shape);
+        *common.material = self.material(random, scene).filter(|_| random.chance(named));
+        *common.visible = !random.chance(0.07);
+        *common.casts_shadow = !random.chance(0.07);
+        *common.receives_shadow = !random.chance(0.07);
+        *common.single_sided = random.chance(0.1);
+        shape
+    }
+
+    /// A shape of any kind, with or without a transform.
+    fn dressed(&self, random: &mut Random, scene: &SceneDesc) -> ShapeDesc {
+        let shape = if random.chance(0.5) {
+            let local = Place { unit: self.unit, origin: [0.0; 3] };
+            let shape = local.shape(random, scene);
+            self.placed(random, shape)
+        } else {
+            self.shape(random, scene)
+        };
+        self.flagged(random, scene, shape, 0.9)
+    }
+
+    fn shape(&self, random: &mut Random, scene: &SceneDesc) -> ShapeDesc {
+        let size = self.unit * if random.chance(0.2) { random.scale(0.01, 50.0) } else { random.between(0.2, 2.0) };
+        let at = self.point(random, 2.0);
+        let any = random.direction();
+        let normal = random.pick(&[[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], any, any]);
+        let other = add(at, mul(normal, size * random.scale(0.1, 3.0)));
+        let capped = random.chance(0.7);
+        match random.below(12) {
+            0 => ShapeDesc::Plane(PlaneDesc { point: at, normal, ..PlaneDesc::default() }),
+            1 => {
+                let inner_radius = size * random.pick(&[0.0, 0.3, 0.95]);
+                ShapeDesc::Disk(DiskDesc { normal, inner_radius, ..DiskDesc::new(at, size) })
+            }
+            2 => {
+                let sides = [size, size * random.scale(0.1, 3.0)];
+                ShapeDesc::Rectangle(RectangleShapeDesc { normal, ..RectangleShapeDesc::new(at, sides) })
+            }
+            3 => {
+                let size = [0; 3].map(|_| size * random.pick(&[0.01, 0.5, 1.0, 2.0]));
+                ShapeDesc::Box(BoxDesc { size, ..BoxDesc::new(at) })
+            }
+            4 => ShapeDesc::Cylinder(CylinderDesc { capped, ..CylinderDesc::new(at, other, size * 0.5) }),
+            5 => {
+                let radius1 = size * random.pick(&[0.0, 0.0, 0.3, 0.8]);
+                ShapeDesc::Cone(ConeDesc { radius1, capped, ..ConeDesc::new(at, other, size * 0.8) })
+            }
+            6 => {
+                let tube = size * random.pick(&[0.1, 0.3, 1.0, 1.2]);
+                ShapeDesc::Torus(TorusDesc { axis: normal, ..TorusDesc::new(at, size, tube) })
+            }
+            7 => {
+                let count = 1 + random.below(60) as usize;
+                let positions: Vec<V> = (0..count).map(|_| add(at, random.vector(size))).collect();
+                let radii = (0..count).map(|_| size * random.scale(0.01, 0.5)).collect();
+                let colors = if random.chance(0.5) { self.colors(random, count) } else { Vec::new() };
+                ShapeDesc::PointSet(PointSetDesc { positions, radii, colors, ..PointSetDesc::default() })
+            }
+            8 => ShapeDesc::Sphere(SphereDesc { center: at, ..self.sphere(random, scene) }),
+            9 => ShapeDesc::Mesh(box_mesh(at, [size, size * 0.5, size * random.pick(&[0.01, 1.0])])),
+            10 => {
+                // Triangles anyhow
+                let count = 1 + random.below(20);
+                let positions = (0..3 * count).map(|_| add(at, random.vector(size))).collect();
+                let triangles = (0..count).map(|i| [3 * i, 3 * i + 1, 3 * i + 2]).collect();
+                self.mesh(random, mesh(positions, triangles))
+            }
+            _ => {
+                let (n, normals) = (3 + random.below(6), random.chance(0.5));
+                let mut ball = ball_mesh(size, n, random.pick(&[0.0, 0.2]), normals, random);
+                ball.positions.iter_mut().for_each(|p| *p = add(*p, at));
+                self.mesh(random, ball)
+            }
+        }
+    }
+
+    fn colors(&self, random: &mut Random, count: usize) -> Vec<V> {
+        (0..count).map(|_| color(random).linear).collect()
+    }
+
+    /// With more than positions.
+    fn mesh(&self, random: &mut Random, mut mesh: MeshDesc) -> ShapeDesc {
+        let count = mesh.positions.len();
+        if random.chance(0.3) {
+            mesh.uvs = (0..count).map(|_| [random.between(-2.0, 2.0), random.unit()]).collect();
+        }
+        if random.chance(0.4) {
+            mesh.colors = self.colors(random, count);
+        }
+        if random.chance(0.2) {
+            mesh.normals = (0..count).map(|_| random.direction()).collect();
+        } else if random.chance(0.3) {
+            mesh.smooth_deg = Some(random.between(0.0, 180.0));
+        }
+        ShapeDesc::Mesh(mesh)
     }
 
     fn light(&self, random: &mut Random, scene: &SceneDesc) -> LightDesc {
@@ -319,6 +471,15 @@ impl Place {
         let target = self.on_a_shape(random, scene).unwrap_or(self.origin);
         let way = sub(target, eye);
         let target = if length(way) < 1e-3 * self.unit { add(eye, mul(random.direction(), self.unit)) } else { target };
+        if random.chance(0.2) {
+            let height = Some(random.scale(0.05, 20.0) * self.unit);
+            return firstlight::CameraDesc {
+                projection: Projection::Orthographic,
+                fov_y_deg: None,
+                height,
+                ..camera(eye, target, 1.0)
+            };
+        }
         camera(eye, target, random.scale(0.5, 130.0))
     }
 }

@@ -5,9 +5,9 @@ use std::ops::ControlFlow;
 
 use firstlight::{
     BlinnPhongDesc, CameraDesc, CheckerboardDesc, ColorDesc, ColorParam, CompileOptions, DirectionalDesc,
-    DisplayEncoding, Image, LightDesc, MaterialDesc, NoAssets, NumberParam, ParallelogramDesc, PhongDesc, PointDesc,
-    RectangleDesc, RenderDesc, RenderSettings, SampleSet, Scene, SceneDesc, ShapeDesc, SphereDesc, SpotDesc,
-    TextureDesc, builtin_scenes,
+    DisplayEncoding, Image, InstanceDesc, LightDesc, MaterialDesc, MeshDesc, NoAssets, NumberParam, ParallelogramDesc,
+    PhongDesc, PointDesc, RectangleDesc, RenderDesc, RenderSettings, SampleSet, Scene, SceneDesc, ShapeDesc,
+    SphereDesc, SpotDesc, TextureDesc, TransformDesc, builtin_scenes,
 };
 
 /// A point or a direction, as descriptions have them.
@@ -74,6 +74,7 @@ pub fn empty(width: u32, height: u32, antialiasing: u32) -> SceneDesc {
         textures: Vec::new(),
         materials: Vec::new(),
         shapes: Vec::new(),
+        groups: Vec::new(),
         lights: Vec::new(),
     }
 }
@@ -150,6 +151,93 @@ pub fn config11(size: u32, antialiasing: u32, samples: u32) -> SceneDesc {
     scene
 }
 
+/// What every shape can say, whatever its kind.
+pub struct Common<'a> {
+    pub material: &'a mut Option<String>,
+    pub transform: &'a mut Option<Box<TransformDesc>>,
+    pub visible: &'a mut bool,
+    pub casts_shadow: &'a mut bool,
+    pub receives_shadow: &'a mut bool,
+    pub single_sided: &'a mut bool,
+}
+
+/// What a shape says that every shape can say.
+pub fn common(shape: &mut ShapeDesc) -> Common<'_> {
+    macro_rules! of {
+        ($($kind:ident)*) => {
+            match shape {
+                $(ShapeDesc::$kind(desc) => Common {
+                    material: &mut desc.material,
+                    transform: &mut desc.transform,
+                    visible: &mut desc.visible,
+                    casts_shadow: &mut desc.casts_shadow,
+                    receives_shadow: &mut desc.receives_shadow,
+                    single_sided: &mut desc.single_sided,
+                },)*
+                #[allow(unreachable_patterns)]
+                _ => unreachable!("no test here uses another shape"),
+            }
+        };
+    }
+    of!(Sphere Parallelogram Plane Disk Rectangle Box Cylinder Cone Torus Mesh PointSet Instance)
+}
+
+/// The shape, scaled, turned and moved.
+pub fn moved(mut shape: ShapeDesc, translate: V, rotate_deg: V, scale: V) -> ShapeDesc {
+    let transform = TransformDesc { translate, rotate_deg, scale: scale.into(), ..TransformDesc::default() };
+    *common(&mut shape).transform = Some(Box::new(transform));
+    shape
+}
+
+pub fn instance(of: &str) -> ShapeDesc {
+    ShapeDesc::Instance(InstanceDesc::new(of.to_owned()))
+}
+
+pub fn mesh(positions: Vec<V>, triangles: Vec<[u32; 3]>) -> MeshDesc {
+    MeshDesc { positions, triangles, ..MeshDesc::default() }
+}
+
+/// A box, as triangles.
+pub fn box_mesh(center: V, size: V) -> MeshDesc {
+    let corner = |i: u32| {
+        let side = |k: usize| center[k] + size[k] * ((i >> k & 1) as f64 - 0.5);
+        [side(0), side(1), side(2)]
+    };
+    let faces = [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]];
+    let triangles = faces.iter().flat_map(|[a, b, c, d]| [[*a, *b, *c], [*a, *c, *d]]).collect();
+    mesh((0..8).map(corner).collect(), triangles)
+}
+
+/// A closed ball of `n` rings of `n` vertices, the front outside, in and out by up to `bumps` of its radius, with or without
+/// normals.
+pub fn ball_mesh(radius: f64, n: u32, bumps: f64, normals: bool, random: &mut Random) -> MeshDesc {
+    let mut directions = vec![[0.0, 1.0, 0.0]];
+    for ring in 1..n {
+        let theta = std::f64::consts::PI * ring as f64 / n as f64;
+        for i in 0..n {
+            let phi = std::f64::consts::TAU * i as f64 / n as f64;
+            let sin = pxfm::f_sin(theta);
+            directions.push([sin * pxfm::f_cos(phi), pxfm::f_cos(theta), sin * pxfm::f_sin(phi)]);
+        }
+    }
+    directions.push([0.0, -1.0, 0.0]);
+    let last = directions.len() as u32 - 1;
+    let at = |ring: u32, i: u32| match ring {
+        0 => 0,
+        ring if ring == n => last,
+        ring => 1 + (ring - 1) * n + i % n,
+    };
+    let mut triangles = Vec::new();
+    for ring in 0..n {
+        for i in 0..n {
+            let (a, b, c, d) = (at(ring, i), at(ring, i + 1), at(ring + 1, i), at(ring + 1, i + 1));
+            triangles.extend([[a, b, c], [b, d, c]].iter().filter(|t| t[0] != t[1] && t[1] != t[2] && t[0] != t[2]));
+        }
+    }
+    let positions = directions.iter().map(|d| mul(*d, radius * (1.0 + random.between(-bumps, bumps)))).collect();
+    MeshDesc { normals: if normals { directions } else { Vec::new() }, ..mesh(positions, triangles) }
+}
+
 /// Adds to a scene, in the order of the text.
 pub trait Build: Sized {
     fn with_camera(self, camera: CameraDesc) -> Self;
@@ -157,6 +245,8 @@ pub trait Build: Sized {
     fn with_texture(self, name: &str, texture: TextureDesc) -> Self;
     fn with_sphere(self, sphere: SphereDesc) -> Self;
     fn with_parallelogram(self, parallelogram: ParallelogramDesc) -> Self;
+    fn with_shape(self, shape: ShapeDesc) -> Self;
+    fn with_group(self, name: &str, shapes: Vec<ShapeDesc>) -> Self;
     fn with_light(self, light: LightDesc) -> Self;
     /// The same scene under other lights.
     fn lit_by(self, lights: &[LightDesc]) -> Self;
@@ -187,6 +277,16 @@ impl Build for SceneDesc {
 
     fn with_parallelogram(mut self, parallelogram: ParallelogramDesc) -> Self {
         self.shapes.push(ShapeDesc::Parallelogram(parallelogram));
+        self
+    }
+
+    fn with_shape(mut self, shape: ShapeDesc) -> Self {
+        self.shapes.push(shape);
+        self
+    }
+
+    fn with_group(mut self, name: &str, shapes: Vec<ShapeDesc>) -> Self {
+        self.groups.push((name.to_owned(), firstlight::GroupDesc { shapes }));
         self
     }
 

@@ -37,6 +37,16 @@ Limits: 64 MiB for all texts of a scene together, 1024 texts, includes 32 deep, 
 numbers and marks in one text.
 "##;
 
+const GROUPS: &str = r#"
+## Groups: `[[group.NAME.KIND]]`
+
+`[[group.tree.cone]]` describes a cone that belongs to the group `tree`; every shape can be in a group, instances of other
+groups too. A group by itself is not seen: `[[instance]]` places it, as often as wanted. A group is described in one
+text, its name is unique, and no group may hold an instance of itself, not by way of others either.
+
+Limits: 4194304 shapes and instances, counted wherever they are placed; groups 32 deep.
+"#;
+
 const COURSE: &str = r#"
 ## Files of the course
 
@@ -58,19 +68,35 @@ key, a missing value, a second value, or a key said twice is an error.
 /// The reference of the scene format as a page of Markdown.
 pub fn reference() -> String {
     let mut page = HEAD.to_owned();
-    table(&mut page, "Picture: `[render]`", &TableInfo::of::<RenderDesc>("render"));
-    table(&mut page, "Camera: `[camera]` or `[camera.NAME]`", &TableInfo::of::<CameraDesc>("camera"));
+    let mut inner: Vec<TableInfo> = Vec::new();
+    let mut section = |title: String, info: TableInfo| {
+        let mut text = String::new();
+        table(&mut text, &title, &info);
+        for table in info.fields.into_iter().flat_map(|field| field.tables) {
+            if !inner.iter().any(|known| known.kind == table.kind) {
+                inner.push(table);
+            }
+        }
+        text
+    };
+    page += &section("Picture: `[render]`".into(), TableInfo::of::<RenderDesc>("render"));
+    page += &section("Camera: `[camera]` or `[camera.NAME]`".into(), TableInfo::of::<CameraDesc>("camera"));
     for info in ShapeDesc::tables() {
-        table(&mut page, &format!("Shape: `[[{}]]`", info.kind), &info);
+        page += &section(format!("Shape: `[[{}]]`", info.kind), info);
     }
+    page += GROUPS;
     for info in LightDesc::tables() {
-        table(&mut page, &format!("Light: `[[light.{}]]`", info.kind), &info);
+        page += &section(format!("Light: `[[light.{}]]`", info.kind), info);
     }
     for info in MaterialDesc::tables() {
-        table(&mut page, &format!("Material: `[material.{}.NAME]`", info.kind), &info);
+        page += &section(format!("Material: `[material.{}.NAME]`", info.kind), info);
     }
     for info in TextureDesc::tables() {
-        table(&mut page, &format!("Texture: `[texture.{}.NAME]`", info.kind), &info);
+        page += &section(format!("Texture: `[texture.{}.NAME]`", info.kind), info);
+    }
+    // What fields of several tables hold is explained once
+    for info in &inner {
+        table(&mut page, &format!("Table: {}", info.kind.replace('_', " ")), info);
     }
     page.push_str(COURSE);
     page
@@ -103,6 +129,11 @@ fn table(page: &mut String, title: &str, info: &TableInfo) {
 
 /// What a field takes; the forms of colours and textured values are explained once, at the head of the page.
 fn takes(field: &FieldInfo) -> String {
+    if let Some(table) = field.tables.first() {
+        // To its heading, by the name that the book gives it
+        let anchor = format!("#table-{}", table.kind.replace('_', "-"));
+        return format!("[{}]({anchor})", field.words);
+    }
     let words = field.words.replace(" ([r, g, b], \"#rrggbb\" or a gray)", "");
     match words.split_once(" or { texture") {
         Some((value, _)) => format!("{value}, textured"),

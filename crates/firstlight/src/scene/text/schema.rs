@@ -14,10 +14,13 @@ use crate::texture::TextureDesc;
 pub fn schema() -> String {
     let mut defs = Map::new();
     let mut reference = |prefix: &str, table: TableInfo| -> (String, Json) {
-        let name = if prefix.is_empty() { table.kind.to_owned() } else { format!("{prefix}.{}", table.kind) };
+        let name = if prefix.is_empty() { table.kind.clone() } else { format!("{prefix}.{}", table.kind) };
         let to = json!({ "$ref": format!("#/$defs/{name}") });
+        for inner in table.fields.into_iter().flat_map(|field| field.tables) {
+            defs.insert(inner.kind, inner.schema);
+        }
         defs.insert(name, table.schema);
-        (table.kind.to_owned(), to)
+        (table.kind, to)
     };
 
     let mut properties = Map::new();
@@ -40,10 +43,17 @@ pub fn schema() -> String {
     properties.insert("camera".into(), json!({ "anyOf": [camera, several] }));
     properties.insert("texture".into(), kinds_by_name::<TextureDesc>(&mut reference));
     properties.insert("material".into(), kinds_by_name::<MaterialDesc>(&mut reference));
+    let mut shapes = Map::new();
     for table in ShapeDesc::tables() {
         let (kind, table) = reference("", table);
-        properties.insert(kind, json!({ "type": "array", "items": table }));
+        shapes.insert(kind, json!({ "type": "array", "items": table }));
     }
+    properties.extend(shapes.clone());
+    let group = json!({ "type": "object", "properties": shapes, "additionalProperties": false });
+    properties.insert(
+        "group".into(),
+        json!({ "type": "object", "description": "Shapes to be placed by instances, by name.", "additionalProperties": group }),
+    );
     let mut lights = Map::new();
     for table in LightDesc::tables() {
         let (kind, table) = reference("light", table);

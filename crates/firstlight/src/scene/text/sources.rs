@@ -41,13 +41,18 @@ pub(crate) type Position = (usize, usize);
 /// Fields that are checked together: when one is a stand-in, what compiling says of the others is noise.
 const RELATED: &[&[&str]] = &[
     &["position", "look_at", "up"],
-    &["fov_y_deg", "focal_length_mm", "sensor_height_mm"],
+    &["projection", "height", "fov_y_deg", "focal_length_mm", "sensor_height_mm"],
     &["width", "height"],
     &["display", "gamma"],
     &["e0", "e1"],
     &["cone_deg", "inner_cone_deg"],
     &["samples", "set"],
+    &["rotate_axis", "angle_deg"],
+    &["keys", "interpolation"],
 ];
+
+/// Fields of the elements of an array that are compared with each other.
+const COMPARED: &[&str] = &["time"];
 
 impl Sources {
     /// Gives the faults of compiling, which know only their paths, their places and the order of the text. Faults of
@@ -106,11 +111,22 @@ impl Sources {
             return true;
         }
         // A part of it is a stand-in: `sphere[0].center[1]` of `sphere[0].center`
-        let part = |p: &String| p.starts_with(path) && p[path.len()..].starts_with('[');
+        let part = |p: &String| p.starts_with(path) && p[path.len()..].starts_with(['[', '.']);
         if self.poisoned.range(path.to_owned()..).take_while(|p| p.starts_with(path)).any(part) {
             return true;
         }
         let (table, field) = path.rsplit_once('.').unwrap_or(("", path));
+        if COMPARED.contains(&field)
+            && let Some((array, _)) = table.rsplit_once('[')
+        {
+            // `keys[1].time`, when `keys[0].time` is a stand-in
+            let first = format!("{array}[");
+            let mut elements = self.poisoned.range(first.clone()..).take_while(|p| p.starts_with(&first));
+            let of_element = |p: &String| p[first.len()..].split_once("].").is_some_and(|(_, rest)| rest == field);
+            if elements.any(of_element) {
+                return true;
+            }
+        }
         RELATED.iter().filter(|group| group.contains(&field)).any(|group| {
             group.iter().any(|sibling| {
                 let sibling = format!("{table}.{sibling}");

@@ -39,6 +39,15 @@ impl SceneDesc {
         for shape in in_order(&self.shapes, Family::kind_index) {
             table(format!("[[{}]]", kind_name(shape)), shape.write());
         }
+        for (name, group) in &self.groups {
+            let name = key(name);
+            if group.shapes.is_empty() {
+                table(format!("[group.{name}]"), Vec::new());
+            }
+            for shape in in_order(&group.shapes, Family::kind_index) {
+                table(format!("[[group.{name}.{}]]", kind_name(shape)), shape.write());
+            }
+        }
         for light in in_order(&self.lights, Family::kind_index) {
             table(format!("[[light.{}]]", kind_name(light)), light.write());
         }
@@ -62,6 +71,10 @@ impl SceneDesc {
         top.extend(named("texture", &self.textures));
         top.extend(named("material", &self.materials));
         top.extend(arrays(&self.shapes, 1));
+        if !self.groups.is_empty() {
+            let groups = self.groups.iter().map(|(name, group)| (name.clone(), braces(&arrays(&group.shapes, 3), 2)));
+            top.push(("group".into(), braces(&groups.collect::<Vec<_>>(), 1)));
+        }
         let lights = arrays(&self.lights, 2);
         if !lights.is_empty() {
             top.push(("light".into(), braces(&lights, 1)));

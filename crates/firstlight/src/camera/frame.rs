@@ -1,0 +1,60 @@
+//! Where a camera is, and which way it is turned.
+
+use super::CameraDesc;
+use crate::context::{CompileContext, show};
+use crate::math::{DVec3, Vec3};
+use crate::transform::TransformDesc;
+
+/// Where a camera is, and which way it is turned: three directions at right angles.
+#[derive(Clone, Copy, Debug)]
+pub struct Frame {
+    /// The eye, or the middle of an orthographic film.
+    pub position: Vec3,
+    /// Unit: to the right in the picture.
+    pub right: Vec3,
+    /// Unit: up in the picture.
+    pub up: Vec3,
+    /// Unit: the line of sight.
+    pub forward: Vec3,
+}
+
+/// `up` nearer to the line of sight than this sine is parallel to it.
+const MIN_SINE: f64 = 1e-6;
+/// Eye and target nearer than this, in metres, are the same point.
+const MIN_DISTANCE: f64 = 1e-9;
+
+impl Frame {
+    pub(super) fn compile(desc: &CameraDesc, cx: &mut CompileContext) -> Self {
+        let (mut eye, mut target) = (DVec3::from(desc.position), DVec3::from(desc.look_at));
+        let mut up = DVec3::from(desc.up);
+        let before = cx.fault_count();
+        let mut position = cx.point("position", desc.position);
+        cx.point("look_at", desc.look_at);
+        cx.edge("up", desc.up);
+        // Whatever a transform does to the three, the frame made of them has right angles
+        if let Some(world_from_object) = TransformDesc::compile_field(desc.transform.as_deref(), cx) {
+            eye = cx.moved_point(world_from_object, eye);
+            target = cx.moved_point(world_from_object, target);
+            up = world_from_object.transform_vector3(up);
+            position = eye.as_vec3();
+        }
+        let forward = (target - eye).normalize_or_zero();
+        let right = forward.cross(up.normalize_or_zero());
+        if cx.fault_count() == before {
+            let (at, from) = (show(&target.to_array()), show(&eye.to_array()));
+            if !((target - eye).length() >= MIN_DISTANCE) {
+                let message = format!("{at} is the camera's position {from}: there is no direction to look in");
+                cx.error("look_at", message, Some("move one of them"));
+            } else if !(right.length() > MIN_SINE) {
+                let message = format!(
+                    "{} is parallel to the line of sight {}, from {from} to {at}",
+                    show(&up.to_array()),
+                    show(&(target - eye).to_array())
+                );
+                cx.error("up", message, Some("choose another up"));
+            }
+        }
+        let right = right.normalize_or_zero();
+        Self { position, right: right.as_vec3(), up: right.cross(forward).as_vec3(), forward: forward.as_vec3() }
+    }
+}

@@ -1,0 +1,51 @@
+//! The orthographic camera: parallel rays, so that what is farther away is as large, and parallel lines stay parallel.
+
+use super::{CameraDesc, FilmPlane, Frame};
+use crate::context::CompileContext;
+use crate::math::{Ray, Vec3};
+use crate::shape::RayDifferential;
+
+/// An orthographic camera, ready to look.
+#[derive(Clone, Copy, Debug)]
+pub struct Orthographic {
+    /// The middle of the film, without a shift, and which way it looks.
+    pub frame: Frame,
+    /// The film, in metres. It stands in the scene: what is behind it is not seen.
+    pub film: FilmPlane,
+}
+
+impl Orthographic {
+    pub(super) fn compile(desc: &CameraDesc, cx: &mut CompileContext, width: u32, height: u32) -> Self {
+        let frame = Frame::compile(desc, cx);
+        let angles = [
+            ("fov_y_deg", desc.fov_y_deg),
+            ("focal_length_mm", desc.focal_length_mm),
+            ("sensor_height_mm", desc.sensor_height_mm),
+        ];
+        for (field, value) in angles {
+            if let Some(value) = value {
+                let message = format!("{value} has no effect with projection = \"orthographic\"");
+                cx.error(field, message, Some("`height` says how much it sees; take this out"));
+            }
+        }
+        let hint = "metres from the lower edge of the picture to the upper";
+        match desc.height {
+            Some(metres) => drop(cx.positive("height", metres, hint)),
+            None => cx.error("height", "an orthographic camera needs it", Some(&format!("write `height = 2`: {hint}"))),
+        }
+        let half_height = desc.height.unwrap_or(1.0) * 0.5;
+        Self { frame, film: FilmPlane::compile(cx, desc.shift, half_height, width, height) }
+    }
+
+    /// The ray from the film at `x`, `y` in pixels from its upper left corner, and how it changes over `step` pixels to
+    /// the right and down: it starts elsewhere, and its direction stays.
+    #[inline(always)]
+    pub fn ray(&self, x: f32, y: f32, step: f32) -> (Ray, RayDifferential) {
+        let Frame { position, right, up, forward } = self.frame;
+        let [film_x, film_y] = self.film.place(x, y);
+        let [step_x, step_y] = self.film.steps(step);
+        let differential =
+            RayDifferential { dx: Vec3::ZERO, dy: Vec3::ZERO, origin_dx: right * step_x, origin_dy: up * step_y };
+        (Ray { o: position + right * film_x + up * film_y, d: forward }, differential)
+    }
+}

@@ -1,0 +1,330 @@
+//! Polygons to triangles.
+//!
+//! A polygon is laid onto the axis plane that its own plane (Newell's method) is nearest to. Where all triangles of the fan
+//! from its first corner turn the same way, the fan is taken; that is so for every convex polygon. Otherwise ears are cut off,
+//! always the first in order (G. H. Meisters 1975, "Polygons have ears"). Which corners are ears is remembered, so that
+//! cutting takes quadratic time, not cubic.
+//!
+//! So that no file can make it long, ears are cut of every polygon of up to [`ALWAYS`] corners, and of those of up to
+//! [`MAX_EARS`] as long as the squares of the sizes of larger ones, in the order of the file, are below a bound that grows with
+//! the number of corners; the others become fans, and are counted.
+
+use rayon::prelude::*;
+
+/// The largest polygon whose ears are cut.
+const MAX_EARS: usize = 4096;
+/// Polygons of so many corners cost little, however many there are.
+const ALWAYS: usize = 64;
+/// The sum of squares of sizes above [`ALWAYS`] that is cut in any case: one of 4096 corners, or 64 of 512.
+const BUDGET: u64 = 1 << 24;
+
+/// What was done to the polygons of a file, for its notes.
+#[derive(Clone, Copy, Default)]
+pub(super) struct Counts {
+    /// Faces of less than 3 corners, left out.
+    pub(super) small: u64,
+    /// Polygons too large for their ears to be cut, that are no fans by shape.
+    pub(super) large: u64,
+}
+
+impl Counts {
+    pub(super) fn add(&mut self, other: Counts) {
+        self.small += other.small;
+        self.large += other.large;
+    }
+
+    /// In words for a user.
+    pub(super) fn notes(&self, notes: &mut Vec<String>) {
+        if self.small > 0 {
+            notes.push(format!("{} faces of less than 3 corners are left out", self.small));
+        }
+        if self.large > 0 {
+            notes.push(format!(
+                "{} concave polygons of more than {ALWAYS} corners are split as fans and may look wrong: \
+                 there are too many, or one has more than {MAX_EARS}",
+                self.large
+            ));
+        }
+    }
+}
+
+/// How many triangles a polygon of so many corners becomes.
+pub(super) fn triangles_of(corners: u32) -> usize {
+    (corners as usize).saturating_sub(2)
+}
+
+/// Triangles of polygons that lie one after another, as numbers of corners. `position`: of a corner.
+pub(super) fn triangulate(sizes: &[u32], position: impl Fn(usize) -> [f32; 3] + Sync) -> (Vec<[u32; 3]>, Counts) {
+    const BLOCK: usize = 4096;
+    let corners: u64 = sizes.iter().map(|&s| u64::from(s)).sum();
+    let budget = BUDGET + ALWAYS as u64 * corners;
+    let cost = |size: u32| if size as usize > ALWAYS { u64::from(size).saturating_mul(size.into()) } else { 0 };
+    // Where each block of polygons begins, and what those before it cost
+    let (mut start, mut spent) = (0usize, 0u64);
+    let blocks: Vec<(usize, u64, &[u32])> = sizes
+        .chunks(BLOCK)
+        .map(|block| {
+            let begin = (start, spent, block);
+            start += block.iter().map(|&s| s as usize).sum::<usize>();
+            spent = block.iter().fold(spent, |spent, &size| spent.saturating_add(cost(size)));
+            begin
+        })
+        .collect();
+    let parts: Vec<(Vec<[u32; 3]>, Counts)> = blocks
+        .into_par_iter()
+        .map(|(mut start, mut spent, block)| {
+            let mut triangles = Vec::with_capacity(block.iter().map(|&s| triangles_of(s)).sum());
+            let mut counts = Counts::default();
+            let mut work = Ears::default();
+            for &size in block {
+                spent = spent.saturating_add(cost(size));
+                let cut = (size as usize) <= ALWAYS || (size as usize <= MAX_EARS && spent <= budget);
+                work.polygon(start, size as usize, cut, &position, &mut triangles, &mut counts);
+                start += size as usize;
+            }
+            (triangles, counts)
+        })
+        .collect();
+    let mut counts = Counts::default();
+    let mut triangles = Vec::with_capacity(parts.iter().map(|p| p.0.len()).sum());
+    for (part, count) in parts {
+        triangles.extend_from_slice(&part);
+        counts.add(count);
+    }
+    (triangles, counts)
+}
+
+type Point = [f64; 2];
+
+/// Twice the signed area of a triangle.
+fn area(a: Point, b: Point, c: Point) -> f64 {
+    (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
+}
+
+/// Room for one polygon at a time.
+#[derive(Default)]
+struct Ears {
+    points: Vec<Point>,
+    next: Vec<u32>,
+    previous: Vec<u32>,
+    ear: Vec<bool>,
+}
+
+impl Ears {
+    /// Adds the triangles of one polygon; `cut`: whether its ears may be cut.
+    fn polygon(
+        &mut self,
+        start: usize,
+        size: usize,
+        cut: bool,
+        position: &impl Fn(usize) -> [f32; 3],
+        triangles: &mut Vec<[u32; 3]>,
+        counts: &mut Counts,
+    ) {
+        counts.small += u64::from(size < 3);
+        if size > 3 && !self.is_fan(start, size, position) {
+            if cut {
+                self.cut(start as u32, triangles);
+                return;
+            }
+            counts.large += 1;
+        }
+        let corner = |i: usize| (start + i) as u32;
+        triangles.extend((2..size).map(|i| [corner(0), corner(i - 1), corner(i)]));
+    }
+
+    /// Lays the polygon into a plane, counter-clockwise; whether the fan from its first corner is right.
+    fn is_fan(&mut self, start: usize, size: usize, position: &impl Fn(usize) -> [f32; 3]) -> bool {
+        let at = |i: usize| position(start + i).map(f64::from);
+        // The normal, by Newell's method, from the first corner
+        let origin = at(0);
+        let from_origin = |i: usize| {
+            let p = at(i);
+            [p[0] - origin[0], p[1] - origin[1], p[2] - origin[2]]
+        };
+        let mut normal = [0.0; 3];
+        let mut p = [0.0; 3];
+        for i in 1..size {
+            let q = from_origin(i);
+            for (axis, n) in normal.iter_mut().enumerate() {
+                let (j, k) = ((axis + 1) % 3, (axis + 2) % 3);
+                *n += p[j] * q[k] - p[k] * q[j];
+            }
+            p = q;
+        }
+        // Without an area, or not finite: nothing better than a fan
+        let sizes = normal.map(f64::abs);
+        let largest = sizes[0].max(sizes[1]).max(sizes[2]);
+        if !(largest > 0.0 && largest.is_finite()) || sizes.iter().any(|s| s.is_nan()) {
+            return true;
+        }
+        let axis = if sizes[2] == largest {
+            2
+        } else if sizes[1] == largest {
+            1
+        } else {
+            0
+        };
+        let (j, k) = ((axis + 1) % 3, (axis + 2) % 3);
+        let turned = normal[axis] < 0.0;
+        self.points.clear();
+        self.points.extend((0..size).map(|i| {
+            let p = from_origin(i);
+            if turned { [p[k], p[j]] } else { [p[j], p[k]] }
+        }));
+        let points = &self.points;
+        (2..size).all(|i| area(points[0], points[i - 1], points[i]) >= 0.0)
+    }
+
+    /// Cuts ears off the polygon in `points`.
+    fn cut(&mut self, start: u32, triangles: &mut Vec<[u32; 3]>) {
+        let size = self.points.len() as u32;
+        self.next.clear();
+        self.next.extend((0..size).map(|i| (i + 1) % size));
+        self.previous.clear();
+        self.previous.extend((0..size).map(|i| (i + size - 1) % size));
+        self.ear.clear();
+        self.ear.resize(size as usize, false);
+        for i in 0..size {
+            self.ear[i as usize] = self.is_ear(i);
+        }
+        let mut at = 0;
+        for _ in 0..size - 2 {
+            // The next ear from here; where there is none, the polygon crosses itself: any corner that turns forwards, or any
+            let begin = at;
+            while !self.ear[at as usize] {
+                at = self.next[at as usize];
+                if at == begin {
+                    at = self.forward(begin);
+                    break;
+                }
+            }
+            let (before, after) = (self.previous[at as usize], self.next[at as usize]);
+            triangles.push([start + before, start + at, start + after]);
+            self.next[before as usize] = after;
+            self.previous[after as usize] = before;
+            self.ear[before as usize] = self.is_ear(before);
+            self.ear[after as usize] = self.is_ear(after);
+            at = after;
+        }
+    }
+
+    fn corner(&self, i: u32) -> [Point; 3] {
+        [self.previous[i as usize], i, self.next[i as usize]].map(|i| self.points[i as usize])
+    }
+
+    /// Whether the triangle at a corner is forward and no other corner is in it.
+    fn is_ear(&self, i: u32) -> bool {
+        let [a, b, c] = self.corner(i);
+        if !(area(a, b, c) > 0.0) {
+            return false;
+        }
+        let mut other = self.next[self.next[i as usize] as usize];
+        while other != self.previous[i as usize] {
+            let p = self.points[other as usize];
+            // Corners at the same place as one of the three do not count: polygons with holes have such seams
+            let within = area(a, b, p) >= 0.0 && area(b, c, p) >= 0.0 && area(c, a, p) >= 0.0;
+            if within && p != a && p != b && p != c {
+                return false;
+            }
+            other = self.next[other as usize];
+        }
+        true
+    }
+
+    /// The first corner from `begin` that turns forwards, otherwise `begin`.
+    fn forward(&self, begin: u32) -> u32 {
+        let mut i = begin;
+        loop {
+            let [a, b, c] = self.corner(i);
+            if area(a, b, c) > 0.0 {
+                return i;
+            }
+            i = self.next[i as usize];
+            if i == begin {
+                return begin;
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Triangles of a flat polygon, and their areas.
+    fn split(points: &[[f32; 2]], place: impl Fn([f32; 2]) -> [f32; 3] + Sync) -> (Vec<[u32; 3]>, Vec<f64>) {
+        let (triangles, _) = triangulate(&[points.len() as u32], |i| place(points[i]));
+        let at = |i: u32| points[i as usize].map(f64::from);
+        let areas = triangles.iter().map(|t| area(at(t[0]), at(t[1]), at(t[2])) / 2.0).collect();
+        (triangles, areas)
+    }
+
+    #[test]
+    fn convex_polygons_are_fans() {
+        let (triangles, _) = split(&[[0.0, 0.0], [2.0, 0.0], [3.0, 1.0], [1.0, 2.0]], |p| [p[0], p[1], 5.0]);
+        assert_eq!(triangles, [[0, 1, 2], [0, 2, 3]]);
+    }
+
+    #[test]
+    fn a_dart_is_split_at_its_notch() {
+        let dart = [[0.0, 0.0], [2.0, 1.0], [0.0, 2.0], [1.0, 1.0]];
+        for turn in 0..4 {
+            let mut points = dart;
+            points.rotate_left(turn);
+            let places: [fn([f32; 2]) -> [f32; 3]; 3] =
+                [|p| [p[0], p[1], 1.0], |p| [1.0, p[0], p[1]], |p| [p[1], 0.0, p[0]]];
+            for place in places {
+                let (triangles, areas) = split(&points, place);
+                assert_eq!(triangles.len(), 2);
+                assert!(areas.iter().all(|&a| a > 0.0), "{triangles:?}");
+                assert_eq!(areas.iter().sum::<f64>(), 1.0);
+            }
+        }
+    }
+
+    #[test]
+    fn combs_and_spirals_are_covered_once() {
+        let mut comb = vec![[0.0, -1.0], [100.0, -1.0]];
+        comb.extend((0..=100).rev().map(|i| [i as f32, if i % 2 == 0 { 5.0 } else { 0.0 }]));
+        let mut spiral: Vec<[f32; 2]> = Vec::new();
+        let square = [[1.0, 0.0], [0.0, 1.0], [-1.0, 0.0], [0.0, -1.0]];
+        spiral.extend((0..40).map(|i| square[i % 4].map(|x: f32| x * (10.0 + i as f32))));
+        spiral.extend((0..40).rev().map(|i| square[i % 4].map(|x: f32| x * (9.0 + i as f32))));
+        for polygon in [comb, spiral] {
+            let whole: f64 = (0..polygon.len())
+                .map(|i| {
+                    let (p, q) = (polygon[i].map(f64::from), polygon[(i + 1) % polygon.len()].map(f64::from));
+                    (p[0] * q[1] - p[1] * q[0]) / 2.0
+                })
+                .sum();
+            let (triangles, areas) = split(&polygon, |p| [p[0], p[1], p[0] + p[1]]);
+            assert_eq!(triangles.len(), polygon.len() - 2);
+            assert!(areas.iter().all(|&a| a * whole.signum() >= 0.0));
+            assert!((areas.iter().sum::<f64>() - whole).abs() < 1e-6);
+        }
+    }
+
+    #[test]
+    fn any_polygon_has_two_triangles_less_than_corners() {
+        let mut state = 7u32;
+        for size in 0..200 {
+            let points: Vec<[f32; 3]> = (0..size)
+                .map(|_| {
+                    [0; 3].map(|_| {
+                        state = state.wrapping_mul(1664525).wrapping_add(1013904223);
+                        match state >> 27 {
+                            0 => f32::NAN,
+                            1 => f32::MAX,
+                            _ => (state >> 20) as f32,
+                        }
+                    })
+                })
+                .collect();
+            let (triangles, counts) = triangulate(&[size], |i| points[i]);
+            assert_eq!(triangles.len(), triangles_of(size));
+            assert_eq!(counts.small, u64::from(size < 3));
+            assert!(triangles.iter().flatten().all(|&i| i < size));
+        }
+    }
+}

@@ -1,0 +1,115 @@
+//! What the camera rays of neighbouring pixels hit, together.
+//!
+//! Rays of one block of 8 x 8 go through the mesh of the world as a bundle; everything else is asked ray by ray. The
+//! answers are those of [`Scene::intersect`], to the bit.
+
+use fearless_simd::Level;
+
+use crate::accel::RayTile;
+use crate::math::Ray;
+use crate::scene::{Hit, Nearest, Scene};
+use crate::shape::{RayDifferential, TileHits};
+
+/// Rays across a block.
+const BLOCK: u32 = 8;
+
+/// The camera rays of a square of pixels, and what they hit.
+pub(crate) struct PixelHits {
+    level: Level,
+    /// Pixels across.
+    side: u32,
+    /// Rays across.
+    across: u32,
+    hits: Vec<Option<Hit>>,
+    rays: Box<RayTile>,
+    found: Box<TileHits>,
+}
+
+impl PixelHits {
+    /// For a scene whose pixels have `n` x `n` rays.
+    pub fn new(level: Level, n: u32) -> Self {
+        let side = (BLOCK / n).max(1);
+        let across = side * n;
+        PixelHits {
+            level,
+            side,
+            across,
+            hits: vec![None; (across * across) as usize],
+            rays: Box::new(RayTile::ZERO),
+            found: Box::new(TileHits::new(0.0)),
+        }
+    }
+
+    /// Pixels across and down that are traced together.
+    pub fn side(&self) -> u32 {
+        self.side
+    }
+
+    /// Traces the rays of the pixels from (`i`, `j`), `width` x `height` of them, at most [`side`](Self::side).
+    pub fn trace(&mut self, scene: &Scene, i: u32, j: u32, width: u32, height: u32) {
+        let n = scene.antialiasing;
+        let (rays_across, rays_down) = (width * n, height * n);
+        for top in (0..rays_down).step_by(BLOCK as usize) {
+            for left in (0..rays_across).step_by(BLOCK as usize) {
+                let (w, h) = ((rays_across - left).min(BLOCK), (rays_down - top).min(BLOCK));
+                self.block(scene, i * n, j * n, left, top, w, h);
+            }
+        }
+    }
+
+    /// Traces the `w` x `h` rays from (`left`, `top`) of the square that begins at ray (`x`, `y`) of the film.
+    #[allow(clippy::too_many_arguments, reason = "a rectangle in a square on a film")]
+    fn block(&mut self, scene: &Scene, x: u32, y: u32, left: u32, top: u32, w: u32, h: u32) {
+        let geometry = &scene.geometry;
+        let bundle = geometry.world_as_bundle();
+        let mut active = 0u64;
+        for row in 0..h {
+            for column in 0..w {
+                let (ray, _) = camera_ray(scene, x + left + column, y + top + row);
+                let mut nearest = Nearest::default();
+                scene.meet_listed(&ray, &mut nearest);
+                if bundle {
+                    geometry.meet_upper(self.level, &ray, &mut nearest);
+                    // Blocks of 4 x 4 after each other
+                    let place = ((row / 4 * 2 + column / 4) * 16 + row % 4 * 4 + column % 4) as usize;
+                    self.rays.set(place, ray.o, ray.d);
+                    self.found.t[place] = nearest.limit();
+                    self.found.surface[place] = u32::MAX;
+                    self.found.triangle[place] = u32::MAX;
+                    active |= 1 << place;
+                } else {
+                    geometry.meet_trees(self.level, &ray, &mut nearest);
+                }
+                self.hits[((top + row) * self.across + left + column) as usize] = nearest.0;
+            }
+        }
+        if !bundle {
+            return;
+        }
+        let mut met = geometry.meet_world(self.level, &self.rays, active, &mut self.found);
+        while met != 0 {
+            let place = met.trailing_zeros();
+            met &= met - 1;
+            let (row, column) = (place / 32 * 4 + place % 16 / 4, place / 16 % 2 * 4 + place % 4);
+            let hit = &mut self.hits[((top + row) * self.across + left + column) as usize];
+            let mut nearest = Nearest(*hit);
+            geometry.offer_world(&self.found, place as usize, &mut nearest);
+            *hit = nearest.0;
+        }
+    }
+
+    /// What the ray (`column`, `row`) of pixel (`i`, `j`), counted from the first pixel that was traced, hits.
+    #[inline(always)]
+    pub fn get(&self, n: u32, i: u32, j: u32, column: u32, row: u32) -> Option<Hit> {
+        self.hits[((j * n + row) * self.across + i * n + column) as usize]
+    }
+}
+
+/// The camera ray (`x`, `y`) of the film, counted in rays, and how it changes to the next.
+#[inline(always)]
+pub(crate) fn camera_ray(scene: &Scene, x: u32, y: u32) -> (Ray, RayDifferential) {
+    let n = scene.antialiasing;
+    // The middle of the sub-pixel
+    let at = |ray: u32| (ray / n) as f32 + ((ray % n) as f32 + 0.5) / n as f32;
+    scene.camera.ray(at(x), at(y), 1.0 / n as f32)
+}

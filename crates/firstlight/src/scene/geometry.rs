@@ -1,0 +1,297 @@
+//! All that a ray can meet, and how a ray finds it.
+//!
+//! Three kinds of places:
+//! - spheres and parallelograms of the world lie in plain lists while there are few of them ([`LISTED`]), and are asked
+//!   one after the other;
+//! - the triangles of all meshes of the world lie in one tree;
+//! - everything else is *placed*: it has a space of its own and a transform to the world. A second tree, over the boxes of
+//!   all that is placed, leads to it: that is the upper one of two levels.
+//!
+//! A group that has instances is flattened: each of its meshes, point sets and solids is placed once for every instance,
+//! however deep the groups are nested. No tree can change an answer: what is first on a ray is the smallest distance, and
+//! the lowest id at the same distance.
+
+use std::sync::Arc;
+
+use crate::accel::{Aabb, Bvh};
+use crate::ids::{MaterialId, SurfaceId};
+use crate::math::DVec3;
+use crate::shape::{Mesh, Parallelogram, Placement, PointSet, Solid, Sphere, TrianglePoint};
+
+/// What a surface id stands for.
+#[derive(Clone, Debug)]
+pub(crate) struct Surface {
+    /// What the scene calls it: the names of the instances around it and its own, with `/` between.
+    pub name: Option<Arc<str>>,
+    /// Its material; `None` where each triangle of a mesh has its own.
+    pub material: Option<MaterialId>,
+    /// Whether camera rays see it.
+    pub visible: bool,
+    /// Whether it stands in the way of light.
+    pub casts_shadow: bool,
+    /// Whether others can take its light away.
+    pub receives_shadow: bool,
+    /// Whether camera rays pass through from behind.
+    pub single_sided: bool,
+}
+
+/// A thing with a space of its own.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Target {
+    /// The mesh of that index of [`Geometry::meshes`].
+    Mesh(u32),
+    /// The point set of that index of [`Geometry::point_sets`].
+    Points(u32),
+    /// The solid of that index of [`Geometry::solids`].
+    Solid(u32),
+}
+
+/// A thing in the world.
+#[derive(Clone, Debug)]
+pub(crate) struct Placed {
+    pub placement: Placement,
+    pub target: Target,
+    /// Its surface; the first of several in a joined mesh.
+    pub surface: SurfaceId,
+    pub camera: Meets,
+    pub shadow: Meets,
+}
+
+/// Where on a surface a ray ended.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum At {
+    Sphere(u32),
+    Parallelogram(u32),
+    /// A light's shape.
+    Light,
+    /// On the mesh of the world.
+    World(TrianglePoint),
+    /// On something placed.
+    Placed(u32, Spot),
+}
+
+/// Where on something placed.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Spot {
+    Triangle(TrianglePoint),
+    /// The point of a point set.
+    Point(u32),
+    /// The part of a solid.
+    Part(u8),
+}
+
+/// Whether rays of one kind can meet something placed, or a joined mesh: all of it, none of it, or what its surfaces say.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Meets {
+    All,
+    None,
+    /// Ask each surface.
+    Some,
+}
+
+/// The first thing on a ray.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Hit {
+    /// Where: the ray's `o + t d`, t > 0.
+    pub t: f64,
+    /// What.
+    pub surface: SurfaceId,
+    pub(crate) at: At,
+}
+
+impl Hit {
+    /// The triangle of a mesh or the point of a point set, in the order of its file; 0 for all else.
+    pub fn primitive(&self) -> u32 {
+        match self.at {
+            At::World(point) | At::Placed(_, Spot::Triangle(point)) => point.triangle,
+            At::Placed(_, Spot::Point(point)) => point,
+            _ => 0,
+        }
+    }
+}
+
+/// The nearest hit so far: of several at the same distance, the one with the lowest id.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Nearest(pub Option<Hit>);
+
+impl Nearest {
+    #[inline(always)]
+    pub fn offer(&mut self, t: f64, surface: SurfaceId, at: At) {
+        if self.0.is_none_or(|hit| t < hit.t || t == hit.t && surface < hit.surface) {
+            self.0 = Some(Hit { t, surface, at });
+        }
+    }
+
+    /// What is farther than this cannot be nearest. Rounded up, so that nothing at the same distance is lost.
+    #[inline(always)]
+    pub fn limit(&self) -> f32 {
+        self.0.map_or(f32::INFINITY, |hit| (hit.t as f32).next_up())
+    }
+}
+
+/// What lies in the upper tree.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Item {
+    Sphere(u32),
+    Parallelogram(u32),
+    Placed(u32),
+}
+
+/// A shape of the world, and which surface it is.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Owned<T> {
+    /// Whether camera rays see it: a copy of what its surface says.
+    pub seen: bool,
+    pub shape: T,
+    pub surface: SurfaceId,
+}
+
+/// Up to this many spheres and parallelograms are asked one by one, without a tree.
+pub(crate) const LISTED: usize = 48;
+
+/// All that a ray can meet, but for the lights.
+pub(crate) struct Geometry {
+    /// What each surface id of a shape stands for.
+    pub surfaces: Vec<Surface>,
+    pub spheres: Vec<Owned<Sphere>>,
+    pub parallelograms: Vec<Owned<Parallelogram>>,
+    /// Whether spheres and parallelograms are few: then they are asked one by one and do not lie in the upper tree.
+    pub listed: bool,
+    /// The triangles of all meshes of the world, in world space.
+    pub world: Option<Joined>,
+    pub placed: Vec<Placed>,
+    pub meshes: Vec<Mesh>,
+    pub point_sets: Vec<PointSet>,
+    pub solids: Vec<Solid>,
+    /// What has no box: planes.
+    pub unbounded: Vec<u32>,
+    pub items: Vec<Item>,
+    /// Over the boxes of `items`.
+    pub upper: Bvh,
+}
+
+/// The mesh of the world, and which rays meet it.
+pub(crate) struct Joined {
+    pub mesh: Mesh,
+    pub camera: Meets,
+    pub shadow: Meets,
+}
+
+/// What the walk through a scene finds.
+#[derive(Default)]
+pub(crate) struct Parts {
+    pub surfaces: Vec<Surface>,
+    pub spheres: Vec<Owned<Sphere>>,
+    pub parallelograms: Vec<Owned<Parallelogram>>,
+    pub world: Option<Joined>,
+    pub placed: Vec<Placed>,
+    pub meshes: Vec<Mesh>,
+    pub point_sets: Vec<PointSet>,
+    pub solids: Vec<Solid>,
+}
+
+/// A box of the upper tree: a little larger, so that no rounding of the shape's own test lies outside.
+fn widened([low, high]: [DVec3; 2]) -> Aabb {
+    let room = (high - low) * 1e-6 + low.abs().max(high.abs()) * 1e-6;
+    Aabb { min: (low - room).as_vec3(), max: (high + room).as_vec3() }
+}
+
+impl std::fmt::Debug for Geometry {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "Geometry({} surfaces, {} placed)", self.surfaces.len(), self.placed.len())
+    }
+}
+
+impl Geometry {
+    /// From shapes that are in the world; the trees of meshes and point sets are there already.
+    pub fn new(parts: Parts) -> Self {
+        let Parts { surfaces, spheres, parallelograms, world, placed, meshes, point_sets, solids } = parts;
+        let listed = spheres.len() + parallelograms.len() <= LISTED;
+        let (mut items, mut boxes, mut unbounded) = (Vec::new(), Vec::new(), Vec::new());
+        if !listed {
+            for (i, sphere) in spheres.iter().enumerate() {
+                items.push(Item::Sphere(i as u32));
+                boxes.push(widened(sphere.shape.bounds()));
+            }
+            for (i, flat) in parallelograms.iter().enumerate() {
+                items.push(Item::Parallelogram(i as u32));
+                boxes.push(widened(flat.shape.bounds()));
+            }
+        }
+        for (i, thing) in placed.iter().enumerate() {
+            let own = match thing.target {
+                // Nothing in it can be hit
+                Target::Mesh(mesh) if meshes[mesh as usize].tree.len() == 0 => continue,
+                Target::Points(points) if point_sets[points as usize].bounds().is_none() => continue,
+                Target::Mesh(mesh) => meshes[mesh as usize].bounds(),
+                Target::Points(points) => point_sets[points as usize].bounds(),
+                Target::Solid(solid) => solids[solid as usize].bounds(),
+            };
+            match own {
+                Some(own) => {
+                    items.push(Item::Placed(i as u32));
+                    boxes.push(widened(thing.placement.bounds(own)));
+                }
+                None => unbounded.push(i as u32),
+            }
+        }
+        let upper = Bvh::build(&boxes);
+        Geometry {
+            surfaces,
+            spheres,
+            parallelograms,
+            listed,
+            world,
+            placed,
+            meshes,
+            point_sets,
+            solids,
+            unbounded,
+            items,
+            upper,
+        }
+    }
+
+    /// The listed shapes that stand in the way of light.
+    pub fn listed_obstacles(&self) -> (Vec<Sphere>, Vec<Parallelogram>) {
+        if !self.listed {
+            return (Vec::new(), Vec::new());
+        }
+        let casts = |surface: SurfaceId| self.surfaces[surface.index()].casts_shadow;
+        let spheres = self.spheres.iter().filter(|sphere| casts(sphere.surface)).map(|sphere| sphere.shape);
+        let flats = self.parallelograms.iter().filter(|flat| casts(flat.surface)).map(|flat| flat.shape);
+        (spheres.collect(), flats.collect())
+    }
+
+    /// Every mesh, that of the world first.
+    pub fn all_meshes(&self) -> impl Iterator<Item = &Mesh> {
+        self.world.iter().map(|world| &world.mesh).chain(&self.meshes)
+    }
+
+    /// Bytes of meshes and point sets without trees, and of all trees.
+    pub fn bytes(&self) -> [u64; 2] {
+        let meshes: usize = self.all_meshes().map(Mesh::bytes).sum();
+        let points: usize = self.point_sets.iter().map(PointSet::bytes).sum();
+        let mesh_trees: usize = self.all_meshes().map(|mesh| mesh.tree.bytes()).sum();
+        let point_trees: usize = self.point_sets.iter().map(PointSet::tree_bytes).sum();
+        let placed = size_of_val(self.placed.as_slice()) + size_of_val(self.items.as_slice());
+        [(meshes + points) as u64, (mesh_trees + point_trees + self.upper.bytes() + placed) as u64]
+    }
+
+    /// The box around all shapes that have an end: its least and its greatest corner. `None` without such shapes.
+    pub fn bounds(&self) -> Option<[DVec3; 2]> {
+        let spheres = self.spheres.iter().map(|sphere| sphere.shape.bounds());
+        let flats = self.parallelograms.iter().map(|flat| flat.shape.bounds());
+        let world = self.world.iter().filter_map(|world| world.mesh.bounds());
+        let placed = self.placed.iter().filter_map(|thing| {
+            let own = match thing.target {
+                Target::Mesh(mesh) => self.meshes[mesh as usize].bounds(),
+                Target::Points(points) => self.point_sets[points as usize].bounds(),
+                Target::Solid(solid) => self.solids[solid as usize].bounds(),
+            };
+            own.map(|own| thing.placement.bounds(own))
+        });
+        let all = spheres.chain(flats).chain(world).chain(placed);
+        all.reduce(|[low, high], [a, b]| [low.min(a), high.max(b)])
+    }
+}

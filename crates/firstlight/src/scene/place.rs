@@ -1,0 +1,472 @@
+//! From described shapes to placed ones: groups are flattened, transforms joined, surfaces numbered.
+//!
+//! Two steps. First every group, and the scene itself, is compiled once in its own space ([`Group`]): a list of leaves in
+//! scene order, and one mesh joined from all its meshes. Then the scene is walked ([`Walk`]), instances with it, and every
+//! leaf that is come across is given a surface and a place in the world.
+
+use std::collections::HashMap;
+use std::sync::Arc;
+
+use glam::DAffine3;
+
+use super::SceneDesc;
+use super::geometry::{Geometry, Joined, Meets, Owned, Parts, Placed, Surface, Target};
+use crate::context::{Assets, CompileContext};
+use crate::describe::Family;
+use crate::ids::{MaterialId, SurfaceId};
+use crate::shape::{
+    Common, Mesh, MeshBuilder, MeshSource, Parallelogram, Placement, PointSet, ShapeDesc, Solid, Sphere,
+};
+use crate::transform::TransformDesc;
+
+/// The most things that are placed, instances of groups counted by what they hold.
+const MAX_PLACED: u64 = 1 << 22;
+/// Bytes of the names of all that instances place.
+const MAX_NAMES: usize = 1 << 30;
+/// The deepest groups within groups.
+const MAX_DEPTH: usize = 32;
+
+/// Materials by name.
+pub(super) struct MaterialNames<'a> {
+    names: Vec<&'a str>,
+    ids: HashMap<&'a str, u32>,
+}
+
+impl<'a> MaterialNames<'a> {
+    pub fn new(desc: &'a SceneDesc) -> Self {
+        let names: Vec<&str> = desc.materials.iter().map(|(name, _)| name.as_str()).collect();
+        let ids = names.iter().enumerate().rev().map(|(id, name)| (*name, id as u32)).collect();
+        MaterialNames { names, ids }
+    }
+
+    /// The one of shapes that name none.
+    pub fn default(&self) -> MaterialId {
+        MaterialId(self.names.len() as u32)
+    }
+
+    /// The one of that name, if there is one.
+    pub fn find(&self, name: &str) -> Option<MaterialId> {
+        self.ids.get(name).copied().map(MaterialId)
+    }
+
+    /// The one called `name`, or a fault at `field`.
+    pub fn resolve(&self, cx: &mut CompileContext, field: &str, name: &str) -> MaterialId {
+        self.find(name).unwrap_or_else(|| {
+            cx.unknown(field, "material", name, &self.names);
+            MaterialId(0)
+        })
+    }
+}
+
+/// A shape in the space of its group.
+struct Leaf {
+    form: Form,
+    transform: Option<DAffine3>,
+    surface: Surface,
+    /// Whether the material was named, and is not the default.
+    has_material: bool,
+}
+
+enum Form {
+    Sphere(Sphere),
+    Parallelogram(Parallelogram),
+    Solid(u32),
+    Points(u32),
+    /// Part of the group's mesh.
+    MeshPart,
+    /// An instance of another group.
+    Instance(usize),
+    /// Something that was refused.
+    Nothing,
+}
+
+/// A group, or the scene itself, in its own space.
+struct Group {
+    leaves: Vec<Leaf>,
+    /// All its meshes, joined.
+    mesh: Option<Mesh>,
+}
+
+/// What an instance says of everything in it.
+#[derive(Clone)]
+struct Over {
+    /// The names of the instances around, with `/` between.
+    name: Option<Arc<str>>,
+    material: Option<MaterialId>,
+    visible: bool,
+    casts_shadow: bool,
+    receives_shadow: bool,
+    single_sided: bool,
+}
+
+impl Over {
+    const NONE: Over = Over {
+        name: None,
+        material: None,
+        visible: true,
+        casts_shadow: true,
+        receives_shadow: true,
+        single_sided: false,
+    };
+
+    /// The name of something within.
+    fn path(&self, own: &Option<Arc<str>>) -> Option<Arc<str>> {
+        match (&self.name, own) {
+            (Some(name), Some(own)) => Some(format!("{name}/{own}").into()),
+            (name, own) => name.clone().or_else(|| own.clone()),
+        }
+    }
+
+    /// What an instance within says, under this.
+    fn within(&self, leaf: &Leaf) -> Over {
+        Over {
+            name: self.path(&leaf.surface.name),
+            material: self.material.or(leaf.surface.material.filter(|_| leaf.has_material)),
+            visible: self.visible && leaf.surface.visible,
+            casts_shadow: self.casts_shadow && leaf.surface.casts_shadow,
+            receives_shadow: self.receives_shadow && leaf.surface.receives_shadow,
+            single_sided: self.single_sided || leaf.surface.single_sided,
+        }
+    }
+
+    fn surface(&self, own: &Surface) -> Surface {
+        Surface {
+            name: self.path(&own.name),
+            material: self.material.or(own.material),
+            visible: self.visible && own.visible,
+            casts_shadow: self.casts_shadow && own.casts_shadow,
+            receives_shadow: self.receives_shadow && own.receives_shadow,
+            single_sided: self.single_sided || own.single_sided,
+        }
+    }
+}
+
+/// Compiles all shapes of a scene. `None` after an error.
+pub(super) fn compile_shapes(
+    desc: &SceneDesc,
+    cx: &mut CompileContext,
+    assets: &dyn Assets,
+    files: &mut MeshFiles,
+) -> Option<Geometry> {
+    let before = cx.error_count();
+    let materials = MaterialNames::new(desc);
+    // The first of a name; a second one is a fault of the text
+    let group_ids = desc.groups.iter().enumerate().rev().map(|(id, (name, _))| (name.as_str(), id)).collect();
+    let mut compiler =
+        Compiler { desc, materials, group_ids, assets, files, solids: Vec::new(), point_sets: Vec::new() };
+    let root = compiler.group(cx, "", &desc.shapes);
+    let mut groups = Vec::with_capacity(desc.groups.len());
+    for (name, group) in &desc.groups {
+        groups.push(compiler.group(cx, &format!("group.{name}."), &group.shapes));
+    }
+    compiler.refuse_circles(cx, &groups);
+    let Compiler { solids, point_sets, .. } = compiler;
+    if cx.error_count() > before {
+        return None;
+    }
+    let things = count_things(&root, &groups, &mut vec![None; groups.len()]);
+    if things > MAX_PLACED {
+        let message = format!("the scene and its instances place {things} things, the limit is {MAX_PLACED}");
+        cx.error("instance", message, Some("join the meshes of a group in one, or place fewer"));
+        return None;
+    }
+    let meshes: Vec<&Mesh> = groups.iter().filter_map(|group| group.mesh.as_ref()).collect();
+    let mut count = 0;
+    let mesh_of = groups.iter().map(|group| {
+        group.mesh.as_ref().map(|_| {
+            count += 1;
+            count - 1
+        })
+    });
+    let mesh_of = mesh_of.collect();
+    let parts = Parts { solids, point_sets, ..Parts::default() };
+    let mut walk = Walk { groups: &groups, meshes, mesh_of, parts, name_bytes: 0 };
+    walk.group(&root, None, DAffine3::IDENTITY, &Over::NONE);
+    let Walk { mut parts, name_bytes, .. } = walk;
+    if name_bytes > MAX_NAMES {
+        let message = format!("the names of what the instances place have more than {MAX_NAMES} bytes");
+        cx.error("instance", message, Some("give shorter names, or fewer"));
+        return None;
+    }
+    parts.meshes = groups.into_iter().filter_map(|group| group.mesh).collect();
+    parts.world = root.mesh.map(|mesh| {
+        let (camera, shadow) = meets(&parts.surfaces, 0, &mesh);
+        Joined { mesh, camera, shadow }
+    });
+    Some(Geometry::new(parts))
+}
+
+/// The mesh files that were read, for the hash of the scene and for reports.
+pub(super) type MeshFiles = Vec<(String, [u8; 32])>;
+
+struct Compiler<'a> {
+    desc: &'a SceneDesc,
+    materials: MaterialNames<'a>,
+    /// Groups by name.
+    group_ids: HashMap<&'a str, usize>,
+    assets: &'a dyn Assets,
+    files: &'a mut MeshFiles,
+    solids: Vec<Solid>,
+    point_sets: Vec<PointSet>,
+}
+
+impl Compiler<'_> {
+    /// Compiles the shapes of a group, or of the scene, whose paths begin with `prefix`.
+    fn group(&mut self, cx: &mut CompileContext, prefix: &str, shapes: &[ShapeDesc]) -> Group {
+        let mut leaves: Vec<Leaf> = Vec::with_capacity(shapes.len());
+        let mut mesh = MeshBuilder::default();
+        // Scene order: kind by kind, in each the order of the text
+        for (kind, word) in ShapeDesc::KINDS.iter().enumerate() {
+            let of_kind = shapes.iter().filter(|shape| shape.kind_index() == kind);
+            for (i, shape) in of_kind.enumerate() {
+                let leaf = cx.within(&format!("{prefix}{word}[{i}]"), |cx| {
+                    let number = leaves.len() as u32;
+                    self.leaf(cx, shape, number, &mut mesh)
+                });
+                leaves.push(leaf);
+            }
+        }
+        Group { leaves, mesh: mesh.build(cx) }
+    }
+
+    fn leaf(&mut self, cx: &mut CompileContext, shape: &ShapeDesc, number: u32, mesh: &mut MeshBuilder) -> Leaf {
+        let Common { name, material, transform, visible, casts_shadow, receives_shadow, single_sided, .. } =
+            shape.common();
+        let named = material.map(|name| self.materials.resolve(cx, "material", name));
+        let mut surface = Surface {
+            name: name.map(Arc::from),
+            material: Some(named.unwrap_or(self.materials.default())),
+            visible,
+            casts_shadow,
+            receives_shadow,
+            single_sided,
+        };
+        let transform = TransformDesc::compile_field(transform, cx);
+        let solid = |solids: &mut Vec<Solid>, solid: Solid| {
+            solids.push(solid);
+            Form::Solid(solids.len() as u32 - 1)
+        };
+        let form = match shape {
+            ShapeDesc::Sphere(desc) => Form::Sphere(desc.compile(cx)),
+            ShapeDesc::Parallelogram(desc) => Form::Parallelogram(desc.compile(cx)),
+            ShapeDesc::Rectangle(desc) => Form::Parallelogram(desc.compile(cx)),
+            ShapeDesc::Plane(desc) => solid(&mut self.solids, desc.compile(cx)),
+            ShapeDesc::Disk(desc) => solid(&mut self.solids, desc.compile(cx)),
+            ShapeDesc::Box(desc) => solid(&mut self.solids, desc.compile(cx)),
+            ShapeDesc::Cylinder(desc) => solid(&mut self.solids, desc.compile(cx)),
+            ShapeDesc::Cone(desc) => solid(&mut self.solids, desc.compile(cx)),
+            ShapeDesc::Torus(desc) => solid(&mut self.solids, desc.compile(cx)),
+            ShapeDesc::PointSet(desc) => match desc.compile(cx, self.assets, self.files) {
+                Some(points) => {
+                    self.point_sets.push(points);
+                    Form::Points(self.point_sets.len() as u32 - 1)
+                }
+                None => Form::Nothing,
+            },
+            ShapeDesc::Mesh(desc) => match desc.compile(cx, self.assets, self.files) {
+                Some(source) => {
+                    let faces = self.face_materials(cx, &source, desc.file.is_some(), named);
+                    surface.material = if let [one] = faces[..] { Some(one) } else { None };
+                    mesh.add(cx, source, transform, number, faces);
+                    Form::MeshPart
+                }
+                None => Form::Nothing,
+            },
+            ShapeDesc::Instance(desc) => match self.group_ids.get(desc.of.as_str()) {
+                Some(group) => Form::Instance(*group),
+                None => {
+                    let names: Vec<&str> = self.desc.groups.iter().map(|(name, _)| name.as_str()).collect();
+                    cx.unknown("of", "group", &desc.of, &names);
+                    Form::Nothing
+                }
+            },
+        };
+        Leaf { form, transform, surface, has_material: named.is_some() }
+    }
+
+    /// What the triangles of a mesh choose from: one material for all, or one for each name of the file.
+    fn face_materials(
+        &self,
+        cx: &mut CompileContext,
+        source: &MeshSource,
+        from_file: bool,
+        named: Option<MaterialId>,
+    ) -> Vec<MaterialId> {
+        let all = named.unwrap_or(self.materials.default());
+        if source.data.face_materials.is_empty() {
+            return vec![all];
+        }
+        let chosen = source.data.materials.iter().enumerate().map(|(i, name)| match self.materials.find(name) {
+            Some(id) => id,
+            // Faces before the first name of a file
+            None if from_file && name.is_empty() => all,
+            None if from_file => {
+                let message = format!("no material is called {name:?}, which faces of the mesh ask for");
+                let hint = "they have the mesh's own material; describe one of that name";
+                cx.warning("file", message, Some(hint));
+                all
+            }
+            None => self.materials.resolve(cx, &format!("materials[{i}]"), name),
+        });
+        chosen.collect()
+    }
+
+    /// A group that holds an instance of itself would never end. Without recursion: groups may be many.
+    fn refuse_circles(&self, cx: &mut CompileContext, groups: &[Group]) {
+        let instances = |group: usize| -> Vec<usize> {
+            let of = |leaf: &Leaf| if let Form::Instance(of) = leaf.form { Some(of) } else { None };
+            groups[group].leaves.iter().filter_map(of).collect()
+        };
+        // How deep the groups below each are, once that is known; those whose depth is being found are on the path
+        let mut depths: Vec<Option<usize>> = vec![None; groups.len()];
+        let mut on_path = vec![false; groups.len()];
+        for start in 0..groups.len() {
+            if depths[start].is_some() {
+                continue;
+            }
+            on_path[start] = true;
+            let mut path = vec![(start, instances(start), 0, 0)];
+            while let Some((group, of, next, deepest)) = path.last_mut() {
+                let field = |i: usize| format!("group.{}.instance[{i}].of", self.desc.groups[*group].0);
+                let Some(below) = of.get(*next).copied() else {
+                    (depths[*group], on_path[*group]) = (Some(*deepest), false);
+                    path.pop();
+                    continue;
+                };
+                if on_path[below] {
+                    let message = format!("{:?} would hold itself", self.desc.groups[below].0);
+                    cx.error(&field(*next), message, Some("take an instance out of the circle of groups"));
+                } else if let Some(depth) = depths[below] {
+                    // Said once: of the first that is too deep
+                    if depth + 1 == MAX_DEPTH + 1 && *deepest <= MAX_DEPTH {
+                        let message = format!("groups are more than {MAX_DEPTH} deep");
+                        cx.error(&field(*next), message, Some("place some of them directly"));
+                    }
+                    *deepest = (*deepest).max(depth + 1);
+                } else {
+                    on_path[below] = true;
+                    path.push((below, instances(below), 0, 0));
+                    continue;
+                }
+                *next += 1;
+            }
+        }
+    }
+}
+
+/// The shapes and instances that a group places, with all that is in them. `known` are those of other groups; the groups are
+/// without circles and not deep.
+fn count_things(group: &Group, groups: &[Group], known: &mut [Option<u64>]) -> u64 {
+    let mut things = 0u64;
+    for leaf in &group.leaves {
+        let within = match leaf.form {
+            Form::Instance(of) => match known[of] {
+                Some(count) => count,
+                None => {
+                    let count = count_things(&groups[of], groups, known);
+                    known[of] = Some(count);
+                    count
+                }
+            },
+            _ => 0,
+        };
+        things = things.saturating_add(within).saturating_add(1);
+    }
+    things
+}
+
+/// Walks a scene through all its instances.
+struct Walk<'a> {
+    groups: &'a [Group],
+    /// The meshes of the groups that have one.
+    meshes: Vec<&'a Mesh>,
+    /// Which of them each group has.
+    mesh_of: Vec<Option<u32>>,
+    parts: Parts,
+    /// Bytes of the names of surfaces within instances.
+    name_bytes: usize,
+}
+
+impl Walk<'_> {
+    /// Places what a group holds. `index` is that of the group, `None` for the scene itself.
+    fn group(&mut self, group: &Group, index: Option<usize>, world_from_group: DAffine3, over: &Over) {
+        let outer = over.name.as_ref().map_or(0, |name| name.len());
+        if outer > 0 {
+            let own = |leaf: &Leaf| leaf.surface.name.as_ref().map_or(0, |name| outer + 1 + name.len());
+            self.name_bytes += group.leaves.iter().map(own).sum::<usize>();
+        }
+        if self.name_bytes > MAX_NAMES {
+            return;
+        }
+        let first = self.parts.surfaces.len() as u32;
+        let surfaces = group.leaves.iter().filter(|leaf| !matches!(leaf.form, Form::Instance(_)));
+        self.parts.surfaces.extend(surfaces.map(|leaf| over.surface(&leaf.surface)));
+        for (i, leaf) in group.leaves.iter().enumerate() {
+            let world = leaf.transform.map_or(world_from_group, |transform| world_from_group * transform);
+            let surface = SurfaceId(first + i as u32);
+            let seen = over.visible && leaf.surface.visible;
+            match &leaf.form {
+                Form::Nothing | Form::MeshPart => {}
+                Form::Sphere(sphere) => match sphere.moved(&world) {
+                    Some(mut shape) => {
+                        shape.single_sided |= over.single_sided;
+                        self.parts.spheres.push(Owned { seen, shape, surface });
+                    }
+                    None => {
+                        self.parts.solids.push(Solid::Ball(sphere.ball()));
+                        let target = Target::Solid(self.parts.solids.len() as u32 - 1);
+                        self.place(world * sphere.world_from_ball(), target, surface);
+                    }
+                },
+                Form::Parallelogram(flat) => {
+                    let mut shape = flat.moved(&world);
+                    shape.single_sided |= over.single_sided;
+                    self.parts.parallelograms.push(Owned { seen, shape, surface });
+                }
+                Form::Solid(solid) => self.place(world, Target::Solid(*solid), surface),
+                Form::Points(points) => self.place(world, Target::Points(*points), surface),
+                Form::Instance(of) => {
+                    let groups = self.groups;
+                    self.group(&groups[*of], Some(*of), world, &over.within(leaf));
+                }
+            }
+        }
+        // The mesh of the scene itself is in the world already
+        if let Some(mesh) = index.and_then(|index| self.mesh_of[index]) {
+            self.place(world_from_group, Target::Mesh(mesh), SurfaceId(first));
+        }
+    }
+
+    fn place(&mut self, world_from_object: DAffine3, target: Target, surface: SurfaceId) {
+        let (camera, shadow) = match target {
+            Target::Mesh(mesh) => meets(&self.parts.surfaces, surface.0, self.meshes[mesh as usize]),
+            Target::Points(_) | Target::Solid(_) => {
+                let own = &self.parts.surfaces[surface.index()];
+                let of = |met: bool| if met { Meets::All } else { Meets::None };
+                (of(own.visible), of(own.casts_shadow))
+            }
+        };
+        let placement = Placement::new(world_from_object);
+        self.parts.placed.push(Placed { placement, target, surface, camera, shadow });
+    }
+}
+
+/// Which camera rays and which shadow rays meet a mesh whose surfaces start at `first`.
+fn meets(surfaces: &[Surface], first: u32, mesh: &Mesh) -> (Meets, Meets) {
+    let own = || mesh.parts.iter().map(|part| &surfaces[(first + part.surface) as usize]);
+    let camera = if own().all(|s| s.visible && !s.single_sided) {
+        Meets::All
+    } else if own().any(|s| s.visible) {
+        Meets::Some
+    } else {
+        Meets::None
+    };
+    let shadow = if own().all(|s| s.casts_shadow) {
+        Meets::All
+    } else if own().any(|s| s.casts_shadow) {
+        Meets::Some
+    } else {
+        Meets::None
+    };
+    (camera, shadow)
+}

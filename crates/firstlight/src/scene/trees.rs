@@ -1,0 +1,415 @@
+//! Rays through the trees of a scene: the mesh of the world, and all that is placed.
+
+use fearless_simd::{Level, Simd};
+
+use super::geometry::{At, Geometry, Hit, Item, Meets, Nearest, Spot, Target};
+use crate::accel::{RayPacket16, RayTile, TraceRay, dispatch_eight, dispatch_sixteen};
+use crate::ids::{MaterialId, SurfaceId};
+use crate::math::{Ray, ShadowRay, Vec3};
+use crate::shape::{Mesh, RayDifferential, ShapePoint, SolidHit, TileHits, TrianglePoint, every};
+
+impl Geometry {
+    /// Whether there is anything beside the lists.
+    #[inline(always)]
+    pub fn has_trees(&self) -> bool {
+        self.world.is_some() || !self.items.is_empty() || !self.unbounded.is_empty()
+    }
+
+    /// Offers what a camera ray meets in the trees.
+    #[inline(never)]
+    pub fn meet_trees(&self, level: Level, ray: &Ray, nearest: &mut Nearest) {
+        dispatch_eight!(level, simd => self.meet(simd, ray, nearest))
+    }
+
+    #[inline(always)]
+    fn meet<S: Simd>(&self, simd: S, ray: &Ray, nearest: &mut Nearest) {
+        if let Some(world) = &self.world
+            && let Some((t, point)) =
+                self.meet_mesh(simd, &world.mesh, SurfaceId(0), world.camera, ray.o, ray.d, nearest.limit())
+        {
+            let surface = SurfaceId(world.mesh.part(point.triangle).surface);
+            nearest.offer(t as f64, surface, At::World(point));
+        }
+        self.meet_upper_with(simd, ray, nearest);
+    }
+
+    /// Offers what a camera ray meets of all that is not the mesh of the world.
+    #[inline(always)]
+    pub fn meet_upper(&self, level: Level, ray: &Ray, nearest: &mut Nearest) {
+        if !self.items.is_empty() || !self.unbounded.is_empty() {
+            self.meet_upper_now(level, ray, nearest);
+        }
+    }
+
+    #[inline(never)]
+    fn meet_upper_now(&self, level: Level, ray: &Ray, nearest: &mut Nearest) {
+        dispatch_eight!(level, simd => self.meet_upper_with(simd, ray, nearest))
+    }
+
+    /// Whether the mesh of the world can be asked for many rays at once: where no triangle lets some rays pass.
+    pub fn world_as_bundle(&self) -> bool {
+        self.world.as_ref().is_some_and(|world| world.camera == Meets::All)
+    }
+
+    /// What rays meet of the mesh of the world, at most as far as `hits` says: which rays meet something.
+    #[inline(never)]
+    pub fn meet_world(&self, level: Level, rays: &RayTile, active: u64, hits: &mut TileHits) -> u64 {
+        let Some(world) = &self.world else { return 0 };
+        world.mesh.tree.tile_at(level, rays, active, 0, hits, &every)
+    }
+
+    /// Offers what [`meet_world`](Self::meet_world) found for the ray at `place`.
+    pub fn offer_world(&self, hits: &TileHits, place: usize, nearest: &mut Nearest) {
+        if let (Some(world), Some(hit)) = (&self.world, hits.get(place)) {
+            let surface = SurfaceId(world.mesh.part(hit.triangle).surface);
+            let point = TrianglePoint { triangle: hit.triangle, u: hit.u, v: hit.v };
+            nearest.offer(hit.t as f64, surface, At::World(point));
+        }
+    }
+
+    #[inline(always)]
+    fn meet_upper_with<S: Simd>(&self, simd: S, ray: &Ray, nearest: &mut Nearest) {
+        for &thing in &self.unbounded {
+            self.meet_placed(simd, thing, ray, nearest);
+        }
+        if self.items.is_empty() {
+            return;
+        }
+        let mut limit = nearest.limit();
+        self.upper.closest(simd, &TraceRay::new(ray.o, ray.d), &mut limit, |item, limit| {
+            match self.items[item as usize] {
+                Item::Sphere(i) => {
+                    let sphere = &self.spheres[i as usize];
+                    if sphere.seen
+                        && let Some(t) = sphere.shape.intersect(ray)
+                    {
+                        nearest.offer(t, sphere.surface, At::Sphere(i));
+                    }
+                }
+                Item::Parallelogram(i) => {
+                    let flat = &self.parallelograms[i as usize];
+                    if flat.seen
+                        && let Some(t) = flat.shape.intersect(ray)
+                    {
+                        nearest.offer(t, flat.surface, At::Parallelogram(i));
+                    }
+                }
+                Item::Placed(i) => self.meet_placed(simd, i, ray, nearest),
+            }
+            *limit = nearest.limit();
+        });
+    }
+
+    #[inline(always)]
+    fn meet_placed<S: Simd>(&self, simd: S, index: u32, ray: &Ray, nearest: &mut Nearest) {
+        let thing = &self.placed[index as usize];
+        if thing.camera == Meets::None {
+            return;
+        }
+        let single_sided = || self.surfaces[thing.surface.index()].single_sided;
+        let own = thing.placement.ray(ray);
+        match thing.target {
+            Target::Mesh(mesh) => {
+                let mesh = &self.meshes[mesh as usize];
+                let (o, d) = (own.o.as_vec3(), own.d.as_vec3());
+                let hit = self.meet_mesh(simd, mesh, thing.surface, thing.camera, o, d, nearest.limit());
+                if let Some((t, point)) = hit {
+                    let surface = SurfaceId(thing.surface.0 + mesh.part(point.triangle).surface);
+                    nearest.offer(t as f64, surface, At::Placed(index, Spot::Triangle(point)));
+                }
+            }
+            Target::Points(points) => {
+                let points = &self.point_sets[points as usize];
+                if let Some((t, point)) = points.intersect(simd, &own, nearest.limit(), single_sided()) {
+                    nearest.offer(t, thing.surface, At::Placed(index, Spot::Point(point)));
+                }
+            }
+            Target::Solid(solid) => {
+                let solid = &self.solids[solid as usize];
+                if let Some(hit) = solid.intersect(&own, 0.0, f64::INFINITY, single_sided()) {
+                    nearest.offer(hit.t, thing.surface, At::Placed(index, Spot::Part(hit.part)));
+                }
+            }
+        }
+    }
+
+    /// Whether a camera ray ends at a triangle, or passes through.
+    fn seen(&self, mesh: &Mesh, first: u32, triangle: u32, d: Vec3) -> bool {
+        let surface = &self.surfaces[(first + mesh.part(triangle).surface) as usize];
+        surface.visible && !(surface.single_sided && mesh.is_behind(triangle, d))
+    }
+
+    /// Whether anything in the trees stands between a surface and a light.
+    #[inline(never)]
+    pub fn is_blocked(&self, level: Level, ray: &ShadowRay) -> bool {
+        dispatch_eight!(level, simd => self.blocked(simd, ray))
+    }
+
+    #[inline(always)]
+    fn blocked<S: Simd>(&self, simd: S, ray: &ShadowRay) -> bool {
+        let (o, t_end) = (ray.start, ray.end());
+        if let Some(world) = &self.world
+            && self.blocked_by_mesh(simd, &world.mesh, SurfaceId(0), world.shadow, o, ray.l, t_end)
+        {
+            return true;
+        }
+        if self.unbounded.iter().any(|thing| self.blocked_by_placed(simd, *thing, ray, t_end)) {
+            return true;
+        }
+        if self.items.is_empty() {
+            return false;
+        }
+        self.upper.any(simd, &TraceRay::new(o, ray.l), t_end, |item| match self.items[item as usize] {
+            Item::Sphere(i) => {
+                let sphere = &self.spheres[i as usize];
+                self.surfaces[sphere.surface.index()].casts_shadow
+                    && sphere.shape.shadow(ray.p, ray.error).blocks(ray.l, ray.is_finite())
+            }
+            Item::Parallelogram(i) => {
+                let flat = &self.parallelograms[i as usize];
+                self.surfaces[flat.surface.index()].casts_shadow
+                    && flat.shape.shadow(ray.p, ray.error).blocks(ray.l, ray.is_finite())
+            }
+            Item::Placed(i) => self.blocked_by_placed(simd, i, ray, t_end),
+        })
+    }
+
+    #[inline(always)]
+    fn blocked_by_placed<S: Simd>(&self, simd: S, index: u32, ray: &ShadowRay, t_end: f32) -> bool {
+        let thing = &self.placed[index as usize];
+        if thing.shadow == Meets::None {
+            return false;
+        }
+        let own = thing.placement.line(ray.start, ray.l);
+        match thing.target {
+            Target::Mesh(mesh) => {
+                let mesh = &self.meshes[mesh as usize];
+                let (o, l) = (own.o.as_vec3(), own.d.as_vec3());
+                self.blocked_by_mesh(simd, mesh, thing.surface, thing.shadow, o, l, t_end)
+            }
+            Target::Points(points) => self.point_sets[points as usize].blocks(simd, &own, t_end),
+            Target::Solid(solid) => self.solids[solid as usize].blocks(&own, 0.0, t_end as f64),
+        }
+    }
+
+    /// Whether a triangle stands in the way of light.
+    fn casts(&self, mesh: &Mesh, first: u32, triangle: u32) -> bool {
+        self.surfaces[(first + mesh.part(triangle).surface) as usize].casts_shadow
+    }
+
+    /// The first triangle on a ray, in the mesh's space. Not inlined: one copy for each instruction set is enough.
+    #[inline(never)]
+    #[allow(clippy::too_many_arguments, reason = "a mesh with its place, a ray with its reach")]
+    fn meet_mesh<S: Simd>(
+        &self,
+        simd: S,
+        mesh: &Mesh,
+        first: SurfaceId,
+        meets: Meets,
+        o: Vec3,
+        d: Vec3,
+        limit: f32,
+    ) -> Option<(f32, TrianglePoint)> {
+        if meets == Meets::None {
+            return None;
+        }
+        let asks = |triangle| meets == Meets::All || self.seen(mesh, first.0, triangle, d);
+        let hit = simd.vectorize(
+            #[inline(always)]
+            || mesh.tree.closest(simd, &TraceRay::new(o, d), limit, &asks),
+        )?;
+        Some((hit.t, TrianglePoint { triangle: hit.triangle, u: hit.u, v: hit.v }))
+    }
+
+    /// Whether any triangle stands on the way, in the mesh's space.
+    #[inline(never)]
+    #[allow(clippy::too_many_arguments, reason = "a mesh with its place, a ray with its reach")]
+    fn blocked_by_mesh<S: Simd>(
+        &self,
+        simd: S,
+        mesh: &Mesh,
+        first: SurfaceId,
+        meets: Meets,
+        o: Vec3,
+        l: Vec3,
+        t_end: f32,
+    ) -> bool {
+        if meets == Meets::None {
+            return false;
+        }
+        let asks = |triangle| meets == Meets::All || self.casts(mesh, first.0, triangle);
+        simd.vectorize(
+            #[inline(always)]
+            || mesh.tree.any(simd, &TraceRay::new(o, l), t_end, &asks),
+        )
+    }
+
+    /// Which of sixteen rays a mesh blocks, in the mesh's space.
+    #[inline(never)]
+    #[allow(clippy::too_many_arguments, reason = "a mesh with its place, rays with their reach")]
+    fn lanes_blocked_by_mesh<S: Simd>(
+        &self,
+        simd: S,
+        mesh: &Mesh,
+        first: SurfaceId,
+        meets: Meets,
+        rays: &RayPacket16,
+        t_end: &[f32; 16],
+        active: u16,
+    ) -> u16 {
+        if meets == Meets::None || active == 0 {
+            return 0;
+        }
+        let asks = |triangle| meets == Meets::All || self.casts(mesh, first.0, triangle);
+        simd.vectorize(
+            #[inline(always)]
+            || mesh.tree.any16(simd, rays, t_end, active, &asks),
+        )
+    }
+
+    /// What a camera ray sees at a hit of a shape.
+    #[inline(always)]
+    pub fn point(&self, ray: &Ray, hit: &Hit, differential: &RayDifferential) -> ShapePoint {
+        match hit.at {
+            At::Sphere(i) => self.spheres[i as usize].shape.point(ray, hit.t, differential),
+            At::Parallelogram(i) => self.parallelograms[i as usize].shape.point(ray, hit.t, differential),
+            _ => self.far_point(ray, hit, differential),
+        }
+    }
+
+    /// [`point`](Self::point) for what is in the trees.
+    #[inline(never)]
+    fn far_point(&self, ray: &Ray, hit: &Hit, differential: &RayDifferential) -> ShapePoint {
+        match hit.at {
+            At::World(point) => {
+                let world = self.world.as_ref().expect("the hit is on it");
+                world.mesh.point(None, point, ray, hit.t, differential)
+            }
+            At::Placed(index, spot) => {
+                let thing = &self.placed[index as usize];
+                match (thing.target, spot) {
+                    (Target::Mesh(mesh), Spot::Triangle(point)) => {
+                        self.meshes[mesh as usize].point(Some(&thing.placement), point, ray, hit.t, differential)
+                    }
+                    (Target::Points(points), Spot::Point(point)) => {
+                        self.point_sets[points as usize].point(&thing.placement, point, ray, hit.t, differential)
+                    }
+                    (Target::Solid(solid), Spot::Part(part)) => {
+                        let hit = SolidHit { t: hit.t, part };
+                        thing.placement.solid_point(&self.solids[solid as usize], &hit, ray, differential)
+                    }
+                    _ => unreachable!("a spot is on the kind of thing that was hit"),
+                }
+            }
+            At::Sphere(_) | At::Parallelogram(_) | At::Light => unreachable!("these are not in the trees"),
+        }
+    }
+
+    /// The material of the triangle that was hit, of a mesh that has several.
+    pub fn face_material(&self, hit: &Hit) -> MaterialId {
+        let (mesh, triangle) = match hit.at {
+            At::World(point) => (&self.world.as_ref().expect("the hit is on it").mesh, point.triangle),
+            At::Placed(index, Spot::Triangle(point)) => {
+                let Target::Mesh(mesh) = self.placed[index as usize].target else {
+                    unreachable!("only meshes have triangles")
+                };
+                (&self.meshes[mesh as usize], point.triangle)
+            }
+            _ => unreachable!("only meshes have more than one material"),
+        };
+        mesh.part(triangle).material(triangle)
+    }
+}
+
+/// Sixteen rays from one surface towards a light, each ending at a point of it.
+pub(crate) struct ShadowRays {
+    /// Where they start, and the surface they leave: `l` and `t_max` are of no account.
+    pub from: ShadowRay,
+    /// Origins and ways, as the trees want them.
+    pub rays: RayPacket16,
+    /// [`ShadowRay::end`] of each.
+    pub t_end: [f32; 16],
+}
+
+impl ShadowRays {
+    fn ray(&self, lane: usize) -> ShadowRay {
+        ShadowRay { l: self.rays.d(lane), ..self.from }
+    }
+}
+
+/// The lanes that are set in `active`.
+#[inline(always)]
+fn lanes(active: u16) -> impl Iterator<Item = usize> {
+    (0..16).filter(move |lane| active >> lane & 1 == 1)
+}
+
+impl Geometry {
+    /// Which of the rays in `active` something in the trees stands in the way of: the same answers as
+    /// [`is_blocked`](Self::is_blocked).
+    #[inline(never)]
+    pub fn are_blocked(&self, level: Level, shadows: &ShadowRays, active: u16) -> u16 {
+        dispatch_sixteen!(level, simd => self.blocked_lanes(simd, shadows, active), else {
+            let blocked = |lane: &usize| self.is_blocked(level, &shadows.ray(*lane));
+            lanes(active).filter(blocked).fold(0, |mask, lane| mask | 1 << lane)
+        })
+    }
+
+    #[inline(always)]
+    fn blocked_lanes<S: Simd>(&self, simd: S, shadows: &ShadowRays, active: u16) -> u16 {
+        let mut done = 0;
+        if let Some(world) = &self.world {
+            let (mesh, rays, t_end) = (&world.mesh, &shadows.rays, &shadows.t_end);
+            done |= self.lanes_blocked_by_mesh(simd, mesh, SurfaceId(0), world.shadow, rays, t_end, active);
+        }
+        for &thing in &self.unbounded {
+            done |= self.placed_blocks_lanes(simd, thing, shadows, active & !done);
+        }
+        if self.items.is_empty() || active & !done == 0 {
+            return done;
+        }
+        done | self.upper.any16(simd, &shadows.rays, &shadows.t_end, active & !done, |item, asking| {
+            let one_by_one = |blocks: &dyn Fn(&ShadowRay) -> bool| {
+                lanes(asking).filter(|lane| blocks(&shadows.ray(*lane))).fold(0, |mask, lane| mask | 1 << lane)
+            };
+            let (p, error) = (shadows.from.p, shadows.from.error);
+            match self.items[item as usize] {
+                Item::Sphere(i) => {
+                    let sphere = &self.spheres[i as usize];
+                    if !self.surfaces[sphere.surface.index()].casts_shadow {
+                        return 0;
+                    }
+                    let shadow = sphere.shape.shadow(p, error);
+                    one_by_one(&|ray| shadow.blocks(ray.l, ray.is_finite()))
+                }
+                Item::Parallelogram(i) => {
+                    let flat = &self.parallelograms[i as usize];
+                    if !self.surfaces[flat.surface.index()].casts_shadow {
+                        return 0;
+                    }
+                    let shadow = flat.shape.shadow(p, error);
+                    one_by_one(&|ray| shadow.blocks(ray.l, ray.is_finite()))
+                }
+                Item::Placed(i) => self.placed_blocks_lanes(simd, i, shadows, asking),
+            }
+        })
+    }
+
+    #[inline(always)]
+    fn placed_blocks_lanes<S: Simd>(&self, simd: S, index: u32, shadows: &ShadowRays, active: u16) -> u16 {
+        let thing = &self.placed[index as usize];
+        if thing.shadow == Meets::None || active == 0 {
+            return 0;
+        }
+        let Target::Mesh(mesh) = thing.target else {
+            let blocks = |lane: &usize| self.blocked_by_placed(simd, index, &shadows.ray(*lane), shadows.t_end[*lane]);
+            return lanes(active).filter(blocks).fold(0, |mask, lane| mask | 1 << lane);
+        };
+        let mesh = &self.meshes[mesh as usize];
+        let mut own = RayPacket16::ZERO;
+        for lane in lanes(active) {
+            let line = thing.placement.line(shadows.rays.o(lane), shadows.rays.d(lane));
+            own.set(lane, line.o.as_vec3(), line.d.as_vec3());
+        }
+        self.lanes_blocked_by_mesh(simd, mesh, thing.surface, thing.shadow, &own, &shadows.t_end, active)
+    }
+}

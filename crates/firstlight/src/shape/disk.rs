@@ -1,0 +1,206 @@
+//! Disks and rings.
+
+use std::f64::consts::PI;
+
+use glam::DVec2;
+
+use super::common::shape_table;
+use super::solid::{Solid, SolidHit, SolidPoint, turn};
+use super::surface::UvEdge;
+use crate::context::CompileContext;
+use crate::math::{DRay, DVec3, Frame};
+
+shape_table! {
+    /// A flat disk, or a ring. u runs around it counterclockwise as seen from the front, v from 0 at the rim to 1 at the
+    /// centre, or at the inner edge of a ring. u is 1/2 towards +x, or towards +y where the normal is within 26 degrees of
+    /// the x axis.
+    ///
+    /// ```toml
+    /// [[disk]]
+    /// center = [0, 0, 0]
+    /// normal = [0, 1, 0]
+    /// radius = 2
+    /// inner_radius = 0.5
+    /// ```
+    pub struct DiskDesc {
+        /// Centre, in metres, world space.
+        pub center: [f64; 3],
+        /// The direction its front faces, of any length above 1e-9.
+        pub normal: [f64; 3] = [0.0, 1.0, 0.0],
+        /// Radius in metres, 1e-9 to 2.5e8.
+        pub radius: f64,
+        /// The radius of the hole in the middle, in metres; 0 or more, and smaller than `radius`.
+        pub inner_radius: f64 = 0.0,
+    }
+}
+
+/// A disk, ready to be hit.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Disk {
+    center: DVec3,
+    /// z is the normal, angles are counted from x.
+    frame: Frame,
+    radius: f64,
+    inner: f64,
+}
+
+impl DiskDesc {
+    pub(crate) fn compile(&self, cx: &mut CompileContext) -> Solid {
+        cx.point("center", self.center);
+        cx.edge("normal", self.normal);
+        let before = cx.fault_count();
+        let radius = cx.positive("radius", self.radius, "the radius is in metres");
+        let inner = self.inner_radius;
+        if cx.fault_count() == before && !(inner >= 0.0 && inner < radius) {
+            let message = format!("{inner} is outside [0, {radius})");
+            cx.error("inner_radius", message, Some("the hole is smaller than the disk; 0 is no hole"));
+        }
+        let frame = Frame::around(DVec3::from(self.normal).normalize_or(DVec3::Y));
+        Solid::Disk(Disk { center: self.center.into(), frame, radius, inner })
+    }
+}
+
+impl Disk {
+    #[inline(always)]
+    pub fn intersect(&self, ray: &DRay, t_min: f64, t_max: f64, single_sided: bool) -> Option<SolidHit> {
+        let cos = self.frame.z.dot(ray.d);
+        if single_sided && cos >= 0.0 {
+            return None;
+        }
+        let from = ray.o - self.center;
+        let t = -self.frame.z.dot(from) / cos;
+        if !(t > t_min && t < t_max) {
+            return None;
+        }
+        let distance2 = (from + ray.d * t).length_squared();
+        let inside = distance2 <= self.radius * self.radius && distance2 >= self.inner * self.inner;
+        inside.then_some(SolidHit { t, part: 0 })
+    }
+
+    pub fn point(&self, ray: &DRay, hit: &SolidHit) -> SolidPoint {
+        let hit = self.frame.local(ray.o - self.center + ray.d * hit.t).truncate();
+        let on = ring_point(hit, self.radius, self.inner);
+        let world = |v: DVec2| self.frame.x * v.x + self.frame.y * v.y;
+        SolidPoint {
+            p: self.center + world(on.p),
+            normal: self.frame.z,
+            uv: on.uv,
+            dpdu: world(on.dpdu),
+            dpdv: world(on.dpdv),
+            edges: [UvEdge::Periodic, UvEdge::Bounded],
+            terms: self.center.abs() + self.frame.disk_reach() * self.radius,
+        }
+    }
+
+    pub fn bounds(&self) -> Option<[DVec3; 2]> {
+        let reach = self.frame.disk_reach() * self.radius;
+        Some([self.center - reach, self.center + reach])
+    }
+}
+
+/// A point of a ring around the origin, with its texture coordinate.
+pub(super) struct RingPoint {
+    pub p: DVec2,
+    pub uv: DVec2,
+    pub dpdu: DVec2,
+    pub dpdv: DVec2,
+}
+
+/// u around, v from 0 at `radius` to 1 at `inner`, where `p` is moved to if rounding has put it outside.
+pub(super) fn ring_point(p: DVec2, radius: f64, inner: f64) -> RingPoint {
+    let outwards = p.normalize_or(DVec2::X);
+    let distance = p.length().clamp(inner, radius);
+    RingPoint {
+        p: outwards * distance,
+        uv: DVec2::new(turn(outwards.x, outwards.y), (radius - distance) / (radius - inner)),
+        dpdu: outwards.perp() * (2.0 * PI * distance),
+        dpdv: outwards * (inner - radius),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::check::{Known, Random, faults, made, never};
+    use super::*;
+
+    fn disk(center: DVec3, normal: DVec3, radius: f64, inner_radius: f64) -> Solid {
+        let desc = DiskDesc { normal: normal.into(), inner_radius, ..DiskDesc::new(center.into(), radius) };
+        made(|cx| desc.compile(cx))
+    }
+
+    #[test]
+    fn rays_meet_it_where_the_formula_says() {
+        let mut random = Random::new(1);
+        let mut hits = 0;
+        for _ in 0..20_000 {
+            let (radius, normal) = (random.magnitude(1e-3, 1e5), random.direction());
+            let center = random.in_ball() * (10.0 * radius);
+            let inner = radius * random.between(-0.5, 0.9).max(0.0);
+            let solid = disk(center, normal, radius, inner);
+            let o = center + random.direction() * (radius * random.magnitude(0.1, 100.0));
+            let ray = DRay { o, d: (center + random.in_ball() * radius * 1.2 - o).normalize() };
+            let cos = normal.dot(ray.d);
+            let t = normal.dot(center - ray.o) / cos;
+            let distance = (ray.at(t) - center).length() / radius;
+            let unsure = 1e-12 / cos.abs();
+            let hit = solid.intersect(&ray, 0.0, f64::INFINITY, false);
+            let ring = inner / radius;
+            if t <= 0.0 || distance > 1.0 + unsure || distance < ring - unsure {
+                assert!(hit.is_none(), "{ray:?} {solid:?}");
+            } else if distance < 1.0 - unsure && distance > ring + unsure {
+                hits += 1;
+                let hit = hit.expect("it lies ahead");
+                assert!((hit.t - t).abs() * cos.abs() < 1e-11 * radius, "{hit:?} {t}");
+                let single_sided = solid.intersect(&ray, 0.0, f64::INFINITY, true);
+                assert_eq!(single_sided.is_some(), cos < 0.0);
+                let p = solid.point(&ray, &hit);
+                let v = (1.0 - distance) / (1.0 - ring);
+                assert!((p.uv.y - v).abs() < 10.0 * unsure / (1.0 - ring) && (0.0..=1.0).contains(&p.uv.x));
+                assert!((p.p - center).dot(normal).abs() < 1e-15 * p.terms.length());
+            }
+        }
+        assert!(hits > 4000, "{hits}");
+    }
+
+    #[test]
+    fn u_runs_around_and_v_inwards() {
+        let solid = disk(DVec3::ZERO, DVec3::Y, 2.0, 1.0);
+        let at = |x: f64, z: f64| {
+            let ray = DRay { o: DVec3::new(x, 1.0, z), d: DVec3::NEG_Y };
+            solid.intersect(&ray, 0.0, 2.0, true).map(|hit| solid.point(&ray, &hit).uv)
+        };
+        assert_eq!(at(2.0, 0.0), Some(DVec2::new(0.5, 0.0)));
+        assert_eq!(at(0.0, -1.5), Some(DVec2::new(0.75, 0.5)));
+        assert_eq!(at(0.0, 1.0), Some(DVec2::new(0.25, 1.0)));
+        assert_eq!(at(0.5, 0.0), None);
+    }
+
+    #[test]
+    fn derivatives_and_bounds_hold_and_rays_leave_it() {
+        let mut random = Random::new(3);
+        for _ in 0..200 {
+            let size = random.magnitude(1e-6, 1e6);
+            let center = random.in_ball() * random.magnitude(1e-8, 1e8);
+            let normal = random.direction();
+            let solid = disk(center, normal, size, size * 0.3);
+            let known = Known { solid, distance: &|_| 0.0, center, size };
+            known.is_left_by_rays(40, &never);
+            if center.length() < 10.0 * size {
+                known.derivatives_hold(500);
+                let side = normal.any_orthonormal_vector();
+                known.bounds_are_tight(4000, &|x| {
+                    let (sin, cos) = pxfm::f_sincos(x * 2.0 * PI);
+                    center + (side * cos + normal.cross(side) * sin) * size
+                });
+            }
+        }
+    }
+
+    #[test]
+    fn a_hole_as_large_as_the_disk_is_a_fault() {
+        let desc = DiskDesc { inner_radius: 1.0, ..DiskDesc::new([0.0; 3], 1.0) };
+        let found = faults(|cx| desc.compile(cx));
+        assert!(found[0].0 == "inner_radius" && found[0].1.contains("1 is outside [0, 1)"), "{found:?}");
+        assert_eq!(faults(|cx| DiskDesc::new([0.0; 3], -1.0).compile(cx))[0].0, "radius");
+    }
+}

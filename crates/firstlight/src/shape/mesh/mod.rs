@@ -1,0 +1,340 @@
+//! Triangle meshes: described, read, joined.
+//!
+//! What a ray finds on one is in [`surface`]; the tree of its triangles is in [`super::triangles`].
+
+mod surface;
+
+use std::ops::ControlFlow;
+
+use glam::DAffine3;
+
+pub(crate) use surface::{Mesh, MeshPart, TrianglePoint};
+
+use super::common::shape_table;
+use super::placement::Placement;
+use super::triangles::TriangleTree;
+use crate::context::{AssetError, Assets, CompileContext, CompileStage, show};
+use crate::describe::FilePath;
+use crate::ids::MaterialId;
+use crate::import::{MeshData, read_mesh};
+use crate::math::Vec3;
+
+shape_table! {
+    /// Triangles: from a PLY, STL or OBJ file, or written out.
+    ///
+    /// Corners run counterclockwise around the front; where the mesh has normals, those decide which side is the front.
+    /// Triangles without area, and those with a coordinate that is no number, are left out. Colours of the vertices multiply
+    /// the material's diffuse, specular and ambient colours. Where a file names materials (OBJ `usemtl`), each face has the
+    /// scene's material of that name, if there is one, otherwise the mesh's own.
+    ///
+    /// ```toml
+    /// [[mesh]]
+    /// file = "bunny.ply"
+    /// smooth_deg = 40
+    /// material = "clay"
+    /// ```
+    pub struct MeshDesc {
+        /// The file, relative to the text that names it. Instead of all lists.
+        pub file: Option<FilePath> = None,
+        /// Where the vertices are, in metres.
+        pub positions: Vec<[f64; 3]> = Vec::new(),
+        /// The three vertices of each triangle, counted from 0.
+        pub triangles: Vec<[u32; 3]> = Vec::new(),
+        /// A normal for each vertex, of any length; none for flat triangles.
+        pub normals: Vec<[f64; 3]> = Vec::new(),
+        /// A texture coordinate for each vertex; without, (0, 0), (1, 0), (0, 1) at the corners of each triangle.
+        pub uvs: Vec<[f64; 2]> = Vec::new(),
+        /// Which set of a file's texture coordinates is used, counted from 0.
+        pub uv_set: u32 = 0,
+        /// A colour for each vertex, linear Rec. 709.
+        pub colors: Vec<[f64; 3]> = Vec::new(),
+        /// The names of materials that `face_materials` chooses from.
+        pub materials: Vec<String> = Vec::new(),
+        /// The material of each triangle, as a position in `materials`, counted from 0.
+        pub face_materials: Vec<u32> = Vec::new(),
+        /// Normals are made smooth across edges where faces meet at up to this angle in degrees, 0 to 180; the normals of a
+        /// file are replaced. Without it they are used as they are, and a mesh without normals is flat.
+        pub smooth_deg: Option<f64> = None,
+    }
+}
+
+/// The largest mesh file, in bytes.
+pub(crate) const MAX_MESH_FILE: u64 = 1 << 36;
+/// Coordinates beyond this, in metres, are refused, as everywhere in a scene.
+const MAX_COORDINATE: f64 = 2.5e8;
+
+/// Reads the file of a mesh or point set. `None` after an error.
+pub(crate) fn read_mesh_file(
+    cx: &mut CompileContext,
+    assets: &dyn Assets,
+    file: &FilePath,
+    files: &mut Vec<(String, [u8; 32])>,
+) -> Option<MeshData> {
+    let bytes = match assets.read(&file.0, MAX_MESH_FILE) {
+        Ok(bytes) => bytes,
+        Err(error) => {
+            let colon = if matches!(error, AssetError::NotFound | AssetError::Io(_)) { ":" } else { "" };
+            let hint = match error {
+                AssetError::NotFound => "file names are relative to the text that names them",
+                AssetError::Outside => "copy it into the folder of the scene, or allow its folder with --allow-dir",
+                AssetError::TooLarge { .. } => "split it",
+                AssetError::Io(_) => "a mesh is a plain file that can be read",
+            };
+            cx.error("file", format!("{:?}{colon} {error}", file.0), Some(hint));
+            return None;
+        }
+    };
+    files.push((file.0.clone(), *blake3::hash(&bytes).as_bytes()));
+    let progress = |done, total| {
+        cx.tell(CompileStage::Reading { file: &file.0, done, total });
+        ControlFlow::Continue(())
+    };
+    match read_mesh(&file.0, &bytes, &progress) {
+        Ok(data) => Some(data),
+        Err(error) => {
+            cx.error("file", error.to_string(), None);
+            None
+        }
+    }
+}
+
+/// A mesh in its own space, checked.
+pub(crate) struct MeshSource {
+    pub data: MeshData,
+    pub uv_set: usize,
+}
+
+impl MeshDesc {
+    /// Reads or checks the mesh. `None` after an error.
+    pub(crate) fn compile(
+        &self,
+        cx: &mut CompileContext,
+        assets: &dyn Assets,
+        files: &mut Vec<(String, [u8; 32])>,
+    ) -> Option<MeshSource> {
+        let before = cx.error_count();
+        let mut data = match &self.file {
+            Some(file) => {
+                for (field, said) in self.lists() {
+                    if said {
+                        cx.error(field, "it is said beside a file", Some("give the file, or the lists"));
+                    }
+                }
+                read_mesh_file(cx, assets, file, files)?
+            }
+            None => self.written(cx)?,
+        };
+        if data.triangles.is_empty() {
+            let message = format!("it holds {} points and no triangles", data.positions.len());
+            cx.error("file", message, Some("points are shown by [[point_set]]"));
+        }
+        if let Some(angle) = self.smooth_deg {
+            let angle = cx.between(
+                "smooth_deg",
+                angle,
+                0.0,
+                180.0,
+                Some("edges where faces meet at up to this angle are smooth; 0 is flat"),
+            );
+            if cx.error_count() == before {
+                data.smooth(angle);
+            }
+        }
+        let uv_set = self.uv_set as usize;
+        if self.uv_set > 0 && uv_set >= data.uvs.len() {
+            let sets = match data.uvs.len() {
+                0 => "no texture coordinates".to_owned(),
+                1 => "one set of texture coordinates".to_owned(),
+                sets => format!("{sets} sets of texture coordinates"),
+            };
+            let message = format!("there is no set {}: the mesh has {sets}", self.uv_set);
+            cx.error("uv_set", message, Some("sets are counted from 0"));
+        }
+        (cx.error_count() == before).then_some(MeshSource { data, uv_set })
+    }
+
+    fn lists(&self) -> [(&'static str, bool); 7] {
+        [
+            ("positions", !self.positions.is_empty()),
+            ("triangles", !self.triangles.is_empty()),
+            ("normals", !self.normals.is_empty()),
+            ("uvs", !self.uvs.is_empty()),
+            ("colors", !self.colors.is_empty()),
+            ("materials", !self.materials.is_empty()),
+            ("face_materials", !self.face_materials.is_empty()),
+        ]
+    }
+
+    /// The mesh of the lists.
+    fn written(&self, cx: &mut CompileContext) -> Option<MeshData> {
+        let before = cx.error_count();
+        if self.positions.is_empty() || self.triangles.is_empty() {
+            let hint = "write `file = \"NAME.ply\"`, or positions and triangles";
+            let field = if self.positions.is_empty() { "file" } else { "triangles" };
+            cx.error(field, "there is neither a file nor both positions and triangles", Some(hint));
+        }
+        let vertices = self.positions.len();
+        for (field, length) in [("normals", self.normals.len()), ("uvs", self.uvs.len()), ("colors", self.colors.len())]
+        {
+            if length != 0 && length != vertices {
+                let message = format!("{length} of them for {vertices} positions");
+                cx.error(field, message, Some("give one for each vertex, or none"));
+            }
+        }
+        for (i, position) in self.positions.iter().enumerate() {
+            if !position.iter().all(|c| c.abs() <= MAX_COORDINATE) {
+                let message = format!("{} is outside [-2.5e8, 2.5e8]", show(position));
+                cx.error(&format!("positions[{i}]"), message, Some("coordinates are in metres"));
+            }
+        }
+        for (i, triangle) in self.triangles.iter().enumerate() {
+            if let Some(wrong) = triangle.iter().find(|v| **v as usize >= vertices) {
+                let message = format!("there is no vertex {wrong}: there are {vertices}, counted from 0");
+                cx.error(&format!("triangles[{i}]"), message, None);
+            }
+        }
+        for (i, color) in self.colors.iter().enumerate() {
+            if !color.iter().all(|c| (0.0..=1e6).contains(c)) {
+                let message = format!("{} is outside [0, 1e6]", show(color));
+                cx.error(&format!("colors[{i}]"), message, Some("a colour is linear red, green, blue"));
+            }
+        }
+        for (i, number) in self.normals.iter().flatten().chain(self.uvs.iter().flatten()).enumerate() {
+            if !(number.abs() <= 1e30) {
+                let three = self.normals.len() * 3;
+                let (field, at) = if i < three { ("normals", i / 3) } else { ("uvs", (i - three) / 2) };
+                cx.error(&format!("{field}[{at}]"), format!("{number} is outside [-1e30, 1e30]"), None);
+            }
+        }
+        let faces = self.face_materials.len();
+        if faces != 0 && faces != self.triangles.len() {
+            let message = format!("{faces} of them for {} triangles", self.triangles.len());
+            cx.error("face_materials", message, Some("give one for each triangle, or none"));
+        }
+        for (i, face) in self.face_materials.iter().enumerate() {
+            if *face as usize >= self.materials.len() {
+                let message = format!("there is no material {face}: `materials` has {}", self.materials.len());
+                cx.error(&format!("face_materials[{i}]"), message, Some("they are counted from 0"));
+            }
+        }
+        if cx.error_count() > before {
+            return None;
+        }
+        let single3 = |v: &[f64; 3]| v.map(|c| c as f32);
+        Some(MeshData {
+            positions: self.positions.iter().map(single3).collect(),
+            normals: self.normals.iter().map(single3).collect(),
+            uvs: if self.uvs.is_empty() {
+                Vec::new()
+            } else {
+                vec![self.uvs.iter().map(|uv| uv.map(|c| c as f32)).collect()]
+            },
+            colors: self.colors.iter().map(|c| [c[0] as f32, c[1] as f32, c[2] as f32, 1.0]).collect(),
+            triangles: self.triangles.clone(),
+            face_materials: self.face_materials.clone(),
+            materials: self.materials.clone(),
+            ..MeshData::default()
+        })
+    }
+}
+
+/// Joins the meshes of one space.
+#[derive(Default)]
+pub(crate) struct MeshBuilder {
+    positions: Vec<[f32; 3]>,
+    triangles: Vec<[u32; 3]>,
+    normals: Vec<[f32; 3]>,
+    uvs: Vec<[f32; 2]>,
+    colors: Vec<[f32; 3]>,
+    parts: Vec<MeshPart>,
+}
+
+/// Makes `list` as long as `length` and adds `more`, if either has anything.
+fn join<T: Clone>(list: &mut Vec<T>, length: usize, more: Vec<T>, added: usize, filler: T) {
+    if list.is_empty() && more.is_empty() {
+        return;
+    }
+    list.resize(length, filler.clone());
+    if list.is_empty() {
+        *list = more;
+    } else {
+        list.extend(more);
+    }
+    list.resize(length + added, filler);
+}
+
+impl MeshBuilder {
+    /// Adds a mesh, moved by `transform`; `surface` is its number in the group, `materials` what its faces choose from.
+    pub fn add(
+        &mut self,
+        cx: &mut CompileContext,
+        source: MeshSource,
+        transform: Option<DAffine3>,
+        surface: u32,
+        materials: Vec<MaterialId>,
+    ) {
+        let MeshSource { mut data, uv_set } = source;
+        let (vertices, first) = (self.positions.len(), self.triangles.len());
+        if vertices + data.positions.len() > u32::MAX as usize || first + data.triangles.len() > u32::MAX as usize {
+            let message = "the meshes of one group have more than 4294967295 vertices or triangles together";
+            cx.error("file", message, Some("put some of them in a group of their own"));
+            return;
+        }
+        move_mesh(&mut data, transform);
+        let largest = data.positions.iter().flatten().filter(|c| c.is_finite()).fold(0.0f32, |a, c| a.max(c.abs()));
+        if largest as f64 > MAX_COORDINATE {
+            let message = format!("a vertex has the coordinate {largest}, outside [-2.5e8, 2.5e8]");
+            cx.error("file", message, Some("coordinates are in metres: scale the mesh"));
+            return;
+        }
+        let MeshData { positions, mut triangles, normals, mut uvs, colors, face_materials, .. } = data;
+        let added = positions.len();
+        let own_uvs = if uv_set < uvs.len() { uvs.swap_remove(uv_set) } else { Vec::new() };
+        self.parts.push(MeshPart {
+            first_triangle: first as u32,
+            surface,
+            face_materials,
+            materials,
+            has_uvs: !own_uvs.is_empty(),
+        });
+        let colors = colors.into_iter().map(|[r, g, b, _]| [r, g, b].map(|c| if c >= 0.0 { c.min(1e6) } else { 0.0 }));
+        join(&mut self.normals, vertices, normals, added, [0.0; 3]);
+        join(&mut self.uvs, vertices, own_uvs, added, [0.0; 2]);
+        join(&mut self.colors, vertices, colors.collect(), added, [1.0; 3]);
+        if vertices > 0 {
+            triangles.iter_mut().flatten().for_each(|v| *v += vertices as u32);
+            self.triangles.extend(triangles);
+            self.positions.extend(positions);
+        } else {
+            (self.positions, self.triangles) = (positions, triangles);
+        }
+    }
+
+    /// Builds the tree. `None` if there is nothing to be hit.
+    pub fn build(self, cx: &CompileContext) -> Option<Mesh> {
+        let MeshBuilder { positions, triangles, normals, uvs, colors, parts } = self;
+        if triangles.is_empty() {
+            return None;
+        }
+        cx.tell(CompileStage::Building { triangles: triangles.len() as u64 });
+        let tree = TriangleTree::build(&positions, &triangles);
+        Some(Mesh { positions, triangles, normals, uvs, colors, parts, tree })
+    }
+}
+
+/// Moves positions and normals, in f64.
+fn move_mesh(data: &mut MeshData, transform: Option<DAffine3>) {
+    let Some(transform) = transform else { return };
+    let placement = Placement::new(transform);
+    for p in &mut data.positions {
+        *p = transform.transform_point3(Vec3::from(*p).as_dvec3()).as_vec3().into();
+    }
+    for n in &mut data.normals {
+        let moved = placement.normal(Vec3::from(*n).as_dvec3()).normalize_or_zero();
+        *n = moved.as_vec3().into();
+    }
+    // A mirror turns the corners of every face around
+    if transform.matrix3.determinant() < 0.0 {
+        data.triangles.iter_mut().for_each(|t| t.swap(1, 2));
+    }
+}

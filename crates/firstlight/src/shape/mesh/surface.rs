@@ -1,0 +1,188 @@
+//! Triangle meshes, ready to be hit: what the tree of triangles does not need to know.
+
+use glam::DVec2;
+
+use crate::color::Rgb;
+use crate::ids::MaterialId;
+use crate::math::{DVec3, ErrorBound, Ray, UNIT_ROUNDOFF, Vec2, Vec3};
+use crate::shape::placement::Placement;
+use crate::shape::surface::{Footprint, RayDifferential, ShapePoint, UvEdge};
+use crate::shape::triangles::TriangleTree;
+
+/// The meshes of one space, the world or that of a group, joined: one tree for all their triangles.
+pub(crate) struct Mesh {
+    pub positions: Vec<[f32; 3]>,
+    pub triangles: Vec<[u32; 3]>,
+    /// Unit, one for each position; empty if no part has any. The normals of parts without are zero.
+    pub normals: Vec<[f32; 3]>,
+    /// One for each position; empty if no part has any.
+    pub uvs: Vec<[f32; 2]>,
+    /// Linear Rec. 709, one for each position; empty if no part has any. The colours of parts without are white.
+    pub colors: Vec<[f32; 3]>,
+    /// The meshes it was joined from, in scene order, by their first triangle.
+    pub parts: Vec<MeshPart>,
+    pub tree: TriangleTree,
+}
+
+/// One mesh of several that were joined.
+#[derive(Clone, Debug)]
+pub(crate) struct MeshPart {
+    /// Its first triangle; it ends where the next begins.
+    pub first_triangle: u32,
+    /// Its surface, counted from that of the group it lies in.
+    pub surface: u32,
+    /// The material of each triangle, as an index of `materials`; empty where there is one for all.
+    pub face_materials: Vec<u32>,
+    /// What `face_materials` chooses from; the first is that of all where it is empty.
+    pub materials: Vec<MaterialId>,
+    /// Whether it has texture coordinates of its own.
+    pub has_uvs: bool,
+}
+
+impl MeshPart {
+    /// The material of a triangle of the joined mesh.
+    pub fn material(&self, triangle: u32) -> MaterialId {
+        let index = self.face_materials.get((triangle - self.first_triangle) as usize).copied().unwrap_or(0);
+        self.materials[index as usize]
+    }
+}
+
+/// A point of a triangle: the weights of its second and third corner.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct TrianglePoint {
+    pub triangle: u32,
+    pub u: f32,
+    pub v: f32,
+}
+
+impl Mesh {
+    /// Bytes in memory, without the tree.
+    pub fn bytes(&self) -> usize {
+        let lists = size_of_val(self.positions.as_slice())
+            + size_of_val(self.triangles.as_slice())
+            + size_of_val(self.normals.as_slice())
+            + size_of_val(self.uvs.as_slice())
+            + size_of_val(self.colors.as_slice());
+        lists + self.parts.iter().map(|part| size_of_val(part.face_materials.as_slice())).sum::<usize>()
+    }
+
+    /// The box around all triangles that can be hit; `None` if there are none.
+    pub fn bounds(&self) -> Option<[DVec3; 2]> {
+        let bounds = self.tree.bounds();
+        (self.tree.len() > 0).then(|| [bounds.min.as_dvec3(), bounds.max.as_dvec3()])
+    }
+
+    /// Whether a ray of the mesh's space meets a triangle from behind.
+    pub fn is_behind(&self, triangle: u32, d: Vec3) -> bool {
+        let face = self.face_normal(triangle);
+        let normals = self.triangles[triangle as usize].map(|i| self.normals.get(i as usize).copied());
+        let own = normals.into_iter().flatten().map(|n| Vec3::from(n).as_dvec3()).sum::<DVec3>();
+        let turned = own.dot(face) < 0.0;
+        (face.dot(d.as_dvec3()) > 0.0) != turned
+    }
+
+    /// The part that a triangle belongs to.
+    #[inline]
+    pub fn part(&self, triangle: u32) -> &MeshPart {
+        let after = self.parts.partition_point(|part| part.first_triangle <= triangle);
+        &self.parts[after - 1]
+    }
+
+    #[inline(always)]
+    fn corners(&self, triangle: u32) -> [DVec3; 3] {
+        self.triangles[triangle as usize].map(|i| Vec3::from(self.positions[i as usize]).as_dvec3())
+    }
+
+    /// The normal of a triangle's front, by the order of its corners; of any length.
+    #[inline(always)]
+    pub fn face_normal(&self, triangle: u32) -> DVec3 {
+        let [a, b, c] = self.corners(triangle);
+        (b - a).cross(c - a)
+    }
+
+    /// What `ray`, which met the mesh at `t`, sees there.
+    ///
+    /// The point is found from the weights of the corners, so that it lies on the triangle however far the ray came.
+    pub fn point(
+        &self,
+        placement: Option<&Placement>,
+        at: TrianglePoint,
+        ray: &Ray,
+        t: f64,
+        differential: &RayDifferential,
+    ) -> ShapePoint {
+        let corners = self.corners(at.triangle);
+        let (u, v) = (at.u as f64, at.v as f64);
+        let weights = [1.0 - u - v, u, v];
+        let blend = |q: [DVec3; 3]| q[0] * weights[0] + q[1] * weights[1] + q[2] * weights[2];
+        let own = blend(corners);
+        let (e1, e2) = (corners[1] - corners[0], corners[2] - corners[0]);
+        // The tree's rays start and end in single precision, in the mesh's own space: a point there is wrong by this
+        let largest = corners[0].abs().max(corners[1].abs()).max(corners[2].abs());
+        let rounding = (largest + e1.abs() + e2.abs()) * (4.0 * UNIT_ROUNDOFF as f64);
+        // To the world
+        let (p, terms, rounding, e1, e2, mut normal) = match placement {
+            None => (own, largest, rounding, e1, e2, e1.cross(e2)),
+            Some(at) => {
+                let m = &at.world_from_object;
+                let (w1, w2) = (m.transform_vector3(e1), m.transform_vector3(e2));
+                (m.transform_point3(own), at.terms(largest), at.reach(rounding), w1, w2, at.normal(e1.cross(e2)))
+            }
+        };
+        normal = normal.normalize_or_zero();
+        let rounded = p.as_vec3();
+        let ErrorBound(base) = ErrorBound::of_rounded(rounded, terms);
+        let error = ErrorBound(base + rounding.as_vec3());
+        // The normals of the corners decide which side is the front, and the shading
+        let indices = self.triangles[at.triangle as usize].map(|i| i as usize);
+        let mut shading = DVec3::ZERO;
+        if !self.normals.is_empty() {
+            let blended = blend(indices.map(|i| Vec3::from(self.normals[i]).as_dvec3()));
+            shading = placement.map_or(blended, |at| at.normal(blended)).normalize_or_zero();
+        }
+        if shading == DVec3::ZERO {
+            shading = normal;
+        } else if shading.dot(normal) < 0.0 {
+            normal = -normal;
+        }
+        // Texture coordinates; the weights themselves where there are none
+        let part = self.part(at.triangle);
+        let corner_uvs = if part.has_uvs {
+            indices.map(|i| Vec2::from(self.uvs[i]).as_dvec2())
+        } else {
+            [DVec2::ZERO, DVec2::X, DVec2::Y]
+        };
+        let (f1, f2) = (corner_uvs[1] - corner_uvs[0], corner_uvs[2] - corner_uvs[0]);
+        let uv = corner_uvs[0] + f1 * u + f2 * v;
+        // The dual basis of the edges turns steps on the surface into steps of the weights, and those of uv
+        let cross = e1.cross(e2);
+        let area2 = cross.length_squared();
+        let (u_axis, v_axis) = (e2.cross(cross) / area2, cross.cross(e1) / area2);
+        let steps = differential.on_plane(ray.d, t as f32, normal.as_vec3(), f32::MAX.sqrt() * 0.5);
+        let [dx, dy] = steps.map(|dp| {
+            let dp = dp.as_dvec3();
+            let step = f1 * dp.dot(u_axis) + f2 * dp.dot(v_axis);
+            if step.is_finite() { step.as_vec2() } else { Vec2::ZERO }
+        });
+        // Tangents: how the point moves with u and with v
+        let det = f1.perp_dot(f2);
+        let tangents =
+            if det != 0.0 { [(e1 * f2.y - e2 * f1.y) / det, (e2 * f1.x - e1 * f2.x) / det] } else { [e1, e2] };
+        let color = if self.colors.is_empty() {
+            Rgb::WHITE
+        } else {
+            let c = blend(indices.map(|i| Vec3::from(self.colors[i]).as_dvec3()));
+            Rgb::new(c.x as f32, c.y as f32, c.z as f32)
+        };
+        ShapePoint {
+            p: rounded,
+            error,
+            normal: normal.as_vec3(),
+            shading: shading.as_vec3(),
+            uv: uv.as_vec2(),
+            footprint: Footprint { dx, dy, edges: [UvEdge::Unbounded; 2] },
+            tangents: tangents.map(|d| d.as_vec3()),
+            color,
+        }
+    }
+}

@@ -1,0 +1,274 @@
+//! Point sets: millions of spheres with radii and colours.
+
+use fearless_simd::Simd;
+
+use super::ball::ball_tangents;
+use super::common::shape_table;
+use super::mesh::read_mesh_file;
+use super::placement::Placement;
+use super::sphere::{SphereUv, equirectangular};
+use super::surface::{Footprint, RayDifferential, ShapePoint, UvEdge};
+use crate::accel::{Aabb, Bvh, TraceRay};
+use crate::color::Rgb;
+use crate::context::{Assets, CompileContext, show};
+use crate::describe::FilePath;
+use crate::import::MeshData;
+use crate::math::{DRay, DVec3, ErrorBound, Ray, Vec3};
+
+shape_table! {
+    /// Spheres by the million: the vertices of a PLY file, or written out.
+    ///
+    /// The radius of each is the file's property `radius`, or the list `radii`, or `radius` for all. Colours multiply the
+    /// material's diffuse, specular and ambient colours. All spheres of a set have one id; which of them was hit is the
+    /// number of the primitive. Spheres without a finite centre and a radius above 0 are left out.
+    ///
+    /// ```toml
+    /// [[point_set]]
+    /// file = "scan.ply"
+    /// radius = 0.002
+    /// ```
+    pub struct PointSetDesc {
+        /// A PLY file, relative to the text that names it; its faces, if it has any, are not looked at.
+        pub file: Option<FilePath> = None,
+        /// Instead of a file: the centres, in metres.
+        pub positions: Vec<[f64; 3]> = Vec::new(),
+        /// The radius of each position.
+        pub radii: Vec<f64> = Vec::new(),
+        /// The colour of each position, linear Rec. 709.
+        pub colors: Vec<[f64; 3]> = Vec::new(),
+        /// In metres, greater than 0: the radius of those that have none of their own.
+        pub radius: f64 = 0.01,
+    }
+}
+
+/// Spheres in a space of their own.
+pub(crate) struct PointSet {
+    /// Centre and radius of each.
+    spheres: Vec<[f32; 4]>,
+    /// Empty, or one for each sphere.
+    colors: Vec<[f32; 3]>,
+    tree: Bvh,
+}
+
+impl PointSetDesc {
+    /// `None` after an error.
+    pub(crate) fn compile(
+        &self,
+        cx: &mut CompileContext,
+        assets: &dyn Assets,
+        files: &mut Vec<(String, [u8; 32])>,
+    ) -> Option<PointSet> {
+        let before = cx.error_count();
+        let radius = cx.positive("radius", self.radius, "the radius is in metres") as f32;
+        let data = match &self.file {
+            Some(file) => {
+                let lists =
+                    [("positions", self.positions.len()), ("radii", self.radii.len()), ("colors", self.colors.len())];
+                for (field, _) in lists.iter().filter(|(_, length)| *length > 0) {
+                    cx.error(field, "it is said beside a file", Some("give the file, or the lists"));
+                }
+                read_mesh_file(cx, assets, file, files)?
+            }
+            None => self.written(cx),
+        };
+        if cx.error_count() > before {
+            return None;
+        }
+        Some(PointSet::new(data, radius))
+    }
+
+    fn written(&self, cx: &mut CompileContext) -> MeshData {
+        let points = self.positions.len();
+        if points == 0 {
+            cx.error(
+                "file",
+                "there is neither a file nor positions",
+                Some("write `file = \"NAME.ply\"`, or positions"),
+            );
+        }
+        for (i, position) in self.positions.iter().enumerate() {
+            cx.point(&format!("positions[{i}]"), *position);
+        }
+        for (field, length) in [("radii", self.radii.len()), ("colors", self.colors.len())] {
+            if length != 0 && length != points {
+                let message = format!("{length} of them for {points} positions");
+                cx.error(field, message, Some("give one for each position, or none"));
+            }
+        }
+        for (i, radius) in self.radii.iter().enumerate() {
+            cx.positive(&format!("radii[{i}]"), *radius, "radii are in metres");
+        }
+        for (i, color) in self.colors.iter().enumerate() {
+            if !color.iter().all(|c| (0.0..=1e6).contains(c)) {
+                let message = format!("{} is outside [0, 1e6]", show(color));
+                cx.error(&format!("colors[{i}]"), message, Some("a colour is linear red, green, blue"));
+            }
+        }
+        MeshData {
+            positions: self.positions.iter().map(|p| p.map(|c| c as f32)).collect(),
+            radii: self.radii.iter().map(|r| *r as f32).collect(),
+            colors: self.colors.iter().map(|c| [c[0] as f32, c[1] as f32, c[2] as f32, 1.0]).collect(),
+            ..MeshData::default()
+        }
+    }
+}
+
+/// One sphere, in f64.
+struct Ball {
+    c: DVec3,
+    r: f64,
+}
+
+impl Ball {
+    /// Where the line of a ray enters and leaves, if it meets the ball; the ray's direction is of any length. See
+    /// `Sphere::intersect` for the form.
+    #[inline(always)]
+    fn roots(&self, ray: &DRay) -> Option<[f64; 2]> {
+        let f = ray.o - self.c;
+        let dd = ray.d.length_squared();
+        let b = -f.dot(ray.d);
+        let nearest = f + ray.d * (b / dd);
+        let discriminant = self.r * self.r - nearest.length_squared();
+        if !(discriminant >= 0.0) {
+            return None;
+        }
+        let root = (discriminant * dd).sqrt();
+        let product = f.length_squared() - self.r * self.r;
+        let q = if b > 0.0 { b + root } else { b - root };
+        Some(if b > 0.0 { [product / q, q / dd] } else { [q / dd, product / q] })
+    }
+}
+
+impl PointSet {
+    fn new(data: MeshData, radius: f32) -> Self {
+        let sphere = |(i, p): (usize, &[f32; 3])| [p[0], p[1], p[2], data.radii.get(i).copied().unwrap_or(radius)];
+        let spheres: Vec<[f32; 4]> = data.positions.iter().enumerate().map(sphere).collect();
+        let nothing = Aabb { min: Vec3::splat(f32::NAN), max: Vec3::splat(f32::NAN) };
+        let bounds = |[x, y, z, r]: &[f32; 4]| {
+            let fine = x.abs().max(y.abs()).max(z.abs()) <= 2.5e8 && *r > 0.0 && *r <= 2.5e8;
+            if !(fine && !x.is_nan() && !y.is_nan() && !z.is_nan()) {
+                return nothing;
+            }
+            let (c, r) = (Vec3::new(*x, *y, *z), Vec3::splat(*r * (1.0 + 1e-6)));
+            Aabb { min: c - r, max: c + r }
+        };
+        let boxes: Vec<Aabb> = spheres.iter().map(bounds).collect();
+        let colors =
+            data.colors.iter().map(|[r, g, b, _]| [*r, *g, *b].map(|c| if c >= 0.0 { c.min(1e6) } else { 0.0 }));
+        PointSet { spheres, colors: colors.collect(), tree: Bvh::build(&boxes) }
+    }
+
+    /// How many there are.
+    pub fn len(&self) -> usize {
+        self.spheres.len()
+    }
+
+    /// Bytes in memory, without the tree.
+    pub fn bytes(&self) -> usize {
+        size_of_val(self.spheres.as_slice()) + size_of_val(self.colors.as_slice())
+    }
+
+    /// Bytes of the tree.
+    pub fn tree_bytes(&self) -> usize {
+        self.tree.bytes()
+    }
+
+    /// The box around all; `None` if there is nothing to be hit.
+    pub fn bounds(&self) -> Option<[DVec3; 2]> {
+        let bounds = self.tree.bounds();
+        bounds.is_sound().then(|| [bounds.min.as_dvec3(), bounds.max.as_dvec3()])
+    }
+
+    fn ball(&self, index: u32) -> Ball {
+        let [x, y, z, r] = self.spheres[index as usize].map(f64::from);
+        Ball { c: DVec3::new(x, y, z), r }
+    }
+
+    /// The first sphere on a ray of the set's own space: its distance, at most `limit`, and its number. Of several at the
+    /// same distance the lowest. `single_sided`: rays pass through from inside.
+    #[inline(never)]
+    pub fn intersect<S: Simd>(&self, simd: S, ray: &DRay, limit: f32, single_sided: bool) -> Option<(f64, u32)> {
+        simd.vectorize(
+            #[inline(always)]
+            || self.intersect_here(simd, ray, limit, single_sided),
+        )
+    }
+
+    #[inline(always)]
+    fn intersect_here<S: Simd>(&self, simd: S, ray: &DRay, limit: f32, single_sided: bool) -> Option<(f64, u32)> {
+        let mut nearest: Option<(f64, u32)> = None;
+        let mut limit = limit;
+        let trace = TraceRay::new(ray.o.as_vec3(), ray.d.as_vec3());
+        self.tree.closest(simd, &trace, &mut limit, |index, limit| {
+            let Some([enter, leave]) = self.ball(index).roots(ray) else { return };
+            let t = if enter > 0.0 {
+                enter
+            } else if leave > 0.0 && !single_sided {
+                leave
+            } else {
+                return;
+            };
+            if nearest.is_none_or(|(best, number)| t < best || t == best && index < number) {
+                nearest = Some((t, index));
+                *limit = limit.min((t as f32).next_up());
+            }
+        });
+        nearest
+    }
+
+    /// Whether any sphere is met between 0 and `limit`.
+    #[inline(never)]
+    pub fn blocks<S: Simd>(&self, simd: S, ray: &DRay, limit: f32) -> bool {
+        simd.vectorize(
+            #[inline(always)]
+            || self.blocks_here(simd, ray, limit),
+        )
+    }
+
+    #[inline(always)]
+    fn blocks_here<S: Simd>(&self, simd: S, ray: &DRay, limit: f32) -> bool {
+        let trace = TraceRay::new(ray.o.as_vec3(), ray.d.as_vec3());
+        let between = |t: f64| t > 0.0 && t < limit as f64;
+        self.tree.any(simd, &trace, limit, |index| {
+            self.ball(index).roots(ray).is_some_and(|[enter, leave]| between(enter) || between(leave))
+        })
+    }
+
+    /// What `ray`, which met sphere `index` at `t`, sees there.
+    pub fn point(
+        &self,
+        placement: &Placement,
+        index: u32,
+        ray: &Ray,
+        t: f64,
+        differential: &RayDifferential,
+    ) -> ShapePoint {
+        let Ball { c, r } = self.ball(index);
+        let own = placement.ray(ray);
+        // From the centre outwards: the point lies on the sphere however far away the camera is
+        let outwards = (own.o - c + own.d * t).normalize_or(DVec3::Y);
+        let on = c + outwards * r;
+        let p = placement.world_from_object.transform_point3(on).as_vec3();
+        let error = ErrorBound::of_rounded(p, placement.terms(c.abs() + DVec3::splat(r)));
+        let normal = placement.normal(outwards).normalize_or(DVec3::Y).as_vec3();
+        // Steps on the surface, in the set's own space
+        let [dpx, dpy] = differential.on_plane(ray.d, t as f32, normal, f32::MAX.sqrt() * 0.5).map(|dp| {
+            let dp = placement.object_from_world.transform_vector3(dp.as_dvec3()) / r;
+            if dp.length_squared() <= 1.0 { dp.as_vec3() } else { dp.normalize_or_zero().as_vec3() }
+        });
+        let n = outwards.as_vec3();
+        let (uv, dx, dy) = equirectangular(n, dpx, dpy);
+        let color = self.colors.get(index as usize).map_or(Rgb::WHITE, |[r, g, b]| Rgb::new(*r, *g, *b));
+        let tangents = ball_tangents(SphereUv::Equirectangular, outwards);
+        ShapePoint {
+            p,
+            error,
+            normal,
+            shading: normal,
+            uv,
+            footprint: Footprint { dx, dy, edges: [UvEdge::Periodic, UvEdge::Bounded] },
+            tangents: tangents.map(|d| placement.world_from_object.transform_vector3(d * r).as_vec3()),
+            color,
+        }
+    }
+}

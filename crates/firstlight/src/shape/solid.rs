@@ -1,0 +1,294 @@
+//! The shapes that curve or have several sides, as one family: how rays meet them, in f64, each in its own space.
+
+use glam::DVec2;
+
+use super::ball::Ball;
+use super::cuboid::Cuboid;
+use super::disk::Disk;
+use super::frustum::Frustum;
+use super::plane::Plane;
+use super::surface::UvEdge;
+use super::torus::Torus;
+use crate::math::{DRay, DVec3};
+
+/// A shape, ready to be hit.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Solid {
+    Plane(Plane),
+    Disk(Disk),
+    Cuboid(Cuboid),
+    /// Cylinders and cones.
+    Frustum(Frustum),
+    Torus(Torus),
+    Ball(Ball),
+}
+
+/// Where a ray meets a shape.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct SolidHit {
+    /// The ray's `o + t d`.
+    pub t: f64,
+    /// Which side of it, as the shape numbers them.
+    pub part: u8,
+}
+
+/// A point of a shape.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct SolidPoint {
+    /// On the surface: what the ray's length has cost is taken back.
+    pub p: DVec3,
+    /// Unit normal of the front, which is the outside of what has an inside.
+    pub normal: DVec3,
+    /// Texture coordinate.
+    pub uv: DVec2,
+    /// The change of `p` with u. No length where u has no meaning: at a centre, at an apex, at a pole.
+    pub dpdu: DVec3,
+    /// The change of `p` with v.
+    pub dpdv: DVec3,
+    /// What lies beyond 0 and 1 of u and of v.
+    pub edges: [UvEdge; 2],
+    /// The absolute size of what `p` was summed up from, for [`ErrorBound::of_rounded`](crate::math::ErrorBound::of_rounded).
+    pub terms: DVec3,
+}
+
+impl SolidPoint {
+    /// The change of uv with a step `dp` along the surface. What lies off the surface is left out; once around is the most
+    /// that a step makes of a coordinate with an end.
+    pub fn uv_step(&self, dp: DVec3) -> DVec2 {
+        let across = self.dpdu.cross(self.dpdv);
+        let area2 = across.length_squared();
+        let step = if area2 > 0.0 {
+            DVec2::new(dp.cross(self.dpdv).dot(across), self.dpdu.cross(dp).dot(across)) / area2
+        } else {
+            // One of them has no length: a step there is once around
+            let along = |way: DVec3| if way == DVec3::ZERO { 1.0 } else { dp.dot(way) / way.length_squared() };
+            DVec2::new(along(self.dpdu), along(self.dpdv))
+        };
+        let limit = |step: f64, edge| if edge == UvEdge::Unbounded { step } else { step.clamp(-1.0, 1.0) };
+        DVec2::new(limit(step.x, self.edges[0]), limit(step.y, self.edges[1]))
+    }
+}
+
+/// One expression for every kind.
+macro_rules! each {
+    ($solid:expr, $shape:ident => $answer:expr) => {
+        match $solid {
+            Solid::Plane($shape) => $answer,
+            Solid::Disk($shape) => $answer,
+            Solid::Cuboid($shape) => $answer,
+            Solid::Frustum($shape) => $answer,
+            Solid::Torus($shape) => $answer,
+            Solid::Ball($shape) => $answer,
+        }
+    };
+}
+
+impl Solid {
+    /// The nearest hit with `t_min` < t < `t_max`. `single_sided`: what is seen from behind is let through.
+    #[inline]
+    pub fn intersect(&self, ray: &DRay, t_min: f64, t_max: f64, single_sided: bool) -> Option<SolidHit> {
+        each!(self, shape => shape.intersect(ray, t_min, t_max, single_sided))
+    }
+
+    /// Whether there is any hit, from either side, with `t_min` < t < `t_max`.
+    #[inline]
+    pub fn blocks(&self, ray: &DRay, t_min: f64, t_max: f64) -> bool {
+        self.intersect(ray, t_min, t_max, false).is_some()
+    }
+
+    /// The point of a hit of [`intersect`](Self::intersect) with the same ray.
+    #[inline]
+    pub fn point(&self, ray: &DRay, hit: &SolidHit) -> SolidPoint {
+        each!(self, shape => shape.point(ray, hit))
+    }
+
+    /// The smallest box around it, to within rounding; `None` if it has no end.
+    pub fn bounds(&self) -> Option<[DVec3; 2]> {
+        each!(self, shape => shape.bounds())
+    }
+
+    /// Whether all of it lies on one side of the tangent plane of each of its points. Then no ray that leaves such a shape
+    /// on its front meets it again, whatever rounding says; nor does one that leaves a flat shape on its back.
+    #[cfg(test)]
+    pub fn is_convex(&self) -> bool {
+        match self {
+            Solid::Plane(_) | Solid::Disk(_) | Solid::Cuboid(_) | Solid::Ball(_) => true,
+            Solid::Frustum(frustum) => frustum.capped,
+            Solid::Torus(_) => false,
+        }
+    }
+
+    /// Whether it has no thickness: both sides of it can be left without meeting it again.
+    #[cfg(test)]
+    pub fn is_flat(&self) -> bool {
+        matches!(self, Solid::Plane(_) | Solid::Disk(_))
+    }
+}
+
+/// The part of a line inside a convex shape, made by cutting away what is outside of one side after another. A line through
+/// the inside has both ends, so no ray slips out where sides meet.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Chord {
+    pub enter: SolidHit,
+    pub leave: SolidHit,
+}
+
+impl Chord {
+    /// The whole line.
+    pub const LINE: Chord =
+        Chord { enter: SolidHit { t: f64::NEG_INFINITY, part: 0 }, leave: SolidHit { t: f64::INFINITY, part: 0 } };
+
+    /// None of it.
+    pub const NOTHING: Chord =
+        Chord { enter: SolidHit { t: f64::INFINITY, part: 0 }, leave: SolidHit { t: f64::NEG_INFINITY, part: 0 } };
+
+    /// What is left between the sides `enter` and `leave`.
+    #[inline(always)]
+    pub fn cut(&mut self, enter: SolidHit, leave: SolidHit) {
+        if enter.t > self.enter.t {
+            self.enter = enter;
+        }
+        if leave.t < self.leave.t {
+            self.leave = leave;
+        }
+    }
+
+    /// What is left between two planes, where a coordinate that is `o` + t `d` has the values `low` and `high`.
+    #[inline(always)]
+    pub fn cut_slab(&mut self, o: f64, d: f64, low: f64, high: f64, part_low: u8, part_high: u8) {
+        if d == 0.0 {
+            if !(o >= low && o <= high) {
+                *self = Chord::NOTHING;
+            }
+            return;
+        }
+        let at_low = SolidHit { t: (low - o) / d, part: part_low };
+        let at_high = SolidHit { t: (high - o) / d, part: part_high };
+        if d > 0.0 { self.cut(at_low, at_high) } else { self.cut(at_high, at_low) }
+    }
+
+    /// Whether nothing is left.
+    #[inline(always)]
+    pub fn is_empty(&self) -> bool {
+        !(self.enter.t <= self.leave.t)
+    }
+
+    /// The first end with `t_min` < t < `t_max`; only where the line enters, if `single_sided`. `shift` is added to every t.
+    #[inline(always)]
+    pub fn first(&self, shift: f64, t_min: f64, t_max: f64, single_sided: bool) -> Option<SolidHit> {
+        if self.is_empty() {
+            return None;
+        }
+        let within = |hit: SolidHit| {
+            let t = hit.t + shift;
+            (t > t_min && t < t_max).then_some(SolidHit { t, part: hit.part })
+        };
+        within(self.enter).or_else(|| if single_sided { None } else { within(self.leave) })
+    }
+}
+
+/// u for an angle around an axis, counted from the x and towards the y of its frame: 1/2 at x, rising, as on a sphere.
+#[inline(always)]
+pub(crate) fn turn(x: f64, y: f64) -> f64 {
+    use std::f64::consts::PI;
+    0.5 + pxfm::f_atan2(y, x) / (2.0 * PI)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn steps_in_uv_are_bounded_where_u_has_no_meaning() {
+        let mut point = SolidPoint {
+            p: DVec3::ZERO,
+            normal: DVec3::Z,
+            uv: DVec2::ZERO,
+            dpdu: DVec3::X * 4.0,
+            dpdv: DVec3::new(1.0, 2.0, 0.0),
+            edges: [UvEdge::Periodic, UvEdge::Bounded],
+            terms: DVec3::ZERO,
+        };
+        // Skewed, and with a part along the normal
+        assert_eq!(point.uv_step(DVec3::new(0.5, 1.0, 9.0)), DVec2::new(0.0, 0.5));
+        assert_eq!(point.uv_step(DVec3::new(1.0, 0.0, 0.0)), DVec2::new(0.25, 0.0));
+        assert_eq!(point.uv_step(DVec3::new(100.0, -100.0, 0.0)), DVec2::new(1.0, -1.0));
+        point.dpdu = DVec3::ZERO;
+        assert_eq!(point.uv_step(DVec3::new(0.2, 0.4, 0.0)), DVec2::new(1.0, 0.2));
+        point.dpdu = DVec3::X * 1e-200;
+        assert!(point.uv_step(DVec3::new(0.2, 0.4, 0.0)).is_finite());
+    }
+
+    #[test]
+    fn whatever_compiles_answers_with_numbers() {
+        use super::super::check::{Random, made};
+        use super::super::{BoxDesc, ConeDesc, DiskDesc, SphereUv, TorusDesc};
+        let mut random = Random::new(1);
+        let mut hits = 0;
+        for i in 0..20_000 {
+            // Any two sizes that a scene may say, anywhere
+            let mut length = || random.magnitude(1.01e-9, 2.4e8);
+            let (a, b, c) = (length(), length(), length());
+            let at = random.in_ball() * random.magnitude(1e-9, 2.4e8);
+            let axis = random.direction();
+            let solid = match i % 6 {
+                0 => made(|cx| DiskDesc { normal: axis.into(), ..DiskDesc::new(at.into(), a) }.compile(cx)),
+                1 => made(|cx| BoxDesc { size: [a, b, c], ..BoxDesc::new(at.into()) }.compile(cx)),
+                2 => made(|cx| TorusDesc { axis: axis.into(), ..TorusDesc::new(at.into(), a, b) }.compile(cx)),
+                3 => Solid::Ball(Ball { uv: SphereUv::Angles }),
+                _ => {
+                    let tip = at + axis * c.max(at.length() * 1e-6);
+                    let tip = tip.clamp(DVec3::splat(-2.5e8), DVec3::splat(2.5e8));
+                    if (tip - at).length() < 1e-9 {
+                        continue;
+                    }
+                    let radius1 = if i % 3 == 0 { 0.0 } else { b };
+                    let cone = ConeDesc { radius1, capped: i % 2 == 0, ..ConeDesc::new(at.into(), tip.into(), a) };
+                    made(|cx| cone.compile(cx))
+                }
+            };
+            let [low, high] = solid.bounds().expect("it has an end");
+            for _ in 0..8 {
+                let o = (low + high) * 0.5 + random.direction() * random.magnitude(1e-9, 4e8);
+                let inside = low + (high - low) * DVec3::new(random.unit(), random.unit(), random.unit());
+                let d = if random.unit() < 0.2 { random.direction() } else { inside - o };
+                let ray = DRay { o, d };
+                let Some(hit) = solid.intersect(&ray, 0.0, f64::INFINITY, false) else { continue };
+                hits += 1;
+                let point = solid.point(&ray, &hit);
+                assert!(hit.t > 0.0 && hit.t.is_finite(), "{solid:?} {ray:?} {hit:?}");
+                let fine = point.p.is_finite() && point.dpdu.is_finite() && point.dpdv.is_finite();
+                assert!(fine && (point.normal.length() - 1.0).abs() < 1e-9, "{solid:?} {ray:?} {point:?}");
+                assert!(point.uv.clamp(DVec2::ZERO, DVec2::ONE) == point.uv, "{solid:?} {ray:?} {point:?}");
+                assert!(point.uv_step(random.in_ball()).is_finite());
+            }
+        }
+        assert!(hits > 10_000, "{hits}");
+    }
+
+    #[test]
+    fn no_description_breaks_compiling() {
+        use super::super::check::faults;
+        use super::super::{BoxDesc, ConeDesc, CylinderDesc, DiskDesc, PlaneDesc, RectangleDesc, TorusDesc};
+        let numbers = [0.0, -1.0, 1e-300, 1e30, 1e308, f64::INFINITY, f64::NAN];
+        for x in numbers {
+            for y in numbers {
+                let (v, w) = ([x, y, 0.0], [y, 1.0, x]);
+                let plane = PlaneDesc { point: v, normal: w, up: Some([x; 3]), ..PlaneDesc::default() };
+                let disk = DiskDesc { normal: v, inner_radius: y, ..DiskDesc::new(w, x) };
+                let rectangle = RectangleDesc { normal: w, up: Some([y; 3]), ..RectangleDesc::new(v, [x, y]) };
+                let cuboid = BoxDesc { size: v, ..BoxDesc::new(w) };
+                let cone = ConeDesc { radius1: y, ..ConeDesc::new(v, w, x) };
+                let torus = TorusDesc { axis: v, ..TorusDesc::new(w, x, y) };
+                let found = faults(|cx| plane.compile(cx));
+                assert!(!found.is_empty() || x.abs() <= 1.0 && y.abs() <= 1.0);
+                assert!(!faults(|cx| disk.compile(cx)).is_empty());
+                assert!(!faults(|cx| rectangle.compile(cx)).is_empty());
+                assert!(!faults(|cx| cuboid.compile(cx)).is_empty());
+                assert!(!faults(|cx| cone.compile(cx)).is_empty());
+                assert!(!faults(|cx| torus.compile(cx)).is_empty());
+                assert!(!faults(|cx| CylinderDesc::new(v, w, x).compile(cx)).is_empty());
+            }
+        }
+    }
+}
