@@ -57,6 +57,7 @@ mod error;
 mod ids;
 mod image;
 mod import;
+mod integrate;
 mod light;
 mod material;
 mod math;

@@ -57,9 +57,15 @@ impl BlinnPhongLobe {
         self.half_exponent.pow(if base < 1.0 { base } else { 1.0 })
     }
 
+    /// The highlight's exponent.
+    #[inline(always)]
+    pub(crate) fn exponent(&self) -> f32 {
+        2.0 * self.half_exponent.value()
+    }
+
     /// [`eval`](Self::eval) in sixteen lanes: the same bits.
     #[inline(always)]
-    pub(crate) fn eval_lanes<S: Simd>(&self, cos_i: f32x16<S>, cos_o: f32, cos_io: f32x16<S>) -> f32x16<S> {
+    pub(crate) fn eval_lanes<S: Simd>(&self, cos_i: f32x16<S>, cos_o: f32x16<S>, cos_io: f32x16<S>) -> f32x16<S> {
         let simd = cos_i.token();
         let (zero, one) = (simd.splat_f32x16(0.0), simd.splat_f32x16(1.0));
         let sum = cos_i + cos_o;

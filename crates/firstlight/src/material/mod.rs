@@ -112,7 +112,7 @@ impl Lobe {
 
     /// [`eval`](Self::eval) in sixteen lanes: the same bits.
     #[inline(always)]
-    pub(crate) fn eval_lanes<S: Simd>(&self, cos_i: f32x16<S>, cos_o: f32, cos_io: f32x16<S>) -> f32x16<S> {
+    pub(crate) fn eval_lanes<S: Simd>(&self, cos_i: f32x16<S>, cos_o: f32x16<S>, cos_io: f32x16<S>) -> f32x16<S> {
         match self {
             Lobe::None => cos_i.token().splat_f32x16(0.0),
             Lobe::Phong(lobe) => lobe.eval_lanes(cos_i, cos_o, cos_io),

@@ -50,9 +50,15 @@ impl PhongLobe {
         self.exponent.pow(if base > 0.0 { base } else { 0.0 })
     }
 
+    /// The highlight's exponent.
+    #[inline(always)]
+    pub(crate) fn exponent(&self) -> f32 {
+        self.exponent.value()
+    }
+
     /// [`eval`](Self::eval) in sixteen lanes: the same bits.
     #[inline(always)]
-    pub(crate) fn eval_lanes<S: Simd>(&self, cos_i: f32x16<S>, cos_o: f32, cos_io: f32x16<S>) -> f32x16<S> {
+    pub(crate) fn eval_lanes<S: Simd>(&self, cos_i: f32x16<S>, cos_o: f32x16<S>, cos_io: f32x16<S>) -> f32x16<S> {
         let (zero, one) = (cos_i.token().splat_f32x16(0.0), cos_i.token().splat_f32x16(1.0));
         let base = (cos_i * 2.0) * cos_o - cos_io;
         let base = base.simd_lt(one).select(base, one);

@@ -4,6 +4,27 @@ use fearless_simd::{f32x16, prelude::*};
 
 use super::Vec3;
 
+/// Runs code for sixteen numbers at a time with the instruction set that suits it: AVX-512, AVX2, NEON, or what every processor
+/// has. Three copies, not five: the code below takes the compiler seconds.
+macro_rules! dispatch_wide {
+    ($level:expr, $simd:ident => $op:expr) => {{
+        let level: fearless_simd::Level = $level;
+        #[cfg(target_arch = "x86_64")]
+        if let Some($simd) = level.as_avx512() {
+            $op
+        } else if let Some($simd) = level.as_avx2() {
+            $op
+        } else {
+            let $simd = fearless_simd::Fallback::new();
+            $op
+        }
+        #[cfg(not(target_arch = "x86_64"))]
+        fearless_simd::dispatch!(level, $simd => $op)
+    }};
+}
+
+pub(crate) use dispatch_wide;
+
 /// Sixteen vectors, coordinate by coordinate.
 #[derive(Clone, Copy)]
 pub struct Vec3x16<S: Simd> {

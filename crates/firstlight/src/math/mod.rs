@@ -10,7 +10,7 @@ mod roots;
 mod sum;
 
 pub(crate) use frame::Frame;
-pub(crate) use lanes::Vec3x16;
+pub(crate) use lanes::{Vec3x16, dispatch_wide};
 pub(crate) use pow::Exponent;
 pub use ray::Ray;
 pub(crate) use ray::{DRay, ErrorBound, ShadowRay};

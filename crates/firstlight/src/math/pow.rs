@@ -39,6 +39,16 @@ impl Exponent {
         Exponent { kind }
     }
 
+    /// y.
+    #[inline]
+    pub fn value(self) -> f32 {
+        match self.kind {
+            Kind::Whole(n) => n as f32,
+            Kind::Half(n) => n as f32 + 0.5,
+            Kind::Real(y) => y,
+        }
+    }
+
     /// `x`^y for x from 0 to 1 (a little above 1 by rounding does no harm). 0^0 is 1.
     ///
     /// Relative error: below y x 2^-23 + 2^-21 for y that are multiples of 1/2, 3e-6 + |y log2 x| x 2^-22 otherwise.

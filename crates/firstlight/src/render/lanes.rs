@@ -94,7 +94,7 @@ fn gather_rectangle<S: Simd>(
         let cos_io = wo.dot(l) * inverse_distance;
         diffuse += lit.select(cos_i * weight, zero);
         if !matches!(lobe, Lobe::None) {
-            specular += lit.select(lobe.eval_lanes(cos_i, cos_o, cos_io) * weight, zero);
+            specular += lit.select(lobe.eval_lanes(cos_i, splat(cos_o), cos_io) * weight, zero);
         }
     }
     LobeSums { diffuse: partials(diffuse), specular: partials(specular) }

@@ -1,0 +1,90 @@
+//! Light, integrated: what arrives from an area light at a point, to a stated error, without a fixed set of samples.
+//!
+//! Before it stands visibility, which says what may be in the way; after it the film. A point takes one of these roads:
+//! - the light is seen whole and is well above the horizon: one Gauss rule, its order by distance and sharpness
+//!   ([`tensor`]);
+//! - a few convex things are in the way, or the horizon cuts the light, or the light is near: row by row, with
+//!   intervals in closed form, the error measured and brought under its bound ([`rows`]);
+//! - anything else: a mask over fixed points, their number doubled until the answer stands still ([`mask`]).
+//!
+//! A highlight that is narrow beside the light is integrated by itself, over the part of the light that it covers.
+
+mod hider;
+mod lobe;
+mod rows;
+mod rules;
+mod tensor;
+mod view;
+
+use std::ops::Add;
+
+use fearless_simd::prelude::*;
+
+pub(crate) use hider::Hider;
+pub(crate) use rows::MAX_HIDERS;
+use rows::Region;
+pub(crate) use view::{FlatLight, Outline, Receiver, View};
+
+use crate::material::Lobe;
+
+/// What arrives from one light, before all colours: the weight times the cosine, and the weight times the highlight.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct Sums {
+    pub diffuse: f32,
+    pub specular: f32,
+}
+
+impl Add for Sums {
+    type Output = Sums;
+
+    #[inline(always)]
+    fn add(self, other: Sums) -> Sums {
+        Sums { diffuse: self.diffuse + other.diffuse, specular: self.specular + other.specular }
+    }
+}
+
+/// Which of the two are asked for.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Wanted {
+    pub diffuse: bool,
+    pub specular: bool,
+}
+
+/// What arrives from a flat light that only `hiders` stand in front of, and how far it can be wrong.
+///
+/// `enough(sums, error)` says whether an error will do, given what is known so far.
+pub(crate) fn integrate<S: Simd>(
+    simd: S,
+    view: &View,
+    hiders: &[Hider],
+    enough: &dyn Fn(&Sums, &Sums) -> bool,
+) -> (Sums, Sums) {
+    let whole = Region::WHOLE;
+    let is_clear = hiders.is_empty() && view.is_above_horizon();
+    let both = Wanted { diffuse: true, specular: !matches!(view.lobe, Lobe::None) };
+    if is_clear && let Some(order) = tensor::order(view, &whole) {
+        return (tensor::integrate(simd, view, &whole, both, order), Sums::default());
+    }
+    // A highlight that is narrow beside the light
+    let Some(narrow) = lobe::region(view) else {
+        return rows::integrate(simd, view, hiders, &whole, both, enough);
+    };
+    let diffuse_only = Wanted { diffuse: true, specular: false };
+    let specular_only = Wanted { diffuse: false, specular: true };
+    let blunt = View { lobe: Lobe::None, ..*view };
+    let (diffuse, diffuse_error) = match is_clear.then(|| tensor::order(&blunt, &whole)).flatten() {
+        Some(order) => (tensor::integrate(simd, &blunt, &whole, diffuse_only, order), Sums::default()),
+        None => rows::integrate(simd, &blunt, hiders, &whole, diffuse_only, enough),
+    };
+    let Some(region) = narrow else { return (diffuse, diffuse_error) };
+    let enough = |sums: &Sums, error: &Sums| enough(&(*sums + diffuse), &(*error + diffuse_error));
+    let order = if is_clear && view.outline == Outline::Parallelogram { tensor::order(view, &region) } else { None };
+    let (specular, specular_error) = match order {
+        Some(order) => (tensor::integrate(simd, view, &region, specular_only, order), Sums::default()),
+        None => rows::integrate(simd, view, hiders, &region, specular_only, &enough),
+    };
+    (diffuse + specular, diffuse_error + specular_error)
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,330 @@
+//! The integral of a flat light row by row: what is left of each row is a few intervals, and along an interval the light is
+//! smooth.
+//!
+//! Rows lie at the nodes of a Kronrod rule, sixteen lanes for fifteen rows, on panels that end where something changes its
+//! course: where a hidden part begins, has a corner or touches the light's edge. The Gauss rule inside the Kronrod rule says
+//! how far a panel can be wrong; the worst panel is halved until the whole is good enough.
+//!
+//! Source of the pair of rules: Piessens et al., "QUADPACK", 1983, qk15.
+
+use arrayvec::ArrayVec;
+use fearless_simd::{f32x16, prelude::*};
+
+use super::hider::{Hider, Interval};
+use super::rules::{EMBEDDED_WEIGHTS, KRONROD, KRONROD_WEIGHTS, gauss};
+use super::view::{Outline, View};
+use super::{Sums, Wanted};
+use crate::material::Lobe;
+
+/// The most things in the way that are settled row by row.
+pub(crate) const MAX_HIDERS: usize = 8;
+
+/// The most panels that a light is cut into.
+const MAX_PANELS: usize = 64;
+
+/// The part of a light that is integrated, and in how many pieces along a row.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Region {
+    /// Of x.
+    pub x: [f32; 2],
+    /// Of y.
+    pub y: [f32; 2],
+    /// Pieces of equal length that an interval is cut into: for a highlight that is narrow beside the region.
+    pub pieces: usize,
+}
+
+impl Region {
+    /// All of a light.
+    pub const WHOLE: Region = Region { x: [-1.0, 1.0], y: [-1.0, 1.0], pieces: 1 };
+}
+
+/// An integral over a part of a light.
+#[derive(Clone, Copy, Debug, Default)]
+struct Panel {
+    t: [f32; 2],
+    sums: Sums,
+    error: Sums,
+}
+
+/// The integral of what nothing hides of a light over a region, and a bound of its error.
+///
+/// `enough(sums, error)` says whether an error will do.
+pub(crate) fn integrate<S: Simd>(
+    simd: S,
+    view: &View,
+    hiders: &[Hider],
+    region: &Region,
+    wanted: Wanted,
+    enough: &dyn Fn(&Sums, &Sums) -> bool,
+) -> (Sums, Sums) {
+    let cuts = cuts(view, hiders, region);
+    let mut panels: ArrayVec<Panel, MAX_PANELS> = ArrayVec::new();
+    let (mut sums, mut error) = (Sums::default(), Sums::default());
+    for t in cuts.windows(2) {
+        let panel = panel(simd, view, hiders, region, wanted, [t[0], t[1]]);
+        sums = sums + panel.sums;
+        error = error + panel.error;
+        panels.push(panel);
+    }
+    while !enough(&sums, &error) && panels.len() < MAX_PANELS {
+        // Halve the worst
+        let size = |panel: &Panel| panel.error.diffuse + panel.error.specular;
+        let mut worst = 0;
+        for i in 1..panels.len() {
+            if size(&panels[i]) > size(&panels[worst]) {
+                worst = i;
+            }
+        }
+        let [from, to] = panels[worst].t;
+        let middle = 0.5 * (from + to);
+        if !(from < middle && middle < to) {
+            break;
+        }
+        panels[worst] = panel(simd, view, hiders, region, wanted, [from, middle]);
+        panels.push(panel(simd, view, hiders, region, wanted, [middle, to]));
+        // Anew, so that nothing is left over of what was taken away
+        (sums, error) = (Sums::default(), Sums::default());
+        for panel in &panels {
+            sums = sums + panel.sums;
+            error = error + panel.error;
+        }
+    }
+    (sums, error)
+}
+
+/// Where panels begin and end: in the light's own parameter of rows.
+fn cuts(view: &View, hiders: &[Hider], region: &Region) -> ArrayVec<f32, { MAX_PANELS / 2 }> {
+    let mut cuts = ArrayVec::new();
+    let [from, to] = region.y.map(|y| parameter(view.outline, y));
+    // Shorter panels are not worth their rows
+    let least = (to - from) * 1e-4;
+    let mut offer = |y: f64| {
+        let t = parameter(view.outline, y as f32);
+        if t > from + least && t < to - least && !cuts.is_full() && cuts.iter().all(|c: &f32| (c - t).abs() > least) {
+            cuts.push(t);
+        }
+    };
+    for hider in hiders {
+        hider.corners(&mut offer);
+    }
+    for line in [&view.cos, &view.horizon] {
+        for x in [-1.0, 1.0] {
+            let y = -(line.c + line.x * x) / line.y;
+            offer(f64::from(y));
+        }
+    }
+    // Room for both ends
+    cuts.truncate(MAX_PANELS / 2 - 2);
+    cuts.push(from);
+    cuts.push(to);
+    cuts.sort_unstable_by(f32::total_cmp);
+    cuts
+}
+
+/// The parameter of row `y`. On a disk rows are spread so that their lengths change smoothly up to the rim:
+/// y = (3 t - t^3) / 2, whose half length is (1 - t^2) sqrt(4 - t^2) / 2.
+fn parameter(outline: Outline, y: f32) -> f32 {
+    match outline {
+        Outline::Parallelogram => y,
+        Outline::Disk => {
+            let y = y.clamp(-1.0, 1.0);
+            // Newton's way, from the sine that the cubic is close to
+            let mut t = y * 0.75;
+            for _ in 0..30 {
+                let slope = 1.5 * (1.0 - t * t);
+                if slope < 1e-3 {
+                    break;
+                }
+                t = (t - (0.5 * t * (3.0 - t * t) - y) / slope).clamp(-1.0, 1.0);
+            }
+            if y.abs() == 1.0 { y } else { t }
+        }
+    }
+}
+
+/// Fifteen rows of a light. Not inlined: one copy for each instruction set is enough.
+#[inline(never)]
+fn panel<S: Simd>(simd: S, view: &View, hiders: &[Hider], region: &Region, wanted: Wanted, t: [f32; 2]) -> Panel {
+    simd.vectorize(
+        #[inline(always)]
+        || panel_now(simd, view, hiders, region, wanted, t),
+    )
+}
+
+#[inline(always)]
+fn panel_now<S: Simd>(simd: S, view: &View, hiders: &[Hider], region: &Region, wanted: Wanted, t: [f32; 2]) -> Panel {
+    let splat = |v: f32| simd.splat_f32x16(v);
+    let (middle, half) = (0.5 * (t[0] + t[1]), 0.5 * (t[1] - t[0]));
+    let t_rows = f32x16::simd_from(simd, KRONROD) * half + middle;
+    // The rows, and how densely they lie
+    let (y, reach, density) = match view.outline {
+        Outline::Parallelogram => (t_rows, splat(1.0), splat(half)),
+        Outline::Disk => {
+            let tt = t_rows * t_rows;
+            let y = t_rows * (3.0 - tt) * 0.5;
+            let inside = (1.0 - tt).max(splat(0.0));
+            (y, inside * (4.0 - tt).sqrt() * 0.5, inside * (1.5 * half))
+        }
+    };
+    let row = Row::new(simd, view, y);
+    // What is above the horizon, in the region, and in the light
+    let mut all = Interval { from: (-reach).max(splat(region.x[0])), to: reach.min(splat(region.x[1])) };
+    all.clip(row.cos, view.cos.x);
+    all.clip(y * view.horizon.y + view.horizon.c, view.horizon.x);
+    // Near the light, pieces that grow with the distance from the point's foot
+    let nearest = least(row.rest).sqrt();
+    let length = view.la * (region.x[1] - region.x[0]);
+    let foot = row.along * (-1.0 / view.la);
+    let steps = if length > NEAR * nearest { nearest / view.la } else { 0.0 };
+    let order = if length * 1.5 > NEAR * nearest || region.pieces > 1 { 5 } else { FAR_ORDER };
+    // Each visible interval in turn
+    let mut hidden: ArrayVec<Interval<S>, MAX_HIDERS> = ArrayVec::new();
+    for hider in hiders {
+        let interval = hider.hidden(simd, y);
+        if (interval.from.simd_lt(interval.to) & interval.from.simd_lt(all.to) & interval.to.simd_gt(all.from)).any_true() {
+            hidden.push(interval);
+        }
+    }
+    let mut visible: ArrayVec<Interval<S>, { MAX_HIDERS + 1 }> = ArrayVec::new();
+    let mut at = all.from;
+    for _ in 0..=hidden.len() {
+        // Past all that hides the place
+        for _ in 0..hidden.len() {
+            for interval in &hidden {
+                let covers = interval.from.simd_le(at) & interval.to.simd_gt(at);
+                at = covers.select(interval.to, at);
+            }
+        }
+        let mut end = all.to;
+        for interval in &hidden {
+            let ahead = interval.from.simd_gt(at) & interval.from.simd_lt(interval.to);
+            end = ahead.select(interval.from.min(end), end);
+        }
+        if at.simd_lt(end).any_true() {
+            visible.push(Interval { from: at, to: end });
+        }
+        at = end;
+        if !at.simd_lt(all.to).any_true() {
+            break;
+        }
+    }
+    let mut sums = [splat(0.0); 2];
+    // Rings around the foot, each as wide as it is far away; or all at once
+    let (mut inner, mut outer) = (0.0, if steps > 0.0 { steps } else { f32::INFINITY });
+    let mut side = 1.0;
+    loop {
+        let (a, b) = if outer == f32::INFINITY {
+            (splat(-f32::MAX), splat(f32::MAX))
+        } else {
+            let (near, far) = (foot + inner * side, foot + outer * side);
+            (near.min(far), near.max(far))
+        };
+        for interval in &visible {
+            let (from, to) = (interval.from.max(a), interval.to.min(b));
+            if from.simd_lt(to).any_true() {
+                row.add(simd, view, from, to, region.pieces, order, wanted, &mut sums);
+            }
+        }
+        if outer == f32::INFINITY {
+            break;
+        }
+        side = -side;
+        if side > 0.0 {
+            if !((foot + outer).simd_lt(all.to) | (foot - outer).simd_gt(all.from)).any_true() {
+                break;
+            }
+            (inner, outer) = (outer, outer * 2.0 + steps);
+        }
+    }
+    let total = |values: f32x16<S>| {
+        let values = values * density * view.measure;
+        let sum = |weights: &[f32; 16]| (values * f32x16::simd_from(simd, *weights)).to_array().iter().sum::<f32>();
+        let (fine, coarse) = (sum(&KRONROD_WEIGHTS), sum(&EMBEDDED_WEIGHTS));
+        (fine, (fine - coarse).abs() * TRUST)
+    };
+    let ([diffuse, d], [specular, s]) = {
+        let ((a, b), (c, d)) = (total(sums[0]), total(sums[1]));
+        ([a, b], [c, d])
+    };
+    Panel { t, sums: Sums { diffuse, specular }, error: Sums { diffuse: d, specular: s } }
+}
+
+/// The Kronrod rule's own error is this part of its difference to the Gauss rule, or less: at a corner, where both are at
+/// their worst, a fourth.
+const TRUST: f32 = 0.3;
+/// Rows longer than this many times the point's distance from them are cut into pieces that grow with the distance.
+const NEAR: f32 = 2.0;
+/// Nodes along a row that is short against its distance.
+const FAR_ORDER: usize = 4;
+
+/// The least of the lanes.
+#[inline(always)]
+fn least<S: Simd>(v: f32x16<S>) -> f32 {
+    v.to_array().into_iter().fold(f32::INFINITY, |a, b| if b < a { b } else { a })
+}
+
+/// What does not change along a row.
+struct Row<S: Simd> {
+    /// Of x = 0, along the light's first edge from the point's foot.
+    along: f32x16<S>,
+    /// |l|^2 without the part along the row.
+    rest: f32x16<S>,
+    /// ns.l of x = 0.
+    cos: f32x16<S>,
+    /// wo.l of x = 0.
+    out: f32x16<S>,
+}
+
+impl<S: Simd> Row<S> {
+    #[inline(always)]
+    fn new(simd: S, view: &View, y: f32x16<S>) -> Self {
+        let across = y * view.lb + view.fb;
+        Row {
+            along: y * view.skew + view.fa,
+            rest: across * across + simd.splat_f32x16(view.height * view.height),
+            cos: y * view.cos.y + view.cos.c,
+            out: y * view.out.y + view.out.c,
+        }
+    }
+
+    /// Adds the integral along an interval.
+    #[inline(always)]
+    #[allow(clippy::too_many_arguments, reason = "an interval of a row of a light, and how it is cut")]
+    fn add(
+        &self,
+        simd: S,
+        view: &View,
+        from: f32x16<S>,
+        to: f32x16<S>,
+        pieces: usize,
+        order: usize,
+        wanted: Wanted,
+        sums: &mut [f32x16<S>; 2],
+    ) {
+        let zero = simd.splat_f32x16(0.0);
+        let half = ((to - from) * (0.5 / pieces as f32)).max(zero);
+        let rule = gauss(order);
+        for piece in 0..pieces {
+            let middle = from + half * (2 * piece + 1) as f32;
+            for (node, weight) in rule.nodes.iter().zip(rule.weights) {
+                let x = middle + half * *node;
+                let s = x * view.la + self.along;
+                let distance2 = s * s + self.rest;
+                let inverse = 1.0 / distance2.max(simd.splat_f32x16(f32::MIN_POSITIVE)).sqrt();
+                let mut share = half * *weight;
+                if view.physical {
+                    share *= inverse * inverse * (inverse * view.height);
+                }
+                // Rounding may lead below the horizon, on it nothing arrives
+                let cos_i = ((x * view.cos.x + self.cos) * inverse).max(zero);
+                if wanted.diffuse {
+                    sums[0] += cos_i * share;
+                }
+                if wanted.specular && !matches!(view.lobe, Lobe::None) {
+                    let cos_io = (x * view.out.x + self.out) * inverse;
+                    sums[1] += view.lobe.eval_lanes(cos_i, simd.splat_f32x16(view.cos_o), cos_io) * share;
+                }
+            }
+        }
+    }
+}
