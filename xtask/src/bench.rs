@@ -79,7 +79,7 @@ fn config11(options: &Options) -> Result<Scene, String> {
     let mut parsed = SceneDesc::parse("config11.toml", builtin.text.as_bytes(), &NoAssets);
     let render = &mut parsed.desc.render;
     (render.width, render.height, render.antialiasing, render.samples) =
-        (options.size, options.size, options.aa, options.samples);
+        (options.size, options.size, options.aa, options.samples.into());
     Ok(parsed.compile(&NoAssets, &CompileOptions::default()).map_err(|e| e.to_string())?.scene)
 }
 

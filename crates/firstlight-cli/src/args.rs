@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::{Args, Parser, Subcommand, ValueEnum, ValueHint};
-use firstlight::{SimdLevel, Window};
+use firstlight::{SamplesDesc, SimdLevel, Window};
 
 /// Renders the direct light of a scene: camera ray, first surface, every light. No noise, the same bits every time
 #[derive(Debug, Parser)]
@@ -163,9 +163,9 @@ pub struct RenderArgs {
     /// Antialiasing by N x N camera rays in each pixel, 1 to 64; 4 is "4X" [default: the scene's]
     #[arg(long, value_name = "N", value_parser = whole::<u32>(1, 64), help_heading = "Quality")]
     pub aa: Option<u32>,
-    /// Points sampled on every area light, 1 to 1048576 [default: the scene's]
-    #[arg(long, value_name = "N", value_parser = samples, help_heading = "Quality")]
-    pub samples: Option<u32>,
+    /// Points sampled on every area light, 1 to 1048576, or exact: they are integrated, not sampled [default: the scene's]
+    #[arg(long, value_name = "N|exact", value_parser = samples, help_heading = "Quality")]
+    pub samples: Option<SamplesDesc>,
     /// Renders by the plainest code there is: the same bytes, slowly
     #[arg(long, help_heading = "Quality")]
     pub reference: bool,
@@ -259,12 +259,12 @@ where
     }
 }
 
-/// Reads the number of samples.
-fn samples(text: &str) -> Result<u32, String> {
-    whole(1, 1_048_576)(text).map_err(|needed| {
-        let exact = text.eq_ignore_ascii_case("exact");
-        format!("{needed}{}", if exact { "; exact integration is not there yet" } else { "" })
-    })
+/// Reads the number of samples, or the word for none.
+fn samples(text: &str) -> Result<SamplesDesc, String> {
+    if text == "exact" {
+        return Ok(SamplesDesc::Exact);
+    }
+    whole(1, 1_048_576)(text).map(SamplesDesc::Count).map_err(|needed| format!("{needed}, or the word exact"))
 }
 
 /// Reads the name of a camera; one without a name cannot be asked for.

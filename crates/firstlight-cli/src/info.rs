@@ -3,7 +3,7 @@
 use std::fmt::Write;
 use std::ops::ControlFlow;
 
-use firstlight::{DisplayEncoding, Frame, Projection, Scene, SceneDesc, read_mesh};
+use firstlight::{DisplayEncoding, Frame, Projection, SamplesDesc, Scene, SceneDesc, read_mesh};
 use serde_json::{Map, Value, json};
 
 use crate::args::InfoArgs;
@@ -137,6 +137,10 @@ fn gather(name: &str, desc: &SceneDesc, scene: &Scene) -> Value {
         "geometry_bytes": summary.geometry_bytes[0],
         "tree_bytes": summary.geometry_bytes[1],
         "lights": list_of(&summary.lights, |(kind, name, samples)| {
+            let samples = match samples {
+                SamplesDesc::Exact => json!("exact"),
+                SamplesDesc::Count(count) => json!(count),
+            };
             json!({ "kind": kind, "name": name, "samples": samples })
         }),
         "materials": list_of(&summary.materials, |(name, kind)| json!({ "name": name, "kind": kind })),

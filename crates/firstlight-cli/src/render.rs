@@ -6,7 +6,9 @@ use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-use firstlight::{Diagnostic, Format, LightDesc, RenderSettings, RenderStats, SampleSet, SceneDesc, SimdLevel, Window};
+use firstlight::{
+    Diagnostic, Format, LightDesc, RenderSettings, RenderStats, SampleSet, SamplesDesc, SceneDesc, SimdLevel, Window,
+};
 
 use crate::args::{Bits, Frames, RenderArgs};
 use crate::input::{self, Input};
@@ -57,7 +59,7 @@ struct Overrides<'a> {
     width: Option<u32>,
     height: Option<u32>,
     antialiasing: Option<u32>,
-    samples: Option<u32>,
+    samples: Option<SamplesDesc>,
     camera: Option<&'a str>,
     exposure: Option<f64>,
 }
@@ -396,17 +398,19 @@ impl Overrides<'_> {
     }
 }
 
-/// Has `samples` points of the light sampled, if it has an area.
-fn set_samples(light: &mut LightDesc, samples: u32) -> Result<(), Failure> {
-    let LightDesc::Rectangle(light) = light else { return Ok(()) };
-    let side = samples.isqrt();
-    if matches!(light.set, SampleSet::Grid | SampleSet::Stratified) && side * side != samples {
+/// Has the light sampled so, if it has an area.
+fn set_samples(light: &mut LightDesc, samples: SamplesDesc) -> Result<(), Failure> {
+    if let (SamplesDesc::Count(samples), Some((_, SampleSet::Grid | SampleSet::Stratified))) =
+        (samples, light.samples())
+        && samples.isqrt() * samples.isqrt() != samples
+    {
+        let side = samples.isqrt();
         let (below, above) = (side * side, (side + 1) * (side + 1));
         return Err(Failure::Usage(format!(
             "--samples {samples}: a light of this scene samples m x m cells; the nearest such numbers are {below} and {above}"
         )));
     }
-    light.samples = Some(samples);
+    light.set_samples(samples);
     Ok(())
 }
 

@@ -70,14 +70,17 @@ mod transform;
 pub use camera::{Camera, CameraDesc, FilmPlane, Frame, Orthographic, Pinhole, Projection};
 pub use color::{Display, Encoding, Rgb};
 pub use context::{AssetError, Assets, CompileStage, FolderAssets, MemoryAssets, NoAssets, OnCompile};
-pub use describe::{ColorDesc, ColorParam, FilePath, NumberParam, ParamDesc, ScaleDesc};
+pub use describe::{ColorDesc, ColorParam, FilePath, NumberParam, ParamDesc, SamplesDesc, ScaleDesc};
 pub use error::{Diagnostic, Place, SceneError, Severity};
 pub use ids::{LightId, MaterialId, SurfaceId, TextureId};
 pub use image::{
     Format, Image, ImageError, PendingFile, Receipt, StagedFile, StoredImage, Window, Written, write_whole,
 };
 pub use import::{ImportError, MeshData, MeshFormat, MeshPart, MeshPlace, MeshReport, is_point_set, read_mesh};
-pub use light::{DirectionalDesc, EmitSides, Falloff, LightDesc, PointDesc, RectangleDesc, SampleSet, SpotDesc};
+pub use light::{
+    DirectionalDesc, DiskLightDesc, EmitSides, Falloff, LightDesc, PointDesc, RectangleDesc, SampleSet,
+    SphereLightDesc, SpotDesc,
+};
 pub use material::{BlinnPhongDesc, MaterialDesc, PhongDesc};
 pub use math::{Ray, Vec2, Vec3};
 pub use render::{Film, RenderSettings, RenderStats, SimdLevel, render};

@@ -23,7 +23,7 @@ const BAD: &[(&str, &[&str])] = &[
     ("render scene.toml --samples 0", &["--samples", "1 to 1048576"]),
     ("render scene.toml --samples 1048577", &["--samples", "1 to 1048576"]),
     ("render scene.toml --samples many", &["--samples", "many", "1 to 1048576"]),
-    ("render scene.toml --samples exact", &["--samples", "1 to 1048576", "exact integration is not there yet"]),
+    ("render scene.toml --samples exacty", &["--samples", "1 to 1048576", "the word exact"]),
     ("render scene.toml --samples 99999999999", &["1 to 1048576"]),
     ("render scene.toml --aa 4X", &["--aa", "4X", "1 to 64"]),
     ("render scene.toml --height tall", &["--height", "1 to 65536"]),

@@ -35,7 +35,14 @@ impl FieldInfo {
         let mut schema = T::schema();
         if let Some(range) = range(&sentence(doc)) {
             // Ranges are of plain numbers; those of an array hold for each element
-            let numbers = if schema["type"] == "array" { &mut schema["items"] } else { &mut schema };
+            let numbers = if schema["type"] == "array" {
+                &mut schema["items"]
+            } else if schema["anyOf"][0]["type"] == "integer" {
+                // A whole number or a word
+                &mut schema["anyOf"][0]
+            } else {
+                &mut schema
+            };
             if numbers["type"] == "number" || numbers["type"] == "integer" {
                 for (key, value) in range {
                     numbers[key] = value;

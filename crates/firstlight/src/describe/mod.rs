@@ -230,5 +230,5 @@ pub(crate) mod write;
 pub(crate) use family::{Family, TableInfo, family};
 pub(crate) use info::{Choice, FieldInfo};
 pub(crate) use read::{Fields, Table, Value, Words, nearest};
-pub use value::{ColorDesc, ColorParam, FilePath, NumberParam, ParamDesc, ScaleDesc};
+pub use value::{ColorDesc, ColorParam, FilePath, NumberParam, ParamDesc, SamplesDesc, ScaleDesc};
 pub(crate) use write::Written;

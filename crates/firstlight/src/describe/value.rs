@@ -4,7 +4,7 @@ use crate::color::{Encoding, Rgb};
 use serde_json::{Value as Json, json};
 
 use super::node::{Data, Node, quoted};
-use super::read::{Reader, Value};
+use super::read::{Reader, Value, nearest};
 use super::write::Written;
 
 /// A colour: linear Rec. 709. In text `[r, g, b]` is linear, `"#rrggbb"` sRGB, and a number is that much gray (linear).
@@ -168,6 +168,80 @@ impl Value for ScaleDesc {
         // By their bits: -0 is 0, but is written differently
         let same = x.to_bits() == y.to_bits() && y.to_bits() == z.to_bits();
         if same { x.write() } else { self.xyz.write() }
+    }
+}
+
+/// How area lights are sampled. In text a whole number, or `"exact"`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum SamplesDesc {
+    /// They are integrated, not sampled.
+    Exact,
+    /// A fixed set of so many points.
+    Count(u32),
+}
+
+/// The word for [`SamplesDesc::Exact`] in scene text.
+const EXACT: &str = "exact";
+
+impl From<u32> for SamplesDesc {
+    /// So many points.
+    fn from(count: u32) -> Self {
+        Self::Count(count)
+    }
+}
+
+impl std::fmt::Display for SamplesDesc {
+    /// As scene text says it, without quotes.
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Exact => f.write_str(EXACT),
+            Self::Count(count) => count.fmt(f),
+        }
+    }
+}
+
+impl Value for SamplesDesc {
+    fn words() -> String {
+        format!("a whole number or \"{EXACT}\"")
+    }
+
+    fn plural() -> String {
+        format!("whole numbers or \"{EXACT}\"")
+    }
+
+    fn schema() -> Json {
+        json!({ "anyOf": [u32::schema(), { "enum": [EXACT] }] })
+    }
+
+    fn placeholder() -> Self {
+        Self::Count(1)
+    }
+
+    fn read(node: &Node, reader: &mut Reader<'_>) -> Option<Self> {
+        match &node.data {
+            Data::Number(_) => u32::read(node, reader).map(Self::Count),
+            Data::String(word) if word == EXACT => Some(Self::Exact),
+            Data::String(word) => {
+                let hint = if word.parse::<u32>().is_ok() {
+                    Some("leave the quotes out".into())
+                } else {
+                    nearest(word, &[EXACT]).map(|near| format!("did you mean \"{near}\"?"))
+                };
+                reader.error(node.span, format!("{} is not {}", quoted(word), Self::words()), hint);
+                None
+            }
+            _ => {
+                reader.wrong_type(node, &Self::words(), None);
+                None
+            }
+        }
+    }
+
+    fn write(&self) -> Written {
+        match self {
+            Self::Exact => Written::Text(EXACT.to_owned()),
+            Self::Count(count) => count.write(),
+        }
     }
 }
 

@@ -50,11 +50,14 @@ impl DirectionalDesc {
             direction = cx.moved_edge(world_from_object, "direction", direction);
         }
         let to_light = -direction.normalize_or_zero();
+        let scale = scaled(cx, self.color, self.strength, self.falloff.factor());
         Light {
             kind: LightKind::Directional(Directional { to_light: to_light.as_vec3() }),
-            scale: scaled(cx, self.color, self.strength, self.falloff.factor()),
+            scale,
+            intensity: scale,
             radiance: Rgb::BLACK,
             shadows: self.shadows,
+            exact: false,
         }
     }
 }

@@ -1,24 +1,30 @@
 //! Lights: where light comes from, and how much. A light never traces rays.
 
+mod area;
 mod directional;
+mod disk;
 mod point;
 mod rectangle;
 mod samples;
+mod sphere;
 mod spot;
 
 use crate::color::Rgb;
 use crate::context::CompileContext;
-use crate::describe::{ColorDesc, family, words};
+use crate::describe::{ColorDesc, SamplesDesc, family, words};
 use crate::math::Vec3;
 use crate::transform::TransformDesc;
 
+pub use area::{Area, AreaShape};
 pub use directional::{Directional, DirectionalDesc};
+pub use disk::{Disk, DiskLightDesc};
 pub use point::{Point, PointDesc};
 pub use rectangle::{Rectangle, RectangleDesc};
 pub use samples::SampleSet;
+pub use sphere::{Sphere, SphereLightDesc};
 pub use spot::{Spot, SpotDesc};
 
-pub(crate) use rectangle::MAX_SAMPLES;
+pub(crate) use area::{Points, check_samples};
 
 words! {
     /// How light weakens on its way.
@@ -35,7 +41,7 @@ words! {
 words! {
     /// The sides of an area light that emit. A side that does not emit is not seen.
     pub enum EmitSides {
-        /// The side e0 x e1 points to.
+        /// The side that e0 x e1, or `normal`, points to; the outside of a sphere.
         Front = "front",
         /// Both sides.
         Both = "both",
@@ -53,6 +59,10 @@ family! {
         Spot(SpotDesc) = "spot",
         /// `[[light.rectangle]]`
         Rectangle(RectangleDesc) = "rectangle",
+        /// `[[light.disk]]`
+        Disk(DiskLightDesc) = "disk",
+        /// `[[light.sphere]]`
+        Sphere(SphereLightDesc) = "sphere",
     }
 }
 
@@ -64,6 +74,29 @@ impl LightDesc {
             LightDesc::Directional(light) => light.name.clone(),
             LightDesc::Spot(light) => light.name.clone(),
             LightDesc::Rectangle(light) => light.name.clone(),
+            LightDesc::Disk(light) => light.name.clone(),
+            LightDesc::Sphere(light) => light.name.clone(),
+        }
+    }
+
+    /// How an area light is sampled: its own `samples`, if it says any, and how the points are laid out. `None` for a
+    /// light without an area.
+    pub fn samples(&self) -> Option<(Option<SamplesDesc>, SampleSet)> {
+        match self {
+            LightDesc::Point(_) | LightDesc::Directional(_) | LightDesc::Spot(_) => None,
+            LightDesc::Rectangle(light) => Some((light.samples, light.set)),
+            LightDesc::Disk(light) => Some((light.samples, light.set)),
+            LightDesc::Sphere(light) => Some((light.samples, light.set)),
+        }
+    }
+
+    /// Has an area light say its own `samples`; other lights stay as they are.
+    pub fn set_samples(&mut self, samples: SamplesDesc) {
+        match self {
+            LightDesc::Point(_) | LightDesc::Directional(_) | LightDesc::Spot(_) => {}
+            LightDesc::Rectangle(light) => light.samples = Some(samples),
+            LightDesc::Disk(light) => light.samples = Some(samples),
+            LightDesc::Sphere(light) => light.samples = Some(samples),
         }
     }
 }
@@ -76,10 +109,16 @@ pub struct Light {
     /// What each sample's weight is multiplied with: `color` x `strength`, over the number of samples, and over pi where
     /// the light is physical, so that it meets materials that give pi x BRDF x cosine.
     pub scale: Rgb,
+    /// What the whole light sends, whatever its samples: `color` x `strength`, over pi where the light is physical. The
+    /// integral over its area takes this in place of `scale`, which has the area and the number of samples in it.
+    #[allow(dead_code, reason = "for integration")]
+    pub intensity: Rgb,
     /// What the camera sees of it: `color` x `strength`.
     pub radiance: Rgb,
     /// Whether its light can be blocked.
     pub shadows: bool,
+    /// Whether it asks to be integrated, not sampled. It has points all the same, for those who sample every light.
+    pub exact: bool,
 }
 
 /// The place and shape of a light.
@@ -92,8 +131,8 @@ pub enum LightKind {
     Directional(Directional),
     /// `[[light.spot]]`
     Spot(Spot),
-    /// `[[light.rectangle]]`
-    Rectangle(Rectangle),
+    /// `[[light.rectangle]]`, `[[light.disk]]`, `[[light.sphere]]`
+    Area(Area),
 }
 
 /// The way from a surface to one point of a light.
@@ -118,13 +157,18 @@ pub struct LightSample {
 pub(crate) const MIN_DISTANCE2: f32 = 1e-30;
 
 impl Light {
-    /// How many points of it are sampled, 1 or more.
+    /// How many points of it are sampled, 1 or more; of a light that is `exact`, where it is sampled all the same.
     #[inline(always)]
     pub fn samples(&self) -> usize {
         match &self.kind {
-            LightKind::Rectangle(rectangle) => rectangle.samples(),
+            LightKind::Area(area) => area.samples(),
             LightKind::Point(_) | LightKind::Directional(_) | LightKind::Spot(_) => 1,
         }
+    }
+
+    /// What it says of its samples: of a light without an area, that it has one.
+    pub fn said_samples(&self) -> SamplesDesc {
+        if self.exact { SamplesDesc::Exact } else { SamplesDesc::Count(self.samples() as u32) }
     }
 
     /// The way from `p` to sample `k`.
@@ -134,14 +178,14 @@ impl Light {
         match &self.kind {
             LightKind::Point(point) => to(point.position),
             LightKind::Spot(spot) => to(spot.position),
-            LightKind::Rectangle(rectangle) => to(rectangle.point(k)),
+            LightKind::Area(area) => to(area.point(k)),
             LightKind::Directional(directional) => Towards { l: directional.to_light, finite: false },
         }
     }
 
-    /// How much arrives along the way `l` from a sample to a surface. `None` where the two are the same point.
+    /// How much arrives from sample `k`, to which `l` leads from a surface. `None` where the two are the same point.
     #[inline(always)]
-    pub fn sample(&self, l: Vec3) -> Option<LightSample> {
+    pub fn sample(&self, k: usize, l: Vec3) -> Option<LightSample> {
         let distance2 = l.dot(l);
         if !(distance2 >= MIN_DISTANCE2) {
             return None;
@@ -151,7 +195,7 @@ impl Light {
             LightKind::Point(point) => point.weight(inverse_distance),
             LightKind::Directional(_) => 1.0,
             LightKind::Spot(spot) => spot.weight(l, inverse_distance),
-            LightKind::Rectangle(rectangle) => rectangle.weight(l, inverse_distance),
+            LightKind::Area(area) => area.weight(k, l, inverse_distance),
         };
         Some(LightSample { inverse_distance, weight })
     }

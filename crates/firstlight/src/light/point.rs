@@ -47,11 +47,14 @@ pub struct Point {
 impl PointDesc {
     pub(crate) fn compile(&self, cx: &mut CompileContext) -> Light {
         let position = moved_point(cx, "position", self.position, self.transform.as_deref());
+        let scale = scaled(cx, self.color, self.strength, self.falloff.factor());
         Light {
             kind: LightKind::Point(Point { position, physical: self.falloff == Falloff::Physical }),
-            scale: scaled(cx, self.color, self.strength, self.falloff.factor()),
+            scale,
+            intensity: scale,
             radiance: Rgb::BLACK,
             shadows: self.shadows,
+            exact: false,
         }
     }
 }

@@ -96,6 +96,7 @@ impl SpotDesc {
             2.0 * sin * sin
         };
         let (outer, inner) = (one_minus_cos(self.cone_deg), one_minus_cos(inner));
+        let scale = scaled(cx, self.color, self.strength, self.falloff.factor());
         Light {
             kind: LightKind::Spot(Spot {
                 position,
@@ -104,9 +105,11 @@ impl SpotDesc {
                 inverse_fade: (1.0 / (outer - inner)) as f32,
                 physical: self.falloff == Falloff::Physical,
             }),
-            scale: scaled(cx, self.color, self.strength, self.falloff.factor()),
+            scale,
+            intensity: scale,
             radiance: Rgb::BLACK,
             shadows: self.shadows,
+            exact: false,
         }
     }
 }

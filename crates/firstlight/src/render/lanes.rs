@@ -10,11 +10,11 @@ use super::Counts;
 use super::pixel::{Lighting, LobeSums};
 use super::plain::Plain;
 use crate::accel::RayPacket16;
-use crate::light::{LightKind, MIN_DISTANCE2, Rectangle};
+use crate::light::{Area, LightKind, MIN_DISTANCE2, Points};
 use crate::material::Lobe;
 use crate::math::{LANES, LaneSum, ShadowRay, Vec3, Vec3x16};
 use crate::scene::{Geometry, Scene, ShadowRays};
-use crate::shape::{ParallelogramShadow, PlaneSide, SphereShadow, SurfaceInteraction};
+use crate::shape::{DiskShadow, ParallelogramShadow, PlaneSide, SphereShadow, SurfaceInteraction};
 
 /// Light, sixteen samples at a time.
 pub(crate) struct Lanes {
@@ -25,11 +25,22 @@ pub(crate) struct Lanes {
     flats: Vec<ParallelogramShadow>,
     /// Those of `flats` that can stand in the way of the light at hand.
     between: Vec<ParallelogramShadow>,
+    /// Sphere and disk lights that block, each with its index.
+    round: (Vec<(usize, SphereShadow)>, Vec<(usize, DiskShadow)>),
+    /// Those that are not the light at hand.
+    others: (Vec<SphereShadow>, Vec<DiskShadow>),
 }
 
 impl Lanes {
     pub fn new(level: Level) -> Self {
-        Lanes { level, spheres: Vec::new(), flats: Vec::new(), between: Vec::new() }
+        Lanes {
+            level,
+            spheres: Vec::new(),
+            flats: Vec::new(),
+            between: Vec::new(),
+            round: Default::default(),
+            others: Default::default(),
+        }
     }
 }
 
@@ -37,15 +48,29 @@ impl Lanes {
 struct Obstacles<'a> {
     spheres: &'a [SphereShadow],
     flats: &'a [ParallelogramShadow],
+    /// Other lights that block.
+    light_spheres: &'a [SphereShadow],
+    light_disks: &'a [DiskShadow],
     /// All that lies in trees.
     trees: Option<&'a Geometry>,
 }
 
-/// The sums over the points of a rectangle light that none of the `obstacles` hides.
+impl Obstacles<'_> {
+    fn are_none(&self) -> bool {
+        self.spheres.is_empty()
+            && self.flats.is_empty()
+            && self.light_spheres.is_empty()
+            && self.light_disks.is_empty()
+            && self.trees.is_none()
+    }
+}
+
+/// The sums over the `points` of an area light that none of the `obstacles` hides.
 #[inline(always)]
-fn gather_rectangle<S: Simd>(
+fn gather_area<S: Simd>(
     simd: S,
-    rectangle: &Rectangle,
+    area: &Area,
+    points: &Points,
     si: &SurfaceInteraction,
     lobe: &Lobe,
     obstacles: &Obstacles,
@@ -58,12 +83,9 @@ fn gather_rectangle<S: Simd>(
     let cos_o = si.ns.dot(si.wo);
     let shadow = si.shadow_ray(Vec3::ZERO, 1.0);
     let (mut diffuse, mut specular) = (zero, zero);
-    for block in rectangle.blocks() {
-        let l = Vec3x16 {
-            x: f32x16::simd_from(simd, block.x) - p.x,
-            y: f32x16::simd_from(simd, block.y) - p.y,
-            z: f32x16::simd_from(simd, block.z) - p.z,
-        };
+    for (index, block) in points.blocks.iter().enumerate() {
+        let q = block.lanes(simd);
+        let l = Vec3x16 { x: q.x - p.x, y: q.y - p.y, z: q.z - p.z };
         // Above the horizon, and not the surface's own point
         let height = ns.dot(l);
         let distance2 = l.dot(l);
@@ -78,6 +100,12 @@ fn gather_rectangle<S: Simd>(
         for flat in obstacles.flats {
             lit &= !flat.blocks_lanes(l);
         }
+        for sphere in obstacles.light_spheres {
+            lit &= !sphere.blocks_lanes(l, distance2);
+        }
+        for disk in obstacles.light_disks {
+            lit &= !disk.blocks_lanes(l);
+        }
         if lit.all_false() {
             continue;
         }
@@ -89,7 +117,7 @@ fn gather_rectangle<S: Simd>(
         }
         // How much is sent this way, and what the surface makes of it
         let inverse_distance = splat(1.0) / distance2.sqrt();
-        let weight = rectangle.weight_lanes(l, inverse_distance);
+        let weight = area.weight_lanes(points, index, l, inverse_distance);
         let cos_i = height * inverse_distance;
         let cos_io = wo.dot(l) * inverse_distance;
         diffuse += lit.select(cos_i * weight, zero);
@@ -132,6 +160,16 @@ impl Lighting for Lanes {
         }
         self.flats.clear();
         self.flats.extend(scene.flat_obstacles.iter().map(|flat| flat.shadow(si.p, si.error)));
+        let (spheres, disks) = &mut self.round;
+        spheres.clear();
+        for (light, sphere) in &scene.light_obstacles.spheres {
+            let shadow = sphere.shadow(si.p, si.error);
+            if !shadow.is_below(si.ng) {
+                spheres.push((*light, shadow));
+            }
+        }
+        disks.clear();
+        disks.extend(scene.light_obstacles.disks.iter().map(|(light, disk)| (*light, disk.shadow(si.p, si.error))));
     }
 
     fn gather(
@@ -144,7 +182,7 @@ impl Lighting for Lanes {
     ) -> LobeSums {
         let light = &scene.lights[index];
         // A single sample fills no lanes
-        let LightKind::Rectangle(rectangle) = &light.kind else {
+        let LightKind::Area(area) = &light.kind else {
             return Plain.gather(scene, index, si, lobe, counts);
         };
         self.between.clear();
@@ -154,18 +192,24 @@ impl Lighting for Lanes {
                 self.between.push(*flat);
             }
         }
+        let (spheres, disks) = (&self.round.0, &self.round.1);
+        let (light_spheres, light_disks) = (&mut self.others.0, &mut self.others.1);
+        light_spheres.clear();
+        light_spheres.extend(spheres.iter().filter(|(light, _)| *light != index).map(|(_, shadow)| *shadow));
+        light_disks.clear();
+        light_disks.extend(disks.iter().filter(|(light, _)| *light != index).map(|(_, shadow)| *shadow));
         let trees = scene.geometry.has_trees().then_some(&*scene.geometry);
         let obstacles = if light.shadows && si.receives_shadow {
-            Obstacles { spheres: &self.spheres, flats: &self.between, trees }
+            Obstacles { spheres: &self.spheres, flats: &self.between, light_spheres, light_disks, trees }
         } else {
-            Obstacles { spheres: &[], flats: &[], trees: None }
+            Obstacles { spheres: &[], flats: &[], light_spheres: &[], light_disks: &[], trees: None }
         };
-        let samples = rectangle.samples() as u64;
+        let samples = area.samples() as u64;
         counts.shadow_rays += samples;
-        if obstacles.spheres.is_empty() && obstacles.flats.is_empty() && obstacles.trees.is_none() {
+        if obstacles.are_none() {
             counts.shadow_rays_skipped += samples;
         }
         // One dispatch for all samples of a light: what is below is compiled for each instruction set, the rest once
-        dispatch!(self.level, simd => gather_rectangle(simd, rectangle, si, lobe, &obstacles))
+        dispatch!(self.level, simd => gather_area(simd, area, area.points(), si, lobe, &obstacles))
     }
 }

@@ -25,7 +25,9 @@ pub use simd::SimdLevel;
 
 use crate::camera::Projection;
 use crate::color::{Display, Encoding};
+use crate::describe::SamplesDesc;
 use crate::image::{Receipt, Window};
+use crate::light::Light;
 use crate::math::Ray;
 use crate::scene::Scene;
 use film::FilmTile;
@@ -254,7 +256,12 @@ impl Scene {
             ("world_from_camera", numbers(self.camera.world_from_camera())),
             ("film_half_size", numbers(self.camera.film_half_size())),
             ("light_samples", {
-                let counts: Vec<String> = self.lights.iter().map(|light| light.samples().to_string()).collect();
+                // The plain renderer samples every light
+                let said = |light: &Light| match light.said_samples() {
+                    SamplesDesc::Exact if settings.reference => light.samples().to_string(),
+                    said => said.to_string(),
+                };
+                let counts: Vec<String> = self.lights.iter().map(said).collect();
                 counts.join(" ")
             }),
             ("color_space", "linear Rec. 709, alpha premultiplied, before display encoding".to_owned()),

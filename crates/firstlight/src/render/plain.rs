@@ -33,11 +33,11 @@ impl Lighting for Plain {
                 continue;
             }
             // How much is sent this way
-            let Some(sample) = light.sample(to.l) else { continue };
+            let Some(sample) = light.sample(k, to.l) else { continue };
             // Nor does what something else hides
             if light.shadows && si.receives_shadow {
                 let t_max = if to.finite { 1.0 } else { f32::INFINITY };
-                if scene.occluded(&si.shadow_ray(to.l, t_max)) {
+                if scene.occluded_from(&si.shadow_ray(to.l, t_max), Some(index)) {
                     continue;
                 }
             } else {

@@ -7,15 +7,15 @@ use fearless_simd::Level;
 
 use super::geometry::Geometry;
 use super::place::compile_shapes;
-use super::{DisplayEncoding, RenderDesc, Scene, SceneDesc, SceneSummary};
+use super::{DisplayEncoding, LightObstacles, RenderDesc, Scene, SceneDesc, SceneSummary};
 use crate::camera::{Camera, CameraDesc};
 use crate::color::{Display, Encoding, Rgb};
 use crate::context::{AssetError, Assets, CompileContext, OnCompile};
-use crate::describe::{ColorParam, Family, NumberParam};
+use crate::describe::{ColorParam, Family, NumberParam, SamplesDesc};
 use crate::error::{Diagnostic, SceneError, Severity};
 use crate::ids::TextureId;
 use crate::image::read::{Limits, TexelData, Texels, decode};
-use crate::light::{Light, LightDesc, LightKind, MAX_SAMPLES};
+use crate::light::{AreaShape, Light, LightDesc, LightKind, check_samples};
 use crate::material::{LobeKind, MAX_SHININESS, Material, MaterialDesc};
 use crate::shape::{Parallelogram, PlaneSide, ShapeDesc};
 use crate::texture::{Param, Texture, TextureDesc, TextureSpace};
@@ -98,6 +98,7 @@ impl SceneDesc {
         let (obstacles, flats) = geometry.listed_obstacles();
         let flat_obstacles: Vec<_> = flats.into_iter().chain(blocking(&lights)).collect();
         let light_sides = sides(&lights, &flat_obstacles);
+        let light_obstacles = round_blocking(&lights);
         let summary = self.summary(desc, &geometry, &lights, &textures);
         let scene = Scene {
             width: picture.width,
@@ -114,6 +115,7 @@ impl SceneDesc {
             obstacles,
             flat_obstacles,
             light_sides,
+            light_obstacles,
             level: Level::new(),
             hash: self.hash(&textures, &files, options.complete),
             time: cx.keyed.then_some(time),
@@ -136,7 +138,7 @@ impl SceneDesc {
             }
             let hint = "n of the n x n camera rays in each pixel";
             let antialiasing = cx.count("antialiasing", render.antialiasing, 1, MAX_ANTIALIASING, Some(hint));
-            cx.count("samples", render.samples, 1, MAX_SAMPLES, Some("points on each area light"));
+            check_samples(cx, render.samples, "points on each area light");
             let gamma = cx.between("gamma", render.gamma, 0.1, 10.0, Some("2.2 is usual"));
             let exposure = cx.between("exposure", render.exposure, -64.0, 64.0, Some("in stops: each doubles"));
             cx.between("fps", render.fps, MIN_FPS, MAX_FPS, Some("frames in a second"));
@@ -219,9 +221,9 @@ impl SceneDesc {
 
     fn compile_lights(&self, cx: &mut CompileContext) -> Vec<Light> {
         let samples = self.render.samples;
-        let points = self.lights.iter().map(|light| match light {
-            LightDesc::Rectangle(rectangle) => rectangle.samples.unwrap_or(samples) as u64,
-            LightDesc::Point(_) | LightDesc::Directional(_) | LightDesc::Spot(_) => 0,
+        let points = self.lights.iter().filter_map(LightDesc::samples).map(|(own, _)| match own.unwrap_or(samples) {
+            SamplesDesc::Exact => 0,
+            SamplesDesc::Count(count) => count as u64,
         });
         let points: u64 = points.sum();
         if points > MAX_LIGHT_POINTS {
@@ -237,6 +239,8 @@ impl SceneDesc {
                     LightDesc::Directional(directional) => directional.compile(cx),
                     LightDesc::Spot(spot) => spot.compile(cx),
                     LightDesc::Rectangle(rectangle) => rectangle.compile(cx, samples),
+                    LightDesc::Disk(disk) => disk.compile(cx, samples),
+                    LightDesc::Sphere(sphere) => sphere.compile(cx, samples),
                 });
                 lights.push(light);
             }
@@ -265,7 +269,7 @@ impl SceneDesc {
             triangles: geometry.all_meshes().map(|mesh| mesh.triangles.len() as u64).sum(),
             points: geometry.point_sets.iter().map(|points| points.len() as u64).sum(),
             geometry_bytes: geometry.bytes(),
-            lights: described.iter().zip(lights).map(|(d, l)| (d.kind(), d.name(), l.samples())).collect(),
+            lights: described.iter().zip(lights).map(|(d, l)| (d.kind(), d.name(), l.said_samples())).collect(),
             materials: self.materials.iter().map(|(name, m)| (name.clone(), m.kind())).collect(),
             textures: textures.sizes(),
             texture_bytes: textures.bytes(),
@@ -279,8 +283,8 @@ impl SceneDesc {
         let mut said = self.clone();
         said.render.camera = self.chosen_camera().map(|i| self.cameras[i].0.clone());
         for light in &mut said.lights {
-            if let LightDesc::Rectangle(rectangle) = light {
-                rectangle.samples.get_or_insert(self.render.samples);
+            if let Some((None, _)) = light.samples() {
+                light.set_samples(self.render.samples);
             }
         }
         said.render.samples = RenderDesc::default().samples;
@@ -310,23 +314,40 @@ struct Picture {
     display: Display,
 }
 
-/// The shapes of the lights that stand in the way of others.
+/// The rectangle lights that stand in the way of others.
 fn blocking(lights: &[Light]) -> impl Iterator<Item = Parallelogram> + '_ {
     lights.iter().filter_map(|light| match &light.kind {
-        LightKind::Rectangle(rectangle) if rectangle.blocks => Some(rectangle.shape),
+        LightKind::Area(area) if area.blocks => match &area.shape {
+            AreaShape::Rectangle(rectangle) => Some(rectangle.shape),
+            AreaShape::Disk(_) | AreaShape::Sphere(_) => None,
+        },
         _ => None,
     })
+}
+
+/// The disk and sphere lights that stand in the way of others.
+fn round_blocking(lights: &[Light]) -> LightObstacles {
+    let mut found = LightObstacles::default();
+    for (index, light) in lights.iter().enumerate() {
+        match &light.kind {
+            LightKind::Area(area) if area.blocks => match &area.shape {
+                AreaShape::Rectangle(_) => {}
+                AreaShape::Disk(disk) => found.disks.push((index, disk.shape)),
+                AreaShape::Sphere(sphere) => found.spheres.push((index, sphere.shape)),
+            },
+            _ => {}
+        }
+    }
+    found
 }
 
 /// On which side of each flat shape a light lies. Nothing for a light of one point, which is asked about directly, nor
 /// beyond [`MAX_SIDES`]: where nothing is known, the light counts as lying on both sides.
 fn sides(lights: &[Light], flats: &[Parallelogram]) -> Vec<Vec<PlaneSide>> {
-    let rectangles = lights.iter().filter(|light| matches!(light.kind, LightKind::Rectangle(_))).count();
-    let known = rectangles * flats.len() <= MAX_SIDES;
+    let areas = lights.iter().filter(|light| matches!(light.kind, LightKind::Area(_))).count();
+    let known = areas * flats.len() <= MAX_SIDES;
     let of_light = |light: &Light| match &light.kind {
-        LightKind::Rectangle(rectangle) if known => {
-            flats.iter().map(|flat| flat.side_of(&rectangle.shape.corners)).collect()
-        }
+        LightKind::Area(area) if known => flats.iter().map(|flat| area.shape.side_of(flat)).collect(),
         _ => Vec::new(),
     };
     lights.iter().map(of_light).collect()
@@ -335,7 +356,7 @@ fn sides(lights: &[Light], flats: &[Parallelogram]) -> Vec<Vec<PlaneSide>> {
 /// Pairs of a light and a flat shape whose sides are kept.
 const MAX_SIDES: usize = 1 << 24;
 
-/// The most points of all area lights together: 12 bytes each.
+/// The most points of all sampled area lights together: 12 bytes each, on spheres 24.
 const MAX_LIGHT_POINTS: u64 = 1 << 24;
 
 /// Names belong to one thing each, whatever its kind.

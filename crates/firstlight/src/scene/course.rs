@@ -129,7 +129,7 @@ pub(super) fn parse(name: &str, bytes: &[u8]) -> Parsed {
     if let Some(m) = light_resolution {
         for light in &mut desc.lights {
             if let LightDesc::Rectangle(light) = light {
-                (light.samples, light.set) = (Some(m * m), SampleSet::Grid);
+                (light.samples, light.set) = (Some((m * m).into()), SampleSet::Grid);
             }
         }
     }

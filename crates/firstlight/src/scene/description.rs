@@ -1,7 +1,7 @@
 //! A scene as it may be said, in text or in code: nothing resolved, nothing checked.
 
 use crate::camera::CameraDesc;
-use crate::describe::{ColorDesc, table, words};
+use crate::describe::{ColorDesc, SamplesDesc, table, words};
 use crate::light::LightDesc;
 use crate::material::MaterialDesc;
 use crate::shape::{GroupDesc, ShapeDesc};
@@ -19,6 +19,9 @@ words! {
     }
 }
 
+/// How area lights are sampled in a scene that does not say it.
+const DEFAULT_SAMPLES: SamplesDesc = SamplesDesc::Count(400);
+
 table! {
     /// The picture: `[render]`.
     ///
@@ -35,8 +38,9 @@ table! {
         pub height: u32 = 1024,
         /// n of the n x n camera rays in each pixel, 1 to 64; 4 is "4X".
         pub antialiasing: u32 = 4,
-        /// Points sampled on each area light that does not say its own, 1 to 1048576.
-        pub samples: u32 = 400,
+        /// Points sampled on each area light that does not say its own, 1 to 1048576, or `"exact"`: they are integrated, not
+        /// sampled.
+        pub samples: SamplesDesc = DEFAULT_SAMPLES,
         /// The camera's name, where there are several; without it, the first.
         pub camera: Option<String> = None,
         /// What no surface covers.

@@ -24,10 +24,11 @@ use fearless_simd::Level;
 
 use crate::camera::Camera;
 use crate::color::{Display, Rgb};
+use crate::describe::SamplesDesc;
 use crate::ids::SurfaceId;
 use crate::light::Light;
 use crate::material::Material;
-use crate::shape::{Parallelogram, PlaneSide, Sphere};
+use crate::shape::{Disk, Parallelogram, PlaneSide, Sphere};
 
 use crate::texture::Texture;
 pub(crate) use geometry::{Geometry, Nearest};
@@ -55,7 +56,9 @@ pub struct Scene {
     pub(crate) obstacles: Vec<Sphere>,
     /// All that is flat, listed and in the way of light: parallelograms, then the rectangle lights that block.
     pub(crate) flat_obstacles: Vec<Parallelogram>,
-    /// For each rectangle light, on which side of each flat obstacle it lies; where nothing is known, both.
+    /// The disk and sphere lights that block.
+    pub(crate) light_obstacles: LightObstacles,
+    /// For each area light, on which side of each flat obstacle it lies; where nothing is known, both.
     pub(crate) light_sides: Vec<Vec<PlaneSide>>,
     /// The best instruction set of this processor: for rays that are asked for one at a time.
     pub(crate) level: Level,
@@ -65,6 +68,14 @@ pub struct Scene {
     /// The texture files that something stands in for.
     pub(crate) placeholders: Vec<String>,
     pub(crate) summary: SceneSummary,
+}
+
+/// The disk and sphere lights that stand in the way of others, each with its index in [`Scene::lights`]. A light's own
+/// points lie on its shape, which never hides them.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct LightObstacles {
+    pub spheres: Vec<(usize, Sphere)>,
+    pub disks: Vec<(usize, Disk)>,
 }
 
 /// What a scene holds, for people.
@@ -84,8 +95,8 @@ pub struct SceneSummary {
     pub points: u64,
     /// Bytes of meshes and point sets without their trees, and of all trees.
     pub geometry_bytes: [u64; 2],
-    /// Kind, name if it has one, and number of sampled points of each light, in scene order.
-    pub lights: Vec<(&'static str, Option<String>, usize)>,
+    /// Kind, name if it has one, and samples of each light, in scene order; a light without an area has one.
+    pub lights: Vec<(&'static str, Option<String>, SamplesDesc)>,
     /// Name and kind of each material, in the order of the text.
     pub materials: Vec<(String, &'static str)>,
     /// Name, kind and size in pixels (images) or squares (checkerboards) of each texture, in the order of the text. An

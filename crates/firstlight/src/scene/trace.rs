@@ -62,9 +62,9 @@ impl Scene {
         }
         let first_light = self.geometry.surfaces.len();
         for (i, light) in self.lights.iter().enumerate() {
-            if let LightKind::Rectangle(rectangle) = &light.kind
-                && rectangle.visible
-                && let Some(t) = rectangle.shape.intersect(ray)
+            if let LightKind::Area(area) = &light.kind
+                && area.visible
+                && let Some(t) = area.shape.intersect(ray)
             {
                 nearest.offer(t, SurfaceId((first_light + i) as u32), At::Light);
             }
@@ -74,9 +74,25 @@ impl Scene {
     /// Whether anything stands between a surface and a light. Any hit will do, so the order is of no account.
     #[inline]
     pub fn occluded(&self, ray: &ShadowRay) -> bool {
-        let finite = ray.t_max == 1.0;
+        self.occluded_from(ray, None)
+    }
+
+    /// [`occluded`](Self::occluded) for a ray towards the light of that index, whose own shape does not hide it.
+    #[inline]
+    pub(crate) fn occluded_from(&self, ray: &ShadowRay, light: Option<usize>) -> bool {
+        let finite = ray.is_finite();
+        let round = &self.light_obstacles;
+        let others = |index: usize| light != Some(index);
         self.obstacles.iter().any(|sphere| sphere.shadow(ray.p, ray.error).blocks(ray.l, finite))
             || self.flat_obstacles.iter().any(|flat| flat.shadow(ray.p, ray.error).blocks(ray.l, finite))
+            || round
+                .spheres
+                .iter()
+                .any(|(index, sphere)| others(*index) && sphere.shadow(ray.p, ray.error).blocks(ray.l, finite))
+            || round
+                .disks
+                .iter()
+                .any(|(index, disk)| others(*index) && disk.shadow(ray.p, ray.error).blocks(ray.l, finite))
             || self.geometry.has_trees() && self.geometry.is_blocked(self.level, ray)
     }
 

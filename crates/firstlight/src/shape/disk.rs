@@ -2,13 +2,14 @@
 
 use std::f64::consts::PI;
 
+use fearless_simd::{mask32x16, prelude::*};
 use glam::DVec2;
 
 use super::common::shape_table;
 use super::solid::{Solid, SolidHit, SolidPoint, turn};
 use super::surface::UvEdge;
 use crate::context::CompileContext;
-use crate::math::{DRay, DVec3, Frame};
+use crate::math::{DRay, DVec3, ErrorBound, Frame, UNIT_ROUNDOFF, Vec3, Vec3x16};
 
 shape_table! {
     /// A flat disk, or a ring. u runs around it counterclockwise as seen from the front, v from 0 at the rim to 1 at the
@@ -61,6 +62,30 @@ impl DiskDesc {
 }
 
 impl Disk {
+    /// Without a hole. z of the frame is the normal.
+    pub fn new(center: DVec3, frame: Frame, radius: f64) -> Self {
+        Disk { center, frame, radius, inner: 0.0 }
+    }
+
+    /// What this disk, without its hole, needs to know of a point that asks for light.
+    #[inline(always)]
+    pub fn shadow(&self, p: Vec3, error: ErrorBound) -> DiskShadow {
+        // In f64, so that the side the point is on is wrong by the point's own rounding only
+        let from = p.as_dvec3() - self.center;
+        let s = self.frame.z.dot(from);
+        let n = if s < 0.0 { -self.frame.z } else { self.frame.z }.as_vec3();
+        let (x, y) = (self.frame.x / self.radius, self.frame.y / self.radius);
+        DiskShadow {
+            n,
+            height: s.abs() as f32,
+            margin: n.abs().dot(error.0),
+            abs_n: n.abs() * (10.0 * UNIT_ROUNDOFF),
+            x: x.as_vec3(),
+            y: y.as_vec3(),
+            at: [from.dot(x) as f32, from.dot(y) as f32],
+        }
+    }
+
     #[inline(always)]
     pub fn intersect(&self, ray: &DRay, t_min: f64, t_max: f64, single_sided: bool) -> Option<SolidHit> {
         let cos = self.frame.z.dot(ray.d);
@@ -95,6 +120,57 @@ impl Disk {
     pub fn bounds(&self) -> Option<[DVec3; 2]> {
         let reach = self.frame.disk_reach() * self.radius;
         Some([self.center - reach, self.center + reach])
+    }
+}
+
+/// A disk as an obstacle to light, seen from one point.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct DiskShadow {
+    /// The normal on the point's side.
+    n: Vec3,
+    /// How far the point is from the plane, 0 or more.
+    height: f32,
+    /// How far `height` can be wrong.
+    margin: f32,
+    /// How far n.l can be wrong, for each length along an axis.
+    abs_n: Vec3,
+    /// Two perpendicular directions of the plane, over the radius.
+    x: Vec3,
+    y: Vec3,
+    /// Where the point is along them, in radii from the middle.
+    at: [f32; 2],
+}
+
+impl DiskShadow {
+    /// Whether the disk stands between the point and the end of `l` (finite), or anywhere along it (not finite). Point and
+    /// end have to be on different sides of the plane, by more than their errors.
+    ///
+    /// The plane is crossed at the height / descent part of `l`: everything times `descent`, there is no division.
+    #[inline(always)]
+    pub fn blocks(&self, l: Vec3, finite: bool) -> bool {
+        let descent = -self.n.dot(l);
+        let beyond = descent - self.height;
+        let crosses = if finite { beyond > self.margin + self.abs_n.dot(l.abs()) } else { descent > 0.0 };
+        let x = self.at[0] * descent + l.dot(self.x) * self.height;
+        let y = self.at[1] * descent + l.dot(self.y) * self.height;
+        self.height > self.margin && crosses && x * x + y * y <= descent * descent
+    }
+
+    /// [`blocks`](Self::blocks) for sixteen finite `l`: the same answers.
+    #[inline(always)]
+    pub fn blocks_lanes<S: Simd>(&self, l: Vec3x16<S>) -> mask32x16<S> {
+        let simd = l.x.token();
+        if !(self.height > self.margin) {
+            return simd.splat_mask32x16(false);
+        }
+        let splat = |v: Vec3| Vec3x16::splat(simd, v);
+        let descent = -splat(self.n).dot(l);
+        let beyond = descent - self.height;
+        let wrong = l.abs().dot(splat(self.abs_n));
+        let crosses = beyond.simd_gt(simd.splat_f32x16(self.margin) + wrong);
+        let x = descent * self.at[0] + l.dot(splat(self.x)) * self.height;
+        let y = descent * self.at[1] + l.dot(splat(self.y)) * self.height;
+        crosses & (x * x + y * y).simd_le(descent * descent)
     }
 }
 

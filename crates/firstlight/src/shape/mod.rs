@@ -40,6 +40,7 @@ pub use surface::{Footprint, RayDifferential, SurfaceInteraction, UvEdge};
 pub use torus::TorusDesc;
 
 pub(crate) use common::Common;
+pub(crate) use disk::{Disk, DiskShadow};
 pub(crate) use mesh::{Mesh, MeshBuilder, MeshSource, TrianglePoint};
 pub(crate) use parallelogram::{ParallelogramShadow, PlaneSide};
 pub(crate) use placement::Placement;

@@ -173,6 +173,18 @@ impl Parallelogram {
         }
     }
 
+    /// Where a ball lies, or what reaches as far as one along the normal.
+    pub(crate) fn side_of_ball(&self, center: DVec3, radius: f64) -> PlaneSide {
+        let height = self.n.dot(center - self.p);
+        if height >= radius {
+            PlaneSide::Front
+        } else if height <= -radius {
+            PlaneSide::Back
+        } else {
+            PlaneSide::Both
+        }
+    }
+
     /// What this parallelogram needs to know of a point that asks for light.
     #[inline(always)]
     pub(crate) fn shadow(&self, p: Vec3, error: ErrorBound) -> ParallelogramShadow {

@@ -30,7 +30,7 @@ fn a_whole_file_is_a_built_in_scene_with_changes() {
     let mut expected = builtin("config23");
     (expected.render.width, expected.render.height, expected.render.antialiasing) = (320, 320, 3);
     let [LightDesc::Rectangle(rectangle)] = expected.lights.as_mut_slice() else { panic!() };
-    (rectangle.samples, rectangle.set) = (Some(400), SampleSet::Grid);
+    (rectangle.samples, rectangle.set) = (Some(400.into()), SampleSet::Grid);
     assert_eq!(parsed.desc, expected);
     assert_eq!(light(&parsed.desc).center, [-3.0, 5.9, -6.0]);
 }

@@ -82,14 +82,18 @@ fn maybe<T: std::fmt::Debug + Clone>(strategy: impl Strategy<Value = T>) -> impl
     proptest::option::of(strategy)
 }
 
+fn samples() -> impl Strategy<Value = SamplesDesc> {
+    prop_oneof![Just(SamplesDesc::Exact), any::<u32>().prop_map(SamplesDesc::Count)]
+}
+
 prop_compose! {
     fn render()(
-        size in [any::<u32>(), any::<u32>(), any::<u32>(), any::<u32>()], camera in maybe(text()),
-        colors in [color(), color()], transparent: bool, display in select(DisplayEncoding::ALL),
+        size in [any::<u32>(), any::<u32>(), any::<u32>()], camera in maybe(text()),
+        samples in samples(), colors in [color(), color()], transparent: bool, display in select(DisplayEncoding::ALL),
         gamma in number(), exposure in number(), fps in number(),
     ) -> RenderDesc {
         RenderDesc {
-            width: size[0], height: size[1], antialiasing: size[2], samples: size[3], camera, background: colors[0],
+            width: size[0], height: size[1], antialiasing: size[2], samples, camera, background: colors[0],
             transparent, ambient: colors[1], display, gamma, exposure, fps,
         }
     }
@@ -240,31 +244,36 @@ fn light() -> impl Strategy<Value = LightDesc> {
             LightDesc::Spot(SpotDesc { name, color, strength, falloff, shadows, ..new })
         },
     );
-    let rectangle = (
-        [vector(), vector(), vector()],
-        moved(),
-        maybe(select(EmitSides::ALL)),
-        any::<[bool; 2]>(),
-        maybe(any::<u32>()),
-        select(SampleSet::ALL),
-        any::<u32>(),
-        common(),
-    )
-        .prop_map(|([center, e0, e1], transform, sides, [visible, blocks], samples, set, seed, common)| {
-            let (name, color, strength, falloff, shadows) = common;
-            let new = RectangleDesc {
-                transform,
-                sides,
-                visible,
-                blocks,
-                samples,
-                set,
-                seed,
-                ..RectangleDesc::new(center, e0, e1)
-            };
-            LightDesc::Rectangle(RectangleDesc { name, color, strength, falloff, shadows, ..new })
-        });
-    prop_oneof![point.boxed(), directional.boxed(), spot.boxed(), rectangle.boxed()]
+    /// An area light's own fields with what all of them can say.
+    macro_rules! area {
+        ($variant:ident, $own:expr) => {
+            (
+                $own,
+                moved(),
+                maybe(select(EmitSides::ALL)),
+                any::<[bool; 2]>(),
+                maybe(samples()),
+                select(SampleSet::ALL),
+                any::<u32>(),
+                common(),
+            )
+                .prop_map(|(own, transform, sides, [visible, blocks], samples, set, seed, common)| {
+                    let mut light = own;
+                    (light.name, light.color, light.strength, light.falloff, light.shadows) = common;
+                    (light.transform, light.sides, light.visible, light.blocks) = (transform, sides, visible, blocks);
+                    (light.samples, light.set, light.seed) = (samples, set, seed);
+                    LightDesc::$variant(light)
+                })
+                .boxed()
+        };
+    }
+    let edges = [vector(), vector(), vector()];
+    let rectangle = area!(Rectangle, edges.prop_map(|[center, e0, e1]| RectangleDesc::new(center, e0, e1)));
+    let round = ([vector(), vector()], number());
+    let disk = area!(Disk, round.prop_map(|([center, normal], radius)| DiskLightDesc::new(center, normal, radius)));
+    let ball = (vector(), number());
+    let sphere = area!(Sphere, ball.prop_map(|(center, radius)| SphereLightDesc::new(center, radius)));
+    prop_oneof![point.boxed(), directional.boxed(), spot.boxed(), rectangle, disk, sphere]
 }
 
 fn material() -> impl Strategy<Value = MaterialDesc> {

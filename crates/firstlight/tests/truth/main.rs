@@ -2,6 +2,7 @@
 //! program's picture. Everything here goes through the public interface.
 
 mod analytic;
+mod area_lights;
 mod cameras;
 mod checker;
 mod determinism;

@@ -1,9 +1,9 @@
 //! Random scenes, the same for the same seed: the harder for a renderer, the better.
 
 use firstlight::{
-    BoxDesc, ColorDesc, ColorParam, ConeDesc, CylinderDesc, DiskDesc, EmitSides, Falloff, LightDesc, MaterialDesc,
-    MeshDesc, ParallelogramDesc, PlaneDesc, PointSetDesc, Projection, RectangleDesc, RectangleShapeDesc, SampleSet,
-    SceneDesc, ShapeDesc, SphereDesc, SphereUv, TorusDesc,
+    BoxDesc, ColorDesc, ColorParam, ConeDesc, CylinderDesc, DiskDesc, DiskLightDesc, EmitSides, Falloff, LightDesc,
+    MaterialDesc, MeshDesc, ParallelogramDesc, PlaneDesc, PointSetDesc, Projection, RectangleDesc, RectangleShapeDesc,
+    SampleSet, SceneDesc, ShapeDesc, SphereDesc, SphereLightDesc, SphereUv, TorusDesc,
 };
 
 use crate::scenes::*;
@@ -20,7 +20,7 @@ pub fn scene(seed: u64) -> SceneDesc {
     let origin = if random.chance(0.15) { mul(random.direction(), 1000.0 * unit_length) } else { [0.0; 3] };
     let antialiasing = 1 + random.below(3);
     let mut scene = empty(12, 12, antialiasing);
-    scene.render.samples = 1 + random.below(70);
+    scene.render.samples = (1 + random.below(70)).into();
     scene.render.transparent = random.chance(0.2);
     if random.chance(0.4) {
         scene.render.background = color(random);
@@ -402,7 +402,6 @@ impl Place {
                 LightDesc::Spot(firstlight::SpotDesc { color, falloff, shadows, ..desc })
             }
             _ => {
-                let ([e0, e1], center) = self.rectangle_frame(random, scene, at);
                 let set = random.pick(&[
                     SampleSet::Sobol,
                     SampleSet::Sobol,
@@ -411,27 +410,46 @@ impl Place {
                     SampleSet::Stratified,
                 ]);
                 let samples = match set {
-                    SampleSet::Sobol | SampleSet::Uniform => random.chance(0.5).then(|| 1 + random.below(70)),
+                    SampleSet::Sobol | SampleSet::Uniform => random.chance(0.5).then(|| (1 + random.below(70)).into()),
                     SampleSet::Grid | SampleSet::Stratified => {
                         let side = 1 + random.below(8);
-                        Some(side * side)
+                        Some((side * side).into())
                     }
                 };
+                let over = |area: f64| if falloff == Falloff::Physical { strength / area } else { strength };
+                let sides = random.pick(&[None, None, Some(EmitSides::Front), Some(EmitSides::Both)]);
+                let (visible, blocks, seed) = (random.chance(0.7), random.chance(0.3), random.below(100));
+                macro_rules! light {
+                    ($kind:ident, $area:expr, $desc:ident($($argument:expr),*)) => {
+                        LightDesc::$kind($desc {
+                            color, strength: over($area), falloff, sides, visible, blocks, shadows, samples, set, seed,
+                            ..$desc::new($($argument),*)
+                        })
+                    };
+                }
+                let kind = random.below(4);
+                if kind == 0 {
+                    let (center, radius) = self.ball_frame(random, scene, at);
+                    return light!(Sphere, radius * radius, SphereLightDesc(center, radius));
+                }
+                let ([e0, e1], center) = self.rectangle_frame(random, scene, at);
                 let area = length(cross(e0, e1));
-                LightDesc::Rectangle(RectangleDesc {
-                    color,
-                    strength: if falloff == Falloff::Physical { strength / area } else { strength },
-                    falloff,
-                    sides: random.pick(&[None, None, Some(EmitSides::Front), Some(EmitSides::Both)]),
-                    visible: random.chance(0.7),
-                    blocks: random.chance(0.3),
-                    shadows,
-                    samples,
-                    seed: random.below(100),
-                    ..rectangle(center, e0, e1, set, 1)
-                })
+                match kind {
+                    1 => light!(Disk, area, DiskLightDesc(center, cross(unit(e0), unit(e1)), area.sqrt() * 0.5)),
+                    _ => light!(Rectangle, area, RectangleDesc(center, e0, e1)),
+                }
             }
         }
+    }
+
+    /// Centre and radius of a sphere light: anyhow, or that of a sphere of the scene.
+    fn ball_frame(&self, random: &mut Random, scene: &SceneDesc, at: V) -> (V, f64) {
+        if random.chance(0.3)
+            && let Some(ShapeDesc::Sphere(ball)) = scene.shapes.first()
+        {
+            return (ball.center, ball.radius * random.pick(&[1.0, 0.5, 1.5]));
+        }
+        (at, random.scale(0.02, 2.0) * self.unit)
     }
 
     /// Edges and centre of a rectangle light: anyhow, or in the plane of a parallelogram.

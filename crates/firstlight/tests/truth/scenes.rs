@@ -66,7 +66,7 @@ pub fn empty(width: u32, height: u32, antialiasing: u32) -> SceneDesc {
             width,
             height,
             antialiasing,
-            samples: 64,
+            samples: 64.into(),
             display: DisplayEncoding::Linear,
             ..RenderDesc::default()
         },
@@ -117,7 +117,7 @@ pub fn spot(position: V, look_at: V, cone_deg: f64, inner_cone_deg: Option<f64>,
 
 /// Physical, strength 1, invisible, with `samples` points of `set`.
 pub fn rectangle(center: V, e0: V, e1: V, set: SampleSet, samples: u32) -> RectangleDesc {
-    RectangleDesc { visible: false, samples: Some(samples), set, ..RectangleDesc::new(center, e0, e1) }
+    RectangleDesc { visible: false, samples: Some(samples.into()), set, ..RectangleDesc::new(center, e0, e1) }
 }
 
 pub fn matte(diffuse: f64) -> MaterialDesc {
@@ -147,7 +147,7 @@ pub fn config11(size: u32, antialiasing: u32, samples: u32) -> SceneDesc {
     let parsed = SceneDesc::parse("config11.toml", builtin.text.as_bytes(), &NoAssets);
     assert!(parsed.faults().is_empty());
     let mut scene = parsed.desc;
-    scene.render = RenderDesc { width: size, height: size, antialiasing, samples, ..scene.render };
+    scene.render = RenderDesc { width: size, height: size, antialiasing, samples: samples.into(), ..scene.render };
     scene
 }
 
@@ -307,8 +307,8 @@ impl Build for SceneDesc {
                 LightDesc::Directional(light) => light.shadows = false,
                 LightDesc::Spot(light) => light.shadows = false,
                 LightDesc::Rectangle(light) => light.shadows = false,
-                #[allow(unreachable_patterns)]
-                _ => unreachable!("no test here uses another light"),
+                LightDesc::Disk(light) => light.shadows = false,
+                LightDesc::Sphere(light) => light.shadows = false,
             }
         }
         self

@@ -1,0 +1,392 @@
+//! Area lights: what all of them say beside their shape, and what runs.
+
+use std::f64::consts::PI;
+use std::sync::{Arc, OnceLock};
+
+use fearless_simd::{f32x16, prelude::*};
+
+use super::{Disk, EmitSides, Falloff, Light, LightKind, Rectangle, SampleSet, Sphere, scaled};
+use crate::color::Rgb;
+use crate::context::CompileContext;
+use crate::describe::{ColorDesc, SamplesDesc};
+use crate::math::{DVec3, LANES, Ray, Vec3, Vec3x16};
+use crate::shape::{Parallelogram, PlaneSide};
+
+/// The largest number of points on one light.
+pub(crate) const MAX_SAMPLES: u32 = 1 << 20;
+
+/// How many points stand for a light that is `exact`, where it has to be sampled all the same.
+pub(crate) const REFERENCE_SAMPLES: u32 = 4096;
+
+/// Declares the table of an area light: its name, its own fields, then those that all area lights have.
+macro_rules! area_table {
+    (
+        $(#[doc = $doc:literal])*
+        pub struct $name:ident { $($own:tt)* }
+    ) => {
+        $crate::describe::table! {
+            $(#[doc = $doc])*
+            pub struct $name {
+                /// What reports and id files call it.
+                pub name: Option<String> = None,
+                $($own)*
+                /// Linear colour; channels of 0 or more.
+                pub color: $crate::describe::ColorDesc = $crate::describe::ColorDesc::WHITE,
+                /// Radiance (physical), or a plain factor (constant); 0 to 1e15.
+                pub strength: f64 = 1.0,
+                /// How light weakens on its way.
+                pub falloff: $crate::light::Falloff = $crate::light::Falloff::Physical,
+                /// The sides that emit; without it, `front` under `physical` and `both` under `constant`.
+                pub sides: Option<$crate::light::EmitSides> = None,
+                /// Whether the camera sees it, as its colour.
+                pub visible: bool = true,
+                /// Whether it stops the light of others.
+                pub blocks: bool = false,
+                /// Whether its light can be blocked.
+                pub shadows: bool = true,
+                /// How many points of it are sampled, 1 to 1048576, or `"exact"`: it is integrated, not sampled. Without
+                /// it, `render.samples`.
+                pub samples: Option<$crate::describe::SamplesDesc> = None,
+                /// How those points are laid out.
+                pub set: $crate::light::SampleSet = $crate::light::SampleSet::Sobol,
+                /// The seed of the sets `uniform` and `stratified`.
+                pub seed: u32 = 0,
+            }
+        }
+
+        impl $name {
+            /// What it says that every area light can say.
+            pub(super) fn emitter(&self) -> $crate::light::area::Emitter {
+                $crate::light::area::Emitter {
+                    color: self.color,
+                    strength: self.strength,
+                    falloff: self.falloff,
+                    sides: self.sides,
+                    visible: self.visible,
+                    blocks: self.blocks,
+                    shadows: self.shadows,
+                    samples: self.samples,
+                    set: self.set,
+                    seed: self.seed,
+                }
+            }
+        }
+    };
+}
+
+pub(super) use area_table;
+
+/// What every area light says beside its name and its shape.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Emitter {
+    pub color: ColorDesc,
+    pub strength: f64,
+    pub falloff: Falloff,
+    pub sides: Option<EmitSides>,
+    pub visible: bool,
+    pub blocks: bool,
+    pub shadows: bool,
+    pub samples: Option<SamplesDesc>,
+    pub set: SampleSet,
+    pub seed: u32,
+}
+
+/// Checks how many points are asked for.
+pub(crate) fn check_samples(cx: &mut CompileContext, samples: SamplesDesc, hint: &str) -> SamplesDesc {
+    if let SamplesDesc::Count(count) = samples {
+        cx.count("samples", count, 1, MAX_SAMPLES, Some(hint));
+    }
+    samples
+}
+
+impl Emitter {
+    /// Whether both sides emit.
+    pub fn both_sides(&self) -> bool {
+        match self.sides {
+            Some(sides) => sides == EmitSides::Both,
+            None => self.falloff == Falloff::Constant,
+        }
+    }
+
+    /// The light of that shape. `samples` is the scene's default.
+    pub fn compile(&self, cx: &mut CompileContext, shape: AreaShape, samples: SamplesDesc) -> Light {
+        let samples = match self.samples {
+            Some(own) => check_samples(cx, own, "points on this light"),
+            None => samples,
+        };
+        let (exact, count) = match samples {
+            SamplesDesc::Exact => (true, REFERENCE_SAMPLES),
+            SamplesDesc::Count(count) => (false, count),
+        };
+        if let Err(hint) = self.set.allows(count) {
+            let field = if self.samples.is_some() { "samples" } else { "set" };
+            let message = format!("{count} points cannot be laid out as \"{}\"", self.set.name());
+            cx.error(field, message, Some(&hint));
+        }
+        // Physical: each point stands for its share of the area
+        let area = match self.falloff {
+            Falloff::Physical => shape.measure(),
+            Falloff::Constant => 1.0,
+        };
+        let scale = scaled(cx, self.color, self.strength, self.falloff.factor() * area / count.max(1) as f64);
+        let intensity = self.color.linear.map(|c| (c * self.strength * self.falloff.factor()) as f32);
+        let area = Area {
+            n: shape.flat_normal(),
+            shape,
+            set: self.set,
+            count,
+            seed: self.seed,
+            points: Arc::default(),
+            both_sides: self.both_sides(),
+            physical: self.falloff == Falloff::Physical,
+            visible: self.visible,
+            blocks: self.blocks,
+        };
+        // A light that is integrated may never ask for its points; a description with faults makes no scene
+        if !exact && !cx.has_errors() {
+            area.points();
+        }
+        Light {
+            kind: LightKind::Area(area),
+            scale,
+            intensity: Rgb::new(intensity[0], intensity[1], intensity[2]),
+            radiance: Rgb::from(self.color) * self.strength as f32,
+            shadows: self.shadows,
+            exact,
+        }
+    }
+}
+
+/// An area light, ready to shine.
+#[derive(Clone, Debug)]
+pub struct Area {
+    /// Its shape, in world space.
+    pub shape: AreaShape,
+    /// Whether the side behind, or inside, emits as well.
+    pub both_sides: bool,
+    /// Whether light weakens with the square of the distance and the cosine at the light.
+    pub physical: bool,
+    /// Whether the camera sees it.
+    pub visible: bool,
+    /// Whether it stops the light of others.
+    pub blocks: bool,
+    /// Unit normal of the front, where all of it faces one way.
+    n: Option<Vec3>,
+    set: SampleSet,
+    count: u32,
+    seed: u32,
+    /// The sampled points, made when first asked for.
+    points: Arc<OnceLock<Points>>,
+}
+
+/// The shape of an area light. In f64, as it was described.
+#[derive(Clone, Copy, Debug)]
+#[allow(clippy::large_enum_variant, reason = "lights are few, and asked for often")]
+pub enum AreaShape {
+    /// `[[light.rectangle]]`; a transform can make a parallelogram of it.
+    Rectangle(Rectangle),
+    /// `[[light.disk]]`
+    Disk(Disk),
+    /// `[[light.sphere]]`
+    Sphere(Sphere),
+}
+
+impl AreaShape {
+    /// The point that stands for `uv` of the unit square, and, where each point has a normal of its own, the unit normal
+    /// there. Equal areas of the square become equal areas of the shape.
+    fn point(&self, uv: [f64; 2]) -> (DVec3, Option<DVec3>) {
+        match self {
+            AreaShape::Rectangle(rectangle) => (rectangle.point(uv), None),
+            AreaShape::Disk(disk) => (disk.point(uv), None),
+            AreaShape::Sphere(sphere) => {
+                let n = Sphere::normal(uv);
+                (sphere.center + n * sphere.radius, Some(n))
+            }
+        }
+    }
+
+    /// Unit normal of the front, where all of it faces one way.
+    fn flat_normal(&self) -> Option<Vec3> {
+        match self {
+            AreaShape::Rectangle(rectangle) => Some(rectangle.n.as_vec3()),
+            AreaShape::Disk(disk) => Some(disk.n.as_vec3()),
+            AreaShape::Sphere(_) => None,
+        }
+    }
+
+    /// Its area, in square metres; of a flat shape, that of one side.
+    pub fn measure(&self) -> f64 {
+        match self {
+            AreaShape::Rectangle(rectangle) => rectangle.e0.cross(rectangle.e1).length(),
+            AreaShape::Disk(disk) => PI * disk.radius * disk.radius,
+            AreaShape::Sphere(sphere) => 4.0 * PI * sphere.radius * sphere.radius,
+        }
+    }
+
+    /// The smallest box around it: its least and its greatest corner.
+    #[allow(dead_code, reason = "for integration")]
+    pub fn bounds(&self) -> [DVec3; 2] {
+        match self {
+            AreaShape::Rectangle(rectangle) => rectangle.shape.bounds(),
+            AreaShape::Disk(disk) => {
+                let reach = (disk.a * disk.a + disk.b * disk.b).map(f64::sqrt);
+                [disk.center - reach, disk.center + reach]
+            }
+            AreaShape::Sphere(sphere) => sphere.shape.bounds(),
+        }
+    }
+
+    /// The smallest t > 0 at which a camera ray meets a side that emits.
+    #[inline(always)]
+    pub(crate) fn intersect(&self, ray: &Ray) -> Option<f64> {
+        match self {
+            AreaShape::Rectangle(rectangle) => rectangle.shape.intersect(ray),
+            AreaShape::Disk(disk) => disk.intersect(ray),
+            AreaShape::Sphere(sphere) => sphere.shape.intersect(ray),
+        }
+    }
+
+    /// On which side of a flat shape all of it lies.
+    pub(crate) fn side_of(&self, flat: &Parallelogram) -> PlaneSide {
+        match self {
+            AreaShape::Rectangle(rectangle) => flat.side_of(&rectangle.shape.corners),
+            AreaShape::Disk(disk) => {
+                let (a, b) = (flat.n.dot(disk.a), flat.n.dot(disk.b));
+                flat.side_of_ball(disk.center, (a * a + b * b).sqrt())
+            }
+            AreaShape::Sphere(sphere) => flat.side_of_ball(sphere.center, sphere.radius),
+        }
+    }
+}
+
+#[allow(dead_code, reason = "measure and bounds are for integration")]
+impl Area {
+    /// How many points are sampled, where it is sampled.
+    #[inline(always)]
+    pub fn samples(&self) -> usize {
+        self.count as usize
+    }
+
+    /// Its area: [`AreaShape::measure`].
+    pub fn measure(&self) -> f64 {
+        self.shape.measure()
+    }
+
+    /// The smallest box around it: [`AreaShape::bounds`].
+    pub fn bounds(&self) -> [DVec3; 2] {
+        self.shape.bounds()
+    }
+
+    /// The sampled points.
+    #[inline(always)]
+    pub(crate) fn points(&self) -> &Points {
+        self.points.get_or_init(|| Points::new(&self.shape, self.set, self.count, self.seed))
+    }
+
+    /// Sampled point `k`, world space.
+    #[inline(always)]
+    pub fn point(&self, k: usize) -> Vec3 {
+        self.points().blocks[k / LANES].get(k % LANES)
+    }
+
+    /// 1 where the light emits towards the surface under `constant`; the cosine at the light over d^2 under `physical`.
+    /// `l` points to point `k` of the light.
+    #[inline(always)]
+    pub(crate) fn weight(&self, k: usize, l: Vec3, inverse_distance: f32) -> f32 {
+        if !self.physical && self.both_sides {
+            return 1.0;
+        }
+        let n = self.n.unwrap_or_else(|| self.points().normals[k / LANES].get(k % LANES));
+        let side = -n.dot(l);
+        let side = if self.both_sides { side.abs() } else { side };
+        if !self.physical {
+            return if side > 0.0 { 1.0 } else { 0.0 };
+        }
+        let cos = side * inverse_distance;
+        if cos > 0.0 { cos * (inverse_distance * inverse_distance) } else { 0.0 }
+    }
+
+    /// [`weight`](Self::weight) of the sixteen points of a block of `points`: the same bits.
+    #[inline(always)]
+    pub(crate) fn weight_lanes<S: Simd>(
+        &self,
+        points: &Points,
+        block: usize,
+        l: Vec3x16<S>,
+        inverse_distance: f32x16<S>,
+    ) -> f32x16<S> {
+        let simd = inverse_distance.token();
+        let (zero, one) = (simd.splat_f32x16(0.0), simd.splat_f32x16(1.0));
+        if !self.physical && self.both_sides {
+            return one;
+        }
+        let n = match self.n {
+            Some(n) => Vec3x16::splat(simd, n),
+            None => points.normals[block].lanes(simd),
+        };
+        let side = -n.dot(l);
+        let side = if self.both_sides { side.abs() } else { side };
+        if !self.physical {
+            return side.simd_gt(zero).select(one, zero);
+        }
+        let cos = side * inverse_distance;
+        cos.simd_gt(zero).select(cos * (inverse_distance * inverse_distance), zero)
+    }
+}
+
+/// The sampled points of an area light in blocks of sixteen, coordinate by coordinate, as lanes want them.
+#[derive(Clone, Debug)]
+pub(crate) struct Points {
+    pub blocks: Vec<PointBlock>,
+    /// The unit normal at each point, where each has its own. They are kept, not found from the points: those are rounded,
+    /// and of a small sphere far from the origin nothing would be left.
+    normals: Vec<PointBlock>,
+}
+
+/// Sixteen points, or normals. Where there is none, every coordinate is NaN: it is above no horizon and sends no light.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct PointBlock {
+    x: [f32; LANES],
+    y: [f32; LANES],
+    z: [f32; LANES],
+}
+
+impl PointBlock {
+    const NONE: PointBlock = PointBlock { x: [f32::NAN; LANES], y: [f32::NAN; LANES], z: [f32::NAN; LANES] };
+
+    #[inline(always)]
+    fn get(&self, lane: usize) -> Vec3 {
+        Vec3::new(self.x[lane], self.y[lane], self.z[lane])
+    }
+
+    fn set(&mut self, lane: usize, v: DVec3) {
+        let v = v.as_vec3();
+        (self.x[lane], self.y[lane], self.z[lane]) = (v.x, v.y, v.z);
+    }
+
+    #[inline(always)]
+    pub fn lanes<S: Simd>(&self, simd: S) -> Vec3x16<S> {
+        Vec3x16 {
+            x: f32x16::simd_from(simd, self.x),
+            y: f32x16::simd_from(simd, self.y),
+            z: f32x16::simd_from(simd, self.z),
+        }
+    }
+}
+
+impl Points {
+    fn new(shape: &AreaShape, set: SampleSet, count: u32, seed: u32) -> Self {
+        let blocks = (count as usize).div_ceil(LANES);
+        let normals = if shape.flat_normal().is_none() { blocks } else { 0 };
+        let mut points = Points { blocks: vec![PointBlock::NONE; blocks], normals: vec![PointBlock::NONE; normals] };
+        for k in 0..count {
+            let (block, lane) = (k as usize / LANES, k as usize % LANES);
+            let (q, n) = shape.point(set.point(k, count, seed));
+            points.blocks[block].set(lane, q);
+            if let Some(n) = n {
+                points.normals[block].set(lane, n);
+            }
+        }
+        points
+    }
+}
