@@ -66,8 +66,7 @@ impl PixelHits {
         for row in 0..h {
             for column in 0..w {
                 let (ray, _) = camera_ray(scene, x + left + column, y + top + row);
-                let mut nearest = Nearest::default();
-                scene.meet_listed(&ray, &mut nearest);
+                let mut nearest = scene.meet_listed(&ray);
                 if bundle {
                     geometry.meet_upper(self.level, &ray, &mut nearest);
                     // Blocks of 4 x 4 after each other

@@ -81,7 +81,6 @@ fn gather_area<S: Simd>(
     let (ng, ns, wo) = (Vec3x16::splat(simd, si.ng), Vec3x16::splat(simd, si.ns), Vec3x16::splat(simd, si.wo));
     let is_flat = si.ng == si.ns;
     let cos_o = si.ns.dot(si.wo);
-    let shadow = si.shadow_ray(Vec3::ZERO, 1.0);
     let (mut diffuse, mut specular) = (zero, zero);
     for (index, block) in points.blocks.iter().enumerate() {
         let q = block.lanes(simd);
@@ -110,7 +109,12 @@ fn gather_area<S: Simd>(
             continue;
         }
         if let Some(geometry) = obstacles.trees {
-            lit &= !hidden_by_trees(simd, geometry, &shadow, l, lit.to_bitmask() as u16);
+            let mut ways = [[0.0; LANES]; 3];
+            for (way, l) in ways.iter_mut().zip([l.x, l.y, l.z]) {
+                l.store_slice(way);
+            }
+            let hidden = hidden_by_trees(simd.level(), geometry, si, ways, lit.to_bitmask() as u16);
+            lit &= !mask32x16::from_bitmask(simd, hidden as u64);
             if lit.all_false() {
                 continue;
             }
@@ -128,18 +132,23 @@ fn gather_area<S: Simd>(
     LobeSums { diffuse: partials(diffuse), specular: partials(specular) }
 }
 
-/// Which of the lanes in `active` something in the trees hides: `ray` says where they start, `l` where they lead.
-#[inline(always)]
-fn hidden_by_trees<S: Simd>(simd: S, geometry: &Geometry, ray: &ShadowRay, l: Vec3x16<S>, active: u16) -> mask32x16<S> {
-    let mut shadows = ShadowRays { from: *ray, rays: RayPacket16::ZERO, t_end: [0.0; LANES] };
-    for (axis, l) in [l.x, l.y, l.z].into_iter().enumerate() {
-        shadows.rays.o[axis] = [ray.start[axis]; LANES];
-        l.store_slice(&mut shadows.rays.d[axis]);
-    }
+/// Which of the lanes in `active` something in the trees hides on the ways `l` from a surface. Not inlined: scenes without
+/// trees keep their loop small.
+#[inline(never)]
+fn hidden_by_trees(
+    level: Level,
+    geometry: &Geometry,
+    si: &SurfaceInteraction,
+    l: [[f32; LANES]; 3],
+    active: u16,
+) -> u16 {
+    let from = si.shadow_ray(Vec3::ZERO, 1.0);
+    let o = from.start.to_array().map(|o| [o; LANES]);
+    let mut shadows = ShadowRays { from, rays: RayPacket16 { o, d: l }, t_end: [0.0; LANES] };
     for (lane, end) in shadows.t_end.iter_mut().enumerate() {
-        *end = ShadowRay { l: shadows.rays.d(lane), ..*ray }.end();
+        *end = ShadowRay { l: shadows.rays.d(lane), ..from }.end();
     }
-    mask32x16::from_bitmask(simd, geometry.are_blocked(simd.level(), &shadows, active) as u64)
+    geometry.are_blocked(level, &shadows, active)
 }
 
 #[inline(always)]

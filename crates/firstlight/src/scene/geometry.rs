@@ -57,8 +57,10 @@ pub(crate) struct Placed {
     pub shadow: Meets,
 }
 
-/// Where on a surface a ray ended.
+/// Where on a surface a ray ended. In whole words: such a value is copied for every camera ray, and the compiler's own layout is
+/// copied byte by byte.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[repr(u32)]
 pub(crate) enum At {
     Sphere(u32),
     Parallelogram(u32),
@@ -72,6 +74,7 @@ pub(crate) enum At {
 
 /// Where on something placed.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[repr(u32)]
 pub(crate) enum Spot {
     Triangle(TrianglePoint),
     /// The point of a point set.

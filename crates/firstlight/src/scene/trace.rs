@@ -7,7 +7,7 @@ use super::geometry::{At, Nearest};
 use crate::color::Rgb;
 use crate::ids::SurfaceId;
 use crate::light::LightKind;
-use crate::math::{Ray, ShadowRay};
+use crate::math::{Ray, ShadowRay, Vec3};
 use crate::shape::{RayDifferential, ShapePoint, SurfaceInteraction};
 
 pub use super::geometry::Hit;
@@ -33,17 +33,20 @@ impl Scene {
     /// [`intersect`](Self::intersect) with an instruction set: the same answer.
     #[inline(always)]
     pub(crate) fn intersect_at(&self, level: Level, ray: &Ray) -> Option<Hit> {
-        let mut nearest = Nearest::default();
-        self.meet_listed(ray, &mut nearest);
-        if self.geometry.has_trees() {
-            self.geometry.meet_trees(level, ray, &mut nearest);
+        let listed = self.meet_listed(ray);
+        if !self.geometry.has_trees() {
+            return listed.0;
         }
+        let mut nearest = listed;
+        self.geometry.meet_trees(level, ray, &mut nearest);
         nearest.0
     }
 
-    /// The shapes that lie in lists, and the lights.
+    /// What the ray meets first of the shapes that lie in lists, and of the lights. Returned, not written to a place of the
+    /// caller's: so it stays in registers.
     #[inline(always)]
-    pub(crate) fn meet_listed(&self, ray: &Ray, nearest: &mut Nearest) {
+    pub(crate) fn meet_listed(&self, ray: &Ray) -> Nearest {
+        let mut nearest = Nearest::default();
         if self.geometry.listed {
             for (i, sphere) in self.geometry.spheres.iter().enumerate() {
                 if sphere.seen
@@ -69,6 +72,7 @@ impl Scene {
                 nearest.offer(t, SurfaceId((first_light + i) as u32), At::Light);
             }
         }
+        nearest
     }
 
     /// Whether anything stands between a surface and a light. Any hit will do, so the order is of no account.
@@ -104,13 +108,22 @@ impl Scene {
     pub fn surface(&self, ray: &Ray, hit: &Hit, differential: &RayDifferential) -> SurfaceInteraction {
         let surface = &self.geometry.surfaces[hit.surface.index()];
         let point = self.geometry.point(ray, hit, differential);
-        let ShapePoint { p, error, normal, shading, uv, footprint, tangents, color } = point;
+        let ShapePoint { p, error, normal, shading, uv, footprint, color } = point;
         let wo = -ray.d;
         let (ng, ns) = if normal.dot(wo) < 0.0 { (-normal, -shading) } else { (normal, shading) };
         let material = surface.material.unwrap_or_else(|| self.geometry.face_material(hit));
         let receives_shadow = surface.receives_shadow;
         let surface = hit.surface;
-        SurfaceInteraction { p, error, ng, ns, wo, uv, footprint, tangents, color, surface, material, receives_shadow }
+        SurfaceInteraction { p, error, ng, ns, wo, uv, footprint, color, surface, material, receives_shadow }
+    }
+
+    /// How the point of a hit moves with u, and with v: metres for 1. Not orthogonal, and no length where uv has no
+    /// direction. Asked for apart from [`surface`](Self::surface), because few need it.
+    ///
+    /// # Panics
+    /// If the hit is a light's.
+    pub fn tangents(&self, ray: &Ray, hit: &Hit) -> [Vec3; 2] {
+        self.geometry.tangents(ray, hit).map(|d| d.as_vec3())
     }
 
     /// What a camera ray ends at.

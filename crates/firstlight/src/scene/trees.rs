@@ -2,10 +2,10 @@
 
 use fearless_simd::{Level, Simd};
 
-use super::geometry::{At, Geometry, Hit, Item, Meets, Nearest, Spot, Target};
+use super::geometry::{At, Geometry, Hit, Item, Meets, Nearest, Placed, Spot, Target};
 use crate::accel::{RayPacket16, RayTile, TraceRay, dispatch_eight, dispatch_sixteen};
 use crate::ids::{MaterialId, SurfaceId};
-use crate::math::{Ray, ShadowRay, Vec3};
+use crate::math::{DVec3, Ray, ShadowRay, Vec3};
 use crate::shape::{Mesh, RayDifferential, ShapePoint, SolidHit, TileHits, TrianglePoint, every};
 
 impl Geometry {
@@ -302,6 +302,34 @@ impl Geometry {
                 }
             }
             At::Sphere(_) | At::Parallelogram(_) | At::Light => unreachable!("these are not in the trees"),
+        }
+    }
+
+    /// How the point of a hit of a shape moves with u and with v.
+    pub fn tangents(&self, ray: &Ray, hit: &Hit) -> [DVec3; 2] {
+        match hit.at {
+            At::Sphere(i) => self.spheres[i as usize].shape.tangents(ray, hit.t),
+            At::Parallelogram(i) => self.parallelograms[i as usize].shape.tangents(),
+            At::World(point) => {
+                let world = self.world.as_ref().expect("the hit is on it");
+                world.mesh.tangents(None, point.triangle)
+            }
+            At::Placed(index, spot) => {
+                let Placed { placement, target, .. } = &self.placed[index as usize];
+                match (*target, spot) {
+                    (Target::Mesh(mesh), Spot::Triangle(point)) => {
+                        self.meshes[mesh as usize].tangents(Some(placement), point.triangle)
+                    }
+                    (Target::Points(points), Spot::Point(point)) => {
+                        self.point_sets[points as usize].tangents(placement, point, ray, hit.t)
+                    }
+                    (Target::Solid(solid), Spot::Part(part)) => {
+                        placement.solid_tangents(&self.solids[solid as usize], &SolidHit { t: hit.t, part }, ray)
+                    }
+                    _ => unreachable!("a spot is on the kind of thing that was hit"),
+                }
+            }
+            At::Light => panic!("a light has no texture coordinates"),
         }
     }
 

@@ -136,9 +136,13 @@ impl Parallelogram {
             shading: n,
             uv: uv.as_vec2(),
             footprint: Footprint { dx, dy, edges: [UvEdge::Bounded; 2] },
-            tangents: self.edges.map(|e| e.as_vec3()),
             color: Rgb::WHITE,
         }
+    }
+
+    /// How a point moves with u and with v: the edges.
+    pub(crate) fn tangents(&self) -> [DVec3; 2] {
+        self.edges
     }
 
     /// The smallest box around it.

@@ -70,12 +70,10 @@ impl Placement {
     /// What `ray`, which met `solid` there, sees.
     pub fn solid_point(&self, solid: &Solid, hit: &SolidHit, ray: &Ray, differential: &RayDifferential) -> ShapePoint {
         let at = solid.point(&self.ray(ray), hit);
-        let SolidPoint { p: own, normal, uv, dpdu, dpdv, edges, terms } = at;
+        let SolidPoint { p: own, normal, uv, edges, terms, .. } = at;
         let p = self.world_from_object.transform_point3(own).as_vec3();
         let error = ErrorBound::of_rounded(p, self.terms(terms));
         let normal = self.normal(normal).normalize_or(DVec3::Y).as_vec3();
-        let m = &self.world_from_object;
-        let tangents = [m.transform_vector3(dpdu), m.transform_vector3(dpdv)];
         // Steps on the surface as steps of uv
         let steps = differential.on_plane(ray.d, hit.t as f32, normal, f32::MAX.sqrt() * 0.5);
         let [dx, dy] = steps.map(|dp| at.uv_step(self.object_from_world.transform_vector3(dp.as_dvec3())).as_vec2());
@@ -86,8 +84,13 @@ impl Placement {
             shading: normal,
             uv: uv.as_vec2(),
             footprint: Footprint { dx, dy, edges },
-            tangents: tangents.map(|d| d.as_vec3()),
             color: Rgb::WHITE,
         }
+    }
+
+    /// How the point of `solid` that `ray` met there moves with u and with v.
+    pub fn solid_tangents(&self, solid: &Solid, hit: &SolidHit, ray: &Ray) -> [DVec3; 2] {
+        let SolidPoint { dpdu, dpdv, .. } = solid.point(&self.ray(ray), hit);
+        [dpdu, dpdv].map(|d| self.world_from_object.transform_vector3(d))
     }
 }

@@ -259,7 +259,6 @@ impl PointSet {
         let n = outwards.as_vec3();
         let (uv, dx, dy) = equirectangular(n, dpx, dpy);
         let color = self.colors.get(index as usize).map_or(Rgb::WHITE, |[r, g, b]| Rgb::new(*r, *g, *b));
-        let tangents = ball_tangents(SphereUv::Equirectangular, outwards);
         ShapePoint {
             p,
             error,
@@ -267,8 +266,16 @@ impl PointSet {
             shading: normal,
             uv,
             footprint: Footprint { dx, dy, edges: [UvEdge::Periodic, UvEdge::Bounded] },
-            tangents: tangents.map(|d| placement.world_from_object.transform_vector3(d * r).as_vec3()),
             color,
         }
+    }
+
+    /// How the point of sphere `index` that `ray` met at `t` moves with u and with v.
+    pub fn tangents(&self, placement: &Placement, index: u32, ray: &Ray, t: f64) -> [DVec3; 2] {
+        let Ball { c, r } = self.ball(index);
+        let own = placement.ray(ray);
+        let outwards = (own.o - c + own.d * t).normalize_or(DVec3::Y);
+        let tangents = ball_tangents(SphereUv::Equirectangular, outwards);
+        tangents.map(|d| placement.world_from_object.transform_vector3(d * r))
     }
 }

@@ -111,9 +111,14 @@ impl Sphere {
             SphereUv::Angles => [UvEdge::Bounded, UvEdge::Bounded],
         };
         let error = ErrorBound::of_rounded(p, self.c.abs() + DVec3::splat(self.r));
-        let tangents = ball_tangents(self.uv, outwards).map(|d| (d * self.r).as_vec3());
         let footprint = Footprint { dx, dy, edges };
-        ShapePoint { p, error, normal: n, shading: n, uv, footprint, tangents, color: Rgb::WHITE }
+        ShapePoint { p, error, normal: n, shading: n, uv, footprint, color: Rgb::WHITE }
+    }
+
+    /// How the point that `ray` meets at `t` moves with u and with v.
+    pub(crate) fn tangents(&self, ray: &Ray, t: f64) -> [DVec3; 2] {
+        let outwards = (ray.o.as_dvec3() - self.c + ray.d.as_dvec3() * t).normalize_or(DVec3::Y);
+        ball_tangents(self.uv, outwards).map(|d| d * self.r)
     }
 
     /// The smallest box around it.

@@ -41,8 +41,6 @@ pub(crate) struct ShapePoint {
     pub uv: Vec2,
     /// See [`Footprint`].
     pub footprint: Footprint,
-    /// How the point moves with u, and with v: metres for 1.
-    pub tangents: [Vec3; 2],
     /// Multiplies the colours of the material.
     pub color: Rgb,
 }
@@ -64,8 +62,6 @@ pub struct SurfaceInteraction {
     pub uv: Vec2,
     /// The patch of texture that the camera ray stands for.
     pub footprint: Footprint,
-    /// How the point moves with u, and with v: metres for 1. Not orthogonal, and no length where uv has no direction.
-    pub tangents: [Vec3; 2],
     /// Multiplies the colours of the material: linear Rec. 709.
     pub color: Rgb,
     /// What was hit.
@@ -107,8 +103,12 @@ impl RayDifferential {
     pub(crate) fn on_plane(&self, d: Vec3, t: f32, n: Vec3, limit: f32) -> [Vec3; 2] {
         let cos = n.dot(d);
         let along_plane = |v: Vec3| v - d * (n.dot(v) / cos);
-        [(self.dx, self.origin_dx), (self.dy, self.origin_dy)].map(|(dd, origin)| {
-            let step = along_plane(dd) * t + along_plane(origin);
+        let step = |dd: Vec3, origin: Vec3| {
+            let mut step = along_plane(dd) * t;
+            // Where all rays come from one eye there are no divisions for it
+            if origin != Vec3::ZERO {
+                step += along_plane(origin);
+            }
             let length2 = step.length_squared();
             // Also where the division gave infinity or no number
             if length2 <= limit * limit {
@@ -119,6 +119,8 @@ impl RayDifferential {
                 // Edge-on: along the line of sight, as far as allowed
                 (d - n * cos) * limit
             }
-        })
+        };
+        // Written out: a map of the array is not inlined
+        [step(self.dx, self.origin_dx), step(self.dy, self.origin_dy)]
     }
 }

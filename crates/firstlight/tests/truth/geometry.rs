@@ -516,3 +516,48 @@ fn many_shapes_give_the_bits_of_few() {
         assert!(bits(&few) == bits(&many), "seed {seed}: {} pixels differ", differing(&few, &many, 0.0));
     }
 }
+
+#[test]
+fn tangents_are_the_steps_from_one_hit_to_the_next() {
+    let random = &mut Random::new(11);
+    let turn = |shape: ShapeDesc| moved(shape, [0.1, -0.2, 0.3], [20.0, 30.0, 40.0], [0.8, 1.1, 0.9]);
+    let flat = parallelogram([-1.0, -1.0, 0.0], [2.0, 0.3, 0.1], [0.2, 2.0, -0.4]);
+    let shapes = [
+        ShapeDesc::Sphere(sphere([0.0; 3], 1.0)),
+        turn(ShapeDesc::Sphere(sphere([0.0; 3], 1.0))),
+        ShapeDesc::Parallelogram(flat),
+        turn(ShapeDesc::Torus(TorusDesc::new([0.0; 3], 0.75, 0.25))),
+        ShapeDesc::Mesh(ball_mesh(1.0, 6, 0.1, true, random)),
+    ];
+    for shape in shapes {
+        let desc = empty(64, 64, 1)
+            .with_camera(camera([0.0, 0.0, 3.0], [0.0; 3], 40.0))
+            .with_shape(shape)
+            .lit_by(&[corner_light([0.0, 5.0, 5.0], 1.0)]);
+        let scene = compile(&desc);
+        let step = 1.0 / 256.0;
+        let mut compared = 0;
+        for _ in 0..400 {
+            let (x, y) = (random.between(20.0, 44.0) as f32, random.between(20.0, 44.0) as f32);
+            let see = |x: f32, y: f32| {
+                let (ray, differential) = scene.camera().ray(x, y, step);
+                scene.intersect(&ray).map(|hit| (scene.surface(&ray, &hit, &differential), hit, ray))
+            };
+            let (Some((a, hit, ray)), Some((b, other, _))) = (see(x, y), see(x + step, y)) else { continue };
+            // The same triangle, and not seen edge-on
+            if hit.primitive() != other.primitive() || a.ng.dot(a.wo) < 0.2 {
+                continue;
+            }
+            let [u, v] = scene.tangents(&ray, &hit);
+            let (duv, moved) = (b.uv - a.uv, b.p - a.p);
+            // Not across a seam
+            if duv.length() > 0.1 {
+                continue;
+            }
+            let wrong = (u * duv.x + v * duv.y - moved).length();
+            assert!(wrong < 0.05 * moved.length() + 2e-6, "{desc:#?}: {wrong}, {moved}");
+            compared += 1;
+        }
+        assert!(compared > 50, "{compared}: {desc:#?}");
+    }
+}

@@ -145,13 +145,7 @@ impl Mesh {
         } else if shading.dot(normal) < 0.0 {
             normal = -normal;
         }
-        // Texture coordinates; the weights themselves where there are none
-        let part = self.part(at.triangle);
-        let corner_uvs = if part.has_uvs {
-            indices.map(|i| Vec2::from(self.uvs[i]).as_dvec2())
-        } else {
-            [DVec2::ZERO, DVec2::X, DVec2::Y]
-        };
+        let corner_uvs = self.corner_uvs(at.triangle);
         let (f1, f2) = (corner_uvs[1] - corner_uvs[0], corner_uvs[2] - corner_uvs[0]);
         let uv = corner_uvs[0] + f1 * u + f2 * v;
         // The dual basis of the edges turns steps on the surface into steps of the weights, and those of uv
@@ -164,10 +158,6 @@ impl Mesh {
             let step = f1 * dp.dot(u_axis) + f2 * dp.dot(v_axis);
             if step.is_finite() { step.as_vec2() } else { Vec2::ZERO }
         });
-        // Tangents: how the point moves with u and with v
-        let det = f1.perp_dot(f2);
-        let tangents =
-            if det != 0.0 { [(e1 * f2.y - e2 * f1.y) / det, (e2 * f1.x - e1 * f2.x) / det] } else { [e1, e2] };
         let color = if self.colors.is_empty() {
             Rgb::WHITE
         } else {
@@ -181,8 +171,30 @@ impl Mesh {
             shading: shading.as_vec3(),
             uv: uv.as_vec2(),
             footprint: Footprint { dx, dy, edges: [UvEdge::Unbounded; 2] },
-            tangents: tangents.map(|d| d.as_vec3()),
             color,
+        }
+    }
+
+    /// How a point of a triangle moves with u and with v; the edges where uv has no direction.
+    pub fn tangents(&self, placement: Option<&Placement>, triangle: u32) -> [DVec3; 2] {
+        let [a, b, c] = self.corners(triangle);
+        let [e1, e2] = [b - a, c - a].map(|e| match placement {
+            None => e,
+            Some(at) => at.world_from_object.transform_vector3(e),
+        });
+        let [a, b, c] = self.corner_uvs(triangle);
+        let (f1, f2) = (b - a, c - a);
+        let det = f1.perp_dot(f2);
+        if det != 0.0 { [(e1 * f2.y - e2 * f1.y) / det, (e2 * f1.x - e1 * f2.x) / det] } else { [e1, e2] }
+    }
+
+    /// The texture coordinates of a triangle's corners; the weights themselves where there are none.
+    #[inline(always)]
+    fn corner_uvs(&self, triangle: u32) -> [DVec2; 3] {
+        if self.part(triangle).has_uvs {
+            self.triangles[triangle as usize].map(|i| Vec2::from(self.uvs[i as usize]).as_dvec2())
+        } else {
+            [DVec2::ZERO, DVec2::X, DVec2::Y]
         }
     }
 }
