@@ -97,6 +97,15 @@ pub struct ReadingArgs {
     pub up: Option<Axis>,
 }
 
+/// `--aa-mode`
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum AntialiasingMode {
+    /// each surface in a pixel is lit once where its light bends little
+    Adaptive,
+    /// every camera ray is lit by itself
+    Full,
+}
+
 /// An axis of a model.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Axis {
@@ -166,6 +175,10 @@ pub struct RenderArgs {
     /// Points sampled on every area light, 1 to 1048576, or exact: they are integrated, not sampled [default: the scene's]
     #[arg(long, value_name = "N|exact", value_parser = samples, help_heading = "Quality")]
     pub samples: Option<SamplesDesc>,
+    /// How edges are smoothed: adaptive lights each surface in a pixel once where that is enough, full lights every camera ray
+    /// [default: adaptive]
+    #[arg(long, value_name = "MODE", help_heading = "Quality")]
+    pub aa_mode: Option<AntialiasingMode>,
     /// Renders by the plainest code there is: the same bytes, slowly
     #[arg(long, help_heading = "Quality")]
     pub reference: bool,

@@ -7,10 +7,10 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 use firstlight::{
-    Diagnostic, Format, LightDesc, RenderSettings, RenderStats, SampleSet, SamplesDesc, SceneDesc, SimdLevel, Window,
+    AaMode, Diagnostic, Format, LightDesc, RenderSettings, RenderStats, SampleSet, SamplesDesc, SceneDesc, SimdLevel, Window,
 };
 
-use crate::args::{Bits, Frames, RenderArgs};
+use crate::args::{AntialiasingMode, Bits, Frames, RenderArgs};
 use crate::input::{self, Input};
 use crate::interrupt::Watch;
 use crate::output::{self, Output, Ready, Staged, Target};
@@ -262,6 +262,12 @@ impl<'a> Plan<'a> {
         settings.tile_size = args.tile_size.unwrap_or(settings.tile_size);
         settings.crop = args.crop;
         settings.reference = args.reference;
+        if let Some(mode) = args.aa_mode {
+            settings.aa_mode = match mode {
+                AntialiasingMode::Adaptive => AaMode::Adaptive,
+                AntialiasingMode::Full => AaMode::Full,
+            };
+        }
 
         let overrides = Overrides {
             width: args.width,

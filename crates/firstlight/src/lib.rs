@@ -83,7 +83,7 @@ pub use light::{
 };
 pub use material::{BlinnPhongDesc, MaterialDesc, PhongDesc};
 pub use math::{Ray, Vec2, Vec3};
-pub use render::{Film, RenderSettings, RenderStats, SimdLevel, render};
+pub use render::{AaMode, Film, RenderSettings, RenderStats, SimdLevel, render};
 pub use scene::{Builtin, Parsed, builtin_scenes, reference, schema};
 pub use scene::{
     CameraHit, CompileOptions, Compiled, DisplayEncoding, Hit, ModelSettings, RenderDesc, Scene, SceneDesc,

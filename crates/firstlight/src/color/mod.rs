@@ -2,9 +2,11 @@
 
 mod display;
 mod quantize;
+mod steps;
 
 pub use display::{Display, Encoding};
 pub(crate) use quantize::Quantizer;
+pub(crate) use steps::DisplaySteps;
 
 use std::ops::{Add, AddAssign, Mul};
 

@@ -25,6 +25,8 @@ pub(crate) enum Hider {
 pub(crate) struct Edges {
     sides: [Linear; EDGES],
     count: usize,
+    /// What a side is divided by to be a distance, or less: at the light, not at the edge, which is nearer.
+    lengths: [f32; EDGES],
 }
 
 /// Hidden is where `quadratic` and `ahead` are 0 or more; and, of a sphere that the light's plane cuts, only where that
@@ -158,12 +160,14 @@ impl Hider {
         let linear = |v: Vec3, c: f32| Linear { c: v.dot(view.l0) - c, x: v.dot(view.a), y: v.dot(view.b) };
         let mut sides = [Linear::default(); EDGES];
         sides[0] = linear(normal, distance);
+        let mut lengths = [1.0; EDGES];
         let turn = corners[0].cross(corners[1]).dot(corners[2]);
         for i in 0..count {
             let plane = corners[i].cross(corners[(i + 1) % count]);
+            lengths[i + 1] = plane.length();
             sides[i + 1] = linear(if turn < 0.0 { -plane } else { plane }, 0.0);
         }
-        Some(Hider::Edges(Edges { sides, count: count + 1 }))
+        Some(Hider::Edges(Edges { sides, count: count + 1, lengths }))
     }
 
     /// A sphere whose centre is at `s` from the point, which is outside of it. `None` if it is wholly behind the light's plane.
@@ -262,6 +266,15 @@ impl Hider {
                 }
             }
         }
+    }
+}
+
+impl Edges {
+    /// How far inside the edges, in metres, the way to the point (x, y) of the light passes; below 0 outside.
+    pub fn depth(&self, x: f32, y: f32) -> f32 {
+        self.sides[..self.count].iter().zip(&self.lengths).fold(f32::INFINITY, |depth, (side, length)| {
+            depth.min(side.at(x, y) / length)
+        })
     }
 }
 

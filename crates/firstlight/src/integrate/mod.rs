@@ -9,8 +9,11 @@
 //!
 //! A highlight that is narrow beside the light is integrated by itself, over the part of the light that it covers.
 
+mod between;
+mod emitter;
 mod hider;
 mod lobe;
+mod mask;
 mod rows;
 mod rules;
 mod tensor;
@@ -20,10 +23,14 @@ use std::ops::Add;
 
 use fearless_simd::prelude::*;
 
-pub(crate) use hider::Hider;
-pub(crate) use rows::MAX_HIDERS;
+pub(crate) use between::{Asker, Between};
+pub(crate) use emitter::Emitter;
+use hider::Hider;
+pub(crate) use mask::Masked;
 use rows::Region;
-pub(crate) use view::{FlatLight, Outline, Receiver, View};
+pub(crate) use tensor::sharpness;
+pub(crate) use view::{Receiver, View};
+use view::Outline;
 
 use crate::material::Lobe;
 

@@ -116,6 +116,8 @@ pub(crate) struct View {
     pub lb: f32,
     /// Of the point above the light's plane.
     pub height: f32,
+    /// How far the point is in front of a side that emits; infinite where both do.
+    pub facing: f32,
     /// ns.l
     pub cos: Linear,
     /// The height of l above the horizon.
@@ -133,27 +135,16 @@ pub(crate) struct View {
 }
 
 impl View {
-    /// `None` where no light arrives: the side that faces the point does not emit, or the light is below the horizon.
-    pub fn new(light: &FlatLight, at: &Receiver) -> Option<View> {
+    pub fn new(light: &FlatLight, at: &Receiver) -> View {
         let l0 = (light.c - at.p.as_dvec3()).as_vec3();
         let side = -light.n.dot(l0);
-        if !light.both_sides && !(side > 0.0) {
-            return None;
-        }
-        let height = side.abs();
-        if light.physical && height == 0.0 {
-            return None;
-        }
         let linear = |v: Vec3| Linear { c: v.dot(l0), x: v.dot(light.a), y: v.dot(light.b) };
         let (cos, horizon) = (linear(at.ns), linear(at.horizon));
-        if !(cos.max() > 0.0 && horizon.max() > 0.0) {
-            return None;
-        }
         let area = match light.outline {
             Outline::Parallelogram => 4.0,
             Outline::Disk => std::f32::consts::PI,
         };
-        Some(View {
+        View {
             l0,
             a: light.a,
             b: light.b,
@@ -162,7 +153,8 @@ impl View {
             skew: light.skew,
             fb: l0.dot(light.ub),
             lb: light.lb,
-            height,
+            height: side.abs(),
+            facing: if light.both_sides { f32::INFINITY } else { side },
             cos,
             horizon,
             out: linear(at.wo),
@@ -173,7 +165,31 @@ impl View {
             physical: light.physical,
             outline: light.outline,
             measure: if light.physical { light.la * light.lb } else { 1.0 / area },
-        })
+        }
+    }
+
+    /// Whether any light can arrive: a side that emits faces the point, and some of the light is above the horizon.
+    #[inline(always)]
+    pub fn arrives(&self) -> bool {
+        self.facing > 0.0 && (self.height > 0.0 || !self.physical) && self.cos.max() > 0.0 && self.horizon.max() > 0.0
+    }
+
+    /// The distance to the nearest place of the light's square, or a little less.
+    pub fn nearest(&self) -> f32 {
+        let gap = |foot: f32, half: f32| (foot.abs() - half).max(0.0);
+        let (x, y) = (gap(self.fa, self.la + self.skew.abs()), gap(self.fb, self.lb));
+        (x * x + y * y + self.height * self.height).sqrt()
+    }
+
+    /// The most that can arrive, or thereabouts: the cosine at the surface is 1, and nothing is in the way.
+    pub fn most(&self) -> f32 {
+        if !self.physical {
+            return 1.0;
+        }
+        let size = self.la.max(self.lb);
+        let distance = self.nearest().max(0.3 * size);
+        // No more than a whole half space of light
+        (4.0 * self.measure * self.height.min(distance) / (distance * distance * distance)).min(std::f32::consts::PI)
     }
 
     /// The way to the point (x, y) of the light.

@@ -99,18 +99,24 @@ impl DiskLightDesc {
     }
 }
 
+/// The point of the unit disk that stands for a point of the square [-1, 1]^2.
+pub(crate) fn concentric([x, y]: [f64; 2]) -> [f64; 2] {
+    if x == 0.0 && y == 0.0 {
+        return [0.0; 2];
+    }
+    let (r, angle) = if x.abs() > y.abs() { (x, FRAC_PI_4 * (y / x)) } else { (y, FRAC_PI_4 * (2.0 - x / y)) };
+    let (sin, cos) = f_sincos(angle);
+    [r * cos, r * sin]
+}
+
 impl Disk {
     /// The point that stands for `uv` of the unit square: squares around its middle become circles.
     ///
     /// Source: Shirley, Chiu, "A low distortion map between disk and square", Journal of Graphics Tools 2(3), 1997.
     pub(super) fn point(&self, uv: [f64; 2]) -> DVec3 {
         let [x, y] = uv.map(|w| 2.0 * w - 1.0);
-        if x == 0.0 && y == 0.0 {
-            return self.center;
-        }
-        let (r, angle) = if x.abs() > y.abs() { (x, FRAC_PI_4 * (y / x)) } else { (y, FRAC_PI_4 * (2.0 - x / y)) };
-        let (sin, cos) = f_sincos(angle);
-        self.center + self.a * (r * cos) + self.b * (r * sin)
+        let [x, y] = concentric([x, y]);
+        self.center + self.a * x + self.b * y
     }
 
     #[inline(always)]

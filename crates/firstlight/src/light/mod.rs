@@ -18,6 +18,7 @@ use crate::transform::TransformDesc;
 pub use area::{Area, AreaShape};
 pub use directional::{Directional, DirectionalDesc};
 pub use disk::{Disk, DiskLightDesc};
+pub(crate) use disk::concentric;
 pub use point::{Point, PointDesc};
 pub use rectangle::{Rectangle, RectangleDesc};
 pub use samples::SampleSet;

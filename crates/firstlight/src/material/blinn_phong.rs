@@ -33,7 +33,7 @@ table! {
 ///
 /// |wi + wo|^2 = 2 + 2 wi.wo, so (n.h)^2 = (n.wi + n.wo)^2 / (2 + 2 wi.wo), and (n.h)^s is that to the power s / 2: no
 /// square root, and for an even whole exponent no logarithm.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BlinnPhongLobe {
     half_exponent: Exponent,
 }

@@ -89,7 +89,7 @@ pub struct Bsdf {
 }
 
 /// A highlight in numbers.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Lobe {
     /// No highlight.
     None,

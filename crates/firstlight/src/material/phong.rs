@@ -30,7 +30,7 @@ table! {
 }
 
 /// max(r.wo, 0)^shininess with r = 2 (n.wi) n - wi, so that r.wo = 2 (n.wi) (n.wo) - wi.wo.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PhongLobe {
     exponent: Exponent,
 }

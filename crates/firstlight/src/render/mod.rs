@@ -5,13 +5,16 @@
 //! share the way from pixel to surface and from light to film; what differs is how the light of one source is summed at
 //! one surface, the trait [`Lighting`].
 
+mod arrival;
 mod film;
 mod hits;
 mod lanes;
+mod patch;
 mod pixel;
 mod plain;
 mod simd;
 mod tile;
+mod tiled;
 
 use std::num::NonZeroUsize;
 use std::ops::ControlFlow;
@@ -25,17 +28,30 @@ pub use simd::SimdLevel;
 
 use crate::camera::Projection;
 use crate::color::{Display, Encoding};
-use crate::describe::SamplesDesc;
+use crate::describe::{SamplesDesc, words};
 use crate::image::{Receipt, Window};
 use crate::light::Light;
 use crate::math::Ray;
 use crate::scene::Scene;
+use arrival::{Arrivals, Lights};
 use film::FilmTile;
 use hits::PixelHits;
 use lanes::Lanes;
 use pixel::{Lighting, PixelSum};
 use plain::Plain;
 use tile::Tile;
+use tiled::Tiled;
+
+words! {
+    /// How the edges of what a pixel holds are smoothed.
+    pub enum AaMode {
+        /// All n x n camera rays say what is seen; light is taken once for each surface in a pixel where it is shown to
+        /// bend little over it.
+        Adaptive = "adaptive",
+        /// Each of the n x n camera rays is lit by itself.
+        Full = "full",
+    }
+}
 
 /// A caller's wishes. None of them changes a bit of the picture, but `crop`, which chooses its part.
 #[derive(Clone, Debug, PartialEq)]
@@ -49,7 +65,9 @@ pub struct RenderSettings {
     pub simd: SimdLevel,
     /// The part of the film to render; all of it if `None`.
     pub crop: Option<Window>,
-    /// Renders with the plain code that is the specification.
+    /// How edges are smoothed.
+    pub aa_mode: AaMode,
+    /// Renders with the plain code that is the specification: all lights are sampled, and each camera ray is lit by itself.
     pub reference: bool,
 }
 
@@ -109,7 +127,7 @@ impl RenderSettings {
 
 impl Default for RenderSettings {
     fn default() -> Self {
-        RenderSettings { threads: None, tile_size: 16, simd: SimdLevel::Auto, crop: None, reference: false }
+        RenderSettings { threads: None, tile_size: 16, simd: SimdLevel::Auto, crop: None, aa_mode: AaMode::Adaptive, reference: false }
     }
 }
 
@@ -161,6 +179,9 @@ pub fn render(
     let (done, stop) = (AtomicU64::new(0), AtomicBool::new(false));
     let totals = [const { AtomicU64::new(0) }; 3];
     let level = settings.simd.resolve();
+    let lights = Lights::new(scene);
+    // Where every light is sampled at every ray, the bits are those of the plain renderer
+    let every_ray = settings.aa_mode == AaMode::Full && lights.emitters.iter().all(Option::is_none);
     let render_one = |tile: &Tile| {
         if stop.load(Ordering::Relaxed) {
             return;
@@ -174,6 +195,10 @@ pub fn render(
         };
         let rendered = if settings.reference {
             render_tile(scene, tile, &mut Plain, None, &go_on)
+        } else if !every_ray {
+            let token = level.token();
+            let arrivals = Arrivals::new(scene, &lights, token);
+            Tiled::new(scene, settings.aa_mode, PixelHits::new(token, scene.antialiasing), arrivals).render(tile, &go_on)
         } else {
             let token = level.token();
             let hits = scene.geometry.has_trees().then(|| PixelHits::new(token, scene.antialiasing));

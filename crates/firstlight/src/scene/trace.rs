@@ -84,6 +84,12 @@ impl Scene {
     /// [`occluded`](Self::occluded) for a ray towards the light of that index, whose own shape does not hide it.
     #[inline]
     pub(crate) fn occluded_from(&self, ray: &ShadowRay, light: Option<usize>) -> bool {
+        self.occluded_by_lists(ray, light) || self.geometry.has_trees() && self.geometry.is_blocked(self.level, ray)
+    }
+
+    /// The part of [`occluded_from`](Self::occluded_from) that does not lie in trees.
+    #[inline]
+    pub(crate) fn occluded_by_lists(&self, ray: &ShadowRay, light: Option<usize>) -> bool {
         let finite = ray.is_finite();
         let round = &self.light_obstacles;
         let others = |index: usize| light != Some(index);
@@ -97,7 +103,6 @@ impl Scene {
                 .disks
                 .iter()
                 .any(|(index, disk)| others(*index) && disk.shadow(ray.p, ray.error).blocks(ray.l, finite))
-            || self.geometry.has_trees() && self.geometry.is_blocked(self.level, ray)
     }
 
     /// The surface at a hit, turned to the viewer. `differential` is that of the camera ray.

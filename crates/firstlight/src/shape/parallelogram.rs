@@ -145,6 +145,31 @@ impl Parallelogram {
         self.edges
     }
 
+    /// The four corners, around, in f64.
+    #[inline(always)]
+    pub(crate) fn deep_corners(&self) -> [DVec3; 4] {
+        let [e0, e1] = self.edges;
+        [self.p, self.p + e0, self.p + e0 + e1, self.p + e1]
+    }
+
+    /// How far outside of the edges a point of the plane is, in metres, or less; below 0 inside.
+    pub(crate) fn outside(&self, q: DVec3) -> f64 {
+        let from = q - self.p;
+        let outside = |axis: DVec3| {
+            let w = from.dot(axis);
+            (-w).max(w - 1.0) / axis.length()
+        };
+        outside(self.u_axis).max(outside(self.v_axis))
+    }
+
+    /// At most how near it is to a point: exactly, where its edges are perpendicular.
+    pub(crate) fn distance(&self, q: DVec3) -> f64 {
+        let from = q - self.p;
+        let height = self.n.dot(from).abs();
+        let aside = self.outside(q).max(0.0);
+        (height * height + aside * aside).sqrt()
+    }
+
     /// The smallest box around it.
     pub(crate) fn bounds(&self) -> [DVec3; 2] {
         let [e0, e1] = self.edges;

@@ -195,6 +195,12 @@ pub(crate) struct SphereShadow {
 }
 
 impl SphereShadow {
+    /// Whether the point lies on the sphere.
+    #[inline(always)]
+    pub fn is_on(&self) -> bool {
+        self.side == Side::On
+    }
+
     /// Whether the sphere cannot hide any light that arrives on the side `n` (unit) of the point: because the point lies
     /// on its outside, and it is convex; or because all of it is below the point's horizon, by more than the rounding of
     /// [`blocks`](Self::blocks), which is below 2e-4 r near the sphere and below 1e-6 |f| far from it.

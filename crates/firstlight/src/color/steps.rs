@@ -1,0 +1,90 @@
+//! How far an error of linear light shows.
+
+use super::{Display, Encoding, Rgb};
+
+/// Entries for each doubling of the value.
+const PER_OCTAVE: u32 = 8;
+/// The table begins at 2^-40 and ends at 2^24.
+const FIRST: i32 = -40;
+const LAST: i32 = 24;
+const ENTRIES: usize = ((LAST - FIRST) as u32 * PER_OCTAVE) as usize + 1;
+
+/// The display encoding as a table, for judging errors: in steps of an 8-bit picture. Beyond white it goes on as steep as
+/// it is there, over the value: what a picture cuts off may still be wanted in a file of floats.
+#[derive(Clone, Debug)]
+pub(crate) struct DisplaySteps {
+    encoded: Vec<f32>,
+}
+
+impl DisplaySteps {
+    pub fn new(display: &Display) -> Self {
+        let encoding = display.encoding;
+        // Of the curve at white
+        let slope = match encoding {
+            Encoding::Srgb => 1.055 / 2.4,
+            Encoding::Gamma(gamma) => 1.0 / gamma,
+            Encoding::Linear => 1.0,
+        };
+        let factor = display.factor();
+        let encode = |i: usize| {
+            let (octave, part) = (i as i32 / PER_OCTAVE as i32 + FIRST, i as u32 % PER_OCTAVE);
+            let value = pxfm::f_exp2(f64::from(octave)) * (1.0 + f64::from(part) / f64::from(PER_OCTAVE)) * factor;
+            let value = if value < 1.0 { encoding.encode(value) } else { 1.0 + slope * pxfm::f_log(value) };
+            (255.0 * value) as f32
+        };
+        DisplaySteps { encoded: (0..ENTRIES).map(encode).collect() }
+    }
+
+    /// The encoded value of a linear one, 0 or more, in steps.
+    #[inline(always)]
+    fn encode(&self, value: f32) -> f32 {
+        const SHIFT: u32 = 23 - PER_OCTAVE.ilog2();
+        const START: u32 = ((127 + FIRST) as u32) << 23;
+        let bits = value.to_bits();
+        if !(value >= f32::from_bits(START)) {
+            return self.encoded[0] * (value.max(0.0) * f32::from_bits(((127 - FIRST) as u32) << 23));
+        }
+        let place = (((bits - START) >> SHIFT) as usize).min(ENTRIES - 2);
+        let part = (bits & ((1 << SHIFT) - 1)) as f32 / (1u32 << SHIFT) as f32;
+        self.encoded[place] + (self.encoded[place + 1] - self.encoded[place]) * part
+    }
+
+    /// How many steps a value of at least `value` can be off by an error of `error`, 0 or more.
+    #[inline(always)]
+    pub fn of_error(&self, value: f32, error: f32) -> f32 {
+        if error == 0.0 {
+            return 0.0;
+        }
+        let low = (value - error).max(0.0);
+        self.encode(low + error) - self.encode(low)
+    }
+
+    /// The most steps of any channel.
+    #[inline(always)]
+    pub fn of_color(&self, value: Rgb, error: Rgb) -> f32 {
+        let of = |v, e| self.of_error(v, e);
+        of(value.r, error.r).max(of(value.g, error.g)).max(of(value.b, error.b))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn steps_are_those_of_the_encoding() {
+        for encoding in [Encoding::Srgb, Encoding::Gamma(2.2), Encoding::Linear] {
+            let display = Display { encoding, exposure: -1.0 };
+            let steps = DisplaySteps::new(&display);
+            for i in 0..200 {
+                let value = 1.9 * (i as f32 / 200.0).powi(4);
+                let truth = display.encode(value) * 255.0;
+                assert!((f64::from(steps.encode(value)) - truth).abs() < 0.12, "{encoding:?} {value}");
+            }
+            assert_eq!(steps.of_error(0.3, 0.0), 0.0);
+            // Where nothing is lit an error shows as much as it can
+            assert!(steps.of_error(0.0, 1e-3) >= steps.of_error(0.5, 1e-3));
+            assert!(steps.of_error(1e6, 1.0) > 0.0 && steps.of_error(1e30, 1e30).is_finite());
+        }
+    }
+}

@@ -1,0 +1,256 @@
+//! What stands between a point, with the patch of surface around it, and a flat light.
+
+use arrayvec::ArrayVec;
+
+use super::emitter::Emitter;
+use super::hider::Hider;
+use super::rows::MAX_HIDERS;
+use super::view::View;
+use crate::math::{DVec3, Vec3};
+use crate::scene::Scene;
+use crate::shape::{Parallelogram, PlaneSide, Sphere, SurfaceInteraction};
+
+/// Who asks, and for how much of a surface.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Asker<'a> {
+    pub si: &'a SurfaceInteraction,
+    /// How far the patch of surface reaches from the point, in metres; 0 for the point alone.
+    pub reach: f32,
+}
+
+/// What may hide a light.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Between {
+    /// Convex things that hide a part of it.
+    pub hiders: ArrayVec<Hider, MAX_HIDERS>,
+    /// Whether all of it is hidden from the point.
+    pub hidden: bool,
+    /// Whether more is in the way than can be told row by row: each way has to be asked.
+    pub ask: bool,
+    /// Over how much of the light's size the outline of a shadow moves on it where the point moves across the patch; 0
+    /// where the patch is proved to be lit, or hidden, as one.
+    pub drift: f32,
+}
+
+/// Side planes of the pyramid over a light, and how the patch sees it.
+struct Pyramid {
+    /// Unit normals, outwards.
+    sides: [Vec3; 4],
+    corners: [Vec3; 4],
+    /// The farthest of the light.
+    far: f32,
+    /// The size of the light across the line of sight, at least.
+    size: f32,
+    reach: f32,
+}
+
+impl Pyramid {
+    fn new(view: &View, reach: f32) -> Pyramid {
+        let corners = view.corners();
+        let turn = corners[0].cross(corners[1]).dot(corners[2]);
+        let mut sides = [Vec3::ZERO; 4];
+        for i in 0..4 {
+            let n = corners[i].cross(corners[(i + 1) % 4]);
+            let n = if turn > 0.0 { -n } else { n };
+            sides[i] = n.normalize_or_zero();
+        }
+        let far = corners.iter().fold(0.0f32, |far, corner| far.max(corner.length()));
+        // Foreshortened
+        let slant = view.height / view.l0.length().max(f32::MIN_POSITIVE);
+        let size = 2.0 * view.la.min(view.lb) * slant.max(0.02);
+        Pyramid { sides, corners, far, size, reach }
+    }
+
+    /// How far outside of one side a ball around `s` of radius `r` lies, at most.
+    fn gap(&self, s: Vec3, r: f32) -> f32 {
+        self.sides.iter().fold(f32::NEG_INFINITY, |gap, n| gap.max(n.dot(s))) - r
+    }
+
+    /// The same of the hull of some points.
+    fn gap_of(&self, points: &[Vec3]) -> f32 {
+        let least = |n: &Vec3| points.iter().fold(f32::INFINITY, |least, q| least.min(n.dot(*q)));
+        self.sides.iter().fold(f32::NEG_INFINITY, |gap, n| gap.max(least(n)))
+    }
+
+    /// See [`Between::drift`]: of a shadow that something casts which is `near` to the point.
+    fn drift(&self, near: f32) -> f32 {
+        let t = (near / self.far).clamp(1e-6, 1.0);
+        2.0 * self.reach * (1.0 - t) / (t * self.size)
+    }
+}
+
+/// Room for the rounding of a distance.
+const SLACK: f32 = 1e-5;
+
+impl Between {
+    /// Looks at all that is in lists; what is in trees is not.
+    pub fn look(scene: &Scene, light: usize, emitter: &Emitter, view: &View, asker: &Asker) -> Between {
+        let mut between = Between::default();
+        let pyramid = Pyramid::new(view, asker.reach);
+        let (p, horizon) = (asker.si.p, asker.si.ng);
+        for sphere in &scene.obstacles {
+            between.sphere(view, emitter, &pyramid, sphere, asker, horizon);
+            if between.hidden {
+                return between;
+            }
+        }
+        for (index, sphere) in &scene.light_obstacles.spheres {
+            if *index != light {
+                between.sphere(view, emitter, &pyramid, sphere, asker, horizon);
+            }
+        }
+        let sides = &scene.light_sides[light];
+        for (i, flat) in scene.flat_obstacles.iter().enumerate() {
+            let side = sides.get(i).copied().unwrap_or(PlaneSide::Both);
+            let shadow = flat.shadow(p, asker.si.error);
+            if !shadow.is_one_sided(side) {
+                between.flat(view, emitter, &pyramid, flat, asker);
+            } else if asker.reach > 0.0 && side == PlaneSide::Both {
+                // A patch that the plane cuts
+                between.drift = between.drift.max(pyramid.drift(0.0));
+            }
+            if between.hidden {
+                return between;
+            }
+        }
+        between.ask |= scene.light_obstacles.disks.iter().any(|(index, _)| *index != light);
+        between
+    }
+
+    fn add(&mut self, hider: Option<Hider>) {
+        if let Some(hider) = hider
+            && self.hiders.try_push(hider).is_err()
+        {
+            self.ask = true;
+        }
+    }
+
+    fn sphere(
+        &mut self,
+        view: &View,
+        emitter: &Emitter,
+        pyramid: &Pyramid,
+        sphere: &Sphere,
+        asker: &Asker,
+        horizon: Vec3,
+    ) {
+        let si = asker.si;
+        let shadow = sphere.shadow(si.p, si.error);
+        if shadow.is_below(horizon) {
+            // The whole patch, if the sphere is the surface's own, or deep enough
+            let s = (sphere.c - si.p.as_dvec3()).as_vec3();
+            let (r, distance) = (sphere.r as f32, s.length());
+            let own = (distance - r).abs() <= r * 1e-3;
+            if !own && -horizon.dot(s) - r < asker.reach * (1.0 + distance) {
+                self.drift = self.drift.max(pyramid.drift((distance - r).max(0.0)));
+            }
+            return;
+        }
+        let to = sphere.c - si.p.as_dvec3();
+        let (distance, r) = (to.length(), sphere.r);
+        // From inside, or from its inner side: light from outside is hidden, light from inside is not
+        if distance <= r * (1.0 + 1e-6) || shadow.is_on() {
+            let l = pyramid.corners;
+            let outside = |l: &Vec3| (l.as_dvec3() - to).length() > r * (1.0 + 1e-6);
+            let inside = |l: &Vec3| (l.as_dvec3() - to).length() < r * (1.0 - 1e-6);
+            if l.iter().all(inside) {
+                return;
+            }
+            // All of the light is outside only if the sphere does not reach through it
+            let apart = self.is_apart(view, to, r);
+            if l.iter().all(outside) && apart {
+                self.hidden = true;
+                return;
+            }
+            self.ask = true;
+            self.drift = self.drift.max(pyramid.drift(0.0));
+            return;
+        }
+        let s = to.as_vec3();
+        let gap = pyramid.gap(s, r as f32);
+        if gap > SLACK * distance as f32 + asker.reach {
+            return;
+        }
+        let near = (distance - r) as f32;
+        self.drift = self.drift.max(pyramid.drift((near - asker.reach).max(0.0)));
+        if gap > SLACK * distance as f32 {
+            return;
+        }
+        if touches(emitter, to, r, si.p) {
+            self.ask = true;
+            return;
+        }
+        let Some(hider) = Hider::sphere(view, to, r) else { return };
+        self.settle(pyramid, hider, view, asker, to, r - f64::from(asker.reach));
+        if !self.hidden {
+            self.add(Some(hider));
+        }
+    }
+
+    /// Whether the light's plane stays clear of the sphere.
+    fn is_apart(&self, view: &View, to: DVec3, r: f64) -> bool {
+        let n = view.a.cross(view.b).normalize().as_dvec3();
+        n.dot(view.l0.as_dvec3() - to).abs() > r
+    }
+
+    /// One convex thing hides all of the light if it hides its corners.
+    fn settle(&mut self, pyramid: &Pyramid, hider: Hider, view: &View, asker: &Asker, to: DVec3, r: f64) {
+        let corners = [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]];
+        if !corners.iter().all(|[x, y]| hider.hides(*x, *y)) {
+            return;
+        }
+        self.hidden = true;
+        // The whole patch: the ways to the corners pass the sphere's middle nearly as closely from all of it
+        let firm = r > 0.0 && asker.reach > 0.0 && Hider::sphere(view, to, r).is_some_and(|smaller| {
+            corners.iter().all(|[x, y]| smaller.hides(*x, *y))
+        });
+        self.drift = if firm || asker.reach == 0.0 { 0.0 } else { self.drift.max(pyramid.drift((to.length() - r) as f32)) };
+    }
+
+    fn flat(&mut self, view: &View, emitter: &Emitter, pyramid: &Pyramid, flat: &Parallelogram, asker: &Asker) {
+        let from = asker.si.p.as_dvec3();
+        let corners = flat.deep_corners().map(|q| (q - from).as_vec3());
+        // Below the horizon
+        let above = corners.iter().fold(f32::NEG_INFINITY, |above, q| above.max(asker.si.ng.dot(*q)));
+        let size = corners.iter().fold(0.0f32, |size, q| size.max(q.length()));
+        if above < -SLACK * size - asker.reach {
+            return;
+        }
+        let gap = pyramid.gap_of(&corners);
+        if gap > SLACK * size + asker.reach {
+            return;
+        }
+        let near = flat.distance(from) as f32;
+        let drift = self.drift.max(pyramid.drift((near - asker.reach).max(0.0)));
+        self.drift = drift;
+        if gap > SLACK * size {
+            return;
+        }
+        if let Emitter::Ball { center, radius } = emitter
+            && flat.distance(*center) < *radius
+        {
+            self.ask = true;
+            return;
+        }
+        let Some(hider) = Hider::polygon(view, &corners) else { return };
+        let ends = [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]];
+        if ends.iter().all(|[x, y]| hider.hides(*x, *y)) {
+            self.hidden = true;
+            let Hider::Edges(edges) = &hider else { return };
+            let share = (near / pyramid.far).min(1.0);
+            let firm = ends.iter().all(|[x, y]| edges.depth(*x, *y) * share > asker.reach);
+            self.drift = if firm || asker.reach == 0.0 { 0.0 } else { drift };
+            return;
+        }
+        self.add(Some(hider));
+    }
+}
+
+/// Whether a sphere reaches into a light that is a ball: what of it is behind the light's surface does not show on the disk
+/// that stands for the light.
+fn touches(emitter: &Emitter, to: DVec3, r: f64, p: Vec3) -> bool {
+    match emitter {
+        Emitter::Ball { center, radius } => (*center - p.as_dvec3() - to).length() < radius + r,
+        _ => false,
+    }
+}

@@ -1,0 +1,351 @@
+//! How much of one light arrives at one place of a surface, and how much that bends over the patch around it.
+
+use fearless_simd::Level;
+
+use super::Counts;
+use super::lanes::Lanes;
+use super::pixel::Lighting;
+use super::plain::Plain;
+use crate::color::{DisplaySteps, Rgb};
+use crate::integrate::{Asker, Between, Emitter, Masked, Receiver, Sums, View, integrate, sharpness};
+use crate::light::{Light, LightKind};
+use crate::material::Lobe;
+use crate::math::{Vec3, dispatch_wide};
+use crate::scene::Scene;
+use crate::shape::{PlaneSide, SurfaceInteraction};
+
+/// What of one light arrives.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Arrival {
+    pub sums: Sums,
+    /// How far the mean over the patch can be from what arrives at its middle.
+    pub bend: Sums,
+}
+
+/// A place of a surface that asks for light.
+#[derive(Clone, Copy)]
+pub(crate) struct Place<'a> {
+    pub si: &'a SurfaceInteraction,
+    pub lobe: &'a Lobe,
+    /// How far the patch reaches from its middle, in metres; 0 for a point.
+    pub reach: f32,
+    /// How far the normal turns on the way, in radians.
+    pub turn: f32,
+    /// What is there beside this light, at least.
+    pub base: Rgb,
+    /// What the two sums are multiplied with.
+    pub colors: [Rgb; 2],
+}
+
+/// What all tiles share: the lights as they are integrated, and how errors show.
+pub(crate) struct Lights {
+    /// For each light, if it is integrated.
+    pub emitters: Vec<Option<Emitter>>,
+    pub steps: DisplaySteps,
+    /// In display steps: how far one light may be wrong at a place.
+    tolerance: f32,
+}
+
+/// In display steps: how far all lights together may be wrong.
+const TOLERANCE: f32 = 0.15;
+
+impl Lights {
+    pub fn new(scene: &Scene) -> Lights {
+        let emitter = |light: &Light| match &light.kind {
+            LightKind::Area(area) if light.exact => Some(Emitter::new(area)),
+            _ => None,
+        };
+        let emitters: Vec<_> = scene.lights.iter().map(emitter).collect();
+        let tolerance = TOLERANCE / (emitters.len().max(1) as f32).sqrt();
+        Lights { emitters, steps: DisplaySteps::new(&scene.display), tolerance }
+    }
+}
+
+/// The lights, as one thread asks for them.
+pub(crate) struct Arrivals<'a> {
+    scene: &'a Scene,
+    lights: &'a Lights,
+    level: Level,
+    sampled: Lanes,
+}
+
+impl<'a> Arrivals<'a> {
+    pub fn new(scene: &'a Scene, lights: &'a Lights, level: Level) -> Self {
+        Arrivals { scene, lights, level, sampled: Lanes::new(level) }
+    }
+
+    /// Has to be called first at each place.
+    pub fn look_around(&mut self, si: &SurfaceInteraction) {
+        if self.lights.emitters.iter().any(Option::is_none) {
+            self.sampled.look_around(self.scene, si);
+        }
+    }
+
+    /// How many display steps a value can be off by an error.
+    pub fn steps(&self, value: Rgb, error: Rgb) -> f32 {
+        self.lights.steps.of_color(value, error)
+    }
+
+    /// What the sums of light `index` are multiplied with, before the colours of the surface.
+    pub fn scale(&self, index: usize) -> Rgb {
+        let light = &self.scene.lights[index];
+        if self.lights.emitters[index].is_some() { light.intensity } else { light.scale }
+    }
+
+    /// What of light `index` arrives.
+    pub fn arrival(&mut self, index: usize, place: &Place, counts: &mut Counts) -> Arrival {
+        let light = &self.scene.lights[index];
+        match (&self.lights.emitters[index], &light.kind) {
+            (Some(emitter), _) => self.integrated(index, emitter, place, counts),
+            (None, LightKind::Area(area)) => {
+                let sums = self.sampled.gather(self.scene, index, place.si, place.lobe, counts);
+                let sums = Sums { diffuse: sums.diffuse.total(), specular: sums.specular.total() };
+                let mut arrival = Arrival { sums, bend: Sums::default() };
+                if place.reach > 0.0 {
+                    // As it would be if it were integrated, in the unit of samples
+                    let emitter = Emitter::new(area);
+                    let one = area.samples() as f32 / if area.physical { area.measure() as f32 } else { 1.0 };
+                    let bend = self.bend_of(index, &emitter, place);
+                    arrival.bend = Sums { diffuse: bend.diffuse * one, specular: bend.specular * one };
+                }
+                arrival
+            }
+            (None, _) => self.single(index, light, place, counts),
+        }
+    }
+
+    /// A light of one point.
+    fn single(&mut self, index: usize, light: &Light, place: &Place, counts: &mut Counts) -> Arrival {
+        let si = place.si;
+        let sums = Plain.gather(self.scene, index, si, place.lobe, counts);
+        let sums = Sums { diffuse: sums.diffuse.total(), specular: sums.specular.total() };
+        if place.reach == 0.0 {
+            return Arrival { sums, bend: Sums::default() };
+        }
+        let to = light.towards(0, si.p);
+        let distance = if to.finite { to.l.length() } else { f32::INFINITY };
+        // The most that can arrive on the patch, the cosine being 1
+        let near = (distance - place.reach).max(0.0);
+        let (height, behind) = (si.ns.dot(to.l).min(si.ng.dot(to.l)), place.reach + place.turn * to.l.length());
+        if height < -behind {
+            return Arrival { sums, bend: Sums::default() };
+        }
+        let Some(sample) = light.sample(0, to.l) else {
+            return Arrival { sums, bend: Sums { diffuse: f32::MAX, specular: f32::MAX } };
+        };
+        let weight = sample.weight.max(sums.diffuse) * 1.2;
+        // A spot's rim, a terminator, a shadow's edge
+        let rim = match &light.kind {
+            LightKind::Spot(spot) => {
+                let toward = (-to.l).normalize_or_zero();
+                let cos = 1.0 - toward.dot(spot.axis);
+                let swing = 2.0 * place.reach / near.max(f32::MIN_POSITIVE);
+                if (cos - spot.outer).abs() < swing * 2.0 { 1.0 } else { swing * spot.inverse_fade.min(1e6) * swing }
+            }
+            _ => 0.0,
+        };
+        let weight = if rim >= 1.0 { weight.max(1.0 / (near * near).max(f32::MIN_POSITIVE)) } else { weight };
+        let edge = if light.shadows && si.receives_shadow { self.edge(index, to.l, to.finite, place) } else { 0.0 };
+        let swing = place.turn + place.reach / distance;
+        let terminator = if height < behind { swing * 0.5 } else { 0.0 };
+        let smooth = swing * swing;
+        let share = (edge + rim + terminator + smooth).min(1.0);
+        let lobe = (sharp_of(place.lobe, si) * (2.0 * place.turn + place.reach / distance).powi(2)).min(1.0);
+        let specular = if matches!(place.lobe, Lobe::None) { 0.0 } else { weight * (edge + rim + terminator + lobe).min(1.0) };
+        Arrival { sums, bend: Sums { diffuse: weight * share, specular } }
+    }
+
+    /// Whether the edge of a shadow, of a light of one point, may run through the patch: 1, or 0 if that is excluded.
+    fn edge(&self, light: usize, l: Vec3, finite: bool, place: &Place) -> f32 {
+        let (scene, si) = (self.scene, place.si);
+        if scene.geometry.has_trees() || !scene.light_obstacles.disks.is_empty() {
+            return 1.0;
+        }
+        let length = l.length();
+        let d = l / length;
+        let end = if finite { length } else { f32::INFINITY };
+        let spheres = scene.obstacles.iter();
+        let lights = scene.light_obstacles.spheres.iter().filter(|(index, _)| *index != light).map(|(_, sphere)| sphere);
+        for sphere in spheres.chain(lights) {
+            let s = (sphere.c - si.p.as_dvec3()).as_vec3();
+            let (r, distance) = (sphere.r as f32, s.length());
+            // The surface's own sphere, from outside
+            if (distance - r).abs() <= r * 1e-3 && s.dot(si.ng) < 0.0 {
+                continue;
+            }
+            let t = s.dot(d).clamp(0.0, end);
+            let miss = (s - d * t).length();
+            let through = distance > r + place.reach && end - s.dot(d) > r + place.reach && s.dot(d) > 0.0;
+            let slack = place.reach + (distance + length.min(1e30)) * 1e-5;
+            if miss > r + slack {
+                continue;
+            }
+            if through && miss < r - slack {
+                return 0.0;
+            }
+            return 1.0;
+        }
+        let mut edge = 0.0;
+        for flat in &scene.flat_obstacles {
+            let n = flat.n.as_vec3();
+            let height = flat.n.dot(si.p.as_dvec3() - flat.p) as f32;
+            let tip = if finite { height + n.dot(l) } else if n.dot(l) * height < 0.0 { -height } else { height };
+            let slack = place.reach + (height.abs() + length.min(1e30)) * 1e-5;
+            if height.abs() <= slack && flat.shadow(si.p, si.error).is_one_sided(PlaneSide::Both) {
+                // The surface's own
+                continue;
+            }
+            if height > slack && tip > slack || height < -slack && tip < -slack {
+                continue;
+            }
+            let t = -f64::from(height) / f64::from(n.dot(l));
+            let hit = si.p.as_dvec3() + l.as_dvec3() * t;
+            let aside = flat.outside(hit) as f32;
+            if aside > slack {
+                continue;
+            }
+            if aside < -slack && height.abs() > slack && (!finite || tip.abs() > slack) {
+                return 0.0;
+            }
+            edge = 1.0;
+        }
+        edge
+    }
+
+    fn view(&self, emitter: &Emitter, place: &Place) -> Option<View> {
+        let si = place.si;
+        let flat = emitter.flat(si.p)?;
+        Some(View::new(&flat, &Receiver { p: si.p, horizon: si.ng, ns: si.ns, wo: si.wo, lobe: *place.lobe }))
+    }
+
+    /// An area light, integrated.
+    fn integrated(&mut self, index: usize, emitter: &Emitter, place: &Place, counts: &mut Counts) -> Arrival {
+        let (scene, si) = (self.scene, place.si);
+        let light = &scene.lights[index];
+        counts.shadow_rays += 1;
+        let Some(view) = self.view(emitter, place) else {
+            let between = Between::default();
+            let masked = Masked { scene, light: index, emitter, si, lobe: place.lobe, between: &between };
+            let sums = if matches!(emitter, Emitter::Points) { masked.by_points(light) } else { Sums::default() };
+            // Nothing is known of how it bends
+            let bend = if matches!(emitter, Emitter::Points) && place.reach > 0.0 { f32::MAX } else { 0.0 };
+            return Arrival { sums, bend: Sums { diffuse: bend, specular: bend } };
+        };
+        if !view.arrives() {
+            return Arrival { sums: Sums::default(), bend: horizon_bend(&view, place) };
+        }
+        let between = if light.shadows && si.receives_shadow {
+            let mut between = Between::look(scene, index, emitter, &view, &Asker { si, reach: place.reach });
+            if scene.geometry.has_trees() {
+                between.drift = f32::INFINITY;
+            }
+            between
+        } else {
+            Between::default()
+        };
+        let mut bend = bend(&view, place, between.drift);
+        if between.hidden {
+            if between.drift == 0.0 {
+                bend = Sums::default();
+            }
+            return Arrival { sums: Sums::default(), bend };
+        }
+        let enough = |sums: &Sums, error: &Sums| {
+            let [diffuse, specular] = place.colors;
+            let value = place.base + diffuse * sums.diffuse + specular * sums.specular;
+            let wrong = diffuse * error.diffuse + specular * error.specular;
+            self.lights.steps.of_color(value, wrong) <= self.lights.tolerance
+        };
+        let trees = scene.geometry.has_trees() && light.shadows && si.receives_shadow;
+        let hiders = if between.ask || trees { &[][..] } else { &between.hiders[..] };
+        let (whole, _) = dispatch_wide!(self.level, simd => integrate(simd, &view, hiders, &enough));
+        let sums = if between.ask || trees {
+            let masked = Masked { scene, light: index, emitter, si, lobe: place.lobe, between: &between };
+            masked.integrate(&view, &whole, &enough).0
+        } else {
+            whole
+        };
+        Arrival { sums, bend }
+    }
+
+    fn bend_of(&self, index: usize, emitter: &Emitter, place: &Place) -> Sums {
+        let (scene, light) = (self.scene, &self.scene.lights[index]);
+        let Some(view) = self.view(emitter, place) else {
+            let unknown = if matches!(emitter, Emitter::Points) { f32::MAX } else { 0.0 };
+            return Sums { diffuse: unknown, specular: unknown };
+        };
+        if !view.arrives() {
+            return horizon_bend(&view, place);
+        }
+        if !(light.shadows && place.si.receives_shadow) {
+            return bend(&view, place, 0.0);
+        }
+        let between = Between::look(scene, index, emitter, &view, &Asker { si: place.si, reach: place.reach });
+        if between.hidden && between.drift == 0.0 {
+            return Sums::default();
+        }
+        bend(&view, place, if scene.geometry.has_trees() { f32::INFINITY } else { between.drift })
+    }
+}
+
+/// What arrives on a patch whose middle sees nothing of a light, at most.
+fn horizon_bend(view: &View, place: &Place) -> Sums {
+    if place.reach == 0.0 {
+        return Sums::default();
+    }
+    let far = view.l0.length() + view.la + view.lb + view.skew.abs();
+    let behind = place.reach + place.turn * far;
+    if view.facing < -place.reach || view.cos.max() < -behind || view.horizon.max() < -behind {
+        return Sums::default();
+    }
+    let all = view.most() * (place.turn + place.reach / view.nearest().max(place.reach)).min(1.0) * 0.5;
+    Sums { diffuse: all, specular: all }
+}
+
+/// How far the mean over a patch can be from what arrives at its middle. `drift`: see [`Between::drift`].
+fn bend(view: &View, place: &Place, drift: f32) -> Sums {
+    if place.reach == 0.0 {
+        return Sums::default();
+    }
+    let (most, nearest) = (view.most(), view.nearest());
+    let swing = place.turn + place.reach / nearest.max(place.reach);
+    let cuts = !view.is_above_horizon() || view.cos.min() < place.reach + place.turn * view.l0.length();
+    // Where the outline of a shadow comes in, the share it hides begins to grow at once: an eighth of the way it moves
+    let kink = (drift * 0.125).min(1.0);
+    let cos = (view.cos.max() / view.l0.length()).min(1.0) + swing;
+    let horizon = if cuts { swing * swing.min(1.0) } else { 0.0 };
+    let smooth = (place.reach / nearest.max(place.reach)).powi(2) * 2.0 + place.turn * place.turn * 0.5;
+    let diffuse = most * (cos * (kink + smooth.min(1.0)) + horizon).min(1.0);
+    if matches!(view.lobe, Lobe::None) {
+        return Sums { diffuse, specular: 0.0 };
+    }
+    let moved = 2.0 * place.turn + place.reach / nearest.max(place.reach);
+    let narrow = (sharpness(view) * moved * moved).min(1.0);
+    Sums { diffuse, specular: most * brightest(view) * (kink + smooth + narrow + horizon).min(1.0) }
+}
+
+/// How bright a highlight can be on a light, at most, or thereabouts.
+fn brightest(view: &View) -> f32 {
+    let size2 = view.la.max(view.lb).powi(2);
+    let distance2 = view.nearest().powi(2);
+    let sharp = sharpness(view) * size2;
+    if sharp > 0.5 * distance2 {
+        return 1.0;
+    }
+    let at = |x: f32, y: f32| {
+        let l = view.l(x, y);
+        let inverse = 1.0 / l.length();
+        view.lobe.eval((view.ns.dot(l) * inverse).max(0.0), view.cos_o, view.wo.dot(l) * inverse)
+    };
+    let corners = at(-1.0, -1.0).max(at(1.0, -1.0)).max(at(1.0, 1.0)).max(at(-1.0, 1.0));
+    (corners.max(at(0.0, 0.0)) * 1.5).min(1.0)
+}
+
+/// [`sharpness`] of a lobe at a surface.
+fn sharp_of(lobe: &Lobe, si: &SurfaceInteraction) -> f32 {
+    match lobe {
+        Lobe::None => 0.0,
+        Lobe::Phong(lobe) => 0.5 * lobe.exponent(),
+        Lobe::BlinnPhong(lobe) => 0.125 * lobe.exponent() / si.ns.dot(si.wo).powi(2).max(0.01),
+    }
+}
