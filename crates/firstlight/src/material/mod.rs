@@ -10,6 +10,7 @@ pub use phong::{PhongDesc, PhongLobe};
 
 use crate::color::Rgb;
 use crate::describe::family;
+use crate::ids::TextureId;
 use crate::shape::SurfaceInteraction;
 use crate::texture::{Param, Texture};
 
@@ -71,6 +72,17 @@ impl Material {
         };
         let ambient = self.ambient.map_or(diffuse, |a| a.color(si, textures) * si.color);
         Bsdf { diffuse, specular, ambient, lobe }
+    }
+}
+
+impl Material {
+    /// Whether it is the same all over the footprint of a surface, and a little beyond.
+    pub(crate) fn is_even(&self, si: &SurfaceInteraction, textures: &[Texture]) -> bool {
+        let even = |texture: Option<TextureId>| texture.is_none_or(|id| textures[id.index()].is_even(si));
+        even(self.diffuse.texture)
+            && (self.specular.texture == self.diffuse.texture || even(self.specular.texture))
+            && self.ambient.is_none_or(|ambient| even(ambient.texture))
+            && even(self.shininess.texture)
     }
 }
 

@@ -20,7 +20,22 @@ pub(crate) struct Arrival {
     pub sums: Sums,
     /// How far the mean over the patch can be from what arrives at its middle.
     pub bend: Sums,
+    /// Whether all that light does here is wide beside the patch, so that neighbours tell what it does.
+    pub resolved: bool,
 }
+
+impl Arrival {
+    /// At a point, or where nothing bends.
+    fn even(sums: Sums) -> Arrival {
+        Arrival { sums, bend: Sums::default(), resolved: true }
+    }
+}
+
+/// Outlines that move over a larger part of the light than this, and highlights that move by more of their width, squared, are
+/// not wide beside the patch.
+const RESOLVED: f32 = 0.5;
+/// The same for the angle by which the light's direction and the normal turn.
+const RESOLVED_SWING: f32 = 0.2;
 
 /// A place of a surface that asks for light.
 #[derive(Clone, Copy)]
@@ -100,12 +115,13 @@ impl<'a> Arrivals<'a> {
             (None, LightKind::Area(area)) => {
                 let sums = self.sampled.gather(self.scene, index, place.si, place.lobe, counts);
                 let sums = Sums { diffuse: sums.diffuse.total(), specular: sums.specular.total() };
-                let mut arrival = Arrival { sums, bend: Sums::default() };
+                let mut arrival = Arrival::even(sums);
                 if place.reach > 0.0 {
                     // As it would be if it were integrated, in the unit of samples
                     let emitter = Emitter::new(area);
                     let one = area.samples() as f32 / if area.physical { area.measure() as f32 } else { 1.0 };
-                    let bend = self.bend_of(index, &emitter, place);
+                    let (bend, resolved) = self.bend_of(index, &emitter, place);
+                    arrival.resolved = resolved;
                     arrival.bend = Sums { diffuse: bend.diffuse * one, specular: bend.specular * one };
                 }
                 arrival
@@ -120,7 +136,7 @@ impl<'a> Arrivals<'a> {
         let sums = Plain.gather(self.scene, index, si, place.lobe, counts);
         let sums = Sums { diffuse: sums.diffuse.total(), specular: sums.specular.total() };
         if place.reach == 0.0 {
-            return Arrival { sums, bend: Sums::default() };
+            return Arrival::even(sums);
         }
         let to = light.towards(0, si.p);
         let distance = if to.finite { to.l.length() } else { f32::INFINITY };
@@ -128,10 +144,10 @@ impl<'a> Arrivals<'a> {
         let near = (distance - place.reach).max(0.0);
         let (height, behind) = (si.ns.dot(to.l).min(si.ng.dot(to.l)), place.reach + place.turn * to.l.length());
         if height < -behind {
-            return Arrival { sums, bend: Sums::default() };
+            return Arrival::even(sums);
         }
         let Some(sample) = light.sample(0, to.l) else {
-            return Arrival { sums, bend: Sums { diffuse: f32::MAX, specular: f32::MAX } };
+            return Arrival { sums, bend: Sums { diffuse: f32::MAX, specular: f32::MAX }, resolved: false };
         };
         let weight = sample.weight.max(sums.diffuse) * 1.2;
         // A spot's rim, a terminator, a shadow's edge
@@ -152,7 +168,8 @@ impl<'a> Arrivals<'a> {
         let share = (edge + rim + terminator + smooth).min(1.0);
         let lobe = (sharp_of(place.lobe, si) * (2.0 * place.turn + place.reach / distance).powi(2)).min(1.0);
         let specular = if matches!(place.lobe, Lobe::None) { 0.0 } else { weight * (edge + rim + terminator + lobe).min(1.0) };
-        Arrival { sums, bend: Sums { diffuse: weight * share, specular } }
+        let resolved = edge == 0.0 && rim == 0.0 && swing < RESOLVED_SWING && lobe < RESOLVED;
+        Arrival { sums, bend: Sums { diffuse: weight * share, specular }, resolved }
     }
 
     /// Whether the edge of a shadow, of a light of one point, may run through the patch: 1, or 0 if that is excluded.
@@ -229,10 +246,11 @@ impl<'a> Arrivals<'a> {
             let sums = if matches!(emitter, Emitter::Points) { masked.by_points(light) } else { Sums::default() };
             // Nothing is known of how it bends
             let bend = if matches!(emitter, Emitter::Points) && place.reach > 0.0 { f32::MAX } else { 0.0 };
-            return Arrival { sums, bend: Sums { diffuse: bend, specular: bend } };
+            return Arrival { sums, bend: Sums { diffuse: bend, specular: bend }, resolved: false };
         };
         if !view.arrives() {
-            return Arrival { sums: Sums::default(), bend: horizon_bend(&view, place) };
+            let (bend, resolved) = horizon_bend(&view, place);
+            return Arrival { sums: Sums::default(), bend, resolved };
         }
         let between = if light.shadows && si.receives_shadow {
             let mut between = Between::look(scene, index, emitter, &view, &Asker { si, reach: place.reach });
@@ -243,12 +261,12 @@ impl<'a> Arrivals<'a> {
         } else {
             Between::default()
         };
-        let mut bend = bend(&view, place, between.drift);
+        let (mut bend, resolved) = bend(&view, place, between.drift);
         if between.hidden {
             if between.drift == 0.0 {
                 bend = Sums::default();
             }
-            return Arrival { sums: Sums::default(), bend };
+            return Arrival { sums: Sums::default(), bend, resolved };
         }
         let enough = |sums: &Sums, error: &Sums| {
             let [diffuse, specular] = place.colors;
@@ -265,14 +283,14 @@ impl<'a> Arrivals<'a> {
         } else {
             whole
         };
-        Arrival { sums, bend }
+        Arrival { sums, bend, resolved }
     }
 
-    fn bend_of(&self, index: usize, emitter: &Emitter, place: &Place) -> Sums {
+    fn bend_of(&self, index: usize, emitter: &Emitter, place: &Place) -> (Sums, bool) {
         let (scene, light) = (self.scene, &self.scene.lights[index]);
         let Some(view) = self.view(emitter, place) else {
             let unknown = if matches!(emitter, Emitter::Points) { f32::MAX } else { 0.0 };
-            return Sums { diffuse: unknown, specular: unknown };
+            return (Sums { diffuse: unknown, specular: unknown }, false);
         };
         if !view.arrives() {
             return horizon_bend(&view, place);
@@ -282,30 +300,31 @@ impl<'a> Arrivals<'a> {
         }
         let between = Between::look(scene, index, emitter, &view, &Asker { si: place.si, reach: place.reach });
         if between.hidden && between.drift == 0.0 {
-            return Sums::default();
+            return (Sums::default(), true);
         }
         bend(&view, place, if scene.geometry.has_trees() { f32::INFINITY } else { between.drift })
     }
 }
 
 /// What arrives on a patch whose middle sees nothing of a light, at most.
-fn horizon_bend(view: &View, place: &Place) -> Sums {
+fn horizon_bend(view: &View, place: &Place) -> (Sums, bool) {
     if place.reach == 0.0 {
-        return Sums::default();
+        return (Sums::default(), true);
     }
     let far = view.l0.length() + view.la + view.lb + view.skew.abs();
     let behind = place.reach + place.turn * far;
     if view.facing < -place.reach || view.cos.max() < -behind || view.horizon.max() < -behind {
-        return Sums::default();
+        return (Sums::default(), true);
     }
-    let all = view.most() * (place.turn + place.reach / view.nearest().max(place.reach)).min(1.0) * 0.5;
-    Sums { diffuse: all, specular: all }
+    let swing = place.turn + place.reach / view.nearest().max(place.reach);
+    let all = view.most() * swing.min(1.0) * 0.5;
+    (Sums { diffuse: all, specular: all }, swing < RESOLVED_SWING)
 }
 
 /// How far the mean over a patch can be from what arrives at its middle. `drift`: see [`Between::drift`].
-fn bend(view: &View, place: &Place, drift: f32) -> Sums {
+fn bend(view: &View, place: &Place, drift: f32) -> (Sums, bool) {
     if place.reach == 0.0 {
-        return Sums::default();
+        return (Sums::default(), true);
     }
     let (most, nearest) = (view.most(), view.nearest());
     let swing = place.turn + place.reach / nearest.max(place.reach);
@@ -316,12 +335,14 @@ fn bend(view: &View, place: &Place, drift: f32) -> Sums {
     let horizon = if cuts { swing * swing.min(1.0) } else { 0.0 };
     let smooth = (place.reach / nearest.max(place.reach)).powi(2) * 2.0 + place.turn * place.turn * 0.5;
     let diffuse = most * (cos * (kink + smooth.min(1.0)) + horizon).min(1.0);
+    let resolved = drift < RESOLVED && swing < RESOLVED_SWING;
     if matches!(view.lobe, Lobe::None) {
-        return Sums { diffuse, specular: 0.0 };
+        return (Sums { diffuse, specular: 0.0 }, resolved);
     }
     let moved = 2.0 * place.turn + place.reach / nearest.max(place.reach);
     let narrow = (sharpness(view) * moved * moved).min(1.0);
-    Sums { diffuse, specular: most * brightest(view) * (kink + smooth + narrow + horizon).min(1.0) }
+    let specular = most * brightest(view) * (kink + smooth + narrow + horizon).min(1.0);
+    (Sums { diffuse, specular }, resolved && narrow < RESOLVED)
 }
 
 /// How bright a highlight can be on a light, at most, or thereabouts.

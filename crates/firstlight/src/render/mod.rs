@@ -13,6 +13,7 @@ mod patch;
 mod pixel;
 mod plain;
 mod simd;
+mod solo;
 mod tile;
 mod tiled;
 
@@ -40,7 +41,7 @@ use lanes::Lanes;
 use pixel::{Lighting, PixelSum};
 use plain::Plain;
 use tile::Tile;
-use tiled::Tiled;
+use tiled::{CELL, Tiled};
 
 words! {
     /// How the edges of what a pixel holds are smoothed.
@@ -174,14 +175,19 @@ pub fn render(
     }
     let window = settings.window(scene);
     let film = Mutex::new(Film::new([scene.width, scene.height], window));
-    let tiles = Tile::cover(window, settings.tile_size);
+    let lights = Lights::new(scene);
+    // Where every light is sampled at every ray, the bits are those of the plain renderer
+    let every_ray = settings.reference
+        || settings.aa_mode == AaMode::Full && lights.emitters.iter().all(Option::is_none);
+    let tiles = if every_ray {
+        Tile::cover(window, settings.tile_size)
+    } else {
+        Tile::cover_cells(window, settings.tile_size, CELL)
+    };
     let all = window.width as u64 * window.height as u64;
     let (done, stop) = (AtomicU64::new(0), AtomicBool::new(false));
     let totals = [const { AtomicU64::new(0) }; 3];
     let level = settings.simd.resolve();
-    let lights = Lights::new(scene);
-    // Where every light is sampled at every ray, the bits are those of the plain renderer
-    let every_ray = settings.aa_mode == AaMode::Full && lights.emitters.iter().all(Option::is_none);
     let render_one = |tile: &Tile| {
         if stop.load(Ordering::Relaxed) {
             return;

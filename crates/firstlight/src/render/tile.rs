@@ -23,6 +23,25 @@ impl Tile {
         }
         tiles
     }
+
+    /// The same in whole cells of a grid of the film: at the window's edges tiles are smaller, elsewhere as large as `size`,
+    /// rounded up to cells.
+    pub fn cover_cells(window: Window, size: u32, cell: u32) -> Vec<Tile> {
+        let size = size.next_multiple_of(cell) as u64;
+        let spans = |from: u32, length: u32| {
+            let end = from as u64 + length as u64;
+            let first = from as u64 / cell as u64 * cell as u64;
+            (0..).map(move |k| first + k * size).take_while(move |start| *start < end).map(move |start| {
+                let (a, b) = (start.max(from as u64), (start + size).min(end));
+                (a as u32, (b - a) as u32)
+            })
+        };
+        let mut tiles = Vec::new();
+        for (y, height) in spans(window.y, window.height) {
+            tiles.extend(spans(window.x, window.width).map(|(x, width)| Tile { x, y, width, height }));
+        }
+        tiles
+    }
 }
 
 #[cfg(test)]

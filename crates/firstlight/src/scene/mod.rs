@@ -31,7 +31,7 @@ use crate::material::Material;
 use crate::shape::{Disk, Parallelogram, PlaneSide, Sphere};
 
 use crate::texture::Texture;
-pub(crate) use geometry::{Geometry, Nearest};
+pub(crate) use geometry::{At, Geometry, Nearest};
 pub(crate) use trees::ShadowRays;
 
 /// A scene, ready to be rendered: flat lists and ids. Between here and the image nothing can fail.

@@ -59,6 +59,13 @@ impl Checkerboard {
         self.colors[0] * (0.5 * (1.0 + mean)) + self.colors[1] * (0.5 * (1.0 - mean))
     }
 
+    /// Whether the footprint, widened by as much again for what curves, lies in one square.
+    pub(crate) fn is_even(&self, uv: Vec2, footprint: &Footprint) -> bool {
+        let scale = Vec2::new(self.counts[0] as f32, self.counts[1] as f32);
+        let (center, reach) = (uv * scale, (footprint.dx.abs() + footprint.dy.abs()) * scale);
+        (center - reach).floor() == (center + reach).floor()
+    }
+
     /// The mean over the footprint of +1 on the first colour's squares and -1 on the second's. In f64: the integral is
     /// a small difference of larger numbers where the footprint is thin.
     fn mean(&self, uv: Vec2, footprint: &Footprint) -> f64 {

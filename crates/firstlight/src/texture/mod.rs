@@ -39,6 +39,14 @@ impl Texture {
             Texture::Image(image) => image.color(si.uv),
         }
     }
+
+    /// Whether it is proved to be the same all over the footprint, and a little beyond.
+    pub(crate) fn is_even(&self, si: &SurfaceInteraction) -> bool {
+        match self {
+            Texture::Checkerboard(board) => board.is_even(si.uv, &si.footprint),
+            Texture::Image(_) => false,
+        }
+    }
 }
 
 /// A parameter of a material: the same everywhere, or a texture times a factor. `Param<Rgb>` is colour, `Param<f32>` data.

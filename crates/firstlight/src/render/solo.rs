@@ -1,0 +1,203 @@
+//! Blocks of pixels that hold one surface, proved without a ray for each.
+//!
+//! A block's rays lie in the pyramid between the rays through its corners. Shapes outside of it are out; if the rays through
+//! the corners all meet one convex shape, so do all between them; and if it is nearer there than anything else can be, it
+//! is all that is seen.
+
+use crate::light::{AreaShape, LightKind};
+use crate::math::{Ray, Vec3};
+use crate::scene::{At, Hit, Scene};
+use crate::ids::SurfaceId;
+use crate::shape::{Parallelogram, Sphere};
+
+/// Something that a block's rays may meet.
+#[derive(Clone, Copy)]
+pub(crate) enum Candidate {
+    Sphere(u32),
+    Parallelogram(u32),
+    /// A light's shape.
+    Light(u32),
+}
+
+/// The rays of a rectangle of the film.
+pub(crate) struct Pyramid {
+    corners: [Ray; 4],
+    /// Outward unit normals.
+    sides: [Vec3; 4],
+    forward: Vec3,
+    eye: Vec3,
+}
+
+/// Depths and heights are told apart beyond this share of them.
+const SLACK: f64 = 1e-5;
+
+impl Pyramid {
+    /// Of the pixels from (`left`, `top`), `side` across and down.
+    pub fn new(scene: &Scene, left: f32, top: f32, side: f32) -> Self {
+        let (right, bottom) = (left + side, top + side);
+        let at = |x: f32, y: f32| scene.camera.ray(x, y, 1.0).0;
+        let corners = [at(left, top), at(right, top), at(right, bottom), at(left, bottom)];
+        let middle = at(0.5 * (left + right), 0.5 * (top + bottom));
+        let mut sides = [Vec3::ZERO; 4];
+        for i in 0..4 {
+            let (a, b) = (&corners[i], &corners[(i + 1) % 4]);
+            let n = a.d.cross(b.o + b.d - a.o).normalize_or_zero();
+            sides[i] = if n.dot(middle.o + middle.d - a.o) > 0.0 { -n } else { n };
+        }
+        let frame = scene.camera.frame();
+        Pyramid { corners, sides, forward: frame.forward, eye: frame.position }
+    }
+
+    /// How far in front of the camera, along its line of sight.
+    fn depth(&self, q: crate::math::DVec3) -> f64 {
+        self.forward.as_dvec3().dot(q - self.eye.as_dvec3())
+    }
+
+    fn misses_sphere(&self, sphere: &Sphere) -> bool {
+        let slack = sphere.c.abs().max_element().max(sphere.r) * SLACK;
+        let outside = |(n, ray): (&Vec3, &Ray)| n.as_dvec3().dot(sphere.c - ray.o.as_dvec3()) > sphere.r + slack;
+        self.sides.iter().zip(&self.corners).any(outside) || self.depth(sphere.c) + sphere.r < -slack
+    }
+
+    fn misses_flat(&self, flat: &Parallelogram) -> bool {
+        let corners = flat.deep_corners();
+        let size = corners.iter().fold(0.0f64, |size, q| size.max(q.abs().max_element()));
+        let slack = size * SLACK;
+        let outside = |(n, ray): (&Vec3, &Ray)| {
+            corners.iter().all(|q| n.as_dvec3().dot(*q - ray.o.as_dvec3()) > slack)
+        };
+        self.sides.iter().zip(&self.corners).any(outside) || corners.iter().all(|q| self.depth(*q) < -slack)
+    }
+
+    /// Those of the listed shapes and lights that the rays may meet.
+    pub fn candidates(&self, scene: &Scene, from: &[Candidate], into: &mut Vec<Candidate>) {
+        into.clear();
+        let geometry = &scene.geometry;
+        into.extend(from.iter().filter(|candidate| match candidate {
+            Candidate::Sphere(i) => !self.misses_sphere(&geometry.spheres[*i as usize].shape),
+            Candidate::Parallelogram(i) => !self.misses_flat(&geometry.parallelograms[*i as usize].shape),
+            Candidate::Light(i) => match &scene.lights[*i as usize].kind {
+                LightKind::Area(area) => match &area.shape {
+                    AreaShape::Rectangle(rectangle) => !self.misses_flat(&rectangle.shape),
+                    AreaShape::Sphere(sphere) => !self.misses_sphere(&sphere.shape),
+                    AreaShape::Disk(_) => true,
+                },
+                _ => false,
+            },
+        }));
+    }
+
+    /// The depths, at most and at least, at which all the rays meet a shape; `None` if not all are proved to.
+    fn cover(&self, scene: &Scene, candidate: Candidate) -> Option<[f64; 2]> {
+        let depths = |intersect: &dyn Fn(&Ray) -> Option<f64>| {
+            let mut range = [f64::INFINITY, 0.0f64];
+            for ray in &self.corners {
+                let t = intersect(ray)?;
+                let depth = self.depth(ray.o.as_dvec3() + ray.d.as_dvec3() * t);
+                range = [range[0].min(depth), range[1].max(depth)];
+            }
+            Some(range)
+        };
+        match candidate {
+            Candidate::Parallelogram(i) => {
+                let flat = &scene.geometry.parallelograms[i as usize].shape;
+                depths(&|ray| flat.intersect(ray))
+            }
+            Candidate::Sphere(i) => {
+                let sphere = &scene.geometry.spheres[i as usize].shape;
+                let inside = |ray: &Ray| (ray.o.as_dvec3() - sphere.c).length() <= sphere.r * (1.0 + SLACK);
+                if self.corners.iter().any(inside) {
+                    return None;
+                }
+                depths(&|ray| sphere.intersect(ray))?;
+                Some([self.depth(sphere.c) - sphere.r, self.depth(sphere.c)])
+            }
+            Candidate::Light(_) => None,
+        }
+    }
+
+    /// The least depth of a shape.
+    fn nearest(&self, scene: &Scene, candidate: Candidate) -> f64 {
+        let flat = |flat: &Parallelogram| flat.deep_corners().iter().fold(f64::INFINITY, |z, q| z.min(self.depth(*q)));
+        match candidate {
+            Candidate::Sphere(i) => {
+                let sphere = &scene.geometry.spheres[i as usize].shape;
+                self.depth(sphere.c) - sphere.r
+            }
+            Candidate::Parallelogram(i) => flat(&scene.geometry.parallelograms[i as usize].shape),
+            Candidate::Light(i) => match &scene.lights[i as usize].kind {
+                LightKind::Area(area) => match &area.shape {
+                    AreaShape::Rectangle(rectangle) => flat(&rectangle.shape),
+                    _ => f64::NEG_INFINITY,
+                },
+                _ => f64::INFINITY,
+            },
+        }
+    }
+
+    /// The one shape that all the rays see, if that is proved. `candidates` is all that they may meet.
+    pub fn only(&self, scene: &Scene, candidates: &[Candidate]) -> Option<Candidate> {
+        candidates.iter().copied().enumerate().find_map(|(i, one)| {
+            let [_, far] = self.cover(scene, one)?;
+            let others = candidates.iter().enumerate().filter(|(j, _)| *j != i);
+            let mut behind = others.map(|(_, other)| match self.cover(scene, *other) {
+                Some([near, _]) => near,
+                None => self.nearest(scene, *other),
+            });
+            behind.all(|near| near > far + (far.abs() + near.abs()) * SLACK).then_some(one)
+        })
+    }
+}
+
+/// All that is listed, in a scene where nothing else can be seen.
+pub(crate) fn all(scene: &Scene) -> Vec<Candidate> {
+    let geometry = &scene.geometry;
+    let mut all = Vec::new();
+    all.extend((0..geometry.spheres.len()).filter(|i| geometry.spheres[*i].seen).map(|i| Candidate::Sphere(i as u32)));
+    let flats = &geometry.parallelograms;
+    all.extend((0..flats.len()).filter(|i| flats[*i].seen).map(|i| Candidate::Parallelogram(i as u32)));
+    let visible = |i: &usize| matches!(&scene.lights[*i].kind, LightKind::Area(area) if area.visible);
+    all.extend((0..scene.lights.len()).filter(visible).map(|i| Candidate::Light(i as u32)));
+    all
+}
+
+impl Candidate {
+    /// What a ray that meets only this ends at.
+    pub fn hit(self, scene: &Scene, ray: &Ray) -> Option<Hit> {
+        let geometry = &scene.geometry;
+        let (t, surface, at) = match self {
+            Candidate::Sphere(i) => {
+                let owned = &geometry.spheres[i as usize];
+                (owned.shape.intersect(ray)?, owned.surface, At::Sphere(i))
+            }
+            Candidate::Parallelogram(i) => {
+                let owned = &geometry.parallelograms[i as usize];
+                (owned.shape.intersect(ray)?, owned.surface, At::Parallelogram(i))
+            }
+            Candidate::Light(i) => {
+                let LightKind::Area(area) = &scene.lights[i as usize].kind else { return None };
+                (area.shape.intersect(ray)?, SurfaceId(geometry.surfaces.len() as u32 + i), At::Light)
+            }
+        };
+        Some(Hit { t, surface, at })
+    }
+
+    /// How much its normal turns over a metre, in radians.
+    pub fn curvature(self, scene: &Scene) -> f32 {
+        match self {
+            Candidate::Sphere(i) => (1.0 / scene.geometry.spheres[i as usize].shape.r) as f32,
+            Candidate::Parallelogram(_) | Candidate::Light(_) => 0.0,
+        }
+    }
+}
+
+/// The first of some things on a ray: of several at the same distance, the one with the lowest id.
+pub(crate) fn first(scene: &Scene, candidates: &[Candidate], ray: &Ray) -> Option<Hit> {
+    let mut nearest = crate::scene::Nearest::default();
+    for candidate in candidates {
+        if let Some(hit) = candidate.hit(scene, ray) {
+            nearest.offer(hit.t, hit.surface, hit.at);
+        }
+    }
+    nearest.0
+}
