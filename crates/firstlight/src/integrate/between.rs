@@ -1,5 +1,7 @@
 //! What stands between a point, with the patch of surface around it, and a flat light.
 
+use std::cell::OnceCell;
+
 use arrayvec::ArrayVec;
 
 use super::emitter::Emitter;
@@ -30,6 +32,33 @@ pub(crate) struct Between {
     /// Over how much of the light's size the outline of a shadow moves on it where the point moves across the patch; 0
     /// where the patch is proved to be lit, or hidden, as one.
     pub drift: f32,
+}
+
+/// The cone around a light: what is outside of it needs no closer look.
+struct LightCone {
+    /// Unit, to the light's middle, and how far that is.
+    axis: Vec3,
+    sin: f32,
+    cos: f32,
+    reach: f32,
+}
+
+impl LightCone {
+    fn new(view: &View, reach: f32) -> LightCone {
+        let far = view.l0.length();
+        // A circle around the light's square
+        let radius = view.l(1.0, 1.0).distance(view.l0).max(view.l(1.0, -1.0).distance(view.l0));
+        let sin = (radius / far).min(1.0);
+        LightCone { axis: view.l0 / far, sin, cos: (1.0 - sin * sin).sqrt(), reach }
+    }
+
+    /// Whether the ball around `s` is outside, seen from anywhere on the patch.
+    #[inline(always)]
+    fn misses(&self, s: Vec3, r: f32) -> bool {
+        let along = s.dot(self.axis);
+        let aside = (s.length_squared() - along * along).max(0.0).sqrt();
+        aside * self.cos - along * self.sin > (r + self.reach) * 1.001 + (along.abs() + aside) * SLACK
+    }
 }
 
 /// Side planes of the pyramid over a light, and how the patch sees it.
@@ -86,28 +115,33 @@ impl Between {
     /// Looks at all that is in lists; what is in trees is not.
     pub fn look(scene: &Scene, light: usize, emitter: &Emitter, view: &View, asker: &Asker) -> Between {
         let mut between = Between::default();
-        let pyramid = Pyramid::new(view, asker.reach);
+        let cone = LightCone::new(view, asker.reach);
+        let pyramid = OnceCell::new();
+        let pyramid = || pyramid.get_or_init(|| Pyramid::new(view, asker.reach));
         let (p, horizon) = (asker.si.p, asker.si.ng);
         for sphere in &scene.obstacles {
-            between.sphere(view, emitter, &pyramid, sphere, asker, horizon);
+            let s = (sphere.c - p.as_dvec3()).as_vec3();
+            if cone.misses(s, sphere.r as f32) {
+                continue;
+            }
+            between.sphere(view, emitter, pyramid(), sphere, asker, horizon);
             if between.hidden {
                 return between;
             }
         }
         for (index, sphere) in &scene.light_obstacles.spheres {
             if *index != light {
-                between.sphere(view, emitter, &pyramid, sphere, asker, horizon);
+                between.sphere(view, emitter, pyramid(), sphere, asker, horizon);
             }
         }
         let sides = &scene.light_sides[light];
         for (i, flat) in scene.flat_obstacles.iter().enumerate() {
             let side = sides.get(i).copied().unwrap_or(PlaneSide::Both);
-            let shadow = flat.shadow(p, asker.si.error);
-            if !shadow.is_one_sided(side) {
-                between.flat(view, emitter, &pyramid, flat, asker);
-            } else if asker.reach > 0.0 && side == PlaneSide::Both {
-                // A patch that the plane cuts
-                between.drift = between.drift.max(pyramid.drift(0.0));
+            if !flat.is_one_sided(p, asker.si.error, side) {
+                between.flat(view, emitter, pyramid(), flat, asker);
+            } else if flat.cuts(p, asker.si.error, asker.reach) {
+                // A part of the patch is on its other side
+                between.drift = f32::INFINITY;
             }
             if between.hidden {
                 return between;

@@ -214,6 +214,28 @@ impl Parallelogram {
         }
     }
 
+    /// [`ParallelogramShadow::is_one_sided`] for a point, at a smaller price.
+    #[inline(always)]
+    pub(crate) fn is_one_sided(&self, p: Vec3, error: ErrorBound, light: PlaneSide) -> bool {
+        let s = self.n.dot(p.as_dvec3() - self.p);
+        let margin = self.n.as_vec3().abs().dot(error.0);
+        s.abs() as f32 <= margin
+            || match light {
+                PlaneSide::Front => s >= 0.0,
+                PlaneSide::Back => s < 0.0,
+                PlaneSide::Both => false,
+            }
+    }
+
+    /// Whether it may cut the patch that reaches `reach` around a point, which is not on it.
+    #[inline(always)]
+    pub(crate) fn cuts(&self, p: Vec3, error: ErrorBound, reach: f32) -> bool {
+        let height = self.n.dot(p.as_dvec3() - self.p).abs() as f32;
+        height <= reach
+            && height > self.n.as_vec3().abs().dot(error.0)
+            && self.distance(p.as_dvec3()) <= f64::from(reach)
+    }
+
     /// What this parallelogram needs to know of a point that asks for light.
     #[inline(always)]
     pub(crate) fn shadow(&self, p: Vec3, error: ErrorBound) -> ParallelogramShadow {
