@@ -48,7 +48,7 @@ fn a_disk_tends_to_its_closed_form() {
 #[test]
 fn a_sphere_above_the_horizon_tends_to_its_closed_form() {
     for (center, r) in
-        [([0.0, 2.0, 0.0], 0.5), ([1.0, 1.0, -0.5], 0.9), ([3.0, 40.0, 7.0], 0.001), ([0.0, 2.0, 0.0], 1.9)]
+        [([0.0, 2.0, 0.0], 0.5), ([1.0, 1.0, -0.5], 0.9), ([3.0, 40.0, 7.0], 0.001), ([0.0, 2.0, 0.0], 1.5)]
     {
         let (d, cos) = (length(center), unit(center)[1]);
         let truth = PI * (r / d) * (r / d) * cos;
@@ -184,7 +184,7 @@ fn the_shadow_of_a_sphere_under_a_sphere_light_has_its_radii() {
         0.5,
         16384,
     )));
-    let open = |scene: &SceneDesc| SceneDesc { shapes: scene.shapes[1..].to_vec(), ..scene.clone() };
+    let open = |scene: &SceneDesc| SceneDesc { shapes: scene.shapes[..1].to_vec(), ..scene.clone() };
     let bare = open(&scene);
     let at = |scene: &SceneDesc, r: f64| probe(scene, [r, 0.5, 0.0], [r, 0.0, 0.0])[0];
     let umbra = first(1.0, 1.6, |r| at(&scene, r) > 0.0);
