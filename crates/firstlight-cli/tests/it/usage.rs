@@ -86,6 +86,7 @@ fn a_grid_of_samples_is_square() {
     folder.put("scene.toml", format!("{SCENE}set = \"grid\"\n"));
     folder.run("render scene.toml --samples 12 -o a.png").exits(2).says(&["--samples 12", "9 and 16"]);
     folder.run("render scene.toml --samples 9 -o a.png").done();
+    folder.run("render scene.toml --samples exact --width 4 --aa 1 -o a.png").done();
 }
 
 #[test]

@@ -25,10 +25,12 @@ pub(crate) struct Lanes {
     flats: Vec<ParallelogramShadow>,
     /// Those of `flats` that can stand in the way of the light at hand.
     between: Vec<ParallelogramShadow>,
-    /// Sphere and disk lights that block, each with its index.
-    round: (Vec<(usize, SphereShadow)>, Vec<(usize, DiskShadow)>),
-    /// Those that are not the light at hand.
-    others: (Vec<SphereShadow>, Vec<DiskShadow>),
+    /// Sphere lights that block, each with its index, and those of them that are not the light at hand.
+    light_spheres: Vec<(usize, SphereShadow)>,
+    other_spheres: Vec<SphereShadow>,
+    /// Disk lights that block, likewise.
+    light_disks: Vec<(usize, DiskShadow)>,
+    other_disks: Vec<DiskShadow>,
 }
 
 impl Lanes {
@@ -38,8 +40,10 @@ impl Lanes {
             spheres: Vec::new(),
             flats: Vec::new(),
             between: Vec::new(),
-            round: Default::default(),
-            others: Default::default(),
+            light_spheres: Vec::new(),
+            other_spheres: Vec::new(),
+            light_disks: Vec::new(),
+            other_disks: Vec::new(),
         }
     }
 }
@@ -169,16 +173,16 @@ impl Lighting for Lanes {
         }
         self.flats.clear();
         self.flats.extend(scene.flat_obstacles.iter().map(|flat| flat.shadow(si.p, si.error)));
-        let (spheres, disks) = &mut self.round;
-        spheres.clear();
+        self.light_spheres.clear();
         for (light, sphere) in &scene.light_obstacles.spheres {
             let shadow = sphere.shadow(si.p, si.error);
             if !shadow.is_below(si.ng) {
-                spheres.push((*light, shadow));
+                self.light_spheres.push((*light, shadow));
             }
         }
-        disks.clear();
-        disks.extend(scene.light_obstacles.disks.iter().map(|(light, disk)| (*light, disk.shadow(si.p, si.error))));
+        self.light_disks.clear();
+        self.light_disks
+            .extend(scene.light_obstacles.disks.iter().map(|(light, disk)| (*light, disk.shadow(si.p, si.error))));
     }
 
     fn gather(
@@ -201,15 +205,22 @@ impl Lighting for Lanes {
                 self.between.push(*flat);
             }
         }
-        let (spheres, disks) = (&self.round.0, &self.round.1);
-        let (light_spheres, light_disks) = (&mut self.others.0, &mut self.others.1);
-        light_spheres.clear();
-        light_spheres.extend(spheres.iter().filter(|(light, _)| *light != index).map(|(_, shadow)| *shadow));
-        light_disks.clear();
-        light_disks.extend(disks.iter().filter(|(light, _)| *light != index).map(|(_, shadow)| *shadow));
+        // Its own shape does not hide it
+        self.other_spheres.clear();
+        let others = self.light_spheres.iter().filter(|(light, _)| *light != index);
+        self.other_spheres.extend(others.map(|(_, shadow)| *shadow));
+        self.other_disks.clear();
+        let others = self.light_disks.iter().filter(|(light, _)| *light != index);
+        self.other_disks.extend(others.map(|(_, shadow)| *shadow));
         let trees = scene.geometry.has_trees().then_some(&*scene.geometry);
         let obstacles = if light.shadows && si.receives_shadow {
-            Obstacles { spheres: &self.spheres, flats: &self.between, light_spheres, light_disks, trees }
+            Obstacles {
+                spheres: &self.spheres,
+                flats: &self.between,
+                light_spheres: &self.other_spheres,
+                light_disks: &self.other_disks,
+                trees,
+            }
         } else {
             Obstacles { spheres: &[], flats: &[], light_spheres: &[], light_disks: &[], trees: None }
         };

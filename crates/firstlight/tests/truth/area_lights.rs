@@ -8,15 +8,15 @@ use crate::analytic::{first, irradiance, white};
 use crate::scenes::*;
 
 const UP: V = [0.0, 1.0, 0.0];
-const DOWN: V = [0.0, -1.0, 0.0];
+pub(crate) const DOWN: V = [0.0, -1.0, 0.0];
 
 /// Physical, strength 1, invisible.
-fn disk(center: V, normal: V, radius: f64, samples: u32) -> DiskLightDesc {
+pub(crate) fn disk(center: V, normal: V, radius: f64, samples: u32) -> DiskLightDesc {
     DiskLightDesc { visible: false, samples: Some(samples.into()), ..DiskLightDesc::new(center, normal, radius) }
 }
 
 /// Physical, strength 1, invisible.
-fn ball(center: V, radius: f64, samples: u32) -> SphereLightDesc {
+pub(crate) fn ball(center: V, radius: f64, samples: u32) -> SphereLightDesc {
     SphereLightDesc { visible: false, samples: Some(samples.into()), ..SphereLightDesc::new(center, radius) }
 }
 
@@ -26,9 +26,10 @@ fn assert_near(is: f64, should: f64, relative: f64) {
 }
 
 /// pi L/2 [1 - (d^2 + h^2 - R^2) / sqrt((d^2 + h^2 + R^2)^2 - 4 R^2 d^2)], L = 1.
-fn disk_overhead(r: f64, h: f64, d: f64) -> f64 {
+pub(crate) fn disk_overhead(r: f64, h: f64, d: f64) -> f64 {
     let sum = d * d + h * h;
-    PI / 2.0 * (1.0 - (sum - r * r) / ((sum + r * r).powi(2) - 4.0 * r * r * d * d).sqrt())
+    let all = sum + r * r;
+    PI / 2.0 * (1.0 - (sum - r * r) / (all * all - 4.0 * r * r * d * d).sqrt())
 }
 
 #[test]
@@ -48,7 +49,7 @@ fn a_disk_tends_to_its_closed_form() {
 #[test]
 fn a_sphere_above_the_horizon_tends_to_its_closed_form() {
     for (center, r) in
-        [([0.0, 2.0, 0.0], 0.5), ([1.0, 1.0, -0.5], 0.9), ([3.0, 40.0, 7.0], 0.001), ([0.0, 2.0, 0.0], 1.9)]
+        [([0.0, 2.0, 0.0], 0.5), ([1.0, 1.0, -0.5], 0.9), ([3.0, 40.0, 7.0], 0.001), ([0.0, 2.0, 0.0], 1.5)]
     {
         let (d, cos) = (length(center), unit(center)[1]);
         let truth = PI * (r / d) * (r / d) * cos;
@@ -69,7 +70,7 @@ fn a_small_sphere_far_from_the_origin_keeps_its_light() {
     let light = ball(add(far, [0.0, 512.0, 0.0]), 0.001, 1024);
     let scene = white(far, UP, 100.0).with_light(LightDesc::Sphere(SphereLightDesc { strength: 1e9, ..light }));
     let film = probe(&scene, add(far, [0.0, 32.0, 1.0]), far);
-    assert_near(film[0] as f64 * PI, 1e9 * PI * (0.001f64 / 512.0).powi(2), 1e-3);
+    assert_near(film[0] as f64 * PI, 1e9 * PI * (0.001 / 512.0) * (0.001 / 512.0), 1e-3);
 }
 
 #[test]
@@ -184,7 +185,7 @@ fn the_shadow_of_a_sphere_under_a_sphere_light_has_its_radii() {
         0.5,
         16384,
     )));
-    let open = |scene: &SceneDesc| SceneDesc { shapes: scene.shapes[1..].to_vec(), ..scene.clone() };
+    let open = |scene: &SceneDesc| SceneDesc { shapes: scene.shapes[..1].to_vec(), ..scene.clone() };
     let bare = open(&scene);
     let at = |scene: &SceneDesc, r: f64| probe(scene, [r, 0.5, 0.0], [r, 0.0, 0.0])[0];
     let umbra = first(1.0, 1.6, |r| at(&scene, r) > 0.0);

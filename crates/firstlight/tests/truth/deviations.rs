@@ -8,6 +8,7 @@ use std::fmt::Write;
 use firstlight::{Falloff, LightDesc, ParallelogramDesc, RectangleDesc, SampleSet};
 
 use crate::analytic::{corners, first, irradiance, lambert, white};
+use crate::area_lights::{DOWN, ball, disk, disk_overhead};
 use crate::scenes::*;
 
 const UP: V = [0.0, 1.0, 0.0];
@@ -64,6 +65,15 @@ fn rows() -> Vec<Row> {
     let whole =
         floor(LightDesc::Rectangle(rectangle([0.0, 1.0, 0.0], [2.0, 0.0, 0.0], [0.0, 0.0, 2.0], SampleSet::Grid, 400)));
     rows.push(row("a 2 x 2 light in four parts, as the whole", whole, irradiance([0.0; 3], UP, &quarters), 2e-6));
+    // Disk and sphere lights
+    for (d, what) in [(0.0, "on its axis"), (1.5, "1.5 off its axis")] {
+        let is = floor(LightDesc::Disk(disk([d, 2.0, 0.0], DOWN, 1.0, 4096)));
+        let what = format!("disk light of radius 1 at height 2, {what}, 4096 points, `sobol`");
+        rows.push(row(what, disk_overhead(1.0, 2.0, d), is, 5e-4));
+    }
+    let is = floor(LightDesc::Sphere(ball([0.6, 0.8, 0.0], 0.5, 4096)));
+    let what = "sphere light of radius 0.5, 1 m away, 53° above, 4096 points, `sobol`";
+    rows.push(row(what, PI * 0.25 * 0.8, is, 5e-3));
     // Shadows
     let shadow = white([0.0; 3], UP, 5.0).with_sphere(sphere([0.0, 2.0, 0.0], 1.0));
     let shadow = shadow.with_light(LightDesc::Point(point([0.0, 6.0, 0.0], 100.0)));
