@@ -106,6 +106,15 @@ pub enum Axis {
     Z,
 }
 
+/// The border of light and dark on smooth meshes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Terminator {
+    /// as the round surface that the normals speak of would have it
+    Smooth,
+    /// as the facets have it
+    Hard,
+}
+
 /// Reads an angle in degrees.
 fn angle(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
@@ -166,6 +175,9 @@ pub struct RenderArgs {
     /// Points sampled on every area light, 1 to 1048576 [default: the scene's]
     #[arg(long, value_name = "N", value_parser = samples, help_heading = "Quality")]
     pub samples: Option<u32>,
+    /// What is made of the border of light and dark on meshes with smooth normals [default: the scene's]
+    #[arg(long, value_name = "WORD", help_heading = "Quality")]
+    pub shadow_terminator: Option<Terminator>,
     /// Renders by the plainest code there is: the same bytes, slowly
     #[arg(long, help_heading = "Quality")]
     pub reference: bool,

@@ -6,9 +6,12 @@ use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-use firstlight::{Diagnostic, Format, LightDesc, RenderSettings, RenderStats, SampleSet, SceneDesc, SimdLevel, Window};
+use firstlight::{
+    Diagnostic, Format, LightDesc, RenderSettings, RenderStats, SampleSet, SceneDesc, ShadowTerminator, SimdLevel,
+    Window,
+};
 
-use crate::args::{Bits, Frames, RenderArgs};
+use crate::args::{Bits, Frames, RenderArgs, Terminator};
 use crate::input::{self, Input};
 use crate::interrupt::Watch;
 use crate::output::{self, Output, Ready, Staged, Target};
@@ -60,6 +63,7 @@ struct Overrides<'a> {
     samples: Option<u32>,
     camera: Option<&'a str>,
     exposure: Option<f64>,
+    terminator: Option<ShadowTerminator>,
 }
 
 /// Renders.
@@ -268,6 +272,10 @@ impl<'a> Plan<'a> {
             samples: args.samples,
             camera: args.camera.as_deref(),
             exposure: args.exposure,
+            terminator: args.shadow_terminator.map(|word| match word {
+                Terminator::Smooth => ShadowTerminator::Smooth,
+                Terminator::Hard => ShadowTerminator::Hard,
+            }),
         };
         let (scene, bits, frames, quiet) = (args.scene.as_path(), args.bits, args.frames, args.quiet);
         Ok(Self { scene, outputs, bits, stats, settings, overrides, time: args.time.unwrap_or(0.0), frames, quiet })
@@ -380,6 +388,7 @@ impl Overrides<'_> {
         (render.width, render.height) = (width, height);
         render.antialiasing = self.antialiasing.unwrap_or(render.antialiasing);
         render.exposure = self.exposure.unwrap_or(render.exposure);
+        render.shadow_terminator = self.terminator.unwrap_or(render.shadow_terminator);
         if let Some(name) = self.camera {
             if !desc.cameras.iter().any(|(known, _)| known == name) {
                 return Err(Failure::Usage(no_such_camera(name, desc)));

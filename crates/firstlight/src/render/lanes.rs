@@ -52,9 +52,10 @@ fn gather_rectangle<S: Simd>(
 ) -> LobeSums {
     let splat = |v: f32| simd.splat_f32x16(v);
     let zero = splat(0.0);
-    let p = Vec3x16::splat(simd, si.p);
-    let (ng, ns, wo) = (Vec3x16::splat(simd, si.ng), Vec3x16::splat(simd, si.ns), Vec3x16::splat(simd, si.wo));
-    let is_flat = si.ng == si.ns;
+    let p = Vec3x16::splat(simd, si.lit_from);
+    let (ns, wo) = (Vec3x16::splat(simd, si.ns), Vec3x16::splat(simd, si.wo));
+    let horizon = Vec3x16::splat(simd, si.horizon);
+    let one_horizon = si.horizon == si.ns;
     let cos_o = si.ns.dot(si.wo);
     let (mut diffuse, mut specular) = (zero, zero);
     for block in rectangle.blocks() {
@@ -67,8 +68,8 @@ fn gather_rectangle<S: Simd>(
         let height = ns.dot(l);
         let distance2 = l.dot(l);
         let mut lit = height.simd_gt(zero) & distance2.simd_ge(splat(MIN_DISTANCE2));
-        if !is_flat {
-            lit &= ng.dot(l).simd_gt(zero);
+        if !one_horizon {
+            lit &= horizon.dot(l).simd_gt(zero);
         }
         // Not hidden
         for sphere in obstacles.spheres {
@@ -134,13 +135,13 @@ impl Lighting for Lanes {
     fn look_around(&mut self, scene: &Scene, si: &SurfaceInteraction) {
         self.spheres.clear();
         for sphere in &scene.obstacles {
-            let shadow = sphere.shadow(si.p, si.error);
-            if !shadow.is_below(si.ng) {
+            let shadow = sphere.shadow(si.lit_from, si.error);
+            if !shadow.is_below(si.horizon) {
                 self.spheres.push(shadow);
             }
         }
         self.flats.clear();
-        self.flats.extend(scene.flat_obstacles.iter().map(|flat| flat.shadow(si.p, si.error)));
+        self.flats.extend(scene.flat_obstacles.iter().map(|flat| flat.shadow(si.lit_from, si.error)));
     }
 
     fn gather(

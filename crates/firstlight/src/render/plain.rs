@@ -26,10 +26,10 @@ impl Lighting for Plain {
         let cos_o = si.ns.dot(si.wo);
         for k in 0..light.samples() {
             counts.shadow_rays += 1;
-            let to = light.towards(k, si.p);
+            let to = light.towards(k, si.lit_from);
             // Light from below the surface does not count
             let height = si.ns.dot(to.l);
-            if !(si.ng.dot(to.l) > 0.0 && height > 0.0) {
+            if !(si.horizon.dot(to.l) > 0.0 && height > 0.0) {
                 continue;
             }
             // How much is sent this way

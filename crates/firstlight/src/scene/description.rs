@@ -4,7 +4,7 @@ use crate::camera::CameraDesc;
 use crate::describe::{ColorDesc, table, words};
 use crate::light::LightDesc;
 use crate::material::MaterialDesc;
-use crate::shape::{GroupDesc, ShapeDesc};
+use crate::shape::{GroupDesc, ShadowTerminator, ShapeDesc};
 use crate::texture::TextureDesc;
 
 words! {
@@ -37,6 +37,8 @@ table! {
         pub antialiasing: u32 = 4,
         /// Points sampled on each area light that does not say its own, 1 to 1048576.
         pub samples: u32 = 400,
+        /// What is made of the border of light and dark on meshes with smooth normals.
+        pub shadow_terminator: ShadowTerminator = ShadowTerminator::Smooth,
         /// The camera's name, where there are several; without it, the first.
         pub camera: Option<String> = None,
         /// What no surface covers.

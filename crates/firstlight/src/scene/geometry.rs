@@ -16,7 +16,7 @@ use std::sync::Arc;
 use crate::accel::{Aabb, Bvh};
 use crate::ids::{MaterialId, SurfaceId};
 use crate::math::DVec3;
-use crate::shape::{Mesh, Parallelogram, Placement, PointSet, Solid, Sphere, TrianglePoint};
+use crate::shape::{Mesh, Parallelogram, Placement, PointSet, ShadowTerminator, Solid, Sphere, TrianglePoint};
 
 /// What a surface id stands for.
 #[derive(Clone, Debug)]
@@ -171,6 +171,8 @@ pub(crate) struct Geometry {
     pub items: Vec<Item>,
     /// Over the boxes of `items`.
     pub upper: Bvh,
+    /// Where light is gathered on meshes with smooth normals.
+    pub terminator: ShadowTerminator,
 }
 
 /// The mesh of the world, and which rays meet it.
@@ -207,7 +209,7 @@ impl std::fmt::Debug for Geometry {
 
 impl Geometry {
     /// From shapes that are in the world; the trees of meshes and point sets are there already.
-    pub fn new(parts: Parts) -> Self {
+    pub fn new(parts: Parts, terminator: ShadowTerminator) -> Self {
         let Parts { surfaces, spheres, parallelograms, world, placed, meshes, point_sets, solids } = parts;
         let listed = spheres.len() + parallelograms.len() <= LISTED;
         let (mut items, mut boxes, mut unbounded) = (Vec::new(), Vec::new(), Vec::new());
@@ -252,6 +254,7 @@ impl Geometry {
             unbounded,
             items,
             upper,
+            terminator,
         }
     }
 

@@ -193,7 +193,7 @@ pub(super) fn compile_shapes(
         let (camera, shadow) = meets(&parts.surfaces, 0, &mesh);
         Joined { mesh, camera, shadow }
     });
-    Some(Geometry::new(parts))
+    Some(Geometry::new(parts, desc.render.shadow_terminator))
 }
 
 /// The mesh files that were read, for the hash of the scene and for reports.

@@ -92,13 +92,28 @@ impl Scene {
     pub fn surface(&self, ray: &Ray, hit: &Hit, differential: &RayDifferential) -> SurfaceInteraction {
         let surface = &self.geometry.surfaces[hit.surface.index()];
         let point = self.geometry.point(ray, hit, differential);
-        let ShapePoint { p, error, normal, shading, uv, footprint, color } = point;
+        let ShapePoint { p, error, normal, shading, lifted, uv, footprint, color } = point;
         let wo = -ray.d;
         let (ng, ns) = if normal.dot(wo) < 0.0 { (-normal, -shading) } else { (normal, shading) };
+        let (lit_from, horizon) = lifted.map_or((p, ng), |lifted| (lifted, ns));
         let material = surface.material.unwrap_or_else(|| self.geometry.face_material(hit));
         let receives_shadow = surface.receives_shadow;
         let surface = hit.surface;
-        SurfaceInteraction { p, error, ng, ns, wo, uv, footprint, color, surface, material, receives_shadow }
+        SurfaceInteraction {
+            p,
+            error,
+            ng,
+            ns,
+            lit_from,
+            horizon,
+            wo,
+            uv,
+            footprint,
+            color,
+            surface,
+            material,
+            receives_shadow,
+        }
     }
 
     /// How the point of a hit moves with u, and with v: metres for 1. Not orthogonal, and no length where uv has no

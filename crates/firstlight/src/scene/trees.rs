@@ -283,13 +283,14 @@ impl Geometry {
         match hit.at {
             At::World(point) => {
                 let world = self.world.as_ref().expect("the hit is on it");
-                world.mesh.point(None, point, ray, hit.t, differential)
+                world.mesh.point(None, point, ray, hit.t, differential, self.terminator)
             }
             At::Placed(index, spot) => {
                 let thing = &self.placed[index as usize];
                 match (thing.target, spot) {
                     (Target::Mesh(mesh), Spot::Triangle(point)) => {
-                        self.meshes[mesh as usize].point(Some(&thing.placement), point, ray, hit.t, differential)
+                        let mesh = &self.meshes[mesh as usize];
+                        mesh.point(Some(&thing.placement), point, ray, hit.t, differential, self.terminator)
                     }
                     (Target::Points(points), Spot::Point(point)) => {
                         self.point_sets[points as usize].point(&thing.placement, point, ray, hit.t, differential)

@@ -87,10 +87,11 @@ prop_compose! {
         size in [any::<u32>(), any::<u32>(), any::<u32>(), any::<u32>()], camera in maybe(text()),
         colors in [color(), color()], transparent: bool, display in select(DisplayEncoding::ALL),
         gamma in number(), exposure in number(), fps in number(),
+        shadow_terminator in select(ShadowTerminator::ALL),
     ) -> RenderDesc {
         RenderDesc {
             width: size[0], height: size[1], antialiasing: size[2], samples: size[3], camera, background: colors[0],
-            transparent, ambient: colors[1], display, gamma, exposure, fps,
+            transparent, ambient: colors[1], display, gamma, exposure, fps, shadow_terminator,
         }
     }
 }

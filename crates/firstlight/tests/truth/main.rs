@@ -11,3 +11,4 @@ mod known;
 mod random;
 mod robust;
 mod scenes;
+mod terminator;
