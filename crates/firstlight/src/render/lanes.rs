@@ -10,10 +10,11 @@ use super::Counts;
 use super::pixel::{Lighting, LobeSums};
 use super::plain::Plain;
 use crate::accel::RayPacket16;
+use crate::ids::LightId;
 use crate::light::{LightKind, MIN_DISTANCE2, Rectangle};
 use crate::material::Lobe;
 use crate::math::{LANES, LaneSum, ShadowRay, Vec3, Vec3x16};
-use crate::scene::{Geometry, Scene, ShadowRays};
+use crate::scene::{Geometry, LinkId, Scene, ShadowRays};
 use crate::shape::{ParallelogramShadow, PlaneSide, SphereShadow, SurfaceInteraction};
 
 /// Light, sixteen samples at a time.
@@ -21,6 +22,10 @@ pub(crate) struct Lanes {
     level: Level,
     /// Spheres that can stand between the surface looked around from and any light.
     spheres: Vec<SphereShadow>,
+    /// For which lights each of `spheres` casts shadows; empty where nothing chooses.
+    sphere_links: Vec<Option<LinkId>>,
+    /// Those of `spheres` that cast shadows for the light at hand, where something chooses.
+    casting: Vec<SphereShadow>,
     /// All that is flat, as seen from that surface, by the index that tells on which side of it each light lies.
     flats: Vec<ParallelogramShadow>,
     /// Those of `flats` that can stand in the way of the light at hand.
@@ -29,7 +34,8 @@ pub(crate) struct Lanes {
 
 impl Lanes {
     pub fn new(level: Level) -> Self {
-        Lanes { level, spheres: Vec::new(), flats: Vec::new(), between: Vec::new() }
+        let (spheres, flats) = (Vec::new(), Vec::new());
+        Lanes { level, spheres, sphere_links: Vec::new(), casting: Vec::new(), flats, between: Vec::new() }
     }
 }
 
@@ -39,6 +45,8 @@ struct Obstacles<'a> {
     flats: &'a [ParallelogramShadow],
     /// All that lies in trees.
     trees: Option<&'a Geometry>,
+    /// The light that they stand in the way of.
+    light: LightId,
 }
 
 /// The sums over the points of a rectangle light that none of the `obstacles` hides.
@@ -86,7 +94,7 @@ fn gather_rectangle<S: Simd>(
             for (way, l) in ways.iter_mut().zip([l.x, l.y, l.z]) {
                 l.store_slice(way);
             }
-            let hidden = hidden_by_trees(simd.level(), geometry, si, ways, lit.to_bitmask() as u16);
+            let hidden = hidden_by_trees(simd.level(), geometry, si, obstacles.light, ways, lit.to_bitmask() as u16);
             lit &= !mask32x16::from_bitmask(simd, hidden as u64);
             if lit.all_false() {
                 continue;
@@ -112,10 +120,11 @@ fn hidden_by_trees(
     level: Level,
     geometry: &Geometry,
     si: &SurfaceInteraction,
+    light: LightId,
     l: [[f32; LANES]; 3],
     active: u16,
 ) -> u16 {
-    let from = si.shadow_ray(Vec3::ZERO, 1.0);
+    let from = si.shadow_ray(light, Vec3::ZERO, 1.0);
     let o = from.start.to_array().map(|o| [o; LANES]);
     let mut shadows = ShadowRays { from, rays: RayPacket16 { o, d: l }, t_end: [0.0; LANES] };
     for (lane, end) in shadows.t_end.iter_mut().enumerate() {
@@ -134,10 +143,15 @@ fn partials<S: Simd>(v: f32x16<S>) -> LaneSum {
 impl Lighting for Lanes {
     fn look_around(&mut self, scene: &Scene, si: &SurfaceInteraction) {
         self.spheres.clear();
-        for sphere in &scene.obstacles {
+        self.sphere_links.clear();
+        let [links, _] = &scene.obstacle_links;
+        for (i, sphere) in scene.obstacles.iter().enumerate() {
             let shadow = sphere.shadow(si.lit_from, si.error);
             if !shadow.is_below(si.horizon) {
                 self.spheres.push(shadow);
+                if !links.is_empty() {
+                    self.sphere_links.push(links[i]);
+                }
             }
         }
         self.flats.clear();
@@ -157,18 +171,33 @@ impl Lighting for Lanes {
         let LightKind::Rectangle(rectangle) = &light.kind else {
             return Plain.gather(scene, index, si, lobe, counts);
         };
+        // What casts no shadow for this light is not in its way
+        let id = LightId(index as u32);
+        let spheres = if self.sphere_links.is_empty() {
+            &self.spheres
+        } else {
+            self.casting.clear();
+            for (sphere, links) in self.spheres.iter().zip(&self.sphere_links) {
+                if scene.geometry.links.contains(*links, id) {
+                    self.casting.push(*sphere);
+                }
+            }
+            &self.casting
+        };
         self.between.clear();
+        let [_, flat_links] = &scene.obstacle_links;
         let sides = &scene.light_sides[index];
         for (i, flat) in self.flats.iter().enumerate() {
-            if !flat.is_one_sided(sides.get(i).copied().unwrap_or(PlaneSide::Both)) {
+            let side = sides.get(i).copied().unwrap_or(PlaneSide::Both);
+            if !flat.is_one_sided(side) && (flat_links.is_empty() || scene.casts(flat_links, i, id)) {
                 self.between.push(*flat);
             }
         }
         let trees = scene.geometry.has_trees().then_some(&*scene.geometry);
         let obstacles = if light.shadows && si.receives_shadow {
-            Obstacles { spheres: &self.spheres, flats: &self.between, trees }
+            Obstacles { spheres, flats: &self.between, trees, light: id }
         } else {
-            Obstacles { spheres: &[], flats: &[], trees: None }
+            Obstacles { spheres: &[], flats: &[], trees: None, light: id }
         };
         let samples = rectangle.samples() as u64;
         counts.shadow_rays += samples;

@@ -2,6 +2,7 @@
 
 use super::Counts;
 use super::pixel::{Lighting, LobeSums};
+use crate::ids::LightId;
 use crate::material::Lobe;
 use crate::math::LaneSum;
 use crate::scene::Scene;
@@ -37,7 +38,7 @@ impl Lighting for Plain {
             // Nor does what something else hides
             if light.shadows && si.receives_shadow {
                 let t_max = if to.finite { 1.0 } else { f32::INFINITY };
-                if scene.occluded(&si.shadow_ray(to.l, t_max)) {
+                if scene.occluded(&si.shadow_ray(LightId(index as u32), to.l, t_max)) {
                     continue;
                 }
             } else {

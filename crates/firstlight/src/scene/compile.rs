@@ -96,6 +96,7 @@ impl SceneDesc {
             return (None, cx.take_faults());
         };
         let (obstacles, flats) = geometry.listed_obstacles();
+        let obstacle_links = geometry.listed_obstacle_links();
         let flat_obstacles: Vec<_> = flats.into_iter().chain(blocking(&lights)).collect();
         let light_sides = sides(&lights, &flat_obstacles);
         let summary = self.summary(desc, &geometry, &lights, &textures);
@@ -113,6 +114,7 @@ impl SceneDesc {
             materials,
             obstacles,
             flat_obstacles,
+            obstacle_links,
             light_sides,
             level: Level::new(),
             hash: self.hash(&textures, &files, options.complete),

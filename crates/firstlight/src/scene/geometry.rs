@@ -13,8 +13,9 @@
 
 use std::sync::Arc;
 
+use super::links::{LinkId, LinkSets};
 use crate::accel::{Aabb, Bvh};
-use crate::ids::{MaterialId, SurfaceId};
+use crate::ids::{LightId, MaterialId, SurfaceId};
 use crate::math::DVec3;
 use crate::shape::{Mesh, Parallelogram, Placement, PointSet, ShadowTerminator, Solid, Sphere, TrianglePoint};
 
@@ -33,6 +34,10 @@ pub(crate) struct Surface {
     pub receives_shadow: bool,
     /// Whether camera rays pass through from behind.
     pub single_sided: bool,
+    /// The lights that shine on it; `None`: all.
+    pub lights: Option<LinkId>,
+    /// The lights it casts shadows for, if it casts any; `None`: all.
+    pub shadows: Option<LinkId>,
 }
 
 /// A thing with a space of its own.
@@ -173,6 +178,8 @@ pub(crate) struct Geometry {
     pub upper: Bvh,
     /// Where light is gathered on meshes with smooth normals.
     pub terminator: ShadowTerminator,
+    /// The sets of lights that surfaces choose.
+    pub links: LinkSets,
 }
 
 /// The mesh of the world, and which rays meet it.
@@ -193,6 +200,7 @@ pub(crate) struct Parts {
     pub meshes: Vec<Mesh>,
     pub point_sets: Vec<PointSet>,
     pub solids: Vec<Solid>,
+    pub links: LinkSets,
 }
 
 /// A box of the upper tree: a little larger, so that no rounding of the shape's own test lies outside.
@@ -210,7 +218,7 @@ impl std::fmt::Debug for Geometry {
 impl Geometry {
     /// From shapes that are in the world; the trees of meshes and point sets are there already.
     pub fn new(parts: Parts, terminator: ShadowTerminator) -> Self {
-        let Parts { surfaces, spheres, parallelograms, world, placed, meshes, point_sets, solids } = parts;
+        let Parts { surfaces, spheres, parallelograms, world, placed, meshes, point_sets, solids, links } = parts;
         let listed = spheres.len() + parallelograms.len() <= LISTED;
         let (mut items, mut boxes, mut unbounded) = (Vec::new(), Vec::new(), Vec::new());
         if !listed {
@@ -255,6 +263,7 @@ impl Geometry {
             items,
             upper,
             terminator,
+            links,
         }
     }
 
@@ -267,6 +276,34 @@ impl Geometry {
         let spheres = self.spheres.iter().filter(|sphere| casts(sphere.surface)).map(|sphere| sphere.shape);
         let flats = self.parallelograms.iter().filter(|flat| casts(flat.surface)).map(|flat| flat.shape);
         (spheres.collect(), flats.collect())
+    }
+
+    /// For which lights each of [`listed_obstacles`](Self::listed_obstacles) casts shadows. Nothing where no surface chooses.
+    pub fn listed_obstacle_links(&self) -> [Vec<Option<LinkId>>; 2] {
+        if !self.listed || self.links.is_empty() {
+            return [Vec::new(), Vec::new()];
+        }
+        let of = |surface: SurfaceId| &self.surfaces[surface.index()];
+        let links = |surfaces: &mut dyn Iterator<Item = SurfaceId>| {
+            surfaces.map(of).filter(|surface| surface.casts_shadow).map(|surface| surface.shadows).collect()
+        };
+        [
+            links(&mut self.spheres.iter().map(|sphere| sphere.surface)),
+            links(&mut self.parallelograms.iter().map(|flat| flat.surface)),
+        ]
+    }
+
+    /// The lights that shine on a surface; `None`: all.
+    #[inline(always)]
+    pub fn lights_of(&self, surface: SurfaceId) -> Option<LinkId> {
+        if self.links.is_empty() { None } else { self.surfaces[surface.index()].lights }
+    }
+
+    /// Whether a surface stands in the way of a light.
+    #[inline]
+    pub fn casts(&self, surface: SurfaceId, light: LightId) -> bool {
+        let surface = &self.surfaces[surface.index()];
+        surface.casts_shadow && self.links.contains(surface.shadows, light)
     }
 
     /// Every mesh, that of the world first.

@@ -5,6 +5,7 @@ mod compile;
 mod course;
 mod description;
 mod geometry;
+mod links;
 mod model;
 mod place;
 mod text;
@@ -31,6 +32,7 @@ use crate::shape::{Parallelogram, PlaneSide, Sphere};
 
 use crate::texture::Texture;
 pub(crate) use geometry::{Geometry, Nearest};
+pub(crate) use links::LinkId;
 pub(crate) use trees::ShadowRays;
 
 /// A scene, ready to be rendered: flat lists and ids. Between here and the image nothing can fail.
@@ -55,6 +57,8 @@ pub struct Scene {
     pub(crate) obstacles: Vec<Sphere>,
     /// All that is flat, listed and in the way of light: parallelograms, then the rectangle lights that block.
     pub(crate) flat_obstacles: Vec<Parallelogram>,
+    /// For which lights each of `obstacles` and of the first of `flat_obstacles` casts shadows; empty where no surface chooses.
+    pub(crate) obstacle_links: [Vec<Option<LinkId>>; 2],
     /// For each rectangle light, on which side of each flat obstacle it lies; where nothing is known, both.
     pub(crate) light_sides: Vec<Vec<PlaneSide>>,
     /// The best instruction set of this processor: for rays that are asked for one at a time.

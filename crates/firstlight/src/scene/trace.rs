@@ -4,8 +4,9 @@ use fearless_simd::Level;
 
 use super::Scene;
 use super::geometry::{At, Nearest};
+use super::links::LinkId;
 use crate::color::Rgb;
-use crate::ids::SurfaceId;
+use crate::ids::{LightId, SurfaceId};
 use crate::light::LightKind;
 use crate::math::{Ray, ShadowRay, Vec3};
 use crate::shape::{RayDifferential, ShapePoint, SurfaceInteraction};
@@ -75,13 +76,23 @@ impl Scene {
         nearest
     }
 
-    /// Whether anything stands between a surface and a light. Any hit will do, so the order is of no account.
+    /// Whether anything that casts shadows for the ray's light stands between a surface and it. Any hit will do, so the order
+    /// is of no account.
     #[inline]
     pub fn occluded(&self, ray: &ShadowRay) -> bool {
         let finite = ray.t_max == 1.0;
-        self.obstacles.iter().any(|sphere| sphere.shadow(ray.p, ray.error).blocks(ray.l, finite))
-            || self.flat_obstacles.iter().any(|flat| flat.shadow(ray.p, ray.error).blocks(ray.l, finite))
+        let [sphere_links, flat_links] = &self.obstacle_links;
+        let spheres = self.obstacles.iter().enumerate().filter(|(i, _)| self.casts(sphere_links, *i, ray.light));
+        let flats = self.flat_obstacles.iter().enumerate().filter(|(i, _)| self.casts(flat_links, *i, ray.light));
+        spheres.map(|(_, sphere)| sphere.shadow(ray.p, ray.error)).any(|sphere| sphere.blocks(ray.l, finite))
+            || flats.map(|(_, flat)| flat.shadow(ray.p, ray.error)).any(|flat| flat.blocks(ray.l, finite))
             || self.geometry.has_trees() && self.geometry.is_blocked(self.level, ray)
+    }
+
+    /// Whether obstacle `i` of a list casts shadows for a light; those beyond the end of `links` do for all.
+    #[inline(always)]
+    pub(crate) fn casts(&self, links: &[Option<LinkId>], i: usize, light: LightId) -> bool {
+        self.geometry.links.contains(links.get(i).copied().flatten(), light)
     }
 
     /// The surface at a hit, turned to the viewer. `differential` is that of the camera ray.

@@ -2,7 +2,7 @@
 
 use crate::color::Rgb;
 use crate::describe::words;
-use crate::ids::{MaterialId, SurfaceId};
+use crate::ids::{LightId, MaterialId, SurfaceId};
 use crate::math::{ErrorBound, ShadowRay, Vec2, Vec3};
 
 words! {
@@ -91,11 +91,11 @@ pub struct SurfaceInteraction {
 }
 
 impl SurfaceInteraction {
-    /// A ray from here along `l`, up to `t_max` times its length.
+    /// A ray from here towards a light along `l`, up to `t_max` times its length.
     #[inline(always)]
-    pub(crate) fn shadow_ray(&self, l: Vec3, t_max: f32) -> ShadowRay {
+    pub(crate) fn shadow_ray(&self, light: LightId, l: Vec3, t_max: f32) -> ShadowRay {
         let start = self.error.offset(self.lit_from, self.ng).as_vec3();
-        ShadowRay { p: self.lit_from, error: self.error, start, l, t_max }
+        ShadowRay { p: self.lit_from, error: self.error, start, l, t_max, light }
     }
 }
 

@@ -8,6 +8,7 @@ mod determinism;
 mod deviations;
 mod geometry;
 mod known;
+mod links;
 mod random;
 mod robust;
 mod scenes;
