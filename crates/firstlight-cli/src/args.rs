@@ -115,6 +115,15 @@ pub enum Axis {
     Z,
 }
 
+/// The border of light and dark on smooth meshes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum Terminator {
+    /// as the round surface that the normals speak of would have it
+    Smooth,
+    /// as the facets have it
+    Hard,
+}
+
 /// Reads an angle in degrees.
 fn angle(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
@@ -179,6 +188,9 @@ pub struct RenderArgs {
     /// [default: adaptive]
     #[arg(long, value_name = "MODE", help_heading = "Quality")]
     pub aa_mode: Option<AntialiasingMode>,
+    /// What is made of the border of light and dark on meshes with smooth normals [default: the scene's]
+    #[arg(long, value_name = "WORD", help_heading = "Quality")]
+    pub shadow_terminator: Option<Terminator>,
     /// Renders by the plainest code there is: the same bytes, slowly
     #[arg(long, help_heading = "Quality")]
     pub reference: bool,

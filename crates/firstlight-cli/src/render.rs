@@ -7,10 +7,11 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 use firstlight::{
-    AaMode, Diagnostic, Format, LightDesc, RenderSettings, RenderStats, SampleSet, SamplesDesc, SceneDesc, SimdLevel, Window,
+    AaMode, Diagnostic, Format, LightDesc, RenderSettings, RenderStats, SampleSet, SamplesDesc, SceneDesc,
+    ShadowTerminator, SimdLevel, Window,
 };
 
-use crate::args::{AntialiasingMode, Bits, Frames, RenderArgs};
+use crate::args::{AntialiasingMode, Bits, Frames, RenderArgs, Terminator};
 use crate::input::{self, Input};
 use crate::interrupt::Watch;
 use crate::output::{self, Output, Ready, Staged, Target};
@@ -62,6 +63,7 @@ struct Overrides<'a> {
     samples: Option<SamplesDesc>,
     camera: Option<&'a str>,
     exposure: Option<f64>,
+    terminator: Option<ShadowTerminator>,
 }
 
 /// Renders.
@@ -276,6 +278,10 @@ impl<'a> Plan<'a> {
             samples: args.samples,
             camera: args.camera.as_deref(),
             exposure: args.exposure,
+            terminator: args.shadow_terminator.map(|word| match word {
+                Terminator::Smooth => ShadowTerminator::Smooth,
+                Terminator::Hard => ShadowTerminator::Hard,
+            }),
         };
         let (scene, bits, frames, quiet) = (args.scene.as_path(), args.bits, args.frames, args.quiet);
         Ok(Self { scene, outputs, bits, stats, settings, overrides, time: args.time.unwrap_or(0.0), frames, quiet })
@@ -388,6 +394,7 @@ impl Overrides<'_> {
         (render.width, render.height) = (width, height);
         render.antialiasing = self.antialiasing.unwrap_or(render.antialiasing);
         render.exposure = self.exposure.unwrap_or(render.exposure);
+        render.shadow_terminator = self.terminator.unwrap_or(render.shadow_terminator);
         if let Some(name) = self.camera {
             if !desc.cameras.iter().any(|(known, _)| known == name) {
                 return Err(Failure::Usage(no_such_camera(name, desc)));

@@ -193,7 +193,7 @@ pub(crate) struct CompileContext {
 }
 
 /// Faults that are told; of more, the number.
-const MAX_FAULTS: usize = 256;
+pub(crate) const MAX_FAULTS: usize = 256;
 
 /// Names that are searched for the one that was meant.
 const MAX_NAMES_COMPARED: usize = 1000;

@@ -92,7 +92,8 @@ pub use scene::{
 pub use shape::RectangleDesc as RectangleShapeDesc;
 pub use shape::{
     BoxDesc, ConeDesc, CylinderDesc, DiskDesc, Footprint, GroupDesc, InstanceDesc, MeshDesc, ParallelogramDesc,
-    PlaneDesc, PointSetDesc, RayDifferential, ShapeDesc, SphereDesc, SphereUv, SurfaceInteraction, TorusDesc, UvEdge,
+    PlaneDesc, PointSetDesc, RayDifferential, ShadowTerminator, ShapeDesc, SphereDesc, SphereUv, SurfaceInteraction,
+    TorusDesc, UvEdge,
 };
 pub use texture::{CheckerboardDesc, Filter, ImageTextureDesc, TextureDesc, TextureSpace, Wrap};
 pub use transform::{Interpolation, TransformDesc, TransformKeyDesc};

@@ -150,3 +150,22 @@ fn a_course_file_without_output_is_called_like_itself() {
     folder.run("render mine.txt").done();
     assert_eq!(folder.names(), ["mine.png", "mine.txt"]);
 }
+
+#[test]
+fn the_border_of_light_and_dark_can_be_left_hard() {
+    let folder = Folder::new();
+    let stone = "[render]\nwidth = 24\nheight = 24\n[camera]\nposition = [0, 0, 4]\n\
+        [[light.directional]]\ndirection = [-1, 0, 0]\n[[mesh]]\nsmooth_deg = 180\n\
+        positions = [[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]]\n\
+        triangles = [[0, 2, 4], [2, 1, 4], [1, 3, 4], [3, 0, 4], [2, 0, 5], [1, 2, 5], [3, 1, 5], [0, 3, 5]]\n\
+        transform = { rotate_deg = [0, 20, 0] }\n";
+    folder.put("stone.toml", stone);
+    let shot = |options: &str| {
+        folder.run(&format!("render stone.toml -o out.png {options}")).done();
+        Picture::decode(&folder.get("out.png")).data
+    };
+    let (default, hard) = (shot(""), shot("--shadow-terminator hard"));
+    assert!(default == shot("--shadow-terminator smooth"));
+    assert!(default != hard);
+    folder.run("render stone.toml --shadow-terminator soft").exits(2);
+}

@@ -8,6 +8,7 @@ use super::emitter::Emitter;
 use super::hider::Hider;
 use super::rows::MAX_HIDERS;
 use super::view::View;
+use crate::ids::LightId;
 use crate::math::{DVec3, Vec3};
 use crate::scene::Scene;
 use crate::shape::{Parallelogram, PlaneSide, Sphere, SurfaceInteraction};
@@ -118,8 +119,13 @@ impl Between {
         let cone = LightCone::new(view, asker.reach);
         let pyramid = OnceCell::new();
         let pyramid = || pyramid.get_or_init(|| Pyramid::new(view, asker.reach));
-        let (p, horizon) = (asker.si.p, asker.si.ng);
-        for sphere in &scene.obstacles {
+        let (p, horizon) = (asker.si.lit_from, asker.si.horizon);
+        let id = LightId(light as u32);
+        let [sphere_links, flat_links] = &scene.obstacle_links;
+        for (i, sphere) in scene.obstacles.iter().enumerate() {
+            if !scene.casts(sphere_links, i, id) {
+                continue;
+            }
             let s = (sphere.c - p.as_dvec3()).as_vec3();
             if cone.misses(s, sphere.r as f32) {
                 continue;
@@ -136,6 +142,9 @@ impl Between {
         }
         let sides = &scene.light_sides[light];
         for (i, flat) in scene.flat_obstacles.iter().enumerate() {
+            if !scene.casts(flat_links, i, id) {
+                continue;
+            }
             let side = sides.get(i).copied().unwrap_or(PlaneSide::Both);
             if !flat.is_one_sided(p, asker.si.error, side) {
                 between.flat(view, emitter, pyramid(), flat, asker);
@@ -169,10 +178,10 @@ impl Between {
         horizon: Vec3,
     ) {
         let si = asker.si;
-        let shadow = sphere.shadow(si.p, si.error);
+        let shadow = sphere.shadow(si.lit_from, si.error);
         if shadow.is_below(horizon) {
             // The whole patch, if the sphere is the surface's own, or deep enough
-            let s = (sphere.c - si.p.as_dvec3()).as_vec3();
+            let s = (sphere.c - si.lit_from.as_dvec3()).as_vec3();
             let (r, distance) = (sphere.r as f32, s.length());
             let own = (distance - r).abs() <= r * 1e-3;
             if !own && -horizon.dot(s) - r < asker.reach * (1.0 + distance) {
@@ -180,7 +189,7 @@ impl Between {
             }
             return;
         }
-        let to = sphere.c - si.p.as_dvec3();
+        let to = sphere.c - si.lit_from.as_dvec3();
         let (distance, r) = (to.length(), sphere.r);
         // From inside, or from its inner side: light from outside is hidden, light from inside is not
         if distance <= r * (1.0 + 1e-6) || shadow.is_on() {
@@ -210,7 +219,7 @@ impl Between {
         if gap > SLACK * distance as f32 {
             return;
         }
-        if touches(emitter, to, r, si.p) {
+        if touches(emitter, to, r, si.lit_from) {
             self.ask = true;
             return;
         }
@@ -242,10 +251,10 @@ impl Between {
     }
 
     fn flat(&mut self, view: &View, emitter: &Emitter, pyramid: &Pyramid, flat: &Parallelogram, asker: &Asker) {
-        let from = asker.si.p.as_dvec3();
+        let from = asker.si.lit_from.as_dvec3();
         let corners = flat.deep_corners().map(|q| (q - from).as_vec3());
         // Below the horizon
-        let above = corners.iter().fold(f32::NEG_INFINITY, |above, q| above.max(asker.si.ng.dot(*q)));
+        let above = corners.iter().fold(f32::NEG_INFINITY, |above, q| above.max(asker.si.horizon.dot(*q)));
         let size = corners.iter().fold(0.0f32, |size, q| size.max(q.length()));
         if above < -SLACK * size - asker.reach {
             return;

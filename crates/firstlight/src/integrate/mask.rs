@@ -10,6 +10,7 @@ use super::between::Between;
 use super::emitter::Emitter;
 use super::view::{Outline, View};
 use crate::accel::RayPacket16;
+use crate::ids::LightId;
 use crate::light::{Light, LightKind, SampleSet};
 use crate::material::Lobe;
 use crate::math::{LANES, ShadowRay, Vec3};
@@ -71,7 +72,7 @@ impl Masked<'_> {
         };
         let ball = match self.emitter {
             Emitter::Ball { center, radius } => {
-                let to = (*center - self.si.p.as_dvec3()).as_vec3();
+                let to = (*center - self.si.lit_from.as_dvec3()).as_vec3();
                 Some((to, (to.length_squared() - (radius * radius) as f32).max(0.0)))
             }
             _ => None,
@@ -139,8 +140,8 @@ impl Masked<'_> {
         let mut hidden = 0;
         if self.between.ask {
             for lane in lanes(active) {
-                let ray = self.si.shadow_ray(ways[lane], 1.0);
-                hidden |= u16::from(self.scene.occluded_by_lists(&ray, Some(self.light))) << lane;
+                let ray = self.si.shadow_ray(LightId(self.light as u32), ways[lane], 1.0);
+                hidden |= u16::from(self.scene.occluded_by_lists(&ray)) << lane;
             }
         } else {
             for lane in lanes(active) {
@@ -153,7 +154,7 @@ impl Masked<'_> {
         if asking == 0 || !geometry.has_trees() {
             return hidden;
         }
-        let from = self.si.shadow_ray(Vec3::ZERO, 1.0);
+        let from = self.si.shadow_ray(LightId(self.light as u32), Vec3::ZERO, 1.0);
         let mut shadows = ShadowRays { from, rays: RayPacket16::ZERO, t_end: [0.0; LANES] };
         for lane in 0..LANES {
             shadows.rays.set(lane, from.start, ways[lane]);
@@ -170,16 +171,16 @@ impl Masked<'_> {
         let (mut diffuse, mut specular) = (0.0f64, 0.0f64);
         let count = area.samples();
         for k in 0..count {
-            let l = area.point(k) - si.p;
+            let l = area.point(k) - si.lit_from;
             let height = si.ns.dot(l);
-            if !(si.ng.dot(l) > 0.0 && height > 0.0) {
+            if !(si.horizon.dot(l) > 0.0 && height > 0.0) {
                 continue;
             }
             let Some(sample) = light.sample(k, l) else { continue };
             if sample.weight == 0.0
                 || light.shadows
                     && si.receives_shadow
-                    && self.scene.occluded_from(&si.shadow_ray(l, 1.0), Some(self.light))
+                    && self.scene.occluded(&si.shadow_ray(LightId(self.light as u32), l, 1.0))
             {
                 continue;
             }

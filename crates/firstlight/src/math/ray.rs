@@ -1,6 +1,7 @@
 //! Rays, and how sure we are of where they start.
 
 use super::{DVec3, UNIT_ROUNDOFF, Vec3};
+use crate::ids::LightId;
 
 /// A camera ray: the points `o + t d`, 0 < t.
 #[derive(Clone, Copy, Debug)]
@@ -76,6 +77,8 @@ pub struct ShadowRay {
     pub l: Vec3,
     /// 1 where `l` reaches the light, infinite where the light is infinitely far away.
     pub t_max: f32,
+    /// The light: not everything casts shadows for every one.
+    pub light: LightId,
 }
 
 impl ShadowRay {

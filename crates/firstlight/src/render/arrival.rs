@@ -7,6 +7,7 @@ use super::lanes::Lanes;
 use super::pixel::Lighting;
 use super::plain::Plain;
 use crate::color::{DisplaySteps, Rgb};
+use crate::ids::LightId;
 use crate::integrate::{Asker, Between, Emitter, Masked, Receiver, Sums, View, integrate, sharpness};
 use crate::light::{Light, LightKind};
 use crate::material::Lobe;
@@ -110,6 +111,10 @@ impl<'a> Arrivals<'a> {
     /// What of light `index` arrives.
     pub fn arrival(&mut self, index: usize, place: &Place, counts: &mut Counts) -> Arrival {
         let light = &self.scene.lights[index];
+        let links = self.scene.geometry.lights_of(place.si.surface);
+        if !self.scene.geometry.links.contains(links, LightId(index as u32)) {
+            return Arrival::even(Sums::default());
+        }
         match (&self.lights.emitters[index], &light.kind) {
             (Some(emitter), _) => self.integrated(index, emitter, place, counts),
             (None, LightKind::Area(area)) => {
@@ -138,11 +143,11 @@ impl<'a> Arrivals<'a> {
         if place.reach == 0.0 {
             return Arrival::even(sums);
         }
-        let to = light.towards(0, si.p);
+        let to = light.towards(0, si.lit_from);
         let distance = if to.finite { to.l.length() } else { f32::INFINITY };
         // The most that can arrive on the patch, the cosine being 1
         let near = (distance - place.reach).max(0.0);
-        let (height, behind) = (si.ns.dot(to.l).min(si.ng.dot(to.l)), place.reach + place.turn * to.l.length());
+        let (height, behind) = (si.ns.dot(to.l).min(si.horizon.dot(to.l)), place.reach + place.turn * to.l.length());
         if height < -behind {
             return Arrival::even(sums);
         }
@@ -181,13 +186,16 @@ impl<'a> Arrivals<'a> {
         let length = l.length();
         let d = l / length;
         let end = if finite { length } else { f32::INFINITY };
-        let spheres = scene.obstacles.iter();
+        let id = LightId(light as u32);
+        let [sphere_links, flat_links] = &scene.obstacle_links;
+        let spheres = scene.obstacles.iter().enumerate().filter(|(i, _)| scene.casts(sphere_links, *i, id));
+        let spheres = spheres.map(|(_, sphere)| sphere);
         let lights = scene.light_obstacles.spheres.iter().filter(|(index, _)| *index != light).map(|(_, sphere)| sphere);
         for sphere in spheres.chain(lights) {
-            let s = (sphere.c - si.p.as_dvec3()).as_vec3();
+            let s = (sphere.c - si.lit_from.as_dvec3()).as_vec3();
             let (r, distance) = (sphere.r as f32, s.length());
             // The surface's own sphere, from outside
-            if (distance - r).abs() <= r * 1e-3 && s.dot(si.ng) < 0.0 {
+            if (distance - r).abs() <= r * 1e-3 && s.dot(si.horizon) < 0.0 {
                 continue;
             }
             let t = s.dot(d).clamp(0.0, end);
@@ -203,12 +211,15 @@ impl<'a> Arrivals<'a> {
             return 1.0;
         }
         let mut edge = 0.0;
-        for flat in &scene.flat_obstacles {
+        for (i, flat) in scene.flat_obstacles.iter().enumerate() {
+            if !scene.casts(flat_links, i, id) {
+                continue;
+            }
             let n = flat.n.as_vec3();
-            let height = flat.n.dot(si.p.as_dvec3() - flat.p) as f32;
+            let height = flat.n.dot(si.lit_from.as_dvec3() - flat.p) as f32;
             let tip = if finite { height + n.dot(l) } else if n.dot(l) * height < 0.0 { -height } else { height };
             let slack = place.reach + (height.abs() + length.min(1e30)) * 1e-5;
-            if height.abs() <= slack && flat.shadow(si.p, si.error).is_one_sided(PlaneSide::Both) {
+            if height.abs() <= slack && flat.shadow(si.lit_from, si.error).is_one_sided(PlaneSide::Both) {
                 // The surface's own
                 continue;
             }
@@ -216,7 +227,7 @@ impl<'a> Arrivals<'a> {
                 continue;
             }
             let t = -f64::from(height) / f64::from(n.dot(l));
-            let hit = si.p.as_dvec3() + l.as_dvec3() * t;
+            let hit = si.lit_from.as_dvec3() + l.as_dvec3() * t;
             let aside = flat.outside(hit) as f32;
             if aside > slack {
                 continue;
@@ -231,8 +242,8 @@ impl<'a> Arrivals<'a> {
 
     fn view(&self, emitter: &Emitter, place: &Place) -> Option<View> {
         let si = place.si;
-        let flat = emitter.flat(si.p)?;
-        Some(View::new(&flat, &Receiver { p: si.p, horizon: si.ng, ns: si.ns, wo: si.wo, lobe: *place.lobe }))
+        let flat = emitter.flat(si.lit_from)?;
+        Some(View::new(&flat, &Receiver { p: si.lit_from, horizon: si.horizon, ns: si.ns, wo: si.wo, lobe: *place.lobe }))
     }
 
     /// An area light, integrated.

@@ -10,10 +10,11 @@ use super::Counts;
 use super::pixel::{Lighting, LobeSums};
 use super::plain::Plain;
 use crate::accel::RayPacket16;
+use crate::ids::LightId;
 use crate::light::{Area, LightKind, MIN_DISTANCE2, Points};
 use crate::material::Lobe;
 use crate::math::{LANES, LaneSum, ShadowRay, Vec3, Vec3x16};
-use crate::scene::{Geometry, Scene, ShadowRays};
+use crate::scene::{Geometry, LinkId, Scene, ShadowRays};
 use crate::shape::{DiskShadow, ParallelogramShadow, PlaneSide, SphereShadow, SurfaceInteraction};
 
 /// Light, sixteen samples at a time.
@@ -21,6 +22,10 @@ pub(crate) struct Lanes {
     level: Level,
     /// Spheres that can stand between the surface looked around from and any light.
     spheres: Vec<SphereShadow>,
+    /// For which lights each of `spheres` casts shadows; empty where nothing chooses.
+    sphere_links: Vec<Option<LinkId>>,
+    /// Those of `spheres` that cast shadows for the light at hand, where something chooses.
+    casting: Vec<SphereShadow>,
     /// All that is flat, as seen from that surface, by the index that tells on which side of it each light lies.
     flats: Vec<ParallelogramShadow>,
     /// Those of `flats` that can stand in the way of the light at hand.
@@ -38,6 +43,8 @@ impl Lanes {
         Lanes {
             level,
             spheres: Vec::new(),
+            sphere_links: Vec::new(),
+            casting: Vec::new(),
             flats: Vec::new(),
             between: Vec::new(),
             light_spheres: Vec::new(),
@@ -57,6 +64,8 @@ struct Obstacles<'a> {
     light_disks: &'a [DiskShadow],
     /// All that lies in trees.
     trees: Option<&'a Geometry>,
+    /// The light that they stand in the way of.
+    light: LightId,
 }
 
 impl Obstacles<'_> {
@@ -81,9 +90,10 @@ fn gather_area<S: Simd>(
 ) -> LobeSums {
     let splat = |v: f32| simd.splat_f32x16(v);
     let zero = splat(0.0);
-    let p = Vec3x16::splat(simd, si.p);
-    let (ng, ns, wo) = (Vec3x16::splat(simd, si.ng), Vec3x16::splat(simd, si.ns), Vec3x16::splat(simd, si.wo));
-    let is_flat = si.ng == si.ns;
+    let p = Vec3x16::splat(simd, si.lit_from);
+    let (ns, wo) = (Vec3x16::splat(simd, si.ns), Vec3x16::splat(simd, si.wo));
+    let horizon = Vec3x16::splat(simd, si.horizon);
+    let one_horizon = si.horizon == si.ns;
     let cos_o = si.ns.dot(si.wo);
     let (mut diffuse, mut specular) = (zero, zero);
     for (index, block) in points.blocks.iter().enumerate() {
@@ -93,8 +103,8 @@ fn gather_area<S: Simd>(
         let height = ns.dot(l);
         let distance2 = l.dot(l);
         let mut lit = height.simd_gt(zero) & distance2.simd_ge(splat(MIN_DISTANCE2));
-        if !is_flat {
-            lit &= ng.dot(l).simd_gt(zero);
+        if !one_horizon {
+            lit &= horizon.dot(l).simd_gt(zero);
         }
         // Not hidden
         for sphere in obstacles.spheres {
@@ -117,7 +127,7 @@ fn gather_area<S: Simd>(
             for (way, l) in ways.iter_mut().zip([l.x, l.y, l.z]) {
                 l.store_slice(way);
             }
-            let hidden = hidden_by_trees(simd.level(), geometry, si, ways, lit.to_bitmask() as u16);
+            let hidden = hidden_by_trees(simd.level(), geometry, si, obstacles.light, ways, lit.to_bitmask() as u16);
             lit &= !mask32x16::from_bitmask(simd, hidden as u64);
             if lit.all_false() {
                 continue;
@@ -143,10 +153,11 @@ fn hidden_by_trees(
     level: Level,
     geometry: &Geometry,
     si: &SurfaceInteraction,
+    light: LightId,
     l: [[f32; LANES]; 3],
     active: u16,
 ) -> u16 {
-    let from = si.shadow_ray(Vec3::ZERO, 1.0);
+    let from = si.shadow_ray(light, Vec3::ZERO, 1.0);
     let o = from.start.to_array().map(|o| [o; LANES]);
     let mut shadows = ShadowRays { from, rays: RayPacket16 { o, d: l }, t_end: [0.0; LANES] };
     for (lane, end) in shadows.t_end.iter_mut().enumerate() {
@@ -165,24 +176,29 @@ fn partials<S: Simd>(v: f32x16<S>) -> LaneSum {
 impl Lighting for Lanes {
     fn look_around(&mut self, scene: &Scene, si: &SurfaceInteraction) {
         self.spheres.clear();
-        for sphere in &scene.obstacles {
-            let shadow = sphere.shadow(si.p, si.error);
-            if !shadow.is_below(si.ng) {
+        self.sphere_links.clear();
+        let [links, _] = &scene.obstacle_links;
+        for (i, sphere) in scene.obstacles.iter().enumerate() {
+            let shadow = sphere.shadow(si.lit_from, si.error);
+            if !shadow.is_below(si.horizon) {
                 self.spheres.push(shadow);
+                if !links.is_empty() {
+                    self.sphere_links.push(links[i]);
+                }
             }
         }
         self.flats.clear();
-        self.flats.extend(scene.flat_obstacles.iter().map(|flat| flat.shadow(si.p, si.error)));
+        self.flats.extend(scene.flat_obstacles.iter().map(|flat| flat.shadow(si.lit_from, si.error)));
         self.light_spheres.clear();
         for (light, sphere) in &scene.light_obstacles.spheres {
-            let shadow = sphere.shadow(si.p, si.error);
-            if !shadow.is_below(si.ng) {
+            let shadow = sphere.shadow(si.lit_from, si.error);
+            if !shadow.is_below(si.horizon) {
                 self.light_spheres.push((*light, shadow));
             }
         }
         self.light_disks.clear();
-        self.light_disks
-            .extend(scene.light_obstacles.disks.iter().map(|(light, disk)| (*light, disk.shadow(si.p, si.error))));
+        let disks = scene.light_obstacles.disks.iter();
+        self.light_disks.extend(disks.map(|(light, disk)| (*light, disk.shadow(si.lit_from, si.error))));
     }
 
     fn gather(
@@ -198,10 +214,25 @@ impl Lighting for Lanes {
         let LightKind::Area(area) = &light.kind else {
             return Plain.gather(scene, index, si, lobe, counts);
         };
+        // What casts no shadow for this light is not in its way
+        let id = LightId(index as u32);
+        let spheres = if self.sphere_links.is_empty() {
+            &self.spheres
+        } else {
+            self.casting.clear();
+            for (sphere, links) in self.spheres.iter().zip(&self.sphere_links) {
+                if scene.geometry.links.contains(*links, id) {
+                    self.casting.push(*sphere);
+                }
+            }
+            &self.casting
+        };
         self.between.clear();
+        let [_, flat_links] = &scene.obstacle_links;
         let sides = &scene.light_sides[index];
         for (i, flat) in self.flats.iter().enumerate() {
-            if !flat.is_one_sided(sides.get(i).copied().unwrap_or(PlaneSide::Both)) {
+            let side = sides.get(i).copied().unwrap_or(PlaneSide::Both);
+            if !flat.is_one_sided(side) && (flat_links.is_empty() || scene.casts(flat_links, i, id)) {
                 self.between.push(*flat);
             }
         }
@@ -215,14 +246,15 @@ impl Lighting for Lanes {
         let trees = scene.geometry.has_trees().then_some(&*scene.geometry);
         let obstacles = if light.shadows && si.receives_shadow {
             Obstacles {
-                spheres: &self.spheres,
+                spheres,
                 flats: &self.between,
                 light_spheres: &self.other_spheres,
                 light_disks: &self.other_disks,
                 trees,
+                light: id,
             }
         } else {
-            Obstacles { spheres: &[], flats: &[], light_spheres: &[], light_disks: &[], trees: None }
+            Obstacles { spheres: &[], flats: &[], light_spheres: &[], light_disks: &[], trees: None, light: id }
         };
         let samples = area.samples() as u64;
         counts.shadow_rays += samples;

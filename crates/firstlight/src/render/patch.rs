@@ -117,7 +117,7 @@ impl Patch {
         let (mut reach, mut turn, mut uneven) = (0.0f32, 0.0f32, false);
         for member in members {
             uneven |= member.si.receives_shadow != si.receives_shadow;
-            reach = reach.max((member.si.p - si.p).length());
+            reach = reach.max((member.si.lit_from - si.lit_from).length());
             turn = turn.max((member.si.ns - si.ns).length());
         }
         (self.si, self.bsdf, self.reach, self.turn, self.uneven) = (si, bsdf, reach, turn, uneven);

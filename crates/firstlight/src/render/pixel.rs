@@ -5,6 +5,7 @@ use std::ops::ControlFlow;
 use super::hits::camera_ray;
 use super::{Counts, QUESTION_EVERY};
 use crate::color::Rgb;
+use crate::ids::LightId;
 use crate::material::{Bsdf, Lobe};
 use crate::math::{LaneSum, Ray};
 use crate::scene::{CameraHit, Hit, Scene};
@@ -100,7 +101,11 @@ impl PixelSum {
         counts: &mut Counts,
     ) {
         lighting.look_around(scene, si);
+        let links = scene.geometry.lights_of(si.surface);
         for (index, light) in scene.lights.iter().enumerate() {
+            if !scene.geometry.links.contains(links, LightId(index as u32)) {
+                continue;
+            }
             let sums = lighting.gather(scene, index, si, &bsdf.lobe, counts);
             self.lights[index][0] += light.scale * bsdf.diffuse * sums.diffuse.total();
             self.lights[index][1] += light.scale * bsdf.specular * sums.specular.total();

@@ -2,6 +2,7 @@
 
 use super::Counts;
 use super::pixel::{Lighting, LobeSums};
+use crate::ids::LightId;
 use crate::material::Lobe;
 use crate::math::LaneSum;
 use crate::scene::Scene;
@@ -26,10 +27,10 @@ impl Lighting for Plain {
         let cos_o = si.ns.dot(si.wo);
         for k in 0..light.samples() {
             counts.shadow_rays += 1;
-            let to = light.towards(k, si.p);
+            let to = light.towards(k, si.lit_from);
             // Light from below the surface does not count
             let height = si.ns.dot(to.l);
-            if !(si.ng.dot(to.l) > 0.0 && height > 0.0) {
+            if !(si.horizon.dot(to.l) > 0.0 && height > 0.0) {
                 continue;
             }
             // How much is sent this way
@@ -37,7 +38,7 @@ impl Lighting for Plain {
             // Nor does what something else hides
             if light.shadows && si.receives_shadow {
                 let t_max = if to.finite { 1.0 } else { f32::INFINITY };
-                if scene.occluded_from(&si.shadow_ray(to.l, t_max), Some(index)) {
+                if scene.occluded(&si.shadow_ray(LightId(index as u32), to.l, t_max)) {
                     continue;
                 }
             } else {

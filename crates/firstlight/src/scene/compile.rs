@@ -96,6 +96,7 @@ impl SceneDesc {
             return (None, cx.take_faults());
         };
         let (obstacles, flats) = geometry.listed_obstacles();
+        let obstacle_links = geometry.listed_obstacle_links();
         let flat_obstacles: Vec<_> = flats.into_iter().chain(blocking(&lights)).collect();
         let light_sides = sides(&lights, &flat_obstacles);
         let light_obstacles = round_blocking(&lights);
@@ -114,6 +115,7 @@ impl SceneDesc {
             materials,
             obstacles,
             flat_obstacles,
+            obstacle_links,
             light_sides,
             light_obstacles,
             level: Level::new(),

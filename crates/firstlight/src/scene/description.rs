@@ -4,7 +4,7 @@ use crate::camera::CameraDesc;
 use crate::describe::{ColorDesc, SamplesDesc, table, words};
 use crate::light::LightDesc;
 use crate::material::MaterialDesc;
-use crate::shape::{GroupDesc, ShapeDesc};
+use crate::shape::{GroupDesc, ShadowTerminator, ShapeDesc};
 use crate::texture::TextureDesc;
 
 words! {
@@ -41,6 +41,8 @@ table! {
         /// Points sampled on each area light that does not say its own, 1 to 1048576, or `"exact"`: they are integrated, not
         /// sampled.
         pub samples: SamplesDesc = DEFAULT_SAMPLES,
+        /// What is made of the border of light and dark on meshes with smooth normals.
+        pub shadow_terminator: ShadowTerminator = ShadowTerminator::Smooth,
         /// The camera's name, where there are several; without it, the first.
         pub camera: Option<String> = None,
         /// What no surface covers.

@@ -13,10 +13,11 @@
 
 use std::sync::Arc;
 
+use super::links::{LinkId, LinkSets};
 use crate::accel::{Aabb, Bvh};
-use crate::ids::{MaterialId, SurfaceId};
+use crate::ids::{LightId, MaterialId, SurfaceId};
 use crate::math::DVec3;
-use crate::shape::{Mesh, Parallelogram, Placement, PointSet, Solid, Sphere, TrianglePoint};
+use crate::shape::{Mesh, Parallelogram, Placement, PointSet, ShadowTerminator, Solid, Sphere, TrianglePoint};
 
 /// What a surface id stands for.
 #[derive(Clone, Debug)]
@@ -33,6 +34,10 @@ pub(crate) struct Surface {
     pub receives_shadow: bool,
     /// Whether camera rays pass through from behind.
     pub single_sided: bool,
+    /// The lights that shine on it; `None`: all.
+    pub lights: Option<LinkId>,
+    /// The lights it casts shadows for, if it casts any; `None`: all.
+    pub shadows: Option<LinkId>,
 }
 
 /// A thing with a space of its own.
@@ -171,6 +176,10 @@ pub(crate) struct Geometry {
     pub items: Vec<Item>,
     /// Over the boxes of `items`.
     pub upper: Bvh,
+    /// Where light is gathered on meshes with smooth normals.
+    pub terminator: ShadowTerminator,
+    /// The sets of lights that surfaces choose.
+    pub links: LinkSets,
 }
 
 /// The mesh of the world, and which rays meet it.
@@ -191,6 +200,7 @@ pub(crate) struct Parts {
     pub meshes: Vec<Mesh>,
     pub point_sets: Vec<PointSet>,
     pub solids: Vec<Solid>,
+    pub links: LinkSets,
 }
 
 /// A box of the upper tree: a little larger, so that no rounding of the shape's own test lies outside.
@@ -207,8 +217,8 @@ impl std::fmt::Debug for Geometry {
 
 impl Geometry {
     /// From shapes that are in the world; the trees of meshes and point sets are there already.
-    pub fn new(parts: Parts) -> Self {
-        let Parts { surfaces, spheres, parallelograms, world, placed, meshes, point_sets, solids } = parts;
+    pub fn new(parts: Parts, terminator: ShadowTerminator) -> Self {
+        let Parts { surfaces, spheres, parallelograms, world, placed, meshes, point_sets, solids, links } = parts;
         let listed = spheres.len() + parallelograms.len() <= LISTED;
         let (mut items, mut boxes, mut unbounded) = (Vec::new(), Vec::new(), Vec::new());
         if !listed {
@@ -252,6 +262,8 @@ impl Geometry {
             unbounded,
             items,
             upper,
+            terminator,
+            links,
         }
     }
 
@@ -264,6 +276,34 @@ impl Geometry {
         let spheres = self.spheres.iter().filter(|sphere| casts(sphere.surface)).map(|sphere| sphere.shape);
         let flats = self.parallelograms.iter().filter(|flat| casts(flat.surface)).map(|flat| flat.shape);
         (spheres.collect(), flats.collect())
+    }
+
+    /// For which lights each of [`listed_obstacles`](Self::listed_obstacles) casts shadows. Nothing where no surface chooses.
+    pub fn listed_obstacle_links(&self) -> [Vec<Option<LinkId>>; 2] {
+        if !self.listed || self.links.is_empty() {
+            return [Vec::new(), Vec::new()];
+        }
+        let of = |surface: SurfaceId| &self.surfaces[surface.index()];
+        let links = |surfaces: &mut dyn Iterator<Item = SurfaceId>| {
+            surfaces.map(of).filter(|surface| surface.casts_shadow).map(|surface| surface.shadows).collect()
+        };
+        [
+            links(&mut self.spheres.iter().map(|sphere| sphere.surface)),
+            links(&mut self.parallelograms.iter().map(|flat| flat.surface)),
+        ]
+    }
+
+    /// The lights that shine on a surface; `None`: all.
+    #[inline(always)]
+    pub fn lights_of(&self, surface: SurfaceId) -> Option<LinkId> {
+        if self.links.is_empty() { None } else { self.surfaces[surface.index()].lights }
+    }
+
+    /// Whether a surface stands in the way of a light.
+    #[inline]
+    pub fn casts(&self, surface: SurfaceId, light: LightId) -> bool {
+        let surface = &self.surfaces[surface.index()];
+        surface.casts_shadow && self.links.contains(surface.shadows, light)
     }
 
     /// Every mesh, that of the world first.

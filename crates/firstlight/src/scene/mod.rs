@@ -5,6 +5,7 @@ mod compile;
 mod course;
 mod description;
 mod geometry;
+mod links;
 mod model;
 mod place;
 mod text;
@@ -32,6 +33,7 @@ use crate::shape::{Disk, Parallelogram, PlaneSide, Sphere};
 
 use crate::texture::Texture;
 pub(crate) use geometry::{At, Geometry, Nearest};
+pub(crate) use links::LinkId;
 pub(crate) use trees::ShadowRays;
 
 /// A scene, ready to be rendered: flat lists and ids. Between here and the image nothing can fail.
@@ -56,6 +58,8 @@ pub struct Scene {
     pub(crate) obstacles: Vec<Sphere>,
     /// All that is flat, listed and in the way of light: parallelograms, then the rectangle lights that block.
     pub(crate) flat_obstacles: Vec<Parallelogram>,
+    /// For which lights each of `obstacles` and of the first of `flat_obstacles` casts shadows; empty where no surface chooses.
+    pub(crate) obstacle_links: [Vec<Option<LinkId>>; 2],
     /// The disk and sphere lights that block.
     pub(crate) light_obstacles: LightObstacles,
     /// For each area light, on which side of each flat obstacle it lies; where nothing is known, both.

@@ -11,6 +11,7 @@ use glam::DAffine3;
 
 use super::SceneDesc;
 use super::geometry::{Geometry, Joined, Meets, Owned, Parts, Placed, Surface, Target};
+use super::links::{LinkId, Links};
 use crate::context::{Assets, CompileContext};
 use crate::describe::Family;
 use crate::ids::{MaterialId, SurfaceId};
@@ -97,6 +98,8 @@ struct Over {
     casts_shadow: bool,
     receives_shadow: bool,
     single_sided: bool,
+    lights: Option<LinkId>,
+    shadows: Option<LinkId>,
 }
 
 impl Over {
@@ -107,6 +110,8 @@ impl Over {
         casts_shadow: true,
         receives_shadow: true,
         single_sided: false,
+        lights: None,
+        shadows: None,
     };
 
     /// The name of something within.
@@ -118,7 +123,7 @@ impl Over {
     }
 
     /// What an instance within says, under this.
-    fn within(&self, leaf: &Leaf) -> Over {
+    fn within(&self, leaf: &Leaf, links: &mut Links) -> Over {
         Over {
             name: self.path(&leaf.surface.name),
             material: self.material.or(leaf.surface.material.filter(|_| leaf.has_material)),
@@ -126,10 +131,12 @@ impl Over {
             casts_shadow: self.casts_shadow && leaf.surface.casts_shadow,
             receives_shadow: self.receives_shadow && leaf.surface.receives_shadow,
             single_sided: self.single_sided || leaf.surface.single_sided,
+            lights: links.both(self.lights, leaf.surface.lights),
+            shadows: links.both(self.shadows, leaf.surface.shadows),
         }
     }
 
-    fn surface(&self, own: &Surface) -> Surface {
+    fn surface(&self, own: &Surface, links: &mut Links) -> Surface {
         Surface {
             name: self.path(&own.name),
             material: self.material.or(own.material),
@@ -137,6 +144,8 @@ impl Over {
             casts_shadow: self.casts_shadow && own.casts_shadow,
             receives_shadow: self.receives_shadow && own.receives_shadow,
             single_sided: self.single_sided || own.single_sided,
+            lights: links.both(self.lights, own.lights),
+            shadows: links.both(self.shadows, own.shadows),
         }
     }
 }
@@ -152,15 +161,23 @@ pub(super) fn compile_shapes(
     let materials = MaterialNames::new(desc);
     // The first of a name; a second one is a fault of the text
     let group_ids = desc.groups.iter().enumerate().rev().map(|(id, (name, _))| (name.as_str(), id)).collect();
-    let mut compiler =
-        Compiler { desc, materials, group_ids, assets, files, solids: Vec::new(), point_sets: Vec::new() };
+    let mut compiler = Compiler {
+        desc,
+        materials,
+        group_ids,
+        links: Links::new(&desc.lights),
+        assets,
+        files,
+        solids: Vec::new(),
+        point_sets: Vec::new(),
+    };
     let root = compiler.group(cx, "", &desc.shapes);
     let mut groups = Vec::with_capacity(desc.groups.len());
     for (name, group) in &desc.groups {
         groups.push(compiler.group(cx, &format!("group.{name}."), &group.shapes));
     }
     compiler.refuse_circles(cx, &groups);
-    let Compiler { solids, point_sets, .. } = compiler;
+    let Compiler { solids, point_sets, links, .. } = compiler;
     if cx.error_count() > before {
         return None;
     }
@@ -180,12 +197,16 @@ pub(super) fn compile_shapes(
     });
     let mesh_of = mesh_of.collect();
     let parts = Parts { solids, point_sets, ..Parts::default() };
-    let mut walk = Walk { groups: &groups, meshes, mesh_of, parts, name_bytes: 0 };
+    let mut walk = Walk { groups: &groups, meshes, mesh_of, parts, links, name_bytes: 0 };
     walk.group(&root, None, DAffine3::IDENTITY, &Over::NONE);
-    let Walk { mut parts, name_bytes, .. } = walk;
+    let Walk { mut parts, links, name_bytes, .. } = walk;
     if name_bytes > MAX_NAMES {
         let message = format!("the names of what the instances place have more than {MAX_NAMES} bytes");
         cx.error("instance", message, Some("give shorter names, or fewer"));
+        return None;
+    }
+    parts.links = links.finish(cx);
+    if cx.error_count() > before {
         return None;
     }
     parts.meshes = groups.into_iter().filter_map(|group| group.mesh).collect();
@@ -193,7 +214,7 @@ pub(super) fn compile_shapes(
         let (camera, shadow) = meets(&parts.surfaces, 0, &mesh);
         Joined { mesh, camera, shadow }
     });
-    Some(Geometry::new(parts))
+    Some(Geometry::new(parts, desc.render.shadow_terminator))
 }
 
 /// The mesh files that were read, for the hash of the scene and for reports.
@@ -204,6 +225,7 @@ struct Compiler<'a> {
     materials: MaterialNames<'a>,
     /// Groups by name.
     group_ids: HashMap<&'a str, usize>,
+    links: Links,
     assets: &'a dyn Assets,
     files: &'a mut MeshFiles,
     solids: Vec<Solid>,
@@ -230,7 +252,7 @@ impl Compiler<'_> {
     }
 
     fn leaf(&mut self, cx: &mut CompileContext, shape: &ShapeDesc, number: u32, mesh: &mut MeshBuilder) -> Leaf {
-        let Common { name, material, transform, visible, casts_shadow, receives_shadow, single_sided, .. } =
+        let Common { name, material, transform, visible, casts_shadow, receives_shadow, single_sided, lights, shadows } =
             shape.common();
         let named = material.map(|name| self.materials.resolve(cx, "material", name));
         let mut surface = Surface {
@@ -240,6 +262,8 @@ impl Compiler<'_> {
             casts_shadow,
             receives_shadow,
             single_sided,
+            lights: self.links.compile(cx, ["lights_include", "lights_exclude"], lights),
+            shadows: self.links.compile(cx, ["shadow_include", "shadow_exclude"], shadows),
         };
         let transform = TransformDesc::compile_field(transform, cx);
         let solid = |solids: &mut Vec<Solid>, solid: Solid| {
@@ -383,6 +407,7 @@ struct Walk<'a> {
     /// Which of them each group has.
     mesh_of: Vec<Option<u32>>,
     parts: Parts,
+    links: Links,
     /// Bytes of the names of surfaces within instances.
     name_bytes: usize,
 }
@@ -400,7 +425,8 @@ impl Walk<'_> {
         }
         let first = self.parts.surfaces.len() as u32;
         let surfaces = group.leaves.iter().filter(|leaf| !matches!(leaf.form, Form::Instance(_)));
-        self.parts.surfaces.extend(surfaces.map(|leaf| over.surface(&leaf.surface)));
+        let links = &mut self.links;
+        self.parts.surfaces.extend(surfaces.map(|leaf| over.surface(&leaf.surface, links)));
         for (i, leaf) in group.leaves.iter().enumerate() {
             let world = leaf.transform.map_or(world_from_group, |transform| world_from_group * transform);
             let surface = SurfaceId(first + i as u32);
@@ -427,7 +453,8 @@ impl Walk<'_> {
                 Form::Points(points) => self.place(world, Target::Points(*points), surface),
                 Form::Instance(of) => {
                     let groups = self.groups;
-                    self.group(&groups[*of], Some(*of), world, &over.within(leaf));
+                    let over = over.within(leaf, &mut self.links);
+                    self.group(&groups[*of], Some(*of), world, &over);
                 }
             }
         }
@@ -443,7 +470,8 @@ impl Walk<'_> {
             Target::Points(_) | Target::Solid(_) => {
                 let own = &self.parts.surfaces[surface.index()];
                 let of = |met: bool| if met { Meets::All } else { Meets::None };
-                (of(own.visible), of(own.casts_shadow))
+                let shadow = if own.shadows.is_some() && own.casts_shadow { Meets::Some } else { of(own.casts_shadow) };
+                (of(own.visible), shadow)
             }
         };
         let placement = Placement::new(world_from_object);
@@ -461,7 +489,7 @@ fn meets(surfaces: &[Surface], first: u32, mesh: &Mesh) -> (Meets, Meets) {
     } else {
         Meets::None
     };
-    let shadow = if own().all(|s| s.casts_shadow) {
+    let shadow = if own().all(|s| s.casts_shadow && s.shadows.is_none()) {
         Meets::All
     } else if own().any(|s| s.casts_shadow) {
         Meets::Some

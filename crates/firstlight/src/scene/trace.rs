@@ -4,8 +4,9 @@ use fearless_simd::Level;
 
 use super::Scene;
 use super::geometry::{At, Nearest};
+use super::links::LinkId;
 use crate::color::Rgb;
-use crate::ids::SurfaceId;
+use crate::ids::{LightId, SurfaceId};
 use crate::light::LightKind;
 use crate::math::{Ray, ShadowRay, Vec3};
 use crate::shape::{RayDifferential, ShapePoint, SurfaceInteraction};
@@ -75,34 +76,34 @@ impl Scene {
         nearest
     }
 
-    /// Whether anything stands between a surface and a light. Any hit will do, so the order is of no account.
+    /// Whether anything that casts shadows for the ray's light stands between a surface and it. Any hit will do, so the order
+    /// is of no account.
     #[inline]
     pub fn occluded(&self, ray: &ShadowRay) -> bool {
-        self.occluded_from(ray, None)
+        self.occluded_by_lists(ray) || self.geometry.has_trees() && self.geometry.is_blocked(self.level, ray)
     }
 
-    /// [`occluded`](Self::occluded) for a ray towards the light of that index, whose own shape does not hide it.
+    /// The part of [`occluded`](Self::occluded) that does not lie in trees.
     #[inline]
-    pub(crate) fn occluded_from(&self, ray: &ShadowRay, light: Option<usize>) -> bool {
-        self.occluded_by_lists(ray, light) || self.geometry.has_trees() && self.geometry.is_blocked(self.level, ray)
-    }
-
-    /// The part of [`occluded_from`](Self::occluded_from) that does not lie in trees.
-    #[inline]
-    pub(crate) fn occluded_by_lists(&self, ray: &ShadowRay, light: Option<usize>) -> bool {
+    pub(crate) fn occluded_by_lists(&self, ray: &ShadowRay) -> bool {
         let finite = ray.is_finite();
-        let round = &self.light_obstacles;
-        let others = |index: usize| light != Some(index);
-        self.obstacles.iter().any(|sphere| sphere.shadow(ray.p, ray.error).blocks(ray.l, finite))
-            || self.flat_obstacles.iter().any(|flat| flat.shadow(ray.p, ray.error).blocks(ray.l, finite))
-            || round
-                .spheres
-                .iter()
-                .any(|(index, sphere)| others(*index) && sphere.shadow(ray.p, ray.error).blocks(ray.l, finite))
-            || round
-                .disks
-                .iter()
-                .any(|(index, disk)| others(*index) && disk.shadow(ray.p, ray.error).blocks(ray.l, finite))
+        let [sphere_links, flat_links] = &self.obstacle_links;
+        let spheres = self.obstacles.iter().enumerate().filter(|(i, _)| self.casts(sphere_links, *i, ray.light));
+        let flats = self.flat_obstacles.iter().enumerate().filter(|(i, _)| self.casts(flat_links, *i, ray.light));
+        // A light's own shape does not hide it
+        let super::LightObstacles { spheres: light_spheres, disks } = &self.light_obstacles;
+        let light_spheres = light_spheres.iter().filter(|(index, _)| *index != ray.light.index());
+        let mut disks = disks.iter().filter(|(index, _)| *index != ray.light.index());
+        spheres.map(|(_, sphere)| sphere.shadow(ray.p, ray.error)).any(|sphere| sphere.blocks(ray.l, finite))
+            || flats.map(|(_, flat)| flat.shadow(ray.p, ray.error)).any(|flat| flat.blocks(ray.l, finite))
+            || light_spheres.map(|(_, s)| s.shadow(ray.p, ray.error)).any(|sphere| sphere.blocks(ray.l, finite))
+            || disks.any(|(_, disk)| disk.shadow(ray.p, ray.error).blocks(ray.l, finite))
+    }
+
+    /// Whether obstacle `i` of a list casts shadows for a light; those beyond the end of `links` do for all.
+    #[inline(always)]
+    pub(crate) fn casts(&self, links: &[Option<LinkId>], i: usize, light: LightId) -> bool {
+        self.geometry.links.contains(links.get(i).copied().flatten(), light)
     }
 
     /// The surface at a hit, turned to the viewer. `differential` is that of the camera ray.
@@ -113,13 +114,28 @@ impl Scene {
     pub fn surface(&self, ray: &Ray, hit: &Hit, differential: &RayDifferential) -> SurfaceInteraction {
         let surface = &self.geometry.surfaces[hit.surface.index()];
         let point = self.geometry.point(ray, hit, differential);
-        let ShapePoint { p, error, normal, shading, uv, footprint, color } = point;
+        let ShapePoint { p, error, normal, shading, lifted, uv, footprint, color } = point;
         let wo = -ray.d;
         let (ng, ns) = if normal.dot(wo) < 0.0 { (-normal, -shading) } else { (normal, shading) };
+        let (lit_from, horizon) = lifted.map_or((p, ng), |lifted| (lifted, ns));
         let material = surface.material.unwrap_or_else(|| self.geometry.face_material(hit));
         let receives_shadow = surface.receives_shadow;
         let surface = hit.surface;
-        SurfaceInteraction { p, error, ng, ns, wo, uv, footprint, color, surface, material, receives_shadow }
+        SurfaceInteraction {
+            p,
+            error,
+            ng,
+            ns,
+            lit_from,
+            horizon,
+            wo,
+            uv,
+            footprint,
+            color,
+            surface,
+            material,
+            receives_shadow,
+        }
     }
 
     /// How the point of a hit moves with u, and with v: metres for 1. Not orthogonal, and no length where uv has no

@@ -4,7 +4,7 @@ use fearless_simd::{Level, Simd};
 
 use super::geometry::{At, Geometry, Hit, Item, Meets, Nearest, Placed, Spot, Target};
 use crate::accel::{RayPacket16, RayTile, TraceRay, dispatch_eight, dispatch_sixteen};
-use crate::ids::{MaterialId, SurfaceId};
+use crate::ids::{LightId, MaterialId, SurfaceId};
 use crate::math::{DVec3, Ray, ShadowRay, Vec3};
 use crate::shape::{Mesh, RayDifferential, ShapePoint, SolidHit, TileHits, TrianglePoint, every};
 
@@ -149,7 +149,7 @@ impl Geometry {
     fn blocked<S: Simd>(&self, simd: S, ray: &ShadowRay) -> bool {
         let (o, t_end) = (ray.start, ray.end());
         if let Some(world) = &self.world
-            && self.blocked_by_mesh(simd, &world.mesh, SurfaceId(0), world.shadow, o, ray.l, t_end)
+            && self.blocked_by_mesh(simd, &world.mesh, SurfaceId(0), world.shadow, ray.light, o, ray.l, t_end)
         {
             return true;
         }
@@ -162,12 +162,12 @@ impl Geometry {
         self.upper.any(simd, &TraceRay::new(o, ray.l), t_end, |item| match self.items[item as usize] {
             Item::Sphere(i) => {
                 let sphere = &self.spheres[i as usize];
-                self.surfaces[sphere.surface.index()].casts_shadow
+                self.casts(sphere.surface, ray.light)
                     && sphere.shape.shadow(ray.p, ray.error).blocks(ray.l, ray.is_finite())
             }
             Item::Parallelogram(i) => {
                 let flat = &self.parallelograms[i as usize];
-                self.surfaces[flat.surface.index()].casts_shadow
+                self.casts(flat.surface, ray.light)
                     && flat.shape.shadow(ray.p, ray.error).blocks(ray.l, ray.is_finite())
             }
             Item::Placed(i) => self.blocked_by_placed(simd, i, ray, t_end),
@@ -180,21 +180,22 @@ impl Geometry {
         if thing.shadow == Meets::None {
             return false;
         }
+        let casts = || thing.shadow == Meets::All || self.casts(thing.surface, ray.light);
         let own = thing.placement.line(ray.start, ray.l);
         match thing.target {
             Target::Mesh(mesh) => {
                 let mesh = &self.meshes[mesh as usize];
                 let (o, l) = (own.o.as_vec3(), own.d.as_vec3());
-                self.blocked_by_mesh(simd, mesh, thing.surface, thing.shadow, o, l, t_end)
+                self.blocked_by_mesh(simd, mesh, thing.surface, thing.shadow, ray.light, o, l, t_end)
             }
-            Target::Points(points) => self.point_sets[points as usize].blocks(simd, &own, t_end),
-            Target::Solid(solid) => self.solids[solid as usize].blocks(&own, 0.0, t_end as f64),
+            Target::Points(points) => casts() && self.point_sets[points as usize].blocks(simd, &own, t_end),
+            Target::Solid(solid) => casts() && self.solids[solid as usize].blocks(&own, 0.0, t_end as f64),
         }
     }
 
-    /// Whether a triangle stands in the way of light.
-    fn casts(&self, mesh: &Mesh, first: u32, triangle: u32) -> bool {
-        self.surfaces[(first + mesh.part(triangle).surface) as usize].casts_shadow
+    /// Whether a triangle stands in the way of a light.
+    fn triangle_casts(&self, mesh: &Mesh, first: SurfaceId, triangle: u32, light: LightId) -> bool {
+        self.casts(SurfaceId(first.0 + mesh.part(triangle).surface), light)
     }
 
     /// The first triangle on a ray, in the mesh's space. Not inlined: one copy for each instruction set is enough.
@@ -230,6 +231,7 @@ impl Geometry {
         mesh: &Mesh,
         first: SurfaceId,
         meets: Meets,
+        light: LightId,
         o: Vec3,
         l: Vec3,
         t_end: f32,
@@ -237,7 +239,7 @@ impl Geometry {
         if meets == Meets::None {
             return false;
         }
-        let asks = |triangle| meets == Meets::All || self.casts(mesh, first.0, triangle);
+        let asks = |triangle| meets == Meets::All || self.triangle_casts(mesh, first, triangle, light);
         simd.vectorize(
             #[inline(always)]
             || mesh.tree.any(simd, &TraceRay::new(o, l), t_end, &asks),
@@ -253,6 +255,7 @@ impl Geometry {
         mesh: &Mesh,
         first: SurfaceId,
         meets: Meets,
+        light: LightId,
         rays: &RayPacket16,
         t_end: &[f32; 16],
         active: u16,
@@ -260,7 +263,7 @@ impl Geometry {
         if meets == Meets::None || active == 0 {
             return 0;
         }
-        let asks = |triangle| meets == Meets::All || self.casts(mesh, first.0, triangle);
+        let asks = |triangle| meets == Meets::All || self.triangle_casts(mesh, first, triangle, light);
         simd.vectorize(
             #[inline(always)]
             || mesh.tree.any16(simd, rays, t_end, active, &asks),
@@ -283,13 +286,14 @@ impl Geometry {
         match hit.at {
             At::World(point) => {
                 let world = self.world.as_ref().expect("the hit is on it");
-                world.mesh.point(None, point, ray, hit.t, differential)
+                world.mesh.point(None, point, ray, hit.t, differential, self.terminator)
             }
             At::Placed(index, spot) => {
                 let thing = &self.placed[index as usize];
                 match (thing.target, spot) {
                     (Target::Mesh(mesh), Spot::Triangle(point)) => {
-                        self.meshes[mesh as usize].point(Some(&thing.placement), point, ray, hit.t, differential)
+                        let mesh = &self.meshes[mesh as usize];
+                        mesh.point(Some(&thing.placement), point, ray, hit.t, differential, self.terminator)
                     }
                     (Target::Points(points), Spot::Point(point)) => {
                         self.point_sets[points as usize].point(&thing.placement, point, ray, hit.t, differential)
@@ -387,7 +391,16 @@ impl Geometry {
         let mut done = 0;
         if let Some(world) = &self.world {
             let (mesh, rays, t_end) = (&world.mesh, &shadows.rays, &shadows.t_end);
-            done |= self.lanes_blocked_by_mesh(simd, mesh, SurfaceId(0), world.shadow, rays, t_end, active);
+            done |= self.lanes_blocked_by_mesh(
+                simd,
+                mesh,
+                SurfaceId(0),
+                world.shadow,
+                shadows.from.light,
+                rays,
+                t_end,
+                active,
+            );
         }
         for &thing in &self.unbounded {
             done |= self.placed_blocks_lanes(simd, thing, shadows, active & !done);
@@ -403,7 +416,7 @@ impl Geometry {
             match self.items[item as usize] {
                 Item::Sphere(i) => {
                     let sphere = &self.spheres[i as usize];
-                    if !self.surfaces[sphere.surface.index()].casts_shadow {
+                    if !self.casts(sphere.surface, shadows.from.light) {
                         return 0;
                     }
                     let shadow = sphere.shape.shadow(p, error);
@@ -411,7 +424,7 @@ impl Geometry {
                 }
                 Item::Parallelogram(i) => {
                     let flat = &self.parallelograms[i as usize];
-                    if !self.surfaces[flat.surface.index()].casts_shadow {
+                    if !self.casts(flat.surface, shadows.from.light) {
                         return 0;
                     }
                     let shadow = flat.shape.shadow(p, error);
@@ -438,6 +451,7 @@ impl Geometry {
             let line = thing.placement.line(shadows.rays.o(lane), shadows.rays.d(lane));
             own.set(lane, line.o.as_vec3(), line.d.as_vec3());
         }
-        self.lanes_blocked_by_mesh(simd, mesh, thing.surface, thing.shadow, &own, &shadows.t_end, active)
+        let light = shadows.from.light;
+        self.lanes_blocked_by_mesh(simd, mesh, thing.surface, thing.shadow, light, &own, &shadows.t_end, active)
     }
 }

@@ -12,6 +12,10 @@ pub(crate) struct Common<'a> {
     pub casts_shadow: bool,
     pub receives_shadow: bool,
     pub single_sided: bool,
+    /// `lights_include`, `lights_exclude`.
+    pub lights: [Option<&'a [String]>; 2],
+    /// `shadow_include`, `shadow_exclude`.
+    pub shadows: [Option<&'a [String]>; 2],
 }
 
 /// Declares the table of a shape: its own fields, then those that all shapes have.
@@ -39,6 +43,14 @@ macro_rules! shape_table {
                 /// Whether camera rays pass through from behind, the side its normals point away from. Light is blocked
                 /// from both sides all the same.
                 pub single_sided: bool = false,
+                /// The names of the lights that shine on it, and no others; an empty list is none.
+                pub lights_include: Option<Vec<String>> = None,
+                /// The names of the lights that do not shine on it; instead of `lights_include`.
+                pub lights_exclude: Option<Vec<String>> = None,
+                /// The names of the lights it casts shadows for, and for no others; an empty list is none.
+                pub shadow_include: Option<Vec<String>> = None,
+                /// The names of the lights it casts no shadow for; instead of `shadow_include`.
+                pub shadow_exclude: Option<Vec<String>> = None,
             }
         }
 
@@ -53,6 +65,8 @@ macro_rules! shape_table {
                     casts_shadow: self.casts_shadow,
                     receives_shadow: self.receives_shadow,
                     single_sided: self.single_sided,
+                    lights: [self.lights_include.as_deref(), self.lights_exclude.as_deref()],
+                    shadows: [self.shadow_include.as_deref(), self.shadow_exclude.as_deref()],
                 }
             }
         }

@@ -36,7 +36,7 @@ pub use plane::PlaneDesc;
 pub use point_set::PointSetDesc;
 pub use rectangle::RectangleDesc;
 pub use sphere::{Sphere, SphereDesc, SphereUv};
-pub use surface::{Footprint, RayDifferential, SurfaceInteraction, UvEdge};
+pub use surface::{Footprint, RayDifferential, ShadowTerminator, SurfaceInteraction, UvEdge};
 pub use torus::TorusDesc;
 
 pub(crate) use common::Common;

@@ -134,6 +134,7 @@ impl Parallelogram {
             error: ErrorBound::of_rounded(p, o.abs() + way.abs() + self.p.abs()),
             normal: n,
             shading: n,
+            lifted: None,
             uv: uv.as_vec2(),
             footprint: Footprint { dx, dy, edges: [UvEdge::Bounded; 2] },
             color: Rgb::WHITE,

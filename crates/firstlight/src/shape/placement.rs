@@ -82,6 +82,7 @@ impl Placement {
             error,
             normal,
             shading: normal,
+            lifted: None,
             uv: uv.as_vec2(),
             footprint: Footprint { dx, dy, edges },
             color: Rgb::WHITE,

@@ -264,6 +264,7 @@ impl PointSet {
             error,
             normal,
             shading: normal,
+            lifted: None,
             uv,
             footprint: Footprint { dx, dy, edges: [UvEdge::Periodic, UvEdge::Bounded] },
             color,

@@ -112,7 +112,7 @@ impl Sphere {
         };
         let error = ErrorBound::of_rounded(p, self.c.abs() + DVec3::splat(self.r));
         let footprint = Footprint { dx, dy, edges };
-        ShapePoint { p, error, normal: n, shading: n, uv, footprint, color: Rgb::WHITE }
+        ShapePoint { p, error, normal: n, shading: n, lifted: None, uv, footprint, color: Rgb::WHITE }
     }
 
     /// How the point that `ray` meets at `t` moves with u and with v.

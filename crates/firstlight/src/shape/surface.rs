@@ -1,8 +1,19 @@
 //! The surface at a hit, as materials and lights need it.
 
 use crate::color::Rgb;
-use crate::ids::{MaterialId, SurfaceId};
+use crate::describe::words;
+use crate::ids::{LightId, MaterialId, SurfaceId};
 use crate::math::{ErrorBound, ShadowRay, Vec2, Vec3};
+
+words! {
+    /// What is made of the border of light and dark on facets with smooth normals.
+    pub enum ShadowTerminator {
+        /// Light is gathered from the round surface that the normals speak of: no facet shadows itself or its neighbours there.
+        Smooth = "smooth",
+        /// Light is gathered from the facets, and each is dark as soon as it is turned away, whatever its normals say.
+        Hard = "hard",
+    }
+}
 
 /// What lies beyond 0 and 1 of a texture coordinate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -37,6 +48,8 @@ pub(crate) struct ShapePoint {
     pub normal: Vec3,
     /// Unit normal that light sees, on the same side.
     pub shading: Vec3,
+    /// Where light is gathered, on the viewer's side, if that is not `p`: see [`SurfaceInteraction::lit_from`].
+    pub lifted: Option<Vec3>,
     /// Texture coordinate.
     pub uv: Vec2,
     /// See [`Footprint`].
@@ -56,6 +69,11 @@ pub struct SurfaceInteraction {
     pub ng: Vec3,
     /// Shading normal: unit, turned together with `ng`.
     pub ns: Vec3,
+    /// Where light is gathered: `p`, or where it is lifted to from a facet that stands for something round; see
+    /// [`ShadowTerminator`].
+    pub lit_from: Vec3,
+    /// The normal of the horizon that light comes from above of: `ng`, or `ns` where the point is lifted.
+    pub horizon: Vec3,
     /// To the viewer, unit.
     pub wo: Vec3,
     /// Texture coordinate, 0 to 1 on the shape.
@@ -73,10 +91,11 @@ pub struct SurfaceInteraction {
 }
 
 impl SurfaceInteraction {
-    /// A ray from here along `l`, up to `t_max` times its length.
+    /// A ray from here towards a light along `l`, up to `t_max` times its length.
     #[inline(always)]
-    pub(crate) fn shadow_ray(&self, l: Vec3, t_max: f32) -> ShadowRay {
-        ShadowRay { p: self.p, error: self.error, start: self.error.offset(self.p, self.ng).as_vec3(), l, t_max }
+    pub(crate) fn shadow_ray(&self, light: LightId, l: Vec3, t_max: f32) -> ShadowRay {
+        let start = self.error.offset(self.lit_from, self.ng).as_vec3();
+        ShadowRay { p: self.lit_from, error: self.error, start, l, t_max, light }
     }
 }
 

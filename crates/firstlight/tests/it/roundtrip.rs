@@ -91,10 +91,11 @@ prop_compose! {
         size in [any::<u32>(), any::<u32>(), any::<u32>()], camera in maybe(text()),
         samples in samples(), colors in [color(), color()], transparent: bool, display in select(DisplayEncoding::ALL),
         gamma in number(), exposure in number(), fps in number(),
+        shadow_terminator in select(ShadowTerminator::ALL),
     ) -> RenderDesc {
         RenderDesc {
             width: size[0], height: size[1], antialiasing: size[2], samples, camera, background: colors[0],
-            transparent, ambient: colors[1], display, gamma, exposure, fps,
+            transparent, ambient: colors[1], display, gamma, exposure, fps, shadow_terminator,
         }
     }
 }
@@ -112,16 +113,21 @@ prop_compose! {
     }
 }
 
+fn links() -> impl Strategy<Value = [Option<Vec<String>>; 4]> {
+    [(); 4].map(|_| maybe(vec(text(), 0..3)))
+}
+
 /// A shape's own fields with what all shapes can say.
 macro_rules! with_common {
     ($variant:ident, $own:expr) => {
-        ($own, maybe(text()), maybe(text()), maybe(transform()), any::<[bool; 4]>())
-            .prop_map(|(own, name, material, transform, flags)| {
+        ($own, maybe(text()), maybe(text()), maybe(transform()), any::<[bool; 4]>(), links())
+            .prop_map(|(own, name, material, transform, flags, links)| {
                 let [visible, casts_shadow, receives_shadow, single_sided] = flags;
                 let mut desc = own;
                 (desc.name, desc.material, desc.transform) = (name, material, transform.map(Box::new));
                 (desc.visible, desc.casts_shadow) = (visible, casts_shadow);
                 (desc.receives_shadow, desc.single_sided) = (receives_shadow, single_sided);
+                [desc.lights_include, desc.lights_exclude, desc.shadow_include, desc.shadow_exclude] = links;
                 ShapeDesc::$variant(desc)
             })
             .boxed()

@@ -9,6 +9,8 @@ mod determinism;
 mod deviations;
 mod geometry;
 mod known;
+mod links;
 mod random;
 mod robust;
 mod scenes;
+mod terminator;

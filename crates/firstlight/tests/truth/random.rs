@@ -54,7 +54,46 @@ pub fn scene(seed: u64) -> SceneDesc {
         scene = scene.with_light(light);
     }
     let camera = place.camera(random, &scene);
-    scene.with_camera(camera)
+    let mut scene = scene.with_camera(camera);
+    if seed % 4 >= 2 {
+        link(&mut Random::new(seed ^ 0x117c), &mut scene);
+    }
+    scene
+}
+
+/// Names the lights, some of them alike, and has shapes and instances choose among them.
+fn link(random: &mut Random, scene: &mut SceneDesc) {
+    let names = ["a", "b", "c"];
+    let mut said = Vec::new();
+    for light in &mut scene.lights {
+        let name = random.chance(0.9).then(|| random.pick(&names).to_owned());
+        said.extend(name.clone());
+        match light {
+            LightDesc::Point(light) => light.name = name,
+            LightDesc::Directional(light) => light.name = name,
+            LightDesc::Spot(light) => light.name = name,
+            LightDesc::Rectangle(light) => light.name = name,
+            #[allow(unreachable_patterns)]
+            _ => {}
+        }
+    }
+    for shape in scene.shapes.iter_mut().chain(scene.groups.iter_mut().flat_map(|(_, group)| &mut group.shapes)) {
+        let links = common(shape).links;
+        // Included or excluded: of lights, and of shadows
+        for (kind, list) in links.into_iter().enumerate() {
+            let other = kind % 2 == 1 && random.chance(0.5);
+            if random.chance(0.2) || other {
+                let chosen = said.iter().filter(|_| random.chance(0.5)).cloned().collect();
+                *list = Some(chosen);
+            }
+        }
+        let [lights_include, lights_exclude, shadow_include, shadow_exclude] = common(shape).links;
+        for (include, exclude) in [(lights_include, lights_exclude), (shadow_include, shadow_exclude)] {
+            if include.is_some() {
+                *exclude = None;
+            }
+        }
+    }
 }
 
 /// Balls almost sunk in a floor, and ones that just touch it from below, under lights that graze it: what of a ball is

@@ -159,6 +159,8 @@ pub struct Common<'a> {
     pub casts_shadow: &'a mut bool,
     pub receives_shadow: &'a mut bool,
     pub single_sided: &'a mut bool,
+    /// `lights_include`, `lights_exclude`, `shadow_include`, `shadow_exclude`.
+    pub links: [&'a mut Option<Vec<String>>; 4],
 }
 
 /// What a shape says that every shape can say.
@@ -173,6 +175,12 @@ pub fn common(shape: &mut ShapeDesc) -> Common<'_> {
                     casts_shadow: &mut desc.casts_shadow,
                     receives_shadow: &mut desc.receives_shadow,
                     single_sided: &mut desc.single_sided,
+                    links: [
+                        &mut desc.lights_include,
+                        &mut desc.lights_exclude,
+                        &mut desc.shadow_include,
+                        &mut desc.shadow_exclude,
+                    ],
                 },)*
                 #[allow(unreachable_patterns)]
                 _ => unreachable!("no test here uses another shape"),

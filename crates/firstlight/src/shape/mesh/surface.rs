@@ -6,7 +6,7 @@ use crate::color::Rgb;
 use crate::ids::MaterialId;
 use crate::math::{DVec3, ErrorBound, Ray, UNIT_ROUNDOFF, Vec2, Vec3};
 use crate::shape::placement::Placement;
-use crate::shape::surface::{Footprint, RayDifferential, ShapePoint, UvEdge};
+use crate::shape::surface::{Footprint, RayDifferential, ShadowTerminator, ShapePoint, UvEdge};
 use crate::shape::triangles::TriangleTree;
 
 /// The meshes of one space, the world or that of a group, joined: one tree for all their triangles.
@@ -110,6 +110,7 @@ impl Mesh {
         ray: &Ray,
         t: f64,
         differential: &RayDifferential,
+        terminator: ShadowTerminator,
     ) -> ShapePoint {
         let corners = self.corners(at.triangle);
         let (u, v) = (at.u as f64, at.v as f64);
@@ -135,15 +136,31 @@ impl Mesh {
         let error = ErrorBound(base + rounding.as_vec3());
         // The normals of the corners decide which side is the front, and the shading
         let indices = self.triangles[at.triangle as usize].map(|i| i as usize);
-        let mut shading = DVec3::ZERO;
-        if !self.normals.is_empty() {
+        let (mut shading, has_normals) = (DVec3::ZERO, !self.normals.is_empty());
+        if has_normals {
             let blended = blend(indices.map(|i| Vec3::from(self.normals[i]).as_dvec3()));
             shading = placement.map_or(blended, |at| at.normal(blended)).normalize_or_zero();
         }
+        let mut lifted = None;
         if shading == DVec3::ZERO {
             shading = normal;
-        } else if shading.dot(normal) < 0.0 {
-            normal = -normal;
+        } else {
+            if shading.dot(normal) < 0.0 {
+                normal = -normal;
+            }
+            if terminator == ShadowTerminator::Smooth {
+                // From the viewer's side, which is decided as the viewer decides it
+                let side = if normal.as_vec3().dot(-ray.d) < 0.0 { -1.0 } else { 1.0 };
+                let round = RoundCorners {
+                    corners: corners.map(|q| placement.map_or(q, |at| at.world_from_object.transform_point3(q))),
+                    normals: indices.map(|i| {
+                        let n = Vec3::from(self.normals[i]).as_dvec3();
+                        placement.map_or(n, |at| at.normal(n)).normalize_or_zero() * side
+                    }),
+                    weights,
+                };
+                lifted = round.lift(p, normal * side).map(|p| p.as_vec3());
+            }
         }
         let corner_uvs = self.corner_uvs(at.triangle);
         let (f1, f2) = (corner_uvs[1] - corner_uvs[0], corner_uvs[2] - corner_uvs[0]);
@@ -169,6 +186,7 @@ impl Mesh {
             error,
             normal: normal.as_vec3(),
             shading: shading.as_vec3(),
+            lifted,
             uv: uv.as_vec2(),
             footprint: Footprint { dx, dy, edges: [UvEdge::Unbounded; 2] },
             color,
@@ -198,3 +216,35 @@ impl Mesh {
         }
     }
 }
+
+/// A facet that stands for something round, in world space: its corners, the normals there on the viewer's side, and the
+/// weights of a point.
+struct RoundCorners {
+    corners: [DVec3; 3],
+    normals: [DVec3; 3],
+    weights: [f64; 3],
+}
+
+impl RoundCorners {
+    /// The point `p` of the facet, lifted to a round surface through its corners: towards the planes through the corners,
+    /// across their normals, as far as it lies below them, by the weights. `None` where it is not lifted: on flat facets, and
+    /// on those with a normal that points below the facet, whose normal is `ng`; they have their own horizon.
+    ///
+    /// d_i = min(0, (p - v_i).n_i), p' = p - sum b_i d_i n_i.
+    /// Source: Hanika, "Hacking the shadow terminator", Ray Tracing Gems II, chapter 4, 2021.
+    fn lift(&self, p: DVec3, ng: DVec3) -> Option<DVec3> {
+        let is_flat = self.normals.iter().all(|n| (*n - ng).abs().max_element() <= SAME_NORMAL);
+        if is_flat || !self.normals.iter().all(|n| n.dot(ng) > 0.0) {
+            return None;
+        }
+        let mut lifted = p;
+        for ((v, n), weight) in self.corners.iter().zip(self.normals).zip(self.weights) {
+            let below = (p - *v).dot(n).min(0.0);
+            lifted -= n * (weight * below);
+        }
+        Some(lifted)
+    }
+}
+
+/// Normals that differ by no more along each axis are the same but for their rounding to f32 and that of the corners.
+const SAME_NORMAL: f64 = 1e-6;
