@@ -1,12 +1,26 @@
 //! The project's own commands: `cargo xtask COMMAND`.
 
 mod bench;
+mod exact;
 mod generate;
 mod models;
 mod pictures;
 mod rays;
 mod test;
 mod verify;
+
+// What the tests of whole scenes know, shared with them: file by file, as they stand there
+#[path = "../../crates/firstlight/tests/truth/converged.rs"]
+#[allow(dead_code, reason = "tests use more of it")]
+mod converged;
+#[path = "../../crates/firstlight/tests/truth/exact_scenes.rs"]
+mod exact_scenes;
+#[path = "../../crates/firstlight/tests/truth/random.rs"]
+#[allow(dead_code, reason = "tests use more of it")]
+mod random;
+#[path = "../../crates/firstlight/tests/truth/scenes.rs"]
+#[allow(dead_code, reason = "tests use more of it")]
+mod scenes;
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitCode};
@@ -44,11 +58,20 @@ enum Task {
     /// page under docs/benchmarks.
     Models(models::Options),
     /// Runs the tests that take long: more scenes, more rays.
+    #[command(args_conflicts_with_subcommands = true)]
     Verify {
         /// Random scenes for the comparison of the renderers.
         #[arg(long, default_value_t = 5000)]
         scenes: u32,
+        #[command(subcommand)]
+        what: Option<Verify>,
     },
+}
+
+#[derive(Subcommand)]
+enum Verify {
+    /// Compares integrated light with the converged picture, on random scenes.
+    Exact(exact::Options),
 }
 
 /// What a command ends with: nothing, or what went wrong.
@@ -62,7 +85,8 @@ fn main() -> ExitCode {
         Task::Bench(options) => bench::run(&options),
         Task::Rays(options) => rays::run(&options),
         Task::Models(options) => models::run(&options),
-        Task::Verify { scenes } => verify::run(scenes),
+        Task::Verify { what: Some(Verify::Exact(options)), .. } => exact::run(&options),
+        Task::Verify { scenes, what: None } => verify::run(scenes),
     };
     match outcome {
         Ok(()) => ExitCode::SUCCESS,

@@ -215,7 +215,8 @@ impl Hider {
         match self {
             Hider::Edges(edges) => edges.sides[..edges.count].iter().all(|side| side.at(x, y) >= 0.0),
             Hider::Cone(cone) => {
-                let q = |q: &Quadratic| q.c + 2.0 * (x * q.x + y * q.y) + x * x * q.xx + 2.0 * x * y * q.xy + y * y * q.yy;
+                let q =
+                    |q: &Quadratic| q.c + 2.0 * (x * q.x + y * q.y) + x * x * q.xx + 2.0 * x * y * q.xy + y * y * q.yy;
                 let on_line = q(&cone.quadratic) >= 0.0 && cone.ahead.at(x, y) > 0.0;
                 match &cone.cut {
                     None => on_line,

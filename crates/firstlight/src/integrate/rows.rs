@@ -181,7 +181,9 @@ fn panel_now<S: Simd>(simd: S, view: &View, hiders: &[Hider], region: &Region, w
     let mut hidden: ArrayVec<Interval<S>, MAX_HIDERS> = ArrayVec::new();
     for hider in hiders {
         let interval = hider.hidden(simd, y);
-        if (interval.from.simd_lt(interval.to) & interval.from.simd_lt(all.to) & interval.to.simd_gt(all.from)).any_true() {
+        if (interval.from.simd_lt(interval.to) & interval.from.simd_lt(all.to) & interval.to.simd_gt(all.from))
+            .any_true()
+        {
             hidden.push(interval);
         }
     }

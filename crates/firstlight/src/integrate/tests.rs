@@ -4,8 +4,8 @@ use fearless_simd::Level;
 
 use super::view::FlatLight;
 use super::*;
-use crate::math::dispatch_wide;
 use crate::material::{BlinnPhongLobe, PhongLobe};
+use crate::math::dispatch_wide;
 use crate::math::{DVec3, Vec3};
 
 struct Random(u64);

@@ -123,7 +123,7 @@ pub fn grazing(seed: u64) -> SceneDesc {
     scene.with_camera(camera(eye, on_floor(random, 1.0), 70.0))
 }
 
-fn color(random: &mut Random) -> ColorDesc {
+pub fn color(random: &mut Random) -> ColorDesc {
     match random.below(4) {
         0 => ColorDesc::gray(random.unit()),
         1 => ColorDesc::linear(random.pick(&[0.0, 1.0]), random.pick(&[0.0, 0.5]), 1.0),
@@ -153,9 +153,9 @@ fn material(random: &mut Random, scene: &SceneDesc) -> MaterialDesc {
 }
 
 /// Where the world is and how large.
-struct Place {
-    unit: f64,
-    origin: V,
+pub struct Place {
+    pub unit: f64,
+    pub origin: V,
 }
 
 impl Place {
@@ -168,7 +168,7 @@ impl Place {
         add(self.origin, mul(p, self.unit))
     }
 
-    fn material(&self, random: &mut Random, scene: &SceneDesc) -> Option<String> {
+    pub fn material(&self, random: &mut Random, scene: &SceneDesc) -> Option<String> {
         random.chance(0.9).then(|| scene.materials[random.below(scene.materials.len() as u32) as usize].0.clone())
     }
 
@@ -252,7 +252,7 @@ impl Place {
     }
 
     /// A point on a shape of the scene, if there is one.
-    fn on_a_shape(&self, random: &mut Random, scene: &SceneDesc) -> Option<V> {
+    pub fn on_a_shape(&self, random: &mut Random, scene: &SceneDesc) -> Option<V> {
         if scene.shapes.is_empty() {
             return None;
         }
@@ -297,13 +297,13 @@ impl Place {
     }
 
     /// An instance of one of the first groups.
-    fn instance(&self, random: &mut Random, scene: &SceneDesc, groups: u32) -> ShapeDesc {
+    pub fn instance(&self, random: &mut Random, scene: &SceneDesc, groups: u32) -> ShapeDesc {
         let shape = self.placed(random, instance(&format!("group {}", random.clone().below(groups))));
         self.flagged(random, scene, shape, 0.3)
     }
 
     /// Scaled, mirrored, turned, moved.
-    fn placed(&self, random: &mut Random, shape: ShapeDesc) -> ShapeDesc {
+    pub fn placed(&self, random: &mut Random, shape: ShapeDesc) -> ShapeDesc {
         let quarter = random.chance(0.5);
         let turn = random.vector(180.0).map(|deg| if quarter { (deg / 90.0).round() * 90.0 } else { deg });
         let scale = match random.below(4) {
@@ -327,7 +327,7 @@ impl Place {
     }
 
     /// A shape of any kind, with or without a transform.
-    fn dressed(&self, random: &mut Random, scene: &SceneDesc) -> ShapeDesc {
+    pub fn dressed(&self, random: &mut Random, scene: &SceneDesc) -> ShapeDesc {
         let shape = if random.chance(0.5) {
             let local = Place { unit: self.unit, origin: [0.0; 3] };
             let shape = local.shape(random, scene);

@@ -1,0 +1,291 @@
+//! The converged picture of a scene, and how far others are from it. `cargo xtask verify exact` uses this file too.
+//!
+//! Every area light is sampled, under full antialiasing, by four sets of points that know nothing of each other: one
+//! seeded point in each of m x m cells of the light. Where they do not agree, the pixel is rendered again with twice the
+//! points, until they do or until there are too many points. Nothing of what integrates lights has a part in it.
+
+use firstlight::{Image, LightDesc, RenderSettings, SampleSet, SamplesDesc, Scene, SceneDesc, Window};
+
+use crate::scenes::{compile, one_thread, picture};
+
+/// Steps of an 8-bit picture by which the mean of two sets may differ from the mean of the other two.
+const AGREEMENT: f64 = 0.25;
+/// Steps by which one set may differ from the mean of all.
+const SPREAD: f64 = 0.5;
+/// Sets of points, all of one size.
+const SETS: u32 = 4;
+/// The logarithm to base 2 of the number of points of the smallest sets.
+const FIRST: u32 = 10;
+
+/// The settings that a converged picture is made with.
+pub fn traced() -> RenderSettings {
+    one_thread()
+}
+
+/// The settings that hold what is tested: lights that say so are integrated.
+pub fn integrated() -> RenderSettings {
+    one_thread()
+}
+
+/// The scene with every area light given so many points of a set, or integrated. Lights differ in their seeds.
+pub fn with_samples(desc: &SceneDesc, samples: impl Into<SamplesDesc>, set: SampleSet, seed: u32) -> SceneDesc {
+    let (mut desc, samples) = (desc.clone(), samples.into());
+    desc.render.samples = samples;
+    for (light, i) in desc.lights.iter_mut().zip(0..) {
+        let own = seed.wrapping_mul(0x9e37_79b9).wrapping_add(i);
+        macro_rules! give {
+            ($light:ident) => {
+                ($light.samples, $light.set, $light.seed) = (Some(samples), set, own)
+            };
+        }
+        match light {
+            LightDesc::Rectangle(light) => give!(light),
+            LightDesc::Disk(light) => give!(light),
+            LightDesc::Sphere(light) => give!(light),
+            LightDesc::Point(_) | LightDesc::Directional(_) | LightDesc::Spot(_) => {}
+        }
+    }
+    desc
+}
+
+/// The picture with every area light integrated.
+pub fn exact(desc: &SceneDesc) -> Image {
+    picture(&compile(&with_samples(desc, SamplesDesc::Exact, SampleSet::Sobol, 0)), &integrated())
+}
+
+/// The picture with so many points of a set on every area light.
+pub fn sampled(desc: &SceneDesc, set: SampleSet, count: u32) -> Image {
+    picture(&compile(&with_samples(desc, count, set, 1)), &traced())
+}
+
+/// Red, green and blue as they are displayed, in steps of an 8-bit picture, not rounded.
+fn displayed(scene: &Scene, [r, g, b, _]: [f32; 4]) -> [f64; 3] {
+    [r, g, b].map(|x| 255.0 * scene.display().encode(x))
+}
+
+fn furthest(a: [f64; 3], b: [f64; 3]) -> f64 {
+    (0..3).map(|k| (a[k] - b[k]).abs()).fold(0.0, f64::max)
+}
+
+/// What a scene looks like when its lights have more points than anybody waits for.
+pub struct Converged {
+    scene: Scene,
+    width: u32,
+    /// As displayed, in steps of an 8-bit picture.
+    pixels: Vec<[f64; 3]>,
+    /// Places of the pixels that the largest sets do not agree on.
+    pub open: Vec<usize>,
+    /// How far the converged picture itself may be off: the root mean square of half the difference of its two halves.
+    pub doubt: f64,
+}
+
+/// What four sets of one size say of a pixel.
+struct Opinion {
+    mean: [f64; 3],
+    half_difference: [f64; 3],
+    agreed: bool,
+}
+
+fn opinion(scene: &Scene, films: &[[f32; 4]; SETS as usize]) -> Opinion {
+    let mean_of = |films: &[[f32; 4]]| {
+        let sum = films.iter().fold([0.0f64; 4], |sum, film| std::array::from_fn(|k| sum[k] + film[k] as f64));
+        displayed(scene, sum.map(|x| (x / films.len() as f64) as f32))
+    };
+    let (one, other, mean) = (mean_of(&films[..2]), mean_of(&films[2..]), mean_of(films));
+    let agreed =
+        furthest(one, other) <= AGREEMENT && films.iter().all(|film| furthest(displayed(scene, *film), mean) <= SPREAD);
+    Opinion { mean, half_difference: std::array::from_fn(|k| 0.5 * (one[k] - other[k])), agreed }
+}
+
+/// The parts of a picture to render so that every wanted pixel is there: few, and not much more than wanted.
+fn windows(wanted: &[bool], width: u32, height: u32) -> Vec<Window> {
+    const SIDE: u32 = 4;
+    let count = wanted.iter().filter(|wanted| **wanted).count();
+    if 2 * count > wanted.len() {
+        return vec![Window { x: 0, y: 0, width, height }];
+    }
+    let mut windows = Vec::new();
+    for (top, left) in
+        (0..height).step_by(SIDE as usize).flat_map(|y| (0..width).step_by(SIDE as usize).map(move |x| (y, x)))
+    {
+        let cell = (top..(top + SIDE).min(height)).flat_map(|y| (left..(left + SIDE).min(width)).map(move |x| [x, y]));
+        let inside = cell.filter(|[x, y]| wanted[(y * width + x) as usize]);
+        let bounds = inside.fold(None, |bounds: Option<[[u32; 2]; 2]>, at| match bounds {
+            None => Some([at, at]),
+            Some([low, high]) => {
+                Some([[low[0].min(at[0]), low[1].min(at[1])], [high[0].max(at[0]), high[1].max(at[1])]])
+            }
+        });
+        windows.extend(bounds.map(|[[x, y], [right, bottom]]| Window {
+            x,
+            y,
+            width: right - x + 1,
+            height: bottom - y + 1,
+        }));
+    }
+    windows
+}
+
+/// The side m of the sets of m x m points, about 2^`level` points.
+fn side(level: u32) -> u32 {
+    let whole = 1u32 << (level / 2);
+    if level % 2 == 0 { whole } else { (2 * whole * whole).isqrt() }
+}
+
+impl Converged {
+    /// With sets of up to 2^`cap` points; `cap` is 10 to 20.
+    #[track_caller]
+    pub fn new(desc: &SceneDesc, cap: u32) -> Self {
+        let (width, height) = (desc.render.width, desc.render.height);
+        let count = (width * height) as usize;
+        let mut pixels = vec![[0.0; 3]; count];
+        let mut half_differences = vec![[0.0; 3]; count];
+        let mut wanted = vec![true; count];
+        // What the level before said of each pixel, and what this one says
+        let mut before = vec![false; count];
+        let mut scene = None;
+        for level in FIRST..=cap.max(FIRST) {
+            let parts = windows(&wanted, width, height);
+            if parts.is_empty() {
+                break;
+            }
+            // The same parts under each set
+            let mut films = vec![[[0.0f32; 4]; SETS as usize]; count];
+            for set in 0..SETS {
+                let points = side(level) * side(level);
+                let sampled = compile(&with_samples(desc, points, SampleSet::Stratified, level * SETS + set));
+                for part in &parts {
+                    let image = picture(&sampled, &RenderSettings { crop: Some(*part), ..traced() });
+                    for (row, y) in (part.y..part.y + part.height).enumerate() {
+                        for (column, x) in (part.x..part.x + part.width).enumerate() {
+                            films[(y * width + x) as usize][set as usize] =
+                                image.pixels[row * part.width as usize + column];
+                        }
+                    }
+                }
+                scene = Some(sampled);
+            }
+            let Some(scene) = &scene else { break };
+            let mut now = vec![true; count];
+            for i in (0..count).filter(|i| wanted[*i]) {
+                let opinion = opinion(scene, &films[i]);
+                (pixels[i], half_differences[i], now[i]) = (opinion.mean, opinion.half_difference, opinion.agreed);
+            }
+            // Four sets can agree by chance. So their word is taken where they agree all around, or for the second time
+            let around = |i: usize| {
+                let (x, y) = (i as u32 % width, i as u32 / width);
+                let rows = y.saturating_sub(1)..(y + 2).min(height);
+                rows.flat_map(move |y| (x.saturating_sub(1)..(x + 2).min(width)).map(move |x| (y * width + x) as usize))
+            };
+            let last = level >= cap;
+            wanted = (0..count)
+                .map(|i| wanted[i] && !(now[i] && (last || before[i] || around(i).all(|near| now[near]))))
+                .collect();
+            before = now;
+        }
+        let open: Vec<usize> = (0..count).filter(|i| wanted[*i]).collect();
+        let squares: f64 = half_differences.iter().flatten().map(|d| d * d).sum();
+        let scene = scene.expect("a picture has at least one pixel");
+        Converged { scene, width, pixels, open, doubt: (squares / (3 * count) as f64).sqrt() }
+    }
+
+    /// How far a picture is from it, the pixels that are open left out.
+    pub fn deviation(&self, image: &Image) -> Deviation {
+        assert_eq!(image.pixels.len(), self.pixels.len());
+        let mut open = self.open.iter().peekable();
+        let (mut deviation, mut squares) = (Deviation::default(), 0.0);
+        for (i, (truth, film)) in self.pixels.iter().zip(&image.pixels).enumerate() {
+            if open.next_if_eq(&&i).is_some() {
+                continue;
+            }
+            let is = displayed(&self.scene, *film);
+            let off = furthest(*truth, is);
+            // NaN is further off than anything
+            if !(off <= deviation.worst) || deviation.pixels == 0 {
+                (deviation.worst, deviation.at) = (off, [i as u32 % self.width, i as u32 / self.width]);
+            }
+            deviation.pixels += 1;
+            deviation.over += u64::from(!(off <= 1.0));
+            squares += (0..3).map(|k| (truth[k] - is[k]) * (truth[k] - is[k])).sum::<f64>();
+        }
+        deviation.rms = (squares / (3 * deviation.pixels.max(1)) as f64).sqrt();
+        deviation
+    }
+
+    /// As displayed, in steps of an 8-bit picture, not rounded.
+    pub fn pixels(&self) -> &[[f64; 3]] {
+        &self.pixels
+    }
+}
+
+/// How far a picture is from the converged one. In steps of an 8-bit picture, after display encoding, not rounded.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Deviation {
+    /// Pixels compared.
+    pub pixels: u64,
+    /// The furthest channel of all pixels.
+    pub worst: f64,
+    /// Column and row of it.
+    pub at: [u32; 2],
+    /// Pixels of which a channel is off by more than one step.
+    pub over: u64,
+    /// Root of the mean square, over all channels.
+    pub rms: f64,
+}
+
+/// How far an integrated picture may be off.
+#[derive(Clone, Copy, Debug)]
+pub struct Bounds {
+    /// Steps, at any pixel.
+    pub worst: f64,
+    /// The share of pixels that may be off by more than one step, over all scenes together.
+    pub over: f64,
+    /// The root mean square that a scene may always have; beyond it, that of 400 samples.
+    pub rms: f64,
+}
+
+/// What is promised of integrated light.
+pub const PROMISED: Bounds = Bounds { worst: 2.0, over: 1e-4, rms: 0.05 };
+/// The share of pixels that may stay open where sets have up to 2^20 points.
+pub const OPEN: f64 = 1e-4;
+
+/// All that is asked of one scene.
+pub struct Report {
+    pub exact: Deviation,
+    /// With 400 points of `sobol` on every light.
+    pub sobol: Deviation,
+    /// With 400 points of `uniform`.
+    pub uniform: Deviation,
+    pub open: usize,
+    pub doubt: f64,
+}
+
+impl Report {
+    /// Renders the scene in all ways.
+    #[track_caller]
+    pub fn new(desc: &SceneDesc, cap: u32) -> Self {
+        let truth = Converged::new(desc, cap);
+        Report {
+            exact: truth.deviation(&exact(desc)),
+            sobol: truth.deviation(&sampled(desc, SampleSet::Sobol, 400)),
+            uniform: truth.deviation(&sampled(desc, SampleSet::Uniform, 400)),
+            open: truth.open.len(),
+            doubt: truth.doubt,
+        }
+    }
+
+    /// What is outside the bounds of a single scene. The share of pixels off by more than a step is one of many scenes.
+    pub fn fault(&self, bounds: &Bounds) -> Option<String> {
+        let Report { exact, sobol, doubt, .. } = self;
+        if !(exact.worst <= bounds.worst) {
+            let [x, y] = exact.at;
+            return Some(format!("pixel {x}, {y} is off by {:.2} steps of 255", exact.worst));
+        }
+        // What the converged picture does not know itself cannot be held against another
+        let allowed = sobol.rms.max(bounds.rms);
+        if !(exact.rms * exact.rms <= allowed * allowed + doubt * doubt) {
+            return Some(format!("rms {:.3}, of 400 samples {:.3}", exact.rms, sobol.rms));
+        }
+        None
+    }
+}

@@ -1,0 +1,282 @@
+//! `cargo xtask verify exact`: integrated light against the converged picture, on random scenes.
+
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+use std::ops::Range;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::PathBuf;
+use std::sync::Mutex;
+use std::time::Instant;
+
+use rayon::prelude::*;
+
+use crate::converged::{OPEN, PROMISED, Report};
+use crate::{Outcome, exact_scenes, root, write};
+
+/// Which scenes, and how far to go.
+#[derive(clap::Args)]
+pub struct Options {
+    /// Random scenes A to B, B left out.
+    #[arg(long, value_name = "A..B", value_parser = seeds, default_value = "0..100")]
+    seeds: Range<u64>,
+    /// Width and height of the pictures.
+    #[arg(long, default_value_t = 48)]
+    size: u32,
+    /// The converged picture takes up to 2^CAP points on each light, in each of four sets.
+    #[arg(long, default_value_t = 20, value_parser = clap::value_parser!(u32).range(10..=20))]
+    cap: u32,
+    /// Writes docs/verification/exact.csv, one row a scene, and the tables of the book's page. Rows of other scenes stay.
+    #[arg(long)]
+    write: bool,
+    /// Prints every scene, not only those out of bounds or near them.
+    #[arg(long)]
+    all: bool,
+}
+
+fn seeds(text: &str) -> Result<Range<u64>, String> {
+    let parsed = text.split_once("..").and_then(|(a, b)| Some(a.parse().ok()?..b.parse().ok()?));
+    parsed.filter(|seeds| !seeds.is_empty()).ok_or_else(|| "give a range such as 0..100".into())
+}
+
+/// What is kept of one scene.
+#[derive(Clone, Debug, PartialEq)]
+struct Row {
+    seed: u64,
+    size: u32,
+    cap: u32,
+    pixels: u64,
+    open: u64,
+    over: u64,
+    worst: f64,
+    rms: f64,
+    doubt: f64,
+    sobol_rms: f64,
+    uniform_rms: f64,
+    sobol_worst: f64,
+    seconds: f64,
+    commit: String,
+    /// What is out of bounds.
+    fault: String,
+}
+
+const HEADER: &str = "seed,size,cap,pixels,open,over_1,worst,rms,doubt,rms_sobol_400,rms_uniform_400,worst_sobol_400,\
+                      seconds,commit,fault";
+
+impl Row {
+    fn csv(&self) -> String {
+        let Row { seed, size, cap, pixels, open, over, worst, rms, doubt, .. } = self;
+        format!(
+            "{seed},{size},{cap},{pixels},{open},{over},{worst:.3},{rms:.4},{doubt:.4},{:.4},{:.4},{:.3},{:.1},{},{}",
+            self.sobol_rms,
+            self.uniform_rms,
+            self.sobol_worst,
+            self.seconds,
+            self.commit,
+            self.fault.replace(',', ";")
+        )
+    }
+
+    fn read(line: &str) -> Option<Row> {
+        let words: Vec<&str> = line.splitn(15, ',').collect();
+        let number = |i: usize| words.get(i)?.parse::<f64>().ok();
+        let whole = |i: usize| words.get(i)?.parse::<u64>().ok();
+        Some(Row {
+            seed: whole(0)?,
+            size: whole(1)? as u32,
+            cap: whole(2)? as u32,
+            pixels: whole(3)?,
+            open: whole(4)?,
+            over: whole(5)?,
+            worst: number(6)?,
+            rms: number(7)?,
+            doubt: number(8)?,
+            sobol_rms: number(9)?,
+            uniform_rms: number(10)?,
+            sobol_worst: number(11)?,
+            seconds: number(12)?,
+            commit: (*words.get(13)?).to_owned(),
+            fault: (*words.get(14)?).to_owned(),
+        })
+    }
+
+    /// As a row of a table.
+    fn markdown(&self) -> String {
+        let Row { seed, open, over, worst, rms, doubt, sobol_rms, uniform_rms, sobol_worst, seconds, .. } = self;
+        let fault = if self.fault.is_empty() { "" } else { &self.fault };
+        format!(
+            "| {seed} | {worst:.2} | {over} | {rms:.3} | {sobol_rms:.3} | {uniform_rms:.3} | {sobol_worst:.1} | {doubt:.3} | {open} \
+             | {seconds:.0} | {fault} |"
+        )
+    }
+
+    /// Worth a look: out of bounds, near them, or not settled.
+    fn is_notable(&self) -> bool {
+        !self.fault.is_empty() || self.over > 0 || self.worst > 0.75 * PROMISED.worst || 200 * self.open > self.pixels
+    }
+}
+
+const TABLE: &str = "| seed | worst | over 1 | rms | rms, 400 `sobol` | rms, 400 `uniform` | worst, 400 `sobol` | doubt | open | s | out of bounds |\n\
+                     |---|---|---|---|---|---|---|---|---|---|---|";
+
+fn row(seed: u64, options: &Options, commit: &str) -> Row {
+    let start = Instant::now();
+    let report = catch_unwind(AssertUnwindSafe(|| Report::new(&exact_scenes::scene(seed, options.size), options.cap)));
+    let mut row = Row {
+        seed,
+        size: options.size,
+        cap: options.cap,
+        pixels: 0,
+        open: 0,
+        over: 0,
+        worst: f64::NAN,
+        rms: f64::NAN,
+        doubt: f64::NAN,
+        sobol_rms: f64::NAN,
+        uniform_rms: f64::NAN,
+        sobol_worst: f64::NAN,
+        seconds: 0.0,
+        commit: commit.to_owned(),
+        fault: "panic".to_owned(),
+    };
+    if let Ok(report) = report {
+        row.fault = report.fault(&PROMISED).unwrap_or_default();
+        let Report { exact, sobol, uniform, open, doubt } = report;
+        (row.pixels, row.open, row.over) = (exact.pixels, open as u64, exact.over);
+        (row.worst, row.rms, row.doubt) = (exact.worst, exact.rms, doubt);
+        (row.sobol_rms, row.uniform_rms, row.sobol_worst) = (sobol.rms, uniform.rms, sobol.worst);
+    }
+    row.seconds = start.elapsed().as_secs_f64();
+    row
+}
+
+/// What many scenes say together.
+struct Summary {
+    lines: String,
+    faults: Vec<String>,
+}
+
+fn summary<'a>(rows: impl Iterator<Item = &'a Row> + Clone) -> Summary {
+    let sum = |of: fn(&Row) -> f64| rows.clone().map(of).filter(|x| x.is_finite()).sum::<f64>();
+    let greatest = |of: fn(&Row) -> f64| rows.clone().map(of).fold(0.0, f64::max);
+    let scenes = rows.clone().count();
+    let (pixels, open, over) = (sum(|r| r.pixels as f64), sum(|r| r.open as f64), sum(|r| r.over as f64));
+    // Root mean squares over all scenes together
+    let together = |of: fn(&Row) -> f64| {
+        let squares: f64 =
+            rows.clone().map(|r| r.pixels as f64 * of(r) * of(r)).filter(|squares| squares.is_finite()).sum();
+        (squares / pixels.max(1.0)).sqrt()
+    };
+    let (over_share, open_share) = (over / pixels.max(1.0), open / (pixels + open).max(1.0));
+    let mut commits: Vec<&str> = rows.clone().map(|r| r.commit.as_str()).collect();
+    commits.sort_unstable();
+    commits.dedup();
+    let mut lines = String::new();
+    let _ = writeln!(lines, "| {scenes} scenes, {pixels} pixels | measured | allowed |\n|---|---|---|");
+    let _ = writeln!(lines, "| worst pixel | {:.2} | {} |", greatest(|r| r.worst), PROMISED.worst);
+    let _ = writeln!(
+        lines,
+        "| pixels off by more than 1 | {over} ({:.4} %) | {} % |",
+        100.0 * over_share,
+        100.0 * PROMISED.over
+    );
+    let _ = writeln!(lines, "| pixels left open | {open} ({:.4} %) | {} % |", 100.0 * open_share, 100.0 * OPEN);
+    let _ = writeln!(
+        lines,
+        "| root mean square, integrated | {:.4} | in each scene that of 400 `sobol` points, or {} |",
+        together(|r| r.rms),
+        PROMISED.rms
+    );
+    let _ = writeln!(lines, "| the same, 400 `sobol` points | {:.4} | |", together(|r| r.sobol_rms));
+    let _ = writeln!(lines, "| the same, 400 `uniform` points | {:.4} | |", together(|r| r.uniform_rms));
+    let _ = writeln!(lines, "| doubt of the converged pictures | {:.4} | |", together(|r| r.doubt));
+    let _ = writeln!(lines, "\nCommit {}; {:.0} s of one core.", commits.join(", "), sum(|r| r.seconds));
+    let mut faults: Vec<String> =
+        rows.clone().filter(|r| !r.fault.is_empty()).map(|r| format!("scene {}: {}", r.seed, r.fault)).collect();
+    if over_share > PROMISED.over {
+        faults.push(format!("{over} of {pixels} pixels are off by more than one step"));
+    }
+    if open_share > OPEN {
+        faults.push(format!("{open} of {} pixels are open", pixels + open));
+    }
+    Summary { lines, faults }
+}
+
+fn commit() -> String {
+    let ask = |args: &[&str]| {
+        let output = std::process::Command::new("git").current_dir(root()).args(args).output().ok()?;
+        output.status.success().then(|| String::from_utf8_lossy(&output.stdout).trim().to_owned())
+    };
+    let name = ask(&["rev-parse", "--short=8", "HEAD"]).unwrap_or_else(|| "unknown".into());
+    // What is not committed yet belongs to no commit
+    let clean = ask(&["status", "--porcelain", "--", "crates", "xtask", "Cargo.lock"]).is_some_and(|s| s.is_empty());
+    if clean { name } else { format!("{name}+") }
+}
+
+fn csv_path() -> PathBuf {
+    root().join("docs/verification/exact.csv")
+}
+
+fn stored() -> BTreeMap<u64, Row> {
+    let text = std::fs::read_to_string(csv_path()).unwrap_or_default();
+    text.lines().filter_map(Row::read).map(|row| (row.seed, row)).collect()
+}
+
+/// Writes the rows, and the page's part between its two marks.
+fn store(rows: &BTreeMap<u64, Row>) -> Outcome {
+    let mut csv = format!("{HEADER}\n");
+    for row in rows.values() {
+        let _ = writeln!(csv, "{}", row.csv());
+    }
+    write(&csv_path(), csv.as_bytes())?;
+    let path = root().join("docs/src/exact-verification.md");
+    let page = std::fs::read_to_string(&path).map_err(|e| format!("{}: {e}", path.display()))?;
+    let (start, end) = ("<!-- measured -->\n", "<!-- end of what is measured -->");
+    let (Some(from), Some(to)) = (page.find(start), page.find(end)) else {
+        return Err(format!("{}: the marks {start:?} and {end:?} are not there", path.display()));
+    };
+    let (head, tail) = (&page[..from + start.len()], &page[to..]);
+    let mut notable: Vec<&Row> = rows.values().filter(|row| row.is_notable()).collect();
+    notable.sort_by(|a, b| b.worst.total_cmp(&a.worst));
+    let mut measured = format!("\n{}\n", summary(rows.values()).lines);
+    if !notable.is_empty() {
+        let _ =
+            writeln!(measured, "The scenes that come near a bound, or are out of it, the furthest first:\n\n{TABLE}");
+        for row in notable.iter().take(40) {
+            let _ = writeln!(measured, "{}", row.markdown());
+        }
+        measured.push('\n');
+    }
+    write(&path, format!("{head}{measured}{tail}").as_bytes())
+}
+
+pub fn run(options: &Options) -> Outcome {
+    let commit = commit();
+    let rows = Mutex::new(BTreeMap::new());
+    println!("{TABLE}");
+    let start = Instant::now();
+    // In parts, so that what is done is stored even if the rest is not waited for
+    let seeds: Vec<u64> = options.seeds.clone().collect();
+    for part in seeds.chunks(50) {
+        part.par_iter().for_each(|seed| {
+            let row = row(*seed, options, &commit);
+            if options.all || row.is_notable() {
+                println!("{}", row.markdown());
+            }
+            rows.lock().expect("no thread panics while it holds the rows").insert(*seed, row);
+        });
+        let rows = rows.lock().expect("no thread panics while it holds the rows");
+        eprintln!("{} of {} scenes, {:.0} s", rows.len(), seeds.len(), start.elapsed().as_secs_f64());
+        if options.write {
+            let mut all = stored();
+            all.extend(rows.iter().map(|(seed, row)| (*seed, row.clone())));
+            store(&all)?;
+        }
+    }
+    let rows = rows.into_inner().expect("no thread panics while it holds the rows");
+    let Summary { lines, faults } = summary(rows.values());
+    println!("\n{lines}");
+    if faults.is_empty() {
+        return Ok(());
+    }
+    Err(format!("integrated light is out of its bounds:\n{}", faults.join("\n")))
+}
