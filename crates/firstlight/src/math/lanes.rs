@@ -5,7 +5,7 @@ use fearless_simd::{f32x16, prelude::*};
 use super::Vec3;
 
 /// Runs code for sixteen numbers at a time with the instruction set that suits it: AVX-512, AVX2, NEON, or what every processor
-/// has. Three copies, not five: the code below takes the compiler seconds.
+/// has. Three copies, not five: the code below takes the compiler seconds; and of plain numbers, sixteen to a step, minutes.
 macro_rules! dispatch_wide {
     ($level:expr, $simd:ident => $op:expr) => {{
         let level: fearless_simd::Level = $level;
@@ -14,9 +14,10 @@ macro_rules! dispatch_wide {
             $op
         } else if let Some($simd) = level.as_avx2() {
             $op
-        } else {
-            let $simd = fearless_simd::Fallback::new();
+        } else if let Some($simd) = fearless_simd::Level::baseline().as_sse2() {
             $op
+        } else {
+            unreachable!("every processor of this kind has SSE2")
         }
         #[cfg(not(target_arch = "x86_64"))]
         fearless_simd::dispatch!(level, $simd => $op)
