@@ -232,7 +232,7 @@ impl Lighting for Lanes {
         let sides = &scene.light_sides[index];
         for (i, flat) in self.flats.iter().enumerate() {
             let side = sides.get(i).copied().unwrap_or(PlaneSide::Both);
-            if !flat.is_one_sided(side) && (flat_links.is_empty() || scene.casts(flat_links, i, id)) {
+            if !flat.is_one_sided(side) && scene.casts(flat_links, i, id) {
                 self.between.push(*flat);
             }
         }

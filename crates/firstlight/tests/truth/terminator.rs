@@ -96,11 +96,10 @@ fn steps(facets: &Image, round: &Image) -> [f32; 2] {
 
 #[test]
 fn a_coarse_ball_is_lit_as_a_round_one() {
-    let lights: [(&str, fn(V) -> LightDesc); 2] = [("sun", sun), ("small light", small_light)];
-    for (name, light) in lights {
+    for name in ["sun", "small light"] {
         let mut worst = 0.0f32;
         for direction in [[-1.0, 0.0, 0.0], [-1.0, 0.0, 0.3], [-1.0, -0.2, -0.2], [-1.0, 0.0, 0.5]] {
-            let light = light(direction);
+            let light = if name == "sun" { sun(direction) } else { small_light(direction) };
             let round = ShapeDesc::Sphere(sphere([0.0; 3], 1.0));
             let round = both(&scene(round, light.clone(), ShadowTerminator::Smooth));
             let of = |terminator| {
@@ -121,7 +120,7 @@ fn a_coarse_ball_is_lit_as_a_round_one() {
 
 #[test]
 fn what_is_flat_keeps_its_bits() {
-    let corners = vec![[-0.71, -0.53, 0.12], [0.83, -0.61, -0.2], [0.79, 0.66, 0.31], [-0.75, 0.74, 0.63]];
+    let corners = [[-0.71, -0.53, 0.12], [0.83, -0.61, -0.2], [0.79, 0.66, 0.31], [-0.75, 0.74, 0.63]];
     let e = [sub(corners[1], corners[0]), sub(corners[2], corners[0])];
     let flat = mesh(
         vec![corners[0], corners[1], corners[2], sub(add(corners[0], corners[2]), corners[1])],
