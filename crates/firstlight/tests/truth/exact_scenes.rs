@@ -71,7 +71,7 @@ fn exposed(mut scene: SceneDesc, random: &mut Random) -> Option<SceneDesc> {
 }
 
 fn composed(random: &mut Random) -> SceneDesc {
-    let mut scene = empty(48, 48, 1 + random.below(4));
+    let mut scene = empty(48, 48, random.pick(&[1, 1, 2, 2, 3, 4]));
     scene.render.display =
         random.pick(&[DisplayEncoding::Gamma, DisplayEncoding::Srgb, DisplayEncoding::Srgb, DisplayEncoding::Linear]);
     for i in 0..1 + random.below(4) {

@@ -8,6 +8,7 @@ mod checker;
 mod converged;
 mod determinism;
 mod deviations;
+mod exact;
 mod exact_scenes;
 mod geometry;
 mod known;

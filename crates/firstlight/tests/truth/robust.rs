@@ -101,6 +101,31 @@ fn a_parallelogram_does_not_shadow_itself() {
 }
 
 #[test]
+fn a_flat_mesh_does_not_shadow_itself() {
+    let mut random = Random::new(13);
+    let mut lit = 0;
+    for i in 0..times(200) {
+        let size = random.scale(1e-4, 1e4);
+        // Along the axes, at height 0 and elsewhere: along one axis there is then nothing to round
+        let aligned = random.chance(0.6);
+        let n = if aligned { random.pick(&[[0.0, 1.0, 0.0], [1.0, 0.0, 0.0]]) } else { random.direction() };
+        let height = random.pick(&[0.0, 0.0, 0.3 * size, -2.0 * size]);
+        let middle = mul(n, height);
+        let [a, b] = across(n).map(|side| mul(side, size));
+        let corners = [sub(sub(middle, a), b), add(sub(middle, a), b), add(add(middle, a), b), sub(add(middle, a), b)];
+        let eye = add(middle, mul(add(n, random.vector(0.6)), size * random.scale(0.1, 3.0)));
+        let inside = add(middle, add(mul(a, random.between(-0.9, 0.9)), mul(b, random.between(-0.9, 0.9))));
+        let reach = size * random.scale(0.1, 6.0);
+        let scene = empty(6, 6, 1)
+            .with_camera(camera(eye, inside, random.scale(0.5, 60.0)))
+            .with_shape(firstlight::ShapeDesc::Mesh(mesh(corners.to_vec(), vec![[0, 1, 2], [0, 2, 3]])))
+            .lit_by(&lights_around(&mut random, middle, reach));
+        lit += assert_unshadowed(&scene, &format!("flat mesh {i}"));
+    }
+    assert!(lit > 1500, "only {lit} pixels were lit at all");
+}
+
+#[test]
 fn inside_a_sphere_light_stays_inside() {
     let mut random = Random::new(12);
     for i in 0..times(100) {

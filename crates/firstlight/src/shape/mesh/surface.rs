@@ -120,7 +120,9 @@ impl Mesh {
         let (e1, e2) = (corners[1] - corners[0], corners[2] - corners[0]);
         // The tree's rays start and end in single precision, in the mesh's own space: a point there is wrong by this
         let largest = corners[0].abs().max(corners[1].abs()).max(corners[2].abs());
-        let rounding = (largest + e1.abs() + e2.abs()) * (4.0 * UNIT_ROUNDOFF as f64);
+        // along any axis: what rounds along one moves the crossing along the ray, and so along the others. A floor at height 0
+        // is as wrong as it is wide
+        let rounding = DVec3::splat((largest + e1.abs() + e2.abs()).max_element() * (4.0 * UNIT_ROUNDOFF as f64));
         // To the world
         let (p, terms, rounding, e1, e2, mut normal) = match placement {
             None => (own, largest, rounding, e1, e2, e1.cross(e2)),

@@ -1,0 +1,363 @@
+//! Lights that are integrated, `samples = "exact"`, against converged pictures, closed forms, and themselves a moment later.
+
+use std::f64::consts::PI;
+
+use firstlight::{
+    DiskLightDesc, EmitSides, Falloff, LightDesc, NoAssets, ParallelogramDesc, RectangleDesc, SampleSet, SamplesDesc,
+    SceneDesc, ShapeDesc, SphereLightDesc, TorusDesc, builtin_scenes,
+};
+
+use crate::analytic::{corners, lambert, white};
+use crate::converged::{Bounds, Converged, PROMISED, Report, displayed, exact, integrated, with_samples};
+use crate::exact_scenes;
+use crate::scenes::*;
+
+/// Whether lights that say `exact` are integrated. Until they are, 4096 points stand for each, and are held to what that
+/// many points can do.
+const INTEGRATED: bool = false;
+
+/// What a picture of random lights is held to.
+const BOUNDS: Bounds = if INTEGRATED { PROMISED } else { Bounds { worst: 60.0, over: 0.05, rms: 1.0 } };
+
+/// Relative, where the light has a closed form.
+const CLOSED: f64 = if INTEGRATED { 1e-4 } else { 5e-3 };
+
+/// The same, where the light is so near that few of its points matter.
+const CLOSED_AND_NEAR: f64 = if INTEGRATED { 1e-4 } else { 6e-2 };
+
+/// As a share of the light without shadows, where what stands in the way is found point by point.
+const BY_MASK: f64 = if INTEGRATED { 2e-3 } else { 2e-2 };
+
+/// Random scenes that broke a bound once.
+const COUNTEREXAMPLES: [u64; 0] = [];
+
+const UP: V = [0.0, 1.0, 0.0];
+const DOWN: V = [0.0, -1.0, 0.0];
+
+/// Random scenes as `cargo xtask verify exact` has them, smaller.
+fn hold(seeds: impl Iterator<Item = u64>) {
+    let (mut pixels, mut over) = (0, 0);
+    for seed in seeds {
+        let report = Report::new(&exact_scenes::scene(seed, 16), 12);
+        if let Some(fault) = report.fault(&BOUNDS) {
+            panic!("scene {seed}: {fault}; `cargo xtask verify exact --seeds {seed}..{} --size 16 --cap 12`", seed + 1);
+        }
+        (pixels, over) = (pixels + report.exact.pixels, over + report.exact.over);
+    }
+    let allowed = (BOUNDS.over * pixels as f64).ceil();
+    assert!(over as f64 <= allowed, "{over} of {pixels} pixels are off by more than one step, {allowed} may be");
+}
+
+#[test]
+fn random_scenes_are_within_the_bounds() {
+    hold(0..20);
+}
+
+#[test]
+fn more_random_scenes_are_within_the_bounds() {
+    hold(20..40);
+}
+
+#[test]
+fn what_broke_a_bound_once_is_within_it() {
+    hold(COUNTEREXAMPLES.into_iter());
+}
+
+#[test]
+fn built_in_scenes_are_within_half_the_bounds() {
+    let half = Bounds { worst: 0.5 * BOUNDS.worst, over: 0.5 * BOUNDS.over, rms: 0.5 * BOUNDS.rms };
+    for builtin in builtin_scenes() {
+        let mut desc = SceneDesc::parse(builtin.name, builtin.text.as_bytes(), &NoAssets).desc;
+        (desc.render.width, desc.render.height, desc.render.antialiasing) = (32, 32, 2);
+        let report = Report::new(&desc, 14);
+        assert!(report.open * 100 < 32 * 32, "{}: {} pixels are open", builtin.name, report.open);
+        assert_eq!(report.fault(&half), None, "{}", builtin.name);
+        assert!(report.exact.over as f64 <= (half.over * report.exact.pixels as f64).ceil(), "{}", builtin.name);
+    }
+}
+
+/// Red of what the scene shows at `p`, seen from `from`, its lights integrated.
+#[track_caller]
+fn shine(desc: &SceneDesc, from: V, p: V) -> f64 {
+    let mut desc = with_samples(desc, SamplesDesc::Exact, SampleSet::Sobol, 0).with_camera(camera(from, p, 0.01));
+    (desc.render.width, desc.render.height, desc.render.antialiasing) = (1, 1, 1);
+    picture(&compile(&desc), &integrated()).pixels[0][0] as f64
+}
+
+/// What arrives at the origin on a surface that looks up, in lux.
+#[track_caller]
+fn on_the_floor(light: &LightDesc) -> f64 {
+    shine(&white([0.0; 3], UP, 1e-2).with_light(light.clone()), [2e-3, 5e-3, 0.0], [0.0; 3]) * PI
+}
+
+#[track_caller]
+fn assert_near(is: f64, should: f64, allowed: f64, what: &str) {
+    assert!((is - should).abs() <= allowed, "{what}: {is} is not {should}: off by {:e}", is - should);
+}
+
+fn rectangle_light(center: V, e0: V, e1: V) -> LightDesc {
+    LightDesc::Rectangle(RectangleDesc { visible: false, ..RectangleDesc::new(center, e0, e1) })
+}
+
+fn ball(center: V, radius: f64) -> LightDesc {
+    LightDesc::Sphere(SphereLightDesc { visible: false, ..SphereLightDesc::new(center, radius) })
+}
+
+/// pi L/2 [1 - (d^2 + h^2 - R^2) / sqrt((d^2 + h^2 + R^2)^2 - 4 R^2 d^2)], L = 1.
+fn disk_overhead(r: f64, h: f64, d: f64) -> f64 {
+    let sum = d * d + h * h;
+    let root = ((sum + r * r) * (sum + r * r) - 4.0 * r * r * d * d).sqrt();
+    PI / 2.0 * (1.0 - (sum - r * r) / root)
+}
+
+#[test]
+fn disks_have_their_closed_form() {
+    assert_near(disk_overhead(1.0, 2.0, 1.5), 0.3213351, 1e-7, "the published number");
+    for (r, h, d) in
+        [(1.0, 2.0, 0.0), (1.0, 2.0, 1.5), (3.0, 1.0, 0.5), (0.01, 2.0, 1.0), (2.0, 0.5, 3.0), (1.0, 0.1, 0.9)]
+    {
+        let light = DiskLightDesc { visible: false, ..DiskLightDesc::new([d, h, 0.0], DOWN, r) };
+        let truth = disk_overhead(r, h, d);
+        let allowed = truth * if h < 0.3 * r { CLOSED_AND_NEAR } else { CLOSED };
+        assert_near(on_the_floor(&LightDesc::Disk(light)), truth, allowed, &format!("disk {r}, {h}, {d}"));
+        if d == 0.0 {
+            assert_near(truth, PI * r * r / (r * r + h * h), 1e-12, "on the axis");
+        }
+    }
+}
+
+#[test]
+fn spheres_above_the_horizon_have_their_closed_form() {
+    for (center, r) in
+        [([0.0, 2.0, 0.0], 0.5), ([1.0, 1.0, -0.5], 0.9), ([3.0, 40.0, 7.0], 0.001), ([0.0, 2.0, 0.0], 1.9)]
+    {
+        let (d, cos) = (length(center), unit(center)[1]);
+        let truth = PI * (r / d) * (r / d) * cos;
+        let allowed = truth * if r > 0.8 * d { CLOSED_AND_NEAR } else { CLOSED };
+        assert_near(on_the_floor(&ball(center, r)), truth, allowed, &format!("sphere {center:?}, {r}"));
+    }
+}
+
+#[test]
+fn rectangles_have_lamberts_form() {
+    for (center, e0, e1) in [
+        ([0.0, 1.0, 0.0], [2.0, 0.0, 0.0], [0.0, 0.0, 2.0]),
+        ([1.5, 2.0, -0.7], [1.2, 0.6, 0.0], [0.0, 0.0, 2.0]),
+        ([-0.4, 0.2, 0.3], [3.0, 0.0, 0.0], [0.0, 0.0, 0.5]),
+        ([5.0, 30.0, 2.0], [0.01, 0.0, 0.0], [0.0, 0.0, 0.01]),
+        // Partly below the horizon
+        ([2.0, 0.3, 0.0], [0.0, 2.0, 0.0], [0.0, 0.0, -3.0]),
+        ([-1.0, 0.1, 0.4], [0.3, 1.0, 0.0], [0.0, 0.0, 1.0]),
+    ] {
+        let truth = lambert(&corners(center, e0, e1), [0.0; 3], UP).abs();
+        assert!(truth > 0.0);
+        if center == [0.0, 1.0, 0.0] {
+            assert_near(truth, 1.7408395, 5e-8, "the published number");
+        }
+        for light in [
+            RectangleDesc { sides: Some(EmitSides::Both), visible: false, ..RectangleDesc::new(center, e0, e1) },
+            // The same, in two parts
+            RectangleDesc {
+                sides: Some(EmitSides::Both),
+                visible: false,
+                ..RectangleDesc::new(sub(center, mul(e0, 0.25)), mul(e0, 0.5), e1)
+            },
+        ] {
+            let part = light.e0 != e0;
+            let mut is = on_the_floor(&LightDesc::Rectangle(light.clone()));
+            if part {
+                let other = RectangleDesc { center: add(center, mul(e0, 0.25)), ..light };
+                is += on_the_floor(&LightDesc::Rectangle(other));
+            }
+            assert_near(is, truth, CLOSED * truth, &format!("rectangle {center:?}, in parts: {part}"));
+        }
+    }
+}
+
+#[test]
+fn the_classic_model_is_a_mean_over_the_area() {
+    // Of a sphere: the mean of the unit vectors to its points is the gradient of the mean distance, d + r^2 / 3 d
+    for (center, r) in [([0.0, 2.0, 0.0], 0.5), ([1.0, 1.0, -0.5], 0.9)] {
+        let light = SphereLightDesc { falloff: Falloff::Constant, visible: false, ..SphereLightDesc::new(center, r) };
+        let (d, cos) = (length(center), unit(center)[1]);
+        let truth = PI * cos * (1.0 - r * r / (3.0 * d * d));
+        assert_near(on_the_floor(&LightDesc::Sphere(light)), truth, CLOSED * truth, "a sphere");
+    }
+}
+
+/// A plate over all x below `edge` at height `h`, as a thing in a list and as one in a tree.
+fn blades(edge: f64, h: f64) -> [ShapeDesc; 2] {
+    let flat = ParallelogramDesc::new([edge - 20.0, h, -10.0], [20.0, 0.0, 0.0], [0.0, 0.0, 20.0]);
+    let corner = |x: f64, z: f64| [edge - x, h, z];
+    let positions = vec![corner(20.0, -10.0), corner(0.0, -10.0), corner(0.0, 10.0), corner(20.0, 10.0)];
+    let mesh = mesh(positions, vec![[0, 1, 2], [0, 2, 3]]);
+    [ShapeDesc::Parallelogram(flat), ShapeDesc::Mesh(mesh)]
+}
+
+#[test]
+fn a_knife_edge_hides_what_is_behind_it() {
+    // Light 4 m up, a blade 2 m up over all x below the edge: at the origin, the part of the light up to twice the edge
+    let light = rectangle_light([0.0, 4.0, 0.0], [2.0, 0.0, 0.0], [0.0, 0.0, 2.0]);
+    let floor = white([0.0; 3], UP, 0.01).with_light(light);
+    let at = |scene: &SceneDesc| shine(scene, [0.0, 5e-3, 0.0], [0.0; 3]) * PI;
+    let open = at(&floor);
+    for edge in [0.0, 0.1, -0.237, 0.4999, -0.31, -0.499, 0.6, -0.6] {
+        let from = (2.0f64 * edge).clamp(-1.0, 1.0);
+        let width = 1.0 - from;
+        let truth = if width > 0.0 {
+            lambert(&corners([from + 0.5 * width, 4.0, 0.0], [width, 0.0, 0.0], [0.0, 0.0, 2.0]), [0.0; 3], UP).abs()
+        } else {
+            0.0
+        };
+        for (blade, allowed) in blades(edge, 2.0).into_iter().zip([BY_MASK; 2]) {
+            let is = at(&floor.clone().with_shape(blade));
+            assert_near(is, truth, allowed * open, &format!("an edge at {edge}"));
+        }
+        if edge == 0.0 {
+            assert_near(truth, 0.5 * open, 2.0 * CLOSED * open, "half of it");
+        }
+    }
+}
+
+/// What arrives at `p`, looking up, from a sphere light of radiance 1 around `light` past a ball: the sum over a fine grid of
+/// directions, every one asked on paper.
+fn past_a_ball(p: V, light: (V, f64), ball: (V, f64)) -> f64 {
+    let meets = |(center, r): (V, f64), w: V| {
+        let c = sub(center, p);
+        let along = dot(c, w);
+        along > 0.0 && dot(c, c) - along * along < r * r
+    };
+    let axis = unit(sub(light.0, p));
+    let [a, b] = across(axis);
+    let sine = light.1 / length(sub(light.0, p));
+    // Over the disk of directions seen along the axis: dw = dx dy / cos
+    const N: i32 = 400;
+    let mut sum = 0.0;
+    for (i, j) in (0..N).flat_map(|i| (0..N).map(move |j| (i, j))) {
+        let [x, y] = [i, j].map(|k| sine * (2.0 * (k as f64 + 0.5) / N as f64 - 1.0));
+        let square = x * x + y * y;
+        if square >= sine * sine {
+            continue;
+        }
+        let cos = (1.0 - square).sqrt();
+        let w = add(add(mul(a, x), mul(b, y)), mul(axis, cos));
+        if !meets(ball, w) {
+            sum += w[1].max(0.0) / cos;
+        }
+    }
+    sum * (2.0 * sine / N as f64) * (2.0 * sine / N as f64)
+}
+
+#[test]
+fn the_shadow_of_a_ball_under_a_sphere_light_has_its_radii() {
+    let (light, shade) = (([0.0, 6.0, 0.0], 0.5), ([0.0, 2.0, 0.0], 1.0));
+    let floor = white([0.0; 3], UP, 5.0).with_light(ball(light.0, light.1));
+    let as_sphere = floor.clone().with_sphere(sphere(shade.0, shade.1));
+    // The same ball in a tree
+    let as_instance = floor
+        .clone()
+        .with_group("ball", vec![ShapeDesc::Sphere(sphere([0.0; 3], shade.1))])
+        .with_shape(moved(instance("ball"), shade.0, [0.0; 3], [1.0; 3]));
+    let at = |scene: &SceneDesc, r: f64| shine(scene, [r, 0.5, 0.0], [r, 0.0, 0.0]) * PI;
+    let (umbra, penumbra) = (1.259882, 1.887760);
+    for scene in [&as_sphere, &as_instance] {
+        for r in [0.0, 0.7, umbra - 2e-3] {
+            assert_near(at(scene, r), 0.0, 0.1 * BY_MASK * at(&floor, r), &format!("umbra at {r}"));
+        }
+        for r in [penumbra + 2e-3, 2.1, 3.0] {
+            let open = at(&floor, r);
+            assert_near(at(scene, r), open, 0.1 * BY_MASK * open, &format!("open at {r}"));
+        }
+        for r in [1.28, 1.35, 1.45, 1.55, 1.65, 1.75, 1.85, 1.88] {
+            let truth = past_a_ball([r, 0.0, 0.0], light, shade);
+            assert!(truth > 0.0, "light at {r}");
+            assert_near(at(scene, r), truth, BY_MASK * at(&floor, r), &format!("penumbra at {r}"));
+        }
+        // Some light soon after the one radius, some shadow still before the other
+        assert!(at(scene, umbra + 0.03) > 0.0);
+        assert!(at(scene, penumbra - 0.03) < at(&floor, penumbra - 0.03) * (1.0 - 1e-5));
+    }
+}
+
+/// A floor under a round, a flat and a long light, with a thing in between that goes from one side to the other.
+fn frame(time: f64, thing: &ShapeDesc) -> SceneDesc {
+    let lights = [
+        rectangle_light([0.0, 4.0, 0.0], [0.0, 0.0, 1.5], [1.5, 0.0, 0.0]),
+        LightDesc::Disk(DiskLightDesc {
+            falloff: Falloff::Constant,
+            strength: 0.25,
+            ..DiskLightDesc::new([-2.0, 3.0, -1.0], [0.5, -1.0, 0.2], 0.6)
+        }),
+    ];
+    let mut floor = square([0.0; 3], UP, 4.0);
+    floor.material = Some("floor".into());
+    let at = [-1.6 + 3.2 * time, 1.2 + 0.3 * time, 0.4 - 0.5 * time];
+    let mut scene = empty(16, 12, 1)
+        .with_material("floor", blinn_phong(firstlight::ColorParam::gray(0.8), firstlight::ColorParam::gray(0.2), 60.0))
+        .with_parallelogram(floor)
+        .with_shape(moved(thing.clone(), at, [90.0 * time, 20.0, 0.0], [1.0; 3]))
+        .lit_by(&lights)
+        .with_camera(camera_up([0.0, 5.0, 5.0], [0.0, 0.0, 0.0], UP, 40.0));
+    scene.render.display = firstlight::DisplayEncoding::Srgb;
+    for light in &mut scene.lights {
+        if let LightDesc::Rectangle(light) = light {
+            light.strength = 5.0;
+        }
+    }
+    scene
+}
+
+#[test]
+fn nothing_flickers_behind_what_moves() {
+    let torus = ShapeDesc::Torus(TorusDesc { axis: [0.0, 1.0, 0.3], ..TorusDesc::new([0.0; 3], 0.5, 0.15) });
+    let allowed = if INTEGRATED { PROMISED.worst } else { 30.0 };
+    for thing in [ShapeDesc::Sphere(sphere([0.0; 3], 0.5)), torus] {
+        // What each frame shows beside what it should: steps of 255, none where that is not settled
+        let frames: Vec<Vec<Option<[[f64; 3]; 2]>>> = (0..60)
+            .map(|k| {
+                let desc = frame(k as f64 / 59.0, &thing);
+                let (mut truth, image, scene) = (Converged::new(&desc, 13), exact(&desc), compile(&desc));
+                truth.doubt(&image);
+                let pixels = image.pixels.iter().enumerate();
+                pixels.map(|(i, p)| truth.is_settled(i).then(|| [displayed(&scene, *p), truth.pixel(i)])).collect()
+            })
+            .collect();
+        let mut compared = 0;
+        for (k, three) in frames.windows(3).enumerate() {
+            for i in 0..three[0].len() {
+                let (Some(a), Some(b), Some(c)) = (three[0][i], three[1][i], three[2][i]) else { continue };
+                for channel in 0..3 {
+                    let [is, should] = [0, 1].map(|of| a[of][channel] - 2.0 * b[of][channel] + c[of][channel]);
+                    assert_near(is, should, allowed, &format!("frames {k} to {}, pixel {i}", k + 2));
+                    compared += 1;
+                }
+            }
+        }
+        assert!(compared > 58 * 16 * 12 * 3 * 9 / 10, "only {compared} were compared");
+    }
+}
+
+#[test]
+fn a_converged_picture_is_converged() {
+    // A light that is seen whole, on paper
+    let (center, e0, e1) = ([0.4, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]);
+    let scene = white([0.0; 3], UP, 0.01).with_light(rectangle_light(center, e0, e1));
+    let mut scene = scene.with_camera(camera([0.0, 5e-3, 0.0], [0.0; 3], 0.01));
+    (scene.render.width, scene.render.height) = (3, 2);
+    let truth = lambert(&corners(center, e0, e1), [0.0; 3], UP).abs() / PI;
+    let mut converged = Converged::new(&scene, 12);
+    assert_eq!(converged.open(), 0);
+    for i in 0..6 {
+        assert_near(converged.pixel(i)[1], 255.0 * truth, 0.1, "a converged pixel");
+    }
+    // A picture that is wrong is found out, and what is no number most of all
+    let mut image = exact(&scene);
+    image.pixels[4][1] += 3.0 / 255.0;
+    converged.doubt(&image);
+    let deviation = converged.deviation(&image);
+    assert_eq!((deviation.over, deviation.at), (1, [1, 1]));
+    assert_near(deviation.worst, 3.0, 1.0, "the worst of them");
+    image.pixels[5][0] = f32::NAN;
+    let deviation = converged.deviation(&image);
+    assert_eq!((deviation.over, deviation.at, deviation.worst), (2, [2, 1], f64::INFINITY));
+}
