@@ -30,6 +30,9 @@ pub struct Options {
     /// Writes docs/verification/exact.csv, one row a scene, and the tables of the book's page. Rows of other scenes stay.
     #[arg(long)]
     write: bool,
+    /// Only writes the scenes, as text, into this folder.
+    #[arg(long, value_name = "DIR")]
+    dump: Option<PathBuf>,
     /// Prints every scene, not only those out of bounds or near them.
     #[arg(long)]
     all: bool,
@@ -252,6 +255,15 @@ fn store(rows: &BTreeMap<u64, Row>) -> Outcome {
 }
 
 pub fn run(options: &Options) -> Outcome {
+    if let Some(folder) = &options.dump {
+        std::fs::create_dir_all(folder).map_err(|fault| format!("{}: {fault}", folder.display()))?;
+        for seed in options.seeds.clone() {
+            let text = exact_scenes::scene(seed, options.size).to_toml();
+            let file = folder.join(format!("{seed}.toml"));
+            std::fs::write(&file, text).map_err(|fault| format!("{}: {fault}", file.display()))?;
+        }
+        return Ok(());
+    }
     let commit = commit();
     let rows = Mutex::new(BTreeMap::new());
     println!("{TABLE}");
