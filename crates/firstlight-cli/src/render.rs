@@ -260,6 +260,7 @@ impl<'a> Plan<'a> {
         settings.tile_size = args.tile_size.unwrap_or(settings.tile_size);
         settings.crop = args.crop;
         settings.reference = args.reference;
+        settings.visibility = args.visibility.unwrap_or(settings.visibility);
 
         let overrides = Overrides {
             width: args.width,

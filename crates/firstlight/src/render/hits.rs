@@ -77,7 +77,7 @@ impl PixelHits {
                     self.found.surface[place] = u32::MAX;
                     self.found.triangle[place] = u32::MAX;
                     active |= 1 << place;
-                } else {
+                } else if geometry.has_trees() {
                     geometry.meet_trees(self.level, &ray, &mut nearest);
                 }
                 self.hits[((top + row) * self.across + left + column) as usize] = nearest.0;

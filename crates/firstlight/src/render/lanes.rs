@@ -34,11 +34,27 @@ impl Lanes {
 }
 
 /// What can stand in the way of one light, seen from one surface.
-struct Obstacles<'a> {
-    spheres: &'a [SphereShadow],
-    flats: &'a [ParallelogramShadow],
+#[derive(Clone, Copy, Default)]
+pub(super) struct Obstacles<'a> {
+    pub spheres: &'a [SphereShadow],
+    pub flats: &'a [ParallelogramShadow],
     /// All that lies in trees.
-    trees: Option<&'a Geometry>,
+    pub trees: Option<&'a Geometry>,
+    /// For each block of samples, those that are known to be hidden; empty if none are.
+    pub hidden: &'a [u16],
+}
+
+/// The sums over the points of a rectangle light that none of the `obstacles` hides. One dispatch for all samples of a light: what
+/// is below is compiled for each instruction set, the rest once.
+#[inline(never)]
+pub(super) fn sum_rectangle(
+    level: Level,
+    rectangle: &Rectangle,
+    si: &SurfaceInteraction,
+    lobe: &Lobe,
+    obstacles: &Obstacles,
+) -> LobeSums {
+    dispatch!(level, simd => gather_rectangle(simd, rectangle, si, lobe, obstacles))
 }
 
 /// The sums over the points of a rectangle light that none of the `obstacles` hides.
@@ -58,7 +74,7 @@ fn gather_rectangle<S: Simd>(
     let cos_o = si.ns.dot(si.wo);
     let shadow = si.shadow_ray(Vec3::ZERO, 1.0);
     let (mut diffuse, mut specular) = (zero, zero);
-    for block in rectangle.blocks() {
+    for (i, block) in rectangle.blocks().iter().enumerate() {
         let l = Vec3x16 {
             x: f32x16::simd_from(simd, block.x) - p.x,
             y: f32x16::simd_from(simd, block.y) - p.y,
@@ -72,6 +88,12 @@ fn gather_rectangle<S: Simd>(
             lit &= ng.dot(l).simd_gt(zero);
         }
         // Not hidden
+        if let Some(hidden) = obstacles.hidden.get(i) {
+            lit &= !mask32x16::from_bitmask(simd, u64::from(*hidden));
+            if lit.all_false() {
+                continue;
+            }
+        }
         for sphere in obstacles.spheres {
             lit &= !sphere.blocks_lanes(l, distance2);
         }
@@ -156,16 +178,15 @@ impl Lighting for Lanes {
         }
         let trees = scene.geometry.has_trees().then_some(&*scene.geometry);
         let obstacles = if light.shadows && si.receives_shadow {
-            Obstacles { spheres: &self.spheres, flats: &self.between, trees }
+            Obstacles { spheres: &self.spheres, flats: &self.between, trees, hidden: &[] }
         } else {
-            Obstacles { spheres: &[], flats: &[], trees: None }
+            Obstacles::default()
         };
         let samples = rectangle.samples() as u64;
         counts.shadow_rays += samples;
         if obstacles.spheres.is_empty() && obstacles.flats.is_empty() && obstacles.trees.is_none() {
             counts.shadow_rays_skipped += samples;
         }
-        // One dispatch for all samples of a light: what is below is compiled for each instruction set, the rest once
-        dispatch!(self.level, simd => gather_rectangle(simd, rectangle, si, lobe, &obstacles))
+        sum_rectangle(self.level, rectangle, si, lobe, &obstacles)
     }
 }

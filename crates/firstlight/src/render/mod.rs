@@ -10,6 +10,7 @@ mod hits;
 mod lanes;
 mod pixel;
 mod plain;
+mod shafts;
 mod simd;
 mod tile;
 
@@ -27,13 +28,26 @@ use crate::camera::Projection;
 use crate::color::{Display, Encoding};
 use crate::image::{Receipt, Window};
 use crate::math::Ray;
+use crate::describe::words;
 use crate::scene::Scene;
+use crate::visibility::Target;
 use film::FilmTile;
 use hits::PixelHits;
 use lanes::Lanes;
 use pixel::{Lighting, PixelSum};
 use plain::Plain;
+use shafts::Shafts;
 use tile::Tile;
+
+words! {
+    /// How the fast renderer finds out how much of a light reaches a point. Both give the same bits.
+    pub enum VisibilityMode {
+        /// What may stand before a light is gathered once for many points; where nothing does, nothing is traced.
+        Shafts = "shafts",
+        /// Every sample of every light for itself.
+        Traced = "traced",
+    }
+}
 
 /// A caller's wishes. None of them changes a bit of the picture, but `crop`, which chooses its part.
 #[derive(Clone, Debug, PartialEq)]
@@ -49,6 +63,8 @@ pub struct RenderSettings {
     pub crop: Option<Window>,
     /// Renders with the plain code that is the specification.
     pub reference: bool,
+    /// How shadows are found.
+    pub visibility: VisibilityMode,
 }
 
 impl RenderSettings {
@@ -107,7 +123,7 @@ impl RenderSettings {
 
 impl Default for RenderSettings {
     fn default() -> Self {
-        RenderSettings { threads: None, tile_size: 16, simd: SimdLevel::Auto, crop: None, reference: false }
+        RenderSettings { threads: None, tile_size: 16, simd: SimdLevel::Auto, crop: None, reference: false, visibility: VisibilityMode::Shafts }
     }
 }
 
@@ -120,6 +136,13 @@ pub struct RenderStats {
     pub shadow_rays: u64,
     /// Those of them that took no ray: nothing could stand between, or the light casts no shadows.
     pub shadow_rays_skipped: u64,
+    /// Pairs of a lit point and a light: all of it arrives, one thing hides it, it is below the horizon, each sample has an
+    /// answer of its own. Counted where shafts are used, as the next two are.
+    pub visibility: [u64; 4],
+    /// Shafts from points to lights.
+    pub shafts: u64,
+    /// What they held that could stand in the way, all together.
+    pub occluders: u64,
     /// The instruction set; `Fallback` for the plain renderer.
     pub simd: SimdLevel,
     /// Threads.
@@ -132,8 +155,19 @@ pub(crate) struct Counts {
     pub camera_rays: u64,
     pub shadow_rays: u64,
     pub shadow_rays_skipped: u64,
+    pub visibility: [u64; 4],
+    pub shafts: u64,
+    pub occluders: u64,
     /// Shadow rays after which the caller is asked whether to go on.
     next_question: u64,
+}
+
+impl Counts {
+    fn all(&self) -> [u64; 9] {
+        let [lit, hidden, below, mask] = self.visibility;
+        let Counts { camera_rays, shadow_rays, shadow_rays_skipped, shafts, occluders, .. } = *self;
+        [camera_rays, shadow_rays, shadow_rays_skipped, lit, hidden, below, mask, shafts, occluders]
+    }
 }
 
 /// Shadow rays between two questions: some hundredths of a second of the fast renderer, some tenths of the plain one.
@@ -157,7 +191,11 @@ pub fn render(
     let tiles = Tile::cover(window, settings.tile_size);
     let all = window.width as u64 * window.height as u64;
     let (done, stop) = (AtomicU64::new(0), AtomicBool::new(false));
-    let totals = [const { AtomicU64::new(0) }; 3];
+    let totals = [const { AtomicU64::new(0) }; 9];
+    let targets: Vec<Target> = match settings.visibility {
+        VisibilityMode::Shafts if !settings.reference => scene.lights.iter().map(Target::new).collect(),
+        _ => Vec::new(),
+    };
     let level = settings.simd.resolve();
     let render_one = |tile: &Tile| {
         if stop.load(Ordering::Relaxed) {
@@ -172,6 +210,8 @@ pub fn render(
         };
         let rendered = if settings.reference {
             render_tile(scene, tile, &mut Plain, None, &go_on)
+        } else if settings.visibility == VisibilityMode::Shafts {
+            Shafts::new(scene, &targets, level.token()).render(tile, &go_on)
         } else {
             let token = level.token();
             let hits = scene.geometry.has_trees().then(|| PixelHits::new(token, scene.antialiasing));
@@ -179,7 +219,7 @@ pub fn render(
         };
         let ControlFlow::Continue((film_tile, counts)) = rendered else { return };
         film.lock().expect("no thread panics while it holds the film").merge(&film_tile);
-        for (total, count) in totals.iter().zip([counts.camera_rays, counts.shadow_rays, counts.shadow_rays_skipped]) {
+        for (total, count) in totals.iter().zip(counts.all()) {
             total.fetch_add(count, Ordering::Relaxed);
         }
         let pixels = tile.width as u64 * tile.height as u64;
@@ -197,9 +237,20 @@ pub fn render(
     if stop.into_inner() {
         return ControlFlow::Break(());
     }
-    let [camera_rays, shadow_rays, shadow_rays_skipped] = totals.map(AtomicU64::into_inner);
+    let [camera_rays, shadow_rays, shadow_rays_skipped, lit, hidden, below, mask, shafts, occluders] =
+        totals.map(AtomicU64::into_inner);
     let simd = if settings.reference { SimdLevel::Fallback } else { level };
-    let stats = RenderStats { camera_rays, shadow_rays, shadow_rays_skipped, simd, threads };
+    let visibility = [lit, hidden, below, mask];
+    let stats = RenderStats {
+        camera_rays,
+        shadow_rays,
+        shadow_rays_skipped,
+        visibility,
+        shafts,
+        occluders,
+        simd,
+        threads,
+    };
     ControlFlow::Continue((film.into_inner().expect("no thread panics while it holds the film"), stats))
 }
 

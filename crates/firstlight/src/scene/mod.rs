@@ -30,7 +30,7 @@ use crate::material::Material;
 use crate::shape::{Parallelogram, PlaneSide, Sphere};
 
 use crate::texture::Texture;
-pub(crate) use geometry::{Geometry, Nearest};
+pub(crate) use geometry::{Geometry, Item, Meets, Nearest, Target};
 pub(crate) use trees::ShadowRays;
 
 /// A scene, ready to be rendered: flat lists and ids. Between here and the image nothing can fail.

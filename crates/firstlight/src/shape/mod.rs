@@ -7,6 +7,7 @@ mod ball;
 #[cfg(test)]
 mod check;
 mod common;
+mod cover;
 mod cone;
 mod cuboid;
 mod cylinder;
@@ -40,6 +41,7 @@ pub use surface::{Footprint, RayDifferential, SurfaceInteraction, UvEdge};
 pub use torus::TorusDesc;
 
 pub(crate) use common::Common;
+pub(crate) use cover::Cover;
 pub(crate) use mesh::{Mesh, MeshBuilder, MeshSource, TrianglePoint};
 pub(crate) use parallelogram::{ParallelogramShadow, PlaneSide};
 pub(crate) use placement::Placement;
@@ -47,7 +49,7 @@ pub(crate) use point_set::PointSet;
 pub(crate) use solid::{Solid, SolidHit};
 pub(crate) use sphere::SphereShadow;
 pub(crate) use surface::ShapePoint;
-pub(crate) use triangles::{TileHits, TriangleTree, every};
+pub(crate) use triangles::{Eye, SeenTriangle, TOGETHER, TileHits, TriangleTree, every};
 
 use crate::describe::family;
 

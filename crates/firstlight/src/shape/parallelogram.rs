@@ -173,6 +173,19 @@ impl Parallelogram {
         }
     }
 
+    /// [`ParallelogramShadow::is_one_sided`], without the rest of what a shadow has.
+    #[inline(always)]
+    pub(crate) fn is_one_sided(&self, p: Vec3, error: ErrorBound, light: PlaneSide) -> bool {
+        let s = self.n.dot(p.as_dvec3() - self.p);
+        let n = self.n.as_vec3();
+        s.abs() as f32 <= n.abs().dot(error.0)
+            || match light {
+                PlaneSide::Front => s >= 0.0,
+                PlaneSide::Back => !(s >= 0.0),
+                PlaneSide::Both => false,
+            }
+    }
+
     /// What this parallelogram needs to know of a point that asks for light.
     #[inline(always)]
     pub(crate) fn shadow(&self, p: Vec3, error: ErrorBound) -> ParallelogramShadow {
@@ -265,6 +278,30 @@ impl ParallelogramShadow {
                 PlaneSide::Back => !self.front,
                 PlaneSide::Both => false,
             }
+    }
+
+    /// What has to be above 0 for a way l to be blocked, each as f.l - c, and how far that can be wrong for ways with coordinates
+    /// up to `longest`: the way crosses the plane, and does it between the four sides. What makes [`blocks`](Self::blocks)
+    /// ask for more counts as wrong.
+    pub(super) fn bounds(&self, longest: f32, finite: bool) -> [(Vec3, f32, f32); 5] {
+        const DOT: f32 = 32.0 * UNIT_ROUNDOFF;
+        let one = |v: Vec3| v.abs().element_sum();
+        let n = one(self.n);
+        let crosses = if finite {
+            let room = one(self.abs_n) * longest + self.margin + (n * longest + self.height) * DOT;
+            (-self.n, self.height, room)
+        } else {
+            (-self.n, 0.0, n * longest * DOT)
+        };
+        // A point on the plane is blocked from nothing
+        let crosses = if self.height > self.margin { crosses } else { (Vec3::ZERO, f32::INFINITY, 0.0) };
+        let side = |axis: &Axis, end: f32, sign: f32| {
+            let f = (axis.axis * self.height - self.n * (axis.origin - end)) * sign;
+            let size = n * (axis.origin.abs() + end.abs()) + one(axis.axis) * self.height;
+            (f, 0.0, size * longest * DOT)
+        };
+        let (u, v) = (&self.u, &self.v);
+        [crosses, side(u, u.low, 1.0), side(u, u.high, -1.0), side(v, v.low, 1.0), side(v, v.high, -1.0)]
     }
 
     /// Whether the parallelogram stands between the point and the end of `l` (finite), or anywhere along it (not finite).

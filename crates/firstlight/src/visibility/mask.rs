@@ -1,0 +1,152 @@
+//! Which samples of a light are hidden, a bit for each.
+
+use fearless_simd::{Level, f32x16, prelude::*};
+
+use super::occluders::ShadowMesh;
+use super::target::{SampleBlock, Target};
+use super::view::View;
+use super::Viewpoint;
+use crate::accel::{RayPacket16, dispatch_sixteen};
+use crate::math::{LANES, ShadowRay, UNIT_ROUNDOFF, Vec3};
+use crate::scene::{Scene, ShadowRays};
+use crate::shape::SeenTriangle;
+
+impl View {
+    /// Fills [`hidden`](Self::hidden): what triangles, solids and point sets hide, and what is below the horizon for sure. Spheres
+    /// and parallelograms are left to their own tests.
+    pub fn mask(&mut self, level: Level, scene: &Scene, target: &Target, point: &Viewpoint) {
+        let count = target.blocks.len();
+        self.hidden.clear();
+        if count == 0 || self.triangles.is_empty() && self.others.is_empty() && !self.trees {
+            return;
+        }
+        self.in_space.clear();
+        self.in_space.extend(target.blocks.iter().map(|block| !block.present));
+        dispatch_sixteen!(level, simd => self.mask_triangles(simd, scene, target, point), else ());
+        if self.trees || !self.others.is_empty() {
+            self.trace(level, scene, target, point);
+        }
+        // From the order of space to that of the light
+        self.hidden.resize(count, 0);
+        for (block, hidden) in target.blocks.iter().zip(&self.in_space) {
+            let mut rest = hidden & block.present;
+            while rest != 0 {
+                let lane = rest.trailing_zeros() as usize % LANES;
+                rest &= rest - 1;
+                let k = block.sample[lane] as usize;
+                self.hidden[k / LANES] |= 1 << (k % LANES);
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn mask_triangles<S: Simd>(&mut self, simd: S, scene: &Scene, target: &Target, point: &Viewpoint) {
+        // What is below the horizon needs no answer
+        let seen = target.hull.from(point.p);
+        let size = point.ng.abs();
+        let wrong = (size.x + size.y + size.z) * seen.longest * (64.0 * UNIT_ROUNDOFF);
+        let middle = point.ng.dot(seen.l);
+        let slopes = seen.axes.map(|a| point.ng.dot(a));
+        if middle - (slopes[0].abs() + slopes[1].abs() + slopes[2].abs()) < wrong {
+            for (block, hidden) in target.blocks.iter().zip(&mut self.in_space) {
+                let [x, y, z] = [0, 1, 2].map(|axis| f32x16::load_array_ref(simd, &block.at[axis]));
+                let height = z.mul_add(slopes[2], y.mul_add(slopes[1], x.mul_add(slopes[0], middle)));
+                *hidden |= height.simd_lt(-wrong).to_bitmask() as u16;
+            }
+        }
+        let triangles = std::mem::take(&mut self.triangles);
+        for triangle in &triangles {
+            let mut all = true;
+            for (c, cells) in target.cells.iter().enumerate() {
+                let first = c * LANES;
+                let last = (first + LANES).min(target.blocks.len());
+                let there = ((1u32 << (last - first)) - 1) as u16;
+                let verdict = triangle.cells(simd, &cells.middle, &cells.half);
+                for i in first..last {
+                    if verdict.hidden >> (i - first) & 1 == 1 {
+                        self.in_space[i] = 0xffff;
+                    }
+                }
+                let mut some = verdict.unsure & there;
+                while some != 0 {
+                    let i = first + some.trailing_zeros() as usize % LANES;
+                    some &= some - 1;
+                    let asking = !self.in_space[i];
+                    if asking == 0 {
+                        continue;
+                    }
+                    let block = &target.blocks[i];
+                    let verdict = triangle.samples(simd, &block.at);
+                    let mut hidden = verdict.hidden;
+                    let unsure = verdict.unsure & asking & !hidden;
+                    if unsure != 0 {
+                        hidden |= by_kernel(simd, scene, triangle, block, point, unsure);
+                    }
+                    self.in_space[i] |= hidden;
+                }
+                all &= self.in_space[first..last].iter().all(|hidden| *hidden == 0xffff);
+            }
+            if all {
+                break;
+            }
+        }
+        self.triangles = triangles;
+    }
+
+    /// Asks the trees, or only what is no mesh, ray by ray.
+    fn trace(&mut self, level: Level, scene: &Scene, target: &Target, point: &Viewpoint) {
+        for (block, hidden) in target.blocks.iter().zip(&mut self.in_space) {
+            let asking = !*hidden;
+            if asking == 0 {
+                continue;
+            }
+            let shadows = shadow_rays(point, block);
+            *hidden |= if self.trees {
+                scene.geometry.are_blocked(level, &shadows, asking)
+            } else {
+                scene.geometry.are_blocked_by(level, &self.others, &shadows, asking)
+            };
+        }
+    }
+}
+
+/// The rays from a point to a block of samples.
+fn shadow_rays(point: &Viewpoint, block: &SampleBlock) -> ShadowRays {
+    let mut shadows = ShadowRays { from: point.ray(Vec3::ZERO, true), rays: RayPacket16::ZERO, t_end: [0.0; LANES] };
+    for axis in 0..3 {
+        shadows.rays.o[axis] = [point.start[axis]; LANES];
+        for lane in 0..LANES {
+            shadows.rays.d[axis][lane] = block.point[axis][lane] - point.p[axis];
+        }
+    }
+    for (lane, end) in shadows.t_end.iter_mut().enumerate() {
+        *end = ShadowRay { l: shadows.rays.d(lane), ..shadows.from }.end();
+    }
+    shadows
+}
+
+/// Lets the kernel decide for the samples in `unsure`.
+#[inline(never)]
+fn by_kernel<S: Simd>(
+    simd: S,
+    scene: &Scene,
+    triangle: &SeenTriangle,
+    block: &SampleBlock,
+    point: &Viewpoint,
+    unsure: u16,
+) -> u16 {
+    simd.vectorize(
+        #[inline(always)]
+        || {
+            let Some(mesh) = ShadowMesh::of(&scene.geometry, triangle.source) else { return 0 };
+            let mut shadows = shadow_rays(point, block);
+            if let Some(placement) = mesh.placement {
+                for lane in (0..LANES).filter(|lane| unsure >> lane & 1 == 1) {
+                    let line = placement.line(shadows.rays.o(lane), shadows.rays.d(lane));
+                    shadows.rays.set(lane, line.o.as_vec3(), line.d.as_vec3());
+                }
+            }
+            mesh.mesh.tree.meets(simd, &shadows.rays, &shadows.t_end, triangle, unsure)
+        },
+    )
+}
