@@ -30,7 +30,7 @@ use crate::image::{Receipt, Window};
 use crate::math::Ray;
 use crate::describe::words;
 use crate::scene::Scene;
-use crate::visibility::Target;
+use crate::visibility::{Settled, Target};
 use film::FilmTile;
 use hits::PixelHits;
 use lanes::Lanes;
@@ -137,12 +137,14 @@ pub struct RenderStats {
     /// Those of them that took no ray: nothing could stand between, or the light casts no shadows.
     pub shadow_rays_skipped: u64,
     /// Pairs of a lit point and a light: all of it arrives, one thing hides it, it is below the horizon, each sample has an
-    /// answer of its own. Counted where shafts are used, as the next two are.
+    /// answer of its own. Counted where shafts are used, as the next three are.
     pub visibility: [u64; 4],
     /// Shafts from points to lights.
     pub shafts: u64,
     /// What they held that could stand in the way, all together.
     pub occluders: u64,
+    /// Shadow rays for which trees were asked all the same.
+    pub traced: u64,
     /// The instruction set; `Fallback` for the plain renderer.
     pub simd: SimdLevel,
     /// Threads.
@@ -155,18 +157,16 @@ pub(crate) struct Counts {
     pub camera_rays: u64,
     pub shadow_rays: u64,
     pub shadow_rays_skipped: u64,
-    pub visibility: [u64; 4],
-    pub shafts: u64,
-    pub occluders: u64,
+    pub settled: Settled,
     /// Shadow rays after which the caller is asked whether to go on.
     next_question: u64,
 }
 
 impl Counts {
-    fn all(&self) -> [u64; 9] {
-        let [lit, hidden, below, mask] = self.visibility;
-        let Counts { camera_rays, shadow_rays, shadow_rays_skipped, shafts, occluders, .. } = *self;
-        [camera_rays, shadow_rays, shadow_rays_skipped, lit, hidden, below, mask, shafts, occluders]
+    fn all(&self) -> [u64; 10] {
+        let Counts { camera_rays, shadow_rays, shadow_rays_skipped, settled, .. } = *self;
+        let Settled { visibility: [lit, hidden, below, mask], shafts, occluders, traced } = settled;
+        [camera_rays, shadow_rays, shadow_rays_skipped, lit, hidden, below, mask, shafts, occluders, traced]
     }
 }
 
@@ -191,7 +191,7 @@ pub fn render(
     let tiles = Tile::cover(window, settings.tile_size);
     let all = window.width as u64 * window.height as u64;
     let (done, stop) = (AtomicU64::new(0), AtomicBool::new(false));
-    let totals = [const { AtomicU64::new(0) }; 9];
+    let totals = [const { AtomicU64::new(0) }; 10];
     let targets: Vec<Target> = match settings.visibility {
         VisibilityMode::Shafts if !settings.reference => scene.lights.iter().map(Target::new).collect(),
         _ => Vec::new(),
@@ -237,7 +237,7 @@ pub fn render(
     if stop.into_inner() {
         return ControlFlow::Break(());
     }
-    let [camera_rays, shadow_rays, shadow_rays_skipped, lit, hidden, below, mask, shafts, occluders] =
+    let [camera_rays, shadow_rays, shadow_rays_skipped, lit, hidden, below, mask, shafts, occluders, traced] =
         totals.map(AtomicU64::into_inner);
     let simd = if settings.reference { SimdLevel::Fallback } else { level };
     let visibility = [lit, hidden, below, mask];
@@ -248,6 +248,7 @@ pub fn render(
         visibility,
         shafts,
         occluders,
+        traced,
         simd,
         threads,
     };

@@ -1,9 +1,7 @@
 //! The fast renderer's way through a tile: what may stand before a light is gathered once for neighbouring points.
 //!
 //! The camera rays of a block of pixels first, then light by light: the points of the block that need it are taken
-//! together, what lies between them and the light is gathered ([`Occluders`]), and from each point the light is lit, hidden,
-//! below the horizon, or cut ([`View`]). Where the trees hold too much for all of them, the points are parted where their
-//! box is longest, down to single ones; where it is too much for one, the trees are asked ray by ray. The sums over the
+//! together, and a [`Settler`] finds from which of them the light is lit, hidden, below the horizon, or cut. The sums over the
 //! samples are those of [`Lanes`](super::lanes::Lanes), in the same order.
 
 use std::ops::ControlFlow;
@@ -11,7 +9,7 @@ use std::ops::ControlFlow;
 use fearless_simd::Level;
 
 use super::film::FilmTile;
-use super::hits::{PixelHits, camera_ray};
+use super::hits::PixelHits;
 use super::lanes::{Obstacles, sum_rectangle};
 use super::pixel::{Lighting, LobeSums, PixelSum};
 use super::plain::Plain;
@@ -21,13 +19,7 @@ use crate::light::LightKind;
 use crate::material::Bsdf;
 use crate::scene::Scene;
 use crate::shape::SurfaceInteraction;
-use crate::visibility::{Occluders, Target, View, Viewpoint, Visibility};
-
-/// Leaves of triangles gathered for many points; more, and the points are parted.
-const MANY: usize = 16;
-/// For one point: as many as are dearer to look at than rays are to trace, at first and for each block of samples.
-const ONE: usize = 24;
-const ONE_MORE: usize = 12;
+use crate::visibility::{Settler, Target, View, Viewpoint, Visibility};
 
 /// The points of a block of pixels, and what is needed to light them.
 pub(crate) struct Shafts<'a> {
@@ -41,8 +33,7 @@ pub(crate) struct Shafts<'a> {
     sums: Vec<[f32; 2]>,
     /// The points that are being lit, part by part.
     order: Vec<u32>,
-    occluders: Occluders,
-    view: View,
+    settler: Settler,
 }
 
 impl<'a> Shafts<'a> {
@@ -56,8 +47,7 @@ impl<'a> Shafts<'a> {
             surfaces: Vec::new(),
             sums: Vec::new(),
             order: Vec::new(),
-            occluders: Occluders::default(),
-            view: View::default(),
+            settler: Settler::default(),
         }
     }
 
@@ -106,9 +96,8 @@ impl<'a> Shafts<'a> {
             for row in 0..n {
                 for column in 0..n {
                     counts.camera_rays += 1;
-                    let (ray, differential) = camera_ray(scene, (i + x) * n + column, (j + y) * n + row);
-                    let hit = self.hits.get(n, x, y, column, row);
-                    if let Some((si, bsdf)) = pixel.see(scene, scene.see(&ray, hit, &differential)) {
+                    let (ray, differential, hit) = self.hits.seen(n, x, y, column, row);
+                    if let Some((si, bsdf)) = pixel.see(scene, scene.see(ray, *hit, differential)) {
                         self.points.push(Viewpoint::of(&si));
                         self.surfaces.push((si, bsdf));
                     }
@@ -136,114 +125,80 @@ impl<'a> Shafts<'a> {
         counts: &mut Counts,
         go_on: &impl Fn() -> ControlFlow<()>,
     ) -> ControlFlow<()> {
-        self.sums.clear();
-        self.sums.resize(self.points.len(), [0.0; 2]);
-        let light = &self.scene.lights[index];
-        let mut order = std::mem::take(&mut self.order);
-        order.clear();
-        let mut flow = ControlFlow::Continue(());
-        for k in 0..self.points.len() {
-            let shadowed = light.shadows && self.surfaces[k].0.receives_shadow;
-            if shadowed {
-                order.push(k as u32);
+        let (scene, level, target) = (self.scene, self.level, &self.targets[index]);
+        let light = &scene.lights[index];
+        let (surfaces, sums) = (&self.surfaces, &mut self.sums);
+        sums.clear();
+        sums.resize(surfaces.len(), [0.0; 2]);
+        let samples = light.samples() as u64;
+        // Those that nothing can shadow
+        self.order.clear();
+        for (k, (si, bsdf)) in surfaces.iter().enumerate() {
+            if light.shadows && si.receives_shadow {
+                self.order.push(k as u32);
             } else {
-                counts.shadow_rays += light.samples() as u64;
-                counts.shadow_rays_skipped += light.samples() as u64;
-                self.sum(index, k, Visibility::Lit, counts);
-            }
-        }
-        // A point that casts no light has no side
-        if !order.is_empty() {
-            flow = self.part(index, &mut order, counts, go_on);
-        }
-        self.order = order;
-        flow
-    }
-
-    /// Lights some points: all together, or part by part.
-    fn part(
-        &mut self,
-        index: usize,
-        part: &mut [u32],
-        counts: &mut Counts,
-        go_on: &impl Fn() -> ControlFlow<()>,
-    ) -> ControlFlow<()> {
-        let (scene, target) = (self.scene, &self.targets[index]);
-        if counts.shadow_rays >= counts.next_question {
-            counts.next_question = counts.shadow_rays + QUESTION_EVERY;
-            go_on()?;
-        }
-        let cap = if part.len() > 1 { MANY } else { ONE + ONE_MORE * target.blocks.len() };
-        self.occluders.gather(self.level, scene, index, &target.hull, &self.points, part, cap);
-        counts.shafts += 1;
-        if self.occluders.too_many && part.len() > 1 {
-            let half = halve(&self.points, part);
-            let (left, right) = part.split_at_mut(half);
-            self.part(index, left, counts, go_on)?;
-            return self.part(index, right, counts, go_on);
-        }
-        counts.occluders += self.occluders.count() as u64;
-        for k in part.iter().map(|k| *k as usize) {
-            let samples = target.samples as u64;
-            counts.shadow_rays += samples;
-            let visibility = self.view.classify(self.level, scene, target, &self.occluders, &self.points[k]);
-            if visibility == Visibility::Mask {
-                self.view.mask(self.level, scene, target, &self.points[k]);
-            } else {
+                counts.shadow_rays += samples;
                 counts.shadow_rays_skipped += samples;
+                sums[k] = lit(scene, level, index, si, bsdf);
             }
-            counts.visibility[visibility as usize] += 1;
-            self.sum(index, k, visibility, counts);
+        }
+        // The others in parts that are not too long for someone who waits
+        let at_once = (QUESTION_EVERY / samples).clamp(1, 1 << 20) as usize;
+        for part in self.order.chunks_mut(at_once) {
+            if counts.shadow_rays >= counts.next_question {
+                counts.next_question = counts.shadow_rays + QUESTION_EVERY;
+                go_on()?;
+            }
+            counts.shadow_rays += samples * part.len() as u64;
+            let settled = &mut counts.settled;
+            let before = settled.visibility[Visibility::Mask as usize];
+            self.settler.settle(level, scene, index, target, &self.points, part, settled, |k, visibility, view| {
+                let (si, bsdf) = &surfaces[k];
+                match visibility {
+                    Visibility::Hidden | Visibility::BelowHorizon => {}
+                    Visibility::Lit => sums[k] = lit(scene, level, index, si, bsdf),
+                    Visibility::Mask => sums[k] = masked(scene, level, index, si, bsdf, view),
+                }
+            });
+            let cut = settled.visibility[Visibility::Mask as usize] - before;
+            counts.shadow_rays_skipped += samples * (part.len() as u64 - cut);
         }
         ControlFlow::Continue(())
     }
-
-    /// Sums what reaches point `k`.
-    #[inline(always)]
-    fn sum(&mut self, index: usize, k: usize, visibility: Visibility, counts: &mut Counts) {
-        let scene = self.scene;
-        let (si, bsdf) = &self.surfaces[k];
-        let obstacles = match visibility {
-            Visibility::Hidden | Visibility::BelowHorizon => return,
-            Visibility::Lit => Obstacles::default(),
-            Visibility::Mask => Obstacles {
-                spheres: &self.view.spheres,
-                flats: &self.view.flats,
-                trees: None,
-                hidden: &self.view.hidden,
-            },
-        };
-        let sums: LobeSums = match &scene.lights[index].kind {
-            LightKind::Rectangle(rectangle) => {
-                // Without vectors for trees, the trees are asked with the rest
-                let trees = (visibility == Visibility::Mask && self.view.trees && self.view.hidden.is_empty())
-                    .then_some(&*scene.geometry);
-                sum_rectangle(self.level, rectangle, si, &bsdf.lobe, &Obstacles { trees, ..obstacles })
-            }
-            _ => {
-                let mut own = Counts::default();
-                let lit = SurfaceInteraction { receives_shadow: visibility == Visibility::Mask, ..*si };
-                Plain.gather(scene, index, &lit, &bsdf.lobe, &mut own)
-            }
-        };
-        let _ = counts;
-        self.sums[k] = [sums.diffuse.total(), sums.specular.total()];
-    }
 }
 
-/// Parts points where their box is longest, and says how many are in the first part: at least one in each.
-fn halve(points: &[Viewpoint], part: &mut [u32]) -> usize {
-    use crate::accel::Aabb;
-    let bounds = part.iter().fold(Aabb::EMPTY, |bounds, k| bounds.with(points[*k as usize].start));
-    let size = bounds.max - bounds.min;
-    let axis = if size.x >= size.y && size.x >= size.z { 0 } else { 1 + usize::from(size.z > size.y) };
-    let middle = bounds.min[axis] + size[axis] * 0.5;
-    let mut left = 0;
-    for i in 0..part.len() {
-        if points[part[i] as usize].start[axis] < middle {
-            part.swap(i, left);
-            left += 1;
+fn totals(sums: LobeSums) -> [f32; 2] {
+    [sums.diffuse.total(), sums.specular.total()]
+}
+
+/// What arrives of light `index` where nothing hides any of it.
+#[inline(always)]
+fn lit(scene: &Scene, level: Level, index: usize, si: &SurfaceInteraction, bsdf: &Bsdf) -> [f32; 2] {
+    totals(match &scene.lights[index].kind {
+        LightKind::Rectangle(rectangle) => sum_rectangle(level, rectangle, si, &bsdf.lobe, &Obstacles::default()),
+        _ => {
+            let unshadowed = SurfaceInteraction { receives_shadow: false, ..*si };
+            Plain.gather(scene, index, &unshadowed, &bsdf.lobe, &mut Counts::default())
         }
-    }
-    if left == 0 || left == part.len() { part.len() / 2 } else { left }
+    })
+}
+
+/// What arrives of light `index` past what is in `view`.
+#[inline(always)]
+fn masked(
+    scene: &Scene,
+    level: Level,
+    index: usize,
+    si: &SurfaceInteraction,
+    bsdf: &Bsdf,
+    view: &View,
+) -> [f32; 2] {
+    totals(match &scene.lights[index].kind {
+        LightKind::Rectangle(rectangle) => {
+            let obstacles =
+                Obstacles { spheres: &view.spheres, flats: &view.flats, trees: None, hidden: &view.hidden };
+            sum_rectangle(level, rectangle, si, &bsdf.lobe, &obstacles)
+        }
+        _ => Plain.gather(scene, index, si, &bsdf.lobe, &mut Counts::default()),
+    })
 }

@@ -1,30 +1,33 @@
 //! Which samples of a light are hidden, a bit for each.
 
-use fearless_simd::{Level, f32x16, prelude::*};
+use fearless_simd::{Level, dispatch, f32x16, prelude::*};
 
 use super::occluders::ShadowMesh;
 use super::target::{SampleBlock, Target};
 use super::view::View;
 use super::Viewpoint;
 use crate::accel::{RayPacket16, dispatch_sixteen};
-use crate::math::{LANES, ShadowRay, UNIT_ROUNDOFF, Vec3};
+use crate::math::{LANES, UNIT_ROUNDOFF, Vec3};
 use crate::scene::{Scene, ShadowRays};
 use crate::shape::SeenTriangle;
 
 impl View {
     /// Fills [`hidden`](Self::hidden): what triangles, solids and point sets hide, and what is below the horizon for sure. Spheres
     /// and parallelograms are left to their own tests.
-    pub fn mask(&mut self, level: Level, scene: &Scene, target: &Target, point: &Viewpoint) {
+    ///
+    /// Answers with the number of samples that were asked for one by one.
+    pub fn mask(&mut self, level: Level, scene: &Scene, target: &Target, point: &Viewpoint) -> u64 {
         let count = target.blocks.len();
+        let mut traced = 0;
         self.hidden.clear();
         if count == 0 || self.triangles.is_empty() && self.others.is_empty() && !self.trees {
-            return;
+            return 0;
         }
         self.in_space.clear();
         self.in_space.extend(target.blocks.iter().map(|block| !block.present));
         dispatch_sixteen!(level, simd => self.mask_triangles(simd, scene, target, point), else ());
         if self.trees || !self.others.is_empty() {
-            self.trace(level, scene, target, point);
+            traced = self.trace(level, scene, target, point);
         }
         // From the order of space to that of the light
         self.hidden.resize(count, 0);
@@ -37,6 +40,7 @@ impl View {
                 self.hidden[k / LANES] |= 1 << (k % LANES);
             }
         }
+        traced
     }
 
     #[inline(always)]
@@ -94,34 +98,39 @@ impl View {
     }
 
     /// Asks the trees, or only what is no mesh, ray by ray.
-    fn trace(&mut self, level: Level, scene: &Scene, target: &Target, point: &Viewpoint) {
+    fn trace(&mut self, level: Level, scene: &Scene, target: &Target, point: &Viewpoint) -> u64 {
+        let mut traced = 0;
         for (block, hidden) in target.blocks.iter().zip(&mut self.in_space) {
             let asking = !*hidden;
             if asking == 0 {
                 continue;
             }
-            let shadows = shadow_rays(point, block);
+            traced += u64::from(asking.count_ones());
+            let shadows = dispatch!(level, simd => shadow_rays(simd, point, block));
             *hidden |= if self.trees {
                 scene.geometry.are_blocked(level, &shadows, asking)
             } else {
                 scene.geometry.are_blocked_by(level, &self.others, &shadows, asking)
             };
         }
+        traced
     }
 }
 
 /// The rays from a point to a block of samples.
-fn shadow_rays(point: &Viewpoint, block: &SampleBlock) -> ShadowRays {
+#[inline(always)]
+fn shadow_rays<S: Simd>(simd: S, point: &Viewpoint, block: &SampleBlock) -> ShadowRays {
     let mut shadows = ShadowRays { from: point.ray(Vec3::ZERO, true), rays: RayPacket16::ZERO, t_end: [0.0; LANES] };
+    let l = [0, 1, 2].map(|axis| f32x16::load_array_ref(simd, &block.point[axis]) - point.p[axis]);
     for axis in 0..3 {
         shadows.rays.o[axis] = [point.start[axis]; LANES];
-        for lane in 0..LANES {
-            shadows.rays.d[axis][lane] = block.point[axis][lane] - point.p[axis];
-        }
+        l[axis].store_slice(&mut shadows.rays.d[axis]);
     }
-    for (lane, end) in shadows.t_end.iter_mut().enumerate() {
-        *end = ShadowRay { l: shadows.rays.d(lane), ..shadows.from }.end();
-    }
+    // `ShadowRay::end`, operation by operation
+    let o = point.start.abs();
+    let length = l[0].abs() + l[1].abs() + l[2].abs();
+    let end = -((length + (o.x + o.y + o.z)) / length * (32.0 * UNIT_ROUNDOFF)) + 1.0;
+    end.store_slice(&mut shadows.t_end);
     shadows
 }
 
@@ -139,7 +148,7 @@ fn by_kernel<S: Simd>(
         #[inline(always)]
         || {
             let Some(mesh) = ShadowMesh::of(&scene.geometry, triangle.source) else { return 0 };
-            let mut shadows = shadow_rays(point, block);
+            let mut shadows = shadow_rays(simd, point, block);
             if let Some(placement) = mesh.placement {
                 for lane in (0..LANES).filter(|lane| unsure >> lane & 1 == 1) {
                     let line = placement.line(shadows.rays.o(lane), shadows.rays.d(lane));

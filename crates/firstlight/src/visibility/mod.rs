@@ -12,11 +12,12 @@
 
 mod mask;
 mod occluders;
+mod settle;
 mod shaft;
 mod target;
 mod view;
 
-pub(crate) use occluders::Occluders;
+pub(crate) use settle::{Settled, Settler};
 pub(crate) use target::Target;
 pub(crate) use view::{View, Visibility};
 

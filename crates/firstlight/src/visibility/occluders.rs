@@ -31,6 +31,8 @@ pub(crate) struct Occluders {
     pub others: Vec<u32>,
     /// Whether the trees held more than was asked for: then they have to be asked ray by ray.
     pub too_many: bool,
+    /// Whether fewer points might find less: not where there are no vectors to gather with.
+    pub by_parts: bool,
     /// Meshes that the shaft leads through.
     meshes: Vec<Source>,
 }
@@ -158,8 +160,9 @@ impl Occluders {
         self.spheres.len() + self.flats.len() + self.leaves.len() + self.others.len()
     }
 
-    /// Gathers what may stand between `points` and light `index`: all listed shapes that are not proved to be out of the way, and
+    /// Gathers what may stand between those of `points` in `indices` and light `index`: all listed shapes that are not proved to be out of the way, and
     /// of the trees at most `cap` leaves of triangles.
+    #[allow(clippy::too_many_arguments, reason = "a light of a scene and points, as lists")]
     pub fn gather(
         &mut self,
         level: Level,
@@ -197,12 +200,21 @@ impl Occluders {
             }
         }
         if scene.geometry.has_trees() {
-            let gathered = dispatch_sixteen!(level, simd => self.gather_trees(simd, scene, hull, &shaft, points, indices, cap), else false);
+            self.by_parts = true;
+            let gathered = dispatch_sixteen!(
+                level,
+                simd => self.gather_trees(simd, scene, hull, &shaft, points, indices, cap),
+                else {
+                    self.by_parts = false;
+                    false
+                }
+            );
             self.too_many = !gathered;
         }
     }
 
     #[inline(always)]
+    #[allow(clippy::too_many_arguments, reason = "the rest of `gather`")]
     fn gather_trees<S: Simd>(
         &mut self,
         simd: S,

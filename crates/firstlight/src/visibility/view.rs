@@ -3,12 +3,13 @@
 use fearless_simd::{Level, Simd};
 
 use super::occluders::{Occluders, ShadowMesh, Source};
+use super::shaft::Shaft;
 use super::target::{LightSeen, Target};
 use super::Viewpoint;
 use crate::accel::dispatch_sixteen;
 use crate::math::{DVec3, UNIT_ROUNDOFF, Vec3};
-use crate::scene::Scene;
-use crate::shape::{Cover, Eye, ParallelogramShadow, SeenTriangle, SphereShadow, TOGETHER};
+use crate::scene::{Scene, Target as Placed};
+use crate::shape::{Cover, Eye, ParallelogramShadow, Placement, SeenTriangle, SphereShadow, TOGETHER};
 
 /// How much of a light reaches a point.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -100,10 +101,44 @@ impl View {
                 return Visibility::Hidden;
             }
         }
-        self.others.extend_from_slice(&occluders.others);
+        self.gather_others(scene, target, &light, occluders, point);
         let nothing =
             self.spheres.is_empty() && self.flats.is_empty() && self.triangles.is_empty() && self.others.is_empty();
         if nothing { Visibility::Lit } else { Visibility::Mask }
+    }
+
+    /// Keeps those solids and point sets that may be in the way.
+    fn gather_others(
+        &mut self,
+        scene: &Scene,
+        target: &Target,
+        light: &LightSeen,
+        occluders: &Occluders,
+        point: &Viewpoint,
+    ) {
+        if occluders.others.is_empty() {
+            return;
+        }
+        let own = [*point];
+        let shaft = Shaft::of(&own, &[0], &target.hull);
+        for &index in &occluders.others {
+            let thing = &scene.geometry.placed[index as usize];
+            if let Placed::Solid(solid) = thing.target {
+                let solid = &scene.geometry.solids[solid as usize];
+                if let Some((on, n)) = solid.plane() {
+                    if stays_before(&thing.placement, on, n, light, point) {
+                        continue;
+                    }
+                } else if let Some(bounds) = solid.bounds() {
+                    let [low, high] = thing.placement.bounds(bounds);
+                    let far = (high - point.start.as_dvec3()).abs().max((low - point.start.as_dvec3()).abs());
+                    if !shaft.meets(low, high, far.max_element() * 1e-5) {
+                        continue;
+                    }
+                }
+            }
+            self.others.push(index);
+        }
     }
 
     /// Looks at all triangles that were gathered. Says whether one hides all of the light.
@@ -189,6 +224,19 @@ fn eye(mesh: &ShadowMesh, light: &LightSeen, point: &Viewpoint) -> Eye {
             Eye { o, l: own.l, axes: own.axes, longest, shortest: own.shortest * 0.9999, short, finite }
         }
     }
+}
+
+/// Whether point and light are on one side of a plane through `on` with normal `n` in the space of `placement`: by the numbers
+/// with which the plane itself is met.
+fn stays_before(placement: &Placement, on: DVec3, n: DVec3, light: &LightSeen, point: &Viewpoint) -> bool {
+    let height = n.dot(placement.line(point.start, light.l).o - on);
+    let across = placement.object_from_world.matrix3.transpose() * n;
+    let reach: f64 = light.axes.iter().map(|a| across.dot(a.as_dvec3()).abs()).sum();
+    let room = across.abs().element_sum() * f64::from(light.longest) * 1e-6;
+    let middle = across.dot(light.l.as_dvec3()) * height.signum();
+    // The lowest that the light gets, over the plane, turned to the point's side
+    let least = middle - reach - room;
+    height == 0.0 || if light.finite { height.abs() * (1.0 - 1e-9) + least > 0.0 } else { least > 0.0 }
 }
 
 /// Whether all of a light is below the plane with normal `n`.

@@ -198,7 +198,7 @@ impl TriangleTree {
         if eye.finite {
             let ratio = eye.longest / eye.shortest * GRAZE_ALL;
             let room = area * (far_off * ratio) + sliver * (1.0 / GRAZE_ALL) + wrong + det_wrong;
-            nothing |= (most + room).simd_lt(height);
+            nothing |= (most + room).simd_lt(height) & height.simd_gt(room);
         }
         let keep = (!(nothing & sound)) & area.simd_gt(zero);
         let mut keep = keep.to_bitmask() as u32;
