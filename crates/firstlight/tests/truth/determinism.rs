@@ -3,7 +3,9 @@
 
 use std::num::NonZeroUsize;
 
-use firstlight::{Image, LightDesc, RenderSettings, SampleSet, Scene, SceneDesc, ShapeDesc, SimdLevel, Window};
+use firstlight::{
+    Image, LightDesc, RenderSettings, SampleSet, Scene, SceneDesc, ShapeDesc, SimdLevel, VisibilityMode, Window,
+};
 
 use crate::random;
 use crate::scenes::*;
@@ -70,8 +72,10 @@ fn instruction_sets_do_not_matter() {
         let scene = compile(&desc);
         let expected = with(RenderSettings { reference: true, ..one_thread() }, &scene);
         for simd in &levels {
-            let got = with(RenderSettings { simd: *simd, ..one_thread() }, &scene);
-            assert!(got == expected, "{}: {desc:#?}", simd.name());
+            for visibility in [VisibilityMode::Shafts, VisibilityMode::Traced] {
+                let got = with(RenderSettings { simd: *simd, visibility, ..one_thread() }, &scene);
+                assert!(got == expected, "{}, {}: {desc:#?}", simd.name(), visibility.name());
+            }
         }
     }
 }
@@ -115,15 +119,25 @@ fn fault(desc: &SceneDesc) -> Option<String> {
     if let Some(fault) = describe("plain", &plain) {
         return Some(fault);
     }
-    for (simd, threads, tile_size) in
-        [(SimdLevel::Auto, 1, 16), (SimdLevel::available()[0], 1, 16), (SimdLevel::Auto, 2, 8)]
-    {
+    use VisibilityMode::{Shafts, Traced};
+    let (best, least) = (SimdLevel::Auto, SimdLevel::available()[0]);
+    let avx2 = if SimdLevel::Avx2.is_available() { SimdLevel::Avx2 } else { best };
+    for (simd, threads, tile_size, visibility) in [
+        (best, 1, 16, Shafts),
+        (best, 1, 16, Traced),
+        (avx2, 1, 16, Shafts),
+        (least, 1, 16, Shafts),
+        (least, 1, 16, Traced),
+        (best, 2, 8, Shafts),
+    ] {
         let threads = NonZeroUsize::new(threads);
-        let fast = picture(&scene, &RenderSettings { simd, threads, tile_size, ..RenderSettings::default() });
+        let settings = RenderSettings { simd, threads, tile_size, visibility, ..RenderSettings::default() };
+        let fast = picture(&scene, &settings);
         let differs =
             (0..plain.pixels.len()).find(|i| plain.pixels[*i].map(f32::to_bits) != fast.pixels[*i].map(f32::to_bits));
         if let Some(i) = differs {
-            return Some(format!("pixel {i}: plain {:?}, {} {:?}", plain.pixels[i], simd.name(), fast.pixels[i]));
+            let (simd, visibility) = (simd.name(), visibility.name());
+            return Some(format!("pixel {i}: plain {:?}, {simd} {visibility} {:?}", plain.pixels[i], fast.pixels[i]));
         }
     }
     None
