@@ -6,7 +6,7 @@
 
 use firstlight::{Image, LightDesc, RenderSettings, SampleSet, SamplesDesc, Scene, SceneDesc, Window};
 
-use crate::scenes::{compile, one_thread, picture};
+use crate::scenes::{compile, every_ray, one_thread, picture};
 
 /// Steps of an 8-bit picture by which the mean of two sets may differ from the mean of the other two.
 const AGREEMENT: f64 = 0.25;
@@ -19,7 +19,7 @@ const FIRST: u32 = 10;
 
 /// The settings that a converged picture is made with.
 pub fn traced() -> RenderSettings {
-    one_thread()
+    every_ray()
 }
 
 /// The settings that hold what is tested: lights that say so are integrated.
