@@ -51,10 +51,13 @@ impl View {
         let size = point.horizon.abs();
         let wrong = (size.x + size.y + size.z) * seen.longest * (64.0 * UNIT_ROUNDOFF);
         let middle = point.horizon.dot(seen.l);
-        let slopes = seen.axes.map(|a| point.horizon.dot(a));
+        let [a, b, c] = seen.axes;
+        let slopes = [point.horizon.dot(a), point.horizon.dot(b), point.horizon.dot(c)];
         if middle - (slopes[0].abs() + slopes[1].abs() + slopes[2].abs()) < wrong {
             for (block, hidden) in target.blocks.iter().zip(&mut self.in_space) {
-                let [x, y, z] = [0, 1, 2].map(|axis| f32x16::load_array_ref(simd, &block.at[axis]));
+                let x = f32x16::load_array_ref(simd, &block.at[0]);
+                let y = f32x16::load_array_ref(simd, &block.at[1]);
+                let z = f32x16::load_array_ref(simd, &block.at[2]);
                 let height = z.mul_add(slopes[2], y.mul_add(slopes[1], x.mul_add(slopes[0], middle)));
                 *hidden |= height.simd_lt(-wrong).to_bitmask() as u16;
             }
@@ -123,7 +126,11 @@ impl View {
 fn shadow_rays<S: Simd>(simd: S, light: LightId, point: &Viewpoint, block: &SampleBlock) -> ShadowRays {
     let mut shadows =
         ShadowRays { from: point.ray(light, Vec3::ZERO, true), rays: RayPacket16::ZERO, t_end: [0.0; LANES] };
-    let l = [0, 1, 2].map(|axis| f32x16::load_array_ref(simd, &block.point[axis]) - point.p[axis]);
+    let l = [
+        f32x16::load_array_ref(simd, &block.point[0]) - point.p.x,
+        f32x16::load_array_ref(simd, &block.point[1]) - point.p.y,
+        f32x16::load_array_ref(simd, &block.point[2]) - point.p.z,
+    ];
     for axis in 0..3 {
         shadows.rays.o[axis] = [point.start[axis]; LANES];
         l[axis].store_slice(&mut shadows.rays.d[axis]);

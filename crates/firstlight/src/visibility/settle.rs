@@ -11,6 +11,8 @@ use crate::scene::Scene;
 
 /// Leaves of triangles gathered for many points; more, and the points are parted.
 const MANY: usize = 16;
+/// Points that are taken one by one if they are not settled together.
+const FEW: usize = 16;
 /// For one point: as many as are dearer to look at than rays are to trace, at first and for each block of samples.
 const ONE: usize = 24;
 const ONE_MORE: usize = 12;
@@ -61,9 +63,21 @@ impl Settler {
             self.occluders.gather(level, scene, target, points, part, cap);
             counts.shafts += 1;
             if self.occluders.too_many && part.len() > 1 && self.occluders.by_parts {
-                let middle = start + halve(points, part);
-                parts.push((middle, end));
-                parts.push((start, middle));
+                if part.len() <= FEW {
+                    parts.extend((start..end).map(|i| (i, i + 1)));
+                    continue;
+                }
+                // In four
+                let middle = halve(points, part);
+                let (left, right) = part.split_at_mut(middle);
+                let quarters = [halve(points, left), middle, middle + halve(points, right), end - start];
+                let mut first = 0;
+                for last in quarters {
+                    if last > first {
+                        parts.push((start + first, start + last));
+                    }
+                    first = last;
+                }
                 continue;
             }
             counts.occluders += self.occluders.count() as u64;

@@ -106,15 +106,30 @@ pub(crate) struct Verdict {
     pub unsure: u16,
 }
 
+// What follows is written without closures and `map`: out of line they lose the instruction set.
+
 /// Four numbers of each of four leaves.
 #[inline(always)]
-fn sixteen<S: Simd>(simd: S, packs: &[&Pack; TOGETHER], vertex: usize, axis: usize) -> f32x16<S> {
-    let [a, b, c, d] = packs.map(|pack| f32x4::load_array_ref(simd, &pack.vertices[vertex][axis]));
-    let left: f32x8<S> = simd.combine_f32x4(a, b);
-    simd.combine_f32x8(left, simd.combine_f32x4(c, d))
+fn sixteen<S: Simd>(simd: S, packs: [&Pack; TOGETHER], vertex: usize, axis: usize) -> f32x16<S> {
+    let [a, b, c, d] = packs;
+    let left: f32x8<S> = simd.combine_f32x4(
+        f32x4::load_array_ref(simd, &a.vertices[vertex][axis]),
+        f32x4::load_array_ref(simd, &b.vertices[vertex][axis]),
+    );
+    let right: f32x8<S> = simd.combine_f32x4(
+        f32x4::load_array_ref(simd, &c.vertices[vertex][axis]),
+        f32x4::load_array_ref(simd, &d.vertices[vertex][axis]),
+    );
+    simd.combine_f32x8(left, right)
 }
 
 type V<S> = [f32x16<S>; 3];
+
+/// One vertex of all triangles of four leaves, from `o`.
+#[inline(always)]
+fn vertex<S: Simd>(simd: S, packs: [&Pack; TOGETHER], i: usize, o: Vec3) -> V<S> {
+    [sixteen(simd, packs, i, 0) - o.x, sixteen(simd, packs, i, 1) - o.y, sixteen(simd, packs, i, 2) - o.z]
+}
 
 #[inline(always)]
 fn minus<S: Simd>(a: V<S>, b: V<S>) -> V<S> {
@@ -136,6 +151,42 @@ fn largest<S: Simd>(a: V<S>) -> f32x16<S> {
     a[0].abs().max(a[1].abs()).max(a[2].abs())
 }
 
+/// A number that is linear in the way, of sixteen triangles: towards the light's middle, its slopes, and how far it goes.
+#[derive(Clone, Copy)]
+struct Linear<S: Simd> {
+    middle: f32x16<S>,
+    slopes: V<S>,
+    reach: f32x16<S>,
+}
+
+impl<S: Simd> Linear<S> {
+    /// f.l, with the other sign for those in `behind`.
+    #[inline(always)]
+    fn new(f: V<S>, eye: &Eye, behind: mask32x16<S>) -> Self {
+        let (m, a, b, c) = (dot(f, eye.l), dot(f, eye.axes[0]), dot(f, eye.axes[1]), dot(f, eye.axes[2]));
+        Linear { middle: behind.select(-m, m), slopes: [a, b, c], reach: a.abs() + b.abs() + c.abs() }
+    }
+
+    #[inline(always)]
+    fn least(&self) -> f32x16<S> {
+        self.middle - self.reach
+    }
+
+    #[inline(always)]
+    fn most(&self) -> f32x16<S> {
+        self.middle + self.reach
+    }
+
+    #[inline(always)]
+    fn store(&self, behind: mask32x16<S>, to: &mut [[f32; 16]; 4]) {
+        let [a, b, c] = self.slopes;
+        self.middle.store_slice(&mut to[0]);
+        behind.select(-a, a).store_slice(&mut to[1]);
+        behind.select(-b, b).store_slice(&mut to[2]);
+        behind.select(-c, c).store_slice(&mut to[3]);
+    }
+}
+
 impl TriangleTree {
     /// Looks at the triangles of up to four leaves from `eye`: those that may hide some samples of the light go to `seen`. Says
     /// whether one of those that `filter` lets count hides all of it.
@@ -150,13 +201,15 @@ impl TriangleTree {
         seen: &mut Vec<SeenTriangle>,
     ) -> bool {
         let last = leaves.len() - 1;
-        let packs: [&Pack; TOGETHER] = std::array::from_fn(|i| &self.packs[leaves[i.min(last)] as usize]);
-        let o = [eye.o.x, eye.o.y, eye.o.z].map(|x| simd.splat_f32x16(x));
-        let vertex = |i: usize| minus([0, 1, 2].map(|axis| sixteen(simd, &packs, i, axis)), o);
-        let (a, b, c) = (vertex(0), vertex(1), vertex(2));
+        let packs: [&Pack; TOGETHER] = [
+            &self.packs[leaves[0] as usize],
+            &self.packs[leaves[last.min(1)] as usize],
+            &self.packs[leaves[last.min(2)] as usize],
+            &self.packs[leaves[last.min(3)] as usize],
+        ];
+        let (a, b, c) = (vertex(simd, packs, 0, eye.o), vertex(simd, packs, 1, eye.o), vertex(simd, packs, 2, eye.o));
         let (ab, bc, ca) = (minus(a, b), minus(b, c), minus(c, a));
         let n = cross(ca, minus(b, a));
-        let (fu, fv, fw) = (cross(c, bc), cross(a, ca), cross(b, ab));
         let far_off = largest(a).max(largest(b)).max(largest(c));
         let side = largest(ab).max(largest(bc)).max(largest(ca));
         let area = n[0].abs() + n[1].abs() + n[2].abs();
@@ -164,14 +217,11 @@ impl TriangleTree {
         // Turned so that the plane is ahead of those with det > 0
         let zero = simd.splat_f32x16(0.0);
         let behind = height.simd_lt(zero);
-        let turn = |x: f32x16<S>| behind.select(-x, x);
         let height = height.abs();
-        let [l, [a0, a1, a2]] = [[eye.l; 3], eye.axes];
-        let form = |f: V<S>| {
-            let (m, s0, s1, s2) = (turn(dot(f, l[0])), turn(dot(f, a0)), turn(dot(f, a1)), turn(dot(f, a2)));
-            ([m, s0, s1, s2], s0.abs() + s1.abs() + s2.abs())
-        };
-        let ((u, ur), (v, vr), (w, wr), (d, dr)) = (form(fu), form(fv), form(fw), form(n));
+        let u = Linear::new(cross(c, bc), eye, behind);
+        let v = Linear::new(cross(a, ca), eye, behind);
+        let w = Linear::new(cross(b, ab), eye, behind);
+        let d = Linear::new(n, eye, behind);
         // How far each can be wrong
         let (side2, side3) = (side * side, side * side * side);
         let longest = simd.splat_f32x16(eye.longest);
@@ -186,15 +236,14 @@ impl TriangleTree {
             & side.simd_lt(1e9)
             & area.simd_gt(0.0);
         // Those that hide nothing
-        let above = |m: f32x16<S>, r: f32x16<S>| (m - r).simd_gt(edge);
-        let below = |m: f32x16<S>, r: f32x16<S>| (m + r).simd_lt(-edge);
-        let outside = below(u[0], ur) | below(v[0], vr) | below(w[0], wr);
-        let (inside_u, inside_v, inside_w) = (above(u[0], ur), above(v[0], vr), above(w[0], wr));
-        let (least, most) = (d[0] - dr, d[0] + dr);
+        let outside = u.most().min(v.most()).min(w.most()).simd_lt(-edge);
+        let (inside_u, inside_v, inside_w) = (u.least(), v.least(), w.least());
+        let inside_one = inside_u.max(inside_v).max(inside_w).simd_gt(edge);
+        let (least, most) = (d.least(), d.most());
         let large = height.simd_gt(area * (side * 3.0) + wrong);
         let ahead = least.simd_gt(det_wrong);
         let away = most.simd_lt(zero) & ((height - wrong) * -most).simd_gt(area * longest * sliver);
-        let mut nothing = (outside & (inside_u | inside_v | inside_w | large | ahead)) | away;
+        let mut nothing = (outside & (inside_one | large | ahead)) | away;
         if eye.finite {
             let ratio = eye.longest / eye.shortest * GRAZE_ALL;
             let room = area * (far_off * ratio) + sliver * (1.0 / GRAZE_ALL) + wrong + det_wrong;
@@ -218,7 +267,8 @@ impl TriangleTree {
         let graze = large.select(-infinite, middling.select(graze + det_wrong, infinite));
         let graze = sound.select(graze, infinite);
         let edge = sound.select(edge, infinite);
-        let whole = inside_u & inside_v & inside_w & least.simd_gt(near) & sound;
+        let inside_all = inside_u.min(inside_v).min(inside_w).simd_gt(edge);
+        let whole = inside_all & least.simd_gt(near) & sound;
         let mut whole = whole.to_bitmask() as u32 & keep;
         while whole != 0 {
             let lane = whole.trailing_zeros() as usize & 15;
@@ -228,8 +278,12 @@ impl TriangleTree {
                 return true;
             }
         }
-        let forms = [u, v, w, d].map(|form| form.map(|x| x.to_array()));
-        let [edge, graze, near, far] = [edge, graze, near, far].map(|x| x.to_array());
+        let mut forms = [[[0.0; 16]; 4]; 4];
+        u.store(behind, &mut forms[0]);
+        v.store(behind, &mut forms[1]);
+        w.store(behind, &mut forms[2]);
+        d.store(behind, &mut forms[3]);
+        let (edge, graze, near, far) = (edge.to_array(), graze.to_array(), near.to_array(), far.to_array());
         while keep != 0 {
             let lane = keep.trailing_zeros() as usize & 15;
             keep &= keep - 1;
@@ -237,9 +291,9 @@ impl TriangleTree {
             if id == NONE || !filter(id) {
                 continue;
             }
-            seen.push(SeenTriangle {
-                middle: [0, 1, 2, 3].map(|i| forms[i][0][lane]),
-                slopes: [0, 1, 2, 3].map(|i| [forms[i][1][lane], forms[i][2][lane], forms[i][3][lane]]),
+            let mut triangle = SeenTriangle {
+                middle: [0.0; 4],
+                slopes: [[0.0; 3]; 4],
                 edge: edge[lane],
                 graze: graze[lane],
                 near: near[lane],
@@ -247,9 +301,25 @@ impl TriangleTree {
                 leaf: leaves[lane / PACK],
                 place: (lane % PACK) as u32,
                 source,
-            });
+            };
+            for i in 0..4 {
+                triangle.middle[i] = forms[i][0][lane];
+                for axis in 0..3 {
+                    triangle.slopes[i][axis] = forms[i][axis + 1][lane];
+                }
+            }
+            seen.push(triangle);
         }
         false
+    }
+
+    /// Whether the kernel says that a ray is on a triangle.
+    #[inline(always)]
+    fn meets_one(&self, rays: &RayPacket16, t_max: &[f32; 16], pack: &Pack, place: usize, lane: usize) -> bool {
+        let ray = rays.ray(lane);
+        let slabs = Slabs::new(&ray, self.tree.center, self.tree.half);
+        let hit = if ray.is_valid { intersect(&ray, &slabs, &pack.triangle(place)) } else { None };
+        hit.is_some_and(|hit| hit.t > 0.0 && hit.t <= t_max[lane])
     }
 
     /// Which of the rays in `active` the kernel says a triangle is on, 0 < t <= `t_max` of each.
@@ -264,15 +334,9 @@ impl TriangleTree {
     ) -> u16 {
         let (pack, place) = (&self.packs[triangle.leaf as usize], triangle.place as usize % PACK);
         let mut met = 0;
-        let one = |lane: usize| {
-            let ray = rays.ray(lane);
-            let slabs = Slabs::new(&ray, self.tree.center, self.tree.half);
-            let hit = if ray.is_valid { intersect(&ray, &slabs, &pack.triangle(place)) } else { None };
-            u16::from(hit.is_some_and(|hit| hit.t > 0.0 && hit.t <= t_max[lane])) << lane
-        };
         if active.count_ones() <= 2 {
             for lane in bits(u64::from(active)) {
-                met |= one(lane);
+                met |= u16::from(self.meets_one(rays, t_max, pack, place, lane)) << lane;
             }
             return met;
         }
@@ -287,25 +351,40 @@ impl TriangleTree {
             let hit = crossings.mask & crossings.t.simd_gt(simd.splat_f32x16(0.0)) & crossings.t.simd_le(reach);
             met |= hit.to_bitmask() as u16 & group as u16 & !(crossings.unsure as u16);
             for lane in bits(crossings.unsure & group) {
-                met |= one(lane);
+                met |= u16::from(self.meets_one(rays, t_max, pack, place, lane)) << lane;
             }
         }
         met
     }
 }
 
+/// Three vectors of sixteen.
+#[inline(always)]
+fn load<S: Simd>(simd: S, v: &[[f32; 16]; 3]) -> V<S> {
+    [f32x16::load_array_ref(simd, &v[0]), f32x16::load_array_ref(simd, &v[1]), f32x16::load_array_ref(simd, &v[2])]
+}
+
 impl SeenTriangle {
+    /// One of U, V, W, det for sixteen ways.
+    #[inline(always)]
+    fn value<S: Simd>(&self, i: usize, at: V<S>) -> f32x16<S> {
+        let [a, b, c] = self.slopes[i];
+        at[2].mul_add(c, at[1].mul_add(b, at[0].mul_add(a, self.middle[i])))
+    }
+
+    /// How far it goes within cells of half these sizes.
+    #[inline(always)]
+    fn reach<S: Simd>(&self, i: usize, half: V<S>) -> f32x16<S> {
+        let [a, b, c] = self.slopes[i];
+        half[2].mul_add(c.abs(), half[1].mul_add(b.abs(), half[0] * a.abs()))
+    }
+
     /// What it hides of sixteen cells: middles and half sizes along the light's axes. `unsure` are those it may hide some of.
     #[inline(always)]
     pub fn cells<S: Simd>(&self, simd: S, middle: &[[f32; 16]; 3], half: &[[f32; 16]; 3]) -> Verdict {
-        let [m0, m1, m2] = [0, 1, 2].map(|axis| f32x16::load_array_ref(simd, &middle[axis]));
-        let [h0, h1, h2] = [0, 1, 2].map(|axis| f32x16::load_array_ref(simd, &half[axis]));
-        let range = |i: usize| {
-            let [a, b, c] = self.slopes[i];
-            let m = m2.mul_add(c, m1.mul_add(b, m0.mul_add(a, self.middle[i])));
-            (m, h2.mul_add(c.abs(), h1.mul_add(b.abs(), h0 * a.abs())))
-        };
-        let ((u, ur), (v, vr), (w, wr), (d, dr)) = (range(0), range(1), range(2), range(3));
+        let (middle, half) = (load(simd, middle), load(simd, half));
+        let (u, v, w, d) = (self.value(0, middle), self.value(1, middle), self.value(2, middle), self.value(3, middle));
+        let (ur, vr, wr, dr) = (self.reach(0, half), self.reach(1, half), self.reach(2, half), self.reach(3, half));
         let (lu, lv, lw, ld) = (u - ur, v - vr, w - wr, d - dr);
         let (hu, hv, hw, hd) = (u + ur, v + vr, w + wr, d + dr);
         let outside = hu.min(hv).min(hw).simd_lt(-self.edge);
@@ -319,12 +398,8 @@ impl SeenTriangle {
     /// What it hides of sixteen samples. `unsure` are those the kernel has to decide.
     #[inline(always)]
     pub fn samples<S: Simd>(&self, simd: S, at: &[[f32; 16]; 3]) -> Verdict {
-        let [x, y, z] = [0, 1, 2].map(|axis| f32x16::load_array_ref(simd, &at[axis]));
-        let value = |i: usize| {
-            let [a, b, c] = self.slopes[i];
-            z.mul_add(c, y.mul_add(b, x.mul_add(a, self.middle[i])))
-        };
-        let (u, v, w, d) = (value(0), value(1), value(2), value(3));
+        let at = load(simd, at);
+        let (u, v, w, d) = (self.value(0, at), self.value(1, at), self.value(2, at), self.value(3, at));
         let (least, most) = (u.min(v).min(w), u.max(v).max(w));
         let outside = least.simd_lt(-self.edge);
         let other: mask32x16<S> = most.simd_gt(self.edge) | d.abs().simd_gt(self.graze);
