@@ -1,9 +1,11 @@
 // The peer of `cargo xtask rays`: the same rays through Embree, on one thread.
 //
-// usage: embree FOLDER, then on standard input lines "MODE FLAGS WIDTH": MODE camera or shadow, FLAGS robust or fast, WIDTH 1, 4, 8
+// usage: embree FOLDER, then on standard input lines "MODE FLAGS WIDTH": MODE camera, shadow or soft, FLAGS robust or fast, WIDTH 1, 4, 8
 // or 16. Each is answered by the seconds of processor time it took, and leaves its hits in FOLDER/embree.hits.
 // FOLDER holds, in this machine's byte order: mesh (u64 vertices, u64 triangles, u64 copies, then f32 x 3, u32 x 3, f32 x 3 each),
-// camera and shadow (u64 rays, f32 x 6 each: origin, direction; shadow rays end at t = 0.999).
+// camera and shadow (u64 rays, f32 x 6 each: origin, direction; shadow rays end at t = 0.999), and for soft (u64 points, u64 samples,
+// f32 x 9 each: start, point, normal; f32 x 3 each): rays from each start by the way from point to sample, where that is above
+// the surface; embree.hits then has a bit for each.
 #include <embree3/rtcore.h>
 #include <pmmintrin.h>
 #include <xmmintrin.h>
@@ -107,6 +109,38 @@ static void single(RTCScene scene, bool camera, const std::vector<float> &rays, 
   }
 }
 
+// Packets of N samples of one point.
+template <int N> static void soft(RTCScene scene, const std::vector<float> &points, const std::vector<float> &samples, std::vector<uint16_t> &hits) {
+  RTCIntersectContext context;
+  rtcInitIntersectContext(&context);
+  context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
+  alignas(64) int valid[N];
+  alignas(64) typename Wide<N>::Ray r;
+  size_t count = samples.size() / 3;
+  // Coordinate by coordinate
+  std::vector<float> x(count), y(count), z(count);
+  for (size_t k = 0; k < count; k++) { x[k] = samples[3 * k]; y[k] = samples[3 * k + 1]; z[k] = samples[3 * k + 2]; }
+  for (size_t i = 0; i < points.size() / 9; i++) {
+    const float *p = &points[9 * i];
+    for (size_t k = 0; k < count; k += N) {
+      int any = 0;
+      for (int j = 0; j < N; j++) {
+        float dx = x[k + j] - p[3], dy = y[k + j] - p[4], dz = z[k + j] - p[5];
+        r.org_x[j] = p[0]; r.org_y[j] = p[1]; r.org_z[j] = p[2];
+        r.dir_x[j] = dx; r.dir_y[j] = dy; r.dir_z[j] = dz;
+        r.tnear[j] = 0; r.tfar[j] = 0.9999f; r.time[j] = 0; r.mask[j] = -1; r.id[j] = j; r.flags[j] = 0;
+        valid[j] = dx * p[6] + dy * p[7] + dz * p[8] > 0 ? -1 : 0;
+        any |= valid[j];
+      }
+      if (!any) continue;
+      Wide<N>::occluded(valid, scene, &context, &r);
+      uint16_t bits = 0;
+      for (int j = 0; j < N; j++) bits |= (r.tfar[j] < 0 ? 1 : 0) << j;
+      hits[(i * count + k) / 16] |= bits << (k % 16);
+    }
+  }
+}
+
 int main(int argc, char **argv) {
   if (argc < 2) return 1;
   _MM_SET_FLUSH_ZERO_MODE(_MM_FLUSH_ZERO_ON);
@@ -156,9 +190,29 @@ int main(int argc, char **argv) {
   printf("%zu %zu %g %g\n", used[0], used[1], seconds[0], seconds[1]);
   fflush(stdout);
   auto camera = rays_of(folder + "/camera"), shadow = rays_of(folder + "/shadow");
+  std::vector<float> points, samples;
+  if (FILE *f = fopen((folder + "/soft").c_str(), "rb")) {
+    auto counts = take<uint64_t>(f, 2);
+    points = take<float>(f, counts[0] * 9);
+    samples = take<float>(f, counts[1] * 3);
+    fclose(f);
+  }
   char line[256], mode[32], flags[32];
   int width;
   while (fgets(line, sizeof line, stdin) && sscanf(line, "%31s %31s %d", mode, flags, &width) == 3) {
+    if (!strcmp(mode, "soft")) {
+      RTCScene scene = scenes[!strcmp(flags, "robust")];
+      std::vector<uint16_t> hits(points.size() / 9 * (samples.size() / 3) / 16);
+      double start = now();
+      if (width == 8) soft<8>(scene, points, samples, hits); else soft<16>(scene, points, samples, hits);
+      double took = now() - start;
+      FILE *out = file(folder + "/embree.hits", "wb");
+      fwrite(hits.data(), sizeof(uint16_t), hits.size(), out);
+      fclose(out);
+      printf("%.9f\n", took);
+      fflush(stdout);
+      continue;
+    }
     bool is_camera = !strcmp(mode, "camera");
     const auto &rays = is_camera ? camera : shadow;
     RTCScene scene = scenes[!strcmp(flags, "robust")];

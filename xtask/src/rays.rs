@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
 use std::time::Instant;
 
-use firstlight::bench::{HitBits, Instances, Mesh, RayBits};
+use firstlight::bench::{HitBits, Instances, Mesh, RayBits, Soft};
 use serde_json::json;
 
 use crate::bench::{commit, median, processor};
@@ -24,6 +24,9 @@ pub struct Options {
     /// Rounds: each runs every way once, one after the other.
     #[arg(long, default_value_t = 5)]
     rounds: usize,
+    /// Only soft shadows: points of a camera's picture and samples of a square light.
+    #[arg(long)]
+    soft: bool,
     /// Only scenes whose name contains this.
     #[arg(long)]
     scene: Option<String>,
@@ -61,7 +64,15 @@ pub fn run(options: &Options) -> Outcome {
         if options.scene.as_ref().is_some_and(|wanted| !name.contains(wanted)) || options.quick && large {
             continue;
         }
-        rows.extend(measure(&scene(name), options, &folder, embree.as_deref().ok())?);
+        let scene = scene(name);
+        if !options.soft {
+            rows.extend(measure(&scene, options, &folder, embree.as_deref().ok())?);
+        }
+        if scene.offsets.is_empty() && scene.triangles.len() < 2_000_000 {
+            for samples in [64, 256] {
+                rows.push(measure_soft(&scene, samples, options, &folder, embree.as_deref().ok())?);
+            }
+        }
     }
     std::fs::remove_dir_all(&folder).map_err(|e| e.to_string())?;
     let page = page(options, &rows);
@@ -485,6 +496,88 @@ fn measure(scene: &Scene, options: &Options, folder: &Path, program: Option<&Pat
     rows.extend(build);
     rows.push(memory);
     Ok(rows)
+}
+
+/// Soft shadows: all samples of a square light from each point that a camera sees.
+fn measure_soft(
+    scene: &Scene,
+    samples: u32,
+    options: &Options,
+    folder: &Path,
+    program: Option<&Path>,
+) -> Result<Row, String> {
+    let camera = camera_rays(scene, if options.quick { 128 } else { 256 });
+    let mut soft = Soft::new(&scene.positions, &scene.triangles, scene.light, samples, &camera)
+        .ok_or("the scene does not compile")?;
+    let (points, lights) = (soft.points(), soft.samples());
+    let mut embree = None;
+    if let Some(program) = program {
+        write_mesh(&folder.join("mesh"), scene)?;
+        write_rays(&folder.join("camera"), &[])?;
+        write_rays(&folder.join("shadow"), &[])?;
+        let mut bytes = Vec::new();
+        for count in [points.len(), lights.len()] {
+            bytes.extend((count as u64).to_ne_bytes());
+        }
+        bytes.extend(points.iter().flatten().flat_map(|v| v.to_ne_bytes()));
+        bytes.extend(lights.iter().flatten().flat_map(|v| v.to_ne_bytes()));
+        write(&folder.join("soft"), &bytes)?;
+        embree = Some(Embree::start(program, folder)?);
+    }
+    let mut row = Row {
+        scene: scene.name,
+        what: if samples == 64 { "soft, 64 samples" } else { "soft, 256 samples" },
+        ours: Vec::new(),
+        robust: Vec::new(),
+        fast: Vec::new(),
+        differing: None,
+        unit: "M samples/s",
+    };
+    let millions = (points.len() * soft.count()) as f64 / 1e6;
+    let (mut hidden, mut traced) = (Vec::new(), Vec::new());
+    let mut rates = Vec::new();
+    for round in 0..options.rounds {
+        row.ours.push(millions / time(|| soft.shafts(&mut hidden)));
+        rates.push(millions / time(|| soft.traced(&mut traced)));
+        let Some(embree) = &mut embree else { continue };
+        for (flags, ways) in [("robust", &mut row.robust), ("fast", &mut row.fast)] {
+            for (way, width) in [8, 16].into_iter().enumerate() {
+                let rate = millions / embree.time("soft", flags, width)?;
+                if ways.len() <= way {
+                    ways.push((format!("{width} wide"), Vec::new()));
+                }
+                ways[way].1.push(rate);
+                if round == 0 && flags == "robust" && width == 16 {
+                    let bytes = std::fs::read(folder.join("embree.hits")).map_err(|e| e.to_string())?;
+                    let theirs: Vec<u16> = bytes.chunks_exact(2).map(|b| u16::from_ne_bytes([b[0], b[1]])).collect();
+                    let theirs = soft.in_order(&theirs);
+                    let counts = hidden.iter().zip(&theirs).zip(soft.below());
+                    row.differing = Some(counts.map(|((a, b), below)| ((a ^ b) & !below).count_ones() as usize).sum());
+                }
+            }
+        }
+    }
+    let differing: u32 =
+        hidden.iter().zip(&traced).zip(soft.below()).map(|((a, b), below)| ((a ^ b) & !below).count_ones()).sum();
+    let [lit, umbra, below, cut, shafts, occluders, asked] = soft.settled();
+    let all = points.len() as f64 * 0.01;
+    eprintln!(
+        "{}, {samples} samples: {} points, {:.0} % lit, {:.0} % hidden, {:.0} % below, {:.0} % cut; {shafts} shafts, {:.1} occluders in \
+         each; {:.1} % of the samples traced; {differing} differ from the traced ones, which took {:.1} M samples/s",
+        scene.name,
+        points.len(),
+        lit as f64 / all,
+        umbra as f64 / all,
+        below as f64 / all,
+        cut as f64 / all,
+        occluders as f64 / shafts.max(1) as f64,
+        asked as f64 / (points.len() * soft.count()) as f64 * 100.0,
+        median(&rates),
+    );
+    if differing > 0 {
+        return Err(format!("{differing} samples are not what tracing says"));
+    }
+    Ok(row)
 }
 
 /// Whether two hits are not the same one: neither the same triangle nor the same distance up to rounding.

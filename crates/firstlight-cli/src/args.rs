@@ -2,8 +2,9 @@
 
 use std::path::PathBuf;
 
+use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Args, Parser, Subcommand, ValueEnum, ValueHint};
-use firstlight::{SamplesDesc, SimdLevel, Window};
+use firstlight::{SamplesDesc, SimdLevel, VisibilityMode, Window};
 
 /// Renders the direct light of a scene: camera ray, first surface, every light. No noise, the same bits every time
 #[derive(Debug, Parser)]
@@ -195,6 +196,10 @@ pub struct RenderArgs {
     #[arg(long, help_heading = "Quality")]
     pub reference: bool,
 
+    /// How shadows of sampled lights are found: by shafts, which leave out all that is proved not to matter, or by tracing every
+    /// sample; the picture is the same [default: shafts]
+    #[arg(long, value_name = "HOW", value_parser = visibility(), help_heading = "Work")]
+    pub visibility: Option<VisibilityMode>,
     /// Threads to render with, 1 to 1024; the picture is the same for any number [default: one for each processor, or a
     /// course file's num_threads]
     #[arg(long, value_name = "N", value_parser = whole::<u16>(1, 1024), help_heading = "Work")]
@@ -282,6 +287,12 @@ where
         Ok(n) if least <= n && n <= most => Ok(n),
         _ => Err(format!("a whole number from {least} to {most} is needed")),
     }
+}
+
+/// Reads how shadows are found.
+fn visibility() -> impl TypedValueParser<Value = VisibilityMode> {
+    PossibleValuesParser::new(VisibilityMode::ALL.iter().map(|mode| mode.name()))
+        .map(|name| VisibilityMode::from_name(&name).unwrap_or(VisibilityMode::Shafts))
 }
 
 /// Reads the number of samples, or the word for none.

@@ -264,6 +264,7 @@ impl<'a> Plan<'a> {
         settings.tile_size = args.tile_size.unwrap_or(settings.tile_size);
         settings.crop = args.crop;
         settings.reference = args.reference;
+        settings.visibility = args.visibility.unwrap_or(settings.visibility);
         if let Some(mode) = args.aa_mode {
             settings.aa_mode = match mode {
                 AntialiasingMode::Adaptive => AaMode::Adaptive,

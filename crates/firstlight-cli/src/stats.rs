@@ -51,12 +51,31 @@ impl Stats {
             "camera_rays": self.rays.camera_rays,
             "shadow_rays": self.rays.shadow_rays,
             "shadow_rays_skipped": self.rays.shadow_rays_skipped,
+            "lights_lit": self.rays.visibility[0],
+            "lights_hidden": self.rays.visibility[1],
+            "lights_below_horizon": self.rays.visibility[2],
+            "lights_by_mask": self.rays.visibility[3],
+            "shafts": self.rays.shafts,
+            "occluders": self.rays.occluders,
             "mrays_per_s": self.mrays_per_s(),
             "peak_memory_bytes": peak_memory(),
             "simd": self.rays.simd.name(),
             "threads": self.rays.threads,
         });
         format!("{value:#}\n")
+    }
+
+    /// How much of the lights was found to reach the points, in words.
+    fn visibility(&self) -> String {
+        let all: u64 = self.rays.visibility.iter().sum();
+        if all == 0 {
+            return String::new();
+        }
+        let [lit, hidden, below, mask] = self.rays.visibility.map(|count| 100.0 * count as f64 / all as f64);
+        let each = self.rays.occluders as f64 / self.rays.shafts.max(1) as f64;
+        format!(
+            "{each:.1} occluders in each; {lit:.0} % lit, {hidden:.0} % hidden, {below:.0} % below the horizon, {mask:.0} % cut"
+        )
     }
 
     /// One line for each stage and number, without a newline at the end.
@@ -76,6 +95,7 @@ impl Stats {
                 self.rays.shadow_rays.to_string(),
                 format!("{} of them settled without tracing", self.rays.shadow_rays_skipped),
             ),
+            ("shafts", self.rays.shafts.to_string(), self.visibility()),
             ("rays a second", format!("{:.1} million", self.mrays_per_s()), String::new()),
         ];
         if let Some(bytes) = peak_memory() {

@@ -3,8 +3,11 @@
 use fearless_simd::{Level, Simd};
 
 use crate::accel::{Aabb, Bvh, RayPacket16, RayTile, TraceRay, dispatch_eight};
-use crate::math::Vec3;
-use crate::shape::{TileHits, TriangleTree, every};
+use crate::ids::LightId;
+use crate::math::{LANES, Ray, Vec3};
+use crate::scene::{CompileOptions, Scene, SceneDesc, ShadowRays};
+use crate::shape::{RayDifferential, TileHits, TriangleTree, every};
+use crate::visibility::{Settled, Settler, Target, Viewpoint, Visibility};
 
 /// Origin and direction of a ray.
 pub type RayBits = [f32; 6];
@@ -156,5 +159,164 @@ impl<'a> Instances<'a> {
                 self.mesh.0.any(simd, &TraceRay::new(o, d), t_max, &|_| true)
             });
         }
+    }
+}
+
+/// A mesh under a rectangle light, and the points of it that a camera sees and some of the light is above the horizon of.
+pub struct Soft {
+    scene: Scene,
+    target: Target,
+    settler: Settler,
+    points: Vec<Viewpoint>,
+    /// The points of each tile of pixels.
+    tiles: Vec<std::ops::Range<u32>>,
+    settled: Settled,
+}
+
+impl Soft {
+    /// `light` is the middle of a level square and half its side; `camera` are rays, of which each 64 are a tile.
+    pub fn new(
+        positions: &[[f32; 3]],
+        triangles: &[[u32; 3]],
+        light: ([f32; 3], f32),
+        samples: u32,
+        camera: &[RayBits],
+    ) -> Option<Soft> {
+        let mut mesh = crate::MeshDesc { triangles: triangles.to_vec(), ..crate::MeshDesc::default() };
+        mesh.positions = positions.iter().map(|p| p.map(f64::from)).collect();
+        let side = f64::from(light.1) * 2.0;
+        let mut lamp = crate::RectangleDesc::new(light.0.map(f64::from), [side, 0.0, 0.0], [0.0, 0.0, side]);
+        lamp.samples = Some(samples.into());
+        lamp.sides = Some(crate::EmitSides::Both);
+        lamp.visible = false;
+        let desc = SceneDesc {
+            shapes: vec![crate::ShapeDesc::Mesh(mesh)],
+            lights: vec![crate::LightDesc::Rectangle(lamp)],
+            cameras: vec![(String::new(), crate::CameraDesc::new([0.0, 0.0, 9.0]))],
+            ..SceneDesc::default()
+        };
+        let scene = desc.compile(&crate::NoAssets, &CompileOptions::default()).ok()?.scene;
+        let light = LightId(0);
+        let target = Target::new(&scene, light);
+        let (mut points, mut tiles) = (Vec::new(), Vec::new());
+        let still = Vec3::ZERO;
+        let differential = RayDifferential { dx: still, dy: still, origin_dx: still, origin_dy: still };
+        for tile in camera.chunks(64) {
+            let first = points.len() as u32;
+            for ray in tile {
+                let (o, d) = parts(ray);
+                let ray = Ray { o, d };
+                let Some(hit) = scene.intersect(&ray) else { continue };
+                let si = scene.surface(&ray, &hit, &differential);
+                let counts = |k: usize| si.horizon.dot(scene.lights[0].towards(k, si.lit_from).l) > 0.0;
+                if (0..target.samples).any(counts) {
+                    points.push(Viewpoint::of(&si));
+                }
+            }
+            if points.len() as u32 > first {
+                tiles.push(first..points.len() as u32);
+            }
+        }
+        Some(Soft { scene, target, settler: Settler::default(), points, tiles, settled: Settled::default() })
+    }
+
+    /// For each point: where its rays start, the point, its normal.
+    pub fn points(&self) -> Vec<[f32; 9]> {
+        let row = |v: &Viewpoint| {
+            let (s, p, n) = (v.start, v.p, v.horizon);
+            [s.x, s.y, s.z, p.x, p.y, p.z, n.x, n.y, n.z]
+        };
+        self.points.iter().map(row).collect()
+    }
+
+    /// The light's samples, neighbours together, in blocks of sixteen; those that are missing in the last stand for another.
+    pub fn samples(&self) -> Vec<[f32; 3]> {
+        let all = self.target.blocks.iter().flat_map(|b| (0..LANES).map(|i| [0, 1, 2].map(|axis| b.point[axis][i])));
+        all.collect()
+    }
+
+    /// How many samples of a light there are.
+    pub fn count(&self) -> usize {
+        self.target.samples
+    }
+
+    /// For each point and block of samples, in the light's order, which are hidden; those below the horizon in any way.
+    pub fn shafts(&mut self, hidden: &mut Vec<u16>) {
+        let blocks = self.target.blocks.len();
+        hidden.clear();
+        hidden.resize(self.points.len() * blocks, 0);
+        let mut order = Vec::new();
+        self.settled = Settled::default();
+        for tile in &self.tiles {
+            order.clear();
+            order.extend(tile.clone());
+            let (scene, settled) = (&self.scene, &mut self.settled);
+            let each = |k: usize, visibility, view: &crate::visibility::View| {
+                let hidden = &mut hidden[k * blocks..(k + 1) * blocks];
+                match visibility {
+                    Visibility::Lit => {}
+                    Visibility::Hidden | Visibility::BelowHorizon => hidden.fill(0xffff),
+                    Visibility::Mask => hidden.copy_from_slice(&view.hidden),
+                }
+            };
+            self.settler.settle(Level::new(), scene, &self.target, &self.points, &mut order, settled, each);
+        }
+    }
+
+    /// The same, every sample traced, sixteen at a time in the light's order.
+    pub fn traced(&self, hidden: &mut Vec<u16>) {
+        let light = &self.scene.lights[0];
+        hidden.clear();
+        for point in &self.points {
+            for first in (0..self.target.samples).step_by(LANES) {
+                let mut shadows = ShadowRays {
+                    from: point.ray(self.target.light, Vec3::ZERO, true),
+                    rays: RayPacket16::ZERO,
+                    t_end: [0.0; LANES],
+                };
+                let mut active = 0;
+                for k in first..(first + LANES).min(self.target.samples) {
+                    let l = light.towards(k, point.p).l;
+                    shadows.rays.set(k - first, point.start, l);
+                    shadows.t_end[k - first] = point.ray(self.target.light, l, true).end();
+                    active |= u16::from(point.horizon.dot(l) > 0.0) << (k - first);
+                }
+                hidden.push(self.scene.geometry.are_blocked(Level::new(), &shadows, active));
+            }
+        }
+    }
+
+    /// Which samples do not count, as they are below the horizon.
+    pub fn below(&self) -> Vec<u16> {
+        let light = &self.scene.lights[0];
+        let mut below = Vec::new();
+        for point in &self.points {
+            for first in (0..self.target.samples).step_by(LANES) {
+                let lane = |k: usize| k < self.target.samples && point.horizon.dot(light.towards(k, point.p).l) > 0.0;
+                below.push(!(0..LANES).fold(0, |mask, i| mask | u16::from(lane(first + i)) << i));
+            }
+        }
+        below
+    }
+
+    /// Bits of blocks of neighbouring samples, as [`samples`](Self::samples) has them, in the light's order.
+    pub fn in_order(&self, hidden: &[u16]) -> Vec<u16> {
+        let blocks = &self.target.blocks;
+        let mut ordered = vec![0; hidden.len()];
+        for (ordered, hidden) in ordered.chunks_mut(blocks.len()).zip(hidden.chunks(blocks.len())) {
+            for (block, hidden) in blocks.iter().zip(hidden) {
+                for lane in (0..LANES).filter(|lane| hidden & block.present & 1 << lane != 0) {
+                    let k = block.sample[lane] as usize;
+                    ordered[k / LANES] |= 1 << (k % LANES);
+                }
+            }
+        }
+        ordered
+    }
+
+    /// How many points are lit, hidden, below the horizon, cut; shafts; what they held; samples traced.
+    pub fn settled(&self) -> [u64; 7] {
+        let Settled { visibility: [lit, hidden, below, mask], shafts, occluders, traced } = self.settled;
+        [lit, hidden, below, mask, shafts, occluders, traced]
     }
 }

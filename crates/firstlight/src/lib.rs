@@ -66,6 +66,7 @@ mod scene;
 mod shape;
 mod texture;
 mod transform;
+mod visibility;
 
 pub use camera::{Camera, CameraDesc, FilmPlane, Frame, Orthographic, Pinhole, Projection};
 pub use color::{Display, Encoding, Rgb};
@@ -83,7 +84,7 @@ pub use light::{
 };
 pub use material::{BlinnPhongDesc, MaterialDesc, PhongDesc};
 pub use math::{Ray, Vec2, Vec3};
-pub use render::{AaMode, Film, RenderSettings, RenderStats, SimdLevel, render};
+pub use render::{AaMode, Film, RenderSettings, RenderStats, SimdLevel, VisibilityMode, render};
 pub use scene::{Builtin, Parsed, builtin_scenes, reference, schema};
 pub use scene::{
     CameraHit, CompileOptions, Compiled, DisplayEncoding, Hit, ModelSettings, RenderDesc, Scene, SceneDesc,

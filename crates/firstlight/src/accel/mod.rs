@@ -63,6 +63,7 @@ pub(crate) use dispatch_sixteen;
 
 mod beam;
 mod build;
+mod gather;
 mod node;
 mod ray;
 mod traverse;
@@ -71,8 +72,8 @@ use fearless_simd::{Level, prelude::*};
 
 pub(crate) use beam::{Beam, groups};
 pub(crate) use build::{Built, Leaf, build};
-pub(crate) use node::{LEAF, Tree};
-pub(crate) use ray::{LaneSlabs, Lanes, RayPacket16, RayTile, Slabs, TraceRay};
+pub(crate) use node::{LEAF, Node, Tree};
+pub(crate) use ray::{BEAM_PAD, LaneSlabs, Lanes, RayPacket16, RayTile, Slabs, TraceRay};
 
 use node::WIDTH;
 
@@ -198,6 +199,18 @@ impl Bvh {
                 *z_max = beam.z_max(simd, rays, t_max, group);
             });
         }
+    }
+
+    /// Visits what lies in boxes that `meet` says yes to, until `leaf` says no. `meet` is made from the tree's centre and
+    /// how far it reaches. Says whether all was visited.
+    #[inline(always)]
+    pub fn gather<S: Simd, M: Fn(S, &Node) -> u32>(
+        &self,
+        simd: S,
+        meet: impl FnOnce(Vec3, f32) -> M,
+        leaf: impl FnMut(u32) -> bool,
+    ) -> bool {
+        self.tree.gather(simd, meet(self.tree.center, self.tree.half), leaf)
     }
 
     /// The box around all boxes.

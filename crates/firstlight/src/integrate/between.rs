@@ -244,10 +244,11 @@ impl Between {
         }
         self.hidden = true;
         // The whole patch: the ways to the corners pass the sphere's middle nearly as closely from all of it
-        let firm = r > 0.0 && asker.reach > 0.0 && Hider::sphere(view, to, r).is_some_and(|smaller| {
-            corners.iter().all(|[x, y]| smaller.hides(*x, *y))
-        });
-        self.drift = if firm || asker.reach == 0.0 { 0.0 } else { self.drift.max(pyramid.drift((to.length() - r) as f32)) };
+        let firm = r > 0.0
+            && asker.reach > 0.0
+            && Hider::sphere(view, to, r).is_some_and(|smaller| corners.iter().all(|[x, y]| smaller.hides(*x, *y)));
+        self.drift =
+            if firm || asker.reach == 0.0 { 0.0 } else { self.drift.max(pyramid.drift((to.length() - r) as f32)) };
     }
 
     fn flat(&mut self, view: &View, emitter: &Emitter, pyramid: &Pyramid, flat: &Parallelogram, asker: &Asker) {

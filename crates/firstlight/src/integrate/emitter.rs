@@ -18,9 +18,8 @@ pub(crate) enum Emitter {
 
 impl Emitter {
     pub fn new(area: &Area) -> Emitter {
-        let flat = |c, a, b, n, outline| {
-            Emitter::Flat(FlatLight::new(c, a, b, n, outline, area.physical, area.both_sides))
-        };
+        let flat =
+            |c, a, b, n, outline| Emitter::Flat(FlatLight::new(c, a, b, n, outline, area.physical, area.both_sides));
         match &area.shape {
             AreaShape::Rectangle(r) => flat(r.center, r.e0 * 0.5, r.e1 * 0.5, r.n, Outline::Parallelogram),
             AreaShape::Disk(disk) => flat(disk.center, disk.a, disk.b, disk.n, Outline::Disk),

@@ -273,9 +273,10 @@ impl Hider {
 impl Edges {
     /// How far inside the edges, in metres, the way to the point (x, y) of the light passes; below 0 outside.
     pub fn depth(&self, x: f32, y: f32) -> f32 {
-        self.sides[..self.count].iter().zip(&self.lengths).fold(f32::INFINITY, |depth, (side, length)| {
-            depth.min(side.at(x, y) / length)
-        })
+        self.sides[..self.count]
+            .iter()
+            .zip(&self.lengths)
+            .fold(f32::INFINITY, |depth, (side, length)| depth.min(side.at(x, y) / length))
     }
 }
 

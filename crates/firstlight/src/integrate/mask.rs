@@ -30,7 +30,8 @@ struct Points {
 fn points() -> &'static Points {
     static POINTS: OnceLock<Points> = OnceLock::new();
     POINTS.get_or_init(|| {
-        let square = (0..MOST as u32).map(|k| SampleSet::Sobol.point(k, MOST as u32, 0).map(|w| (2.0 * w - 1.0) as f32));
+        let square =
+            (0..MOST as u32).map(|k| SampleSet::Sobol.point(k, MOST as u32, 0).map(|w| (2.0 * w - 1.0) as f32));
         let square: Vec<[f32; 2]> = square.collect();
         let disk = square.iter().map(|p| crate::light::concentric(p.map(f64::from)).map(|w| w as f32)).collect();
         Points { square, disk }
@@ -58,7 +59,8 @@ struct Shares {
 impl Shares {
     /// `whole` is what arrives where nothing is in the way.
     fn sums(&self, whole: &Sums) -> Sums {
-        let share = |i: usize, whole: f32| if self.all[i] > 0.0 { whole * (self.lit[i] / self.all[i]) as f32 } else { 0.0 };
+        let share =
+            |i: usize, whole: f32| if self.all[i] > 0.0 { whole * (self.lit[i] / self.all[i]) as f32 } else { 0.0 };
         Sums { diffuse: share(0, whole.diffuse), specular: share(1, whole.specular) }
     }
 }

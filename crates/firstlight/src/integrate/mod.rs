@@ -29,8 +29,8 @@ use hider::Hider;
 pub(crate) use mask::Masked;
 use rows::Region;
 pub(crate) use tensor::sharpness;
-pub(crate) use view::{Receiver, View};
 use view::Outline;
+pub(crate) use view::{Receiver, View};
 
 use crate::material::Lobe;
 

@@ -17,8 +17,8 @@ use crate::transform::TransformDesc;
 
 pub use area::{Area, AreaShape};
 pub use directional::{Directional, DirectionalDesc};
-pub use disk::{Disk, DiskLightDesc};
 pub(crate) use disk::concentric;
+pub use disk::{Disk, DiskLightDesc};
 pub use point::{Point, PointDesc};
 pub use rectangle::{Rectangle, RectangleDesc};
 pub use samples::SampleSet;

@@ -172,7 +172,8 @@ impl<'a> Arrivals<'a> {
         let smooth = swing * swing;
         let share = (edge + rim + terminator + smooth).min(1.0);
         let lobe = (sharp_of(place.lobe, si) * (2.0 * place.turn + place.reach / distance).powi(2)).min(1.0);
-        let specular = if matches!(place.lobe, Lobe::None) { 0.0 } else { weight * (edge + rim + terminator + lobe).min(1.0) };
+        let specular =
+            if matches!(place.lobe, Lobe::None) { 0.0 } else { weight * (edge + rim + terminator + lobe).min(1.0) };
         let resolved = edge == 0.0 && rim == 0.0 && swing < RESOLVED_SWING && lobe < RESOLVED;
         Arrival { sums, bend: Sums { diffuse: weight * share, specular }, resolved }
     }
@@ -190,7 +191,8 @@ impl<'a> Arrivals<'a> {
         let [sphere_links, flat_links] = &scene.obstacle_links;
         let spheres = scene.obstacles.iter().enumerate().filter(|(i, _)| scene.casts(sphere_links, *i, id));
         let spheres = spheres.map(|(_, sphere)| sphere);
-        let lights = scene.light_obstacles.spheres.iter().filter(|(index, _)| *index != light).map(|(_, sphere)| sphere);
+        let lights =
+            scene.light_obstacles.spheres.iter().filter(|(index, _)| *index != light).map(|(_, sphere)| sphere);
         for sphere in spheres.chain(lights) {
             let s = (sphere.c - si.lit_from.as_dvec3()).as_vec3();
             let (r, distance) = (sphere.r as f32, s.length());
@@ -217,7 +219,13 @@ impl<'a> Arrivals<'a> {
             }
             let n = flat.n.as_vec3();
             let height = flat.n.dot(si.lit_from.as_dvec3() - flat.p) as f32;
-            let tip = if finite { height + n.dot(l) } else if n.dot(l) * height < 0.0 { -height } else { height };
+            let tip = if finite {
+                height + n.dot(l)
+            } else if n.dot(l) * height < 0.0 {
+                -height
+            } else {
+                height
+            };
             let slack = place.reach + (height.abs() + length.min(1e30)) * 1e-5;
             if height.abs() <= slack && flat.shadow(si.lit_from, si.error).is_one_sided(PlaneSide::Both) {
                 // The surface's own
@@ -243,7 +251,10 @@ impl<'a> Arrivals<'a> {
     fn view(&self, emitter: &Emitter, place: &Place) -> Option<View> {
         let si = place.si;
         let flat = emitter.flat(si.lit_from)?;
-        Some(View::new(&flat, &Receiver { p: si.lit_from, horizon: si.horizon, ns: si.ns, wo: si.wo, lobe: *place.lobe }))
+        Some(View::new(
+            &flat,
+            &Receiver { p: si.lit_from, horizon: si.horizon, ns: si.ns, wo: si.wo, lobe: *place.lobe },
+        ))
     }
 
     /// An area light, integrated.

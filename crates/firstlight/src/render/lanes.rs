@@ -56,16 +56,17 @@ impl Lanes {
 }
 
 /// What can stand in the way of one light, seen from one surface.
-struct Obstacles<'a> {
-    spheres: &'a [SphereShadow],
-    flats: &'a [ParallelogramShadow],
-    /// Other lights that block.
-    light_spheres: &'a [SphereShadow],
-    light_disks: &'a [DiskShadow],
-    /// All that lies in trees.
-    trees: Option<&'a Geometry>,
-    /// The light that they stand in the way of.
-    light: LightId,
+#[derive(Clone, Copy, Default)]
+pub(super) struct Obstacles<'a> {
+    pub spheres: &'a [SphereShadow],
+    pub flats: &'a [ParallelogramShadow],
+    /// Other lights that block, where they are not among the former.
+    pub light_spheres: &'a [SphereShadow],
+    pub disks: &'a [DiskShadow],
+    /// All that lies in trees, and the light that it stands in the way of.
+    pub trees: Option<(&'a Geometry, LightId)>,
+    /// For each block of samples, those that are known to be hidden; empty if none are.
+    pub hidden: &'a [u16],
 }
 
 impl Obstacles<'_> {
@@ -73,12 +74,25 @@ impl Obstacles<'_> {
         self.spheres.is_empty()
             && self.flats.is_empty()
             && self.light_spheres.is_empty()
-            && self.light_disks.is_empty()
+            && self.disks.is_empty()
             && self.trees.is_none()
     }
 }
 
-/// The sums over the `points` of an area light that none of the `obstacles` hides.
+/// The sums over the points of an area light that none of the `obstacles` hides. One dispatch for all samples of a light: what
+/// is below is compiled for each instruction set, the rest once.
+#[inline(never)]
+pub(super) fn sum_area(
+    level: Level,
+    area: &Area,
+    si: &SurfaceInteraction,
+    lobe: &Lobe,
+    obstacles: &Obstacles,
+) -> LobeSums {
+    dispatch!(level, simd => gather_area(simd, area, area.points(), si, lobe, obstacles))
+}
+
+/// The sums over the `points` of an area light.
 #[inline(always)]
 fn gather_area<S: Simd>(
     simd: S,
@@ -107,6 +121,12 @@ fn gather_area<S: Simd>(
             lit &= horizon.dot(l).simd_gt(zero);
         }
         // Not hidden
+        if let Some(hidden) = obstacles.hidden.get(index) {
+            lit &= !mask32x16::from_bitmask(simd, u64::from(*hidden));
+            if lit.all_false() {
+                continue;
+            }
+        }
         for sphere in obstacles.spheres {
             lit &= !sphere.blocks_lanes(l, distance2);
         }
@@ -116,18 +136,18 @@ fn gather_area<S: Simd>(
         for sphere in obstacles.light_spheres {
             lit &= !sphere.blocks_lanes(l, distance2);
         }
-        for disk in obstacles.light_disks {
+        for disk in obstacles.disks {
             lit &= !disk.blocks_lanes(l);
         }
         if lit.all_false() {
             continue;
         }
-        if let Some(geometry) = obstacles.trees {
+        if let Some((geometry, light)) = obstacles.trees {
             let mut ways = [[0.0; LANES]; 3];
             for (way, l) in ways.iter_mut().zip([l.x, l.y, l.z]) {
                 l.store_slice(way);
             }
-            let hidden = hidden_by_trees(simd.level(), geometry, si, obstacles.light, ways, lit.to_bitmask() as u16);
+            let hidden = hidden_by_trees(simd.level(), geometry, si, light, ways, lit.to_bitmask() as u16);
             lit &= !mask32x16::from_bitmask(simd, hidden as u64);
             if lit.all_false() {
                 continue;
@@ -243,25 +263,24 @@ impl Lighting for Lanes {
         self.other_disks.clear();
         let others = self.light_disks.iter().filter(|(light, _)| *light != index);
         self.other_disks.extend(others.map(|(_, shadow)| *shadow));
-        let trees = scene.geometry.has_trees().then_some(&*scene.geometry);
+        let trees = scene.geometry.has_trees().then_some((&*scene.geometry, id));
         let obstacles = if light.shadows && si.receives_shadow {
             Obstacles {
                 spheres,
                 flats: &self.between,
                 light_spheres: &self.other_spheres,
-                light_disks: &self.other_disks,
+                disks: &self.other_disks,
                 trees,
-                light: id,
+                hidden: &[],
             }
         } else {
-            Obstacles { spheres: &[], flats: &[], light_spheres: &[], light_disks: &[], trees: None, light: id }
+            Obstacles::default()
         };
         let samples = area.samples() as u64;
         counts.shadow_rays += samples;
         if obstacles.are_none() {
             counts.shadow_rays_skipped += samples;
         }
-        // One dispatch for all samples of a light: what is below is compiled for each instruction set, the rest once
-        dispatch!(self.level, simd => gather_area(simd, area, area.points(), si, lobe, &obstacles))
+        sum_area(self.level, area, si, lobe, &obstacles)
     }
 }

@@ -1,9 +1,12 @@
 //! From scene to film.
 //!
-//! Two renderers of the same bits over one scene: [`plain`](plain/index.html) is the specification, one sample at a
-//! time; the fast one decides sixteen light samples at once and asks only the shapes that can stand in the way. They
-//! share the way from pixel to surface and from light to film; what differs is how the light of one source is summed at
-//! one surface, the trait [`Lighting`].
+//! Three renderers of the same bits over one scene, where every light is sampled at every camera ray:
+//! [`plain`](plain/index.html) is the specification, one sample at a time; [`lanes`](lanes/index.html) decides sixteen light
+//! samples at once and asks only the shapes that can stand in the way; [`shafts`](shafts/index.html) finds what can for many
+//! points together. They share the way from pixel to surface and from light to film; what differs is how the light of one
+//! source is summed at one surface, the trait [`Lighting`].
+//!
+//! [`tiled`](tiled/index.html) integrates lights and lights a surface once where that is enough; all else is as above.
 
 mod arrival;
 mod film;
@@ -12,6 +15,7 @@ mod lanes;
 mod patch;
 mod pixel;
 mod plain;
+mod shafts;
 mod simd;
 mod solo;
 mod tile;
@@ -34,12 +38,14 @@ use crate::image::{Receipt, Window};
 use crate::light::Light;
 use crate::math::Ray;
 use crate::scene::Scene;
+use crate::visibility::{Settled, Target};
 use arrival::{Arrivals, Lights};
 use film::FilmTile;
 use hits::PixelHits;
 use lanes::Lanes;
 use pixel::{Lighting, PixelSum};
 use plain::Plain;
+use shafts::Shafts;
 use tile::Tile;
 use tiled::{CELL, Tiled};
 
@@ -54,7 +60,19 @@ words! {
     }
 }
 
-/// A caller's wishes. None of them changes a bit of the picture, but `crop`, which chooses its part.
+words! {
+    /// How it is found out how much of a light reaches a point.
+    pub enum VisibilityMode {
+        /// What may stand before a light is gathered once for many points; where nothing does, nothing is traced.
+        Shafts = "shafts",
+        /// Every sample of every light for itself, at every camera ray: the bits of the plain renderer. Lights that are
+        /// integrated are sampled, and [`AaMode`] is of no account.
+        Traced = "traced",
+    }
+}
+
+/// A caller's wishes. None of them changes a bit of the picture, but `crop`, which chooses its part, and those that say by
+/// which rules it is made: `aa_mode`, `visibility`, `reference`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RenderSettings {
     /// Threads to render with; all processors if `None`.
@@ -66,10 +84,12 @@ pub struct RenderSettings {
     pub simd: SimdLevel,
     /// The part of the film to render; all of it if `None`.
     pub crop: Option<Window>,
-    /// How edges are smoothed.
+    /// How edges are smoothed, where lights are not traced sample by sample.
     pub aa_mode: AaMode,
     /// Renders with the plain code that is the specification: all lights are sampled, and each camera ray is lit by itself.
     pub reference: bool,
+    /// How shadows are found.
+    pub visibility: VisibilityMode,
 }
 
 impl RenderSettings {
@@ -120,6 +140,11 @@ impl RenderSettings {
         })
     }
 
+    /// Whether all lights are sampled, and that at every camera ray, whatever they and `aa_mode` say.
+    fn samples_all(&self) -> bool {
+        self.reference || self.visibility == VisibilityMode::Traced
+    }
+
     /// The part of the film to render.
     fn window(&self, scene: &Scene) -> Window {
         self.crop.unwrap_or(Window { x: 0, y: 0, width: scene.width, height: scene.height })
@@ -128,7 +153,15 @@ impl RenderSettings {
 
 impl Default for RenderSettings {
     fn default() -> Self {
-        RenderSettings { threads: None, tile_size: 16, simd: SimdLevel::Auto, crop: None, aa_mode: AaMode::Adaptive, reference: false }
+        RenderSettings {
+            threads: None,
+            tile_size: 16,
+            simd: SimdLevel::Auto,
+            crop: None,
+            aa_mode: AaMode::Adaptive,
+            visibility: VisibilityMode::Shafts,
+            reference: false,
+        }
     }
 }
 
@@ -141,6 +174,15 @@ pub struct RenderStats {
     pub shadow_rays: u64,
     /// Those of them that took no ray: nothing could stand between, or the light casts no shadows.
     pub shadow_rays_skipped: u64,
+    /// Pairs of a lit point and a light: all of it arrives, one thing hides it, it is below the horizon, each sample has an
+    /// answer of its own. Counted where shafts are used, as the next three are.
+    pub visibility: [u64; 4],
+    /// Shafts from points to lights.
+    pub shafts: u64,
+    /// What they held that could stand in the way, all together.
+    pub occluders: u64,
+    /// Shadow rays for which trees were asked all the same.
+    pub traced: u64,
     /// The instruction set; `Fallback` for the plain renderer.
     pub simd: SimdLevel,
     /// Threads.
@@ -153,8 +195,17 @@ pub(crate) struct Counts {
     pub camera_rays: u64,
     pub shadow_rays: u64,
     pub shadow_rays_skipped: u64,
+    pub settled: Settled,
     /// Shadow rays after which the caller is asked whether to go on.
     next_question: u64,
+}
+
+impl Counts {
+    fn all(&self) -> [u64; 10] {
+        let Counts { camera_rays, shadow_rays, shadow_rays_skipped, settled, .. } = *self;
+        let Settled { visibility: [lit, hidden, below, mask], shafts, occluders, traced } = settled;
+        [camera_rays, shadow_rays, shadow_rays_skipped, lit, hidden, below, mask, shafts, occluders, traced]
+    }
 }
 
 /// Shadow rays between two questions: some hundredths of a second of the fast renderer, some tenths of the plain one.
@@ -177,8 +228,8 @@ pub fn render(
     let film = Mutex::new(Film::new([scene.width, scene.height], window));
     let lights = Lights::new(scene);
     // Where every light is sampled at every ray, the bits are those of the plain renderer
-    let every_ray = settings.reference
-        || settings.aa_mode == AaMode::Full && lights.emitters.iter().all(Option::is_none);
+    let every_ray =
+        settings.samples_all() || settings.aa_mode == AaMode::Full && lights.emitters.iter().all(Option::is_none);
     let tiles = if every_ray {
         Tile::cover(window, settings.tile_size)
     } else {
@@ -186,7 +237,9 @@ pub fn render(
     };
     let all = window.width as u64 * window.height as u64;
     let (done, stop) = (AtomicU64::new(0), AtomicBool::new(false));
-    let totals = [const { AtomicU64::new(0) }; 3];
+    let totals = [const { AtomicU64::new(0) }; 10];
+    let by_shafts = every_ray && !settings.samples_all();
+    let targets = if by_shafts { Target::of_all(scene) } else { Vec::new() };
     let level = settings.simd.resolve();
     let render_one = |tile: &Tile| {
         if stop.load(Ordering::Relaxed) {
@@ -204,7 +257,10 @@ pub fn render(
         } else if !every_ray {
             let token = level.token();
             let arrivals = Arrivals::new(scene, &lights, token);
-            Tiled::new(scene, settings.aa_mode, PixelHits::new(token, scene.antialiasing), arrivals).render(tile, &go_on)
+            Tiled::new(scene, settings.aa_mode, PixelHits::new(token, scene.antialiasing), arrivals)
+                .render(tile, &go_on)
+        } else if by_shafts {
+            Shafts::new(scene, &targets, level.token()).render(tile, &go_on)
         } else {
             let token = level.token();
             let hits = scene.geometry.has_trees().then(|| PixelHits::new(token, scene.antialiasing));
@@ -212,7 +268,7 @@ pub fn render(
         };
         let ControlFlow::Continue((film_tile, counts)) = rendered else { return };
         film.lock().expect("no thread panics while it holds the film").merge(&film_tile);
-        for (total, count) in totals.iter().zip([counts.camera_rays, counts.shadow_rays, counts.shadow_rays_skipped]) {
+        for (total, count) in totals.iter().zip(counts.all()) {
             total.fetch_add(count, Ordering::Relaxed);
         }
         let pixels = tile.width as u64 * tile.height as u64;
@@ -230,9 +286,21 @@ pub fn render(
     if stop.into_inner() {
         return ControlFlow::Break(());
     }
-    let [camera_rays, shadow_rays, shadow_rays_skipped] = totals.map(AtomicU64::into_inner);
+    let [camera_rays, shadow_rays, shadow_rays_skipped, lit, hidden, below, mask, shafts, occluders, traced] =
+        totals.map(AtomicU64::into_inner);
     let simd = if settings.reference { SimdLevel::Fallback } else { level };
-    let stats = RenderStats { camera_rays, shadow_rays, shadow_rays_skipped, simd, threads };
+    let visibility = [lit, hidden, below, mask];
+    let stats = RenderStats {
+        camera_rays,
+        shadow_rays,
+        shadow_rays_skipped,
+        visibility,
+        shafts,
+        occluders,
+        traced,
+        simd,
+        threads,
+    };
     ControlFlow::Continue((film.into_inner().expect("no thread panics while it holds the film"), stats))
 }
 
@@ -287,9 +355,9 @@ impl Scene {
             ("world_from_camera", numbers(self.camera.world_from_camera())),
             ("film_half_size", numbers(self.camera.film_half_size())),
             ("light_samples", {
-                // The plain renderer samples every light
+                // Where every sample is traced, every light is sampled
                 let said = |light: &Light| match light.said_samples() {
-                    SamplesDesc::Exact if settings.reference => light.samples().to_string(),
+                    SamplesDesc::Exact if settings.samples_all() => light.samples().to_string(),
                     said => said.to_string(),
                 };
                 let counts: Vec<String> = self.lights.iter().map(said).collect();

@@ -84,7 +84,14 @@ impl Patch {
         let reach = 0.5 * (1.0 - 1.0 / n) * ((across + down).length().max((across - down).length()));
         let turn = (reach * candidate.curvature(scene)).min(2.0);
         let material = &scene.materials[si.material.index()];
-        let mut patch = Patch { si, bsdf: material.bsdf(&si, &scene.textures), rays: Rays::All(candidate), reach, turn, uneven: false };
+        let mut patch = Patch {
+            si,
+            bsdf: material.bsdf(&si, &scene.textures),
+            rays: Rays::All(candidate),
+            reach,
+            turn,
+            uneven: false,
+        };
         if scene.antialiasing == 1 {
             // The pixel's only ray is that of its middle
             let (ray, differential) = camera_ray(scene, pixel[0], pixel[1]);

@@ -76,19 +76,36 @@ impl PixelSum {
                     counts.next_question = counts.shadow_rays + QUESTION_EVERY;
                     go_on()?;
                 }
-                match scene.see(&ray, hit(column, row, &ray), &differential) {
-                    CameraHit::Background => self.background += 1,
-                    CameraHit::Emission(color) => self.emission += color,
-                    CameraHit::Surface(si) => {
-                        // Look the material's textures up
-                        let bsdf = scene.materials[si.material.index()].bsdf(&si, &scene.textures);
-                        self.ambient += scene.ambient * bsdf.ambient;
-                        self.add_lights(scene, &si, &bsdf, lighting, counts);
-                    }
+                let seen = scene.see(&ray, hit(column, row, &ray), &differential);
+                if let Some((si, bsdf)) = self.see(scene, seen) {
+                    self.add_lights(scene, &si, &bsdf, lighting, counts);
                 }
             }
         }
         ControlFlow::Continue(())
+    }
+
+    /// Adds what a camera ray ends at, but for the light of lights: that of a surface is added by [`light`](Self::light).
+    pub fn see(&mut self, scene: &Scene, seen: CameraHit) -> Option<(SurfaceInteraction, Bsdf)> {
+        match seen {
+            CameraHit::Background => self.background += 1,
+            CameraHit::Emission(color) => self.emission += color,
+            CameraHit::Surface(si) => {
+                // Look the material's textures up
+                let bsdf = scene.materials[si.material.index()].bsdf(&si, &scene.textures);
+                self.ambient += scene.ambient * bsdf.ambient;
+                return Some((si, bsdf));
+            }
+        }
+        None
+    }
+
+    /// Adds what light `index` sends to a surface: the totals of [`LobeSums`].
+    #[inline(always)]
+    pub fn light(&mut self, scene: &Scene, index: usize, bsdf: &Bsdf, [diffuse, specular]: [f32; 2]) {
+        let light = &scene.lights[index];
+        self.lights[index][0] += light.scale * bsdf.diffuse * diffuse;
+        self.lights[index][1] += light.scale * bsdf.specular * specular;
     }
 
     /// Adds what each light sends.
@@ -102,13 +119,12 @@ impl PixelSum {
     ) {
         lighting.look_around(scene, si);
         let links = scene.geometry.lights_of(si.surface);
-        for (index, light) in scene.lights.iter().enumerate() {
+        for index in 0..scene.lights.len() {
             if !scene.geometry.links.contains(links, LightId(index as u32)) {
                 continue;
             }
             let sums = lighting.gather(scene, index, si, &bsdf.lobe, counts);
-            self.lights[index][0] += light.scale * bsdf.diffuse * sums.diffuse.total();
-            self.lights[index][1] += light.scale * bsdf.specular * sums.specular.total();
+            self.light(scene, index, bsdf, [sums.diffuse.total(), sums.specular.total()]);
         }
     }
 

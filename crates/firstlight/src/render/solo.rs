@@ -4,10 +4,10 @@
 //! the corners all meet one convex shape, so do all between them; and if it is nearer there than anything else can be, it
 //! is all that is seen.
 
+use crate::ids::SurfaceId;
 use crate::light::{AreaShape, LightKind};
 use crate::math::{Ray, Vec3};
 use crate::scene::{At, Hit, Scene};
-use crate::ids::SurfaceId;
 use crate::shape::{Parallelogram, Sphere};
 
 /// Something that a block's rays may meet.
@@ -63,9 +63,7 @@ impl Pyramid {
         let corners = flat.deep_corners();
         let size = corners.iter().fold(0.0f64, |size, q| size.max(q.abs().max_element()));
         let slack = size * SLACK;
-        let outside = |(n, ray): (&Vec3, &Ray)| {
-            corners.iter().all(|q| n.as_dvec3().dot(*q - ray.o.as_dvec3()) > slack)
-        };
+        let outside = |(n, ray): (&Vec3, &Ray)| corners.iter().all(|q| n.as_dvec3().dot(*q - ray.o.as_dvec3()) > slack);
         self.sides.iter().zip(&self.corners).any(outside) || corners.iter().all(|q| self.depth(*q) < -slack)
     }
 

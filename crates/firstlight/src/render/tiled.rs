@@ -78,11 +78,7 @@ impl<'a> Tiled<'a> {
     }
 
     /// Renders one tile. `go_on` is asked now and then.
-    pub fn render(
-        &mut self,
-        tile: &Tile,
-        go_on: &impl Fn() -> ControlFlow<()>,
-    ) -> ControlFlow<(), (FilmTile, Counts)> {
+    pub fn render(&mut self, tile: &Tile, go_on: &impl Fn() -> ControlFlow<()>) -> ControlFlow<(), (FilmTile, Counts)> {
         let mut film = FilmTile::new(tile);
         let mut counts = Counts::default();
         let cells = |from: u32, length: u32| (from / CELL..(from + length).div_ceil(CELL)).map(|cell| cell * CELL);

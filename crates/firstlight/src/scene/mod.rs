@@ -32,7 +32,7 @@ use crate::material::Material;
 use crate::shape::{Disk, Parallelogram, PlaneSide, Sphere};
 
 use crate::texture::Texture;
-pub(crate) use geometry::{At, Geometry, Nearest};
+pub(crate) use geometry::{At, Geometry, Item, Meets, Nearest, Placed, Target};
 pub(crate) use links::LinkId;
 pub(crate) use trees::ShadowRays;
 

@@ -141,7 +141,36 @@ pub(crate) struct DiskShadow {
     at: [f32; 2],
 }
 
+/// What has to hold for a way l to be blocked by a disk: -n.l above `height` and `room` (above 0, of a way without an end), and
+/// (x.l)^2 + (y.l)^2 at most (n.l)^2.
+pub(super) struct DiskBounds {
+    pub n: Vec3,
+    pub x: Vec3,
+    pub y: Vec3,
+    pub height: f32,
+    /// How far behind the plane an end has to lie, at most, to count as behind it.
+    pub room: f32,
+    /// How far all these products together can be wrong, for ways with coordinates up to some bound.
+    pub wrong: f32,
+}
+
 impl DiskShadow {
+    /// The same as products with l, for ways with coordinates up to `longest`. `None` if no way is blocked.
+    pub(super) fn bounds(&self, longest: f32) -> Option<DiskBounds> {
+        const DOT: f32 = 64.0 * UNIT_ROUNDOFF;
+        if !(self.height > self.margin) {
+            return None;
+        }
+        let one = |v: Vec3| v.abs().element_sum();
+        let n = one(self.n);
+        let [x, y] = [(self.x, self.at[0]), (self.y, self.at[1])].map(|(x, at)| x * self.height - self.n * at);
+        let size = |x: Vec3, at: f32| one(x) * self.height + n * at.abs();
+        let sizes = n + size(self.x, self.at[0]) + size(self.y, self.at[1]);
+        let wrong = (sizes * longest + self.height) * DOT;
+        let room = self.margin + one(self.abs_n) * longest;
+        Some(DiskBounds { n: self.n, x, y, height: self.height, room, wrong })
+    }
+
     /// Whether the disk stands between the point and the end of `l` (finite), or anywhere along it (not finite). Point and
     /// end have to be on different sides of the plane, by more than their errors.
     ///

@@ -8,6 +8,7 @@ mod ball;
 mod check;
 mod common;
 mod cone;
+mod cover;
 mod cuboid;
 mod cylinder;
 mod disk;
@@ -40,6 +41,7 @@ pub use surface::{Footprint, RayDifferential, ShadowTerminator, SurfaceInteracti
 pub use torus::TorusDesc;
 
 pub(crate) use common::Common;
+pub(crate) use cover::Cover;
 pub(crate) use disk::{Disk, DiskShadow};
 pub(crate) use mesh::{Mesh, MeshBuilder, MeshSource, TrianglePoint};
 pub(crate) use parallelogram::{ParallelogramShadow, PlaneSide};
@@ -48,7 +50,7 @@ pub(crate) use point_set::PointSet;
 pub(crate) use solid::{Solid, SolidHit};
 pub(crate) use sphere::SphereShadow;
 pub(crate) use surface::ShapePoint;
-pub(crate) use triangles::{TileHits, TriangleTree, every};
+pub(crate) use triangles::{Eye, SeenTriangle, TOGETHER, TileHits, TriangleTree, every};
 
 use crate::describe::family;
 

@@ -331,6 +331,30 @@ impl ParallelogramShadow {
             }
     }
 
+    /// What has to be above 0 for a way l to be blocked, each as f.l - c, and how far that can be wrong for ways with coordinates
+    /// up to `longest`: the way crosses the plane, and does it between the four sides. What makes [`blocks`](Self::blocks)
+    /// ask for more counts as wrong.
+    pub(super) fn bounds(&self, longest: f32, finite: bool) -> [(Vec3, f32, f32); 5] {
+        const DOT: f32 = 32.0 * UNIT_ROUNDOFF;
+        let one = |v: Vec3| v.abs().element_sum();
+        let n = one(self.n);
+        let crosses = if finite {
+            let room = one(self.abs_n) * longest + self.margin + (n * longest + self.height) * DOT;
+            (-self.n, self.height, room)
+        } else {
+            (-self.n, 0.0, n * longest * DOT)
+        };
+        // A point on the plane is blocked from nothing
+        let crosses = if self.height > self.margin { crosses } else { (Vec3::ZERO, f32::INFINITY, 0.0) };
+        let side = |axis: &Axis, end: f32, sign: f32| {
+            let f = (axis.axis * self.height - self.n * (axis.origin - end)) * sign;
+            let size = n * (axis.origin.abs() + end.abs()) + one(axis.axis) * self.height;
+            (f, 0.0, size * longest * DOT)
+        };
+        let (u, v) = (&self.u, &self.v);
+        [crosses, side(u, u.low, 1.0), side(u, u.high, -1.0), side(v, v.low, 1.0), side(v, v.high, -1.0)]
+    }
+
     /// Whether the parallelogram stands between the point and the end of `l` (finite), or anywhere along it (not finite).
     /// Point and end have to be on different sides of the plane, by more than their errors.
     #[inline(always)]

@@ -79,6 +79,11 @@ impl Plane {
         }
     }
 
+    /// A point of it, and its normal.
+    pub fn place(&self) -> (DVec3, DVec3) {
+        (self.point, self.frame.z)
+    }
+
     pub fn bounds(&self) -> Option<[DVec3; 2]> {
         None
     }

@@ -102,6 +102,11 @@ impl Solid {
         each!(self, shape => shape.point(ray, hit))
     }
 
+    /// A point of an infinite plane, and its normal.
+    pub fn plane(&self) -> Option<(DVec3, DVec3)> {
+        if let Solid::Plane(plane) = self { Some(plane.place()) } else { None }
+    }
+
     /// The smallest box around it, to within rounding; `None` if it has no end.
     pub fn bounds(&self) -> Option<[DVec3; 2]> {
         each!(self, shape => shape.bounds())

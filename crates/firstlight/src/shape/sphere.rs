@@ -215,6 +215,11 @@ impl SphereShadow {
         height > r + (r * 4e-4 + self.ff.sqrt() * 1e-5)
     }
 
+    /// From the centre to the point, and the radius, if the point is outside.
+    pub(super) fn outside(&self) -> Option<(Vec3, f32)> {
+        matches!(self.side, Side::Outside | Side::Far).then(|| (self.f, self.r2.sqrt()))
+    }
+
     /// Whether the sphere stands between the point and the end of `l` (finite), or anywhere along it (not finite).
     ///
     /// With a = l.l and b = -f.l, the line comes nearest to the centre at t = b/a and meets the sphere where

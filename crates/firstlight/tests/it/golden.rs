@@ -9,8 +9,8 @@ use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
 use firstlight::{
-    Assets, CompileOptions, FolderAssets, Format, Image, NoAssets, RenderSettings, SceneDesc, StoredImage,
-    builtin_scenes, render,
+    AaMode, Assets, CompileOptions, FolderAssets, Format, Image, NoAssets, RenderSettings, SceneDesc, StoredImage,
+    VisibilityMode, builtin_scenes, render,
 };
 
 fn scenes() -> PathBuf {
@@ -30,22 +30,36 @@ fn name(path: &Path) -> String {
 }
 
 /// The picture of a scene; `size` and `aa` replace its own.
-fn picture(text: &[u8], assets: &dyn Assets, size: Option<[u32; 2]>, aa: Option<u32>, reference: bool) -> Image {
+fn picture(
+    text: &[u8],
+    assets: &dyn Assets,
+    size: Option<[u32; 2]>,
+    aa: Option<u32>,
+    settings: &RenderSettings,
+) -> Image {
     let mut parsed = SceneDesc::parse("scene.toml", text, assets);
-    let settings = &mut parsed.desc.render;
+    let frame = &mut parsed.desc.render;
     if let Some([width, height]) = size {
-        (settings.width, settings.height) = (width, height);
+        (frame.width, frame.height) = (width, height);
     }
-    settings.antialiasing = aa.unwrap_or(settings.antialiasing);
+    frame.antialiasing = aa.unwrap_or(frame.antialiasing);
     let scene = parsed
         .compile(assets, &CompileOptions { strict: true, ..CompileOptions::default() })
         .unwrap_or_else(|e| panic!("{e}"))
         .scene;
-    let settings = RenderSettings { reference, ..RenderSettings::default() };
-    match render(&scene, &settings, &|_, _| ControlFlow::Continue(())) {
+    match render(&scene, settings, &|_, _| ControlFlow::Continue(())) {
         ControlFlow::Continue((film, _)) => film.develop(),
         ControlFlow::Break(()) => unreachable!("nothing stops this render"),
     }
+}
+
+/// All three renderers of the same bits; the plain one last.
+fn renderers() -> [RenderSettings; 3] {
+    [
+        RenderSettings { aa_mode: AaMode::Full, ..RenderSettings::default() },
+        RenderSettings { visibility: VisibilityMode::Traced, ..RenderSettings::default() },
+        RenderSettings { reference: true, ..RenderSettings::default() },
+    ]
 }
 
 /// The pixels that differ in a bit.
@@ -84,10 +98,10 @@ fn every_golden_scene_has_its_bits() {
             let title = format!("{}/{}", name(&family), name(&case));
             let actual = if name(&family) == "config" {
                 let builtin = builtin_scenes().iter().find(|b| b.name == name(&case)).expect("a built-in scene");
-                picture(builtin.text.as_bytes(), &NoAssets, Some([96, 96]), None, false)
+                picture(builtin.text.as_bytes(), &NoAssets, Some([96, 96]), None, &RenderSettings::default())
             } else {
                 let text = std::fs::read(case.join("scene.toml")).unwrap();
-                picture(&text, &FolderAssets::new(&case, &[]).unwrap(), None, None, false)
+                picture(&text, &FolderAssets::new(&case, &[]).unwrap(), None, None, &RenderSettings::default())
             };
             let path = case.join("expected.exr");
             let expected = std::fs::read(&path).ok().map(|bytes| StoredImage::read(&bytes).unwrap().pixels);
@@ -126,8 +140,10 @@ fn every_scene_of_the_gallery_renders_and_the_renderers_agree() {
             count += 1;
             let text = std::fs::read(&path).unwrap();
             assert!(text.starts_with(b"#:schema "), "{}: an editor finds no schema", path.display());
-            let [fast, plain] = [false, true].map(|r| picture(&text, &assets, Some([48, 36]), Some(2), r));
+            let [fast, traced, plain] =
+                renderers().map(|settings| picture(&text, &assets, Some([48, 36]), Some(2), &settings));
             assert_eq!(differences(&fast.pixels, &plain.pixels), 0, "{}", path.display());
+            assert_eq!(differences(&traced.pixels, &plain.pixels), 0, "{}", path.display());
             assert!(fast.pixels.iter().flatten().all(|c| c.is_finite() && *c >= 0.0), "{}", path.display());
             assert!(fast.pixels.iter().any(|p| p[0] > 0.05), "{}: all dark", path.display());
         }
@@ -136,10 +152,12 @@ fn every_scene_of_the_gallery_renders_and_the_renderers_agree() {
 }
 
 #[test]
-fn the_built_in_scenes_are_the_same_in_both_renderers() {
+fn the_built_in_scenes_are_the_same_in_all_renderers() {
     for builtin in builtin_scenes() {
-        let [fast, plain] =
-            [false, true].map(|r| picture(builtin.text.as_bytes(), &NoAssets, Some([40, 40]), Some(2), r));
+        let text = builtin.text.as_bytes();
+        let [fast, traced, plain] =
+            renderers().map(|settings| picture(text, &NoAssets, Some([40, 40]), Some(2), &settings));
         assert_eq!(differences(&fast.pixels, &plain.pixels), 0, "{}", builtin.name);
+        assert_eq!(differences(&traced.pixels, &plain.pixels), 0, "{}", builtin.name);
     }
 }

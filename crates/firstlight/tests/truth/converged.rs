@@ -5,9 +5,9 @@
 //! points, until they do or until there are too many points. Nothing of what integrates lights has a part in it.
 //! (Turned copies of the `sobol` set were tried in their place, and settle no pixel sooner: it is edges that take long.)
 
-use firstlight::{AaMode, Image, LightDesc, RenderSettings, SampleSet, SamplesDesc, Scene, SceneDesc, Window};
+use firstlight::{Image, LightDesc, RenderSettings, SampleSet, SamplesDesc, Scene, SceneDesc, Window};
 
-use crate::scenes::{compile, one_thread, picture};
+use crate::scenes::{compile, every_ray, one_thread, picture};
 
 /// Steps of an 8-bit picture by which the mean of two sets may differ from the mean of the other two.
 const AGREEMENT: f64 = 0.25;
@@ -24,7 +24,7 @@ const DISPUTED: f64 = 0.75;
 
 /// The settings that a converged picture is made with.
 pub fn traced() -> RenderSettings {
-    RenderSettings { aa_mode: AaMode::Full, ..one_thread() }
+    every_ray()
 }
 
 /// The settings that hold what is tested: lights that say so are integrated.

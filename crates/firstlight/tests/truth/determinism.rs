@@ -3,7 +3,9 @@
 
 use std::num::NonZeroUsize;
 
-use firstlight::{Image, LightDesc, RenderSettings, SampleSet, Scene, SceneDesc, ShapeDesc, SimdLevel, Window};
+use firstlight::{
+    AaMode, Image, LightDesc, RenderSettings, SampleSet, Scene, SceneDesc, ShapeDesc, SimdLevel, VisibilityMode, Window,
+};
 
 use crate::random;
 use crate::scenes::*;
@@ -50,15 +52,18 @@ fn with(settings: RenderSettings, scene: &Scene) -> Vec<[u32; 4]> {
 fn threads_and_tiles_do_not_matter() {
     for desc in scenes() {
         let scene = compile(&desc);
-        let expected = with(one_thread(), &scene);
-        for threads in [1, 2, 8] {
-            for tile_size in [8, 16, 23, 64] {
-                let threads = NonZeroUsize::new(threads);
-                let got = with(RenderSettings { threads, tile_size, ..RenderSettings::default() }, &scene);
-                assert!(got == expected, "{threads:?} threads, tiles of {tile_size}: {desc:#?}");
+        for one in [one_thread(), every_ray()] {
+            let expected = with(one.clone(), &scene);
+            for threads in [1, 2, 8] {
+                for tile_size in [8, 16, 23, 64] {
+                    let threads = NonZeroUsize::new(threads);
+                    let got = with(RenderSettings { threads, tile_size, ..one.clone() }, &scene);
+                    assert!(got == expected, "{threads:?} threads, tiles of {tile_size}: {desc:#?}");
+                }
             }
+            let all = RenderSettings { threads: None, ..one };
+            assert!(with(all, &scene) == expected, "all threads: {desc:#?}");
         }
-        assert!(with(RenderSettings::default(), &scene) == expected, "default settings: {desc:#?}");
     }
 }
 
@@ -70,8 +75,10 @@ fn instruction_sets_do_not_matter() {
         let scene = compile(&desc);
         let expected = with(RenderSettings { reference: true, ..one_thread() }, &scene);
         for simd in &levels {
-            let got = with(RenderSettings { simd: *simd, ..one_thread() }, &scene);
-            assert!(got == expected, "{}: {desc:#?}", simd.name());
+            for visibility in [VisibilityMode::Shafts, VisibilityMode::Traced] {
+                let got = with(RenderSettings { simd: *simd, visibility, ..every_ray() }, &scene);
+                assert!(got == expected, "{}, {}: {desc:#?}", simd.name(), visibility.name());
+            }
         }
     }
 }
@@ -80,7 +87,7 @@ fn instruction_sets_do_not_matter() {
 fn a_crop_is_a_part_of_the_whole() {
     for desc in scenes() {
         let scene = compile(&desc);
-        let whole = picture(&scene, &one_thread());
+        let whole = [one_thread(), every_ray()].map(|settings| picture(&scene, &settings));
         let (width, height) = (scene.width(), scene.height());
         for window in [
             Window { x: 0, y: 0, width: 1, height: 1 },
@@ -88,8 +95,9 @@ fn a_crop_is_a_part_of_the_whole() {
             Window { x: width - 9, y: 0, width: 9, height },
             Window { x: 0, y: height - 1, width, height: 1 },
         ] {
-            for reference in [false, true] {
-                let settings = RenderSettings { crop: Some(window), tile_size: 8, reference, ..one_thread() };
+            let plain = RenderSettings { reference: true, ..one_thread() };
+            for (settings, whole) in [(one_thread(), &whole[0]), (every_ray(), &whole[1]), (plain, &whole[1])] {
+                let settings = RenderSettings { crop: Some(window), tile_size: 8, ..settings };
                 let part = picture(&scene, &settings);
                 assert_eq!(part.window, window);
                 for y in 0..window.height {
@@ -115,15 +123,27 @@ fn fault(desc: &SceneDesc) -> Option<String> {
     if let Some(fault) = describe("plain", &plain) {
         return Some(fault);
     }
-    for (simd, threads, tile_size) in
-        [(SimdLevel::Auto, 1, 16), (SimdLevel::available()[0], 1, 16), (SimdLevel::Auto, 2, 8)]
-    {
+    use VisibilityMode::{Shafts, Traced};
+    let (best, least) = (SimdLevel::Auto, SimdLevel::available()[0]);
+    let avx2 = if SimdLevel::Avx2.is_available() { SimdLevel::Avx2 } else { best };
+    for (simd, threads, tile_size, visibility) in [
+        (best, 1, 16, Shafts),
+        (best, 1, 16, Traced),
+        (avx2, 1, 16, Shafts),
+        (least, 1, 16, Shafts),
+        (least, 1, 16, Traced),
+        (best, 2, 8, Shafts),
+    ] {
         let threads = NonZeroUsize::new(threads);
-        let fast = picture(&scene, &RenderSettings { simd, threads, tile_size, ..RenderSettings::default() });
+        // Where every sample is traced, it is of no account
+        let aa_mode = if visibility == Traced { AaMode::Adaptive } else { AaMode::Full };
+        let settings = RenderSettings { simd, threads, tile_size, visibility, aa_mode, ..RenderSettings::default() };
+        let fast = picture(&scene, &settings);
         let differs =
             (0..plain.pixels.len()).find(|i| plain.pixels[*i].map(f32::to_bits) != fast.pixels[*i].map(f32::to_bits));
         if let Some(i) = differs {
-            return Some(format!("pixel {i}: plain {:?}, {} {:?}", plain.pixels[i], simd.name(), fast.pixels[i]));
+            let (simd, visibility) = (simd.name(), visibility.name());
+            return Some(format!("pixel {i}: plain {:?}, {simd} {visibility} {:?}", plain.pixels[i], fast.pixels[i]));
         }
     }
     None

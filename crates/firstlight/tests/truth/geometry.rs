@@ -26,7 +26,7 @@ fn lit(image: &Image) -> usize {
 #[track_caller]
 fn both(desc: &SceneDesc) -> Image {
     let scene = compile(desc);
-    let fast = picture(&scene, &one_thread());
+    let fast = picture(&scene, &every_ray());
     let plain = picture(&scene, &RenderSettings { reference: true, ..one_thread() });
     assert!(bits(&fast) == bits(&plain), "fast and plain differ: {desc:#?}");
     fast
@@ -219,7 +219,7 @@ fn a_million_instances_of_one_triangle() {
     assert!(lit(&whole) > 300, "{}", lit(&whole));
     let crop = Some(Window { x: 10, y: 12, width: 9, height: 8 });
     let [fast, plain] =
-        [false, true].map(|reference| picture(&scene, &RenderSettings { reference, crop, ..one_thread() }));
+        [false, true].map(|reference| picture(&scene, &RenderSettings { reference, crop, ..every_ray() }));
     assert!(bits(&fast) == bits(&plain));
 }
 
@@ -457,7 +457,7 @@ fn hostile_triangles_change_no_bit() {
         };
         let assets = MemoryAssets { files: [("ball.ply".to_owned(), ply(positions, triangles))].into() };
         let scene = desc.compile(&assets, &CompileOptions::default()).expect("it compiles").scene;
-        let fast = picture(&scene, &one_thread());
+        let fast = picture(&scene, &every_ray());
         assert!(bits(&fast) == bits(&picture(&scene, &RenderSettings { reference: true, ..one_thread() })));
         fast
     };

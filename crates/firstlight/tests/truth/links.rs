@@ -40,7 +40,7 @@ fn scene(shape: ShapeDesc, groups: &[(&str, ShapeDesc)]) -> SceneDesc {
 /// The fast picture, after the reference was seen to have the same bits.
 fn both(desc: &SceneDesc) -> Image {
     let scene = compile(desc);
-    let fast = picture(&scene, &one_thread());
+    let fast = picture(&scene, &every_ray());
     let plain = picture(&scene, &RenderSettings { reference: true, ..one_thread() });
     assert!(bits(&fast) == bits(&plain), "fast and plain differ: {desc:#?}");
     fast

@@ -73,8 +73,8 @@ fn link(random: &mut Random, scene: &mut SceneDesc) {
             LightDesc::Directional(light) => light.name = name,
             LightDesc::Spot(light) => light.name = name,
             LightDesc::Rectangle(light) => light.name = name,
-            #[allow(unreachable_patterns)]
-            _ => {}
+            LightDesc::Disk(light) => light.name = name,
+            LightDesc::Sphere(light) => light.name = name,
         }
     }
     for shape in scene.shapes.iter_mut().chain(scene.groups.iter_mut().flat_map(|(_, group)| &mut group.shapes)) {

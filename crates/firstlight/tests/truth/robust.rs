@@ -32,9 +32,9 @@ fn lights_around(random: &mut Random, c: V, reach: f64) -> Vec<LightDesc> {
 #[track_caller]
 fn assert_unshadowed(scene: &SceneDesc, what: &str) -> usize {
     let with = compile(scene);
-    let fast = picture(&with, &one_thread());
+    let fast = picture(&with, &every_ray());
     let plain = picture(&with, &RenderSettings { reference: true, ..one_thread() });
-    let without = shoot(&scene.clone().without_shadows());
+    let without = picture(&compile(&scene.clone().without_shadows()), &every_ray());
     assert_eq!(bits(&fast), bits(&plain), "fast and plain differ: {what}\n{scene:#?}");
     for (i, (a, b)) in fast.pixels.iter().zip(&without.pixels).enumerate() {
         assert_eq!(a, b, "pixel {i} shadows itself: {what}\n{scene:#?}");

@@ -4,7 +4,7 @@ use std::num::NonZeroUsize;
 use std::ops::ControlFlow;
 
 use firstlight::{
-    BlinnPhongDesc, CameraDesc, CheckerboardDesc, ColorDesc, ColorParam, CompileOptions, DirectionalDesc,
+    AaMode, BlinnPhongDesc, CameraDesc, CheckerboardDesc, ColorDesc, ColorParam, CompileOptions, DirectionalDesc,
     DisplayEncoding, Image, InstanceDesc, LightDesc, MaterialDesc, MeshDesc, NoAssets, NumberParam, ParallelogramDesc,
     PhongDesc, PointDesc, RectangleDesc, RenderDesc, RenderSettings, SampleSet, Scene, SceneDesc, ShapeDesc,
     SphereDesc, SpotDesc, TextureDesc, TransformDesc, builtin_scenes,
@@ -335,6 +335,11 @@ pub fn compile(desc: &SceneDesc) -> Scene {
 /// One thread, the fast renderer.
 pub fn one_thread() -> RenderSettings {
     RenderSettings { threads: NonZeroUsize::new(1), ..RenderSettings::default() }
+}
+
+/// The same, every camera ray lit by itself: where no light is integrated, the bits of the plain renderer.
+pub fn every_ray() -> RenderSettings {
+    RenderSettings { aa_mode: AaMode::Full, ..one_thread() }
 }
 
 /// The picture under the settings.

@@ -8,6 +8,7 @@
 #![allow(dead_code)]
 
 mod kernel;
+mod seen;
 #[cfg(test)]
 mod tests;
 
@@ -19,6 +20,7 @@ use crate::accel::{
 };
 use crate::math::{DVec3, Vec3};
 use kernel::{Crossings, intersect, intersect_lanes};
+pub(crate) use seen::{Eye, SeenTriangle, TOGETHER};
 
 /// Triangles in a leaf.
 const PACK: usize = 4;
@@ -150,6 +152,17 @@ impl TriangleTree {
         use rayon::prelude::*;
         let packs = leaves.par_iter().with_min_len(1 << 12).map(pack).collect();
         TriangleTree { tree, packs, len: order.len() }
+    }
+
+    /// Visits the leaves whose boxes `meet` says yes to, until `leaf` says no; see [`Tree::gather`].
+    #[inline(always)]
+    pub fn gather<S: Simd, M: Fn(S, &crate::accel::Node) -> u32>(
+        &self,
+        simd: S,
+        meet: impl FnOnce(Vec3, f32) -> M,
+        leaf: impl FnMut(u32) -> bool,
+    ) -> bool {
+        self.tree.gather(simd, meet(self.tree.center, self.tree.half), leaf)
     }
 
     /// Triangles in the tree.

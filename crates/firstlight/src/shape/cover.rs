@@ -1,0 +1,154 @@
+//! How much of a light a sphere, a parallelogram or a disk hides from a point, proved from the light's hull: the ways `l` + u
+//! `axes[0]` + v `axes[1]` + w `axes[2]`, each of u, v, w from -1 to 1. What is proved holds for the rounded answers of
+//! `blocks` for each way of the hull.
+
+use super::disk::{DiskBounds, DiskShadow};
+use super::parallelogram::ParallelogramShadow;
+use super::sphere::SphereShadow;
+use crate::math::{UNIT_ROUNDOFF, Vec3};
+
+/// How much of a light is hidden.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Cover {
+    /// No way is blocked.
+    Nothing,
+    /// Every way is.
+    All,
+    /// Not known.
+    Some,
+}
+
+/// Steps towards a plane between the light's ways and a sphere.
+const STEPS: usize = 4;
+/// How far, at most, the rounded answers for a sphere are from the true ones: in radii, and in distances.
+const ROOM: [f32; 2] = [4e-4, 1e-5];
+
+/// By how much a product of vectors is wrong, at most, in that of their lengths.
+const DOT: f32 = 16.0 * UNIT_ROUNDOFF;
+
+/// The least of m.w for the ways of the hull, and the way to it.
+#[inline(always)]
+fn lowest(m: Vec3, l: Vec3, axes: &[Vec3; 3]) -> (f32, Vec3) {
+    let (mut least, mut way) = (m.dot(l), l);
+    for axis in axes {
+        let slope = m.dot(*axis);
+        least -= slope.abs();
+        way += if slope > 0.0 { -*axis } else { *axis };
+    }
+    (least, way)
+}
+
+/// The ways to the hull's corners.
+#[inline(always)]
+fn corners(l: Vec3, axes: &[Vec3; 3]) -> impl Iterator<Item = Vec3> {
+    let sign = |i: usize, bit: usize| if i >> bit & 1 == 0 { -1.0 } else { 1.0 };
+    (0..8).map(move |i| l + axes[0] * sign(i, 0) + axes[1] * sign(i, 1) + axes[2] * sign(i, 2))
+}
+
+impl SphereShadow {
+    /// How much of a light it hides. The ways all lead to the light.
+    pub fn covers(&self, l: Vec3, axes: &[Vec3; 3], finite: bool) -> Cover {
+        let Some((f, r)) = self.outside() else { return Cover::Some };
+        let distance = f.length();
+        let room = r * ROOM[0] + distance * ROOM[1];
+        let size = axes[0].length() + axes[1].length() + axes[2].length();
+        if !(distance + size + l.length() < 1e12 && r > 1e-12) {
+            return Cover::Some;
+        }
+        // A plane between the sphere and all ways from the point: across the line from its centre to the nearest of a hull
+        // that grows. Everything is counted from the centre
+        let along = |from: Vec3, way: Vec3| {
+            let t = -from.dot(way) / way.length_squared();
+            from + way * if finite { t.clamp(0.0, 1.0) } else { t.max(0.0) }
+        };
+        let mut near = along(f, l);
+        for _ in 0..STEPS {
+            let length = near.length();
+            let bound = (r + room) * length;
+            let (least, way) = lowest(near, l, axes);
+            let at_point = near.dot(f);
+            // Of light without end the ways must not lead towards the sphere
+            let at_light = if finite {
+                at_point + least - length * (l.length() + size) * DOT
+            } else if least >= 0.0 {
+                at_point
+            } else {
+                f32::NEG_INFINITY
+            };
+            if at_point.min(at_light) > bound {
+                return Cover::Nothing;
+            }
+            let corner = if at_light < at_point { f + way } else { f };
+            if !(length > 0.0) || !finite {
+                break;
+            }
+            let side = corner - near;
+            let t = -near.dot(side) / side.length_squared();
+            if !(t > 0.0) {
+                break;
+            }
+            near += side * t.min(1.0);
+        }
+        // All corners in the shadow of a smaller sphere, beyond its middle
+        let small = r - room;
+        let deep = small > 0.0 && along(f, l).length() < small;
+        if !deep || distance < r + 2.0 * room || !finite {
+            return Cover::Some;
+        }
+        let (least, _) = lowest(-f, l, axes);
+        let reach = l.length() + size;
+        if !(least > f.length_squared() + distance * room + reach * (reach + distance) * DOT) {
+            return Cover::Some;
+        }
+        let all = corners(l, axes).all(|way| {
+            let across = way.cross(f);
+            across.length_squared() < way.length_squared() * (small * small) * 0.9999
+        });
+        if all { Cover::All } else { Cover::Some }
+    }
+}
+
+impl ParallelogramShadow {
+    /// How much of a light it hides; `longest` is the largest coordinate of any way.
+    pub fn covers(&self, l: Vec3, axes: &[Vec3; 3], longest: f32, finite: bool) -> Cover {
+        let mut all = true;
+        for (f, least, wrong) in self.bounds(longest, finite) {
+            let middle = f.dot(l) - least;
+            let reach = f.dot(axes[0]).abs() + f.dot(axes[1]).abs() + f.dot(axes[2]).abs();
+            if middle + reach < -wrong {
+                return Cover::Nothing;
+            }
+            all &= middle - reach > wrong;
+        }
+        if all { Cover::All } else { Cover::Some }
+    }
+}
+
+impl DiskShadow {
+    /// How much of a light it hides; `longest` is the largest coordinate of any way.
+    pub fn covers(&self, l: Vec3, axes: &[Vec3; 3], longest: f32, finite: bool) -> Cover {
+        let Some(DiskBounds { n, x, y, height, room, wrong }) = self.bounds(longest) else { return Cover::Nothing };
+        // Beyond these its squares may leave the range of numbers
+        if !(longest > 1e-9 && longest < 1e12 && wrong < 1e12) {
+            return Cover::Some;
+        }
+        // Downwards -n.l has to come above the height, and where it does x^2 + y^2 below its square
+        let range = |f: Vec3| {
+            let reach = f.dot(axes[0]).abs() + f.dot(axes[1]).abs() + f.dot(axes[2]).abs();
+            (f.dot(l) - reach, f.dot(l) + reach)
+        };
+        let (least, most) = range(-n);
+        let ahead = if finite { height } else { 0.0 };
+        let outside = [x, -x, y, -y].into_iter().any(|f| range(f + n).0 > wrong);
+        if most < ahead - wrong || outside {
+            return Cover::Nothing;
+        }
+        // The ways that do are a cone: with its corners, all of the hull is in it
+        let inside = |way: Vec3| {
+            let (x, y) = (x.dot(way), y.dot(way));
+            (x * x + y * y).sqrt() + wrong < -n.dot(way)
+        };
+        let beyond = if finite { height + room + wrong } else { wrong };
+        if least > beyond && corners(l, axes).all(inside) { Cover::All } else { Cover::Some }
+    }
+}

@@ -1,0 +1,411 @@
+//! Triangles between a point and a light: which of them hide none of it, which all of it, and which some samples.
+//!
+//! Seen from the start o of the rays, with A, B, C counted from o, the triangle test's areas are linear in the way l,
+//!
+//! ```text
+//! fu = C x (B - C)    fv = A x (C - A)    fw = B x (A - B)    n = (C - A) x (B - A) = fu + fv + fw
+//! U = fu.l    V = fv.l    W = fw.l    det = n.l    T = n.A    t = T / det
+//! ```
+//!
+//! up to the factor of the shear along the ray's largest axis. Ways to a light are l = l0 + u a0 + v a1 + w a2 with
+//! coordinates from -1 to 1, so each is a number and three slopes: its values over the whole light, or over a cell of it, lie
+//! between middle and slopes added up, and for a sample it is three multiplications and additions. Turned so that T > 0, a
+//! triangle stands in the way where U, V and W are above 0 and T is below det.
+//!
+//! The answers have to be those of the kernel ([`intersect`]), which rounds, so each bound has a margin, and what lies within
+//! is left to the kernel. With D the largest coordinate of A, B, C; s that of the edges; L that of all ways; |n| = |nx| + |ny|
+//! + |nz|; and half an ulp h = 2^-24:
+//!
+//! - The kernel's sheared vertices are off by at most e = 6 h D along each axis, and its signs of U, V, W are exact for these.
+//!   So what it calls inside lies within sqrt 2 e of the triangle, and what lies inside by more than that it calls inside; an
+//!   edge is no longer than 2 sqrt 2 s there. In units of U that is 24 h D s L. What is computed here is off by less than
+//!   100 h D s L more: edges, products, the light's own frame. [`EDGE`].
+//! - If it calls the ray inside, then the line comes within e of a point X of the triangle at a depth z with
+//!   |T - z det| <= |n| e, and its t is the depth of another point Y of the triangle, wrong by 8 h D / |lz|, with
+//!   |T - t det| <= |n| (e + 8 h D + 96 h s^3 / |det|): the areas are wrong by 4 h s^2 each where the ray is inside, which moves Y
+//!   by 12 h (2 s)^3 / det. Edge-on Y is anywhere on the triangle, 3 s from the ray at most. Where t is before the
+//!   triangle's box, it is moved to where the box begins, which is not behind X.
+//! - So with T > |n| (3 s + 16 h D) no ray is stopped whose det is below T by as much (`far`), nor any that is outside of one
+//!   edge. With T smaller than that, one outside of one edge and inside of another is not stopped either way round;
+//!   and one outside of an edge is not if it is not edge-on (|det| > |n| L / 64) and T > 16 h D |n| + 64 x 96 h s^3.
+//! - A ray is stopped if it is inside of all edges, not edge-on, and det is above T by what t can be wrong, and by what the
+//!   ray stops short of the light.
+//!
+//! Sizes beyond which any of these products could leave the range of numbers are left to the kernel.
+
+use fearless_simd::{f32x4, f32x8, f32x16, mask32x16, prelude::*};
+
+use super::kernel::{intersect, intersect_lanes};
+use super::{NONE, PACK, Pack, TriangleTree, along, bits};
+use crate::accel::{RayPacket16, Slabs, groups};
+use crate::math::{UNIT_ROUNDOFF as H, Vec3};
+
+/// By how much U, V and W can be wrong, in D s L.
+const EDGE: f32 = 192.0 * H;
+/// By how much T can be wrong by its own computation, in D s^2.
+const HEIGHT: f32 = 64.0 * H;
+/// By how much det can be wrong, in s^2 L.
+const TURN: f32 = 96.0 * H;
+/// By how much t det can be wrong: in |n| D, and in s^3 |n| L / |det|.
+const DEPTH: f32 = 16.0 * H;
+const SLIVER: f32 = 96.0 * H;
+/// Rays whose det is below this, in |n| L, are edge-on.
+const GRAZE: f32 = 1.0 / 64.0;
+/// The same, where a triangle must not be met at all.
+const GRAZE_ALL: f32 = 1.0 / 512.0;
+
+/// Packs that are looked at together.
+pub(crate) const TOGETHER: usize = 4;
+
+/// Where rays start, and the light, in the space of a mesh.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Eye {
+    /// The origin of the rays.
+    pub o: Vec3,
+    /// To the light's middle.
+    pub l: Vec3,
+    /// Half the light, along its axes.
+    pub axes: [Vec3; 3],
+    /// The largest coordinate of any way, at least; in another space also the sum of the sizes of what it was computed from.
+    pub longest: f32,
+    /// The largest coordinate of every way, at most.
+    pub shortest: f32,
+    /// How much shorter than 1 the rays are, at most; without bound where nothing is known. 1 or more: they may be of any length.
+    pub short: f32,
+    /// Whether the rays have an end.
+    pub finite: bool,
+}
+
+/// A triangle that may hide some of a light.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct SeenTriangle {
+    /// U, V, W, det towards the light's middle.
+    middle: [f32; 4],
+    /// How they change along the light's axes.
+    slopes: [[f32; 3]; 4],
+    /// How far U, V, W are on one side of 0 if they are, for sure.
+    edge: f32,
+    /// What |det| is above where the ray is not edge-on.
+    graze: f32,
+    /// det above this: the triangle is before the light.
+    near: f32,
+    /// det below this: it is not.
+    far: f32,
+    /// Which it is: the leaf, the place in it, and what the caller says.
+    pub leaf: u32,
+    pub place: u32,
+    pub source: u32,
+}
+
+/// What hides what, of some part of a light: bits of cells or samples.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Verdict {
+    /// For sure.
+    pub hidden: u16,
+    /// Perhaps.
+    pub unsure: u16,
+}
+
+// What follows is written without closures and `map`: out of line they lose the instruction set.
+
+/// Four numbers of each of four leaves.
+#[inline(always)]
+fn sixteen<S: Simd>(simd: S, packs: [&Pack; TOGETHER], vertex: usize, axis: usize) -> f32x16<S> {
+    let [a, b, c, d] = packs;
+    let left: f32x8<S> = simd.combine_f32x4(
+        f32x4::load_array_ref(simd, &a.vertices[vertex][axis]),
+        f32x4::load_array_ref(simd, &b.vertices[vertex][axis]),
+    );
+    let right: f32x8<S> = simd.combine_f32x4(
+        f32x4::load_array_ref(simd, &c.vertices[vertex][axis]),
+        f32x4::load_array_ref(simd, &d.vertices[vertex][axis]),
+    );
+    simd.combine_f32x8(left, right)
+}
+
+type V<S> = [f32x16<S>; 3];
+
+/// One vertex of all triangles of four leaves, from `o`.
+#[inline(always)]
+fn vertex<S: Simd>(simd: S, packs: [&Pack; TOGETHER], i: usize, o: Vec3) -> V<S> {
+    [sixteen(simd, packs, i, 0) - o.x, sixteen(simd, packs, i, 1) - o.y, sixteen(simd, packs, i, 2) - o.z]
+}
+
+#[inline(always)]
+fn minus<S: Simd>(a: V<S>, b: V<S>) -> V<S> {
+    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
+}
+
+#[inline(always)]
+fn cross<S: Simd>(a: V<S>, b: V<S>) -> V<S> {
+    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+}
+
+#[inline(always)]
+fn dot<S: Simd>(a: V<S>, b: Vec3) -> f32x16<S> {
+    a[2].mul_add(b.z, a[1].mul_add(b.y, a[0] * b.x))
+}
+
+#[inline(always)]
+fn largest<S: Simd>(a: V<S>) -> f32x16<S> {
+    a[0].abs().max(a[1].abs()).max(a[2].abs())
+}
+
+/// A number that is linear in the way, of sixteen triangles: towards the light's middle, its slopes, and how far it goes.
+#[derive(Clone, Copy)]
+struct Linear<S: Simd> {
+    middle: f32x16<S>,
+    slopes: V<S>,
+    reach: f32x16<S>,
+}
+
+impl<S: Simd> Linear<S> {
+    /// f.l, with the other sign for those in `behind`.
+    #[inline(always)]
+    fn new(f: V<S>, eye: &Eye, behind: mask32x16<S>) -> Self {
+        let (m, a, b, c) = (dot(f, eye.l), dot(f, eye.axes[0]), dot(f, eye.axes[1]), dot(f, eye.axes[2]));
+        Linear { middle: behind.select(-m, m), slopes: [a, b, c], reach: a.abs() + b.abs() + c.abs() }
+    }
+
+    #[inline(always)]
+    fn least(&self) -> f32x16<S> {
+        self.middle - self.reach
+    }
+
+    #[inline(always)]
+    fn most(&self) -> f32x16<S> {
+        self.middle + self.reach
+    }
+
+    #[inline(always)]
+    fn store(&self, behind: mask32x16<S>, to: &mut [[f32; 16]; 4]) {
+        let [a, b, c] = self.slopes;
+        self.middle.store_slice(&mut to[0]);
+        behind.select(-a, a).store_slice(&mut to[1]);
+        behind.select(-b, b).store_slice(&mut to[2]);
+        behind.select(-c, c).store_slice(&mut to[3]);
+    }
+}
+
+impl TriangleTree {
+    /// Looks at the triangles of up to four leaves from `eye`: those that may hide some samples of the light go to `seen`. Says
+    /// whether one of those that `filter` lets count hides all of it.
+    #[inline(always)]
+    pub fn look<S: Simd>(
+        &self,
+        simd: S,
+        eye: &Eye,
+        leaves: &[u32],
+        source: u32,
+        filter: &impl Fn(u32) -> bool,
+        seen: &mut Vec<SeenTriangle>,
+    ) -> bool {
+        let last = leaves.len() - 1;
+        let packs: [&Pack; TOGETHER] = [
+            &self.packs[leaves[0] as usize],
+            &self.packs[leaves[last.min(1)] as usize],
+            &self.packs[leaves[last.min(2)] as usize],
+            &self.packs[leaves[last.min(3)] as usize],
+        ];
+        let (a, b, c) = (vertex(simd, packs, 0, eye.o), vertex(simd, packs, 1, eye.o), vertex(simd, packs, 2, eye.o));
+        let (ab, bc, ca) = (minus(a, b), minus(b, c), minus(c, a));
+        let n = cross(ca, minus(b, a));
+        let far_off = largest(a).max(largest(b)).max(largest(c));
+        let side = largest(ab).max(largest(bc)).max(largest(ca));
+        let area = n[0].abs() + n[1].abs() + n[2].abs();
+        let height = n[2].mul_add(a[2], n[1].mul_add(a[1], n[0] * a[0]));
+        // Turned so that the plane is ahead of those with det > 0
+        let zero = simd.splat_f32x16(0.0);
+        let behind = height.simd_lt(zero);
+        let height = height.abs();
+        let u = Linear::new(cross(c, bc), eye, behind);
+        let v = Linear::new(cross(a, ca), eye, behind);
+        let w = Linear::new(cross(b, ab), eye, behind);
+        let d = Linear::new(n, eye, behind);
+        // How far each can be wrong
+        let (side2, side3) = (side * side, side * side * side);
+        let longest = simd.splat_f32x16(eye.longest);
+        let edge = far_off * side * longest * EDGE;
+        let det_wrong = side2 * longest * TURN;
+        let wrong = area * far_off * DEPTH + far_off * side2 * HEIGHT;
+        let sliver = side3 * SLIVER;
+        let graze = area * longest * GRAZE;
+        let sound = side.simd_gt(1e-9)
+            & (far_off * longest * side2).simd_gt(1e-30)
+            & (far_off * longest).simd_lt(1e15)
+            & side.simd_lt(1e9)
+            & area.simd_gt(0.0);
+        // Those that hide nothing
+        let outside = u.most().min(v.most()).min(w.most()).simd_lt(-edge);
+        let (inside_u, inside_v, inside_w) = (u.least(), v.least(), w.least());
+        let inside_one = inside_u.max(inside_v).max(inside_w).simd_gt(edge);
+        let (least, most) = (d.least(), d.most());
+        let large = height.simd_gt(area * (side * 3.0) + wrong);
+        let ahead = least.simd_gt(det_wrong);
+        let away = most.simd_lt(zero) & ((height - wrong) * -most).simd_gt(area * longest * sliver);
+        let mut nothing = (outside & (inside_one | large | ahead)) | away;
+        if eye.finite {
+            let ratio = eye.longest / eye.shortest * GRAZE_ALL;
+            let room = area * (far_off * ratio) + sliver * (1.0 / GRAZE_ALL) + wrong + det_wrong;
+            nothing |= (most + room).simd_lt(height) & height.simd_gt(room);
+        }
+        let keep = (!(nothing & sound)) & area.simd_gt(zero);
+        let mut keep = keep.to_bitmask() as u32;
+        if leaves.len() < TOGETHER {
+            keep &= (1 << (PACK * leaves.len())) - 1;
+        }
+        if keep == 0 {
+            return false;
+        }
+        // Those that hide something: for sure where det is above `near`, for sure not where it is below `far`
+        let middling = height.simd_gt(wrong + sliver * (1.0 / GRAZE)) & sound;
+        let before = if eye.finite { (height + wrong + sliver * (1.0 / GRAZE)) * eye.short } else { zero };
+        let infinite = simd.splat_f32x16(f32::INFINITY);
+        let near = middling.select(before.max(graze) + det_wrong, infinite);
+        let far = if eye.finite { height - area * (side * 3.0) - wrong - det_wrong } else { -infinite };
+        let far = (large & sound).select(far, -infinite);
+        let graze = large.select(-infinite, middling.select(graze + det_wrong, infinite));
+        let graze = sound.select(graze, infinite);
+        let edge = sound.select(edge, infinite);
+        let inside_all = inside_u.min(inside_v).min(inside_w).simd_gt(edge);
+        let whole = inside_all & least.simd_gt(near) & sound;
+        let mut whole = whole.to_bitmask() as u32 & keep;
+        while whole != 0 {
+            let lane = whole.trailing_zeros() as usize & 15;
+            whole &= whole - 1;
+            let id = packs[lane / PACK].ids[lane % PACK];
+            if id != NONE && filter(id) {
+                return true;
+            }
+        }
+        let mut forms = [[[0.0; 16]; 4]; 4];
+        u.store(behind, &mut forms[0]);
+        v.store(behind, &mut forms[1]);
+        w.store(behind, &mut forms[2]);
+        d.store(behind, &mut forms[3]);
+        let (edge, graze, near, far) = (edge.to_array(), graze.to_array(), near.to_array(), far.to_array());
+        while keep != 0 {
+            let lane = keep.trailing_zeros() as usize & 15;
+            keep &= keep - 1;
+            let id = packs[lane / PACK].ids[lane % PACK];
+            if id == NONE || !filter(id) {
+                continue;
+            }
+            let mut triangle = SeenTriangle {
+                middle: [0.0; 4],
+                slopes: [[0.0; 3]; 4],
+                edge: edge[lane],
+                graze: graze[lane],
+                near: near[lane],
+                far: far[lane],
+                leaf: leaves[lane / PACK],
+                place: (lane % PACK) as u32,
+                source,
+            };
+            for i in 0..4 {
+                triangle.middle[i] = forms[i][0][lane];
+                for axis in 0..3 {
+                    triangle.slopes[i][axis] = forms[i][axis + 1][lane];
+                }
+            }
+            seen.push(triangle);
+        }
+        false
+    }
+
+    /// Whether the kernel says that a ray is on a triangle.
+    #[inline(always)]
+    fn meets_one(&self, rays: &RayPacket16, t_max: &[f32; 16], pack: &Pack, place: usize, lane: usize) -> bool {
+        let ray = rays.ray(lane);
+        let slabs = Slabs::new(&ray, self.tree.center, self.tree.half);
+        let hit = if ray.is_valid { intersect(&ray, &slabs, &pack.triangle(place)) } else { None };
+        hit.is_some_and(|hit| hit.t > 0.0 && hit.t <= t_max[lane])
+    }
+
+    /// Which of the rays in `active` the kernel says a triangle is on, 0 < t <= `t_max` of each.
+    #[inline(always)]
+    pub fn meets<S: Simd>(
+        &self,
+        simd: S,
+        rays: &RayPacket16,
+        t_max: &[f32; 16],
+        triangle: &SeenTriangle,
+        active: u16,
+    ) -> u16 {
+        let (pack, place) = (&self.packs[triangle.leaf as usize], triangle.place as usize % PACK);
+        let mut met = 0;
+        if active.count_ones() <= 2 {
+            for lane in bits(u64::from(active)) {
+                met |= u16::from(self.meets_one(rays, t_max, pack, place, lane)) << lane;
+            }
+            return met;
+        }
+        for (which, group) in groups(simd, rays, u64::from(active)).into_iter().enumerate() {
+            if group == 0 {
+                continue;
+            }
+            let axes = [[1, 2, 0], [2, 0, 1], [0, 1, 2]][which / 2];
+            let lanes = rays.lanes(simd, 0, axes, self.tree.center, self.tree.half);
+            let Some(crossings) = intersect_lanes(simd, &lanes, along(pack, place, axes)) else { continue };
+            let reach = f32x16::load_array_ref(simd, t_max);
+            let hit = crossings.mask & crossings.t.simd_gt(simd.splat_f32x16(0.0)) & crossings.t.simd_le(reach);
+            met |= hit.to_bitmask() as u16 & group as u16 & !(crossings.unsure as u16);
+            for lane in bits(crossings.unsure & group) {
+                met |= u16::from(self.meets_one(rays, t_max, pack, place, lane)) << lane;
+            }
+        }
+        met
+    }
+}
+
+/// Three vectors of sixteen.
+#[inline(always)]
+fn load<S: Simd>(simd: S, v: &[[f32; 16]; 3]) -> V<S> {
+    [f32x16::load_array_ref(simd, &v[0]), f32x16::load_array_ref(simd, &v[1]), f32x16::load_array_ref(simd, &v[2])]
+}
+
+impl SeenTriangle {
+    /// One of U, V, W, det for sixteen ways.
+    #[inline(always)]
+    fn value<S: Simd>(&self, i: usize, at: V<S>) -> f32x16<S> {
+        let [a, b, c] = self.slopes[i];
+        at[2].mul_add(c, at[1].mul_add(b, at[0].mul_add(a, self.middle[i])))
+    }
+
+    /// How far it goes within cells of half these sizes.
+    #[inline(always)]
+    fn reach<S: Simd>(&self, i: usize, half: V<S>) -> f32x16<S> {
+        let [a, b, c] = self.slopes[i];
+        half[2].mul_add(c.abs(), half[1].mul_add(b.abs(), half[0] * a.abs()))
+    }
+
+    /// What it hides of sixteen cells: middles and half sizes along the light's axes. `unsure` are those it may hide some of.
+    #[inline(always)]
+    pub fn cells<S: Simd>(&self, simd: S, middle: &[[f32; 16]; 3], half: &[[f32; 16]; 3]) -> Verdict {
+        let (middle, half) = (load(simd, middle), load(simd, half));
+        let (u, v, w, d) = (self.value(0, middle), self.value(1, middle), self.value(2, middle), self.value(3, middle));
+        let (ur, vr, wr, dr) = (self.reach(0, half), self.reach(1, half), self.reach(2, half), self.reach(3, half));
+        let (lu, lv, lw, ld) = (u - ur, v - vr, w - wr, d - dr);
+        let (hu, hv, hw, hd) = (u + ur, v + vr, w + wr, d + dr);
+        let outside = hu.min(hv).min(hw).simd_lt(-self.edge);
+        let other = lu.max(lv).max(lw).simd_gt(self.edge);
+        let nothing = (outside & (other | ld.simd_gt(self.graze) | hd.simd_lt(-self.graze))) | hd.simd_lt(self.far);
+        let all = lu.min(lv).min(lw).simd_gt(self.edge) & ld.simd_gt(self.near);
+        let hidden = all.to_bitmask() as u16;
+        Verdict { hidden, unsure: !(nothing.to_bitmask() as u16 | hidden) }
+    }
+
+    /// What it hides of sixteen samples. `unsure` are those the kernel has to decide.
+    #[inline(always)]
+    pub fn samples<S: Simd>(&self, simd: S, at: &[[f32; 16]; 3]) -> Verdict {
+        let at = load(simd, at);
+        let (u, v, w, d) = (self.value(0, at), self.value(1, at), self.value(2, at), self.value(3, at));
+        let (least, most) = (u.min(v).min(w), u.max(v).max(w));
+        let outside = least.simd_lt(-self.edge);
+        let other: mask32x16<S> = most.simd_gt(self.edge) | d.abs().simd_gt(self.graze);
+        let nothing = (outside & other) | d.simd_lt(self.far);
+        let hidden = least.simd_gt(self.edge) & d.simd_gt(self.near);
+        let hidden = hidden.to_bitmask() as u16;
+        Verdict { hidden, unsure: !(nothing.to_bitmask() as u16 | hidden) }
+    }
+}

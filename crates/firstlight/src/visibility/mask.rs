@@ -1,0 +1,171 @@
+//! Which samples of a light are hidden, a bit for each.
+
+use fearless_simd::{Level, dispatch, f32x16, prelude::*};
+
+use super::Viewpoint;
+use super::occluders::ShadowMesh;
+use super::target::{SampleBlock, Target};
+use super::view::View;
+use crate::accel::{RayPacket16, dispatch_sixteen};
+use crate::ids::LightId;
+use crate::math::{LANES, UNIT_ROUNDOFF, Vec3};
+use crate::scene::{Scene, ShadowRays};
+use crate::shape::SeenTriangle;
+
+impl View {
+    /// Fills [`hidden`](Self::hidden): what triangles, solids and point sets hide, and what is below the horizon for sure. Spheres
+    /// and parallelograms are left to their own tests.
+    ///
+    /// Answers with the number of samples that were asked for one by one.
+    pub fn mask(&mut self, level: Level, scene: &Scene, target: &Target, point: &Viewpoint) -> u64 {
+        let count = target.blocks.len();
+        let mut traced = 0;
+        self.hidden.clear();
+        if count == 0 || self.triangles.is_empty() && self.others.is_empty() && !self.trees {
+            return 0;
+        }
+        self.in_space.clear();
+        self.in_space.extend(target.blocks.iter().map(|block| !block.present));
+        dispatch_sixteen!(level, simd => self.mask_triangles(simd, scene, target, point), else ());
+        if self.trees || !self.others.is_empty() {
+            traced = self.trace(level, scene, target, point);
+        }
+        // From the order of space to that of the light
+        self.hidden.resize(count, 0);
+        for (block, hidden) in target.blocks.iter().zip(&self.in_space) {
+            let mut rest = hidden & block.present;
+            while rest != 0 {
+                let lane = rest.trailing_zeros() as usize % LANES;
+                rest &= rest - 1;
+                let k = block.sample[lane] as usize;
+                self.hidden[k / LANES] |= 1 << (k % LANES);
+            }
+        }
+        traced
+    }
+
+    #[inline(always)]
+    fn mask_triangles<S: Simd>(&mut self, simd: S, scene: &Scene, target: &Target, point: &Viewpoint) {
+        // What is below the horizon needs no answer
+        let seen = target.hull.from(point.p);
+        let size = point.horizon.abs();
+        let wrong = (size.x + size.y + size.z) * seen.longest * (64.0 * UNIT_ROUNDOFF);
+        let middle = point.horizon.dot(seen.l);
+        let [a, b, c] = seen.axes;
+        let slopes = [point.horizon.dot(a), point.horizon.dot(b), point.horizon.dot(c)];
+        if middle - (slopes[0].abs() + slopes[1].abs() + slopes[2].abs()) < wrong {
+            for (block, hidden) in target.blocks.iter().zip(&mut self.in_space) {
+                let x = f32x16::load_array_ref(simd, &block.at[0]);
+                let y = f32x16::load_array_ref(simd, &block.at[1]);
+                let z = f32x16::load_array_ref(simd, &block.at[2]);
+                let height = z.mul_add(slopes[2], y.mul_add(slopes[1], x.mul_add(slopes[0], middle)));
+                *hidden |= height.simd_lt(-wrong).to_bitmask() as u16;
+            }
+        }
+        let triangles = std::mem::take(&mut self.triangles);
+        for triangle in &triangles {
+            let mut all = true;
+            for (c, cells) in target.cells.iter().enumerate() {
+                let first = c * LANES;
+                let last = (first + LANES).min(target.blocks.len());
+                let there = ((1u32 << (last - first)) - 1) as u16;
+                let verdict = triangle.cells(simd, &cells.middle, &cells.half);
+                for i in first..last {
+                    if verdict.hidden >> (i - first) & 1 == 1 {
+                        self.in_space[i] = 0xffff;
+                    }
+                }
+                let mut some = verdict.unsure & there;
+                while some != 0 {
+                    let i = first + some.trailing_zeros() as usize % LANES;
+                    some &= some - 1;
+                    let asking = !self.in_space[i];
+                    if asking == 0 {
+                        continue;
+                    }
+                    let block = &target.blocks[i];
+                    let verdict = triangle.samples(simd, &block.at);
+                    let mut hidden = verdict.hidden;
+                    let unsure = verdict.unsure & asking & !hidden;
+                    if unsure != 0 {
+                        hidden |= by_kernel(simd, scene, target.light, triangle, block, point, unsure);
+                    }
+                    self.in_space[i] |= hidden;
+                }
+                all &= self.in_space[first..last].iter().all(|hidden| *hidden == 0xffff);
+            }
+            if all {
+                break;
+            }
+        }
+        self.triangles = triangles;
+    }
+
+    /// Asks the trees, or only what is no mesh, ray by ray.
+    fn trace(&mut self, level: Level, scene: &Scene, target: &Target, point: &Viewpoint) -> u64 {
+        let mut traced = 0;
+        for (block, hidden) in target.blocks.iter().zip(&mut self.in_space) {
+            let asking = !*hidden;
+            if asking == 0 {
+                continue;
+            }
+            traced += u64::from(asking.count_ones());
+            let shadows = dispatch!(level, simd => shadow_rays(simd, target.light, point, block));
+            *hidden |= if self.trees {
+                scene.geometry.are_blocked(level, &shadows, asking)
+            } else {
+                scene.geometry.are_blocked_by(level, &self.others, &shadows, asking)
+            };
+        }
+        traced
+    }
+}
+
+/// The rays from a point to a block of samples.
+#[inline(always)]
+fn shadow_rays<S: Simd>(simd: S, light: LightId, point: &Viewpoint, block: &SampleBlock) -> ShadowRays {
+    let mut shadows =
+        ShadowRays { from: point.ray(light, Vec3::ZERO, true), rays: RayPacket16::ZERO, t_end: [0.0; LANES] };
+    let l = [
+        f32x16::load_array_ref(simd, &block.point[0]) - point.p.x,
+        f32x16::load_array_ref(simd, &block.point[1]) - point.p.y,
+        f32x16::load_array_ref(simd, &block.point[2]) - point.p.z,
+    ];
+    for axis in 0..3 {
+        shadows.rays.o[axis] = [point.start[axis]; LANES];
+        l[axis].store_slice(&mut shadows.rays.d[axis]);
+    }
+    // `ShadowRay::end`, operation by operation
+    let o = point.start.abs();
+    let length = l[0].abs() + l[1].abs() + l[2].abs();
+    let end = -((length + (o.x + o.y + o.z)) / length * (32.0 * UNIT_ROUNDOFF)) + 1.0;
+    end.store_slice(&mut shadows.t_end);
+    shadows
+}
+
+/// Lets the kernel decide for the samples in `unsure`.
+#[inline(never)]
+fn by_kernel<S: Simd>(
+    simd: S,
+    scene: &Scene,
+    light: LightId,
+    triangle: &SeenTriangle,
+    block: &SampleBlock,
+    point: &Viewpoint,
+    unsure: u16,
+) -> u16 {
+    simd.vectorize(
+        #[inline(always)]
+        || {
+            let Some(mesh) = ShadowMesh::of(&scene.geometry, triangle.source, light) else { return 0 };
+            let mut shadows = shadow_rays(simd, light, point, block);
+            if let Some(placement) = mesh.placement {
+                for lane in (0..LANES).filter(|lane| unsure >> lane & 1 == 1) {
+                    let line = placement.line(shadows.rays.o(lane), shadows.rays.d(lane));
+                    shadows.rays.set(lane, line.o.as_vec3(), line.d.as_vec3());
+                }
+            }
+            mesh.mesh.tree.meets(simd, &shadows.rays, &shadows.t_end, triangle, unsure)
+        },
+    )
+}

@@ -1,0 +1,354 @@
+//! What may stand between some points and a light, gathered once for all of them.
+
+use fearless_simd::{Level, Simd};
+
+use super::Viewpoint;
+use super::shaft::{Horizon, Shaft};
+use super::target::{LightHull, Target};
+use crate::accel::{Aabb, dispatch_sixteen};
+use crate::ids::{LightId, SurfaceId};
+use crate::math::Vec3;
+use crate::scene::{Geometry, Item, Meets, Placed, Scene, Target as PlacedTarget};
+use crate::shape::{Mesh, Parallelogram, Placement, PlaneSide, Sphere};
+
+/// A sphere or parallelogram: of the lists of obstacles, of the upper tree, or of the round lights that block.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Which {
+    Listed(u32),
+    InTree(u32),
+    Light(u32),
+}
+
+/// A mesh in its place: 0 is that of the world, others are what is placed, counted from 1.
+pub(crate) type Source = u32;
+
+/// All that may stand between the points of a group and one light. What is not here does not, whatever rounding says.
+#[derive(Debug, Default)]
+pub(crate) struct Occluders {
+    pub spheres: Vec<Which>,
+    pub flats: Vec<(Which, PlaneSide)>,
+    /// Disk lights, as the scene lists them.
+    pub disks: Vec<u32>,
+    /// Leaves of the trees of meshes.
+    pub leaves: Vec<(Source, u32)>,
+    /// Solids and point sets, as they are placed.
+    pub others: Vec<u32>,
+    /// Whether the trees held more than was asked for: then they have to be asked ray by ray.
+    pub too_many: bool,
+    /// Whether fewer points might find less: not where there are no vectors to gather with.
+    pub by_parts: bool,
+    /// Meshes that the shaft leads through.
+    meshes: Vec<Source>,
+}
+
+/// A mesh that casts shadows, in its place.
+pub(crate) struct ShadowMesh<'a> {
+    pub mesh: &'a Mesh,
+    pub placement: Option<&'a Placement>,
+    first: u32,
+    meets: Meets,
+    geometry: &'a Geometry,
+    light: LightId,
+}
+
+impl<'a> ShadowMesh<'a> {
+    /// With what of it stands in the way of a light.
+    pub fn of(geometry: &'a Geometry, source: Source, light: LightId) -> Option<Self> {
+        if source == 0 {
+            let world = geometry.world.as_ref()?;
+            let mesh = &world.mesh;
+            return Some(ShadowMesh { mesh, placement: None, first: 0, meets: world.shadow, geometry, light });
+        }
+        let thing = &geometry.placed[source as usize - 1];
+        let PlacedTarget::Mesh(mesh) = thing.target else { return None };
+        let mesh = &geometry.meshes[mesh as usize];
+        let (placement, first) = (Some(&thing.placement), thing.surface.0);
+        Some(ShadowMesh { mesh, placement, first, meets: thing.shadow, geometry, light })
+    }
+
+    /// Whether a triangle stands in the way of the light. What else lets light through has its place here.
+    #[inline(always)]
+    pub fn casts(&self, triangle: u32) -> bool {
+        self.meets == Meets::All
+            || self.geometry.casts(SurfaceId(self.first + self.mesh.part(triangle).surface), self.light)
+    }
+}
+
+/// The sphere's own test is wrong by less than this part of the radius, and of the distance.
+pub(crate) const SPHERE_ROOM: [f64; 2] = [4e-4, 1e-5];
+
+impl Scene {
+    pub(crate) fn sphere(&self, which: Which) -> &Sphere {
+        match which {
+            Which::Listed(i) => &self.obstacles[i as usize],
+            Which::InTree(i) => &self.geometry.spheres[i as usize].shape,
+            Which::Light(i) => &self.light_obstacles.spheres[i as usize].1,
+        }
+    }
+
+    pub(crate) fn flat(&self, which: Which) -> &Parallelogram {
+        match which {
+            Which::Listed(i) => &self.flat_obstacles[i as usize],
+            Which::InTree(i) => &self.geometry.parallelograms[i as usize].shape,
+            Which::Light(_) => unreachable!("flat lights that block are listed, or disks"),
+        }
+    }
+}
+
+impl Shaft {
+    /// From points to a light.
+    pub fn of(points: &[Viewpoint], indices: &[u32], hull: &LightHull) -> Shaft {
+        let mut starts = Aabb::EMPTY;
+        let mut apart = Vec3::ZERO;
+        let first = &points[indices[0] as usize];
+        let mut horizon = Some(Horizon { n: first.horizon, least: f64::INFINITY });
+        for point in indices.iter().map(|i| &points[*i as usize]) {
+            // Some shapes are asked from the point itself
+            starts = starts.with(point.start).with(point.p);
+            apart = apart.max((point.start - point.p).abs() * 1.0001);
+            match &mut horizon {
+                Some(horizon) if horizon.n == point.horizon => {
+                    let height = |v: Vec3| point.horizon.as_dvec3().dot(v.as_dvec3());
+                    horizon.least = horizon.least.min(height(point.p)).min(height(point.start));
+                }
+                _ => horizon = None,
+            }
+        }
+        let mut shaft = Shaft::between(starts, hull, apart);
+        shaft.horizon = horizon;
+        shaft
+    }
+
+    /// The same in the space of something placed.
+    fn placed(&self, placement: &Placement, hull: &LightHull, apart: Vec3) -> Shaft {
+        let m = &placement.object_from_world;
+        let size = |v: Vec3| {
+            let (a, v) = (&m.matrix3, v.as_dvec3());
+            a.x_axis.abs() * v.x + a.y_axis.abs() * v.y + a.z_axis.abs() * v.z
+        };
+        let Aabb { min, max } = self.points;
+        let middle = (min.as_dvec3() + max.as_dvec3()) * 0.5;
+        let (center, half) = (m.transform_point3(middle), size((max - min) * 0.5) * (1.0 + 1e-6));
+        // Rays start where single precision puts them
+        let room = (center.abs() + half) * f64::from(f32::EPSILON);
+        let points = Aabb { min: (center - half - room).as_vec3(), max: (center + half + room).as_vec3() };
+        let hull = if hull.finite {
+            LightHull {
+                center: m.transform_point3(hull.center.as_dvec3()).as_vec3(),
+                axes: hull.axes.map(|a| m.transform_vector3(a.as_dvec3()).as_vec3()),
+                finite: true,
+            }
+        } else {
+            LightHull { center: m.transform_vector3(hull.center.as_dvec3()).as_vec3(), ..*hull }
+        };
+        let apart = size(apart).as_vec3() + room.as_vec3() * 2.0;
+        let mut shaft = Shaft::between(points, &hull, apart);
+        if !hull.finite {
+            // The rounding of the direction
+            let room = shaft.low.abs() * f32::EPSILON;
+            (shaft.low, shaft.high) = (shaft.low - room, shaft.high + room);
+        }
+        shaft.horizon = self.horizon.map(|horizon| {
+            let n = (placement.world_from_object.matrix3.transpose() * horizon.n.as_dvec3()).as_vec3();
+            let above = horizon.least - horizon.n.as_dvec3().dot(middle);
+            Horizon { n, least: n.as_dvec3().dot(center) + above }
+        });
+        shaft
+    }
+}
+
+impl Occluders {
+    pub fn clear(&mut self) {
+        self.spheres.clear();
+        self.flats.clear();
+        self.disks.clear();
+        self.leaves.clear();
+        self.others.clear();
+        self.meshes.clear();
+        self.too_many = false;
+    }
+
+    /// How many things it holds: shapes and leaves.
+    pub fn count(&self) -> usize {
+        self.spheres.len() + self.flats.len() + self.disks.len() + self.leaves.len() + self.others.len()
+    }
+
+    /// Gathers what may stand between those of `points` in `indices` and a light: all listed shapes that cast shadows for it and
+    /// are not proved to be out of the way, and of the trees at most `cap` leaves of triangles.
+    pub fn gather(
+        &mut self,
+        level: Level,
+        scene: &Scene,
+        target: &Target,
+        points: &[Viewpoint],
+        indices: &[u32],
+        cap: usize,
+    ) {
+        self.clear();
+        let light = target.light;
+        let shaft = Shaft::of(points, indices, &target.hull);
+        let upright = Shaft { horizon: None, ..shaft };
+        let [sphere_links, flat_links] = &scene.obstacle_links;
+        let meets = |sphere: &Sphere| {
+            let [low, high] = sphere.bounds();
+            let far = (low - shaft.points.min.as_dvec3()).abs().max((high - shaft.points.max.as_dvec3()).abs());
+            let room = SPHERE_ROOM[0] * sphere.r + SPHERE_ROOM[1] * far.length();
+            let below = |horizon: &Horizon| {
+                let n = horizon.n.as_dvec3();
+                n.dot(sphere.c) + n.length() * (sphere.r + room) < horizon.least
+            };
+            upright.meets(low, high, room) && !shaft.horizon.as_ref().is_some_and(below)
+        };
+        for (i, sphere) in scene.obstacles.iter().enumerate() {
+            if meets(sphere) && scene.casts(sphere_links, i, light) {
+                self.spheres.push(Which::Listed(i as u32));
+            }
+        }
+        // A light's own shape does not hide it
+        for (i, (index, sphere)) in scene.light_obstacles.spheres.iter().enumerate() {
+            if *index != light.index() && meets(sphere) {
+                self.spheres.push(Which::Light(i as u32));
+            }
+        }
+        let disks = scene.light_obstacles.disks.iter().enumerate();
+        self.disks.extend(disks.filter(|(_, (index, _))| *index != light.index()).map(|(i, _)| i as u32));
+        let sides = &scene.light_sides[light.index()];
+        for (i, flat) in scene.flat_obstacles.iter().enumerate() {
+            let side = sides.get(i).copied().unwrap_or(PlaneSide::Both);
+            let one_sided = |k: &u32| {
+                let point = &points[*k as usize];
+                flat.is_one_sided(point.p, point.error, side)
+            };
+            if scene.casts(flat_links, i, light) && !indices.iter().all(one_sided) {
+                self.flats.push((Which::Listed(i as u32), side));
+            }
+        }
+        if scene.geometry.has_trees() {
+            self.by_parts = true;
+            let gathered = dispatch_sixteen!(
+                level,
+                simd => self.gather_trees(simd, scene, target, &shaft, points, indices, cap),
+                else {
+                    self.by_parts = false;
+                    false
+                }
+            );
+            self.too_many = !gathered;
+        }
+    }
+
+    #[inline(always)]
+    #[allow(clippy::too_many_arguments, reason = "the rest of `gather`")]
+    fn gather_trees<S: Simd>(
+        &mut self,
+        simd: S,
+        scene: &Scene,
+        target: &Target,
+        shaft: &Shaft,
+        points: &[Viewpoint],
+        indices: &[u32],
+        cap: usize,
+    ) -> bool {
+        let geometry = &*scene.geometry;
+        if geometry.world.as_ref().is_some_and(|world| world.shadow != Meets::None)
+            && !self.gather_mesh(simd, geometry, 0, target.light, shaft, cap)
+        {
+            return false;
+        }
+        let casts = |surface| geometry.casts(surface, target.light);
+        let stands = |thing: u32| match &geometry.placed[thing as usize] {
+            Placed {
+                shadow: Meets::Some, target: PlacedTarget::Points(_) | PlacedTarget::Solid(_), surface, ..
+            } => casts(*surface),
+            thing => thing.shadow != Meets::None,
+        };
+        for &thing in &geometry.unbounded {
+            if stands(thing) {
+                self.others.push(thing);
+            }
+        }
+        if geometry.items.is_empty() {
+            return true;
+        }
+        let upright = Shaft { horizon: None, ..*shaft };
+        let mut found = 0;
+        let all = geometry.upper.gather(
+            simd,
+            #[inline(always)]
+            |center, half| {
+                let shaft = upright.within(center, half);
+                #[inline(always)]
+                move |simd, node: &_| shaft.meet(simd, node)
+            },
+            |item| {
+                found += 1;
+                match geometry.items[item as usize] {
+                    Item::Sphere(i) if casts(geometry.spheres[i as usize].surface) => {
+                        self.spheres.push(Which::InTree(i));
+                    }
+                    Item::Parallelogram(i) if casts(geometry.parallelograms[i as usize].surface) => {
+                        self.flats.push((Which::InTree(i), PlaneSide::Both));
+                    }
+                    Item::Placed(i) if stands(i) => match geometry.placed[i as usize].target {
+                        PlacedTarget::Mesh(_) => self.meshes.push(i + 1),
+                        PlacedTarget::Points(_) | PlacedTarget::Solid(_) => self.others.push(i),
+                    },
+                    _ => {}
+                }
+                found <= cap
+            },
+        );
+        if !all {
+            return false;
+        }
+        let apart = indices
+            .iter()
+            .map(|i| &points[*i as usize])
+            .fold(Vec3::ZERO, |apart, point| apart.max((point.start - point.p).abs() * 1.0001));
+        for i in 0..self.meshes.len() {
+            let source = self.meshes[i];
+            let placement = &geometry.placed[source as usize - 1].placement;
+            let own = shaft.placed(placement, &target.hull, apart);
+            if !self.gather_mesh(simd, geometry, source, target.light, &own, cap) {
+                return false;
+            }
+        }
+        true
+    }
+
+    /// The leaves of one mesh. Not inlined: one copy for each instruction set is enough.
+    #[inline(never)]
+    fn gather_mesh<S: Simd>(
+        &mut self,
+        simd: S,
+        geometry: &Geometry,
+        source: Source,
+        light: LightId,
+        shaft: &Shaft,
+        cap: usize,
+    ) -> bool {
+        let Some(mesh) = ShadowMesh::of(geometry, source, light) else { return true };
+        simd.vectorize(
+            #[inline(always)]
+            || {
+                mesh.mesh.tree.gather(
+                    simd,
+                    #[inline(always)]
+                    |center, half| {
+                        let shaft = shaft.within(center, half);
+                        #[inline(always)]
+                        move |simd, node: &_| shaft.meet(simd, node)
+                    },
+                    #[inline(always)]
+                    |leaf| {
+                        let room = self.leaves.len() < cap;
+                        if room {
+                            self.leaves.push((source, leaf));
+                        }
+                        room
+                    },
+                )
+            },
+        )
+    }
+}

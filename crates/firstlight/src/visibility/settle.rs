@@ -1,0 +1,111 @@
+//! From many points and a light to what is seen from each.
+
+use fearless_simd::Level;
+
+use super::Viewpoint;
+use super::occluders::Occluders;
+use super::target::Target;
+use super::view::{View, Visibility};
+use crate::accel::Aabb;
+use crate::scene::Scene;
+
+/// Leaves of triangles gathered for many points; more, and the points are parted.
+const MANY: usize = 16;
+/// Points that are taken one by one if they are not settled together.
+const FEW: usize = 16;
+/// For one point: as many as are dearer to look at than rays are to trace, at first and for each block of samples.
+const ONE: usize = 24;
+const ONE_MORE: usize = 12;
+
+/// Settles what is seen of lights, points together as long as little stands in the way. Keeps its memory.
+#[derive(Debug, Default)]
+pub(crate) struct Settler {
+    pub occluders: Occluders,
+    pub view: View,
+    parts: Vec<(usize, usize)>,
+}
+
+/// What was done, for statistics.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) struct Settled {
+    /// By [`Visibility`].
+    pub visibility: [u64; 4],
+    /// Shafts that something was gathered in.
+    pub shafts: u64,
+    /// What they held.
+    pub occluders: u64,
+    /// Samples whose rays the trees were asked for.
+    pub traced: u64,
+}
+
+impl Settler {
+    /// Hears what of a light is seen from each of the `points` whose numbers are in `order`, in any order: `each` is told which
+    /// point, how much is seen, and by which view. The order of `order` is lost.
+    #[allow(clippy::too_many_arguments, reason = "a light of a scene and points, as lists")]
+    pub fn settle(
+        &mut self,
+        level: Level,
+        scene: &Scene,
+        target: &Target,
+        points: &[Viewpoint],
+        order: &mut [u32],
+        counts: &mut Settled,
+        mut each: impl FnMut(usize, Visibility, &View),
+    ) {
+        let mut parts = std::mem::take(&mut self.parts);
+        parts.clear();
+        if !order.is_empty() {
+            parts.push((0, order.len()));
+        }
+        while let Some((start, end)) = parts.pop() {
+            let part = &mut order[start..end];
+            let cap = if part.len() > 1 { MANY } else { ONE + ONE_MORE * target.blocks.len() };
+            self.occluders.gather(level, scene, target, points, part, cap);
+            counts.shafts += 1;
+            if self.occluders.too_many && part.len() > 1 && self.occluders.by_parts {
+                if part.len() <= FEW {
+                    parts.extend((start..end).map(|i| (i, i + 1)));
+                    continue;
+                }
+                // In four
+                let middle = halve(points, part);
+                let (left, right) = part.split_at_mut(middle);
+                let quarters = [halve(points, left), middle, middle + halve(points, right), end - start];
+                let mut first = 0;
+                for last in quarters {
+                    if last > first {
+                        parts.push((start + first, start + last));
+                    }
+                    first = last;
+                }
+                continue;
+            }
+            counts.occluders += self.occluders.count() as u64;
+            for k in part.iter().map(|k| *k as usize) {
+                let visibility = self.view.classify(level, scene, target, &self.occluders, &points[k]);
+                counts.visibility[visibility as usize] += 1;
+                if visibility == Visibility::Mask {
+                    counts.traced += self.view.mask(level, scene, target, &points[k]);
+                }
+                each(k, visibility, &self.view);
+            }
+        }
+        self.parts = parts;
+    }
+}
+
+/// Parts points where their box is longest, and says how many are in the first part: at least one in each.
+fn halve(points: &[Viewpoint], part: &mut [u32]) -> usize {
+    let bounds = part.iter().fold(Aabb::EMPTY, |bounds, k| bounds.with(points[*k as usize].start));
+    let size = bounds.max - bounds.min;
+    let axis = if size.x >= size.y && size.x >= size.z { 0 } else { 1 + usize::from(size.z > size.y) };
+    let middle = bounds.min[axis] + size[axis] * 0.5;
+    let mut left = 0;
+    for i in 0..part.len() {
+        if points[part[i] as usize].start[axis] < middle {
+            part.swap(i, left);
+            left += 1;
+        }
+    }
+    if left == 0 || left == part.len() { part.len() / 2 } else { left }
+}

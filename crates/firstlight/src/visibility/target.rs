@@ -1,0 +1,241 @@
+//! A light as something to be seen from a surface: a box along its own axes around all that shines, and its sampled
+//! points in the order of space.
+
+use crate::accel::Aabb;
+use crate::ids::LightId;
+use crate::light::{AreaShape, Light, LightKind};
+use crate::math::{DMat3, DVec3, LANES, Vec3};
+use crate::scene::Scene;
+
+/// What encloses a light: the points `center` + u `axes[0]` + v `axes[1]` + w `axes[2]`, each of u, v, w from -1 to 1; or,
+/// of a light that is infinitely far away, the direction `center` alone.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct LightHull {
+    pub center: Vec3,
+    pub axes: [Vec3; 3],
+    /// Whether it is somewhere.
+    pub finite: bool,
+}
+
+/// A light as it is seen from one point: the ways `l` + u `axes[0]` + v `axes[1]` + w `axes[2]` lead to it.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct LightSeen {
+    pub l: Vec3,
+    pub axes: [Vec3; 3],
+    /// The largest coordinate of any way, at least.
+    pub longest: f32,
+    /// The largest coordinate of every way, at most.
+    pub shortest: f32,
+    pub finite: bool,
+}
+
+/// Sixteen sampled points, by their coordinates along the hull's axes. Where there is none, those of another one.
+#[derive(Clone, Copy, Debug)]
+#[repr(C, align(64))]
+pub(crate) struct SampleBlock {
+    pub at: [[f32; LANES]; 3],
+    /// The points themselves, world space.
+    pub point: [[f32; LANES]; 3],
+    /// Which of the light's samples they are.
+    pub sample: [u32; LANES],
+    /// The lanes that hold a sample.
+    pub present: u16,
+}
+
+/// Where the points of sixteen blocks lie: the middle and half the size of each along the hull's axes.
+#[derive(Clone, Copy, Debug)]
+#[repr(C, align(64))]
+pub(crate) struct Cells {
+    pub middle: [[f32; LANES]; 3],
+    pub half: [[f32; LANES]; 3],
+}
+
+/// A light, ready to be aimed at.
+#[derive(Clone, Debug)]
+pub(crate) struct Target {
+    /// The light itself.
+    pub light: LightId,
+    pub hull: LightHull,
+    /// The sampled points, neighbours together; none of a light that is integrated.
+    pub blocks: Vec<SampleBlock>,
+    /// Where the blocks lie, sixteen at a time.
+    pub cells: Vec<Cells>,
+    pub samples: usize,
+}
+
+/// Axes are this much longer than they need to be, and no shorter than this against the others: more than single precision
+/// loses.
+const ROOM: f64 = 1e-5;
+
+impl LightHull {
+    fn at(center: Vec3, finite: bool) -> Self {
+        LightHull { center, axes: [Vec3::ZERO; 3], finite }
+    }
+
+    /// The smallest hull with axes along `e0`, `e1` and across them, around `points`.
+    fn around(e0: DVec3, e1: DVec3, points: &[DVec3]) -> Self {
+        let none = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+        let (low, high) = points.iter().fold(none, |(a, b), q| (a.min(*q), b.max(*q)));
+        let center = (low + (high - low) * 0.5).as_vec3();
+        let across = e0.cross(e1).normalize_or(DVec3::Y);
+        let thin = across * (e0.length() + e1.length());
+        let mut hull = LightHull { center, axes: [e0, e1, thin].map(|axis| axis.as_vec3()), finite: true };
+        // Fit the axes to the points, then look whether rounding lets any point out
+        let mut needed = [0.0f64; 3];
+        for q in points {
+            let at = hull.coordinates(*q);
+            for axis in 0..3 {
+                needed[axis] = needed[axis].max(at[axis].abs());
+            }
+        }
+        for axis in 0..3 {
+            hull.axes[axis] = (hull.axes[axis].as_dvec3() * (needed[axis] * (1.0 + ROOM)).max(ROOM)).as_vec3();
+        }
+        while !points.iter().all(|q| hull.coordinates(*q).abs().max_element() <= 1.0) {
+            hull.axes = hull.axes.map(|a| a * 1.5);
+        }
+        hull
+    }
+
+    pub fn of(light: &Light) -> Self {
+        match &light.kind {
+            LightKind::Point(point) => Self::at(point.position, true),
+            LightKind::Spot(spot) => Self::at(spot.position, true),
+            LightKind::Directional(directional) => Self::at(directional.to_light, false),
+            LightKind::Area(area) => {
+                // The shape as it is described, and its points as they are rounded
+                let (e0, e1, mut points) = match &area.shape {
+                    AreaShape::Rectangle(rectangle) => {
+                        let corners = rectangle.shape.corners.map(|corner| corner.as_dvec3());
+                        let deep = rectangle.shape.deep_corners();
+                        (rectangle.e0, rectangle.e1, corners.into_iter().chain(deep).collect::<Vec<_>>())
+                    }
+                    AreaShape::Disk(disk) => {
+                        let (a, b) = (disk.a, disk.b);
+                        (a, b, [a + b, a - b, b - a, -a - b].map(|v| disk.center + v).into())
+                    }
+                    AreaShape::Sphere(sphere) => {
+                        let r = DVec3::splat(sphere.radius);
+                        let (x, y) = (DVec3::X * sphere.radius, DVec3::Y * sphere.radius);
+                        (x, y, vec![sphere.center - r, sphere.center + r])
+                    }
+                };
+                if !light.exact {
+                    points.extend((0..area.samples()).map(|k| area.point(k).as_dvec3()));
+                }
+                Self::around(e0, e1, &points)
+            }
+        }
+    }
+
+    /// The coordinates of a point along the axes.
+    fn coordinates(&self, q: DVec3) -> DVec3 {
+        let [a, b, c] = self.axes.map(|v| v.as_dvec3());
+        DMat3::from_cols(a, b, c).inverse() * (q - self.center.as_dvec3())
+    }
+
+    /// How far the light reaches from its centre, along the axes of the world.
+    pub fn reach(&self) -> Vec3 {
+        let [a, b, c] = self.axes.map(|v| v.abs());
+        a + b + c
+    }
+
+    /// The box around it. For a light infinitely far away the box of its direction.
+    pub fn bounds(&self) -> Aabb {
+        let reach = self.reach() * (1.0 + 4.0 * f32::EPSILON);
+        let room = (self.center.abs() + reach) * f32::EPSILON;
+        Aabb { min: self.center - reach - room, max: self.center + reach + room }
+    }
+
+    /// The light from `p`.
+    #[inline(always)]
+    pub fn from(&self, p: Vec3) -> LightSeen {
+        let l = if self.finite { self.center - p } else { self.center };
+        LightSeen::new(l, self.axes, self.finite)
+    }
+}
+
+impl LightSeen {
+    #[inline(always)]
+    pub fn new(l: Vec3, axes: [Vec3; 3], finite: bool) -> Self {
+        let reach = axes[0].abs() + axes[1].abs() + axes[2].abs();
+        let longest = (l.abs() + reach).max_element() * (1.0 + 4.0 * f32::EPSILON);
+        let shortest = ((l.abs() - reach).max_element() - longest * (4.0 * f32::EPSILON)).max(0.0);
+        LightSeen { l, axes, longest, shortest, finite }
+    }
+
+    /// Between what values f.w lies for the ways w, but for rounding: its middle and how far it goes from there.
+    #[inline(always)]
+    pub fn range(&self, f: Vec3) -> (f32, f32) {
+        let [a, b, c] = self.axes;
+        (f.dot(self.l), f.dot(a).abs() + f.dot(b).abs() + f.dot(c).abs())
+    }
+}
+
+impl Target {
+    /// All lights of a scene, in its order.
+    pub fn of_all(scene: &Scene) -> Vec<Self> {
+        (0..scene.lights.len()).map(|index| Self::new(scene, LightId(index as u32))).collect()
+    }
+
+    pub fn new(scene: &Scene, id: LightId) -> Self {
+        let light = &scene.lights[id.index()];
+        let hull = LightHull::of(light);
+        let mut target = Target { light: id, hull, blocks: Vec::new(), cells: Vec::new(), samples: light.samples() };
+        let area = match &light.kind {
+            LightKind::Area(area) if !light.exact => area,
+            _ => return target,
+        };
+        let mut samples: Vec<(u32, Vec3, DVec3)> = (0..area.samples())
+            .map(|k| (k as u32, area.point(k), hull.coordinates(area.point(k).as_dvec3())))
+            .collect();
+        gather_neighbours(&mut samples);
+        for chunk in samples.chunks(LANES) {
+            let mut block = SampleBlock {
+                at: [[0.0; LANES]; 3],
+                point: [[0.0; LANES]; 3],
+                sample: [0; LANES],
+                present: ((1u32 << chunk.len()) - 1) as u16,
+            };
+            for lane in 0..LANES {
+                let (k, q, at) = chunk[lane.min(chunk.len() - 1)];
+                for axis in 0..3 {
+                    block.at[axis][lane] = at[axis] as f32;
+                    block.point[axis][lane] = q[axis];
+                }
+                block.sample[lane] = k;
+            }
+            target.blocks.push(block);
+        }
+        for blocks in target.blocks.chunks(LANES) {
+            let mut cells = Cells { middle: [[0.0; LANES]; 3], half: [[0.0; LANES]; 3] };
+            for (place, block) in blocks.iter().enumerate() {
+                for axis in 0..3 {
+                    let (low, high) = block.at[axis]
+                        .iter()
+                        .fold((f32::INFINITY, f32::NEG_INFINITY), |(a, b), x| (a.min(*x), b.max(*x)));
+                    cells.middle[axis][place] = (low + high) * 0.5;
+                    cells.half[axis][place] = (high - low) * 0.5 + 4.0 * f32::EPSILON;
+                }
+            }
+            target.cells.push(cells);
+        }
+        target
+    }
+}
+
+/// Orders samples so that each sixteen are neighbours: halves them along their longest side again and again.
+fn gather_neighbours(samples: &mut [(u32, Vec3, DVec3)]) {
+    if samples.len() <= LANES {
+        return;
+    }
+    let none = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+    let (low, high) = samples.iter().fold(none, |(a, b), (_, _, at)| (a.min(*at), b.max(*at)));
+    let size = high - low;
+    let axis = (0..3).max_by(|a, b| size[*a].total_cmp(&size[*b])).unwrap_or(0);
+    let half = samples.len().div_ceil(LANES) / 2 * LANES;
+    samples.select_nth_unstable_by(half, |a, b| a.2[axis].total_cmp(&b.2[axis]).then(a.0.cmp(&b.0)));
+    let (left, right) = samples.split_at_mut(half);
+    gather_neighbours(left);
+    gather_neighbours(right);
+}

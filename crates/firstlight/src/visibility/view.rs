@@ -1,0 +1,262 @@
+//! A light, seen from one point past what may stand in the way.
+
+use fearless_simd::{Level, Simd};
+
+use super::Viewpoint;
+use super::occluders::{Occluders, ShadowMesh, Source};
+use super::shaft::Shaft;
+use super::target::{LightSeen, Target};
+use crate::accel::dispatch_sixteen;
+use crate::math::{DVec3, UNIT_ROUNDOFF, Vec3};
+use crate::scene::{Scene, Target as Placed};
+use crate::shape::{Cover, DiskShadow, Eye, ParallelogramShadow, Placement, SeenTriangle, SphereShadow, TOGETHER};
+
+/// How much of a light reaches a point.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Visibility {
+    /// All of it that is above the horizon.
+    Lit,
+    /// Nothing: one thing stands before all of it.
+    Hidden,
+    /// Nothing: it is behind the surface.
+    BelowHorizon,
+    /// Each sample for itself.
+    Mask,
+}
+
+/// What may hide some of a light from one point.
+#[derive(Debug, Default)]
+pub(crate) struct View {
+    pub spheres: Vec<SphereShadow>,
+    pub flats: Vec<ParallelogramShadow>,
+    pub disks: Vec<DiskShadow>,
+    pub triangles: Vec<SeenTriangle>,
+    /// Solids and point sets, as they are placed.
+    pub others: Vec<u32>,
+    /// Whether all trees have to be asked, ray by ray.
+    pub trees: bool,
+    /// For each block of sixteen samples, those that are known to be hidden: in the light's order.
+    pub hidden: Vec<u16>,
+    leaves: Vec<u32>,
+    /// The same in the order of space, while it is made.
+    pub(super) in_space: Vec<u16>,
+}
+
+/// Products of three numbers with sum are wrong by less than this, in the sum of their sizes.
+const DOT: f32 = 16.0 * UNIT_ROUNDOFF;
+
+impl View {
+    /// What of a light is seen from `point`, past `occluders`, which were gathered for it. What is left to ask for the samples is
+    /// in this view then.
+    pub fn classify(
+        &mut self,
+        level: Level,
+        scene: &Scene,
+        target: &Target,
+        occluders: &Occluders,
+        point: &Viewpoint,
+    ) -> Visibility {
+        self.spheres.clear();
+        self.flats.clear();
+        self.disks.clear();
+        self.triangles.clear();
+        self.others.clear();
+        self.hidden.clear();
+        self.trees = false;
+        let light = target.hull.from(point.p);
+        if is_below(&light, point.horizon) || is_below(&light, point.ns) {
+            return Visibility::BelowHorizon;
+        }
+        for which in &occluders.spheres {
+            let shadow = scene.sphere(*which).shadow(point.p, point.error);
+            if shadow.is_below(point.horizon) {
+                continue;
+            }
+            match shadow.covers(light.l, &light.axes, light.finite) {
+                Cover::Nothing => {}
+                Cover::All => return Visibility::Hidden,
+                Cover::Some => self.spheres.push(shadow),
+            }
+        }
+        for (which, side) in &occluders.flats {
+            let shadow = scene.flat(*which).shadow(point.p, point.error);
+            if shadow.is_one_sided(*side) {
+                continue;
+            }
+            match shadow.covers(light.l, &light.axes, light.longest, light.finite) {
+                Cover::Nothing => {}
+                Cover::All => return Visibility::Hidden,
+                Cover::Some => self.flats.push(shadow),
+            }
+        }
+        for disk in &occluders.disks {
+            let shadow = scene.light_obstacles.disks[*disk as usize].1.shadow(point.p, point.error);
+            match shadow.covers(light.l, &light.axes, light.longest, light.finite) {
+                Cover::Nothing => {}
+                Cover::All => return Visibility::Hidden,
+                Cover::Some => self.disks.push(shadow),
+            }
+        }
+        if occluders.too_many {
+            self.trees = true;
+            return Visibility::Mask;
+        }
+        if !occluders.leaves.is_empty() {
+            let hidden = dispatch_sixteen!(
+                level,
+                simd => self.look(simd, scene, target, &light, occluders, point),
+                else unreachable!("leaves are gathered with vectors only")
+            );
+            if hidden {
+                return Visibility::Hidden;
+            }
+        }
+        self.gather_others(scene, target, &light, occluders, point);
+        let nothing = self.spheres.is_empty()
+            && self.flats.is_empty()
+            && self.disks.is_empty()
+            && self.triangles.is_empty()
+            && self.others.is_empty();
+        if nothing { Visibility::Lit } else { Visibility::Mask }
+    }
+
+    /// Keeps those solids and point sets that may be in the way.
+    fn gather_others(
+        &mut self,
+        scene: &Scene,
+        target: &Target,
+        light: &LightSeen,
+        occluders: &Occluders,
+        point: &Viewpoint,
+    ) {
+        if occluders.others.is_empty() {
+            return;
+        }
+        let own = [*point];
+        let shaft = Shaft::of(&own, &[0], &target.hull);
+        for &index in &occluders.others {
+            let thing = &scene.geometry.placed[index as usize];
+            if let Placed::Solid(solid) = thing.target {
+                let solid = &scene.geometry.solids[solid as usize];
+                if let Some((on, n)) = solid.plane() {
+                    if stays_before(&thing.placement, on, n, light, point) {
+                        continue;
+                    }
+                } else if let Some(bounds) = solid.bounds() {
+                    let [low, high] = thing.placement.bounds(bounds);
+                    let far = (high - point.start.as_dvec3()).abs().max((low - point.start.as_dvec3()).abs());
+                    if !shaft.meets(low, high, far.max_element() * 1e-5) {
+                        continue;
+                    }
+                }
+            }
+            self.others.push(index);
+        }
+    }
+
+    /// Looks at all triangles that were gathered. Says whether one hides all of the light.
+    #[inline(always)]
+    fn look<S: Simd>(
+        &mut self,
+        simd: S,
+        scene: &Scene,
+        target: &Target,
+        light: &LightSeen,
+        occluders: &Occluders,
+        point: &Viewpoint,
+    ) -> bool {
+        let mut rest = &occluders.leaves[..];
+        let mut leaves = std::mem::take(&mut self.leaves);
+        let mut hidden = false;
+        while let Some(&(source, _)) = rest.first() {
+            let count = rest.iter().take_while(|leaf| leaf.0 == source).count();
+            leaves.clear();
+            leaves.extend(rest[..count].iter().map(|leaf| leaf.1));
+            rest = &rest[count..];
+            if let Some(mesh) = ShadowMesh::of(&scene.geometry, source, target.light) {
+                let eye = eye(&mesh, light, point);
+                if look_at(simd, &mesh, &eye, &leaves, source, &mut self.triangles) {
+                    hidden = true;
+                    break;
+                }
+            }
+        }
+        self.leaves = leaves;
+        hidden
+    }
+}
+
+/// Looks at leaves of one mesh. Not inlined: one copy for each instruction set is enough.
+#[inline(never)]
+fn look_at<S: Simd>(
+    simd: S,
+    mesh: &ShadowMesh,
+    eye: &Eye,
+    leaves: &[u32],
+    source: Source,
+    seen: &mut Vec<SeenTriangle>,
+) -> bool {
+    simd.vectorize(
+        #[inline(always)]
+        || {
+            for four in leaves.chunks(TOGETHER) {
+                if mesh.mesh.tree.look(simd, eye, four, source, &|triangle| mesh.casts(triangle), seen) {
+                    return true;
+                }
+            }
+            false
+        },
+    )
+}
+
+/// The point and the light in the space of a mesh.
+fn eye(mesh: &ShadowMesh, light: &LightSeen, point: &Viewpoint) -> Eye {
+    // Rays end short of the light by the rounding of both ends: `ShadowRay::end`
+    let o = point.start.abs();
+    let short = 32.0 * UNIT_ROUNDOFF * (1.01 + 1.01 * (o.x + o.y + o.z) / light.shortest) + 8.0 * UNIT_ROUNDOFF;
+    let short = if short < 0.5 { 1.0 / (1.0 - short) * (1.0 + 8.0 * UNIT_ROUNDOFF) } else { f32::INFINITY };
+    let finite = light.finite;
+    match mesh.placement {
+        None => {
+            let LightSeen { l, axes, longest, shortest, .. } = *light;
+            Eye { o: point.start, l, axes, longest, shortest, short, finite }
+        }
+        Some(placement) => {
+            let m = &placement.object_from_world.matrix3;
+            let size = |v: Vec3| {
+                let v = v.abs().as_dvec3();
+                m.x_axis.abs() * v.x + m.y_axis.abs() * v.y + m.z_axis.abs() * v.z
+            };
+            let o = placement.line(point.start, light.l).o.as_vec3();
+            let own = LightSeen::new(
+                (*m * light.l.as_dvec3()).as_vec3(),
+                light.axes.map(|a| (*m * a.as_dvec3()).as_vec3()),
+                finite,
+            );
+            let sizes: DVec3 = size(light.l) + size(light.axes[0]) + size(light.axes[1]) + size(light.axes[2]);
+            let longest = (sizes.max_element() * 1.0001) as f32;
+            Eye { o, l: own.l, axes: own.axes, longest, shortest: own.shortest * 0.9999, short, finite }
+        }
+    }
+}
+
+/// Whether point and light are on one side of a plane through `on` with normal `n` in the space of `placement`: by the numbers
+/// with which the plane itself is met.
+fn stays_before(placement: &Placement, on: DVec3, n: DVec3, light: &LightSeen, point: &Viewpoint) -> bool {
+    let height = n.dot(placement.line(point.start, light.l).o - on);
+    let across = placement.object_from_world.matrix3.transpose() * n;
+    let reach: f64 = light.axes.iter().map(|a| across.dot(a.as_dvec3()).abs()).sum();
+    let room = across.abs().element_sum() * f64::from(light.longest) * 1e-6;
+    let middle = across.dot(light.l.as_dvec3()) * height.signum();
+    // The lowest that the light gets, over the plane, turned to the point's side
+    let least = middle - reach - room;
+    height == 0.0 || if light.finite { height.abs() * (1.0 - 1e-9) + least > 0.0 } else { least > 0.0 }
+}
+
+/// Whether all of a light is below the plane with normal `n`.
+#[inline(always)]
+fn is_below(light: &LightSeen, n: Vec3) -> bool {
+    let (middle, reach) = light.range(n);
+    let size = n.abs();
+    middle + reach < -(size.x + size.y + size.z) * light.longest * DOT
+}
