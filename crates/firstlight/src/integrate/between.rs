@@ -11,6 +11,7 @@ use super::view::View;
 use crate::ids::LightId;
 use crate::math::{DVec3, Vec3};
 use crate::scene::Scene;
+use crate::visibility::{Occluders, ShadowMesh};
 use crate::shape::{Parallelogram, PlaneSide, Sphere, SurfaceInteraction};
 
 /// Who asks, and for how much of a surface.
@@ -30,6 +31,8 @@ pub(crate) struct Between {
     pub hidden: bool,
     /// Whether more is in the way than can be told row by row: each way has to be asked.
     pub ask: bool,
+    /// Whether the trees have to be asked as well, way by way.
+    pub ask_trees: bool,
     /// Over how much of the light's size the outline of a shadow moves on it where the point moves across the patch; 0
     /// where the patch is proved to be lit, or hidden, as one.
     pub drift: f32,
@@ -113,8 +116,15 @@ impl Pyramid {
 const SLACK: f32 = 1e-5;
 
 impl Between {
-    /// Looks at all that is in lists; what is in trees is not.
-    pub fn look(scene: &Scene, light: usize, emitter: &Emitter, view: &View, asker: &Asker) -> Between {
+    /// Looks at all that is in lists, and at what was gathered in trees.
+    pub fn look(
+        scene: &Scene,
+        light: usize,
+        emitter: &Emitter,
+        view: &View,
+        asker: &Asker,
+        trees: Option<&Occluders>,
+    ) -> Between {
         let mut between = Between::default();
         let cone = LightCone::new(view, asker.reach);
         let pyramid = OnceCell::new();
@@ -157,7 +167,85 @@ impl Between {
             }
         }
         between.ask |= scene.light_obstacles.disks.iter().any(|(index, _)| *index != light);
+        if let Some(trees) = trees {
+            for which in &trees.spheres {
+                between.sphere(view, emitter, pyramid(), scene.sphere(*which), asker, horizon);
+            }
+            for (which, _) in &trees.flats {
+                let flat = scene.flat(*which);
+                if !flat.is_one_sided(p, asker.si.error, PlaneSide::Both) {
+                    between.flat(view, emitter, pyramid(), flat, asker);
+                }
+            }
+            if !between.hidden {
+                between.meshes(scene, id, view, pyramid(), asker, emitter, trees);
+            }
+        }
         between
+    }
+
+    /// Adds triangles, if they are few.
+    #[allow(clippy::too_many_arguments, reason = "a light of a scene, a point, and what is between")]
+    fn meshes(
+        &mut self,
+        scene: &Scene,
+        light: LightId,
+        view: &View,
+        pyramid: &Pyramid,
+        asker: &Asker,
+        emitter: &Emitter,
+        trees: &Occluders,
+    ) {
+        if trees.too_many || !trees.others.is_empty() {
+            // Anywhere, as far as is known
+            (self.ask_trees, self.drift) = (true, f32::INFINITY);
+            return;
+        }
+        let from = asker.si.lit_from.as_dvec3();
+        let horizon = asker.si.horizon;
+        for (source, leaf) in &trees.leaves {
+            let Some(mesh) = ShadowMesh::of(&scene.geometry, *source, light) else { continue };
+            for (triangle, corners) in mesh.mesh.tree.leaf(*leaf) {
+                if !mesh.casts(triangle) {
+                    continue;
+                }
+                let place = |q: Vec3| match mesh.placement {
+                    Some(placement) => placement.world_from_object.transform_point3(q.as_dvec3()),
+                    None => q.as_dvec3(),
+                };
+                let corners = corners.map(|q| (place(q) - from).as_vec3());
+                let size = corners.iter().fold(0.0f32, |size, q| size.max(q.length()));
+                let above = corners.iter().fold(f32::NEG_INFINITY, |above, q| above.max(horizon.dot(*q)));
+                let edge = (corners[1] - corners[0]).length().max((corners[2] - corners[0]).length());
+                // The surface's own triangle, and what is below it
+                let room = edge * 1e-4 + asker.si.error.0.length() * 4.0;
+                if above <= room {
+                    continue;
+                }
+                let gap = pyramid.gap_of(&corners);
+                if gap > SLACK * size + asker.reach {
+                    continue;
+                }
+                let near = distance(&corners);
+                self.drift = self.drift.max(pyramid.drift((near - asker.reach).max(0.0)));
+                if gap > SLACK * size {
+                    continue;
+                }
+                let ball = match emitter {
+                    Emitter::Ball { center, radius } => {
+                        let to = (*center - from).as_vec3();
+                        distance(&corners.map(|q| q - to)) < *radius as f32
+                    }
+                    _ => false,
+                };
+                let hider = Hider::polygon(view, &corners);
+                if ball || hider.is_none() || self.hiders.is_full() {
+                    self.ask_trees = true;
+                    return;
+                }
+                self.add(hider);
+            }
+        }
     }
 
     fn add(&mut self, hider: Option<Hider>) {
@@ -276,6 +364,11 @@ impl Between {
             self.ask = true;
             return;
         }
+        // In the light's own plane nothing is before it: a light that blocks, for one
+        let n = (corners[1] - corners[0]).cross(corners[3] - corners[0]).normalize_or_zero();
+        if pyramid.corners.iter().all(|l| n.dot(*l - corners[0]).abs() <= SLACK * pyramid.far) {
+            return;
+        }
         let Some(hider) = Hider::polygon(view, &corners) else { return };
         let ends = [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]];
         if ends.iter().all(|[x, y]| hider.hides(*x, *y)) {
@@ -288,6 +381,39 @@ impl Between {
         }
         self.add(Some(hider));
     }
+}
+
+/// How far a triangle is from the origin.
+///
+/// Source: Ericson, "Real-Time Collision Detection", 2005, section 5.1.5.
+fn distance([a, b, c]: &[Vec3; 3]) -> f32 {
+    let (ab, ac) = (*b - *a, *c - *a);
+    let (d1, d2) = (-ab.dot(*a), -ac.dot(*a));
+    if d1 <= 0.0 && d2 <= 0.0 {
+        return a.length();
+    }
+    let (d3, d4) = (-ab.dot(*b), -ac.dot(*b));
+    if d3 >= 0.0 && d4 <= d3 {
+        return b.length();
+    }
+    let vc = d1 * d4 - d3 * d2;
+    if vc <= 0.0 && d1 >= 0.0 && d3 <= 0.0 {
+        return (*a + ab * (d1 / (d1 - d3))).length();
+    }
+    let (d5, d6) = (-ab.dot(*c), -ac.dot(*c));
+    if d6 >= 0.0 && d5 <= d6 {
+        return c.length();
+    }
+    let vb = d5 * d2 - d1 * d6;
+    if vb <= 0.0 && d2 >= 0.0 && d6 <= 0.0 {
+        return (*a + ac * (d2 / (d2 - d6))).length();
+    }
+    let va = d3 * d6 - d5 * d4;
+    if va <= 0.0 && d4 - d3 >= 0.0 && d5 - d6 >= 0.0 {
+        return (*b + (*c - *b) * ((d4 - d3) / ((d4 - d3) + (d5 - d6)))).length();
+    }
+    let n = ab.cross(ac);
+    (n.dot(*a) / n.length()).abs()
 }
 
 /// Whether a sphere reaches into a light that is a ball: what of it is behind the light's surface does not show on the disk

@@ -153,7 +153,7 @@ impl Masked<'_> {
         }
         let geometry = &self.scene.geometry;
         let asking = active & !hidden;
-        if asking == 0 || !geometry.has_trees() {
+        if asking == 0 || !self.between.ask_trees {
             return hidden;
         }
         let from = self.si.shadow_ray(LightId(self.light as u32), Vec3::ZERO, 1.0);

@@ -14,6 +14,7 @@ use crate::material::Lobe;
 use crate::math::{Vec3, dispatch_wide};
 use crate::scene::Scene;
 use crate::shape::{PlaneSide, SurfaceInteraction};
+use crate::visibility::{Occluders, Target, Viewpoint};
 
 /// What of one light arrives.
 #[derive(Clone, Copy, Debug, Default)]
@@ -60,6 +61,8 @@ pub(crate) struct Lights {
     pub steps: DisplaySteps,
     /// In display steps: how far one light may be wrong at a place.
     tolerance: f32,
+    /// The lights as shafts lead to them; none where there are no trees to lead through.
+    targets: Vec<Target>,
 }
 
 /// In display steps: how far all lights together may be wrong.
@@ -73,7 +76,8 @@ impl Lights {
         };
         let emitters: Vec<_> = scene.lights.iter().map(emitter).collect();
         let tolerance = TOLERANCE / (emitters.len().max(1) as f32).sqrt();
-        Lights { emitters, steps: DisplaySteps::new(&scene.display), tolerance }
+        let targets = if scene.geometry.has_trees() { Target::of_all(scene) } else { Vec::new() };
+        Lights { emitters, steps: DisplaySteps::new(&scene.display), tolerance, targets }
     }
 }
 
@@ -83,11 +87,17 @@ pub(crate) struct Arrivals<'a> {
     lights: &'a Lights,
     level: Level,
     sampled: Lanes,
+    occluders: Occluders,
 }
+
+/// Patches whose normal turns by less than this, in radians, are flat.
+const FLAT: f32 = 1e-4;
+/// Leaves of triangles that are worth looking at one by one.
+const LEAVES: usize = 12;
 
 impl<'a> Arrivals<'a> {
     pub fn new(scene: &'a Scene, lights: &'a Lights, level: Level) -> Self {
-        Arrivals { scene, lights, level, sampled: Lanes::new(level) }
+        Arrivals { scene, lights, level, sampled: Lanes::new(level), occluders: Occluders::default() }
     }
 
     /// Has to be called first at each place.
@@ -179,9 +189,10 @@ impl<'a> Arrivals<'a> {
     }
 
     /// Whether the edge of a shadow, of a light of one point, may run through the patch: 1, or 0 if that is excluded.
-    fn edge(&self, light: usize, l: Vec3, finite: bool, place: &Place) -> f32 {
+    fn edge(&mut self, light: usize, l: Vec3, finite: bool, place: &Place) -> f32 {
         let (scene, si) = (self.scene, place.si);
-        if scene.geometry.has_trees() || !scene.light_obstacles.disks.is_empty() {
+        if !scene.light_obstacles.disks.is_empty() || self.gather(light, place) && (self.occluders.too_many || self.occluders.count() > 0)
+        {
             return 1.0;
         }
         let length = l.length();
@@ -275,11 +286,7 @@ impl<'a> Arrivals<'a> {
             return Arrival { sums: Sums::default(), bend, resolved };
         }
         let between = if light.shadows && si.receives_shadow {
-            let mut between = Between::look(scene, index, emitter, &view, &Asker { si, reach: place.reach });
-            if scene.geometry.has_trees() {
-                between.drift = f32::INFINITY;
-            }
-            between
+            self.between(index, emitter, &view, place)
         } else {
             Between::default()
         };
@@ -296,10 +303,9 @@ impl<'a> Arrivals<'a> {
             let wrong = diffuse * error.diffuse + specular * error.specular;
             self.lights.steps.of_color(value, wrong) <= self.lights.tolerance
         };
-        let trees = scene.geometry.has_trees() && light.shadows && si.receives_shadow;
-        let hiders = if between.ask || trees { &[][..] } else { &between.hiders[..] };
+        let hiders = if between.ask || between.ask_trees { &[][..] } else { &between.hiders[..] };
         let (whole, _) = dispatch_wide!(self.level, simd => integrate(simd, &view, hiders, &enough));
-        let sums = if between.ask || trees {
+        let sums = if between.ask || between.ask_trees {
             let masked = Masked { scene, light: index, emitter, si, lobe: place.lobe, between: &between };
             masked.integrate(&view, &whole, &enough).0
         } else {
@@ -308,8 +314,25 @@ impl<'a> Arrivals<'a> {
         Arrival { sums, bend, resolved }
     }
 
-    fn bend_of(&self, index: usize, emitter: &Emitter, place: &Place) -> (Sums, bool) {
-        let (scene, light) = (self.scene, &self.scene.lights[index]);
+    /// What stands between a place and an area light.
+    fn between(&mut self, index: usize, emitter: &Emitter, view: &View, place: &Place) -> Between {
+        let trees = self.gather(index, place);
+        let asker = Asker { si: place.si, reach: place.reach };
+        Between::look(self.scene, index, emitter, view, &asker, trees.then_some(&self.occluders))
+    }
+
+    /// Gathers what of the trees may be in the way of a light; whether there are any.
+    fn gather(&mut self, index: usize, place: &Place) -> bool {
+        if !self.scene.geometry.has_trees() {
+            return false;
+        }
+        let (target, point) = (&self.lights.targets[index], Viewpoint::of(place.si));
+        self.occluders.gather_around(self.level, self.scene, target, &point, place.reach, place.turn > FLAT, LEAVES);
+        true
+    }
+
+    fn bend_of(&mut self, index: usize, emitter: &Emitter, place: &Place) -> (Sums, bool) {
+        let light = &self.scene.lights[index];
         let Some(view) = self.view(emitter, place) else {
             let unknown = if matches!(emitter, Emitter::Points) { f32::MAX } else { 0.0 };
             return (Sums { diffuse: unknown, specular: unknown }, false);
@@ -320,11 +343,11 @@ impl<'a> Arrivals<'a> {
         if !(light.shadows && place.si.receives_shadow) {
             return bend(&view, place, 0.0);
         }
-        let between = Between::look(scene, index, emitter, &view, &Asker { si: place.si, reach: place.reach });
+        let between = self.between(index, emitter, &view, place);
         if between.hidden && between.drift == 0.0 {
             return (Sums::default(), true);
         }
-        bend(&view, place, if scene.geometry.has_trees() { f32::INFINITY } else { between.drift })
+        bend(&view, place, between.drift)
     }
 }
 

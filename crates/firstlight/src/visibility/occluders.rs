@@ -11,6 +11,18 @@ use crate::math::Vec3;
 use crate::scene::{Geometry, Item, Meets, Placed, Scene, Target as PlacedTarget};
 use crate::shape::{Mesh, Parallelogram, Placement, PlaneSide, Sphere};
 
+/// What every processor has.
+#[cfg(target_arch = "x86_64")]
+fn baseline() -> fearless_simd::Sse2 {
+    Level::baseline().as_sse2().expect("every processor of this kind has it")
+}
+
+/// What every processor has.
+#[cfg(not(target_arch = "x86_64"))]
+fn baseline() -> fearless_simd::Fallback {
+    fearless_simd::Fallback::new()
+}
+
 /// A sphere or parallelogram: of the lists of obstacles, of the upper tree, or of the round lights that block.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Which {
@@ -314,6 +326,47 @@ impl Occluders {
             }
         }
         true
+    }
+
+    /// Gathers what of the trees may stand between a light and the patch, `curved` or flat, that reaches `reach` around `point`: at most `cap`
+    /// leaves. The same with every instruction set.
+    #[allow(clippy::too_many_arguments, reason = "a light of a scene, and a patch")]
+    pub fn gather_around(
+        &mut self,
+        level: Level,
+        scene: &Scene,
+        target: &Target,
+        point: &Viewpoint,
+        reach: f32,
+        curved: bool,
+        cap: usize,
+    ) {
+        self.clear();
+        let mut points = [*point; 2];
+        if reach > 0.0 {
+            for (point, side) in points.iter_mut().zip([-1.0, 1.0]) {
+                point.p += Vec3::splat(reach * side);
+                point.start += Vec3::splat(reach * side);
+            }
+            if curved {
+                // It sees over what its middle does not
+                points[1].horizon = -point.horizon;
+            }
+        }
+        let indices = &[0, 1][..if reach > 0.0 { 2 } else { 1 }];
+        let shaft = Shaft::of(&points, indices, &target.hull);
+        let gathered = dispatch_sixteen!(
+            level,
+            simd => self.gather_trees(simd, scene, target, &shaft, &points, indices, cap),
+            else {
+                let simd = baseline();
+                simd.vectorize(
+                    #[inline(always)]
+                    || self.gather_trees(simd, scene, target, &shaft, &points, indices, cap),
+                )
+            }
+        );
+        self.too_many = !gathered;
     }
 
     /// The leaves of one mesh. Not inlined: one copy for each instruction set is enough.

@@ -165,6 +165,12 @@ impl TriangleTree {
         self.tree.gather(simd, meet(self.tree.center, self.tree.half), leaf)
     }
 
+    /// The triangles of a leaf: their numbers and corners.
+    pub fn leaf(&self, leaf: u32) -> impl Iterator<Item = (u32, [Vec3; 3])> + '_ {
+        let pack = &self.packs[leaf as usize];
+        (0..PACK).filter(|place| pack.ids[*place] != NONE).map(|place| (pack.ids[place], pack.triangle(place)))
+    }
+
     /// Triangles in the tree.
     pub fn len(&self) -> usize {
         self.len
