@@ -185,8 +185,8 @@ pub struct RenderArgs {
     /// Points sampled on every area light, 1 to 1048576, or exact: they are integrated, not sampled [default: the scene's]
     #[arg(long, value_name = "N|exact", value_parser = samples, help_heading = "Quality")]
     pub samples: Option<SamplesDesc>,
-    /// How edges are smoothed: adaptive lights each surface in a pixel once where that is enough, full lights every camera ray
-    /// [default: adaptive]
+    /// How edges are smoothed: full lights every camera ray, adaptive lights each surface in a pixel once where that is enough
+    /// [default: full]
     #[arg(long, value_name = "MODE", help_heading = "Quality")]
     pub aa_mode: Option<AntialiasingMode>,
     /// What is made of the border of light and dark on meshes with smooth normals [default: the scene's]

@@ -55,6 +55,7 @@ impl Stats {
             "lights_hidden": self.rays.visibility[1],
             "lights_below_horizon": self.rays.visibility[2],
             "lights_by_mask": self.rays.visibility[3],
+            "lights_in_closed_form": self.rays.closed_form,
             "shafts": self.rays.shafts,
             "occluders": self.rays.occluders,
             "mrays_per_s": self.mrays_per_s(),
@@ -67,14 +68,15 @@ impl Stats {
 
     /// How much of the lights was found to reach the points, in words.
     fn visibility(&self) -> String {
-        let all: u64 = self.rays.visibility.iter().sum();
+        let all = self.rays.visibility.iter().sum::<u64>() + self.rays.closed_form;
         if all == 0 {
             return String::new();
         }
-        let [lit, hidden, below, mask] = self.rays.visibility.map(|count| 100.0 * count as f64 / all as f64);
-        let each = self.rays.occluders as f64 / self.rays.shafts.max(1) as f64;
+        let percent = |count: u64| 100.0 * count as f64 / all as f64;
+        let [lit, hidden, below, mask] = self.rays.visibility.map(percent);
+        let closed = percent(self.rays.closed_form);
         format!(
-            "{each:.1} occluders in each; {lit:.0} % lit, {hidden:.0} % hidden, {below:.0} % below the horizon, {mask:.0} % cut"
+            "{lit:.0} % lit, {hidden:.0} % hidden, {below:.0} % below the horizon, {closed:.0} % in closed form, {mask:.0} % by mask"
         )
     }
 
@@ -84,6 +86,8 @@ impl Stats {
         let frames = if self.frames > 1 { format!("{} frames of ", self.frames) } else { String::new() };
         let picture = format!("{frames}{} x {} pixels", self.width, self.height);
         let how = format!("{}, {} thread{}", self.rays.simd.name(), self.rays.threads, plural(self.rays.threads));
+        let all = self.rays.visibility.iter().sum::<u64>() + self.rays.closed_form;
+        let each = self.rays.occluders as f64 / self.rays.shafts.max(1) as f64;
         let mut rows = vec![
             ("parse", seconds(self.parse), String::new()),
             ("compile", seconds(self.compile), String::new()),
@@ -95,7 +99,8 @@ impl Stats {
                 self.rays.shadow_rays.to_string(),
                 format!("{} of them settled without tracing", self.rays.shadow_rays_skipped),
             ),
-            ("shafts", self.rays.shafts.to_string(), self.visibility()),
+            ("points and lights", all.to_string(), self.visibility()),
+            ("shafts", self.rays.shafts.to_string(), format!("{each:.1} things in each that may be in the way")),
             ("rays a second", format!("{:.1} million", self.mrays_per_s()), String::new()),
         ];
         if let Some(bytes) = peak_memory() {

@@ -14,7 +14,7 @@ use crate::material::Lobe;
 use crate::math::{Vec3, dispatch_wide};
 use crate::scene::Scene;
 use crate::shape::{PlaneSide, SurfaceInteraction};
-use crate::visibility::{Occluders, Target, Viewpoint};
+use crate::visibility::{Occluders, Target, Viewpoint, Visibility};
 
 /// What of one light arrives.
 #[derive(Clone, Copy, Debug, Default)]
@@ -272,7 +272,6 @@ impl<'a> Arrivals<'a> {
     fn integrated(&mut self, index: usize, emitter: &Emitter, place: &Place, counts: &mut Counts) -> Arrival {
         let (scene, si) = (self.scene, place.si);
         let light = &scene.lights[index];
-        counts.shadow_rays += 1;
         let Some(view) = self.view(emitter, place) else {
             let between = Between::default();
             let masked = Masked { scene, light: index, emitter, si, lobe: place.lobe, between: &between };
@@ -282,6 +281,7 @@ impl<'a> Arrivals<'a> {
             return Arrival { sums, bend: Sums { diffuse: bend, specular: bend }, resolved: false };
         };
         if !view.arrives() {
+            counts.settled.visibility[Visibility::BelowHorizon as usize] += 1;
             let (bend, resolved) = horizon_bend(&view, place);
             return Arrival { sums: Sums::default(), bend, resolved };
         }
@@ -292,6 +292,7 @@ impl<'a> Arrivals<'a> {
         };
         let (mut bend, resolved) = bend(&view, place, between.drift);
         if between.hidden {
+            counts.settled.visibility[Visibility::Hidden as usize] += 1;
             if between.drift == 0.0 {
                 bend = Sums::default();
             }
@@ -303,6 +304,11 @@ impl<'a> Arrivals<'a> {
             let wrong = diffuse * error.diffuse + specular * error.specular;
             self.lights.steps.of_color(value, wrong) <= self.lights.tolerance
         };
+        match (between.ask || between.ask_trees, between.hiders.is_empty()) {
+            (true, _) => counts.settled.visibility[Visibility::Mask as usize] += 1,
+            (false, true) => counts.settled.visibility[Visibility::Lit as usize] += 1,
+            (false, false) => counts.closed_form += 1,
+        }
         let hiders = if between.ask || between.ask_trees { &[][..] } else { &between.hiders[..] };
         let (whole, _) = dispatch_wide!(self.level, simd => integrate(simd, &view, hiders, &enough));
         let sums = if between.ask || between.ask_trees {

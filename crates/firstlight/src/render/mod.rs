@@ -158,7 +158,7 @@ impl Default for RenderSettings {
             tile_size: 16,
             simd: SimdLevel::Auto,
             crop: None,
-            aa_mode: AaMode::Adaptive,
+            aa_mode: AaMode::Full,
             visibility: VisibilityMode::Shafts,
             reference: false,
         }
@@ -177,6 +177,9 @@ pub struct RenderStats {
     /// Pairs of a lit point and a light: all of it arrives, one thing hides it, it is below the horizon, each sample has an
     /// answer of its own. Counted where shafts are used, as the next three are.
     pub visibility: [u64; 4],
+    /// Pairs of a lit point and a light that is integrated, of which some is hidden by things so few that what is left is known
+    /// in closed form. Not among those of `visibility`.
+    pub closed_form: u64,
     /// Shafts from points to lights.
     pub shafts: u64,
     /// What they held that could stand in the way, all together.
@@ -196,15 +199,16 @@ pub(crate) struct Counts {
     pub shadow_rays: u64,
     pub shadow_rays_skipped: u64,
     pub settled: Settled,
+    pub closed_form: u64,
     /// Shadow rays after which the caller is asked whether to go on.
     next_question: u64,
 }
 
 impl Counts {
-    fn all(&self) -> [u64; 10] {
-        let Counts { camera_rays, shadow_rays, shadow_rays_skipped, settled, .. } = *self;
+    fn all(&self) -> [u64; 11] {
+        let Counts { camera_rays, shadow_rays, shadow_rays_skipped, settled, closed_form, .. } = *self;
         let Settled { visibility: [lit, hidden, below, mask], shafts, occluders, traced } = settled;
-        [camera_rays, shadow_rays, shadow_rays_skipped, lit, hidden, below, mask, shafts, occluders, traced]
+        [camera_rays, shadow_rays, shadow_rays_skipped, lit, hidden, below, mask, shafts, occluders, traced, closed_form]
     }
 }
 
@@ -237,7 +241,7 @@ pub fn render(
     };
     let all = window.width as u64 * window.height as u64;
     let (done, stop) = (AtomicU64::new(0), AtomicBool::new(false));
-    let totals = [const { AtomicU64::new(0) }; 10];
+    let totals = [const { AtomicU64::new(0) }; 11];
     let by_shafts = every_ray && !settings.samples_all();
     let targets = if by_shafts { Target::of_all(scene) } else { Vec::new() };
     let level = settings.simd.resolve();
@@ -286,7 +290,7 @@ pub fn render(
     if stop.into_inner() {
         return ControlFlow::Break(());
     }
-    let [camera_rays, shadow_rays, shadow_rays_skipped, lit, hidden, below, mask, shafts, occluders, traced] =
+    let [camera_rays, shadow_rays, shadow_rays_skipped, lit, hidden, below, mask, shafts, occluders, traced, closed_form] =
         totals.map(AtomicU64::into_inner);
     let simd = if settings.reference { SimdLevel::Fallback } else { level };
     let visibility = [lit, hidden, below, mask];
@@ -295,6 +299,7 @@ pub fn render(
         shadow_rays,
         shadow_rays_skipped,
         visibility,
+        closed_form,
         shafts,
         occluders,
         traced,

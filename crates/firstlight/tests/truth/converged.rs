@@ -5,7 +5,7 @@
 //! points, until they do or until there are too many points. Nothing of what integrates lights has a part in it.
 //! (Turned copies of the `sobol` set were tried in their place, and settle no pixel sooner: it is edges that take long.)
 
-use firstlight::{Image, LightDesc, RenderSettings, SampleSet, SamplesDesc, Scene, SceneDesc, Window};
+use firstlight::{AaMode, Image, LightDesc, RenderSettings, SampleSet, SamplesDesc, Scene, SceneDesc, Window};
 
 use crate::scenes::{compile, every_ray, one_thread, picture};
 
@@ -29,7 +29,7 @@ pub fn traced() -> RenderSettings {
 
 /// The settings that hold what is tested: lights that say so are integrated.
 pub fn integrated() -> RenderSettings {
-    one_thread()
+    RenderSettings { aa_mode: AaMode::Adaptive, ..one_thread() }
 }
 
 /// The scene with every area light given so many points of a set, or integrated. Lights differ in their seeds.
