@@ -4,7 +4,7 @@
 use std::num::NonZeroUsize;
 
 use firstlight::{
-    AaMode, Image, LightDesc, RenderSettings, SampleSet, Scene, SceneDesc, ShapeDesc, SimdLevel, VisibilityMode, Window,
+    AaMode, Image, LightDesc, RenderSettings, SampleSet, SamplesDesc, Scene, SceneDesc, ShapeDesc, SimdLevel, VisibilityMode, Window,
 };
 
 use crate::random;
@@ -44,15 +44,30 @@ fn meshes() -> SceneDesc {
         .with_light(LightDesc::Point(point([-3.0, 3.0, 3.0], 10.0)))
 }
 
+/// The same with every light integrated.
+fn integrated_scenes() -> Vec<SceneDesc> {
+    let integrated = |mut desc: SceneDesc| {
+        desc.render.samples = SamplesDesc::Exact;
+        desc.lights.iter_mut().for_each(|light| light.set_samples(SamplesDesc::Exact));
+        desc
+    };
+    scenes().into_iter().map(integrated).collect()
+}
+
+/// Light once for each surface in a pixel.
+fn adaptive() -> RenderSettings {
+    RenderSettings { aa_mode: AaMode::Adaptive, ..one_thread() }
+}
+
 fn with(settings: RenderSettings, scene: &Scene) -> Vec<[u32; 4]> {
     bits(&picture(scene, &settings))
 }
 
 #[test]
 fn threads_and_tiles_do_not_matter() {
-    for desc in scenes() {
+    for desc in scenes().into_iter().chain(integrated_scenes()) {
         let scene = compile(&desc);
-        for one in [one_thread(), every_ray()] {
+        for one in [adaptive(), every_ray()] {
             let expected = with(one.clone(), &scene);
             for threads in [1, 2, 8] {
                 for tile_size in [8, 16, 23, 64] {
@@ -84,10 +99,24 @@ fn instruction_sets_do_not_matter() {
 }
 
 #[test]
-fn a_crop_is_a_part_of_the_whole() {
-    for desc in scenes() {
+fn instruction_sets_do_not_matter_to_integrals() {
+    for desc in integrated_scenes() {
         let scene = compile(&desc);
-        let whole = [one_thread(), every_ray()].map(|settings| picture(&scene, &settings));
+        for one in [adaptive(), every_ray()] {
+            let expected = with(one.clone(), &scene);
+            for simd in SimdLevel::available() {
+                let got = with(RenderSettings { simd, ..one.clone() }, &scene);
+                assert!(got == expected, "{}: {desc:#?}", simd.name());
+            }
+        }
+    }
+}
+
+#[test]
+fn a_crop_is_a_part_of_the_whole() {
+    for desc in scenes().into_iter().chain(integrated_scenes()) {
+        let scene = compile(&desc);
+        let whole = [adaptive(), every_ray()].map(|settings| picture(&scene, &settings));
         let (width, height) = (scene.width(), scene.height());
         for window in [
             Window { x: 0, y: 0, width: 1, height: 1 },
@@ -95,8 +124,10 @@ fn a_crop_is_a_part_of_the_whole() {
             Window { x: width - 9, y: 0, width: 9, height },
             Window { x: 0, y: height - 1, width, height: 1 },
         ] {
+            // The plain renderer gives the bits of every ray where no light is integrated
             let plain = RenderSettings { reference: true, ..one_thread() };
-            for (settings, whole) in [(one_thread(), &whole[0]), (every_ray(), &whole[1]), (plain, &whole[1])] {
+            let plain = (desc.render.samples != SamplesDesc::Exact).then_some((plain, &whole[1]));
+            for (settings, whole) in [(adaptive(), &whole[0]), (every_ray(), &whole[1])].into_iter().chain(plain) {
                 let settings = RenderSettings { crop: Some(window), tile_size: 8, ..settings };
                 let part = picture(&scene, &settings);
                 assert_eq!(part.window, window);
