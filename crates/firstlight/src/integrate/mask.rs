@@ -80,7 +80,7 @@ impl Masked<'_> {
             _ => None,
         };
         let mut shares = Shares::default();
-        let mut before: Option<Sums> = None;
+        let mut before: [Option<Sums>; 2] = [None; 2];
         let (mut from, mut to) = (0, FEWEST);
         loop {
             for block in table[from..to].chunks_exact(LANES) {
@@ -120,18 +120,22 @@ impl Masked<'_> {
                 }
             }
             let now = shares.sums(whole);
-            if let Some(before) = before {
+            if let [Some(before), earlier] = before {
+                let off = |of: fn(&Sums) -> f32| {
+                    let earlier = earlier.map_or(0.0, |sums| (of(&sums) - of(&before)).abs() * 0.5);
+                    (of(&now) - of(&before)).abs().max(earlier)
+                };
                 // What one more point could change is the least that can be wrong
                 let one = 1.0 / to as f32;
                 let error = Sums {
-                    diffuse: (now.diffuse - before.diffuse).abs().max(whole.diffuse * one),
-                    specular: (now.specular - before.specular).abs().max(whole.specular * one),
+                    diffuse: off(|sums| sums.diffuse).max(whole.diffuse * one),
+                    specular: off(|sums| sums.specular).max(whole.specular * one),
                 };
                 if to == MOST || shares.hidden == 0 && to >= 2 * FEWEST || enough(&now, &error) {
                     return (now, error);
                 }
             }
-            before = Some(now);
+            before = [Some(now), before[0]];
             (from, to) = (to, to * 2);
         }
     }

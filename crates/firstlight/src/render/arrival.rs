@@ -48,6 +48,8 @@ pub(crate) struct Place<'a> {
     pub reach: f32,
     /// How far the normal turns on the way, in radians.
     pub turn: f32,
+    /// How far off the patch's middle the place is, as a part of `reach`.
+    pub off: f32,
     /// What is there beside this light, at least.
     pub base: Rgb,
     /// What the two sums are multiplied with.
@@ -179,7 +181,7 @@ impl<'a> Arrivals<'a> {
         let edge = if light.shadows && si.receives_shadow { self.edge(index, to.l, to.finite, place) } else { 0.0 };
         let swing = place.turn + place.reach / distance;
         let terminator = if height < behind { swing * 0.5 } else { 0.0 };
-        let smooth = swing * swing;
+        let smooth = swing * swing + 2.0 * swing * place.off;
         let share = (edge + rim + terminator + smooth).min(1.0);
         let lobe = (sharp_of(place.lobe, si) * (2.0 * place.turn + place.reach / distance).powi(2)).min(1.0);
         let specular =
@@ -381,10 +383,11 @@ fn bend(view: &View, place: &Place, drift: f32) -> (Sums, bool) {
     let swing = place.turn + place.reach / nearest.max(place.reach);
     let cuts = !view.is_above_horizon() || view.cos.min() < place.reach + place.turn * view.l0.length();
     // Where the outline of a shadow comes in, the share it hides begins to grow at once: an eighth of the way it moves
-    let kink = (drift * 0.125).min(1.0);
+    let kink = (drift * (0.125 + 0.5 * place.off)).min(1.0);
     let cos = (view.cos.max() / view.l0.length()).min(1.0) + swing;
     let horizon = if cuts { swing * swing.min(1.0) } else { 0.0 };
     let smooth = (place.reach / nearest.max(place.reach)).powi(2) * 2.0 + place.turn * place.turn * 0.5;
+    let smooth = smooth + 2.0 * swing * place.off;
     let diffuse = most * (cos * (kink + smooth.min(1.0)) + horizon).min(1.0);
     let resolved = drift < RESOLVED && swing < RESOLVED_SWING;
     if matches!(view.lobe, Lobe::None) {
@@ -392,6 +395,7 @@ fn bend(view: &View, place: &Place, drift: f32) -> (Sums, bool) {
     }
     let moved = 2.0 * place.turn + place.reach / nearest.max(place.reach);
     let narrow = (sharpness(view) * moved * moved).min(1.0);
+    let narrow = (narrow + 2.0 * narrow.sqrt() * place.off).min(1.0);
     let specular = most * brightest(view) * (kink + smooth + narrow + horizon).min(1.0);
     (Sums { diffuse, specular }, resolved && narrow < RESOLVED)
 }

@@ -4,6 +4,7 @@ use super::hits::camera_ray;
 use super::solo::Candidate;
 use crate::color::Rgb;
 use crate::material::Bsdf;
+use crate::math::Vec3;
 use crate::scene::{Hit, Scene};
 use crate::shape::SurfaceInteraction;
 
@@ -19,6 +20,8 @@ pub(crate) struct Patch {
     /// How far it reaches from where it is shaded, in metres, and how far its normal turns on the way, in radians.
     pub reach: f32,
     pub turn: f32,
+    /// How far off its middle it is shaded, as a part of `reach`.
+    pub off: f32,
     /// Whether more than colours change over it: then it is shaded at each of its rays.
     pub uneven: bool,
 }
@@ -65,6 +68,11 @@ impl Patch {
         }
     }
 
+    /// Whether it fills its pixel, and is shaded in the middle.
+    pub fn is_whole(&self, scene: &Scene) -> bool {
+        self.off < 0.1 && self.count(scene) == scene.antialiasing * scene.antialiasing
+    }
+
     /// Calls `each` with what every ray sees. `pixel` is the one that the patch is in.
     pub fn for_each(&self, scene: &Scene, pixel: [u32; 2], mut each: impl FnMut(&SurfaceInteraction, &Bsdf)) {
         match &self.rays {
@@ -90,6 +98,7 @@ impl Patch {
             rays: Rays::All(candidate),
             reach,
             turn,
+            off: 0.0,
             uneven: false,
         };
         if scene.antialiasing == 1 {
@@ -121,14 +130,25 @@ impl Patch {
         let distance = |member: &Member| (member.at[0] - x).powi(2) + (member.at[1] - y).powi(2);
         let nearest = members.iter().min_by(|a, b| distance(a).total_cmp(&distance(b))).expect("a patch has members");
         let (si, bsdf) = (nearest.si, nearest.bsdf);
+        self.place(si);
+        self.bsdf = bsdf;
+        mean.apply(self);
+    }
+
+    /// Has it shaded at `si`.
+    fn place(&mut self, si: SurfaceInteraction) {
+        let Rays::Some(members) = &self.rays else { return };
+        let mut middle = Vec3::ZERO;
         let (mut reach, mut turn, mut uneven) = (0.0f32, 0.0f32, false);
         for member in members {
             uneven |= member.si.receives_shadow != si.receives_shadow;
             reach = reach.max((member.si.lit_from - si.lit_from).length());
             turn = turn.max((member.si.ns - si.ns).length());
+            middle += member.si.lit_from - si.lit_from;
         }
-        (self.si, self.bsdf, self.reach, self.turn, self.uneven) = (si, bsdf, reach, turn, uneven);
-        mean.apply(self);
+        let off = middle.length() / members.len() as f32;
+        self.off = if reach > 0.0 { off / reach } else { 0.0 };
+        (self.si, self.reach, self.turn, self.uneven) = (si, reach, turn, uneven);
     }
 }
 
@@ -219,10 +239,23 @@ impl PixelPatches {
                 Some(Rays::Some(members)) => members.push(member),
                 _ => {
                     let rays = Rays::Some(vec![member]);
-                    self.patches.push(Patch { si, bsdf, rays, reach: 0.0, turn: 0.0, uneven: false });
+                    self.patches.push(Patch { si, bsdf, rays, reach: 0.0, turn: 0.0, off: 0.0, uneven: false });
                 }
             }
         }
         self.patches.iter_mut().for_each(Patch::settle);
+        // Where one surface fills the pixel, it is shaded in the middle
+        if let [patch] = &mut self.patches[..]
+            && patch.off > 0.0
+            && patch.count(scene) == n * n
+        {
+            let (ray, differential) = scene.camera.ray(i as f32 + 0.5, j as f32 + 0.5, 1.0);
+            let hit = scene.intersect(&ray).filter(|hit| hit.surface == patch.si.surface);
+            if let Some(si) = hit.map(|hit| scene.surface(&ray, &hit, &differential))
+                && patch.holds(&si)
+            {
+                patch.place(si);
+            }
+        }
     }
 }

@@ -16,7 +16,7 @@ use std::ops::ControlFlow;
 use super::arrival::{Arrival, Arrivals, Place};
 use super::film::FilmTile;
 use super::hits::PixelHits;
-use super::patch::{Patch, PixelPatches, Rays};
+use super::patch::{Patch, PixelPatches};
 use super::solo::{self, Candidate, Pyramid};
 use super::tile::Tile;
 use super::{AaMode, Counts};
@@ -203,7 +203,8 @@ impl<'a> Tiled<'a> {
             let scale = self.arrivals.scale(index);
             let colors = [scale * patch.bsdf.diffuse, scale * patch.bsdf.specular];
             let (si, lobe) = (&patch.si, &patch.bsdf.lobe);
-            let place = Place { si, lobe, reach: patch.reach, turn: patch.turn, base, colors };
+            let (reach, turn, off) = (patch.reach, patch.turn, patch.off);
+            let place = Place { si, lobe, reach, turn, off, base, colors };
             let arrival = self.arrivals.arrival(index, &place, counts);
             value += colors[0] * arrival.sums.diffuse + colors[1] * arrival.sums.specular;
             self.arrived.push(arrival);
@@ -266,7 +267,7 @@ impl<'a> Tiled<'a> {
         if !shows(&here.bend) {
             return true;
         }
-        if !here.resolved || !matches!(patch.rays, Rays::All(_)) {
+        if !here.resolved || !patch.is_whole(scene) {
             return false;
         }
         let mut bend = Sums::default();
@@ -275,7 +276,7 @@ impl<'a> Tiled<'a> {
             let same = |i: &usize| {
                 let patches = &pixels[*i].patches;
                 patches.len() == 1
-                    && matches!(patches[0].rays, Rays::All(_))
+                    && patches[0].is_whole(scene)
                     && patches[0].si.surface == patch.si.surface
                     && patches[0].bsdf.lobe == patch.bsdf.lobe
             };
@@ -296,7 +297,7 @@ impl<'a> Tiled<'a> {
         let scale = self.arrivals.scale(index);
         let colors = [scale * bsdf.diffuse, scale * bsdf.specular];
         let base = self.scene.ambient * bsdf.ambient;
-        let place = Place { si, lobe: &bsdf.lobe, reach: 0.0, turn: 0.0, base, colors };
+        let place = Place { si, lobe: &bsdf.lobe, reach: 0.0, turn: 0.0, off: 0.0, base, colors };
         let sums = self.arrivals.arrival(index, &place, counts).sums;
         self.terms[index][0] += colors[0] * sums.diffuse;
         self.terms[index][1] += colors[1] * sums.specular;

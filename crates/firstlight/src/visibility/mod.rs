@@ -17,7 +17,7 @@ mod shaft;
 mod target;
 mod view;
 
-pub(crate) use occluders::{Occluders, ShadowMesh, Which};
+pub(crate) use occluders::{Occluders, ShadowMesh};
 pub(crate) use settle::{Settled, Settler};
 pub(crate) use target::Target;
 pub(crate) use view::{View, Visibility};
