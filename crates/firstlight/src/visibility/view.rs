@@ -62,7 +62,7 @@ impl View {
         self.hidden.clear();
         self.trees = false;
         let light = target.hull.from(point.p);
-        if is_below(&light, point.ng) || is_below(&light, point.ns) {
+        if is_below(&light, point.ng) || point.ns != point.ng && is_below(&light, point.ns) {
             return Visibility::BelowHorizon;
         }
         for which in &occluders.spheres {
@@ -70,7 +70,7 @@ impl View {
             if shadow.is_below(point.ng) {
                 continue;
             }
-            match shadow.covers(light.l, &light.axes, light.finite) {
+            match shadow.covers(light.l, &light.axes, light.longest, light.finite) {
                 Cover::Nothing => {}
                 Cover::All => return Visibility::Hidden,
                 Cover::Some => self.spheres.push(shadow),
@@ -87,10 +87,7 @@ impl View {
                 Cover::Some => self.flats.push(shadow),
             }
         }
-        if occluders.too_many {
-            self.trees = true;
-            return Visibility::Mask;
-        }
+        self.trees = occluders.too_many;
         if !occluders.leaves.is_empty() {
             let hidden = dispatch_sixteen!(
                 level,
@@ -100,6 +97,9 @@ impl View {
             if hidden {
                 return Visibility::Hidden;
             }
+        }
+        if self.trees {
+            return Visibility::Mask;
         }
         self.gather_others(scene, target, &light, occluders, point);
         let nothing =
