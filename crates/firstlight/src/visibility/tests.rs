@@ -219,7 +219,8 @@ fn random_scene(random: &mut Random) -> Scene {
         desc.shapes.push(ShapeDesc::Plane(PlaneDesc { point, ..PlaneDesc::default() }));
     }
     for _ in 0..2 {
-        let center = origin + random.place([0.5, 2.0, 5.0][random.below(3)]) * unit;
+        let reach = [0.5, 2.0, 5.0][random.below(3)];
+        let center = origin + random.place(reach) * unit;
         let a = random.direction();
         let b = a.cross(random.direction()).normalize_or(a.any_orthonormal_vector());
         let (x, y) = (random.scale(0.02, 4.0) * unit, random.scale(0.02, 4.0) * unit);
