@@ -57,6 +57,7 @@ impl Stats {
             "lights_by_mask": self.rays.visibility[3],
             "shafts": self.rays.shafts,
             "occluders": self.rays.occluders,
+            "shadow_rays_traced": self.rays.traced,
             "mrays_per_s": self.mrays_per_s(),
             "peak_memory_bytes": peak_memory(),
             "simd": self.rays.simd.name(),
@@ -74,7 +75,7 @@ impl Stats {
         let [lit, hidden, below, mask] = self.rays.visibility.map(|count| 100.0 * count as f64 / all as f64);
         let each = self.rays.occluders as f64 / self.rays.shafts.max(1) as f64;
         format!(
-            "{each:.1} occluders in each; {lit:.0} % lit, {hidden:.0} % hidden, {below:.0} % below the horizon, {mask:.0} % cut"
+            "{each:.1} things in each; lights are {lit:.0} % lit, {hidden:.0} % hidden, {below:.0} % below the horizon, {mask:.0} % cut"
         )
     }
 
