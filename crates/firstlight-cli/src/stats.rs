@@ -58,6 +58,7 @@ impl Stats {
             "lights_in_closed_form": self.rays.closed_form,
             "shafts": self.rays.shafts,
             "occluders": self.rays.occluders,
+            "shadow_rays_traced": self.rays.traced,
             "mrays_per_s": self.mrays_per_s(),
             "peak_memory_bytes": peak_memory(),
             "simd": self.rays.simd.name(),

@@ -56,6 +56,8 @@ fn how_the_work_is_done_changes_no_byte() {
         "--tile-size 64",
         "--simd auto",
         "--simd fallback",
+        "--visibility traced",
+        "--visibility shafts --simd fallback",
         "--reference",
         "--reference --threads 3 --tile-size 9",
         "--quiet",

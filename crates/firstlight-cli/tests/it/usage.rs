@@ -44,6 +44,7 @@ const BAD: &[(&str, &[&str])] = &[
     ("render scene.toml --crop 30,0,6,5 --width 18", &["--crop", "18 x 12"]),
     ("render scene.toml --camera back", &["back", "front, side"]),
     ("render config11 --camera back", &["back", "no cameras"]),
+    ("render scene.toml --visibility guessed", &["guessed", "shafts", "traced"]),
     ("render scene.toml --simd mmx", &["mmx", "auto", "fallback", "avx2"]),
     ("render scene.toml --bits 12", &["12", "8", "16"]),
     ("render scene.toml --bits 16 -o a.exr", &["--bits", "PNG"]),

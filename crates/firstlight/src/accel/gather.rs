@@ -1,6 +1,6 @@
 //! All that lies in some part of space.
 
-use fearless_simd::prelude::*;
+use fearless_simd::{f32x8, prelude::*};
 
 use super::node::{LEAF, Node, Tree};
 
@@ -8,10 +8,15 @@ use super::node::{LEAF, Node, Tree};
 const STACK: usize = 96;
 
 impl Tree {
-    /// Visits the leaves below nodes whose boxes `meet` says yes to, a bit for each of eight, in any order, until `leaf` says
-    /// no. Says whether all were visited.
+    /// Visits the leaves below nodes whose boxes `meet` says yes to, a bit for each of eight and where they begin, near ones
+    /// before far ones, more or less, until `leaf` says no. Says whether all were visited.
     #[inline(always)]
-    pub fn gather<S: Simd>(&self, simd: S, meet: impl Fn(S, &Node) -> u32, mut leaf: impl FnMut(u32) -> bool) -> bool {
+    pub fn gather<S: Simd>(
+        &self,
+        simd: S,
+        meet: impl Fn(S, &Node) -> (u32, f32x8<S>),
+        mut leaf: impl FnMut(u32) -> bool,
+    ) -> bool {
         if self.nodes.is_empty() {
             return true;
         }
@@ -23,22 +28,40 @@ impl Tree {
             heap.resize(self.stack, 0);
             &mut heap[..]
         };
-        let mut len = 1;
-        while len > 0 {
-            len -= 1;
-            let node = &self.nodes[stack[len] as usize];
-            let mut mask = meet(simd, node);
-            while mask != 0 {
-                let child = node.children[mask.trailing_zeros() as usize & 7];
-                mask &= mask - 1;
-                if child & LEAF == 0 {
-                    stack[len] = child;
-                    len += 1;
-                } else if !leaf(child & !LEAF) {
+        let mut len = 0;
+        let mut child = 0;
+        loop {
+            if child & LEAF != 0 {
+                if !leaf(child & !LEAF) {
                     return false;
                 }
+            } else {
+                let node = &self.nodes[child as usize];
+                let (mut mask, enter) = meet(simd, node);
+                if mask != 0 {
+                    // On with the nearest, the others in any order
+                    let mut place = mask.trailing_zeros() as usize & 7;
+                    mask &= mask - 1;
+                    if mask != 0 {
+                        let enter = enter.to_array();
+                        while mask != 0 {
+                            let other = mask.trailing_zeros() as usize & 7;
+                            mask &= mask - 1;
+                            let nearer = enter[other] < enter[place];
+                            stack[len] = node.children[if nearer { place } else { other }];
+                            place = if nearer { other } else { place };
+                            len += 1;
+                        }
+                    }
+                    child = node.children[place];
+                    continue;
+                }
             }
+            if len == 0 {
+                return true;
+            }
+            len -= 1;
+            child = stack[len];
         }
-        true
     }
 }

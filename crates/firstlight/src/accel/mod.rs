@@ -68,7 +68,7 @@ mod node;
 mod ray;
 mod traverse;
 
-use fearless_simd::{Level, prelude::*};
+use fearless_simd::{Level, f32x8, prelude::*};
 
 pub(crate) use beam::{Beam, groups};
 pub(crate) use build::{Built, Leaf, build};
@@ -204,7 +204,7 @@ impl Bvh {
     /// Visits what lies in boxes that `meet` says yes to, until `leaf` says no. `meet` is made from the tree's centre and
     /// how far it reaches. Says whether all was visited.
     #[inline(always)]
-    pub fn gather<S: Simd, M: Fn(S, &Node) -> u32>(
+    pub fn gather<S: Simd, M: Fn(S, &Node) -> (u32, f32x8<S>)>(
         &self,
         simd: S,
         meet: impl FnOnce(Vec3, f32) -> M,

@@ -148,7 +148,7 @@ impl<'a> Shafts<'a> {
             }
             counts.shadow_rays += samples * part.len() as u64;
             let settled = &mut counts.settled;
-            let before = settled.visibility[Visibility::Mask as usize];
+            let before = *settled;
             self.settler.settle(level, scene, target, &self.points, part, settled, |k, visibility, view| {
                 let (si, bsdf) = &surfaces[k];
                 match visibility {
@@ -157,8 +157,11 @@ impl<'a> Shafts<'a> {
                     Visibility::Mask => sums[k] = masked(scene, level, index, si, bsdf, view),
                 }
             });
-            let cut = settled.visibility[Visibility::Mask as usize] - before;
-            counts.shadow_rays_skipped += samples * (part.len() as u64 - cut);
+            // Cut by shapes of the lists, which are asked for every sample, or by what is in the trees
+            let cut = settled.visibility[Visibility::Mask as usize] - before.visibility[Visibility::Mask as usize];
+            let traced = settled.traced - before.traced;
+            let asked = if scene.geometry.has_trees() { traced } else { samples * cut };
+            counts.shadow_rays_skipped += samples * part.len() as u64 - asked;
         }
         ControlFlow::Continue(())
     }

@@ -46,42 +46,41 @@ fn corners(l: Vec3, axes: &[Vec3; 3]) -> impl Iterator<Item = Vec3> {
 }
 
 impl SphereShadow {
-    /// How much of a light it hides. The ways all lead to the light.
-    pub fn covers(&self, l: Vec3, axes: &[Vec3; 3], finite: bool) -> Cover {
+    /// How much of a light it hides; `longest` is the largest coordinate of any way.
+    pub fn covers(&self, l: Vec3, axes: &[Vec3; 3], longest: f32, finite: bool) -> Cover {
         let Some((f, r)) = self.outside() else { return Cover::Some };
-        let distance = f.length();
+        // No way is longer than the sum of its coordinates
+        let (distance, reach) = (f.length(), longest * 3.0);
         let room = r * ROOM[0] + distance * ROOM[1];
-        let size = axes[0].length() + axes[1].length() + axes[2].length();
-        if !(distance + size + l.length() < 1e12 && r > 1e-12) {
+        if !(distance + reach < 1e12 && r > 1e-12) {
             return Cover::Some;
         }
         // A plane between the sphere and all ways from the point: across the line from its centre to the nearest of a hull
         // that grows. Everything is counted from the centre
-        let along = |from: Vec3, way: Vec3| {
-            let t = -from.dot(way) / way.length_squared();
-            from + way * if finite { t.clamp(0.0, 1.0) } else { t.max(0.0) }
-        };
-        let mut near = along(f, l);
+        let t = -f.dot(l) / l.length_squared();
+        let first = f + l * if finite { t.clamp(0.0, 1.0) } else { t.max(0.0) };
+        let mut near = first;
         for _ in 0..STEPS {
             let length = near.length();
+            if !(length > r) {
+                break;
+            }
             let bound = (r + room) * length;
             let (least, way) = lowest(near, l, axes);
             let at_point = near.dot(f);
-            // Of light without end the ways must not lead towards the sphere
-            let at_light = if finite {
-                at_point + least - length * (l.length() + size) * DOT
-            } else if least >= 0.0 {
-                at_point
-            } else {
-                f32::NEG_INFINITY
+            let at_light = match finite {
+                true => at_point + least - length * reach * DOT,
+                // Of light without end the ways must not lead towards the sphere
+                false if least >= 0.0 => at_point,
+                false => f32::NEG_INFINITY,
             };
             if at_point.min(at_light) > bound {
                 return Cover::Nothing;
             }
-            let corner = if at_light < at_point { f + way } else { f };
-            if !(length > 0.0) || !finite {
+            if !finite {
                 break;
             }
+            let corner = if at_light < at_point { f + way } else { f };
             let side = corner - near;
             let t = -near.dot(side) / side.length_squared();
             if !(t > 0.0) {
@@ -91,12 +90,11 @@ impl SphereShadow {
         }
         // All corners in the shadow of a smaller sphere, beyond its middle
         let small = r - room;
-        let deep = small > 0.0 && along(f, l).length() < small;
+        let deep = small > 0.0 && first.length_squared() < small * small;
         if !deep || distance < r + 2.0 * room || !finite {
             return Cover::Some;
         }
         let (least, _) = lowest(-f, l, axes);
-        let reach = l.length() + size;
         if !(least > f.length_squared() + distance * room + reach * (reach + distance) * DOT) {
             return Cover::Some;
         }

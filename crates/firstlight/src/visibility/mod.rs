@@ -15,6 +15,8 @@ mod occluders;
 mod settle;
 mod shaft;
 mod target;
+#[cfg(test)]
+mod tests;
 mod view;
 
 pub(crate) use occluders::{Occluders, ShadowMesh};

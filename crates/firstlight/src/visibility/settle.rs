@@ -9,13 +9,15 @@ use super::view::{View, Visibility};
 use crate::accel::Aabb;
 use crate::scene::Scene;
 
-/// Leaves of triangles gathered for many points; more, and the points are parted.
-const MANY: usize = 16;
+/// Leaves of triangles gathered for many points; more, and the points are parted. With twice as many a ball of 7 thousand
+/// triangles took a third longer, as did a terrain of a million.
+const MANY: usize = 8;
 /// Points that are taken one by one if they are not settled together.
 const FEW: usize = 16;
-/// For one point: as many as are dearer to look at than rays are to trace, at first and for each block of samples.
-const ONE: usize = 24;
-const ONE_MORE: usize = 12;
+/// Leaves looked at from one point, the nearest first, and how many more for each block of samples. What is hidden by none of
+/// them is traced. Ten times as many leave half as much to trace, and take twice the time on triangles of a pixel's size.
+const ONE: usize = 16;
+const ONE_MORE: usize = 1;
 
 /// Settles what is seen of lights, points together as long as little stands in the way. Keeps its memory.
 #[derive(Debug, Default)]

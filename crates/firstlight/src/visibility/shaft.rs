@@ -145,9 +145,9 @@ impl Shaft {
 }
 
 impl TreeShaft {
-    /// The children of a node that the shaft meets, a bit for each.
+    /// The children of a node that the shaft meets: a bit for each, and where they begin.
     #[inline(always)]
-    pub fn meet<S: Simd>(&self, simd: S, node: &Node) -> u32 {
+    pub fn meet<S: Simd>(&self, simd: S, node: &Node) -> (u32, f32x8<S>) {
         let planes = &node.planes;
         let mut enter = simd.splat_f32x8(0.0);
         let mut leave = simd.splat_f32x8(self.s_max);
@@ -171,6 +171,6 @@ impl TreeShaft {
             let height = f32x8::load_array_ref(simd, top(2)).mul_add(self.n.z, height);
             met &= height.simd_ge(self.least);
         }
-        met.to_bitmask() as u32
+        (met.to_bitmask() as u32, enter)
     }
 }

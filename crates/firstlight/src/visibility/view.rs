@@ -64,7 +64,7 @@ impl View {
         self.hidden.clear();
         self.trees = false;
         let light = target.hull.from(point.p);
-        if is_below(&light, point.horizon) || is_below(&light, point.ns) {
+        if is_below(&light, point.horizon) || point.ns != point.horizon && is_below(&light, point.ns) {
             return Visibility::BelowHorizon;
         }
         for which in &occluders.spheres {
@@ -72,7 +72,7 @@ impl View {
             if shadow.is_below(point.horizon) {
                 continue;
             }
-            match shadow.covers(light.l, &light.axes, light.finite) {
+            match shadow.covers(light.l, &light.axes, light.longest, light.finite) {
                 Cover::Nothing => {}
                 Cover::All => return Visibility::Hidden,
                 Cover::Some => self.spheres.push(shadow),
@@ -97,10 +97,7 @@ impl View {
                 Cover::Some => self.disks.push(shadow),
             }
         }
-        if occluders.too_many {
-            self.trees = true;
-            return Visibility::Mask;
-        }
+        self.trees = occluders.too_many;
         if !occluders.leaves.is_empty() {
             let hidden = dispatch_sixteen!(
                 level,
@@ -110,6 +107,9 @@ impl View {
             if hidden {
                 return Visibility::Hidden;
             }
+        }
+        if self.trees {
+            return Visibility::Mask;
         }
         self.gather_others(scene, target, &light, occluders, point);
         let nothing = self.spheres.is_empty()

@@ -12,7 +12,7 @@ mod seen;
 #[cfg(test)]
 mod tests;
 
-use fearless_simd::{Level, f32x4, f32x16, prelude::*};
+use fearless_simd::{Level, f32x4, f32x8, f32x16, prelude::*};
 
 use crate::accel::{
     Aabb, Beam, Built, LEAF, LaneSlabs, RayPacket16, RayTile, Slabs, TraceRay, Tree, build, dispatch_eight,
@@ -156,7 +156,7 @@ impl TriangleTree {
 
     /// Visits the leaves whose boxes `meet` says yes to, until `leaf` says no; see [`Tree::gather`].
     #[inline(always)]
-    pub fn gather<S: Simd, M: Fn(S, &crate::accel::Node) -> u32>(
+    pub fn gather<S: Simd, M: Fn(S, &crate::accel::Node) -> (u32, f32x8<S>)>(
         &self,
         simd: S,
         meet: impl FnOnce(Vec3, f32) -> M,
