@@ -11,8 +11,8 @@ use super::view::View;
 use crate::ids::LightId;
 use crate::math::{DVec3, Vec3};
 use crate::scene::Scene;
-use crate::visibility::{Occluders, ShadowMesh};
 use crate::shape::{Parallelogram, PlaneSide, Sphere, SurfaceInteraction};
+use crate::visibility::{Occluders, ShadowMesh};
 
 /// Who asks, and for how much of a surface.
 #[derive(Clone, Copy, Debug)]

@@ -193,7 +193,8 @@ impl<'a> Arrivals<'a> {
     /// Whether the edge of a shadow, of a light of one point, may run through the patch: 1, or 0 if that is excluded.
     fn edge(&mut self, light: usize, l: Vec3, finite: bool, place: &Place) -> f32 {
         let (scene, si) = (self.scene, place.si);
-        if !scene.light_obstacles.disks.is_empty() || self.gather(light, place) && (self.occluders.too_many || self.occluders.count() > 0)
+        if !scene.light_obstacles.disks.is_empty()
+            || self.gather(light, place) && (self.occluders.too_many || self.occluders.count() > 0)
         {
             return 1.0;
         }

@@ -208,7 +208,19 @@ impl Counts {
     fn all(&self) -> [u64; 11] {
         let Counts { camera_rays, shadow_rays, shadow_rays_skipped, settled, closed_form, .. } = *self;
         let Settled { visibility: [lit, hidden, below, mask], shafts, occluders, traced } = settled;
-        [camera_rays, shadow_rays, shadow_rays_skipped, lit, hidden, below, mask, shafts, occluders, traced, closed_form]
+        [
+            camera_rays,
+            shadow_rays,
+            shadow_rays_skipped,
+            lit,
+            hidden,
+            below,
+            mask,
+            shafts,
+            occluders,
+            traced,
+            closed_form,
+        ]
     }
 }
 
@@ -290,8 +302,19 @@ pub fn render(
     if stop.into_inner() {
         return ControlFlow::Break(());
     }
-    let [camera_rays, shadow_rays, shadow_rays_skipped, lit, hidden, below, mask, shafts, occluders, traced, closed_form] =
-        totals.map(AtomicU64::into_inner);
+    let [
+        camera_rays,
+        shadow_rays,
+        shadow_rays_skipped,
+        lit,
+        hidden,
+        below,
+        mask,
+        shafts,
+        occluders,
+        traced,
+        closed_form,
+    ] = totals.map(AtomicU64::into_inner);
     let simd = if settings.reference { SimdLevel::Fallback } else { level };
     let visibility = [lit, hidden, below, mask];
     let stats = RenderStats {

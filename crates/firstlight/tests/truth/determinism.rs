@@ -4,7 +4,8 @@
 use std::num::NonZeroUsize;
 
 use firstlight::{
-    AaMode, Image, LightDesc, RenderSettings, SampleSet, SamplesDesc, Scene, SceneDesc, ShapeDesc, SimdLevel, VisibilityMode, Window,
+    AaMode, Image, LightDesc, RenderSettings, SampleSet, SamplesDesc, Scene, SceneDesc, ShapeDesc, SimdLevel,
+    VisibilityMode, Window,
 };
 
 use crate::random;
