@@ -280,7 +280,12 @@ impl Between {
         let to = sphere.c - si.lit_from.as_dvec3();
         let (distance, r) = (to.length(), sphere.r);
         // From inside, or from its inner side: light from outside is hidden, light from inside is not
-        if distance <= r * (1.0 + 1e-6) || shadow.is_on() {
+        let is_on = shadow.is_on();
+        if is_on && horizon.as_dvec3().dot(to) < 0.0 {
+            // Its outside: nothing of it is above the horizon but by rounding
+            return;
+        }
+        if distance <= r * (1.0 + 1e-6) || is_on {
             let l = pyramid.corners;
             let outside = |l: &Vec3| (l.as_dvec3() - to).length() > r * (1.0 + 1e-6);
             let inside = |l: &Vec3| (l.as_dvec3() - to).length() < r * (1.0 - 1e-6);
