@@ -4,7 +4,7 @@ use super::rows::Region;
 use super::tensor::sharpness;
 use super::view::View;
 use crate::material::Lobe;
-use crate::math::{DVec3, Vec3};
+use crate::math::{DVec3, Vec3, square};
 
 /// Beyond the angle at which a highlight has fallen to exp(-FALL) it is left out.
 const FALL: f32 = 11.0;
@@ -22,7 +22,7 @@ pub(crate) fn region(view: &View) -> Option<Option<Region>> {
         return None;
     }
     let sharpness = sharpness(view);
-    let size2 = (view.la + view.skew.abs()).max(view.lb).powi(2);
+    let size2 = square((view.la + view.skew.abs()).max(view.lb));
     // The angle the light fills, seen from the nearest part of its plane that it can fill
     let gap = |foot: f32, half: f32| (foot.abs() - half).max(0.0);
     let (gap_x, gap_y) = (gap(view.fa, view.la + view.skew.abs()), gap(view.fb, view.lb));
@@ -59,7 +59,7 @@ fn covered(view: &View) -> Option<Region> {
     if !(angle < 1.2) {
         return None;
     }
-    let cos2 = f64::from(1.0 - angle * angle * 0.5).max(0.0).powi(2);
+    let cos2 = f64::from(square((1.0 - angle * angle * 0.5).max(0.0)));
     let mirror = view.mirror()?.as_dvec3();
     let [l0, a, b] = [view.l0, view.a, view.b].map(|v| v.as_dvec3());
     // The whole of the cone has to lie on the light's side of the point

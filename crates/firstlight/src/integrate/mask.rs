@@ -162,9 +162,9 @@ impl Masked<'_> {
         }
         let from = self.si.shadow_ray(LightId(self.light as u32), Vec3::ZERO, 1.0);
         let mut shadows = ShadowRays { from, rays: RayPacket16::ZERO, t_end: [0.0; LANES] };
-        for lane in 0..LANES {
-            shadows.rays.set(lane, from.start, ways[lane]);
-            shadows.t_end[lane] = ShadowRay { l: ways[lane], ..from }.end();
+        for (lane, way) in ways.iter().enumerate() {
+            shadows.rays.set(lane, from.start, *way);
+            shadows.t_end[lane] = ShadowRay { l: *way, ..from }.end();
         }
         hidden | geometry.are_blocked(self.scene.level, &shadows, asking)
     }

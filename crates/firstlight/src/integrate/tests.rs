@@ -21,7 +21,7 @@ impl Random {
     }
 
     fn scale(&mut self, a: f64, b: f64) -> f64 {
-        a * (b / a).powf(self.unit())
+        a * pxfm::f_pow(b / a, self.unit())
     }
 
     fn direction(&mut self) -> DVec3 {
@@ -123,7 +123,7 @@ fn brute(case: &Case, n: usize) -> Sums {
             }
             let mut weight = 4.0 / (n * n) as f64 * f64::from(case.view.measure);
             if light.physical {
-                weight *= f64::from(light.n.dot(l).abs() / distance.powi(3));
+                weight *= f64::from(light.n.dot(l).abs() / (distance * distance * distance));
             }
             let cos_i = height / distance;
             diffuse += weight * f64::from(cos_i);

@@ -27,3 +27,9 @@ pub(crate) const UNIT_ROUNDOFF: f32 = f32::EPSILON * 0.5;
 pub(crate) fn vec3(v: [f64; 3]) -> Vec3 {
     Vec3::new(v[0] as f32, v[1] as f32, v[2] as f32)
 }
+
+/// x^2.
+#[inline(always)]
+pub(crate) fn square(x: f32) -> f32 {
+    x * x
+}

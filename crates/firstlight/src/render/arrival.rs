@@ -11,7 +11,7 @@ use crate::ids::LightId;
 use crate::integrate::{Asker, Between, Emitter, Masked, Receiver, Sums, View, integrate, sharpness};
 use crate::light::{Light, LightKind};
 use crate::material::Lobe;
-use crate::math::{Vec3, dispatch_wide};
+use crate::math::{Vec3, dispatch_wide, square};
 use crate::scene::Scene;
 use crate::shape::{PlaneSide, SurfaceInteraction};
 use crate::visibility::{Occluders, Target, Viewpoint, Visibility};
@@ -183,7 +183,7 @@ impl<'a> Arrivals<'a> {
         let terminator = if height < behind { swing * 0.5 } else { 0.0 };
         let smooth = swing * swing + 2.0 * swing * place.off;
         let share = (edge + rim + terminator + smooth).min(1.0);
-        let lobe = (sharp_of(place.lobe, si) * (2.0 * place.turn + place.reach / distance).powi(2)).min(1.0);
+        let lobe = (sharp_of(place.lobe, si) * square(2.0 * place.turn + place.reach / distance)).min(1.0);
         let specular =
             if matches!(place.lobe, Lobe::None) { 0.0 } else { weight * (edge + rim + terminator + lobe).min(1.0) };
         let resolved = edge == 0.0 && rim == 0.0 && swing < RESOLVED_SWING && lobe < RESOLVED;
@@ -387,7 +387,7 @@ fn bend(view: &View, place: &Place, drift: f32) -> (Sums, bool) {
     let kink = (drift * (0.125 + 0.5 * place.off)).min(1.0);
     let cos = (view.cos.max() / view.l0.length()).min(1.0) + swing;
     let horizon = if cuts { swing * swing.min(1.0) } else { 0.0 };
-    let smooth = (place.reach / nearest.max(place.reach)).powi(2) * 2.0 + place.turn * place.turn * 0.5;
+    let smooth = square(place.reach / nearest.max(place.reach)) * 2.0 + place.turn * place.turn * 0.5;
     let smooth = smooth + 2.0 * swing * place.off;
     let diffuse = most * (cos * (kink + smooth.min(1.0)) + horizon).min(1.0);
     let resolved = drift < RESOLVED && swing < RESOLVED_SWING;
@@ -403,8 +403,8 @@ fn bend(view: &View, place: &Place, drift: f32) -> (Sums, bool) {
 
 /// How bright a highlight can be on a light, at most, or thereabouts.
 fn brightest(view: &View) -> f32 {
-    let size2 = view.la.max(view.lb).powi(2);
-    let distance2 = view.nearest().powi(2);
+    let size2 = square(view.la.max(view.lb));
+    let distance2 = square(view.nearest());
     let sharp = sharpness(view) * size2;
     if sharp > 0.5 * distance2 {
         return 1.0;
@@ -423,6 +423,6 @@ fn sharp_of(lobe: &Lobe, si: &SurfaceInteraction) -> f32 {
     match lobe {
         Lobe::None => 0.0,
         Lobe::Phong(lobe) => 0.5 * lobe.exponent(),
-        Lobe::BlinnPhong(lobe) => 0.125 * lobe.exponent() / si.ns.dot(si.wo).powi(2).max(0.01),
+        Lobe::BlinnPhong(lobe) => 0.125 * lobe.exponent() / square(si.ns.dot(si.wo)).max(0.01),
     }
 }

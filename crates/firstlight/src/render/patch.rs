@@ -4,7 +4,7 @@ use super::hits::camera_ray;
 use super::solo::Candidate;
 use crate::color::Rgb;
 use crate::material::Bsdf;
-use crate::math::Vec3;
+use crate::math::{Vec3, square};
 use crate::scene::{Hit, Scene};
 use crate::shape::SurfaceInteraction;
 
@@ -127,7 +127,7 @@ impl Patch {
             mean.add(&member.bsdf);
         }
         let (x, y) = (x / count, y / count);
-        let distance = |member: &Member| (member.at[0] - x).powi(2) + (member.at[1] - y).powi(2);
+        let distance = |member: &Member| square(member.at[0] - x) + square(member.at[1] - y);
         let nearest = members.iter().min_by(|a, b| distance(a).total_cmp(&distance(b))).expect("a patch has members");
         let (si, bsdf) = (nearest.si, nearest.bsdf);
         self.place(si);

@@ -131,9 +131,9 @@ fn shadow_rays<S: Simd>(simd: S, light: LightId, point: &Viewpoint, block: &Samp
         f32x16::load_array_ref(simd, &block.point[1]) - point.p.y,
         f32x16::load_array_ref(simd, &block.point[2]) - point.p.z,
     ];
-    for axis in 0..3 {
+    for (axis, l) in l.iter().enumerate() {
         shadows.rays.o[axis] = [point.start[axis]; LANES];
-        l[axis].store_slice(&mut shadows.rays.d[axis]);
+        l.store_slice(&mut shadows.rays.d[axis]);
     }
     // `ShadowRay::end`, operation by operation
     let o = point.start.abs();

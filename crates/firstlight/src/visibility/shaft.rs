@@ -151,10 +151,9 @@ impl TreeShaft {
         let planes = &node.planes;
         let mut enter = simd.splat_f32x8(0.0);
         let mut leave = simd.splat_f32x8(self.s_max);
-        for axis in 0..3 {
-            let [low, high] = &self.lines[axis];
-            let a = f32x8::load_array_ref(simd, &planes[axis][1]).mul_add(low.r, low.c);
-            let b = f32x8::load_array_ref(simd, &planes[axis][0]).mul_add(high.r, high.c);
+        for ([low, high], [low_planes, high_planes]) in self.lines.iter().zip(planes) {
+            let a = f32x8::load_array_ref(simd, high_planes).mul_add(low.r, low.c);
+            let b = f32x8::load_array_ref(simd, low_planes).mul_add(high.r, high.c);
             // A pattern that seldom changes from node to node
             match (low.enters, high.enters) {
                 (false, true) => (enter, leave) = (enter.max(b), leave.min(a)),

@@ -84,12 +84,12 @@ impl LightHull {
         let mut needed = [0.0f64; 3];
         for q in points {
             let at = hull.coordinates(*q);
-            for axis in 0..3 {
-                needed[axis] = needed[axis].max(at[axis].abs());
+            for (axis, needed) in needed.iter_mut().enumerate() {
+                *needed = needed.max(at[axis].abs());
             }
         }
-        for axis in 0..3 {
-            hull.axes[axis] = (hull.axes[axis].as_dvec3() * (needed[axis] * (1.0 + ROOM)).max(ROOM)).as_vec3();
+        for (axis, needed) in hull.axes.iter_mut().zip(needed) {
+            *axis = (axis.as_dvec3() * (needed * (1.0 + ROOM)).max(ROOM)).as_vec3();
         }
         while !points.iter().all(|q| hull.coordinates(*q).abs().max_element() <= 1.0) {
             hull.axes = hull.axes.map(|a| a * 1.5);

@@ -140,7 +140,7 @@ fn windows(wanted: &[bool], width: u32, height: u32) -> Vec<Window> {
 /// The side m of the sets of m x m points, about 2^`level` points.
 fn side(level: u32) -> u32 {
     let whole = 1u32 << (level / 2);
-    if level % 2 == 0 { whole } else { (2 * whole * whole).isqrt() }
+    if level.is_multiple_of(2) { whole } else { (2 * whole * whole).isqrt() }
 }
 
 impl Converged {

@@ -302,10 +302,10 @@ impl TriangleTree {
                 place: (lane % PACK) as u32,
                 source,
             };
-            for i in 0..4 {
-                triangle.middle[i] = forms[i][0][lane];
-                for axis in 0..3 {
-                    triangle.slopes[i][axis] = forms[i][axis + 1][lane];
+            for (i, [middle, slopes @ ..]) in forms.iter().enumerate() {
+                triangle.middle[i] = middle[lane];
+                for (axis, slope) in slopes.iter().enumerate() {
+                    triangle.slopes[i][axis] = slope[lane];
                 }
             }
             seen.push(triangle);
