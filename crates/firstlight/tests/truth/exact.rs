@@ -324,8 +324,9 @@ fn nothing_flickers_behind_what_moves() {
             .collect();
         let mut compared = 0;
         for (k, three) in frames.windows(3).enumerate() {
-            for i in 0..three[0].len() {
-                let (Some(a), Some(b), Some(c)) = (three[0][i], three[1][i], three[2][i]) else { continue };
+            let pixels = three[0].iter().zip(&three[1]).zip(&three[2]).enumerate();
+            for (i, ((a, b), c)) in pixels {
+                let (Some(a), Some(b), Some(c)) = (a, b, c) else { continue };
                 for channel in 0..3 {
                     let [is, should] = [0, 1].map(|of| a[of][channel] - 2.0 * b[of][channel] + c[of][channel]);
                     assert_near(is, should, allowed, &format!("frames {k} to {}, pixel {i}", k + 2));
