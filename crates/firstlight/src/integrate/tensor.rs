@@ -65,19 +65,22 @@ pub(crate) fn order(view: &View, region: &Region) -> Option<usize> {
     let distance2 = gap_x * gap_x + gap_y * gap_y + view.height * view.height;
     let size = half_x.max(half_y) + 0.5 * (y1 - y0) * view.skew.abs();
     let far = if distance2 > 0.0 { distance2.sqrt() / size } else { 0.0 };
-    let by_distance = FAR_ENOUGH.iter().position(|least| far >= *least)?;
+    let table = match view.outline {
+        Outline::Parallelogram => &FAR_ENOUGH,
+        Outline::Disk => &FAR_ENOUGH_DISK,
+    };
+    let by_distance = table.iter().position(|least| far >= *least)?;
     let sharp = sharpness(view) * (size * size) / distance2;
     let by_lobe = SHARP_ENOUGH.iter().position(|most| sharp <= *most)?;
-    let least = if view.outline == Outline::Disk { DISK } else { FIRST };
-    Some((FIRST + by_distance.max(by_lobe)).max(least))
+    Some(FIRST + by_distance.max(by_lobe))
 }
 
 /// The order that the tables begin with.
 const FIRST: usize = 3;
-/// The least order that knows the area of a disk.
-const DISK: usize = 5;
 /// In half sizes of the light, how far a point has to be for each order.
 const FAR_ENOUGH: [f32; 8] = [5.0, 3.2, 2.2, 1.7, 1.35, 1.1, 0.95, 0.85];
+/// The same for a disk, whose rows are not all as long: that alone takes five.
+const FAR_ENOUGH_DISK: [f32; 8] = [f32::INFINITY, f32::INFINITY, 8.0, 4.2, 2.6, 1.9, 1.5, 1.3];
 /// How far a light may reach across a highlight, in the exponent of the highlight's fall, for each order.
 const SHARP_ENOUGH: [f32; 8] = [0.2, 0.6, 1.1, 1.8, 2.6, 3.4, 4.4, 5.4];
 
