@@ -112,7 +112,6 @@ pub struct Light {
     pub scale: Rgb,
     /// What the whole light sends, whatever its samples: `color` x `strength`, over pi where the light is physical. The
     /// integral over its area takes this in place of `scale`, which has the area and the number of samples in it.
-    #[allow(dead_code, reason = "for integration")]
     pub intensity: Rgb,
     /// What the camera sees of it: `color` x `strength`.
     pub radiance: Rgb,

@@ -36,7 +36,6 @@ area_table! {
 
 /// The shape of a rectangle light, in world space.
 #[derive(Clone, Copy, Debug)]
-#[allow(dead_code, reason = "for integration")]
 pub struct Rectangle {
     /// The middle.
     pub center: DVec3,
