@@ -307,8 +307,7 @@ impl Between {
         if gap > SLACK * distance as f32 + asker.reach {
             return;
         }
-        let near = (distance - r) as f32;
-        self.drift = self.drift.max(pyramid.drift((near - asker.reach).max(0.0)));
+        self.drift = self.drift.max(pyramid.drift(tangent(distance, r, asker.reach)));
         if gap > SLACK * distance as f32 {
             return;
         }
@@ -317,7 +316,7 @@ impl Between {
             return;
         }
         let Some(hider) = Hider::sphere(view, to, r) else { return };
-        self.settle(pyramid, hider, view, asker, to, r - f64::from(asker.reach));
+        self.settle(pyramid, hider, view, asker, to, r);
         if !self.hidden {
             self.add(Some(hider));
         }
@@ -337,11 +336,16 @@ impl Between {
         }
         self.hidden = true;
         // The whole patch: the ways to the corners pass the sphere's middle nearly as closely from all of it
-        let firm = r > 0.0
+        let smaller = r - f64::from(asker.reach);
+        let firm = smaller > 0.0
             && asker.reach > 0.0
-            && Hider::sphere(view, to, r).is_some_and(|smaller| corners.iter().all(|[x, y]| smaller.hides(*x, *y)));
-        self.drift =
-            if firm || asker.reach == 0.0 { 0.0 } else { self.drift.max(pyramid.drift((to.length() - r) as f32)) };
+            && Hider::sphere(view, to, smaller)
+                .is_some_and(|smaller| corners.iter().all(|[x, y]| smaller.hides(*x, *y)));
+        self.drift = if firm || asker.reach == 0.0 {
+            0.0
+        } else {
+            self.drift.max(pyramid.drift(tangent(to.length(), r, asker.reach)))
+        };
     }
 
     fn flat(&mut self, view: &View, emitter: &Emitter, pyramid: &Pyramid, flat: &Parallelogram, asker: &Asker) {
@@ -386,6 +390,14 @@ impl Between {
         }
         self.add(Some(hider));
     }
+}
+
+/// How far off the outline of a sphere of radius `r` is seen, at least, from within `reach` of a point at `distance` from its
+/// middle. A step of d turns the way to the outline by at most d over that: across the line of sight by d over the distance, along
+/// it by that times r over the tangent, and the squares add up.
+fn tangent(distance: f64, r: f64, reach: f32) -> f32 {
+    let near = (distance - f64::from(reach)).max(r);
+    (near * near - r * r).sqrt() as f32
 }
 
 /// How far a triangle is from the origin.

@@ -22,14 +22,46 @@ pub(crate) struct Arrival {
     pub sums: Sums,
     /// How far the mean over the patch can be from what arrives at its middle.
     pub bend: Sums,
+    /// Over how much of the light's size the outlines of shadows move across the patch; see [`Between::drift`].
+    pub drift: f32,
     /// Whether all that light does here is wide beside the patch, so that neighbours tell what it does.
     pub resolved: bool,
+    /// Whether nothing of it has a corner, and what curves does so little that a quadratic in the place follows it.
+    pub smooth: bool,
+}
+
+/// How a light changes over a patch.
+#[derive(Clone, Copy, Debug, Default)]
+struct Change {
+    /// See [`Arrival::bend`], and so on.
+    bend: Sums,
+    drift: f32,
+    resolved: bool,
+    smooth: bool,
+}
+
+impl Change {
+    /// Not at all.
+    const NONE: Change =
+        Change { bend: Sums { diffuse: 0.0, specular: 0.0 }, drift: 0.0, resolved: true, smooth: true };
+    /// Nobody knows.
+    const UNKNOWN: Change = Change {
+        bend: Sums { diffuse: f32::MAX, specular: f32::MAX },
+        drift: f32::INFINITY,
+        resolved: false,
+        smooth: false,
+    };
+
+    fn with(self, sums: Sums) -> Arrival {
+        let Change { bend, drift, resolved, smooth } = self;
+        Arrival { sums, bend, drift, resolved, smooth }
+    }
 }
 
 impl Arrival {
     /// At a point, or where nothing bends.
-    fn even(sums: Sums) -> Arrival {
-        Arrival { sums, bend: Sums::default(), resolved: true }
+    pub fn even(sums: Sums) -> Arrival {
+        Change::NONE.with(sums)
     }
 }
 
@@ -132,16 +164,15 @@ impl<'a> Arrivals<'a> {
             (None, LightKind::Area(area)) => {
                 let sums = self.sampled.gather(self.scene, index, place.si, place.lobe, counts);
                 let sums = Sums { diffuse: sums.diffuse.total(), specular: sums.specular.total() };
-                let mut arrival = Arrival::even(sums);
-                if place.reach > 0.0 {
-                    // As it would be if it were integrated, in the unit of samples
-                    let emitter = Emitter::new(area);
-                    let one = area.samples() as f32 / if area.physical { area.measure() as f32 } else { 1.0 };
-                    let (bend, resolved) = self.bend_of(index, &emitter, place);
-                    arrival.resolved = resolved;
-                    arrival.bend = Sums { diffuse: bend.diffuse * one, specular: bend.specular * one };
+                if place.reach == 0.0 {
+                    return Arrival::even(sums);
                 }
-                arrival
+                // As it would be if it were integrated, in the unit of samples
+                let emitter = Emitter::new(area);
+                let one = area.samples() as f32 / if area.physical { area.measure() as f32 } else { 1.0 };
+                let mut change = self.change_of(index, &emitter, place);
+                change.bend = Sums { diffuse: change.bend.diffuse * one, specular: change.bend.specular * one };
+                change.with(sums)
             }
             (None, _) => self.single(index, light, place, counts),
         }
@@ -164,7 +195,7 @@ impl<'a> Arrivals<'a> {
             return Arrival::even(sums);
         }
         let Some(sample) = light.sample(0, to.l) else {
-            return Arrival { sums, bend: Sums { diffuse: f32::MAX, specular: f32::MAX }, resolved: false };
+            return Change::UNKNOWN.with(sums);
         };
         let weight = sample.weight.max(sums.diffuse) * 1.2;
         // A spot's rim, a terminator, a shadow's edge
@@ -187,7 +218,9 @@ impl<'a> Arrivals<'a> {
         let specular =
             if matches!(place.lobe, Lobe::None) { 0.0 } else { weight * (edge + rim + terminator + lobe).min(1.0) };
         let resolved = edge == 0.0 && rim == 0.0 && swing < RESOLVED_SWING && lobe < RESOLVED;
-        Arrival { sums, bend: Sums { diffuse: weight * share, specular }, resolved }
+        let drift = if edge == 0.0 { 0.0 } else { f32::INFINITY };
+        let smooth = resolved && terminator == 0.0 && is_smooth(swing, lobe);
+        Change { bend: Sums { diffuse: weight * share, specular }, drift, resolved, smooth }.with(sums)
     }
 
     /// Whether the edge of a shadow, of a light of one point, may run through the patch: 1, or 0 if that is excluded.
@@ -279,27 +312,21 @@ impl<'a> Arrivals<'a> {
             let between = Between::default();
             let masked = Masked { scene, light: index, emitter, si, lobe: place.lobe, between: &between };
             let sums = if matches!(emitter, Emitter::Points) { masked.by_points(light) } else { Sums::default() };
-            // Nothing is known of how it bends
-            let bend = if matches!(emitter, Emitter::Points) && place.reach > 0.0 { f32::MAX } else { 0.0 };
-            return Arrival { sums, bend: Sums { diffuse: bend, specular: bend }, resolved: false };
+            return unseen(emitter, place).with(sums);
         };
         if !view.arrives() {
             counts.settled.visibility[Visibility::BelowHorizon as usize] += 1;
-            let (bend, resolved) = horizon_bend(&view, place);
-            return Arrival { sums: Sums::default(), bend, resolved };
+            return horizon_change(&view, place).with(Sums::default());
         }
         let between = if light.shadows && si.receives_shadow {
             self.between(index, emitter, &view, place)
         } else {
             Between::default()
         };
-        let (mut bend, resolved) = bend(&view, place, between.drift);
+        let change = change(&view, place, &between);
         if between.hidden {
             counts.settled.visibility[Visibility::Hidden as usize] += 1;
-            if between.drift == 0.0 {
-                bend = Sums::default();
-            }
-            return Arrival { sums: Sums::default(), bend, resolved };
+            return change.with(Sums::default());
         }
         let enough = |sums: &Sums, error: &Sums| {
             let [diffuse, specular] = place.colors;
@@ -320,7 +347,7 @@ impl<'a> Arrivals<'a> {
         } else {
             whole
         };
-        Arrival { sums, bend, resolved }
+        change.with(sums)
     }
 
     /// What stands between a place and an area light.
@@ -340,45 +367,60 @@ impl<'a> Arrivals<'a> {
         true
     }
 
-    fn bend_of(&mut self, index: usize, emitter: &Emitter, place: &Place) -> (Sums, bool) {
+    /// How an area light would change if it were integrated.
+    fn change_of(&mut self, index: usize, emitter: &Emitter, place: &Place) -> Change {
         let light = &self.scene.lights[index];
-        let Some(view) = self.view(emitter, place) else {
-            let unknown = if matches!(emitter, Emitter::Points) { f32::MAX } else { 0.0 };
-            return (Sums { diffuse: unknown, specular: unknown }, false);
-        };
+        let Some(view) = self.view(emitter, place) else { return unseen(emitter, place) };
         if !view.arrives() {
-            return horizon_bend(&view, place);
+            return horizon_change(&view, place);
         }
-        if !(light.shadows && place.si.receives_shadow) {
-            return bend(&view, place, 0.0);
-        }
-        let between = self.between(index, emitter, &view, place);
-        if between.hidden && between.drift == 0.0 {
-            return (Sums::default(), true);
-        }
-        bend(&view, place, between.drift)
+        let between = if light.shadows && place.si.receives_shadow {
+            self.between(index, emitter, &view, place)
+        } else {
+            Between::default()
+        };
+        change(&view, place, &between)
+    }
+}
+
+/// Patches over which the light's direction and the normal turn by less than the first, in radians, and a highlight by less
+/// than the second of its width, squared, are followed by a quadratic: its error is that of the third order, about a
+/// hundredth of the highlight times the second to the power of 3/2.
+fn is_smooth(swing: f32, lobe: f32) -> bool {
+    swing < 0.1 && lobe < 0.1
+}
+
+/// Of a light that nothing is seen of, or that has no view.
+fn unseen(emitter: &Emitter, place: &Place) -> Change {
+    let is_known = !matches!(emitter, Emitter::Points) || place.reach == 0.0;
+    if is_known {
+        Change { drift: f32::INFINITY, resolved: false, smooth: false, ..Change::NONE }
+    } else {
+        Change::UNKNOWN
     }
 }
 
 /// What arrives on a patch whose middle sees nothing of a light, at most.
-fn horizon_bend(view: &View, place: &Place) -> (Sums, bool) {
+fn horizon_change(view: &View, place: &Place) -> Change {
     if place.reach == 0.0 {
-        return (Sums::default(), true);
+        return Change::NONE;
     }
     let far = view.l0.length() + view.la + view.lb + view.skew.abs();
     let behind = place.reach + place.turn * far;
     if view.facing < -place.reach || view.cos.max() < -behind || view.horizon.max() < -behind {
-        return (Sums::default(), true);
+        return Change::NONE;
     }
     let swing = place.turn + place.reach / view.nearest().max(place.reach);
     let all = view.most() * swing.min(1.0) * 0.5;
-    (Sums { diffuse: all, specular: all }, swing < RESOLVED_SWING)
+    let bend = Sums { diffuse: all, specular: all };
+    Change { bend, drift: 0.0, resolved: swing < RESOLVED_SWING, smooth: false }
 }
 
-/// How far the mean over a patch can be from what arrives at its middle. `drift`: see [`Between::drift`].
-fn bend(view: &View, place: &Place, drift: f32) -> (Sums, bool) {
-    if place.reach == 0.0 {
-        return (Sums::default(), true);
+/// How far the mean over a patch can be from what arrives at its middle, and so on.
+fn change(view: &View, place: &Place, between: &Between) -> Change {
+    let drift = between.drift;
+    if place.reach == 0.0 || between.hidden && drift == 0.0 {
+        return Change::NONE;
     }
     let (most, nearest) = (view.most(), view.nearest());
     let swing = place.turn + place.reach / nearest.max(place.reach);
@@ -391,14 +433,18 @@ fn bend(view: &View, place: &Place, drift: f32) -> (Sums, bool) {
     let smooth = smooth + 2.0 * swing * place.off;
     let diffuse = most * (cos * (kink + smooth.min(1.0)) + horizon).min(1.0);
     let resolved = drift < RESOLVED && swing < RESOLVED_SWING;
+    let is_clear = drift == 0.0 && between.hiders.is_empty() && !between.ask && !between.ask_trees && !cuts;
     if matches!(view.lobe, Lobe::None) {
-        return (Sums { diffuse, specular: 0.0 }, resolved);
+        let bend = Sums { diffuse, specular: 0.0 };
+        return Change { bend, drift, resolved, smooth: is_clear && is_smooth(swing, 0.0) };
     }
     let moved = 2.0 * place.turn + place.reach / nearest.max(place.reach);
-    let narrow = (sharpness(view) * moved * moved).min(1.0);
+    let lobe = sharpness(view) * moved * moved;
+    let narrow = lobe.min(1.0);
     let narrow = (narrow + 2.0 * narrow.sqrt() * place.off).min(1.0);
     let specular = most * brightest(view) * (kink + smooth + narrow + horizon).min(1.0);
-    (Sums { diffuse, specular }, resolved && narrow < RESOLVED)
+    let bend = Sums { diffuse, specular };
+    Change { bend, drift, resolved: resolved && narrow < RESOLVED, smooth: is_clear && is_smooth(swing, lobe) }
 }
 
 /// How bright a highlight can be on a light, at most, or thereabouts.

@@ -9,6 +9,7 @@
 //! [`tiled`](tiled/index.html) integrates lights and lights a surface once where that is enough; all else is as above.
 
 mod arrival;
+mod field;
 mod film;
 mod hits;
 mod lanes;
@@ -18,6 +19,7 @@ mod plain;
 mod shafts;
 mod simd;
 mod solo;
+mod square;
 mod tile;
 mod tiled;
 

@@ -1,7 +1,9 @@
 //! One surface in one pixel: what is shaded once.
 
+use arrayvec::ArrayVec;
+
 use super::hits::camera_ray;
-use super::solo::Candidate;
+use super::solo::{self, Candidate};
 use crate::color::Rgb;
 use crate::material::Bsdf;
 use crate::math::{Vec3, square};
@@ -33,7 +35,12 @@ pub(crate) enum Rays {
     Some(Vec<Member>),
     /// All of the pixel's, which meet nothing else.
     All(Candidate),
+    /// Those that are bits of this, row by row: they meet this first.
+    Mask(Candidate, u64),
 }
+
+/// The most rays across a pixel for which there are masks.
+const MASKED: u32 = 8;
 
 /// What one camera ray sees of a patch.
 #[derive(Clone)]
@@ -46,6 +53,8 @@ pub(crate) struct Member {
 
 /// Normals that differ more than this cosine belong to different patches.
 const SAME_NORMAL: f32 = 0.9;
+/// In radians: normals that turn less from the middle of a patch belong to it.
+const MAX_TURN: f32 = 0.2;
 
 impl Patch {
     /// Whether a camera ray that sees `si` sees the same patch.
@@ -65,6 +74,7 @@ impl Patch {
         match &self.rays {
             Rays::Some(members) => members.len() as u32,
             Rays::All(_) => scene.antialiasing * scene.antialiasing,
+            Rays::Mask(_, mask) => mask.count_ones(),
         }
     }
 
@@ -77,7 +87,13 @@ impl Patch {
     pub fn for_each(&self, scene: &Scene, pixel: [u32; 2], mut each: impl FnMut(&SurfaceInteraction, &Bsdf)) {
         match &self.rays {
             Rays::Some(members) => members.iter().for_each(|member| each(&member.si, &member.bsdf)),
-            Rays::All(candidate) => for_each_ray(scene, pixel, *candidate, &mut each),
+            Rays::All(candidate) => {
+                for_each_ray(scene, pixel, *candidate, 0..square_of(scene.antialiasing), &mut each);
+            }
+            Rays::Mask(candidate, mask) => {
+                let rays = (0..square_of(scene.antialiasing)).filter(|k| mask >> k & 1 == 1);
+                for_each_ray(scene, pixel, *candidate, rays, &mut each);
+            }
         }
     }
 
@@ -107,10 +123,84 @@ impl Patch {
             patch.si = scene.surface(&ray, &hit, &differential);
         } else if !material.is_even(&si, &scene.textures) {
             let mut mean = Mean::default();
-            for_each_ray(scene, pixel, candidate, &mut |_, bsdf| mean.add(bsdf));
+            patch.for_each(scene, pixel, |_, bsdf| mean.add(bsdf));
             mean.apply(&mut patch);
         }
         Some(patch)
+    }
+
+    /// The patch that the rays of `mask` see, which all meet one shape first; `None` if it turns too far over the pixel to be
+    /// one patch.
+    fn masked(scene: &Scene, pixel: [u32; 2], candidate: Candidate, mask: u64) -> Option<Patch> {
+        let n = scene.antialiasing;
+        let places = || (0..n * n).filter(move |k| mask >> k & 1 == 1).map(move |k| [k % n, k / n]);
+        let count = mask.count_ones() as f32;
+        let sum = places().fold([0, 0], |[x, y], [column, row]| [x + column, y + row]);
+        // In the middle of the rays; what hides some of the shape does not matter here
+        let at = |axis: usize| pixel[axis] as f32 + (sum[axis] as f32 / count + 0.5) / n as f32;
+        let (ray, differential) = scene.camera.ray(at(0), at(1), 1.0 / n as f32);
+        let hit = candidate.hit(scene, &ray)?;
+        let si = scene.surface(&ray, &hit, &differential);
+        // How far they are, and whether around it
+        let curvature = candidate.curvature(scene);
+        let (mut reach, mut middle) = (0.0f32, Vec3::ZERO);
+        if curvature == 0.0 {
+            let [across, down] = differential.on_plane(ray.d, hit.t as f32, si.ng, f32::MAX.sqrt() * 0.25);
+            let from = [0, 1].map(|axis| (at(axis) - pixel[axis] as f32) * n as f32 - 0.5);
+            for [column, row] in places() {
+                reach = reach.max((across * (column as f32 - from[0]) + down * (row as f32 - from[1])).length());
+            }
+        } else {
+            for [column, row] in places() {
+                let (ray, _) = camera_ray(scene, pixel[0] * n + column, pixel[1] * n + row);
+                let hit = candidate.hit(scene, &ray)?;
+                let way = (ray.o.as_dvec3() + ray.d.as_dvec3() * hit.t).as_vec3() - si.p;
+                reach = reach.max(way.length());
+                middle += way;
+            }
+        }
+        let off = if reach > 0.0 { middle.length() / (count * reach) } else { 0.0 };
+        let turn = reach * curvature;
+        if turn > MAX_TURN {
+            return None;
+        }
+        let material = &scene.materials[si.material.index()];
+        let bsdf = material.bsdf(&si, &scene.textures);
+        let rays = Rays::Mask(candidate, mask);
+        let mut patch = Patch { si, bsdf, rays, reach, turn, off, uneven: false };
+        // Over all of the pixel
+        let (ray, whole) = scene.camera.ray(pixel[0] as f32 + 0.5, pixel[1] as f32 + 0.5, 1.0);
+        let even = candidate
+            .hit(scene, &ray)
+            .is_some_and(|hit| material.is_even(&scene.surface(&ray, &hit, &whole), &scene.textures));
+        if mask.count_ones() > 1 && !even {
+            let mut mean = Mean::default();
+            patch.for_each(scene, pixel, |_, bsdf| mean.add(bsdf));
+            mean.apply(&mut patch);
+        }
+        Some(patch)
+    }
+
+    /// The parts of it in the quarters of its pixel; none if it is too small, or not of one listed shape.
+    pub fn quarters(&self, scene: &Scene, pixel: [u32; 2]) -> ArrayVec<Patch, 4> {
+        let n = scene.antialiasing;
+        let (candidate, mask) = match &self.rays {
+            Rays::Mask(candidate, mask) => (*candidate, *mask),
+            Rays::All(candidate) if n <= MASKED => (*candidate, u64::MAX),
+            _ => return ArrayVec::new(),
+        };
+        if self.count(scene) <= 4 {
+            return ArrayVec::new();
+        }
+        let half = n.div_ceil(2);
+        let mut parts = [0u64; 4];
+        for k in (0..n * n).filter(|k| mask >> k & 1 == 1) {
+            parts[(k / n / half * 2 + k % n / half) as usize] |= 1 << k;
+        }
+        let parts = parts.into_iter().filter(|part| *part != 0);
+        let quarters: Option<ArrayVec<Patch, 4>> =
+            parts.map(|part| Patch::masked(scene, pixel, candidate, part)).collect();
+        quarters.unwrap_or_default()
     }
 
     /// Finds the middle of the members, and how far they reach.
@@ -187,21 +277,29 @@ impl Mean {
     }
 }
 
+fn square_of(n: u32) -> u32 {
+    n * n
+}
+
 fn for_each_ray(
     scene: &Scene,
     [i, j]: [u32; 2],
     candidate: Candidate,
+    rays: impl Iterator<Item = u32>,
     each: &mut impl FnMut(&SurfaceInteraction, &Bsdf),
 ) {
     let n = scene.antialiasing;
-    for (row, column) in (0..n).flat_map(|row| (0..n).map(move |column| (row, column))) {
-        let (ray, differential) = camera_ray(scene, i * n + column, j * n + row);
+    for k in rays {
+        let (ray, differential) = camera_ray(scene, i * n + k % n, j * n + k / n);
         // It is proved that it meets it; a rounding may say otherwise
         let Some(hit) = candidate.hit(scene, &ray) else { continue };
         let si = scene.surface(&ray, &hit, &differential);
         each(&si, &scene.materials[si.material.index()].bsdf(&si, &scene.textures));
     }
 }
+
+/// The most shapes in a pixel for which there are masks.
+const KINDS: usize = 8;
 
 /// What the rays of a pixel see.
 #[derive(Default)]
@@ -215,6 +313,62 @@ impl PixelPatches {
     pub fn clear(&mut self) {
         self.patches.clear();
         (self.background, self.emission) = (0, Rgb::BLACK);
+    }
+
+    /// Sorts what the rays of a pixel see that meet nothing but these. `once`: see [`collect`](Self::collect).
+    pub fn collect_listed(&mut self, scene: &Scene, [i, j]: [u32; 2], once: bool, candidates: &[Candidate]) {
+        let n = scene.antialiasing;
+        let first = |k: u32| {
+            let (ray, _) = camera_ray(scene, i * n + k % n, j * n + k / n);
+            solo::first(scene, candidates, &ray)
+        };
+        let one_by_one = |pixel: &mut Self| {
+            pixel.collect(scene, [i, j], once, |column, row| first(row * n + column).map(|(_, hit)| hit));
+        };
+        if !once || n > MASKED {
+            return one_by_one(self);
+        }
+        self.clear();
+        let mut masks: ArrayVec<(usize, u64), KINDS> = ArrayVec::new();
+        for k in 0..n * n {
+            let Some((place, _)) = first(k) else {
+                self.background += 1;
+                continue;
+            };
+            if let Candidate::Light(light) = candidates[place] {
+                self.emission += scene.lights[light as usize].radiance;
+                continue;
+            }
+            match masks.iter().position(|(known, _)| *known == place) {
+                Some(known) => masks[known].1 |= 1 << k,
+                None if masks.is_full() => return one_by_one(self),
+                None => masks.push((place, 1 << k)),
+            }
+        }
+        for (place, mask) in masks {
+            match Patch::masked(scene, [i, j], candidates[place], mask) {
+                Some(patch) => self.patches.push(patch),
+                None => return one_by_one(self),
+            }
+        }
+    }
+
+    /// The pixel's colour, from what its surfaces send of ambient light and of each light, diffuse and specular, all rays
+    /// together: red, green, blue premultiplied, alpha.
+    pub fn color(&self, scene: &Scene, ambient: Rgb, terms: &[[Rgb; 2]]) -> [f32; 4] {
+        let rays = (scene.antialiasing * scene.antialiasing) as f32;
+        // The sum in its one order
+        let mean = |sum: Rgb| Rgb::new(sum.r / rays, sum.g / rays, sum.b / rays);
+        let uncovered = self.background as f32 / rays;
+        let mut color = if scene.transparent { Rgb::BLACK } else { scene.background * uncovered };
+        color += mean(self.emission);
+        color += mean(ambient);
+        for [diffuse, specular] in terms {
+            color += mean(*diffuse);
+            color += mean(*specular);
+        }
+        let alpha = if scene.transparent { 1.0 - uncovered } else { 1.0 };
+        [color.r, color.g, color.b, alpha]
     }
 
     /// Sorts what the rays of a pixel see. `once` puts what is one surface together; without it each ray is a patch.

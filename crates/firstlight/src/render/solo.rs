@@ -4,14 +4,17 @@
 //! the corners all meet one convex shape, so do all between them; and if it is nearer there than anything else can be, it
 //! is all that is seen.
 
+use super::patch::Patch;
+use super::square::Square;
 use crate::ids::SurfaceId;
 use crate::light::{AreaShape, LightKind};
-use crate::math::{Ray, Vec3};
+use crate::material::Bsdf;
+use crate::math::{DVec3, Ray, Vec3};
 use crate::scene::{At, Hit, Scene};
 use crate::shape::{Parallelogram, Sphere};
 
 /// Something that a block's rays may meet.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Candidate {
     Sphere(u32),
     Parallelogram(u32),
@@ -26,6 +29,12 @@ pub(crate) struct Pyramid {
     sides: [Vec3; 4],
     forward: Vec3,
     eye: Vec3,
+    /// The cone around it: where it begins and how wide it is there, which way it leads, and the sine and cosine of half its
+    /// angle.
+    middle: Ray,
+    width: f64,
+    sin: f64,
+    cos: f64,
 }
 
 /// Depths and heights are told apart beyond this share of them.
@@ -45,15 +54,31 @@ impl Pyramid {
             sides[i] = if n.dot(middle.o + middle.d - a.o) > 0.0 { -n } else { n };
         }
         let frame = scene.camera.frame();
-        Pyramid { corners, sides, forward: frame.forward, eye: frame.position }
+        let sin = corners.iter().fold(0.0f64, |sin, ray| sin.max(f64::from(middle.d.cross(ray.d).length())));
+        let width = corners.iter().fold(0.0f64, |width, ray| width.max(f64::from((ray.o - middle.o).length())));
+        let (sin, width) = (sin * (1.0 + SLACK) + SLACK * SLACK, width * (1.0 + SLACK));
+        let cos = (1.0 - sin * sin).max(0.0).sqrt();
+        Pyramid { corners, sides, forward: frame.forward, eye: frame.position, middle, width, sin, cos }
+    }
+
+    /// Whether the cone around it misses a ball.
+    fn cone_misses(&self, c: DVec3, r: f64) -> bool {
+        let s = c - self.middle.o.as_dvec3();
+        let along = s.dot(self.middle.d.as_dvec3());
+        let aside = (s.length_squared() - along * along).max(0.0).sqrt();
+        // Behind the apex the cone's nearest point is the apex, and this is farther off than said
+        aside * self.cos - along * self.sin > r + self.width + (along.abs() + aside) * SLACK
     }
 
     /// How far in front of the camera, along its line of sight.
-    fn depth(&self, q: crate::math::DVec3) -> f64 {
+    fn depth(&self, q: DVec3) -> f64 {
         self.forward.as_dvec3().dot(q - self.eye.as_dvec3())
     }
 
     fn misses_sphere(&self, sphere: &Sphere) -> bool {
+        if self.cone_misses(sphere.c, sphere.r) {
+            return true;
+        }
         let slack = sphere.c.abs().max_element().max(sphere.r) * SLACK;
         let outside = |(n, ray): (&Vec3, &Ray)| n.as_dvec3().dot(sphere.c - ray.o.as_dvec3()) > sphere.r + slack;
         self.sides.iter().zip(&self.corners).any(outside) || self.depth(sphere.c) + sphere.r < -slack
@@ -114,23 +139,51 @@ impl Pyramid {
         }
     }
 
-    /// The least depth of a shape.
+    /// The least depth at which the rays can meet a shape.
     fn nearest(&self, scene: &Scene, candidate: Candidate) -> f64 {
-        let flat = |flat: &Parallelogram| flat.deep_corners().iter().fold(f64::INFINITY, |z, q| z.min(self.depth(*q)));
         match candidate {
             Candidate::Sphere(i) => {
                 let sphere = &scene.geometry.spheres[i as usize].shape;
-                self.depth(sphere.c) - sphere.r
+                let nearest = self.depth(sphere.c) - sphere.r;
+                // All of it is behind the plane that touches it where the middle ray meets it
+                let from = self.middle.o.as_dvec3() - sphere.c;
+                match sphere.intersect(&self.middle) {
+                    Some(t) if from.length() > sphere.r * (1.0 + SLACK) => {
+                        let q = from + self.middle.d.as_dvec3() * t;
+                        nearest.max(self.nearest_on_plane(q / q.length(), sphere.c + q).unwrap_or(nearest))
+                    }
+                    _ => nearest,
+                }
             }
-            Candidate::Parallelogram(i) => flat(&scene.geometry.parallelograms[i as usize].shape),
+            Candidate::Parallelogram(i) => self.nearest_flat(&scene.geometry.parallelograms[i as usize].shape),
             Candidate::Light(i) => match &scene.lights[i as usize].kind {
                 LightKind::Area(area) => match &area.shape {
-                    AreaShape::Rectangle(rectangle) => flat(&rectangle.shape),
+                    AreaShape::Rectangle(rectangle) => self.nearest_flat(&rectangle.shape),
                     _ => f64::NEG_INFINITY,
                 },
                 _ => f64::INFINITY,
             },
         }
+    }
+
+    fn nearest_flat(&self, flat: &Parallelogram) -> f64 {
+        let on_shape = flat.deep_corners().iter().fold(f64::INFINITY, |z, q| z.min(self.depth(*q)));
+        self.nearest_on_plane(flat.n, flat.p).map_or(on_shape, |on_plane| on_plane.max(on_shape))
+    }
+
+    /// The least depth at which the rays meet the plane through `p` with normal `n`, if all of them do. That depth, or its
+    /// inverse where they come from one eye, is linear over the film: the corners' rays have the least.
+    fn nearest_on_plane(&self, n: DVec3, p: DVec3) -> Option<f64> {
+        let mut nearest = f64::INFINITY;
+        for ray in &self.corners {
+            let (o, d) = (ray.o.as_dvec3(), ray.d.as_dvec3());
+            let t = n.dot(p - o) / n.dot(d);
+            if !(t > 0.0 && t.is_finite()) {
+                return None;
+            }
+            nearest = nearest.min(self.depth(o + d * t));
+        }
+        Some(nearest - nearest.abs() * SLACK)
     }
 
     /// The one shape that all the rays see, if that is proved. `candidates` is all that they may meet.
@@ -180,6 +233,33 @@ impl Candidate {
         Some(Hit { t, surface, at })
     }
 
+    /// The material over a square of pixels that see only this, if it is the same all over it.
+    pub fn even(self, scene: &Scene, square: Square) -> Option<Bsdf> {
+        let middle = |from: u32| from as f32 + 0.5 * square.side as f32;
+        let (ray, differential) = scene.camera.ray(middle(square.x), middle(square.y), square.side as f32);
+        let hit = self.hit(scene, &ray)?;
+        let si = scene.surface(&ray, &hit, &differential);
+        let material = &scene.materials[si.material.index()];
+        material.is_even(&si, &scene.textures).then(|| material.bsdf(&si, &scene.textures))
+    }
+
+    /// Tells the material at each pixel of a square that sees only this, the mean over its rays; nothing for pixels over which
+    /// more than colours change.
+    pub fn bsdfs(self, scene: &Scene, square: Square, tell: &mut impl FnMut([u32; 2], Bsdf)) {
+        if square.side == 1 {
+            let at = [square.x, square.y];
+            if let Some(patch) = Patch::whole(scene, at, self).filter(|patch| !patch.uneven) {
+                tell(at, patch.bsdf);
+            }
+        } else if let Some(bsdf) = self.even(scene, square) {
+            square.pixels().for_each(|at| tell(at, bsdf));
+        } else {
+            for quarter in square.quarters() {
+                self.bsdfs(scene, quarter, tell);
+            }
+        }
+    }
+
     /// How much its normal turns over a metre, in radians.
     pub fn curvature(self, scene: &Scene) -> f32 {
         match self {
@@ -189,13 +269,15 @@ impl Candidate {
     }
 }
 
-/// The first of some things on a ray: of several at the same distance, the one with the lowest id.
-pub(crate) fn first(scene: &Scene, candidates: &[Candidate], ray: &Ray) -> Option<Hit> {
-    let mut nearest = crate::scene::Nearest::default();
-    for candidate in candidates {
-        if let Some(hit) = candidate.hit(scene, ray) {
-            nearest.offer(hit.t, hit.surface, hit.at);
+/// The first of some things on a ray, and its place among them: of several at the same distance, the one with the lowest id.
+pub(crate) fn first(scene: &Scene, candidates: &[Candidate], ray: &Ray) -> Option<(usize, Hit)> {
+    let mut first: Option<(usize, Hit)> = None;
+    for (i, candidate) in candidates.iter().enumerate() {
+        if let Some(hit) = candidate.hit(scene, ray)
+            && first.is_none_or(|(_, before)| (hit.t, hit.surface) < (before.t, before.surface))
+        {
+            first = Some((i, hit));
         }
     }
-    nearest.0
+    first
 }

@@ -13,11 +13,15 @@
 
 use std::ops::ControlFlow;
 
+use arrayvec::ArrayVec;
+
 use super::arrival::{Arrival, Arrivals, Place};
+use super::field::{Field, Shade};
 use super::film::FilmTile;
 use super::hits::PixelHits;
 use super::patch::{Patch, PixelPatches};
 use super::solo::{self, Candidate, Pyramid};
+use super::square::Square;
 use super::tile::Tile;
 use super::{AaMode, Counts};
 use crate::color::Rgb;
@@ -32,11 +36,26 @@ const BEND: f32 = 0.4;
 pub(crate) const CELL: u32 = 32;
 /// With its rim.
 const ACROSS: usize = CELL as usize + 2;
-/// Pixels across the blocks that may hold one surface only.
-const BLOCK: i64 = 8;
+/// Pixels across the smallest squares that are asked whether they hold one surface.
+const SMALLEST: u32 = 2;
+/// Lists of candidates: of the cell with its rim, and of squares of each size down to the smallest.
+const DEPTHS: usize = (CELL / SMALLEST).ilog2() as usize + 2;
+/// Pixels across the largest square whose colours are looked up one by one.
+const PATCHWORK: u32 = 8;
 /// What light does within a pixel, at most, as a part of its second difference over three: a corner in the middle of
 /// the pixel makes an eighth, the onset of a root nearly a fourth.
 const WITHIN: f32 = 0.2;
+
+/// How much is known of a pixel.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Known {
+    /// Nothing yet.
+    Nothing,
+    /// All of its rays meet this shape.
+    Only(Candidate),
+    /// Its patches.
+    Patches,
+}
 
 /// One thread's way from tiles to film.
 pub(crate) struct Tiled<'a> {
@@ -45,12 +64,18 @@ pub(crate) struct Tiled<'a> {
     hits: PixelHits,
     /// All that can be seen, if it is in lists.
     listed: Option<Vec<Candidate>>,
-    /// What the cell's rays may meet of it, and the block's.
-    near: [Vec<Candidate>; 2],
+    /// What the rays of the cell and its rim may meet of it; those of the cell, its quarters, their quarters.
+    near: [Vec<Candidate>; DEPTHS],
+    /// The upper left corner of the cell.
+    corner: [u32; 2],
+    field: Field,
     arrivals: Arrivals<'a>,
     /// The cell and its rim, row by row.
+    known: Vec<Known>,
     pixels: Vec<PixelPatches>,
-    /// Where each pixel's patches begin among all of the cell.
+    /// The colours that are known without looking at neighbours.
+    colors: Vec<Option<[f32; 4]>>,
+    /// Where the light of each pixel's patches begins among all of the cell, once it is known.
     first: Vec<usize>,
     /// What arrived at each patch, light by light, and what that makes.
     arrived: Vec<Arrival>,
@@ -58,6 +83,9 @@ pub(crate) struct Tiled<'a> {
     /// Diffuse and specular of each light at one pixel, in scene order.
     terms: Vec<[Rgb; 2]>,
 }
+
+/// Of a pixel whose light is not known.
+const UNLIT: usize = usize::MAX;
 
 impl<'a> Tiled<'a> {
     pub fn new(scene: &'a Scene, mode: AaMode, hits: PixelHits, arrivals: Arrivals<'a>) -> Self {
@@ -68,9 +96,13 @@ impl<'a> Tiled<'a> {
             hits,
             listed: listed.then(|| solo::all(scene)),
             near: Default::default(),
+            corner: [0; 2],
+            field: Field::new(scene.lights.len()),
             arrivals,
+            known: vec![Known::Nothing; ACROSS * ACROSS],
+            colors: vec![None; ACROSS * ACROSS],
             pixels: (0..ACROSS * ACROSS).map(|_| PixelPatches::default()).collect(),
-            first: vec![0; ACROSS * ACROSS],
+            first: vec![UNLIT; ACROSS * ACROSS],
             arrived: Vec::new(),
             values: Vec::new(),
             terms: vec![[Rgb::BLACK; 2]; scene.lights.len()],
@@ -101,194 +133,347 @@ impl<'a> Tiled<'a> {
         go_on: &impl Fn() -> ControlFlow<()>,
     ) -> ControlFlow<()> {
         let scene = self.scene;
-        self.look(corner);
-        let mut pixels = std::mem::take(&mut self.pixels);
-        // What arrives at the middle of each patch
-        let lights = scene.lights.len();
+        self.corner = corner;
+        self.known.fill(Known::Nothing);
+        self.colors.fill(None);
+        self.first.fill(UNLIT);
         self.arrived.clear();
         self.values.clear();
-        for (index, pixel) in pixels.iter().enumerate() {
-            if index % ACROSS == 0 {
-                go_on()?;
-            }
-            self.first[index] = self.values.len();
-            for patch in &pixel.patches {
-                self.once(patch, counts);
-            }
+        if let Some(listed) = &self.listed {
+            let [x, y] = corner.map(|at| at as f32 - 1.0);
+            Pyramid::new(scene, x, y, ACROSS as f32).candidates(scene, listed, &mut self.near[0]);
+            // All of the cell, also where it is not in the tile: what is found must not depend on that
+            self.field.begin(corner);
+            self.split(Square { x: corner[0], y: corner[1], side: CELL }, 1, counts, go_on)?;
+        } else {
+            self.trace();
         }
-        debug_assert_eq!(self.arrived.len(), self.values.len() * lights);
+        let rays = (scene.antialiasing * scene.antialiasing) as u64;
         for y in 0..CELL {
             for x in 0..CELL {
                 let [i, j] = [corner[0] + x, corner[1] + y];
                 let inside = |at: u32, from: u32, length: u32| at >= from && at < from + length;
                 if inside(i, tile.x, tile.width) && inside(j, tile.y, tile.height) {
+                    counts.camera_rays += rays;
                     let index = (y as usize + 1) * ACROSS + x as usize + 1;
-                    let color = self.finish(&pixels, index, [i, j], counts);
+                    let color = match self.colors[index] {
+                        Some(color) => color,
+                        None => self.finish([i, j], counts),
+                    };
                     film.set(i - tile.x, j - tile.y, color);
                 }
             }
             go_on()?;
         }
-        std::mem::swap(&mut self.pixels, &mut pixels);
         ControlFlow::Continue(())
     }
 
-    /// Finds out what each pixel of a cell and its rim holds.
-    fn look(&mut self, corner: [u32; 2]) {
+    /// Where a pixel of the cell or its rim is kept.
+    fn index(&self, [i, j]: [u32; 2]) -> usize {
+        (j + 1 - self.corner[1]) as usize * ACROSS + (i + 1 - self.corner[0]) as usize
+    }
+
+    /// Finds out what the pixels of a square hold, and lights what it can of them together. `depth` is that of the list for
+    /// its candidates, those before it hold those of what it is a quarter of.
+    fn split(
+        &mut self,
+        square: Square,
+        depth: usize,
+        counts: &mut Counts,
+        go_on: &impl Fn() -> ControlFlow<()>,
+    ) -> ControlFlow<()> {
+        let scene = self.scene;
+        if square.x >= scene.width || square.y >= scene.height {
+            return ControlFlow::Continue(());
+        }
+        let pyramid = Pyramid::new(scene, square.x as f32, square.y as f32, square.side as f32);
+        let (outer, inner) = self.near.split_at_mut(depth);
+        let near = &mut inner[0];
+        pyramid.candidates(scene, &outer[depth - 1], near);
+        let n = scene.antialiasing;
+        if near.is_empty() {
+            let background = PixelPatches { background: n * n, ..PixelPatches::default() };
+            let color = background.color(scene, Rgb::BLACK, &[]);
+            square.pixels().for_each(|at| self.learn(at, Known::Nothing, Some(color)));
+            return ControlFlow::Continue(());
+        }
+        if self.mode == AaMode::Adaptive
+            && let Some(only) = pyramid.only(scene, near)
+        {
+            return self.solo(square, only, counts, go_on);
+        }
+        if square.side > SMALLEST {
+            for quarter in square.quarters() {
+                self.split(quarter, depth + 1, counts, go_on)?;
+            }
+            return ControlFlow::Continue(());
+        }
+        go_on()?;
+        for at in square.pixels().filter(|[i, j]| *i < scene.width && *j < scene.height) {
+            let index = self.index(at);
+            self.pixels[index].collect_listed(scene, at, self.mode == AaMode::Adaptive, &self.near[depth]);
+            self.known[index] = Known::Patches;
+        }
+        ControlFlow::Continue(())
+    }
+
+    /// Notes what is known of a pixel, if the film has it.
+    fn learn(&mut self, [i, j]: [u32; 2], known: Known, color: Option<[f32; 4]>) {
+        if i < self.scene.width && j < self.scene.height {
+            let index = self.index([i, j]);
+            (self.known[index], self.colors[index]) = (known, color);
+        }
+    }
+
+    /// Lights a square that is proved to see one shape.
+    fn solo(
+        &mut self,
+        square: Square,
+        only: Candidate,
+        counts: &mut Counts,
+        go_on: &impl Fn() -> ControlFlow<()>,
+    ) -> ControlFlow<()> {
+        let scene = self.scene;
+        if square.x >= scene.width || square.y >= scene.height {
+            return ControlFlow::Continue(());
+        }
+        if square.side <= PATCHWORK {
+            go_on()?;
+        }
+        let even = only.even(scene, square);
+        if even.is_none() && square.side > PATCHWORK {
+            for quarter in square.quarters() {
+                self.solo(quarter, only, counts, go_on)?;
+            }
+            return ControlFlow::Continue(());
+        }
+        let mut bsdfs = [None; (PATCHWORK * PATCHWORK) as usize];
+        let shade = match even {
+            Some(bsdf) => Some(Shade::even(scene, only, &bsdf)),
+            None => {
+                // Beyond the film's edge as well: it is a part of the square
+                only.bsdfs(scene, square, &mut |[x, y], bsdf| {
+                    bsdfs[((y - square.y) * PATCHWORK + x - square.x) as usize] = Some(bsdf);
+                });
+                Shade::of(
+                    scene,
+                    only,
+                    square.pixels().map(|[x, y]| bsdfs[((y - square.y) * PATCHWORK + x - square.x) as usize]),
+                )
+            }
+        };
+        if let Some(shade) = &shade {
+            self.field.light(scene, &mut self.arrivals, square, shade, counts);
+        }
+        for at in square.pixels() {
+            let looked_up = || bsdfs[((at[1] - square.y) * PATCHWORK + at[0] - square.x) as usize];
+            let bsdf = shade.and(even.or_else(looked_up));
+            self.learn(at, Known::Only(only), bsdf.and_then(|bsdf| self.color(at, &bsdf)));
+        }
+        ControlFlow::Continue(())
+    }
+
+    /// The colour of a pixel that sees one shape, if all light there is known.
+    fn color(&self, at: [u32; 2], bsdf: &Bsdf) -> Option<[f32; 4]> {
+        let scene = self.scene;
+        let mut color = scene.ambient * bsdf.ambient;
+        for light in 0..scene.lights.len() {
+            let sums = self.field.arrived(light, at)?;
+            let scale = self.arrivals.scale(light);
+            color += scale * bsdf.diffuse * sums.diffuse;
+            color += scale * bsdf.specular * sums.specular;
+        }
+        Some([color.r, color.g, color.b, 1.0])
+    }
+
+    /// Traces all rays of a cell and its rim.
+    fn trace(&mut self) {
         let scene = self.scene;
         let once = self.mode == AaMode::Adaptive;
-        let (left, top) = (corner[0] as i64 - 1, corner[1] as i64 - 1);
-        let place = |i: i64, j: i64| (j - top) as usize * ACROSS + (i - left) as usize;
-        // The part of the film that the cell and its rim cover
-        let end = |from: i64, all: u32| (from + ACROSS as i64).min(all as i64);
-        let (x0, y0) = (left.max(0), top.max(0));
-        let (x1, y1) = (end(left, scene.width), end(top, scene.height));
-        self.pixels.resize_with(ACROSS * ACROSS, PixelPatches::default);
-        self.pixels.iter_mut().for_each(PixelPatches::clear);
-        if let Some(listed) = &self.listed {
-            let [near, nearer] = &mut self.near;
-            let all = Pyramid::new(scene, left as f32, top as f32, ACROSS as f32);
-            all.candidates(scene, listed, near);
-            let blocks = |from: i64, to: i64| (from.div_euclid(BLOCK)..=(to - 1).div_euclid(BLOCK)).map(|b| b * BLOCK);
-            for block_y in blocks(y0, y1) {
-                for block_x in blocks(x0, x1) {
-                    let block = Pyramid::new(scene, block_x as f32, block_y as f32, BLOCK as f32);
-                    block.candidates(scene, near, nearer);
-                    let only = if once { block.only(scene, nearer) } else { None };
-                    for j in block_y.max(y0)..(block_y + BLOCK).min(y1) {
-                        for i in block_x.max(x0)..(block_x + BLOCK).min(x1) {
-                            let pixel = &mut self.pixels[place(i, j)];
-                            let at = [i as u32, j as u32];
-                            if nearer.is_empty() {
-                                pixel.background = scene.antialiasing * scene.antialiasing;
-                            } else if let Some(patch) = only.and_then(|only| Patch::whole(scene, at, only)) {
-                                pixel.patches.push(patch);
-                            } else {
-                                let n = scene.antialiasing;
-                                pixel.collect(scene, at, once, |column, row| {
-                                    let (ray, _) = super::hits::camera_ray(scene, at[0] * n + column, at[1] * n + row);
-                                    solo::first(scene, nearer, &ray)
-                                });
-                            }
-                        }
-                    }
-                }
-            }
-            return;
-        }
-        let side = self.hits.side() as i64;
-        for block_y in (y0..y1).step_by(side as usize) {
-            for block_x in (x0..x1).step_by(side as usize) {
-                let (w, h) = ((x1 - block_x).min(side), (y1 - block_y).min(side));
-                self.hits.trace(scene, block_x as u32, block_y as u32, w as u32, h as u32);
+        let [left, top] = self.corner.map(|at| at.saturating_sub(1));
+        let [right, bottom] = [0, 1].map(|axis| (self.corner[axis] + CELL + 1).min([scene.width, scene.height][axis]));
+        let side = self.hits.side();
+        for block_y in (top..bottom).step_by(side as usize) {
+            for block_x in (left..right).step_by(side as usize) {
+                let (w, h) = ((right - block_x).min(side), (bottom - block_y).min(side));
+                self.hits.trace(scene, block_x, block_y, w, h);
                 for (y, x) in (0..h).flat_map(|y| (0..w).map(move |x| (y, x))) {
-                    let at = [(block_x + x) as u32, (block_y + y) as u32];
+                    let at = [block_x + x, block_y + y];
+                    let index = self.index(at);
                     let hits = &self.hits;
-                    let pixel = &mut self.pixels[place(block_x + x, block_y + y)];
-                    pixel.collect(scene, at, once, |column, row| {
-                        hits.get(scene.antialiasing, x as u32, y as u32, column, row)
-                    });
+                    self.pixels[index]
+                        .collect(scene, at, once, |column, row| hits.get(scene.antialiasing, x, y, column, row));
+                    self.known[index] = Known::Patches;
                 }
             }
         }
     }
 
-    /// What arrives at the middle of a patch.
-    fn once(&mut self, patch: &Patch, counts: &mut Counts) {
+    /// Makes sure that the patches of a pixel of the cell or its rim are known, and what arrives at them; `false` if the film
+    /// ends before it.
+    fn ask(&mut self, [i, j]: [u32; 2], counts: &mut Counts) -> bool {
+        let scene = self.scene;
+        // Left of the first pixel the number wraps around
+        if i >= scene.width || j >= scene.height {
+            return false;
+        }
+        let index = self.index([i, j]);
+        if self.first[index] != UNLIT {
+            return true;
+        }
+        let pixel = &mut self.pixels[index];
+        match self.known[index] {
+            Known::Patches => {}
+            Known::Only(only) if let Some(patch) = Patch::whole(scene, [i, j], only) => {
+                pixel.clear();
+                pixel.patches.push(patch);
+            }
+            _ => pixel.collect_listed(scene, [i, j], true, &self.near[0]),
+        }
+        self.first[index] = self.values.len();
+        let patches = std::mem::take(&mut self.pixels[index].patches);
+        for patch in &patches {
+            self.once(patch, [i, j], counts);
+        }
+        self.pixels[index].patches = patches;
+        true
+    }
+
+    /// What arrives at the middle of a patch of a pixel.
+    fn once(&mut self, patch: &Patch, at: [u32; 2], counts: &mut Counts) {
         let scene = self.scene;
         self.arrivals.look_around(&patch.si);
         let base = scene.ambient * patch.bsdf.ambient;
         let mut value = base;
+        let is_only = matches!(self.known[self.index(at)], Known::Only(_)) && self.is_in_cell(at);
         for index in 0..scene.lights.len() {
             let scale = self.arrivals.scale(index);
             let colors = [scale * patch.bsdf.diffuse, scale * patch.bsdf.specular];
             let (si, lobe) = (&patch.si, &patch.bsdf.lobe);
             let (reach, turn, off) = (patch.reach, patch.turn, patch.off);
             let place = Place { si, lobe, reach, turn, off, base, colors };
-            let arrival = self.arrivals.arrival(index, &place, counts);
+            let known = if is_only { self.field.arrived(index, at) } else { None };
+            let arrival = match known {
+                Some(sums) => Arrival::even(sums),
+                None => self.arrivals.arrival(index, &place, counts),
+            };
             value += colors[0] * arrival.sums.diffuse + colors[1] * arrival.sums.specular;
             self.arrived.push(arrival);
         }
         self.values.push(value);
     }
 
+    fn is_in_cell(&self, at: [u32; 2]) -> bool {
+        at.iter().zip(self.corner).all(|(at, corner)| (corner..corner + CELL).contains(at))
+    }
+
     /// The colour of a pixel: red, green, blue premultiplied, alpha.
-    fn finish(&mut self, pixels: &[PixelPatches], index: usize, at: [u32; 2], counts: &mut Counts) -> [f32; 4] {
+    fn finish(&mut self, at: [u32; 2], counts: &mut Counts) -> [f32; 4] {
         let scene = self.scene;
-        let rays = scene.antialiasing * scene.antialiasing;
-        counts.camera_rays += rays as u64;
-        let pixel = &pixels[index];
+        self.ask(at, counts);
+        let index = self.index(at);
         self.terms.fill([Rgb::BLACK; 2]);
         let mut ambient = Rgb::BLACK;
-        for (k, patch) in pixel.patches.iter().enumerate() {
+        let patches = std::mem::take(&mut self.pixels[index].patches);
+        for (k, patch) in patches.iter().enumerate() {
             let count = patch.count(scene);
             ambient += scene.ambient * patch.bsdf.ambient * count as f32;
             for light in 0..scene.lights.len() {
-                if self.is_enough(pixels, index, k, light) {
+                if self.is_enough(patch, at, k, light, counts) {
                     let arrived = self.arrived[(self.first[index] + k) * scene.lights.len() + light];
                     let (scale, sums) = (self.arrivals.scale(light) * count as f32, arrived.sums);
                     self.terms[light][0] += scale * patch.bsdf.diffuse * sums.diffuse;
                     self.terms[light][1] += scale * patch.bsdf.specular * sums.specular;
                 } else {
-                    patch.for_each(scene, at, |si, bsdf| self.at_ray(light, si, bsdf, counts));
+                    self.in_quarters(patch, at, k, light, counts);
                 }
             }
         }
-        // The sum in its one order
-        let mean = |sum: Rgb| Rgb::new(sum.r / rays as f32, sum.g / rays as f32, sum.b / rays as f32);
-        let uncovered = pixel.background as f32 / rays as f32;
-        let mut color = if scene.transparent { Rgb::BLACK } else { scene.background * uncovered };
-        color += mean(pixel.emission);
-        color += mean(ambient);
-        for [diffuse, specular] in &self.terms {
-            color += mean(*diffuse);
-            color += mean(*specular);
-        }
-        let alpha = if scene.transparent { 1.0 - uncovered } else { 1.0 };
-        [color.r, color.g, color.b, alpha]
+        self.pixels[index].patches = patches;
+        self.pixels[index].color(scene, ambient, &self.terms)
     }
 
-    /// Whether what arrives of a light at the middle of a patch will do for all of it.
-    fn is_enough(&self, pixels: &[PixelPatches], index: usize, k: usize, light: usize) -> bool {
+    /// Whether what arrives of a light at the middle of a patch, the `k`-th of its pixel, will do for all of it.
+    fn is_enough(&mut self, patch: &Patch, at: [u32; 2], k: usize, light: usize, counts: &mut Counts) -> bool {
         let scene = self.scene;
-        let patch = &pixels[index].patches[k];
         if patch.uneven {
             return false;
         }
         let lights = scene.lights.len();
-        let arrived = |index: usize| &self.arrived[(self.first[index] + k) * lights + light];
-        let (here, value) = (arrived(index), self.values[self.first[index] + k]);
-        let scale = self.arrivals.scale(light);
+        let index = self.index(at);
+        let (here, value) =
+            (self.arrived[(self.first[index] + k) * lights + light], self.values[self.first[index] + k]);
         let allowed = BEND / (lights as f32).sqrt();
-        let shows = |bend: &Sums| {
-            let error = scale * patch.bsdf.diffuse * bend.diffuse + scale * patch.bsdf.specular * bend.specular;
-            self.arrivals.steps(value, error) > allowed
-        };
-        if !shows(&here.bend) {
+        let shows = |tiled: &Self, bend: &Sums| tiled.shown(light, &patch.bsdf, value, bend) > allowed;
+        if !shows(self, &here.bend) {
             return true;
         }
         if !here.resolved || !patch.is_whole(scene) {
             return false;
         }
         let mut bend = Sums::default();
-        for step in [1, ACROSS] {
-            let neighbours = [index - step, index + step];
-            let same = |i: &usize| {
-                let patches = &pixels[*i].patches;
-                patches.len() == 1
+        let [i, j] = at;
+        for neighbours in [[[i.wrapping_sub(1), j], [i + 1, j]], [[i, j.wrapping_sub(1)], [i, j + 1]]] {
+            for neighbour in neighbours {
+                if !self.ask(neighbour, counts) {
+                    return false;
+                }
+                let patches = &self.pixels[self.index(neighbour)].patches;
+                let same = patches.len() == 1
                     && patches[0].is_whole(scene)
                     && patches[0].si.surface == patch.si.surface
-                    && patches[0].bsdf.lobe == patch.bsdf.lobe
-            };
-            if !neighbours.iter().all(same) {
-                return false;
+                    && patches[0].bsdf.lobe == patch.bsdf.lobe;
+                if !same {
+                    return false;
+                }
             }
-            let [before, after] = neighbours.map(|i| arrived(i).sums);
+            let [before, after] =
+                neighbours.map(|neighbour| self.arrived[self.first[self.index(neighbour)] * lights + light].sums);
             let second = |a: f32, b: f32, c: f32| (a - b + (c - b)).abs() * WITHIN;
             bend.diffuse += second(before.diffuse, here.sums.diffuse, after.diffuse);
             bend.specular += second(before.specular, here.sums.specular, after.specular);
         }
-        !shows(&bend)
+        !shows(self, &bend)
+    }
+
+    /// Adds what one light sends to a patch, the `k`-th of its pixel, from parts of it: its quarters, where that may do, or
+    /// each ray.
+    fn in_quarters(&mut self, patch: &Patch, at: [u32; 2], k: usize, light: usize, counts: &mut Counts) {
+        let scene = self.scene;
+        let first = self.first[self.index(at)] + k;
+        let (here, value) = (self.arrived[first * scene.lights.len() + light], self.values[first]);
+        // What bends in one place, bends a fourth of that over half the way
+        let allowed = BEND / (scene.lights.len() as f32).sqrt();
+        let quarters = if patch.uneven || self.shown(light, &patch.bsdf, value, &here.bend) > 6.0 * allowed {
+            ArrayVec::new()
+        } else {
+            patch.quarters(scene, at)
+        };
+        if quarters.is_empty() {
+            patch.for_each(scene, at, |si, bsdf| self.at_ray(light, si, bsdf, counts));
+        }
+        for quarter in &quarters {
+            self.arrivals.look_around(&quarter.si);
+            let scale = self.arrivals.scale(light);
+            let Patch { si, bsdf, reach, turn, off, .. } = quarter;
+            let colors = [scale * bsdf.diffuse, scale * bsdf.specular];
+            let base = scene.ambient * bsdf.ambient;
+            let place = Place { si, lobe: &bsdf.lobe, reach: *reach, turn: *turn, off: *off, base, colors };
+            let arrival = self.arrivals.arrival(light, &place, counts);
+            if quarter.uneven || self.shown(light, bsdf, value, &arrival.bend) > allowed {
+                quarter.for_each(scene, at, |si, bsdf| self.at_ray(light, si, bsdf, counts));
+            } else {
+                let count = quarter.count(scene) as f32;
+                self.terms[light][0] += colors[0] * count * arrival.sums.diffuse;
+                self.terms[light][1] += colors[1] * count * arrival.sums.specular;
+            }
+        }
+    }
+
+    /// How many display steps an error of the sums of a light makes.
+    fn shown(&self, light: usize, bsdf: &Bsdf, value: Rgb, error: &Sums) -> f32 {
+        let scale = self.arrivals.scale(light);
+        self.arrivals.steps(value, scale * bsdf.diffuse * error.diffuse + scale * bsdf.specular * error.specular)
     }
 
     /// Adds what one light sends to where one camera ray ends.

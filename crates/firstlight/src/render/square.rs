@@ -1,0 +1,23 @@
+//! Squares of pixels, halved again and again.
+
+/// A square of pixels, in coordinates of the film; it may reach beyond the film's edges.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Square {
+    pub x: u32,
+    pub y: u32,
+    pub side: u32,
+}
+
+impl Square {
+    /// Its four quarters.
+    pub fn quarters(self) -> [Square; 4] {
+        let side = self.side / 2;
+        [[0, 0], [side, 0], [0, side], [side, side]].map(|[x, y]| Square { x: self.x + x, y: self.y + y, side })
+    }
+
+    /// Its pixels, row by row.
+    pub fn pixels(self) -> impl Iterator<Item = [u32; 2]> {
+        let across = self.x..self.x + self.side;
+        (self.y..self.y + self.side).flat_map(move |y| across.clone().map(move |x| [x, y]))
+    }
+}
