@@ -25,6 +25,17 @@ pub struct Output {
     pub target: Target,
     /// As what.
     pub format: Format,
+    /// What it shows.
+    pub content: Content,
+}
+
+/// What a picture shows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Content {
+    /// The scene.
+    Scene,
+    /// The work that each pixel took.
+    Heat,
 }
 
 /// A place that can take bytes, as far as can be seen without giving it any.
@@ -133,7 +144,7 @@ impl Output {
             Target::Stdout => Target::Stdout,
             Target::File(path) => Target::File(with_frame(path, frame)),
         };
-        Output { target, format: self.format }
+        Output { target, ..self.clone() }
     }
 }
 
@@ -188,7 +199,7 @@ pub fn resolve(paths: &[PathBuf], bits: Option<Bits>, format: Option<NamedFormat
                 Err(e) => return usage(e.to_string()),
             },
         };
-        outputs.push(Output { target, format: with_bits(kind, bits) });
+        outputs.push(Output { target, format: with_bits(kind, bits), content: Content::Scene });
     }
 
     let to_stdout = outputs.iter().any(|output| output.target == Target::Stdout);
@@ -231,6 +242,9 @@ pub fn refuse_clashes(scene: Option<&Path>, outputs: &[Output], stats: Option<&T
         let (name, place) = (output.target.name(), output.target.real());
         if scene.as_ref().is_some_and(|scene| place == Target::File(scene.clone())) {
             return usage(format!("the picture {name} would replace the scene's own file; name another with -o"));
+        }
+        if seen.contains(&place) && output.content == Content::Heat {
+            return usage(format!("--heat {name} and -o name the same output; give each its own"));
         }
         if seen.contains(&place) {
             return usage(format!("-o {name} is given twice, perhaps under two names for one file"));

@@ -1,20 +1,21 @@
 //! `firstlight render`: from a scene to picture files.
 
 use std::collections::HashSet;
+use std::iter;
 use std::num::NonZeroUsize;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 use firstlight::{
-    AaMode, Diagnostic, Format, LightDesc, RenderSettings, RenderStats, SampleSet, SamplesDesc, SceneDesc,
+    AaMode, Diagnostic, Display, Format, LightDesc, RenderSettings, RenderStats, SampleSet, SamplesDesc, SceneDesc,
     ShadowTerminator, SimdLevel, Window,
 };
 
 use crate::args::{AntialiasingMode, Bits, Frames, RenderArgs, Terminator};
 use crate::input::{self, Input};
 use crate::interrupt::Watch;
-use crate::output::{self, Output, Ready, Staged, Target};
+use crate::output::{self, Content, Output, Ready, Staged, Target};
 use crate::progress::Progress;
 use crate::report::{Failure, say, show_diagnostics, shown};
 use crate::stats::Stats;
@@ -29,6 +30,7 @@ struct Plan<'a> {
     scene: &'a Path,
     /// Empty: the one that the scene says.
     outputs: Vec<Output>,
+    heat: Option<Output>,
     bits: Option<Bits>,
     stats: StatsPlan,
     settings: RenderSettings,
@@ -146,10 +148,7 @@ struct Took {
 
 impl Took {
     fn and(self, other: Took) -> Took {
-        let mut rays = other.rays;
-        rays.camera_rays += self.rays.camera_rays;
-        rays.shadow_rays += self.rays.shadow_rays;
-        rays.shadow_rays_skipped += self.rays.shadow_rays_skipped;
+        let rays = self.rays.and(&other.rays);
         Took {
             compile: self.compile + other.compile,
             render: self.render + other.render,
@@ -208,8 +207,12 @@ impl Run<'_> {
         // Encode all pictures and bring them to the disk, then let them appear: files first, a reader of standard output
         // may be gone
         let (written, write) = timed(|| {
+            let heat = film.heat().map(|heat| heat.picture());
             let (image, receipt) = (film.develop(), scene.receipt(settings));
-            let encode = |output: &Output| image.encode(output.format, &scene.display(), &receipt);
+            let encode = |output: &Output| match (output.content, &heat) {
+                (Content::Heat, Some(heat)) => heat.encode(output.format, &Display::default(), &receipt),
+                _ => image.encode(output.format, &scene.display(), &receipt),
+            };
             let bytes: Vec<Vec<u8>> = moment
                 .outputs
                 .iter()
@@ -243,7 +246,9 @@ impl<'a> Plan<'a> {
             Some(None) => StatsPlan::Table,
             Some(Some(path)) => StatsPlan::Json(stats_target(path)?),
         };
-        output::refuse_clashes(input::file_of(&args.scene), &outputs, stats.target())?;
+        let heat = args.heat.as_deref().map(heat_output).transpose()?;
+        let all: Vec<Output> = outputs.iter().chain(&heat).cloned().collect();
+        output::refuse_clashes(input::file_of(&args.scene), &all, stats.target())?;
 
         let simd = args.simd.unwrap_or(SimdLevel::Auto);
         if !simd.is_available() {
@@ -264,6 +269,7 @@ impl<'a> Plan<'a> {
         settings.tile_size = args.tile_size.unwrap_or(settings.tile_size);
         settings.crop = args.crop;
         settings.reference = args.reference;
+        settings.heat = heat.is_some();
         settings.visibility = args.visibility.unwrap_or(settings.visibility);
         if let Some(mode) = args.aa_mode {
             settings.aa_mode = match mode {
@@ -285,7 +291,18 @@ impl<'a> Plan<'a> {
             }),
         };
         let (scene, bits, frames, quiet) = (args.scene.as_path(), args.bits, args.frames, args.quiet);
-        Ok(Self { scene, outputs, bits, stats, settings, overrides, time: args.time.unwrap_or(0.0), frames, quiet })
+        Ok(Self {
+            scene,
+            outputs,
+            heat,
+            bits,
+            stats,
+            settings,
+            overrides,
+            time: args.time.unwrap_or(0.0),
+            frames,
+            quiet,
+        })
     }
 
     /// The moments to render, each with its own files.
@@ -347,9 +364,9 @@ impl<'a> Plan<'a> {
         }
 
         if !self.outputs.is_empty() {
-            return Ok((self.outputs.clone(), settings));
+            return Ok((self.outputs.iter().chain(&self.heat).cloned().collect(), settings));
         }
-        let outputs = vec![self.default_output(input)?];
+        let outputs = iter::once(self.default_output(input)?).chain(self.heat.clone()).collect::<Vec<_>>();
         output::refuse_clashes(input::file_of(self.scene), &outputs, self.stats.target())?;
         Ok((outputs, settings))
     }
@@ -368,8 +385,19 @@ impl<'a> Plan<'a> {
                 (PathBuf::from(name), Format::Png8)
             }
         };
-        Ok(Output { target: Target::File(path), format: output::with_bits(format, self.bits) })
+        Ok(Output { target: Target::File(path), format: output::with_bits(format, self.bits), content: Content::Scene })
     }
+}
+
+/// The picture of the work is a `.png`.
+fn heat_output(path: &Path) -> Result<Output, Failure> {
+    let target = Target::of(path);
+    let is_png = path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("png"));
+    if target == Target::Stdout || !is_png {
+        let name = shown(path);
+        return Err(Failure::Usage(format!("--heat {name}: the file's name must end in .png")));
+    }
+    Ok(Output { target, format: Format::Png8, content: Content::Heat })
 }
 
 /// A file for the numbers is a `.json`, so that no slip of the hand writes them over a scene or a picture.

@@ -158,7 +158,9 @@ impl Between {
             let side = sides.get(i).copied().unwrap_or(PlaneSide::Both);
             if !flat.is_one_sided(p, asker.si.error, side) {
                 between.flat(view, emitter, pyramid(), flat, asker);
-            } else if flat.cuts(p, asker.si.error, asker.reach) {
+            } else if flat.cuts(p, asker.si.error, asker.reach)
+                && !(scene.flats_seen.get(i) == Some(&true) && flat.screens(p, asker.si.wo, asker.reach, side))
+            {
                 // A part of the patch is on its other side
                 between.drift = f32::INFINITY;
             }

@@ -3,18 +3,22 @@
 //!
 //! Rows lie at the nodes of a Kronrod rule, sixteen lanes for fifteen rows, on panels that end where something changes its
 //! course: where a hidden part begins, has a corner or touches the light's edge. The Gauss rule inside the Kronrod rule says
-//! how far a panel can be wrong; the worst panel is halved until the whole is good enough.
+//! how far a panel can be wrong; the worst panel is halved until the whole is good enough. Where one thing at most is in the way,
+//! and so all corners are known, seven rows a panel are tried first, two panels in sixteen lanes.
 //!
-//! Source of the pair of rules: Piessens et al., "QUADPACK", 1983, qk15.
+//! Source of the rules: Piessens et al., "QUADPACK", 1983, qk15; Kronrod, "Nodes and Weights of Quadrature Formulas", 1965, for seven.
 
 use arrayvec::ArrayVec;
 use fearless_simd::{f32x16, prelude::*};
 
 use super::hider::{Hider, Interval};
-use super::rules::{EMBEDDED_WEIGHTS, KRONROD, KRONROD_WEIGHTS, gauss};
+use super::rules::{
+    EMBEDDED_PAIR_WEIGHTS, EMBEDDED_WEIGHTS, KRONROD, KRONROD_PAIR, KRONROD_PAIR_WEIGHTS, KRONROD_WEIGHTS, gauss,
+};
 use super::view::{Outline, View};
 use super::{Sums, Wanted};
 use crate::material::Lobe;
+use crate::math::LANES;
 
 /// The most things in the way that are settled row by row.
 pub(crate) const MAX_HIDERS: usize = 8;
@@ -44,6 +48,34 @@ struct Panel {
     t: [f32; 2],
     sums: Sums,
     error: Sums,
+    /// Of seven rows.
+    coarse: bool,
+}
+
+/// Sixteen rows: lane k is row `nodes[k]` of the panel with that `middle` and `half` length.
+struct Rows {
+    nodes: [f32; LANES],
+    middle: [f32; LANES],
+    half: [f32; LANES],
+}
+
+impl Rows {
+    fn panel(t: [f32; 2]) -> Rows {
+        Rows { nodes: KRONROD, middle: [middle(t); LANES], half: [half(t); LANES] }
+    }
+
+    fn pair(one: [f32; 2], other: [f32; 2]) -> Rows {
+        let lanes = |f: fn([f32; 2]) -> f32| std::array::from_fn(|k| f(if k < LANES / 2 { one } else { other }));
+        Rows { nodes: KRONROD_PAIR, middle: lanes(middle), half: lanes(half) }
+    }
+}
+
+fn middle(t: [f32; 2]) -> f32 {
+    0.5 * (t[0] + t[1])
+}
+
+fn half(t: [f32; 2]) -> f32 {
+    0.5 * (t[1] - t[0])
 }
 
 /// The integral of what nothing hides of a light over a region, and a bound of its error.
@@ -60,11 +92,22 @@ pub(crate) fn integrate<S: Simd>(
     let cuts = cuts(view, hiders, region);
     let mut panels: ArrayVec<Panel, MAX_PANELS> = ArrayVec::new();
     let (mut sums, mut error) = (Sums::default(), Sums::default());
-    for t in cuts.windows(2) {
-        let panel = panel(simd, view, hiders, region, wanted, [t[0], t[1]]);
+    let lit = Lit { view, hiders, region, wanted };
+    if hiders.len() <= 1 {
+        for t in cuts.windows(2).step_by(2).zip(cuts.windows(2).skip(1).step_by(2).map(Some).chain([None])) {
+            let (one, other) = (t.0, t.1);
+            let [one, other] = lit.pair(simd, [one[0], one[1]], other.map_or([one[1]; 2], |t| [t[0], t[1]]));
+            panels.push(one);
+            if t.1.is_some() {
+                panels.push(other);
+            }
+        }
+    } else {
+        panels.extend(cuts.windows(2).map(|t| lit.panel(simd, [t[0], t[1]])));
+    }
+    for panel in &panels {
         sums = sums + panel.sums;
         error = error + panel.error;
-        panels.push(panel);
     }
     while !enough(&sums, &error) && panels.len() < MAX_PANELS {
         // Halve the worst
@@ -76,12 +119,15 @@ pub(crate) fn integrate<S: Simd>(
             }
         }
         let [from, to] = panels[worst].t;
-        let middle = 0.5 * (from + to);
-        if !(from < middle && middle < to) {
+        let middle = middle([from, to]);
+        if panels[worst].coarse {
+            panels[worst] = lit.panel(simd, [from, to]);
+        } else if from < middle && middle < to {
+            panels[worst] = lit.panel(simd, [from, middle]);
+            panels.push(lit.panel(simd, [middle, to]));
+        } else {
             break;
         }
-        panels[worst] = panel(simd, view, hiders, region, wanted, [from, middle]);
-        panels.push(panel(simd, view, hiders, region, wanted, [middle, to]));
         // Anew, so that nothing is left over of what was taken away
         (sums, error) = (Sums::default(), Sums::default());
         for panel in &panels {
@@ -142,28 +188,70 @@ fn parameter(outline: Outline, y: f32) -> f32 {
     }
 }
 
-/// Fifteen rows of a light. Not inlined: one copy for each instruction set is enough.
+/// A light, what hides it, and what is asked for.
+#[derive(Clone, Copy)]
+struct Lit<'a> {
+    view: &'a View,
+    hiders: &'a [Hider],
+    region: &'a Region,
+    wanted: Wanted,
+}
+
+impl Lit<'_> {
+    /// A panel by fifteen rows.
+    fn panel<S: Simd>(&self, simd: S, t: [f32; 2]) -> Panel {
+        let rows = sixteen_rows(simd, self, &Rows::panel(t));
+        panel_of(&rows, t, &KRONROD_WEIGHTS, &EMBEDDED_WEIGHTS, false)
+    }
+
+    /// Two panels by seven rows each.
+    fn pair<S: Simd>(&self, simd: S, one: [f32; 2], other: [f32; 2]) -> [Panel; 2] {
+        let rows = sixteen_rows(simd, self, &Rows::pair(one, other));
+        let [first, second] = &KRONROD_PAIR_WEIGHTS;
+        let [first_inner, second_inner] = &EMBEDDED_PAIR_WEIGHTS;
+        [panel_of(&rows, one, first, first_inner, true), panel_of(&rows, other, second, second_inner, true)]
+    }
+}
+
+/// The sum over the rows of a panel, and how far it may be off.
+fn panel_of(
+    rows: &[[f32; LANES]; 2],
+    t: [f32; 2],
+    weights: &[f32; LANES],
+    inner: &[f32; LANES],
+    coarse: bool,
+) -> Panel {
+    let sum =
+        |values: &[f32; LANES], weights: &[f32; LANES]| values.iter().zip(weights).map(|(v, w)| v * w).sum::<f32>();
+    let [diffuse, specular] = [0, 1].map(|i| (sum(&rows[i], weights), sum(&rows[i], inner)));
+    let off = |(fine, coarse): (f32, f32)| (fine - coarse).abs() * TRUST;
+    let sums = Sums { diffuse: diffuse.0, specular: specular.0 };
+    Panel { t, sums, error: Sums { diffuse: off(diffuse), specular: off(specular) }, coarse }
+}
+
+/// What sixteen rows of a light send, diffuse and specular. Not inlined: one copy for each instruction set is enough.
 #[inline(never)]
-fn panel<S: Simd>(simd: S, view: &View, hiders: &[Hider], region: &Region, wanted: Wanted, t: [f32; 2]) -> Panel {
+fn sixteen_rows<S: Simd>(simd: S, lit: &Lit, rows: &Rows) -> [[f32; LANES]; 2] {
     simd.vectorize(
         #[inline(always)]
-        || panel_now(simd, view, hiders, region, wanted, t),
+        || sixteen_rows_now(simd, lit, rows),
     )
 }
 
 #[inline(always)]
-fn panel_now<S: Simd>(simd: S, view: &View, hiders: &[Hider], region: &Region, wanted: Wanted, t: [f32; 2]) -> Panel {
+fn sixteen_rows_now<S: Simd>(simd: S, lit: &Lit, rows: &Rows) -> [[f32; LANES]; 2] {
+    let Lit { view, hiders, region, wanted } = *lit;
     let splat = |v: f32| simd.splat_f32x16(v);
-    let (middle, half) = (0.5 * (t[0] + t[1]), 0.5 * (t[1] - t[0]));
-    let t_rows = f32x16::simd_from(simd, KRONROD) * half + middle;
+    let half = f32x16::simd_from(simd, rows.half);
+    let t_rows = f32x16::simd_from(simd, rows.nodes) * half + f32x16::simd_from(simd, rows.middle);
     // The rows, and how densely they lie
     let (y, reach, density) = match view.outline {
-        Outline::Parallelogram => (t_rows, splat(1.0), splat(half)),
+        Outline::Parallelogram => (t_rows, splat(1.0), half),
         Outline::Disk => {
             let tt = t_rows * t_rows;
             let y = t_rows * (3.0 - tt) * 0.5;
             let inside = (1.0 - tt).max(splat(0.0));
-            (y, inside * (4.0 - tt).sqrt() * 0.5, inside * (1.5 * half))
+            (y, inside * (4.0 - tt).sqrt() * 0.5, inside * (half * 1.5))
         }
     };
     let row = Row::new(simd, view, y);
@@ -238,17 +326,7 @@ fn panel_now<S: Simd>(simd: S, view: &View, hiders: &[Hider], region: &Region, w
             (inner, outer) = (outer, outer * 2.0 + steps);
         }
     }
-    let total = |values: f32x16<S>| {
-        let values = values * density * view.measure;
-        let sum = |weights: &[f32; 16]| (values * f32x16::simd_from(simd, *weights)).to_array().iter().sum::<f32>();
-        let (fine, coarse) = (sum(&KRONROD_WEIGHTS), sum(&EMBEDDED_WEIGHTS));
-        (fine, (fine - coarse).abs() * TRUST)
-    };
-    let ([diffuse, d], [specular, s]) = {
-        let ((a, b), (c, d)) = (total(sums[0]), total(sums[1]));
-        ([a, b], [c, d])
-    };
-    Panel { t, sums: Sums { diffuse, specular }, error: Sums { diffuse: d, specular: s } }
+    sums.map(|sums| (sums * density * view.measure).to_array())
 }
 
 /// The Kronrod rule's own error is this part of its difference to the Gauss rule, or less: at a corner, where both are at

@@ -80,6 +80,32 @@ pub(crate) const EMBEDDED_WEIGHTS: [f32; 16] = [
     0.0,
 ];
 
+/// Nodes of the Kronrod rule of 7, twice, each with a lane that counts nothing.
+pub(crate) const KRONROD_PAIR: [f32; 16] = twice(SEVEN, SEVEN);
+
+/// Weights of the Kronrod rule of 7, which is exact for polynomials of degree 11: of the first lanes, and of the others.
+pub(crate) const KRONROD_PAIR_WEIGHTS: [[f32; 16]; 2] =
+    [twice(SEVEN_WEIGHTS, [0.0; 8]), twice([0.0; 8], SEVEN_WEIGHTS)];
+
+/// Weights, at the same nodes, of the Gauss rule of 3 inside it.
+pub(crate) const EMBEDDED_PAIR_WEIGHTS: [[f32; 16]; 2] =
+    [twice(THREE_WEIGHTS, [0.0; 8]), twice([0.0; 8], THREE_WEIGHTS)];
+
+const SEVEN: [f32; 8] = [-0.960_491_3, -0.774_596_7, -0.434_243_74, 0.0, 0.434_243_74, 0.774_596_7, 0.960_491_3, 0.0];
+const SEVEN_WEIGHTS: [f32; 8] =
+    [0.104_656_22, 0.268_488_1, 0.401_397_41, 0.450_916_54, 0.401_397_41, 0.268_488_1, 0.104_656_22, 0.0];
+const THREE_WEIGHTS: [f32; 8] = [0.0, 0.555_555_6, 0.0, 0.888_888_9, 0.0, 0.555_555_6, 0.0, 0.0];
+
+const fn twice(one: [f32; 8], other: [f32; 8]) -> [f32; 16] {
+    let mut all = [0.0; 16];
+    let mut k = 0;
+    while k < 8 {
+        (all[k], all[k + 8]) = (one[k], other[k]);
+        k += 1;
+    }
+    all
+}
+
 #[rustfmt::skip]
 const GAUSS: [(&[f32], &[f32]); MAX_ORDER] = [
     (&[0.0], &[2.0]),

@@ -311,7 +311,13 @@ impl<'a> Arrivals<'a> {
         let Some(view) = self.view(emitter, place) else {
             let between = Between::default();
             let masked = Masked { scene, light: index, emitter, si, lobe: place.lobe, between: &between };
-            let sums = if matches!(emitter, Emitter::Points) { masked.by_points(light) } else { Sums::default() };
+            let sums = match (emitter, &light.kind) {
+                (Emitter::Points, LightKind::Area(area)) => {
+                    counts.points += area.samples() as u64;
+                    masked.by_points(light)
+                }
+                _ => Sums::default(),
+            };
             return unseen(emitter, place).with(sums);
         };
         if !view.arrives() {
@@ -442,17 +448,18 @@ fn change(view: &View, place: &Place, between: &Between) -> Change {
     let lobe = sharpness(view) * moved * moved;
     let narrow = lobe.min(1.0);
     let narrow = (narrow + 2.0 * narrow.sqrt() * place.off).min(1.0);
-    let specular = most * brightest(view) * (kink + smooth + narrow + horizon).min(1.0);
+    let specular = most * brightest(view, lobe) * (kink + smooth + narrow + horizon).min(1.0);
     let bend = Sums { diffuse, specular };
     Change { bend, drift, resolved: resolved && narrow < RESOLVED, smooth: is_clear && is_smooth(swing, lobe) }
 }
 
-/// How bright a highlight can be on a light, at most, or thereabouts.
-fn brightest(view: &View) -> f32 {
+/// How bright a highlight can be on a light, at most, or thereabouts, from all over a patch; `moved` is what the highlight
+/// moves by over the patch, as a part of its width, squared.
+fn brightest(view: &View, moved: f32) -> f32 {
     let size2 = square(view.la.max(view.lb));
     let distance2 = square(view.nearest());
     let sharp = sharpness(view) * size2;
-    if sharp > 0.5 * distance2 {
+    if sharp > 0.5 * distance2 || moved > 1.0 {
         return 1.0;
     }
     let at = |x: f32, y: f32| {
@@ -461,7 +468,17 @@ fn brightest(view: &View) -> f32 {
         view.lobe.eval((view.ns.dot(l) * inverse).max(0.0), view.cos_o, view.wo.dot(l) * inverse)
     };
     let corners = at(-1.0, -1.0).max(at(1.0, -1.0)).max(at(1.0, 1.0)).max(at(-1.0, 1.0));
-    (corners.max(at(0.0, 0.0)) * 1.5).min(1.0)
+    let here = (corners.max(at(0.0, 0.0)) * 1.5).min(1.0);
+    // exp(-(a - m)^2) is at most exp(-(1 - e) a^2) exp((1/e - 1) m^2), for any share e
+    let root = here.sqrt();
+    let there = if moved < 1e-3 {
+        here
+    } else if moved < 0.1 {
+        root * root.sqrt() * (1.0 + 4.0 * moved)
+    } else {
+        root * (1.0 + 2.0 * moved)
+    };
+    there.min(1.0)
 }
 
 /// [`sharpness`] of a lobe at a surface.

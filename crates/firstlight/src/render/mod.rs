@@ -11,6 +11,7 @@
 mod arrival;
 mod field;
 mod film;
+mod heat;
 mod hits;
 mod lanes;
 mod patch;
@@ -31,6 +32,7 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use rayon::prelude::*;
 
 pub use film::Film;
+pub use heat::Heat;
 pub use simd::SimdLevel;
 
 use crate::camera::Projection;
@@ -92,6 +94,8 @@ pub struct RenderSettings {
     pub reference: bool,
     /// How shadows are found.
     pub visibility: VisibilityMode,
+    /// Keeps what each pixel took, for [`Film::heat`].
+    pub heat: bool,
 }
 
 impl RenderSettings {
@@ -132,7 +136,8 @@ impl RenderSettings {
     /// How much it takes, and what to do.
     pub fn check_memory(&self, scene: &Scene) -> Result<(), String> {
         let window = self.window(scene);
-        let film = window.width as usize * window.height as usize * size_of::<[f32; 4]>();
+        let pixel = size_of::<[f32; 4]>() + if self.heat { size_of::<f32>() } else { 0 };
+        let film = window.width as usize * window.height as usize * pixel;
         Vec::<u8>::new().try_reserve_exact(film + film / 2).map_err(|_| {
             let Window { width, height, .. } = window;
             format!(
@@ -163,6 +168,7 @@ impl Default for RenderSettings {
             aa_mode: AaMode::Full,
             visibility: VisibilityMode::Shafts,
             reference: false,
+            heat: false,
         }
     }
 }
@@ -194,6 +200,24 @@ pub struct RenderStats {
     pub threads: usize,
 }
 
+impl RenderStats {
+    /// Of two renders together, as the later one was made.
+    pub fn and(&self, later: &RenderStats) -> RenderStats {
+        let mut sum = *later;
+        sum.camera_rays += self.camera_rays;
+        sum.shadow_rays += self.shadow_rays;
+        sum.shadow_rays_skipped += self.shadow_rays_skipped;
+        for (sum, count) in sum.visibility.iter_mut().zip(self.visibility) {
+            *sum += count;
+        }
+        sum.closed_form += self.closed_form;
+        sum.shafts += self.shafts;
+        sum.occluders += self.occluders;
+        sum.traced += self.traced;
+        sum
+    }
+}
+
 /// Counts of one tile.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Counts {
@@ -202,6 +226,10 @@ pub(crate) struct Counts {
     pub shadow_rays_skipped: u64,
     pub settled: Settled,
     pub closed_form: u64,
+    /// Camera rays that were asked: not those of places where it is proved what they would meet.
+    pub looks: u64,
+    /// Points of lights that were asked one by one, of lights that are integrated.
+    pub points: u64,
     /// Shadow rays after which the caller is asked whether to go on.
     next_question: u64,
 }
@@ -226,6 +254,15 @@ impl Counts {
     }
 }
 
+impl Counts {
+    /// In the unit of [`Heat`].
+    fn work(&self) -> f32 {
+        let rays = self.looks + (self.shadow_rays - self.shadow_rays_skipped) + self.settled.traced + self.points;
+        let places = self.settled.visibility.iter().sum::<u64>() + self.closed_form;
+        rays as f32 + Heat::PLACE * places as f32
+    }
+}
+
 /// Shadow rays between two questions: some hundredths of a second of the fast renderer, some tenths of the plain one.
 const QUESTION_EVERY: u64 = 1 << 23;
 
@@ -243,7 +280,7 @@ pub fn render(
         panic!("{fault}");
     }
     let window = settings.window(scene);
-    let film = Mutex::new(Film::new([scene.width, scene.height], window));
+    let film = Mutex::new(Film::new([scene.width, scene.height], window, settings.heat));
     let lights = Lights::new(scene);
     // Where every light is sampled at every ray, the bits are those of the plain renderer
     let every_ray =
@@ -350,6 +387,7 @@ fn render_tile(
     let mut film = FilmTile::new(tile);
     let mut counts = Counts::default();
     let mut pixel = PixelSum::new(scene);
+    let rays = (scene.antialiasing * scene.antialiasing) as f32;
     let side = hits.as_ref().map_or(1, PixelHits::side);
     for top in (0..tile.height).step_by(side as usize) {
         for left in (0..tile.width).step_by(side as usize) {
@@ -364,8 +402,10 @@ fn render_tile(
                 };
                 pixel.clear();
                 let at = [tile.x + left + x, tile.y + top + y];
+                let before = counts.work();
                 pixel.sample(scene, at, lighting, hit, &mut counts, go_on)?;
                 film.set(left + x, top + y, pixel.color(scene));
+                film.spend(left + x, top + y, rays + counts.work() - before);
             }
         }
     }

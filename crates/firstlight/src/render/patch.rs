@@ -121,7 +121,9 @@ impl Patch {
             // The pixel's only ray is that of its middle
             let (ray, differential) = camera_ray(scene, pixel[0], pixel[1]);
             patch.si = scene.surface(&ray, &hit, &differential);
-        } else if !material.is_even(&si, &scene.textures) {
+        } else if !(candidate.is_flat_over(scene, &si, &ray, hit.t, &differential)
+            && material.is_even(&si, &scene.textures))
+        {
             let mut mean = Mean::default();
             patch.for_each(scene, pixel, |_, bsdf| mean.add(bsdf));
             mean.apply(&mut patch);
@@ -170,9 +172,10 @@ impl Patch {
         let mut patch = Patch { si, bsdf, rays, reach, turn, off, uneven: false };
         // Over all of the pixel
         let (ray, whole) = scene.camera.ray(pixel[0] as f32 + 0.5, pixel[1] as f32 + 0.5, 1.0);
-        let even = candidate
-            .hit(scene, &ray)
-            .is_some_and(|hit| material.is_even(&scene.surface(&ray, &hit, &whole), &scene.textures));
+        let even = candidate.hit(scene, &ray).is_some_and(|hit| {
+            let si = scene.surface(&ray, &hit, &whole);
+            candidate.is_flat_over(scene, &si, &ray, hit.t, &whole) && material.is_even(&si, &scene.textures)
+        });
         if mask.count_ones() > 1 && !even {
             let mut mean = Mean::default();
             patch.for_each(scene, pixel, |_, bsdf| mean.add(bsdf));

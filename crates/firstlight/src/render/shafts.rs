@@ -57,15 +57,20 @@ impl<'a> Shafts<'a> {
         let mut film = FilmTile::new(tile);
         let mut counts = Counts::default();
         let side = self.hits.side();
+        let rays = (self.scene.antialiasing * self.scene.antialiasing) as f32;
         let mut pixels: Vec<(PixelSum, usize)> = (0..side * side).map(|_| (PixelSum::new(self.scene), 0)).collect();
         for top in (0..tile.height).step_by(side as usize) {
             for left in (0..tile.width).step_by(side as usize) {
                 let (w, h) = ((tile.width - left).min(side), (tile.height - top).min(side));
                 let pixels = &mut pixels[..(w * h) as usize];
+                let before = counts.work();
                 self.block([tile.x + left, tile.y + top], [w, h], pixels, &mut counts, go_on)?;
+                // What is settled for all points of the block together is shared
+                let work = rays + (counts.work() - before) / pixels.len() as f32;
                 for (i, (pixel, _)) in pixels.iter().enumerate() {
                     let (x, y) = (i as u32 % w, i as u32 / w);
                     film.set(left + x, top + y, pixel.color(self.scene));
+                    film.spend(left + x, top + y, work);
                 }
             }
         }

@@ -11,7 +11,7 @@ use crate::light::{AreaShape, LightKind};
 use crate::material::Bsdf;
 use crate::math::{DVec3, Ray, Vec3};
 use crate::scene::{At, Hit, Scene};
-use crate::shape::{Parallelogram, Sphere};
+use crate::shape::{Parallelogram, RayDifferential, Sphere, SurfaceInteraction};
 
 /// Something that a block's rays may meet.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -133,7 +133,7 @@ impl Pyramid {
                     return None;
                 }
                 depths(&|ray| sphere.intersect(ray))?;
-                Some([self.depth(sphere.c) - sphere.r, self.depth(sphere.c)])
+                Some([self.nearest(scene, candidate), self.depth(sphere.c)])
             }
             Candidate::Light(_) => None,
         }
@@ -240,7 +240,28 @@ impl Candidate {
         let hit = self.hit(scene, &ray)?;
         let si = scene.surface(&ray, &hit, &differential);
         let material = &scene.materials[si.material.index()];
-        material.is_even(&si, &scene.textures).then(|| material.bsdf(&si, &scene.textures))
+        let is_even =
+            self.is_flat_over(scene, &si, &ray, hit.t, &differential) && material.is_even(&si, &scene.textures);
+        is_even.then(|| material.bsdf(&si, &scene.textures))
+    }
+
+    /// Whether the steps of a ray to its neighbours say within a half what lies between them: at the rim of what is round,
+    /// nothing is as wide as it seems.
+    pub fn is_flat_over(
+        self,
+        scene: &Scene,
+        si: &SurfaceInteraction,
+        ray: &Ray,
+        t: f64,
+        step: &RayDifferential,
+    ) -> bool {
+        let curvature = self.curvature(scene);
+        if curvature == 0.0 {
+            return true;
+        }
+        let [across, down] = step.on_plane(ray.d, t as f32, si.ng, f32::MAX.sqrt() * 0.25);
+        let turn = 0.5 * curvature * (across.length() + down.length());
+        turn < 0.25 * si.ng.dot(si.wo)
     }
 
     /// Tells the material at each pixel of a square that sees only this, the mean over its rays; nothing for pixels over which

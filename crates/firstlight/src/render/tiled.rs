@@ -75,6 +75,8 @@ pub(crate) struct Tiled<'a> {
     pixels: Vec<PixelPatches>,
     /// The colours that are known without looking at neighbours.
     colors: Vec<Option<[f32; 4]>>,
+    /// What each pixel took; see [`Heat`](super::Heat).
+    work: Vec<f32>,
     /// Where the light of each pixel's patches begins among all of the cell, once it is known.
     first: Vec<usize>,
     /// What arrived at each patch, light by light, and what that makes.
@@ -101,6 +103,7 @@ impl<'a> Tiled<'a> {
             arrivals,
             known: vec![Known::Nothing; ACROSS * ACROSS],
             colors: vec![None; ACROSS * ACROSS],
+            work: vec![0.0; ACROSS * ACROSS],
             pixels: (0..ACROSS * ACROSS).map(|_| PixelPatches::default()).collect(),
             first: vec![UNLIT; ACROSS * ACROSS],
             arrived: Vec::new(),
@@ -136,6 +139,7 @@ impl<'a> Tiled<'a> {
         self.corner = corner;
         self.known.fill(Known::Nothing);
         self.colors.fill(None);
+        self.work.fill(0.0);
         self.first.fill(UNLIT);
         self.arrived.clear();
         self.values.clear();
@@ -146,7 +150,7 @@ impl<'a> Tiled<'a> {
             self.field.begin(corner);
             self.split(Square { x: corner[0], y: corner[1], side: CELL }, 1, counts, go_on)?;
         } else {
-            self.trace();
+            self.trace(counts);
         }
         let rays = (scene.antialiasing * scene.antialiasing) as u64;
         for y in 0..CELL {
@@ -156,11 +160,13 @@ impl<'a> Tiled<'a> {
                 if inside(i, tile.x, tile.width) && inside(j, tile.y, tile.height) {
                     counts.camera_rays += rays;
                     let index = (y as usize + 1) * ACROSS + x as usize + 1;
+                    let before = counts.work();
                     let color = match self.colors[index] {
                         Some(color) => color,
                         None => self.finish([i, j], counts),
                     };
                     film.set(i - tile.x, j - tile.y, color);
+                    film.spend(i - tile.x, j - tile.y, self.work[index] + counts.work() - before);
                 }
             }
             go_on()?;
@@ -194,7 +200,7 @@ impl<'a> Tiled<'a> {
         if near.is_empty() {
             let background = PixelPatches { background: n * n, ..PixelPatches::default() };
             let color = background.color(scene, Rgb::BLACK, &[]);
-            square.pixels().for_each(|at| self.learn(at, Known::Nothing, Some(color)));
+            square.pixels().for_each(|at| self.learn(at, Known::Nothing, Some(color), 0.0));
             return ControlFlow::Continue(());
         }
         if self.mode == AaMode::Adaptive
@@ -213,15 +219,17 @@ impl<'a> Tiled<'a> {
             let index = self.index(at);
             self.pixels[index].collect_listed(scene, at, self.mode == AaMode::Adaptive, &self.near[depth]);
             self.known[index] = Known::Patches;
+            self.work[index] += (n * n) as f32;
+            counts.looks += (n * n) as u64;
         }
         ControlFlow::Continue(())
     }
 
     /// Notes what is known of a pixel, if the film has it.
-    fn learn(&mut self, [i, j]: [u32; 2], known: Known, color: Option<[f32; 4]>) {
+    fn learn(&mut self, [i, j]: [u32; 2], known: Known, color: Option<[f32; 4]>, work: f32) {
         if i < self.scene.width && j < self.scene.height {
             let index = self.index([i, j]);
-            (self.known[index], self.colors[index]) = (known, color);
+            (self.known[index], self.colors[index], self.work[index]) = (known, color, work);
         }
     }
 
@@ -262,13 +270,15 @@ impl<'a> Tiled<'a> {
                 )
             }
         };
+        let before = counts.work();
         if let Some(shade) = &shade {
             self.field.light(scene, &mut self.arrivals, square, shade, counts);
         }
+        let each = (counts.work() - before) / (square.side * square.side) as f32;
         for at in square.pixels() {
             let looked_up = || bsdfs[((at[1] - square.y) * PATCHWORK + at[0] - square.x) as usize];
             let bsdf = shade.and(even.or_else(looked_up));
-            self.learn(at, Known::Only(only), bsdf.and_then(|bsdf| self.color(at, &bsdf)));
+            self.learn(at, Known::Only(only), bsdf.and_then(|bsdf| self.color(at, &bsdf)), each);
         }
         ControlFlow::Continue(())
     }
@@ -287,9 +297,10 @@ impl<'a> Tiled<'a> {
     }
 
     /// Traces all rays of a cell and its rim.
-    fn trace(&mut self) {
+    fn trace(&mut self, counts: &mut Counts) {
         let scene = self.scene;
         let once = self.mode == AaMode::Adaptive;
+        let rays = (scene.antialiasing * scene.antialiasing) as u64;
         let [left, top] = self.corner.map(|at| at.saturating_sub(1));
         let [right, bottom] = [0, 1].map(|axis| (self.corner[axis] + CELL + 1).min([scene.width, scene.height][axis]));
         let side = self.hits.side();
@@ -304,6 +315,8 @@ impl<'a> Tiled<'a> {
                     self.pixels[index]
                         .collect(scene, at, once, |column, row| hits.get(scene.antialiasing, x, y, column, row));
                     self.known[index] = Known::Patches;
+                    self.work[index] = rays as f32;
+                    counts.looks += rays;
                 }
             }
         }
@@ -328,7 +341,10 @@ impl<'a> Tiled<'a> {
                 pixel.clear();
                 pixel.patches.push(patch);
             }
-            _ => pixel.collect_listed(scene, [i, j], true, &self.near[0]),
+            _ => {
+                pixel.collect_listed(scene, [i, j], true, &self.near[0]);
+                counts.looks += (scene.antialiasing * scene.antialiasing) as u64;
+            }
         }
         self.first[index] = self.values.len();
         let patches = std::mem::take(&mut self.pixels[index].patches);

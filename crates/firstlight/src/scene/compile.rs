@@ -100,6 +100,7 @@ impl SceneDesc {
         let flat_obstacles: Vec<_> = flats.into_iter().chain(blocking(&lights)).collect();
         let light_sides = sides(&lights, &flat_obstacles);
         let light_obstacles = round_blocking(&lights);
+        let flats_seen = geometry.listed_flats_seen();
         let summary = self.summary(desc, &geometry, &lights, &textures);
         let scene = Scene {
             width: picture.width,
@@ -115,6 +116,7 @@ impl SceneDesc {
             materials,
             obstacles,
             flat_obstacles,
+            flats_seen,
             obstacle_links,
             light_sides,
             light_obstacles,

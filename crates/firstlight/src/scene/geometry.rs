@@ -278,6 +278,13 @@ impl Geometry {
         (spheres.collect(), flats.collect())
     }
 
+    /// Which of the flat ones of [`listed_obstacles`](Self::listed_obstacles) the camera sees.
+    pub fn listed_flats_seen(&self) -> Vec<bool> {
+        let casts = |surface: SurfaceId| self.surfaces[surface.index()].casts_shadow;
+        let flats = self.parallelograms.iter().filter(|flat| self.listed && casts(flat.surface));
+        flats.map(|flat| flat.seen).collect()
+    }
+
     /// For which lights each of [`listed_obstacles`](Self::listed_obstacles) casts shadows. Nothing where no surface chooses.
     pub fn listed_obstacle_links(&self) -> [Vec<Option<LinkId>>; 2] {
         if !self.listed || self.links.is_empty() {

@@ -58,6 +58,8 @@ pub struct Scene {
     pub(crate) obstacles: Vec<Sphere>,
     /// All that is flat, listed and in the way of light: parallelograms, then the rectangle lights that block.
     pub(crate) flat_obstacles: Vec<Parallelogram>,
+    /// Whether the camera sees the first of `flat_obstacles`.
+    pub(crate) flats_seen: Vec<bool>,
     /// For which lights each of `obstacles` and of the first of `flat_obstacles` casts shadows; empty where no surface chooses.
     pub(crate) obstacle_links: [Vec<Option<LinkId>>; 2],
     /// The disk and sphere lights that block.

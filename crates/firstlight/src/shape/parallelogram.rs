@@ -237,6 +237,19 @@ impl Parallelogram {
             && self.distance(p.as_dvec3()) <= f64::from(reach)
     }
 
+    /// Whether a viewer in the direction `wo` of a point that lies before it, nearly on its plane, sees nothing behind it
+    /// within `reach` of the point.
+    pub(crate) fn screens(&self, p: Vec3, wo: Vec3, reach: f32, light: PlaneSide) -> bool {
+        let cos = match light {
+            PlaneSide::Front => self.n.as_vec3().dot(wo),
+            PlaneSide::Back => -self.n.as_vec3().dot(wo),
+            PlaneSide::Both => return false,
+        };
+        // What is within reach behind it is seen through it no farther off than that
+        let room = 2.0 * reach * (1.0 + 1.0 / cos);
+        cos > 0.0 && !self.single_sided && self.outside(p.as_dvec3()) < -f64::from(room)
+    }
+
     /// What this parallelogram needs to know of a point that asks for light.
     #[inline(always)]
     pub(crate) fn shadow(&self, p: Vec3, error: ErrorBound) -> ParallelogramShadow {

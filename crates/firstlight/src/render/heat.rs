@@ -1,0 +1,81 @@
+//! Where the work went, pixel by pixel.
+
+use crate::color::{Encoding, Rgb};
+use crate::image::{Image, Window};
+
+/// How much work each pixel of a render took.
+///
+/// The unit is one ray that was asked, from the camera or to a light. A place that asks for a light that is integrated counts as
+/// [`PLACE`](Self::PLACE); where many pixels share such places, each has its share. The same for every thread count, tile size
+/// and machine: it is counted, not timed.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Heat {
+    /// The width and height of the whole film.
+    pub film: [u32; 2],
+    /// The part of it that `work` holds.
+    pub window: Window,
+    /// The window's rows from the top, each from the left; 0 or more.
+    pub work: Vec<f32>,
+}
+
+/// From nothing to much, as sRGB-encoded red, green, blue.
+const RAMP: [[f32; 3]; 6] =
+    [[0.0, 0.0, 0.02], [0.16, 0.1, 0.4], [0.5, 0.12, 0.5], [0.85, 0.25, 0.3], [0.99, 0.62, 0.15], [1.0, 1.0, 0.8]];
+
+impl Heat {
+    /// What a place that asks for an integrated light counts: about what it takes, in rays.
+    pub const PLACE: f32 = 16.0;
+    /// Where the ramp of colours begins and ends, as powers of two.
+    pub const SCALE: [i32; 2] = [-2, 16];
+
+    /// As a picture in false colours: black for 1/4 and less, then violet, red and orange, pale yellow for 65536 and more; each
+    /// doubling is a step of the same length. Linear Rec. 709, for a display of sRGB.
+    pub fn picture(&self) -> Image {
+        let pixels = self.work.iter().map(|work| {
+            let Rgb { r, g, b } = color(*work);
+            [r, g, b, 1.0]
+        });
+        Image { film: self.film, window: self.window, pixels: pixels.collect() }
+    }
+
+    /// The mean over all pixels, and the most that one took.
+    pub fn mean_and_most(&self) -> (f64, f32) {
+        let sum: f64 = self.work.iter().copied().map(f64::from).sum();
+        (sum / self.work.len().max(1) as f64, self.work.iter().copied().fold(0.0, f32::max))
+    }
+}
+
+fn color(work: f32) -> Rgb {
+    let [first, last] = Heat::SCALE.map(|power| power as f32);
+    let at = if work > 0.0 { (pxfm::f_log2f(work) - first) / (last - first) } else { 0.0 };
+    let at = at.clamp(0.0, 1.0) * (RAMP.len() - 1) as f32;
+    let place = (at as usize).min(RAMP.len() - 2);
+    let part = at - place as f32;
+    let channel = |k: usize| {
+        let encoded = RAMP[place][k] * (1.0 - part) + RAMP[place + 1][k] * part;
+        Encoding::Srgb.decode(f64::from(encoded)) as f32
+    };
+    Rgb::new(channel(0), channel(1), channel(2))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn more_work_is_brighter() {
+        let luminance = |work: f32| {
+            let Rgb { r, g, b } = color(work);
+            0.2126 * r + 0.7152 * g + 0.0722 * b
+        };
+        let mut before = luminance(0.0);
+        assert!(before < 0.01);
+        for power in -1..=16 {
+            let now = luminance(2.0f32.powi(power));
+            assert!(now > before, "2^{power}: {now} after {before}");
+            before = now;
+        }
+        assert_eq!(luminance(1e9), luminance(65536.0));
+        assert!(luminance(1e9) > 0.9);
+    }
+}
