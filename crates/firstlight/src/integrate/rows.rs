@@ -15,6 +15,7 @@ use super::hider::{Hider, Interval};
 use super::rules::{
     EMBEDDED_PAIR_WEIGHTS, EMBEDDED_WEIGHTS, KRONROD, KRONROD_PAIR, KRONROD_PAIR_WEIGHTS, KRONROD_WEIGHTS, gauss,
 };
+use super::tensor::sharpness;
 use super::view::{Outline, View};
 use super::{Sums, Wanted};
 use crate::material::Lobe;
@@ -264,7 +265,13 @@ fn sixteen_rows_now<S: Simd>(simd: S, lit: &Lit, rows: &Rows) -> [[f32; LANES]; 
     let length = view.la * (region.x[1] - region.x[0]);
     let foot = row.along * (-1.0 / view.la);
     let steps = if length > NEAR * nearest { nearest / view.la } else { 0.0 };
-    let order = if length * 1.5 > NEAR * nearest || region.pieces > 1 { 5 } else { FAR_ORDER };
+    let order = if length * 1.5 > NEAR * nearest || region.pieces > 1 {
+        5
+    } else if length * FAR > nearest || sharpness(view) * length * length > SHARP * nearest * nearest {
+        4
+    } else {
+        3
+    };
     // Each visible interval in turn
     let mut hidden: ArrayVec<Interval<S>, MAX_HIDERS> = ArrayVec::new();
     for hider in hiders {
@@ -334,8 +341,10 @@ fn sixteen_rows_now<S: Simd>(simd: S, lit: &Lit, rows: &Rows) -> [[f32; LANES]; 
 const TRUST: f32 = 0.3;
 /// Rows longer than this many times the point's distance from them are cut into pieces that grow with the distance.
 const NEAR: f32 = 2.0;
-/// Nodes along a row that is short against its distance.
-const FAR_ORDER: usize = 4;
+/// Rows this many times shorter than the point's distance from them, across which a highlight falls by less than exp(-0.2), take
+/// three nodes; see the tables in [`tensor`](super::tensor).
+const FAR: f32 = 2.5;
+const SHARP: f32 = 0.8;
 
 /// The least of the lanes.
 #[inline(always)]

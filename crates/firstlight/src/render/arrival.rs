@@ -28,6 +28,8 @@ pub(crate) struct Arrival {
     pub resolved: bool,
     /// Whether nothing of it has a corner, and what curves does so little that a quadratic in the place follows it.
     pub smooth: bool,
+    /// Whether a highlight is not wide beside the patch.
+    pub sharp: bool,
 }
 
 /// How a light changes over a patch.
@@ -38,23 +40,25 @@ struct Change {
     drift: f32,
     resolved: bool,
     smooth: bool,
+    sharp: bool,
 }
 
 impl Change {
     /// Not at all.
     const NONE: Change =
-        Change { bend: Sums { diffuse: 0.0, specular: 0.0 }, drift: 0.0, resolved: true, smooth: true };
+        Change { bend: Sums { diffuse: 0.0, specular: 0.0 }, drift: 0.0, resolved: true, smooth: true, sharp: false };
     /// Nobody knows.
     const UNKNOWN: Change = Change {
         bend: Sums { diffuse: f32::MAX, specular: f32::MAX },
         drift: f32::INFINITY,
         resolved: false,
         smooth: false,
+        sharp: true,
     };
 
     fn with(self, sums: Sums) -> Arrival {
-        let Change { bend, drift, resolved, smooth } = self;
-        Arrival { sums, bend, drift, resolved, smooth }
+        let Change { bend, drift, resolved, smooth, sharp } = self;
+        Arrival { sums, bend, drift, resolved, smooth, sharp }
     }
 }
 
@@ -220,7 +224,8 @@ impl<'a> Arrivals<'a> {
         let resolved = edge == 0.0 && rim == 0.0 && swing < RESOLVED_SWING && lobe < RESOLVED;
         let drift = if edge == 0.0 { 0.0 } else { f32::INFINITY };
         let smooth = resolved && terminator == 0.0 && is_smooth(swing, lobe);
-        Change { bend: Sums { diffuse: weight * share, specular }, drift, resolved, smooth }.with(sums)
+        Change { bend: Sums { diffuse: weight * share, specular }, drift, resolved, smooth, sharp: is_sharp(lobe) }
+            .with(sums)
     }
 
     /// Whether the edge of a shadow, of a light of one point, may run through the patch: 1, or 0 if that is excluded.
@@ -393,7 +398,11 @@ impl<'a> Arrivals<'a> {
 /// than the second of its width, squared, are followed by a quadratic: its error is that of the third order, about a
 /// hundredth of the highlight times the second to the power of 3/2.
 fn is_smooth(swing: f32, lobe: f32) -> bool {
-    swing < 0.1 && lobe < 0.1
+    swing < 0.1 && !is_sharp(lobe)
+}
+
+fn is_sharp(lobe: f32) -> bool {
+    lobe >= 0.05
 }
 
 /// Of a light that nothing is seen of, or that has no view.
@@ -419,7 +428,7 @@ fn horizon_change(view: &View, place: &Place) -> Change {
     let swing = place.turn + place.reach / view.nearest().max(place.reach);
     let all = view.most() * swing.min(1.0) * 0.5;
     let bend = Sums { diffuse: all, specular: all };
-    Change { bend, drift: 0.0, resolved: swing < RESOLVED_SWING, smooth: false }
+    Change { bend, drift: 0.0, resolved: swing < RESOLVED_SWING, smooth: false, sharp: false }
 }
 
 /// How far the mean over a patch can be from what arrives at its middle, and so on.
@@ -442,7 +451,7 @@ fn change(view: &View, place: &Place, between: &Between) -> Change {
     let is_clear = drift == 0.0 && between.hiders.is_empty() && !between.ask && !between.ask_trees && !cuts;
     if matches!(view.lobe, Lobe::None) {
         let bend = Sums { diffuse, specular: 0.0 };
-        return Change { bend, drift, resolved, smooth: is_clear && is_smooth(swing, 0.0) };
+        return Change { bend, drift, resolved, smooth: is_clear && is_smooth(swing, 0.0), sharp: false };
     }
     let moved = 2.0 * place.turn + place.reach / nearest.max(place.reach);
     let lobe = sharpness(view) * moved * moved;
@@ -450,7 +459,8 @@ fn change(view: &View, place: &Place, between: &Between) -> Change {
     let narrow = (narrow + 2.0 * narrow.sqrt() * place.off).min(1.0);
     let specular = most * brightest(view, lobe) * (kink + smooth + narrow + horizon).min(1.0);
     let bend = Sums { diffuse, specular };
-    Change { bend, drift, resolved: resolved && narrow < RESOLVED, smooth: is_clear && is_smooth(swing, lobe) }
+    let resolved = resolved && narrow < RESOLVED;
+    Change { bend, drift, resolved, smooth: is_clear && is_smooth(swing, lobe), sharp: is_sharp(lobe) }
 }
 
 /// How bright a highlight can be on a light, at most, or thereabouts, from all over a patch; `moved` is what the highlight

@@ -19,8 +19,11 @@ use crate::material::{Bsdf, Lobe};
 use crate::scene::Scene;
 use crate::shape::SurfaceInteraction;
 
-/// In display steps: what the corners of a square may be wrong about its middle.
-const SHOWS: f32 = 0.15;
+/// In display steps: what the corners of a square may be wrong about its middle. The quadratic is wrong by a tenth of that where
+/// the slope of light has a corner, by a third where light itself has one.
+const SHOWS: f32 = 0.4;
+/// The same under a highlight that is not wide.
+const SHOWS_SHARP: f32 = 0.1;
 /// The same where light is smooth: the quadratic's error is a small part of that.
 const SHOWS_SMOOTH: f32 = 1.0;
 /// Outlines of shadows that move over a larger part of a light than this are narrow beside the square.
@@ -236,7 +239,12 @@ impl OneLight<'_, '_> {
             let Some(sums) = self.sums(at(column, row)) else { return false };
             nodes[row as usize][column as usize] = sums;
         }
-        if !self.is_foretold(&nodes, if arrival.smooth { SHOWS_SMOOTH } else { SHOWS }) {
+        let shows = match (arrival.sharp, arrival.smooth) {
+            (true, _) => SHOWS_SHARP,
+            (_, true) => SHOWS_SMOOTH,
+            _ => SHOWS,
+        };
+        if !self.is_foretold(&nodes, shows) {
             return false;
         }
         self.field.fill(self.light, square, &nodes);
