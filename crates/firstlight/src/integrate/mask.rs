@@ -176,10 +176,11 @@ impl Masked<'_> {
         let cos_o = si.ns.dot(si.wo);
         let (mut diffuse, mut specular) = (0.0f64, 0.0f64);
         let count = area.samples();
+        let floor = light.floor(si.lit_from, si.error, si.horizon);
         for k in 0..count {
             let l = area.point(k) - si.lit_from;
             let height = si.ns.dot(l);
-            if !(si.horizon.dot(l) > 0.0 && height > 0.0) {
+            if !(si.horizon.dot(l) > floor && height > 0.0) {
                 continue;
             }
             let Some(sample) = light.sample(k, l) else { continue };

@@ -267,7 +267,7 @@ impl<'a> Arrivals<'a> {
         let flat = emitter.flat(si.lit_from)?;
         Some(View::new(
             &flat,
-            &Receiver { p: si.lit_from, horizon: si.horizon, ns: si.ns, wo: si.wo, lobe: *place.lobe },
+            &Receiver { p: si.lit_from, error: si.error, horizon: si.horizon, ns: si.ns, wo: si.wo, lobe: *place.lobe },
         ))
     }
 

@@ -363,3 +363,34 @@ fn a_converged_picture_is_converged() {
     let deviation = converged.deviation(&image);
     assert_eq!((deviation.over, deviation.at, deviation.worst), (2, [2, 1], f64::INFINITY));
 }
+
+#[test]
+fn a_light_in_the_plane_of_a_surface_sends_nothing_to_it() {
+    // Under constant falloff no cosine weakens a highlight: what rounding lifts above the plane would shine
+    let normal = unit([-0.69, 0.27, 0.67]);
+    let wall = white([0.3, -1.7, 2.9], normal, 6.0);
+    let [a, b] = across(normal);
+    let on = |x: f64, y: f64| add([0.3, -1.7, 2.9], add(mul(a, x), mul(b, y)));
+    let eye = |p: V| add(p, add(mul(normal, 0.4), mul(a, 0.3)));
+    let disk = DiskLightDesc { falloff: Falloff::Constant, visible: false, ..DiskLightDesc::new(on(0.7, 0.4), normal, 2.6) };
+    let plate = RectangleDesc {
+        falloff: Falloff::Constant,
+        visible: false,
+        ..RectangleDesc::new(on(-1.3, 0.2), mul(a, 1.7), mul(b, 0.9))
+    };
+    let shiny = blinn_phong(firstlight::ColorParam::gray(0.5), firstlight::ColorParam::gray(0.5), 2.0);
+    for light in [LightDesc::Disk(disk), LightDesc::Rectangle(plate)] {
+        let mut scene = wall.clone().with_light(light);
+        for shape in &mut scene.shapes {
+            if let ShapeDesc::Parallelogram(flat) = shape {
+                flat.material = Some("shiny".into());
+            }
+        }
+        let scene = scene.with_material("shiny", shiny.clone());
+        for (x, y) in [(0.1, 0.2), (-1.0, 0.7), (2.3, -0.6), (0.9, 0.4), (-2.1, -1.8)] {
+            assert_eq!(shine(&scene, eye(on(x, y)), on(x, y)), 0.0, "integrated, {x}, {y}");
+            let sampled = with_samples(&scene, 1024, SampleSet::Sobol, 0);
+            assert_eq!(probe(&sampled, eye(on(x, y)), on(x, y))[0], 0.0, "sampled, {x}, {y}");
+        }
+    }
+}
