@@ -251,10 +251,12 @@ impl<'a> Arrivals<'a> {
             let t = -f64::from(height) / f64::from(n.dot(l));
             let hit = si.lit_from.as_dvec3() + l.as_dvec3() * t;
             let aside = flat.outside(hit) as f32;
-            if aside > slack {
+            // Where the way meets the plane at a small angle, it moves there by more than the point
+            let wide = slack * (length / n.dot(l).abs()).max(1.0) * 1.25;
+            if aside > wide {
                 continue;
             }
-            if aside < -slack && height.abs() > slack && (!finite || tip.abs() > slack) {
+            if aside < -wide && height.abs() > slack && (!finite || tip.abs() > slack) {
                 return 0.0;
             }
             edge = 1.0;
