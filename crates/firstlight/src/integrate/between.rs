@@ -59,6 +59,10 @@ impl LightCone {
     /// Whether the ball around `s` is outside, seen from anywhere on the patch.
     #[inline(always)]
     fn misses(&self, s: Vec3, r: f32) -> bool {
+        // A light that the point is in the middle of is on all sides of it
+        if self.sin >= 1.0 {
+            return false;
+        }
         let along = s.dot(self.axis);
         let aside = (s.length_squared() - along * along).max(0.0).sqrt();
         aside * self.cos - along * self.sin > (r + self.reach) * 1.001 + (along.abs() + aside) * SLACK
