@@ -184,15 +184,27 @@ impl View {
         (x * x + y * y + self.height * self.height).sqrt()
     }
 
-    /// The most that can arrive, or thereabouts: the cosine at the surface is 1, and nothing is in the way.
-    pub fn most(&self) -> f32 {
+    /// The most that can arrive within `reach` of the point, or thereabouts: the cosine at the surface is 1, and nothing is in
+    /// the way.
+    pub fn most(&self, reach: f32) -> f32 {
         if !self.physical {
             return 1.0;
         }
         let size = self.la.max(self.lb);
         let distance = self.nearest().max(0.3 * size);
         // No more than a whole half space of light
-        (4.0 * self.measure * self.height.min(distance) / (distance * distance * distance)).min(std::f32::consts::PI)
+        (4.0 * self.measure * (self.height + reach).min(distance) / (distance * distance * distance))
+            .min(std::f32::consts::PI)
+    }
+
+    /// What share of [`most`](Self::most) the mean within `reach` can be off where the light's plane runs through: from there one
+    /// side of a light shines and the other does not, or both grow.
+    pub fn crossing(&self, reach: f32) -> f32 {
+        match (self.height <= reach, self.physical) {
+            (false, _) => 0.0,
+            (true, true) => 0.5,
+            (true, false) => f32::from(self.facing.is_finite()),
+        }
     }
 
     /// The way to the point (x, y) of the light.

@@ -373,8 +373,10 @@ fn horizon_bend(view: &View, place: &Place) -> (Sums, bool) {
         return (Sums::default(), true);
     }
     let swing = place.turn + place.reach / view.nearest().max(place.reach);
-    let all = view.most() * swing.min(1.0) * 0.5;
-    (Sums { diffuse: all, specular: all }, swing < RESOLVED_SWING)
+    let crossing = view.crossing(place.reach);
+    let cos = (view.cos.max().max(0.0) / view.l0.length() + swing).min(1.0);
+    let all = view.most(place.reach) * (swing.min(1.0) * 0.5 + cos * crossing).min(1.0);
+    (Sums { diffuse: all, specular: all }, swing < RESOLVED_SWING && crossing == 0.0)
 }
 
 /// How far the mean over a patch can be from what arrives at its middle. `drift`: see [`Between::drift`].
@@ -382,7 +384,7 @@ fn bend(view: &View, place: &Place, drift: f32) -> (Sums, bool) {
     if place.reach == 0.0 {
         return (Sums::default(), true);
     }
-    let (most, nearest) = (view.most(), view.nearest());
+    let (most, nearest, crossing) = (view.most(place.reach), view.nearest(), view.crossing(place.reach));
     let swing = place.turn + place.reach / nearest.max(place.reach);
     let cuts = !view.is_above_horizon() || view.cos.min() < place.reach + place.turn * view.l0.length();
     // Where the outline of a shadow comes in, the share it hides begins to grow at once: an eighth of the way it moves
@@ -391,15 +393,15 @@ fn bend(view: &View, place: &Place, drift: f32) -> (Sums, bool) {
     let horizon = if cuts { swing * swing.min(1.0) } else { 0.0 };
     let smooth = square(place.reach / nearest.max(place.reach)) * 2.0 + place.turn * place.turn * 0.5;
     let smooth = smooth + 2.0 * swing * place.off;
-    let diffuse = most * (cos * (kink + smooth.min(1.0)) + horizon).min(1.0);
-    let resolved = drift < RESOLVED && swing < RESOLVED_SWING;
+    let diffuse = most * (cos * (kink + smooth.min(1.0) + crossing) + horizon).min(1.0);
+    let resolved = drift < RESOLVED && swing < RESOLVED_SWING && crossing == 0.0;
     if matches!(view.lobe, Lobe::None) {
         return (Sums { diffuse, specular: 0.0 }, resolved);
     }
     let moved = 2.0 * place.turn + place.reach / nearest.max(place.reach);
     let narrow = (sharpness(view) * moved * moved).min(1.0);
     let narrow = (narrow + 2.0 * narrow.sqrt() * place.off).min(1.0);
-    let specular = most * brightest(view) * (kink + smooth + narrow + horizon).min(1.0);
+    let specular = most * brightest(view) * (kink + smooth + narrow + horizon + crossing).min(1.0);
     (Sums { diffuse, specular }, resolved && narrow < RESOLVED)
 }
 
