@@ -300,6 +300,19 @@ impl Area {
         n.abs().dot(way_error(self.middle, self.half, p, error))
     }
 
+    /// The way from `p` to the point that stands for `uv` of the unit square, one over its length, and
+    /// [`weight`](Self::weight) there. Equal areas of the square are equal areas of the light.
+    pub(crate) fn at(&self, uv: [f64; 2], p: Vec3) -> (Vec3, f32, f32) {
+        let (q, n) = self.shape.point(uv);
+        let l = q.as_vec3() - p;
+        let inverse_distance = 1.0 / l.length();
+        let weight = match self.n.or(n.map(|n| n.as_vec3())) {
+            Some(n) if self.physical || !self.both_sides => self.weight_with(n, l, inverse_distance),
+            _ => 1.0,
+        };
+        (l, inverse_distance, weight)
+    }
+
     /// 1 where the light emits towards the surface under `constant`; the cosine at the light over d^2 under `physical`.
     /// `l` points to point `k` of the light.
     #[inline(always)]
@@ -307,7 +320,12 @@ impl Area {
         if !self.physical && self.both_sides {
             return 1.0;
         }
-        let n = self.n.unwrap_or_else(|| self.points().normals[k / LANES].get(k % LANES));
+        self.weight_with(self.n.unwrap_or_else(|| self.points().normals[k / LANES].get(k % LANES)), l, inverse_distance)
+    }
+
+    /// The same from a point of normal `n`.
+    #[inline(always)]
+    fn weight_with(&self, n: Vec3, l: Vec3, inverse_distance: f32) -> f32 {
         let side = -n.dot(l);
         let side = if self.both_sides { side.abs() } else { side };
         if !self.physical {

@@ -277,12 +277,20 @@ impl<'a> Arrivals<'a> {
     fn integrated(&mut self, index: usize, emitter: &Emitter, place: &Place, counts: &mut Counts) -> Arrival {
         let (scene, si) = (self.scene, place.si);
         let light = &scene.lights[index];
+        let enough = |sums: &Sums, error: &Sums| {
+            let [diffuse, specular] = place.colors;
+            let value = place.base + diffuse * sums.diffuse + specular * sums.specular;
+            let wrong = diffuse * error.diffuse + specular * error.specular;
+            self.lights.steps.of_color(value, wrong) <= self.lights.tolerance
+        };
         let Some(view) = self.view(emitter, place) else {
-            let between = Between::default();
+            let ask = light.shadows && si.receives_shadow;
+            let between = Between { ask, ask_trees: ask && scene.geometry.has_trees(), ..Between::default() };
             let masked = Masked { scene, light: index, emitter, si, lobe: place.lobe, between: &between };
-            let sums = if matches!(emitter, Emitter::Points) { masked.by_points(light) } else { Sums::default() };
+            let is_points = matches!(emitter, Emitter::Points);
+            let sums = if is_points { masked.by_points(light, &enough) } else { Sums::default() };
             // Nothing is known of how it bends
-            let bend = if matches!(emitter, Emitter::Points) && place.reach > 0.0 { f32::MAX } else { 0.0 };
+            let bend = if is_points && place.reach > 0.0 { f32::MAX } else { 0.0 };
             return Arrival { sums, bend: Sums { diffuse: bend, specular: bend }, resolved: false };
         };
         if !view.arrives() {
@@ -303,12 +311,6 @@ impl<'a> Arrivals<'a> {
             }
             return Arrival { sums: Sums::default(), bend, resolved };
         }
-        let enough = |sums: &Sums, error: &Sums| {
-            let [diffuse, specular] = place.colors;
-            let value = place.base + diffuse * sums.diffuse + specular * sums.specular;
-            let wrong = diffuse * error.diffuse + specular * error.specular;
-            self.lights.steps.of_color(value, wrong) <= self.lights.tolerance
-        };
         match (between.ask || between.ask_trees, between.hiders.is_empty()) {
             (true, _) => counts.settled.visibility[Visibility::Mask as usize] += 1,
             (false, true) => counts.settled.visibility[Visibility::Lit as usize] += 1,
