@@ -11,7 +11,7 @@ use super::view::View;
 use crate::ids::LightId;
 use crate::math::{DVec3, Vec3};
 use crate::scene::Scene;
-use crate::shape::{Parallelogram, PlaneSide, Sphere, SurfaceInteraction};
+use crate::shape::{Disk, Parallelogram, PlaneSide, Sphere, SurfaceInteraction};
 use crate::visibility::{Occluders, ShadowMesh};
 
 /// Who asks, and for how much of a surface.
@@ -59,6 +59,10 @@ impl LightCone {
     /// Whether the ball around `s` is outside, seen from anywhere on the patch.
     #[inline(always)]
     fn misses(&self, s: Vec3, r: f32) -> bool {
+        // A light that the point is in the middle of is on all sides of it
+        if self.sin >= 1.0 {
+            return false;
+        }
         let along = s.dot(self.axis);
         let aside = (s.length_squared() - along * along).max(0.0).sqrt();
         aside * self.cos - along * self.sin > (r + self.reach) * 1.001 + (along.abs() + aside) * SLACK
@@ -168,7 +172,14 @@ impl Between {
                 return between;
             }
         }
-        between.ask |= scene.light_obstacles.disks.iter().any(|(index, _)| *index != light);
+        for (index, disk) in &scene.light_obstacles.disks {
+            if *index != light {
+                between.disk(view, emitter, pyramid(), disk, asker);
+            }
+            if between.hidden {
+                return between;
+            }
+        }
         if let Some(trees) = trees {
             for which in &trees.spheres {
                 between.sphere(view, emitter, pyramid(), scene.sphere(*which), asker, horizon);
@@ -300,8 +311,16 @@ impl Between {
                 self.hidden = true;
                 return;
             }
-            self.ask = true;
-            self.drift = self.drift.max(pyramid.drift(0.0));
+            if touches(emitter, to, r, si.lit_from) {
+                self.ask = true;
+            } else {
+                Hider::shells(view, to, r).into_iter().for_each(|shell| self.add(Some(shell)));
+            }
+            // What is hidden is the same from everywhere inside
+            let inside = is_on || r - distance > 2.0 * f64::from(asker.reach);
+            if !inside || self.ask {
+                self.drift = self.drift.max(pyramid.drift(0.0));
+            }
             return;
         }
         let s = to.as_vec3();
@@ -348,6 +367,36 @@ impl Between {
         } else {
             self.drift.max(pyramid.drift(tangent(to.length(), r, asker.reach)))
         };
+    }
+
+    fn disk(&mut self, view: &View, emitter: &Emitter, pyramid: &Pyramid, disk: &Disk, asker: &Asker) {
+        let (center, r) = disk.ball();
+        let to = center - asker.si.lit_from.as_dvec3();
+        let (s, distance) = (to.as_vec3(), to.length() as f32);
+        let gap = pyramid.gap(s, r as f32);
+        let below = asker.si.horizon.dot(s) + (r as f32) < -(SLACK * distance + asker.reach * (1.0 + distance));
+        if below || gap > SLACK * distance + asker.reach {
+            return;
+        }
+        let shadow = disk.shadow(asker.si.lit_from, asker.si.error);
+        let longest = pyramid.corners.iter().fold(0.0f32, |longest, l| longest.max(l.abs().max_element()));
+        let bounds = shadow.bounds(longest);
+        let height = bounds.as_ref().map_or(0.0, |bounds| bounds.height);
+        let near = height.max(distance - r as f32);
+        self.drift = self.drift.max(pyramid.drift((near - asker.reach).max(0.0)));
+        let Some(bounds) = bounds else { return };
+        if gap > SLACK * distance {
+            return;
+        }
+        if touches(emitter, to, r, asker.si.lit_from) {
+            self.ask = true;
+            return;
+        }
+        let hider = Hider::disk(view, &bounds);
+        // Convex, as all that hides
+        let corners = [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]];
+        self.hidden = corners.iter().all(|[x, y]| hider.hides(*x, *y));
+        self.add(Some(hider));
     }
 
     fn flat(&mut self, view: &View, emitter: &Emitter, pyramid: &Pyramid, flat: &Parallelogram, asker: &Asker) {
@@ -435,7 +484,7 @@ fn distance([a, b, c]: &[Vec3; 3]) -> f32 {
     (n.dot(*a) / n.length()).abs()
 }
 
-/// Whether a sphere reaches into a light that is a ball: what of it is behind the light's surface does not show on the disk
+/// Whether a sphere, or a disk in one, reaches into a light that is a ball: what of it is behind the light's surface does not show on the disk
 /// that stands for the light.
 fn touches(emitter: &Emitter, to: DVec3, r: f64, p: Vec3) -> bool {
     match emitter {

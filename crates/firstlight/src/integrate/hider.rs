@@ -7,6 +7,7 @@ use fearless_simd::{f32x16, prelude::*};
 
 use super::view::{Linear, View};
 use crate::math::{DVec3, Vec3};
+use crate::shape::DiskBounds;
 
 /// The most edges, with the plane.
 const EDGES: usize = 5;
@@ -16,8 +17,18 @@ const EDGES: usize = 5;
 pub(crate) enum Hider {
     /// A triangle or a parallelogram.
     Edges(Edges),
-    /// A sphere that the point is outside of.
+    /// A sphere that the point is outside of, or a disk.
     Cone(Cone),
+    /// Half of a sphere that the point is inside of: what of the light is outside.
+    Shell(Shell),
+}
+
+/// Hidden is what is not inside a sphere: of each row all, or what is before the sphere, or what is beyond it.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Shell {
+    /// r^2 - |l - s|^2, s leading to the centre.
+    inside: Quadratic,
+    is_beyond: bool,
 }
 
 /// Hidden is where all of these are 0 or more.
@@ -33,9 +44,9 @@ pub(crate) struct Edges {
 /// happens before the light is reached, or the light itself is inside.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Cone {
-    /// r^2 |l|^2 - |l x s|^2, s leading to the centre: whether the line meets the sphere.
+    /// r^2 |l|^2 - |l x s|^2, s leading to the centre: whether the line meets the sphere. Of a disk (n.l)^2 - (x.l)^2 - (y.l)^2.
     quadratic: Quadratic,
-    /// l.s
+    /// l.s; of a disk, how far beyond its plane l ends.
     ahead: Linear,
     /// |l|^2 - l.s, which is below 0 where the sphere's middle is behind the light, and r^2 - |l - s|^2.
     cut: Option<[Quadratic; 2]>,
@@ -77,6 +88,10 @@ impl Quadratic {
         }
     }
 
+    fn at(&self, x: f32, y: f32) -> f32 {
+        self.c + 2.0 * (x * self.x + y * self.y) + x * x * self.xx + 2.0 * x * y * self.xy + y * y * self.yy
+    }
+
     /// On row `y`: half the slope, and the constant.
     #[inline(always)]
     fn row<S: Simd>(&self, y: f32x16<S>) -> [f32x16<S>; 2] {
@@ -92,11 +107,24 @@ impl Quadratic {
         roots(f64::from(self.yy), b, c)
     }
 
+    /// Calls `row` with the rows of [`Hider::corners`].
+    fn corners(&self, row: &mut impl FnMut(f64)) {
+        let rows = [self.tangents(), self.crossings(-1.0), self.crossings(1.0)];
+        rows.into_iter().flatten().flatten().filter(|y| y.abs() < 1.0).for_each(row);
+    }
+
     /// The rows that only touch 0.
     fn tangents(&self) -> [Option<f64>; 2] {
         let [c, x, y, xx, xy, yy] = [self.c, self.x, self.y, self.xx, self.xy, self.yy].map(f64::from);
         roots(xy * xy - xx * yy, x * xy - xx * y, x * x - xx * c)
     }
+}
+
+/// r^2 - |l - s|^2: whether a place of the light is inside of a sphere around `s`.
+fn inside(view: &View, s: DVec3, r: f64) -> Quadratic {
+    let from_center = [(view.l0.as_dvec3() - s).as_vec3(), view.a, view.b];
+    let Quadratic { c, x, y, xx, xy, yy } = Quadratic::dot(from_center, from_center);
+    Quadratic { c: (r * r) as f32 - c, x: -x, y: -y, xx: -xx, xy: -xy, yy: -yy }
 }
 
 /// Where a y^2 + 2 b y + c is 0.
@@ -179,20 +207,36 @@ impl Hider {
         if beyond > r {
             return None;
         }
-        let (s, r2) = (s.as_vec3(), (r * r) as f32);
+        let (center, s, r2) = (s, s.as_vec3(), (r * r) as f32);
         let l = [view.l0, view.a, view.b];
         let cross = l.map(|v| v.cross(s));
         let ll = Quadratic::dot(l, l);
         let ahead = Linear { c: s.dot(view.l0), x: s.dot(view.a), y: s.dot(view.b) };
         let cut = (beyond > -r).then(|| {
             let ls = Quadratic { c: ahead.c, x: 0.5 * ahead.x, y: 0.5 * ahead.y, xx: 0.0, xy: 0.0, yy: 0.0 };
-            let from_center = [view.l0 - s, view.a, view.b];
-            let mut inside = Quadratic::dot(from_center, from_center).combined(-1.0, ls, 0.0);
-            inside.c += r2;
-            [ll.combined(1.0, ls, -1.0), inside]
+            [ll.combined(1.0, ls, -1.0), inside(view, center, r)]
         });
         let quadratic = ll.combined(r2, Quadratic::dot(cross, cross), -1.0);
         Some(Hider::Cone(Cone { quadratic, ahead, cut }))
+    }
+
+    /// A sphere around the point, whose centre is at `s` from it: together, all that is outside.
+    pub fn shells(view: &View, s: DVec3, r: f64) -> [Hider; 2] {
+        let inside = inside(view, s, r);
+        [false, true].map(|is_beyond| Hider::Shell(Shell { inside, is_beyond }))
+    }
+
+    /// A disk, as the point sees it.
+    pub fn disk(view: &View, disk: &DiskBounds) -> Hider {
+        let l = [view.l0, view.a, view.b];
+        let square = |v: Vec3| {
+            let [c, x, y] = l.map(|l| v.dot(l));
+            Quadratic { c: c * c, x: c * x, y: c * y, xx: x * x, xy: x * y, yy: y * y }
+        };
+        let across = square(disk.x).combined(1.0, square(disk.y), 1.0);
+        let beyond = disk.height + disk.room;
+        let ahead = Linear { c: -disk.n.dot(view.l0) - beyond, x: -disk.n.dot(view.a), y: -disk.n.dot(view.b) };
+        Hider::Cone(Cone { quadratic: square(disk.n).combined(1.0, across, -1.0), ahead, cut: None })
     }
 
     /// What is hidden of sixteen rows.
@@ -207,6 +251,15 @@ impl Hider {
                 interval
             }
             Hider::Cone(cone) => cone.hidden(simd, y),
+            Hider::Shell(shell) => {
+                let (zero, far) = (simd.splat_f32x16(0.0), simd.splat_f32x16(FAR));
+                let [low, high, meets] = real_roots(simd, &shell.inside, y);
+                let meets = meets.simd_gt(zero);
+                match shell.is_beyond {
+                    false => Interval { from: -far, to: meets.select(low, far) },
+                    true => Interval { from: meets.select(high, -far), to: far },
+                }
+            }
         }
     }
 
@@ -215,14 +268,14 @@ impl Hider {
         match self {
             Hider::Edges(edges) => edges.sides[..edges.count].iter().all(|side| side.at(x, y) >= 0.0),
             Hider::Cone(cone) => {
-                let q =
-                    |q: &Quadratic| q.c + 2.0 * (x * q.x + y * q.y) + x * x * q.xx + 2.0 * x * y * q.xy + y * y * q.yy;
+                let q = |q: &Quadratic| q.at(x, y);
                 let on_line = q(&cone.quadratic) >= 0.0 && cone.ahead.at(x, y) > 0.0;
                 match &cone.cut {
                     None => on_line,
                     Some([before, inside]) => on_line && q(before) > 0.0 || q(inside) >= 0.0,
                 }
             }
+            Hider::Shell(shell) => shell.inside.at(x, y) < 0.0,
         }
     }
 
@@ -257,15 +310,12 @@ impl Hider {
                 }
             }
             Hider::Cone(cone) => {
-                let mut all = |quadratic: &Quadratic| {
-                    let rows = [quadratic.tangents(), quadratic.crossings(-1.0), quadratic.crossings(1.0)];
-                    rows.into_iter().flatten().flatten().filter(|y| y.abs() < 1.0).for_each(&mut row);
-                };
-                all(&cone.quadratic);
+                cone.quadratic.corners(&mut row);
                 if let Some(cut) = &cone.cut {
-                    cut.iter().for_each(&mut all);
+                    cut.iter().for_each(|quadratic| quadratic.corners(&mut row));
                 }
             }
+            Hider::Shell(shell) => shell.inside.corners(&mut row),
         }
     }
 }

@@ -88,7 +88,7 @@ fn covered(view: &View) -> Option<Region> {
 
 impl View {
     /// The direction of a highlight's middle: the viewer's, mirrored at the shading normal.
-    fn mirror(&self) -> Option<Vec3> {
+    pub(super) fn mirror(&self) -> Option<Vec3> {
         let m = self.ns * (2.0 * self.cos_o) - self.wo;
         let length = m.length();
         (length > 0.5).then(|| m / length)

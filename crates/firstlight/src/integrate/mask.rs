@@ -1,17 +1,20 @@
 //! The integral of a light behind anything: a mask over fixed points, their number doubled until the answer stands still.
 //!
 //! The points say what share of the light arrives; how much the whole would be is known exactly. So where nothing is in
-//! the way, or everything, the points' own error is nothing.
+//! the way, or everything, the points' own error is nothing. Where as many points as are worth while do not do, cells take
+//! over: [`cells`].
 
+use std::cell::Cell;
 use std::sync::OnceLock;
 
 use super::Sums;
 use super::between::Between;
+use super::cells::{self, Sent, Source};
 use super::emitter::Emitter;
 use super::view::{Outline, View};
 use crate::accel::RayPacket16;
 use crate::ids::LightId;
-use crate::light::{Light, LightKind, SampleSet};
+use crate::light::{Area, Light, LightKind, SampleSet};
 use crate::material::Lobe;
 use crate::math::{LANES, ShadowRay, Vec3};
 use crate::scene::{Scene, ShadowRays};
@@ -19,7 +22,10 @@ use crate::shape::SurfaceInteraction;
 
 /// The fewest and the most points.
 const FEWEST: usize = 256;
-const MOST: usize = 1 << 14;
+const MOST: usize = 1 << 10;
+/// How much farther off the share may be than two numbers of points tell: both can be off to the same side, and are so all over
+/// a surface, since all of it asks the same points.
+const DOUBT: f32 = 4.0;
 
 /// Points of the square [-1, 1]^2, and what they are on a disk.
 struct Points {
@@ -46,6 +52,8 @@ pub(crate) struct Masked<'a> {
     pub si: &'a SurfaceInteraction,
     pub lobe: &'a Lobe,
     pub between: &'a Between,
+    /// How many points were asked.
+    pub asked: Cell<u64>,
 }
 
 /// Sums of the points so far: what they would send, and what of it arrives.
@@ -74,11 +82,12 @@ impl Masked<'_> {
         };
         let ball = match self.emitter {
             Emitter::Ball { center, radius } => {
-                let to = (*center - self.si.lit_from.as_dvec3()).as_vec3();
-                Some((to, (to.length_squared() - (radius * radius) as f32).max(0.0)))
+                let to = *center - self.si.lit_from.as_dvec3();
+                Some((to.as_vec3(), (to.length_squared() - radius * radius).max(0.0) as f32))
             }
             _ => None,
         };
+        let seen = Seen { masked: self, view, ball };
         let mut shares = Shares::default();
         let mut before: [Option<Sums>; 2] = [None; 2];
         let (mut from, mut to) = (0, FEWEST);
@@ -87,26 +96,11 @@ impl Masked<'_> {
                 let mut ways = [Vec3::ZERO; LANES];
                 let mut sent = [[0.0f32; 2]; LANES];
                 let mut active = 0u16;
-                for (lane, [x, y]) in block.iter().enumerate() {
-                    let l = view.l(*x, *y);
-                    let (height, cos) = (view.horizon.at(*x, *y), view.cos.at(*x, *y));
-                    if !(height > 0.0 && cos > 0.0) {
-                        continue;
+                for (lane, place) in block.iter().enumerate() {
+                    if let Some(point) = seen.point(*place) {
+                        (ways[lane], sent[lane]) = (point.way, point.sums);
+                        active |= 1 << lane;
                     }
-                    let inverse = 1.0 / l.length();
-                    let weight = if view.physical { view.height * inverse * (inverse * inverse) } else { 1.0 };
-                    let cos_i = cos * inverse;
-                    let lobe = self.lobe.eval(cos_i, view.cos_o, view.wo.dot(l) * inverse);
-                    sent[lane] = [weight * cos_i, weight * lobe];
-                    ways[lane] = match ball {
-                        None => l,
-                        // On to the ball's surface
-                        Some((center, cc)) => {
-                            let (a, b) = (l.length_squared(), l.dot(center));
-                            l * ((b - (b * b - a * cc).max(0.0).sqrt()) / a)
-                        }
-                    };
-                    active |= 1 << lane;
                 }
                 let hidden = self.hidden(block, &ways, active);
                 shares.hidden += hidden.count_ones() as usize;
@@ -128,11 +122,14 @@ impl Masked<'_> {
                 // What one more point could change is the least that can be wrong
                 let one = 1.0 / to as f32;
                 let error = Sums {
-                    diffuse: off(|sums| sums.diffuse).max(whole.diffuse * one),
-                    specular: off(|sums| sums.specular).max(whole.specular * one),
+                    diffuse: (DOUBT * off(|sums| sums.diffuse)).max(whole.diffuse * one),
+                    specular: (DOUBT * off(|sums| sums.specular)).max(whole.specular * one),
                 };
-                if to == MOST || shares.hidden == 0 && to >= 2 * FEWEST || enough(&now, &error) {
+                if shares.hidden == 0 && to >= 2 * FEWEST || enough(&now, &error) {
                     return (now, error);
+                }
+                if to == MOST {
+                    return cells::integrate(&seen, Some(whole), enough);
                 }
             }
             before = [Some(now), before[0]];
@@ -143,6 +140,7 @@ impl Masked<'_> {
     /// Which of sixteen ways something stands in.
     fn hidden(&self, places: &[[f32; 2]], ways: &[Vec3; LANES], active: u16) -> u16 {
         let lanes = |mask: u16| (0..LANES).filter(move |lane| mask >> lane & 1 == 1);
+        self.asked.set(self.asked.get() + u64::from(active.count_ones()));
         let mut hidden = 0;
         if self.between.ask {
             for lane in lanes(active) {
@@ -169,34 +167,92 @@ impl Masked<'_> {
         hidden | geometry.are_blocked(self.scene.level, &shadows, asking)
     }
 
-    /// The same for a light that is only points.
-    pub fn by_points(&self, light: &Light) -> Sums {
+    /// The same for a light that no flat one stands for.
+    pub fn by_points(&self, light: &Light, enough: &dyn Fn(&Sums, &Sums) -> bool) -> Sums {
         let LightKind::Area(area) = &light.kind else { return Sums::default() };
         let si = self.si;
-        let cos_o = si.ns.dot(si.wo);
-        let (mut diffuse, mut specular) = (0.0f64, 0.0f64);
-        let count = area.samples();
-        for k in 0..count {
-            let l = area.point(k) - si.lit_from;
-            let height = si.ns.dot(l);
-            if !(si.horizon.dot(l) > 0.0 && height > 0.0) {
-                continue;
-            }
-            let Some(sample) = light.sample(k, l) else { continue };
-            if sample.weight == 0.0
-                || light.shadows
-                    && si.receives_shadow
-                    && self.scene.occluded(&si.shadow_ray(LightId(self.light as u32), l, 1.0))
-            {
-                continue;
-            }
-            let cos_i = height * sample.inverse_distance;
-            let cos_io = si.wo.dot(l) * sample.inverse_distance;
-            diffuse += f64::from(cos_i * sample.weight);
-            specular += f64::from(self.lobe.eval(cos_i, cos_o, cos_io) * sample.weight);
+        let floor = light.floor(si.lit_from, si.error, si.horizon);
+        let measure = if area.physical { area.measure() as f32 } else { 1.0 };
+        cells::integrate(&All { masked: self, area, floor, measure }, None, enough).0
+    }
+}
+
+/// A flat light behind things, as one point sees it.
+struct Seen<'a> {
+    masked: &'a Masked<'a>,
+    view: &'a View,
+    /// Of a ball: the way to its middle, and the square of the way to where it is touched.
+    ball: Option<(Vec3, f32)>,
+}
+
+impl Seen<'_> {
+    /// What the point of the square [-1, 1]^2 would send.
+    fn point(&self, [x, y]: [f32; 2]) -> Option<Sent> {
+        let view = self.view;
+        let (height, cos) = (view.horizon.at(x, y), view.cos.at(x, y));
+        if !(height > 0.0 && cos > 0.0) {
+            return None;
         }
-        // As a share of the area, and the area itself
-        let share = if area.physical { area.measure() } else { 1.0 } / count as f64;
-        Sums { diffuse: (diffuse * share) as f32, specular: (specular * share) as f32 }
+        let l = view.l(x, y);
+        let inverse = 1.0 / l.length();
+        let weight = if view.physical { view.height * inverse * (inverse * inverse) } else { 1.0 };
+        let cos_i = cos * inverse;
+        let lobe = self.masked.lobe.eval(cos_i, view.cos_o, view.wo.dot(l) * inverse);
+        let way = match self.ball {
+            None => l,
+            // On to the ball's surface
+            Some((center, cc)) => {
+                let (a, b) = (l.length_squared(), l.dot(center));
+                l * ((b - (b * b - a * cc).max(0.0).sqrt()) / a)
+            }
+        };
+        Some(Sent { way, sums: [weight * cos_i, weight * lobe] })
+    }
+
+    /// From the unit square.
+    fn place(&self, at: [f32; 2]) -> [f32; 2] {
+        let square = at.map(|w| 2.0 * w - 1.0);
+        match self.view.outline {
+            Outline::Parallelogram => square,
+            Outline::Disk => crate::light::concentric(square.map(f64::from)).map(|w| w as f32),
+        }
+    }
+}
+
+impl Source for Seen<'_> {
+    fn sent(&self, at: [f32; 2]) -> Option<Sent> {
+        self.point(self.place(at))
+    }
+
+    fn hidden(&self, places: &[[f32; 2]; LANES], ways: &[Vec3; LANES], active: u16) -> u16 {
+        self.masked.hidden(&places.map(|at| self.place(at)), ways, active)
+    }
+}
+
+/// All of a light, point by point.
+struct All<'a> {
+    masked: &'a Masked<'a>,
+    area: &'a Area,
+    /// [`Light::floor`].
+    floor: f32,
+    /// What a share of the light is multiplied with.
+    measure: f32,
+}
+
+impl Source for All<'_> {
+    fn sent(&self, at: [f32; 2]) -> Option<Sent> {
+        let si = self.masked.si;
+        let (l, inverse, weight) = self.area.at(at.map(f64::from), si.lit_from);
+        let height = si.ns.dot(l);
+        if !(si.horizon.dot(l) > self.floor && height > 0.0 && weight > 0.0 && inverse < f32::INFINITY) {
+            return None;
+        }
+        let cos_i = height * inverse;
+        let lobe = self.masked.lobe.eval(cos_i, si.ns.dot(si.wo), si.wo.dot(l) * inverse);
+        Some(Sent { way: l, sums: [weight * cos_i * self.measure, weight * lobe * self.measure] })
+    }
+
+    fn hidden(&self, places: &[[f32; 2]; LANES], ways: &[Vec3; LANES], active: u16) -> u16 {
+        self.masked.hidden(places, ways, active)
     }
 }

@@ -27,6 +27,9 @@ pub(crate) const MAX_HIDERS: usize = 8;
 /// The most panels that a light is cut into.
 const MAX_PANELS: usize = 64;
 
+/// How often the distance of rows from a highlight is made four times as large, where panels end around it.
+const GRADES: usize = 6;
+
 /// The part of a light that is integrated, and in how many pieces along a row.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Region {
@@ -90,7 +93,7 @@ pub(crate) fn integrate<S: Simd>(
     wanted: Wanted,
     enough: &dyn Fn(&Sums, &Sums) -> bool,
 ) -> (Sums, Sums) {
-    let cuts = cuts(view, hiders, region);
+    let cuts = cuts(view, hiders, region, wanted);
     let mut panels: ArrayVec<Panel, MAX_PANELS> = ArrayVec::new();
     let (mut sums, mut error) = (Sums::default(), Sums::default());
     let lit = Lit { view, hiders, region, wanted };
@@ -140,7 +143,7 @@ pub(crate) fn integrate<S: Simd>(
 }
 
 /// Where panels begin and end: in the light's own parameter of rows.
-fn cuts(view: &View, hiders: &[Hider], region: &Region) -> ArrayVec<f32, { MAX_PANELS / 2 }> {
+fn cuts(view: &View, hiders: &[Hider], region: &Region, wanted: Wanted) -> ArrayVec<f32, { MAX_PANELS / 2 }> {
     let mut cuts = ArrayVec::new();
     let [from, to] = region.y.map(|y| parameter(view.outline, y));
     // Shorter panels are not worth their rows
@@ -160,12 +163,43 @@ fn cuts(view: &View, hiders: &[Hider], region: &Region) -> ArrayVec<f32, { MAX_P
             offer(f64::from(y));
         }
     }
+    if wanted.specular && region.y == Region::WHOLE.y && !matches!(view.lobe, Lobe::None) {
+        // A highlight on a light that is near may lie between all rows of a panel, and they would agree that there is none
+        let mut around = |y: f32, width: f32| {
+            let mut off = width;
+            for _ in 0..GRADES {
+                if !(off < 1.0) {
+                    break;
+                }
+                offer(f64::from(y - off));
+                offer(f64::from(y + off));
+                off *= 4.0;
+            }
+        };
+        around(-view.fb / view.lb, view.height / view.lb);
+        if let Some(y) = view.highlight() {
+            around(y, view.height / view.lb);
+        }
+    }
     // Room for both ends
     cuts.truncate(MAX_PANELS / 2 - 2);
     cuts.push(from);
     cuts.push(to);
     cuts.sort_unstable_by(f32::total_cmp);
     cuts
+}
+
+impl View {
+    /// The row on which the direction of a highlight's middle meets the light's plane, if it does.
+    fn highlight(&self) -> Option<f32> {
+        let m = self.mirror()?;
+        let n = self.a.cross(self.b);
+        let n = n / n.length();
+        let t = n.dot(self.l0) / n.dot(m);
+        let along_b = (self.b - self.a * (self.skew / self.la)) / self.lb;
+        let y = (t * m.dot(along_b) - self.fb) / self.lb;
+        (t > 0.0 && y.is_finite()).then_some(y)
+    }
 }
 
 /// The parameter of row `y`. On a disk rows are spread so that their lengths change smoothly up to the rim:

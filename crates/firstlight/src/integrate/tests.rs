@@ -6,7 +6,7 @@ use super::view::FlatLight;
 use super::*;
 use crate::material::{BlinnPhongLobe, PhongLobe};
 use crate::math::dispatch_wide;
-use crate::math::{DVec3, Vec3};
+use crate::math::{DVec3, ErrorBound, Vec3};
 
 struct Random(u64);
 
@@ -78,7 +78,7 @@ fn case(seed: u64, hiders: usize, sharpest: f64) -> Option<Case> {
     };
     let p = Vec3::ZERO;
     let (ns, wo) = (ns.as_vec3(), wo.as_vec3());
-    let receiver = Receiver { p, horizon: ns, ns, wo, lobe };
+    let receiver = Receiver { p, error: ErrorBound(Vec3::ZERO), horizon: ns, ns, wo, lobe };
     let view = View::new(&light, &receiver);
     if !view.arrives() {
         return None;

@@ -1,7 +1,8 @@
 //! A flat light, and how one point sees it.
 
+use crate::light::way_error;
 use crate::material::Lobe;
-use crate::math::{DVec3, Vec3};
+use crate::math::{DVec3, ErrorBound, Vec3};
 
 /// What a flat light fills of the square [-1, 1]^2 of its own coordinates.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -64,6 +65,7 @@ impl FlatLight {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Receiver {
     pub p: Vec3,
+    pub error: ErrorBound,
     /// Light from below this plane does not count.
     pub horizon: Vec3,
     /// Shading normal.
@@ -120,7 +122,7 @@ pub(crate) struct View {
     pub facing: f32,
     /// ns.l
     pub cos: Linear,
-    /// The height of l above the horizon.
+    /// The height of l above the horizon, less what rounding can add to it: [`crate::light::Light::floor`].
     pub horizon: Linear,
     /// wo.l
     pub out: Linear,
@@ -139,7 +141,8 @@ impl View {
         let l0 = (light.c - at.p.as_dvec3()).as_vec3();
         let side = -light.n.dot(l0);
         let linear = |v: Vec3| Linear { c: v.dot(l0), x: v.dot(light.a), y: v.dot(light.b) };
-        let (cos, horizon) = (linear(at.ns), linear(at.horizon));
+        let (cos, mut horizon) = (linear(at.ns), linear(at.horizon));
+        horizon.c -= at.horizon.abs().dot(way_error(light.c.as_vec3(), light.a.abs() + light.b.abs(), at.p, at.error));
         let area = match light.outline {
             Outline::Parallelogram => 4.0,
             Outline::Disk => std::f32::consts::PI,
@@ -181,15 +184,27 @@ impl View {
         (x * x + y * y + self.height * self.height).sqrt()
     }
 
-    /// The most that can arrive, or thereabouts: the cosine at the surface is 1, and nothing is in the way.
-    pub fn most(&self) -> f32 {
+    /// The most that can arrive within `reach` of the point, or thereabouts: the cosine at the surface is 1, and nothing is in
+    /// the way.
+    pub fn most(&self, reach: f32) -> f32 {
         if !self.physical {
             return 1.0;
         }
         let size = self.la.max(self.lb);
         let distance = self.nearest().max(0.3 * size);
         // No more than a whole half space of light
-        (4.0 * self.measure * self.height.min(distance) / (distance * distance * distance)).min(std::f32::consts::PI)
+        (4.0 * self.measure * (self.height + reach).min(distance) / (distance * distance * distance))
+            .min(std::f32::consts::PI)
+    }
+
+    /// What share of [`most`](Self::most) the mean within `reach` can be off where the light's plane runs through: from there one
+    /// side of a light shines and the other does not, or both grow.
+    pub fn crossing(&self, reach: f32) -> f32 {
+        match (self.height <= reach, self.physical) {
+            (false, _) => 0.0,
+            (true, true) => 0.5,
+            (true, false) => f32::from(self.facing.is_finite()),
+        }
     }
 
     /// The way to the point (x, y) of the light.

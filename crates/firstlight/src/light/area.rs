@@ -5,11 +5,11 @@ use std::sync::{Arc, OnceLock};
 
 use fearless_simd::{f32x16, prelude::*};
 
-use super::{Disk, EmitSides, Falloff, Light, LightKind, Rectangle, SampleSet, Sphere, scaled};
+use super::{Disk, EmitSides, Falloff, Light, LightKind, Rectangle, SampleSet, Sphere, scaled, way_error};
 use crate::color::Rgb;
 use crate::context::CompileContext;
 use crate::describe::{ColorDesc, SamplesDesc};
-use crate::math::{DVec3, LANES, Ray, Vec3, Vec3x16};
+use crate::math::{DVec3, ErrorBound, LANES, Ray, Vec3, Vec3x16};
 use crate::shape::{Parallelogram, PlaneSide};
 
 /// The largest number of points on one light.
@@ -130,7 +130,10 @@ impl Emitter {
         };
         let scale = scaled(cx, self.color, self.strength, self.falloff.factor() * area / count.max(1) as f64);
         let intensity = self.color.linear.map(|c| (c * self.strength * self.falloff.factor()) as f32);
+        let [low, high] = shape.bounds();
         let area = Area {
+            middle: ((low + high) * 0.5).as_vec3(),
+            half: ((high - low) * 0.5).as_vec3(),
             n: shape.flat_normal(),
             shape,
             set: self.set,
@@ -170,6 +173,9 @@ pub struct Area {
     pub visible: bool,
     /// Whether it stops the light of others.
     pub blocks: bool,
+    /// The middle of the box around it, and half of that box.
+    middle: Vec3,
+    half: Vec3,
     /// Unit normal of the front, where all of it faces one way.
     n: Option<Vec3>,
     set: SampleSet,
@@ -224,7 +230,6 @@ impl AreaShape {
     }
 
     /// The smallest box around it: its least and its greatest corner.
-    #[allow(dead_code, reason = "for integration")]
     pub fn bounds(&self) -> [DVec3; 2] {
         match self {
             AreaShape::Rectangle(rectangle) => rectangle.shape.bounds(),
@@ -289,6 +294,25 @@ impl Area {
         self.points().blocks[k / LANES].get(k % LANES)
     }
 
+    /// [`Light::floor`].
+    #[inline(always)]
+    pub(crate) fn floor(&self, p: Vec3, error: ErrorBound, n: Vec3) -> f32 {
+        n.abs().dot(way_error(self.middle, self.half, p, error))
+    }
+
+    /// The way from `p` to the point that stands for `uv` of the unit square, one over its length, and
+    /// [`weight`](Self::weight) there. Equal areas of the square are equal areas of the light.
+    pub(crate) fn at(&self, uv: [f64; 2], p: Vec3) -> (Vec3, f32, f32) {
+        let (q, n) = self.shape.point(uv);
+        let l = q.as_vec3() - p;
+        let inverse_distance = 1.0 / l.length();
+        let weight = match self.n.or(n.map(|n| n.as_vec3())) {
+            Some(n) if self.physical || !self.both_sides => self.weight_with(n, l, inverse_distance),
+            _ => 1.0,
+        };
+        (l, inverse_distance, weight)
+    }
+
     /// 1 where the light emits towards the surface under `constant`; the cosine at the light over d^2 under `physical`.
     /// `l` points to point `k` of the light.
     #[inline(always)]
@@ -296,7 +320,12 @@ impl Area {
         if !self.physical && self.both_sides {
             return 1.0;
         }
-        let n = self.n.unwrap_or_else(|| self.points().normals[k / LANES].get(k % LANES));
+        self.weight_with(self.n.unwrap_or_else(|| self.points().normals[k / LANES].get(k % LANES)), l, inverse_distance)
+    }
+
+    /// The same from a point of normal `n`.
+    #[inline(always)]
+    fn weight_with(&self, n: Vec3, l: Vec3, inverse_distance: f32) -> f32 {
         let side = -n.dot(l);
         let side = if self.both_sides { side.abs() } else { side };
         if !self.physical {

@@ -12,7 +12,7 @@ mod spot;
 use crate::color::Rgb;
 use crate::context::CompileContext;
 use crate::describe::{ColorDesc, SamplesDesc, family, words};
-use crate::math::Vec3;
+use crate::math::{ErrorBound, UNIT_ROUNDOFF, Vec3};
 use crate::transform::TransformDesc;
 
 pub use area::{Area, AreaShape};
@@ -183,6 +183,22 @@ impl Light {
         }
     }
 
+    /// How high above the plane through `p` with normal `n` (unit) a point of the light has to be to count as above it: as far
+    /// as rounding can lift one that lies in the plane. `error` is that of `p`. In metres; of a light infinitely far away, in
+    /// parts of its unit direction.
+    ///
+    /// A light that lies in the plane of a surface would else send to it, from those of its points that rounding lifts, what
+    /// no cosine weakens: highlights.
+    #[inline(always)]
+    pub fn floor(&self, p: Vec3, error: ErrorBound, n: Vec3) -> f32 {
+        match &self.kind {
+            LightKind::Directional(directional) => n.abs().dot(directional.to_light.abs()) * (4.0 * UNIT_ROUNDOFF),
+            LightKind::Point(point) => n.abs().dot(way_error(point.position, Vec3::ZERO, p, error)),
+            LightKind::Spot(spot) => n.abs().dot(way_error(spot.position, Vec3::ZERO, p, error)),
+            LightKind::Area(area) => area.floor(p, error, n),
+        }
+    }
+
     /// How much arrives from sample `k`, to which `l` leads from a surface. `None` where the two are the same point.
     #[inline(always)]
     pub fn sample(&self, k: usize, l: Vec3) -> Option<LightSample> {
@@ -199,6 +215,13 @@ impl Light {
         };
         Some(LightSample { inverse_distance, weight })
     }
+}
+
+/// How far, along each axis, a way from `p` to a point within `half` of `middle` can be wrong by rounding, together with what
+/// its product with a unit vector adds: the errors of both ends, and four roundings of the way itself.
+pub(crate) fn way_error(middle: Vec3, half: Vec3, p: Vec3, error: ErrorBound) -> Vec3 {
+    let (far, way) = (middle.abs() + half, (middle - p).abs() + half);
+    error.0 + (far + way * 4.0) * UNIT_ROUNDOFF
 }
 
 /// A point of a light's description in world space.

@@ -1,5 +1,7 @@
 //! How much of one light arrives at one place of a surface, and how much that bends over the patch around it.
 
+use std::cell::Cell;
+
 use fearless_simd::Level;
 
 use super::Counts;
@@ -289,10 +291,12 @@ impl<'a> Arrivals<'a> {
             let t = -f64::from(height) / f64::from(n.dot(l));
             let hit = si.lit_from.as_dvec3() + l.as_dvec3() * t;
             let aside = flat.outside(hit) as f32;
-            if aside > slack {
+            // Where the way meets the plane at a small angle, it moves there by more than the point
+            let wide = slack * (length / n.dot(l).abs()).max(1.0) * 1.25;
+            if aside > wide {
                 continue;
             }
-            if aside < -slack && height.abs() > slack && (!finite || tip.abs() > slack) {
+            if aside < -wide && height.abs() > slack && (!finite || tip.abs() > slack) {
                 return 0.0;
             }
             edge = 1.0;
@@ -305,7 +309,7 @@ impl<'a> Arrivals<'a> {
         let flat = emitter.flat(si.lit_from)?;
         Some(View::new(
             &flat,
-            &Receiver { p: si.lit_from, horizon: si.horizon, ns: si.ns, wo: si.wo, lobe: *place.lobe },
+            &Receiver { p: si.lit_from, error: si.error, horizon: si.horizon, ns: si.ns, wo: si.wo, lobe: *place.lobe },
         ))
     }
 
@@ -313,16 +317,20 @@ impl<'a> Arrivals<'a> {
     fn integrated(&mut self, index: usize, emitter: &Emitter, place: &Place, counts: &mut Counts) -> Arrival {
         let (scene, si) = (self.scene, place.si);
         let light = &scene.lights[index];
+        let enough = |sums: &Sums, error: &Sums| {
+            let [diffuse, specular] = place.colors;
+            let value = place.base + diffuse * sums.diffuse + specular * sums.specular;
+            let wrong = diffuse * error.diffuse + specular * error.specular;
+            self.lights.steps.of_color(value, wrong) <= self.lights.tolerance
+        };
         let Some(view) = self.view(emitter, place) else {
-            let between = Between::default();
-            let masked = Masked { scene, light: index, emitter, si, lobe: place.lobe, between: &between };
-            let sums = match (emitter, &light.kind) {
-                (Emitter::Points, LightKind::Area(area)) => {
-                    counts.points += area.samples() as u64;
-                    masked.by_points(light)
-                }
-                _ => Sums::default(),
-            };
+            let ask = light.shadows && si.receives_shadow;
+            let between = Between { ask, ask_trees: ask && scene.geometry.has_trees(), ..Between::default() };
+            let asked = Cell::new(0);
+            let masked = Masked { scene, light: index, emitter, si, lobe: place.lobe, between: &between, asked };
+            let is_points = matches!(emitter, Emitter::Points);
+            let sums = if is_points { masked.by_points(light, &enough) } else { Sums::default() };
+            counts.points += masked.asked.get();
             return unseen(emitter, place).with(sums);
         };
         if !view.arrives() {
@@ -339,12 +347,6 @@ impl<'a> Arrivals<'a> {
             counts.settled.visibility[Visibility::Hidden as usize] += 1;
             return change.with(Sums::default());
         }
-        let enough = |sums: &Sums, error: &Sums| {
-            let [diffuse, specular] = place.colors;
-            let value = place.base + diffuse * sums.diffuse + specular * sums.specular;
-            let wrong = diffuse * error.diffuse + specular * error.specular;
-            self.lights.steps.of_color(value, wrong) <= self.lights.tolerance
-        };
         match (between.ask || between.ask_trees, between.hiders.is_empty()) {
             (true, _) => counts.settled.visibility[Visibility::Mask as usize] += 1,
             (false, true) => counts.settled.visibility[Visibility::Lit as usize] += 1,
@@ -353,8 +355,11 @@ impl<'a> Arrivals<'a> {
         let hiders = if between.ask || between.ask_trees { &[][..] } else { &between.hiders[..] };
         let (whole, _) = dispatch_wide!(self.level, simd => integrate(simd, &view, hiders, &enough));
         let sums = if between.ask || between.ask_trees {
-            let masked = Masked { scene, light: index, emitter, si, lobe: place.lobe, between: &between };
-            masked.integrate(&view, &whole, &enough).0
+            let asked = Cell::new(0);
+            let masked = Masked { scene, light: index, emitter, si, lobe: place.lobe, between: &between, asked };
+            let sums = masked.integrate(&view, &whole, &enough).0;
+            counts.points += masked.asked.get();
+            sums
         } else {
             whole
         };
@@ -426,9 +431,12 @@ fn horizon_change(view: &View, place: &Place) -> Change {
         return Change::NONE;
     }
     let swing = place.turn + place.reach / view.nearest().max(place.reach);
-    let all = view.most() * swing.min(1.0) * 0.5;
+    let crossing = view.crossing(place.reach);
+    let cos = (view.cos.max().max(0.0) / view.l0.length() + swing).min(1.0);
+    let all = view.most(place.reach) * (swing.min(1.0) * 0.5 + cos * crossing).min(1.0);
     let bend = Sums { diffuse: all, specular: all };
-    Change { bend, drift: 0.0, resolved: swing < RESOLVED_SWING, smooth: false, sharp: false }
+    let resolved = swing < RESOLVED_SWING && crossing == 0.0;
+    Change { bend, drift: 0.0, resolved, smooth: false, sharp: false }
 }
 
 /// How far the mean over a patch can be from what arrives at its middle, and so on.
@@ -437,7 +445,7 @@ fn change(view: &View, place: &Place, between: &Between) -> Change {
     if place.reach == 0.0 || between.hidden && drift == 0.0 {
         return Change::NONE;
     }
-    let (most, nearest) = (view.most(), view.nearest());
+    let (most, nearest, crossing) = (view.most(place.reach), view.nearest(), view.crossing(place.reach));
     let swing = place.turn + place.reach / nearest.max(place.reach);
     let cuts = !view.is_above_horizon() || view.cos.min() < place.reach + place.turn * view.l0.length();
     // Where the outline of a shadow comes in, the share it hides begins to grow at once: an eighth of the way it moves
@@ -446,9 +454,9 @@ fn change(view: &View, place: &Place, between: &Between) -> Change {
     let horizon = if cuts { swing * swing.min(1.0) } else { 0.0 };
     let smooth = square(place.reach / nearest.max(place.reach)) * 2.0 + place.turn * place.turn * 0.5;
     let smooth = smooth + 2.0 * swing * place.off;
-    let diffuse = most * (cos * (kink + smooth.min(1.0)) + horizon).min(1.0);
-    let resolved = drift < RESOLVED && swing < RESOLVED_SWING;
-    let is_clear = drift == 0.0 && between.hiders.is_empty() && !between.ask && !between.ask_trees && !cuts;
+    let diffuse = most * (cos * (kink + smooth.min(1.0) + crossing) + horizon).min(1.0);
+    let resolved = drift < RESOLVED && swing < RESOLVED_SWING && crossing == 0.0;
+    let is_clear = resolved && drift == 0.0 && between.hiders.is_empty() && !between.ask && !between.ask_trees && !cuts;
     if matches!(view.lobe, Lobe::None) {
         let bend = Sums { diffuse, specular: 0.0 };
         return Change { bend, drift, resolved, smooth: is_clear && is_smooth(swing, 0.0), sharp: false };
@@ -457,7 +465,7 @@ fn change(view: &View, place: &Place, between: &Between) -> Change {
     let lobe = sharpness(view) * moved * moved;
     let narrow = lobe.min(1.0);
     let narrow = (narrow + 2.0 * narrow.sqrt() * place.off).min(1.0);
-    let specular = most * brightest(view, lobe) * (kink + smooth + narrow + horizon).min(1.0);
+    let specular = most * brightest(view, lobe) * (kink + smooth + narrow + horizon + crossing).min(1.0);
     let bend = Sums { diffuse, specular };
     let resolved = resolved && narrow < RESOLVED;
     Change { bend, drift, resolved, smooth: is_clear && is_smooth(swing, lobe), sharp: is_sharp(lobe) }

@@ -108,6 +108,8 @@ fn gather_area<S: Simd>(
     let (ns, wo) = (Vec3x16::splat(simd, si.ns), Vec3x16::splat(simd, si.wo));
     let horizon = Vec3x16::splat(simd, si.horizon);
     let one_horizon = si.horizon == si.ns;
+    let floor = area.floor(si.lit_from, si.error, si.horizon);
+    let least = if one_horizon { floor } else { 0.0 };
     let cos_o = si.ns.dot(si.wo);
     let (mut diffuse, mut specular) = (zero, zero);
     for (index, block) in points.blocks.iter().enumerate() {
@@ -116,9 +118,9 @@ fn gather_area<S: Simd>(
         // Above the horizon, and not the surface's own point
         let height = ns.dot(l);
         let distance2 = l.dot(l);
-        let mut lit = height.simd_gt(zero) & distance2.simd_ge(splat(MIN_DISTANCE2));
+        let mut lit = height.simd_gt(least) & distance2.simd_ge(splat(MIN_DISTANCE2));
         if !one_horizon {
-            lit &= horizon.dot(l).simd_gt(zero);
+            lit &= horizon.dot(l).simd_gt(floor);
         }
         // Not hidden
         if let Some(hidden) = obstacles.hidden.get(index) {

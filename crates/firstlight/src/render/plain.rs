@@ -25,12 +25,13 @@ impl Lighting for Plain {
         let light = &scene.lights[index];
         let (mut diffuse, mut specular) = (LaneSum::new(), LaneSum::new());
         let cos_o = si.ns.dot(si.wo);
+        let floor = light.floor(si.lit_from, si.error, si.horizon);
         for k in 0..light.samples() {
             counts.shadow_rays += 1;
             let to = light.towards(k, si.lit_from);
-            // Light from below the surface does not count
+            // Light from below the surface does not count, nor what rounding alone may have lifted above it
             let height = si.ns.dot(to.l);
-            if !(si.horizon.dot(to.l) > 0.0 && height > 0.0) {
+            if !(si.horizon.dot(to.l) > floor && height > 0.0) {
                 continue;
             }
             // How much is sent this way

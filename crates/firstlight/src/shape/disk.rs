@@ -67,6 +67,11 @@ impl Disk {
         Disk { center, frame, radius, inner: 0.0 }
     }
 
+    /// Its middle and its radius.
+    pub fn ball(&self) -> (DVec3, f64) {
+        (self.center, self.radius)
+    }
+
     /// What this disk, without its hole, needs to know of a point that asks for light.
     #[inline(always)]
     pub fn shadow(&self, p: Vec3, error: ErrorBound) -> DiskShadow {
@@ -143,7 +148,7 @@ pub(crate) struct DiskShadow {
 
 /// What has to hold for a way l to be blocked by a disk: -n.l above `height` and `room` (above 0, of a way without an end), and
 /// (x.l)^2 + (y.l)^2 at most (n.l)^2.
-pub(super) struct DiskBounds {
+pub(crate) struct DiskBounds {
     pub n: Vec3,
     pub x: Vec3,
     pub y: Vec3,
@@ -156,7 +161,7 @@ pub(super) struct DiskBounds {
 
 impl DiskShadow {
     /// The same as products with l, for ways with coordinates up to `longest`. `None` if no way is blocked.
-    pub(super) fn bounds(&self, longest: f32) -> Option<DiskBounds> {
+    pub(crate) fn bounds(&self, longest: f32) -> Option<DiskBounds> {
         const DOT: f32 = 64.0 * UNIT_ROUNDOFF;
         if !(self.height > self.margin) {
             return None;

@@ -159,6 +159,7 @@ impl Sphere {
         } else {
             Side::On
         };
+        let cc = if side == Side::Far { r2 - f64::from(FAR_END_SLACK) * self.r * ff.sqrt() } else { cc };
         let f = f.as_vec3();
         let df = error.0 + f.abs() * (16.0 * UNIT_ROUNDOFF);
         SphereShadow { f, cc: cc as f32, r2: r2 as f32, ff: ff as f32, df, side }
@@ -185,7 +186,8 @@ enum Side {
 pub(crate) struct SphereShadow {
     /// From the centre to the point.
     f: Vec3,
-    /// |f|^2 - r^2.
+    /// |f|^2 - r^2. From far away: what |q - c|^2 is below where the end q of a shadow ray is inside for sure, a little less
+    /// than r^2.
     cc: f32,
     r2: f32,
     ff: f32,
@@ -224,10 +226,19 @@ impl SphereShadow {
     ///
     /// With a = l.l and b = -f.l, the line comes nearest to the centre at t = b/a and meets the sphere where
     /// a t^2 - 2 b t + cc = 0. From outside, the nearer root is below 1 if the end is inside, or if 0 < b < a.
+    ///
+    /// From many radii away nothing is left of that: there the end is l + f, axis by axis, which is wrong by the rounding of
+    /// the two alone.
     #[inline(always)]
     pub fn blocks(&self, l: Vec3, finite: bool) -> bool {
         let a = l.dot(l);
         let b = -self.f.dot(l);
+        if self.side == Side::Far {
+            // a r^2 - |l x f|^2 does not cancel
+            let (cross, end) = (l.cross(self.f), l + self.f);
+            let discriminant = a * self.r2 - cross.dot(cross);
+            return (discriminant >= 0.0 && b > 0.0 && (!finite || b < a)) || (finite && end.dot(end) < self.cc);
+        }
         // |q - c|^2 - r^2 at the end q of l, and how far it can be wrong
         let end = (a - (b + b)) + self.cc;
         let slack = (a + self.ff) * END_SLACK;
@@ -235,13 +246,7 @@ impl SphereShadow {
             Side::Inside => !finite || end > slack,
             Side::On => b > l.abs().dot(self.df) && (!finite || end > slack),
             Side::Outside | Side::Far => {
-                let discriminant = if self.side == Side::Far {
-                    // a r^2 - |l x f|^2 does not cancel
-                    let cross = l.cross(self.f);
-                    a * self.r2 - cross.dot(cross)
-                } else {
-                    b * b - a * self.cc
-                };
+                let discriminant = b * b - a * self.cc;
                 (discriminant >= 0.0 && b > 0.0 && (!finite || b < a)) || (finite && end < -slack)
             }
         }
@@ -254,6 +259,11 @@ impl SphereShadow {
         let zero = simd.splat_f32x16(0.0);
         let f = Vec3x16::splat(simd, self.f);
         let b = -f.dot(l);
+        if self.side == Side::Far {
+            let (cross, end) = (l.cross(f), Vec3x16 { x: l.x + f.x, y: l.y + f.y, z: l.z + f.z });
+            let discriminant = a * self.r2 - cross.dot(cross);
+            return (discriminant.simd_ge(zero) & b.simd_gt(zero) & b.simd_lt(a)) | end.dot(end).simd_lt(self.cc);
+        }
         let end = (a - (b + b)) + self.cc;
         let slack = (a + self.ff) * END_SLACK;
         match self.side {
@@ -263,12 +273,7 @@ impl SphereShadow {
                 b.simd_gt(wrong) & end.simd_gt(slack)
             }
             Side::Outside | Side::Far => {
-                let discriminant = if self.side == Side::Far {
-                    let cross = l.cross(f);
-                    a * self.r2 - cross.dot(cross)
-                } else {
-                    b * b - a * self.cc
-                };
+                let discriminant = b * b - a * self.cc;
                 (discriminant.simd_ge(zero) & b.simd_gt(zero) & b.simd_lt(a)) | end.simd_lt(-slack)
             }
         }
@@ -277,6 +282,10 @@ impl SphereShadow {
 
 /// The relative error allowed to |q - c|^2 - r^2 at the end of a shadow ray.
 const END_SLACK: f32 = 16.0 * UNIT_ROUNDOFF;
+
+/// The same for |l + f|^2 near r^2, in r |f|: l and f are each wrong by their rounding, and neither is much longer than the
+/// other where their sum is short. That is 4 r |f| roundings, and what the squares add is less.
+const FAR_END_SLACK: f32 = 16.0 * UNIT_ROUNDOFF;
 
 /// Steps in uv are no longer than this: once around.
 const MAX_STEP: f32 = 1.0;
@@ -308,3 +317,35 @@ fn angles(n: Vec3, dnx: Vec3, dny: Vec3) -> (Vec2, Vec2, Vec2) {
 
 /// Keeps the squared distance from a pole above 0.
 const POLE: f32 = 1e-24;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn from_far_away_a_sphere_still_hides_what_is_inside_of_it() {
+        let (c, r) = (DVec3::new(0.113_931_331, 0.120_853_05, -0.037_770_651), 2.5e-4);
+        let sphere = Sphere { c, r, uv: SphereUv::Angles, single_sided: false };
+        for far in [5.0, 40.0, 400.0, 2000.0] {
+            let p = (c + DVec3::new(0.6, -0.48, 0.64) * (far * r)).as_vec3();
+            let shadow = sphere.shadow(p, ErrorBound::of_rounded(p, DVec3::ZERO));
+            let mut told = [0; 2];
+            for (x, y) in (-12..=12).flat_map(|x| (-12..=12).map(move |y| (f64::from(x), f64::from(y)))) {
+                // Points of a plane through the sphere, across and behind it, nearer to the eye than its middle
+                let q = (c + DVec3::new(0.11 * x + 0.24, 0.08 * y - 0.19, 0.07 * (y - x) + 0.25) * r).as_vec3();
+                let off = (q.as_dvec3() - c).length() / r - 1.0;
+                let blocks = shadow.blocks(q - p, true);
+                // Nearer to the surface than rounding
+                let close = far * 4e-7 + 1e-5;
+                if off < -close {
+                    assert!(blocks, "{off} radii from the surface, {far} radii away");
+                    told[0] += 1;
+                } else if off > close && (q.as_dvec3() - c).dot(p.as_dvec3() - c) > 0.0 {
+                    assert!(!blocks, "{off} radii from the surface, {far} radii away");
+                    told[1] += 1;
+                }
+            }
+            assert!(told.iter().all(|count| *count > 50), "{told:?}");
+        }
+    }
+}

@@ -239,7 +239,7 @@ impl Occluders {
             self.by_parts = true;
             let gathered = dispatch_sixteen!(
                 level,
-                simd => self.gather_trees(simd, scene, target, &shaft, points, indices, cap),
+                simd => self.gather_trees::<_, false>(simd, scene, target, &shaft, points, indices, cap),
                 else {
                     self.by_parts = false;
                     false
@@ -251,7 +251,7 @@ impl Occluders {
 
     #[inline(always)]
     #[allow(clippy::too_many_arguments, reason = "the rest of `gather`")]
-    fn gather_trees<S: Simd>(
+    fn gather_trees<S: Simd, const SAME: bool>(
         &mut self,
         simd: S,
         scene: &Scene,
@@ -263,7 +263,7 @@ impl Occluders {
     ) -> bool {
         let geometry = &*scene.geometry;
         if geometry.world.as_ref().is_some_and(|world| world.shadow != Meets::None)
-            && !self.gather_mesh(simd, geometry, 0, target.light, shaft, cap)
+            && !self.gather_mesh::<S, SAME>(simd, geometry, 0, target.light, shaft, cap)
         {
             return false;
         }
@@ -290,7 +290,7 @@ impl Occluders {
             |center, half| {
                 let shaft = upright.within(center, half);
                 #[inline(always)]
-                move |simd, node: &_| shaft.meet(simd, node)
+                move |simd, node: &_| shaft.meet::<S, SAME>(simd, node)
             },
             |item| {
                 found += 1;
@@ -321,7 +321,7 @@ impl Occluders {
             let source = self.meshes[i];
             let placement = &geometry.placed[source as usize - 1].placement;
             let own = shaft.placed(placement, &target.hull, apart);
-            if !self.gather_mesh(simd, geometry, source, target.light, &own, cap) {
+            if !self.gather_mesh::<S, SAME>(simd, geometry, source, target.light, &own, cap) {
                 return false;
             }
         }
@@ -357,21 +357,21 @@ impl Occluders {
         let shaft = Shaft::of(&points, indices, &target.hull);
         let gathered = dispatch_sixteen!(
             level,
-            simd => self.gather_trees(simd, scene, target, &shaft, &points, indices, cap),
+            simd => self.gather_trees::<_, true>(simd, scene, target, &shaft, &points, indices, cap),
             else {
                 let simd = baseline();
                 simd.vectorize(
                     #[inline(always)]
-                    || self.gather_trees(simd, scene, target, &shaft, &points, indices, cap),
+                    || self.gather_trees::<_, true>(simd, scene, target, &shaft, &points, indices, cap),
                 )
             }
         );
         self.too_many = !gathered;
     }
 
-    /// The leaves of one mesh. Not inlined: one copy for each instruction set is enough.
+    /// The leaves of one mesh. Not inlined: one copy for each instruction set, and for each way to multiply, is enough.
     #[inline(never)]
-    fn gather_mesh<S: Simd>(
+    fn gather_mesh<S: Simd, const SAME: bool>(
         &mut self,
         simd: S,
         geometry: &Geometry,
@@ -390,7 +390,7 @@ impl Occluders {
                     |center, half| {
                         let shaft = shaft.within(center, half);
                         #[inline(always)]
-                        move |simd, node: &_| shaft.meet(simd, node)
+                        move |simd, node: &_| shaft.meet::<S, SAME>(simd, node)
                     },
                     #[inline(always)]
                     |leaf| {

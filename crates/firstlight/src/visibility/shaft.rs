@@ -145,15 +145,20 @@ impl Shaft {
 }
 
 impl TreeShaft {
-    /// The children of a node that the shaft meets: a bit for each, and where they begin.
+    /// The children of a node that the shaft meets: a bit for each, and where they begin. Padding makes up for every rounding,
+    /// so an instruction set that multiplies and adds at once may do so; where `SAME`, none does, and all find the same.
     #[inline(always)]
-    pub fn meet<S: Simd>(&self, simd: S, node: &Node) -> (u32, f32x8<S>) {
+    pub fn meet<S: Simd, const SAME: bool>(&self, simd: S, node: &Node) -> (u32, f32x8<S>) {
         let planes = &node.planes;
+        let line = |planes: &[f32; 8], r: f32, c: f32x8<S>| {
+            let planes = f32x8::load_array_ref(simd, planes);
+            if SAME { planes * r + c } else { planes.mul_add(r, c) }
+        };
         let mut enter = simd.splat_f32x8(0.0);
         let mut leave = simd.splat_f32x8(self.s_max);
         for ([low, high], [low_planes, high_planes]) in self.lines.iter().zip(planes) {
-            let a = f32x8::load_array_ref(simd, high_planes).mul_add(low.r, low.c);
-            let b = f32x8::load_array_ref(simd, low_planes).mul_add(high.r, high.c);
+            let a = line(high_planes, low.r, simd.splat_f32x8(low.c));
+            let b = line(low_planes, high.r, simd.splat_f32x8(high.c));
             // A pattern that seldom changes from node to node
             match (low.enters, high.enters) {
                 (false, true) => (enter, leave) = (enter.max(b), leave.min(a)),
@@ -166,8 +171,7 @@ impl TreeShaft {
         if self.has_horizon {
             let top = |axis: usize| &planes[axis][usize::from(self.n[axis] >= 0.0)];
             let height = f32x8::load_array_ref(simd, top(0)) * self.n.x;
-            let height = f32x8::load_array_ref(simd, top(1)).mul_add(self.n.y, height);
-            let height = f32x8::load_array_ref(simd, top(2)).mul_add(self.n.z, height);
+            let height = line(top(2), self.n.z, line(top(1), self.n.y, height));
             met &= height.simd_ge(self.least);
         }
         (met.to_bitmask() as u32, enter)

@@ -117,7 +117,7 @@ fn a_shaft_leaves_out_no_box_that_a_way_to_the_light_meets() {
         }
         let within = shaft.within(center, half);
         for level in SimdLevel::available() {
-            let met = dispatch_eight!(level.token(), simd => within.meet(simd, &node).0);
+            let met = dispatch_eight!(level.token(), simd => within.meet::<_, false>(simd, &node).0);
             assert_eq!(met & 0x80, 0, "there is nothing there");
             for (i, (low, high)) in boxes.iter().enumerate() {
                 let loose = shaft.meets(*low, *high, f64::from(half) * 1e-6);
