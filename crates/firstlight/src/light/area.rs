@@ -277,6 +277,11 @@ impl Area {
         self.shape.bounds()
     }
 
+    /// Unit normal of the front, where all of it faces one way.
+    pub(crate) fn normal(&self) -> Option<Vec3> {
+        self.n
+    }
+
     /// The sampled points.
     #[inline(always)]
     pub(crate) fn points(&self) -> &Points {

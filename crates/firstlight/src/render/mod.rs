@@ -9,9 +9,11 @@
 //! [`tiled`](tiled/index.html) integrates lights and lights a surface once where that is enough; all else is as above.
 
 mod arrival;
+mod cut;
 mod film;
 mod hits;
 mod lanes;
+mod many;
 mod patch;
 mod pixel;
 mod plain;
@@ -186,10 +188,25 @@ pub struct RenderStats {
     pub occluders: u64,
     /// Shadow rays for which trees were asked all the same.
     pub traced: u64,
+    /// What was done with lights, where they are many and integrated.
+    pub lights: LightCounts,
     /// The instruction set; `Fallback` for the plain renderer.
     pub simd: SimdLevel,
     /// Threads.
     pub threads: usize,
+}
+
+/// Where lights are many: what was done with them.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct LightCounts {
+    /// Pairs of a lit place and a light.
+    pub pairs: u64,
+    /// Those of them where the light was asked for by itself.
+    pub singly: u64,
+    /// Those where it is proved to be seen whole, and was taken for a point, by itself or together with others.
+    pub together: u64,
+    /// How many such points were taken; all other lights were left out, within the stated bound.
+    pub nodes: u64,
 }
 
 /// Counts of one tile.
@@ -200,13 +217,14 @@ pub(crate) struct Counts {
     pub shadow_rays_skipped: u64,
     pub settled: Settled,
     pub closed_form: u64,
+    pub lights: LightCounts,
     /// Shadow rays after which the caller is asked whether to go on.
     next_question: u64,
 }
 
 impl Counts {
-    fn all(&self) -> [u64; 11] {
-        let Counts { camera_rays, shadow_rays, shadow_rays_skipped, settled, closed_form, .. } = *self;
+    fn all(&self) -> [u64; COUNTS] {
+        let Counts { camera_rays, shadow_rays, shadow_rays_skipped, settled, closed_form, lights, .. } = *self;
         let Settled { visibility: [lit, hidden, below, mask], shafts, occluders, traced } = settled;
         [
             camera_rays,
@@ -220,9 +238,16 @@ impl Counts {
             occluders,
             traced,
             closed_form,
+            lights.pairs,
+            lights.singly,
+            lights.together,
+            lights.nodes,
         ]
     }
 }
+
+/// How many numbers [`Counts`] has.
+const COUNTS: usize = 15;
 
 /// Shadow rays between two questions: some hundredths of a second of the fast renderer, some tenths of the plain one.
 const QUESTION_EVERY: u64 = 1 << 23;
@@ -253,7 +278,7 @@ pub fn render(
     };
     let all = window.width as u64 * window.height as u64;
     let (done, stop) = (AtomicU64::new(0), AtomicBool::new(false));
-    let totals = [const { AtomicU64::new(0) }; 11];
+    let totals = [const { AtomicU64::new(0) }; COUNTS];
     let by_shafts = every_ray && !settings.samples_all();
     let targets = if by_shafts { Target::of_all(scene) } else { Vec::new() };
     let level = settings.simd.resolve();
@@ -314,6 +339,10 @@ pub fn render(
         occluders,
         traced,
         closed_form,
+        pairs,
+        singly,
+        together,
+        nodes,
     ] = totals.map(AtomicU64::into_inner);
     let simd = if settings.reference { SimdLevel::Fallback } else { level };
     let visibility = [lit, hidden, below, mask];
@@ -326,6 +355,7 @@ pub fn render(
         shafts,
         occluders,
         traced,
+        lights: LightCounts { pairs, singly, together, nodes },
         simd,
         threads,
     };

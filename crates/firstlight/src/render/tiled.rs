@@ -16,6 +16,7 @@ use std::ops::ControlFlow;
 use super::arrival::{Arrival, Arrivals, Place};
 use super::film::FilmTile;
 use super::hits::PixelHits;
+use super::many::Many;
 use super::patch::{Patch, PixelPatches};
 use super::solo::{self, Candidate, Pyramid};
 use super::tile::Tile;
@@ -27,11 +28,11 @@ use crate::scene::Scene;
 use crate::shape::SurfaceInteraction;
 
 /// In display steps: how much may bend over a patch that is shaded once.
-const BEND: f32 = 0.4;
+pub(super) const BEND: f32 = 0.4;
 /// Pixels across a cell.
 pub(crate) const CELL: u32 = 32;
 /// With its rim.
-const ACROSS: usize = CELL as usize + 2;
+pub(super) const ACROSS: usize = CELL as usize + 2;
 /// Pixels across the blocks that may hold one surface only.
 const BLOCK: i64 = 8;
 /// What light does within a pixel, at most, as a part of its second difference over three: a corner in the middle of
@@ -57,11 +58,14 @@ pub(crate) struct Tiled<'a> {
     values: Vec<Rgb>,
     /// Diffuse and specular of each light at one pixel, in scene order.
     terms: Vec<[Rgb; 2]>,
+    /// In place of the three where lights are many.
+    many: Option<Many<'a>>,
 }
 
 impl<'a> Tiled<'a> {
     pub fn new(scene: &'a Scene, mode: AaMode, hits: PixelHits, arrivals: Arrivals<'a>) -> Self {
         let listed = scene.geometry.listed && !scene.geometry.has_trees();
+        let many = arrivals.tree().map(|tree| Many::new(scene, tree));
         Tiled {
             scene,
             mode,
@@ -73,7 +77,8 @@ impl<'a> Tiled<'a> {
             first: vec![0; ACROSS * ACROSS],
             arrived: Vec::new(),
             values: Vec::new(),
-            terms: vec![[Rgb::BLACK; 2]; scene.lights.len()],
+            terms: Vec::new(),
+            many,
         }
     }
 
@@ -107,16 +112,20 @@ impl<'a> Tiled<'a> {
         let lights = scene.lights.len();
         self.arrived.clear();
         self.values.clear();
-        for (index, pixel) in pixels.iter().enumerate() {
-            if index % ACROSS == 0 {
-                go_on()?;
+        if let Some(many) = &mut self.many {
+            many.look(&pixels, &mut self.first, &mut self.arrivals, counts, go_on)?;
+        } else {
+            for (index, pixel) in pixels.iter().enumerate() {
+                if index % ACROSS == 0 {
+                    go_on()?;
+                }
+                self.first[index] = self.values.len();
+                for patch in &pixel.patches {
+                    self.once(patch, counts);
+                }
             }
-            self.first[index] = self.values.len();
-            for patch in &pixel.patches {
-                self.once(patch, counts);
-            }
+            debug_assert_eq!(self.arrived.len(), self.values.len() * lights);
         }
-        debug_assert_eq!(self.arrived.len(), self.values.len() * lights);
         for y in 0..CELL {
             for x in 0..CELL {
                 let [i, j] = [corner[0] + x, corner[1] + y];
@@ -218,21 +227,17 @@ impl<'a> Tiled<'a> {
         let rays = scene.antialiasing * scene.antialiasing;
         counts.camera_rays += rays as u64;
         let pixel = &pixels[index];
-        self.terms.fill([Rgb::BLACK; 2]);
+        self.terms.clear();
         let mut ambient = Rgb::BLACK;
-        for (k, patch) in pixel.patches.iter().enumerate() {
-            let count = patch.count(scene);
-            ambient += scene.ambient * patch.bsdf.ambient * count as f32;
-            for light in 0..scene.lights.len() {
-                if self.is_enough(pixels, index, k, light) {
-                    let arrived = self.arrived[(self.first[index] + k) * scene.lights.len() + light];
-                    let (scale, sums) = (self.arrivals.scale(light) * count as f32, arrived.sums);
-                    self.terms[light][0] += scale * patch.bsdf.diffuse * sums.diffuse;
-                    self.terms[light][1] += scale * patch.bsdf.specular * sums.specular;
-                } else {
-                    patch.for_each(scene, at, |si, bsdf| self.at_ray(light, si, bsdf, counts));
-                }
-            }
+        for patch in &pixel.patches {
+            ambient += scene.ambient * patch.bsdf.ambient * patch.count(scene) as f32;
+        }
+        if let Some(many) = &mut self.many {
+            let terms = &mut self.terms;
+            many.finish(pixels, &self.first, index, at, &mut self.arrivals, counts, |term| terms.push(term));
+        } else {
+            self.terms.resize(scene.lights.len(), [Rgb::BLACK; 2]);
+            self.light_by_light(pixels, index, at, counts);
         }
         // The sum in its one order
         let mean = |sum: Rgb| Rgb::new(sum.r / rays as f32, sum.g / rays as f32, sum.b / rays as f32);
@@ -246,6 +251,24 @@ impl<'a> Tiled<'a> {
         }
         let alpha = if scene.transparent { 1.0 - uncovered } else { 1.0 };
         [color.r, color.g, color.b, alpha]
+    }
+
+    /// Adds what all lights send to a pixel, each for itself.
+    fn light_by_light(&mut self, pixels: &[PixelPatches], index: usize, at: [u32; 2], counts: &mut Counts) {
+        let scene = self.scene;
+        for (k, patch) in pixels[index].patches.iter().enumerate() {
+            let count = patch.count(scene);
+            for light in 0..scene.lights.len() {
+                if self.is_enough(pixels, index, k, light) {
+                    let arrived = self.arrived[(self.first[index] + k) * scene.lights.len() + light];
+                    let (scale, sums) = (self.arrivals.scale(light) * count as f32, arrived.sums);
+                    self.terms[light][0] += scale * patch.bsdf.diffuse * sums.diffuse;
+                    self.terms[light][1] += scale * patch.bsdf.specular * sums.specular;
+                } else {
+                    patch.for_each(scene, at, |si, bsdf| self.at_ray(light, si, bsdf, counts));
+                }
+            }
+        }
     }
 
     /// Whether what arrives of a light at the middle of a patch will do for all of it.
@@ -270,25 +293,8 @@ impl<'a> Tiled<'a> {
         if !here.resolved || !patch.is_whole(scene) {
             return false;
         }
-        let mut bend = Sums::default();
-        for step in [1, ACROSS] {
-            let neighbours = [index - step, index + step];
-            let same = |i: &usize| {
-                let patches = &pixels[*i].patches;
-                patches.len() == 1
-                    && patches[0].is_whole(scene)
-                    && patches[0].si.surface == patch.si.surface
-                    && patches[0].bsdf.lobe == patch.bsdf.lobe
-            };
-            if !neighbours.iter().all(same) {
-                return false;
-            }
-            let [before, after] = neighbours.map(|i| arrived(i).sums);
-            let second = |a: f32, b: f32, c: f32| (a - b + (c - b)).abs() * WITHIN;
-            bend.diffuse += second(before.diffuse, here.sums.diffuse, after.diffuse);
-            bend.specular += second(before.specular, here.sums.specular, after.specular);
-        }
-        !shows(&bend)
+        let arrived = |index: usize| Some(arrived(index).sums);
+        second_difference(scene, pixels, index, patch, &here.sums, arrived).is_some_and(|bend| !shows(&bend))
     }
 
     /// Adds what one light sends to where one camera ray ends.
@@ -302,4 +308,35 @@ impl<'a> Tiled<'a> {
         self.terms[index][0] += colors[0] * sums.diffuse;
         self.terms[index][1] += colors[1] * sums.specular;
     }
+}
+
+/// How far what light does within a pixel can make its mean another, by what arrives `here` and at the neighbours, as `arrived` says;
+/// `None` where those tell nothing.
+pub(super) fn second_difference(
+    scene: &Scene,
+    pixels: &[PixelPatches],
+    index: usize,
+    patch: &Patch,
+    here: &Sums,
+    arrived: impl Fn(usize) -> Option<Sums>,
+) -> Option<Sums> {
+    let mut bend = Sums::default();
+    for step in [1, ACROSS] {
+        let neighbours = [index - step, index + step];
+        let same = |i: &usize| {
+            let patches = &pixels[*i].patches;
+            patches.len() == 1
+                && patches[0].is_whole(scene)
+                && patches[0].si.surface == patch.si.surface
+                && patches[0].bsdf.lobe == patch.bsdf.lobe
+        };
+        if !neighbours.iter().all(same) {
+            return None;
+        }
+        let (before, after) = (arrived(neighbours[0])?, arrived(neighbours[1])?);
+        let second = |a: f32, b: f32, c: f32| (a - b + (c - b)).abs() * WITHIN;
+        bend.diffuse += second(before.diffuse, here.diffuse, after.diffuse);
+        bend.specular += second(before.specular, here.specular, after.specular);
+    }
+    Some(bend)
 }
