@@ -9,7 +9,7 @@ use std::time::Instant;
 use firstlight::{
     AaMode, BlinnPhongDesc, CameraDesc, ColorDesc, ColorParam, CompileOptions, EmitSides, LightDesc, MaterialDesc,
     NoAssets, NumberParam, ParallelogramDesc, PointDesc, RectangleDesc, RenderSettings, SamplesDesc, SceneDesc,
-    ShapeDesc, SphereDesc, SphereLightDesc, SpotDesc, VisibilityMode, render,
+    ShapeDesc, SphereDesc, SphereLightDesc, SpotDesc, VisibilityMode, Window, render,
 };
 
 use crate::scenes::{self, Random};
@@ -39,6 +39,9 @@ pub struct Options {
     /// Asks for every light at every ray as well, and compares.
     #[arg(long)]
     all: bool,
+    /// Renders only a square of so many pixels in the middle.
+    #[arg(long)]
+    part: Option<u32>,
     /// Writes the scene there, and measures nothing.
     #[arg(long)]
     write: Option<PathBuf>,
@@ -53,7 +56,16 @@ pub fn run(options: &Options) -> Outcome {
     let compiled = desc.compile(&NoAssets, &CompileOptions::default()).map_err(|e| e.to_string())?;
     let scene = compiled.scene;
     println!("{} lights: compiled in {:.2} s", options.lights, start.elapsed().as_secs_f64());
-    let fast = RenderSettings { threads: Some(options.threads), aa_mode: AaMode::Adaptive, ..RenderSettings::default() };
+    let crop = options.part.map(|part| {
+        let from = options.size.saturating_sub(part) / 2;
+        Window { x: from, y: from, width: part.min(options.size), height: part.min(options.size) }
+    });
+    let fast = RenderSettings {
+        threads: Some(options.threads),
+        aa_mode: AaMode::Adaptive,
+        crop,
+        ..RenderSettings::default()
+    };
     let picture = |settings: &RenderSettings| {
         let start = Instant::now();
         let ControlFlow::Continue((film, stats)) = render(&scene, settings, &|_, _| ControlFlow::Continue(())) else {

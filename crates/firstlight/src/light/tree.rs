@@ -1,10 +1,11 @@
 //! A tree over the lights of a scene. A node knows what its lights send together, and how far it can be wrong to take them
 //! for one.
 //!
-//! The lights of a node are taken for one that stands, for each channel of colour, in the middle of their power. What they
-//! send differs from that by the second order of their distance from that middle: half the power-weighted sum of its squares,
-//! times the largest second derivative between them. Of the light of a point, cos / d^2, and that of a flat light,
-//! cos cos' / d^2, no second derivative is above 6 / d^4; of cos alone, none is above 1.16 / d^2.
+//! The lights of a node are taken for one that stands, for each channel of colour, in the middle of their power, and how they
+//! are spread around it is counted to the second order of Taylor's series. What diffuse light differs from that is of the third: a
+//! sixth of the power-weighted sum of the cubes of their distances from the middle, times the largest third derivative
+//! between them. Of the light of a point, cos / d^2, and that of a flat light, cos cos' / d^2, no third derivative is above
+//! 24 / d^5; of cos alone, none is above 4 / d^3. Highlights are counted to the first order.
 //!
 //! Nothing here depends on the camera: what a node stands for is settled when the tree is built.
 
@@ -12,7 +13,7 @@ use super::bound::{MOST, Sends, Shine, Sight};
 use super::{AreaShape, Light, LightKind};
 use crate::color::Rgb;
 use crate::material::Lobe;
-use crate::math::Vec3;
+use crate::math::{DVec3, Vec3};
 
 /// All lights of a scene, in a tree for each way of sending light.
 #[derive(Debug)]
@@ -36,8 +37,13 @@ pub(crate) struct LightNode {
     facing: [Vec3; 3],
     /// Whether all channels have the same `middle` and `facing`.
     gray: bool,
+    /// For each channel, the mean of the products of coordinates of the lights from its middle, in square metres, weighted by power,
+    /// the lights' own extent included: xx, yy, zz, xy, yz, zx.
+    square: [[f32; 6]; 3],
     /// For each channel, the sum of power x distance^2 from its middle, the lights' own extent included.
     spread: Rgb,
+    /// The same of distance^3.
+    cubes: Rgb,
     /// For each channel, the sum of power x distance x difference from `facing`.
     cross: Rgb,
     /// Whether things can stand in the way of all of them.
@@ -56,10 +62,12 @@ pub(crate) enum Held {
 /// What arrives of a node, in colour, before the colours of the surface: diffuse and specular.
 pub(crate) type Sent = [Rgb; 2];
 
-/// No second derivative of cos / d^2 is above this over d^4, nor one of cos cos' / d^2.
+/// No second derivative of 1 / d^2 is above this over d^4, nor one of cos' / d^2.
 const CURVE: f32 = 6.0;
-/// Nor one of cos above this over d^2.
-const CURVE_EVEN: f32 = 1.16;
+/// No third derivative of cos / d^2 is above this over d^5, nor one of cos cos' / d^2.
+const TWIST: f32 = 24.0;
+/// Nor one of cos above this over d^3.
+const TWIST_EVEN: f32 = 4.0;
 
 /// One light while the tree is built.
 struct Seed {
@@ -134,26 +142,37 @@ struct Source {
     power: Rgb,
     at: Vec3,
     n: Vec3,
-    /// Its own mean square distance from its middle, in square metres.
-    own: f32,
+    /// The mean of the products of coordinates of its own points, from its middle.
+    own: [f64; 6],
+    /// How far they are from there, at most.
+    reach: f64,
     shadows: bool,
 }
 
 impl Source {
     fn of(_: u32, light: &Light, shine: Shine) -> Source {
         let (_, strength) = Shine::of(light);
-        let own = match &light.kind {
+        let product = |v: DVec3| [v.x * v.x, v.y * v.y, v.z * v.z, v.x * v.y, v.y * v.z, v.z * v.x];
+        let sum = |a: DVec3, b: DVec3, factor: f64| {
+            let (a, b) = (product(a), product(b));
+            std::array::from_fn(|i| (a[i] + b[i]) * factor)
+        };
+        let (own, reach) = match &light.kind {
             LightKind::Area(area) => match &area.shape {
-                AreaShape::Rectangle(r) => (r.e0.length_squared() + r.e1.length_squared()) / 12.0,
-                AreaShape::Disk(disk) => disk.radius * disk.radius * 0.5,
-                AreaShape::Sphere(sphere) if area.physical => sphere.radius * sphere.radius * 0.5,
-                AreaShape::Sphere(sphere) => sphere.radius * sphere.radius,
+                AreaShape::Rectangle(r) => (sum(r.e0, r.e1, 1.0 / 12.0), 0.5 * (r.e0.length() + r.e1.length())),
+                AreaShape::Disk(disk) => (sum(disk.a, disk.b, 0.25), disk.radius),
+                // From outside its light is that of a point
+                AreaShape::Sphere(sphere) if area.physical => ([0.0; 6], sphere.radius),
+                AreaShape::Sphere(sphere) => {
+                    let third = sphere.radius * sphere.radius / 3.0;
+                    ([third, third, third, 0.0, 0.0, 0.0], sphere.radius)
+                }
             },
-            LightKind::Point(_) | LightKind::Directional(_) | LightKind::Spot(_) => 0.0,
+            LightKind::Point(_) | LightKind::Directional(_) | LightKind::Spot(_) => ([0.0; 6], 0.0),
         };
         let at = if shine.sends == Sends::Parallel { shine.low } else { shine.ball().0 };
         let power = light.intensity * strength;
-        Source { power, at, n: shine.axis, own: own as f32 * 1.0001, shadows: light.shadows }
+        Source { power, at, n: shine.axis, own, reach, shadows: light.shadows }
     }
 }
 
@@ -165,11 +184,12 @@ fn channels(color: Rgb) -> [f32; 3] {
 impl LightNode {
     fn of(shine: Shine, held: Held, sources: &[Source]) -> LightNode {
         let (mut middle, mut facing) = ([Vec3::ZERO; 3], [Vec3::ZERO; 3]);
-        let (mut power, mut spread, mut cross) = ([0.0f32; 3], [0.0f32; 3], [0.0f32; 3]);
+        let (mut power, mut spread, mut cubes, mut cross) = ([0.0f32; 3], [0.0f32; 3], [0.0f32; 3], [0.0f32; 3]);
+        let mut square = [[0.0f32; 6]; 3];
         for channel in 0..3 {
             // In f64: a hundred thousand lights far from the origin
             let mut sum = 0.0f64;
-            let (mut at, mut n) = (crate::math::DVec3::ZERO, crate::math::DVec3::ZERO);
+            let (mut at, mut n) = (DVec3::ZERO, DVec3::ZERO);
             for source in sources {
                 let p = f64::from(channels(source.power)[channel]);
                 sum += p;
@@ -182,22 +202,32 @@ impl LightNode {
             }
             (middle[channel], facing[channel]) = ((at / sum).as_vec3(), (n / sum).as_vec3());
             power[channel] = sum as f32;
-            let (mut s, mut c) = (0.0f64, 0.0f64);
+            let (mut two, mut three, mut c, mut products) = (0.0f64, 0.0f64, 0.0f64, [0.0f64; 6]);
             for source in sources {
                 let p = f64::from(channels(source.power)[channel]);
-                let off2 = f64::from((source.at - middle[channel]).length_squared() + source.own);
-                s += p * off2;
-                c += p * off2.sqrt() * f64::from((source.n - facing[channel]).length());
+                let v = (source.at - middle[channel]).as_dvec3();
+                let own = [v.x * v.x, v.y * v.y, v.z * v.z, v.x * v.y, v.y * v.z, v.z * v.x];
+                for i in 0..6 {
+                    products[i] += p * (own[i] + source.own[i]);
+                }
+                let far = v.length() + source.reach;
+                two += p * far * far;
+                three += p * far * far * far;
+                c += p * far * f64::from((source.n - facing[channel]).length());
             }
+            square[channel] = products.map(|v| (v / sum) as f32);
             // Positions are rounded
-            let rounding = f64::from(middle[channel].abs().max_element() * 1e-6);
-            spread[channel] = (s * 1.001 + if sources.len() > 1 { sum * rounding * rounding } else { 0.0 }) as f32;
+            let rounding = if sources.len() > 1 { f64::from(middle[channel].abs().max_element() * 1e-6) } else { 0.0 };
+            spread[channel] = (two * 1.001 + sum * rounding * rounding) as f32;
+            cubes[channel] = (three * 1.001 + sum * rounding * rounding * rounding) as f32;
             cross[channel] = if shine.sends == Sends::Flat && sources.len() > 1 { (c * 1.001) as f32 } else { 0.0 };
         }
-        let gray = sources.len() == 1 || {
-            let near = |a: Vec3, b: Vec3| a == b;
-            near(middle[0], middle[1]) && near(middle[1], middle[2]) && facing[0] == facing[1] && facing[1] == facing[2]
-        };
+        // Of one colour: what is left is rounding
+        let size = (shine.high - shine.low).length();
+        let near = |a: Vec3, b: Vec3, size: f32| (a - b).length() <= size * 1e-6;
+        let gray = (1..3).all(|i| {
+            power[i] == 0.0 || near(middle[i], middle[0], size) && near(facing[i], facing[0], 1.0)
+        }) && power[0] > 0.0;
         let rgb = |v: [f32; 3]| Rgb::new(v[0], v[1], v[2]);
         LightNode {
             shine,
@@ -207,7 +237,9 @@ impl LightNode {
             middle,
             facing,
             gray,
+            square,
             spread: rgb(spread),
+            cubes: rgb(cubes),
             cross: rgb(cross),
             shadows: sources.iter().all(|source| source.shadows),
         }
@@ -222,6 +254,11 @@ impl LightNode {
                 Held::Two([left, _]) => held = tree.nodes[left as usize].held,
             }
         }
+    }
+
+    /// Whether it has no extent.
+    pub fn is_point(&self) -> bool {
+        self.shine.low == self.shine.high
     }
 
     /// Whether its lights can be taken for one, where a zone sees them whole.
@@ -245,19 +282,19 @@ impl LightNode {
         let two = one * one;
         let glint = sight.highlight;
         let (diffuse, specular, crossed) = if self.shine.constant {
-            (0.5 * CURVE_EVEN * two, 0.5 * glint.curve * two, [0.0; 2])
+            (TWIST_EVEN / 6.0 * two * one, 0.5 * glint.curve * two, [0.0; 2])
         } else {
             let curve = CURVE * glint.most + 4.0 * glint.slope + glint.curve;
             let crossed = [3.0, 3.0 * glint.most + glint.slope].map(|c| c * two * one);
-            (0.5 * CURVE * two * two, 0.5 * curve * two * two, crossed)
+            (TWIST / 6.0 * two * two * one, 0.5 * curve * two * two, crossed)
         };
-        let of = |factor: f32, crossed: f32, most: Rgb| {
-            let error = self.spread * factor + self.cross * crossed;
+        let of = |spread: Rgb, factor: f32, crossed: f32, most: Rgb| {
+            let error = spread * factor + self.cross * crossed;
             // No number is no bound
             let least = |error: f32, most: f32| if error < most { error } else { most };
             Rgb::new(least(error.r, most.r), least(error.g, most.g), least(error.b, most.b))
         };
-        [of(diffuse, crossed[0], most[0]), of(specular, crossed[1], most[1])]
+        [of(self.cubes, diffuse, crossed[0], most[0]), of(self.spread, specular, crossed[1], most[1])]
     }
 
     /// What its lights, taken for one, send to a place that sees all of them whole.
@@ -277,18 +314,35 @@ impl LightNode {
     fn send_channel(&self, channel: usize, p: Vec3, ns: Vec3, wo: Vec3, lobe: &Lobe) -> [f32; 2] {
         let middle = self.middle[channel];
         let l = if self.shine.sends == Sends::Parallel { middle } else { middle - p };
-        let inverse = 1.0 / l.length().max(f32::MIN_POSITIVE);
-        let weight = match self.shine.sends {
-            _ if self.shine.constant => 1.0,
-            Sends::Flat => (-self.facing[channel].dot(l)).max(0.0) * (inverse * inverse * inverse),
-            _ => inverse * inverse,
+        let one = 1.0 / l.length().max(f32::MIN_POSITIVE);
+        let d = l * one;
+        let (cos, facing) = (ns.dot(d), self.facing[channel]);
+        // The second derivatives, contracted with how the lights are spread
+        let [xx, yy, zz, xy, yz, zx] = self.square[channel];
+        let times = |v: Vec3| {
+            Vec3::new(xx * v.x + xy * v.y + zx * v.z, xy * v.x + yy * v.y + yz * v.z, zx * v.x + yz * v.y + zz * v.z)
         };
-        let cos_i = (ns.dot(l) * inverse).max(0.0);
+        let (along, trace) = (times(d), xx + yy + zz);
+        let (across, deep) = (ns.dot(along), d.dot(along));
+        let two = one * one;
+        let (weight, diffuse) = match self.shine.sends {
+            // cos
+            _ if self.shine.constant => (1.0, cos + two * (cos * (1.5 * deep - 0.5 * trace) - across)),
+            // cos cos' / d^2
+            Sends::Flat => {
+                let out = -facing.dot(d);
+                let (across_out, both) = (-facing.dot(along), -ns.dot(times(facing)));
+                let second = both - 4.0 * (cos * across_out + out * across) + cos * out * (12.0 * deep - 2.0 * trace);
+                (out.max(0.0) * two, (cos * out + two * second) * two)
+            }
+            // cos / d^2
+            _ => (two, (cos + two * (cos * (7.5 * deep - 1.5 * trace) - 3.0 * across)) * two),
+        };
         let specular = match lobe {
             Lobe::None => 0.0,
-            lobe => lobe.eval(cos_i, ns.dot(wo), wo.dot(l) * inverse),
+            lobe => weight * lobe.eval(cos.max(0.0), ns.dot(wo), wo.dot(d)),
         };
-        [weight * cos_i, weight * specular]
+        [diffuse.max(0.0), specular]
     }
 
     /// What a light of strength 1 in its middle sends, before the cosine at the surface.
@@ -305,5 +359,256 @@ impl LightNode {
     #[inline(always)]
     pub fn distance(&self, p: Vec3) -> f32 {
         if self.shine.sends == Sends::Parallel { f32::INFINITY } else { (self.middle[0] - p).length() }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::bound::Sends;
+    use super::super::{Area, AreaShape, Falloff, Light, LightDesc, PointDesc, RectangleDesc, SphereLightDesc, SpotDesc, Zone};
+    use super::*;
+    use crate::context::CompileContext;
+    use crate::describe::{ColorDesc, SamplesDesc};
+    use crate::material::{BlinnPhongLobe, PhongLobe};
+    use crate::math::Arc;
+
+    /// The same numbers for the same seed.
+    struct Random(u64);
+
+    impl Random {
+        fn next(&mut self) -> f64 {
+            self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (self.0 >> 11) as f64 / (1u64 << 53) as f64
+        }
+
+        fn between(&mut self, low: f64, high: f64) -> f64 {
+            low + (high - low) * self.next()
+        }
+
+        fn direction(&mut self) -> Vec3 {
+            loop {
+                let v = DVec3::new(self.between(-1.0, 1.0), self.between(-1.0, 1.0), self.between(-1.0, 1.0));
+                if v.length() > 0.1 && v.length() < 1.0 {
+                    return v.normalize().as_vec3();
+                }
+            }
+        }
+    }
+
+    fn compiled(desc: &LightDesc) -> Light {
+        let cx = &mut CompileContext::default();
+        let light = match desc {
+            LightDesc::Point(light) => light.compile(cx),
+            LightDesc::Directional(light) => light.compile(cx),
+            LightDesc::Spot(light) => light.compile(cx),
+            LightDesc::Rectangle(light) => light.compile(cx, SamplesDesc::Exact),
+            LightDesc::Disk(light) => light.compile(cx, SamplesDesc::Exact),
+            LightDesc::Sphere(light) => light.compile(cx, SamplesDesc::Exact),
+        };
+        assert!(!cx.has_errors());
+        light
+    }
+
+    /// Some lights of one kind in a ball.
+    fn lights(random: &mut Random, kind: u32, count: u32, size: f64) -> Vec<Light> {
+        let falloff = if kind % 2 == 0 { Falloff::Physical } else { Falloff::Constant };
+        let (front, wild) = (random.direction().as_dvec3(), random.between(0.0, 1.0));
+        (0..count)
+            .map(|_| {
+                let at = (random.direction().as_dvec3() * size * random.next()).to_array();
+                let color = ColorDesc::linear(random.next(), random.next(), random.next());
+                let aim = (front + random.direction().as_dvec3() * wild).normalize();
+                let reach = size * random.between(0.001, 0.2);
+                let desc = match kind / 2 {
+                    0 => LightDesc::Point(PointDesc { color, falloff, ..PointDesc::new(at) }),
+                    1 => LightDesc::Spot(SpotDesc {
+                        look_at: (DVec3::from(at) + aim).to_array(),
+                        cone_deg: random.between(1.0, 180.0),
+                        inner_cone_deg: Some(0.5),
+                        color,
+                        falloff,
+                        ..SpotDesc::new(at)
+                    }),
+                    2 => LightDesc::Sphere(SphereLightDesc { color, falloff, ..SphereLightDesc::new(at, reach) }),
+                    _ => {
+                        let side = aim.any_orthonormal_vector();
+                        let (e0, e1) = (side * reach, aim.cross(side) * reach);
+                        LightDesc::Rectangle(RectangleDesc {
+                            color,
+                            falloff,
+                            ..RectangleDesc::new(at, e0.to_array(), e1.to_array())
+                        })
+                    }
+                };
+                compiled(&desc)
+            })
+            .collect()
+    }
+
+    fn lobe(random: &mut Random) -> Lobe {
+        let shininess = (random.between(0.0, 5.0) * random.between(0.0, 5.0) * random.between(1.0, 20.0)) as f32;
+        match (random.next() * 3.0) as u32 {
+            0 => Lobe::None,
+            1 => Lobe::Phong(PhongLobe::new(shininess)),
+            _ => Lobe::BlinnPhong(BlinnPhongLobe::new(shininess)),
+        }
+    }
+
+    /// What one light sends, point by point of it: the definition.
+    fn truth(light: &Light, p: Vec3, ns: Vec3, wo: Vec3, lobe: &Lobe) -> [[f64; 3]; 2] {
+        let count = light.samples().min(1024);
+        let mut sums = [0.0f64; 2];
+        for k in 0..count {
+            let l = light.towards(k, p).l;
+            let height = ns.dot(l);
+            let Some(sample) = light.sample(k, l).filter(|_| height > 0.0) else { continue };
+            let cos_i = height * sample.inverse_distance;
+            sums[0] += f64::from(cos_i * sample.weight);
+            let specular = lobe.eval(cos_i, ns.dot(wo), wo.dot(l) * sample.inverse_distance);
+            sums[1] += f64::from(specular * sample.weight);
+        }
+        let measure = match &light.kind {
+            LightKind::Area(Area { shape, physical: true, .. }) => shape.measure(),
+            _ => 1.0,
+        };
+        let own = sums.map(|sum| sum * measure / count as f64);
+        own.map(|sum| channels(light.intensity).map(|c| f64::from(c) * sum))
+    }
+
+    #[test]
+    fn no_bound_is_broken() {
+        let mut random = Random(5);
+        let (mut smooth, mut told) = (0, 0);
+        for round in 0..600 {
+            let kind = round % 8;
+            let size = random.between(0.01, 1.0);
+            let some = 1 + (random.next() * 8.0) as u32;
+            let lights = lights(&mut random, kind, some, size);
+            let tree = LightTree::new(&lights);
+            // A zone somewhere around
+            let distance = random.between(0.3, 8.0) as f32;
+            let center = random.direction() * distance;
+            let n = random.direction();
+            let n = if n.dot(center) > 0.0 { -n } else { n };
+            let reach = random.between(0.0, 0.3) as f32 * random.next() as f32;
+            let turn = random.between(0.0, 0.4) as f32 * random.next() as f32;
+            let wo = (n + random.direction() * 0.9).normalize();
+            let mirror = n * (2.0 * n.dot(wo)) - wo;
+            let lobe = lobe(&mut random);
+            let zone = Zone {
+                center,
+                reach,
+                n,
+                turn: Arc::of_chord(turn),
+                mirror,
+                blur: Arc::of_chord(3.0 * turn),
+                wo,
+                wo_turn: Arc::of_chord(turn),
+                lobe,
+            };
+            for _ in 0..4 {
+                let p = center + random.direction() * (reach * random.next() as f32);
+                let ns = (n + random.direction() * (turn * 0.4)).normalize();
+                let wo = (wo + random.direction() * (turn * 0.4)).normalize();
+                if ns.dot(wo) <= 0.0 {
+                    continue;
+                }
+                for node in &tree.nodes {
+                    let sight = node.shine.sight(&zone);
+                    let mut held = Vec::new();
+                    let mut open = vec![node.held];
+                    while let Some(one) = open.pop() {
+                        match one {
+                            Held::Light(light) => held.push(light),
+                            Held::Two(two) => open.extend(two.map(|node| tree.nodes[node as usize].held)),
+                        }
+                    }
+                    let mut sum = [[0.0f64; 3]; 2];
+                    for light in held {
+                        let one = truth(&lights[light as usize], p, ns, wo, &lobe);
+                        for (sum, one) in sum.iter_mut().flatten().zip(one.iter().flatten()) {
+                            *sum += one;
+                        }
+                    }
+                    let flat = |sent: Sent| sent.map(|color| channels(color).map(f64::from));
+                    let most = flat(node.most(&sight));
+                    for (sum, most) in sum.iter().flatten().zip(most.iter().flatten()) {
+                        assert!(*sum <= most * 1.001 + 1e-12, "{round}: {sum} is more than {most}, {node:?}");
+                    }
+                    if !(sight.whole && node.is_smooth()) || sight.weight == 0.0 {
+                        continue;
+                    }
+                    smooth += 1;
+                    let (sent, error) = (flat(node.send(p, ns, wo, &lobe)), flat(node.error(&sight)));
+                    let power = f64::from(node.power.r + node.power.g + node.power.b);
+                    for ((sum, sent), (error, most)) in
+                        sum.iter().flatten().zip(sent.iter().flatten()).zip(error.iter().flatten().zip(most.iter().flatten()))
+                    {
+                        told += u32::from(*error < 0.1 * most);
+                        // The points that stand for the truth are few
+                        let noise = if kind >= 4 { 5e-3 * sum } else { 1e-5 * sum } + 1e-9 * power;
+                        assert!(
+                            (sum - sent).abs() <= error + noise,
+                            "{round}: {sent} is not {sum}, by more than {error}, {node:?}"
+                        );
+                    }
+                    assert!(f64::from(sight.least) <= f64::from(sight.diffuse));
+                }
+            }
+        }
+        assert!(smooth > 1000 && told > 2000, "{smooth} {told}");
+    }
+
+    #[test]
+    fn lights_are_all_there_once() {
+        let mut random = Random(9);
+        let mut all = Vec::new();
+        for kind in 0..8 {
+            all.extend(lights(&mut random, kind, 50, 1.0));
+        }
+        let tree = LightTree::new(&all);
+        let mut seen = vec![0; all.len()];
+        let mut open = tree.roots.clone();
+        while let Some(node) = open.pop() {
+            match tree.nodes[node as usize].held {
+                Held::Light(light) => seen[light as usize] += 1,
+                Held::Two(two) => open.extend(two),
+            }
+        }
+        assert!(seen.iter().all(|times| *times == 1));
+        assert!(tree.nodes.iter().any(|node| node.shine.sends == Sends::Flat && node.count > 1));
+    }
+
+    #[test]
+    fn third_derivatives_are_bounded() {
+        // Along all lines through points at distance 1, by differences in f64
+        let mut random = Random(3);
+        let mut most = [0.0f64; 3];
+        for _ in 0..20000 {
+            let [l, n, m, u] = [0; 4].map(|_| random.direction().as_dvec3());
+            let kernels: [&dyn Fn(DVec3) -> f64; 3] = [
+                &|l| n.dot(l) / (l.length_squared() * l.length()),
+                &|l| n.dot(l) * m.dot(l) / (l.length_squared() * l.length_squared()),
+                &|l| n.dot(l) / l.length(),
+            ];
+            let h = 1e-3;
+            for (most, f) in most.iter_mut().zip(kernels) {
+                let third = (f(l + u * 2.0 * h) - 2.0 * f(l + u * h) + 2.0 * f(l - u * h) - f(l - u * 2.0 * h))
+                    / (2.0 * h * h * h);
+                *most = most.max(third.abs());
+            }
+        }
+        assert!(most[0] <= f64::from(TWIST) && most[1] <= f64::from(TWIST) && most[2] <= f64::from(TWIST_EVEN), "{most:?}");
+        assert!(most[0] > 20.0, "{most:?}");
+    }
+
+    #[test]
+    fn a_sphere_is_its_shape() {
+        let light = compiled(&LightDesc::Sphere(SphereLightDesc::new([0.0; 3], 0.5)));
+        let LightKind::Area(area) = &light.kind else { panic!("a sphere has an area") };
+        assert!(matches!(area.shape, AreaShape::Sphere(_)));
+        let (shine, strength) = Shine::of(&light);
+        assert_eq!(shine.sends, Sends::Round);
+        assert!((strength - std::f32::consts::PI * 0.25).abs() < 1e-6);
     }
 }

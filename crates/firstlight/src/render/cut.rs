@@ -3,7 +3,7 @@
 //! The walk begins with all lights and takes the worst node apart, again and again, until what is left out and what is taken
 //! for one can together be wrong by no more than is allowed. Two walks, one after the other: for a block of pixels
 //! ([`Cut::of_block`]), which settles what is the same for all its places, then for each patch ([`Cut::of_patch`]), with what
-//! the first left open.
+//! the first left open. The first guesses how bright the block is; whether its error does at each patch is known after the second.
 
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
@@ -29,10 +29,11 @@ struct Item {
     node: u32,
     /// How far it can be wrong to take it as it is.
     error: Sent,
-    /// What it sends at least.
-    least: f32,
+    /// What it sends, thereabouts; 0 where that is not known to arrive.
+    typical: f32,
     /// Whether it is seen whole.
     lit: bool,
+    sight: Sight,
 }
 
 impl PartialEq for Item {
@@ -62,7 +63,7 @@ pub(super) struct Cut {
     heap: BinaryHeap<Item>,
     /// The sum of all errors in question, kept up to date roughly.
     error: [[f64; 3]; 2],
-    /// What is sent at least by what is seen whole.
+    /// What is sent, thereabouts, by what is seen whole, and a part of what may be.
     known: [f64; 3],
     /// Nodes that are seen whole and taken for one.
     pub lit: Vec<u32>,
@@ -87,6 +88,8 @@ pub(super) struct Walk<'a> {
 const WORTH: f32 = 0.25;
 /// Nodes wider than this sine are not.
 const WIDE: f32 = 0.7;
+/// The part of what nothing is known of that is guessed to arrive.
+const MAYBE: f32 = 0.3;
 /// Steps between two exact sums of what is in question.
 const AGAIN: u32 = 32;
 
@@ -98,6 +101,11 @@ fn add(sum: &mut [f64; 3], color: Rgb, sign: f64) {
 
 fn color([r, g, b]: &[f64; 3]) -> Rgb {
     Rgb::new(r.max(0.0) as f32, g.max(0.0) as f32, b.max(0.0) as f32)
+}
+
+/// What a node of power 1 sends to a place of a zone that sees it whole, thereabouts.
+fn typical(sight: &Sight) -> f32 {
+    0.5 * (sight.least + sight.diffuse)
 }
 
 impl Walk<'_> {
@@ -120,7 +128,7 @@ impl Walk<'_> {
         if key == 0.0 && !lit {
             return None;
         }
-        Some(Item { key, node: index, error, least: if lit { sight.least } else { 0.0 }, lit })
+        Some(Item { key, node: index, error, typical: if lit { typical(&sight) } else { 0.0 }, lit, sight })
     }
 
     /// The node as one that is seen whole, and whether that would be worth the look.
@@ -128,17 +136,22 @@ impl Walk<'_> {
         if !node.is_smooth() || !(self.together || node.count == 1) {
             return None;
         }
-        let sight: Sight = node.shine.sight(self.zone);
+        let sight = item.sight;
         if !sight.whole {
             return None;
         }
         let error = node.error(&sight);
         let key = self.key(&error);
-        (key <= WORTH * item.key).then_some(Item { key, node: item.node, error, least: sight.least, lit: true })
+        (key <= WORTH * item.key).then_some(Item { key, node: item.node, error, typical: typical(&sight), lit: true, sight })
     }
 }
 
 impl Cut {
+    /// How far what is settled can be wrong: diffuse and specular, before the colours of the surface.
+    pub fn error(&self) -> Sent {
+        [color(&self.error[0]), color(&self.error[1])]
+    }
+
     fn clear(&mut self) {
         self.heap.clear();
         self.lit.clear();
@@ -155,8 +168,8 @@ impl Cut {
     fn count(&mut self, walk: &Walk, item: &Item, sign: f64) {
         add(&mut self.error[0], item.error[0], sign);
         add(&mut self.error[1], item.error[1], sign);
-        if item.least > 0.0 {
-            add(&mut self.known, walk.tree.nodes[item.node as usize].power * item.least, sign);
+        if item.typical > 0.0 {
+            add(&mut self.known, walk.tree.nodes[item.node as usize].power * item.typical, sign);
         }
     }
 
@@ -189,6 +202,11 @@ impl Cut {
             self.push(walk, walk.item(*root, false));
         }
         let mut done = [0.0; 3];
+        let later = |done: &mut [f64; 3], known: &mut [f64; 3], node: &LightNode, sight: &Sight| {
+            let share = MAYBE * typical(sight);
+            add(done, node.power * share, 1.0);
+            add(known, node.power * share, 1.0);
+        };
         for step in 0u32.. {
             if step % AGAIN == 0 {
                 self.recount(walk, &done);
@@ -206,25 +224,33 @@ impl Cut {
                 Held::Light(light) if !shines(light) => {}
                 Held::Light(_) if item.lit && item.key == 0.0 => {
                     // Nothing is lost
-                    add(&mut done, node.power * item.least, 1.0);
-                    add(&mut self.known, node.power * item.least, 1.0);
+                    add(&mut done, node.power * item.typical, 1.0);
+                    add(&mut self.known, node.power * item.typical, 1.0);
                     self.lit.push(item.node);
                 }
-                Held::Light(_) if item.lit => self.open.push(item.node),
+                Held::Light(_) if item.lit => {
+                    later(&mut done, &mut self.known, node, &item.sight);
+                    self.open.push(item.node);
+                }
                 Held::Light(light) => match look(node, light) {
                     Seen::Nothing => {}
                     Seen::Whole => match walk.as_lit(&item, node) {
                         Some(lit) => self.push(walk, Some(lit)),
-                        None => self.open.push(item.node),
+                        None => {
+                            later(&mut done, &mut self.known, node, &item.sight);
+                            self.open.push(item.node);
+                        }
                     },
-                    Seen::Unknown => self.open.push(item.node),
+                    Seen::Unknown => {
+                        later(&mut done, &mut self.known, node, &item.sight);
+                        self.open.push(item.node);
+                    }
                 },
                 Held::Two(children) => {
                     let (mut lit, mut hidden, mut stuck) = (item.lit, false, false);
-                    if !lit && walk.together {
-                        let sight = node.shine.sight(walk.zone);
+                    if !lit {
                         let as_lit = walk.as_lit(&item, node);
-                        if as_lit.is_some() || sight.width < WIDE {
+                        if as_lit.is_some() || item.sight.width < WIDE {
                             match look(node, node.first(walk.tree)) {
                                 Seen::Whole => match as_lit {
                                     Some(item) => {
@@ -240,6 +266,7 @@ impl Cut {
                         }
                     }
                     if stuck {
+                        later(&mut done, &mut self.known, node, &item.sight);
                         self.open.push(item.node);
                     } else if !hidden {
                         for child in children {
@@ -249,6 +276,7 @@ impl Cut {
                 }
             }
         }
+        self.recount(walk, &done);
         while let Some(item) = self.heap.pop() {
             if item.lit {
                 self.lit.push(item.node);
@@ -286,12 +314,22 @@ impl Cut {
             self.count(walk, &item, -1.0);
             let node = &walk.tree.nodes[item.node as usize];
             match node.held {
-                Held::Light(light) => value += ask(light, value),
+                Held::Light(light) if item.lit => value += ask(light, value),
+                Held::Light(light) => {
+                    // Most are seen whole, as points, or not at all
+                    let as_lit = walk.as_lit(&item, node);
+                    let seen = if as_lit.is_some() || node.is_point() { look(node, light) } else { Seen::Unknown };
+                    match (seen, as_lit) {
+                        (Seen::Nothing, _) => {}
+                        (Seen::Whole, Some(item)) => self.push(walk, Some(item)),
+                        _ => value += ask(light, value),
+                    }
+                }
                 Held::Two(children) => {
                     let mut lit = item.lit;
-                    if !lit && walk.together {
+                    if !lit {
                         let as_lit = walk.as_lit(&item, node);
-                        if as_lit.is_some() || node.shine.sight(walk.zone).width < WIDE {
+                        if as_lit.is_some() || item.sight.width < WIDE {
                             match look(node, node.first(walk.tree)) {
                                 Seen::Whole => match as_lit {
                                     Some(item) => {

@@ -29,8 +29,8 @@ pub(crate) const FEW: usize = 16;
 /// So many lights are at most taken one by one; of more, many may be taken for one.
 pub(crate) const SINGLY: usize = 1000;
 /// In display steps: how far what is settled for a block may be wrong, and what is settled for a patch.
-const BLOCK_BUDGET: f32 = 0.35;
-const PATCH_BUDGET: f32 = 0.35;
+const BLOCK_BUDGET: f32 = 0.45;
+const PATCH_BUDGET: f32 = 0.4;
 /// In display steps: how far all lights that are integrated one by one may be wrong together.
 const INTEGRALS: f32 = 0.15;
 /// Pixels across a block.
@@ -191,9 +191,21 @@ impl<'a> Many<'a> {
         self.lit.extend(&self.cut.lit);
         let block = start..self.lit.len() as u32;
         let open = std::mem::take(&mut self.cut.open);
+        let error = self.cut.error();
         for at in group {
             let number = first[at.0] + at.1;
-            self.patches[number] = self.patch(patch(at), block.clone(), &open, arrivals, counts);
+            let patch = patch(at);
+            let singles = self.singles.len();
+            let mut stored = self.patch(patch, block.clone(), &open, arrivals, counts);
+            let bsdf = &patch.bsdf;
+            let shown = arrivals.steps(stored.value, bsdf.diffuse * error[0] + bsdf.specular * error[1]);
+            if shown > BLOCK_BUDGET {
+                // Darker than was guessed: by itself, from the beginning
+                self.singles.truncate(singles);
+                stored = self.patch(patch, 0..0, &tree.roots, arrivals, counts);
+            }
+            self.count(&stored, counts);
+            self.patches[number] = stored;
         }
         self.cut.open = open;
     }
@@ -260,14 +272,15 @@ impl<'a> Many<'a> {
         }
         self.singles[from..].sort_unstable_by_key(|single| single.light);
         stored.singles = from as u32..self.singles.len() as u32;
-        let together: u32 = self.nodes(&stored).map(|node| tree.nodes[node as usize].count).sum();
-        let nodes: usize = stored.lit.iter().map(Range::len).sum();
-        let singly = self.singles.len() - from;
-        counts.lights.pairs += scene.lights.len() as u64;
-        counts.lights.singly += singly as u64;
-        counts.lights.nodes += nodes as u64;
-        counts.lights.together += u64::from(together);
         stored
+    }
+
+    fn count(&self, stored: &Stored, counts: &mut Counts) {
+        let together: u32 = self.nodes(stored).map(|node| self.tree.nodes[node as usize].count).sum();
+        counts.lights.pairs += self.scene.lights.len() as u64;
+        counts.lights.singly += stored.singles.len() as u64;
+        counts.lights.nodes += stored.lit.iter().map(Range::len).sum::<usize>() as u64;
+        counts.lights.together += u64::from(together);
     }
 
     /// The nodes that are taken for one.
@@ -321,7 +334,8 @@ impl<'a> Many<'a> {
             let stored = &self.patches[first[index] + k];
             let mut doubts = std::mem::take(&mut self.doubts);
             self.doubts_of(pixels, first, (index, k), arrivals, &mut doubts);
-            let in_doubt = |single: Option<u32>| doubts.iter().any(|doubt| doubt.single == single);
+            doubts.sort_unstable_by_key(|doubt| doubt.single);
+            let in_doubt = |single: Option<u32>| doubts.binary_search_by_key(&single, |doubt| doubt.single).is_ok();
             let bsdf = &patch.bsdf;
             if !in_doubt(None) {
                 together[0] += bsdf.diffuse * stored.sent[0] * count;

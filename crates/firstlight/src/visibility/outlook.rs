@@ -130,10 +130,14 @@ impl Outlook {
         let size = self.places.min.abs().max(self.places.max.abs()).max(low.abs()).max(high.abs()).max_element();
         let room = f64::from(size) * SLACK;
         let [sphere_links, flat_links] = &scene.obstacle_links;
+        let hull_of = Capsule::around(&self.places, middle, half);
         let mut clear = true;
         let mut hiders: ArrayVec<Which, HIDERS> = ArrayVec::new();
         for i in &self.spheres {
             let sphere = &scene.obstacles[*i as usize];
+            if hull_of.misses(sphere) {
+                continue;
+            }
             let [a, b] = sphere.bounds();
             if scene.casts(sphere_links, *i as usize, light) && shaft.meets(a, b, room + sphere.r * 1e-4) {
                 clear = false;
@@ -298,10 +302,41 @@ impl Outlook {
             Vec3::new(pick(0, min.x, max.x), pick(1, min.y, max.y), pick(2, min.z, max.z))
         };
         let Aabb { min, max } = self.places;
-        (0..8).all(|i| {
-            let p = corner(min, max, i);
-            (0..8).all(|j| blocks(p, corner(low, high, j) - p))
+        // A box without extent has one corner
+        let corners = |min: Vec3, max: Vec3| if min == max { 1 } else { 8 };
+        let (places, ends) = (corners(min, max), corners(low, high));
+        (0..ends).all(|j| {
+            let q = corner(low, high, j);
+            (0..places).all(|i| {
+                let p = corner(min, max, i);
+                blocks(p, q - p)
+            })
         })
+    }
+}
+
+/// All points as near to a line as the hull of places and a box can be.
+struct Capsule {
+    from: Vec3,
+    way: Vec3,
+    inverse: f32,
+    radius: f32,
+}
+
+impl Capsule {
+    fn around(places: &Aabb, middle: Vec3, half: Vec3) -> Capsule {
+        let around = (places.max - places.min) * 0.5;
+        let from = places.min + around;
+        let way = middle - from;
+        let radius = around.length().max(half.length()) * 1.001;
+        Capsule { from, way, inverse: 1.0 / way.length_squared().max(f32::MIN_POSITIVE), radius }
+    }
+
+    fn misses(&self, sphere: &Sphere) -> bool {
+        let to = sphere.c.as_vec3() - self.from;
+        let t = (to.dot(self.way) * self.inverse).clamp(0.0, 1.0);
+        let aside = (to - self.way * t).length();
+        aside > (sphere.r as f32 + self.radius) * 1.001 + to.length() * 1e-5
     }
 }
 
