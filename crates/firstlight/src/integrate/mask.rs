@@ -11,7 +11,7 @@ use super::emitter::Emitter;
 use super::view::{Outline, View};
 use crate::accel::RayPacket16;
 use crate::ids::LightId;
-use crate::light::{Light, LightKind, SampleSet};
+use crate::light::{Light, LightKind, LightSample, MIN_DISTANCE2, SampleSet};
 use crate::material::Lobe;
 use crate::math::{LANES, ShadowRay, Vec3};
 use crate::scene::{Scene, ShadowRays};
@@ -177,12 +177,24 @@ impl Masked<'_> {
         let (mut diffuse, mut specular) = (0.0f64, 0.0f64);
         let count = area.samples();
         for k in 0..count {
-            let l = area.point(k) - si.lit_from;
+            // Thousands of spheres do not have a table each
+            let (q, n) = area.shared_point(k).unwrap_or_else(|| (area.point(k), Vec3::ZERO));
+            let l = q - si.lit_from;
             let height = si.ns.dot(l);
             if !(si.horizon.dot(l) > 0.0 && height > 0.0) {
                 continue;
             }
-            let Some(sample) = light.sample(k, l) else { continue };
+            let sample = if n == Vec3::ZERO {
+                let Some(sample) = light.sample(k, l) else { continue };
+                sample
+            } else {
+                let distance2 = l.dot(l);
+                if !(distance2 >= MIN_DISTANCE2) {
+                    continue;
+                }
+                let inverse_distance = 1.0 / distance2.sqrt();
+                LightSample { inverse_distance, weight: area.weight_facing(n, l, inverse_distance) }
+            };
             if sample.weight == 0.0
                 || light.shadows
                     && si.receives_shadow

@@ -45,6 +45,7 @@ use arrival::{Arrivals, Lights};
 use film::FilmTile;
 use hits::PixelHits;
 use lanes::Lanes;
+use many::SINGLY;
 use pixel::{Lighting, PixelSum};
 use plain::Plain;
 use shafts::Shafts;
@@ -131,6 +132,16 @@ impl RenderSettings {
     /// # Errors
     /// How much it takes, and what to do.
     pub fn check_memory(&self, scene: &Scene) -> Result<(), String> {
+        if self.samples_all() {
+            let points = |light: &Light| if light.exact { light.samples() as u64 } else { 0 };
+            let points: u64 = scene.lights.iter().map(points).sum();
+            if points > MAX_POINTS {
+                return Err(format!(
+                    "sampled, the lights that are integrated have {points} points together, the limit is {MAX_POINTS}; \
+                     give them fewer with --samples"
+                ));
+            }
+        }
         let window = self.window(scene);
         let film = window.width as usize * window.height as usize * size_of::<[f32; 4]>();
         Vec::<u8>::new().try_reserve_exact(film + film / 2).map_err(|_| {
@@ -248,6 +259,10 @@ impl Counts {
 
 /// How many numbers [`Counts`] has.
 const COUNTS: usize = 15;
+
+/// The most points of all lights that are integrated, where they are sampled all the same: 12 bytes each, on spheres 24, and
+/// as much for shafts.
+const MAX_POINTS: u64 = 1 << 26;
 
 /// Shadow rays between two questions: some hundredths of a second of the fast renderer, some tenths of the plain one.
 const QUESTION_EVERY: u64 = 1 << 23;
@@ -419,7 +434,13 @@ impl Scene {
                     said => said.to_string(),
                 };
                 let counts: Vec<String> = self.lights.iter().map(said).collect();
-                counts.join(" ")
+                // Of many lights, how many in a row say the same
+                let run = |same: &[String]| format!("{} x {}", same.len(), same[0]);
+                if counts.len() > SINGLY {
+                    counts.chunk_by(|a, b| a == b).map(run).collect::<Vec<_>>().join(", ")
+                } else {
+                    counts.join(" ")
+                }
             }),
             ("color_space", "linear Rec. 709, alpha premultiplied, before display encoding".to_owned()),
             ("display", {

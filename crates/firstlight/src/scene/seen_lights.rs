@@ -31,8 +31,8 @@ impl SeenLights {
                 && area.visible
             {
                 let [low, high] = area.shape.bounds();
-                // Larger than the rounding to single precision
-                let room = low.abs().max(high.abs()) * f64::from(f32::EPSILON) + 1e-30;
+                // Larger than any rounding, of the box or of the test of a shape
+                let room = (high - low) * 1e-6 + low.abs().max(high.abs()) * 1e-6;
                 all.push(index as u32);
                 boxes.push(Aabb { min: (low - room).as_vec3(), max: (high + room).as_vec3() });
             }
