@@ -90,8 +90,8 @@ const WORTH: f32 = 0.25;
 const WIDE: f32 = 0.7;
 /// The part of what nothing is known of that is guessed to arrive.
 const MAYBE: f32 = 0.3;
-/// Steps between two exact sums of what is in question.
-const AGAIN: u32 = 32;
+/// Sums are made anew where what is in question has become so much less: what was taken away has left its rounding behind.
+const AGAIN: f32 = 1e-8;
 
 fn add(sum: &mut [f64; 3], color: Rgb, sign: f64) {
     for (sum, v) in sum.iter_mut().zip([color.r, color.g, color.b]) {
@@ -183,6 +183,15 @@ impl Cut {
         self.heap = heap;
     }
 
+    /// Sums up anew where that is due. `worst` was the worst in question when it was done last.
+    fn keep_exact(&mut self, walk: &Walk, done: &[f64; 3], worst: &mut f32) {
+        let now = self.heap.peek().map_or(0.0, |item| item.key);
+        if now < *worst * AGAIN {
+            self.recount(walk, done);
+            *worst = now;
+        }
+    }
+
     fn shown(&self, walk: &Walk, value: Option<Rgb>) -> f32 {
         let (diffuse, specular, known) = (color(&self.error[0]), color(&self.error[1]), color(&self.known));
         let mut worst: f32 = 0.0;
@@ -207,10 +216,9 @@ impl Cut {
             add(done, node.power * share, 1.0);
             add(known, node.power * share, 1.0);
         };
-        for step in 0u32.. {
-            if step % AGAIN == 0 {
-                self.recount(walk, &done);
-            }
+        let mut worst = f32::INFINITY;
+        loop {
+            self.keep_exact(walk, &done, &mut worst);
             if self.shown(walk, None) <= walk.budget {
                 self.recount(walk, &done);
                 if self.shown(walk, None) <= walk.budget {
@@ -300,10 +308,9 @@ impl Cut {
         for node in open {
             self.push(walk, walk.item(*node, false));
         }
-        for step in 0u32.. {
-            if step % AGAIN == 0 {
-                self.recount(walk, &[0.0; 3]);
-            }
+        let mut worst = f32::INFINITY;
+        loop {
+            self.keep_exact(walk, &[0.0; 3], &mut worst);
             if self.shown(walk, Some(value)) <= walk.budget {
                 self.recount(walk, &[0.0; 3]);
                 if self.shown(walk, Some(value)) <= walk.budget {
