@@ -3,6 +3,7 @@
 mod bench;
 mod exact;
 mod generate;
+mod lights;
 mod models;
 mod pictures;
 mod rays;
@@ -52,6 +53,8 @@ enum Task {
     },
     /// Measures config 11 and writes a page under docs/benchmarks.
     Bench(bench::Options),
+    /// Measures a hall full of small lights, or writes it as a scene.
+    Lights(lights::Options),
     /// Measures rays through meshes, against Embree where it is installed, and writes a page under docs/benchmarks.
     Rays(rays::Options),
     /// Measures whole processes from a mesh file to a picture, against F3D and Mitsuba where a Python has them, and writes a
@@ -83,6 +86,7 @@ fn main() -> ExitCode {
         Task::Generate { check } => generate::run(check),
         Task::Pictures { filter } => pictures::run(filter.as_deref()),
         Task::Bench(options) => bench::run(&options),
+        Task::Lights(options) => lights::run(&options),
         Task::Rays(options) => rays::run(&options),
         Task::Models(options) => models::run(&options),
         Task::Verify { what: Some(Verify::Exact(options)), .. } => exact::run(&options),

@@ -59,12 +59,36 @@ impl Stats {
             "shafts": self.rays.shafts,
             "occluders": self.rays.occluders,
             "shadow_rays_traced": self.rays.traced,
+            "lights_and_places": self.rays.lights.pairs,
+            "lights_singly": self.rays.lights.singly,
+            "lights_together": self.rays.lights.together,
+            "lights_left_out": self.left_out(),
+            "light_clusters": self.rays.lights.nodes,
             "mrays_per_s": self.mrays_per_s(),
             "peak_memory_bytes": peak_memory(),
             "simd": self.rays.simd.name(),
             "threads": self.rays.threads,
         });
         format!("{value:#}\n")
+    }
+
+    /// Pairs of a place and a light that were left out, within the stated bound.
+    fn left_out(&self) -> u64 {
+        let lights = &self.rays.lights;
+        lights.pairs.saturating_sub(lights.singly + lights.together)
+    }
+
+    /// What was done with many lights, in words.
+    fn many(&self) -> String {
+        let lights = &self.rays.lights;
+        let percent = |count: u64| 100.0 * count as f64 / lights.pairs.max(1) as f64;
+        format!(
+            "{:.1} % by themselves, {:.1} % in {} clusters, {:.1} % left out",
+            percent(lights.singly),
+            percent(lights.together),
+            lights.nodes,
+            percent(self.left_out())
+        )
     }
 
     /// How much of the lights was found to reach the points, in words.
@@ -104,6 +128,9 @@ impl Stats {
             ("shafts", self.rays.shafts.to_string(), format!("{each:.1} things in each that may be in the way")),
             ("rays a second", format!("{:.1} million", self.mrays_per_s()), String::new()),
         ];
+        if self.rays.lights.pairs > 0 {
+            rows.push(("places and many lights", self.rays.lights.pairs.to_string(), self.many()));
+        }
         if let Some(bytes) = peak_memory() {
             rows.push(("memory, at most", format!("{:.1} MiB", bytes as f64 / f64::from(1 << 20)), String::new()));
         }

@@ -84,7 +84,7 @@ pub use light::{
 };
 pub use material::{BlinnPhongDesc, MaterialDesc, PhongDesc};
 pub use math::{Ray, Vec2, Vec3};
-pub use render::{AaMode, Film, Heat, RenderSettings, RenderStats, SimdLevel, VisibilityMode, render};
+pub use render::{AaMode, Film, Heat, LightCounts, RenderSettings, RenderStats, SimdLevel, VisibilityMode, render};
 pub use scene::{Builtin, Parsed, builtin_scenes, reference, schema};
 pub use scene::{
     CameraHit, CompileOptions, Compiled, DisplayEncoding, Hit, ModelSettings, RenderDesc, Scene, SceneDesc,

@@ -1,6 +1,7 @@
 //! Lights: where light comes from, and how much. A light never traces rays.
 
 mod area;
+mod bound;
 mod directional;
 mod disk;
 mod point;
@@ -8,6 +9,8 @@ mod rectangle;
 mod samples;
 mod sphere;
 mod spot;
+mod tree;
+mod zone;
 
 use crate::color::Rgb;
 use crate::context::CompileContext;
@@ -26,6 +29,9 @@ pub use sphere::{Sphere, SphereLightDesc};
 pub use spot::{Spot, SpotDesc};
 
 pub(crate) use area::{Points, check_samples};
+pub(crate) use bound::Sight;
+pub(crate) use tree::{Held, LightNode, LightTree, Sent};
+pub(crate) use zone::Zone;
 
 words! {
     /// How light weakens on its way.

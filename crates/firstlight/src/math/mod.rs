@@ -2,6 +2,7 @@
 //!
 //! Everything here gives the same bits on every machine: + - x / and square root only, or `pxfm`.
 
+mod arc;
 mod frame;
 mod lanes;
 mod pow;
@@ -9,6 +10,7 @@ mod ray;
 mod roots;
 mod sum;
 
+pub(crate) use arc::Arc;
 pub(crate) use frame::Frame;
 pub(crate) use lanes::{Vec3x16, dispatch_wide};
 pub(crate) use pow::Exponent;

@@ -6,12 +6,13 @@ use fearless_simd::Level;
 
 use super::Counts;
 use super::lanes::Lanes;
+use super::many::FEW;
 use super::pixel::Lighting;
 use super::plain::Plain;
 use crate::color::{DisplaySteps, Rgb};
 use crate::ids::LightId;
 use crate::integrate::{Asker, Between, Emitter, Masked, Receiver, Sums, View, integrate, sharpness};
-use crate::light::{Light, LightKind};
+use crate::light::{Light, LightKind, LightTree};
 use crate::material::Lobe;
 use crate::math::{Vec3, dispatch_wide, square};
 use crate::scene::Scene;
@@ -98,9 +99,13 @@ pub(crate) struct Place<'a> {
 pub(crate) struct Lights {
     /// For each light, if it is integrated.
     pub emitters: Vec<Option<Emitter>>,
+    /// Whether any light with an area is not.
+    sampled: bool,
     pub steps: DisplaySteps,
     /// In display steps: how far one light may be wrong at a place.
     tolerance: f32,
+    /// Where there are many.
+    tree: Option<LightTree>,
     /// The lights as shafts lead to them; none where there are no trees to lead through.
     targets: Vec<Target>,
 }
@@ -117,7 +122,10 @@ impl Lights {
         let emitters: Vec<_> = scene.lights.iter().map(emitter).collect();
         let tolerance = TOLERANCE / (emitters.len().max(1) as f32).sqrt();
         let targets = if scene.geometry.has_trees() { Target::of_all(scene) } else { Vec::new() };
-        Lights { emitters, steps: DisplaySteps::new(&scene.display), tolerance, targets }
+        let is_area = |light: &Light| matches!(light.kind, LightKind::Area(_));
+        let sampled = scene.lights.iter().zip(&emitters).any(|(light, emitter)| is_area(light) && emitter.is_none());
+        let tree = (scene.lights.len() > FEW).then(|| LightTree::new(&scene.lights));
+        Lights { emitters, sampled, steps: DisplaySteps::new(&scene.display), tolerance, tree, targets }
     }
 }
 
@@ -128,6 +136,7 @@ pub(crate) struct Arrivals<'a> {
     level: Level,
     sampled: Lanes,
     occluders: Occluders,
+    tolerance: f32,
 }
 
 /// Patches whose normal turns by less than this, in radians, are flat.
@@ -137,12 +146,39 @@ const LEAVES: usize = 12;
 
 impl<'a> Arrivals<'a> {
     pub fn new(scene: &'a Scene, lights: &'a Lights, level: Level) -> Self {
-        Arrivals { scene, lights, level, sampled: Lanes::new(level), occluders: Occluders::default() }
+        Arrivals {
+            scene,
+            lights,
+            level,
+            sampled: Lanes::new(level),
+            occluders: Occluders::default(),
+            tolerance: lights.tolerance,
+        }
+    }
+
+    /// The tree of all lights, where there are many.
+    pub fn tree(&self) -> Option<&'a LightTree> {
+        self.lights.tree.as_ref()
+    }
+
+    /// The instruction set.
+    pub fn level(&self) -> Level {
+        self.level
+    }
+
+    /// How errors show.
+    pub fn display_steps(&self) -> &'a DisplaySteps {
+        &self.lights.steps
+    }
+
+    /// From now on each light may be wrong by so many display steps.
+    pub fn tolerate(&mut self, tolerance: f32) {
+        self.tolerance = tolerance;
     }
 
     /// Has to be called first at each place.
     pub fn look_around(&mut self, si: &SurfaceInteraction) {
-        if self.lights.emitters.iter().any(Option::is_none) {
+        if self.lights.sampled {
             self.sampled.look_around(self.scene, si);
         }
     }
@@ -317,11 +353,12 @@ impl<'a> Arrivals<'a> {
     fn integrated(&mut self, index: usize, emitter: &Emitter, place: &Place, counts: &mut Counts) -> Arrival {
         let (scene, si) = (self.scene, place.si);
         let light = &scene.lights[index];
-        let enough = |sums: &Sums, error: &Sums| {
+        let (steps, tolerance) = (&self.lights.steps, self.tolerance);
+        let enough = move |sums: &Sums, error: &Sums| {
             let [diffuse, specular] = place.colors;
             let value = place.base + diffuse * sums.diffuse + specular * sums.specular;
             let wrong = diffuse * error.diffuse + specular * error.specular;
-            self.lights.steps.of_color(value, wrong) <= self.lights.tolerance
+            steps.of_color(value, wrong) <= tolerance
         };
         let Some(view) = self.view(emitter, place) else {
             let ask = light.shadows && si.receives_shadow;

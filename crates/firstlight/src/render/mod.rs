@@ -9,11 +9,13 @@
 //! [`tiled`](tiled/index.html) integrates lights and lights a surface once where that is enough; all else is as above.
 
 mod arrival;
+mod cut;
 mod field;
 mod film;
 mod heat;
 mod hits;
 mod lanes;
+mod many;
 mod patch;
 mod pixel;
 mod plain;
@@ -47,6 +49,7 @@ use arrival::{Arrivals, Lights};
 use film::FilmTile;
 use hits::PixelHits;
 use lanes::Lanes;
+use many::SINGLY;
 use pixel::{Lighting, PixelSum};
 use plain::Plain;
 use shafts::Shafts;
@@ -135,6 +138,16 @@ impl RenderSettings {
     /// # Errors
     /// How much it takes, and what to do.
     pub fn check_memory(&self, scene: &Scene) -> Result<(), String> {
+        if self.samples_all() {
+            let points = |light: &Light| if light.exact { light.samples() as u64 } else { 0 };
+            let points: u64 = scene.lights.iter().map(points).sum();
+            if points > MAX_POINTS {
+                return Err(format!(
+                    "sampled, the lights that are integrated have {points} points together, the limit is {MAX_POINTS}; \
+                     give them fewer with --samples"
+                ));
+            }
+        }
         let window = self.window(scene);
         let pixel = size_of::<[f32; 4]>() + if self.heat { size_of::<f32>() } else { 0 };
         let film = window.width as usize * window.height as usize * pixel;
@@ -194,6 +207,8 @@ pub struct RenderStats {
     pub occluders: u64,
     /// Shadow rays for which trees were asked all the same.
     pub traced: u64,
+    /// What was done with lights, where they are many and integrated.
+    pub lights: LightCounts,
     /// The instruction set; `Fallback` for the plain renderer.
     pub simd: SimdLevel,
     /// Threads.
@@ -214,8 +229,25 @@ impl RenderStats {
         sum.shafts += self.shafts;
         sum.occluders += self.occluders;
         sum.traced += self.traced;
+        sum.lights.pairs += self.lights.pairs;
+        sum.lights.singly += self.lights.singly;
+        sum.lights.together += self.lights.together;
+        sum.lights.nodes += self.lights.nodes;
         sum
     }
+}
+
+/// Where lights are many: what was done with them.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct LightCounts {
+    /// Pairs of a lit place and a light.
+    pub pairs: u64,
+    /// Those of them where the light was asked for by itself.
+    pub singly: u64,
+    /// Those where it is proved to be seen whole, and was taken for a point, by itself or together with others.
+    pub together: u64,
+    /// How many such points were taken; all other lights were left out, within the stated bound.
+    pub nodes: u64,
 }
 
 /// Counts of one tile.
@@ -230,13 +262,14 @@ pub(crate) struct Counts {
     pub looks: u64,
     /// Points of lights that were asked one by one, of lights that are integrated.
     pub points: u64,
+    pub lights: LightCounts,
     /// Shadow rays after which the caller is asked whether to go on.
     next_question: u64,
 }
 
 impl Counts {
-    fn all(&self) -> [u64; 11] {
-        let Counts { camera_rays, shadow_rays, shadow_rays_skipped, settled, closed_form, .. } = *self;
+    fn all(&self) -> [u64; COUNTS] {
+        let Counts { camera_rays, shadow_rays, shadow_rays_skipped, settled, closed_form, lights, .. } = *self;
         let Settled { visibility: [lit, hidden, below, mask], shafts, occluders, traced } = settled;
         [
             camera_rays,
@@ -250,6 +283,10 @@ impl Counts {
             occluders,
             traced,
             closed_form,
+            lights.pairs,
+            lights.singly,
+            lights.together,
+            lights.nodes,
         ]
     }
 }
@@ -259,9 +296,15 @@ impl Counts {
     fn work(&self) -> f32 {
         let rays = self.looks + (self.shadow_rays - self.shadow_rays_skipped) + self.settled.traced + self.points;
         let places = self.settled.visibility.iter().sum::<u64>() + self.closed_form;
-        rays as f32 + Heat::PLACE * places as f32
+        rays as f32 + Heat::PLACE * places as f32 + self.lights.nodes as f32
     }
 }
+/// How many numbers [`Counts`] has.
+const COUNTS: usize = 15;
+
+/// The most points of all lights that are integrated, where they are sampled all the same: 12 bytes each, on spheres 24, and
+/// as much for shafts.
+const MAX_POINTS: u64 = 1 << 26;
 
 /// Shadow rays between two questions: some hundredths of a second of the fast renderer, some tenths of the plain one.
 const QUESTION_EVERY: u64 = 1 << 23;
@@ -292,7 +335,7 @@ pub fn render(
     };
     let all = window.width as u64 * window.height as u64;
     let (done, stop) = (AtomicU64::new(0), AtomicBool::new(false));
-    let totals = [const { AtomicU64::new(0) }; 11];
+    let totals = [const { AtomicU64::new(0) }; COUNTS];
     let by_shafts = every_ray && !settings.samples_all();
     let targets = if by_shafts { Target::of_all(scene) } else { Vec::new() };
     let level = settings.simd.resolve();
@@ -353,6 +396,10 @@ pub fn render(
         occluders,
         traced,
         closed_form,
+        pairs,
+        singly,
+        together,
+        nodes,
     ] = totals.map(AtomicU64::into_inner);
     let simd = if settings.reference { SimdLevel::Fallback } else { level };
     let visibility = [lit, hidden, below, mask];
@@ -365,6 +412,7 @@ pub fn render(
         shafts,
         occluders,
         traced,
+        lights: LightCounts { pairs, singly, together, nodes },
         simd,
         threads,
     };
@@ -431,7 +479,13 @@ impl Scene {
                     said => said.to_string(),
                 };
                 let counts: Vec<String> = self.lights.iter().map(said).collect();
-                counts.join(" ")
+                // Of many lights, how many in a row say the same
+                let run = |same: &[String]| format!("{} x {}", same.len(), same[0]);
+                if counts.len() > SINGLY {
+                    counts.chunk_by(|a, b| a == b).map(run).collect::<Vec<_>>().join(", ")
+                } else {
+                    counts.join(" ")
+                }
             }),
             ("color_space", "linear Rec. 709, alpha premultiplied, before display encoding".to_owned()),
             ("display", {

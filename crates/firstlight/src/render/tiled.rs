@@ -19,6 +19,7 @@ use super::arrival::{Arrival, Arrivals, Place};
 use super::field::{Field, Shade};
 use super::film::FilmTile;
 use super::hits::PixelHits;
+use super::many::Many;
 use super::patch::{Patch, PixelPatches};
 use super::solo::{self, Candidate, Pyramid};
 use super::square::Square;
@@ -31,11 +32,11 @@ use crate::scene::Scene;
 use crate::shape::SurfaceInteraction;
 
 /// In display steps: how much may bend over a patch that is shaded once.
-const BEND: f32 = 0.4;
+pub(super) const BEND: f32 = 0.4;
 /// Pixels across a cell.
 pub(crate) const CELL: u32 = 32;
 /// With its rim.
-const ACROSS: usize = CELL as usize + 2;
+pub(super) const ACROSS: usize = CELL as usize + 2;
 /// Pixels across the smallest squares that are asked whether they hold one surface.
 const SMALLEST: u32 = 2;
 /// Lists of candidates: of the cell with its rim, and of squares of each size down to the smallest.
@@ -84,6 +85,8 @@ pub(crate) struct Tiled<'a> {
     values: Vec<Rgb>,
     /// Diffuse and specular of each light at one pixel, in scene order.
     terms: Vec<[Rgb; 2]>,
+    /// In place of `field`, `arrived`, `values` where lights are many.
+    many: Option<Many<'a>>,
 }
 
 /// Of a pixel whose light is not known.
@@ -92,6 +95,7 @@ const UNLIT: usize = usize::MAX;
 impl<'a> Tiled<'a> {
     pub fn new(scene: &'a Scene, mode: AaMode, hits: PixelHits, arrivals: Arrivals<'a>) -> Self {
         let listed = scene.geometry.listed && !scene.geometry.has_trees();
+        let many = arrivals.tree().map(|tree| Many::new(scene, tree));
         Tiled {
             scene,
             mode,
@@ -99,7 +103,7 @@ impl<'a> Tiled<'a> {
             listed: listed.then(|| solo::all(scene)),
             near: Default::default(),
             corner: [0; 2],
-            field: Field::new(scene.lights.len()),
+            field: Field::new(if many.is_some() { 0 } else { scene.lights.len() }),
             arrivals,
             known: vec![Known::Nothing; ACROSS * ACROSS],
             colors: vec![None; ACROSS * ACROSS],
@@ -108,7 +112,8 @@ impl<'a> Tiled<'a> {
             first: vec![UNLIT; ACROSS * ACROSS],
             arrived: Vec::new(),
             values: Vec::new(),
-            terms: vec![[Rgb::BLACK; 2]; scene.lights.len()],
+            terms: Vec::new(),
+            many,
         }
     }
 
@@ -151,6 +156,9 @@ impl<'a> Tiled<'a> {
             self.split(Square { x: corner[0], y: corner[1], side: CELL }, 1, counts, go_on)?;
         } else {
             self.trace(counts);
+        }
+        if self.many.is_some() {
+            self.look_at_all(counts, go_on)?;
         }
         let rays = (scene.antialiasing * scene.antialiasing) as u64;
         for y in 0..CELL {
@@ -271,13 +279,13 @@ impl<'a> Tiled<'a> {
             }
         };
         let before = counts.work();
-        if let Some(shade) = &shade {
+        if let Some(shade) = shade.as_ref().filter(|_| self.many.is_none()) {
             self.field.light(scene, &mut self.arrivals, square, shade, counts);
         }
         let each = (counts.work() - before) / (square.side * square.side) as f32;
         for at in square.pixels() {
             let looked_up = || bsdfs[((at[1] - square.y) * PATCHWORK + at[0] - square.x) as usize];
-            let bsdf = shade.and(even.or_else(looked_up));
+            let bsdf = if self.many.is_none() { shade.and(even.or_else(looked_up)) } else { None };
             self.learn(at, Known::Only(only), bsdf.and_then(|bsdf| self.color(at, &bsdf)), each);
         }
         ControlFlow::Continue(())
@@ -322,18 +330,14 @@ impl<'a> Tiled<'a> {
         }
     }
 
-    /// Makes sure that the patches of a pixel of the cell or its rim are known, and what arrives at them; `false` if the film
-    /// ends before it.
-    fn ask(&mut self, [i, j]: [u32; 2], counts: &mut Counts) -> bool {
+    /// Makes sure that the patches of a pixel of the cell or its rim are known; `false` if the film ends before it.
+    fn hold(&mut self, [i, j]: [u32; 2], counts: &mut Counts) -> bool {
         let scene = self.scene;
         // Left of the first pixel the number wraps around
         if i >= scene.width || j >= scene.height {
             return false;
         }
         let index = self.index([i, j]);
-        if self.first[index] != UNLIT {
-            return true;
-        }
         let pixel = &mut self.pixels[index];
         match self.known[index] {
             Known::Patches => {}
@@ -342,17 +346,48 @@ impl<'a> Tiled<'a> {
                 pixel.patches.push(patch);
             }
             _ => {
-                pixel.collect_listed(scene, [i, j], true, &self.near[0]);
+                pixel.collect_listed(scene, [i, j], self.mode == AaMode::Adaptive, &self.near[0]);
                 counts.looks += (scene.antialiasing * scene.antialiasing) as u64;
             }
         }
+        true
+    }
+
+    /// Makes sure that the patches of a pixel of the cell or its rim are known, and what arrives at them; `false` if the film
+    /// ends before it.
+    fn ask(&mut self, at: [u32; 2], counts: &mut Counts) -> bool {
+        if at[0] < self.scene.width && at[1] < self.scene.height && self.first[self.index(at)] != UNLIT {
+            return true;
+        }
+        if !self.hold(at, counts) {
+            return false;
+        }
+        let index = self.index(at);
         self.first[index] = self.values.len();
         let patches = std::mem::take(&mut self.pixels[index].patches);
         for patch in &patches {
-            self.once(patch, [i, j], counts);
+            self.once(patch, at, counts);
         }
         self.pixels[index].patches = patches;
         true
+    }
+
+    /// Finds out what many lights do at all patches of the cell and its rim.
+    fn look_at_all(&mut self, counts: &mut Counts, go_on: &impl Fn() -> ControlFlow<()>) -> ControlFlow<()> {
+        let before = counts.work();
+        for (y, x) in (0..ACROSS as u32).flat_map(|y| (0..ACROSS as u32).map(move |x| (y, x))) {
+            // One less, for the rim
+            let at = [self.corner[0].wrapping_add(x).wrapping_sub(1), self.corner[1].wrapping_add(y).wrapping_sub(1)];
+            if !self.hold(at, counts) {
+                self.pixels[y as usize * ACROSS + x as usize].clear();
+            }
+        }
+        if let Some(many) = &mut self.many {
+            many.look(&self.pixels, &mut self.first, &mut self.arrivals, counts, go_on)?;
+        }
+        let each = (counts.work() - before) / (CELL * CELL) as f32;
+        self.work.iter_mut().for_each(|work| *work += each);
+        ControlFlow::Continue(())
     }
 
     /// What arrives at the middle of a patch of a pixel.
@@ -386,18 +421,35 @@ impl<'a> Tiled<'a> {
     /// The colour of a pixel: red, green, blue premultiplied, alpha.
     fn finish(&mut self, at: [u32; 2], counts: &mut Counts) -> [f32; 4] {
         let scene = self.scene;
+        let index = self.index(at);
+        self.terms.clear();
+        if let Some(many) = &mut self.many {
+            let terms = &mut self.terms;
+            many.finish(&self.pixels, &self.first, index, at, &mut self.arrivals, counts, |term| terms.push(term));
+        } else {
+            self.terms.resize(scene.lights.len(), [Rgb::BLACK; 2]);
+            self.light_by_light(at, counts);
+        }
+        let pixel = &self.pixels[index];
+        let mut ambient = Rgb::BLACK;
+        for patch in &pixel.patches {
+            ambient += scene.ambient * patch.bsdf.ambient * patch.count(scene) as f32;
+        }
+        pixel.color(scene, ambient, &self.terms)
+    }
+
+    /// Adds what all lights send to a pixel, each for itself.
+    fn light_by_light(&mut self, at: [u32; 2], counts: &mut Counts) {
+        let scene = self.scene;
         self.ask(at, counts);
         let index = self.index(at);
-        self.terms.fill([Rgb::BLACK; 2]);
-        let mut ambient = Rgb::BLACK;
         let patches = std::mem::take(&mut self.pixels[index].patches);
         for (k, patch) in patches.iter().enumerate() {
-            let count = patch.count(scene);
-            ambient += scene.ambient * patch.bsdf.ambient * count as f32;
+            let count = patch.count(scene) as f32;
             for light in 0..scene.lights.len() {
-                if self.is_enough(patch, at, k, light, counts) {
+                if self.is_enough(&patches, at, k, light, counts) {
                     let arrived = self.arrived[(self.first[index] + k) * scene.lights.len() + light];
-                    let (scale, sums) = (self.arrivals.scale(light) * count as f32, arrived.sums);
+                    let (scale, sums) = (self.arrivals.scale(light) * count, arrived.sums);
                     self.terms[light][0] += scale * patch.bsdf.diffuse * sums.diffuse;
                     self.terms[light][1] += scale * patch.bsdf.specular * sums.specular;
                 } else {
@@ -406,12 +458,12 @@ impl<'a> Tiled<'a> {
             }
         }
         self.pixels[index].patches = patches;
-        self.pixels[index].color(scene, ambient, &self.terms)
     }
 
     /// Whether what arrives of a light at the middle of a patch, the `k`-th of its pixel, will do for all of it.
-    fn is_enough(&mut self, patch: &Patch, at: [u32; 2], k: usize, light: usize, counts: &mut Counts) -> bool {
+    fn is_enough(&mut self, patches: &[Patch], at: [u32; 2], k: usize, light: usize, counts: &mut Counts) -> bool {
         let scene = self.scene;
+        let patch = &patches[k];
         if patch.uneven {
             return false;
         }
@@ -420,36 +472,20 @@ impl<'a> Tiled<'a> {
         let (here, value) =
             (self.arrived[(self.first[index] + k) * lights + light], self.values[self.first[index] + k]);
         let allowed = BEND / (lights as f32).sqrt();
-        let shows = |tiled: &Self, bend: &Sums| tiled.shown(light, &patch.bsdf, value, bend) > allowed;
-        if !shows(self, &here.bend) {
+        if self.shown(light, &patch.bsdf, value, &here.bend) <= allowed {
             return true;
         }
         if !here.resolved || !patch.is_whole(scene) {
             return false;
         }
-        let mut bend = Sums::default();
         let [i, j] = at;
-        for neighbours in [[[i.wrapping_sub(1), j], [i + 1, j]], [[i, j.wrapping_sub(1)], [i, j + 1]]] {
-            for neighbour in neighbours {
-                if !self.ask(neighbour, counts) {
-                    return false;
-                }
-                let patches = &self.pixels[self.index(neighbour)].patches;
-                let same = patches.len() == 1
-                    && patches[0].is_whole(scene)
-                    && patches[0].si.surface == patch.si.surface
-                    && patches[0].bsdf.lobe == patch.bsdf.lobe;
-                if !same {
-                    return false;
-                }
-            }
-            let [before, after] =
-                neighbours.map(|neighbour| self.arrived[self.first[self.index(neighbour)] * lights + light].sums);
-            let second = |a: f32, b: f32, c: f32| (a - b + (c - b)).abs() * WITHIN;
-            bend.diffuse += second(before.diffuse, here.sums.diffuse, after.diffuse);
-            bend.specular += second(before.specular, here.sums.specular, after.specular);
+        let beside = [[i.wrapping_sub(1), j], [i + 1, j], [i, j.wrapping_sub(1)], [i, j + 1]];
+        if !beside.into_iter().all(|neighbour| self.ask(neighbour, counts)) {
+            return false;
         }
-        !shows(self, &bend)
+        let arrived = |index: usize| Some(self.arrived[self.first[index] * lights + light].sums);
+        second_difference(scene, &self.pixels, index, patch, &here.sums, arrived)
+            .is_some_and(|bend| self.shown(light, &patch.bsdf, value, &bend) <= allowed)
     }
 
     /// Adds what one light sends to a patch, the `k`-th of its pixel, from parts of it: its quarters, where that may do, or
@@ -503,4 +539,35 @@ impl<'a> Tiled<'a> {
         self.terms[index][0] += colors[0] * sums.diffuse;
         self.terms[index][1] += colors[1] * sums.specular;
     }
+}
+
+/// How far what light does within a pixel can make its mean another, by what arrives `here` and at the neighbours, as `arrived` says;
+/// `None` where those tell nothing.
+pub(super) fn second_difference(
+    scene: &Scene,
+    pixels: &[PixelPatches],
+    index: usize,
+    patch: &Patch,
+    here: &Sums,
+    arrived: impl Fn(usize) -> Option<Sums>,
+) -> Option<Sums> {
+    let mut bend = Sums::default();
+    for step in [1, ACROSS] {
+        let neighbours = [index - step, index + step];
+        let same = |i: &usize| {
+            let patches = &pixels[*i].patches;
+            patches.len() == 1
+                && patches[0].is_whole(scene)
+                && patches[0].si.surface == patch.si.surface
+                && patches[0].bsdf.lobe == patch.bsdf.lobe
+        };
+        if !neighbours.iter().all(same) {
+            return None;
+        }
+        let (before, after) = (arrived(neighbours[0])?, arrived(neighbours[1])?);
+        let second = |a: f32, b: f32, c: f32| (a - b + (c - b)).abs() * WITHIN;
+        bend.diffuse += second(before.diffuse, here.diffuse, after.diffuse);
+        bend.specular += second(before.specular, here.specular, after.specular);
+    }
+    Some(bend)
 }

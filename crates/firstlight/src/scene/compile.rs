@@ -7,6 +7,7 @@ use fearless_simd::Level;
 
 use super::geometry::Geometry;
 use super::place::compile_shapes;
+use super::seen_lights::SeenLights;
 use super::{DisplayEncoding, LightObstacles, RenderDesc, Scene, SceneDesc, SceneSummary};
 use crate::camera::{Camera, CameraDesc};
 use crate::color::{Display, Encoding, Rgb};
@@ -112,6 +113,7 @@ impl SceneDesc {
             ambient: picture.ambient,
             display: picture.display,
             geometry: Arc::new(geometry),
+            seen_lights: Arc::new(SeenLights::new(&lights)),
             lights,
             materials,
             obstacles,

@@ -8,6 +8,7 @@ mod geometry;
 mod links;
 mod model;
 mod place;
+mod seen_lights;
 mod text;
 mod trace;
 mod trees;
@@ -34,6 +35,7 @@ use crate::shape::{Disk, Parallelogram, PlaneSide, Sphere};
 use crate::texture::Texture;
 pub(crate) use geometry::{At, Geometry, Item, Meets, Nearest, Placed, Target};
 pub(crate) use links::LinkId;
+use seen_lights::SeenLights;
 pub(crate) use trees::ShadowRays;
 
 /// A scene, ready to be rendered: flat lists and ids. Between here and the image nothing can fail.
@@ -52,6 +54,8 @@ pub struct Scene {
     pub(crate) display: Display,
     pub(crate) geometry: Arc<Geometry>,
     pub(crate) lights: Vec<Light>,
+    /// Those of them that a camera can see.
+    pub(crate) seen_lights: Arc<SeenLights>,
     pub(crate) materials: Vec<Material>,
     pub(crate) textures: Vec<Texture>,
     /// The listed spheres that stand in the way of light.

@@ -65,15 +65,23 @@ impl Scene {
             }
         }
         let first_light = self.geometry.surfaces.len();
-        for (i, light) in self.lights.iter().enumerate() {
-            if let LightKind::Area(area) = &light.kind
-                && area.visible
-                && let Some(t) = area.shape.intersect(ray)
-            {
-                nearest.offer(t, SurfaceId((first_light + i) as u32), At::Light);
-            }
+        if !self.seen_lights.all.is_empty() {
+            self.meet_lights(ray, first_light as u32, &mut nearest);
         }
         nearest
+    }
+
+    /// What the ray meets first of the lights.
+    #[inline(never)]
+    fn meet_lights(&self, ray: &Ray, first: u32, nearest: &mut Nearest) {
+        self.seen_lights.meet(self.level, ray, nearest.limit(), |light, limit| {
+            if let LightKind::Area(area) = &self.lights[light as usize].kind
+                && let Some(t) = area.shape.intersect(ray)
+            {
+                nearest.offer(t, SurfaceId(first + light), At::Light);
+            }
+            *limit = nearest.limit();
+        });
     }
 
     /// Whether anything that casts shadows for the ray's light stands between a surface and it. Any hit will do, so the order

@@ -12,6 +12,7 @@
 
 mod mask;
 mod occluders;
+mod outlook;
 mod settle;
 mod shaft;
 mod target;
@@ -20,6 +21,7 @@ mod tests;
 mod view;
 
 pub(crate) use occluders::{Occluders, ShadowMesh};
+pub(crate) use outlook::{Outlook, Seen};
 pub(crate) use settle::{Settled, Settler};
 pub(crate) use target::Target;
 pub(crate) use view::{View, Visibility};

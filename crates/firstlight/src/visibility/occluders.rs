@@ -355,14 +355,32 @@ impl Occluders {
         }
         let indices = &[0, 1][..if reach > 0.0 { 2 } else { 1 }];
         let shaft = Shaft::of(&points, indices, &target.hull);
+        self.gather_in(level, scene, target, &shaft, &points, indices, cap);
+    }
+
+    /// Gathers what of the trees lies in a shaft from those of `points` in `indices`: at most `cap` leaves. The same with every
+    /// instruction set.
+    #[inline(never)]
+    #[allow(clippy::too_many_arguments, reason = "a light of a scene, and points")]
+    pub fn gather_in(
+        &mut self,
+        level: Level,
+        scene: &Scene,
+        target: &Target,
+        shaft: &Shaft,
+        points: &[Viewpoint],
+        indices: &[u32],
+        cap: usize,
+    ) {
+        self.clear();
         let gathered = dispatch_sixteen!(
             level,
-            simd => self.gather_trees::<_, true>(simd, scene, target, &shaft, &points, indices, cap),
+            simd => self.gather_trees::<_, true>(simd, scene, target, shaft, points, indices, cap),
             else {
                 let simd = baseline();
                 simd.vectorize(
                     #[inline(always)]
-                    || self.gather_trees::<_, true>(simd, scene, target, &shaft, &points, indices, cap),
+                    || self.gather_trees::<_, true>(simd, scene, target, shaft, points, indices, cap),
                 )
             }
         );

@@ -13,6 +13,7 @@ mod exact_scenes;
 mod geometry;
 mod known;
 mod links;
+mod many_lights;
 mod random;
 mod robust;
 mod scenes;

@@ -1,0 +1,565 @@
+//! Many lights: what arrives at the patches of a cell where not every light is asked for at every one.
+//!
+//! For each block of pixels a [`Cut`] says which lights count: nodes of the [`LightTree`](crate::light::LightTree) that are seen
+//! whole from all of it, and nodes that have to be looked at from each patch. What is dropped, and what is lost by taking many
+//! lights for one, stays below [`BLOCK_BUDGET`] and [`PATCH_BUDGET`] together, in display steps.
+//!
+//! Up to [`SINGLY`] lights are all taken one by one; above, many may be taken for one. Cells and blocks lie on a grid of the
+//! film, so nothing depends on tiles, crops or threads.
+
+use std::ops::{ControlFlow, Range};
+
+use super::Counts;
+use super::arrival::{Arrival, Arrivals, Place};
+use super::cut::{Cut, Tone, Walk};
+use super::patch::{Patch, PixelPatches};
+use super::tiled::{ACROSS, BEND, CELL, second_difference};
+use crate::color::Rgb;
+use crate::ids::LightId;
+use crate::integrate::Sums;
+use crate::light::{LightTree, Sent, Zone};
+use crate::material::{Bsdf, Lobe};
+use crate::math::{Arc, Vec3, square};
+use crate::scene::Scene;
+use crate::shape::SurfaceInteraction;
+use crate::visibility::{Outlook, Seen, Viewpoint};
+
+/// So few lights are all asked for everywhere, and none is left out.
+pub(crate) const FEW: usize = 16;
+/// So many lights are at most taken one by one; of more, many may be taken for one.
+pub(crate) const SINGLY: usize = 1000;
+/// In display steps: how far what is settled for a block may be wrong, and what is settled for a patch.
+const BLOCK_BUDGET: f32 = 0.45;
+const PATCH_BUDGET: f32 = 0.4;
+/// In display steps: how far all lights that are integrated one by one may be wrong together.
+const INTEGRALS: f32 = 0.15;
+/// Pixels across a block.
+const BLOCK: usize = 8;
+const BLOCKS: usize = CELL as usize / BLOCK;
+/// Colours of a block that are told apart.
+const TONES: usize = 8;
+
+/// What arrives at the patches of one cell. Keeps its memory.
+pub(super) struct Many<'a> {
+    scene: &'a Scene,
+    tree: &'a LightTree,
+    together: bool,
+    eye: Vec3,
+    outlook: Outlook,
+    cut: Cut,
+    /// Of each patch of the cell, in the order of pixels.
+    patches: Vec<Stored>,
+    /// The lights that were asked for one by one, patch by patch, in scene order.
+    singles: Vec<Single>,
+    /// Nodes that are taken for one, list by list.
+    lit: Vec<u32>,
+    terms: Vec<(u32, [Rgb; 2])>,
+    doubts: Vec<Doubt>,
+}
+
+/// One light at one patch.
+#[derive(Clone, Copy)]
+struct Single {
+    light: u32,
+    arrival: Arrival,
+}
+
+/// What arrives at one patch.
+#[derive(Clone, Default)]
+struct Stored {
+    singles: Range<u32>,
+    /// The nodes of its block, and its own.
+    lit: [Range<u32>; 2],
+    /// What those send, and how far the mean over the patch can be from it.
+    sent: Sent,
+    bend: Sent,
+    value: Rgb,
+}
+
+/// A light, or all that are taken together, whose mean over a patch is in doubt.
+#[derive(Clone, Copy)]
+struct Doubt {
+    shown: f32,
+    /// Among the singles; `None` for the rest.
+    single: Option<u32>,
+    error: Rgb,
+}
+
+/// Where a patch is: its pixel in the cell with its rim, and which of the pixel's it is.
+type At = (usize, usize);
+
+impl<'a> Many<'a> {
+    pub fn new(scene: &'a Scene, tree: &'a LightTree) -> Self {
+        Many {
+            scene,
+            tree,
+            together: scene.lights.len() > SINGLY && scene.geometry.links.is_empty(),
+            eye: scene.camera.frame().position,
+            outlook: Outlook::default(),
+            cut: Cut::default(),
+            patches: Vec::new(),
+            singles: Vec::new(),
+            lit: Vec::new(),
+            terms: Vec::new(),
+            doubts: Vec::new(),
+        }
+    }
+
+    /// Finds out what arrives at the middle of each patch of a cell and its rim. `first` says where each pixel's patches begin among
+    /// all.
+    pub fn look(
+        &mut self,
+        pixels: &[PixelPatches],
+        first: &mut [usize],
+        arrivals: &mut Arrivals<'a>,
+        counts: &mut Counts,
+        go_on: &impl Fn() -> ControlFlow<()>,
+    ) -> ControlFlow<()> {
+        let mut all = 0;
+        for (first, pixel) in first.iter_mut().zip(pixels) {
+            *first = all;
+            all += pixel.patches.len();
+        }
+        self.patches.clear();
+        self.patches.resize(all, Stored::default());
+        self.singles.clear();
+        self.lit.clear();
+        let mut groups: Vec<Vec<At>> = Vec::new();
+        for block in 0..BLOCKS * BLOCKS {
+            go_on()?;
+            groups.iter_mut().for_each(Vec::clear);
+            // The rim belongs to the blocks beside it
+            let side = |b: usize| {
+                let from = if b == 0 { 0 } else { 1 + b * BLOCK };
+                from..if b + 1 == BLOCKS { ACROSS } else { 1 + (b + 1) * BLOCK }
+            };
+            for y in side(block / BLOCKS) {
+                for x in side(block % BLOCKS) {
+                    let index = y * ACROSS + x;
+                    for (k, patch) in pixels[index].patches.iter().enumerate() {
+                        let same = |group: &&mut Vec<At>| {
+                            group.first().is_none_or(|(i, k)| is_alike(&pixels[*i].patches[*k], patch))
+                        };
+                        match groups.iter_mut().find(same) {
+                            Some(group) => group.push((index, k)),
+                            None => groups.push(vec![(index, k)]),
+                        }
+                    }
+                }
+            }
+            for group in groups.iter().filter(|group| !group.is_empty()) {
+                self.group(pixels, first, group, arrivals, counts);
+            }
+        }
+        ControlFlow::Continue(())
+    }
+
+    /// The places of a block that lie on one surface.
+    fn group(
+        &mut self,
+        pixels: &[PixelPatches],
+        first: &[usize],
+        group: &[At],
+        arrivals: &mut Arrivals<'a>,
+        counts: &mut Counts,
+    ) {
+        let scene = self.scene;
+        let tree = self.tree;
+        let patch = |(index, k): &At| &pixels[*index].patches[*k];
+        let zone = zone(group.iter().map(patch), self.eye);
+        let tones = tones(scene, group.iter().map(patch));
+        let one = patch(&group[0]);
+        let receives = group.iter().any(|at| patch(at).si.receives_shadow);
+        let places = group.iter().map(|at| standing(patch(at)));
+        self.outlook.stand(scene, places);
+        let (outlook, level) = (&mut self.outlook, arrivals.level());
+        let walk = Walk {
+            tree,
+            steps: arrivals.display_steps(),
+            zone: &zone,
+            tones: &tones,
+            budget: BLOCK_BUDGET,
+            together: self.together,
+        };
+        let links = scene.geometry.lights_of(one.si.surface);
+        let shines = |light: u32| scene.geometry.links.contains(links, LightId(light));
+        self.cut.of_block(
+            &walk,
+            &mut |node, light| {
+                if !(receives && node.shadows) {
+                    return Seen::Whole;
+                }
+                outlook.look(level, scene, node.shine.low, node.shine.high, LightId(light))
+            },
+            &shines,
+        );
+        let start = self.lit.len() as u32;
+        self.lit.extend(&self.cut.lit);
+        let block = start..self.lit.len() as u32;
+        let open = std::mem::take(&mut self.cut.open);
+        let error = self.cut.error();
+        for at in group {
+            let number = first[at.0] + at.1;
+            let patch = patch(at);
+            let singles = self.singles.len();
+            let mut stored = self.patch(patch, block.clone(), &open, arrivals, counts);
+            let bsdf = &patch.bsdf;
+            let shown = arrivals.steps(stored.value, bsdf.diffuse * error[0] + bsdf.specular * error[1]);
+            if shown > BLOCK_BUDGET {
+                // Darker than was guessed: by itself, from the beginning
+                self.singles.truncate(singles);
+                stored = self.patch(patch, 0..0, &tree.roots, arrivals, counts);
+            }
+            self.count(&stored, counts);
+            self.patches[number] = stored;
+        }
+        self.cut.open = open;
+    }
+
+    /// What arrives at one patch.
+    fn patch(
+        &mut self,
+        patch: &Patch,
+        block: Range<u32>,
+        open: &[u32],
+        arrivals: &mut Arrivals<'a>,
+        counts: &mut Counts,
+    ) -> Stored {
+        let (scene, tree) = (self.scene, self.tree);
+        let (si, bsdf) = (&patch.si, &patch.bsdf);
+        let mut stored = Stored { lit: [block, 0..0], ..Stored::default() };
+        self.add(patch, 0, &mut stored);
+        let base = scene.ambient * bsdf.ambient;
+        let value = base + bsdf.diffuse * stored.sent[0] + bsdf.specular * stored.sent[1];
+        let from = self.singles.len();
+        stored.value = value;
+        if !open.is_empty() {
+            arrivals.look_around(si);
+            arrivals.tolerate(INTEGRALS / open.len() as f32);
+            let zone = zone(std::iter::once(patch), self.eye);
+            let tones = [tone(scene, bsdf)];
+            let steps = arrivals.display_steps();
+            let walk = Walk { tree, steps, zone: &zone, tones: &tones, budget: PATCH_BUDGET, together: self.together };
+            let (outlook, singles, level) = (&mut self.outlook, &mut self.singles, arrivals.level());
+            let mut stands = false;
+            stored.value = self.cut.of_patch(
+                &walk,
+                open,
+                value,
+                &mut |node, light| {
+                    if !(si.receives_shadow && node.shadows) {
+                        return Seen::Whole;
+                    }
+                    if !stands {
+                        outlook.stand(scene, std::iter::once(standing(patch)));
+                        stands = true;
+                    }
+                    outlook.look(level, scene, node.shine.low, node.shine.high, LightId(light))
+                },
+                &mut |light, value| {
+                    let scale = arrivals.scale(light as usize);
+                    let colors = [scale * bsdf.diffuse, scale * bsdf.specular];
+                    let (reach, turn, off) = (patch.reach, patch.turn, patch.off);
+                    let place = Place { si, lobe: &bsdf.lobe, reach, turn, off, base: value, colors };
+                    let arrival = arrivals.arrival(light as usize, &place, counts);
+                    singles.push(Single { light, arrival });
+                    colors[0] * arrival.sums.diffuse + colors[1] * arrival.sums.specular
+                },
+            );
+            let start = self.lit.len() as u32;
+            self.lit.extend(&self.cut.lit);
+            stored.lit[1] = start..self.lit.len() as u32;
+            let before = stored.sent;
+            self.add(patch, 1, &mut stored);
+            for (color, i) in [(bsdf.diffuse, 0), (bsdf.specular, 1)] {
+                stored.value += color * (stored.sent[i] + before[i] * -1.0);
+            }
+        }
+        self.singles[from..].sort_unstable_by_key(|single| single.light);
+        stored.singles = from as u32..self.singles.len() as u32;
+        stored
+    }
+
+    fn count(&self, stored: &Stored, counts: &mut Counts) {
+        let together: u32 = self.nodes(stored).map(|node| self.tree.nodes[node as usize].count).sum();
+        counts.lights.pairs += self.scene.lights.len() as u64;
+        counts.lights.singly += stored.singles.len() as u64;
+        counts.lights.nodes += stored.lit.iter().map(Range::len).sum::<usize>() as u64;
+        counts.lights.together += u64::from(together);
+    }
+
+    /// The nodes that are taken for one.
+    fn nodes(&self, stored: &Stored) -> impl Iterator<Item = u32> + '_ {
+        let [a, b] = stored.lit.clone().map(|range| &self.lit[range.start as usize..range.end as usize]);
+        a.iter().chain(b).copied()
+    }
+
+    /// Adds what the nodes of one list send.
+    fn add(&self, patch: &Patch, list: usize, stored: &mut Stored) {
+        let (si, lobe) = (&patch.si, &patch.bsdf.lobe);
+        let range = &stored.lit[list];
+        for node in &self.lit[range.start as usize..range.end as usize] {
+            let node = &self.tree.nodes[*node as usize];
+            let sent = node.send(si.lit_from, si.ns, si.wo, lobe);
+            stored.sent = [stored.sent[0] + sent[0], stored.sent[1] + sent[1]];
+            if patch.reach > 0.0 {
+                let swing = patch.turn + patch.reach / node.distance(si.lit_from).max(patch.reach);
+                let smooth = (swing * swing + 2.0 * swing * patch.off).min(1.0) * SMOOTH;
+                let weight = node.weight(si.lit_from);
+                let moved = swing + patch.turn;
+                let narrow = (lobe_sharpness(lobe, si) * square(moved)).min(1.0);
+                let narrow = (narrow + 2.0 * narrow.sqrt() * patch.off).min(1.0);
+                let specular = if matches!(lobe, Lobe::None) { 0.0 } else { (narrow + smooth).min(1.0) };
+                stored.bend = [
+                    stored.bend[0] + node.power * (weight * smooth),
+                    stored.bend[1] + node.power * (weight * specular),
+                ];
+            }
+        }
+    }
+
+    /// The colour of a pixel's surfaces, but for emission and ambient light: what each ray sees, added up. `add` hears each
+    /// light's diffuse part and highlight, in scene order, and last what is taken together.
+    pub fn finish(
+        &mut self,
+        pixels: &[PixelPatches],
+        first: &[usize],
+        index: usize,
+        at: [u32; 2],
+        arrivals: &mut Arrivals<'a>,
+        counts: &mut Counts,
+        mut add: impl FnMut([Rgb; 2]),
+    ) {
+        let scene = self.scene;
+        let mut terms = std::mem::take(&mut self.terms);
+        terms.clear();
+        let mut together = [Rgb::BLACK; 2];
+        for (k, patch) in pixels[index].patches.iter().enumerate() {
+            let count = patch.count(scene) as f32;
+            let stored = &self.patches[first[index] + k];
+            let mut doubts = std::mem::take(&mut self.doubts);
+            self.doubts_of(pixels, first, (index, k), arrivals, &mut doubts);
+            doubts.sort_unstable_by_key(|doubt| doubt.single);
+            let in_doubt = |single: Option<u32>| doubts.binary_search_by_key(&single, |doubt| doubt.single).is_ok();
+            let bsdf = &patch.bsdf;
+            if !in_doubt(None) {
+                together[0] += bsdf.diffuse * stored.sent[0] * count;
+                together[1] += bsdf.specular * stored.sent[1] * count;
+            }
+            for i in stored.singles.clone() {
+                if !in_doubt(Some(i)) {
+                    let Single { light, arrival } = self.singles[i as usize];
+                    let scale = arrivals.scale(light as usize) * count;
+                    let diffuse = scale * bsdf.diffuse * arrival.sums.diffuse;
+                    terms.push((light, [diffuse, scale * bsdf.specular * arrival.sums.specular]));
+                }
+            }
+            if !doubts.is_empty() {
+                arrivals.tolerate(INTEGRALS / doubts.len() as f32);
+                patch.for_each(scene, at, |si, bsdf| {
+                    arrivals.look_around(si);
+                    for doubt in &doubts {
+                        match doubt.single {
+                            Some(i) => {
+                                let light = self.singles[i as usize].light;
+                                terms.push((light, at_ray(scene, light as usize, si, bsdf, arrivals, counts)));
+                            }
+                            None => {
+                                for node in self.nodes(stored) {
+                                    let node = &self.tree.nodes[node as usize];
+                                    let sent = node.send(si.lit_from, si.ns, si.wo, &bsdf.lobe);
+                                    together[0] += bsdf.diffuse * sent[0];
+                                    together[1] += bsdf.specular * sent[1];
+                                }
+                            }
+                        }
+                    }
+                });
+            }
+            self.doubts = doubts;
+        }
+        // In scene order
+        terms.sort_by_key(|(light, _)| *light);
+        for same in terms.chunk_by(|a, b| a.0 == b.0) {
+            add(same.iter().fold([Rgb::BLACK; 2], |sum, (_, term)| [sum[0] + term[0], sum[1] + term[1]]));
+        }
+        add(together);
+        self.terms = terms;
+    }
+
+    /// What of the light at a patch has to be asked for at each ray. All the rest may together bend by as much as one may.
+    fn doubts_of(
+        &self,
+        pixels: &[PixelPatches],
+        first: &[usize],
+        (index, k): At,
+        arrivals: &Arrivals,
+        doubts: &mut Vec<Doubt>,
+    ) {
+        doubts.clear();
+        let patch = &pixels[index].patches[k];
+        let stored = &self.patches[first[index] + k];
+        let (bsdf, value) = (&patch.bsdf, stored.value);
+        let mut all = Rgb::BLACK;
+        let mut doubt = |single: Option<u32>, error: Rgb| {
+            all += error;
+            doubts.push(Doubt { shown: 0.0, single, error });
+        };
+        if stored.lit.iter().any(|range| !range.is_empty()) {
+            doubt(None, bsdf.diffuse * stored.bend[0] + bsdf.specular * stored.bend[1]);
+        }
+        let shown = |light: u32, bend: &Sums| {
+            let scale = arrivals.scale(light as usize);
+            scale * bsdf.diffuse * bend.diffuse + scale * bsdf.specular * bend.specular
+        };
+        for i in stored.singles.clone() {
+            let Single { light, arrival } = &self.singles[i as usize];
+            doubt(Some(i), shown(*light, &arrival.bend));
+        }
+        if patch.uneven {
+            return;
+        }
+        if arrivals.steps(value, all) <= BEND {
+            doubts.clear();
+            return;
+        }
+        for doubt in &mut *doubts {
+            doubt.shown = arrivals.steps(value, doubt.error);
+        }
+        // The least first: as many as will do together
+        doubts.sort_unstable_by(|a, b| a.shown.total_cmp(&b.shown).then(a.single.cmp(&b.single)));
+        let mut sum = Rgb::BLACK;
+        doubts.retain(|doubt| {
+            if arrivals.steps(value, sum + doubt.error) <= BEND {
+                sum += doubt.error;
+                return false;
+            }
+            let Some(i) = doubt.single else { return true };
+            let here = &self.singles[i as usize];
+            if !here.arrival.resolved || !patch.is_whole(self.scene) {
+                return true;
+            }
+            let arrived = |index: usize| {
+                let stored = &self.patches[first[index]];
+                let range = stored.singles.start as usize..stored.singles.end as usize;
+                let singles = &self.singles[range];
+                let found = singles.binary_search_by_key(&here.light, |single| single.light).ok()?;
+                Some(singles[found].arrival.sums)
+            };
+            let Some(bend) = second_difference(self.scene, pixels, index, patch, &here.arrival.sums, arrived) else {
+                return true;
+            };
+            let error = shown(here.light, &bend);
+            if arrivals.steps(value, sum + error) <= BEND {
+                sum += error;
+                return false;
+            }
+            true
+        });
+    }
+}
+
+/// No second derivative of what a far light sends is above this, over the square of its distance, and what it sends.
+const SMOOTH: f32 = 3.0;
+
+/// What one light sends to where one camera ray ends.
+fn at_ray(
+    scene: &Scene,
+    light: usize,
+    si: &SurfaceInteraction,
+    bsdf: &Bsdf,
+    arrivals: &mut Arrivals,
+    counts: &mut Counts,
+) -> [Rgb; 2] {
+    let scale = arrivals.scale(light);
+    let colors = [scale * bsdf.diffuse, scale * bsdf.specular];
+    let base = scene.ambient * bsdf.ambient;
+    let place = Place { si, lobe: &bsdf.lobe, reach: 0.0, turn: 0.0, off: 0.0, base, colors };
+    let sums = arrivals.arrival(light, &place, counts).sums;
+    [colors[0] * sums.diffuse, colors[1] * sums.specular]
+}
+
+/// Whether two patches can be looked at together.
+fn is_alike(a: &Patch, b: &Patch) -> bool {
+    a.si.surface == b.si.surface && a.bsdf.lobe == b.bsdf.lobe && a.si.ns.dot(b.si.ns) > 0.8
+}
+
+fn standing(patch: &Patch) -> (Viewpoint, f32, bool) {
+    (Viewpoint::of(&patch.si), patch.reach, patch.turn > 0.0)
+}
+
+/// The direction that the middle of a highlight comes from.
+fn mirror(si: &SurfaceInteraction) -> Vec3 {
+    si.ns * (2.0 * si.ns.dot(si.wo)) - si.wo
+}
+
+/// The zone of some patches, of one surface and one highlight.
+fn zone<'p>(patches: impl Iterator<Item = &'p Patch> + Clone, eye: Vec3) -> Zone {
+    let (mut low, mut high) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
+    let (mut n, mut m, mut w) = (Vec3::ZERO, Vec3::ZERO, Vec3::ZERO);
+    let mut lobe = Lobe::None;
+    for Patch { si, bsdf, .. } in patches.clone() {
+        (low, high) = (low.min(si.lit_from), high.max(si.lit_from));
+        (n, m, w) = (n + si.ns, m + mirror(si), w + si.wo);
+        lobe = bsdf.lobe;
+    }
+    let center = low + (high - low) * 0.5;
+    let (n, m, w) = (n.normalize_or(Vec3::Y), m.normalize_or(Vec3::Y), w.normalize_or(Vec3::Y));
+    let (mut reach, mut turn, mut blur, mut wo_turn) = (0.0f32, 0.0f32, 0.0f32, 0.0f32);
+    for Patch { si, reach: around, turn: turns, .. } in patches {
+        let swing = around / (si.lit_from - eye).length().max(*around).max(f32::MIN_POSITIVE);
+        reach = reach.max((si.lit_from - center).length() + around);
+        turn = turn.max((si.ns - n).length().max((si.horizon - n).length()) + turns);
+        blur = blur.max((mirror(si) - m).length() + 2.0 * turns + swing);
+        wo_turn = wo_turn.max((si.wo - w).length() + swing);
+    }
+    Zone {
+        center,
+        reach,
+        n,
+        turn: Arc::of_chord(turn),
+        mirror: m,
+        blur: Arc::of_chord(blur),
+        wo: w,
+        wo_turn: Arc::of_chord(wo_turn),
+        lobe,
+    }
+}
+
+fn tone(scene: &Scene, bsdf: &Bsdf) -> Tone {
+    Tone { base: scene.ambient * bsdf.ambient, known: bsdf.diffuse, error: [bsdf.diffuse, bsdf.specular] }
+}
+
+/// The colours of some patches: each once, or where they are too many the rest as one.
+fn tones<'p>(scene: &Scene, patches: impl Iterator<Item = &'p Patch>) -> Vec<Tone> {
+    let mut tones: Vec<Tone> = Vec::with_capacity(TONES);
+    for patch in patches {
+        let new = tone(scene, &patch.bsdf);
+        let same = |tone: &Tone| tone.known == new.known && tone.error == new.error && tone.base == new.base;
+        if tones.iter().any(same) {
+            continue;
+        }
+        if tones.len() < TONES {
+            tones.push(new);
+            continue;
+        }
+        let last = &mut tones[TONES - 1];
+        let least = |a: Rgb, b: Rgb| Rgb::new(a.r.min(b.r), a.g.min(b.g), a.b.min(b.b));
+        let most = |a: Rgb, b: Rgb| Rgb::new(a.r.max(b.r), a.g.max(b.g), a.b.max(b.b));
+        *last = Tone {
+            base: least(last.base, new.base),
+            known: least(last.known, new.known),
+            error: [most(last.error[0], new.error[0]), most(last.error[1], new.error[1])],
+        };
+    }
+    tones
+}
+
+/// k, where a highlight falls as exp(-k a^2) with the angle a of the light's direction.
+fn lobe_sharpness(lobe: &Lobe, si: &SurfaceInteraction) -> f32 {
+    match lobe {
+        Lobe::None => 0.0,
+        Lobe::Phong(lobe) => 0.5 * lobe.exponent(),
+        Lobe::BlinnPhong(lobe) => 0.125 * lobe.exponent() / square(si.ns.dot(si.wo)).max(0.01),
+    }
+}
