@@ -12,6 +12,7 @@ use fearless_simd::{f32x16, prelude::*};
 
 use super::hider::{Hider, Interval};
 use super::rules::{EMBEDDED_WEIGHTS, KRONROD, KRONROD_WEIGHTS, gauss};
+use super::tensor::sharpness;
 use super::view::{Outline, View};
 use super::{Sums, Wanted};
 use crate::material::Lobe;
@@ -22,6 +23,8 @@ pub(crate) const MAX_HIDERS: usize = 8;
 /// The most panels that a light is cut into.
 const MAX_PANELS: usize = 64;
 
+/// Highlights narrower than this, in half heights of the light and standard deviations, may lie between the rows of a panel.
+const BETWEEN_ROWS: f32 = 0.1;
 /// How often the distance of rows from a highlight is made four times as large, where panels end around it.
 const GRADES: usize = 6;
 
@@ -116,10 +119,12 @@ fn cuts(view: &View, hiders: &[Hider], region: &Region, wanted: Wanted) -> Array
             offer(f64::from(y));
         }
     }
-    if wanted.specular && region.y == Region::WHOLE.y && !matches!(view.lobe, Lobe::None) {
-        // A highlight on a light that is near may lie between all rows of a panel, and they would agree that there is none
-        let mut around = |y: f32, width: f32| {
-            let mut off = width;
+    // A highlight on a light that is near may lie between all rows of a panel, and they would agree that there is none
+    let sharpness = sharpness(view);
+    let width = view.height / (view.lb * (2.0 * sharpness).sqrt());
+    if wanted.specular && sharpness > 0.0 && width < BETWEEN_ROWS && region.y == Region::WHOLE.y {
+        let mut around = |y: f32| {
+            let mut off = 3.0 * width;
             for _ in 0..GRADES {
                 if !(off < 1.0) {
                     break;
@@ -129,9 +134,9 @@ fn cuts(view: &View, hiders: &[Hider], region: &Region, wanted: Wanted) -> Array
                 off *= 4.0;
             }
         };
-        around(-view.fb / view.lb, view.height / view.lb);
+        around(-view.fb / view.lb);
         if let Some(y) = view.highlight() {
-            around(y, view.height / view.lb);
+            around(y);
         }
     }
     // Room for both ends
