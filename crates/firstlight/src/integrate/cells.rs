@@ -13,10 +13,9 @@ use crate::math::{LANES, Vec3};
 /// end, where there is doubt.
 const FIRST: usize = 32;
 const EVERYWHERE: usize = 128;
-const LAST: usize = 2048;
-/// Standard deviations that an answer may be wrong by. An edge that lies on the light itself (something cuts it) is the same for
-/// all of a surface, so there all of it is wrong alike, and a few in a hundred would be seen by who compares.
-const SURE: f64 = 6.0;
+const LAST: usize = 1024;
+/// Standard deviations that an answer may be wrong by.
+const SURE: f64 = 3.0;
 /// The most cells in doubt that are cut.
 const MOST: usize = 1 << 17;
 
@@ -149,7 +148,7 @@ fn ask(source: &impl Source, side: usize, places: &[[u32; 2]], cells: &mut Vec<C
     }
 }
 
-/// What arrives, and how far it may be wrong: six times its standard deviation, if the points were chosen by chance. Both are parts of
+/// What arrives, and how far it may be wrong: three times its standard deviation, if the points were chosen by chance. Both are parts of
 /// the light's measure; or, where `whole` says what would arrive with nothing in the way, as much as that makes.
 pub(super) fn integrate(
     source: &impl Source,
@@ -273,7 +272,7 @@ mod tests {
             let (sums, error) = integrate(&Through(&shape), whole, &|_, error| error.diffuse <= wanted);
             let off = f64::from(sums.diffuse) - truth;
             assert!(error.diffuse <= wanted, "an error of {} remains", error.diffuse);
-            // Six standard deviations
+            // Three standard deviations
             assert!(off.abs() <= f64::from(wanted), "{} is off by {off:e}", sums.diffuse);
         }
     }

@@ -27,9 +27,8 @@ pub(crate) const MAX_HIDERS: usize = 8;
 /// The most panels that a light is cut into.
 const MAX_PANELS: usize = 64;
 
-/// How often the distance of rows from a highlight is made four times as large, where panels end around it.
-const GRADES: usize = 6;
-
+/// Highlights narrower than this, in half heights of the light and standard deviations, may lie between the rows of a panel.
+const BETWEEN_ROWS: f32 = 0.1;
 /// The part of a light that is integrated, and in how many pieces along a row.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Region {
@@ -163,22 +162,20 @@ fn cuts(view: &View, hiders: &[Hider], region: &Region, wanted: Wanted) -> Array
             offer(f64::from(y));
         }
     }
-    if wanted.specular && region.y == Region::WHOLE.y && !matches!(view.lobe, Lobe::None) {
-        // A highlight on a light that is near may lie between all rows of a panel, and they would agree that there is none
-        let mut around = |y: f32, width: f32| {
-            let mut off = width;
-            for _ in 0..GRADES {
-                if !(off < 1.0) {
-                    break;
-                }
-                offer(f64::from(y - off));
-                offer(f64::from(y + off));
-                off *= 4.0;
-            }
-        };
-        around(-view.fb / view.lb, view.height / view.lb);
-        if let Some(y) = view.highlight() {
-            around(y, view.height / view.lb);
+    // A highlight on a light that is near may lie between all rows of a panel, and they would agree that there is none
+    let sharpness = sharpness(view);
+    let spread = 1.0 / (2.0 * sharpness).sqrt();
+    if wanted.specular
+        && sharpness > 0.0
+        && view.height * spread < BETWEEN_ROWS * view.lb
+        && region.y == Region::WHOLE.y
+        && let Some((y, distance)) = view.highlight()
+    {
+        // Across the line of sight, and along it
+        let width = 4.0 * spread * distance / view.lb;
+        for off in [width, width * distance / view.height] {
+            offer(f64::from(y - off));
+            offer(f64::from(y + off));
         }
     }
     // Room for both ends
@@ -190,15 +187,15 @@ fn cuts(view: &View, hiders: &[Hider], region: &Region, wanted: Wanted) -> Array
 }
 
 impl View {
-    /// The row on which the direction of a highlight's middle meets the light's plane, if it does.
-    fn highlight(&self) -> Option<f32> {
+    /// The row on which the direction of a highlight's middle meets the light's plane, if it does, and how far away that is.
+    fn highlight(&self) -> Option<(f32, f32)> {
         let m = self.mirror()?;
         let n = self.a.cross(self.b);
         let n = n / n.length();
         let t = n.dot(self.l0) / n.dot(m);
         let along_b = (self.b - self.a * (self.skew / self.la)) / self.lb;
         let y = (t * m.dot(along_b) - self.fb) / self.lb;
-        (t > 0.0 && y.is_finite()).then_some(y)
+        (t > 0.0 && y.is_finite()).then_some((y, t))
     }
 }
 
