@@ -182,17 +182,19 @@ pub struct RenderArgs {
     /// Antialiasing by N x N camera rays in each pixel, 1 to 64; 4 is "4X" [default: the scene's]
     #[arg(long, value_name = "N", value_parser = whole::<u32>(1, 64), help_heading = "Quality")]
     pub aa: Option<u32>,
-    /// Points sampled on every area light, 1 to 1048576, or exact: they are integrated, not sampled [default: the scene's]
+    /// What is done with every area light: exact, it is integrated, or the number of points that it is sampled at, 1 to 1048576
+    /// [default: the scene's, which is exact unless it says otherwise]
     #[arg(long, value_name = "N|exact", value_parser = samples, help_heading = "Quality")]
     pub samples: Option<SamplesDesc>,
     /// How edges are smoothed: full lights every camera ray, adaptive lights each surface in a pixel once where that is enough
-    /// [default: full]
+    /// [default: adaptive]
     #[arg(long, value_name = "MODE", help_heading = "Quality")]
     pub aa_mode: Option<AntialiasingMode>,
     /// What is made of the border of light and dark on meshes with smooth normals [default: the scene's]
     #[arg(long, value_name = "WORD", help_heading = "Quality")]
     pub shadow_terminator: Option<Terminator>,
-    /// Renders by the plainest code there is: the same bytes, slowly
+    /// Renders by the plainest code there is, slowly: every camera ray, every point of every light. The bytes are those of
+    /// --aa-mode full where lights are sampled; lights that are integrated are sampled at 4096 points
     #[arg(long, help_heading = "Quality")]
     pub reference: bool,
 

@@ -178,7 +178,7 @@ impl Default for RenderSettings {
             tile_size: 16,
             simd: SimdLevel::Auto,
             crop: None,
-            aa_mode: AaMode::Full,
+            aa_mode: AaMode::Adaptive,
             visibility: VisibilityMode::Shafts,
             reference: false,
             heat: false,

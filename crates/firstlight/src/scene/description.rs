@@ -19,8 +19,8 @@ words! {
     }
 }
 
-/// How area lights are sampled in a scene that does not say it.
-const DEFAULT_SAMPLES: SamplesDesc = SamplesDesc::Count(400);
+/// What is done with area lights in a scene that does not say it.
+const DEFAULT_SAMPLES: SamplesDesc = SamplesDesc::Exact;
 
 table! {
     /// The picture: `[render]`.
@@ -38,8 +38,8 @@ table! {
         pub height: u32 = 1024,
         /// n of the n x n camera rays in each pixel, 1 to 64; 4 is "4X".
         pub antialiasing: u32 = 4,
-        /// Points sampled on each area light that does not say its own, 1 to 1048576, or `"exact"`: they are integrated, not
-        /// sampled.
+        /// What is done with each area light that does not say its own: `"exact"`, it is integrated, or the number of points that
+        /// it is sampled at, 1 to 1048576.
         pub samples: SamplesDesc = DEFAULT_SAMPLES,
         /// What is made of the border of light and dark on meshes with smooth normals.
         pub shadow_terminator: ShadowTerminator = ShadowTerminator::Smooth,
