@@ -60,12 +60,8 @@ pub fn run(options: &Options) -> Outcome {
         let from = options.size.saturating_sub(part) / 2;
         Window { x: from, y: from, width: part.min(options.size), height: part.min(options.size) }
     });
-    let fast = RenderSettings {
-        threads: Some(options.threads),
-        aa_mode: AaMode::Adaptive,
-        crop,
-        ..RenderSettings::default()
-    };
+    let fast =
+        RenderSettings { threads: Some(options.threads), aa_mode: AaMode::Adaptive, crop, ..RenderSettings::default() };
     let picture = |settings: &RenderSettings| {
         let start = Instant::now();
         let ControlFlow::Continue((film, stats)) = render(&scene, settings, &|_, _| ControlFlow::Continue(())) else {
@@ -121,7 +117,10 @@ fn hall(options: &Options) -> SceneDesc {
     scene.materials.push(("wall".into(), paint([0.7, 0.6, 0.5], 0.0, 1.0)));
     scene.materials.push(("ball".into(), paint([0.5, 0.5, 0.7], 0.3, 40.0)));
     let flat = |p: [f64; 3], e0: [f64; 3], e1: [f64; 3], material: &str| {
-        ShapeDesc::Parallelogram(ParallelogramDesc { material: Some(material.into()), ..ParallelogramDesc::new(p, e0, e1) })
+        ShapeDesc::Parallelogram(ParallelogramDesc {
+            material: Some(material.into()),
+            ..ParallelogramDesc::new(p, e0, e1)
+        })
     };
     scene.shapes.push(flat([-20.0, 0.0, -20.0], [0.0, 0.0, 40.0], [40.0, 0.0, 0.0], "floor"));
     scene.shapes.push(flat([-20.0, 0.0, -20.0], [40.0, 0.0, 0.0], [0.0, 12.0, 0.0], "wall"));
@@ -133,7 +132,9 @@ fn hall(options: &Options) -> SceneDesc {
     for _ in 0..24 {
         let r = random.between(0.3, 1.2);
         let center = [random.between(-15.0, 15.0), r, random.between(-15.0, 12.0)];
-        scene.shapes.push(ShapeDesc::Sphere(SphereDesc { material: Some("ball".into()), ..SphereDesc::new(center, r) }));
+        scene
+            .shapes
+            .push(ShapeDesc::Sphere(SphereDesc { material: Some("ball".into()), ..SphereDesc::new(center, r) }));
     }
     if options.mesh {
         let box_at = scenes::box_mesh([2.0, 1.0, 6.0], [2.0, 2.0, 2.0]);
@@ -167,6 +168,9 @@ fn hall(options: &Options) -> SceneDesc {
             }),
         });
     }
-    scene.cameras.push((String::new(), CameraDesc { look_at: [0.0, 1.5, 0.0], fov_y_deg: Some(50.0), ..CameraDesc::new([3.0, 5.0, 19.0]) }));
+    scene.cameras.push((
+        String::new(),
+        CameraDesc { look_at: [0.0, 1.5, 0.0], fov_y_deg: Some(50.0), ..CameraDesc::new([3.0, 5.0, 19.0]) },
+    ));
     scene
 }

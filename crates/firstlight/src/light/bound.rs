@@ -103,7 +103,10 @@ impl Shine {
                     Arc { cos: 1.0 - a, sin: (a * (2.0 - a)).sqrt() }
                 };
                 let (inner, outer) = (cone(inner), cone(spot.outer));
-                (Shine { axis: spot.axis, fan: Arc::ZERO, inner, outer, ..at(sends, spot.position, !spot.physical) }, 1.0)
+                (
+                    Shine { axis: spot.axis, fan: Arc::ZERO, inner, outer, ..at(sends, spot.position, !spot.physical) },
+                    1.0,
+                )
             }
             LightKind::Area(area) => {
                 let [low, high] = area.shape.bounds();
@@ -126,7 +129,9 @@ impl Shine {
                     _ => Sends::Other,
                 };
                 let mut shine = Shine { low, high, ..at(sends, low, !area.physical) };
-                if !area.both_sides && let Some(n) = area.normal() {
+                if !area.both_sides
+                    && let Some(n) = area.normal()
+                {
                     (shine.axis, shine.fan) = (n, Arc::ZERO);
                 }
                 (shine, strength as f32)

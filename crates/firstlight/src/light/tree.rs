@@ -118,9 +118,8 @@ impl LightTree {
         let size = high - low;
         let axis = if size.x >= size.y && size.x >= size.z { 0 } else { 1 + usize::from(size.z > size.y) };
         let half = seeds.len() / 2;
-        seeds.select_nth_unstable_by(half, |a, b| {
-            a.center[axis].total_cmp(&b.center[axis]).then(a.light.cmp(&b.light))
-        });
+        seeds
+            .select_nth_unstable_by(half, |a, b| a.center[axis].total_cmp(&b.center[axis]).then(a.light.cmp(&b.light)));
         let (left, right) = seeds.split_at_mut(half);
         let (a, mut sources) = self.grow(lights, left);
         let (b, others) = self.grow(lights, right);
@@ -225,9 +224,9 @@ impl LightNode {
         // Of one colour: what is left is rounding
         let size = (shine.high - shine.low).length();
         let near = |a: Vec3, b: Vec3, size: f32| (a - b).length() <= size * 1e-6;
-        let gray = (1..3).all(|i| {
-            power[i] == 0.0 || near(middle[i], middle[0], size) && near(facing[i], facing[0], 1.0)
-        }) && power[0] > 0.0;
+        let gray = (1..3)
+            .all(|i| power[i] == 0.0 || near(middle[i], middle[0], size) && near(facing[i], facing[0], 1.0))
+            && power[0] > 0.0;
         let rgb = |v: [f32; 3]| Rgb::new(v[0], v[1], v[2]);
         LightNode {
             shine,
@@ -365,7 +364,9 @@ impl LightNode {
 #[cfg(test)]
 mod tests {
     use super::super::bound::Sends;
-    use super::super::{Area, AreaShape, Falloff, Light, LightDesc, PointDesc, RectangleDesc, SphereLightDesc, SpotDesc, Zone};
+    use super::super::{
+        Area, AreaShape, Falloff, Light, LightDesc, PointDesc, RectangleDesc, SphereLightDesc, SpotDesc, Zone,
+    };
     use super::*;
     use crate::context::CompileContext;
     use crate::describe::{ColorDesc, SamplesDesc};
@@ -411,7 +412,7 @@ mod tests {
 
     /// Some lights of one kind in a ball.
     fn lights(random: &mut Random, kind: u32, count: u32, size: f64) -> Vec<Light> {
-        let falloff = if kind % 2 == 0 { Falloff::Physical } else { Falloff::Constant };
+        let falloff = if kind.is_multiple_of(2) { Falloff::Physical } else { Falloff::Constant };
         let (front, wild) = (random.direction().as_dvec3(), random.between(0.0, 1.0));
         (0..count)
             .map(|_| {
@@ -541,8 +542,11 @@ mod tests {
                     smooth += 1;
                     let (sent, error) = (flat(node.send(p, ns, wo, &lobe)), flat(node.error(&sight)));
                     let power = f64::from(node.power.r + node.power.g + node.power.b);
-                    for ((sum, sent), (error, most)) in
-                        sum.iter().flatten().zip(sent.iter().flatten()).zip(error.iter().flatten().zip(most.iter().flatten()))
+                    for ((sum, sent), (error, most)) in sum
+                        .iter()
+                        .flatten()
+                        .zip(sent.iter().flatten())
+                        .zip(error.iter().flatten().zip(most.iter().flatten()))
                     {
                         told += u32::from(*error < 0.1 * most);
                         // The points that stand for the truth are few
@@ -598,7 +602,10 @@ mod tests {
                 *most = most.max(third.abs());
             }
         }
-        assert!(most[0] <= f64::from(TWIST) && most[1] <= f64::from(TWIST) && most[2] <= f64::from(TWIST_EVEN), "{most:?}");
+        assert!(
+            most[0] <= f64::from(TWIST) && most[1] <= f64::from(TWIST) && most[2] <= f64::from(TWIST_EVEN),
+            "{most:?}"
+        );
         assert!(most[0] > 20.0, "{most:?}");
     }
 

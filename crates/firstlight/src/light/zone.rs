@@ -38,8 +38,7 @@ impl Zone {
     /// What highlights are for light from the directions that are within `spread` of `d` (unit).
     pub fn highlight(&self, d: Vec3, spread: Arc) -> Highlight {
         let off = Arc::between(d, self.mirror);
-        let (nearest, farthest) =
-            (off.minus(spread).minus(self.blur), off.plus(spread).plus(self.blur));
+        let (nearest, farthest) = (off.minus(spread).minus(self.blur), off.plus(spread).plus(self.blur));
         match &self.lobe {
             Lobe::None => Highlight::default(),
             Lobe::Phong(lobe) => {

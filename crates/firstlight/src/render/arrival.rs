@@ -108,7 +108,14 @@ const LEAVES: usize = 12;
 
 impl<'a> Arrivals<'a> {
     pub fn new(scene: &'a Scene, lights: &'a Lights, level: Level) -> Self {
-        Arrivals { scene, lights, level, sampled: Lanes::new(level), occluders: Occluders::default(), tolerance: lights.tolerance }
+        Arrivals {
+            scene,
+            lights,
+            level,
+            sampled: Lanes::new(level),
+            occluders: Occluders::default(),
+            tolerance: lights.tolerance,
+        }
     }
 
     /// The tree of all lights, where there are many.

@@ -6,10 +6,10 @@
 use arrayvec::ArrayVec;
 use fearless_simd::Level;
 
+use super::Viewpoint;
 use super::occluders::{Occluders, ShadowMesh, Which};
 use super::shaft::{Horizon, Shaft};
 use super::target::{LightHull, Target};
-use super::Viewpoint;
 use crate::accel::Aabb;
 use crate::ids::LightId;
 use crate::math::{DVec3, ErrorBound, Vec3};
@@ -281,9 +281,8 @@ impl Outlook {
             let reach = n.abs().dot(half.as_dvec3()) + f64::from(self.room);
             let at = height(middle);
             let margin = f64::from(self.room);
-            let side = |sign: f64| {
-                self.points.iter().all(|point| sign * height(point.p) >= -margin) && sign * at >= reach
-            };
+            let side =
+                |sign: f64| self.points.iter().all(|point| sign * height(point.p) >= -margin) && sign * at >= reach;
             return side(1.0) || side(-1.0);
         }
         let Some([low, high]) = solid.bounds() else { return false };

@@ -20,7 +20,7 @@ fn adaptive() -> RenderSettings {
     RenderSettings { aa_mode: AaMode::Adaptive, ..one_thread() }
 }
 
-/// What lights may be: all kinds, points alone, or with areas.
+/// What lights may be: points and spots, or these and such with areas.
 #[derive(Clone, Copy, PartialEq)]
 enum Kinds {
     Points,
@@ -78,7 +78,10 @@ fn lit(mut scene: SceneDesc, seed: u64, count: u32, kinds: Kinds) -> SceneDesc {
             0..=2 => LightDesc::Point(PointDesc { color, ..point(p, strength) }),
             3 => {
                 let at = add(p, [random.between(-1.0, 1.0), -1.0, random.between(-1.0, 1.0)]);
-                LightDesc::Spot(SpotDesc { color, ..spot(p, at, 80.0, Some(random.between(1.0, 80.0)), strength * 2.0) })
+                LightDesc::Spot(SpotDesc {
+                    color,
+                    ..spot(p, at, 80.0, Some(random.between(1.0, 80.0)), strength * 2.0)
+                })
             }
             4 => {
                 let falloff = Falloff::Constant;
@@ -86,7 +89,7 @@ fn lit(mut scene: SceneDesc, seed: u64, count: u32, kinds: Kinds) -> SceneDesc {
             }
             5 => {
                 let r = random.between(0.01, 0.05);
-                let strength = strength / (3.14 * r * r);
+                let strength = strength / (std::f64::consts::PI * r * r);
                 LightDesc::Sphere(SphereLightDesc { color, strength, visible: false, ..SphereLightDesc::new(p, r) })
             }
             _ => {
