@@ -38,8 +38,8 @@ const BLOCK: usize = 8;
 const BLOCKS: usize = CELL as usize / BLOCK;
 /// Sizes of blocks: each has four of the next.
 const LEVELS: usize = 3;
-/// What each of those may have of [`BLOCK_BUDGET`].
-const SHARES: [f32; LEVELS] = [0.5, 0.25, 0.25];
+/// What each of those may have of [`BLOCK_BUDGET`]. Together less than all: a patch may be darker than its block was guessed to be.
+const SHARES: [f32; LEVELS] = [0.3, 0.15, 0.15];
 /// Colours of a block that are told apart.
 const TONES: usize = 8;
 
