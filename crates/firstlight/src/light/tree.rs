@@ -412,7 +412,7 @@ mod tests {
 
     /// Some lights of one kind in a ball.
     fn lights(random: &mut Random, kind: u32, count: u32, size: f64) -> Vec<Light> {
-        let falloff = if kind % 2 == 0 { Falloff::Physical } else { Falloff::Constant };
+        let falloff = if kind.is_multiple_of(2) { Falloff::Physical } else { Falloff::Constant };
         let (front, wild) = (random.direction().as_dvec3(), random.between(0.0, 1.0));
         (0..count)
             .map(|_| {

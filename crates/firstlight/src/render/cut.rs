@@ -2,7 +2,7 @@
 //!
 //! The walk begins with all lights and takes the worst node apart, again and again, until what is left out and what is taken
 //! for one can together be wrong by no more than is allowed. Two walks, one after the other: for a block of pixels
-//! ([`Cut::of_block`]), which settles what is the same for all its places, then for each patch ([`Cut::of_patch`]), with what
+//! ([`Cut::of_block`]), and for its quarters, which settles what is the same for all their places, then for each patch ([`Cut::of_patch`]), with what
 //! the first left open. The first guesses how bright the block is; whether its error does at each patch is known after the second.
 
 use std::cmp::Ordering;
@@ -65,6 +65,8 @@ pub(super) struct Cut {
     error: [[f64; 3]; 2],
     /// What is sent, thereabouts, by what is seen whole, and a part of what may be.
     known: [f64; 3],
+    /// That part of it.
+    maybe: [f64; 3],
     /// Nodes that are seen whole and taken for one.
     pub lit: Vec<u32>,
     /// Nodes that have to be looked at from nearer.
@@ -154,6 +156,12 @@ impl Walk<'_> {
 }
 
 impl Cut {
+    /// What is sent, thereabouts, before the colours of the surface.
+    /// What is open yet is not in it.
+    pub fn known(&self) -> [f64; 3] {
+        std::array::from_fn(|i| (self.known[i] - self.maybe[i]).max(0.0))
+    }
+
     /// How far what is settled can be wrong: diffuse and specular, before the colours of the surface.
     pub fn error(&self) -> Sent {
         [color(&self.error[0]), color(&self.error[1])]
@@ -163,7 +171,7 @@ impl Cut {
         self.heap.clear();
         self.lit.clear();
         self.open.clear();
-        (self.error, self.known) = ([[0.0; 3]; 2], [0.0; 3]);
+        (self.error, self.known, self.maybe) = ([[0.0; 3]; 2], [0.0; 3], [0.0; 3]);
     }
 
     fn push(&mut self, walk: &Walk, item: Option<Item>) {
@@ -212,20 +220,25 @@ impl Cut {
 
     /// Settles what it can for all places of a block. `look` says what is seen of a node; `shines` whether a light shines on
     /// the surface at all.
+    /// Of the nodes `from`; `known` is what larger blocks around it know already.
     pub fn of_block(
         &mut self,
         walk: &Walk,
+        from: &[u32],
+        known: [f64; 3],
         look: &mut dyn FnMut(&LightNode, u32) -> Seen,
         shines: &dyn Fn(u32) -> bool,
     ) {
         self.clear();
-        for root in &walk.tree.roots {
-            self.push(walk, walk.item(*root, false));
+        let mut done = known;
+        self.known = known;
+        for node in from {
+            self.push(walk, walk.item(*node, false));
         }
-        let mut done = [0.0; 3];
-        let later = |done: &mut [f64; 3], known: &mut [f64; 3], node: &LightNode, sight: &Sight| {
+        let later = |done: &mut [f64; 3], [known, maybe]: [&mut [f64; 3]; 2], node: &LightNode, sight: &Sight| {
             let share = MAYBE * typical(sight);
             add(done, node.power * share, 1.0);
+            add(maybe, node.power * share, 1.0);
             add(known, node.power * share, 1.0);
         };
         let mut worst = f32::INFINITY;
@@ -249,7 +262,7 @@ impl Cut {
                     self.lit.push(item.node);
                 }
                 Held::Light(_) if item.lit => {
-                    later(&mut done, &mut self.known, node, &item.sight);
+                    later(&mut done, [&mut self.known, &mut self.maybe], node, &item.sight);
                     self.open.push(item.node);
                 }
                 Held::Light(light) => match look(node, light) {
@@ -257,12 +270,12 @@ impl Cut {
                     Seen::Whole => match walk.as_lit(&item, node) {
                         Some(lit) => self.push(walk, Some(lit)),
                         None => {
-                            later(&mut done, &mut self.known, node, &item.sight);
+                            later(&mut done, [&mut self.known, &mut self.maybe], node, &item.sight);
                             self.open.push(item.node);
                         }
                     },
                     Seen::Unknown => {
-                        later(&mut done, &mut self.known, node, &item.sight);
+                        later(&mut done, [&mut self.known, &mut self.maybe], node, &item.sight);
                         self.open.push(item.node);
                     }
                 },
@@ -286,7 +299,7 @@ impl Cut {
                         }
                     }
                     if stuck {
-                        later(&mut done, &mut self.known, node, &item.sight);
+                        later(&mut done, [&mut self.known, &mut self.maybe], node, &item.sight);
                         self.open.push(item.node);
                     } else if !hidden {
                         for child in children {

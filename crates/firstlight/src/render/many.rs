@@ -1,6 +1,6 @@
 //! Many lights: what arrives at the patches of a cell where not every light is asked for at every one.
 //!
-//! For each block of pixels a [`Cut`] says which lights count: nodes of the [`LightTree`](crate::light::LightTree) that are seen
+//! For each block of pixels, and for its quarters and theirs, a [`Cut`] says which lights count: nodes of the [`LightTree`](crate::light::LightTree) that are seen
 //! whole from all of it, and nodes that have to be looked at from each patch. What is dropped, and what is lost by taking many
 //! lights for one, stays below [`BLOCK_BUDGET`] and [`PATCH_BUDGET`] together, in display steps.
 //!
@@ -36,6 +36,10 @@ const INTEGRALS: f32 = 0.15;
 /// Pixels across a block.
 const BLOCK: usize = 8;
 const BLOCKS: usize = CELL as usize / BLOCK;
+/// Sizes of blocks: each has four of the next.
+const LEVELS: usize = 3;
+/// What each of those may have of [`BLOCK_BUDGET`]. Together less than all: a patch may be darker than its block was guessed to be.
+const SHARES: [f32; LEVELS] = [0.3, 0.15, 0.15];
 /// Colours of a block that are told apart.
 const TONES: usize = 8;
 
@@ -68,8 +72,8 @@ struct Single {
 #[derive(Clone, Default)]
 struct Stored {
     singles: Range<u32>,
-    /// The nodes of its block, and its own.
-    lit: [Range<u32>; 2],
+    /// The nodes of its blocks, the largest first, and its own.
+    lit: [Range<u32>; LEVELS + 1],
     /// What those send, and how far the mean over the patch can be from it.
     sent: Sent,
     bend: Sent,
@@ -83,6 +87,17 @@ struct Doubt {
     /// Among the singles; `None` for the rest.
     single: Option<u32>,
     error: Rgb,
+}
+
+/// What larger blocks say of the lights, to those in them.
+struct Above {
+    level: usize,
+    /// Nodes that they could not settle.
+    open: Vec<u32>,
+    /// What is sent, thereabouts, and how far what they settled can be wrong, before the colours of the surface.
+    known: [f64; 3],
+    error: Sent,
+    lit: [Range<u32>; LEVELS + 1],
 }
 
 /// Where a patch is: its pixel in the cell with its rim, and which of the pixel's it is.
@@ -125,6 +140,13 @@ impl<'a> Many<'a> {
         self.singles.clear();
         self.lit.clear();
         let mut groups: Vec<Vec<At>> = Vec::new();
+        let all = Above {
+            level: 0,
+            open: self.tree.roots.clone(),
+            known: [0.0; 3],
+            error: [Rgb::BLACK; 2],
+            lit: Default::default(),
+        };
         for block in 0..BLOCKS * BLOCKS {
             go_on()?;
             groups.iter_mut().for_each(Vec::clear);
@@ -148,7 +170,7 @@ impl<'a> Many<'a> {
                 }
             }
             for group in groups.iter().filter(|group| !group.is_empty()) {
-                self.group(pixels, first, group, arrivals, counts);
+                self.group(pixels, first, group, &all, arrivals, counts);
             }
         }
         ControlFlow::Continue(())
@@ -160,11 +182,11 @@ impl<'a> Many<'a> {
         pixels: &[PixelPatches],
         first: &[usize],
         group: &[At],
+        above: &Above,
         arrivals: &mut Arrivals<'a>,
         counts: &mut Counts,
     ) {
-        let scene = self.scene;
-        let tree = self.tree;
+        let (scene, tree) = (self.scene, self.tree);
         let patch = |(index, k): &At| &pixels[*index].patches[*k];
         let zone = zone(group.iter().map(patch), self.eye);
         let tones = tones(scene, group.iter().map(patch));
@@ -173,18 +195,14 @@ impl<'a> Many<'a> {
         let places = group.iter().map(|at| standing(patch(at)));
         self.outlook.stand(scene, places);
         let (outlook, level) = (&mut self.outlook, arrivals.level());
-        let walk = Walk {
-            tree,
-            steps: arrivals.display_steps(),
-            zone: &zone,
-            tones: &tones,
-            budget: BLOCK_BUDGET,
-            together: self.together,
-        };
+        let (steps, budget) = (arrivals.display_steps(), BLOCK_BUDGET * SHARES[above.level]);
+        let walk = Walk { tree, steps, zone: &zone, tones: &tones, budget, together: self.together };
         let links = scene.geometry.lights_of(one.si.surface);
         let shines = |light: u32| scene.geometry.links.contains(links, LightId(light));
         self.cut.of_block(
             &walk,
+            &above.open,
+            above.known,
             &mut |node, light| {
                 if !(receives && node.shadows) {
                     return Seen::Whole;
@@ -195,40 +213,66 @@ impl<'a> Many<'a> {
         );
         let start = self.lit.len() as u32;
         self.lit.extend(&self.cut.lit);
-        let block = start..self.lit.len() as u32;
-        let open = std::mem::take(&mut self.cut.open);
+        let mut lit = above.lit.clone();
+        lit[above.level] = start..self.lit.len() as u32;
         let error = self.cut.error();
-        for at in group {
-            let number = first[at.0] + at.1;
-            let patch = patch(at);
-            let singles = self.singles.len();
-            let mut stored = self.patch(patch, block.clone(), &open, arrivals, counts);
-            let bsdf = &patch.bsdf;
-            let shown = arrivals.steps(stored.value, bsdf.diffuse * error[0] + bsdf.specular * error[1]);
-            if shown > BLOCK_BUDGET {
-                // Darker than was guessed: by itself, from the beginning
-                self.singles.truncate(singles);
-                stored = self.patch(patch, 0..0, &tree.roots, arrivals, counts);
+        let here = Above {
+            level: above.level + 1,
+            open: std::mem::take(&mut self.cut.open),
+            known: self.cut.known(),
+            error: [above.error[0] + error[0], above.error[1] + error[1]],
+            lit,
+        };
+        if here.level == LEVELS || here.open.is_empty() {
+            for at in group {
+                self.patches[first[at.0] + at.1] = self.settle(patch(at), &here, arrivals, counts);
             }
-            self.count(&stored, counts);
-            self.patches[number] = stored;
+            return;
         }
-        self.cut.open = open;
+        // In four, by where they are in the block
+        let half = BLOCK >> here.level;
+        for quarter in 0..4 {
+            let is_in = |(index, _): &&At| {
+                let part = |v: usize| (v.clamp(1, CELL as usize) - 1) / half % 2;
+                part(index / ACROSS) * 2 + part(index % ACROSS) == quarter
+            };
+            let part: Vec<At> = group.iter().filter(is_in).copied().collect();
+            if !part.is_empty() {
+                self.group(pixels, first, &part, &here, arrivals, counts);
+            }
+        }
+    }
+
+    /// What arrives at one patch of a block.
+    fn settle(&mut self, patch: &Patch, above: &Above, arrivals: &mut Arrivals<'a>, counts: &mut Counts) -> Stored {
+        let singles = self.singles.len();
+        let mut stored = self.patch(patch, &above.lit, &above.open, arrivals, counts);
+        let bsdf = &patch.bsdf;
+        let shown = arrivals.steps(stored.value, bsdf.diffuse * above.error[0] + bsdf.specular * above.error[1]);
+        if shown > BLOCK_BUDGET {
+            // Darker than was guessed: by itself, from the beginning
+            self.singles.truncate(singles);
+            stored = self.patch(patch, &Default::default(), &self.tree.roots, arrivals, counts);
+        }
+        self.count(&stored, counts);
+        stored
     }
 
     /// What arrives at one patch.
     fn patch(
         &mut self,
         patch: &Patch,
-        block: Range<u32>,
+        blocks: &[Range<u32>; LEVELS + 1],
         open: &[u32],
         arrivals: &mut Arrivals<'a>,
         counts: &mut Counts,
     ) -> Stored {
         let (scene, tree) = (self.scene, self.tree);
         let (si, bsdf) = (&patch.si, &patch.bsdf);
-        let mut stored = Stored { lit: [block, 0..0], ..Stored::default() };
-        self.add(patch, 0, &mut stored);
+        let mut stored = Stored { lit: blocks.clone(), ..Stored::default() };
+        for list in 0..LEVELS {
+            self.add(patch, list, &mut stored);
+        }
         let base = scene.ambient * bsdf.ambient;
         let value = base + bsdf.diffuse * stored.sent[0] + bsdf.specular * stored.sent[1];
         let from = self.singles.len();
@@ -268,9 +312,9 @@ impl<'a> Many<'a> {
             );
             let start = self.lit.len() as u32;
             self.lit.extend(&self.cut.lit);
-            stored.lit[1] = start..self.lit.len() as u32;
+            stored.lit[LEVELS] = start..self.lit.len() as u32;
             let before = stored.sent;
-            self.add(patch, 1, &mut stored);
+            self.add(patch, LEVELS, &mut stored);
             for (color, i) in [(bsdf.diffuse, 0), (bsdf.specular, 1)] {
                 stored.value += color * (stored.sent[i] + before[i] * -1.0);
             }
@@ -290,8 +334,7 @@ impl<'a> Many<'a> {
 
     /// The nodes that are taken for one.
     fn nodes(&self, stored: &Stored) -> impl Iterator<Item = u32> + '_ {
-        let [a, b] = stored.lit.clone().map(|range| &self.lit[range.start as usize..range.end as usize]);
-        a.iter().chain(b).copied()
+        stored.lit.clone().into_iter().flat_map(|range| &self.lit[range.start as usize..range.end as usize]).copied()
     }
 
     /// Adds what the nodes of one list send.
@@ -320,6 +363,7 @@ impl<'a> Many<'a> {
 
     /// The colour of a pixel's surfaces, but for emission and ambient light: what each ray sees, added up. `add` hears each
     /// light's diffuse part and highlight, in scene order, and last what is taken together.
+    #[allow(clippy::too_many_arguments, reason = "a pixel among those of a cell, and what it asks with")]
     pub fn finish(
         &mut self,
         pixels: &[PixelPatches],

@@ -20,7 +20,7 @@ fn adaptive() -> RenderSettings {
     RenderSettings { aa_mode: AaMode::Adaptive, ..one_thread() }
 }
 
-/// What lights may be: all kinds, points alone, or with areas.
+/// What lights may be: points and spots, or these and such with areas.
 #[derive(Clone, Copy, PartialEq)]
 enum Kinds {
     Points,
@@ -89,7 +89,7 @@ fn lit(mut scene: SceneDesc, seed: u64, count: u32, kinds: Kinds) -> SceneDesc {
             }
             5 => {
                 let r = random.between(0.01, 0.05);
-                let strength = strength / (3.14 * r * r);
+                let strength = strength / (std::f64::consts::PI * r * r);
                 LightDesc::Sphere(SphereLightDesc { color, strength, visible: false, ..SphereLightDesc::new(p, r) })
             }
             _ => {
