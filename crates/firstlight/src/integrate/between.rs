@@ -298,7 +298,7 @@ impl Between {
             // Its outside: nothing of it is above the horizon but by rounding
             return;
         }
-        if distance <= r * (1.0 + 1e-6) || is_on {
+        if distance <= r || is_on {
             let l = pyramid.corners;
             let outside = |l: &Vec3| (l.as_dvec3() - to).length() > r * (1.0 + 1e-6);
             let inside = |l: &Vec3| (l.as_dvec3() - to).length() < r * (1.0 - 1e-6);

@@ -63,6 +63,13 @@ struct Quadratic {
     yy: f32,
 }
 
+impl Linear {
+    fn squared(self) -> Quadratic {
+        let Linear { c, x, y } = self;
+        Quadratic { c: c * c, x: c * x, y: c * y, xx: x * x, xy: x * y, yy: y * y }
+    }
+}
+
 impl Quadratic {
     /// The product of two vectors that are linear over the light.
     fn dot(p: [Vec3; 3], q: [Vec3; 3]) -> Quadratic {
@@ -216,7 +223,13 @@ impl Hider {
             let ls = Quadratic { c: ahead.c, x: 0.5 * ahead.x, y: 0.5 * ahead.y, xx: 0.0, xy: 0.0, yy: 0.0 };
             [ll.combined(1.0, ls, -1.0), inside(view, center, r)]
         });
-        let quadratic = ll.combined(r2, Quadratic::dot(cross, cross), -1.0);
+        // The same as (r^2 - |s|^2) |l|^2 + (l.s)^2, which is small by itself where the point is close to the sphere
+        let power = r * r - center.length_squared();
+        let quadratic = if power.abs() < 0.5 * r * r {
+            ll.combined(power as f32, ahead.squared(), 1.0)
+        } else {
+            ll.combined(r2, Quadratic::dot(cross, cross), -1.0)
+        };
         Some(Hider::Cone(Cone { quadratic, ahead, cut }))
     }
 
@@ -231,7 +244,7 @@ impl Hider {
         let l = [view.l0, view.a, view.b];
         let square = |v: Vec3| {
             let [c, x, y] = l.map(|l| v.dot(l));
-            Quadratic { c: c * c, x: c * x, y: c * y, xx: x * x, xy: x * y, yy: y * y }
+            Linear { c, x, y }.squared()
         };
         let across = square(disk.x).combined(1.0, square(disk.y), 1.0);
         let beyond = disk.height + disk.room;

@@ -19,7 +19,7 @@ use super::tensor::sharpness;
 use super::view::{Outline, View};
 use super::{Sums, Wanted};
 use crate::material::Lobe;
-use crate::math::LANES;
+use crate::math::{LANES, square};
 
 /// The most things in the way that are settled row by row.
 pub(crate) const MAX_HIDERS: usize = 8;
@@ -96,7 +96,9 @@ pub(crate) fn integrate<S: Simd>(
     let mut panels: ArrayVec<Panel, MAX_PANELS> = ArrayVec::new();
     let (mut sums, mut error) = (Sums::default(), Sums::default());
     let lit = Lit { view, hiders, region, wanted };
-    if hiders.len() <= 1 {
+    // Seven rows tell what is wide: a light that is not near, and no narrow highlight on it
+    let (size2, distance2) = (square(view.la.max(view.lb)), square(view.nearest()));
+    if hiders.len() <= 1 && size2 <= distance2 && sharpness(view) * size2 <= distance2 {
         for t in cuts.windows(2).step_by(2).zip(cuts.windows(2).skip(1).step_by(2).map(Some).chain([None])) {
             let (one, other) = (t.0, t.1);
             let [one, other] = lit.pair(simd, [one[0], one[1]], other.map_or([one[1]; 2], |t| [t[0], t[1]]));
@@ -256,7 +258,8 @@ fn panel_of(
     let sum =
         |values: &[f32; LANES], weights: &[f32; LANES]| values.iter().zip(weights).map(|(v, w)| v * w).sum::<f32>();
     let [diffuse, specular] = [0, 1].map(|i| (sum(&rows[i], weights), sum(&rows[i], inner)));
-    let off = |(fine, coarse): (f32, f32)| (fine - coarse).abs() * TRUST;
+    let trust = if coarse { 1.0 } else { TRUST };
+    let off = |(fine, inner): (f32, f32)| (fine - inner).abs() * trust;
     let sums = Sums { diffuse: diffuse.0, specular: specular.0 };
     Panel { t, sums, error: Sums { diffuse: off(diffuse), specular: off(specular) }, coarse }
 }

@@ -79,14 +79,17 @@ impl Pyramid {
         if self.cone_misses(sphere.c, sphere.r) {
             return true;
         }
-        let slack = sphere.c.abs().max_element().max(sphere.r) * SLACK;
+        // Rays are known to the rounding of their directions
+        let off = (sphere.c - self.middle.o.as_dvec3()).length();
+        let slack = sphere.c.abs().max_element().max(sphere.r).max(off) * SLACK;
         let outside = |(n, ray): (&Vec3, &Ray)| n.as_dvec3().dot(sphere.c - ray.o.as_dvec3()) > sphere.r + slack;
         self.sides.iter().zip(&self.corners).any(outside) || self.depth(sphere.c) + sphere.r < -slack
     }
 
     fn misses_flat(&self, flat: &Parallelogram) -> bool {
         let corners = flat.deep_corners();
-        let size = corners.iter().fold(0.0f64, |size, q| size.max(q.abs().max_element()));
+        let from = self.middle.o.as_dvec3();
+        let size = corners.iter().fold(0.0f64, |size, q| size.max(q.abs().max_element()).max((*q - from).length()));
         let slack = size * SLACK;
         let outside = |(n, ray): (&Vec3, &Ray)| corners.iter().all(|q| n.as_dvec3().dot(*q - ray.o.as_dvec3()) > slack);
         self.sides.iter().zip(&self.corners).any(outside) || corners.iter().all(|q| self.depth(*q) < -slack)

@@ -9,8 +9,8 @@ use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
 use firstlight::{
-    AaMode, Assets, CompileOptions, FolderAssets, Format, Image, NoAssets, RenderSettings, SceneDesc, StoredImage,
-    VisibilityMode, builtin_scenes, render,
+    AaMode, Assets, CompileOptions, FolderAssets, Format, Image, NoAssets, RenderSettings, SamplesDesc, SceneDesc,
+    StoredImage, VisibilityMode, builtin_scenes, render,
 };
 
 fn scenes() -> PathBuf {
@@ -29,20 +29,33 @@ fn name(path: &Path) -> String {
     path.file_name().unwrap().to_string_lossy().into_owned()
 }
 
-/// The picture of a scene; `size` and `aa` replace its own.
-fn picture(
-    text: &[u8],
-    assets: &dyn Assets,
+/// What replaces a scene's own.
+#[derive(Clone, Copy, Default)]
+struct Instead {
     size: Option<[u32; 2]>,
     aa: Option<u32>,
-    settings: &RenderSettings,
-) -> Image {
+    samples: Option<SamplesDesc>,
+}
+
+impl Instead {
+    /// Small and sampled.
+    fn sampled(size: [u32; 2]) -> Instead {
+        Instead { size: Some(size), aa: Some(2), samples: Some(SamplesDesc::Count(64)) }
+    }
+}
+
+/// The picture of a scene.
+fn picture(text: &[u8], assets: &dyn Assets, instead: Instead, settings: &RenderSettings) -> Image {
     let mut parsed = SceneDesc::parse("scene.toml", text, assets);
     let frame = &mut parsed.desc.render;
-    if let Some([width, height]) = size {
+    if let Some([width, height]) = instead.size {
         (frame.width, frame.height) = (width, height);
     }
-    frame.antialiasing = aa.unwrap_or(frame.antialiasing);
+    frame.antialiasing = instead.aa.unwrap_or(frame.antialiasing);
+    if let Some(samples) = instead.samples {
+        frame.samples = samples;
+        parsed.desc.lights.iter_mut().for_each(|light| light.set_samples(samples));
+    }
     let scene = parsed
         .compile(assets, &CompileOptions { strict: true, ..CompileOptions::default() })
         .unwrap_or_else(|e| panic!("{e}"))
@@ -98,10 +111,12 @@ fn every_golden_scene_has_its_bits() {
             let title = format!("{}/{}", name(&family), name(&case));
             let actual = if name(&family) == "config" {
                 let builtin = builtin_scenes().iter().find(|b| b.name == name(&case)).expect("a built-in scene");
-                picture(builtin.text.as_bytes(), &NoAssets, Some([96, 96]), None, &RenderSettings::default())
+                let instead = Instead { size: Some([96, 96]), ..Instead::default() };
+                picture(builtin.text.as_bytes(), &NoAssets, instead, &RenderSettings::default())
             } else {
                 let text = std::fs::read(case.join("scene.toml")).unwrap();
-                picture(&text, &FolderAssets::new(&case, &[]).unwrap(), None, None, &RenderSettings::default())
+                let assets = FolderAssets::new(&case, &[]).unwrap();
+                picture(&text, &assets, Instead::default(), &RenderSettings::default())
             };
             let path = case.join("expected.exr");
             let expected = std::fs::read(&path).ok().map(|bytes| StoredImage::read(&bytes).unwrap().pixels);
@@ -141,11 +156,18 @@ fn every_scene_of_the_gallery_renders_and_the_renderers_agree() {
             let text = std::fs::read(&path).unwrap();
             assert!(text.starts_with(b"#:schema "), "{}: an editor finds no schema", path.display());
             let [fast, traced, plain] =
-                renderers().map(|settings| picture(&text, &assets, Some([48, 36]), Some(2), &settings));
+                renderers().map(|settings| picture(&text, &assets, Instead::sampled([48, 36]), &settings));
             assert_eq!(differences(&fast.pixels, &plain.pixels), 0, "{}", path.display());
             assert_eq!(differences(&traced.pixels, &plain.pixels), 0, "{}", path.display());
-            assert!(fast.pixels.iter().flatten().all(|c| c.is_finite() && *c >= 0.0), "{}", path.display());
-            assert!(fast.pixels.iter().any(|p| p[0] > 0.05), "{}: all dark", path.display());
+            // As the scene says, and by default: integrated light is near the sampled
+            let instead = Instead { samples: None, ..Instead::sampled([48, 36]) };
+            let default = picture(&text, &assets, instead, &RenderSettings::default());
+            for image in [&fast, &default] {
+                assert!(image.pixels.iter().flatten().all(|c| c.is_finite() && *c >= 0.0), "{}", path.display());
+                assert!(image.pixels.iter().any(|p| p[0] > 0.05), "{}: all dark", path.display());
+            }
+            let off = fast.pixels.iter().zip(&default.pixels).map(|(a, b)| (a[1] - b[1]).abs()).sum::<f32>();
+            assert!(off / (fast.pixels.len() as f32) < 0.02, "{}: off by {off}", path.display());
         }
     }
     assert!(count >= 8, "{count} scenes");
@@ -156,7 +178,7 @@ fn the_built_in_scenes_are_the_same_in_all_renderers() {
     for builtin in builtin_scenes() {
         let text = builtin.text.as_bytes();
         let [fast, traced, plain] =
-            renderers().map(|settings| picture(text, &NoAssets, Some([40, 40]), Some(2), &settings));
+            renderers().map(|settings| picture(text, &NoAssets, Instead::sampled([40, 40]), &settings));
         assert_eq!(differences(&fast.pixels, &plain.pixels), 0, "{}", builtin.name);
         assert_eq!(differences(&traced.pixels, &plain.pixels), 0, "{}", builtin.name);
     }
