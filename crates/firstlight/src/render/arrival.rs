@@ -111,7 +111,7 @@ pub(crate) struct Lights {
 }
 
 /// In display steps: how far all lights together may be wrong.
-const TOLERANCE: f32 = 0.15;
+const TOLERANCE: f32 = 0.1;
 
 impl Lights {
     pub fn new(scene: &Scene) -> Lights {

@@ -325,8 +325,9 @@ fn lights_add() {
         let lights = every_light();
         for i in 0..lights.len() {
             for j in 0..i {
-                let [a, b] = [&lights[i], &lights[j]].map(|l| shoot(&scene.clone().lit_by(std::slice::from_ref(l))));
-                let both = shoot(&scene.clone().lit_by(&[lights[i].clone(), lights[j].clone()]));
+                let [a, b] =
+                    [&lights[i], &lights[j]].map(|l| shoot_every_ray(&scene.clone().lit_by(std::slice::from_ref(l))));
+                let both = shoot_every_ray(&scene.clone().lit_by(&[lights[i].clone(), lights[j].clone()]));
                 for ((a, b), both) in a.pixels.iter().zip(&b.pixels).zip(&both.pixels) {
                     let sum = a[0] + b[0];
                     // Diffuse light has two terms, and a sum of two has no order. With highlights there are four
@@ -353,18 +354,18 @@ fn light_is_linear_in_strength() {
         light
     };
     let scene = still_life(0.5);
-    let base = shoot(&scene.clone().lit_by(&every_light()));
+    let base = shoot_every_ray(&scene.clone().lit_by(&every_light()));
     assert!(base.pixels.iter().any(|p| p[0] > 0.1));
     // Powers of two change no digit, so the whole picture scales exactly
     for s in [2.0, 1024.0, 0.25] {
         let lights: Vec<_> = every_light().iter().map(|l| scale(l, s)).collect();
-        let scaled = shoot(&scene.clone().lit_by(&lights));
+        let scaled = shoot_every_ray(&scene.clone().lit_by(&lights));
         for (a, b) in base.pixels.iter().zip(&scaled.pixels) {
             assert_eq!(a[0] * s as f32, b[0]);
         }
     }
     let lights: Vec<_> = every_light().iter().map(|l| scale(l, 3.0)).collect();
-    for (a, b) in base.pixels.iter().zip(&shoot(&scene.lit_by(&lights)).pixels) {
+    for (a, b) in base.pixels.iter().zip(&shoot_every_ray(&scene.lit_by(&lights)).pixels) {
         assert_close(b[0], 3.0 * a[0] as f64, ROUNDING);
     }
 }
@@ -386,9 +387,9 @@ fn splitting_a_light_changes_nothing() {
         lights
     };
     let scene = still_life(0.5);
-    let one = shoot(&scene.clone().lit_by(&parts(1)));
+    let one = shoot_every_ray(&scene.clone().lit_by(&parts(1)));
     for n in [2, 4, 16] {
-        let many = shoot(&scene.clone().lit_by(&parts(n)));
+        let many = shoot_every_ray(&scene.clone().lit_by(&parts(n)));
         let mut flips = 0;
         for (a, b) in one.pixels.iter().zip(&many.pixels) {
             // The points agree to rounding, so a shadow's edge may fall on the other side of one of them

@@ -361,12 +361,18 @@ pub fn shoot(desc: &SceneDesc) -> Image {
     picture(&compile(desc), &one_thread())
 }
 
+/// The same, every camera ray lit by itself: what is true of every digit.
+#[track_caller]
+pub fn shoot_every_ray(desc: &SceneDesc) -> Image {
+    picture(&compile(desc), &every_ray())
+}
+
 /// Red, green and blue of what `desc` shows at `p`, seen from `from`: one camera ray, aimed.
 #[track_caller]
 pub fn probe(desc: &SceneDesc, from: V, p: V) -> [f32; 3] {
     let mut desc = desc.clone().with_camera(camera(from, p, 0.01));
     (desc.render.width, desc.render.height, desc.render.antialiasing) = (1, 1, 1);
-    let [r, g, b, _] = shoot(&desc).pixels[0];
+    let [r, g, b, _] = shoot_every_ray(&desc).pixels[0];
     [r, g, b]
 }
 
