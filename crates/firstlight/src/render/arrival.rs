@@ -89,6 +89,8 @@ pub(crate) struct Place<'a> {
     pub turn: f32,
     /// How far off the patch's middle the place is, as a part of `reach`.
     pub off: f32,
+    /// The share of the pixel that it stands for: errors of its parts are as good as independent.
+    pub share: f32,
     /// What is there beside this light, at least.
     pub base: Rgb,
     /// What the two sums are multiplied with.
@@ -110,6 +112,8 @@ pub(crate) struct Lights {
     targets: Vec<Target>,
 }
 
+/// Parts of a pixel smaller than this are judged as if they were as large.
+const LEAST_SHARE: f32 = 1.0 / 16.0;
 /// In display steps: how far all lights together may be wrong.
 const TOLERANCE: f32 = 0.1;
 
@@ -353,7 +357,7 @@ impl<'a> Arrivals<'a> {
     fn integrated(&mut self, index: usize, emitter: &Emitter, place: &Place, counts: &mut Counts) -> Arrival {
         let (scene, si) = (self.scene, place.si);
         let light = &scene.lights[index];
-        let (steps, tolerance) = (&self.lights.steps, self.tolerance);
+        let (steps, tolerance) = (&self.lights.steps, self.tolerance / place.share.max(LEAST_SHARE).sqrt());
         let enough = move |sums: &Sums, error: &Sums| {
             let [diffuse, specular] = place.colors;
             let value = place.base + diffuse * sums.diffuse + specular * sums.specular;

@@ -304,7 +304,7 @@ impl<'a> Many<'a> {
                     let scale = arrivals.scale(light as usize);
                     let colors = [scale * bsdf.diffuse, scale * bsdf.specular];
                     let (reach, turn, off) = (patch.reach, patch.turn, patch.off);
-                    let place = Place { si, lobe: &bsdf.lobe, reach, turn, off, base: value, colors };
+                    let place = Place { si, lobe: &bsdf.lobe, reach, turn, off, share: 1.0, base: value, colors };
                     let arrival = arrivals.arrival(light as usize, &place, counts);
                     singles.push(Single { light, arrival });
                     colors[0] * arrival.sums.diffuse + colors[1] * arrival.sums.specular
@@ -518,7 +518,7 @@ fn at_ray(
     let scale = arrivals.scale(light);
     let colors = [scale * bsdf.diffuse, scale * bsdf.specular];
     let base = scene.ambient * bsdf.ambient;
-    let place = Place { si, lobe: &bsdf.lobe, reach: 0.0, turn: 0.0, off: 0.0, base, colors };
+    let place = Place { si, lobe: &bsdf.lobe, reach: 0.0, turn: 0.0, off: 0.0, share: 1.0, base, colors };
     let sums = arrivals.arrival(light, &place, counts).sums;
     [colors[0] * sums.diffuse, colors[1] * sums.specular]
 }

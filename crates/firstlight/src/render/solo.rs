@@ -50,8 +50,9 @@ impl Pyramid {
         let mut sides = [Vec3::ZERO; 4];
         for i in 0..4 {
             let (a, b) = (&corners[i], &corners[(i + 1) % 4]);
-            let n = a.d.cross(b.o + b.d - a.o).normalize_or_zero();
-            sides[i] = if n.dot(middle.o + middle.d - a.o) > 0.0 { -n } else { n };
+            // Origins first: beside those of far eyes a direction would be lost
+            let n = a.d.cross((b.o - a.o) + b.d).normalize_or_zero();
+            sides[i] = if n.dot((middle.o - a.o) + middle.d) > 0.0 { -n } else { n };
         }
         let frame = scene.camera.frame();
         let sin = corners.iter().fold(0.0f64, |sin, ray| sin.max(f64::from(middle.d.cross(ray.d).length())));
@@ -64,7 +65,8 @@ impl Pyramid {
     /// Whether the cone around it misses a ball.
     fn cone_misses(&self, c: DVec3, r: f64) -> bool {
         let s = c - self.middle.o.as_dvec3();
-        let along = s.dot(self.middle.d.as_dvec3());
+        // Unit to more digits than the ray's, which would not do from far off
+        let along = s.dot(self.middle.d.as_dvec3().normalize());
         let aside = (s.length_squared() - along * along).max(0.0).sqrt();
         // Behind the apex the cone's nearest point is the apex, and this is farther off than said
         aside * self.cos - along * self.sin > r + self.width + (along.abs() + aside) * SLACK

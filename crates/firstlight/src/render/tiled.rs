@@ -396,13 +396,14 @@ impl<'a> Tiled<'a> {
         self.arrivals.look_around(&patch.si);
         let base = scene.ambient * patch.bsdf.ambient;
         let mut value = base;
+        let share = self.share(patch);
         let is_only = matches!(self.known[self.index(at)], Known::Only(_)) && self.is_in_cell(at);
         for index in 0..scene.lights.len() {
             let scale = self.arrivals.scale(index);
             let colors = [scale * patch.bsdf.diffuse, scale * patch.bsdf.specular];
             let (si, lobe) = (&patch.si, &patch.bsdf.lobe);
             let (reach, turn, off) = (patch.reach, patch.turn, patch.off);
-            let place = Place { si, lobe, reach, turn, off, base, colors };
+            let place = Place { si, lobe, reach, turn, off, share, base, colors };
             let known = if is_only { self.field.arrived(index, at) } else { None };
             let arrival = match known {
                 Some(sums) => Arrival::even(sums),
@@ -502,23 +503,33 @@ impl<'a> Tiled<'a> {
             patch.quarters(scene, at)
         };
         if quarters.is_empty() {
-            patch.for_each(scene, at, |si, bsdf| self.at_ray(light, si, bsdf, counts));
+            let share = self.share(patch);
+            patch.for_each(scene, at, |si, bsdf| self.at_ray(light, si, bsdf, share, counts));
         }
+        let share = self.share(patch);
         for quarter in &quarters {
             self.arrivals.look_around(&quarter.si);
             let scale = self.arrivals.scale(light);
             let Patch { si, bsdf, reach, turn, off, .. } = quarter;
             let colors = [scale * bsdf.diffuse, scale * bsdf.specular];
             let base = scene.ambient * bsdf.ambient;
-            let place = Place { si, lobe: &bsdf.lobe, reach: *reach, turn: *turn, off: *off, base, colors };
+            let place = Place { si, lobe: &bsdf.lobe, reach: *reach, turn: *turn, off: *off, share, base, colors };
             let arrival = self.arrivals.arrival(light, &place, counts);
             if quarter.uneven || self.shown(light, bsdf, value, &arrival.bend) > allowed {
-                quarter.for_each(scene, at, |si, bsdf| self.at_ray(light, si, bsdf, counts));
+                quarter.for_each(scene, at, |si, bsdf| self.at_ray(light, si, bsdf, share, counts));
             } else {
                 let count = quarter.count(scene) as f32;
                 self.terms[light][0] += colors[0] * count * arrival.sums.diffuse;
                 self.terms[light][1] += colors[1] * count * arrival.sums.specular;
             }
+        }
+    }
+
+    /// The share of its pixel that a patch has, where each surface is lit once.
+    fn share(&self, patch: &Patch) -> f32 {
+        match self.mode {
+            AaMode::Adaptive => patch.count(self.scene) as f32 / (self.scene.antialiasing * self.scene.antialiasing) as f32,
+            AaMode::Full => 1.0,
         }
     }
 
@@ -529,12 +540,12 @@ impl<'a> Tiled<'a> {
     }
 
     /// Adds what one light sends to where one camera ray ends.
-    fn at_ray(&mut self, index: usize, si: &SurfaceInteraction, bsdf: &Bsdf, counts: &mut Counts) {
+    fn at_ray(&mut self, index: usize, si: &SurfaceInteraction, bsdf: &Bsdf, share: f32, counts: &mut Counts) {
         self.arrivals.look_around(si);
         let scale = self.arrivals.scale(index);
         let colors = [scale * bsdf.diffuse, scale * bsdf.specular];
         let base = self.scene.ambient * bsdf.ambient;
-        let place = Place { si, lobe: &bsdf.lobe, reach: 0.0, turn: 0.0, off: 0.0, base, colors };
+        let place = Place { si, lobe: &bsdf.lobe, reach: 0.0, turn: 0.0, off: 0.0, share, base, colors };
         let sums = self.arrivals.arrival(index, &place, counts).sums;
         self.terms[index][0] += colors[0] * sums.diffuse;
         self.terms[index][1] += colors[1] * sums.specular;
