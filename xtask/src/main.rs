@@ -1,11 +1,14 @@
 //! The project's own commands: `cargo xtask COMMAND`.
 
 mod bench;
+mod curves;
+mod engine;
 mod exact;
 mod generate;
 mod lights;
 mod models;
 mod pictures;
+mod plot;
 mod rays;
 mod test;
 mod verify;
@@ -46,13 +49,15 @@ enum Task {
         #[arg(long)]
         check: bool,
     },
-    /// Renders the pictures of the book: the built-in scenes and the gallery.
+    /// Renders the pictures of the book: the built-in scenes, the gallery, and what goes on inside (visibility, heat).
     Pictures {
         /// Only those whose name contains this.
         filter: Option<String>,
     },
     /// Measures config 11 and writes a page under docs/benchmarks.
     Bench(bench::Options),
+    /// Measures what each part of the light engine gains, on config 11 and on a mesh, and writes a page under docs/benchmarks.
+    Engine(engine::Options),
     /// Measures a hall full of small lights, or writes it as a scene.
     Lights(lights::Options),
     /// Measures rays through meshes, against Embree where it is installed, and writes a page under docs/benchmarks.
@@ -86,6 +91,7 @@ fn main() -> ExitCode {
         Task::Generate { check } => generate::run(check),
         Task::Pictures { filter } => pictures::run(filter.as_deref()),
         Task::Bench(options) => bench::run(&options),
+        Task::Engine(options) => engine::run(&options),
         Task::Lights(options) => lights::run(&options),
         Task::Rays(options) => rays::run(&options),
         Task::Models(options) => models::run(&options),
