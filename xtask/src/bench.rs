@@ -120,7 +120,13 @@ impl Difference {
 fn ways() -> Vec<Way> {
     let way = |name: String, simd: SimdLevel, threads: usize, reference: bool| Way {
         name,
-        settings: RenderSettings { threads: NonZeroUsize::new(threads), simd, reference, aa_mode: AaMode::Full, ..Default::default() },
+        settings: RenderSettings {
+            threads: NonZeroUsize::new(threads),
+            simd,
+            reference,
+            aa_mode: AaMode::Full,
+            ..Default::default()
+        },
         seconds: Vec::new(),
     };
     let mut ways = vec![way("plain, 1 thread".into(), SimdLevel::Auto, 1, true)];

@@ -19,7 +19,7 @@ use crate::{Outcome, root, write};
 /// What to measure, and where to write it.
 #[derive(clap::Args)]
 pub struct Options {
-    /// Rounds on config 11: each runs every way once, one after the other.
+    /// Rounds on config 11: each runs every way once, one after the other; 0 leaves it out.
     #[arg(long, default_value_t = 5)]
     rounds: usize,
     /// Rounds on the mesh; 0 leaves it out.
@@ -29,14 +29,20 @@ pub struct Options {
     #[arg(long, default_value_t = 1024)]
     size: u32,
     /// On the mesh, the ways are compared in a square of so many pixels in the middle; 0: in the whole picture.
-    #[arg(long, default_value_t = 256)]
+    #[arg(long, default_value_t = 128)]
     mesh_part: u32,
+    /// Also renders the whole picture of the mesh, once.
+    #[arg(long)]
+    mesh_whole: bool,
     /// The program to time from process start to file, if it is built already.
     #[arg(long)]
     program: Option<PathBuf>,
     /// Also measures how time grows with triangles and with samples, and draws that for the book.
     #[arg(long)]
     curves: bool,
+    /// Width and height of the pictures for that.
+    #[arg(long, default_value_t = 256)]
+    curve_size: u32,
     /// The folder under docs/benchmarks, usually the date and the machine.
     #[arg(long)]
     name: Option<String>,
@@ -71,50 +77,60 @@ fn way(name: &'static str, samples: SamplesDesc, visibility: VisibilityMode, aa_
 
 pub fn run(options: &Options) -> Outcome {
     use {AaMode::*, VisibilityMode::*};
-    // Config 11
-    let mut ways = [
-        way("a: every sample traced, every camera ray", 400.into(), Traced, Full),
-        way("b: shafts, every camera ray", 400.into(), Shafts, Full),
-        way("c: shafts, once a pixel where that is enough", 400.into(), Shafts, Adaptive),
-        way("d: integrated, every camera ray", SamplesDesc::Exact, Shafts, Full),
-        way("e: integrated, once a pixel where that is enough: the default", SamplesDesc::Exact, Shafts, Adaptive),
-    ];
-    let same_bits = measure(&mut ways, options.rounds, CONVERGED[0], &|samples| config11(options.size, AA, samples))?;
-    // From process start to file
-    let program = options.program.clone().map_or_else(built, Ok)?;
-    let (size, threads) = (options.size.to_string(), THREADS.to_string());
-    let words = ["--width", &size, "--height", &size, "--threads", &threads];
-    let processes = processes(&program, &words, PROCESSES)?;
-    // The mesh: the square in the middle in turns, the whole picture by the default alone
+    let mut config = Vec::new();
+    let (mut same_bits, mut process) = (false, Vec::new());
+    if options.rounds > 0 {
+        config.push(way("a: every sample traced, every camera ray", 400.into(), Traced, Full));
+        config.push(way("b: shafts, every camera ray", 400.into(), Shafts, Full));
+        config.push(way("c: shafts, once a pixel where that is enough", 400.into(), Shafts, Adaptive));
+        config.push(way("d: integrated, every camera ray", SamplesDesc::Exact, Shafts, Full));
+        config.push(way(
+            "e: integrated, once a pixel where that is enough: the default",
+            SamplesDesc::Exact,
+            Shafts,
+            Adaptive,
+        ));
+        let config11 = |samples| config11(options.size, AA, samples);
+        same_bits = measure(&mut config, options.rounds, CONVERGED[0], &config11)?;
+        // From process start to file
+        let program = options.program.clone().map_or_else(built, Ok)?;
+        let (size, threads) = (options.size.to_string(), THREADS.to_string());
+        process = processes(&program, &["--width", &size, "--height", &size, "--threads", &threads], PROCESSES)?;
+    }
+    // The mesh: a square in the middle in turns, the whole picture by the default alone
     let mut mesh = Vec::new();
-    let mut whole = [way("the whole picture", SamplesDesc::Exact, Shafts, Adaptive)];
+    let mut whole = Vec::new();
     if options.mesh_rounds > 0 {
-        mesh.push(way("every sample traced, every camera ray, 256 points", 256.into(), Traced, Full));
-        mesh.push(way("shafts, every camera ray, 256 points", 256.into(), Shafts, Full));
-        mesh.push(way("integrated, once a pixel where that is enough: the default", SamplesDesc::Exact, Shafts, Adaptive));
+        mesh.push(way("256 points traced, every camera ray", 256.into(), Traced, Full));
+        mesh.push(way("256 points, shafts, every camera ray", 256.into(), Shafts, Full));
+        mesh.push(way("256 points, shafts, once a pixel where that is enough", 256.into(), Shafts, Adaptive));
+        mesh.push(way(
+            "integrated, once a pixel where that is enough: the default",
+            SamplesDesc::Exact,
+            Shafts,
+            Adaptive,
+        ));
         let part = if options.mesh_part == 0 { options.size } else { options.mesh_part.min(options.size) };
         let from = (options.size - part) / 2;
         let crop = Window { x: from, y: from, width: part, height: part };
         mesh.iter_mut().for_each(|way| way.settings.crop = Some(crop));
-        let terrain = |samples| terrain(TRIANGLES_ACROSS, options.size, &LIGHTS, samples);
+        let terrain = |samples| terrain(ACROSS, options.size, &LIGHTS, samples);
         measure(&mut mesh, options.mesh_rounds, CONVERGED[1], &terrain)?;
-        let scene = terrain(SamplesDesc::Exact)?;
-        for _ in 0..options.mesh_rounds {
-            let seconds = picture(&scene, &whole[0].settings)?.2;
-            whole[0].seconds.push(seconds);
+        if options.mesh_whole {
+            whole.push(picture(&terrain(SamplesDesc::Exact)?, &settings(Shafts, Adaptive))?.2);
         }
     }
-    let curves = if options.curves { Some(curves::measure()?) } else { None };
+    let curves = if options.curves { Some(curves::measure(options.curve_size)?) } else { None };
 
-    let page = page(options, &ways, same_bits, &processes, &mesh, &whole[0], curves.as_ref());
+    let page = page(options, &config, same_bits, &process, &mesh, &whole, curves.as_ref());
     println!("{page}");
     if let Some(name) = &options.name {
         let folder = root().join("docs/benchmarks").join(name);
         write(&folder.join("README.md"), page.as_bytes())?;
         let rows = |ways: &[Way]| ways.iter().map(Way::json).collect::<Vec<_>>();
         let data = json!({
-            "size": options.size, "antialiasing": AA, "threads": THREADS, "config11": rows(&ways),
-            "process_s": processes, "mesh_part": options.mesh_part, "mesh": rows(&mesh), "mesh_whole": rows(&whole),
+            "size": options.size, "antialiasing": AA, "threads": THREADS, "config11": rows(&config),
+            "process_s": process, "mesh_part": options.mesh_part, "mesh": rows(&mesh), "mesh_whole_s": whole,
             "curves": curves.as_ref().map(curves::Curves::json), "commit": commit(), "processor": processor(),
         });
         let text = serde_json::to_string_pretty(&data).map_err(|e| e.to_string())?;
@@ -173,7 +189,7 @@ impl Way {
 // The mesh
 
 /// The terrain of 1 million triangles has so many squares along each side.
-const TRIANGLES_ACROSS: u32 = 707;
+const ACROSS: u32 = 707;
 
 /// A rectangle light: its middle, two edges, its colour and strength.
 pub(crate) type Lamp = ([f64; 3], [[f64; 3]; 2], [f64; 3], f64);
@@ -225,11 +241,11 @@ pub(crate) fn terrain(n: u32, size: u32, lamps: &[Lamp], samples: SamplesDesc) -
 
 fn page(
     options: &Options,
-    ways: &[Way],
+    config: &[Way],
     same_bits: bool,
-    processes: &[f64],
+    process: &[f64],
     mesh: &[Way],
-    whole: &Way,
+    whole: &[f64],
     curves: Option<&curves::Curves>,
 ) -> String {
     let mut page = String::new();
@@ -245,27 +261,32 @@ fn page(
     );
     let _ = writeln!(page, "- processor: {}", processor());
     let _ = writeln!(page, "- commit: {}", commit());
-    let mut command =
-        format!("cargo xtask engine --rounds {rounds} --mesh-rounds {mesh_rounds} --size {size} --mesh-part {mesh_part}");
+    let mut command = format!(
+        "cargo xtask engine --rounds {rounds} --mesh-rounds {mesh_rounds} --size {size} --mesh-part {mesh_part}"
+    );
+    if options.mesh_whole {
+        command.push_str(" --mesh-whole");
+    }
     if options.curves {
-        command.push_str(" --curves");
+        let _ = write!(command, " --curves --curve-size {}", options.curve_size);
     }
     if let Some(name) = &options.name {
         let _ = write!(command, " --name {name}");
     }
     let _ = writeln!(page, "- command: `{command}`\n");
-    let _ = writeln!(page, "### Config 11\n");
-    let _ = writeln!(page, "400 points on the light, or the integral; {rounds} rounds.\n");
-    table(&mut page, ways);
-    let words = if same_bits { "the same bits" } else { "NOT the same bits" };
-    let _ = writeln!(page, "\na and b made {words}.");
-    let _ = writeln!(
-        page,
-        "`firstlight render config11` with {size} x {size} pixels and {THREADS} threads, process start to file: {:.0} ms (median \
-         of {}).",
-        median(processes) * 1e3,
-        processes.len()
-    );
+    if !config.is_empty() {
+        let _ = writeln!(page, "### Config 11\n");
+        let _ = writeln!(page, "400 points on the light, or the integral; {rounds} rounds.\n");
+        table(&mut page, config);
+        let words = if same_bits { "the same bits" } else { "NOT the same bits" };
+        let _ = writeln!(
+            page,
+            "\na and b made {words}. `firstlight render config11` with {size} x {size} pixels and {THREADS} threads, process start \
+             to file: {:.0} ms (median of {}).",
+            median(process) * 1e3,
+            process.len()
+        );
+    }
     if !mesh.is_empty() {
         let part = mesh[0].settings.crop.map_or(*size, |crop| crop.width);
         let _ = writeln!(page, "\n### A terrain of a million triangles under three rectangle lights\n");
@@ -274,7 +295,9 @@ fn page(
             "All ways rendered the same {part} x {part} pixels in the middle of {size} x {size}; {mesh_rounds} rounds.\n"
         );
         table(&mut page, mesh);
-        let _ = writeln!(page, "\nThe whole picture by the default: {:.2} s.", median(&whole.seconds));
+        for seconds in whole {
+            let _ = writeln!(page, "\nThe whole picture by the default, once: {seconds:.2} s.");
+        }
     }
     if let Some(curves) = curves {
         page.push_str(&curves.table());
@@ -283,7 +306,9 @@ fn page(
 }
 
 fn table(page: &mut String, ways: &[Way]) {
-    let _ = writeln!(page, "| way | seconds | least to most | times the first | worst error | rms error | pixels off by more than 1 |");
+    let head =
+        "| way | seconds | least to most | times the first | worst error | rms error | pixels off by more than 1 |";
+    let _ = writeln!(page, "{head}");
     let _ = writeln!(page, "|---|---|---|---|---|---|---|");
     for way in ways {
         let (least, most) = way.seconds.iter().fold((f64::MAX, 0.0f64), |(a, b), s| (a.min(*s), b.max(*s)));

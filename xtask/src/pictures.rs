@@ -5,8 +5,8 @@ use std::path::Path;
 
 use firstlight::bench::{Sight, sights};
 use firstlight::{
-    Assets, CompileOptions, Display, Encoding, Film, FolderAssets, Format, Image, NoAssets, RenderSettings, SamplesDesc,
-    Scene, SceneDesc, Window, builtin_scenes, render,
+    Assets, CompileOptions, Display, Encoding, Film, FolderAssets, Format, Image, NoAssets, RenderSettings,
+    SamplesDesc, Scene, SceneDesc, Window, builtin_scenes, render,
 };
 
 use crate::bench::config11;
@@ -106,8 +106,7 @@ fn rendered(scene: &Scene, settings: &RenderSettings) -> Result<Film, String> {
 
 /// Writes `docs/src/pictures/NAME.png`.
 fn save(name: &str, image: &Image, display: &Display, scene: &Scene, settings: &RenderSettings) -> Outcome {
-    let bytes =
-        image.encode(Format::Png8, display, &scene.receipt(settings)).map_err(|e| format!("{name}: {e}"))?;
+    let bytes = image.encode(Format::Png8, display, &scene.receipt(settings)).map_err(|e| format!("{name}: {e}"))?;
     let path = Path::new("docs/src/pictures").join(format!("{name}.png"));
     write(&root().join(&path), &bytes)?;
     eprintln!("wrote {}", path.display());

@@ -5,7 +5,7 @@ use fearless_simd::{Level, Simd};
 use crate::accel::{Aabb, Bvh, RayPacket16, RayTile, TraceRay, dispatch_eight};
 use crate::ids::LightId;
 use crate::math::{LANES, Ray, Vec3};
-use crate::scene::{CompileOptions, Scene, SceneDesc, ShadowRays};
+use crate::scene::{CameraHit, CompileOptions, Scene, SceneDesc, ShadowRays};
 use crate::shape::{RayDifferential, TileHits, TriangleTree, every};
 use crate::visibility::{Occluders, Settled, Settler, Target, View, Viewpoint, Visibility};
 
@@ -337,7 +337,7 @@ pub enum Sight {
 }
 
 /// What is seen of a light, which is sampled, from where the ray through the middle of each pixel ends, row by row; `None` where that
-/// is nowhere. Each `block` x `block` pixels have a shaft together.
+/// is nowhere, or at a light. Each `block` x `block` pixels have a shaft together.
 pub fn sights(scene: &Scene, light: u32, block: u32) -> Vec<Option<Sight>> {
     let (level, target) = (Level::new(), Target::new(scene, LightId(light)));
     let (mut occluders, mut view) = (Occluders::default(), View::default());
@@ -351,8 +351,8 @@ pub fn sights(scene: &Scene, light: u32, block: u32) -> Vec<Option<Sight>> {
             for y in top..(top + block).min(scene.height) {
                 for x in left..(left + block).min(scene.width) {
                     let (ray, differential) = scene.camera.ray(x as f32 + 0.5, y as f32 + 0.5, 1.0);
-                    if let Some(hit) = scene.intersect(&ray) {
-                        points.push(Viewpoint::of(&scene.surface(&ray, &hit, &differential)));
+                    if let CameraHit::Surface(si) = scene.see(&ray, scene.intersect(&ray), &differential) {
+                        points.push(Viewpoint::of(&si));
                         pixels.push((y * scene.width + x) as usize);
                     }
                 }
