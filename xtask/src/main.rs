@@ -7,6 +7,7 @@ mod exact;
 mod generate;
 mod lights;
 mod models;
+mod peers;
 mod pictures;
 mod plot;
 mod rays;
@@ -65,6 +66,8 @@ enum Task {
     /// Measures whole processes from a mesh file to a picture, against F3D and Mitsuba where a Python has them, and writes a
     /// page under docs/benchmarks.
     Models(models::Options),
+    /// Measures config 11 against Mitsuba and POV-Ray, where they are named, and writes a page under docs/benchmarks.
+    Peers(peers::Options),
     /// Runs the tests that take long: more scenes, more rays.
     #[command(args_conflicts_with_subcommands = true)]
     Verify {
@@ -95,6 +98,7 @@ fn main() -> ExitCode {
         Task::Lights(options) => lights::run(&options),
         Task::Rays(options) => rays::run(&options),
         Task::Models(options) => models::run(&options),
+        Task::Peers(options) => peers::run(&options),
         Task::Verify { what: Some(Verify::Exact(options)), .. } => exact::run(&options),
         Task::Verify { scenes, what: None } => verify::run(scenes),
     };
