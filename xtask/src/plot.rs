@@ -36,7 +36,7 @@ fn label(power: i32) -> String {
         6.. => format!("{} M", 10u64.pow(power as u32 - 6)),
         3..6 => format!("{} k", 10u64.pow(power as u32 - 3)),
         0..3 => format!("{}", 10u64.pow(power as u32)),
-        _ => format!("{:.*}", power.unsigned_abs() as usize, 10f64.powi(power)),
+        _ => format!("{:.*}", power.unsigned_abs() as usize, pxfm::f_exp10(f64::from(power))),
     }
 }
 
@@ -67,12 +67,12 @@ impl Plot<'_> {
             let _ = writeln!(svg, "<text x=\"{x:.1}\" y=\"{y:.1}\"{more}>{words}</text>");
         };
         for power in x[0]..=x[1] {
-            let at = across(10f64.powi(power));
+            let at = across(pxfm::f_exp10(f64::from(power)));
             ruled(&mut svg, [at, top], [at, bottom]);
             text(&mut svg, [at, bottom + 18.0], " text-anchor=\"middle\"", &label(power));
         }
         for power in y[0]..=y[1] {
-            let at = up(10f64.powi(power));
+            let at = up(pxfm::f_exp10(f64::from(power)));
             ruled(&mut svg, [left, at], [right, at]);
             text(&mut svg, [left - 8.0, at + 4.0], " text-anchor=\"end\"", &label(power));
         }
