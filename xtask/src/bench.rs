@@ -3,11 +3,14 @@
 use std::fmt::Write as _;
 use std::num::NonZeroUsize;
 use std::ops::ControlFlow;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::time::Instant;
 
-use firstlight::{CompileOptions, NoAssets, RenderSettings, Scene, SceneDesc, SimdLevel, builtin_scenes, render};
+use firstlight::{
+    AaMode, CompileOptions, Display, Image, NoAssets, RenderSettings, RenderStats, SamplesDesc, Scene, SceneDesc,
+    SimdLevel, builtin_scenes, render,
+};
 use serde_json::json;
 
 use crate::{Outcome, cargo, root, run as run_to_end, write};
@@ -40,17 +43,12 @@ struct Way {
 }
 
 pub fn run(options: &Options) -> Outcome {
-    let scene = config11(options)?;
+    let scene = config11(options.size, options.aa, options.samples.into())?;
     let mut ways = ways();
     let mut samples = 0;
     for round in 1..=options.rounds {
         for way in &mut ways {
-            let start = Instant::now();
-            let ControlFlow::Continue((_, stats)) = render(&scene, &way.settings, &|_, _| ControlFlow::Continue(()))
-            else {
-                return Err("stopped".into());
-            };
-            let seconds = start.elapsed().as_secs_f64();
+            let (_, stats, seconds) = picture(&scene, &way.settings)?;
             samples = samples.max(stats.shadow_rays);
             eprintln!("round {round}: {:30} {seconds:8.3} s", way.name);
             way.seconds.push(seconds);
@@ -74,20 +72,61 @@ pub fn run(options: &Options) -> Outcome {
     Ok(())
 }
 
-fn config11(options: &Options) -> Result<Scene, String> {
+/// Config 11 with `size` x `size` pixels, `aa` x `aa` camera rays in each, and so many points on the light.
+pub(crate) fn config11(size: u32, aa: u32, samples: SamplesDesc) -> Result<Scene, String> {
     let builtin = builtin_scenes().iter().find(|b| b.name == "config11").ok_or("there is no config11")?;
     let mut parsed = SceneDesc::parse("config11.toml", builtin.text.as_bytes(), &NoAssets);
     let render = &mut parsed.desc.render;
-    (render.width, render.height, render.antialiasing, render.samples) =
-        (options.size, options.size, options.aa, options.samples.into());
+    (render.width, render.height, render.antialiasing, render.samples) = (size, size, aa, samples);
     Ok(parsed.compile(&NoAssets, &CompileOptions::default()).map_err(|e| e.to_string())?.scene)
+}
+
+/// Renders a picture, and says in how many seconds.
+pub(crate) fn picture(scene: &Scene, settings: &RenderSettings) -> Result<(Image, RenderStats, f64), String> {
+    let start = Instant::now();
+    let ControlFlow::Continue((film, stats)) = render(scene, settings, &|_, _| ControlFlow::Continue(())) else {
+        return Err("stopped".into());
+    };
+    let seconds = start.elapsed().as_secs_f64();
+    Ok((film.develop(), stats, seconds))
+}
+
+/// How far two pictures are apart, in steps of an 8-bit picture as it is displayed.
+#[derive(Clone, Copy)]
+pub(crate) struct Difference {
+    pub worst: f64,
+    /// Root mean square of the worst channel of each pixel.
+    pub rms: f64,
+    /// Pixels that are off by more than one step.
+    pub over: usize,
+}
+
+impl Difference {
+    pub fn between(a: &Image, b: &Image, display: &Display) -> Difference {
+        let shown = |x: f32| display.encode(x).clamp(0.0, 1.0);
+        let steps = |a: f32, b: f32| 255.0 * (shown(a) - shown(b)).abs();
+        let (mut worst, mut over, mut sum) = (0.0f64, 0, 0.0);
+        for (a, b) in a.pixels.iter().zip(&b.pixels) {
+            let step = (0..3).map(|i| steps(a[i], b[i])).fold(0.0, f64::max);
+            worst = worst.max(step);
+            over += usize::from(step > 1.0);
+            sum += step * step;
+        }
+        Difference { worst, rms: (sum / a.pixels.len() as f64).sqrt(), over }
+    }
 }
 
 /// The plain renderer, every instruction set on one thread, and the best on two and on all.
 fn ways() -> Vec<Way> {
     let way = |name: String, simd: SimdLevel, threads: usize, reference: bool| Way {
         name,
-        settings: RenderSettings { threads: NonZeroUsize::new(threads), simd, reference, ..Default::default() },
+        settings: RenderSettings {
+            threads: NonZeroUsize::new(threads),
+            simd,
+            reference,
+            aa_mode: AaMode::Full,
+            ..Default::default()
+        },
         seconds: Vec::new(),
     };
     let mut ways = vec![way("plain, 1 thread".into(), SimdLevel::Auto, 1, true)];
@@ -108,31 +147,41 @@ struct Program {
 }
 
 fn program(options: &Options) -> Result<Program, String> {
-    run_to_end(cargo().args(["build", "--release", "--quiet", "--bin", "firstlight"]))?;
-    let program = root().join("target/release/firstlight");
-    let folder = std::env::temp_dir().join(format!("firstlight-bench-{}", std::process::id()));
-    std::fs::create_dir_all(&folder).map_err(|e| e.to_string())?;
-    let render = |size: u32, more: &[&str]| -> Outcome {
-        let mut command = Command::new(&program);
-        let size = size.to_string();
-        command.args(["render", "config11", "--quiet", "--width", &size, "--height", &size, "-o"]);
-        command.arg(folder.join("picture.png")).args(more);
-        let status = command.status().map_err(|e| e.to_string())?;
-        if status.success() { Ok(()) } else { Err(format!("{}: {status}", program.display())) }
-    };
-    let mut small = Vec::new();
-    for _ in 0..21 {
-        let start = Instant::now();
-        render(64, &[])?;
-        small.push(start.elapsed().as_secs_f64());
-    }
-    let stats: PathBuf = folder.join("stats.json");
+    let program = built()?;
+    let small = processes(&program, &["--width", "64", "--height", "64"], 21)?;
+    let stats = std::env::temp_dir().join(format!("firstlight-bench-{}.json", std::process::id()));
     // Memory does not depend on the number of samples
-    render(options.size, &["--samples", "1", &format!("--stats={}", stats.display())])?;
+    let (size, file) = (options.size.to_string(), format!("--stats={}", stats.display()));
+    processes(&program, &["--width", &size, "--height", &size, "--samples", "1", &file], 1)?;
     let text = std::fs::read_to_string(&stats).map_err(|e| e.to_string())?;
+    std::fs::remove_file(&stats).map_err(|e| e.to_string())?;
     let stats: serde_json::Value = serde_json::from_str(&text).map_err(|e| e.to_string())?;
-    std::fs::remove_dir_all(&folder).map_err(|e| e.to_string())?;
     Ok(Program { small, memory: stats["peak_memory_bytes"].as_u64().unwrap_or(0) })
+}
+
+/// Builds the program: where it is.
+pub(crate) fn built() -> Result<PathBuf, String> {
+    run_to_end(cargo().args(["build", "--release", "--quiet", "--bin", "firstlight"]))?;
+    let target = std::env::var_os("CARGO_TARGET_DIR").unwrap_or_else(|| "target".into());
+    Ok(root().join(target).join("release/firstlight"))
+}
+
+/// Runs `firstlight render config11` so many times: the seconds from process start to file, one for each run.
+pub(crate) fn processes(program: &Path, more: &[&str], runs: usize) -> Result<Vec<f64>, String> {
+    let file = std::env::temp_dir().join(format!("firstlight-bench-{}.png", std::process::id()));
+    let mut seconds = Vec::new();
+    for _ in 0..runs {
+        let mut command = Command::new(program);
+        command.args(["render", "config11", "--quiet", "-o"]).arg(&file).args(more);
+        let start = Instant::now();
+        let status = command.status().map_err(|e| e.to_string())?;
+        seconds.push(start.elapsed().as_secs_f64());
+        if !status.success() {
+            return Err(format!("{}: {status}", program.display()));
+        }
+    }
+    std::fs::remove_file(&file).map_err(|e| e.to_string())?;
+    Ok(seconds)
 }
 
 fn page(options: &Options, ways: &[Way], samples: u64, program: &Program) -> String {

@@ -2,16 +2,16 @@
 //! asked for.
 
 use std::num::NonZeroUsize;
-use std::ops::ControlFlow;
 use std::path::PathBuf;
 use std::time::Instant;
 
 use firstlight::{
     AaMode, BlinnPhongDesc, CameraDesc, ColorDesc, ColorParam, CompileOptions, EmitSides, LightDesc, MaterialDesc,
     NoAssets, NumberParam, ParallelogramDesc, PointDesc, RectangleDesc, RenderSettings, SamplesDesc, SceneDesc,
-    ShapeDesc, SphereDesc, SphereLightDesc, SpotDesc, VisibilityMode, Window, render,
+    ShapeDesc, SphereDesc, SphereLightDesc, SpotDesc, VisibilityMode, Window,
 };
 
+use crate::bench::{Difference, picture};
 use crate::scenes::{self, Random};
 use crate::{Outcome, write};
 
@@ -62,14 +62,7 @@ pub fn run(options: &Options) -> Outcome {
     });
     let fast =
         RenderSettings { threads: Some(options.threads), aa_mode: AaMode::Adaptive, crop, ..RenderSettings::default() };
-    let picture = |settings: &RenderSettings| {
-        let start = Instant::now();
-        let ControlFlow::Continue((film, stats)) = render(&scene, settings, &|_, _| ControlFlow::Continue(())) else {
-            return Err("stopped".to_owned());
-        };
-        Ok((film.develop(), stats, start.elapsed().as_secs_f64()))
-    };
-    let (image, stats, seconds) = picture(&fast)?;
+    let (image, stats, seconds) = picture(&scene, &fast)?;
     let lights = stats.lights;
     let places = (lights.pairs / u64::from(options.lights).max(1)).max(1) as f64;
     println!(
@@ -80,20 +73,11 @@ pub fn run(options: &Options) -> Outcome {
     );
     if options.all {
         let traced = RenderSettings { visibility: VisibilityMode::Traced, ..fast };
-        let (all, _, seconds) = picture(&traced)?;
-        let display = scene.display();
-        let steps = |a: f32, b: f32| 255.0 * (display.encode(a) - display.encode(b)).abs();
-        let (mut worst, mut over, mut sum) = (0.0f64, 0, 0.0);
-        for (a, b) in image.pixels.iter().zip(&all.pixels) {
-            let step = (0..3).map(|i| steps(a[i], b[i])).fold(0.0, f64::max);
-            worst = worst.max(step);
-            over += u32::from(step > 1.0);
-            sum += step * step;
-        }
-        let pixels = image.pixels.len() as f64;
+        let (all, _, seconds) = picture(&scene, &traced)?;
+        let Difference { worst, rms, over } = Difference::between(&image, &all, &scene.display());
         println!(
-            "every light at every ray: {seconds:.2} s; off by {worst:.3} steps at worst, {:.4} rms, {over} of {pixels} pixels by more than 1",
-            (sum / pixels).sqrt()
+            "every light at every ray: {seconds:.2} s; off by {worst:.3} steps at worst, {rms:.4} rms, {over} of {} pixels by more than 1",
+            image.pixels.len()
         );
     }
     Ok(())

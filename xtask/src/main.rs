@@ -1,11 +1,15 @@
 //! The project's own commands: `cargo xtask COMMAND`.
 
 mod bench;
+mod curves;
+mod engine;
 mod exact;
 mod generate;
 mod lights;
 mod models;
+mod peers;
 mod pictures;
+mod plot;
 mod rays;
 mod test;
 mod verify;
@@ -46,13 +50,15 @@ enum Task {
         #[arg(long)]
         check: bool,
     },
-    /// Renders the pictures of the book: the built-in scenes and the gallery.
+    /// Renders the pictures of the book: the built-in scenes, the gallery, and what goes on inside (visibility, heat).
     Pictures {
         /// Only those whose name contains this.
         filter: Option<String>,
     },
     /// Measures config 11 and writes a page under docs/benchmarks.
     Bench(bench::Options),
+    /// Measures what each part of the light engine gains, on config 11 and on a mesh, and writes a page under docs/benchmarks.
+    Engine(engine::Options),
     /// Measures a hall full of small lights, or writes it as a scene.
     Lights(lights::Options),
     /// Measures rays through meshes, against Embree where it is installed, and writes a page under docs/benchmarks.
@@ -60,6 +66,8 @@ enum Task {
     /// Measures whole processes from a mesh file to a picture, against F3D and Mitsuba where a Python has them, and writes a
     /// page under docs/benchmarks.
     Models(models::Options),
+    /// Measures config 11 against Mitsuba and POV-Ray, where they are named, and writes a page under docs/benchmarks.
+    Peers(peers::Options),
     /// Runs the tests that take long: more scenes, more rays.
     #[command(args_conflicts_with_subcommands = true)]
     Verify {
@@ -86,9 +94,11 @@ fn main() -> ExitCode {
         Task::Generate { check } => generate::run(check),
         Task::Pictures { filter } => pictures::run(filter.as_deref()),
         Task::Bench(options) => bench::run(&options),
+        Task::Engine(options) => engine::run(&options),
         Task::Lights(options) => lights::run(&options),
         Task::Rays(options) => rays::run(&options),
         Task::Models(options) => models::run(&options),
+        Task::Peers(options) => peers::run(&options),
         Task::Verify { what: Some(Verify::Exact(options)), .. } => exact::run(&options),
         Task::Verify { scenes, what: None } => verify::run(scenes),
     };

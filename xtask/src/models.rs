@@ -9,9 +9,9 @@ use std::time::Instant;
 
 use serde_json::json;
 
-use crate::bench::{commit, median, processor};
+use crate::bench::{built, commit, median, processor};
 use crate::rays::terrain_mesh;
-use crate::{Outcome, cargo, root, run as run_to_end, write};
+use crate::{Outcome, root, write};
 
 /// What to measure, and where to write it.
 #[derive(clap::Args)]
@@ -45,11 +45,10 @@ struct Way {
 }
 
 pub fn run(options: &Options) -> Outcome {
-    run_to_end(cargo().args(["build", "--release", "--bin", "firstlight"]))?;
     let folder = std::env::temp_dir().join(format!("firstlight-models-{}", std::process::id()));
     std::fs::create_dir_all(&folder).map_err(|e| e.to_string())?;
     let mut ways = Vec::new();
-    let ours = root().join("target/release/firstlight").display().to_string();
+    let ours = built()?.display().to_string();
     for (mesh, n) in [("terrain, 1 M", 707), ("terrain, 10 M", 2236)] {
         if options.quick && n > 1000 {
             continue;

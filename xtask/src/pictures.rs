@@ -1,12 +1,15 @@
-//! `cargo xtask pictures`: the pictures of the book.
+//! `cargo xtask pictures`: the pictures of the book. Its plots come from `cargo xtask engine --curves`.
 
 use std::ops::ControlFlow;
 use std::path::Path;
 
+use firstlight::bench::{Sight, sights};
 use firstlight::{
-    Assets, CompileOptions, FolderAssets, Format, NoAssets, RenderSettings, SceneDesc, builtin_scenes, render,
+    Assets, CompileOptions, Display, Encoding, Film, FolderAssets, Format, Image, NoAssets, RenderSettings,
+    SamplesDesc, Scene, SceneDesc, Window, builtin_scenes, render,
 };
 
+use crate::bench::config11;
 use crate::{Outcome, root, write};
 
 pub fn run(filter: Option<&str>) -> Outcome {
@@ -32,7 +35,53 @@ pub fn run(filter: Option<&str>) -> Outcome {
             picture(&name, &text, &assets, None)?;
         }
     }
+    if wanted("visibility") {
+        visibility()?;
+    }
+    if wanted("heat") {
+        heat()?;
+    }
     Ok(())
+}
+
+/// Pixels across and down of the pictures of what goes on inside.
+const INSIDE: u32 = 512;
+/// Pixels across and down that have a shaft together.
+const BLOCK: u32 = 4;
+
+/// How much of the light is seen at the middle of each pixel of config 11, and how that was found out: `visibility.png`.
+fn visibility() -> Outcome {
+    let scene = config11(INSIDE, 1, 400.into())?;
+    let kinds = [
+        (Sight::Empty, [0.99, 0.86, 0.42]),
+        (Sight::Lit, [0.93, 0.55, 0.14]),
+        (Sight::Hidden, [0.16, 0.22, 0.42]),
+        (Sight::BelowHorizon, [0.45, 0.45, 0.45]),
+        (Sight::Cut, [0.78, 0.16, 0.28]),
+    ];
+    let sights = sights(&scene, 0, BLOCK);
+    for (kind, _) in kinds {
+        let count = sights.iter().filter(|sight| **sight == Some(kind)).count();
+        eprintln!("{kind:?}: {:.1} %", 100.0 * count as f64 / sights.len() as f64);
+    }
+    let color = |sight: &Option<Sight>| {
+        let found = kinds.iter().find(|(kind, _)| Some(*kind) == *sight);
+        let [r, g, b] = found.map_or([0.0; 3], |(_, color)| color.map(|c| Encoding::Srgb.decode(c) as f32));
+        [r, g, b, 1.0]
+    };
+    let window = Window { x: 0, y: 0, width: INSIDE, height: INSIDE };
+    let image = Image { film: [INSIDE; 2], window, pixels: sights.iter().map(color).collect() };
+    save("visibility", &image, &Display::default(), &scene, &RenderSettings::default())
+}
+
+/// Where the work of config 11 went: `heat.png`.
+fn heat() -> Outcome {
+    let scene = config11(INSIDE, 4, SamplesDesc::Exact)?;
+    let settings = RenderSettings { heat: true, ..RenderSettings::default() };
+    let heat = rendered(&scene, &settings)?.heat().ok_or("no heat was kept")?;
+    let (mean, most) = heat.mean_and_most();
+    eprintln!("work: {mean:.1} in the mean, {most:.0} at most");
+    save("heat", &heat.picture(), &Display::default(), &scene, &settings)
 }
 
 /// Renders one scene into `docs/src/pictures/NAME.png`.
@@ -45,13 +94,19 @@ fn picture(name: &str, text: &[u8], assets: &dyn Assets, size: Option<u32>) -> O
         .compile(assets, &CompileOptions { strict: true, ..CompileOptions::default() })
         .map_err(|e| e.to_string())?;
     let (scene, settings) = (&compiled.scene, RenderSettings::default());
-    let ControlFlow::Continue((film, _)) = render(scene, &settings, &|_, _| ControlFlow::Continue(())) else {
+    save(name, &rendered(scene, &settings)?.develop(), &scene.display(), scene, &settings)
+}
+
+fn rendered(scene: &Scene, settings: &RenderSettings) -> Result<Film, String> {
+    let ControlFlow::Continue((film, _)) = render(scene, settings, &|_, _| ControlFlow::Continue(())) else {
         return Err("stopped".into());
     };
-    let bytes = film
-        .develop()
-        .encode(Format::Png8, &scene.display(), &scene.receipt(&settings))
-        .map_err(|e| format!("{name}: {e}"))?;
+    Ok(film)
+}
+
+/// Writes `docs/src/pictures/NAME.png`.
+fn save(name: &str, image: &Image, display: &Display, scene: &Scene, settings: &RenderSettings) -> Outcome {
+    let bytes = image.encode(Format::Png8, display, &scene.receipt(settings)).map_err(|e| format!("{name}: {e}"))?;
     let path = Path::new("docs/src/pictures").join(format!("{name}.png"));
     write(&root().join(&path), &bytes)?;
     eprintln!("wrote {}", path.display());

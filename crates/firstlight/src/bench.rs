@@ -1,13 +1,13 @@
-//! What the project's own benchmark of rays asks of the library's insides. Not for others: it changes without notice.
+//! What the project's own benchmarks and pictures ask of the library's insides. Not for others: it changes without notice.
 
 use fearless_simd::{Level, Simd};
 
 use crate::accel::{Aabb, Bvh, RayPacket16, RayTile, TraceRay, dispatch_eight};
 use crate::ids::LightId;
 use crate::math::{LANES, Ray, Vec3};
-use crate::scene::{CompileOptions, Scene, SceneDesc, ShadowRays};
+use crate::scene::{CameraHit, CompileOptions, Scene, SceneDesc, ShadowRays};
 use crate::shape::{RayDifferential, TileHits, TriangleTree, every};
-use crate::visibility::{Settled, Settler, Target, Viewpoint, Visibility};
+use crate::visibility::{Occluders, Settled, Settler, Target, View, Viewpoint, Visibility};
 
 /// Origin and direction of a ray.
 pub type RayBits = [f32; 6];
@@ -319,4 +319,61 @@ impl Soft {
         let Settled { visibility: [lit, hidden, below, mask], shafts, occluders, traced } = self.settled;
         [lit, hidden, below, mask, shafts, occluders, traced]
     }
+}
+
+/// How much of a light is seen, and how that was found out.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Sight {
+    /// Nothing lies between the points of a block and the light: all of it, for all of them.
+    Empty,
+    /// Something lies there, but not before this point: all of it.
+    Lit,
+    /// One thing hides all of it.
+    Hidden,
+    /// It is behind the surface.
+    BelowHorizon,
+    /// Some of it.
+    Cut,
+}
+
+/// What is seen of a light, which is sampled, from where the ray through the middle of each pixel ends, row by row; `None` where that
+/// is nowhere, or at a light. Each `block` x `block` pixels have a shaft together.
+pub fn sights(scene: &Scene, light: u32, block: u32) -> Vec<Option<Sight>> {
+    let (level, target) = (Level::new(), Target::new(scene, LightId(light)));
+    let (mut occluders, mut view) = (Occluders::default(), View::default());
+    let mut sights = vec![None; (scene.width * scene.height) as usize];
+    let (mut points, mut pixels, mut order) = (Vec::new(), Vec::new(), Vec::new());
+    for top in (0..scene.height).step_by(block as usize) {
+        for left in (0..scene.width).step_by(block as usize) {
+            // The block's points
+            points.clear();
+            pixels.clear();
+            for y in top..(top + block).min(scene.height) {
+                for x in left..(left + block).min(scene.width) {
+                    let (ray, differential) = scene.camera.ray(x as f32 + 0.5, y as f32 + 0.5, 1.0);
+                    if let CameraHit::Surface(si) = scene.see(&ray, scene.intersect(&ray), &differential) {
+                        points.push(Viewpoint::of(&si));
+                        pixels.push((y * scene.width + x) as usize);
+                    }
+                }
+            }
+            if points.is_empty() {
+                continue;
+            }
+            // What may stand between them and the light, then each for itself
+            order.clear();
+            order.extend(0..points.len() as u32);
+            occluders.gather(level, scene, &target, &points, &order, usize::MAX);
+            for (point, pixel) in points.iter().zip(&pixels) {
+                sights[*pixel] = Some(match view.classify(level, scene, &target, &occluders, point) {
+                    Visibility::Lit if occluders.count() == 0 => Sight::Empty,
+                    Visibility::Lit => Sight::Lit,
+                    Visibility::Hidden => Sight::Hidden,
+                    Visibility::BelowHorizon => Sight::BelowHorizon,
+                    Visibility::Mask => Sight::Cut,
+                });
+            }
+        }
+    }
+    sights
 }
