@@ -528,7 +528,9 @@ impl<'a> Tiled<'a> {
     /// The share of its pixel that a patch has, where each surface is lit once.
     fn share(&self, patch: &Patch) -> f32 {
         match self.mode {
-            AaMode::Adaptive => patch.count(self.scene) as f32 / (self.scene.antialiasing * self.scene.antialiasing) as f32,
+            AaMode::Adaptive => {
+                patch.count(self.scene) as f32 / (self.scene.antialiasing * self.scene.antialiasing) as f32
+            }
             AaMode::Full => 1.0,
         }
     }
