@@ -26,6 +26,15 @@ pub(crate) struct Patch {
     pub off: f32,
     /// Whether more than colours change over it: then it is shaded at each of its rays.
     pub uneven: bool,
+    /// How far its colours differ.
+    pub contrast: Contrast,
+}
+
+/// How far colours of the rays of a patch differ, channel by channel.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct Contrast {
+    pub diffuse: Rgb,
+    pub specular: Rgb,
 }
 
 /// The camera rays that see a patch.
@@ -116,6 +125,7 @@ impl Patch {
             turn,
             off: 0.0,
             uneven: false,
+            contrast: Contrast::default(),
         };
         if scene.antialiasing == 1 {
             // The pixel's only ray is that of its middle
@@ -169,7 +179,7 @@ impl Patch {
         let material = &scene.materials[si.material.index()];
         let bsdf = material.bsdf(&si, &scene.textures);
         let rays = Rays::Mask(candidate, mask);
-        let mut patch = Patch { si, bsdf, rays, reach, turn, off, uneven: false };
+        let mut patch = Patch { si, bsdf, rays, reach, turn, off, uneven: false, contrast: Contrast::default() };
         // Over all of the pixel
         let (ray, whole) = scene.camera.ray(pixel[0] as f32 + 0.5, pixel[1] as f32 + 0.5, 1.0);
         let even = candidate.hit(scene, &ray).is_some_and(|hit| {
@@ -252,6 +262,8 @@ struct Mean {
     specular: Rgb,
     ambient: Rgb,
     count: u32,
+    /// The least and the most of diffuse, of specular.
+    range: Option<[[Rgb; 2]; 2]>,
     lobe: Option<crate::material::Lobe>,
     uneven: bool,
 }
@@ -262,6 +274,12 @@ impl Mean {
         self.specular += bsdf.specular;
         self.ambient += bsdf.ambient;
         self.count += 1;
+        let both = |f: fn(f32, f32) -> f32, a: Rgb, b: Rgb| Rgb::new(f(a.r, b.r), f(a.g, b.g), f(a.b, b.b));
+        let colors = [bsdf.diffuse, bsdf.specular];
+        let range = self.range.get_or_insert([[colors[0]; 2], [colors[1]; 2]]);
+        for ([least, most], color) in range.iter_mut().zip(colors) {
+            (*least, *most) = (both(f32::min, *least, color), both(f32::max, *most, color));
+        }
         // Any ray that sees a highlight says what it is like
         if !bsdf.specular.is_black() {
             match self.lobe {
@@ -277,6 +295,10 @@ impl Mean {
         let (diffuse, specular, ambient) = (mean(self.diffuse), mean(self.specular), mean(self.ambient));
         patch.bsdf = Bsdf { diffuse, specular, ambient, lobe };
         patch.uneven |= self.uneven;
+        if let Some([diffuse, specular]) = self.range {
+            let between = |[least, most]: [Rgb; 2]| Rgb::new(most.r - least.r, most.g - least.g, most.b - least.b);
+            patch.contrast = Contrast { diffuse: between(diffuse), specular: between(specular) };
+        }
     }
 }
 
@@ -396,7 +418,16 @@ impl PixelPatches {
                 Some(Rays::Some(members)) => members.push(member),
                 _ => {
                     let rays = Rays::Some(vec![member]);
-                    self.patches.push(Patch { si, bsdf, rays, reach: 0.0, turn: 0.0, off: 0.0, uneven: false });
+                    self.patches.push(Patch {
+                        si,
+                        bsdf,
+                        rays,
+                        reach: 0.0,
+                        turn: 0.0,
+                        off: 0.0,
+                        uneven: false,
+                        contrast: Contrast::default(),
+                    });
                 }
             }
         }

@@ -4,7 +4,7 @@
 //! the corners all meet one convex shape, so do all between them; and if it is nearer there than anything else can be, it
 //! is all that is seen.
 
-use super::patch::Patch;
+use super::patch::{Contrast, Patch};
 use super::square::Square;
 use crate::ids::SurfaceId;
 use crate::light::{AreaShape, LightKind};
@@ -26,7 +26,7 @@ pub(crate) enum Candidate {
 pub(crate) struct Pyramid {
     corners: [Ray; 4],
     /// Outward unit normals.
-    sides: [Vec3; 4],
+    sides: [DVec3; 4],
     forward: Vec3,
     eye: Vec3,
     /// The cone around it: where it begins and how wide it is there, which way it leads, and the sine and cosine of half its
@@ -47,12 +47,13 @@ impl Pyramid {
         let at = |x: f32, y: f32| scene.camera.ray(x, y, 1.0).0;
         let corners = [at(left, top), at(right, top), at(right, bottom), at(left, bottom)];
         let middle = at(0.5 * (left + right), 0.5 * (top + bottom));
-        let mut sides = [Vec3::ZERO; 4];
+        let mut sides = [DVec3::ZERO; 4];
         for i in 0..4 {
             let (a, b) = (&corners[i], &corners[(i + 1) % 4]);
-            // Origins first: beside those of far eyes a direction would be lost
-            let n = a.d.cross((b.o - a.o) + b.d).normalize_or_zero();
-            sides[i] = if n.dot((middle.o - a.o) + middle.d) > 0.0 { -n } else { n };
+            // Rays of neighbours are nearly parallel, and far eyes see far
+            let to = |ray: &Ray| (ray.o.as_dvec3() - a.o.as_dvec3()) + ray.d.as_dvec3();
+            let n = a.d.as_dvec3().cross(to(b)).normalize_or_zero();
+            sides[i] = if n.dot(to(&middle)) > 0.0 { -n } else { n };
         }
         let frame = scene.camera.frame();
         let sin = corners.iter().fold(0.0f64, |sin, ray| sin.max(f64::from(middle.d.cross(ray.d).length())));
@@ -84,7 +85,7 @@ impl Pyramid {
         // Rays are known to the rounding of their directions
         let off = (sphere.c - self.middle.o.as_dvec3()).length();
         let slack = sphere.c.abs().max_element().max(sphere.r).max(off) * SLACK;
-        let outside = |(n, ray): (&Vec3, &Ray)| n.as_dvec3().dot(sphere.c - ray.o.as_dvec3()) > sphere.r + slack;
+        let outside = |(n, ray): (&DVec3, &Ray)| n.dot(sphere.c - ray.o.as_dvec3()) > sphere.r + slack;
         self.sides.iter().zip(&self.corners).any(outside) || self.depth(sphere.c) + sphere.r < -slack
     }
 
@@ -93,7 +94,7 @@ impl Pyramid {
         let from = self.middle.o.as_dvec3();
         let size = corners.iter().fold(0.0f64, |size, q| size.max(q.abs().max_element()).max((*q - from).length()));
         let slack = size * SLACK;
-        let outside = |(n, ray): (&Vec3, &Ray)| corners.iter().all(|q| n.as_dvec3().dot(*q - ray.o.as_dvec3()) > slack);
+        let outside = |(n, ray): (&DVec3, &Ray)| corners.iter().all(|q| n.dot(*q - ray.o.as_dvec3()) > slack);
         self.sides.iter().zip(&self.corners).any(outside) || corners.iter().all(|q| self.depth(*q) < -slack)
     }
 
@@ -271,14 +272,14 @@ impl Candidate {
 
     /// Tells the material at each pixel of a square that sees only this, the mean over its rays; nothing for pixels over which
     /// more than colours change.
-    pub fn bsdfs(self, scene: &Scene, square: Square, tell: &mut impl FnMut([u32; 2], Bsdf)) {
+    pub fn bsdfs(self, scene: &Scene, square: Square, tell: &mut impl FnMut([u32; 2], Bsdf, Contrast)) {
         if square.side == 1 {
             let at = [square.x, square.y];
             if let Some(patch) = Patch::whole(scene, at, self).filter(|patch| !patch.uneven) {
-                tell(at, patch.bsdf);
+                tell(at, patch.bsdf, patch.contrast);
             }
         } else if let Some(bsdf) = self.even(scene, square) {
-            square.pixels().for_each(|at| tell(at, bsdf));
+            square.pixels().for_each(|at| tell(at, bsdf, Contrast::default()));
         } else {
             for quarter in square.quarters() {
                 self.bsdfs(scene, quarter, tell);

@@ -20,7 +20,7 @@ use super::field::{Field, Shade};
 use super::film::FilmTile;
 use super::hits::PixelHits;
 use super::many::Many;
-use super::patch::{Patch, PixelPatches};
+use super::patch::{Contrast, Patch, PixelPatches};
 use super::solo::{self, Candidate, Pyramid};
 use super::square::Square;
 use super::tile::Tile;
@@ -39,6 +39,8 @@ pub(crate) const CELL: u32 = 32;
 pub(super) const ACROSS: usize = CELL as usize + 2;
 /// Pixels across the smallest squares that are asked whether they hold one surface.
 const SMALLEST: u32 = 2;
+/// What colours and light that change together make of a pixel, at most, as a part of both changes: one along each axis.
+const MIXED: f32 = 0.25;
 /// Lists of candidates: of the cell with its rim, and of squares of each size down to the smallest.
 const DEPTHS: usize = (CELL / SMALLEST).ilog2() as usize + 2;
 /// Pixels across the largest square whose colours are looked up one by one.
@@ -264,12 +266,14 @@ impl<'a> Tiled<'a> {
             return ControlFlow::Continue(());
         }
         let mut bsdfs = [None; (PATCHWORK * PATCHWORK) as usize];
+        let mut contrasts = [Contrast::default(); (PATCHWORK * PATCHWORK) as usize];
         let shade = match even {
             Some(bsdf) => Some(Shade::even(scene, only, &bsdf)),
             None => {
                 // Beyond the film's edge as well: it is a part of the square
-                only.bsdfs(scene, square, &mut |[x, y], bsdf| {
-                    bsdfs[((y - square.y) * PATCHWORK + x - square.x) as usize] = Some(bsdf);
+                only.bsdfs(scene, square, &mut |[x, y], bsdf, contrast| {
+                    let place = ((y - square.y) * PATCHWORK + x - square.x) as usize;
+                    (bsdfs[place], contrasts[place]) = (Some(bsdf), contrast);
                 });
                 Shade::of(
                     scene,
@@ -284,11 +288,46 @@ impl<'a> Tiled<'a> {
         }
         let each = (counts.work() - before) / (square.side * square.side) as f32;
         for at in square.pixels() {
-            let looked_up = || bsdfs[((at[1] - square.y) * PATCHWORK + at[0] - square.x) as usize];
-            let bsdf = if self.many.is_none() { shade.and(even.or_else(looked_up)) } else { None };
-            self.learn(at, Known::Only(only), bsdf.and_then(|bsdf| self.color(at, &bsdf)), each);
+            let color = match (&shade, even) {
+                _ if self.many.is_some() => None,
+                (Some(_), Some(bsdf)) => self.color(at, &bsdf),
+                (Some(_), None) => {
+                    let place = ((at[1] - square.y) * PATCHWORK + at[0] - square.x) as usize;
+                    bsdfs[place]
+                        .and_then(|bsdf| self.color(at, &bsdf))
+                        .filter(|color| !self.mixes(at, square, &contrasts[place], color))
+                }
+                _ => None,
+            };
+            self.learn(at, Known::Only(only), color, each);
         }
         ControlFlow::Continue(())
+    }
+
+    /// Whether colours and light change together over a pixel of a square so much that the mean of their product is not that
+    /// of their means. Where half of a pixel has one colour, and light has a slope, that is an eighth of both.
+    fn mixes(&self, [i, j]: [u32; 2], square: Square, contrast: &Contrast, [r, g, b, _]: &[f32; 4]) -> bool {
+        if *contrast == Contrast::default() {
+            return false;
+        }
+        let inside = |at: [u32; 2]| {
+            (square.x..square.x + square.side).contains(&at[0]) && (square.y..square.y + square.side).contains(&at[1])
+        };
+        let beside = [[i.wrapping_sub(1), j], [i + 1, j], [i, j.wrapping_sub(1)], [i, j + 1]];
+        let mut error = Rgb::BLACK;
+        for light in 0..self.scene.lights.len() {
+            let Some(here) = self.field.arrived(light, [i, j]) else { return true };
+            let mut slope = Sums::default();
+            for at in beside.into_iter().filter(|at| inside(*at)) {
+                let Some(there) = self.field.arrived(light, at) else { return true };
+                slope.diffuse = slope.diffuse.max((there.diffuse - here.diffuse).abs());
+                slope.specular = slope.specular.max((there.specular - here.specular).abs());
+            }
+            let scale = self.arrivals.scale(light);
+            error += scale * contrast.diffuse * (slope.diffuse * MIXED);
+            error += scale * contrast.specular * (slope.specular * MIXED);
+        }
+        self.arrivals.steps(Rgb::new(*r, *g, *b), error) > BEND
     }
 
     /// The colour of a pixel that sees one shape, if all light there is known.
@@ -473,6 +512,11 @@ impl<'a> Tiled<'a> {
         let (here, value) =
             (self.arrived[(self.first[index] + k) * lights + light], self.values[self.first[index] + k]);
         let allowed = BEND / (lights as f32).sqrt();
+        let is_dark = here.sums == Sums::default() && here.bend == Sums::default();
+        if patch.contrast != Contrast::default() && !is_dark {
+            // How light slopes there is not known
+            return false;
+        }
         if self.shown(light, &patch.bsdf, value, &here.bend) <= allowed {
             return true;
         }
