@@ -61,6 +61,8 @@ const WORTH: f32 = 0.25;
 const WIDE: f32 = 0.7;
 /// The part of what nothing is known of that is guessed to arrive.
 const MAYBE: f32 = 0.3;
+/// From fewer places than this each asks for itself.
+const WORTH_A_LOOK: usize = 6;
 /// So many nodes are taken apart between two looks at the sum.
 const STRIDE: u32 = 8;
 /// Sums are made anew where the worst in question has become so much less.
@@ -102,7 +104,12 @@ impl Crowd {
     fn add(&mut self, walk: &Walk, mut item: Item) {
         let node = &walk.tree.nodes[item.node as usize];
         let sight = &item.sight;
-        item.error = if item.by == By::Middle { node.error(sight) } else { node.most(sight) };
+        item.error = match (item.by, node.held) {
+            (By::Middle, _) => node.error(sight),
+            // Asked at each place, it is what it is
+            (_, Held::Light(_)) if node.is_point() => Sent::default(),
+            _ => node.most(sight),
+        };
         let typical = 0.5 * (sight.least + sight.diffuse.min(1e3 * sight.least));
         item.typical = if matches!(item.by, By::Middle | By::One) { typical } else { MAYBE * typical };
         let key = walk.key(&item.error);
@@ -205,14 +212,16 @@ impl Crowd {
     }
 
     /// Looks at what was not looked at yet, and says how all nodes count.
-    pub fn settle(&mut self, walk: &Walk, look: &mut dyn FnMut(&LightNode, u32) -> Seen) {
+    ///
+    /// Where `places` are few, asking from each is less work than looking.
+    pub fn settle(&mut self, walk: &Walk, places: usize, look: &mut dyn FnMut(&LightNode, u32) -> Seen) {
         self.nodes.clear();
         let heap = std::mem::take(&mut self.heap);
         for place in &heap {
             let item = self.items[at(*place)];
             let node = &walk.tree.nodes[item.node as usize];
             let mut by = item.by;
-            if matches!(by, By::MiddleIfSeen | By::OneIfSeen) && !item.looked {
+            if matches!(by, By::MiddleIfSeen | By::OneIfSeen) && !item.looked && places >= WORTH_A_LOOK {
                 match look(node, node.first(walk.tree)) {
                     Seen::Nothing => {
                         self.count(walk, &item, -1.0);
@@ -221,8 +230,7 @@ impl Crowd {
                     Seen::Whole if by == By::MiddleIfSeen => {
                         self.count(walk, &item, -1.0);
                         by = By::Middle;
-                        let error = node.error(&item.sight);
-                        self.count(walk, &Item { error, ..item }, 1.0);
+                        self.count(walk, &Item { error: node.error(&item.sight), ..item }, 1.0);
                     }
                     Seen::Whole => by = By::One,
                     Seen::Unknown => {}

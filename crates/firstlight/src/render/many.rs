@@ -33,7 +33,7 @@ pub(crate) const SINGLY: usize = 1000;
 const BLOCK_BUDGET: f32 = 0.45;
 const PATCH_BUDGET: f32 = 0.4;
 /// In display steps: the root of the sum of squares of all that may be wrong where many are taken for one.
-const CROWD: f32 = 1.0;
+const CROWD: f32 = 1.2;
 /// A patch that is darker than was guessed is looked at again beyond this factor of it.
 const LENIENT: f32 = 1.25;
 /// How much wider the first look at a block is, that says how bright it is.
@@ -41,7 +41,9 @@ const PILOT: f32 = 4.0;
 /// The part of what that look finds that is taken for sure.
 const SURE: f32 = 0.8;
 /// Blocks that ask for more lights by themselves are quartered.
-const CLOSE: usize = 6;
+const CLOSE: usize = 24;
+/// An error that shows whatever is there.
+const ANYTHING: f32 = 1e30;
 /// In a list of nodes: one light stands for this one.
 const ONE: u32 = 1 << 31;
 /// In display steps: how far all lights that are integrated one by one may be wrong together.
@@ -88,6 +90,8 @@ struct Stored {
     singles: Range<u32>,
     /// The nodes of its blocks, the largest first, and its own.
     lit: [Range<u32>; LEVELS + 1],
+    /// Those of its block that count where the light that stands for them is seen; those that do are among its own.
+    maybe: Range<u32>,
     /// What those send, and how far the mean over the patch can be from it.
     sent: Sent,
     bend: Sent,
@@ -298,7 +302,7 @@ impl<'a> Many<'a> {
             let some = [0, group.len() / 2, group.len() - 1].map(|i| patch(&group[i]));
             let all = some.map(|patch| {
                 crowd.nodes.iter().fold(Rgb::BLACK, |sum, (node, by)| match entry(*node, *by) {
-                    entry if arrives(scene, tree, entry, *by, &patch.si) => {
+                    entry if matches!(by, By::Middle | By::One) || arrives(scene, tree, entry, &patch.si) => {
                         sum + sent(scene, tree, entry, &patch.si, &patch.bsdf.lobe)[0]
                     }
                     _ => sum,
@@ -312,16 +316,20 @@ impl<'a> Many<'a> {
         if is_close {
             again.extend_from_slice(group);
         } else {
-            crowd.settle(&walk, &mut look);
+            crowd.settle(&walk, group.len(), &mut look);
             let start = self.lit.len() as u32;
             let everywhere = crowd.nodes.iter().filter(|(_, by)| matches!(by, By::Middle | By::One));
             self.lit.extend(everywhere.map(|(node, by)| entry(*node, *by)));
             let lit = start..self.lit.len() as u32;
+            let sometimes = crowd.nodes.iter().filter(|(_, by)| matches!(by, By::MiddleIfSeen | By::OneIfSeen));
+            self.lit.extend(sometimes.map(|(node, by)| entry(*node, *by)));
+            let maybe = lit.end..self.lit.len() as u32;
             let mut found: Option<Rgb> = None;
             for at in group {
                 let patch = patch(at);
                 let singles = self.singles.len();
-                let (stored, light) = self.in_crowd(patch, &crowd, &lit, arrivals, counts);
+                let lists = [lit.clone(), maybe.clone()];
+                let (stored, light) = self.in_crowd(patch, &crowd.singles, lists, arrivals, counts);
                 let error = crowd.error([patch.bsdf.diffuse, patch.bsdf.specular]);
                 if arrivals.steps(stored.value, error) > CROWD * LENIENT && guess != Rgb::BLACK {
                     // Darker than was guessed
@@ -362,36 +370,34 @@ impl<'a> Many<'a> {
     fn in_crowd(
         &mut self,
         patch: &Patch,
-        crowd: &Crowd,
-        everywhere: &Range<u32>,
+        singles: &[u32],
+        [everywhere, maybe]: [Range<u32>; 2],
         arrivals: &mut Arrivals<'a>,
         counts: &mut Counts,
     ) -> (Stored, Rgb) {
         let (scene, tree) = (self.scene, self.tree);
         let (si, bsdf) = (&patch.si, &patch.bsdf);
         let mut stored = Stored::default();
-        stored.lit[0] = everywhere.clone();
         let start = self.lit.len() as u32;
-        for (node, by) in &crowd.nodes {
-            if matches!(by, By::MiddleIfSeen | By::OneIfSeen) {
-                counts.points += 1;
-                let entry = entry(*node, *by);
-                if arrives(scene, tree, entry, *by, si) {
-                    self.lit.push(entry);
-                }
+        counts.points += maybe.len() as u64;
+        for i in maybe.clone() {
+            let entry = self.lit[i as usize];
+            if arrives(scene, tree, entry, si) {
+                self.lit.push(entry);
             }
         }
+        (stored.lit[0], stored.maybe) = (everywhere, maybe);
         stored.lit[LEVELS] = start..self.lit.len() as u32;
         self.add(patch, 0, &mut stored);
         self.add(patch, LEVELS, &mut stored);
         stored.value = scene.ambient * bsdf.ambient + bsdf.diffuse * stored.sent[0] + bsdf.specular * stored.sent[1];
         let from = self.singles.len() as u32;
         let mut light = stored.sent[0];
-        if !crowd.singles.is_empty() {
+        if !singles.is_empty() {
             arrivals.look_around(si);
-            arrivals.tolerate(INTEGRALS / (crowd.singles.len() as f32).sqrt());
+            arrivals.tolerate(INTEGRALS / (singles.len() as f32).sqrt());
         }
-        for index in &crowd.singles {
+        for index in singles {
             let scale = arrivals.scale(*index as usize);
             let colors = [scale * bsdf.diffuse, scale * bsdf.specular];
             let (reach, turn, off) = (patch.reach, patch.turn, patch.off);
@@ -571,11 +577,9 @@ impl<'a> Many<'a> {
                                 terms.push((light, at_ray(scene, light as usize, si, bsdf, arrivals, counts)));
                             }
                             None => {
-                                for node in self.nodes(stored) {
-                                    let sent = sent(self.scene, self.tree, node, si, &bsdf.lobe);
-                                    together[0] += bsdf.diffuse * sent[0];
-                                    together[1] += bsdf.specular * sent[1];
-                                }
+                                let [diffuse, specular] = self.sent_at(stored, si, &bsdf.lobe);
+                                together[0] += bsdf.diffuse * diffuse;
+                                together[1] += bsdf.specular * specular;
                             }
                         }
                     }
@@ -590,6 +594,52 @@ impl<'a> Many<'a> {
         }
         add(together);
         self.terms = terms;
+    }
+
+    /// What nodes send to where one camera ray ends.
+    fn sent_at(&self, stored: &Stored, si: &SurfaceInteraction, lobe: &Lobe) -> Sent {
+        let (scene, tree) = (self.scene, self.tree);
+        let mut sum = [Rgb::BLACK; 2];
+        let mut add = |entry: u32| {
+            let sent = sent(scene, tree, entry, si, lobe);
+            sum = [sum[0] + sent[0], sum[1] + sent[1]];
+        };
+        if stored.maybe.is_empty() {
+            self.nodes(stored).for_each(&mut add);
+            return sum;
+        }
+        let list = |range: &Range<u32>| &self.lit[range.start as usize..range.end as usize];
+        list(&stored.lit[0]).iter().for_each(|entry| add(*entry));
+        let seen = list(&stored.maybe).iter().filter(|entry| arrives(scene, tree, **entry, si));
+        seen.for_each(|entry| add(*entry));
+        sum
+    }
+
+    /// How far the mean over a patch can be from what arrives at its middle because other lights are seen from elsewhere on it:
+    /// as its neighbours tell, and anything where they do not.
+    fn flicker(&self, pixels: &[PixelPatches], first: &[usize], (index, k): At) -> Rgb {
+        let patch = &pixels[index].patches[k];
+        let stored = &self.patches[first[index] + k];
+        if patch.reach == 0.0 || stored.maybe.is_empty() {
+            return Rgb::BLACK;
+        }
+        let anything = Rgb::new(ANYTHING, ANYTHING, ANYTHING);
+        if !patch.is_whole(self.scene) {
+            return anything;
+        }
+        let mut all = Rgb::BLACK;
+        for channel in 0..3 {
+            let of = |color: Rgb| [color.r, color.g, color.b][channel];
+            let sums = |stored: &Stored| Sums { diffuse: of(stored.sent[0]), specular: of(stored.sent[1]) };
+            let arrived = |index: usize| Some(sums(&self.patches[first[index]]));
+            let Some(bend) = second_difference(self.scene, pixels, index, patch, &sums(stored), arrived) else {
+                return anything;
+            };
+            let one = |channel_of: usize| if channel_of == channel { 1.0 } else { 0.0 };
+            let mask = Rgb::new(one(0), one(1), one(2));
+            all += mask * (patch.bsdf.diffuse * bend.diffuse + patch.bsdf.specular * bend.specular);
+        }
+        all
     }
 
     /// What of the light at a patch has to be asked for at each ray. All the rest may together bend by as much as one may.
@@ -611,7 +661,8 @@ impl<'a> Many<'a> {
             doubts.push(Doubt { shown: 0.0, single, error });
         };
         if stored.lit.iter().any(|range| !range.is_empty()) {
-            doubt(None, bsdf.diffuse * stored.bend[0] + bsdf.specular * stored.bend[1]);
+            let smooth = bsdf.diffuse * stored.bend[0] + bsdf.specular * stored.bend[1];
+            doubt(None, smooth + self.flicker(pixels, first, (index, k)));
         }
         let shown = |light: u32, bend: &Sums| {
             let scale = arrivals.scale(light as usize);
@@ -672,10 +723,10 @@ fn entry(node: u32, by: By) -> u32 {
     if matches!(by, By::One | By::OneIfSeen) { node | ONE } else { node }
 }
 
-/// Whether the light that stands for a node is seen, where `by` asks for that.
-fn arrives(scene: &Scene, tree: &LightTree, entry: u32, by: By, si: &SurfaceInteraction) -> bool {
+/// Whether the light that stands for a node is seen.
+fn arrives(scene: &Scene, tree: &LightTree, entry: u32, si: &SurfaceInteraction) -> bool {
     let node = &tree.nodes[(entry & !ONE) as usize];
-    if matches!(by, By::Middle | By::One) || !(si.receives_shadow && node.shadows) {
+    if !(si.receives_shadow && node.shadows) {
         return true;
     }
     let one = &tree.nodes[node.one as usize];
