@@ -108,7 +108,8 @@ impl Crowd {
             (By::Middle, _) => node.error(sight),
             // Asked at each place, it is what it is
             (_, Held::Light(_)) if node.is_point() => Sent::default(),
-            _ => node.most(sight),
+            // Between nothing and the most nothing is farther off its mean, in the mean, than half of that
+            _ => node.most(sight).map(|most| most * 0.5),
         };
         let typical = 0.5 * (sight.least + sight.diffuse.min(1e3 * sight.least));
         item.typical = if matches!(item.by, By::Middle | By::One) { typical } else { MAYBE * typical };

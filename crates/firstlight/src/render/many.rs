@@ -13,6 +13,7 @@ use super::Counts;
 use super::arrival::{Arrival, Arrivals, Place};
 use super::crowd::{By, Crowd};
 use super::cut::{Cut, Tone, Walk};
+use super::fence::Fence;
 use super::patch::{Patch, PixelPatches};
 use super::tiled::{ACROSS, BEND, CELL, second_difference};
 use crate::color::Rgb;
@@ -33,7 +34,7 @@ pub(crate) const SINGLY: usize = 1000;
 const BLOCK_BUDGET: f32 = 0.45;
 const PATCH_BUDGET: f32 = 0.4;
 /// In display steps: the root of the sum of squares of all that may be wrong where many are taken for one.
-const CROWD: f32 = 1.2;
+const CROWD: f32 = 1.5;
 /// A patch that is darker than was guessed is looked at again beyond this factor of it.
 const LENIENT: f32 = 1.25;
 /// How much wider the first look at a block is, that says how bright it is.
@@ -67,6 +68,7 @@ pub(super) struct Many<'a> {
     outlook: Outlook,
     cut: Cut,
     crowd: Crowd,
+    fence: Fence,
     /// Of each patch of the cell, in the order of pixels.
     patches: Vec<Stored>,
     /// The lights that were asked for one by one, patch by patch, in scene order.
@@ -131,6 +133,7 @@ impl<'a> Many<'a> {
             outlook: Outlook::default(),
             cut: Cut::default(),
             crowd: Crowd::default(),
+            fence: Fence::default(),
             patches: Vec::new(),
             singles: Vec::new(),
             lit: Vec::new(),
@@ -288,7 +291,7 @@ impl<'a> Many<'a> {
         let steps = arrivals.display_steps();
         let walk = Walk { tree, steps, zone: &zone, tones: &tones, budget: CROWD };
         let mut crowd = std::mem::take(&mut self.crowd);
-        let (simd, outlook) = (arrivals.level(), &mut self.outlook);
+        let (simd, outlook, fence) = (arrivals.level(), &mut self.outlook, &mut self.fence);
         let mut look = |node: &LightNode, light: u32| {
             if !(receives && node.shadows) {
                 return Seen::Whole;
@@ -301,8 +304,9 @@ impl<'a> Many<'a> {
             crowd.peek();
             let some = [0, group.len() / 2, group.len() - 1].map(|i| patch(&group[i]));
             let all = some.map(|patch| {
+                fence.stand(scene, &patch.si);
                 crowd.nodes.iter().fold(Rgb::BLACK, |sum, (node, by)| match entry(*node, *by) {
-                    entry if matches!(by, By::Middle | By::One) || arrives(scene, tree, entry, &patch.si) => {
+                    entry if matches!(by, By::Middle | By::One) || arrives(scene, tree, fence, entry, &patch.si) => {
                         sum + sent(scene, tree, entry, &patch.si, &patch.bsdf.lobe)[0]
                     }
                     _ => sum,
@@ -380,9 +384,12 @@ impl<'a> Many<'a> {
         let mut stored = Stored::default();
         let start = self.lit.len() as u32;
         counts.points += maybe.len() as u64;
+        if !maybe.is_empty() {
+            self.fence.stand(scene, si);
+        }
         for i in maybe.clone() {
             let entry = self.lit[i as usize];
-            if arrives(scene, tree, entry, si) {
+            if arrives(scene, tree, &self.fence, entry, si) {
                 self.lit.push(entry);
             }
         }
@@ -544,6 +551,7 @@ impl<'a> Many<'a> {
     ) {
         let scene = self.scene;
         let mut terms = std::mem::take(&mut self.terms);
+        let mut fence = std::mem::take(&mut self.fence);
         terms.clear();
         let mut together = [Rgb::BLACK; 2];
         for (k, patch) in pixels[index].patches.iter().enumerate() {
@@ -577,7 +585,7 @@ impl<'a> Many<'a> {
                                 terms.push((light, at_ray(scene, light as usize, si, bsdf, arrivals, counts)));
                             }
                             None => {
-                                let [diffuse, specular] = self.sent_at(stored, si, &bsdf.lobe);
+                                let [diffuse, specular] = self.sent_at(stored, &mut fence, si, &bsdf.lobe);
                                 together[0] += bsdf.diffuse * diffuse;
                                 together[1] += bsdf.specular * specular;
                             }
@@ -593,11 +601,11 @@ impl<'a> Many<'a> {
             add(same.iter().fold([Rgb::BLACK; 2], |sum, (_, term)| [sum[0] + term[0], sum[1] + term[1]]));
         }
         add(together);
-        self.terms = terms;
+        (self.terms, self.fence) = (terms, fence);
     }
 
     /// What nodes send to where one camera ray ends.
-    fn sent_at(&self, stored: &Stored, si: &SurfaceInteraction, lobe: &Lobe) -> Sent {
+    fn sent_at(&self, stored: &Stored, fence: &mut Fence, si: &SurfaceInteraction, lobe: &Lobe) -> Sent {
         let (scene, tree) = (self.scene, self.tree);
         let mut sum = [Rgb::BLACK; 2];
         let mut add = |entry: u32| {
@@ -610,7 +618,8 @@ impl<'a> Many<'a> {
         }
         let list = |range: &Range<u32>| &self.lit[range.start as usize..range.end as usize];
         list(&stored.lit[0]).iter().for_each(|entry| add(*entry));
-        let seen = list(&stored.maybe).iter().filter(|entry| arrives(scene, tree, **entry, si));
+        fence.stand(scene, si);
+        let seen = list(&stored.maybe).iter().filter(|entry| arrives(scene, tree, fence, **entry, si));
         seen.for_each(|entry| add(*entry));
         sum
     }
@@ -724,7 +733,7 @@ fn entry(node: u32, by: By) -> u32 {
 }
 
 /// Whether the light that stands for a node is seen.
-fn arrives(scene: &Scene, tree: &LightTree, entry: u32, si: &SurfaceInteraction) -> bool {
+fn arrives(scene: &Scene, tree: &LightTree, fence: &Fence, entry: u32, si: &SurfaceInteraction) -> bool {
     let node = &tree.nodes[(entry & !ONE) as usize];
     if !(si.receives_shadow && node.shadows) {
         return true;
@@ -735,7 +744,7 @@ fn arrives(scene: &Scene, tree: &LightTree, entry: u32, si: &SurfaceInteraction)
         Sends::Parallel => (one.shine.low, f32::INFINITY),
         _ => (one.shine.ball().0 - si.lit_from, 1.0),
     };
-    si.horizon.dot(l) > 0.0 && si.ns.dot(l) > 0.0 && !scene.occluded(&si.shadow_ray(LightId(light), l, t_max))
+    si.horizon.dot(l) > 0.0 && si.ns.dot(l) > 0.0 && !fence.blocks(scene, &si.shadow_ray(LightId(light), l, t_max))
 }
 
 /// What an entry of a list of nodes sends: diffuse and specular, before the colours of the surface.

@@ -11,6 +11,7 @@
 mod arrival;
 mod crowd;
 mod cut;
+mod fence;
 mod field;
 mod film;
 mod heat;
