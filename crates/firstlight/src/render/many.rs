@@ -4,8 +4,9 @@
 //! whole from all of it, and nodes that have to be looked at from each patch. What is dropped, and what is lost by taking many
 //! lights for one, stays below [`BLOCK_BUDGET`] and [`PATCH_BUDGET`] together, in display steps.
 //!
-//! Up to [`SINGLY`] lights are all taken one by one; above, many may be taken for one. Cells and blocks lie on a grid of the
-//! film, so nothing depends on tiles, crops or threads.
+//! Up to [`SINGLY`] lights are all taken one by one. Of more, one may stand for many: a [`Crowd`] says for which, for each block, and
+//! what may be wrong is [`CROWD`] as the root of a sum of squares. Cells and blocks lie on a grid of the film, so nothing depends on
+//! tiles, crops or threads.
 
 use std::ops::{ControlFlow, Range};
 
@@ -47,7 +48,7 @@ const CLOSE: usize = 24;
 const ANYTHING: f32 = 1e30;
 /// In a list of nodes: one light stands for this one.
 const ONE: u32 = 1 << 31;
-/// In display steps: how far all lights that are integrated one by one may be wrong together.
+/// In display steps: how far all lights that are integrated one by one may be wrong together, if their errors are independent.
 const INTEGRALS: f32 = 0.15;
 /// Pixels across a block.
 const BLOCK: usize = 8;
@@ -75,6 +76,8 @@ pub(super) struct Many<'a> {
     singles: Vec<Single>,
     /// Nodes that are taken for one, list by list.
     lit: Vec<u32>,
+    /// Nodes that count where they are seen, block by block.
+    dots: Vec<Dot>,
     terms: Vec<(u32, [Rgb; 2])>,
     doubts: Vec<Doubt>,
 }
@@ -86,13 +89,24 @@ struct Single {
     arrival: Arrival,
 }
 
+/// A node that counts where the light that stands for it is seen.
+#[derive(Clone, Copy)]
+struct Dot {
+    entry: u32,
+    light: u32,
+    /// Where the light is; of one that is infinitely far away, its direction.
+    at: Vec3,
+    finite: bool,
+    shadows: bool,
+}
+
 /// What arrives at one patch.
 #[derive(Clone, Default)]
 struct Stored {
     singles: Range<u32>,
     /// The nodes of its blocks, the largest first, and its own.
     lit: [Range<u32>; LEVELS + 1],
-    /// Those of its block that count where the light that stands for them is seen; those that do are among its own.
+    /// The dots of its block; those that are seen are among its own nodes.
     maybe: Range<u32>,
     /// What those send, and how far the mean over the patch can be from it.
     sent: Sent,
@@ -137,6 +151,7 @@ impl<'a> Many<'a> {
             patches: Vec::new(),
             singles: Vec::new(),
             lit: Vec::new(),
+            dots: Vec::new(),
             terms: Vec::new(),
             doubts: Vec::new(),
         }
@@ -161,6 +176,7 @@ impl<'a> Many<'a> {
         self.patches.resize(all, Stored::default());
         self.singles.clear();
         self.lit.clear();
+        self.dots.clear();
         let mut groups: Vec<Vec<At>> = Vec::new();
         let all = Above {
             level: 0,
@@ -306,7 +322,10 @@ impl<'a> Many<'a> {
             let all = some.map(|patch| {
                 fence.stand(scene, &patch.si);
                 crowd.nodes.iter().fold(Rgb::BLACK, |sum, (node, by)| match entry(*node, *by) {
-                    entry if matches!(by, By::Middle | By::One) || arrives(scene, tree, fence, entry, &patch.si) => {
+                    entry
+                        if matches!(by, By::Middle | By::One)
+                            || Dot::new(tree, entry).arrives(scene, fence, &patch.si) =>
+                    {
                         sum + sent(scene, tree, entry, &patch.si, &patch.bsdf.lobe)[0]
                     }
                     _ => sum,
@@ -325,9 +344,10 @@ impl<'a> Many<'a> {
             let everywhere = crowd.nodes.iter().filter(|(_, by)| matches!(by, By::Middle | By::One));
             self.lit.extend(everywhere.map(|(node, by)| entry(*node, *by)));
             let lit = start..self.lit.len() as u32;
+            let start = self.dots.len() as u32;
             let sometimes = crowd.nodes.iter().filter(|(_, by)| matches!(by, By::MiddleIfSeen | By::OneIfSeen));
-            self.lit.extend(sometimes.map(|(node, by)| entry(*node, *by)));
-            let maybe = lit.end..self.lit.len() as u32;
+            self.dots.extend(sometimes.map(|(node, by)| Dot::new(tree, entry(*node, *by))));
+            let maybe = start..self.dots.len() as u32;
             let mut found: Option<Rgb> = None;
             for at in group {
                 let patch = patch(at);
@@ -379,7 +399,7 @@ impl<'a> Many<'a> {
         arrivals: &mut Arrivals<'a>,
         counts: &mut Counts,
     ) -> (Stored, Rgb) {
-        let (scene, tree) = (self.scene, self.tree);
+        let scene = self.scene;
         let (si, bsdf) = (&patch.si, &patch.bsdf);
         let mut stored = Stored::default();
         let start = self.lit.len() as u32;
@@ -387,12 +407,9 @@ impl<'a> Many<'a> {
         if !maybe.is_empty() {
             self.fence.stand(scene, si);
         }
-        for i in maybe.clone() {
-            let entry = self.lit[i as usize];
-            if arrives(scene, tree, &self.fence, entry, si) {
-                self.lit.push(entry);
-            }
-        }
+        let dots = &self.dots[maybe.start as usize..maybe.end as usize];
+        let seen = dots.iter().filter(|dot| dot.arrives(scene, &self.fence, si));
+        self.lit.extend(seen.map(|dot| dot.entry));
         (stored.lit[0], stored.maybe) = (everywhere, maybe);
         stored.lit[LEVELS] = start..self.lit.len() as u32;
         self.add(patch, 0, &mut stored);
@@ -619,8 +636,8 @@ impl<'a> Many<'a> {
         let list = |range: &Range<u32>| &self.lit[range.start as usize..range.end as usize];
         list(&stored.lit[0]).iter().for_each(|entry| add(*entry));
         fence.stand(scene, si);
-        let seen = list(&stored.maybe).iter().filter(|entry| arrives(scene, tree, fence, **entry, si));
-        seen.for_each(|entry| add(*entry));
+        let dots = &self.dots[stored.maybe.start as usize..stored.maybe.end as usize];
+        dots.iter().filter(|dot| dot.arrives(scene, fence, si)).for_each(|dot| add(dot.entry));
         sum
     }
 
@@ -732,19 +749,28 @@ fn entry(node: u32, by: By) -> u32 {
     if matches!(by, By::One | By::OneIfSeen) { node | ONE } else { node }
 }
 
-/// Whether the light that stands for a node is seen.
-fn arrives(scene: &Scene, tree: &LightTree, fence: &Fence, entry: u32, si: &SurfaceInteraction) -> bool {
-    let node = &tree.nodes[(entry & !ONE) as usize];
-    if !(si.receives_shadow && node.shadows) {
-        return true;
+impl Dot {
+    fn new(tree: &LightTree, entry: u32) -> Dot {
+        let node = &tree.nodes[(entry & !ONE) as usize];
+        let one = &tree.nodes[node.one as usize];
+        let light = match one.held {
+            Held::Light(light) => light,
+            Held::Two(_) => one.first(tree),
+        };
+        let finite = one.shine.sends != Sends::Parallel;
+        let at = if finite { one.shine.ball().0 } else { one.shine.low };
+        Dot { entry, light, at, finite, shadows: node.shadows }
     }
-    let one = &tree.nodes[node.one as usize];
-    let Held::Light(light) = one.held else { return true };
-    let (l, t_max) = match one.shine.sends {
-        Sends::Parallel => (one.shine.low, f32::INFINITY),
-        _ => (one.shine.ball().0 - si.lit_from, 1.0),
-    };
-    si.horizon.dot(l) > 0.0 && si.ns.dot(l) > 0.0 && !fence.blocks(scene, &si.shadow_ray(LightId(light), l, t_max))
+
+    /// Whether its light is seen from where `fence` stands.
+    #[inline]
+    fn arrives(&self, scene: &Scene, fence: &Fence, si: &SurfaceInteraction) -> bool {
+        if !(si.receives_shadow && self.shadows) {
+            return true;
+        }
+        let l = if self.finite { self.at - si.lit_from } else { self.at };
+        si.horizon.dot(l) > 0.0 && si.ns.dot(l) > 0.0 && !fence.blocks(scene, LightId(self.light), l, self.finite)
+    }
 }
 
 /// What an entry of a list of nodes sends: diffuse and specular, before the colours of the surface.
