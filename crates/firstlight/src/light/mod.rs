@@ -29,7 +29,7 @@ pub use sphere::{Sphere, SphereLightDesc};
 pub use spot::{Spot, SpotDesc};
 
 pub(crate) use area::{Points, check_samples};
-pub(crate) use bound::Sight;
+pub(crate) use bound::{Sends, Sight};
 pub(crate) use tree::{Held, LightNode, LightTree, Sent};
 pub(crate) use zone::Zone;
 

@@ -48,6 +48,8 @@ pub(crate) struct LightNode {
     cross: Rgb,
     /// Whether things can stand in the way of all of them.
     pub shadows: bool,
+    /// The node of one of its lights, chosen by chance as their powers are, that can stand for all.
+    pub one: u32,
 }
 
 /// What a node holds.
@@ -110,7 +112,8 @@ impl LightTree {
             let source = Source::of(seed.light, &lights[seed.light as usize], seed.shine);
             let sources = vec![source];
             let held = Held::Light(seed.light);
-            return (self.push(LightNode::of(seed.shine, held, &sources)), sources);
+            let one = self.nodes.len() as u32;
+            return (self.push(LightNode { one, ..LightNode::of(seed.shine, held, &sources) }), sources);
         }
         // Halve them where they are farthest apart; where all are at one place, by their order
         let none = (Vec3::INFINITY, Vec3::NEG_INFINITY);
@@ -125,7 +128,11 @@ impl LightTree {
         let (b, others) = self.grow(lights, right);
         sources.extend(others);
         let shine = self.nodes[a as usize].shine.union(&self.nodes[b as usize].shine);
-        let node = LightNode::of(shine, Held::Two([a, b]), &sources);
+        let [left, right] = [a, b].map(|child| &self.nodes[child as usize]);
+        let share = |node: &LightNode| f64::from(node.power.r) + f64::from(node.power.g) + f64::from(node.power.b);
+        let all = share(left) + share(right);
+        let one = if chance(self.nodes.len() as u64) * all < share(left) { left.one } else { right.one };
+        let node = LightNode { one, ..LightNode::of(shine, Held::Two([a, b]), &sources) };
         (self.push(node), sources)
     }
 
@@ -133,6 +140,16 @@ impl LightTree {
         self.nodes.push(node);
         self.nodes.len() as u32 - 1
     }
+}
+
+/// A number from 0 to 1 that looks like chance, the same for the same place.
+///
+/// Source: Steele, Lea and Flood, "Fast splittable pseudorandom number generators", OOPSLA 2014: the mixing of SplitMix64.
+fn chance(place: u64) -> f64 {
+    let mut z = (place + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+    z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
 }
 
 /// One light, as its nodes count it.
@@ -241,6 +258,7 @@ impl LightNode {
             cubes: rgb(cubes),
             cross: rgb(cross),
             shadows: sources.iter().all(|source| source.shadows),
+            one: 0,
         }
     }
 
@@ -342,6 +360,11 @@ impl LightNode {
             lobe => weight * lobe.eval(cos.max(0.0), ns.dot(wo), wo.dot(d)),
         };
         [diffuse.max(0.0), specular]
+    }
+
+    /// What arrives of a power of 1 in its middle: diffuse and specular.
+    pub fn send_one(&self, p: Vec3, ns: Vec3, wo: Vec3, lobe: &Lobe) -> [f32; 2] {
+        self.send_channel(0, p, ns, wo, lobe)
     }
 
     /// What a light of strength 1 in its middle sends, before the cosine at the surface.

@@ -82,8 +82,6 @@ pub(super) struct Walk<'a> {
     pub tones: &'a [Tone],
     /// In display steps.
     pub budget: f32,
-    /// Whether many lights may be taken for one.
-    pub together: bool,
 }
 
 /// Nodes whose error, taken for one, is no more than this part of all they send are looked at whether they are seen whole.
@@ -111,7 +109,7 @@ fn typical(sight: &Sight) -> f32 {
 }
 
 impl Walk<'_> {
-    fn key(&self, error: &Sent) -> f32 {
+    pub fn key(&self, error: &Sent) -> f32 {
         self.tones.iter().fold(0.0, |key, tone| {
             let shown = tone.error[0] * error[0] + tone.error[1] * error[1];
             shown.r.max(shown.g).max(shown.b).max(key)
@@ -135,7 +133,7 @@ impl Walk<'_> {
 
     /// The node as one that is seen whole, and whether that would be worth the look.
     fn as_lit(&self, item: &Item, node: &LightNode) -> Option<Item> {
-        if !node.is_smooth() || !(self.together || node.count == 1) {
+        if !node.is_smooth() || node.count > 1 {
             return None;
         }
         let sight = item.sight;

@@ -4,20 +4,23 @@
 //! whole from all of it, and nodes that have to be looked at from each patch. What is dropped, and what is lost by taking many
 //! lights for one, stays below [`BLOCK_BUDGET`] and [`PATCH_BUDGET`] together, in display steps.
 //!
-//! Up to [`SINGLY`] lights are all taken one by one; above, many may be taken for one. Cells and blocks lie on a grid of the
-//! film, so nothing depends on tiles, crops or threads.
+//! Up to [`SINGLY`] lights are all taken one by one. Of more, one may stand for many: a [`Crowd`] says for which, for each block, and
+//! what may be wrong is [`CROWD`] as the root of a sum of squares. Cells and blocks lie on a grid of the film, so nothing depends on
+//! tiles, crops or threads.
 
 use std::ops::{ControlFlow, Range};
 
 use super::Counts;
 use super::arrival::{Arrival, Arrivals, Place};
+use super::crowd::{By, Crowd};
 use super::cut::{Cut, Tone, Walk};
+use super::fence::Fence;
 use super::patch::{Patch, PixelPatches};
 use super::tiled::{ACROSS, BEND, CELL, second_difference};
 use crate::color::Rgb;
 use crate::ids::LightId;
 use crate::integrate::Sums;
-use crate::light::{LightTree, Sent, Zone};
+use crate::light::{Held, LightKind, LightNode, LightTree, Sends, Sent, Zone};
 use crate::material::{Bsdf, Lobe};
 use crate::math::{Arc, Vec3, square};
 use crate::scene::Scene;
@@ -31,7 +34,21 @@ pub(crate) const SINGLY: usize = 1000;
 /// In display steps: how far what is settled for a block may be wrong, and what is settled for a patch.
 const BLOCK_BUDGET: f32 = 0.45;
 const PATCH_BUDGET: f32 = 0.4;
-/// In display steps: how far all lights that are integrated one by one may be wrong together.
+/// In display steps: the root of the sum of squares of all that may be wrong where many are taken for one.
+const CROWD: f32 = 1.5;
+/// A patch that is darker than was guessed is looked at again beyond this factor of it.
+const LENIENT: f32 = 1.25;
+/// How much wider the first look at a block is, that says how bright it is.
+const PILOT: f32 = 4.0;
+/// The part of what that look finds that is taken for sure.
+const SURE: f32 = 0.8;
+/// Blocks that ask for more lights by themselves are quartered.
+const CLOSE: usize = 24;
+/// An error that shows whatever is there.
+const ANYTHING: f32 = 1e30;
+/// In a list of nodes: one light stands for this one.
+const ONE: u32 = 1 << 31;
+/// In display steps: how far all lights that are integrated one by one may be wrong together, if their errors are independent.
 const INTEGRALS: f32 = 0.15;
 /// Pixels across a block.
 const BLOCK: usize = 8;
@@ -51,12 +68,16 @@ pub(super) struct Many<'a> {
     eye: Vec3,
     outlook: Outlook,
     cut: Cut,
+    crowd: Crowd,
+    fence: Fence,
     /// Of each patch of the cell, in the order of pixels.
     patches: Vec<Stored>,
     /// The lights that were asked for one by one, patch by patch, in scene order.
     singles: Vec<Single>,
     /// Nodes that are taken for one, list by list.
     lit: Vec<u32>,
+    /// Nodes that count where they are seen, block by block.
+    dots: Vec<Dot>,
     terms: Vec<(u32, [Rgb; 2])>,
     doubts: Vec<Doubt>,
 }
@@ -68,12 +89,25 @@ struct Single {
     arrival: Arrival,
 }
 
+/// A node that counts where the light that stands for it is seen.
+#[derive(Clone, Copy)]
+struct Dot {
+    entry: u32,
+    light: u32,
+    /// Where the light is; of one that is infinitely far away, its direction.
+    at: Vec3,
+    finite: bool,
+    shadows: bool,
+}
+
 /// What arrives at one patch.
 #[derive(Clone, Default)]
 struct Stored {
     singles: Range<u32>,
     /// The nodes of its blocks, the largest first, and its own.
     lit: [Range<u32>; LEVELS + 1],
+    /// The dots of its block; those that are seen are among its own nodes.
+    maybe: Range<u32>,
     /// What those send, and how far the mean over the patch can be from it.
     sent: Sent,
     bend: Sent,
@@ -112,9 +146,12 @@ impl<'a> Many<'a> {
             eye: scene.camera.frame().position,
             outlook: Outlook::default(),
             cut: Cut::default(),
+            crowd: Crowd::default(),
+            fence: Fence::default(),
             patches: Vec::new(),
             singles: Vec::new(),
             lit: Vec::new(),
+            dots: Vec::new(),
             terms: Vec::new(),
             doubts: Vec::new(),
         }
@@ -139,6 +176,7 @@ impl<'a> Many<'a> {
         self.patches.resize(all, Stored::default());
         self.singles.clear();
         self.lit.clear();
+        self.dots.clear();
         let mut groups: Vec<Vec<At>> = Vec::new();
         let all = Above {
             level: 0,
@@ -170,7 +208,11 @@ impl<'a> Many<'a> {
                 }
             }
             for group in groups.iter().filter(|group| !group.is_empty()) {
-                self.group(pixels, first, group, &all, arrivals, counts);
+                if self.together {
+                    self.crowd(pixels, first, group, 0, None, arrivals, counts);
+                } else {
+                    self.group(pixels, first, group, &all, arrivals, counts);
+                }
             }
         }
         ControlFlow::Continue(())
@@ -196,7 +238,7 @@ impl<'a> Many<'a> {
         self.outlook.stand(scene, places);
         let (outlook, level) = (&mut self.outlook, arrivals.level());
         let (steps, budget) = (arrivals.display_steps(), BLOCK_BUDGET * SHARES[above.level]);
-        let walk = Walk { tree, steps, zone: &zone, tones: &tones, budget, together: self.together };
+        let walk = Walk { tree, steps, zone: &zone, tones: &tones, budget };
         let links = scene.geometry.lights_of(one.si.surface);
         let shines = |light: u32| scene.geometry.links.contains(links, LightId(light));
         self.cut.of_block(
@@ -243,6 +285,156 @@ impl<'a> Many<'a> {
         }
     }
 
+    /// The places of a block that lie on one surface, where lights are so many that one may stand for others. `guess` is what is
+    /// known to be sent there.
+    #[allow(clippy::too_many_arguments, reason = "a block of a cell, and what it asks with")]
+    fn crowd(
+        &mut self,
+        pixels: &[PixelPatches],
+        first: &[usize],
+        group: &[At],
+        level: usize,
+        guess: Option<Rgb>,
+        arrivals: &mut Arrivals<'a>,
+        counts: &mut Counts,
+    ) {
+        let (scene, tree) = (self.scene, self.tree);
+        let patch = |(index, k): &At| &pixels[*index].patches[*k];
+        let zone = zone(group.iter().map(patch), self.eye);
+        let tones = tones(scene, group.iter().map(patch));
+        let receives = group.iter().any(|at| patch(at).si.receives_shadow);
+        self.outlook.stand(scene, group.iter().map(|at| standing(patch(at))));
+        let steps = arrivals.display_steps();
+        let walk = Walk { tree, steps, zone: &zone, tones: &tones, budget: CROWD };
+        let mut crowd = std::mem::take(&mut self.crowd);
+        let (simd, outlook, fence) = (arrivals.level(), &mut self.outlook, &mut self.fence);
+        let mut look = |node: &LightNode, light: u32| {
+            if !(receives && node.shadows) {
+                return Seen::Whole;
+            }
+            outlook.look(simd, scene, node.shine.low, node.shine.high, LightId(light))
+        };
+        crowd.begin(&walk);
+        let guess = guess.unwrap_or_else(|| {
+            crowd.refine(&Walk { budget: CROWD * PILOT, ..walk }, None, &mut look);
+            crowd.peek();
+            let some = [0, group.len() / 2, group.len() - 1].map(|i| patch(&group[i]));
+            let all = some.map(|patch| {
+                fence.stand(scene, &patch.si);
+                crowd.nodes.iter().fold(Rgb::BLACK, |sum, (node, by)| match entry(*node, *by) {
+                    entry
+                        if matches!(by, By::Middle | By::One)
+                            || Dot::new(tree, entry).arrives(scene, fence, &patch.si) =>
+                    {
+                        sum + sent(scene, tree, entry, &patch.si, &patch.bsdf.lobe)[0]
+                    }
+                    _ => sum,
+                })
+            });
+            all.into_iter().reduce(least).unwrap_or(Rgb::BLACK) * SURE
+        });
+        crowd.refine(&walk, Some(guess), &mut look);
+        let is_close = crowd.singles.len() > CLOSE && level < LEVELS && group.len() > 1;
+        let (mut again, mut darkest) = (Vec::new(), guess);
+        if is_close {
+            again.extend_from_slice(group);
+        } else {
+            crowd.settle(&walk, group.len(), &mut look);
+            let start = self.lit.len() as u32;
+            let everywhere = crowd.nodes.iter().filter(|(_, by)| matches!(by, By::Middle | By::One));
+            self.lit.extend(everywhere.map(|(node, by)| entry(*node, *by)));
+            let lit = start..self.lit.len() as u32;
+            let start = self.dots.len() as u32;
+            let sometimes = crowd.nodes.iter().filter(|(_, by)| matches!(by, By::MiddleIfSeen | By::OneIfSeen));
+            self.dots.extend(sometimes.map(|(node, by)| Dot::new(tree, entry(*node, *by))));
+            let maybe = start..self.dots.len() as u32;
+            let mut found: Option<Rgb> = None;
+            for at in group {
+                let patch = patch(at);
+                let singles = self.singles.len();
+                let lists = [lit.clone(), maybe.clone()];
+                let (stored, light) = self.in_crowd(patch, &crowd.singles, lists, arrivals, counts);
+                let error = crowd.error([patch.bsdf.diffuse, patch.bsdf.specular]);
+                if arrivals.steps(stored.value, error) > CROWD * LENIENT && guess != Rgb::BLACK {
+                    // Darker than was guessed
+                    self.singles.truncate(singles);
+                    found = Some(found.map_or(light, |found| least(found, light)));
+                    again.push(*at);
+                    continue;
+                }
+                self.count(&stored, counts);
+                self.patches[first[at.0] + at.1] = stored;
+            }
+            darkest = if level < LEVELS {
+                found.unwrap_or(guess) * SURE
+            } else if level < 2 * LEVELS {
+                least(found.unwrap_or(guess), guess) * 0.5
+            } else {
+                Rgb::BLACK
+            };
+        }
+        self.crowd = crowd;
+        if again.is_empty() {
+            return;
+        }
+        let half = (BLOCK >> (level + 1)).max(1);
+        for quarter in 0..4 {
+            let is_in = |(index, _): &&At| {
+                let part = |v: usize| (v.clamp(1, CELL as usize) - 1) / half % 2;
+                part(index / ACROSS) * 2 + part(index % ACROSS) == quarter
+            };
+            let part: Vec<At> = again.iter().filter(is_in).copied().collect();
+            if !part.is_empty() {
+                self.crowd(pixels, first, &part, level + 1, Some(darkest), arrivals, counts);
+            }
+        }
+    }
+
+    /// What arrives at one patch of a block, as its block says; and what of it is diffuse light.
+    fn in_crowd(
+        &mut self,
+        patch: &Patch,
+        singles: &[u32],
+        [everywhere, maybe]: [Range<u32>; 2],
+        arrivals: &mut Arrivals<'a>,
+        counts: &mut Counts,
+    ) -> (Stored, Rgb) {
+        let scene = self.scene;
+        let (si, bsdf) = (&patch.si, &patch.bsdf);
+        let mut stored = Stored::default();
+        let start = self.lit.len() as u32;
+        counts.points += maybe.len() as u64;
+        if !maybe.is_empty() {
+            self.fence.stand(scene, si);
+        }
+        let dots = &self.dots[maybe.start as usize..maybe.end as usize];
+        let seen = dots.iter().filter(|dot| dot.arrives(scene, &self.fence, si));
+        self.lit.extend(seen.map(|dot| dot.entry));
+        (stored.lit[0], stored.maybe) = (everywhere, maybe);
+        stored.lit[LEVELS] = start..self.lit.len() as u32;
+        self.add(patch, 0, &mut stored);
+        self.add(patch, LEVELS, &mut stored);
+        stored.value = scene.ambient * bsdf.ambient + bsdf.diffuse * stored.sent[0] + bsdf.specular * stored.sent[1];
+        let from = self.singles.len() as u32;
+        let mut light = stored.sent[0];
+        if !singles.is_empty() {
+            arrivals.look_around(si);
+            arrivals.tolerate(INTEGRALS / (singles.len() as f32).sqrt());
+        }
+        for index in singles {
+            let scale = arrivals.scale(*index as usize);
+            let colors = [scale * bsdf.diffuse, scale * bsdf.specular];
+            let (reach, turn, off) = (patch.reach, patch.turn, patch.off);
+            let place = Place { si, lobe: &bsdf.lobe, reach, turn, off, base: stored.value, colors };
+            let arrival = arrivals.arrival(*index as usize, &place, counts);
+            light += scale * arrival.sums.diffuse;
+            stored.value += colors[0] * arrival.sums.diffuse + colors[1] * arrival.sums.specular;
+            self.singles.push(Single { light: *index, arrival });
+        }
+        stored.singles = from..self.singles.len() as u32;
+        (stored, light)
+    }
+
     /// What arrives at one patch of a block.
     fn settle(&mut self, patch: &Patch, above: &Above, arrivals: &mut Arrivals<'a>, counts: &mut Counts) -> Stored {
         let singles = self.singles.len();
@@ -279,11 +471,11 @@ impl<'a> Many<'a> {
         stored.value = value;
         if !open.is_empty() {
             arrivals.look_around(si);
-            arrivals.tolerate(INTEGRALS / open.len() as f32);
+            arrivals.tolerate(INTEGRALS / (open.len() as f32).sqrt());
             let zone = zone(std::iter::once(patch), self.eye);
             let tones = [tone(scene, bsdf)];
             let steps = arrivals.display_steps();
-            let walk = Walk { tree, steps, zone: &zone, tones: &tones, budget: PATCH_BUDGET, together: self.together };
+            let walk = Walk { tree, steps, zone: &zone, tones: &tones, budget: PATCH_BUDGET };
             let (outlook, singles, level) = (&mut self.outlook, &mut self.singles, arrivals.level());
             let mut stands = false;
             stored.value = self.cut.of_patch(
@@ -325,7 +517,7 @@ impl<'a> Many<'a> {
     }
 
     fn count(&self, stored: &Stored, counts: &mut Counts) {
-        let together: u32 = self.nodes(stored).map(|node| self.tree.nodes[node as usize].count).sum();
+        let together: u32 = self.nodes(stored).map(|node| self.tree.nodes[(node & !ONE) as usize].count).sum();
         counts.lights.pairs += self.scene.lights.len() as u64;
         counts.lights.singly += stored.singles.len() as u64;
         counts.lights.nodes += stored.lit.iter().map(Range::len).sum::<usize>() as u64;
@@ -341,9 +533,9 @@ impl<'a> Many<'a> {
     fn add(&self, patch: &Patch, list: usize, stored: &mut Stored) {
         let (si, lobe) = (&patch.si, &patch.bsdf.lobe);
         let range = &stored.lit[list];
-        for node in &self.lit[range.start as usize..range.end as usize] {
-            let node = &self.tree.nodes[*node as usize];
-            let sent = node.send(si.lit_from, si.ns, si.wo, lobe);
+        for entry in &self.lit[range.start as usize..range.end as usize] {
+            let sent = sent(self.scene, self.tree, *entry, si, lobe);
+            let node = &self.tree.nodes[(entry & !ONE) as usize];
             stored.sent = [stored.sent[0] + sent[0], stored.sent[1] + sent[1]];
             if patch.reach > 0.0 {
                 let swing = patch.turn + patch.reach / node.distance(si.lit_from).max(patch.reach);
@@ -376,6 +568,7 @@ impl<'a> Many<'a> {
     ) {
         let scene = self.scene;
         let mut terms = std::mem::take(&mut self.terms);
+        let mut fence = std::mem::take(&mut self.fence);
         terms.clear();
         let mut together = [Rgb::BLACK; 2];
         for (k, patch) in pixels[index].patches.iter().enumerate() {
@@ -399,7 +592,7 @@ impl<'a> Many<'a> {
                 }
             }
             if !doubts.is_empty() {
-                arrivals.tolerate(INTEGRALS / doubts.len() as f32);
+                arrivals.tolerate(INTEGRALS / (doubts.len() as f32).sqrt());
                 patch.for_each(scene, at, |si, bsdf| {
                     arrivals.look_around(si);
                     for doubt in &doubts {
@@ -409,12 +602,9 @@ impl<'a> Many<'a> {
                                 terms.push((light, at_ray(scene, light as usize, si, bsdf, arrivals, counts)));
                             }
                             None => {
-                                for node in self.nodes(stored) {
-                                    let node = &self.tree.nodes[node as usize];
-                                    let sent = node.send(si.lit_from, si.ns, si.wo, &bsdf.lobe);
-                                    together[0] += bsdf.diffuse * sent[0];
-                                    together[1] += bsdf.specular * sent[1];
-                                }
+                                let [diffuse, specular] = self.sent_at(stored, &mut fence, si, &bsdf.lobe);
+                                together[0] += bsdf.diffuse * diffuse;
+                                together[1] += bsdf.specular * specular;
                             }
                         }
                     }
@@ -428,7 +618,54 @@ impl<'a> Many<'a> {
             add(same.iter().fold([Rgb::BLACK; 2], |sum, (_, term)| [sum[0] + term[0], sum[1] + term[1]]));
         }
         add(together);
-        self.terms = terms;
+        (self.terms, self.fence) = (terms, fence);
+    }
+
+    /// What nodes send to where one camera ray ends.
+    fn sent_at(&self, stored: &Stored, fence: &mut Fence, si: &SurfaceInteraction, lobe: &Lobe) -> Sent {
+        let (scene, tree) = (self.scene, self.tree);
+        let mut sum = [Rgb::BLACK; 2];
+        let mut add = |entry: u32| {
+            let sent = sent(scene, tree, entry, si, lobe);
+            sum = [sum[0] + sent[0], sum[1] + sent[1]];
+        };
+        if stored.maybe.is_empty() {
+            self.nodes(stored).for_each(&mut add);
+            return sum;
+        }
+        let list = |range: &Range<u32>| &self.lit[range.start as usize..range.end as usize];
+        list(&stored.lit[0]).iter().for_each(|entry| add(*entry));
+        fence.stand(scene, si);
+        let dots = &self.dots[stored.maybe.start as usize..stored.maybe.end as usize];
+        dots.iter().filter(|dot| dot.arrives(scene, fence, si)).for_each(|dot| add(dot.entry));
+        sum
+    }
+
+    /// How far the mean over a patch can be from what arrives at its middle because other lights are seen from elsewhere on it:
+    /// as its neighbours tell, and anything where they do not.
+    fn flicker(&self, pixels: &[PixelPatches], first: &[usize], (index, k): At) -> Rgb {
+        let patch = &pixels[index].patches[k];
+        let stored = &self.patches[first[index] + k];
+        if patch.reach == 0.0 || stored.maybe.is_empty() {
+            return Rgb::BLACK;
+        }
+        let anything = Rgb::new(ANYTHING, ANYTHING, ANYTHING);
+        if !patch.is_whole(self.scene) {
+            return anything;
+        }
+        let mut all = Rgb::BLACK;
+        for channel in 0..3 {
+            let of = |color: Rgb| [color.r, color.g, color.b][channel];
+            let sums = |stored: &Stored| Sums { diffuse: of(stored.sent[0]), specular: of(stored.sent[1]) };
+            let arrived = |index: usize| Some(sums(&self.patches[first[index]]));
+            let Some(bend) = second_difference(self.scene, pixels, index, patch, &sums(stored), arrived) else {
+                return anything;
+            };
+            let one = |channel_of: usize| if channel_of == channel { 1.0 } else { 0.0 };
+            let mask = Rgb::new(one(0), one(1), one(2));
+            all += mask * (patch.bsdf.diffuse * bend.diffuse + patch.bsdf.specular * bend.specular);
+        }
+        all
     }
 
     /// What of the light at a patch has to be asked for at each ray. All the rest may together bend by as much as one may.
@@ -450,7 +687,8 @@ impl<'a> Many<'a> {
             doubts.push(Doubt { shown: 0.0, single, error });
         };
         if stored.lit.iter().any(|range| !range.is_empty()) {
-            doubt(None, bsdf.diffuse * stored.bend[0] + bsdf.specular * stored.bend[1]);
+            let smooth = bsdf.diffuse * stored.bend[0] + bsdf.specular * stored.bend[1];
+            doubt(None, smooth + self.flicker(pixels, first, (index, k)));
         }
         let shown = |light: u32, bend: &Sums| {
             let scale = arrivals.scale(light as usize);
@@ -505,6 +743,68 @@ impl<'a> Many<'a> {
 
 /// No second derivative of what a far light sends is above this, over the square of its distance, and what it sends.
 const SMOOTH: f32 = 3.0;
+
+/// A node as lists of nodes name it.
+fn entry(node: u32, by: By) -> u32 {
+    if matches!(by, By::One | By::OneIfSeen) { node | ONE } else { node }
+}
+
+impl Dot {
+    fn new(tree: &LightTree, entry: u32) -> Dot {
+        let node = &tree.nodes[(entry & !ONE) as usize];
+        let one = &tree.nodes[node.one as usize];
+        let light = match one.held {
+            Held::Light(light) => light,
+            Held::Two(_) => one.first(tree),
+        };
+        let finite = one.shine.sends != Sends::Parallel;
+        let at = if finite { one.shine.ball().0 } else { one.shine.low };
+        Dot { entry, light, at, finite, shadows: node.shadows }
+    }
+
+    /// Whether its light is seen from where `fence` stands.
+    #[inline]
+    fn arrives(&self, scene: &Scene, fence: &Fence, si: &SurfaceInteraction) -> bool {
+        if !(si.receives_shadow && self.shadows) {
+            return true;
+        }
+        let l = if self.finite { self.at - si.lit_from } else { self.at };
+        si.horizon.dot(l) > 0.0 && si.ns.dot(l) > 0.0 && !fence.blocks(scene, LightId(self.light), l, self.finite)
+    }
+}
+
+/// What an entry of a list of nodes sends: diffuse and specular, before the colours of the surface.
+#[inline(always)]
+fn sent(scene: &Scene, tree: &LightTree, entry: u32, si: &SurfaceInteraction, lobe: &Lobe) -> Sent {
+    let node = &tree.nodes[(entry & !ONE) as usize];
+    if entry & ONE == 0 {
+        return node.send(si.lit_from, si.ns, si.wo, lobe);
+    }
+    let [diffuse, specular] = sent_by_one(scene, &tree.nodes[node.one as usize], si, lobe);
+    [node.power * diffuse, node.power * specular]
+}
+
+/// What one light would send if its power were 1.
+fn sent_by_one(scene: &Scene, one: &LightNode, si: &SurfaceInteraction, lobe: &Lobe) -> [f32; 2] {
+    let Held::Light(light) = one.held else { return [0.0; 2] };
+    let light = &scene.lights[light as usize];
+    let k = light.samples() / 2;
+    let l = light.towards(k, si.lit_from).l;
+    let height = si.ns.dot(l);
+    if !(si.horizon.dot(l) > 0.0 && height > 0.0) {
+        return [0.0; 2];
+    }
+    if matches!(light.kind, LightKind::Area(_)) && one.is_smooth() {
+        return one.send_one(si.lit_from, si.ns, si.wo, lobe);
+    }
+    let Some(sample) = light.sample(k, l) else { return [0.0; 2] };
+    let (cos_i, cos_io) = (height * sample.inverse_distance, si.wo.dot(l) * sample.inverse_distance);
+    [cos_i * sample.weight, lobe.eval(cos_i, si.ns.dot(si.wo), cos_io) * sample.weight]
+}
+
+fn least(a: Rgb, b: Rgb) -> Rgb {
+    Rgb::new(a.r.min(b.r), a.g.min(b.g), a.b.min(b.b))
+}
 
 /// What one light sends to where one camera ray ends.
 fn at_ray(

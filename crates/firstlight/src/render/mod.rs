@@ -9,7 +9,9 @@
 //! [`tiled`](tiled/index.html) integrates lights and lights a surface once where that is enough; all else is as above.
 
 mod arrival;
+mod crowd;
 mod cut;
+mod fence;
 mod field;
 mod film;
 mod heat;

@@ -6,6 +6,7 @@ use std::sync::Arc;
 use fearless_simd::Level;
 
 use super::geometry::Geometry;
+use super::light_spheres::LightSpheres;
 use super::place::compile_shapes;
 use super::seen_lights::SeenLights;
 use super::{DisplayEncoding, LightObstacles, RenderDesc, Scene, SceneDesc, SceneSummary};
@@ -344,6 +345,7 @@ fn round_blocking(lights: &[Light]) -> LightObstacles {
             _ => {}
         }
     }
+    found.tree = LightSpheres::new(&found.spheres);
     found
 }
 

@@ -5,6 +5,7 @@ mod compile;
 mod course;
 mod description;
 mod geometry;
+mod light_spheres;
 mod links;
 mod model;
 mod place;
@@ -34,6 +35,7 @@ use crate::shape::{Disk, Parallelogram, PlaneSide, Sphere};
 
 use crate::texture::Texture;
 pub(crate) use geometry::{At, Geometry, Item, Meets, Nearest, Placed, Target};
+use light_spheres::LightSpheres;
 pub(crate) use links::LinkId;
 use seen_lights::SeenLights;
 pub(crate) use trees::ShadowRays;
@@ -86,6 +88,8 @@ pub struct Scene {
 pub(crate) struct LightObstacles {
     pub spheres: Vec<(usize, Sphere)>,
     pub disks: Vec<(usize, Disk)>,
+    /// Over the spheres, where they are many.
+    pub tree: Option<LightSpheres>,
 }
 
 /// What a scene holds, for people.

@@ -9,7 +9,7 @@ use crate::color::Rgb;
 use crate::ids::{LightId, SurfaceId};
 use crate::light::LightKind;
 use crate::math::{Ray, ShadowRay, Vec3};
-use crate::shape::{RayDifferential, ShapePoint, SurfaceInteraction};
+use crate::shape::{RayDifferential, ShapePoint, Sphere, SurfaceInteraction};
 
 pub use super::geometry::Hit;
 
@@ -98,13 +98,30 @@ impl Scene {
         let [sphere_links, flat_links] = &self.obstacle_links;
         let spheres = self.obstacles.iter().enumerate().filter(|(i, _)| self.casts(sphere_links, *i, ray.light));
         let flats = self.flat_obstacles.iter().enumerate().filter(|(i, _)| self.casts(flat_links, *i, ray.light));
-        // A light's own shape does not hide it
-        let super::LightObstacles { spheres: light_spheres, disks } = &self.light_obstacles;
-        let light_spheres = light_spheres.iter().filter(|(index, _)| *index != ray.light.index());
-        let mut disks = disks.iter().filter(|(index, _)| *index != ray.light.index());
         spheres.map(|(_, sphere)| sphere.shadow(ray.p, ray.error)).any(|sphere| sphere.blocks(ray.l, finite))
             || flats.map(|(_, flat)| flat.shadow(ray.p, ray.error)).any(|flat| flat.blocks(ray.l, finite))
-            || light_spheres.map(|(_, s)| s.shadow(ray.p, ray.error)).any(|sphere| sphere.blocks(ray.l, finite))
+            || self.occluded_by_lights(ray)
+    }
+
+    /// The part of it that does not lie in lists of things: lights, and trees.
+    #[inline]
+    pub(crate) fn occluded_but_by_lists(&self, ray: &ShadowRay) -> bool {
+        self.occluded_by_lights(ray) || self.geometry.has_trees() && self.geometry.is_blocked(self.level, ray)
+    }
+
+    /// Whether the shape of another light stands on the ray.
+    #[inline]
+    fn occluded_by_lights(&self, ray: &ShadowRay) -> bool {
+        let finite = ray.is_finite();
+        // A light's own shape does not hide it
+        let super::LightObstacles { spheres: light_spheres, disks, tree } = &self.light_obstacles;
+        let is_blocked = |(index, sphere): &(usize, Sphere)| {
+            *index != ray.light.index() && sphere.shadow(ray.p, ray.error).blocks(ray.l, finite)
+        };
+        let mut disks = disks.iter().filter(|(index, _)| *index != ray.light.index());
+        tree.as_ref()
+            .and_then(|tree| tree.any(self.level, ray, |i| is_blocked(&light_spheres[i as usize])))
+            .unwrap_or_else(|| light_spheres.iter().any(is_blocked))
             || disks.any(|(_, disk)| disk.shadow(ray.p, ray.error).blocks(ray.l, finite))
     }
 

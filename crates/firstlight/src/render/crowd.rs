@@ -1,0 +1,259 @@
+//! Which lights of a great crowd count at the places of a block, and how: by nodes of the tree that are seen whole, by nodes of which
+//! one light stands for all, and by lights that are asked for themselves.
+//!
+//! Here errors are added as independent ones are: by their squares. Each is counted as large as it can be: where many are taken
+//! for one, by the bound of Taylor's series; where one light's shadow stands for a node's, by all that the node can send.
+
+use std::collections::BinaryHeap;
+
+use super::cut::{Tone, Walk};
+use crate::color::Rgb;
+use crate::light::{Held, LightNode, Sent, Sight};
+use crate::visibility::Seen;
+
+/// How a node counts at all places of a block.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum By {
+    /// As its middle, seen from everywhere.
+    Middle,
+    /// As its middle, where the light that stands for it is seen.
+    MiddleIfSeen,
+    /// As the light that stands for it, seen from everywhere.
+    One,
+    /// As the light that stands for it, where that is seen.
+    OneIfSeen,
+}
+
+/// A node in question.
+#[derive(Clone, Copy)]
+struct Item {
+    node: u32,
+    /// How far it can be wrong to take it as it is.
+    error: Sent,
+    /// What is sent to the zone, thereabouts, before the cosine's rest.
+    typical: f32,
+    by: By,
+    /// Whether it was asked what is seen of it.
+    looked: bool,
+    sight: Sight,
+}
+
+/// Sums of products of errors, channel by channel: diffuse with itself, with highlights, highlights with themselves.
+type Squares = [[f64; 3]; 3];
+
+/// The lights of a block. Keeps its memory.
+#[derive(Default)]
+pub(super) struct Crowd {
+    items: Vec<Item>,
+    /// The worst first: the bits of its key, and which item, the first one first.
+    heap: BinaryHeap<u64>,
+    squares: Squares,
+    known: [f64; 3],
+    /// Nodes that count, and how.
+    pub nodes: Vec<(u32, By)>,
+    /// Lights that have to be asked for themselves.
+    pub singles: Vec<u32>,
+}
+
+/// Nodes whose error, taken for one, is no more than this part of all they send are looked at whether they are seen whole.
+const WORTH: f32 = 0.25;
+/// Nodes wider than this sine are not.
+const WIDE: f32 = 0.7;
+/// The part of what nothing is known of that is guessed to arrive.
+const MAYBE: f32 = 0.3;
+/// From fewer places than this each asks for itself.
+const WORTH_A_LOOK: usize = 6;
+/// So many nodes are taken apart between two looks at the sum.
+const STRIDE: u32 = 8;
+/// Sums are made anew where the worst in question has become so much less.
+const AGAIN: f32 = 1e-4;
+
+fn of(color: Rgb) -> [f64; 3] {
+    [color.r, color.g, color.b].map(f64::from)
+}
+
+impl Crowd {
+    /// Begins a block with all lights.
+    pub fn begin(&mut self, walk: &Walk) {
+        self.items.clear();
+        self.heap.clear();
+        self.singles.clear();
+        (self.squares, self.known) = Default::default();
+        for root in &walk.tree.roots {
+            self.push(walk, *root, false);
+        }
+    }
+
+    /// Adds a node, and says nothing of one that sends nothing.
+    fn push(&mut self, walk: &Walk, index: u32, lit: bool) {
+        let node = &walk.tree.nodes[index as usize];
+        let sight = node.shine.sight(walk.zone);
+        if sight.weight == 0.0 {
+            return;
+        }
+        let smooth = sight.whole && node.is_smooth();
+        let by = match (lit, smooth) {
+            (true, true) => By::Middle,
+            (true, false) => By::One,
+            (false, true) => By::MiddleIfSeen,
+            (false, false) => By::OneIfSeen,
+        };
+        self.add(walk, Item { node: index, error: Default::default(), typical: 0.0, by, looked: lit, sight });
+    }
+
+    fn add(&mut self, walk: &Walk, mut item: Item) {
+        let node = &walk.tree.nodes[item.node as usize];
+        let sight = &item.sight;
+        item.error = match (item.by, node.held) {
+            (By::Middle, _) => node.error(sight),
+            // Asked at each place, it is what it is
+            (_, Held::Light(_)) if node.is_point() => Sent::default(),
+            // Between nothing and the most nothing is farther off its mean, in the mean, than half of that
+            _ => node.most(sight).map(|most| most * 0.5),
+        };
+        let typical = 0.5 * (sight.least + sight.diffuse.min(1e3 * sight.least));
+        item.typical = if matches!(item.by, By::Middle | By::One) { typical } else { MAYBE * typical };
+        let key = walk.key(&item.error);
+        self.count(walk, &item, 1.0);
+        let index = self.items.len() as u32;
+        self.heap.push(u64::from(key.max(0.0).to_bits()) << 32 | u64::from(!index));
+        self.items.push(item);
+    }
+
+    fn count(&mut self, walk: &Walk, item: &Item, sign: f64) {
+        let (d, s) = (of(item.error[0]), of(item.error[1]));
+        let power = of(walk.tree.nodes[item.node as usize].power);
+        for i in 0..3 {
+            self.squares[0][i] += d[i] * d[i] * sign;
+            self.squares[1][i] += d[i] * s[i] * sign;
+            self.squares[2][i] += s[i] * s[i] * sign;
+            self.known[i] += power[i] * f64::from(item.typical) * sign;
+        }
+    }
+
+    /// Sums up anew: what was taken away leaves rounding behind.
+    fn recount(&mut self, walk: &Walk) {
+        (self.squares, self.known) = Default::default();
+        let (items, heap) = (std::mem::take(&mut self.items), std::mem::take(&mut self.heap));
+        for place in &heap {
+            self.count(walk, &items[at(*place)], 1.0);
+        }
+        (self.items, self.heap) = (items, heap);
+    }
+
+    /// What is sent, thereabouts, before the colours of the surface.
+    pub fn known(&self) -> Rgb {
+        let [r, g, b] = self.known.map(|v| v.max(0.0) as f32);
+        Rgb::new(r, g, b)
+    }
+
+    /// How far all that counts can be wrong together where diffuse light and highlights are multiplied with `colors`: the root of the sum
+    /// of squares.
+    pub fn error(&self, colors: [Rgb; 2]) -> Rgb {
+        let (d, s) = (of(colors[0]), of(colors[1]));
+        let [r, g, b] = std::array::from_fn(|i| {
+            let [dd, ds, ss] = self.squares.map(|sum| sum[i].max(0.0));
+            (d[i] * d[i] * dd + 2.0 * d[i] * s[i] * ds + s[i] * s[i] * ss).sqrt() as f32
+        });
+        Rgb::new(r, g, b)
+    }
+
+    fn shown(&self, walk: &Walk, tones: &[Tone], guess: Option<Rgb>) -> f32 {
+        let known = guess.unwrap_or_else(|| self.known());
+        tones.iter().fold(0.0, |worst, tone| {
+            walk.steps.of_color(tone.base + tone.known * known, self.error(tone.error)).max(worst)
+        })
+    }
+
+    /// Takes nodes apart until what is wrong shows by no more than `walk.budget`. `guess` is what is known to be sent; else it is
+    /// guessed. `look` says what is seen of a node.
+    pub fn refine(&mut self, walk: &Walk, guess: Option<Rgb>, look: &mut dyn FnMut(&LightNode, u32) -> Seen) {
+        let mut counted = f32::INFINITY;
+        for turn in 0u32.. {
+            let worst = self.heap.peek().map_or(0.0, |place| f32::from_bits((place >> 32) as u32));
+            let due = worst < counted * AGAIN;
+            if due {
+                self.recount(walk);
+                counted = worst;
+            }
+            if worst == 0.0 || (due || turn % STRIDE == 0) && self.shown(walk, walk.tones, guess) <= walk.budget {
+                self.recount(walk);
+                if worst == 0.0 || self.shown(walk, walk.tones, guess) <= walk.budget {
+                    break;
+                }
+            }
+            let Some(place) = self.heap.pop() else { break };
+            let item = self.items[at(place)];
+            self.count(walk, &item, -1.0);
+            let node = &walk.tree.nodes[item.node as usize];
+            let mut lit = matches!(item.by, By::Middle | By::One);
+            if !lit && !item.looked && self.is_worth_it(walk, &item, node) {
+                match look(node, node.first(walk.tree)) {
+                    Seen::Nothing => continue,
+                    Seen::Whole => {
+                        lit = true;
+                        if item.by == By::MiddleIfSeen {
+                            self.add(walk, Item { by: By::Middle, looked: true, ..item });
+                            continue;
+                        }
+                    }
+                    Seen::Unknown => {}
+                }
+            }
+            match node.held {
+                Held::Light(light) => self.singles.push(light),
+                Held::Two(children) => children.into_iter().for_each(|child| self.push(walk, child, lit)),
+            }
+        }
+    }
+
+    fn is_worth_it(&self, walk: &Walk, item: &Item, node: &LightNode) -> bool {
+        item.sight.width < WIDE
+            || item.by == By::MiddleIfSeen && walk.key(&node.error(&item.sight)) <= WORTH * walk.key(&item.error)
+    }
+
+    /// Looks at what was not looked at yet, and says how all nodes count.
+    ///
+    /// Where `places` are few, asking from each is less work than looking.
+    pub fn settle(&mut self, walk: &Walk, places: usize, look: &mut dyn FnMut(&LightNode, u32) -> Seen) {
+        self.nodes.clear();
+        let heap = std::mem::take(&mut self.heap);
+        for place in &heap {
+            let item = self.items[at(*place)];
+            let node = &walk.tree.nodes[item.node as usize];
+            let mut by = item.by;
+            if matches!(by, By::MiddleIfSeen | By::OneIfSeen) && !item.looked && places >= WORTH_A_LOOK {
+                match look(node, node.first(walk.tree)) {
+                    Seen::Nothing => {
+                        self.count(walk, &item, -1.0);
+                        continue;
+                    }
+                    Seen::Whole if by == By::MiddleIfSeen => {
+                        self.count(walk, &item, -1.0);
+                        by = By::Middle;
+                        self.count(walk, &Item { error: node.error(&item.sight), ..item }, 1.0);
+                    }
+                    Seen::Whole => by = By::One,
+                    Seen::Unknown => {}
+                }
+            }
+            self.nodes.push((item.node, by));
+        }
+        self.heap = heap;
+        self.heap.clear();
+        self.nodes.sort_unstable_by_key(|(node, _)| *node);
+        self.singles.sort_unstable();
+    }
+
+    /// How all nodes in question would count as they are.
+    pub fn peek(&mut self) {
+        self.nodes.clear();
+        self.nodes.extend(self.heap.iter().map(|place| &self.items[at(*place)]).map(|item| (item.node, item.by)));
+        self.nodes.sort_unstable_by_key(|(node, _)| *node);
+    }
+}
+
+/// Which item a place of the heap means.
+fn at(place: u64) -> usize {
+    !(place as u32) as usize
+}
