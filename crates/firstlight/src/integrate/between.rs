@@ -150,7 +150,8 @@ impl Between {
             }
         }
         for (index, sphere) in &scene.light_obstacles.spheres {
-            if *index != light {
+            let s = (sphere.c - p.as_dvec3()).as_vec3();
+            if *index != light && !cone.misses(s, sphere.r as f32) {
                 between.sphere(view, emitter, pyramid(), sphere, asker, horizon);
             }
         }
