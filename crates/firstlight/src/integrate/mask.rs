@@ -22,6 +22,8 @@ use crate::shape::SurfaceInteraction;
 
 /// The fewest and the most points.
 const FEWEST: usize = 256;
+/// Parts of a pixel up to this share are small.
+const SMALL: f32 = 0.25;
 const MOST: usize = 1 << 10;
 /// How much farther off the share may be than two numbers of points tell: both can be off to the same side, and are so all over
 /// a surface, since all of it asks the same points.
@@ -52,6 +54,8 @@ pub(crate) struct Masked<'a> {
     pub si: &'a SurfaceInteraction,
     pub lobe: &'a Lobe,
     pub between: &'a Between,
+    /// The share of a pixel that asks. Of small parts, each with an error of its own, less is asked.
+    pub share: f32,
     /// How many points were asked.
     pub asked: Cell<u64>,
 }
@@ -90,7 +94,9 @@ impl Masked<'_> {
         let seen = Seen { masked: self, view, ball };
         let mut shares = Shares::default();
         let mut before: [Option<Sums>; 2] = [None; 2];
-        let (mut from, mut to) = (0, FEWEST);
+        let is_small = self.share <= SMALL;
+        let (fewest, doubt) = if is_small { (FEWEST / 4, 1.0) } else { (FEWEST, DOUBT) };
+        let (mut from, mut to) = (0, fewest);
         loop {
             for block in table[from..to].chunks_exact(LANES) {
                 let mut ways = [Vec3::ZERO; LANES];
@@ -122,10 +128,13 @@ impl Masked<'_> {
                 // What one more point could change is the least that can be wrong
                 let one = 1.0 / to as f32;
                 let error = Sums {
-                    diffuse: (DOUBT * off(|sums| sums.diffuse)).max(whole.diffuse * one),
-                    specular: (DOUBT * off(|sums| sums.specular)).max(whole.specular * one),
+                    diffuse: (doubt * off(|sums| sums.diffuse)).max(whole.diffuse * one),
+                    specular: (doubt * off(|sums| sums.specular)).max(whole.specular * one),
                 };
-                if shares.hidden == 0 && to >= 2 * FEWEST || enough(&now, &error) {
+                if shares.hidden == 0 && to >= 2 * fewest || enough(&now, &error) {
+                    return (now, error);
+                }
+                if to == MOST && is_small {
                     return (now, error);
                 }
                 if to == MOST {

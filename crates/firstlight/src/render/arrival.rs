@@ -368,7 +368,16 @@ impl<'a> Arrivals<'a> {
             let ask = light.shadows && si.receives_shadow;
             let between = Between { ask, ask_trees: ask && scene.geometry.has_trees(), ..Between::default() };
             let asked = Cell::new(0);
-            let masked = Masked { scene, light: index, emitter, si, lobe: place.lobe, between: &between, asked };
+            let masked = Masked {
+                scene,
+                light: index,
+                emitter,
+                si,
+                lobe: place.lobe,
+                between: &between,
+                share: place.share,
+                asked,
+            };
             let is_points = matches!(emitter, Emitter::Points);
             let sums = if is_points { masked.by_points(light, &enough) } else { Sums::default() };
             counts.points += masked.asked.get();
@@ -397,7 +406,16 @@ impl<'a> Arrivals<'a> {
         let (whole, _) = dispatch_wide!(self.level, simd => integrate(simd, &view, hiders, &enough));
         let sums = if between.ask || between.ask_trees {
             let asked = Cell::new(0);
-            let masked = Masked { scene, light: index, emitter, si, lobe: place.lobe, between: &between, asked };
+            let masked = Masked {
+                scene,
+                light: index,
+                emitter,
+                si,
+                lobe: place.lobe,
+                between: &between,
+                share: place.share,
+                asked,
+            };
             let sums = masked.integrate(&view, &whole, &enough).0;
             counts.points += masked.asked.get();
             sums

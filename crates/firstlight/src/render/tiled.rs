@@ -547,7 +547,9 @@ impl<'a> Tiled<'a> {
             patch.quarters(scene, at)
         };
         if quarters.is_empty() {
-            let share = self.share(patch);
+            // Facets have errors of their own
+            let parts = if patch.is_faceted() { patch.count(scene) as f32 } else { 1.0 };
+            let share = self.share(patch) / parts;
             patch.for_each(scene, at, |si, bsdf| self.at_ray(light, si, bsdf, share, counts));
         }
         let share = self.share(patch);

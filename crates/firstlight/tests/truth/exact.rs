@@ -25,7 +25,7 @@ const CLOSED_AND_NEAR: f64 = 1e-4;
 const BY_MASK: f64 = 2e-3;
 
 /// Random scenes that broke a bound once.
-const COUNTEREXAMPLES: [u64; 10] = [3, 7, 8, 10, 23, 36, 49, 50, 108, 151];
+const COUNTEREXAMPLES: [u64; 12] = [3, 7, 8, 10, 23, 32, 36, 49, 50, 108, 151, 154];
 
 const UP: V = [0.0, 1.0, 0.0];
 const DOWN: V = [0.0, -1.0, 0.0];
