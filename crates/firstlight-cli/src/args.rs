@@ -219,7 +219,7 @@ pub struct RenderArgs {
     #[arg(help_heading = "Messages")]
     pub stats: Option<Option<PathBuf>>,
     /// Writes a second picture that shows where the work went: from black over violet, red and orange to pale yellow, each
-    /// doubling of what a pixel took a step of the same length
+    /// doubling of what a pixel took a step of the same length [default: none]
     #[arg(long, value_name = "FILE.png", value_hint = ValueHint::FilePath, help_heading = "Messages")]
     pub heat: Option<PathBuf>,
     /// Says nothing but errors, warnings, and --stats where asked for
