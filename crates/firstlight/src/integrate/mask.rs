@@ -95,7 +95,7 @@ impl Masked<'_> {
         let mut shares = Shares::default();
         let mut before: [Option<Sums>; 2] = [None; 2];
         let is_small = self.share <= SMALL;
-        let (fewest, doubt) = if is_small { (FEWEST / 4, 1.0) } else { (FEWEST, DOUBT) };
+        let (fewest, doubt) = if is_small { (FEWEST / 4, 2.0) } else { (FEWEST, DOUBT) };
         let (mut from, mut to) = (0, fewest);
         loop {
             for block in table[from..to].chunks_exact(LANES) {
@@ -132,9 +132,6 @@ impl Masked<'_> {
                     specular: (doubt * off(|sums| sums.specular)).max(whole.specular * one),
                 };
                 if shares.hidden == 0 && to >= 2 * fewest || enough(&now, &error) {
-                    return (now, error);
-                }
-                if to == MOST && is_small {
                     return (now, error);
                 }
                 if to == MOST {

@@ -113,7 +113,7 @@ pub(crate) struct Lights {
 }
 
 /// Parts of a pixel smaller than this are judged as if they were as large.
-const LEAST_SHARE: f32 = 1.0 / 16.0;
+const LEAST_SHARE: f32 = 1.0 / 8.0;
 /// In display steps: how far all lights together may be wrong.
 const TOLERANCE: f32 = 0.1;
 
