@@ -39,6 +39,18 @@ impl Rgb {
         Self::new(v, v, v)
     }
 
+    /// The smaller of two, channel by channel.
+    #[inline(always)]
+    pub(crate) fn min(self, o: Rgb) -> Rgb {
+        Rgb::new(self.r.min(o.r), self.g.min(o.g), self.b.min(o.b))
+    }
+
+    /// The larger of two, channel by channel.
+    #[inline(always)]
+    pub(crate) fn max(self, o: Rgb) -> Rgb {
+        Rgb::new(self.r.max(o.r), self.g.max(o.g), self.b.max(o.b))
+    }
+
     /// Whether every channel is exactly 0.
     #[inline(always)]
     pub fn is_black(self) -> bool {

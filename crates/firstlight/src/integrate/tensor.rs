@@ -84,14 +84,9 @@ const FAR_ENOUGH_DISK: [f32; 8] = [f32::INFINITY, f32::INFINITY, 8.0, 4.2, 2.6, 
 /// How far a light may reach across a highlight, in the exponent of the highlight's fall, for each order.
 const SHARP_ENOUGH: [f32; 8] = [0.2, 0.6, 1.1, 1.8, 2.6, 3.4, 4.4, 5.4];
 
-/// k, where the highlight falls as exp(-k a^2) with the angle a of the light's direction, or not as fast.
+/// [`Lobe::sharpness`] as the point sees it.
 pub(crate) fn sharpness(view: &View) -> f32 {
-    match view.lobe {
-        Lobe::None => 0.0,
-        Lobe::Phong(lobe) => 0.5 * lobe.exponent(),
-        // The half vector moves half as fast; at grazing angles it is quicker to turn sideways
-        Lobe::BlinnPhong(lobe) => 0.125 * lobe.exponent() / (view.cos_o * view.cos_o).max(0.01),
-    }
+    view.lobe.sharpness(view.cos_o)
 }
 
 /// The integral over a region of a light that is above the horizon, by the rule of `n` x `n` nodes.

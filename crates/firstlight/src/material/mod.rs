@@ -122,6 +122,16 @@ impl Lobe {
         }
     }
 
+    /// k, where the highlight falls as exp(-k a^2) with the angle a of the light's direction, or not as fast. `cos_o` is n.wo.
+    pub(crate) fn sharpness(&self, cos_o: f32) -> f32 {
+        match self {
+            Lobe::None => 0.0,
+            Lobe::Phong(lobe) => 0.5 * lobe.exponent(),
+            // The half vector moves half as fast; at grazing angles it is quicker to turn sideways
+            Lobe::BlinnPhong(lobe) => 0.125 * lobe.exponent() / (cos_o * cos_o).max(0.01),
+        }
+    }
+
     /// [`eval`](Self::eval) in sixteen lanes: the same bits.
     #[inline(always)]
     pub(crate) fn eval_lanes<S: Simd>(&self, cos_i: f32x16<S>, cos_o: f32x16<S>, cos_io: f32x16<S>) -> f32x16<S> {

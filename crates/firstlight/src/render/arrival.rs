@@ -13,7 +13,7 @@ use crate::color::{DisplaySteps, Rgb};
 use crate::ids::LightId;
 use crate::integrate::{Asker, Between, Emitter, Masked, Receiver, Sums, View, integrate, sharpness};
 use crate::light::{Light, LightKind, LightTree};
-use crate::material::Lobe;
+use crate::material::{Bsdf, Lobe};
 use crate::math::{Vec3, dispatch_wide, square};
 use crate::scene::Scene;
 use crate::shape::{PlaneSide, SurfaceInteraction};
@@ -224,6 +224,23 @@ impl<'a> Arrivals<'a> {
         }
     }
 
+    /// What light `index` sends to one point, which stands for `share` of a pixel: diffuse and specular, with all colours.
+    pub fn at_point(
+        &mut self,
+        index: usize,
+        si: &SurfaceInteraction,
+        bsdf: &Bsdf,
+        share: f32,
+        counts: &mut Counts,
+    ) -> [Rgb; 2] {
+        let scale = self.scale(index);
+        let colors = [scale * bsdf.diffuse, scale * bsdf.specular];
+        let base = self.scene.ambient * bsdf.ambient;
+        let place = Place { si, lobe: &bsdf.lobe, reach: 0.0, turn: 0.0, off: 0.0, share, base, colors };
+        let sums = self.arrival(index, &place, counts).sums;
+        [colors[0] * sums.diffuse, colors[1] * sums.specular]
+    }
+
     /// A light of one point.
     fn single(&mut self, index: usize, light: &Light, place: &Place, counts: &mut Counts) -> Arrival {
         let si = place.si;
@@ -260,7 +277,8 @@ impl<'a> Arrivals<'a> {
         let terminator = if height < behind { swing * 0.5 } else { 0.0 };
         let smooth = swing * swing + 2.0 * swing * place.off;
         let share = (edge + rim + terminator + smooth).min(1.0);
-        let lobe = (sharp_of(place.lobe, si) * square(2.0 * place.turn + place.reach / distance)).min(1.0);
+        let lobe =
+            (place.lobe.sharpness(si.ns.dot(si.wo)) * square(2.0 * place.turn + place.reach / distance)).min(1.0);
         let specular =
             if matches!(place.lobe, Lobe::None) { 0.0 } else { weight * (edge + rim + terminator + lobe).min(1.0) };
         let resolved = edge == 0.0 && rim == 0.0 && swing < RESOLVED_SWING && lobe < RESOLVED;
@@ -364,20 +382,20 @@ impl<'a> Arrivals<'a> {
             let wrong = diffuse * error.diffuse + specular * error.specular;
             steps.of_color(value, wrong) <= tolerance
         };
+        let masked = |between| Masked {
+            scene,
+            light: index,
+            emitter,
+            si,
+            lobe: place.lobe,
+            between,
+            share: place.share,
+            asked: Cell::new(0),
+        };
         let Some(view) = self.view(emitter, place) else {
             let ask = light.shadows && si.receives_shadow;
             let between = Between { ask, ask_trees: ask && scene.geometry.has_trees(), ..Between::default() };
-            let asked = Cell::new(0);
-            let masked = Masked {
-                scene,
-                light: index,
-                emitter,
-                si,
-                lobe: place.lobe,
-                between: &between,
-                share: place.share,
-                asked,
-            };
+            let masked = masked(&between);
             let is_points = matches!(emitter, Emitter::Points);
             let sums = if is_points { masked.by_points(light, &enough) } else { Sums::default() };
             counts.points += masked.asked.get();
@@ -405,17 +423,7 @@ impl<'a> Arrivals<'a> {
         let hiders = if between.ask || between.ask_trees { &[][..] } else { &between.hiders[..] };
         let (whole, _) = dispatch_wide!(self.level, simd => integrate(simd, &view, hiders, &enough));
         let sums = if between.ask || between.ask_trees {
-            let asked = Cell::new(0);
-            let masked = Masked {
-                scene,
-                light: index,
-                emitter,
-                si,
-                lobe: place.lobe,
-                between: &between,
-                share: place.share,
-                asked,
-            };
+            let masked = masked(&between);
             let sums = masked.integrate(&view, &whole, &enough).0;
             counts.points += masked.asked.get();
             sums
@@ -556,13 +564,4 @@ fn brightest(view: &View, moved: f32) -> f32 {
         root * (1.0 + 2.0 * moved)
     };
     there.min(1.0)
-}
-
-/// [`sharpness`] of a lobe at a surface.
-fn sharp_of(lobe: &Lobe, si: &SurfaceInteraction) -> f32 {
-    match lobe {
-        Lobe::None => 0.0,
-        Lobe::Phong(lobe) => 0.5 * lobe.exponent(),
-        Lobe::BlinnPhong(lobe) => 0.125 * lobe.exponent() / square(si.ns.dot(si.wo)).max(0.01),
-    }
 }

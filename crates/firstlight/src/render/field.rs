@@ -57,7 +57,6 @@ impl Shade {
 
     /// Of pixels that are these; `None` if one is not known, or if their highlights differ in more than colour.
     pub fn of(scene: &Scene, candidate: Candidate, mut bsdfs: impl Iterator<Item = Option<Bsdf>>) -> Option<Shade> {
-        let both = |f: fn(f32, f32) -> f32, a: Rgb, b: Rgb| Rgb::new(f(a.r, b.r), f(a.g, b.g), f(a.b, b.b));
         let mut all = Shade::even(scene, candidate, &bsdfs.next()??);
         for bsdf in bsdfs {
             let shade = Shade::even(scene, candidate, &bsdf?);
@@ -67,9 +66,9 @@ impl Shade {
                 (one, other) if one == other => {}
                 _ => return None,
             }
-            all.diffuse = both(f32::max, all.diffuse, shade.diffuse);
-            all.specular = both(f32::max, all.specular, shade.specular);
-            all.base = both(f32::min, all.base, shade.base);
+            all.diffuse = all.diffuse.max(shade.diffuse);
+            all.specular = all.specular.max(shade.specular);
+            all.base = all.base.min(shade.base);
         }
         Some(all)
     }

@@ -331,7 +331,7 @@ impl<'a> Many<'a> {
                     _ => sum,
                 })
             });
-            all.into_iter().reduce(least).unwrap_or(Rgb::BLACK) * SURE
+            all.into_iter().reduce(Rgb::min).unwrap_or(Rgb::BLACK) * SURE
         });
         crowd.refine(&walk, Some(guess), &mut look);
         let is_close = crowd.singles.len() > CLOSE && level < LEVELS && group.len() > 1;
@@ -358,7 +358,7 @@ impl<'a> Many<'a> {
                 if arrivals.steps(stored.value, error) > CROWD * LENIENT && guess != Rgb::BLACK {
                     // Darker than was guessed
                     self.singles.truncate(singles);
-                    found = Some(found.map_or(light, |found| least(found, light)));
+                    found = Some(found.map_or(light, |found| found.min(light)));
                     again.push(*at);
                     continue;
                 }
@@ -368,7 +368,7 @@ impl<'a> Many<'a> {
             darkest = if level < LEVELS {
                 found.unwrap_or(guess) * SURE
             } else if level < 2 * LEVELS {
-                least(found.unwrap_or(guess), guess) * 0.5
+                found.unwrap_or(guess).min(guess) * 0.5
             } else {
                 Rgb::BLACK
             };
@@ -542,7 +542,7 @@ impl<'a> Many<'a> {
                 let smooth = (swing * swing + 2.0 * swing * patch.off).min(1.0) * SMOOTH;
                 let weight = node.weight(si.lit_from);
                 let moved = swing + patch.turn;
-                let narrow = (lobe_sharpness(lobe, si) * square(moved)).min(1.0);
+                let narrow = (lobe.sharpness(si.ns.dot(si.wo)) * square(moved)).min(1.0);
                 let narrow = (narrow + 2.0 * narrow.sqrt() * patch.off).min(1.0);
                 let specular = if matches!(lobe, Lobe::None) { 0.0 } else { (narrow + smooth).min(1.0) };
                 stored.bend = [
@@ -599,7 +599,7 @@ impl<'a> Many<'a> {
                         match doubt.single {
                             Some(i) => {
                                 let light = self.singles[i as usize].light;
-                                terms.push((light, at_ray(scene, light as usize, si, bsdf, arrivals, counts)));
+                                terms.push((light, arrivals.at_point(light as usize, si, bsdf, 1.0, counts)));
                             }
                             None => {
                                 let [diffuse, specular] = self.sent_at(stored, &mut fence, si, &bsdf.lobe);
@@ -802,27 +802,6 @@ fn sent_by_one(scene: &Scene, one: &LightNode, si: &SurfaceInteraction, lobe: &L
     [cos_i * sample.weight, lobe.eval(cos_i, si.ns.dot(si.wo), cos_io) * sample.weight]
 }
 
-fn least(a: Rgb, b: Rgb) -> Rgb {
-    Rgb::new(a.r.min(b.r), a.g.min(b.g), a.b.min(b.b))
-}
-
-/// What one light sends to where one camera ray ends.
-fn at_ray(
-    scene: &Scene,
-    light: usize,
-    si: &SurfaceInteraction,
-    bsdf: &Bsdf,
-    arrivals: &mut Arrivals,
-    counts: &mut Counts,
-) -> [Rgb; 2] {
-    let scale = arrivals.scale(light);
-    let colors = [scale * bsdf.diffuse, scale * bsdf.specular];
-    let base = scene.ambient * bsdf.ambient;
-    let place = Place { si, lobe: &bsdf.lobe, reach: 0.0, turn: 0.0, off: 0.0, share: 1.0, base, colors };
-    let sums = arrivals.arrival(light, &place, counts).sums;
-    [colors[0] * sums.diffuse, colors[1] * sums.specular]
-}
-
 /// Whether two patches can be looked at together.
 fn is_alike(a: &Patch, b: &Patch) -> bool {
     a.si.surface == b.si.surface && a.bsdf.lobe == b.bsdf.lobe && a.si.ns.dot(b.si.ns) > 0.8
@@ -888,22 +867,11 @@ fn tones<'p>(scene: &Scene, patches: impl Iterator<Item = &'p Patch>) -> Vec<Ton
             continue;
         }
         let last = &mut tones[TONES - 1];
-        let least = |a: Rgb, b: Rgb| Rgb::new(a.r.min(b.r), a.g.min(b.g), a.b.min(b.b));
-        let most = |a: Rgb, b: Rgb| Rgb::new(a.r.max(b.r), a.g.max(b.g), a.b.max(b.b));
         *last = Tone {
-            base: least(last.base, new.base),
-            known: least(last.known, new.known),
-            error: [most(last.error[0], new.error[0]), most(last.error[1], new.error[1])],
+            base: last.base.min(new.base),
+            known: last.known.min(new.known),
+            error: [last.error[0].max(new.error[0]), last.error[1].max(new.error[1])],
         };
     }
     tones
-}
-
-/// k, where a highlight falls as exp(-k a^2) with the angle a of the light's direction.
-fn lobe_sharpness(lobe: &Lobe, si: &SurfaceInteraction) -> f32 {
-    match lobe {
-        Lobe::None => 0.0,
-        Lobe::Phong(lobe) => 0.5 * lobe.exponent(),
-        Lobe::BlinnPhong(lobe) => 0.125 * lobe.exponent() / square(si.ns.dot(si.wo)).max(0.01),
-    }
 }

@@ -9,6 +9,7 @@
 //! [`tiled`](tiled/index.html) integrates lights and lights a surface once where that is enough; all else is as above.
 
 mod arrival;
+mod counts;
 mod crowd;
 mod cut;
 mod fence;
@@ -35,6 +36,7 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
 use rayon::prelude::*;
 
+pub use counts::{LightCounts, RenderStats};
 pub use film::Film;
 pub use heat::Heat;
 pub use simd::SimdLevel;
@@ -46,8 +48,9 @@ use crate::image::{Receipt, Window};
 use crate::light::Light;
 use crate::math::Ray;
 use crate::scene::Scene;
-use crate::visibility::{Settled, Target};
+use crate::visibility::Target;
 use arrival::{Arrivals, Lights};
+use counts::Counts;
 use film::FilmTile;
 use hits::PixelHits;
 use lanes::Lanes;
@@ -188,122 +191,6 @@ impl Default for RenderSettings {
     }
 }
 
-/// What a render did.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct RenderStats {
-    /// Rays from the camera.
-    pub camera_rays: u64,
-    /// Pairs of a lit point and a point of a light that were decided.
-    pub shadow_rays: u64,
-    /// Those of them that took no ray: nothing could stand between, or the light casts no shadows.
-    pub shadow_rays_skipped: u64,
-    /// Pairs of a lit point and a light: all of it arrives, one thing hides it, it is below the horizon, each sample has an
-    /// answer of its own. Counted where shafts are used, as the next three are.
-    pub visibility: [u64; 4],
-    /// Pairs of a lit point and a light that is integrated, of which some is hidden by things so few that what is left is known
-    /// in closed form. Not among those of `visibility`.
-    pub closed_form: u64,
-    /// Shafts from points to lights.
-    pub shafts: u64,
-    /// What they held that could stand in the way, all together.
-    pub occluders: u64,
-    /// Shadow rays for which trees were asked all the same.
-    pub traced: u64,
-    /// What was done with lights, where they are many and integrated.
-    pub lights: LightCounts,
-    /// The instruction set; `Fallback` for the plain renderer.
-    pub simd: SimdLevel,
-    /// Threads.
-    pub threads: usize,
-}
-
-impl RenderStats {
-    /// Of two renders together, as the later one was made.
-    pub fn and(&self, later: &RenderStats) -> RenderStats {
-        let mut sum = *later;
-        sum.camera_rays += self.camera_rays;
-        sum.shadow_rays += self.shadow_rays;
-        sum.shadow_rays_skipped += self.shadow_rays_skipped;
-        for (sum, count) in sum.visibility.iter_mut().zip(self.visibility) {
-            *sum += count;
-        }
-        sum.closed_form += self.closed_form;
-        sum.shafts += self.shafts;
-        sum.occluders += self.occluders;
-        sum.traced += self.traced;
-        sum.lights.pairs += self.lights.pairs;
-        sum.lights.singly += self.lights.singly;
-        sum.lights.together += self.lights.together;
-        sum.lights.nodes += self.lights.nodes;
-        sum
-    }
-}
-
-/// Where lights are many: what was done with them.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct LightCounts {
-    /// Pairs of a lit place and a light.
-    pub pairs: u64,
-    /// Those of them where the light was asked for by itself.
-    pub singly: u64,
-    /// Those where it is proved to be seen whole, and was taken for a point, by itself or together with others.
-    pub together: u64,
-    /// How many such points were taken; all other lights were left out, within the stated bound.
-    pub nodes: u64,
-}
-
-/// Counts of one tile.
-#[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct Counts {
-    pub camera_rays: u64,
-    pub shadow_rays: u64,
-    pub shadow_rays_skipped: u64,
-    pub settled: Settled,
-    pub closed_form: u64,
-    /// Camera rays that were asked: not those of places where it is proved what they would meet.
-    pub looks: u64,
-    /// Points of lights that were asked one by one, of lights that are integrated.
-    pub points: u64,
-    pub lights: LightCounts,
-    /// Shadow rays after which the caller is asked whether to go on.
-    next_question: u64,
-}
-
-impl Counts {
-    fn all(&self) -> [u64; COUNTS] {
-        let Counts { camera_rays, shadow_rays, shadow_rays_skipped, settled, closed_form, lights, .. } = *self;
-        let Settled { visibility: [lit, hidden, below, mask], shafts, occluders, traced } = settled;
-        [
-            camera_rays,
-            shadow_rays,
-            shadow_rays_skipped,
-            lit,
-            hidden,
-            below,
-            mask,
-            shafts,
-            occluders,
-            traced,
-            closed_form,
-            lights.pairs,
-            lights.singly,
-            lights.together,
-            lights.nodes,
-        ]
-    }
-}
-
-impl Counts {
-    /// In the unit of [`Heat`].
-    fn work(&self) -> f32 {
-        let rays = self.looks + (self.shadow_rays - self.shadow_rays_skipped) + self.settled.traced + self.points;
-        let places = self.settled.visibility.iter().sum::<u64>() + self.closed_form;
-        rays as f32 + Heat::PLACE * places as f32 + self.lights.nodes as f32
-    }
-}
-/// How many numbers [`Counts`] has.
-const COUNTS: usize = 15;
-
 /// The most points of all lights that are integrated, where they are sampled all the same: 12 bytes each, on spheres 24, and
 /// as much for shafts.
 const MAX_POINTS: u64 = 1 << 26;
@@ -325,7 +212,10 @@ pub fn render(
         panic!("{fault}");
     }
     let window = settings.window(scene);
-    let film = Mutex::new(Film::new([scene.width, scene.height], window, settings.heat));
+    let threads = settings.threads.map_or_else(available_threads, NonZeroUsize::get);
+    let simd = if settings.reference { SimdLevel::Fallback } else { settings.simd.resolve() };
+    let nothing = Counts::default().stats(simd, threads);
+    let result = Mutex::new((Film::new([scene.width, scene.height], window, settings.heat), nothing));
     let lights = Lights::new(scene);
     // Where every light is sampled at every ray, the bits are those of the plain renderer
     let every_ray =
@@ -337,7 +227,6 @@ pub fn render(
     };
     let all = window.width as u64 * window.height as u64;
     let (done, stop) = (AtomicU64::new(0), AtomicBool::new(false));
-    let totals = [const { AtomicU64::new(0) }; COUNTS];
     let by_shafts = every_ray && !settings.samples_all();
     let targets = if by_shafts { Target::of_all(scene) } else { Vec::new() };
     let level = settings.simd.resolve();
@@ -367,9 +256,10 @@ pub fn render(
             render_tile(scene, tile, &mut Lanes::new(token), hits, &go_on)
         };
         let ControlFlow::Continue((film_tile, counts)) = rendered else { return };
-        film.lock().expect("no thread panics while it holds the film").merge(&film_tile);
-        for (total, count) in totals.iter().zip(counts.all()) {
-            total.fetch_add(count, Ordering::Relaxed);
+        {
+            let (film, stats) = &mut *result.lock().expect("no thread panics while it holds the film");
+            film.merge(&film_tile);
+            *stats = stats.and(&counts.stats(simd, threads));
         }
         let pixels = tile.width as u64 * tile.height as u64;
         let now = done.fetch_add(pixels, Ordering::Relaxed) + pixels;
@@ -377,7 +267,6 @@ pub fn render(
             stop.store(true, Ordering::Relaxed);
         }
     };
-    let threads = settings.threads.map_or_else(available_threads, NonZeroUsize::get);
     match rayon::ThreadPoolBuilder::new().num_threads(threads).build() {
         Ok(pool) => pool.install(|| tiles.par_iter().for_each(render_one)),
         // A system that gives no threads still has this one
@@ -386,39 +275,7 @@ pub fn render(
     if stop.into_inner() {
         return ControlFlow::Break(());
     }
-    let [
-        camera_rays,
-        shadow_rays,
-        shadow_rays_skipped,
-        lit,
-        hidden,
-        below,
-        mask,
-        shafts,
-        occluders,
-        traced,
-        closed_form,
-        pairs,
-        singly,
-        together,
-        nodes,
-    ] = totals.map(AtomicU64::into_inner);
-    let simd = if settings.reference { SimdLevel::Fallback } else { level };
-    let visibility = [lit, hidden, below, mask];
-    let stats = RenderStats {
-        camera_rays,
-        shadow_rays,
-        shadow_rays_skipped,
-        visibility,
-        closed_form,
-        shafts,
-        occluders,
-        traced,
-        lights: LightCounts { pairs, singly, together, nodes },
-        simd,
-        threads,
-    };
-    ControlFlow::Continue((film.into_inner().expect("no thread panics while it holds the film"), stats))
+    ControlFlow::Continue(result.into_inner().expect("no thread panics while it holds the film"))
 }
 
 fn available_threads() -> usize {

@@ -281,11 +281,10 @@ impl Mean {
         self.specular += bsdf.specular;
         self.ambient += bsdf.ambient;
         self.count += 1;
-        let both = |f: fn(f32, f32) -> f32, a: Rgb, b: Rgb| Rgb::new(f(a.r, b.r), f(a.g, b.g), f(a.b, b.b));
         let colors = [bsdf.diffuse, bsdf.specular];
         let range = self.range.get_or_insert([[colors[0]; 2], [colors[1]; 2]]);
         for ([least, most], color) in range.iter_mut().zip(colors) {
-            (*least, *most) = (both(f32::min, *least, color), both(f32::max, *most, color));
+            (*least, *most) = (least.min(color), most.max(color));
         }
         // Any ray that sees a highlight says what it is like
         if !bsdf.specular.is_black() {

@@ -15,6 +15,11 @@ impl Square {
         [[0, 0], [side, 0], [0, side], [side, side]].map(|[x, y]| Square { x: self.x + x, y: self.y + y, side })
     }
 
+    /// Those of them that a film of `size` pixels has a part of.
+    pub fn quarters_on(self, size: [u32; 2]) -> impl Iterator<Item = Square> {
+        self.quarters().into_iter().filter(move |quarter| quarter.x < size[0] && quarter.y < size[1])
+    }
+
     /// Its pixels, row by row.
     pub fn pixels(self) -> impl Iterator<Item = [u32; 2]> {
         let across = self.x..self.x + self.side;

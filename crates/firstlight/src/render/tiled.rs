@@ -199,9 +199,6 @@ impl<'a> Tiled<'a> {
         go_on: &impl Fn() -> ControlFlow<()>,
     ) -> ControlFlow<()> {
         let scene = self.scene;
-        if square.x >= scene.width || square.y >= scene.height {
-            return ControlFlow::Continue(());
-        }
         let pyramid = Pyramid::new(scene, square.x as f32, square.y as f32, square.side as f32);
         let (outer, inner) = self.near.split_at_mut(depth);
         let near = &mut inner[0];
@@ -219,7 +216,7 @@ impl<'a> Tiled<'a> {
             return self.solo(square, only, counts, go_on);
         }
         if square.side > SMALLEST {
-            for quarter in square.quarters() {
+            for quarter in square.quarters_on([scene.width, scene.height]) {
                 self.split(quarter, depth + 1, counts, go_on)?;
             }
             return ControlFlow::Continue(());
@@ -252,15 +249,12 @@ impl<'a> Tiled<'a> {
         go_on: &impl Fn() -> ControlFlow<()>,
     ) -> ControlFlow<()> {
         let scene = self.scene;
-        if square.x >= scene.width || square.y >= scene.height {
-            return ControlFlow::Continue(());
-        }
         if square.side <= PATCHWORK {
             go_on()?;
         }
         let even = only.even(scene, square);
         if even.is_none() && square.side > PATCHWORK {
-            for quarter in square.quarters() {
+            for quarter in square.quarters_on([scene.width, scene.height]) {
                 self.solo(quarter, only, counts, go_on)?;
             }
             return ControlFlow::Continue(());
@@ -590,13 +584,9 @@ impl<'a> Tiled<'a> {
     /// Adds what one light sends to where one camera ray ends.
     fn at_ray(&mut self, index: usize, si: &SurfaceInteraction, bsdf: &Bsdf, share: f32, counts: &mut Counts) {
         self.arrivals.look_around(si);
-        let scale = self.arrivals.scale(index);
-        let colors = [scale * bsdf.diffuse, scale * bsdf.specular];
-        let base = self.scene.ambient * bsdf.ambient;
-        let place = Place { si, lobe: &bsdf.lobe, reach: 0.0, turn: 0.0, off: 0.0, share, base, colors };
-        let sums = self.arrivals.arrival(index, &place, counts).sums;
-        self.terms[index][0] += colors[0] * sums.diffuse;
-        self.terms[index][1] += colors[1] * sums.specular;
+        let [diffuse, specular] = self.arrivals.at_point(index, si, bsdf, share, counts);
+        self.terms[index][0] += diffuse;
+        self.terms[index][1] += specular;
     }
 }
 
