@@ -1,0 +1,242 @@
+//! More lights than are taken one by one: cuts in which one light may stand for others.
+
+use std::ops::Range;
+
+use super::places::{standing, tones, zone};
+use super::{At, BLOCK, CLOSE, CROWD, INTEGRALS, LENIENT, LEVELS, Many, ONE, PILOT, SURE, Single, Stored};
+use crate::color::Rgb;
+use crate::ids::LightId;
+use crate::light::{Held, LightKind, LightNode, LightTree, Sends, Sent};
+use crate::material::Lobe;
+use crate::math::Vec3;
+use crate::render::arrival::{Arrivals, Place};
+use crate::render::counts::Counts;
+use crate::render::crowd::By;
+use crate::render::cut::Walk;
+use crate::render::fence::Fence;
+use crate::render::patch::{Patch, PixelPatches};
+use crate::render::tiled::{ACROSS, CELL};
+use crate::scene::Scene;
+use crate::shape::SurfaceInteraction;
+use crate::visibility::Seen;
+
+/// A node that counts where the light that stands for it is seen.
+#[derive(Clone, Copy)]
+pub(super) struct Dot {
+    pub(super) entry: u32,
+    light: u32,
+    /// Where the light is; of one that is infinitely far away, its direction.
+    at: Vec3,
+    finite: bool,
+    shadows: bool,
+}
+
+impl<'a> Many<'a> {
+    /// The places of a block that lie on one surface, where lights are so many that one may stand for others. `guess` is what is
+    /// known to be sent there.
+    #[allow(clippy::too_many_arguments, reason = "a block of a cell, and what it asks with")]
+    pub(super) fn crowd(
+        &mut self,
+        pixels: &[PixelPatches],
+        first: &[usize],
+        group: &[At],
+        level: usize,
+        guess: Option<Rgb>,
+        arrivals: &mut Arrivals<'a>,
+        counts: &mut Counts,
+    ) {
+        let (scene, tree) = (self.scene, self.tree);
+        let patch = |(index, k): &At| &pixels[*index].patches[*k];
+        let zone = zone(group.iter().map(patch), self.eye);
+        let tones = tones(scene, group.iter().map(patch));
+        let receives = group.iter().any(|at| patch(at).si.receives_shadow);
+        self.outlook.stand(scene, group.iter().map(|at| standing(patch(at))));
+        let steps = arrivals.display_steps();
+        let walk = Walk { tree, steps, zone: &zone, tones: &tones, budget: CROWD };
+        let mut crowd = std::mem::take(&mut self.crowd);
+        let (simd, outlook, fence) = (arrivals.level(), &mut self.outlook, &mut self.fence);
+        let mut look = |node: &LightNode, light: u32| {
+            if !(receives && node.shadows) {
+                return Seen::Whole;
+            }
+            outlook.look(simd, scene, node.shine.low, node.shine.high, LightId(light))
+        };
+        crowd.begin(&walk);
+        let guess = guess.unwrap_or_else(|| {
+            crowd.refine(&Walk { budget: CROWD * PILOT, ..walk }, None, &mut look);
+            crowd.peek();
+            let some = [0, group.len() / 2, group.len() - 1].map(|i| patch(&group[i]));
+            let all = some.map(|patch| {
+                fence.stand(scene, &patch.si);
+                crowd.nodes.iter().fold(Rgb::BLACK, |sum, (node, by)| match entry(*node, *by) {
+                    entry
+                        if matches!(by, By::Middle | By::One)
+                            || Dot::new(tree, entry).arrives(scene, fence, &patch.si) =>
+                    {
+                        sum + sent(scene, tree, entry, &patch.si, &patch.bsdf.lobe)[0]
+                    }
+                    _ => sum,
+                })
+            });
+            all.into_iter().reduce(Rgb::min).unwrap_or(Rgb::BLACK) * SURE
+        });
+        crowd.refine(&walk, Some(guess), &mut look);
+        let is_close = crowd.singles.len() > CLOSE && level < LEVELS && group.len() > 1;
+        let (mut again, mut darkest) = (Vec::new(), guess);
+        if is_close {
+            again.extend_from_slice(group);
+        } else {
+            crowd.settle(&walk, group.len(), &mut look);
+            let start = self.lit.len() as u32;
+            let everywhere = crowd.nodes.iter().filter(|(_, by)| matches!(by, By::Middle | By::One));
+            self.lit.extend(everywhere.map(|(node, by)| entry(*node, *by)));
+            let lit = start..self.lit.len() as u32;
+            let start = self.dots.len() as u32;
+            let sometimes = crowd.nodes.iter().filter(|(_, by)| matches!(by, By::MiddleIfSeen | By::OneIfSeen));
+            self.dots.extend(sometimes.map(|(node, by)| Dot::new(tree, entry(*node, *by))));
+            let maybe = start..self.dots.len() as u32;
+            let mut found: Option<Rgb> = None;
+            for at in group {
+                let patch = patch(at);
+                let singles = self.singles.len();
+                let lists = [lit.clone(), maybe.clone()];
+                let (stored, light) = self.in_crowd(patch, &crowd.singles, lists, arrivals, counts);
+                let error = crowd.error([patch.bsdf.diffuse, patch.bsdf.specular]);
+                if arrivals.steps(stored.value, error) > CROWD * LENIENT && guess != Rgb::BLACK {
+                    // Darker than was guessed
+                    self.singles.truncate(singles);
+                    found = Some(found.map_or(light, |found| found.min(light)));
+                    again.push(*at);
+                    continue;
+                }
+                self.count(&stored, counts);
+                self.patches[first[at.0] + at.1] = stored;
+            }
+            darkest = if level < LEVELS {
+                found.unwrap_or(guess) * SURE
+            } else if level < 2 * LEVELS {
+                found.unwrap_or(guess).min(guess) * 0.5
+            } else {
+                Rgb::BLACK
+            };
+        }
+        self.crowd = crowd;
+        if again.is_empty() {
+            return;
+        }
+        let half = (BLOCK >> (level + 1)).max(1);
+        for quarter in 0..4 {
+            let is_in = |(index, _): &&At| {
+                let part = |v: usize| (v.clamp(1, CELL as usize) - 1) / half % 2;
+                part(index / ACROSS) * 2 + part(index % ACROSS) == quarter
+            };
+            let part: Vec<At> = again.iter().filter(is_in).copied().collect();
+            if !part.is_empty() {
+                self.crowd(pixels, first, &part, level + 1, Some(darkest), arrivals, counts);
+            }
+        }
+    }
+
+    /// What arrives at one patch of a block, as its block says; and what of it is diffuse light.
+    pub(super) fn in_crowd(
+        &mut self,
+        patch: &Patch,
+        singles: &[u32],
+        [everywhere, maybe]: [Range<u32>; 2],
+        arrivals: &mut Arrivals<'a>,
+        counts: &mut Counts,
+    ) -> (Stored, Rgb) {
+        let scene = self.scene;
+        let (si, bsdf) = (&patch.si, &patch.bsdf);
+        let mut stored = Stored::default();
+        let start = self.lit.len() as u32;
+        counts.points += maybe.len() as u64;
+        if !maybe.is_empty() {
+            self.fence.stand(scene, si);
+        }
+        let dots = &self.dots[maybe.start as usize..maybe.end as usize];
+        let seen = dots.iter().filter(|dot| dot.arrives(scene, &self.fence, si));
+        self.lit.extend(seen.map(|dot| dot.entry));
+        (stored.lit[0], stored.maybe) = (everywhere, maybe);
+        stored.lit[LEVELS] = start..self.lit.len() as u32;
+        self.add(patch, 0, &mut stored);
+        self.add(patch, LEVELS, &mut stored);
+        stored.value = scene.ambient * bsdf.ambient + bsdf.diffuse * stored.sent[0] + bsdf.specular * stored.sent[1];
+        let from = self.singles.len() as u32;
+        let mut light = stored.sent[0];
+        if !singles.is_empty() {
+            arrivals.look_around(si);
+            arrivals.tolerate(INTEGRALS / (singles.len() as f32).sqrt());
+        }
+        for index in singles {
+            let scale = arrivals.scale(*index as usize);
+            let colors = [scale * bsdf.diffuse, scale * bsdf.specular];
+            let (reach, turn, off) = (patch.reach, patch.turn, patch.off);
+            let place = Place { si, lobe: &bsdf.lobe, reach, turn, off, share: 1.0, base: stored.value, colors };
+            let arrival = arrivals.arrival(*index as usize, &place, counts);
+            light += scale * arrival.sums.diffuse;
+            stored.value += colors[0] * arrival.sums.diffuse + colors[1] * arrival.sums.specular;
+            self.singles.push(Single { light: *index, arrival });
+        }
+        stored.singles = from..self.singles.len() as u32;
+        (stored, light)
+    }
+}
+
+impl Dot {
+    pub(super) fn new(tree: &LightTree, entry: u32) -> Dot {
+        let node = &tree.nodes[(entry & !ONE) as usize];
+        let one = &tree.nodes[node.one as usize];
+        let light = match one.held {
+            Held::Light(light) => light,
+            Held::Two(_) => one.first(tree),
+        };
+        let finite = one.shine.sends != Sends::Parallel;
+        let at = if finite { one.shine.ball().0 } else { one.shine.low };
+        Dot { entry, light, at, finite, shadows: node.shadows }
+    }
+
+    /// Whether its light is seen from where `fence` stands.
+    #[inline]
+    pub(super) fn arrives(&self, scene: &Scene, fence: &Fence, si: &SurfaceInteraction) -> bool {
+        if !(si.receives_shadow && self.shadows) {
+            return true;
+        }
+        let l = if self.finite { self.at - si.lit_from } else { self.at };
+        si.horizon.dot(l) > 0.0 && si.ns.dot(l) > 0.0 && !fence.blocks(scene, LightId(self.light), l, self.finite)
+    }
+}
+
+/// A node as lists of nodes name it.
+pub(super) fn entry(node: u32, by: By) -> u32 {
+    if matches!(by, By::One | By::OneIfSeen) { node | ONE } else { node }
+}
+
+/// What an entry of a list of nodes sends: diffuse and specular, before the colours of the surface.
+#[inline(always)]
+pub(super) fn sent(scene: &Scene, tree: &LightTree, entry: u32, si: &SurfaceInteraction, lobe: &Lobe) -> Sent {
+    let node = &tree.nodes[(entry & !ONE) as usize];
+    if entry & ONE == 0 {
+        return node.send(si.lit_from, si.ns, si.wo, lobe);
+    }
+    let [diffuse, specular] = sent_by_one(scene, &tree.nodes[node.one as usize], si, lobe);
+    [node.power * diffuse, node.power * specular]
+}
+
+/// What one light would send if its power were 1.
+pub(super) fn sent_by_one(scene: &Scene, one: &LightNode, si: &SurfaceInteraction, lobe: &Lobe) -> [f32; 2] {
+    let Held::Light(light) = one.held else { return [0.0; 2] };
+    let light = &scene.lights[light as usize];
+    let k = light.samples() / 2;
+    let l = light.towards(k, si.lit_from).l;
+    let height = si.ns.dot(l);
+    if !(si.horizon.dot(l) > 0.0 && height > 0.0) {
+        return [0.0; 2];
+    }
+    if matches!(light.kind, LightKind::Area(_)) && one.is_smooth() {
+        return one.send_one(si.lit_from, si.ns, si.wo, lobe);
+    }
+    let Some(sample) = light.sample(k, l) else { return [0.0; 2] };
+    let (cos_i, cos_io) = (height * sample.inverse_distance, si.wo.dot(l) * sample.inverse_distance);
+    [cos_i * sample.weight, lobe.eval(cos_i, si.ns.dot(si.wo), cos_io) * sample.weight]
+}

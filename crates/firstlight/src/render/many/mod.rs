@@ -1,0 +1,393 @@
+//! Many lights: what arrives at the patches of a cell where not every light is asked for at every one.
+//!
+//! For each block of pixels, and for its quarters and theirs, a [`Cut`] says which lights count: nodes of the [`LightTree`](crate::light::LightTree) that are seen
+//! whole from all of it, and nodes that have to be looked at from each patch. What is dropped, and what is lost by taking many
+//! lights for one, stays below [`BLOCK_BUDGET`] and [`PATCH_BUDGET`] together, in display steps.
+//!
+//! Up to [`SINGLY`] lights are all taken one by one. Of more, one may stand for many: a [`Crowd`] says for which, for each block, and
+//! what may be wrong is [`CROWD`] as the root of a sum of squares. Cells and blocks lie on a grid of the film, so nothing depends on
+//! tiles, crops or threads.
+
+mod dense;
+mod finish;
+mod places;
+
+use std::ops::{ControlFlow, Range};
+
+use super::arrival::{Arrival, Arrivals, Place};
+use super::counts::Counts;
+use super::crowd::Crowd;
+use super::cut::{Cut, Walk};
+use super::fence::Fence;
+use super::patch::{Patch, PixelPatches};
+use super::tiled::{ACROSS, CELL};
+use crate::color::Rgb;
+use crate::ids::LightId;
+use crate::light::{LightTree, Sent};
+use crate::material::Lobe;
+use crate::math::{Vec3, square};
+use crate::scene::Scene;
+use crate::visibility::{Outlook, Seen};
+use dense::{Dot, sent};
+use finish::Doubt;
+use places::{is_alike, standing, tone, tones, zone};
+
+/// So few lights are all asked for everywhere, and none is left out.
+pub(crate) const FEW: usize = 16;
+/// So many lights are at most taken one by one; of more, many may be taken for one.
+pub(crate) const SINGLY: usize = 1000;
+/// In display steps: how far what is settled for a block may be wrong, and what is settled for a patch.
+const BLOCK_BUDGET: f32 = 0.45;
+const PATCH_BUDGET: f32 = 0.4;
+/// In display steps: the root of the sum of squares of all that may be wrong where many are taken for one.
+const CROWD: f32 = 1.5;
+/// A patch that is darker than was guessed is looked at again beyond this factor of it.
+const LENIENT: f32 = 1.25;
+/// How much wider the first look at a block is, that says how bright it is.
+const PILOT: f32 = 4.0;
+/// The part of what that look finds that is taken for sure.
+const SURE: f32 = 0.8;
+/// Blocks that ask for more lights by themselves are quartered.
+const CLOSE: usize = 24;
+/// An error that shows whatever is there.
+const ANYTHING: f32 = 1e30;
+/// In a list of nodes: one light stands for this one.
+const ONE: u32 = 1 << 31;
+/// In display steps: how far all lights that are integrated one by one may be wrong together, if their errors are independent.
+const INTEGRALS: f32 = 0.15;
+/// Pixels across a block.
+const BLOCK: usize = 8;
+const BLOCKS: usize = CELL as usize / BLOCK;
+/// Sizes of blocks: each has four of the next.
+const LEVELS: usize = 3;
+/// What each of those may have of [`BLOCK_BUDGET`]. Together less than all: a patch may be darker than its block was guessed to be.
+const SHARES: [f32; LEVELS] = [0.3, 0.15, 0.15];
+/// Colours of a block that are told apart.
+const TONES: usize = 8;
+
+/// What arrives at the patches of one cell. Keeps its memory.
+pub(super) struct Many<'a> {
+    scene: &'a Scene,
+    tree: &'a LightTree,
+    together: bool,
+    eye: Vec3,
+    outlook: Outlook,
+    cut: Cut,
+    crowd: Crowd,
+    fence: Fence,
+    /// Of each patch of the cell, in the order of pixels.
+    patches: Vec<Stored>,
+    /// The lights that were asked for one by one, patch by patch, in scene order.
+    singles: Vec<Single>,
+    /// Nodes that are taken for one, list by list.
+    lit: Vec<u32>,
+    /// Nodes that count where they are seen, block by block.
+    dots: Vec<Dot>,
+    terms: Vec<(u32, [Rgb; 2])>,
+    doubts: Vec<Doubt>,
+}
+
+/// One light at one patch.
+#[derive(Clone, Copy)]
+struct Single {
+    light: u32,
+    arrival: Arrival,
+}
+
+/// What arrives at one patch.
+#[derive(Clone, Default)]
+struct Stored {
+    singles: Range<u32>,
+    /// The nodes of its blocks, the largest first, and its own.
+    lit: [Range<u32>; LEVELS + 1],
+    /// The dots of its block; those that are seen are among its own nodes.
+    maybe: Range<u32>,
+    /// What those send, and how far the mean over the patch can be from it.
+    sent: Sent,
+    bend: Sent,
+    value: Rgb,
+}
+
+/// What larger blocks say of the lights, to those in them.
+struct Above {
+    level: usize,
+    /// Nodes that they could not settle.
+    open: Vec<u32>,
+    /// What is sent, thereabouts, and how far what they settled can be wrong, before the colours of the surface.
+    known: [f64; 3],
+    error: Sent,
+    lit: [Range<u32>; LEVELS + 1],
+}
+
+/// Where a patch is: its pixel in the cell with its rim, and which of the pixel's it is.
+type At = (usize, usize);
+
+impl<'a> Many<'a> {
+    pub fn new(scene: &'a Scene, tree: &'a LightTree) -> Self {
+        Many {
+            scene,
+            tree,
+            together: scene.lights.len() > SINGLY && scene.geometry.links.is_empty(),
+            eye: scene.camera.frame().position,
+            outlook: Outlook::default(),
+            cut: Cut::default(),
+            crowd: Crowd::default(),
+            fence: Fence::default(),
+            patches: Vec::new(),
+            singles: Vec::new(),
+            lit: Vec::new(),
+            dots: Vec::new(),
+            terms: Vec::new(),
+            doubts: Vec::new(),
+        }
+    }
+
+    /// Finds out what arrives at the middle of each patch of a cell and its rim. `first` says where each pixel's patches begin among
+    /// all.
+    pub fn look(
+        &mut self,
+        pixels: &[PixelPatches],
+        first: &mut [usize],
+        arrivals: &mut Arrivals<'a>,
+        counts: &mut Counts,
+        go_on: &impl Fn() -> ControlFlow<()>,
+    ) -> ControlFlow<()> {
+        let mut all = 0;
+        for (first, pixel) in first.iter_mut().zip(pixels) {
+            *first = all;
+            all += pixel.patches.len();
+        }
+        self.patches.clear();
+        self.patches.resize(all, Stored::default());
+        self.singles.clear();
+        self.lit.clear();
+        self.dots.clear();
+        let mut groups: Vec<Vec<At>> = Vec::new();
+        let all = Above {
+            level: 0,
+            open: self.tree.roots.clone(),
+            known: [0.0; 3],
+            error: [Rgb::BLACK; 2],
+            lit: Default::default(),
+        };
+        for block in 0..BLOCKS * BLOCKS {
+            go_on()?;
+            groups.iter_mut().for_each(Vec::clear);
+            // The rim belongs to the blocks beside it
+            let side = |b: usize| {
+                let from = if b == 0 { 0 } else { 1 + b * BLOCK };
+                from..if b + 1 == BLOCKS { ACROSS } else { 1 + (b + 1) * BLOCK }
+            };
+            for y in side(block / BLOCKS) {
+                for x in side(block % BLOCKS) {
+                    let index = y * ACROSS + x;
+                    for (k, patch) in pixels[index].patches.iter().enumerate() {
+                        let same = |group: &&mut Vec<At>| {
+                            group.first().is_none_or(|(i, k)| is_alike(&pixels[*i].patches[*k], patch))
+                        };
+                        match groups.iter_mut().find(same) {
+                            Some(group) => group.push((index, k)),
+                            None => groups.push(vec![(index, k)]),
+                        }
+                    }
+                }
+            }
+            for group in groups.iter().filter(|group| !group.is_empty()) {
+                if self.together {
+                    self.crowd(pixels, first, group, 0, None, arrivals, counts);
+                } else {
+                    self.group(pixels, first, group, &all, arrivals, counts);
+                }
+            }
+        }
+        ControlFlow::Continue(())
+    }
+
+    /// The places of a block that lie on one surface.
+    fn group(
+        &mut self,
+        pixels: &[PixelPatches],
+        first: &[usize],
+        group: &[At],
+        above: &Above,
+        arrivals: &mut Arrivals<'a>,
+        counts: &mut Counts,
+    ) {
+        let (scene, tree) = (self.scene, self.tree);
+        let patch = |(index, k): &At| &pixels[*index].patches[*k];
+        let zone = zone(group.iter().map(patch), self.eye);
+        let tones = tones(scene, group.iter().map(patch));
+        let one = patch(&group[0]);
+        let receives = group.iter().any(|at| patch(at).si.receives_shadow);
+        let places = group.iter().map(|at| standing(patch(at)));
+        self.outlook.stand(scene, places);
+        let (outlook, level) = (&mut self.outlook, arrivals.level());
+        let (steps, budget) = (arrivals.display_steps(), BLOCK_BUDGET * SHARES[above.level]);
+        let walk = Walk { tree, steps, zone: &zone, tones: &tones, budget };
+        let links = scene.geometry.lights_of(one.si.surface);
+        let shines = |light: u32| scene.geometry.links.contains(links, LightId(light));
+        self.cut.of_block(
+            &walk,
+            &above.open,
+            above.known,
+            &mut |node, light| {
+                if !(receives && node.shadows) {
+                    return Seen::Whole;
+                }
+                outlook.look(level, scene, node.shine.low, node.shine.high, LightId(light))
+            },
+            &shines,
+        );
+        let start = self.lit.len() as u32;
+        self.lit.extend(&self.cut.lit);
+        let mut lit = above.lit.clone();
+        lit[above.level] = start..self.lit.len() as u32;
+        let error = self.cut.error();
+        let here = Above {
+            level: above.level + 1,
+            open: std::mem::take(&mut self.cut.open),
+            known: self.cut.known(),
+            error: [above.error[0] + error[0], above.error[1] + error[1]],
+            lit,
+        };
+        if here.level == LEVELS || here.open.is_empty() {
+            for at in group {
+                self.patches[first[at.0] + at.1] = self.settle(patch(at), &here, arrivals, counts);
+            }
+            return;
+        }
+        // In four, by where they are in the block
+        let half = BLOCK >> here.level;
+        for quarter in 0..4 {
+            let is_in = |(index, _): &&At| {
+                let part = |v: usize| (v.clamp(1, CELL as usize) - 1) / half % 2;
+                part(index / ACROSS) * 2 + part(index % ACROSS) == quarter
+            };
+            let part: Vec<At> = group.iter().filter(is_in).copied().collect();
+            if !part.is_empty() {
+                self.group(pixels, first, &part, &here, arrivals, counts);
+            }
+        }
+    }
+
+    /// What arrives at one patch of a block.
+    fn settle(&mut self, patch: &Patch, above: &Above, arrivals: &mut Arrivals<'a>, counts: &mut Counts) -> Stored {
+        let singles = self.singles.len();
+        let mut stored = self.patch(patch, &above.lit, &above.open, arrivals, counts);
+        let bsdf = &patch.bsdf;
+        let shown = arrivals.steps(stored.value, bsdf.diffuse * above.error[0] + bsdf.specular * above.error[1]);
+        if shown > BLOCK_BUDGET {
+            // Darker than was guessed: by itself, from the beginning
+            self.singles.truncate(singles);
+            stored = self.patch(patch, &Default::default(), &self.tree.roots, arrivals, counts);
+        }
+        self.count(&stored, counts);
+        stored
+    }
+
+    /// What arrives at one patch.
+    fn patch(
+        &mut self,
+        patch: &Patch,
+        blocks: &[Range<u32>; LEVELS + 1],
+        open: &[u32],
+        arrivals: &mut Arrivals<'a>,
+        counts: &mut Counts,
+    ) -> Stored {
+        let (scene, tree) = (self.scene, self.tree);
+        let (si, bsdf) = (&patch.si, &patch.bsdf);
+        let mut stored = Stored { lit: blocks.clone(), ..Stored::default() };
+        for list in 0..LEVELS {
+            self.add(patch, list, &mut stored);
+        }
+        let base = scene.ambient * bsdf.ambient;
+        let value = base + bsdf.diffuse * stored.sent[0] + bsdf.specular * stored.sent[1];
+        let from = self.singles.len();
+        stored.value = value;
+        if !open.is_empty() {
+            arrivals.look_around(si);
+            arrivals.tolerate(INTEGRALS / (open.len() as f32).sqrt());
+            let zone = zone(std::iter::once(patch), self.eye);
+            let tones = [tone(scene, bsdf)];
+            let steps = arrivals.display_steps();
+            let walk = Walk { tree, steps, zone: &zone, tones: &tones, budget: PATCH_BUDGET };
+            let (outlook, singles, level) = (&mut self.outlook, &mut self.singles, arrivals.level());
+            let mut stands = false;
+            stored.value = self.cut.of_patch(
+                &walk,
+                open,
+                value,
+                &mut |node, light| {
+                    if !(si.receives_shadow && node.shadows) {
+                        return Seen::Whole;
+                    }
+                    if !stands {
+                        outlook.stand(scene, std::iter::once(standing(patch)));
+                        stands = true;
+                    }
+                    outlook.look(level, scene, node.shine.low, node.shine.high, LightId(light))
+                },
+                &mut |light, value| {
+                    let scale = arrivals.scale(light as usize);
+                    let colors = [scale * bsdf.diffuse, scale * bsdf.specular];
+                    let (reach, turn, off) = (patch.reach, patch.turn, patch.off);
+                    let place = Place { si, lobe: &bsdf.lobe, reach, turn, off, share: 1.0, base: value, colors };
+                    let arrival = arrivals.arrival(light as usize, &place, counts);
+                    singles.push(Single { light, arrival });
+                    colors[0] * arrival.sums.diffuse + colors[1] * arrival.sums.specular
+                },
+            );
+            let start = self.lit.len() as u32;
+            self.lit.extend(&self.cut.lit);
+            stored.lit[LEVELS] = start..self.lit.len() as u32;
+            let before = stored.sent;
+            self.add(patch, LEVELS, &mut stored);
+            for (color, i) in [(bsdf.diffuse, 0), (bsdf.specular, 1)] {
+                stored.value += color * (stored.sent[i] + before[i] * -1.0);
+            }
+        }
+        self.singles[from..].sort_unstable_by_key(|single| single.light);
+        stored.singles = from as u32..self.singles.len() as u32;
+        stored
+    }
+
+    fn count(&self, stored: &Stored, counts: &mut Counts) {
+        let together: u32 = self.nodes(stored).map(|node| self.tree.nodes[(node & !ONE) as usize].count).sum();
+        counts.lights.pairs += self.scene.lights.len() as u64;
+        counts.lights.singly += stored.singles.len() as u64;
+        counts.lights.nodes += stored.lit.iter().map(Range::len).sum::<usize>() as u64;
+        counts.lights.together += u64::from(together);
+    }
+
+    /// The nodes that are taken for one.
+    fn nodes(&self, stored: &Stored) -> impl Iterator<Item = u32> + '_ {
+        stored.lit.clone().into_iter().flat_map(|range| &self.lit[range.start as usize..range.end as usize]).copied()
+    }
+
+    /// Adds what the nodes of one list send.
+    fn add(&self, patch: &Patch, list: usize, stored: &mut Stored) {
+        let (si, lobe) = (&patch.si, &patch.bsdf.lobe);
+        let range = &stored.lit[list];
+        for entry in &self.lit[range.start as usize..range.end as usize] {
+            let sent = sent(self.scene, self.tree, *entry, si, lobe);
+            let node = &self.tree.nodes[(entry & !ONE) as usize];
+            stored.sent = [stored.sent[0] + sent[0], stored.sent[1] + sent[1]];
+            if patch.reach > 0.0 {
+                let swing = patch.turn + patch.reach / node.distance(si.lit_from).max(patch.reach);
+                let smooth = (swing * swing + 2.0 * swing * patch.off).min(1.0) * SMOOTH;
+                let weight = node.weight(si.lit_from);
+                let moved = swing + patch.turn;
+                let narrow = (lobe.sharpness(si.ns.dot(si.wo)) * square(moved)).min(1.0);
+                let narrow = (narrow + 2.0 * narrow.sqrt() * patch.off).min(1.0);
+                let specular = if matches!(lobe, Lobe::None) { 0.0 } else { (narrow + smooth).min(1.0) };
+                stored.bend = [
+                    stored.bend[0] + node.power * (weight * smooth),
+                    stored.bend[1] + node.power * (weight * specular),
+                ];
+            }
+        }
+    }
+}
+
+/// No second derivative of what a far light sends is above this, over the square of its distance, and what it sends.
+const SMOOTH: f32 = 3.0;

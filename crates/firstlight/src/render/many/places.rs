@@ -1,0 +1,85 @@
+//! Patches that are looked at together: their zone and their colours.
+
+use super::TONES;
+use crate::light::Zone;
+use crate::material::{Bsdf, Lobe};
+use crate::math::{Arc, Vec3};
+use crate::render::cut::Tone;
+use crate::render::patch::Patch;
+use crate::scene::Scene;
+use crate::shape::SurfaceInteraction;
+use crate::visibility::Viewpoint;
+
+/// Whether two patches can be looked at together.
+pub(super) fn is_alike(a: &Patch, b: &Patch) -> bool {
+    a.si.surface == b.si.surface && a.bsdf.lobe == b.bsdf.lobe && a.si.ns.dot(b.si.ns) > 0.8
+}
+
+pub(super) fn standing(patch: &Patch) -> (Viewpoint, f32, bool) {
+    (Viewpoint::of(&patch.si), patch.reach, patch.turn > 0.0)
+}
+
+/// The direction that the middle of a highlight comes from.
+pub(super) fn mirror(si: &SurfaceInteraction) -> Vec3 {
+    si.ns * (2.0 * si.ns.dot(si.wo)) - si.wo
+}
+
+/// The zone of some patches, of one surface and one highlight.
+pub(super) fn zone<'p>(patches: impl Iterator<Item = &'p Patch> + Clone, eye: Vec3) -> Zone {
+    let (mut low, mut high) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
+    let (mut n, mut m, mut w) = (Vec3::ZERO, Vec3::ZERO, Vec3::ZERO);
+    let mut lobe = Lobe::None;
+    for Patch { si, bsdf, .. } in patches.clone() {
+        (low, high) = (low.min(si.lit_from), high.max(si.lit_from));
+        (n, m, w) = (n + si.ns, m + mirror(si), w + si.wo);
+        lobe = bsdf.lobe;
+    }
+    let center = low + (high - low) * 0.5;
+    let (n, m, w) = (n.normalize_or(Vec3::Y), m.normalize_or(Vec3::Y), w.normalize_or(Vec3::Y));
+    let (mut reach, mut turn, mut blur, mut wo_turn) = (0.0f32, 0.0f32, 0.0f32, 0.0f32);
+    for Patch { si, reach: around, turn: turns, .. } in patches {
+        let swing = around / (si.lit_from - eye).length().max(*around).max(f32::MIN_POSITIVE);
+        reach = reach.max((si.lit_from - center).length() + around);
+        turn = turn.max((si.ns - n).length().max((si.horizon - n).length()) + turns);
+        blur = blur.max((mirror(si) - m).length() + 2.0 * turns + swing);
+        wo_turn = wo_turn.max((si.wo - w).length() + swing);
+    }
+    Zone {
+        center,
+        reach,
+        n,
+        turn: Arc::of_chord(turn),
+        mirror: m,
+        blur: Arc::of_chord(blur),
+        wo: w,
+        wo_turn: Arc::of_chord(wo_turn),
+        lobe,
+    }
+}
+
+pub(super) fn tone(scene: &Scene, bsdf: &Bsdf) -> Tone {
+    Tone { base: scene.ambient * bsdf.ambient, known: bsdf.diffuse, error: [bsdf.diffuse, bsdf.specular] }
+}
+
+/// The colours of some patches: each once, or where they are too many the rest as one.
+pub(super) fn tones<'p>(scene: &Scene, patches: impl Iterator<Item = &'p Patch>) -> Vec<Tone> {
+    let mut tones: Vec<Tone> = Vec::with_capacity(TONES);
+    for patch in patches {
+        let new = tone(scene, &patch.bsdf);
+        let same = |tone: &Tone| tone.known == new.known && tone.error == new.error && tone.base == new.base;
+        if tones.iter().any(same) {
+            continue;
+        }
+        if tones.len() < TONES {
+            tones.push(new);
+            continue;
+        }
+        let last = &mut tones[TONES - 1];
+        *last = Tone {
+            base: last.base.min(new.base),
+            known: last.known.min(new.known),
+            error: [last.error[0].max(new.error[0]), last.error[1].max(new.error[1])],
+        };
+    }
+    tones
+}
