@@ -1,8 +1,10 @@
 //! The renderer that pictures are made with: a cell of pixels goes through the same stations together, and each surface in a
 //! pixel is shaded once where that is shown to be enough.
 //!
-//! - Which surfaces a pixel holds: blocks that hold one are proved without a ray for each ([`solo`](super::solo)), else all
+//! - Which surfaces pixels hold: squares that hold one are proved without a ray for each ([`solo`](super::solo)), else all
 //!   n x n camera rays say it ([`patch`](super::patch)).
+//! - Over such a square light is taken from nine places where those tell all ([`field`](super::field)). Where lights are
+//!   many, [`many`](super::many) takes the place of this and the next.
 //! - What arrives of each light at the middle of each patch, with a bound of how much it bends over it
 //!   ([`arrival`](super::arrival)).
 //! - Where the bound would show, the neighbours are asked: where shadows and highlights are wider than a pixel, what light
