@@ -9,8 +9,10 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Instant;
 
-use crate::converged::{PROMISED, Report};
-use crate::{Outcome, exact_scenes, root, write};
+use firstlight::SceneDesc;
+
+use crate::converged::{Converged, PROMISED, Report};
+use crate::{Outcome, exact_scenes, kept, root, write};
 
 /// The share of pixels that may stay open where sets have up to 2^20 points.
 const OPEN: f64 = 1e-4;
@@ -27,6 +29,13 @@ pub struct Options {
     /// The converged picture takes up to 2^CAP points on each light, in each of four sets.
     #[arg(long, default_value_t = 20, value_parser = clap::value_parser!(u32).range(8..=20))]
     cap: u32,
+    /// Where converged pictures are kept, and taken from while the scene is the same and they had as many points. They depend
+    /// on nothing that integrates; after a change of what sampled light looks like, empty it.
+    #[arg(long, value_name = "DIR", default_value = "target/converged")]
+    kept: PathBuf,
+    /// Only makes the converged pictures that are not kept yet.
+    #[arg(long)]
+    converge: bool,
     /// Writes docs/verification/exact.csv, one row a scene, and the tables of the book's page. Rows of other scenes stay.
     #[arg(long)]
     write: bool,
@@ -123,9 +132,34 @@ impl Row {
 const TABLE: &str = "| seed | worst | over 1 | rms | rms, 400 `sobol` | rms, 400 `uniform` | worst, 400 `sobol` | doubt | open | s | out of bounds |\n\
                      |---|---|---|---|---|---|---|---|---|---|---|";
 
+impl Options {
+    fn kept(&self, seed: u64) -> PathBuf {
+        root().join(&self.kept).join(format!("{seed:04}-{}.png", self.size))
+    }
+}
+
+/// The one that is kept, or a new one, and then that is.
+fn converged(seed: u64, desc: &SceneDesc, options: &Options) -> Converged {
+    let path = options.kept(seed);
+    kept::read(&path, desc, options.cap).unwrap_or_else(|| {
+        let truth = Converged::new(desc, options.cap);
+        kept::write(&path, desc, options.cap, &truth);
+        truth
+    })
+}
+
 fn row(seed: u64, options: &Options, commit: &str) -> Row {
     let start = Instant::now();
-    let report = catch_unwind(AssertUnwindSafe(|| Report::new(&exact_scenes::scene(seed, options.size), options.cap)));
+    let report = catch_unwind(AssertUnwindSafe(|| {
+        let desc = exact_scenes::scene(seed, options.size);
+        let mut truth = converged(seed, &desc, options);
+        let levels = truth.levels.clone();
+        let report = Report::beside(&mut truth, &desc);
+        if truth.levels != levels {
+            kept::write(&options.kept(seed), &desc, options.cap, &truth);
+        }
+        report
+    }));
     let mut row = Row {
         seed,
         size: options.size,
@@ -264,9 +298,13 @@ pub fn run(options: &Options) -> Outcome {
         }
         return Ok(());
     }
+    let folder = root().join(&options.kept);
+    std::fs::create_dir_all(&folder).map_err(|fault| format!("{}: {fault}", folder.display()))?;
     let commit = commit();
     let rows = Mutex::new(BTreeMap::new());
-    println!("{TABLE}");
+    if !options.converge {
+        println!("{TABLE}");
+    }
     let start = Instant::now();
     // In parts, so that what is done is stored even if the rest is not waited for
     let seeds: Vec<u64> = options.seeds.clone().collect();
@@ -275,6 +313,14 @@ pub fn run(options: &Options) -> Outcome {
         let next = AtomicUsize::new(0);
         let work = || {
             while let Some(seed) = part.get(next.fetch_add(1, Ordering::Relaxed)) {
+                if options.converge {
+                    let desc = exact_scenes::scene(*seed, options.size);
+                    let start = Instant::now();
+                    let truth = converged(*seed, &desc, options);
+                    let seconds = start.elapsed().as_secs_f64();
+                    println!("scene {seed}: {} of {} pixels open, {seconds:.1} s", truth.open(), truth.pixels.len());
+                    continue;
+                }
                 let row = row(*seed, options, &commit);
                 if options.all || row.is_notable() {
                     println!("{}", row.markdown());
@@ -287,6 +333,9 @@ pub fn run(options: &Options) -> Outcome {
                 scope.spawn(work);
             }
         });
+        if options.converge {
+            continue;
+        }
         let rows = rows.lock().expect("no thread panics while it holds the rows");
         eprintln!("{} of {} scenes, {:.0} s", rows.len(), seeds.len(), start.elapsed().as_secs_f64());
         if options.write {
@@ -294,6 +343,9 @@ pub fn run(options: &Options) -> Outcome {
             all.extend(rows.iter().map(|(seed, row)| (*seed, row.clone())));
             store(&all)?;
         }
+    }
+    if options.converge {
+        return Ok(());
     }
     let rows = rows.into_inner().expect("no thread panics while it holds the rows");
     let Summary { lines, faults } = summary(rows.values());

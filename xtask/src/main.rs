@@ -20,6 +20,8 @@ mod verify;
 mod converged;
 #[path = "../../crates/firstlight/tests/truth/exact_scenes.rs"]
 mod exact_scenes;
+#[path = "../../crates/firstlight/tests/truth/kept.rs"]
+mod kept;
 #[path = "../../crates/firstlight/tests/truth/random.rs"]
 #[allow(dead_code, reason = "tests use more of it")]
 mod random;

@@ -80,16 +80,16 @@ pub struct Converged {
     desc: SceneDesc,
     /// With whatever points; for its display.
     scene: Scene,
-    width: u32,
-    height: u32,
+    pub(crate) width: u32,
+    pub(crate) height: u32,
     /// As displayed, in steps of an 8-bit picture.
-    pixels: Vec<[f64; 3]>,
+    pub(crate) pixels: Vec<[f64; 3]>,
     /// Half of what the two halves of the sets differ by, pixel by pixel.
-    half_differences: Vec<[f64; 3]>,
+    pub(crate) half_differences: Vec<[f64; 3]>,
     /// The size of the sets that settled each pixel: about 2^level points.
-    levels: Vec<u32>,
+    pub(crate) levels: Vec<u32>,
     /// Whether the largest sets do not agree on a pixel.
-    open: Vec<bool>,
+    pub(crate) open: Vec<bool>,
 }
 
 /// What four sets of one size say of a pixel.
@@ -149,9 +149,17 @@ impl Converged {
     /// With sets of up to 2^`cap` points; `cap` is 8 to 20.
     #[track_caller]
     pub fn new(desc: &SceneDesc, cap: u32) -> Self {
+        let mut converged = Self::unknown(desc);
+        converged.settle(FIRST, cap.max(FIRST));
+        converged
+    }
+
+    /// Nothing is known yet: every pixel is open.
+    #[track_caller]
+    pub(crate) fn unknown(desc: &SceneDesc) -> Self {
         let (width, height) = (desc.render.width, desc.render.height);
         let count = (width * height) as usize;
-        let mut converged = Converged {
+        Converged {
             desc: desc.clone(),
             scene: compile(desc),
             width,
@@ -160,9 +168,7 @@ impl Converged {
             half_differences: vec![[0.0; 3]; count],
             levels: vec![0; count],
             open: vec![true; count],
-        };
-        converged.settle(FIRST, cap.max(FIRST));
-        converged
+        }
     }
 
     /// Asks sets of 2^`first` points, then of twice as many and so on up to 2^`cap`, for the pixels that are open, until they
@@ -338,7 +344,13 @@ impl Report {
     /// Renders the scene in all ways.
     #[track_caller]
     pub fn new(desc: &SceneDesc, cap: u32) -> Self {
-        let (mut truth, exact) = (Converged::new(desc, cap), exact(desc));
+        Self::beside(&mut Converged::new(desc, cap), desc)
+    }
+
+    /// Renders the scene, and looks at the converged picture again where there is reason to doubt it.
+    #[track_caller]
+    pub fn beside(truth: &mut Converged, desc: &SceneDesc) -> Self {
+        let exact = exact(desc);
         truth.doubt(&exact);
         let (sobol, uniform) = (sampled(desc, SampleSet::Sobol, 400), sampled(desc, SampleSet::Uniform, 400));
         let report = |truth: &Converged| Report {
@@ -348,12 +360,12 @@ impl Report {
             open: truth.open(),
             doubt: truth.own_error(),
         };
-        let first = report(&truth);
+        let first = report(truth);
         if first.fault(&PROMISED).is_none() || !(first.exact.worst <= PROMISED.worst) {
             return first;
         }
         truth.again(AGAIN);
-        report(&truth)
+        report(truth)
     }
 
     /// What is outside the bounds of a single scene. The share of pixels off by more than a step is one of many scenes.

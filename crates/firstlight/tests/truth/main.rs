@@ -11,6 +11,7 @@ mod deviations;
 mod exact;
 mod exact_scenes;
 mod geometry;
+mod kept;
 mod known;
 mod links;
 mod many_lights;
