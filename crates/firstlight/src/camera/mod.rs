@@ -12,7 +12,7 @@ pub use pinhole::Pinhole;
 
 use crate::context::CompileContext;
 use crate::describe::{table, words};
-use crate::math::Ray;
+use crate::math::{Ray, Vec3};
 use crate::shape::RayDifferential;
 use crate::transform::TransformDesc;
 
@@ -93,6 +93,14 @@ impl Camera {
         match self {
             Camera::Pinhole(pinhole) => pinhole.ray(x, y, step),
             Camera::Orthographic(orthographic) => orthographic.ray(x, y, step),
+        }
+    }
+
+    /// How far the way to it turns, in radians, over a step of `reach` metres from a point.
+    pub(crate) fn sway(&self, p: Vec3, reach: f32) -> f32 {
+        match self {
+            Camera::Pinhole(pinhole) => reach / (pinhole.frame.position - p).length().max(f32::MIN_POSITIVE),
+            Camera::Orthographic(_) => 0.0,
         }
     }
 

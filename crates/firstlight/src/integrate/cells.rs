@@ -16,6 +16,8 @@ const EVERYWHERE: usize = 128;
 const LAST: usize = 1024;
 /// Standard deviations that an answer may be wrong by.
 const SURE: f64 = 3.0;
+/// Cells that are rougher than this part of the mean are cut where they are too rough together.
+const SMOOTHER: f64 = 0.25;
 /// The most cells in doubt that are cut.
 const MOST: usize = 1 << 17;
 
@@ -30,6 +32,9 @@ pub(super) struct Sent {
 
 /// A light whose points are those of the unit square, equal areas for equal areas.
 pub(super) trait Source {
+    /// Which points its cells have: those of different series know nothing of each other.
+    fn series(&self) -> u32;
+
     /// What the point would send; `None` from below the horizon, or from a side that does not emit.
     fn sent(&self, at: [f32; 2]) -> Option<Sent>;
 
@@ -52,6 +57,17 @@ struct Cell {
     state: State,
     /// What its middle sends, each for all of the light's measure.
     sums: [f32; 2],
+    /// How far that is from the mean over it.
+    rough: [f32; 2],
+}
+
+impl Cell {
+    /// How rough cells are whose four middles send this together, where the middle of all four sends `middle`: it is off by four
+    /// times as much as they are.
+    fn roughness(four: &[Cell], middle: [f32; 2]) -> [f32; 2] {
+        let mean = |k: usize| four.iter().map(|cell| cell.sums[k]).sum::<f32>() * 0.25;
+        [0, 1].map(|k| (mean(k) - middle[k]).abs() * (1.0 / 3.0))
+    }
 }
 
 /// The states of all cells of one size, `side` along each side; where none was asked, those of larger ones.
@@ -94,6 +110,8 @@ impl Grid {
 struct Totals {
     all: [f64; 2],
     lit: [f64; 2],
+    /// How far `lit` may be off because cells are rough.
+    rough: [f64; 2],
 }
 
 impl Totals {
@@ -105,6 +123,7 @@ impl Totals {
             self.all[k] += f64::from(*sum) * area;
             if cell.state == State::Lit {
                 self.lit[k] += f64::from(*sum) * area;
+                self.rough[k] += f64::from(cell.rough[k]) * area;
             }
         }
     }
@@ -113,24 +132,24 @@ impl Totals {
 /// A number from 0 to 1 for each cell of each level, as if by chance.
 ///
 /// Source of the mixing: Wellons, "Prospecting for hash functions", 2018, `lowbias32`.
-fn chance([x, y]: [u32; 2], side: usize, dimension: u32) -> f32 {
-    let mut h = x ^ y.rotate_left(12) ^ (side as u32).rotate_left(16) ^ (dimension << 31);
+fn chance([x, y]: [u32; 2], side: usize, dimension: u32, series: u32) -> f32 {
+    let mut h = x ^ y.rotate_left(12) ^ (side as u32).rotate_left(16) ^ (dimension << 31) ^ (series << 27);
     h = (h ^ (h >> 16)).wrapping_mul(0x7feb_352d);
     h = (h ^ (h >> 15)).wrapping_mul(0x846c_a68b);
     h ^= h >> 16;
     (h >> 8) as f32 * (1.0 / (1 << 24) as f32)
 }
 
-/// Asks the points of some cells.
+/// Asks the points of some cells, four of them a square.
 fn ask(source: &impl Source, side: usize, places: &[[u32; 2]], cells: &mut Vec<Cell>) {
-    let width = 1.0 / side as f32;
+    let (width, series) = (1.0 / side as f32, source.series());
     for places in places.chunks(LANES) {
         let (mut points, mut ways, mut active) = ([[0.0; 2]; LANES], [Vec3::ZERO; LANES], 0u16);
         let from = cells.len();
         for (lane, at) in places.iter().enumerate() {
-            let point = [0, 1].map(|k| (at[k] as f32 + chance(*at, side, k as u32)) * width);
+            let point = [0, 1].map(|k| (at[k] as f32 + chance(*at, side, k as u32, series)) * width);
             let middle = at.map(|w| (w as f32 + 0.5) * width);
-            let mut cell = Cell { at: *at, state: State::Dark, sums: [0.0; 2] };
+            let mut cell = Cell { at: *at, state: State::Dark, sums: [0.0; 2], rough: [0.0; 2] };
             if let Some(sent) = source.sent(point) {
                 (points[lane], ways[lane]) = (point, sent.way);
                 active |= 1 << lane;
@@ -155,10 +174,7 @@ pub(super) fn integrate(
     whole: Option<&Sums>,
     enough: &dyn Fn(&Sums, &Sums) -> bool,
 ) -> (Sums, Sums) {
-    let side = FIRST as u32;
-    let places: Vec<[u32; 2]> = (0..side * side).map(|k| [k % side, k / side]).collect();
-    let mut cells = Vec::new();
-    ask(source, FIRST, &places, &mut cells);
+    let mut cells = all(source, FIRST as u32);
     let mut grid = Grid { side: FIRST, states: cells.iter().map(|cell| cell.state).collect() };
     let mut settled = Totals::default();
     loop {
@@ -176,7 +192,9 @@ pub(super) fn integrate(
             }
         }
         // A cell that an edge runs through at random is wrong by a root of a sixth, and about half of these have one
-        let [d, s] = doubt.map(|doubt| SURE * (doubt * (1.0 / 12.0)).sqrt());
+        let edges = doubt.map(|doubt| SURE * (doubt * (1.0 / 12.0)).sqrt());
+        // Of a share, what cells are rough by is in both its parts
+        let rough = if whole.is_some() { [0.0; 2] } else { totals.rough };
         let whole = whole.copied().unwrap_or_else(|| {
             let [diffuse, specular] = totals.all.map(|sum| sum as f32);
             Sums { diffuse, specular }
@@ -185,19 +203,56 @@ pub(super) fn integrate(
             let share = |k: usize| if totals.all[k] > 0.0 { (part[k] / totals.all[k]) as f32 } else { 0.0 };
             Sums { diffuse: whole.diffuse * share(0), specular: whole.specular * share(1) }
         };
-        let (sums, error) = (part(totals.lit), part([d, s]));
+        let (sums, by_edges, by_roughness) = (part(totals.lit), part(edges), part(rough));
+        let error = by_edges + by_roughness;
         // What stands in one more cell, and was not met by its point
         let one = Sums { diffuse: whole.diffuse * area as f32, specular: whole.specular * area as f32 };
         if grid.side < EVERYWHERE && !enough(&sums, &one) {
             doubtful.fill(true);
         } else {
+            if enough(&sums, &error) || grid.side == LAST {
+                return (sums, error);
+            }
+            if !enough(&sums, &(by_roughness + by_roughness)) {
+                // Those that are not much smoother than the mean
+                let roughness = |cell: &Cell| {
+                    let part =
+                        |k: usize| if totals.all[k] > 0.0 { f64::from(cell.rough[k]) / totals.all[k] } else { 0.0 };
+                    if cell.state == State::Lit { part(0) + part(1) } else { 0.0 }
+                };
+                let mean = cells.iter().map(roughness).sum::<f64>() / cells.len() as f64;
+                for (cell, doubtful) in cells.iter().zip(&mut doubtful) {
+                    *doubtful |= roughness(cell) > SMOOTHER * mean;
+                }
+            }
             let count = doubtful.iter().filter(|doubtful| **doubtful).count();
-            if count == 0 || count > MOST || grid.side == LAST || enough(&sums, &error) {
+            if count == 0 || count > MOST {
                 return (sums, error);
             }
         }
         (cells, grid) = cut(source, &cells, doubtful, &grid, &mut settled);
     }
+}
+
+/// All cells of one size.
+fn all(source: &impl Source, side: u32) -> Vec<Cell> {
+    let half = side / 2;
+    let squares = (0..half * half).map(|k| [k % half, k / half]);
+    let places: Vec<[u32; 2]> = squares.clone().flat_map(four).collect();
+    let mut cells = Vec::with_capacity(places.len());
+    ask(source, side as usize, &places, &mut cells);
+    for (four, at) in cells.chunks_exact_mut(4).zip(squares) {
+        let middle = source.sent(at.map(|w| (w as f32 + 0.5) / half as f32)).map_or([0.0; 2], |sent| sent.sums);
+        let rough = Cell::roughness(four, middle);
+        four.iter_mut().for_each(|cell| cell.rough = rough);
+    }
+    cells
+}
+
+/// The quarters of a cell.
+fn four([x, y]: [u32; 2]) -> [[u32; 2]; 4] {
+    let [x, y] = [2 * x, 2 * y];
+    [[x, y], [x + 1, y], [x, y + 1], [x + 1, y + 1]]
 }
 
 /// Cuts the doubtful cells into four, and those next to them where the new ones bring doubt. What is not cut is settled.
@@ -221,12 +276,13 @@ fn cut(
     let mut queue: Vec<usize> = (0..cells.len()).filter(|i| doubtful[*i]).collect();
     while !queue.is_empty() {
         places.clear();
-        for i in queue.drain(..) {
-            let [x, y] = cells[i].at.map(|w| 2 * w);
-            places.extend([[x, y], [x + 1, y], [x, y + 1], [x + 1, y + 1]]);
-        }
+        places.extend(queue.iter().flat_map(|i| four(cells[*i].at)));
         let from = new.len();
         ask(source, finer.side, &places, &mut new);
+        for (four, i) in new[from..].chunks_exact_mut(4).zip(queue.drain(..)) {
+            let rough = Cell::roughness(four, cells[i].sums);
+            four.iter_mut().for_each(|cell| cell.rough = rough);
+        }
         for cell in &new[from..] {
             finer.set(cell.at, cell.state);
         }
@@ -255,6 +311,10 @@ mod tests {
     struct Through<F: Fn(f32, f32) -> bool>(F);
 
     impl<F: Fn(f32, f32) -> bool> Source for Through<F> {
+        fn series(&self) -> u32 {
+            0
+        }
+
         fn sent(&self, [x, y]: [f32; 2]) -> Option<Sent> {
             Some(Sent { way: Vec3::Z, sums: [1.0, x + y] })
         }

@@ -24,12 +24,14 @@ use crate::shape::SurfaceInteraction;
 const FEWEST: usize = 256;
 /// Parts of a pixel up to this share are small.
 const SMALL: f32 = 0.25;
-const MOST: usize = 1 << 10;
+pub(crate) const MOST: usize = 1 << 10;
 /// How much farther off the share may be than two numbers of points tell: both can be off to the same side, and are so all over
 /// a surface, since all of it asks the same points.
 const DOUBT: f32 = 4.0;
+/// Series of points, as different as points of one sequence are.
+pub(crate) const SERIES: usize = 16;
 
-/// Points of the square [-1, 1]^2, and what they are on a disk.
+/// Points of the square [-1, 1]^2, and what they are on a disk: series by series.
 struct Points {
     square: Vec<[f32; 2]>,
     disk: Vec<[f32; 2]>,
@@ -38,8 +40,8 @@ struct Points {
 fn points() -> &'static Points {
     static POINTS: OnceLock<Points> = OnceLock::new();
     POINTS.get_or_init(|| {
-        let square =
-            (0..MOST as u32).map(|k| SampleSet::Sobol.point(k, MOST as u32, 0).map(|w| (2.0 * w - 1.0) as f32));
+        let count = (SERIES * MOST) as u32;
+        let square = (0..count).map(|k| SampleSet::Sobol.point(k, count, 0).map(|w| (2.0 * w - 1.0) as f32));
         let square: Vec<[f32; 2]> = square.collect();
         let disk = square.iter().map(|p| crate::light::concentric(p.map(f64::from)).map(|w| w as f32)).collect();
         Points { square, disk }
@@ -56,21 +58,25 @@ pub(crate) struct Masked<'a> {
     pub between: &'a Between,
     /// The share of a pixel that asks. Of small parts, each with an error of its own, less is asked.
     pub share: f32,
+    /// Which of the [`SERIES`] is asked: errors of different ones are as good as independent.
+    pub series: usize,
     /// How many points were asked.
     pub asked: Cell<u64>,
 }
 
-/// Sums of the points so far: what they would send, and what of it arrives.
-#[derive(Clone, Copy, Default)]
-struct Shares {
+/// What the first points of a series say: sums of what they would send, and of what of it arrives.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Tally {
     all: [f64; 2],
     lit: [f64; 2],
-    hidden: usize,
+    /// How many points were asked, and how many of them are hidden.
+    pub count: usize,
+    pub hidden: usize,
 }
 
-impl Shares {
+impl Tally {
     /// `whole` is what arrives where nothing is in the way.
-    fn sums(&self, whole: &Sums) -> Sums {
+    pub fn sums(&self, whole: &Sums) -> Sums {
         let share =
             |i: usize, whole: f32| if self.all[i] > 0.0 { whole * (self.lit[i] / self.all[i]) as f32 } else { 0.0 };
         Sums { diffuse: share(0, whole.diffuse), specular: share(1, whole.specular) }
@@ -80,46 +86,15 @@ impl Shares {
 impl Masked<'_> {
     /// What arrives, and how far it may be wrong. `whole` is what would arrive if nothing were in the way.
     pub fn integrate(&self, view: &View, whole: &Sums, enough: &dyn Fn(&Sums, &Sums) -> bool) -> (Sums, Sums) {
-        let table = match view.outline {
-            Outline::Parallelogram => &points().square,
-            Outline::Disk => &points().disk,
-        };
-        let ball = match self.emitter {
-            Emitter::Ball { center, radius } => {
-                let to = *center - self.si.lit_from.as_dvec3();
-                Some((to.as_vec3(), (to.length_squared() - radius * radius).max(0.0) as f32))
-            }
-            _ => None,
-        };
-        let seen = Seen { masked: self, view, ball };
-        let mut shares = Shares::default();
+        let seen = self.seen(view);
+        let mut tally = Tally::default();
         let mut before: [Option<Sums>; 2] = [None; 2];
         let is_small = self.share <= SMALL;
         let (fewest, doubt) = if is_small { (FEWEST / 4, 2.0) } else { (FEWEST, DOUBT) };
-        let (mut from, mut to) = (0, fewest);
+        let mut to = fewest;
         loop {
-            for block in table[from..to].chunks_exact(LANES) {
-                let mut ways = [Vec3::ZERO; LANES];
-                let mut sent = [[0.0f32; 2]; LANES];
-                let mut active = 0u16;
-                for (lane, place) in block.iter().enumerate() {
-                    if let Some(point) = seen.point(*place) {
-                        (ways[lane], sent[lane]) = (point.way, point.sums);
-                        active |= 1 << lane;
-                    }
-                }
-                let hidden = self.hidden(block, &ways, active);
-                shares.hidden += hidden.count_ones() as usize;
-                for (lane, [diffuse, specular]) in sent.iter().enumerate() {
-                    shares.all[0] += f64::from(*diffuse);
-                    shares.all[1] += f64::from(*specular);
-                    if hidden >> lane & 1 == 0 {
-                        shares.lit[0] += f64::from(*diffuse);
-                        shares.lit[1] += f64::from(*specular);
-                    }
-                }
-            }
-            let now = shares.sums(whole);
+            seen.ask(&mut tally, to);
+            let now = tally.sums(whole);
             if let [Some(before), earlier] = before {
                 let off = |of: fn(&Sums) -> f32| {
                     let earlier = earlier.map_or(0.0, |sums| (of(&sums) - of(&before)).abs() * 0.5);
@@ -131,7 +106,7 @@ impl Masked<'_> {
                     diffuse: (doubt * off(|sums| sums.diffuse)).max(whole.diffuse * one),
                     specular: (doubt * off(|sums| sums.specular)).max(whole.specular * one),
                 };
-                if shares.hidden == 0 && to >= 2 * fewest || enough(&now, &error) {
+                if tally.hidden == 0 && to >= 2 * fewest || enough(&now, &error) {
                     return (now, error);
                 }
                 if to == MOST {
@@ -139,8 +114,29 @@ impl Masked<'_> {
                 }
             }
             before = [Some(now), before[0]];
-            (from, to) = (to, to * 2);
+            to *= 2;
         }
+    }
+
+    /// Goes on with the points of the series, up to so many.
+    pub fn ask(&self, view: &View, tally: &mut Tally, to: usize) {
+        self.seen(view).ask(tally, to);
+    }
+
+    /// What arrives, by cells from the beginning.
+    pub fn by_cells(&self, view: &View, whole: &Sums, enough: &dyn Fn(&Sums, &Sums) -> bool) -> Sums {
+        cells::integrate(&self.seen(view), Some(whole), enough).0
+    }
+
+    fn seen<'b>(&'b self, view: &'b View) -> Seen<'b> {
+        let ball = match self.emitter {
+            Emitter::Ball { center, radius } => {
+                let to = *center - self.si.lit_from.as_dvec3();
+                Some((to.as_vec3(), (to.length_squared() - radius * radius).max(0.0) as f32))
+            }
+            _ => None,
+        };
+        Seen { masked: self, view, ball }
     }
 
     /// Which of sixteen ways something stands in.
@@ -192,6 +188,37 @@ struct Seen<'a> {
 }
 
 impl Seen<'_> {
+    /// Goes on with the points of the series, up to so many.
+    fn ask(&self, tally: &mut Tally, to: usize) {
+        let table = match self.view.outline {
+            Outline::Parallelogram => &points().square,
+            Outline::Disk => &points().disk,
+        };
+        let table = &table[self.masked.series * MOST..][..MOST];
+        for block in table[tally.count..to].chunks_exact(LANES) {
+            let mut ways = [Vec3::ZERO; LANES];
+            let mut sent = [[0.0f32; 2]; LANES];
+            let mut active = 0u16;
+            for (lane, place) in block.iter().enumerate() {
+                if let Some(point) = self.point(*place) {
+                    (ways[lane], sent[lane]) = (point.way, point.sums);
+                    active |= 1 << lane;
+                }
+            }
+            let hidden = self.masked.hidden(block, &ways, active);
+            tally.hidden += hidden.count_ones() as usize;
+            for (lane, [diffuse, specular]) in sent.iter().enumerate() {
+                tally.all[0] += f64::from(*diffuse);
+                tally.all[1] += f64::from(*specular);
+                if hidden >> lane & 1 == 0 {
+                    tally.lit[0] += f64::from(*diffuse);
+                    tally.lit[1] += f64::from(*specular);
+                }
+            }
+        }
+        tally.count = to;
+    }
+
     /// What the point of the square [-1, 1]^2 would send.
     fn point(&self, [x, y]: [f32; 2]) -> Option<Sent> {
         let view = self.view;
@@ -226,6 +253,10 @@ impl Seen<'_> {
 }
 
 impl Source for Seen<'_> {
+    fn series(&self) -> u32 {
+        self.masked.series as u32
+    }
+
     fn sent(&self, at: [f32; 2]) -> Option<Sent> {
         self.point(self.place(at))
     }
@@ -246,6 +277,10 @@ struct All<'a> {
 }
 
 impl Source for All<'_> {
+    fn series(&self) -> u32 {
+        self.masked.series as u32
+    }
+
     fn sent(&self, at: [f32; 2]) -> Option<Sent> {
         let si = self.masked.si;
         let (l, inverse, weight) = self.area.at(at.map(f64::from), si.lit_from);

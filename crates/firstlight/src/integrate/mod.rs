@@ -28,7 +28,7 @@ use fearless_simd::prelude::*;
 pub(crate) use between::{Asker, Between};
 pub(crate) use emitter::Emitter;
 use hider::Hider;
-pub(crate) use mask::Masked;
+pub(crate) use mask::{MOST, Masked, SERIES, Tally};
 use rows::Region;
 pub(crate) use tensor::sharpness;
 use view::Outline;

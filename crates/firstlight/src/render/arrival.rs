@@ -91,10 +91,28 @@ pub(crate) struct Place<'a> {
     pub off: f32,
     /// The share of the pixel that it stands for: errors of its parts are as good as independent.
     pub share: f32,
+    /// Which points of lights it asks; see [`Masked::series`].
+    pub series: usize,
     /// What is there beside this light, at least.
     pub base: Rgb,
     /// What the two sums are multiplied with.
     pub colors: [Rgb; 2],
+}
+
+/// What one place sees of an area light that is integrated.
+pub(crate) enum Seen {
+    /// This arrives.
+    Known(Sums),
+    /// Things are in the way; points of the light have to be asked.
+    Behind(Box<Behind>),
+}
+
+/// A light behind things.
+pub(crate) struct Behind {
+    pub view: View,
+    between: Between,
+    /// What would arrive if nothing were in the way.
+    pub whole: Sums,
 }
 
 /// What all tiles share: the lights as they are integrated, and how errors show.
@@ -170,6 +188,11 @@ impl<'a> Arrivals<'a> {
         self.level
     }
 
+    /// The light that is everywhere.
+    pub fn ambient(&self) -> Rgb {
+        self.scene.ambient
+    }
+
     /// How errors show.
     pub fn display_steps(&self) -> &'a DisplaySteps {
         &self.lights.steps
@@ -206,7 +229,19 @@ impl<'a> Arrivals<'a> {
             return Arrival::even(Sums::default());
         }
         match (&self.lights.emitters[index], &light.kind) {
-            (Some(emitter), _) => self.integrated(index, emitter, place, counts),
+            (Some(emitter), _) => {
+                let (change, seen) = self.look(index, emitter, place, counts);
+                change.with(match seen {
+                    Seen::Known(sums) => sums,
+                    Seen::Behind(behind) => {
+                        let Behind { view, whole, .. } = &*behind;
+                        let masked = self.masked(index, emitter, place, &behind.between);
+                        let sums = masked.integrate(view, whole, &self.enough(place)).0;
+                        counts.points += masked.asked.get();
+                        sums
+                    }
+                })
+            }
             (None, LightKind::Area(area)) => {
                 let sums = self.sampled.gather(self.scene, index, place.si, place.lobe, counts);
                 let sums = Sums { diffuse: sums.diffuse.total(), specular: sums.specular.total() };
@@ -236,7 +271,8 @@ impl<'a> Arrivals<'a> {
         let scale = self.scale(index);
         let colors = [scale * bsdf.diffuse, scale * bsdf.specular];
         let base = self.scene.ambient * bsdf.ambient;
-        let place = Place { si, lobe: &bsdf.lobe, reach: 0.0, turn: 0.0, off: 0.0, share, base, colors };
+        let lobe = &bsdf.lobe;
+        let place = Place { si, lobe, reach: 0.0, turn: 0.0, off: 0.0, share, series: 0, base, colors };
         let sums = self.arrival(index, &place, counts).sums;
         [colors[0] * sums.diffuse, colors[1] * sums.specular]
     }
@@ -277,8 +313,8 @@ impl<'a> Arrivals<'a> {
         let terminator = if height < behind { swing * 0.5 } else { 0.0 };
         let smooth = swing * swing + 2.0 * swing * place.off;
         let share = (edge + rim + terminator + smooth).min(1.0);
-        let lobe =
-            (place.lobe.sharpness(si.ns.dot(si.wo)) * square(2.0 * place.turn + place.reach / distance)).min(1.0);
+        let moved = 2.0 * place.turn + place.reach / distance + self.scene.camera.sway(si.lit_from, place.reach);
+        let lobe = (place.lobe.sharpness(si.ns.dot(si.wo)) * square(moved)).min(1.0);
         let specular =
             if matches!(place.lobe, Lobe::None) { 0.0 } else { weight * (edge + rim + terminator + lobe).min(1.0) };
         let resolved = edge == 0.0 && rim == 0.0 && swing < RESOLVED_SWING && lobe < RESOLVED;
@@ -371,66 +407,83 @@ impl<'a> Arrivals<'a> {
         ))
     }
 
-    /// An area light, integrated.
-    fn integrated(&mut self, index: usize, emitter: &Emitter, place: &Place, counts: &mut Counts) -> Arrival {
+    /// What of light `index` arrives at one point, if that is known without a mask over points of the light.
+    pub fn seen(&mut self, index: usize, place: &Place, counts: &mut Counts) -> Seen {
+        let links = self.scene.geometry.lights_of(place.si.surface);
+        match &self.lights.emitters[index] {
+            Some(emitter) if self.scene.geometry.links.contains(links, LightId(index as u32)) => {
+                self.look(index, emitter, place, counts).1
+            }
+            _ => Seen::Known(self.arrival(index, place, counts).sums),
+        }
+    }
+
+    /// Looks at an area light that is integrated.
+    fn look(&mut self, index: usize, emitter: &Emitter, place: &Place, counts: &mut Counts) -> (Change, Seen) {
         let (scene, si) = (self.scene, place.si);
         let light = &scene.lights[index];
-        let (steps, tolerance) = (&self.lights.steps, self.tolerance / place.share.max(LEAST_SHARE).sqrt());
-        let enough = move |sums: &Sums, error: &Sums| {
-            let [diffuse, specular] = place.colors;
-            let value = place.base + diffuse * sums.diffuse + specular * sums.specular;
-            let wrong = diffuse * error.diffuse + specular * error.specular;
-            steps.of_color(value, wrong) <= tolerance
-        };
-        let masked = |between| Masked {
-            scene,
-            light: index,
-            emitter,
-            si,
-            lobe: place.lobe,
-            between,
-            share: place.share,
-            asked: Cell::new(0),
-        };
         let Some(view) = self.view(emitter, place) else {
             let ask = light.shadows && si.receives_shadow;
             let between = Between { ask, ask_trees: ask && scene.geometry.has_trees(), ..Between::default() };
-            let masked = masked(&between);
+            let masked = self.masked(index, emitter, place, &between);
             let is_points = matches!(emitter, Emitter::Points);
-            let sums = if is_points { masked.by_points(light, &enough) } else { Sums::default() };
+            let sums = if is_points { masked.by_points(light, &self.enough(place)) } else { Sums::default() };
             counts.points += masked.asked.get();
-            return unseen(emitter, place).with(sums);
+            return (unseen(emitter, place), Seen::Known(sums));
         };
         if !view.arrives() {
             counts.settled.visibility[Visibility::BelowHorizon as usize] += 1;
-            return horizon_change(&view, place).with(Sums::default());
+            return (horizon_change(&view, place), Seen::Known(Sums::default()));
         }
         let between = if light.shadows && si.receives_shadow {
             self.between(index, emitter, &view, place)
         } else {
             Between::default()
         };
-        let change = change(&view, place, &between);
+        let change = change(&view, place, &between, scene.camera.sway(si.lit_from, place.reach));
         if between.hidden {
             counts.settled.visibility[Visibility::Hidden as usize] += 1;
-            return change.with(Sums::default());
+            return (change, Seen::Known(Sums::default()));
         }
-        match (between.ask || between.ask_trees, between.hiders.is_empty()) {
+        let behind = between.ask || between.ask_trees;
+        match (behind, between.hiders.is_empty()) {
             (true, _) => counts.settled.visibility[Visibility::Mask as usize] += 1,
             (false, true) => counts.settled.visibility[Visibility::Lit as usize] += 1,
             (false, false) => counts.closed_form += 1,
         }
-        let hiders = if between.ask || between.ask_trees { &[][..] } else { &between.hiders[..] };
+        let hiders = if behind { &[][..] } else { &between.hiders[..] };
+        let enough = self.enough(place);
         let (whole, _) = dispatch_wide!(self.level, simd => integrate(simd, &view, hiders, &enough));
-        let sums = if between.ask || between.ask_trees {
-            let masked = masked(&between);
-            let sums = masked.integrate(&view, &whole, &enough).0;
-            counts.points += masked.asked.get();
-            sums
-        } else {
-            whole
-        };
-        change.with(sums)
+        (change, if behind { Seen::Behind(Box::new(Behind { view, between, whole })) } else { Seen::Known(whole) })
+    }
+
+    /// Whether sums with such an error will do for one light at a place.
+    pub fn enough<'b>(&self, place: &'b Place) -> impl Fn(&Sums, &Sums) -> bool + use<'a, 'b> {
+        let (steps, tolerance) = (&self.lights.steps, self.tolerance_of(place.share));
+        let [diffuse, specular] = place.colors;
+        let base = place.base;
+        move |sums, error| {
+            let value = base + diffuse * sums.diffuse + specular * sums.specular;
+            let wrong = diffuse * error.diffuse + specular * error.specular;
+            steps.of_color(value, wrong) <= tolerance
+        }
+    }
+
+    /// In display steps: how far one light may be wrong at a place that stands for such a share of a pixel.
+    pub fn tolerance_of(&self, share: f32) -> f32 {
+        self.tolerance / share.max(LEAST_SHARE).sqrt()
+    }
+
+    fn masked<'b>(&'b self, light: usize, emitter: &'b Emitter, place: &'b Place, between: &'b Between) -> Masked<'b> {
+        let Place { si, lobe, share, series, .. } = *place;
+        Masked { scene: self.scene, light, emitter, si, lobe, between, share, series, asked: Cell::new(0) }
+    }
+
+    /// A light behind things, as a place sees it.
+    pub fn behind<'b>(&'b self, light: usize, place: &'b Place, behind: &'b Behind) -> Masked<'b> {
+        let emitter =
+            self.lights.emitters[light].as_ref().expect("only lights that are integrated are seen behind things");
+        self.masked(light, emitter, place, &behind.between)
     }
 
     /// What stands between a place and an area light.
@@ -462,7 +515,7 @@ impl<'a> Arrivals<'a> {
         } else {
             Between::default()
         };
-        change(&view, place, &between)
+        change(&view, place, &between, self.scene.camera.sway(place.si.lit_from, place.reach))
     }
 }
 
@@ -506,8 +559,9 @@ fn horizon_change(view: &View, place: &Place) -> Change {
     Change { bend, drift: 0.0, resolved, smooth: false, sharp: false }
 }
 
-/// How far the mean over a patch can be from what arrives at its middle, and so on.
-fn change(view: &View, place: &Place, between: &Between) -> Change {
+/// How far the mean over a patch can be from what arrives at its middle, and so on. `sway` is by how much the way to the viewer
+/// turns over it.
+fn change(view: &View, place: &Place, between: &Between, sway: f32) -> Change {
     let drift = between.drift;
     if place.reach == 0.0 || between.hidden && drift == 0.0 {
         return Change::NONE;
@@ -528,7 +582,7 @@ fn change(view: &View, place: &Place, between: &Between) -> Change {
         let bend = Sums { diffuse, specular: 0.0 };
         return Change { bend, drift, resolved, smooth: is_clear && is_smooth(swing, 0.0), sharp: false };
     }
-    let moved = 2.0 * place.turn + place.reach / nearest.max(place.reach);
+    let moved = 2.0 * place.turn + place.reach / nearest.max(place.reach) + sway;
     let lobe = sharpness(view) * moved * moved;
     let narrow = lobe.min(1.0);
     let narrow = (narrow + 2.0 * narrow.sqrt() * place.off).min(1.0);

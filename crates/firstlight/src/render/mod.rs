@@ -28,6 +28,7 @@ mod solo;
 mod square;
 mod tile;
 mod tiled;
+mod together;
 
 use std::num::NonZeroUsize;
 use std::ops::ControlFlow;

@@ -62,8 +62,6 @@ pub(crate) struct Member {
 
 /// Normals that differ more than this cosine belong to different patches.
 const SAME_NORMAL: f32 = 0.9;
-/// In radians: normals that differ by more are those of different facets.
-const FACETED: f32 = 0.02;
 /// In radians: normals that turn less from the middle of a patch belong to it.
 const MAX_TURN: f32 = 0.2;
 
@@ -87,11 +85,6 @@ impl Patch {
             Rays::All(_) => scene.antialiasing * scene.antialiasing,
             Rays::Mask(_, mask) => mask.count_ones(),
         }
-    }
-
-    /// Whether its rays end on parts of a surface that face different ways, each for itself.
-    pub fn is_faceted(&self) -> bool {
-        matches!(self.rays, Rays::Some(_)) && self.turn > FACETED
     }
 
     /// Whether it fills its pixel, and is shaded in the middle.

@@ -26,15 +26,17 @@ use super::patch::{Contrast, Patch, PixelPatches};
 use super::solo::{self, Candidate, Pyramid};
 use super::square::Square;
 use super::tile::Tile;
+use super::together::Together;
 use super::{AaMode, Counts};
 use crate::color::Rgb;
 use crate::integrate::Sums;
 use crate::material::Bsdf;
 use crate::scene::Scene;
-use crate::shape::SurfaceInteraction;
 
 /// In display steps: how much may bend over a patch that is shaded once.
-pub(super) const BEND: f32 = 0.4;
+pub(super) const BEND: f32 = 0.25;
+/// The part of that which needs no second look.
+const FINE: f32 = 0.1;
 /// Pixels across a cell.
 pub(crate) const CELL: u32 = 32;
 /// With its rim.
@@ -438,7 +440,7 @@ impl<'a> Tiled<'a> {
             let colors = [scale * patch.bsdf.diffuse, scale * patch.bsdf.specular];
             let (si, lobe) = (&patch.si, &patch.bsdf.lobe);
             let (reach, turn, off) = (patch.reach, patch.turn, patch.off);
-            let place = Place { si, lobe, reach, turn, off, share, base, colors };
+            let place = Place { si, lobe, reach, turn, off, share, series: 0, base, colors };
             let known = if is_only { self.field.arrived(index, at) } else { None };
             let arrival = match known {
                 Some(sums) => Arrival::even(sums),
@@ -483,9 +485,8 @@ impl<'a> Tiled<'a> {
         for (k, patch) in patches.iter().enumerate() {
             let count = patch.count(scene) as f32;
             for light in 0..scene.lights.len() {
-                if self.is_enough(&patches, at, k, light, counts) {
-                    let arrived = self.arrived[(self.first[index] + k) * scene.lights.len() + light];
-                    let (scale, sums) = (self.arrivals.scale(light) * count, arrived.sums);
+                if let Some(sums) = self.at_once(&patches, at, k, light, counts) {
+                    let scale = self.arrivals.scale(light) * count;
                     self.terms[light][0] += scale * patch.bsdf.diffuse * sums.diffuse;
                     self.terms[light][1] += scale * patch.bsdf.specular * sums.specular;
                 } else {
@@ -496,12 +497,19 @@ impl<'a> Tiled<'a> {
         self.pixels[index].patches = patches;
     }
 
-    /// Whether what arrives of a light at the middle of a patch, the `k`-th of its pixel, will do for all of it.
-    fn is_enough(&mut self, patches: &[Patch], at: [u32; 2], k: usize, light: usize, counts: &mut Counts) -> bool {
+    /// The mean of what arrives of a light over a patch, the `k`-th of its pixel, if what arrives at its middle tells it.
+    fn at_once(
+        &mut self,
+        patches: &[Patch],
+        at: [u32; 2],
+        k: usize,
+        light: usize,
+        counts: &mut Counts,
+    ) -> Option<Sums> {
         let scene = self.scene;
         let patch = &patches[k];
         if patch.uneven {
-            return false;
+            return None;
         }
         let lights = scene.lights.len();
         let index = self.index(at);
@@ -511,22 +519,41 @@ impl<'a> Tiled<'a> {
         let is_dark = here.sums == Sums::default() && here.bend == Sums::default();
         if patch.contrast != Contrast::default() && !is_dark {
             // How light slopes there is not known
-            return false;
+            return None;
         }
-        if self.shown(light, &patch.bsdf, value, &here.bend) <= allowed {
-            return true;
+        let shown = self.shown(light, &patch.bsdf, value, &here.bend);
+        if shown <= FINE * allowed {
+            return Some(here.sums);
         }
+        let else_here = (shown <= allowed).then_some(here.sums);
         if !here.resolved || !patch.is_whole(scene) {
-            return false;
+            return else_here;
         }
         let [i, j] = at;
         let beside = [[i.wrapping_sub(1), j], [i + 1, j], [i, j.wrapping_sub(1)], [i, j + 1]];
         if !beside.into_iter().all(|neighbour| self.ask(neighbour, counts)) {
-            return false;
+            return else_here;
         }
         let arrived = |index: usize| Some(self.arrived[self.first[index] * lights + light].sums);
-        second_difference(scene, &self.pixels, index, patch, &here.sums, arrived)
-            .is_some_and(|bend| self.shown(light, &patch.bsdf, value, &bend) <= allowed)
+        let Some(differences) = second_difference(scene, &self.pixels, index, patch, &here.sums, arrived) else {
+            return else_here;
+        };
+        if else_here.is_none() && self.shown(light, &patch.bsdf, value, &within(&differences)) > allowed {
+            return None;
+        }
+        // The outline of a shadow makes no parabola
+        let drifts = |[i, j]: [u32; 2]| self.arrived[self.first[self.index([i, j])] * lights + light].drift > 0.0;
+        if here.drift > 0.0 || beside.into_iter().any(drifts) {
+            return Some(here.sums);
+        }
+        // The mean of a parabola over the rays of a pixel
+        let n = scene.antialiasing as f32;
+        let part = (1.0 - 1.0 / (n * n)) / 24.0;
+        let [x, y] = differences;
+        Some(Sums {
+            diffuse: (here.sums.diffuse + (x.diffuse + y.diffuse) * part).max(0.0),
+            specular: (here.sums.specular + (x.specular + y.specular) * part).max(0.0),
+        })
     }
 
     /// Adds what one light sends to a patch, the `k`-th of its pixel, from parts of it: its quarters, where that may do, or
@@ -543,10 +570,7 @@ impl<'a> Tiled<'a> {
             patch.quarters(scene, at)
         };
         if quarters.is_empty() {
-            // Facets have errors of their own
-            let parts = if patch.is_faceted() { patch.count(scene) as f32 } else { 1.0 };
-            let share = self.share(patch) / parts;
-            patch.for_each(scene, at, |si, bsdf| self.at_ray(light, si, bsdf, share, counts));
+            self.at_rays(patch, at, light, self.share(patch), counts);
         }
         let share = self.share(patch);
         for quarter in &quarters {
@@ -555,10 +579,11 @@ impl<'a> Tiled<'a> {
             let Patch { si, bsdf, reach, turn, off, .. } = quarter;
             let colors = [scale * bsdf.diffuse, scale * bsdf.specular];
             let base = scene.ambient * bsdf.ambient;
-            let place = Place { si, lobe: &bsdf.lobe, reach: *reach, turn: *turn, off: *off, share, base, colors };
+            let place =
+                Place { si, lobe: &bsdf.lobe, reach: *reach, turn: *turn, off: *off, share, series: 0, base, colors };
             let arrival = self.arrivals.arrival(light, &place, counts);
             if quarter.uneven || self.shown(light, bsdf, value, &arrival.bend) > allowed {
-                quarter.for_each(scene, at, |si, bsdf| self.at_ray(light, si, bsdf, share, counts));
+                self.at_rays(quarter, at, light, share, counts);
             } else {
                 let count = quarter.count(scene) as f32;
                 self.terms[light][0] += colors[0] * count * arrival.sums.diffuse;
@@ -583,17 +608,20 @@ impl<'a> Tiled<'a> {
         self.arrivals.steps(value, scale * bsdf.diffuse * error.diffuse + scale * bsdf.specular * error.specular)
     }
 
-    /// Adds what one light sends to where one camera ray ends.
-    fn at_ray(&mut self, index: usize, si: &SurfaceInteraction, bsdf: &Bsdf, share: f32, counts: &mut Counts) {
-        self.arrivals.look_around(si);
-        let [diffuse, specular] = self.arrivals.at_point(index, si, bsdf, share, counts);
-        self.terms[index][0] += diffuse;
-        self.terms[index][1] += specular;
+    /// Adds what one light sends to a patch, asked at each of its rays. It is as good as `share` of the pixel.
+    fn at_rays(&mut self, patch: &Patch, at: [u32; 2], light: usize, share: f32, counts: &mut Counts) {
+        let rays = patch.count(self.scene) as usize;
+        let salt = at[0] ^ at[1].rotate_left(16) ^ patch.si.surface.index() as u32;
+        let mut together = Together::new(light, rays, share, salt);
+        patch.for_each(self.scene, at, |si, bsdf| together.ask(&mut self.arrivals, si, bsdf, counts));
+        let [diffuse, specular] = together.finish(&self.arrivals, counts);
+        self.terms[light][0] += diffuse;
+        self.terms[light][1] += specular;
     }
 }
 
-/// How far what light does within a pixel can make its mean another, by what arrives `here` and at the neighbours, as `arrived` says;
-/// `None` where those tell nothing.
+/// How far neighbours along each axis differ from what they foretell of a pixel in their middle, by what arrives `here` and at
+/// them, as `arrived` says; `None` where they tell nothing.
 pub(super) fn second_difference(
     scene: &Scene,
     pixels: &[PixelPatches],
@@ -601,9 +629,9 @@ pub(super) fn second_difference(
     patch: &Patch,
     here: &Sums,
     arrived: impl Fn(usize) -> Option<Sums>,
-) -> Option<Sums> {
-    let mut bend = Sums::default();
-    for step in [1, ACROSS] {
+) -> Option<[Sums; 2]> {
+    let mut differences = [Sums::default(); 2];
+    for (difference, step) in differences.iter_mut().zip([1, ACROSS]) {
         let neighbours = [index - step, index + step];
         let same = |i: &usize| {
             let patches = &pixels[*i].patches;
@@ -616,9 +644,18 @@ pub(super) fn second_difference(
             return None;
         }
         let (before, after) = (arrived(neighbours[0])?, arrived(neighbours[1])?);
-        let second = |a: f32, b: f32, c: f32| (a - b + (c - b)).abs() * WITHIN;
-        bend.diffuse += second(before.diffuse, here.diffuse, after.diffuse);
-        bend.specular += second(before.specular, here.specular, after.specular);
+        let second = |a: f32, b: f32, c: f32| a - b + (c - b);
+        difference.diffuse = second(before.diffuse, here.diffuse, after.diffuse);
+        difference.specular = second(before.specular, here.specular, after.specular);
     }
-    Some(bend)
+    Some(differences)
+}
+
+/// How far what light does within a pixel can make its mean another, by its second differences.
+pub(super) fn within(differences: &[Sums; 2]) -> Sums {
+    let [x, y] = differences;
+    Sums {
+        diffuse: (x.diffuse.abs() + y.diffuse.abs()) * WITHIN,
+        specular: (x.specular.abs() + y.specular.abs()) * WITHIN,
+    }
 }

@@ -12,7 +12,7 @@ use crate::render::arrival::Arrivals;
 use crate::render::counts::Counts;
 use crate::render::fence::Fence;
 use crate::render::patch::PixelPatches;
-use crate::render::tiled::{BEND, second_difference};
+use crate::render::tiled::{BEND, second_difference, within};
 use crate::shape::SurfaceInteraction;
 
 /// A light, or all that are taken together, whose mean over a patch is in doubt.
@@ -130,9 +130,10 @@ impl<'a> Many<'a> {
             let of = |color: Rgb| [color.r, color.g, color.b][channel];
             let sums = |stored: &Stored| Sums { diffuse: of(stored.sent[0]), specular: of(stored.sent[1]) };
             let arrived = |index: usize| Some(sums(&self.patches[first[index]]));
-            let Some(bend) = second_difference(self.scene, pixels, index, patch, &sums(stored), arrived) else {
+            let Some(differences) = second_difference(self.scene, pixels, index, patch, &sums(stored), arrived) else {
                 return anything;
             };
+            let bend = within(&differences);
             let one = |channel_of: usize| if channel_of == channel { 1.0 } else { 0.0 };
             let mask = Rgb::new(one(0), one(1), one(2));
             all += mask * (patch.bsdf.diffuse * bend.diffuse + patch.bsdf.specular * bend.specular);
@@ -200,10 +201,11 @@ impl<'a> Many<'a> {
                 let found = singles.binary_search_by_key(&here.light, |single| single.light).ok()?;
                 Some(singles[found].arrival.sums)
             };
-            let Some(bend) = second_difference(self.scene, pixels, index, patch, &here.arrival.sums, arrived) else {
+            let Some(differences) = second_difference(self.scene, pixels, index, patch, &here.arrival.sums, arrived)
+            else {
                 return true;
             };
-            let error = shown(here.light, &bend);
+            let error = shown(here.light, &within(&differences));
             if arrivals.steps(value, sum + error) <= BEND {
                 sum += error;
                 return false;
