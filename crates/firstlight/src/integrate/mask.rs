@@ -42,10 +42,24 @@ fn points() -> &'static Points {
     POINTS.get_or_init(|| {
         let count = (SERIES * MOST) as u32;
         let square = (0..count).map(|k| SampleSet::Sobol.point(k, count, 0).map(|w| (2.0 * w - 1.0) as f32));
-        let square: Vec<[f32; 2]> = square.collect();
+        let mut square: Vec<[f32; 2]> = square.collect();
+        // Those that are asked together are near each other: so are the ways to them
+        for series in square.chunks_exact_mut(MOST) {
+            let (mut from, mut to) = (0, LANES);
+            while from < MOST {
+                series[from..to].sort_by_key(|place| curve(*place));
+                (from, to) = (to, to * 2);
+            }
+        }
         let disk = square.iter().map(|p| crate::light::concentric(p.map(f64::from)).map(|w| w as f32)).collect();
         Points { square, disk }
     })
+}
+
+/// Where a point of the square [-1, 1]^2 lies on Morton's curve through 256 x 256 cells.
+fn curve(place: [f32; 2]) -> u32 {
+    let [x, y] = place.map(|w| ((w + 1.0) * 128.0) as u32);
+    (0..8).fold(0, |code, bit| code | (x >> bit & 1) << (2 * bit) | (y >> bit & 1) << (2 * bit + 1))
 }
 
 /// A light behind things, seen from a surface.

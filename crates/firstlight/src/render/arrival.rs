@@ -23,6 +23,8 @@ use crate::visibility::{Occluders, Target, Viewpoint, Visibility};
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Arrival {
     pub sums: Sums,
+    /// Whether that was not asked, since it would not do for the patch.
+    pub skipped: bool,
     /// How far the mean over the patch can be from what arrives at its middle.
     pub bend: Sums,
     /// Over how much of the light's size the outlines of shadows move across the patch; see [`Between::drift`].
@@ -61,7 +63,7 @@ impl Change {
 
     fn with(self, sums: Sums) -> Arrival {
         let Change { bend, drift, resolved, smooth, sharp } = self;
-        Arrival { sums, bend, drift, resolved, smooth, sharp }
+        Arrival { sums, skipped: false, bend, drift, resolved, smooth, sharp }
     }
 }
 
@@ -93,6 +95,10 @@ pub(crate) struct Place<'a> {
     pub share: f32,
     /// Which points of lights it asks; see [`Masked::series`].
     pub series: usize,
+    /// Where it stands for a patch: how much may bend over it, in display steps, and whether its neighbours may tell that less
+    /// does. If it will not do for the patch, points of the light are not asked.
+    pub allowed: f32,
+    pub beside: bool,
     /// What is there beside this light, at least.
     pub base: Rgb,
     /// What the two sums are multiplied with.
@@ -134,6 +140,8 @@ pub(crate) struct Lights {
 const LEAST_SHARE: f32 = 1.0 / 8.0;
 /// In display steps: how far all lights together may be wrong.
 const TOLERANCE: f32 = 0.1;
+/// The same where each place is wrong by itself, as by chance: nothing of that shows as a step or an edge.
+const BY_CHANCE: f32 = 0.35;
 
 impl Lights {
     pub fn new(scene: &Scene) -> Lights {
@@ -235,6 +243,12 @@ impl<'a> Arrivals<'a> {
                     Seen::Known(sums) => sums,
                     Seen::Behind(behind) => {
                         let Behind { view, whole, .. } = &*behind;
+                        let [diffuse, specular] = place.colors;
+                        let of = |sums: &Sums| diffuse * sums.diffuse + specular * sums.specular;
+                        let told = change.resolved && place.beside;
+                        if !told && self.steps(place.base + of(whole), of(&change.bend)) > place.allowed {
+                            return Arrival { skipped: true, ..change.with(Sums::default()) };
+                        }
                         let masked = self.masked(index, emitter, place, &behind.between);
                         let sums = masked.integrate(view, whole, &self.enough(place)).0;
                         counts.points += masked.asked.get();
@@ -272,7 +286,19 @@ impl<'a> Arrivals<'a> {
         let colors = [scale * bsdf.diffuse, scale * bsdf.specular];
         let base = self.scene.ambient * bsdf.ambient;
         let lobe = &bsdf.lobe;
-        let place = Place { si, lobe, reach: 0.0, turn: 0.0, off: 0.0, share, series: 0, base, colors };
+        let place = Place {
+            si,
+            lobe,
+            reach: 0.0,
+            turn: 0.0,
+            off: 0.0,
+            share,
+            series: 0,
+            allowed: f32::INFINITY,
+            beside: false,
+            base,
+            colors,
+        };
         let sums = self.arrival(index, &place, counts).sums;
         [colors[0] * sums.diffuse, colors[1] * sums.specular]
     }
@@ -472,6 +498,11 @@ impl<'a> Arrivals<'a> {
     /// In display steps: how far one light may be wrong at a place that stands for such a share of a pixel.
     pub fn tolerance_of(&self, share: f32) -> f32 {
         self.tolerance / share.max(LEAST_SHARE).sqrt()
+    }
+
+    /// The same where the errors of neighbours are as good as independent.
+    pub fn tolerance_by_chance(&self, share: f32) -> f32 {
+        self.tolerance_of(share) * (BY_CHANCE / TOLERANCE)
     }
 
     fn masked<'b>(&'b self, light: usize, emitter: &'b Emitter, place: &'b Place, between: &'b Between) -> Masked<'b> {

@@ -280,6 +280,8 @@ impl OneLight<'_, '_> {
             off: 0.0,
             share: 1.0,
             series: 0,
+            allowed: f32::INFINITY,
+            beside: false,
             base: self.shade.base,
             colors,
         };

@@ -434,13 +434,15 @@ impl<'a> Tiled<'a> {
         let base = scene.ambient * patch.bsdf.ambient;
         let mut value = base;
         let share = self.share(patch);
+        let allowed = BEND / (scene.lights.len() as f32).sqrt();
         let is_only = matches!(self.known[self.index(at)], Known::Only(_)) && self.is_in_cell(at);
         for index in 0..scene.lights.len() {
             let scale = self.arrivals.scale(index);
             let colors = [scale * patch.bsdf.diffuse, scale * patch.bsdf.specular];
             let (si, lobe) = (&patch.si, &patch.bsdf.lobe);
             let (reach, turn, off) = (patch.reach, patch.turn, patch.off);
-            let place = Place { si, lobe, reach, turn, off, share, series: 0, base, colors };
+            let beside = patch.is_whole(scene);
+            let place = Place { si, lobe, reach, turn, off, share, series: 0, allowed, beside, base, colors };
             let known = if is_only { self.field.arrived(index, at) } else { None };
             let arrival = match known {
                 Some(sums) => Arrival::even(sums),
@@ -516,6 +518,9 @@ impl<'a> Tiled<'a> {
         let (here, value) =
             (self.arrived[(self.first[index] + k) * lights + light], self.values[self.first[index] + k]);
         let allowed = BEND / (lights as f32).sqrt();
+        if here.skipped {
+            return None;
+        }
         let is_dark = here.sums == Sums::default() && here.bend == Sums::default();
         if patch.contrast != Contrast::default() && !is_dark {
             // How light slopes there is not known
@@ -534,7 +539,10 @@ impl<'a> Tiled<'a> {
         if !beside.into_iter().all(|neighbour| self.ask(neighbour, counts)) {
             return else_here;
         }
-        let arrived = |index: usize| Some(self.arrived[self.first[index] * lights + light].sums);
+        let arrived = |index: usize| {
+            let arrival = &self.arrived[self.first[index] * lights + light];
+            (!arrival.skipped).then_some(arrival.sums)
+        };
         let Some(differences) = second_difference(scene, &self.pixels, index, patch, &here.sums, arrived) else {
             return else_here;
         };
@@ -579,10 +587,21 @@ impl<'a> Tiled<'a> {
             let Patch { si, bsdf, reach, turn, off, .. } = quarter;
             let colors = [scale * bsdf.diffuse, scale * bsdf.specular];
             let base = scene.ambient * bsdf.ambient;
-            let place =
-                Place { si, lobe: &bsdf.lobe, reach: *reach, turn: *turn, off: *off, share, series: 0, base, colors };
+            let place = Place {
+                si,
+                lobe: &bsdf.lobe,
+                reach: *reach,
+                turn: *turn,
+                off: *off,
+                share,
+                series: 0,
+                allowed,
+                beside: false,
+                base,
+                colors,
+            };
             let arrival = self.arrivals.arrival(light, &place, counts);
-            if quarter.uneven || self.shown(light, bsdf, value, &arrival.bend) > allowed {
+            if quarter.uneven || arrival.skipped || self.shown(light, bsdf, value, &arrival.bend) > allowed {
                 self.at_rays(quarter, at, light, share, counts);
             } else {
                 let count = quarter.count(scene) as f32;

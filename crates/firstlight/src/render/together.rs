@@ -58,7 +58,19 @@ impl Together {
         let scale = arrivals.scale(self.light);
         let colors = [scale * bsdf.diffuse, scale * bsdf.specular];
         let base = arrivals.ambient() * bsdf.ambient;
-        Place { si, lobe: &bsdf.lobe, reach: 0.0, turn: 0.0, off: 0.0, share: self.each, series, base, colors }
+        Place {
+            si,
+            lobe: &bsdf.lobe,
+            reach: 0.0,
+            turn: 0.0,
+            off: 0.0,
+            share: self.each,
+            series,
+            allowed: f32::INFINITY,
+            beside: false,
+            base,
+            colors,
+        }
     }
 
     /// Asks for what one ray sees.
@@ -110,7 +122,7 @@ impl Together {
         let wanted = POINTS * self.share.sqrt();
         let first = (0.5 * wanted / asking.len() as f32) as usize;
         let mut to = first.next_power_of_two().clamp(LANES, FIRST);
-        let tolerance = arrivals.tolerance_of(self.share);
+        let tolerance = arrivals.tolerance_by_chance(self.share);
         let part = 1.0 / self.rays as f32;
         let mut is_first = true;
         loop {

@@ -172,8 +172,19 @@ impl<'a> Many<'a> {
             let scale = arrivals.scale(*index as usize);
             let colors = [scale * bsdf.diffuse, scale * bsdf.specular];
             let (reach, turn, off) = (patch.reach, patch.turn, patch.off);
-            let place =
-                Place { si, lobe: &bsdf.lobe, reach, turn, off, share: 1.0, series: 0, base: stored.value, colors };
+            let place = Place {
+                si,
+                lobe: &bsdf.lobe,
+                reach,
+                turn,
+                off,
+                share: 1.0,
+                series: 0,
+                allowed: f32::INFINITY,
+                beside: false,
+                base: stored.value,
+                colors,
+            };
             let arrival = arrivals.arrival(*index as usize, &place, counts);
             light += scale * arrival.sums.diffuse;
             stored.value += colors[0] * arrival.sums.diffuse + colors[1] * arrival.sums.specular;

@@ -331,8 +331,19 @@ impl<'a> Many<'a> {
                     let scale = arrivals.scale(light as usize);
                     let colors = [scale * bsdf.diffuse, scale * bsdf.specular];
                     let (reach, turn, off) = (patch.reach, patch.turn, patch.off);
-                    let place =
-                        Place { si, lobe: &bsdf.lobe, reach, turn, off, share: 1.0, series: 0, base: value, colors };
+                    let place = Place {
+                        si,
+                        lobe: &bsdf.lobe,
+                        reach,
+                        turn,
+                        off,
+                        share: 1.0,
+                        series: 0,
+                        allowed: f32::INFINITY,
+                        beside: false,
+                        base: value,
+                        colors,
+                    };
                     let arrival = arrivals.arrival(light as usize, &place, counts);
                     singles.push(Single { light, arrival });
                     colors[0] * arrival.sums.diffuse + colors[1] * arrival.sums.specular
