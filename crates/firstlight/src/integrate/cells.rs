@@ -18,6 +18,8 @@ const LAST: usize = 1024;
 const SURE: f64 = 3.0;
 /// Cells that are rougher than this part of the mean are cut where they are too rough together.
 const SMOOTHER: f64 = 0.25;
+/// Cells that send more than so many times the mean are heavy.
+const HEAVY: f64 = 4.0;
 /// The most cells in doubt that are cut.
 const MOST: usize = 1 << 17;
 
@@ -110,8 +112,8 @@ impl Grid {
 struct Totals {
     all: [f64; 2],
     lit: [f64; 2],
-    /// How far `lit` may be off because cells are rough.
-    rough: [f64; 2],
+    /// How far they may be off because cells are rough: what is lit of them, what is hidden.
+    rough: [[f64; 2]; 2],
 }
 
 impl Totals {
@@ -123,9 +125,14 @@ impl Totals {
             self.all[k] += f64::from(*sum) * area;
             if cell.state == State::Lit {
                 self.lit[k] += f64::from(*sum) * area;
-                self.rough[k] += f64::from(cell.rough[k]) * area;
             }
+            self.rough[usize::from(cell.state == State::Hidden)][k] += f64::from(cell.rough[k]) * area;
         }
+    }
+
+    /// What is a part of one of the sums, as a share of all.
+    fn share(&self, k: usize, part: f64) -> f64 {
+        if self.all[k] > 0.0 { part / self.all[k] } else { 0.0 }
     }
 }
 
@@ -193,15 +200,19 @@ pub(super) fn integrate(
         }
         // A cell that an edge runs through at random is wrong by a root of a sixth, and about half of these have one
         let edges = doubt.map(|doubt| SURE * (doubt * (1.0 / 12.0)).sqrt());
-        // Of a share, what cells are rough by is in both its parts
-        let rough = if whole.is_some() { [0.0; 2] } else { totals.rough };
+        let [lit, hidden] = totals.rough;
+        let rough = [0, 1].map(|k| {
+            let share = totals.share(k, totals.lit[k]);
+            // Where the whole is known, only the share is in doubt: what is lit of it against what is not
+            if whole.is_some() { lit[k] * (1.0 - share) + hidden[k] * share } else { lit[k] }
+        });
         let whole = whole.copied().unwrap_or_else(|| {
             let [diffuse, specular] = totals.all.map(|sum| sum as f32);
             Sums { diffuse, specular }
         });
-        let part = |part: [f64; 2]| {
-            let share = |k: usize| if totals.all[k] > 0.0 { (part[k] / totals.all[k]) as f32 } else { 0.0 };
-            Sums { diffuse: whole.diffuse * share(0), specular: whole.specular * share(1) }
+        let part = |part: [f64; 2]| Sums {
+            diffuse: whole.diffuse * totals.share(0, part[0]) as f32,
+            specular: whole.specular * totals.share(1, part[1]) as f32,
         };
         let (sums, by_edges, by_roughness) = (part(totals.lit), part(edges), part(rough));
         let error = by_edges + by_roughness;
@@ -209,20 +220,29 @@ pub(super) fn integrate(
         let one = Sums { diffuse: whole.diffuse * area as f32, specular: whole.specular * area as f32 };
         if grid.side < EVERYWHERE && !enough(&sums, &one) {
             doubtful.fill(true);
+        } else if grid.side == LAST {
+            return (sums, error);
         } else {
-            if enough(&sums, &error) || grid.side == LAST {
-                return (sums, error);
-            }
-            if !enough(&sums, &(by_roughness + by_roughness)) {
+            let is_enough = enough(&sums, &error);
+            if is_enough {
+                doubtful.fill(false);
+            } else if !enough(&sums, &(by_roughness + by_roughness)) {
                 // Those that are not much smoother than the mean
                 let roughness = |cell: &Cell| {
-                    let part =
-                        |k: usize| if totals.all[k] > 0.0 { f64::from(cell.rough[k]) / totals.all[k] } else { 0.0 };
-                    if cell.state == State::Lit { part(0) + part(1) } else { 0.0 }
+                    let [diffuse, specular] = cell.rough.map(f64::from);
+                    if cell.state == State::Dark { 0.0 } else { totals.share(0, diffuse) + totals.share(1, specular) }
                 };
                 let mean = cells.iter().map(roughness).sum::<f64>() / cells.len() as f64;
                 for (cell, doubtful) in cells.iter().zip(&mut doubtful) {
                     *doubtful |= roughness(cell) > SMOOTHER * mean;
+                }
+            }
+            // One that sends far more than others is looked at more closely
+            for (cell, doubtful) in cells.iter().zip(&mut doubtful) {
+                let [diffuse, specular] = cell.sums.map(f64::from);
+                let is_heavy = totals.share(0, diffuse).max(totals.share(1, specular)) > HEAVY;
+                if is_heavy && cell.state != State::Dark && !*doubtful {
+                    *doubtful = !enough(&sums, &part([diffuse * area, specular * area]));
                 }
             }
             let count = doubtful.iter().filter(|doubtful| **doubtful).count();

@@ -28,6 +28,8 @@ pub(crate) const MOST: usize = 1 << 10;
 /// How much farther off the share may be than two numbers of points tell: both can be off to the same side, and are so all over
 /// a surface, since all of it asks the same points.
 const DOUBT: f32 = 4.0;
+/// The share of points that have to be as good as alike.
+const UNEVEN: f64 = 1.0 / 16.0;
 /// Series of points, as different as points of one sequence are.
 pub(crate) const SERIES: usize = 16;
 
@@ -83,6 +85,8 @@ pub(crate) struct Masked<'a> {
 pub(crate) struct Tally {
     all: [f64; 2],
     lit: [f64; 2],
+    /// Of the squares of what they would send.
+    squares: [f64; 2],
     /// How many points were asked, and how many of them are hidden.
     pub count: usize,
     pub hidden: usize,
@@ -94,6 +98,17 @@ impl Tally {
         let share =
             |i: usize, whole: f32| if self.all[i] > 0.0 { whole * (self.lit[i] / self.all[i]) as f32 } else { 0.0 };
         Sums { diffuse: share(0, whole.diffuse), specular: share(1, whole.specular) }
+    }
+}
+
+impl Tally {
+    /// Whether a few points send most of it, so that the others tell nothing: of the diffuse part, of a highlight.
+    pub fn is_uneven(&self) -> [bool; 2] {
+        // As many points that send alike would be as good as these
+        [0, 1].map(|k| {
+            let alike = self.all[k] * self.all[k] / self.squares[k];
+            self.squares[k] > 0.0 && alike < UNEVEN * self.count as f64
+        })
     }
 }
 
@@ -120,7 +135,8 @@ impl Masked<'_> {
                     diffuse: (doubt * off(|sums| sums.diffuse)).max(whole.diffuse * one),
                     specular: (doubt * off(|sums| sums.specular)).max(whole.specular * one),
                 };
-                if tally.hidden == 0 && to >= 2 * fewest || enough(&now, &error) {
+                let [is_uneven, _] = tally.is_uneven();
+                if !is_uneven && (tally.hidden == 0 && to >= 2 * fewest || enough(&now, &error)) {
                     return (now, error);
                 }
                 if to == MOST {
@@ -224,6 +240,8 @@ impl Seen<'_> {
             for (lane, [diffuse, specular]) in sent.iter().enumerate() {
                 tally.all[0] += f64::from(*diffuse);
                 tally.all[1] += f64::from(*specular);
+                tally.squares[0] += f64::from(*diffuse) * f64::from(*diffuse);
+                tally.squares[1] += f64::from(*specular) * f64::from(*specular);
                 if hidden >> lane & 1 == 0 {
                     tally.lit[0] += f64::from(*diffuse);
                     tally.lit[1] += f64::from(*specular);

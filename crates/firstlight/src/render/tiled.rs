@@ -549,9 +549,10 @@ impl<'a> Tiled<'a> {
         if else_here.is_none() && self.shown(light, &patch.bsdf, value, &within(&differences)) > allowed {
             return None;
         }
-        // The outline of a shadow makes no parabola
-        let drifts = |[i, j]: [u32; 2]| self.arrived[self.first[self.index([i, j])] * lights + light].drift > 0.0;
-        if here.drift > 0.0 || beside.into_iter().any(drifts) {
+        // The outline of a shadow makes no parabola, nor does a light's rim
+        let breaks = |arrival: &Arrival| arrival.drift > 0.0 || !arrival.resolved;
+        let beside = beside.map(|at| &self.arrived[self.first[self.index(at)] * lights + light]);
+        if breaks(&here) || beside.into_iter().any(breaks) {
             return Some(here.sums);
         }
         // The mean of a parabola over the rays of a pixel

@@ -127,7 +127,7 @@ impl Together {
         let mut is_first = true;
         loop {
             let (mut value, mut moved, mut squares, mut all) = (self.value, Rgb::BLACK, Rgb::BLACK, Rgb::BLACK);
-            let mut hidden = 0;
+            let (mut hidden, mut is_uneven) = (0, false);
             for one in asking.iter_mut() {
                 let place = self.place(arrivals, &one.si, &one.bsdf, one.series);
                 let masked: Masked = arrivals.behind(self.light, &place, &one.behind);
@@ -139,9 +139,13 @@ impl Together {
                 (value, moved, squares) = (value + of(&now), moved + off, squares + off * off);
                 all += of(&one.behind.whole);
                 hidden += one.tally.hidden;
+                is_uneven |= one.tally.is_uneven()[0];
                 one.before = now;
             }
             let points = (to * asking.len()) as f32;
+            if is_uneven {
+                return false;
+            }
             if hidden == 0 && points >= wanted {
                 return true;
             }

@@ -19,6 +19,8 @@ const SETS: u32 = 4;
 const FIRST: u32 = 8;
 /// That of the largest.
 const LAST: u32 = 20;
+/// From how many points on, to base 2, a pixel takes long beside what else a picture takes.
+const LONG: u32 = 13;
 /// The logarithm to base 2 of how many times the points the sets have where a root mean square is out of bounds.
 const AGAIN: u32 = 4;
 /// Steps off at which a pixel of the converged picture is looked at again.
@@ -110,18 +112,19 @@ fn opinion(scene: &Scene, films: &[[f32; 4]; SETS as usize]) -> Opinion {
     Opinion { mean, half_difference: std::array::from_fn(|k| 0.5 * (one[k] - other[k])), agreed }
 }
 
-/// The parts of a picture to render so that every wanted pixel is there: few, and not much more than wanted.
-fn windows(wanted: &[bool], width: u32, height: u32) -> Vec<Window> {
-    const SIDE: u32 = 4;
+/// The parts of a picture to render so that every wanted pixel is there: few, and not much more than wanted; where pixels take
+/// long, nothing more.
+fn windows(wanted: &[bool], width: u32, height: u32, level: u32) -> Vec<Window> {
+    let side = if level < LONG { 4 } else { 1 };
     let count = wanted.iter().filter(|wanted| **wanted).count();
-    if 2 * count > wanted.len() {
+    if side > 1 && 2 * count > wanted.len() {
         return vec![Window { x: 0, y: 0, width, height }];
     }
     let mut windows = Vec::new();
     for (top, left) in
-        (0..height).step_by(SIDE as usize).flat_map(|y| (0..width).step_by(SIDE as usize).map(move |x| (y, x)))
+        (0..height).step_by(side as usize).flat_map(|y| (0..width).step_by(side as usize).map(move |x| (y, x)))
     {
-        let cell = (top..(top + SIDE).min(height)).flat_map(|y| (left..(left + SIDE).min(width)).map(move |x| [x, y]));
+        let cell = (top..(top + side).min(height)).flat_map(|y| (left..(left + side).min(width)).map(move |x| [x, y]));
         let inside = cell.filter(|[x, y]| wanted[(y * width + x) as usize]);
         let bounds = inside.fold(None, |bounds: Option<[[u32; 2]; 2]>, at| match bounds {
             None => Some([at, at]),
@@ -178,7 +181,7 @@ impl Converged {
         let count = self.pixels.len();
         let mut before = vec![false; count];
         for level in first..=cap {
-            let parts = windows(&self.open, self.width, self.height);
+            let parts = windows(&self.open, self.width, self.height, level);
             if parts.is_empty() {
                 return;
             }
