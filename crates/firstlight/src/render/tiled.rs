@@ -531,7 +531,9 @@ impl<'a> Tiled<'a> {
             return Some(here.sums);
         }
         let else_here = (shown <= allowed).then_some(here.sums);
-        if !here.resolved || !patch.is_whole(scene) {
+        // The outline of a shadow makes no parabola, nor does a light's rim
+        let breaks = |arrival: &Arrival| arrival.drift > 0.0 || !arrival.resolved;
+        if !here.resolved || !patch.is_whole(scene) || else_here.is_some() && breaks(&here) {
             return else_here;
         }
         let [i, j] = at;
@@ -549,8 +551,6 @@ impl<'a> Tiled<'a> {
         if else_here.is_none() && self.shown(light, &patch.bsdf, value, &within(&differences)) > allowed {
             return None;
         }
-        // The outline of a shadow makes no parabola, nor does a light's rim
-        let breaks = |arrival: &Arrival| arrival.drift > 0.0 || !arrival.resolved;
         let beside = beside.map(|at| &self.arrived[self.first[self.index(at)] * lights + light]);
         if breaks(&here) || beside.into_iter().any(breaks) {
             return Some(here.sums);
