@@ -5,80 +5,19 @@ use std::cell::Cell;
 use fearless_simd::Level;
 
 use super::Counts;
+use super::change::{Arrival, Change, change, horizon_change, unseen};
 use super::lanes::Lanes;
 use super::many::FEW;
 use super::pixel::Lighting;
-use super::plain::Plain;
 use crate::color::{DisplaySteps, Rgb};
 use crate::ids::LightId;
-use crate::integrate::{Asker, Between, Emitter, Masked, Receiver, Sums, View, integrate, sharpness};
+use crate::integrate::{Asker, Between, Emitter, Masked, Receiver, Sums, View, integrate};
 use crate::light::{Light, LightKind, LightTree};
 use crate::material::{Bsdf, Lobe};
-use crate::math::{Vec3, dispatch_wide, square};
+use crate::math::dispatch_wide;
 use crate::scene::Scene;
-use crate::shape::{PlaneSide, SurfaceInteraction};
+use crate::shape::SurfaceInteraction;
 use crate::visibility::{Occluders, Target, Viewpoint, Visibility};
-
-/// What of one light arrives.
-#[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct Arrival {
-    pub sums: Sums,
-    /// Whether that was not asked, since it would not do for the patch.
-    pub skipped: bool,
-    /// How far the mean over the patch can be from what arrives at its middle.
-    pub bend: Sums,
-    /// Over how much of the light's size the outlines of shadows move across the patch; see [`Between::drift`].
-    pub drift: f32,
-    /// Whether all that light does here is wide beside the patch, so that neighbours tell what it does.
-    pub resolved: bool,
-    /// Whether nothing of it has a corner, and what curves does so little that a quadratic in the place follows it.
-    pub smooth: bool,
-    /// Whether a highlight is not wide beside the patch.
-    pub sharp: bool,
-}
-
-/// How a light changes over a patch.
-#[derive(Clone, Copy, Debug, Default)]
-struct Change {
-    /// See [`Arrival::bend`], and so on.
-    bend: Sums,
-    drift: f32,
-    resolved: bool,
-    smooth: bool,
-    sharp: bool,
-}
-
-impl Change {
-    /// Not at all.
-    const NONE: Change =
-        Change { bend: Sums { diffuse: 0.0, specular: 0.0 }, drift: 0.0, resolved: true, smooth: true, sharp: false };
-    /// Nobody knows.
-    const UNKNOWN: Change = Change {
-        bend: Sums { diffuse: f32::MAX, specular: f32::MAX },
-        drift: f32::INFINITY,
-        resolved: false,
-        smooth: false,
-        sharp: true,
-    };
-
-    fn with(self, sums: Sums) -> Arrival {
-        let Change { bend, drift, resolved, smooth, sharp } = self;
-        Arrival { sums, skipped: false, bend, drift, resolved, smooth, sharp }
-    }
-}
-
-impl Arrival {
-    /// At a point, or where nothing bends.
-    pub fn even(sums: Sums) -> Arrival {
-        Change::NONE.with(sums)
-    }
-}
-
-/// Outlines that move over a larger part of the light than this, and highlights that move by more of their width, squared, are
-/// not wide beside the patch.
-const RESOLVED: f32 = 0.5;
-/// The same for the angle by which the light's direction and the normal turn.
-const RESOLVED_SWING: f32 = 0.2;
 
 /// A place of a surface that asks for light.
 #[derive(Clone, Copy)]
@@ -161,11 +100,11 @@ impl Lights {
 
 /// The lights, as one thread asks for them.
 pub(crate) struct Arrivals<'a> {
-    scene: &'a Scene,
+    pub(super) scene: &'a Scene,
     lights: &'a Lights,
     level: Level,
     sampled: Lanes,
-    occluders: Occluders,
+    pub(super) occluders: Occluders,
     tolerance: f32,
 }
 
@@ -303,127 +242,6 @@ impl<'a> Arrivals<'a> {
         [colors[0] * sums.diffuse, colors[1] * sums.specular]
     }
 
-    /// A light of one point.
-    fn single(&mut self, index: usize, light: &Light, place: &Place, counts: &mut Counts) -> Arrival {
-        let si = place.si;
-        let sums = Plain.gather(self.scene, index, si, place.lobe, counts);
-        let sums = Sums { diffuse: sums.diffuse.total(), specular: sums.specular.total() };
-        if place.reach == 0.0 {
-            return Arrival::even(sums);
-        }
-        let to = light.towards(0, si.lit_from);
-        let distance = if to.finite { to.l.length() } else { f32::INFINITY };
-        // The most that can arrive on the patch, the cosine being 1
-        let near = (distance - place.reach).max(0.0);
-        let (height, behind) = (si.ns.dot(to.l).min(si.horizon.dot(to.l)), place.reach + place.turn * to.l.length());
-        if height < -behind {
-            return Arrival::even(sums);
-        }
-        let Some(sample) = light.sample(0, to.l) else {
-            return Change::UNKNOWN.with(sums);
-        };
-        let weight = sample.weight.max(sums.diffuse) * 1.2;
-        // A spot's rim, a terminator, a shadow's edge
-        let rim = match &light.kind {
-            LightKind::Spot(spot) => {
-                let toward = (-to.l).normalize_or_zero();
-                let cos = 1.0 - toward.dot(spot.axis);
-                let swing = 2.0 * place.reach / near.max(f32::MIN_POSITIVE);
-                if (cos - spot.outer).abs() < swing * 2.0 { 1.0 } else { swing * spot.inverse_fade.min(1e6) * swing }
-            }
-            _ => 0.0,
-        };
-        let weight = if rim >= 1.0 { weight.max(1.0 / (near * near).max(f32::MIN_POSITIVE)) } else { weight };
-        let edge = if light.shadows && si.receives_shadow { self.edge(index, to.l, to.finite, place) } else { 0.0 };
-        let swing = place.turn + place.reach / distance;
-        let terminator = if height < behind { swing * 0.5 } else { 0.0 };
-        let smooth = swing * swing + 2.0 * swing * place.off;
-        let share = (edge + rim + terminator + smooth).min(1.0);
-        let moved = 2.0 * place.turn + place.reach / distance + self.scene.camera.sway(si.lit_from, place.reach);
-        let lobe = (place.lobe.sharpness(si.ns.dot(si.wo)) * square(moved)).min(1.0);
-        let specular =
-            if matches!(place.lobe, Lobe::None) { 0.0 } else { weight * (edge + rim + terminator + lobe).min(1.0) };
-        let resolved = edge == 0.0 && rim == 0.0 && swing < RESOLVED_SWING && lobe < RESOLVED;
-        let drift = if edge == 0.0 { 0.0 } else { f32::INFINITY };
-        let smooth = resolved && terminator == 0.0 && is_smooth(swing, lobe);
-        Change { bend: Sums { diffuse: weight * share, specular }, drift, resolved, smooth, sharp: is_sharp(lobe) }
-            .with(sums)
-    }
-
-    /// Whether the edge of a shadow, of a light of one point, may run through the patch: 1, or 0 if that is excluded.
-    fn edge(&mut self, light: usize, l: Vec3, finite: bool, place: &Place) -> f32 {
-        let (scene, si) = (self.scene, place.si);
-        if !scene.light_obstacles.disks.is_empty()
-            || self.gather(light, place) && (self.occluders.too_many || self.occluders.count() > 0)
-        {
-            return 1.0;
-        }
-        let length = l.length();
-        let d = l / length;
-        let end = if finite { length } else { f32::INFINITY };
-        let id = LightId(light as u32);
-        let [sphere_links, flat_links] = &scene.obstacle_links;
-        let spheres = scene.obstacles.iter().enumerate().filter(|(i, _)| scene.casts(sphere_links, *i, id));
-        let spheres = spheres.map(|(_, sphere)| sphere);
-        let lights =
-            scene.light_obstacles.spheres.iter().filter(|(index, _)| *index != light).map(|(_, sphere)| sphere);
-        for sphere in spheres.chain(lights) {
-            let s = (sphere.c - si.lit_from.as_dvec3()).as_vec3();
-            let (r, distance) = (sphere.r as f32, s.length());
-            // The surface's own sphere, from outside
-            if (distance - r).abs() <= r * 1e-3 && s.dot(si.horizon) < 0.0 {
-                continue;
-            }
-            let t = s.dot(d).clamp(0.0, end);
-            let miss = (s - d * t).length();
-            let through = distance > r + place.reach && end - s.dot(d) > r + place.reach && s.dot(d) > 0.0;
-            let slack = place.reach + (distance + length.min(1e30)) * 1e-5;
-            if miss > r + slack {
-                continue;
-            }
-            if through && miss < r - slack {
-                return 0.0;
-            }
-            return 1.0;
-        }
-        let mut edge = 0.0;
-        for (i, flat) in scene.flat_obstacles.iter().enumerate() {
-            if !scene.casts(flat_links, i, id) {
-                continue;
-            }
-            let n = flat.n.as_vec3();
-            let height = flat.n.dot(si.lit_from.as_dvec3() - flat.p) as f32;
-            let tip = if finite {
-                height + n.dot(l)
-            } else if n.dot(l) * height < 0.0 {
-                -height
-            } else {
-                height
-            };
-            let slack = place.reach + (height.abs() + length.min(1e30)) * 1e-5;
-            if height.abs() <= slack && flat.shadow(si.lit_from, si.error).is_one_sided(PlaneSide::Both) {
-                // The surface's own
-                continue;
-            }
-            if height > slack && tip > slack || height < -slack && tip < -slack {
-                continue;
-            }
-            let t = -f64::from(height) / f64::from(n.dot(l));
-            let hit = si.lit_from.as_dvec3() + l.as_dvec3() * t;
-            let aside = flat.outside(hit) as f32;
-            // Where the way meets the plane at a small angle, it moves there by more than the point
-            let wide = slack * (length / n.dot(l).abs()).max(1.0) * 1.25;
-            if aside > wide {
-                continue;
-            }
-            if aside < -wide && height.abs() > slack && (!finite || tip.abs() > slack) {
-                return 0.0;
-            }
-            edge = 1.0;
-        }
-        edge
-    }
-
     fn view(&self, emitter: &Emitter, place: &Place) -> Option<View> {
         let si = place.si;
         let flat = emitter.flat(si.lit_from)?;
@@ -525,7 +343,7 @@ impl<'a> Arrivals<'a> {
     }
 
     /// Gathers what of the trees may be in the way of a light; whether there are any.
-    fn gather(&mut self, index: usize, place: &Place) -> bool {
+    pub(super) fn gather(&mut self, index: usize, place: &Place) -> bool {
         if !self.scene.geometry.has_trees() {
             return false;
         }
@@ -548,105 +366,4 @@ impl<'a> Arrivals<'a> {
         };
         change(&view, place, &between, self.scene.camera.sway(place.si.lit_from, place.reach))
     }
-}
-
-/// Patches over which the light's direction and the normal turn by less than the first, in radians, and a highlight by less
-/// than the second of its width, squared, are followed by a quadratic: its error is that of the third order, about a
-/// hundredth of the highlight times the second to the power of 3/2.
-fn is_smooth(swing: f32, lobe: f32) -> bool {
-    swing < 0.1 && !is_sharp(lobe)
-}
-
-fn is_sharp(lobe: f32) -> bool {
-    lobe >= 0.05
-}
-
-/// Of a light that nothing is seen of, or that has no view.
-fn unseen(emitter: &Emitter, place: &Place) -> Change {
-    let is_known = !matches!(emitter, Emitter::Points) || place.reach == 0.0;
-    if is_known {
-        Change { drift: f32::INFINITY, resolved: false, smooth: false, ..Change::NONE }
-    } else {
-        Change::UNKNOWN
-    }
-}
-
-/// What arrives on a patch whose middle sees nothing of a light, at most.
-fn horizon_change(view: &View, place: &Place) -> Change {
-    if place.reach == 0.0 {
-        return Change::NONE;
-    }
-    let far = view.l0.length() + view.la + view.lb + view.skew.abs();
-    let behind = place.reach + place.turn * far;
-    if view.facing < -place.reach || view.cos.max() < -behind || view.horizon.max() < -behind {
-        return Change::NONE;
-    }
-    let swing = place.turn + place.reach / view.nearest().max(place.reach);
-    let crossing = view.crossing(place.reach);
-    let cos = (view.cos.max().max(0.0) / view.l0.length() + swing).min(1.0);
-    let all = view.most(place.reach) * (swing.min(1.0) * 0.5 + cos * crossing).min(1.0);
-    let bend = Sums { diffuse: all, specular: all };
-    let resolved = swing < RESOLVED_SWING && crossing == 0.0;
-    Change { bend, drift: 0.0, resolved, smooth: false, sharp: false }
-}
-
-/// How far the mean over a patch can be from what arrives at its middle, and so on. `sway` is by how much the way to the viewer
-/// turns over it.
-fn change(view: &View, place: &Place, between: &Between, sway: f32) -> Change {
-    let drift = between.drift;
-    if place.reach == 0.0 || between.hidden && drift == 0.0 {
-        return Change::NONE;
-    }
-    let (most, nearest, crossing) = (view.most(place.reach), view.nearest(), view.crossing(place.reach));
-    let swing = place.turn + place.reach / nearest.max(place.reach);
-    let cuts = !view.is_above_horizon() || view.cos.min() < place.reach + place.turn * view.l0.length();
-    // Where the outline of a shadow comes in, the share it hides begins to grow at once: an eighth of the way it moves
-    let kink = (drift * (0.125 + 0.5 * place.off)).min(1.0);
-    let cos = (view.cos.max() / view.l0.length()).min(1.0) + swing;
-    let horizon = if cuts { swing * swing.min(1.0) } else { 0.0 };
-    let smooth = square(place.reach / nearest.max(place.reach)) * 2.0 + place.turn * place.turn * 0.5;
-    let smooth = smooth + 2.0 * swing * place.off;
-    let diffuse = most * (cos * (kink + smooth.min(1.0) + crossing) + horizon).min(1.0);
-    let resolved = drift < RESOLVED && swing < RESOLVED_SWING && crossing == 0.0;
-    let is_clear = resolved && drift == 0.0 && between.hiders.is_empty() && !between.ask && !between.ask_trees && !cuts;
-    if matches!(view.lobe, Lobe::None) {
-        let bend = Sums { diffuse, specular: 0.0 };
-        return Change { bend, drift, resolved, smooth: is_clear && is_smooth(swing, 0.0), sharp: false };
-    }
-    let moved = 2.0 * place.turn + place.reach / nearest.max(place.reach) + sway;
-    let lobe = sharpness(view) * moved * moved;
-    let narrow = lobe.min(1.0);
-    let narrow = (narrow + 2.0 * narrow.sqrt() * place.off).min(1.0);
-    let specular = most * brightest(view, lobe) * (kink + smooth + narrow + horizon + crossing).min(1.0);
-    let bend = Sums { diffuse, specular };
-    let resolved = resolved && narrow < RESOLVED;
-    Change { bend, drift, resolved, smooth: is_clear && is_smooth(swing, lobe), sharp: is_sharp(lobe) }
-}
-
-/// How bright a highlight can be on a light, at most, or thereabouts, from all over a patch; `moved` is what the highlight
-/// moves by over the patch, as a part of its width, squared.
-fn brightest(view: &View, moved: f32) -> f32 {
-    let size2 = square(view.la.max(view.lb));
-    let distance2 = square(view.nearest());
-    let sharp = sharpness(view) * size2;
-    if sharp > 0.5 * distance2 || moved > 1.0 {
-        return 1.0;
-    }
-    let at = |x: f32, y: f32| {
-        let l = view.l(x, y);
-        let inverse = 1.0 / l.length();
-        view.lobe.eval((view.ns.dot(l) * inverse).max(0.0), view.cos_o, view.wo.dot(l) * inverse)
-    };
-    let corners = at(-1.0, -1.0).max(at(1.0, -1.0)).max(at(1.0, 1.0)).max(at(-1.0, 1.0));
-    let here = (corners.max(at(0.0, 0.0)) * 1.5).min(1.0);
-    // exp(-(a - m)^2) is at most exp(-(1 - e) a^2) exp((1/e - 1) m^2), for any share e
-    let root = here.sqrt();
-    let there = if moved < 1e-3 {
-        here
-    } else if moved < 0.1 {
-        root * root.sqrt() * (1.0 + 4.0 * moved)
-    } else {
-        root * (1.0 + 2.0 * moved)
-    };
-    there.min(1.0)
 }

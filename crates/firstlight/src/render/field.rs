@@ -9,7 +9,8 @@
 //! ([`Arrival::drift`]), and how the light's direction and the highlight turn ([`Arrival::resolved`]).
 
 use super::Counts;
-use super::arrival::{Arrival, Arrivals, Place};
+use super::arrival::{Arrivals, Place};
+use super::change::Arrival;
 use super::solo::Candidate;
 use super::square::Square;
 use super::tiled::CELL;

@@ -9,6 +9,7 @@
 //! [`tiled`](tiled/index.html) integrates lights and lights a surface once where that is enough; all else is as above.
 
 mod arrival;
+mod change;
 mod counts;
 mod crowd;
 mod cut;
@@ -24,6 +25,7 @@ mod pixel;
 mod plain;
 mod shafts;
 mod simd;
+mod single;
 mod solo;
 mod square;
 mod tile;

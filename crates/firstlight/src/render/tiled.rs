@@ -17,7 +17,8 @@ use std::ops::ControlFlow;
 
 use arrayvec::ArrayVec;
 
-use super::arrival::{Arrival, Arrivals, Place};
+use super::arrival::{Arrivals, Place};
+use super::change::Arrival;
 use super::field::{Field, Shade};
 use super::film::FilmTile;
 use super::hits::PixelHits;

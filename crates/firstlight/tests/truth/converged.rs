@@ -18,7 +18,7 @@ const SETS: u32 = 4;
 /// The logarithm to base 2 of the number of points of the smallest sets.
 const FIRST: u32 = 8;
 /// That of the largest.
-const LAST: u32 = 20;
+pub const LAST: u32 = 20;
 /// From how many points on, to base 2, a pixel takes long beside what else a picture takes.
 const LONG: u32 = 13;
 /// The logarithm to base 2 of how many times the points the sets have where a root mean square is out of bounds.
@@ -336,6 +336,7 @@ pub struct Report {
     /// With 400 points of `sobol` on every light.
     pub sobol: Deviation,
     /// With 400 points of `uniform`.
+    #[allow(dead_code, reason = "a table shows it, no test asks")]
     pub uniform: Deviation,
     /// Pixels that are left out.
     pub open: usize,
@@ -371,21 +372,24 @@ impl Report {
         report(truth)
     }
 
-    /// What is outside the bounds of a single scene. The share of pixels off by more than a step is one of many scenes.
+    /// See [`fault`].
     pub fn fault(&self, bounds: &Bounds) -> Option<String> {
-        let Report { exact, sobol, uniform, doubt, .. } = self;
-        if !(exact.worst <= bounds.worst) {
-            let [x, y] = exact.at;
-            return Some(format!("pixel {x}, {y} is off by {:.2} steps of 255", exact.worst));
-        }
-        // What the converged picture does not know itself cannot be held against another
-        let allowed = sobol.rms.max(bounds.rms);
-        if !(exact.rms * exact.rms <= allowed * allowed + doubt * doubt) {
-            return Some(format!(
-                "rms {:.3}; of 400 points {:.3}, of 400 random ones {:.3}",
-                exact.rms, sobol.rms, uniform.rms
-            ));
-        }
-        None
+        fault(&self.exact, self.doubt, bounds, || self.sobol.rms)
     }
+}
+
+/// What is outside the bounds of a single scene. `doubt` is what the converged picture may be off itself, `sampled` the root mean
+/// square of 400 points of `sobol`. The share of pixels off by more than a step is one of many scenes.
+pub fn fault(exact: &Deviation, doubt: f64, bounds: &Bounds, sampled: impl FnOnce() -> f64) -> Option<String> {
+    if !(exact.worst <= bounds.worst) {
+        let [x, y] = exact.at;
+        return Some(format!("pixel {x}, {y} is off by {:.2} steps of 255", exact.worst));
+    }
+    // What the converged picture does not know itself cannot be held against another
+    let is_within = |rms: f64| exact.rms * exact.rms <= rms * rms + doubt * doubt;
+    if is_within(bounds.rms) {
+        return None;
+    }
+    let sampled = sampled();
+    (!is_within(sampled)).then(|| format!("rms {:.3}; of 400 points {sampled:.3}", exact.rms))
 }

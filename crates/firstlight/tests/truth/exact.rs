@@ -1,6 +1,7 @@
 //! Lights that are integrated, `samples = "exact"`, against converged pictures, closed forms, and themselves a moment later.
 
 use std::f64::consts::PI;
+use std::path::Path;
 
 use firstlight::{
     DiskLightDesc, EmitSides, Falloff, LightDesc, NoAssets, ParallelogramDesc, RectangleDesc, SampleSet, SamplesDesc,
@@ -8,9 +9,11 @@ use firstlight::{
 };
 
 use crate::analytic::{corners, lambert, white};
-use crate::converged::{Bounds, Converged, PROMISED, Report, displayed, exact, integrated, with_samples};
-use crate::exact_scenes;
+use crate::converged::{
+    Bounds, Converged, LAST, PROMISED, Report, displayed, exact, fault, integrated, sampled, with_samples,
+};
 use crate::scenes::*;
+use crate::{exact_scenes, kept};
 
 /// What a picture of random lights is held to.
 const BOUNDS: Bounds = PROMISED;
@@ -30,15 +33,26 @@ const COUNTEREXAMPLES: [u64; 12] = [3, 7, 8, 10, 23, 32, 36, 49, 50, 108, 151, 1
 const UP: V = [0.0, 1.0, 0.0];
 const DOWN: V = [0.0, -1.0, 0.0];
 
-/// Random scenes as `cargo xtask verify exact` has them, smaller.
-fn hold(seeds: impl Iterator<Item = u64>) {
+/// Random scenes as `cargo xtask verify exact` has them, `size` x `size` pixels, beside converged pictures that are kept.
+fn hold(seeds: impl Iterator<Item = u64>, size: u32) {
     let (mut pixels, mut over) = (0, 0);
     for seed in seeds {
-        let report = Report::new(&exact_scenes::scene(seed, 16), 12);
-        if let Some(fault) = report.fault(&BOUNDS) {
-            panic!("scene {seed}: {fault}; `cargo xtask verify exact --seeds {seed}..{} --size 16 --cap 12`", seed + 1);
+        let desc = exact_scenes::scene(seed, size);
+        let folder = "tests/truth/converged";
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(folder).join(format!("{seed:04}-{size}.png"));
+        let command = format!("cargo xtask verify exact --seeds {seed}..{} --size {size}", seed + 1);
+        let Some(truth) = kept::read(&path, &desc, LAST) else {
+            panic!(
+                "{} is not there, or shows another scene: `{command} --converge --kept crates/firstlight/{folder}` makes it",
+                path.display()
+            );
+        };
+        let exact = truth.deviation(&exact(&desc));
+        let sobol = || truth.deviation(&sampled(&desc, SampleSet::Sobol, 400)).rms;
+        if let Some(fault) = fault(&exact, truth.own_error(), &BOUNDS, sobol) {
+            panic!("scene {seed}: {fault}; `{command}`");
         }
-        (pixels, over) = (pixels + report.exact.pixels, over + report.exact.over);
+        (pixels, over) = (pixels + exact.pixels, over + exact.over);
     }
     let allowed = (BOUNDS.over * pixels as f64).ceil();
     assert!(over as f64 <= allowed, "{over} of {pixels} pixels are off by more than one step, {allowed} may be");
@@ -46,18 +60,17 @@ fn hold(seeds: impl Iterator<Item = u64>) {
 
 #[test]
 fn random_scenes_are_within_the_bounds() {
-    hold(0..20);
+    hold(0..20, 48);
 }
 
 #[test]
 fn more_random_scenes_are_within_the_bounds() {
-    hold(20..40);
+    hold(20..40, 48);
 }
 
 #[test]
 fn what_broke_a_bound_once_is_within_it() {
-    // Those below 40 are held to it by the tests above
-    hold(COUNTEREXAMPLES.into_iter().filter(|seed| *seed >= 40));
+    hold(COUNTEREXAMPLES.into_iter(), 16);
 }
 
 #[test]

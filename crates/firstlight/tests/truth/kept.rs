@@ -22,6 +22,7 @@ fn name(desc: &SceneDesc) -> String {
 }
 
 /// Writes a converged picture whose sets had up to 2^`cap` points.
+#[allow(dead_code, reason = "tests only read")]
 #[track_caller]
 pub fn write(path: &Path, desc: &SceneDesc, cap: u32, truth: &Converged) {
     let mut samples = Vec::with_capacity(truth.pixels.len() * 8);

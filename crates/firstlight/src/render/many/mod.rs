@@ -14,7 +14,8 @@ mod places;
 
 use std::ops::{ControlFlow, Range};
 
-use super::arrival::{Arrival, Arrivals, Place};
+use super::arrival::{Arrivals, Place};
+use super::change::Arrival;
 use super::counts::Counts;
 use super::crowd::Crowd;
 use super::cut::{Cut, Walk};

@@ -1,0 +1,168 @@
+//! What of one light arrives at a place, and how much that bends over the patch around it.
+
+use super::arrival::Place;
+use crate::integrate::{Between, Emitter, Sums, View, sharpness};
+use crate::material::Lobe;
+use crate::math::square;
+
+/// What of one light arrives.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Arrival {
+    pub sums: Sums,
+    /// Whether that was not asked, since it would not do for the patch.
+    pub skipped: bool,
+    /// How far the mean over the patch can be from what arrives at its middle.
+    pub bend: Sums,
+    /// Over how much of the light's size the outlines of shadows move across the patch; see [`Between::drift`].
+    pub drift: f32,
+    /// Whether all that light does here is wide beside the patch, so that neighbours tell what it does.
+    pub resolved: bool,
+    /// Whether nothing of it has a corner, and what curves does so little that a quadratic in the place follows it.
+    pub smooth: bool,
+    /// Whether a highlight is not wide beside the patch.
+    pub sharp: bool,
+}
+
+/// How a light changes over a patch.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Change {
+    /// See [`Arrival::bend`], and so on.
+    pub bend: Sums,
+    pub drift: f32,
+    pub resolved: bool,
+    pub smooth: bool,
+    pub sharp: bool,
+}
+
+impl Change {
+    /// Not at all.
+    pub const NONE: Change =
+        Change { bend: Sums { diffuse: 0.0, specular: 0.0 }, drift: 0.0, resolved: true, smooth: true, sharp: false };
+    /// Nobody knows.
+    pub const UNKNOWN: Change = Change {
+        bend: Sums { diffuse: f32::MAX, specular: f32::MAX },
+        drift: f32::INFINITY,
+        resolved: false,
+        smooth: false,
+        sharp: true,
+    };
+
+    pub fn with(self, sums: Sums) -> Arrival {
+        let Change { bend, drift, resolved, smooth, sharp } = self;
+        Arrival { sums, skipped: false, bend, drift, resolved, smooth, sharp }
+    }
+}
+
+impl Arrival {
+    /// At a point, or where nothing bends.
+    pub fn even(sums: Sums) -> Arrival {
+        Change::NONE.with(sums)
+    }
+}
+
+/// Outlines that move over a larger part of the light than this, and highlights that move by more of their width, squared, are
+/// not wide beside the patch.
+pub(super) const RESOLVED: f32 = 0.5;
+/// The same for the angle by which the light's direction and the normal turn.
+pub(super) const RESOLVED_SWING: f32 = 0.2;
+
+/// Patches over which the light's direction and the normal turn by less than the first, in radians, and a highlight by less
+/// than the second of its width, squared, are followed by a quadratic: its error is that of the third order, about a
+/// hundredth of the highlight times the second to the power of 3/2.
+pub(super) fn is_smooth(swing: f32, lobe: f32) -> bool {
+    swing < 0.1 && !is_sharp(lobe)
+}
+
+pub(super) fn is_sharp(lobe: f32) -> bool {
+    lobe >= 0.05
+}
+
+/// Of a light that nothing is seen of, or that has no view.
+pub(super) fn unseen(emitter: &Emitter, place: &Place) -> Change {
+    let is_known = !matches!(emitter, Emitter::Points) || place.reach == 0.0;
+    if is_known {
+        Change { drift: f32::INFINITY, resolved: false, smooth: false, ..Change::NONE }
+    } else {
+        Change::UNKNOWN
+    }
+}
+
+/// What arrives on a patch whose middle sees nothing of a light, at most.
+pub(super) fn horizon_change(view: &View, place: &Place) -> Change {
+    if place.reach == 0.0 {
+        return Change::NONE;
+    }
+    let far = view.l0.length() + view.la + view.lb + view.skew.abs();
+    let behind = place.reach + place.turn * far;
+    if view.facing < -place.reach || view.cos.max() < -behind || view.horizon.max() < -behind {
+        return Change::NONE;
+    }
+    let swing = place.turn + place.reach / view.nearest().max(place.reach);
+    let crossing = view.crossing(place.reach);
+    let cos = (view.cos.max().max(0.0) / view.l0.length() + swing).min(1.0);
+    let all = view.most(place.reach) * (swing.min(1.0) * 0.5 + cos * crossing).min(1.0);
+    let bend = Sums { diffuse: all, specular: all };
+    let resolved = swing < RESOLVED_SWING && crossing == 0.0;
+    Change { bend, drift: 0.0, resolved, smooth: false, sharp: false }
+}
+
+/// How far the mean over a patch can be from what arrives at its middle, and so on. `sway` is by how much the way to the viewer
+/// turns over it.
+pub(super) fn change(view: &View, place: &Place, between: &Between, sway: f32) -> Change {
+    let drift = between.drift;
+    if place.reach == 0.0 || between.hidden && drift == 0.0 {
+        return Change::NONE;
+    }
+    let (most, nearest, crossing) = (view.most(place.reach), view.nearest(), view.crossing(place.reach));
+    let swing = place.turn + place.reach / nearest.max(place.reach);
+    let cuts = !view.is_above_horizon() || view.cos.min() < place.reach + place.turn * view.l0.length();
+    // Where the outline of a shadow comes in, the share it hides begins to grow at once: an eighth of the way it moves
+    let kink = (drift * (0.125 + 0.5 * place.off)).min(1.0);
+    let cos = (view.cos.max() / view.l0.length()).min(1.0) + swing;
+    let horizon = if cuts { swing * swing.min(1.0) } else { 0.0 };
+    let smooth = square(place.reach / nearest.max(place.reach)) * 2.0 + place.turn * place.turn * 0.5;
+    let smooth = smooth + 2.0 * swing * place.off;
+    let diffuse = most * (cos * (kink + smooth.min(1.0) + crossing) + horizon).min(1.0);
+    let resolved = drift < RESOLVED && swing < RESOLVED_SWING && crossing == 0.0;
+    let is_clear = resolved && drift == 0.0 && between.hiders.is_empty() && !between.ask && !between.ask_trees && !cuts;
+    if matches!(view.lobe, Lobe::None) {
+        let bend = Sums { diffuse, specular: 0.0 };
+        return Change { bend, drift, resolved, smooth: is_clear && is_smooth(swing, 0.0), sharp: false };
+    }
+    let moved = 2.0 * place.turn + place.reach / nearest.max(place.reach) + sway;
+    let lobe = sharpness(view) * moved * moved;
+    let narrow = lobe.min(1.0);
+    let narrow = (narrow + 2.0 * narrow.sqrt() * place.off).min(1.0);
+    let specular = most * brightest(view, lobe) * (kink + smooth + narrow + horizon + crossing).min(1.0);
+    let bend = Sums { diffuse, specular };
+    let resolved = resolved && narrow < RESOLVED;
+    Change { bend, drift, resolved, smooth: is_clear && is_smooth(swing, lobe), sharp: is_sharp(lobe) }
+}
+
+/// How bright a highlight can be on a light, at most, or thereabouts, from all over a patch; `moved` is what the highlight
+/// moves by over the patch, as a part of its width, squared.
+fn brightest(view: &View, moved: f32) -> f32 {
+    let size2 = square(view.la.max(view.lb));
+    let distance2 = square(view.nearest());
+    let sharp = sharpness(view) * size2;
+    if sharp > 0.5 * distance2 || moved > 1.0 {
+        return 1.0;
+    }
+    let at = |x: f32, y: f32| {
+        let l = view.l(x, y);
+        let inverse = 1.0 / l.length();
+        view.lobe.eval((view.ns.dot(l) * inverse).max(0.0), view.cos_o, view.wo.dot(l) * inverse)
+    };
+    let corners = at(-1.0, -1.0).max(at(1.0, -1.0)).max(at(1.0, 1.0)).max(at(-1.0, 1.0));
+    let here = (corners.max(at(0.0, 0.0)) * 1.5).min(1.0);
+    // exp(-(a - m)^2) is at most exp(-(1 - e) a^2) exp((1/e - 1) m^2), for any share e
+    let root = here.sqrt();
+    let there = if moved < 1e-3 {
+        here
+    } else if moved < 0.1 {
+        root * root.sqrt() * (1.0 + 4.0 * moved)
+    } else {
+        root * (1.0 + 2.0 * moved)
+    };
+    there.min(1.0)
+}
