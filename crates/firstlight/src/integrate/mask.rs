@@ -135,7 +135,9 @@ impl Masked<'_> {
                     diffuse: (doubt * off(|sums| sums.diffuse)).max(whole.diffuse * one),
                     specular: (doubt * off(|sums| sums.specular)).max(whole.specular * one),
                 };
-                let [is_uneven, _] = tally.is_uneven();
+                let [diffuse, highlight] = tally.is_uneven();
+                let shows = || !enough(&now, &Sums { diffuse: 0.0, specular: whole.specular });
+                let is_uneven = diffuse || highlight && shows();
                 if !is_uneven && (tally.hidden == 0 && to >= 2 * fewest || enough(&now, &error)) {
                     return (now, error);
                 }

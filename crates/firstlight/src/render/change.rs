@@ -77,10 +77,16 @@ pub(super) fn is_sharp(lobe: f32) -> bool {
     lobe >= 0.05
 }
 
-/// Of a light that nothing is seen of, or that has no view.
+/// Of a light that nothing is seen of, or that has no view: from inside of a ball nothing of its outside.
 pub(super) fn unseen(emitter: &Emitter, place: &Place) -> Change {
-    let is_known = !matches!(emitter, Emitter::Points) || place.reach == 0.0;
-    if is_known {
+    let is_known = match emitter {
+        Emitter::Flat(_) => true,
+        Emitter::Ball { center, radius } => {
+            (*center - place.si.lit_from.as_dvec3()).length() + f64::from(place.reach) < radius * (1.0 - 1e-6)
+        }
+        Emitter::Points => false,
+    };
+    if is_known || place.reach == 0.0 {
         Change { drift: f32::INFINITY, resolved: false, smooth: false, ..Change::NONE }
     } else {
         Change::UNKNOWN

@@ -139,7 +139,12 @@ impl Together {
                 (value, moved, squares) = (value + of(&now), moved + off, squares + off * off);
                 all += of(&one.behind.whole);
                 hidden += one.tally.hidden;
-                is_uneven |= one.tally.is_uneven()[0];
+                let [diffuse, highlight] = one.tally.is_uneven();
+                let shows = || {
+                    let sent = place.colors[1] * one.behind.whole.specular;
+                    arrivals.steps(place.base + of(&one.behind.whole), sent) > tolerance
+                };
+                is_uneven |= diffuse || highlight && shows();
                 one.before = now;
             }
             let points = (to * asking.len()) as f32;

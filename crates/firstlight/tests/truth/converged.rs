@@ -5,9 +5,11 @@
 //! points, until they do or until there are too many points. Nothing of what integrates lights has a part in it.
 //! (Turned copies of the `sobol` set were tried in their place, and settle no pixel sooner: it is edges that take long.)
 
-use firstlight::{AaMode, Image, LightDesc, RenderSettings, SampleSet, SamplesDesc, Scene, SceneDesc, Window};
+use std::f64::consts::PI;
 
-use crate::scenes::{compile, every_ray, one_thread, picture};
+use firstlight::{AaMode, Falloff, Image, LightDesc, RenderSettings, SampleSet, SamplesDesc, Scene, SceneDesc, Window};
+
+use crate::scenes::*;
 
 /// Steps of an 8-bit picture by which the mean of two sets may differ from the mean of the other two.
 const AGREEMENT: f64 = 0.25;
@@ -92,6 +94,8 @@ pub struct Converged {
     pub(crate) levels: Vec<u32>,
     /// Whether the largest sets do not agree on a pixel.
     pub(crate) open: Vec<bool>,
+    /// The smallest sets that may settle a pixel; see [`resolving`].
+    pub(crate) least: Vec<u32>,
 }
 
 /// What four sets of one size say of a pixel.
@@ -142,6 +146,53 @@ fn windows(wanted: &[bool], width: u32, height: u32, level: u32) -> Vec<Window> 
     windows
 }
 
+/// The logarithm to base 2 of how many points a light needs so that they lie no farther from each other than the light is from what
+/// a pixel shows. Fewer can all miss the part that sends most, and agree.
+fn resolving(desc: &SceneDesc, scene: &Scene, [i, j]: [u32; 2]) -> u32 {
+    let n = desc.render.antialiasing;
+    let rays = (0..n * n).map(|k| [k % n, k / n].map(|w| (w as f32 + 0.5) / n as f32));
+    let shown: Vec<V> = rays
+        .filter_map(|[x, y]| {
+            let (ray, _) = scene.camera().ray(i as f32 + x, j as f32 + y, 1.0);
+            let hit = scene.intersect(&ray)?;
+            Some(add(ray.o.to_array().map(f64::from), mul(ray.d.to_array().map(f64::from), hit.t)))
+        })
+        .collect();
+    // Over a light's size, its distance
+    let nearness = |light: &LightDesc| {
+        let (size, distance): (f64, Box<dyn Fn(V) -> f64>) = match light {
+            LightDesc::Rectangle(light) if light.falloff == Falloff::Physical => {
+                let [a, b] = [light.e0, light.e1].map(length);
+                let (u, v, center) = (unit(light.e0), unit(light.e1), light.center);
+                let n = unit(cross(u, v));
+                let beyond = |x: f64, half: f64| (x.abs() - half).max(0.0);
+                let far = move |p: V| {
+                    let d = sub(p, center);
+                    length([dot(d, n), beyond(dot(d, u), 0.5 * a), beyond(dot(d, v), 0.5 * b)])
+                };
+                (a.max(b), Box::new(far))
+            }
+            LightDesc::Disk(light) if light.falloff == Falloff::Physical => {
+                let (n, center, radius) = (unit(light.normal), light.center, light.radius);
+                let far = move |p: V| {
+                    let d = sub(p, center);
+                    let height = dot(d, n);
+                    length([height, (length(sub(d, mul(n, height))) - radius).max(0.0), 0.0])
+                };
+                (2.0 * radius, Box::new(far))
+            }
+            LightDesc::Sphere(light) if light.falloff == Falloff::Physical => {
+                let (center, radius) = (light.center, light.radius);
+                (2.0 * PI.sqrt() * radius, Box::new(move |p: V| (length(sub(p, center)) - radius).abs()))
+            }
+            _ => return f64::INFINITY,
+        };
+        shown.iter().map(|p| distance(*p) / size).fold(f64::INFINITY, f64::min)
+    };
+    let nearest = desc.lights.iter().map(nearness).fold(f64::INFINITY, f64::min);
+    (FIRST..=LAST).find(|level| f64::from(side(*level)) * nearest >= 1.0).unwrap_or(LAST + 1)
+}
+
 /// The side m of the sets of m x m points, about 2^`level` points.
 fn side(level: u32) -> u32 {
     let whole = 1u32 << (level / 2);
@@ -162,9 +213,12 @@ impl Converged {
     pub(crate) fn unknown(desc: &SceneDesc) -> Self {
         let (width, height) = (desc.render.width, desc.render.height);
         let count = (width * height) as usize;
+        let scene = compile(desc);
+        let least = (0..count).map(|i| resolving(desc, &scene, [i as u32 % width, i as u32 / width])).collect();
         Converged {
             desc: desc.clone(),
-            scene: compile(desc),
+            scene,
+            least,
             width,
             height,
             pixels: vec![[0.0; 3]; count],
@@ -190,7 +244,7 @@ impl Converged {
             for i in (0..count).filter(|i| self.open[*i]) {
                 let opinion = opinion(&self.scene, &films[i]);
                 (self.pixels[i], self.half_differences[i]) = (opinion.mean, opinion.half_difference);
-                (self.levels[i], now[i]) = (level, opinion.agreed);
+                (self.levels[i], now[i]) = (level, opinion.agreed && level >= self.least[i]);
             }
             // Four sets can agree by chance. So their word is taken where they agree all around, or for the second time
             let last = level == cap;
