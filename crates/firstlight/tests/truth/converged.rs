@@ -20,7 +20,7 @@ const SETS: u32 = 4;
 /// The logarithm to base 2 of the number of points of the smallest sets.
 const FIRST: u32 = 8;
 /// That of the largest.
-pub const LAST: u32 = 20;
+const LAST: u32 = 20;
 /// From how many points on, to base 2, a pixel takes long beside what else a picture takes.
 const LONG: u32 = 13;
 /// The logarithm to base 2 of how many times the points the sets have where a root mean square is out of bounds.
