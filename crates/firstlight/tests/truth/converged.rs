@@ -235,13 +235,16 @@ impl Converged {
         let count = self.pixels.len();
         let mut before = vec![false; count];
         for level in first..=cap {
-            let parts = windows(&self.open, self.width, self.height, level);
+            // Points that cannot settle a pixel yet are not asked, but for those that a second opinion may follow
+            let wanted: Vec<bool> =
+                (0..count).map(|i| self.open[i] && self.least[i] <= cap && self.least[i] <= level + 1).collect();
+            let parts = windows(&wanted, self.width, self.height, level);
             if parts.is_empty() {
-                return;
+                continue;
             }
             let films = self.films(&parts, level);
-            let mut now = vec![true; count];
-            for i in (0..count).filter(|i| self.open[*i]) {
+            let mut now: Vec<bool> = self.open.iter().map(|open| !open).collect();
+            for i in (0..count).filter(|i| wanted[*i]) {
                 let opinion = opinion(&self.scene, &films[i]);
                 (self.pixels[i], self.half_differences[i]) = (opinion.mean, opinion.half_difference);
                 (self.levels[i], now[i]) = (level, opinion.agreed && level >= self.least[i]);
