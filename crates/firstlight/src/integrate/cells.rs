@@ -182,7 +182,8 @@ pub(super) fn integrate(
     enough: &dyn Fn(&Sums, &Sums) -> bool,
 ) -> (Sums, Sums) {
     let mut cells = all(source, FIRST as u32);
-    let mut grid = Grid { side: FIRST, states: cells.iter().map(|cell| cell.state).collect() };
+    let mut grid = Grid { side: FIRST, states: vec![State::Dark; FIRST * FIRST] };
+    cells.iter().for_each(|cell| grid.set(cell.at, cell.state));
     let mut settled = Totals::default();
     loop {
         let area = 1.0 / (grid.side * grid.side) as f64;

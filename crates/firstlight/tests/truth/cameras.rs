@@ -4,11 +4,11 @@ use std::ops::ControlFlow;
 
 use firstlight::*;
 
-/// The film of a scene in TOML.
+/// The film of a scene in TOML, each of its camera rays for itself: what is asked is where they lead.
 fn film(text: &str, crop: Option<Window>) -> Image {
     let parsed = SceneDesc::parse("scene.toml", text.as_bytes(), &NoAssets);
     let scene = parsed.compile(&NoAssets, &CompileOptions::default()).unwrap_or_else(|e| panic!("{e}")).scene;
-    let settings = RenderSettings { crop, ..RenderSettings::default() };
+    let settings = RenderSettings { crop, aa_mode: AaMode::Full, ..RenderSettings::default() };
     match render(&scene, &settings, &|_, _| ControlFlow::Continue(())) {
         ControlFlow::Continue((film, _)) => film.develop(),
         ControlFlow::Break(()) => unreachable!("nothing stops this render"),
