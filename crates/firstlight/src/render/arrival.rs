@@ -8,6 +8,7 @@ use super::Counts;
 use super::change::{Arrival, Change, change, horizon_change, unseen};
 use super::lanes::Lanes;
 use super::many::FEW;
+use super::patch::Patch;
 use super::pixel::Lighting;
 use crate::color::{DisplaySteps, Rgb};
 use crate::ids::LightId;
@@ -42,6 +43,30 @@ pub(crate) struct Place<'a> {
     pub base: Rgb,
     /// What the two sums are multiplied with.
     pub colors: [Rgb; 2],
+}
+
+impl<'a> Place<'a> {
+    /// One point, by itself; `base` and `colors` as in the struct.
+    pub fn point(si: &'a SurfaceInteraction, lobe: &'a Lobe, base: Rgb, colors: [Rgb; 2]) -> Self {
+        Place {
+            si,
+            lobe,
+            reach: 0.0,
+            turn: 0.0,
+            off: 0.0,
+            share: 1.0,
+            series: 0,
+            allowed: f32::INFINITY,
+            beside: false,
+            base,
+            colors,
+        }
+    }
+
+    /// The same for all of a patch that is shaded there.
+    pub fn over(self, patch: &Patch) -> Self {
+        Place { reach: patch.reach, turn: patch.turn, off: patch.off, ..self }
+    }
 }
 
 /// What one place sees of an area light that is integrated.
@@ -135,11 +160,6 @@ impl<'a> Arrivals<'a> {
         self.level
     }
 
-    /// The light that is everywhere.
-    pub fn ambient(&self) -> Rgb {
-        self.scene.ambient
-    }
-
     /// How errors show.
     pub fn display_steps(&self) -> &'a DisplaySteps {
         &self.lights.steps
@@ -212,6 +232,13 @@ impl<'a> Arrivals<'a> {
         }
     }
 
+    /// A point that asks for light `index`, beside nothing but ambient light.
+    pub fn place<'p>(&self, index: usize, si: &'p SurfaceInteraction, bsdf: &'p Bsdf) -> Place<'p> {
+        let scale = self.scale(index);
+        let colors = [scale * bsdf.diffuse, scale * bsdf.specular];
+        Place::point(si, &bsdf.lobe, self.scene.ambient * bsdf.ambient, colors)
+    }
+
     /// What light `index` sends to one point, which stands for `share` of a pixel: diffuse and specular, with all colours.
     pub fn at_point(
         &mut self,
@@ -221,25 +248,9 @@ impl<'a> Arrivals<'a> {
         share: f32,
         counts: &mut Counts,
     ) -> [Rgb; 2] {
-        let scale = self.scale(index);
-        let colors = [scale * bsdf.diffuse, scale * bsdf.specular];
-        let base = self.scene.ambient * bsdf.ambient;
-        let lobe = &bsdf.lobe;
-        let place = Place {
-            si,
-            lobe,
-            reach: 0.0,
-            turn: 0.0,
-            off: 0.0,
-            share,
-            series: 0,
-            allowed: f32::INFINITY,
-            beside: false,
-            base,
-            colors,
-        };
+        let place = Place { share, ..self.place(index, si, bsdf) };
         let sums = self.arrival(index, &place, counts).sums;
-        [colors[0] * sums.diffuse, colors[1] * sums.specular]
+        [place.colors[0] * sums.diffuse, place.colors[1] * sums.specular]
     }
 
     fn view(&self, emitter: &Emitter, place: &Place) -> Option<View> {

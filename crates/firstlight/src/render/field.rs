@@ -273,19 +273,7 @@ impl OneLight<'_, '_> {
     fn arrival(&mut self, si: &SurfaceInteraction, reach: f32, turn: f32) -> Arrival {
         let scale = self.arrivals.scale(self.light);
         let colors = [scale * self.shade.diffuse, scale * self.shade.specular];
-        let place = Place {
-            si,
-            lobe: &self.shade.lobe,
-            reach,
-            turn,
-            off: 0.0,
-            share: 1.0,
-            series: 0,
-            allowed: f32::INFINITY,
-            beside: false,
-            base: self.shade.base,
-            colors,
-        };
+        let place = Place { reach, turn, ..Place::point(si, &self.shade.lobe, self.shade.base, colors) };
         self.arrivals.look_around(si);
         self.arrivals.arrival(self.light, &place, self.counts)
     }

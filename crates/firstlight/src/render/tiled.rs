@@ -438,18 +438,14 @@ impl<'a> Tiled<'a> {
         let allowed = BEND / (scene.lights.len() as f32).sqrt();
         let is_only = matches!(self.known[self.index(at)], Known::Only(_)) && self.is_in_cell(at);
         for index in 0..scene.lights.len() {
-            let scale = self.arrivals.scale(index);
-            let colors = [scale * patch.bsdf.diffuse, scale * patch.bsdf.specular];
-            let (si, lobe) = (&patch.si, &patch.bsdf.lobe);
-            let (reach, turn, off) = (patch.reach, patch.turn, patch.off);
-            let beside = patch.is_whole(scene);
-            let place = Place { si, lobe, reach, turn, off, share, series: 0, allowed, beside, base, colors };
+            let place = self.arrivals.place(index, &patch.si, &patch.bsdf).over(patch);
+            let place = Place { share, allowed, beside: patch.is_whole(scene), ..place };
             let known = if is_only { self.field.arrived(index, at) } else { None };
             let arrival = match known {
                 Some(sums) => Arrival::even(sums),
                 None => self.arrivals.arrival(index, &place, counts),
             };
-            value += colors[0] * arrival.sums.diffuse + colors[1] * arrival.sums.specular;
+            value += place.colors[0] * arrival.sums.diffuse + place.colors[1] * arrival.sums.specular;
             self.arrived.push(arrival);
         }
         self.values.push(value);
@@ -585,30 +581,15 @@ impl<'a> Tiled<'a> {
         let share = self.share(patch);
         for quarter in &quarters {
             self.arrivals.look_around(&quarter.si);
-            let scale = self.arrivals.scale(light);
-            let Patch { si, bsdf, reach, turn, off, .. } = quarter;
-            let colors = [scale * bsdf.diffuse, scale * bsdf.specular];
-            let base = scene.ambient * bsdf.ambient;
-            let place = Place {
-                si,
-                lobe: &bsdf.lobe,
-                reach: *reach,
-                turn: *turn,
-                off: *off,
-                share,
-                series: 0,
-                allowed,
-                beside: false,
-                base,
-                colors,
-            };
+            let place = self.arrivals.place(light, &quarter.si, &quarter.bsdf).over(quarter);
+            let place = Place { share, allowed, ..place };
             let arrival = self.arrivals.arrival(light, &place, counts);
-            if quarter.uneven || arrival.skipped || self.shown(light, bsdf, value, &arrival.bend) > allowed {
+            if quarter.uneven || arrival.skipped || self.shown(light, &quarter.bsdf, value, &arrival.bend) > allowed {
                 self.at_rays(quarter, at, light, share, counts);
             } else {
                 let count = quarter.count(scene) as f32;
-                self.terms[light][0] += colors[0] * count * arrival.sums.diffuse;
-                self.terms[light][1] += colors[1] * count * arrival.sums.specular;
+                self.terms[light][0] += place.colors[0] * count * arrival.sums.diffuse;
+                self.terms[light][1] += place.colors[1] * count * arrival.sums.specular;
             }
         }
     }

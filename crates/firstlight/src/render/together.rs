@@ -55,22 +55,7 @@ impl Together {
     }
 
     fn place<'a>(&self, arrivals: &Arrivals, si: &'a SurfaceInteraction, bsdf: &'a Bsdf, series: usize) -> Place<'a> {
-        let scale = arrivals.scale(self.light);
-        let colors = [scale * bsdf.diffuse, scale * bsdf.specular];
-        let base = arrivals.ambient() * bsdf.ambient;
-        Place {
-            si,
-            lobe: &bsdf.lobe,
-            reach: 0.0,
-            turn: 0.0,
-            off: 0.0,
-            share: self.each,
-            series,
-            allowed: f32::INFINITY,
-            beside: false,
-            base,
-            colors,
-        }
+        Place { share: self.each, series, ..arrivals.place(self.light, si, bsdf) }
     }
 
     /// Asks for what one ray sees.

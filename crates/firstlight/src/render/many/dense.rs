@@ -169,25 +169,10 @@ impl<'a> Many<'a> {
             arrivals.tolerate(INTEGRALS / (singles.len() as f32).sqrt());
         }
         for index in singles {
-            let scale = arrivals.scale(*index as usize);
-            let colors = [scale * bsdf.diffuse, scale * bsdf.specular];
-            let (reach, turn, off) = (patch.reach, patch.turn, patch.off);
-            let place = Place {
-                si,
-                lobe: &bsdf.lobe,
-                reach,
-                turn,
-                off,
-                share: 1.0,
-                series: 0,
-                allowed: f32::INFINITY,
-                beside: false,
-                base: stored.value,
-                colors,
-            };
+            let place = Place { base: stored.value, ..arrivals.place(*index as usize, si, bsdf).over(patch) };
             let arrival = arrivals.arrival(*index as usize, &place, counts);
-            light += scale * arrival.sums.diffuse;
-            stored.value += colors[0] * arrival.sums.diffuse + colors[1] * arrival.sums.specular;
+            light += arrivals.scale(*index as usize) * arrival.sums.diffuse;
+            stored.value += place.colors[0] * arrival.sums.diffuse + place.colors[1] * arrival.sums.specular;
             self.singles.push(Single { light: *index, arrival });
         }
         stored.singles = from..self.singles.len() as u32;

@@ -329,25 +329,10 @@ impl<'a> Many<'a> {
                     outlook.look(level, scene, node.shine.low, node.shine.high, LightId(light))
                 },
                 &mut |light, value| {
-                    let scale = arrivals.scale(light as usize);
-                    let colors = [scale * bsdf.diffuse, scale * bsdf.specular];
-                    let (reach, turn, off) = (patch.reach, patch.turn, patch.off);
-                    let place = Place {
-                        si,
-                        lobe: &bsdf.lobe,
-                        reach,
-                        turn,
-                        off,
-                        share: 1.0,
-                        series: 0,
-                        allowed: f32::INFINITY,
-                        beside: false,
-                        base: value,
-                        colors,
-                    };
+                    let place = Place { base: value, ..arrivals.place(light as usize, si, bsdf).over(patch) };
                     let arrival = arrivals.arrival(light as usize, &place, counts);
                     singles.push(Single { light, arrival });
-                    colors[0] * arrival.sums.diffuse + colors[1] * arrival.sums.specular
+                    place.colors[0] * arrival.sums.diffuse + place.colors[1] * arrival.sums.specular
                 },
             );
             let start = self.lit.len() as u32;
