@@ -20,6 +20,8 @@ mod verify;
 mod converged;
 #[path = "../../crates/firstlight/tests/truth/exact_scenes.rs"]
 mod exact_scenes;
+#[path = "../../crates/firstlight/tests/truth/graded.rs"]
+mod graded;
 #[path = "../../crates/firstlight/tests/truth/kept.rs"]
 mod kept;
 #[path = "../../crates/firstlight/tests/truth/random.rs"]

@@ -1,10 +1,17 @@
-//! What the project's own benchmarks and pictures ask of the library's insides. Not for others: it changes without notice.
+//! What the project's own benchmarks, pictures and verifications ask of the library's insides. Not for others: it changes without
+//! notice.
+
+use std::ops::ControlFlow;
 
 use fearless_simd::{Level, Simd};
 
 use crate::accel::{Aabb, Bvh, RayPacket16, RayTile, TraceRay, dispatch_eight};
 use crate::ids::LightId;
 use crate::math::{LANES, Ray, Vec3};
+use crate::render::Counts;
+use crate::render::given::Given;
+pub use crate::render::given::{ChoosePoints, LightPoint};
+use crate::render::pixel::PixelSum;
 use crate::scene::{CameraHit, CompileOptions, Scene, SceneDesc, ShadowRays};
 use crate::shape::{RayDifferential, TileHits, TriangleTree, every};
 use crate::visibility::{Occluders, Settled, Settler, Target, View, Viewpoint, Visibility};
@@ -376,4 +383,14 @@ pub fn sights(scene: &Scene, light: u32, block: u32) -> Vec<Option<Sight>> {
         }
     }
     sights
+}
+
+/// A pixel of the film, all its n x n camera rays lit by the plain renderer with the points that are chosen on area lights: red,
+/// green, blue premultiplied, alpha.
+pub fn pixel(scene: &Scene, at: [u32; 2], choose: &mut ChoosePoints) -> [f32; 4] {
+    let mut sum = PixelSum::new(scene);
+    let hit = |_, _, ray: &Ray| scene.intersect(ray);
+    let go_on = || ControlFlow::Continue(());
+    let _ = sum.sample(scene, at, &mut Given::new(choose), hit, &mut Counts::default(), &go_on);
+    sum.color(scene)
 }

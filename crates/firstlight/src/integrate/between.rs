@@ -70,7 +70,7 @@ impl LightCone {
 }
 
 /// Side planes of the pyramid over a light, and how the patch sees it.
-struct Pyramid {
+pub(super) struct Pyramid {
     /// Unit normals, outwards.
     sides: [Vec3; 4],
     corners: [Vec3; 4],
@@ -117,7 +117,7 @@ impl Pyramid {
 }
 
 /// Room for the rounding of a distance.
-const SLACK: f32 = 1e-5;
+pub(super) const SLACK: f32 = 1e-5;
 
 impl Between {
     /// Looks at all that is in lists, and at what was gathered in trees.
@@ -210,9 +210,13 @@ impl Between {
         emitter: &Emitter,
         trees: &Occluders,
     ) {
-        if trees.too_many || !trees.others.is_empty() {
+        if trees.too_many || !trees.others.iter().all(|other| self.solid(scene, *other, view, pyramid, emitter, asker))
+        {
             // Anywhere, as far as is known
             (self.ask_trees, self.drift) = (true, f32::INFINITY);
+            return;
+        }
+        if self.hidden {
             return;
         }
         let from = asker.si.lit_from.as_dvec3();
@@ -228,41 +232,52 @@ impl Between {
                     None => q.as_dvec3(),
                 };
                 let corners = corners.map(|q| (place(q) - from).as_vec3());
-                let size = corners.iter().fold(0.0f32, |size, q| size.max(q.length()));
                 let above = corners.iter().fold(f32::NEG_INFINITY, |above, q| above.max(horizon.dot(*q)));
                 let edge = (corners[1] - corners[0]).length().max((corners[2] - corners[0]).length());
                 // The surface's own triangle, and what is below it
                 let room = edge * 1e-4 + asker.si.error.0.length() * 4.0;
-                if above <= room {
-                    continue;
-                }
-                let gap = pyramid.gap_of(&corners);
-                if gap > SLACK * size + asker.reach {
-                    continue;
-                }
-                let near = distance(&corners);
-                self.drift = self.drift.max(pyramid.drift((near - asker.reach).max(0.0)));
-                if gap > SLACK * size {
-                    continue;
-                }
-                let ball = match emitter {
-                    Emitter::Ball { center, radius } => {
-                        let to = (*center - from).as_vec3();
-                        distance(&corners.map(|q| q - to)) < *radius as f32
-                    }
-                    _ => false,
-                };
-                let hider = Hider::polygon(view, &corners);
-                if ball || hider.is_none() || self.hiders.is_full() {
+                if above > room && !self.polygon(view, pyramid, emitter, asker, &corners) {
                     self.ask_trees = true;
                     return;
                 }
-                self.add(hider);
             }
         }
     }
 
-    fn add(&mut self, hider: Option<Hider>) {
+    /// Adds a flat thing with these corners, around, from the point; `false` if the trees have to be asked.
+    pub(super) fn polygon(
+        &mut self,
+        view: &View,
+        pyramid: &Pyramid,
+        emitter: &Emitter,
+        asker: &Asker,
+        corners: &[Vec3],
+    ) -> bool {
+        let size = corners.iter().fold(0.0f32, |size, q| size.max(q.length()));
+        let gap = pyramid.gap_of(corners);
+        if gap > SLACK * size + asker.reach {
+            return true;
+        }
+        let near = distance(corners, Vec3::ZERO);
+        self.drift = self.drift.max(pyramid.drift((near - asker.reach).max(0.0)));
+        if gap > SLACK * size {
+            return true;
+        }
+        let ball = match emitter {
+            Emitter::Ball { center, radius } => {
+                distance(corners, (*center - asker.si.lit_from.as_dvec3()).as_vec3()) < *radius as f32
+            }
+            _ => false,
+        };
+        let hider = Hider::polygon(view, corners);
+        if ball || hider.is_none() || self.hiders.is_full() {
+            return false;
+        }
+        self.add(hider);
+        true
+    }
+
+    pub(super) fn add(&mut self, hider: Option<Hider>) {
         if let Some(hider) = hider
             && self.hiders.try_push(hider).is_err()
         {
@@ -300,10 +315,15 @@ impl Between {
             return;
         }
         if distance <= r || is_on {
+            // What is hidden is the same from everywhere inside
+            let inside = is_on || r - distance > 2.0 * f64::from(asker.reach);
+            if !inside {
+                self.drift = self.drift.max(pyramid.drift(0.0));
+            }
             let l = pyramid.corners;
             let outside = |l: &Vec3| (l.as_dvec3() - to).length() > r * (1.0 + 1e-6);
-            let inside = |l: &Vec3| (l.as_dvec3() - to).length() < r * (1.0 - 1e-6);
-            if l.iter().all(inside) {
+            let within = |l: &Vec3| (l.as_dvec3() - to).length() < r * (1.0 - 1e-6);
+            if l.iter().all(within) {
                 return;
             }
             // All of the light is outside only if the sphere does not reach through it
@@ -317,9 +337,7 @@ impl Between {
             } else {
                 Hider::shells(view, to, r).into_iter().for_each(|shell| self.add(Some(shell)));
             }
-            // What is hidden is the same from everywhere inside
-            let inside = is_on || r - distance > 2.0 * f64::from(asker.reach);
-            if !inside || self.ask {
+            if self.ask {
                 self.drift = self.drift.max(pyramid.drift(0.0));
             }
             return;
@@ -370,7 +388,7 @@ impl Between {
         };
     }
 
-    fn disk(&mut self, view: &View, emitter: &Emitter, pyramid: &Pyramid, disk: &Disk, asker: &Asker) {
+    pub(super) fn disk(&mut self, view: &View, emitter: &Emitter, pyramid: &Pyramid, disk: &Disk, asker: &Asker) {
         let (center, r) = disk.ball();
         let to = center - asker.si.lit_from.as_dvec3();
         let (s, distance) = (to.as_vec3(), to.length() as f32);
@@ -455,7 +473,14 @@ fn tangent(distance: f64, r: f64, reach: f32) -> f32 {
 /// How far a triangle is from the origin.
 ///
 /// Source: Ericson, "Real-Time Collision Detection", 2005, section 5.1.5.
-fn distance([a, b, c]: &[Vec3; 3]) -> f32 {
+fn distance(corners: &[Vec3], p: Vec3) -> f32 {
+    let apex = corners[0] - p;
+    let triangles = corners[1..].windows(2).map(|side| triangle_distance(&[apex, side[0] - p, side[1] - p]));
+    triangles.fold(f32::INFINITY, f32::min)
+}
+
+/// The distance of a triangle.
+fn triangle_distance([a, b, c]: &[Vec3; 3]) -> f32 {
     let (ab, ac) = (*b - *a, *c - *a);
     let (d1, d2) = (-ab.dot(*a), -ac.dot(*a));
     if d1 <= 0.0 && d2 <= 0.0 {

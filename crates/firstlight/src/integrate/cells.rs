@@ -13,6 +13,10 @@ use crate::math::{LANES, Vec3};
 /// end, where there is doubt.
 const FIRST: usize = 32;
 const EVERYWHERE: usize = 128;
+/// The same where what is lit, or what is hidden, is a smaller part than this: a sliver that few cells meet falls apart when those are
+/// cut that met it, and what lies between is lost.
+const EVERYWHERE_THIN: usize = 256;
+const THIN: f64 = 0.02;
 const LAST: usize = 1024;
 /// Standard deviations that an answer may be wrong by.
 const SURE: f64 = 3.0;
@@ -219,7 +223,9 @@ pub(super) fn integrate(
         let error = by_edges + by_roughness;
         // What stands in one more cell, and was not met by its point
         let one = Sums { diffuse: whole.diffuse * area as f32, specular: whole.specular * area as f32 };
-        if grid.side < EVERYWHERE && !enough(&sums, &one) {
+        let lit = totals.share(0, totals.lit[0]);
+        let everywhere = if lit.min(1.0 - lit) < THIN { EVERYWHERE_THIN } else { EVERYWHERE };
+        if grid.side < everywhere && !enough(&sums, &one) {
             doubtful.fill(true);
         } else if grid.side == LAST {
             return (sums, error);

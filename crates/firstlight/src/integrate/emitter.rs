@@ -12,7 +12,7 @@ pub(crate) enum Emitter {
     /// A sphere whose outside emits as light does. From any point outside it looks like the disk in which the cone around
     /// it touches it: the same directions, and the same radiance in each.
     Ball { center: DVec3, radius: f64 },
-    /// Any other sphere: its points are counted one by one.
+    /// Any other sphere: [`points`](super::points).
     Points,
 }
 

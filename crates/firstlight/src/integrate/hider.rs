@@ -205,6 +205,13 @@ impl Hider {
         Some(Hider::Edges(Edges { sides, count: count + 1, lengths }))
     }
 
+    /// All that is farther than `distance` along the unit vector `n`.
+    pub fn beyond(view: &View, n: Vec3, distance: f32) -> Hider {
+        let mut sides = [Linear::default(); EDGES];
+        sides[0] = Linear { c: n.dot(view.l0) - distance, x: n.dot(view.a), y: n.dot(view.b) };
+        Hider::Edges(Edges { sides, count: 1, lengths: [1.0; EDGES] })
+    }
+
     /// A sphere whose centre is at `s` from the point, which is outside of it. `None` if it is wholly behind the light's plane.
     pub fn sphere(view: &View, s: DVec3, r: f64) -> Option<Hider> {
         let normal = view.a.cross(view.b);

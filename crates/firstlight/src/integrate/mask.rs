@@ -14,7 +14,7 @@ use super::emitter::Emitter;
 use super::view::{Outline, View};
 use crate::accel::RayPacket16;
 use crate::ids::LightId;
-use crate::light::{Area, Light, LightKind, SampleSet};
+use crate::light::SampleSet;
 use crate::material::Lobe;
 use crate::math::{LANES, ShadowRay, Vec3};
 use crate::scene::{Scene, ShadowRays};
@@ -28,6 +28,9 @@ pub(crate) const MOST: usize = 1 << 10;
 /// How much farther off the share may be than two numbers of points tell: both can be off to the same side, and are so all over
 /// a surface, since all of it asks the same points.
 const DOUBT: f32 = 4.0;
+/// Three standard deviations of the share of a light that the edge of a shadow cuts off, for each n^(-3/4): by that n points are
+/// wrong, chosen by chance in as many squares, since the edge runs through a root of n of them.
+const EDGE: f32 = 1.0;
 /// The share of points that have to be as good as alike.
 const UNEVEN: f64 = 1.0 / 16.0;
 /// Series of points, as different as points of one sequence are.
@@ -56,6 +59,12 @@ fn points() -> &'static Points {
         let disk = square.iter().map(|p| crate::light::concentric(p.map(f64::from)).map(|w| w as f32)).collect();
         Points { square, disk }
     })
+}
+
+/// How far `count` points may be wrong about the share of a light on one side of an edge.
+fn of_edge(count: usize) -> f32 {
+    let root = (count as f32).sqrt();
+    EDGE / (root * root.sqrt())
 }
 
 /// Where a point of the square [-1, 1]^2 lies on Morton's curve through 256 x 256 cells.
@@ -102,13 +111,14 @@ impl Tally {
 }
 
 impl Tally {
-    /// Whether a few points send most of it, so that the others tell nothing: of the diffuse part, of a highlight.
-    pub fn is_uneven(&self) -> [bool; 2] {
+    /// Whether a few points send most of it, or none sends any, so that the others tell nothing: of the diffuse part, of a highlight.
+    pub fn is_uneven(&self, whole: &Sums) -> [bool; 2] {
         // As many points that send alike would be as good as these
-        [0, 1].map(|k| {
+        let is_uneven = |k: usize, whole: f32| {
             let alike = self.all[k] * self.all[k] / self.squares[k];
-            self.squares[k] > 0.0 && alike < UNEVEN * self.count as f64
-        })
+            if self.squares[k] > 0.0 { alike < UNEVEN * self.count as f64 } else { whole > 0.0 }
+        };
+        [is_uneven(0, whole.diffuse), is_uneven(1, whole.specular)]
     }
 }
 
@@ -129,13 +139,18 @@ impl Masked<'_> {
                     let earlier = earlier.map_or(0.0, |sums| (of(&sums) - of(&before)).abs() * 0.5);
                     (of(&now) - of(&before)).abs().max(earlier)
                 };
-                // What one more point could change is the least that can be wrong
-                let one = 1.0 / to as f32;
+                // What one more point could change is the least that can be wrong, and what points make of a shadow's edge
+                let has_edge = !is_small && (1..to).contains(&tally.hidden);
+                let part = |share: f32| Sums { diffuse: whole.diffuse * share, specular: whole.specular * share };
+                if has_edge && !enough(&now, &part(of_edge(MOST))) {
+                    return cells::integrate(&seen, Some(whole), enough);
+                }
+                let one = if has_edge { of_edge(to) } else { 1.0 / to as f32 };
                 let error = Sums {
                     diffuse: (doubt * off(|sums| sums.diffuse)).max(whole.diffuse * one),
                     specular: (doubt * off(|sums| sums.specular)).max(whole.specular * one),
                 };
-                let [diffuse, highlight] = tally.is_uneven();
+                let [diffuse, highlight] = tally.is_uneven(whole);
                 let shows = || !enough(&now, &Sums { diffuse: 0.0, specular: whole.specular });
                 let is_uneven = diffuse || highlight && shows();
                 if !is_uneven && (tally.hidden == 0 && to >= 2 * fewest || enough(&now, &error)) {
@@ -172,7 +187,7 @@ impl Masked<'_> {
     }
 
     /// Which of sixteen ways something stands in.
-    fn hidden(&self, places: &[[f32; 2]], ways: &[Vec3; LANES], active: u16) -> u16 {
+    pub(super) fn hidden(&self, places: &[[f32; 2]], ways: &[Vec3; LANES], active: u16) -> u16 {
         let lanes = |mask: u16| (0..LANES).filter(move |lane| mask >> lane & 1 == 1);
         self.asked.set(self.asked.get() + u64::from(active.count_ones()));
         let mut hidden = 0;
@@ -199,15 +214,6 @@ impl Masked<'_> {
             shadows.t_end[lane] = ShadowRay { l: *way, ..from }.end();
         }
         hidden | geometry.are_blocked(self.scene.level, &shadows, asking)
-    }
-
-    /// The same for a light that no flat one stands for.
-    pub fn by_points(&self, light: &Light, enough: &dyn Fn(&Sums, &Sums) -> bool) -> Sums {
-        let LightKind::Area(area) = &light.kind else { return Sums::default() };
-        let si = self.si;
-        let floor = light.floor(si.lit_from, si.error, si.horizon);
-        let measure = if area.physical { area.measure() as f32 } else { 1.0 };
-        cells::integrate(&All { masked: self, area, floor, measure }, None, enough).0
     }
 }
 
@@ -297,37 +303,5 @@ impl Source for Seen<'_> {
 
     fn hidden(&self, places: &[[f32; 2]; LANES], ways: &[Vec3; LANES], active: u16) -> u16 {
         self.masked.hidden(&places.map(|at| self.place(at)), ways, active)
-    }
-}
-
-/// All of a light, point by point.
-struct All<'a> {
-    masked: &'a Masked<'a>,
-    area: &'a Area,
-    /// [`Light::floor`].
-    floor: f32,
-    /// What a share of the light is multiplied with.
-    measure: f32,
-}
-
-impl Source for All<'_> {
-    fn series(&self) -> u32 {
-        self.masked.series as u32
-    }
-
-    fn sent(&self, at: [f32; 2]) -> Option<Sent> {
-        let si = self.masked.si;
-        let (l, inverse, weight) = self.area.at(at.map(f64::from), si.lit_from);
-        let height = si.ns.dot(l);
-        if !(si.horizon.dot(l) > self.floor && height > 0.0 && weight > 0.0 && inverse < f32::INFINITY) {
-            return None;
-        }
-        let cos_i = height * inverse;
-        let lobe = self.masked.lobe.eval(cos_i, si.ns.dot(si.wo), si.wo.dot(l) * inverse);
-        Some(Sent { way: l, sums: [weight * cos_i * self.measure, weight * lobe * self.measure] })
-    }
-
-    fn hidden(&self, places: &[[f32; 2]; LANES], ways: &[Vec3; LANES], active: u16) -> u16 {
-        self.masked.hidden(places, ways, active)
     }
 }

@@ -16,8 +16,10 @@ mod emitter;
 mod hider;
 mod lobe;
 mod mask;
+mod points;
 mod rows;
 mod rules;
+mod solids;
 mod tensor;
 mod view;
 

@@ -331,6 +331,11 @@ impl Area {
         n.abs().dot(way_error(self.middle, self.half, p, error))
     }
 
+    /// The point that stands for `uv` of the unit square, world space.
+    pub(crate) fn position(&self, uv: [f64; 2]) -> [f64; 3] {
+        self.shape.point(uv).0.to_array()
+    }
+
     /// The way from `p` to the point that stands for `uv` of the unit square, one over its length, and
     /// [`weight`](Self::weight) there. Equal areas of the square are equal areas of the light.
     pub(crate) fn at(&self, uv: [f64; 2], p: Vec3) -> (Vec3, f32, f32) {

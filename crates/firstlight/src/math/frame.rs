@@ -61,6 +61,12 @@ impl Frame {
         let squares = self.x * self.x + self.y * self.y;
         DVec3::new(squares.x.sqrt(), squares.y.sqrt(), squares.z.sqrt())
     }
+
+    /// How far it reaches in a direction: the length of the part of `d` across z.
+    pub fn across(&self, d: DVec3) -> f64 {
+        let (x, y) = (self.x.dot(d), self.y.dot(d));
+        (x * x + y * y).sqrt()
+    }
 }
 
 #[cfg(test)]

@@ -3,6 +3,7 @@
 use super::Counts;
 use super::pixel::{Lighting, LobeSums};
 use crate::ids::LightId;
+use crate::light::{Light, LightSample, Towards};
 use crate::material::Lobe;
 use crate::math::LaneSum;
 use crate::scene::Scene;
@@ -22,35 +23,68 @@ impl Lighting for Plain {
         lobe: &Lobe,
         counts: &mut Counts,
     ) -> LobeSums {
-        let light = &scene.lights[index];
+        let facing = Facing::new(scene, index, si, lobe);
         let (mut diffuse, mut specular) = (LaneSum::new(), LaneSum::new());
-        let cos_o = si.ns.dot(si.wo);
-        let floor = light.floor(si.lit_from, si.error, si.horizon);
-        for k in 0..light.samples() {
-            counts.shadow_rays += 1;
-            let to = light.towards(k, si.lit_from);
-            // Light from below the surface does not count, nor what rounding alone may have lifted above it
-            let height = si.ns.dot(to.l);
-            if !(si.horizon.dot(to.l) > floor && height > 0.0) {
-                continue;
+        for k in 0..facing.light.samples() {
+            let to = facing.light.towards(k, si.lit_from);
+            if let Some(arriving) = facing.arriving(to, || facing.light.sample(k, to.l), counts) {
+                diffuse.add(k, arriving[0]);
+                specular.add(k, arriving[1]);
             }
-            // How much is sent this way
-            let Some(sample) = light.sample(k, to.l) else { continue };
-            // Nor does what something else hides
-            if light.shadows && si.receives_shadow {
-                let t_max = if to.finite { 1.0 } else { f32::INFINITY };
-                if scene.occluded(&si.shadow_ray(LightId(index as u32), to.l, t_max)) {
-                    continue;
-                }
-            } else {
-                counts.shadow_rays_skipped += 1;
-            }
-            // What the surface makes of it
-            let cos_i = height * sample.inverse_distance;
-            let cos_io = si.wo.dot(to.l) * sample.inverse_distance;
-            diffuse.add(k, cos_i * sample.weight);
-            specular.add(k, lobe.eval(cos_i, cos_o, cos_io) * sample.weight);
         }
         LobeSums { diffuse, specular }
+    }
+}
+
+/// A light and a surface that face each other.
+pub(super) struct Facing<'a> {
+    scene: &'a Scene,
+    pub light: &'a Light,
+    index: usize,
+    si: &'a SurfaceInteraction,
+    lobe: &'a Lobe,
+    cos_o: f32,
+    floor: f32,
+}
+
+impl<'a> Facing<'a> {
+    pub fn new(scene: &'a Scene, index: usize, si: &'a SurfaceInteraction, lobe: &'a Lobe) -> Self {
+        let light = &scene.lights[index];
+        let cos_o = si.ns.dot(si.wo);
+        let floor = light.floor(si.lit_from, si.error, si.horizon);
+        Facing { scene, light, index, si, lobe, cos_o, floor }
+    }
+
+    /// What one point of the light, to which `to` leads, adds to the diffuse sum and to that of the highlight. `sample` says
+    /// how much the light sends this way; `None` where nothing arrives.
+    #[inline(always)]
+    pub fn arriving(
+        &self,
+        to: Towards,
+        sample: impl FnOnce() -> Option<LightSample>,
+        counts: &mut Counts,
+    ) -> Option<[f32; 2]> {
+        let si = self.si;
+        counts.shadow_rays += 1;
+        // Light from below the surface does not count, nor what rounding alone may have lifted above it
+        let height = si.ns.dot(to.l);
+        if !(si.horizon.dot(to.l) > self.floor && height > 0.0) {
+            return None;
+        }
+        // How much is sent this way
+        let sample = sample()?;
+        // Nor does what something else hides
+        if self.light.shadows && si.receives_shadow {
+            let t_max = if to.finite { 1.0 } else { f32::INFINITY };
+            if self.scene.occluded(&si.shadow_ray(LightId(self.index as u32), to.l, t_max)) {
+                return None;
+            }
+        } else {
+            counts.shadow_rays_skipped += 1;
+        }
+        // What the surface makes of it
+        let cos_i = height * sample.inverse_distance;
+        let cos_io = si.wo.dot(to.l) * sample.inverse_distance;
+        Some([cos_i * sample.weight, self.lobe.eval(cos_i, self.cos_o, cos_io) * sample.weight])
     }
 }

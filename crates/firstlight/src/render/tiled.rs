@@ -38,6 +38,8 @@ use crate::scene::Scene;
 pub(super) const BEND: f32 = 0.25;
 /// The part of that which needs no second look.
 const FINE: f32 = 0.1;
+/// The part of that which colours and light may make together.
+const MINGLED: f32 = 0.5;
 /// Pixels across a cell.
 pub(crate) const CELL: u32 = 32;
 /// With its rim.
@@ -520,8 +522,11 @@ impl<'a> Tiled<'a> {
         }
         let is_dark = here.sums == Sums::default() && here.bend == Sums::default();
         if patch.contrast != Contrast::default() && !is_dark {
-            // How light slopes there is not known
-            return None;
+            // Light and dark colours get what arrives in the middle only if that is what arrives everywhere
+            let slope = self.slope(patch, at, light, counts)?;
+            if self.mingled(light, &patch.contrast, value, &slope) > MINGLED * allowed {
+                return None;
+            }
         }
         let shown = self.shown(light, &patch.bsdf, value, &here.bend);
         if shown <= FINE * allowed {
@@ -562,6 +567,39 @@ impl<'a> Tiled<'a> {
         })
     }
 
+    /// How much what arrives changes over a pixel, along both axes together, by its neighbours; `None` where they do not tell.
+    fn slope(&mut self, patch: &Patch, [i, j]: [u32; 2], light: usize, counts: &mut Counts) -> Option<Sums> {
+        if !patch.is_whole(self.scene) {
+            return None;
+        }
+        let mut slope = Sums::default();
+        for [before, after] in [[[i.wrapping_sub(1), j], [i + 1, j]], [[i, j.wrapping_sub(1)], [i, j + 1]]] {
+            let mut arrived = [Sums::default(); 2];
+            for (sums, at) in arrived.iter_mut().zip([before, after]) {
+                if !self.ask(at, counts) {
+                    return None;
+                }
+                let index = self.index(at);
+                let [beside] = &self.pixels[index].patches[..] else { return None };
+                let arrival = &self.arrived[self.first[index] * self.scene.lights.len() + light];
+                if arrival.skipped || !is_same(self.scene, beside, patch) {
+                    return None;
+                }
+                *sums = arrival.sums;
+            }
+            slope = slope + apart(&arrived[0], &arrived[1], 0.5);
+        }
+        Some(slope)
+    }
+
+    /// How many display steps it can make that colours which differ that much get the mean of what arrives, where that changes
+    /// by `slope` over them: two halves, one of each colour, are wrong by this.
+    fn mingled(&self, light: usize, contrast: &Contrast, value: Rgb, slope: &Sums) -> f32 {
+        let scale = self.arrivals.scale(light);
+        let colors = scale * contrast.diffuse * slope.diffuse + scale * contrast.specular * slope.specular;
+        self.arrivals.steps(value, colors * (0.5 * MIXED))
+    }
+
     /// Adds what one light sends to a patch, the `k`-th of its pixel, from parts of it: its quarters, where that may do, or
     /// each ray.
     fn in_quarters(&mut self, patch: &Patch, at: [u32; 2], k: usize, light: usize, counts: &mut Counts) {
@@ -579,17 +617,31 @@ impl<'a> Tiled<'a> {
             self.at_rays(patch, at, light, self.share(patch), counts);
         }
         let share = self.share(patch);
-        for quarter in &quarters {
-            self.arrivals.look_around(&quarter.si);
-            let place = self.arrivals.place(light, &quarter.si, &quarter.bsdf).over(quarter);
-            let place = Place { share, allowed, ..place };
-            let arrival = self.arrivals.arrival(light, &place, counts);
-            if quarter.uneven || arrival.skipped || self.shown(light, &quarter.bsdf, value, &arrival.bend) > allowed {
+        let arrivals: ArrayVec<Arrival, 4> = quarters
+            .iter()
+            .map(|quarter| {
+                self.arrivals.look_around(&quarter.si);
+                let place = self.arrivals.place(light, &quarter.si, &quarter.bsdf).over(quarter);
+                let place = Place { share, allowed, ..place };
+                self.arrivals.arrival(light, &place, counts)
+            })
+            .collect();
+        for (quarter, arrival) in quarters.iter().zip(&arrivals) {
+            // The others are as far away as it is wide
+            let slope = arrivals.iter().fold(Sums::default(), |most, other| {
+                let apart = apart(&other.sums, &arrival.sums, 1.0);
+                Sums { diffuse: most.diffuse.max(apart.diffuse), specular: most.specular.max(apart.specular) }
+            });
+            if quarter.uneven
+                || arrival.skipped
+                || self.shown(light, &quarter.bsdf, value, &arrival.bend) > allowed
+                || self.mingled(light, &quarter.contrast, value, &slope) > MINGLED * allowed
+            {
                 self.at_rays(quarter, at, light, share, counts);
             } else {
-                let count = quarter.count(scene) as f32;
-                self.terms[light][0] += place.colors[0] * count * arrival.sums.diffuse;
-                self.terms[light][1] += place.colors[1] * count * arrival.sums.specular;
+                let scale = self.arrivals.scale(light) * quarter.count(scene) as f32;
+                self.terms[light][0] += scale * quarter.bsdf.diffuse * arrival.sums.diffuse;
+                self.terms[light][1] += scale * quarter.bsdf.specular * arrival.sums.specular;
             }
         }
     }
@@ -622,6 +674,19 @@ impl<'a> Tiled<'a> {
     }
 }
 
+/// Whether a patch fills its pixel and is of the same surface as another, so that one tells something of the other.
+fn is_same(scene: &Scene, beside: &Patch, patch: &Patch) -> bool {
+    beside.is_whole(scene) && beside.si.surface == patch.si.surface && beside.bsdf.lobe == patch.bsdf.lobe
+}
+
+/// So many times how far two sums are apart.
+fn apart(one: &Sums, other: &Sums, times: f32) -> Sums {
+    Sums {
+        diffuse: (one.diffuse - other.diffuse).abs() * times,
+        specular: (one.specular - other.specular).abs() * times,
+    }
+}
+
 /// How far neighbours along each axis differ from what they foretell of a pixel in their middle, by what arrives `here` and at
 /// them, as `arrived` says; `None` where they tell nothing.
 pub(super) fn second_difference(
@@ -635,13 +700,7 @@ pub(super) fn second_difference(
     let mut differences = [Sums::default(); 2];
     for (difference, step) in differences.iter_mut().zip([1, ACROSS]) {
         let neighbours = [index - step, index + step];
-        let same = |i: &usize| {
-            let patches = &pixels[*i].patches;
-            patches.len() == 1
-                && patches[0].is_whole(scene)
-                && patches[0].si.surface == patch.si.surface
-                && patches[0].bsdf.lobe == patch.bsdf.lobe
-        };
+        let same = |i: &usize| matches!(&pixels[*i].patches[..], [beside] if is_same(scene, beside, patch));
         if !neighbours.iter().all(same) {
             return None;
         }

@@ -63,7 +63,8 @@ impl Together {
         let series = (self.series + self.rays) % SERIES;
         self.rays += 1;
         arrivals.look_around(si);
-        let place = self.place(arrivals, si, bsdf, series);
+        // What is integrated is wrong alike at all rays: that much by no more than if one stood for all
+        let place = Place { share: self.share, ..self.place(arrivals, si, bsdf, series) };
         self.value += place.base;
         match arrivals.seen(self.light, &place, counts) {
             Seen::Known(sums) => self.add(&place.colors, &sums),
@@ -124,7 +125,7 @@ impl Together {
                 (value, moved, squares) = (value + of(&now), moved + off, squares + off * off);
                 all += of(&one.behind.whole);
                 hidden += one.tally.hidden;
-                let [diffuse, highlight] = one.tally.is_uneven();
+                let [diffuse, highlight] = one.tally.is_uneven(&one.behind.whole);
                 let shows = || {
                     let sent = place.colors[1] * one.behind.whole.specular;
                     arrivals.steps(place.base + of(&one.behind.whole), sent) > tolerance

@@ -67,6 +67,11 @@ impl Ball {
     pub fn bounds(&self) -> Option<[DVec3; 2]> {
         Some([DVec3::NEG_ONE, DVec3::ONE])
     }
+
+    /// The most that `d` . x is over it, to within rounding.
+    pub fn support(&self, d: DVec3) -> f64 {
+        d.length()
+    }
 }
 
 #[cfg(test)]

@@ -6,6 +6,7 @@ use fearless_simd::{mask32x16, prelude::*};
 use glam::DVec2;
 
 use super::common::shape_table;
+use super::placement::Placement;
 use super::solid::{Solid, SolidHit, SolidPoint, turn};
 use super::surface::UvEdge;
 use crate::context::CompileContext;
@@ -72,6 +73,18 @@ impl Disk {
         (self.center, self.radius)
     }
 
+    /// The disk that it is in the world; `None` if it has a hole, or is no disk there.
+    pub fn placed(&self, placement: &Placement) -> Option<Disk> {
+        let to_world = &placement.world_from_object;
+        let [x, y] = [self.frame.x, self.frame.y].map(|axis| to_world.transform_vector3(axis));
+        let (long, other) = (x.length(), y.length());
+        let is_round = (long - other).abs() <= 1e-9 * long && x.dot(y).abs() <= 1e-9 * long * long;
+        let [x, y] = [x / long, y / other];
+        let frame = Frame { x, y, z: x.cross(y) };
+        let disk = Disk::new(to_world.transform_point3(self.center), frame, self.radius * long);
+        (is_round && self.inner == 0.0).then_some(disk)
+    }
+
     /// What this disk, without its hole, needs to know of a point that asks for light.
     #[inline(always)]
     pub fn shadow(&self, p: Vec3, error: ErrorBound) -> DiskShadow {
@@ -125,6 +138,11 @@ impl Disk {
     pub fn bounds(&self) -> Option<[DVec3; 2]> {
         let reach = self.frame.disk_reach() * self.radius;
         Some([self.center - reach, self.center + reach])
+    }
+
+    /// The most that `d` . x is over it, to within rounding.
+    pub fn support(&self, d: DVec3) -> f64 {
+        self.center.dot(d) + self.radius * self.frame.across(d)
     }
 }
 

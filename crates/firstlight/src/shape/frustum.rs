@@ -188,6 +188,12 @@ impl Frustum {
         let reach = self.radii.map(|r| self.frame.disk_reach() * r);
         Some([(self.p0 - reach[0]).min(p1 - reach[1]), (self.p0 + reach[0]).max(p1 + reach[1])])
     }
+
+    /// The most that `d` . x is over it, to within rounding.
+    pub fn support(&self, d: DVec3) -> f64 {
+        let [one, other] = self.radii.map(|r| r * self.frame.across(d));
+        (self.p0.dot(d) + one).max((self.p0 + self.frame.z * self.height).dot(d) + other)
+    }
 }
 
 #[cfg(test)]

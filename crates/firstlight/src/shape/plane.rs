@@ -87,6 +87,13 @@ impl Plane {
     pub fn bounds(&self) -> Option<[DVec3; 2]> {
         None
     }
+
+    /// The most that `d` . x is over it, to within rounding.
+    pub fn support(&self, d: DVec3) -> f64 {
+        // Only in its own normal's direction it has an end
+        let along = self.frame.x.dot(d).abs().max(self.frame.y.dot(d).abs());
+        if along <= 1e-6 * d.length() { self.point.dot(d) } else { f64::INFINITY }
+    }
 }
 
 #[cfg(test)]

@@ -112,6 +112,11 @@ impl Solid {
         each!(self, shape => shape.bounds())
     }
 
+    /// The most that `d` . x is over it, to within rounding: how far it reaches in a direction.
+    pub fn support(&self, d: DVec3) -> f64 {
+        each!(self, shape => shape.support(d))
+    }
+
     /// Whether all of it lies on one side of the tangent plane of each of its points. Then no ray that leaves such a shape
     /// on its front meets it again, whatever rounding says; nor does one that leaves a flat shape on its back.
     #[cfg(test)]

@@ -148,6 +148,11 @@ impl Torus {
         let reach = self.frame.disk_reach() * self.major + DVec3::splat(self.minor);
         Some([self.center - reach, self.center + reach])
     }
+
+    /// The most that `d` . x is over it, to within rounding.
+    pub fn support(&self, d: DVec3) -> f64 {
+        self.center.dot(d) + self.major * self.frame.across(d) + self.minor * d.length()
+    }
 }
 
 #[cfg(test)]

@@ -2,13 +2,15 @@
 //!
 //! Every area light is sampled, under full antialiasing, by four sets of points that know nothing of each other: one
 //! seeded point in each of m x m cells of the light. Where they do not agree, the pixel is rendered again with twice the
-//! points, until they do or until there are too many points. Nothing of what integrates lights has a part in it.
+//! points, until they do or until there are too many points. Where a light is very near, its points are graded ([`graded`]).
+//! Nothing of what integrates lights has a part in it.
 //! (Turned copies of the `sobol` set were tried in their place, and settle no pixel sooner: it is edges that take long.)
 
 use std::f64::consts::PI;
 
 use firstlight::{AaMode, Falloff, Image, LightDesc, RenderSettings, SampleSet, SamplesDesc, Scene, SceneDesc, Window};
 
+use crate::graded;
 use crate::scenes::*;
 
 /// Steps of an 8-bit picture by which the mean of two sets may differ from the mean of the other two.
@@ -94,8 +96,8 @@ pub struct Converged {
     pub(crate) levels: Vec<u32>,
     /// Whether the largest sets do not agree on a pixel.
     pub(crate) open: Vec<bool>,
-    /// The smallest sets that may settle a pixel; see [`resolving`].
-    pub(crate) least: Vec<u32>,
+    /// Whether a pixel shows something that a light is so near to that points are graded; see [`graded`].
+    near: Vec<bool>,
 }
 
 /// What four sets of one size say of a pixel.
@@ -146,9 +148,9 @@ fn windows(wanted: &[bool], width: u32, height: u32, level: u32) -> Vec<Window> 
     windows
 }
 
-/// The logarithm to base 2 of how many points a light needs so that they lie no farther from each other than the light is from what
-/// a pixel shows. Fewer can all miss the part that sends most, and agree.
-fn resolving(desc: &SceneDesc, scene: &Scene, [i, j]: [u32; 2]) -> u32 {
+/// Whether a light that weakens with the square of the distance is so near to what a pixel shows that points of equal shares of it can
+/// all miss the part that sends most, and agree.
+fn is_near(desc: &SceneDesc, scene: &Scene, [i, j]: [u32; 2]) -> bool {
     let n = desc.render.antialiasing;
     let rays = (0..n * n).map(|k| [k % n, k / n].map(|w| (w as f32 + 0.5) / n as f32));
     let shown: Vec<V> = rays
@@ -158,8 +160,7 @@ fn resolving(desc: &SceneDesc, scene: &Scene, [i, j]: [u32; 2]) -> u32 {
             Some(add(ray.o.to_array().map(f64::from), mul(ray.d.to_array().map(f64::from), hit.t)))
         })
         .collect();
-    // Over a light's size, its distance
-    let nearness = |light: &LightDesc| {
+    let is_near = |light: &LightDesc| {
         let (size, distance): (f64, Box<dyn Fn(V) -> f64>) = match light {
             LightDesc::Rectangle(light) if light.falloff == Falloff::Physical => {
                 let [a, b] = [light.e0, light.e1].map(length);
@@ -185,12 +186,11 @@ fn resolving(desc: &SceneDesc, scene: &Scene, [i, j]: [u32; 2]) -> u32 {
                 let (center, radius) = (light.center, light.radius);
                 (2.0 * PI.sqrt() * radius, Box::new(move |p: V| (length(sub(p, center)) - radius).abs()))
             }
-            _ => return f64::INFINITY,
+            _ => return false,
         };
-        shown.iter().map(|p| distance(*p) / size).fold(f64::INFINITY, f64::min)
+        shown.iter().any(|p| graded::is_near(distance(*p), size))
     };
-    let nearest = desc.lights.iter().map(nearness).fold(f64::INFINITY, f64::min);
-    (FIRST..=LAST).find(|level| f64::from(side(*level)) * nearest >= 1.0).unwrap_or(LAST + 1)
+    desc.lights.iter().any(is_near)
 }
 
 /// The side m of the sets of m x m points, about 2^`level` points.
@@ -214,11 +214,11 @@ impl Converged {
         let (width, height) = (desc.render.width, desc.render.height);
         let count = (width * height) as usize;
         let scene = compile(desc);
-        let least = (0..count).map(|i| resolving(desc, &scene, [i as u32 % width, i as u32 / width])).collect();
+        let near = (0..count).map(|i| is_near(desc, &scene, [i as u32 % width, i as u32 / width])).collect();
         Converged {
             desc: desc.clone(),
             scene,
-            least,
+            near,
             width,
             height,
             pixels: vec![[0.0; 3]; count],
@@ -235,19 +235,17 @@ impl Converged {
         let count = self.pixels.len();
         let mut before = vec![false; count];
         for level in first..=cap {
-            // Points that cannot settle a pixel yet are not asked, but for those that a second opinion may follow
-            let wanted: Vec<bool> =
-                (0..count).map(|i| self.open[i] && self.least[i] <= cap && self.least[i] <= level + 1).collect();
-            let parts = windows(&wanted, self.width, self.height, level);
-            if parts.is_empty() {
-                continue;
-            }
-            let films = self.films(&parts, level);
+            let evenly: Vec<bool> = (0..count).map(|i| self.open[i] && !self.near[i]).collect();
+            let mut films = self.films(&windows(&evenly, self.width, self.height, level), level);
             let mut now: Vec<bool> = self.open.iter().map(|open| !open).collect();
-            for i in (0..count).filter(|i| wanted[*i]) {
+            for i in (0..count).filter(|i| self.open[*i]) {
+                if self.near[i] {
+                    let at = [i as u32 % self.width, i as u32 / self.width];
+                    films[i] = std::array::from_fn(|set| graded::pixel(&self.scene, at, level, set as u32));
+                }
                 let opinion = opinion(&self.scene, &films[i]);
                 (self.pixels[i], self.half_differences[i]) = (opinion.mean, opinion.half_difference);
-                (self.levels[i], now[i]) = (level, opinion.agreed && level >= self.least[i]);
+                (self.levels[i], now[i]) = (level, opinion.agreed);
             }
             // Four sets can agree by chance. So their word is taken where they agree all around, or for the second time
             let last = level == cap;
@@ -262,7 +260,7 @@ impl Converged {
     #[track_caller]
     fn films(&self, parts: &[Window], level: u32) -> Vec<[[f32; 4]; SETS as usize]> {
         let mut films = vec![[[0.0; 4]; SETS as usize]; self.pixels.len()];
-        for set in 0..SETS {
+        for set in (0..SETS).filter(|_| !parts.is_empty()) {
             let points = side(level) * side(level);
             let sampled = compile(&with_samples(&self.desc, points, SampleSet::Stratified, level * SETS + set));
             for part in parts {

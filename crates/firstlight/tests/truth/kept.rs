@@ -74,10 +74,6 @@ pub fn read(path: &Path, desc: &SceneDesc, cap: u32) -> Option<Converged> {
         truth.open[i] = alpha == 0;
         truth.levels[i] = u32::from((u16::MAX - alpha) / LEVEL);
     }
-    let settled = (0..truth.pixels.len()).filter(|i| !truth.open[*i]);
-    if settled.into_iter().any(|i| truth.levels[i] < truth.least[i]) {
-        return None;
-    }
     let enough = truth.open() == 0 || text(CAP)?.parse::<u32>().ok()? >= cap;
     enough.then_some(truth)
 }
