@@ -207,8 +207,17 @@ impl Hider {
 
     /// All that is farther than `distance` along the unit vector `n`.
     pub fn beyond(view: &View, n: Vec3, distance: f32) -> Hider {
+        Hider::side(Linear { c: n.dot(view.l0) - distance, x: n.dot(view.a), y: n.dot(view.b) })
+    }
+
+    /// All of the light where that is below 0.
+    pub fn below(Linear { c, x, y }: Linear) -> Hider {
+        Hider::side(Linear { c: -c, x: -x, y: -y })
+    }
+
+    fn side(side: Linear) -> Hider {
         let mut sides = [Linear::default(); EDGES];
-        sides[0] = Linear { c: n.dot(view.l0) - distance, x: n.dot(view.a), y: n.dot(view.b) };
+        sides[0] = side;
         Hider::Edges(Edges { sides, count: 1, lengths: [1.0; EDGES] })
     }
 

@@ -1,8 +1,9 @@
 //! The part of a light that a narrow highlight covers.
 
+use super::hider::Hider;
 use super::rows::Region;
 use super::tensor::sharpness;
-use super::view::View;
+use super::view::{Linear, View};
 use crate::material::Lobe;
 use crate::math::{DVec3, Vec3, square};
 
@@ -44,6 +45,26 @@ pub(crate) fn region(view: &View) -> Option<Option<Region>> {
     let reach = sharpness * half * half / distance2;
     let pieces = (reach / PIECE).sqrt().ceil().clamp(1.0, MAX_PIECES) as usize;
     Some(Some(Region { pieces, ..clipped }))
+}
+
+/// Highlights of lower exponents have a kink where they end.
+const KINKED: f32 = 8.0;
+
+/// Where a blunt highlight of Phong ends: what lies beyond, as if something hid it, if some of the light does; `Some(None)` if all does;
+/// `None` if nothing does, or the end does not show.
+pub(crate) fn end(view: &View) -> Option<Option<Hider>> {
+    let Lobe::Phong(lobe) = view.lobe else { return None };
+    if lobe.exponent() >= KINKED {
+        return None;
+    }
+    // The cosine to the mirrored direction, times |l|
+    let mirrored = |cos: f32, out: f32| 2.0 * view.cos_o * cos - out;
+    let Linear { c, x, y } = view.cos;
+    let along = Linear { c: mirrored(c, view.out.c), x: mirrored(x, view.out.x), y: mirrored(y, view.out.y) };
+    if along.min() >= 0.0 {
+        return None;
+    }
+    Some((along.max() > 0.0).then(|| Hider::below(along)))
 }
 
 /// The box around where the cone of a highlight meets the light's plane; `None` if that has no end.

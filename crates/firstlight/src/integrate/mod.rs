@@ -25,13 +25,14 @@ mod view;
 
 use std::ops::Add;
 
+use arrayvec::ArrayVec;
 use fearless_simd::prelude::*;
 
 pub(crate) use between::{Asker, Between};
 pub(crate) use emitter::Emitter;
 use hider::Hider;
 pub(crate) use mask::{MOST, Masked, SERIES, Tally};
-use rows::Region;
+use rows::{MAX_HIDERS, Region};
 pub(crate) use tensor::sharpness;
 use view::Outline;
 pub(crate) use view::{Receiver, View};
@@ -73,6 +74,21 @@ pub(crate) fn integrate<S: Simd>(
     let whole = Region::WHOLE;
     let is_clear = hiders.is_empty() && view.is_above_horizon();
     let both = Wanted { diffuse: true, specular: !matches!(view.lobe, Lobe::None) };
+    let diffuse_only = Wanted { diffuse: true, specular: false };
+    let specular_only = Wanted { diffuse: false, specular: true };
+    // A highlight that ends within the light
+    if let Some(end) = lobe::end(view)
+        && hiders.len() < MAX_HIDERS
+    {
+        let blunt = View { lobe: Lobe::None, ..*view };
+        let (diffuse, diffuse_error) = integrate(simd, &blunt, hiders, enough);
+        let Some(end) = end else { return (diffuse, diffuse_error) };
+        let enough = |sums: &Sums, error: &Sums| enough(&(*sums + diffuse), &(*error + diffuse_error));
+        let mut hiders: ArrayVec<Hider, MAX_HIDERS> = hiders.iter().copied().collect();
+        hiders.push(end);
+        let (specular, specular_error) = rows::integrate(simd, view, &hiders, &whole, specular_only, &enough);
+        return (diffuse + specular, diffuse_error + specular_error);
+    }
     if is_clear && let Some(order) = tensor::order(view, &whole) {
         return (tensor::integrate(simd, view, &whole, both, order), Sums::default());
     }
@@ -80,8 +96,6 @@ pub(crate) fn integrate<S: Simd>(
     let Some(narrow) = lobe::region(view) else {
         return rows::integrate(simd, view, hiders, &whole, both, enough);
     };
-    let diffuse_only = Wanted { diffuse: true, specular: false };
-    let specular_only = Wanted { diffuse: false, specular: true };
     let blunt = View { lobe: Lobe::None, ..*view };
     let (diffuse, diffuse_error) = match is_clear.then(|| tensor::order(&blunt, &whole)).flatten() {
         Some(order) => (tensor::integrate(simd, &blunt, &whole, diffuse_only, order), Sums::default()),
