@@ -163,11 +163,9 @@ impl Between {
             let side = sides.get(i).copied().unwrap_or(PlaneSide::Both);
             if !flat.is_one_sided(p, asker.si.error, side) {
                 between.flat(view, emitter, pyramid(), flat, asker);
-            } else if flat.cuts(p, asker.si.error, asker.reach)
-                && !(scene.flats_seen.get(i) == Some(&true) && flat.screens(p, asker.si.wo, asker.reach, side))
-            {
-                // A part of the patch is on its other side
-                between.drift = f32::INFINITY;
+            } else if flat.plane_cuts(p, asker.si.error, asker.reach) {
+                let is_seen = scene.flats_seen.get(i) == Some(&true);
+                between.beside(pyramid(), flat, asker, if is_seen { side } else { PlaneSide::Both });
             }
             if between.hidden {
                 return between;
@@ -189,6 +187,8 @@ impl Between {
                 let flat = scene.flat(*which);
                 if !flat.is_one_sided(p, asker.si.error, PlaneSide::Both) {
                     between.flat(view, emitter, pyramid(), flat, asker);
+                } else if flat.plane_cuts(p, asker.si.error, asker.reach) {
+                    between.beside(pyramid(), flat, asker, PlaneSide::Both);
                 }
             }
             if !between.hidden {
@@ -416,6 +416,25 @@ impl Between {
         let corners = [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]];
         self.hidden = corners.iter().all(|[x, y]| hider.hides(*x, *y));
         self.add(Some(hider));
+    }
+
+    /// A parallelogram that hides nothing from the point, but that a part of the patch is on the other side of its plane. `side` is that
+    /// of the light, if the parallelogram is one that is seen.
+    fn beside(&mut self, pyramid: &Pyramid, flat: &Parallelogram, asker: &Asker, side: PlaneSide) {
+        let si = asker.si;
+        let from = si.lit_from.as_dvec3();
+        let corners = flat.deep_corners().map(|q| (q - from).as_vec3());
+        let above = corners.iter().fold(f32::NEG_INFINITY, |above, q| above.max(si.horizon.dot(*q)));
+        let size = corners.iter().fold(0.0f32, |size, q| size.max(q.length()));
+        if above < -SLACK * size - asker.reach || pyramid.gap_of(&corners) > SLACK * size + asker.reach {
+            return;
+        }
+        let near = flat.distance(from) as f32;
+        // Where light is gathered from the surface itself, that part may be what nobody sees
+        let is_lifted = si.lit_from != si.p;
+        if is_lifted || near > asker.reach || !flat.screens(si.lit_from, si.wo, asker.reach, side) {
+            self.drift = self.drift.max(pyramid.drift((near - asker.reach).max(0.0)));
+        }
     }
 
     fn flat(&mut self, view: &View, emitter: &Emitter, pyramid: &Pyramid, flat: &Parallelogram, asker: &Asker) {

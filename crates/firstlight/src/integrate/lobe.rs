@@ -54,7 +54,8 @@ const KINKED: f32 = 8.0;
 /// `None` if nothing does, or the end does not show.
 pub(crate) fn end(view: &View) -> Option<Option<Hider>> {
     let Lobe::Phong(lobe) = view.lobe else { return None };
-    if lobe.exponent() >= KINKED {
+    // What is raised to 0 is 1 everywhere
+    if lobe.exponent() >= KINKED || lobe.exponent() == 0.0 {
         return None;
     }
     // The cosine to the mirrored direction, times |l|

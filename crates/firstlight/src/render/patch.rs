@@ -67,7 +67,7 @@ const MAX_TURN: f32 = 0.2;
 
 impl Patch {
     /// Whether a camera ray that sees `si` sees the same patch.
-    fn holds(&self, si: &SurfaceInteraction) -> bool {
+    pub fn holds(&self, si: &SurfaceInteraction) -> bool {
         let one = &self.si;
         if one.surface != si.surface || one.material != si.material || !(one.ns.dot(si.ns) > SAME_NORMAL) {
             return false;
@@ -246,7 +246,7 @@ impl Patch {
         for member in members {
             uneven |= member.si.receives_shadow != si.receives_shadow;
             reach = reach.max((member.si.lit_from - si.lit_from).length());
-            turn = turn.max((member.si.ns - si.ns).length());
+            turn = turn.max((member.si.ns - si.ns).length()).max((member.si.horizon - si.horizon).length());
             middle += member.si.lit_from - si.lit_from;
         }
         let off = middle.length() / members.len() as f32;

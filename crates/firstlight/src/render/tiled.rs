@@ -40,6 +40,8 @@ pub(super) const BEND: f32 = 0.25;
 const FINE: f32 = 0.1;
 /// The part of that which colours and light may make together.
 const MINGLED: f32 = 0.5;
+/// By how much the normals of three pixels in a row may differ from turning evenly, in radians.
+const EVEN: f32 = 0.02;
 /// Pixels across a cell.
 pub(crate) const CELL: u32 = 32;
 /// With its rim.
@@ -676,7 +678,7 @@ impl<'a> Tiled<'a> {
 
 /// Whether a patch fills its pixel and is of the same surface as another, so that one tells something of the other.
 fn is_same(scene: &Scene, beside: &Patch, patch: &Patch) -> bool {
-    beside.is_whole(scene) && beside.si.surface == patch.si.surface && beside.bsdf.lobe == patch.bsdf.lobe
+    beside.is_whole(scene) && beside.bsdf.lobe == patch.bsdf.lobe && patch.holds(&beside.si)
 }
 
 /// So many times how far two sums are apart.
@@ -702,6 +704,11 @@ pub(super) fn second_difference(
         let neighbours = [index - step, index + step];
         let same = |i: &usize| matches!(&pixels[*i].patches[..], [beside] if is_same(scene, beside, patch));
         if !neighbours.iter().all(same) {
+            return None;
+        }
+        // Nor do they where an edge of the surface runs between
+        let [before, after] = neighbours.map(|i| pixels[i].patches[0].si.ns);
+        if !((before + after - patch.si.ns * 2.0).length() <= EVEN) {
             return None;
         }
         let (before, after) = (arrived(neighbours[0])?, arrived(neighbours[1])?);

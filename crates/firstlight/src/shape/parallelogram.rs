@@ -228,13 +228,11 @@ impl Parallelogram {
             }
     }
 
-    /// Whether it may cut the patch that reaches `reach` around a point, which is not on it.
+    /// Whether its plane may cut the patch that reaches `reach` around a point, which is not on it.
     #[inline(always)]
-    pub(crate) fn cuts(&self, p: Vec3, error: ErrorBound, reach: f32) -> bool {
+    pub(crate) fn plane_cuts(&self, p: Vec3, error: ErrorBound, reach: f32) -> bool {
         let height = self.n.dot(p.as_dvec3() - self.p).abs() as f32;
-        height <= reach
-            && height > self.n.as_vec3().abs().dot(error.0)
-            && self.distance(p.as_dvec3()) <= f64::from(reach)
+        height <= reach && height > self.n.as_vec3().abs().dot(error.0)
     }
 
     /// Whether a viewer in the direction `wo` of a point that lies before it, nearly on its plane, sees nothing behind it
