@@ -9,8 +9,8 @@ use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
 use firstlight::{
-    AaMode, Assets, CompileOptions, FolderAssets, Format, Image, NoAssets, RenderSettings, SamplesDesc, SceneDesc,
-    StoredImage, VisibilityMode, builtin_scenes, render,
+    AaMode, Assets, CompileOptions, FolderAssets, Format, Image, NoAssets, RenderSettings, SamplesDesc, Scene,
+    SceneDesc, StoredImage, VisibilityMode, builtin_scenes, render,
 };
 
 fn scenes() -> PathBuf {
@@ -44,8 +44,8 @@ impl Instead {
     }
 }
 
-/// The picture of a scene.
-fn picture(text: &[u8], assets: &dyn Assets, instead: Instead, settings: &RenderSettings) -> Image {
+/// The scene of a text.
+fn compiled(text: &[u8], assets: &dyn Assets, instead: Instead) -> Scene {
     let mut parsed = SceneDesc::parse("scene.toml", text, assets);
     let frame = &mut parsed.desc.render;
     if let Some([width, height]) = instead.size {
@@ -56,11 +56,19 @@ fn picture(text: &[u8], assets: &dyn Assets, instead: Instead, settings: &Render
         frame.samples = samples;
         parsed.desc.lights.iter_mut().for_each(|light| light.set_samples(samples));
     }
-    let scene = parsed
+    parsed
         .compile(assets, &CompileOptions { strict: true, ..CompileOptions::default() })
         .unwrap_or_else(|e| panic!("{e}"))
-        .scene;
-    match render(&scene, settings, &|_, _| ControlFlow::Continue(())) {
+        .scene
+}
+
+/// The picture of a scene.
+fn picture(text: &[u8], assets: &dyn Assets, instead: Instead, settings: &RenderSettings) -> Image {
+    shown(&compiled(text, assets, instead), settings)
+}
+
+fn shown(scene: &Scene, settings: &RenderSettings) -> Image {
+    match render(scene, settings, &|_, _| ControlFlow::Continue(())) {
         ControlFlow::Continue((film, _)) => film.develop(),
         ControlFlow::Break(()) => unreachable!("nothing stops this render"),
     }
@@ -98,6 +106,31 @@ fn leave(case: &str, expected: &[[f32; 4]], actual: &Image) -> PathBuf {
     std::fs::write(folder.join("difference.exr"), exr(&with(difference.collect()))).unwrap();
     std::fs::write(folder.join("actual.exr"), exr(actual)).unwrap();
     folder
+}
+
+/// The steps of an 8-bit picture by which a pixel that is lit once may be off the mean of its rays, each lit by itself.
+const ONCE: f64 = 1.0;
+
+#[test]
+fn what_is_lit_once_is_as_if_each_ray_was() {
+    let mut wrong = Vec::new();
+    for case in folders(&scenes().join("golden")).iter().flat_map(|family| folders(family)) {
+        let Ok(text) = std::fs::read(case.join("scene.toml")) else { continue };
+        let assets = FolderAssets::new(&case, &[]).unwrap();
+        let scene = compiled(&text, &assets, Instead { samples: Some(SamplesDesc::Exact), ..Instead::default() });
+        let [once, each] = [AaMode::Adaptive, AaMode::Full]
+            .map(|aa_mode| shown(&scene, &RenderSettings { aa_mode, ..RenderSettings::default() }));
+        let steps = |x: f32| 255.0 * scene.display().encode(x);
+        let off =
+            |(a, b): (&[f32; 4], &[f32; 4])| (0..3).map(|k| (steps(a[k]) - steps(b[k])).abs()).fold(0.0, f64::max);
+        let all: Vec<f64> = once.pixels.iter().zip(&each.pixels).map(off).collect();
+        let worst = (0..all.len()).max_by(|a, b| all[*a].total_cmp(&all[*b])).expect("a picture has pixels");
+        if !(all[worst] <= ONCE) {
+            let [x, y] = [worst as u32 % scene.width(), worst as u32 / scene.width()];
+            wrong.push(format!("{}: pixel {x}, {y} is {:.2} steps off", case.display(), all[worst]));
+        }
+    }
+    assert!(wrong.is_empty(), "\n{}", wrong.join("\n"));
 }
 
 #[test]
