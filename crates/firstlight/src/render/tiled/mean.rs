@@ -1,0 +1,280 @@
+//! The mean of what a light sends to a patch of a pixel, from as little as tells it: the patch's middle; that and the neighbours, where
+//! light is wider than a pixel; its quarters; each of its rays.
+
+use arrayvec::ArrayVec;
+
+use super::ACROSS;
+use super::Tiled;
+use crate::color::Rgb;
+use crate::integrate::Sums;
+use crate::material::Bsdf;
+use crate::render::arrival::Place;
+use crate::render::change::Arrival;
+use crate::render::patch::{Contrast, Patch, PixelPatches};
+use crate::render::together::Together;
+use crate::render::{AaMode, Counts};
+use crate::scene::Scene;
+
+/// In display steps: how much may bend over a patch that is shaded once.
+pub(in crate::render) const BEND: f32 = 0.25;
+/// The part of that which needs no second look.
+const FINE: f32 = 0.1;
+/// The part of that which colours and light may make together.
+const MINGLED: f32 = 0.5;
+/// By how much the normals of three pixels in a row may differ from turning evenly, in radians.
+const EVEN: f32 = 0.02;
+/// What colours and light that change together make of a pixel, at most, as a part of both changes: one along each axis.
+pub(super) const MIXED: f32 = 0.25;
+/// What light does within a pixel, at most, as a part of its second difference over three: a corner in the middle of
+/// the pixel makes an eighth, the onset of a root nearly a fourth.
+const WITHIN: f32 = 0.2;
+
+impl Tiled<'_> {
+    /// Adds what all lights send to a pixel, each for itself.
+    pub(super) fn light_by_light(&mut self, at: [u32; 2], counts: &mut Counts) {
+        let scene = self.scene;
+        self.ask(at, counts);
+        let index = self.index(at);
+        let patches = std::mem::take(&mut self.pixels[index].patches);
+        for (k, patch) in patches.iter().enumerate() {
+            let count = patch.count(scene) as f32;
+            for light in 0..scene.lights.len() {
+                if let Some(sums) = self.at_once(&patches, at, k, light, counts) {
+                    let scale = self.arrivals.scale(light) * count;
+                    self.terms[light][0] += scale * patch.bsdf.diffuse * sums.diffuse;
+                    self.terms[light][1] += scale * patch.bsdf.specular * sums.specular;
+                } else {
+                    self.in_quarters(patch, at, k, light, counts);
+                }
+            }
+        }
+        self.pixels[index].patches = patches;
+    }
+
+    /// The mean of what arrives of a light over a patch, the `k`-th of its pixel, if what arrives at its middle tells it.
+    fn at_once(
+        &mut self,
+        patches: &[Patch],
+        at: [u32; 2],
+        k: usize,
+        light: usize,
+        counts: &mut Counts,
+    ) -> Option<Sums> {
+        let scene = self.scene;
+        let patch = &patches[k];
+        if patch.uneven {
+            return None;
+        }
+        let lights = scene.lights.len();
+        let index = self.index(at);
+        let (here, value) =
+            (self.arrived[(self.first[index] + k) * lights + light], self.values[self.first[index] + k]);
+        let allowed = BEND / (lights as f32).sqrt();
+        if here.skipped {
+            return None;
+        }
+        let is_dark = here.sums == Sums::default() && here.bend == Sums::default();
+        if patch.contrast != Contrast::default() && !is_dark {
+            // Light and dark colours get what arrives in the middle only if that is what arrives everywhere
+            let slope = self.slope(patch, at, light, counts)?;
+            if self.mingled(light, &patch.contrast, value, &slope) > MINGLED * allowed {
+                return None;
+            }
+        }
+        let shown = self.shown(light, &patch.bsdf, value, &here.bend);
+        if shown <= FINE * allowed {
+            return Some(here.sums);
+        }
+        let else_here = (shown <= allowed).then_some(here.sums);
+        // The outline of a shadow makes no parabola, nor does a light's rim
+        let breaks = |arrival: &Arrival| arrival.drift > 0.0 || !arrival.resolved;
+        if !here.resolved || !patch.is_whole(scene) || else_here.is_some() && breaks(&here) {
+            return else_here;
+        }
+        let [i, j] = at;
+        let beside = [[i.wrapping_sub(1), j], [i + 1, j], [i, j.wrapping_sub(1)], [i, j + 1]];
+        if !beside.into_iter().all(|neighbour| self.ask(neighbour, counts)) {
+            return else_here;
+        }
+        let arrived = |index: usize| {
+            let arrival = &self.arrived[self.first[index] * lights + light];
+            (!arrival.skipped).then_some(arrival.sums)
+        };
+        let Some(differences) = second_difference(scene, &self.pixels, index, patch, &here.sums, arrived) else {
+            return else_here;
+        };
+        if else_here.is_none() && self.shown(light, &patch.bsdf, value, &within(&differences)) > allowed {
+            return None;
+        }
+        let beside = beside.map(|at| &self.arrived[self.first[self.index(at)] * lights + light]);
+        if breaks(&here) || beside.into_iter().any(breaks) {
+            return Some(here.sums);
+        }
+        // The mean of a parabola over the rays of a pixel
+        let n = scene.antialiasing as f32;
+        let part = (1.0 - 1.0 / (n * n)) / 24.0;
+        let [x, y] = differences;
+        Some(Sums {
+            diffuse: (here.sums.diffuse + (x.diffuse + y.diffuse) * part).max(0.0),
+            specular: (here.sums.specular + (x.specular + y.specular) * part).max(0.0),
+        })
+    }
+
+    /// How much what arrives changes over a pixel, along both axes together, by its neighbours; `None` where they do not tell.
+    fn slope(&mut self, patch: &Patch, [i, j]: [u32; 2], light: usize, counts: &mut Counts) -> Option<Sums> {
+        if !patch.is_whole(self.scene) {
+            return None;
+        }
+        let mut slope = Sums::default();
+        for [before, after] in [[[i.wrapping_sub(1), j], [i + 1, j]], [[i, j.wrapping_sub(1)], [i, j + 1]]] {
+            let mut arrived = [Sums::default(); 2];
+            for (sums, at) in arrived.iter_mut().zip([before, after]) {
+                if !self.ask(at, counts) {
+                    return None;
+                }
+                let index = self.index(at);
+                let [beside] = &self.pixels[index].patches[..] else { return None };
+                let arrival = &self.arrived[self.first[index] * self.scene.lights.len() + light];
+                if arrival.skipped || !is_same(self.scene, beside, patch) {
+                    return None;
+                }
+                *sums = arrival.sums;
+            }
+            slope = slope + apart(&arrived[0], &arrived[1], 0.5);
+        }
+        Some(slope)
+    }
+
+    /// How many display steps it can make that colours which differ that much get the mean of what arrives, where that changes
+    /// by `slope` over them: two halves, one of each colour, are wrong by this.
+    fn mingled(&self, light: usize, contrast: &Contrast, value: Rgb, slope: &Sums) -> f32 {
+        let scale = self.arrivals.scale(light);
+        let colors = scale * contrast.diffuse * slope.diffuse + scale * contrast.specular * slope.specular;
+        self.arrivals.steps(value, colors * (0.5 * MIXED))
+    }
+
+    /// Adds what one light sends to a patch, the `k`-th of its pixel, from parts of it: its quarters, where that may do, or
+    /// each ray.
+    fn in_quarters(&mut self, patch: &Patch, at: [u32; 2], k: usize, light: usize, counts: &mut Counts) {
+        let scene = self.scene;
+        let first = self.first[self.index(at)] + k;
+        let (here, value) = (self.arrived[first * scene.lights.len() + light], self.values[first]);
+        // What bends in one place, bends a fourth of that over half the way
+        let allowed = BEND / (scene.lights.len() as f32).sqrt();
+        let quarters = if patch.uneven || self.shown(light, &patch.bsdf, value, &here.bend) > 6.0 * allowed {
+            ArrayVec::new()
+        } else {
+            patch.quarters(scene, at)
+        };
+        if quarters.is_empty() {
+            self.at_rays(patch, at, light, self.share(patch), counts);
+        }
+        let share = self.share(patch);
+        let arrivals: ArrayVec<Arrival, 4> = quarters
+            .iter()
+            .map(|quarter| {
+                self.arrivals.look_around(&quarter.si);
+                let place = self.arrivals.place(light, &quarter.si, &quarter.bsdf).over(quarter);
+                let place = Place { share, allowed, ..place };
+                self.arrivals.arrival(light, &place, counts)
+            })
+            .collect();
+        for (quarter, arrival) in quarters.iter().zip(&arrivals) {
+            // The others are as far away as it is wide
+            let slope = arrivals.iter().fold(Sums::default(), |most, other| {
+                let apart = apart(&other.sums, &arrival.sums, 1.0);
+                Sums { diffuse: most.diffuse.max(apart.diffuse), specular: most.specular.max(apart.specular) }
+            });
+            if quarter.uneven
+                || arrival.skipped
+                || self.shown(light, &quarter.bsdf, value, &arrival.bend) > allowed
+                || self.mingled(light, &quarter.contrast, value, &slope) > MINGLED * allowed
+            {
+                self.at_rays(quarter, at, light, share, counts);
+            } else {
+                let scale = self.arrivals.scale(light) * quarter.count(scene) as f32;
+                self.terms[light][0] += scale * quarter.bsdf.diffuse * arrival.sums.diffuse;
+                self.terms[light][1] += scale * quarter.bsdf.specular * arrival.sums.specular;
+            }
+        }
+    }
+
+    /// The share of its pixel that a patch has, where each surface is lit once.
+    pub(super) fn share(&self, patch: &Patch) -> f32 {
+        match self.mode {
+            AaMode::Adaptive => {
+                patch.count(self.scene) as f32 / (self.scene.antialiasing * self.scene.antialiasing) as f32
+            }
+            AaMode::Full => 1.0,
+        }
+    }
+
+    /// How many display steps an error of the sums of a light makes.
+    fn shown(&self, light: usize, bsdf: &Bsdf, value: Rgb, error: &Sums) -> f32 {
+        let scale = self.arrivals.scale(light);
+        self.arrivals.steps(value, scale * bsdf.diffuse * error.diffuse + scale * bsdf.specular * error.specular)
+    }
+
+    /// Adds what one light sends to a patch, asked at each of its rays. It is as good as `share` of the pixel.
+    fn at_rays(&mut self, patch: &Patch, at: [u32; 2], light: usize, share: f32, counts: &mut Counts) {
+        let rays = patch.count(self.scene) as usize;
+        let salt = at[0] ^ at[1].rotate_left(16) ^ patch.si.surface.index() as u32;
+        let mut together = Together::new(light, rays, share, salt);
+        patch.for_each(self.scene, at, |si, bsdf| together.ask(&mut self.arrivals, si, bsdf, counts));
+        let [diffuse, specular] = together.finish(&self.arrivals, counts);
+        self.terms[light][0] += diffuse;
+        self.terms[light][1] += specular;
+    }
+}
+
+/// Whether a patch fills its pixel and is of the same surface as another, so that one tells something of the other.
+fn is_same(scene: &Scene, beside: &Patch, patch: &Patch) -> bool {
+    beside.is_whole(scene) && beside.bsdf.lobe == patch.bsdf.lobe && patch.holds(&beside.si)
+}
+
+/// So many times how far two sums are apart.
+fn apart(one: &Sums, other: &Sums, times: f32) -> Sums {
+    Sums {
+        diffuse: (one.diffuse - other.diffuse).abs() * times,
+        specular: (one.specular - other.specular).abs() * times,
+    }
+}
+
+/// How far neighbours along each axis differ from what they foretell of a pixel in their middle, by what arrives `here` and at
+/// them, as `arrived` says; `None` where they tell nothing.
+pub(in crate::render) fn second_difference(
+    scene: &Scene,
+    pixels: &[PixelPatches],
+    index: usize,
+    patch: &Patch,
+    here: &Sums,
+    arrived: impl Fn(usize) -> Option<Sums>,
+) -> Option<[Sums; 2]> {
+    let mut differences = [Sums::default(); 2];
+    for (difference, step) in differences.iter_mut().zip([1, ACROSS]) {
+        let neighbours = [index - step, index + step];
+        let same = |i: &usize| matches!(&pixels[*i].patches[..], [beside] if is_same(scene, beside, patch));
+        if !neighbours.iter().all(same) {
+            return None;
+        }
+        // Nor do they where an edge of the surface runs between
+        let [before, after] = neighbours.map(|i| pixels[i].patches[0].si.ns);
+        if !((before + after - patch.si.ns * 2.0).length() <= EVEN) {
+            return None;
+        }
+        let (before, after) = (arrived(neighbours[0])?, arrived(neighbours[1])?);
+        let second = |a: f32, b: f32, c: f32| a - b + (c - b);
+        difference.diffuse = second(before.diffuse, here.diffuse, after.diffuse);
+        difference.specular = second(before.specular, here.specular, after.specular);
+    }
+    Some(differences)
+}
+
+/// How far what light does within a pixel can make its mean another, by its second differences.
+pub(in crate::render) fn within(differences: &[Sums; 2]) -> Sums {
+    let [x, y] = differences;
+    Sums {
+        diffuse: (x.diffuse.abs() + y.diffuse.abs()) * WITHIN,
+        specular: (x.specular.abs() + y.specular.abs()) * WITHIN,
+    }
+}
