@@ -194,6 +194,8 @@ impl Between {
             if !between.hidden {
                 between.meshes(scene, id, view, pyramid(), asker, emitter, trees);
             }
+            // What is told row by row is not asked for then, and lists do not know what is in trees
+            between.ask_trees |= between.ask;
         }
         between
     }

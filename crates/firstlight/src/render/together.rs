@@ -16,8 +16,8 @@ use crate::shape::SurfaceInteraction;
 const POINTS: f32 = 512.0;
 /// The most that a ray begins with.
 const FIRST: usize = 256;
-/// How much farther off the sums may be than two numbers of points tell.
-const DOUBT: f32 = 2.0;
+/// How much farther off the sums may be than two numbers of points tell: of many rays, and of one. Few can agree by chance.
+const DOUBT: [f32; 2] = [2.0, 6.0];
 
 /// A ray whose light is behind things.
 struct Asking {
@@ -141,7 +141,8 @@ impl Together {
                 return true;
             }
             // By how much the sum moved, or by as much as its parts would together if they moved by chance
-            let off = Rgb::max(moved.map(f32::abs), squares.map(f32::sqrt)) * DOUBT;
+            let doubt = DOUBT[0] + (DOUBT[1] - DOUBT[0]) / asking.len() as f32;
+            let off = Rgb::max(moved.map(f32::abs), squares.map(f32::sqrt)) * doubt;
             // What one more point could change is the least that can be wrong
             let error = off.max(all * (1.0 / points));
             if !is_first && arrivals.steps(value * part, error * part) <= tolerance {
