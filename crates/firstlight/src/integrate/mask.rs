@@ -31,6 +31,8 @@ const DOUBT: f32 = 4.0;
 /// Three standard deviations of the share of a light that the edge of a shadow cuts off, for each n^(-3/4): by that n points are
 /// wrong, chosen by chance in as many squares, since the edge runs through a root of n of them.
 const EDGE: f32 = 1.0;
+/// Where none of so many times the first points is hidden, of points that send alike, nothing is.
+const CLEAR: f64 = 1.5;
 /// The share of points that have to be as good as alike.
 const UNEVEN: f64 = 1.0 / 16.0;
 /// Series of points, as different as points of one sequence are.
@@ -113,12 +115,21 @@ impl Tally {
 impl Tally {
     /// Whether a few points send most of it, or none sends any, so that the others tell nothing: of the diffuse part, of a highlight.
     pub fn is_uneven(&self, whole: &Sums) -> [bool; 2] {
-        // As many points that send alike would be as good as these
+        let alike = self.alike();
         let is_uneven = |k: usize, whole: f32| {
-            let alike = self.all[k] * self.all[k] / self.squares[k];
-            if self.squares[k] > 0.0 { alike < UNEVEN * self.count as f64 } else { whole > 0.0 }
+            if self.squares[k] > 0.0 { alike[k] < UNEVEN * self.count as f64 } else { whole > 0.0 }
         };
         [is_uneven(0, whole.diffuse), is_uneven(1, whole.specular)]
+    }
+
+    /// As many points that send alike would be as good as these.
+    fn alike(&self) -> [f64; 2] {
+        [0, 1].map(|k| self.all[k] * self.all[k] / self.squares[k])
+    }
+
+    /// As many points that send alike as would be as good for the diffuse part.
+    pub fn worth(&self) -> f64 {
+        if self.squares[0] > 0.0 { self.alike()[0] } else { self.count as f64 }
     }
 }
 
@@ -153,7 +164,9 @@ impl Masked<'_> {
                 let [diffuse, highlight] = tally.is_uneven(whole);
                 let shows = || !enough(&now, &Sums { diffuse: 0.0, specular: whole.specular });
                 let is_uneven = diffuse || highlight && shows();
-                if !is_uneven && (tally.hidden == 0 && to >= 2 * fewest || enough(&now, &error)) {
+                // Where nothing is hidden, so many have to have said so
+                let is_clear = tally.hidden == 0 && (tally.worth() >= fewest as f64 * CLEAR || to == MOST);
+                if !is_uneven && (is_clear || tally.hidden > 0 && enough(&now, &error)) {
                     return (now, error);
                 }
                 if to == MOST {

@@ -14,6 +14,8 @@ use crate::shape::SurfaceInteraction;
 
 /// Points that find what is in the way of a pixel.
 const POINTS: f32 = 512.0;
+/// The part of them, of points that send alike, none of which is hidden where nothing is.
+const CLEAR: f64 = 0.75;
 /// The most that a ray begins with.
 const FIRST: usize = 256;
 /// How much farther off the sums may be than two numbers of points tell: of many rays, and of one. Few can agree by chance.
@@ -113,7 +115,7 @@ impl Together {
         let mut is_first = true;
         loop {
             let (mut value, mut moved, mut squares, mut all) = (self.value, Rgb::BLACK, Rgb::BLACK, Rgb::BLACK);
-            let (mut hidden, mut is_uneven) = (0, false);
+            let (mut hidden, mut is_uneven, mut worth) = (0, false, 0.0);
             for one in asking.iter_mut() {
                 let place = self.place(arrivals, &one.si, &one.bsdf, one.series);
                 let masked: Masked = arrivals.behind(self.light, &place, &one.behind);
@@ -125,6 +127,7 @@ impl Together {
                 (value, moved, squares) = (value + of(&now), moved + off, squares + off * off);
                 all += of(&one.behind.whole);
                 hidden += one.tally.hidden;
+                worth += one.tally.worth();
                 let [diffuse, highlight] = one.tally.is_uneven(&one.behind.whole);
                 let shows = || {
                     let sent = place.colors[1] * one.behind.whole.specular;
@@ -137,7 +140,8 @@ impl Together {
             if is_uneven {
                 return false;
             }
-            if hidden == 0 && points >= wanted {
+            let is_clear = hidden == 0 && (worth >= f64::from(wanted) * CLEAR || to == MOST);
+            if is_clear {
                 return true;
             }
             // By how much the sum moved, or by as much as its parts would together if they moved by chance
@@ -145,7 +149,7 @@ impl Together {
             let off = Rgb::max(moved.map(f32::abs), squares.map(f32::sqrt)) * doubt;
             // What one more point could change is the least that can be wrong
             let error = off.max(all * (1.0 / points));
-            if !is_first && arrivals.steps(value * part, error * part) <= tolerance {
+            if hidden > 0 && !is_first && arrivals.steps(value * part, error * part) <= tolerance {
                 return true;
             }
             if to == MOST {
