@@ -13,8 +13,8 @@ use crate::math::{LANES, Vec3};
 /// end, where there is doubt.
 const FIRST: usize = 32;
 const EVERYWHERE: usize = 128;
-/// The same where what is lit, or what is hidden, is a smaller part than this: a sliver that few cells meet falls apart when those are
-/// cut that met it, and what lies between is lost.
+/// The same where what is lit is a smaller part than this: a sliver that few cells meet falls apart when those are cut that met it, and
+/// what lies between is lost.
 const EVERYWHERE_THIN: usize = 256;
 const THIN: f64 = 0.02;
 const LAST: usize = 1024;
@@ -224,7 +224,8 @@ pub(super) fn integrate(
         // What stands in one more cell, and was not met by its point
         let one = Sums { diffuse: whole.diffuse * area as f32, specular: whole.specular * area as f32 };
         let lit = totals.share(0, totals.lit[0]);
-        let everywhere = if lit.min(1.0 - lit) < THIN { EVERYWHERE_THIN } else { EVERYWHERE };
+        let is_thin = lit > 0.0 && lit < THIN;
+        let everywhere = if is_thin { EVERYWHERE_THIN } else { EVERYWHERE };
         if grid.side < everywhere && !enough(&sums, &one) {
             doubtful.fill(true);
         } else if grid.side == LAST {
