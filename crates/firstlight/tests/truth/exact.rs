@@ -66,7 +66,8 @@ fn hold(seeds: impl Iterator<Item = u64>, size: u32) {
 
 #[test]
 fn random_scenes_are_within_the_bounds() {
-    hold(0..20, 48);
+    // The torus of scene 3 takes longer than all the others; it is held at 16 x 16
+    hold((0..20).filter(|seed| *seed != 3).chain([40]), 48);
 }
 
 #[test]
