@@ -109,6 +109,25 @@ impl Pyramid {
         self.sides.iter().fold(f32::NEG_INFINITY, |gap, n| gap.max(least(n)))
     }
 
+    /// Whether the hull of some points may be in the way from the middle of the patch; `None` if it is not in the way from any of it.
+    fn meets(&self, points: &[Vec3]) -> Option<bool> {
+        let room = points.iter().fold(0.0f32, |size, q| size.max(q.length())) * SLACK;
+        let gap = self.gap_of(points);
+        (gap <= room + self.reach).then_some(gap <= room)
+    }
+
+    /// The same of a parallelogram, in the way from above the horizon; with its corners from the middle.
+    fn meets_flat(&self, flat: &Parallelogram, si: &SurfaceInteraction) -> Option<([Vec3; 4], bool)> {
+        let from = si.lit_from.as_dvec3();
+        let corners = flat.deep_corners().map(|q| (q - from).as_vec3());
+        let above = corners.iter().fold(f32::NEG_INFINITY, |above, q| above.max(si.horizon.dot(*q)));
+        let size = corners.iter().fold(0.0f32, |size, q| size.max(q.length()));
+        if above < -SLACK * size - self.reach {
+            return None;
+        }
+        self.meets(&corners).map(|is_met| (corners, is_met))
+    }
+
     /// See [`Between::drift`]: of a shadow that something casts which is `near` to the point.
     fn drift(&self, near: f32) -> f32 {
         let t = (near / self.far).clamp(1e-6, 1.0);
@@ -255,14 +274,10 @@ impl Between {
         asker: &Asker,
         corners: &[Vec3],
     ) -> bool {
-        let size = corners.iter().fold(0.0f32, |size, q| size.max(q.length()));
-        let gap = pyramid.gap_of(corners);
-        if gap > SLACK * size + asker.reach {
-            return true;
-        }
+        let Some(is_met) = pyramid.meets(corners) else { return true };
         let near = distance(corners, Vec3::ZERO);
         self.drift = self.drift.max(pyramid.drift((near - asker.reach).max(0.0)));
-        if gap > SLACK * size {
+        if !is_met {
             return true;
         }
         let ball = match emitter {
@@ -424,14 +439,10 @@ impl Between {
     /// of the light, if the parallelogram is one that is seen.
     fn beside(&mut self, pyramid: &Pyramid, flat: &Parallelogram, asker: &Asker, side: PlaneSide) {
         let si = asker.si;
-        let from = si.lit_from.as_dvec3();
-        let corners = flat.deep_corners().map(|q| (q - from).as_vec3());
-        let above = corners.iter().fold(f32::NEG_INFINITY, |above, q| above.max(si.horizon.dot(*q)));
-        let size = corners.iter().fold(0.0f32, |size, q| size.max(q.length()));
-        if above < -SLACK * size - asker.reach || pyramid.gap_of(&corners) > SLACK * size + asker.reach {
+        if pyramid.meets_flat(flat, si).is_none() {
             return;
         }
-        let near = flat.distance(from) as f32;
+        let near = flat.distance(si.lit_from.as_dvec3()) as f32;
         // Where light is gathered from the surface itself, that part may be what nobody sees
         let is_lifted = si.lit_from != si.p;
         if is_lifted || near > asker.reach || !flat.screens(si.lit_from, si.wo, asker.reach, side) {
@@ -440,22 +451,11 @@ impl Between {
     }
 
     fn flat(&mut self, view: &View, emitter: &Emitter, pyramid: &Pyramid, flat: &Parallelogram, asker: &Asker) {
-        let from = asker.si.lit_from.as_dvec3();
-        let corners = flat.deep_corners().map(|q| (q - from).as_vec3());
-        // Below the horizon
-        let above = corners.iter().fold(f32::NEG_INFINITY, |above, q| above.max(asker.si.horizon.dot(*q)));
-        let size = corners.iter().fold(0.0f32, |size, q| size.max(q.length()));
-        if above < -SLACK * size - asker.reach {
-            return;
-        }
-        let gap = pyramid.gap_of(&corners);
-        if gap > SLACK * size + asker.reach {
-            return;
-        }
-        let near = flat.distance(from) as f32;
+        let Some((corners, is_met)) = pyramid.meets_flat(flat, asker.si) else { return };
+        let near = flat.distance(asker.si.lit_from.as_dvec3()) as f32;
         let drift = self.drift.max(pyramid.drift((near - asker.reach).max(0.0)));
         self.drift = drift;
-        if gap > SLACK * size {
+        if !is_met {
             return;
         }
         if let Emitter::Ball { center, radius } = emitter
@@ -491,16 +491,16 @@ fn tangent(distance: f64, r: f64, reach: f32) -> f32 {
     (near * near - r * r).sqrt() as f32
 }
 
-/// How far a triangle is from the origin.
-///
-/// Source: Ericson, "Real-Time Collision Detection", 2005, section 5.1.5.
+/// How far a convex polygon is from a point.
 fn distance(corners: &[Vec3], p: Vec3) -> f32 {
     let apex = corners[0] - p;
     let triangles = corners[1..].windows(2).map(|side| triangle_distance(&[apex, side[0] - p, side[1] - p]));
     triangles.fold(f32::INFINITY, f32::min)
 }
 
-/// The distance of a triangle.
+/// How far a triangle is from the origin.
+///
+/// Source: Ericson, "Real-Time Collision Detection", 2005, section 5.1.5.
 fn triangle_distance([a, b, c]: &[Vec3; 3]) -> f32 {
     let (ab, ac) = (*b - *a, *c - *a);
     let (d1, d2) = (-ab.dot(*a), -ac.dot(*a));

@@ -222,7 +222,7 @@ pub(super) fn integrate(
         let (sums, by_edges, by_roughness) = (part(totals.lit), part(edges), part(rough));
         let error = by_edges + by_roughness;
         // What stands in one more cell, and was not met by its point
-        let one = Sums { diffuse: whole.diffuse * area as f32, specular: whole.specular * area as f32 };
+        let one = whole * area as f32;
         let lit = totals.share(0, totals.lit[0]);
         let is_thin = lit > 0.0 && lit < THIN;
         let everywhere = if is_thin { EVERYWHERE_THIN } else { EVERYWHERE };

@@ -152,8 +152,7 @@ impl Masked<'_> {
                 };
                 // What one more point could change is the least that can be wrong, and what points make of a shadow's edge
                 let has_edge = !is_small && (1..to).contains(&tally.hidden);
-                let part = |share: f32| Sums { diffuse: whole.diffuse * share, specular: whole.specular * share };
-                if has_edge && !enough(&now, &part(of_edge(MOST))) {
+                if has_edge && !enough(&now, &(*whole * of_edge(MOST))) {
                     return cells::integrate(&seen, Some(whole), enough);
                 }
                 let one = if has_edge { of_edge(to) } else { 1.0 / to as f32 };

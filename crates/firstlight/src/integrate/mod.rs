@@ -23,7 +23,7 @@ mod solids;
 mod tensor;
 mod view;
 
-use std::ops::Add;
+use std::ops::{Add, Mul};
 
 use arrayvec::ArrayVec;
 use fearless_simd::prelude::*;
@@ -52,6 +52,15 @@ impl Add for Sums {
     #[inline(always)]
     fn add(self, other: Sums) -> Sums {
         Sums { diffuse: self.diffuse + other.diffuse, specular: self.specular + other.specular }
+    }
+}
+
+impl Mul<f32> for Sums {
+    type Output = Sums;
+
+    #[inline(always)]
+    fn mul(self, times: f32) -> Sums {
+        Sums { diffuse: self.diffuse * times, specular: self.specular * times }
     }
 }
 

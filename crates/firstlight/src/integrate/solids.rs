@@ -65,9 +65,7 @@ impl Between {
             Solid::Frustum(_) | Solid::Torus(_) | Solid::Ball(_) => false,
         }
     }
-}
 
-impl Between {
     /// Adds an infinite plane with this unit normal, `distance` from the point along it; `false` if the trees have to be asked.
     fn half_space(&mut self, view: &View, emitter: &Emitter, distance: f64, n: DVec3, asker: &Asker) -> bool {
         let (distance, n) = if distance < 0.0 { (-distance, -n) } else { (distance, n) };
@@ -108,7 +106,7 @@ impl Between {
 }
 
 /// How a solid lies to the horizon of a patch.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(Clone, Copy, Debug)]
 enum Rise {
     /// Below that of all its points.
     Below,

@@ -225,7 +225,7 @@ impl<'a> Arrivals<'a> {
                 let emitter = Emitter::new(area);
                 let one = area.samples() as f32 / if area.physical { area.measure() as f32 } else { 1.0 };
                 let mut change = self.change_of(index, &emitter, place);
-                change.bend = Sums { diffuse: change.bend.diffuse * one, specular: change.bend.specular * one };
+                change.bend = change.bend * one;
                 change.with(sums)
             }
             (None, _) => self.single(index, light, place, counts),

@@ -32,7 +32,6 @@ use crate::color::Rgb;
 use crate::integrate::Sums;
 use crate::material::Bsdf;
 use crate::scene::Scene;
-use mean::MIXED;
 pub(super) use mean::{BEND, second_difference, within};
 
 /// Pixels across a cell.
@@ -296,7 +295,7 @@ impl<'a> Tiled<'a> {
     }
 
     /// Whether colours and light change together over a pixel of a square so much that the mean of their product is not that
-    /// of their means. Where half of a pixel has one colour, and light has a slope, that is an eighth of both.
+    /// of their means.
     fn mixes(&self, [i, j]: [u32; 2], square: Square, contrast: &Contrast, [r, g, b, _]: &[f32; 4]) -> bool {
         if *contrast == Contrast::default() {
             return false;
@@ -314,9 +313,8 @@ impl<'a> Tiled<'a> {
                 slope.diffuse = slope.diffuse.max((there.diffuse - here.diffuse).abs());
                 slope.specular = slope.specular.max((there.specular - here.specular).abs());
             }
-            let scale = self.arrivals.scale(light);
-            error += scale * contrast.diffuse * (slope.diffuse * MIXED);
-            error += scale * contrast.specular * (slope.specular * MIXED);
+            // Along both axes
+            error += self.mingled(light, contrast, &(slope * 2.0));
         }
         self.arrivals.steps(Rgb::new(*r, *g, *b), error) > BEND
     }

@@ -3,8 +3,7 @@
 
 use arrayvec::ArrayVec;
 
-use super::ACROSS;
-use super::Tiled;
+use super::{ACROSS, Tiled};
 use crate::color::Rgb;
 use crate::integrate::Sums;
 use crate::material::Bsdf;
@@ -23,8 +22,6 @@ const FINE: f32 = 0.1;
 const MINGLED: f32 = 0.5;
 /// By how much the normals of three pixels in a row may differ from turning evenly, in radians.
 const EVEN: f32 = 0.02;
-/// What colours and light that change together make of a pixel, at most, as a part of both changes: one along each axis.
-pub(super) const MIXED: f32 = 0.25;
 /// What light does within a pixel, at most, as a part of its second difference over three: a corner in the middle of
 /// the pixel makes an eighth, the onset of a root nearly a fourth.
 const WITHIN: f32 = 0.2;
@@ -77,7 +74,7 @@ impl Tiled<'_> {
         if patch.contrast != Contrast::default() && !is_dark {
             // Light and dark colours get what arrives in the middle only if that is what arrives everywhere
             let slope = self.slope(patch, at, light, counts)?;
-            if self.mingled(light, &patch.contrast, value, &slope) > MINGLED * allowed {
+            if self.mingles(light, &patch.contrast, value, &slope) {
                 return None;
             }
         }
@@ -140,17 +137,22 @@ impl Tiled<'_> {
                 }
                 *sums = arrival.sums;
             }
-            slope = slope + apart(&arrived[0], &arrived[1], 0.5);
+            slope = slope + apart(&arrived[0], &arrived[1]) * 0.5;
         }
         Some(slope)
     }
 
-    /// How many display steps it can make that colours which differ that much get the mean of what arrives, where that changes
-    /// by `slope` over them: two halves, one of each colour, are wrong by this.
-    fn mingled(&self, light: usize, contrast: &Contrast, value: Rgb, slope: &Sums) -> f32 {
-        let scale = self.arrivals.scale(light);
-        let colors = scale * contrast.diffuse * slope.diffuse + scale * contrast.specular * slope.specular;
-        self.arrivals.steps(value, colors * (0.5 * MIXED))
+    /// By how much the mean of colours times light can differ from the mean of colours times that of light, where colours differ that
+    /// much, and what arrives changes by `slope` along both axes together: two halves, one of each colour, make an eighth of both.
+    pub(super) fn mingled(&self, light: usize, contrast: &Contrast, slope: &Sums) -> Rgb {
+        let colors = contrast.diffuse * slope.diffuse + contrast.specular * slope.specular;
+        self.arrivals.scale(light) * colors * 0.125
+    }
+
+    /// Whether that shows.
+    fn mingles(&self, light: usize, contrast: &Contrast, value: Rgb, slope: &Sums) -> bool {
+        let allowed = BEND / (self.scene.lights.len() as f32).sqrt();
+        self.arrivals.steps(value, self.mingled(light, contrast, slope)) > MINGLED * allowed
     }
 
     /// Adds what one light sends to a patch, the `k`-th of its pixel, from parts of it: its quarters, where that may do, or
@@ -182,13 +184,13 @@ impl Tiled<'_> {
         for (quarter, arrival) in quarters.iter().zip(&arrivals) {
             // The others are as far away as it is wide
             let slope = arrivals.iter().fold(Sums::default(), |most, other| {
-                let apart = apart(&other.sums, &arrival.sums, 1.0);
+                let apart = apart(&other.sums, &arrival.sums);
                 Sums { diffuse: most.diffuse.max(apart.diffuse), specular: most.specular.max(apart.specular) }
             });
             if quarter.uneven
                 || arrival.skipped
                 || self.shown(light, &quarter.bsdf, value, &arrival.bend) > allowed
-                || self.mingled(light, &quarter.contrast, value, &slope) > MINGLED * allowed
+                || self.mingles(light, &quarter.contrast, value, &slope)
             {
                 self.at_rays(quarter, at, light, share, counts);
             } else {
@@ -232,12 +234,9 @@ fn is_same(scene: &Scene, beside: &Patch, patch: &Patch) -> bool {
     beside.is_whole(scene) && beside.bsdf.lobe == patch.bsdf.lobe && patch.holds(&beside.si)
 }
 
-/// So many times how far two sums are apart.
-fn apart(one: &Sums, other: &Sums, times: f32) -> Sums {
-    Sums {
-        diffuse: (one.diffuse - other.diffuse).abs() * times,
-        specular: (one.specular - other.specular).abs() * times,
-    }
+/// How far two sums are apart.
+fn apart(one: &Sums, other: &Sums) -> Sums {
+    Sums { diffuse: (one.diffuse - other.diffuse).abs(), specular: (one.specular - other.specular).abs() }
 }
 
 /// How far neighbours along each axis differ from what they foretell of a pixel in their middle, by what arrives `here` and at
