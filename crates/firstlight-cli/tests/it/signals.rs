@@ -5,6 +5,22 @@ use std::process::{Child, ChildStderr, Command, ExitStatus, Stdio};
 
 use crate::common::Folder;
 
+/// The program in this folder, with signals as a shell's foreground has them: whoever started the tests may ignore some, as `nohup`
+/// does, and that is inherited.
+fn listening(folder: &Folder) -> Command {
+    let program = env!("CARGO_BIN_EXE_firstlight");
+    let resets = Command::new("env").args(["--default-signal=INT,TERM,HUP", "true"]).output();
+    let mut command = if resets.is_ok_and(|output| output.status.success()) {
+        let mut command = Command::new("env");
+        command.args(["--default-signal=INT,TERM,HUP", program]);
+        command
+    } else {
+        Command::new(program)
+    };
+    command.current_dir(folder.path("")).stdin(Stdio::null());
+    command
+}
+
 /// A render that is under way, and would be for a long time. Its tiles are quick, so that it can stop soon.
 struct Long {
     child: Child,
@@ -14,19 +30,10 @@ struct Long {
 impl Long {
     fn begin(folder: &Folder) -> Self {
         folder.put("old.png", "old");
-        let program = env!("CARGO_BIN_EXE_firstlight");
-        // Whoever started the tests may ignore signals, and that is inherited
-        let resets = Command::new("env").args(["--default-signal=INT,TERM,HUP", "true"]).output();
-        let mut command = if resets.is_ok_and(|output| output.status.success()) {
-            let mut command = Command::new("env");
-            command.args(["--default-signal=INT,TERM,HUP", program]);
-            command
-        } else {
-            Command::new(program)
-        };
+        let mut command = listening(folder);
         let line = "render config11 --width 2048 --aa 4 --samples 4096 --tile-size 8 --threads 1 -o old.png -o new.exr \
                     --stats=stats.json";
-        command.args(line.split_whitespace()).current_dir(folder.path("")).stdin(Stdio::null()).stderr(Stdio::piped());
+        command.args(line.split_whitespace()).stderr(Stdio::piped());
         let mut child = command.spawn().unwrap();
         let mut stderr = BufReader::new(child.stderr.take().unwrap());
         // The first line of progress tells that it is under way
@@ -79,7 +86,7 @@ fn interrupted_twice_it_ends_at_once() {
 fn interrupted_between_frames_it_leaves_whole_ones() {
     let folder = Folder::new();
     let line = "render config11 --width 256 --aa 2 --samples 64 --threads 1 --frames 0..9999 -o f.png";
-    let mut child = folder.command(line.split_whitespace()).stderr(Stdio::piped()).spawn().unwrap();
+    let mut child = listening(&folder).args(line.split_whitespace()).stderr(Stdio::piped()).spawn().unwrap();
     let mut stderr = BufReader::new(child.stderr.take().unwrap());
     let mut said = String::new();
     while !said.contains("wrote f.0001.png") {

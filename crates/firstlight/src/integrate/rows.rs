@@ -435,28 +435,52 @@ impl<S: Simd> Row<S> {
         wanted: Wanted,
         sums: &mut [f32x16<S>; 2],
     ) {
+        match order {
+            3 => self.add_nodes::<3>(simd, view, [from, to], pieces, wanted, sums),
+            4 => self.add_nodes::<4>(simd, view, [from, to], pieces, wanted, sums),
+            _ => self.add_nodes::<5>(simd, view, [from, to], pieces, wanted, sums),
+        }
+    }
+
+    /// The same by the rule of so many nodes.
+    #[inline(always)]
+    fn add_nodes<const NODES: usize>(
+        &self,
+        simd: S,
+        view: &View,
+        [from, to]: [f32x16<S>; 2],
+        pieces: usize,
+        wanted: Wanted,
+        sums: &mut [f32x16<S>; 2],
+    ) {
         let zero = simd.splat_f32x16(0.0);
         let half = ((to - from) * (0.5 / pieces as f32)).max(zero);
-        let rule = gauss(order);
+        let rule = gauss(NODES);
         for piece in 0..pieces {
             let middle = from + half * (2 * piece + 1) as f32;
-            for (node, weight) in rule.nodes.iter().zip(rule.weights) {
-                let x = middle + half * *node;
+            let (mut shares, mut cos_i, mut cos_io) = ([zero; NODES], [zero; NODES], [zero; NODES]);
+            for k in 0..NODES {
+                let x = middle + half * rule.nodes[k];
                 let s = x * view.la + self.along;
                 let distance2 = s * s + self.rest;
                 let inverse = 1.0 / distance2.max(simd.splat_f32x16(f32::MIN_POSITIVE)).sqrt();
-                let mut share = half * *weight;
+                shares[k] = half * rule.weights[k];
                 if view.physical {
-                    share *= inverse * inverse * (inverse * view.height);
+                    shares[k] *= inverse * inverse * (inverse * view.height);
                 }
                 // Rounding may lead below the horizon, on it nothing arrives
-                let cos_i = ((x * view.cos.x + self.cos) * inverse).max(zero);
-                if wanted.diffuse {
-                    sums[0] += cos_i * share;
+                cos_i[k] = ((x * view.cos.x + self.cos) * inverse).max(zero);
+                cos_io[k] = (x * view.out.x + self.out) * inverse;
+            }
+            if wanted.diffuse {
+                for (cos_i, share) in cos_i.iter().zip(&shares) {
+                    sums[0] += *cos_i * *share;
                 }
-                if wanted.specular && !matches!(view.lobe, Lobe::None) {
-                    let cos_io = (x * view.out.x + self.out) * inverse;
-                    sums[1] += view.lobe.eval_lanes(cos_i, simd.splat_f32x16(view.cos_o), cos_io) * share;
+            }
+            if wanted.specular && !matches!(view.lobe, Lobe::None) {
+                let lobes = view.lobe.eval_lanes(cos_i, simd.splat_f32x16(view.cos_o), cos_io);
+                for (lobe, share) in lobes.iter().zip(&shares) {
+                    sums[1] += *lobe * *share;
                 }
             }
         }

@@ -133,7 +133,8 @@ fn integrate_now<S: Simd>(simd: S, view: &View, region: &Region, wanted: Wanted,
         }
         if wanted.specular && !matches!(view.lobe, Lobe::None) {
             let cos_io = (x * view.out.x + y * view.out.y + view.out.c) * inverse;
-            specular += view.lobe.eval_lanes(cos_i, splat(view.cos_o), cos_io) * share;
+            let [lobe] = view.lobe.eval_lanes([cos_i], splat(view.cos_o), [cos_io]);
+            specular += lobe * share;
         }
     }
     let total = |v: f32x16<S>| crate::math::LaneSum::from_partials(v.to_array()).total() * view.measure;

@@ -63,15 +63,25 @@ impl BlinnPhongLobe {
         2.0 * self.half_exponent.value()
     }
 
-    /// [`eval`](Self::eval) in sixteen lanes: the same bits.
+    /// [`eval`](Self::eval) in so many times sixteen lanes: the same bits.
     #[inline(always)]
-    pub(crate) fn eval_lanes<S: Simd>(&self, cos_i: f32x16<S>, cos_o: f32x16<S>, cos_io: f32x16<S>) -> f32x16<S> {
-        let simd = cos_i.token();
+    pub(crate) fn eval_lanes<S: Simd, const N: usize>(
+        &self,
+        mut cos_i: [f32x16<S>; N],
+        cos_o: f32x16<S>,
+        cos_io: [f32x16<S>; N],
+    ) -> [f32x16<S>; N] {
+        let simd = cos_o.token();
         let (zero, one) = (simd.splat_f32x16(0.0), simd.splat_f32x16(1.0));
-        let sum = cos_i + cos_o;
-        let length2 = cos_io * 2.0 + 2.0;
-        let base = (sum * sum) / length2;
-        let base = base.simd_lt(one).select(base, one);
-        length2.simd_gt(zero).select(self.half_exponent.pow_lanes(base), zero)
+        for (base, cos_io) in cos_i.iter_mut().zip(cos_io) {
+            let (sum, length2) = (*base + cos_o, cos_io * 2.0 + 2.0);
+            *base = (sum * sum) / length2;
+            *base = base.simd_lt(one).select(*base, one);
+        }
+        let mut powers = self.half_exponent.pow_lanes(cos_i);
+        for (power, cos_io) in powers.iter_mut().zip(cos_io) {
+            *power = (cos_io * 2.0 + 2.0).simd_gt(zero).select(*power, zero);
+        }
+        powers
     }
 }

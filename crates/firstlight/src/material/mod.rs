@@ -132,11 +132,16 @@ impl Lobe {
         }
     }
 
-    /// [`eval`](Self::eval) in sixteen lanes: the same bits.
+    /// [`eval`](Self::eval) in so many times sixteen lanes: the same bits.
     #[inline(always)]
-    pub(crate) fn eval_lanes<S: Simd>(&self, cos_i: f32x16<S>, cos_o: f32x16<S>, cos_io: f32x16<S>) -> f32x16<S> {
+    pub(crate) fn eval_lanes<S: Simd, const N: usize>(
+        &self,
+        cos_i: [f32x16<S>; N],
+        cos_o: f32x16<S>,
+        cos_io: [f32x16<S>; N],
+    ) -> [f32x16<S>; N] {
         match self {
-            Lobe::None => cos_i.token().splat_f32x16(0.0),
+            Lobe::None => [cos_o.token().splat_f32x16(0.0); N],
             Lobe::Phong(lobe) => lobe.eval_lanes(cos_i, cos_o, cos_io),
             Lobe::BlinnPhong(lobe) => lobe.eval_lanes(cos_i, cos_o, cos_io),
         }

@@ -56,12 +56,20 @@ impl PhongLobe {
         self.exponent.value()
     }
 
-    /// [`eval`](Self::eval) in sixteen lanes: the same bits.
+    /// [`eval`](Self::eval) in so many times sixteen lanes: the same bits.
     #[inline(always)]
-    pub(crate) fn eval_lanes<S: Simd>(&self, cos_i: f32x16<S>, cos_o: f32x16<S>, cos_io: f32x16<S>) -> f32x16<S> {
-        let (zero, one) = (cos_i.token().splat_f32x16(0.0), cos_i.token().splat_f32x16(1.0));
-        let base = (cos_i * 2.0) * cos_o - cos_io;
-        let base = base.simd_lt(one).select(base, one);
-        self.exponent.pow_lanes(base.simd_gt(zero).select(base, zero))
+    pub(crate) fn eval_lanes<S: Simd, const N: usize>(
+        &self,
+        mut cos_i: [f32x16<S>; N],
+        cos_o: f32x16<S>,
+        cos_io: [f32x16<S>; N],
+    ) -> [f32x16<S>; N] {
+        let (zero, one) = (cos_o.token().splat_f32x16(0.0), cos_o.token().splat_f32x16(1.0));
+        for (base, cos_io) in cos_i.iter_mut().zip(cos_io) {
+            *base = (*base * 2.0) * cos_o - cos_io;
+            *base = base.simd_lt(one).select(*base, one);
+            *base = base.simd_gt(zero).select(*base, zero);
+        }
+        self.exponent.pow_lanes(cos_i)
     }
 }

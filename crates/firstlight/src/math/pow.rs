@@ -61,21 +61,31 @@ impl Exponent {
         }
     }
 
-    /// [`pow`](Self::pow) in sixteen lanes: the same bits in each.
+    /// [`pow`](Self::pow) in so many times sixteen lanes: the same bits in each. Several at once hide how long each
+    /// multiplication waits for the one before.
     #[inline(always)]
-    pub fn pow_lanes<S: Simd>(self, x: f32x16<S>) -> f32x16<S> {
+    pub fn pow_lanes<S: Simd, const N: usize>(self, mut x: [f32x16<S>; N]) -> [f32x16<S>; N] {
         match self.kind {
             Kind::Whole(n) => chain_lanes(x, n),
-            Kind::Half(n) => chain_lanes(x, n) * x.sqrt(),
+            Kind::Half(n) => {
+                let mut powers = chain_lanes(x, n);
+                for (power, x) in powers.iter_mut().zip(x) {
+                    *power *= x.sqrt();
+                }
+                powers
+            }
             Kind::Real(y) => {
                 // A plain loop, which the compiler turns into lanes. Written with the lanes' own bit casts, this took
                 // six times as long to compile as all the rest of the library, and ran no faster.
-                let mut lanes = [0.0; LANES];
-                x.store_slice(&mut lanes);
-                for lane in &mut lanes {
-                    *lane = exp2(y * log2(*lane));
+                for x in &mut x {
+                    let mut lanes = [0.0; LANES];
+                    x.store_slice(&mut lanes);
+                    for lane in &mut lanes {
+                        *lane = exp2(y * log2(*lane));
+                    }
+                    *x = f32x16::simd_from(x.token(), lanes);
                 }
-                f32x16::simd_from(x.token(), lanes)
+                x
             }
         }
     }
@@ -95,18 +105,22 @@ fn chain(x: f32, n: u32) -> f32 {
     result
 }
 
-/// [`chain`] in sixteen lanes.
+/// [`chain`] in lanes.
 #[inline(always)]
-fn chain_lanes<S: Simd>(x: f32x16<S>, n: u32) -> f32x16<S> {
-    let (mut result, mut square, mut rest) = (x.token().splat_f32x16(1.0), x, n);
+fn chain_lanes<S: Simd, const N: usize>(x: [f32x16<S>; N], n: u32) -> [f32x16<S>; N] {
+    let (mut results, mut squares, mut rest) = ([x[0].token().splat_f32x16(1.0); N], x, n);
     while rest > 0 {
         if rest & 1 == 1 {
-            result *= square;
+            for (result, square) in results.iter_mut().zip(&squares) {
+                *result *= *square;
+            }
         }
-        square *= square;
+        for square in &mut squares {
+            *square *= *square;
+        }
         rest >>= 1;
     }
-    result
+    results
 }
 
 /// The bits of sqrt(1/2): mantissas are taken from sqrt(1/2) to sqrt(2), so that x near 1 loses nothing.
@@ -195,7 +209,8 @@ mod tests {
                     let lanes: [f32; 16] = dispatch!(level, simd => {
                         let v = f32x16::from_slice(simd, chunk);
                         let mut out = [0.0; 16];
-                        e.pow_lanes(v).store_slice(&mut out);
+                        let [_, power] = e.pow_lanes([v * 0.5, v]);
+                        power.store_slice(&mut out);
                         out
                     });
                     for (x, lane) in chunk.iter().zip(lanes) {

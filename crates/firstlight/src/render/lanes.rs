@@ -162,7 +162,8 @@ fn gather_area<S: Simd>(
         let cos_io = wo.dot(l) * inverse_distance;
         diffuse += lit.select(cos_i * weight, zero);
         if !matches!(lobe, Lobe::None) {
-            specular += lit.select(lobe.eval_lanes(cos_i, splat(cos_o), cos_io) * weight, zero);
+            let [lobe] = lobe.eval_lanes([cos_i], splat(cos_o), [cos_io]);
+            specular += lit.select(lobe * weight, zero);
         }
     }
     LobeSums { diffuse: partials(diffuse), specular: partials(specular) }
