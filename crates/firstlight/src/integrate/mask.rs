@@ -14,7 +14,7 @@ use super::emitter::Emitter;
 use super::view::{Outline, View};
 use crate::accel::RayPacket16;
 use crate::ids::LightId;
-use crate::light::SampleSet;
+use crate::light::{SERIES, point_of_series};
 use crate::material::Lobe;
 use crate::math::{LANES, ShadowRay, Vec3};
 use crate::scene::{Scene, ShadowRays};
@@ -35,9 +35,6 @@ const EDGE: f32 = 1.0;
 const CLEAR: f64 = 1.5;
 /// The share of points that have to be as good as alike.
 const UNEVEN: f64 = 1.0 / 16.0;
-/// Series of points, as different as points of one sequence are.
-pub(crate) const SERIES: usize = 16;
-
 /// Points of the square [-1, 1]^2, and what they are on a disk: series by series.
 struct Points {
     square: Vec<[f32; 2]>,
@@ -47,9 +44,8 @@ struct Points {
 fn points() -> &'static Points {
     static POINTS: OnceLock<Points> = OnceLock::new();
     POINTS.get_or_init(|| {
-        let count = (SERIES * MOST) as u32;
-        let square = (0..count).map(|k| SampleSet::Sobol.point(k, count, 0).map(|w| (2.0 * w - 1.0) as f32));
-        let mut square: Vec<[f32; 2]> = square.collect();
+        let each = |series| (0..MOST as u32).map(move |k| point_of_series(k, series).map(|w| (2.0 * w - 1.0) as f32));
+        let mut square: Vec<[f32; 2]> = (0..SERIES).flat_map(each).collect();
         // Those that are asked together are near each other: so are the ways to them
         for series in square.chunks_exact_mut(MOST) {
             let (mut from, mut to) = (0, LANES);
@@ -85,7 +81,7 @@ pub(crate) struct Masked<'a> {
     pub between: &'a Between,
     /// The share of a pixel that asks. Of small parts, each with an error of its own, less is asked.
     pub share: f32,
-    /// Which of the [`SERIES`] is asked: errors of different ones are as good as independent.
+    /// Which of the [`SERIES`] is asked: what one passes by, others meet.
     pub series: usize,
     /// How many points were asked.
     pub asked: Cell<u64>,

@@ -25,6 +25,7 @@ pub use disk::{Disk, DiskLightDesc};
 pub use point::{Point, PointDesc};
 pub use rectangle::{Rectangle, RectangleDesc};
 pub use samples::SampleSet;
+pub(crate) use samples::{SERIES, point_of_series};
 pub use sphere::{Sphere, SphereLightDesc};
 pub use spot::{Spot, SpotDesc};
 

@@ -34,7 +34,7 @@ impl SampleSet {
         let side = count.isqrt().max(1);
         let in_cell = |[x, y]: [f64; 2]| [((k % side) as f64 + x) / side as f64, ((k / side) as f64 + y) / side as f64];
         match self {
-            SampleSet::Sobol => sobol(k),
+            SampleSet::Sobol => point_of_series(k, 0),
             SampleSet::Grid => in_cell([0.5, 0.5]),
             SampleSet::Stratified => in_cell(random(k, seed)),
             SampleSet::Uniform => random(k, seed),
@@ -42,15 +42,30 @@ impl SampleSet {
     }
 }
 
-/// Point `k` of the Sobol' (0, 2)-sequence, both coordinates scrambled in Owen's way under fixed seeds: the first 2^m
-/// points are stratified in every way that the square can be cut into 2^m equal boxes of binary sides.
+/// Series of points that go well together.
+pub(crate) const SERIES: usize = 16;
+
+/// Point `k` of one of the [`SERIES`] of a Sobol' (0, 2)-sequence, both coordinates scrambled in Owen's way under fixed seeds: the first
+/// 2^m points of each are stratified in every way that the square can be cut into 2^m equal boxes of binary sides.
 ///
-/// Source: Burley, "Practical hash-based Owen scrambling", JCGT 9(4), 2020, section 3.
-fn sobol(k: u32) -> [f64; 2] {
+/// Series 0 is the sequence itself. In each of the others some digits of all points are turned, so that the first 2^m points of all
+/// together are stratified nearly as well: m from 3 to 10, they are a (t, m + 4, 2)-net in base 2 with t up to 2.
+///
+/// Sources: Burley, "Practical hash-based Owen scrambling", JCGT 9(4), 2020, section 3; of nets: Niederreiter, "Random Number Generation
+/// and Quasi-Monte Carlo Methods", 1992, section 4.1.
+pub(crate) fn point_of_series(k: u32, series: usize) -> [f64; 2] {
+    let turned = |digits: [u32; 4]| {
+        let chosen = (0..4).filter(|bit| series >> bit & 1 == 1);
+        chosen.fold(0, |turned, bit| turned ^ digits[bit] << 16)
+    };
     // The radical inverse is the first dimension; Sobol's second direction numbers make the other
-    let (x, y) = (k.reverse_bits(), sobol_second(k));
+    let (x, y) = (k.reverse_bits() ^ turned(TURNED[0]), sobol_second(k) ^ turned(TURNED[1]));
     [unit(owen(x, SCRAMBLE[0])), unit(owen(y, SCRAMBLE[1]))]
 }
+
+/// The digits that each bit of a series' number turns: the first 16 of each coordinate. Found by search: of all that was tried, the sum of t
+/// squared over all numbers of points and 2, 4, 8 and 16 series is the least.
+const TURNED: [[u32; 4]; 2] = [[0x7a7f, 0x7f4b, 0x9526, 0x8cf9], [0xdfca, 0x22a7, 0x1251, 0x29d3]];
 
 /// The scramble of the sequence: part of the definition of every picture with an area light.
 const SCRAMBLE: [u32; 2] = [0x5be0_cd19, 0x1f83_d9ab];
@@ -123,6 +138,24 @@ mod tests {
                     seen[cell] = true;
                 }
             }
+        }
+    }
+
+    #[test]
+    fn series_are_stratified_together() {
+        for m in 3..=10u32 {
+            let least = (0..=m + SERIES.ilog2()).find(|t| {
+                let boxes = m + SERIES.ilog2() - t;
+                (0..=boxes).all(|shape| {
+                    let (columns, rows) = (1usize << shape, 1usize << (boxes - shape));
+                    let mut counts = vec![0; columns * rows];
+                    for [x, y] in (0..SERIES).flat_map(|series| (0..1 << m).map(move |k| point_of_series(k, series))) {
+                        counts[(x * columns as f64) as usize * rows + (y * rows as f64) as usize] += 1;
+                    }
+                    counts.iter().all(|count| *count == 1 << t)
+                })
+            });
+            assert!(least <= Some(2), "{least:?} with {} points each", 1 << m);
         }
     }
 

@@ -7,7 +7,8 @@
 use super::Counts;
 use super::arrival::{Arrivals, Behind, Place, Seen};
 use crate::color::Rgb;
-use crate::integrate::{MOST, Masked, SERIES, Sums, Tally};
+use crate::integrate::{MOST, Masked, Sums, Tally};
+use crate::light::SERIES;
 use crate::material::Bsdf;
 use crate::math::LANES;
 use crate::shape::SurfaceInteraction;
@@ -18,8 +19,15 @@ const POINTS: f32 = 512.0;
 const CLEAR: f64 = 0.75;
 /// The most that a ray begins with.
 const FIRST: usize = 256;
-/// How much farther off the sums may be than two numbers of points tell: of many rays, and of one. Few can agree by chance.
-const DOUBT: [f32; 2] = [2.0, 6.0];
+/// How much farther off the sums may be than two numbers of points tell: of many rays, and of one more, which can agree by chance.
+const DOUBT: [f32; 2] = [2.0, 4.0];
+/// The same of what the rays would make together by chance. Points of different series share a light better than by chance: behind the
+/// same straight edge sixteen are wrong by half as much.
+const DOUBT_BY_CHANCE: [f32; 2] = [1.0, 5.0];
+/// The part of what may be wrong that points may tell nothing about.
+const UNTOLD: f32 = 0.5;
+/// How many times as much may be wrong where each ray has asked as many points as there are.
+const AT_MOST: f32 = 2.0;
 
 /// A ray whose light is behind things.
 struct Asking {
@@ -115,7 +123,7 @@ impl Together {
         let mut is_first = true;
         loop {
             let (mut value, mut moved, mut squares, mut all) = (self.value, Rgb::BLACK, Rgb::BLACK, Rgb::BLACK);
-            let (mut hidden, mut is_uneven, mut worth) = (0, false, 0.0);
+            let (mut hidden, mut worth, mut uneven) = (0, 0.0, Rgb::BLACK);
             for one in asking.iter_mut() {
                 let place = self.place(arrivals, &one.si, &one.bsdf, one.series);
                 let masked: Masked = arrivals.behind(self.light, &place, &one.behind);
@@ -129,15 +137,14 @@ impl Together {
                 hidden += one.tally.hidden;
                 worth += one.tally.worth();
                 let [diffuse, highlight] = one.tally.is_uneven(&one.behind.whole);
-                let shows = || {
-                    let sent = place.colors[1] * one.behind.whole.specular;
-                    arrivals.steps(place.base + of(&one.behind.whole), sent) > tolerance
-                };
-                is_uneven |= diffuse || highlight && shows();
+                let known = |is_uneven: bool, sum: f32| if is_uneven { sum } else { 0.0 };
+                let Sums { diffuse: all, specular: shine } = one.behind.whole;
+                uneven += of(&Sums { diffuse: known(diffuse, all), specular: known(highlight, shine) });
                 one.before = now;
             }
             let points = (to * asking.len()) as f32;
-            if is_uneven {
+            // Whatever is true of what points tell nothing about
+            if arrivals.steps(value * part, uneven * part) > tolerance * UNTOLD {
                 return false;
             }
             let is_clear = hidden == 0 && (worth >= f64::from(wanted) * CLEAR || to == MOST);
@@ -145,11 +152,12 @@ impl Together {
                 return true;
             }
             // By how much the sum moved, or by as much as its parts would together if they moved by chance
-            let doubt = DOUBT[0] + (DOUBT[1] - DOUBT[0]) / asking.len() as f32;
-            let off = Rgb::max(moved.map(f32::abs), squares.map(f32::sqrt)) * doubt;
+            let doubt = |[many, one]: [f32; 2]| many + one / asking.len() as f32;
+            let off = Rgb::max(moved.map(f32::abs) * doubt(DOUBT), squares.map(f32::sqrt) * doubt(DOUBT_BY_CHANCE));
             // What one more point could change is the least that can be wrong
             let error = off.max(all * (1.0 / points));
-            if hidden > 0 && !is_first && arrivals.steps(value * part, error * part) <= tolerance {
+            let most = if to == MOST { tolerance * AT_MOST } else { tolerance };
+            if hidden > 0 && !is_first && arrivals.steps(value * part, error * part) <= most {
                 return true;
             }
             if to == MOST {
