@@ -6,10 +6,9 @@ use fearless_simd::Level;
 
 use super::Counts;
 use super::change::{Arrival, Change, change, horizon_change, unseen};
-use super::lanes::Lanes;
 use super::many::FEW;
 use super::patch::Patch;
-use super::pixel::Lighting;
+use super::shafts;
 use crate::color::{DisplaySteps, Rgb};
 use crate::ids::LightId;
 use crate::integrate::{Asker, Between, Emitter, Masked, Receiver, Sums, View, integrate};
@@ -18,7 +17,7 @@ use crate::material::{Bsdf, Lobe};
 use crate::math::dispatch_wide;
 use crate::scene::Scene;
 use crate::shape::SurfaceInteraction;
-use crate::visibility::{Occluders, Target, Viewpoint, Visibility};
+use crate::visibility::{Occluders, Settler, Target, Viewpoint, Visibility};
 
 /// A place of a surface that asks for light.
 #[derive(Clone, Copy)]
@@ -89,14 +88,12 @@ pub(crate) struct Behind {
 pub(crate) struct Lights {
     /// For each light, if it is integrated.
     pub emitters: Vec<Option<Emitter>>,
-    /// Whether any light with an area is not.
-    sampled: bool,
     pub steps: DisplaySteps,
     /// In display steps: how far one light may be wrong at a place.
     tolerance: f32,
     /// Where there are many.
     tree: Option<LightTree>,
-    /// The lights as shafts lead to them; none where there are no trees to lead through.
+    /// The lights as shafts lead to them; none where all are integrated, and there are no trees to lead through.
     targets: Vec<Target>,
 }
 
@@ -115,11 +112,11 @@ impl Lights {
         };
         let emitters: Vec<_> = scene.lights.iter().map(emitter).collect();
         let tolerance = TOLERANCE / (emitters.len().max(1) as f32).sqrt();
-        let targets = if scene.geometry.has_trees() { Target::of_all(scene) } else { Vec::new() };
         let is_area = |light: &Light| matches!(light.kind, LightKind::Area(_));
         let sampled = scene.lights.iter().zip(&emitters).any(|(light, emitter)| is_area(light) && emitter.is_none());
+        let targets = if sampled || scene.geometry.has_trees() { Target::of_all(scene) } else { Vec::new() };
         let tree = (scene.lights.len() > FEW).then(|| LightTree::new(&scene.lights));
-        Lights { emitters, sampled, steps: DisplaySteps::new(&scene.display), tolerance, tree, targets }
+        Lights { emitters, steps: DisplaySteps::new(&scene.display), tolerance, tree, targets }
     }
 }
 
@@ -128,7 +125,8 @@ pub(crate) struct Arrivals<'a> {
     pub(super) scene: &'a Scene,
     lights: &'a Lights,
     level: Level,
-    sampled: Lanes,
+    /// Of lights that are sampled.
+    settler: Settler,
     pub(super) occluders: Occluders,
     tolerance: f32,
 }
@@ -144,7 +142,7 @@ impl<'a> Arrivals<'a> {
             scene,
             lights,
             level,
-            sampled: Lanes::new(level),
+            settler: Settler::default(),
             occluders: Occluders::default(),
             tolerance: lights.tolerance,
         }
@@ -168,13 +166,6 @@ impl<'a> Arrivals<'a> {
     /// From now on each light may be wrong by so many display steps.
     pub fn tolerate(&mut self, tolerance: f32) {
         self.tolerance = tolerance;
-    }
-
-    /// Has to be called first at each place.
-    pub fn look_around(&mut self, si: &SurfaceInteraction) {
-        if self.lights.sampled {
-            self.sampled.look_around(self.scene, si);
-        }
     }
 
     /// How many display steps a value can be off by an error.
@@ -216,8 +207,10 @@ impl<'a> Arrivals<'a> {
                 })
             }
             (None, LightKind::Area(area)) => {
-                let sums = self.sampled.gather(self.scene, index, place.si, place.lobe, counts);
-                let sums = Sums { diffuse: sums.diffuse.total(), specular: sums.specular.total() };
+                let (settler, target) = (&mut self.settler, &self.lights.targets[index]);
+                let [diffuse, specular] =
+                    shafts::to_point(settler, self.level, self.scene, index, target, place.si, place.lobe, counts);
+                let sums = Sums { diffuse, specular };
                 if place.reach == 0.0 {
                     return Arrival::even(sums);
                 }

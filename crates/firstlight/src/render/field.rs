@@ -274,7 +274,6 @@ impl OneLight<'_, '_> {
         let scale = self.arrivals.scale(self.light);
         let colors = [scale * self.shade.diffuse, scale * self.shade.specular];
         let place = Place { reach, turn, ..Place::point(si, &self.shade.lobe, self.shade.base, colors) };
-        self.arrivals.look_around(si);
         self.arrivals.arrival(self.light, &place, self.counts)
     }
 

@@ -17,7 +17,7 @@ use super::tile::Tile;
 use super::{Counts, QUESTION_EVERY};
 use crate::ids::LightId;
 use crate::light::LightKind;
-use crate::material::Bsdf;
+use crate::material::{Bsdf, Lobe};
 use crate::scene::Scene;
 use crate::shape::SurfaceInteraction;
 use crate::visibility::{Settler, Target, View, Viewpoint, Visibility};
@@ -141,7 +141,7 @@ impl<'a> Shafts<'a> {
             } else {
                 counts.shadow_rays += samples;
                 counts.shadow_rays_skipped += samples;
-                sums[k] = lit(scene, level, index, si, bsdf);
+                sums[k] = lit(scene, level, index, si, &bsdf.lobe);
             }
         }
         // The others in parts that are not too long for someone who waits
@@ -151,25 +151,74 @@ impl<'a> Shafts<'a> {
                 counts.next_question = counts.shadow_rays + QUESTION_EVERY;
                 go_on()?;
             }
-            counts.shadow_rays += samples * part.len() as u64;
-            let settled = &mut counts.settled;
-            let before = *settled;
-            self.settler.settle(level, scene, target, &self.points, part, settled, |k, visibility, view| {
-                let (si, bsdf) = &surfaces[k];
-                match visibility {
-                    Visibility::Hidden | Visibility::BelowHorizon => {}
-                    Visibility::Lit => sums[k] = lit(scene, level, index, si, bsdf),
-                    Visibility::Mask => sums[k] = masked(scene, level, index, si, bsdf, view),
-                }
-            });
-            // Cut by shapes of the lists, which are asked for every sample, or by what is in the trees
-            let cut = settled.visibility[Visibility::Mask as usize] - before.visibility[Visibility::Mask as usize];
-            let traced = settled.traced - before.traced;
-            let asked = if scene.geometry.has_trees() { traced } else { samples * cut };
-            counts.shadow_rays_skipped += samples * part.len() as u64 - asked;
+            settle(
+                &mut self.settler,
+                level,
+                scene,
+                index,
+                target,
+                &self.points,
+                part,
+                counts,
+                |k, visibility, view| {
+                    let (si, bsdf) = &surfaces[k];
+                    sums[k] = sent(scene, level, index, si, &bsdf.lobe, visibility, view);
+                },
+            );
         }
         ControlFlow::Continue(())
     }
+}
+
+/// What light `index`, which shines on the surface, sends to one point of it.
+#[allow(clippy::too_many_arguments, reason = "a light of a scene and a point of a surface")]
+pub(super) fn to_point(
+    settler: &mut Settler,
+    level: Level,
+    scene: &Scene,
+    index: usize,
+    target: &Target,
+    si: &SurfaceInteraction,
+    lobe: &Lobe,
+    counts: &mut Counts,
+) -> [f32; 2] {
+    let light = &scene.lights[index];
+    if !(light.shadows && si.receives_shadow) {
+        counts.shadow_rays += light.samples() as u64;
+        counts.shadow_rays_skipped += light.samples() as u64;
+        return lit(scene, level, index, si, lobe);
+    }
+    let mut sums = [0.0; 2];
+    settle(settler, level, scene, index, target, &[Viewpoint::of(si)], &mut [0], counts, |_, visibility, view| {
+        sums = sent(scene, level, index, si, lobe, visibility, view);
+    });
+    sums
+}
+
+/// Hears what of light `index` is seen from those `points` whose numbers are in `part`, and counts the samples.
+#[allow(clippy::too_many_arguments, reason = "a light of a scene and points, as lists")]
+fn settle(
+    settler: &mut Settler,
+    level: Level,
+    scene: &Scene,
+    index: usize,
+    target: &Target,
+    points: &[Viewpoint],
+    part: &mut [u32],
+    counts: &mut Counts,
+    each: impl FnMut(usize, Visibility, &View),
+) {
+    let samples = scene.lights[index].samples() as u64;
+    let all = samples * part.len() as u64;
+    let settled = &mut counts.settled;
+    let before = *settled;
+    settler.settle(level, scene, target, points, part, settled, each);
+    // Cut by shapes of the lists, which are asked for every sample, or by what is in the trees
+    let cut = settled.visibility[Visibility::Mask as usize] - before.visibility[Visibility::Mask as usize];
+    let traced = settled.traced - before.traced;
+    let asked = if scene.geometry.has_trees() { traced } else { samples * cut };
+    counts.shadow_rays += all;
+    counts.shadow_rays_skipped += all - asked;
 }
 
 /// Whether a surface lets light `index` shine on it.
@@ -183,27 +232,45 @@ fn totals(sums: LobeSums) -> [f32; 2] {
     [sums.diffuse.total(), sums.specular.total()]
 }
 
+/// What arrives of light `index`, so much of which is seen.
+#[inline(always)]
+fn sent(
+    scene: &Scene,
+    level: Level,
+    index: usize,
+    si: &SurfaceInteraction,
+    lobe: &Lobe,
+    visibility: Visibility,
+    view: &View,
+) -> [f32; 2] {
+    match visibility {
+        Visibility::Hidden | Visibility::BelowHorizon => [0.0; 2],
+        Visibility::Lit => lit(scene, level, index, si, lobe),
+        Visibility::Mask => masked(scene, level, index, si, lobe, view),
+    }
+}
+
 /// What arrives of light `index` where nothing hides any of it.
 #[inline(always)]
-fn lit(scene: &Scene, level: Level, index: usize, si: &SurfaceInteraction, bsdf: &Bsdf) -> [f32; 2] {
+fn lit(scene: &Scene, level: Level, index: usize, si: &SurfaceInteraction, lobe: &Lobe) -> [f32; 2] {
     totals(match &scene.lights[index].kind {
-        LightKind::Area(area) => sum_area(level, area, si, &bsdf.lobe, &Obstacles::default()),
+        LightKind::Area(area) => sum_area(level, area, si, lobe, &Obstacles::default()),
         _ => {
             let unshadowed = SurfaceInteraction { receives_shadow: false, ..*si };
-            Plain.gather(scene, index, &unshadowed, &bsdf.lobe, &mut Counts::default())
+            Plain.gather(scene, index, &unshadowed, lobe, &mut Counts::default())
         }
     })
 }
 
 /// What arrives of light `index` past what is in `view`.
 #[inline(always)]
-fn masked(scene: &Scene, level: Level, index: usize, si: &SurfaceInteraction, bsdf: &Bsdf, view: &View) -> [f32; 2] {
+fn masked(scene: &Scene, level: Level, index: usize, si: &SurfaceInteraction, lobe: &Lobe, view: &View) -> [f32; 2] {
     totals(match &scene.lights[index].kind {
         LightKind::Area(area) => {
             let View { spheres, flats, disks, hidden, .. } = view;
             let obstacles = Obstacles { spheres, flats, disks, hidden, ..Obstacles::default() };
-            sum_area(level, area, si, &bsdf.lobe, &obstacles)
+            sum_area(level, area, si, lobe, &obstacles)
         }
-        _ => Plain.gather(scene, index, si, &bsdf.lobe, &mut Counts::default()),
+        _ => Plain.gather(scene, index, si, lobe, &mut Counts::default()),
     })
 }

@@ -421,7 +421,6 @@ impl<'a> Tiled<'a> {
     /// What arrives at the middle of a patch of a pixel.
     fn once(&mut self, patch: &Patch, at: [u32; 2], counts: &mut Counts) {
         let scene = self.scene;
-        self.arrivals.look_around(&patch.si);
         let base = scene.ambient * patch.bsdf.ambient;
         let mut value = base;
         let share = self.share(patch);

@@ -72,7 +72,6 @@ impl Together {
     pub fn ask(&mut self, arrivals: &mut Arrivals, si: &SurfaceInteraction, bsdf: &Bsdf, counts: &mut Counts) {
         let series = (self.series + self.rays) % SERIES;
         self.rays += 1;
-        arrivals.look_around(si);
         // What is integrated is wrong alike at all rays: that much by no more than if one stood for all
         let place = Place { share: self.share, ..self.place(arrivals, si, bsdf, series) };
         self.value += place.base;

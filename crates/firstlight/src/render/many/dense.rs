@@ -165,7 +165,6 @@ impl<'a> Many<'a> {
         let from = self.singles.len() as u32;
         let mut light = stored.sent[0];
         if !singles.is_empty() {
-            arrivals.look_around(si);
             arrivals.tolerate(INTEGRALS / (singles.len() as f32).sqrt());
         }
         for index in singles {

@@ -66,7 +66,6 @@ impl<'a> Many<'a> {
             if !doubts.is_empty() {
                 arrivals.tolerate(INTEGRALS / (doubts.len() as f32).sqrt());
                 patch.for_each(scene, at, |si, bsdf| {
-                    arrivals.look_around(si);
                     for doubt in &doubts {
                         match doubt.single {
                             Some(i) => {

@@ -306,7 +306,6 @@ impl<'a> Many<'a> {
         let from = self.singles.len();
         stored.value = value;
         if !open.is_empty() {
-            arrivals.look_around(si);
             arrivals.tolerate(INTEGRALS / (open.len() as f32).sqrt());
             let zone = zone(std::iter::once(patch), self.eye);
             let tones = [tone(scene, bsdf)];

@@ -175,7 +175,6 @@ impl Tiled<'_> {
         let arrivals: ArrayVec<Arrival, 4> = quarters
             .iter()
             .map(|quarter| {
-                self.arrivals.look_around(&quarter.si);
                 let place = self.arrivals.place(light, &quarter.si, &quarter.bsdf).over(quarter);
                 let place = Place { share, allowed, ..place };
                 self.arrivals.arrival(light, &place, counts)
