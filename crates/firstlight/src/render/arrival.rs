@@ -8,7 +8,7 @@ use super::Counts;
 use super::change::{Arrival, Change, change, horizon_change, unseen};
 use super::many::FEW;
 use super::patch::Patch;
-use super::shafts;
+use super::sampled::Sampled;
 use crate::color::{DisplaySteps, Rgb};
 use crate::ids::LightId;
 use crate::integrate::{Asker, Between, Emitter, Masked, Receiver, Sums, View, integrate};
@@ -207,9 +207,8 @@ impl<'a> Arrivals<'a> {
                 })
             }
             (None, LightKind::Area(area)) => {
-                let (settler, target) = (&mut self.settler, &self.lights.targets[index]);
-                let [diffuse, specular] =
-                    shafts::to_point(settler, self.level, self.scene, index, target, place.si, place.lobe, counts);
+                let light = Sampled::new(self.scene, self.level, index, &self.lights.targets);
+                let [diffuse, specular] = light.to_point(&mut self.settler, place.si, place.lobe, counts);
                 let sums = Sums { diffuse, specular };
                 if place.reach == 0.0 {
                     return Arrival::even(sums);

@@ -24,6 +24,7 @@ mod many;
 mod patch;
 pub(crate) mod pixel;
 mod plain;
+mod sampled;
 mod shafts;
 mod simd;
 mod single;

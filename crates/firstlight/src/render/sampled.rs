@@ -1,0 +1,129 @@
+//! One light that is sampled, settled by shafts: how much of it points see, and what that sends to them.
+//!
+//! The sums over the samples are those of [`Lanes`](super::lanes::Lanes), in the same order.
+
+use fearless_simd::Level;
+
+use super::Counts;
+use super::lanes::{Obstacles, sum_area};
+use super::pixel::{Lighting, LobeSums};
+use super::plain::Plain;
+use crate::light::{Light, LightKind};
+use crate::material::Lobe;
+use crate::scene::Scene;
+use crate::shape::SurfaceInteraction;
+use crate::visibility::{Settler, Target, View, Viewpoint, Visibility};
+
+/// A light, and how shafts lead to it.
+pub(super) struct Sampled<'a> {
+    scene: &'a Scene,
+    level: Level,
+    index: usize,
+    target: &'a Target,
+}
+
+impl<'a> Sampled<'a> {
+    /// Light `index`; `targets` has one for each light.
+    pub fn new(scene: &'a Scene, level: Level, index: usize, targets: &'a [Target]) -> Self {
+        Sampled { scene, level, index, target: &targets[index] }
+    }
+
+    fn light(&self) -> &'a Light {
+        &self.scene.lights[self.index]
+    }
+
+    /// How many points it has.
+    pub fn samples(&self) -> u64 {
+        self.light().samples() as u64
+    }
+
+    /// Whether something may shadow a surface from it.
+    pub fn is_shadowed(&self, si: &SurfaceInteraction) -> bool {
+        self.light().shadows && si.receives_shadow
+    }
+
+    /// What it sends to one point, diffuse and specular; it has to shine on the surface.
+    pub fn to_point(
+        &self,
+        settler: &mut Settler,
+        si: &SurfaceInteraction,
+        lobe: &Lobe,
+        counts: &mut Counts,
+    ) -> [f32; 2] {
+        if !self.is_shadowed(si) {
+            return self.unshadowed(si, lobe, counts);
+        }
+        let mut sums = [0.0; 2];
+        self.settle(settler, &[Viewpoint::of(si)], &mut [0], counts, |_, visibility, view| {
+            sums = self.sent(si, lobe, visibility, view);
+        });
+        sums
+    }
+
+    /// What it sends to a point that nothing shadows.
+    pub fn unshadowed(&self, si: &SurfaceInteraction, lobe: &Lobe, counts: &mut Counts) -> [f32; 2] {
+        counts.shadow_rays += self.samples();
+        counts.shadow_rays_skipped += self.samples();
+        self.lit(si, lobe)
+    }
+
+    /// Hears what of it is seen from those `points` whose numbers are in `part`; see [`Settler::settle`].
+    pub fn settle(
+        &self,
+        settler: &mut Settler,
+        points: &[Viewpoint],
+        part: &mut [u32],
+        counts: &mut Counts,
+        each: impl FnMut(usize, Visibility, &View),
+    ) {
+        let all = self.samples() * part.len() as u64;
+        let settled = &mut counts.settled;
+        let before = *settled;
+        settler.settle(self.level, self.scene, self.target, points, part, settled, each);
+        // Cut by shapes of the lists, which are asked for every sample, or by what is in the trees
+        let cut = settled.visibility[Visibility::Mask as usize] - before.visibility[Visibility::Mask as usize];
+        let traced = settled.traced - before.traced;
+        let asked = if self.scene.geometry.has_trees() { traced } else { self.samples() * cut };
+        counts.shadow_rays += all;
+        counts.shadow_rays_skipped += all - asked;
+    }
+
+    /// What it sends to a point that sees so much of it.
+    #[inline(always)]
+    pub fn sent(&self, si: &SurfaceInteraction, lobe: &Lobe, visibility: Visibility, view: &View) -> [f32; 2] {
+        match visibility {
+            Visibility::Hidden | Visibility::BelowHorizon => [0.0; 2],
+            Visibility::Lit => self.lit(si, lobe),
+            Visibility::Mask => self.masked(si, lobe, view),
+        }
+    }
+
+    /// Where nothing hides any of it.
+    #[inline(always)]
+    fn lit(&self, si: &SurfaceInteraction, lobe: &Lobe) -> [f32; 2] {
+        totals(match &self.light().kind {
+            LightKind::Area(area) => sum_area(self.level, area, si, lobe, &Obstacles::default()),
+            _ => {
+                let unshadowed = SurfaceInteraction { receives_shadow: false, ..*si };
+                Plain.gather(self.scene, self.index, &unshadowed, lobe, &mut Counts::default())
+            }
+        })
+    }
+
+    /// Past what is in `view`.
+    #[inline(always)]
+    fn masked(&self, si: &SurfaceInteraction, lobe: &Lobe, view: &View) -> [f32; 2] {
+        totals(match &self.light().kind {
+            LightKind::Area(area) => {
+                let View { spheres, flats, disks, hidden, .. } = view;
+                let obstacles = Obstacles { spheres, flats, disks, hidden, ..Obstacles::default() };
+                sum_area(self.level, area, si, lobe, &obstacles)
+            }
+            _ => Plain.gather(self.scene, self.index, si, lobe, &mut Counts::default()),
+        })
+    }
+}
+
+fn totals(sums: LobeSums) -> [f32; 2] {
+    [sums.diffuse.total(), sums.specular.total()]
+}
