@@ -60,8 +60,8 @@ fn points() -> &'static Points {
 }
 
 /// How far `count` points may be wrong about the share of a light on one side of an edge.
-fn of_edge(count: usize) -> f32 {
-    let root = (count as f32).sqrt();
+pub(crate) fn of_edge(count: f32) -> f32 {
+    let root = count.sqrt();
     EDGE / (root * root.sqrt())
 }
 
@@ -148,10 +148,10 @@ impl Masked<'_> {
                 };
                 // What one more point could change is the least that can be wrong, and what points make of a shadow's edge
                 let has_edge = !is_small && (1..to).contains(&tally.hidden);
-                if has_edge && !enough(&now, &(*whole * of_edge(MOST))) {
+                if has_edge && !enough(&now, &(*whole * of_edge(MOST as f32))) {
                     return cells::integrate(&seen, Some(whole), enough);
                 }
-                let one = if has_edge { of_edge(to) } else { 1.0 / to as f32 };
+                let one = if has_edge { of_edge(to as f32) } else { 1.0 / to as f32 };
                 let error = Sums {
                     diffuse: (doubt * off(|sums| sums.diffuse)).max(whole.diffuse * one),
                     specular: (doubt * off(|sums| sums.specular)).max(whole.specular * one),

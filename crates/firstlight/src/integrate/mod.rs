@@ -31,7 +31,7 @@ use fearless_simd::prelude::*;
 pub(crate) use between::{Asker, Between};
 pub(crate) use emitter::Emitter;
 use hider::Hider;
-pub(crate) use mask::{MOST, Masked, Tally};
+pub(crate) use mask::{MOST, Masked, Tally, of_edge};
 use rows::{MAX_HIDERS, Region};
 pub(crate) use tensor::sharpness;
 use view::Outline;

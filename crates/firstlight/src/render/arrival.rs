@@ -102,7 +102,7 @@ const LEAST_SHARE: f32 = 1.0 / 8.0;
 /// In display steps: how far all lights together may be wrong.
 const TOLERANCE: f32 = 0.1;
 /// The same where each place is wrong by itself, as by chance: nothing of that shows as a step or an edge.
-const BY_CHANCE: f32 = 0.25;
+const BY_CHANCE: f32 = 0.2;
 
 impl Lights {
     pub fn new(scene: &Scene) -> Lights {

@@ -7,7 +7,7 @@
 use super::Counts;
 use super::arrival::{Arrivals, Behind, Place, Seen};
 use crate::color::Rgb;
-use crate::integrate::{MOST, Masked, Sums, Tally};
+use crate::integrate::{MOST, Masked, Sums, Tally, of_edge};
 use crate::light::SERIES;
 use crate::material::Bsdf;
 use crate::math::LANES;
@@ -26,8 +26,8 @@ const DOUBT: [f32; 2] = [2.0, 4.0];
 const DOUBT_BY_CHANCE: [f32; 2] = [1.0, 5.0];
 /// The part of what may be wrong that points may tell nothing about.
 const UNTOLD: f32 = 0.5;
-/// How many times as much may be wrong where each ray has asked as many points as there are.
-const AT_MOST: f32 = 2.0;
+/// The part of what chance makes of an edge that is wrong at the least: two numbers of points may agree for no reason.
+const OF_EDGE: f32 = 0.4;
 
 /// A ray whose light is behind things.
 struct Asking {
@@ -70,7 +70,7 @@ impl Together {
 
     /// Asks for what one ray sees.
     pub fn ask(&mut self, arrivals: &mut Arrivals, si: &SurfaceInteraction, bsdf: &Bsdf, counts: &mut Counts) {
-        let series = (self.series + self.rays) % SERIES;
+        let series = self.series ^ (self.rays % SERIES);
         self.rays += 1;
         // What is integrated is wrong alike at all rays: that much by no more than if one stood for all
         let place = Place { share: self.share, ..self.place(arrivals, si, bsdf, series) };
@@ -153,10 +153,8 @@ impl Together {
             // By how much the sum moved, or by as much as its parts would together if they moved by chance
             let doubt = |[many, one]: [f32; 2]| many + one / asking.len() as f32;
             let off = Rgb::max(moved.map(f32::abs) * doubt(DOUBT), squares.map(f32::sqrt) * doubt(DOUBT_BY_CHANCE));
-            // What one more point could change is the least that can be wrong
-            let error = off.max(all * (1.0 / points));
-            let most = if to == MOST { tolerance * AT_MOST } else { tolerance };
-            if hidden > 0 && !is_first && arrivals.steps(value * part, error * part) <= most {
+            let error = off.max(all * (of_edge(points) * OF_EDGE));
+            if hidden > 0 && !is_first && arrivals.steps(value * part, error * part) <= tolerance {
                 return true;
             }
             if to == MOST {
