@@ -20,7 +20,7 @@ pub(crate) struct PixelHits {
     side: u32,
     /// Rays across.
     across: u32,
-    hits: Vec<(Ray, RayDifferential, Option<Hit>)>,
+    hits: Vec<Option<Hit>>,
     rays: Box<RayTile>,
     found: Box<TileHits>,
 }
@@ -34,7 +34,7 @@ impl PixelHits {
             level,
             side,
             across,
-            hits: Vec::new(),
+            hits: vec![None; (across * across) as usize],
             rays: Box::new(RayTile::ZERO),
             found: Box::new(TileHits::new(0.0)),
         }
@@ -49,10 +49,6 @@ impl PixelHits {
     pub fn trace(&mut self, scene: &Scene, i: u32, j: u32, width: u32, height: u32) {
         let n = scene.antialiasing;
         let (rays_across, rays_down) = (width * n, height * n);
-        if self.hits.is_empty() {
-            let (ray, differential) = camera_ray(scene, 0, 0);
-            self.hits.resize((self.across * self.across) as usize, (ray, differential, None));
-        }
         for top in (0..rays_down).step_by(BLOCK as usize) {
             for left in (0..rays_across).step_by(BLOCK as usize) {
                 let (w, h) = ((rays_across - left).min(BLOCK), (rays_down - top).min(BLOCK));
@@ -69,7 +65,7 @@ impl PixelHits {
         let mut active = 0u64;
         for row in 0..h {
             for column in 0..w {
-                let (ray, differential) = camera_ray(scene, x + left + column, y + top + row);
+                let (ray, _) = camera_ray(scene, x + left + column, y + top + row);
                 let mut nearest = scene.meet_listed(&ray);
                 if bundle {
                     geometry.meet_upper(self.level, &ray, &mut nearest);
@@ -83,7 +79,7 @@ impl PixelHits {
                 } else if geometry.has_trees() {
                     geometry.meet_trees(self.level, &ray, &mut nearest);
                 }
-                self.hits[((top + row) * self.across + left + column) as usize] = (ray, differential, nearest.0);
+                self.hits[((top + row) * self.across + left + column) as usize] = nearest.0;
             }
         }
         if !bundle {
@@ -94,7 +90,7 @@ impl PixelHits {
             let place = met.trailing_zeros();
             met &= met - 1;
             let (row, column) = (place / 32 * 4 + place % 16 / 4, place / 16 % 2 * 4 + place % 4);
-            let (_, _, hit) = &mut self.hits[((top + row) * self.across + left + column) as usize];
+            let hit = &mut self.hits[((top + row) * self.across + left + column) as usize];
             let mut nearest = Nearest(*hit);
             geometry.offer_world(&self.found, place as usize, &mut nearest);
             *hit = nearest.0;
@@ -104,13 +100,7 @@ impl PixelHits {
     /// What the ray (`column`, `row`) of pixel (`i`, `j`), counted from the first pixel that was traced, hits.
     #[inline(always)]
     pub fn get(&self, n: u32, i: u32, j: u32, column: u32, row: u32) -> Option<Hit> {
-        self.seen(n, i, j, column, row).2
-    }
-
-    /// The same, with the ray and how it changes to the next.
-    #[inline(always)]
-    pub fn seen(&self, n: u32, i: u32, j: u32, column: u32, row: u32) -> &(Ray, RayDifferential, Option<Hit>) {
-        &self.hits[((j * n + row) * self.across + i * n + column) as usize]
+        self.hits[((j * n + row) * self.across + i * n + column) as usize]
     }
 }
 

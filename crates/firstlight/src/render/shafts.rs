@@ -8,7 +8,7 @@ use std::ops::ControlFlow;
 use fearless_simd::Level;
 
 use super::film::FilmTile;
-use super::hits::PixelHits;
+use super::hits::{PixelHits, camera_ray};
 use super::pixel::PixelSum;
 use super::sampled::Sampled;
 use super::tile::Tile;
@@ -94,8 +94,10 @@ impl<'a> Shafts<'a> {
             for row in 0..n {
                 for column in 0..n {
                     counts.camera_rays += 1;
-                    let (ray, differential, hit) = self.hits.seen(n, x, y, column, row);
-                    if let Some((si, bsdf)) = pixel.see(scene, scene.see(ray, *hit, differential)) {
+                    // Found anew: to keep a ray costs more than to find it
+                    let (ray, differential) = camera_ray(scene, (i + x) * n + column, (j + y) * n + row);
+                    let hit = self.hits.get(n, x, y, column, row);
+                    if let Some((si, bsdf)) = pixel.see(scene, scene.see(&ray, hit, &differential)) {
                         self.points.push(Viewpoint::of(&si));
                         self.surfaces.push((si, bsdf));
                     }

@@ -1,8 +1,8 @@
 //! One light, asked for at every ray of a patch, and judged by what all of them make together.
 //!
-//! Behind things a light is asked point by point. The rays ask different points, so that their errors are as good as
-//! independent: n rays need far fewer each than one that stands for all of them, and what one ray's points pass by, those of
-//! others meet. What points cannot settle is left to each ray by itself.
+//! Behind things a light is asked point by point. The rays ask different points, which are laid out together: n rays need far fewer
+//! each than one that stands for all of them, and what one ray's points pass by, those of others meet. What points cannot settle is
+//! left to each ray by itself.
 
 use super::Counts;
 use super::arrival::{Arrivals, Behind, Place, Seen};
@@ -122,7 +122,7 @@ impl Together {
         let mut is_first = true;
         loop {
             let (mut value, mut moved, mut squares, mut all) = (self.value, Rgb::BLACK, Rgb::BLACK, Rgb::BLACK);
-            let (mut hidden, mut worth, mut uneven) = (0, 0.0, Rgb::BLACK);
+            let (mut hidden, mut worth, mut untold) = (0, 0.0, Rgb::BLACK);
             for one in asking.iter_mut() {
                 let place = self.place(arrivals, &one.si, &one.bsdf, one.series);
                 let masked: Masked = arrivals.behind(self.light, &place, &one.behind);
@@ -136,14 +136,15 @@ impl Together {
                 hidden += one.tally.hidden;
                 worth += one.tally.worth();
                 let [diffuse, highlight] = one.tally.is_uneven(&one.behind.whole);
-                let known = |is_uneven: bool, sum: f32| if is_uneven { sum } else { 0.0 };
-                let Sums { diffuse: all, specular: shine } = one.behind.whole;
-                uneven += of(&Sums { diffuse: known(diffuse, all), specular: known(highlight, shine) });
+                let part = |is_uneven: bool, sum: f32| if is_uneven { sum } else { 0.0 };
+                let whole = &one.behind.whole;
+                untold +=
+                    of(&Sums { diffuse: part(diffuse, whole.diffuse), specular: part(highlight, whole.specular) });
                 one.before = now;
             }
             let points = (to * asking.len()) as f32;
-            // Whatever is true of what points tell nothing about
-            if arrivals.steps(value * part, uneven * part) > tolerance * UNTOLD {
+            // What few points send, or none, can be anything
+            if arrivals.steps(value * part, untold * part) > tolerance * UNTOLD {
                 return false;
             }
             let is_clear = hidden == 0 && (worth >= f64::from(wanted) * CLEAR || to == MOST);
