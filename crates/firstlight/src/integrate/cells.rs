@@ -26,6 +26,10 @@ const SMOOTHER: f64 = 0.25;
 const HEAVY: f64 = 4.0;
 /// The most cells in doubt that are cut.
 const MOST: usize = 1 << 17;
+/// Cells this many times nearer to a highlight's middle than they are wide are cut, until they are that part of it wide: so
+/// what lies on its skirt, or between all cells of the first size, is not overlooked.
+const SKIRT: f32 = 3.0;
+const FINE: f32 = 0.5;
 
 /// What a point of a light would send, before anything is in the way.
 #[derive(Clone, Copy, Debug, Default)]
@@ -44,8 +48,40 @@ pub(super) trait Source {
     /// What the point would send; `None` from below the horizon, or from a side that does not emit.
     fn sent(&self, at: [f32; 2]) -> Option<Sent>;
 
+    /// The highlight that its points make, if that may be narrow beside the first cells, and nothing else says what it makes in all.
+    fn highlight(&self) -> Option<Highlight> {
+        None
+    }
+
     /// Which of sixteen points something hides.
     fn hidden(&self, places: &[[f32; 2]; LANES], ways: &[Vec3; LANES], active: u16) -> u16;
+}
+
+/// Where a highlight comes from.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Highlight {
+    /// The way to its middle: unit.
+    pub way: Vec3,
+    /// Its standard deviation, in radians.
+    pub spread: f32,
+}
+
+impl Highlight {
+    /// Marks those of some cells, four of them a square, that have to be cut for it.
+    fn mark(&self, cells: &[Cell], side: usize, marks: &mut [bool]) {
+        for (four, marks) in cells.chunks_exact(4).zip(marks.chunks_exact_mut(4)) {
+            let ways = || four.iter().map(|cell| cell.way).filter(|way| *way != Vec3::ZERO);
+            let apart = |one: Vec3| ways().fold(0.0f32, |most, other| most.max((other - one).length()));
+            let across = ways().fold(0.0f32, |most, way| most.max(apart(way)));
+            // One alone does not tell how wide it is
+            let width = if across > 0.0 { across } else { std::f32::consts::TAU / side as f32 };
+            if width > FINE * self.spread {
+                for (cell, mark) in four.iter().zip(marks) {
+                    *mark |= cell.way != Vec3::ZERO && (cell.way - self.way).length() < SKIRT * width;
+                }
+            }
+        }
+    }
 }
 
 /// What a cell's point says.
@@ -65,6 +101,8 @@ struct Cell {
     sums: [f32; 2],
     /// How far that is from the mean over it.
     rough: [f32; 2],
+    /// The way to its middle: unit; zero where that sends nothing.
+    way: Vec3,
 }
 
 impl Cell {
@@ -160,12 +198,13 @@ fn ask(source: &impl Source, side: usize, places: &[[u32; 2]], cells: &mut Vec<C
         for (lane, at) in places.iter().enumerate() {
             let point = [0, 1].map(|k| (at[k] as f32 + chance(*at, side, k as u32, series)) * width);
             let middle = at.map(|w| (w as f32 + 0.5) * width);
-            let mut cell = Cell { at: *at, state: State::Dark, sums: [0.0; 2], rough: [0.0; 2] };
+            let mut cell = Cell { at: *at, state: State::Dark, sums: [0.0; 2], rough: [0.0; 2], way: Vec3::ZERO };
             if let Some(sent) = source.sent(point) {
                 (points[lane], ways[lane]) = (point, sent.way);
                 active |= 1 << lane;
                 // A middle below the horizon is near it
-                (cell.state, cell.sums) = (State::Lit, source.sent(middle).map_or(sent.sums, |sent| sent.sums));
+                let sent = source.sent(middle).unwrap_or(sent);
+                (cell.state, cell.sums, cell.way) = (State::Lit, sent.sums, sent.way.normalize_or_zero());
             }
             cells.push(cell);
         }
@@ -189,6 +228,7 @@ pub(super) fn integrate(
     let mut grid = Grid { side: FIRST, states: vec![State::Dark; FIRST * FIRST] };
     cells.iter().for_each(|cell| grid.set(cell.at, cell.state));
     let mut settled = Totals::default();
+    let highlight = source.highlight();
     loop {
         let area = 1.0 / (grid.side * grid.side) as f64;
         let mut totals = settled;
@@ -252,6 +292,9 @@ pub(super) fn integrate(
                 if is_heavy && cell.state != State::Dark && !*doubtful {
                     *doubtful = !enough(&sums, &part([diffuse * area, specular * area]));
                 }
+            }
+            if let Some(highlight) = &highlight {
+                highlight.mark(&cells, grid.side, &mut doubtful);
             }
             let count = doubtful.iter().filter(|doubtful| **doubtful).count();
             if count == 0 || count > MOST {

@@ -6,10 +6,11 @@ use std::f64::consts::TAU;
 use pxfm::{f_exp, f_log, f_sincos};
 
 use super::Sums;
-use super::cells::{self, Sent, Source};
+use super::cells::{self, Highlight, Sent, Source};
 use super::mask::Masked;
 use crate::light::{Area, AreaShape, Light, LightKind, Sphere, concentric};
 use crate::math::{DVec3, LANES, Vec3};
+use crate::shape::SurfaceInteraction;
 
 impl Masked<'_> {
     /// What arrives from a sphere for which there is no [`View`](super::View).
@@ -27,6 +28,9 @@ impl Masked<'_> {
         }
     }
 }
+
+/// Highlights wider than this, in radians, are found by any cells.
+const WIDE: f32 = 0.3;
 
 /// The way to a point of the light, and what its part of the light's measure sends this way.
 struct Way {
@@ -58,6 +62,14 @@ impl<F: Fn([f32; 2]) -> Option<Way>> Source for Ways<'_, F> {
         let cos_i = height * inverse;
         let lobe = self.masked.lobe.eval(cos_i, si.ns.dot(si.wo), si.wo.dot(way) * inverse);
         Some(Sent { way, sums: [weight * cos_i, weight * lobe] })
+    }
+
+    fn highlight(&self) -> Option<Highlight> {
+        let SurfaceInteraction { ns, wo, .. } = *self.masked.si;
+        let cos_o = ns.dot(wo);
+        let sharpness = self.masked.lobe.sharpness(cos_o);
+        let spread = 1.0 / (2.0 * sharpness).sqrt();
+        (sharpness > 0.0 && spread < WIDE).then(|| Highlight { way: ns * (2.0 * cos_o) - wo, spread })
     }
 
     fn hidden(&self, places: &[[f32; 2]; LANES], ways: &[Vec3; LANES], active: u16) -> u16 {
