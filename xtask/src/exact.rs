@@ -20,9 +20,9 @@ const OPEN: f64 = 1e-4;
 /// Which scenes, and how far to go.
 #[derive(clap::Args)]
 pub struct Options {
-    /// Random scenes A to B, B left out.
-    #[arg(long, value_name = "A..B", value_parser = seeds, default_value = "0..100")]
-    seeds: Range<u64>,
+    /// Random scenes A to B, B left out; or some, single numbers as well: 0..40,372,779.
+    #[arg(long, value_name = "A..B", value_parser = seeds, value_delimiter = ',', default_value = "0..100")]
+    seeds: Vec<Range<u64>>,
     /// Width and height of the pictures.
     #[arg(long, default_value_t = 48)]
     size: u32,
@@ -48,8 +48,11 @@ pub struct Options {
 }
 
 fn seeds(text: &str) -> Result<Range<u64>, String> {
-    let parsed = text.split_once("..").and_then(|(a, b)| Some(a.parse().ok()?..b.parse().ok()?));
-    parsed.filter(|seeds| !seeds.is_empty()).ok_or_else(|| "give a range such as 0..100".into())
+    let parsed = match text.split_once("..") {
+        Some((a, b)) => a.parse().ok().zip(b.parse().ok()).map(|(a, b)| a..b),
+        None => text.parse().ok().and_then(|a: u64| Some(a..a.checked_add(1)?)),
+    };
+    parsed.filter(|seeds| !seeds.is_empty()).ok_or_else(|| "give a range such as 0..100, or a number".into())
 }
 
 /// What is kept of one scene.
@@ -291,7 +294,7 @@ fn store(rows: &BTreeMap<u64, Row>) -> Outcome {
 pub fn run(options: &Options) -> Outcome {
     if let Some(folder) = &options.dump {
         std::fs::create_dir_all(folder).map_err(|fault| format!("{}: {fault}", folder.display()))?;
-        for seed in options.seeds.clone() {
+        for seed in options.seeds.iter().cloned().flatten() {
             let text = exact_scenes::scene(seed, options.size).to_toml();
             let file = folder.join(format!("{seed}.toml"));
             std::fs::write(&file, text).map_err(|fault| format!("{}: {fault}", file.display()))?;
@@ -307,7 +310,7 @@ pub fn run(options: &Options) -> Outcome {
     }
     let start = Instant::now();
     // In parts, so that what is done is stored even if the rest is not waited for
-    let seeds: Vec<u64> = options.seeds.clone().collect();
+    let seeds: Vec<u64> = options.seeds.iter().cloned().flatten().collect();
     for part in seeds.chunks(50) {
         // Threads of our own: one of rayon's that waits for a render would begin another scene
         let next = AtomicUsize::new(0);
