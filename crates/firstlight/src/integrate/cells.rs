@@ -26,8 +26,8 @@ const SMOOTHER: f64 = 0.25;
 const HEAVY: f64 = 4.0;
 /// The most cells in doubt that are cut.
 const MOST: usize = 1 << 17;
-/// Cells this many times nearer to a highlight's middle than they are wide are cut, until they are that part of it wide: so
-/// what lies on its skirt, or between all cells of the first size, is not overlooked.
+/// Cells are cut that are no farther from a highlight's middle than so many times their width, until they are as narrow as that
+/// part of its spread: so what lies on its skirt, or between all cells of the first size, is not overlooked.
 const SKIRT: f32 = 3.0;
 const FINE: f32 = 0.5;
 
@@ -70,14 +70,15 @@ impl Highlight {
     /// Marks those of some cells, four of them a square, that have to be cut for it.
     fn mark(&self, cells: &[Cell], side: usize, marks: &mut [bool]) {
         for (four, marks) in cells.chunks_exact(4).zip(marks.chunks_exact_mut(4)) {
-            let ways = || four.iter().map(|cell| cell.way).filter(|way| *way != Vec3::ZERO);
-            let apart = |one: Vec3| ways().fold(0.0f32, |most, other| most.max((other - one).length()));
-            let across = ways().fold(0.0f32, |most, way| most.max(apart(way)));
+            let ways: [Vec3; 4] = std::array::from_fn(|k| four[k].way.normalize_or_zero());
+            let there = || ways.iter().filter(|way| **way != Vec3::ZERO);
+            let apart = |one: &Vec3| there().fold(0.0f32, |most, other| most.max((*other - *one).length()));
+            let across = there().fold(0.0f32, |most, way| most.max(apart(way)));
             // One alone does not tell how wide it is
             let width = if across > 0.0 { across } else { std::f32::consts::TAU / side as f32 };
             if width > FINE * self.spread {
-                for (cell, mark) in four.iter().zip(marks) {
-                    *mark |= cell.way != Vec3::ZERO && (cell.way - self.way).length() < SKIRT * width;
+                for (way, mark) in ways.iter().zip(marks) {
+                    *mark |= *way != Vec3::ZERO && (*way - self.way).length() < SKIRT * width;
                 }
             }
         }
@@ -101,7 +102,7 @@ struct Cell {
     sums: [f32; 2],
     /// How far that is from the mean over it.
     rough: [f32; 2],
-    /// The way to its middle: unit; zero where that sends nothing.
+    /// The way to its middle; zero where nothing is sent.
     way: Vec3,
 }
 
@@ -204,7 +205,7 @@ fn ask(source: &impl Source, side: usize, places: &[[u32; 2]], cells: &mut Vec<C
                 active |= 1 << lane;
                 // A middle below the horizon is near it
                 let sent = source.sent(middle).unwrap_or(sent);
-                (cell.state, cell.sums, cell.way) = (State::Lit, sent.sums, sent.way.normalize_or_zero());
+                (cell.state, cell.sums, cell.way) = (State::Lit, sent.sums, sent.way);
             }
             cells.push(cell);
         }

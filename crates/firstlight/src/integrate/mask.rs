@@ -35,6 +35,7 @@ const EDGE: f32 = 1.0;
 const CLEAR: f64 = 1.5;
 /// The share of points that have to be as good as alike.
 const UNEVEN: f64 = 1.0 / 16.0;
+
 /// Points of the square [-1, 1]^2, and what they are on a disk: series by series.
 struct Points {
     square: Vec<[f32; 2]>,
