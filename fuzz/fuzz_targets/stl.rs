@@ -2,6 +2,7 @@
 
 #![no_main]
 
-mod mesh;
+use firstlight::MeshFormat;
+use firstlight_testkit::hostile_mesh;
 
-libfuzzer_sys::fuzz_target!(|data: &[u8]| mesh::mesh(firstlight::MeshFormat::Stl, data));
+libfuzzer_sys::fuzz_target!(|data: &[u8]| hostile_mesh::check(MeshFormat::Stl, data));

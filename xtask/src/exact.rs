@@ -10,9 +10,10 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Instant;
 
 use firstlight::SceneDesc;
+use firstlight_testkit::converged::{Converged, PROMISED, Report};
+use firstlight_testkit::{exact_scenes, kept};
 
-use crate::converged::{Converged, PROMISED, Report};
-use crate::{Outcome, exact_scenes, kept, root, write};
+use crate::{Outcome, root, write};
 
 /// The share of pixels that may stay open where sets have up to 2^20 points.
 const OPEN: f64 = 1e-4;

@@ -10,9 +10,9 @@ use firstlight::{
     NoAssets, NumberParam, ParallelogramDesc, PointDesc, RectangleDesc, RenderSettings, SamplesDesc, SceneDesc,
     ShapeDesc, SphereDesc, SphereLightDesc, SpotDesc, VisibilityMode, Window,
 };
+use firstlight_testkit::scenes::{self, Random};
 
 use crate::bench::{Difference, picture};
-use crate::scenes::{self, Random};
 use crate::{Outcome, write};
 
 /// What to measure.

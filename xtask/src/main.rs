@@ -14,23 +14,6 @@ mod rays;
 mod test;
 mod verify;
 
-// What the tests of whole scenes know, shared with them: file by file, as they stand there
-#[path = "../../crates/firstlight/tests/truth/converged.rs"]
-#[allow(dead_code, reason = "tests use more of it")]
-mod converged;
-#[path = "../../crates/firstlight/tests/truth/exact_scenes.rs"]
-mod exact_scenes;
-#[path = "../../crates/firstlight/tests/truth/graded.rs"]
-mod graded;
-#[path = "../../crates/firstlight/tests/truth/kept.rs"]
-mod kept;
-#[path = "../../crates/firstlight/tests/truth/random.rs"]
-#[allow(dead_code, reason = "tests use more of it")]
-mod random;
-#[path = "../../crates/firstlight/tests/truth/scenes.rs"]
-#[allow(dead_code, reason = "tests use more of it")]
-mod scenes;
-
 use std::path::{Path, PathBuf};
 use std::process::{Command, ExitCode};
 

@@ -10,7 +10,7 @@ const RAYS: &str = "1000000";
 pub fn run(scenes: u32) -> Outcome {
     let mut command = cargo();
     command.env("FIRSTLIGHT_SCENES", scenes.to_string());
-    run_to_end(command.args(["test", "--release", "--package", "firstlight", "--test", "truth"]))?;
+    run_to_end(command.args(["test", "--release", "--package", "firstlight-testkit", "--test", "truth"]))?;
     let mut command = cargo();
     command.env("FIRSTLIGHT_RAYS", RAYS);
     run_to_end(command.args(["test", "--release", "--package", "firstlight", "--lib", "shape::triangles"]))

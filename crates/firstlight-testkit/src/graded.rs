@@ -3,11 +3,12 @@
 //!
 //! A light is cut in two, and each part again, until every part is small beside its distance; then each part gets the same
 //! number of random points, one in each of m x m cells. Nothing is assumed of what a light sends, only where it is.
-//! `cargo xtask verify exact` uses this file too.
+//!
 
 use firstlight::Scene;
 use firstlight::bench::{self, LightPoint};
 
+use crate::Random;
 use crate::scenes::{V, length, sub};
 
 /// A part's radius over the distance to its middle, at most.
@@ -49,31 +50,18 @@ fn parts(from: V, at: &dyn Fn([f64; 2]) -> V) -> Vec<Part> {
     parts
 }
 
-/// Numbers from 0 to 1, one after another. Source: S. Vigna 2015, SplitMix64.
-struct Numbers(u64);
-
-impl Numbers {
-    fn next(&mut self) -> f64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
-    }
-}
-
 /// A pixel of the film with about 2^`level` points on each area light at each camera ray, others for each `set`.
 pub fn pixel(scene: &Scene, at: [u32; 2], level: u32, set: u32) -> [f32; 4] {
     let seed = u64::from(at[0]) << 40 ^ u64::from(at[1]) << 16 ^ u64::from(level) << 8 ^ u64::from(set);
-    let mut numbers = Numbers(seed.wrapping_mul(0xd134_2543_de82_ef95));
+    let mut numbers = Random::new(seed);
     let choose = &mut |_: usize, from: V, position: &dyn Fn([f64; 2]) -> V, points: &mut Vec<LightPoint>| {
         let parts = parts(from, position);
         let m = (f64::from(1u32 << level) / parts.len() as f64).sqrt().ceil().max(1.0) as u32;
         for [[u0, v0], [u1, v1]] in parts {
             let step = [(u1 - u0) / f64::from(m), (v1 - v0) / f64::from(m)];
             for (row, column) in (0..m).flat_map(|row| (0..m).map(move |column| (row, column))) {
-                let u = u0 + step[0] * (f64::from(column) + numbers.next());
-                let v = v0 + step[1] * (f64::from(row) + numbers.next());
+                let u = u0 + step[0] * (f64::from(column) + numbers.unit());
+                let v = v0 + step[1] * (f64::from(row) + numbers.unit());
                 points.push(([u, v], step[0] * step[1]));
             }
         }
@@ -91,14 +79,14 @@ mod tests {
         // Lambert's sum over the edges, for a point on the axis of a square of side 1
         for height in [1e-4, 1e-2, 0.3, 2.0] {
             let at = |[u, v]: [f64; 2]| [u - 0.5, v - 0.5, height];
-            let mut numbers = Numbers(1);
+            let mut numbers = Random::new(1);
             let (mut sum, mut area) = (0.0, 0.0);
             for [[u0, v0], [u1, v1]] in parts([0.0; 3], &at) {
                 let m = 24;
                 let share = (u1 - u0) * (v1 - v0) / f64::from(m * m);
                 for (i, j) in (0..m).flat_map(|i| (0..m).map(move |j| (i, j))) {
-                    let u = u0 + (u1 - u0) * (f64::from(i) + numbers.next()) / f64::from(m);
-                    let v = v0 + (v1 - v0) * (f64::from(j) + numbers.next()) / f64::from(m);
+                    let u = u0 + (u1 - u0) * (f64::from(i) + numbers.unit()) / f64::from(m);
+                    let v = v0 + (v1 - v0) * (f64::from(j) + numbers.unit()) / f64::from(m);
                     let l = at([u, v]);
                     sum += share * height * height / (dot(l, l) * dot(l, l));
                     area += share;

@@ -1,4 +1,4 @@
-//! The converged picture of a scene, and how far others are from it. `cargo xtask verify exact` uses this file too.
+//! The converged picture of a scene, and how far others are from it.
 //!
 //! Every area light is sampled, under full antialiasing, by four sets of points that know nothing of each other: one
 //! seeded point in each of m x m cells of the light. Where they do not agree, the pixel is rendered again with twice the
@@ -89,11 +89,11 @@ pub struct Converged {
     pub(crate) width: u32,
     pub(crate) height: u32,
     /// As displayed, in steps of an 8-bit picture.
-    pub(crate) pixels: Vec<[f64; 3]>,
+    pub pixels: Vec<[f64; 3]>,
     /// Half of what the two halves of the sets differ by, pixel by pixel.
     pub(crate) half_differences: Vec<[f64; 3]>,
     /// The size of the sets that settled each pixel: about 2^level points.
-    pub(crate) levels: Vec<u32>,
+    pub levels: Vec<u32>,
     /// Whether the largest sets do not agree on a pixel.
     pub(crate) open: Vec<bool>,
     /// Whether a pixel shows something that a light is so near to that points are graded; see [`graded`].
@@ -391,7 +391,6 @@ pub struct Report {
     /// With 400 points of `sobol` on every light.
     pub sobol: Deviation,
     /// With 400 points of `uniform`.
-    #[allow(dead_code, reason = "a table shows it, no test asks")]
     pub uniform: Deviation,
     /// Pixels that are left out.
     pub open: usize,

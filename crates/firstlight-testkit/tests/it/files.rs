@@ -6,9 +6,10 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 use firstlight::{ImportError, MeshData, MeshFormat, read_mesh};
+use firstlight_testkit::hostile_mesh;
 
 fn folder() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/models")
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../firstlight/tests/models")
 }
 
 fn try_read(name: &str, bytes: &[u8]) -> Result<MeshData, ImportError> {
@@ -457,16 +458,13 @@ fn the_kind_of_a_file_is_found() {
     );
 }
 
-#[path = "../../../fuzz/fuzz_targets/mesh.rs"]
-mod check;
-
 #[test]
 fn nothing_in_the_corpora_breaks_the_readers() {
     let corpus = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../fuzz/corpus");
     for (kind, format) in [("ply", MeshFormat::Ply), ("stl", MeshFormat::Stl), ("obj", MeshFormat::Obj)] {
         let mut inputs = 0;
         for entry in std::fs::read_dir(corpus.join(kind)).unwrap() {
-            check::mesh(format, &std::fs::read(entry.unwrap().path()).unwrap());
+            hostile_mesh::check(format, &std::fs::read(entry.unwrap().path()).unwrap());
             inputs += 1;
         }
         assert!(inputs >= 5, "{inputs} inputs of {kind}");

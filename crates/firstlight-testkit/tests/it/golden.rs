@@ -134,7 +134,6 @@ fn what_is_lit_once_is_as_if_each_ray_was() {
 }
 
 #[test]
-#[cfg(feature = "exr")]
 fn every_golden_scene_has_its_bits() {
     let mut wrong = Vec::new();
     let mut count = 0;

@@ -10,6 +10,8 @@ use firstlight::{
     SphereDesc, SpotDesc, TextureDesc, TransformDesc, builtin_scenes,
 };
 
+pub use crate::Random;
+
 /// A point or a direction, as descriptions have them.
 pub type V = [f64; 3];
 
@@ -182,8 +184,6 @@ pub fn common(shape: &mut ShapeDesc) -> Common<'_> {
                         &mut desc.shadow_exclude,
                     ],
                 },)*
-                #[allow(unreachable_patterns)]
-                _ => unreachable!("no test here uses another shape"),
             }
         };
     }
@@ -379,64 +379,4 @@ pub fn probe(desc: &SceneDesc, from: V, p: V) -> [f32; 3] {
 /// The bits of a picture.
 pub fn bits(image: &Image) -> Vec<[u32; 4]> {
     image.pixels.iter().map(|p| p.map(f32::to_bits)).collect()
-}
-
-/// A repeatable stream of random numbers: SplitMix64.
-#[derive(Clone)]
-pub struct Random(u64);
-
-impl Random {
-    pub fn new(seed: u64) -> Self {
-        Random(seed.wrapping_mul(0x2545_f491_4f6c_dd1d) ^ 0x6a09_e667_f3bc_c909)
-    }
-
-    pub fn bits(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let z = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^ (z >> 31)
-    }
-
-    /// From 0 up to 1.
-    pub fn unit(&mut self) -> f64 {
-        (self.bits() >> 11) as f64 / (1u64 << 53) as f64
-    }
-
-    pub fn between(&mut self, low: f64, high: f64) -> f64 {
-        low + (high - low) * self.unit()
-    }
-
-    /// From `low` to `high`, each factor as likely as the next.
-    pub fn scale(&mut self, low: f64, high: f64) -> f64 {
-        pxfm::f_exp(self.between(pxfm::f_log(low), pxfm::f_log(high)))
-    }
-
-    /// A whole number below `n`.
-    pub fn below(&mut self, n: u32) -> u32 {
-        (self.bits() % n as u64) as u32
-    }
-
-    pub fn chance(&mut self, p: f64) -> bool {
-        self.unit() < p
-    }
-
-    pub fn pick<T: Copy>(&mut self, from: &[T]) -> T {
-        from[self.below(from.len() as u32) as usize]
-    }
-
-    /// Each coordinate from -`reach` to `reach`.
-    pub fn vector(&mut self, reach: f64) -> V {
-        [0; 3].map(|_| self.between(-reach, reach))
-    }
-
-    /// A unit vector, every direction as likely.
-    pub fn direction(&mut self) -> V {
-        loop {
-            let v = self.vector(1.0);
-            let l = length(v);
-            if l > 0.1 && l <= 1.0 {
-                return mul(v, 1.0 / l);
-            }
-        }
-    }
 }

@@ -2,15 +2,14 @@
 
 use std::path::Path;
 
-#[path = "../../../../fuzz/fuzz_targets/scene_text/check.rs"]
-mod check;
+use firstlight_testkit::hostile_text;
 
 #[test]
 fn nothing_in_the_corpus_breaks_the_reader() {
     let corpus = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../fuzz/corpus/scene_text");
     let mut inputs = 0;
     for entry in std::fs::read_dir(corpus).unwrap() {
-        check::scene_text(&std::fs::read(entry.unwrap().path()).unwrap());
+        hostile_text::check(&std::fs::read(entry.unwrap().path()).unwrap());
         inputs += 1;
     }
     assert!(inputs >= 10, "{inputs} inputs");

@@ -1,7 +1,9 @@
+//! Scene text from anywhere: what reading, compiling and writing it promise.
+
 use firstlight::{CompileOptions, NoAssets, SceneDesc};
 
 /// Reads, compiles and writes a text; its first byte chooses the language. Panics where a promise is broken.
-pub fn scene_text(data: &[u8]) {
+pub fn check(data: &[u8]) {
     let Some((language, text)) = data.split_first() else { return };
     let name = match language {
         b'j' => "scene.json",

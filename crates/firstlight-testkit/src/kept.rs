@@ -1,5 +1,5 @@
 //! Converged pictures kept as files: PNG, 16 bits a channel, as displayed; a pixel that is open is transparent, another
-//! nearly opaque, the less so the more points it took. `cargo xtask verify exact` uses this file too.
+//! nearly opaque, the less so the more points it took.
 
 use std::path::Path;
 
@@ -22,7 +22,6 @@ fn name(desc: &SceneDesc) -> String {
 }
 
 /// Writes a converged picture whose sets had up to 2^`cap` points.
-#[allow(dead_code, reason = "tests only read")]
 #[track_caller]
 pub fn write(path: &Path, desc: &SceneDesc, cap: u32, truth: &Converged) {
     let mut samples = Vec::with_capacity(truth.pixels.len() * 8);

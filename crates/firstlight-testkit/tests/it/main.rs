@@ -1,8 +1,10 @@
 //! What the library promises, from outside.
 
 mod course;
+mod files;
 mod fuzz_corpus;
 mod golden;
+mod images;
 mod invalid;
 mod reference;
 mod roundtrip;

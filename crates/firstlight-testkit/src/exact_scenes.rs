@@ -1,5 +1,5 @@
 //! Random scenes for lights that are integrated, the same for the same seed: whatever makes soft light hard, in pictures that are
-//! neither black nor blown out. `cargo xtask verify exact` uses this file too.
+//! neither black nor blown out.
 
 use firstlight::{
     BoxDesc, ColorDesc, ColorParam, ConeDesc, CylinderDesc, DiskDesc, DiskLightDesc, DisplayEncoding, EmitSides,

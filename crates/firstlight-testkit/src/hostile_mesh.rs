@@ -1,9 +1,11 @@
+//! Mesh files from anywhere: what reading them promises.
+
 use std::ops::ControlFlow;
 
 use firstlight::MeshFormat;
 
 /// Reads a mesh, makes it smooth and counts its facts. Panics where a promise is broken.
-pub fn mesh(format: MeshFormat, bytes: &[u8]) {
+pub fn check(format: MeshFormat, bytes: &[u8]) {
     match format.read("mesh", bytes, &|_, _| ControlFlow::Continue(())) {
         Err(error) => assert!(error.to_string().starts_with("mesh"), "{error}"),
         Ok(mut mesh) => {

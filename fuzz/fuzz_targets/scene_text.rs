@@ -1,0 +1,7 @@
+//! Reads hostile scene text: `cargo +nightly fuzz run scene_text`.
+
+#![no_main]
+
+use firstlight_testkit::hostile_text;
+
+libfuzzer_sys::fuzz_target!(|data: &[u8]| hostile_text::check(data));
