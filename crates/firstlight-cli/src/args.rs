@@ -153,7 +153,8 @@ pub struct RenderArgs {
     /// The format of -o - and of names without an ending, such as /dev/null [default: png for -]
     #[arg(long, value_name = "FORMAT", help_heading = "Output")]
     pub format: Option<NamedFormat>,
-    /// Stops of exposure of 8- and 16-bit pictures, -64 to 64: they are multiplied by 2^EV [default: the scene's]
+    /// Stops of exposure of 8- and 16-bit pictures, -64 to 64: they are multiplied by 2^EV; other files are the same with it
+    /// [default: the scene's]
     #[arg(long, value_name = "EV", allow_negative_numbers = true, value_parser = exposure, help_heading = "Output")]
     pub exposure: Option<f64>,
 
@@ -194,12 +195,13 @@ pub struct RenderArgs {
     #[arg(long, value_name = "WORD", help_heading = "Quality")]
     pub shadow_terminator: Option<Terminator>,
     /// Renders by the plainest code there is, slowly: every camera ray, every point of every light. The bytes are those of
-    /// --aa-mode full where lights are sampled; lights that are integrated are sampled at 4096 points
+    /// --aa-mode full where lights are sampled; lights that are integrated are sampled at 400 points,
+    /// or at as many as --samples says
     #[arg(long, help_heading = "Quality")]
     pub reference: bool,
 
     /// How shadows of sampled lights are found: by shafts, which leave out all that is proved not to matter, or by tracing every
-    /// sample; the picture is the same [default: shafts]
+    /// sample at every camera ray, which gives the bytes of --reference, faster [default: shafts]
     #[arg(long, value_name = "HOW", value_parser = visibility(), help_heading = "Work")]
     pub visibility: Option<VisibilityMode>,
     /// Threads to render with, 1 to 1024; the picture is the same for any number [default: one for each processor, or a

@@ -2,6 +2,7 @@
 
 mod args;
 mod check;
+mod faster;
 mod info;
 mod input;
 mod interrupt;

@@ -13,6 +13,7 @@ use firstlight::{
 };
 
 use crate::args::{AntialiasingMode, Bits, Frames, RenderArgs, Terminator};
+use crate::faster::faster;
 use crate::input::{self, Input};
 use crate::interrupt::Watch;
 use crate::output::{self, Content, Output, Ready, Staged, Target};
@@ -35,6 +36,8 @@ struct Plan<'a> {
     stats: StatsPlan,
     settings: RenderSettings,
     overrides: Overrides<'a>,
+    /// Of 8- and 16-bit files, in place of the scene's.
+    exposure: Option<f64>,
     time: f64,
     frames: Option<Frames>,
     quiet: bool,
@@ -64,7 +67,6 @@ struct Overrides<'a> {
     antialiasing: Option<u32>,
     samples: Option<SamplesDesc>,
     camera: Option<&'a str>,
-    exposure: Option<f64>,
     terminator: Option<ShadowTerminator>,
 }
 
@@ -190,7 +192,10 @@ impl Run<'_> {
         // Render, until somebody asks to stop
         let watch = Watch::begin();
         let pixels = u64::from(window.width) * u64::from(window.height);
-        let begin = || Progress::begin(pixels, moments.len() as u64, plan.quiet);
+        let begin = || {
+            let faster = faster(scene, settings, &self.input.parsed.desc.render);
+            Progress::begin(pixels, moments.len() as u64, plan.quiet, faster)
+        };
         let progress = &*self.progress.get_or_insert_with(begin);
         progress.frame(index as u64);
         let (rendered, render) = timed(|| {
@@ -209,9 +214,11 @@ impl Run<'_> {
         let (written, write) = timed(|| {
             let heat = film.heat().map(|heat| heat.picture());
             let (image, receipt) = (film.develop(), scene.receipt(settings));
+            let own = scene.display();
+            let display = Display { exposure: plan.exposure.unwrap_or(own.exposure), ..own };
             let encode = |output: &Output| match (output.content, &heat) {
                 (Content::Heat, Some(heat)) => heat.encode(output.format, &Display::default(), &receipt),
-                _ => image.encode(output.format, &scene.display(), &receipt),
+                _ => image.encode(output.format, &display, &receipt),
             };
             let bytes: Vec<Vec<u8>> = moment
                 .outputs
@@ -284,7 +291,6 @@ impl<'a> Plan<'a> {
             antialiasing: args.aa,
             samples: args.samples,
             camera: args.camera.as_deref(),
-            exposure: args.exposure,
             terminator: args.shadow_terminator.map(|word| match word {
                 Terminator::Smooth => ShadowTerminator::Smooth,
                 Terminator::Hard => ShadowTerminator::Hard,
@@ -299,6 +305,7 @@ impl<'a> Plan<'a> {
             stats,
             settings,
             overrides,
+            exposure: args.exposure,
             time: args.time.unwrap_or(0.0),
             frames,
             quiet,
@@ -422,7 +429,6 @@ impl Overrides<'_> {
         let (width, height) = film_size((self.width, self.height), (render.width, render.height))?;
         (render.width, render.height) = (width, height);
         render.antialiasing = self.antialiasing.unwrap_or(render.antialiasing);
-        render.exposure = self.exposure.unwrap_or(render.exposure);
         render.shadow_terminator = self.terminator.unwrap_or(render.shadow_terminator);
         if let Some(name) = self.camera {
             if !desc.cameras.iter().any(|(known, _)| known == name) {

@@ -56,16 +56,57 @@ fn how_the_work_is_done_changes_no_byte() {
         "--tile-size 64",
         "--simd auto",
         "--simd fallback",
-        "--visibility traced",
         "--visibility shafts --simd fallback",
-        "--reference",
-        "--reference --threads 3 --tile-size 9",
         "--quiet",
         "--stats",
     ];
     for option in options {
         assert!(folder.png(option) == plain, "{option} changes the picture");
     }
+    // Every camera ray and every sample, by three renderers
+    let every = folder.png("--aa-mode full");
+    for option in ["--visibility traced", "--reference", "--reference --threads 3 --tile-size 9"] {
+        assert!(folder.png(option) == every, "{option} changes the picture");
+    }
+}
+
+#[test]
+fn lights_that_are_integrated_are_sampled_at_400_points_by_the_plain_renderer() {
+    let folder = Folder::new();
+    folder.put("scene.toml", SCENE.replace("samples = 16\n", ""));
+    let exr = |options: &str| folder.run(&format!("render scene.toml {options} -o - --format exr")).done().stdout;
+    let expected = exr("--samples 400 --aa-mode full");
+    for options in ["--reference", "--visibility traced", "--samples 400 --reference", "--samples exact --reference"] {
+        assert!(exr(options) == expected, "{options}");
+    }
+    assert!(exr("--samples 399 --reference") != expected);
+}
+
+#[test]
+fn an_exposure_touches_8_and_16_bits_only() {
+    let folder = Folder::with_scene();
+    let bytes = |format: &str, options: &str| {
+        let line = format!("render scene.toml --samples exact {options} -o - --format {format}");
+        folder.run(&line).done().stdout
+    };
+    for format in ["exr", "hdr"] {
+        let plain = bytes(format, "");
+        assert!(!plain.windows(8).any(|part| part == b"exposure"), "{format}");
+        for options in ["--exposure 6", "--exposure -6.5"] {
+            assert!(bytes(format, options) == plain, "{format} {options}");
+        }
+    }
+    for bits in ["--bits 8", "--bits 16"] {
+        let said = |bytes: &[u8], words: &str| bytes.windows(words.len()).any(|part| part == words.as_bytes());
+        let (plain, bright) = (bytes("png", bits), bytes("png", &format!("{bits} --exposure 2")));
+        assert!(said(&plain, "srgb, exposure 0") && said(&bright, "srgb, exposure 2"), "{bits}");
+        assert!(Picture::decode(&plain) != Picture::decode(&bright), "{bits}");
+    }
+    // The scene's own decides how exactly lights are integrated, and is asked for in the same way
+    folder.put("bright.toml", SCENE.replace("[render]", "[render]\nexposure = 2"));
+    let own = folder.run("render bright.toml --samples exact -o - --format png").done().stdout;
+    let other = folder.run("render bright.toml --samples exact --exposure 0 -o - --format png").done().stdout;
+    assert!(own != other);
 }
 
 #[test]

@@ -24,6 +24,26 @@ fn a_quick_render_says_one_line_on_standard_error() {
 }
 
 #[test]
+fn a_long_render_says_what_would_make_it_faster() {
+    use std::io::{BufRead, BufReader};
+    use std::process::Stdio;
+    use std::time::{Duration, Instant};
+    let folder = Folder::new();
+    let line = "render config11 --width 700 --reference --threads 1 --tile-size 8";
+    let mut child = folder.command(line.split_whitespace()).stderr(Stdio::piped()).spawn().unwrap();
+    let (started, mut said) = (Instant::now(), String::new());
+    let read = BufReader::new(child.stderr.take().unwrap()).read_line(&mut said);
+    child.kill().unwrap();
+    child.wait().unwrap();
+    assert!(read.unwrap() > 0 && said.starts_with("advice: about ") && said.contains(" left; faster: "), "{said}");
+    for way in ["--reference", "--samples 64", "--aa 2", "--width 350"] {
+        assert!(said.contains(way), "{way}: {said}");
+    }
+    // Early enough to be of use, wherever the tests run
+    assert!(started.elapsed() < Duration::from_secs(60), "{:?}", started.elapsed());
+}
+
+#[test]
 fn the_picture_is_alone_on_standard_output() {
     let folder = Folder::with_scene();
     let loud = folder.run("render scene.toml -o - --stats").done();

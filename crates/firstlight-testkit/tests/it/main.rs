@@ -6,5 +6,6 @@ mod fuzz_corpus;
 mod golden;
 mod images;
 mod invalid;
+mod receipts;
 mod reference;
 mod roundtrip;

@@ -97,6 +97,18 @@ impl Display {
     }
 }
 
+/// `srgb, exposure 0`, `gamma 2.2, exposure -1`
+impl std::fmt::Display for Display {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self.encoding {
+            Encoding::Srgb => f.write_str("srgb")?,
+            Encoding::Gamma(gamma) => write!(f, "gamma {gamma}")?,
+            Encoding::Linear => f.write_str("linear")?,
+        }
+        write!(f, ", exposure {}", self.exposure)
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -68,20 +68,24 @@ impl Image {
     /// The others store the film as it is, and `display` has no part in them. NaN is stored as 0 and infinity as the
     /// largest number, except in EXR, which has both.
     ///
+    /// The receipt's entry `display` is this function's own: 8- and 16-bit files say `display` there, the others have none,
+    /// whatever `receipt` says of it.
+    ///
     /// # Errors
     /// A picture whose window is empty, or outside its film, or which has not as many pixels as the window says; a
     /// display or receipt outside what it may be; a format that this build does not have.
     pub fn encode(&self, format: Format, display: &Display, receipt: &Receipt) -> Result<Vec<u8>, ImageError> {
         self.check()?;
         receipt.check()?;
+        let shown = || receipt.shown_by(Some(display));
         match format {
-            Format::Png8 => png::encode(self, png::Depth::Eight, display, receipt),
-            Format::Png16 => png::encode(self, png::Depth::Sixteen, display, receipt),
+            Format::Png8 => png::encode(self, png::Depth::Eight, display, &shown()),
+            Format::Png16 => png::encode(self, png::Depth::Sixteen, display, &shown()),
             #[cfg(feature = "exr")]
-            Format::Exr => exr::encode(self, receipt),
+            Format::Exr => exr::encode(self, &receipt.shown_by(None)),
             #[cfg(not(feature = "exr"))]
             Format::Exr => Err(ImageError::WithoutExr),
-            Format::Hdr => Ok(hdr::encode(self, receipt)),
+            Format::Hdr => Ok(hdr::encode(self, &receipt.shown_by(None))),
         }
     }
 
@@ -107,7 +111,17 @@ impl Image {
     }
 }
 
+/// The key of what an 8- or 16-bit file does to the film.
+const DISPLAY_KEY: &str = "display";
+
 impl Receipt {
+    /// The receipt of a file that shows the film by `display`, or as it is.
+    fn shown_by(&self, display: Option<&Display>) -> Receipt {
+        let others = self.entries.iter().filter(|(key, _)| key != DISPLAY_KEY).cloned();
+        let own = display.map(|display| (DISPLAY_KEY.to_owned(), display.to_string()));
+        Receipt { entries: others.chain(own).collect() }
+    }
+
     /// Whether every format can hold it.
     fn check(&self) -> Result<(), ImageError> {
         let mut seen = std::collections::BTreeSet::new();
@@ -208,8 +222,26 @@ mod tests {
             }
             let stored = StoredImage::read(&bytes).unwrap();
             assert_eq!(stored.format, format);
-            assert_eq!(stored.receipt, receipt(), "{format:?}");
+            let is_shown = matches!(format, Format::Png8 | Format::Png16);
+            assert_eq!(stored.receipt, receipt().shown_by(is_shown.then(Display::default).as_ref()), "{format:?}");
             assert_eq!((stored.film, stored.window), (picture.film, picture.window));
+        }
+    }
+
+    #[test]
+    fn only_files_of_8_and_16_bits_say_how_they_show_the_film() {
+        let picture = whole(3, 2, |x, _| [x as f32, 0.5, 0.25, 1.0]);
+        let bright = Display { exposure: 1.5, ..Display::default() };
+        for format in FORMATS.into_iter().filter(|&f| built(f)) {
+            let of = |display: &Display, receipt: &Receipt| picture.encode(format, display, receipt).unwrap();
+            let [plain, exposed] = [Display::default(), bright].map(|display| of(&display, &receipt()));
+            let is_shown = matches!(format, Format::Png8 | Format::Png16);
+            assert_eq!(plain != exposed, is_shown, "{format:?}");
+            let stored = StoredImage::read(&exposed).unwrap().receipt;
+            let said = stored.entries.iter().find(|(key, _)| key == "display").map(|(_, value)| value.as_str());
+            assert_eq!(said, is_shown.then_some("srgb, exposure 1.5"), "{format:?}");
+            // What another file said of it does not come along
+            assert!(of(&Display::default(), &stored) == plain, "{format:?}");
         }
     }
 

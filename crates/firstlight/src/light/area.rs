@@ -16,7 +16,7 @@ use crate::shape::{Parallelogram, PlaneSide};
 pub(crate) const MAX_SAMPLES: u32 = 1 << 20;
 
 /// How many points stand for a light that is `exact`, where it has to be sampled all the same.
-pub(crate) const REFERENCE_SAMPLES: u32 = 4096;
+pub(crate) const REFERENCE_SAMPLES: u32 = 400;
 
 /// Declares the table of an area light: its name, its own fields, then those that all area lights have.
 macro_rules! area_table {

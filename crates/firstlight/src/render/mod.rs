@@ -24,6 +24,7 @@ mod many;
 mod patch;
 pub(crate) mod pixel;
 mod plain;
+mod receipt;
 mod sampled;
 mod shafts;
 mod simd;
@@ -46,10 +47,8 @@ pub use film::Film;
 pub use heat::Heat;
 pub use simd::SimdLevel;
 
-use crate::camera::Projection;
-use crate::color::{Display, Encoding};
-use crate::describe::{SamplesDesc, words};
-use crate::image::{Receipt, Window};
+use crate::describe::words;
+use crate::image::Window;
 use crate::light::Light;
 use crate::math::Ray;
 use crate::scene::Scene;
@@ -59,7 +58,6 @@ pub(crate) use counts::Counts;
 use film::FilmTile;
 use hits::PixelHits;
 use lanes::Lanes;
-use many::SINGLY;
 use pixel::{Lighting, PixelSum};
 use plain::Plain;
 use shafts::Shafts;
@@ -175,6 +173,11 @@ impl RenderSettings {
         self.reference || self.visibility == VisibilityMode::Traced
     }
 
+    /// How edges are smoothed in effect: where every light is sampled at every camera ray, each is lit by itself.
+    fn effective_aa_mode(&self) -> AaMode {
+        if self.samples_all() { AaMode::Full } else { self.aa_mode }
+    }
+
     /// The part of the film to render.
     fn window(&self, scene: &Scene) -> Window {
         self.crop.unwrap_or(Window { x: 0, y: 0, width: scene.width, height: scene.height })
@@ -230,6 +233,7 @@ pub fn render(
     } else {
         Tile::cover_cells(window, settings.tile_size, CELL)
     };
+    let tiles = tile::spread(&tiles);
     let all = window.width as u64 * window.height as u64;
     let (done, stop) = (AtomicU64::new(0), AtomicBool::new(false));
     let by_shafts = every_ray && !settings.samples_all();
@@ -322,66 +326,4 @@ fn render_tile(
         }
     }
     ControlFlow::Continue((film, counts))
-}
-
-impl Scene {
-    /// What a picture of this scene says of itself: all that decides its pixels.
-    pub fn receipt(&self, settings: &RenderSettings) -> Receipt {
-        let mut entries = vec![
-            ("version", env!("CARGO_PKG_VERSION").to_owned()),
-            ("scene_hash", self.hash.clone()),
-            ("width", self.width.to_string()),
-            ("height", self.height.to_string()),
-            ("antialiasing", self.antialiasing.to_string()),
-            ("camera", self.summary.camera.clone()),
-            ("world_from_camera", numbers(self.camera.world_from_camera())),
-            ("film_half_size", numbers(self.camera.film_half_size())),
-            ("light_samples", {
-                // Where every sample is traced, every light is sampled
-                let said = |light: &Light| match light.said_samples() {
-                    SamplesDesc::Exact if settings.samples_all() => light.samples().to_string(),
-                    said => said.to_string(),
-                };
-                let counts: Vec<String> = self.lights.iter().map(said).collect();
-                // Of many lights, how many in a row say the same
-                let run = |same: &[String]| format!("{} x {}", same.len(), same[0]);
-                if counts.len() > SINGLY {
-                    counts.chunk_by(|a, b| a == b).map(run).collect::<Vec<_>>().join(", ")
-                } else {
-                    counts.join(" ")
-                }
-            }),
-            ("color_space", "linear Rec. 709, alpha premultiplied, before display encoding".to_owned()),
-            ("display", {
-                let Display { encoding, exposure } = self.display;
-                let encoding = match encoding {
-                    Encoding::Srgb => "srgb".to_owned(),
-                    Encoding::Gamma(gamma) => format!("gamma {gamma}"),
-                    Encoding::Linear => "linear".to_owned(),
-                };
-                format!("{encoding}, exposure {exposure}; 8- and 16-bit files only")
-            }),
-        ];
-        if let Some(time) = self.time {
-            entries.push(("time", time.to_string()));
-        }
-        if self.camera.projection() != Projection::Perspective {
-            entries.push(("projection", self.camera.projection().name().to_owned()));
-        }
-        if self.camera.film_shift() != [0.0; 2] {
-            entries.push(("film_shift", numbers(self.camera.film_shift())));
-        }
-        if !self.placeholders.is_empty() {
-            entries.push(("placeholders", self.placeholders.join(" ")));
-        }
-        if let Some(w) = settings.crop {
-            entries.push(("crop", format!("{},{},{},{}", w.x, w.y, w.width, w.height)));
-        }
-        Receipt { entries: entries.into_iter().map(|(key, value)| (key.to_owned(), value)).collect() }
-    }
-}
-
-/// Numbers as text that reads back to the same bits.
-fn numbers(values: impl IntoIterator<Item = f32>) -> String {
-    values.into_iter().map(|v| v.to_string()).collect::<Vec<_>>().join(" ")
 }

@@ -44,9 +44,43 @@ impl Tile {
     }
 }
 
+/// Runs of neighbouring tiles stay together; of a large picture there are about so many runs.
+const RUNS: usize = 256;
+
+/// The same tiles in an order in which any stretch of them is spread over the whole picture, so that the time the first of them took
+/// tells how long all will take. Neighbours still follow each other in runs: they look at the same things.
+pub(crate) fn spread(tiles: &[Tile]) -> Vec<Tile> {
+    let runs: Vec<&[Tile]> = tiles.chunks((tiles.len() / RUNS).max(1)).collect();
+    let count = runs.len();
+    // Steps of the golden section of all, or the next number that comes by every run
+    let is_whole = |step: &usize| (1..=*step).rev().find(|d| step % d == 0 && count % d == 0) == Some(1);
+    let step = (count * 618 / 1000..count).find(is_whole).unwrap_or(1);
+    (0..count).flat_map(|k| runs[k * step % count]).copied().collect()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn tiles_are_spread_and_none_is_lost() {
+        for (width, height) in [(1, 1), (8, 8), (16, 8), (24, 8), (40, 24), (100, 77), (1024, 768), (1000, 1000)] {
+            let tiles = Tile::cover(Window { x: 3, y: 2, width, height }, 8);
+            let spread = spread(&tiles);
+            let sorted = |mut tiles: Vec<Tile>| {
+                tiles.sort_by_key(|t| (t.y, t.x));
+                tiles
+            };
+            assert_eq!(sorted(spread.clone()), sorted(tiles.clone()), "{width} x {height}");
+            // Of each tenth of them about as much lies in the upper half of the picture as in the lower
+            if tiles.len() > 1000 {
+                for part in spread.chunks_exact(tiles.len() / 10) {
+                    let upper = part.iter().filter(|t| t.y < height / 2).count();
+                    assert!((0.4..0.6).contains(&(upper as f64 / part.len() as f64)), "{width} x {height}: {upper}");
+                }
+            }
+        }
+    }
 
     #[test]
     fn every_pixel_is_in_one_tile() {

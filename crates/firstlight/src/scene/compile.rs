@@ -285,16 +285,15 @@ impl SceneDesc {
         }
     }
 
-    /// BLAKE3 of all that decides the picture. What follows from a default is hashed as if it were said.
+    /// BLAKE3 of all that decides the picture, but for the samples of lights. What follows from a default is hashed as if it
+    /// were said.
     fn hash(&self, textures: &Textures, meshes: &[(String, [u8; 32])], complete: bool) -> String {
         let mut said = self.clone();
         said.render.camera = self.chosen_camera().map(|i| self.cameras[i].0.clone());
-        for light in &mut said.lights {
-            if let Some((None, _)) = light.samples() {
-                light.set_samples(self.render.samples);
-            }
-        }
-        said.render.samples = RenderDesc::default().samples;
+        // How lights are sampled is a choice of who renders: receipts say what is in effect, light by light
+        let default = RenderDesc::default().samples;
+        said.lights.iter_mut().for_each(|light| light.set_samples(default));
+        said.render.samples = default;
         said.render.fps = RenderDesc::default().fps;
         let mut hasher = blake3::Hasher::new();
         hasher.update(said.to_json().as_bytes());

@@ -167,7 +167,8 @@ impl Scene {
     }
 
     /// 64 hexadecimal digits: BLAKE3 of the description, its settings and the files it names. The same at all times: what
-    /// moves is told apart by [`time`](Self::time).
+    /// moves is told apart by [`time`](Self::time). The same for all samples of lights, which are told apart by
+    /// [`receipt`](Self::receipt).
     pub fn hash(&self) -> &str {
         &self.hash
     }

@@ -1,0 +1,98 @@
+//! What a picture says of itself: all that decides its pixels, and nothing else.
+
+use super::RenderSettings;
+use super::many::SINGLY;
+use crate::camera::Projection;
+use crate::describe::SamplesDesc;
+use crate::image::Receipt;
+use crate::light::Light;
+use crate::scene::Scene;
+
+/// How many entries **Pixels** has in the changelog, over all versions. It is part of the version in a receipt, so that two
+/// builds whose pictures differ never say the same. The test below compares it with the changelog.
+const PIXELS_ENTRIES: u32 = 12;
+
+impl Scene {
+    /// What a picture of this scene says of itself: all that decides the film, by the rules that are in effect, so that
+    /// settings that give the same film say the same. How 8- and 16-bit files show it is added where they are
+    /// [encoded](crate::Image::encode).
+    pub fn receipt(&self, settings: &RenderSettings) -> Receipt {
+        let mut entries = vec![
+            ("version", format!("{}+pixels.{PIXELS_ENTRIES}", env!("CARGO_PKG_VERSION"))),
+            ("scene_hash", self.hash.clone()),
+            ("width", self.width.to_string()),
+            ("height", self.height.to_string()),
+            ("antialiasing", self.antialiasing.to_string()),
+            ("aa_mode", settings.effective_aa_mode().name().to_owned()),
+            ("camera", self.summary.camera.clone()),
+            ("world_from_camera", numbers(self.camera.world_from_camera())),
+            ("film_half_size", numbers(self.camera.film_half_size())),
+            ("light_samples", light_samples(&self.lights, settings)),
+            ("color_space", "linear Rec. 709, alpha premultiplied, before display encoding".to_owned()),
+        ];
+        if let Some(time) = self.time {
+            entries.push(("time", time.to_string()));
+        }
+        if self.camera.projection() != Projection::Perspective {
+            entries.push(("projection", self.camera.projection().name().to_owned()));
+        }
+        if self.camera.film_shift() != [0.0; 2] {
+            entries.push(("film_shift", numbers(self.camera.film_shift())));
+        }
+        if !self.placeholders.is_empty() {
+            entries.push(("placeholders", self.placeholders.join(" ")));
+        }
+        let w = settings.window(self);
+        if [w.width, w.height] != [self.width, self.height] {
+            entries.push(("crop", format!("{},{},{},{}", w.x, w.y, w.width, w.height)));
+        }
+        Receipt { entries: entries.into_iter().map(|(key, value)| (key.to_owned(), value)).collect() }
+    }
+}
+
+/// The points that each light is sampled at, or that it is integrated: in effect, whoever said so.
+fn light_samples(lights: &[Light], settings: &RenderSettings) -> String {
+    // Where every sample is traced, every light is sampled
+    let said = |light: &Light| match light.said_samples() {
+        SamplesDesc::Exact if settings.samples_all() => light.samples().to_string(),
+        said => said.to_string(),
+    };
+    let counts: Vec<String> = lights.iter().map(said).collect();
+    // Of many lights, how many in a row say the same
+    let run = |same: &[String]| format!("{} x {}", same.len(), same[0]);
+    if counts.len() > SINGLY {
+        counts.chunk_by(|a, b| a == b).map(run).collect::<Vec<_>>().join(", ")
+    } else {
+        counts.join(" ")
+    }
+}
+
+/// Numbers as text that reads back to the same bits.
+fn numbers(values: impl IntoIterator<Item = f32>) -> String {
+    values.into_iter().map(|v| v.to_string()).collect::<Vec<_>>().join(" ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::PIXELS_ENTRIES;
+
+    #[test]
+    fn the_version_in_receipts_is_raised_with_every_change_of_pixels() {
+        let changelog = concat!(env!("CARGO_MANIFEST_DIR"), "/../../CHANGELOG.md");
+        let changelog = std::fs::read_to_string(changelog).expect("the changelog is there");
+        let (mut heading, mut entries) = ("", 0);
+        for line in changelog.lines() {
+            if line.starts_with('#') {
+                heading = line;
+            }
+            entries += u32::from(heading == "### Pixels" && line.starts_with("- "));
+        }
+        assert!(entries > 0, "the changelog has no entry under Pixels");
+        assert_eq!(
+            PIXELS_ENTRIES as usize,
+            entries,
+            "the changelog has {entries} entries under Pixels: set PIXELS_ENTRIES in {} to {entries}",
+            file!()
+        );
+    }
+}
