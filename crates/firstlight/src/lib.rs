@@ -5,9 +5,7 @@
 //! and developed into a picture ([`Image`]).
 //!
 //! ```
-//! use std::ops::ControlFlow;
-//!
-//! use firstlight::{CompileOptions, Format, NoAssets, RenderSettings, SceneDesc, render};
+//! use firstlight::{CompileOptions, Format, NoAssets, RenderSettings, SceneDesc, render_image};
 //!
 //! # fn main() -> Result<(), Box<dyn std::error::Error>> {
 //! let text = r#"
@@ -25,26 +23,30 @@
 //! // Every fault of the text comes at once, with its place
 //! let parsed = SceneDesc::parse("ball.toml", text.as_bytes(), &NoAssets);
 //! let scene = parsed.compile(&NoAssets, &CompileOptions::default())?.scene;
-//! // From here on nothing can fail
-//! let settings = RenderSettings::default();
-//! let ControlFlow::Continue((film, stats)) = render(&scene, &settings, &|_, _| ControlFlow::Continue(())) else {
-//!     unreachable!("the progress function never stops it");
-//! };
-//! assert_eq!(stats.camera_rays, 32 * 24 * 16);
-//! let image = film.develop();
+//! // Rendering cannot fail
+//! let image = render_image(&scene);
 //! // Linear Rec. 709, red, green, blue, alpha: the middle of the ball is lit, the corner is not
 //! assert!(image.pixels[12 * 32 + 16][0] > 0.1);
 //! assert_eq!(image.pixels[0], [0.0, 0.0, 0.0, 1.0]);
-//! let png = image.encode(Format::Png8, &scene.display(), &scene.receipt(&settings))?;
+//! let receipt = scene.receipt(&RenderSettings::default());
+//! let png = image.encode(Format::Png8, &scene.display(), &receipt)?;
 //! assert!(png.starts_with(b"\x89PNG"));
 //! # Ok(())
 //! # }
 //! ```
 //!
 //! - What a scene may say: [`SceneDesc`] and the `*Desc` types; [`reference()`] writes the manual of the text.
-//! - What a ray sees, without a picture: [`Scene::intersect`] and [`Scene::look`].
+//! - Rendering with settings, with progress, and stopped early: [`render`].
+//! - What a ray sees, without a picture: [`Scene::intersect`] and [`Scene::look`]; whether light gets through:
+//!   [`Scene::shadow_rays`] and [`Scene::occluded`].
+//! - The same scene from many places: [`Scene::with_camera`].
 //! - Where files come from: [`Assets`].
 //! - Faults, as data: [`SceneError`], [`Diagnostic`], [`ImageError`]. The library never prints and never exits.
+//!
+//! Whole programs are in the folder `examples`.
+
+// What can be reached from outside can be named there
+#![warn(unnameable_types)]
 
 mod accel;
 #[doc(hidden)]
@@ -83,8 +85,10 @@ pub use light::{
     SphereLightDesc, SpotDesc,
 };
 pub use material::{BlinnPhongDesc, MaterialDesc, PhongDesc};
-pub use math::{Ray, Vec2, Vec3};
-pub use render::{AaMode, Film, Heat, LightCounts, RenderSettings, RenderStats, SimdLevel, VisibilityMode, render};
+pub use math::{DVec3, Ray, ShadowRay, Vec2, Vec3};
+pub use render::{
+    AaMode, Film, Heat, LightCounts, RenderSettings, RenderStats, SimdLevel, VisibilityMode, render, render_image,
+};
 pub use scene::{Builtin, Parsed, builtin_scenes, reference, schema};
 pub use scene::{
     CameraHit, CompileOptions, Compiled, DisplayEncoding, Hit, ModelSettings, RenderDesc, Scene, SceneDesc,
@@ -98,3 +102,12 @@ pub use shape::{
 };
 pub use texture::{CheckerboardDesc, Filter, ImageTextureDesc, TextureDesc, TextureSpace, Wrap};
 pub use transform::{Interpolation, TransformDesc, TransformKeyDesc};
+
+/// The code of the book and of the README is compiled, and run where that takes no files.
+#[cfg(doctest)]
+mod pages {
+    #[doc = include_str!("../../../docs/src/library.md")]
+    mod library {}
+    #[doc = include_str!("../../../README.md")]
+    mod readme {}
+}

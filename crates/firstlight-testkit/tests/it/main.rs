@@ -6,6 +6,8 @@ mod fuzz_corpus;
 mod golden;
 mod images;
 mod invalid;
+mod queries;
 mod receipts;
 mod reference;
 mod roundtrip;
+mod scene_blocks;

@@ -27,7 +27,7 @@ macro_rules! area_table {
         $crate::describe::table! {
             $(#[doc = $doc])*
             pub struct $name {
-                /// What reports and id files call it.
+                /// What reports call it.
                 pub name: Option<String> = None,
                 $($own)*
                 /// Linear colour; channels of 0 or more.

@@ -14,8 +14,8 @@ pub(crate) use arc::Arc;
 pub(crate) use frame::Frame;
 pub(crate) use lanes::{Vec3x16, dispatch_wide};
 pub(crate) use pow::Exponent;
-pub use ray::Ray;
-pub(crate) use ray::{DRay, ErrorBound, ShadowRay};
+pub(crate) use ray::{DRay, ErrorBound};
+pub use ray::{Ray, ShadowRay};
 pub(crate) use roots::{bracketed, depressed_cubic};
 pub(crate) use sum::{LANES, LaneSum};
 

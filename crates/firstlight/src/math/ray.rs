@@ -64,25 +64,36 @@ impl ErrorBound {
     }
 }
 
-/// A ray from a surface towards a light: the points `p + t l`, 0 < t < t_max.
+/// A ray from a surface towards a light: the points `p + t l`, 0 < t < t_max. [`Scene::shadow_rays`](crate::Scene::shadow_rays)
+/// and [`Scene::shadow_ray_to`](crate::Scene::shadow_ray_to) make them, for [`Scene::occluded`](crate::Scene::occluded).
 #[derive(Clone, Copy, Debug)]
 pub struct ShadowRay {
     /// Where it starts, on a surface.
-    pub p: Vec3,
+    pub(crate) p: Vec3,
     /// How sure we are of `p`.
-    pub error: ErrorBound,
+    pub(crate) error: ErrorBound,
     /// Where it starts for what cannot tell one side of a surface from the other by the bound: [`ErrorBound::offset`].
-    pub start: Vec3,
+    pub(crate) start: Vec3,
     /// Towards the light, of any length.
-    pub l: Vec3,
+    pub(crate) l: Vec3,
     /// 1 where `l` reaches the light, infinite where the light is infinitely far away.
-    pub t_max: f32,
+    pub(crate) t_max: f32,
     /// The light: not everything casts shadows for every one.
-    pub light: LightId,
+    pub(crate) light: LightId,
 }
 
 impl ShadowRay {
-    /// Whether the light is at the end of `l`.
+    /// From the surface to the light's point, in metres, world space; a unit vector if that is infinitely far away.
+    pub fn direction(&self) -> Vec3 {
+        self.l
+    }
+
+    /// The light it leads to.
+    pub fn light(&self) -> LightId {
+        self.light
+    }
+
+    /// Whether the light is at the end of [`direction`](Self::direction), and not infinitely far away.
     #[inline(always)]
     pub fn is_finite(&self) -> bool {
         self.t_max == 1.0
@@ -91,7 +102,7 @@ impl ShadowRay {
     /// Where the way ends for what has no bound of its own at the light: short of a light that lies on a surface, by the
     /// rounding of both ends.
     #[inline(always)]
-    pub fn end(&self) -> f32 {
+    pub(crate) fn end(&self) -> f32 {
         if !self.is_finite() {
             return f32::INFINITY;
         }

@@ -48,7 +48,7 @@ pub use heat::Heat;
 pub use simd::SimdLevel;
 
 use crate::describe::words;
-use crate::image::Window;
+use crate::image::{Image, Window};
 use crate::light::Light;
 use crate::math::Ray;
 use crate::scene::Scene;
@@ -285,6 +285,16 @@ pub fn render(
         return ControlFlow::Break(());
     }
     ControlFlow::Continue(result.into_inner().expect("no thread panics while it holds the film"))
+}
+
+/// Renders `scene` with the default settings, on all processors.
+///
+/// [`render`] takes settings, tells how far it is, can be stopped, and counts what it does.
+pub fn render_image(scene: &Scene) -> Image {
+    match render(scene, &RenderSettings::default(), &|_, _| ControlFlow::Continue(())) {
+        ControlFlow::Continue((film, _)) => film.develop(),
+        ControlFlow::Break(()) => unreachable!("only the progress function stops a render"),
+    }
 }
 
 fn available_threads() -> usize {

@@ -125,6 +125,7 @@ impl SceneDesc {
             light_obstacles,
             level: Level::new(),
             hash: self.hash(&textures, &files, options.complete),
+            moment: time,
             time: cx.keyed.then_some(time),
             placeholders: textures.placeholders,
             textures: textures.compiled,
@@ -307,6 +308,31 @@ impl SceneDesc {
             hasher.update(file.as_bytes()).update(&[0]).update(hash);
         }
         hasher.finalize().to_hex().to_string()
+    }
+}
+
+impl Scene {
+    /// The same scene seen by another camera, at the same moment and in the same size. What was compiled is shared and not
+    /// made anew, so this takes no time: it is how a turntable is made. [`hash`](Self::hash) is another one, and the summary
+    /// calls the camera nothing.
+    ///
+    /// # Errors
+    /// What is wrong with the camera, with paths that begin with `camera`.
+    pub fn with_camera(&self, camera: &CameraDesc) -> Result<Scene, SceneError> {
+        let mut cx = CompileContext::at_time(self.moment);
+        let compiled = cx.within("camera", |cx| camera.compile(cx, self.width, self.height));
+        if cx.has_errors() {
+            return Err(SceneError { faults: cx.take_faults() });
+        }
+        let mut scene = self.clone();
+        scene.camera = compiled;
+        scene.time = self.time.or(cx.keyed.then_some(self.moment));
+        scene.summary.camera = String::new();
+        let said = SceneDesc { cameras: vec![(String::new(), camera.clone())], ..SceneDesc::default() };
+        let mut hasher = blake3::Hasher::new();
+        hasher.update(self.hash.as_bytes()).update(b"camera").update(said.to_json().as_bytes());
+        scene.hash = hasher.finalize().to_hex().to_string();
+        Ok(scene)
     }
 }
 

@@ -75,6 +75,8 @@ pub struct Scene {
     /// The best instruction set of this processor: for rays that are asked for one at a time.
     pub(crate) level: Level,
     pub(crate) hash: String,
+    /// The moment that was compiled, in seconds.
+    pub(crate) moment: f64,
     /// The moment, in seconds, if anything of the scene changes with time.
     pub(crate) time: Option<f64>,
     /// The texture files that something stands in for.

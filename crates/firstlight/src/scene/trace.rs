@@ -8,7 +8,7 @@ use super::links::LinkId;
 use crate::color::Rgb;
 use crate::ids::{LightId, SurfaceId};
 use crate::light::LightKind;
-use crate::math::{Ray, ShadowRay, Vec3};
+use crate::math::{DVec3, Ray, ShadowRay, Vec3};
 use crate::shape::{RayDifferential, ShapePoint, Sphere, SurfaceInteraction};
 
 pub use super::geometry::Hit;
@@ -82,6 +82,47 @@ impl Scene {
             }
             *limit = nearest.limit();
         });
+    }
+
+    /// The lights, in scene order.
+    pub fn lights(&self) -> impl ExactSizeIterator<Item = LightId> + use<> {
+        (0..self.lights.len() as u32).map(LightId)
+    }
+
+    /// How many points of a light are sampled; 1 for one without an area. For a light that is integrated, as many as
+    /// [`RenderSettings::reference`](crate::RenderSettings::reference) would sample it at.
+    ///
+    /// # Panics
+    /// If the scene has no such light.
+    pub fn light_points(&self, light: LightId) -> usize {
+        self.lights[light.index()].samples()
+    }
+
+    /// A ray from `surface` to each of the [points](Self::light_points) of a light that are above the surface's horizon, for
+    /// [`occluded`](Self::occluded). Those below it send nothing, so the share of the points whose rays are not occluded is
+    /// the visible fraction of the light.
+    ///
+    /// # Panics
+    /// If the scene has no such light.
+    pub fn shadow_rays(
+        &self,
+        surface: &SurfaceInteraction,
+        light: LightId,
+    ) -> impl Iterator<Item = ShadowRay> + use<'_> {
+        let si = *surface;
+        let from = &self.lights[light.index()];
+        let floor = from.floor(si.lit_from, si.error, si.horizon);
+        (0..from.samples()).filter_map(move |k| {
+            let to = from.towards(k, si.lit_from);
+            let is_above = si.horizon.dot(to.l) > floor && si.ns.dot(to.l) > 0.0;
+            is_above.then(|| si.shadow_ray(light, to.l, if to.finite { 1.0 } else { f32::INFINITY }))
+        })
+    }
+
+    /// A ray from `surface` to a point, world space, for [`occluded`](Self::occluded): whether the two see each other, as far
+    /// as the shadows of `light` go. Whether the point is above the horizon is not looked at.
+    pub fn shadow_ray_to(&self, surface: &SurfaceInteraction, light: LightId, point: DVec3) -> ShadowRay {
+        surface.shadow_ray(light, (point - surface.lit_from.as_dvec3()).as_vec3(), 1.0)
     }
 
     /// Whether anything that casts shadows for the ray's light stands between a surface and it. Any hit will do, so the order

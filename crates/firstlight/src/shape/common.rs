@@ -28,7 +28,7 @@ macro_rules! shape_table {
             $(#[doc = $doc])*
             pub struct $name {
                 $($own)*
-                /// What reports and id files call it.
+                /// What reports call it.
                 pub name: Option<String> = None,
                 /// The name of a material; without it, matte gray 0.8.
                 pub material: Option<String> = None,

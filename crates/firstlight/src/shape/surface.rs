@@ -100,8 +100,8 @@ impl SurfaceInteraction {
 }
 
 /// How a camera ray changes from one ray of the grid to the next: the change of its unnormalised direction, over that
-/// direction's length, and the change of its origin.
-#[derive(Clone, Copy, Debug)]
+/// direction's length, and the change of its origin. The default is 0: a ray that stands for a point alone.
+#[derive(Clone, Copy, Debug, Default)]
 pub struct RayDifferential {
     /// Of the direction, to the ray on the right.
     pub dx: Vec3,
