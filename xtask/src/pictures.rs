@@ -1,11 +1,11 @@
 //! `cargo xtask pictures`: the pictures of the book. Its plots come from `cargo xtask engine --curves`.
 
 use std::ops::ControlFlow;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use firstlight::bench::{Sight, sights};
 use firstlight::{
-    Assets, CompileOptions, Display, Encoding, Film, FolderAssets, Format, Image, NoAssets, RenderSettings,
+    Assets, CompileOptions, Display, Encoding, Film, FolderAssets, Format, Image, NoAssets, Parsed, RenderSettings,
     SamplesDesc, Scene, SceneDesc, Window, builtin_scenes, render,
 };
 
@@ -21,18 +21,26 @@ pub fn run(filter: Option<&str>) -> Outcome {
     }
     let gallery = root().join("scenes/gallery");
     let assets = FolderAssets::new(&gallery, &[]).map_err(|(path, e)| format!("{}: {e}", path.display()))?;
-    let mut files: Vec<_> = std::fs::read_dir(&gallery)
-        .map_err(|e| format!("scenes/gallery: {e}"))?
-        .flatten()
-        .map(|entry| entry.path())
-        .filter(|path| path.extension().is_some_and(|e| e == "toml"))
-        .collect();
-    files.sort();
-    for file in files {
+    for file in scene_files(&gallery)? {
         let name = file.file_stem().unwrap_or_default().to_string_lossy().into_owned();
         if wanted(&name) {
             let text = std::fs::read(&file).map_err(|e| format!("{}: {e}", file.display()))?;
             picture(&name, &text, &assets, None)?;
+        }
+    }
+    // The scenes that pages speak of; of several cameras each
+    let scenes = root().join("docs/scenes");
+    for file in scene_files(&scenes)? {
+        let stem = file.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+        let text = std::fs::read(&file).map_err(|e| format!("{}: {e}", file.display()))?;
+        let mut parsed = SceneDesc::parse(&format!("{stem}.toml"), &text, &NoAssets);
+        let cameras: Vec<String> = parsed.desc.cameras.iter().map(|(name, _)| name.clone()).collect();
+        for camera in cameras {
+            let name = if camera.is_empty() { stem.clone() } else { format!("{stem}-{camera}") };
+            if wanted(&name) {
+                parsed.desc.render.camera = Some(camera);
+                compile_and_save(&name, &parsed, &NoAssets)?;
+            }
         }
     }
     if wanted("visibility") {
@@ -42,6 +50,15 @@ pub fn run(filter: Option<&str>) -> Outcome {
         heat()?;
     }
     Ok(())
+}
+
+/// The scenes of a folder, in order.
+fn scene_files(folder: &Path) -> Result<Vec<PathBuf>, String> {
+    let entries = std::fs::read_dir(folder).map_err(|e| format!("{}: {e}", folder.display()))?;
+    let mut files: Vec<_> = entries.flatten().map(|entry| entry.path()).collect();
+    files.retain(|path| path.extension().is_some_and(|e| e == "toml"));
+    files.sort();
+    Ok(files)
 }
 
 /// Pixels across and down of the pictures of what goes on inside.
@@ -90,6 +107,10 @@ fn picture(name: &str, text: &[u8], assets: &dyn Assets, size: Option<u32>) -> O
     if let Some(size) = size {
         (parsed.desc.render.width, parsed.desc.render.height) = (size, size);
     }
+    compile_and_save(name, &parsed, assets)
+}
+
+fn compile_and_save(name: &str, parsed: &Parsed, assets: &dyn Assets) -> Outcome {
     let compiled = parsed
         .compile(assets, &CompileOptions { strict: true, ..CompileOptions::default() })
         .map_err(|e| e.to_string())?;

@@ -1,6 +1,8 @@
 //! The built program, from outside: each test is named by what it promises.
 
 mod answers;
+#[cfg(unix)]
+mod book;
 mod common;
 mod faults;
 mod files;
