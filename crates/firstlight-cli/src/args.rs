@@ -144,7 +144,8 @@ pub struct RenderArgs {
     pub reading: ReadingArgs,
 
     /// A picture to write: its ending, .png, .exr or .hdr, says the format; - is standard output. May be given several
-    /// times [default: the scene's name with .png, or a course file's output_file, in the working folder]
+    /// times [default: the scene's name with .png, or with .render.png where that is a file not written by firstlight; a
+    /// course file's output_file; in the working folder]
     #[arg(short, long = "output", value_name = "FILE", value_hint = ValueHint::FilePath, help_heading = "Output")]
     pub output: Vec<PathBuf>,
     /// Bits of each channel of PNG files: 8 or 16 [default: 8]

@@ -29,24 +29,43 @@ pub struct Input {
     pub parsed: Parsed,
     /// Whether it is a model by itself, for which a camera and a light are found.
     pub is_model: bool,
+    /// The scene's or model's own file, as it was named; standard input may be one too.
+    own: Option<PathBuf>,
     assets: Remembered,
     strict: bool,
 }
 
-/// Files that are kept once they were read.
+/// The files of a scene, kept once they were read.
 struct Remembered {
-    assets: Box<dyn Assets>,
+    /// None for a built-in scene, which reads no files.
+    folder: Option<FolderAssets>,
+    /// What the description calls a model, and its file's name, which need not be UTF-8.
+    model: Option<(String, PathBuf)>,
     files: Mutex<HashMap<String, Result<Vec<u8>, AssetError>>>,
     /// Whether they will be asked for again.
     again: bool,
 }
 
+impl Remembered {
+    fn new(folder: Option<FolderAssets>) -> Self {
+        Self { folder, model: None, files: Mutex::default(), again: false }
+    }
+
+    fn read_anew(&self, path: &str, limit: u64) -> Result<Vec<u8>, AssetError> {
+        match (&self.folder, &self.model) {
+            (Some(folder), Some((called, file))) if called == path => folder.read_path(file, limit),
+            (Some(folder), _) => folder.read(path, limit),
+            (None, _) => NoAssets.read(path, limit),
+        }
+    }
+}
+
 impl Assets for Remembered {
     fn read(&self, path: &str, limit: u64) -> Result<Vec<u8>, AssetError> {
         let Some(mut files) = self.files.lock().ok().filter(|_| self.again) else {
-            return self.assets.read(path, limit);
+            return self.read_anew(path, limit);
         };
-        let read = files.entry(path.to_owned()).or_insert_with(|| self.assets.read(path, limit));
+        let read = files.entry(path.to_owned()).or_insert_with(|| self.read_anew(path, limit));
         match read {
             Ok(bytes) if bytes.len() as u64 > limit => Err(AssetError::TooLarge { size: bytes.len() as u64, limit }),
             read => read.clone(),
@@ -89,14 +108,11 @@ pub fn read(scene: &Path, reading: &ReadingArgs) -> Result<Input, Failure> {
         FolderAssets::new(folder, &reading.allow_dir)
             .map_err(|(path, e)| Failure::Work(format!("--allow-dir: {}: {e}", shown(&path))))
     };
-    let assets: Box<dyn Assets> = match folder {
-        Some(folder) => Box::new(allowed(&folder)?),
-        None => Box::new(NoAssets),
-    };
-
-    let parsed = SceneDesc::parse(&name, &text, assets.as_ref());
-    let assets = Remembered { assets, files: Mutex::default(), again: false };
-    Ok(Input { name, stem, parsed, is_model: false, assets, strict: reading.strict })
+    let assets = Remembered::new(folder.map(|folder| allowed(&folder)).transpose()?);
+    let parsed = SceneDesc::parse(&name, &text, &assets);
+    let stdin = || cfg!(unix).then(|| PathBuf::from("/dev/stdin"));
+    let own = if scene == "-" { stdin() } else { file_of(scene).map(Path::to_path_buf) };
+    Ok(Input { name, stem, parsed, is_model: false, own, assets, strict: reading.strict })
 }
 
 /// Whether `scene` names a model, by its ending.
@@ -124,13 +140,15 @@ fn read_model(path: &Path, reading: &ReadingArgs) -> Result<Input, Failure> {
         up: if reading.up == Some(Axis::Z) { UpAxis::Z } else { UpAxis::Y },
         points: is_point_set(&head),
     };
-    let file = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    let file = PathBuf::from(path.file_name().unwrap_or_default());
+    let called = file.to_string_lossy().into_owned();
     Ok(Input {
         name: path.display().to_string(),
         stem: path.file_stem().map_or_else(|| PathBuf::from("model"), PathBuf::from),
-        parsed: SceneDesc::of_model(&file, &settings).into(),
+        parsed: SceneDesc::of_model(&called, &settings).into(),
         is_model: true,
-        assets: Remembered { assets: Box::new(assets), files: Mutex::default(), again: false },
+        own: Some(path.to_path_buf()),
+        assets: Remembered { model: Some((called, file)), ..Remembered::new(Some(assets)) },
         strict: reading.strict,
     })
 }
@@ -147,8 +165,14 @@ impl Input {
     /// # Errors
     /// It cannot be read any more.
     pub fn model_bytes(&self) -> Result<Vec<u8>, Failure> {
-        let file = Path::new(&self.name).file_name().unwrap_or_default().to_string_lossy().into_owned();
-        self.assets.read(&file, u64::MAX).map_err(|why| Failure::Work(format!("{}: {why}", self.name)))
+        let called = self.assets.model.as_ref().map_or("", |(called, _)| called);
+        self.assets.read(called, u64::MAX).map_err(|why| Failure::Work(format!("{}: {why}", self.name)))
+    }
+
+    /// The files that the scene was made of so far: its own, and all that it read.
+    pub fn files(&self) -> Vec<PathBuf> {
+        let read = self.assets.folder.iter().flat_map(FolderAssets::files);
+        self.own.iter().cloned().chain(read).collect()
     }
 
     /// Keeps the scene's files in memory, for it will be compiled more than once.

@@ -22,6 +22,7 @@ use report::{Failure, answer};
 
 fn main() -> ExitCode {
     interrupt::install();
+    hush_decoders();
     // Wrong usage, help and version are clap's to say
     let cli = match Cli::try_parse() {
         Ok(cli) => cli,
@@ -50,6 +51,16 @@ fn main() -> ExitCode {
             failure.exit_code()
         }
     }
+}
+
+/// What the library catches is told as a damaged picture: nothing else is said of it.
+fn hush_decoders() {
+    let hook = std::panic::take_hook();
+    std::panic::set_hook(Box::new(move |panic| {
+        if !firstlight::is_decoding() {
+            hook(panic);
+        }
+    }));
 }
 
 fn with_newline(mut text: String) -> String {

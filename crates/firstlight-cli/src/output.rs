@@ -1,10 +1,11 @@
-//! Where pictures go: files, whole or absent, and standard output.
+//! Where pictures go: files, whole or absent, and standard output. Never over a file that the scene was made of.
 
-use std::fs;
-use std::io::{self, IsTerminal, Write};
+use std::ffi::{OsStr, OsString};
+use std::fs::{self, File};
+use std::io::{self, BufReader, IsTerminal};
 use std::path::{Path, PathBuf};
 
-use firstlight::{Format, ImageError, PendingFile, StagedFile, Written};
+use firstlight::{Format, ImageError, PendingFile, Receipt, StagedFile, Written, write_open};
 
 use crate::args::{Bits, NamedFormat};
 use crate::report::{Failure, say, shown};
@@ -57,7 +58,7 @@ impl Target {
     }
 
     /// What messages call it.
-    fn name(&self) -> String {
+    pub fn name(&self) -> String {
         match self {
             Target::Stdout => "-".into(),
             Target::File(path) => shown(path),
@@ -101,28 +102,32 @@ impl Ready {
 }
 
 impl Staged<'_> {
-    /// Whether this is standard output, whose reader may be gone.
-    pub fn is_stdout(&self) -> bool {
-        matches!(self, Staged::Stdout(_))
+    /// Whether this is standard output, a device or a pipe: its reader may be gone, and nothing of it can be taken back.
+    pub fn is_direct(&self) -> bool {
+        match self {
+            Staged::Stdout(_) => true,
+            Staged::File(_, file) => file.is_direct(),
+        }
     }
 
-    /// Lets the bytes appear, and says so unless `quiet`.
+    /// Lets the bytes appear, and says so unless `quiet`. While a reader lets wait, `stop` is asked whether to go on.
     ///
     /// # Errors
     /// They did not get there as a whole; a file that was there before is there still.
-    pub fn commit(self, quiet: bool) -> Result<(), Failure> {
+    pub fn commit(self, quiet: bool, stop: &dyn Fn() -> bool) -> Result<(), Failure> {
         match self {
-            Staged::Stdout(bytes) => {
-                let mut out = io::stdout().lock();
-                out.write_all(bytes).and_then(|()| out.flush()).map_err(|e| {
-                    Failure::Work(match e.kind() {
-                        io::ErrorKind::BrokenPipe => "standard output: closed before everything was written".into(),
-                        _ => format!("standard output: {e}"),
-                    })
+            Staged::Stdout(bytes) => stdout().and_then(|out| write_open(out, bytes, stop)).map_err(|e| {
+                Failure::Work(match e.kind() {
+                    io::ErrorKind::Interrupted => return Failure::InterruptedWriting("standard output".into()),
+                    io::ErrorKind::BrokenPipe => "standard output: closed before everything was written".into(),
+                    _ => format!("standard output: {e}"),
                 })
-            }
+            }),
             Staged::File(path, file) => {
-                let written = file.commit().map_err(failed)?;
+                let written = file.commit_unless(stop).map_err(|e| match e {
+                    ImageError::Stopped { .. } => Failure::InterruptedWriting(shown(&path)),
+                    e => failed(e),
+                })?;
                 if !quiet {
                     say(format_args!("wrote {}{}", shown(&path), aside(&path, written)));
                 }
@@ -130,6 +135,25 @@ impl Staged<'_> {
             }
         }
     }
+}
+
+/// Lets all of them appear, or none as far as that can be: first what is written to directly, for a device may be full and
+/// the reader of a pipe gone, then the files, which are on the disk and only want their names.
+///
+/// # Errors
+/// Those of [`Staged::commit`], of the first that fails.
+pub fn commit(mut staged: Vec<Staged>, quiet: bool, stop: &dyn Fn() -> bool) -> Result<(), Failure> {
+    staged.sort_by_key(|staged| !staged.is_direct());
+    staged.into_iter().try_for_each(|staged| staged.commit(quiet, stop))
+}
+
+/// Standard output, without a buffer.
+fn stdout() -> io::Result<File> {
+    #[cfg(unix)]
+    let handle = std::os::fd::AsFd::as_fd(&io::stdout()).try_clone_to_owned();
+    #[cfg(windows)]
+    let handle = std::os::windows::io::AsHandle::as_handle(&io::stdout()).try_clone_to_owned();
+    handle.map(File::from)
 }
 
 /// The library's words name the path, what is wrong and what to do.
@@ -146,17 +170,30 @@ impl Output {
         };
         Output { target, ..self.clone() }
     }
+
+    /// Whether the picture may go there though nobody named it: there is no file yet, or a picture of our own.
+    pub fn is_free(&self) -> bool {
+        let Target::File(path) = &self.target else { return true };
+        match fs::metadata(path) {
+            Ok(meta) if meta.is_file() => {
+                File::open(path).is_ok_and(|file| Receipt::is_in_png(&mut BufReader::new(file)))
+            }
+            // A folder cannot be replaced; a device that a link leads to is meant
+            Ok(meta) => !meta.is_dir(),
+            Err(_) => true,
+        }
+    }
 }
 
 /// The path with the number of a frame in its name: in place of the last row of `#`, with at least as many digits, else
 /// before the ending with at least four.
 fn with_frame(path: &Path, frame: u32) -> PathBuf {
     let name = path.file_name().unwrap_or_default();
-    if let Some(name) = name.to_str()
-        && let Some(end) = name.rfind('#').map(|last| last + 1)
-    {
-        let start = name[..end].trim_end_matches('#').len();
-        return path.with_file_name(format!("{}{frame:0width$}{}", &name[..start], &name[end..], width = end - start));
+    if let Some((before, marks, after)) = around_marks(name) {
+        let mut numbered = before;
+        numbered.push(format!("{frame:0marks$}"));
+        numbered.push(after);
+        return path.with_file_name(numbered);
     }
     let mut numbered = path.file_stem().unwrap_or_default().to_os_string();
     numbered.push(format!(".{frame:04}"));
@@ -167,14 +204,30 @@ fn with_frame(path: &Path, frame: u32) -> PathBuf {
     path.with_file_name(numbered)
 }
 
+/// What stands before the last row of `#` in a name, how many they are, and what stands after them.
+fn around_marks(name: &OsStr) -> Option<(OsString, usize, OsString)> {
+    let bytes = name.as_encoded_bytes();
+    let end = bytes.iter().rposition(|b| *b == b'#')? + 1;
+    let start = bytes[..end].iter().rposition(|b| *b != b'#').map_or(0, |last| last + 1);
+    // A name need not be UTF-8
+    #[cfg(unix)]
+    let part = |bytes: &[u8]| Some(<OsStr as std::os::unix::ffi::OsStrExt>::from_bytes(bytes).to_owned());
+    #[cfg(not(unix))]
+    let part = |bytes: &[u8]| std::str::from_utf8(bytes).ok().map(OsString::from);
+    Some((part(&bytes[..start])?, end - start, part(&bytes[end..])?))
+}
+
 /// What else there is to say of a file that was written: nothing, for a plain file.
 fn aside(path: &Path, written: Written) -> String {
     if written == Written::Direct {
         return " directly: a device or pipe is not replaced as a whole".into();
     }
+    let replaced = written == Written::Replaced;
     let is_link = fs::symlink_metadata(path).is_ok_and(|meta| meta.is_symlink());
     match path.canonicalize() {
-        Ok(real) if is_link => format!(", a link: {} was replaced", shown(&real)),
+        Ok(real) if is_link && replaced => format!(", a link: {} was replaced", shown(&real)),
+        Ok(real) if is_link => format!(", a link to {}", shown(&real)),
+        _ if replaced => " (replaced)".into(),
         _ => String::new(),
     }
 }
@@ -262,6 +315,82 @@ pub fn refuse_clashes(scene: Option<&Path>, outputs: &[Output], stats: Option<&T
     Ok(())
 }
 
+/// A file, the same under each of its names.
+struct Identity {
+    real: PathBuf,
+    /// Device and number of the file, the same for all its hard links; where the system tells, and the file is there.
+    inode: Option<(u64, u64)>,
+}
+
+impl Identity {
+    /// `None` for what is no plain file: nothing of a device is lost.
+    fn of(path: &Path) -> Option<Self> {
+        let meta = fs::metadata(path).ok();
+        if meta.as_ref().is_some_and(|meta| !meta.is_file()) {
+            return None;
+        }
+        #[cfg(unix)]
+        let inode = {
+            use std::os::unix::fs::MetadataExt;
+            meta.map(|meta| (meta.dev(), meta.ino()))
+        };
+        #[cfg(not(unix))]
+        let inode = None;
+        Some(Self { real: real(path), inode })
+    }
+
+    /// What is written to. Standard output may have been sent to a file.
+    fn of_target(target: &Target) -> Option<Self> {
+        match target {
+            Target::Stdout if cfg!(unix) => Self::of(Path::new("/dev/stdout")),
+            Target::Stdout => None,
+            Target::File(path) => Self::of(path),
+        }
+    }
+
+    fn is(&self, other: &Identity) -> bool {
+        self.real == other.real || (self.inode.is_some() && self.inode == other.inode)
+    }
+}
+
+/// Sees that nothing would be written over a file that the scene was made of, under whatever name.
+///
+/// # Errors
+/// The first that would, with both names and what to do.
+pub fn refuse_overwriting<'a>(
+    read: &[PathBuf],
+    outputs: impl IntoIterator<Item = &'a Output>,
+    stats: Option<&Target>,
+) -> Result<(), Failure> {
+    let files: Vec<(Identity, &PathBuf)> = read.iter().filter_map(|name| Some((Identity::of(name)?, name))).collect();
+    let overwritten = |target: &Target| {
+        let place = Identity::of_target(target)?;
+        files.iter().find(|(file, _)| file.is(&place)).map(|(_, name)| shown(relative(name)))
+    };
+    let usage = |what: String, file: String, advice: &str| {
+        Err(Failure::Usage(format!("{what} would replace {file}, which the scene is made of; {advice}")))
+    };
+    for output in outputs {
+        if let Some(file) = overwritten(&output.target) {
+            let name = output.target.name();
+            return match output.content {
+                Content::Scene => usage(format!("the picture {name}"), file, "name another file with -o"),
+                Content::Heat => usage(format!("--heat {name}"), file, "name another file"),
+            };
+        }
+    }
+    match stats.and_then(|stats| Some((stats, overwritten(stats)?))) {
+        Some((stats, file)) => usage(format!("--stats={}", stats.name()), file, "name another file"),
+        None => Ok(()),
+    }
+}
+
+/// A path as seen from the working folder, if it lies in it.
+fn relative(path: &Path) -> &Path {
+    let folder = std::env::current_dir().and_then(|folder| folder.canonicalize());
+    folder.ok().and_then(|folder| path.strip_prefix(folder).ok()).unwrap_or(path)
+}
+
 /// The file that a path means, whether there is one yet or not: links are followed, `.` and `..` resolved.
 fn real(path: &Path) -> PathBuf {
     let mut path = std::path::absolute(path).unwrap_or_else(|_| path.to_path_buf());
@@ -314,5 +443,14 @@ mod tests {
         ] {
             assert_eq!(with_frame(Path::new(path), frame), Path::new(expected), "{path}");
         }
+    }
+
+    #[test]
+    #[cfg(unix)]
+    fn a_name_need_not_be_utf8() {
+        use std::os::unix::ffi::OsStrExt;
+        let path = |bytes: &'static [u8]| Path::new(OsStr::from_bytes(bytes));
+        assert_eq!(with_frame(path(b"\xff_##\xfe.png"), 7), path(b"\xff_07\xfe.png"));
+        assert_eq!(with_frame(path(b"\xff.png"), 7), path(b"\xff.0007.png"));
     }
 }

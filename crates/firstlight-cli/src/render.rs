@@ -122,7 +122,9 @@ pub fn run(args: &RenderArgs) -> Result<(), Failure> {
         say(format_args!("{}", stats.to_table()));
     }
     if let Some(ready) = stats_file {
-        ready.stage(stats.to_json().as_bytes())?.commit(plan.quiet)?;
+        let watch = Watch::begin();
+        let json = stats.to_json();
+        ready.stage(json.as_bytes())?.commit(plan.quiet, &|| watch.check().is_err())?;
     }
     Ok(())
 }
@@ -179,6 +181,10 @@ impl Run<'_> {
         // Compile
         let (compiled, compile) = timed(|| self.input.compile(moment.time, plan.quiet));
         let mut compiled = compiled?;
+        // Now it is known which files the scene is made of: none of them may be lost, by none of the frames to come
+        let ahead = if index == 0 { moments } else { &moments[index..=index] };
+        let outputs = ahead.iter().flat_map(|moment| &moment.outputs);
+        output::refuse_overwriting(&self.input.files(), outputs, plan.stats.target())?;
         compiled.warnings.retain(|warning| !self.warned.contains(warning));
         if !compiled.warnings.is_empty() {
             let show = || show_diagnostics(&compiled.warnings);
@@ -209,8 +215,7 @@ impl Run<'_> {
             progress.finish(window.width, window.height);
         }
 
-        // Encode all pictures and bring them to the disk, then let them appear: files first, a reader of standard output
-        // may be gone
+        // Encode all pictures and bring them to the disk, then let them appear
         let (written, write) = timed(|| {
             let heat = film.heat().map(|heat| heat.picture());
             let (image, receipt) = (film.develop(), scene.receipt(settings));
@@ -228,10 +233,9 @@ impl Run<'_> {
                 .map_err(|e| Failure::Work(e.to_string()))?;
             watch.check()?;
             let stage = ready.into_iter().zip(&bytes).map(|(ready, bytes)| ready.stage(bytes));
-            let mut staged: Vec<Staged> = stage.collect::<Result<_, _>>()?;
+            let staged: Vec<Staged> = stage.collect::<Result<_, _>>()?;
             watch.check()?;
-            staged.sort_by_key(Staged::is_stdout);
-            progress.aside(|| staged.into_iter().try_for_each(|staged| staged.commit(plan.quiet)))
+            progress.aside(|| output::commit(staged, plan.quiet, &|| watch.check().is_err()))
         });
         written?;
         Ok(Took { compile, render, write, rays })
@@ -378,7 +382,8 @@ impl<'a> Plan<'a> {
         Ok((outputs, settings))
     }
 
-    /// A course file's `output_file`, else the scene's name with `.png`, in the working folder.
+    /// A course file's `output_file`, else the scene's name with `.png`, in the working folder. Of the files there it takes the
+    /// place of none but our own pictures: `bunny.obj` may well have a texture `bunny.png` beside it.
     fn default_output(&self, input: &Input) -> Result<Output, Failure> {
         let (path, format) = match &input.parsed.output {
             Some(path) => {
@@ -387,9 +392,26 @@ impl<'a> Plan<'a> {
                 (path, format)
             }
             None => {
-                let mut name = input.stem.clone().into_os_string();
-                name.push(".png");
-                (PathBuf::from(name), Format::Png8)
+                let named = |ending: &str| {
+                    let mut name = input.stem.clone().into_os_string();
+                    name.push(ending);
+                    Output { target: Target::File(name.into()), format: Format::Png8, content: Content::Scene }
+                };
+                let is_free = |output: &Output| match self.frames {
+                    Some(Frames { first, last }) => (first..=last).all(|frame| output.of_frame(frame).is_free()),
+                    None => output.is_free(),
+                };
+                let choices = [".png", ".render.png"].map(named);
+                let [name, other] = choices.each_ref().map(|output| output.target.name());
+                let Some(free) = choices.iter().position(is_free) else {
+                    return Err(Failure::Work(format!(
+                        "{name} and {other} would replace files that are no pictures of firstlight; name another with -o"
+                    )));
+                };
+                if free > 0 && !self.quiet {
+                    say(format_args!("{name} is there and is no picture of firstlight; writing {other}"));
+                }
+                return Ok(Output { format: output::with_bits(Format::Png8, self.bits), ..choices[free].clone() });
             }
         };
         Ok(Output { target: Target::File(path), format: output::with_bits(format, self.bits), content: Content::Scene })

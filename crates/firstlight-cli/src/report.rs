@@ -23,6 +23,8 @@ pub enum Failure {
     Scene(Vec<Diagnostic>),
     /// Stopped by Ctrl-C or by another program: exit code 130.
     Interrupted,
+    /// The same, while a device or pipe of this name let wait: exit code 130.
+    InterruptedWriting(String),
     /// The same, after some of the frames: exit code 130.
     InterruptedAfter {
         /// Frames whose files are there.
@@ -38,7 +40,7 @@ impl Failure {
         ExitCode::from(match self {
             Failure::Work(_) | Failure::Scene(_) => 1,
             Failure::Usage(_) => 2,
-            Failure::Interrupted | Failure::InterruptedAfter { .. } => 130,
+            Failure::Interrupted | Failure::InterruptedWriting(_) | Failure::InterruptedAfter { .. } => 130,
         })
     }
 
@@ -55,6 +57,9 @@ impl Failure {
                 say(format_args!("{}", count(faults)));
             }
             Failure::Interrupted => say(format_args!("interrupted; nothing was written")),
+            Failure::InterruptedWriting(to) => {
+                say(format_args!("interrupted while {to} was written; it may have got a part"));
+            }
             Failure::InterruptedAfter { done, all } => {
                 say(format_args!("interrupted; {done} of {all} frames were written, each of them whole"));
             }

@@ -3,7 +3,7 @@
 //!
 //! [`scenes`] builds scenes and looks at them; [`random`] and [`exact_scenes`] make them up; [`converged`] knows how they
 //! look when nothing is left to chance, with [`graded`] points where a light is near and [`kept`] files where that took long;
-//! [`hostile_text`] and [`hostile_mesh`] are what fuzzing holds the readers to.
+//! [`hostile_text`], [`hostile_mesh`] and [`hostile_picture`] are what fuzzing holds the readers to.
 
 #![allow(missing_docs, reason = "tests say what they build by its name")]
 
@@ -11,6 +11,7 @@ pub mod converged;
 pub mod exact_scenes;
 pub mod graded;
 pub mod hostile_mesh;
+pub mod hostile_picture;
 pub mod hostile_text;
 pub mod kept;
 mod numbers;

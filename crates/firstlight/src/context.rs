@@ -1,7 +1,8 @@
 //! The one door to files, and what compiling a description carries along.
 
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
 
 use crate::color::Rgb;
 use crate::describe::ColorDesc;
@@ -65,9 +66,13 @@ impl Assets for MemoryAssets {
 
 /// The files of one folder and those below it, and of further folders that were allowed. Links are followed; where they
 /// lead must be inside as well.
+///
+/// It knows which files were asked for ([`FolderAssets::files`]), so that a program can see that it writes over none of
+/// them.
 pub struct FolderAssets {
     root: PathBuf,
     allowed: Vec<PathBuf>,
+    files: Mutex<BTreeSet<PathBuf>>,
 }
 
 impl FolderAssets {
@@ -85,12 +90,20 @@ impl FolderAssets {
         for dir in allow {
             allowed.push(canonical(dir)?);
         }
-        Ok(Self { root, allowed })
+        Ok(Self { root, allowed, files: Mutex::default() })
     }
-}
 
-impl Assets for FolderAssets {
-    fn read(&self, path: &str, limit: u64) -> Result<Vec<u8>, AssetError> {
+    /// The files that were asked for and are there, by their names from the root of the system, links resolved; whether or
+    /// not they could be read to their end.
+    pub fn files(&self) -> Vec<PathBuf> {
+        self.files.lock().unwrap_or_else(PoisonError::into_inner).iter().cloned().collect()
+    }
+
+    /// As [`Assets::read`], for a name that no text can hold: one that is not UTF-8.
+    ///
+    /// # Errors
+    /// Those of [`Assets::read`].
+    pub fn read_path(&self, path: &Path, limit: u64) -> Result<Vec<u8>, AssetError> {
         use std::io::Read;
         let io = |e: std::io::Error| match e.kind() {
             std::io::ErrorKind::NotFound => AssetError::NotFound,
@@ -111,6 +124,7 @@ impl Assets for FolderAssets {
         if !meta.is_file() {
             return Err(AssetError::Io("is not a plain file".into()));
         }
+        self.files.lock().unwrap_or_else(PoisonError::into_inner).insert(real.clone());
         if meta.len() > limit {
             return Err(AssetError::TooLarge { size: meta.len(), limit });
         }
@@ -122,10 +136,16 @@ impl Assets for FolderAssets {
     }
 }
 
+impl Assets for FolderAssets {
+    fn read(&self, path: &str, limit: u64) -> Result<Vec<u8>, AssetError> {
+        self.read_path(Path::new(path), limit)
+    }
+}
+
 /// Whether a path, by its words alone, leads out of the folder it starts in.
-fn leaves(path: &str) -> bool {
+fn leaves(path: &Path) -> bool {
     let mut depth = 0i32;
-    for part in Path::new(path).components() {
+    for part in path.components() {
         match part {
             std::path::Component::Normal(_) => depth += 1,
             std::path::Component::CurDir => {}

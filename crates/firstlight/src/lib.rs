@@ -42,6 +42,9 @@
 //! - The same scene from many places: [`Scene::with_camera`].
 //! - Where files come from: [`Assets`].
 //! - Faults, as data: [`SceneError`], [`Diagnostic`], [`ImageError`]. The library never prints and never exits.
+//! - It needs unwinding: the decoders of pictures belong to others, and a panic of one on a damaged file is caught and
+//!   becomes [`ImageError::Damaged`]. With `panic = "abort"` it ends the program. The library sets no panic hook; one that
+//!   is to be silent about these asks [`is_decoding`].
 //!
 //! Whole programs are in the folder `examples`.
 
@@ -77,7 +80,8 @@ pub use describe::{ColorDesc, ColorParam, FilePath, NumberParam, ParamDesc, Samp
 pub use error::{Diagnostic, Place, SceneError, Severity};
 pub use ids::{LightId, MaterialId, SurfaceId, TextureId};
 pub use image::{
-    Format, Image, ImageError, PendingFile, Receipt, StagedFile, StoredImage, Window, Written, write_whole,
+    Format, Image, ImageError, PendingFile, Receipt, StagedFile, StoredImage, Window, Written, is_decoding, write_open,
+    write_whole,
 };
 pub use import::{ImportError, MeshData, MeshFormat, MeshPart, MeshPlace, MeshReport, is_point_set, read_mesh};
 pub use light::{

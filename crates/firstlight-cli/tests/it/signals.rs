@@ -8,17 +8,27 @@ use crate::common::Folder;
 /// The program in this folder, with signals as a shell's foreground has them: whoever started the tests may ignore some, as `nohup`
 /// does, and that is inherited.
 fn listening(folder: &Folder) -> Command {
-    let program = env!("CARGO_BIN_EXE_firstlight");
-    let resets = Command::new("env").args(["--default-signal=INT,TERM,HUP", "true"]).output();
-    let mut command = if resets.is_ok_and(|output| output.status.success()) {
-        let mut command = Command::new("env");
-        command.args(["--default-signal=INT,TERM,HUP", program]);
+    ignoring(folder, "").unwrap_or_else(|| {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_firstlight"));
+        command.current_dir(folder.path("")).stdin(Stdio::null());
         command
-    } else {
-        Command::new(program)
-    };
+    })
+}
+
+/// The same, where these of the signals are ignored and the others are not. `None` where `env` cannot do that.
+fn ignoring(folder: &Folder, ignored: &str) -> Option<Command> {
+    let mut options = vec!["--default-signal=INT,TERM,HUP".to_owned()];
+    if !ignored.is_empty() {
+        options.push(format!("--ignore-signal={ignored}"));
+    }
+    let resets = Command::new("env").args(&options).arg("true").output();
+    if !resets.is_ok_and(|output| output.status.success()) {
+        return None;
+    }
+    let mut command = Command::new("env");
+    command.args(&options).arg(env!("CARGO_BIN_EXE_firstlight"));
     command.current_dir(folder.path("")).stdin(Stdio::null());
-    command
+    Some(command)
 }
 
 /// A render that is under way, and would be for a long time. Its tiles are quick, so that it can stop soon.
@@ -29,8 +39,11 @@ struct Long {
 
 impl Long {
     fn begin(folder: &Folder) -> Self {
+        Self::begin_as(folder, listening(folder))
+    }
+
+    fn begin_as(folder: &Folder, mut command: Command) -> Self {
         folder.put("old.png", "old");
-        let mut command = listening(folder);
         let line = "render config11 --width 2048 --aa 4 --samples 4096 --tile-size 8 --threads 1 -o old.png -o new.exr \
                     --stats=stats.json";
         command.args(line.split_whitespace()).stderr(Stdio::piped());
@@ -68,6 +81,79 @@ fn interrupted_it_leaves_the_old_file_and_no_other() {
         assert_eq!(folder.names(), ["old.png"], "{signal}");
         assert_eq!(folder.get("old.png"), b"old");
     }
+}
+
+/// In the background and under `nohup` some signals are ignored. The others are not, and leave no more behind than ever.
+#[test]
+fn what_is_ignored_from_outside_stays_ignored_and_the_rest_is_not() {
+    for (ignored, others) in [("INT", ["TERM", "HUP"]), ("HUP", ["TERM", "INT"]), ("INT,HUP", ["TERM", "TERM"])] {
+        for signal in others {
+            let folder = Folder::new();
+            let Some(command) = ignoring(&folder, ignored) else { return };
+            let long = Long::begin_as(&folder, command);
+            for ignored in ignored.split(',') {
+                long.send(&format!("-{ignored}"));
+            }
+            std::thread::sleep(std::time::Duration::from_millis(100));
+            long.send(&format!("-{signal}"));
+            let (status, said) = long.end();
+            assert_eq!(status.code(), Some(130), "{ignored} ignored, {signal}: {said}");
+            assert!(said.contains("interrupted; nothing was written"), "{said}");
+            assert_eq!(folder.names(), ["old.png"], "{signal}");
+        }
+    }
+}
+
+/// A pipe that nobody reads lets its writer wait: the first signal ends that, and the file beside it does not appear.
+#[test]
+fn waiting_for_the_reader_of_a_pipe_it_can_be_stopped() {
+    let folder = Folder::with_scene();
+    if !Command::new("mkfifo").arg(folder.path("pipe.png")).status().is_ok_and(|s| s.success()) {
+        return; // no such program here
+    }
+    let mut command = listening(&folder);
+    let line = "render scene.toml --width 4 --aa 1 --samples 1 -o a.png -o pipe.png";
+    let mut child = command.args(line.split(' ')).stderr(Stdio::piped()).spawn().unwrap();
+    // Until it has come so far, its file is under another name
+    while !folder.names().iter().any(|name| name.ends_with(".tmp")) && child.try_wait().unwrap().is_none() {
+        std::thread::sleep(std::time::Duration::from_millis(5));
+    }
+    std::thread::sleep(std::time::Duration::from_millis(300));
+    assert!(child.try_wait().unwrap().is_none());
+    Command::new("kill").args(["-TERM", &child.id().to_string()]).status().unwrap();
+    let said = std::io::read_to_string(child.stderr.take().unwrap()).unwrap();
+    assert_eq!(child.wait().unwrap().code(), Some(130), "{said}");
+    assert_eq!(said, "interrupted while pipe.png was written; it may have got a part\n");
+    assert_eq!(folder.names(), ["pipe.png", "scene.toml"]);
+    // With a reader, all goes well
+    let mut reader = Command::new("cat").arg(folder.path("pipe.png")).stdout(Stdio::piped()).spawn().unwrap();
+    let output = folder.command(line.split(' ')).output().unwrap();
+    crate::common::ran(output).done().says(&["wrote pipe.png directly", "wrote a.png"]);
+    let mut got = Vec::new();
+    std::io::Read::read_to_end(&mut reader.stdout.take().unwrap(), &mut got).unwrap();
+    reader.wait().unwrap();
+    assert!(got == folder.get("a.png"));
+}
+
+/// The same for standard output, whose reader has stopped reading.
+#[test]
+fn waiting_for_the_reader_of_standard_output_it_can_be_stopped() {
+    let folder = Folder::with_scene();
+    let mut command = listening(&folder);
+    // More than a pipe holds
+    let line = "render scene.toml --width 400 --aa 1 --samples 1 -o a.png -o - --format exr";
+    command.args(line.split(' ')).stdout(Stdio::piped()).stderr(Stdio::piped());
+    let mut child = command.spawn().unwrap();
+    while !folder.names().iter().any(|name| name.ends_with(".tmp")) && child.try_wait().unwrap().is_none() {
+        std::thread::sleep(std::time::Duration::from_millis(5));
+    }
+    std::thread::sleep(std::time::Duration::from_millis(500));
+    assert!(child.try_wait().unwrap().is_none());
+    Command::new("kill").args(["-TERM", &child.id().to_string()]).status().unwrap();
+    let said = std::io::read_to_string(child.stderr.take().unwrap()).unwrap();
+    assert_eq!(child.wait().unwrap().code(), Some(130), "{said}");
+    assert!(said.contains("interrupted while standard output was written"), "{said}");
+    assert_eq!(folder.names(), ["scene.toml"]);
 }
 
 #[test]

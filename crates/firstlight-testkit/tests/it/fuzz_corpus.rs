@@ -2,15 +2,26 @@
 
 use std::path::Path;
 
-use firstlight_testkit::hostile_text;
+use firstlight_testkit::{hostile_picture, hostile_text};
 
-#[test]
-fn nothing_in_the_corpus_breaks_the_reader() {
-    let corpus = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../fuzz/corpus/scene_text");
+/// Checks each input of a folder of the corpus.
+fn replay(folder: &str, check: impl Fn(&[u8])) {
+    let corpus = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../fuzz/corpus").join(folder);
     let mut inputs = 0;
     for entry in std::fs::read_dir(corpus).unwrap() {
-        hostile_text::check(&std::fs::read(entry.unwrap().path()).unwrap());
+        check(&std::fs::read(entry.unwrap().path()).unwrap());
         inputs += 1;
     }
     assert!(inputs >= 10, "{inputs} inputs");
+}
+
+#[test]
+fn nothing_in_the_corpus_breaks_the_reader() {
+    replay("scene_text", hostile_text::check);
+}
+
+/// Panics of decoders among them, which are caught; a failure would name the check.
+#[test]
+fn no_picture_in_the_corpus_does_harm() {
+    replay("picture", hostile_picture::check);
 }

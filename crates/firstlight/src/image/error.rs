@@ -67,6 +67,13 @@ pub enum ImageError {
         source: io::Error,
     },
 
+    /// Stopped while a device, pipe or socket let wait; it may have got a part.
+    #[error("{}: was stopped while it was written", path.display())]
+    Stopped {
+        /// The file, as it was named.
+        path: PathBuf,
+    },
+
     /// Bytes that are no picture of a known kind.
     #[error("is not a {expected} file; convert it to one")]
     UnknownKind {
@@ -107,6 +114,7 @@ fn ending(path: &std::path::Path) -> String {
 fn advice(error: &io::Error) -> &'static str {
     match error.kind() {
         io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded => "; free some space, or write elsewhere",
+        io::ErrorKind::FileTooLarge => "; raise the limit on the size of files (ulimit -f), or write a smaller picture",
         io::ErrorKind::PermissionDenied => "; choose a folder that you may write to, or change its permissions",
         io::ErrorKind::ReadOnlyFilesystem => "; choose a folder that can be written to",
         io::ErrorKind::InvalidFilename => "; choose a shorter or simpler name",

@@ -6,19 +6,21 @@
 //!
 //! A file with several names (hard links) keeps its old contents under the others, as with every program that renames.
 
-use std::fs::{self, Permissions};
+use std::fs::{self, File, Permissions};
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
 use tempfile::NamedTempFile;
 
-use super::ImageError;
+use super::{ImageError, patient};
 
 /// How a file was written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Written {
-    /// Whole, by renaming.
+    /// Whole, by renaming, where there was no file.
     Whole,
+    /// Whole, by renaming, in place of a file that was there.
+    Replaced,
     /// Into a device, pipe, socket or open file of a process, which cannot be replaced.
     Direct,
 }
@@ -110,7 +112,8 @@ impl PendingFile {
             Target::Name(name, permissions) => {
                 let fill = || {
                     let mut file = temporary(&name)?;
-                    file.write_all(bytes)?;
+                    // By itself, for its errors name the file that is asked for, not this one
+                    file.as_file_mut().write_all(bytes)?;
                     if let Some(permissions) = permissions {
                         file.as_file().set_permissions(permissions)?;
                     }
@@ -139,18 +142,34 @@ impl StagedFile<'_> {
     /// # Errors
     /// Those of [`write_whole`].
     pub fn commit(self) -> Result<Written, ImageError> {
+        self.commit_unless(&|| false)
+    }
+
+    /// The same, unless `stop` says so while a device, pipe or socket lets wait. Such a one should come before the files
+    /// that are staged with it, so that all of them or none appear.
+    ///
+    /// # Errors
+    /// Those of [`write_whole`], and [`ImageError::Stopped`].
+    pub fn commit_unless(self, stop: &dyn Fn() -> bool) -> Result<Written, ImageError> {
         let Self { path, rest } = self;
         match rest {
             Rest::Rename(file, name) => {
+                let replaced = fs::symlink_metadata(&name).is_ok();
                 // On failure the error holds the temporary file, and dropping it removes it
                 file.persist(name).map_err(|e| refused(&path, e.error))?;
-                Ok(Written::Whole)
+                Ok(if replaced { Written::Replaced } else { Written::Whole })
             }
-            Rest::Write(bytes, to) => {
-                write_direct(&to, bytes).map_err(|e| refused(&path, e))?;
-                Ok(Written::Direct)
-            }
+            Rest::Write(bytes, to) => match patient::write_to(&to, bytes, stop) {
+                Ok(()) => Ok(Written::Direct),
+                Err(e) if e.kind() == io::ErrorKind::Interrupted => Err(ImageError::Stopped { path }),
+                Err(e) => Err(refused(&path, e)),
+            },
         }
+    }
+
+    /// Whether it is a device, pipe or socket, which is written to directly.
+    pub fn is_direct(&self) -> bool {
+        matches!(self.rest, Rest::Write(..))
     }
 }
 
@@ -207,27 +226,15 @@ fn resolve(path: &Path, absolute: &Path) -> Result<Target, ImageError> {
 
 /// An empty file in the folder of `name`, removed when dropped, with the permissions that new files have.
 fn temporary(name: &Path) -> io::Result<NamedTempFile> {
-    let mut builder = tempfile::Builder::new();
-    builder.prefix(".firstlight-").suffix(".tmp");
-    // The system takes away from these what its user wants taken away
-    #[cfg(unix)]
-    builder.permissions(std::os::unix::fs::PermissionsExt::from_mode(0o666));
-    let file = builder.tempfile_in(name.parent().unwrap_or(Path::new("/")));
-    // Its name is of no interest in an error
-    file.map_err(|e| e.raw_os_error().map(io::Error::from_raw_os_error).unwrap_or(e))
-}
-
-/// Writes to what cannot be replaced. Appends, so that a program's output redirected to a file is not cut.
-fn write_direct(to: &Path, bytes: &[u8]) -> io::Result<()> {
-    #[cfg(unix)]
-    if std::os::unix::fs::FileTypeExt::is_socket(&fs::metadata(to)?.file_type()) {
-        let mut socket = std::os::unix::net::UnixStream::connect(to)?;
-        socket.write_all(bytes)?;
-        return socket.flush();
-    }
-    let mut file = fs::OpenOptions::new().append(true).open(to)?;
-    file.write_all(bytes)?;
-    file.flush()
+    let folder = name.parent().unwrap_or(Path::new("/"));
+    tempfile::Builder::new().prefix(".firstlight-").suffix(".tmp").make_in(folder, |path| {
+        let mut options = File::options();
+        options.write(true).create_new(true);
+        // The system takes away from these what its user wants taken away
+        #[cfg(unix)]
+        std::os::unix::fs::OpenOptionsExt::mode(&mut options, 0o666);
+        options.open(path)
+    })
 }
 
 fn refused(path: &Path, source: io::Error) -> ImageError {
@@ -259,7 +266,7 @@ mod tests {
         let path = folder.path().join("a.png");
         assert_eq!(write_whole(&path, b"one").unwrap(), Written::Whole);
         assert_eq!(fs::read(&path).unwrap(), b"one");
-        assert_eq!(write_whole(&path, b"").unwrap(), Written::Whole);
+        assert_eq!(write_whole(&path, b"").unwrap(), Written::Replaced);
         assert_eq!(fs::read(&path).unwrap(), b"");
         assert_eq!(names(folder.path()), ["a.png"]);
     }
@@ -360,13 +367,13 @@ mod tests {
             // A link to a link, both relative to their own folders
             symlink("../real/a.png", at("real/second")).unwrap();
             symlink("real/second", at("first")).unwrap();
-            assert_eq!(write_whole(&at("first"), b"new").unwrap(), Written::Whole);
+            assert_eq!(write_whole(&at("first"), b"new").unwrap(), Written::Replaced);
             assert_eq!(fs::read(at("real/a.png")).unwrap(), b"new");
             assert!(fs::symlink_metadata(at("first")).unwrap().is_symlink());
             assert!(fs::symlink_metadata(at("real/second")).unwrap().is_symlink());
             // A link to nothing
             symlink("real/b.png", at("dangling")).unwrap();
-            write_whole(&at("dangling"), b"b").unwrap();
+            assert_eq!(write_whole(&at("dangling"), b"b").unwrap(), Written::Whole);
             assert_eq!(fs::read(at("real/b.png")).unwrap(), b"b");
             assert_eq!(names(&at("real")), ["a.png", "b.png", "second"]);
             // A link into nowhere, a link to a folder, and one that leads in a circle
@@ -446,8 +453,14 @@ mod tests {
             if !std::process::Command::new("mkfifo").arg(&path).status().is_ok_and(|s| s.success()) {
                 return; // no such program here
             }
-            // Checking it waits for nobody
+            // Checking it waits for nobody, and who waits for a reader can be stopped
             let pending = PendingFile::new(&path).unwrap();
+            let asked = std::cell::Cell::new(0);
+            let third = || asked.replace(asked.get() + 1) == 3;
+            let staged = pending.clone().stage(b"bytes").unwrap();
+            assert!(staged.is_direct());
+            let words = staged.commit_unless(&third).unwrap_err().to_string();
+            assert_eq!(words, format!("{}: was stopped while it was written", path.display()));
             let from = path.clone();
             let reader = std::thread::spawn(move || fs::read(from).unwrap());
             assert_eq!(pending.commit(b"bytes").unwrap(), Written::Direct);

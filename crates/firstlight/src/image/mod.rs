@@ -3,19 +3,24 @@
 //! Owns the encoders (one file each), writing files whole, and decoding the pictures that textures are made of.
 //! Before it stands the film; after it, only the disk.
 
+mod contain;
+mod damage;
 mod error;
 #[cfg(feature = "exr")]
 mod exr;
 mod file;
 mod format;
 mod hdr;
+mod patient;
 mod png;
 pub(crate) mod read;
 mod stored;
 
+pub use contain::is_decoding;
 pub use error::ImageError;
 pub use file::{PendingFile, StagedFile, Written, write_whole};
 pub use format::Format;
+pub use patient::write_open;
 pub use stored::StoredImage;
 
 use crate::color::Display;
@@ -120,6 +125,11 @@ impl Receipt {
         let others = self.entries.iter().filter(|(key, _)| key != DISPLAY_KEY).cloned();
         let own = display.map(|display| (DISPLAY_KEY.to_owned(), display.to_string()));
         Receipt { entries: others.chain(own).collect() }
+    }
+
+    /// Whether a file is a PNG that firstlight wrote, with a receipt in it. Reads no further than to where the pixels begin.
+    pub fn is_in_png(file: &mut dyn std::io::Read) -> bool {
+        png::has_receipt(file).unwrap_or(false)
     }
 
     /// Whether every format can hold it.
@@ -243,6 +253,24 @@ mod tests {
             // What another file said of it does not come along
             assert!(of(&Display::default(), &stored) == plain, "{format:?}");
         }
+    }
+
+    #[test]
+    fn our_own_pictures_are_known_by_their_receipts() {
+        let picture = whole(3, 2, |_, _| [0.5; 4]);
+        let is_ours = |bytes: &[u8]| Receipt::is_in_png(&mut &bytes[..]);
+        for format in [Format::Png8, Format::Png16] {
+            let ours = picture.encode(format, &Display::default(), &receipt()).unwrap();
+            assert!(is_ours(&ours));
+            for length in 0..ours.len() {
+                is_ours(&ours[..length]);
+            }
+        }
+        let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/images");
+        for name in ["basn2c08.png", "bricks-color.png", "bricks-color.jpeg"] {
+            assert!(!is_ours(&std::fs::read(folder.join(name)).unwrap()), "{name}");
+        }
+        assert!(!is_ours(b"") && !is_ours(b"\x89PNG\r\n\x1a\n\xff\xff\xff\xffiTXt"));
     }
 
     #[test]

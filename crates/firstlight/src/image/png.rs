@@ -113,6 +113,40 @@ fn write(
     Ok(bytes)
 }
 
+/// Whether a chunk of a receipt comes before the pixels of a PNG file.
+///
+/// # Errors
+/// The file ends before that is known, or cannot be read.
+pub(super) fn has_receipt(mut file: &mut dyn std::io::Read) -> std::io::Result<bool> {
+    let mut signature = [0; 8];
+    file.read_exact(&mut signature)?;
+    if signature != *b"\x89PNG\r\n\x1a\n" {
+        return Ok(false);
+    }
+    loop {
+        let mut head = [0; 8];
+        file.read_exact(&mut head)?;
+        let [a, b, c, d, kind @ ..] = head;
+        let mut rest = u64::from(u32::from_be_bytes([a, b, c, d])) + 4;
+        match &kind {
+            b"IDAT" | b"IEND" => return Ok(false),
+            b"iTXt" if rest > PREFIX.len() as u64 => {
+                let mut begin = [0; PREFIX.len()];
+                file.read_exact(&mut begin)?;
+                if begin == PREFIX.as_bytes() {
+                    return Ok(true);
+                }
+                rest -= PREFIX.len() as u64;
+            }
+            _ => {}
+        }
+        let skipped = std::io::copy(&mut std::io::Read::take(&mut file, rest), &mut std::io::sink())?;
+        if skipped < rest {
+            return Err(std::io::ErrorKind::UnexpectedEof.into());
+        }
+    }
+}
+
 /// The gAMA chunk holds 100000 / gamma and cHRM the primaries of Rec. 709. A gamma that gAMA cannot hold goes unsaid.
 fn set_gamma(encoder: &mut codec::Encoder<'_, &mut Vec<u8>>, gamma: f64) {
     let scaled = (100_000.0 / gamma).round();

@@ -15,6 +15,8 @@ use ::png;
 use codec::ImageDecoder;
 
 use super::ImageError;
+use super::contain::contained;
+use super::damage;
 
 /// How large a picture may be.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -55,9 +57,9 @@ pub(crate) enum TexelData {
 /// [`ImageError::UnknownKind`], [`ImageError::TooLarge`] before anything is decoded, and [`ImageError::Damaged`].
 pub(crate) fn decode(bytes: &[u8], limits: &Limits) -> Result<Texels, ImageError> {
     if bytes.starts_with(b"\x89PNG\r\n\x1a\n") {
-        decode_png(bytes, limits)
+        contained("PNG", || decode_png(bytes, limits))
     } else if bytes.starts_with(&[0xff, 0xd8, 0xff]) {
-        decode_jpeg(bytes, limits)
+        contained("JPEG", || decode_jpeg(bytes, limits))
     } else {
         Err(ImageError::UnknownKind { expected: "PNG or JPEG" })
     }
@@ -77,6 +79,7 @@ const SHORT: &str = "it is too short for its size";
 fn decode_png(bytes: &[u8], limits: &Limits) -> Result<Texels, ImageError> {
     let damaged = |reason: String| ImageError::Damaged { format: "PNG", reason };
     let fault = |e: png::DecodingError| damaged(e.to_string());
+    damage::in_png(bytes).map_err(damaged)?;
     let mut decoder = png::Decoder::new(Cursor::new(bytes));
     decoder.set_ignore_text_chunk(true);
     decoder.set_ignore_iccp_chunk(true);
@@ -113,6 +116,7 @@ fn decode_png(bytes: &[u8], limits: &Limits) -> Result<Texels, ImageError> {
 fn decode_jpeg(bytes: &[u8], limits: &Limits) -> Result<Texels, ImageError> {
     let damaged = |reason: String| ImageError::Damaged { format: "JPEG", reason };
     let fault = |e: codec::ImageError| damaged(e.to_string());
+    damage::in_jpeg(bytes).map_err(damaged)?;
     let decoder = codec::codecs::jpeg::JpegDecoder::new(Cursor::new(bytes)).map_err(fault)?;
     // Check the size
     let (width, height) = decoder.dimensions();

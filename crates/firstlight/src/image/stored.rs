@@ -6,6 +6,8 @@ use ::image as codec;
 use ::png;
 use codec::ImageDecoder;
 
+use super::contain::contained;
+use super::damage;
 use super::read::{Limits, check_size};
 use super::{Format, ImageError, PREFIX, Receipt, Window};
 
@@ -37,12 +39,12 @@ impl StoredImage {
     /// [`ImageError::Damaged`]; [`ImageError::WithoutExr`].
     pub fn read(bytes: &[u8]) -> Result<StoredImage, ImageError> {
         if bytes.starts_with(b"\x89PNG\r\n\x1a\n") {
-            read_png(bytes)
+            contained("PNG", || read_png(bytes))
         } else if bytes.starts_with(b"#?RADIANCE\n") {
-            read_hdr(bytes)
+            contained("HDR", || read_hdr(bytes))
         } else if bytes.starts_with(&[0x76, 0x2f, 0x31, 0x01]) {
             #[cfg(feature = "exr")]
-            return read_exr(bytes);
+            return contained("EXR", || read_exr(bytes));
             #[cfg(not(feature = "exr"))]
             Err(ImageError::WithoutExr)
         } else {
@@ -59,6 +61,7 @@ impl StoredImage {
 fn read_png(bytes: &[u8]) -> Result<StoredImage, ImageError> {
     let damaged = |reason: String| ImageError::Damaged { format: "PNG", reason };
     let fault = |e: png::DecodingError| damaged(e.to_string());
+    damage::in_png(bytes).map_err(damaged)?;
     let mut decoder = png::Decoder::new(Cursor::new(bytes));
     let info = decoder.read_header_info().map_err(fault)?;
     let (width, height) = (info.width, info.height);

@@ -1,0 +1,22 @@
+//! Reads hostile pictures: `cargo +nightly fuzz run picture`.
+//!
+//! A panic inside a decoder is caught by the library, and no failure here. To look for such panics, so that they can be
+//! refused before the decoder sees them, set `FUZZ_DECODERS`: then each ends the run, as every other panic does.
+
+#![no_main]
+
+use firstlight_testkit::hostile_picture;
+
+libfuzzer_sys::fuzz_target!(
+    init: {
+        if std::env::var_os("FUZZ_DECODERS").is_none() {
+            let hook = std::panic::take_hook();
+            std::panic::set_hook(Box::new(move |panic| {
+                if !firstlight::is_decoding() {
+                    hook(panic);
+                }
+            }));
+        }
+    },
+    |data: &[u8]| hostile_picture::check(data)
+);
