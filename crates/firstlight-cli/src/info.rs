@@ -3,7 +3,7 @@
 use std::fmt::Write;
 use std::ops::ControlFlow;
 
-use firstlight::{DisplayEncoding, Frame, Projection, SamplesDesc, Scene, SceneDesc, read_mesh};
+use firstlight::{DVec3, DisplayEncoding, Frame, Projection, SamplesDesc, Scene, SceneDesc, read_mesh};
 use serde_json::{Map, Value, json};
 
 use crate::args::InfoArgs;
@@ -44,7 +44,7 @@ fn answer_model(input: &Input, args: &InfoArgs) -> Result<(), Failure> {
         "vertices": report.vertices,
         "positions": report.positions,
         "triangles": report.triangles,
-        "bounds": report.bounds.map(|[min, max]| json!({ "min": min.map(shortest), "max": max.map(shortest) })),
+        "bounds": report.bounds.map(bounds),
         "closed": report.is_closed(),
         "boundary_edges": report.boundary_edges,
         "non_manifold_edges": report.non_manifold_edges,
@@ -146,7 +146,7 @@ fn gather(name: &str, desc: &SceneDesc, scene: &Scene) -> Value {
         "materials": list_of(&summary.materials, |(name, kind)| json!({ "name": name, "kind": kind })),
         "textures": list_of(&summary.textures, |(name, kind, size)| json!({ "name": name, "kind": kind, "size": size })),
         "texture_bytes": summary.texture_bytes,
-        "bounds": summary.bounds.map(|[min, max]| json!({ "min": min.map(shortest), "max": max.map(shortest) })),
+        "bounds": summary.bounds.map(bounds),
     })
 }
 
@@ -157,6 +157,21 @@ fn list_of<T>(things: &[T], say: impl Fn(&T) -> Value) -> Value {
 /// The number that the shortest decimal form of `n` means: 0.1, not 0.10000000149.
 fn shortest(n: f32) -> f64 {
     n.to_string().parse().unwrap_or_else(|_| f64::from(n))
+}
+
+fn bounds([min, max]: [[f64; 3]; 2]) -> Value {
+    let size = (0..3).map(|i| max[i] - min[i]).fold(0.0, f64::max);
+    json!({ "min": min.map(|c| coordinate(c, size)), "max": max.map(|c| coordinate(c, size)) })
+}
+
+/// A coordinate, of which as much is known as 32 bits say of `size`.
+fn coordinate(c: f64, size: f64) -> f64 {
+    if c.abs() <= 64.0 * size {
+        return shortest(c as f32);
+    }
+    // Far from 0: to the ten-millionth part of the size
+    let decimals = (7.0 - size.max(1e-9).log10().ceil()).clamp(0.0, 15.0) as usize;
+    format!("{c:.decimals$}").parse().unwrap_or(c)
 }
 
 /// The camera that renders, or null where there is none.
@@ -170,7 +185,9 @@ fn camera(desc: &SceneDesc, scene: &Scene) -> Value {
             // Where that has brought it
             let Frame { position, forward, up, .. } = scene.camera().frame();
             let list = |v: &firstlight::Vec3| json!(v.to_array().map(shortest));
-            value = json!({ "name": name, "position": list(position), "forward": list(forward), "up": list(up) });
+            let position =
+                position.to_array().map(|c| if scene.origin() == DVec3::ZERO { shortest(c as f32) } else { c });
+            value = json!({ "name": name, "position": position, "forward": list(forward), "up": list(up) });
         }
         match (camera.projection, camera.focal_length_mm) {
             (Projection::Orthographic, _) => {

@@ -157,7 +157,7 @@ fn is_near(desc: &SceneDesc, scene: &Scene, [i, j]: [u32; 2]) -> bool {
         .filter_map(|[x, y]| {
             let (ray, _) = scene.camera().ray(i as f32 + x, j as f32 + y, 1.0);
             let hit = scene.intersect(&ray)?;
-            Some(add(ray.o.to_array().map(f64::from), mul(ray.d.to_array().map(f64::from), hit.t)))
+            Some(add(ray.o.to_array(), mul(ray.d.to_array().map(f64::from), hit.t)))
         })
         .collect();
     let is_near = |light: &LightDesc| {

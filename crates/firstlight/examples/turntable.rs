@@ -9,7 +9,7 @@ use std::ops::ControlFlow;
 use std::path::Path;
 
 use firstlight::{
-    CameraDesc, CompileOptions, FolderAssets, Format, ModelSettings, RenderSettings, SceneDesc, TransformDesc, Vec3,
+    CameraDesc, CompileOptions, DVec3, FolderAssets, Format, ModelSettings, RenderSettings, SceneDesc, TransformDesc,
     render, write_whole,
 };
 
@@ -32,17 +32,17 @@ fn turn(model: &Path, folder: &Path, pictures: u32, size: u32) -> Result<(), Box
     let options = CompileOptions { complete: true, ..CompileOptions::default() };
     // Compiled once: the model is read and its tree built here and nowhere else
     let scene = desc.compile(&assets, &options)?.scene;
-    let [low, high] = scene.summary().bounds.ok_or("the model is empty")?.map(Vec3::from);
+    let [low, high] = scene.summary().bounds.ok_or("the model is empty")?.map(DVec3::from);
     let (middle, radius) = ((low + high) * 0.5, (high - low).length() * 0.5);
     // A field of view of 30 degrees holds a ball that is 3.9 radii away
-    let mut camera = CameraDesc::new([0.0, f64::from(radius), 4.0 * f64::from(radius)]);
+    let mut camera = CameraDesc::new([0.0, radius, 4.0 * radius]);
     camera.fov_y_deg = Some(30.0);
     let settings = RenderSettings::default();
     for i in 0..pictures {
         // Around the origin first, then to the model
         camera.transform = Some(Box::new(TransformDesc {
             rotate_deg: [0.0, 360.0 * f64::from(i) / f64::from(pictures), 0.0],
-            translate: middle.as_dvec3().to_array(),
+            translate: middle.to_array(),
             ..TransformDesc::default()
         }));
         let seen = scene.with_camera(&camera)?;

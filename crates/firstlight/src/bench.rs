@@ -12,7 +12,7 @@ use crate::render::Counts;
 use crate::render::given::Given;
 pub use crate::render::given::{ChoosePoints, LightPoint};
 use crate::render::pixel::PixelSum;
-use crate::scene::{CameraHit, CompileOptions, Scene, SceneDesc, ShadowRays};
+use crate::scene::{CompileOptions, Scene, SceneDesc, Seen, ShadowRays};
 use crate::shape::{RayDifferential, TileHits, TriangleTree, every};
 use crate::visibility::{Occluders, Settled, Settler, Target, View, Viewpoint, Visibility};
 
@@ -213,8 +213,8 @@ impl Soft {
             for ray in tile {
                 let (o, d) = parts(ray);
                 let ray = Ray { o, d };
-                let Some(hit) = scene.intersect(&ray) else { continue };
-                let si = scene.surface(&ray, &hit, &differential);
+                let Some(hit) = scene.intersect_local(&ray) else { continue };
+                let si = scene.local_surface(&ray, &hit, &differential);
                 let counts = |k: usize| si.horizon.dot(scene.lights[0].towards(k, si.lit_from).l) > 0.0;
                 if (0..target.samples).any(counts) {
                     points.push(Viewpoint::of(&si));
@@ -357,8 +357,8 @@ pub fn sights(scene: &Scene, light: u32, block: u32) -> Vec<Option<Sight>> {
             pixels.clear();
             for y in top..(top + block).min(scene.height) {
                 for x in left..(left + block).min(scene.width) {
-                    let (ray, differential) = scene.camera.ray(x as f32 + 0.5, y as f32 + 0.5, 1.0);
-                    if let CameraHit::Surface(si) = scene.see(&ray, scene.intersect(&ray), &differential) {
+                    let (ray, differential) = scene.camera.local_ray(x as f32 + 0.5, y as f32 + 0.5, 1.0);
+                    if let Seen::Surface(si) = scene.see(&ray, scene.intersect_local(&ray), &differential) {
                         points.push(Viewpoint::of(&si));
                         pixels.push((y * scene.width + x) as usize);
                     }
@@ -389,7 +389,7 @@ pub fn sights(scene: &Scene, light: u32, block: u32) -> Vec<Option<Sight>> {
 /// green, blue premultiplied, alpha.
 pub fn pixel(scene: &Scene, at: [u32; 2], choose: &mut ChoosePoints) -> [f32; 4] {
     let mut sum = PixelSum::new(scene);
-    let hit = |_, _, ray: &Ray| scene.intersect(ray);
+    let hit = |_, _, ray: &Ray| scene.intersect_local(ray);
     let go_on = || ControlFlow::Continue(());
     let _ = sum.sample(scene, at, &mut Given::new(choose), hit, &mut Counts::default(), &go_on);
     sum.color(scene)

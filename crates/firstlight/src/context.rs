@@ -202,6 +202,8 @@ pub(crate) struct CompileContext {
     pub(crate) time: f64,
     /// Who wants to know what is being done.
     pub(crate) progress: Option<OnCompile>,
+    /// Where the coordinates of the scene count from, once that is known: what is compiled after it is kept less this.
+    pub(crate) origin: DVec3,
     /// Whether anything has keys, so that the time decides the picture.
     pub(crate) keyed: bool,
     path: String,
@@ -320,6 +322,19 @@ impl CompileContext {
         vec3(v)
     }
 
+    /// Where a camera is, or where it looks: it may stand back from things that are as far out as things may be.
+    pub(crate) fn far_point(&mut self, field: &str, v: [f64; 3]) {
+        if self.finite(field, &v) && v.iter().any(|x| x.abs() > MAX_FAR_COORDINATE) {
+            let message = format!("{} is outside -2.5e9 to 2.5e9", show(&v));
+            self.error(field, message, Some("use a larger unit of length"));
+        }
+    }
+
+    /// A point of the world as the scene keeps it: less the scene's origin.
+    pub(crate) fn local(&self, p: DVec3) -> DVec3 {
+        p - self.origin
+    }
+
     /// A point that a transform moves, in world space; a fault where it is moved too far.
     pub(crate) fn moved_point(&mut self, world_from_object: DAffine3, p: DVec3) -> DVec3 {
         let moved = world_from_object.transform_point3(p);
@@ -423,6 +438,8 @@ impl CompileContext {
 
 /// Squares of products of two differences of world coordinates stay finite, also at the far ends of shapes.
 const MAX_COORDINATE: f64 = 2.5e8;
+/// That holds as well for products of a difference of such coordinates and one of those of a camera.
+const MAX_FAR_COORDINATE: f64 = 2.5e9;
 const MIN_LENGTH: f64 = 1e-9;
 const MAX_STRENGTH: f64 = 1e15;
 const MAX_COLOR: f64 = 1e6;

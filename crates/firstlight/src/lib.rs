@@ -89,20 +89,19 @@ pub use light::{
     SphereLightDesc, SpotDesc,
 };
 pub use material::{BlinnPhongDesc, MaterialDesc, PhongDesc};
-pub use math::{DVec3, Ray, ShadowRay, Vec2, Vec3};
+pub use math::{DVec3, ShadowRay, Vec2, Vec3, WorldRay};
 pub use render::{
     AaMode, Film, Heat, LightCounts, RenderSettings, RenderStats, SimdLevel, VisibilityMode, render, render_image,
 };
 pub use scene::{Builtin, Parsed, builtin_scenes, reference, schema};
 pub use scene::{
     CameraHit, CompileOptions, Compiled, DisplayEncoding, Hit, ModelSettings, RenderDesc, Scene, SceneDesc,
-    SceneSummary, UpAxis,
+    SceneSummary, SurfacePoint, UpAxis,
 };
 pub use shape::RectangleDesc as RectangleShapeDesc;
 pub use shape::{
     BoxDesc, ConeDesc, CylinderDesc, DiskDesc, Footprint, GroupDesc, InstanceDesc, MeshDesc, ParallelogramDesc,
-    PlaneDesc, PointSetDesc, RayDifferential, ShadowTerminator, ShapeDesc, SphereDesc, SphereUv, SurfaceInteraction,
-    TorusDesc, UvEdge,
+    PlaneDesc, PointSetDesc, RayDifferential, ShadowTerminator, ShapeDesc, SphereDesc, SphereUv, TorusDesc, UvEdge,
 };
 pub use texture::{CheckerboardDesc, Filter, ImageTextureDesc, TextureDesc, TextureSpace, Wrap};
 pub use transform::{Interpolation, TransformDesc, TransformKeyDesc};

@@ -1,6 +1,7 @@
 //! What the library promises, from outside.
 
 mod course;
+mod far;
 mod files;
 mod fuzz_corpus;
 mod golden;

@@ -3,8 +3,8 @@
 use std::ops::ControlFlow;
 
 use firstlight::{
-    CameraDesc, CameraHit, CompileOptions, DVec3, Film, LightId, NoAssets, Ray, RayDifferential, RenderSettings, Scene,
-    SceneDesc, SurfaceInteraction, TransformDesc, TransformKeyDesc, Vec3, render, render_image,
+    CameraDesc, CameraHit, CompileOptions, DVec3, Film, LightId, NoAssets, RayDifferential, RenderSettings, Scene,
+    SceneDesc, SurfacePoint, TransformDesc, TransformKeyDesc, Vec3, WorldRay, render, render_image,
 };
 
 fn compiled(text: &str, time: f64) -> Scene {
@@ -44,8 +44,8 @@ set = \"grid\"
 ";
 
 /// The floor at the origin, seen from above.
-fn floor(scene: &Scene) -> SurfaceInteraction {
-    let ray = Ray { o: Vec3::new(0.0, 0.5, 0.0), d: Vec3::NEG_Y };
+fn floor(scene: &Scene) -> SurfacePoint {
+    let ray = WorldRay { o: DVec3::new(0.0, 0.5, 0.0), d: Vec3::NEG_Y };
     match scene.look(&ray, &RayDifferential::default()) {
         CameraHit::Surface(surface) => surface,
         seen => panic!("{seen:?}"),

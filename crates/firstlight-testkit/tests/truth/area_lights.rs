@@ -125,7 +125,7 @@ fn a_disk_shines_to_its_front_or_to_both_sides() {
 fn seen(light: LightDesc, eye: V, target: V) -> Option<f32> {
     let scene = compile(&empty(1, 1, 1).with_light(light).with_camera(camera(eye, target, 1.0)));
     let d = unit(sub(target, eye)).map(|x| x as f32);
-    let ray = firstlight::Ray { o: eye.map(|x| x as f32).into(), d: d.into() };
+    let ray = firstlight::WorldRay { o: eye.into(), d: d.into() };
     let still = firstlight::RayDifferential {
         dx: [0.0; 3].into(),
         dy: [0.0; 3].into(),

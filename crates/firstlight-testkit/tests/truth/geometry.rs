@@ -5,8 +5,8 @@ use std::num::NonZeroUsize;
 
 use firstlight::{
     BoxDesc, CompileOptions, ConeDesc, CylinderDesc, DiskDesc, Image, LightDesc, MemoryAssets, MeshDesc, PlaneDesc,
-    Ray, RectangleDesc, RectangleShapeDesc, RenderSettings, SampleSet, SceneDesc, ShapeDesc, SphereDesc, TorusDesc,
-    TransformDesc, Vec3, Window,
+    RectangleDesc, RectangleShapeDesc, RenderSettings, SampleSet, SceneDesc, ShapeDesc, SphereDesc, TorusDesc,
+    TransformDesc, Vec3, Window, WorldRay,
 };
 
 use crate::scenes::*;
@@ -138,7 +138,8 @@ fn ids_of_instances_are_in_scene_order() {
         let eye = mul(random.direction(), 8.0);
         let way = unit(sub(random.vector(3.0), eye));
         let [o, d] = [eye, way].map(|v| Vec3::from_array(v.map(|x| x as f32)));
-        let [a, b] = [&instances, &written].map(|scene| scene.intersect(&Ray { o, d: d.normalize() }));
+        let ray = WorldRay { o: o.as_dvec3(), d: d.normalize() };
+        let [a, b] = [&instances, &written].map(|scene| scene.intersect(&ray));
         // What comes first in the text of the scene, kind by kind, is the floor in the one and a sphere in the other:
         // number the things without it
         let floor_of_written = copies;
@@ -549,7 +550,7 @@ fn tangents_are_the_steps_from_one_hit_to_the_next() {
                 continue;
             }
             let [u, v] = scene.tangents(&ray, &hit);
-            let (duv, moved) = (b.uv - a.uv, b.p - a.p);
+            let (duv, moved) = (b.uv - a.uv, (b.p - a.p).as_vec3());
             // Not across a seam
             if duv.length() > 0.1 {
                 continue;

@@ -4,7 +4,7 @@
 //! checkerboards from 32 x 32 texels and cut bytes off instead of rounding them. So only the insides of surfaces are
 //! compared: away from their outlines, the squares' edges and the borders of shadows.
 
-use firstlight::{Ray, Vec3};
+use firstlight::{Vec3, WorldRay};
 
 use crate::scenes::*;
 
@@ -41,7 +41,7 @@ fn hidden(p: V, n: V) -> [u32; 2] {
 
 /// What a place on the film shows, as far as the comparison cares: surface, square of its board, light.
 fn seen(scene: &firstlight::Scene, x: f64, y: f64) -> (u32, [u32; 2], [u32; 2]) {
-    let (ray, differential): (Ray, _) = scene.camera().ray(x as f32, y as f32, 1.0);
+    let (ray, differential): (WorldRay, _) = scene.camera().ray(x as f32, y as f32, 1.0);
     let Some(hit) = scene.intersect(&ray) else { panic!("the room is closed behind {x}, {y}") };
     let id = hit.surface.0;
     if id >= 9 {
@@ -55,7 +55,7 @@ fn seen(scene: &firstlight::Scene, x: f64, y: f64) -> (u32, [u32; 2], [u32; 2]) 
         _ => 1.0,
     };
     let square = si.uv.to_array().map(|w| if squares > 1.0 { (w as f64 * squares) as u32 } else { 0 });
-    let [blocked, below] = hidden(v(si.p), v(si.ng));
+    let [blocked, below] = hidden(si.p.to_array(), v(si.ng));
     // Lit by all of it that is above the horizon, by none of it, or in the penumbra
     let light = match blocked {
         0 => 0,

@@ -8,14 +8,18 @@ use crate::transform::TransformDesc;
 /// Where a camera is, and which way it is turned: three directions at right angles.
 #[derive(Clone, Copy, Debug)]
 pub struct Frame {
-    /// The eye, or the middle of an orthographic film.
-    pub position: Vec3,
+    /// The eye, or the middle of an orthographic film, in world space.
+    pub position: DVec3,
     /// Unit: to the right in the picture.
     pub right: Vec3,
     /// Unit: up in the picture.
     pub up: Vec3,
     /// Unit: the line of sight.
     pub forward: Vec3,
+    /// Where the coordinates of the scene count from.
+    pub(crate) origin: DVec3,
+    /// `position` in the scene's own coordinates.
+    pub(crate) eye: Vec3,
 }
 
 /// `up` nearer to the line of sight than this sine is parallel to it.
@@ -28,15 +32,14 @@ impl Frame {
         let (mut eye, mut target) = (DVec3::from(desc.position), DVec3::from(desc.look_at));
         let mut up = DVec3::from(desc.up);
         let before = cx.fault_count();
-        let mut position = cx.point("position", desc.position);
-        cx.point("look_at", desc.look_at);
+        cx.far_point("position", desc.position);
+        cx.far_point("look_at", desc.look_at);
         cx.edge("up", desc.up);
         // Whatever a transform does to the three, the frame made of them has right angles
         if let Some(world_from_object) = TransformDesc::compile_field(desc.transform.as_deref(), cx) {
             eye = cx.moved_point(world_from_object, eye);
             target = cx.moved_point(world_from_object, target);
             up = world_from_object.transform_vector3(up);
-            position = eye.as_vec3();
         }
         let forward = (target - eye).normalize_or_zero();
         let right = forward.cross(up.normalize_or_zero());
@@ -55,6 +58,14 @@ impl Frame {
             }
         }
         let right = right.normalize_or_zero();
-        Self { position, right: right.as_vec3(), up: right.cross(forward).as_vec3(), forward: forward.as_vec3() }
+        let up = right.cross(forward);
+        Self {
+            position: eye,
+            right: right.as_vec3(),
+            up: up.as_vec3(),
+            forward: forward.as_vec3(),
+            origin: cx.origin,
+            eye: cx.local(eye).as_vec3(),
+        }
     }
 }

@@ -12,7 +12,7 @@ pub use pinhole::Pinhole;
 
 use crate::context::CompileContext;
 use crate::describe::{table, words};
-use crate::math::{Ray, Vec3};
+use crate::math::{Ray, Vec3, WorldRay};
 use crate::shape::RayDifferential;
 use crate::transform::TransformDesc;
 
@@ -88,8 +88,14 @@ impl CameraDesc {
 impl Camera {
     /// The ray through the film at `x`, `y` in pixels from its upper left corner, and how it changes over `step` pixels
     /// to the right and down.
+    pub fn ray(&self, x: f32, y: f32, step: f32) -> (WorldRay, RayDifferential) {
+        let (ray, differential) = self.local_ray(x, y, step);
+        (ray.in_world(self.frame().origin), differential)
+    }
+
+    /// The same in the scene's own coordinates.
     #[inline(always)]
-    pub fn ray(&self, x: f32, y: f32, step: f32) -> (Ray, RayDifferential) {
+    pub(crate) fn local_ray(&self, x: f32, y: f32, step: f32) -> (Ray, RayDifferential) {
         match self {
             Camera::Pinhole(pinhole) => pinhole.ray(x, y, step),
             Camera::Orthographic(orthographic) => orthographic.ray(x, y, step),
@@ -99,7 +105,7 @@ impl Camera {
     /// How far the way to it turns, in radians, over a step of `reach` metres from a point.
     pub(crate) fn sway(&self, p: Vec3, reach: f32) -> f32 {
         match self {
-            Camera::Pinhole(pinhole) => reach / (pinhole.frame.position - p).length().max(f32::MIN_POSITIVE),
+            Camera::Pinhole(pinhole) => reach / (pinhole.frame.eye - p).length().max(f32::MIN_POSITIVE),
             Camera::Orthographic(_) => 0.0,
         }
     }
@@ -128,8 +134,9 @@ impl Camera {
     }
 
     /// The matrix from camera to world space, row by row: the camera looks along its -z, y is up in the picture.
-    pub fn world_from_camera(&self) -> [f32; 16] {
-        let Frame { right: r, up: u, forward: f, position: p } = self.frame();
+    pub fn world_from_camera(&self) -> [f64; 16] {
+        let Frame { right, up, forward, position: p, .. } = self.frame();
+        let [r, u, f] = [right, up, forward].map(|v| v.as_dvec3());
         [r.x, u.x, -f.x, p.x, r.y, u.y, -f.y, p.y, r.z, u.z, -f.z, p.z, 0.0, 0.0, 0.0, 1.0]
     }
 
@@ -168,7 +175,7 @@ mod tests {
         for (x, y, o) in
             [(100.0, 50.0, [0.0, 0.0, 10.0]), (0.0, 0.0, [-4.0, 2.0, 10.0]), (150.0, 75.0, [2.0, -1.0, 10.0])]
         {
-            let (ray, differential) = camera.ray(x, y, 0.5);
+            let (ray, differential) = camera.local_ray(x, y, 0.5);
             assert_eq!((ray.o, ray.d), (o.into(), Vec3::NEG_Z));
             assert_eq!((differential.dx, differential.dy), (Vec3::ZERO, Vec3::ZERO));
             // Half a pixel is 0.02 m
@@ -183,7 +190,7 @@ mod tests {
         // A plane askew before each camera: where the ray and its neighbours meet it
         let n = DVec3::new(0.3, -0.5, 0.8).normalize();
         let meet = |camera: &Camera, x: f32, y: f32| {
-            let (ray, _) = camera.ray(x, y, 1.0);
+            let (ray, _) = camera.local_ray(x, y, 1.0);
             let (o, d) = (ray.o.as_dvec3(), ray.d.as_dvec3());
             let t = -n.dot(o) / n.dot(d);
             (o + d * t, t)
@@ -194,7 +201,7 @@ mod tests {
             let camera = compiled(&desc, 640, 480);
             let (x, y) = (200.0, 100.0);
             let (p, t) = meet(&camera, x, y);
-            let (ray, differential) = camera.ray(x, y, 1.0);
+            let (ray, differential) = camera.local_ray(x, y, 1.0);
             let [dx, dy] = differential.on_plane(ray.d, t as f32, n.as_vec3(), 1e9);
             for (step, neighbour) in [(dx, meet(&camera, x + 1.0, y).0), (dy, meet(&camera, x, y + 1.0).0)] {
                 let exact = neighbour - p;
@@ -221,14 +228,14 @@ mod tests {
         );
         for (whole, part) in [(whole, quarter), (large, small)] {
             for (x, y) in [(0.0, 0.0), (3.25, 40.5), (63.5, 47.5), (64.0, 48.0)] {
-                let (a, b) = (whole.ray(x + 64.0, y, 0.25), part.ray(x, y, 0.25));
+                let (a, b) = (whole.local_ray(x + 64.0, y, 0.25), part.local_ray(x, y, 0.25));
                 assert_eq!((a.0.o, a.0.d), (b.0.o, b.0.d));
                 assert_eq!((a.1.dx, a.1.dy, a.1.origin_dx), (b.1.dx, b.1.dy, b.1.origin_dx));
             }
         }
         // More of the right and of what is above
-        assert!(quarter.ray(32.0, 24.0, 1.0).0.d.dot(whole.frame().right) > 0.0);
-        assert!(quarter.ray(32.0, 24.0, 1.0).0.d.dot(whole.frame().up) > 0.0);
+        assert!(quarter.local_ray(32.0, 24.0, 1.0).0.d.dot(whole.frame().right) > 0.0);
+        assert!(quarter.local_ray(32.0, 24.0, 1.0).0.d.dot(whole.frame().up) > 0.0);
     }
 
     #[test]
@@ -243,8 +250,8 @@ mod tests {
             ..CameraDesc::new([0.0, 0.0, 10.0])
         };
         let camera = compiled(&moved(1.0.into()), 100, 100);
-        let Frame { position, right, up, forward } = *camera.frame();
-        assert_eq!((position, forward), (Vec3::new(10.0, 5.0, 0.0), Vec3::NEG_X));
+        let Frame { position, right, up, forward, .. } = *camera.frame();
+        assert_eq!((position, forward), (DVec3::new(10.0, 5.0, 0.0), Vec3::NEG_X));
         assert_eq!((right, up), (Vec3::NEG_Z, Vec3::Y));
         // Stretched and mirrored: the directions stay those of a frame
         let Frame { right, up, forward, .. } = *compiled(&moved([-1.0, 3.0, 2.0].into()), 100, 100).frame();

@@ -40,12 +40,12 @@ impl Orthographic {
     /// The ray from the film at `x`, `y` in pixels from its upper left corner, and how it changes over `step` pixels to
     /// the right and down: it starts elsewhere, and its direction stays.
     #[inline(always)]
-    pub fn ray(&self, x: f32, y: f32, step: f32) -> (Ray, RayDifferential) {
-        let Frame { position, right, up, forward } = self.frame;
+    pub(super) fn ray(&self, x: f32, y: f32, step: f32) -> (Ray, RayDifferential) {
+        let Frame { eye, right, up, forward, .. } = self.frame;
         let [film_x, film_y] = self.film.place(x, y);
         let [step_x, step_y] = self.film.steps(step);
         let differential =
             RayDifferential { dx: Vec3::ZERO, dy: Vec3::ZERO, origin_dx: right * step_x, origin_dy: up * step_y };
-        (Ray { o: position + right * film_x + up * film_y, d: forward }, differential)
+        (Ray { o: eye + right * film_x + up * film_y, d: forward }, differential)
     }
 }

@@ -33,8 +33,8 @@ impl Pinhole {
     /// The ray through the film at `x`, `y` in pixels from its upper left corner, and how it changes over `step` pixels
     /// to the right and down.
     #[inline(always)]
-    pub fn ray(&self, x: f32, y: f32, step: f32) -> (Ray, RayDifferential) {
-        let Frame { position, right, up, forward } = self.frame;
+    pub(super) fn ray(&self, x: f32, y: f32, step: f32) -> (Ray, RayDifferential) {
+        let Frame { eye, right, up, forward, .. } = self.frame;
         let [film_x, film_y] = self.film.place(x, y);
         let towards = right * film_x + up * film_y + forward;
         let length = towards.length();
@@ -45,7 +45,7 @@ impl Pinhole {
             origin_dx: Vec3::ZERO,
             origin_dy: Vec3::ZERO,
         };
-        (Ray { o: position, d: towards / length }, differential)
+        (Ray { o: eye, d: towards / length }, differential)
     }
 }
 

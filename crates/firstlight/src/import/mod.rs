@@ -26,6 +26,7 @@ mod weld;
 use std::ops::{ControlFlow, Range};
 use std::sync::atomic::{AtomicU64, Ordering};
 
+use crate::math::{DVec3, origin_for};
 use error::Fault;
 pub use error::{ImportError, MeshPlace};
 pub use report::MeshReport;
@@ -40,8 +41,10 @@ const MAX_COUNT: u64 = (1 << 32) - 2;
 /// the triangles whose positions are not finite.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct MeshData {
-    /// Where the vertices are, in the file's units and axes.
+    /// Where the vertices are, in the file's units and axes, less `origin`.
     pub positions: Vec<[f32; 3]>,
+    /// What was taken off every position, in f64: 0 but for meshes far from 0, of which 32 bits would lose what is small.
+    pub origin: [f64; 3],
     /// Per vertex, as the file has them: not always of length 1; `[0, 0, 0]` where the file gives none.
     pub normals: Vec<[f32; 3]>,
     /// Sets of texture coordinates, each per vertex; no set if the file has none. v as the file has it.
@@ -118,12 +121,21 @@ impl MeshFormat {
         progress: &(dyn Fn(u64, u64) -> ControlFlow<()> + Sync),
     ) -> Result<MeshData, ImportError> {
         let progress = Progress { report: progress, done: AtomicU64::new(0), total: bytes.len() as u64 };
-        let mesh = match self {
-            Self::Ply => ply::read(bytes, &progress),
-            Self::Stl => stl::read(bytes, &progress),
-            Self::Obj => obj::read(bytes, &progress),
+        let read = |origin: [f64; 3]| {
+            let mesh = match self {
+                Self::Ply => ply::read(bytes, origin, &progress),
+                Self::Stl => stl::read(bytes, &progress),
+                Self::Obj => obj::read(bytes, origin, &progress),
+            };
+            mesh.map_err(|fault| fault.into_error(name, bytes))
         };
-        let mesh = mesh.map_err(|fault| fault.into_error(name, bytes))?;
+        let mut mesh = read([0.0; 3])?;
+        // What is far from 0 has lost its small digits: once more, without what all of it has in common. STL has no more digits
+        let origin = mesh.bounds().map_or(DVec3::ZERO, origin_for).to_array();
+        if self != Self::Stl && origin != [0.0; 3] {
+            mesh = read(origin)?;
+            mesh.origin = origin;
+        }
         debug_assert!(mesh.fault().is_none(), "{:?}", mesh.fault());
         Ok(mesh)
     }

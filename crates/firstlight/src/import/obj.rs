@@ -35,8 +35,8 @@ const NONE: i32 = 0;
 /// Different unknown statements that are told by name.
 const MAX_UNKNOWN: usize = 8;
 
-/// Reads an OBJ file.
-pub(super) fn read(file: &[u8], progress: &Progress) -> Result<MeshData, Fault> {
+/// Reads an OBJ file; positions less `origin`.
+pub(super) fn read(file: &[u8], origin: [f64; 3], progress: &Progress) -> Result<MeshData, Fault> {
     let start = if file.starts_with(b"\xef\xbb\xbf") { 3 } else { 0 };
     // A piece does not begin with a line that goes on from the one before
     let pieces = pieces(file, start, PIECE, |at| {
@@ -45,7 +45,7 @@ pub(super) fn read(file: &[u8], progress: &Progress) -> Result<MeshData, Fault> 
         line.last() != Some(&b'\\')
     });
     let read = |range: &Range<usize>| {
-        let mut piece = Piece::default();
+        let mut piece = Piece { origin, ..Piece::default() };
         piece.read(&file[..range.end], range.start)?;
         progress.advance(range.len())?;
         Ok(piece)
@@ -86,6 +86,8 @@ enum Event<'a> {
 /// What one thread has read.
 #[derive(Default)]
 struct Piece<'a> {
+    /// What is taken off every position.
+    origin: [f64; 3],
     positions: Vec<[f32; 3]>,
     /// Empty, or one per position.
     colors: Vec<[f32; 3]>,
@@ -179,8 +181,18 @@ impl<'a> Piece<'a> {
     #[inline(always)]
     fn position(&mut self, text: &mut Cursor) -> Result<(), Fault> {
         let at = text.at;
-        let mut of = |n| number(text, at, "v", n);
-        self.positions.push([of(1)?, of(2)?, of(3)?]);
+        if self.origin == [0.0; 3] {
+            let mut of = |n| number(text, at, "v", n);
+            self.positions.push([of(1)?, of(2)?, of(3)?]);
+        } else {
+            let mut position = [0.0; 3];
+            for (i, value) in position.iter_mut().enumerate() {
+                skip_blanks(text);
+                let Some(number) = text.f64() else { return Err(no_number(text, at, "v", i + 1)) };
+                *value = (number - self.origin[i]) as f32;
+            }
+            self.positions.push(position);
+        }
         skip_blanks(text);
         // Three numbers more are a colour; one is a weight
         if !text.at_line_end() {

@@ -19,7 +19,7 @@ pub struct MeshReport {
     /// How many triangles there are.
     pub triangles: u64,
     /// The lowest and highest coordinates of all finite vertices; `None` if there are none.
-    pub bounds: Option<[[f32; 3]; 2]>,
+    pub bounds: Option<[[f64; 3]; 2]>,
     /// Vertices with a coordinate that is NaN or infinite.
     pub non_finite_vertices: u64,
     /// Vertices of no triangle.
@@ -74,7 +74,7 @@ impl MeshData {
         let mut report = MeshReport {
             vertices: count(self.positions.len()),
             triangles: count(self.triangles.len()),
-            bounds: self.bounds(),
+            bounds: self.bounds().map(|corners| corners.map(|corner| corner.to_array())),
             non_finite_vertices: count(self.positions.par_iter().filter(|p| !finite(p)).count()),
             unused_vertices: count(used.iter().filter(|used| !**used).count()),
             has_normals: !self.normals.is_empty(),
@@ -88,14 +88,15 @@ impl MeshData {
         report
     }
 
-    /// The lowest and highest coordinates of finite vertices.
-    fn bounds(&self) -> Option<[[f32; 3]; 2]> {
+    /// The lowest and highest coordinates of finite vertices, as the file has them.
+    pub(crate) fn bounds(&self) -> Option<[DVec3; 2]> {
         let finite = self.positions.par_iter().filter(|p| p.iter().all(|x| x.is_finite()));
         let join = |a: [[f32; 3]; 2], b: [[f32; 3]; 2]| {
             [[0, 1, 2].map(|i| a[0][i].min(b[0][i])), [0, 1, 2].map(|i| a[1][i].max(b[1][i]))]
         };
         // Adding 0 makes 0 of -0, of which the least would not be the same every time
-        finite.map(|p| [p.map(|x| x + 0.0); 2]).reduce_with(join)
+        let corners = finite.map(|p| [p.map(|x| x + 0.0); 2]).reduce_with(join)?;
+        Some(corners.map(|corner| DVec3::from(corner.map(f64::from)) + DVec3::from(self.origin)))
     }
 
     /// Bytes of all lists.

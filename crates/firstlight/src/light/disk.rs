@@ -85,7 +85,7 @@ impl DiskLightDesc {
             let x = x.normalize_or(frame.x);
             (radius, frame) = (long, Frame { x, y: n.cross(x), z: n });
         }
-        let emitter = self.emitter();
+        let (emitter, center) = (self.emitter(), cx.local(center));
         let disk = Disk {
             center,
             n: frame.z,

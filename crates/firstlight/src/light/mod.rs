@@ -231,13 +231,14 @@ pub(crate) fn way_error(middle: Vec3, half: Vec3, p: Vec3, error: ErrorBound) ->
     error.0 + (far + way * 4.0) * UNIT_ROUNDOFF
 }
 
-/// A point of a light's description in world space.
+/// A point of a light's description as the scene keeps it.
 fn moved_point(cx: &mut CompileContext, field: &str, p: [f64; 3], transform: Option<&TransformDesc>) -> Vec3 {
-    let position = cx.point(field, p);
-    match TransformDesc::compile_field(transform, cx) {
-        Some(world_from_object) => cx.moved_point(world_from_object, p.into()).as_vec3(),
-        None => position,
-    }
+    cx.point(field, p);
+    let world = match TransformDesc::compile_field(transform, cx) {
+        Some(world_from_object) => cx.moved_point(world_from_object, p.into()),
+        None => p.into(),
+    };
+    cx.local(world).as_vec3()
 }
 
 /// `color` x `strength`, checked; `factor` is what the kind of light makes of it.

@@ -78,7 +78,7 @@ impl RectangleDesc {
                 cx.error("transform", message, Some("choose another transform"));
             }
         }
-        let emitter = self.emitter();
+        let (emitter, center) = (self.emitter(), cx.local(center));
         let shape = Parallelogram::new(center - (e0 + e1) * 0.5, e0, e1, front, !emitter.both_sides());
         let rectangle = Rectangle { center, e0, e1, n: shape.n, shape };
         emitter.compile(cx, AreaShape::Rectangle(rectangle), samples)

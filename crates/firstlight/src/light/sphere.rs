@@ -72,7 +72,7 @@ impl SphereLightDesc {
             }
             radius = length;
         }
-        let emitter = self.emitter();
+        let (emitter, center) = (self.emitter(), cx.local(center));
         let single_sided = !emitter.both_sides();
         let shape = SphereShape { c: center, r: radius, uv: SphereUv::Equirectangular, single_sided };
         emitter.compile(cx, AreaShape::Sphere(Sphere { center, radius, shape }), samples)

@@ -65,12 +65,11 @@ pub struct Spot {
 
 impl SpotDesc {
     pub(crate) fn compile(&self, cx: &mut CompileContext) -> Light {
-        let mut position = cx.point("position", self.position);
+        cx.point("position", self.position);
         cx.point("look_at", self.look_at);
         let (mut from, mut to) = (DVec3::from(self.position), DVec3::from(self.look_at));
         if let Some(world_from_object) = TransformDesc::compile_field(self.transform.as_deref(), cx) {
             (from, to) = (cx.moved_point(world_from_object, from), cx.moved_point(world_from_object, to));
-            position = from.as_vec3();
         }
         let axis = to - from;
         if !(axis.length() >= 1e-9) {
@@ -99,7 +98,7 @@ impl SpotDesc {
         let scale = scaled(cx, self.color, self.strength, self.falloff.factor());
         Light {
             kind: LightKind::Spot(Spot {
-                position,
+                position: cx.local(from).as_vec3(),
                 axis: axis.normalize_or_zero().as_vec3(),
                 outer: outer as f32,
                 inverse_fade: (1.0 / (outer - inner)) as f32,

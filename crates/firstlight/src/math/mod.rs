@@ -5,6 +5,7 @@
 mod arc;
 mod frame;
 mod lanes;
+mod origin;
 mod pow;
 mod ray;
 mod roots;
@@ -13,9 +14,10 @@ mod sum;
 pub(crate) use arc::Arc;
 pub(crate) use frame::Frame;
 pub(crate) use lanes::{Vec3x16, dispatch_wide};
+pub(crate) use origin::origin_for;
 pub(crate) use pow::Exponent;
-pub(crate) use ray::{DRay, ErrorBound};
-pub use ray::{Ray, ShadowRay};
+pub(crate) use ray::{DRay, ErrorBound, Ray};
+pub use ray::{ShadowRay, WorldRay};
 pub(crate) use roots::{bracketed, depressed_cubic};
 pub(crate) use sum::{LANES, LaneSum};
 

@@ -3,13 +3,38 @@
 use super::{DVec3, UNIT_ROUNDOFF, Vec3};
 use crate::ids::LightId;
 
+/// A camera ray in the world: the points `o + t d`, 0 < t.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct WorldRay {
+    /// Origin, world space.
+    pub o: DVec3,
+    /// Direction, unit.
+    pub d: Vec3,
+}
+
+impl WorldRay {
+    /// The same ray in a scene whose coordinates count from `origin`.
+    #[inline(always)]
+    pub(crate) fn within(&self, origin: DVec3) -> Ray {
+        Ray { o: (self.o - origin).as_vec3(), d: self.d }
+    }
+}
+
 /// A camera ray: the points `o + t d`, 0 < t.
 #[derive(Clone, Copy, Debug)]
-pub struct Ray {
-    /// Origin, world space.
+pub(crate) struct Ray {
+    /// Origin, in a scene's own coordinates: those of the world less the scene's origin.
     pub o: Vec3,
     /// Direction, unit.
     pub d: Vec3,
+}
+
+impl Ray {
+    /// The same ray in the world, where the scene's coordinates count from `origin`.
+    #[inline(always)]
+    pub fn in_world(&self, origin: DVec3) -> WorldRay {
+        WorldRay { o: origin + self.o.as_dvec3(), d: self.d }
+    }
 }
 
 /// The points `o + t d`, in f64, in world space or in the space of a shape. `d` is of any length except 0, so that `t` means

@@ -160,9 +160,9 @@ impl Field {
     fn surface(&mut self, scene: &Scene, candidate: Candidate, at: [u32; 2]) -> Option<SurfaceInteraction> {
         let node = self.node(at);
         if self.nodes[node].of != Some(candidate) {
-            let (ray, differential) = scene.camera.ray(at[0] as f32, at[1] as f32, 1.0);
+            let (ray, differential) = scene.camera.local_ray(at[0] as f32, at[1] as f32, 1.0);
             let hit = candidate.hit(scene, &ray);
-            let si = hit.map(|hit| scene.surface(&ray, &hit, &differential));
+            let si = hit.map(|hit| scene.local_surface(&ray, &hit, &differential));
             self.nodes[node] = Node { of: Some(candidate), si };
         }
         self.nodes[node].si

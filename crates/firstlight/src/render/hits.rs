@@ -110,5 +110,5 @@ pub(crate) fn camera_ray(scene: &Scene, x: u32, y: u32) -> (Ray, RayDifferential
     let n = scene.antialiasing;
     // The middle of the sub-pixel
     let at = |ray: u32| (ray / n) as f32 + ((ray % n) as f32 + 0.5) / n as f32;
-    scene.camera.ray(at(x), at(y), 1.0 / n as f32)
+    scene.camera.local_ray(at(x), at(y), 1.0 / n as f32)
 }

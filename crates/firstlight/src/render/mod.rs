@@ -324,7 +324,7 @@ fn render_tile(
             for (y, x) in (0..h).flat_map(|y| (0..w).map(move |x| (y, x))) {
                 let hit = |column: u32, row: u32, ray: &Ray| match &hits {
                     Some(hits) => hits.get(scene.antialiasing, x, y, column, row),
-                    None => scene.intersect(ray),
+                    None => scene.intersect_local(ray),
                 };
                 pixel.clear();
                 let at = [tile.x + left + x, tile.y + top + y];

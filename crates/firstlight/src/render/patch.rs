@@ -109,9 +109,9 @@ impl Patch {
     /// The patch that fills a pixel whose rays all meet one shape.
     pub fn whole(scene: &Scene, pixel: [u32; 2], candidate: Candidate) -> Option<Patch> {
         let n = scene.antialiasing as f32;
-        let (ray, differential) = scene.camera.ray(pixel[0] as f32 + 0.5, pixel[1] as f32 + 0.5, 1.0);
+        let (ray, differential) = scene.camera.local_ray(pixel[0] as f32 + 0.5, pixel[1] as f32 + 0.5, 1.0);
         let hit = candidate.hit(scene, &ray)?;
-        let si = scene.surface(&ray, &hit, &differential);
+        let si = scene.local_surface(&ray, &hit, &differential);
         // To the rays in the pixel's corners
         let [across, down] = differential.on_plane(ray.d, hit.t as f32, si.ng, f32::MAX.sqrt() * 0.25);
         let reach = 0.5 * (1.0 - 1.0 / n) * ((across + down).length().max((across - down).length()));
@@ -130,7 +130,7 @@ impl Patch {
         if scene.antialiasing == 1 {
             // The pixel's only ray is that of its middle
             let (ray, differential) = camera_ray(scene, pixel[0], pixel[1]);
-            patch.si = scene.surface(&ray, &hit, &differential);
+            patch.si = scene.local_surface(&ray, &hit, &differential);
         } else if !(candidate.is_flat_over(scene, &si, &ray, hit.t, &differential)
             && material.is_even(&si, &scene.textures))
         {
@@ -150,9 +150,9 @@ impl Patch {
         let sum = places().fold([0, 0], |[x, y], [column, row]| [x + column, y + row]);
         // In the middle of the rays; what hides some of the shape does not matter here
         let at = |axis: usize| pixel[axis] as f32 + (sum[axis] as f32 / count + 0.5) / n as f32;
-        let (ray, differential) = scene.camera.ray(at(0), at(1), 1.0 / n as f32);
+        let (ray, differential) = scene.camera.local_ray(at(0), at(1), 1.0 / n as f32);
         let hit = candidate.hit(scene, &ray)?;
-        let si = scene.surface(&ray, &hit, &differential);
+        let si = scene.local_surface(&ray, &hit, &differential);
         // How far they are, and whether around it
         let curvature = candidate.curvature(scene);
         let (mut reach, mut middle) = (0.0f32, Vec3::ZERO);
@@ -181,9 +181,9 @@ impl Patch {
         let rays = Rays::Mask(candidate, mask);
         let mut patch = Patch { si, bsdf, rays, reach, turn, off, uneven: false, contrast: Contrast::default() };
         // Over all of the pixel
-        let (ray, whole) = scene.camera.ray(pixel[0] as f32 + 0.5, pixel[1] as f32 + 0.5, 1.0);
+        let (ray, whole) = scene.camera.local_ray(pixel[0] as f32 + 0.5, pixel[1] as f32 + 0.5, 1.0);
         let even = candidate.hit(scene, &ray).is_some_and(|hit| {
-            let si = scene.surface(&ray, &hit, &whole);
+            let si = scene.local_surface(&ray, &hit, &whole);
             candidate.is_flat_over(scene, &si, &ray, hit.t, &whole) && material.is_even(&si, &scene.textures)
         });
         if mask.count_ones() > 1 && !even {
@@ -317,7 +317,7 @@ fn for_each_ray(
         let (ray, differential) = camera_ray(scene, i * n + k % n, j * n + k / n);
         // It is proved that it meets it; a rounding may say otherwise
         let Some(hit) = candidate.hit(scene, &ray) else { continue };
-        let si = scene.surface(&ray, &hit, &differential);
+        let si = scene.local_surface(&ray, &hit, &differential);
         each(&si, &scene.materials[si.material.index()].bsdf(&si, &scene.textures));
     }
 }
@@ -409,7 +409,7 @@ impl PixelPatches {
                 continue;
             }
             let (ray, differential) = camera_ray(scene, i * n + column, j * n + row);
-            let si = scene.surface(&ray, &hit, &differential);
+            let si = scene.local_surface(&ray, &hit, &differential);
             let bsdf = scene.materials[si.material.index()].bsdf(&si, &scene.textures);
             let member = Member { si, bsdf, at: [column as f32, row as f32] };
             let same = self.patches.iter_mut().find(|patch| once && patch.holds(&si));
@@ -436,9 +436,9 @@ impl PixelPatches {
             && patch.off > 0.0
             && patch.count(scene) == n * n
         {
-            let (ray, differential) = scene.camera.ray(i as f32 + 0.5, j as f32 + 0.5, 1.0);
-            let hit = scene.intersect(&ray).filter(|hit| hit.surface == patch.si.surface);
-            if let Some(si) = hit.map(|hit| scene.surface(&ray, &hit, &differential))
+            let (ray, differential) = scene.camera.local_ray(i as f32 + 0.5, j as f32 + 0.5, 1.0);
+            let hit = scene.intersect_local(&ray).filter(|hit| hit.surface == patch.si.surface);
+            if let Some(si) = hit.map(|hit| scene.local_surface(&ray, &hit, &differential))
                 && patch.holds(&si)
             {
                 patch.place(si);

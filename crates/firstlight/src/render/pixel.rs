@@ -8,7 +8,7 @@ use crate::color::Rgb;
 use crate::ids::LightId;
 use crate::material::{Bsdf, Lobe};
 use crate::math::{LaneSum, Ray};
-use crate::scene::{CameraHit, Hit, Scene};
+use crate::scene::{Hit, Scene, Seen};
 use crate::shape::SurfaceInteraction;
 
 /// How the light of one source is summed at one surface: the only thing in which the renderers differ.
@@ -86,11 +86,11 @@ impl PixelSum {
     }
 
     /// Adds what a camera ray ends at, but for the light of lights: that of a surface is added by [`light`](Self::light).
-    pub fn see(&mut self, scene: &Scene, seen: CameraHit) -> Option<(SurfaceInteraction, Bsdf)> {
+    pub fn see(&mut self, scene: &Scene, seen: Seen) -> Option<(SurfaceInteraction, Bsdf)> {
         match seen {
-            CameraHit::Background => self.background += 1,
-            CameraHit::Emission(color) => self.emission += color,
-            CameraHit::Surface(si) => {
+            Seen::Background => self.background += 1,
+            Seen::Emission(color) => self.emission += color,
+            Seen::Surface(si) => {
                 // Look the material's textures up
                 let bsdf = scene.materials[si.material.index()].bsdf(&si, &scene.textures);
                 self.ambient += scene.ambient * bsdf.ambient;

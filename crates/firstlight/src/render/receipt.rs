@@ -10,7 +10,7 @@ use crate::scene::Scene;
 
 /// How many entries **Pixels** has in the changelog, over all versions. It is part of the version in a receipt, so that two
 /// builds whose pictures differ never say the same. The test below compares it with the changelog.
-const PIXELS_ENTRIES: u32 = 12;
+const PIXELS_ENTRIES: u32 = 13;
 
 impl Scene {
     /// What a picture of this scene says of itself: all that decides the film, by the rules that are in effect, so that
@@ -25,7 +25,7 @@ impl Scene {
             ("antialiasing", self.antialiasing.to_string()),
             ("aa_mode", settings.effective_aa_mode().name().to_owned()),
             ("camera", self.summary.camera.clone()),
-            ("world_from_camera", numbers(self.camera.world_from_camera())),
+            ("world_from_camera", matrix(self.camera.world_from_camera())),
             ("film_half_size", numbers(self.camera.film_half_size())),
             ("light_samples", light_samples(&self.lights, settings)),
             ("color_space", "linear Rec. 709, alpha premultiplied, before display encoding".to_owned()),
@@ -65,6 +65,12 @@ fn light_samples(lights: &[Light], settings: &RenderSettings) -> String {
     } else {
         counts.join(" ")
     }
+}
+
+/// A matrix of a camera, row by row: directions are of 32 bits, the place of 64.
+fn matrix(rows: [f64; 16]) -> String {
+    let text = |(i, v): (usize, f64)| if i % 4 == 3 { v.to_string() } else { (v as f32).to_string() };
+    rows.into_iter().enumerate().map(text).collect::<Vec<_>>().join(" ")
 }
 
 /// Numbers as text that reads back to the same bits.

@@ -44,7 +44,7 @@ impl Pyramid {
     /// Of the pixels from (`left`, `top`), `side` across and down.
     pub fn new(scene: &Scene, left: f32, top: f32, side: f32) -> Self {
         let (right, bottom) = (left + side, top + side);
-        let at = |x: f32, y: f32| scene.camera.ray(x, y, 1.0).0;
+        let at = |x: f32, y: f32| scene.camera.local_ray(x, y, 1.0).0;
         let corners = [at(left, top), at(right, top), at(right, bottom), at(left, bottom)];
         let middle = at(0.5 * (left + right), 0.5 * (top + bottom));
         let mut sides = [DVec3::ZERO; 4];
@@ -60,7 +60,7 @@ impl Pyramid {
         let width = corners.iter().fold(0.0f64, |width, ray| width.max(f64::from((ray.o - middle.o).length())));
         let (sin, width) = (sin * (1.0 + SLACK) + SLACK * SLACK, width * (1.0 + SLACK));
         let cos = (1.0 - sin * sin).max(0.0).sqrt();
-        Pyramid { corners, sides, forward: frame.forward, eye: frame.position, middle, width, sin, cos }
+        Pyramid { corners, sides, forward: frame.forward, eye: frame.eye, middle, width, sin, cos }
     }
 
     /// Whether the cone around it misses a ball.
@@ -242,9 +242,9 @@ impl Candidate {
     /// The material over a square of pixels that see only this, if it is the same all over it.
     pub fn even(self, scene: &Scene, square: Square) -> Option<Bsdf> {
         let middle = |from: u32| from as f32 + 0.5 * square.side as f32;
-        let (ray, differential) = scene.camera.ray(middle(square.x), middle(square.y), square.side as f32);
+        let (ray, differential) = scene.camera.local_ray(middle(square.x), middle(square.y), square.side as f32);
         let hit = self.hit(scene, &ray)?;
-        let si = scene.surface(&ray, &hit, &differential);
+        let si = scene.local_surface(&ray, &hit, &differential);
         let material = &scene.materials[si.material.index()];
         let is_even =
             self.is_flat_over(scene, &si, &ray, hit.t, &differential) && material.is_even(&si, &scene.textures);

@@ -19,6 +19,7 @@ use crate::ids::TextureId;
 use crate::image::read::{Limits, TexelData, Texels, decode};
 use crate::light::{AreaShape, Light, LightDesc, LightKind, check_samples};
 use crate::material::{LobeKind, MAX_SHININESS, Material, MaterialDesc};
+use crate::math::DVec3;
 use crate::shape::{Parallelogram, PlaneSide, ShapeDesc};
 use crate::texture::{Param, Texture, TextureDesc, TextureSpace};
 use crate::transform::MAX_TIME;
@@ -90,7 +91,9 @@ impl SceneDesc {
         textures.check_unused(cx);
         let mut files = Vec::new();
         let geometry = compile_shapes(self, cx, assets, &mut files);
-        let completed = options.complete.then(|| self.completed(geometry.as_ref().and_then(Geometry::bounds)));
+        let origin = cx.origin;
+        let bounds = geometry.as_ref().and_then(Geometry::bounds).map(|bounds| bounds.map(|corner| corner + origin));
+        let completed = options.complete.then(|| self.completed(bounds));
         let desc = completed.as_ref().unwrap_or(self);
         let camera = desc.compile_camera(cx, picture.width, picture.height);
         let lights = desc.compile_lights(cx);
@@ -103,12 +106,16 @@ impl SceneDesc {
         let light_sides = sides(&lights, &flat_obstacles);
         let light_obstacles = round_blocking(&lights);
         let flats_seen = geometry.listed_flats_seen();
-        let summary = self.summary(desc, &geometry, &lights, &textures);
+        let summary = SceneSummary {
+            bounds: bounds.map(|bounds| bounds.map(|corner| corner.to_array())),
+            ..self.summary(desc, &geometry, &lights, &textures)
+        };
         let scene = Scene {
             width: picture.width,
             height: picture.height,
             antialiasing: picture.antialiasing,
             camera,
+            origin,
             background: picture.background,
             transparent: self.render.transparent,
             ambient: picture.ambient,
@@ -256,6 +263,13 @@ impl SceneDesc {
         lights
     }
 
+    /// The box around the chosen camera and what it looks at, as they are said.
+    pub(super) fn camera_bounds(&self) -> Option<[DVec3; 2]> {
+        let (_, camera) = &self.cameras[self.chosen_camera()?];
+        let (eye, target) = (DVec3::from(camera.position), DVec3::from(camera.look_at));
+        camera.transform.is_none().then_some([eye.min(target), eye.max(target)])
+    }
+
     fn summary(
         &self,
         completed: &SceneDesc,
@@ -281,7 +295,7 @@ impl SceneDesc {
             materials: self.materials.iter().map(|(name, m)| (name.clone(), m.kind())).collect(),
             textures: textures.sizes(),
             texture_bytes: textures.bytes(),
-            bounds: geometry.bounds().map(|b| b.map(|v| v.as_vec3().to_array())),
+            bounds: None,
             camera: self.chosen_camera().map(|i| self.cameras[i].0.clone()).unwrap_or_default(),
         }
     }
@@ -320,6 +334,7 @@ impl Scene {
     /// What is wrong with the camera, with paths that begin with `camera`.
     pub fn with_camera(&self, camera: &CameraDesc) -> Result<Scene, SceneError> {
         let mut cx = CompileContext::at_time(self.moment);
+        cx.origin = self.origin;
         let compiled = cx.within("camera", |cx| camera.compile(cx, self.width, self.height));
         if cx.has_errors() {
             return Err(SceneError { faults: cx.take_faults() });

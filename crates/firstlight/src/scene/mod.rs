@@ -13,13 +13,16 @@ mod seen_lights;
 mod text;
 mod trace;
 mod trees;
+mod world;
 
 pub use builtin::{Builtin, builtin_scenes};
 pub use compile::{CompileOptions, Compiled};
 pub use description::{DisplayEncoding, RenderDesc, SceneDesc};
 pub use model::{ModelSettings, UpAxis};
 pub use text::{Parsed, reference, schema};
-pub use trace::{CameraHit, Hit};
+pub use trace::Hit;
+pub(crate) use trace::Seen;
+pub use world::{CameraHit, SurfacePoint};
 
 use std::sync::Arc;
 
@@ -31,6 +34,7 @@ use crate::describe::SamplesDesc;
 use crate::ids::SurfaceId;
 use crate::light::Light;
 use crate::material::Material;
+use crate::math::DVec3;
 use crate::shape::{Disk, Parallelogram, PlaneSide, Sphere};
 
 use crate::texture::Texture;
@@ -50,6 +54,8 @@ pub struct Scene {
     /// n of the n x n camera rays in a pixel.
     pub(crate) antialiasing: u32,
     pub(crate) camera: Camera,
+    /// Where all coordinates count from, in world space: that of the middle of what is far from 0, so that 32 bits are enough.
+    pub(crate) origin: DVec3,
     pub(crate) background: Rgb,
     pub(crate) transparent: bool,
     pub(crate) ambient: Rgb,
@@ -120,8 +126,9 @@ pub struct SceneSummary {
     pub textures: Vec<(String, &'static str, Option<[u32; 2]>)>,
     /// Bytes of all texels in memory.
     pub texture_bytes: u64,
-    /// The smallest box, along the axes, around all shapes: its least and its greatest corner. `None` without shapes.
-    pub bounds: Option<[[f32; 3]; 2]>,
+    /// The smallest box, along the axes, around all shapes, in world space: its least and its greatest corner. `None` without
+    /// shapes.
+    pub bounds: Option<[[f64; 3]; 2]>,
     /// The camera's name; empty for the one without.
     pub camera: String,
 }

@@ -15,6 +15,7 @@ use super::links::{LinkId, Links};
 use crate::context::{Assets, CompileContext};
 use crate::describe::Family;
 use crate::ids::{MaterialId, SurfaceId};
+use crate::math::{DVec3, origin_for};
 use crate::shape::{
     Common, Mesh, MeshBuilder, MeshSource, Parallelogram, Placement, PointSet, ShapeDesc, Solid, Sphere,
 };
@@ -84,8 +85,61 @@ enum Form {
 /// A group, or the scene itself, in its own space.
 struct Group {
     leaves: Vec<Leaf>,
-    /// All its meshes, joined.
+    /// All its meshes, to be joined.
+    builder: MeshBuilder,
+    /// All its meshes, joined, once it is known where they count from.
     mesh: Option<Mesh>,
+    /// Where `mesh` counts from, in the space of the group.
+    origin: DVec3,
+}
+
+impl Group {
+    /// Joins the meshes; they count from `origin`.
+    fn join(&mut self, cx: &CompileContext, origin: DVec3) {
+        self.mesh = std::mem::take(&mut self.builder).build(cx, origin);
+        self.origin = origin;
+    }
+}
+
+/// Finds the boxes around groups.
+struct Extents<'a> {
+    groups: &'a [Group],
+    solids: &'a [Solid],
+    point_sets: &'a [PointSet],
+    /// Those that are known.
+    known: Vec<Option<Option<[DVec3; 2]>>>,
+}
+
+impl Extents<'_> {
+    /// The box around all of a group that has an end, in its own space. Groups are without circles and not deep.
+    fn of(&mut self, group: &Group) -> Option<[DVec3; 2]> {
+        let mut all = group.builder.bounds();
+        for leaf in &group.leaves {
+            let own = match &leaf.form {
+                Form::Nothing | Form::MeshPart => None,
+                Form::Sphere(sphere) => Some(sphere.bounds()),
+                Form::Parallelogram(flat) => Some(flat.bounds()),
+                Form::Solid(solid) => self.solids[*solid as usize].bounds(),
+                Form::Points(points) => {
+                    let points = &self.point_sets[*points as usize];
+                    points.bounds().map(|bounds| bounds.map(|corner| corner + points.origin()))
+                }
+                Form::Instance(of) => {
+                    if self.known[*of].is_none() {
+                        let groups = self.groups;
+                        self.known[*of] = Some(self.of(&groups[*of]));
+                    }
+                    self.known[*of].flatten()
+                }
+            };
+            let own = own.map(|own| leaf.transform.map_or(own, |transform| Placement::new(transform).bounds(own)));
+            all = match (all, own) {
+                (Some([low, high]), Some([a, b])) => Some([low.min(a), high.max(b)]),
+                (all, own) => all.or(own),
+            };
+        }
+        all
+    }
 }
 
 /// What an instance says of everything in it.
@@ -171,7 +225,7 @@ pub(super) fn compile_shapes(
         solids: Vec::new(),
         point_sets: Vec::new(),
     };
-    let root = compiler.group(cx, "", &desc.shapes);
+    let mut root = compiler.group(cx, "", &desc.shapes);
     let mut groups = Vec::with_capacity(desc.groups.len());
     for (name, group) in &desc.groups {
         groups.push(compiler.group(cx, &format!("group.{name}."), &group.shapes));
@@ -187,6 +241,17 @@ pub(super) fn compile_shapes(
         cx.error("instance", message, Some("join the meshes of a group in one, or place fewer"));
         return None;
     }
+    // Say where coordinates count from: those of each group's mesh, and those of the scene
+    let known = vec![None; groups.len()];
+    let bounds = Extents { groups: &groups, solids: &solids, point_sets: &point_sets, known }.of(&root);
+    cx.origin = bounds.or_else(|| desc.camera_bounds()).map_or(DVec3::ZERO, origin_for);
+    for group in &mut groups {
+        group.join(cx, group.builder.bounds().map_or(DVec3::ZERO, origin_for));
+    }
+    root.join(cx, cx.origin);
+    if cx.error_count() > before {
+        return None;
+    }
     let meshes: Vec<&Mesh> = groups.iter().filter_map(|group| group.mesh.as_ref()).collect();
     let mut count = 0;
     let mesh_of = groups.iter().map(|group| {
@@ -198,7 +263,9 @@ pub(super) fn compile_shapes(
     let mesh_of = mesh_of.collect();
     let parts = Parts { solids, point_sets, ..Parts::default() };
     let mut walk = Walk { groups: &groups, meshes, mesh_of, parts, links, name_bytes: 0 };
-    walk.group(&root, None, DAffine3::IDENTITY, &Over::NONE);
+    let scene_from_world = DAffine3 { translation: -cx.origin, ..DAffine3::IDENTITY };
+    let is_shifted = cx.origin != DVec3::ZERO;
+    walk.group(&root, None, if is_shifted { scene_from_world } else { DAffine3::IDENTITY }, &Over::NONE);
     let Walk { mut parts, links, name_bytes, .. } = walk;
     if name_bytes > MAX_NAMES {
         let message = format!("the names of what the instances place have more than {MAX_NAMES} bytes");
@@ -248,7 +315,7 @@ impl Compiler<'_> {
                 leaves.push(leaf);
             }
         }
-        Group { leaves, mesh: mesh.build(cx) }
+        Group { leaves, builder: mesh, mesh: None, origin: DVec3::ZERO }
     }
 
     fn leaf(&mut self, cx: &mut CompileContext, shape: &ShapeDesc, number: u32, mesh: &mut MeshBuilder) -> Leaf {
@@ -450,7 +517,10 @@ impl Walk<'_> {
                     self.parts.parallelograms.push(Owned { seen, shape, surface });
                 }
                 Form::Solid(solid) => self.place(world, Target::Solid(*solid), surface),
-                Form::Points(points) => self.place(world, Target::Points(*points), surface),
+                Form::Points(points) => {
+                    let origin = self.parts.point_sets[*points as usize].origin();
+                    self.place(from(world, origin), Target::Points(*points), surface);
+                }
                 Form::Instance(of) => {
                     let groups = self.groups;
                     let over = over.within(leaf, &mut self.links);
@@ -460,7 +530,7 @@ impl Walk<'_> {
         }
         // The mesh of the scene itself is in the world already
         if let Some(mesh) = index.and_then(|index| self.mesh_of[index]) {
-            self.place(world_from_group, Target::Mesh(mesh), SurfaceId(first));
+            self.place(from(world_from_group, group.origin), Target::Mesh(mesh), SurfaceId(first));
         }
     }
 
@@ -477,6 +547,14 @@ impl Walk<'_> {
         let placement = Placement::new(world_from_object);
         self.parts.placed.push(Placed { placement, target, surface, camera, shadow });
     }
+}
+
+/// The same transform, for coordinates that count from `origin`.
+fn from(transform: DAffine3, origin: DVec3) -> DAffine3 {
+    if origin == DVec3::ZERO {
+        return transform;
+    }
+    DAffine3 { translation: transform.transform_point3(origin), ..transform }
 }
 
 /// Which camera rays and which shadow rays meet a mesh whose surfaces start at `first`.

@@ -8,14 +8,14 @@ use super::links::LinkId;
 use crate::color::Rgb;
 use crate::ids::{LightId, SurfaceId};
 use crate::light::LightKind;
-use crate::math::{DVec3, Ray, ShadowRay, Vec3};
+use crate::math::{Ray, ShadowRay};
 use crate::shape::{RayDifferential, ShapePoint, Sphere, SurfaceInteraction};
 
 pub use super::geometry::Hit;
 
-/// What a camera ray ends at.
+/// What a camera ray ends at, in the scene's own coordinates.
 #[derive(Clone, Copy, Debug)]
-pub enum CameraHit {
+pub(crate) enum Seen {
     /// A surface to be lit.
     Surface(SurfaceInteraction),
     /// A light, seen as its colour.
@@ -25,13 +25,13 @@ pub enum CameraHit {
 }
 
 impl Scene {
-    /// The first surface on a ray that a camera can see; of several at the same distance, the one with the lowest id.
+    /// [`intersect`](Self::intersect) in the scene's own coordinates.
     #[inline(always)]
-    pub fn intersect(&self, ray: &Ray) -> Option<Hit> {
+    pub(crate) fn intersect_local(&self, ray: &Ray) -> Option<Hit> {
         self.intersect_at(self.level, ray)
     }
 
-    /// [`intersect`](Self::intersect) with an instruction set: the same answer.
+    /// [`intersect_local`](Self::intersect_local) with an instruction set: the same answer.
     #[inline(always)]
     pub(crate) fn intersect_at(&self, level: Level, ray: &Ray) -> Option<Hit> {
         let listed = self.meet_listed(ray);
@@ -98,33 +98,6 @@ impl Scene {
         self.lights[light.index()].samples()
     }
 
-    /// A ray from `surface` to each of the [points](Self::light_points) of a light that are above the surface's horizon, for
-    /// [`occluded`](Self::occluded). Those below it send nothing, so the share of the points whose rays are not occluded is
-    /// the visible fraction of the light.
-    ///
-    /// # Panics
-    /// If the scene has no such light.
-    pub fn shadow_rays(
-        &self,
-        surface: &SurfaceInteraction,
-        light: LightId,
-    ) -> impl Iterator<Item = ShadowRay> + use<'_> {
-        let si = *surface;
-        let from = &self.lights[light.index()];
-        let floor = from.floor(si.lit_from, si.error, si.horizon);
-        (0..from.samples()).filter_map(move |k| {
-            let to = from.towards(k, si.lit_from);
-            let is_above = si.horizon.dot(to.l) > floor && si.ns.dot(to.l) > 0.0;
-            is_above.then(|| si.shadow_ray(light, to.l, if to.finite { 1.0 } else { f32::INFINITY }))
-        })
-    }
-
-    /// A ray from `surface` to a point, world space, for [`occluded`](Self::occluded): whether the two see each other, as far
-    /// as the shadows of `light` go. Whether the point is above the horizon is not looked at.
-    pub fn shadow_ray_to(&self, surface: &SurfaceInteraction, light: LightId, point: DVec3) -> ShadowRay {
-        surface.shadow_ray(light, (point - surface.lit_from.as_dvec3()).as_vec3(), 1.0)
-    }
-
     /// Whether anything that casts shadows for the ray's light stands between a surface and it. Any hit will do, so the order
     /// is of no account.
     #[inline]
@@ -177,7 +150,7 @@ impl Scene {
     /// # Panics
     /// If the hit is a light's: a light has no material.
     #[inline(always)]
-    pub fn surface(&self, ray: &Ray, hit: &Hit, differential: &RayDifferential) -> SurfaceInteraction {
+    pub(crate) fn local_surface(&self, ray: &Ray, hit: &Hit, differential: &RayDifferential) -> SurfaceInteraction {
         let surface = &self.geometry.surfaces[hit.surface.index()];
         let point = self.geometry.point(ray, hit, differential);
         let ShapePoint { p, error, normal, shading, lifted, uv, footprint, color } = point;
@@ -204,29 +177,14 @@ impl Scene {
         }
     }
 
-    /// How the point of a hit moves with u, and with v: metres for 1. Not orthogonal, and no length where uv has no
-    /// direction. Asked for apart from [`surface`](Self::surface), because few need it.
-    ///
-    /// # Panics
-    /// If the hit is a light's.
-    pub fn tangents(&self, ray: &Ray, hit: &Hit) -> [Vec3; 2] {
-        self.geometry.tangents(ray, hit).map(|d| d.as_vec3())
-    }
-
-    /// What a camera ray ends at.
-    #[inline(always)]
-    pub fn look(&self, ray: &Ray, differential: &RayDifferential) -> CameraHit {
-        self.see(ray, self.intersect(ray), differential)
-    }
-
     /// What the camera sees of a hit.
     #[inline(always)]
-    pub(crate) fn see(&self, ray: &Ray, hit: Option<Hit>, differential: &RayDifferential) -> CameraHit {
+    pub(crate) fn see(&self, ray: &Ray, hit: Option<Hit>, differential: &RayDifferential) -> Seen {
         match hit {
-            None => CameraHit::Background,
+            None => Seen::Background,
             Some(hit) => match hit.surface.index().checked_sub(self.geometry.surfaces.len()) {
-                Some(light) => CameraHit::Emission(self.lights[light].radiance),
-                None => CameraHit::Surface(self.surface(ray, &hit, differential)),
+                Some(light) => Seen::Emission(self.lights[light].radiance),
+                None => Seen::Surface(self.local_surface(ray, &hit, differential)),
             },
         }
     }

@@ -4,7 +4,7 @@ use fearless_simd::Simd;
 
 use super::ball::ball_tangents;
 use super::common::shape_table;
-use super::mesh::read_mesh_file;
+use super::mesh::{from_own_origin, read_mesh_file};
 use super::placement::Placement;
 use super::sphere::{SphereUv, equirectangular};
 use super::surface::{Footprint, RayDifferential, ShapePoint, UvEdge};
@@ -47,6 +47,8 @@ pub(crate) struct PointSet {
     spheres: Vec<[f32; 4]>,
     /// Empty, or one for each sphere.
     colors: Vec<[f32; 3]>,
+    /// What was taken off every centre.
+    origin: DVec3,
     tree: Bvh,
 }
 
@@ -104,8 +106,10 @@ impl PointSetDesc {
                 cx.error(&format!("colors[{i}]"), message, Some("a colour is linear red, green, blue"));
             }
         }
+        let (positions, origin) = from_own_origin(&self.positions);
         MeshData {
-            positions: self.positions.iter().map(|p| p.map(|c| c as f32)).collect(),
+            positions,
+            origin,
             radii: self.radii.iter().map(|r| *r as f32).collect(),
             colors: self.colors.iter().map(|c| [c[0] as f32, c[1] as f32, c[2] as f32, 1.0]).collect(),
             ..MeshData::default()
@@ -155,7 +159,7 @@ impl PointSet {
         let boxes: Vec<Aabb> = spheres.iter().map(bounds).collect();
         let colors =
             data.colors.iter().map(|[r, g, b, _]| [*r, *g, *b].map(|c| if c >= 0.0 { c.min(1e6) } else { 0.0 }));
-        PointSet { spheres, colors: colors.collect(), tree: Bvh::build(&boxes) }
+        PointSet { spheres, colors: colors.collect(), origin: data.origin.into(), tree: Bvh::build(&boxes) }
     }
 
     /// How many there are.
@@ -173,7 +177,12 @@ impl PointSet {
         self.tree.bytes()
     }
 
-    /// The box around all; `None` if there is nothing to be hit.
+    /// What was taken off every centre: from here on the set is placed there.
+    pub fn origin(&self) -> DVec3 {
+        self.origin
+    }
+
+    /// The box around all, counted from [`origin`](Self::origin); `None` if there is nothing to be hit.
     pub fn bounds(&self) -> Option<[DVec3; 2]> {
         let bounds = self.tree.bounds();
         bounds.is_sound().then(|| [bounds.min.as_dvec3(), bounds.max.as_dvec3()])

@@ -275,11 +275,11 @@ fn seen_points(random: &mut Random, scene: &Scene) -> Vec<Viewpoint> {
     let mut points = Vec::new();
     for i in 0..24 {
         let (x, y) = (middle[0] + (i % 6) as f32 * apart, middle[1] + (i / 6) as f32 * apart);
-        let (ray, differential): (Ray, RayDifferential) = scene.camera.ray(x, y, 1.0);
-        if let Some(hit) = scene.intersect(&ray)
+        let (ray, differential): (Ray, RayDifferential) = scene.camera.local_ray(x, y, 1.0);
+        if let Some(hit) = scene.intersect_local(&ray)
             && hit.surface.index() < scene.geometry.surfaces.len()
         {
-            points.push(Viewpoint::of(&scene.surface(&ray, &hit, &differential)));
+            points.push(Viewpoint::of(&scene.local_surface(&ray, &hit, &differential)));
         }
     }
     points

@@ -90,7 +90,7 @@ fn read_uniform(
         lists.iter().all(|&(offset, count, length)| binary_value(&row[offset..], count, big) == length as f64)
     };
     let read = |row: &[u8], slot: usize, missing: f32| match slots[slot] {
-        Some((offset, scalar)) => binary_value(&row[offset..], scalar, big) as f32,
+        Some((offset, scalar)) => (binary_value(&row[offset..], scalar, big) - plan.offsets[slot]) as f32,
         None => missing,
     };
     match purpose {

@@ -132,7 +132,9 @@ impl Row {
         self.coordinates.clear();
         for (property, &what) in elements[element].properties.iter().zip(&plan.uses[element]) {
             match (property.kind, what) {
-                (Kind::Scalar(scalar), Use::Slot(slot)) => self.slots[slot] = source.value(scalar)? as f32,
+                (Kind::Scalar(scalar), Use::Slot(slot)) => {
+                    self.slots[slot] = (source.value(scalar)? - plan.offsets[slot]) as f32;
+                }
                 (Kind::Scalar(scalar), _) => source.skip(scalar, 1)?,
                 (Kind::List { count, item }, _) => {
                     let at = source.offset();

@@ -25,12 +25,13 @@ mod source;
 
 use super::{Fault, MeshData, Progress};
 use header::{Encoding, Header};
-use plan::Plan;
+use plan::{Plan, X};
 
-/// Reads a PLY file.
-pub(super) fn read(file: &[u8], progress: &Progress) -> Result<MeshData, Fault> {
+/// Reads a PLY file; positions less `origin`.
+pub(super) fn read(file: &[u8], origin: [f64; 3], progress: &Progress) -> Result<MeshData, Fault> {
     let header = Header::read(file)?;
-    let plan = Plan::new(&header, file.len())?;
+    let mut plan = Plan::new(&header, file.len())?;
+    plan.offsets[X..X + 3].copy_from_slice(&origin);
     let mut body = match header.encoding {
         Encoding::Ascii => body::read_text(file, &header, &plan, progress)?,
         encoding => binary::read_binary(file, &header, &plan, encoding, progress)?,

@@ -112,6 +112,8 @@ pub(super) struct Plan {
     pub wedges: bool,
     /// Faces have colours of their own.
     pub face_colors: bool,
+    /// What is taken off the number in each slot.
+    pub offsets: [f64; SLOTS],
 }
 
 impl Plan {
@@ -159,6 +161,7 @@ impl Plan {
             uvs,
             colors: color_type.map(Colors::new),
             radii: has(RADIUS..SLOTS),
+            offsets: [0.0; SLOTS],
             wedges: false,
             face_colors: false,
         };

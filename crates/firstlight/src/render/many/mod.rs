@@ -129,7 +129,7 @@ impl<'a> Many<'a> {
             scene,
             tree,
             together: scene.lights.len() > SINGLY && scene.geometry.links.is_empty(),
-            eye: scene.camera.frame().position,
+            eye: scene.camera.frame().eye,
             outlook: Outlook::default(),
             cut: Cut::default(),
             crowd: Crowd::default(),

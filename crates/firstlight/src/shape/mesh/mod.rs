@@ -17,7 +17,7 @@ use crate::context::{AssetError, Assets, CompileContext, CompileStage, show};
 use crate::describe::FilePath;
 use crate::ids::MaterialId;
 use crate::import::{MeshData, read_mesh};
-use crate::math::Vec3;
+use crate::math::{DVec3, Vec3, origin_for};
 
 shape_table! {
     /// Triangles: from a PLY, STL or OBJ file, or written out.
@@ -221,8 +221,10 @@ impl MeshDesc {
             return None;
         }
         let single3 = |v: &[f64; 3]| v.map(|c| c as f32);
+        let (positions, origin) = from_own_origin(&self.positions);
         Some(MeshData {
-            positions: self.positions.iter().map(single3).collect(),
+            positions,
+            origin,
             normals: self.normals.iter().map(single3).collect(),
             uvs: if self.uvs.is_empty() {
                 Vec::new()
@@ -238,9 +240,37 @@ impl MeshDesc {
     }
 }
 
+/// Positions in 32 bits, and what was taken off them: 0 but where they are far from 0.
+pub(crate) fn from_own_origin(positions: &[[f64; 3]]) -> (Vec<[f32; 3]>, [f64; 3]) {
+    let corners = positions.iter().map(|p| [DVec3::from(*p); 2]);
+    let bounds = corners.reduce(|[low, high], [a, b]| [low.min(a), high.max(b)]);
+    let origin = bounds.map_or(DVec3::ZERO, origin_for);
+    (positions.iter().map(|p| (DVec3::from(*p) - origin).as_vec3().to_array()).collect(), origin.to_array())
+}
+
 /// Joins the meshes of one space.
 #[derive(Default)]
 pub(crate) struct MeshBuilder {
+    /// As they came.
+    sources: Vec<Source>,
+    /// Vertices and triangles of all of them.
+    counts: [usize; 2],
+    bounds: Option<[DVec3; 2]>,
+    joined: Lists,
+}
+
+/// A mesh that is to be joined with others, and its part of them.
+struct Source {
+    data: MeshData,
+    uv_set: usize,
+    transform: Option<DAffine3>,
+    surface: u32,
+    materials: Vec<MaterialId>,
+}
+
+/// What is joined of all meshes.
+#[derive(Default)]
+struct Lists {
     positions: Vec<[f32; 3]>,
     triangles: Vec<[u32; 3]>,
     normals: Vec<[f32; 3]>,
@@ -273,20 +303,53 @@ impl MeshBuilder {
         surface: u32,
         materials: Vec<MaterialId>,
     ) {
-        let MeshSource { mut data, uv_set } = source;
-        let (vertices, first) = (self.positions.len(), self.triangles.len());
-        if vertices + data.positions.len() > u32::MAX as usize || first + data.triangles.len() > u32::MAX as usize {
+        let MeshSource { data, uv_set } = source;
+        let counts = [self.counts[0] + data.positions.len(), self.counts[1] + data.triangles.len()];
+        if counts.iter().any(|count| *count > u32::MAX as usize) {
             let message = "the meshes of one group have more than 4294967295 vertices or triangles together";
             cx.error("file", message, Some("put some of them in a group of their own"));
             return;
         }
-        move_mesh(&mut data, transform);
-        let largest = data.positions.iter().flatten().filter(|c| c.is_finite()).fold(0.0f32, |a, c| a.max(c.abs()));
-        if largest as f64 > MAX_COORDINATE {
-            let message = format!("a vertex has the coordinate {largest}, outside [-2.5e8, 2.5e8]");
+        let bounds = bounds(&data, transform);
+        let largest = bounds.iter().flatten().fold(0.0f64, |most, corner| most.max(corner.abs().max_element()));
+        if largest > MAX_COORDINATE {
+            let message = format!("a vertex has the coordinate {}, outside [-2.5e8, 2.5e8]", largest as f32);
             cx.error("file", message, Some("coordinates are in metres: scale the mesh"));
             return;
         }
+        self.counts = counts;
+        self.bounds = match (self.bounds, bounds) {
+            (Some([low, high]), Some([a, b])) => Some([low.min(a), high.max(b)]),
+            (all, own) => all.or(own),
+        };
+        self.sources.push(Source { data, uv_set, transform, surface, materials });
+    }
+
+    /// The box around all meshes so far, in the space that they are joined in.
+    pub fn bounds(&self) -> Option<[DVec3; 2]> {
+        self.bounds
+    }
+
+    /// Joins all meshes, less `origin`, and builds the tree. `None` if there is nothing to be hit.
+    pub fn build(mut self, cx: &CompileContext, origin: DVec3) -> Option<Mesh> {
+        for source in std::mem::take(&mut self.sources) {
+            self.joined.add(source, origin);
+        }
+        let Lists { positions, triangles, normals, uvs, colors, parts } = self.joined;
+        if triangles.is_empty() {
+            return None;
+        }
+        cx.tell(CompileStage::Building { triangles: triangles.len() as u64 });
+        let tree = TriangleTree::build(&positions, &triangles);
+        Some(Mesh { positions, triangles, normals, uvs, colors, parts, tree })
+    }
+}
+
+impl Lists {
+    fn add(&mut self, source: Source, origin: DVec3) {
+        let Source { mut data, uv_set, transform, surface, materials } = source;
+        move_mesh(&mut data, transform, origin);
+        let (vertices, first) = (self.positions.len(), self.triangles.len());
         let MeshData { positions, mut triangles, normals, mut uvs, colors, face_materials, .. } = data;
         let added = positions.len();
         let own_uvs = if uv_set < uvs.len() { uvs.swap_remove(uv_set) } else { Vec::new() };
@@ -309,22 +372,33 @@ impl MeshBuilder {
             (self.positions, self.triangles) = (positions, triangles);
         }
     }
-
-    /// Builds the tree. `None` if there is nothing to be hit.
-    pub fn build(self, cx: &CompileContext) -> Option<Mesh> {
-        let MeshBuilder { positions, triangles, normals, uvs, colors, parts } = self;
-        if triangles.is_empty() {
-            return None;
-        }
-        cx.tell(CompileStage::Building { triangles: triangles.len() as u64 });
-        let tree = TriangleTree::build(&positions, &triangles);
-        Some(Mesh { positions, triangles, normals, uvs, colors, parts, tree })
-    }
 }
 
-/// Moves positions and normals, in f64.
-fn move_mesh(data: &mut MeshData, transform: Option<DAffine3>) {
-    let Some(transform) = transform else { return };
+/// The box around all positions that are numbers, moved by `transform`.
+fn bounds(data: &MeshData, transform: Option<DAffine3>) -> Option<[DVec3; 2]> {
+    let (origin, world_from_mesh) = (DVec3::from(data.origin), transform.unwrap_or(DAffine3::IDENTITY));
+    let mut bounds: Option<[DVec3; 2]> = None;
+    for p in &data.positions {
+        let p = Vec3::from(*p).as_dvec3();
+        if p.is_finite() {
+            let p = world_from_mesh.transform_point3(p + origin);
+            bounds = Some(bounds.map_or([p; 2], |[low, high]| [low.min(p), high.max(p)]));
+        }
+    }
+    bounds
+}
+
+/// Moves positions and normals, in f64; positions then count from `origin`.
+fn move_mesh(data: &mut MeshData, transform: Option<DAffine3>, origin: DVec3) {
+    let own = DVec3::from(data.origin);
+    let is_shifted = own != DVec3::ZERO || origin != DVec3::ZERO;
+    if transform.is_none() && !is_shifted {
+        return;
+    }
+    let mut transform = transform.unwrap_or(DAffine3::IDENTITY);
+    if is_shifted {
+        transform.translation = transform.transform_point3(own) - origin;
+    }
     let placement = Placement::new(transform);
     for p in &mut data.positions {
         *p = transform.transform_point3(Vec3::from(*p).as_dvec3()).as_vec3().into();
