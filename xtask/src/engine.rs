@@ -222,7 +222,7 @@ pub(crate) fn terrain(n: u32, size: u32, lamps: &[Lamp], samples: SamplesDesc) -
             strength: *strength,
             sides: Some(EmitSides::Both),
             visible: false,
-            ..RectangleDesc::new(*center, *e0, *e1)
+            ..RectangleDesc::with_edges(*center, *e0, *e1)
         })
     });
     let camera = CameraDesc { look_at: [0.0, 0.0, 0.0], fov_y_deg: Some(45.0), ..CameraDesc::new([0.5, 1.6, 2.0]) };

@@ -148,7 +148,7 @@ fn hall(options: &Options) -> SceneDesc {
                 color,
                 strength: strength / 6.4e-3,
                 sides: Some(EmitSides::Front),
-                ..RectangleDesc::new(p, [0.08, 0.0, 0.0], [0.0, 0.0, 0.08])
+                ..RectangleDesc::with_edges(p, [0.08, 0.0, 0.0], [0.0, 0.0, 0.08])
             }),
         });
     }

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Args, Parser, Subcommand, ValueEnum, ValueHint};
-use firstlight::{SamplesDesc, SimdLevel, VisibilityMode, Window};
+use firstlight::{ColorDesc, Framing, SamplesDesc, SimdLevel, View, VisibilityMode, Window};
 
 /// Renders the direct light of a scene: camera ray, first surface, every light. No noise, the same bits every time
 #[derive(Debug, Parser)]
@@ -55,6 +55,12 @@ Examples:
       one rendering, two files
   firstlight render bunny.ply --smooth 40
       a model by itself: a camera and a light are found for it
+  firstlight render bunny.ply --view left --transparent --size 256
+      from another side, for a page of any colour
+  firstlight render models/*.ply plan.toml -o 'out/{stem}.png' --size 256
+      many pictures in one call
+  firstlight render bunny.ply --print-scene > bunny.toml
+      the same as a scene, to go on from
   firstlight render room.toml --width 320 --aa 1 --samples 16
       a quick look, in the scene's own aspect ratio
   firstlight render room.toml --crop 400,300,64,64 -o detail.png
@@ -137,14 +143,16 @@ fn angle(text: &str) -> Result<f64, String> {
 #[derive(Args, Debug)]
 pub struct RenderArgs {
     /// A scene file (.toml, .json, or a course file .txt), a model (.ply, .stl, .obj), the name of a built-in scene such as config23 (see `firstlight
-    /// scenes`; a file of such a name is ./config23), or - for standard input
+    /// scenes`; a file of such a name is ./config23), or - for standard input. Several are rendered one after the other, also after one
+    /// that failed
     #[arg(value_name = "SCENE", value_hint = ValueHint::FilePath, default_value = "config11")]
-    pub scene: PathBuf,
+    pub scenes: Vec<PathBuf>,
     #[command(flatten)]
     pub reading: ReadingArgs,
 
-    /// A picture to write: its ending, .png, .exr or .hdr, says the format; - is standard output. May be given several
-    /// times [default: the scene's name with .png, or with .render.png where that is a file not written by firstlight; a
+    /// A picture to write: its ending, .png, .exr or .hdr, says the format; - is standard output. {stem} in it is the scene's file name
+    /// without its ending, {name} the whole of it; with several scenes one of them is needed, in --heat and --stats too. May be given
+    /// several times [default: the scene's name with .png, or with .render.png where that is a file not written by firstlight; a
     /// course file's output_file; in the working folder]
     #[arg(short, long = "output", value_name = "FILE", value_hint = ValueHint::FilePath, help_heading = "Output")]
     pub output: Vec<PathBuf>,
@@ -165,7 +173,25 @@ pub struct RenderArgs {
     /// Pixels down, 1 to 65536; without --width, the width follows in the scene's aspect ratio [default: the scene's]
     #[arg(long, value_name = "PIXELS", value_parser = whole::<u32>(1, 65536), help_heading = "Picture")]
     pub height: Option<u32>,
-    /// Renders only this part of the picture, in pixels from its top left corner [default: all of it]
+    /// Pixels along the longer side, in the scene's aspect ratio (a model by itself is square), or WIDTHxHEIGHT; 1 to 65536 each
+    /// [default: the scene's]
+    #[arg(long, value_name = "PIXELS", value_parser = size, conflicts_with_all = ["width", "height"], help_heading = "Picture")]
+    pub size: Option<Size>,
+    /// Leaves what no surface covers transparent [default: as the scene has it]
+    #[arg(long, conflicts_with = "background", help_heading = "Picture")]
+    pub transparent: bool,
+    /// The colour of what no surface covers: '#rrggbb' (sRGB), or R,G,B (linear, 0 to 1e6, as in scene text) [default: the scene's]
+    #[arg(long, value_name = "COLOR", value_parser = color, allow_hyphen_values = true, help_heading = "Picture")]
+    pub background: Option<ColorDesc>,
+    /// Where the camera of a model, or of a scene without a camera, looks from: front, back, left, right, top, bottom, iso, or
+    /// AZIMUTH,ELEVATION in degrees; 0,0 is in front, on the side of +z, 90,0 on the right, on that of +x [default: 25,18]
+    #[arg(long, value_name = "VIEW", value_parser = view, allow_hyphen_values = true, help_heading = "Picture")]
+    pub view: Option<View>,
+    /// What such a camera leaves free at least on each side of the picture, as a part of its shorter side, 0 to 0.45 [default: 0.04]
+    #[arg(long, value_name = "PART", value_parser = margin, help_heading = "Picture")]
+    pub margin: Option<f64>,
+    /// Renders only this part of the picture, in pixels from its top left corner: the same pixels as in the whole. At most 134217728 at once;
+    /// larger pictures are made in parts [default: all of it]
     #[arg(long, value_name = "X,Y,WIDTH,HEIGHT", value_parser = crop, allow_hyphen_values = true, help_heading = "Picture")]
     pub crop: Option<Window>,
     /// The camera to render from, where the scene names several [default: the scene's]
@@ -225,6 +251,12 @@ pub struct RenderArgs {
     /// doubling of what a pixel took a step of the same length [default: none]
     #[arg(long, value_name = "FILE.png", value_hint = ValueHint::FilePath, help_heading = "Messages")]
     pub heat: Option<PathBuf>,
+    /// Renders nothing, and writes the scene as TOML: with what the options say in place of it, with the camera and the light that were
+    /// found for it, all in one text. To FILE, or to standard output; the files it names are seen from there [default: renders]
+    #[arg(long, value_name = "FILE.toml", require_equals = true, value_hint = ValueHint::FilePath, help_heading = "Output")]
+    #[arg(conflicts_with_all = ["output", "bits", "format", "exposure", "crop", "time", "frames", "aa_mode", "reference", "visibility"])]
+    #[arg(conflicts_with_all = ["threads", "tile_size", "simd", "stats", "heat"])]
+    pub print_scene: Option<Option<PathBuf>>,
     /// Says nothing but errors, warnings, and --stats where asked for
     #[arg(short, long, help_heading = "Messages")]
     pub quiet: bool,
@@ -371,6 +403,61 @@ fn crop(text: &str) -> Result<Window, String> {
     }
 }
 
+/// `--size`
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Size {
+    /// Pixels along the longer side.
+    Longer(u32),
+    /// Pixels across and down.
+    Both(u32, u32),
+}
+
+/// Reads `PIXELS`, or `WIDTHxHEIGHT`.
+fn size(text: &str) -> Result<Size, String> {
+    let side = |text: &str| whole::<u32>(1, 65536)(text).ok();
+    let read = match text.split_once(['x', 'X']) {
+        Some((width, height)) => side(width).zip(side(height)).map(|(width, height)| Size::Both(width, height)),
+        None => side(text).map(Size::Longer),
+    };
+    read.ok_or_else(|| "one whole number, as 256, or two, as 256x512, are needed, from 1 to 65536".into())
+}
+
+/// Reads numbers with commas between, all of them finite.
+fn numbers<const N: usize>(text: &str) -> Option<[f64; N]> {
+    let numbers: Vec<f64> = text.split(',').map(|n| n.trim().parse()).collect::<Result<_, _>>().ok()?;
+    <[f64; N]>::try_from(numbers).ok().filter(|numbers| numbers.iter().all(|n| n.is_finite()))
+}
+
+/// Reads a colour.
+fn color(text: &str) -> Result<ColorDesc, String> {
+    let linear = || numbers::<3>(text).filter(|rgb| rgb.iter().all(|c| (0.0..=1e6).contains(c))).map(ColorDesc::from);
+    let wanted =
+        "a colour is '#' and 6 hexadecimal digits (sRGB), as '#336699', or three numbers R,G,B from 0 to 1e6 (linear)";
+    ColorDesc::from_hex(text).or_else(linear).ok_or_else(|| wanted.into())
+}
+
+/// Reads where an automatic camera looks from.
+fn view(text: &str) -> Result<View, String> {
+    let angles = || numbers::<2>(text).filter(|[azimuth, elevation]| azimuth.abs() <= 360.0 && elevation.abs() <= 90.0);
+    View::from_name(text).or_else(|| angles().map(|[azimuth, elevation]| View::new(azimuth, elevation))).ok_or_else(
+        || {
+            let names: Vec<&str> = View::NAMED.iter().map(|(name, _)| *name).collect();
+            format!(
+                "one of {}, or two angles AZIMUTH,ELEVATION from -360 to 360 and from -90 to 90 degrees are needed",
+                names.join(", ")
+            )
+        },
+    )
+}
+
+/// Reads a part of the picture's shorter side.
+fn margin(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(margin) if (0.0..=Framing::MAX_MARGIN).contains(&margin) => Ok(margin),
+        _ => Err("a part of the picture's shorter side is needed, from 0 to 0.45".into()),
+    }
+}
+
 /// Reads the name of a SIMD level; completions and help list them all, whatever this machine has.
 #[derive(Clone)]
 struct SimdParser;
@@ -435,6 +522,31 @@ mod tests {
             assert!(frames(bad).is_err(), "{bad}");
         }
         assert!(time("-0.5").is_ok() && time("inf").is_err() && time("nan").is_err() && time("2e9").is_err());
+    }
+
+    #[test]
+    fn a_size_is_one_side_or_both() {
+        assert_eq!((size("256"), size("256x512")), (Ok(Size::Longer(256)), Ok(Size::Both(256, 512))));
+        for bad in ["", "0", "65537", "x", "1x", "x1", "1x2x3", "1x0", "-1", "1.5", "256 512"] {
+            assert!(size(bad).is_err(), "{bad}");
+        }
+    }
+
+    #[test]
+    fn a_colour_is_srgb_or_linear() {
+        assert_eq!((color("#ffffff"), color("0, 0.5,2")), (Ok(ColorDesc::WHITE), Ok(ColorDesc::linear(0.0, 0.5, 2.0))));
+        for bad in ["", "white", "#fff", "ffffff", "#gggggg", "1,2", "1,2,3,4", "-1,0,0", "nan,0,0", "1e7,0,0", "0.5"] {
+            assert!(color(bad).is_err(), "{bad}");
+        }
+    }
+
+    #[test]
+    fn a_view_is_a_name_or_two_angles() {
+        assert_eq!((view("left"), view("-30,15.5")), (Ok(View::new(-90.0, 0.0)), Ok(View::new(-30.0, 15.5))));
+        for bad in ["", "Left", "above", "30", "1,2,3", "0,91", "361,0", "nan,0", "inf,0"] {
+            assert!(view(bad).is_err(), "{bad}");
+        }
+        assert!(margin("0").is_ok() && margin("0.45").is_ok() && margin("0.5").is_err() && margin("-0.1").is_err());
     }
 
     #[test]

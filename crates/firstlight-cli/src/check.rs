@@ -14,6 +14,7 @@ pub fn run(args: &CheckArgs) -> Result<(), Failure> {
     let input = input::read(&args.scene.scene, &args.scene.reading)?;
     let compiled = input.compile(0.0, false)?;
     show_diagnostics(&compiled.warnings);
+    input.tell_added(&compiled);
     // As much of the output as the text alone says
     if let Some(path) = &input.parsed.output {
         output::format_of_course(&input.name, Path::new(path))?;

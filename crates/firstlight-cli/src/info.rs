@@ -3,7 +3,9 @@
 use std::fmt::Write;
 use std::ops::ControlFlow;
 
-use firstlight::{DVec3, DisplayEncoding, Frame, Projection, SamplesDesc, Scene, SceneDesc, read_mesh};
+use firstlight::{
+    CameraDesc, Compiled, DVec3, DisplayEncoding, Frame, Projection, SamplesDesc, Scene, SceneDesc, read_mesh,
+};
 use serde_json::{Map, Value, json};
 
 use crate::args::InfoArgs;
@@ -21,7 +23,8 @@ pub fn run(args: &InfoArgs) -> Result<(), Failure> {
     }
     let compiled = input.compile(args.time.unwrap_or(0.0), false)?;
     show_diagnostics(&compiled.warnings);
-    let info = gather(&input.name, &input.parsed.desc, &compiled.scene);
+    input.tell_added(&compiled);
+    let info = gather(&input.name, &input.parsed.desc, &compiled);
     answer(&if args.json { format!("{info:#}\n") } else { text(&info) })
 }
 
@@ -107,7 +110,8 @@ fn model_text(info: &Value) -> String {
 }
 
 /// Everything there is to say, as JSON; the text is made from it.
-fn gather(name: &str, desc: &SceneDesc, scene: &Scene) -> Value {
+fn gather(name: &str, desc: &SceneDesc, compiled: &Compiled) -> Value {
+    let (scene, added) = (&compiled.scene, &compiled.added);
     let summary = scene.summary();
     let render = &desc.render;
     let display = match render.display {
@@ -126,7 +130,10 @@ fn gather(name: &str, desc: &SceneDesc, scene: &Scene) -> Value {
             "display": display,
         },
         "time": scene.time(),
-        "camera": camera(desc, scene),
+        "camera": match &added.camera {
+            Some(found) => found_camera(found, scene),
+            None => camera(desc, scene),
+        },
         "cameras": desc.cameras.iter().map(|(name, _)| name).collect::<Vec<_>>(),
         "shapes": summary.shapes.iter().map(|(kind, count)| ((*kind).to_owned(), json!(count))).collect::<Map<_, _>>(),
         "groups": list_of(&summary.groups, |(name, shapes)| json!({ "name": name, "shapes": shapes })),
@@ -178,33 +185,40 @@ fn coordinate(c: f64, size: f64) -> f64 {
 fn camera(desc: &SceneDesc, scene: &Scene) -> Value {
     let named = |name: &String| desc.cameras.iter().find(|(known, _)| known == name);
     let chosen = desc.render.camera.as_ref().map_or(desc.cameras.first(), named);
-    chosen.map_or(Value::Null, |(name, camera)| {
-        let mut value =
-            json!({ "name": name, "position": camera.position, "look_at": camera.look_at, "up": camera.up });
-        if camera.transform.is_some() {
-            // Where that has brought it
-            let Frame { position, forward, up, .. } = scene.camera().frame();
-            let list = |v: &firstlight::Vec3| json!(v.to_array().map(shortest));
-            let position =
-                position.to_array().map(|c| if scene.origin() == DVec3::ZERO { shortest(c as f32) } else { c });
-            value = json!({ "name": name, "position": position, "forward": list(forward), "up": list(up) });
+    chosen.map_or(Value::Null, |(name, camera)| of_camera(name, camera, scene))
+}
+
+/// The camera that was found for a scene without one.
+fn found_camera(found: &CameraDesc, scene: &Scene) -> Value {
+    let mut value = of_camera("", found, scene);
+    value["found"] = json!(true);
+    value
+}
+
+fn of_camera(name: &str, camera: &CameraDesc, scene: &Scene) -> Value {
+    let mut value = json!({ "name": name, "position": camera.position, "look_at": camera.look_at, "up": camera.up });
+    if camera.transform.is_some() {
+        // Where that has brought it
+        let Frame { position, forward, up, .. } = scene.camera().frame();
+        let list = |v: &firstlight::Vec3| json!(v.to_array().map(shortest));
+        let position = position.to_array().map(|c| if scene.origin() == DVec3::ZERO { shortest(c as f32) } else { c });
+        value = json!({ "name": name, "position": position, "forward": list(forward), "up": list(up) });
+    }
+    match (camera.projection, camera.focal_length_mm) {
+        (Projection::Orthographic, _) => {
+            value["projection"] = json!(camera.projection.name());
+            value["height"] = json!(camera.height);
         }
-        match (camera.projection, camera.focal_length_mm) {
-            (Projection::Orthographic, _) => {
-                value["projection"] = json!(camera.projection.name());
-                value["height"] = json!(camera.height);
-            }
-            (Projection::Perspective, Some(length)) => {
-                value["focal_length_mm"] = json!(length);
-                value["sensor_height_mm"] = json!(camera.sensor_height_mm.unwrap_or(24.0));
-            }
-            (Projection::Perspective, None) => value["fov_y_deg"] = json!(camera.fov_y_deg.unwrap_or(45.0)),
+        (Projection::Perspective, Some(length)) => {
+            value["focal_length_mm"] = json!(length);
+            value["sensor_height_mm"] = json!(camera.sensor_height_mm.unwrap_or(24.0));
         }
-        if camera.shift != [0.0; 2] {
-            value["shift"] = json!(camera.shift);
-        }
-        value
-    })
+        (Projection::Perspective, None) => value["fov_y_deg"] = json!(camera.fov_y_deg.unwrap_or(45.0)),
+    }
+    if camera.shift != [0.0; 2] {
+        value["shift"] = json!(camera.shift);
+    }
+    value
 }
 
 /// The same for people: a line for each thing.

@@ -1,19 +1,21 @@
 //! Where a scene comes from: a file, standard input, or the program itself.
 
 use std::collections::HashMap;
+use std::ffi::{OsStr, OsString};
 use std::fs::File;
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 
 use firstlight::{
-    AssetError, Assets, CompileOptions, Compiled, FolderAssets, ModelSettings, NoAssets, Parsed, SceneDesc, UpAxis,
-    builtin_scenes, is_point_set,
+    AssetError, Assets, CompileOptions, Compiled, FolderAssets, Framing, ModelSettings, NoAssets, Parsed, SceneDesc,
+    UpAxis, builtin_scenes, is_point_set,
 };
 
 use crate::args::{Axis, ReadingArgs};
+use crate::output::Names;
 use crate::progress::loading;
-use crate::report::{Failure, shown};
+use crate::report::{Failure, say, shown};
 use crate::scenes;
 
 /// No scene text is longer, in bytes. Meshes and pictures are files of their own.
@@ -23,14 +25,16 @@ const TEXT_LIMIT: u64 = 64 << 20;
 pub struct Input {
     /// What messages call it: the path as written, the built-in name, `<stdin>` or `<stdin>.json`.
     pub name: String,
-    /// What its pictures are called, without an ending.
-    pub stem: PathBuf,
     /// The description, and the faults of its text.
     pub parsed: Parsed,
     /// Whether it is a model by itself, for which a camera and a light are found.
     pub is_model: bool,
     /// The scene's or model's own file, as it was named; standard input may be one too.
     own: Option<PathBuf>,
+    /// The folder that the names of its files start at; a built-in scene has none.
+    pub folder: Option<PathBuf>,
+    /// How a camera that is found for it frames what it sees.
+    pub framing: Framing,
     assets: Remembered,
     strict: bool,
 }
@@ -81,26 +85,20 @@ pub fn read(scene: &Path, reading: &ReadingArgs) -> Result<Input, Failure> {
     if is_model(scene) {
         return read_model(scene, reading);
     }
-    for (option, said) in [("--smooth", reading.smooth.is_some()), ("--up", reading.up.is_some())] {
-        if said {
-            let scene = shown(scene);
-            return Err(Failure::Usage(format!("{option} is for models, and {scene} is none (.ply, .stl, .obj)")));
-        }
-    }
-    let (name, stem, text, folder) = if scene == "-" {
+    refuse_options_of_models(scene, reading)?;
+    let (name, text, folder) = if scene == "-" {
         let text = read_limited(io::stdin().lock()).map_err(|why| Failure::Work(format!("standard input: {why}")))?;
         // A name tells JSON from TOML; no TOML begins with a brace. A byte order mark is no part of the text
         let marked = text.strip_prefix(b"\xef\xbb\xbf").unwrap_or(&text);
         let json = marked.trim_ascii_start().starts_with(b"{");
         let name = if json { "<stdin>.json" } else { "<stdin>" };
-        (name.to_owned(), PathBuf::from("scene"), text, Some(PathBuf::new()))
+        (name.to_owned(), text, Some(PathBuf::new()))
     } else if let Some(builtin) = builtin_scenes().iter().find(|builtin| scene == builtin.name) {
-        (builtin.name.to_owned(), PathBuf::from(builtin.name), builtin.text.as_bytes().to_vec(), None)
+        (builtin.name.to_owned(), builtin.text.as_bytes().to_vec(), None)
     } else {
         let name = scene.display().to_string();
         let text = read_file(scene).map_err(|why| Failure::Work(format!("{}: {why}", shown(scene))))?;
-        let stem = scene.file_stem().map_or_else(|| PathBuf::from("scene"), PathBuf::from);
-        (name, stem, text, Some(scene.parent().map(Path::to_path_buf).unwrap_or_default()))
+        (name, text, Some(scene.parent().map(Path::to_path_buf).unwrap_or_default()))
     };
 
     // A scene reads its own folder; a built-in scene has none
@@ -108,11 +106,26 @@ pub fn read(scene: &Path, reading: &ReadingArgs) -> Result<Input, Failure> {
         FolderAssets::new(folder, &reading.allow_dir)
             .map_err(|(path, e)| Failure::Work(format!("--allow-dir: {}: {e}", shown(&path))))
     };
-    let assets = Remembered::new(folder.map(|folder| allowed(&folder)).transpose()?);
+    let assets = Remembered::new(folder.as_deref().map(allowed).transpose()?);
     let parsed = SceneDesc::parse(&name, &text, &assets);
     let stdin = || cfg!(unix).then(|| PathBuf::from("/dev/stdin"));
     let own = if scene == "-" { stdin() } else { file_of(scene).map(Path::to_path_buf) };
-    Ok(Input { name, stem, parsed, is_model: false, own, assets, strict: reading.strict })
+    let framing = Framing::default();
+    Ok(Input { name, parsed, is_model: false, own, folder, framing, assets, strict: reading.strict })
+}
+
+/// Sees that options for models are said of models only.
+///
+/// # Errors
+/// `scene` is none.
+pub fn refuse_options_of_models(scene: &Path, reading: &ReadingArgs) -> Result<(), Failure> {
+    for (option, said) in [("--smooth", reading.smooth.is_some()), ("--up", reading.up.is_some())] {
+        if said && !is_model(scene) {
+            let scene = shown(scene);
+            return Err(Failure::Usage(format!("{option} is for models, and {scene} is none (.ply, .stl, .obj)")));
+        }
+    }
+    Ok(())
 }
 
 /// Whether `scene` names a model, by its ending.
@@ -144,9 +157,10 @@ fn read_model(path: &Path, reading: &ReadingArgs) -> Result<Input, Failure> {
     let called = file.to_string_lossy().into_owned();
     Ok(Input {
         name: path.display().to_string(),
-        stem: path.file_stem().map_or_else(|| PathBuf::from("model"), PathBuf::from),
         parsed: SceneDesc::of_model(&called, &settings).into(),
         is_model: true,
+        folder: Some(folder),
+        framing: Framing::default(),
         own: Some(path.to_path_buf()),
         assets: Remembered { model: Some((called, file)), ..Remembered::new(Some(assets)) },
         strict: reading.strict,
@@ -159,7 +173,39 @@ pub fn file_of(scene: &Path) -> Option<&Path> {
     is_file.then_some(scene)
 }
 
+/// What the placeholders in the names of its outputs stand for.
+pub fn names_of(scene: &Path) -> Names {
+    let builtin_or_stdin = file_of(scene).is_none();
+    let whole = |part: Option<&OsStr>| part.map_or_else(|| OsString::from("scene"), OsStr::to_owned);
+    if scene == "-" {
+        return Names { stem: whole(None), name: whole(None) };
+    }
+    let name = whole(scene.file_name());
+    Names { stem: if builtin_or_stdin { name.clone() } else { whole(scene.file_stem()) }, name }
+}
+
+/// No course file that anybody writes is longer, in bytes.
+const COURSE_LIMIT: u64 = 1 << 16;
+
+/// The `output_file` that a course file names; `None` for all other scenes, and for what cannot be read.
+pub fn course_output(scene: &Path) -> Option<String> {
+    let file = file_of(scene).filter(|file| !is_model(file))?;
+    let is_short = file.metadata().is_ok_and(|meta| meta.is_file() && meta.len() <= COURSE_LIMIT);
+    let text = if is_short { read_file(file).ok()? } else { return None };
+    SceneDesc::parse(&file.display().to_string(), &text, &NoAssets).output
+}
+
 impl Input {
+    /// Says that a camera was found, where a scene's text has none; a model never has one.
+    pub fn tell_added(&self, compiled: &Compiled) {
+        if compiled.added.camera.is_some() && !self.is_model {
+            let name = &self.name;
+            say(format_args!(
+                "note: {name} has no camera; one was found that sees all of it (--view, --margin, --print-scene)"
+            ));
+        }
+    }
+
     /// The bytes of the model's own file.
     ///
     /// # Errors
@@ -187,7 +233,8 @@ impl Input {
     /// Every fault of text and meaning.
     pub fn compile(&self, time: f64, quiet: bool) -> Result<Compiled, Failure> {
         let progress = (!quiet).then(loading);
-        let options = CompileOptions { strict: self.strict, time, complete: self.is_model, progress };
+        let options =
+            CompileOptions { strict: self.strict, time, framing: self.framing, light: self.is_model, progress };
         self.parsed.compile(&self.assets, &options).map_err(|e| Failure::Scene(e.faults))
     }
 }

@@ -11,12 +11,21 @@ use crate::args::{Bits, NamedFormat};
 use crate::report::{Failure, say, shown};
 
 /// A place for bytes.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub enum Target {
     /// Standard output.
     Stdout,
     /// A file, or a device.
     File(PathBuf),
+}
+
+/// What the placeholders in the names of outputs stand for.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Names {
+    /// The scene's file name without its ending: `{stem}`.
+    pub stem: OsString,
+    /// The whole of it: `{name}`.
+    pub name: OsString,
 }
 
 /// A picture to be written.
@@ -57,6 +66,19 @@ impl Target {
         if path == "-" { Target::Stdout } else { Target::File(path.to_path_buf()) }
     }
 
+    /// With the names of a scene in place of the placeholders.
+    pub fn of_scene(&self, names: &Names) -> Self {
+        match self {
+            Target::Stdout => Target::Stdout,
+            Target::File(path) => Target::File(filled(path, names)),
+        }
+    }
+
+    /// Whether it is another file for each scene.
+    fn has_placeholder(&self) -> bool {
+        matches!(self, Target::File(path) if path.to_str().is_some_and(|text| placeholder(text).is_some()))
+    }
+
     /// What messages call it.
     pub fn name(&self) -> String {
         match self {
@@ -66,7 +88,7 @@ impl Target {
     }
 
     /// The same for every name of one file.
-    fn real(&self) -> Self {
+    pub fn real(&self) -> Self {
         match self {
             Target::Stdout => Target::Stdout,
             Target::File(path) => Target::File(real(path)),
@@ -161,7 +183,65 @@ fn failed(e: ImageError) -> Failure {
     Failure::Work(e.to_string())
 }
 
+/// The first placeholder of a text: where it stands, and whether it is `{stem}`.
+fn placeholder(text: &str) -> Option<(std::ops::Range<usize>, bool)> {
+    let found = |word: &str| text.find(word).map(|at| (at..at + word.len(), word == STEM));
+    [found(STEM), found(NAME)].into_iter().flatten().min_by_key(|(range, _)| range.start)
+}
+
+const STEM: &str = "{stem}";
+const NAME: &str = "{name}";
+
+/// The path with the names of a scene in place of the placeholders. A path that is no text has none.
+fn filled(path: &Path, names: &Names) -> PathBuf {
+    let Some(mut rest) = path.to_str() else { return path.to_path_buf() };
+    let mut filled = OsString::new();
+    while let Some((range, is_stem)) = placeholder(rest) {
+        filled.push(&rest[..range.start]);
+        filled.push(if is_stem { &names.stem } else { &names.name });
+        rest = &rest[range.end..];
+    }
+    filled.push(rest);
+    filled.into()
+}
+
+/// Sees that words in braces are placeholders, and that each of several scenes has its own output.
+///
+/// # Errors
+/// What to write instead.
+pub fn check_placeholders(option: &str, target: &Target, several: bool) -> Result<(), Failure> {
+    let name = target.name();
+    let words = name.split('{').skip(1).filter_map(|part| part.split_once('}')).map(|(word, _)| word);
+    let is_word = |word: &&str| !word.is_empty() && word.bytes().all(|b| b.is_ascii_lowercase());
+    if let Some(word) = words.filter(is_word).find(|word| !["stem", "name"].contains(word)) {
+        let message =
+            format!("{option} {name}: {{{word}}} stands for nothing; {STEM} and {NAME} are those of the scene's file");
+        return Err(Failure::Usage(message));
+    }
+    if several && *target == Target::Stdout {
+        return Err(Failure::Usage(format!(
+            "{option} - takes one scene, and several are given; name files, as '{STEM}.png'"
+        )));
+    }
+    if several && !target.has_placeholder() {
+        let own = Path::new(&name);
+        let ending = own.extension().map(|ending| format!(".{}", ending.to_string_lossy())).unwrap_or_default();
+        let own = shown(&own.with_file_name(format!("{STEM}{ending}")));
+        let message = format!(
+            "{option} {name} would be one file for several scenes; write '{own}', where {STEM} is the name of each scene \
+             without its ending ({NAME}: with it)"
+        );
+        return Err(Failure::Usage(message));
+    }
+    Ok(())
+}
+
 impl Output {
+    /// With the names of a scene in place of the placeholders.
+    pub fn of_scene(&self, names: &Names) -> Output {
+        Output { target: self.target.of_scene(names), ..self.clone() }
+    }
+
     /// Where the frame of that number goes.
     pub fn of_frame(&self, frame: u32) -> Output {
         let target = match &self.target {
@@ -428,6 +508,27 @@ pub fn with_bits(format: Format, bits: Option<Bits>) -> Format {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn placeholders_are_the_names_of_the_scene() {
+        let names = Names { stem: "a{name}".into(), name: "a.ply".into() };
+        for (path, expected) in [
+            ("{stem}.png", "a{name}.png"),
+            ("{name}/{stem}{stem}.png", "a.ply/a{name}a{name}.png"),
+            ("{}{Stem}{stem.png", "{}{Stem}{stem.png"),
+        ] {
+            assert_eq!(filled(Path::new(path), &names), Path::new(expected), "{path}");
+        }
+        let check = |path: &str, several| check_placeholders("-o", &Target::of(Path::new(path)), several);
+        assert!(
+            check("{stem}.png", true).is_ok()
+                && check("a/{name}/x.png", true).is_ok()
+                && check("{A}{}.png", false).is_ok()
+        );
+        for (path, several) in [("a.png", true), ("-", true), ("{frame}.png", false), ("{stem}_{x}.png", true)] {
+            assert!(check(path, several).is_err(), "{path}");
+        }
+    }
 
     #[test]
     fn a_frame_has_its_number_in_its_name() {

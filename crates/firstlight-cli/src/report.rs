@@ -32,15 +32,34 @@ pub enum Failure {
         /// Frames that were asked for.
         all: usize,
     },
+    /// Some of several scenes could not be rendered, and what was wrong with each has been said: exit code 1.
+    Several {
+        /// What messages call those that failed.
+        failed: Vec<String>,
+        /// How many there are.
+        all: usize,
+    },
+    /// Stopped while one of several scenes was rendered: exit code 130.
+    InterruptedIn {
+        /// What it is called.
+        scene: String,
+        /// How many were rendered before it.
+        done: usize,
+        /// How many there are.
+        all: usize,
+    },
 }
 
 impl Failure {
     /// The program's exit code.
     pub fn exit_code(&self) -> ExitCode {
         ExitCode::from(match self {
-            Failure::Work(_) | Failure::Scene(_) => 1,
+            Failure::Work(_) | Failure::Scene(_) | Failure::Several { .. } => 1,
             Failure::Usage(_) => 2,
-            Failure::Interrupted | Failure::InterruptedWriting(_) | Failure::InterruptedAfter { .. } => 130,
+            Failure::Interrupted
+            | Failure::InterruptedWriting(_)
+            | Failure::InterruptedAfter { .. }
+            | Failure::InterruptedIn { .. } => 130,
         })
     }
 
@@ -62,6 +81,13 @@ impl Failure {
             }
             Failure::InterruptedAfter { done, all } => {
                 say(format_args!("interrupted; {done} of {all} frames were written, each of them whole"));
+            }
+            Failure::Several { failed, all } => {
+                let (count, names) = (failed.len(), clean(&failed.join(", ")));
+                say(format_args!("{} of {all} scenes were rendered; {count} could not be: {names}", all - count));
+            }
+            Failure::InterruptedIn { scene, done, all } => {
+                say(format_args!("interrupted in {}; {done} of {all} scenes were rendered before it", clean(scene)));
             }
         }
     }

@@ -163,8 +163,10 @@ fn is_near(desc: &SceneDesc, scene: &Scene, [i, j]: [u32; 2]) -> bool {
     let is_near = |light: &LightDesc| {
         let (size, distance): (f64, Box<dyn Fn(V) -> f64>) = match light {
             LightDesc::Rectangle(light) if light.falloff == Falloff::Physical => {
-                let [a, b] = [light.e0, light.e1].map(length);
-                let (u, v, center) = (unit(light.e0), unit(light.e1), light.center);
+                let (e0, e1) =
+                    light.e0.zip(light.e1).expect("scenes that are verified say their rectangles by e0 and e1");
+                let [a, b] = [e0, e1].map(length);
+                let (u, v, center) = (unit(e0), unit(e1), light.center);
                 let n = unit(cross(u, v));
                 let beyond = |x: f64, half: f64| (x.abs() - half).max(0.0);
                 let far = move |p: V| {
@@ -174,7 +176,9 @@ fn is_near(desc: &SceneDesc, scene: &Scene, [i, j]: [u32; 2]) -> bool {
                 (a.max(b), Box::new(far))
             }
             LightDesc::Disk(light) if light.falloff == Falloff::Physical => {
-                let (n, center, radius) = (unit(light.normal), light.center, light.radius);
+                let said = light.normal.zip(light.radius);
+                let (normal, radius) = said.expect("scenes that are verified say their disks by normal and radius");
+                let (n, center) = (unit(normal), light.center);
                 let far = move |p: V| {
                     let d = sub(p, center);
                     let height = dot(d, n);

@@ -273,16 +273,16 @@ impl Stage {
             _ => lamp.center,
         };
         macro_rules! light {
-            ($kind:ident, $desc:ident($($argument:expr),*)) => {
+            ($kind:ident, $desc:ident::$new:ident($($argument:expr),*)) => {
                 LightDesc::$kind($desc {
                     color, strength, falloff, sides, visible, blocks,
-                    ..$desc::new($($argument),*)
+                    ..$desc::$new($($argument),*)
                 })
             };
         }
         match random.below(8) {
-            0 | 1 => light!(Disk, DiskLightDesc(center, lamp.front, lamp.reach)),
-            2 | 3 => light!(Sphere, SphereLightDesc(center, lamp.reach)),
+            0 | 1 => light!(Disk, DiskLightDesc::with_normal(center, lamp.front, lamp.reach)),
+            2 | 3 => light!(Sphere, SphereLightDesc::new(center, lamp.reach)),
             _ => {
                 // e0 x e1 is the front
                 let [a, b] = across(lamp.front);
@@ -290,7 +290,7 @@ impl Stage {
                 let turn = radians(random.between(0.0, 360.0));
                 let (sin, cos) = if random.chance(0.5) { (0.0, 1.0) } else { pxfm::f_sincos(turn) };
                 let (a, b) = (add(mul(a, cos), mul(b, sin)), sub(mul(b, cos), mul(a, sin)));
-                light!(Rectangle, RectangleDesc(center, mul(a, 2.0 * lamp.reach), mul(b, wide)))
+                light!(Rectangle, RectangleDesc::with_edges(center, mul(a, 2.0 * lamp.reach), mul(b, wide)))
             }
         }
     }

@@ -459,23 +459,27 @@ impl Place {
                 let sides = random.pick(&[None, None, Some(EmitSides::Front), Some(EmitSides::Both)]);
                 let (visible, blocks, seed) = (random.chance(0.7), random.chance(0.3), random.below(100));
                 macro_rules! light {
-                    ($kind:ident, $area:expr, $desc:ident($($argument:expr),*)) => {
+                    ($kind:ident, $area:expr, $desc:ident::$new:ident($($argument:expr),*)) => {
                         LightDesc::$kind($desc {
                             color, strength: over($area), falloff, sides, visible, blocks, shadows, samples, set, seed,
-                            ..$desc::new($($argument),*)
+                            ..$desc::$new($($argument),*)
                         })
                     };
                 }
                 let kind = random.below(4);
                 if kind == 0 {
                     let (center, radius) = self.ball_frame(random, scene, at);
-                    return light!(Sphere, radius * radius, SphereLightDesc(center, radius));
+                    return light!(Sphere, radius * radius, SphereLightDesc::new(center, radius));
                 }
                 let ([e0, e1], center) = self.rectangle_frame(random, scene, at);
                 let area = length(cross(e0, e1));
                 match kind {
-                    1 => light!(Disk, area, DiskLightDesc(center, cross(unit(e0), unit(e1)), area.sqrt() * 0.5)),
-                    _ => light!(Rectangle, area, RectangleDesc(center, e0, e1)),
+                    1 => light!(
+                        Disk,
+                        area,
+                        DiskLightDesc::with_normal(center, cross(unit(e0), unit(e1)), area.sqrt() * 0.5)
+                    ),
+                    _ => light!(Rectangle, area, RectangleDesc::with_edges(center, e0, e1)),
                 }
             }
         }

@@ -119,7 +119,7 @@ pub fn spot(position: V, look_at: V, cone_deg: f64, inner_cone_deg: Option<f64>,
 
 /// Physical, strength 1, invisible, with `samples` points of `set`.
 pub fn rectangle(center: V, e0: V, e1: V, set: SampleSet, samples: u32) -> RectangleDesc {
-    RectangleDesc { visible: false, samples: Some(samples.into()), set, ..RectangleDesc::new(center, e0, e1) }
+    RectangleDesc { visible: false, samples: Some(samples.into()), set, ..RectangleDesc::with_edges(center, e0, e1) }
 }
 
 pub fn matte(diffuse: f64) -> MaterialDesc {

@@ -45,7 +45,7 @@ fn scene(width: u32, height: u32) -> SceneDesc {
     let camera = CameraDesc { look_at: [0.0, 0.9, 0.0], fov_y_deg: Some(32.0), ..CameraDesc::new([2.5, 3.4, 6.0]) };
     desc.cameras.push((String::new(), camera));
     // A square light of 2 m x 2 m that faces down: the front is where e0 x e1 points
-    let lamp = RectangleDesc::new([-2.0, 5.0, 2.0], [2.0, 0.0, 0.0], [0.0, 0.0, 2.0]);
+    let lamp = RectangleDesc::with_edges([-2.0, 5.0, 2.0], [2.0, 0.0, 0.0], [0.0, 0.0, 2.0]);
     desc.lights.push(LightDesc::Rectangle(RectangleDesc { strength: 28.0, ..lamp }));
     // Textures and materials have names, and others refer to them
     let tiles = CheckerboardDesc { counts: [2, 2], colors: [ColorDesc::gray(0.75), ColorDesc::linear(0.2, 0.3, 0.4)] };

@@ -26,10 +26,10 @@ fn main() -> Result<(), Box<dyn Error>> {
 fn turn(model: &Path, folder: &Path, pictures: u32, size: u32) -> Result<(), Box<dyn Error>> {
     let name = model.file_name().and_then(|name| name.to_str()).ok_or("the model's file has no name")?;
     let assets = FolderAssets::new(model.parent().unwrap_or(Path::new("")), &[]).map_err(|(_, why)| why)?;
-    // A scene around the model. `complete` gives it a light, and a camera, which is replaced below
+    // A scene around the model. It is given a light, and a camera, which is replaced below
     let mut desc = SceneDesc::of_model(name, &ModelSettings { smooth_deg: Some(60.0), ..ModelSettings::default() });
     (desc.render.width, desc.render.height) = (size, size);
-    let options = CompileOptions { complete: true, ..CompileOptions::default() };
+    let options = CompileOptions { light: true, ..CompileOptions::default() };
     // Compiled once: the model is read and its tree built here and nowhere else
     let scene = desc.compile(&assets, &options)?.scene;
     let [low, high] = scene.summary().bounds.ok_or("the model is empty")?.map(DVec3::from);

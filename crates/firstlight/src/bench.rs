@@ -192,7 +192,7 @@ impl Soft {
         let mut mesh = crate::MeshDesc { triangles: triangles.to_vec(), ..crate::MeshDesc::default() };
         mesh.positions = positions.iter().map(|p| p.map(f64::from)).collect();
         let side = f64::from(light.1) * 2.0;
-        let mut lamp = crate::RectangleDesc::new(light.0.map(f64::from), [side, 0.0, 0.0], [0.0, 0.0, side]);
+        let mut lamp = crate::RectangleDesc::with_edges(light.0.map(f64::from), [side, 0.0, 0.0], [0.0, 0.0, side]);
         lamp.samples = Some(samples.into());
         lamp.sides = Some(crate::EmitSides::Both);
         lamp.visible = false;

@@ -93,11 +93,11 @@ pub use math::{DVec3, ShadowRay, Vec2, Vec3, WorldRay};
 pub use render::{
     AaMode, Film, Heat, LightCounts, RenderSettings, RenderStats, SimdLevel, VisibilityMode, render, render_image,
 };
-pub use scene::{Builtin, Parsed, builtin_scenes, reference, schema};
 pub use scene::{
-    CameraHit, CompileOptions, Compiled, DisplayEncoding, Hit, ModelSettings, RenderDesc, Scene, SceneDesc,
-    SceneSummary, SurfacePoint, UpAxis,
+    Added, CameraHit, CompileOptions, Compiled, DisplayEncoding, Framing, Hit, ModelSettings, RenderDesc, Scene,
+    SceneDesc, SceneSummary, SurfacePoint, UpAxis, View,
 };
+pub use scene::{Builtin, Parsed, builtin_scenes, reference, schema};
 pub use shape::RectangleDesc as RectangleShapeDesc;
 pub use shape::{
     BoxDesc, ConeDesc, CylinderDesc, DiskDesc, Footprint, GroupDesc, InstanceDesc, MeshDesc, ParallelogramDesc,

@@ -6,8 +6,10 @@ mod book;
 mod common;
 mod faults;
 mod files;
+mod found;
 mod frames;
 mod pictures;
+mod several;
 #[cfg(unix)]
 mod signals;
 mod streams;

@@ -3,6 +3,7 @@
 mod course;
 mod far;
 mod files;
+mod framing;
 mod fuzz_corpus;
 mod golden;
 mod images;

@@ -2,6 +2,7 @@
 
 use firstlight::*;
 use proptest::collection::{hash_map, vec};
+use proptest::option;
 use proptest::prelude::*;
 use proptest::sample::select;
 
@@ -273,10 +274,28 @@ fn light() -> impl Strategy<Value = LightDesc> {
                 .boxed()
         };
     }
-    let edges = [vector(), vector(), vector()];
-    let rectangle = area!(Rectangle, edges.prop_map(|[center, e0, e1]| RectangleDesc::new(center, e0, e1)));
-    let round = ([vector(), vector()], number());
-    let disk = area!(Disk, round.prop_map(|([center, normal], radius)| DiskLightDesc::new(center, normal, radius)));
+    let edges = [option::of(vector()), option::of(vector())];
+    let facing = [option::of(vector()), option::of(vector()), option::of(vector())];
+    let flat = (vector(), edges, option::of([number(), number()]), facing);
+    let flat = flat.prop_map(|(center, [e0, e1], size, [look_at, normal, up])| RectangleDesc {
+        e0,
+        e1,
+        size,
+        look_at,
+        normal,
+        up,
+        ..RectangleDesc::new(center)
+    });
+    let rectangle = area!(Rectangle, flat);
+    let round = (vector(), [option::of(vector()), option::of(vector())], [option::of(number()), option::of(number())]);
+    let round = round.prop_map(|(center, [normal, look_at], [radius, size])| DiskLightDesc {
+        normal,
+        look_at,
+        radius,
+        size,
+        ..DiskLightDesc::new(center)
+    });
+    let disk = area!(Disk, round);
     let ball = (vector(), number());
     let sphere = area!(Sphere, ball.prop_map(|(center, radius)| SphereLightDesc::new(center, radius)));
     prop_oneof![point.boxed(), directional.boxed(), spot.boxed(), rectangle, disk, sphere]

@@ -375,8 +375,9 @@ fn splitting_a_light_changes_nothing() {
     // The middles of 16 x 16 cells are those of 4 x 4 lights with 4 x 4 cells each, and of 2 x 8 with 8 x 2
     let whole = rectangle([0.5, 3.0, 0.3], [0.0, 0.0, 2.0], [2.0, 0.0, 0.0], SampleSet::Grid, 256);
     let parts = |n: u32| {
-        let (a, b) = (mul(whole.e0, 1.0 / n as f64), mul(whole.e1, 1.0 / n as f64));
-        let corner = sub(whole.center, mul(add(whole.e0, whole.e1), 0.5));
+        let (e0, e1) = (whole.e0.unwrap(), whole.e1.unwrap());
+        let (a, b) = (mul(e0, 1.0 / n as f64), mul(e1, 1.0 / n as f64));
+        let corner = sub(whole.center, mul(add(e0, e1), 0.5));
         let mut lights = Vec::new();
         for i in 0..n {
             for j in 0..n {

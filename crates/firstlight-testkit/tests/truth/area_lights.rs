@@ -12,7 +12,11 @@ pub(crate) const DOWN: V = [0.0, -1.0, 0.0];
 
 /// Physical, strength 1, invisible.
 pub(crate) fn disk(center: V, normal: V, radius: f64, samples: u32) -> DiskLightDesc {
-    DiskLightDesc { visible: false, samples: Some(samples.into()), ..DiskLightDesc::new(center, normal, radius) }
+    DiskLightDesc {
+        visible: false,
+        samples: Some(samples.into()),
+        ..DiskLightDesc::with_normal(center, normal, radius)
+    }
 }
 
 /// Physical, strength 1, invisible.
@@ -142,7 +146,7 @@ fn seen(light: LightDesc, eye: V, target: V) -> Option<f32> {
 #[test]
 fn the_camera_sees_sides_that_emit() {
     for (sides, front_only) in [(None, true), (Some(EmitSides::Both), false)] {
-        let lamp = DiskLightDesc { sides, strength: 3.0, ..DiskLightDesc::new([0.0, 1.0, 0.0], DOWN, 0.5) };
+        let lamp = DiskLightDesc { sides, strength: 3.0, ..DiskLightDesc::with_normal([0.0, 1.0, 0.0], DOWN, 0.5) };
         let at = |x: f64, y: f64| seen(LightDesc::Disk(lamp.clone()), [x, y, 0.0], [x, 1.0, 0.0]);
         assert_eq!((at(0.49, 0.0), at(0.51, 0.0)), (Some(3.0), None));
         assert_eq!(at(0.1, 2.0), if front_only { None } else { Some(3.0) });

@@ -118,7 +118,7 @@ fn assert_near(is: f64, should: f64, allowed: f64, what: &str) {
 }
 
 fn rectangle_light(center: V, e0: V, e1: V) -> LightDesc {
-    LightDesc::Rectangle(RectangleDesc { visible: false, ..RectangleDesc::new(center, e0, e1) })
+    LightDesc::Rectangle(RectangleDesc { visible: false, ..RectangleDesc::with_edges(center, e0, e1) })
 }
 
 fn ball(center: V, radius: f64) -> LightDesc {
@@ -163,7 +163,7 @@ fn disks_have_their_closed_form() {
     for (r, h, d) in
         [(1.0, 2.0, 0.0), (1.0, 2.0, 1.5), (3.0, 1.0, 0.5), (0.01, 2.0, 1.0), (2.0, 0.5, 3.0), (1.0, 0.1, 0.9)]
     {
-        let light = DiskLightDesc { visible: false, ..DiskLightDesc::new([d, h, 0.0], DOWN, r) };
+        let light = DiskLightDesc { visible: false, ..DiskLightDesc::with_normal([d, h, 0.0], DOWN, r) };
         let truth = disk_overhead(r, h, d);
         let allowed = truth * if h < 0.3 * r { CLOSED_AND_NEAR } else { CLOSED };
         assert_near(on_the_floor(&LightDesc::Disk(light)), truth, allowed, &format!("disk {r}, {h}, {d}"));
@@ -202,15 +202,15 @@ fn rectangles_have_lamberts_form() {
             assert_near(truth, 1.7408395, 5e-8, "the published number");
         }
         for light in [
-            RectangleDesc { sides: Some(EmitSides::Both), visible: false, ..RectangleDesc::new(center, e0, e1) },
+            RectangleDesc { sides: Some(EmitSides::Both), visible: false, ..RectangleDesc::with_edges(center, e0, e1) },
             // The same, in two parts
             RectangleDesc {
                 sides: Some(EmitSides::Both),
                 visible: false,
-                ..RectangleDesc::new(sub(center, mul(e0, 0.25)), mul(e0, 0.5), e1)
+                ..RectangleDesc::with_edges(sub(center, mul(e0, 0.25)), mul(e0, 0.5), e1)
             },
         ] {
-            let part = light.e0 != e0;
+            let part = light.e0 != Some(e0);
             let mut is = on_the_floor(&LightDesc::Rectangle(light.clone()));
             if part {
                 let other = RectangleDesc { center: add(center, mul(e0, 0.25)), ..light };
@@ -333,7 +333,7 @@ fn frame(time: f64, thing: &ShapeDesc) -> SceneDesc {
         LightDesc::Disk(DiskLightDesc {
             falloff: Falloff::Constant,
             strength: 0.25,
-            ..DiskLightDesc::new([-2.0, 3.0, -1.0], [0.5, -1.0, 0.2], 0.6)
+            ..DiskLightDesc::with_normal([-2.0, 3.0, -1.0], [0.5, -1.0, 0.2], 0.6)
         }),
     ];
     let mut floor = square([0.0; 3], UP, 4.0);
@@ -418,12 +418,15 @@ fn a_light_in_the_plane_of_a_surface_sends_nothing_to_it() {
     let [a, b] = across(normal);
     let on = |x: f64, y: f64| add([0.3, -1.7, 2.9], add(mul(a, x), mul(b, y)));
     let eye = |p: V| add(p, add(mul(normal, 0.4), mul(a, 0.3)));
-    let disk =
-        DiskLightDesc { falloff: Falloff::Constant, visible: false, ..DiskLightDesc::new(on(0.7, 0.4), normal, 2.6) };
+    let disk = DiskLightDesc {
+        falloff: Falloff::Constant,
+        visible: false,
+        ..DiskLightDesc::with_normal(on(0.7, 0.4), normal, 2.6)
+    };
     let plate = RectangleDesc {
         falloff: Falloff::Constant,
         visible: false,
-        ..RectangleDesc::new(on(-1.3, 0.2), mul(a, 1.7), mul(b, 0.9))
+        ..RectangleDesc::with_edges(on(-1.3, 0.2), mul(a, 1.7), mul(b, 0.9))
     };
     let shiny = blinn_phong(firstlight::ColorParam::gray(0.5), firstlight::ColorParam::gray(0.5), 2.0);
     for light in [LightDesc::Disk(disk), LightDesc::Rectangle(plate)] {

@@ -104,7 +104,7 @@ fn lit(mut scene: SceneDesc, seed: u64, count: u32, kinds: Kinds) -> SceneDesc {
                     strength: strength / (side * side),
                     visible: false,
                     sides: Some(random.pick(&sides)),
-                    ..RectangleDesc::new(p, mul(a, side), mul(b, side))
+                    ..RectangleDesc::with_edges(p, mul(a, side), mul(b, side))
                 })
             }
         });

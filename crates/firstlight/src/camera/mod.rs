@@ -28,7 +28,8 @@ words! {
 }
 
 table! {
-    /// A camera: `[camera]`, or several as `[camera.NAME]`, of which `render.camera` or `--camera` names one.
+    /// A camera: `[camera]`, or several as `[camera.NAME]`, of which `render.camera` or `--camera` names one. A scene without a camera
+    /// is given one that sees all of its shapes.
     ///
     /// What a perspective camera sees is `fov_y_deg`, or `focal_length_mm` with `sensor_height_mm`; with neither it is 45
     /// degrees. What an orthographic camera sees is `height` metres.

@@ -25,6 +25,15 @@ impl ColorDesc {
         Self { linear: [r, g, b] }
     }
 
+    /// The colour of `#rrggbb`, which is sRGB.
+    pub fn from_hex(text: &str) -> Option<Self> {
+        let digits = text.strip_prefix('#').filter(|d| d.len() == 6 && d.bytes().all(|b| b.is_ascii_hexdigit()))?;
+        let channel = |i: usize| {
+            u8::from_str_radix(&digits[i..i + 2], 16).ok().map(|byte| Encoding::Srgb.decode(f64::from(byte) / 255.0))
+        };
+        Some(ColorDesc::linear(channel(0)?, channel(2)?, channel(4)?))
+    }
+
     /// The same linear value in all channels.
     pub const fn gray(v: f64) -> Self {
         Self::linear(v, v, v)
@@ -50,15 +59,6 @@ impl From<f64> for ColorDesc {
     fn from(v: f64) -> Self {
         Self::gray(v)
     }
-}
-
-/// The colour of `#rrggbb`.
-fn from_hex(text: &str) -> Option<ColorDesc> {
-    let digits = text.strip_prefix('#').filter(|d| d.len() == 6 && d.bytes().all(|b| b.is_ascii_hexdigit()))?;
-    let channel = |i: usize| {
-        u8::from_str_radix(&digits[i..i + 2], 16).ok().map(|byte| Encoding::Srgb.decode(f64::from(byte) / 255.0))
-    };
-    Some(ColorDesc::linear(channel(0)?, channel(2)?, channel(4)?))
 }
 
 impl Value for ColorDesc {
@@ -87,7 +87,7 @@ impl Value for ColorDesc {
             Data::Array(elements) if elements.len() == 3 => <[f64; 3]>::read(node, reader).map(Self::from),
             Data::Number(_) => f64::read(node, reader).map(Self::gray),
             Data::String(text) => {
-                let color = from_hex(text);
+                let color = Self::from_hex(text);
                 if color.is_none() {
                     let message = format!("{} is not a colour", quoted(text));
                     let hint = "a string colour is \"#\" and 6 hexadecimal digits, as \"#ff8000\"; \
@@ -444,14 +444,14 @@ mod tests {
 
     #[test]
     fn hex_colours_are_srgb() {
-        assert_eq!(from_hex("#ffffff"), Some(ColorDesc::WHITE));
-        assert_eq!(from_hex("#000000"), Some(ColorDesc::BLACK));
+        assert_eq!(ColorDesc::from_hex("#ffffff"), Some(ColorDesc::WHITE));
+        assert_eq!(ColorDesc::from_hex("#000000"), Some(ColorDesc::BLACK));
         // 188 of 255 is half of the light, the well-known middle of black and white
-        let half = from_hex("#bcbcbc").expect("is a colour").linear[0];
+        let half = ColorDesc::from_hex("#bcbcbc").expect("is a colour").linear[0];
         assert!((half - 0.502886).abs() < 1e-6, "{half}");
-        assert_eq!(from_hex("#0a0A0a").expect("is a colour").linear[0], 10.0 / 255.0 / 12.92);
+        assert_eq!(ColorDesc::from_hex("#0a0A0a").expect("is a colour").linear[0], 10.0 / 255.0 / 12.92);
         for bad in ["", "#", "ffffff", "#fff", "#ggffff", "#fffffff", "#\u{e4}\u{e4}\u{e4}", "red"] {
-            assert_eq!(from_hex(bad), None, "{bad}");
+            assert_eq!(ColorDesc::from_hex(bad), None, "{bad}");
         }
     }
 

@@ -7,7 +7,7 @@ use fearless_simd::{f32x16, prelude::*};
 
 use super::{Disk, EmitSides, Falloff, Light, LightKind, Rectangle, SampleSet, Sphere, scaled, way_error};
 use crate::color::Rgb;
-use crate::context::CompileContext;
+use crate::context::{CompileContext, show};
 use crate::describe::{ColorDesc, SamplesDesc};
 use crate::math::{DVec3, ErrorBound, LANES, Ray, Vec3, Vec3x16};
 use crate::shape::{Parallelogram, PlaneSide};
@@ -75,6 +75,36 @@ macro_rules! area_table {
 }
 
 pub(super) use area_table;
+
+/// The direction that the front of a flat light faces.
+pub(super) fn front(
+    cx: &mut CompileContext,
+    center: [f64; 3],
+    look_at: Option<[f64; 3]>,
+    normal: Option<[f64; 3]>,
+) -> [f64; 3] {
+    const DOWN: [f64; 3] = [0.0, -1.0, 0.0];
+    if let (Some(target), Some(normal)) = (look_at, normal) {
+        let message = format!("{} is given beside normal = {}", show(&target), show(&normal));
+        cx.error("look_at", message, Some("one of them says where the light faces; leave out the other"));
+        return DOWN;
+    }
+    let Some(target) = look_at else {
+        let normal = normal.unwrap_or(DOWN);
+        return if cx.edge("normal", normal) { normal } else { DOWN };
+    };
+    cx.point("look_at", target);
+    let towards = DVec3::from(target) - DVec3::from(center);
+    if towards.length() < MIN_DISTANCE {
+        let message = format!("{} is the light's center: there is no direction to face", show(&target));
+        cx.error("look_at", message, Some("move one of them, or say normal instead"));
+        return DOWN;
+    }
+    towards.normalize().to_array()
+}
+
+/// A light and what it faces nearer than this, in metres, are the same point.
+const MIN_DISTANCE: f64 = 1e-9;
 
 /// What every area light says beside its name and its shape.
 #[derive(Clone, Copy, Debug)]

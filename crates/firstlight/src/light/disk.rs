@@ -5,7 +5,7 @@ use std::f64::consts::FRAC_PI_4;
 use pxfm::f_sincos;
 
 use super::Light;
-use super::area::{AreaShape, area_table};
+use super::area::{AreaShape, area_table, front};
 use crate::context::{CompileContext, show};
 use crate::describe::SamplesDesc;
 use crate::math::{DRay, DVec3, Frame, Ray};
@@ -22,17 +22,22 @@ area_table! {
     /// ```toml
     /// [[light.disk]]
     /// center = [0, 3, 0]
-    /// normal = [0, -1, 0]
+    /// look_at = [0, 0, 0]
     /// radius = 0.5
     /// strength = 10
     /// ```
     pub struct DiskLightDesc {
         /// The middle, in metres, world space.
         pub center: [f64; 3],
-        /// The direction its front faces, of any length above 1e-9.
-        pub normal: [f64; 3],
-        /// Radius in metres, 1e-9 to 2.5e8.
-        pub radius: f64,
+        /// The direction that the front faces, of any length above 1e-9. With neither it nor `look_at` the front faces
+        /// straight down, [0, -1, 0].
+        pub normal: Option<[f64; 3]> = None,
+        /// The point that the front faces, in metres, world space; instead of `normal`.
+        pub look_at: Option<[f64; 3]> = None,
+        /// Radius in metres, 1e-9 to 2.5e8; it or `size` is needed.
+        pub radius: Option<f64> = None,
+        /// Diameter in metres, 1e-9 to 2.5e8, instead of `radius`.
+        pub size: Option<f64> = None,
         /// Where it is moved; it has to leave the disk round. Mirrored, it keeps its front.
         pub transform: Option<Box<TransformDesc>> = None,
     }
@@ -62,13 +67,34 @@ pub struct Disk {
 const MAX_SKEW: f64 = 1e-6;
 
 impl DiskLightDesc {
+    /// By its middle, the direction that its front faces, and its radius.
+    pub fn with_normal(center: [f64; 3], normal: [f64; 3], radius: f64) -> Self {
+        Self { normal: Some(normal), radius: Some(radius), ..Self::new(center) }
+    }
+
+    fn radius(&self, cx: &mut CompileContext) -> f64 {
+        match (self.radius, self.size) {
+            (Some(radius), None) => cx.positive("radius", radius, "the radius is in metres"),
+            (None, Some(size)) => cx.positive("size", size, "the diameter is in metres") * 0.5,
+            (None, None) => {
+                cx.error("radius", "is missing, and so is size", Some("write radius = ..., in metres"));
+                1.0
+            }
+            (Some(radius), Some(size)) => {
+                let message = format!("{size} is given beside radius = {radius}");
+                cx.error("size", message, Some("size is the diameter; keep one of them"));
+                1.0
+            }
+        }
+    }
+
     /// `samples` is the scene's default.
     pub(crate) fn compile(&self, cx: &mut CompileContext, samples: SamplesDesc) -> Light {
         cx.point("center", self.center);
-        cx.edge("normal", self.normal);
-        let mut radius = cx.positive("radius", self.radius, "the radius is in metres");
+        let mut frame =
+            Frame::around(DVec3::from(front(cx, self.center, self.look_at, self.normal)).normalize_or(DVec3::Y));
+        let mut radius = self.radius(cx);
         let mut center = DVec3::from(self.center);
-        let mut frame = Frame::around(DVec3::from(self.normal).normalize_or(DVec3::Y));
         if let Some(world_from_object) = TransformDesc::compile_field(self.transform.as_deref(), cx) {
             center = cx.moved_point(world_from_object, center);
             let before = cx.fault_count();

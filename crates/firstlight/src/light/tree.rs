@@ -460,7 +460,7 @@ mod tests {
                         LightDesc::Rectangle(RectangleDesc {
                             color,
                             falloff,
-                            ..RectangleDesc::new(at, e0.to_array(), e1.to_array())
+                            ..RectangleDesc::with_edges(at, e0.to_array(), e1.to_array())
                         })
                     }
                 };

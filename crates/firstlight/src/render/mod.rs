@@ -137,6 +137,14 @@ impl RenderSettings {
                 ));
             }
         }
+        let Window { width, height, .. } = self.window(scene);
+        let pixels = width as u64 * height as u64;
+        if pixels > MAX_PIXELS {
+            return Err(format!(
+                "{width} x {height} are {pixels} pixels, and at most {MAX_PIXELS} are rendered at once; render parts of \
+                 the picture, each with --crop X,Y,WIDTH,HEIGHT"
+            ));
+        }
         Ok(())
     }
 
@@ -198,6 +206,9 @@ impl Default for RenderSettings {
         }
     }
 }
+
+/// The most pixels that are rendered at once; the whole picture may have more.
+const MAX_PIXELS: u64 = 1 << 27;
 
 /// The most points of all lights that are integrated, where they are sampled all the same: 12 bytes each, on spheres 24, and
 /// as much for shafts.

@@ -95,7 +95,7 @@ mod tests {
         }
         assert!(entries > 0, "the changelog has no entry under Pixels");
         assert_eq!(
-            PIXELS_ENTRIES as usize,
+            PIXELS_ENTRIES,
             entries,
             "the changelog has {entries} entries under Pixels: set PIXELS_ENTRIES in {} to {entries}",
             file!()

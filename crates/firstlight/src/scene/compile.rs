@@ -1,5 +1,6 @@
 //! From description to scene: names become ids, units become those of computing, and every fault is found.
 
+use std::borrow::Cow;
 use std::collections::HashMap;
 use std::sync::Arc;
 
@@ -7,6 +8,8 @@ use fearless_simd::Level;
 
 use super::geometry::Geometry;
 use super::light_spheres::LightSpheres;
+use super::model::{Added, Framing};
+use super::outline::Outline;
 use super::place::compile_shapes;
 use super::seen_lights::SeenLights;
 use super::{DisplayEncoding, LightObstacles, RenderDesc, Scene, SceneDesc, SceneSummary};
@@ -29,8 +32,10 @@ use crate::transform::MAX_TIME;
 pub struct CompileOptions {
     /// Warnings are errors.
     pub strict: bool,
-    /// A scene without a camera is given one that sees all of it, a scene without lights is given one.
-    pub complete: bool,
+    /// How the camera frames the scene that a scene without one is given.
+    pub framing: Framing,
+    /// A scene without lights is given one, from the upper left behind the camera.
+    pub light: bool,
     /// Told what is being done, for scenes that take their time.
     pub progress: Option<OnCompile>,
     /// In seconds, from -1e9 to 1e9: where the scene has keys, it is compiled as it is at this time.
@@ -44,11 +49,12 @@ pub struct Compiled {
     pub scene: Scene,
     /// What was put up with: missing and damaged textures.
     pub warnings: Vec<Diagnostic>,
+    /// What it was given because the description lacks it.
+    pub added: Added,
 }
 
-/// The most pixels of a picture.
-const MAX_PIXELS: u64 = 1 << 27;
-const MAX_SIDE: u32 = 65536;
+/// The largest side of a picture, in pixels.
+pub(crate) const MAX_SIDE: u32 = 65536;
 const MAX_ANTIALIASING: u32 = 64;
 const MIN_FPS: f64 = 0.001;
 const MAX_FPS: f64 = 1e6;
@@ -61,24 +67,24 @@ impl SceneDesc {
     /// # Errors
     /// Every fault at once, each with the path of its value.
     pub fn compile(&self, assets: &dyn Assets, options: &CompileOptions) -> Result<Compiled, SceneError> {
-        let (scene, mut faults) = self.compile_or_faults(assets, options);
+        let (made, mut faults) = self.compile_or_faults(assets, options);
         if options.strict {
             faults.iter_mut().for_each(|fault| fault.severity = Severity::Error);
         }
-        match scene {
-            Some(scene) if faults.iter().all(|f| f.severity == Severity::Warning) => {
-                Ok(Compiled { scene, warnings: faults })
+        match made {
+            Some((scene, added)) if faults.iter().all(|f| f.severity == Severity::Warning) => {
+                Ok(Compiled { scene, warnings: faults, added })
             }
             _ => Err(SceneError { faults }),
         }
     }
 
-    /// The scene, if there are no errors, and all errors and warnings.
-    pub(crate) fn compile_or_faults(
+    /// The scene, if there are no errors, with what was added to it, and all errors and warnings.
+    fn compile_or_faults(
         &self,
         assets: &dyn Assets,
         options: &CompileOptions,
-    ) -> (Option<Scene>, Vec<Diagnostic>) {
+    ) -> (Option<(Scene, Added)>, Vec<Diagnostic>) {
         let time = options.time;
         let mut cx = CompileContext::at_time(time);
         cx.progress = options.progress.clone();
@@ -93,9 +99,9 @@ impl SceneDesc {
         let geometry = compile_shapes(self, cx, assets, &mut files);
         let origin = cx.origin;
         let bounds = geometry.as_ref().and_then(Geometry::bounds).map(|bounds| bounds.map(|corner| corner + origin));
-        let completed = options.complete.then(|| self.completed(bounds));
-        let desc = completed.as_ref().unwrap_or(self);
-        let camera = desc.compile_camera(cx, picture.width, picture.height);
+        let added = self.complete(cx, assets, options, geometry.as_ref());
+        let desc = &*self.with(&added);
+        let camera = desc.compile_camera(cx, picture.width, picture.height, geometry.is_some());
         let lights = desc.compile_lights(cx);
         let (Some(geometry), false) = (geometry, cx.has_errors()) else {
             return (None, cx.take_faults());
@@ -131,14 +137,56 @@ impl SceneDesc {
             light_sides,
             light_obstacles,
             level: Level::new(),
-            hash: self.hash(&textures, &files, options.complete),
+            hash: self.hash(&textures, &files, &added),
             moment: time,
             time: cx.keyed.then_some(time),
             placeholders: textures.placeholders,
             textures: textures.compiled,
             summary,
         };
-        (Some(scene), cx.take_faults())
+        (Some((scene, added)), cx.take_faults())
+    }
+
+    /// Finds what the scene lacks: a camera, and a light where one is asked for.
+    fn complete(
+        &self,
+        cx: &mut CompileContext,
+        assets: &dyn Assets,
+        options: &CompileOptions,
+        geometry: Option<&Geometry>,
+    ) -> Added {
+        let Framing { view, margin } = options.framing;
+        cx.between("view.azimuth_deg", view.azimuth_deg, -360.0, 360.0, Some("in degrees; 0 is in front"));
+        cx.between("view.elevation_deg", view.elevation_deg, -90.0, 90.0, Some("in degrees; 90 is straight above"));
+        cx.between("margin", margin, 0.0, Framing::MAX_MARGIN, Some("a part of the picture's shorter side"));
+        if cx.has_errors() {
+            return Added::default();
+        }
+        // What moves is framed as it is at 0 s, so that a camera that was found stands still in all frames
+        let still = if self.cameras.is_empty() && cx.keyed && options.time != 0.0 {
+            let mut at_zero = CompileContext::at_time(0.0);
+            compile_shapes(self, &mut at_zero, assets, &mut Vec::new()).map(|still| (still, at_zero.origin))
+        } else {
+            None
+        };
+        let origin = still.as_ref().map_or(cx.origin, |(_, origin)| *origin);
+        let outline = still.as_ref().map(|(still, _)| still).or(geometry).map(|seen| Outline::new(seen, origin));
+        self.lacks(outline.as_ref(), &options.framing, options.light)
+    }
+
+    /// The description with what was added; without its shapes, if anything was.
+    fn with(&self, added: &Added) -> Cow<'_, SceneDesc> {
+        if *added == Added::default() {
+            return Cow::Borrowed(self);
+        }
+        let mut desc = SceneDesc {
+            render: self.render.clone(),
+            cameras: self.cameras.clone(),
+            lights: self.lights.clone(),
+            ..SceneDesc::default()
+        };
+        added.add_to(&mut desc);
+        Cow::Owned(desc)
     }
 
     fn compile_render(&self, cx: &mut CompileContext) -> Picture {
@@ -146,11 +194,6 @@ impl SceneDesc {
             let render = &self.render;
             let width = cx.count("width", render.width, 1, MAX_SIDE, Some("pixels across"));
             let height = cx.count("height", render.height, 1, MAX_SIDE, Some("pixels down"));
-            if width <= MAX_SIDE && height <= MAX_SIDE && width as u64 * height as u64 > MAX_PIXELS {
-                let message =
-                    format!("{width} x {height} is {} pixels, the limit is {MAX_PIXELS}", width as u64 * height as u64);
-                cx.error("width", message, Some("render it in parts, each with its own camera"));
-            }
             let hint = "n of the n x n camera rays in each pixel";
             let antialiasing = cx.count("antialiasing", render.antialiasing, 1, MAX_ANTIALIASING, Some(hint));
             check_samples(cx, render.samples, "points on each area light");
@@ -174,7 +217,9 @@ impl SceneDesc {
     }
 
     /// Checks every camera and answers with the chosen one.
-    fn compile_camera(&self, cx: &mut CompileContext, width: u32, height: u32) -> Camera {
+    ///
+    /// `known`: whether the shapes compiled, so that a camera would have been found if there is anything to see.
+    fn compile_camera(&self, cx: &mut CompileContext, width: u32, height: u32, known: bool) -> Camera {
         let (mut chosen, wanted) = (None, self.chosen_camera());
         for (i, (name, camera)) in self.cameras.iter().enumerate() {
             let path = if name.is_empty() { "camera".to_owned() } else { format!("camera.{name}") };
@@ -184,7 +229,11 @@ impl SceneDesc {
             }
         }
         if self.cameras.is_empty() {
-            cx.error("camera", "there is none", Some("add [camera] with position and look_at"));
+            // Faults of the shapes are told by themselves
+            if known && !cx.has_errors() {
+                let message = "there is none, and no shape with an end to find one for";
+                cx.error("camera", message, Some("add [camera] with position and look_at"));
+            }
         } else if chosen.is_none() {
             let wanted = self.render.camera.as_deref().unwrap_or_default();
             let names: Vec<&str> = self.cameras.iter().map(|(name, _)| name.as_str()).collect();
@@ -296,15 +345,16 @@ impl SceneDesc {
             textures: textures.sizes(),
             texture_bytes: textures.bytes(),
             bounds: None,
-            camera: self.chosen_camera().map(|i| self.cameras[i].0.clone()).unwrap_or_default(),
+            camera: completed.chosen_camera().map(|i| completed.cameras[i].0.clone()).unwrap_or_default(),
         }
     }
 
     /// BLAKE3 of all that decides the picture, but for the samples of lights. What follows from a default is hashed as if it
     /// were said.
-    fn hash(&self, textures: &Textures, meshes: &[(String, [u8; 32])], complete: bool) -> String {
+    fn hash(&self, textures: &Textures, meshes: &[(String, [u8; 32])], added: &Added) -> String {
         let mut said = self.clone();
-        said.render.camera = self.chosen_camera().map(|i| self.cameras[i].0.clone());
+        added.add_to(&mut said);
+        said.render.camera = said.chosen_camera().map(|i| said.cameras[i].0.clone());
         // How lights are sampled is a choice of who renders: receipts say what is in effect, light by light
         let default = RenderDesc::default().samples;
         said.lights.iter_mut().for_each(|light| light.set_samples(default));
@@ -314,9 +364,6 @@ impl SceneDesc {
         hasher.update(said.to_json().as_bytes());
         for (file, hash) in textures.file_hashes() {
             hasher.update(file.as_bytes()).update(&[0]).update(&hash);
-        }
-        if complete {
-            hasher.update(b"complete");
         }
         for (file, hash) in meshes {
             hasher.update(file.as_bytes()).update(&[0]).update(hash);

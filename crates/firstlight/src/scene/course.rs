@@ -17,6 +17,7 @@
 
 use std::ops::RangeInclusive;
 
+use super::MAX_SIDE;
 use super::builtin::builtin_scenes;
 use super::description::SceneDesc;
 use super::text::sources::{SourceFile, Sources};
@@ -35,9 +36,6 @@ const KEYS: &[&str] = &[
     "area_light_resolution",
     "num_threads",
 ];
-
-/// The largest square picture within the limit of 134217728 pixels.
-const MAX_RESOLUTION: u32 = 11585;
 
 /// Whether the text called `name` is a course's file: by its name, or else by its first line that is not blank.
 pub(super) fn is_course(name: &str, text: &[u8]) -> bool {
@@ -113,7 +111,7 @@ pub(super) fn parse(name: &str, bytes: &[u8]) -> Parsed {
         value
     };
     // Take the built-in scene and change what is said
-    let resolution = number("output_resolution", 1..=MAX_RESOLUTION);
+    let resolution = number("output_resolution", 1..=MAX_SIDE);
     let camera = number("camera_id", 1..=3).unwrap_or(1);
     let light = number("light_id", 1..=3).unwrap_or(1);
     let antialiasing = number("num_samples", 1..=64);

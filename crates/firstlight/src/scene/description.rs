@@ -1,7 +1,7 @@
 //! A scene as it may be said, in text or in code: nothing resolved, nothing checked.
 
 use crate::camera::CameraDesc;
-use crate::describe::{ColorDesc, SamplesDesc, table, words};
+use crate::describe::{ColorDesc, FilePath, SamplesDesc, table, words};
 use crate::light::LightDesc;
 use crate::material::MaterialDesc;
 use crate::shape::{GroupDesc, ShadowTerminator, ShapeDesc};
@@ -32,7 +32,7 @@ table! {
     /// antialiasing = 4
     /// ```
     pub struct RenderDesc {
-        /// Pixels across, 1 to 65536; at most 134217728 pixels in all.
+        /// Pixels across, 1 to 65536. Of a picture of more than 134217728 pixels only parts can be rendered, with `--crop`.
         pub width: u32 = 1024,
         /// Pixels down, 1 to 65536.
         pub height: u32 = 1024,
@@ -83,4 +83,21 @@ pub struct SceneDesc {
     pub groups: Vec<(String, GroupDesc)>,
     /// `[[light.KIND]]`
     pub lights: Vec<LightDesc>,
+}
+
+impl SceneDesc {
+    /// The names of all files that it reads when it is compiled: pictures, meshes, point sets.
+    pub fn files_mut(&mut self) -> impl Iterator<Item = &mut FilePath> {
+        let pictures = self.textures.iter_mut().filter_map(|(_, texture)| match texture {
+            TextureDesc::Image(image) => Some(&mut image.file),
+            TextureDesc::Checkerboard(_) => None,
+        });
+        let grouped = self.groups.iter_mut().flat_map(|(_, group)| &mut group.shapes);
+        let models = self.shapes.iter_mut().chain(grouped).filter_map(|shape| match shape {
+            ShapeDesc::Mesh(mesh) => mesh.file.as_mut(),
+            ShapeDesc::PointSet(points) => points.file.as_mut(),
+            _ => None,
+        });
+        pictures.chain(models)
+    }
 }

@@ -328,19 +328,22 @@ impl Geometry {
         [(meshes + points) as u64, (mesh_trees + point_trees + self.upper.bytes() + placed) as u64]
     }
 
+    /// The box around something placed, in its own space; `None` if it is empty or has no end.
+    pub fn bounds_of(&self, target: Target) -> Option<[DVec3; 2]> {
+        match target {
+            Target::Mesh(mesh) => self.meshes[mesh as usize].bounds(),
+            Target::Points(points) => self.point_sets[points as usize].bounds(),
+            Target::Solid(solid) => self.solids[solid as usize].bounds(),
+        }
+    }
+
     /// The box around all shapes that have an end: its least and its greatest corner. `None` without such shapes.
     pub fn bounds(&self) -> Option<[DVec3; 2]> {
         let spheres = self.spheres.iter().map(|sphere| sphere.shape.bounds());
         let flats = self.parallelograms.iter().map(|flat| flat.shape.bounds());
         let world = self.world.iter().filter_map(|world| world.mesh.bounds());
-        let placed = self.placed.iter().filter_map(|thing| {
-            let own = match thing.target {
-                Target::Mesh(mesh) => self.meshes[mesh as usize].bounds(),
-                Target::Points(points) => self.point_sets[points as usize].bounds(),
-                Target::Solid(solid) => self.solids[solid as usize].bounds(),
-            };
-            own.map(|own| thing.placement.bounds(own))
-        });
+        let placed =
+            self.placed.iter().filter_map(|thing| self.bounds_of(thing.target).map(|own| thing.placement.bounds(own)));
         let all = spheres.chain(flats).chain(world).chain(placed);
         all.reduce(|[low, high], [a, b]| [low.min(a), high.max(b)])
     }

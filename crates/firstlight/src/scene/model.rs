@@ -1,6 +1,7 @@
-//! A scene around one model: a camera that sees all of it, and a light.
+//! What a scene is given that it does not say: a camera that sees all of it, and for a bare model a light.
 
 use super::SceneDesc;
+use super::outline::Outline;
 use crate::camera::CameraDesc;
 use crate::describe::{ColorDesc, FilePath};
 use crate::light::{DirectionalDesc, LightDesc};
@@ -29,18 +30,105 @@ pub struct ModelSettings {
     pub points: bool,
 }
 
+/// The direction that an automatic camera looks from.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct View {
+    /// Around the y axis, in degrees, from -360 to 360: 0 is in front, on the side of +z, and 90 on the right, on the side of +x.
+    pub azimuth_deg: f64,
+    /// Above the horizon, in degrees, from -90 to 90.
+    pub elevation_deg: f64,
+}
+
+impl View {
+    /// The views that have names.
+    pub const NAMED: [(&str, View); 7] = [
+        ("front", View::new(0.0, 0.0)),
+        ("back", View::new(180.0, 0.0)),
+        ("left", View::new(-90.0, 0.0)),
+        ("right", View::new(90.0, 0.0)),
+        ("top", View::new(0.0, 90.0)),
+        ("bottom", View::new(0.0, -90.0)),
+        // Along the diagonal of a cube: the elevation is atan(1 / sqrt 2)
+        ("iso", View::new(45.0, 35.264389682754654)),
+    ];
+
+    /// From these angles, in degrees.
+    pub const fn new(azimuth_deg: f64, elevation_deg: f64) -> Self {
+        View { azimuth_deg, elevation_deg }
+    }
+
+    /// The view called `name`.
+    pub fn from_name(name: &str) -> Option<View> {
+        View::NAMED.iter().find(|(known, _)| *known == name).map(|(_, view)| *view)
+    }
+
+    /// Towards the camera, and what is up in its picture: both unit.
+    fn directions(&self) -> [DVec3; 2] {
+        let [(around, front), (above, level)] = [self.azimuth_deg, self.elevation_deg].map(sin_cos_deg);
+        let back = DVec3::new(around * level, above, front * level);
+        // From straight above the far side is up, from straight below the near side
+        let steep = DVec3::new(around, 0.0, front) * -above.signum();
+        [back, if level.abs() < MIN_LEVEL { steep } else { DVec3::Y }]
+    }
+}
+
+impl Default for View {
+    /// From the front, a little from the right and from above.
+    fn default() -> Self {
+        View::new(25.0, 18.0)
+    }
+}
+
+/// How an automatic camera frames what it sees.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Framing {
+    /// Where it looks from.
+    pub view: View,
+    /// What is left free at least on each side of the picture, as a part of its shorter side: 0 to 0.45.
+    pub margin: f64,
+}
+
+impl Framing {
+    /// The widest margin.
+    pub const MAX_MARGIN: f64 = 0.45;
+}
+
+impl Default for Framing {
+    fn default() -> Self {
+        Framing { view: View::default(), margin: 0.04 }
+    }
+}
+
+/// What a scene was given because it lacks it. A description with both added means the same picture, without anything being
+/// found.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Added {
+    /// A camera that sees all shapes, where the scene has no camera.
+    pub camera: Option<CameraDesc>,
+    /// A light, where the scene has none and one was asked for.
+    pub light: Option<DirectionalDesc>,
+}
+
+impl Added {
+    /// Adds it to the description.
+    pub fn add_to(&self, desc: &mut SceneDesc) {
+        desc.cameras.extend(self.camera.iter().map(|camera| (String::new(), camera.clone())));
+        desc.lights.extend(self.light.iter().map(|light| LightDesc::Directional(light.clone())));
+    }
+}
+
 /// The vertical field of view of the camera that is given to a scene without one.
 const FOV_Y_DEG: f64 = 30.0;
-/// What is left free around.
-const MARGIN: f64 = 1.06;
-/// From the middle of the scene to the camera: in front, a little to the right and from above.
-const FROM: DVec3 = DVec3::new(0.45, 0.35, 1.0);
+/// From the eye to the nearest part of what it sees, at least, in lengths of the box around it.
+const NEAREST: f64 = 0.02;
+/// Views with a cosine of the elevation below this are straight from above or from below.
+const MIN_LEVEL: f64 = 1e-5;
 /// What the light is to the camera: to the left, up and back, in directions of the picture.
 const LIGHT_FROM: DVec3 = DVec3::new(-0.5, 0.75, 0.8);
 
 impl SceneDesc {
     /// A scene that shows a model: one shape, no camera and no light. Compile it with
-    /// [`CompileOptions::complete`](crate::CompileOptions::complete), which adds both.
+    /// [`CompileOptions::light`](crate::CompileOptions::light), which adds a light.
     pub fn of_model(file: &str, settings: &ModelSettings) -> Self {
         let transform = (settings.up == UpAxis::Z)
             .then(|| Box::new(TransformDesc { rotate_deg: [-90.0, 0.0, 0.0], ..TransformDesc::default() }));
@@ -56,77 +144,231 @@ impl SceneDesc {
         desc
     }
 
-    /// The description with a camera that sees all within `bounds`, and with a light, where it has none.
-    pub(super) fn completed(&self, bounds: Option<[DVec3; 2]>) -> Self {
-        let mut desc = SceneDesc { shapes: Vec::new(), groups: Vec::new(), ..self.clone() };
-        let [low, high] = bounds.unwrap_or([DVec3::NEG_ONE, DVec3::ONE]);
-        if desc.cameras.is_empty() {
-            let aspect = self.render.width as f64 / self.render.height.max(1) as f64;
-            desc.cameras.push((String::new(), framing(low, high, aspect)));
+    /// What it lacks. `seen` is what a camera sees; `None` where that is not known, and then nothing is found.
+    pub(super) fn lacks(&self, seen: Option<&Outline>, framing: &Framing, light: bool) -> Added {
+        let mut added = Added::default();
+        if self.cameras.is_empty() {
+            let size = [self.render.width, self.render.height].map(|n| f64::from(n.max(1)));
+            // A bare model is always shown, whatever is in its file
+            let nothing = || light.then(|| framing_of(&cube, [DVec3::NEG_ONE, DVec3::ONE], framing, size));
+            added.camera = match seen.map(|seen| (seen, seen.bounds())) {
+                Some((seen, Some(bounds))) => Some(framing_of(&|d| seen.support(d), bounds, framing, size)),
+                Some((_, None)) => nothing(),
+                None => None,
+            };
+            if let (Some(camera), Some(seen)) = (&mut added.camera, seen) {
+                for place in [&mut camera.position, &mut camera.look_at] {
+                    *place = (DVec3::from(*place) + seen.origin).to_array();
+                }
+            }
         }
-        if desc.lights.is_empty() {
+        if light && self.lights.is_empty() {
             // From the upper left of the first camera
-            let camera = &desc.cameras[0].1;
-            let back = (DVec3::from(camera.position) - DVec3::from(camera.look_at)).normalize_or(DVec3::Z);
-            let right = DVec3::from(camera.up).cross(back).normalize_or(DVec3::X);
-            let from = right * LIGHT_FROM.x + back.cross(right) * LIGHT_FROM.y + back * LIGHT_FROM.z;
-            let mut light = DirectionalDesc::new((-from).to_array());
-            light.strength = 2.6;
-            desc.lights.push(LightDesc::Directional(light));
+            let camera = added.camera.as_ref().or(self.cameras.first().map(|(_, camera)| camera));
+            added.light = camera.map(|camera| {
+                let back = (DVec3::from(camera.position) - DVec3::from(camera.look_at)).normalize_or(DVec3::Z);
+                let right = DVec3::from(camera.up).cross(back).normalize_or(DVec3::X);
+                let from = right * LIGHT_FROM.x + back.cross(right) * LIGHT_FROM.y + back * LIGHT_FROM.z;
+                let mut light = DirectionalDesc::new((-from).to_array());
+                light.strength = 2.6;
+                light
+            });
         }
-        desc
+        added
     }
 }
 
-/// A camera that sees a whole box, and not much more.
-fn framing(low: DVec3, high: DVec3, aspect: f64) -> CameraDesc {
-    let center = (low + high) * 0.5;
-    let half = ((high - low) * 0.5).max(DVec3::splat(1e-6 * (1.0 + center.abs().max_element())));
-    let back = FROM.normalize();
-    let right = DVec3::Y.cross(back).normalize();
-    let up = back.cross(right);
-    // The corner that is nearest to leaving the picture decides the distance
-    let tan_y = pxfm::f_tan(FOV_Y_DEG.to_radians() * 0.5);
-    let tan_x = tan_y * aspect;
-    let mut distance: f64 = 0.0;
-    for corner in 0..8 {
-        let sign = |bit: u32| if corner >> bit & 1 == 1 { 1.0 } else { -1.0 };
-        let q = half * DVec3::new(sign(0), sign(1), sign(2));
-        let across = (q.dot(right).abs() / tan_x).max(q.dot(up).abs() / tan_y);
-        distance = distance.max(q.dot(back) + across * MARGIN);
+/// The support function of the cube between -1 and 1.
+fn cube(d: DVec3) -> f64 {
+    d.abs().element_sum()
+}
+
+/// Sine and cosine, exact for right angles.
+fn sin_cos_deg(angle: f64) -> (f64, f64) {
+    match angle.rem_euclid(360.0) {
+        0.0 => (0.0, 1.0),
+        90.0 => (1.0, 0.0),
+        180.0 => (0.0, -1.0),
+        270.0 => (-1.0, 0.0),
+        angle => pxfm::f_sincos(angle.to_radians()),
     }
-    let mut camera = CameraDesc::new((center + back * distance).to_array());
-    camera.look_at = center.to_array();
+}
+
+/// The nearest camera that sees all of a thing within its margins, with the thing in the middle of the picture. `support(d)` is the
+/// most that `d` . x is over the thing, `bounds` a box around it, `size` that of the picture.
+///
+/// In the camera's directions right, up and back, with the eye at c, a point x is within the picture where
+/// |x.right - c.right| <= t (c.back - x.back), with t the tangent of half the field of view inside of the margins. So the two
+/// planes through the eye that bound it are those that touch the thing in the directions (1, t) and (-1, t) of (right, back), and the
+/// eye is where they cross: that is the nearest eye for this direction. The one for up and down gives another distance; the larger
+/// holds, and in the other direction the eye is moved to where the thing's outline leaves the same on both sides.
+fn framing_of(support: &dyn Fn(DVec3) -> f64, bounds: [DVec3; 2], framing: &Framing, size: [f64; 2]) -> CameraDesc {
+    let [back, up] = framing.view.directions();
+    let right = up.cross(back).normalize();
+    let up_there = back.cross(right);
+    // The tangents of half the fields of view, within the margins
+    let tan_y = pxfm::f_tan(FOV_Y_DEG.to_radians() * 0.5);
+    let margin = framing.margin * size[0].min(size[1]);
+    let [width, height] = size.map(|side| (side - 2.0 * margin) / size[1] * tan_y);
+    // Around the middle of the box: far from the origin nothing is lost
+    let middle = (bounds[0] + bounds[1]) * 0.5;
+    let reach = |d: DVec3| support(d) - middle.dot(d);
+    let touching = |across: DVec3, tan: f64| [reach(across + back * tan), reach(-across + back * tan)];
+    let apart = |across: DVec3, tan: f64| touching(across, tan).iter().sum::<f64>() / (2.0 * tan);
+    // Never so near that the tip of a needle, or what has no size at all, lies in the eye
+    let (front, rear) = (reach(back), -reach(-back));
+    let largest = (bounds[1] - bounds[0]).max_element();
+    let nearest = front + (NEAREST * largest).max(1e-6 * (1.0 + middle.abs().max_element()));
+    let away = apart(right, width).max(apart(up_there, height)).max(nearest);
+    let centre = |across: DVec3, tan: f64| {
+        let [one, other] =
+            touching(across, outline(tan, |tan| touching(across, tan).iter().sum::<f64>() - 2.0 * tan * away));
+        (one - other) * 0.5
+    };
+    let axis = middle + right * centre(right, width) + up_there * centre(up_there, height);
+    let mut camera = CameraDesc::new((axis + back * away).to_array());
+    camera.look_at = (axis + back * ((front + rear) * 0.5)).to_array();
+    camera.up = up.to_array();
     camera.fov_y_deg = Some(FOV_Y_DEG);
     camera
+}
+
+/// The tangent from 0 to `most` at which `over`, which is convex and falls from 0 or more to 0 or less, is 0: that of the angle at which
+/// the outline is seen on both sides.
+fn outline(most: f64, over: impl Fn(f64) -> f64) -> f64 {
+    let (mut low, mut high) = (0.0, most);
+    let (mut at_low, mut at_high) = (over(low), over(high));
+    let enough = at_low * 1e-12;
+    if !(at_low > 0.0) || !(at_high < -enough) {
+        return if at_low > 0.0 { most } else { 0.0 };
+    }
+    // False position; an end that stays counts for half (the Illinois method)
+    let mut stayed = 0;
+    for _ in 0..100 {
+        let tan = (low * at_high - high * at_low) / (at_high - at_low);
+        let there = over(tan);
+        if there.abs() <= enough || !(tan > low && tan < high) {
+            return tan;
+        }
+        if there > 0.0 {
+            (low, at_low) = (tan, there);
+            if stayed > 0 {
+                at_high *= 0.5;
+            }
+            stayed = 1;
+        } else {
+            (high, at_high) = (tan, there);
+            if stayed < 0 {
+                at_low *= 0.5;
+            }
+            stayed = -1;
+        }
+    }
+    high
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    #[test]
-    fn all_of_a_box_is_in_the_picture_and_touches_its_margin() {
-        for (low, high, aspect) in [
-            (DVec3::NEG_ONE, DVec3::ONE, 1.0),
-            (DVec3::new(5.0, 0.0, -3.0), DVec3::new(5.1, 40.0, -2.0), 2.0),
-            (DVec3::ZERO, DVec3::new(1e-3, 1e-5, 1e-3), 0.5),
-        ] {
-            let camera = framing(low, high, aspect);
-            let eye = DVec3::from(camera.position);
-            let forward = (DVec3::from(camera.look_at) - eye).normalize();
-            let right = forward.cross(DVec3::Y).normalize();
-            let up = right.cross(forward);
-            let tan = pxfm::f_tan(FOV_Y_DEG.to_radians() * 0.5);
-            let mut most: f64 = 0.0;
-            for corner in 0..8 {
-                let pick = |bit: u32, a: f64, b: f64| if corner >> bit & 1 == 1 { b } else { a };
-                let q = DVec3::new(pick(0, low.x, high.x), pick(1, low.y, high.y), pick(2, low.z, high.z)) - eye;
-                let depth = q.dot(forward);
-                let (x, y) = (q.dot(right) / depth / (tan * aspect), q.dot(up) / depth / tan);
-                most = most.max(x.abs()).max(y.abs());
+    /// Where points are in a picture of the size, in parts of it from the left and from the top: the least and the most.
+    fn shown(camera: &CameraDesc, points: &[DVec3], size: [f64; 2]) -> [[f64; 2]; 2] {
+        let eye = DVec3::from(camera.position);
+        let forward = (DVec3::from(camera.look_at) - eye).normalize();
+        let right = forward.cross(camera.up.into()).normalize();
+        let up = right.cross(forward);
+        let tan = pxfm::f_tan(FOV_Y_DEG.to_radians() * 0.5);
+        let mut found = [[f64::INFINITY, f64::NEG_INFINITY]; 2];
+        for point in points {
+            let q = *point - eye;
+            let depth = q.dot(forward);
+            assert!(depth > 0.0);
+            let at = [q.dot(right) / (depth * tan * size[0] / size[1]), -q.dot(up) / (depth * tan)];
+            for (found, at) in found.iter_mut().zip(at) {
+                let at = 0.5 + 0.5 * at;
+                *found = [found[0].min(at), found[1].max(at)];
             }
-            assert!(most < 1.0 && most > 0.85, "{most}");
         }
+        found
+    }
+
+    #[test]
+    fn the_outline_is_in_the_middle_and_touches_its_margin() {
+        let mut random = crate::shape::check::Random::new(7);
+        let mut views: Vec<View> = View::NAMED.iter().map(|(_, view)| *view).collect();
+        views.push(View::default());
+        views.extend((0..40).map(|_| View::new(random.between(-360.0, 360.0), random.between(-90.0, 90.0))));
+        let mut held_off = 0;
+        for (i, view) in views.iter().enumerate() {
+            // Points in boxes of many proportions, near the origin and far from it
+            let half =
+                DVec3::new(random.magnitude(0.1, 10.0), random.magnitude(0.1, 10.0), random.magnitude(0.1, 10.0));
+            let from = if i % 3 == 0 { DVec3::new(1e5, -3e4, 2e5) } else { DVec3::ZERO };
+            let mut between =
+                || DVec3::new(random.between(-1.0, 1.0), random.between(-1.0, 1.0), random.between(-1.0, 1.0));
+            let points: Vec<DVec3> = (0..5 + i).map(|_| from + between() * half).collect();
+            let low = points.iter().copied().reduce(DVec3::min).unwrap_or_default();
+            let high = points.iter().copied().reduce(DVec3::max).unwrap_or_default();
+            let support = |d: DVec3| points.iter().map(|p| p.dot(d)).fold(f64::NEG_INFINITY, f64::max);
+            for (size, margin) in [([300.0, 300.0], 0.04), ([400.0, 100.0], 0.0), ([100.0, 300.0], 0.2)] {
+                let framing = Framing { view: *view, margin };
+                let camera = framing_of(&support, [low, high], &framing, size);
+                let [x, y] = shown(&camera, &points, size);
+                let free = [0, 1].map(|axis| margin * size[0].min(size[1]) / size[axis]);
+                // Equal on both sides, and nowhere less than asked; in one direction exactly that
+                let over = [x[0] - free[0], y[0] - free[1]];
+                assert!((x[0] - (1.0 - x[1])).abs() < 1e-6, "{view:?} {size:?}: {x:?}");
+                assert!((y[0] - (1.0 - y[1])).abs() < 1e-6, "{view:?} {size:?}: {y:?}");
+                assert!(over.iter().all(|o| *o > -1e-6), "{view:?} {size:?}: {over:?}");
+                let eye = DVec3::from(camera.position);
+                let back = (eye - DVec3::from(camera.look_at)).normalize();
+                let before = eye.dot(back) - support(back);
+                let is_held_off = before < NEAREST * (high - low).max_element() * (1.0 + 1e-6);
+                held_off += usize::from(is_held_off);
+                assert!(is_held_off || over.iter().any(|o| *o < 1e-6), "{view:?} {size:?}: {over:?}");
+            }
+        }
+        assert!(held_off < views.len() / 2, "{held_off}");
+    }
+
+    #[test]
+    fn a_ball_is_seen_as_round_as_it_is() {
+        // The cone around a ball of radius 1 at the distance d has the sine 1 / d
+        let support = |d: DVec3| d.length();
+        let framing = Framing { view: View::new(0.0, 0.0), margin: 0.1 };
+        let camera = framing_of(&support, [DVec3::NEG_ONE, DVec3::ONE], &framing, [200.0, 100.0]);
+        let tan = 0.8 * pxfm::f_tan(FOV_Y_DEG.to_radians() * 0.5);
+        let distance = (1.0 + 1.0 / (tan * tan)).sqrt();
+        assert!((DVec3::from(camera.position) - DVec3::new(0.0, 0.0, distance)).length() < 1e-12, "{camera:?}");
+        assert_eq!(DVec3::from(camera.look_at), DVec3::ZERO);
+    }
+
+    #[test]
+    fn a_point_and_a_line_along_the_view_have_a_camera() {
+        for (low, high) in [(DVec3::ONE, DVec3::ONE), (DVec3::NEG_Z, DVec3::Z)] {
+            let support = |d: DVec3| low.dot(d).max(high.dot(d));
+            let camera =
+                framing_of(&support, [low, high], &Framing { view: View::new(0.0, 0.0), margin: 0.04 }, [9.0, 9.0]);
+            assert!(camera.position[2] > high.z && camera.look_at[2] < camera.position[2], "{camera:?}");
+        }
+    }
+
+    #[test]
+    fn views_are_where_their_names_say() {
+        for (name, back, up) in [
+            ("front", DVec3::Z, DVec3::Y),
+            ("back", DVec3::NEG_Z, DVec3::Y),
+            ("left", DVec3::NEG_X, DVec3::Y),
+            ("right", DVec3::X, DVec3::Y),
+            ("top", DVec3::Y, DVec3::NEG_Z),
+            ("bottom", DVec3::NEG_Y, DVec3::Z),
+        ] {
+            assert_eq!(View::from_name(name).map(|view| view.directions()), Some([back, up]), "{name}");
+        }
+        let iso = View::from_name("iso").map(|view| view.directions()[0]).unwrap_or_default();
+        assert!((iso - DVec3::ONE.normalize()).length() < 1e-15);
+        // Turned by as much as the camera goes around
+        assert_eq!(View::new(90.0, 90.0).directions(), [DVec3::Y, DVec3::NEG_X]);
+        assert_eq!(View::from_name("above"), None);
     }
 }

@@ -8,7 +8,7 @@ use crate::context::CompileContext;
 use crate::math::{DRay, DVec3, ErrorBound};
 
 /// Numbers that are the same on every run.
-pub(super) struct Random(u64);
+pub(crate) struct Random(u64);
 
 impl Random {
     pub fn new(seed: u64) -> Self {

@@ -5,7 +5,7 @@
 
 mod ball;
 #[cfg(test)]
-mod check;
+pub(crate) mod check;
 mod common;
 mod cone;
 mod cover;
@@ -36,6 +36,7 @@ pub use parallelogram::{Parallelogram, ParallelogramDesc};
 pub use plane::PlaneDesc;
 pub use point_set::PointSetDesc;
 pub use rectangle::RectangleDesc;
+pub(crate) use rectangle::facing;
 pub use sphere::{Sphere, SphereDesc, SphereUv};
 pub use surface::{Footprint, RayDifferential, ShadowTerminator, SurfaceInteraction, UvEdge};
 pub use torus::TorusDesc;

@@ -91,6 +91,11 @@ impl Parallelogram {
         }
     }
 
+    /// The most that `d` . x is over it, to within rounding.
+    pub(crate) fn support(&self, d: DVec3) -> f64 {
+        self.p.dot(d) + self.edges.iter().map(|edge| edge.dot(d).max(0.0)).sum::<f64>()
+    }
+
     /// How far u or v can be wrong for a ray that starts `from` away from the corner, computed with `roundoff`. Two
     /// shapes that share an edge overlap by this much, so that no ray slips between them.
     #[inline(always)]

@@ -188,6 +188,15 @@ impl PointSet {
         bounds.is_sound().then(|| [bounds.min.as_dvec3(), bounds.max.as_dvec3()])
     }
 
+    /// The most that `d` . x is over it, to within rounding.
+    pub fn support(&self, d: DVec3) -> f64 {
+        let length = d.length();
+        let reach = |[x, y, z, r]: [f64; 4]| DVec3::new(x, y, z).dot(d) + r * length;
+        // Those that are left out are nowhere
+        let there = self.spheres.iter().filter(|sphere| sphere.iter().all(|x| x.is_finite()) && sphere[3] > 0.0);
+        there.map(|sphere| reach(sphere.map(f64::from))).fold(f64::NEG_INFINITY, f64::max)
+    }
+
     fn ball(&self, index: u32) -> Ball {
         let [x, y, z, r] = self.spheres[index as usize].map(f64::from);
         Ball { c: DVec3::new(x, y, z), r }

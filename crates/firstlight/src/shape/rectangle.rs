@@ -42,7 +42,7 @@ impl RectangleDesc {
 }
 
 /// The frame of what is flat, from its `normal` and `up`.
-pub(super) fn facing(cx: &mut CompileContext, normal: [f64; 3], up: Option<[f64; 3]>) -> Frame {
+pub(crate) fn facing(cx: &mut CompileContext, normal: [f64; 3], up: Option<[f64; 3]>) -> Frame {
     let mut fine = cx.edge("normal", normal);
     if let Some(up) = up {
         fine &= cx.edge("up", up);

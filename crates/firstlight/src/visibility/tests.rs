@@ -243,11 +243,11 @@ fn random_scene(random: &mut Random) -> Scene {
         let name = (i == 0).then(|| "one".to_owned());
         desc.lights.push(match random.below(3) {
             0 => {
-                let light = RectangleDesc::new(center, (a * x).to_array(), (b * y).to_array());
+                let light = RectangleDesc::with_edges(center, (a * x).to_array(), (b * y).to_array());
                 LightDesc::Rectangle(RectangleDesc { name, samples, sides, blocks, ..light })
             }
             1 => {
-                let light = DiskLightDesc::new(center, a.to_array(), x);
+                let light = DiskLightDesc::with_normal(center, a.to_array(), x);
                 LightDesc::Disk(DiskLightDesc { name, samples, sides, blocks, ..light })
             }
             _ => {

@@ -56,7 +56,7 @@ key, a missing value, a second value, or a key said twice is an error.
 
 | key | value | without it |
 |---|---|---|
-| `output_resolution` | pixels across and down, 1 to 11585: one number, the picture is square | 1024 |
+| `output_resolution` | pixels across and down, 1 to 65536: one number, the picture is square | 1024 |
 | `output_file` | the picture, relative to the working folder; a name without blanks | chosen by the program |
 | `camera_id` | 1, 2 or 3 | 1 |
 | `light_id` | 1, 2 or 3 | 1 |

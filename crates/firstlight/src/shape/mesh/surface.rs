@@ -7,7 +7,7 @@ use crate::ids::MaterialId;
 use crate::math::{DVec3, ErrorBound, Ray, UNIT_ROUNDOFF, Vec2, Vec3};
 use crate::shape::placement::Placement;
 use crate::shape::surface::{Footprint, RayDifferential, ShadowTerminator, ShapePoint, UvEdge};
-use crate::shape::triangles::TriangleTree;
+use crate::shape::triangles::{TriangleTree, can_be_hit};
 
 /// The meshes of one space, the world or that of a group, joined: one tree for all their triangles.
 pub(crate) struct Mesh {
@@ -70,6 +70,11 @@ impl Mesh {
     pub fn bounds(&self) -> Option<[DVec3; 2]> {
         let bounds = self.tree.bounds();
         (self.tree.len() > 0).then(|| [bounds.min.as_dvec3(), bounds.max.as_dvec3()])
+    }
+
+    /// Whether a ray can hit a triangle: it has an area, and all of it is somewhere.
+    pub fn is_hit(&self, triangle: &[u32; 3]) -> bool {
+        can_be_hit(&self.positions, triangle)
     }
 
     /// Whether a ray of the mesh's space meets a triangle from behind.

@@ -124,6 +124,11 @@ fn corners(positions: &[[f32; 3]], triangle: &[u32; 3]) -> Option<[Vec3; 3]> {
     ((b - a).cross(c - a) != DVec3::ZERO).then_some(corners)
 }
 
+/// Whether a triangle is in a tree over its mesh.
+pub(crate) fn can_be_hit(positions: &[[f32; 3]], triangle: &[u32; 3]) -> bool {
+    corners(positions, triangle).is_some_and(|corners| corners.iter().all(|corner| corner.is_finite()))
+}
+
 impl TriangleTree {
     /// Builds the tree over a mesh. A triangle without area, or with a vertex that is not finite or not there, is left out.
     pub fn build(positions: &[[f32; 3]], triangles: &[[u32; 3]]) -> TriangleTree {

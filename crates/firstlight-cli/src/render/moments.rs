@@ -1,0 +1,139 @@
+//! One moment after the other: compiled, rendered, written.
+
+use std::ops::ControlFlow;
+use std::time::Duration;
+
+use firstlight::{Diagnostic, Display, RenderSettings, RenderStats, Window};
+
+use super::plan::Plan;
+use super::timed;
+use crate::faster::faster;
+use crate::input::Input;
+use crate::interrupt::Watch;
+use crate::output::{self, Content, Output, Ready, Staged, Target};
+use crate::progress::Progress;
+use crate::report::{Failure, show_diagnostics};
+
+/// A moment to render, and where its pictures go.
+pub(super) struct Moment {
+    /// In seconds.
+    pub time: f64,
+    pub outputs: Vec<Output>,
+}
+
+impl Moment {
+    pub fn ready(&self) -> Result<Vec<Ready>, Failure> {
+        self.outputs.iter().map(|output| output.target.ready()).collect()
+    }
+}
+
+/// What one moment took, or several.
+pub(super) struct Took {
+    pub compile: Duration,
+    pub render: Duration,
+    pub write: Duration,
+    pub rays: RenderStats,
+}
+
+impl Took {
+    pub fn and(self, other: Took) -> Took {
+        let rays = self.rays.and(&other.rays);
+        Took {
+            compile: self.compile + other.compile,
+            render: self.render + other.render,
+            write: self.write + other.write,
+            rays,
+        }
+    }
+}
+
+/// The rendering of one moment after the other.
+pub(super) struct Run<'a> {
+    pub plan: &'a Plan<'a>,
+    pub input: &'a Input,
+    pub settings: &'a RenderSettings,
+    /// Where the numbers go, if that is a file.
+    pub stats: Option<&'a Target>,
+    /// Once there is something to render.
+    pub progress: Option<Progress>,
+    /// What has been said already.
+    pub warned: Vec<Diagnostic>,
+}
+
+impl Run<'_> {
+    /// Compiles, renders and writes one of the moments.
+    pub fn render(
+        &mut self,
+        index: usize,
+        moments: &[Moment],
+        window: Window,
+        ready: Vec<Ready>,
+    ) -> Result<Took, Failure> {
+        let (plan, settings, moment) = (self.plan, self.settings, &moments[index]);
+
+        // Compile
+        let (compiled, compile) = timed(|| self.input.compile(moment.time, plan.quiet));
+        let mut compiled = compiled?;
+        // Now it is known which files the scene is made of: none of them may be lost, by none of the frames to come
+        let ahead = if index == 0 { moments } else { &moments[index..=index] };
+        let outputs = ahead.iter().flat_map(|moment| &moment.outputs);
+        output::refuse_overwriting(&self.input.files(), outputs, self.stats)?;
+        compiled.warnings.retain(|warning| !self.warned.contains(warning));
+        if !compiled.warnings.is_empty() {
+            let show = || show_diagnostics(&compiled.warnings);
+            self.progress.as_ref().map_or_else(show, |progress| progress.aside(show));
+            self.warned.append(&mut compiled.warnings);
+        }
+        if index == 0 && !plan.quiet {
+            self.input.tell_added(&compiled);
+        }
+        let scene = &compiled.scene;
+        settings.check(scene).map_err(Failure::Usage)?;
+        settings.check_memory(scene).map_err(Failure::Work)?;
+
+        // Render, until somebody asks to stop
+        let watch = Watch::begin();
+        let pixels = u64::from(window.width) * u64::from(window.height);
+        let begin = || {
+            let faster = faster(scene, settings, &self.input.parsed.desc.render);
+            Progress::begin(pixels, moments.len() as u64, plan.quiet, faster)
+        };
+        let progress = &*self.progress.get_or_insert_with(begin);
+        progress.frame(index as u64);
+        let (rendered, render) = timed(|| {
+            firstlight::render(scene, settings, &|done, _| {
+                progress.update(done);
+                watch.flow()
+            })
+        });
+        let ControlFlow::Continue((film, rays)) = rendered else { return Err(Failure::Interrupted) };
+        if index + 1 == moments.len() {
+            progress.finish(window.width, window.height);
+        }
+
+        // Encode all pictures and bring them to the disk, then let them appear
+        let (written, write) = timed(|| {
+            let heat = film.heat().map(|heat| heat.picture());
+            let (image, receipt) = (film.develop(), scene.receipt(settings));
+            let own = scene.display();
+            let display = Display { exposure: plan.exposure.unwrap_or(own.exposure), ..own };
+            let encode = |output: &Output| match (output.content, &heat) {
+                (Content::Heat, Some(heat)) => heat.encode(output.format, &Display::default(), &receipt),
+                _ => image.encode(output.format, &display, &receipt),
+            };
+            let bytes: Vec<Vec<u8>> = moment
+                .outputs
+                .iter()
+                .map(encode)
+                .collect::<Result<_, _>>()
+                .map_err(|e| Failure::Work(e.to_string()))?;
+            watch.check()?;
+            let stage = ready.into_iter().zip(&bytes).map(|(ready, bytes)| ready.stage(bytes));
+            let staged: Vec<Staged> = stage.collect::<Result<_, _>>()?;
+            watch.check()?;
+            progress.aside(|| output::commit(staged, plan.quiet, &|| watch.check().is_err()))
+        });
+        written?;
+        Ok(Took { compile, render, write, rays })
+    }
+}

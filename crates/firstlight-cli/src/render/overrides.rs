@@ -1,0 +1,126 @@
+//! What the command line says in place of the scene.
+
+use firstlight::{ColorDesc, LightDesc, SampleSet, SamplesDesc, SceneDesc, ShadowTerminator};
+
+use crate::args::Size;
+use crate::report::Failure;
+
+/// No film has more pixels on one side.
+const SIDE_LIMIT: u64 = 1 << 16;
+
+/// What the command line says in place of the scene.
+pub(super) struct Overrides<'a> {
+    pub width: Option<u32>,
+    pub height: Option<u32>,
+    pub size: Option<Size>,
+    pub transparent: bool,
+    pub background: Option<ColorDesc>,
+    pub antialiasing: Option<u32>,
+    pub samples: Option<SamplesDesc>,
+    pub camera: Option<&'a str>,
+    pub terminator: Option<ShadowTerminator>,
+}
+
+impl Overrides<'_> {
+    pub fn apply(&self, desc: &mut SceneDesc) -> Result<(), Failure> {
+        let render = &mut desc.render;
+        let scene = (render.width, render.height);
+        let asked = match self.size {
+            Some(Size::Both(width, height)) => (Some(width), Some(height)),
+            Some(Size::Longer(side)) if scene.0 >= scene.1 => (Some(side), None),
+            Some(Size::Longer(side)) => (None, Some(side)),
+            None => (self.width, self.height),
+        };
+        (render.width, render.height) = film_size(asked, scene)?;
+        if let Some(background) = self.background {
+            (render.background, render.transparent) = (background, false);
+        }
+        render.transparent |= self.transparent;
+        render.antialiasing = self.antialiasing.unwrap_or(render.antialiasing);
+        render.shadow_terminator = self.terminator.unwrap_or(render.shadow_terminator);
+        if let Some(name) = self.camera {
+            if !desc.cameras.iter().any(|(known, _)| known == name) {
+                return Err(Failure::Usage(no_such_camera(name, desc)));
+            }
+            render.camera = Some(name.to_owned());
+        }
+        if let Some(samples) = self.samples {
+            render.samples = samples;
+            for light in &mut desc.lights {
+                set_samples(light, samples)?;
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Has the light sampled so, if it has an area.
+fn set_samples(light: &mut LightDesc, samples: SamplesDesc) -> Result<(), Failure> {
+    if let (SamplesDesc::Count(samples), Some((_, SampleSet::Grid | SampleSet::Stratified))) =
+        (samples, light.samples())
+        && samples.isqrt() * samples.isqrt() != samples
+    {
+        let side = samples.isqrt();
+        let (below, above) = (side * side, (side + 1) * (side + 1));
+        return Err(Failure::Usage(format!(
+            "--samples {samples}: a light of this scene samples m x m cells; the nearest such numbers are {below} and {above}"
+        )));
+    }
+    light.set_samples(samples);
+    Ok(())
+}
+
+fn no_such_camera(name: &str, desc: &SceneDesc) -> String {
+    let names: Vec<&str> = desc.cameras.iter().map(|(name, _)| name.as_str()).filter(|name| !name.is_empty()).collect();
+    match names[..] {
+        [] => format!("--camera {name}: the scene names no cameras; leave the option out"),
+        _ => format!("--camera {name}: the scene has no such camera; it has {}", names.join(", ")),
+    }
+}
+
+/// Columns and rows: as asked, and one alone keeps the scene's aspect ratio, to the nearest pixel.
+fn film_size(asked: (Option<u32>, Option<u32>), scene: (u32, u32)) -> Result<(u32, u32), Failure> {
+    let (scene_width, scene_height) = (u64::from(scene.0), u64::from(scene.1));
+    // The scene's own numbers are judged with the scene, a size of 0 among them
+    if asked == (None, None) || scene_width == 0 || scene_height == 0 {
+        return Ok(scene);
+    }
+    let scaled = |n: u64, times: u64, over: u64| ((2 * n * times + over) / (2 * over)).max(1);
+    let (width, height) = match (asked.0.map(u64::from), asked.1.map(u64::from)) {
+        (Some(width), Some(height)) => (width, height),
+        (Some(width), None) => (width, scaled(width, scene_height, scene_width)),
+        (None, Some(height)) => (scaled(height, scene_width, scene_height), height),
+        (None, None) => (scene_width, scene_height),
+    };
+    if width > SIDE_LIMIT || height > SIDE_LIMIT {
+        return Err(Failure::Usage(format!(
+            "the picture would have {width} x {height} pixels; at most {SIDE_LIMIT} on a side are possible"
+        )));
+    }
+    Ok((width as u32, height as u32))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn one_side_alone_keeps_the_aspect_ratio() {
+        let size = |width, height| film_size((width, height), (300, 200)).ok();
+        assert_eq!(size(None, None), Some((300, 200)));
+        assert_eq!(size(Some(30), None), Some((30, 20)));
+        assert_eq!(size(None, Some(21)), Some((32, 21))); // 31.5
+        assert_eq!(size(Some(1), None), Some((1, 1))); // 0.67
+        assert_eq!(size(Some(7), Some(9)), Some((7, 9)));
+        assert_eq!(film_size((None, Some(1)), (1, 65536)).ok(), Some((1, 1)));
+    }
+
+    #[test]
+    fn a_film_has_its_limits() {
+        assert_eq!(film_size((Some(1), None), (1, 65536)).ok(), Some((1, 65536)));
+        assert!(film_size((Some(2), None), (1, 65536)).is_err());
+        assert!(film_size((Some(65536), Some(65536)), (1, 1)).is_ok());
+        // Nothing asked: the scene's own sizes are not judged here
+        assert_eq!(film_size((None, None), (0, 7)).ok(), Some((0, 7)));
+    }
+}

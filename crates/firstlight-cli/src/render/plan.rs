@@ -1,0 +1,366 @@
+//! The arguments, understood: first by themselves, then together with the scene.
+
+use std::collections::{HashMap, HashSet};
+use std::iter;
+use std::num::NonZeroUsize;
+use std::path::{Path, PathBuf};
+
+use firstlight::{AaMode, Format, Framing, RenderSettings, ShadowTerminator, SimdLevel, View, Window};
+
+use super::moments::Moment;
+use super::overrides::Overrides;
+use crate::args::{AntialiasingMode, Bits, Frames, RenderArgs, Terminator};
+use crate::input::{self, Input};
+use crate::output::{self, Content, Names, Output, Target};
+use crate::report::{Failure, say, shown};
+
+/// No more pixels are rendered at once.
+const PIXEL_LIMIT: u64 = 1 << 27;
+
+/// The arguments, understood as far as they can be without the scene.
+pub(super) struct Plan<'a> {
+    pub jobs: Vec<Job<'a>>,
+    /// Without the names of the scene in them. Empty: the one that the scene says.
+    pub outputs: Vec<Output>,
+    pub heat: Option<Output>,
+    pub bits: Option<Bits>,
+    pub stats: StatsPlan,
+    pub settings: RenderSettings,
+    pub overrides: Overrides<'a>,
+    /// Of 8- and 16-bit files, in place of the scene's.
+    pub exposure: Option<f64>,
+    /// How a camera frames a scene that has none, as far as it was said.
+    pub view: Option<View>,
+    pub margin: Option<f64>,
+    pub time: f64,
+    pub frames: Option<Frames>,
+    pub quiet: bool,
+}
+
+/// One of the scenes to render.
+pub(super) struct Job<'a> {
+    pub scene: &'a Path,
+    /// What the placeholders in the names of its outputs stand for.
+    pub names: Names,
+}
+
+/// Where the numbers go.
+pub(super) enum StatsPlan {
+    Nowhere,
+    Table,
+    Json(Target),
+}
+
+impl StatsPlan {
+    /// Where JSON goes.
+    pub fn target(&self) -> Option<&Target> {
+        match self {
+            StatsPlan::Json(target) => Some(target),
+            StatsPlan::Nowhere | StatsPlan::Table => None,
+        }
+    }
+}
+
+impl<'a> Plan<'a> {
+    pub fn resolve(args: &'a RenderArgs) -> Result<Self, Failure> {
+        let outputs = output::resolve(&args.output, args.bits, args.format)?;
+
+        let stats = match &args.stats {
+            None => StatsPlan::Nowhere,
+            Some(None) => StatsPlan::Table,
+            Some(Some(path)) => StatsPlan::Json(stats_target(path)?),
+        };
+        let heat = args.heat.as_deref().map(heat_output).transpose()?;
+        let jobs: Vec<Job> = args.scenes.iter().map(|scene| Job { scene, names: input::names_of(scene) }).collect();
+        let several = jobs.len() > 1;
+        let pictures = outputs.iter().map(|output| ("-o", &output.target));
+        let pictures = pictures.chain(heat.iter().map(|heat| ("--heat", &heat.target)));
+        for (option, target) in pictures.chain(stats.target().map(|target| ("--stats", target))) {
+            output::check_placeholders(option, target, several)?;
+        }
+        for job in &jobs {
+            let all: Vec<Output> = outputs.iter().chain(&heat).map(|output| output.of_scene(&job.names)).collect();
+            let stats = stats.target().map(|target| target.of_scene(&job.names));
+            output::refuse_clashes(input::file_of(job.scene), &all, stats.as_ref())?;
+            input::refuse_options_of_models(job.scene, &args.reading)?;
+        }
+
+        let simd = args.simd.unwrap_or(SimdLevel::Auto);
+        if !simd.is_available() {
+            let names: Vec<&str> = SimdLevel::available().iter().map(|level| level.name()).collect();
+            let (name, names) = (simd.name(), names.join(", "));
+            return Err(Failure::Usage(format!("--simd {name} is not to be had on this processor; it has {names}")));
+        }
+
+        if args.frames.is_some() && outputs.iter().any(|output| output.target == Target::Stdout) {
+            let message =
+                "--frames writes a file for each frame, and -o - is not one; name files, or give --time instead";
+            return Err(Failure::Usage(message.into()));
+        }
+
+        let mut settings = RenderSettings::default();
+        settings.simd = simd;
+        settings.threads = args.threads.and_then(|n| NonZeroUsize::new(n.into()));
+        settings.tile_size = args.tile_size.unwrap_or(settings.tile_size);
+        settings.crop = args.crop;
+        settings.reference = args.reference;
+        settings.heat = heat.is_some();
+        settings.visibility = args.visibility.unwrap_or(settings.visibility);
+        if let Some(mode) = args.aa_mode {
+            settings.aa_mode = match mode {
+                AntialiasingMode::Adaptive => AaMode::Adaptive,
+                AntialiasingMode::Full => AaMode::Full,
+            };
+        }
+
+        let overrides = Overrides {
+            width: args.width,
+            height: args.height,
+            size: args.size,
+            transparent: args.transparent,
+            background: args.background,
+            antialiasing: args.aa,
+            samples: args.samples,
+            camera: args.camera.as_deref(),
+            terminator: args.shadow_terminator.map(|word| match word {
+                Terminator::Smooth => ShadowTerminator::Smooth,
+                Terminator::Hard => ShadowTerminator::Hard,
+            }),
+        };
+        let (bits, frames, quiet) = (args.bits, args.frames, args.quiet);
+        let plan = Self {
+            jobs,
+            outputs,
+            heat,
+            bits,
+            stats,
+            settings,
+            overrides,
+            exposure: args.exposure,
+            view: args.view,
+            margin: args.margin,
+            time: args.time.unwrap_or(0.0),
+            frames,
+            quiet,
+        };
+        if several {
+            plan.refuse_shared()?;
+        }
+        Ok(plan)
+    }
+
+    /// Sees that no two of several scenes have an output in common, and that none is the file of another scene.
+    fn refuse_shared(&self) -> Result<(), Failure> {
+        let scenes: HashSet<Target> =
+            self.jobs.iter().filter_map(|job| input::file_of(job.scene)).map(|file| Target::of(file).real()).collect();
+        let frames = self.frames.map_or(0..=0, |Frames { first, last }| first..=last);
+        let mut seen: HashMap<Target, usize> = HashMap::new();
+        for (index, job) in self.jobs.iter().enumerate() {
+            let own = if self.outputs.is_empty() {
+                // What is wrong with it is said when it is its turn
+                self.default_output(job, &shown(job.scene), input::course_output(job.scene).as_deref(), false)
+                    .into_iter()
+                    .collect()
+            } else {
+                self.outputs.clone()
+            };
+            let pictures = own.iter().chain(&self.heat).flat_map(|output| {
+                let of_frame = move |frame| if self.frames.is_some() { output.of_frame(frame) } else { output.clone() };
+                frames.clone().map(of_frame).map(|output| output.target)
+            });
+            for target in pictures.chain(self.stats.target().cloned()) {
+                let target = target.of_scene(&job.names);
+                let (name, real) = (target.name(), target.real());
+                if scenes.contains(&real) {
+                    return Err(Failure::Usage(format!(
+                        "{name} would replace the file of one of the scenes; name another output with -o"
+                    )));
+                }
+                if let Some(before) = seen.insert(real, index)
+                    && before != index
+                {
+                    let (one, other) = (shown(self.jobs[before].scene), shown(job.scene));
+                    return Err(Failure::Usage(format!(
+                        "{one} and {other} would both be written to {name}; {{name}} in the output's name keeps their \
+                         endings apart, else render them in two calls"
+                    )));
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// The moments to render, each with its own files.
+    pub fn moments(&self, job: &Job, input: &Input, outputs: &[Output]) -> Result<Vec<Moment>, Failure> {
+        let Some(Frames { first, last }) = self.frames else {
+            let outputs = outputs.iter().map(|output| output.of_scene(&job.names)).collect();
+            return Ok(vec![Moment { time: self.time, outputs }]);
+        };
+        let stats = self.stats.target().map(|target| target.of_scene(&job.names));
+        for output in outputs {
+            if let Target::File(path) = &output.target
+                && path.metadata().is_ok_and(|meta| !meta.is_file() && !meta.is_dir())
+            {
+                let path = shown(path);
+                return Err(Failure::Usage(format!("--frames writes a file for each frame, and {path} is not one")));
+            }
+        }
+        // Compiling refuses a rate that is none
+        let fps = Some(input.parsed.desc.render.fps).filter(|fps| *fps > 0.0).unwrap_or(1.0);
+        let mut seen = HashSet::new();
+        let mut moments = Vec::new();
+        for frame in first..=last {
+            let outputs = outputs.iter().map(|output| output.of_frame(frame).of_scene(&job.names));
+            let outputs: Vec<Output> = outputs.collect();
+            output::refuse_clashes(input::file_of(job.scene), &outputs, stats.as_ref())?;
+            for output in &outputs {
+                if let Target::File(path) = &output.target
+                    && !seen.insert(path.clone())
+                {
+                    let path = shown(path);
+                    return Err(Failure::Usage(format!("two frames would be {path}; give the files other names")));
+                }
+            }
+            moments.push(Moment { time: f64::from(frame) / fps, outputs });
+        }
+        Ok(moments)
+    }
+
+    /// Brings the plan and the scene together: the description takes the overrides, and what the plan leaves open
+    /// is decided.
+    ///
+    /// # Errors
+    /// What the options ask for and the scene has not.
+    pub fn join(&self, job: &Job, input: &mut Input) -> Result<(Vec<Output>, RenderSettings), Failure> {
+        // A text with faults may lack what the options refer to: say the faults, not what follows from them
+        if input.parsed.faults().iter().any(|fault| fault.severity == firstlight::Severity::Error) {
+            input.compile(self.time, self.quiet)?;
+        }
+        self.overrides.apply(&mut input.parsed.desc)?;
+        self.frame(input)?;
+
+        let mut settings = self.settings.clone();
+        if settings.threads.is_none() {
+            // A course file's wish, held to what --threads allows
+            let threads = input.parsed.threads.map(|n| n.min(1024) as usize);
+            settings.threads = threads.and_then(NonZeroUsize::new);
+        }
+        let (width, height) = (input.parsed.desc.render.width, input.parsed.desc.render.height);
+        if let Some(crop) = settings.crop
+            && !inside(crop, width, height)
+        {
+            let Window { x, y, width: w, height: h } = crop;
+            return Err(Failure::Usage(format!(
+                "--crop {x},{y},{w},{h} is not inside the picture, which is {width} x {height} pixels"
+            )));
+        }
+
+        let (width, height) = settings.crop.map_or((width, height), |crop| (crop.width, crop.height));
+        let pixels = u64::from(width) * u64::from(height);
+        if pixels > PIXEL_LIMIT {
+            return Err(Failure::Usage(format!(
+                "{width} x {height} are {pixels} pixels, and at most {PIXEL_LIMIT} are rendered at once; render parts of the \
+                 picture, each with --crop X,Y,WIDTH,HEIGHT"
+            )));
+        }
+
+        if !self.outputs.is_empty() {
+            return Ok((self.outputs.iter().chain(&self.heat).cloned().collect(), settings));
+        }
+        let outputs: Vec<Output> =
+            iter::once(self.default_output(job, &input.name, input.parsed.output.as_deref(), true)?)
+                .chain(self.heat.clone())
+                .collect();
+        let own: Vec<Output> = outputs.iter().map(|output| output.of_scene(&job.names)).collect();
+        let stats = self.stats.target().map(|target| target.of_scene(&job.names));
+        output::refuse_clashes(input::file_of(job.scene), &own, stats.as_ref())?;
+        Ok((outputs, settings))
+    }
+
+    /// Has a camera that is found for the scene frame it as asked.
+    fn frame(&self, input: &mut Input) -> Result<(), Failure> {
+        for (option, said) in [("--view", self.view.is_some()), ("--margin", self.margin.is_some())] {
+            if said && !input.parsed.desc.cameras.is_empty() {
+                let name = &input.name;
+                return Err(Failure::Usage(format!(
+                    "{option} is for models and for scenes without a camera, and {name} has one; take its [camera] out, or \
+                     leave the option out"
+                )));
+            }
+        }
+        let found = input.framing;
+        input.framing = Framing { view: self.view.unwrap_or(found.view), margin: self.margin.unwrap_or(found.margin) };
+        Ok(())
+    }
+
+    /// A course file's `output_file`, else the scene's name with `.png`, in the working folder. Of the files there it takes the
+    /// place of none but our own pictures: `bunny.obj` may well have a texture `bunny.png` beside it. `tell`: says so.
+    fn default_output(&self, job: &Job, scene: &str, course: Option<&str>, tell: bool) -> Result<Output, Failure> {
+        if let Some(path) = course {
+            let path = PathBuf::from(path);
+            let format = output::with_bits(output::format_of_course(scene, &path)?, self.bits);
+            return Ok(Output { target: Target::File(path), format, content: Content::Scene });
+        }
+        let format = output::with_bits(Format::Png8, self.bits);
+        let choices = ["{stem}.png", "{stem}.render.png"].map(|name| Output {
+            target: Target::File(PathBuf::from(name)),
+            format,
+            content: Content::Scene,
+        });
+        let is_free = |output: &Output| match self.frames {
+            Some(Frames { first, last }) => {
+                (first..=last).all(|frame| output.of_frame(frame).of_scene(&job.names).is_free())
+            }
+            None => output.of_scene(&job.names).is_free(),
+        };
+        let [name, other] = choices.each_ref().map(|output| output.of_scene(&job.names).target.name());
+        let Some(free) = choices.iter().position(is_free) else {
+            return Err(Failure::Work(format!(
+                "{name} and {other} would replace files that are no pictures of firstlight; name another with -o"
+            )));
+        };
+        if free > 0 && tell && !self.quiet {
+            say(format_args!("{name} is there and is no picture of firstlight; writing {other}"));
+        }
+        Ok(choices[free].clone())
+    }
+}
+
+/// The picture of the work is a `.png`.
+fn heat_output(path: &Path) -> Result<Output, Failure> {
+    let target = Target::of(path);
+    let is_png = path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("png"));
+    if target == Target::Stdout || !is_png {
+        let name = shown(path);
+        return Err(Failure::Usage(format!("--heat {name}: the file's name must end in .png")));
+    }
+    Ok(Output { target, format: Format::Png8, content: Content::Heat })
+}
+
+/// A file for the numbers is a `.json`, so that no slip of the hand writes them over a scene or a picture.
+fn stats_target(path: &Path) -> Result<Target, Failure> {
+    let target = Target::of(path);
+    let is_json = path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("json"));
+    if target != Target::Stdout && !is_json {
+        let name = shown(path);
+        return Err(Failure::Usage(format!("--stats={name}: the file's name must end in .json; - is standard output")));
+    }
+    Ok(target)
+}
+
+fn inside(crop: Window, width: u32, height: u32) -> bool {
+    let end = |start: u32, length: u32| u64::from(start) + u64::from(length);
+    end(crop.x, crop.width) <= u64::from(width) && end(crop.y, crop.height) <= u64::from(height)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_crop_may_touch_the_edges() {
+        let crop = |x, y, width, height| inside(Window { x, y, width, height }, 10, 20);
+        assert!(crop(0, 0, 10, 20) && crop(9, 19, 1, 1));
+        assert!(!crop(0, 0, 11, 1) && !crop(10, 0, 1, 1) && !crop(0, 20, 1, 1) && !crop(u32::MAX, 0, u32::MAX, 1));
+    }
+}
