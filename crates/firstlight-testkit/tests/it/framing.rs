@@ -85,8 +85,11 @@ fn every_model_is_in_the_middle_of_its_picture() {
             let scene = compiled(&model, Framing { view, margin }, UpAxis::Y);
             let free = SIZE.map(|side| margin * f64::from(SIZE[1]) / f64::from(side));
             // The corners of its triangles, projected: equal on both sides, the margin where it is narrowest
-            let corners =
-                mesh.triangles.iter().flatten().map(|i| DVec3::from(mesh.positions[*i as usize].map(f64::from)));
+            let corners = mesh
+                .triangles
+                .iter()
+                .flatten()
+                .map(|i| DVec3::from(mesh.origin) + DVec3::from(mesh.positions[*i as usize].map(f64::from)));
             let at = project(&scene, corners);
             let mut least = f64::INFINITY;
             for (at, free) in at.iter().zip(free) {
