@@ -52,7 +52,7 @@ fn scene(at: V, is_moved: bool) -> SceneDesc {
         ..PlaneDesc::default()
     };
     let cube = BoxDesc { size: [0.12, 0.16, 0.12], ..BoxDesc::new(there([-0.3, 0.08, -0.2])) };
-    let disk = DiskLightDesc::new(add(at, [-0.6, 1.0, 0.6]), [0.4, -1.0, -0.4], 0.1);
+    let disk = DiskLightDesc::with_normal(add(at, [-0.6, 1.0, 0.6]), [0.4, -1.0, -0.4], 0.1);
     let mut lamp = SphereLightDesc::new(add(at, [-0.05, 0.3, -0.45]), 0.04);
     lamp.strength = 3.0;
     let shadow = rectangle(add(at, [0.2, 1.2, 0.3]), [0.3, 0.0, 0.0], [0.0, 0.0, 0.3], SampleSet::Sobol, 64);
@@ -239,7 +239,7 @@ fn the_automatic_camera_takes_every_model_that_the_reader_takes() {
         let files = [("box.obj".to_owned(), obj(at, size))].into_iter().collect();
         let mut desc = SceneDesc::of_model("box.obj", &ModelSettings::default());
         (desc.render.width, desc.render.height) = (64, 64);
-        let options = CompileOptions { complete: true, ..CompileOptions::default() };
+        let options = CompileOptions { light: true, ..CompileOptions::default() };
         match desc.compile(&MemoryAssets { files }, &options) {
             Ok(compiled) => picture(&compiled.scene, &adaptive()),
             Err(error) => panic!("{size} m at {at:?}: {error}"),
