@@ -334,6 +334,25 @@ fn a_file_that_was_there_is_said_to_be_replaced() {
     assert_eq!(say("render scene.toml --stats=n.json"), "wrote scene.png (replaced)\nwrote n.json (replaced)\n");
 }
 
+/// Small files that decoders panic on: nothing is heard of that but a damaged picture, with its name.
+#[test]
+fn a_damaged_texture_is_told_by_its_name() {
+    let corpus = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../fuzz/corpus/picture");
+    for (file, why) in [
+        ("palette-of-44-bytes.png", "PNG file: its palette has 44 bytes, not 3 for each"),
+        ("two-components.jpg", "JPEG file: its frame has 2 components"),
+        ("decoder-fails-upsampling.jpg", "JPEG file: its decoder failed on it; write or fetch it anew"),
+    ] {
+        let folder = with_files();
+        fs::copy(corpus.join(file), folder.path("wall.png")).unwrap();
+        let said = format!("\"wall.png\" cannot be read as a picture: is a damaged {why}");
+        let ran = folder.run("render wall.toml -o a.png").done().says(&[&said, "magenta and black stand in for it"]);
+        assert!(!ran.stderr.contains(".rs:"), "{}", ran.stderr);
+        folder.run("render wall.toml -o b.png --strict").exits(1).says(&[&said]);
+        assert!(!folder.path("b.png").exists());
+    }
+}
+
 /// Names that are no UTF-8, of everything that can be named on the command line.
 #[test]
 #[cfg(target_os = "linux")]

@@ -75,8 +75,9 @@ impl Frame {
         let Some((&[_, _, _, _, _, count], rest)) = segment.split_first_chunk::<6>() else {
             return Err("its frame is cut short".into());
         };
-        if !(1..=4).contains(&count) || rest.len() != 3 * usize::from(count) {
-            return Err(format!("its frame has {count} components in {} bytes, not 1 to 4 in 3 each", rest.len()));
+        // Two are no picture: neither gray nor colours
+        if !matches!(count, 1 | 3 | 4) || rest.len() != 3 * usize::from(count) {
+            return Err(format!("its frame has {count} components in {} bytes, not 1, 3 or 4 in 3 each", rest.len()));
         }
         let components: Vec<[u8; 3]> = rest.chunks_exact(3).map(|c| [c[0], c[1] >> 4, c[1] & 15]).collect();
         for (i, [number, across, down]) in components.iter().enumerate() {
@@ -190,7 +191,7 @@ mod tests {
             damaged[at] = value;
             in_jpeg(&damaged).unwrap_err()
         };
-        assert_eq!(words(&cat, 0xc2, 5, 2), "its frame has 2 components in 9 bytes, not 1 to 4 in 3 each");
+        assert_eq!(words(&cat, 0xc2, 5, 2), "its frame has 2 components in 9 bytes, not 1, 3 or 4 in 3 each");
         assert_eq!(words(&cat, 0xc2, 7, 0x50), "component 1 is sampled 5 x 0, not 1 to 4 times");
         assert_eq!(words(&cat, 0xc2, 9, 1), "its frame has component 1 twice");
         assert_eq!(words(&cat, 0xda, 0, 9), "a scan has 9 components in 10 bytes");

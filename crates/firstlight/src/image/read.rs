@@ -307,6 +307,20 @@ mod tests {
         }
     }
 
+    /// A panic of the decoder, which no look at the segments foresees.
+    #[test]
+    fn where_the_decoder_fails_the_file_is_damaged() {
+        let corpus = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../fuzz/corpus/picture");
+        for name in
+            ["decoder-fails-upsampling.jpg", "decoder-fails-transform.jpg", "decoder-fails-transform-scalar.jpg"]
+        {
+            let bytes = std::fs::read(corpus.join(name)).unwrap();
+            damage::in_jpeg(&bytes).unwrap();
+            let words = decode(&bytes, &Limits::default()).unwrap_err().to_string();
+            assert!(words.starts_with("is a damaged JPEG file: "), "{name}: {words}");
+        }
+    }
+
     /// Makes the checksums of a PNG's chunks right again, so that damage gets past them.
     fn repair(bytes: &mut [u8]) {
         let mut at = 8;
