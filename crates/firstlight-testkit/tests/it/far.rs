@@ -112,14 +112,14 @@ fn a_detailed_model_is_the_same_wherever_it_is() {
         }
     }
     let (off, _) = difference(&here, &picture(&compiled(&flat), &adaptive()), &expected);
-    assert!(off > 300, "the detail does not show: {off} pixels");
+    assert!(off > 30, "the detail does not show: {off} pixels");
     for at in PLACES {
         for is_moved in [false, true] {
             let there = compiled(&scene(at, is_moved));
             assert!((there.origin() - DVec3::from(at)).length() < 8.0, "{}", there.origin());
             let (off, mean) = difference(&here, &picture(&there, &adaptive()), &expected);
             println!("{at:?}, moved: {is_moved}: {off} pixels differ, {mean} in the mean");
-            assert!(off <= 15 && mean < 0.05, "{at:?}, moved: {is_moved}: {off} pixels differ, {mean} in the mean");
+            assert!(off <= 10 && mean < 0.05, "{at:?}, moved: {is_moved}: {off} pixels differ, {mean} in the mean");
         }
     }
 }
@@ -165,7 +165,7 @@ fn rays_and_answers_are_in_the_coordinates_of_the_world() {
             ];
             met -= i32::from(hidden[0] != hidden[1]);
         }
-        assert!(met > 400, "{met} at {at:?}");
+        assert!(met > 250, "{met} at {at:?}");
         // The camera
         let [(a, _), (b, _)] = [&here, &there].map(|scene| scene.camera().ray(20.0, 30.0, 1.0));
         assert!((a.o + far - b.o).length() < 1e-6 && (a.d - b.d).length() < 1e-6, "{a:?} {b:?}");
@@ -255,7 +255,7 @@ fn the_automatic_camera_takes_every_model_that_the_reader_takes() {
         ([0.0, 2.4e8, 0.0], 1e7),
     ] {
         let (off, mean) = difference(&here, &shot(at, size), &expected);
-        assert!(off < 20 && mean < 0.1, "{size} m at {at:?}: {off} pixels differ, {mean} in the mean");
+        assert!(off < 100 && mean < 0.3, "{size} m at {at:?}: {off} pixels differ, {mean} in the mean");
     }
 }
 
