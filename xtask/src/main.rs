@@ -75,8 +75,19 @@ enum Verify {
 /// What a command ends with: nothing, or what went wrong.
 type Outcome = Result<(), String>;
 
+impl Task {
+    /// Whether it renders so much, or measures, that only a release build will do.
+    fn wants_release(&self) -> bool {
+        !matches!(self, Task::Test | Task::Generate { .. } | Task::Verify { what: None, .. })
+    }
+}
+
 fn main() -> ExitCode {
-    let outcome = match Args::parse().command {
+    let task = Args::parse().command;
+    if cfg!(debug_assertions) && task.wants_release() {
+        return again_in_release();
+    }
+    let outcome = match task {
         Task::Test => test::run(),
         Task::Generate { check } => generate::run(check),
         Task::Pictures { filter } => pictures::run(filter.as_deref()),
@@ -91,6 +102,23 @@ fn main() -> ExitCode {
     };
     match outcome {
         Ok(()) => ExitCode::SUCCESS,
+        Err(fault) => {
+            eprintln!("xtask: {fault}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+/// Runs this command line again, built for release. What is quick shares the build of the tests.
+fn again_in_release() -> ExitCode {
+    let status = cargo()
+        .args(["run", "--quiet", "--release", "--package", "xtask", "--"])
+        .args(std::env::args_os().skip(1))
+        .current_dir(".")
+        .status();
+    match status {
+        Ok(status) if status.success() => ExitCode::SUCCESS,
+        Ok(_) => ExitCode::FAILURE,
         Err(fault) => {
             eprintln!("xtask: {fault}");
             ExitCode::FAILURE

@@ -2,26 +2,16 @@
 
 use crate::{Outcome, cargo, generate, root, run as run_to_end};
 
-/// The book's builder, put under `target/tools` where the machine has none.
-const MDBOOK: &str = "0.5.4";
-
+/// Builds the book, where mdBook is installed; its links are among the tests.
 fn build_book() -> Outcome {
-    let tools = root().join("target/tools");
-    let program = tools.join("bin/mdbook");
-    if !program.exists() {
-        let version = format!("mdbook@{MDBOOK}");
-        run_to_end(
-            cargo()
-                .args(["install", "--quiet", "--locked", "--no-default-features", "--root"])
-                .arg(&tools)
-                .arg(version),
-        )?;
-    }
-    let mut command = std::process::Command::new(program);
-    // A warning of the book's builder is a broken page
-    let output = command.arg("build").arg(root().join("docs")).output().map_err(|e| format!("mdbook: {e}"))?;
+    let mut command = std::process::Command::new("mdbook");
+    let Ok(output) = command.arg("build").arg(root().join("docs")).output() else {
+        eprintln!("\nno mdbook: the book is not built, only its links are tested");
+        return Ok(());
+    };
     let said = String::from_utf8_lossy(&output.stderr);
     eprintln!("\n$ mdbook build docs\n{said}");
+    // A warning of the book's builder is a broken page
     if output.status.success() && !said.contains("WARN") && !said.contains("ERROR") {
         Ok(())
     } else {

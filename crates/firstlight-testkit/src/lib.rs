@@ -7,15 +7,24 @@
 
 #![allow(missing_docs, reason = "tests say what they build by its name")]
 
+#[cfg(feature = "scenes")]
 pub mod converged;
+#[cfg(feature = "scenes")]
 pub mod exact_scenes;
+#[cfg(feature = "scenes")]
 pub mod graded;
+#[cfg(feature = "scenes")]
 pub mod hostile_mesh;
+#[cfg(feature = "scenes")]
 pub mod hostile_picture;
+#[cfg(feature = "scenes")]
 pub mod hostile_text;
+#[cfg(feature = "scenes")]
 pub mod kept;
 mod numbers;
+#[cfg(feature = "scenes")]
 pub mod random;
+#[cfg(feature = "scenes")]
 pub mod scenes;
 
 pub use numbers::Random;

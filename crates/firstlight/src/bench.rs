@@ -216,7 +216,7 @@ impl Soft {
                 let Some(hit) = scene.intersect_local(&ray) else { continue };
                 let si = scene.local_surface(&ray, &hit, &differential);
                 let counts = |k: usize| si.horizon.dot(scene.lights[0].towards(k, si.lit_from).l) > 0.0;
-                if (0..target.samples).any(counts) {
+                if (0..scene.lights[0].samples()).any(counts) {
                     points.push(Viewpoint::of(&si));
                 }
             }
@@ -244,7 +244,7 @@ impl Soft {
 
     /// How many samples of a light there are.
     pub fn count(&self) -> usize {
-        self.target.samples
+        self.scene.lights[0].samples()
     }
 
     /// For each point and block of samples, in the light's order, which are hidden; those below the horizon in any way.
@@ -275,14 +275,14 @@ impl Soft {
         let light = &self.scene.lights[0];
         hidden.clear();
         for point in &self.points {
-            for first in (0..self.target.samples).step_by(LANES) {
+            for first in (0..self.count()).step_by(LANES) {
                 let mut shadows = ShadowRays {
                     from: point.ray(self.target.light, Vec3::ZERO, true),
                     rays: RayPacket16::ZERO,
                     t_end: [0.0; LANES],
                 };
                 let mut active = 0;
-                for k in first..(first + LANES).min(self.target.samples) {
+                for k in first..(first + LANES).min(self.count()) {
                     let l = light.towards(k, point.p).l;
                     shadows.rays.set(k - first, point.start, l);
                     shadows.t_end[k - first] = point.ray(self.target.light, l, true).end();
@@ -298,8 +298,8 @@ impl Soft {
         let light = &self.scene.lights[0];
         let mut below = Vec::new();
         for point in &self.points {
-            for first in (0..self.target.samples).step_by(LANES) {
-                let lane = |k: usize| k < self.target.samples && point.horizon.dot(light.towards(k, point.p).l) > 0.0;
+            for first in (0..self.count()).step_by(LANES) {
+                let lane = |k: usize| k < self.count() && point.horizon.dot(light.towards(k, point.p).l) > 0.0;
                 below.push(!(0..LANES).fold(0, |mask, i| mask | u16::from(lane(first + i)) << i));
             }
         }

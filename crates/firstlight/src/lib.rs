@@ -52,6 +52,7 @@
 #![warn(unnameable_types)]
 
 mod accel;
+#[cfg(feature = "bench")]
 #[doc(hidden)]
 pub mod bench;
 mod camera;
@@ -73,6 +74,7 @@ mod texture;
 mod transform;
 mod visibility;
 
+pub use accel::SimdLevel;
 pub use camera::{Camera, CameraDesc, FilmPlane, Frame, Orthographic, Pinhole, Projection};
 pub use color::{Display, Encoding, Rgb};
 pub use context::{AssetError, Assets, CompileStage, FolderAssets, MemoryAssets, NoAssets, OnCompile};
@@ -90,9 +92,7 @@ pub use light::{
 };
 pub use material::{BlinnPhongDesc, MaterialDesc, PhongDesc};
 pub use math::{DVec3, ShadowRay, Vec2, Vec3, WorldRay};
-pub use render::{
-    AaMode, Film, Heat, LightCounts, RenderSettings, RenderStats, SimdLevel, VisibilityMode, render, render_image,
-};
+pub use render::{AaMode, Film, Heat, LightCounts, RenderSettings, RenderStats, VisibilityMode, render, render_image};
 pub use scene::{
     Added, CameraHit, CompileOptions, Compiled, DisplayEncoding, Framing, Hit, ModelSettings, RenderDesc, Scene,
     SceneDesc, SceneSummary, SurfacePoint, UpAxis, View,

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 use firstlight::{ImportError, MeshData, MeshFormat, read_mesh};
-use firstlight_testkit::hostile_mesh;
+use firstlight_testkit::{Random, hostile_mesh};
 
 fn folder() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../firstlight/tests/models")
@@ -104,16 +104,6 @@ fn materials_groups_and_smoothing_of_an_obj() {
     assert!(boxes.parts.iter().all(|p| !p.object.is_empty()), "{:?}", boxes.parts);
 }
 
-/// Numbers without pattern, always the same.
-struct Random(u64);
-
-impl Random {
-    fn next(&mut self, below: u32) -> u32 {
-        self.0 = self.0.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-        ((self.0 >> 33) % u64::from(below)) as u32
-    }
-}
-
 /// A PLY file in one of the three encodings, value by value.
 struct PlyWriter {
     kind: u32,
@@ -154,7 +144,7 @@ impl PlyWriter {
 
 #[test]
 fn ply_of_any_layout_comes_back_in_all_encodings() {
-    let mut random = Random(1);
+    let mut random = Random::new(1);
     let reals = ["float", "float32", "double", "float64"];
     let wholes = ["char", "int8", "uchar", "uint8", "short", "int16", "ushort", "uint16", "int", "int32", "uint"];
     for round in 0..300 {
@@ -162,10 +152,10 @@ fn ply_of_any_layout_comes_back_in_all_encodings() {
         // Properties of vertices in any order, with unknown ones and lists among them
         let attributes: [(&[&str], u32); 5] = [
             (&["x", "y", "z"], 1),
-            (&["nx", "ny", "nz"], random.next(2)),
-            (&["s", "t"], random.next(2)),
-            (&["red", "green", "blue"], random.next(2)),
-            (&["radius"], random.next(2)),
+            (&["nx", "ny", "nz"], random.below(2)),
+            (&["s", "t"], random.below(2)),
+            (&["red", "green", "blue"], random.below(2)),
+            (&["radius"], random.below(2)),
         ];
         let mut properties: Vec<(String, &str, bool)> = Vec::new();
         for (names, present) in attributes {
@@ -173,27 +163,27 @@ fn ply_of_any_layout_comes_back_in_all_encodings() {
                 let of = if *name == "red" || *name == "green" || *name == "blue" {
                     "uchar"
                 } else {
-                    reals[random.next(4) as usize]
+                    reals[random.below(4) as usize]
                 };
                 properties.push((name.to_string(), of, false));
             }
         }
-        for i in 0..random.next(3) {
-            properties.push((format!("unknown{i}"), wholes[random.next(11) as usize], random.next(2) == 1));
+        for i in 0..random.below(3) {
+            properties.push((format!("unknown{i}"), wholes[random.below(11) as usize], random.below(2) == 1));
         }
         for i in (1..properties.len()).rev() {
-            properties.swap(i, random.next(i as u32 + 1) as usize);
+            properties.swap(i, random.below(i as u32 + 1) as usize);
         }
-        let (vertices, faces) = (3 + random.next(40), random.next(30));
-        let index = ["uchar", "int", "uint", "short"][random.next(4) as usize];
-        let triangles_only = random.next(2) == 1;
-        let faces_first = random.next(2) == 1;
+        let (vertices, faces) = (3 + random.below(40), random.below(30));
+        let index = ["uchar", "int", "uint", "short"][random.below(4) as usize];
+        let triangles_only = random.below(2) == 1;
+        let faces_first = random.below(2) == 1;
         let values: Vec<Vec<f64>> =
-            (0..vertices).map(|_| properties.iter().map(|_| f64::from(random.next(100)) / 4.0).collect()).collect();
+            (0..vertices).map(|_| properties.iter().map(|_| f64::from(random.below(100)) / 4.0).collect()).collect();
         let polygons: Vec<Vec<u32>> = (0..faces)
             .map(|_| {
-                let size = if triangles_only { 3 } else { random.next(7) };
-                (0..size).map(|_| random.next(vertices)).collect()
+                let size = if triangles_only { 3 } else { random.below(7) };
+                (0..size).map(|_| random.below(vertices)).collect()
             })
             .collect();
         let meshes: Vec<MeshData> = (0..3)

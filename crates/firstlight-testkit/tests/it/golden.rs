@@ -17,18 +17,6 @@ fn scenes() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes")
 }
 
-/// The folders in a folder, in the order of their names.
-fn folders(path: &Path) -> Vec<PathBuf> {
-    let mut found: Vec<_> =
-        std::fs::read_dir(path).unwrap().map(|e| e.unwrap().path()).filter(|p| p.is_dir()).collect();
-    found.sort();
-    found
-}
-
-fn name(path: &Path) -> String {
-    path.file_name().unwrap().to_string_lossy().into_owned()
-}
-
 /// What replaces a scene's own.
 #[derive(Clone, Copy, Default)]
 struct Instead {
@@ -108,101 +96,87 @@ fn leave(case: &str, expected: &[[f32; 4]], actual: &Image) -> PathBuf {
     folder
 }
 
+// A test for every folder of `scenes/golden`, and for every scene of the gallery
+include!(concat!(env!("OUT_DIR"), "/golden.rs"));
+
+/// Holds a case, `FAMILY/CASE`: its bits, and that what is lit once is as if each ray was.
+fn hold(title: &str) {
+    let case = scenes().join("golden").join(title);
+    let (image, scene) = match title.strip_prefix("config/") {
+        Some(config) => {
+            let builtin = builtin_scenes().iter().find(|b| b.name == config).expect("a built-in scene");
+            let instead = Instead { size: Some([96, 96]), ..Instead::default() };
+            (picture(builtin.text.as_bytes(), &NoAssets, instead, &RenderSettings::default()), None)
+        }
+        None => {
+            let text = std::fs::read(case.join("scene.toml")).unwrap();
+            let assets = FolderAssets::new(&case, &[]).unwrap();
+            let integrated = Instead { samples: Some(SamplesDesc::Exact), ..Instead::default() };
+            let image = picture(&text, &assets, Instead::default(), &RenderSettings::default());
+            (image, Some(compiled(&text, &assets, integrated)))
+        }
+    };
+    hold_bits(title, &case.join("expected.exr"), &image);
+    if let Some(scene) = scene {
+        hold_lit_once(&scene);
+    }
+}
+
+/// The same bits as when the picture was last looked at.
+fn hold_bits(title: &str, path: &Path, actual: &Image) {
+    let expected = std::fs::read(path).ok().map(|bytes| StoredImage::read(&bytes).unwrap().pixels);
+    let wrong_pixels = match &expected {
+        Some(pixels) if pixels.len() == actual.pixels.len() => differences(pixels, &actual.pixels),
+        _ => actual.pixels.len(),
+    };
+    if wrong_pixels == 0 {
+        return;
+    }
+    let left = expected.filter(|e| e.len() == actual.pixels.len()).map(|e| leave(title, &e, actual));
+    if std::env::var_os("FIRSTLIGHT_BLESS").is_some() {
+        std::fs::write(path, exr(actual)).unwrap();
+    }
+    let difference = match left {
+        Some(folder) => format!("; see {}", folder.display()),
+        None => " from none of that size".to_owned(),
+    };
+    panic!("{title}: {wrong_pixels} pixels differ{difference}\nFIRSTLIGHT_BLESS=1 takes the new picture");
+}
+
 /// The steps of an 8-bit picture by which a pixel that is lit once may be off the mean of its rays, each lit by itself.
 const ONCE: f64 = 1.0;
 
-#[test]
-fn what_is_lit_once_is_as_if_each_ray_was() {
-    let mut wrong = Vec::new();
-    for case in folders(&scenes().join("golden")).iter().flat_map(|family| folders(family)) {
-        let Ok(text) = std::fs::read(case.join("scene.toml")) else { continue };
-        let assets = FolderAssets::new(&case, &[]).unwrap();
-        let scene = compiled(&text, &assets, Instead { samples: Some(SamplesDesc::Exact), ..Instead::default() });
-        let [once, each] = [AaMode::Adaptive, AaMode::Full]
-            .map(|aa_mode| shown(&scene, &RenderSettings { aa_mode, ..RenderSettings::default() }));
-        let steps = |x: f32| 255.0 * scene.display().encode(x);
-        let off =
-            |(a, b): (&[f32; 4], &[f32; 4])| (0..3).map(|k| (steps(a[k]) - steps(b[k])).abs()).fold(0.0, f64::max);
-        let all: Vec<f64> = once.pixels.iter().zip(&each.pixels).map(off).collect();
-        let worst = (0..all.len()).max_by(|a, b| all[*a].total_cmp(&all[*b])).expect("a picture has pixels");
-        if !(all[worst] <= ONCE) {
-            let [x, y] = [worst as u32 % scene.width(), worst as u32 / scene.width()];
-            wrong.push(format!("{}: pixel {x}, {y} is {:.2} steps off", case.display(), all[worst]));
-        }
-    }
-    assert!(wrong.is_empty(), "\n{}", wrong.join("\n"));
+/// What is lit once is as if each ray was.
+fn hold_lit_once(scene: &Scene) {
+    let [once, each] = [AaMode::Adaptive, AaMode::Full]
+        .map(|aa_mode| shown(scene, &RenderSettings { aa_mode, ..RenderSettings::default() }));
+    let steps = |x: f32| 255.0 * scene.display().encode(x);
+    let off = |(a, b): (&[f32; 4], &[f32; 4])| (0..3).map(|k| (steps(a[k]) - steps(b[k])).abs()).fold(0.0, f64::max);
+    let all: Vec<f64> = once.pixels.iter().zip(&each.pixels).map(off).collect();
+    let worst = (0..all.len()).max_by(|a, b| all[*a].total_cmp(&all[*b])).expect("a picture has pixels");
+    let [x, y] = [worst as u32 % scene.width(), worst as u32 / scene.width()];
+    assert!(all[worst] <= ONCE, "pixel {x}, {y} is {:.2} steps off", all[worst]);
 }
 
-#[test]
-fn every_golden_scene_has_its_bits() {
-    let mut wrong = Vec::new();
-    let mut count = 0;
-    for family in folders(&scenes().join("golden")) {
-        for case in folders(&family) {
-            count += 1;
-            let title = format!("{}/{}", name(&family), name(&case));
-            let actual = if name(&family) == "config" {
-                let builtin = builtin_scenes().iter().find(|b| b.name == name(&case)).expect("a built-in scene");
-                let instead = Instead { size: Some([96, 96]), ..Instead::default() };
-                picture(builtin.text.as_bytes(), &NoAssets, instead, &RenderSettings::default())
-            } else {
-                let text = std::fs::read(case.join("scene.toml")).unwrap();
-                let assets = FolderAssets::new(&case, &[]).unwrap();
-                picture(&text, &assets, Instead::default(), &RenderSettings::default())
-            };
-            let path = case.join("expected.exr");
-            let expected = std::fs::read(&path).ok().map(|bytes| StoredImage::read(&bytes).unwrap().pixels);
-            let wrong_pixels = match &expected {
-                Some(pixels) if pixels.len() == actual.pixels.len() => differences(pixels, &actual.pixels),
-                _ => actual.pixels.len(),
-            };
-            if wrong_pixels == 0 {
-                continue;
-            }
-            let left = expected.filter(|e| e.len() == actual.pixels.len()).map(|e| leave(&title, &e, &actual));
-            wrong.push(format!(
-                "{title}: {wrong_pixels} pixels differ{}",
-                match left {
-                    Some(folder) => format!("; see {}", folder.display()),
-                    None => " from none of that size".to_owned(),
-                }
-            ));
-            if std::env::var_os("FIRSTLIGHT_BLESS").is_some() {
-                std::fs::write(&path, exr(&actual)).unwrap();
-            }
-        }
-    }
-    assert!(count >= 20, "{count} cases");
-    assert!(wrong.is_empty(), "\n{}\nFIRSTLIGHT_BLESS=1 takes the new pictures", wrong.join("\n"));
-}
-
-#[test]
-fn every_scene_of_the_gallery_renders_and_the_renderers_agree() {
+/// Every renderer has the same picture of a scene of the gallery, and by default it is near that.
+fn hold_gallery(file: &str) {
     let folder = scenes().join("gallery");
     let assets = FolderAssets::new(&folder, &[]).unwrap();
-    let mut count = 0;
-    for entry in std::fs::read_dir(&folder).unwrap() {
-        let path = entry.unwrap().path();
-        if path.extension().is_some_and(|e| e == "toml") {
-            count += 1;
-            let text = std::fs::read(&path).unwrap();
-            assert!(text.starts_with(b"#:schema "), "{}: an editor finds no schema", path.display());
-            let [fast, traced, plain] =
-                renderers().map(|settings| picture(&text, &assets, Instead::sampled([48, 36]), &settings));
-            assert_eq!(differences(&fast.pixels, &plain.pixels), 0, "{}", path.display());
-            assert_eq!(differences(&traced.pixels, &plain.pixels), 0, "{}", path.display());
-            // As the scene says, and by default: integrated light is near the sampled
-            let instead = Instead { samples: None, ..Instead::sampled([48, 36]) };
-            let default = picture(&text, &assets, instead, &RenderSettings::default());
-            for image in [&fast, &default] {
-                assert!(image.pixels.iter().flatten().all(|c| c.is_finite() && *c >= 0.0), "{}", path.display());
-                assert!(image.pixels.iter().any(|p| p[0] > 0.05), "{}: all dark", path.display());
-            }
-            let off = fast.pixels.iter().zip(&default.pixels).map(|(a, b)| (a[1] - b[1]).abs()).sum::<f32>();
-            assert!(off / (fast.pixels.len() as f32) < 0.02, "{}: off by {off}", path.display());
-        }
+    let text = std::fs::read(folder.join(file)).unwrap();
+    assert!(text.starts_with(b"#:schema "), "an editor finds no schema");
+    let [fast, traced, plain] =
+        renderers().map(|settings| picture(&text, &assets, Instead::sampled([48, 36]), &settings));
+    assert_eq!(differences(&fast.pixels, &plain.pixels), 0);
+    assert_eq!(differences(&traced.pixels, &plain.pixels), 0);
+    // As the scene says, and by default: integrated light is near the sampled
+    let instead = Instead { samples: None, ..Instead::sampled([48, 36]) };
+    let default = picture(&text, &assets, instead, &RenderSettings::default());
+    for image in [&fast, &default] {
+        assert!(image.pixels.iter().flatten().all(|c| c.is_finite() && *c >= 0.0));
+        assert!(image.pixels.iter().any(|p| p[0] > 0.05), "all dark");
     }
-    assert!(count >= 8, "{count} scenes");
+    let off = fast.pixels.iter().zip(&default.pixels).map(|(a, b)| (a[1] - b[1]).abs()).sum::<f32>();
+    assert!(off / (fast.pixels.len() as f32) < 0.02, "off by {off}");
 }
 
 #[test]

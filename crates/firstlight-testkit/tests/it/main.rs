@@ -1,11 +1,13 @@
 //! What the library promises, from outside.
 
 mod course;
+mod docs;
 mod far;
 mod files;
 mod framing;
 mod fuzz_corpus;
 mod golden;
+mod house;
 mod images;
 mod invalid;
 mod queries;

@@ -336,7 +336,8 @@ prop_compose! {
             hash_map(text(), camera(), 0..4).prop_map(|m| m.into_iter().collect()).boxed(),
         ],
         textures in hash_map(text(), texture(), 0..4), materials in hash_map(text(), material(), 0..4),
-        shapes in vec(shape(), 0..6), groups in hash_map(text(), vec(shape(), 1..4), 0..3), lights in vec(light(), 0..6),
+        shapes in vec(shape(), 0..6), groups in hash_map(text(), vec(shape(), 1..4), 0..3),
+        lights in vec(light(), 0..6),
     ) -> SceneDesc {
         let mut desc = SceneDesc {
             render, cameras, textures: textures.into_iter().collect(), materials: materials.into_iter().collect(),

@@ -4,9 +4,6 @@
 //! business of who built the tree (`shape/triangles` for meshes, `scene` for instances and other shapes). Before it
 //! stand shapes, which give boxes; after it, hits.
 
-// The rest of the renderer comes to use it step by step.
-#![allow(dead_code)]
-
 /// Runs code for eight boxes or triangles at a time with the instruction set that suits it: AVX2 where it is there (AVX-512 has
 /// nothing to add to eight), NEON, or none. Two copies, not five: a traversal takes the compiler seconds.
 macro_rules! dispatch_eight {
@@ -64,6 +61,7 @@ pub(crate) use dispatch_sixteen;
 mod beam;
 mod build;
 mod gather;
+mod level;
 mod node;
 mod ray;
 mod traverse;
@@ -72,6 +70,7 @@ use fearless_simd::{Level, f32x8, prelude::*};
 
 pub(crate) use beam::{Beam, groups};
 pub(crate) use build::{Built, Leaf, build};
+pub use level::SimdLevel;
 pub(crate) use node::{LEAF, Node, Tree};
 pub(crate) use ray::{BEAM_PAD, LaneSlabs, Lanes, RayPacket16, RayTile, Slabs, TraceRay};
 
@@ -95,12 +94,6 @@ impl Aabb {
     pub fn is_sound(&self) -> bool {
         let far = Vec3::splat(ray::MAX_COORDINATE);
         self.min.cmpge(-far).all() && self.max.cmple(far).all() && self.min.cmple(self.max).all()
-    }
-
-    /// The smallest box around both.
-    #[inline(always)]
-    pub fn union(self, other: Aabb) -> Aabb {
-        Aabb { min: self.min.min(other.min), max: self.max.max(other.max) }
     }
 
     /// The smallest box around this and a point.
@@ -178,8 +171,9 @@ impl Bvh {
         done
     }
 
-    /// Asks what lies on any of the rays of a tile in `active`, the nearest boxes first. `t_max` is as far as each ray asks; `leaf` hears which
-    /// rays ask and may make it smaller.
+    /// Asks what lies on any of the rays of a tile in `active`, the nearest boxes first. `t_max` is as far as each ray
+    /// asks; `leaf` hears which rays ask and may make it smaller.
+    #[cfg(test)]
     #[inline(always)]
     pub fn tile<S: Simd>(
         &self,
@@ -237,7 +231,6 @@ impl Bvh {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::render::SimdLevel;
 
     /// Whether a ray meets a box, exactly enough.
     fn meets(bounds: &Aabb, ray: &TraceRay, t_max: f32) -> bool {
@@ -248,11 +241,8 @@ mod tests {
 
     #[test]
     fn every_box_on_a_ray_is_asked() {
-        let mut state = 1u32;
-        let mut random = || {
-            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-            (state >> 8) as f32 / 8_388_608.0 - 1.0
-        };
+        let mut numbers = firstlight_testkit::Random::new(1);
+        let mut random = || numbers.between(-1.0, 1.0) as f32;
         let mut boxes: Vec<_> = (0..1000)
             .map(|_| {
                 let min = Vec3::new(random(), random(), random());

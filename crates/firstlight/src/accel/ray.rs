@@ -10,9 +10,9 @@ use crate::math::Vec3;
 /// A ray that is not valid meets nothing.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct TraceRay {
-    /// Origin.
+    /// Origin. `t` counts in lengths of the direction, which may be of any.
     pub o: Vec3,
-    /// Direction, of any length; `t` counts in lengths of it.
+    #[cfg(test)]
     pub d: Vec3,
     /// The reciprocal of the direction for slabs: components that are nothing beside the largest are made larger.
     pub rd: Vec3,
@@ -54,6 +54,7 @@ impl TraceRay {
         let is_valid = o.abs().cmple(Vec3::splat(MAX_COORDINATE)).all() && size.cmple(Vec3::splat(MAX_DIRECTION)).all();
         TraceRay {
             o,
+            #[cfg(test)]
             d,
             rd,
             axes: [kx, ky, kz],

@@ -1,6 +1,6 @@
 //! Radiance HDR files: linear colour with 8-bit mantissas and one exponent a pixel.
 //!
-//! Written here and not by the `image` crate, whose exponents come from the system's logarithm, wrap around for
+//! Not by the `image` crate, whose exponents come from the system's logarithm, wrap around for
 //! numbers below 2^-128, and whose files of exactly 32768 columns cannot be read. Colour is rounded to nearest, which suits
 //! the readers that take a mantissa as it is (all but Radiance's own tools, which add a half).
 //!
@@ -77,6 +77,60 @@ fn run_lengths(values: &[u8], bytes: &mut Vec<u8>) {
     }
 }
 
+/// Width, height, and what follows the header. `None` if it is none, or the rows do not go from the top left.
+pub(super) fn header(bytes: &[u8]) -> Option<(u32, u32, &[u8])> {
+    let end = bytes.windows(2).position(|w| w == b"\n\n")?;
+    let is_rgbe = |line: &[u8]| line == b"FORMAT=32-bit_rle_rgbe";
+    if !bytes[..end].split(|&b| b == b'\n').any(is_rgbe) {
+        return None;
+    }
+    let rest = &bytes[end + 2..];
+    let line = rest.iter().position(|&b| b == b'\n')?;
+    let words = std::str::from_utf8(&rest[..line]).ok()?;
+    let (height, width) = words.strip_prefix("-Y ")?.split_once(" +X ")?;
+    let [width, height] = [width, height].map(|side| side.parse().ok().filter(|side| *side > 0));
+    Some((width?, height?, &rest[line + 1..]))
+}
+
+/// The pixels, alpha 1, of rows with the runs that [`encode`] writes or without any. `None` if they are damaged.
+pub(super) fn decode(mut bytes: &[u8], width: u32, height: u32) -> Option<Vec<[f32; 4]>> {
+    let columns = width as usize;
+    let mut pixels = Vec::new();
+    let mut row = vec![[0; 4]; columns];
+    for _ in 0..height {
+        if (8..=32767).contains(&width) && bytes.starts_with(&[2, 2, (width >> 8) as u8, width as u8]) {
+            bytes = &bytes[4..];
+            for channel in 0..4 {
+                let mut x = 0;
+                while x < columns {
+                    let (&count, rest) = bytes.split_first()?;
+                    let (length, same) = if count > 128 { (count - 128, true) } else { (count, false) };
+                    let length = usize::from(length);
+                    let (values, rest) = rest.split_at_checked(if same { 1 } else { length })?;
+                    let to = row.get_mut(x..x + length).filter(|to| !to.is_empty())?;
+                    for (i, pixel) in to.iter_mut().enumerate() {
+                        pixel[channel] = values[if same { 0 } else { i }];
+                    }
+                    (x, bytes) = (x + length, rest);
+                }
+            }
+        } else {
+            let (values, rest) = bytes.split_at_checked(4 * columns)?;
+            row.as_flattened_mut().copy_from_slice(values);
+            bytes = rest;
+        }
+        pixels.extend(row.iter().map(color));
+    }
+    Some(pixels)
+}
+
+/// The colour of three mantissas and an exponent; exact.
+fn color(&[r, g, b, e]: &[u8; 4]) -> [f32; 4] {
+    let unit = f64::from_bits((1023 - 128 - 8 + u64::from(e)) << 52);
+    let value = |mantissa: u8| if e == 0 { 0.0 } else { (f64::from(mantissa) * unit) as f32 };
+    [value(r), value(g), value(b), 1.0]
+}
+
 /// A text as one line: a backslash becomes two, a line's end `\n`, another control character `\u{...}`.
 fn escape(text: &str) -> String {
     let mut line = String::new();
@@ -119,7 +173,7 @@ mod tests {
     use super::*;
     use image::ImageDecoder;
 
-    fn decode(bytes: &[u8]) -> (u32, u32, Vec<f32>) {
+    fn decoded(bytes: &[u8]) -> (u32, u32, Vec<f32>) {
         let decoder = image::codecs::hdr::HdrDecoder::new(std::io::Cursor::new(bytes)).unwrap();
         let (width, height) = decoder.dimensions();
         let mut raw = vec![0; decoder.total_bytes() as usize];
@@ -133,10 +187,16 @@ mod tests {
         for width in [1, 7, 8, 9, 127, 128, 129, 255, 256, 1000, 32767, 32768, 32769] {
             let value = |x: u32| [(x % 7) as f32 / 8.0, if x % 300 < 200 { 0.5 } else { (x % 5) as f32 }, 1.0, 0.5];
             let picture = whole(width, 3, |x, y| value(x + y));
-            let (w, h, data) = decode(&encode(&picture, &receipt()));
+            let (w, h, data) = decoded(&encode(&picture, &receipt()));
             assert_eq!((w, h), (width, 3));
             let expected: Vec<f32> = picture.pixels.iter().flat_map(|p| p[..3].to_vec()).collect();
             assert!(data == expected, "{width}");
+            // And so do we
+            let bytes = encode(&picture, &receipt());
+            let (w, h, rows) = header(&bytes).unwrap();
+            assert_eq!((w, h), (width, 3));
+            let ours = decode(rows, w, h).unwrap();
+            assert!(ours.iter().flat_map(|p| &p[..3]).eq(&expected), "{width}");
         }
     }
 
@@ -146,7 +206,7 @@ mod tests {
             [[1.0, 0.001, 0.3], [0.997, 0.5, 0.2], [1e-5, 2e-7, 3e-6], [12345.6, 0.1, 99.0], [1e30, 1e29, 0.0]];
         for color in colors {
             let picture = whole(1, 1, |_, _| [color[0], color[1], color[2], 1.0]);
-            let (_, _, data) = decode(&encode(&picture, &Receipt::default()));
+            let (_, _, data) = decoded(&encode(&picture, &Receipt::default()));
             for (got, wanted) in data.iter().zip(color) {
                 assert!((got - wanted).abs() <= color[0] / 256.0, "{got} {wanted}");
             }

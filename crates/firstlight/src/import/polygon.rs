@@ -307,17 +307,14 @@ mod tests {
 
     #[test]
     fn any_polygon_has_two_triangles_less_than_corners() {
-        let mut state = 7u32;
+        let mut random = firstlight_testkit::Random::new(7);
         for size in 0..200 {
             let points: Vec<[f32; 3]> = (0..size)
                 .map(|_| {
-                    [0; 3].map(|_| {
-                        state = state.wrapping_mul(1664525).wrapping_add(1013904223);
-                        match state >> 27 {
-                            0 => f32::NAN,
-                            1 => f32::MAX,
-                            _ => (state >> 20) as f32,
-                        }
+                    [0; 3].map(|_| match random.below(32) {
+                        0 => f32::NAN,
+                        1 => f32::MAX,
+                        _ => random.below(4096) as f32,
                     })
                 })
                 .collect();

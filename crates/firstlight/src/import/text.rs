@@ -284,9 +284,9 @@ mod tests {
 
     #[test]
     fn numbers_are_those_of_the_standard_library() {
-        let mut state = 1u64;
+        let mut random = firstlight_testkit::Random::new(1);
         for i in 0..400_000u32 {
-            state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+            let state = random.bits();
             let value = f32::from_bits((state >> 32) as u32);
             let text = match i % 4 {
                 0 => format!("{value}"),

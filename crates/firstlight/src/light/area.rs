@@ -294,7 +294,6 @@ impl AreaShape {
     }
 }
 
-#[allow(dead_code, reason = "measure and bounds are for integration")]
 impl Area {
     /// How many points are sampled, where it is sampled.
     #[inline(always)]
@@ -307,11 +306,6 @@ impl Area {
         self.shape.measure()
     }
 
-    /// The smallest box around it: [`AreaShape::bounds`].
-    pub fn bounds(&self) -> [DVec3; 2] {
-        self.shape.bounds()
-    }
-
     /// Unit normal of the front, where all of it faces one way.
     pub(crate) fn normal(&self) -> Option<Vec3> {
         self.n
@@ -321,32 +315,6 @@ impl Area {
     #[inline(always)]
     pub(crate) fn points(&self) -> &Points {
         self.points.get_or_init(|| Points::new(&self.shape, self.set, self.count, self.seed))
-    }
-
-    /// Point `k` of a sphere that is integrated, and the unit normal there, world space: the same as the sampled point of that
-    /// number where it has [`REFERENCE_SAMPLES`], from a table that all spheres share. `None` for other shapes and sets.
-    pub(crate) fn shared_point(&self, k: usize) -> Option<(Vec3, Vec3)> {
-        static NORMALS: OnceLock<Vec<DVec3>> = OnceLock::new();
-        let AreaShape::Sphere(sphere) = &self.shape else { return None };
-        if self.set != SampleSet::Sobol || self.count != REFERENCE_SAMPLES {
-            return None;
-        }
-        let normals = NORMALS.get_or_init(|| {
-            (0..REFERENCE_SAMPLES).map(|k| Sphere::normal(SampleSet::Sobol.point(k, REFERENCE_SAMPLES, 0))).collect()
-        });
-        let n = normals[k];
-        Some(((sphere.center + n * sphere.radius).as_vec3(), n.as_vec3()))
-    }
-
-    /// [`weight`](Self::weight) of a point with the unit normal `n`.
-    pub(crate) fn weight_facing(&self, n: Vec3, l: Vec3, inverse_distance: f32) -> f32 {
-        let side = -n.dot(l);
-        let side = if self.both_sides { side.abs() } else { side };
-        if !self.physical {
-            return if self.both_sides || side > 0.0 { 1.0 } else { 0.0 };
-        }
-        let cos = side * inverse_distance;
-        if cos > 0.0 { cos * (inverse_distance * inverse_distance) } else { 0.0 }
     }
 
     /// Sampled point `k`, world space.
@@ -362,12 +330,14 @@ impl Area {
     }
 
     /// The point that stands for `uv` of the unit square, world space.
+    #[cfg(feature = "bench")]
     pub(crate) fn position(&self, uv: [f64; 2]) -> [f64; 3] {
         self.shape.point(uv).0.to_array()
     }
 
     /// The way from `p` to the point that stands for `uv` of the unit square, one over its length, and
     /// [`weight`](Self::weight) there. Equal areas of the square are equal areas of the light.
+    #[cfg(feature = "bench")]
     pub(crate) fn at(&self, uv: [f64; 2], p: Vec3) -> (Vec3, f32, f32) {
         let (q, n) = self.shape.point(uv);
         let l = q.as_vec3() - p;

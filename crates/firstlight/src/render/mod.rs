@@ -16,6 +16,7 @@ mod cut;
 mod fence;
 mod field;
 mod film;
+#[cfg(feature = "bench")]
 pub(crate) mod given;
 mod heat;
 mod hits;
@@ -27,7 +28,6 @@ mod plain;
 mod receipt;
 mod sampled;
 mod shafts;
-mod simd;
 mod single;
 mod solo;
 mod square;
@@ -45,8 +45,8 @@ use rayon::prelude::*;
 pub use counts::{LightCounts, RenderStats};
 pub use film::Film;
 pub use heat::Heat;
-pub use simd::SimdLevel;
 
+use crate::accel::SimdLevel;
 use crate::describe::words;
 use crate::image::{Image, Window};
 use crate::light::Light;

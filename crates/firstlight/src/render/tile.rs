@@ -53,7 +53,8 @@ pub(crate) fn spread(tiles: &[Tile]) -> Vec<Tile> {
     let runs: Vec<&[Tile]> = tiles.chunks((tiles.len() / RUNS).max(1)).collect();
     let count = runs.len();
     // Steps of the golden section of all, or the next number that comes by every run
-    let is_whole = |step: &usize| (1..=*step).rev().find(|d| step % d == 0 && count % d == 0) == Some(1);
+    let is_whole =
+        |step: &usize| (1..=*step).rev().find(|d| step.is_multiple_of(*d) && count.is_multiple_of(*d)) == Some(1);
     let step = (count * 618 / 1000..count).find(is_whole).unwrap_or(1);
     (0..count).flat_map(|k| runs[k * step % count]).copied().collect()
 }

@@ -319,8 +319,9 @@ impl Compiler<'_> {
     }
 
     fn leaf(&mut self, cx: &mut CompileContext, shape: &ShapeDesc, number: u32, mesh: &mut MeshBuilder) -> Leaf {
-        let Common { name, material, transform, visible, casts_shadow, receives_shadow, single_sided, lights, shadows } =
-            shape.common();
+        let common = shape.common();
+        let Common { name, material, transform, visible, casts_shadow, receives_shadow, single_sided, .. } = common;
+        let Common { lights, shadows, .. } = common;
         let named = material.map(|name| self.materials.resolve(cx, "material", name));
         let mut surface = Surface {
             name: name.map(Arc::from),

@@ -390,13 +390,14 @@ impl Geometry {
     pub fn are_blocked_by(&self, level: Level, things: &[u32], shadows: &ShadowRays, active: u16) -> u16 {
         let mut done = 0;
         for &thing in things {
-            done |= dispatch_sixteen!(level, simd => self.placed_blocks_lanes(simd, thing, shadows, active & !done), else {
+            let asked = active & !done;
+            done |= dispatch_sixteen!(level, simd => self.placed_blocks_lanes(simd, thing, shadows, asked), else {
                 let blocked = |lane: &usize| {
                     dispatch_eight!(level, simd => {
                         self.blocked_by_placed(simd, thing, &shadows.ray(*lane), shadows.t_end[*lane])
                     })
                 };
-                lanes(active & !done).filter(blocked).fold(0, |mask, lane| mask | 1 << lane)
+                lanes(asked).filter(blocked).fold(0, |mask, lane| mask | 1 << lane)
             });
         }
         done

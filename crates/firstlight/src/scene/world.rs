@@ -13,6 +13,7 @@ use crate::shape::{Footprint, RayDifferential, SurfaceInteraction};
 
 /// What a camera ray ends at.
 #[derive(Clone, Copy, Debug)]
+#[allow(clippy::large_enum_variant, reason = "there is one of it at a time")]
 pub enum CameraHit {
     /// A surface to be lit.
     Surface(SurfacePoint),

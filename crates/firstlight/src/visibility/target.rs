@@ -60,7 +60,6 @@ pub(crate) struct Target {
     pub blocks: Vec<SampleBlock>,
     /// Where the blocks lie, sixteen at a time.
     pub cells: Vec<Cells>,
-    pub samples: usize,
 }
 
 /// Axes are this much longer than they need to be, and no shorter than this against the others: more than single precision
@@ -181,7 +180,7 @@ impl Target {
     pub fn new(scene: &Scene, id: LightId) -> Self {
         let light = &scene.lights[id.index()];
         let hull = LightHull::of(light);
-        let mut target = Target { light: id, hull, blocks: Vec::new(), cells: Vec::new(), samples: light.samples() };
+        let mut target = Target { light: id, hull, blocks: Vec::new(), cells: Vec::new() };
         let area = match &light.kind {
             LightKind::Area(area) if !light.exact => area,
             _ => return target,

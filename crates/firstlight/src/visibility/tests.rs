@@ -3,9 +3,8 @@ use fearless_simd::Level;
 use super::shaft::{Horizon, Shaft};
 use super::target::LightHull;
 use super::*;
-use crate::accel::{Aabb, LEAF, Node, dispatch_eight};
+use crate::accel::{Aabb, LEAF, Node, SimdLevel, dispatch_eight};
 use crate::math::{DVec3, Ray};
-use crate::render::SimdLevel;
 use crate::scene::{CompileOptions, Scene, SceneDesc};
 use crate::shape::RayDifferential;
 use crate::{

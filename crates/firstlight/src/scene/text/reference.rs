@@ -33,15 +33,15 @@ before the text that includes them. File names are relative to the text that inc
 `[render]`, `[camera]` and every name can be said in one text only. In JSON a top-level `"$schema"` is allowed, and not
 read.
 
-Limits: 64 MiB for all texts of a scene together, 1024 texts, includes 32 deep, tables and arrays 64 deep, 16777216 words,
-numbers and marks in one text.
+Limits: 64 MiB for all texts of a scene together, 1024 texts, includes 32 deep, tables and arrays 64 deep, 16777216
+words, numbers and marks in one text.
 "##;
 
 const GROUPS: &str = r#"
 ## Groups: `[[group.NAME.KIND]]`
 
-`[[group.tree.cone]]` describes a cone that belongs to the group `tree`; every shape can be in a group, instances of other
-groups too. A group by itself is not seen: `[[instance]]` places it, as often as wanted. A group is described in one
+`[[group.tree.cone]]` describes a cone that belongs to the group `tree`; every shape can be in a group, instances of
+other groups too. A group by itself is not seen: `[[instance]]` places it, as often as wanted. A group is described in one
 text, its name is unique, and no group may hold an instance of itself, not by way of others either.
 
 Limits: 4194304 shapes and instances, counted wherever they are placed; groups 32 deep.

@@ -5,9 +5,10 @@ use glam::DVec2;
 use crate::color::Rgb;
 use crate::ids::MaterialId;
 use crate::math::{DVec3, ErrorBound, Ray, UNIT_ROUNDOFF, Vec2, Vec3};
+use crate::shape::TriangleTree;
 use crate::shape::placement::Placement;
 use crate::shape::surface::{Footprint, RayDifferential, ShadowTerminator, ShapePoint, UvEdge};
-use crate::shape::triangles::{TriangleTree, can_be_hit};
+use crate::shape::triangles::can_be_hit;
 
 /// The meshes of one space, the world or that of a group, joined: one tree for all their triangles.
 pub(crate) struct Mesh {

@@ -2,10 +2,7 @@
 //!
 //! A hit is defined by the kernel alone ([`kernel::intersect`]): 0 < t <= t_max, both sides, and of several at the same t
 //! the triangle with the lowest number. The tree only leaves out what cannot be a hit, so it answers as if every triangle
-//! had been asked, bit for bit ([`TriangleTree::brute_force`]), by single ray, packet or tile, on every processor.
-
-// The rest of the renderer comes to use it step by step.
-#![allow(dead_code)]
+//! had been asked, bit for bit (`TriangleTree::brute_force`), by single ray, packet or tile, on every processor.
 
 mod kernel;
 mod seen;
@@ -510,6 +507,7 @@ impl TriangleTree {
     }
 
     /// What [`TriangleTree::closest`] must answer: every triangle asked, in turn.
+    #[cfg(test)]
     pub fn brute_force(&self, ray: &TraceRay, t_max: f32, filter: &impl Fn(u32) -> bool) -> Option<TriangleHit> {
         if !ray.is_valid {
             return None;
@@ -541,11 +539,13 @@ impl TriangleTree {
     }
 
     /// [`TriangleTree::any`] for who has no instruction set at hand.
+    #[cfg(any(test, feature = "bench"))]
     pub fn any_at(&self, level: Level, ray: &TraceRay, t_max: f32, filter: &impl Fn(u32) -> bool) -> bool {
         dispatch_eight!(level, simd => self.any(simd, ray, t_max, filter))
     }
 
     /// [`TriangleTree::any16`] for who has no instruction set at hand.
+    #[cfg(any(test, feature = "bench"))]
     pub fn any16_at(
         &self,
         level: Level,

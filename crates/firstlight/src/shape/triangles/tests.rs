@@ -1,7 +1,7 @@
 //! The tree against asking every triangle, and closed meshes against rays through their seams.
 
 use super::*;
-use crate::render::SimdLevel;
+use crate::accel::SimdLevel;
 
 /// One type of filter for all tests: each has its own code for each processor level.
 type Filter = fn(u32) -> bool;
