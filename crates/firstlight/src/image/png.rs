@@ -229,7 +229,8 @@ mod tests {
         let software = &info.uncompressed_latin1_text[0];
         assert_eq!((software.keyword.as_str(), software.text.as_str()), ("Software", SOFTWARE));
         let found: Vec<_> = info.utf8_text.iter().map(|t| (t.keyword.clone(), t.get_text().unwrap())).collect();
-        let expected: Vec<_> = receipt().entries.into_iter().map(|(k, v)| (format!("firstlight:{k}"), v)).collect();
+        let shown = receipt().shown_by(Some(&Display::default()));
+        let expected: Vec<_> = shown.entries.into_iter().map(|(k, v)| (format!("firstlight:{k}"), v)).collect();
         assert_eq!(found, expected);
     }
 
