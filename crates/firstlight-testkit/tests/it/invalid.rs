@@ -88,10 +88,10 @@ fn floods_are_refused_soon() {
     for (name, text) in [
         ("scene.toml", millions("\n")),
         ("scene.toml", millions("a\n")),
-        ("scene.toml", [b"a = [".to_vec(), millions("0,"), b"]".to_vec()].concat()),
+        ("scene.toml", [b"a = [".to_vec(), millions("'',"), b"]".to_vec()].concat()),
         ("scene.toml", millions("a b ")),
         ("scene.toml", millions("\"a\"")),
-        ("scene.json", [b"[".to_vec(), millions("0,"), b"0]".to_vec()].concat()),
+        ("scene.json", [b"[".to_vec(), millions("\"\","), b"0]".to_vec()].concat()),
     ] {
         let words = soon(name, &text);
         assert!(words.contains("more than 16777216 words, numbers and marks in one text"), "{words}");
@@ -101,6 +101,44 @@ fn floods_are_refused_soon() {
     let words = soon("scene.toml", text.as_bytes());
     assert_eq!(words.lines().count(), 258);
     assert!(words.ends_with("199744 more faults are not listed"), "{words}");
+}
+
+#[test]
+fn tables_by_the_million_are_refused_soon() {
+    // A table takes many times the memory of its letters, and a parser's more than that
+    let dotted = |lines: usize| -> String { (0..lines).map(|i| format!("a{i}{}.b = 1\n", ".a".repeat(59))).collect() };
+    for (name, text, expected) in [
+        ("scene.toml", dotted(60_000), "more than 2097152 tables in one text"),
+        ("scene.toml", "[[sphere]]\n".repeat(3_000_000), "more than 2097152 tables in one text"),
+        ("scene.toml", format!("a = [{}]", "{},".repeat(400_000)), "more than 262144 tables in one value"),
+        ("scene.json", format!("[{}1]", "{},".repeat(3_000_000)), "more than 2097152 tables in one text"),
+    ] {
+        let words = soon(name, text.as_bytes());
+        assert!(words.contains(expected), "{words}");
+        assert_eq!(words.lines().count(), 1);
+    }
+    // Below the limit each is read, and one line said of each
+    let words = soon("scene.toml", dotted(1000).as_bytes());
+    assert!(words.ends_with("744 more faults are not listed"), "{words}");
+}
+
+#[test]
+fn one_slip_by_the_million_takes_no_longer_than_once() {
+    // Without newlines all of it is one line
+    let words = soon("scene.toml", format!("a = 1\r{}", "x = 1\r".repeat(3_000_000)).as_bytes());
+    let expected = "scene.toml:1:6: not TOML: a carriage return without a newline; save the text with lines that end in a \
+                    newline (LF, or CR LF)";
+    assert_eq!(words, expected);
+    for slip in ["= ", "] ", "x ", "1.", "''"] {
+        let words = soon("scene.toml", format!("a = 1 {}", slip.repeat(2_000_000)).as_bytes());
+        assert!(words.starts_with("scene.toml:1:"), "{words}");
+        assert_eq!(words.lines().count(), 1);
+    }
+    let words = soon("scene.toml", "x ==\n".repeat(2_000_000).as_bytes());
+    assert!(words.ends_with("more faults are not listed"), "{words}");
+    // The Windows way, and inside of JSON, a carriage return is nothing special
+    assert!(soon("scene.toml", b"a = 1\r\nb = [1,\r\n2]\r\n").starts_with("scene.toml:1:1: a: unknown key"));
+    assert!(soon("scene.json", b"{\r\"a\": 1\r}").starts_with("scene.json:1:3: a: unknown key"));
 }
 
 #[test]

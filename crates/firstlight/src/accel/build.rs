@@ -130,7 +130,16 @@ pub(crate) struct Built {
 }
 
 /// Builds the tree over those of `count` boxes that are sound, with at most 2 to the power of `leaf_bits` of them in a leaf.
-pub(crate) fn build(count: usize, boxes: impl Fn(usize) -> Aabb + Sync, leaf_bits: u32) -> Built {
+///
+/// `key`: things of the same key are the same to every ray, and only that of the lowest id need be in a leaf. It is asked
+/// where more boxes than a leaf holds have one centre, which no tree can part: ten thousand copies of a triangle would all
+/// be asked by every ray that comes near.
+pub(crate) fn build<K: Ord>(
+    count: usize,
+    boxes: impl Fn(usize) -> Aabb + Sync,
+    leaf_bits: u32,
+    key: impl Fn(u32) -> K + Sync,
+) -> Built {
     assert!(count < LEAF as usize, "ids fit 31 bits");
     // Collect the primitives, and find the middle of all
     let prim = |i: usize| {
@@ -161,7 +170,9 @@ pub(crate) fn build(count: usize, boxes: impl Fn(usize) -> Aabb + Sync, leaf_bit
     prims.par_chunks_mut(1 << 14).for_each(move_all);
     let centers = prims.par_chunks(1 << 14).map(centers_of).reduce(|| Bounds::EMPTY, Bounds::join);
     // Cut and gather, in tasks
-    let settings = Settings { leaf: 1 << leaf_bits, leaf_bits, task: (prims.len() / TASKS).max(MIN_TASK) };
+    let distinct = |prims: &mut [Prim]| distinct(prims, &key);
+    let task = (prims.len() / TASKS).max(MIN_TASK);
+    let settings = Settings { leaf: 1 << leaf_bits, leaf_bits, task, distinct: &distinct };
     let top = settings.top(&mut prims, centers, 0, 0);
     let order: Vec<u32> = prims.par_iter().with_min_len(1 << 14).map(Prim::id).collect();
     drop(prims);
@@ -183,15 +194,35 @@ pub(crate) fn build(count: usize, boxes: impl Fn(usize) -> Aabb + Sync, leaf_bit
     Built { tree: Tree { nodes: join.nodes, center, half, bounds, stack }, order, leaves: join.leaves }
 }
 
+/// Brings to the front the lowest id of each key, in their order, and says how many they are; leaves the rest behind them.
+fn distinct<K: Ord>(prims: &mut [Prim], key: &impl Fn(u32) -> K) -> usize {
+    let mut keyed: Vec<(K, Prim)> = prims.iter().map(|prim| (key(prim.id()), *prim)).collect();
+    keyed.sort_unstable_by(|(a, p), (b, q)| a.cmp(b).then(p.id().cmp(&q.id())));
+    let is_first = |i: usize| i == 0 || keyed[i].0 != keyed[i - 1].0;
+    let count = (0..keyed.len()).filter(|i| is_first(*i)).count();
+    // Where none is twice all stay where they are
+    if count < prims.len() {
+        let (mut first, mut rest) = (0, count);
+        for (i, (_, prim)) in keyed.iter().enumerate() {
+            let place = if is_first(i) { &mut first } else { &mut rest };
+            prims[*place] = *prim;
+            *place += 1;
+        }
+    }
+    count
+}
+
 /// What a build is told.
 #[derive(Clone, Copy)]
-struct Settings {
+struct Settings<'a> {
     /// The most primitives in a leaf.
     leaf: usize,
     /// The same, as a power of two.
     leaf_bits: u32,
     /// The most primitives in a task.
     task: usize,
+    /// Parts primitives of one centre from their copies.
+    distinct: &'a (dyn Fn(&mut [Prim]) -> usize + Sync),
 }
 
 /// Where and how to cut: the bin of each primitive, and the first bin that goes to the right.
@@ -353,9 +384,17 @@ fn halve(prims: &[Prim]) -> (usize, Bounds, Bounds) {
     (left.len(), centers_of(left), centers_of(right))
 }
 
-impl Settings {
+impl Settings<'_> {
+    /// Without the copies among primitives that no cut can part.
+    fn without_copies<'p>(&self, prims: &'p mut [Prim], centers: Bounds) -> &'p mut [Prim] {
+        let has_extent = (centers.hi - centers.lo).xyz().max_element() > 0.0;
+        let count = if prims.len() <= self.leaf || has_extent { prims.len() } else { (self.distinct)(prims) };
+        &mut prims[..count]
+    }
+
     /// The tree above the tasks, and the tasks.
     fn top(&self, prims: &mut [Prim], centers: Bounds, base: u32, depth: usize) -> Top {
+        let prims = self.without_copies(prims, centers);
         if prims.len() <= self.task {
             return Top::Part(self.part(prims, centers, base, depth));
         }
@@ -399,6 +438,7 @@ impl Settings {
         binary: &mut Vec<Binary>,
         bins: &mut Bins,
     ) -> Bounds {
+        let prims = self.without_copies(prims, centers);
         let place = binary.len();
         if prims.len() <= self.leaf {
             let bounds = bounds_of(prims);

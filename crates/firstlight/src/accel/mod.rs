@@ -114,7 +114,12 @@ pub(crate) struct Bvh {
 impl Bvh {
     /// Builds the tree. Boxes that are not sound are left out; the others keep their index as their id.
     pub fn build(boxes: &[Aabb]) -> Bvh {
-        let Built { mut tree, order, leaves } = build(boxes.len(), |i| boxes[i], 0);
+        Self::build_distinct(boxes, |id| id)
+    }
+
+    /// The same; of things with the same key, which are the same to every ray, only the first need be found.
+    pub fn build_distinct<K: Ord>(boxes: &[Aabb], key: impl Fn(u32) -> K + Sync) -> Bvh {
+        let Built { mut tree, order, leaves } = build(boxes.len(), |i| boxes[i], 0, key);
         // Let leaves say the id at once
         for node in &mut tree.nodes {
             for place in 0..WIDTH {
@@ -205,6 +210,15 @@ impl Bvh {
         leaf: impl FnMut(u32) -> bool,
     ) -> bool {
         self.tree.gather(simd, meet(self.tree.center, self.tree.half), leaf)
+    }
+
+    /// How many things are in it.
+    #[cfg(test)]
+    pub fn len(&self) -> usize {
+        let is_leaf = |node: &Node, place: usize| {
+            node.planes[0][0][place] <= node.planes[0][1][place] && node.children[place] & LEAF != 0
+        };
+        self.tree.nodes.iter().map(|node| (0..WIDTH).filter(|place| is_leaf(node, *place)).count()).sum()
     }
 
     /// The box around all boxes.
@@ -309,5 +323,20 @@ mod tests {
         assert_eq!(asked, [0, 1, 2]);
         assert_eq!(bvh.bounds(), Aabb { min: Vec3::new(0.0, -1.0, -1.0), max: Vec3::new(99.5, 1.0, 1.0) });
         assert!(bvh.bytes() > 0);
+    }
+
+    #[test]
+    fn of_copies_the_first_is_asked() {
+        let mut boxes = vec![Aabb { min: Vec3::ZERO, max: Vec3::ONE }; 10_000];
+        boxes.push(Aabb { min: Vec3::splat(-1.0), max: Vec3::splat(2.0) });
+        let asked = |bvh: &Bvh| {
+            let mut asked = Vec::new();
+            let ray = TraceRay::new(Vec3::new(-3.0, 0.1, 0.2), Vec3::X);
+            bvh.closest_at(Level::new(), &ray, &mut f32::INFINITY.clone(), |id, _| asked.push(id));
+            asked.sort_unstable();
+            asked
+        };
+        assert_eq!(asked(&Bvh::build_distinct(&boxes, |id| id / 5000)), [0, 5000, 10_000]);
+        assert_eq!(asked(&Bvh::build(&boxes)).len(), 10_001);
     }
 }

@@ -7,7 +7,7 @@
 //! A table is itself a value: `transform: Option<TransformDesc> = None` is a field that holds a table, `keys: Vec<KeyDesc>`
 //! one that holds any number of them.
 //!
-//! - [`node`]: TOML and JSON as one tree that knows where everything stands;
+//! - [`node`]: TOML and JSON as one tree that knows where everything stands; [`scan`] and [`toml`](mod@toml) help it;
 //! - [`read`]: from the tree to values, collecting every fault;
 //! - [`write`](mod@write): from values to text;
 //! - [`family!`]: the enum of all kinds of a family, lights say;
@@ -224,6 +224,8 @@ pub(crate) mod family;
 pub(crate) mod info;
 pub(crate) mod node;
 pub(crate) mod read;
+mod scan;
+mod toml;
 pub(crate) mod value;
 pub(crate) mod write;
 

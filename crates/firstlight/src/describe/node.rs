@@ -1,16 +1,13 @@
 //! TOML and JSON as one tree that knows where everything stands.
 //!
-//! Both parsers come from outside and were written for friendly input. Nesting and the number of tokens are therefore
-//! counted by [`scan`] before either sees the text: their recursion, and the recursive drop of what they build, would
-//! overflow the stack, and a token takes many times the memory of its letters.
+//! [`scan`](super::scan) goes before the parsers, which were written for friendly input.
+
+use std::borrow::Cow;
+use std::sync::Arc;
 
 use jsonc_parser::ast;
-use toml::de::{DeTable, DeValue};
 
-/// Largest nesting of arrays and tables.
-pub(crate) const MAX_DEPTH: usize = 64;
-/// Most words, numbers and punctuation marks in one text.
-pub(crate) const MAX_TOKENS: usize = 1 << 24;
+use super::scan::{Numbers, Piece, Scan};
 
 /// A range of bytes of a text.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -26,14 +23,14 @@ impl From<std::ops::Range<usize>> for Span {
 }
 
 /// A value and where it stands; a table stands where its header or key is.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(crate) struct Node {
     pub span: Span,
     pub data: Data,
 }
 
 /// What a value is.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(crate) enum Data {
     String(String),
     /// Any number; infinite also where the text's digits exceed every finite number.
@@ -42,14 +39,16 @@ pub(crate) enum Data {
     /// What scene text has no use for, in words: "a date", "null".
     Other(&'static str),
     Array(Vec<Node>),
+    /// A long list of numbers, or of lists of numbers, that stays in the text.
+    Numbers(Numbers),
     /// In the order of the text, without duplicate keys.
     Table(Vec<Entry>),
 }
 
 /// A key of a table, and its value.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(crate) struct Entry {
-    pub key: String,
+    pub key: Arc<str>,
     pub key_span: Span,
     pub value: Node,
 }
@@ -65,14 +64,43 @@ impl Node {
         if let Data::Table(entries) = &self.data { Some(entries) } else { None }
     }
 
-    /// The elements, if this is an array.
-    pub(crate) fn elements(&self) -> Option<&[Node]> {
-        if let Data::Array(elements) = &self.data { Some(elements) } else { None }
+    /// How many elements it has, if this is an array.
+    pub(crate) fn len(&self) -> Option<usize> {
+        match &self.data {
+            Data::Array(elements) => Some(elements.len()),
+            Data::Numbers(numbers) => Some(numbers.count as usize),
+            _ => None,
+        }
+    }
+
+    /// Shows each element of an array of `text` to `f`.
+    pub(crate) fn each(&self, text: &str, mut f: impl FnMut(usize, &Node)) {
+        match &self.data {
+            Data::Array(elements) => elements.iter().enumerate().for_each(|(i, element)| f(i, element)),
+            Data::Numbers(numbers) => {
+                for (i, (span, number)) in numbers.elements(text, self.span).enumerate() {
+                    f(i, &Node { span, data: numbers.data(number) });
+                }
+            }
+            _ => {}
+        }
+    }
+
+    /// An element of an array of `text`.
+    pub(crate) fn element(&self, text: &str, index: usize) -> Option<Cow<'_, Node>> {
+        match &self.data {
+            Data::Array(elements) => elements.get(index).map(Cow::Borrowed),
+            Data::Numbers(numbers) => {
+                let (span, number) = numbers.elements(text, self.span).nth(index)?;
+                Some(Cow::Owned(Node { span, data: numbers.data(number) }))
+            }
+            _ => None,
+        }
     }
 
     /// The value at `key`, if this is a table and has it.
     pub(crate) fn get(&self, key: &str) -> Option<&Node> {
-        self.entries()?.iter().find(|e| e.key == key).map(|e| &e.value)
+        self.entries()?.iter().find(|e| &*e.key == key).map(|e| &e.value)
     }
 
     /// What it is, in words.
@@ -82,8 +110,10 @@ impl Node {
             Data::Number(_) => "a number".into(),
             Data::Bool(_) => "a truth value".into(),
             Data::Other(words) => (*words).into(),
-            Data::Array(elements) if elements.len() == 1 => "an array of 1 value".into(),
-            Data::Array(elements) => format!("an array of {} values", elements.len()),
+            Data::Array(_) | Data::Numbers(_) => match self.len().unwrap_or_default() {
+                1 => "an array of 1 value".into(),
+                many => format!("an array of {many} values"),
+            },
             Data::Table(_) => "a table".into(),
         }
     }
@@ -109,161 +139,23 @@ pub(crate) enum Syntax {
 /// # Errors
 /// All faults of the syntax; for JSON the first.
 pub(crate) fn parse(text: &str, syntax: Syntax) -> Result<Node, Vec<SyntaxFault>> {
-    scan(text, syntax).map_err(|fault| vec![fault])?;
     match syntax {
-        Syntax::Toml => parse_toml(text),
+        Syntax::Toml => super::toml::parse(text),
         Syntax::Json => parse_json(text).map_err(|fault| vec![fault]),
     }
 }
 
-/// Refuses text whose nesting or number of tokens would hurt the parsers.
-fn scan(text: &str, syntax: Syntax) -> Result<(), SyntaxFault> {
-    let bytes = text.as_bytes();
-    let too_deep = |at: usize| SyntaxFault {
-        span: Span { start: at, end: at + 1 },
-        message: format!("more than {MAX_DEPTH} tables or arrays within each other"),
-        hint: Some("a scene needs no more than 5".into()),
-    };
-    // Depth at each open bracket; a dotted key `a.b.c` nests like a table in a table in a table
-    let mut open: Vec<usize> = Vec::new();
-    let (mut depth, mut dots, mut key_dots) = (0, 0, 0);
-    let (mut tokens, mut in_word) = (0usize, false);
-    let mut i = 0;
-    while i < bytes.len() {
-        let at = i;
-        let byte = bytes[i];
-        i += 1;
-        let is_word = byte.is_ascii_alphanumeric() || matches!(byte, b'_' | b'-' | b'+') || byte >= 0x80;
-        if !(is_word && in_word) {
-            tokens += 1;
-        }
-        in_word = is_word;
-        match byte {
-            b'"' | b'\'' if byte == b'"' || syntax == Syntax::Toml => i = string_end(bytes, at, syntax),
-            b'#' if syntax == Syntax::Toml => {
-                while i < bytes.len() && bytes[i] != b'\n' {
-                    i += 1;
-                }
-            }
-            b'[' | b'{' => {
-                open.push(depth);
-                depth += 1 + key_dots;
-                (dots, key_dots) = (0, 0);
-                if depth > MAX_DEPTH {
-                    return Err(too_deep(at));
-                }
-            }
-            b']' | b'}' => {
-                depth = open.pop().unwrap_or(0);
-                (dots, key_dots) = (0, 0);
-            }
-            b'=' => (dots, key_dots) = (0, dots),
-            b',' | b'\n' | b':' => (dots, key_dots) = (0, 0),
-            b'.' => {
-                dots += 1;
-                if depth + dots > MAX_DEPTH {
-                    return Err(too_deep(at));
-                }
-            }
-            _ => {}
-        }
-        if tokens > MAX_TOKENS {
-            return Err(SyntaxFault {
-                span: Span { start: at, end: at + 1 },
-                message: format!("more than {MAX_TOKENS} words, numbers and marks in one text"),
-                hint: Some("spread the scene over several files with `include`".into()),
-            });
-        }
+impl Numbers {
+    /// What an element is: a number, or a list of them.
+    fn data(self, number: Option<f64>) -> Data {
+        let row = Numbers { count: self.width.unwrap_or_default(), width: None };
+        number.map_or(Data::Numbers(row), Data::Number)
     }
-    Ok(())
-}
-
-/// The byte after the string that starts at `start`; where it is never closed, the end of the line or of the text.
-fn string_end(bytes: &[u8], start: usize, syntax: Syntax) -> usize {
-    let quote = bytes[start];
-    let long = syntax == Syntax::Toml && bytes[start..].starts_with(&[quote; 3]);
-    let escapes = quote == b'"';
-    let mut i = if long { start + 3 } else { start + 1 };
-    while i < bytes.len() {
-        match bytes[i] {
-            b'\\' if escapes => i += 1,
-            b'\n' if !long => return i,
-            byte if byte == quote && !long => return i + 1,
-            byte if byte == quote && bytes[i..].starts_with(&[quote; 3]) => {
-                // Up to two quotes may stand before the three that close it
-                while bytes.get(i) == Some(&quote) {
-                    i += 1;
-                }
-                return i;
-            }
-            _ => {}
-        }
-        i += 1;
-    }
-    bytes.len()
-}
-
-fn parse_toml(text: &str) -> Result<Node, Vec<SyntaxFault>> {
-    let (table, errors) = DeTable::parse_recoverable(text);
-    if !errors.is_empty() {
-        let mut faults: Vec<SyntaxFault> = errors
-            .iter()
-            .map(|e| {
-                let span: Span = e.span().map(Span::from).unwrap_or_default();
-                if e.message() == "duplicate key" {
-                    let key = text.get(span.start..span.end).unwrap_or_default();
-                    return twice(span, key.trim_matches(['"', '\'']));
-                }
-                SyntaxFault { span, message: format!("not TOML: {}", e.message()), hint: None }
-            })
-            .collect();
-        // One slip makes the parser stumble over every word that follows it on the line: tell the first
-        faults.sort_by_key(|f| f.span.start);
-        let mut told = None;
-        faults.retain(|f| {
-            let start = f.span.start.min(text.len());
-            let line = text.as_bytes()[..start].iter().rposition(|b| *b == b'\n');
-            told.replace(line) != Some(line)
-        });
-        return Err(faults);
-    }
-    Ok(Node { span: Span::default(), data: toml_table(table.into_inner()) })
-}
-
-fn toml_table(table: DeTable<'_>) -> Data {
-    let mut entries: Vec<Entry> = table
-        .into_iter()
-        .map(|(key, value)| Entry {
-            key_span: key.span().into(),
-            key: key.into_inner().into_owned(),
-            value: toml_node(value),
-        })
-        .collect();
-    // The parser sorts by name; the text's order is the scene's order
-    entries.sort_by_key(|e| e.key_span.start);
-    Data::Table(entries)
-}
-
-fn toml_node(value: toml::Spanned<DeValue<'_>>) -> Node {
-    let span = value.span().into();
-    let data = match value.into_inner() {
-        DeValue::String(s) => Data::String(s.into_owned()),
-        DeValue::Integer(i) => match i64::from_str_radix(i.as_str(), i.radix()) {
-            Ok(whole) => Data::Number(whole as f64),
-            // Digits beyond 64 bits: still a number in base 10
-            Err(_) if i.radix() == 10 => Data::Number(i.as_str().parse().unwrap_or(f64::INFINITY)),
-            Err(_) => Data::Number(f64::INFINITY),
-        },
-        DeValue::Float(f) => Data::Number(f.as_str().parse().unwrap_or(f64::NAN)),
-        DeValue::Boolean(b) => Data::Bool(b),
-        DeValue::Datetime(_) => Data::Other("a date or time"),
-        DeValue::Array(elements) => Data::Array(elements.into_iter().map(toml_node).collect()),
-        DeValue::Table(table) => toml_table(table),
-    };
-    Node { span, data }
 }
 
 fn parse_json(text: &str) -> Result<Node, SyntaxFault> {
+    let whole = Scan::new(text, Syntax::Json).next()?.unwrap_or_default();
+    let piece = Piece::new(text, &whole);
     let strict = jsonc_parser::ParseOptions {
         allow_comments: false,
         allow_loose_object_property_names: false,
@@ -276,14 +168,14 @@ fn parse_json(text: &str) -> Result<Node, SyntaxFault> {
         allow_non_finite_numbers: false,
         allow_extended_string_escapes: false,
     };
-    let parsed = jsonc_parser::parse_to_ast(text, &jsonc_parser::CollectOptions::default(), &strict);
+    let parsed = jsonc_parser::parse_to_ast(&piece.text, &jsonc_parser::CollectOptions::default(), &strict);
     let value = parsed.map_err(|e| SyntaxFault {
-        span: Span { start: e.range().start, end: e.range().end },
+        span: piece.span(e.range().start..e.range().end),
         message: format!("not JSON: {}", lower_first(&e.kind().to_string())),
         hint: None,
     })?;
     match value.value {
-        Some(value) => json_node(value),
+        Some(value) => json_node(value, &piece),
         None => Err(SyntaxFault {
             span: Span::default(),
             message: "not JSON: the text is empty".into(),
@@ -292,29 +184,34 @@ fn parse_json(text: &str) -> Result<Node, SyntaxFault> {
     }
 }
 
-fn json_node(value: ast::Value<'_>) -> Result<Node, SyntaxFault> {
-    let range = ast_range(&value);
+fn json_node(value: ast::Value<'_>, piece: &Piece<'_>) -> Result<Node, SyntaxFault> {
+    let range = piece.span(ast_range(&value));
     let data = match value {
         ast::Value::StringLit(s) => Data::String(s.value.into_owned()),
         ast::Value::NumberLit(n) => Data::Number(n.value.parse().unwrap_or(f64::NAN)),
         ast::Value::BooleanLit(b) => Data::Bool(b.value),
         ast::Value::NullKeyword(_) => Data::Other("null"),
-        ast::Value::Array(array) => {
-            Data::Array(array.elements.into_iter().map(json_node).collect::<Result<Vec<_>, _>>()?)
-        }
+        ast::Value::Array(array) => match piece.list_at(range) {
+            Some(numbers) => Data::Numbers(numbers),
+            None => {
+                let elements = array.elements.into_iter().map(|element| json_node(element, piece));
+                Data::Array(elements.collect::<Result<Vec<_>, _>>()?)
+            }
+        },
         ast::Value::Object(object) => {
             let mut entries = Vec::with_capacity(object.properties.len());
             let mut seen = std::collections::HashSet::new();
             for property in object.properties {
                 let (key, key_range) = match property.name {
-                    ast::ObjectPropName::String(s) => (s.value.into_owned(), s.range),
-                    ast::ObjectPropName::Word(w) => (w.value.to_owned(), w.range),
+                    ast::ObjectPropName::String(s) => (Arc::from(&*s.value), s.range),
+                    ast::ObjectPropName::Word(w) => (Arc::from(w.value), w.range),
                 };
-                let key_span = Span { start: key_range.start, end: key_range.end };
+                let key: Arc<str> = key;
+                let key_span = piece.span(key_range.start..key_range.end);
                 if !seen.insert(key.clone()) {
                     return Err(twice(key_span, &key));
                 }
-                let mut value = json_node(property.value)?;
+                let mut value = json_node(property.value, piece)?;
                 // A table stands where its key is: its braces may be pages apart
                 if matches!(value.data, Data::Table(_)) {
                     value.span = key_span;
@@ -331,7 +228,7 @@ fn json_node(value: ast::Value<'_>) -> Result<Node, SyntaxFault> {
     Ok(Node { span, data })
 }
 
-fn ast_range(value: &ast::Value<'_>) -> Span {
+fn ast_range(value: &ast::Value<'_>) -> std::ops::Range<usize> {
     let range = match value {
         ast::Value::StringLit(v) => v.range,
         ast::Value::NumberLit(v) => v.range,
@@ -340,10 +237,10 @@ fn ast_range(value: &ast::Value<'_>) -> Span {
         ast::Value::Array(v) => v.range,
         ast::Value::NullKeyword(v) => v.range,
     };
-    Span { start: range.start, end: range.end }
+    range.start..range.end
 }
 
-fn twice(span: Span, key: &str) -> SyntaxFault {
+pub(super) fn twice(span: Span, key: &str) -> SyntaxFault {
     let message = format!("{} is said twice", quoted(key));
     SyntaxFault { span, message, hint: Some("keep one of them".into()) }
 }
@@ -376,10 +273,11 @@ mod tests {
         let text = "# first\n[[sphere]]\nradius = 1\n[material.phong.\"a b\"]\n[[sphere]]\n";
         let root = parse(text, Syntax::Toml).expect("is TOML");
         let at = |span: Span| &text[span.start..span.end];
-        let spheres = root.get("sphere").and_then(Node::elements).expect("two spheres");
-        assert_eq!(at(spheres[0].span), "[[sphere]]");
-        assert!(spheres[1].span.start > spheres[0].span.start);
-        assert_eq!(at(spheres[0].get("radius").expect("is there").span), "1");
+        let spheres = root.get("sphere").expect("is there");
+        let sphere = |i: usize| spheres.element(text, i).expect("two spheres");
+        assert_eq!(at(sphere(0).span), "[[sphere]]");
+        assert!(sphere(1).span.start > sphere(0).span.start);
+        assert_eq!(at(sphere(0).get("radius").expect("is there").span), "1");
         let phong = root.get("material").and_then(|m| m.get("phong")).expect("is there");
         assert_eq!(at(phong.get("a b").expect("is there").span), "[material.phong.\"a b\"]");
     }

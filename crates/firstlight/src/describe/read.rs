@@ -4,6 +4,7 @@
 //! the stand-in is noise and is dropped.
 
 use std::collections::BTreeSet;
+use std::fmt::Write;
 
 use serde_json::{Value as Json, json};
 
@@ -108,6 +109,10 @@ impl<'a> Reader<'a> {
         Self { file, text, folder, path: String::new(), faults }
     }
 
+    pub(crate) fn text(&self) -> &'a str {
+        self.text
+    }
+
     pub(crate) fn folder(&self) -> &'a str {
         self.folder
     }
@@ -121,7 +126,12 @@ impl<'a> Reader<'a> {
 
     /// Runs `f` with `[index]` added to the path.
     pub(crate) fn at<R>(&mut self, index: usize, f: impl FnOnce(&mut Self) -> R) -> R {
-        self.deeper(&format!("[{index}]"), f)
+        let length = self.path.len();
+        // Without making a string: lists have millions
+        _ = write!(self.path, "[{index}]");
+        let result = f(self);
+        self.path.truncate(length);
+        result
     }
 
     fn deeper<R>(&mut self, part: &str, f: impl FnOnce(&mut Self) -> R) -> R {
@@ -165,7 +175,7 @@ impl<'a> Reader<'a> {
     pub(crate) fn wrong_type(&mut self, node: &Node, expected: &str, hint: Option<String>) {
         let message = match node.data {
             Data::Other("null") => format!("null is not {expected}"),
-            Data::Array(_) | Data::Table(_) => format!("{} is not {expected}", node.kind()),
+            Data::Array(_) | Data::Numbers(_) | Data::Table(_) => format!("{} is not {expected}", node.kind()),
             _ => format!("{} is {}, not {expected}", self.show(node), node.kind()),
         };
         let hint = if matches!(node.data, Data::Other("null")) {
@@ -213,7 +223,7 @@ impl<'a> Reader<'a> {
     ) -> Vec<&'static str> {
         let mut meant = Vec::new();
         for entry in entries {
-            if !known.contains(&entry.key.as_str()) {
+            if !known.contains(&&*entry.key) {
                 let near = nearest(&entry.key, known);
                 meant.extend(near);
                 let hint = match near {
@@ -251,7 +261,7 @@ impl Fields<'_, '_, '_> {
         if let Some(value) = self.find(name) {
             return value;
         }
-        if !self.silent && !self.entries.iter().any(|e| e.key == name) {
+        if !self.silent && !self.entries.iter().any(|e| &*e.key == name) {
             if !self.meant.contains(&name) {
                 let hint = format!("write `{name} = ...`, {}", T::words());
                 self.reader.error(self.span, format!("\"{name}\" is missing"), Some(hint));
@@ -267,7 +277,7 @@ impl Fields<'_, '_, '_> {
     }
 
     fn find<T: Value>(&mut self, name: &'static str) -> Option<T> {
-        let entry = self.entries.iter().find(|e| e.key == name)?;
+        let entry = self.entries.iter().find(|e| &*e.key == name)?;
         self.reader.within(name, |r| {
             let value = T::read(&entry.value, r);
             if value.is_none() {
@@ -497,14 +507,17 @@ impl<T: Value, const N: usize> Value for [T; N] {
     }
 
     fn read(node: &Node, reader: &mut Reader<'_>) -> Option<Self> {
-        let elements = match node.elements() {
-            Some(elements) if elements.len() == N => elements,
-            _ => {
-                reader.wrong_type(node, &Self::words(), None);
-                return None;
+        if node.len() != Some(N) {
+            reader.wrong_type(node, &Self::words(), None);
+            return None;
+        }
+        let mut values = [const { None }; N];
+        node.each(reader.text, |i, element| {
+            if let Some(value) = values.get_mut(i) {
+                *value = reader.at(i, |r| T::read(element, r));
             }
-        };
-        all_elements(elements, reader)?.try_into().ok()
+        });
+        values.iter().all(Option::is_some).then(|| values.map(|value| value.unwrap_or_else(T::placeholder)))
     }
 
     fn write(&self) -> Written {
@@ -538,22 +551,19 @@ impl<T: Value> Value for Vec<T> {
     }
 
     fn read(node: &Node, reader: &mut Reader<'_>) -> Option<Self> {
-        let Some(elements) = node.elements() else {
+        let Some(length) = node.len() else {
             reader.wrong_type(node, &Self::words(), None);
             return None;
         };
-        all_elements(elements, reader)
+        // Every element is read before giving up: every fault is told
+        let mut values = Vec::with_capacity(length);
+        node.each(reader.text, |i, element| values.extend(reader.at(i, |r| T::read(element, r))));
+        (values.len() == length).then_some(values)
     }
 
     fn write(&self) -> Written {
         Written::List(self.iter().map(T::write).collect())
     }
-}
-
-/// Reads every element before giving up: every fault is told.
-fn all_elements<T: Value>(elements: &[Node], reader: &mut Reader<'_>) -> Option<Vec<T>> {
-    let values: Vec<Option<T>> = elements.iter().enumerate().map(|(i, e)| reader.at(i, |r| T::read(e, r))).collect();
-    values.into_iter().collect()
 }
 
 impl<T: Words> Value for T {

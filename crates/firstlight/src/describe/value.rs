@@ -84,7 +84,7 @@ impl Value for ColorDesc {
 
     fn read(node: &Node, reader: &mut Reader<'_>) -> Option<Self> {
         match &node.data {
-            Data::Array(elements) if elements.len() == 3 => <[f64; 3]>::read(node, reader).map(Self::from),
+            _ if node.len() == Some(3) => <[f64; 3]>::read(node, reader).map(Self::from),
             Data::Number(_) => f64::read(node, reader).map(Self::gray),
             Data::String(text) => {
                 let color = Self::from_hex(text);
@@ -155,7 +155,7 @@ impl Value for ScaleDesc {
     fn read(node: &Node, reader: &mut Reader<'_>) -> Option<Self> {
         match &node.data {
             Data::Number(_) => f64::read(node, reader).map(Self::from),
-            Data::Array(elements) if elements.len() == 3 => <[f64; 3]>::read(node, reader).map(Self::from),
+            _ if node.len() == Some(3) => <[f64; 3]>::read(node, reader).map(Self::from),
             _ => {
                 reader.wrong_type(node, &Self::words(), None);
                 None

@@ -144,9 +144,9 @@ impl MeshFormat {
 /// Reads a mesh from the bytes of a file, on all threads.
 ///
 /// `name` tells the kind by its ending ([`MeshFormat::detect`]) and stands in errors; no file is opened. `progress` is told
-/// the bytes read and those there are, from any thread, and may stop the work. Polygons become triangles: those that are fans
-/// from their first corner so, others by cutting ears; concave ones of very many corners, or very many of more than 64, as fans
-/// all the same, with a note.
+/// the bytes read and those there are, from any thread, and may stop the work. Polygons become triangles, concave
+/// ones too: small ones that are fans from their first corner so, others by cutting ears. Of large ones that cross themselves a
+/// note is made.
 ///
 /// # Errors
 /// [`ImportError`], with the place in the file.

@@ -3,34 +3,29 @@
 //! A polygon is laid onto the axis plane that its own plane (Newell's method) is nearest to. Where all triangles of the fan
 //! from its first corner turn the same way, the fan is taken; that is so for every convex polygon. Otherwise ears are cut off,
 //! always the first in order (G. H. Meisters 1975, "Polygons have ears"). Which corners are ears is remembered, so that
-//! cutting takes quadratic time, not cubic.
-//!
-//! So that no file can make it long, ears are cut of every polygon of up to [`ALWAYS`] corners, and of those of up to
-//! [`MAX_EARS`] as long as the squares of the sizes of larger ones, in the order of the file, are below a bound that grows with
-//! the number of corners; the others become fans, and are counted.
+//! cutting takes quadratic time, not cubic. Polygons of more than [`SMALL`] corners are cut in [`rounds`] instead.
+
+mod rounds;
 
 use rayon::prelude::*;
+use rounds::Rounds;
 
-/// The largest polygon whose ears are cut.
-const MAX_EARS: usize = 4096;
-/// Polygons of so many corners cost little, however many there are.
-const ALWAYS: usize = 64;
-/// The sum of squares of sizes above [`ALWAYS`] that is cut in any case: one of 4096 corners, or 64 of 512.
-const BUDGET: u64 = 1 << 24;
+/// The largest polygon that is a fan, or whose ears are cut in order.
+const SMALL: usize = 64;
 
 /// What was done to the polygons of a file, for its notes.
 #[derive(Clone, Copy, Default)]
 pub(super) struct Counts {
     /// Faces of less than 3 corners, left out.
     pub(super) small: u64,
-    /// Polygons too large for their ears to be cut, that are no fans by shape.
-    pub(super) large: u64,
+    /// Large polygons that cross themselves.
+    pub(super) tangled: u64,
 }
 
 impl Counts {
     pub(super) fn add(&mut self, other: Counts) {
         self.small += other.small;
-        self.large += other.large;
+        self.tangled += other.tangled;
     }
 
     /// In words for a user.
@@ -38,11 +33,10 @@ impl Counts {
         if self.small > 0 {
             notes.push(format!("{} faces of less than 3 corners are left out", self.small));
         }
-        if self.large > 0 {
+        if self.tangled > 0 {
             notes.push(format!(
-                "{} concave polygons of more than {ALWAYS} corners are split as fans and may look wrong: \
-                 there are too many, or one has more than {MAX_EARS}",
-                self.large
+                "{} polygons of more than {SMALL} corners cross themselves: some of their triangles overlap",
+                self.tangled
             ));
         }
     }
@@ -56,30 +50,24 @@ pub(super) fn triangles_of(corners: u32) -> usize {
 /// Triangles of polygons that lie one after another, as numbers of corners. `position`: of a corner.
 pub(super) fn triangulate(sizes: &[u32], position: impl Fn(usize) -> [f32; 3] + Sync) -> (Vec<[u32; 3]>, Counts) {
     const BLOCK: usize = 4096;
-    let corners: u64 = sizes.iter().map(|&s| u64::from(s)).sum();
-    let budget = BUDGET + ALWAYS as u64 * corners;
-    let cost = |size: u32| if size as usize > ALWAYS { u64::from(size).saturating_mul(size.into()) } else { 0 };
-    // Where each block of polygons begins, and what those before it cost
-    let (mut start, mut spent) = (0usize, 0u64);
-    let blocks: Vec<(usize, u64, &[u32])> = sizes
+    // Where each block of polygons begins
+    let mut start = 0usize;
+    let blocks: Vec<(usize, &[u32])> = sizes
         .chunks(BLOCK)
         .map(|block| {
-            let begin = (start, spent, block);
+            let begin = (start, block);
             start += block.iter().map(|&s| s as usize).sum::<usize>();
-            spent = block.iter().fold(spent, |spent, &size| spent.saturating_add(cost(size)));
             begin
         })
         .collect();
     let parts: Vec<(Vec<[u32; 3]>, Counts)> = blocks
         .into_par_iter()
-        .map(|(mut start, mut spent, block)| {
+        .map(|(mut start, block)| {
             let mut triangles = Vec::with_capacity(block.iter().map(|&s| triangles_of(s)).sum());
             let mut counts = Counts::default();
             let mut work = Ears::default();
             for &size in block {
-                spent = spent.saturating_add(cost(size));
-                let cut = (size as usize) <= ALWAYS || (size as usize <= MAX_EARS && spent <= budget);
-                work.polygon(start, size as usize, cut, &position, &mut triangles, &mut counts);
+                work.polygon(start, size as usize, &position, &mut triangles, &mut counts);
                 start += size as usize;
             }
             (triangles, counts)
@@ -108,33 +96,41 @@ struct Ears {
     next: Vec<u32>,
     previous: Vec<u32>,
     ear: Vec<bool>,
+    rounds: Rounds,
 }
 
 impl Ears {
-    /// Adds the triangles of one polygon; `cut`: whether its ears may be cut.
+    /// Adds the triangles of one polygon.
     fn polygon(
         &mut self,
         start: usize,
         size: usize,
-        cut: bool,
         position: &impl Fn(usize) -> [f32; 3],
         triangles: &mut Vec<[u32; 3]>,
         counts: &mut Counts,
     ) {
         counts.small += u64::from(size < 3);
-        if size > 3 && !self.is_fan(start, size, position) {
-            if cut {
+        if size > 3 && self.lay(start, size, position) {
+            if size > SMALL {
+                counts.tangled += u64::from(self.rounds.cut(&self.points, start as u32, triangles).tangled);
+                return;
+            }
+            if !self.is_fan() {
                 self.cut(start as u32, triangles);
                 return;
             }
-            counts.large += 1;
+        }
+        if size > SMALL {
+            rounds::halve(start as u32, size as u32, triangles);
+            return;
         }
         let corner = |i: usize| (start + i) as u32;
         triangles.extend((2..size).map(|i| [corner(0), corner(i - 1), corner(i)]));
     }
 
-    /// Lays the polygon into a plane, counter-clockwise; whether the fan from its first corner is right.
-    fn is_fan(&mut self, start: usize, size: usize, position: &impl Fn(usize) -> [f32; 3]) -> bool {
+    /// Lays the polygon into a plane, counter-clockwise. Not one without an area or with a corner that is not finite: for those
+    /// nothing is better than a fan.
+    fn lay(&mut self, start: usize, size: usize, position: &impl Fn(usize) -> [f32; 3]) -> bool {
         let at = |i: usize| position(start + i).map(f64::from);
         // The normal, by Newell's method, from the first corner
         let origin = at(0);
@@ -152,11 +148,10 @@ impl Ears {
             }
             p = q;
         }
-        // Without an area, or not finite: nothing better than a fan
         let sizes = normal.map(f64::abs);
         let largest = sizes[0].max(sizes[1]).max(sizes[2]);
         if !(largest > 0.0 && largest.is_finite()) || sizes.iter().any(|s| s.is_nan()) {
-            return true;
+            return false;
         }
         let axis = if sizes[2] == largest {
             2
@@ -172,8 +167,13 @@ impl Ears {
             let p = from_origin(i);
             if turned { [p[k], p[j]] } else { [p[j], p[k]] }
         }));
+        true
+    }
+
+    /// Whether the fan from the first corner is right.
+    fn is_fan(&self) -> bool {
         let points = &self.points;
-        (2..size).all(|i| area(points[0], points[i - 1], points[i]) >= 0.0)
+        (2..points.len()).all(|i| area(points[0], points[i - 1], points[i]) >= 0.0)
     }
 
     /// Cuts ears off the polygon in `points`.

@@ -159,13 +159,13 @@ fn tree(said: &[Said<'_>]) -> Node {
     let leaf = |field: &str, key: &str| {
         let said = said.iter().find(|s| s.key == key)?;
         let value = Node { span: said.span, data: Data::String(said.value.to_owned()) };
-        Some(Entry { key: field.to_owned(), key_span: said.span, value })
+        Some(Entry { key: field.into(), key_span: said.span, value })
     };
     let node = |entries: Vec<Entry>| {
         let span = entries.first().map_or(Span::default(), |e| e.key_span);
         Node { span, data: Data::Table(entries) }
     };
-    let table = |key: &str, value: Node| Entry { key: key.to_owned(), key_span: value.span, value };
+    let table = |key: &str, value: Node| Entry { key: key.into(), key_span: value.span, value };
     let render = node(
         [("width", "output_resolution"), ("height", "output_resolution"), ("antialiasing", "num_samples")]
             .iter()

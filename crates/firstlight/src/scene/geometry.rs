@@ -40,6 +40,23 @@ pub(crate) struct Surface {
     pub shadows: Option<LinkId>,
 }
 
+/// What a surface says of rays: which of them it lets pass. Of two shapes at the same place that say the same, no ray ends
+/// at the one with the higher id, and no light is stopped by it alone.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub(crate) struct RayRules {
+    visible: bool,
+    casts_shadow: bool,
+    single_sided: bool,
+    shadows: Option<LinkId>,
+}
+
+impl Surface {
+    pub fn ray_rules(&self) -> RayRules {
+        let Surface { visible, casts_shadow, single_sided, shadows, .. } = *self;
+        RayRules { visible, casts_shadow, single_sided, shadows }
+    }
+}
+
 /// A thing with a space of its own.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Target {
@@ -203,6 +220,39 @@ pub(crate) struct Parts {
     pub links: LinkSets,
 }
 
+/// Leaves out what has the key of something before it.
+fn drop_copies<T, K: Ord>(list: &mut Vec<T>, key: impl Fn(&T) -> K) {
+    let mut keys: Vec<(K, usize)> = list.iter().enumerate().map(|(i, thing)| (key(thing), i)).collect();
+    keys.sort_unstable();
+    let mut is_copy = vec![false; list.len()];
+    for pair in keys.windows(2).filter(|pair| pair[0].0 == pair[1].0) {
+        is_copy[pair[1].1] = true;
+    }
+    let mut is_copy = is_copy.into_iter();
+    list.retain(|_| is_copy.next() != Some(true));
+}
+
+/// The same for two placed things that no ray can tell apart: of one shape, at one place, with the same to say of rays. That of
+/// the lower surface, which is the one that was placed first, is then the one that rays end at.
+fn same_to_rays(thing: &Placed, surfaces: &[Surface], meshes: &[Mesh], solids: &[Solid]) -> [u8; 32] {
+    let rules = |of: u32| surfaces[(thing.surface.0 + of) as usize].ray_rules();
+    // Numbers are written so that different ones differ
+    let what = match thing.target {
+        Target::Mesh(mesh) => {
+            let rules: Vec<RayRules> = meshes[mesh as usize].parts.iter().map(|part| rules(part.surface)).collect();
+            format!("mesh {mesh} {rules:?}")
+        }
+        Target::Points(points) => format!("points {points} {:?}", rules(0)),
+        Target::Solid(solid) => format!("{:?} {:?}", solids[solid as usize], rules(0)),
+    };
+    let mut hash = blake3::Hasher::new();
+    hash.update(what.as_bytes());
+    for number in thing.placement.world_from_object.to_cols_array() {
+        hash.update(&number.to_bits().to_le_bytes());
+    }
+    *hash.finalize().as_bytes()
+}
+
 /// A box of the upper tree: a little larger, so that no rounding of the shape's own test lies outside.
 fn widened([low, high]: [DVec3; 2]) -> Aabb {
     let room = (high - low) * 1e-6 + low.abs().max(high.abs()) * 1e-6;
@@ -218,7 +268,13 @@ impl std::fmt::Debug for Geometry {
 impl Geometry {
     /// From shapes that are in the world; the trees of meshes and point sets are there already.
     pub fn new(parts: Parts, terminator: ShadowTerminator) -> Self {
-        let Parts { surfaces, spheres, parallelograms, world, placed, meshes, point_sets, solids, links } = parts;
+        let Parts { surfaces, mut spheres, mut parallelograms, world, placed, meshes, point_sets, solids, links } =
+            parts;
+        if spheres.len() + parallelograms.len() > LISTED {
+            let rules = |surface: SurfaceId| surfaces[surface.index()].ray_rules();
+            drop_copies(&mut spheres, |s| (s.shape.place_bits(), s.shape.single_sided, rules(s.surface)));
+            drop_copies(&mut parallelograms, |f| (f.shape.place_bits(), f.shape.single_sided, rules(f.surface)));
+        }
         let listed = spheres.len() + parallelograms.len() <= LISTED;
         let (mut items, mut boxes, mut unbounded) = (Vec::new(), Vec::new(), Vec::new());
         if !listed {
@@ -248,7 +304,13 @@ impl Geometry {
                 None => unbounded.push(i as u32),
             }
         }
-        let upper = Bvh::build(&boxes);
+        drop_copies(&mut unbounded, |i| same_to_rays(&placed[*i as usize], &surfaces, &meshes, &solids));
+        // Where things cannot be told apart by their boxes; what is left of spheres and parallelograms can
+        let key = |item: u32| match items[item as usize] {
+            Item::Placed(i) => Err(same_to_rays(&placed[i as usize], &surfaces, &meshes, &solids)),
+            _ => Ok(item),
+        };
+        let upper = Bvh::build_distinct(&boxes, key);
         Geometry {
             surfaces,
             spheres,
@@ -346,5 +408,64 @@ impl Geometry {
             self.placed.iter().filter_map(|thing| self.bounds_of(thing.target).map(|own| thing.placement.bounds(own)));
         let all = spheres.chain(flats).chain(world).chain(placed);
         all.reduce(|[low, high], [a, b]| [low.min(a), high.max(b)])
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::context::NoAssets;
+    use crate::scene::{CompileOptions, Scene, SceneDesc};
+
+    fn compile(text: &str) -> Scene {
+        let parsed = SceneDesc::parse("s.toml", text.as_bytes(), &NoAssets);
+        assert_eq!(parsed.faults(), []);
+        parsed.compile(&NoAssets, &CompileOptions::default()).expect("is a scene").scene
+    }
+
+    #[test]
+    fn copies_of_shapes_are_met_once() {
+        let camera = "[camera]\nposition = [0, 0, 9]\n[[light.point]]\nname = \"l\"\nposition = [0, 5, 9]\n";
+        let sphere = "[[sphere]]\ncenter = [0, 0, 0]\nradius = 1\n";
+        let kinds = [
+            "[[parallelogram]]\np = [0, 0, 0]\ne0 = [1, 0, 0]\ne1 = [0, 1, 0]\n",
+            "[[box]]\ncenter = [5, 0, 0]\n",
+            "[[plane]]\npoint = [0, -3, 0]\n",
+        ];
+        let mut text = camera.to_owned();
+        for shape in [sphere].iter().chain(&kinds) {
+            text += &shape.repeat(500);
+            // They differ in what rays meet, not in what is seen of them
+            for other in ["material = \"m\"", "name = \"n\"", "receives_shadow = false", "lights_exclude = [\"l\"]"] {
+                text += &format!("{shape}{other}\n");
+            }
+            for other in ["visible = false", "casts_shadow = false", "single_sided = true", "shadow_exclude = [\"l\"]"]
+            {
+                text += &format!("{shape}{other}\n").repeat(2);
+            }
+        }
+        text += "[material.phong.m]\n";
+        let geometry = compile(&text).geometry;
+        assert_eq!(geometry.surfaces.len(), 4 * (500 + 4 + 8));
+        assert_eq!((geometry.spheres.len(), geometry.parallelograms.len()), (5, 5));
+        assert_eq!((geometry.placed.len(), geometry.unbounded.len()), (2 * 512, 5));
+        assert!(geometry.listed && geometry.spheres[0].surface.0 == 0);
+        let met = geometry.upper.len();
+        assert_eq!(met, 5);
+        // In a different place, turned, or of another size they are no copies
+        let others = "[[box]]\ncenter = [5, 0, 0]\nsize = [1, 1, 2]\n[[box]]\ntransform = { translate = [5, 0, 0] }\n\
+                      [[box]]\ncenter = [5, 0, 0]\ntransform = { rotate_deg = [0, 0, 0.1] }\n";
+        assert_eq!(compile(&format!("{camera}{others}{others}")).geometry.upper.len(), 3);
+    }
+
+    #[test]
+    fn copies_of_instances_are_met_once() {
+        let group = "[camera]\nposition = [0, 0, 9]\n[[group.g.sphere]]\ncenter = [0, 0, 0]\nradius = 1\n[[group.g.mesh]]\n\
+                     positions = [[0, 0, 0], [1, 0, 0], [0, 1, 0]]\ntriangles = [[0, 1, 2]]\n";
+        let text = format!("{group}{}", "[[instance]]\nof = \"g\"\n".repeat(300));
+        let geometry = compile(&text).geometry;
+        assert_eq!((geometry.spheres.len(), geometry.upper.len()), (1, 1));
+        let hidden = format!("{text}{}", "[[instance]]\nof = \"g\"\ncasts_shadow = false\n".repeat(300));
+        let geometry = compile(&hidden).geometry;
+        assert_eq!((geometry.spheres.len(), geometry.upper.len()), (2, 2));
     }
 }

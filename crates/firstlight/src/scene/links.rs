@@ -10,7 +10,7 @@ use crate::ids::LightId;
 use crate::light::LightDesc;
 
 /// A set of lights, one of [`LinkSets`].
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub(crate) struct LinkId(u32);
 
 /// Sets of lights, bit by bit.

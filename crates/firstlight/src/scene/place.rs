@@ -10,7 +10,7 @@ use std::sync::Arc;
 use glam::DAffine3;
 
 use super::SceneDesc;
-use super::geometry::{Geometry, Joined, Meets, Owned, Parts, Placed, Surface, Target};
+use super::geometry::{Geometry, Joined, Meets, Owned, Parts, Placed, RayRules, Surface, Target};
 use super::links::{LinkId, Links};
 use crate::context::{Assets, CompileContext};
 use crate::describe::Family;
@@ -224,6 +224,7 @@ pub(super) fn compile_shapes(
         files,
         solids: Vec::new(),
         point_sets: Vec::new(),
+        classes: HashMap::new(),
     };
     let mut root = compiler.group(cx, "", &desc.shapes);
     let mut groups = Vec::with_capacity(desc.groups.len());
@@ -297,6 +298,8 @@ struct Compiler<'a> {
     files: &'a mut MeshFiles,
     solids: Vec<Solid>,
     point_sets: Vec<PointSet>,
+    /// Numbers for what surfaces say of rays.
+    classes: HashMap<RayRules, u32>,
 }
 
 impl Compiler<'_> {
@@ -359,7 +362,8 @@ impl Compiler<'_> {
                 Some(source) => {
                     let faces = self.face_materials(cx, &source, desc.file.is_some(), named);
                     surface.material = if let [one] = faces[..] { Some(one) } else { None };
-                    mesh.add(cx, source, transform, number, faces);
+                    let class = self.class(&surface);
+                    mesh.add(cx, source, transform, number, class, faces);
                     Form::MeshPart
                 }
                 None => Form::Nothing,
@@ -374,6 +378,12 @@ impl Compiler<'_> {
             },
         };
         Leaf { form, transform, surface, has_material: named.is_some() }
+    }
+
+    /// A number for what a surface says of rays: of shapes at the same place, those of one number are the same to them.
+    fn class(&mut self, surface: &Surface) -> u32 {
+        let next = self.classes.len() as u32;
+        *self.classes.entry(surface.ray_rules()).or_insert(next)
     }
 
     /// What the triangles of a mesh choose from: one material for all, or one for each name of the file.

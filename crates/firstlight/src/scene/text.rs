@@ -194,6 +194,90 @@ mod tests {
         assert_eq!((desc.render.width, desc.render.exposure), (64, -15.0));
     }
 
+    /// A mesh of so many positions, in TOML and in JSON, `odd` being the hundredth.
+    fn long_lists(odd: &str) -> [(&'static str, String); 2] {
+        let row = |i: usize| if i == 99 { odd.to_owned() } else { format!("[{i}, {}.5, -1e-3]", i % 7) };
+        let rows: Vec<String> = (0..10_000).map(row).collect();
+        let toml = format!(
+            "[[mesh]]\ntriangles = [[0, 1, 2]]\npositions = [ # many\n{},\n]\nname = \"m\"\n",
+            rows.join(",\n")
+        );
+        let json = format!(
+            "{{ \"mesh\": [{{\"triangles\": [[0, 1, 2]],\n\"positions\": [{}],\n\"name\": \"m\" }}] }}",
+            rows.join(",\n")
+        );
+        [("s.toml", toml), ("s.json", json)]
+    }
+
+    #[test]
+    fn long_lists_of_numbers_are_read_where_they_stand() {
+        for (name, text) in long_lists("[99, 1.5, -1e-3]") {
+            let desc = faultless(name, &text, &MemoryAssets::default());
+            let [ShapeDesc::Mesh(mesh)] = &desc.shapes[..] else { panic!("{:?}", desc.shapes.len()) };
+            let expected: Vec<[f64; 3]> = (0..10_000).map(|i| [f64::from(i), f64::from(i % 7) + 0.5, -1e-3]).collect();
+            assert_eq!((&mesh.positions, mesh.name.as_deref()), (&expected, Some("m")));
+        }
+    }
+
+    #[test]
+    fn faults_of_long_lists_have_places() {
+        // What the reader finds, what compiling finds, and what is no list of numbers any more
+        for (odd, words) in [
+            (
+                "[99, 1e999, 0]",
+                "mesh[0].positions[99][1]: 1e999 is too large for a number; at most 1.7976931348623157e308",
+            ),
+            (
+                "[99, 0, -3e8]",
+                "mesh[0].positions[99]: [99, 0, -300000000] is outside [-2.5e8, 2.5e8]; coordinates are in metres",
+            ),
+            ("[99, 0]", "mesh[0].positions[99]: an array of 2 values is not an array of 3 numbers"),
+            ("[99, 0, \"1\"]", "mesh[0].positions[99][2]: \"1\" is a string, not a number"),
+        ] {
+            for (name, text) in long_lists(odd) {
+                let parsed = SceneDesc::parse(name, text.as_bytes(), &NoAssets);
+                let error = parsed.compile(&NoAssets, &CompileOptions::default()).expect_err("is wrong");
+                let fault = error.faults.iter().find(|fault| fault.path.contains("positions")).expect("is told");
+                let place = fault.place.as_ref().expect("has one");
+                let line = text.lines().position(|line| line.contains(odd)).expect("is there") as u32 + 1;
+                assert_eq!((place.line, place.excerpt.contains(odd)), (line, true), "{fault}");
+                assert!(fault.to_string().ends_with(words), "{fault}");
+            }
+        }
+    }
+
+    #[test]
+    fn tables_are_said_once() {
+        let told = |text: &str| -> Vec<String> {
+            SceneDesc::parse("s.toml", text.as_bytes(), &NoAssets).faults().iter().map(ToString::to_string).collect()
+        };
+        let twice = |place: &str, key: &str| vec![format!("s.toml:{place}: \"{key}\" is said twice; keep one of them")];
+        assert_eq!(told("[render]\nwidth = 1\n[camera]\nposition = [0, 0, 1]\n[render]\n"), twice("5:2", "render"));
+        assert_eq!(told("[render]\nwidth = 1\nheight = 2\nwidth = 3\n"), twice("4:1", "width"));
+        assert_eq!(told("render.width = 1\nrender.width = 2\n"), twice("2:8", "width"));
+        assert_eq!(told("render.width = 1\n[render]\nheight = 1\n"), twice("2:2", "render"));
+        assert_eq!(told("[material.phong.a]\n[material]\nphong.b = {}\n"), Vec::<String>::new());
+        assert_eq!(told("[material.phong]\n[material]\nphong.b = {}\n"), twice("3:1", "phong"));
+        assert_eq!(told("sphere = []\n[[sphere]]\n"), twice("2:3", "sphere"));
+        assert_eq!(told("[[sphere]]\n[sphere]\n"), twice("2:2", "sphere"));
+        // Many keys are found by another way than few
+        let many: String = (0..40).map(|i| format!("a{i} = 1\n")).collect();
+        assert_eq!(told(&format!("{many}a3 = 2\n")), twice("41:1", "a3"));
+        let kinds =
+            [("1", "a number"), ("[1]", "an array of 1 value"), ("{ c = 1 }", "a table"), ("\"x\"", "a string")];
+        for (value, kind) in kinds {
+            let words = format!("s.toml:2:1: not TOML: \"a\" is {kind} already, and takes no keys here");
+            assert_eq!(told(&format!("a = {value}\na.b = 1\n")), [words.clone()]);
+            assert_eq!(told(&format!("a = {value}\n[a.b]\n")), [words.replace("2:1", "2:2")]);
+        }
+        // Tables within the last of an array of tables, and one that is said after what it holds
+        let text = "[[sphere]]\ncenter = [0, 0, 0]\nradius = 1\n[sphere.transform]\nscale = 2\n[[sphere]]\nradius = 2\n\
+                    center = [1, 0, 0]\n[camera.a.transform]\nscale = 2\n[camera.a]\nposition = [0, 0, 1]\n";
+        let desc = faultless("s.toml", text, &MemoryAssets::default());
+        let scaled: Vec<bool> = desc.shapes.iter().map(|shape| shape.common().transform.is_some()).collect();
+        assert_eq!((scaled, desc.cameras.len()), (vec![true, false], 1));
+    }
+
     #[test]
     fn included_texts_come_first_and_files_start_at_the_scene() {
         let mut assets = MemoryAssets::default();

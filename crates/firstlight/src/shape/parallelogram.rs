@@ -96,6 +96,11 @@ impl Parallelogram {
         self.p.dot(d) + self.edges.iter().map(|edge| edge.dot(d).max(0.0)).sum::<f64>()
     }
 
+    /// Where it is and which side is its front, as numbers that are the same for the same place only.
+    pub(crate) fn place_bits(&self) -> [[u64; 3]; 4] {
+        [self.p, self.n, self.edges[0], self.edges[1]].map(|v| v.to_array().map(f64::to_bits))
+    }
+
     /// How far u or v can be wrong for a ray that starts `from` away from the corner, computed with `roundoff`. Two
     /// shapes that share an edge overlap by this much, so that no ray slips between them.
     #[inline(always)]

@@ -157,9 +157,11 @@ impl PointSet {
             Aabb { min: c - r, max: c + r }
         };
         let boxes: Vec<Aabb> = spheres.iter().map(bounds).collect();
+        // Of equal spheres the first is the one that is seen
+        let tree = Bvh::build_distinct(&boxes, |id| spheres[id as usize].map(|x| (x + 0.0).to_bits()));
         let colors =
             data.colors.iter().map(|[r, g, b, _]| [*r, *g, *b].map(|c| if c >= 0.0 { c.min(1e6) } else { 0.0 }));
-        PointSet { spheres, colors: colors.collect(), origin: data.origin.into(), tree: Bvh::build(&boxes) }
+        PointSet { spheres, colors: colors.collect(), origin: data.origin.into(), tree }
     }
 
     /// How many there are.

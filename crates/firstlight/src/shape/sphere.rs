@@ -121,6 +121,12 @@ impl Sphere {
         ball_tangents(self.uv, outwards).map(|d| d * self.r)
     }
 
+    /// Where it is, as numbers that are the same for the same place only.
+    pub(crate) fn place_bits(&self) -> [u64; 4] {
+        let [x, y, z] = self.c.to_array();
+        [x, y, z, self.r].map(f64::to_bits)
+    }
+
     /// The smallest box around it.
     pub(crate) fn bounds(&self) -> [DVec3; 2] {
         [self.c - self.r, self.c + self.r]

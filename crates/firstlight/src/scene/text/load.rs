@@ -129,13 +129,13 @@ impl Loader<'_> {
 
     /// Reads the included texts.
     fn include(&mut self, file: usize, text: &str, folder: &str, include: &Node) {
-        let Some(elements) = include.elements() else {
+        let Some(length) = include.len() else {
             let mut reader = Reader::new(file, text, folder, &mut self.faults);
             reader.within("include", |r| r.wrong_type(include, "an array of file names", None));
             self.incomplete = true;
             return;
         };
-        for (i, element) in elements.iter().enumerate() {
+        for (i, element) in (0..length).filter_map(|i| Some((i, include.element(text, i)?))) {
             let mut fault = |message: String, hint: Option<String>, other| {
                 let mut reader = Reader::new(file, text, folder, &mut self.faults);
                 reader.within("include", |r| r.at(i, |r| r.conflict(element.span, message, hint, other)));
@@ -198,7 +198,7 @@ impl Loader<'_> {
             return;
         };
         for entry in entries {
-            let (key, span) = (entry.key.as_str(), entry.key_span);
+            let (key, span) = (&*entry.key, entry.key_span);
             let node = &mut entry.value;
             if let Some(kind) = ShapeDesc::KINDS.iter().position(|k| *k == key) {
                 let shapes = &mut self.desc.shapes;

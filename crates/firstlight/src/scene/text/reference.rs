@@ -33,8 +33,9 @@ before the text that includes them. File names are relative to the text that inc
 `[render]`, `[camera]` and every name can be said in one text only. In JSON a top-level `"$schema"` is allowed, and not
 read.
 
-Limits: 64 MiB for all texts of a scene together, 1024 texts, includes 32 deep, tables and arrays 64 deep, 16777216
-words, numbers and marks in one text.
+Limits: 64 MiB for all texts of a scene together, 1024 texts, includes 32 deep, tables and arrays 64 deep; in one text
+2097152 tables, 262144 of them in one value, and 16777216 words, numbers and marks, not counting lists of 64 numbers or
+more.
 "##;
 
 const GROUPS: &str = r#"

@@ -3,6 +3,7 @@
 //! Compiling knows a value by its path alone, `light.spot[2].cone_deg`. The trees of all texts are kept, and a path is
 //! walked down only when there is a fault to place: a map of every path would be larger than the scene.
 
+use std::borrow::Cow;
 use std::collections::BTreeSet;
 
 use crate::describe::node::{Node, Span};
@@ -194,14 +195,18 @@ impl Sources {
 
 /// Follows `path` into a file's tree as far as it goes: what is left of the path, the path walked, and its place.
 fn walk<'p>(file: &SourceFile, path: &'p str) -> (&'p str, String, Span) {
-    let mut node = &file.root;
+    let mut node = Cow::Borrowed(&file.root);
     let mut left = path;
     let mut walked = String::new();
     while !left.is_empty() {
         if let Some((index, rest)) = left.strip_prefix('[').and_then(|l| l.split_once(']')) {
             let base = file.bases.iter().find(|(array, _)| *array == walked).map_or(0, |(_, base)| *base);
             let element = index.parse::<usize>().ok().and_then(|i| i.checked_sub(base));
-            let Some(next) = element.and_then(|i| node.elements()?.get(i)) else { break };
+            let next = element.and_then(|i| match &node {
+                Cow::Borrowed(node) => node.element(&file.text, i),
+                Cow::Owned(node) => node.element(&file.text, i).map(|element| Cow::Owned(element.into_owned())),
+            });
+            let Some(next) = next else { break };
             walked.push_str(&format!("[{index}]"));
             (node, left) = (next, rest);
         } else {
@@ -211,14 +216,15 @@ fn walk<'p>(file: &SourceFile, path: &'p str) -> (&'p str, String, Span) {
                 let after = rest.strip_prefix(name)?;
                 (after.is_empty() || after.starts_with(['.', '['])).then_some(after)
             };
-            let entries = node.entries().unwrap_or_default();
+            // What is not in the tree itself is numbers
+            let entries = if let Cow::Borrowed(node) = &node { node.entries().unwrap_or_default() } else { &[] };
             let found = entries.iter().filter_map(|e| Some((e, fits(&e.key).or_else(|| fits(&key(&e.key)))?)));
             let Some((entry, after)) = found.min_by_key(|(_, after)| after.len()) else { break };
             if !walked.is_empty() {
                 walked.push('.');
             }
             walked.push_str(&key(&entry.key));
-            (node, left) = (&entry.value, after);
+            (node, left) = (Cow::Borrowed(&entry.value), after);
         }
     }
     (left, walked, node.span)

@@ -31,7 +31,7 @@ impl Arrays<'_> {
     ) {
         let count = self.counts.entry(path.to_owned()).or_insert(0);
         self.bases.push((path.to_owned(), *count));
-        let Some(elements) = node.elements() else {
+        if node.len().is_none() {
             let hint = match self.syntax {
                 Syntax::Toml => format!("write [[{path}]] for each {key}"),
                 Syntax::Json => format!("write \"{key}\": [{{ ... }}], one object for each"),
@@ -39,11 +39,11 @@ impl Arrays<'_> {
             reader.wrong_type(node, "an array of tables", Some(hint));
             reader.poison();
             return;
-        };
-        for element in elements {
+        }
+        node.each(reader.text(), |_, element| {
             reader.at(*count, |r| read(r, element));
             *count += 1;
-        }
+        });
     }
 }
 
@@ -68,12 +68,12 @@ pub(super) fn read_groups(
         let name = &entry.key;
         reader.within(name, |r| {
             let span = entry.value.span;
-            if let Some(other) = names.get(&("group", name.clone())) {
+            if let Some(other) = names.get(&("group", name.to_string())) {
                 let message = format!("the name {} is taken", quoted(name));
                 r.conflict(span, message, Some("each group is described in one place".into()), Some(*other));
                 return;
             }
-            names.insert(("group", name.clone()), (file, span));
+            names.insert(("group", name.to_string()), (file, span));
             let mut group = GroupDesc::default();
             match entry.value.entries() {
                 None => {
@@ -83,7 +83,7 @@ pub(super) fn read_groups(
                 }
                 Some(kinds) => {
                     for of_kind in kinds {
-                        let kind = ShapeDesc::KINDS.iter().position(|k| *k == of_kind.key);
+                        let kind = ShapeDesc::KINDS.iter().position(|k| *k == &*of_kind.key);
                         r.within(&of_kind.key, |r| match kind {
                             Some(kind) => {
                                 let path = format!("group.{}.{}", key(name), of_kind.key);
@@ -102,7 +102,7 @@ pub(super) fn read_groups(
                     }
                 }
             }
-            groups.push((name.clone(), group));
+            groups.push((name.to_string(), group));
         });
     }
 }
@@ -121,7 +121,7 @@ pub(super) fn kinds<'n, F: Family>(
     };
     let mut kinds = Vec::new();
     for entry in entries {
-        let kind = F::KINDS.iter().position(|k| *k == entry.key);
+        let kind = F::KINDS.iter().position(|k| *k == &*entry.key);
         if kind.is_none() {
             let near =
                 nearest(&entry.key, F::KINDS).map(|near| format!("did you mean \"{near}\"? ")).unwrap_or_default();
@@ -130,7 +130,7 @@ pub(super) fn kinds<'n, F: Family>(
             reader.within(&node::shortened(&entry.key), |r| r.error(entry.key_span, message, Some(hint)));
         }
         if kind.is_some() || F::WORD != LightDesc::WORD {
-            kinds.push((kind, entry.key.as_str(), &entry.value));
+            kinds.push((kind, &*entry.key, &entry.value));
         }
     }
     kinds
@@ -160,13 +160,13 @@ pub(super) fn named<F: Family>(
             for entry in entries {
                 r.within(&entry.key, |r| {
                     let span = entry.value.span;
-                    if let Some(other) = names.get(&(F::WORD, entry.key.clone())) {
+                    if let Some(other) = names.get(&(F::WORD, entry.key.to_string())) {
                         let message = format!("the name {} is taken", quoted(&entry.key));
                         let hint = format!("names are unique among all kinds of {}", F::WORD);
                         r.conflict(span, message, Some(hint), Some(*other));
                         return;
                     }
-                    names.insert((F::WORD, entry.key.clone()), (file, span));
+                    names.insert((F::WORD, entry.key.to_string()), (file, span));
                     match kind {
                         Some(kind) => {
                             // `diffuse = 1` directly in [material.phong]: a name was forgotten
@@ -176,12 +176,12 @@ pub(super) fn named<F: Family>(
                                 r.poison();
                                 return;
                             }
-                            list.push((entry.key.clone(), F::read(kind, &entry.value, r)));
+                            list.push((entry.key.to_string(), F::read(kind, &entry.value, r)));
                         }
                         // Those who use the name shall find something
                         None => {
                             r.poison();
-                            list.push((entry.key.clone(), F::read(0, &Node::empty(), r)));
+                            list.push((entry.key.to_string(), F::read(0, &Node::empty(), r)));
                         }
                     }
                 });
@@ -221,7 +221,7 @@ pub(super) fn cameras(
     // Tables among values: two ways of saying cameras in one, but for those that a camera has of its own
     if let Data::Table(entries) = &mut node.data {
         let own = |entry: &node::Entry| {
-            CameraDesc::info().iter().any(|field| field.name == entry.key && !field.tables.is_empty())
+            CameraDesc::info().iter().any(|field| field.name == &*entry.key && !field.tables.is_empty())
         };
         entries.retain(|entry| {
             if is_table(&entry.value) && own(entry) {

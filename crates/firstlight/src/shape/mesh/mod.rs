@@ -265,6 +265,7 @@ struct Source {
     uv_set: usize,
     transform: Option<DAffine3>,
     surface: u32,
+    class: u32,
     materials: Vec<MaterialId>,
 }
 
@@ -277,6 +278,8 @@ struct Lists {
     uvs: Vec<[f32; 2]>,
     colors: Vec<[f32; 3]>,
     parts: Vec<MeshPart>,
+    /// Of each part: rays treat parts of one class alike.
+    classes: Vec<u32>,
 }
 
 /// Makes `list` as long as `length` and adds `more`, if either has anything.
@@ -294,13 +297,15 @@ fn join<T: Clone>(list: &mut Vec<T>, length: usize, more: Vec<T>, added: usize, 
 }
 
 impl MeshBuilder {
-    /// Adds a mesh, moved by `transform`; `surface` is its number in the group, `materials` what its faces choose from.
+    /// Adds a mesh, moved by `transform`; `surface` is its number in the group, `materials` what its faces choose from. Rays
+    /// are let through, and light is stopped, by all meshes of a `class` alike.
     pub fn add(
         &mut self,
         cx: &mut CompileContext,
         source: MeshSource,
         transform: Option<DAffine3>,
         surface: u32,
+        class: u32,
         materials: Vec<MaterialId>,
     ) {
         let MeshSource { data, uv_set } = source;
@@ -322,7 +327,7 @@ impl MeshBuilder {
             (Some([low, high]), Some([a, b])) => Some([low.min(a), high.max(b)]),
             (all, own) => all.or(own),
         };
-        self.sources.push(Source { data, uv_set, transform, surface, materials });
+        self.sources.push(Source { data, uv_set, transform, surface, class, materials });
     }
 
     /// The box around all meshes so far, in the space that they are joined in.
@@ -335,24 +340,30 @@ impl MeshBuilder {
         for source in std::mem::take(&mut self.sources) {
             self.joined.add(source, origin);
         }
-        let Lists { positions, triangles, normals, uvs, colors, parts } = self.joined;
+        let Lists { positions, triangles, normals, uvs, colors, parts, classes } = self.joined;
         if triangles.is_empty() {
             return None;
         }
         cx.tell(CompileStage::Building { triangles: triangles.len() as u64 });
-        let tree = TriangleTree::build(&positions, &triangles);
-        Some(Mesh { positions, triangles, normals, uvs, colors, parts, tree })
+        let tree = TriangleTree::build(&[], &[]);
+        let mut mesh = Mesh { positions, triangles, normals, uvs, colors, parts, tree };
+        // Copies of a triangle are one, but where rays may treat them differently: by their surface, or by the side that
+        // their normals say is the front
+        let class = |triangle| (classes[mesh.part_index(triangle)], mesh.is_turned(triangle));
+        mesh.tree = TriangleTree::build_distinct(&mesh.positions, &mesh.triangles, class);
+        Some(mesh)
     }
 }
 
 impl Lists {
     fn add(&mut self, source: Source, origin: DVec3) {
-        let Source { mut data, uv_set, transform, surface, materials } = source;
+        let Source { mut data, uv_set, transform, surface, class, materials } = source;
         move_mesh(&mut data, transform, origin);
         let (vertices, first) = (self.positions.len(), self.triangles.len());
         let MeshData { positions, mut triangles, normals, mut uvs, colors, face_materials, .. } = data;
         let added = positions.len();
         let own_uvs = if uv_set < uvs.len() { uvs.swap_remove(uv_set) } else { Vec::new() };
+        self.classes.push(class);
         self.parts.push(MeshPart {
             first_triangle: first as u32,
             surface,

@@ -80,18 +80,26 @@ impl Mesh {
 
     /// Whether a ray of the mesh's space meets a triangle from behind.
     pub fn is_behind(&self, triangle: u32, d: Vec3) -> bool {
-        let face = self.face_normal(triangle);
+        (self.face_normal(triangle).dot(d.as_dvec3()) > 0.0) != self.is_turned(triangle)
+    }
+
+    /// Whether its normals say that the front of a triangle is the other side than the order of its corners says.
+    pub fn is_turned(&self, triangle: u32) -> bool {
         let normals = self.triangles[triangle as usize].map(|i| self.normals.get(i as usize).copied());
         let own = normals.into_iter().flatten().map(|n| Vec3::from(n).as_dvec3()).sum::<DVec3>();
-        let turned = own.dot(face) < 0.0;
-        (face.dot(d.as_dvec3()) > 0.0) != turned
+        own.dot(self.face_normal(triangle)) < 0.0
     }
 
     /// The part that a triangle belongs to.
     #[inline]
     pub fn part(&self, triangle: u32) -> &MeshPart {
-        let after = self.parts.partition_point(|part| part.first_triangle <= triangle);
-        &self.parts[after - 1]
+        &self.parts[self.part_index(triangle)]
+    }
+
+    /// The same, as an index of `parts`.
+    #[inline]
+    pub fn part_index(&self, triangle: u32) -> usize {
+        self.parts.partition_point(|part| part.first_triangle <= triangle) - 1
     }
 
     #[inline(always)]

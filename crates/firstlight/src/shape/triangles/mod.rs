@@ -129,6 +129,21 @@ pub(crate) fn can_be_hit(positions: &[[f32; 3]], triangle: &[u32; 3]) -> bool {
 impl TriangleTree {
     /// Builds the tree over a mesh. A triangle without area, or with a vertex that is not finite or not there, is left out.
     pub fn build(positions: &[[f32; 3]], triangles: &[[u32; 3]]) -> TriangleTree {
+        Self::build_distinct(positions, triangles, |_| ())
+    }
+
+    /// The same. Of triangles with the same corners in the same order and the same `class` the first stands for all: the
+    /// filters of whoever asks treat a class alike, and of hits at the same t the lowest number wins. Numbers stay as they are.
+    pub fn build_distinct<C: Ord>(
+        positions: &[[f32; 3]],
+        triangles: &[[u32; 3]],
+        class: impl Fn(u32) -> C + Sync,
+    ) -> TriangleTree {
+        let key = |id: u32| {
+            // Adding 0 makes 0 of -0
+            let corners = triangles[id as usize].map(|i| positions[i as usize].map(|x| (x + 0.0).to_bits()));
+            (corners, class(id))
+        };
         let bounds = |i: usize| match corners(positions, &triangles[i]) {
             Some([a, b, c]) => {
                 let sum = a + b + c;
@@ -137,7 +152,7 @@ impl TriangleTree {
             }
             None => Aabb::EMPTY,
         };
-        let Built { tree, order, leaves } = build(triangles.len(), bounds, PACK.ilog2());
+        let Built { tree, order, leaves } = build(triangles.len(), bounds, PACK.ilog2(), key);
         let pack = |leaf: &crate::accel::Leaf| {
             let mut pack = Pack { vertices: [[[f32::NAN; PACK]; 3]; 3], ids: [NONE; PACK] };
             let run = &order[leaf.first as usize..(leaf.first + leaf.count) as usize];
@@ -153,7 +168,8 @@ impl TriangleTree {
         };
         use rayon::prelude::*;
         let packs = leaves.par_iter().with_min_len(1 << 12).map(pack).collect();
-        TriangleTree { tree, packs, len: order.len() }
+        let len = leaves.iter().map(|leaf| leaf.count as usize).sum();
+        TriangleTree { tree, packs, len }
     }
 
     /// Visits the leaves whose boxes `meet` says yes to, until `leaf` says no; see [`Tree::gather`].
@@ -173,7 +189,7 @@ impl TriangleTree {
         (0..PACK).filter(|place| pack.ids[*place] != NONE).map(|place| (pack.ids[place], pack.triangle(place)))
     }
 
-    /// Triangles in the tree.
+    /// Triangles in the tree: those with an area, and of copies not all.
     pub fn len(&self) -> usize {
         self.len
     }
