@@ -166,17 +166,19 @@ impl<'t> Scan<'t> {
                 }
                 _ => {}
             }
-            let limits = [(self.tokens, MAX_TOKENS, "words, numbers and marks"), (self.tables, MAX_TABLES, "tables")];
-            for (count, most, what) in limits {
-                if count > most {
-                    let hint = "spread the scene over several files with `include`; a mesh or point set of many parts is best \
-                                a file of its own";
-                    return Err(SyntaxFault {
-                        span: Span { start: at, end: at + 1 },
-                        message: format!("more than {most} {what} in one text"),
-                        hint: Some(hint.into()),
-                    });
-                }
+            if self.tokens > MAX_TOKENS || self.tables > MAX_TABLES {
+                let (most, what) = if self.tables > MAX_TABLES {
+                    (MAX_TABLES, "tables")
+                } else {
+                    (MAX_TOKENS, "words, numbers and marks")
+                };
+                let hint = "spread the scene over several files with `include`; a mesh or point set of many parts is best a \
+                            file of its own";
+                return Err(SyntaxFault {
+                    span: Span { start: at, end: at + 1 },
+                    message: format!("more than {most} {what} in one text"),
+                    hint: Some(hint.into()),
+                });
             }
             if is_toml && self.tables - tables_before > MAX_INLINE_TABLES {
                 return Err(SyntaxFault {

@@ -452,7 +452,7 @@ mod tests {
         let met = geometry.upper.len();
         assert_eq!(met, 5);
         // In a different place, turned, or of another size they are no copies
-        let others = "[[box]]\ncenter = [5, 0, 0]\nsize = [1, 1, 2]\n[[box]]\ntransform = { translate = [5, 0, 0] }\n\
+        let others = "[[box]]\ncenter = [5, 0, 0]\nsize = [1, 1, 2]\n[[box]]\ncenter = [0, 0, 0]\ntransform = { translate = [5, 0, 0] }\n\
                       [[box]]\ncenter = [5, 0, 0]\ntransform = { rotate_deg = [0, 0, 0.1] }\n";
         assert_eq!(compile(&format!("{camera}{others}{others}")).geometry.upper.len(), 3);
     }

