@@ -6,9 +6,12 @@ use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Args, Parser, Subcommand, ValueEnum, ValueHint};
 use firstlight::{ColorDesc, Framing, SamplesDesc, SimdLevel, View, VisibilityMode, Window};
 
+/// The version and, where it is known, the commit: `0.1.0 (0123456789)`.
+const VERSION: &str = concat!(env!("CARGO_PKG_VERSION"), env!("FIRSTLIGHT_COMMIT"));
+
 /// Renders the direct light of a scene: camera ray, first surface, every light. No noise, the same bits every time
 #[derive(Debug, Parser)]
-#[command(name = "firstlight", version, arg_required_else_help = true, max_term_width = 100)]
+#[command(name = "firstlight", version = VERSION, arg_required_else_help = true, max_term_width = 100)]
 #[command(after_help = EXIT_CODES)]
 #[command(disable_help_subcommand = true, args_override_self = false)]
 pub struct Cli {
@@ -78,7 +81,7 @@ Examples:
 #[derive(Args, Debug)]
 pub struct SceneArgs {
     /// A scene file (.toml, .json, or a course file .txt), a model (.ply, .stl, .obj), the name of a built-in scene such as config23 (see `firstlight
-    /// scenes`; a file of such a name is ./config23), or - for standard input
+    /// scenes`; a file of such a name is ./config23), or - for standard input, a scene or a model
     #[arg(value_name = "SCENE", value_hint = ValueHint::FilePath)]
     pub scene: PathBuf,
     #[command(flatten)]
@@ -143,7 +146,7 @@ fn angle(text: &str) -> Result<f64, String> {
 #[derive(Args, Debug)]
 pub struct RenderArgs {
     /// A scene file (.toml, .json, or a course file .txt), a model (.ply, .stl, .obj), the name of a built-in scene such as config23 (see `firstlight
-    /// scenes`; a file of such a name is ./config23), or - for standard input. Several are rendered one after the other, also after one
+    /// scenes`; a file of such a name is ./config23), or - for standard input, a scene or a model. Several are rendered one after the other, also after one
     /// that failed
     #[arg(value_name = "SCENE", value_hint = ValueHint::FilePath, default_value = "config11")]
     pub scenes: Vec<PathBuf>,
@@ -257,7 +260,7 @@ pub struct RenderArgs {
     #[arg(conflicts_with_all = ["output", "bits", "format", "exposure", "crop", "time", "frames", "aa_mode", "reference", "visibility"])]
     #[arg(conflicts_with_all = ["threads", "tile_size", "simd", "stats", "heat"])]
     pub print_scene: Option<Option<PathBuf>>,
-    /// Says nothing but errors, warnings, and --stats where asked for
+    /// Says nothing but errors, warnings (no notes), and --stats where asked for
     #[arg(short, long, help_heading = "Messages")]
     pub quiet: bool,
 }

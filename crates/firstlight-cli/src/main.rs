@@ -3,6 +3,7 @@
 mod args;
 mod check;
 mod faster;
+mod hints;
 mod info;
 mod input;
 mod interrupt;
@@ -27,6 +28,7 @@ fn main() -> ExitCode {
     let cli = match Cli::try_parse() {
         Ok(cli) => cli,
         Err(e) => {
+            let e = hints::improve(e);
             let said = e.print();
             return match said {
                 Err(why) if why.kind() != std::io::ErrorKind::BrokenPipe => ExitCode::from(1),

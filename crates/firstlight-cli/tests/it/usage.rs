@@ -1,6 +1,6 @@
 //! Wrong usage: exit code 2, what is allowed, and no file.
 
-use crate::common::{Folder, SCENE};
+use crate::common::{Folder, SCENE, ran};
 
 /// The words after `firstlight`, and what must be said.
 #[rustfmt::skip]
@@ -101,6 +101,81 @@ fn wrong_usage_is_exit_code_2_and_says_what_is_allowed() {
         let ran = folder.run(line).exits(2).says(parts);
         assert!(ran.stdout.is_empty(), "{line} answers");
         assert_eq!(folder.names(), ["scene.toml"], "{line} leaves a file");
+    }
+}
+
+/// What is written with another program in mind, and what is there instead.
+#[rustfmt::skip]
+const MEANT: &[(&str, &str)] = &[
+    ("scene.toml", "to render it: firstlight render scene.toml"),
+    ("nowhere.ply", "to render it: firstlight render nowhere.ply"),
+    ("config23", "to render it: firstlight render config23"),
+    ("help", "firstlight --help"),
+    ("help render", "firstlight COMMAND --help"),
+    ("version", "firstlight --version"),
+    ("show scene.toml", "nothing opens a window"),
+    ("validate scene.toml", "firstlight check SCENE"),
+    ("render scene.toml --spp 16", "points on each area light are --samples N, camera rays in each pixel --aa N"),
+    ("render scene.toml --spp=16", "--samples N"),
+    ("render scene.toml -j 4", "threads are --threads N"),
+    ("render scene.toml -j4", "threads are --threads N"),
+    ("render scene.toml --quality high", "--aa-mode full"),
+    ("render scene.toml --resolution 320x240", "--width and --height"),
+    ("render scene.toml --output-file a.png", "-o FILE"),
+    ("render scene.toml --fps 30", "fps in [render]"),
+    ("render scene.toml -f 1", "--frames A..B"),
+    ("render scene.toml --max-bounces 4", "one bounce"),
+    ("render scene.toml --denoise", "no noise"),
+    ("render scene.toml +W320", "--width 320"),
+    ("check scene.toml --verbose", "--stats"),
+];
+
+#[test]
+fn words_of_other_programs_lead_to_what_exists() {
+    let folder = Folder::with_scene();
+    for (line, part) in MEANT {
+        println!("firstlight {line}");
+        let ran = folder.run(line).exits(2).says(&["tip: ", part]);
+        assert_eq!(ran.stderr.matches("tip: ").count(), 1, "{}", ran.stderr);
+        assert_eq!(folder.names(), ["scene.toml"], "{line} leaves a file");
+    }
+}
+
+#[test]
+fn what_is_written_cannot_disturb_a_terminal() {
+    let folder = Folder::with_scene();
+    let odd = "a\u{1b}[2J\u{202e}b\n";
+    let lines: &[&[&str]] = &[
+        &[odd],
+        &["render", odd],
+        &["render", "scene.toml", odd],
+        &["render", "scene.toml", &format!("--{odd}")],
+        &["render", "scene.toml", "--width", odd],
+        &["render", "scene.toml", "--camera", odd],
+        &["render", "scene.toml", "-o", odd],
+        &["render", "scene.toml", "--allow-dir", odd],
+        &["render", "scene.toml", "--visibility", odd],
+        &["scenes", odd],
+        &["check", &format!("{odd}.ply")],
+    ];
+    for line in lines {
+        let ran = ran(folder.command(*line).output().unwrap());
+        assert!(matches!(ran.code, Some(1 | 2)), "{line:?}: {}", ran.stderr);
+        assert!(
+            !ran.stderr.chars().any(|c| c.is_control() && c != '\n' || c == '\u{202e}'),
+            "{line:?}: {:?}",
+            ran.stderr
+        );
+        assert!(ran.stderr.contains("a\\u{1b}[2J\\u{202e}b\\n"), "{line:?}: {:?}", ran.stderr);
+    }
+}
+
+#[test]
+fn a_long_name_is_cut() {
+    let folder = Folder::new();
+    for name in ["x".repeat(3000), format!("{}.ply", "x".repeat(3000)), format!("{}.toml", "x/".repeat(1000))] {
+        let ran = folder.run(&format!("check {name}")).exits(1).says(&[" ... "]);
+        assert!(ran.stderr.len() < 1300, "{}", ran.stderr);
     }
 }
 
