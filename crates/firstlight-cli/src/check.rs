@@ -15,6 +15,7 @@ pub fn run(args: &CheckArgs) -> Result<(), Failure> {
     let compiled = input.compile(0.0, false)?;
     show_diagnostics(&compiled.warnings);
     input.tell_added(&compiled);
+    show_diagnostics(&compiled.advice);
     // As much of the output as the text alone says
     if let Some(path) = &input.parsed.output {
         output::format_of_course(&input.name, Path::new(path))?;

@@ -4,7 +4,8 @@ use std::fmt::Write;
 use std::ops::ControlFlow;
 
 use firstlight::{
-    CameraDesc, Compiled, DVec3, DisplayEncoding, Frame, Projection, SamplesDesc, Scene, SceneDesc, read_mesh,
+    CameraDesc, Compiled, DVec3, DisplayEncoding, Frame, Projection, SamplesDesc, Scene, SceneDesc, printable,
+    read_mesh,
 };
 use serde_json::{Map, Value, json};
 
@@ -23,6 +24,7 @@ pub fn run(args: &InfoArgs) -> Result<(), Failure> {
     }
     let compiled = input.compile(args.time.unwrap_or(0.0), false)?;
     show_diagnostics(&compiled.warnings);
+    show_diagnostics(&compiled.advice);
     input.tell_added(&compiled);
     let info = gather(&input.name, &input.parsed.desc, &compiled);
     answer(&if args.json { format!("{info:#}\n") } else { text(&info) })
@@ -279,10 +281,10 @@ fn pairs(object: &Value) -> String {
     pairs.map(|(key, value)| format!("{key} {}", word(value))).collect::<Vec<_>>().join(", ")
 }
 
-/// A string without its quotes (and without line ends or escapes of its own), a list as `(1, 2, 3)`, an object as pairs.
+/// A string without its quotes (what could disturb a terminal is escaped), a list as `(1, 2, 3)`, an object as pairs.
 fn word(value: &Value) -> String {
     match value {
-        Value::String(text) => text.chars().map(|c| if c.is_control() { '\u{fffd}' } else { c }).collect(),
+        Value::String(text) => printable(text).into_owned(),
         Value::Array(_) => format!("({})", list(value)),
         // 10, not 10.0
         Value::Number(number) => number.as_f64().map_or_else(|| number.to_string(), |n| n.to_string()),

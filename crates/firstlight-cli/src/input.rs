@@ -8,8 +8,8 @@ use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 
 use firstlight::{
-    AssetError, Assets, CompileOptions, Compiled, FolderAssets, Framing, ModelSettings, NoAssets, Parsed, SceneDesc,
-    UpAxis, builtin_scenes, is_point_set,
+    AssetError, Assets, CompileOptions, Compiled, FolderAssets, Framing, MeshFormat, ModelSettings, NoAssets, Parsed,
+    SceneDesc, UpAxis, builtin_scenes, is_point_set,
 };
 
 use crate::args::{Axis, ReadingArgs};
@@ -20,6 +20,10 @@ use crate::scenes;
 
 /// No scene text is longer, in bytes. Meshes and pictures are files of their own.
 const TEXT_LIMIT: u64 = 64 << 20;
+/// No model in a pipe is longer, in bytes: it is kept in memory as it comes.
+const MODEL_LIMIT: u64 = 1 << 30;
+/// Bytes that tell what a file is.
+const HEAD: u64 = 1 << 16;
 
 /// A scene that was read, and what is needed to compile it.
 pub struct Input {
@@ -82,43 +86,56 @@ impl Assets for Remembered {
 /// # Errors
 /// Its text cannot be had. Faults inside the text are kept for [`Input::compile`].
 pub fn read(scene: &Path, reading: &ReadingArgs) -> Result<Input, Failure> {
+    let work = |why: String| Failure::Work(format!("{}: {why}", shown(scene)));
     if is_model(scene) {
         return read_model(scene, reading);
     }
-    refuse_options_of_models(scene, reading)?;
-    let (name, text, folder) = if scene == "-" {
-        let text = read_limited(io::stdin().lock()).map_err(|why| Failure::Work(format!("standard input: {why}")))?;
+    // A file may be given as standard input
+    let stdin = || cfg!(unix).then(|| PathBuf::from("/dev/stdin"));
+    let input = if scene == "-" {
+        let bytes = read_stream(io::stdin().lock()).map_err(|why| Failure::Work(format!("standard input: {why}")))?;
+        if is_mesh(&bytes) {
+            return Ok(piped_model("<stdin>", stdin(), bytes, reading));
+        }
         // A name tells JSON from TOML; no TOML begins with a brace. A byte order mark is no part of the text
-        let marked = text.strip_prefix(b"\xef\xbb\xbf").unwrap_or(&text);
+        let marked = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(&bytes);
         let json = marked.trim_ascii_start().starts_with(b"{");
         let name = if json { "<stdin>.json" } else { "<stdin>" };
-        (name.to_owned(), text, Some(PathBuf::new()))
+        read_text(name.to_owned(), &bytes, Some(Path::new("")), stdin(), reading)?
     } else if let Some(builtin) = builtin_scenes().iter().find(|builtin| scene == builtin.name) {
-        (builtin.name.to_owned(), builtin.text.as_bytes().to_vec(), None)
+        read_text(builtin.name.to_owned(), builtin.text.as_bytes(), None, None, reading)?
     } else {
-        let name = scene.display().to_string();
-        let text = read_file(scene).map_err(|why| Failure::Work(format!("{}: {why}", shown(scene))))?;
-        (name, text, Some(scene.parent().map(Path::to_path_buf).unwrap_or_default()))
+        let file = open(scene).map_err(work)?;
+        let meta = file.metadata().map_err(|e| work(e.to_string()))?;
+        let bytes = if meta.is_file() {
+            let head = read_head(&file).map_err(work)?;
+            // Whatever its name: a model is known by its content
+            if is_mesh(&head) || is_binary_stl(&head, meta.len()) {
+                return read_model(scene, reading);
+            }
+            read_rest(head, file, TEXT_LIMIT)
+        } else {
+            read_stream(file)
+        };
+        let bytes = bytes.map_err(work)?;
+        if is_mesh(&bytes) {
+            return Ok(piped_model(&scene.display().to_string(), Some(scene.to_path_buf()), bytes, reading));
+        }
+        let folder = scene.parent().map(Path::to_path_buf).unwrap_or_default();
+        read_text(scene.display().to_string(), &bytes, Some(&folder), Some(scene.to_path_buf()), reading)?
     };
-
-    // A scene reads its own folder; a built-in scene has none
-    let allowed = |folder: &Path| {
-        FolderAssets::new(folder, &reading.allow_dir)
-            .map_err(|(path, e)| Failure::Work(format!("--allow-dir: {}: {e}", shown(&path))))
-    };
-    let assets = Remembered::new(folder.as_deref().map(allowed).transpose()?);
-    let parsed = SceneDesc::parse(&name, &text, &assets);
-    let stdin = || cfg!(unix).then(|| PathBuf::from("/dev/stdin"));
-    let own = if scene == "-" { stdin() } else { file_of(scene).map(Path::to_path_buf) };
-    let framing = Framing::default();
-    Ok(Input { name, parsed, is_model: false, own, folder, framing, assets, strict: reading.strict })
+    // What is no scene either is said better by its faults
+    if input.parsed.faults().is_empty() {
+        refuse_options_of_models(scene, reading)?;
+    }
+    Ok(input)
 }
 
 /// Sees that options for models are said of models only.
 ///
 /// # Errors
 /// `scene` is none.
-pub fn refuse_options_of_models(scene: &Path, reading: &ReadingArgs) -> Result<(), Failure> {
+fn refuse_options_of_models(scene: &Path, reading: &ReadingArgs) -> Result<(), Failure> {
     for (option, said) in [("--smooth", reading.smooth.is_some()), ("--up", reading.up.is_some())] {
         if said && !is_model(scene) {
             let scene = shown(scene);
@@ -128,43 +145,103 @@ pub fn refuse_options_of_models(scene: &Path, reading: &ReadingArgs) -> Result<(
     Ok(())
 }
 
+/// A scene of text, with its files in `folder`; a built-in scene has none. `own` is the file of the text.
+fn read_text(
+    name: String,
+    text: &[u8],
+    folder: Option<&Path>,
+    own: Option<PathBuf>,
+    reading: &ReadingArgs,
+) -> Result<Input, Failure> {
+    // A scene reads its own folder
+    let assets = Remembered::new(folder.map(|folder| folder_assets(folder, reading)).transpose()?);
+    let parsed = SceneDesc::parse(&name, text, &assets);
+    let (folder, framing) = (folder.map(Path::to_path_buf), Framing::default());
+    Ok(Input { name, parsed, is_model: false, own, folder, framing, assets, strict: reading.strict })
+}
+
+/// The files of a folder, and of those that are allowed besides.
+fn folder_assets(folder: &Path, reading: &ReadingArgs) -> Result<FolderAssets, Failure> {
+    FolderAssets::new(folder, &reading.allow_dir)
+        .map_err(|(path, e)| Failure::Work(format!("--allow-dir: {}: {e}", shown(&path))))
+}
+
 /// Whether `scene` names a model, by its ending.
 fn is_model(scene: &Path) -> bool {
     let ending = scene.extension().map(|ending| ending.to_string_lossy().to_ascii_lowercase());
     matches!(ending.as_deref(), Some("ply" | "stl" | "obj"))
 }
 
+/// Whether these are the first bytes of a mesh file; of a binary STL file, all of its bytes.
+fn is_mesh(bytes: &[u8]) -> bool {
+    MeshFormat::detect("", bytes).is_some()
+}
+
+/// The length of a binary STL file that begins so, by its count of facets.
+fn binary_stl_length(head: &[u8]) -> Option<u64> {
+    let count = head.get(80..84)?;
+    let count = u32::from_le_bytes([count[0], count[1], count[2], count[3]]);
+    (count > 0).then_some(84 + 50 * u64::from(count))
+}
+
+/// Whether a file of that length, which begins so, is a binary STL file.
+fn is_binary_stl(head: &[u8], length: u64) -> bool {
+    binary_stl_length(head) == Some(length)
+}
+
 /// A scene around a model.
 fn read_model(path: &Path, reading: &ReadingArgs) -> Result<Input, Failure> {
     let work = |why: String| Failure::Work(format!("{}: {why}", shown(path)));
     // Enough of it to tell points from faces
-    let mut head = Vec::new();
-    match File::open(path) {
-        Err(e) if e.kind() == io::ErrorKind::NotFound => return Err(work("no such file".into())),
-        Err(e) => return Err(work(e.to_string())),
-        Ok(file) if file.metadata().is_ok_and(|meta| meta.is_dir()) => return Err(work("is a folder".into())),
-        Ok(file) => file.take(1 << 16).read_to_end(&mut head).map_err(|e| work(e.to_string()))?,
-    };
+    let file = open(path).map_err(work)?;
+    if !file.metadata().is_ok_and(|meta| meta.is_file()) {
+        let bytes = read_stream(file).map_err(work)?;
+        return Ok(piped_model(&path.display().to_string(), Some(path.to_path_buf()), bytes, reading));
+    }
+    let head = read_head(file).map_err(work)?;
     let folder = path.parent().map(Path::to_path_buf).unwrap_or_default();
-    let assets = FolderAssets::new(&folder, &reading.allow_dir)
-        .map_err(|(path, e)| Failure::Work(format!("--allow-dir: {}: {e}", shown(&path))))?;
-    let settings = ModelSettings {
-        smooth_deg: reading.smooth,
-        up: if reading.up == Some(Axis::Z) { UpAxis::Z } else { UpAxis::Y },
-        points: is_point_set(&head),
-    };
     let file = PathBuf::from(path.file_name().unwrap_or_default());
-    let called = file.to_string_lossy().into_owned();
+    let (called, name) = (file.to_string_lossy().into_owned(), path.display().to_string());
+    let assets = Remembered::new(Some(folder_assets(&folder, reading)?));
     Ok(Input {
-        name: path.display().to_string(),
-        parsed: SceneDesc::of_model(&called, &settings).into(),
+        parsed: Parsed::of_model(&name, &called, &model_settings(&head, reading)),
+        name,
         is_model: true,
         folder: Some(folder),
         framing: Framing::default(),
         own: Some(path.to_path_buf()),
-        assets: Remembered { model: Some((called, file)), ..Remembered::new(Some(assets)) },
+        assets: Remembered { model: Some((called, file)), ..assets },
         strict: reading.strict,
     })
+}
+
+/// A scene around a model that came through a pipe, with all its bytes; `own` is the pipe.
+fn piped_model(name: &str, own: Option<PathBuf>, bytes: Vec<u8>, reading: &ReadingArgs) -> Input {
+    let file = PathBuf::from(Path::new(name).file_name().unwrap_or_default());
+    let called = file.to_string_lossy().into_owned();
+    let parsed = Parsed::of_model(name, &called, &model_settings(&bytes, reading));
+    // There is nothing to read it from again
+    let files = Mutex::new([(called.clone(), Ok(bytes))].into());
+    let assets = Remembered { model: Some((called, file)), files, again: true, ..Remembered::new(None) };
+    Input {
+        name: name.to_owned(),
+        parsed,
+        is_model: true,
+        folder: None,
+        framing: Framing::default(),
+        own,
+        assets,
+        strict: reading.strict,
+    }
+}
+
+/// How a model that begins with `head` is shown.
+fn model_settings(head: &[u8], reading: &ReadingArgs) -> ModelSettings {
+    ModelSettings {
+        smooth_deg: reading.smooth,
+        up: if reading.up == Some(Axis::Z) { UpAxis::Z } else { UpAxis::Y },
+        points: is_point_set(head),
+    }
 }
 
 /// The file that `scene` names; none for standard input and built-in scenes.
@@ -239,7 +316,7 @@ impl Input {
     }
 }
 
-fn read_file(path: &Path) -> Result<Vec<u8>, String> {
+fn open(path: &Path) -> Result<File, String> {
     match File::open(path) {
         Err(e) if e.kind() == io::ErrorKind::NotFound => {
             // A name with an ending or a folder is a file's; any other may be a built-in scene's, mistyped
@@ -250,18 +327,50 @@ fn read_file(path: &Path) -> Result<Vec<u8>, String> {
             Err(format!("no such file, and no built-in scene; {near}built in are {names}"))
         }
         Err(e) => Err(e.to_string()),
-        Ok(file) if file.metadata().is_ok_and(|meta| meta.is_dir()) => Err("is a folder; name a scene file".into()),
-        Ok(file) => read_limited(file),
+        Ok(file) if file.metadata().is_ok_and(|meta| meta.is_dir()) => {
+            Err("is a folder; name a scene file or a model".into())
+        }
+        Ok(file) => Ok(file),
     }
 }
 
-fn read_limited(from: impl Read) -> Result<Vec<u8>, String> {
-    let mut text = Vec::new();
-    from.take(TEXT_LIMIT + 1).read_to_end(&mut text).map_err(|e| e.to_string())?;
-    if text.len() as u64 > TEXT_LIMIT {
-        return Err(format!("is longer than {TEXT_LIMIT} bytes, the limit for scene text"));
+/// The first bytes of a file: enough to know what it is.
+fn read_head(from: impl Read) -> Result<Vec<u8>, String> {
+    let mut head = Vec::new();
+    from.take(HEAD).read_to_end(&mut head).map_err(|e| e.to_string())?;
+    Ok(head)
+}
+
+/// All bytes of a pipe: the text of a scene, or a model.
+fn read_stream(mut from: impl Read) -> Result<Vec<u8>, String> {
+    let head = read_head(&mut from)?;
+    match binary_stl_length(&head) {
+        _ if is_mesh(&head) => read_rest(head, from, MODEL_LIMIT),
+        // With a byte more than it has by its own count, it is none
+        Some(length) if head.contains(&0) && length <= MODEL_LIMIT => {
+            let mut bytes = head;
+            let rest = (length + 1).saturating_sub(bytes.len() as u64);
+            from.take(rest).read_to_end(&mut bytes).map_err(|e| e.to_string())?;
+            Ok(bytes)
+        }
+        _ => read_rest(head, from, TEXT_LIMIT),
     }
-    Ok(text)
+}
+
+/// All bytes of a file that begins with `head`, at most `limit` of them.
+fn read_rest(head: Vec<u8>, from: impl Read, limit: u64) -> Result<Vec<u8>, String> {
+    let mut bytes = head;
+    // What is no text at all need not be read to its end: what it is, its beginning says
+    if limit == TEXT_LIMIT && bytes.contains(&0) {
+        return Ok(bytes);
+    }
+    let rest = (limit + 1).saturating_sub(bytes.len() as u64);
+    from.take(rest).read_to_end(&mut bytes).map_err(|e| e.to_string())?;
+    match bytes.len() as u64 {
+        length if length <= limit => Ok(bytes),
+        _ if limit == TEXT_LIMIT => Err(format!("is longer than {limit} bytes, the limit for scene text")),
+        _ => Err(format!("is longer than {limit} bytes, the limit for a model in a pipe; save it as a file")),
+    }
 }
 
 #[cfg(test)]
@@ -270,6 +379,19 @@ mod tests {
 
     #[test]
     fn endless_text_is_refused() {
-        assert!(read_limited(io::repeat(b' ')).is_err_and(|e| e.contains("67108864")));
+        assert!(read_stream(io::repeat(b' ')).is_err_and(|e| e.contains("67108864")));
+        // What cannot be text is not read to its end
+        assert!(read_stream(io::repeat(0)).is_ok_and(|bytes| bytes.len() as u64 == HEAD));
+    }
+
+    #[test]
+    fn a_binary_stl_file_is_known_by_its_length() {
+        let mut stl = vec![b'x'; 80];
+        stl.extend(2000u32.to_le_bytes());
+        stl.resize(84 + 50 * 2000, 0);
+        let read = read_stream(stl.as_slice()).unwrap();
+        assert!(is_mesh(&read) && read == stl);
+        assert!(is_binary_stl(&stl[..HEAD as usize], stl.len() as u64));
+        assert!(!is_binary_stl(&stl[..HEAD as usize], stl.len() as u64 + 1));
     }
 }

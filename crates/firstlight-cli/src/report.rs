@@ -1,12 +1,13 @@
 //! What the program says: messages and diagnostics on standard error, answers on standard output. Nothing here panics
 //! when the other end is gone.
 
+use std::borrow::Cow;
 use std::fmt;
 use std::io::{self, IsTerminal, Write};
 use std::path::Path;
 use std::process::ExitCode;
 
-use firstlight::{Diagnostic, Place, Severity};
+use firstlight::{Diagnostic, Place, Severity, printable};
 use miette::{
     GraphicalReportHandler, GraphicalTheme, LabeledSpan, MietteError, MietteSpanContents, SourceCode, SourceSpan,
     SpanContents,
@@ -110,21 +111,34 @@ pub fn answer(text: &str) -> Result<(), Failure> {
     }
 }
 
-/// Shows every diagnostic: with a drawn excerpt on a terminal, and elsewhere as lines that stay the same.
+/// Diagnostics that are shown at a time; of more, the number.
+const MAX_SHOWN: usize = 20;
+
+/// Shows diagnostics: with a drawn excerpt on a terminal, and elsewhere as lines that stay the same.
 pub fn show_diagnostics(diagnostics: &[Diagnostic]) {
     let style = Style::of_stderr();
-    for diagnostic in diagnostics {
+    for diagnostic in diagnostics.iter().take(MAX_SHOWN) {
         say(format_args!("{}", style.render(diagnostic).trim_end_matches('\n')));
     }
+    if diagnostics.len() > MAX_SHOWN {
+        say(format_args!("and {} more", faults(diagnostics) - MAX_SHOWN as u64));
+    }
+}
+
+/// How many faults there are, those included that the library has only counted.
+fn faults(diagnostics: &[Diagnostic]) -> u64 {
+    let counted = |d: &Diagnostic| d.message.strip_suffix(" more faults are not listed")?.parse::<u64>().ok();
+    diagnostics.iter().map(|d| counted(d).unwrap_or(1)).sum()
 }
 
 /// `2 errors, 1 warning`
 fn count(diagnostics: &[Diagnostic]) -> String {
     let of = |severity, word: &str| {
-        let n = diagnostics.iter().filter(|d| d.severity == severity).count();
+        let of_severity: Vec<Diagnostic> = diagnostics.iter().filter(|d| d.severity == severity).cloned().collect();
+        let n = faults(&of_severity);
         (n > 0).then(|| format!("{n} {word}{}", if n == 1 { "" } else { "s" }))
     };
-    let parts = [of(Severity::Error, "error"), of(Severity::Warning, "warning")];
+    let parts = [of(Severity::Error, "error"), of(Severity::Warning, "warning"), of(Severity::Advice, "note")];
     parts.into_iter().flatten().collect::<Vec<_>>().join(", ")
 }
 
@@ -165,7 +179,7 @@ fn plain(diagnostic: &Diagnostic) -> String {
     let mut text = format!("{}: {}", word(diagnostic.severity), clean(&diagnostic.to_string()));
     if let Some(place) = &diagnostic.place {
         let number = place.line.to_string();
-        let excerpt = clean(&place.excerpt);
+        let excerpt = clean_line(&place.excerpt);
         // Tabs stay tabs, so that the caret stands under its character whatever their width
         let before = excerpt.chars().take(place.offset as usize);
         let blank: String = before.map(|c| if c == '\t' { '\t' } else { ' ' }).collect();
@@ -180,6 +194,7 @@ fn word(severity: Severity) -> &'static str {
     match severity {
         Severity::Error => "error",
         Severity::Warning => "warning",
+        Severity::Advice => "note",
     }
 }
 
@@ -189,14 +204,35 @@ fn shown_width(place: &Place, excerpt: &str) -> usize {
     (place.width as usize).min(rest).max(1)
 }
 
-/// The text without control characters, one for one: a scene cannot move the cursor of whoever reads its faults.
-fn clean(text: &str) -> String {
-    text.chars().map(|c| if c.is_control() && c != '\t' && c != '\n' { '\u{fffd}' } else { c }).collect()
+/// A line of text without control characters, one for one but for tabs, so that a caret below stands where it should.
+fn clean_line(text: &str) -> String {
+    let hidden = |c: char| c != '\t' && matches!(printable(c.encode_utf8(&mut [0; 4])), Cow::Owned(_));
+    text.chars().map(|c| if hidden(c) { '\u{fffd}' } else { c }).collect()
 }
 
-/// A path as messages show it: on one line, without control characters.
+/// A path as messages show it: on one line, without control characters, and not longer than a line or two.
 pub fn shown(path: &Path) -> String {
-    path.display().to_string().chars().map(|c| if c.is_control() { '\u{fffd}' } else { c }).collect()
+    printable(&cut(&path.display().to_string(), MAX_NAME)).into_owned()
+}
+
+/// Characters of a name, and of a message, that are shown; of more, the beginning and the end.
+const MAX_NAME: usize = 160;
+const MAX_MESSAGE: usize = 1000;
+
+/// A message as it is shown: a scene cannot move the cursor of whoever reads its faults, nor fill the screen with one.
+fn clean(text: &str) -> String {
+    printable(&cut(text, MAX_MESSAGE)).into_owned()
+}
+
+/// The text, or its beginning and its end where it has more than `most` characters.
+fn cut(text: &str, most: usize) -> Cow<'_, str> {
+    let length = text.chars().count();
+    if length <= most {
+        return Cow::Borrowed(text);
+    }
+    let start: String = text.chars().take(most / 2).collect();
+    let end: String = text.chars().skip(length - most / 2).collect();
+    Cow::Owned(format!("{start} ... {end}"))
 }
 
 /// A diagnostic as `miette` wants it.
@@ -230,6 +266,7 @@ impl Drawn {
             severity: match diagnostic.severity {
                 Severity::Error => miette::Severity::Error,
                 Severity::Warning => miette::Severity::Warning,
+                Severity::Advice => miette::Severity::Advice,
             },
             excerpt: diagnostic.place.as_ref().map(Excerpt::new),
         }
@@ -238,7 +275,7 @@ impl Drawn {
 
 impl Excerpt {
     fn new(place: &Place) -> Self {
-        let text = clean(&place.excerpt);
+        let text = clean_line(&place.excerpt);
         let bytes = |chars: usize| text.chars().take(chars).map(char::len_utf8).sum::<usize>();
         let start = place.offset as usize;
         let (from, to) = (bytes(start), bytes(start + shown_width(place, &text)));
@@ -374,5 +411,7 @@ error: scene.toml:14:13: light.spot[2].cone_deg: 190 is outside (0, 180]; the co
         let warning = Diagnostic { severity: Severity::Warning, ..fault() };
         assert_eq!(count(&[fault(), fault(), warning.clone()]), "2 errors, 1 warning");
         assert_eq!(count(&[fault()]), "1 error");
+        let more = Diagnostic { message: "199744 more faults are not listed".into(), ..fault() };
+        assert_eq!(count(&[fault(), fault(), more]), "199746 errors");
     }
 }

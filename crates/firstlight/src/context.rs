@@ -6,6 +6,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 
 use crate::color::Rgb;
 use crate::describe::ColorDesc;
+use crate::describe::node::quoted;
 use crate::error::{Diagnostic, Severity};
 use crate::math::{DAffine3, DVec3, Vec3, vec3};
 
@@ -208,6 +209,8 @@ pub(crate) struct CompileContext {
     pub(crate) keyed: bool,
     path: String,
     faults: Vec<Diagnostic>,
+    /// What is said of scenes without errors.
+    advice: Vec<Diagnostic>,
     /// Errors, whether told or not.
     errors: usize,
     /// Faults that are not told.
@@ -248,6 +251,49 @@ impl CompileContext {
         self.push(Severity::Warning, field, message.into(), hint);
     }
 
+    /// Records something that may surprise.
+    pub(crate) fn advise(&mut self, field: &str, message: impl Into<String>, hint: Option<&str>) {
+        if self.advice.len() < MAX_FAULTS {
+            let advice = self.diagnostic(Severity::Advice, field, message.into(), hint);
+            self.advice.push(advice);
+        }
+    }
+
+    /// Advises if colours of vertices, which multiply reflectances, go beyond 1.
+    pub(crate) fn advise_vertex_colors(&mut self, colors: &[[f32; 4]]) {
+        let most = colors.iter().flat_map(|[r, g, b, _]| [*r, *g, *b]).fold(0.0, f32::max);
+        if most > 1.0 {
+            let message =
+                format!("the colours of its vertices go up to {most}: that reflects more light than there is");
+            self.advise("", message, Some("they are 0 to 1; a file may have bytes, as whole numbers of one byte each"));
+        }
+    }
+
+    /// Advises if an angle in degrees looks like one in radians: a few, and no whole number of degrees.
+    pub(crate) fn advise_radians(&mut self, field: &str, degrees: f64) {
+        if degrees > 0.0 && degrees < 3.2 && degrees.fract() != 0.0 {
+            let message =
+                format!("{degrees} degrees are little: as radians they would be {:.2} degrees", degrees.to_degrees());
+            self.advise(field, message, Some("angles are in degrees"));
+        }
+    }
+
+    /// Advises if angles to turn by look like radians: all of them small multiples of pi / 12, and none a whole number.
+    pub(crate) fn advise_radian_turns(&mut self, field: &str, degrees: &[f64]) {
+        const STEP: f64 = std::f64::consts::PI / 12.0;
+        let is_like = |angle: f64| {
+            let steps = (angle / STEP).round();
+            angle.abs() < 6.5 && steps != 0.0 && (angle - steps * STEP).abs() < 2e-3 && angle.fract() != 0.0
+        };
+        let turns = || degrees.iter().copied().filter(|angle| *angle != 0.0);
+        if turns().next().is_some() && turns().all(is_like) {
+            let meant: Vec<String> = degrees.iter().map(|angle| format!("{:.0}", angle.to_degrees())).collect();
+            let meant = if let [one] = &meant[..] { one.clone() } else { format!("[{}]", meant.join(", ")) };
+            let message = format!("{} looks like radians: in degrees it would be {meant}", show(degrees));
+            self.advise(field, message, Some("angles are in degrees"));
+        }
+    }
+
     /// Records that nothing is called `wanted`: `no camera is called "tpo"; did you mean "top"?`
     pub(crate) fn unknown(&mut self, field: &str, what: &str, wanted: &str, names: &[&str]) {
         // Looking for the nearest of many names takes its time, and many faults of this kind come together
@@ -256,14 +302,15 @@ impl CompileContext {
         } else {
             None
         };
+        let wanted = quoted(wanted);
         let message = match nearest {
-            Some(name) => format!("no {what} is called {wanted:?}; did you mean {name:?}?"),
-            None if names.is_empty() => format!("no {what} is called {wanted:?}; the scene has none"),
+            Some(name) => format!("no {what} is called {wanted}; did you mean {}?", quoted(name)),
+            None if names.is_empty() => format!("no {what} is called {wanted}; the scene has none"),
             None => {
                 let list: Vec<String> =
-                    names.iter().filter(|name| !name.is_empty()).take(8).map(|name| format!("{name:?}")).collect();
+                    names.iter().filter(|name| !name.is_empty()).take(8).map(|name| quoted(name)).collect();
                 let more = if names.len() > 8 { ", ..." } else { "" };
-                format!("no {what} is called {wanted:?}; there are {}{more}", list.join(", "))
+                format!("no {what} is called {wanted}; there are {}{more}", list.join(", "))
             }
         };
         self.error(field, message, None);
@@ -275,12 +322,22 @@ impl CompileContext {
             self.omitted += 1;
             return;
         }
+        let fault = self.diagnostic(severity, field, message, hint);
+        self.faults.push(fault);
+    }
+
+    fn diagnostic(&self, severity: Severity, field: &str, message: String, hint: Option<&str>) -> Diagnostic {
         let mut path = self.path.clone();
         if !path.is_empty() && !field.is_empty() {
             path.push('.');
         }
         path.push_str(field);
-        self.faults.push(Diagnostic { severity, place: None, path, message, hint: hint.map(str::to_owned) });
+        Diagnostic { severity, place: None, path, message, hint: hint.map(str::to_owned) }
+    }
+
+    /// What may surprise, in the order found.
+    pub(crate) fn take_advice(&mut self) -> Vec<Diagnostic> {
+        std::mem::take(&mut self.advice)
     }
 
     /// Runs `f` with an empty path, for a fault that belongs elsewhere.

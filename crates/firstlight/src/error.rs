@@ -1,5 +1,6 @@
 //! What can go wrong, as data: the library never prints and never exits.
 
+use std::borrow::Cow;
 use std::fmt;
 
 /// Where in a text something stands.
@@ -26,6 +27,8 @@ pub enum Severity {
     Error,
     /// Rendering goes on; an error under `strict`.
     Warning,
+    /// Nothing is wrong for certain, but the picture may surprise; never an error.
+    Advice,
 }
 
 /// One fault, with its place, the value, what is allowed, and what to do.
@@ -45,20 +48,44 @@ pub struct Diagnostic {
     pub hint: Option<String>,
 }
 
+/// Control characters, and those that change the direction of text or cannot be seen, are escaped.
 impl fmt::Display for Diagnostic {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         if let Some(place) = &self.place {
-            write!(f, "{}:{}:{}: ", place.file, place.line, place.column)?;
+            write!(f, "{}:{}:{}: ", printable(&place.file), place.line, place.column)?;
         }
         if !self.path.is_empty() {
-            write!(f, "{}: ", self.path)?;
+            write!(f, "{}: ", printable(&self.path))?;
         }
-        f.write_str(&self.message)?;
+        f.write_str(&printable(&self.message))?;
         if let Some(hint) = &self.hint {
-            write!(f, "; {hint}")?;
+            write!(f, "; {}", printable(hint))?;
         }
         Ok(())
     }
+}
+
+/// Text of others as it can be shown on a terminal, on one line: control characters, and those that change the direction of
+/// text or cannot be seen, are escaped as in Rust, `\u{1b}`.
+pub fn printable(text: &str) -> Cow<'_, str> {
+    let hidden = |c: char| {
+        c.is_control()
+            || matches!(c, '\u{ad}' | '\u{61c}' | '\u{180e}' | '\u{feff}')
+            || matches!(c, '\u{200b}'..='\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2060}'..='\u{206f}')
+            || matches!(c, '\u{fff9}'..='\u{fffb}' | '\u{e0000}'..='\u{e007f}')
+    };
+    if !text.chars().any(hidden) {
+        return Cow::Borrowed(text);
+    }
+    let mut shown = String::with_capacity(text.len() + 8);
+    for c in text.chars() {
+        if hidden(c) {
+            shown.extend(c.escape_default());
+        } else {
+            shown.push(c);
+        }
+    }
+    Cow::Owned(shown)
 }
 
 /// A scene cannot be rendered: every fault found, in the order of the text.
@@ -79,5 +106,25 @@ impl fmt::Display for SceneError {
             fault.fmt(f)?;
         }
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_could_disturb_a_terminal_is_escaped() {
+        assert!(matches!(printable("a \u{e4} \u{1f600}"), Cow::Borrowed(_)));
+        assert_eq!(printable("a\u{1b}[2J\u{7}\n\tb"), "a\\u{1b}[2J\\u{7}\\n\\tb");
+        assert_eq!(printable("\u{202e}a\u{9b}\u{200b}"), "\\u{202e}a\\u{9b}\\u{200b}");
+        let diagnostic = Diagnostic {
+            severity: Severity::Error,
+            place: None,
+            path: "a\u{1b}".into(),
+            message: "b\u{1b}".into(),
+            hint: Some("c\u{1b}".into()),
+        };
+        assert_eq!(diagnostic.to_string(), "a\\u{1b}: b\\u{1b}; c\\u{1b}");
     }
 }

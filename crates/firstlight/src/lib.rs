@@ -79,7 +79,7 @@ pub use camera::{Camera, CameraDesc, FilmPlane, Frame, Orthographic, Pinhole, Pr
 pub use color::{Display, Encoding, Rgb};
 pub use context::{AssetError, Assets, CompileStage, FolderAssets, MemoryAssets, NoAssets, OnCompile};
 pub use describe::{ColorDesc, ColorParam, FilePath, NumberParam, ParamDesc, SamplesDesc, ScaleDesc};
-pub use error::{Diagnostic, Place, SceneError, Severity};
+pub use error::{Diagnostic, Place, SceneError, Severity, printable};
 pub use ids::{LightId, MaterialId, SurfaceId, TextureId};
 pub use image::{
     Format, Image, ImageError, PendingFile, Receipt, StagedFile, StoredImage, Window, Written, is_decoding, write_open,

@@ -3,7 +3,7 @@
 use std::ops::ControlFlow;
 use std::time::Duration;
 
-use firstlight::{Diagnostic, Display, RenderSettings, RenderStats, Window};
+use firstlight::{Diagnostic, Display, RenderSettings, RenderStats, Scene, Severity, Window};
 
 use super::plan::Plan;
 use super::timed;
@@ -78,6 +78,10 @@ impl Run<'_> {
         let ahead = if index == 0 { moments } else { &moments[index..=index] };
         let outputs = ahead.iter().flat_map(|moment| &moment.outputs);
         output::refuse_overwriting(&self.input.files(), outputs, self.stats)?;
+        if !plan.quiet {
+            compiled.advice.extend(self.advice_on_time(&compiled.scene, moments.len()));
+            compiled.warnings.append(&mut compiled.advice);
+        }
         compiled.warnings.retain(|warning| !self.warned.contains(warning));
         if !compiled.warnings.is_empty() {
             let show = || show_diagnostics(&compiled.warnings);
@@ -135,5 +139,26 @@ impl Run<'_> {
         });
         written?;
         Ok(Took { compile, render, write, rays })
+    }
+}
+
+impl Run<'_> {
+    /// What there is to say where a moment was asked for and nothing changes with time.
+    fn advice_on_time(&self, scene: &Scene, frames: usize) -> Option<Diagnostic> {
+        let message = match (self.plan.frames, scene.time()) {
+            (Some(_), None) => format!("the scene has no keys: the pictures of all {frames} frames are the same"),
+            (None, None) if self.plan.time != 0.0 => {
+                "the scene has no keys: its picture is the same at any --time".into()
+            }
+            _ => return None,
+        };
+        let hint = "keys = [{ time = 0, ... }, ...] in a transform move a shape, a light or the camera";
+        Some(Diagnostic {
+            severity: Severity::Advice,
+            place: None,
+            path: String::new(),
+            message: format!("{}: {message}", self.input.name),
+            hint: Some(hint.into()),
+        })
     }
 }

@@ -82,7 +82,6 @@ impl<'a> Plan<'a> {
             let all: Vec<Output> = outputs.iter().chain(&heat).map(|output| output.of_scene(&job.names)).collect();
             let stats = stats.target().map(|target| target.of_scene(&job.names));
             output::refuse_clashes(input::file_of(job.scene), &all, stats.as_ref())?;
-            input::refuse_options_of_models(job.scene, &args.reading)?;
         }
 
         let simd = args.simd.unwrap_or(SimdLevel::Auto);

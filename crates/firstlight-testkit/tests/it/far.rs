@@ -36,7 +36,7 @@ fn scene(at: V, is_moved: bool) -> SceneDesc {
     let ball = ball_mesh(0.08, 12, 0.05, true, random);
     let points = PointSetDesc {
         positions: (0..40).map(|_| there(add([-0.25, 0.1, 0.25], mul(random.vector(1.0), 0.08)))).collect(),
-        radius: 0.012,
+        radius: Some(0.012),
         ..PointSetDesc::default()
     };
     // What is in a group is written at 0: its instance is what is far

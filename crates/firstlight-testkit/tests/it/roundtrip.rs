@@ -152,7 +152,7 @@ fn mesh() -> impl Strategy<Value = MeshDesc> {
 }
 
 fn point_set() -> impl Strategy<Value = PointSetDesc> {
-    (maybe(text()), several(vector()), vec(number(), 0..3), several(vector()), number()).prop_map(
+    (maybe(text()), several(vector()), vec(number(), 0..3), several(vector()), maybe(number())).prop_map(
         |(file, positions, radii, colors, radius)| {
             let file = file.map(FilePath::from);
             PointSetDesc { file, positions, radii, colors, radius, ..PointSetDesc::default() }

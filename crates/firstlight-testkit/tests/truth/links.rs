@@ -106,7 +106,7 @@ fn shapes() -> Vec<ShapeDesc> {
         moved(ShapeDesc::Mesh(ball_mesh(0.6, 8, 0.1, true, random)), [-0.2, 0.7, 0.0], [0.0; 3], [1.0; 3]),
         ShapeDesc::PointSet(PointSetDesc {
             positions: (0..20).map(|_| add([-0.2, 0.8, 0.0], random.vector(0.5))).collect(),
-            radius: 0.2,
+            radius: Some(0.2),
             ..PointSetDesc::default()
         }),
     ]

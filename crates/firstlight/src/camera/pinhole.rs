@@ -61,6 +61,7 @@ fn fov_y(desc: &CameraDesc, cx: &mut CompileContext) -> f64 {
                 let hint = "the full vertical angle, in degrees";
                 cx.error("fov_y_deg", format!("{fov} is outside [0.001, 179.99]"), Some(hint));
             }
+            cx.advise_radians("fov_y_deg", fov);
         }
         (None, Some(focal)) => {
             cx.between("focal_length_mm", focal, 0.01, 1e6, Some("in millimetres"));

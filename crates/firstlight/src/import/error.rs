@@ -30,6 +30,16 @@ pub enum ImportError {
         /// The file, as it was named.
         file: String,
     },
+    /// A file of another kind, known by its content.
+    #[error("{file}: {message}; {hint}")]
+    Foreign {
+        /// The file, as it was named.
+        file: String,
+        /// What it looks like.
+        message: String,
+        /// What to do.
+        hint: String,
+    },
     /// A file that is broken, cut off, or says what cannot be.
     #[error("{file}{place}: {message}; {hint}")]
     Damaged {

@@ -14,6 +14,7 @@
 //!   as well (`weld.rs`).
 
 mod error;
+mod foreign;
 mod obj;
 mod ply;
 mod polygon;
@@ -29,6 +30,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use crate::math::{DVec3, origin_for};
 use error::Fault;
 pub use error::{ImportError, MeshPlace};
+pub(crate) use foreign::{Foreign, Wanted, foreign};
 pub use report::MeshReport;
 
 /// Vertices and triangles are counted in 32 bits, with one number to spare for "none".
@@ -96,7 +98,7 @@ impl MeshFormat {
     /// The kind of a file: a PLY file by its first line, others by the ending of `name` (`.ply`, `.stl`, `.obj`, in any
     /// case), without such an ending by their content. `None` if nothing says so.
     pub fn detect(name: &str, bytes: &[u8]) -> Option<Self> {
-        if bytes.starts_with(b"ply") && bytes.get(3).is_some_and(|b| b.is_ascii_whitespace()) {
+        if ply::looks_like(bytes) {
             return Some(Self::Ply);
         }
         let ending = name.rsplit_once('.').map(|(_, ending)| ending.to_ascii_lowercase());
@@ -155,6 +157,11 @@ pub fn read_mesh(
     bytes: &[u8],
     progress: &(dyn Fn(u64, u64) -> ControlFlow<()> + Sync),
 ) -> Result<MeshData, ImportError> {
+    // Whatever its ending says
+    if let Some(foreign) = foreign(bytes, Wanted::Mesh) {
+        let (message, hint) = (foreign.message(Wanted::Mesh), foreign.hint(Wanted::Mesh).to_owned());
+        return Err(ImportError::Foreign { file: name.to_owned(), message, hint });
+    }
     match MeshFormat::detect(name, bytes) {
         Some(format) => format.read(name, bytes, progress),
         None => Err(ImportError::UnknownKind { file: name.to_owned() }),

@@ -56,7 +56,7 @@ pub(super) fn read(file: &[u8], origin: [f64; 3], progress: &Progress) -> Result
     build(parts, known)
 }
 
-/// Whether a file of unknown name is OBJ: its first statement is one.
+/// Whether a file of unknown name is OBJ: its first statement is one, and no `v = 1` of another language.
 pub(super) fn looks_like(file: &[u8]) -> bool {
     let mut text = Cursor { bytes: &file[..file.len().min(1 << 16)], at: 0 };
     loop {
@@ -64,7 +64,7 @@ pub(super) fn looks_like(file: &[u8]) -> bool {
         match text.word() {
             b"v" | b"vt" | b"vn" | b"mtllib" | b"o" | b"g" | b"s" | b"usemtl" => {
                 text.skip_blanks();
-                return !text.at_line_end();
+                return !text.at_line_end() && text.peek() != Some(b'=');
             }
             word if word.starts_with(b"#") => {
                 text.rest_of_line();

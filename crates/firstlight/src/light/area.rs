@@ -215,6 +215,18 @@ pub struct Area {
     points: Arc<OnceLock<Points>>,
 }
 
+impl Area {
+    /// A point of it and the unit normal of its front, if all of it shines to that side alone.
+    pub(crate) fn front(&self) -> Option<(DVec3, DVec3)> {
+        match &self.shape {
+            _ if self.both_sides => None,
+            AreaShape::Rectangle(rectangle) => Some((rectangle.center, rectangle.n)),
+            AreaShape::Disk(disk) => Some((disk.center, disk.n)),
+            AreaShape::Sphere(_) => None,
+        }
+    }
+}
+
 /// The shape of an area light. In f64, as it was described.
 #[derive(Clone, Copy, Debug)]
 #[allow(clippy::large_enum_variant, reason = "lights are few, and asked for often")]

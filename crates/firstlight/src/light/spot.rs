@@ -89,6 +89,8 @@ impl SpotDesc {
             let message = format!("{inner} is outside [0, {}], the cone itself", self.cone_deg);
             cx.error("inner_cone_deg", message, Some("full strength ends inside the cone; both are full angles"));
         }
+        cx.advise_radians("cone_deg", self.cone_deg);
+        cx.advise_radians("inner_cone_deg", if self.inner_cone_deg.is_some() { inner } else { 0.0 });
         // 1 - cos(a / 2) = 2 sin^2(a / 4)
         let one_minus_cos = |deg: f64| {
             let sin = f_sin(deg * 0.25 * std::f64::consts::PI / 180.0);

@@ -6,6 +6,7 @@ use std::sync::Arc;
 
 use fearless_simd::Level;
 
+use super::advice::{advise, advise_reflectance};
 use super::geometry::Geometry;
 use super::light_spheres::LightSpheres;
 use super::model::{Added, Framing};
@@ -51,6 +52,9 @@ pub struct Compiled {
     pub warnings: Vec<Diagnostic>,
     /// What it was given because the description lacks it.
     pub added: Added,
+    /// What may surprise whoever looks at the picture, though nothing is wrong for certain: a scene without light, angles that look
+    /// like radians. Never an error, also not under `strict`.
+    pub advice: Vec<Diagnostic>,
 }
 
 /// The largest side of a picture, in pixels.
@@ -67,28 +71,29 @@ impl SceneDesc {
     /// # Errors
     /// Every fault at once, each with the path of its value.
     pub fn compile(&self, assets: &dyn Assets, options: &CompileOptions) -> Result<Compiled, SceneError> {
-        let (made, mut faults) = self.compile_or_faults(assets, options);
+        let mut cx = CompileContext::at_time(options.time);
+        let made = self.compile_or_faults(&mut cx, assets, options);
+        let mut faults = cx.take_faults();
         if options.strict {
             faults.iter_mut().for_each(|fault| fault.severity = Severity::Error);
         }
         match made {
             Some((scene, added)) if faults.iter().all(|f| f.severity == Severity::Warning) => {
-                Ok(Compiled { scene, warnings: faults, added })
+                Ok(Compiled { scene, warnings: faults, added, advice: cx.take_advice() })
             }
             _ => Err(SceneError { faults }),
         }
     }
 
-    /// The scene, if there are no errors, with what was added to it, and all errors and warnings.
+    /// The scene, if there are no errors, with what was added to it; all there is to say is in `cx`.
     fn compile_or_faults(
         &self,
+        cx: &mut CompileContext,
         assets: &dyn Assets,
         options: &CompileOptions,
-    ) -> (Option<(Scene, Added)>, Vec<Diagnostic>) {
+    ) -> Option<(Scene, Added)> {
         let time = options.time;
-        let mut cx = CompileContext::at_time(time);
         cx.progress = options.progress.clone();
-        let cx = &mut cx;
         cx.between("time", time, -MAX_TIME, MAX_TIME, Some("the moment to compile, in seconds"));
         let picture = self.compile_render(cx);
         let mut textures = Textures::new(self, assets);
@@ -104,7 +109,7 @@ impl SceneDesc {
         let camera = desc.compile_camera(cx, picture.width, picture.height, geometry.is_some());
         let lights = desc.compile_lights(cx);
         let (Some(geometry), false) = (geometry, cx.has_errors()) else {
-            return (None, cx.take_faults());
+            return None;
         };
         let (obstacles, flats) = geometry.listed_obstacles();
         let obstacle_links = geometry.listed_obstacle_links();
@@ -144,7 +149,8 @@ impl SceneDesc {
             textures: textures.compiled,
             summary,
         };
-        (Some((scene, added)), cx.take_faults())
+        advise(cx, &scene, desc);
+        Some((scene, added))
     }
 
     /// Finds what the scene lacks: a camera, and a light where one is asked for.
@@ -518,7 +524,9 @@ impl<'a> Textures<'a> {
     }
 
     fn color_param(&mut self, cx: &mut CompileContext, field: &str, param: &ColorParam) -> Param<Rgb> {
-        let factor = cx.color(&factor_path(field, &param.texture), param.factor);
+        let path = factor_path(field, &param.texture);
+        let factor = cx.color(&path, param.factor);
+        advise_reflectance(cx, &path, param.factor.linear);
         Param { texture: self.resolve(cx, field, &param.texture, TextureSpace::Srgb), factor }
     }
 

@@ -1,5 +1,6 @@
 //! Scenes: described, read, compiled.
 
+mod advice;
 mod builtin;
 mod compile;
 mod course;

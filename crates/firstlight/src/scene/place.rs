@@ -14,6 +14,7 @@ use super::geometry::{Geometry, Joined, Meets, Owned, Parts, Placed, RayRules, S
 use super::links::{LinkId, Links};
 use crate::context::{Assets, CompileContext};
 use crate::describe::Family;
+use crate::describe::node::quoted;
 use crate::ids::{MaterialId, SurfaceId};
 use crate::math::{DVec3, origin_for};
 use crate::shape::{
@@ -58,6 +59,15 @@ impl<'a> MaterialNames<'a> {
             MaterialId(0)
         })
     }
+}
+
+/// The first of a list of names, in quotes, and how many more there are.
+fn first_names(names: &[&str]) -> String {
+    const SHOWN: usize = 6;
+    let shown: Vec<String> = names.iter().take(SHOWN).map(|name| quoted(name)).collect();
+    let more = names.len().saturating_sub(SHOWN);
+    let more = if more > 0 { format!(" and {more} more") } else { String::new() };
+    shown.join(", ") + &more
 }
 
 /// A shape in the space of its group.
@@ -398,19 +408,26 @@ impl Compiler<'_> {
         if source.data.face_materials.is_empty() {
             return vec![all];
         }
-        let chosen = source.data.materials.iter().enumerate().map(|(i, name)| match self.materials.find(name) {
+        let mut unknown = Vec::new();
+        let choose = source.data.materials.iter().enumerate().map(|(i, name)| match self.materials.find(name) {
             Some(id) => id,
             // Faces before the first name of a file
             None if from_file && name.is_empty() => all,
             None if from_file => {
-                let message = format!("no material is called {name:?}, which faces of the mesh ask for");
-                let hint = "they have the mesh's own material; describe one of that name";
-                cx.warning("file", message, Some(hint));
+                unknown.push(name.as_str());
                 all
             }
             None => self.materials.resolve(cx, &format!("materials[{i}]"), name),
         });
-        chosen.collect()
+        let chosen = choose.collect();
+        if !unknown.is_empty() {
+            let count = unknown.len();
+            let (noun, pronoun) = if count == 1 { ("a material", "is") } else { ("materials", "are") };
+            let message = format!("names {noun} that {pronoun} not described: {}", first_names(&unknown));
+            let hint = "their faces have the mesh's own material; a scene describes one as [material.phong.NAME]";
+            cx.warning("file", message, Some(hint));
+        }
+        chosen
     }
 
     /// A group that holds an instance of itself would never end. Without recursion: groups may be many.

@@ -21,7 +21,9 @@ use crate::describe::Family;
 use crate::describe::node::Span;
 use crate::describe::read::Faults;
 use crate::error::{Diagnostic, SceneError, Severity};
+use crate::import::{Foreign, Wanted, foreign};
 use crate::scene::compile::{CompileOptions, Compiled};
+use crate::scene::model::ModelSettings;
 
 /// Most bytes of all texts of a scene together: 64 MiB.
 const MAX_BYTES: u64 = 64 << 20;
@@ -40,6 +42,8 @@ pub struct Parsed {
     sources: Sources,
     /// A whole text or a group of named things is missing, so that compiling would complain without reason.
     incomplete: bool,
+    /// What messages call the model that the scene is about, and what the description calls it.
+    model: Option<[String; 2]>,
 }
 
 impl From<SceneDesc> for Parsed {
@@ -66,9 +70,11 @@ impl Parsed {
             return Err(SceneError { faults: self.faults.clone() });
         }
         match self.desc.compile(assets, options) {
-            Ok(compiled) if self.faults.is_empty() => {
-                Ok(Compiled { warnings: self.sources.attach(compiled.warnings), ..compiled })
-            }
+            Ok(compiled) if self.faults.is_empty() => Ok(Compiled {
+                warnings: self.of_file(self.sources.attach(compiled.warnings)),
+                advice: self.of_file(self.sources.attach(compiled.advice)),
+                ..compiled
+            }),
             Ok(_) => Err(SceneError { faults: self.faults.clone() }),
             Err(error) => {
                 let text = self.positions.iter().copied().zip(self.faults.iter().cloned());
@@ -78,9 +84,35 @@ impl Parsed {
                     all.retain(|(_, fault)| fault.severity == Severity::Error);
                 }
                 all.sort_by_key(|(position, _)| *position);
-                Err(SceneError { faults: all.into_iter().map(|(_, fault)| fault).collect() })
+                Err(SceneError { faults: self.of_file(all.into_iter().map(|(_, fault)| fault).collect()) })
             }
         }
+    }
+
+    /// A scene that shows a model, as [`SceneDesc::of_model`] makes it; what is wrong with it is said of the file, which is
+    /// called `name`, and not of a description that nobody wrote.
+    pub fn of_model(name: &str, file: &str, settings: &ModelSettings) -> Self {
+        let model = Some([name.to_owned(), file.to_owned()]);
+        Self { model, ..SceneDesc::of_model(file, settings).into() }
+    }
+
+    /// The same diagnostics; of a model by itself, about its file.
+    fn of_file(&self, mut list: Vec<Diagnostic>) -> Vec<Diagnostic> {
+        let Some([name, file]) = &self.model else { return list };
+        for diagnostic in &mut list {
+            let path = std::mem::take(&mut diagnostic.path);
+            let field = path.strip_prefix("mesh[0]").or(path.strip_prefix("point_set[0]"));
+            let field = field.map_or(path.as_str(), |field| field.trim_start_matches('.'));
+            let message = &diagnostic.message;
+            // The words of the readers begin with the file
+            let rest = message.strip_prefix(file.as_str()).or(message.strip_prefix(&format!("{file:?}")));
+            diagnostic.message = match (rest, field) {
+                (Some(rest), _) => format!("{name}{rest}"),
+                (None, "" | "file") => format!("{name}: {message}"),
+                (None, field) => format!("{name}: {field}: {message}"),
+            };
+        }
+        list
     }
 }
 
@@ -93,6 +125,9 @@ impl SceneDesc {
     /// includes them. The lists of the description come in scene order: kinds in the order of their enums, then the
     /// order of the text, included files first.
     pub fn parse(name: &str, text: &[u8], assets: &dyn Assets) -> Parsed {
+        if let Some(foreign) = foreign(text, Wanted::Scene) {
+            return Parsed::foreign(name, foreign);
+        }
         if course::is_course(name, text) {
             return course::parse(name, text);
         }
@@ -113,6 +148,19 @@ impl SceneDesc {
 }
 
 impl Parsed {
+    /// Of a file that is no text of a scene: one fault, and no place in it.
+    fn foreign(name: &str, foreign: Foreign) -> Self {
+        let fault = Diagnostic {
+            severity: Severity::Error,
+            place: None,
+            path: String::new(),
+            message: format!("{name} {}", foreign.message(Wanted::Scene)),
+            hint: Some(foreign.hint(Wanted::Scene).to_owned()),
+        };
+        let nothing = Self::from(SceneDesc::default());
+        Self { faults: vec![fault], positions: vec![(0, 0)], incomplete: true, ..nothing }
+    }
+
     pub(super) fn new(desc: SceneDesc, mut sources: Sources, faults: Faults, incomplete: bool) -> Self {
         sources.poisoned = faults.poisoned;
         let mut placed: Vec<(Position, Diagnostic)> =
@@ -129,7 +177,7 @@ impl Parsed {
             placed.push(((usize::MAX, 0), more));
         }
         let (positions, faults) = placed.into_iter().unzip();
-        Self { desc, output: None, threads: None, faults, positions, sources, incomplete }
+        Self { desc, output: None, threads: None, faults, positions, sources, incomplete, model: None }
     }
 }
 
@@ -168,6 +216,47 @@ mod tests {
         let parsed = SceneDesc::parse(name, text.as_bytes(), assets);
         assert_eq!(parsed.faults(), []);
         parsed.desc
+    }
+
+    #[test]
+    fn what_is_no_scene_is_one_fault() {
+        let gltf = b"{ \"asset\": { \"version\": \"2.0\" }, \"meshes\": [] }";
+        for (name, text, said) in [
+            (
+                "a.gltf",
+                &gltf[..],
+                "looks like a glTF model, not like a firstlight scene; that kind is not read yet; export it as PLY, STL or OBJ",
+            ),
+            (
+                "a.toml",
+                b"\x89PNG\r\n\x1a\n",
+                "looks like a PNG picture, not like a firstlight scene; a scene is TOML or JSON text; it names pictures in [texture.image.NAME]",
+            ),
+            (
+                "a.txt",
+                b"ply\nformat ascii 1.0\n",
+                "looks like a PLY model, not like a firstlight scene; give it as a model, or name it as the file of a [[mesh]] or [[point_set]]",
+            ),
+        ] {
+            let error = SceneDesc::parse(name, text, &NoAssets).compile(&NoAssets, &CompileOptions::default());
+            assert_eq!(error.err().map(|e| e.to_string()), Some(format!("{name} {said}")));
+        }
+        for builtin in crate::scene::builtin_scenes() {
+            assert_eq!(foreign(builtin.text.as_bytes(), Wanted::Scene), None, "{}", builtin.name);
+        }
+    }
+
+    #[test]
+    fn prose_is_one_fault() {
+        let prose = "It was a dark night. The rain fell in torrents\n".repeat(250);
+        let parsed = SceneDesc::parse("story", prose.as_bytes(), &NoAssets);
+        let [fault] = parsed.faults() else { panic!("{:?}", parsed.faults().len()) };
+        assert_eq!(
+            fault.to_string(),
+            "story:1:4: not TOML: 250 lines are not understood, this is the first; a scene is TOML or JSON text"
+        );
+        let json = SceneDesc::parse("scene", b" { \"camera\": { \"position\": [0, 0, 5] } }", &NoAssets);
+        assert_eq!(json.faults(), []);
     }
 
     #[test]

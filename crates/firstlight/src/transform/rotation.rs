@@ -52,12 +52,14 @@ impl Turn {
             if !deg.iter().all(|d| d.abs() <= MAX_ANGLE) {
                 cx.error("rotate_deg", format!("{} is outside [-1e9, 1e9]", show(&deg)), Some("in degrees"));
             }
+            cx.advise_radian_turns("rotate_deg", &deg);
             say(cx, "rotate_deg", Rotation::Euler(deg.into()));
         }
         match (self.axis, self.angle) {
             (Some(axis), Some(angle)) => {
                 cx.edge("rotate_axis", axis);
                 cx.between("angle_deg", angle, -MAX_ANGLE, MAX_ANGLE, Some("in degrees"));
+                cx.advise_radian_turns("angle_deg", &[angle]);
                 say(cx, "rotate_axis", Rotation::Axis(DVec3::from(axis).normalize_or_zero(), angle));
             }
             (Some(axis), None) => {

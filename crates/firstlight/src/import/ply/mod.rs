@@ -27,6 +27,11 @@ use super::{Fault, MeshData, Progress};
 use header::{Encoding, Header};
 use plan::{Plan, X};
 
+/// Whether a file of any name is PLY: its first line.
+pub(super) fn looks_like(file: &[u8]) -> bool {
+    file.starts_with(b"ply") && file.get(3).is_some_and(|b| b.is_ascii_whitespace())
+}
+
 /// Reads a PLY file; positions less `origin`.
 pub(super) fn read(file: &[u8], origin: [f64; 3], progress: &Progress) -> Result<MeshData, Fault> {
     let header = Header::read(file)?;

@@ -10,6 +10,7 @@ use crate::describe::Family;
 use crate::describe::node::{self, Data, Node, Span, Syntax, quoted};
 use crate::describe::read::{Fault, Faults, Reader, nearest};
 use crate::describe::value::{join_path, normalized};
+use crate::import::{Wanted, foreign};
 use crate::light::LightDesc;
 use crate::material::MaterialDesc;
 use crate::scene::description::{RenderDesc, SceneDesc};
@@ -20,6 +21,15 @@ use crate::texture::TextureDesc;
 const MAX_INCLUDE_DEPTH: usize = 32;
 /// Most texts of a scene.
 const MAX_FILES: usize = 1024;
+
+/// Lines with faults of the syntax, the first line among them, from which on a text is taken for another language.
+const MAX_SYNTAX_FAULTS: usize = 20;
+
+/// Whether nothing but blanks and comments stands on the lines above.
+fn is_first_line(text: &str, span: Span) -> bool {
+    let above = text.get(..span.start).and_then(|before| before.rsplit_once('\n')).map_or("", |(above, _)| above);
+    above.lines().all(|line| line.trim().is_empty() || line.trim_start().starts_with('#'))
+}
 
 /// The keys of a scene's top level.
 const BEFORE_SHAPES: &[&str] = &["include", "render", "camera", "texture", "material"];
@@ -89,7 +99,9 @@ impl Loader<'_> {
         self.chain.push(path.clone());
         self.bytes += bytes.len() as u64;
         let folder = path.rsplit_once('/').map_or("", |(folder, _)| folder);
-        let syntax = if name.to_lowercase().ends_with(".json") { Syntax::Json } else { Syntax::Toml };
+        // No TOML begins with a brace
+        let is_json = name.to_lowercase().ends_with(".json") || text.trim_start().starts_with('{');
+        let syntax = if is_json { Syntax::Json } else { Syntax::Toml };
         // Turn the text into a tree; without one, its faults are all there is to say
         let root = if let Some(message) = too_long(bytes) {
             self.file_fault(file, Span::default(), message, None);
@@ -100,6 +112,13 @@ impl Loader<'_> {
         } else {
             match node::parse(&text, syntax) {
                 Ok(root) => Some(root),
+                // Another language, most likely
+                Err(faults) if faults.len() > MAX_SYNTAX_FAULTS && is_first_line(&text, faults[0].span) => {
+                    let lines = faults.len();
+                    let message = format!("not TOML: {lines} lines are not understood, this is the first");
+                    self.file_fault(file, faults[0].span, message, Some("a scene is TOML or JSON text".into()));
+                    None
+                }
                 Err(faults) => {
                     for fault in faults {
                         self.file_fault(file, fault.span, fault.message, fault.hint);
@@ -183,6 +202,11 @@ impl Loader<'_> {
                     continue;
                 }
             };
+            if let Some(foreign) = foreign(&bytes, Wanted::Scene) {
+                let message = format!("{shown} {}", foreign.message(Wanted::Scene));
+                fault(message, Some(foreign.hint(Wanted::Scene).to_owned()), None);
+                continue;
+            }
             self.included.insert(path.clone(), (file, element.span));
             self.load(&path.clone(), path, &bytes);
         }

@@ -69,7 +69,7 @@ impl Sources {
     /// As `attach`, with positions and unsorted.
     pub(super) fn locate(&self, mut faults: Vec<Diagnostic>) -> Vec<(Position, Diagnostic)> {
         // Errors first, so that warnings never push one out
-        faults.sort_by_key(|fault| fault.severity == Severity::Warning);
+        faults.sort_by_key(|fault| fault.severity != Severity::Error);
         let mut placed = Vec::new();
         for mut fault in faults {
             if placed.len() == MAX_FAULTS {

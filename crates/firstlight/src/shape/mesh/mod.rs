@@ -12,7 +12,7 @@ pub(crate) use surface::{Mesh, MeshPart, TrianglePoint};
 
 use super::common::shape_table;
 use super::placement::Placement;
-use super::triangles::TriangleTree;
+use super::triangles::{TriangleTree, can_be_hit};
 use crate::context::{AssetError, Assets, CompileContext, CompileStage, show};
 use crate::describe::FilePath;
 use crate::ids::MaterialId;
@@ -125,8 +125,8 @@ impl MeshDesc {
             None => self.written(cx)?,
         };
         if data.triangles.is_empty() {
-            let message = format!("it holds {} points and no triangles", data.positions.len());
-            cx.error("file", message, Some("points are shown by [[point_set]]"));
+            let message = format!("holds {} points and no faces", data.positions.len());
+            cx.error("file", message, Some("points are shown by [[point_set]], as spheres; PLY files can hold them"));
         }
         if let Some(angle) = self.smooth_deg {
             let angle = cx.between(
@@ -136,6 +136,7 @@ impl MeshDesc {
                 180.0,
                 Some("edges where faces meet at up to this angle are smooth; 0 is flat"),
             );
+            cx.advise_radians("smooth_deg", angle);
             if cx.error_count() == before {
                 data.smooth(angle);
             }
@@ -322,6 +323,10 @@ impl MeshBuilder {
             cx.error("file", message, Some("coordinates are in metres: scale the mesh"));
             return;
         }
+        if !data.triangles.iter().any(|triangle| can_be_hit(&data.positions, triangle)) {
+            advise_nothing(cx, &data);
+        }
+        cx.advise_vertex_colors(&data.colors);
         self.counts = counts;
         self.bounds = match (self.bounds, bounds) {
             (Some([low, high]), Some([a, b])) => Some([low.min(a), high.max(b)]),
@@ -383,6 +388,22 @@ impl Lists {
             (self.positions, self.triangles) = (positions, triangles);
         }
     }
+}
+
+/// Says why nothing of a mesh can be hit.
+fn advise_nothing(cx: &mut CompileContext, data: &MeshData) {
+    let (triangles, corners) = (data.triangles.len(), data.triangles.iter().flatten());
+    let finite = corners.map(|v| Vec3::from(data.positions[*v as usize])).filter(|p| p.is_finite());
+    let bounds = finite.map(|p| (p, p)).reduce(|(low, high), (p, _)| (low.min(p), high.max(p)));
+    let message = match bounds {
+        None => format!("none of its {triangles} triangles has a corner that is finite: nothing of it can be seen"),
+        Some((low, high)) if low == high => {
+            let place = show(&(low.as_dvec3() + DVec3::from(data.origin)).to_array());
+            format!("it has no size, all of its {triangles} triangles are at {place}: nothing of it can be seen")
+        }
+        Some(_) => format!("none of its {triangles} triangles has an area: nothing of it can be seen"),
+    };
+    cx.advise("", message, Some("look at it in the program that wrote it"));
 }
 
 /// The box around all positions that are numbers, moved by `transform`.

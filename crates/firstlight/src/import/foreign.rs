@@ -1,0 +1,350 @@
+//! What a file is that is neither a scene nor a mesh, by its content: so that one line can say it, instead of a line for
+//! every word that no reader understands.
+
+use super::{obj, ply, stl};
+
+/// A file of a kind that is not what was wanted.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Foreign {
+    /// With its article: "a PNG picture".
+    pub kind: &'static str,
+    family: Family,
+}
+
+/// What is to be done about it goes by families.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Family {
+    /// A mesh that is read, where a scene is wanted.
+    Mesh,
+    /// A model or scene of which only meshes could be used, once exported.
+    Model,
+    /// Numbered points.
+    Cloud,
+    /// A scene of another renderer.
+    Scene,
+    Picture,
+    Archive,
+    /// Text in an encoding that is not read.
+    Encoding,
+    /// The materials of an OBJ file.
+    Materials,
+    Other,
+}
+
+/// What a file was to be.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Wanted {
+    Scene,
+    Mesh,
+}
+
+impl Foreign {
+    /// `looks like a PNG picture, not like a firstlight scene`
+    pub fn message(self, wanted: Wanted) -> String {
+        let wanted = match wanted {
+            Wanted::Scene => "a firstlight scene",
+            Wanted::Mesh => "a mesh",
+        };
+        format!("looks like {}, not like {wanted}", self.kind)
+    }
+
+    /// What to do.
+    pub fn hint(self, wanted: Wanted) -> &'static str {
+        match (self.family, wanted) {
+            (Family::Mesh, _) => "give it as a model, or name it as the file of a [[mesh]] or [[point_set]]",
+            (Family::Model, _) => "that kind is not read yet; export it as PLY, STL or OBJ",
+            (Family::Cloud, _) => "that kind is not read yet; convert it to PLY",
+            (Family::Scene, _) => "scenes of other programs are not read; export their meshes as PLY or OBJ",
+            (Family::Picture, Wanted::Scene) => {
+                "a scene is TOML or JSON text; it names pictures in [texture.image.NAME]"
+            }
+            (Family::Archive, _) => "unpack it first",
+            (Family::Encoding, _) => "save it as UTF-8",
+            (Family::Materials, _) => "give the OBJ file that belongs to it; materials are described in a scene",
+            (Family::Picture | Family::Other, Wanted::Mesh) => "a mesh is a PLY, STL or OBJ file",
+            (Family::Other, Wanted::Scene) => "a scene is TOML or JSON text, a model a PLY, STL or OBJ file",
+        }
+    }
+}
+
+/// First bytes, and what they are the first bytes of.
+const MAGIC: &[(&[u8], &str, Family)] = &[
+    (b"glTF", "a binary glTF model (GLB)", Family::Model),
+    (b"BLENDER", "a Blender file", Family::Model),
+    (b"Kaydara FBX Binary", "an FBX model", Family::Model),
+    (b"; FBX ", "an FBX model", Family::Model),
+    (b"PXR-USDC", "a USD scene", Family::Model),
+    (b"#usda", "a USD scene", Family::Model),
+    (b"#VRML", "a VRML scene", Family::Model),
+    (b"#X3D", "an X3D scene", Family::Model),
+    (b"Ogawa", "an Alembic scene", Family::Model),
+    (b"DRACO", "a Draco mesh", Family::Model),
+    (b"ISO-10303-21", "a STEP model", Family::Model),
+    (b"3D Geometry File Format", "a Rhino model", Family::Model),
+    (b"//Maya ASCII", "a Maya scene", Family::Model),
+    (b"OFF\n", "an OFF mesh", Family::Model),
+    (b"OFF\r", "an OFF mesh", Family::Model),
+    (b"OFF ", "an OFF mesh", Family::Model),
+    (b"COFF", "an OFF mesh", Family::Model),
+    (b"NOFF", "an OFF mesh", Family::Model),
+    (b"\x20BDV", "an OpenVDB volume", Family::Model),
+    (b"# .PCD", "a PCD point cloud", Family::Cloud),
+    (b"LASF", "a LAS point cloud", Family::Cloud),
+    (b"ASTM-E57", "an E57 point cloud", Family::Cloud),
+    (b"\x89PNG\r\n\x1a\n", "a PNG picture", Family::Picture),
+    (b"\xff\xd8\xff", "a JPEG picture", Family::Picture),
+    (b"GIF8", "a GIF picture", Family::Picture),
+    (b"II*\0", "a TIFF picture", Family::Picture),
+    (b"MM\0*", "a TIFF picture", Family::Picture),
+    (b"\x76\x2f\x31\x01", "an OpenEXR picture", Family::Picture),
+    (b"#?RADIANCE", "a Radiance picture (HDR)", Family::Picture),
+    (b"#?RGBE", "a Radiance picture (HDR)", Family::Picture),
+    (b"8BPS", "a Photoshop picture", Family::Picture),
+    (b"DDS ", "a DDS picture", Family::Picture),
+    (b"qoif", "a QOI picture", Family::Picture),
+    (b"\xabKTX ", "a KTX texture", Family::Picture),
+    (b"PK\x05\x06", "an empty zip archive", Family::Archive),
+    (b"\x1f\x8b", "gzip-compressed data", Family::Archive),
+    (b"BZh", "bzip2-compressed data", Family::Archive),
+    (b"\xfd7zXZ\0", "xz-compressed data", Family::Archive),
+    (b"\x28\xb5\x2f\xfd", "zstd-compressed data (newer Blender files are)", Family::Archive),
+    (b"7z\xbc\xaf\x27\x1c", "a 7z archive", Family::Archive),
+    (b"Rar!\x1a\x07", "a RAR archive", Family::Archive),
+    (b"%PDF", "a PDF document", Family::Other),
+    (b"%!PS", "a PostScript document", Family::Other),
+    (b"{\\rtf", "an RTF document", Family::Other),
+    (b"\x7fELF", "a program (ELF)", Family::Other),
+    (b"MZ\x90\0", "a program for Windows", Family::Other),
+    (b"\xcf\xfa\xed\xfe", "a program (Mach-O)", Family::Other),
+    (b"\xca\xfe\xba\xbe", "a program (Mach-O or Java)", Family::Other),
+    (b"\0asm", "a program (WebAssembly)", Family::Other),
+    (b"#!/", "a script", Family::Other),
+    (b"SQLite format 3\0", "a database (SQLite)", Family::Other),
+    (b"\x93NUMPY", "a NumPy array", Family::Other),
+    (b"\x89HDF", "an HDF5 file", Family::Other),
+    (b"\xff\xfe", "text in UTF-16", Family::Encoding),
+    (b"\xfe\xff", "text in UTF-16", Family::Encoding),
+];
+
+/// Bytes that are looked at for words.
+const HEAD: usize = 1 << 16;
+/// Bytes at both ends of JSON that are looked at: `asset` may stand behind a buffer within the text.
+const JSON_ENDS: usize = 1 << 20;
+
+/// What `bytes` are, if they are nothing that could be a scene, nor a mesh if one is wanted. `None` where nothing speaks
+/// against it.
+pub(crate) fn foreign(bytes: &[u8], wanted: Wanted) -> Option<Foreign> {
+    let is = |kind, family| Some(Foreign { kind, family });
+    let mesh = |kind| if wanted == Wanted::Scene { is(kind, Family::Mesh) } else { None };
+    // Meshes first: the header of a binary STL file may begin with anything
+    if ply::looks_like(bytes) {
+        return mesh("a PLY model");
+    }
+    if stl::looks_like(bytes) {
+        return mesh("an STL model");
+    }
+    if obj::looks_like(bytes) {
+        return mesh("an OBJ model");
+    }
+    if let Some((_, kind, family)) = MAGIC.iter().find(|(magic, ..)| bytes.starts_with(magic)) {
+        return is(kind, *family);
+    }
+    // Kinds that say what they are farther on
+    let at = |start: usize, word: &[u8]| bytes.get(start..).is_some_and(|rest| rest.starts_with(word));
+    let length =
+        |start: usize| bytes.get(start..start + 4).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]]) as usize);
+    if at(0, b"PK\x03\x04") {
+        return archive(bytes);
+    }
+    if at(0, b"RIFF") && at(8, b"WEBP") {
+        return is("a WebP picture", Family::Picture);
+    }
+    if at(4, b"ftypavif") || at(4, b"ftypheic") || at(4, b"ftypmif1") {
+        return is("an AVIF or HEIC picture", Family::Picture);
+    }
+    if at(4, b"ftyp") {
+        return is("a film (MP4)", Family::Other);
+    }
+    if at(0, b"BM") && matches!(length(14), Some(12 | 40 | 52 | 56 | 64 | 108 | 124)) {
+        return is("a BMP picture", Family::Picture);
+    }
+    if at(0, b"MM") && length(2) == Some(bytes.len()) {
+        return is("a 3DS model", Family::Model);
+    }
+    if at(257, b"ustar") {
+        return is("a tar archive", Family::Archive);
+    }
+    let head = &bytes[..bytes.len().min(HEAD)];
+    // No text has a zero byte. A mesh may well, and its reader says what is wrong with it
+    if head.contains(&0) {
+        return if wanted == Wanted::Scene { is("binary data of an unknown kind", Family::Other) } else { None };
+    }
+    text(bytes, head, wanted)
+}
+
+/// A zip archive, by the names of its first files.
+fn archive(bytes: &[u8]) -> Option<Foreign> {
+    let head = &bytes[..bytes.len().min(4096)];
+    let (kind, family) = if has(head, b"3D/3dmodel") || has(head, b"3dmodel.model") {
+        ("a 3MF model", Family::Model)
+    } else if has(&head[..head.len().min(256)], b".usd") {
+        ("a USD scene (USDZ)", Family::Model)
+    } else {
+        ("a zip archive", Family::Archive)
+    };
+    Some(Foreign { kind, family })
+}
+
+/// Text of another language.
+fn text(bytes: &[u8], head: &[u8], wanted: Wanted) -> Option<Foreign> {
+    let is = |kind, family| Some(Foreign { kind, family });
+    let head = head.strip_prefix(b"\xef\xbb\xbf").unwrap_or(head).trim_ascii_start();
+    if head.starts_with(b"{") {
+        let (first, last) = (&bytes[..bytes.len().min(JSON_ENDS)], &bytes[bytes.len().saturating_sub(JSON_ENDS)..]);
+        let has = |word: &[u8]| has(first, word) || has(last, word);
+        let parts: [&[u8]; 5] = [b"\"meshes\"", b"\"nodes\"", b"\"buffers\"", b"\"accessors\"", b"\"scenes\""];
+        if has(b"\"asset\"") && parts.iter().any(|part| has(part)) {
+            return is("a glTF model", Family::Model);
+        }
+        return if wanted == Wanted::Mesh { is("JSON text", Family::Other) } else { None };
+    }
+    if head.starts_with(b"<") {
+        let low = head.to_ascii_lowercase();
+        return if has(&low, b"<collada") {
+            is("a COLLADA model", Family::Model)
+        } else if has(&low, b"<x3d") {
+            is("an X3D scene", Family::Model)
+        } else if has(&low, b"<amf") {
+            is("an AMF model", Family::Model)
+        } else if has(&low, b"<scene version") {
+            is("a Mitsuba scene", Family::Scene)
+        } else if has(&low, b"<svg") {
+            is("an SVG drawing", Family::Picture)
+        } else if has(&low, b"<!doctype html") || has(&low, b"<html") {
+            is("a web page (HTML)", Family::Other)
+        } else {
+            is("XML", Family::Other)
+        };
+    }
+    // The first words of lines; comments begin as those of TOML do
+    for line in head.split(|b| *b == b'\n').take(200) {
+        let line = line.trim_ascii();
+        let word = line.split(|b| b.is_ascii_whitespace() || *b == b'{').next().unwrap_or_default();
+        let braced = line[word.len()..].trim_ascii_start().starts_with(b"{");
+        match word {
+            b"newmtl" if line.len() > word.len() => return is("the materials of an OBJ file (MTL)", Family::Materials),
+            b"#version" | b"#include" | b"#declare" | b"#local" | b"global_settings" | b"light_source"
+                if braced || line.starts_with(b"#") =>
+            {
+                return is("a POV-Ray scene", Family::Scene);
+            }
+            b"camera" | b"sphere" | b"plane" | b"background" if braced => return is("a POV-Ray scene", Family::Scene),
+            b"WorldBegin" | b"LookAt" | b"Film" | b"Integrator" | b"Sampler" | b"Camera"
+                if line == b"WorldBegin" || has(line, b"\"") || word == b"LookAt" && !has(line, b"=") =>
+            {
+                return is("a pbrt scene", Family::Scene);
+            }
+            _ => {}
+        }
+    }
+    None
+}
+
+/// Whether `word` is anywhere in `bytes`.
+fn has(bytes: &[u8], word: &[u8]) -> bool {
+    let Some(first) = word.first() else { return true };
+    let mut rest = bytes;
+    while let Some(at) = rest.iter().position(|b| b == first) {
+        if rest[at..].starts_with(word) {
+            return true;
+        }
+        rest = &rest[at + 1..];
+    }
+    false
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn files_are_known_by_their_content() {
+        let mut stl = vec![0u8; 80];
+        stl.extend(1u32.to_le_bytes());
+        stl.extend([0u8; 50]);
+        let mut tar = vec![b'a'; 257];
+        tar.extend(b"ustar\0");
+        let mut bmp = b"BM\0\0\0\0\0\0\0\0\0\0\0\0".to_vec();
+        bmp.extend(40u32.to_le_bytes());
+        let mut max = b"MM".to_vec();
+        max.extend(8u32.to_le_bytes());
+        max.extend([0, 0]);
+        let gltf = format!("{{ \"buffers\": [\"{}\"], \"asset\": {{}} }}", "x".repeat(3 << 20));
+        let usdz = b"PK\x03\x04\x0a\0\0\0\0\0\0\0\0\0\0\0\0\0model.usdc";
+        let expected: &[(&[u8], &str)] = &[
+            (b"ply\nformat ascii 1.0\n", "a PLY model"),
+            (b"solid a\nfacet normal 0 0 1\n", "an STL model"),
+            (&stl, "an STL model"),
+            (b"# a\nmtllib a.mtl\nv 1 2 3\n", "an OBJ model"),
+            (b"glTF\x02\0\0\0", "a binary glTF model (GLB)"),
+            (b"{ \"asset\": { \"version\": \"2.0\" }, \"meshes\": [] }", "a glTF model"),
+            (gltf.as_bytes(), "a glTF model"),
+            (b"\x89PNG\r\n\x1a\n\0\0", "a PNG picture"),
+            (b"\xff\xd8\xff\xe0", "a JPEG picture"),
+            (b"\x76\x2f\x31\x01\x02", "an OpenEXR picture"),
+            (b"RIFF\0\0\0\0WEBPVP8 ", "a WebP picture"),
+            (&bmp, "a BMP picture"),
+            (&max, "a 3DS model"),
+            (b"BLENDER-v300", "a Blender file"),
+            (b"Kaydara FBX Binary  \0", "an FBX model"),
+            (b"PXR-USDC\0", "a USD scene"),
+            (b"#usda 1.0\n", "a USD scene"),
+            (b"PK\x03\x04\0\0", "a zip archive"),
+            (usdz, "a USD scene (USDZ)"),
+            (b"PK\x03\x04\0\03D/3dmodel.model", "a 3MF model"),
+            (b"\x1f\x8b\x08", "gzip-compressed data"),
+            (&tar, "a tar archive"),
+            (b"%PDF-1.7", "a PDF document"),
+            (b"\x7fELF\x02", "a program (ELF)"),
+            (b"<!DOCTYPE html><p>", "a web page (HTML)"),
+            (b"\n <?xml version=\"1.0\"?>\n<COLLADA>", "a COLLADA model"),
+            (b"<scene version=\"3.0.0\">", "a Mitsuba scene"),
+            (b"\xff\xfea\0", "text in UTF-16"),
+            (b"a\0b", "binary data of an unknown kind"),
+            (b"// a\n#include \"colors.inc\"\n", "a POV-Ray scene"),
+            (b"# x\ncamera {\n location <0, 0, 1>\n}\n", "a POV-Ray scene"),
+            (b"LookAt 0 0 5  0 0 0  0 1 0\n", "a pbrt scene"),
+            (b"# Blender\nnewmtl clay\nKd 1 1 1\n", "the materials of an OBJ file (MTL)"),
+            (b"OFF\n8 6 0\n", "an OFF mesh"),
+        ];
+        for (bytes, kind) in expected {
+            let found = foreign(bytes, Wanted::Scene);
+            let start = String::from_utf8_lossy(&bytes[..bytes.len().min(20)]).into_owned();
+            assert_eq!(found.map(|found| found.kind), Some(*kind), "{start:?}");
+            let as_mesh = foreign(bytes, Wanted::Mesh);
+            let is_mesh = ["a PLY model", "an STL model", "an OBJ model"].contains(kind);
+            let is_unknown = *kind == "binary data of an unknown kind";
+            assert_eq!(as_mesh.map(|found| found.kind), (!is_mesh && !is_unknown).then_some(*kind), "{start:?}");
+        }
+    }
+
+    #[test]
+    fn scenes_are_not_foreign() {
+        let texts: &[&[u8]] = &[
+            b"",
+            b"\xef\xbb\xbf[render]\n",
+            b"# a comment\n[camera]\nposition = [0, 0, 5]\n",
+            b"camera = { position = [0, 0, 5] }\n",
+            b"v = 1\n",
+            b"s= 1\n",
+            b"o.x = 1\n",
+            b"{ \"camera\": { \"position\": [0, 0, 5] } }",
+            b"output_resolution 30\noutput_file course.png\n",
+            b"[[sphere]]\nname = \"camera { }\"\n",
+            b"\xe4\xf6",
+        ];
+        for text in texts {
+            assert_eq!(foreign(text, Wanted::Scene), None, "{:?}", String::from_utf8_lossy(text));
+        }
+    }
+}
