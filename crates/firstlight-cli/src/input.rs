@@ -268,7 +268,7 @@ const COURSE_LIMIT: u64 = 1 << 16;
 pub fn course_output(scene: &Path) -> Option<String> {
     let file = file_of(scene).filter(|file| !is_model(file))?;
     let is_short = file.metadata().is_ok_and(|meta| meta.is_file() && meta.len() <= COURSE_LIMIT);
-    let text = if is_short { read_file(file).ok()? } else { return None };
+    let text = if is_short { std::fs::read(file).ok()? } else { return None };
     SceneDesc::parse(&file.display().to_string(), &text, &NoAssets).output
 }
 
