@@ -80,8 +80,7 @@ fn what_would_be_one_file_is_refused_before_anything_is_rendered() {
 fn frames_heat_and_numbers_are_files_of_each() {
     let folder = three();
     let quick = QUICK.join(" ");
-    let line =
-        format!("render a.toml c.toml -o out/{{stem}}_#.png --heat out/{{stem}}.heat.png --stats=out/{{name}}.json");
+    let line = "render a.toml c.toml -o out/{stem}_#.png --heat out/{stem}.heat.png --stats=out/{name}.json".to_owned();
     folder.run(&format!("{line} --frames 3..4 {quick}")).done();
     assert_eq!(
         files(&folder, "out"),

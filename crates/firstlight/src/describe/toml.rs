@@ -147,6 +147,7 @@ struct Table {
     items: Vec<Item>,
     made: Made,
     /// Where its keys are, once they are many.
+    #[allow(clippy::box_collection, reason = "most tables are small and have none: a word, not six")]
     places: Option<Box<HashMap<Arc<str>, usize>>>,
 }
 

@@ -301,7 +301,7 @@ mod tests {
             (b"#usda 1.0\n", "a USD scene"),
             (b"PK\x03\x04\0\0", "a zip archive"),
             (usdz, "a USD scene (USDZ)"),
-            (b"PK\x03\x04\0\03D/3dmodel.model", "a 3MF model"),
+            (b"PK\x03\x04\x00\x003D/3dmodel.model", "a 3MF model"),
             (b"\x1f\x8b\x08", "gzip-compressed data"),
             (&tar, "a tar archive"),
             (b"%PDF-1.7", "a PDF document"),

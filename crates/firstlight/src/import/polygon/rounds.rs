@@ -299,7 +299,7 @@ mod tests {
     /// Around the origin, `radius` away.
     fn around(size: usize, radius: impl Fn(usize) -> f64) -> Vec<Point> {
         let at = |i: usize| {
-            let (sin, cos) = (TAU * i as f64 / size as f64).sin_cos();
+            let (sin, cos) = pxfm::f_sincos(TAU * i as f64 / size as f64);
             [cos * radius(i), sin * radius(i)]
         };
         (0..size).map(at).collect()
@@ -312,7 +312,7 @@ mod tests {
         let mut comb = vec![[0.0, -1.0], [SIZE as f64, -1.0]];
         comb.extend((1..SIZE - 1).rev().map(|i| [i as f64, if i % 2 == 0 { 5.0 } else { 0.0 }]));
         let winding = |i: usize, out: f64| {
-            let (sin, cos) = (i as f64 * 0.05).sin_cos();
+            let (sin, cos) = pxfm::f_sincos(i as f64 * 0.05);
             let radius = 10.0 + i as f64 * 0.01 + out;
             [cos * radius, sin * radius]
         };
