@@ -138,7 +138,7 @@ fn a_file_of_another_kind_is_one_line_that_says_what_it_is() {
         // The same under a model's name, and as the file of a mesh in a scene
         let what = said.split(", ").next().unwrap();
         folder.put("a.ply", bytes);
-        let ran = folder.run("render a.ply").exits(1).says(&["error: a.ply: ", what, "not like a mesh"]);
+        let ran = folder.run("render a.ply -o out.png").exits(1).says(&["error: a.ply: ", what, "not like a mesh"]);
         assert_eq!(ran.stderr.lines().count(), 2, "{}", ran.stderr);
         assert!(!ran.stderr.contains("mesh[0]"), "{}", ran.stderr);
         folder.put("scene.toml", format!("{SCENE}[[mesh]]\nfile = \"a.ply\"\n"));
@@ -164,7 +164,7 @@ fn a_model_is_known_by_its_content() {
     assert!(Picture::decode(&folder.get("a.png")) == Picture::decode(&folder.get("b.png")));
     folder.run_with_input("render - --width 20 --aa 1 --smooth 30", MODEL.as_bytes()).done().says(&["wrote "]);
     assert!(folder.run_with_input("info -", MODEL.as_bytes()).done().text().contains("triangles  2\n"));
-    folder.run_with_input("check -", b"v 0 0 0\nv 1 0 x\nf 1 1 1\n").exits(1).says(&["error: <stdin>:2: `x`"]);
+    folder.run_with_input("check -", b"v 0 0 0\nv 1 0 x\nf 1 1 1\n").exits(1).says(&["error: <stdin>:2: v: `x`"]);
 }
 
 #[test]
@@ -176,7 +176,7 @@ fn a_model_is_spoken_of_by_its_name() {
     let ran = folder.run("check models/a.obj").done().says(&[named]);
     assert_eq!(ran.stderr.lines().count(), 1, "{}", ran.stderr);
     folder.put("models/a.obj", "v 0 0 0\nv 1 1 1\nv 2 2 z\n");
-    folder.run("check models/a.obj").exits(1).says(&["error: models/a.obj:3: `z`"]);
+    folder.run("check models/a.obj").exits(1).says(&["error: models/a.obj:3: v: `z`"]);
     folder.put("models/a.obj", "v 0 0 0\n".repeat(3) + "f 1 2 3\n");
     folder.run("check models/a.obj").done().says(&["note: models/a.obj: it has no size"]);
     folder.run("check models/b.obj").exits(1).says(&["error: models/b.obj: no such file"]);
@@ -185,10 +185,18 @@ fn a_model_is_spoken_of_by_its_name() {
 #[test]
 fn of_many_faults_the_first_are_listed() {
     let folder = Folder::new();
-    folder.put("many.toml", "[render]\n".to_owned() + &(0..250).map(|i| format!("k{i} = 1\n")).collect::<String>());
+    folder.put(
+        "many.toml",
+        "[camera]\nposition = [0, 0, 5]\n[render]\n".to_owned()
+            + &(0..250).map(|i| format!("k{i} = 1\n")).collect::<String>(),
+    );
     let ran = folder.run("check many.toml").exits(1).says(&["\nand 230 more\n250 errors\n"]);
     assert_eq!(ran.stderr.matches("error: many.toml:").count(), 20, "{}", ran.stderr);
-    folder.put("more.toml", "[render]\n".to_owned() + &(0..2500).map(|i| format!("k{i} = 1\n")).collect::<String>());
+    folder.put(
+        "more.toml",
+        "[camera]\nposition = [0, 0, 5]\n[render]\n".to_owned()
+            + &(0..2500).map(|i| format!("k{i} = 1\n")).collect::<String>(),
+    );
     folder.run("check more.toml").exits(1).says(&["\nand 2480 more\n2500 errors\n"]);
     // Another language is not listed word by word
     folder.put("prose", "It was a dark night.\n".repeat(100));

@@ -128,7 +128,7 @@ fn a_scene_without_a_camera_is_given_one_and_no_light() {
 #[test]
 fn a_camera_that_is_found_stands_still_while_the_scene_moves() {
     let folder = Folder::new();
-    let keys = "transform = { keys = [{ time = 0 }, { time = 1, translate = [0.5, 0, 0] }] }";
+    let keys = "transform = { keys = [{ time = 0, translate = [0, 0, 0] }, { time = 1, translate = [0.5, 0, 0] }] }";
     let ball = |rest: &str| format!("[[sphere]]\ncenter = [0, 0, 0]\nradius = 1\n{rest}\n");
     folder.put(
         "scene.toml",

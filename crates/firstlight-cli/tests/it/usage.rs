@@ -15,7 +15,6 @@ const BAD: &[(&str, &[&str])] = &[
     ("render scene.toml sub/scene.toml", &["scene.toml and sub/scene.toml", "scene.png", "{name}"]),
     ("render scene.toml scene.toml -o {name}.png", &["scene.toml.png"]),
     ("render scene.toml -o {frame}.png", &["{frame}", "{stem} and {name}"]),
-    ("render scene.toml other.toml --smooth 30", &["--smooth", "scene.toml is none"]),
     ("render scene.toml --size 0", &["--size", "256x512", "1 to 65536"]),
     ("render scene.toml --size 10x", &["--size", "10x"]),
     ("render scene.toml --size 10 --width 5", &["--size", "--width", "cannot be used with"]),
@@ -126,7 +125,6 @@ const MEANT: &[(&str, &str)] = &[
     ("render scene.toml -f 1", "--frames A..B"),
     ("render scene.toml --max-bounces 4", "one bounce"),
     ("render scene.toml --denoise", "no noise"),
-    ("render scene.toml +W320", "--width 320"),
     ("check scene.toml --verbose", "--stats"),
 ];
 

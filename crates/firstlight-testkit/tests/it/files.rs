@@ -444,7 +444,7 @@ fn the_kind_of_a_file_is_found() {
     assert_eq!(of("a.bin", b"glTF"), None);
     assert_eq!(
         try_read("a.bin", b"glTF").unwrap_err().to_string(),
-        "a.bin: is not a mesh of a known kind; give a PLY, STL or OBJ file"
+        "a.bin: looks like a binary glTF model (GLB), not like a mesh; that kind is not read yet; export it as PLY, STL or OBJ"
     );
 }
 

@@ -1,8 +1,9 @@
-//! The integral of a light behind anything: a mask over fixed points, their number doubled until the answer stands still.
+//! The integral of a light behind anything: a mask over fixed points, their number doubled until the answer stands
+//! still.
 //!
 //! The points say what share of the light arrives; how much the whole would be is known exactly. So where nothing is in
-//! the way, or everything, the points' own error is nothing. Where as many points as are worth while do not do, cells take
-//! over: [`cells`].
+//! the way, or everything, the points' own error is nothing. Where as many points as are worth while do not do, cells
+//! take over: [`cells`].
 
 use std::cell::Cell;
 use std::sync::OnceLock;
@@ -25,11 +26,11 @@ const FEWEST: usize = 256;
 /// Parts of a pixel up to this share are small.
 const SMALL: f32 = 0.25;
 pub(crate) const MOST: usize = 1 << 10;
-/// How much farther off the share may be than two numbers of points tell: both can be off to the same side, and are so all over
-/// a surface, since all of it asks the same points.
+/// How much farther off the share may be than two numbers of points tell: both can be off to the same side, and are so
+/// all over a surface, since all of it asks the same points.
 const DOUBT: f32 = 4.0;
-/// Three standard deviations of the share of a light that the edge of a shadow cuts off, for each n^(-3/4): by that n points are
-/// wrong, chosen by chance in as many squares, since the edge runs through a root of n of them.
+/// Three standard deviations of the share of a light that the edge of a shadow cuts off, for each n^(-3/4): by that n
+/// points are wrong, chosen by chance in as many squares, since the edge runs through a root of n of them.
 const EDGE: f32 = 1.0;
 /// Where none of so many times the first points is hidden, of points that send alike, nothing is.
 const CLEAR: f64 = 1.5;
@@ -110,7 +111,8 @@ impl Tally {
 }
 
 impl Tally {
-    /// Whether a few points send most of it, or none sends any, so that the others tell nothing: of the diffuse part, of a highlight.
+    /// Whether a few points send most of it, or none sends any, so that the others tell nothing: of the diffuse part,
+    /// of a highlight.
     pub fn is_uneven(&self, whole: &Sums) -> [bool; 2] {
         let alike = self.alike();
         let is_uneven = |k: usize, whole: f32| {
@@ -147,7 +149,8 @@ impl Masked<'_> {
                     let earlier = earlier.map_or(0.0, |sums| (of(&sums) - of(&before)).abs() * 0.5);
                     (of(&now) - of(&before)).abs().max(earlier)
                 };
-                // What one more point could change is the least that can be wrong, and what points make of a shadow's edge
+                // What one more point could change is the least that can be wrong, and what points make of a shadow's
+                // edge
                 let has_edge = !is_small && (1..to).contains(&tally.hidden);
                 if has_edge && !enough(&now, &(*whole * of_edge(MOST as f32))) {
                     return cells::integrate(&seen, Some(whole), enough);

@@ -5,8 +5,8 @@
 //!   ([`tensor`]);
 //! - a few convex things are in the way, or the horizon cuts the light, or the light is near: row by row, with
 //!   intervals in closed form, the error measured and brought under its bound ([`rows`]);
-//! - anything else: a mask over fixed points, their number doubled until the answer stands still ([`mask`]); and where that
-//!   takes too many, cells that are cut where shadows have their edges ([`cells`]).
+//! - anything else: a mask over fixed points, their number doubled until the answer stands still ([`mask`]); and where
+//!   that takes too many, cells that are cut where shadows have their edges ([`cells`]).
 //!
 //! A highlight that is narrow beside the light is integrated by itself, over the part of the light that it covers.
 

@@ -184,8 +184,8 @@ impl View {
         (x * x + y * y + self.height * self.height).sqrt()
     }
 
-    /// The most that can arrive within `reach` of the point, or thereabouts: the cosine at the surface is 1, and nothing is in
-    /// the way.
+    /// The most that can arrive within `reach` of the point, or thereabouts: the cosine at the surface is 1, and
+    /// nothing is in the way.
     pub fn most(&self, reach: f32) -> f32 {
         if !self.physical {
             return 1.0;
@@ -197,8 +197,8 @@ impl View {
             .min(std::f32::consts::PI)
     }
 
-    /// What share of [`most`](Self::most) the mean within `reach` can be off where the light's plane runs through: from there one
-    /// side of a light shines and the other does not, or both grow.
+    /// What share of [`most`](Self::most) the mean within `reach` can be off where the light's plane runs through: from
+    /// there one side of a light shines and the other does not, or both grow.
     pub fn crossing(&self, reach: f32) -> f32 {
         match (self.height <= reach, self.physical) {
             (false, _) => 0.0,

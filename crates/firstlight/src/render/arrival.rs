@@ -34,8 +34,8 @@ pub(crate) struct Place<'a> {
     pub share: f32,
     /// Which points of lights it asks; see [`Masked::series`].
     pub series: usize,
-    /// Where it stands for a patch: how much may bend over it, in display steps, and whether its neighbours may tell that less
-    /// does. If it will not do for the patch, points of the light are not asked.
+    /// Where it stands for a patch: how much may bend over it, in display steps, and whether its neighbours may tell
+    /// that less does. If it will not do for the patch, points of the light are not asked.
     pub allowed: f32,
     pub beside: bool,
     /// What is there beside this light, at least.
@@ -231,7 +231,8 @@ impl<'a> Arrivals<'a> {
         Place::point(si, &bsdf.lobe, self.scene.ambient * bsdf.ambient, colors)
     }
 
-    /// What light `index` sends to one point, which stands for `share` of a pixel: diffuse and specular, with all colours.
+    /// What light `index` sends to one point, which stands for `share` of a pixel: diffuse and specular, with all
+    /// colours.
     pub fn at_point(
         &mut self,
         index: usize,

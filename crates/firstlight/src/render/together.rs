@@ -1,8 +1,8 @@
 //! One light, asked for at every ray of a patch, and judged by what all of them make together.
 //!
-//! Behind things a light is asked point by point. The rays ask different points, which are laid out together: n rays need far fewer
-//! each than one that stands for all of them, and what one ray's points pass by, those of others meet. What points cannot settle is
-//! left to each ray by itself.
+//! Behind things a light is asked point by point. The rays ask different points, which are laid out together: n rays
+//! need far fewer each than one that stands for all of them, and what one ray's points pass by, those of others meet.
+//! What points cannot settle is left to each ray by itself.
 
 use super::Counts;
 use super::arrival::{Arrivals, Behind, Place, Seen};
@@ -19,10 +19,11 @@ const POINTS: f32 = 512.0;
 const CLEAR: f64 = 0.75;
 /// The most that a ray begins with.
 const FIRST: usize = 256;
-/// How much farther off the sums may be than two numbers of points tell: of many rays, and of one more, which can agree by chance.
+/// How much farther off the sums may be than two numbers of points tell: of many rays, and of one more, which can agree
+/// by chance.
 const DOUBT: [f32; 2] = [2.0, 4.0];
-/// The same of what the rays would make together by chance. Points of different series share a light better than by chance: behind the
-/// same straight edge sixteen are wrong by half as much.
+/// The same of what the rays would make together by chance. Points of different series share a light better than by
+/// chance: behind the same straight edge sixteen are wrong by half as much.
 const DOUBT_BY_CHANCE: [f32; 2] = [1.0, 5.0];
 /// The part of what may be wrong that points may tell nothing about.
 const UNTOLD: f32 = 0.5;

@@ -10,8 +10,9 @@ use crate::shape::{Footprint, UvEdge};
 
 table! {
     /// Squares of two colours, `counts[0]` across u in 0..1 and `counts[1]` across v in 0..1: the first colour where
-    /// floor(u n) + floor(v m) is even. On a plane without end u and v are metres, and the squares go on. A function, not an image: its value is the area mean over the pixel's
-    /// footprint, so its edges are sharp from near and gray from far, for every count.
+    /// floor(u n) + floor(v m) is even. On a plane without end u and v are metres, and the squares go on. A function,
+    /// not an image: its value is the area mean over the pixel's footprint, so its edges are sharp from near and gray
+    /// from far, for every count.
     ///
     /// ```toml
     /// [texture.checkerboard.tiles]
