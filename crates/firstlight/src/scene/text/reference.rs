@@ -43,8 +43,7 @@ const GROUPS: &str = r#"
 
 `[[group.tree.cone]]` describes a cone that belongs to the group `tree`; every shape can be in a group, instances of
 other groups too. A group by itself is not seen: `[[instance]]` places it, as often as wanted. A group is described
-in one
-text, its name is unique, and no group may hold an instance of itself, not by way of others either.
+in one text, its name is unique, and no group may hold an instance of itself, not by way of others either.
 
 Limits: 4194304 shapes and instances, counted wherever they are placed; groups 32 deep.
 "#;
