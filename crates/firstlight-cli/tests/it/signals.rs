@@ -172,7 +172,7 @@ fn interrupted_between_frames_it_leaves_whole_ones() {
     let folder = Folder::new();
     let line = "render config11 --width 256 --aa 2 --samples 64 --threads 1 --frames 0..9999 -o f.png";
     let mut child = listening(&folder).args(line.split_whitespace()).stderr(Stdio::piped()).spawn().unwrap();
-    let stderr = BufReader::new(child.stderr.take().unwrap());
+    let mut stderr = BufReader::new(child.stderr.take().unwrap());
     let mut said = String::new();
     while !said.contains("wrote f.0001.png") {
         assert!(stderr.read_line(&mut said).unwrap() > 0, "{said}");
