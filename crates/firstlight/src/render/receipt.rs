@@ -91,7 +91,7 @@ mod tests {
             if line.starts_with('#') {
                 heading = line;
             }
-            entries += usize::from(heading == "### Pixels" && line.starts_with("- "));
+            entries += u32::from(heading == "### Pixels" && line.starts_with("- "));
         }
         assert!(entries > 0, "the changelog has no entry under Pixels");
         assert_eq!(
