@@ -12,8 +12,8 @@
 //! 2. It begins with `solid` in any case, after blanks or none, no byte of its first 1024 is zero, and `facet` or
 //!    `endsolid` is among the 1024 bytes after that line, or nothing follows: text.
 //! 3. At least 84 bytes: binary, and its count is wrong. More bytes than counted: the rest is ignored, with a note. A
-//!    count of 0 or 2^32 - 1, and whole facets: it was not known when the header was written, and the length decides, with a
-//!    note. Fewer bytes than counted: an error.
+//!    count of 0 or 2^32 - 1, and whole facets: it was not known when the header was written, and the length decides,
+//!    with a note. Fewer bytes than counted: an error.
 //!
 //! Source: 3D Systems 1988, "StereoLithography Interface Specification".
 
