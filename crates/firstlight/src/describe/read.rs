@@ -562,7 +562,7 @@ impl<T: Value> Value for Vec<T> {
     }
 
     fn write(&self) -> Written {
-        Written::List(self.iter().map(T::write).collect())
+        Written::list(self.iter().map(T::write))
     }
 }
 

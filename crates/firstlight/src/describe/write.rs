@@ -9,6 +9,11 @@ pub(crate) enum Written {
     Bool(bool),
     Text(String),
     List(Vec<Written>),
+    /// A list of lists of as many numbers each, one after another: there may be millions.
+    Rows {
+        width: usize,
+        numbers: Vec<f64>,
+    },
     /// An inline table.
     Table(Vec<(&'static str, Written)>),
 }
@@ -48,7 +53,49 @@ pub(crate) fn json_string(text: &str) -> String {
     serde_json::Value::from(text).to_string()
 }
 
+/// Numbers in brackets.
+fn row(numbers: &[f64], out: &mut String, write: impl Fn(f64) -> String) {
+    out.push('[');
+    for (i, v) in numbers.iter().enumerate() {
+        out.push_str(if i > 0 { ", " } else { "" });
+        out.push_str(&write(*v));
+    }
+    out.push(']');
+}
+
+/// Rows in brackets.
+fn rows(width: usize, numbers: &[f64], write: impl Fn(f64) -> String) -> String {
+    let mut out = String::from("[");
+    for (i, numbers) in numbers.chunks(width).enumerate() {
+        out.push_str(if i > 0 { ", " } else { "" });
+        row(numbers, &mut out, &write);
+    }
+    out + "]"
+}
+
 impl Written {
+    /// A list of any length.
+    pub(crate) fn list(elements: impl Iterator<Item = Written>) -> Self {
+        let mut elements = elements.peekable();
+        let numbers_of = |element: &Written| -> Option<Vec<f64>> {
+            let Written::List(row) = element else { return None };
+            row.iter().map(|v| if let Written::Number(v) = v { Some(*v) } else { None }).collect()
+        };
+        let Some(width) = elements.peek().and_then(numbers_of).map(|row| row.len()).filter(|width| *width > 0) else {
+            return Written::List(elements.collect());
+        };
+        let mut numbers = Vec::new();
+        while let Some(row) = elements.peek().and_then(numbers_of).filter(|row| row.len() == width) {
+            numbers.extend(row);
+            elements.next();
+        }
+        if elements.peek().is_none() {
+            return Written::Rows { width, numbers };
+        }
+        let row = |row: &[f64]| Written::List(row.iter().map(|v| Written::Number(*v)).collect());
+        Written::List(numbers.chunks(width).map(row).chain(elements).collect())
+    }
+
     /// On one line, as TOML.
     pub(crate) fn to_toml(&self) -> String {
         match self {
@@ -58,6 +105,7 @@ impl Written {
             Written::Bool(v) => v.to_string(),
             Written::Text(v) => toml_string(v),
             Written::List(v) => format!("[{}]", v.iter().map(Self::to_toml).collect::<Vec<_>>().join(", ")),
+            Written::Rows { width, numbers } => rows(*width, numbers, |v| Written::Number(v).to_toml()),
             Written::Table(v) => {
                 let pairs: Vec<String> = v.iter().map(|(k, v)| format!("{} = {}", key(k), v.to_toml())).collect();
                 if pairs.is_empty() {
@@ -77,6 +125,7 @@ impl Written {
             Written::Bool(v) => v.to_string(),
             Written::Text(v) => json_string(v),
             Written::List(v) => format!("[{}]", v.iter().map(Self::to_json).collect::<Vec<_>>().join(", ")),
+            Written::Rows { width, numbers } => rows(*width, numbers, |v| Written::Number(v).to_json()),
             Written::Table(v) => {
                 let pairs: Vec<String> =
                     v.iter().map(|(k, v)| format!("{}: {}", json_string(k), v.to_json())).collect();
@@ -107,6 +156,24 @@ mod tests {
             assert!(root.get_ref().is_float() || root.get_ref().is_integer(), "{text}");
         }
         assert_eq!(number(-6.0), "-6");
+    }
+
+    #[test]
+    fn rows_are_written_as_the_lists_they_are() {
+        let list = |numbers: &[f64]| Written::List(numbers.iter().map(|v| Written::Number(*v)).collect());
+        let even = [list(&[1.0, f64::NAN]), list(&[-0.0, 2.5])];
+        let rows = Written::list(even.iter().cloned());
+        assert!(matches!(&rows, Written::Rows { width: 2, numbers } if numbers.len() == 4));
+        assert_eq!(
+            (rows.to_toml(), rows.to_json()),
+            ("[[1, nan], [-0.0, 2.5]]".into(), "[[1, null], [-0.0, 2.5]]".into())
+        );
+        assert_eq!(rows.to_toml(), Written::List(even.to_vec()).to_toml());
+        for odd in [list(&[]), list(&[1.0]), Written::Number(1.0), Written::List(vec![Written::Bool(true); 2])] {
+            let all = [even[0].clone(), even[0].clone(), odd];
+            assert_eq!(Written::list(all.iter().cloned()).to_toml(), Written::List(all.to_vec()).to_toml());
+        }
+        assert_eq!(Written::list(std::iter::empty()), Written::List(Vec::new()));
     }
 
     #[test]

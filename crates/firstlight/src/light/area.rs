@@ -349,7 +349,7 @@ impl Area {
 
     /// The way from `p` to the point that stands for `uv` of the unit square, one over its length, and
     /// [`weight`](Self::weight) there. Equal areas of the square are equal areas of the light.
-    #[cfg(feature = "bench")]
+    #[cfg(any(test, feature = "bench"))]
     pub(crate) fn at(&self, uv: [f64; 2], p: Vec3) -> (Vec3, f32, f32) {
         let (q, n) = self.shape.point(uv);
         let l = q.as_vec3() - p;
