@@ -111,9 +111,14 @@ impl Tiled<'_> {
         let n = scene.antialiasing as f32;
         let part = (1.0 - 1.0 / (n * n)) / 24.0;
         let [x, y] = differences;
+        let (diffuse, specular) = ((x.diffuse + y.diffuse) * part, (x.specular + y.specular) * part);
+        // More than it bends here: something ends between this pixel and the next, the edge of a hard shadow for one
+        if self.shown(light, &patch.bsdf, value, &Sums { diffuse: diffuse.abs(), specular: specular.abs() }) > shown {
+            return Some(here.sums);
+        }
         Some(Sums {
-            diffuse: (here.sums.diffuse + (x.diffuse + y.diffuse) * part).max(0.0),
-            specular: (here.sums.specular + (x.specular + y.specular) * part).max(0.0),
+            diffuse: (here.sums.diffuse + diffuse).max(0.0),
+            specular: (here.sums.specular + specular).max(0.0),
         })
     }
 
