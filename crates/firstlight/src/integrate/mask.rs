@@ -11,6 +11,7 @@ use super::Sums;
 use super::between::Between;
 use super::cells::{self, Sent, Source};
 use super::emitter::Emitter;
+use super::near::Near;
 use super::view::{Outline, View};
 use crate::accel::RayPacket16;
 use crate::ids::LightId;
@@ -192,7 +193,7 @@ impl Masked<'_> {
             }
             _ => None,
         };
-        Seen { masked: self, view, ball }
+        Seen { masked: self, view, ball, near: Near::new(view) }
     }
 
     /// Which of sixteen ways something stands in.
@@ -232,27 +233,35 @@ struct Seen<'a> {
     view: &'a View,
     /// Of a ball: the way to its middle, and the square of the way to where it is touched.
     ball: Option<(Vec3, f32)>,
+    /// How points are spread over a light that is very near.
+    near: Option<Near>,
 }
 
 impl Seen<'_> {
     /// Goes on with the points of the series, up to so many.
     fn ask(&self, tally: &mut Tally, to: usize) {
         let table = match self.view.outline {
-            Outline::Parallelogram => &points().square,
-            Outline::Disk => &points().disk,
+            Outline::Disk if self.near.is_none() => &points().disk,
+            _ => &points().square,
         };
         let table = &table[self.masked.series * MOST..][..MOST];
         for block in table[tally.count..to].chunks_exact(LANES) {
             let mut ways = [Vec3::ZERO; LANES];
             let mut sent = [[0.0f32; 2]; LANES];
             let mut active = 0u16;
+            let mut places = [[0.0; 2]; LANES];
             for (lane, place) in block.iter().enumerate() {
-                if let Some(point) = self.point(*place) {
+                let (at, part) = match &self.near {
+                    Some(near) => near.place(place.map(|w| 0.5 * w + 0.5)),
+                    None => (self.counted(*place), 1.0),
+                };
+                places[lane] = at;
+                if let Some(point) = self.point(at, part) {
                     (ways[lane], sent[lane]) = (point.way, point.sums);
                     active |= 1 << lane;
                 }
             }
-            let hidden = self.masked.hidden(block, &ways, active);
+            let hidden = self.masked.hidden(&places, &ways, active);
             tally.hidden += hidden.count_ones() as usize;
             for (lane, [diffuse, specular]) in sent.iter().enumerate() {
                 tally.all[0] += f64::from(*diffuse);
@@ -268,8 +277,8 @@ impl Seen<'_> {
         tally.count = to;
     }
 
-    /// What the point of the square [-1, 1]^2 would send.
-    fn point(&self, [x, y]: [f32; 2]) -> Option<Sent> {
+    /// What a place of the light would send, if it stands for so much of it.
+    fn point(&self, [x, y]: [f32; 2], part: f32) -> Option<Sent> {
         let view = self.view;
         let (height, cos) = (view.horizon.at(x, y), view.cos.at(x, y));
         if !(height > 0.0 && cos > 0.0) {
@@ -277,7 +286,7 @@ impl Seen<'_> {
         }
         let l = view.l(x, y);
         let inverse = 1.0 / l.length();
-        let weight = if view.physical { view.height * inverse * (inverse * inverse) } else { 1.0 };
+        let weight = part * if view.physical { view.height * inverse * (inverse * inverse) } else { 1.0 };
         let cos_i = cos * inverse;
         let lobe = self.masked.lobe.eval(cos_i, view.cos_o, view.wo.dot(l) * inverse);
         let way = match self.ball {
@@ -291,13 +300,22 @@ impl Seen<'_> {
         Some(Sent { way, sums: [weight * cos_i, weight * lobe] })
     }
 
-    /// From the unit square.
-    fn place(&self, at: [f32; 2]) -> [f32; 2] {
+    /// From the unit square, and for how much of the light a place stands.
+    fn place(&self, at: [f32; 2]) -> ([f32; 2], f32) {
+        if let Some(near) = &self.near {
+            return near.place(at);
+        }
         let square = at.map(|w| 2.0 * w - 1.0);
-        match self.view.outline {
+        let place = match self.view.outline {
             Outline::Parallelogram => square,
             Outline::Disk => crate::light::concentric(square.map(f64::from)).map(|w| w as f32),
-        }
+        };
+        (self.counted(place), 1.0)
+    }
+
+    /// A place that is counted from the middle, as the view counts them.
+    fn counted(&self, [x, y]: [f32; 2]) -> [f32; 2] {
+        [x - self.view.origin[0], y - self.view.origin[1]]
     }
 }
 
@@ -307,10 +325,11 @@ impl Source for Seen<'_> {
     }
 
     fn sent(&self, at: [f32; 2]) -> Option<Sent> {
-        self.point(self.place(at))
+        let (place, part) = self.place(at);
+        self.point(place, part)
     }
 
     fn hidden(&self, places: &[[f32; 2]; LANES], ways: &[Vec3; LANES], active: u16) -> u16 {
-        self.masked.hidden(&places.map(|at| self.place(at)), ways, active)
+        self.masked.hidden(&places.map(|at| self.place(at).0), ways, active)
     }
 }

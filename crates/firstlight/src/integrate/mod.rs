@@ -16,6 +16,7 @@ mod emitter;
 mod hider;
 mod lobe;
 mod mask;
+mod near;
 mod points;
 mod rows;
 mod rules;
@@ -80,7 +81,7 @@ pub(crate) fn integrate<S: Simd>(
     hiders: &[Hider],
     enough: &dyn Fn(&Sums, &Sums) -> bool,
 ) -> (Sums, Sums) {
-    let whole = Region::WHOLE;
+    let whole = Region::whole(view);
     let is_clear = hiders.is_empty() && view.is_above_horizon();
     let both = Wanted { diffuse: true, specular: !matches!(view.lobe, Lobe::None) };
     let diffuse_only = Wanted { diffuse: true, specular: false };

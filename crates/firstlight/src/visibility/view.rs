@@ -175,7 +175,7 @@ impl View {
             rest = &rest[count..];
             if let Some(mesh) = ShadowMesh::of(&scene.geometry, source, target.light) {
                 let eye = eye(&mesh, light, point);
-                if look_at(simd, &mesh, &eye, &leaves, source, &mut self.triangles) {
+                if look_at(simd, &mesh, &eye, &leaves, source, point.but.of(source), &mut self.triangles) {
                     hidden = true;
                     break;
                 }
@@ -186,7 +186,7 @@ impl View {
     }
 }
 
-/// Looks at leaves of one mesh. Not inlined: one copy for each instruction set is enough.
+/// Looks at leaves of one mesh, `but` for one of its triangles. Not inlined: one copy for each instruction set is enough.
 #[inline(never)]
 fn look_at<S: Simd>(
     simd: S,
@@ -194,13 +194,15 @@ fn look_at<S: Simd>(
     eye: &Eye,
     leaves: &[u32],
     source: Source,
+    but: u32,
     seen: &mut Vec<SeenTriangle>,
 ) -> bool {
     simd.vectorize(
         #[inline(always)]
         || {
             for four in leaves.chunks(TOGETHER) {
-                if mesh.mesh.tree.look(simd, eye, four, source, &|triangle| mesh.casts(triangle), seen) {
+                let casts = |triangle| triangle != but && mesh.casts(triangle);
+                if mesh.mesh.tree.look(simd, eye, four, source, &casts, seen) {
                     return true;
                 }
             }
