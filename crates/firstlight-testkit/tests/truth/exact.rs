@@ -88,6 +88,11 @@ fn what_broke_a_bound_once_is_within_it() {
 }
 
 #[test]
+fn smooth_meshes_are_within_the_bounds() {
+    hold(exact_scenes::SMOOTH..exact_scenes::SMOOTH + 12, 16);
+}
+
+#[test]
 #[ignore = "takes long: cargo xtask verify runs it"]
 fn built_in_scenes_are_within_half_the_bounds() {
     let half = Bounds { worst: 0.5 * BOUNDS.worst, over: 0.5 * BOUNDS.over, rms: 0.5 * BOUNDS.rms };
