@@ -88,6 +88,7 @@ fn what_broke_a_bound_once_is_within_it() {
 }
 
 #[test]
+#[ignore = "its converged pictures are still to be made: cargo xtask verify exact --seeds 1000..1012 --size 16 --converge"]
 fn smooth_meshes_are_within_the_bounds() {
     hold(exact_scenes::SMOOTH..exact_scenes::SMOOTH + 12, 16);
 }
