@@ -21,7 +21,7 @@ fn case(name: &str) -> SceneDesc {
     let text = std::fs::read(&path).unwrap_or_else(|fault| panic!("{}: {fault}", path.display()));
     let assets = assets(name);
     let parsed = SceneDesc::parse(name, &text, &assets);
-    assert!(parsed.faults.is_empty(), "{name}: {:?}", parsed.faults);
+    assert!(parsed.faults().is_empty(), "{name}: {:?}", parsed.faults());
     parsed.desc
 }
 

@@ -136,7 +136,7 @@ fn balls_that_nearly_touch_shine_as_far_ones_do() {
         for gap in [1e-6, 1e-4, 1e-2, 0.5] {
             for aside in [0.0, 1e-3, 0.1, 1.0] {
                 let (up, aside) = (radius * (1.0 + gap), radius * aside);
-                let d = aside.hypot(up);
+                let d: f64 = f64::hypot(aside, up);
                 let light = SphereLightDesc { visible: false, ..SphereLightDesc::new([0.3 + aside, up, 0.2], radius) };
                 let is = shine(LightDesc::Sphere(light), &[], [0.3, 0.2]);
                 let should = (radius / d) * (radius / d) * (up / d);

@@ -9,7 +9,7 @@ use crate::math::{Vec3, square};
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Arrival {
     pub sums: Sums,
-    /// Whether that was not asked, since it would not do for the patch.
+    /// Whether that was not asked, since rays of the patch are.
     pub skipped: bool,
     /// How far the mean over the patch can be from what arrives at its middle.
     pub bend: Sums,
@@ -54,6 +54,17 @@ impl Change {
 }
 
 impl Arrival {
+    /// Of a patch whose rays are asked, not its middle.
+    pub const PARTED: Arrival = Arrival {
+        sums: Sums { diffuse: 0.0, specular: 0.0 },
+        skipped: true,
+        bend: Sums { diffuse: f32::MAX, specular: f32::MAX },
+        drift: f32::INFINITY,
+        resolved: false,
+        smooth: false,
+        sharp: true,
+    };
+
     /// At a point, or where nothing bends.
     pub fn even(sums: Sums) -> Arrival {
         Change::NONE.with(sums)

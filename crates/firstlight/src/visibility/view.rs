@@ -46,6 +46,22 @@ pub(crate) struct View {
 const DOT: f32 = 16.0 * UNIT_ROUNDOFF;
 
 impl View {
+    /// Nothing is in the way.
+    pub fn clear(&mut self) {
+        self.spheres.clear();
+        self.flats.clear();
+        self.disks.clear();
+        self.triangles.clear();
+        self.others.clear();
+        self.hidden.clear();
+        self.trees = false;
+    }
+
+    /// Whether something in trees may be in the way.
+    pub fn has_trees(&self) -> bool {
+        self.trees || !self.triangles.is_empty() || !self.others.is_empty()
+    }
+
     /// What of a light is seen from `point`, past `occluders`, which were gathered for it. What is left to ask for the samples is
     /// in this view then.
     pub fn classify(
@@ -56,13 +72,7 @@ impl View {
         occluders: &Occluders,
         point: &Viewpoint,
     ) -> Visibility {
-        self.spheres.clear();
-        self.flats.clear();
-        self.disks.clear();
-        self.triangles.clear();
-        self.others.clear();
-        self.hidden.clear();
-        self.trees = false;
+        self.clear();
         let light = target.hull.from(point.p);
         if is_below(&light, point.horizon) || point.ns != point.horizon && is_below(&light, point.ns) {
             return Visibility::BelowHorizon;
