@@ -27,7 +27,7 @@ fn shine(light: LightDesc, things: &[ShapeDesc], [x, z]: [f64; 2]) -> f64 {
 
 fn plate(center: V, e0: V, e1: V, falloff: Falloff) -> LightDesc {
     let sides = Some(EmitSides::Both);
-    LightDesc::Rectangle(RectangleDesc { sides, falloff, visible: false, ..RectangleDesc::new(center, e0, e1) })
+    LightDesc::Rectangle(RectangleDesc { sides, falloff, visible: false, ..RectangleDesc::with_edges(center, e0, e1) })
 }
 
 fn overhead(h: f64, falloff: Falloff) -> LightDesc {
@@ -95,7 +95,7 @@ fn what_cuts_the_floor_sheds_half_a_cosine_on_either_side() {
                 let disk = DiskLightDesc {
                     sides: Some(EmitSides::Both),
                     visible: false,
-                    ..DiskLightDesc::new([0.0; 3], normal, 1.0)
+                    ..DiskLightDesc::with_normal([0.0; 3], normal, 1.0)
                 };
                 let rectangle = plate([0.0; 3], [2.0 * cos, 2.0 * sin, 0.0], [0.0, 0.0, 2.0], Falloff::Physical);
                 for (light, name) in [(LightDesc::Disk(disk), "disk"), (rectangle, "rectangle")] {
