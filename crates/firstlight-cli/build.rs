@@ -1,5 +1,5 @@
-//! Finds the commit that the program is built from, for `firstlight --version`. Without git, or outside of a clone, there is
-//! none, and the version stands alone.
+//! Finds the commit that the program is built from, for `firstlight --version`. Without git, or outside of a clone,
+//! there is none, and the version stands alone.
 
 use std::path::Path;
 use std::process::Command;

@@ -1,5 +1,5 @@
-//! Makes a test of every folder under `scenes/golden` and of every scene of the gallery, so that each has a line of its own in
-//! what the runner says and can be run by itself.
+//! Makes a test of every folder under `scenes/golden` and of every scene of the gallery, so that each has a line of its
+//! own in what the runner says and can be run by itself.
 
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};

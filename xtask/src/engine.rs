@@ -1,4 +1,5 @@
-//! `cargo xtask engine`: what each part of the light engine gains, on config 11 and on a mesh of a million triangles, in turns.
+//! `cargo xtask engine`: what each part of the light engine gains, on config 11 and on a mesh of a million triangles,
+//! in turns.
 
 use std::fmt::Write as _;
 use std::num::NonZeroUsize;
@@ -139,7 +140,8 @@ pub fn run(options: &Options) -> Outcome {
     Ok(())
 }
 
-/// Runs all ways in turns, then compares their pictures with one of many samples. Says whether the first two, which have the same samples, made the same bits.
+/// Runs all ways in turns, then compares their pictures with one of many samples. Says whether the first two, which
+/// have the same samples, made the same bits.
 fn measure(
     ways: &mut [Way],
     rounds: usize,

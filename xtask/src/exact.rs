@@ -30,14 +30,15 @@ pub struct Options {
     /// The converged picture takes up to 2^CAP points on each light, in each of four sets.
     #[arg(long, default_value_t = 20, value_parser = clap::value_parser!(u32).range(8..=20))]
     cap: u32,
-    /// Where converged pictures are kept, and taken from while the scene is the same and they had as many points. They depend
-    /// on nothing that integrates; after a change of what sampled light looks like, empty it.
+    /// Where converged pictures are kept, and taken from while the scene is the same and they had as many points. They
+    /// depend on nothing that integrates; after a change of what sampled light looks like, empty it.
     #[arg(long, value_name = "DIR", default_value = "target/converged")]
     kept: PathBuf,
     /// Only makes the converged pictures that are not kept yet.
     #[arg(long)]
     converge: bool,
-    /// Writes docs/verification/exact.csv, one row a scene, and the tables of the book's page. Rows of other scenes stay.
+    /// Writes docs/verification/exact.csv, one row a scene, and the tables of the book's page. Rows of other scenes
+    /// stay.
     #[arg(long)]
     write: bool,
     /// Only writes the scenes, as text, into this folder.

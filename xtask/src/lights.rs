@@ -1,5 +1,5 @@
-//! `cargo xtask lights`: a hall full of small lights, its time, and how far its picture is from one in which every light is
-//! asked for.
+//! `cargo xtask lights`: a hall full of small lights, its time, and how far its picture is from one in which every
+//! light is asked for.
 
 use std::num::NonZeroUsize;
 use std::path::PathBuf;

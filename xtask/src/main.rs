@@ -44,14 +44,15 @@ enum Task {
     },
     /// Measures config 11 and writes a page under docs/benchmarks.
     Bench(bench::Options),
-    /// Measures what each part of the light engine gains, on config 11 and on a mesh, and writes a page under docs/benchmarks.
+    /// Measures what each part of the light engine gains, on config 11 and on a mesh, and writes a page under
+    /// docs/benchmarks.
     Engine(engine::Options),
     /// Measures a hall full of small lights, or writes it as a scene.
     Lights(lights::Options),
     /// Measures rays through meshes, against Embree where it is installed, and writes a page under docs/benchmarks.
     Rays(rays::Options),
-    /// Measures whole processes from a mesh file to a picture, against F3D and Mitsuba where a Python has them, and writes a
-    /// page under docs/benchmarks.
+    /// Measures whole processes from a mesh file to a picture, against F3D and Mitsuba where a Python has them, and
+    /// writes a page under docs/benchmarks.
     Models(models::Options),
     /// Measures config 11 against Mitsuba and POV-Ray, where they are named, and writes a page under docs/benchmarks.
     Peers(peers::Options),

@@ -16,8 +16,8 @@ use crate::{Outcome, root, write};
 /// What to measure, and where to write it.
 #[derive(clap::Args)]
 pub struct Options {
-    /// A Python that has f3d and mitsuba (`pip install f3d mitsuba`; F3D also wants libEGL); without one only firstlight is
-    /// timed.
+    /// A Python that has f3d and mitsuba (`pip install f3d mitsuba`; F3D also wants libEGL); without one only
+    /// firstlight is timed.
     #[arg(long)]
     python: Option<PathBuf>,
     /// Rounds: each runs every program once, one after the other.

@@ -1,7 +1,8 @@
-//! `cargo xtask peers`: config 11 as whole processes, ours and those of Mitsuba and POV-Ray in turns, each with its error.
+//! `cargo xtask peers`: config 11 as whole processes, ours and those of Mitsuba and POV-Ray in turns, each with its
+//! error.
 //!
-//! The scene of the others lies in `xtask/peers/config11*`. They shade otherwise, so each picture is held against a converged
-//! one of the same program.
+//! The scene of the others lies in `xtask/peers/config11*`. They shade otherwise, so each picture is held against a
+//! converged one of the same program.
 
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};

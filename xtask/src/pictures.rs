@@ -66,7 +66,8 @@ const INSIDE: u32 = 512;
 /// Pixels across and down that have a shaft together.
 const BLOCK: u32 = 4;
 
-/// How much of the light is seen at the middle of each pixel of config 11, and how that was found out: `visibility.png`.
+/// How much of the light is seen at the middle of each pixel of config 11, and how that was found out:
+/// `visibility.png`.
 fn visibility() -> Outcome {
     let scene = config11(INSIDE, 1, 400.into())?;
     let kinds = [

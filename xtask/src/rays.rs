@@ -1,7 +1,7 @@
 //! `cargo xtask rays`: rays through meshes, ours and Embree's in turns, on one thread.
 //!
-//! Embree is driven by `xtask/embree/embree.cc`, which is compiled if a C++ compiler and libembree-dev (3) are there. Scenes
-//! and rays go through files in a temporary folder, orders and times through its standard input and output.
+//! Embree is driven by `xtask/embree/embree.cc`, which is compiled if a C++ compiler and libembree-dev (3) are there.
+//! Scenes and rays go through files in a temporary folder, orders and times through its standard input and output.
 
 use std::fmt::Write as _;
 use std::io::{BufRead, BufReader, Write as _};

@@ -5,8 +5,9 @@ use crate::{Outcome, cargo, run as run_to_end};
 /// The rays that each mesh is asked, by its tree and triangle by triangle.
 const RAYS: &str = "1000000";
 
-/// The tests that `cargo test` leaves out render until nothing changes any more; those that grow with `FIRSTLIGHT_SCENES` compare the renderers on that many random scenes; those that grow with
-/// `FIRSTLIGHT_RAYS` compare the trees of meshes with asking every triangle.
+/// The tests that `cargo test` leaves out render until nothing changes any more; those that grow with
+/// `FIRSTLIGHT_SCENES` compare the renderers on that many random scenes; those that grow with `FIRSTLIGHT_RAYS` compare
+/// the trees of meshes with asking every triangle.
 pub fn run(scenes: u32) -> Outcome {
     let mut command = cargo();
     command.env("FIRSTLIGHT_SCENES", scenes.to_string());

@@ -80,8 +80,9 @@ Examples:
 /// Where a scene comes from.
 #[derive(Args, Debug)]
 pub struct SceneArgs {
-    /// A scene file (.toml, .json, or a course file .txt), a model (.ply, .stl, .obj), the name of a built-in scene such as config23 (see `firstlight
-    /// scenes`; a file of such a name is ./config23), or - for standard input, a scene or a model
+    /// A scene file (.toml, .json, or a course file .txt), a model (.ply, .stl, .obj), the name of a built-in scene
+    /// such as config23 (see `firstlight scenes`; a file of such a name is ./config23), or - for standard input, a
+    /// scene or a model
     #[arg(value_name = "SCENE", value_hint = ValueHint::FilePath)]
     pub scene: PathBuf,
     #[command(flatten)]
@@ -98,8 +99,8 @@ pub struct ReadingArgs {
     /// none]
     #[arg(long = "allow-dir", value_name = "DIR", value_hint = ValueHint::DirPath)]
     pub allow_dir: Vec<PathBuf>,
-    /// Makes the normals of a model smooth where its faces meet at less than DEGREES, 0 to 180 [default: its own normals; flat
-    /// if it has none]
+    /// Makes the normals of a model smooth where its faces meet at less than DEGREES, 0 to 180 [default: its own
+    /// normals; flat if it has none]
     #[arg(long, value_name = "DEGREES", value_parser = angle, help_heading = "Models (.ply, .stl, .obj)")]
     pub smooth: Option<f64>,
     /// The axis of a model that points upwards [default: y]
@@ -145,18 +146,18 @@ fn angle(text: &str) -> Result<f64, String> {
 /// `firstlight render`
 #[derive(Args, Debug)]
 pub struct RenderArgs {
-    /// A scene file (.toml, .json, or a course file .txt), a model (.ply, .stl, .obj), the name of a built-in scene such as config23 (see `firstlight
-    /// scenes`; a file of such a name is ./config23), or - for standard input, a scene or a model. Several are rendered one after the other, also after one
-    /// that failed
+    /// A scene file (.toml, .json, or a course file .txt), a model (.ply, .stl, .obj), the name of a built-in scene
+    /// such as config23 (see `firstlight scenes`; a file of such a name is ./config23), or - for standard input, a
+    /// scene or a model. Several are rendered one after the other, also after one that failed
     #[arg(value_name = "SCENE", value_hint = ValueHint::FilePath, default_value = "config11")]
     pub scenes: Vec<PathBuf>,
     #[command(flatten)]
     pub reading: ReadingArgs,
 
-    /// A picture to write: its ending, .png, .exr or .hdr, says the format; - is standard output. {stem} in it is the scene's file name
-    /// without its ending, {name} the whole of it; with several scenes one of them is needed, in --heat and --stats too. May be given
-    /// several times [default: the scene's name with .png, or with .render.png where that is a file not written by firstlight; a
-    /// course file's output_file; in the working folder]
+    /// A picture to write: its ending, .png, .exr or .hdr, says the format; - is standard output. {stem} in it is the
+    /// scene's file name without its ending, {name} the whole of it; with several scenes one of them is needed, in
+    /// --heat and --stats too. May be given several times [default: the scene's name with .png, or with .render.png
+    /// where that is a file not written by firstlight; a course file's output_file; in the working folder]
     #[arg(short, long = "output", value_name = "FILE", value_hint = ValueHint::FilePath, help_heading = "Output")]
     pub output: Vec<PathBuf>,
     /// Bits of each channel of PNG files: 8 or 16 [default: 8]
@@ -165,36 +166,40 @@ pub struct RenderArgs {
     /// The format of -o - and of names without an ending, such as /dev/null [default: png for -]
     #[arg(long, value_name = "FORMAT", help_heading = "Output")]
     pub format: Option<NamedFormat>,
-    /// Stops of exposure of 8- and 16-bit pictures, -64 to 64: they are multiplied by 2^EV; other files are the same with it
-    /// [default: the scene's]
+    /// Stops of exposure of 8- and 16-bit pictures, -64 to 64: they are multiplied by 2^EV; other files are the same
+    /// with it [default: the scene's]
     #[arg(long, value_name = "EV", allow_negative_numbers = true, value_parser = exposure, help_heading = "Output")]
     pub exposure: Option<f64>,
 
-    /// Pixels across, 1 to 65536; without --height, the height follows in the scene's aspect ratio [default: the scene's]
+    /// Pixels across, 1 to 65536; without --height, the height follows in the scene's aspect ratio [default: the
+    /// scene's]
     #[arg(long, value_name = "PIXELS", value_parser = whole::<u32>(1, 65536), help_heading = "Picture")]
     pub width: Option<u32>,
     /// Pixels down, 1 to 65536; without --width, the width follows in the scene's aspect ratio [default: the scene's]
     #[arg(long, value_name = "PIXELS", value_parser = whole::<u32>(1, 65536), help_heading = "Picture")]
     pub height: Option<u32>,
-    /// Pixels along the longer side, in the scene's aspect ratio (a model by itself is square), or WIDTHxHEIGHT; 1 to 65536 each
-    /// [default: the scene's]
+    /// Pixels along the longer side, in the scene's aspect ratio (a model by itself is square), or WIDTHxHEIGHT; 1 to
+    /// 65536 each [default: the scene's]
     #[arg(long, value_name = "PIXELS", value_parser = size, conflicts_with_all = ["width", "height"], help_heading = "Picture")]
     pub size: Option<Size>,
     /// Leaves what no surface covers transparent [default: as the scene has it]
     #[arg(long, conflicts_with = "background", help_heading = "Picture")]
     pub transparent: bool,
-    /// The colour of what no surface covers: '#rrggbb' (sRGB), or R,G,B (linear, 0 to 1e6, as in scene text) [default: the scene's]
+    /// The colour of what no surface covers: '#rrggbb' (sRGB), or R,G,B (linear, 0 to 1e6, as in scene text) [default:
+    /// the scene's]
     #[arg(long, value_name = "COLOR", value_parser = color, allow_hyphen_values = true, help_heading = "Picture")]
     pub background: Option<ColorDesc>,
-    /// Where the camera of a model, or of a scene without a camera, looks from: front, back, left, right, top, bottom, iso, or
-    /// AZIMUTH,ELEVATION in degrees; 0,0 is in front, on the side of +z, 90,0 on the right, on that of +x [default: 25,18]
+    /// Where the camera of a model, or of a scene without a camera, looks from: front, back, left, right, top, bottom,
+    /// iso, or AZIMUTH,ELEVATION in degrees; 0,0 is in front, on the side of +z, 90,0 on the right, on that of +x
+    /// [default: 25,18]
     #[arg(long, value_name = "VIEW", value_parser = view, allow_hyphen_values = true, help_heading = "Picture")]
     pub view: Option<View>,
-    /// What such a camera leaves free at least on each side of the picture, as a part of its shorter side, 0 to 0.45 [default: 0.04]
+    /// What such a camera leaves free at least on each side of the picture, as a part of its shorter side, 0 to 0.45
+    /// [default: 0.04]
     #[arg(long, value_name = "PART", value_parser = margin, help_heading = "Picture")]
     pub margin: Option<f64>,
-    /// Renders only this part of the picture, in pixels from its top left corner: the same pixels as in the whole. At most 134217728 at once;
-    /// larger pictures are made in parts [default: all of it]
+    /// Renders only this part of the picture, in pixels from its top left corner: the same pixels as in the whole. At
+    /// most 134217728 at once; larger pictures are made in parts [default: all of it]
     #[arg(long, value_name = "X,Y,WIDTH,HEIGHT", value_parser = crop, allow_hyphen_values = true, help_heading = "Picture")]
     pub crop: Option<Window>,
     /// The camera to render from, where the scene names several [default: the scene's]
@@ -204,34 +209,34 @@ pub struct RenderArgs {
     /// The moment to render, in seconds, where the scene has keys [default: 0]
     #[arg(long, value_name = "SECONDS", value_parser = time, allow_negative_numbers = true, help_heading = "Time")]
     pub time: Option<f64>,
-    /// Renders every frame from A to B, both included; frame n is the moment n / fps, with the scene's fps. Each is a file
-    /// of its own: name.png becomes name.0001.png, and the last row of # in a name says where the number stands and with
-    /// how many digits at least [default: one picture, of the moment that --time says]
+    /// Renders every frame from A to B, both included; frame n is the moment n / fps, with the scene's fps. Each is a
+    /// file of its own: name.png becomes name.0001.png, and the last row of # in a name says where the number stands
+    /// and with how many digits at least [default: one picture, of the moment that --time says]
     #[arg(long, value_name = "A..B", value_parser = frames, conflicts_with = "time", help_heading = "Time")]
     pub frames: Option<Frames>,
 
     /// Antialiasing by N x N camera rays in each pixel, 1 to 64; 4 is "4X" [default: the scene's]
     #[arg(long, value_name = "N", value_parser = whole::<u32>(1, 64), help_heading = "Quality")]
     pub aa: Option<u32>,
-    /// What is done with every area light: exact, it is integrated, or the number of points that it is sampled at, 1 to 1048576
-    /// [default: the scene's, which is exact unless it says otherwise]
+    /// What is done with every area light: exact, it is integrated, or the number of points that it is sampled at, 1 to
+    /// 1048576 [default: the scene's, which is exact unless it says otherwise]
     #[arg(long, value_name = "N|exact", value_parser = samples, help_heading = "Quality")]
     pub samples: Option<SamplesDesc>,
-    /// How edges are smoothed: full lights every camera ray, adaptive lights each surface in a pixel once where that is enough
-    /// [default: adaptive]
+    /// How edges are smoothed: full lights every camera ray, adaptive lights each surface in a pixel once where that is
+    /// enough [default: adaptive]
     #[arg(long, value_name = "MODE", help_heading = "Quality")]
     pub aa_mode: Option<AntialiasingMode>,
     /// What is made of the border of light and dark on meshes with smooth normals [default: the scene's]
     #[arg(long, value_name = "WORD", help_heading = "Quality")]
     pub shadow_terminator: Option<Terminator>,
-    /// Renders by the plainest code there is, slowly: every camera ray, every point of every light. The bytes are those of
-    /// --aa-mode full where lights are sampled; lights that are integrated are sampled at 400 points,
+    /// Renders by the plainest code there is, slowly: every camera ray, every point of every light. The bytes are those
+    /// of --aa-mode full where lights are sampled; lights that are integrated are sampled at 400 points,
     /// or at as many as --samples says
     #[arg(long, help_heading = "Quality")]
     pub reference: bool,
 
-    /// How shadows of sampled lights are found: by shafts, which leave out all that is proved not to matter, or by tracing every
-    /// sample at every camera ray, which gives the bytes of --reference, faster [default: shafts]
+    /// How shadows of sampled lights are found: by shafts, which leave out all that is proved not to matter, or by
+    /// tracing every sample at every camera ray, which gives the bytes of --reference, faster [default: shafts]
     #[arg(long, value_name = "HOW", value_parser = visibility(), help_heading = "Work")]
     pub visibility: Option<VisibilityMode>,
     /// Threads to render with, 1 to 1024; the picture is the same for any number [default: one for each processor, or a
@@ -245,17 +250,18 @@ pub struct RenderArgs {
     #[arg(long, value_name = "LEVEL", value_parser = SimdParser, help_heading = "Work")]
     pub simd: Option<SimdLevel>,
 
-    /// Says at the end what each stage took, in seconds, rays and bytes: a table on standard error, or JSON in a file (- is
-    /// standard output)
+    /// Says at the end what each stage took, in seconds, rays and bytes: a table on standard error, or JSON in a file
+    /// (- is standard output)
     #[arg(long, value_name = "FILE.json", require_equals = true, value_hint = ValueHint::FilePath)]
     #[arg(help_heading = "Messages")]
     pub stats: Option<Option<PathBuf>>,
-    /// Writes a second picture that shows where the work went: from black over violet, red and orange to pale yellow, each
-    /// doubling of what a pixel took a step of the same length [default: none]
+    /// Writes a second picture that shows where the work went: from black over violet, red and orange to pale yellow,
+    /// each doubling of what a pixel took a step of the same length [default: none]
     #[arg(long, value_name = "FILE.png", value_hint = ValueHint::FilePath, help_heading = "Messages")]
     pub heat: Option<PathBuf>,
-    /// Renders nothing, and writes the scene as TOML: with what the options say in place of it, with the camera and the light that were
-    /// found for it, all in one text. To FILE, or to standard output; the files it names are seen from there [default: renders]
+    /// Renders nothing, and writes the scene as TOML: with what the options say in place of it, with the camera and the
+    /// light that were found for it, all in one text. To FILE, or to standard output; the files it names are seen from
+    /// there [default: renders]
     #[arg(long, value_name = "FILE.toml", require_equals = true, value_hint = ValueHint::FilePath, help_heading = "Output")]
     #[arg(conflicts_with_all = ["output", "bits", "format", "exposure", "crop", "time", "frames", "aa_mode", "reference", "visibility"])]
     #[arg(conflicts_with_all = ["threads", "tile_size", "simd", "stats", "heat"])]

@@ -1,5 +1,5 @@
-//! What somebody may have meant who wrote a command or an option that does not exist: the words of other programs, and what
-//! they are here.
+//! What somebody may have meant who wrote a command or an option that does not exist: the words of other programs, and
+//! what they are here.
 
 use std::ffi::OsStr;
 use std::path::Path;
@@ -148,7 +148,8 @@ fn of_option(option: &str) -> Option<String> {
     found.map(|(_, meant)| (*meant).to_owned())
 }
 
-/// What a word in the place of a command may have meant: a scene whose command was forgotten, or another program's word.
+/// What a word in the place of a command may have meant: a scene whose command was forgotten, or another program's
+/// word.
 fn of_command(word: &str) -> Option<String> {
     let path = Path::new(word);
     let ending = path.extension().and_then(OsStr::to_str).map(str::to_ascii_lowercase);

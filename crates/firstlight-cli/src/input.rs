@@ -303,8 +303,8 @@ impl Input {
         self.assets.again = true;
     }
 
-    /// Compiles the description as it is now, at `time` in seconds. Files are read the first time only: a scene has the same
-    /// textures in all its frames. What takes its time is told, unless `quiet`.
+    /// Compiles the description as it is now, at `time` in seconds. Files are read the first time only: a scene has the
+    /// same textures in all its frames. What takes its time is told, unless `quiet`.
     ///
     /// # Errors
     /// Every fault of text and meaning.

@@ -2,8 +2,8 @@
 //!
 //! A render is stopped between tiles. Where there is nothing to tidy up, as while a scene is read, the program ends at
 //! once, as it does on the second request. Before the first file appears under its name a request still stops all of
-//! them; after that it comes too late, and the program ends as if there had been none. Devices and pipes come before files,
-//! and a request ends the wait for their readers.
+//! them; after that it comes too late, and the program ends as if there had been none. Devices and pipes come before
+//! files, and a request ends the wait for their readers.
 
 use std::ops::ControlFlow;
 #[cfg(unix)]
@@ -44,8 +44,8 @@ impl Drop for Watch {
     }
 }
 
-/// Takes SIGINT, SIGTERM and SIGHUP (Ctrl-C and closing on Windows), and lets a limit on the size of files be an error of
-/// writing like any other. What is ignored from outside, as `nohup` and background jobs have it, stays ignored.
+/// Takes SIGINT, SIGTERM and SIGHUP (Ctrl-C and closing on Windows), and lets a limit on the size of files be an error
+/// of writing like any other. What is ignored from outside, as `nohup` and background jobs have it, stays ignored.
 pub fn install() {
     // Refuses where one of the three is ignored, or taken already
     if ctrlc::try_set_handler(on_request).is_err() {
@@ -80,8 +80,8 @@ fn take_those_not_ignored() {
     });
 }
 
-/// The signals that are ignored from outside. Where the system does not tell, those that shells ignore for their background
-/// jobs and `nohup`.
+/// The signals that are ignored from outside. Where the system does not tell, those that shells ignore for their
+/// background jobs and `nohup`.
 #[cfg(unix)]
 fn ignored_signals() -> Vec<i32> {
     let told = || {

@@ -124,7 +124,8 @@ impl Ready {
 }
 
 impl Staged<'_> {
-    /// Whether this is standard output, a device or a pipe: its reader may be gone, and nothing of it can be taken back.
+    /// Whether this is standard output, a device or a pipe: its reader may be gone, and nothing of it can be taken
+    /// back.
     pub fn is_direct(&self) -> bool {
         match self {
             Staged::Stdout(_) => true,
@@ -159,8 +160,8 @@ impl Staged<'_> {
     }
 }
 
-/// Lets all of them appear, or none as far as that can be: first what is written to directly, for a device may be full and
-/// the reader of a pipe gone, then the files, which are on the disk and only want their names.
+/// Lets all of them appear, or none as far as that can be: first what is written to directly, for a device may be full
+/// and the reader of a pipe gone, then the files, which are on the disk and only want their names.
 ///
 /// # Errors
 /// Those of [`Staged::commit`], of the first that fails.

@@ -71,8 +71,8 @@ enum Kind {
 }
 
 impl Progress {
-    /// Begins now, for `frames` pictures of `frame` pixels each. `faster` is what would make it faster; it is said once, if it
-    /// takes long.
+    /// Begins now, for `frames` pictures of `frame` pixels each. `faster` is what would make it faster; it is said
+    /// once, if it takes long.
     pub fn begin(frame: u64, frames: u64, quiet: bool, faster: String) -> Self {
         let started = Instant::now();
         let left = Arc::new(Mutex::new(TimeLeft::default()));

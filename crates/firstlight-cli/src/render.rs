@@ -77,8 +77,8 @@ fn render(plan: &Plan, job: &Job, reading: &ReadingArgs) -> Result<(), Failure> 
         input.remember_files();
     }
 
-    // See whether the numbers can be written, and the picture or the first of them, before any work is done for them; this
-    // may make a file for a moment
+    // See whether the numbers can be written, and the picture or the first of them, before any work is done for them;
+    // this may make a file for a moment
     let watch = Watch::begin();
     let mut ready = Some(moments[0].ready()?);
     let stats_target = plan.stats.target().map(|target| target.of_scene(&job.names));

@@ -296,7 +296,8 @@ impl SourceCode for Excerpt {
         lines_before: usize,
         _lines_after: usize,
     ) -> Result<Box<dyn SpanContents<'a> + 'a>, MietteError> {
-        // Asked without context it is for the place in the headline, else for the lines to draw, which begin at column 0
+        // Asked without context it is for the place in the headline, else for the lines to draw, which begin at column
+        // 0
         let column = if lines_before == 0 { self.column } else { 0 };
         let (text, span) = (self.text.as_bytes(), (0, self.text.len()).into());
         Ok(Box::new(MietteSpanContents::new_named(self.file.clone(), text, span, self.line, column, 1)))

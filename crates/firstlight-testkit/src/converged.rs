@@ -1,10 +1,11 @@
 //! The converged picture of a scene, and how far others are from it.
 //!
 //! Every area light is sampled, under full antialiasing, by four sets of points that know nothing of each other: one
-//! seeded point in each of m x m cells of the light. Where they do not agree, the pixel is rendered again with twice the
-//! points, until they do or until there are too many points. Where a light is very near, its points are graded ([`graded`]).
-//! Nothing of what integrates lights has a part in it.
-//! (Turned copies of the `sobol` set were tried in their place, and settle no pixel sooner: it is edges that take long.)
+//! seeded point in each of m x m cells of the light. Where they do not agree, the pixel is rendered again with twice
+//! the points, until they do or until there are too many points. Where a light is very near, its points are graded
+//! ([`graded`]). Nothing of what integrates lights has a part in it.
+//! (Turned copies of the `sobol` set were tried in their place, and settle no pixel sooner: it is edges that take
+//! long.)
 
 use std::f64::consts::PI;
 
@@ -71,8 +72,8 @@ pub fn sampled(desc: &SceneDesc, set: SampleSet, count: u32) -> Image {
     picture(&compile(&with_samples(desc, count, set, 1)), &traced())
 }
 
-/// Red, green and blue as they are displayed, in steps of an 8-bit picture, not rounded. What is not a number is as far off
-/// as can be.
+/// Red, green and blue as they are displayed, in steps of an 8-bit picture, not rounded. What is not a number is as far
+/// off as can be.
 pub fn displayed(scene: &Scene, [r, g, b, _]: [f32; 4]) -> [f64; 3] {
     [r, g, b].map(|x| if x.is_nan() { f64::INFINITY } else { 255.0 * scene.display().encode(x) })
 }
@@ -118,8 +119,8 @@ fn opinion(scene: &Scene, films: &[[f32; 4]; SETS as usize]) -> Opinion {
     Opinion { mean, half_difference: std::array::from_fn(|k| 0.5 * (one[k] - other[k])), agreed }
 }
 
-/// The parts of a picture to render so that every wanted pixel is there: few, and not much more than wanted; where pixels take
-/// long, nothing more.
+/// The parts of a picture to render so that every wanted pixel is there: few, and not much more than wanted; where
+/// pixels take long, nothing more.
 fn windows(wanted: &[bool], width: u32, height: u32, level: u32) -> Vec<Window> {
     let side = if level < LONG { 4 } else { 1 };
     let count = wanted.iter().filter(|wanted| **wanted).count();
@@ -148,8 +149,8 @@ fn windows(wanted: &[bool], width: u32, height: u32, level: u32) -> Vec<Window> 
     windows
 }
 
-/// Whether a light that weakens with the square of the distance is so near to what a pixel shows that points of equal shares of it can
-/// all miss the part that sends most, and agree.
+/// Whether a light that weakens with the square of the distance is so near to what a pixel shows that points of equal
+/// shares of it can all miss the part that sends most, and agree.
 fn is_near(desc: &SceneDesc, scene: &Scene, [i, j]: [u32; 2]) -> bool {
     let n = desc.render.antialiasing;
     let rays = (0..n * n).map(|k| [k % n, k / n].map(|w| (w as f32 + 0.5) / n as f32));
@@ -232,8 +233,8 @@ impl Converged {
         }
     }
 
-    /// Asks sets of 2^`first` points, then of twice as many and so on up to 2^`cap`, for the pixels that are open, until they
-    /// agree.
+    /// Asks sets of 2^`first` points, then of twice as many and so on up to 2^`cap`, for the pixels that are open,
+    /// until they agree.
     #[track_caller]
     fn settle(&mut self, first: u32, cap: u32) {
         let count = self.pixels.len();
@@ -289,8 +290,8 @@ impl Converged {
             .flat_map(move |y| columns.clone().map(move |x| (y * width + x) as usize))
     }
 
-    /// Looks again, with at least four and up to sixteen times the points, where a picture is far off: sets that agreed by
-    /// chance shall be nobody's fault.
+    /// Looks again, with at least four and up to sixteen times the points, where a picture is far off: sets that agreed
+    /// by chance shall be nobody's fault.
     #[track_caller]
     pub fn doubt(&mut self, image: &Image) {
         let disputed: Vec<bool> = (0..self.pixels.len())
@@ -304,8 +305,9 @@ impl Converged {
         }
     }
 
-    /// Looks again at all that is settled, beginning with 2^`more` times the points. Where a picture is smooth all its pixels are
-    /// wrong alike, and then the two halves can be nearer to each other than to the truth in all of them at once.
+    /// Looks again at all that is settled, beginning with 2^`more` times the points. Where a picture is smooth all its
+    /// pixels are wrong alike, and then the two halves can be nearer to each other than to the truth in all of them at
+    /// once.
     #[track_caller]
     pub fn again(&mut self, more: u32) {
         let settled: Vec<bool> = self.open.iter().map(|open| !open).collect();
@@ -436,8 +438,8 @@ impl Report {
     }
 }
 
-/// What is outside the bounds of a single scene. `doubt` is what the converged picture may be off itself, `sampled` the root mean
-/// square of 400 points of `sobol`. The share of pixels off by more than a step is one of many scenes.
+/// What is outside the bounds of a single scene. `doubt` is what the converged picture may be off itself, `sampled` the
+/// root mean square of 400 points of `sobol`. The share of pixels off by more than a step is one of many scenes.
 pub fn fault(exact: &Deviation, doubt: f64, bounds: &Bounds, sampled: impl FnOnce() -> f64) -> Option<String> {
     if !(exact.worst <= bounds.worst) {
         let [x, y] = exact.at;

@@ -1,5 +1,5 @@
-//! Random scenes for lights that are integrated, the same for the same seed: whatever makes soft light hard, in pictures that are
-//! neither black nor blown out.
+//! Random scenes for lights that are integrated, the same for the same seed: whatever makes soft light hard, in
+//! pictures that are neither black nor blown out.
 
 use firstlight::{
     BoxDesc, ColorDesc, ColorParam, ConeDesc, CylinderDesc, DiskDesc, DiskLightDesc, DisplayEncoding, EmitSides,
@@ -29,8 +29,8 @@ pub fn scene(seed: u64, size: u32) -> SceneDesc {
     scene
 }
 
-/// The scene with its light or its exposure set so that what is lit is neither black nor white; `None` if next to nothing
-/// is lit.
+/// The scene with its light or its exposure set so that what is lit is neither black nor white; `None` if next to
+/// nothing is lit.
 fn exposed(mut scene: SceneDesc, random: &mut Random) -> Option<SceneDesc> {
     // A small picture; where other points make no other one, there is nothing to integrate
     let mut small = with_samples(&scene, 36, SampleSet::Grid, 0);

@@ -1,8 +1,9 @@
-//! Points on area lights that lie the closer together the nearer the light is: where a light touches what it lights, points of
-//! equal shares of its area would all miss the small part that sends nearly everything.
+//! Points on area lights that lie the closer together the nearer the light is: where a light touches what it lights,
+//! points of equal shares of its area would all miss the small part that sends nearly everything.
 //!
-//! A light is cut in two, and each part again, until every part is small beside its distance; then each part gets the same
-//! number of random points, one in each of m x m cells. Nothing is assumed of what a light sends, only where it is.
+//! A light is cut in two, and each part again, until every part is small beside its distance; then each part gets the
+//! same number of random points, one in each of m x m cells. Nothing is assumed of what a light sends, only where it
+//! is.
 //!
 
 use firstlight::Scene;
@@ -13,15 +14,15 @@ use crate::scenes::{V, length, sub};
 
 /// A part's radius over the distance to its middle, at most.
 const WIDTH: f64 = 0.5;
-/// A part's radius over the size of the coordinates, from which on it is not cut further: numbers of 24 bits do not tell its
-/// points apart.
+/// A part's radius over the size of the coordinates, from which on it is not cut further: numbers of 24 bits do not
+/// tell its points apart.
 const FINEST: f64 = 1e-6;
 
 /// A part of the unit square that stands for a light: from, to.
 type Part = [[f64; 2]; 2];
 
-/// Whether [`pixel`] does better than points of equal shares, for a light of that size at that distance: so near that 256 of
-/// them are farther apart than it is away.
+/// Whether [`pixel`] does better than points of equal shares, for a light of that size at that distance: so near that
+/// 256 of them are farther apart than it is away.
 pub fn is_near(distance: f64, size: f64) -> bool {
     16.0 * distance < size
 }

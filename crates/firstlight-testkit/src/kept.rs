@@ -48,8 +48,8 @@ pub fn write(path: &Path, desc: &SceneDesc, cap: u32, truth: &Converged) {
     std::fs::rename(&part, path).unwrap_or_else(|fault| panic!("{}: {fault}", path.display()));
 }
 
-/// Reads it again. `None` if the file is not there, shows another scene, or stopped at fewer points than 2^`cap` with pixels
-/// open.
+/// Reads it again. `None` if the file is not there, shows another scene, or stopped at fewer points than 2^`cap` with
+/// pixels open.
 #[track_caller]
 pub fn read(path: &Path, desc: &SceneDesc, cap: u32) -> Option<Converged> {
     let file = std::fs::File::open(path).ok()?;

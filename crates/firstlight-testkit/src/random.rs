@@ -8,8 +8,8 @@ use firstlight::{
 
 use crate::scenes::*;
 
-/// Scene number `seed`: a small picture of shapes that are huge and tiny, that overlap, touch and lie in one plane, under
-/// lights of every kind that touch and cut them. Every other one has shapes of all kinds, meshes and instances.
+/// Scene number `seed`: a small picture of shapes that are huge and tiny, that overlap, touch and lie in one plane,
+/// under lights of every kind that touch and cut them. Every other one has shapes of all kinds, meshes and instances.
 pub fn scene(seed: u64) -> SceneDesc {
     let mut random = Random::new(seed);
     let random = &mut random;

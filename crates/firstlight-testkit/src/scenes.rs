@@ -216,8 +216,8 @@ pub fn box_mesh(center: V, size: V) -> MeshDesc {
     mesh((0..8).map(corner).collect(), triangles)
 }
 
-/// A closed ball of `n` rings of `n` vertices, the front outside, in and out by up to `bumps` of its radius, with or without
-/// normals.
+/// A closed ball of `n` rings of `n` vertices, the front outside, in and out by up to `bumps` of its radius, with or
+/// without normals.
 pub fn ball_mesh(radius: f64, n: u32, bumps: f64, normals: bool, random: &mut Random) -> MeshDesc {
     let mut directions = vec![[0.0, 1.0, 0.0]];
     for ring in 1..n {

@@ -32,8 +32,8 @@ fn config11(size: u32) -> Result<Scene, Box<dyn Error>> {
     Ok(parsed.compile(&NoAssets, &CompileOptions::default())?.scene)
 }
 
-/// For the middle of each pixel, row by row from the top: the depth in metres, infinite where nothing is, and the visible
-/// fraction of all lights.
+/// For the middle of each pixel, row by row from the top: the depth in metres, infinite where nothing is, and the
+/// visible fraction of all lights.
 fn look(scene: &Scene) -> [Vec<f64>; 2] {
     let (mut depth, mut visible) = (Vec::new(), Vec::new());
     let points: usize = scene.lights().map(|light| scene.light_points(light)).sum();

@@ -1,5 +1,5 @@
-//! What the project's own benchmarks, pictures and verifications ask of the library's insides. Not for others: it changes without
-//! notice.
+//! What the project's own benchmarks, pictures and verifications ask of the library's insides. Not for others: it
+//! changes without notice.
 
 use std::ops::ControlFlow;
 
@@ -169,7 +169,8 @@ impl<'a> Instances<'a> {
     }
 }
 
-/// A mesh under a rectangle light, and the points of it that a camera sees and some of the light is above the horizon of.
+/// A mesh under a rectangle light, and the points of it that a camera sees and some of the light is above the horizon
+/// of.
 pub struct Soft {
     scene: Scene,
     target: Target,
@@ -236,7 +237,8 @@ impl Soft {
         self.points.iter().map(row).collect()
     }
 
-    /// The light's samples, neighbours together, in blocks of sixteen; those that are missing in the last stand for another.
+    /// The light's samples, neighbours together, in blocks of sixteen; those that are missing in the last stand for
+    /// another.
     pub fn samples(&self) -> Vec<[f32; 3]> {
         let all = self.target.blocks.iter().flat_map(|b| (0..LANES).map(|i| [0, 1, 2].map(|axis| b.point[axis][i])));
         all.collect()
@@ -343,8 +345,8 @@ pub enum Sight {
     Cut,
 }
 
-/// What is seen of a light, which is sampled, from where the ray through the middle of each pixel ends, row by row; `None` where that
-/// is nowhere, or at a light. Each `block` x `block` pixels have a shaft together.
+/// What is seen of a light, which is sampled, from where the ray through the middle of each pixel ends, row by row;
+/// `None` where that is nowhere, or at a light. Each `block` x `block` pixels have a shaft together.
 pub fn sights(scene: &Scene, light: u32, block: u32) -> Vec<Option<Sight>> {
     let (level, target) = (Level::new(), Target::new(scene, LightId(light)));
     let (mut occluders, mut view) = (Occluders::default(), View::default());
@@ -385,8 +387,8 @@ pub fn sights(scene: &Scene, light: u32, block: u32) -> Vec<Option<Sight>> {
     sights
 }
 
-/// A pixel of the film, all its n x n camera rays lit by the plain renderer with the points that are chosen on area lights: red,
-/// green, blue premultiplied, alpha.
+/// A pixel of the film, all its n x n camera rays lit by the plain renderer with the points that are chosen on area
+/// lights: red, green, blue premultiplied, alpha.
 pub fn pixel(scene: &Scene, at: [u32; 2], choose: &mut ChoosePoints) -> [f32; 4] {
     let mut sum = PixelSum::new(scene);
     let hit = |_, _, ray: &Ray| scene.intersect_local(ray);

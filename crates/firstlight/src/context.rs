@@ -94,8 +94,8 @@ impl FolderAssets {
         Ok(Self { root, allowed, files: Mutex::default() })
     }
 
-    /// The files that were asked for and are there, by their names from the root of the system, links resolved; whether or
-    /// not they could be read to their end.
+    /// The files that were asked for and are there, by their names from the root of the system, links resolved; whether
+    /// or not they could be read to their end.
     pub fn files(&self) -> Vec<PathBuf> {
         self.files.lock().unwrap_or_else(PoisonError::into_inner).iter().cloned().collect()
     }

@@ -33,7 +33,8 @@ pub enum Severity {
 
 /// One fault, with its place, the value, what is allowed, and what to do.
 ///
-/// Displays as `scene.toml:14:9: light.spot[2].cone_deg: 190 is outside (0, 180]; the cone is the full angle, not half`.
+/// Displays as `scene.toml:14:9: light.spot[2].cone_deg: 190 is outside (0, 180]; the cone is the full angle, not
+/// half`.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Diagnostic {
     /// Error or warning.
@@ -65,8 +66,8 @@ impl fmt::Display for Diagnostic {
     }
 }
 
-/// Text of others as it can be shown on a terminal, on one line: control characters, and those that change the direction of
-/// text or cannot be seen, are escaped as in Rust, `\u{1b}`.
+/// Text of others as it can be shown on a terminal, on one line: control characters, and those that change the
+/// direction of text or cannot be seen, are escaped as in Rust, `\u{1b}`.
 pub fn printable(text: &str) -> Cow<'_, str> {
     let hidden = |c: char| {
         c.is_control()

@@ -43,8 +43,8 @@
 //! - Where files come from: [`Assets`].
 //! - Faults, as data: [`SceneError`], [`Diagnostic`], [`ImageError`]. The library never prints and never exits.
 //! - It needs unwinding: the decoders of pictures belong to others, and a panic of one on a damaged file is caught and
-//!   becomes [`ImageError::Damaged`]. With `panic = "abort"` it ends the program. The library sets no panic hook; one that
-//!   is to be silent about these asks [`is_decoding`].
+//!   becomes [`ImageError::Damaged`]. With `panic = "abort"` it ends the program. The library sets no panic hook; one
+//!   that is to be silent about these asks [`is_decoding`].
 //!
 //! Whole programs are in the folder `examples`.
 

@@ -292,8 +292,9 @@ impl<'a> Plan<'a> {
         Ok(())
     }
 
-    /// A course file's `output_file`, else the scene's name with `.png`, in the working folder. Of the files there it takes the
-    /// place of none but our own pictures: `bunny.obj` may well have a texture `bunny.png` beside it. `tell`: says so.
+    /// A course file's `output_file`, else the scene's name with `.png`, in the working folder. Of the files there it
+    /// takes the place of none but our own pictures: `bunny.obj` may well have a texture `bunny.png` beside it. `tell`:
+    /// says so.
     fn default_output(&self, job: &Job, scene: &str, course: Option<&str>, tell: bool) -> Result<Output, Failure> {
         if let Some(path) = course {
             let path = PathBuf::from(path);

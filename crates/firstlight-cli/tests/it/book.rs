@@ -1,8 +1,9 @@
 //! Every command that the book and the README show runs, made small.
 //!
-//! Blocks of shell and Python run as they stand, page by page, in a folder that has the files the text speaks of; so do commands
-//! within the text, `firstlight scenes` for one. What they call `firstlight` is a script that asks the program for a picture
-//! 16 pixels wide with one ray in each pixel. What cannot run has `<!-- not run: REASON -->` on the line before it.
+//! Blocks of shell and Python run as they stand, page by page, in a folder that has the files the text speaks of; so do
+//! commands within the text, `firstlight scenes` for one. What they call `firstlight` is a script that asks the program
+//! for a picture 16 pixels wide with one ray in each pixel. What cannot run has `<!-- not run: REASON -->` on the line
+//! before it.
 
 use std::fs;
 use std::os::unix::fs::PermissionsExt;
@@ -38,7 +39,8 @@ done
 exec "$PROGRAM" "$@"
 "#;
 
-/// Other programs that commands lead to or come from, and what stands in for them. Cargo runs the program and does nothing else.
+/// Other programs that commands lead to or come from, and what stands in for them. Cargo runs the program and does
+/// nothing else.
 const OTHERS: [(&str, &str); 4] = [
     ("magick", "#!/bin/sh\ncat > /dev/null\n"),
     ("man", "#!/bin/sh\ncat > /dev/null\n"),

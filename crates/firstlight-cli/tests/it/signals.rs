@@ -5,8 +5,8 @@ use std::process::{Child, ChildStderr, Command, ExitStatus, Stdio};
 
 use crate::common::Folder;
 
-/// The program in this folder, with signals as a shell's foreground has them: whoever started the tests may ignore some, as `nohup`
-/// does, and that is inherited.
+/// The program in this folder, with signals as a shell's foreground has them: whoever started the tests may ignore
+/// some, as `nohup` does, and that is inherited.
 fn listening(folder: &Folder) -> Command {
     ignoring(folder, "").unwrap_or_else(|| {
         let mut command = Command::new(env!("CARGO_BIN_EXE_firstlight"));
@@ -83,7 +83,8 @@ fn interrupted_it_leaves_the_old_file_and_no_other() {
     }
 }
 
-/// In the background and under `nohup` some signals are ignored. The others are not, and leave no more behind than ever.
+/// In the background and under `nohup` some signals are ignored. The others are not, and leave no more behind than
+/// ever.
 #[test]
 fn what_is_ignored_from_outside_stays_ignored_and_the_rest_is_not() {
     for (ignored, others) in [("INT", ["TERM", "HUP"]), ("HUP", ["TERM", "INT"]), ("INT,HUP", ["TERM", "TERM"])] {

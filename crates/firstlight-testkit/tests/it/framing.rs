@@ -58,7 +58,8 @@ fn project(scene: &Scene, points: impl Iterator<Item = DVec3>) -> [[f64; 2]; 2] 
     found
 }
 
-/// The columns and rows in which a ray through the middle of a pixel meets the model: the first of each, and the one after the last.
+/// The columns and rows in which a ray through the middle of a pixel meets the model: the first of each, and the one
+/// after the last.
 fn seen(scene: &Scene) -> Option<[[u32; 2]; 2]> {
     let mut found = [[u32::MAX, 0]; 2];
     for (y, x) in (0..SIZE[1]).flat_map(|y| (0..SIZE[0]).map(move |x| (y, x))) {

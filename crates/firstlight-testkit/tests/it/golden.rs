@@ -1,9 +1,9 @@
-//! Every case of `scenes/golden/FAMILY/CASE`: the same bits as when it was last looked at. And the gallery: every scene of
-//! it renders, and both renderers agree.
+//! Every case of `scenes/golden/FAMILY/CASE`: the same bits as when it was last looked at. And the gallery: every scene
+//! of it renders, and both renderers agree.
 //!
 //! A case is a folder with `scene.toml` and `expected.exr`. In the family `config` the scene is the built-in one of the
-//! folder's name. `FIRSTLIGHT_BLESS=1` writes the expectations, and the run still fails; what differs is left beside the
-//! test program as `actual.exr` and `difference.exr`.
+//! folder's name. `FIRSTLIGHT_BLESS=1` writes the expectations, and the run still fails; what differs is left beside
+//! the test program as `actual.exr` and `difference.exr`.
 
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};

@@ -1,7 +1,7 @@
 //! Every case of `scenes/invalid`: the exact words of its diagnostics, one to a line.
 //!
-//! A case is a text (`.toml`, `.json`, `.txt`), or a folder (`.dir`) whose text is called `scene`, with `.expected` beside
-//! it. All are compiled strictly. `FIRSTLIGHT_BLESS=1` writes the expectations, and the run still fails.
+//! A case is a text (`.toml`, `.json`, `.txt`), or a folder (`.dir`) whose text is called `scene`, with `.expected`
+//! beside it. All are compiled strictly. `FIRSTLIGHT_BLESS=1` writes the expectations, and the run still fails.
 
 use std::fmt::Write;
 use std::path::{Path, PathBuf};

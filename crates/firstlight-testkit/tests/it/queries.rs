@@ -1,4 +1,5 @@
-//! What a compiled scene answers besides pictures: what a ray sees, what of a light is seen, and the view of another camera.
+//! What a compiled scene answers besides pictures: what a ray sees, what of a light is seen, and the view of another
+//! camera.
 
 use std::ops::ControlFlow;
 
@@ -12,8 +13,8 @@ fn compiled(text: &str, time: f64) -> Scene {
     SceneDesc::parse("scene.toml", text.as_bytes(), &NoAssets).compile(&NoAssets, &options).unwrap().scene
 }
 
-/// A floor at height 0 below a square light, of which the point above the origin sees the right half past a board; and a
-/// light behind the floor.
+/// A floor at height 0 below a square light, of which the point above the origin sees the right half past a board; and
+/// a light behind the floor.
 const HALF: &str = "\
 [render]
 width = 16

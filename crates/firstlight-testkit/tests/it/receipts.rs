@@ -8,7 +8,8 @@ use firstlight::{
     SimdLevel, VisibilityMode, Window, render,
 };
 
-/// Everything that a setting can change: area lights with and without a word on samples, a smooth mesh, keys, two cameras.
+/// Everything that a setting can change: area lights with and without a word on samples, a smooth mesh, keys, two
+/// cameras.
 const SCENE: &str = r#"
     [render]
     width = 33

@@ -227,7 +227,8 @@ fn transforms_move_round_lights_as_their_numbers_do() {
             irradiance(p, n, &[LightDesc::Sphere(ball(at, 0.4, 4096))]),
             1e-5,
         );
-        // Turned by a quarter about x, -z is up: the front of what faces +z faces the floor; mirrored it keeps its front
+        // Turned by a quarter about x, -z is up: the front of what faces +z faces the floor; mirrored it keeps its
+        // front
         let normal = [0.0, 0.0, scale];
         let light = DiskLightDesc { transform: moved(scale), ..disk([0.1, 0.0, 0.2], normal, 0.2, 4096) };
         let moved = disk(at, DOWN, 0.4, 4096);

@@ -78,7 +78,8 @@ fn pixels_beside_a_hard_edge_are_what_their_rays_say() {
     }
 }
 
-/// The mean of a checkerboard over what of a pixel's footprint lies within 0 to 1 of u and v, by 256 x 256 points of it.
+/// The mean of a checkerboard over what of a pixel's footprint lies within 0 to 1 of u and v, by 256 x 256 points of
+/// it.
 fn by_counting(scene: &Scene, [x, y]: [u32; 2], counts: [f64; 2]) -> Option<f64> {
     let (ray, differential) = scene.camera().ray(x as f32 + 0.5, y as f32 + 0.5, 1.0);
     let si = scene.surface(&ray, &scene.intersect(&ray)?, &differential);

@@ -1,5 +1,6 @@
-//! Checkerboards: sharp from near, gray from far, and no line anywhere but at the squares' own edges. Under ambient light
-//! alone a picture is its texture, and where all that a pixel sees lies in one square, the pixel has that square's colour.
+//! Checkerboards: sharp from near, gray from far, and no line anywhere but at the squares' own edges. Under ambient
+//! light alone a picture is its texture, and where all that a pixel sees lies in one square, the pixel has that
+//! square's colour.
 
 use std::f64::consts::PI;
 

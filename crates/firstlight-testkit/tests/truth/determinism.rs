@@ -1,5 +1,5 @@
-//! Same bits: whatever the threads, the tiles, the instruction set and the renderer, every picture is the same to the last
-//! bit. `FIRSTLIGHT_SCENES` is the number of random scenes, 200 unless said.
+//! Same bits: whatever the threads, the tiles, the instruction set and the renderer, every picture is the same to the
+//! last bit. `FIRSTLIGHT_SCENES` is the number of random scenes, 200 unless said.
 
 use std::num::NonZeroUsize;
 

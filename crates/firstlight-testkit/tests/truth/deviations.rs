@@ -1,6 +1,6 @@
-//! The table of measured deviations that the book publishes. It is made here, and since the bits of a picture are a promise,
-//! so is the table: it has to be the page `docs/src/deviations.md`, word for word. `FIRSTLIGHT_BLESS=1` writes the page, and
-//! the run still fails.
+//! The table of measured deviations that the book publishes. It is made here, and since the bits of a picture are a
+//! promise, so is the table: it has to be the page `docs/src/deviations.md`, word for word. `FIRSTLIGHT_BLESS=1` writes
+//! the page, and the run still fails.
 
 use std::f64::consts::PI;
 use std::fmt::Write;

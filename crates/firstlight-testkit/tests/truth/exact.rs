@@ -1,4 +1,5 @@
-//! Lights that are integrated, `samples = "exact"`, against converged pictures, closed forms, and themselves a moment later.
+//! Lights that are integrated, `samples = "exact"`, against converged pictures, closed forms, and themselves a moment
+//! later.
 
 use std::f64::consts::PI;
 use std::path::Path;
@@ -42,7 +43,8 @@ const KEPT: u32 = 13;
 const UP: V = [0.0, 1.0, 0.0];
 const DOWN: V = [0.0, -1.0, 0.0];
 
-/// Random scenes as `cargo xtask verify exact` has them, `size` x `size` pixels, beside converged pictures that are kept.
+/// Random scenes as `cargo xtask verify exact` has them, `size` x `size` pixels, beside converged pictures that are
+/// kept.
 fn hold(seeds: impl Iterator<Item = u64>, size: u32) {
     let (mut pixels, mut over) = (0, 0);
     for seed in seeds {
@@ -278,8 +280,8 @@ fn a_knife_edge_hides_what_is_behind_it() {
     }
 }
 
-/// What arrives at `p`, looking up, from a sphere light of radiance 1 around `light` past a ball: the sum over a fine grid of
-/// directions, every one asked on paper.
+/// What arrives at `p`, looking up, from a sphere light of radiance 1 around `light` past a ball: the sum over a fine
+/// grid of directions, every one asked on paper.
 fn past_a_ball(p: V, light: (V, f64), ball: (V, f64)) -> f64 {
     let meets = |(center, r): (V, f64), w: V| {
         let c = sub(center, p);

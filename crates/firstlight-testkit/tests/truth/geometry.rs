@@ -1,5 +1,5 @@
-//! Meshes, solids, groups and instances: pictures of scenes that say the same in two ways, and rays that must not meet what
-//! they start from.
+//! Meshes, solids, groups and instances: pictures of scenes that say the same in two ways, and rays that must not meet
+//! what they start from.
 
 use std::num::NonZeroUsize;
 
@@ -90,8 +90,8 @@ fn solids_of_instances_are_copies_to_the_bit() {
 
 #[test]
 fn meshes_of_instances_are_copies() {
-    // A mesh by itself is taken to the world vertex by vertex and rounded to f32 there; a ray is taken to the instance. So
-    // the last bits differ: of hits, and at silhouettes and edges of shadows what is hit at all
+    // A mesh by itself is taken to the world vertex by vertex and rounded to f32 there; a ray is taken to the instance.
+    // So the last bits differ: of hits, and at silhouettes and edges of shadows what is hit at all
     let [instances, written] = by_instances_and_written_out(&things()).map(|desc| both(&desc));
     assert!(lit(&instances) > 1000);
     let wrong = differing(&instances, &written, 2e-5);
@@ -321,8 +321,8 @@ fn what_has_no_hollows_never_shadows_itself() {
     assert!(faults.is_empty(), "{} shadow themselves:\n{}", faults.len(), faults.concat());
 }
 
-/// Two boards side by side over a floor, as two meshes that are joined: `left` from x = -2 to 0, `right` from 0 to 2, seen
-/// from above under a light high up.
+/// Two boards side by side over a floor, as two meshes that are joined: `left` from x = -2 to 0, `right` from 0 to 2,
+/// seen from above under a light high up.
 fn boards(change: impl Fn(&mut MeshDesc, &mut MeshDesc), in_group: bool) -> SceneDesc {
     let board = |x: f64| {
         // Faces up

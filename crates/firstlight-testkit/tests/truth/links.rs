@@ -1,4 +1,5 @@
-//! Which lights shine on what, and for which it casts shadows: pictures against the sums of pictures under one light each.
+//! Which lights shine on what, and for which it casts shadows: pictures against the sums of pictures under one light
+//! each.
 
 use firstlight::{
     BoxDesc, CameraHit, Image, LightDesc, MeshDesc, PointSetDesc, RectangleDesc, RenderSettings, SampleSet, SceneDesc,
@@ -69,8 +70,8 @@ fn random_choice(random: &mut Random) -> Chosen {
     [(); 2].map(|_| [(); 3].map(|_| random.chance(0.5)))
 }
 
-/// The picture is the sum, over all lights, of the pictures under each alone, with the shape casting a shadow or not; and
-/// where the shape is seen, of the lights that shine on it.
+/// The picture is the sum, over all lights, of the pictures under each alone, with the shape casting a shadow or not;
+/// and where the shape is seen, of the lights that shine on it.
 fn is_the_sum(desc: &SceneDesc, plain: &SceneDesc, chosen: Chosen, is_it: &dyn Fn(u32) -> bool) {
     let all = lights(false);
     let image = both(&desc.clone().lit_by(&all));

@@ -15,7 +15,8 @@ const STATED: f64 = 0.85 + 0.02;
 /// The same, with what integrals may be wrong by, of the one picture and of the other.
 const WITH_INTEGRALS: f64 = 1.15;
 
-/// In display steps: what may be wrong where one light may stand for others, in any pixel; and the root of the mean of squares.
+/// In display steps: what may be wrong where one light may stand for others, in any pixel; and the root of the mean of
+/// squares.
 const CROWDED: f64 = 2.0;
 const CROWDED_RMS: f64 = 0.5;
 

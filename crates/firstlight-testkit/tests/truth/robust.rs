@@ -147,8 +147,8 @@ fn inside_a_sphere_light_stays_inside() {
         for p in central.pixels {
             assert!((p[0] as f64 * PI - 1.0).abs() < 3e-6, "{p:?} in sphere {i}");
         }
-        // Light from outside does not come in. Where it grazes the wall to within rounding, the wall cannot tell that from
-        // its own starting point: a cosine of 3e-6 at most, of light that is up to 6 here
+        // Light from outside does not come in. Where it grazes the wall to within rounding, the wall cannot tell that
+        // from its own starting point: a cosine of 3e-6 at most, of light that is up to 6 here
         let reach = r * random.scale(1.3, 10.0);
         let scene = scene.lit_by(&lights_around(&mut random, c, reach));
         let brightest = shoot(&scene).pixels.iter().map(|p| p[0]).fold(0.0, f32::max);

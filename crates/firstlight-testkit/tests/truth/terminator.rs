@@ -70,8 +70,8 @@ fn both(desc: &SceneDesc) -> Image {
     fast
 }
 
-/// How far the first is from the second near the border of light and dark, in the middle of the ball, and by how much it grows from one pixel to the next on
-/// rows that lead from light to dark.
+/// How far the first is from the second near the border of light and dark, in the middle of the ball, and by how much
+/// it grows from one pixel to the next on rows that lead from light to dark.
 fn steps(facets: &Image, round: &Image) -> [f32; 2] {
     let value = |image: &Image, x: u32, y: u32| image.pixels[(y * SIZE + x) as usize][0];
     let (mut apart, mut growth) = (0.0f32, 0.0f32);
@@ -106,7 +106,8 @@ fn a_coarse_ball_is_lit_as_a_round_one() {
                 let turned = moved(ShapeDesc::Mesh(coarse_ball()), [0.0; 3], [13.0, 7.0, 0.0], [1.0; 3]);
                 steps(&both(&scene(turned, light.clone(), terminator)), &round)
             };
-            // A facet lies up to 5 % nearer to the middle of the ball than the sphere, and what is seen there has its normal
+            // A facet lies up to 5 % nearer to the middle of the ball than the sphere, and what is seen there has its
+            // normal
             let [apart, growth] = of(ShadowTerminator::Smooth);
             assert!(apart < 0.05, "{name} {direction:?}: {apart} from the round ball");
             assert!(growth < 0.01, "{name} {direction:?}: {growth} brighter on the way to the dark");

@@ -1,10 +1,10 @@
 //! Many rays as one: between two lines in each of two planes.
 //!
-//! Of rays that share their largest axis z and its sign, each is x = a + b z. A line below all of them and a line above all
-//! of them, in x z and in y z, bound them all; a box is met only if it reaches over the lower line and under the upper one
-//! somewhere along its own stretch of z. That is four multiplications and additions for eight boxes, whatever the number
-//! of rays, and exact for a pinhole's tile. The lines start where all rays start, or end where all end, whichever is
-//! narrower: rays from one point, rays to one point, and parallel rays are all bounded tightly.
+//! Of rays that share their largest axis z and its sign, each is x = a + b z. A line below all of them and a line above
+//! all of them, in x z and in y z, bound them all; a box is met only if it reaches over the lower line and under the
+//! upper one somewhere along its own stretch of z. That is four multiplications and additions for eight boxes, whatever
+//! the number of rays, and exact for a pinhole's tile. The lines start where all rays start, or end where all end,
+//! whichever is narrower: rays from one point, rays to one point, and parallel rays are all bounded tightly.
 
 use fearless_simd::{f32x8, f32x16, mask32x16, prelude::*};
 

@@ -5,8 +5,8 @@
 //! gathered into nodes of eight by opening the largest box first (Wald, Benthin and Boulos 2008).
 //!
 //! It replaces `obvhs`, whose medium preset needs 48 bytes for each of its 2 n nodes, twice while it builds, besides 64
-//! bytes of boxes and sort keys for each primitive: more than 2.5 GB for ten million triangles. Here a primitive takes 32
-//! bytes and is sorted in place.
+//! bytes of boxes and sort keys for each primitive: more than 2.5 GB for ten million triangles. Here a primitive takes
+//! 32 bytes and is sorted in place.
 //!
 //! The tree is the same for every number of threads: where it is cut into tasks depends on the number of primitives
 //! alone, bins are joined by minimum, maximum and whole numbers, and the tasks' results are joined in their order.
@@ -129,11 +129,12 @@ pub(crate) struct Built {
     pub leaves: Vec<Leaf>,
 }
 
-/// Builds the tree over those of `count` boxes that are sound, with at most 2 to the power of `leaf_bits` of them in a leaf.
+/// Builds the tree over those of `count` boxes that are sound, with at most 2 to the power of `leaf_bits` of them in a
+/// leaf.
 ///
-/// `key`: things of the same key are the same to every ray, and only that of the lowest id need be in a leaf. It is asked
-/// where more boxes than a leaf holds have one centre, which no tree can part: ten thousand copies of a triangle would all
-/// be asked by every ray that comes near.
+/// `key`: things of the same key are the same to every ray, and only that of the lowest id need be in a leaf. It is
+/// asked where more boxes than a leaf holds have one centre, which no tree can part: ten thousand copies of a triangle
+/// would all be asked by every ray that comes near.
 pub(crate) fn build<K: Ord>(
     count: usize,
     boxes: impl Fn(usize) -> Aabb + Sync,
@@ -194,7 +195,8 @@ pub(crate) fn build<K: Ord>(
     Built { tree: Tree { nodes: join.nodes, center, half, bounds, stack }, order, leaves: join.leaves }
 }
 
-/// Brings to the front the lowest id of each key, in their order, and says how many they are; leaves the rest behind them.
+/// Brings to the front the lowest id of each key, in their order, and says how many they are; leaves the rest behind
+/// them.
 fn distinct<K: Ord>(prims: &mut [Prim], key: &impl Fn(u32) -> K) -> usize {
     let mut keyed: Vec<(K, Prim)> = prims.iter().map(|prim| (key(prim.id()), *prim)).collect();
     keyed.sort_unstable_by(|(a, p), (b, q)| a.cmp(b).then(p.id().cmp(&q.id())));

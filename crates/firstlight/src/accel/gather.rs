@@ -8,8 +8,8 @@ use super::node::{LEAF, Node, Tree};
 const STACK: usize = 96;
 
 impl Tree {
-    /// Visits the leaves below nodes whose boxes `meet` says yes to, a bit for each of eight and where they begin, near ones
-    /// before far ones, more or less, until `leaf` says no. Says whether all were visited.
+    /// Visits the leaves below nodes whose boxes `meet` says yes to, a bit for each of eight and where they begin, near
+    /// ones before far ones, more or less, until `leaf` says no. Says whether all were visited.
     #[inline(always)]
     pub fn gather<S: Simd>(
         &self,

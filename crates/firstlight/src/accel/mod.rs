@@ -4,8 +4,8 @@
 //! business of who built the tree (`shape/triangles` for meshes, `scene` for instances and other shapes). Before it
 //! stand shapes, which give boxes; after it, hits.
 
-/// Runs code for eight boxes or triangles at a time with the instruction set that suits it: AVX2 where it is there (AVX-512 has
-/// nothing to add to eight), NEON, or none. Two copies, not five: a traversal takes the compiler seconds.
+/// Runs code for eight boxes or triangles at a time with the instruction set that suits it: AVX2 where it is there
+/// (AVX-512 has nothing to add to eight), NEON, or none. Two copies, not five: a traversal takes the compiler seconds.
 macro_rules! dispatch_eight {
     ($level:expr, $simd:ident => $op:expr) => {{
         let level: fearless_simd::Level = $level;
@@ -26,7 +26,8 @@ macro_rules! dispatch_eight {
     }};
 }
 
-/// Runs code for sixteen rays at a time where the instruction set has room for it, and otherwise what takes them one by one.
+/// Runs code for sixteen rays at a time where the instruction set has room for it, and otherwise what takes them one by
+/// one.
 macro_rules! dispatch_sixteen {
     ($level:expr, $simd:ident => $op:expr, else $one_by_one:expr) => {{
         let level: fearless_simd::Level = $level;
@@ -105,8 +106,8 @@ impl Aabb {
 
 /// A tree over boxes that each hold one thing: instances, spheres, whole meshes.
 ///
-/// Boxes are asked as if they were a little larger (2^-19 of the distance between the ray's origin and the farthest part of
-/// the tree). A leaf that answers with a `t` before its own box by more than that may be left out, or not.
+/// Boxes are asked as if they were a little larger (2^-19 of the distance between the ray's origin and the farthest
+/// part of the tree). A leaf that answers with a `t` before its own box by more than that may be left out, or not.
 pub(crate) struct Bvh {
     tree: Tree,
 }
@@ -132,7 +133,8 @@ impl Bvh {
         Bvh { tree }
     }
 
-    /// Asks what lies on the ray, the nearest boxes first. `leaf` may make `t_max` smaller; boxes beyond it are not asked.
+    /// Asks what lies on the ray, the nearest boxes first. `leaf` may make `t_max` smaller; boxes beyond it are not
+    /// asked.
     #[inline(always)]
     pub fn closest<S: Simd>(&self, simd: S, ray: &TraceRay, t_max: &mut f32, leaf: impl FnMut(u32, &mut f32)) {
         if ray.is_valid {
@@ -146,8 +148,8 @@ impl Bvh {
         ray.is_valid && self.tree.any(simd, &Slabs::new(ray, self.tree.center, self.tree.half), t_max, leaf)
     }
 
-    /// Asks what lies on any of the rays in `active`, as far as `t_max` of each. `leaf` hears which rays are still asking and says which of
-    /// them are done; the answer is all that are.
+    /// Asks what lies on any of the rays in `active`, as far as `t_max` of each. `leaf` hears which rays are still
+    /// asking and says which of them are done; the answer is all that are.
     #[inline(always)]
     pub fn any16<S: Simd>(
         &self,
@@ -200,8 +202,8 @@ impl Bvh {
         }
     }
 
-    /// Visits what lies in boxes that `meet` says yes to, until `leaf` says no. `meet` is made from the tree's centre and
-    /// how far it reaches. Says whether all was visited.
+    /// Visits what lies in boxes that `meet` says yes to, until `leaf` says no. `meet` is made from the tree's centre
+    /// and how far it reaches. Says whether all was visited.
     #[inline(always)]
     pub fn gather<S: Simd, M: Fn(S, &Node) -> (u32, f32x8<S>)>(
         &self,

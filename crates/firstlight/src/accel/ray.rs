@@ -28,8 +28,8 @@ pub(crate) struct TraceRay {
 /// left everything else; its reciprocal is taken as if it were this, which keeps all numbers finite.
 pub(super) const SMALLEST: f32 = 1.0 / (1u64 << 32) as f32;
 
-/// Origins farther out than this, about 10^15, and directions whose largest component is not between these, about 10^-12
-/// and 10^18, meet nothing: beyond, products could overflow.
+/// Origins farther out than this, about 10^15, and directions whose largest component is not between these, about
+/// 10^-12 and 10^18, meet nothing: beyond, products could overflow.
 pub(super) const MAX_COORDINATE: f32 = (1u64 << 50) as f32;
 pub(super) const MIN_DIRECTION: f32 = 1.0 / (1u64 << 40) as f32;
 pub(super) const MAX_DIRECTION: f32 = (1u64 << 60) as f32;
@@ -68,10 +68,10 @@ impl TraceRay {
 ///
 /// A hit is one only if the ray meets the triangle's own box, padded by `OWN_PAD`, and is not nearer than that box. A
 /// node is left out only if the ray misses its box, padded by `NODE_PAD`, or the best hit is nearer. Both use the same
-/// reciprocal direction, so the two tests differ by rounding alone: six roundings of at most 2^-24 each on either side, of
-/// numbers no larger than twice that distance (Ize 2013, "Robust BVH ray traversal"). The pads differ by 2^-20 of it,
-/// which is more: **the tree can never change an answer**. `OWN_PAD` in its turn is larger than what the triangle test's
-/// own rounding can let in beside the triangle: half a dozen roundings of 2^-24.
+/// reciprocal direction, so the two tests differ by rounding alone: six roundings of at most 2^-24 each on either side,
+/// of numbers no larger than twice that distance (Ize 2013, "Robust BVH ray traversal"). The pads differ by 2^-20 of
+/// it, which is more: **the tree can never change an answer**. `OWN_PAD` in its turn is larger than what the triangle
+/// test's own rounding can let in beside the triangle: half a dozen roundings of 2^-24.
 pub(crate) const OWN_PAD: f32 = 1.0 / (1 << 20) as f32;
 pub(crate) const NODE_PAD: f32 = 2.0 * OWN_PAD;
 /// Of the hull of many rays, which has roundings of its own: slopes, and the places where the rays enter.
@@ -155,7 +155,8 @@ impl<const N: usize> Rays<N> {
     }
 }
 
-/// Sixteen rays with one largest axis, ready for triangles: what [`TraceRay`] and [`Slabs`] hold, operation by operation.
+/// Sixteen rays with one largest axis, ready for triangles: what [`TraceRay`] and [`Slabs`] hold, operation by
+/// operation.
 #[derive(Clone, Copy)]
 pub(crate) struct Lanes<S: Simd> {
     /// Origins along kx, ky, kz.

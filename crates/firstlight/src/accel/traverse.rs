@@ -226,8 +226,9 @@ impl Tree {
         }
     }
 
-    /// Asks the leaves that any of sixteen rays meet, until all of `asking` are done. `leaf` hears which rays ask a leaf, `few` which
-    /// few rays, one by one, a child of a node and all below it; both say which are done. Returns all that are.
+    /// Asks the leaves that any of sixteen rays meet, until all of `asking` are done. `leaf` hears which rays ask a
+    /// leaf, `few` which few rays, one by one, a child of a node and all below it; both say which are done. Returns all
+    /// that are.
     #[inline(always)]
     pub fn packet<S: Simd>(
         &self,
@@ -282,9 +283,9 @@ impl Tree {
         all & !asking
     }
 
-    /// Asks the leaves that four blocks of rays may meet, the nearest first. `leaf` hears which blocks ask, and may lessen how
-    /// far along the beams is of interest to each. The beam around all does at first; where there are many leaves, `split`
-    /// gives one for each block. `touch` hears of leaves that will be asked later.
+    /// Asks the leaves that four blocks of rays may meet, the nearest first. `leaf` hears which blocks ask, and may
+    /// lessen how far along the beams is of interest to each. The beam around all does at first; where there are many
+    /// leaves, `split` gives one for each block. `touch` hears of leaves that will be asked later.
     #[inline(always)]
     pub fn blocks<S: Simd>(
         &self,

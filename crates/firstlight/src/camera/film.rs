@@ -35,10 +35,12 @@ impl FilmPlane {
         }
     }
 
-    /// The place on the film at `x`, `y` in pixels from its upper left corner: to the right of the line of sight, and above.
+    /// The place on the film at `x`, `y` in pixels from its upper left corner: to the right of the line of sight, and
+    /// above.
     #[inline(always)]
     pub(super) fn place(&self, x: f32, y: f32) -> [f32; 2] {
-        // 2 x / W - 1 and 1 - 2 y / H, with one rounding each: places that mirror each other on the film have rays that do
+        // 2 x / W - 1 and 1 - 2 y / H, with one rounding each: places that mirror each other on the film have rays that
+        // do
         let right = (2.0 * x - self.axis.x) / self.size.x * self.half.x;
         let above = (self.axis.y - 2.0 * y) / self.size.y * self.half.y;
         [right, above]

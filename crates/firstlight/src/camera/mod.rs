@@ -21,18 +21,18 @@ words! {
     pub enum Projection {
         /// From one point, the eye: what is farther away is smaller.
         Perspective = "perspective",
-        /// Along parallel rays, from the whole of a film: everything keeps its size. The film, `height` metres high, stands
-        /// upright in the scene with its middle at `position`; what is behind it is not seen.
+        /// Along parallel rays, from the whole of a film: everything keeps its size. The film, `height` metres high,
+        /// stands upright in the scene with its middle at `position`; what is behind it is not seen.
         Orthographic = "orthographic",
     }
 }
 
 table! {
-    /// A camera: `[camera]`, or several as `[camera.NAME]`, of which `render.camera` or `--camera` names one. A scene without a camera
-    /// is given one that sees all of its shapes.
+    /// A camera: `[camera]`, or several as `[camera.NAME]`, of which `render.camera` or `--camera` names one. A scene
+    /// without a camera is given one that sees all of its shapes.
     ///
-    /// What a perspective camera sees is `fov_y_deg`, or `focal_length_mm` with `sensor_height_mm`; with neither it is 45
-    /// degrees. What an orthographic camera sees is `height` metres.
+    /// What a perspective camera sees is `fov_y_deg`, or `focal_length_mm` with `sensor_height_mm`; with neither it is
+    /// 45 degrees. What an orthographic camera sees is `height` metres.
     ///
     /// ```toml
     /// [camera]
@@ -51,18 +51,19 @@ table! {
         pub projection: Projection = Projection::Perspective,
         /// The vertical field of view: the full angle, in degrees, 0.001 to 179.99.
         pub fov_y_deg: Option<f64> = None,
-        /// Focal length in millimetres, 0.01 to 1000000, instead of `fov_y_deg`: fov = 2 atan(sensor height / (2 focal length)).
+        /// Focal length in millimetres, 0.01 to 1000000, instead of `fov_y_deg`: fov = 2 atan(sensor height / (2 focal
+        /// length)).
         pub focal_length_mm: Option<f64> = None,
         /// The height of the sensor in millimetres, 0.01 to 10000, for `focal_length_mm`; 24 unless said.
         pub sensor_height_mm: Option<f64> = None,
-        /// From the lower edge of an orthographic picture to the upper, in metres, 1e-9 to 2.5e8. An orthographic camera
-        /// needs it, and no other takes it.
+        /// From the lower edge of an orthographic picture to the upper, in metres, 1e-9 to 2.5e8. An orthographic
+        /// camera needs it, and no other takes it.
         pub height: Option<f64> = None,
         /// Moves the film without turning the camera, in widths and heights of it, each from -100 to 100: with positive
         /// numbers the picture shows more of what is on the right, and above. Upright lines stay upright.
         pub shift: [f64; 2] = [0.0, 0.0],
-        /// Where it is moved; it moves `position`, `look_at` and `up`. What it sees stays as large, whatever the scale, and
-        /// is never mirrored.
+        /// Where it is moved; it moves `position`, `look_at` and `up`. What it sees stays as large, whatever the scale,
+        /// and is never mirrored.
         pub transform: Option<Box<TransformDesc>> = None,
     }
 }
@@ -141,8 +142,8 @@ impl Camera {
         [r.x, u.x, -f.x, p.x, r.y, u.y, -f.y, p.y, r.z, u.z, -f.z, p.z, 0.0, 0.0, 0.0, 1.0]
     }
 
-    /// Half the width and half the height of the film: at distance 1 from the eye (tangents of half the fields of view), or
-    /// in metres where the camera is orthographic.
+    /// Half the width and half the height of the film: at distance 1 from the eye (tangents of half the fields of
+    /// view), or in metres where the camera is orthographic.
     pub fn film_half_size(&self) -> [f32; 2] {
         self.film().half.to_array()
     }
@@ -214,7 +215,8 @@ mod tests {
 
     #[test]
     fn a_shift_is_a_part_of_a_larger_film() {
-        // The right upper quarter of a film of twice the size, bit by bit; 12 mm and 24 mm high at the same focal length
+        // The right upper quarter of a film of twice the size, bit by bit; 12 mm and 24 mm high at the same focal
+        // length
         let of = |sensor, shift| CameraDesc {
             focal_length_mm: Some(20.0),
             sensor_height_mm: Some(sensor),

@@ -1,8 +1,8 @@
 //! Linear f32 to 8 or 16 bits, many at a time.
 //!
-//! The definition is [`definition`]: round to nearest of the largest code times [`Display::encode`]. It costs a power for
-//! each number. Since it never falls as x grows, code k is the number of thresholds at or below x, where threshold k is
-//! the smallest f32 whose code is k or more. So the thresholds are found once, from the definition itself, and a
+//! The definition is [`definition`]: round to nearest of the largest code times [`Display::encode`]. It costs a power
+//! for each number. Since it never falls as x grows, code k is the number of thresholds at or below x, where threshold
+//! k is the smallest f32 whose code is k or more. So the thresholds are found once, from the definition itself, and a
 //! number is then a table look-up by its leading bits, which say how many thresholds lie below its bucket, and a search
 //! among the thresholds inside the bucket: none or one for 8 bits and usual curves, a few for 16.
 

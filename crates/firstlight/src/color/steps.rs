@@ -9,8 +9,8 @@ const FIRST: i32 = -40;
 const LAST: i32 = 24;
 const ENTRIES: usize = ((LAST - FIRST) as u32 * PER_OCTAVE) as usize + 1;
 
-/// The display encoding as a table, for judging errors: in steps of an 8-bit picture. Beyond white it goes on as steep as
-/// it is there, over the value: what a picture cuts off may still be wanted in a file of floats.
+/// The display encoding as a table, for judging errors: in steps of an 8-bit picture. Beyond white it goes on as steep
+/// as it is there, over the value: what a picture cuts off may still be wanted in a file of floats.
 #[derive(Clone, Debug)]
 pub(crate) struct DisplaySteps {
     encoded: Vec<f32>,

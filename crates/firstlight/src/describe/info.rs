@@ -115,8 +115,8 @@ pub(crate) fn table_schema<T: Table>() -> Json {
     schema
 }
 
-/// The range a doc comment states, as keywords of JSON Schema. The comment is what people read, so it is what the schema
-/// is made from; these are the ways it may say it: "greater than 0", "0 or more", "1 to 64", "in (0, 180]".
+/// The range a doc comment states, as keywords of JSON Schema. The comment is what people read, so it is what the
+/// schema is made from; these are the ways it may say it: "greater than 0", "0 or more", "1 to 64", "in (0, 180]".
 fn range(doc: &str) -> Option<Map<String, Json>> {
     let mut range = Map::new();
     let words: Vec<&str> = doc.split_whitespace().collect();

@@ -4,8 +4,8 @@
 //! A field with `= default` may be left out of the text, and is left out by the writer while it has that value; a field
 //! without is required, and is an argument of `new`. A table whose fields all have defaults implements `Default`.
 //!
-//! A table is itself a value: `transform: Option<TransformDesc> = None` is a field that holds a table, `keys: Vec<KeyDesc>`
-//! one that holds any number of them.
+//! A table is itself a value: `transform: Option<TransformDesc> = None` is a field that holds a table, `keys:
+//! Vec<KeyDesc>` one that holds any number of them.
 //!
 //! - [`node`]: TOML and JSON as one tree that knows where everything stands; [`scan`] and [`toml`](mod@toml) help it;
 //! - [`read`]: from the tree to values, collecting every fault;

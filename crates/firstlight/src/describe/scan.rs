@@ -1,9 +1,10 @@
 //! Looking through a text before the parsers do.
 //!
-//! Both parsers come from outside and were written for friendly input: their recursion, and the recursive drop of what they
-//! build, would overflow the stack, and a token takes many times the memory of its letters. Nesting, tokens and tables are
-//! therefore counted here, one expression after another, and what goes beyond a limit never reaches them. Nor do long lists of
-//! numbers: a list of millions of positions is left as it stands in the text ([`Numbers`]), and read from there.
+//! Both parsers come from outside and were written for friendly input: their recursion, and the recursive drop of what
+//! they build, would overflow the stack, and a token takes many times the memory of its letters. Nesting, tokens and
+//! tables are therefore counted here, one expression after another, and what goes beyond a limit never reaches them.
+//! Nor do long lists of numbers: a list of millions of positions is left as it stands in the text ([`Numbers`]), and
+//! read from there.
 
 use std::borrow::Cow;
 use std::collections::HashMap;
@@ -232,8 +233,8 @@ fn string_end(bytes: &[u8], start: usize, syntax: Syntax) -> usize {
     bytes.len()
 }
 
-/// The long list of numbers that starts at the bracket at `start`, and where it ends. `None` where anything else stands there:
-/// the parsers will say what it is.
+/// The long list of numbers that starts at the bracket at `start`, and where it ends. `None` where anything else stands
+/// there: the parsers will say what it is.
 fn numbers_at(bytes: &[u8], start: usize, syntax: Syntax) -> Option<(usize, Numbers)> {
     let nested = bytes.get(skip(bytes, start + 1, syntax)) == Some(&b'[');
     let list = |start: usize, element: &mut dyn FnMut(usize) -> Option<usize>| -> Option<(usize, u32)> {

@@ -1,8 +1,8 @@
 //! TOML to a tree, expression by expression.
 //!
-//! The parser of the `toml` crate sees one expression at a time, or a few, and what it makes of them goes into the tree at
-//! once: of a whole text it makes maps that take more than 1,000 bytes for each table. Which expressions go together, and
-//! which say something twice, is decided here, by the rules of TOML 1.0.
+//! The parser of the `toml` crate sees one expression at a time, or a few, and what it makes of them goes into the tree
+//! at once: of a whole text it makes maps that take more than 1,000 bytes for each table. Which expressions go
+//! together, and which say something twice, is decided here, by the rules of TOML 1.0.
 
 use std::collections::{HashMap, HashSet};
 use std::sync::Arc;

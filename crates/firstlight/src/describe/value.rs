@@ -245,7 +245,8 @@ impl Value for SamplesDesc {
     }
 }
 
-/// A parameter that a texture can drive: a constant, or `{ texture = "NAME", factor = ... }`, the texture times a factor.
+/// A parameter that a texture can drive: a constant, or `{ texture = "NAME", factor = ... }`, the texture times a
+/// factor.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ParamDesc<T> {
     /// The texture's name, if a texture drives it.

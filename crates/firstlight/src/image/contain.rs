@@ -15,8 +15,8 @@ thread_local! {
 
 /// Whether this thread is decoding a picture, so that a panic would be caught and become [`ImageError::Damaged`].
 ///
-/// The library sets no panic hook, and the hook that is there speaks of every panic, of those that are caught as well. A
-/// program that does not want to hear of them asks here:
+/// The library sets no panic hook, and the hook that is there speaks of every panic, of those that are caught as well.
+/// A program that does not want to hear of them asks here:
 ///
 /// ```
 /// let hook = std::panic::take_hook();

@@ -1,7 +1,7 @@
 //! Damage in picture files that is looked for before a decoder sees them, because decoders fail on it.
 //!
-//! Only what no sound file has is refused, and what cannot be followed is left to the decoder: it knows best what a file
-//! may lack. What neither of the two finds is caught (`contain.rs`).
+//! Only what no sound file has is refused, and what cannot be followed is left to the decoder: it knows best what a
+//! file may lack. What neither of the two finds is caught (`contain.rs`).
 
 /// Looks at the palette of a PNG file.
 ///

@@ -1,7 +1,7 @@
 //! OpenEXR files: the film as it is, in 32-bit floats.
 //!
-//! Channels R, G, B, and A unless every alpha is 1; premultiplied, as the format wants. The data window is the picture's
-//! window, the display window the whole film. Rec. 709 chromaticities. The receipt is in string attributes
+//! Channels R, G, B, and A unless every alpha is 1; premultiplied, as the format wants. The data window is the
+//! picture's window, the display window the whole film. Rec. 709 chromaticities. The receipt is in string attributes
 //! `firstlight:KEY`, UTF-8, the program in `software`. Lossless ZIP in blocks of 16 rows.
 
 use std::io::Cursor;

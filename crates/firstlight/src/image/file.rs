@@ -62,13 +62,13 @@ enum Target {
 
 /// Writes a file, whole or not at all: a temporary file beside the target, then renamed.
 ///
-/// A new file gets the permissions that every new file gets, a replaced one keeps its own. Of a link, what it points to is
-/// replaced or made, and the link stays. A device, pipe, socket, or a process's open file (`/dev/stdout`) cannot be
+/// A new file gets the permissions that every new file gets, a replaced one keeps its own. Of a link, what it points to
+/// is replaced or made, and the link stays. A device, pipe, socket, or a process's open file (`/dev/stdout`) cannot be
 /// replaced and is written to directly.
 ///
 /// # Errors
-/// [`ImageError::NoFolder`], [`ImageError::IsFolder`], [`ImageError::ReadOnly`] and [`ImageError::Write`], all with `path`.
-/// A file that was there is then still there, unchanged.
+/// [`ImageError::NoFolder`], [`ImageError::IsFolder`], [`ImageError::ReadOnly`] and [`ImageError::Write`], all with
+/// `path`. A file that was there is then still there, unchanged.
 pub fn write_whole(path: &Path, bytes: &[u8]) -> Result<Written, ImageError> {
     PendingFile::unchecked(path)?.stage(bytes)?.commit()
 }
@@ -145,8 +145,8 @@ impl StagedFile<'_> {
         self.commit_unless(&|| false)
     }
 
-    /// The same, unless `stop` says so while a device, pipe or socket lets wait. Such a one should come before the files
-    /// that are staged with it, so that all of them or none appear.
+    /// The same, unless `stop` says so while a device, pipe or socket lets wait. Such a one should come before the
+    /// files that are staged with it, so that all of them or none appear.
     ///
     /// # Errors
     /// Those of [`write_whole`], and [`ImageError::Stopped`].

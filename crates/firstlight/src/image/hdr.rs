@@ -1,8 +1,8 @@
 //! Radiance HDR files: linear colour with 8-bit mantissas and one exponent a pixel.
 //!
 //! Not by the `image` crate, whose exponents come from the system's logarithm, wrap around for
-//! numbers below 2^-128, and whose files of exactly 32768 columns cannot be read. Colour is rounded to nearest, which suits
-//! the readers that take a mantissa as it is (all but Radiance's own tools, which add a half).
+//! numbers below 2^-128, and whose files of exactly 32768 columns cannot be read. Colour is rounded to nearest, which
+//! suits the readers that take a mantissa as it is (all but Radiance's own tools, which add a half).
 //!
 //! Source: G. Ward, "Real Pixels", Graphics Gems II, 1991; the Radiance file formats manual, "picture files".
 

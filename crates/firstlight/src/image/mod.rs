@@ -73,8 +73,8 @@ impl Image {
     /// The others store the film as it is, and `display` has no part in them. NaN is stored as 0 and infinity as the
     /// largest number, except in EXR, which has both.
     ///
-    /// The receipt's entry `display` is this function's own: 8- and 16-bit files say `display` there, the others have none,
-    /// whatever `receipt` says of it.
+    /// The receipt's entry `display` is this function's own: 8- and 16-bit files say `display` there, the others have
+    /// none, whatever `receipt` says of it.
     ///
     /// # Errors
     /// A picture whose window is empty, or outside its film, or which has not as many pixels as the window says; a
@@ -127,7 +127,8 @@ impl Receipt {
         Receipt { entries: others.chain(own).collect() }
     }
 
-    /// Whether a file is a PNG that firstlight wrote, with a receipt in it. Reads no further than to where the pixels begin.
+    /// Whether a file is a PNG that firstlight wrote, with a receipt in it. Reads no further than to where the pixels
+    /// begin.
     pub fn is_in_png(file: &mut dyn std::io::Read) -> bool {
         png::has_receipt(file).unwrap_or(false)
     }

@@ -2,11 +2,11 @@
 //!
 //! Only the numbers of the picture count. Colour profiles and gamma chunks are ignored, as glTF demands (glTF 2.0,
 //! "Images"). So is the orientation that a camera wrote into EXIF: uv was made for the texels as they are stored, and a
-//! turned texture would slip off them. Alpha is dropped and colour left as it stands, straight. Of an animation the first
-//! picture is taken.
+//! turned texture would slip off them. Alpha is dropped and colour left as it stands, straight. Of an animation the
+//! first picture is taken.
 //!
-//! Memory is bounded by the length of the file, whatever its header says: no PNG expands more than 1032 times (the limit
-//! of deflate), and a JPEG spends at least one bit on every 16 x 16 texels.
+//! Memory is bounded by the length of the file, whatever its header says: no PNG expands more than 1032 times (the
+//! limit of deflate), and a JPEG spends at least one bit on every 16 x 16 texels.
 
 use std::io::Cursor;
 

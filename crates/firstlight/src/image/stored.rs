@@ -29,8 +29,9 @@ pub struct StoredImage {
 const LIMITS: Limits = Limits { side: 65536, texels: 1 << 27 };
 
 impl StoredImage {
-    /// Reads a PNG, EXR or HDR file; which of them, its first bytes say. Made for the files that firstlight writes; those
-    /// of other programs are read if they are of the same make (no palettes, no tiles with levels, no other channels alone).
+    /// Reads a PNG, EXR or HDR file; which of them, its first bytes say. Made for the files that firstlight writes;
+    /// those of other programs are read if they are of the same make (no palettes, no tiles with levels, no other
+    /// channels alone).
     ///
     /// # Errors
     /// [`ImageError::UnknownKind`]; [`ImageError::TooLarge`] above 65536 a side or 2^27 in all, the largest film;

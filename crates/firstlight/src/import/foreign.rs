@@ -1,5 +1,5 @@
-//! What a file is that is neither a scene nor a mesh, by its content: so that one line can say it, instead of a line for
-//! every word that no reader understands.
+//! What a file is that is neither a scene nor a mesh, by its content: so that one line can say it, instead of a line
+//! for every word that no reader understands.
 
 use super::{obj, ply, stl};
 
@@ -131,8 +131,8 @@ const HEAD: usize = 1 << 16;
 /// Bytes at both ends of JSON that are looked at: `asset` may stand behind a buffer within the text.
 const JSON_ENDS: usize = 1 << 20;
 
-/// What `bytes` are, if they are nothing that could be a scene, nor a mesh if one is wanted. `None` where nothing speaks
-/// against it.
+/// What `bytes` are, if they are nothing that could be a scene, nor a mesh if one is wanted. `None` where nothing
+/// speaks against it.
 pub(crate) fn foreign(bytes: &[u8], wanted: Wanted) -> Option<Foreign> {
     let is = |kind, family| Some(Foreign { kind, family });
     let mesh = |kind| if wanted == Wanted::Scene { is(kind, Family::Mesh) } else { None };

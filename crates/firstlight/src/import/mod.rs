@@ -1,17 +1,17 @@
 //! Reading meshes of others: PLY, STL and OBJ, from bytes to a plain [`MeshData`].
 //!
-//! The station before is whoever has the bytes (a scene's files come through [`Assets`](crate::Assets)); the station after is
-//! whoever makes shapes of them. Nothing here opens a file, compiles or transforms. Axes, units and the direction of v are
-//! left as the file has them, for the file does not say them.
+//! The station before is whoever has the bytes (a scene's files come through [`Assets`](crate::Assets)); the station
+//! after is whoever makes shapes of them. Nothing here opens a file, compiles or transforms. Axes, units and the
+//! direction of v are left as the file has them, for the file does not say them.
 //!
-//! The readers are our own. `ply-rs-bw`, `stl_io` and `tobj` read value by value into maps, enums or growing lists on one
-//! thread, believe the counts of a header, and do not say the line of a fault; a renderer that must open a hundred megabytes
-//! in a second, from anybody, needs otherwise.
+//! The readers are our own. `ply-rs-bw`, `stl_io` and `tobj` read value by value into maps, enums or growing lists on
+//! one thread, believe the counts of a header, and do not say the line of a fault; a renderer that must open a hundred
+//! megabytes in a second, from anybody, needs otherwise.
 //!
 //! - Memory follows the length of the file, never what its header claims.
 //! - The result does not depend on the number of threads.
-//! - Text is cut at line ends into pieces for all threads (`text.rs`); vertices are made one by their keys on all threads
-//!   as well (`weld.rs`).
+//! - Text is cut at line ends into pieces for all threads (`text.rs`); vertices are made one by their keys on all
+//!   threads as well (`weld.rs`).
 
 mod error;
 mod foreign;
@@ -38,21 +38,22 @@ const MAX_COUNT: u64 = (1 << 32) - 2;
 
 /// A triangle mesh as a file holds it: nothing compiled, nothing transformed.
 ///
-/// Every list "per vertex" has the length of `positions` or is empty; every list "per triangle" that of `triangles`, or is
-/// empty. Indices are in range. Numbers may be anything a file can say, NaN and infinities too: whoever uses them leaves out
-/// the triangles whose positions are not finite.
+/// Every list "per vertex" has the length of `positions` or is empty; every list "per triangle" that of `triangles`, or
+/// is empty. Indices are in range. Numbers may be anything a file can say, NaN and infinities too: whoever uses them
+/// leaves out the triangles whose positions are not finite.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct MeshData {
     /// Where the vertices are, in the file's units and axes, less `origin`.
     pub positions: Vec<[f32; 3]>,
-    /// What was taken off every position, in f64: 0 but for meshes far from 0, of which 32 bits would lose what is small.
+    /// What was taken off every position, in f64: 0 but for meshes far from 0, of which 32 bits would lose what is
+    /// small.
     pub origin: [f64; 3],
     /// Per vertex, as the file has them: not always of length 1; `[0, 0, 0]` where the file gives none.
     pub normals: Vec<[f32; 3]>,
     /// Sets of texture coordinates, each per vertex; no set if the file has none. v as the file has it.
     pub uvs: Vec<Vec<[f32; 2]>>,
-    /// Per vertex: red, green, blue, **linear** Rec. 709, and alpha. Whole numbers in files are taken as sRGB and decoded,
-    /// fractions as linear already. Without alpha in the file it is 1.
+    /// Per vertex: red, green, blue, **linear** Rec. 709, and alpha. Whole numbers in files are taken as sRGB and
+    /// decoded, fractions as linear already. Without alpha in the file it is 1.
     pub colors: Vec<[f32; 4]>,
     /// Per vertex: the radius of a point of a PLY point set.
     pub radii: Vec<f32>,
@@ -132,7 +133,8 @@ impl MeshFormat {
             mesh.map_err(|fault| fault.into_error(name, bytes))
         };
         let mut mesh = read([0.0; 3])?;
-        // What is far from 0 has lost its small digits: once more, without what all of it has in common. STL has no more digits
+        // What is far from 0 has lost its small digits: once more, without what all of it has in common. STL has no
+        // more digits
         let origin = mesh.bounds().map_or(DVec3::ZERO, origin_for).to_array();
         if self != Self::Stl && origin != [0.0; 3] {
             mesh = read(origin)?;
@@ -145,10 +147,10 @@ impl MeshFormat {
 
 /// Reads a mesh from the bytes of a file, on all threads.
 ///
-/// `name` tells the kind by its ending ([`MeshFormat::detect`]) and stands in errors; no file is opened. `progress` is told
-/// the bytes read and those there are, from any thread, and may stop the work. Polygons become triangles, concave
-/// ones too: small ones that are fans from their first corner so, others by cutting ears. Of large ones that cross themselves a
-/// note is made.
+/// `name` tells the kind by its ending ([`MeshFormat::detect`]) and stands in errors; no file is opened. `progress` is
+/// told the bytes read and those there are, from any thread, and may stop the work. Polygons become triangles, concave
+/// ones too: small ones that are fans from their first corner so, others by cutting ears. Of large ones that cross
+/// themselves a note is made.
 ///
 /// # Errors
 /// [`ImportError`], with the place in the file.

@@ -1,13 +1,13 @@
 //! Wavefront OBJ: polygons, with their texture coordinates, normals, materials, groups and smoothing.
 //!
-//! Read: `v` (three numbers; red, green, blue after them, as linear numbers; a single weight is ignored), `vt`, `vn`, `f` in all
-//! forms with indices from 1 or, negative, from the last (those of texture coordinates or normals are left out if the file has
-//! none at all), `o`, `g`, `s`, `usemtl`, the names of `mtllib`; `\` at the end of a line goes
-//! on with the next, `#` begins a comment. An index may point to what comes later. `l` and `p` are left out; free-form curves
-//! and surfaces and all other statements are not understood. Notes count them.
+//! Read: `v` (three numbers; red, green, blue after them, as linear numbers; a single weight is ignored), `vt`, `vn`,
+//! `f` in all forms with indices from 1 or, negative, from the last (those of texture coordinates or normals are left
+//! out if the file has none at all), `o`, `g`, `s`, `usemtl`, the names of `mtllib`; `\` at the end of a line goes
+//! on with the next, `#` begins a comment. An index may point to what comes later. `l` and `p` are left out; free-form
+//! curves and surfaces and all other statements are not understood. Notes count them.
 //!
-//! Different corners (position, texture coordinates, normal) become vertices in the order of their first use; where the faces
-//! use nothing but positions, or the same index for all, vertices are those of the file.
+//! Different corners (position, texture coordinates, normal) become vertices in the order of their first use; where the
+//! faces use nothing but positions, or the same index for all, vertices are those of the file.
 //!
 //! Text is read on all threads, a piece of lines each: an index from the last is kept relative to its piece until the
 //! pieces before it are counted.

@@ -1,9 +1,10 @@
 //! Polygons to triangles.
 //!
-//! A polygon is laid onto the axis plane that its own plane (Newell's method) is nearest to. Where all triangles of the fan
-//! from its first corner turn the same way, the fan is taken; that is so for every convex polygon. Otherwise ears are cut off,
-//! always the first in order (G. H. Meisters 1975, "Polygons have ears"). Which corners are ears is remembered, so that
-//! cutting takes quadratic time, not cubic. Polygons of more than [`SMALL`] corners are cut in [`rounds`] instead.
+//! A polygon is laid onto the axis plane that its own plane (Newell's method) is nearest to. Where all triangles of the
+//! fan from its first corner turn the same way, the fan is taken; that is so for every convex polygon. Otherwise ears
+//! are cut off, always the first in order (G. H. Meisters 1975, "Polygons have ears"). Which corners are ears is
+//! remembered, so that cutting takes quadratic time, not cubic. Polygons of more than [`SMALL`] corners are cut in
+//! [`rounds`] instead.
 
 mod rounds;
 
@@ -128,8 +129,8 @@ impl Ears {
         triangles.extend((2..size).map(|i| [corner(0), corner(i - 1), corner(i)]));
     }
 
-    /// Lays the polygon into a plane, counter-clockwise. Not one without an area or with a corner that is not finite: for those
-    /// nothing is better than a fan.
+    /// Lays the polygon into a plane, counter-clockwise. Not one without an area or with a corner that is not finite:
+    /// for those nothing is better than a fan.
     fn lay(&mut self, start: usize, size: usize, position: &impl Fn(usize) -> [f32; 3]) -> bool {
         let at = |i: usize| position(start + i).map(f64::from);
         // The normal, by Newell's method, from the first corner
@@ -190,7 +191,8 @@ impl Ears {
         }
         let mut at = 0;
         for _ in 0..size - 2 {
-            // The next ear from here; where there is none, the polygon crosses itself: any corner that turns forwards, or any
+            // The next ear from here; where there is none, the polygon crosses itself: any corner that turns forwards,
+            // or any
             let begin = at;
             while !self.ear[at as usize] {
                 at = self.next[at as usize];

@@ -8,8 +8,8 @@ use crate::math::DVec3;
 
 /// What [`MeshData::report`] finds.
 ///
-/// Edges and faces are compared by the positions of their ends, to the bit (-0 as 0): vertices that were split for normals or
-/// texture coordinates are one.
+/// Edges and faces are compared by the positions of their ends, to the bit (-0 as 0): vertices that were split for
+/// normals or texture coordinates are one.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct MeshReport {
     /// How many vertices there are.

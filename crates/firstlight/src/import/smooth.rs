@@ -1,9 +1,10 @@
 //! Vertex normals from the faces around them, kept apart at creases.
 //!
-//! At each position the corners of all triangles are gathered. Two that share an edge there are on one side of no crease if
-//! their triangles' normals differ by at most the angle and are of one smoothing group; corners that are joined so, step by
-//! step, share a normal: the sum of their triangles' unit normals, weighted by the angle at the corner, so that it does
-//! not matter how polygons were cut into triangles. Sums are of f64, in the order of the triangles.
+//! At each position the corners of all triangles are gathered. Two that share an edge there are on one side of no
+//! crease if their triangles' normals differ by at most the angle and are of one smoothing group; corners that are
+//! joined so, step by step, share a normal: the sum of their triangles' unit normals, weighted by the angle at the
+//! corner, so that it does not matter how polygons were cut into triangles. Sums are of f64, in the order of the
+//! triangles.
 //!
 //! Source: G. Thürmer, C. A. Wüthrich 1998, "Computing Vertex Normals from Polygonal Facets".
 
@@ -19,13 +20,13 @@ const MAX_AROUND_EDGE: usize = 8;
 const BLOCK: usize = 1 << 12;
 
 impl MeshData {
-    /// Replaces the normals by smooth ones: those of the faces around each vertex, except across edges where faces meet at more
-    /// than `crease_deg` degrees, or are of different smoothing groups (0: never smooth), if the file has them.
+    /// Replaces the normals by smooth ones: those of the faces around each vertex, except across edges where faces meet
+    /// at more than `crease_deg` degrees, or are of different smoothing groups (0: never smooth), if the file has them.
     ///
-    /// Vertices at creases are split; those at the same position (to the bit, -0 as 0) are smoothed together, whatever their
-    /// texture coordinates. 0 or less keeps every edge of faces that differ; 180 or more smooths over all. A vertex without a
-    /// triangle that has an area gets the normal `[0, 0, 0]`, all others are of length 1. New vertices follow the old ones. The
-    /// result does not depend on the number of threads.
+    /// Vertices at creases are split; those at the same position (to the bit, -0 as 0) are smoothed together, whatever
+    /// their texture coordinates. 0 or less keeps every edge of faces that differ; 180 or more smooths over all. A
+    /// vertex without a triangle that has an area gets the normal `[0, 0, 0]`, all others are of length 1. New vertices
+    /// follow the old ones. The result does not depend on the number of threads.
     ///
     /// The mesh is left as it is, but without normals, if it would need more than 2^32 - 2 vertices.
     pub fn smooth(&mut self, crease_deg: f64) {

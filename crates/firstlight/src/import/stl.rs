@@ -1,15 +1,19 @@
 //! STL: triangles and nothing else, in binary data or text.
 //!
-//! Corners at the same position (to the bit, -0 as 0) become one vertex, numbered in the order of the file: normals can then be
-//! smoothed over edges. The normals of facets are not read: the order of the corners says the same (counter-clockwise from
-//! outside), and more reliably. Neither are the two bytes after each binary facet, which some programs use for colours.
+//! Corners at the same position (to the bit, -0 as 0) become one vertex, numbered in the order of the file: normals can
+//! then be smoothed over edges. The normals of facets are not read: the order of the corners says the same
+//! (counter-clockwise from outside), and more reliably. Neither are the two bytes after each binary facet, which some
+//! programs use for colours.
 //!
-//! **Which of the two kinds a file is**, its first word does not tell: many binary files begin with `solid`. In this order:
+//! **Which of the two kinds a file is**, its first word does not tell: many binary files begin with `solid`. In this
+//! order:
 //!
 //! 1. 84 bytes and 50 for each facet counted at byte 80: binary.
-//! 2. It begins with `solid` in any case, after blanks or none, no byte of its first 1024 is zero, and `facet` or `endsolid` is
+//! 2. It begins with `solid` in any case, after blanks or none, no byte of its first 1024 is zero, and `facet` or
+//! `endsolid` is
 //!    among the 1024 bytes after that line, or nothing follows: text.
-//! 3. At least 84 bytes: binary, and its count is wrong. More bytes than counted: the rest is ignored, with a note. A count
+//! 3. At least 84 bytes: binary, and its count is wrong. More bytes than counted: the rest is ignored, with a note. A
+//! count
 //!    of 0 or 2^32 - 1, and whole facets: it was not known when the header was written, and the length decides, with a
 //!    note. Fewer bytes than counted: an error.
 //!

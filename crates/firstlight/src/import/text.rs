@@ -1,8 +1,8 @@
 //! Words and numbers of text files, and how large files are cut for all threads.
 //!
-//! Numbers are correctly rounded. The common ones, of up to 19 digits and a small power of ten, are one multiplication or
-//! division of two exact f64 (W. D. Clinger 1990, "How to read floating point numbers accurately"); the standard library
-//! reads the others.
+//! Numbers are correctly rounded. The common ones, of up to 19 digits and a small power of ten, are one multiplication
+//! or division of two exact f64 (W. D. Clinger 1990, "How to read floating point numbers accurately"); the standard
+//! library reads the others.
 
 use std::ops::Range;
 
@@ -252,8 +252,8 @@ impl Decimal {
     }
 }
 
-/// Cuts `bytes[start..]` into pieces of about `size` bytes for which `cut(end)` holds at every inner boundary; each begins
-/// after a line end.
+/// Cuts `bytes[start..]` into pieces of about `size` bytes for which `cut(end)` holds at every inner boundary; each
+/// begins after a line end.
 pub(super) fn pieces(bytes: &[u8], start: usize, size: usize, cut: impl Fn(usize) -> bool) -> Vec<Range<usize>> {
     let mut pieces = Vec::new();
     let mut from = start;

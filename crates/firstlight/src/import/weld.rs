@@ -1,9 +1,9 @@
 //! Making one vertex of all corners with the same key, on all threads, always with the same result.
 //!
-//! A single hash table over all corners misses the cache at every look. Here corners are first dealt into buckets by their
-//! hash, so that each bucket's table stays in the cache and buckets are worked on in parallel. Every corner learns the
-//! *first* corner with its key; that, and not the order of any table, numbers the vertices. So the hash may be seeded anew
-//! in each process, which keeps files that were made to collide from being slow.
+//! A single hash table over all corners misses the cache at every look. Here corners are first dealt into buckets by
+//! their hash, so that each bucket's table stays in the cache and buckets are worked on in parallel. Every corner
+//! learns the *first* corner with its key; that, and not the order of any table, numbers the vertices. So the hash may
+//! be seeded anew in each process, which keeps files that were made to collide from being slow.
 
 use std::hash::{BuildHasher, RandomState};
 use std::sync::atomic::{AtomicU32, Ordering};

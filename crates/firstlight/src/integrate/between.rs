@@ -111,7 +111,8 @@ impl Pyramid {
         self.sides.iter().fold(f32::NEG_INFINITY, |gap, n| gap.max(least(n)))
     }
 
-    /// Whether the hull of some points may be in the way from the middle of the patch; `None` if it is not in the way from any of it.
+    /// Whether the hull of some points may be in the way from the middle of the patch; `None` if it is not in the way
+    /// from any of it.
     fn meets(&self, points: &[Vec3]) -> Option<bool> {
         let room = points.iter().fold(0.0f32, |size, q| size.max(q.length())) * SLACK;
         let gap = self.gap_of(points);
@@ -267,8 +268,9 @@ impl Between {
                 if rises(horizon) <= room {
                     continue;
                 }
-                // One that goes on as its own facet does, or falls off from it, hides nothing that is above that; and one in the
-                // same plane nothing at all: what comes from below has passed that plane before it gets there
+                // One that goes on as its own facet does, or falls off from it, hides nothing that is above that; and
+                // one in the same plane nothing at all: what comes from below has passed that plane before it gets
+                // there
                 if is_lifted && rises(ng) <= room && (!sees_below || is_in_plane(&corners, edge * FLAT)) {
                     continue;
                 }
@@ -449,8 +451,8 @@ impl Between {
         self.add(Some(hider));
     }
 
-    /// A parallelogram that hides nothing from the point, but that a part of the patch is on the other side of its plane. `side` is that
-    /// of the light, if the parallelogram is one that is seen.
+    /// A parallelogram that hides nothing from the point, but that a part of the patch is on the other side of its
+    /// plane. `side` is that of the light, if the parallelogram is one that is seen.
     fn beside(&mut self, pyramid: &Pyramid, flat: &Parallelogram, asker: &Asker, side: PlaneSide) {
         let si = asker.si;
         if pyramid.meets_flat(flat, si).is_none() {
@@ -497,9 +499,9 @@ impl Between {
     }
 }
 
-/// How far off the outline of a sphere of radius `r` is seen, at least, from within `reach` of a point at `distance` from its
-/// middle. A step of d turns the way to the outline by at most d over that: across the line of sight by d over the distance, along
-/// it by that times r over the tangent, and the squares add up.
+/// How far off the outline of a sphere of radius `r` is seen, at least, from within `reach` of a point at `distance`
+/// from its middle. A step of d turns the way to the outline by at most d over that: across the line of sight by d over
+/// the distance, along it by that times r over the tangent, and the squares add up.
 fn tangent(distance: f64, r: f64, reach: f32) -> f32 {
     let near = (distance - f64::from(reach)).max(r);
     (near * near - r * r).sqrt() as f32
@@ -551,8 +553,8 @@ fn triangle_distance([a, b, c]: &[Vec3; 3]) -> f32 {
     (n.dot(*a) / n.length()).abs()
 }
 
-/// Whether a sphere, or a disk in one, reaches into a light that is a ball: what of it is behind the light's surface does not show on the disk
-/// that stands for the light.
+/// Whether a sphere, or a disk in one, reaches into a light that is a ball: what of it is behind the light's surface
+/// does not show on the disk that stands for the light.
 fn touches(emitter: &Emitter, to: DVec3, r: f64, p: Vec3) -> bool {
     match emitter {
         Emitter::Ball { center, radius } => (*center - p.as_dvec3() - to).length() < radius + r,

@@ -1,20 +1,21 @@
-//! The integral of a light behind anything, cell by cell: cells of the light's square in which something changes are cut into
-//! four, until what is left to doubt is small enough.
+//! The integral of a light behind anything, cell by cell: cells of the light's square in which something changes are
+//! cut into four, until what is left to doubt is small enough.
 //!
-//! Each cell has one point, at a place of its own, that says whether something is in the way; what the cell would send is
-//! taken from its middle. A cell is in doubt where one next to it answers otherwise. Doubt halves from one level to the next
-//! where an edge of a shadow runs: after k levels it is 2^(-1.5 k) of what it was, for 2^k times the rays. Points that are
-//! doubled in number all over the light (tried, and still the way to begin with) need 2^(2 k) times the rays for that.
+//! Each cell has one point, at a place of its own, that says whether something is in the way; what the cell would send
+//! is taken from its middle. A cell is in doubt where one next to it answers otherwise. Doubt halves from one level to
+//! the next where an edge of a shadow runs: after k levels it is 2^(-1.5 k) of what it was, for 2^k times the rays.
+//! Points that are doubled in number all over the light (tried, and still the way to begin with) need 2^(2 k) times the
+//! rays for that.
 
 use super::Sums;
 use crate::math::{LANES, Vec3};
 
-/// Cells along a side to begin with; as many as there may be all over the light, so that nothing small is overlooked; and at the
-/// end, where there is doubt.
+/// Cells along a side to begin with; as many as there may be all over the light, so that nothing small is overlooked;
+/// and at the end, where there is doubt.
 const FIRST: usize = 32;
 const EVERYWHERE: usize = 128;
-/// The same where what is lit is a smaller part than this: a sliver that few cells meet falls apart when those are cut that met it, and
-/// what lies between is lost.
+/// The same where what is lit is a smaller part than this: a sliver that few cells meet falls apart when those are cut
+/// that met it, and what lies between is lost.
 const EVERYWHERE_THIN: usize = 256;
 const THIN: f64 = 0.02;
 const LAST: usize = 1024;
@@ -26,8 +27,8 @@ const SMOOTHER: f64 = 0.25;
 const HEAVY: f64 = 4.0;
 /// The most cells in doubt that are cut.
 const MOST: usize = 1 << 17;
-/// Cells are cut that are no farther from a highlight's middle than so many times their width, until they are as narrow as that
-/// part of its spread: so what lies on its skirt, or between all cells of the first size, is not overlooked.
+/// Cells are cut that are no farther from a highlight's middle than so many times their width, until they are as narrow
+/// as that part of its spread: so what lies on its skirt, or between all cells of the first size, is not overlooked.
 const SKIRT: f32 = 3.0;
 const FINE: f32 = 0.5;
 
@@ -45,7 +46,8 @@ pub(super) trait Source {
     /// What the point would send; `None` from below the horizon, or from a side that does not emit.
     fn sent(&self, at: [f32; 2]) -> Option<Sent>;
 
-    /// The highlight that its points make, if that may be narrow beside the first cells, and nothing else says what it makes in all.
+    /// The highlight that its points make, if that may be narrow beside the first cells, and nothing else says what it
+    /// makes in all.
     fn highlight(&self) -> Option<Highlight> {
         None
     }
@@ -104,8 +106,8 @@ struct Cell {
 }
 
 impl Cell {
-    /// How rough cells are whose four middles send this together, where the middle of all four sends `middle`: it is off by four
-    /// times as much as they are.
+    /// How rough cells are whose four middles send this together, where the middle of all four sends `middle`: it is
+    /// off by four times as much as they are.
     fn roughness(four: &[Cell], middle: [f32; 2]) -> [f32; 2] {
         let mean = |k: usize| four.iter().map(|cell| cell.sums[k]).sum::<f32>() * 0.25;
         [0, 1].map(|k| (mean(k) - middle[k]).abs() * (1.0 / 3.0))
@@ -215,8 +217,9 @@ fn ask(source: &impl Source, side: usize, places: &[[u32; 2]], cells: &mut Vec<C
     }
 }
 
-/// What arrives, and how far it may be wrong: three times its standard deviation, if the points were chosen by chance. Both are parts of
-/// the light's measure; or, where `whole` says what would arrive with nothing in the way, as much as that makes.
+/// What arrives, and how far it may be wrong: three times its standard deviation, if the points were chosen by chance.
+/// Both are parts of the light's measure; or, where `whole` says what would arrive with nothing in the way, as much as
+/// that makes.
 pub(super) fn integrate(
     source: &impl Source,
     whole: Option<&Sums>,
@@ -324,7 +327,8 @@ fn four([x, y]: [u32; 2]) -> [[u32; 2]; 4] {
     [[x, y], [x + 1, y], [x, y + 1], [x + 1, y + 1]]
 }
 
-/// Cuts the doubtful cells into four, and those next to them where the new ones bring doubt. What is not cut is settled.
+/// Cuts the doubtful cells into four, and those next to them where the new ones bring doubt. What is not cut is
+/// settled.
 fn cut(
     source: &impl Source,
     cells: &[Cell],

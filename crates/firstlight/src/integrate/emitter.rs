@@ -9,8 +9,8 @@ use crate::math::{DVec3, Vec3};
 pub(crate) enum Emitter {
     /// A rectangle or a disk.
     Flat(FlatLight),
-    /// A sphere whose outside emits as light does. From any point outside it looks like the disk in which the cone around
-    /// it touches it: the same directions, and the same radiance in each.
+    /// A sphere whose outside emits as light does. From any point outside it looks like the disk in which the cone
+    /// around it touches it: the same directions, and the same radiance in each.
     Ball { center: DVec3, radius: f64 },
     /// Any other sphere: [`points`](super::points).
     Points,

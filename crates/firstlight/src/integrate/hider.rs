@@ -1,7 +1,7 @@
 //! What a convex thing hides of a flat light, row by row.
 //!
-//! Seen from one point, what a convex thing hides of a flat light is convex as well: on every row y of the light it is one
-//! interval of x. Straight edges give linear inequalities in x, spheres one quadratic.
+//! Seen from one point, what a convex thing hides of a flat light is convex as well: on every row y of the light it is
+//! one interval of x. Straight edges give linear inequalities in x, spheres one quadratic.
 
 use fearless_simd::{f32x16, prelude::*};
 
@@ -44,7 +44,8 @@ pub(crate) struct Edges {
 /// happens before the light is reached, or the light itself is inside.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Cone {
-    /// r^2 |l|^2 - |l x s|^2, s leading to the centre: whether the line meets the sphere. Of a disk (n.l)^2 - (x.l)^2 - (y.l)^2.
+    /// r^2 |l|^2 - |l x s|^2, s leading to the centre: whether the line meets the sphere. Of a disk (n.l)^2 - (x.l)^2 -
+    /// (y.l)^2.
     quadratic: Quadratic,
     /// l.s; of a disk, how far beyond its plane l ends.
     ahead: Linear,
@@ -221,7 +222,8 @@ impl Hider {
         Hider::Edges(Edges { sides, count: 1, lengths: [1.0; EDGES] })
     }
 
-    /// A sphere whose centre is at `s` from the point, which is outside of it. `None` if it is wholly behind the light's plane.
+    /// A sphere whose centre is at `s` from the point, which is outside of it. `None` if it is wholly behind the
+    /// light's plane.
     pub fn sphere(view: &View, s: DVec3, r: f64) -> Option<Hider> {
         let normal = view.a.cross(view.b);
         let normal = (normal / normal.length()).as_dvec3();

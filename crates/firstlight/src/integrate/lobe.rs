@@ -16,8 +16,8 @@ const PIECE: f32 = 1.2;
 /// The most pieces.
 const MAX_PIECES: f32 = 12.0;
 
-/// What a highlight covers of the light: `None` if it is not narrow beside the light, and has to be integrated with the rest;
-/// `Some(None)` if it covers nothing of it.
+/// What a highlight covers of the light: `None` if it is not narrow beside the light, and has to be integrated with the
+/// rest; `Some(None)` if it covers nothing of it.
 pub(crate) fn region(view: &View) -> Option<Option<Region>> {
     if matches!(view.lobe, Lobe::None) {
         return None;
@@ -50,8 +50,8 @@ pub(crate) fn region(view: &View) -> Option<Option<Region>> {
 /// Highlights of lower exponents have a kink where they end.
 const KINKED: f32 = 8.0;
 
-/// Where a blunt highlight of Phong ends: what lies beyond, as if something hid it, if some of the light does; `Some(None)` if all does;
-/// `None` if nothing does, or the end does not show.
+/// Where a blunt highlight of Phong ends: what lies beyond, as if something hid it, if some of the light does;
+/// `Some(None)` if all does; `None` if nothing does, or the end does not show.
 pub(crate) fn end(view: &View) -> Option<Option<Hider>> {
     let Lobe::Phong(lobe) = view.lobe else { return None };
     // What is raised to 0 is 1 everywhere

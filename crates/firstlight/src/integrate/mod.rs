@@ -5,8 +5,8 @@
 //!   ([`tensor`]);
 //! - a few convex things are in the way, or the horizon cuts the light, or the light is near: row by row, with
 //!   intervals in closed form, the error measured and brought under its bound ([`rows`]);
-//! - anything else: a mask over fixed points, their number doubled until the answer stands still ([`mask`]); and where that
-//!   takes too many, cells that are cut where shadows have their edges ([`cells`]).
+//! - anything else: a mask over fixed points, their number doubled until the answer stands still ([`mask`]); and where
+//!   that takes too many, cells that are cut where shadows have their edges ([`cells`]).
 //!
 //! A highlight that is narrow beside the light is integrated by itself, over the part of the light that it covers.
 
@@ -121,8 +121,8 @@ pub(crate) fn integrate<S: Simd>(
     (diffuse + specular, diffuse_error + specular_error)
 }
 
-/// What arrives from a flat light that nothing stands in front of; `None` where the horizon cuts it and some points of it tell as much: where it
-/// is not near, and no highlight on it is narrow.
+/// What arrives from a flat light that nothing stands in front of; `None` where the horizon cuts it and some points of
+/// it tell as much: where it is not near, and no highlight on it is narrow.
 pub(crate) fn unshadowed<S: Simd>(simd: S, view: &View, enough: &dyn Fn(&Sums, &Sums) -> bool) -> Option<Sums> {
     let is_even =
         !view.is_above_horizon() && tensor::order(view, &Region::whole(view)).is_some() && lobe::end(view).is_none();

@@ -4,8 +4,8 @@ use pxfm::{f_exp, f_log};
 
 use super::view::{Outline, View};
 
-/// How the points of the unit square are spread over a light: rows by the hyperbolic sine of their parameter, in the distance
-/// of the point; and places along a row in the same way, in the distance of the row.
+/// How the points of the unit square are spread over a light: rows by the hyperbolic sine of their parameter, in the
+/// distance of the point; and places along a row in the same way, in the distance of the row.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Near {
     outline: Outline,

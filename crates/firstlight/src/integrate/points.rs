@@ -1,5 +1,6 @@
-//! The integral of a sphere that no flat light stands for, by cells: over rings of its area where light does not weaken on its way,
-//! over directions where it does. A sphere that nearly touches a surface does all it does within next to nothing of its area.
+//! The integral of a sphere that no flat light stands for, by cells: over rings of its area where light does not weaken
+//! on its way, over directions where it does. A sphere that nearly touches a surface does all it does within next to
+//! nothing of its area.
 
 use std::f64::consts::TAU;
 
@@ -81,8 +82,8 @@ struct Rings {
     to: DVec3,
     /// Around what the rings lie: unit vectors, the last is the axis.
     frame: [DVec3; 3],
-    /// The width of the innermost ring, and the logarithm of how many times the outermost is as wide. Widths are those of the height of
-    /// a cap, for which the sphere has the radius 1: equal widths are equal areas.
+    /// The width of the innermost ring, and the logarithm of how many times the outermost is as wide. Widths are those
+    /// of the height of a cap, for which the sphere has the radius 1: equal widths are equal areas.
     width: f64,
     growth: f64,
 }
@@ -113,8 +114,8 @@ impl Rings {
     }
 }
 
-/// Equal areas of the square are equal solid angles, of a sphere both sides of which emit: of the cone around it, first to its near
-/// side, then to the far one; or, from within, of all that is above the surface.
+/// Equal areas of the square are equal solid angles, of a sphere both sides of which emit: of the cone around it, first
+/// to its near side, then to the far one; or, from within, of all that is above the surface.
 struct Directions {
     /// From the point to the sphere's middle, and the square of the way to where the cone touches; below 0 within.
     to: DVec3,

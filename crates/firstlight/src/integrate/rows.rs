@@ -1,12 +1,13 @@
-//! The integral of a flat light row by row: what is left of each row is a few intervals, and along an interval the light is
-//! smooth.
+//! The integral of a flat light row by row: what is left of each row is a few intervals, and along an interval the
+//! light is smooth.
 //!
-//! Rows lie at the nodes of a Kronrod rule, sixteen lanes for fifteen rows, on panels that end where something changes its
-//! course: where a hidden part begins, has a corner or touches the light's edge. The Gauss rule inside the Kronrod rule says
-//! how far a panel can be wrong; the worst panel is halved until the whole is good enough. Where one thing at most is in the way,
-//! and so all corners are known, seven rows a panel are tried first, two panels in sixteen lanes.
+//! Rows lie at the nodes of a Kronrod rule, sixteen lanes for fifteen rows, on panels that end where something changes
+//! its course: where a hidden part begins, has a corner or touches the light's edge. The Gauss rule inside the Kronrod
+//! rule says how far a panel can be wrong; the worst panel is halved until the whole is good enough. Where one thing at
+//! most is in the way, and so all corners are known, seven rows a panel are tried first, two panels in sixteen lanes.
 //!
-//! Source of the rules: Piessens et al., "QUADPACK", 1983, qk15; Kronrod, "Nodes and Weights of Quadrature Formulas", 1965, for seven.
+//! Source of the rules: Piessens et al., "QUADPACK", 1983, qk15; Kronrod, "Nodes and Weights of Quadrature Formulas",
+//! 1965, for seven.
 
 use arrayvec::ArrayVec;
 use fearless_simd::{f32x16, prelude::*};
@@ -27,10 +28,11 @@ pub(crate) const MAX_HIDERS: usize = 8;
 /// The most panels that a light is cut into.
 const MAX_PANELS: usize = 64;
 
-/// Highlights narrower than this, in half heights of the light and standard deviations, may lie between the rows of a panel.
+/// Highlights narrower than this, in half heights of the light and standard deviations, may lie between the rows of a
+/// panel.
 const BETWEEN_ROWS: f32 = 0.1;
-/// Points nearer to a light than this, in half heights of the light, are right below it: under constant falloff, under physical
-/// falloff, which makes a much narrower peak.
+/// Points nearer to a light than this, in half heights of the light, are right below it: under constant falloff, under
+/// physical falloff, which makes a much narrower peak.
 const BELOW: [f32; 2] = [0.03, 0.15];
 /// Below a light that is very near, each panel is this many times as far from the foot of the point as the one before.
 const WIDER: f32 = 8.0;
@@ -218,7 +220,8 @@ fn cuts(view: &View, hiders: &[Hider], region: &Region, wanted: Wanted) -> Array
 }
 
 impl View {
-    /// The row on which the direction of a highlight's middle meets the light's plane, if it does, and how far away that is.
+    /// The row on which the direction of a highlight's middle meets the light's plane, if it does, and how far away
+    /// that is.
     fn highlight(&self) -> Option<(f32, f32)> {
         let m = self.mirror()?;
         let n = self.a.cross(self.b);
@@ -230,8 +233,8 @@ impl View {
     }
 }
 
-/// How rows are spread. On a disk so that their lengths change smoothly up to the rim: y = (3 t - t^3) / 2, whose half length
-/// is (1 - t^2) sqrt(4 - t^2) / 2; y and t are counted from where places are.
+/// How rows are spread. On a disk so that their lengths change smoothly up to the rim: y = (3 t - t^3) / 2, whose half
+/// length is (1 - t^2) sqrt(4 - t^2) / 2; y and t are counted from where places are.
 #[derive(Clone, Copy)]
 struct Spread {
     outline: Outline,
@@ -450,13 +453,13 @@ fn sixteen_rows_now<S: Simd>(simd: S, lit: &Lit, rows: &Rows) -> [[f32; LANES]; 
     sums.map(|sums| (sums * density * view.measure).to_array())
 }
 
-/// The Kronrod rule's own error is this part of its difference to the Gauss rule, or less: at a corner, where both are at
-/// their worst, a fourth.
+/// The Kronrod rule's own error is this part of its difference to the Gauss rule, or less: at a corner, where both are
+/// at their worst, a fourth.
 const TRUST: f32 = 0.3;
 /// Rows longer than this many times the point's distance from them are cut into pieces that grow with the distance.
 const NEAR: f32 = 2.0;
-/// Rows this many times shorter than the point's distance from them, across which a highlight falls by less than exp(-0.2), take
-/// three nodes; see the tables in [`tensor`](super::tensor).
+/// Rows this many times shorter than the point's distance from them, across which a highlight falls by less than
+/// exp(-0.2), take three nodes; see the tables in [`tensor`](super::tensor).
 const FAR: f32 = 2.5;
 const SHARP: f32 = 0.8;
 

@@ -59,8 +59,8 @@ pub(crate) const KRONROD_WEIGHTS: [f32; 16] = [
     0.0,
 ];
 
-/// Weights, at the same nodes, of the Gauss rule of 7 inside it: the difference of the two says how far the answer can be
-/// wrong.
+/// Weights, at the same nodes, of the Gauss rule of 7 inside it: the difference of the two says how far the answer can
+/// be wrong.
 pub(crate) const EMBEDDED_WEIGHTS: [f32; 16] = [
     0.0,
     0.129_484_97,
@@ -83,7 +83,8 @@ pub(crate) const EMBEDDED_WEIGHTS: [f32; 16] = [
 /// Nodes of the Kronrod rule of 7, twice, each with a lane that counts nothing.
 pub(crate) const KRONROD_PAIR: [f32; 16] = twice(SEVEN, SEVEN);
 
-/// Weights of the Kronrod rule of 7, which is exact for polynomials of degree 11: of the first lanes, and of the others.
+/// Weights of the Kronrod rule of 7, which is exact for polynomials of degree 11: of the first lanes, and of the
+/// others.
 pub(crate) const KRONROD_PAIR_WEIGHTS: [[f32; 16]; 2] =
     [twice(SEVEN_WEIGHTS, [0.0; 8]), twice([0.0; 8], SEVEN_WEIGHTS)];
 

@@ -66,7 +66,8 @@ impl Between {
         }
     }
 
-    /// Adds an infinite plane with this unit normal, `distance` from the point along it; `false` if the trees have to be asked.
+    /// Adds an infinite plane with this unit normal, `distance` from the point along it; `false` if the trees have to
+    /// be asked.
     fn half_space(&mut self, view: &View, emitter: &Emitter, distance: f64, n: DVec3, asker: &Asker) -> bool {
         let (distance, n) = if distance < 0.0 { (-distance, -n) } else { (distance, n) };
         let heights = match emitter {
@@ -125,7 +126,8 @@ impl Rise {
         let Some([low, high]) = solid.bounds().map(|bounds| thing.placement.bounds(bounds)) else {
             return if is_own && above < f64::INFINITY { Rise::Below } else { Rise::Above };
         };
-        // What of it is its own surface, is the horizon of all of it: nothing that looks outward is hidden by what it is part of
+        // What of it is its own surface, is the horizon of all of it: nothing that looks outward is hidden by what it
+        // is part of
         let size = (low - p).abs().max((high - p).abs()).length();
         let room = f64::from(SLACK) * size;
         let reach = f64::from(asker.reach);

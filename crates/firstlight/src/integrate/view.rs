@@ -93,13 +93,14 @@ impl Linear {
     }
 }
 
-/// Points nearer to a light than this, in its half size, count its places from the nearest: from the middle, numbers would cancel.
+/// Points nearer to a light than this, in its half size, count its places from the nearest: from the middle, numbers
+/// would cancel.
 const NEAR: f32 = 0.03;
 
 /// A flat light as one point sees it: l = l0 + x a + y b leads from the point to the light.
 ///
-/// Places (x, y) are counted from the light's middle, or, where the point is near the light, from the place that is nearest
-/// to it: all numbers around there are small then, and wrong by a small part of themselves.
+/// Places (x, y) are counted from the light's middle, or, where the point is near the light, from the place that is
+/// nearest to it: all numbers around there are small then, and wrong by a small part of themselves.
 ///
 /// Distances are computed in a frame of the light's plane, where nothing cancels near it:
 /// |l|^2 = (fa + la x + skew y)^2 + (fb + lb y)^2 + height^2.
@@ -269,8 +270,8 @@ impl View {
         [gap(self.fa, [self.la * -x0 + lean, self.la * x1 + lean]), gap(self.fb, [self.lb * -y0, self.lb * y1])]
     }
 
-    /// The most that can arrive within `reach` of the point, or thereabouts: the cosine at the surface is 1, and nothing is in
-    /// the way.
+    /// The most that can arrive within `reach` of the point, or thereabouts: the cosine at the surface is 1, and
+    /// nothing is in the way.
     pub fn most(&self, reach: f32) -> f32 {
         if !self.physical {
             return 1.0;
@@ -282,8 +283,8 @@ impl View {
             .min(std::f32::consts::PI)
     }
 
-    /// What share of [`most`](Self::most) the mean within `reach` can be off where the light's plane runs through: from there one
-    /// side of a light shines and the other does not, or both grow.
+    /// What share of [`most`](Self::most) the mean within `reach` can be off where the light's plane runs through: from
+    /// there one side of a light shines and the other does not, or both grow.
     pub fn crossing(&self, reach: f32) -> f32 {
         match (self.height <= reach, self.physical) {
             (false, _) => 0.0,

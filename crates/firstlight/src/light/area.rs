@@ -46,8 +46,8 @@ macro_rules! area_table {
                 pub blocks: bool = false,
                 /// Whether its light can be blocked.
                 pub shadows: bool = true,
-                /// How many points of it are sampled, 1 to 1048576, or `"exact"`: it is integrated, not sampled. Without
-                /// it, `render.samples`.
+                /// How many points of it are sampled, 1 to 1048576, or `"exact"`: it is integrated, not sampled.
+                /// Without it, `render.samples`.
                 pub samples: Option<$crate::describe::SamplesDesc> = None,
                 /// How those points are laid out.
                 pub set: $crate::light::SampleSet = $crate::light::SampleSet::Sobol,
@@ -242,8 +242,8 @@ pub enum AreaShape {
 }
 
 impl AreaShape {
-    /// The point that stands for `uv` of the unit square, and, where each point has a normal of its own, the unit normal
-    /// there. Equal areas of the square become equal areas of the shape.
+    /// The point that stands for `uv` of the unit square, and, where each point has a normal of its own, the unit
+    /// normal there. Equal areas of the square become equal areas of the shape.
     fn point(&self, uv: [f64; 2]) -> (DVec3, Option<DVec3>) {
         match self {
             AreaShape::Rectangle(rectangle) => (rectangle.point(uv), None),
@@ -423,8 +423,8 @@ impl Area {
 #[derive(Clone, Debug)]
 pub(crate) struct Points {
     pub blocks: Vec<PointBlock>,
-    /// The unit normal at each point, where each has its own. They are kept, not found from the points: those are rounded,
-    /// and of a small sphere far from the origin nothing would be left.
+    /// The unit normal at each point, where each has its own. They are kept, not found from the points: those are
+    /// rounded, and of a small sphere far from the origin nothing would be left.
     normals: Vec<PointBlock>,
 }
 

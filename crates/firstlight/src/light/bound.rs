@@ -1,6 +1,7 @@
 //! What a light, or many together, can send at most to a zone of places, and what it sends at least.
 //!
-//! Everything here is in the unit of integrated light: what is multiplied with [`Light::intensity`](super::Light::intensity).
+//! Everything here is in the unit of integrated light: what is multiplied with
+//! [`Light::intensity`](super::Light::intensity).
 
 use super::zone::{Highlight, Zone};
 use super::{AreaShape, Light, LightKind};
@@ -43,7 +44,8 @@ pub(crate) struct Shine {
 /// How a zone sees what shines.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Sight {
-    /// What a light of strength 1 sends, at most: before the cosine at the surface, and with it, and with the highlight.
+    /// What a light of strength 1 sends, at most: before the cosine at the surface, and with it, and with the
+    /// highlight.
     pub weight: f32,
     pub diffuse: f32,
     pub highlight: Highlight,

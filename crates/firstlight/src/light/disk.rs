@@ -16,8 +16,8 @@ area_table! {
     /// A round disk that shines: soft shadows.
     ///
     /// Physical: every point sends the radiance L = color x strength to its emitting side;
-    /// E = integral of L cos cos' / d^2 dA, which is pi L R^2 / (R^2 + h^2) at the height h below its middle. Constant: the
-    /// mean over the area of color x strength.
+    /// E = integral of L cos cos' / d^2 dA, which is pi L R^2 / (R^2 + h^2) at the height h below its middle. Constant:
+    /// the mean over the area of color x strength.
     ///
     /// ```toml
     /// [[light.disk]]
@@ -62,8 +62,8 @@ pub struct Disk {
     single_sided: bool,
 }
 
-/// A transform that leaves two perpendicular radii with a larger sine of their angle off the right one, or with lengths of
-/// a larger relative difference, makes an ellipse.
+/// A transform that leaves two perpendicular radii with a larger sine of their angle off the right one, or with lengths
+/// of a larger relative difference, makes an ellipse.
 const MAX_SKEW: f64 = 1e-6;
 
 impl DiskLightDesc {

@@ -37,8 +37,8 @@ pub(crate) use zone::Zone;
 words! {
     /// How light weakens on its way.
     pub enum Falloff {
-        /// As light does: inverse square, and the cosine at an area's surface. `strength` is candela for point and spot,
-        /// lux for directional, radiance for areas.
+        /// As light does: inverse square, and the cosine at an area's surface. `strength` is candela for point and
+        /// spot, lux for directional, radiance for areas.
         Physical = "physical",
         /// The classic model: `color` x `strength` from every point of the light, whatever the distance and the light's
         /// own angle; an area light is the mean over its area.
@@ -114,8 +114,8 @@ impl LightDesc {
 pub struct Light {
     /// Its place and shape.
     pub kind: LightKind,
-    /// What each sample's weight is multiplied with: `color` x `strength`, over the number of samples, and over pi where
-    /// the light is physical, so that it meets materials that give pi x BRDF x cosine.
+    /// What each sample's weight is multiplied with: `color` x `strength`, over the number of samples, and over pi
+    /// where the light is physical, so that it meets materials that give pi x BRDF x cosine.
     pub scale: Rgb,
     /// What the whole light sends, whatever its samples: `color` x `strength`, over pi where the light is physical. The
     /// integral over its area takes this in place of `scale`, which has the area and the number of samples in it.
@@ -190,12 +190,12 @@ impl Light {
         }
     }
 
-    /// How high above the plane through `p` with normal `n` (unit) a point of the light has to be to count as above it: as far
-    /// as rounding can lift one that lies in the plane. `error` is that of `p`. In metres; of a light infinitely far away, in
-    /// parts of its unit direction.
+    /// How high above the plane through `p` with normal `n` (unit) a point of the light has to be to count as above it:
+    /// as far as rounding can lift one that lies in the plane. `error` is that of `p`. In metres; of a light infinitely
+    /// far away, in parts of its unit direction.
     ///
-    /// A light that lies in the plane of a surface would else send to it, from those of its points that rounding lifts, what
-    /// no cosine weakens: highlights.
+    /// A light that lies in the plane of a surface would else send to it, from those of its points that rounding lifts,
+    /// what no cosine weakens: highlights.
     #[inline(always)]
     pub fn floor(&self, p: Vec3, error: ErrorBound, n: Vec3) -> f32 {
         match &self.kind {
@@ -224,8 +224,8 @@ impl Light {
     }
 }
 
-/// How far, along each axis, a way from `p` to a point within `half` of `middle` can be wrong by rounding, together with what
-/// its product with a unit vector adds: the errors of both ends, and four roundings of the way itself.
+/// How far, along each axis, a way from `p` to a point within `half` of `middle` can be wrong by rounding, together
+/// with what its product with a unit vector adds: the errors of both ends, and four roundings of the way itself.
 pub(crate) fn way_error(middle: Vec3, half: Vec3, p: Vec3, error: ErrorBound) -> Vec3 {
     let (far, way) = (middle.abs() + half, (middle - p).abs() + half);
     error.0 + (far + way * 4.0) * UNIT_ROUNDOFF

@@ -42,14 +42,14 @@ area_table! {
         pub size: Option<[f64; 2]> = None,
         /// The point that the front faces, in metres, world space; with `size`.
         pub look_at: Option<[f64; 3]> = None,
-        /// The direction that the front faces, of any length above 1e-9; with `size`, instead of `look_at`. With neither of
-        /// them the front faces straight down, [0, -1, 0].
+        /// The direction that the front faces, of any length above 1e-9; with `size`, instead of `look_at`. With
+        /// neither of them the front faces straight down, [0, -1, 0].
         pub normal: Option<[f64; 3]> = None,
-        /// The direction of the height, made perpendicular to where the front faces; not parallel to it. Without it +y; of a
-        /// light that faces straight up -z, straight down +z.
+        /// The direction of the height, made perpendicular to where the front faces; not parallel to it. Without it +y;
+        /// of a light that faces straight up -z, straight down +z.
         pub up: Option<[f64; 3]> = None,
-        /// Where it is moved; it moves `center` and both sides, which may make a parallelogram of it. Mirrored, it keeps its
-        /// front.
+        /// Where it is moved; it moves `center` and both sides, which may make a parallelogram of it. Mirrored, it
+        /// keeps its front.
         pub transform: Option<Box<TransformDesc>> = None,
     }
 }

@@ -45,14 +45,16 @@ impl SampleSet {
 /// Series of points that go well together.
 pub(crate) const SERIES: usize = 16;
 
-/// Point `k` of one of the [`SERIES`] of a Sobol' (0, 2)-sequence, both coordinates scrambled in Owen's way under fixed seeds: the first
-/// 2^m points of each are stratified in every way that the square can be cut into 2^m equal boxes of binary sides.
+/// Point `k` of one of the [`SERIES`] of a Sobol' (0, 2)-sequence, both coordinates scrambled in Owen's way under fixed
+/// seeds: the first 2^m points of each are stratified in every way that the square can be cut into 2^m equal boxes of
+/// binary sides.
 ///
-/// Series 0 is the sequence itself. In each of the others some digits of all points are turned, so that the first 2^m points of all
-/// together are stratified nearly as well: m from 3 to 10, they are a (t, m + 4, 2)-net in base 2 with t up to 2.
+/// Series 0 is the sequence itself. In each of the others some digits of all points are turned, so that the first 2^m
+/// points of all together are stratified nearly as well: m from 3 to 10, they are a (t, m + 4, 2)-net in base 2 with t
+/// up to 2.
 ///
-/// Sources: Burley, "Practical hash-based Owen scrambling", JCGT 9(4), 2020, section 3; of nets: Niederreiter, "Random Number Generation
-/// and Quasi-Monte Carlo Methods", 1992, section 4.1.
+/// Sources: Burley, "Practical hash-based Owen scrambling", JCGT 9(4), 2020, section 3; of nets: Niederreiter, "Random
+/// Number Generation and Quasi-Monte Carlo Methods", 1992, section 4.1.
 pub(crate) fn point_of_series(k: u32, series: usize) -> [f64; 2] {
     let turned = |digits: [u32; 4]| {
         let chosen = (0..4).filter(|bit| series >> bit & 1 == 1);
@@ -63,8 +65,8 @@ pub(crate) fn point_of_series(k: u32, series: usize) -> [f64; 2] {
     [unit(owen(x, SCRAMBLE[0])), unit(owen(y, SCRAMBLE[1]))]
 }
 
-/// The digits that each bit of a series' number turns: the first 16 of each coordinate. Found by search: of all that was tried, the sum of t
-/// squared over all numbers of points and 2, 4, 8 and 16 series is the least.
+/// The digits that each bit of a series' number turns: the first 16 of each coordinate. Found by search: of all that
+/// was tried, the sum of t squared over all numbers of points and 2, 4, 8 and 16 series is the least.
 const TURNED: [[u32; 4]; 2] = [[0x7a7f, 0x7f4b, 0x9526, 0x8cf9], [0xdfca, 0x22a7, 0x1251, 0x29d3]];
 
 /// The scramble of the sequence: part of the definition of every picture with an area light.

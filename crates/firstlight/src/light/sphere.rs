@@ -16,8 +16,8 @@ area_table! {
     /// A sphere that shines: soft shadows. Its front is the outside.
     ///
     /// Physical: every point sends the radiance L = color x strength to its emitting side;
-    /// E = pi L (R / d)^2 cos where all of it is above the horizon, d being the distance of its centre. Constant: the mean
-    /// over its whole area of color x strength; what it sends from its far side goes through it.
+    /// E = pi L (R / d)^2 cos where all of it is above the horizon, d being the distance of its centre. Constant: the
+    /// mean over its whole area of color x strength; what it sends from its far side goes through it.
     ///
     /// ```toml
     /// [[light.sphere]]

@@ -1,11 +1,12 @@
-//! A tree over the lights of a scene. A node knows what its lights send together, and how far it can be wrong to take them
-//! for one.
+//! A tree over the lights of a scene. A node knows what its lights send together, and how far it can be wrong to take
+//! them for one.
 //!
-//! The lights of a node are taken for one that stands, for each channel of colour, in the middle of their power, and how they
-//! are spread around it is counted to the second order of Taylor's series. What diffuse light differs from that is of the third: a
-//! sixth of the power-weighted sum of the cubes of their distances from the middle, times the largest third derivative
-//! between them. Of the light of a point, cos / d^2, and that of a flat light, cos cos' / d^2, no third derivative is above
-//! 24 / d^5; of cos alone, none is above 4 / d^3. Highlights are counted to the first order.
+//! The lights of a node are taken for one that stands, for each channel of colour, in the middle of their power, and
+//! how they are spread around it is counted to the second order of Taylor's series. What diffuse light differs from
+//! that is of the third: a sixth of the power-weighted sum of the cubes of their distances from the middle, times the
+//! largest third derivative between them. Of the light of a point, cos / d^2, and that of a flat light, cos cos' / d^2,
+//! no third derivative is above 24 / d^5; of cos alone, none is above 4 / d^3. Highlights are counted to the first
+//! order.
 //!
 //! Nothing here depends on the camera: what a node stands for is settled when the tree is built.
 
@@ -37,8 +38,8 @@ pub(crate) struct LightNode {
     facing: [Vec3; 3],
     /// Whether all channels have the same `middle` and `facing`.
     gray: bool,
-    /// For each channel, the mean of the products of coordinates of the lights from its middle, in square metres, weighted by power,
-    /// the lights' own extent included: xx, yy, zz, xy, yz, zx.
+    /// For each channel, the mean of the products of coordinates of the lights from its middle, in square metres,
+    /// weighted by power, the lights' own extent included: xx, yy, zz, xy, yz, zx.
     square: [[f32; 6]; 3],
     /// For each channel, the sum of power x distance^2 from its middle, the lights' own extent included.
     spread: Rgb,
@@ -144,7 +145,8 @@ impl LightTree {
 
 /// A number from 0 to 1 that looks like chance, the same for the same place.
 ///
-/// Source: Steele, Lea and Flood, "Fast splittable pseudorandom number generators", OOPSLA 2014: the mixing of SplitMix64.
+/// Source: Steele, Lea and Flood, "Fast splittable pseudorandom number generators", OOPSLA 2014: the mixing of
+/// SplitMix64.
 fn chance(place: u64) -> f64 {
     let mut z = (place + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
     z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);

@@ -25,8 +25,8 @@ pub(crate) struct Zone {
     pub lobe: Lobe,
 }
 
-/// What a highlight is, at most, in some directions, and how fast it changes as the direction turns: 1 over radians, and over
-/// their square.
+/// What a highlight is, at most, in some directions, and how fast it changes as the direction turns: 1 over radians,
+/// and over their square.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Highlight {
     pub most: f32,
@@ -64,8 +64,8 @@ impl Zone {
 }
 
 impl Highlight {
-    /// cos^s, whose value `at` gives, for cosines up to `cos` and sines up to `sin` of the angle between two directions. One
-    /// moves as the light does, at a rate of up to `rates[0]`, and is bent by up to `rates[1]`.
+    /// cos^s, whose value `at` gives, for cosines up to `cos` and sines up to `sin` of the angle between two
+    /// directions. One moves as the light does, at a rate of up to `rates[0]`, and is bent by up to `rates[1]`.
     fn of_power(s: f32, at: impl Fn(f32) -> f32, cos: f32, sin: f32, rates: [f32; 2]) -> Highlight {
         let most = at(cos).min(1.0) * 1.0001;
         if !(s >= 2.0) {

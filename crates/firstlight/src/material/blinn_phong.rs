@@ -6,8 +6,8 @@ use crate::describe::{ColorParam, NumberParam, table};
 use crate::math::Exponent;
 
 table! {
-    /// Blinn-Phong: f = diffuse max(n.wi, 0) + specular max(n.h, 0)^shininess, h = normalize(wi + wo); the specular term is 0
-    /// where n.wi <= 0.
+    /// Blinn-Phong: f = diffuse max(n.wi, 0) + specular max(n.h, 0)^shininess, h = normalize(wi + wo); the specular
+    /// term is 0 where n.wi <= 0.
     ///
     /// Source: Blinn, "Models of light reflection for computer synthesized pictures", SIGGRAPH 1977.
     ///

@@ -122,7 +122,8 @@ impl Lobe {
         }
     }
 
-    /// k, where the highlight falls as exp(-k a^2) with the angle a of the light's direction, or not as fast. `cos_o` is n.wo.
+    /// k, where the highlight falls as exp(-k a^2) with the angle a of the light's direction, or not as fast. `cos_o`
+    /// is n.wo.
     pub(crate) fn sharpness(&self, cos_o: f32) -> f32 {
         match self {
             Lobe::None => 0.0,

@@ -17,19 +17,19 @@ const NEAR_X: f64 = 0.9;
 const MIN_SINE: f64 = 1e-6;
 
 impl Frame {
-    /// For what is round about `axis` (unit): z is the axis, x is where angles are counted from: world +x, or world +y where
-    /// the axis is within 26 degrees of +x or -x, made perpendicular to the axis.
+    /// For what is round about `axis` (unit): z is the axis, x is where angles are counted from: world +x, or world +y
+    /// where the axis is within 26 degrees of +x or -x, made perpendicular to the axis.
     pub fn around(axis: DVec3) -> Self {
         let from = if axis.x.abs() > NEAR_X { DVec3::Y } else { DVec3::X };
         let x = (from - axis * axis.dot(from)).normalize_or(DVec3::X);
         Frame { x, y: axis.cross(x), z: axis }
     }
 
-    /// For what is flat and faces `normal` (unit): z is the normal, y is `up` made perpendicular to it, x is to the right
-    /// for those the normal points to. `None` if `up` is parallel to the normal.
+    /// For what is flat and faces `normal` (unit): z is the normal, y is `up` made perpendicular to it, x is to the
+    /// right for those the normal points to. `None` if `up` is parallel to the normal.
     ///
-    /// Without `up` that is +y; of what faces straight up it is -z, of what faces straight down +z, as if tipped over from
-    /// facing +z.
+    /// Without `up` that is +y; of what faces straight up it is -z, of what faces straight down +z, as if tipped over
+    /// from facing +z.
     pub fn facing(normal: DVec3, up: Option<DVec3>) -> Option<Self> {
         let flat = |up: DVec3| {
             let x = up.cross(normal);

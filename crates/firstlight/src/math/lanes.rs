@@ -4,8 +4,9 @@ use fearless_simd::{f32x16, prelude::*};
 
 use super::Vec3;
 
-/// Runs code for sixteen numbers at a time with the instruction set that suits it: AVX-512, AVX2, NEON, or what every processor
-/// has. Three copies, not five: the code below takes the compiler seconds; and of plain numbers, sixteen to a step, minutes.
+/// Runs code for sixteen numbers at a time with the instruction set that suits it: AVX-512, AVX2, NEON, or what every
+/// processor has. Three copies, not five: the code below takes the compiler seconds; and of plain numbers, sixteen to a
+/// step, minutes.
 macro_rules! dispatch_wide {
     ($level:expr, $simd:ident => $op:expr) => {{
         let level: fearless_simd::Level = $level;

@@ -2,15 +2,15 @@
 
 use super::DVec3;
 
-/// Boxes that are farther from 0 than so many times their size are counted from their own middle. Below it, 32 bits tell apart the
-/// 262,144th part of the size: less than half of a hundredth of a pixel of a large picture.
+/// Boxes that are farther from 0 than so many times their size are counted from their own middle. Below it, 32 bits
+/// tell apart the 262,144th part of the size: less than half of a hundredth of a pixel of a large picture.
 const FAR: f64 = 64.0;
 
 /// A point is farther from 0 than this, in metres.
 const FAR_POINT: f64 = 65536.0;
 
-/// What to take off every coordinate of a space in which all is within this box: 0 unless all of it is far from 0. In whole steps
-/// of about the size of the box, so that numbers keep their digits.
+/// What to take off every coordinate of a space in which all is within this box: 0 unless all of it is far from 0. In
+/// whole steps of about the size of the box, so that numbers keep their digits.
 pub(crate) fn origin_for([low, high]: [DVec3; 2]) -> DVec3 {
     let (center, size) = ((low + high) * 0.5, (high - low).max_element());
     let far = center.abs().max_element();

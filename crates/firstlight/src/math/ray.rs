@@ -37,8 +37,8 @@ impl Ray {
     }
 }
 
-/// The points `o + t d`, in f64, in world space or in the space of a shape. `d` is of any length except 0, so that `t` means
-/// the same in both.
+/// The points `o + t d`, in f64, in world space or in the space of a shape. `d` is of any length except 0, so that `t`
+/// means the same in both.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct DRay {
     pub o: DVec3,
@@ -52,8 +52,8 @@ impl DRay {
         self.o + self.d * t
     }
 
-    /// The same ray, counted from its point nearest to `center`, with `center` as the origin of space; and the `t` of that
-    /// point. What is computed from it loses nothing to the distance of `o`.
+    /// The same ray, counted from its point nearest to `center`, with `center` as the origin of space; and the `t` of
+    /// that point. What is computed from it loses nothing to the distance of `o`.
     #[inline(always)]
     pub fn nearest_to(&self, center: DVec3) -> (DRay, f64) {
         let f = self.o - center;
@@ -70,15 +70,16 @@ impl DRay {
 pub struct ErrorBound(pub Vec3);
 
 impl ErrorBound {
-    /// Of a point that was found in f64 from terms of these absolute values, and then rounded to `p`. Nearly always the last
-    /// rounding alone: it grows neither with the distance of the camera nor with the size of the shape.
+    /// Of a point that was found in f64 from terms of these absolute values, and then rounded to `p`. Nearly always the
+    /// last rounding alone: it grows neither with the distance of the camera nor with the size of the shape.
     #[inline(always)]
     pub fn of_rounded(p: Vec3, terms: DVec3) -> Self {
         ErrorBound(p.abs() * (4.0 * UNIT_ROUNDOFF) + (terms * (8.0 * f64::EPSILON)).as_vec3())
     }
 
-    /// Where a ray that leaves `p` on the side of the unit normal `ng` starts: `p`, lifted until the whole box of the bound
-    /// is below the plane through the new point. What the surface curves away from cannot be hit again from there.
+    /// Where a ray that leaves `p` on the side of the unit normal `ng` starts: `p`, lifted until the whole box of the
+    /// bound is below the plane through the new point. What the surface curves away from cannot be hit again from
+    /// there.
     ///
     /// The lift is the least that does it: the reach of the box along the normal.
     /// Source: Pharr, Jakob, Humphreys, "Physically Based Rendering", 4th edition, 6.8.6.
@@ -89,8 +90,9 @@ impl ErrorBound {
     }
 }
 
-/// A ray from a surface towards a light: the points `p + t l`, 0 < t < t_max. [`Scene::shadow_rays`](crate::Scene::shadow_rays)
-/// and [`Scene::shadow_ray_to`](crate::Scene::shadow_ray_to) make them, for [`Scene::occluded`](crate::Scene::occluded).
+/// A ray from a surface towards a light: the points `p + t l`, 0 < t < t_max.
+/// [`Scene::shadow_rays`](crate::Scene::shadow_rays) and [`Scene::shadow_ray_to`](crate::Scene::shadow_ray_to) make
+/// them, for [`Scene::occluded`](crate::Scene::occluded).
 #[derive(Clone, Copy, Debug)]
 pub struct ShadowRay {
     /// Where it starts, on a surface.
@@ -144,8 +146,8 @@ impl ShadowRay {
         self.t_max == 1.0
     }
 
-    /// Where the way ends for what has no bound of its own at the light: short of a light that lies on a surface, by the
-    /// rounding of both ends.
+    /// Where the way ends for what has no bound of its own at the light: short of a light that lies on a surface, by
+    /// the rounding of both ends.
     #[inline(always)]
     pub(crate) fn end(&self) -> f32 {
         if !self.is_finite() {

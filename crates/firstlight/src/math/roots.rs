@@ -3,8 +3,8 @@
 /// Steps of [`bracketed`] after which the bracket has shrunk as far as it can.
 const MAX_STEPS: usize = 128;
 
-/// The root of `f` between `low` and `high`, where it has different signs: Newton's steps, and halving wherever one of them
-/// leaves the bracket or shrinks it too slowly. `f` answers with its value and its slope.
+/// The root of `f` between `low` and `high`, where it has different signs: Newton's steps, and halving wherever one of
+/// them leaves the bracket or shrinks it too slowly. `f` answers with its value and its slope.
 ///
 /// Never leaves the bracket, whatever the slopes say, and always ends.
 pub(crate) fn bracketed(low: f64, high: f64, low_is_negative: bool, f: impl Fn(f64) -> (f64, f64)) -> f64 {
@@ -30,8 +30,8 @@ pub(crate) fn bracketed(low: f64, high: f64, low_is_negative: bool, f: impl Fn(f
     x
 }
 
-/// The real roots of x^3 + p x + q between `low` and `high`, rising; a double one may be found once, twice or not at all.
-/// Answers with the number of them and the roots.
+/// The real roots of x^3 + p x + q between `low` and `high`, rising; a double one may be found once, twice or not at
+/// all. Answers with the number of them and the roots.
 pub(crate) fn depressed_cubic(p: f64, q: f64, low: f64, high: f64) -> (usize, [f64; 3]) {
     let f = |x: f64| (x * (x * x + p) + q, 3.0 * x * x + p);
     // Between its turning points the cubic rises or falls

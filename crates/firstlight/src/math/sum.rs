@@ -3,8 +3,8 @@
 /// Partial sums, and lanes of the vectors that fill them.
 pub const LANES: usize = 16;
 
-/// A sum whose order is part of the definition of a picture: term `k` goes into partial `k mod 16`, and the partials are
-/// joined in one fixed tree, so that sixteen lanes and one give the same bits.
+/// A sum whose order is part of the definition of a picture: term `k` goes into partial `k mod 16`, and the partials
+/// are joined in one fixed tree, so that sixteen lanes and one give the same bits.
 #[derive(Clone, Copy, Debug)]
 pub struct LaneSum([f32; LANES]);
 

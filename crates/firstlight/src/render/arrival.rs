@@ -74,7 +74,8 @@ impl<'a> Place<'a> {
 pub(crate) enum Seen {
     /// This arrives.
     Known(Sums),
-    /// Things are in the way; points of the light have to be asked. This would arrive if nothing were, if that is known.
+    /// Things are in the way; points of the light have to be asked. This would arrive if nothing were, if that is
+    /// known.
     Behind(Option<Sums>),
 }
 
@@ -220,7 +221,8 @@ impl<'a> Arrivals<'a> {
         Place::point(si, &bsdf.lobe, self.scene.ambient * bsdf.ambient, colors)
     }
 
-    /// What light `index` sends to one point, which stands for `share` of a pixel: diffuse and specular, with all colours.
+    /// What light `index` sends to one point, which stands for `share` of a pixel: diffuse and specular, with all
+    /// colours.
     pub fn at_point(
         &mut self,
         index: usize,
@@ -313,14 +315,15 @@ impl<'a> Arrivals<'a> {
         self.tolerance_of(share) * (BY_CHANCE / TOLERANCE)
     }
 
-    /// Whether it is worth to look for light `index` from all rays of a block of pixels together: not where its samples are fixed.
+    /// Whether it is worth to look for light `index` from all rays of a block of pixels together: not where its samples
+    /// are fixed.
     pub fn looks_for(&self, index: usize) -> bool {
         let is_area = matches!(self.scene.lights[index].kind, LightKind::Area(_));
         self.lights.emitters[index].is_some() || !is_area
     }
 
-    /// Hears what of light `index` is seen from those `points` whose numbers are in `order`. `each` may take what is in the way, if something
-    /// in trees is.
+    /// Hears what of light `index` is seen from those `points` whose numbers are in `order`. `each` may take what is in
+    /// the way, if something in trees is.
     pub fn sights(
         &mut self,
         index: usize,
@@ -386,8 +389,8 @@ impl<'a> Arrivals<'a> {
         LadderAsker { scene, level, area, target, ladder }
     }
 
-    /// Whether points spread evenly over a sphere light may miss most of what it sends to a place: what is near sends far more than the rest
-    /// where light weakens on its way, and a highlight may lie on it that is narrow beside it.
+    /// Whether points spread evenly over a sphere light may miss most of what it sends to a place: what is near sends
+    /// far more than the rest where light weakens on its way, and a highlight may lie on it that is narrow beside it.
     pub fn may_miss(&self, index: usize, place: &Place) -> bool {
         let LightKind::Area(Area { shape: AreaShape::Sphere(sphere), physical, .. }) = &self.scene.lights[index].kind
         else {
@@ -401,8 +404,8 @@ impl<'a> Arrivals<'a> {
         if *physical || wide >= 1.0 {
             return *physical || spread < NARROW;
         }
-        // The chord of the angle between the mirrored direction and the light's middle is at most that angle; at the end of its reach a
-        // highlight has fallen to e^-18
+        // The chord of the angle between the mirrored direction and the light's middle is at most that angle; at the
+        // end of its reach a highlight has fallen to e^-18
         let apart = (ns * (2.0 * cos_o) - wo - to.normalize()).length();
         spread < NARROW * wide && apart < wide * FRAC_PI_2 + 6.0 * spread
     }

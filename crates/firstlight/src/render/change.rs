@@ -71,15 +71,15 @@ impl Arrival {
     }
 }
 
-/// Outlines that move over a larger part of the light than this, and highlights that move by more of their width, squared, are
-/// not wide beside the patch.
+/// Outlines that move over a larger part of the light than this, and highlights that move by more of their width,
+/// squared, are not wide beside the patch.
 pub(super) const RESOLVED: f32 = 0.5;
 /// The same for the angle by which the light's direction and the normal turn.
 pub(super) const RESOLVED_SWING: f32 = 0.2;
 
-/// Patches over which the light's direction and the normal turn by less than the first, in radians, and a highlight by less
-/// than the second of its width, squared, are followed by a quadratic: its error is that of the third order, about a
-/// hundredth of the highlight times the second to the power of 3/2.
+/// Patches over which the light's direction and the normal turn by less than the first, in radians, and a highlight by
+/// less than the second of its width, squared, are followed by a quadratic: its error is that of the third order, about
+/// a hundredth of the highlight times the second to the power of 3/2.
 pub(super) fn is_smooth(swing: f32, lobe: f32) -> bool {
     swing < 0.1 && !is_sharp(lobe)
 }
@@ -123,8 +123,8 @@ pub(super) fn horizon_change(view: &View, place: &Place) -> Change {
     Change { bend, drift: 0.0, resolved, smooth: false, sharp: false }
 }
 
-/// How far the mean over a patch can be from what arrives at its middle, and so on. `sway` is by how much the way to the viewer
-/// turns over it.
+/// How far the mean over a patch can be from what arrives at its middle, and so on. `sway` is by how much the way to
+/// the viewer turns over it.
 pub(super) fn change(view: &View, place: &Place, between: &Between, sway: f32) -> Change {
     let drift = between.drift;
     if place.reach == 0.0 || between.hidden && drift == 0.0 {
@@ -156,8 +156,8 @@ pub(super) fn change(view: &View, place: &Place, between: &Between, sway: f32) -
     Change { bend, drift, resolved, smooth: is_clear && is_smooth(swing, lobe), sharp: is_sharp(lobe) }
 }
 
-/// How bright a highlight can be on a light, at most, or thereabouts, from all over a patch; `moved` is what the highlight
-/// moves by over the patch, as a part of its width, squared.
+/// How bright a highlight can be on a light, at most, or thereabouts, from all over a patch; `moved` is what the
+/// highlight moves by over the patch, as a part of its width, squared.
 fn brightest(view: &View, moved: f32) -> f32 {
     let size2 = square(view.la.max(view.lb));
     let distance2 = square(view.nearest());

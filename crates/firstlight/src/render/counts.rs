@@ -13,11 +13,11 @@ pub struct RenderStats {
     pub shadow_rays: u64,
     /// Those of them that took no ray: nothing could stand between, or the light casts no shadows.
     pub shadow_rays_skipped: u64,
-    /// Pairs of a lit point and a light: all of it arrives, one thing hides it, it is below the horizon, each sample has an
-    /// answer of its own. Counted where shafts are used, as the next three are.
+    /// Pairs of a lit point and a light: all of it arrives, one thing hides it, it is below the horizon, each sample
+    /// has an answer of its own. Counted where shafts are used, as the next three are.
     pub visibility: [u64; 4],
-    /// Pairs of a lit point and a light that is integrated, of which some is hidden by things so few that what is left is known
-    /// in closed form. Not among those of `visibility`.
+    /// Pairs of a lit point and a light that is integrated, of which some is hidden by things so few that what is left
+    /// is known in closed form. Not among those of `visibility`.
     pub closed_form: u64,
     /// Shafts from points to lights.
     pub shafts: u64,

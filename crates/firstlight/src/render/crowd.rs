@@ -1,8 +1,9 @@
-//! Which lights of a great crowd count at the places of a block, and how: by nodes of the tree that are seen whole, by nodes of which
-//! one light stands for all, and by lights that are asked for themselves.
+//! Which lights of a great crowd count at the places of a block, and how: by nodes of the tree that are seen whole, by
+//! nodes of which one light stands for all, and by lights that are asked for themselves.
 //!
-//! Here errors are added as independent ones are: by their squares. Each is counted as large as it can be: where many are taken
-//! for one, by the bound of Taylor's series; where one light's shadow stands for a node's, by all that the node can send.
+//! Here errors are added as independent ones are: by their squares. Each is counted as large as it can be: where many
+//! are taken for one, by the bound of Taylor's series; where one light's shadow stands for a node's, by all that the
+//! node can send.
 
 use std::collections::BinaryHeap;
 
@@ -55,7 +56,8 @@ pub(super) struct Crowd {
     pub singles: Vec<u32>,
 }
 
-/// Nodes whose error, taken for one, is no more than this part of all they send are looked at whether they are seen whole.
+/// Nodes whose error, taken for one, is no more than this part of all they send are looked at whether they are seen
+/// whole.
 const WORTH: f32 = 0.25;
 /// Nodes wider than this sine are not.
 const WIDE: f32 = 0.7;
@@ -147,8 +149,8 @@ impl Crowd {
         Rgb::new(r, g, b)
     }
 
-    /// How far all that counts can be wrong together where diffuse light and highlights are multiplied with `colors`: the root of the sum
-    /// of squares.
+    /// How far all that counts can be wrong together where diffuse light and highlights are multiplied with `colors`:
+    /// the root of the sum of squares.
     pub fn error(&self, colors: [Rgb; 2]) -> Rgb {
         let (d, s) = (of(colors[0]), of(colors[1]));
         let [r, g, b] = std::array::from_fn(|i| {
@@ -165,8 +167,8 @@ impl Crowd {
         })
     }
 
-    /// Takes nodes apart until what is wrong shows by no more than `walk.budget`. `guess` is what is known to be sent; else it is
-    /// guessed. `look` says what is seen of a node.
+    /// Takes nodes apart until what is wrong shows by no more than `walk.budget`. `guess` is what is known to be sent;
+    /// else it is guessed. `look` says what is seen of a node.
     pub fn refine(&mut self, walk: &Walk, guess: Option<Rgb>, look: &mut dyn FnMut(&LightNode, u32) -> Seen) {
         let mut counted = f32::INFINITY;
         for turn in 0u32.. {

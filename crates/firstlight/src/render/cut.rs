@@ -1,9 +1,10 @@
 //! From all lights of a scene to those that count at some places: a cut through the tree of lights.
 //!
-//! The walk begins with all lights and takes the worst node apart, again and again, until what is left out and what is taken
-//! for one can together be wrong by no more than is allowed. Two walks, one after the other: for a block of pixels
-//! ([`Cut::of_block`]), and for its quarters, which settles what is the same for all their places, then for each patch ([`Cut::of_patch`]), with what
-//! the first left open. The first guesses how bright the block is; whether its error does at each patch is known after the second.
+//! The walk begins with all lights and takes the worst node apart, again and again, until what is left out and what is
+//! taken for one can together be wrong by no more than is allowed. Two walks, one after the other: for a block of
+//! pixels ([`Cut::of_block`]), and for its quarters, which settles what is the same for all their places, then for each
+//! patch ([`Cut::of_patch`]), with what the first left open. The first guesses how bright the block is; whether its
+//! error does at each patch is known after the second.
 
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
@@ -84,13 +85,15 @@ pub(super) struct Walk<'a> {
     pub budget: f32,
 }
 
-/// Nodes whose error, taken for one, is no more than this part of all they send are looked at whether they are seen whole.
+/// Nodes whose error, taken for one, is no more than this part of all they send are looked at whether they are seen
+/// whole.
 const WORTH: f32 = 0.25;
 /// Nodes wider than this sine are not.
 const WIDE: f32 = 0.7;
 /// The part of what nothing is known of that is guessed to arrive.
 const MAYBE: f32 = 0.3;
-/// Sums are made anew where what is in question has become so much less: what was taken away has left its rounding behind.
+/// Sums are made anew where what is in question has become so much less: what was taken away has left its rounding
+/// behind.
 const AGAIN: f32 = 1e-8;
 
 fn add(sum: &mut [f64; 3], color: Rgb, sign: f64) {
@@ -216,8 +219,8 @@ impl Cut {
         worst
     }
 
-    /// Settles what it can for all places of a block. `look` says what is seen of a node; `shines` whether a light shines on
-    /// the surface at all.
+    /// Settles what it can for all places of a block. `look` says what is seen of a node; `shines` whether a light
+    /// shines on the surface at all.
     /// Of the nodes `from`; `known` is what larger blocks around it know already.
     pub fn of_block(
         &mut self,
@@ -317,8 +320,8 @@ impl Cut {
         self.open.sort_unstable();
     }
 
-    /// Settles at one patch what the block left `open`. `value` is what is known to be there already; `ask` evaluates a light
-    /// and says what it adds.
+    /// Settles at one patch what the block left `open`. `value` is what is known to be there already; `ask` evaluates a
+    /// light and says what it adds.
     pub fn of_patch(
         &mut self,
         walk: &Walk,

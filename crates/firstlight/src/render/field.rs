@@ -1,9 +1,9 @@
 //! The light over a square of pixels that see one shape, from few places.
 //!
-//! Where nothing that a light does is narrow beside the square, nine places tell it all: the corners, the middles of the
-//! sides and the middle. The corners alone foretell what the other five hold, as if light changed evenly. Where that shows
-//! no error, the quadratic through all nine is nearer still, and every pixel takes its light from it. Elsewhere the square is
-//! quartered; what is left at the end is lit pixel by pixel.
+//! Where nothing that a light does is narrow beside the square, nine places tell it all: the corners, the middles of
+//! the sides and the middle. The corners alone foretell what the other five hold, as if light changed evenly. Where
+//! that shows no error, the quadratic through all nine is nearer still, and every pixel takes its light from it.
+//! Elsewhere the square is quartered; what is left at the end is lit pixel by pixel.
 //!
 //! What can be narrow is known before: how far the outline of a shadow moves on the light across the square
 //! ([`Arrival::drift`]), and how the light's direction and the highlight turn ([`Arrival::resolved`]).
@@ -20,8 +20,8 @@ use crate::material::{Bsdf, Lobe};
 use crate::scene::Scene;
 use crate::shape::SurfaceInteraction;
 
-/// In display steps: what the corners of a square may be wrong about its middle. The quadratic is wrong by a tenth of that where
-/// the slope of light has a corner, by a third where light itself has one.
+/// In display steps: what the corners of a square may be wrong about its middle. The quadratic is wrong by a tenth of
+/// that where the slope of light has a corner, by a third where light itself has one.
 const SHOWS: f32 = 0.4;
 /// The same under a highlight that is not wide.
 const SHOWS_SHARP: f32 = 0.1;

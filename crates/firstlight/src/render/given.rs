@@ -1,5 +1,5 @@
-//! The plain renderer with other points: the same light, point by point, but where on the lights they lie is somebody else's
-//! choice. Verification asks for it where equal shares of a light's area would take too many of them.
+//! The plain renderer with other points: the same light, point by point, but where on the lights they lie is somebody
+//! else's choice. Verification asks for it where equal shares of a light's area would take too many of them.
 
 use super::Counts;
 use super::pixel::{Lighting, LobeSums};
@@ -14,8 +14,8 @@ use crate::shape::SurfaceInteraction;
 /// light, all of which is 1.
 pub type LightPoint = ([f64; 2], f64);
 
-/// Writes points of an area light, given as its index, for a surface point; the function says where in the world, in metres, a
-/// point of the unit square lies.
+/// Writes points of an area light, given as its index, for a surface point; the function says where in the world, in
+/// metres, a point of the unit square lies.
 pub type ChoosePoints<'a> = dyn FnMut(usize, [f64; 3], &dyn Fn([f64; 2]) -> [f64; 3], &mut Vec<LightPoint>) + 'a;
 
 /// Light, by points that are given.

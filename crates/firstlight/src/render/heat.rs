@@ -5,9 +5,9 @@ use crate::image::{Image, Window};
 
 /// How much work each pixel of a render took.
 ///
-/// The unit is one ray that was asked, from the camera or to a light. A place that asks for a light that is integrated counts as
-/// [`PLACE`](Self::PLACE); where many pixels share such places, each has its share. The same for every thread count, tile size
-/// and machine: it is counted, not timed.
+/// The unit is one ray that was asked, from the camera or to a light. A place that asks for a light that is integrated
+/// counts as [`PLACE`](Self::PLACE); where many pixels share such places, each has its share. The same for every thread
+/// count, tile size and machine: it is counted, not timed.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Heat {
     /// The width and height of the whole film.
@@ -28,8 +28,8 @@ impl Heat {
     /// Where the ramp of colours begins and ends, as powers of two.
     pub const SCALE: [i32; 2] = [-2, 16];
 
-    /// As a picture in false colours: black for 1/4 and less, then violet, red and orange, pale yellow for 65536 and more; each
-    /// doubling is a step of the same length. Linear Rec. 709, for a display of sRGB.
+    /// As a picture in false colours: black for 1/4 and less, then violet, red and orange, pale yellow for 65536 and
+    /// more; each doubling is a step of the same length. Linear Rec. 709, for a display of sRGB.
     pub fn picture(&self) -> Image {
         let pixels = self.work.iter().map(|work| {
             let Rgb { r, g, b } = color(*work);

@@ -1,13 +1,14 @@
-//! The points of area lights that are integrated behind things: for each light sixteen series of them, which are stratified together,
-//! in rungs that each quadruple their number, up to [`MOST`]. To mask many points takes little longer than to mask few: most of it goes by the
-//! number of occluders.
+//! The points of area lights that are integrated behind things: for each light sixteen series of them, which are
+//! stratified together, in rungs that each quadruple their number, up to [`MOST`]. To mask many points takes little
+//! longer than to mask few: most of it goes by the number of occluders.
 //!
-//! Each rung holds all its points, ready for shafts and masks, so that any may be the next: how much of them is hidden is found as for lights that are
-//! sampled ([`View::mask`]). What they send is tallied with and without what is hidden, so that where all that a light would send is
-//! known exactly, the points only say which share of it arrives: a ratio estimate.
+//! Each rung holds all its points, ready for shafts and masks, so that any may be the next: how much of them is hidden
+//! is found as for lights that are sampled ([`View::mask`]). What they send is tallied with and without what is hidden,
+//! so that where all that a light would send is known exactly, the points only say which share of it arrives: a ratio
+//! estimate.
 //!
-//! Sources: of the masks, Haines and Wallace 1991 (shaft culling); of ratio estimates, Cochran, "Sampling Techniques", 1977, chapter 6;
-//! of the effective number of points, Kish 1965.
+//! Sources: of the masks, Haines and Wallace 1991 (shaft culling); of ratio estimates, Cochran, "Sampling Techniques",
+//! 1977, chapter 6; of the effective number of points, Kish 1965.
 
 use std::ops::Range;
 use std::sync::OnceLock;
@@ -79,8 +80,8 @@ pub(super) struct Tally {
 }
 
 impl Tally {
-    /// What arrives. `whole` is what would if nothing were in the way, if that is known; else points alone tell, each of which
-    /// stands for `measure` over their number.
+    /// What arrives. `whole` is what would if nothing were in the way, if that is known; else points alone tell, each
+    /// of which stands for `measure` over their number.
     pub fn sums(&self, whole: Option<&Sums>, measure: f32) -> Sums {
         let Some(whole) = whole else {
             let one = f64::from(measure) / self.count.max(1) as f64;
@@ -97,13 +98,14 @@ impl Tally {
         Sums { diffuse: (self.all[0] * one) as f32, specular: (self.all[1] * one) as f32 }
     }
 
-    /// The effective number of points, of the diffuse part and of the highlight: as many that send alike would be as good.
+    /// The effective number of points, of the diffuse part and of the highlight: as many that send alike would be as
+    /// good.
     pub fn effective(&self) -> [f64; 2] {
         [0, 1].map(|k| if self.squares[k] > 0.0 { self.all[k] * self.all[k] / self.squares[k] } else { 0.0 })
     }
 
-    /// Asks the first so many points of a series, a rung of it. Beyond [`MOST`] it goes on with other series, every `stride`-th, as a whole.
-    /// Answers with what half as many said, and the number of points that rays were traced to.
+    /// Asks the first so many points of a series, a rung of it. Beyond [`MOST`] it goes on with other series, every
+    /// `stride`-th, as a whole. Answers with what half as many said, and the number of points that rays were traced to.
     pub fn ask(
         &mut self,
         asker: &Asker,
@@ -207,8 +209,8 @@ impl Tally {
     }
 }
 
-/// How far points of which `effective` send alike may be wrong about the share of a light on one side of an edge: three standard deviations
-/// of as many points in as many squares, since the edge runs through a root of them.
+/// How far points of which `effective` send alike may be wrong about the share of a light on one side of an edge: three
+/// standard deviations of as many points in as many squares, since the edge runs through a root of them.
 pub(super) fn of_edge(effective: f64) -> f32 {
     let root = effective.max(1e-9).sqrt();
     (1.0 / (root * root.sqrt())) as f32

@@ -86,8 +86,8 @@ impl<'a> Obstacles<'a> {
     }
 }
 
-/// The sums over the points of an area light that none of the `obstacles` hides. One dispatch for all samples of a light: what
-/// is below is compiled for each instruction set, the rest once.
+/// The sums over the points of an area light that none of the `obstacles` hides. One dispatch for all samples of a
+/// light: what is below is compiled for each instruction set, the rest once.
 #[inline(never)]
 pub(super) fn sum_area(
     level: Level,
@@ -176,8 +176,8 @@ fn gather_area<S: Simd>(
     LobeSums { diffuse: partials(diffuse), specular: partials(specular) }
 }
 
-/// Which of the lanes in `active` something in the trees hides on the ways `l` from a surface. Not inlined: scenes without
-/// trees keep their loop small.
+/// Which of the lanes in `active` something in the trees hides on the ways `l` from a surface. Not inlined: scenes
+/// without trees keep their loop small.
 #[inline(never)]
 fn hidden_by_trees(
     level: Level,

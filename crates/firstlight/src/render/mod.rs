@@ -1,10 +1,10 @@
 //! From scene to film.
 //!
 //! Three renderers of the same bits over one scene, where every light is sampled at every camera ray:
-//! [`plain`](plain/index.html) is the specification, one sample at a time; [`lanes`](lanes/index.html) decides sixteen light
-//! samples at once and asks only the shapes that can stand in the way; [`shafts`](shafts/index.html) finds what can for many
-//! points together. They share the way from pixel to surface and from light to film; what differs is how the light of one
-//! source is summed at one surface, the trait [`Lighting`].
+//! [`plain`](plain/index.html) is the specification, one sample at a time; [`lanes`](lanes/index.html) decides sixteen
+//! light samples at once and asks only the shapes that can stand in the way; [`shafts`](shafts/index.html) finds what
+//! can for many points together. They share the way from pixel to surface and from light to film; what differs is how
+//! the light of one source is summed at one surface, the trait [`Lighting`].
 //!
 //! [`tiled`](tiled/index.html) integrates lights and lights a surface once where that is enough; all else is as above.
 
@@ -87,8 +87,8 @@ words! {
     }
 }
 
-/// A caller's wishes. None of them changes a bit of the picture, but `crop`, which chooses its part, and those that say by
-/// which rules it is made: `aa_mode`, `visibility`, `reference`.
+/// A caller's wishes. None of them changes a bit of the picture, but `crop`, which chooses its part, and those that say
+/// by which rules it is made: `aa_mode`, `visibility`, `reference`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RenderSettings {
     /// Threads to render with; all processors if `None`.
@@ -102,7 +102,8 @@ pub struct RenderSettings {
     pub crop: Option<Window>,
     /// How edges are smoothed, where lights are not traced sample by sample.
     pub aa_mode: AaMode,
-    /// Renders with the plain code that is the specification: all lights are sampled, and each camera ray is lit by itself.
+    /// Renders with the plain code that is the specification: all lights are sampled, and each camera ray is lit by
+    /// itself.
     pub reference: bool,
     /// How shadows are found.
     pub visibility: VisibilityMode,
@@ -149,8 +150,8 @@ impl RenderSettings {
         Ok(())
     }
 
-    /// Whether there is memory for the film, and for the file that is made of it. For settings that [`check`](Self::check)
-    /// has passed.
+    /// Whether there is memory for the film, and for the file that is made of it. For settings that
+    /// [`check`](Self::check) has passed.
     ///
     /// # Errors
     /// How much it takes, and what to do.
@@ -211,15 +212,15 @@ impl Default for RenderSettings {
 /// The most pixels that are rendered at once; the whole picture may have more.
 const MAX_PIXELS: u64 = 1 << 27;
 
-/// The most points of all lights that are integrated, where they are sampled all the same: 12 bytes each, on spheres 24, and
-/// as much for shafts.
+/// The most points of all lights that are integrated, where they are sampled all the same: 12 bytes each, on spheres
+/// 24, and as much for shafts.
 const MAX_POINTS: u64 = 1 << 26;
 
 /// Shadow rays between two questions: some hundredths of a second of the fast renderer, some tenths of the plain one.
 const QUESTION_EVERY: u64 = 1 << 23;
 
-/// Renders `scene`. `progress(done, all)`, in pixels, is called after each tile from the thread that rendered it, and now
-/// and then within one that takes long; on `Break` the render stops, without a film.
+/// Renders `scene`. `progress(done, all)`, in pixels, is called after each tile from the thread that rendered it, and
+/// now and then within one that takes long; on `Break` the render stops, without a film.
 ///
 /// # Panics
 /// If the settings do not fit, see [`RenderSettings::check`].
@@ -313,8 +314,8 @@ fn available_threads() -> usize {
     std::thread::available_parallelism().map_or(1, NonZeroUsize::get)
 }
 
-/// Renders one tile: n x n camera rays a pixel, row by row, and at each surface all lights in scene order. With `hits` the
-/// camera rays of neighbouring pixels are traced together. `go_on` is asked now and then.
+/// Renders one tile: n x n camera rays a pixel, row by row, and at each surface all lights in scene order. With `hits`
+/// the camera rays of neighbouring pixels are traced together. `go_on` is asked now and then.
 fn render_tile(
     scene: &Scene,
     tile: &Tile,

@@ -141,8 +141,8 @@ impl Patch {
         Some(patch)
     }
 
-    /// The patch that the rays of `mask` see, which all meet one shape first; `None` if it turns too far over the pixel to be
-    /// one patch.
+    /// The patch that the rays of `mask` see, which all meet one shape first; `None` if it turns too far over the pixel
+    /// to be one patch.
     fn masked(scene: &Scene, pixel: [u32; 2], candidate: Candidate, mask: u64) -> Option<Patch> {
         let n = scene.antialiasing;
         let places = || (0..n * n).filter(move |k| mask >> k & 1 == 1).map(move |k| [k % n, k / n]);
@@ -377,8 +377,8 @@ impl PixelPatches {
         }
     }
 
-    /// The pixel's colour, from what its surfaces send of ambient light and of each light, diffuse and specular, all rays
-    /// together: red, green, blue premultiplied, alpha.
+    /// The pixel's colour, from what its surfaces send of ambient light and of each light, diffuse and specular, all
+    /// rays together: red, green, blue premultiplied, alpha.
     pub fn color(&self, scene: &Scene, ambient: Rgb, terms: &[[Rgb; 2]]) -> [f32; 4] {
         let rays = (scene.antialiasing * scene.antialiasing) as f32;
         // The sum in its one order

@@ -56,8 +56,8 @@ impl PixelSum {
         self.lights.fill([Rgb::BLACK; 2]);
     }
 
-    /// Sends the n x n camera rays of pixel (`i`, `j`), row by row, and adds what they see. `hit` says what the ray of a
-    /// column and a row ends at.
+    /// Sends the n x n camera rays of pixel (`i`, `j`), row by row, and adds what they see. `hit` says what the ray of
+    /// a column and a row ends at.
     pub fn sample(
         &mut self,
         scene: &Scene,
@@ -85,7 +85,8 @@ impl PixelSum {
         ControlFlow::Continue(())
     }
 
-    /// Adds what a camera ray ends at, but for the light of lights: that of a surface is added by [`light`](Self::light).
+    /// Adds what a camera ray ends at, but for the light of lights: that of a surface is added by
+    /// [`light`](Self::light).
     pub fn see(&mut self, scene: &Scene, seen: Seen) -> Option<(SurfaceInteraction, Bsdf)> {
         match seen {
             Seen::Background => self.background += 1,

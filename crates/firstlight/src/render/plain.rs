@@ -55,8 +55,8 @@ impl<'a> Facing<'a> {
         Facing { scene, light, index, si, lobe, cos_o, floor }
     }
 
-    /// What one point of the light, to which `to` leads, adds to the diffuse sum and to that of the highlight. `sample` says
-    /// how much the light sends this way; `None` where nothing arrives.
+    /// What one point of the light, to which `to` leads, adds to the diffuse sum and to that of the highlight. `sample`
+    /// says how much the light sends this way; `None` where nothing arrives.
     #[inline(always)]
     pub fn arriving(
         &self,

@@ -8,8 +8,8 @@ use crate::image::Receipt;
 use crate::light::Light;
 use crate::scene::Scene;
 
-/// How many entries **Pixels** has in the changelog, over all versions. It is part of the version in a receipt, so that two
-/// builds whose pictures differ never say the same. The test below compares it with the changelog.
+/// How many entries **Pixels** has in the changelog, over all versions. It is part of the version in a receipt, so that
+/// two builds whose pictures differ never say the same. The test below compares it with the changelog.
 const PIXELS_ENTRIES: u32 = 20;
 
 impl Scene {

@@ -1,7 +1,8 @@
 //! The fast renderer's way through a tile: what may stand before a light is gathered once for neighbouring points.
 //!
 //! The camera rays of a block of pixels first, then light by light: the points of the block that need it are taken
-//! together, and a [`Settler`] finds from which of them the light is lit, hidden, below the horizon, or cut ([`Sampled`]).
+//! together, and a [`Settler`] finds from which of them the light is lit, hidden, below the horizon, or cut
+//! ([`Sampled`]).
 
 use std::ops::ControlFlow;
 

@@ -1,8 +1,8 @@
 //! Blocks of pixels that hold one surface, proved without a ray for each.
 //!
-//! A block's rays lie in the pyramid between the rays through its corners. Shapes outside of it are out; if the rays through
-//! the corners all meet one convex shape, so do all between them; and if it is nearer there than anything else can be, it
-//! is all that is seen.
+//! A block's rays lie in the pyramid between the rays through its corners. Shapes outside of it are out; if the rays
+//! through the corners all meet one convex shape, so do all between them; and if it is nearer there than anything else
+//! can be, it is all that is seen.
 
 use super::patch::{Contrast, Patch};
 use super::square::Square;
@@ -29,8 +29,8 @@ pub(crate) struct Pyramid {
     sides: [DVec3; 4],
     forward: Vec3,
     eye: Vec3,
-    /// The cone around it: where it begins and how wide it is there, which way it leads, and the sine and cosine of half its
-    /// angle.
+    /// The cone around it: where it begins and how wide it is there, which way it leads, and the sine and cosine of
+    /// half its angle.
     middle: Ray,
     width: f64,
     sin: f64,
@@ -177,8 +177,8 @@ impl Pyramid {
         self.nearest_on_plane(flat.n, flat.p).map_or(on_shape, |on_plane| on_plane.max(on_shape))
     }
 
-    /// The least depth at which the rays meet the plane through `p` with normal `n`, if all of them do. That depth, or its
-    /// inverse where they come from one eye, is linear over the film: the corners' rays have the least.
+    /// The least depth at which the rays meet the plane through `p` with normal `n`, if all of them do. That depth, or
+    /// its inverse where they come from one eye, is linear over the film: the corners' rays have the least.
     fn nearest_on_plane(&self, n: DVec3, p: DVec3) -> Option<f64> {
         let mut nearest = f64::INFINITY;
         for ray in &self.corners {
@@ -251,8 +251,8 @@ impl Candidate {
         is_even.then(|| material.bsdf(&si, &scene.textures))
     }
 
-    /// Whether the steps of a ray to its neighbours say within a half what lies between them: at the rim of what is round,
-    /// nothing is as wide as it seems.
+    /// Whether the steps of a ray to its neighbours say within a half what lies between them: at the rim of what is
+    /// round, nothing is as wide as it seems.
     pub fn is_flat_over(
         self,
         scene: &Scene,
@@ -270,8 +270,8 @@ impl Candidate {
         turn < 0.25 * si.ng.dot(si.wo)
     }
 
-    /// Tells the material at each pixel of a square that sees only this, the mean over its rays; nothing for pixels over which
-    /// more than colours change.
+    /// Tells the material at each pixel of a square that sees only this, the mean over its rays; nothing for pixels
+    /// over which more than colours change.
     pub fn bsdfs(self, scene: &Scene, square: Square, tell: &mut impl FnMut([u32; 2], Bsdf, Contrast)) {
         if square.side == 1 {
             let at = [square.x, square.y];
@@ -296,7 +296,8 @@ impl Candidate {
     }
 }
 
-/// The first of some things on a ray, and its place among them: of several at the same distance, the one with the lowest id.
+/// The first of some things on a ray, and its place among them: of several at the same distance, the one with the
+/// lowest id.
 pub(crate) fn first(scene: &Scene, candidates: &[Candidate], ray: &Ray) -> Option<(usize, Hit)> {
     let mut first: Option<(usize, Hit)> = None;
     for (i, candidate) in candidates.iter().enumerate() {

@@ -24,8 +24,8 @@ impl Tile {
         tiles
     }
 
-    /// The same in whole cells of a grid of the film: at the window's edges tiles are smaller, elsewhere as large as `size`,
-    /// rounded up to cells.
+    /// The same in whole cells of a grid of the film: at the window's edges tiles are smaller, elsewhere as large as
+    /// `size`, rounded up to cells.
     pub fn cover_cells(window: Window, size: u32, cell: u32) -> Vec<Tile> {
         let size = size.next_multiple_of(cell) as u64;
         let spans = |from: u32, length: u32| {
@@ -47,8 +47,8 @@ impl Tile {
 /// Runs of neighbouring tiles stay together; of a large picture there are about so many runs.
 const RUNS: usize = 256;
 
-/// The same tiles in an order in which any stretch of them is spread over the whole picture, so that the time the first of them took
-/// tells how long all will take. Neighbours still follow each other in runs: they look at the same things.
+/// The same tiles in an order in which any stretch of them is spread over the whole picture, so that the time the first
+/// of them took tells how long all will take. Neighbours still follow each other in runs: they look at the same things.
 pub(crate) fn spread(tiles: &[Tile]) -> Vec<Tile> {
     let runs: Vec<&[Tile]> = tiles.chunks((tiles.len() / RUNS).max(1)).collect();
     let count = runs.len();

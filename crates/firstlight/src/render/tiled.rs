@@ -1,15 +1,15 @@
-//! The renderer that pictures are made with: a cell of pixels goes through the same stations together, and each surface in a
-//! pixel is shaded once where that is shown to be enough.
+//! The renderer that pictures are made with: a cell of pixels goes through the same stations together, and each surface
+//! in a pixel is shaded once where that is shown to be enough.
 //!
-//! - Which surfaces pixels hold: squares that hold one are proved without a ray for each ([`solo`](super::solo)), else all
-//!   n x n camera rays say it ([`patch`](super::patch)).
-//! - Over such a square light is taken from nine places where those tell all ([`field`](super::field)). Where lights are
-//!   many, [`many`](super::many) takes the place of this and the next.
+//! - Which surfaces pixels hold: squares that hold one are proved without a ray for each ([`solo`](super::solo)), else
+//!   all n x n camera rays say it ([`patch`](super::patch)).
+//! - Over such a square light is taken from nine places where those tell all ([`field`](super::field)). Where lights
+//!   are many, [`many`](super::many) takes the place of this and the next.
 //! - What arrives of each light at the middle of each patch, with a bound of how much it bends over it
 //!   ([`arrival`](super::arrival)).
-//! - Where the bound would show, the neighbours are asked: where shadows and highlights are wider than a pixel, what light
-//!   does over a pixel shows in the second difference of three. Where that would show as well, or tells nothing, the light
-//!   is asked for at every ray.
+//! - Where the bound would show, the neighbours are asked: where shadows and highlights are wider than a pixel, what
+//!   light does over a pixel shows in the second difference of three. Where that would show as well, or tells nothing,
+//!   the light is asked for at every ray.
 //!
 //! Cells lie on a grid of the film, with a rim of one pixel around each, so that no decision depends on tiles or crops.
 
@@ -196,8 +196,8 @@ impl<'a> Tiled<'a> {
         (j + 1 - self.corner[1]) as usize * ACROSS + (i + 1 - self.corner[0]) as usize
     }
 
-    /// Finds out what the pixels of a square hold, and lights what it can of them together. `depth` is that of the list for
-    /// its candidates, those before it hold those of what it is a quarter of.
+    /// Finds out what the pixels of a square hold, and lights what it can of them together. `depth` is that of the list
+    /// for its candidates, those before it hold those of what it is a quarter of.
     fn split(
         &mut self,
         square: Square,
@@ -305,8 +305,8 @@ impl<'a> Tiled<'a> {
         ControlFlow::Continue(())
     }
 
-    /// Whether colours and light change together over a pixel of a square so much that the mean of their product is not that
-    /// of their means.
+    /// Whether colours and light change together over a pixel of a square so much that the mean of their product is not
+    /// that of their means.
     fn mixes(&self, [i, j]: [u32; 2], square: Square, contrast: &Contrast, [r, g, b, _]: &[f32; 4]) -> bool {
         if *contrast == Contrast::default() {
             return false;
@@ -397,8 +397,8 @@ impl<'a> Tiled<'a> {
         true
     }
 
-    /// Makes sure that the patches of a pixel of the cell or its rim are known, and what arrives at them; `false` if the film
-    /// ends before it.
+    /// Makes sure that the patches of a pixel of the cell or its rim are known, and what arrives at them; `false` if
+    /// the film ends before it.
     fn ask(&mut self, at: [u32; 2], counts: &mut Counts) -> bool {
         if at[0] < self.scene.width && at[1] < self.scene.height && self.first[self.index(at)] != UNLIT {
             return true;

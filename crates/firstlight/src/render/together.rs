@@ -1,8 +1,9 @@
 //! One light, asked for at every ray of a patch, and judged by what all of them make together.
 //!
-//! Behind things a light is asked point by point ([`ladder`](super::ladder)). The rays ask different points, which are stratified together:
-//! n rays need far fewer each than one that stands for all of them, and what one ray's points pass by, those of others meet. Their number
-//! grows until what they say together will do. What points cannot settle, since few of them send nearly all, is left to cells.
+//! Behind things a light is asked point by point ([`ladder`](super::ladder)). The rays ask different points, which are
+//! stratified together: n rays need far fewer each than one that stands for all of them, and what one ray's points pass
+//! by, those of others meet. Their number grows until what they say together will do. What points cannot settle, since
+//! few of them send nearly all, is left to cells.
 
 use super::Counts;
 use super::arrival::{Arrivals, Place, Seen};
@@ -18,21 +19,23 @@ use crate::visibility::View;
 const POINTS: f32 = 512.0;
 /// The effective part of them, none of which is hidden where nothing is.
 const CLEAR: f64 = 0.75;
-/// How much farther off the sums may be than two numbers of points tell: of many rays, and of one more, which can agree by chance.
+/// How much farther off the sums may be than two numbers of points tell: of many rays, and of one more, which can agree
+/// by chance.
 const DOUBT: [f32; 2] = [2.0, 4.0];
-/// The same of what the rays would make together by chance. Points of different series share a light better than by chance: behind the
-/// same straight edge sixteen are wrong by half as much.
+/// The same of what the rays would make together by chance. Points of different series share a light better than by
+/// chance: behind the same straight edge sixteen are wrong by half as much.
 const DOUBT_BY_CHANCE: [f32; 2] = [1.0, 5.0];
 /// The part of what may be wrong that points may tell nothing about.
 const UNTOLD: f32 = 0.5;
 /// Effective points of all rays together that tell something.
 const TOLD: f64 = 32.0;
-/// The same of the diffuse part, as a part of all points: fewer, and the light is so near that its points miss where it is nearest.
+/// The same of the diffuse part, as a part of all points: fewer, and the light is so near that its points miss where it
+/// is nearest.
 const UNEVEN: f64 = 1.0 / 16.0;
 /// The part of what chance makes of an edge that is wrong at the least: two numbers of points may agree for no reason.
 const OF_EDGE: f32 = 0.4;
-/// Points cost more the more there are: the tolerance grows with their number, to so many times what it is for few at [`MOST`] of a ray. Where
-/// that is not met either, there are more, up to so many of a pixel.
+/// Points cost more the more there are: the tolerance grows with their number, to so many times what it is for few at
+/// [`MOST`] of a ray. Where that is not met either, there are more, up to so many of a pixel.
 const COARSE: f32 = 3.5;
 const MOST_OF_ALL: usize = MOST * SERIES;
 
@@ -105,7 +108,8 @@ impl Together {
         self.add(&place.colors, sums);
     }
 
-    /// Asks for what one ray sees past what is in `view`. `whole` is what would arrive if nothing were in the way, if that is known.
+    /// Asks for what one ray sees past what is in `view`. `whole` is what would arrive if nothing were in the way, if
+    /// that is known.
     pub fn behind(&mut self, arrivals: &Arrivals, place: &Place, whole: Option<Sums>, view: View) {
         let series = self.series ^ (self.rays % SERIES);
         self.rays += 1;

@@ -1,4 +1,5 @@
-//! What may surprise whoever looks at the picture of a compiled scene. Nothing of it is an error: a scene may well want it so.
+//! What may surprise whoever looks at the picture of a compiled scene. Nothing of it is an error: a scene may well want
+//! it so.
 
 use pxfm::{f_acos, f_asin};
 

@@ -52,8 +52,8 @@ pub struct Compiled {
     pub warnings: Vec<Diagnostic>,
     /// What it was given because the description lacks it.
     pub added: Added,
-    /// What may surprise whoever looks at the picture, though nothing is wrong for certain: a scene without light, angles that look
-    /// like radians. Never an error, also not under `strict`.
+    /// What may surprise whoever looks at the picture, though nothing is wrong for certain: a scene without light,
+    /// angles that look like radians. Never an error, also not under `strict`.
     pub advice: Vec<Diagnostic>,
 }
 
@@ -355,8 +355,8 @@ impl SceneDesc {
         }
     }
 
-    /// BLAKE3 of all that decides the picture, but for the samples of lights. What follows from a default is hashed as if it
-    /// were said.
+    /// BLAKE3 of all that decides the picture, but for the samples of lights. What follows from a default is hashed as
+    /// if it were said.
     fn hash(&self, textures: &Textures, meshes: &[(String, [u8; 32])], added: &Added) -> String {
         let mut said = self.clone();
         added.add_to(&mut said);
@@ -379,9 +379,9 @@ impl SceneDesc {
 }
 
 impl Scene {
-    /// The same scene seen by another camera, at the same moment and in the same size. What was compiled is shared and not
-    /// made anew, so this takes no time: it is how a turntable is made. [`hash`](Self::hash) is another one, and the summary
-    /// calls the camera nothing.
+    /// The same scene seen by another camera, at the same moment and in the same size. What was compiled is shared and
+    /// not made anew, so this takes no time: it is how a turntable is made. [`hash`](Self::hash) is another one, and
+    /// the summary calls the camera nothing.
     ///
     /// # Errors
     /// What is wrong with the camera, with paths that begin with `camera`.

@@ -11,9 +11,9 @@
 //! num_threads 8
 //! ```
 //!
-//! `num_samples` is n of the n x n camera rays in each pixel, `area_light_resolution` m of the m x m points of the light,
-//! laid out as a grid. The picture is square. What is left out is as in the built-in scene of camera 1 and light 1; without
-//! `output_file` and `num_threads` the program chooses.
+//! `num_samples` is n of the n x n camera rays in each pixel, `area_light_resolution` m of the m x m points of the
+//! light, laid out as a grid. The picture is square. What is left out is as in the built-in scene of camera 1 and light
+//! 1; without `output_file` and `num_threads` the program chooses.
 
 use std::ops::RangeInclusive;
 

@@ -32,14 +32,15 @@ table! {
     /// antialiasing = 4
     /// ```
     pub struct RenderDesc {
-        /// Pixels across, 1 to 65536. Of a picture of more than 134217728 pixels only parts can be rendered, with `--crop`.
+        /// Pixels across, 1 to 65536. Of a picture of more than 134217728 pixels only parts can be rendered, with
+        /// `--crop`.
         pub width: u32 = 1024,
         /// Pixels down, 1 to 65536.
         pub height: u32 = 1024,
         /// n of the n x n camera rays in each pixel, 1 to 64; 4 is "4X".
         pub antialiasing: u32 = 4,
-        /// What is done with each area light that does not say its own: `"exact"`, it is integrated, or the number of points that
-        /// it is sampled at, 1 to 1048576.
+        /// What is done with each area light that does not say its own: `"exact"`, it is integrated, or the number of
+        /// points that it is sampled at, 1 to 1048576.
         pub samples: SamplesDesc = DEFAULT_SAMPLES,
         /// What is made of the border of light and dark on meshes with smooth normals.
         pub shadow_terminator: ShadowTerminator = ShadowTerminator::Smooth,
@@ -57,8 +58,8 @@ table! {
         pub gamma: f64 = 2.2,
         /// In stops: 8- and 16-bit pictures are multiplied by 2^exposure, from -64 to 64.
         pub exposure: f64 = 0.0,
-        /// Frames in a second, 0.001 to 1000000: frame number n of `--frames` is the moment n / fps. Without keys it is of no
-        /// account.
+        /// Frames in a second, 0.001 to 1000000: frame number n of `--frames` is the moment n / fps. Without keys it is
+        /// of no account.
         pub fps: f64 = 24.0,
     }
 }

@@ -4,12 +4,12 @@
 //! - spheres and parallelograms of the world lie in plain lists while there are few of them ([`LISTED`]), and are asked
 //!   one after the other;
 //! - the triangles of all meshes of the world lie in one tree;
-//! - everything else is *placed*: it has a space of its own and a transform to the world. A second tree, over the boxes of
-//!   all that is placed, leads to it: that is the upper one of two levels.
+//! - everything else is *placed*: it has a space of its own and a transform to the world. A second tree, over the boxes
+//!   of all that is placed, leads to it: that is the upper one of two levels.
 //!
-//! A group that has instances is flattened: each of its meshes, point sets and solids is placed once for every instance,
-//! however deep the groups are nested. No tree can change an answer: what is first on a ray is the smallest distance, and
-//! the lowest id at the same distance.
+//! A group that has instances is flattened: each of its meshes, point sets and solids is placed once for every
+//! instance, however deep the groups are nested. No tree can change an answer: what is first on a ray is the smallest
+//! distance, and the lowest id at the same distance.
 
 use std::sync::Arc;
 
@@ -40,8 +40,8 @@ pub(crate) struct Surface {
     pub shadows: Option<LinkId>,
 }
 
-/// What a surface says of rays: which of them it lets pass. Of two shapes at the same place that say the same, no ray ends
-/// at the one with the higher id, and no light is stopped by it alone.
+/// What a surface says of rays: which of them it lets pass. Of two shapes at the same place that say the same, no ray
+/// ends at the one with the higher id, and no light is stopped by it alone.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub(crate) struct RayRules {
     visible: bool,
@@ -79,8 +79,8 @@ pub(crate) struct Placed {
     pub shadow: Meets,
 }
 
-/// Where on a surface a ray ended. In whole words: such a value is copied for every camera ray, and the compiler's own layout is
-/// copied byte by byte.
+/// Where on a surface a ray ended. In whole words: such a value is copied for every camera ray, and the compiler's own
+/// layout is copied byte by byte.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(u32)]
 pub(crate) enum At {
@@ -105,7 +105,8 @@ pub(crate) enum Spot {
     Part(u8),
 }
 
-/// Whether rays of one kind can meet something placed, or a joined mesh: all of it, none of it, or what its surfaces say.
+/// Whether rays of one kind can meet something placed, or a joined mesh: all of it, none of it, or what its surfaces
+/// say.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Meets {
     All,
@@ -241,8 +242,8 @@ fn drop_copies<T, K: Ord>(list: &mut Vec<T>, key: impl Fn(&T) -> K) {
     list.retain(|_| is_copy.next() != Some(true));
 }
 
-/// The same for two placed things that no ray can tell apart: of one shape, at one place, with the same to say of rays. That of
-/// the lower surface, which is the one that was placed first, is then the one that rays end at.
+/// The same for two placed things that no ray can tell apart: of one shape, at one place, with the same to say of rays.
+/// That of the lower surface, which is the one that was placed first, is then the one that rays end at.
 fn same_to_rays(thing: &Placed, surfaces: &[Surface], meshes: &[Mesh], solids: &[Solid]) -> [u8; 32] {
     let rules = |of: u32| surfaces[(thing.surface.0 + of) as usize].ray_rules();
     // Numbers are written so that different ones differ
@@ -356,7 +357,8 @@ impl Geometry {
         flats.map(|flat| flat.seen).collect()
     }
 
-    /// For which lights each of [`listed_obstacles`](Self::listed_obstacles) casts shadows. Nothing where no surface chooses.
+    /// For which lights each of [`listed_obstacles`](Self::listed_obstacles) casts shadows. Nothing where no surface
+    /// chooses.
     pub fn listed_obstacle_links(&self) -> [Vec<Option<LinkId>>; 2] {
         if !self.listed || self.links.is_empty() {
             return [Vec::new(), Vec::new()];

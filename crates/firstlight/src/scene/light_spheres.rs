@@ -18,8 +18,8 @@ pub(crate) struct LightSpheres {
 
 /// So many are asked one by one.
 const LISTED: usize = 24;
-/// Room in the boxes for the rounding of the spheres' own tests: as a part of the radius, and of the distance. Those are below 2e-4 and
-/// below 1e-6.
+/// Room in the boxes for the rounding of the spheres' own tests: as a part of the radius, and of the distance. Those
+/// are below 2e-4 and below 1e-6.
 const ROOM: [f64; 2] = [1e-3, 5e-6];
 /// So many times as far as the spheres may what asks be.
 const AROUND: f64 = 16.0;

@@ -1,7 +1,7 @@
 //! Which lights shine on a surface, and for which lights it casts shadows: sets of lights, each kept once.
 //!
-//! Surfaces that say nothing have no set and pay nothing. The lists of an instance and those of what it places are combined:
-//! both must allow a light.
+//! Surfaces that say nothing have no set and pay nothing. The lists of an instance and those of what it places are
+//! combined: both must allow a light.
 
 use std::collections::HashMap;
 

@@ -57,7 +57,8 @@ pub struct Scene {
     /// n of the n x n camera rays in a pixel.
     pub(crate) antialiasing: u32,
     pub(crate) camera: Camera,
-    /// Where all coordinates count from, in world space: that of the middle of what is far from 0, so that 32 bits are enough.
+    /// Where all coordinates count from, in world space: that of the middle of what is far from 0, so that 32 bits are
+    /// enough.
     pub(crate) origin: DVec3,
     pub(crate) background: Rgb,
     pub(crate) transparent: bool,
@@ -75,7 +76,8 @@ pub struct Scene {
     pub(crate) flat_obstacles: Vec<Parallelogram>,
     /// Whether the camera sees the first of `flat_obstacles`.
     pub(crate) flats_seen: Vec<bool>,
-    /// For which lights each of `obstacles` and of the first of `flat_obstacles` casts shadows; empty where no surface chooses.
+    /// For which lights each of `obstacles` and of the first of `flat_obstacles` casts shadows; empty where no surface
+    /// chooses.
     pub(crate) obstacle_links: [Vec<Option<LinkId>>; 2],
     /// The disk and sphere lights that block.
     pub(crate) light_obstacles: LightObstacles,
@@ -129,8 +131,8 @@ pub struct SceneSummary {
     pub textures: Vec<(String, &'static str, Option<[u32; 2]>)>,
     /// Bytes of all texels in memory.
     pub texture_bytes: u64,
-    /// The smallest box, along the axes, around all shapes, in world space: its least and its greatest corner. `None` without
-    /// shapes.
+    /// The smallest box, along the axes, around all shapes, in world space: its least and its greatest corner. `None`
+    /// without shapes.
     pub bounds: Option<[[f64; 3]; 2]>,
     /// The camera's name; empty for the one without.
     pub camera: String,
@@ -178,8 +180,8 @@ impl Scene {
         self.time
     }
 
-    /// 64 hexadecimal digits: BLAKE3 of the description, its settings and the files it names. The same at all times: what
-    /// moves is told apart by [`time`](Self::time). The same for all samples of lights, which are told apart by
+    /// 64 hexadecimal digits: BLAKE3 of the description, its settings and the files it names. The same at all times:
+    /// what moves is told apart by [`time`](Self::time). The same for all samples of lights, which are told apart by
     /// [`receipt`](Self::receipt).
     pub fn hash(&self) -> &str {
         &self.hash

@@ -33,7 +33,8 @@ pub struct ModelSettings {
 /// The direction that an automatic camera looks from.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct View {
-    /// Around the y axis, in degrees, from -360 to 360: 0 is in front, on the side of +z, and 90 on the right, on the side of +x.
+    /// Around the y axis, in degrees, from -360 to 360: 0 is in front, on the side of +z, and 90 on the right, on the
+    /// side of +x.
     pub azimuth_deg: f64,
     /// Above the horizon, in degrees, from -90 to 90.
     pub elevation_deg: f64,
@@ -99,8 +100,8 @@ impl Default for Framing {
     }
 }
 
-/// What a scene was given because it lacks it. A description with both added means the same picture, without anything being
-/// found.
+/// What a scene was given because it lacks it. A description with both added means the same picture, without anything
+/// being found.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Added {
     /// A camera that sees all shapes, where the scene has no camera.
@@ -194,14 +195,15 @@ fn sin_cos_deg(angle: f64) -> (f64, f64) {
     }
 }
 
-/// The nearest camera that sees all of a thing within its margins, with the thing in the middle of the picture. `support(d)` is the
-/// most that `d` . x is over the thing, `bounds` a box around it, `size` that of the picture.
+/// The nearest camera that sees all of a thing within its margins, with the thing in the middle of the picture.
+/// `support(d)` is the most that `d` . x is over the thing, `bounds` a box around it, `size` that of the picture.
 ///
 /// In the camera's directions right, up and back, with the eye at c, a point x is within the picture where
-/// |x.right - c.right| <= t (c.back - x.back), with t the tangent of half the field of view inside of the margins. So the two
-/// planes through the eye that bound it are those that touch the thing in the directions (1, t) and (-1, t) of (right, back), and the
-/// eye is where they cross: that is the nearest eye for this direction. The one for up and down gives another distance; the larger
-/// holds, and in the other direction the eye is moved to where the thing's outline leaves the same on both sides.
+/// |x.right - c.right| <= t (c.back - x.back), with t the tangent of half the field of view inside of the margins. So
+/// the two planes through the eye that bound it are those that touch the thing in the directions (1, t) and (-1, t) of
+/// (right, back), and the eye is where they cross: that is the nearest eye for this direction. The one for up and down
+/// gives another distance; the larger holds, and in the other direction the eye is moved to where the thing's outline
+/// leaves the same on both sides.
 fn framing_of(support: &dyn Fn(DVec3) -> f64, bounds: [DVec3; 2], framing: &Framing, size: [f64; 2]) -> CameraDesc {
     let [back, up] = framing.view.directions();
     let right = up.cross(back).normalize();
@@ -233,8 +235,8 @@ fn framing_of(support: &dyn Fn(DVec3) -> f64, bounds: [DVec3; 2], framing: &Fram
     camera
 }
 
-/// The tangent from 0 to `most` at which `over`, which is convex and falls from 0 or more to 0 or less, is 0: that of the angle at which
-/// the outline is seen on both sides.
+/// The tangent from 0 to `most` at which `over`, which is convex and falls from 0 or more to 0 or less, is 0: that of
+/// the angle at which the outline is seen on both sides.
 fn outline(most: f64, over: impl Fn(f64) -> f64) -> f64 {
     let (mut low, mut high) = (0.0, most);
     let (mut at_low, mut at_high) = (over(low), over(high));
@@ -271,7 +273,8 @@ fn outline(most: f64, over: impl Fn(f64) -> f64) -> f64 {
 mod tests {
     use super::*;
 
-    /// Where points are in a picture of the size, in parts of it from the left and from the top: the least and the most.
+    /// Where points are in a picture of the size, in parts of it from the left and from the top: the least and the
+    /// most.
     fn shown(camera: &CameraDesc, points: &[DVec3], size: [f64; 2]) -> [[f64; 2]; 2] {
         let eye = DVec3::from(camera.position);
         let forward = (DVec3::from(camera.look_at) - eye).normalize();

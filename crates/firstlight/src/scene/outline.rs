@@ -15,7 +15,8 @@ pub(super) struct Outline<'a> {
     meshes: Vec<Vec<DVec3>>,
 }
 
-/// The corners of the triangles of `mesh` whose surface is seen, each once. `first` is the surface that its own are counted from.
+/// The corners of the triangles of `mesh` whose surface is seen, each once. `first` is the surface that its own are
+/// counted from.
 fn corners(geometry: &Geometry, mesh: &Mesh, first: u32) -> Vec<DVec3> {
     let mut seen = vec![false; mesh.positions.len()];
     let ends = mesh.parts.iter().skip(1).map(|part| part.first_triangle as usize).chain([mesh.triangles.len()]);

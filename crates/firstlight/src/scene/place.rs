@@ -1,8 +1,8 @@
 //! From described shapes to placed ones: groups are flattened, transforms joined, surfaces numbered.
 //!
-//! Two steps. First every group, and the scene itself, is compiled once in its own space ([`Group`]): a list of leaves in
-//! scene order, and one mesh joined from all its meshes. Then the scene is walked ([`Walk`]), instances with it, and every
-//! leaf that is come across is given a surface and a place in the world.
+//! Two steps. First every group, and the scene itself, is compiled once in its own space ([`Group`]): a list of leaves
+//! in scene order, and one mesh joined from all its meshes. Then the scene is walked ([`Walk`]), instances with it, and
+//! every leaf that is come across is given a surface and a place in the world.
 
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -473,8 +473,8 @@ impl Compiler<'_> {
     }
 }
 
-/// The shapes and instances that a group places, with all that is in them. `known` are those of other groups; the groups are
-/// without circles and not deep.
+/// The shapes and instances that a group places, with all that is in them. `known` are those of other groups; the
+/// groups are without circles and not deep.
 fn count_things(group: &Group, groups: &[Group], known: &mut [Option<u64>]) -> u64 {
     let mut things = 0u64;
     for leaf in &group.leaves {

@@ -89,8 +89,8 @@ impl Parsed {
         }
     }
 
-    /// A scene that shows a model, as [`SceneDesc::of_model`] makes it; what is wrong with it is said of the file, which is
-    /// called `name`, and not of a description that nobody wrote.
+    /// A scene that shows a model, as [`SceneDesc::of_model`] makes it; what is wrong with it is said of the file,
+    /// which is called `name`, and not of a description that nobody wrote.
     pub fn of_model(name: &str, file: &str, settings: &ModelSettings) -> Self {
         let model = Some([name.to_owned(), file.to_owned()]);
         Self { model, ..SceneDesc::of_model(file, settings).into() }
@@ -117,8 +117,8 @@ impl Parsed {
 }
 
 impl SceneDesc {
-    /// Reads TOML (`.toml`, or anything else), JSON (`name` ends in `.json`), or the course's key-value text (`.txt`, or
-    /// text whose first line that is not blank is `key value` of a known course key). Never fails: faults are kept
+    /// Reads TOML (`.toml`, or anything else), JSON (`name` ends in `.json`), or the course's key-value text (`.txt`,
+    /// or text whose first line that is not blank is `key value` of a known course key). Never fails: faults are kept
     /// inside.
     ///
     /// `name` is what faults call the text; the files it includes are read from `assets`, relative to the text that

@@ -43,8 +43,8 @@ impl Scene {
         nearest.0
     }
 
-    /// What the ray meets first of the shapes that lie in lists, and of the lights. Returned, not written to a place of the
-    /// caller's: so it stays in registers.
+    /// What the ray meets first of the shapes that lie in lists, and of the lights. Returned, not written to a place of
+    /// the caller's: so it stays in registers.
     #[inline(always)]
     pub(crate) fn meet_listed(&self, ray: &Ray) -> Nearest {
         let mut nearest = Nearest::default();
@@ -98,8 +98,8 @@ impl Scene {
         self.lights[light.index()].samples()
     }
 
-    /// Whether anything that casts shadows for the ray's light stands between a surface and it. Any hit will do, so the order
-    /// is of no account.
+    /// Whether anything that casts shadows for the ray's light stands between a surface and it. Any hit will do, so the
+    /// order is of no account.
     #[inline]
     pub fn occluded(&self, ray: &ShadowRay) -> bool {
         self.occluded_by_lists(ray) || self.geometry.has_trees() && self.geometry.is_blocked(self.level, ray)

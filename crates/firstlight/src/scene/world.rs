@@ -1,7 +1,7 @@
 //! What a ray sees, in world space: the questions that are asked from outside.
 //!
-//! Inside, a scene counts its coordinates from an origin of its own, in 32 bits ([`Scene::origin`]); here they are those of the world,
-//! in 64.
+//! Inside, a scene counts its coordinates from an origin of its own, in 32 bits ([`Scene::origin`]); here they are
+//! those of the world, in 64.
 
 use super::Scene;
 use super::geometry::Hit;
@@ -56,8 +56,8 @@ pub struct SurfacePoint {
 }
 
 impl Scene {
-    /// Where the scene's own coordinates, which are of 32 bits, count from, in world space: 0, but where all of the scene is far
-    /// from there. What is asked and answered is in world space all the same.
+    /// Where the scene's own coordinates, which are of 32 bits, count from, in world space: 0, but where all of the
+    /// scene is far from there. What is asked and answered is in world space all the same.
     pub fn origin(&self) -> DVec3 {
         self.origin
     }
@@ -94,9 +94,9 @@ impl Scene {
         }
     }
 
-    /// A ray from `surface` to each of the [points](Self::light_points) of a light that are above the surface's horizon, for
-    /// [`occluded`](Self::occluded). Those below it send nothing, so the share of the points whose rays are not occluded is
-    /// the visible fraction of the light.
+    /// A ray from `surface` to each of the [points](Self::light_points) of a light that are above the surface's
+    /// horizon, for [`occluded`](Self::occluded). Those below it send nothing, so the share of the points whose rays
+    /// are not occluded is the visible fraction of the light.
     ///
     /// # Panics
     /// If the scene has no such light.
@@ -111,8 +111,8 @@ impl Scene {
         })
     }
 
-    /// A ray from `surface` to a point, world space, for [`occluded`](Self::occluded): whether the two see each other, as far
-    /// as the shadows of `light` go. Whether the point is above the horizon is not looked at.
+    /// A ray from `surface` to a point, world space, for [`occluded`](Self::occluded): whether the two see each other,
+    /// as far as the shadows of `light` go. Whether the point is above the horizon is not looked at.
     pub fn shadow_ray_to(&self, surface: &SurfacePoint, light: LightId, point: DVec3) -> ShadowRay {
         surface.local.shadow_ray(light, (point - surface.lit_from).as_vec3(), 1.0)
     }

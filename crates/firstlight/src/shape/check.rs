@@ -80,7 +80,8 @@ pub(super) fn faults<T>(compile: impl FnOnce(&mut CompileContext) -> T) -> Vec<(
 /// A solid with what is known of it otherwise.
 pub(super) struct Known<'a> {
     pub solid: Solid,
-    /// A function of points that is negative inside, no greater than the distance to the surface, and near it that distance.
+    /// A function of points that is negative inside, no greater than the distance to the surface, and near it that
+    /// distance.
     pub distance: &'a dyn Fn(DVec3) -> f64,
     pub center: DVec3,
     /// How far it reaches from there.
@@ -106,7 +107,8 @@ impl Known<'_> {
         DRay { o, d: d * random.magnitude(1e-3, 1e3) }
     }
 
-    /// The first crossing of the surface, by steps that cannot pass it unless it is touched less deep than 1e-12 of the size.
+    /// The first crossing of the surface, by steps that cannot pass it unless it is touched less deep than 1e-12 of the
+    /// size.
     fn march(&self, ray: &DRay) -> Option<f64> {
         let speed = ray.d.length();
         let least = 1e-6 * self.size;
@@ -250,8 +252,8 @@ impl Known<'_> {
         assert!((met[0] - bounds[0]).cmple(room).all() && (bounds[1] - met[1]).cmple(room).all(), "{bounds:?} {met:?}");
     }
 
-    /// No ray from inside gets out unseen, and from outside as many ends are met going in as coming out. `rims`: points that
-    /// rays are aimed at besides others, where sides meet; `inside`: points well inside.
+    /// No ray from inside gets out unseen, and from outside as many ends are met going in as coming out. `rims`: points
+    /// that rays are aimed at besides others, where sides meet; `inside`: points well inside.
     pub fn is_closed(&self, rays: usize, rims: &dyn Fn(f64) -> DVec3, inside: &dyn Fn(f64) -> DVec3) {
         let mut random = Random::new(17);
         for i in 0..rays {
@@ -280,8 +282,8 @@ impl Known<'_> {
         }
     }
 
-    /// A ray that leaves a point of the surface, as rays of light do, does not find that point again. `clear`: how long a ray
-    /// with this cosine to the normal is free at least, in sizes.
+    /// A ray that leaves a point of the surface, as rays of light do, does not find that point again. `clear`: how long
+    /// a ray with this cosine to the normal is free at least, in sizes.
     pub fn is_left_by_rays(&self, rays: usize, clear: &dyn Fn(f64) -> f64) {
         let mut random = Random::new(19);
         for _ in 0..rays {

@@ -8,9 +8,9 @@ use crate::context::CompileContext;
 shape_table! {
     /// A round cone, or a part of one between two radii, closed by caps or open.
     ///
-    /// On the mantle u runs around the axis, to the right as seen from outside with `p1` above, and v from 0 at `p0` to 1
-    /// at `p1`. u is 1/2 towards +x, or towards +y where the axis is within 26 degrees of the x axis. On the caps u is that
-    /// of the mantle where they meet, and v runs from 0 at the rim to 1 at the centre.
+    /// On the mantle u runs around the axis, to the right as seen from outside with `p1` above, and v from 0 at `p0` to
+    /// 1 at `p1`. u is 1/2 towards +x, or towards +y where the axis is within 26 degrees of the x axis. On the caps u
+    /// is that of the mantle where they meet, and v runs from 0 at the rim to 1 at the centre.
     ///
     /// ```toml
     /// [[cone]]

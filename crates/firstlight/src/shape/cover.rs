@@ -1,6 +1,6 @@
-//! How much of a light a sphere, a parallelogram or a disk hides from a point, proved from the light's hull: the ways `l` + u
-//! `axes[0]` + v `axes[1]` + w `axes[2]`, each of u, v, w from -1 to 1. What is proved holds for the rounded answers of
-//! `blocks` for each way of the hull.
+//! How much of a light a sphere, a parallelogram or a disk hides from a point, proved from the light's hull: the ways
+//! `l` + u `axes[0]` + v `axes[1]` + w `axes[2]`, each of u, v, w from -1 to 1. What is proved holds for the rounded
+//! answers of `blocks` for each way of the hull.
 
 use super::disk::{DiskBounds, DiskShadow};
 use super::parallelogram::ParallelogramShadow;
@@ -55,8 +55,8 @@ impl SphereShadow {
         if !(distance + reach < 1e12 && r > 1e-12) {
             return Cover::Some;
         }
-        // A plane between the sphere and all ways from the point: across the line from its centre to the nearest of a hull
-        // that grows. Everything is counted from the centre
+        // A plane between the sphere and all ways from the point: across the line from its centre to the nearest of a
+        // hull that grows. Everything is counted from the centre
         let t = -f.dot(l) / l.length_squared();
         let first = f + l * if finite { t.clamp(0.0, 1.0) } else { t.max(0.0) };
         let mut near = first;

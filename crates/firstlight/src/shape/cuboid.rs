@@ -9,9 +9,9 @@ use crate::context::CompileContext;
 use crate::math::{DRay, DVec3, Frame};
 
 shape_table! {
-    /// A box along the axes of the world, with an outside and an inside. Each of its six faces carries the whole texture,
-    /// from 0 to 1 to the right and up as seen from outside: up is +y on the four walls, -z on the top and +z on the
-    /// bottom, as on a `[[rectangle]]` that faces the same way.
+    /// A box along the axes of the world, with an outside and an inside. Each of its six faces carries the whole
+    /// texture, from 0 to 1 to the right and up as seen from outside: up is +y on the four walls, -z on the top and +z
+    /// on the bottom, as on a `[[rectangle]]` that faces the same way.
     ///
     /// ```toml
     /// [[box]]

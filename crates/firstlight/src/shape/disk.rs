@@ -13,9 +13,9 @@ use crate::context::CompileContext;
 use crate::math::{DRay, DVec3, ErrorBound, Frame, UNIT_ROUNDOFF, Vec3, Vec3x16};
 
 shape_table! {
-    /// A flat disk, or a ring. u runs around it counterclockwise as seen from the front, v from 0 at the rim to 1 at the
-    /// centre, or at the inner edge of a ring. u is 1/2 towards +x, or towards +y where the normal is within 26 degrees of
-    /// the x axis.
+    /// A flat disk, or a ring. u runs around it counterclockwise as seen from the front, v from 0 at the rim to 1 at
+    /// the centre, or at the inner edge of a ring. u is 1/2 towards +x, or towards +y where the normal is within 26
+    /// degrees of the x axis.
     ///
     /// ```toml
     /// [[disk]]
@@ -164,8 +164,8 @@ pub(crate) struct DiskShadow {
     at: [f32; 2],
 }
 
-/// What has to hold for a way l to be blocked by a disk: -n.l above `height` and `room` (above 0, of a way without an end), and
-/// (x.l)^2 + (y.l)^2 at most (n.l)^2.
+/// What has to hold for a way l to be blocked by a disk: -n.l above `height` and `room` (above 0, of a way without an
+/// end), and (x.l)^2 + (y.l)^2 at most (n.l)^2.
 pub(crate) struct DiskBounds {
     pub n: Vec3,
     pub x: Vec3,
@@ -194,8 +194,8 @@ impl DiskShadow {
         Some(DiskBounds { n: self.n, x, y, height: self.height, room, wrong })
     }
 
-    /// Whether the disk stands between the point and the end of `l` (finite), or anywhere along it (not finite). Point and
-    /// end have to be on different sides of the plane, by more than their errors.
+    /// Whether the disk stands between the point and the end of `l` (finite), or anywhere along it (not finite). Point
+    /// and end have to be on different sides of the plane, by more than their errors.
     ///
     /// The plane is crossed at the height / descent part of `l`: everything times `descent`, there is no division.
     #[inline(always)]

@@ -82,8 +82,8 @@ impl Frustum {
             chord.cut(mantle.enter, mantle.leave);
             return chord.first(shift, t_min, t_max, single_sided);
         }
-        // Open: the ends of what is inside the mantle, where they lie between the ends of the axis. Two tubes that share an
-        // end overlap by the rounding, so that no ray slips between them
+        // Open: the ends of what is inside the mantle, where they lie between the ends of the axis. Two tubes that
+        // share an end overlap by the rounding, so that no ray slips between them
         if mantle.is_empty() {
             return None;
         }
@@ -98,8 +98,8 @@ impl Frustum {
     /// The part of the line o + t d inside the mantle, which is thought to go on beyond the ends, up to the apex.
     ///
     /// In the plane across the axis, with the radius R + D t: |o + t d| = R + D t, or a t^2 + 2 b t + c = 0 with
-    /// a = d.d - D^2, b = o.d - D R, c = o.o - R^2. The discriminant b^2 - a c cancels where the line grazes the mantle, and
-    /// near the apex; written as |R d - D o|^2 - |o x d|^2 it does not.
+    /// a = d.d - D^2, b = o.d - D R, c = o.o - R^2. The discriminant b^2 - a c cancels where the line grazes the
+    /// mantle, and near the apex; written as |R d - D o|^2 - |o x d|^2 it does not.
     #[inline(always)]
     fn mantle(&self, o: DVec3, d: DVec3) -> Chord {
         let (radius, change) = (self.radius(o.z), self.slope * d.z);

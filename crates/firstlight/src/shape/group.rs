@@ -13,12 +13,12 @@ pub struct GroupDesc {
 }
 
 shape_table! {
-    /// A copy of a group: all its shapes, moved, turned and scaled together. What it places takes about 300 bytes for each
-    /// mesh, point set or other shape of the group. Groups may hold instances of others, 32 deep; a scene places at most
-    /// 4194304 shapes and instances.
+    /// A copy of a group: all its shapes, moved, turned and scaled together. What it places takes about 300 bytes for
+    /// each mesh, point set or other shape of the group. Groups may hold instances of others, 32 deep; a scene places
+    /// at most 4194304 shapes and instances.
     ///
-    /// Each shape of each instance has its own id, and the names of the instances around it and its own as name, with `/`
-    /// between. `material` replaces the materials of everything in the group; what is
+    /// Each shape of each instance has its own id, and the names of the instances around it and its own as name, with
+    /// `/` between. `material` replaces the materials of everything in the group; what is
     /// invisible or casts no shadow in the group stays so.
     ///
     /// ```toml

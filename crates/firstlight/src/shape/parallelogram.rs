@@ -245,8 +245,8 @@ impl Parallelogram {
         height <= reach && height > self.n.as_vec3().abs().dot(error.0)
     }
 
-    /// Whether a viewer in the direction `wo` of a point that lies before it, nearly on its plane, sees nothing behind it
-    /// within `reach` of the point.
+    /// Whether a viewer in the direction `wo` of a point that lies before it, nearly on its plane, sees nothing behind
+    /// it within `reach` of the point.
     pub(crate) fn screens(&self, p: Vec3, wo: Vec3, reach: f32, light: PlaneSide) -> bool {
         let cos = match light {
             PlaneSide::Front => self.n.as_vec3().dot(wo),
@@ -300,8 +300,8 @@ pub(crate) struct ParallelogramShadow {
     height: f32,
     /// How far `height` can be wrong.
     margin: f32,
-    /// How far n.l can be wrong, for each length along an axis: the rounding of n, of l, of the end of l, of the products
-    /// and of their sum.
+    /// How far n.l can be wrong, for each length along an axis: the rounding of n, of l, of the end of l, of the
+    /// products and of their sum.
     abs_n: Vec3,
     u: Axis,
     v: Axis,
@@ -352,9 +352,9 @@ impl ParallelogramShadow {
             }
     }
 
-    /// What has to be above 0 for a way l to be blocked, each as f.l - c, and how far that can be wrong for ways with coordinates
-    /// up to `longest`: the way crosses the plane, and does it between the four sides. What makes [`blocks`](Self::blocks)
-    /// ask for more counts as wrong.
+    /// What has to be above 0 for a way l to be blocked, each as f.l - c, and how far that can be wrong for ways with
+    /// coordinates up to `longest`: the way crosses the plane, and does it between the four sides. What makes
+    /// [`blocks`](Self::blocks) ask for more counts as wrong.
     pub(super) fn bounds(&self, longest: f32, finite: bool) -> [(Vec3, f32, f32); 5] {
         const DOT: f32 = 32.0 * UNIT_ROUNDOFF;
         let one = |v: Vec3| v.abs().element_sum();
@@ -376,8 +376,8 @@ impl ParallelogramShadow {
         [crosses, side(u, u.low, 1.0), side(u, u.high, -1.0), side(v, v.low, 1.0), side(v, v.high, -1.0)]
     }
 
-    /// Whether the parallelogram stands between the point and the end of `l` (finite), or anywhere along it (not finite).
-    /// Point and end have to be on different sides of the plane, by more than their errors.
+    /// Whether the parallelogram stands between the point and the end of `l` (finite), or anywhere along it (not
+    /// finite). Point and end have to be on different sides of the plane, by more than their errors.
     #[inline(always)]
     pub fn blocks(&self, l: Vec3, finite: bool) -> bool {
         let descent = -self.n.dot(l);

@@ -56,8 +56,8 @@ impl Placement {
         abs(self.world_from_object.matrix3) * p
     }
 
-    /// The box of the world around a box of the object, with room for the rounding of rays that are taken to the object's
-    /// space and to f32 there.
+    /// The box of the world around a box of the object, with room for the rounding of rays that are taken to the
+    /// object's space and to f32 there.
     pub fn bounds(&self, [low, high]: [DVec3; 2]) -> [DVec3; 2] {
         let center = self.world_from_object.transform_point3((low + high) * 0.5);
         let half = self.reach((high - low) * 0.5);

@@ -8,8 +8,9 @@ use crate::context::CompileContext;
 use crate::math::{DRay, DVec3, Frame};
 
 shape_table! {
-    /// A plane without end (it is let go 1e9 m from `point`). The texture coordinate is the distance from `point` in metres,
-    /// to the right and up as seen from the side the normal points to; it goes on for ever, and so does a checkerboard.
+    /// A plane without end (it is let go 1e9 m from `point`). The texture coordinate is the distance from `point` in
+    /// metres, to the right and up as seen from the side the normal points to; it goes on for ever, and so does a
+    /// checkerboard.
     ///
     /// ```toml
     /// [[plane]]
@@ -44,8 +45,8 @@ impl PlaneDesc {
     }
 }
 
-/// What is farther from `point` than this is not computed with, in metres: squares of squares of coordinates stay finite in
-/// f32. Far beyond where any pixel could tell.
+/// What is farther from `point` than this is not computed with, in metres: squares of squares of coordinates stay
+/// finite in f32. Far beyond where any pixel could tell.
 const REACH: f64 = 1e9;
 
 impl Plane {

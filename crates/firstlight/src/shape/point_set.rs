@@ -19,8 +19,8 @@ use crate::math::{DRay, DVec3, ErrorBound, Ray, Vec3};
 shape_table! {
     /// Spheres by the million: the vertices of a PLY file, or written out.
     ///
-    /// The radius of each is the file's property `radius`, or the list `radii`, or `radius` for all; where nothing says it, it is 0.7
-    /// times the distance to the fourth nearest point, by the median of some. Colours multiply the
+    /// The radius of each is the file's property `radius`, or the list `radii`, or `radius` for all; where nothing says
+    /// it, it is 0.7 times the distance to the fourth nearest point, by the median of some. Colours multiply the
     /// material's diffuse, specular and ambient colours. All spheres of a set have one id; which of them was hit is the
     /// number of the primitive. Spheres without a finite centre and a radius above 0 are left out.
     ///
@@ -38,8 +38,8 @@ shape_table! {
         pub radii: Vec<f64> = Vec::new(),
         /// The colour of each position, linear Rec. 709.
         pub colors: Vec<[f64; 3]> = Vec::new(),
-        /// In metres, greater than 0: the radius of those that have none of their own. Without it, one is chosen by the spacing of
-        /// the points, so that neighbours on a surface touch.
+        /// In metres, greater than 0: the radius of those that have none of their own. Without it, one is chosen by the
+        /// spacing of the points, so that neighbours on a surface touch.
         pub radius: Option<f64> = None,
     }
 }
@@ -140,8 +140,8 @@ impl PointSetDesc {
 const ALONE: f64 = 0.01;
 /// Points whose neighbours are looked at.
 const SAMPLED: usize = 64;
-/// The neighbour that says how far apart points are. In a square grid the first four are as near, and points that lie on a
-/// surface by chance have their fourth, in the mean, at 1.09 times the spacing of such a grid of as many.
+/// The neighbour that says how far apart points are. In a square grid the first four are as near, and points that lie
+/// on a surface by chance have their fourth, in the mean, at 1.09 times the spacing of such a grid of as many.
 const NEIGHBOUR: usize = 4;
 /// A radius that is as many times the spacing of the points, or as small a part of it, is hardly meant.
 const FAR_OFF: f64 = 20.0;
@@ -151,8 +151,8 @@ fn chosen_radius(spacing: f64) -> f64 {
     (0.7 * spacing).clamp(1e-9, 2.5e8)
 }
 
-/// How far apart points are: the median, over at most `sampled` of them, of the distance to the [`NEIGHBOUR`]th other place,
-/// or the farthest where there are fewer. `None` if all are at one place.
+/// How far apart points are: the median, over at most `sampled` of them, of the distance to the [`NEIGHBOUR`]th other
+/// place, or the farthest where there are fewer. `None` if all are at one place.
 fn spacing(positions: &[[f32; 3]], sampled: usize) -> Option<f64> {
     let sampled = sampled.min(positions.len());
     let samples: Vec<[f32; 3]> = (0..sampled).map(|i| positions[i * positions.len() / sampled]).collect();
@@ -283,8 +283,8 @@ impl PointSet {
         Ball { c: DVec3::new(x, y, z), r }
     }
 
-    /// The first sphere on a ray of the set's own space: its distance, at most `limit`, and its number. Of several at the
-    /// same distance the lowest. `single_sided`: rays pass through from inside.
+    /// The first sphere on a ray of the set's own space: its distance, at most `limit`, and its number. Of several at
+    /// the same distance the lowest. `single_sided`: rays pass through from inside.
     #[inline(never)]
     pub fn intersect<S: Simd>(&self, simd: S, ray: &DRay, limit: f32, single_sided: bool) -> Option<(f64, u32)> {
         simd.vectorize(

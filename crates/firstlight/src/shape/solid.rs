@@ -47,13 +47,14 @@ pub(crate) struct SolidPoint {
     pub dpdv: DVec3,
     /// What lies beyond 0 and 1 of u and of v.
     pub edges: [UvEdge; 2],
-    /// The absolute size of what `p` was summed up from, for [`ErrorBound::of_rounded`](crate::math::ErrorBound::of_rounded).
+    /// The absolute size of what `p` was summed up from, for
+    /// [`ErrorBound::of_rounded`](crate::math::ErrorBound::of_rounded).
     pub terms: DVec3,
 }
 
 impl SolidPoint {
-    /// The change of uv with a step `dp` along the surface. What lies off the surface is left out; once around is the most
-    /// that a step makes of a coordinate that comes back.
+    /// The change of uv with a step `dp` along the surface. What lies off the surface is left out; once around is the
+    /// most that a step makes of a coordinate that comes back.
     pub fn uv_step(&self, dp: DVec3) -> DVec2 {
         let across = self.dpdu.cross(self.dpdv);
         let area2 = across.length_squared();
@@ -118,8 +119,8 @@ impl Solid {
         each!(self, shape => shape.support(d))
     }
 
-    /// Whether all of it lies on one side of the tangent plane of each of its points. Then no ray that leaves such a shape
-    /// on its front meets it again, whatever rounding says; nor does one that leaves a flat shape on its back.
+    /// Whether all of it lies on one side of the tangent plane of each of its points. Then no ray that leaves such a
+    /// shape on its front meets it again, whatever rounding says; nor does one that leaves a flat shape on its back.
     #[cfg(test)]
     pub fn is_convex(&self) -> bool {
         match self {
@@ -136,8 +137,8 @@ impl Solid {
     }
 }
 
-/// The part of a line inside a convex shape, made by cutting away what is outside of one side after another. A line through
-/// the inside has both ends, so no ray slips out where sides meet.
+/// The part of a line inside a convex shape, made by cutting away what is outside of one side after another. A line
+/// through the inside has both ends, so no ray slips out where sides meet.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Chord {
     pub enter: SolidHit,
@@ -184,7 +185,8 @@ impl Chord {
         !(self.enter.t <= self.leave.t)
     }
 
-    /// The first end with `t_min` < t < `t_max`; only where the line enters, if `single_sided`. `shift` is added to every t.
+    /// The first end with `t_min` < t < `t_max`; only where the line enters, if `single_sided`. `shift` is added to
+    /// every t.
     #[inline(always)]
     pub fn first(&self, shift: f64, t_min: f64, t_max: f64, single_sided: bool) -> Option<SolidHit> {
         if self.is_empty() {

@@ -192,8 +192,8 @@ enum Side {
 pub(crate) struct SphereShadow {
     /// From the centre to the point.
     f: Vec3,
-    /// |f|^2 - r^2. From far away: what |q - c|^2 is below where the end q of a shadow ray is inside for sure, a little less
-    /// than r^2.
+    /// |f|^2 - r^2. From far away: what |q - c|^2 is below where the end q of a shadow ray is inside for sure, a little
+    /// less than r^2.
     cc: f32,
     r2: f32,
     ff: f32,
@@ -209,9 +209,9 @@ impl SphereShadow {
         self.side == Side::On
     }
 
-    /// Whether the sphere cannot hide any light that arrives on the side `n` (unit) of the point: because the point lies
-    /// on its outside, and it is convex; or because all of it is below the point's horizon, by more than the rounding of
-    /// [`blocks`](Self::blocks), which is below 2e-4 r near the sphere and below 1e-6 |f| far from it.
+    /// Whether the sphere cannot hide any light that arrives on the side `n` (unit) of the point: because the point
+    /// lies on its outside, and it is convex; or because all of it is below the point's horizon, by more than the
+    /// rounding of [`blocks`](Self::blocks), which is below 2e-4 r near the sphere and below 1e-6 |f| far from it.
     #[inline(always)]
     pub fn is_below(&self, n: Vec3) -> bool {
         if self.side == Side::On {
@@ -233,8 +233,8 @@ impl SphereShadow {
     /// With a = l.l and b = -f.l, the line comes nearest to the centre at t = b/a and meets the sphere where
     /// a t^2 - 2 b t + cc = 0. From outside, the nearer root is below 1 if the end is inside, or if 0 < b < a.
     ///
-    /// From many radii away nothing is left of that: there the end is l + f, axis by axis, which is wrong by the rounding of
-    /// the two alone.
+    /// From many radii away nothing is left of that: there the end is l + f, axis by axis, which is wrong by the
+    /// rounding of the two alone.
     #[inline(always)]
     pub fn blocks(&self, l: Vec3, finite: bool) -> bool {
         let a = l.dot(l);
@@ -289,8 +289,8 @@ impl SphereShadow {
 /// The relative error allowed to |q - c|^2 - r^2 at the end of a shadow ray.
 const END_SLACK: f32 = 16.0 * UNIT_ROUNDOFF;
 
-/// The same for |l + f|^2 near r^2, in r |f|: l and f are each wrong by their rounding, and neither is much longer than the
-/// other where their sum is short. That is 4 r |f| roundings, and what the squares add is less.
+/// The same for |l + f|^2 near r^2, in r |f|: l and f are each wrong by their rounding, and neither is much longer than
+/// the other where their sum is short. That is 4 r |f| roundings, and what the squares add is less.
 const FAR_END_SLACK: f32 = 16.0 * UNIT_ROUNDOFF;
 
 /// Steps in uv are no longer than this: once around.

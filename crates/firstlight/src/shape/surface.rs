@@ -8,7 +8,8 @@ use crate::math::{ErrorBound, Facet, ShadowRay, Vec2, Vec3};
 words! {
     /// What is made of the border of light and dark on facets with smooth normals.
     pub enum ShadowTerminator {
-        /// Light is gathered from the round surface that the normals speak of: no facet shadows itself or its neighbours there.
+        /// Light is gathered from the round surface that the normals speak of: no facet shadows itself or its
+        /// neighbours there.
         Smooth = "smooth",
         /// Light is gathered from the facets, and each is dark as soon as it is turned away, whatever its normals say.
         Hard = "hard",

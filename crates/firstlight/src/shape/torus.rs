@@ -11,12 +11,12 @@ use crate::context::CompileContext;
 use crate::math::{DRay, DVec3, Frame, bracketed, depressed_cubic};
 
 shape_table! {
-    /// A ring: a tube bent round into a circle. Where the tube is thicker than the circle the ring has no hole, and only
-    /// its outside counts.
+    /// A ring: a tube bent round into a circle. Where the tube is thicker than the circle the ring has no hole, and
+    /// only its outside counts.
     ///
-    /// u runs around the axis, to the right as seen from outside with the axis upwards; it is 1/2 towards +x, or towards
-    /// +y where the axis is within 26 degrees of the x axis. v runs around the tube, upwards as seen from outside: 1/2
-    /// farthest from the axis, 3/4 at the top, 0 and 1 where the tube is nearest to the axis.
+    /// u runs around the axis, to the right as seen from outside with the axis upwards; it is 1/2 towards +x, or
+    /// towards +y where the axis is within 26 degrees of the x axis. v runs around the tube, upwards as seen from
+    /// outside: 1/2 farthest from the axis, 3/4 at the top, 0 and 1 where the tube is nearest to the axis.
     ///
     /// ```toml
     /// [[torus]]
@@ -70,11 +70,11 @@ impl Torus {
         (distance - self.minor, slope)
     }
 
-    /// The line meets the torus where a polynomial of degree four is 0. Its coefficients know the roots badly where two are
-    /// close, so they are asked only where the line turns around in it: the three roots of its derivative, which as a
-    /// cubic in the distance from the point nearest to the centre has no square. Between those the torus is entered or
-    /// left at most once, and the signs of the distance to the torus, which loses nothing, say whether; the place is found
-    /// by Newton's method on the distance, held between the two.
+    /// The line meets the torus where a polynomial of degree four is 0. Its coefficients know the roots badly where two
+    /// are close, so they are asked only where the line turns around in it: the three roots of its derivative, which as
+    /// a cubic in the distance from the point nearest to the centre has no square. Between those the torus is entered
+    /// or left at most once, and the signs of the distance to the torus, which loses nothing, say whether; the place is
+    /// found by Newton's method on the distance, held between the two.
     #[inline]
     pub fn intersect(&self, ray: &DRay, t_min: f64, t_max: f64, single_sided: bool) -> Option<SolidHit> {
         let (near, shift) = ray.nearest_to(self.center);
@@ -101,8 +101,8 @@ impl Torus {
         if !(low < high) {
             return None;
         }
-        // With s the way from the nearest point: F = (s^2 + k)^2 - 4 R^2 |(o + s d) across the axis|^2, a quarter of whose
-        // derivative is s^3 + (k - 2 R^2 d.d) s - 2 R^2 o.d
+        // With s the way from the nearest point: F = (s^2 + k)^2 - 4 R^2 |(o + s d) across the axis|^2, a quarter of
+        // whose derivative is s^3 + (k - 2 R^2 d.d) s - 2 R^2 o.d
         let (across, major2) = (d.truncate(), self.major * self.major);
         let k = o.length_squared() + (self.major - self.minor) * (self.major + self.minor);
         let p = k - 2.0 * major2 * across.length_squared();

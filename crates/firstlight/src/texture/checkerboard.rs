@@ -11,8 +11,9 @@ use crate::shape::{Footprint, UvEdge};
 
 table! {
     /// Squares of two colours, `counts[0]` across u in 0..1 and `counts[1]` across v in 0..1: the first colour where
-    /// floor(u n) + floor(v m) is even. On a plane without end u and v are metres, and the squares go on. A function, not an image: its value is the area mean over the pixel's
-    /// footprint, so its edges are sharp from near and gray from far, for every count.
+    /// floor(u n) + floor(v m) is even. On a plane without end u and v are metres, and the squares go on. A function,
+    /// not an image: its value is the area mean over the pixel's footprint, so its edges are sharp from near and gray
+    /// from far, for every count.
     ///
     /// ```toml
     /// [texture.checkerboard.tiles]
@@ -70,8 +71,8 @@ impl Checkerboard {
         (center - reach).floor() == (center + reach).floor()
     }
 
-    /// The mean over the footprint, as far as the surface goes, of +1 on the first colour's squares and -1 on the second's.
-    /// In f64: the integral is a small difference of larger numbers where the footprint is thin.
+    /// The mean over the footprint, as far as the surface goes, of +1 on the first colour's squares and -1 on the
+    /// second's. In f64: the integral is a small difference of larger numbers where the footprint is thin.
     fn mean(&self, uv: Vec2, footprint: &Footprint) -> f64 {
         // Count in squares: the lines of the board are the whole numbers
         let scale = DVec2::new(self.counts[0] as f64, self.counts[1] as f64);

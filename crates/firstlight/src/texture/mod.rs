@@ -49,7 +49,8 @@ impl Texture {
     }
 }
 
-/// A parameter of a material: the same everywhere, or a texture times a factor. `Param<Rgb>` is colour, `Param<f32>` data.
+/// A parameter of a material: the same everywhere, or a texture times a factor. `Param<Rgb>` is colour, `Param<f32>`
+/// data.
 #[derive(Clone, Copy, Debug)]
 pub struct Param<T> {
     /// The texture, if one drives it.

@@ -9,10 +9,11 @@ use crate::math::DVec3;
 table! {
     /// One of the `keys` of a transform: what it is at a time.
     ///
-    /// Translation, rotation and scale are three matters of their own: each goes from one key that says it to the next that
-    /// does. Before its first key and after its last it stays as that key says. Between two keys with `rotate_deg` the three
-    /// angles change at a constant rate, so that from 0 to 360 is a full turn; so does the angle between two keys of the same
-    /// `rotate_axis`. Between quaternions, and between different axes, the rotation goes the shortest way.
+    /// Translation, rotation and scale are three matters of their own: each goes from one key that says it to the next
+    /// that does. Before its first key and after its last it stays as that key says. Between two keys with `rotate_deg`
+    /// the three angles change at a constant rate, so that from 0 to 360 is a full turn; so does the angle between two
+    /// keys of the same `rotate_axis`. Between quaternions, and between different axes, the rotation goes the shortest
+    /// way.
     ///
     /// ```toml
     /// [camera]

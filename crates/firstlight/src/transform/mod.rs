@@ -1,7 +1,7 @@
 //! Transforms: where a thing is, how it is turned and how large it is, at a moment.
 //!
-//! From `transform = { ... }` of the scene text to a [`DAffine3`] that takes the thing's own coordinates to those of the
-//! world (`world_from_object`). What is made of it is left to those who have one: cameras, lights, shapes.
+//! From `transform = { ... }` of the scene text to a [`DAffine3`] that takes the thing's own coordinates to those of
+//! the world (`world_from_object`). What is made of it is left to those who have one: cameras, lights, shapes.
 //!
 //! - this file: the table, what may be said together, and the order scale, rotate, translate;
 //! - [`keys`]: what changes with time;
@@ -32,8 +32,8 @@ words! {
 }
 
 table! {
-    /// Where a thing is, how it is turned, how large it is: `transform = { ... }` of what has one, or a table of its own
-    /// below it, as `[camera.transform]` or `[light.point.transform]`.
+    /// Where a thing is, how it is turned, how large it is: `transform = { ... }` of what has one, or a table of its
+    /// own below it, as `[camera.transform]` or `[light.point.transform]`.
     ///
     /// A point is scaled, then rotated, then translated. With `keys` the transform changes with time: a translation, a
     /// rotation or a scale is said either here, and then stays, or in keys. What no key says stays as it is here.
@@ -52,8 +52,8 @@ table! {
     pub struct TransformDesc {
         /// Where to, in metres.
         pub translate: [f64; 3] = [0.0, 0.0, 0.0],
-        /// Degrees about the x axis, then about the y axis, then about the z axis; the axes stay where they are (Blender's
-        /// "XYZ Euler"). Each from -1e9 to 1e9.
+        /// Degrees about the x axis, then about the y axis, then about the z axis; the axes stay where they are
+        /// (Blender's "XYZ Euler"). Each from -1e9 to 1e9.
         pub rotate_deg: [f64; 3] = [0.0, 0.0, 0.0],
         /// Instead of `rotate_deg`: the axis to turn about, through the origin, of any length above 1e-9.
         pub rotate_axis: Option<[f64; 3]> = None,
@@ -63,8 +63,8 @@ table! {
         pub quaternion: Option<[f64; 4]> = None,
         /// Along the axes, before anything is turned: not 0; below 0 it mirrors. One number scales all three.
         pub scale: ScaleDesc = ScaleDesc::ONE,
-        /// Instead of everything else: three rows of four numbers; the fourth of each row translates. (glTF's own are columns,
-        /// four of four.)
+        /// Instead of everything else: three rows of four numbers; the fourth of each row translates. (glTF's own are
+        /// columns, four of four.)
         pub matrix: Option<[f64; 12]> = None,
         /// What changes with time, each key later than the one before.
         pub keys: Vec<TransformKeyDesc> = Vec::new(),
@@ -79,8 +79,8 @@ const MIN_VOLUME: f64 = 1e-9;
 const SCALES: std::ops::RangeInclusive<f64> = 1e-9..=2.5e8;
 
 impl TransformDesc {
-    /// `world_from_object` at `time`, in seconds. Every key is checked, whatever the time. After a fault: something that can
-    /// be computed with.
+    /// `world_from_object` at `time`, in seconds. Every key is checked, whatever the time. After a fault: something
+    /// that can be computed with.
     pub(crate) fn compile(&self, cx: &mut CompileContext, time: f64) -> DAffine3 {
         let before = cx.fault_count();
         let affine = match &self.matrix {
@@ -90,7 +90,8 @@ impl TransformDesc {
         if cx.fault_count() == before { affine } else { DAffine3::IDENTITY }
     }
 
-    /// Of the field `transform` that a thing may have, at the context's time: `None` if it has none, or one that was refused.
+    /// Of the field `transform` that a thing may have, at the context's time: `None` if it has none, or one that was
+    /// refused.
     pub(crate) fn compile_field(transform: Option<&Self>, cx: &mut CompileContext) -> Option<DAffine3> {
         let transform = transform?;
         let (before, time) = (cx.fault_count(), cx.time);

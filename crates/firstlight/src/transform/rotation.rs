@@ -113,8 +113,8 @@ impl Rotation {
         }
     }
 
-    /// The part `f` of the way from here to `to`. Angles, and turns about one axis, go the way they are written, as many
-    /// times around as that takes; everything else the shortest way.
+    /// The part `f` of the way from here to `to`. Angles, and turns about one axis, go the way they are written, as
+    /// many times around as that takes; everything else the shortest way.
     pub(super) fn mix(self, to: Rotation, f: f64) -> Rotation {
         match (self, to) {
             (Rotation::Euler(a), Rotation::Euler(b)) => Rotation::Euler(a + (b - a) * f),
@@ -147,8 +147,8 @@ fn about(a: DVec3, (sin, cos): (f64, f64)) -> DMat3 {
     DMat3::from_cols(column(DVec3::X), column(DVec3::Y), column(DVec3::Z))
 }
 
-/// The unit quaternion that lies the part `f` of the way from `a` to `b`, at a constant rate, the shorter way around. At
-/// exactly half a turn both ways are as long: the one that the signs as written are nearer to.
+/// The unit quaternion that lies the part `f` of the way from `a` to `b`, at a constant rate, the shorter way around.
+/// At exactly half a turn both ways are as long: the one that the signs as written are nearer to.
 ///
 /// Source: Shoemake, "Animating rotation with quaternion curves", SIGGRAPH 1985, section 3.3.
 fn slerp(a: DQuat, b: DQuat, f: f64) -> DQuat {

@@ -13,8 +13,8 @@ use crate::scene::{Scene, ShadowRays};
 use crate::shape::SeenTriangle;
 
 impl View {
-    /// Fills [`hidden`](Self::hidden): what triangles, solids and point sets hide, and what is below the horizon for sure. Spheres
-    /// and parallelograms are left to their own tests.
+    /// Fills [`hidden`](Self::hidden): what triangles, solids and point sets hide, and what is below the horizon for
+    /// sure. Spheres and parallelograms are left to their own tests.
     ///
     /// Answers with the number of samples that were asked for one by one.
     pub fn mask(&mut self, level: Level, scene: &Scene, target: &Target, point: &Viewpoint) -> u64 {

@@ -185,8 +185,8 @@ impl Occluders {
         self.spheres.len() + self.flats.len() + self.disks.len() + self.leaves.len() + self.others.len()
     }
 
-    /// Gathers what may stand between those of `points` in `indices` and a light: all listed shapes that cast shadows for it and
-    /// are not proved to be out of the way, and of the trees at most `cap` leaves of triangles.
+    /// Gathers what may stand between those of `points` in `indices` and a light: all listed shapes that cast shadows
+    /// for it and are not proved to be out of the way, and of the trees at most `cap` leaves of triangles.
     pub fn gather(
         &mut self,
         level: Level,
@@ -328,8 +328,8 @@ impl Occluders {
         true
     }
 
-    /// Gathers what of the trees may stand between a light and the patch, `curved` or flat, that reaches `reach` around `point`: at most `cap`
-    /// leaves. The same with every instruction set.
+    /// Gathers what of the trees may stand between a light and the patch, `curved` or flat, that reaches `reach` around
+    /// `point`: at most `cap` leaves. The same with every instruction set.
     #[allow(clippy::too_many_arguments, reason = "a light of a scene, and a patch")]
     pub fn gather_around(
         &mut self,
@@ -358,8 +358,8 @@ impl Occluders {
         self.gather_in(level, scene, target, &shaft, &points, indices, cap);
     }
 
-    /// Gathers what of the trees lies in a shaft from those of `points` in `indices`: at most `cap` leaves. The same with every
-    /// instruction set.
+    /// Gathers what of the trees lies in a shaft from those of `points` in `indices`: at most `cap` leaves. The same
+    /// with every instruction set.
     #[inline(never)]
     #[allow(clippy::too_many_arguments, reason = "a light of a scene, and points")]
     pub fn gather_in(

@@ -1,7 +1,7 @@
 //! What a zone of places sees of a box: all of it, nothing, or what is not known.
 //!
-//! Coarser than [`View`](super::View), and for places and lights by the hundred: it proves that nothing stands between, or that
-//! one convex thing stands before it all, and leaves everything else to who looks from nearer.
+//! Coarser than [`View`](super::View), and for places and lights by the hundred: it proves that nothing stands between,
+//! or that one convex thing stands before it all, and leaves everything else to who looks from nearer.
 
 use arrayvec::ArrayVec;
 use fearless_simd::Level;
@@ -293,8 +293,9 @@ impl Outlook {
         })
     }
 
-    /// Whether one convex thing stands between all of the places and all of a box: then it stands between all their corners. From
-    /// one place, what is behind a convex thing is convex; and so is, for one point of the box, the set of places it hides it from.
+    /// Whether one convex thing stands between all of the places and all of a box: then it stands between all their
+    /// corners. From one place, what is behind a convex thing is convex; and so is, for one point of the box, the set
+    /// of places it hides it from.
     fn hides(&self, blocks: impl Fn(Vec3, Vec3) -> bool, low: Vec3, high: Vec3) -> bool {
         let corner = |min: Vec3, max: Vec3, i: u32| {
             let pick = |bit: u32, a: f32, b: f32| if i >> bit & 1 == 0 { a } else { b };

@@ -9,13 +9,14 @@ use super::view::{View, Visibility};
 use crate::accel::Aabb;
 use crate::scene::Scene;
 
-/// Leaves of triangles gathered for many points; more, and the points are parted. With twice as many a ball of 7 thousand
-/// triangles took a third longer, as did a terrain of a million.
+/// Leaves of triangles gathered for many points; more, and the points are parted. With twice as many a ball of 7
+/// thousand triangles took a third longer, as did a terrain of a million.
 const MANY: usize = 8;
 /// Points that are taken one by one if they are not settled together.
 const FEW: usize = 16;
-/// Leaves looked at from one point, the nearest first, and how many more for each block of samples. What is hidden by none of
-/// them is traced. Ten times as many leave half as much to trace, and take twice the time on triangles of a pixel's size.
+/// Leaves looked at from one point, the nearest first, and how many more for each block of samples. What is hidden by
+/// none of them is traced. Ten times as many leave half as much to trace, and take twice the time on triangles of a
+/// pixel's size.
 const ONE: usize = 16;
 const ONE_MORE: usize = 1;
 /// Blocks of samples of a light that is integrated, for that.
@@ -43,8 +44,8 @@ pub(crate) struct Settled {
 }
 
 impl Settler {
-    /// Hears what of a light is seen from each of the `points` whose numbers are in `order`, in any order: `each` is told which
-    /// point, how much is seen, and by which view, which it may keep. The order of `order` is lost.
+    /// Hears what of a light is seen from each of the `points` whose numbers are in `order`, in any order: `each` is
+    /// told which point, how much is seen, and by which view, which it may keep. The order of `order` is lost.
     #[allow(clippy::too_many_arguments, reason = "a light of a scene and points, as lists")]
     pub fn settle(
         &mut self,

@@ -1,13 +1,14 @@
 //! The space that a light's ways to some points can cross, and which boxes lie in it.
 //!
-//! The hull of a box of points and a box of ends is the union, over s from 0 to 1, of the boxes between the two: their low
-//! side along an axis is low + s (end's low - low), their high side likewise. Whether a box meets one of them is six linear
-//! inequalities in s: each says from where or up to where, so a slab test, at the price of a ray's. Light from infinitely
-//! far away is the same with directions for ends, and s without end.
+//! The hull of a box of points and a box of ends is the union, over s from 0 to 1, of the boxes between the two: their
+//! low side along an axis is low + s (end's low - low), their high side likewise. Whether a box meets one of them is
+//! six linear inequalities in s: each says from where or up to where, so a slab test, at the price of a ray's. Light
+//! from infinitely far away is the same with directions for ends, and s without end.
 //!
-//! A shaft never leaves out what a ray within it could be told to meet: boxes are padded by [`BEAM_PAD`] of the distance
-//! between the points and the farthest part of the tree, twice what single rays pad them with, which in turn is twice what
-//! the test of a triangle needs (`accel/ray.rs`). The roundings of the six bounds and of the sides are below a tenth of it.
+//! A shaft never leaves out what a ray within it could be told to meet: boxes are padded by [`BEAM_PAD`] of the
+//! distance between the points and the farthest part of the tree, twice what single rays pad them with, which in turn
+//! is twice what the test of a triangle needs (`accel/ray.rs`). The roundings of the six bounds and of the sides are
+//! below a tenth of it.
 
 use fearless_simd::{f32x8, prelude::*};
 
@@ -62,8 +63,8 @@ const SMALLEST: f32 = 1.0 / (1u64 << 32) as f32;
 const TINY: f32 = 1.0 / (1u128 << 72) as f32;
 
 impl Shaft {
-    /// From rays that start in `points` towards `light`. `apart` is how far, along each axis, a ray's start can be from the
-    /// point its direction is measured from.
+    /// From rays that start in `points` towards `light`. `apart` is how far, along each axis, a ray's start can be from
+    /// the point its direction is measured from.
     pub fn between(points: Aabb, light: &LightHull, apart: Vec3) -> Self {
         if !light.finite {
             let d = light.center;
@@ -145,8 +146,9 @@ impl Shaft {
 }
 
 impl TreeShaft {
-    /// The children of a node that the shaft meets: a bit for each, and where they begin. Padding makes up for every rounding,
-    /// so an instruction set that multiplies and adds at once may do so; where `SAME`, none does, and all find the same.
+    /// The children of a node that the shaft meets: a bit for each, and where they begin. Padding makes up for every
+    /// rounding, so an instruction set that multiplies and adds at once may do so; where `SAME`, none does, and all
+    /// find the same.
     #[inline(always)]
     pub fn meet<S: Simd, const SAME: bool>(&self, simd: S, node: &Node) -> (u32, f32x8<S>) {
         let planes = &node.planes;

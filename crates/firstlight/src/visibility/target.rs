@@ -7,8 +7,8 @@ use crate::light::{AreaShape, Light, LightKind, Points};
 use crate::math::{DMat3, DVec3, LANES, Vec3};
 use crate::scene::Scene;
 
-/// What encloses a light: the points `center` + u `axes[0]` + v `axes[1]` + w `axes[2]`, each of u, v, w from -1 to 1; or,
-/// of a light that is infinitely far away, the direction `center` alone.
+/// What encloses a light: the points `center` + u `axes[0]` + v `axes[1]` + w `axes[2]`, each of u, v, w from -1 to 1;
+/// or, of a light that is infinitely far away, the direction `center` alone.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct LightHull {
     pub center: Vec3,
@@ -62,8 +62,8 @@ pub(crate) struct Target {
     pub cells: Vec<Cells>,
 }
 
-/// Axes are this much longer than they need to be, and no shorter than this against the others: more than single precision
-/// loses.
+/// Axes are this much longer than they need to be, and no shorter than this against the others: more than single
+/// precision loses.
 const ROOM: f64 = 1e-5;
 
 impl LightHull {

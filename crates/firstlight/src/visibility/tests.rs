@@ -182,7 +182,8 @@ fn random_mesh(random: &mut Random, at: DVec3, unit: f64) -> MeshDesc {
     mesh
 }
 
-/// Meshes, some placed, spheres, parallelograms, a plane and lights that touch them, cut them, or lie in one plane with them.
+/// Meshes, some placed, spheres, parallelograms, a plane and lights that touch them, cut them, or lie in one plane with
+/// them.
 fn random_scene(random: &mut Random) -> Scene {
     let unit = [1.0, 1.0, 1e-4, 1e4][random.below(4)];
     let origin = if random.unit() < 0.2 { random.direction() * 300.0 * unit } else { DVec3::ZERO };

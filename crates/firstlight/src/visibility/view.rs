@@ -62,8 +62,8 @@ impl View {
         self.trees || !self.triangles.is_empty() || !self.others.is_empty()
     }
 
-    /// What of a light is seen from `point`, past `occluders`, which were gathered for it. What is left to ask for the samples is
-    /// in this view then.
+    /// What of a light is seen from `point`, past `occluders`, which were gathered for it. What is left to ask for the
+    /// samples is in this view then.
     pub fn classify(
         &mut self,
         level: Level,
@@ -196,7 +196,8 @@ impl View {
     }
 }
 
-/// Looks at leaves of one mesh, `but` for one of its triangles. Not inlined: one copy for each instruction set is enough.
+/// Looks at leaves of one mesh, `but` for one of its triangles. Not inlined: one copy for each instruction set is
+/// enough.
 #[inline(never)]
 fn look_at<S: Simd>(
     simd: S,
@@ -252,8 +253,8 @@ fn eye(mesh: &ShadowMesh, light: &LightSeen, point: &Viewpoint) -> Eye {
     }
 }
 
-/// Whether point and light are on one side of a plane through `on` with normal `n` in the space of `placement`: by the numbers
-/// with which the plane itself is met.
+/// Whether point and light are on one side of a plane through `on` with normal `n` in the space of `placement`: by the
+/// numbers with which the plane itself is met.
 fn stays_before(placement: &Placement, on: DVec3, n: DVec3, light: &LightSeen, point: &Viewpoint) -> bool {
     let height = n.dot(placement.line(point.start, light.l).o - on);
     let across = placement.object_from_world.matrix3.transpose() * n;

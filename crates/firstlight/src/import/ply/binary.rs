@@ -1,4 +1,5 @@
-//! Binary rows of a PLY file: converted in place on all threads where they are all of one length, one after another elsewhere.
+//! Binary rows of a PLY file: converted in place on all threads where they are all of one length, one after another
+//! elsewhere.
 
 use rayon::prelude::*;
 
@@ -44,8 +45,8 @@ pub(super) fn read_binary(
     Ok(body)
 }
 
-/// Reads an element whose rows are all as long as the first one, on all threads. `false`, with nothing read, if they are not,
-/// or if a value is not what it must be: then reading one by one finds out where.
+/// Reads an element whose rows are all as long as the first one, on all threads. `false`, with nothing read, if they
+/// are not, or if a value is not what it must be: then reading one by one finds out where.
 fn read_uniform(
     source: &mut Binary,
     plan: &Plan,

@@ -2,17 +2,18 @@
 //!
 //! What is read, by name, in any order and of any type:
 //!
-//! - `vertex`: `x y z`; `nx ny nz`; texture coordinates `u v`, `s t`, `texture_u texture_v`, `u1 v1` or `texture_s texture_t`;
-//!   colours `red green blue alpha`, `diffuse_red ...` or `r g b a`; `radius`;
+//! - `vertex`: `x y z`; `nx ny nz`; texture coordinates `u v`, `s t`, `texture_u texture_v`, `u1 v1` or `texture_s
+//!   texture_t`; colours `red green blue alpha`, `diffuse_red ...` or `r g b a`; `radius`;
 //! - `face`: the list `vertex_indices` or `vertex_index`; the list `texcoord` (two numbers for each corner, as MeshLab
 //!   writes); `red green blue alpha` in bytes, where vertices have no colours. The last two part vertices;
 //! - `tristrips`: the list `vertex_indices`, with -1 between strips.
 //!
-//! All else is skipped. Lines end with LF, CR LF or CR; what stands after the last element is ignored with a note. Rows of
-//! text stand on lines of their own; where they do not, the numbers are read wherever lines end, as many programs do.
+//! All else is skipped. Lines end with LF, CR LF or CR; what stands after the last element is ignored with a note. Rows
+//! of text stand on lines of their own; where they do not, the numbers are read wherever lines end, as many programs
+//! do.
 //!
-//! Text is read on all threads, a piece of lines each. Binary rows of one length, which vertices nearly always and faces
-//! often are, are converted in place on all threads; others one after another.
+//! Text is read on all threads, a piece of lines each. Binary rows of one length, which vertices nearly always and
+//! faces often are, are converted in place on all threads; others one after another.
 //!
 //! Source: G. Turk 1994, "The PLY Polygon File Format".
 

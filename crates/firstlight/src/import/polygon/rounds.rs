@@ -1,11 +1,12 @@
 //! Large polygons to triangles: ears, cut in rounds.
 //!
-//! Cutting always the first ear looks at every corner for each, and makes long thin triangles that all meet in one corner,
-//! which no tree of boxes can part: a disc of 20,000 corners as a fan took minutes to render. Here no two ears that are
-//! neighbours are cut in one round, so that each round makes of a convex polygon one of half the corners, and the triangles of
-//! all rounds but the last few are small. A corner is looked at again only when one of its neighbours was cut: of a polygon that
-//! does not cross itself no other can have become an ear. Whether one is asks a tree of the corners that turn backwards, which alone
-//! can lie in its triangle. So n corners take n log n steps, where they are not made to take more.
+//! Cutting always the first ear looks at every corner for each, and makes long thin triangles that all meet in one
+//! corner, which no tree of boxes can part: a disc of 20,000 corners as a fan took minutes to render. Here no two ears
+//! that are neighbours are cut in one round, so that each round makes of a convex polygon one of half the corners, and
+//! the triangles of all rounds but the last few are small. A corner is looked at again only when one of its neighbours
+//! was cut: of a polygon that does not cross itself no other can have become an ear. Whether one is asks a tree of the
+//! corners that turn backwards, which alone can lie in its triangle. So n corners take n log n steps, where they are
+//! not made to take more.
 
 use super::{Point, area};
 
@@ -28,7 +29,8 @@ pub(super) struct Rounds {
 const GONE: u32 = u32::MAX;
 
 impl Rounds {
-    /// Adds the triangles of a polygon that lies in a plane, counter-clockwise, as numbers of corners counted from `start`.
+    /// Adds the triangles of a polygon that lies in a plane, counter-clockwise, as numbers of corners counted from
+    /// `start`.
     pub(super) fn cut(&mut self, points: &[Point], start: u32, triangles: &mut Vec<[u32; 3]>) -> Looked {
         let size = points.len() as u32;
         self.next.clear();
@@ -102,8 +104,8 @@ impl Rounds {
         triangle
     }
 
-    /// Cuts corners that are no ears, once around, and says how many: those that turn forward, but if there are none, or too much
-    /// was looked at, every second.
+    /// Cuts corners that are no ears, once around, and says how many: those that turn forward, but if there are none,
+    /// or too much was looked at, every second.
     #[expect(clippy::too_many_arguments, reason = "the rest of `cut`")]
     fn force(
         &mut self,
@@ -227,8 +229,8 @@ impl Backward {
         }
     }
 
-    /// Whether any is in a triangle, on its edges too, but not at the place of one of its corners: polygons with holes have
-    /// such seams.
+    /// Whether any is in a triangle, on its edges too, but not at the place of one of its corners: polygons with holes
+    /// have such seams.
     fn is_any_in(&self, points: &[Point], triangle: [Point; 3], steps: &mut u64) -> bool {
         if self.nodes.is_empty() {
             return false;

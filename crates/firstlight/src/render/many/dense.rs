@@ -32,8 +32,8 @@ pub(super) struct Dot {
 }
 
 impl<'a> Many<'a> {
-    /// The places of a block that lie on one surface, where lights are so many that one may stand for others. `guess` is what is
-    /// known to be sent there.
+    /// The places of a block that lie on one surface, where lights are so many that one may stand for others. `guess`
+    /// is what is known to be sent there.
     #[allow(clippy::too_many_arguments, reason = "a block of a cell, and what it asks with")]
     pub(super) fn crowd(
         &mut self,

@@ -25,8 +25,8 @@ pub(super) struct Doubt {
 }
 
 impl<'a> Many<'a> {
-    /// The colour of a pixel's surfaces, but for emission and ambient light: what each ray sees, added up. `add` hears each
-    /// light's diffuse part and highlight, in scene order, and last what is taken together.
+    /// The colour of a pixel's surfaces, but for emission and ambient light: what each ray sees, added up. `add` hears
+    /// each light's diffuse part and highlight, in scene order, and last what is taken together.
     #[allow(clippy::too_many_arguments, reason = "a pixel among those of a cell, and what it asks with")]
     pub fn finish(
         &mut self,
@@ -112,8 +112,8 @@ impl<'a> Many<'a> {
         sum
     }
 
-    /// How far the mean over a patch can be from what arrives at its middle because other lights are seen from elsewhere on it:
-    /// as its neighbours tell, and anything where they do not.
+    /// How far the mean over a patch can be from what arrives at its middle because other lights are seen from
+    /// elsewhere on it: as its neighbours tell, and anything where they do not.
     pub(super) fn flicker(&self, pixels: &[PixelPatches], first: &[usize], (index, k): At) -> Rgb {
         let patch = &pixels[index].patches[k];
         let stored = &self.patches[first[index] + k];
@@ -140,7 +140,8 @@ impl<'a> Many<'a> {
         all
     }
 
-    /// What of the light at a patch has to be asked for at each ray. All the rest may together bend by as much as one may.
+    /// What of the light at a patch has to be asked for at each ray. All the rest may together bend by as much as one
+    /// may.
     pub(super) fn doubts_of(
         &self,
         pixels: &[PixelPatches],

@@ -1,12 +1,13 @@
 //! Many lights: what arrives at the patches of a cell where not every light is asked for at every one.
 //!
-//! For each block of pixels, and for its quarters and theirs, a [`Cut`] says which lights count: nodes of the [`LightTree`](crate::light::LightTree) that are seen
-//! whole from all of it, and nodes that have to be looked at from each patch. What is dropped, and what is lost by taking many
-//! lights for one, stays below [`BLOCK_BUDGET`] and [`PATCH_BUDGET`] together, in display steps.
+//! For each block of pixels, and for its quarters and theirs, a [`Cut`] says which lights count: nodes of the
+//! [`LightTree`](crate::light::LightTree) that are seen whole from all of it, and nodes that have to be looked at from
+//! each patch. What is dropped, and what is lost by taking many lights for one, stays below [`BLOCK_BUDGET`] and
+//! [`PATCH_BUDGET`] together, in display steps.
 //!
-//! Up to [`SINGLY`] lights are all taken one by one. Of more, one may stand for many: a [`Crowd`] says for which, for each block, and
-//! what may be wrong is [`CROWD`] as the root of a sum of squares. Cells and blocks lie on a grid of the film, so nothing depends on
-//! tiles, crops or threads.
+//! Up to [`SINGLY`] lights are all taken one by one. Of more, one may stand for many: a [`Crowd`] says for which, for
+//! each block, and what may be wrong is [`CROWD`] as the root of a sum of squares. Cells and blocks lie on a grid of
+//! the film, so nothing depends on tiles, crops or threads.
 
 mod dense;
 mod finish;
@@ -54,14 +55,16 @@ const CLOSE: usize = 24;
 const ANYTHING: f32 = 1e30;
 /// In a list of nodes: one light stands for this one.
 const ONE: u32 = 1 << 31;
-/// In display steps: how far all lights that are integrated one by one may be wrong together, if their errors are independent.
+/// In display steps: how far all lights that are integrated one by one may be wrong together, if their errors are
+/// independent.
 const INTEGRALS: f32 = 0.15;
 /// Pixels across a block.
 const BLOCK: usize = 8;
 const BLOCKS: usize = CELL as usize / BLOCK;
 /// Sizes of blocks: each has four of the next.
 const LEVELS: usize = 3;
-/// What each of those may have of [`BLOCK_BUDGET`]. Together less than all: a patch may be darker than its block was guessed to be.
+/// What each of those may have of [`BLOCK_BUDGET`]. Together less than all: a patch may be darker than its block was
+/// guessed to be.
 const SHARES: [f32; LEVELS] = [0.3, 0.15, 0.15];
 /// Colours of a block that are told apart.
 const TONES: usize = 8;
@@ -143,8 +146,8 @@ impl<'a> Many<'a> {
         }
     }
 
-    /// Finds out what arrives at the middle of each patch of a cell and its rim. `first` says where each pixel's patches begin among
-    /// all.
+    /// Finds out what arrives at the middle of each patch of a cell and its rim. `first` says where each pixel's
+    /// patches begin among all.
     pub fn look(
         &mut self,
         pixels: &[PixelPatches],

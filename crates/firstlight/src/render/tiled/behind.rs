@@ -1,5 +1,6 @@
-//! What of each light the rays of a block of pixels see past what lies in trees: gathered for all of them together, so that a patch
-//! is asked once where nothing is in the way from any of its rays, and its rays are asked together where something is.
+//! What of each light the rays of a block of pixels see past what lies in trees: gathered for all of them together, so
+//! that a patch is asked once where nothing is in the way from any of its rays, and its rays are asked together where
+//! something is.
 
 use super::{CELL, Tiled};
 use crate::color::Rgb;

@@ -1,5 +1,5 @@
-//! The mean of what a light sends to a patch of a pixel, from as little as tells it: the patch's middle; that and the neighbours, where
-//! light is wider than a pixel; its quarters; each of its rays.
+//! The mean of what a light sends to a patch of a pixel, from as little as tells it: the patch's middle; that and the
+//! neighbours, where light is wider than a pixel; its quarters; each of its rays.
 
 use arrayvec::ArrayVec;
 
@@ -51,7 +51,8 @@ impl Tiled<'_> {
         self.pixels[index].patches = patches;
     }
 
-    /// The mean of what arrives of a light over a patch, the `k`-th of its pixel, if what arrives at its middle tells it.
+    /// The mean of what arrives of a light over a patch, the `k`-th of its pixel, if what arrives at its middle tells
+    /// it.
     fn at_once(
         &mut self,
         patches: &[Patch],
@@ -125,7 +126,8 @@ impl Tiled<'_> {
         })
     }
 
-    /// How much what arrives changes over a pixel, along both axes together, by its neighbours; `None` where they do not tell.
+    /// How much what arrives changes over a pixel, along both axes together, by its neighbours; `None` where they do
+    /// not tell.
     fn slope(&mut self, patch: &Patch, [i, j]: [u32; 2], light: usize, counts: &mut Counts) -> Option<Sums> {
         if !patch.is_whole(self.scene) {
             return None;
@@ -150,8 +152,9 @@ impl Tiled<'_> {
         Some(slope)
     }
 
-    /// By how much the mean of colours times light can differ from the mean of colours times that of light, where colours differ that
-    /// much, and what arrives changes by `slope` along both axes together: two halves, one of each colour, make an eighth of both.
+    /// By how much the mean of colours times light can differ from the mean of colours times that of light, where
+    /// colours differ that much, and what arrives changes by `slope` along both axes together: two halves, one of each
+    /// colour, make an eighth of both.
     pub(super) fn mingled(&self, light: usize, contrast: &Contrast, slope: &Sums) -> Rgb {
         let colors = contrast.diffuse * slope.diffuse + contrast.specular * slope.specular;
         self.arrivals.scale(light) * colors * 0.125
@@ -163,8 +166,8 @@ impl Tiled<'_> {
         self.arrivals.steps(value, self.mingled(light, contrast, slope)) > MINGLED * allowed
     }
 
-    /// Adds what one light sends to a patch, the `k`-th of its pixel, from parts of it: its quarters, where that may do, or
-    /// each ray.
+    /// Adds what one light sends to a patch, the `k`-th of its pixel, from parts of it: its quarters, where that may
+    /// do, or each ray.
     fn in_quarters(&mut self, patch: &Patch, at: [u32; 2], k: usize, light: usize, counts: &mut Counts) {
         let scene = self.scene;
         let first = self.first[self.index(at)] + k;
@@ -261,8 +264,8 @@ fn apart(one: &Sums, other: &Sums) -> Sums {
     Sums { diffuse: (one.diffuse - other.diffuse).abs(), specular: (one.specular - other.specular).abs() }
 }
 
-/// How far neighbours along each axis differ from what they foretell of a pixel in their middle, by what arrives `here` and at
-/// them, as `arrived` says; `None` where they tell nothing.
+/// How far neighbours along each axis differ from what they foretell of a pixel in their middle, by what arrives `here`
+/// and at them, as `arrived` says; `None` where they tell nothing.
 pub(in crate::render) fn second_difference(
     scene: &Scene,
     pixels: &[PixelPatches],

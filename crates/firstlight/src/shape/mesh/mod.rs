@@ -23,9 +23,9 @@ shape_table! {
     /// Triangles: from a PLY, STL or OBJ file, or written out.
     ///
     /// Corners run counterclockwise around the front; where the mesh has normals, those decide which side is the front.
-    /// Triangles without area, and those with a coordinate that is no number, are left out. Colours of the vertices multiply
-    /// the material's diffuse, specular and ambient colours. Where a file names materials (OBJ `usemtl`), each face has the
-    /// scene's material of that name, if there is one, otherwise the mesh's own.
+    /// Triangles without area, and those with a coordinate that is no number, are left out. Colours of the vertices
+    /// multiply the material's diffuse, specular and ambient colours. Where a file names materials (OBJ `usemtl`), each
+    /// face has the scene's material of that name, if there is one, otherwise the mesh's own.
     ///
     /// ```toml
     /// [[mesh]]
@@ -52,8 +52,8 @@ shape_table! {
         pub materials: Vec<String> = Vec::new(),
         /// The material of each triangle, as a position in `materials`, counted from 0.
         pub face_materials: Vec<u32> = Vec::new(),
-        /// Normals are made smooth across edges where faces meet at up to this angle in degrees, 0 to 180; the normals of a
-        /// file are replaced. Without it they are used as they are, and a mesh without normals is flat.
+        /// Normals are made smooth across edges where faces meet at up to this angle in degrees, 0 to 180; the normals
+        /// of a file are replaced. Without it they are used as they are, and a mesh without normals is flat.
         pub smooth_deg: Option<f64> = None,
     }
 }
@@ -298,8 +298,8 @@ fn join<T: Clone>(list: &mut Vec<T>, length: usize, more: Vec<T>, added: usize, 
 }
 
 impl MeshBuilder {
-    /// Adds a mesh, moved by `transform`; `surface` is its number in the group, `materials` what its faces choose from. Rays
-    /// are let through, and light is stopped, by all meshes of a `class` alike.
+    /// Adds a mesh, moved by `transform`; `surface` is its number in the group, `materials` what its faces choose from.
+    /// Rays are let through, and light is stopped, by all meshes of a `class` alike.
     pub fn add(
         &mut self,
         cx: &mut CompileContext,
@@ -352,8 +352,8 @@ impl MeshBuilder {
         cx.tell(CompileStage::Building { triangles: triangles.len() as u64 });
         let tree = TriangleTree::build(&[], &[]);
         let mut mesh = Mesh { positions, triangles, normals, uvs, colors, parts, tree };
-        // Copies of a triangle are one, but where rays may treat them differently: by their surface, or by the side that
-        // their normals say is the front
+        // Copies of a triangle are one, but where rays may treat them differently: by their surface, or by the side
+        // that their normals say is the front
         let class = |triangle| (classes[mesh.part_index(triangle)], mesh.is_turned(triangle));
         mesh.tree = TriangleTree::build_distinct(&mesh.positions, &mesh.triangles, class);
         Some(mesh)

@@ -134,8 +134,8 @@ impl Mesh {
         let (e1, e2) = (corners[1] - corners[0], corners[2] - corners[0]);
         // The tree's rays start and end in single precision, in the mesh's own space: a point there is wrong by this
         let largest = corners[0].abs().max(corners[1].abs()).max(corners[2].abs());
-        // along any axis: what rounds along one moves the crossing along the ray, and so along the others. A floor at height 0
-        // is as wrong as it is wide
+        // along any axis: what rounds along one moves the crossing along the ray, and so along the others. A floor at
+        // height 0 is as wrong as it is wide
         let rounding = DVec3::splat((largest + e1.abs() + e2.abs()).max_element() * (4.0 * UNIT_ROUNDOFF as f64));
         // To the world
         let (p, terms, rounding, e1, e2, mut normal) = match placement {
@@ -233,8 +233,8 @@ impl Mesh {
     }
 }
 
-/// A facet that stands for something round, in world space: its corners, the normals there on the viewer's side, and the
-/// weights of a point.
+/// A facet that stands for something round, in world space: its corners, the normals there on the viewer's side, and
+/// the weights of a point.
 struct RoundCorners {
     corners: [DVec3; 3],
     normals: [DVec3; 3],
@@ -242,9 +242,10 @@ struct RoundCorners {
 }
 
 impl RoundCorners {
-    /// The point `p` of the facet, lifted to a round surface through its corners: towards the planes through the corners,
-    /// across their normals, as far as it lies below them, by the weights. `None` where it is not lifted: on flat facets, and
-    /// on those with a normal that points below the facet, whose normal is `ng`; they have their own horizon.
+    /// The point `p` of the facet, lifted to a round surface through its corners: towards the planes through the
+    /// corners, across their normals, as far as it lies below them, by the weights. `None` where it is not lifted: on
+    /// flat facets, and on those with a normal that points below the facet, whose normal is `ng`; they have their own
+    /// horizon.
     ///
     /// d_i = min(0, (p - v_i).n_i), p' = p - sum b_i d_i n_i.
     /// Source: Hanika, "Hacking the shadow terminator", Ray Tracing Gems II, chapter 4, 2021.

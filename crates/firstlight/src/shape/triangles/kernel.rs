@@ -1,19 +1,21 @@
 //! One ray and one triangle, and the same in lanes.
 //!
-//! Woop, Benthin and Wald 2013, "Watertight ray/triangle intersection", JCGT 2 (1): the vertices are seen from the ray's
-//! origin and sheared until the ray runs along z; then U, V and W are the signed areas between the ray and each edge,
+//! Woop, Benthin and Wald 2013, "Watertight ray/triangle intersection", JCGT 2 (1): the vertices are seen from the
+//! ray's origin and sheared until the ray runs along z; then U, V and W are the signed areas between the ray and each
+//! edge,
 //!
 //! ```text
 //! U = Cx By - Cy Bx    V = Ax Cy - Ay Cx    W = Bx Ay - By Ax    det = U + V + W    t = (U Az + V Bz + W Cz) / det
 //! ```
 //!
 //! Two triangles that share an edge compute the same number for it, with opposite signs if they wind alike, so no ray
-//! passes between them; where a number is exactly 0 its sign is found in f64, in which the products are exact. Without fused
-//! multiply-add, the same bits everywhere: one triangle or many, one ray or sixteen.
+//! passes between them; where a number is exactly 0 its sign is found in f64, in which the products are exact. Without
+//! fused multiply-add, the same bits everywhere: one triangle or many, one ray or sixteen.
 //!
-//! t is a mean of the vertices' depths. On a triangle seen edge-on the weights are mostly rounding, and t may be anywhere
-//! between these depths, and a little outside. So that no order of asking can change an answer, a hit's t is never before
-//! the triangle's own box, and a ray that misses that box misses the triangle: see `OWN_PAD` in `accel/ray.rs`.
+//! t is a mean of the vertices' depths. On a triangle seen edge-on the weights are mostly rounding, and t may be
+//! anywhere between these depths, and a little outside. So that no order of asking can change an answer, a hit's t is
+//! never before the triangle's own box, and a ray that misses that box misses the triangle: see `OWN_PAD` in
+//! `accel/ray.rs`.
 
 use fearless_simd::{f32x16, mask32x16, prelude::*};
 

@@ -1,8 +1,9 @@
 //! Triangle meshes: the tree over the triangles of one mesh, and the ways to ask it.
 //!
-//! A hit is defined by the kernel alone ([`kernel::intersect`]): 0 < t <= t_max, both sides, and of several at the same t
-//! the triangle with the lowest number. The tree only leaves out what cannot be a hit, so it answers as if every triangle
-//! had been asked, bit for bit (`TriangleTree::brute_force`), by single ray, packet or tile, on every processor.
+//! A hit is defined by the kernel alone ([`kernel::intersect`]): 0 < t <= t_max, both sides, and of several at the same
+//! t the triangle with the lowest number. The tree only leaves out what cannot be a hit, so it answers as if every
+//! triangle had been asked, bit for bit (`TriangleTree::brute_force`), by single ray, packet or tile, on every
+//! processor.
 
 mod kernel;
 mod seen;
@@ -25,7 +26,8 @@ const PACK: usize = 4;
 const NONE: u32 = u32::MAX;
 /// Fewer rays than this go one by one.
 const FEW: u32 = 4;
-/// Processors with fewer lanes than this take packets and tiles ray by ray. The same answers, and half the code to compile.
+/// Processors with fewer lanes than this take packets and tiles ray by ray. The same answers, and half the code to
+/// compile.
 const WIDE: usize = 8;
 
 /// The triangles of a leaf, coordinate by coordinate.
@@ -66,7 +68,8 @@ pub(crate) struct TileHits {
     pub t: [f32; 64],
     pub u: [f32; 64],
     pub v: [f32; 64],
-    /// What the caller said when the mesh was asked. Of hits at the same t the lowest surface wins, then the lowest triangle.
+    /// What the caller said when the mesh was asked. Of hits at the same t the lowest surface wins, then the lowest
+    /// triangle.
     pub surface: [u32; 64],
     pub triangle: [u32; 64],
 }
@@ -127,13 +130,15 @@ pub(crate) fn can_be_hit(positions: &[[f32; 3]], triangle: &[u32; 3]) -> bool {
 }
 
 impl TriangleTree {
-    /// Builds the tree over a mesh. A triangle without area, or with a vertex that is not finite or not there, is left out.
+    /// Builds the tree over a mesh. A triangle without area, or with a vertex that is not finite or not there, is left
+    /// out.
     pub fn build(positions: &[[f32; 3]], triangles: &[[u32; 3]]) -> TriangleTree {
         Self::build_distinct(positions, triangles, |_| ())
     }
 
-    /// The same. Of triangles with the same corners in the same order and the same `class` the first stands for all: the
-    /// filters of whoever asks treat a class alike, and of hits at the same t the lowest number wins. Numbers stay as they are.
+    /// The same. Of triangles with the same corners in the same order and the same `class` the first stands for all:
+    /// the filters of whoever asks treat a class alike, and of hits at the same t the lowest number wins. Numbers stay
+    /// as they are.
     pub fn build_distinct<C: Ord>(
         positions: &[[f32; 3]],
         triangles: &[[u32; 3]],
@@ -209,7 +214,8 @@ impl TriangleTree {
         Slabs::new(ray, self.tree.center, self.tree.half)
     }
 
-    /// Asks the memory for a node or leaf that will be looked at soon. All that safe code can do is to load a word of it.
+    /// Asks the memory for a node or leaf that will be looked at soon. All that safe code can do is to load a word of
+    /// it.
     #[inline(always)]
     fn touch(&self, child: u32) {
         if let Some(pack) = self.packs.get((child ^ LEAF) as usize) {
@@ -397,8 +403,9 @@ impl TriangleTree {
         done
     }
 
-    /// The first triangle on each ray of a tile in `active`, among those that `filter` lets count, if it is better than what `hits` holds
-    /// already. Says which rays found one. `surface` is kept with the hits, and decides between hits at the same t.
+    /// The first triangle on each ray of a tile in `active`, among those that `filter` lets count, if it is better than
+    /// what `hits` holds already. Says which rays found one. `surface` is kept with the hits, and decides between hits
+    /// at the same t.
     #[inline(always)]
     pub fn tile<S: Simd>(
         &self,

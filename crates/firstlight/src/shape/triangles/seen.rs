@@ -8,28 +8,29 @@
 //! ```
 //!
 //! up to the factor of the shear along the ray's largest axis. Ways to a light are l = l0 + u a0 + v a1 + w a2 with
-//! coordinates from -1 to 1, so each is a number and three slopes: its values over the whole light, or over a cell of it, lie
-//! between middle and slopes added up, and for a sample it is three multiplications and additions. Turned so that T > 0, a
-//! triangle stands in the way where U, V and W are above 0 and T is below det.
+//! coordinates from -1 to 1, so each is a number and three slopes: its values over the whole light, or over a cell of
+//! it, lie between middle and slopes added up, and for a sample it is three multiplications and additions. Turned so
+//! that T > 0, a triangle stands in the way where U, V and W are above 0 and T is below det.
 //!
-//! The answers have to be those of the kernel ([`intersect`]), which rounds, so each bound has a margin, and what lies within
-//! is left to the kernel. With D the largest coordinate of A, B, C; s that of the edges; L that of all ways; |n| = |nx| + |ny|
-//! + |nz|; and half an ulp h = 2^-24:
+//! The answers have to be those of the kernel ([`intersect`]), which rounds, so each bound has a margin, and what lies
+//! within is left to the kernel. With D the largest coordinate of A, B, C; s that of the edges; L that of all ways; |n|
+//! = |nx| + |ny| + |nz|; and half an ulp h = 2^-24:
 //!
-//! - The kernel's sheared vertices are off by at most e = 6 h D along each axis, and its signs of U, V, W are exact for these.
-//!   So what it calls inside lies within sqrt 2 e of the triangle, and what lies inside by more than that it calls inside; an
-//!   edge is no longer than 2 sqrt 2 s there. In units of U that is 24 h D s L. What is computed here is off by less than
-//!   100 h D s L more: edges, products, the light's own frame. [`EDGE`].
+//! - The kernel's sheared vertices are off by at most e = 6 h D along each axis, and its signs of U, V, W are exact for
+//!   these. So what it calls inside lies within sqrt 2 e of the triangle, and what lies inside by more than that it
+//!   calls inside; an edge is no longer than 2 sqrt 2 s there. In units of U that is 24 h D s L. What is computed here
+//!   is off by less than 100 h D s L more: edges, products, the light's own frame. [`EDGE`].
 //! - If it calls the ray inside, then the line comes within e of a point X of the triangle at a depth z with
 //!   |T - z det| <= |n| e, and its t is the depth of another point Y of the triangle, wrong by 8 h D / |lz|, with
-//!   |T - t det| <= |n| (e + 8 h D + 96 h s^3 / |det|): the areas are wrong by 4 h s^2 each where the ray is inside, which moves Y
-//!   by 12 h (2 s)^3 / det. Edge-on Y is anywhere on the triangle, 3 s from the ray at most. Where t is before the
-//!   triangle's box, it is moved to where the box begins, which is not behind X.
-//! - So with T > |n| (3 s + 16 h D) no ray is stopped whose det is below T by as much (`far`), nor any that is outside of one
-//!   edge. With T smaller than that, one outside of one edge and inside of another is not stopped either way round;
-//!   and one outside of an edge is not if it is not edge-on (|det| > |n| L / 64) and T > 16 h D |n| + 64 x 96 h s^3.
-//! - A ray is stopped if it is inside of all edges, not edge-on, and det is above T by what t can be wrong, and by what the
-//!   ray stops short of the light.
+//!   |T - t det| <= |n| (e + 8 h D + 96 h s^3 / |det|): the areas are wrong by 4 h s^2 each where the ray is inside,
+//!   which moves Y by 12 h (2 s)^3 / det. Edge-on Y is anywhere on the triangle, 3 s from the ray at most. Where t is
+//!   before the triangle's box, it is moved to where the box begins, which is not behind X.
+//! - So with T > |n| (3 s + 16 h D) no ray is stopped whose det is below T by as much (`far`), nor any that is outside
+//!   of one edge. With T smaller than that, one outside of one edge and inside of another is not stopped either way
+//!   round; and one outside of an edge is not if it is not edge-on (|det| > |n| L / 64) and T > 16 h D |n| + 64 x 96 h
+//!   s^3.
+//! - A ray is stopped if it is inside of all edges, not edge-on, and det is above T by what t can be wrong, and by what
+//!   the ray stops short of the light.
 //!
 //! Sizes beyond which any of these products could leave the range of numbers are left to the kernel.
 
@@ -66,11 +67,13 @@ pub(crate) struct Eye {
     pub l: Vec3,
     /// Half the light, along its axes.
     pub axes: [Vec3; 3],
-    /// The largest coordinate of any way, at least; in another space also the sum of the sizes of what it was computed from.
+    /// The largest coordinate of any way, at least; in another space also the sum of the sizes of what it was computed
+    /// from.
     pub longest: f32,
     /// The largest coordinate of every way, at most.
     pub shortest: f32,
-    /// How much shorter than 1 the rays are, at most; without bound where nothing is known. 1 or more: they may be of any length.
+    /// How much shorter than 1 the rays are, at most; without bound where nothing is known. 1 or more: they may be of
+    /// any length.
     pub short: f32,
     /// Whether the rays have an end.
     pub finite: bool,
@@ -151,7 +154,8 @@ fn largest<S: Simd>(a: V<S>) -> f32x16<S> {
     a[0].abs().max(a[1].abs()).max(a[2].abs())
 }
 
-/// A number that is linear in the way, of sixteen triangles: towards the light's middle, its slopes, and how far it goes.
+/// A number that is linear in the way, of sixteen triangles: towards the light's middle, its slopes, and how far it
+/// goes.
 #[derive(Clone, Copy)]
 struct Linear<S: Simd> {
     middle: f32x16<S>,
@@ -188,8 +192,8 @@ impl<S: Simd> Linear<S> {
 }
 
 impl TriangleTree {
-    /// Looks at the triangles of up to four leaves from `eye`: those that may hide some samples of the light go to `seen`. Says
-    /// whether one of those that `filter` lets count hides all of it.
+    /// Looks at the triangles of up to four leaves from `eye`: those that may hide some samples of the light go to
+    /// `seen`. Says whether one of those that `filter` lets count hides all of it.
     #[inline(always)]
     pub fn look<S: Simd>(
         &self,
@@ -379,7 +383,8 @@ impl SeenTriangle {
         half[2].mul_add(c.abs(), half[1].mul_add(b.abs(), half[0] * a.abs()))
     }
 
-    /// What it hides of sixteen cells: middles and half sizes along the light's axes. `unsure` are those it may hide some of.
+    /// What it hides of sixteen cells: middles and half sizes along the light's axes. `unsure` are those it may hide
+    /// some of.
     #[inline(always)]
     pub fn cells<S: Simd>(&self, simd: S, middle: &[[f32; 16]; 3], half: &[[f32; 16]; 3]) -> Verdict {
         let (middle, half) = (load(simd, middle), load(simd, half));
