@@ -3,8 +3,8 @@
 
 use firstlight::{
     BoxDesc, ColorDesc, ColorParam, ConeDesc, CylinderDesc, DiskDesc, DiskLightDesc, DisplayEncoding, EmitSides,
-    Falloff, LightDesc, MaterialDesc, ParallelogramDesc, PlaneDesc, Projection, RectangleDesc, SampleSet, SceneDesc,
-    ShapeDesc, SphereLightDesc, TorusDesc,
+    Falloff, LightDesc, MaterialDesc, MeshDesc, ParallelogramDesc, PlaneDesc, Projection, RectangleDesc, SampleSet,
+    SceneDesc, ShapeDesc, SphereLightDesc, TorusDesc,
 };
 
 use crate::converged::{traced, with_samples};
@@ -14,11 +14,14 @@ use crate::scenes::*;
 /// How often a seed may try for a picture that shows something.
 const TRIES: u64 = 64;
 
+/// From this number on scenes show meshes that stand for something smooth, hollows and all.
+pub const SMOOTH: u64 = 1000;
+
 /// Scene number `seed`, `size` x `size` pixels. The size decides nothing else.
 pub fn scene(seed: u64, size: u32) -> SceneDesc {
     let mut tries = (0..TRIES).map(|i| {
         let mut random = Random::new((seed << 8) + i);
-        let scene = composed(&mut random);
+        let scene = if seed < SMOOTH { composed(&mut random) } else { smooth(&mut random) };
         exposed(scene, &mut random)
     });
     let Some(mut scene) = tries.find_map(|scene| scene) else { panic!("scene {seed} shows nothing, try as it may") };
@@ -116,6 +119,34 @@ fn composed(random: &mut Random) -> SceneDesc {
     scene.with_camera(camera)
 }
 
+/// Valleys, hills and bumpy balls of facets with blended normals, under what lights there are.
+fn smooth(random: &mut Random) -> SceneDesc {
+    let mut scene = empty(48, 48, random.pick(&[1, 1, 2, 3]));
+    for i in 0..1 + random.below(3) {
+        let material = material(random, &scene);
+        scene = scene.with_material(&format!("material {i}"), material);
+    }
+    let stage = Stage::new(random);
+    if random.chance(0.6) {
+        scene = stage.set(random, scene);
+    }
+    for _ in 0..1 + random.below(2) {
+        let shape = stage.hollow(random);
+        let shape = stage.dressed(random, &scene, shape);
+        scene = scene.with_shape(shape);
+    }
+    let lights: Vec<_> = (0..1 + random.below(2)).map(|_| stage.place_light(random)).collect();
+    if random.chance(0.3) {
+        scene = stage.obstruct(random, scene, lights[0]);
+    }
+    for lamp in lights {
+        let light = stage.light(random, &scene, lamp);
+        scene = scene.with_light(light);
+    }
+    let camera = stage.camera(random);
+    scene.with_camera(camera)
+}
+
 /// A colour that is neither black nor white.
 fn tint(random: &mut Random) -> ColorDesc {
     if random.chance(0.3) {
@@ -170,6 +201,43 @@ impl Stage {
     fn at(&self, x: f64, z: f64, y: f64) -> V {
         let offset = add(add(mul(self.a, x), mul(self.b, z)), mul(self.n, y));
         add(self.middle, mul(offset, self.unit))
+    }
+
+    /// A mesh of few or many facets that curves inwards somewhere, its normals blended.
+    fn hollow(&self, random: &mut Random) -> ShapeDesc {
+        let smooth_deg = Some(random.pick(&[45.0, 60.0, 180.0]));
+        if random.chance(0.35) {
+            let (n, bumps) = (4 + random.below(16), random.pick(&[0.05, 0.2, 0.4]));
+            let mut ball = ball_mesh(self.unit * random.between(0.4, 1.2), n, bumps, random.chance(0.3), random);
+            let center = self.at(random.between(-0.5, 0.5), random.between(-0.5, 0.5), random.between(0.0, 1.2));
+            ball.positions.iter_mut().for_each(|p| *p = add(*p, center));
+            return ShapeDesc::Mesh(if ball.normals.is_empty() { MeshDesc { smooth_deg, ..ball } } else { ball });
+        }
+        // Heights over a grid: a gutter, folds, a bowl, hills, rubble
+        let (n, kind) = (2 + random.below(12), random.below(5));
+        let (half, depth, power) = (random.between(0.6, 2.0), random.between(0.1, 0.9), random.pick(&[1.0, 2.0]));
+        let waves = random.between(1.0, 4.0);
+        let grow = |x: f64| if power == 1.0 { x.abs() } else { x * x };
+        let mut positions = Vec::new();
+        for (i, j) in (0..=n).flat_map(|j| (0..=n).map(move |i| (i, j))) {
+            let [x, z] = [i, j].map(|k| 2.0 * k as f64 / n as f64 - 1.0);
+            let height = match kind {
+                0 => grow(x),
+                1 => f64::from(i % 2),
+                2 => 0.5 * (grow(x) + grow(z)),
+                3 => 0.5 + 0.5 * pxfm::f_sin(2.0 * waves * x) * pxfm::f_cos(2.0 * waves * z),
+                _ => random.unit(),
+            };
+            positions.push(self.at(half * x, half * z, depth * height));
+        }
+        let corner = |i: u32, j: u32| j * (n + 1) + i;
+        let quads = (0..n).flat_map(|j| (0..n).map(move |i| (i, j)));
+        let triangles = quads.flat_map(|(i, j)| {
+            let [a, b, c, d] = [corner(i, j), corner(i + 1, j), corner(i + 1, j + 1), corner(i, j + 1)];
+            if (i + j) % 2 == 0 { [[a, b, c], [a, c, d]] } else { [[a, b, d], [b, c, d]] }
+        });
+        let smooth_deg = Some(random.pick(&[60.0, 180.0]));
+        ShapeDesc::Mesh(MeshDesc { smooth_deg, ..mesh(positions, triangles.collect()) })
     }
 
     fn material(&self, random: &mut Random, scene: &SceneDesc) -> Option<String> {

@@ -260,7 +260,7 @@ impl Soft {
             order.clear();
             order.extend(tile.clone());
             let (scene, settled) = (&self.scene, &mut self.settled);
-            let each = |k: usize, visibility, view: &crate::visibility::View| {
+            let each = |k: usize, visibility, view: &mut crate::visibility::View| {
                 let hidden = &mut hidden[k * blocks..(k + 1) * blocks];
                 match visibility {
                     Visibility::Lit => {}

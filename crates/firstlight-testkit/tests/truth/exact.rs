@@ -26,7 +26,10 @@ const CLOSED: f64 = 1e-4;
 const CLOSED_AND_NEAR: f64 = 1e-4;
 
 /// As a share of the light without shadows, where what stands in the way is found point by point.
-const BY_MASK: f64 = 2e-3;
+const BY_MASK: f64 = 4e-3;
+
+/// Relative, of a sphere that is integrated by points all over it.
+const BY_POINTS: f64 = 1e-3;
 
 /// Random scenes that broke a bound once, beside 3, 7, 8, 10, 20, 23, 32 and 36, which are among the first forty.
 const COUNTEREXAMPLES: [u64; 27] = [
@@ -87,6 +90,12 @@ fn random_scenes_are_within_the_bounds_where_few_pixels_are_open() {
 #[test]
 fn what_broke_a_bound_once_is_within_it() {
     hold(COUNTEREXAMPLES.into_iter(), 16);
+}
+
+#[test]
+#[ignore = "its converged pictures are still to be made: cargo xtask verify exact --seeds 1000..1012 --size 16 --converge"]
+fn smooth_meshes_are_within_the_bounds() {
+    hold(exact_scenes::SMOOTH..exact_scenes::SMOOTH + 12, 16);
 }
 
 #[test]
@@ -233,7 +242,7 @@ fn the_classic_model_is_a_mean_over_the_area() {
         let light = SphereLightDesc { falloff: Falloff::Constant, visible: false, ..SphereLightDesc::new(center, r) };
         let (d, cos) = (length(center), unit(center)[1]);
         let truth = PI * cos * (1.0 - r * r / (3.0 * d * d));
-        assert_near(on_the_floor(&LightDesc::Sphere(light)), truth, CLOSED * truth, "a sphere");
+        assert_near(on_the_floor(&LightDesc::Sphere(light)), truth, BY_POINTS * truth, "a sphere");
     }
 }
 

@@ -4,6 +4,7 @@
 mod analytic;
 mod area_lights;
 mod cameras;
+mod cases;
 mod checker;
 mod determinism;
 mod deviations;
@@ -12,6 +13,7 @@ mod geometry;
 mod known;
 mod links;
 mod many_lights;
+mod near;
 mod robust;
 mod terminator;
 

@@ -9,7 +9,7 @@ use super::hider::Hider;
 use super::rows::MAX_HIDERS;
 use super::view::View;
 use crate::ids::LightId;
-use crate::math::{DVec3, Vec3};
+use crate::math::{DVec3, Facet, Vec3};
 use crate::scene::Scene;
 use crate::shape::{Disk, Parallelogram, PlaneSide, Sphere, SurfaceInteraction};
 use crate::visibility::{Occluders, ShadowMesh};
@@ -49,11 +49,13 @@ struct LightCone {
 
 impl LightCone {
     fn new(view: &View, reach: f32) -> LightCone {
-        let far = view.l0.length();
+        let middle = view.middle();
+        let far = middle.length();
         // A circle around the light's square
-        let radius = view.l(1.0, 1.0).distance(view.l0).max(view.l(1.0, -1.0).distance(view.l0));
+        let [_, right, corner, _] = view.corners();
+        let radius = corner.distance(middle).max(right.distance(middle));
         let sin = (radius / far).min(1.0);
-        LightCone { axis: view.l0 / far, sin, cos: (1.0 - sin * sin).sqrt(), reach }
+        LightCone { axis: middle / far, sin, cos: (1.0 - sin * sin).sqrt(), reach }
     }
 
     /// Whether the ball around `s` is outside, seen from anywhere on the patch.
@@ -93,7 +95,7 @@ impl Pyramid {
         }
         let far = corners.iter().fold(0.0f32, |far, corner| far.max(corner.length()));
         // Foreshortened
-        let slant = view.height / view.l0.length().max(f32::MIN_POSITIVE);
+        let slant = view.height / view.middle().length().max(f32::MIN_POSITIVE);
         let size = 2.0 * view.la.min(view.lb) * slant.max(0.02);
         Pyramid { sides, corners, far, size, reach }
     }
@@ -138,6 +140,8 @@ impl Pyramid {
 
 /// Room for the rounding of a distance.
 pub(super) const SLACK: f32 = 1e-5;
+/// Points no farther off the plane of a facet than this part of its edges are in it.
+const FLAT: f32 = 1e-5;
 
 impl Between {
     /// Looks at all that is in lists, and at what was gathered in trees.
@@ -242,11 +246,14 @@ impl Between {
             return;
         }
         let from = asker.si.lit_from.as_dvec3();
-        let horizon = asker.si.horizon;
+        let SurfaceInteraction { horizon, ng, facet, .. } = *asker.si;
+        // A lifted point sees over its own facet, and light may come along it from below
+        let is_lifted = facet != Facet::NONE;
+        let sees_below = is_lifted && !view.corners().iter().all(|l| ng.dot(*l) > 0.0);
         for (source, leaf) in &trees.leaves {
             let Some(mesh) = ShadowMesh::of(&scene.geometry, *source, light) else { continue };
             for (triangle, corners) in mesh.mesh.tree.leaf(*leaf) {
-                if !mesh.casts(triangle) {
+                if triangle == facet.of(*source) || !mesh.casts(triangle) {
                     continue;
                 }
                 let place = |q: Vec3| match mesh.placement {
@@ -254,11 +261,20 @@ impl Between {
                     None => q.as_dvec3(),
                 };
                 let corners = corners.map(|q| (place(q) - from).as_vec3());
-                let above = corners.iter().fold(f32::NEG_INFINITY, |above, q| above.max(horizon.dot(*q)));
+                let rises = |n: Vec3| corners.iter().fold(f32::NEG_INFINITY, |above, q| above.max(n.dot(*q)));
                 let edge = (corners[1] - corners[0]).length().max((corners[2] - corners[0]).length());
                 // The surface's own triangle, and what is below it
                 let room = edge * 1e-4 + asker.si.error.0.length() * 4.0;
-                if above > room && !self.polygon(view, pyramid, emitter, asker, &corners) {
+                if rises(horizon) <= room {
+                    continue;
+                }
+                // One that goes on as its own facet does, or falls off from it, hides nothing that is above that; and
+                // one in the same plane nothing at all: what comes from below has passed that plane before it gets
+                // there
+                if is_lifted && rises(ng) <= room && (!sees_below || is_in_plane(&corners, edge * FLAT)) {
+                    continue;
+                }
+                if !self.polygon(view, pyramid, emitter, asker, &corners) {
                     self.ask_trees = true;
                     return;
                 }
@@ -388,7 +404,7 @@ impl Between {
 
     /// One convex thing hides all of the light if it hides its corners.
     fn settle(&mut self, pyramid: &Pyramid, hider: Hider, view: &View, asker: &Asker, to: DVec3, r: f64) {
-        let corners = [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]];
+        let corners = view.square();
         if !corners.iter().all(|[x, y]| hider.hides(*x, *y)) {
             return;
         }
@@ -431,8 +447,7 @@ impl Between {
         }
         let hider = Hider::disk(view, &bounds);
         // Convex, as all that hides
-        let corners = [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]];
-        self.hidden = corners.iter().all(|[x, y]| hider.hides(*x, *y));
+        self.hidden = view.square().iter().all(|[x, y]| hider.hides(*x, *y));
         self.add(Some(hider));
     }
 
@@ -471,7 +486,7 @@ impl Between {
             return;
         }
         let Some(hider) = Hider::polygon(view, &corners) else { return };
-        let ends = [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]];
+        let ends = view.square();
         if ends.iter().all(|[x, y]| hider.hides(*x, *y)) {
             self.hidden = true;
             let Hider::Edges(edges) = &hider else { return };
@@ -490,6 +505,12 @@ impl Between {
 fn tangent(distance: f64, r: f64, reach: f32) -> f32 {
     let near = (distance - f64::from(reach)).max(r);
     (near * near - r * r).sqrt() as f32
+}
+
+/// Whether the origin is in the plane of a triangle, or no farther off than that.
+fn is_in_plane([a, b, c]: &[Vec3; 3], room: f32) -> bool {
+    let n = (*b - *a).cross(*c - *a);
+    n.dot(*a).abs() <= room * n.length()
 }
 
 /// How far a convex polygon is from a point.

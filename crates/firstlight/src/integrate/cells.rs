@@ -43,9 +43,6 @@ pub(super) struct Sent {
 
 /// A light whose points are those of the unit square, equal areas for equal areas.
 pub(super) trait Source {
-    /// Which points its cells have: those of different series know nothing of each other.
-    fn series(&self) -> u32;
-
     /// What the point would send; `None` from below the horizon, or from a side that does not emit.
     fn sent(&self, at: [f32; 2]) -> Option<Sent>;
 
@@ -184,8 +181,8 @@ impl Totals {
 /// A number from 0 to 1 for each cell of each level, as if by chance.
 ///
 /// Source of the mixing: Wellons, "Prospecting for hash functions", 2018, `lowbias32`.
-fn chance([x, y]: [u32; 2], side: usize, dimension: u32, series: u32) -> f32 {
-    let mut h = x ^ y.rotate_left(12) ^ (side as u32).rotate_left(16) ^ (dimension << 31) ^ (series << 27);
+fn chance([x, y]: [u32; 2], side: usize, dimension: u32) -> f32 {
+    let mut h = x ^ y.rotate_left(12) ^ (side as u32).rotate_left(16) ^ (dimension << 31);
     h = (h ^ (h >> 16)).wrapping_mul(0x7feb_352d);
     h = (h ^ (h >> 15)).wrapping_mul(0x846c_a68b);
     h ^= h >> 16;
@@ -194,12 +191,12 @@ fn chance([x, y]: [u32; 2], side: usize, dimension: u32, series: u32) -> f32 {
 
 /// Asks the points of some cells, four of them a square.
 fn ask(source: &impl Source, side: usize, places: &[[u32; 2]], cells: &mut Vec<Cell>) {
-    let (width, series) = (1.0 / side as f32, source.series());
+    let width = 1.0 / side as f32;
     for places in places.chunks(LANES) {
         let (mut points, mut ways, mut active) = ([[0.0; 2]; LANES], [Vec3::ZERO; LANES], 0u16);
         let from = cells.len();
         for (lane, at) in places.iter().enumerate() {
-            let point = [0, 1].map(|k| (at[k] as f32 + chance(*at, side, k as u32, series)) * width);
+            let point = [0, 1].map(|k| (at[k] as f32 + chance(*at, side, k as u32)) * width);
             let middle = at.map(|w| (w as f32 + 0.5) * width);
             let mut cell = Cell { at: *at, state: State::Dark, sums: [0.0; 2], rough: [0.0; 2], way: Vec3::ZERO };
             if let Some(sent) = source.sent(point) {
@@ -387,10 +384,6 @@ mod tests {
     struct Through<F: Fn(f32, f32) -> bool>(F);
 
     impl<F: Fn(f32, f32) -> bool> Source for Through<F> {
-        fn series(&self) -> u32 {
-            0
-        }
-
         fn sent(&self, [x, y]: [f32; 2]) -> Option<Sent> {
             Some(Sent { way: Vec3::Z, sums: [1.0, x + y] })
         }

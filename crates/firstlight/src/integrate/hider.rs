@@ -115,10 +115,10 @@ impl Quadratic {
         roots(f64::from(self.yy), b, c)
     }
 
-    /// Calls `row` with the rows of [`Hider::corners`].
-    fn corners(&self, row: &mut impl FnMut(f64)) {
-        let rows = [self.tangents(), self.crossings(-1.0), self.crossings(1.0)];
-        rows.into_iter().flatten().flatten().filter(|y| y.abs() < 1.0).for_each(row);
+    /// Calls `row` with the rows of [`Hider::corners`], where x goes from `x0` to `x1`.
+    fn corners(&self, [x0, x1]: [f64; 2], row: &mut impl FnMut(f64)) {
+        let rows = [self.tangents(), self.crossings(x0), self.crossings(x1)];
+        rows.into_iter().flatten().flatten().for_each(row);
     }
 
     /// The rows that only touch 0.
@@ -311,8 +311,14 @@ impl Hider {
     }
 
     /// Calls `row` with the rows at which the hidden part begins, ends, or has a corner, and those at which its outline
-    /// crosses x = -1 and 1: between them, what is left of a row changes smoothly. Some may be told in vain.
-    pub fn corners(&self, mut row: impl FnMut(f64)) {
+    /// crosses both ends of x: between them, what is left of a row changes smoothly. Some may be told in vain.
+    pub fn corners(&self, view: &View, mut row: impl FnMut(f64)) {
+        let ([x0, x1], [y0, y1]) = (view.x.map(f64::from), view.y.map(f64::from));
+        let mut row = |y: f64| {
+            if y > y0 && y < y1 {
+                row(y);
+            }
+        };
         match self {
             Hider::Edges(edges) => {
                 let sides = &edges.sides[..edges.count];
@@ -324,9 +330,9 @@ impl Hider {
                 };
                 for (i, p) in sides.iter().enumerate() {
                     let [c, px, py] = [p.c, p.x, p.y].map(f64::from);
-                    for x in [-1.0, 1.0] {
+                    for x in [x0, x1] {
                         let y = -(c + px * x) / py;
-                        if y.abs() < 1.0 && inside(x, y, [i, i]) {
+                        if inside(x, y, [i, i]) {
                             row(y);
                         }
                     }
@@ -334,19 +340,19 @@ impl Hider {
                         let [d, qx, qy] = [q.c, q.x, q.y].map(f64::from);
                         let area = px * qy - py * qx;
                         let (x, y) = ((py * d - c * qy) / area, (c * qx - px * d) / area);
-                        if y.abs() < 1.0 && x.abs() <= 1.0 && inside(x, y, [i, j]) {
+                        if (x0..=x1).contains(&x) && inside(x, y, [i, j]) {
                             row(y);
                         }
                     }
                 }
             }
             Hider::Cone(cone) => {
-                cone.quadratic.corners(&mut row);
+                cone.quadratic.corners([x0, x1], &mut row);
                 if let Some(cut) = &cone.cut {
-                    cut.iter().for_each(|quadratic| quadratic.corners(&mut row));
+                    cut.iter().for_each(|quadratic| quadratic.corners([x0, x1], &mut row));
                 }
             }
-            Hider::Shell(shell) => shell.inside.corners(&mut row),
+            Hider::Shell(shell) => shell.inside.corners([x0, x1], &mut row),
         }
     }
 }

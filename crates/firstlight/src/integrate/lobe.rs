@@ -25,8 +25,7 @@ pub(crate) fn region(view: &View) -> Option<Option<Region>> {
     let sharpness = sharpness(view);
     let size2 = square((view.la + view.skew.abs()).max(view.lb));
     // The angle the light fills, seen from the nearest part of its plane that it can fill
-    let gap = |foot: f32, half: f32| (foot.abs() - half).max(0.0);
-    let (gap_x, gap_y) = (gap(view.fa, view.la + view.skew.abs()), gap(view.fb, view.lb));
+    let [gap_x, gap_y] = view.gaps();
     let distance2 = (gap_x * gap_x + gap_y * gap_y + view.height * view.height).max(size2 * 1e-6);
     if sharpness * size2 <= WIDE * distance2 {
         return None;
@@ -34,10 +33,11 @@ pub(crate) fn region(view: &View) -> Option<Option<Region>> {
     let cone = covered(view);
     let region = match cone {
         Some(region) => region,
-        None => Region::WHOLE,
+        None => Region::whole(view),
     };
     let ([x0, x1], [y0, y1]) = (region.x, region.y);
-    let clipped = Region { x: [x0.max(-1.0), x1.min(1.0)], y: [y0.max(-1.0), y1.min(1.0)], pieces: 1 };
+    let ([left, right], [low, high]) = (view.x, view.y);
+    let clipped = Region { x: [x0.max(left), x1.min(right)], y: [y0.max(low), y1.min(high)], pieces: 1 };
     if !(clipped.x[0] < clipped.x[1] && clipped.y[0] < clipped.y[1]) {
         return Some(None);
     }
@@ -62,10 +62,10 @@ pub(crate) fn end(view: &View) -> Option<Option<Hider>> {
     let mirrored = |cos: f32, out: f32| 2.0 * view.cos_o * cos - out;
     let Linear { c, x, y } = view.cos;
     let along = Linear { c: mirrored(c, view.out.c), x: mirrored(x, view.out.x), y: mirrored(y, view.out.y) };
-    if along.min() >= 0.0 {
+    if view.min(&along) >= 0.0 {
         return None;
     }
-    Some((along.max() > 0.0).then(|| Hider::below(along)))
+    Some((view.max(&along) > 0.0).then(|| Hider::below(along)))
 }
 
 /// The box around where the cone of a highlight meets the light's plane; `None` if that has no end.

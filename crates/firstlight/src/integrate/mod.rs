@@ -16,6 +16,7 @@ mod emitter;
 mod hider;
 mod lobe;
 mod mask;
+mod near;
 mod points;
 mod rows;
 mod rules;
@@ -31,7 +32,7 @@ use fearless_simd::prelude::*;
 pub(crate) use between::{Asker, Between};
 pub(crate) use emitter::Emitter;
 use hider::Hider;
-pub(crate) use mask::{MOST, Masked, Tally, of_edge};
+pub(crate) use mask::Masked;
 use rows::{MAX_HIDERS, Region};
 pub(crate) use tensor::sharpness;
 use view::Outline;
@@ -80,7 +81,7 @@ pub(crate) fn integrate<S: Simd>(
     hiders: &[Hider],
     enough: &dyn Fn(&Sums, &Sums) -> bool,
 ) -> (Sums, Sums) {
-    let whole = Region::WHOLE;
+    let whole = Region::whole(view);
     let is_clear = hiders.is_empty() && view.is_above_horizon();
     let both = Wanted { diffuse: true, specular: !matches!(view.lobe, Lobe::None) };
     let diffuse_only = Wanted { diffuse: true, specular: false };
@@ -118,6 +119,14 @@ pub(crate) fn integrate<S: Simd>(
         None => rows::integrate(simd, view, hiders, &region, specular_only, &enough),
     };
     (diffuse + specular, diffuse_error + specular_error)
+}
+
+/// What arrives from a flat light that nothing stands in front of; `None` where the horizon cuts it and some points of
+/// it tell as much: where it is not near, and no highlight on it is narrow.
+pub(crate) fn unshadowed<S: Simd>(simd: S, view: &View, enough: &dyn Fn(&Sums, &Sums) -> bool) -> Option<Sums> {
+    let is_even =
+        !view.is_above_horizon() && tensor::order(view, &Region::whole(view)).is_some() && lobe::end(view).is_none();
+    (!is_even).then(|| integrate(simd, view, &[], enough).0)
 }
 
 #[cfg(test)]

@@ -48,10 +48,6 @@ struct Ways<'a, F> {
 }
 
 impl<F: Fn([f32; 2]) -> Option<Way>> Source for Ways<'_, F> {
-    fn series(&self) -> u32 {
-        self.masked.series as u32
-    }
-
     fn sent(&self, at: [f32; 2]) -> Option<Sent> {
         let Way { way, weight } = (self.ways)(at)?;
         let (inverse, way, weight) = ((1.0 / way.length()) as f32, way.as_vec3(), weight as f32);

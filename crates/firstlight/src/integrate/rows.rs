@@ -34,6 +34,9 @@ const BETWEEN_ROWS: f32 = 0.1;
 /// Points nearer to a light than this, in half heights of the light, are right below it: under constant falloff, under
 /// physical falloff, which makes a much narrower peak.
 const BELOW: [f32; 2] = [0.03, 0.15];
+/// Below a light that is very near, each panel is this many times as far from the foot of the point as the one before.
+const WIDER: f32 = 8.0;
+
 /// The part of a light that is integrated, and in how many pieces along a row.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Region {
@@ -47,7 +50,9 @@ pub(crate) struct Region {
 
 impl Region {
     /// All of a light.
-    pub const WHOLE: Region = Region { x: [-1.0, 1.0], y: [-1.0, 1.0], pieces: 1 };
+    pub fn whole(view: &View) -> Region {
+        Region { x: view.x, y: view.y, pieces: 1 }
+    }
 }
 
 /// An integral over a part of a light.
@@ -151,26 +156,39 @@ pub(crate) fn integrate<S: Simd>(
 /// Where panels begin and end: in the light's own parameter of rows.
 fn cuts(view: &View, hiders: &[Hider], region: &Region, wanted: Wanted) -> ArrayVec<f32, { MAX_PANELS / 2 }> {
     let mut cuts = ArrayVec::new();
-    let [from, to] = region.y.map(|y| parameter(view.outline, y));
+    let spread = Spread::new(view);
+    let [from, to] = region.y.map(|y| spread.parameter(y));
+    // Below a light that is very near, rows are as wide as they are far from the foot of the point
+    let near = if view.is_near { view.l0.length() / view.lb } else { 0.0 };
     // Shorter panels are not worth their rows
-    let least = (to - from) * 1e-4;
+    let least = if near > 0.0 {
+        0.1 * spread.parameter(if region.y[1] > -region.y[0] { near } else { -near }).abs()
+    } else {
+        (to - from) * 1e-4
+    };
     let mut offer = |y: f64| {
-        let t = parameter(view.outline, y as f32);
+        let t = spread.parameter(y as f32);
         if t > from + least && t < to - least && !cuts.is_full() && cuts.iter().all(|c: &f32| (c - t).abs() > least) {
             cuts.push(t);
         }
     };
+    let mut off = near;
+    while off > 0.0 && off < 2.0 {
+        offer(f64::from(-off));
+        offer(f64::from(off));
+        off *= WIDER;
+    }
     for hider in hiders {
-        hider.corners(&mut offer);
+        hider.corners(view, &mut offer);
     }
     for line in [&view.cos, &view.horizon] {
-        for x in [-1.0, 1.0] {
+        for x in view.x {
             let y = -(line.c + line.x * x) / line.y;
             offer(f64::from(y));
         }
     }
     // Below a light that is near, most comes from around the foot of the point, between all rows of a panel
-    if view.nearest() < BELOW[usize::from(view.physical)] * view.lb {
+    if !view.is_near && view.nearest() < BELOW[usize::from(view.physical)] * view.lb {
         let (foot, width) = (-view.fb / view.lb, view.height / view.lb);
         for off in [2.0 * width, 8.0 * width] {
             offer(f64::from(foot - off));
@@ -183,7 +201,7 @@ fn cuts(view: &View, hiders: &[Hider], region: &Region, wanted: Wanted) -> Array
     if wanted.specular
         && sharpness > 0.0
         && view.height * spread < BETWEEN_ROWS * view.lb
-        && region.y == Region::WHOLE.y
+        && region.y == view.y
         && let Some((y, distance)) = view.highlight()
     {
         // Across the line of sight, and along it
@@ -215,25 +233,73 @@ impl View {
     }
 }
 
-/// The parameter of row `y`. On a disk rows are spread so that their lengths change smoothly up to the rim:
-/// y = (3 t - t^3) / 2, whose half length is (1 - t^2) sqrt(4 - t^2) / 2.
-fn parameter(outline: Outline, y: f32) -> f32 {
-    match outline {
-        Outline::Parallelogram => y,
-        Outline::Disk => {
-            let y = y.clamp(-1.0, 1.0);
-            // Newton's way, from the sine that the cubic is close to
-            let mut t = y * 0.75;
-            for _ in 0..30 {
-                let slope = 1.5 * (1.0 - t * t);
-                if slope < 1e-3 {
-                    break;
+/// How rows are spread. On a disk so that their lengths change smoothly up to the rim: y = (3 t - t^3) / 2, whose half
+/// length is (1 - t^2) sqrt(4 - t^2) / 2; y and t are counted from where places are.
+#[derive(Clone, Copy)]
+struct Spread {
+    outline: Outline,
+    /// The row that the others are counted from, from the middle, and its t.
+    y: f32,
+    t: f32,
+}
+
+impl Spread {
+    fn new(view: &View) -> Spread {
+        let y = view.origin[1];
+        Spread { outline: view.outline, y, t: if view.outline == Outline::Disk { parameter_of_disk(y) } else { y } }
+    }
+
+    /// The parameter of row `y`.
+    fn parameter(&self, y: f32) -> f32 {
+        match self.outline {
+            Outline::Parallelogram => y,
+            Outline::Disk if self.t == 0.0 => parameter_of_disk(y),
+            Outline::Disk => {
+                let (low, high) = (-1.0 - self.t, 1.0 - self.t);
+                if y <= -1.0 - self.y {
+                    return low;
+                } else if y >= 1.0 - self.y {
+                    return high;
                 }
-                t = (t - (0.5 * t * (3.0 - t * t) - y) / slope).clamp(-1.0, 1.0);
+                // Halving is slow and sure
+                let (mut from, mut to) = if y < 0.0 { (low, 0.0) } else { (0.0, high) };
+                for _ in 0..60 {
+                    let middle = 0.5 * (from + to);
+                    *(if self.row(middle) < y { &mut from } else { &mut to }) = middle;
+                }
+                0.5 * (from + to)
             }
-            if y.abs() == 1.0 { y } else { t }
         }
     }
+
+    /// The row of a parameter, of a disk.
+    fn row(&self, t: f32) -> f32 {
+        t * (self.straight() - self.bent() * t - t * t) * 0.5
+    }
+
+    /// (3 t - t^3) / 2, counted from t0, is t (3 - 3 t0^2 - 3 t0 t - t^2) / 2.
+    fn straight(&self) -> f32 {
+        3.0 - 3.0 * self.t * self.t
+    }
+
+    fn bent(&self) -> f32 {
+        3.0 * self.t
+    }
+}
+
+/// The t of row `y` of a disk, both from its middle.
+fn parameter_of_disk(y: f32) -> f32 {
+    let y = y.clamp(-1.0, 1.0);
+    // Newton's way, from the sine that the cubic is close to
+    let mut t = y * 0.75;
+    for _ in 0..30 {
+        let slope = 1.5 * (1.0 - t * t);
+        if slope < 1e-3 {
+            break;
+        }
+        t = (t - (0.5 * t * (3.0 - t * t) - y) / slope).clamp(-1.0, 1.0);
+    }
+    if y.abs() == 1.0 { y } else { t }
 }
 
 /// A light, what hides it, and what is asked for.
@@ -294,18 +360,21 @@ fn sixteen_rows_now<S: Simd>(simd: S, lit: &Lit, rows: &Rows) -> [[f32; LANES]; 
     let half = f32x16::simd_from(simd, rows.half);
     let t_rows = f32x16::simd_from(simd, rows.nodes) * half + f32x16::simd_from(simd, rows.middle);
     // The rows, and how densely they lie
-    let (y, reach, density) = match view.outline {
-        Outline::Parallelogram => (t_rows, splat(1.0), half),
+    let (y, [from, to], density) = match view.outline {
+        Outline::Parallelogram => (t_rows, view.x.map(splat), half),
         Outline::Disk => {
-            let tt = t_rows * t_rows;
-            let y = t_rows * (3.0 - tt) * 0.5;
+            let spread = Spread::new(view);
+            let y = t_rows * (spread.straight() - t_rows * spread.bent() - t_rows * t_rows) * 0.5;
+            let t = t_rows + spread.t;
+            let tt = t * t;
             let inside = (1.0 - tt).max(splat(0.0));
-            (y, inside * (4.0 - tt).sqrt() * 0.5, inside * (half * 1.5))
+            let reach = inside * (4.0 - tt).sqrt() * 0.5;
+            (y, [-reach - view.origin[0], reach - view.origin[0]], inside * (half * 1.5))
         }
     };
     let row = Row::new(simd, view, y);
     // What is above the horizon, in the region, and in the light
-    let mut all = Interval { from: (-reach).max(splat(region.x[0])), to: reach.min(splat(region.x[1])) };
+    let mut all = Interval { from: from.max(splat(region.x[0])), to: to.min(splat(region.x[1])) };
     all.clip(row.cos, view.cos.x);
     all.clip(y * view.horizon.y + view.horizon.c, view.horizon.x);
     // Near the light, pieces that grow with the distance from the point's foot

@@ -77,8 +77,7 @@ impl Between {
                 [middle - radius, middle + radius]
             }
             _ => {
-                let heights = [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]]
-                    .map(|[x, y]: [f32; 2]| n.dot(view.l(x, y).as_dvec3()));
+                let heights = view.corners().map(|l| n.dot(l.as_dvec3()));
                 [
                     heights.into_iter().fold(f64::INFINITY, f64::min),
                     heights.into_iter().fold(f64::NEG_INFINITY, f64::max),

@@ -2,7 +2,7 @@
 
 use crate::light::way_error;
 use crate::material::Lobe;
-use crate::math::{DVec3, ErrorBound, Vec3};
+use crate::math::{DVec3, ErrorBound, UNIT_ROUNDOFF, Vec3};
 
 /// What a flat light fills of the square [-1, 1]^2 of its own coordinates.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -24,6 +24,8 @@ pub(crate) struct FlatLight {
     pub b: Vec3,
     /// Unit normal of the front.
     pub n: Vec3,
+    /// `a`, `b` and `n` as they were given.
+    deep: [DVec3; 3],
     /// The length of `a`, and `a` as a unit vector.
     pub la: f32,
     pub ua: Vec3,
@@ -49,6 +51,7 @@ impl FlatLight {
             a: a.as_vec3(),
             b: b.as_vec3(),
             n: n.as_vec3(),
+            deep: [a, b, n],
             la: la as f32,
             ua: ua.as_vec3(),
             skew: skew as f32,
@@ -88,26 +91,28 @@ impl Linear {
     pub fn at(&self, x: f32, y: f32) -> f32 {
         self.c + x * self.x + y * self.y
     }
-
-    /// The least over the square.
-    #[inline(always)]
-    pub fn min(&self) -> f32 {
-        self.c - self.x.abs() - self.y.abs()
-    }
-
-    /// The greatest over the square.
-    #[inline(always)]
-    pub fn max(&self) -> f32 {
-        self.c + self.x.abs() + self.y.abs()
-    }
 }
 
+/// Points nearer to a light than this, in its half size, count its places from the nearest: from the middle, numbers
+/// would cancel.
+const NEAR: f32 = 0.03;
+
 /// A flat light as one point sees it: l = l0 + x a + y b leads from the point to the light.
+///
+/// Places (x, y) are counted from the light's middle, or, where the point is near the light, from the place that is
+/// nearest to it: all numbers around there are small then, and wrong by a small part of themselves.
 ///
 /// Distances are computed in a frame of the light's plane, where nothing cancels near it:
 /// |l|^2 = (fa + la x + skew y)^2 + (fb + lb y)^2 + height^2.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct View {
+    /// Whether places are counted from the nearest.
+    pub is_near: bool,
+    /// Where they are counted from, from the middle.
+    pub origin: [f32; 2],
+    /// From where to where the light's square goes: -1 to 1 if they are counted from the middle.
+    pub x: [f32; 2],
+    pub y: [f32; 2],
     pub l0: Vec3,
     pub a: Vec3,
     pub b: Vec3,
@@ -147,7 +152,11 @@ impl View {
             Outline::Parallelogram => 4.0,
             Outline::Disk => std::f32::consts::PI,
         };
-        View {
+        let view = View {
+            is_near: false,
+            origin: [0.0; 2],
+            x: [-1.0, 1.0],
+            y: [-1.0, 1.0],
             l0,
             a: light.a,
             b: light.b,
@@ -168,20 +177,97 @@ impl View {
             physical: light.physical,
             outline: light.outline,
             measure: if light.physical { light.la * light.lb } else { 1.0 / area },
+        };
+        if view.nearest() < NEAR * view.la.max(view.lb) { view.near(light, at) } else { view }
+    }
+
+    /// The same with places counted from the nearest.
+    fn near(self, light: &FlatLight, at: &Receiver) -> View {
+        let [a, b, n] = light.deep;
+        let middle = light.c - at.p.as_dvec3();
+        let (ua, ub) = (a.normalize(), (b - a * (a.dot(b) / a.length_squared())).normalize());
+        let (skew, lb) = (b.dot(ua), b.dot(ub));
+        // As f32 knows it
+        let place = |w: f64| f64::from(w.clamp(-1.0, 1.0) as f32);
+        let y = place(-middle.dot(ub) / lb);
+        let x = place(-(middle.dot(ua) + y * skew) / a.length());
+        let [x, y] = match light.outline {
+            Outline::Parallelogram => [x, y],
+            Outline::Disk => {
+                let outside = (x * x + y * y).sqrt().max(1.0);
+                [place(x / outside), place(y / outside)]
+            }
+        };
+        let l0 = middle + a * x + b * y;
+        let side = -n.dot(l0);
+        let linear = |v: Vec3| {
+            let v = v.as_dvec3();
+            Linear { c: v.dot(l0) as f32, x: v.dot(a) as f32, y: v.dot(b) as f32 }
+        };
+        let mut horizon = linear(at.horizon);
+        horizon.c -= at.horizon.abs().dot(at.error.0 + l0.abs().as_vec3() * UNIT_ROUNDOFF);
+        View {
+            is_near: true,
+            origin: [x as f32, y as f32],
+            x: [(-1.0 - x) as f32, (1.0 - x) as f32],
+            y: [(-1.0 - y) as f32, (1.0 - y) as f32],
+            l0: l0.as_vec3(),
+            fa: l0.dot(ua) as f32,
+            fb: l0.dot(ub) as f32,
+            height: side.abs() as f32,
+            facing: if light.both_sides { f32::INFINITY } else { side as f32 },
+            cos: linear(at.ns),
+            horizon,
+            out: linear(at.wo),
+            ..self
         }
+    }
+
+    /// The corners of the light's square, around.
+    pub fn square(&self) -> [[f32; 2]; 4] {
+        let ([x0, x1], [y0, y1]) = (self.x, self.y);
+        [[x0, y0], [x1, y0], [x1, y1], [x0, y1]]
+    }
+
+    /// The least of a quantity over the square.
+    #[inline(always)]
+    pub fn min(&self, of: &Linear) -> f32 {
+        of.c + (of.x * self.x[0]).min(of.x * self.x[1]) + (of.y * self.y[0]).min(of.y * self.y[1])
+    }
+
+    /// The greatest.
+    #[inline(always)]
+    pub fn max(&self, of: &Linear) -> f32 {
+        of.c + (of.x * self.x[0]).max(of.x * self.x[1]) + (of.y * self.y[0]).max(of.y * self.y[1])
+    }
+
+    /// The way to the light's middle.
+    #[inline(always)]
+    pub fn middle(&self) -> Vec3 {
+        self.l(0.5 * (self.x[0] + self.x[1]), 0.5 * (self.y[0] + self.y[1]))
     }
 
     /// Whether any light can arrive: a side that emits faces the point, and some of the light is above the horizon.
     #[inline(always)]
     pub fn arrives(&self) -> bool {
-        self.facing > 0.0 && (self.height > 0.0 || !self.physical) && self.cos.max() > 0.0 && self.horizon.max() > 0.0
+        self.facing > 0.0
+            && (self.height > 0.0 || !self.physical)
+            && self.max(&self.cos) > 0.0
+            && self.max(&self.horizon) > 0.0
     }
 
     /// The distance to the nearest place of the light's square, or a little less.
     pub fn nearest(&self) -> f32 {
-        let gap = |foot: f32, half: f32| (foot.abs() - half).max(0.0);
-        let (x, y) = (gap(self.fa, self.la + self.skew.abs()), gap(self.fb, self.lb));
+        let [x, y] = self.gaps();
         (x * x + y * y + self.height * self.height).sqrt()
+    }
+
+    /// How far beside the light's square the foot of the point is, along its edges, or a little less.
+    pub fn gaps(&self) -> [f32; 2] {
+        let gap = |foot: f32, [low, high]: [f32; 2]| (foot - low).max(-foot - high).max(0.0);
+        let ([x0, x1], [y0, y1]) = (self.x, self.y);
+        let lean = self.skew.abs() * y1.max(-y0);
+        [gap(self.fa, [self.la * -x0 + lean, self.la * x1 + lean]), gap(self.fb, [self.lb * -y0, self.lb * y1])]
     }
 
     /// The most that can arrive within `reach` of the point, or thereabouts: the cosine at the surface is 1, and
@@ -215,12 +301,12 @@ impl View {
 
     /// The ways to the corners of the square, around.
     pub fn corners(&self) -> [Vec3; 4] {
-        [self.l(-1.0, -1.0), self.l(1.0, -1.0), self.l(1.0, 1.0), self.l(-1.0, 1.0)]
+        self.square().map(|[x, y]| self.l(x, y))
     }
 
     /// Whether all of the light is above the horizon.
     #[inline(always)]
     pub fn is_above_horizon(&self) -> bool {
-        self.cos.min() > 0.0 && self.horizon.min() > 0.0
+        self.min(&self.cos) > 0.0 && self.min(&self.horizon) > 0.0
     }
 }

@@ -5,7 +5,9 @@ use std::sync::{Arc, OnceLock};
 
 use fearless_simd::{f32x16, prelude::*};
 
-use super::{Disk, EmitSides, Falloff, Light, LightKind, Rectangle, SampleSet, Sphere, scaled, way_error};
+use super::{
+    Disk, EmitSides, Falloff, Light, LightKind, Rectangle, SampleSet, Sphere, point_of_series, scaled, way_error,
+};
 use crate::color::Rgb;
 use crate::context::{CompileContext, show};
 use crate::describe::{ColorDesc, SamplesDesc};
@@ -326,7 +328,13 @@ impl Area {
     /// The sampled points.
     #[inline(always)]
     pub(crate) fn points(&self) -> &Points {
-        self.points.get_or_init(|| Points::new(&self.shape, self.set, self.count, self.seed))
+        self.points
+            .get_or_init(|| Points::new(&self.shape, (0..self.count).map(|k| self.set.point(k, self.count, self.seed))))
+    }
+
+    /// The first points of one of the series that are stratified together.
+    pub(crate) fn points_of_series(&self, series: usize, count: u32) -> Points {
+        Points::new(&self.shape, (0..count).map(|k| point_of_series(k, series)))
     }
 
     /// Sampled point `k`, world space.
@@ -428,6 +436,19 @@ pub(crate) struct PointBlock {
     z: [f32; LANES],
 }
 
+impl Points {
+    /// How many there are.
+    pub fn count(&self) -> usize {
+        let last = self.blocks.last().map_or(0, |block| block.x.iter().filter(|x| !x.is_nan()).count());
+        self.blocks.len().saturating_sub(1) * LANES + last
+    }
+
+    /// Point `k`, world space.
+    pub fn get(&self, k: usize) -> Vec3 {
+        self.blocks[k / LANES].get(k % LANES)
+    }
+}
+
 impl PointBlock {
     const NONE: PointBlock = PointBlock { x: [f32::NAN; LANES], y: [f32::NAN; LANES], z: [f32::NAN; LANES] };
 
@@ -452,13 +473,14 @@ impl PointBlock {
 }
 
 impl Points {
-    fn new(shape: &AreaShape, set: SampleSet, count: u32, seed: u32) -> Self {
-        let blocks = (count as usize).div_ceil(LANES);
+    /// The points that stand for some of the unit square.
+    fn new(shape: &AreaShape, places: impl ExactSizeIterator<Item = [f64; 2]>) -> Self {
+        let blocks = places.len().div_ceil(LANES);
         let normals = if shape.flat_normal().is_none() { blocks } else { 0 };
         let mut points = Points { blocks: vec![PointBlock::NONE; blocks], normals: vec![PointBlock::NONE; normals] };
-        for k in 0..count {
-            let (block, lane) = (k as usize / LANES, k as usize % LANES);
-            let (q, n) = shape.point(set.point(k, count, seed));
+        for (k, place) in places.enumerate() {
+            let (block, lane) = (k / LANES, k % LANES);
+            let (q, n) = shape.point(place);
             points.blocks[block].set(lane, q);
             if let Some(n) = n {
                 points.normals[block].set(lane, n);

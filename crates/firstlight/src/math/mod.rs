@@ -16,7 +16,7 @@ pub(crate) use frame::Frame;
 pub(crate) use lanes::{Vec3x16, dispatch_wide};
 pub(crate) use origin::origin_for;
 pub(crate) use pow::Exponent;
-pub(crate) use ray::{DRay, ErrorBound, Ray};
+pub(crate) use ray::{DRay, ErrorBound, Facet, Ray};
 pub use ray::{ShadowRay, WorldRay};
 pub(crate) use roots::{bracketed, depressed_cubic};
 pub(crate) use sum::{LANES, LaneSum};

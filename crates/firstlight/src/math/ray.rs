@@ -107,6 +107,26 @@ pub struct ShadowRay {
     pub(crate) t_max: f32,
     /// The light: not everything casts shadows for every one.
     pub(crate) light: LightId,
+    /// What does not stand in the way: the facet that the ray was lifted from.
+    pub(crate) but: Facet,
+}
+
+/// A triangle of a mesh in its place, or none.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Facet {
+    /// 0 is the mesh of the world, others are what is placed, counted from 1.
+    pub source: u32,
+    pub triangle: u32,
+}
+
+impl Facet {
+    pub const NONE: Facet = Facet { source: u32::MAX, triangle: u32::MAX };
+
+    /// The number of the triangle, if it is one of this mesh; else one that no triangle has.
+    #[inline(always)]
+    pub fn of(self, source: u32) -> u32 {
+        if self.source == source { self.triangle } else { u32::MAX }
+    }
 }
 
 impl ShadowRay {

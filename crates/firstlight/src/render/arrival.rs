@@ -1,23 +1,26 @@
 //! How much of one light arrives at one place of a surface, and how much that bends over the patch around it.
 
 use std::cell::Cell;
+use std::f32::consts::FRAC_PI_2;
 
 use fearless_simd::Level;
 
 use super::Counts;
 use super::change::{Arrival, Change, change, horizon_change, unseen};
+use super::ladder::{Asker as LadderAsker, Ladder};
 use super::many::FEW;
 use super::patch::Patch;
 use super::sampled::Sampled;
+use super::together::Together;
 use crate::color::{DisplaySteps, Rgb};
 use crate::ids::LightId;
-use crate::integrate::{Asker, Between, Emitter, Masked, Receiver, Sums, View, integrate};
-use crate::light::{Light, LightKind, LightTree};
+use crate::integrate::{Asker, Between, Emitter, Masked, Receiver, Sums, View, integrate, unshadowed};
+use crate::light::{Area, AreaShape, Light, LightKind, LightTree};
 use crate::material::{Bsdf, Lobe};
 use crate::math::dispatch_wide;
 use crate::scene::Scene;
 use crate::shape::SurfaceInteraction;
-use crate::visibility::{Occluders, Settler, Target, Viewpoint, Visibility};
+use crate::visibility::{Occluders, Settler, Target, View as ShadowView, Viewpoint, Visibility};
 
 /// A place of a surface that asks for light.
 #[derive(Clone, Copy)]
@@ -32,12 +35,11 @@ pub(crate) struct Place<'a> {
     pub off: f32,
     /// The share of the pixel that it stands for: errors of its parts are as good as independent.
     pub share: f32,
-    /// Which points of lights it asks; see [`Masked::series`].
-    pub series: usize,
-    /// Where it stands for a patch: how much may bend over it, in display steps, and whether its neighbours may tell
-    /// that less does. If it will not do for the patch, points of the light are not asked.
-    pub allowed: f32,
-    pub beside: bool,
+    /// Whether it is known that nothing is in the way of the light, or nothing in trees.
+    pub lit: bool,
+    pub clear: bool,
+    /// Whether it stands for a patch, of which points of the light are asked at each ray, if at all.
+    pub parted: bool,
     /// What is there beside this light, at least.
     pub base: Rgb,
     /// What the two sums are multiplied with.
@@ -54,9 +56,9 @@ impl<'a> Place<'a> {
             turn: 0.0,
             off: 0.0,
             share: 1.0,
-            series: 0,
-            allowed: f32::INFINITY,
-            beside: false,
+            lit: false,
+            clear: false,
+            parted: false,
             base,
             colors,
         }
@@ -72,16 +74,9 @@ impl<'a> Place<'a> {
 pub(crate) enum Seen {
     /// This arrives.
     Known(Sums),
-    /// Things are in the way; points of the light have to be asked.
-    Behind(Box<Behind>),
-}
-
-/// A light behind things.
-pub(crate) struct Behind {
-    pub view: View,
-    between: Between,
-    /// What would arrive if nothing were in the way.
-    pub whole: Sums,
+    /// Things are in the way; points of the light have to be asked. This would arrive if nothing were, if that is
+    /// known.
+    Behind(Option<Sums>),
 }
 
 /// What all tiles share: the lights as they are integrated, and how errors show.
@@ -93,8 +88,10 @@ pub(crate) struct Lights {
     tolerance: f32,
     /// Where there are many.
     tree: Option<LightTree>,
-    /// The lights as shafts lead to them; none where all are integrated, and there are no trees to lead through.
+    /// The lights as shafts lead to them.
     targets: Vec<Target>,
+    /// The points of those that are integrated.
+    ladders: Vec<Ladder>,
 }
 
 /// Parts of a pixel smaller than this are judged as if they were as large.
@@ -112,11 +109,10 @@ impl Lights {
         };
         let emitters: Vec<_> = scene.lights.iter().map(emitter).collect();
         let tolerance = TOLERANCE / (emitters.len().max(1) as f32).sqrt();
-        let is_area = |light: &Light| matches!(light.kind, LightKind::Area(_));
-        let sampled = scene.lights.iter().zip(&emitters).any(|(light, emitter)| is_area(light) && emitter.is_none());
-        let targets = if sampled || scene.geometry.has_trees() { Target::of_all(scene) } else { Vec::new() };
+        let targets = Target::of_all(scene);
+        let ladders = emitters.iter().map(|_| Ladder::default()).collect();
         let tree = (scene.lights.len() > FEW).then(|| LightTree::new(&scene.lights));
-        Lights { emitters, steps: DisplaySteps::new(&scene.display), tolerance, tree, targets }
+        Lights { emitters, steps: DisplaySteps::new(&scene.display), tolerance, tree, targets, ladders }
     }
 }
 
@@ -128,11 +124,15 @@ pub(crate) struct Arrivals<'a> {
     /// Of lights that are sampled.
     settler: Settler,
     pub(super) occluders: Occluders,
+    /// Views that are not used any more.
+    views: Vec<ShadowView>,
     tolerance: f32,
 }
 
 /// Patches whose normal turns by less than this, in radians, are flat.
 const FLAT: f32 = 1e-4;
+/// Highlights narrower than this part of a sphere light, both as angles, are not found by points all over it.
+const NARROW: f32 = 1.0 / 6.0;
 /// Leaves of triangles that are worth looking at one by one.
 const LEAVES: usize = 12;
 
@@ -144,6 +144,7 @@ impl<'a> Arrivals<'a> {
             level,
             settler: Settler::default(),
             occluders: Occluders::default(),
+            views: Vec::new(),
             tolerance: lights.tolerance,
         }
     }
@@ -189,22 +190,11 @@ impl<'a> Arrivals<'a> {
         match (&self.lights.emitters[index], &light.kind) {
             (Some(emitter), _) => {
                 let (change, seen) = self.look(index, emitter, place, counts);
-                change.with(match seen {
-                    Seen::Known(sums) => sums,
-                    Seen::Behind(behind) => {
-                        let Behind { view, whole, .. } = &*behind;
-                        let [diffuse, specular] = place.colors;
-                        let of = |sums: &Sums| diffuse * sums.diffuse + specular * sums.specular;
-                        let told = change.resolved && place.beside;
-                        if !told && self.steps(place.base + of(whole), of(&change.bend)) > place.allowed {
-                            return Arrival { skipped: true, ..change.with(Sums::default()) };
-                        }
-                        let masked = self.masked(index, emitter, place, &behind.between);
-                        let sums = masked.integrate(view, whole, &self.enough(place)).0;
-                        counts.points += masked.asked.get();
-                        sums
-                    }
-                })
+                match seen {
+                    Seen::Known(sums) => change.with(sums),
+                    Seen::Behind(_) if place.parted => Arrival { skipped: true, ..change.with(Sums::default()) },
+                    Seen::Behind(whole) => change.with(self.one(index, place, whole, counts)),
+                }
             }
             (None, LightKind::Area(area)) => {
                 let light = Sampled::new(self.scene, self.level, index, &self.lights.targets);
@@ -271,19 +261,17 @@ impl<'a> Arrivals<'a> {
         let (scene, si) = (self.scene, place.si);
         let light = &scene.lights[index];
         let Some(view) = self.view(emitter, place) else {
-            let ask = light.shadows && si.receives_shadow;
-            let between = Between { ask, ask_trees: ask && scene.geometry.has_trees(), ..Between::default() };
-            let masked = self.masked(index, emitter, place, &between);
-            let is_points = matches!(emitter, Emitter::Points);
-            let sums = if is_points { masked.by_points(light, &self.enough(place)) } else { Sums::default() };
-            counts.points += masked.asked.get();
-            return (unseen(emitter, place), Seen::Known(sums));
+            let seen = match emitter {
+                Emitter::Points => Seen::Behind(None),
+                Emitter::Flat(_) | Emitter::Ball { .. } => Seen::Known(Sums::default()),
+            };
+            return (unseen(emitter, place), seen);
         };
         if !view.arrives() {
             counts.settled.visibility[Visibility::BelowHorizon as usize] += 1;
             return (horizon_change(&view, place), Seen::Known(Sums::default()));
         }
-        let between = if light.shadows && si.receives_shadow {
+        let between = if light.shadows && si.receives_shadow && !place.lit {
             self.between(index, emitter, &view, place)
         } else {
             Between::default()
@@ -302,7 +290,7 @@ impl<'a> Arrivals<'a> {
         let hiders = if behind { &[][..] } else { &between.hiders[..] };
         let enough = self.enough(place);
         let (whole, _) = dispatch_wide!(self.level, simd => integrate(simd, &view, hiders, &enough));
-        (change, if behind { Seen::Behind(Box::new(Behind { view, between, whole })) } else { Seen::Known(whole) })
+        (change, if behind { Seen::Behind(Some(whole)) } else { Seen::Known(whole) })
     }
 
     /// Whether sums with such an error will do for one light at a place.
@@ -327,21 +315,163 @@ impl<'a> Arrivals<'a> {
         self.tolerance_of(share) * (BY_CHANCE / TOLERANCE)
     }
 
-    fn masked<'b>(&'b self, light: usize, emitter: &'b Emitter, place: &'b Place, between: &'b Between) -> Masked<'b> {
-        let Place { si, lobe, share, series, .. } = *place;
-        Masked { scene: self.scene, light, emitter, si, lobe, between, share, series, asked: Cell::new(0) }
+    /// Whether it is worth to look for light `index` from all rays of a block of pixels together: not where its samples
+    /// are fixed.
+    pub fn looks_for(&self, index: usize) -> bool {
+        let is_area = matches!(self.scene.lights[index].kind, LightKind::Area(_));
+        self.lights.emitters[index].is_some() || !is_area
     }
 
-    /// A light behind things, as a place sees it.
-    pub fn behind<'b>(&'b self, light: usize, place: &'b Place, behind: &'b Behind) -> Masked<'b> {
-        let emitter =
-            self.lights.emitters[light].as_ref().expect("only lights that are integrated are seen behind things");
-        self.masked(light, emitter, place, &behind.between)
+    /// Hears what of light `index` is seen from those `points` whose numbers are in `order`. `each` may take what is in
+    /// the way, if something in trees is.
+    pub fn sights(
+        &mut self,
+        index: usize,
+        points: &[Viewpoint],
+        order: &mut [u32],
+        counts: &mut Counts,
+        mut each: impl FnMut(usize, Visibility, &mut dyn FnMut() -> Option<ShadowView>),
+    ) {
+        let (target, views) = (&self.lights.targets[index], &mut self.views);
+        let settled = &mut counts.settled;
+        self.settler.settle(self.level, self.scene, target, points, order, settled, |k, visibility, view| {
+            each(k, visibility, &mut || {
+                view.has_trees().then(|| std::mem::replace(view, views.pop().unwrap_or_default()))
+            });
+        });
+    }
+
+    /// Has rays that are asked together ask past what is in `view`.
+    pub fn ask_behind(
+        &mut self,
+        together: &mut Together,
+        index: usize,
+        place: &Place,
+        view: ShadowView,
+        counts: &mut Counts,
+    ) {
+        match &self.lights.emitters[index] {
+            Some(emitter) => {
+                let enough = self.enough(place);
+                let whole = match self.view(emitter, place) {
+                    Some(seen) if !seen.arrives() => Some(Sums::default()),
+                    Some(seen) => dispatch_wide!(self.level, simd => unshadowed(simd, &seen, &enough)),
+                    None if matches!(emitter, Emitter::Points) => None,
+                    None => Some(Sums::default()),
+                };
+                together.behind(self, place, whole, view);
+            }
+            // One ray tells
+            None => {
+                let sums = self.of_single(index, &Place { lit: false, ..*place });
+                counts.points += 1;
+                together.know(place, &sums);
+                self.keep(view);
+            }
+        }
+    }
+
+    /// What arrives at one point, past what is in the way.
+    fn one(&mut self, index: usize, place: &Place, whole: Option<Sums>, counts: &mut Counts) -> Sums {
+        let Some(view) = self.settle(index, place.si, counts) else { return Sums::default() };
+        let mut together = Together::new(index, 1, place.share, 0);
+        together.behind(self, place, whole, view);
+        together.finish(self, counts).1
+    }
+
+    /// Area light `index`, as its points are asked for.
+    pub fn asker(&self, index: usize) -> LadderAsker<'a> {
+        let (scene, level) = (self.scene, self.level);
+        let LightKind::Area(area) = &scene.lights[index].kind else {
+            unreachable!("lights of one point are not integrated")
+        };
+        let (target, ladder) = (&self.lights.targets[index], &self.lights.ladders[index]);
+        LadderAsker { scene, level, area, target, ladder }
+    }
+
+    /// Whether points spread evenly over a sphere light may miss most of what it sends to a place: what is near sends
+    /// far more than the rest where light weakens on its way, and a highlight may lie on it that is narrow beside it.
+    pub fn may_miss(&self, index: usize, place: &Place) -> bool {
+        let LightKind::Area(Area { shape: AreaShape::Sphere(sphere), physical, .. }) = &self.scene.lights[index].kind
+        else {
+            return false;
+        };
+        let SurfaceInteraction { ns, wo, lit_from, .. } = *place.si;
+        let cos_o = ns.dot(wo);
+        let spread = 1.0 / (2.0 * place.lobe.sharpness(cos_o)).sqrt();
+        let to = (sphere.center - lit_from.as_dvec3()).as_vec3();
+        let wide = sphere.radius as f32 / to.length();
+        if *physical || wide >= 1.0 {
+            return *physical || spread < NARROW;
+        }
+        // The chord of the angle between the mirrored direction and the light's middle is at most that angle; at the
+        // end of its reach a highlight has fallen to e^-18
+        let apart = (ns * (2.0 * cos_o) - wo - to.normalize()).length();
+        spread < NARROW * wide && apart < wide * FRAC_PI_2 + 6.0 * spread
+    }
+
+    /// What all points of area light `index` together stand for.
+    pub fn measure(&self, index: usize) -> f32 {
+        match &self.scene.lights[index].kind {
+            LightKind::Area(area) if area.physical => area.measure() as f32,
+            _ => 1.0,
+        }
+    }
+
+    /// What may be in the way of light `index` from one point; `None` if nothing of it is seen.
+    pub fn settle(&mut self, index: usize, si: &SurfaceInteraction, counts: &mut Counts) -> Option<ShadowView> {
+        let mut kept = self.views.pop().unwrap_or_default();
+        if !(self.scene.lights[index].shadows && si.receives_shadow) {
+            kept.clear();
+            return Some(kept);
+        }
+        let mut found = None;
+        let (target, points) = (&self.lights.targets[index], [Viewpoint::of(si)]);
+        let settled = &mut counts.settled;
+        self.settler.settle(self.level, self.scene, target, &points, &mut [0], settled, |_, visibility, view| {
+            found = Some(visibility);
+            std::mem::swap(&mut kept, view);
+        });
+        match found {
+            Some(Visibility::Hidden | Visibility::BelowHorizon) | None => {
+                self.views.push(kept);
+                None
+            }
+            Some(Visibility::Lit | Visibility::Mask) => Some(kept),
+        }
+    }
+
+    /// Takes a view back, for its memory.
+    pub fn keep(&mut self, view: ShadowView) {
+        self.views.push(view);
+    }
+
+    /// What arrives at one point, past anything, by cells of the light: where few of its points send nearly all.
+    pub fn by_cells(&self, index: usize, place: &Place, counts: &mut Counts) -> Sums {
+        let emitter = self.lights.emitters[index].as_ref().expect("only lights that are integrated are asked by cells");
+        let light = &self.scene.lights[index];
+        let ask = light.shadows && place.si.receives_shadow;
+        let between = Between { ask, ask_trees: ask && self.scene.geometry.has_trees(), ..Between::default() };
+        let Place { si, lobe, .. } = *place;
+        let asked = Cell::new(0);
+        let masked = Masked { scene: self.scene, light: index, emitter, si, lobe, between: &between, asked: &asked };
+        let enough = self.enough(place);
+        let sums = match self.view(emitter, place) {
+            Some(view) if !view.arrives() => Sums::default(),
+            Some(view) => {
+                let (whole, _) = dispatch_wide!(self.level, simd => integrate(simd, &view, &[], &enough));
+                masked.by_cells(&view, &whole, &enough)
+            }
+            None if matches!(emitter, Emitter::Points) => masked.by_points(light, &enough),
+            None => Sums::default(),
+        };
+        counts.points += asked.get();
+        sums
     }
 
     /// What stands between a place and an area light.
     fn between(&mut self, index: usize, emitter: &Emitter, view: &View, place: &Place) -> Between {
-        let trees = self.gather(index, place);
+        let trees = !place.clear && self.gather(index, place);
         let asker = Asker { si: place.si, reach: place.reach };
         Between::look(self.scene, index, emitter, view, &asker, trees.then_some(&self.occluders))
     }

@@ -3,13 +3,13 @@
 use super::arrival::Place;
 use crate::integrate::{Between, Emitter, Sums, View, sharpness};
 use crate::material::Lobe;
-use crate::math::square;
+use crate::math::{Vec3, square};
 
 /// What of one light arrives.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Arrival {
     pub sums: Sums,
-    /// Whether that was not asked, since it would not do for the patch.
+    /// Whether that was not asked, since rays of the patch are.
     pub skipped: bool,
     /// How far the mean over the patch can be from what arrives at its middle.
     pub bend: Sums,
@@ -54,6 +54,17 @@ impl Change {
 }
 
 impl Arrival {
+    /// Of a patch whose rays are asked, not its middle.
+    pub const PARTED: Arrival = Arrival {
+        sums: Sums { diffuse: 0.0, specular: 0.0 },
+        skipped: true,
+        bend: Sums { diffuse: f32::MAX, specular: f32::MAX },
+        drift: f32::INFINITY,
+        resolved: false,
+        smooth: false,
+        sharp: true,
+    };
+
     /// At a point, or where nothing bends.
     pub fn even(sums: Sums) -> Arrival {
         Change::NONE.with(sums)
@@ -98,14 +109,14 @@ pub(super) fn horizon_change(view: &View, place: &Place) -> Change {
     if place.reach == 0.0 {
         return Change::NONE;
     }
-    let far = view.l0.length() + view.la + view.lb + view.skew.abs();
+    let far = view.middle().length() + view.la + view.lb + view.skew.abs();
     let behind = place.reach + place.turn * far;
-    if view.facing < -place.reach || view.cos.max() < -behind || view.horizon.max() < -behind {
+    if view.facing < -place.reach || view.max(&view.cos) < -behind || view.max(&view.horizon) < -behind {
         return Change::NONE;
     }
     let swing = place.turn + place.reach / view.nearest().max(place.reach);
     let crossing = view.crossing(place.reach);
-    let cos = (view.cos.max().max(0.0) / view.l0.length() + swing).min(1.0);
+    let cos = (view.max(&view.cos).max(0.0) / view.middle().length() + swing).min(1.0);
     let all = view.most(place.reach) * (swing.min(1.0) * 0.5 + cos * crossing).min(1.0);
     let bend = Sums { diffuse: all, specular: all };
     let resolved = swing < RESOLVED_SWING && crossing == 0.0;
@@ -121,10 +132,10 @@ pub(super) fn change(view: &View, place: &Place, between: &Between, sway: f32) -
     }
     let (most, nearest, crossing) = (view.most(place.reach), view.nearest(), view.crossing(place.reach));
     let swing = place.turn + place.reach / nearest.max(place.reach);
-    let cuts = !view.is_above_horizon() || view.cos.min() < place.reach + place.turn * view.l0.length();
+    let cuts = !view.is_above_horizon() || view.min(&view.cos) < place.reach + place.turn * view.middle().length();
     // Where the outline of a shadow comes in, the share it hides begins to grow at once: an eighth of the way it moves
     let kink = (drift * (0.125 + 0.5 * place.off)).min(1.0);
-    let cos = (view.cos.max() / view.l0.length()).min(1.0) + swing;
+    let cos = (view.max(&view.cos) / view.middle().length()).min(1.0) + swing;
     let horizon = if cuts { swing * swing.min(1.0) } else { 0.0 };
     let smooth = square(place.reach / nearest.max(place.reach)) * 2.0 + place.turn * place.turn * 0.5;
     let smooth = smooth + 2.0 * swing * place.off;
@@ -154,13 +165,13 @@ fn brightest(view: &View, moved: f32) -> f32 {
     if sharp > 0.5 * distance2 || moved > 1.0 {
         return 1.0;
     }
-    let at = |x: f32, y: f32| {
-        let l = view.l(x, y);
+    let at = |l: Vec3| {
         let inverse = 1.0 / l.length();
         view.lobe.eval((view.ns.dot(l) * inverse).max(0.0), view.cos_o, view.wo.dot(l) * inverse)
     };
-    let corners = at(-1.0, -1.0).max(at(1.0, -1.0)).max(at(1.0, 1.0)).max(at(-1.0, 1.0));
-    let here = (corners.max(at(0.0, 0.0)) * 1.5).min(1.0);
+    let [a, b, c, d] = view.corners().map(at);
+    let corners = a.max(b).max(c).max(d);
+    let here = (corners.max(at(view.middle())) * 1.5).min(1.0);
     // exp(-(a - m)^2) is at most exp(-(1 - e) a^2) exp((1/e - 1) m^2), for any share e
     let root = here.sqrt();
     let there = if moved < 1e-3 {

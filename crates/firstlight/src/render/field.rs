@@ -226,6 +226,9 @@ impl OneLight<'_, '_> {
         // The arc, not the chord
         let arrival = self.arrival(&middle, reach * 1.01, turn * 1.05);
         let zero = Sums::default();
+        if arrival.skipped {
+            return false;
+        }
         if arrival.sums == zero && arrival.bend == zero {
             self.field.fill(self.light, square, &[[zero; 3]; 3]);
             return true;
@@ -273,7 +276,8 @@ impl OneLight<'_, '_> {
     fn arrival(&mut self, si: &SurfaceInteraction, reach: f32, turn: f32) -> Arrival {
         let scale = self.arrivals.scale(self.light);
         let colors = [scale * self.shade.diffuse, scale * self.shade.specular];
-        let place = Place { reach, turn, ..Place::point(si, &self.shade.lobe, self.shade.base, colors) };
+        let parted = reach > 0.0;
+        let place = Place { reach, turn, parted, ..Place::point(si, &self.shade.lobe, self.shade.base, colors) };
         self.arrivals.arrival(self.light, &place, self.counts)
     }
 

@@ -16,6 +16,7 @@ use crate::material::Lobe;
 use crate::math::{LANES, LaneSum, ShadowRay, Vec3, Vec3x16};
 use crate::scene::{Geometry, LinkId, Scene, ShadowRays};
 use crate::shape::{DiskShadow, ParallelogramShadow, PlaneSide, SphereShadow, SurfaceInteraction};
+use crate::visibility::View;
 
 /// Light, sixteen samples at a time.
 pub(crate) struct Lanes {
@@ -69,7 +70,13 @@ pub(super) struct Obstacles<'a> {
     pub hidden: &'a [u16],
 }
 
-impl Obstacles<'_> {
+impl<'a> Obstacles<'a> {
+    /// What is in a view whose samples are masked.
+    pub fn of(view: &'a View) -> Self {
+        let View { spheres, flats, disks, hidden, .. } = view;
+        Obstacles { spheres, flats, disks, hidden, ..Obstacles::default() }
+    }
+
     fn are_none(&self) -> bool {
         self.spheres.is_empty()
             && self.flats.is_empty()

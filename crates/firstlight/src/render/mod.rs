@@ -20,6 +20,7 @@ mod film;
 pub(crate) mod given;
 mod heat;
 mod hits;
+mod ladder;
 mod lanes;
 mod many;
 mod patch;

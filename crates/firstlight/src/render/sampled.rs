@@ -74,7 +74,7 @@ impl<'a> Sampled<'a> {
         points: &[Viewpoint],
         part: &mut [u32],
         counts: &mut Counts,
-        each: impl FnMut(usize, Visibility, &View),
+        each: impl FnMut(usize, Visibility, &mut View),
     ) {
         let all = self.samples() * part.len() as u64;
         let settled = &mut counts.settled;
@@ -114,11 +114,7 @@ impl<'a> Sampled<'a> {
     #[inline(always)]
     fn masked(&self, si: &SurfaceInteraction, lobe: &Lobe, view: &View) -> [f32; 2] {
         totals(match &self.light().kind {
-            LightKind::Area(area) => {
-                let View { spheres, flats, disks, hidden, .. } = view;
-                let obstacles = Obstacles { spheres, flats, disks, hidden, ..Obstacles::default() };
-                sum_area(self.level, area, si, lobe, &obstacles)
-            }
+            LightKind::Area(area) => sum_area(self.level, area, si, lobe, &Obstacles::of(view)),
             _ => Plain.gather(self.scene, self.index, si, lobe, &mut Counts::default()),
         })
     }

@@ -10,14 +10,14 @@ use crate::integrate::Sums;
 use crate::light::{Light, LightKind};
 use crate::material::Lobe;
 use crate::math::{Vec3, square};
-use crate::shape::PlaneSide;
+use crate::shape::{PlaneSide, SurfaceInteraction};
 
 impl Arrivals<'_> {
     /// What arrives of a light of one point.
     pub(super) fn single(&mut self, index: usize, light: &Light, place: &Place, counts: &mut Counts) -> Arrival {
         let si = place.si;
-        let sums = Plain.gather(self.scene, index, si, place.lobe, counts);
-        let sums = Sums { diffuse: sums.diffuse.total(), specular: sums.specular.total() };
+        let sums = self.of_single(index, place);
+        counts.points += u64::from(!place.lit);
         if place.reach == 0.0 {
             return Arrival::even(sums);
         }
@@ -60,11 +60,19 @@ impl Arrivals<'_> {
             .with(sums)
     }
 
+    /// What arrives at one point of a light of one point.
+    pub(super) fn of_single(&self, index: usize, place: &Place) -> Sums {
+        let unshadowed = SurfaceInteraction { receives_shadow: false, ..*place.si };
+        let si = if place.lit { &unshadowed } else { place.si };
+        let sums = Plain.gather(self.scene, index, si, place.lobe, &mut Counts::default());
+        Sums { diffuse: sums.diffuse.total(), specular: sums.specular.total() }
+    }
+
     /// Whether the edge of a shadow, of a light of one point, may run through the patch: 1, or 0 if that is excluded.
     fn edge(&mut self, light: usize, l: Vec3, finite: bool, place: &Place) -> f32 {
         let (scene, si) = (self.scene, place.si);
         if !scene.light_obstacles.disks.is_empty()
-            || self.gather(light, place) && (self.occluders.too_many || self.occluders.count() > 0)
+            || !place.clear && self.gather(light, place) && (self.occluders.too_many || self.occluders.count() > 0)
         {
             return 1.0;
         }

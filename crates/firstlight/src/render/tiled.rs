@@ -13,6 +13,7 @@
 //!
 //! Cells lie on a grid of the film, with a rim of one pixel around each, so that no decision depends on tiles or crops.
 
+mod behind;
 mod mean;
 
 use std::ops::ControlFlow;
@@ -32,6 +33,7 @@ use crate::color::Rgb;
 use crate::integrate::Sums;
 use crate::material::Bsdf;
 use crate::scene::Scene;
+use behind::{Block, Outlook};
 pub(super) use mean::{BEND, second_difference, within};
 
 /// Pixels across a cell.
@@ -83,6 +85,10 @@ pub(crate) struct Tiled<'a> {
     values: Vec<Rgb>,
     /// Diffuse and specular of each light at one pixel, in scene order.
     terms: Vec<[Rgb; 2]>,
+    /// What the rays of each pixel's patches see of each light past what is in trees, and where those of a pixel begin.
+    outlooks: Vec<Outlook>,
+    seen: Vec<usize>,
+    block: Block,
     /// In place of `field`, `arrived`, `values` where lights are many.
     many: Option<Many<'a>>,
 }
@@ -111,6 +117,9 @@ impl<'a> Tiled<'a> {
             arrived: Vec::new(),
             values: Vec::new(),
             terms: Vec::new(),
+            outlooks: Vec::new(),
+            seen: vec![UNLIT; ACROSS * ACROSS],
+            block: Block::default(),
             many,
         }
     }
@@ -146,6 +155,8 @@ impl<'a> Tiled<'a> {
         self.first.fill(UNLIT);
         self.arrived.clear();
         self.values.clear();
+        self.outlooks.clear();
+        self.seen.fill(UNLIT);
         if let Some(listed) = &self.listed {
             let [x, y] = corner.map(|at| at as f32 - 1.0);
             Pyramid::new(scene, x, y, ACROSS as f32).candidates(scene, listed, &mut self.near[0]);
@@ -153,7 +164,7 @@ impl<'a> Tiled<'a> {
             self.field.begin(corner);
             self.split(Square { x: corner[0], y: corner[1], side: CELL }, 1, counts, go_on)?;
         } else {
-            self.trace(counts);
+            self.trace(tile, counts, go_on)?;
         }
         if self.many.is_some() {
             self.look_at_all(counts, go_on)?;
@@ -332,8 +343,8 @@ impl<'a> Tiled<'a> {
         Some([color.r, color.g, color.b, 1.0])
     }
 
-    /// Traces all rays of a cell and its rim.
-    fn trace(&mut self, counts: &mut Counts) {
+    /// Traces all rays of a cell and its rim, and looks for lights from what they meet.
+    fn trace(&mut self, tile: &Tile, counts: &mut Counts, go_on: &impl Fn() -> ControlFlow<()>) -> ControlFlow<()> {
         let scene = self.scene;
         let once = self.mode == AaMode::Adaptive;
         let rays = (scene.antialiasing * scene.antialiasing) as u64;
@@ -354,8 +365,13 @@ impl<'a> Tiled<'a> {
                     self.work[index] = rays as f32;
                     counts.looks += rays;
                 }
+                if scene.geometry.has_trees() && self.many.is_none() {
+                    self.look(tile, [block_x, block_y], [w, h], counts);
+                }
             }
+            go_on()?;
         }
+        ControlFlow::Continue(())
     }
 
     /// Makes sure that the patches of a pixel of the cell or its rim are known; `false` if the film ends before it.
@@ -393,8 +409,8 @@ impl<'a> Tiled<'a> {
         let index = self.index(at);
         self.first[index] = self.values.len();
         let patches = std::mem::take(&mut self.pixels[index].patches);
-        for patch in &patches {
-            self.once(patch, at, counts);
+        for (k, patch) in patches.iter().enumerate() {
+            self.once(patch, k, at, counts);
         }
         self.pixels[index].patches = patches;
         true
@@ -419,25 +435,41 @@ impl<'a> Tiled<'a> {
     }
 
     /// What arrives at the middle of a patch of a pixel.
-    fn once(&mut self, patch: &Patch, at: [u32; 2], counts: &mut Counts) {
+    fn once(&mut self, patch: &Patch, k: usize, at: [u32; 2], counts: &mut Counts) {
         let scene = self.scene;
         let base = scene.ambient * patch.bsdf.ambient;
         let mut value = base;
         let share = self.share(patch);
-        let allowed = BEND / (scene.lights.len() as f32).sqrt();
-        let is_only = matches!(self.known[self.index(at)], Known::Only(_)) && self.is_in_cell(at);
+        let pixel = self.index(at);
+        let is_only = matches!(self.known[pixel], Known::Only(_)) && self.is_in_cell(at);
         for index in 0..scene.lights.len() {
+            let outlook = self.outlook(pixel, k, index);
             let place = self.arrivals.place(index, &patch.si, &patch.bsdf).over(patch);
-            let place = Place { share, allowed, beside: patch.is_whole(scene), ..place };
+            let lit = matches!(outlook, Outlook::Lit);
+            let clear = lit || matches!(outlook, Outlook::Clear);
+            let place = Place { share, parted: true, lit, clear, ..place };
             let known = if is_only { self.field.arrived(index, at) } else { None };
-            let arrival = match known {
-                Some(sums) => Arrival::even(sums),
-                None => self.arrivals.arrival(index, &place, counts),
+            let arrival = match (outlook, known) {
+                (Outlook::Dark, _) => Arrival::even(Sums::default()),
+                (Outlook::Parted | Outlook::Settled(_), _) => Arrival::PARTED,
+                (_, Some(sums)) => Arrival::even(sums),
+                _ => self.arrivals.arrival(index, &place, counts),
             };
             value += place.colors[0] * arrival.sums.diffuse + place.colors[1] * arrival.sums.specular;
+            if let Outlook::Settled([diffuse, specular]) = outlook {
+                value += (diffuse + specular) * (1.0 / patch.count(scene) as f32);
+            }
             self.arrived.push(arrival);
         }
         self.values.push(value);
+    }
+
+    /// What the rays of a pixel's patch, its `k`-th, see of a light past what is in trees.
+    fn outlook(&self, pixel: usize, k: usize, light: usize) -> Outlook {
+        match self.seen[pixel] {
+            UNLIT => Outlook::Unknown,
+            first => self.outlooks[first + k * self.scene.lights.len() + light],
+        }
     }
 
     fn is_in_cell(&self, at: [u32; 2]) -> bool {

@@ -16,7 +16,7 @@ use std::sync::Arc;
 use super::links::{LinkId, LinkSets};
 use crate::accel::{Aabb, Bvh};
 use crate::ids::{LightId, MaterialId, SurfaceId};
-use crate::math::DVec3;
+use crate::math::{DVec3, Facet};
 use crate::shape::{Mesh, Parallelogram, Placement, PointSet, ShadowTerminator, Solid, Sphere, TrianglePoint};
 
 /// What a surface id stands for.
@@ -132,6 +132,15 @@ impl Hit {
             At::World(point) | At::Placed(_, Spot::Triangle(point)) => point.triangle,
             At::Placed(_, Spot::Point(point)) => point,
             _ => 0,
+        }
+    }
+
+    /// The triangle that was hit, where it is.
+    pub(crate) fn facet(&self) -> Facet {
+        match self.at {
+            At::World(point) => Facet { source: 0, triangle: point.triangle },
+            At::Placed(index, Spot::Triangle(point)) => Facet { source: index + 1, triangle: point.triangle },
+            _ => Facet::NONE,
         }
     }
 }

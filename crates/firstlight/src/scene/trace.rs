@@ -8,7 +8,7 @@ use super::links::LinkId;
 use crate::color::Rgb;
 use crate::ids::{LightId, SurfaceId};
 use crate::light::LightKind;
-use crate::math::{Ray, ShadowRay};
+use crate::math::{Facet, Ray, ShadowRay};
 use crate::shape::{RayDifferential, ShapePoint, Sphere, SurfaceInteraction};
 
 pub use super::geometry::Hit;
@@ -156,7 +156,10 @@ impl Scene {
         let ShapePoint { p, error, normal, shading, lifted, uv, footprint, color } = point;
         let wo = -ray.d;
         let (ng, ns) = if normal.dot(wo) < 0.0 { (-normal, -shading) } else { (normal, shading) };
-        let (lit_from, horizon) = lifted.map_or((p, ng), |lifted| (lifted, ns));
+        let (lit_from, horizon, facet) = match lifted {
+            Some(lifted) => (lifted, ns, hit.facet()),
+            None => (p, ng, Facet::NONE),
+        };
         let material = surface.material.unwrap_or_else(|| self.geometry.face_material(hit));
         let receives_shadow = surface.receives_shadow;
         let surface = hit.surface;
@@ -167,6 +170,7 @@ impl Scene {
             ns,
             lit_from,
             horizon,
+            facet,
             wo,
             uv,
             footprint,

@@ -149,7 +149,17 @@ impl Geometry {
     fn blocked<S: Simd>(&self, simd: S, ray: &ShadowRay) -> bool {
         let (o, t_end) = (ray.start, ray.end());
         if let Some(world) = &self.world
-            && self.blocked_by_mesh(simd, &world.mesh, SurfaceId(0), world.shadow, ray.light, o, ray.l, t_end)
+            && self.blocked_by_mesh(
+                simd,
+                &world.mesh,
+                SurfaceId(0),
+                world.shadow,
+                ray.light,
+                ray.but.of(0),
+                o,
+                ray.l,
+                t_end,
+            )
         {
             return true;
         }
@@ -186,7 +196,17 @@ impl Geometry {
             Target::Mesh(mesh) => {
                 let mesh = &self.meshes[mesh as usize];
                 let (o, l) = (own.o.as_vec3(), own.d.as_vec3());
-                self.blocked_by_mesh(simd, mesh, thing.surface, thing.shadow, ray.light, o, l, t_end)
+                self.blocked_by_mesh(
+                    simd,
+                    mesh,
+                    thing.surface,
+                    thing.shadow,
+                    ray.light,
+                    ray.but.of(index + 1),
+                    o,
+                    l,
+                    t_end,
+                )
             }
             Target::Points(points) => casts() && self.point_sets[points as usize].blocks(simd, &own, t_end),
             Target::Solid(solid) => casts() && self.solids[solid as usize].blocks(&own, 0.0, t_end as f64),
@@ -222,7 +242,7 @@ impl Geometry {
         Some((hit.t, TrianglePoint { triangle: hit.triangle, u: hit.u, v: hit.v }))
     }
 
-    /// Whether any triangle stands on the way, in the mesh's space.
+    /// Whether any triangle `but` one stands on the way, in the mesh's space.
     #[inline(never)]
     #[allow(clippy::too_many_arguments, reason = "a mesh with its place, a ray with its reach")]
     fn blocked_by_mesh<S: Simd>(
@@ -232,6 +252,7 @@ impl Geometry {
         first: SurfaceId,
         meets: Meets,
         light: LightId,
+        but: u32,
         o: Vec3,
         l: Vec3,
         t_end: f32,
@@ -239,14 +260,15 @@ impl Geometry {
         if meets == Meets::None {
             return false;
         }
-        let asks = |triangle| meets == Meets::All || self.triangle_casts(mesh, first, triangle, light);
+        let asks =
+            |triangle| triangle != but && (meets == Meets::All || self.triangle_casts(mesh, first, triangle, light));
         simd.vectorize(
             #[inline(always)]
             || mesh.tree.any(simd, &TraceRay::new(o, l), t_end, &asks),
         )
     }
 
-    /// Which of sixteen rays a mesh blocks, in the mesh's space.
+    /// Which of sixteen rays a mesh blocks, `but` for one of its triangles, in the mesh's space.
     #[inline(never)]
     #[allow(clippy::too_many_arguments, reason = "a mesh with its place, rays with their reach")]
     fn lanes_blocked_by_mesh<S: Simd>(
@@ -256,6 +278,7 @@ impl Geometry {
         first: SurfaceId,
         meets: Meets,
         light: LightId,
+        but: u32,
         rays: &RayPacket16,
         t_end: &[f32; 16],
         active: u16,
@@ -263,7 +286,8 @@ impl Geometry {
         if meets == Meets::None || active == 0 {
             return 0;
         }
-        let asks = |triangle| meets == Meets::All || self.triangle_casts(mesh, first, triangle, light);
+        let asks =
+            |triangle| triangle != but && (meets == Meets::All || self.triangle_casts(mesh, first, triangle, light));
         simd.vectorize(
             #[inline(always)]
             || mesh.tree.any16(simd, rays, t_end, active, &asks),
@@ -414,6 +438,7 @@ impl Geometry {
                 SurfaceId(0),
                 world.shadow,
                 shadows.from.light,
+                shadows.from.but.of(0),
                 rays,
                 t_end,
                 active,
@@ -468,7 +493,7 @@ impl Geometry {
             let line = thing.placement.line(shadows.rays.o(lane), shadows.rays.d(lane));
             own.set(lane, line.o.as_vec3(), line.d.as_vec3());
         }
-        let light = shadows.from.light;
-        self.lanes_blocked_by_mesh(simd, mesh, thing.surface, thing.shadow, light, &own, &shadows.t_end, active)
+        let (light, but) = (shadows.from.light, shadows.from.but.of(index + 1));
+        self.lanes_blocked_by_mesh(simd, mesh, thing.surface, thing.shadow, light, but, &own, &shadows.t_end, active)
     }
 }

@@ -56,9 +56,9 @@ impl Ball {
         let (uv, edges) = match self.uv {
             SphereUv::Equirectangular => {
                 let (around, up) = (f_atan2(-n.z, n.x), f_atan2(n.y, from_y));
-                (DVec2::new(0.5 + around / (2.0 * PI), 0.5 + up / PI), [UvEdge::Periodic, UvEdge::Bounded])
+                (DVec2::new(0.5 + around / (2.0 * PI), 0.5 + up / PI), [UvEdge::Periodic, UvEdge::Folded])
             }
-            SphereUv::Angles => (DVec2::new(f_atan2(from_x, n.x), f_atan2(from_y, n.y)) / PI, [UvEdge::Bounded; 2]),
+            SphereUv::Angles => (DVec2::new(f_atan2(from_x, n.x), f_atan2(from_y, n.y)) / PI, [UvEdge::Folded; 2]),
         };
         let [dpdu, dpdv] = ball_tangents(self.uv, n);
         SolidPoint { p: n, normal: n, uv, dpdu, dpdv, edges, terms: DVec3::ONE }

@@ -365,7 +365,7 @@ impl PointSet {
             shading: normal,
             lifted: None,
             uv,
-            footprint: Footprint { dx, dy, edges: [UvEdge::Periodic, UvEdge::Bounded] },
+            footprint: Footprint { dx, dy, edges: [UvEdge::Periodic, UvEdge::Folded] },
             color,
         }
     }

@@ -54,7 +54,7 @@ pub(crate) struct SolidPoint {
 
 impl SolidPoint {
     /// The change of uv with a step `dp` along the surface. What lies off the surface is left out; once around is the
-    /// most that a step makes of a coordinate with an end.
+    /// most that a step makes of a coordinate that comes back.
     pub fn uv_step(&self, dp: DVec3) -> DVec2 {
         let across = self.dpdu.cross(self.dpdv);
         let area2 = across.length_squared();
@@ -65,7 +65,8 @@ impl SolidPoint {
             let along = |way: DVec3| if way == DVec3::ZERO { 1.0 } else { dp.dot(way) / way.length_squared() };
             DVec2::new(along(self.dpdu), along(self.dpdv))
         };
-        let limit = |step: f64, edge| if edge == UvEdge::Unbounded { step } else { step.clamp(-1.0, 1.0) };
+        let comes_back = |edge| matches!(edge, UvEdge::Periodic | UvEdge::Folded);
+        let limit = |step: f64, edge| if comes_back(edge) { step.clamp(-1.0, 1.0) } else { step };
         DVec2::new(limit(step.x, self.edges[0]), limit(step.y, self.edges[1]))
     }
 }
@@ -218,7 +219,7 @@ mod tests {
             uv: DVec2::ZERO,
             dpdu: DVec3::X * 4.0,
             dpdv: DVec3::new(1.0, 2.0, 0.0),
-            edges: [UvEdge::Periodic, UvEdge::Bounded],
+            edges: [UvEdge::Periodic, UvEdge::Folded],
             terms: DVec3::ZERO,
         };
         // Skewed, and with a part along the normal

@@ -107,8 +107,8 @@ impl Sphere {
             SphereUv::Angles => angles(n, dpx / r, dpy / r),
         };
         let edges = match self.uv {
-            SphereUv::Equirectangular => [UvEdge::Periodic, UvEdge::Bounded],
-            SphereUv::Angles => [UvEdge::Bounded, UvEdge::Bounded],
+            SphereUv::Equirectangular => [UvEdge::Periodic, UvEdge::Folded],
+            SphereUv::Angles => [UvEdge::Folded, UvEdge::Folded],
         };
         let error = ErrorBound::of_rounded(p, self.c.abs() + DVec3::splat(self.r));
         let footprint = Footprint { dx, dy, edges };

@@ -3,7 +3,7 @@
 use crate::color::Rgb;
 use crate::describe::words;
 use crate::ids::{LightId, MaterialId, SurfaceId};
-use crate::math::{ErrorBound, ShadowRay, Vec2, Vec3};
+use crate::math::{ErrorBound, Facet, ShadowRay, Vec2, Vec3};
 
 words! {
     /// What is made of the border of light and dark on facets with smooth normals.
@@ -19,8 +19,10 @@ words! {
 /// What lies beyond 0 and 1 of a texture coordinate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum UvEdge {
-    /// Nothing: the shape ends there.
+    /// Nothing: the surface ends there, or another begins, at a rim or the edge of a face.
     Bounded,
+    /// More of the shape, but the coordinate turns back: at the poles of a sphere.
+    Folded,
     /// The other end of the shape: it closes on itself.
     Periodic,
     /// More of the shape: it has no end, and 0 and 1 are places like any other.
@@ -75,6 +77,8 @@ pub struct SurfaceInteraction {
     pub lit_from: Vec3,
     /// The normal of the horizon that light comes from above of: `ng`, or `ns` where the point is lifted.
     pub horizon: Vec3,
+    /// What does not stand in the way from there: the facet that the point is lifted from.
+    pub(crate) facet: Facet,
     /// To the viewer, unit.
     pub wo: Vec3,
     /// Texture coordinate, 0 to 1 on the shape.
@@ -96,7 +100,7 @@ impl SurfaceInteraction {
     #[inline(always)]
     pub(crate) fn shadow_ray(&self, light: LightId, l: Vec3, t_max: f32) -> ShadowRay {
         let start = self.error.offset(self.lit_from, self.ng).as_vec3();
-        ShadowRay { p: self.lit_from, error: self.error, start, l, t_max, light }
+        ShadowRay { p: self.lit_from, error: self.error, start, l, t_max, light, but: self.facet }
     }
 }
 

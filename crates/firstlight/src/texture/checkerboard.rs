@@ -1,5 +1,6 @@
 //! The checkerboard, exact over the footprint.
 
+use arrayvec::ArrayVec;
 use glam::DVec2;
 
 use crate::color::Rgb;
@@ -50,6 +51,9 @@ const MAX_COUNT: u32 = 65536;
 /// inverse of this number.
 const MAX_CROSSINGS: f64 = 1024.0;
 
+/// A footprint that reaches farther beyond the rim of its surface, in squares, is not cut there: the board is gray.
+const MAX_REACH: f64 = 1e9;
+
 /// A footprint whose area is smaller than this fraction of its sides' squares is a line.
 const MIN_AREA: f64 = 1e-9;
 
@@ -67,8 +71,8 @@ impl Checkerboard {
         (center - reach).floor() == (center + reach).floor()
     }
 
-    /// The mean over the footprint of +1 on the first colour's squares and -1 on the second's. In f64: the integral is
-    /// a small difference of larger numbers where the footprint is thin.
+    /// The mean over the footprint, as far as the surface goes, of +1 on the first colour's squares and -1 on the
+    /// second's. In f64: the integral is a small difference of larger numbers where the footprint is thin.
     fn mean(&self, uv: Vec2, footprint: &Footprint) -> f64 {
         // Count in squares: the lines of the board are the whole numbers
         let scale = DVec2::new(self.counts[0] as f64, self.counts[1] as f64);
@@ -81,6 +85,10 @@ impl Checkerboard {
         if low == high {
             return waves[0].sign(center.x) * waves[1].sign(center.y);
         }
+        let leaves = |i: usize| center[i] - reach[i] < 0.0 || center[i] + reach[i] > scale[i];
+        if (0..2).any(|i| footprint.edges[i] == UvEdge::Bounded && leaves(i)) {
+            return mean_within(&waves, center, a, b);
+        }
         if !(reach.max_element() < MAX_CROSSINGS) {
             return 0.0;
         }
@@ -88,19 +96,87 @@ impl Checkerboard {
         if area.abs() > MIN_AREA * (a.length_squared() + b.length_squared()) {
             mean_over_parallelogram(&waves, center, a, b, area)
         } else {
-            mean_over_line(&waves, center, if a.length_squared() > b.length_squared() { a } else { b })
+            let along = if a.length_squared() > b.length_squared() { a } else { b };
+            mean_over_line(&waves, center - along * 0.5, center + along * 0.5)
         }
     }
+}
+
+/// The corners of a parallelogram around `c` with sides `a` and `b`.
+fn corners(c: DVec2, a: DVec2, b: DVec2) -> [DVec2; 4] {
+    [-a - b, a - b, a + b, b - a].map(|d| c + d * 0.5)
+}
+
+/// A parallelogram, cut at both ends of both axes: no more than 8 corners, but what rounding adds.
+type Outline = ArrayVec<DVec2, 16>;
+
+/// The mean over what of a footprint lies on the surface, where that ends within it.
+fn mean_within(waves: &[Wave; 2], c: DVec2, a: DVec2, b: DVec2) -> f64 {
+    // The line along the footprint, for one that is no more than that
+    let along = if a.length_squared() > b.length_squared() { a } else { b };
+    let (mut outline, mut line) = (Outline::new(), Outline::new());
+    outline.extend(corners(c, a, b));
+    line.extend([c - along * 0.5, c + along * 0.5]);
+    if !outline.iter().all(|p| p.abs().max_element() < MAX_REACH) {
+        return 0.0;
+    }
+    for (axis, wave) in waves.iter().enumerate().filter(|(_, wave)| wave.edge == UvEdge::Bounded) {
+        for (end, sign) in [(0.0, 1.0), (wave.count, -1.0)] {
+            (outline, line) = (cut(&outline, axis, end, sign, true), cut(&line, axis, end, sign, false));
+        }
+    }
+    let none = (DVec2::INFINITY, DVec2::NEG_INFINITY);
+    let (low, high) = outline.iter().fold(none, |(low, high), p| (low.min(*p), high.max(*p)));
+    let size = high - low;
+    // Also where nothing is left
+    if (size * 0.5).max_element() >= MAX_CROSSINGS {
+        return 0.0;
+    }
+    let area = (0..outline.len()).map(|i| outline[i].perp_dot(outline[(i + 1) % outline.len()])).sum::<f64>() * 0.5;
+    if area.abs() > MIN_AREA * size.length_squared() {
+        return mean_over(waves, &outline, area);
+    }
+    match line[..] {
+        [from, to] if from != to => mean_over_line(waves, from, to),
+        _ => waves[0].sign(c.x) * waves[1].sign(c.y),
+    }
+}
+
+/// What of an outline, closed or not, lies where (p[axis] - end) `sign` >= 0.
+///
+/// Source: Sutherland and Hodgman, "Reentrant polygon clipping", 1974.
+fn cut(outline: &[DVec2], axis: usize, end: f64, sign: f64, closed: bool) -> Outline {
+    let mut left = Outline::new();
+    let height = |p: DVec2| (p[axis] - end) * sign;
+    for (i, &p) in outline.iter().enumerate() {
+        if height(p) >= 0.0 {
+            let _ = left.try_push(p);
+        }
+        if !closed && i + 1 == outline.len() {
+            break;
+        }
+        let q = outline[(i + 1) % outline.len()];
+        if (height(p) < 0.0) != (height(q) < 0.0) {
+            let mut at = p + (q - p) * (height(p) / (height(p) - height(q)));
+            at[axis] = end;
+            let _ = left.try_push(at);
+        }
+    }
+    left
 }
 
 /// The mean over the parallelogram around `c` with sides `a` and `b` of w0(x) w1(y), by Green's theorem: the integral
 /// over an area of w0(x) w1(y) is that along its outline of W0(x) w1(y) dy, where W0 is the integral of w0. Between two
 /// lines of the board w1 is constant and W0 straight, so each piece of the outline is exact.
 fn mean_over_parallelogram(waves: &[Wave; 2], c: DVec2, a: DVec2, b: DVec2, area: f64) -> f64 {
-    let corner = [-a - b, a - b, a + b, b - a].map(|d| c + d * 0.5);
+    mean_over(waves, &corners(c, a, b), area)
+}
+
+/// The same over a convex outline with that area.
+fn mean_over(waves: &[Wave; 2], outline: &[DVec2], area: f64) -> f64 {
     let mut integral = 0.0;
-    for i in 0..4 {
-        let (from, to) = (corner[i], corner[(i + 1) % 4]);
+    for (i, &from) in outline.iter().enumerate() {
+        let to = outline[(i + 1) % outline.len()];
         for_each_piece(from, to, |p, q| {
             let middle = waves[1].sign((p.y + q.y) * 0.5);
             integral += (waves[0].integral(p.x) + waves[0].integral(q.x)) * 0.5 * middle * (q.y - p.y);
@@ -109,11 +185,11 @@ fn mean_over_parallelogram(waves: &[Wave; 2], c: DVec2, a: DVec2, b: DVec2, area
     (integral / area).clamp(-1.0, 1.0)
 }
 
-/// The mean along the line of length `a` around `c`.
-fn mean_over_line(waves: &[Wave; 2], c: DVec2, a: DVec2) -> f64 {
-    let length = a.length();
+/// The mean along a line.
+fn mean_over_line(waves: &[Wave; 2], from: DVec2, to: DVec2) -> f64 {
+    let length = (to - from).length();
     let mut integral = 0.0;
-    for_each_piece(c - a * 0.5, c + a * 0.5, |p, q| {
+    for_each_piece(from, to, |p, q| {
         let middle = (p + q) * 0.5;
         integral += waves[0].sign(middle.x) * waves[1].sign(middle.y) * (q - p).length();
     });
@@ -166,7 +242,7 @@ impl Wave {
     /// +1 or -1: the square that holds `x`.
     fn sign(&self, x: f64) -> f64 {
         let square = match self.edge {
-            UvEdge::Bounded => x.floor().clamp(0.0, self.count - 1.0),
+            UvEdge::Bounded | UvEdge::Folded => x.floor().clamp(0.0, self.count - 1.0),
             UvEdge::Periodic => x.floor().rem_euclid(self.count),
             UvEdge::Unbounded => x.floor(),
         };
@@ -176,10 +252,12 @@ impl Wave {
     /// The integral of the wave from 0 to `x`.
     fn integral(&self, x: f64) -> f64 {
         match self.edge {
-            // The outermost squares go on for ever
-            UvEdge::Bounded if x < 0.0 => x,
-            UvEdge::Bounded if x > self.count => triangle(self.count) + (x - self.count) * self.sign(self.count),
-            UvEdge::Bounded | UvEdge::Unbounded => triangle(x),
+            // The outermost squares go on for ever: of what ends there nothing asks
+            UvEdge::Bounded | UvEdge::Folded if x < 0.0 => x,
+            UvEdge::Bounded | UvEdge::Folded if x > self.count => {
+                triangle(self.count) + (x - self.count) * self.sign(self.count)
+            }
+            UvEdge::Bounded | UvEdge::Folded | UvEdge::Unbounded => triangle(x),
             // An odd count leaves one square over in each round
             UvEdge::Periodic => {
                 let round = (x / self.count).floor();
@@ -210,25 +288,29 @@ mod tests {
     /// The mean over 512 x 512 points of the footprint.
     fn by_counting(n: u32, uv: Vec2, f: &Footprint) -> f64 {
         let steps = 512;
-        let mut sum = 0.0;
+        let (mut sum, mut count) = (0.0, 0.0);
         for i in 0..steps {
             for j in 0..steps {
                 let at = |k: i32| ((k as f64) + 0.5) / steps as f64 - 0.5;
                 let p = uv.as_dvec2() + f.dx.as_dvec2() * at(i) + f.dy.as_dvec2() * at(j);
+                if f.edges[0] == UvEdge::Bounded && p.clamp(DVec2::ZERO, DVec2::ONE) != p {
+                    continue;
+                }
                 let square = |x: f64| match f.edges[0] {
-                    UvEdge::Bounded => (x * n as f64).floor().clamp(0.0, n as f64 - 1.0),
+                    UvEdge::Bounded | UvEdge::Folded => (x * n as f64).floor().clamp(0.0, n as f64 - 1.0),
                     UvEdge::Periodic => ((x - x.floor()) * n as f64).floor(),
                     UvEdge::Unbounded => (x * n as f64).floor(),
                 };
                 sum += if (square(p.x) + square(p.y)).rem_euclid(2.0) == 0.0 { 1.0 } else { -1.0 };
+                count += 1.0;
             }
         }
-        sum / (steps * steps) as f64
+        sum / count
     }
 
     #[test]
     fn the_mean_is_that_of_many_points() {
-        for edge in [UvEdge::Bounded, UvEdge::Periodic, UvEdge::Unbounded] {
+        for edge in [UvEdge::Bounded, UvEdge::Folded, UvEdge::Periodic, UvEdge::Unbounded] {
             for n in 1..=9 {
                 for (k, size) in [0.02, 0.3, 1.7].into_iter().enumerate() {
                     let f = footprint(Vec2::new(size, 0.3 * size), Vec2::new(-0.2 * size, 0.8 * size), edge);
@@ -247,6 +329,30 @@ mod tests {
         for uv in [Vec2::ZERO, Vec2::ONE, Vec2::new(1.0, 0.0), Vec2::new(0.5, 0.999)] {
             assert_eq!(board(1).color(uv, &f), Rgb::WHITE);
         }
+    }
+
+    /// A plate of 3 x 1 squares: what is seen of it from the side, from far away, at its corners.
+    #[test]
+    fn nothing_beyond_the_rim_counts() {
+        let plate = Checkerboard { counts: [3, 1], colors: [Rgb::WHITE, Rgb::BLACK] };
+        // Two squares of one colour and one of the other, however far beyond the rim it goes
+        for size in [2.0, 30.0, 3e3, 3e5] {
+            let f = footprint(Vec2::new(size, 0.0), Vec2::new(0.0, size), UvEdge::Bounded);
+            let mean = plate.mean(Vec2::new(0.5, 0.5), &f);
+            assert!((mean - 1.0 / 3.0).abs() < 1e-6, "{size}: {mean}");
+            let thin = footprint(Vec2::new(size, 0.0), Vec2::ZERO, UvEdge::Bounded);
+            let mean = plate.mean(Vec2::new(0.5, 0.5), &thin);
+            assert!((mean - 1.0 / 3.0).abs() < 1e-6, "a line of {size}: {mean}");
+        }
+        // From a corner a quarter is left: half a square of the first colour along u
+        let f = footprint(Vec2::new(1.0, 0.0), Vec2::new(0.0, 1.0), UvEdge::Bounded);
+        let mean = plate.mean(Vec2::ZERO, &f);
+        assert!((mean - (1.0 / 3.0 - 1.0 / 6.0) / 0.5).abs() < 1e-6, "{mean}");
+        // A line along the rim, and one that only touches a corner
+        let line = footprint(Vec2::new(2.0, 0.0), Vec2::ZERO, UvEdge::Bounded);
+        assert!((plate.mean(Vec2::new(0.5, 1.0), &line) - 1.0 / 3.0).abs() < 1e-6);
+        let touching = footprint(Vec2::new(1.0, -1.0), Vec2::ZERO, UvEdge::Bounded);
+        assert_eq!(plate.mean(Vec2::ZERO, &touching), 1.0);
     }
 
     #[test]

@@ -27,7 +27,7 @@ pub(crate) use target::Target;
 pub(crate) use view::{View, Visibility};
 
 use crate::ids::LightId;
-use crate::math::{ErrorBound, ShadowRay, Vec3};
+use crate::math::{ErrorBound, Facet, ShadowRay, Vec3};
 use crate::shape::SurfaceInteraction;
 
 /// A point that light is gathered from.
@@ -40,19 +40,21 @@ pub(crate) struct Viewpoint {
     /// Light with horizon.l <= 0 or ns.l <= 0 does not count.
     pub horizon: Vec3,
     pub ns: Vec3,
+    /// What does not stand in the way.
+    pub but: Facet,
 }
 
 impl Viewpoint {
     #[inline(always)]
     pub fn of(si: &SurfaceInteraction) -> Self {
         let start = si.shadow_ray(LightId(0), Vec3::ZERO, 1.0).start;
-        Viewpoint { p: si.lit_from, error: si.error, start, horizon: si.horizon, ns: si.ns }
+        Viewpoint { p: si.lit_from, error: si.error, start, horizon: si.horizon, ns: si.ns, but: si.facet }
     }
 
     /// A ray along `l` towards a light.
     #[inline(always)]
     pub fn ray(&self, light: LightId, l: Vec3, finite: bool) -> ShadowRay {
         let t_max = if finite { 1.0 } else { f32::INFINITY };
-        ShadowRay { p: self.p, error: self.error, start: self.start, l, t_max, light }
+        ShadowRay { p: self.p, error: self.error, start: self.start, l, t_max, light, but: self.but }
     }
 }

@@ -19,6 +19,8 @@ const FEW: usize = 16;
 /// pixel's size.
 const ONE: usize = 16;
 const ONE_MORE: usize = 1;
+/// Blocks of samples of a light that is integrated, for that.
+const UNKNOWN: usize = 64;
 
 /// Settles what is seen of lights, points together as long as little stands in the way. Keeps its memory.
 #[derive(Debug, Default)]
@@ -43,7 +45,7 @@ pub(crate) struct Settled {
 
 impl Settler {
     /// Hears what of a light is seen from each of the `points` whose numbers are in `order`, in any order: `each` is
-    /// told which point, how much is seen, and by which view. The order of `order` is lost.
+    /// told which point, how much is seen, and by which view, which it may keep. The order of `order` is lost.
     #[allow(clippy::too_many_arguments, reason = "a light of a scene and points, as lists")]
     pub fn settle(
         &mut self,
@@ -53,7 +55,7 @@ impl Settler {
         points: &[Viewpoint],
         order: &mut [u32],
         counts: &mut Settled,
-        mut each: impl FnMut(usize, Visibility, &View),
+        mut each: impl FnMut(usize, Visibility, &mut View),
     ) {
         let mut parts = std::mem::take(&mut self.parts);
         parts.clear();
@@ -62,7 +64,8 @@ impl Settler {
         }
         while let Some((start, end)) = parts.pop() {
             let part = &mut order[start..end];
-            let cap = if part.len() > 1 { MANY } else { ONE + ONE_MORE * target.blocks.len() };
+            let blocks = if target.blocks.is_empty() { UNKNOWN } else { target.blocks.len() };
+            let cap = if part.len() > 1 { MANY } else { ONE + ONE_MORE * blocks };
             self.occluders.gather(level, scene, target, points, part, cap);
             counts.shafts += 1;
             if self.occluders.too_many && part.len() > 1 && self.occluders.by_parts {
@@ -90,7 +93,7 @@ impl Settler {
                 if visibility == Visibility::Mask {
                     counts.traced += self.view.mask(level, scene, target, &points[k]);
                 }
-                each(k, visibility, &self.view);
+                each(k, visibility, &mut self.view);
             }
         }
         self.parts = parts;

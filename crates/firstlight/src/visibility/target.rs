@@ -3,7 +3,7 @@
 
 use crate::accel::Aabb;
 use crate::ids::LightId;
-use crate::light::{AreaShape, Light, LightKind};
+use crate::light::{AreaShape, Light, LightKind, Points};
 use crate::math::{DMat3, DVec3, LANES, Vec3};
 use crate::scene::Scene;
 
@@ -129,8 +129,14 @@ impl LightHull {
 
     /// The coordinates of a point along the axes.
     fn coordinates(&self, q: DVec3) -> DVec3 {
+        self.all_coordinates()(q)
+    }
+
+    /// The same for many points.
+    fn all_coordinates(&self) -> impl Fn(DVec3) -> DVec3 + use<> {
         let [a, b, c] = self.axes.map(|v| v.as_dvec3());
-        DMat3::from_cols(a, b, c).inverse() * (q - self.center.as_dvec3())
+        let (inverse, center) = (DMat3::from_cols(a, b, c).inverse(), self.center.as_dvec3());
+        move |q| inverse * (q - center)
     }
 
     /// How far the light reaches from its centre, along the axes of the world.
@@ -180,14 +186,20 @@ impl Target {
     pub fn new(scene: &Scene, id: LightId) -> Self {
         let light = &scene.lights[id.index()];
         let hull = LightHull::of(light);
-        let mut target = Target { light: id, hull, blocks: Vec::new(), cells: Vec::new() };
-        let area = match &light.kind {
-            LightKind::Area(area) if !light.exact => area,
-            _ => return target,
-        };
-        let mut samples: Vec<(u32, Vec3, DVec3)> = (0..area.samples())
-            .map(|k| (k as u32, area.point(k), hull.coordinates(area.point(k).as_dvec3())))
-            .collect();
+        let target = Target { light: id, hull, blocks: Vec::new(), cells: Vec::new() };
+        match &light.kind {
+            LightKind::Area(area) if !light.exact => target.with(area.points()),
+            _ => target,
+        }
+    }
+
+    /// The same light with these points of it.
+    pub fn with(&self, points: &Points) -> Self {
+        let hull = self.hull;
+        let mut target = Target { light: self.light, hull, blocks: Vec::new(), cells: Vec::new() };
+        let coordinates = hull.all_coordinates();
+        let mut samples: Vec<(u32, Vec3, DVec3)> =
+            (0..points.count()).map(|k| (k as u32, points.get(k), coordinates(points.get(k).as_dvec3()))).collect();
         gather_neighbours(&mut samples);
         for chunk in samples.chunks(LANES) {
             let mut block = SampleBlock {

@@ -46,6 +46,22 @@ pub(crate) struct View {
 const DOT: f32 = 16.0 * UNIT_ROUNDOFF;
 
 impl View {
+    /// Nothing is in the way.
+    pub fn clear(&mut self) {
+        self.spheres.clear();
+        self.flats.clear();
+        self.disks.clear();
+        self.triangles.clear();
+        self.others.clear();
+        self.hidden.clear();
+        self.trees = false;
+    }
+
+    /// Whether something in trees may be in the way.
+    pub fn has_trees(&self) -> bool {
+        self.trees || !self.triangles.is_empty() || !self.others.is_empty()
+    }
+
     /// What of a light is seen from `point`, past `occluders`, which were gathered for it. What is left to ask for the
     /// samples is in this view then.
     pub fn classify(
@@ -56,13 +72,7 @@ impl View {
         occluders: &Occluders,
         point: &Viewpoint,
     ) -> Visibility {
-        self.spheres.clear();
-        self.flats.clear();
-        self.disks.clear();
-        self.triangles.clear();
-        self.others.clear();
-        self.hidden.clear();
-        self.trees = false;
+        self.clear();
         let light = target.hull.from(point.p);
         if is_below(&light, point.horizon) || point.ns != point.horizon && is_below(&light, point.ns) {
             return Visibility::BelowHorizon;
@@ -175,7 +185,7 @@ impl View {
             rest = &rest[count..];
             if let Some(mesh) = ShadowMesh::of(&scene.geometry, source, target.light) {
                 let eye = eye(&mesh, light, point);
-                if look_at(simd, &mesh, &eye, &leaves, source, &mut self.triangles) {
+                if look_at(simd, &mesh, &eye, &leaves, source, point.but.of(source), &mut self.triangles) {
                     hidden = true;
                     break;
                 }
@@ -186,7 +196,8 @@ impl View {
     }
 }
 
-/// Looks at leaves of one mesh. Not inlined: one copy for each instruction set is enough.
+/// Looks at leaves of one mesh, `but` for one of its triangles. Not inlined: one copy for each instruction set is
+/// enough.
 #[inline(never)]
 fn look_at<S: Simd>(
     simd: S,
@@ -194,13 +205,15 @@ fn look_at<S: Simd>(
     eye: &Eye,
     leaves: &[u32],
     source: Source,
+    but: u32,
     seen: &mut Vec<SeenTriangle>,
 ) -> bool {
     simd.vectorize(
         #[inline(always)]
         || {
             for four in leaves.chunks(TOGETHER) {
-                if mesh.mesh.tree.look(simd, eye, four, source, &|triangle| mesh.casts(triangle), seen) {
+                let casts = |triangle| triangle != but && mesh.casts(triangle);
+                if mesh.mesh.tree.look(simd, eye, four, source, &casts, seen) {
                     return true;
                 }
             }

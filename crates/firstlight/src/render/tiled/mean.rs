@@ -3,7 +3,7 @@
 
 use arrayvec::ArrayVec;
 
-use super::{ACROSS, Tiled};
+use super::{ACROSS, Outlook, Tiled};
 use crate::color::Rgb;
 use crate::integrate::Sums;
 use crate::material::Bsdf;
@@ -36,7 +36,10 @@ impl Tiled<'_> {
         for (k, patch) in patches.iter().enumerate() {
             let count = patch.count(scene) as f32;
             for light in 0..scene.lights.len() {
-                if let Some(sums) = self.at_once(&patches, at, k, light, counts) {
+                if let Outlook::Settled([diffuse, specular]) = self.outlook(index, k, light) {
+                    self.terms[light][0] += diffuse;
+                    self.terms[light][1] += specular;
+                } else if let Some(sums) = self.at_once(&patches, at, k, light, counts) {
                     let scale = self.arrivals.scale(light) * count;
                     self.terms[light][0] += scale * patch.bsdf.diffuse * sums.diffuse;
                     self.terms[light][1] += scale * patch.bsdf.specular * sums.specular;
@@ -112,9 +115,14 @@ impl Tiled<'_> {
         let n = scene.antialiasing as f32;
         let part = (1.0 - 1.0 / (n * n)) / 24.0;
         let [x, y] = differences;
+        let (diffuse, specular) = ((x.diffuse + y.diffuse) * part, (x.specular + y.specular) * part);
+        // More than it bends here: something ends between this pixel and the next, the edge of a hard shadow for one
+        if self.shown(light, &patch.bsdf, value, &Sums { diffuse: diffuse.abs(), specular: specular.abs() }) > shown {
+            return Some(here.sums);
+        }
         Some(Sums {
-            diffuse: (here.sums.diffuse + (x.diffuse + y.diffuse) * part).max(0.0),
-            specular: (here.sums.specular + (x.specular + y.specular) * part).max(0.0),
+            diffuse: (here.sums.diffuse + diffuse).max(0.0),
+            specular: (here.sums.specular + specular).max(0.0),
         })
     }
 
@@ -166,20 +174,22 @@ impl Tiled<'_> {
         let (here, value) = (self.arrived[first * scene.lights.len() + light], self.values[first]);
         // What bends in one place, bends a fourth of that over half the way
         let allowed = BEND / (scene.lights.len() as f32).sqrt();
-        let quarters = if patch.uneven || self.shown(light, &patch.bsdf, value, &here.bend) > 6.0 * allowed {
-            ArrayVec::new()
-        } else {
-            patch.quarters(scene, at)
-        };
+        let quarters =
+            if patch.uneven || here.skipped || self.shown(light, &patch.bsdf, value, &here.bend) > 6.0 * allowed {
+                ArrayVec::new()
+            } else {
+                patch.quarters(scene, at)
+            };
         if quarters.is_empty() {
-            self.at_rays(patch, at, light, self.share(patch), counts);
+            let outlook = self.outlook(self.index(at), k, light);
+            self.at_rays(patch, at, light, outlook, self.share(patch), counts);
         }
         let share = self.share(patch);
         let arrivals: ArrayVec<Arrival, 4> = quarters
             .iter()
             .map(|quarter| {
                 let place = self.arrivals.place(light, &quarter.si, &quarter.bsdf).over(quarter);
-                let place = Place { share, allowed, ..place };
+                let place = Place { share, parted: true, ..place };
                 self.arrivals.arrival(light, &place, counts)
             })
             .collect();
@@ -194,7 +204,7 @@ impl Tiled<'_> {
                 || self.shown(light, &quarter.bsdf, value, &arrival.bend) > allowed
                 || self.mingles(light, &quarter.contrast, value, &slope)
             {
-                self.at_rays(quarter, at, light, share, counts);
+                self.at_rays(quarter, at, light, Outlook::Unknown, share, counts);
             } else {
                 let scale = self.arrivals.scale(light) * quarter.count(scene) as f32;
                 self.terms[light][0] += scale * quarter.bsdf.diffuse * arrival.sums.diffuse;
@@ -205,10 +215,13 @@ impl Tiled<'_> {
 
     /// The share of its pixel that a patch has, where each surface is lit once.
     pub(super) fn share(&self, patch: &Patch) -> f32 {
+        self.share_of(patch.count(self.scene))
+    }
+
+    /// That of so many of its rays.
+    pub(super) fn share_of(&self, rays: u32) -> f32 {
         match self.mode {
-            AaMode::Adaptive => {
-                patch.count(self.scene) as f32 / (self.scene.antialiasing * self.scene.antialiasing) as f32
-            }
+            AaMode::Adaptive => rays as f32 / (self.scene.antialiasing * self.scene.antialiasing) as f32,
             AaMode::Full => 1.0,
         }
     }
@@ -220,12 +233,22 @@ impl Tiled<'_> {
     }
 
     /// Adds what one light sends to a patch, asked at each of its rays. It is as good as `share` of the pixel.
-    fn at_rays(&mut self, patch: &Patch, at: [u32; 2], light: usize, share: f32, counts: &mut Counts) {
+    fn at_rays(
+        &mut self,
+        patch: &Patch,
+        at: [u32; 2],
+        light: usize,
+        outlook: Outlook,
+        share: f32,
+        counts: &mut Counts,
+    ) {
         let rays = patch.count(self.scene) as usize;
         let salt = at[0] ^ at[1].rotate_left(16) ^ patch.si.surface.index() as u32;
         let mut together = Together::new(light, rays, share, salt);
-        patch.for_each(self.scene, at, |si, bsdf| together.ask(&mut self.arrivals, si, bsdf, counts));
-        let [diffuse, specular] = together.finish(&self.arrivals, counts);
+        let lit = matches!(outlook, Outlook::Lit);
+        let clear = lit || matches!(outlook, Outlook::Clear);
+        patch.for_each(self.scene, at, |si, bsdf| together.ask(&mut self.arrivals, si, bsdf, lit, clear, counts));
+        let ([diffuse, specular], _) = together.finish(&mut self.arrivals, counts);
         self.terms[light][0] += diffuse;
         self.terms[light][1] += specular;
     }

@@ -1,0 +1,132 @@
+//! Scenes that were wrong once, held to what they should show: see `cases/README.md`.
+
+use std::path::Path;
+
+use firstlight::{CompileOptions, FolderAssets, Image, SampleSet, SamplesDesc, Scene, SceneDesc};
+
+use crate::converged::{displayed, exact, integrated, sampled, with_samples};
+use crate::scenes::*;
+
+fn folder() -> &'static Path {
+    Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/truth/cases"))
+}
+
+/// The files beside a scene.
+fn assets(name: &str) -> FolderAssets {
+    FolderAssets::new(folder().join(name).parent().expect("it lies in a folder"), &[]).expect("the folder is there")
+}
+
+fn case(name: &str) -> SceneDesc {
+    let path = folder().join(name);
+    let text = std::fs::read(&path).unwrap_or_else(|fault| panic!("{}: {fault}", path.display()));
+    let assets = assets(name);
+    let parsed = SceneDesc::parse(name, &text, &assets);
+    assert!(parsed.faults().is_empty(), "{name}: {:?}", parsed.faults());
+    parsed.desc
+}
+
+/// By how many steps of 255 two pictures differ at most.
+fn apart(scene: &Scene, one: &Image, other: &Image) -> f64 {
+    let steps = |(a, b): (&[f32; 4], &[f32; 4])| {
+        let [a, b] = [a, b].map(|pixel| displayed(scene, *pixel));
+        (0..3).map(|k| (a[k] - b[k]).abs()).fold(0.0, f64::max)
+    };
+    one.pixels.iter().zip(&other.pixels).map(steps).fold(0.0, f64::max)
+}
+
+#[test]
+fn hollow_meshes_do_not_hide_light_from_themselves() {
+    let desc = case("smooth_valley_black.toml");
+    let exact = exact(&desc);
+    let off = apart(&compile(&desc), &exact, &sampled(&desc, SampleSet::Sobol, 4096));
+    assert!(off < 0.25, "{off} steps off");
+    let black = exact.pixels.iter().filter(|pixel| pixel[0] == 0.0).count();
+    assert_eq!(black, sampled(&desc, SampleSet::Sobol, 4).pixels.iter().filter(|pixel| pixel[0] == 0.0).count());
+}
+
+#[test]
+fn lights_that_nearly_touch_are_whole() {
+    for name in ["near_contact_rect_1e-5.toml", "near_contact_speck.toml"] {
+        let [red, ..] = exact(&case(name)).pixels[0];
+        assert!((red - 0.8).abs() < 2e-4, "{name}: {red}");
+    }
+}
+
+#[test]
+fn a_disk_that_cuts_the_floor_sheds_its_light_on_both_sides() {
+    let desc = case("near_contact_disk.toml");
+    let image = exact(&desc);
+    let cos = 0.957_826_288;
+    let (mut brighter, mut darker) = (0, 0);
+    for pixel in &image.pixels {
+        let near = |should: f64| (f64::from(pixel[0]) - 0.8 * should).abs() < 1.5e-3;
+        // The disk ends a metre away: it is not quite all of a half plane
+        (brighter, darker) = (brighter + i32::from(near(0.5 + 0.5 * cos)), darker + i32::from(near(0.5 - 0.5 * cos)));
+    }
+    assert_eq!(brighter + darker, 16 * 16, "{brighter} on one side, {darker} on the other");
+    assert!(brighter == darker, "{brighter} on one side, {darker} on the other");
+}
+
+#[test]
+fn pixels_beside_a_hard_edge_are_what_their_rays_say() {
+    let desc = case("adaptive_directional_edge.toml");
+    for antialiasing in [2, 3, 4] {
+        let mut desc = desc.clone();
+        desc.render.antialiasing = antialiasing;
+        let off = apart(&compile(&desc), &shoot(&desc), &shoot_every_ray(&desc));
+        assert!(off < 0.5, "{antialiasing} x {antialiasing} rays: {off} steps off");
+    }
+}
+
+/// The mean of a checkerboard over what of a pixel's footprint lies within 0 to 1 of u and v, by 256 x 256 points of
+/// it.
+fn by_counting(scene: &Scene, [x, y]: [u32; 2], counts: [f64; 2]) -> Option<f64> {
+    let (ray, differential) = scene.camera().ray(x as f32 + 0.5, y as f32 + 0.5, 1.0);
+    let si = scene.surface(&ray, &scene.intersect(&ray)?, &differential);
+    let (mut sum, mut count) = (0.0, 0.0);
+    for (i, j) in (0..256).flat_map(|j| (0..256).map(move |i| (i, j))) {
+        let [a, b] = [i, j].map(|k| (f64::from(k) + 0.5) / 256.0 - 0.5);
+        let at = |uv: f32, dx: f32, dy: f32| f64::from(uv) + a * f64::from(dx) + b * f64::from(dy);
+        let u = at(si.uv.x, si.footprint.dx.x, si.footprint.dy.x);
+        let v = at(si.uv.y, si.footprint.dx.y, si.footprint.dy.y);
+        if (0.0..1.0).contains(&u) && (0.0..1.0).contains(&v) {
+            let square = (u * counts[0]).floor() + (v * counts[1]).floor();
+            (sum, count) = (sum + f64::from(square.rem_euclid(2.0) == 0.0), count + 1.0);
+        }
+    }
+    Some(sum / count)
+}
+
+#[test]
+fn a_plate_has_nothing_beyond_its_rim() {
+    let desc = case("checker_plate_edge.toml");
+    let (scene, image) = (compile(&desc), shoot_every_ray(&desc));
+    let (mut seen, mut mixed) = (0, 0);
+    for (pixel, i) in image.pixels.iter().zip(0..) {
+        let at = [i % 24, i / 24];
+        let Some(should) = by_counting(&scene, at, [108.0, 68.0]) else { continue };
+        let is = f64::from(pixel[0]);
+        assert!((is - should).abs() < 0.02, "{at:?}: {is} is not {should}");
+        (seen, mixed) = (seen + 1, mixed + i32::from((0.05..0.95).contains(&should)));
+    }
+    assert!(seen > 100 && mixed > 50, "{seen} pixels, {mixed} of both colours");
+}
+
+#[test]
+fn what_took_too_long_is_right() {
+    for (name, size) in
+        [("blades_256_n4.toml", 12), ("bumpy_ball/scene.toml", 16), ("constant_sphere_light_over_plane.toml", 12)]
+    {
+        let mut desc = case(name);
+        (desc.render.width, desc.render.height) = (size, size);
+        let assets = assets(name);
+        let compiled = |samples: SamplesDesc| {
+            let desc = with_samples(&desc, samples, SampleSet::Sobol, 1);
+            desc.compile(&assets, &CompileOptions::default()).expect("it is fine").scene
+        };
+        let scene = compiled(SamplesDesc::Exact);
+        let truth = picture(&compiled(SamplesDesc::Count(4096)), &every_ray());
+        let off = apart(&scene, &picture(&scene, &integrated()), &truth);
+        assert!(off < 1.0, "{name}: {off} steps off");
+    }
+}
