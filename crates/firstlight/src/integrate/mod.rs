@@ -122,10 +122,12 @@ pub(crate) fn integrate<S: Simd>(
 }
 
 /// What arrives from a flat light that nothing stands in front of; `None` where the horizon cuts it and some points of
-/// it tell as much: where it is not near, and no highlight on it is narrow.
+/// it tell as much: where much of it is above, it is not near, and no highlight on it is narrow.
 pub(crate) fn unshadowed<S: Simd>(simd: S, view: &View, enough: &dyn Fn(&Sums, &Sums) -> bool) -> Option<Sums> {
-    let is_even =
-        !view.is_above_horizon() && tensor::order(view, &Region::whole(view)).is_some() && lobe::end(view).is_none();
+    let is_even = !view.is_above_horizon()
+        && view.is_half_above_horizon()
+        && tensor::order(view, &Region::whole(view)).is_some()
+        && lobe::end(view).is_none();
     (!is_even).then(|| integrate(simd, view, &[], enough).0)
 }
 

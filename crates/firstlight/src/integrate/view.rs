@@ -309,4 +309,9 @@ impl View {
     pub fn is_above_horizon(&self) -> bool {
         self.min(&self.cos) > 0.0 && self.min(&self.horizon) > 0.0
     }
+
+    /// Whether the light reaches at least as far above the horizon as below it.
+    pub fn is_half_above_horizon(&self) -> bool {
+        [&self.cos, &self.horizon].into_iter().all(|height| self.max(height) + self.min(height) >= 0.0)
+    }
 }

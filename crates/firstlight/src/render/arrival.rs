@@ -100,6 +100,7 @@ const LEAST_SHARE: f32 = 1.0 / 8.0;
 const TOLERANCE: f32 = 0.1;
 /// The same where each place is wrong by itself, as by chance: nothing of that shows as a step or an edge.
 const BY_CHANCE: f32 = 0.2;
+const LEAST_SHARE_BY_CHANCE: f32 = 1.0 / 16.0;
 
 impl Lights {
     pub fn new(scene: &Scene) -> Lights {
@@ -312,7 +313,7 @@ impl<'a> Arrivals<'a> {
 
     /// The same where the errors of neighbours are as good as independent.
     pub fn tolerance_by_chance(&self, share: f32) -> f32 {
-        self.tolerance_of(share) * (BY_CHANCE / TOLERANCE)
+        self.tolerance * (BY_CHANCE / TOLERANCE) / share.max(LEAST_SHARE_BY_CHANCE).sqrt()
     }
 
     /// Whether it is worth to look for light `index` from all rays of a block of pixels together: not where its samples

@@ -1,5 +1,5 @@
 //! The points of area lights that are integrated behind things: for each light sixteen series of them, which are
-//! stratified together, in rungs that each quadruple their number, up to [`MOST`]. To mask many points takes little
+//! stratified together, in rungs that each quadruple their number, up to [`LAST`]. To mask many points takes little
 //! longer than to mask few: most of it goes by the number of occluders.
 //!
 //! Each rung holds all its points, ready for shafts and masks, so that any may be the next: how much of them is hidden
@@ -24,16 +24,17 @@ use crate::scene::Scene;
 use crate::shape::SurfaceInteraction;
 use crate::visibility::{Target, View, Viewpoint};
 
-/// The points of the first rung, and of all of a series.
+/// The points of the first rung, and of the last: all of a series.
 pub(super) const FIRST: usize = 64;
+pub(super) const LAST: usize = FIRST * GROWTH.pow(RUNGS as u32 - 1);
 /// How many times as many there are with each rung.
 pub(super) const GROWTH: usize = 4;
-pub(super) const MOST: usize = 1 << 10;
+const RUNGS: usize = 4;
 
-/// The points of one light, series by series, each made when it is first asked for.
+/// The points of one light, series by series, each rung made when it is first asked for.
 #[derive(Default)]
 pub(super) struct Ladder {
-    series: [OnceLock<Vec<Rung>>; SERIES],
+    series: [[OnceLock<Rung>; RUNGS]; SERIES],
 }
 
 /// Some points of one light.
@@ -43,17 +44,12 @@ struct Rung {
 }
 
 impl Ladder {
-    /// The first so many points of a series, [`FIRST`] or [`GROWTH`] times as many once and again, up to [`MOST`].
-    fn rung(&self, area: &Area, target: &Target, series: usize, points: usize) -> &Rung {
-        let rungs = self.series[series].get_or_init(|| {
-            let counts = std::iter::successors(Some(FIRST), |count| Some(count * GROWTH)).take_while(|n| *n <= MOST);
-            let rung = |count| {
-                let points = area.points_of_series(series, count as u32);
-                Rung { target: target.with(&points), points }
-            };
-            counts.map(rung).collect()
-        });
-        &rungs[(points / FIRST).ilog(GROWTH) as usize]
+    /// The first so many points of a series, [`FIRST`] or [`GROWTH`] times as many once and again, up to [`LAST`].
+    fn rung(&self, area: &Area, target: &Target, series: usize, count: usize) -> &Rung {
+        self.series[series][(count / FIRST).ilog(GROWTH) as usize].get_or_init(|| {
+            let points = area.points_of_series(series, count as u32);
+            Rung { target: target.with(&points), points }
+        })
     }
 }
 
@@ -74,8 +70,9 @@ pub(super) struct Tally {
     lit: [f64; 2],
     /// Of the squares of what they would send.
     squares: [f64; 2],
-    /// How many points were asked, and how many of them are hidden.
+    /// How many points were asked, how many of them would send anything, and how many of those are hidden.
     pub count: usize,
+    pub sending: usize,
     pub hidden: usize,
 }
 
@@ -104,7 +101,7 @@ impl Tally {
         [0, 1].map(|k| if self.squares[k] > 0.0 { self.all[k] * self.all[k] / self.squares[k] } else { 0.0 })
     }
 
-    /// Asks the first so many points of a series, a rung of it. Beyond [`MOST`] it goes on with other series, every
+    /// Asks the first so many points of a series, a rung of it. Beyond [`LAST`] it goes on with other series, every
     /// `stride`-th, as a whole. Answers with what half as many said, and the number of points that rays were traced to.
     pub fn ask(
         &mut self,
@@ -115,14 +112,14 @@ impl Tally {
         (series, stride): (usize, usize),
         to: usize,
     ) -> (Tally, u64) {
-        if to <= MOST {
+        if to <= LAST {
             *self = Tally::default();
         }
         let point = Viewpoint::of(si);
         let (mut half, mut traced) = (*self, 0);
         while self.count < to {
-            let series = series ^ (self.count / MOST * stride) % SERIES;
-            let rung = asker.ladder.rung(asker.area, asker.target, series, to.min(MOST));
+            let series = series ^ (self.count / LAST * stride) % SERIES;
+            let rung = asker.ladder.rung(asker.area, asker.target, series, to.min(LAST));
             traced += view.mask(asker.level, asker.scene, &rung.target, &point);
             let obstacles = Obstacles::of(view);
             let middle = (to / 2).saturating_sub(self.count) / LANES;
@@ -186,6 +183,7 @@ impl Tally {
             for disk in obstacles.disks {
                 lit &= !disk.blocks_lanes(l);
             }
+            self.sending += sends.count_ones() as usize;
             self.hidden += (sends & !lit.to_bitmask()).count_ones() as usize;
             let add = |sent: f32x16<S>, [all, arrives, squares]: &mut [f32x16<S>; 3]| {
                 *all += sent;

@@ -7,7 +7,7 @@
 
 use super::Counts;
 use super::arrival::{Arrivals, Place, Seen};
-use super::ladder::{FIRST, GROWTH, MOST, Tally, of_edge};
+use super::ladder::{Asker, FIRST, GROWTH, LAST, Tally, of_edge};
 use crate::color::Rgb;
 use crate::integrate::Sums;
 use crate::light::SERIES;
@@ -29,15 +29,19 @@ const DOUBT_BY_CHANCE: [f32; 2] = [1.0, 5.0];
 const UNTOLD: f32 = 0.5;
 /// Effective points of all rays together that tell something.
 const TOLD: f64 = 32.0;
-/// The same of the diffuse part, as a part of all points: fewer, and the light is so near that its points miss where it
-/// is nearest.
+/// The same of the diffuse part, as a part of all points that send: fewer, and the light is so near that its points miss
+/// where it is nearest.
 const UNEVEN: f64 = 1.0 / 16.0;
 /// The part of what chance makes of an edge that is wrong at the least: two numbers of points may agree for no reason.
 const OF_EDGE: f32 = 0.4;
 /// Points cost more the more there are: the tolerance grows with their number, to so many times what it is for few at
-/// [`MOST`] of a ray. Where that is not met either, there are more, up to so many of a pixel.
+/// [`MANY`] of a ray; and to so many times that at [`MANY_OF_ALL`] of a pixel.
 const COARSE: f32 = 3.5;
-const MOST_OF_ALL: usize = MOST * SERIES;
+const MANY: usize = 1 << 10;
+const COARSER: f32 = 2.0;
+const MANY_OF_ALL: usize = MANY * SERIES;
+/// The most points of a pixel.
+const MOST: usize = LAST * SERIES;
 
 /// A ray whose light is behind things.
 struct Asking {
@@ -51,7 +55,37 @@ struct Asking {
     whole: Option<Sums>,
     /// Whether points of the light may miss most of what it sends.
     may_miss: bool,
+    /// Whether it needs no more points.
+    settled: bool,
     tally: Tally,
+}
+
+impl Asking {
+    /// Asks the first so many points; answers with what half of them say.
+    fn ask(&mut self, asker: &Asker, stride: usize, to: usize, counts: &mut Counts) -> Tally {
+        let before = self.tally.count;
+        let (half, traced) = self.tally.ask(asker, &mut self.view, &self.si, &self.lobe, (self.series, stride), to);
+        counts.settled.traced += traced;
+        let more = (self.tally.count - before) as u64;
+        counts.shadow_rays += more;
+        counts.shadow_rays_skipped += more;
+        half
+    }
+
+    /// What arrives, as far as points tell, and what would if nothing were in the way.
+    fn sums(&self, measure: f32) -> (Sums, Sums) {
+        (self.tally.sums(self.whole.as_ref(), measure), self.whole.unwrap_or_else(|| self.tally.whole(measure)))
+    }
+
+    /// The diffuse part and the highlight, with their colours.
+    fn each(&self, sums: &Sums) -> [Rgb; 2] {
+        [self.colors[0] * sums.diffuse, self.colors[1] * sums.specular]
+    }
+
+    fn color(&self, sums: &Sums) -> Rgb {
+        let [diffuse, specular] = self.each(sums);
+        diffuse + specular
+    }
 }
 
 /// What the rays of one patch ask of one light.
@@ -117,7 +151,18 @@ impl Together {
         let Place { si, lobe, base, colors, .. } = *place;
         let tally = Tally::default();
         let may_miss = whole.is_none() && arrivals.may_miss(self.light, place);
-        self.asking.push(Asking { si: *si, lobe: *lobe, base, colors, series, view, whole, may_miss, tally });
+        self.asking.push(Asking {
+            si: *si,
+            lobe: *lobe,
+            base,
+            colors,
+            series,
+            view,
+            whole,
+            may_miss,
+            settled: false,
+            tally,
+        });
     }
 
     fn add(&mut self, colors: &[Rgb; 2], sums: &Sums) {
@@ -156,63 +201,72 @@ impl Together {
         let measure = arrivals.measure(self.light);
         let wanted = POINTS * self.share.sqrt();
         let stride = asking.len().next_power_of_two();
-        let most = (MOST_OF_ALL / stride).max(MOST);
+        let most = MOST / stride;
         let first = (0.5 * wanted / asking.len() as f32) as usize;
         let mut to = if first <= FIRST { FIRST } else { FIRST * GROWTH };
         let tolerance = arrivals.tolerance_by_chance(self.share);
+        let allowed = |to: usize| {
+            let coarser = if to * stride >= MANY_OF_ALL { COARSER } else { 1.0 };
+            tolerance * (1.0 + (COARSE - 1.0) * (to.min(MANY) as f32 / MANY as f32)) * coarser
+        };
         let part = 1.0 / self.rays as f32;
         loop {
             let (mut value, mut moved, mut squares) = (self.value, Rgb::BLACK, Rgb::BLACK);
             // What would arrive if nothing were in the way, of each kind, and by how many effective points that is told
             let (mut all, mut effective) = ([Rgb::BLACK; 2], [0.0; 2]);
-            let (mut hidden, mut is_known) = (0, true);
+            // The same of those rays only that may meet the edge of a shadow
+            let (mut all_edge, mut effective_edge) = ([Rgb::BLACK; 2], [0.0; 2]);
+            let (mut sending, mut hidden, mut is_known) = (0, 0, true);
             for one in asking.iter_mut() {
-                let colors = one.colors;
-                let before = one.tally.count;
-                let (half, traced) = one.tally.ask(&asker, &mut one.view, &one.si, &one.lobe, (one.series, stride), to);
-                counts.settled.traced += traced;
-                counts.shadow_rays += (one.tally.count - before) as u64;
-                counts.shadow_rays_skipped += (one.tally.count - before) as u64;
-                let now = one.tally.sums(one.whole.as_ref(), measure);
-                let of = |sums: &Sums| colors[0] * sums.diffuse + colors[1] * sums.specular;
-                let off = of(&now) + of(&half.sums(one.whole.as_ref(), measure)) * -1.0;
-                (value, moved, squares) = (value + of(&now), moved + off, squares + off * off);
-                let whole = one.whole.unwrap_or_else(|| one.tally.whole(measure));
-                all = [all[0] + colors[0] * whole.diffuse, all[1] + colors[1] * whole.specular];
-                for (sum, one) in effective.iter_mut().zip(one.tally.effective()) {
-                    *sum += one;
+                let half = if one.settled { one.tally } else { one.ask(&asker, stride, to, counts) };
+                let (now, whole) = one.sums(measure);
+                let off = one.color(&now) + one.color(&half.sums(one.whole.as_ref(), measure)) * -1.0;
+                (value, moved, squares) = (value + one.color(&now), moved + off, squares + off * off);
+                for (k, (color, points)) in one.each(&whole).into_iter().zip(one.tally.effective()).enumerate() {
+                    (all[k], effective[k]) = (all[k] + color, effective[k] + points);
+                    if !one.settled {
+                        (all_edge[k], effective_edge[k]) = (all_edge[k] + color, effective_edge[k] + points);
+                    }
                 }
+                sending += one.tally.sending;
                 hidden += one.tally.hidden;
                 is_known &= one.whole.is_some();
             }
             let shows = |error: Rgb| arrivals.steps(value * part, error * part);
             // What few points send, or none, can be anything
-            let least = [TOLD.max((to * asking.len()) as f64 * UNEVEN), TOLD];
+            let least = [TOLD.max(sending as f64 * UNEVEN), TOLD];
             let untold = [0, 1].map(|k| if effective[k] < least[k] { all[k] } else { Rgb::BLACK });
             let is_told = shows(untold[0] + untold[1]) <= tolerance * UNTOLD;
             let found = effective[0].max(effective[1]);
-            if is_told && is_known && hidden == 0 && (found >= f64::from(wanted) * CLEAR || to >= MOST) {
+            if is_told && is_known && hidden == 0 && (found >= f64::from(wanted) * CLEAR || to >= MANY) {
                 return true;
             }
             // By how much the sum moved, or by as much as its parts would together if they moved by chance
             let doubt = |[many, one]: [f32; 2]| many + one / asking.len() as f32;
             let off = Rgb::max(moved.map(f32::abs) * doubt(DOUBT), squares.map(f32::sqrt) * doubt(DOUBT_BY_CHANCE));
-            let edge = (all[0] * of_edge(effective[0]) + all[1] * of_edge(effective[1])) * OF_EDGE;
+            let [diffuse, specular] = [0, 1].map(|k| all_edge[k] * of_edge(effective_edge[k]));
+            let edge = (diffuse + specular) * OF_EDGE;
             let error = shows(off.max(edge));
-            let allowed = |to: usize| tolerance * (1.0 + (COARSE - 1.0) * (to.min(MOST) as f32 / MOST as f32));
             if is_told && error <= allowed(to) {
                 return true;
             }
-            if to == most {
-                return is_told;
+            // Rays are settled that nothing is in the way of, if enough points of them agree
+            let is_clear = |one: &Asking| one.whole.is_some() && one.tally.hidden == 0;
+            let agree: f64 = asking.iter().filter(|one| is_clear(one)).map(|one| one.tally.effective()[0]).sum();
+            if agree >= f64::from(wanted) * CLEAR {
+                asking.iter_mut().filter(|one| is_clear(one)).for_each(|one| one.settled = true);
             }
-            // The next that will do, as errors shrink where an edge is
-            let mut next = (to * GROWTH).min(most);
-            let ratio = |next: usize| of_edge(next as f64) / of_edge(to as f64);
-            while next < MOST && error * ratio(next) > allowed(next) {
-                next *= GROWTH;
+            // Errors shrink as they do where an edge is: what the most will not settle, cells do
+            let asked = to;
+            let ratio = |next: usize| of_edge(next as f64) / of_edge(asked as f64);
+            if to == most || error * ratio(most) > allowed(most) {
+                return false;
             }
-            to = next;
+            to *= GROWTH;
+            while to < MANY && error * ratio(to) > allowed(to) {
+                to *= GROWTH;
+            }
+            to = to.min(most);
         }
     }
 }
