@@ -5,8 +5,8 @@
 //!   ([`tensor`]);
 //! - a few convex things are in the way, or the horizon cuts the light, or the light is near: row by row, with
 //!   intervals in closed form, the error measured and brought under its bound ([`rows`]);
-//! - anything else: a mask over fixed points, their number doubled until the answer stands still ([`mask`]); and where
-//!   that takes too many, cells that are cut where shadows have their edges ([`cells`]).
+//! - anything else: the share of the light that points of it see, which the renderer asks for all rays of a pixel
+//!   together; where points do not tell, cells that are cut where shadows have their edges ([`cells`], [`mask`]).
 //!
 //! A highlight that is narrow beside the light is integrated by itself, over the part of the light that it covers.
 
