@@ -389,7 +389,7 @@ pub struct Bounds {
 }
 
 /// What is promised of integrated light.
-pub const PROMISED: Bounds = Bounds { worst: 2.0, over: 1e-4, rms: 0.05 };
+pub const PROMISED: Bounds = Bounds { worst: 2.0, over: 1e-4, rms: 0.1 };
 
 /// All that is asked of one scene.
 pub struct Report {

@@ -59,6 +59,34 @@ macro_rules! dispatch_sixteen {
 pub(crate) use dispatch_eight;
 pub(crate) use dispatch_sixteen;
 
+/// The instruction set that every processor has.
+#[cfg(target_arch = "x86_64")]
+pub(crate) fn baseline() -> fearless_simd::Sse2 {
+    fearless_simd::Level::baseline().as_sse2().expect("every processor of this kind has it")
+}
+
+/// The instruction set that every processor has.
+#[cfg(not(target_arch = "x86_64"))]
+pub(crate) fn baseline() -> fearless_simd::Fallback {
+    fearless_simd::Fallback::new()
+}
+
+/// Runs code for sixteen numbers at a time with every instruction set: what it finds decides how a place is lit.
+macro_rules! dispatch_all {
+    ($level:expr, $simd:ident => $op:expr) => {
+        $crate::accel::dispatch_sixteen!($level, $simd => $op, else {
+            let $simd = $crate::accel::baseline();
+            fearless_simd::Simd::vectorize(
+                $simd,
+                #[inline(always)]
+                || $op,
+            )
+        })
+    };
+}
+
+pub(crate) use dispatch_all;
+
 mod beam;
 mod build;
 mod gather;

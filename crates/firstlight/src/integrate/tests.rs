@@ -116,6 +116,8 @@ fn brute(case: &Case, n: usize) -> Sums {
             if light.outline == Outline::Disk && x * x + y * y > 1.0 {
                 continue;
             }
+            // Places are counted from the view's origin
+            let [x, y] = [x - case.view.origin[0], y - case.view.origin[1]];
             let l = case.view.l(x, y);
             let (height, distance) = (at.ns.dot(l), l.length());
             if height <= 0.0 || case.hiders.iter().any(|hider| hider.hides(x, y)) {

@@ -331,11 +331,17 @@ pub(crate) struct PixelPatches {
     pub patches: Vec<Patch>,
     pub background: u32,
     pub emission: Rgb,
+    /// Lists that are not used any more, for their memory.
+    pub spare: Vec<Vec<Member>>,
 }
 
 impl PixelPatches {
     pub fn clear(&mut self) {
-        self.patches.clear();
+        let spare = &mut self.spare;
+        spare.extend(self.patches.drain(..).filter_map(|patch| match patch.rays {
+            Rays::Some(members) => Some(members),
+            _ => None,
+        }));
         (self.background, self.emission) = (0, Rgb::BLACK);
     }
 
@@ -416,7 +422,10 @@ impl PixelPatches {
             match same.map(|patch| &mut patch.rays) {
                 Some(Rays::Some(members)) => members.push(member),
                 _ => {
-                    let rays = Rays::Some(vec![member]);
+                    let mut members = self.spare.pop().unwrap_or_default();
+                    members.clear();
+                    members.push(member);
+                    let rays = Rays::Some(members);
                     self.patches.push(Patch {
                         si,
                         bsdf,

@@ -29,8 +29,8 @@ const DOUBT_BY_CHANCE: [f32; 2] = [1.0, 5.0];
 const UNTOLD: f32 = 0.5;
 /// Effective points of all rays together that tell something.
 const TOLD: f64 = 32.0;
-/// The same of the diffuse part, as a part of all points that send: fewer, and the light is so near that its points miss
-/// where it is nearest.
+/// The same of the diffuse part, as a part of all points that send: fewer, and the light is so near that its points
+/// miss where it is nearest.
 const UNEVEN: f64 = 1.0 / 16.0;
 /// The part of what chance makes of an edge that is wrong at the least: two numbers of points may agree for no reason.
 const OF_EDGE: f32 = 0.4;

@@ -6,7 +6,7 @@ use super::Viewpoint;
 use super::occluders::ShadowMesh;
 use super::target::{SampleBlock, Target};
 use super::view::View;
-use crate::accel::{RayPacket16, dispatch_sixteen};
+use crate::accel::{RayPacket16, dispatch_all};
 use crate::ids::LightId;
 use crate::math::{LANES, UNIT_ROUNDOFF, Vec3};
 use crate::scene::{Scene, ShadowRays};
@@ -26,7 +26,7 @@ impl View {
         }
         self.in_space.clear();
         self.in_space.extend(target.blocks.iter().map(|block| !block.present));
-        dispatch_sixteen!(level, simd => self.mask_triangles(simd, scene, target, point), else ());
+        dispatch_all!(level, simd => self.mask_triangles(simd, scene, target, point));
         if self.trees || !self.others.is_empty() {
             traced = self.trace(level, scene, target, point);
         }
@@ -58,7 +58,7 @@ impl View {
                 let x = f32x16::load_array_ref(simd, &block.at[0]);
                 let y = f32x16::load_array_ref(simd, &block.at[1]);
                 let z = f32x16::load_array_ref(simd, &block.at[2]);
-                let height = z.mul_add(slopes[2], y.mul_add(slopes[1], x.mul_add(slopes[0], middle)));
+                let height = z * slopes[2] + (y * slopes[1] + (x * slopes[0] + middle));
                 *hidden |= height.simd_lt(-wrong).to_bitmask() as u16;
             }
         }

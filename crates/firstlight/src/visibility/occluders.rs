@@ -5,23 +5,11 @@ use fearless_simd::{Level, Simd};
 use super::Viewpoint;
 use super::shaft::{Horizon, Shaft};
 use super::target::{LightHull, Target};
-use crate::accel::{Aabb, dispatch_sixteen};
+use crate::accel::{Aabb, dispatch_all};
 use crate::ids::{LightId, SurfaceId};
 use crate::math::Vec3;
 use crate::scene::{Geometry, Item, Meets, Placed, Scene, Target as PlacedTarget};
 use crate::shape::{Mesh, Parallelogram, Placement, PlaneSide, Sphere};
-
-/// What every processor has.
-#[cfg(target_arch = "x86_64")]
-fn baseline() -> fearless_simd::Sse2 {
-    Level::baseline().as_sse2().expect("every processor of this kind has it")
-}
-
-/// What every processor has.
-#[cfg(not(target_arch = "x86_64"))]
-fn baseline() -> fearless_simd::Fallback {
-    fearless_simd::Fallback::new()
-}
 
 /// A sphere or parallelogram: of the lists of obstacles, of the upper tree, or of the round lights that block.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -47,8 +35,6 @@ pub(crate) struct Occluders {
     pub others: Vec<u32>,
     /// Whether the trees held more than was asked for: then they have to be asked ray by ray.
     pub too_many: bool,
-    /// Whether fewer points might find less: not where there are no vectors to gather with.
-    pub by_parts: bool,
     /// Meshes that the shaft leads through.
     meshes: Vec<Source>,
 }
@@ -236,22 +222,15 @@ impl Occluders {
             }
         }
         if scene.geometry.has_trees() {
-            self.by_parts = true;
-            let gathered = dispatch_sixteen!(
-                level,
-                simd => self.gather_trees::<_, false>(simd, scene, target, &shaft, points, indices, cap),
-                else {
-                    self.by_parts = false;
-                    false
-                }
-            );
+            let gathered =
+                dispatch_all!(level, simd => self.gather_trees(simd, scene, target, &shaft, points, indices, cap));
             self.too_many = !gathered;
         }
     }
 
     #[inline(always)]
     #[allow(clippy::too_many_arguments, reason = "the rest of `gather`")]
-    fn gather_trees<S: Simd, const SAME: bool>(
+    fn gather_trees<S: Simd>(
         &mut self,
         simd: S,
         scene: &Scene,
@@ -263,7 +242,7 @@ impl Occluders {
     ) -> bool {
         let geometry = &*scene.geometry;
         if geometry.world.as_ref().is_some_and(|world| world.shadow != Meets::None)
-            && !self.gather_mesh::<S, SAME>(simd, geometry, 0, target.light, shaft, cap)
+            && !self.gather_mesh(simd, geometry, 0, target.light, shaft, cap)
         {
             return false;
         }
@@ -290,7 +269,7 @@ impl Occluders {
             |center, half| {
                 let shaft = upright.within(center, half);
                 #[inline(always)]
-                move |simd, node: &_| shaft.meet::<S, SAME>(simd, node)
+                move |simd, node: &_| shaft.meet(simd, node)
             },
             |item| {
                 found += 1;
@@ -321,7 +300,7 @@ impl Occluders {
             let source = self.meshes[i];
             let placement = &geometry.placed[source as usize - 1].placement;
             let own = shaft.placed(placement, &target.hull, apart);
-            if !self.gather_mesh::<S, SAME>(simd, geometry, source, target.light, &own, cap) {
+            if !self.gather_mesh(simd, geometry, source, target.light, &own, cap) {
                 return false;
             }
         }
@@ -329,7 +308,7 @@ impl Occluders {
     }
 
     /// Gathers what of the trees may stand between a light and the patch, `curved` or flat, that reaches `reach` around
-    /// `point`: at most `cap` leaves. The same with every instruction set.
+    /// `point`: at most `cap` leaves.
     #[allow(clippy::too_many_arguments, reason = "a light of a scene, and a patch")]
     pub fn gather_around(
         &mut self,
@@ -373,23 +352,14 @@ impl Occluders {
         cap: usize,
     ) {
         self.clear();
-        let gathered = dispatch_sixteen!(
-            level,
-            simd => self.gather_trees::<_, true>(simd, scene, target, shaft, points, indices, cap),
-            else {
-                let simd = baseline();
-                simd.vectorize(
-                    #[inline(always)]
-                    || self.gather_trees::<_, true>(simd, scene, target, shaft, points, indices, cap),
-                )
-            }
-        );
+        let gathered =
+            dispatch_all!(level, simd => self.gather_trees(simd, scene, target, shaft, points, indices, cap));
         self.too_many = !gathered;
     }
 
-    /// The leaves of one mesh. Not inlined: one copy for each instruction set, and for each way to multiply, is enough.
+    /// The leaves of one mesh. Not inlined: one copy for each instruction set is enough.
     #[inline(never)]
-    fn gather_mesh<S: Simd, const SAME: bool>(
+    fn gather_mesh<S: Simd>(
         &mut self,
         simd: S,
         geometry: &Geometry,
@@ -408,7 +378,7 @@ impl Occluders {
                     |center, half| {
                         let shaft = shaft.within(center, half);
                         #[inline(always)]
-                        move |simd, node: &_| shaft.meet::<S, SAME>(simd, node)
+                        move |simd, node: &_| shaft.meet(simd, node)
                     },
                     #[inline(always)]
                     |leaf| {

@@ -68,7 +68,7 @@ impl Settler {
             let cap = if part.len() > 1 { MANY } else { ONE + ONE_MORE * blocks };
             self.occluders.gather(level, scene, target, points, part, cap);
             counts.shafts += 1;
-            if self.occluders.too_many && part.len() > 1 && self.occluders.by_parts {
+            if self.occluders.too_many && part.len() > 1 {
                 if part.len() <= FEW {
                     parts.extend((start..end).map(|i| (i, i + 1)));
                     continue;

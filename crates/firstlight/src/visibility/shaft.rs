@@ -147,14 +147,13 @@ impl Shaft {
 
 impl TreeShaft {
     /// The children of a node that the shaft meets: a bit for each, and where they begin. Padding makes up for every
-    /// rounding, so an instruction set that multiplies and adds at once may do so; where `SAME`, none does, and all
-    /// find the same.
+    /// rounding; no instruction set multiplies and adds at once, so that all find the same.
     #[inline(always)]
-    pub fn meet<S: Simd, const SAME: bool>(&self, simd: S, node: &Node) -> (u32, f32x8<S>) {
+    pub fn meet<S: Simd>(&self, simd: S, node: &Node) -> (u32, f32x8<S>) {
         let planes = &node.planes;
         let line = |planes: &[f32; 8], r: f32, c: f32x8<S>| {
             let planes = f32x8::load_array_ref(simd, planes);
-            if SAME { planes * r + c } else { planes.mul_add(r, c) }
+            planes * r + c
         };
         let mut enter = simd.splat_f32x8(0.0);
         let mut leave = simd.splat_f32x8(self.s_max);

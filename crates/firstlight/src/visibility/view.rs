@@ -6,7 +6,7 @@ use super::Viewpoint;
 use super::occluders::{Occluders, ShadowMesh, Source};
 use super::shaft::Shaft;
 use super::target::{LightSeen, Target};
-use crate::accel::dispatch_sixteen;
+use crate::accel::dispatch_all;
 use crate::math::{DVec3, UNIT_ROUNDOFF, Vec3};
 use crate::scene::{Scene, Target as Placed};
 use crate::shape::{Cover, DiskShadow, Eye, ParallelogramShadow, Placement, SeenTriangle, SphereShadow, TOGETHER};
@@ -109,10 +109,9 @@ impl View {
         }
         self.trees = occluders.too_many;
         if !occluders.leaves.is_empty() {
-            let hidden = dispatch_sixteen!(
+            let hidden = dispatch_all!(
                 level,
-                simd => self.look(simd, scene, target, &light, occluders, point),
-                else unreachable!("leaves are gathered with vectors only")
+                simd => self.look(simd, scene, target, &light, occluders, point)
             );
             if hidden {
                 return Visibility::Hidden;

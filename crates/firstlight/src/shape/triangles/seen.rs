@@ -146,7 +146,7 @@ fn cross<S: Simd>(a: V<S>, b: V<S>) -> V<S> {
 
 #[inline(always)]
 fn dot<S: Simd>(a: V<S>, b: Vec3) -> f32x16<S> {
-    a[2].mul_add(b.z, a[1].mul_add(b.y, a[0] * b.x))
+    a[2] * b.z + (a[1] * b.y + a[0] * b.x)
 }
 
 #[inline(always)]
@@ -217,7 +217,7 @@ impl TriangleTree {
         let far_off = largest(a).max(largest(b)).max(largest(c));
         let side = largest(ab).max(largest(bc)).max(largest(ca));
         let area = n[0].abs() + n[1].abs() + n[2].abs();
-        let height = n[2].mul_add(a[2], n[1].mul_add(a[1], n[0] * a[0]));
+        let height = n[2] * a[2] + (n[1] * a[1] + n[0] * a[0]);
         // Turned so that the plane is ahead of those with det > 0
         let zero = simd.splat_f32x16(0.0);
         let behind = height.simd_lt(zero);
@@ -373,14 +373,14 @@ impl SeenTriangle {
     #[inline(always)]
     fn value<S: Simd>(&self, i: usize, at: V<S>) -> f32x16<S> {
         let [a, b, c] = self.slopes[i];
-        at[2].mul_add(c, at[1].mul_add(b, at[0].mul_add(a, self.middle[i])))
+        at[2] * c + (at[1] * b + (at[0] * a + self.middle[i]))
     }
 
     /// How far it goes within cells of half these sizes.
     #[inline(always)]
     fn reach<S: Simd>(&self, i: usize, half: V<S>) -> f32x16<S> {
         let [a, b, c] = self.slopes[i];
-        half[2].mul_add(c.abs(), half[1].mul_add(b.abs(), half[0] * a.abs()))
+        half[2] * c.abs() + (half[1] * b.abs() + half[0] * a.abs())
     }
 
     /// What it hides of sixteen cells: middles and half sizes along the light's axes. `unsure` are those it may hide
