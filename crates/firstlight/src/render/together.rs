@@ -36,7 +36,7 @@ const UNEVEN: f64 = 1.0 / 16.0;
 const OF_EDGE: f32 = 0.4;
 /// Points cost more the more there are: the tolerance grows with their number, to so many times what it is for few at
 /// [`MANY`] of a ray; and to so many times that at [`MANY_OF_ALL`] of a pixel.
-const COARSE: f32 = 3.5;
+const COARSE: f32 = 2.5;
 const MANY: usize = 1 << 10;
 const COARSER: f32 = 2.0;
 const MANY_OF_ALL: usize = MANY * SERIES;
