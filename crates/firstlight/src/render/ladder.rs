@@ -118,7 +118,7 @@ impl Tally {
         let point = Viewpoint::of(si);
         let (mut half, mut traced) = (*self, 0);
         while self.count < to {
-            let series = series ^ (self.count / LAST * stride) % SERIES;
+            let series = series ^ ((self.count / LAST * stride) % SERIES);
             let rung = asker.ladder.rung(asker.area, asker.target, series, to.min(LAST));
             traced += view.mask(asker.level, asker.scene, &rung.target, &point);
             let obstacles = Obstacles::of(view);
