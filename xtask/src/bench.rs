@@ -63,7 +63,8 @@ pub fn run(options: &Options) -> Outcome {
         let runs: Vec<_> = ways.iter().map(|w| json!({ "way": w.name, "seconds": w.seconds })).collect();
         let data = json!({
             "width": options.size, "height": options.size, "antialiasing": options.aa, "samples": options.samples,
-            "decided_samples": samples, "runs": runs, "small_picture_s": program.small, "peak_memory_bytes": program.memory,
+            "decided_samples": samples, "runs": runs,
+            "small_picture_s": program.small, "peak_memory_bytes": program.memory,
             "commit": commit(), "processor": processor(),
         });
         let text = serde_json::to_string_pretty(&data).map_err(|e| e.to_string())?;
@@ -191,9 +192,9 @@ fn page(options: &Options, ways: &[Way], samples: u64, program: &Program) -> Str
     let _ = writeln!(page, "## Config 11, every shadow ray decided\n");
     let _ = writeln!(
         page,
-        "{size} x {size} pixels, {aa} x {aa} camera rays in each, {n} points on the light: {:.3} thousand million light \
-         samples. Medians of {rounds} rounds; in each round every way ran once, one after the other, in one process. \
-         Times are of the render stage.\n",
+        "{size} x {size} pixels, {aa} x {aa} camera rays in each, {n} points on the light: {:.3} thousand million \
+         light samples. Medians of {rounds} rounds; in each round every way ran once, one after the other, in one \
+         process. Times are of the render stage.\n",
         samples as f64 / 1e9
     );
     let _ = writeln!(page, "- processor: {}", processor());

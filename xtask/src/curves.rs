@@ -96,8 +96,8 @@ impl Curves {
     /// Both curves as a part of a page.
     pub fn table(&self) -> String {
         let mut page = format!(
-            "\n### How time grows\n\n{size} x {size} pixels; each number is the median of {RUNS} pictures, in seconds, or one picture where that took \
-             more than {LONG:.0}. The terrain under \
+            "\n### How time grows\n\n{size} x {size} pixels; each number is the median of {RUNS} pictures, in \
+             seconds, or one picture where that took more than {LONG:.0}. The terrain under \
              one rectangle light, and for the samples the terrain of {} triangles, and config 11; sampled with shafts; \
              what is integrated, or says so, is lit once a pixel where that is enough, all else at every camera ray.\n",
             2 * SOME * SOME,

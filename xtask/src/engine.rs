@@ -255,10 +255,11 @@ fn page(
     let _ = writeln!(page, "## What each part of the light engine gains\n");
     let _ = writeln!(
         page,
-        "{size} x {size} pixels, {AA} x {AA} camera rays in each, {THREADS} threads. In each round every way ran once, one after the \
-         other, in one process; times are of the render stage, medians over the rounds. A ratio is the median of the ratios \
-         within each round. An error is in steps of an 8-bit picture as it is displayed, against a picture with shafts at every \
-         camera ray and {} points on the light of config 11, {} on each light of the mesh: these have an error of their own.\n",
+        "{size} x {size} pixels, {AA} x {AA} camera rays in each, {THREADS} threads. In each round every way ran \
+         once, one after the other, in one process; times are of the render stage, medians over the rounds. A ratio \
+         is the median of the ratios within each round. An error is in steps of an 8-bit picture as it is displayed, \
+         against a picture with shafts at every camera ray and {} points on the light of config 11, {} on each light \
+         of the mesh: these have an error of their own.\n",
         CONVERGED[0], CONVERGED[1],
     );
     let _ = writeln!(page, "- processor: {}", processor());
@@ -283,8 +284,8 @@ fn page(
         let words = if same_bits { "the same bits" } else { "NOT the same bits" };
         let _ = writeln!(
             page,
-            "\na and b made {words}. `firstlight render config11` with {size} x {size} pixels and {THREADS} threads, process start \
-             to file: {:.0} ms (median of {}).",
+            "\na and b made {words}. `firstlight render config11` with {size} x {size} pixels and {THREADS} threads, \
+             process start to file: {:.0} ms (median of {}).",
             median(process) * 1e3,
             process.len()
         );
@@ -294,7 +295,8 @@ fn page(
         let _ = writeln!(page, "\n### A terrain of a million triangles under three rectangle lights\n");
         let _ = writeln!(
             page,
-            "All ways rendered the same {part} x {part} pixels in the middle of {size} x {size}; {mesh_rounds} rounds.\n"
+            "All ways rendered the same {part} x {part} pixels in the middle of {size} x {size}; {mesh_rounds} \
+             rounds.\n"
         );
         table(&mut page, mesh);
         for seconds in whole {

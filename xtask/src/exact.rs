@@ -123,8 +123,8 @@ impl Row {
         let Row { seed, open, over, worst, rms, doubt, sobol_rms, uniform_rms, sobol_worst, seconds, .. } = self;
         let fault = if self.fault.is_empty() { "" } else { &self.fault };
         format!(
-            "| {seed} | {worst:.2} | {over} | {rms:.3} | {sobol_rms:.3} | {uniform_rms:.3} | {sobol_worst:.1} | {doubt:.3} | {open} \
-             | {seconds:.0} | {fault} |"
+            "| {seed} | {worst:.2} | {over} | {rms:.3} | {sobol_rms:.3} | {uniform_rms:.3} | {sobol_worst:.1} | \
+             {doubt:.3} | {open} | {seconds:.0} | {fault} |"
         )
     }
 
@@ -134,7 +134,8 @@ impl Row {
     }
 }
 
-const TABLE: &str = "| seed | worst | over 1 | rms | rms, 400 `sobol` | rms, 400 `uniform` | worst, 400 `sobol` | doubt | open | s | out of bounds |\n\
+const TABLE: &str = "| seed | worst | over 1 | rms | rms, 400 `sobol` | rms, 400 `uniform` | worst, 400 `sobol` | \
+    doubt | open | s | out of bounds |\n\
                      |---|---|---|---|---|---|---|---|---|---|---|";
 
 impl Options {

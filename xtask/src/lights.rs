@@ -76,7 +76,8 @@ pub fn run(options: &Options) -> Outcome {
         let (all, _, seconds) = picture(&scene, &traced)?;
         let Difference { worst, rms, over } = Difference::between(&image, &all, &scene.display());
         println!(
-            "every light at every ray: {seconds:.2} s; off by {worst:.3} steps at worst, {rms:.4} rms, {over} of {} pixels by more than 1",
+            "every light at every ray: {seconds:.2} s; off by {worst:.3} steps at worst, {rms:.4} rms, {over} of {} \
+             pixels by more than 1",
             image.pixels.len()
         );
     }

@@ -88,7 +88,10 @@ pub fn run(options: &Options) -> Outcome {
         write(&folder.join("README.md"), page.as_bytes())?;
         let rows: Vec<_> = ways
             .iter()
-            .map(|way| json!({ "mesh": way.mesh, "program": way.name, "seconds": way.seconds, "kilobytes": way.kilobytes }))
+            .map(|way| {
+                let (mesh, program) = (&way.mesh, &way.name);
+                json!({ "mesh": mesh, "program": program, "seconds": way.seconds, "kilobytes": way.kilobytes })
+            })
             .collect();
         let data = json!({ "rows": rows, "commit": commit(), "processor": processor() });
         let text = serde_json::to_string_pretty(&data).map_err(|e| e.to_string())?;
@@ -121,7 +124,8 @@ fn process(command: &[String]) -> Result<u64, String> {
 fn ply_bytes(n: u32) -> Vec<u8> {
     let (positions, triangles) = terrain_mesh(n);
     let mut bytes = format!(
-        "ply\nformat binary_little_endian 1.0\nelement vertex {}\nproperty float x\nproperty float y\nproperty float z\n\
+        "ply\nformat binary_little_endian 1.0\nelement vertex {}\nproperty float x\nproperty float y\n\
+         property float z\n\
          element face {}\nproperty list uchar int vertex_indices\nend_header\n",
         positions.len(),
         triangles.len()
@@ -139,8 +143,8 @@ fn page(options: &Options, ways: &[Way]) -> String {
     let mut page = String::from("# From a mesh file to a picture\n\n");
     let _ = writeln!(
         page,
-        "Whole processes, from a binary PLY file to a PNG file of {SIZE} x {SIZE} pixels with one light that casts shadows; \
-         medians of {} rounds, the programs in turns. Processor: {}. Commit {}.\n\n\
+        "Whole processes, from a binary PLY file to a PNG file of {SIZE} x {SIZE} pixels with one light that casts \
+         shadows; medians of {} rounds, the programs in turns. Processor: {}. Commit {}.\n\n\
          `cargo xtask models --python PYTHON --rounds {}`\n",
         options.rounds,
         processor(),

@@ -207,12 +207,13 @@ fn page(options: &Options, ways: &[Way]) -> String {
     let mut page = String::from("## Config 11 in other programs\n\n");
     let _ = writeln!(
         page,
-        "Whole processes, from start to a PNG file of {size} x {size} pixels, 2 threads, 16 camera rays in each pixel where nothing else is said (POV-Ray: 17); \
-         medians of {rounds} rounds, the programs in turns. Place, size and shape of all things are the same; shading is not: \
-         Mitsuba's materials and lamp are physical, POV-Ray takes its lamp's places for shadows alone. So the error is that against \
-         a converged picture of the same program, which was made once, in steps of an 8-bit picture as it is displayed, where \
-         that picture is smooth: where 3 x 3 pixels span less than 6 steps. Samples of Mitsuba are camera rays x samples of the lamp \
-         for each; its kernel was compiled before.\n"
+        "Whole processes, from start to a PNG file of {size} x {size} pixels, 2 threads, 16 camera rays in each pixel \
+         where nothing else is said (POV-Ray: 17); medians of {rounds} rounds, the programs in turns. Place, size and \
+         shape of all things are the same; shading is not: Mitsuba's materials and lamp are physical, POV-Ray takes \
+         its lamp's places for shadows alone. So the error is that against a converged picture of the same program, \
+         which was made once, in steps of an 8-bit picture as it is displayed, where that picture is smooth: where 3 \
+         x 3 pixels span less than 6 steps. Samples of Mitsuba are camera rays x samples of the lamp for each; its \
+         kernel was compiled before.\n"
     );
     let _ = writeln!(page, "- processor: {}\n- commit: {}", processor(), commit());
     for version in versions(options) {

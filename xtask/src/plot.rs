@@ -61,7 +61,8 @@ impl Plot<'_> {
         let ruled = |svg: &mut String, [x0, y0]: [f64; 2], [x1, y1]: [f64; 2]| {
             let _ = writeln!(
                 svg,
-                "<line x1=\"{x0:.1}\" y1=\"{y0:.1}\" x2=\"{x1:.1}\" y2=\"{y1:.1}\" stroke=\"currentColor\" stroke-opacity=\"0.25\"/>"
+                "<line x1=\"{x0:.1}\" y1=\"{y0:.1}\" x2=\"{x1:.1}\" y2=\"{y1:.1}\" stroke=\"currentColor\" \
+                 stroke-opacity=\"0.25\"/>"
             );
         };
         let text = |svg: &mut String, [x, y]: [f64; 2], more: &str, words: &str| {

@@ -562,8 +562,9 @@ fn measure_soft(
     let [lit, umbra, below, cut, shafts, occluders, asked] = soft.settled();
     let all = points.len() as f64 * 0.01;
     eprintln!(
-        "{}, {samples} samples: {} points, {:.0} % lit, {:.0} % hidden, {:.0} % below, {:.0} % cut; {shafts} shafts, {:.1} occluders in \
-         each; {:.1} % of the samples traced; {differing} differ from the traced ones, which took {:.1} M samples/s",
+        "{}, {samples} samples: {} points, {:.0} % lit, {:.0} % hidden, {:.0} % below, {:.0} % cut; {shafts} shafts, \
+         {:.1} occluders in each; {:.1} % of the samples traced; {differing} differ from the traced ones, which took \
+         {:.1} M samples/s",
         scene.name,
         points.len(),
         lit as f64 / all,
@@ -590,10 +591,10 @@ fn page(options: &Options, rows: &[Row]) -> String {
     let size = if options.quick { 256 } else { 1024 };
     let _ = writeln!(
         page,
-        "{size} x {size} camera rays, and as many from points the camera sees to a square light, sixteen from each, the points \
-         in random order. One thread, processor time; medians of {} rounds, in each of which every way ran once, one after \
-         the other. Together: tiles of 64 and packets of 16, against the best of Embree's 4, 8 and 16 wide packets, marked \
-         coherent.\n",
+        "{size} x {size} camera rays, and as many from points the camera sees to a square light, sixteen from each, \
+         the points in random order. One thread, processor time; medians of {} rounds, in each of which every way ran \
+         once, one after the other. Together: tiles of 64 and packets of 16, against the best of Embree's 4, 8 and 16 \
+         wide packets, marked coherent.\n",
         options.rounds
     );
     let _ = writeln!(page, "- processor: {}", processor());

@@ -180,7 +180,8 @@ pub struct RenderArgs {
     pub height: Option<u32>,
     /// Pixels along the longer side, in the scene's aspect ratio (a model by itself is square), or WIDTHxHEIGHT; 1 to
     /// 65536 each [default: the scene's]
-    #[arg(long, value_name = "PIXELS", value_parser = size, conflicts_with_all = ["width", "height"], help_heading = "Picture")]
+    #[arg(long, value_name = "PIXELS", value_parser = size, help_heading = "Picture")]
+    #[arg(conflicts_with_all = ["width", "height"])]
     pub size: Option<Size>,
     /// Leaves what no surface covers transparent [default: as the scene has it]
     #[arg(long, conflicts_with = "background", help_heading = "Picture")]
@@ -200,7 +201,8 @@ pub struct RenderArgs {
     pub margin: Option<f64>,
     /// Renders only this part of the picture, in pixels from its top left corner: the same pixels as in the whole. At
     /// most 134217728 at once; larger pictures are made in parts [default: all of it]
-    #[arg(long, value_name = "X,Y,WIDTH,HEIGHT", value_parser = crop, allow_hyphen_values = true, help_heading = "Picture")]
+    #[arg(long, value_name = "X,Y,WIDTH,HEIGHT", value_parser = crop, help_heading = "Picture")]
+    #[arg(allow_hyphen_values = true)]
     pub crop: Option<Window>,
     /// The camera to render from, where the scene names several [default: the scene's]
     #[arg(long, value_name = "NAME", value_parser = camera, help_heading = "Picture")]
@@ -262,8 +264,10 @@ pub struct RenderArgs {
     /// Renders nothing, and writes the scene as TOML: with what the options say in place of it, with the camera and the
     /// light that were found for it, all in one text. To FILE, or to standard output; the files it names are seen from
     /// there [default: renders]
-    #[arg(long, value_name = "FILE.toml", require_equals = true, value_hint = ValueHint::FilePath, help_heading = "Output")]
-    #[arg(conflicts_with_all = ["output", "bits", "format", "exposure", "crop", "time", "frames", "aa_mode", "reference", "visibility"])]
+    #[arg(long, value_name = "FILE.toml", require_equals = true, help_heading = "Output")]
+    #[arg(value_hint = ValueHint::FilePath)]
+    #[arg(conflicts_with_all = ["output", "bits", "format", "exposure", "crop"])]
+    #[arg(conflicts_with_all = ["time", "frames", "aa_mode", "reference", "visibility"])]
     #[arg(conflicts_with_all = ["threads", "tile_size", "simd", "stats", "heat"])]
     pub print_scene: Option<Option<PathBuf>>,
     /// Says nothing but errors, warnings (no notes), and --stats where asked for

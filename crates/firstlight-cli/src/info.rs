@@ -153,7 +153,10 @@ fn gather(name: &str, desc: &SceneDesc, compiled: &Compiled) -> Value {
             json!({ "kind": kind, "name": name, "samples": samples })
         }),
         "materials": list_of(&summary.materials, |(name, kind)| json!({ "name": name, "kind": kind })),
-        "textures": list_of(&summary.textures, |(name, kind, size)| json!({ "name": name, "kind": kind, "size": size })),
+        "textures": list_of(
+            &summary.textures,
+            |(name, kind, size)| json!({ "name": name, "kind": kind, "size": size }),
+        ),
         "texture_bytes": summary.texture_bytes,
         "bounds": summary.bounds.map(bounds),
     })

@@ -229,8 +229,8 @@ pub fn check_placeholders(option: &str, target: &Target, several: bool) -> Resul
         let ending = own.extension().map(|ending| format!(".{}", ending.to_string_lossy())).unwrap_or_default();
         let own = shown(&own.with_file_name(format!("{STEM}{ending}")));
         let message = format!(
-            "{option} {name} would be one file for several scenes; write '{own}', where {STEM} is the name of each scene \
-             without its ending ({NAME}: with it)"
+            "{option} {name} would be one file for several scenes; write '{own}', where {STEM} is the name of each \
+             scene without its ending ({NAME}: with it)"
         );
         return Err(Failure::Usage(message));
     }

@@ -101,7 +101,8 @@ impl Stats {
         let [lit, hidden, below, mask] = self.rays.visibility.map(percent);
         let closed = percent(self.rays.closed_form);
         format!(
-            "{lit:.0} % lit, {hidden:.0} % hidden, {below:.0} % below the horizon, {closed:.0} % in closed form, {mask:.0} % by mask"
+            "{lit:.0} % lit, {hidden:.0} % hidden, {below:.0} % below the horizon, {closed:.0} % in closed form, \
+             {mask:.0} % by mask"
         )
     }
 

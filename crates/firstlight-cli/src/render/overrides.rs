@@ -63,7 +63,8 @@ fn set_samples(light: &mut LightDesc, samples: SamplesDesc) -> Result<(), Failur
         let side = samples.isqrt();
         let (below, above) = (side * side, (side + 1) * (side + 1));
         return Err(Failure::Usage(format!(
-            "--samples {samples}: a light of this scene samples m x m cells; the nearest such numbers are {below} and {above}"
+            "--samples {samples}: a light of this scene samples m x m cells; the nearest such numbers are {below} and \
+             {above}"
         )));
     }
     light.set_samples(samples);

@@ -258,8 +258,8 @@ impl<'a> Plan<'a> {
         let pixels = u64::from(width) * u64::from(height);
         if pixels > PIXEL_LIMIT {
             return Err(Failure::Usage(format!(
-                "{width} x {height} are {pixels} pixels, and at most {PIXEL_LIMIT} are rendered at once; render parts of the \
-                 picture, each with --crop X,Y,WIDTH,HEIGHT"
+                "{width} x {height} are {pixels} pixels, and at most {PIXEL_LIMIT} are rendered at once; render parts \
+                 of the picture, each with --crop X,Y,WIDTH,HEIGHT"
             )));
         }
 
@@ -282,8 +282,8 @@ impl<'a> Plan<'a> {
             if said && !input.parsed.desc.cameras.is_empty() {
                 let name = &input.name;
                 return Err(Failure::Usage(format!(
-                    "{option} is for models and for scenes without a camera, and {name} has one; take its [camera] out, or \
-                     leave the option out"
+                    "{option} is for models and for scenes without a camera, and {name} has one; take its [camera] \
+                     out, or leave the option out"
                 )));
             }
         }

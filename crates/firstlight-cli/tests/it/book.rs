@@ -244,7 +244,8 @@ fn every_command_of_the_book_and_the_readme_runs() {
 
 #[test]
 fn a_page_is_cut_into_what_runs_and_what_does_not() {
-    let page = "Say `firstlight\nscenes` or `first`.\n\n```sh\necho\n```\n<!-- not run: it takes a year -->\n```sh\nx | firstlight render -\n```\n";
+    let page = "Say `firstlight\nscenes` or `first`.\n\n```sh\necho\n```\n<!-- not run: it takes a year -->\n```sh\n\
+        x | firstlight render -\n```\n";
     let found: Vec<_> = pieces(page).iter().map(|p| (p.line, p.mark.is_some(), p.scripts().len())).collect();
     assert_eq!(found, [(1, false, 1), (4, false, 0), (8, true, 1)]);
 }

@@ -116,7 +116,8 @@ fn a_file_of_another_kind_is_one_line_that_says_what_it_is() {
         (
             "a.gltf",
             b"{ \"asset\": { \"version\": \"2.0\" }, \"meshes\": [] }\n",
-            "looks like a glTF model, not like a firstlight scene; that kind is not read yet; export it as PLY, STL or OBJ",
+            "looks like a glTF model, not like a firstlight scene; that kind is not read yet; export it as PLY, STL \
+             or OBJ",
         ),
         ("a.glb", b"glTF\x02\0\0\0\x0c\0\0\0", "looks like a binary glTF model (GLB)"),
         ("a.png", b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR", "looks like a PNG picture"),
@@ -236,7 +237,11 @@ fn advice_is_a_note_and_no_error() {
     let note = "note: scene.toml: the scene has no keys: the pictures of all 3 frames are the same";
     assert_eq!(ran.stderr.matches(note).count(), 1, "{}", ran.stderr);
     folder.run("render scene.toml --time 2 --width 8 --aa 1").done().says(&["its picture is the same at any --time"]);
-    let keys = SCENE.replace("radius = 1\n", "radius = 1\ntransform = { keys = [{ time = 0, translate = [0, 0, 0] }, { time = 1, translate = [1, 0, 0] }] }\n");
+    let keys = SCENE.replace(
+        "radius = 1\n",
+        "radius = 1\ntransform = { keys = [{ time = 0, translate = [0, 0, 0] }, \
+        { time = 1, translate = [1, 0, 0] }] }\n",
+    );
     folder.put("scene.toml", keys);
     let ran = folder.run("render scene.toml --frames 0..2 --width 8 --aa 1").done();
     assert!(!ran.stderr.contains("note"), "{}", ran.stderr);

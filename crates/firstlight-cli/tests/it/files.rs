@@ -213,7 +213,11 @@ fn with_files() -> Folder {
     folder.put("wall.toml", scene);
     folder.put("lights.json", r#"{ "light": { "point": [{ "position": [0, 9, 0], "strength": 1 }] } }"#);
     // What a file holds decides what it is
-    folder.put("mesh.exr", "solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet\nendsolid a\n");
+    folder.put(
+        "mesh.exr",
+        "solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\n\
+        endloop\nendfacet\nendsolid a\n",
+    );
     folder.put("wall.png", texture());
     folder
 }
@@ -308,7 +312,12 @@ fn the_default_name_takes_no_place_but_that_of_our_own_pictures() {
         .exits(1)
         .says(&["wall.png and wall.render.png would replace files that are no pictures of firstlight", "-o"]);
     // A model beside its texture, as models are shipped
-    folder.put("bunny.ply", "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n");
+    folder.put(
+        "bunny.ply",
+        "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\n\
+        property float z\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n\
+        3 0 1 2\n",
+    );
     folder.put("bunny.png", texture());
     folder.run(&format!("render bunny.ply {quick}")).done().says(&["wrote bunny.render.png"]);
     assert_eq!(folder.get("bunny.png"), texture());

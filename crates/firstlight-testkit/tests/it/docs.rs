@@ -112,7 +112,8 @@ fn the_summary_lists_every_page_once() {
 
 #[test]
 fn links_and_headings_are_found() {
-    let text = "# Two words\n## A `b`, c!\n```\n# code [x](no.md)\n```\nsee [a](b.md#c) and `[d](e)`, ![f](g.png)\n# Two words\n";
+    let text = "# Two words\n## A `b`, c!\n```\n# code [x](no.md)\n```\nsee [a](b.md#c) and `[d](e)`, ![f](g.png)\n\
+        # Two words\n";
     assert_eq!(targets(text), ["b.md#c", "g.png"]);
     assert_eq!(anchors(text), ["a-b-c", "two-words", "two-words-1"].map(String::from).into());
 }

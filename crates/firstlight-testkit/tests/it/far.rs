@@ -215,7 +215,8 @@ fn a_file_keeps_its_digits_far_from_0() {
         let header = |format: &str| {
             let n = near.positions.len();
             format!(
-                "ply\nformat {format} 1.0\nelement vertex {n}\nproperty double x\nproperty double y\nproperty double z\n\
+                "ply\nformat {format} 1.0\nelement vertex {n}\nproperty double x\nproperty double y\n\
+                 property double z\n\
                  element face 0\nproperty list uchar int vertex_indices\nend_header\n"
             )
         };

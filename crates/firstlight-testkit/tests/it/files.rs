@@ -282,7 +282,8 @@ fn large_obj(faces: u32) -> String {
 /// A large PLY text whose rows are cut anywhere.
 fn large_ply(vertices: u32) -> String {
     let mut text = format!("ply\nformat ascii 1.0\nelement vertex {vertices}\n");
-    text += "property float x\nproperty float y\nproperty float z\nproperty uchar red\nproperty uchar green\nproperty uchar blue\n";
+    text += "property float x\nproperty float y\nproperty float z\nproperty uchar red\nproperty uchar green\n\
+        property uchar blue\n";
     writeln!(text, "element face {vertices}\nproperty list uchar int vertex_indices\nend_header").unwrap();
     for i in 0..vertices {
         writeln!(text, "{} {:.3} {:e} {} 7 255", i, i as f32 * 0.1, i as f32 / 3.0, i % 256).unwrap();
@@ -444,7 +445,8 @@ fn the_kind_of_a_file_is_found() {
     assert_eq!(of("a.bin", b"glTF"), None);
     assert_eq!(
         try_read("a.bin", b"glTF").unwrap_err().to_string(),
-        "a.bin: looks like a binary glTF model (GLB), not like a mesh; that kind is not read yet; export it as PLY, STL or OBJ"
+        "a.bin: looks like a binary glTF model (GLB), not like a mesh; that kind is not read yet; export it as PLY, \
+         STL or OBJ"
     );
 }
 

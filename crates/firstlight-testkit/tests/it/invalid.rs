@@ -127,8 +127,8 @@ fn tables_by_the_million_are_refused_soon() {
 fn one_slip_by_the_million_takes_no_longer_than_once() {
     // Without newlines all of it is one line
     let words = soon("scene.toml", format!("a = 1\r{}", "x = 1\r".repeat(3_000_000)).as_bytes());
-    let expected = "scene.toml:1:6: not TOML: a carriage return without a newline; save the text with lines that end in a \
-                    newline (LF, or CR LF)";
+    let expected = "scene.toml:1:6: not TOML: a carriage return without a newline; save the text with lines that end \
+                    in a newline (LF, or CR LF)";
     assert_eq!(words, expected);
     for slip in ["= ", "] ", "x ", "1.", "''"] {
         let words = soon("scene.toml", format!("a = 1 {}", slip.repeat(2_000_000)).as_bytes());

@@ -114,9 +114,12 @@ fn the_schema_refuses_what_the_reader_refuses() {
         assert!(check(text).is_some(), "{text}");
     }
     for text in [
-        r##"{ "light": { "point": [{ "position": [0, 0, 0], "transform": { "scale": 2, "keys": [{ "time": 1, "rotate_deg": [0, 1e9, 0] }] } }] } }"##,
-        r##"{ "$schema": "x", "include": ["a.toml"], "camera": { "a": { "position": [0, 0, 1] }, "b": { "position": [0, 0, 1] } } }"##,
-        r##"{ "material": { "phong": { "red": { "diffuse": { "texture": "t", "factor": "#ff0000" }, "shininess": 3 } } } }"##,
+        r##"{ "light": { "point": [{ "position": [0, 0, 0], "transform": { "scale": 2,
+            "keys": [{ "time": 1, "rotate_deg": [0, 1e9, 0] }] } }] } }"##,
+        r##"{ "$schema": "x", "include": ["a.toml"], "camera": {
+            "a": { "position": [0, 0, 1] }, "b": { "position": [0, 0, 1] } } }"##,
+        r##"{ "material": { "phong": { "red": {
+            "diffuse": { "texture": "t", "factor": "#ff0000" }, "shininess": 3 } } } }"##,
     ] {
         assert_eq!(check(text), None, "{text}");
     }

@@ -63,7 +63,8 @@ fn a_shifted_film_is_a_part_of_a_larger_one_bit_for_bit() {
                  [[light.directional]]\ndirection = [-1, -2, -3]\n";
     let text = |size: u32, camera: &str| {
         format!(
-            "[render]\nwidth = {size}\nheight = {size}\nantialiasing = 2\n[camera]\nposition = [0, 0, 6]\n{camera}\n{scene}"
+            "[render]\nwidth = {size}\nheight = {size}\nantialiasing = 2\n[camera]\nposition = [0, 0, 6]\n{camera}\n\
+             {scene}"
         )
     };
     for (whole, part) in [

@@ -92,9 +92,9 @@ fn rows() -> Vec<Row> {
 fn page() -> String {
     let mut page = String::from(
         "# Measured deviations\n\n\
-         What firstlight renders, beside what it should be on paper. Irradiance is in lux for lights of candela, lux, or radiance; \
-         lengths are in metres. A test makes this table and compares it with this page: whoever builds firstlight measures \
-         the same digits.\n\n\
+         What firstlight renders, beside what it should be on paper. Irradiance is in lux for lights of candela, lux, \
+         or radiance; lengths are in metres. A test makes this table and compares it with this page: whoever builds \
+         firstlight measures the same digits.\n\n\
          | what | closed form | rendered | relative deviation | allowed |\n|---|---|---|---|---|\n",
     );
     for Row { what, truth, is, allowed } in rows() {
@@ -104,7 +104,8 @@ fn page() -> String {
             .expect("a string takes it");
     }
     page.push_str(
-        "\nLights of a fixed number of points have the error of that number: it shrinks with more points, and is not noise.\n",
+        "\nLights of a fixed number of points have the error of that number: it shrinks with more points, and is not \
+         noise.\n",
     );
     page
 }

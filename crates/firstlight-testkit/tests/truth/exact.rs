@@ -57,7 +57,8 @@ fn hold(seeds: impl Iterator<Item = u64>, size: u32) {
         let command = format!("cargo xtask verify exact --seeds {seed}..{} --size {size}", seed + 1);
         let Some(truth) = kept::read(&path, &desc, KEPT) else {
             panic!(
-                "{} is not there, or shows another scene: `{command} --converge --kept crates/firstlight-testkit/{folder}` makes it",
+                "{} is not there, or shows another scene: `{command} --converge --kept \
+                 crates/firstlight-testkit/{folder}` makes it",
                 path.display()
             );
         };
@@ -157,7 +158,8 @@ fn narrow_highlights_of_spheres_are_found() {
             camera = {{ position = [0.4, 1.0, 3.0], look_at = [-0.1, 0.0, 0.2], fov_y_deg = 12 }}
             material.phong.mirror = {{ diffuse = 0, specular = 1, shininess = {shininess} }}
             parallelogram = [{{ p = [-9, 0, 9], e0 = [18, 0, 0], e1 = [0, 0, -18], material = 'mirror' }}]
-            light.sphere = [{{ center = [-0.5, 1.2, -1.6], radius = 1.1, visible = false, strength = {strength}, {kind} }}]"
+            light.sphere = [{{ center = [-0.5, 1.2, -1.6], radius = 1.1, visible = false, \
+             strength = {strength}, {kind} }}]"
         );
         let desc = SceneDesc::parse("highlight", text.as_bytes(), &NoAssets).desc;
         let scene = compile(&desc);

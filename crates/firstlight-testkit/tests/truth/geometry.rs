@@ -405,7 +405,8 @@ fn an_instance_hands_its_flags_on() {
 /// A binary PLY file.
 fn ply(positions: &[V], triangles: &[[u32; 3]]) -> Vec<u8> {
     let mut bytes = format!(
-        "ply\nformat binary_little_endian 1.0\nelement vertex {}\nproperty float x\nproperty float y\nproperty float z\n\
+        "ply\nformat binary_little_endian 1.0\nelement vertex {}\nproperty float x\nproperty float y\n\
+         property float z\n\
          element face {}\nproperty list uchar int vertex_indices\nend_header\n",
         positions.len(),
         triangles.len()

@@ -173,8 +173,8 @@ impl<'t> Scan<'t> {
                 } else {
                     (MAX_TOKENS, "words, numbers and marks")
                 };
-                let hint = "spread the scene over several files with `include`; a mesh or point set of many parts is best a \
-                            file of its own";
+                let hint = "spread the scene over several files with `include`; a mesh or point set of many parts is \
+                            best a file of its own";
                 return Err(SyntaxFault {
                     span: Span { start: at, end: at + 1 },
                     message: format!("more than {most} {what} in one text"),

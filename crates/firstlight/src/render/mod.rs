@@ -143,8 +143,8 @@ impl RenderSettings {
         let pixels = width as u64 * height as u64;
         if pixels > MAX_PIXELS {
             return Err(format!(
-                "{width} x {height} are {pixels} pixels, and at most {MAX_PIXELS} are rendered at once; render parts of \
-                 the picture, each with --crop X,Y,WIDTH,HEIGHT"
+                "{width} x {height} are {pixels} pixels, and at most {MAX_PIXELS} are rendered at once; render parts \
+                 of the picture, each with --crop X,Y,WIDTH,HEIGHT"
             ));
         }
         Ok(())

@@ -222,18 +222,14 @@ mod tests {
         let away = BALL.replace("[0, 0, 5]", "[0, 0, 5]\nlook_at = [0, 0, 9]") + LIGHT;
         assert_eq!(
             said(&away),
-            [
-                "s.toml:1:1: camera: nothing is in the picture: the camera at [0, 0, 5] has everything behind it, shapes lie from \
-              [-1, -1, -1] to [1, 1, 1]; position and look_at say where it is and what it looks at"
-            ]
+            ["s.toml:1:1: camera: nothing is in the picture: the camera at [0, 0, 5] has everything behind it, \
+              shapes lie from [-1, -1, -1] to [1, 1, 1]; position and look_at say where it is and what it looks at"]
         );
         let past = BALL.replace("[0, 0, 5]", "[0, 0, 5]\nlook_at = [0, 5, 0]") + LIGHT;
         assert_eq!(
             said(&past),
-            [
-                "s.toml:1:1: camera: no camera ray of 256 x 256 meets anything: the camera is at [0, 0, 5], shapes lie from \
-              [-1, -1, -1] to [1, 1, 1]; position and look_at say where it is and what it looks at"
-            ]
+            ["s.toml:1:1: camera: no camera ray of 256 x 256 meets anything: the camera is at [0, 0, 5], shapes \
+              lie from [-1, -1, -1] to [1, 1, 1]; position and look_at say where it is and what it looks at"]
         );
         // As small as a pixel, but there
         let small = BALL.replace("radius = 1", "radius = 0.02") + LIGHT;
@@ -250,10 +246,8 @@ mod tests {
         let up = lamp("[0, 0, 1]", "[1, 0, 0]");
         assert_eq!(
             said(&up),
-            [
-                "s.toml:8:1: light.rectangle[0]: its front faces away from everything: it lights nothing; its front is where \
-              e0 x e1 points: exchange e0 and e1, or write sides = \"both\""
-            ]
+            ["s.toml:8:1: light.rectangle[0]: its front faces away from everything: it lights nothing; its front \
+              is where e0 x e1 points: exchange e0 and e1, or write sides = \"both\""]
         );
         assert_eq!(said(&lamp("[1, 0, 0]", "[0, 0, 1]")), [""; 0]);
         assert_eq!(said(&format!("{up}sides = \"both\"\n")), [""; 0]);
@@ -275,17 +269,13 @@ mod tests {
         let material = |color: &str| format!("{BALL}{LIGHT}[material.phong.m]\n{color}\n");
         assert_eq!(
             said(&material("diffuse = [255, 128, 0]")),
-            [
-                "s.toml:9:11: material.phong.m.diffuse: [255, 128, 0] reflects more light than there is; if these are bytes, write \
-              \"#rrggbb\", or divide them by 255"
-            ]
+            ["s.toml:9:11: material.phong.m.diffuse: [255, 128, 0] reflects more light than there is; if these are \
+              bytes, write \"#rrggbb\", or divide them by 255"]
         );
         assert_eq!(
             said(&material("specular = 1.5")),
-            [
-                "s.toml:9:12: material.phong.m.specular: [1.5, 1.5, 1.5] reflects more light than there is; a reflectance is 0 to 1; a \
-              light has its strength"
-            ]
+            ["s.toml:9:12: material.phong.m.specular: [1.5, 1.5, 1.5] reflects more light than there is; a \
+              reflectance is 0 to 1; a light has its strength"]
         );
         assert_eq!(said(&material("diffuse = 1")), [""; 0]);
         let points = |colors: &str| {
@@ -304,9 +294,8 @@ mod tests {
         };
         assert_eq!(
             fov("0.785"),
-            [
-                "s.toml:3:13: camera.fov_y_deg: 0.785 degrees are little: as radians they would be 44.98 degrees; angles are in degrees"
-            ]
+            ["s.toml:3:13: camera.fov_y_deg: 0.785 degrees are little: as radians they would be 44.98 degrees; \
+                 angles are in degrees"]
         );
         assert_eq!((fov("1"), fov("3.5")), (vec![], vec![]));
         let spot = |more: &str| said(&format!("{BALL}{LIGHT}[[light.spot]]\nposition = [0, 3, 0]\n{more}\n"));
@@ -320,10 +309,8 @@ mod tests {
         };
         assert_eq!(
             turned("rotate_deg = [0, 1.5708, 0]"),
-            [
-                "s.toml:6:28: sphere[0].transform.rotate_deg: [0, 1.5708, 0] looks like radians: in degrees it would be [0, 90, 0]; angles \
-              are in degrees"
-            ]
+            ["s.toml:6:28: sphere[0].transform.rotate_deg: [0, 1.5708, 0] looks like radians: in degrees it would \
+              be [0, 90, 0]; angles are in degrees"]
         );
         assert!(turned("rotate_axis = [0, 1, 0], angle_deg = -3.14159")[0].contains("in degrees it would be -180"));
         assert_eq!(turned("rotate_deg = [0, 1.5, 0]"), [""; 0]);
@@ -362,43 +349,35 @@ mod tests {
         };
         assert_eq!(
             of(POINT_MESH),
-            [
-                "folder/a.obj: it has no size, all of its 1 triangles are at [1, 2, 3]: nothing of it can be seen; look at it in the \
-              program that wrote it"
-            ]
+            ["folder/a.obj: it has no size, all of its 1 triangles are at [1, 2, 3]: nothing of it can be seen; \
+              look at it in the program that wrote it"]
         );
         assert_eq!(
             of("v nan 2 3\nv 1 2 inf\nv 1 nan 3\nf 1 2 3\n"),
-            [
-                "folder/a.obj: none of its 1 triangles has a corner that is finite: nothing of it can be seen; look at it in the \
-              program that wrote it"
-            ]
+            ["folder/a.obj: none of its 1 triangles has a corner that is finite: nothing of it can be seen; look \
+              at it in the program that wrote it"]
         );
         assert_eq!(
             of("v 1 2 3\n"),
-            [
-                "folder/a.obj: holds 1 points and no faces; points are shown by [[point_set]], as spheres; PLY files can hold them"
-            ]
+            ["folder/a.obj: holds 1 points and no faces; points are shown by [[point_set]], as spheres; PLY files \
+                 can hold them"]
         );
         assert_eq!(
             of("v 1 2 x\n"),
-            [
-                "folder/a.obj:1: v: `x` where number 3 is needed; a position has 3 numbers, texture coordinates have 1 to 3, a normal has 3"
-            ]
+            ["folder/a.obj:1: v: `x` where number 3 is needed; a position has 3 numbers, texture coordinates have \
+                 1 to 3, a normal has 3"]
         );
         assert_eq!(
             of("glTF\u{2}\0\0\0"),
-            [
-                "folder/a.obj: looks like a binary glTF model (GLB), not like a mesh; that kind is not read yet; export it as PLY, STL or OBJ"
-            ]
+            ["folder/a.obj: looks like a binary glTF model (GLB), not like a mesh; that kind is not read yet; \
+                 export it as PLY, STL or OBJ"]
         );
         let many: String = (0..9).map(|i| format!("usemtl m{i}\nf 1 2 3\n")).collect();
         assert_eq!(
             of(&format!("v 0 0 0\nv 1 0 0\nv 0 1 0\nusemtl {}\nf 1 2 3\n{many}", "x".repeat(100))),
-            [
-                "folder/a.obj: names materials that are not described: \"xxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxx...\", \"m0\", \"m1\", \"m2\", \
-              \"m3\", \"m4\" and 4 more; their faces have the mesh's own material; a scene describes one as [material.phong.NAME]"
-            ]
+            ["folder/a.obj: names materials that are not described: \"xxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxxx...\", \
+              \"m0\", \"m1\", \"m2\", \"m3\", \"m4\" and 4 more; their faces have the mesh's own material; a scene \
+              describes one as [material.phong.NAME]"]
         );
     }
 }

@@ -463,14 +463,16 @@ mod tests {
         let met = geometry.upper.len();
         assert_eq!(met, 5);
         // In a different place, turned, or of another size they are no copies
-        let others = "[[box]]\ncenter = [5, 0, 0]\nsize = [1, 1, 2]\n[[box]]\ncenter = [0, 0, 0]\ntransform = { translate = [5, 0, 0] }\n\
+        let others = "[[box]]\ncenter = [5, 0, 0]\nsize = [1, 1, 2]\n[[box]]\ncenter = [0, 0, 0]\n\
+            transform = { translate = [5, 0, 0] }\n\
                       [[box]]\ncenter = [5, 0, 0]\ntransform = { rotate_deg = [0, 0, 0.1] }\n";
         assert_eq!(compile(&format!("{camera}{others}{others}")).geometry.upper.len(), 3);
     }
 
     #[test]
     fn copies_of_instances_are_met_once() {
-        let group = "[camera]\nposition = [0, 0, 9]\n[[group.g.sphere]]\ncenter = [0, 0, 0]\nradius = 1\n[[group.g.mesh]]\n\
+        let group = "[camera]\nposition = [0, 0, 9]\n[[group.g.sphere]]\ncenter = [0, 0, 0]\nradius = 1\n\
+            [[group.g.mesh]]\n\
                      positions = [[0, 0, 0], [1, 0, 0], [0, 1, 0]]\ntriangles = [[0, 1, 2]]\n";
         let text = format!("{group}{}", "[[instance]]\nof = \"g\"\n".repeat(300));
         let geometry = compile(&text).geometry;

@@ -127,7 +127,8 @@ mod tests {
             ),
             // What no camera sees is not looked for, and a plane has no end
             (
-                "[[plane]]\n[[sphere]]\ncenter = [0, 0, 0]\nradius = 1\n[[sphere]]\ncenter = [9, 0, 0]\nradius = 1\nvisible = false",
+                "[[plane]]\n[[sphere]]\ncenter = [0, 0, 0]\nradius = 1\n[[sphere]]\ncenter = [9, 0, 0]\nradius = 1\n\
+                 visible = false",
                 [-1.0; 3],
                 [1.0; 3],
             ),

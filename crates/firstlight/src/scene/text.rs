@@ -225,17 +225,20 @@ mod tests {
             (
                 "a.gltf",
                 &gltf[..],
-                "looks like a glTF model, not like a firstlight scene; that kind is not read yet; export it as PLY, STL or OBJ",
+                "looks like a glTF model, not like a firstlight scene; that kind is not read yet; export it as PLY, \
+                 STL or OBJ",
             ),
             (
                 "a.toml",
                 b"\x89PNG\r\n\x1a\n",
-                "looks like a PNG picture, not like a firstlight scene; a scene is TOML or JSON text; it names pictures in [texture.image.NAME]",
+                "looks like a PNG picture, not like a firstlight scene; a scene is TOML or JSON text; it names \
+                 pictures in [texture.image.NAME]",
             ),
             (
                 "a.txt",
                 b"ply\nformat ascii 1.0\n",
-                "looks like a PLY model, not like a firstlight scene; give it as a model, or name it as the file of a [[mesh]] or [[point_set]]",
+                "looks like a PLY model, not like a firstlight scene; give it as a model, or name it as the file of a \
+                 [[mesh]] or [[point_set]]",
             ),
         ] {
             let error = SceneDesc::parse(name, text, &NoAssets).compile(&NoAssets, &CompileOptions::default());

@@ -374,8 +374,10 @@ mod tests {
         assert_eq!(
             of(vec![euler(1.0), euler(1.0), euler(0.5)]),
             [
-                "keys[1].time: 1 is not after 1, the time of keys[0]; write the keys in the order of their times, each once",
-                "keys[2].time: 0.5 is not after 1, the time of keys[1]; write the keys in the order of their times, each once"
+                "keys[1].time: 1 is not after 1, the time of keys[0]; write the keys in the order of their times, \
+                 each once",
+                "keys[2].time: 0.5 is not after 1, the time of keys[1]; write the keys in the order of their times, \
+                 each once"
             ]
         );
         assert_eq!(

@@ -84,7 +84,8 @@ mod tests {
     #[test]
     fn colors_of_faces_part_vertices_and_are_decoded() {
         let mesh = square(
-            "element face 2\nproperty list uchar int vertex_indices\nproperty uchar red\nproperty uchar green\nproperty uchar blue\n",
+            "element face 2\nproperty list uchar int vertex_indices\nproperty uchar red\nproperty uchar green\n\
+             property uchar blue\n",
             "3 0 1 2 255 0 0\n3 0 2 3 0 0 188\n",
         );
         assert_eq!(mesh.positions.len(), 6);

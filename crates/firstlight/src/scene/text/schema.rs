@@ -38,7 +38,8 @@ pub fn schema() -> String {
     let (_, camera) = reference("", TableInfo::of::<CameraDesc>("camera"));
     // One camera has values, several are tables within a table
     let several = json!({
-        "type": "object", "description": "Several cameras, by name.", "minProperties": 1, "additionalProperties": camera,
+        "type": "object", "description": "Several cameras, by name.",
+        "minProperties": 1, "additionalProperties": camera,
     });
     properties.insert("camera".into(), json!({ "anyOf": [camera, several] }));
     properties.insert("texture".into(), kinds_by_name::<TextureDesc>(&mut reference));
@@ -52,7 +53,10 @@ pub fn schema() -> String {
     let group = json!({ "type": "object", "properties": shapes, "additionalProperties": false });
     properties.insert(
         "group".into(),
-        json!({ "type": "object", "description": "Shapes to be placed by instances, by name.", "additionalProperties": group }),
+        json!({
+            "type": "object", "description": "Shapes to be placed by instances, by name.",
+            "additionalProperties": group,
+        }),
     );
     let mut lights = Map::new();
     for table in LightDesc::tables() {

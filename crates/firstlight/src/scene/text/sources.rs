@@ -249,10 +249,12 @@ mod tests {
 
     #[test]
     fn faults_of_compiling_find_their_places() {
-        let text = "include = [\"a.json\"]\n[camera.side]\nposition = [0, 0, 1]\n[[sphere]]\ncenter = [0, 0, 0]\nradius = 0\n\
+        let text = "include = [\"a.json\"]\n[camera.side]\nposition = [0, 0, 1]\n[[sphere]]\ncenter = [0, 0, 0]\n\
+            radius = 0\n\
                     [[light.spot]]\nposition = [0, 0, 0]\n[material.phong.\"a.b[0]\"]\ndiffuse = -1\n";
         let mut assets = MemoryAssets::default();
-        let json = "{\n \"sphere\": [{ \"center\": [0, 0, 0],\n \"radius\": -1 }],\n \"material\": { \"phong\": { \"a\": {} } } }";
+        let json = "{\n \"sphere\": [{ \"center\": [0, 0, 0],\n \"radius\": -1 }],\n \"material\": { \"phong\": { \
+            \"a\": {} } } }";
         assets.files.insert("a.json".into(), json.into());
         let paths = [
             "sphere[1].radius",
