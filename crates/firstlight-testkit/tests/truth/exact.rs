@@ -32,13 +32,10 @@ const BY_MASK: f64 = 4e-3;
 const BY_POINTS: f64 = 1e-3;
 
 /// Random scenes that broke a bound once, beside 3, 7, 8, 10, 20, 23, 32 and 36, which are among the first forty.
-const COUNTEREXAMPLES: [u64; 26] = [
+const COUNTEREXAMPLES: [u64; 27] = [
     48, 49, 50, 59, 65, 66, 68, 69, 83, 86, 99, 108, 151, 154, 171, 257, 300, 329, 357, 481, 493, 779, 806, 842, 958,
-    978,
+    978, 990,
 ];
-
-/// The same, of which slivers of light behind a cone take long.
-const SLIVERS: u64 = 990;
 
 /// The logarithm to base 2 of the number of points that kept pictures stop at, or later, where pixels are open.
 const KEPT: u32 = 13;
@@ -94,12 +91,6 @@ fn random_scenes_are_within_the_bounds_where_few_pixels_are_open() {
 #[test]
 fn what_broke_a_bound_once_is_within_it() {
     hold(COUNTEREXAMPLES.into_iter(), 16);
-}
-
-#[test]
-#[ignore = "takes long: cargo xtask verify runs it"]
-fn slivers_are_within_the_bounds() {
-    hold(std::iter::once(SLIVERS), 16);
 }
 
 #[test]
