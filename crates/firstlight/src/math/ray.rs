@@ -107,7 +107,7 @@ pub struct ShadowRay {
     pub(crate) t_max: f32,
     /// The light: not everything casts shadows for every one.
     pub(crate) light: LightId,
-    /// What does not stand in the way: the facet that the ray was lifted from.
+    /// What does not stand in the way: the facet that the ray starts on.
     pub(crate) but: Facet,
 }
 

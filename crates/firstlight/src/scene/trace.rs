@@ -8,7 +8,7 @@ use super::links::LinkId;
 use crate::color::Rgb;
 use crate::ids::{LightId, SurfaceId};
 use crate::light::LightKind;
-use crate::math::{Facet, Ray, ShadowRay};
+use crate::math::{Ray, ShadowRay};
 use crate::shape::{RayDifferential, ShapePoint, Sphere, SurfaceInteraction};
 
 pub use super::geometry::Hit;
@@ -156,10 +156,11 @@ impl Scene {
         let ShapePoint { p, error, normal, shading, lifted, uv, footprint, color } = point;
         let wo = -ray.d;
         let (ng, ns) = if normal.dot(wo) < 0.0 { (-normal, -shading) } else { (normal, shading) };
-        let (lit_from, horizon, facet) = match lifted {
-            Some(lifted) => (lifted, ns, hit.facet()),
-            None => (p, ng, Facet::NONE),
+        let (lit_from, horizon) = match lifted {
+            Some(lifted) => (lifted, ns),
+            None => (p, ng),
         };
+        let facet = hit.facet();
         let material = surface.material.unwrap_or_else(|| self.geometry.face_material(hit));
         let receives_shadow = surface.receives_shadow;
         let surface = hit.surface;

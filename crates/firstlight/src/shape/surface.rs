@@ -77,7 +77,7 @@ pub struct SurfaceInteraction {
     pub lit_from: Vec3,
     /// The normal of the horizon that light comes from above of: `ng`, or `ns` where the point is lifted.
     pub horizon: Vec3,
-    /// What does not stand in the way from there: the facet that the point is lifted from.
+    /// What does not stand in the way from there: the facet that was hit. It is flat, and light comes from above it.
     pub(crate) facet: Facet,
     /// To the viewer, unit.
     pub wo: Vec3,
