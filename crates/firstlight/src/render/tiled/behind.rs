@@ -2,17 +2,17 @@
 //! that a patch is asked once where nothing is in the way from any of its rays, and its rays are asked together where
 //! something is.
 
+use std::ops::Range;
+
 use super::{CELL, Tiled};
 use crate::color::Rgb;
 use crate::ids::LightId;
 use crate::integrate::Sums;
-use crate::material::Bsdf;
 use crate::render::Counts;
 use crate::render::arrival::{Arrivals, Place};
-use crate::render::patch::Rays;
+use crate::render::patch::{Member, PixelPatches, Rays};
 use crate::render::tile::Tile;
 use crate::render::together::Together;
-use crate::shape::SurfaceInteraction;
 use crate::visibility::{View, Viewpoint, Visibility};
 
 /// What the rays of one patch see of one light.
@@ -46,34 +46,40 @@ enum Sight {
 /// The rays of a block of pixels, as they look for lights. Keeps its memory.
 #[derive(Default)]
 pub(super) struct Block {
-    rays: Vec<(SurfaceInteraction, Bsdf)>,
     points: Vec<Viewpoint>,
     order: Vec<u32>,
     sights: Vec<Sight>,
     /// Of those that are behind things, what is in the way.
     views: Vec<Option<View>>,
-    /// The patches: that of which pixel, its first ray and how many, where its outlooks are.
-    patches: Vec<(u32, u32, u32)>,
+    patches: Vec<BlockPatch>,
+}
+
+/// A patch of a pixel of the block.
+#[derive(Clone, Copy)]
+struct BlockPatch {
+    /// The pixel, as the cell counts them, and which of its patches.
+    pixel: u32,
+    patch: u32,
+    /// The first of its rays in the block, and how many.
+    first: u32,
+    count: u32,
 }
 
 impl Tiled<'_> {
     /// Looks from all rays of the pixels from `from`, `size` of them across and down, for all lights.
     pub(super) fn look(&mut self, tile: &Tile, from: [u32; 2], size: [u32; 2], counts: &mut Counts) {
         let mut block = std::mem::take(&mut self.block);
-        block.rays.clear();
         block.points.clear();
         block.patches.clear();
         let lights = self.scene.lights.len();
         for (y, x) in (0..size[1]).flat_map(|y| (0..size[0]).map(move |x| (y, x))) {
             let index = self.index([from[0] + x, from[1] + y]);
             self.seen[index] = self.outlooks.len();
-            for patch in &self.pixels[index].patches {
+            for (k, patch) in self.pixels[index].patches.iter().enumerate() {
                 let Rays::Some(members) = &patch.rays else { continue };
-                block.patches.push((index as u32, block.rays.len() as u32, members.len() as u32));
-                for member in members {
-                    block.points.push(Viewpoint::of(&member.si));
-                    block.rays.push((member.si, member.bsdf));
-                }
+                let (first, count) = (block.points.len() as u32, members.len() as u32);
+                block.patches.push(BlockPatch { pixel: index as u32, patch: k as u32, first, count });
+                block.points.extend(members.iter().map(|member| Viewpoint::of(&member.si)));
                 self.outlooks.extend(std::iter::repeat_n(Outlook::Unknown, lights));
             }
         }
@@ -84,15 +90,15 @@ impl Tiled<'_> {
             }
             self.sights(&mut block, light, counts);
             for k in 0..block.patches.len() {
-                let (index, start, count) = block.patches[k];
-                let range = start as usize..(start + count) as usize;
+                let patch = block.patches[k];
+                let (index, range) = (patch.pixel as usize, patch.rays());
                 let of = |sight: Sight| block.sights[range.clone()].iter().filter(|s| **s == sight).count();
                 let dark = of(Sight::Dark);
-                let outlook = if dark + of(Sight::BelowHorizon) == count as usize {
+                let outlook = if dark + of(Sight::BelowHorizon) == patch.count as usize {
                     Outlook::Dark
                 } else if dark > 0 || of(Sight::Behind) > 0 {
                     let at = [0, 1].map(|axis| {
-                        let place = [index as usize % super::ACROSS, index as usize / super::ACROSS][axis];
+                        let place = [index % super::ACROSS, index / super::ACROSS][axis];
                         (self.corner[axis] + place as u32).wrapping_sub(1)
                     });
                     let inside = [0, 1].into_iter().all(|axis| {
@@ -101,11 +107,16 @@ impl Tiled<'_> {
                             && (self.corner[axis]..self.corner[axis] + CELL).contains(&at[axis])
                     });
                     if inside {
-                        let share = self.share_of(count);
-                        let salt = at[0] ^ at[1].rotate_left(16) ^ block.rays[range.start].0.surface.index() as u32;
+                        let members = patch.members(&self.pixels);
+                        let share = self.share_of(patch.count);
+                        let salt = at[0] ^ at[1].rotate_left(16) ^ members[0].si.surface.index() as u32;
                         let before = counts.work();
-                        let terms = block.settle(&mut self.arrivals, light, range.clone(), share, salt, counts);
-                        self.work[index as usize] += counts.work() - before;
+                        let mut together = Together::new(light, members.len(), share, salt);
+                        for (member, k) in members.iter().zip(range.clone()) {
+                            block.settle(k, member, &mut self.arrivals, light, share, &mut together, counts);
+                        }
+                        let (terms, _) = together.finish(&mut self.arrivals, counts);
+                        self.work[index] += counts.work() - before;
                         Outlook::Settled(terms)
                     } else {
                         Outlook::Parted
@@ -129,12 +140,16 @@ impl Tiled<'_> {
         block.order.clear();
         block.sights.clear();
         block.views.clear();
-        block.views.resize_with(block.rays.len(), || None);
-        for (k, (si, _)) in block.rays.iter().enumerate() {
-            let shines = scene.geometry.links.contains(scene.geometry.lights_of(si.surface), LightId(light as u32));
-            block.sights.push(if shines { Sight::Lit } else { Sight::BelowHorizon });
-            if shines && shadows && si.receives_shadow {
-                block.order.push(k as u32);
+        block.views.resize_with(block.points.len(), || None);
+        for patch in &block.patches {
+            // A patch is of one surface
+            let surface = self.pixels[patch.pixel as usize].patches[patch.patch as usize].si.surface;
+            let shines = scene.geometry.links.contains(scene.geometry.lights_of(surface), LightId(light as u32));
+            for (member, k) in patch.members(&self.pixels).iter().zip(patch.first..) {
+                block.sights.push(if shines { Sight::Lit } else { Sight::BelowHorizon });
+                if shines && shadows && member.si.receives_shadow {
+                    block.order.push(k);
+                }
             }
         }
         let Block { points, order, sights, views, .. } = block;
@@ -155,35 +170,47 @@ impl Tiled<'_> {
     }
 }
 
+impl BlockPatch {
+    /// Its rays, as the block counts them.
+    fn rays(&self) -> Range<usize> {
+        self.first as usize..(self.first + self.count) as usize
+    }
+
+    /// What they see.
+    fn members<'a>(&self, pixels: &'a [PixelPatches]) -> &'a [Member] {
+        match &pixels[self.pixel as usize].patches[self.patch as usize].rays {
+            Rays::Some(members) => members,
+            Rays::All(_) | Rays::Mask(..) => unreachable!("patches of a block have their rays"),
+        }
+    }
+}
+
 impl Block {
-    /// What the rays of one patch see of a light, added up.
+    /// Adds what ray `k` of the block sees of a light to that of the others of its patch.
+    #[allow(clippy::too_many_arguments, reason = "a ray of a patch, a light, and where it goes")]
     fn settle(
         &mut self,
+        k: usize,
+        Member { si, bsdf, .. }: &Member,
         arrivals: &mut Arrivals,
         light: usize,
-        range: std::ops::Range<usize>,
         share: f32,
-        salt: u32,
+        together: &mut Together,
         counts: &mut Counts,
-    ) -> [Rgb; 2] {
-        let mut together = Together::new(light, range.len(), share, salt);
-        for k in range {
-            let (si, bsdf) = &self.rays[k];
-            match self.sights[k] {
-                Sight::Dark | Sight::BelowHorizon => {
-                    let place = arrivals.place(light, si, bsdf);
-                    together.know(&place, &Sums::default());
-                }
-                sight @ (Sight::Lit | Sight::Clear) => {
-                    together.ask(arrivals, si, bsdf, sight == Sight::Lit, true, counts);
-                }
-                Sight::Behind => {
-                    let view = self.views[k].take().expect("what is behind things has a view");
-                    let place = Place { share, lit: true, clear: true, ..arrivals.place(light, si, bsdf) };
-                    arrivals.ask_behind(&mut together, light, &place, view, counts);
-                }
+    ) {
+        match self.sights[k] {
+            Sight::Dark | Sight::BelowHorizon => {
+                let place = arrivals.place(light, si, bsdf);
+                together.know(&place, &Sums::default());
+            }
+            sight @ (Sight::Lit | Sight::Clear) => {
+                together.ask(arrivals, si, bsdf, sight == Sight::Lit, true, counts);
+            }
+            Sight::Behind => {
+                let view = self.views[k].take().expect("what is behind things has a view");
+                let place = Place { share, lit: true, clear: true, ..arrivals.place(light, si, bsdf) };
+                arrivals.ask_behind(together, light, &place, view, counts);
             }
         }
-        together.finish(arrivals, counts).0
     }
 }
