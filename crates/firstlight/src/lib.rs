@@ -67,6 +67,7 @@ mod integrate;
 mod light;
 mod material;
 mod math;
+mod parallel;
 mod render;
 mod scene;
 mod shape;

@@ -12,11 +12,13 @@
 //! alone, bins are joined by minimum, maximum and whole numbers, and the tasks' results are joined in their order.
 
 use glam::{BVec4A, UVec4, Vec4, Vec4Swizzles};
+
 use rayon::prelude::*;
 
 use super::Aabb;
 use super::node::{LEAF, Node, Tree, WIDTH};
 use crate::math::Vec3;
+use crate::parallel::{self, CHUNK};
 
 /// The most bins along an axis.
 const BINS: usize = 32;
@@ -148,34 +150,33 @@ pub(crate) fn build<K: Ord>(
         Prim { lo: min.extend(f32::from_bits(i as u32)), hi: max.extend(0.0) }
     };
     let is_sound = |prim: &Prim| Aabb { min: prim.lo.xyz(), max: prim.hi.xyz() }.is_sound();
-    let mut prims: Vec<Prim> = (0..count).into_par_iter().with_min_len(1 << 14).map(prim).collect();
-    if !prims.par_iter().with_min_len(1 << 14).all(is_sound) {
+    let mut prims: Vec<Prim> = (0..count).into_par_iter().with_min_len(CHUNK).map(prim).collect();
+    if !parallel::all(prims.len(), CHUNK, |i| is_sound(&prims[i])) {
         prims.retain(is_sound);
     }
     if prims.is_empty() {
         let tree = Tree { nodes: Vec::new(), center: Vec3::ZERO, half: 0.0, bounds: Aabb::EMPTY, stack: 0 };
         return Built { tree, order: Vec::new(), leaves: Vec::new() };
     }
-    let all = prims.par_chunks(1 << 14).map(bounds_of).reduce(|| Bounds::EMPTY, Bounds::join);
+    let all = join_chunks(&prims, bounds_of);
     let bounds = Aabb { min: all.lo.xyz(), max: all.hi.xyz() };
     let center = (bounds.min + bounds.max) * 0.5;
     // See them from there
     let away = center.extend(0.0);
-    let move_all = |prims: &mut [Prim]| {
+    parallel::for_each_chunk(&mut prims, CHUNK, |_, prims| {
         for prim in prims {
             let id = prim.lo.w;
             (prim.lo, prim.hi) = (prim.lo - away, prim.hi - away);
             prim.lo.w = id;
         }
-    };
-    prims.par_chunks_mut(1 << 14).for_each(move_all);
-    let centers = prims.par_chunks(1 << 14).map(centers_of).reduce(|| Bounds::EMPTY, Bounds::join);
+    });
+    let centers = join_chunks(&prims, centers_of);
     // Cut and gather, in tasks
     let distinct = |prims: &mut [Prim]| distinct(prims, &key);
     let task = (prims.len() / TASKS).max(MIN_TASK);
     let settings = Settings { leaf: 1 << leaf_bits, leaf_bits, task, distinct: &distinct };
     let top = settings.top(&mut prims, centers, 0, 0);
-    let order: Vec<u32> = prims.par_iter().with_min_len(1 << 14).map(Prim::id).collect();
+    let order: Vec<u32> = parallel::map(prims.len(), CHUNK, |i| prims[i].id());
     drop(prims);
     // Join what the tasks made
     let (mut nodes_count, mut leaves_count) = (0, 0);
@@ -350,6 +351,12 @@ fn bounds_of(prims: &[Prim]) -> Bounds {
     bounds
 }
 
+/// What all chunks have, joined.
+fn join_chunks(prims: &[Prim], bounds: impl Fn(&[Prim]) -> Bounds + Sync) -> Bounds {
+    let chunks: Vec<&[Prim]> = prims.chunks(CHUNK).collect();
+    parallel::collect(chunks.len(), |i| bounds(chunks[i])).into_iter().fold(Bounds::EMPTY, Bounds::join)
+}
+
 /// The box around the centres.
 fn centers_of(prims: &[Prim]) -> Bounds {
     let mut centers = Bounds::EMPTY;
@@ -402,7 +409,8 @@ impl Settings<'_> {
         }
         let binning = Binning::new(centers, prims.len());
         let bins = if prims.len() >= PARALLEL {
-            let parts: Vec<Bins> = prims.par_chunks(PARALLEL).map(|prims| Bins::of(prims, &binning)).collect();
+            let chunks: Vec<&[Prim]> = prims.chunks(PARALLEL).collect();
+            let parts = parallel::collect(chunks.len(), |i| Bins::of(chunks[i], &binning));
             parts.iter().skip(1).fold(parts[0].clone(), Bins::join)
         } else {
             Bins::of(prims, &binning)

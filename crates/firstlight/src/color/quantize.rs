@@ -6,9 +6,8 @@
 //! number is then a table look-up by its leading bits, which say how many thresholds lie below its bucket, and a search
 //! among the thresholds inside the bucket: none or one for 8 bits and usual curves, a few for 16.
 
-use rayon::prelude::*;
-
 use super::Display;
+use crate::parallel;
 
 /// The codes of one display and depth.
 pub(crate) struct Quantizer {
@@ -50,16 +49,11 @@ impl Quantizer {
     pub(crate) fn new(display: &Display, largest: u32) -> Self {
         debug_assert!(display.fault().is_none() && (1..=65535).contains(&largest));
         // Find each threshold, starting where the inverse curve says that it is
-        let thresholds: Vec<u32> = (1..largest + 1)
-            .into_par_iter()
-            .with_min_len(64)
-            .map(|k| {
-                let edge = display.encoding.decode((f64::from(k) - 0.5) / f64::from(largest)) / display.factor();
-                smallest((edge as f32).to_bits(), |bits| {
-                    u32::from(definition(display, largest, f32::from_bits(bits))) >= k
-                })
-            })
-            .collect();
+        let thresholds = parallel::map(largest as usize, 64, |i| {
+            let k = i as u32 + 1;
+            let edge = display.encoding.decode((f64::from(k) - 0.5) / f64::from(largest)) / display.factor();
+            smallest((edge as f32).to_bits(), |bits| u32::from(definition(display, largest, f32::from_bits(bits))) >= k)
+        });
         debug_assert!(thresholds.is_sorted());
         // Count the thresholds in each bucket; 256 buckets an octave for 8 bits, 2048 for 16
         let shift = if largest <= 255 { 15 } else { 12 };

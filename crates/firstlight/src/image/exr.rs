@@ -19,9 +19,9 @@ use codec::meta::attribute::{
 use codec::meta::header::Header;
 use codec::meta::{BlockDescription, attribute::Text as Name};
 use codec::prelude::{Compression, SmallVec};
-use rayon::prelude::*;
 
 use super::{Image, ImageError, PREFIX, Receipt, SOFTWARE};
+use crate::parallel;
 
 /// The bytes of an EXR file. The picture and the receipt have been checked.
 pub(super) fn encode(picture: &Image, receipt: &Receipt) -> Result<Vec<u8>, ImageError> {
@@ -33,15 +33,13 @@ pub(super) fn encode(picture: &Image, receipt: &Receipt) -> Result<Vec<u8>, Imag
     // Compress all blocks of rows at once
     let headers: SmallVec<[Header; 3]> = SmallVec::from_elem(header, 1);
     let blocks: Vec<_> = enumerate_ordered_header_block_indices(&headers).collect();
-    let chunks: Vec<(usize, Chunk)> = blocks
-        .into_par_iter()
-        .map(|(i, index)| {
-            let rows = index.pixel_position.y()..index.pixel_position.y() + index.pixel_size.y();
-            let data = planes(&picture.pixels[rows.start * width..rows.end * width], width, places);
-            Ok((i, UncompressedBlock { index, data }.compress_to_chunk(&headers)?))
-        })
-        .collect::<Result<_, Error>>()
-        .map_err(fault)?;
+    let chunks = parallel::collect(blocks.len(), |block| {
+        let (i, index) = blocks[block];
+        let rows = index.pixel_position.y()..index.pixel_position.y() + index.pixel_size.y();
+        let data = planes(&picture.pixels[rows.start * width..rows.end * width], width, places);
+        Ok((i, UncompressedBlock { index, data }.compress_to_chunk(&headers)?))
+    });
+    let chunks: Vec<(usize, Chunk)> = chunks.into_iter().collect::<Result<_, Error>>().map_err(fault)?;
     let mut bytes = Cursor::new(Vec::new());
     codec::block::write(&mut bytes, headers, true, |_, writer| {
         chunks.into_iter().try_for_each(|(i, chunk)| writer.write_chunk(i, chunk))

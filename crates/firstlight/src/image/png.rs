@@ -6,10 +6,10 @@
 
 use ::png as codec;
 use codec::text_metadata::{ITXtChunk, TEXtChunk};
-use rayon::prelude::*;
 
 use super::{Image, ImageError, PREFIX, Receipt, SOFTWARE};
 use crate::color::{Display, Encoding, Quantizer};
+use crate::parallel;
 
 /// Bits a channel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -61,8 +61,8 @@ fn each<T: Copy + Default + Send, const N: usize>(
 ) -> Vec<T> {
     let width = picture.window.width as usize;
     let mut all = vec![[T::default(); N]; picture.pixels.len()];
-    all.par_chunks_mut(width).zip(picture.pixels.par_chunks(width)).for_each(|(row, pixels)| {
-        for (out, pixel) in row.iter_mut().zip(pixels) {
+    parallel::for_each_chunk(&mut all, width, |y, row| {
+        for (out, pixel) in row.iter_mut().zip(&picture.pixels[y * width..]) {
             *out = samples(*pixel);
         }
     });

@@ -16,14 +16,14 @@
 
 use std::collections::{BTreeMap, HashMap};
 use std::ops::Range;
-
-use rayon::prelude::*;
+use std::sync::Mutex;
 
 use super::error::{WRITE_ANEW, shown};
 use super::polygon::{self, Counts, triangles_of};
 use super::text::{Cursor, is_blank, pieces};
 use super::weld::weld;
 use super::{Fault, MAX_COUNT, MeshData, MeshPart, Progress, all};
+use crate::parallel::{self, CHUNK};
 
 /// Bytes of text that one thread reads at a time.
 const PIECE: usize = 1 << 20;
@@ -44,13 +44,14 @@ pub(super) fn read(file: &[u8], origin: [f64; 3], progress: &Progress) -> Result
         let line = line.strip_suffix(b"\r").unwrap_or(line);
         line.last() != Some(&b'\\')
     });
-    let read = |range: &Range<usize>| {
+    let read = |i: usize| {
+        let range = &pieces[i];
         let mut piece = Piece { origin, ..Piece::default() };
         piece.read(&file[..range.end], range.start)?;
         progress.advance(range.len())?;
         Ok(piece)
     };
-    let mut parts = all(pieces.par_iter().map(read).collect())?;
+    let mut parts = all(parallel::collect(pieces.len(), read))?;
     let known = join(&mut parts)?;
     resolve(file, &pieces, &mut parts, &known.counts)?;
     build(parts, known)
@@ -384,7 +385,7 @@ fn join(parts: &mut [Piece]) -> Result<Known, Fault> {
 /// Texture coordinates and normals of files that have none are left out.
 fn resolve(file: &[u8], pieces: &[Range<usize>], parts: &mut [Piece], counts: &[[usize; 3]]) -> Result<(), Fault> {
     let all_counts = counts.last().copied().unwrap_or_default();
-    let resolve = |(part, before): (&mut Piece, &[usize; 3])| {
+    let resolve = |part: &mut Piece, before: &[usize; 3]| {
         for (n, corner) in part.corners.iter_mut().enumerate() {
             for (kind, index) in corner.iter_mut().enumerate().filter(|(_, index)| **index != NONE) {
                 let value = i64::from(*index);
@@ -402,9 +403,13 @@ fn resolve(file: &[u8], pieces: &[Range<usize>], parts: &mut [Piece], counts: &[
         }
         None
     };
-    let faults: Vec<_> = parts.par_iter_mut().zip(counts).map(resolve).collect();
-    let first = faults.into_iter().enumerate().find_map(|(part, fault)| fault.map(|fault| (part, fault)));
-    let Some((part, (corner, kind, absolute))) = first else { return Ok(()) };
+    let faults = Mutex::new(Vec::new());
+    parallel::for_each_chunk(parts, 1, |i, part| {
+        let fault = resolve(&mut part[0], &counts[i]).map(|fault| (i, fault));
+        faults.lock().expect("no thread panics while it holds the faults").extend(fault);
+    });
+    let faults = faults.into_inner().expect("no thread panics while it holds the faults");
+    let Some((part, (corner, kind, absolute))) = faults.into_iter().min() else { return Ok(()) };
     // Read the piece once more, to find the line
     let at = place_of(&file[..pieces[part].end], pieces[part].start, corner);
     let word = Cursor { bytes: file, at }.word();
@@ -487,8 +492,8 @@ fn build(mut parts: Vec<Piece>, known: Known) -> Result<MeshData, Fault> {
 fn vertices(keys: &[[i32; 3]], known: Known, mesh: &mut MeshData, triangles: &mut [[u32; 3]]) {
     let Known { positions, colors, uvs, normals, .. } = known;
     let alpha = |c: &[f32; 3]| [c[0], c[1], c[2], 1.0];
-    let with_uvs = keys.par_iter().filter(|key| key[1] != NONE).count();
-    let with_normals = keys.par_iter().filter(|key| key[2] != NONE).count();
+    let with = |kind: usize| parallel::count(keys.len(), CHUNK, |i| keys[i][kind] != NONE);
+    let (with_uvs, with_normals) = (with(1), with(2));
     for (with, what) in [(with_uvs, "texture coordinates are 0 0"), (with_normals, "normals are 0 0 0")] {
         if with > 0 && with < keys.len() {
             mesh.notes.push(format!("{} of {} corners say none: their {what}", keys.len() - with, keys.len()));
@@ -496,11 +501,15 @@ fn vertices(keys: &[[i32; 3]], known: Known, mesh: &mut MeshData, triangles: &mu
     }
     // The same index for all that there is: vertices are those of the file
     let same = |i: usize, with: usize, list: usize| {
-        with == 0 || (with == keys.len() && list == positions.len() && keys.par_iter().all(|key| key[i] == key[0]))
+        with == 0
+            || (with == keys.len()
+                && list == positions.len()
+                && parallel::all(keys.len(), CHUNK, |k| keys[k][i] == keys[k][0]))
     };
     if same(1, with_uvs, uvs.len()) && same(2, with_normals, normals.len()) {
-        triangles.par_iter_mut().for_each(|t| *t = t.map(|i| keys[i as usize][0] as u32 - 1));
-        mesh.colors = colors.par_iter().map(alpha).collect();
+        let vertex = |i: u32| keys[i as usize][0] as u32 - 1;
+        parallel::for_each_chunk(triangles, CHUNK, |_, part| part.iter_mut().for_each(|t| *t = t.map(vertex)));
+        mesh.colors = parallel::map(colors.len(), CHUNK, |i| alpha(&colors[i]));
         mesh.positions = positions;
         mesh.uvs = if with_uvs > 0 { vec![uvs] } else { Vec::new() };
         mesh.normals = if with_normals > 0 { normals } else { Vec::new() };
@@ -510,20 +519,19 @@ fn vertices(keys: &[[i32; 3]], known: Known, mesh: &mut MeshData, triangles: &mu
         let [v, vt, vn] = keys[i].map(|index| index as u32);
         [v, vt, vn, 0]
     });
-    triangles.par_iter_mut().for_each(|t| *t = t.map(|i| welded.vertex[i as usize]));
-    let key = |&corner: &u32| keys[corner as usize];
-    let at = |index: i32| (index as usize).checked_sub(1);
-    let first = &welded.first;
-    let used = |i: &u32| key(i)[0] as usize - 1;
-    mesh.positions = first.par_iter().map(|i| positions[used(i)]).collect();
+    welded.renumber(triangles);
+    let at = |i: usize, kind: usize| (keys[welded.first[i] as usize][kind] as usize).checked_sub(1);
+    let used = |i: usize| at(i, 0).expect("every corner has a position");
+    let count = welded.first.len();
+    mesh.positions = parallel::map(count, CHUNK, |i| positions[used(i)]);
     if !colors.is_empty() {
-        mesh.colors = first.par_iter().map(|i| alpha(&colors[used(i)])).collect();
+        mesh.colors = parallel::map(count, CHUNK, |i| alpha(&colors[used(i)]));
     }
     if with_uvs > 0 {
-        mesh.uvs = vec![first.par_iter().map(|i| at(key(i)[1]).map_or([0.0; 2], |n| uvs[n])).collect()];
+        mesh.uvs = vec![parallel::map(count, CHUNK, |i| at(i, 1).map_or([0.0; 2], |n| uvs[n]))];
     }
     if with_normals > 0 {
-        mesh.normals = first.par_iter().map(|i| at(key(i)[2]).map_or([0.0; 3], |n| normals[n])).collect();
+        mesh.normals = parallel::map(count, CHUNK, |i| at(i, 2).map_or([0.0; 3], |n| normals[n]));
     }
 }
 

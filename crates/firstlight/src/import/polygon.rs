@@ -8,7 +8,7 @@
 
 mod rounds;
 
-use rayon::prelude::*;
+use crate::parallel;
 use rounds::Rounds;
 
 /// The largest polygon that is a fan, or whose ears are cut in order.
@@ -61,19 +61,17 @@ pub(super) fn triangulate(sizes: &[u32], position: impl Fn(usize) -> [f32; 3] + 
             begin
         })
         .collect();
-    let parts: Vec<(Vec<[u32; 3]>, Counts)> = blocks
-        .into_par_iter()
-        .map(|(mut start, block)| {
-            let mut triangles = Vec::with_capacity(block.iter().map(|&s| triangles_of(s)).sum());
-            let mut counts = Counts::default();
-            let mut work = Ears::default();
-            for &size in block {
-                work.polygon(start, size as usize, &position, &mut triangles, &mut counts);
-                start += size as usize;
-            }
-            (triangles, counts)
-        })
-        .collect();
+    let parts: Vec<(Vec<[u32; 3]>, Counts)> = parallel::collect(blocks.len(), |i| {
+        let (mut start, block) = blocks[i];
+        let mut triangles = Vec::with_capacity(block.iter().map(|&s| triangles_of(s)).sum());
+        let mut counts = Counts::default();
+        let mut work = Ears::default();
+        for &size in block {
+            work.polygon(start, size as usize, &position, &mut triangles, &mut counts);
+            start += size as usize;
+        }
+        (triangles, counts)
+    });
     let mut counts = Counts::default();
     let mut triangles = Vec::with_capacity(parts.iter().map(|p| p.0.len()).sum());
     for (part, count) in parts {

@@ -5,6 +5,7 @@ use rayon::prelude::*;
 use super::MeshData;
 use super::weld::weld;
 use crate::math::DVec3;
+use crate::parallel::{self, CHUNK};
 
 /// What [`MeshData::report`] finds.
 ///
@@ -56,8 +57,9 @@ impl MeshReport {
 }
 
 /// What one triangle is.
-#[derive(Clone, Copy, PartialEq, Eq)]
+#[derive(Clone, Copy, PartialEq, Eq, Default)]
 enum Face {
+    #[default]
     Fine,
     Degenerate,
     NonFinite,
@@ -70,15 +72,15 @@ impl MeshData {
         let count = |n: usize| n as u64;
         let mut used = vec![false; self.positions.len()];
         self.triangles.iter().flatten().for_each(|&v| used[v as usize] = true);
-        let bad = |n: &&[f32; 3]| !finite(n) || n.iter().all(|&x| x == 0.0);
+        let bad = |n: &[f32; 3]| !finite(n) || n.iter().all(|&x| x == 0.0);
         let mut report = MeshReport {
             vertices: count(self.positions.len()),
             triangles: count(self.triangles.len()),
             bounds: self.bounds().map(|corners| corners.map(|corner| corner.to_array())),
-            non_finite_vertices: count(self.positions.par_iter().filter(|p| !finite(p)).count()),
+            non_finite_vertices: count(parallel::count(self.positions.len(), CHUNK, |i| !finite(&self.positions[i]))),
             unused_vertices: count(used.iter().filter(|used| !**used).count()),
             has_normals: !self.normals.is_empty(),
-            bad_normals: count(self.normals.par_iter().filter(bad).count()),
+            bad_normals: count(parallel::count(self.normals.len(), CHUNK, |i| bad(&self.normals[i]))),
             uv_sets: count(self.uvs.len()),
             has_colors: !self.colors.is_empty(),
             bytes: self.bytes(),
@@ -90,12 +92,16 @@ impl MeshData {
 
     /// The lowest and highest coordinates of finite vertices, as the file has them.
     pub(crate) fn bounds(&self) -> Option<[DVec3; 2]> {
-        let finite = self.positions.par_iter().filter(|p| p.iter().all(|x| x.is_finite()));
         let join = |a: [[f32; 3]; 2], b: [[f32; 3]; 2]| {
             [[0, 1, 2].map(|i| a[0][i].min(b[0][i])), [0, 1, 2].map(|i| a[1][i].max(b[1][i]))]
         };
-        // Adding 0 makes 0 of -0, of which the least would not be the same every time
-        let corners = finite.map(|p| [p.map(|x| x + 0.0); 2]).reduce_with(join)?;
+        let chunks: Vec<&[[f32; 3]]> = self.positions.chunks(CHUNK).collect();
+        let of_chunk = |i: usize| {
+            let finite = chunks[i].iter().filter(|p| p.iter().all(|x| x.is_finite()));
+            // Adding 0 makes 0 of -0, of which the least would not be the same every time
+            finite.map(|p| [p.map(|x| x + 0.0); 2]).reduce(join)
+        };
+        let corners = parallel::collect(chunks.len(), of_chunk).into_iter().flatten().reduce(join)?;
         Some(corners.map(|corner| DVec3::from(corner.map(f64::from)) + DVec3::from(self.origin)))
     }
 
@@ -135,33 +141,29 @@ impl MeshData {
             let area = (b - a).cross(c - a).length();
             if area > 0.0 { Face::Fine } else { Face::Degenerate }
         };
-        let kinds: Vec<Face> = self.triangles.par_iter().map(kind).collect();
+        let kinds = parallel::map(self.triangles.len(), CHUNK, |i| kind(&self.triangles[i]));
         let of_kind = |kind: Face| kinds.iter().filter(|k| **k == kind).count() as u64;
         report.non_finite_triangles = of_kind(Face::NonFinite);
         report.degenerate_triangles = of_kind(Face::Degenerate);
         // The faces that have an area
-        let mut fine: Vec<[u32; 3]> = self
-            .triangles
-            .par_iter()
-            .zip(&kinds)
-            .filter(|(_, kind)| **kind == Face::Fine)
-            .map(|(t, _)| at(t))
-            .collect();
+        let faces = self.triangles.iter().zip(&kinds).filter(|(_, kind)| **kind == Face::Fine);
+        let mut fine: Vec<[u32; 3]> = faces.map(|(t, _)| at(t)).collect();
         // Edges with their lower end first, and whether that turns them round
-        let mut edges: Vec<(u32, u32, bool)> = fine
-            .par_iter()
-            .flat_map_iter(|&[a, b, c]| [(a, b), (b, c), (c, a)].map(|(p, q)| (p.min(q), p.max(q), p > q)))
-            .collect();
+        let edge = |i: usize| {
+            let (p, q) = (fine[i / 3][i % 3], fine[i / 3][(i + 1) % 3]);
+            [p.min(q), p.max(q), u32::from(p > q)]
+        };
+        let mut edges = parallel::map(3 * fine.len(), CHUNK, edge);
         edges.par_sort_unstable();
-        for edge in edges.chunk_by(|a, b| (a.0, a.1) == (b.0, b.1)) {
+        for edge in edges.chunk_by(|a, b| a[..2] == b[..2]) {
             match edge {
                 [_] => report.boundary_edges += 1,
-                [one, other] => report.turned_edges += u64::from(one.2 == other.2),
+                [one, other] => report.turned_edges += u64::from(one[2] == other[2]),
                 _ => report.non_manifold_edges += 1,
             }
         }
         drop(edges);
-        fine.par_iter_mut().for_each(|t| t.sort_unstable());
+        parallel::for_each_chunk(&mut fine, CHUNK, |_, fine| fine.iter_mut().for_each(|t| t.sort_unstable()));
         fine.par_sort_unstable();
         report.duplicate_triangles = fine.windows(2).filter(|pair| pair[0] == pair[1]).count() as u64;
     }

@@ -8,11 +8,10 @@
 //!
 //! Source: G. Thürmer, C. A. Wüthrich 1998, "Computing Vertex Normals from Polygonal Facets".
 
-use rayon::prelude::*;
-
 use super::MeshData;
 use super::weld::weld;
 use crate::math::DVec3;
+use crate::parallel;
 
 /// Edges of more triangles than this at one position are creases: comparing each with each would take too long.
 const MAX_AROUND_EDGE: usize = 8;
@@ -39,7 +38,7 @@ impl MeshData {
             if crease_deg >= 180.0 { f64::NEG_INFINITY } else { pxfm::f_cos(crease_deg.max(0.0).to_radians()) - 1e-12 };
         // Faces, places, and the corners at each place in the order of the triangles
         let (triangles, positions) = (&self.triangles, &self.positions);
-        let faces: Vec<DVec3> = triangles.par_iter().map(|t| unit_normal(positions, t)).collect();
+        let faces: Vec<DVec3> = parallel::map(triangles.len(), BLOCK, |i| unit_normal(positions, &triangles[i]));
         let places = weld(positions.len(), |i| {
             let [x, y, z] = positions[i].map(|x| (x + 0.0).to_bits());
             [x, y, z, 0]
@@ -47,18 +46,15 @@ impl MeshData {
         let around = Around { mesh: self, faces: &faces, place: &places.vertex, least_cosine };
         let (starts, at_place) = gather(triangles, &places.vertex, places.first.len());
         // The normals at each place, and the vertices that are needed for them
-        let blocks: Vec<Normals> = (0..places.first.len().div_ceil(BLOCK))
-            .into_par_iter()
-            .map(|block| {
-                let mut room = Room::default();
-                let mut normals = Normals::default();
-                for place in block * BLOCK..((block + 1) * BLOCK).min(places.first.len()) {
-                    let corners = &at_place[starts[place] as usize..starts[place + 1] as usize];
-                    around.normals(corners, &mut room, &mut normals);
-                }
-                normals
-            })
-            .collect();
+        let blocks: Vec<Normals> = parallel::collect(places.first.len().div_ceil(BLOCK), |block| {
+            let mut room = Room::default();
+            let mut normals = Normals::default();
+            for place in block * BLOCK..((block + 1) * BLOCK).min(places.first.len()) {
+                let corners = &at_place[starts[place] as usize..starts[place + 1] as usize];
+                around.normals(corners, &mut room, &mut normals);
+            }
+            normals
+        });
         let old = self.positions.len();
         let count = old + blocks.iter().map(|b| b.new.len()).sum::<usize>();
         if count as u64 > super::MAX_COUNT {

@@ -17,12 +17,11 @@
 //!
 //! Source: 3D Systems 1988, "StereoLithography Interface Specification".
 
-use rayon::prelude::*;
-
 use super::error::{WRITE_ANEW, shown};
 use super::text::{Cursor, is_blank, is_line_end, pieces};
-use super::weld::weld;
+use super::weld::{Welded, weld};
 use super::{Fault, MAX_COUNT, MeshData, MeshPart, Progress, all};
+use crate::parallel::{self, CHUNK};
 
 /// Bytes before the first facet.
 const HEADER: usize = 84;
@@ -120,13 +119,13 @@ fn check_count(count: u64) -> Result<(), Fault> {
 /// Makes one vertex of all corners at a position.
 fn join(corners: usize, position: impl Fn(usize) -> [f32; 3] + Sync) -> MeshData {
     // Adding 0 makes 0 of -0
-    let welded = weld(corners, |i| {
+    let Welded { vertex, first } = weld(corners, |i| {
         let [x, y, z] = position(i).map(|x| (x + 0.0).to_bits());
         [x, y, z, 0]
     });
     MeshData {
-        positions: welded.first.par_iter().map(|&i| position(i as usize).map(|x| x + 0.0)).collect(),
-        triangles: welded.vertex.par_chunks_exact(3).map(|t| [t[0], t[1], t[2]]).collect(),
+        positions: parallel::map(first.len(), CHUNK, |i| position(first[i] as usize).map(|x| x + 0.0)),
+        triangles: vertex.as_chunks().0.to_vec(),
         ..MeshData::default()
     }
 }
@@ -151,12 +150,13 @@ fn read_text(file: &[u8], progress: &Progress) -> Result<MeshData, Fault> {
         facet && text.word().eq_ignore_ascii_case(b"normal")
     };
     let pieces = pieces(file, start(file).at, PIECE, begins);
-    let read = |piece: &std::ops::Range<usize>| {
+    let read = |i: usize| {
+        let piece = &pieces[i];
         let found = read_piece(&file[..piece.end], piece.start)?;
         progress.advance(piece.len())?;
         Ok(found)
     };
-    let parts = all(pieces.par_iter().map(read).collect())?;
+    let parts = all(parallel::collect(pieces.len(), read))?;
     // Join the pieces and their solids
     let mut corners: Vec<[f32; 3]> = Vec::with_capacity(parts.iter().map(|p| p.corners.len()).sum());
     let mut solids: Vec<(usize, &[u8])> = Vec::new();

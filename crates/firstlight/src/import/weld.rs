@@ -8,7 +8,7 @@
 use std::hash::{BuildHasher, RandomState};
 use std::sync::atomic::{AtomicU32, Ordering};
 
-use rayon::prelude::*;
+use crate::parallel::{self, CHUNK};
 
 /// What is the same in corners that become one vertex.
 pub(super) type Key = [u32; 4];
@@ -37,31 +37,29 @@ pub(super) fn weld(count: usize, key: impl Fn(usize) -> Key + Sync) -> Welded {
     let shift = 64 - buckets.trailing_zeros();
     let bucket_of = |hash: u64| if shift == 64 { 0 } else { (hash >> shift) as usize };
     // Deal the corners of each block into buckets, in order
-    let blocks: Vec<(Vec<u32>, Vec<u32>)> = (0..count.div_ceil(BLOCK))
-        .into_par_iter()
-        .map(|block| {
-            let corners = block * BLOCK..((block + 1) * BLOCK).min(count);
-            let chosen: Vec<u16> = corners.clone().map(|i| bucket_of(hash.of(key(i))) as u16).collect();
-            let mut starts = vec![0u32; buckets + 1];
-            for &bucket in &chosen {
-                starts[bucket as usize + 1] += 1;
-            }
-            for i in 0..buckets {
-                starts[i + 1] += starts[i];
-            }
-            let mut next = starts.clone();
-            let mut dealt = vec![0u32; chosen.len()];
-            for (i, &bucket) in corners.zip(&chosen) {
-                let place = &mut next[bucket as usize];
-                dealt[*place as usize] = i as u32;
-                *place += 1;
-            }
-            (dealt, starts)
-        })
-        .collect();
+    let corners = |block: usize| block * BLOCK..((block + 1) * BLOCK).min(count);
+    let blocks: Vec<(Vec<u32>, Vec<u32>)> = parallel::collect(count.div_ceil(BLOCK), |block| {
+        let chosen: Vec<u16> = corners(block).map(|i| bucket_of(hash.of(key(i))) as u16).collect();
+        let mut starts = vec![0u32; buckets + 1];
+        for &bucket in &chosen {
+            starts[bucket as usize + 1] += 1;
+        }
+        for i in 0..buckets {
+            starts[i + 1] += starts[i];
+        }
+        let mut next = starts.clone();
+        let mut dealt = vec![0u32; chosen.len()];
+        for (i, &bucket) in corners(block).zip(&chosen) {
+            let place = &mut next[bucket as usize];
+            dealt[*place as usize] = i as u32;
+            *place += 1;
+        }
+        (dealt, starts)
+    });
     // Find the first corner of each key, bucket by bucket
-    let first_of: Vec<AtomicU32> = (0..count).into_par_iter().map(|_| AtomicU32::new(0)).collect();
-    (0..buckets).into_par_iter().for_each(|bucket| {
+    let zeros = |block: usize| corners(block).map(|_| AtomicU32::new(0)).collect::<Vec<_>>();
+    let first_of = parallel::collect(count.div_ceil(BLOCK), zeros);
+    parallel::for_each(buckets, &|bucket| {
         let of_block = |(_, starts): &'_ (Vec<u32>, Vec<u32>)| starts[bucket] as usize..starts[bucket + 1] as usize;
         let size: usize = blocks.iter().map(|b| of_block(b).len()).sum();
         // Tag from the hash beside the corner, so that most keys are looked at only when they are equal
@@ -84,17 +82,15 @@ pub(super) fn weld(count: usize, key: impl Fn(usize) -> Key + Sync) -> Welded {
                     }
                     at = (at + 1) & mask;
                 };
-                first_of[corner as usize].store(first, Ordering::Relaxed);
+                in_blocks(&first_of, corner).store(first, Ordering::Relaxed);
             }
         }
     });
     drop(blocks);
     // Number the first corners in order
-    let is_first = |i: usize| first_of[i].load(Ordering::Relaxed) == i as u32;
-    let lists: Vec<Vec<u32>> = (0..count.div_ceil(BLOCK))
-        .into_par_iter()
-        .map(|b| (b * BLOCK..((b + 1) * BLOCK).min(count)).filter(|&i| is_first(i)).map(|i| i as u32).collect())
-        .collect();
+    let is_first = |i: &u32| in_blocks(&first_of, *i).load(Ordering::Relaxed) == *i;
+    let lists: Vec<Vec<u32>> =
+        parallel::collect(count.div_ceil(BLOCK), |block| corners(block).map(|i| i as u32).filter(is_first).collect());
     let mut first = Vec::with_capacity(lists.iter().map(Vec::len).sum());
     let mut starts = Vec::with_capacity(lists.len());
     for list in &lists {
@@ -102,14 +98,31 @@ pub(super) fn weld(count: usize, key: impl Fn(usize) -> Key + Sync) -> Welded {
         first.extend_from_slice(list);
     }
     // A corner's vertex: its rank among the first corners
-    let rank: Vec<AtomicU32> = (0..count).into_par_iter().map(|_| AtomicU32::new(0)).collect();
-    lists.par_iter().zip(&starts).for_each(|(list, &start)| {
-        for (i, &corner) in list.iter().enumerate() {
-            rank[corner as usize].store(start + i as u32, Ordering::Relaxed);
+    let mut rank = vec![0u32; count];
+    parallel::for_each_chunk(&mut rank, BLOCK, |block, rank| {
+        for (number, &corner) in (starts[block]..).zip(&lists[block]) {
+            rank[corner as usize - block * BLOCK] = number;
         }
     });
-    let vertex = first_of.into_par_iter().map(|f| rank[f.into_inner() as usize].load(Ordering::Relaxed)).collect();
+    let vertex = parallel::map(count, BLOCK, |i| {
+        let first = in_blocks(&first_of, i as u32).load(Ordering::Relaxed);
+        rank[first as usize]
+    });
     Welded { vertex, first }
+}
+
+impl Welded {
+    /// Puts vertices in place of corners.
+    pub fn renumber(&self, triangles: &mut [[u32; 3]]) {
+        parallel::for_each_chunk(triangles, CHUNK, |_, part| {
+            part.iter_mut().for_each(|triangle| *triangle = triangle.map(|corner| self.vertex[corner as usize]));
+        });
+    }
+}
+
+/// The number of a corner in a list that is cut into blocks.
+fn in_blocks(list: &[Vec<AtomicU32>], corner: u32) -> &AtomicU32 {
+    &list[corner as usize / BLOCK][corner as usize % BLOCK]
 }
 
 /// Multiplies and folds, with secret numbers of this process.

@@ -41,8 +41,6 @@ use std::ops::ControlFlow;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
-use rayon::prelude::*;
-
 pub use counts::{LightCounts, RenderStats};
 pub use film::Film;
 pub use heat::Heat;
@@ -52,6 +50,7 @@ use crate::describe::words;
 use crate::image::{Image, Window};
 use crate::light::Light;
 use crate::math::Ray;
+use crate::parallel;
 use crate::scene::Scene;
 use crate::visibility::Target;
 use arrival::{Arrivals, Lights};
@@ -290,7 +289,7 @@ pub fn render(
         }
     };
     match rayon::ThreadPoolBuilder::new().num_threads(threads).build() {
-        Ok(pool) => pool.install(|| tiles.par_iter().for_each(render_one)),
+        Ok(pool) => pool.install(|| parallel::for_each(tiles.len(), &|i| render_one(&tiles[i]))),
         // A system that gives no threads still has this one
         Err(_) => tiles.iter().for_each(render_one),
     }

@@ -1,7 +1,6 @@
 //! Point sets: millions of spheres with radii and colours.
 
 use fearless_simd::Simd;
-use rayon::prelude::*;
 
 use super::ball::ball_tangents;
 use super::common::shape_table;
@@ -15,6 +14,7 @@ use crate::context::{Assets, CompileContext, show};
 use crate::describe::FilePath;
 use crate::import::MeshData;
 use crate::math::{DRay, DVec3, ErrorBound, Ray, Vec3};
+use crate::parallel;
 
 shape_table! {
     /// Spheres by the million: the vertices of a PLY file, or written out.
@@ -157,8 +157,8 @@ fn spacing(positions: &[[f32; 3]], sampled: usize) -> Option<f64> {
     let sampled = sampled.min(positions.len());
     let samples: Vec<[f32; 3]> = (0..sampled).map(|i| positions[i * positions.len() / sampled]).collect();
     // Few samples at a time, so that a piece of the points is at hand for all of them
-    let nearest: Vec<[f32; NEIGHBOUR]> =
-        samples.par_chunks(16).flat_map_iter(|samples| nearest(positions, samples)).collect();
+    let chunks: Vec<&[[f32; 3]]> = samples.chunks(16).collect();
+    let nearest = parallel::collect(chunks.len(), |i| nearest(positions, chunks[i])).concat();
     let farthest = |squares: &[f32; NEIGHBOUR]| squares.iter().copied().filter(|s| s.is_finite()).reduce(f32::max);
     let mut squares: Vec<f32> = nearest.iter().filter_map(farthest).collect();
     squares.sort_by(f32::total_cmp);

@@ -1,7 +1,5 @@
 //! From faces as they stand in a PLY file to the triangles of a mesh.
 
-use rayon::prelude::*;
-
 use super::super::polygon::{self, Counts};
 use super::super::weld::weld;
 use super::super::{Fault, MAX_COUNT, MeshData};
@@ -95,7 +93,7 @@ pub(super) fn assemble(mut parts: Vec<Faces>, plan: &Plan, mesh: &mut MeshData) 
         mesh.colors = welded.first.iter().map(linear).collect();
     }
     mesh.triangles = triangles;
-    mesh.triangles.par_iter_mut().for_each(|t| *t = t.map(|i| welded.vertex[i as usize]));
+    welded.renumber(&mut mesh.triangles);
     Ok(())
 }
 

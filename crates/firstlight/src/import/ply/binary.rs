@@ -1,16 +1,14 @@
 //! Binary rows of a PLY file: converted in place on all threads where they are all of one length, one after another
 //! elsewhere.
 
-use rayon::prelude::*;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use super::super::{Fault, Progress};
 use super::body::{Body, Faces, PIECE, Row};
 use super::header::{Element, Encoding, Header, Kind, Scalar};
 use super::plan::{NX, Plan, Purpose, RADIUS, RED, SLOTS, U, Use, X};
 use super::source::{Binary, Source, binary_value};
-
-/// Rows that one thread converts at a time.
-const ROWS: usize = 1 << 14;
+use crate::parallel::{self, CHUNK};
 
 /// Reads what follows the header.
 pub(super) fn read_binary(
@@ -86,6 +84,7 @@ fn read_uniform(
     let left = (source.bytes.len() - source.at) as u64;
     let Some(size) = element.count.checked_mul(stride as u64).filter(|&size| size <= left) else { return Ok(false) };
     let rows = &source.bytes[source.at..source.at + size as usize];
+    let row = |k: usize| &rows[k * stride..(k + 1) * stride];
     let big = source.big;
     let uniform = |row: &[u8]| {
         lists.iter().all(|&(offset, count, length)| binary_value(&row[offset..], count, big) == length as f64)
@@ -99,26 +98,26 @@ fn read_uniform(
         // Without lists every row is as long as the first
         _ if !lists.is_empty()
             && purpose != Purpose::Faces
-            && !rows.par_chunks(stride * ROWS).all(|block| block.chunks_exact(stride).all(uniform)) =>
+            && !parallel::all(size as usize / stride, CHUNK, |i| uniform(row(i))) =>
         {
             return Ok(false);
         }
         Purpose::Vertices => {
-            let rows = || rows.par_chunks_exact(stride).with_min_len(ROWS);
+            let count = rows.len() / stride;
             let vertices = &mut body.vertices;
-            vertices.positions = rows().map(|r| [0, 1, 2].map(|i| read(r, X + i, 0.0))).collect();
+            vertices.positions = parallel::map(count, CHUNK, |k| [0, 1, 2].map(|i| read(row(k), X + i, 0.0)));
             if plan.normals {
-                vertices.normals = rows().map(|r| [0, 1, 2].map(|i| read(r, NX + i, 0.0))).collect();
+                vertices.normals = parallel::map(count, CHUNK, |k| [0, 1, 2].map(|i| read(row(k), NX + i, 0.0)));
             }
             if plan.uvs {
-                vertices.uvs = rows().map(|r| [0, 1].map(|i| read(r, U + i, 0.0))).collect();
+                vertices.uvs = parallel::map(count, CHUNK, |k| [0, 1].map(|i| read(row(k), U + i, 0.0)));
             }
             if let Some(colors) = &plan.colors {
-                let raw = |r: &[u8]| [0, 1, 2, 3].map(|i| read(r, RED + i, colors.opaque()));
-                vertices.colors = rows().map(|r| colors.linear(raw(r))).collect();
+                let raw = |k: usize| [0, 1, 2, 3].map(|i| read(row(k), RED + i, colors.opaque()));
+                vertices.colors = parallel::map(count, CHUNK, |k| colors.linear(raw(k)));
             }
             if plan.radii {
-                vertices.radii = rows().map(|r| read(r, RADIUS, 0.0)).collect();
+                vertices.radii = parallel::map(count, CHUNK, |k| read(row(k), RADIUS, 0.0));
             }
         }
         Purpose::Faces => {
@@ -148,6 +147,7 @@ fn uniform_faces(
     vertices: u64,
 ) -> Option<Faces> {
     let count = rows.len() / stride;
+    let row = |k: usize| &rows[k * stride..(k + 1) * stride];
     let index = |row: &[u8], i: usize| {
         let at = &row[offset + i * item.size()..];
         // The two usual types, without a way through f64
@@ -167,29 +167,36 @@ fn uniform_faces(
     let mut faces = Faces::default();
     let fine = if length == 3 {
         faces.triangles = vec![[0; 3]; count];
-        faces.triangles.par_chunks_mut(ROWS).zip(rows.par_chunks(stride * ROWS)).all(|(triangles, rows)| {
-            triangles.iter_mut().zip(rows.chunks_exact(stride)).all(|(triangle, row)| {
-                let [Some(a), Some(b), Some(c)] = [0, 1, 2].map(|i| index(row, i)) else { return false };
-                *triangle = [a, b, c];
-                uniform(row)
-            })
+        fill(&mut faces.triangles, 1, |triangle, k| {
+            let [Some(a), Some(b), Some(c)] = [0, 1, 2].map(|i| index(row(k), i)) else { return false };
+            triangle[0] = [a, b, c];
+            uniform(row(k))
         })
     } else {
         faces.sizes = vec![length as u32; count];
         faces.corners = vec![0; count * length];
-        let each = length.max(1) * ROWS;
-        faces.corners.par_chunks_mut(each).zip(rows.par_chunks(stride * ROWS)).all(|(corners, rows)| {
-            corners.chunks_exact_mut(length.max(1)).zip(rows.chunks_exact(stride)).all(|(face, row)| {
-                let read = face.iter_mut().enumerate().all(|(i, corner)| match index(row, i) {
+        length > 0
+            && fill(&mut faces.corners, length, |face, k| {
+                let read = face.iter_mut().enumerate().all(|(i, corner)| match index(row(k), i) {
                     Some(index) => {
                         *corner = index;
                         true
                     }
                     None => false,
                 });
-                read && uniform(row)
+                read && uniform(row(k))
             })
-        }) && length > 0
     };
     fine.then_some(faces)
+}
+
+/// Has `read` fill a list, `each` elements for each row, whose number it is told; whether it could.
+fn fill<T: Send>(list: &mut [T], each: usize, read: impl Fn(&mut [T], usize) -> bool + Sync) -> bool {
+    let fine = AtomicBool::new(true);
+    parallel::for_each_chunk(list, each * CHUNK, |chunk, list| {
+        if !list.chunks_exact_mut(each).zip(chunk * CHUNK..).all(|(face, row)| read(face, row)) {
+            fine.store(false, Ordering::Relaxed);
+        }
+    });
+    fine.into_inner()
 }

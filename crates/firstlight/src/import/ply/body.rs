@@ -1,13 +1,12 @@
 //! The rows of a PLY file, one after another: vertices and faces as they stand there, and text on all threads.
 
-use rayon::prelude::*;
-
 use super::super::error::WRITE_ANEW;
 use super::super::text::{Cursor, is_blank, is_line_end, pieces};
 use super::super::{Fault, MeshData, Progress, all};
 use super::header::{Element, Header, Kind, Scalar};
 use super::plan::{ALPHA, Colors, NX, Plan, Purpose, RADIUS, RED, SLOTS, U, Use, X};
 use super::source::{Source, Text};
+use crate::parallel;
 
 /// Bytes of a file that one thread reads at a time.
 pub(super) const PIECE: usize = 1 << 20;
@@ -266,16 +265,17 @@ fn read_lines(file: &[u8], header: &Header, plan: &Plan, progress: &Progress) ->
     }
     // The number of the first row of each piece
     let pieces = pieces(file, header.body, PIECE, |_| true);
-    let counts: Vec<u64> =
-        pieces.par_iter().map(|p| file[p.clone()].iter().filter(|&&b| b == b'\n').count() as u64).collect();
+    let lines = |i: usize| file[pieces[i].clone()].iter().filter(|&&b| b == b'\n').count() as u64;
+    let counts = parallel::collect(pieces.len(), lines);
     let mut start = 0;
     let starts: Vec<u64> = counts.iter().map(|count| (start, start += count).0).collect();
-    let read = |(piece, &start): (&std::ops::Range<usize>, &u64)| {
+    let read = |i: usize| {
+        let piece = &pieces[i];
         let mut vertices = Vertices::default();
         let mut faces = Faces::default();
         let mut row = Row::new(plan);
         let mut text = Text { cursor: Cursor { bytes: &file[..piece.end], at: piece.start }, free: false };
-        let mut number = start;
+        let mut number = starts[i];
         while number < rows && !text.cursor.at_end() {
             // All rows of an element that are in this piece
             let element = ends.partition_point(|&end| end <= number);
@@ -287,7 +287,7 @@ fn read_lines(file: &[u8], header: &Header, plan: &Plan, progress: &Progress) ->
         progress.advance(piece.len())?;
         Ok((vertices, faces, number, text.cursor.at))
     };
-    let parts = all(pieces.par_iter().zip(&starts).map(read).collect())?;
+    let parts = all(parallel::collect(pieces.len(), read))?;
     // Join the pieces
     let mut body = Body { end: header.body, ..Body::default() };
     let mut done = 0;

@@ -1,11 +1,10 @@
 //! What is read of a PLY file: which property of which element is what.
 
-use rayon::prelude::*;
-
 use super::super::error::{WRITE_ANEW, shown};
 use super::super::{Fault, MAX_COUNT};
 use super::header::{Element, Encoding, Header, Kind, Scalar};
 use crate::color::Encoding as ColorEncoding;
+use crate::parallel;
 
 /// The attributes of a vertex, as places in a row.
 pub(super) const SLOTS: usize = 13;
@@ -77,8 +76,8 @@ impl Colors {
             Scalar::U16 => 65535,
             _ => 255,
         };
-        let decode = |i: i32| ColorEncoding::Srgb.decode(f64::from(i) / f64::from(largest)) as f32;
-        Self { table: (0..=largest).into_par_iter().map(decode).collect() }
+        let decode = |i: usize| ColorEncoding::Srgb.decode(i as f64 / largest as f64) as f32;
+        Self { table: parallel::map(largest + 1, 256, decode) }
     }
 
     pub fn linear(&self, raw: [f32; 4]) -> [f32; 4] {
