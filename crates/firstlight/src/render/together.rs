@@ -176,11 +176,11 @@ impl Together {
     pub fn finish(mut self, arrivals: &mut Arrivals, counts: &mut Counts) -> ([Rgb; 2], Sums) {
         if !self.asking.is_empty() {
             let mut asking = std::mem::take(&mut self.asking);
-            let settled = self.points(arrivals, &mut asking, counts);
+            let all_settled = self.points(arrivals, &mut asking, counts);
             let measure = arrivals.measure(self.light);
-            for Asking { si, lobe, base, colors, tally, whole, view, .. } in asking {
+            for Asking { si, lobe, base, colors, tally, whole, view, settled, .. } in asking {
                 let place = Place { share: self.each, ..Place::point(&si, &lobe, base, colors) };
-                let sums = if settled {
+                let sums = if all_settled || settled {
                     tally.sums(whole.as_ref(), measure)
                 } else {
                     arrivals.by_cells(self.light, &place, counts)
