@@ -31,11 +31,15 @@ const BY_MASK: f64 = 4e-3;
 /// Relative, of a sphere that is integrated by points all over it.
 const BY_POINTS: f64 = 1e-3;
 
-/// Random scenes that broke a bound once, beside 3, 7, 8, 10, 20, 23, 32 and 36, which are among the first forty.
-const COUNTEREXAMPLES: [u64; 27] = [
+/// Random scenes that broke a bound once, beside 7, 8, 10, 20, 23, 32 and 36, which are among the first forty.
+const COUNTEREXAMPLES: [u64; 26] = [
     48, 49, 50, 59, 65, 66, 68, 69, 83, 86, 99, 108, 151, 154, 171, 257, 300, 329, 357, 481, 493, 779, 806, 842, 958,
-    978, 990,
+    978,
 ];
+
+/// Those of them that take as long as all others: a torus under three lights of constant falloff, and a strong light of
+/// which slivers are seen. They are held in fewer pixels.
+const SLOW: [u64; 2] = [3, 990];
 
 /// The logarithm to base 2 of the number of points that kept pictures stop at, or later, where pixels are open.
 const KEPT: u32 = 13;
@@ -73,8 +77,7 @@ fn hold(seeds: impl Iterator<Item = u64>, size: u32) {
 #[test]
 #[ignore = "takes long: cargo xtask verify runs it"]
 fn random_scenes_are_within_the_bounds() {
-    // The torus of scene 3 takes longer than all the others; it is held at 16 x 16
-    hold((0..20).filter(|seed| *seed != 3).chain([40]), 48);
+    hold((0..20).filter(|seed| !SLOW.contains(seed)).chain([40]), 48);
 }
 
 #[test]
@@ -85,12 +88,17 @@ fn more_random_scenes_are_within_the_bounds() {
 
 #[test]
 fn random_scenes_are_within_the_bounds_where_few_pixels_are_open() {
-    hold(0..40, 16);
+    hold((0..40).filter(|seed| !SLOW.contains(seed)), 16);
 }
 
 #[test]
 fn what_broke_a_bound_once_is_within_it() {
     hold(COUNTEREXAMPLES.into_iter(), 16);
+}
+
+#[test]
+fn what_is_slow_is_within_the_bounds() {
+    hold(SLOW.into_iter(), 8);
 }
 
 #[test]
