@@ -1,4 +1,4 @@
-//! Reads hostile OBJ files: `cargo +nightly fuzz run obj`.
+//! Reads hostile OBJ files: `cargo +nightly fuzz run -s none obj`.
 
 #![no_main]
 

@@ -1,4 +1,4 @@
-//! Reads hostile PLY files: `cargo +nightly fuzz run ply`.
+//! Reads hostile PLY files: `cargo +nightly fuzz run -s none ply`.
 
 #![no_main]
 

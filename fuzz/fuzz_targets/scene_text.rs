@@ -1,4 +1,4 @@
-//! Reads hostile scene text: `cargo +nightly fuzz run scene_text`.
+//! Reads hostile scene text: `cargo +nightly fuzz run -s none scene_text`.
 
 #![no_main]
 

@@ -1,4 +1,4 @@
-//! Reads hostile STL files: `cargo +nightly fuzz run stl`.
+//! Reads hostile STL files: `cargo +nightly fuzz run -s none stl`.
 
 #![no_main]
 
