@@ -25,6 +25,9 @@ const DOUBT: [f32; 2] = [2.0, 4.0];
 /// The same of what the rays would make together by chance. Points of different series share a light better than by
 /// chance: behind the same straight edge sixteen are wrong by half as much.
 const DOUBT_BY_CHANCE: [f32; 2] = [1.0, 5.0];
+/// The same of one ray, against a quarter of its points in place of half of them, which is wrong by more: that both
+/// agree by chance is rare.
+const DOUBT_OF_QUARTER: f32 = 0.9;
 /// The part of what may be wrong that points may tell nothing about.
 const UNTOLD: f32 = 0.5;
 /// Effective points of all rays together that tell something.
@@ -58,6 +61,8 @@ struct Asking {
     /// Whether it needs no more points.
     settled: bool,
     tally: Tally,
+    /// What a quarter of the points said, or fewer.
+    before: Option<Rgb>,
 }
 
 impl Asking {
@@ -162,6 +167,7 @@ impl Together {
             may_miss,
             settled: false,
             tally,
+            before: None,
         });
     }
 
@@ -212,6 +218,7 @@ impl Together {
         let part = 1.0 / self.rays as f32;
         loop {
             let (mut value, mut moved, mut squares) = (self.value, Rgb::BLACK, Rgb::BLACK);
+            let (mut moved_more, mut squares_more) = (Rgb::BLACK, Rgb::BLACK);
             // What would arrive if nothing were in the way, of each kind, and by how many effective points that is told
             let (mut all, mut effective) = ([Rgb::BLACK; 2], [0.0; 2]);
             // The same of those rays only that may meet the edge of a shadow
@@ -221,7 +228,11 @@ impl Together {
                 let half = if one.settled { one.tally } else { one.ask(&asker, stride, to, counts) };
                 let (now, whole) = one.sums(measure);
                 let off = one.color(&now) + one.color(&half.sums(one.whole.as_ref(), measure)) * -1.0;
-                (value, moved, squares) = (value + one.color(&now), moved + off, squares + off * off);
+                let color = one.color(&now);
+                (value, moved, squares) = (value + color, moved + off, squares + off * off);
+                let more = one.before.map_or(Rgb::BLACK, |before| color + before * -1.0);
+                (moved_more, squares_more) = (moved_more + more, squares_more + more * more);
+                one.before = Some(color);
                 for (k, (color, points)) in one.each(&whole).into_iter().zip(one.tally.effective()).enumerate() {
                     (all[k], effective[k]) = (all[k] + color, effective[k] + points);
                     if !one.settled {
@@ -244,6 +255,9 @@ impl Together {
             // By how much the sum moved, or by as much as its parts would together if they moved by chance
             let doubt = |[many, one]: [f32; 2]| many + one / asking.len() as f32;
             let off = Rgb::max(moved.map(f32::abs) * doubt(DOUBT), squares.map(f32::sqrt) * doubt(DOUBT_BY_CHANCE));
+            let one = DOUBT_OF_QUARTER / asking.len() as f32;
+            let more = Rgb::max(moved_more.map(f32::abs) * DOUBT[1], squares_more.map(f32::sqrt) * DOUBT_BY_CHANCE[1]);
+            let off = off.max(more * one);
             let [diffuse, specular] = [0, 1].map(|k| all_edge[k] * of_edge(effective_edge[k]));
             let edge = (diffuse + specular) * OF_EDGE;
             let error = shows(off.max(edge));
