@@ -8,12 +8,15 @@ use crate::material::{BlinnPhongLobe, PhongLobe};
 use crate::math::dispatch_wide;
 use crate::math::{DVec3, ErrorBound, Vec3};
 
-struct Random(u64);
+struct Random(firstlight_testkit::Random);
 
 impl Random {
+    fn new(seed: u64) -> Self {
+        Random(firstlight_testkit::Random::new(seed))
+    }
+
     fn unit(&mut self) -> f64 {
-        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (self.0 >> 11) as f64 / (1u64 << 53) as f64
+        self.0.unit()
     }
 
     fn between(&mut self, a: f64, b: f64) -> f64 {
@@ -43,7 +46,7 @@ struct Case {
 }
 
 fn case(seed: u64, hiders: usize, sharpest: f64) -> Option<Case> {
-    let mut random = Random(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) ^ 77);
+    let mut random = Random::new(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) ^ 77);
     let random = &mut random;
     for _ in 0..4 {
         random.unit();

@@ -8,21 +8,16 @@ use crate::context::CompileContext;
 use crate::math::{DRay, DVec3, ErrorBound};
 
 /// Numbers that are the same on every run.
-pub(crate) struct Random(u64);
+pub(crate) struct Random(firstlight_testkit::Random);
 
 impl Random {
     pub fn new(seed: u64) -> Self {
-        Random(seed)
+        Random(firstlight_testkit::Random::new(seed))
     }
 
     /// From 0 to 1.
     pub fn unit(&mut self) -> f64 {
-        // SplitMix64
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        ((z ^ (z >> 31)) >> 11) as f64 / (1u64 << 53) as f64
+        self.0.unit()
     }
 
     pub fn between(&mut self, low: f64, high: f64) -> f64 {

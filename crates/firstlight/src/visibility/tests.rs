@@ -12,12 +12,15 @@ use crate::{
     PlaneDesc, PointDesc, RectangleDesc, ShapeDesc, SphereDesc, SphereLightDesc, TransformDesc,
 };
 
-struct Random(u64);
+struct Random(firstlight_testkit::Random);
 
 impl Random {
+    fn new(seed: u64) -> Self {
+        Random(firstlight_testkit::Random::new(seed))
+    }
+
     fn unit(&mut self) -> f64 {
-        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        (self.0 >> 11) as f64 / (1u64 << 53) as f64
+        self.0.unit()
     }
 
     fn below(&mut self, n: usize) -> usize {
@@ -62,7 +65,7 @@ fn meets(low: DVec3, high: DVec3, from: DVec3, to: DVec3) -> bool {
 
 #[test]
 fn a_shaft_leaves_out_no_box_that_a_way_to_the_light_meets() {
-    let random = &mut Random(1);
+    let random = &mut Random::new(1);
     let mut left_out = 0;
     for round in 0..4000 {
         let unit = random.scale(1e-6, 1e6);
@@ -289,7 +292,7 @@ fn seen_points(random: &mut Random, scene: &Scene) -> Vec<Viewpoint> {
 
 #[test]
 fn every_sample_is_answered_as_by_its_own_ray() {
-    let random = &mut Random(7);
+    let random = &mut Random::new(7);
     let mut seen = [0u64; 4];
     let mut traced = 0;
     let mut settler = Settler::default();
@@ -343,7 +346,7 @@ fn every_sample_is_answered_as_by_its_own_ray() {
 
 #[test]
 fn a_light_lies_in_its_hull() {
-    let random = &mut Random(3);
+    let random = &mut Random::new(3);
     for _ in 0..60 {
         let scene = random_scene(random);
         for (light, target) in scene.lights.iter().zip(Target::of_all(&scene)) {

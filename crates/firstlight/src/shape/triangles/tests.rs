@@ -13,13 +13,15 @@ fn some(triangle: u32) -> bool {
 }
 
 /// Numbers that look random.
-struct Random(u64);
+struct Random(firstlight_testkit::Random);
 
 impl Random {
+    fn new(seed: u64) -> Self {
+        Random(firstlight_testkit::Random::new(seed))
+    }
+
     fn next(&mut self) -> u32 {
-        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-        let x = (self.0 >> 32) as u32;
-        x ^ (x >> 15)
+        (self.0.bits() >> 32) as u32
     }
 
     /// From -1 to 1.
@@ -279,7 +281,7 @@ impl Mesh {
 
     /// Whole, broken and worse.
     fn zoo() -> Vec<(String, Self)> {
-        let mut random = Random(17);
+        let mut random = Random::new(17);
         let random = &mut random;
         let mut zoo = Mesh::models();
         let mut add = |name: &str, mesh: Mesh| zoo.push((name.to_owned(), mesh));
@@ -400,7 +402,7 @@ fn a_zoo_of_meshes_equals_brute_force() {
         .enumerate()
         .map(|(number, (name, mesh))| {
             let tree = mesh.tree();
-            let mut random = Random(1000 + number as u64);
+            let mut random = Random::new(1000 + number as u64);
             // Large ones are asked less often
             let rays = (rays_a_mesh() * 3000 / mesh.triangles.len().max(3000)).max(128);
             let mut hits = 0;
@@ -435,7 +437,7 @@ const FAR: Vec3 = Vec3::new(148_376.0, 1234.0, -223_423.0);
 
 #[test]
 fn every_way_of_asking_equals_brute_force() {
-    let mut random = Random(1);
+    let mut random = Random::new(1);
     let random = &mut random;
     let meshes = [
         Mesh::soup(1000, Vec3::splat(0.1), random),
@@ -456,7 +458,7 @@ fn every_way_of_asking_equals_brute_force() {
 
 #[test]
 fn scale_and_place_do_not_matter() {
-    let mut random = Random(2);
+    let mut random = Random::new(2);
     for (center, size) in [(FAR, 1.0), (Vec3::ZERO, 1e-6), (Vec3::ZERO, 1e6), (FAR, 1000.0)] {
         for mesh in [Mesh::soup(600, Vec3::splat(0.2), &mut random), Mesh::sphere(16)] {
             let mesh = mesh.map(|p| center + p * size);
@@ -468,7 +470,7 @@ fn scale_and_place_do_not_matter() {
 
 #[test]
 fn what_has_no_area_or_no_place_is_left_out() {
-    let mut random = Random(3);
+    let mut random = Random::new(3);
     let mut mesh = Mesh::soup(50, Vec3::splat(0.5), &mut random);
     mesh.positions[0] = [f32::NAN, 0.0, 0.0];
     mesh.positions[4] = [0.0, f32::INFINITY, 0.0];
@@ -500,7 +502,7 @@ fn a_closed_mesh_has_no_holes() {
         let mut targets: Vec<Vec3> = mesh.positions.iter().map(|p| Vec3::from_array(*p)).collect();
         targets.extend(mesh.triangles.iter().map(|t| middle(corner(t[0]), corner(t[1]))));
         targets.extend(mesh.triangles.iter().map(|t| middle(corner(t[1]), corner(t[2]))));
-        let mut random = Random(round as u64);
+        let mut random = Random::new(round as u64);
         // And anywhere, so that there are a million rays, or ten
         let wanted = (rays_a_mesh() / 20).clamp(500, 5_000) * 1000;
         let more = wanted.saturating_sub(targets.len());
@@ -534,7 +536,7 @@ fn a_closed_mesh_has_no_holes() {
 
 #[test]
 fn the_tree_does_not_depend_on_the_number_of_threads() {
-    let mut random = Random(5);
+    let mut random = Random::new(5);
     let mesh = Mesh::soup(100_000, Vec3::splat(0.02), &mut random);
     let fingerprint = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads can be had");
