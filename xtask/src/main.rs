@@ -1,123 +1,59 @@
-//! The project's own commands: `cargo xtask COMMAND`.
+//! `cargo xtask test`: every check, then every test, so that the test runner has the last word. All other commands are
+//! handed to `firstlight-tools`: they need the library, and cargo would build it for them in another way than for the
+//! tests.
 
-mod bench;
-mod curves;
-mod engine;
-mod exact;
-mod generate;
-mod lights;
-mod models;
-mod peers;
-mod pictures;
-mod plot;
-mod rays;
-mod test;
-mod verify;
+use std::ffi::OsString;
+use std::process::ExitCode;
 
-use std::path::{Path, PathBuf};
-use std::process::{Command, ExitCode};
+use xtask::{Outcome, cargo, root, run as run_to_end};
 
-use clap::{Parser, Subcommand};
-
-/// The project's own commands.
-#[derive(Parser)]
-#[command(name = "cargo xtask")]
-struct Args {
-    #[command(subcommand)]
-    command: Task,
-}
-
-#[derive(Subcommand)]
-enum Task {
-    /// Runs every check and every test; needs Rust and nothing else.
-    Test,
-    /// Writes what is made from the code: the scene format reference and the JSON Schema.
-    Generate {
-        /// Changes nothing; fails if a file is not up to date.
-        #[arg(long)]
-        check: bool,
-    },
-    /// Renders the pictures of the book: the built-in scenes, the gallery, and what goes on inside (visibility, heat).
-    Pictures {
-        /// Only those whose name contains this.
-        filter: Option<String>,
-    },
-    /// Measures config 11 and writes a page under docs/benchmarks.
-    Bench(bench::Options),
-    /// Measures what each part of the light engine gains, on config 11 and on a mesh, and writes a page under
-    /// docs/benchmarks.
-    Engine(engine::Options),
-    /// Measures a hall full of small lights, or writes it as a scene.
-    Lights(lights::Options),
-    /// Measures rays through meshes, against Embree where it is installed, and writes a page under docs/benchmarks.
-    Rays(rays::Options),
-    /// Measures whole processes from a mesh file to a picture, against F3D and Mitsuba where a Python has them, and
-    /// writes a page under docs/benchmarks.
-    Models(models::Options),
-    /// Measures config 11 against Mitsuba and POV-Ray, where they are named, and writes a page under docs/benchmarks.
-    Peers(peers::Options),
-    /// Runs the tests that take long: more scenes, more rays.
-    #[command(args_conflicts_with_subcommands = true)]
-    Verify {
-        /// Random scenes for the comparison of the renderers.
-        #[arg(long, default_value_t = 5000)]
-        scenes: u32,
-        #[command(subcommand)]
-        what: Option<Verify>,
-    },
-}
-
-#[derive(Subcommand)]
-enum Verify {
-    /// Compares integrated light with the converged picture, on random scenes.
-    Exact(exact::Options),
-}
-
-/// What a command ends with: nothing, or what went wrong.
-type Outcome = Result<(), String>;
-
-impl Task {
-    /// Whether it renders so much, or measures, that only a release build will do.
-    fn wants_release(&self) -> bool {
-        !matches!(self, Task::Test | Task::Generate { .. } | Task::Verify { what: None, .. })
-    }
-}
-
-fn main() -> ExitCode {
-    let task = Args::parse().command;
-    if cfg!(debug_assertions) && task.wants_release() {
-        return again_in_release();
-    }
-    let outcome = match task {
-        Task::Test => test::run(),
-        Task::Generate { check } => generate::run(check),
-        Task::Pictures { filter } => pictures::run(filter.as_deref()),
-        Task::Bench(options) => bench::run(&options),
-        Task::Engine(options) => engine::run(&options),
-        Task::Lights(options) => lights::run(&options),
-        Task::Rays(options) => rays::run(&options),
-        Task::Models(options) => models::run(&options),
-        Task::Peers(options) => peers::run(&options),
-        Task::Verify { what: Some(Verify::Exact(options)), .. } => exact::run(&options),
-        Task::Verify { scenes, what: None } => verify::run(scenes),
+/// Builds the book, where mdBook is installed; its links are among the tests.
+fn build_book() -> Outcome {
+    let mut command = std::process::Command::new("mdbook");
+    let Ok(output) = command.arg("build").arg(root().join("docs")).output() else {
+        eprintln!("\nno mdbook: the book is not built, only its links are tested");
+        return Ok(());
     };
-    match outcome {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(fault) => {
-            eprintln!("xtask: {fault}");
-            ExitCode::FAILURE
-        }
+    let said = String::from_utf8_lossy(&output.stderr);
+    eprintln!("\n$ mdbook build docs\n{said}");
+    // A warning of the book's builder is a broken page
+    if output.status.success() && !said.contains("WARN") && !said.contains("ERROR") {
+        Ok(())
+    } else {
+        Err("mdbook build docs: not without warnings".into())
     }
 }
 
-/// Runs this command line again, built for release. What is quick shares the build of the tests.
-fn again_in_release() -> ExitCode {
-    let status = cargo()
-        .args(["run", "--quiet", "--release", "--package", "xtask", "--"])
-        .args(std::env::args_os().skip(1))
-        .current_dir(".")
-        .status();
-    match status {
+/// The numbers of the page that walks through config 11, from a script that shares no code with the renderer.
+fn check_walk() -> Outcome {
+    let mut python = std::process::Command::new("python3");
+    if python.arg("--version").output().is_err() {
+        eprintln!("\nno python3: docs/walk.py --check is left out");
+        return Ok(());
+    }
+    run_to_end(std::process::Command::new("python3").current_dir(root()).args(["docs/walk.py", "--check"]))
+}
+
+fn test() -> Outcome {
+    run_command(&["fmt", "--all", "--check"])?;
+    build_book()?;
+    check_walk()?;
+    run_command(&["clippy", "--workspace", "--all-targets", "--quiet", "--", "-D", "warnings"])?;
+    run_to_end(cargo().env("RUSTDOCFLAGS", "-D warnings").args(["doc", "--workspace", "--no-deps", "--quiet"]))?;
+    // The library alone, without what can be left out
+    run_command(&["check", "--package", "firstlight", "--no-default-features", "--quiet"])?;
+    run_command(&["test", "--workspace", "--no-fail-fast"])
+}
+
+fn run_command(args: &[&str]) -> Outcome {
+    run_to_end(cargo().args(args))
+}
+
+/// Runs another command, from where we are.
+fn hand_on(args: &[OsString]) -> ExitCode {
+    let mut command = cargo();
+    command.args(["run", "--quiet", "--release", "--package", "firstlight-tools", "--"]).args(args).current_dir(".");
+    match command.status() {
         Ok(status) if status.success() => ExitCode::SUCCESS,
         Ok(_) => ExitCode::FAILURE,
         Err(fault) => {
@@ -127,32 +63,16 @@ fn again_in_release() -> ExitCode {
     }
 }
 
-/// The repository's root.
-fn root() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).parent().map(Path::to_path_buf).unwrap_or_default()
-}
-
-/// The cargo that runs us.
-fn cargo() -> Command {
-    let mut command = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
-    command.current_dir(root());
-    command
-}
-
-/// Runs a command to its end, its output shown.
-fn run(command: &mut Command) -> Outcome {
-    let words: Vec<_> = std::iter::once(command.get_program()).chain(command.get_args()).collect();
-    let line = words.join(" ".as_ref()).to_string_lossy().into_owned();
-    eprintln!("\n$ {line}");
-    let status = command.status().map_err(|e| format!("{line}: {e}"))?;
-    if status.success() { Ok(()) } else { Err(format!("{line}: {status}")) }
-}
-
-/// Writes a file and makes its folder.
-fn write(path: &Path, bytes: &[u8]) -> Outcome {
-    let fault = |e: std::io::Error| format!("{}: {e}", path.display());
-    if let Some(folder) = path.parent() {
-        std::fs::create_dir_all(folder).map_err(fault)?;
+fn main() -> ExitCode {
+    let args: Vec<OsString> = std::env::args_os().skip(1).collect();
+    if args != ["test"] {
+        return hand_on(&args);
     }
-    std::fs::write(path, bytes).map_err(fault)
+    match test() {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(fault) => {
+            eprintln!("xtask: {fault}");
+            ExitCode::FAILURE
+        }
+    }
 }

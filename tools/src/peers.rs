@@ -1,7 +1,7 @@
 //! `cargo xtask peers`: config 11 as whole processes, ours and those of Mitsuba and POV-Ray in turns, each with its
 //! error.
 //!
-//! The scene of the others lies in `xtask/peers/config11*`. They shade otherwise, so each picture is held against a
+//! The scene of the others lies in `tools/peers/config11*`. They shade otherwise, so each picture is held against a
 //! converged one of the same program.
 
 use std::fmt::Write as _;
@@ -116,7 +116,7 @@ fn ways(options: &Options, folder: &Path) -> Result<Vec<Way>, String> {
     });
     if let Some(python) = &options.python {
         let python = python.display().to_string();
-        let script = root().join("xtask/peers/config11_mitsuba.py").display().to_string();
+        let script = root().join("tools/peers/config11_mitsuba.py").display().to_string();
         let mitsuba = |rays: &str, samples: &str, out: &str| words(&[&python, &script, &size, rays, samples, out]);
         // Always 25 samples of the light: its loop over them is unrolled, and 400 take half a minute to compile
         add("Mitsuba", "direct, 2048 x 25 samples", true, &|out| mitsuba("2048", "25", out));
@@ -125,7 +125,7 @@ fn ways(options: &Options, folder: &Path) -> Result<Vec<Way>, String> {
     }
     if let Some(povray) = &options.povray {
         let povray = povray.display().to_string();
-        let scene = format!("+I{}", root().join("xtask/peers/config11.pov").display());
+        let scene = format!("+I{}", root().join("tools/peers/config11.pov").display());
         let (w, h) = (format!("+W{size}"), format!("+H{size}"));
         let fixed =
             [&povray, &scene, "+FN16", &w, &h, "+A0.0", "+R4", "+AM1", "-J", "+WT2", "-D", "-V", "File_Gamma=2.2"];

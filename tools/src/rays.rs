@@ -1,6 +1,6 @@
 //! `cargo xtask rays`: rays through meshes, ours and Embree's in turns, on one thread.
 //!
-//! Embree is driven by `xtask/embree/embree.cc`, which is compiled if a C++ compiler and libembree-dev (3) are there.
+//! Embree is driven by `tools/embree/embree.cc`, which is compiled if a C++ compiler and libembree-dev (3) are there.
 //! Scenes and rays go through files in a temporary folder, orders and times through its standard input and output.
 
 use std::fmt::Write as _;
@@ -269,7 +269,7 @@ fn shadow_rays(scene: &Scene, camera: &[RayBits], hits: &[HitBits]) -> Vec<RayBi
 /// Compiles the peer; the fault is why there is none.
 fn compile(folder: &Path) -> Result<PathBuf, String> {
     let program = folder.join("embree");
-    let source = root().join("xtask/embree/embree.cc");
+    let source = root().join("tools/embree/embree.cc");
     let output =
         Command::new("c++").args(["-O3", "-march=native", "-o"]).arg(&program).arg(source).arg("-lembree3").output();
     let output = output.map_err(|e| format!("c++: {e}"))?;

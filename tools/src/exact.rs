@@ -253,7 +253,8 @@ fn commit() -> String {
     };
     let name = ask(&["rev-parse", "--short=8", "HEAD"]).unwrap_or_else(|| "unknown".into());
     // What is not committed yet belongs to no commit
-    let clean = ask(&["status", "--porcelain", "--", "crates", "xtask", "Cargo.lock"]).is_some_and(|s| s.is_empty());
+    let clean =
+        ask(&["status", "--porcelain", "--", "crates", "tools", "xtask", "Cargo.lock"]).is_some_and(|s| s.is_empty());
     if clean { name } else { format!("{name}+") }
 }
 

@@ -17,3 +17,11 @@ pub fn run(check: bool) -> Outcome {
     }
     Ok(())
 }
+
+#[cfg(test)]
+mod tests {
+    #[test]
+    fn the_files_are_what_the_code_says() {
+        assert_eq!(super::run(true), Ok(()));
+    }
+}

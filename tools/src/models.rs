@@ -1,6 +1,6 @@
 //! `cargo xtask models`: from a PLY file to a PNG file as whole processes, ours and those of others in turns.
 //!
-//! F3D and Mitsuba are asked through `xtask/peers/*.py`, if the Python that is named has them.
+//! F3D and Mitsuba are asked through `tools/peers/*.py`, if the Python that is named has them.
 
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -65,7 +65,7 @@ pub fn run(options: &Options) -> Outcome {
         if let Some(python) = &options.python {
             let python = python.display().to_string();
             for (name, script) in [("F3D", "mesh_f3d.py"), ("Mitsuba, scalar", "mesh_mitsuba.py")] {
-                let script = root().join("xtask/peers").join(script).display().to_string();
+                let script = root().join("tools/peers").join(script).display().to_string();
                 add(name, words(&[&python, &script, &ply, &png, SIZE]));
             }
         }
