@@ -31,9 +31,8 @@ const MAX_PANELS: usize = 64;
 /// Highlights narrower than this, in half heights of the light and standard deviations, may lie between the rows of a
 /// panel.
 const BETWEEN_ROWS: f32 = 0.1;
-/// Points nearer to a light than this, in half heights of the light, are right below it: under constant falloff, under
-/// physical falloff, which makes a much narrower peak.
-const BELOW: [f32; 2] = [0.03, 0.15];
+/// Points nearer to a light than this, in half heights of the light, are right below it.
+const BELOW: f32 = 0.15;
 /// Below a light that is very near, each panel is this many times as far from the foot of the point as the one before.
 const WIDER: f32 = 8.0;
 
@@ -188,7 +187,7 @@ fn cuts(view: &View, hiders: &[Hider], region: &Region, wanted: Wanted) -> Array
         }
     }
     // Below a light that is near, most comes from around the foot of the point, between all rows of a panel
-    if !view.is_near && view.nearest() < BELOW[usize::from(view.physical)] * view.lb {
+    if !view.is_near && view.nearest() < BELOW * view.lb {
         let (foot, width) = (-view.fb / view.lb, view.height / view.lb);
         for off in [2.0 * width, 8.0 * width] {
             offer(f64::from(foot - off));
