@@ -37,14 +37,17 @@ pub(crate) fn for_each_chunk<T: Send>(list: &mut [T], size: usize, each: impl Fn
     for_each(chunks.len(), &|i| each(i, &mut chunks[i].lock().expect("each chunk comes once")));
 }
 
+/// Calls `each` with the elements of a list, in chunks of `size`, and which of them it is.
+pub(crate) fn for_each_mut<T: Send>(list: &mut [T], size: usize, each: impl Fn(usize, &mut T) + Sync) {
+    for_each_chunk(list, size, |chunk, list| {
+        list.iter_mut().zip(chunk * size..).for_each(|(value, i)| each(i, value));
+    });
+}
+
 /// What `make` makes of each number below `count`, in chunks of `size`.
 pub(crate) fn map<T: Clone + Default + Send>(count: usize, size: usize, make: impl Fn(usize) -> T + Sync) -> Vec<T> {
     let mut list = vec![T::default(); count];
-    for_each_chunk(&mut list, size, |chunk, list| {
-        for (i, value) in list.iter_mut().enumerate() {
-            *value = make(chunk * size + i);
-        }
-    });
+    for_each_mut(&mut list, size, |i, value| *value = make(i));
     list
 }
 

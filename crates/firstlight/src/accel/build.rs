@@ -12,7 +12,6 @@
 //! alone, bins are joined by minimum, maximum and whole numbers, and the tasks' results are joined in their order.
 
 use glam::{BVec4A, UVec4, Vec4, Vec4Swizzles};
-
 use rayon::prelude::*;
 
 use super::Aabb;

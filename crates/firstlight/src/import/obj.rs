@@ -385,28 +385,27 @@ fn join(parts: &mut [Piece]) -> Result<Known, Fault> {
 /// Texture coordinates and normals of files that have none are left out.
 fn resolve(file: &[u8], pieces: &[Range<usize>], parts: &mut [Piece], counts: &[[usize; 3]]) -> Result<(), Fault> {
     let all_counts = counts.last().copied().unwrap_or_default();
-    let resolve = |part: &mut Piece, before: &[usize; 3]| {
-        for (n, corner) in part.corners.iter_mut().enumerate() {
-            for (kind, index) in corner.iter_mut().enumerate().filter(|(_, index)| **index != NONE) {
-                let value = i64::from(*index);
-                // A list that is not there at all: as if the corner did not name it
-                if all_counts[kind] == 0 && kind > 0 {
-                    *index = NONE;
-                    continue;
-                }
-                let absolute = if value < 0 { value - RELATIVE + before[kind] as i64 + 1 } else { value };
-                if absolute < 1 || absolute > all_counts[kind] as i64 {
-                    return Some((n, kind, absolute));
-                }
-                *index = absolute as i32;
+    let resolve = |(n, corner): (usize, &mut [i32; 3]), before: &[usize; 3]| {
+        for (kind, index) in corner.iter_mut().enumerate().filter(|(_, index)| **index != NONE) {
+            let value = i64::from(*index);
+            // A list that is not there at all: as if the corner did not name it
+            if all_counts[kind] == 0 && kind > 0 {
+                *index = NONE;
+                continue;
             }
+            let absolute = if value < 0 { value - RELATIVE + before[kind] as i64 + 1 } else { value };
+            if absolute < 1 || absolute > all_counts[kind] as i64 {
+                return Some((n, kind, absolute));
+            }
+            *index = absolute as i32;
         }
         None
     };
     let faults = Mutex::new(Vec::new());
-    parallel::for_each_chunk(parts, 1, |i, part| {
-        let fault = resolve(&mut part[0], &counts[i]).map(|fault| (i, fault));
-        faults.lock().expect("no thread panics while it holds the faults").extend(fault);
+    parallel::for_each_mut(parts, 1, |i, part| {
+        if let Some(fault) = part.corners.iter_mut().enumerate().find_map(|corner| resolve(corner, &counts[i])) {
+            faults.lock().expect("no thread panics while it holds the faults").push((i, fault));
+        }
     });
     let faults = faults.into_inner().expect("no thread panics while it holds the faults");
     let Some((part, (corner, kind, absolute))) = faults.into_iter().min() else { return Ok(()) };
@@ -508,7 +507,7 @@ fn vertices(keys: &[[i32; 3]], known: Known, mesh: &mut MeshData, triangles: &mu
     };
     if same(1, with_uvs, uvs.len()) && same(2, with_normals, normals.len()) {
         let vertex = |i: u32| keys[i as usize][0] as u32 - 1;
-        parallel::for_each_chunk(triangles, CHUNK, |_, part| part.iter_mut().for_each(|t| *t = t.map(vertex)));
+        parallel::for_each_mut(triangles, CHUNK, |_, t| *t = t.map(vertex));
         mesh.colors = parallel::map(colors.len(), CHUNK, |i| alpha(&colors[i]));
         mesh.positions = positions;
         mesh.uvs = if with_uvs > 0 { vec![uvs] } else { Vec::new() };

@@ -163,7 +163,7 @@ impl MeshData {
             }
         }
         drop(edges);
-        parallel::for_each_chunk(&mut fine, CHUNK, |_, fine| fine.iter_mut().for_each(|t| t.sort_unstable()));
+        parallel::for_each_mut(&mut fine, CHUNK, |_, t| t.sort_unstable());
         fine.par_sort_unstable();
         report.duplicate_triangles = fine.windows(2).filter(|pair| pair[0] == pair[1]).count() as u64;
     }

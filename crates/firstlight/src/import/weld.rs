@@ -114,9 +114,8 @@ pub(super) fn weld(count: usize, key: impl Fn(usize) -> Key + Sync) -> Welded {
 impl Welded {
     /// Puts vertices in place of corners.
     pub fn renumber(&self, triangles: &mut [[u32; 3]]) {
-        parallel::for_each_chunk(triangles, CHUNK, |_, part| {
-            part.iter_mut().for_each(|triangle| *triangle = triangle.map(|corner| self.vertex[corner as usize]));
-        });
+        let vertex = |corner: u32| self.vertex[corner as usize];
+        parallel::for_each_mut(triangles, CHUNK, |_, triangle| *triangle = triangle.map(vertex));
     }
 }
 
