@@ -399,9 +399,9 @@ fn a_light_in_the_plane_of_a_ceiling_is_not_blocked_by_it() {
             .with_parallelogram(square(floor, n, 3.0 * h))
             .with_light(LightDesc::Rectangle(light.clone()))
             .with_light(LightDesc::Point(point(add(light.center, mul(b, 0.1 * h)), h * h)));
-        let open = shoot(&scene);
+        let open = shoot_every_ray(&scene);
         assert!(open.pixels.iter().all(|p| p[0] > 0.0));
-        let covered = shoot(&scene.clone().with_parallelogram(square(top, n, 2.0 * h)));
+        let covered = shoot_every_ray(&scene.clone().with_parallelogram(square(top, n, 2.0 * h)));
         assert_eq!(bits(&open), bits(&covered), "ceiling {i} blocks its own light\n{scene:#?}");
         // Nor does the light's own rectangle, when it blocks
         let mut blocking = scene.clone();
@@ -409,7 +409,11 @@ fn a_light_in_the_plane_of_a_ceiling_is_not_blocked_by_it() {
         blocking.lights.truncate(1);
         let mut alone = scene.clone();
         alone.lights.truncate(1);
-        assert_eq!(bits(&shoot(&alone)), bits(&shoot(&blocking)), "light {i} blocks itself\n{scene:#?}");
+        assert_eq!(
+            bits(&shoot_every_ray(&alone)),
+            bits(&shoot_every_ray(&blocking)),
+            "light {i} blocks itself\n{scene:#?}"
+        );
     }
 }
 

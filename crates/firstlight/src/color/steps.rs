@@ -59,6 +59,22 @@ impl DisplaySteps {
         self.encode(low + error) - self.encode(low)
     }
 
+    /// The value that is so many steps above black.
+    pub fn value_of(&self, steps: f32) -> f32 {
+        let above = self.encoded.partition_point(|encoded| *encoded < steps);
+        let octave = above as f64 / f64::from(PER_OCTAVE) + f64::from(FIRST);
+        pxfm::f_exp2(octave) as f32
+    }
+
+    /// How many steps an error makes at a value for each unit of it. `least` is the least value that shows: errors as
+    /// large are looked for at black, where the curve is steepest.
+    #[inline(always)]
+    pub fn slope(&self, value: f32, least: f32) -> f32 {
+        let value = value.max(least);
+        let error = least.max(value * 0.0625);
+        self.of_error(value, error) / error
+    }
+
     /// The most steps of any channel.
     #[inline(always)]
     pub fn of_color(&self, value: Rgb, error: Rgb) -> f32 {

@@ -30,6 +30,35 @@ impl Emitter {
         }
     }
 
+    /// Whether light weakens with the square of the distance and the cosine at the light.
+    pub fn is_physical(&self) -> bool {
+        match self {
+            Emitter::Flat(flat) => flat.physical,
+            Emitter::Ball { .. } | Emitter::Points => true,
+        }
+    }
+
+    /// Whether a flat light stands for it everywhere.
+    pub fn is_closed(&self) -> bool {
+        !matches!(self, Emitter::Points)
+    }
+
+    /// Whether what it sends changes at once where a point passes its plane.
+    pub fn is_one_sided(&self) -> bool {
+        match self {
+            Emitter::Flat(flat) => flat.physical || !flat.both_sides,
+            Emitter::Ball { .. } | Emitter::Points => false,
+        }
+    }
+
+    /// What it fills of its square.
+    pub fn outline(&self) -> Outline {
+        match self {
+            Emitter::Flat(flat) => flat.outline,
+            Emitter::Ball { .. } | Emitter::Points => Outline::Disk,
+        }
+    }
+
     /// The flat light that stands for it, seen from `p`; `None` if nothing emits towards `p`.
     pub fn flat(&self, p: Vec3) -> Option<FlatLight> {
         match self {

@@ -10,18 +10,25 @@
 //!
 //! A highlight that is narrow beside the light is integrated by itself, over the part of the light that it covers.
 
+mod batch;
 mod between;
 mod cells;
+mod classify;
 mod emitter;
+mod evaluate;
+mod fit;
 mod hider;
 mod lobe;
 mod mask;
 mod near;
+mod occluder;
+mod panels;
 mod points;
 mod rows;
 mod rules;
 mod solids;
 mod tensor;
+mod tolerance;
 mod view;
 
 use std::ops::{Add, Mul};
@@ -29,12 +36,16 @@ use std::ops::{Add, Mul};
 use arrayvec::ArrayVec;
 use fearless_simd::prelude::*;
 
+pub(crate) use batch::ShadingPoint;
 pub(crate) use between::{Asker, Between};
+pub(crate) use classify::Obstacles;
 pub(crate) use emitter::Emitter;
+pub(crate) use evaluate::{Arrived, Asked, Evaluator, Visibility};
 use hider::Hider;
 pub(crate) use mask::Masked;
 use rows::{MAX_HIDERS, Region};
 pub(crate) use tensor::sharpness;
+pub(crate) use tolerance::Tolerance;
 use view::Outline;
 pub(crate) use view::{Receiver, View};
 

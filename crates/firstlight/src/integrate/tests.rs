@@ -4,9 +4,11 @@ use fearless_simd::Level;
 
 use super::view::FlatLight;
 use super::*;
+use crate::color::{Display, DisplaySteps, Rgb};
 use crate::material::{BlinnPhongLobe, PhongLobe};
 use crate::math::dispatch_wide;
 use crate::math::{DVec3, ErrorBound, Vec3};
+use crate::shape::{Sphere, SphereUv};
 
 struct Random(firstlight_testkit::Random);
 
@@ -187,4 +189,70 @@ fn one_thing_in_the_way() {
 #[test]
 fn several_things_in_the_way() {
     check(3000..3400, 5, 100.0, 500, 5e-3);
+}
+
+/// What batches say of the same light behind the same spheres, sixteen points and more at once.
+fn batched(cases: &[(Case, Vec<Sphere>)], steps: &DisplaySteps) -> Vec<Sums> {
+    let tolerance = Tolerance::DEFAULT;
+    let one = |(case, spheres): &(Case, Vec<Sphere>)| {
+        let Receiver { p, error, ns, wo, .. } = case.receiver;
+        let worth = [Rgb::gray(0.5), Rgb::gray(0.5)];
+        let point = ShadingPoint { worth, ..ShadingPoint::new(p, error, ns, wo) };
+        let asked = Asked {
+            emitter: &Emitter::Flat(case.light),
+            obstacles: &Obstacles::of_spheres(spheres),
+            lobe: &case.receiver.lobe,
+            steps,
+            tolerance: &tolerance,
+            allowed: tolerance.point,
+            least: steps.value_of(tolerance.point),
+            shadows: true,
+        };
+        let all = |level: Level, count: usize| {
+            let mut arrived = Vec::new();
+            Evaluator::default().evaluate(level, &asked, &vec![point; count], &mut arrived);
+            arrived
+        };
+        let sums = all(Level::new(), 1)[0].sums;
+        // Neither who shares a batch nor the instruction set changes a bit
+        for same in all(Level::new(), 21).iter().chain(&all(Level::fallback(), 3)) {
+            assert_eq!(same.sums, sums);
+        }
+        sums
+    };
+    cases.iter().map(one).collect()
+}
+
+#[test]
+fn batches_agree_with_rows_asked_one_by_one() {
+    let steps = DisplaySteps::new(&Display::default());
+    let mut cases = Vec::new();
+    for seed in 5000..5600 {
+        let Some(mut case) = case(seed, 0, 200.0) else { continue };
+        let mut random = Random::new(seed);
+        let mut spheres = Vec::new();
+        for _ in 0..(seed % 4) {
+            let at = case.light.c * random.between(0.1, 1.1) + random.direction() * random.unit();
+            let r = random.scale(0.05, 1.0);
+            // Above the horizon, and around neither the point nor a part of the light
+            let is_clear = at.length() > r * 1.01 && at.dot(case.receiver.ns.as_dvec3()) > -r;
+            if is_clear {
+                spheres.push(Sphere { c: at, r, uv: SphereUv::Angles, single_sided: false });
+                case.hiders.extend(Hider::sphere(&case.view, at, r));
+            }
+        }
+        cases.push((case, spheres));
+    }
+    assert!(cases.len() > 200, "{}", cases.len());
+    let mut over = 0;
+    for ((case, _), found) in cases.iter().zip(batched(&cases, &steps)) {
+        let (truth, _) = integrated(case, 1e-6);
+        let value = Rgb::gray(0.5 * (truth.diffuse + truth.specular));
+        let error = 0.5 * ((found.diffuse - truth.diffuse).abs() + (found.specular - truth.specular).abs());
+        let off = steps.of_color(value, Rgb::gray(error));
+        assert!(off < 1.0, "{found:?} is not {truth:?}: {off} steps\n{:?}", case.view);
+        over += u32::from(off > 0.25);
+    }
+    // As a rule they are far better than that
+    assert!(over * 100 < cases.len() as u32, "{over} of {}", cases.len());
 }

@@ -76,6 +76,12 @@ impl Material {
 }
 
 impl Material {
+    /// Whether it has no texture.
+    pub(crate) fn is_plain(&self) -> bool {
+        let ambient = self.ambient.and_then(|ambient| ambient.texture);
+        [self.diffuse.texture, self.specular.texture, self.shininess.texture, ambient] == [None; 4]
+    }
+
     /// Whether it is the same all over the footprint of a surface, and a little beyond.
     pub(crate) fn is_even(&self, si: &SurfaceInteraction, textures: &[Texture]) -> bool {
         let even = |texture: Option<TextureId>| texture.is_none_or(|id| textures[id.index()].is_even(si));

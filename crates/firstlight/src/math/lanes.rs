@@ -60,3 +60,30 @@ impl<S: Simd> Vec3x16<S> {
         Self { x: self.x.abs(), y: self.y.abs(), z: self.z.abs() }
     }
 }
+
+impl<S: Simd> std::ops::Add for Vec3x16<S> {
+    type Output = Self;
+
+    #[inline(always)]
+    fn add(self, o: Self) -> Self {
+        Self { x: self.x + o.x, y: self.y + o.y, z: self.z + o.z }
+    }
+}
+
+impl<S: Simd> std::ops::Sub for Vec3x16<S> {
+    type Output = Self;
+
+    #[inline(always)]
+    fn sub(self, o: Self) -> Self {
+        Self { x: self.x - o.x, y: self.y - o.y, z: self.z - o.z }
+    }
+}
+
+impl<S: Simd> std::ops::Mul<f32x16<S>> for Vec3x16<S> {
+    type Output = Self;
+
+    #[inline(always)]
+    fn mul(self, by: f32x16<S>) -> Self {
+        Self { x: self.x * by, y: self.y * by, z: self.z * by }
+    }
+}

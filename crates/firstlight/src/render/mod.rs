@@ -9,19 +9,22 @@
 //! [`tiled`](tiled/index.html) integrates lights and lights a surface once where that is enough; all else is as above.
 
 mod arrival;
+mod cell;
 mod change;
 mod counts;
 mod crowd;
 mod cut;
 mod fence;
-mod field;
 mod film;
+mod fragment;
 #[cfg(feature = "bench")]
 pub(crate) mod given;
+mod grid;
 mod heat;
 mod hits;
 mod ladder;
 mod lanes;
+mod light_queue;
 mod many;
 mod patch;
 pub(crate) mod pixel;
@@ -54,15 +57,18 @@ use crate::parallel;
 use crate::scene::Scene;
 use crate::visibility::Target;
 use arrival::{Arrivals, Lights};
+use cell::{CELL, Cells};
 pub(crate) use counts::Counts;
 use film::FilmTile;
 use hits::PixelHits;
 use lanes::Lanes;
+use light_queue::{BatchLights, LightQueue};
+use many::FEW;
 use pixel::{Lighting, PixelSum};
 use plain::Plain;
 use shafts::Shafts;
 use tile::Tile;
-use tiled::{CELL, Tiled};
+use tiled::Tiled;
 
 words! {
     /// How the edges of what a pixel holds are smoothed.
@@ -237,6 +243,7 @@ pub fn render(
     let nothing = Counts::default().stats(simd, threads);
     let result = Mutex::new((Film::new([scene.width, scene.height], window, settings.heat), nothing));
     let lights = Lights::new(scene);
+    let batch = BatchLights::new(scene, &lights);
     // Where every light is sampled at every ray, the bits are those of the plain renderer
     let every_ray =
         settings.samples_all() || settings.aa_mode == AaMode::Full && lights.emitters.iter().all(Option::is_none);
@@ -251,6 +258,8 @@ pub fn render(
     let by_shafts = every_ray && !settings.samples_all();
     let targets = if by_shafts { Target::of_all(scene) } else { Vec::new() };
     let level = settings.simd.resolve();
+    let by_cells = scene.geometry.listed && !scene.geometry.has_trees() && scene.lights.len() <= FEW;
+    let spare: Mutex<Vec<Cells>> = Mutex::new(Vec::new());
     let render_one = |tile: &Tile| {
         if stop.load(Ordering::Relaxed) {
             return;
@@ -267,8 +276,19 @@ pub fn render(
         } else if !every_ray {
             let token = level.token();
             let arrivals = Arrivals::new(scene, &lights, token);
-            Tiled::new(scene, settings.aa_mode, PixelHits::new(token, scene.antialiasing), arrivals)
-                .render(tile, &go_on)
+            if by_cells {
+                // Their memory goes from tile to tile
+                let used = spare.lock().expect("no thread panics while it holds a renderer").pop();
+                let mut cells = used.unwrap_or_else(|| {
+                    Cells::new(scene, settings.aa_mode, LightQueue::new(scene, &lights, &batch, arrivals))
+                });
+                let rendered = cells.render(tile, &go_on);
+                spare.lock().expect("no thread panics while it holds a renderer").push(cells);
+                rendered
+            } else {
+                Tiled::new(scene, settings.aa_mode, PixelHits::new(token, scene.antialiasing), arrivals)
+                    .render(tile, &go_on)
+            }
         } else if by_shafts {
             Shafts::new(scene, &targets, level.token()).render(tile, &go_on)
         } else {

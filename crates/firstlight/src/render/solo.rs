@@ -4,7 +4,6 @@
 //! through the corners all meet one convex shape, so do all between them; and if it is nearer there than anything else
 //! can be, it is all that is seen.
 
-use super::patch::{Contrast, Patch};
 use super::square::Square;
 use crate::ids::SurfaceId;
 use crate::light::{AreaShape, LightKind};
@@ -219,24 +218,43 @@ pub(crate) fn all(scene: &Scene) -> Vec<Candidate> {
 }
 
 impl Candidate {
+    /// How far along a ray that meets only this it ends.
+    #[inline(always)]
+    pub fn intersect(self, scene: &Scene, ray: &Ray) -> Option<f64> {
+        match self {
+            Candidate::Sphere(i) => scene.geometry.spheres[i as usize].shape.intersect(ray),
+            Candidate::Parallelogram(i) => scene.geometry.parallelograms[i as usize].shape.intersect(ray),
+            Candidate::Light(i) => match &scene.lights[i as usize].kind {
+                LightKind::Area(area) => area.shape.intersect(ray),
+                _ => None,
+            },
+        }
+    }
+
+    /// Its surface.
+    #[inline(always)]
+    pub fn surface(self, scene: &Scene) -> SurfaceId {
+        match self {
+            Candidate::Sphere(i) => scene.geometry.spheres[i as usize].surface,
+            Candidate::Parallelogram(i) => scene.geometry.parallelograms[i as usize].surface,
+            Candidate::Light(i) => SurfaceId(scene.geometry.surfaces.len() as u32 + i),
+        }
+    }
+
+    /// What a ray ends at that meets it at `t`.
+    #[inline(always)]
+    pub fn hit_at(self, scene: &Scene, t: f64) -> Hit {
+        let at = match self {
+            Candidate::Sphere(i) => At::Sphere(i),
+            Candidate::Parallelogram(i) => At::Parallelogram(i),
+            Candidate::Light(_) => At::Light,
+        };
+        Hit { t, surface: self.surface(scene), at }
+    }
+
     /// What a ray that meets only this ends at.
     pub fn hit(self, scene: &Scene, ray: &Ray) -> Option<Hit> {
-        let geometry = &scene.geometry;
-        let (t, surface, at) = match self {
-            Candidate::Sphere(i) => {
-                let owned = &geometry.spheres[i as usize];
-                (owned.shape.intersect(ray)?, owned.surface, At::Sphere(i))
-            }
-            Candidate::Parallelogram(i) => {
-                let owned = &geometry.parallelograms[i as usize];
-                (owned.shape.intersect(ray)?, owned.surface, At::Parallelogram(i))
-            }
-            Candidate::Light(i) => {
-                let LightKind::Area(area) = &scene.lights[i as usize].kind else { return None };
-                (area.shape.intersect(ray)?, SurfaceId(geometry.surfaces.len() as u32 + i), At::Light)
-            }
-        };
-        Some(Hit { t, surface, at })
+        self.intersect(scene, ray).map(|t| self.hit_at(scene, t))
     }
 
     /// The material over a square of pixels that see only this, if it is the same all over it.
@@ -268,23 +286,6 @@ impl Candidate {
         let [across, down] = step.on_plane(ray.d, t as f32, si.ng, f32::MAX.sqrt() * 0.25);
         let turn = 0.5 * curvature * (across.length() + down.length());
         turn < 0.25 * si.ng.dot(si.wo)
-    }
-
-    /// Tells the material at each pixel of a square that sees only this, the mean over its rays; nothing for pixels
-    /// over which more than colours change.
-    pub fn bsdfs(self, scene: &Scene, square: Square, tell: &mut impl FnMut([u32; 2], Bsdf, Contrast)) {
-        if square.side == 1 {
-            let at = [square.x, square.y];
-            if let Some(patch) = Patch::whole(scene, at, self).filter(|patch| !patch.uneven) {
-                tell(at, patch.bsdf, patch.contrast);
-            }
-        } else if let Some(bsdf) = self.even(scene, square) {
-            square.pixels().for_each(|at| tell(at, bsdf, Contrast::default()));
-        } else {
-            for quarter in square.quarters() {
-                self.bsdfs(scene, quarter, tell);
-            }
-        }
     }
 
     /// How much its normal turns over a metre, in radians.

@@ -1,10 +1,10 @@
-//! The renderer that pictures are made with: a cell of pixels goes through the same stations together, and each surface
-//! in a pixel is shaded once where that is shown to be enough.
+//! The renderer of scenes that batches do not know yet, with meshes and other things in trees or with many lights: a
+//! cell of pixels goes through the same stations together, and each surface in a pixel is shaded once where that is
+//! shown to be enough.
 //!
 //! - Which surfaces pixels hold: squares that hold one are proved without a ray for each ([`solo`](super::solo)), else
-//!   all n x n camera rays say it ([`patch`](super::patch)).
-//! - Over such a square light is taken from nine places where those tell all ([`field`](super::field)). Where lights
-//!   are many, [`many`](super::many) takes the place of this and the next.
+//!   all n x n camera rays say it ([`patch`](super::patch)). Where lights are many, [`many`](super::many) takes the
+//!   place of the next.
 //! - What arrives of each light at the middle of each patch, with a bound of how much it bends over it
 //!   ([`arrival`](super::arrival)).
 //! - Where the bound would show, the neighbours are asked: where shadows and highlights are wider than a pixel, what
@@ -19,33 +19,28 @@ mod mean;
 use std::ops::ControlFlow;
 
 use super::arrival::{Arrivals, Place};
+use super::cell::CELL;
 use super::change::Arrival;
-use super::field::{Field, Shade};
 use super::film::FilmTile;
 use super::hits::PixelHits;
 use super::many::Many;
-use super::patch::{Contrast, Patch, PixelPatches};
+use super::patch::{Patch, PixelPatches};
 use super::solo::{self, Candidate, Pyramid};
 use super::square::Square;
 use super::tile::Tile;
 use super::{AaMode, Counts};
 use crate::color::Rgb;
 use crate::integrate::Sums;
-use crate::material::Bsdf;
 use crate::scene::Scene;
 use behind::{Block, Outlook};
 pub(super) use mean::{BEND, second_difference, within};
 
-/// Pixels across a cell.
-pub(crate) const CELL: u32 = 32;
 /// With its rim.
 pub(super) const ACROSS: usize = CELL as usize + 2;
 /// Pixels across the smallest squares that are asked whether they hold one surface.
 const SMALLEST: u32 = 2;
 /// Lists of candidates: of the cell with its rim, and of squares of each size down to the smallest.
 const DEPTHS: usize = (CELL / SMALLEST).ilog2() as usize + 2;
-/// Pixels across the largest square whose colours are looked up one by one.
-const PATCHWORK: u32 = 8;
 
 /// How much is known of a pixel.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -69,7 +64,6 @@ pub(crate) struct Tiled<'a> {
     near: [Vec<Candidate>; DEPTHS],
     /// The upper left corner of the cell.
     corner: [u32; 2],
-    field: Field,
     arrivals: Arrivals<'a>,
     /// The cell and its rim, row by row.
     known: Vec<Known>,
@@ -89,7 +83,7 @@ pub(crate) struct Tiled<'a> {
     outlooks: Vec<Outlook>,
     seen: Vec<usize>,
     block: Block,
-    /// In place of `field`, `arrived`, `values` where lights are many.
+    /// In place of `arrived`, `values` where lights are many.
     many: Option<Many<'a>>,
 }
 
@@ -107,7 +101,6 @@ impl<'a> Tiled<'a> {
             listed: listed.then(|| solo::all(scene)),
             near: Default::default(),
             corner: [0; 2],
-            field: Field::new(if many.is_some() { 0 } else { scene.lights.len() }),
             arrivals,
             known: vec![Known::Nothing; ACROSS * ACROSS],
             colors: vec![None; ACROSS * ACROSS],
@@ -161,7 +154,6 @@ impl<'a> Tiled<'a> {
             let [x, y] = corner.map(|at| at as f32 - 1.0);
             Pyramid::new(scene, x, y, ACROSS as f32).candidates(scene, listed, &mut self.near[0]);
             // All of the cell, also where it is not in the tile: what is found must not depend on that
-            self.field.begin(corner);
             self.split(Square { x: corner[0], y: corner[1], side: CELL }, 1, counts, go_on)?;
         } else {
             self.trace(tile, counts, go_on)?;
@@ -220,7 +212,8 @@ impl<'a> Tiled<'a> {
         if self.mode == AaMode::Adaptive
             && let Some(only) = pyramid.only(scene, near)
         {
-            return self.solo(square, only, counts, go_on);
+            square.pixels().for_each(|at| self.learn(at, Known::Only(only), None, 0.0));
+            return ControlFlow::Continue(());
         }
         if square.side > SMALLEST {
             for quarter in square.quarters_on([scene.width, scene.height]) {
@@ -245,102 +238,6 @@ impl<'a> Tiled<'a> {
             let index = self.index([i, j]);
             (self.known[index], self.colors[index], self.work[index]) = (known, color, work);
         }
-    }
-
-    /// Lights a square that is proved to see one shape.
-    fn solo(
-        &mut self,
-        square: Square,
-        only: Candidate,
-        counts: &mut Counts,
-        go_on: &impl Fn() -> ControlFlow<()>,
-    ) -> ControlFlow<()> {
-        let scene = self.scene;
-        if square.side <= PATCHWORK {
-            go_on()?;
-        }
-        let even = only.even(scene, square);
-        if even.is_none() && square.side > PATCHWORK {
-            for quarter in square.quarters_on([scene.width, scene.height]) {
-                self.solo(quarter, only, counts, go_on)?;
-            }
-            return ControlFlow::Continue(());
-        }
-        let mut bsdfs = [None; (PATCHWORK * PATCHWORK) as usize];
-        let mut contrasts = [Contrast::default(); (PATCHWORK * PATCHWORK) as usize];
-        let shade = match even {
-            Some(bsdf) => Some(Shade::even(scene, only, &bsdf)),
-            None => {
-                // Beyond the film's edge as well: it is a part of the square
-                only.bsdfs(scene, square, &mut |[x, y], bsdf, contrast| {
-                    let place = ((y - square.y) * PATCHWORK + x - square.x) as usize;
-                    (bsdfs[place], contrasts[place]) = (Some(bsdf), contrast);
-                });
-                Shade::of(
-                    scene,
-                    only,
-                    square.pixels().map(|[x, y]| bsdfs[((y - square.y) * PATCHWORK + x - square.x) as usize]),
-                )
-            }
-        };
-        let before = counts.work();
-        if let Some(shade) = shade.as_ref().filter(|_| self.many.is_none()) {
-            self.field.light(scene, &mut self.arrivals, square, shade, counts);
-        }
-        let each = (counts.work() - before) / (square.side * square.side) as f32;
-        for at in square.pixels() {
-            let color = match (&shade, even) {
-                _ if self.many.is_some() => None,
-                (Some(_), Some(bsdf)) => self.color(at, &bsdf),
-                (Some(_), None) => {
-                    let place = ((at[1] - square.y) * PATCHWORK + at[0] - square.x) as usize;
-                    bsdfs[place]
-                        .and_then(|bsdf| self.color(at, &bsdf))
-                        .filter(|color| !self.mixes(at, square, &contrasts[place], color))
-                }
-                _ => None,
-            };
-            self.learn(at, Known::Only(only), color, each);
-        }
-        ControlFlow::Continue(())
-    }
-
-    /// Whether colours and light change together over a pixel of a square so much that the mean of their product is not
-    /// that of their means.
-    fn mixes(&self, [i, j]: [u32; 2], square: Square, contrast: &Contrast, [r, g, b, _]: &[f32; 4]) -> bool {
-        if *contrast == Contrast::default() {
-            return false;
-        }
-        let inside = |at: [u32; 2]| {
-            (square.x..square.x + square.side).contains(&at[0]) && (square.y..square.y + square.side).contains(&at[1])
-        };
-        let beside = [[i.wrapping_sub(1), j], [i + 1, j], [i, j.wrapping_sub(1)], [i, j + 1]];
-        let mut error = Rgb::BLACK;
-        for light in 0..self.scene.lights.len() {
-            let Some(here) = self.field.arrived(light, [i, j]) else { return true };
-            let mut slope = Sums::default();
-            for at in beside.into_iter().filter(|at| inside(*at)) {
-                let Some(there) = self.field.arrived(light, at) else { return true };
-                slope.diffuse = slope.diffuse.max((there.diffuse - here.diffuse).abs());
-                slope.specular = slope.specular.max((there.specular - here.specular).abs());
-            }
-            // Along both axes
-            error += self.mingled(light, contrast, &(slope * 2.0));
-        }
-        self.arrivals.steps(Rgb::new(*r, *g, *b), error) > BEND
-    }
-
-    /// The colour of a pixel that sees one shape, if all light there is known.
-    fn color(&self, at: [u32; 2], bsdf: &Bsdf) -> Option<[f32; 4]> {
-        let scene = self.scene;
-        let mut color = scene.ambient * bsdf.ambient;
-        for light in 0..scene.lights.len() {
-            let sums = self.field.arrived(light, at)?;
-            let scale = self.arrivals.scale(light);
-            color += scale * bsdf.diffuse * sums.diffuse;
-            color += scale * bsdf.specular * sums.specular;
-        }
-        Some([color.r, color.g, color.b, 1.0])
     }
 
     /// Traces all rays of a cell and its rim, and looks for lights from what they meet.
@@ -441,18 +338,15 @@ impl<'a> Tiled<'a> {
         let mut value = base;
         let share = self.share(patch);
         let pixel = self.index(at);
-        let is_only = matches!(self.known[pixel], Known::Only(_)) && self.is_in_cell(at);
         for index in 0..scene.lights.len() {
             let outlook = self.outlook(pixel, k, index);
             let place = self.arrivals.place(index, &patch.si, &patch.bsdf).over(patch);
             let lit = matches!(outlook, Outlook::Lit);
             let clear = lit || matches!(outlook, Outlook::Clear);
             let place = Place { share, parted: true, lit, clear, ..place };
-            let known = if is_only { self.field.arrived(index, at) } else { None };
-            let arrival = match (outlook, known) {
-                (Outlook::Dark, _) => Arrival::even(Sums::default()),
-                (Outlook::Parted | Outlook::Settled(_), _) => Arrival::PARTED,
-                (_, Some(sums)) => Arrival::even(sums),
+            let arrival = match outlook {
+                Outlook::Dark => Arrival::even(Sums::default()),
+                Outlook::Parted | Outlook::Settled(_) => Arrival::PARTED,
                 _ => self.arrivals.arrival(index, &place, counts),
             };
             value += place.colors[0] * arrival.sums.diffuse + place.colors[1] * arrival.sums.specular;
@@ -470,10 +364,6 @@ impl<'a> Tiled<'a> {
             UNLIT => Outlook::Unknown,
             first => self.outlooks[first + k * self.scene.lights.len() + light],
         }
-    }
-
-    fn is_in_cell(&self, at: [u32; 2]) -> bool {
-        at.iter().zip(self.corner).all(|(at, corner)| (corner..corner + CELL).contains(at))
     }
 
     /// The colour of a pixel: red, green, blue premultiplied, alpha.

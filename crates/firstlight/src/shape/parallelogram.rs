@@ -129,19 +129,32 @@ impl Parallelogram {
         (inside(self.u_axis) && inside(self.v_axis)).then_some(t)
     }
 
+    /// Where `ray` meets it at `t`, how sure that is, and the normal there.
+    #[inline(always)]
+    pub(crate) fn place(&self, ray: &Ray, t: f64) -> (Vec3, ErrorBound, Vec3) {
+        let (o, way) = (ray.o.as_dvec3(), ray.d.as_dvec3() * t);
+        let p = (o + way).as_vec3();
+        (p, ErrorBound::of_rounded(p, o.abs() + way.abs() + self.p.abs()), self.n.as_vec3())
+    }
+
+    /// The same of the point of its plane that is nearest to `q`.
+    pub(crate) fn nearest_place(&self, q: DVec3) -> (Vec3, ErrorBound, Vec3) {
+        let p = (q - self.n * self.n.dot(q - self.p)).as_vec3();
+        (p, ErrorBound::of_rounded(p, q.abs() + self.p.abs()), self.n.as_vec3())
+    }
+
     /// The point that `ray` meets at `t`, with its texture coordinate and the footprint of the ray.
     #[inline(always)]
     pub(crate) fn point(&self, ray: &Ray, t: f64, differential: &RayDifferential) -> ShapePoint {
-        let (o, way) = (ray.o.as_dvec3(), ray.d.as_dvec3() * t);
-        let p = (o + way).as_vec3();
-        let hit = o - self.p + way;
+        let (p, error, n) = self.place(ray, t);
+        let hit = ray.o.as_dvec3() - self.p + ray.d.as_dvec3() * t;
         let uv = DVec2::new(hit.dot(self.u_axis), hit.dot(self.v_axis)).clamp(DVec2::ZERO, DVec2::ONE);
-        let (n, u_axis, v_axis) = (self.n.as_vec3(), self.u_axis.as_vec3(), self.v_axis.as_vec3());
+        let (u_axis, v_axis) = (self.u_axis.as_vec3(), self.v_axis.as_vec3());
         let steps = differential.on_plane(ray.d, t as f32, n, f32::MAX.sqrt() * 0.5);
         let [dx, dy] = steps.map(|dp| Vec2::new(dp.dot(u_axis), dp.dot(v_axis)));
         ShapePoint {
             p,
-            error: ErrorBound::of_rounded(p, o.abs() + way.abs() + self.p.abs()),
+            error,
             normal: n,
             shading: n,
             lifted: None,

@@ -94,13 +94,27 @@ impl Sphere {
         }
     }
 
-    /// The point of the sphere that `ray` meets at `t`, with its texture coordinate and the footprint of the ray.
+    /// Where `ray` meets the sphere at `t`, how sure that is, and the normal there.
     #[inline(always)]
-    pub(crate) fn point(&self, ray: &Ray, t: f64, differential: &RayDifferential) -> ShapePoint {
+    pub(crate) fn place(&self, ray: &Ray, t: f64) -> (Vec3, ErrorBound, Vec3) {
         // From the centre outwards: the point lies on the sphere however far away the camera is
         let outwards = (ray.o.as_dvec3() - self.c + ray.d.as_dvec3() * t).normalize_or(DVec3::Y);
         let p = (self.c + outwards * self.r).as_vec3();
-        let (n, r) = (outwards.as_vec3(), self.r as f32);
+        (p, ErrorBound::of_rounded(p, self.c.abs() + DVec3::splat(self.r)), outwards.as_vec3())
+    }
+
+    /// The same of the point of the sphere that is nearest to `q`.
+    pub(crate) fn nearest_place(&self, q: DVec3) -> (Vec3, ErrorBound, Vec3) {
+        let outwards = (q - self.c).normalize_or(DVec3::Y);
+        let p = (self.c + outwards * self.r).as_vec3();
+        (p, ErrorBound::of_rounded(p, self.c.abs() + DVec3::splat(self.r)), outwards.as_vec3())
+    }
+
+    /// The point of the sphere that `ray` meets at `t`, with its texture coordinate and the footprint of the ray.
+    #[inline(always)]
+    pub(crate) fn point(&self, ray: &Ray, t: f64, differential: &RayDifferential) -> ShapePoint {
+        let (p, error, n) = self.place(ray, t);
+        let r = self.r as f32;
         let [dpx, dpy] = differential.on_plane(ray.d, t as f32, n, r);
         let (uv, dx, dy) = match self.uv {
             SphereUv::Equirectangular => equirectangular(n, dpx / r, dpy / r),
@@ -110,7 +124,6 @@ impl Sphere {
             SphereUv::Equirectangular => [UvEdge::Periodic, UvEdge::Folded],
             SphereUv::Angles => [UvEdge::Folded, UvEdge::Folded],
         };
-        let error = ErrorBound::of_rounded(p, self.c.abs() + DVec3::splat(self.r));
         let footprint = Footprint { dx, dy, edges };
         ShapePoint { p, error, normal: n, shading: n, lifted: None, uv, footprint, color: Rgb::WHITE }
     }

@@ -16,13 +16,14 @@ mod places;
 use std::ops::{ControlFlow, Range};
 
 use super::arrival::{Arrivals, Place};
+use super::cell::CELL;
 use super::change::Arrival;
 use super::counts::Counts;
 use super::crowd::Crowd;
 use super::cut::{Cut, Walk};
 use super::fence::Fence;
 use super::patch::{Patch, PixelPatches};
-use super::tiled::{ACROSS, CELL};
+use super::tiled::ACROSS;
 use crate::color::Rgb;
 use crate::ids::LightId;
 use crate::light::{LightTree, Sent};

@@ -155,7 +155,7 @@ impl Tiled<'_> {
     /// By how much the mean of colours times light can differ from the mean of colours times that of light, where
     /// colours differ that much, and what arrives changes by `slope` along both axes together: two halves, one of each
     /// colour, make an eighth of both.
-    pub(super) fn mingled(&self, light: usize, contrast: &Contrast, slope: &Sums) -> Rgb {
+    fn mingled(&self, light: usize, contrast: &Contrast, slope: &Sums) -> Rgb {
         let colors = contrast.diffuse * slope.diffuse + contrast.specular * slope.specular;
         self.arrivals.scale(light) * colors * 0.125
     }

@@ -1,0 +1,261 @@
+//! A light's moments on a cell of it, for sixteen cells at once: from 5 x 5 Gauss nodes, their mean, how far the fit
+//! can be wrong, and, where things stand in the way, the antiderivative along rows.
+//!
+//! On a cell the light is a polynomial of degree 4 along each axis, or nearly so. How nearly, the last coefficients of
+//! its Legendre series say: they fall by the same factor from one to the next, as those of any function that is smooth
+//! beyond the cell.
+//!
+//! Source: Trefethen, "Approximation Theory and Approximation Practice", 2013, chapters 8 and 19.
+
+use fearless_simd::{f32x16, prelude::*};
+
+use super::batch::{Block, Members, Seen};
+use crate::material::Lobe;
+use crate::math::LANES;
+
+/// Moments of a light: the cosine, and the highlight.
+pub(crate) const MOMENTS: usize = 2;
+/// Nodes along an axis.
+const NODES: usize = 5;
+/// A polynomial along both axes: [power of x][power of y].
+pub(crate) type Polynomial = [[f32; NODES]; NODES];
+
+/// The Gauss-Legendre rule of five nodes on [-1, 1].
+const GAUSS: [f64; NODES] =
+    [-0.906_179_845_938_664, -0.538_469_310_105_683_1, 0.0, 0.538_469_310_105_683_1, 0.906_179_845_938_664];
+const WEIGHTS: [f64; NODES] = [
+    0.236_926_885_056_189_08,
+    0.478_628_670_499_366_47,
+    0.568_888_888_888_888_9,
+    0.478_628_670_499_366_47,
+    0.236_926_885_056_189_08,
+];
+
+/// P3 and P4 at `x`.
+const fn legendre(x: f64) -> [f64; 2] {
+    let xx = x * x;
+    [0.5 * x * (5.0 * xx - 3.0), 0.125 * (xx * (35.0 * xx - 30.0) + 3.0)]
+}
+
+/// What each node counts in the coefficients of P3 and P4.
+const TAILS: [[f32; NODES]; 2] = {
+    let mut tails = [[0.0; NODES]; 2];
+    let mut i = 0;
+    while i < NODES {
+        let [p3, p4] = legendre(GAUSS[i]);
+        tails[0][i] = (3.5 * WEIGHTS[i] * p3) as f32;
+        tails[1][i] = (4.5 * WEIGHTS[i] * p4) as f32;
+        i += 1;
+    }
+    tails
+};
+
+/// Coefficients of x^0 to x^4 of the polynomial that is 1 at a node and 0 at the others.
+const LAGRANGE: [[f64; NODES]; NODES] = {
+    let mut all = [[0.0; NODES]; NODES];
+    let mut i = 0;
+    while i < NODES {
+        let mut p = [0.0; NODES];
+        p[0] = 1.0;
+        let mut j = 0;
+        let mut degree = 0;
+        while j < NODES {
+            if j != i {
+                // times (x - x_j) / (x_i - x_j)
+                let scale = 1.0 / (GAUSS[i] - GAUSS[j]);
+                let mut k = degree + 1;
+                while k > 0 {
+                    p[k] = (p[k - 1] - GAUSS[j] * p[k]) * scale;
+                    k -= 1;
+                }
+                p[0] *= -GAUSS[j] * scale;
+                degree += 1;
+            }
+            j += 1;
+        }
+        all[i] = p;
+        i += 1;
+    }
+    all
+};
+
+/// The same as floats, and of the antiderivative: what each node counts in x^1 to x^5.
+const fn matrix(antiderivative: bool) -> [[f32; NODES]; NODES] {
+    let mut matrix = [[0.0; NODES]; NODES];
+    let mut i = 0;
+    while i < NODES {
+        let mut k = 0;
+        while k < NODES {
+            let by = if antiderivative { (k + 1) as f64 } else { 1.0 };
+            matrix[k][i] = (LAGRANGE[i][k] / by) as f32;
+            k += 1;
+        }
+        i += 1;
+    }
+    matrix
+}
+const ANTIDERIVATIVE: [[f32; NODES]; NODES] = matrix(true);
+const MONOMIALS: [[f32; NODES]; NODES] = matrix(false);
+const NODES_32: [f32; NODES] = {
+    let mut nodes = [0.0; NODES];
+    let mut i = 0;
+    while i < NODES {
+        nodes[i] = GAUSS[i] as f32;
+        i += 1;
+    }
+    nodes
+};
+
+/// A rectangle of a light's square, of one point.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Cell {
+    /// The point it is seen from.
+    pub point: u32,
+    /// From where to where.
+    pub x: [f32; 2],
+    pub y: [f32; 2],
+    /// How often it was halved.
+    pub depth: u32,
+}
+
+/// What sixteen cells send, and how far their polynomials can be off along x and along y; each for both moments.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Fits {
+    pub sums: [Block; MOMENTS],
+    pub tails: [[Block; MOMENTS]; 2],
+}
+
+/// The fit of up to sixteen cells. With `polynomials`, the antiderivatives along x: of each cell, moment by moment.
+/// Not inlined: one copy for each instruction set is enough.
+#[inline(never)]
+pub(crate) fn fit<S: Simd>(
+    simd: S,
+    lobe: &Lobe,
+    physical: bool,
+    members: &Members,
+    cells: &[Cell],
+    polynomials: Option<&mut Vec<[Polynomial; MOMENTS]>>,
+) -> Fits {
+    simd.vectorize(
+        #[inline(always)]
+        || fit_now(simd, lobe, physical, members, cells, polynomials),
+    )
+}
+
+#[inline(always)]
+fn fit_now<S: Simd>(
+    simd: S,
+    lobe: &Lobe,
+    physical: bool,
+    members: &Members,
+    cells: &[Cell],
+    polynomials: Option<&mut Vec<[Polynomial; MOMENTS]>>,
+) -> Fits {
+    use Seen::*;
+    let splat = |v: f32| simd.splat_f32x16(v);
+    let cell =
+        |f: &dyn Fn(&Cell) -> f32| f32x16::simd_from(simd, std::array::from_fn(|k| f(&cells[k.min(cells.len() - 1)])));
+    let [x0, x1] = [cell(&|c| c.x[0]), cell(&|c| c.x[1])];
+    let [y0, y1] = [cell(&|c| c.y[0]), cell(&|c| c.y[1])];
+    let (xm, xh, ym, yh) = ((x0 + x1) * 0.5, (x1 - x0) * 0.5, (y0 + y1) * 0.5, (y1 - y0) * 0.5);
+    let (fa, la, skew, fb, lb) = (
+        members.lanes(simd, Fa),
+        members.lanes(simd, La),
+        members.lanes(simd, Skew),
+        members.lanes(simd, Fb),
+        members.lanes(simd, Lb),
+    );
+    let (height, cos_o) = (members.lanes(simd, Height), members.lanes(simd, CosO));
+    let cos = members.linear(simd, [CosC, CosX, CosY]);
+    let out = members.linear(simd, [OutC, OutX, OutY]);
+    let zero = splat(0.0);
+    let height2 = height * height;
+    let has_lobe = !matches!(lobe, Lobe::None);
+    // Ask the light at all nodes
+    let mut values = [[[zero; NODES]; NODES]; MOMENTS];
+    for (j, node) in NODES_32.iter().enumerate() {
+        let y = yh * *node + ym;
+        let along_row = y * skew + fa;
+        let across = y * lb + fb;
+        let rest = across * across + height2;
+        let (cos_row, out_row) = (y * cos.y + cos.c, y * out.y + out.c);
+        let (mut cos_i, mut cos_io, mut weights) = ([zero; NODES], [zero; NODES], [splat(1.0); NODES]);
+        for (i, node) in NODES_32.iter().enumerate() {
+            let x = xh * *node + xm;
+            let along = x * la + along_row;
+            let inverse = 1.0 / (along * along + rest).sqrt();
+            if physical {
+                weights[i] = inverse * inverse * (inverse * height);
+            }
+            cos_i[i] = (x * cos.x + cos_row) * inverse;
+            cos_io[i] = (x * out.x + out_row) * inverse;
+        }
+        for i in 0..NODES {
+            values[0][j][i] = cos_i[i] * weights[i];
+        }
+        if has_lobe {
+            let lobes = lobe.eval_lanes(cos_i, cos_o, cos_io);
+            for i in 0..NODES {
+                values[1][j][i] = lobes[i] * weights[i];
+            }
+        }
+    }
+    // Sum them, and look at the ends of their series
+    let area = xh * yh * members.lanes(simd, Measure);
+    let mut fits = Fits::default();
+    let weights = WEIGHTS.map(|w| w as f32);
+    let moments = if has_lobe { MOMENTS } else { 1 };
+    for (moment, values) in values.iter().enumerate().take(moments) {
+        let (mut sum, mut tail_x, mut tail_y) = (zero, zero, zero);
+        for j in 0..NODES {
+            let row = &values[j];
+            let (mut total, mut c3, mut c4) = (zero, zero, zero);
+            let (mut d3, mut d4) = (zero, zero);
+            for i in 0..NODES {
+                total += row[i] * weights[i];
+                c3 += row[i] * TAILS[0][i];
+                c4 += row[i] * TAILS[1][i];
+                d3 += values[i][j] * TAILS[0][i];
+                d4 += values[i][j] * TAILS[1][i];
+            }
+            sum += total * weights[j];
+            tail_x += (c4.abs() + c3.abs() * 0.3) * (2.0 * weights[j]);
+            tail_y += (d4.abs() + d3.abs() * 0.3) * (2.0 * weights[j]);
+        }
+        fits.sums[moment] = (sum * area).to_array();
+        fits.tails[0][moment] = (tail_x * area).to_array();
+        fits.tails[1][moment] = (tail_y * area).to_array();
+    }
+    let Some(polynomials) = polynomials else { return fits };
+    let mut lanes = [[[[0.0f32; LANES]; NODES]; NODES]; MOMENTS];
+    for moment in 0..moments {
+        // Along rows: [row][power of x]
+        let mut rows = [[zero; NODES]; NODES];
+        for (row, values) in rows.iter_mut().zip(&values[moment]) {
+            for (power, matrix) in row.iter_mut().zip(&ANTIDERIVATIVE) {
+                for (value, factor) in values.iter().zip(matrix) {
+                    *power += *value * *factor;
+                }
+            }
+        }
+        // Across them
+        for k in 0..NODES {
+            for (m, matrix) in MONOMIALS.iter().enumerate() {
+                let mut sum = zero;
+                for (row, factor) in rows.iter().zip(matrix) {
+                    sum += row[k] * *factor;
+                }
+                lanes[moment][k][m] = (sum * area).to_array();
+            }
+        }
+    }
+    let first = polynomials.len();
+    polynomials.resize(first + cells.len(), [[[0.0; NODES]; NODES]; MOMENTS]);
+    for (k, polynomial) in polynomials[first..].iter_mut().enumerate() {
+        let numbers = polynomial.as_flattened_mut().as_flattened_mut().iter_mut();
+        for (number, lanes) in numbers.zip(lanes.as_flattened().as_flattened()) {
+            *number = lanes[k];
+        }
+    }
+    fits
+}

@@ -1,0 +1,460 @@
+//! Convex things in the way of a light: what they hide of it, row by row, for sixteen points at once.
+//!
+//! What a point sees of a convex thing on a light's plane is convex, so a row of the light has one hidden interval at
+//! most, and its ends are roots of a linear function or of a quadratic.
+//!
+//! Source of the quadratic of a sphere: the cone that touches it, r^2 |l|^2 - |l x s|^2 >= 0, as in Heidrich, Brabec,
+//! Seidel, "Soft Shadow Maps for Linear Lights", 2000, for one row; the rest is ours.
+
+use fearless_simd::{f32x16, mask32x16, prelude::*};
+
+use super::batch::{Block, Linear16, Members, Seen};
+use crate::math::{DVec3, Vec3, Vec3x16};
+
+/// A vector of doubles as two of floats: the difference to a point loses nothing where the two are close.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Exact {
+    high: Vec3,
+    low: Vec3,
+}
+
+impl Exact {
+    pub fn new(v: DVec3) -> Exact {
+        let high = v.as_vec3();
+        Exact { high, low: (v - high.as_dvec3()).as_vec3() }
+    }
+
+    /// The way there from sixteen points.
+    #[inline(always)]
+    pub fn seen_from<S: Simd>(self, simd: S, p: Vec3x16<S>) -> Vec3x16<S> {
+        let (h, l) = (Vec3x16::splat(simd, self.high), Vec3x16::splat(simd, self.low));
+        Vec3x16 { x: (h.x - p.x) + l.x, y: (h.y - p.y) + l.y, z: (h.z - p.z) + l.z }
+    }
+}
+
+/// A convex thing that may stand in the way.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Occluder {
+    Sphere {
+        center: Exact,
+        radius: f32,
+    },
+    /// A parallelogram by its corners, around.
+    Flat {
+        corners: [Exact; 4],
+    },
+}
+
+/// The ways to four corners from sixteen points.
+#[inline(always)]
+pub(crate) fn corners_from<S: Simd>(simd: S, [a, b, c, d]: &[Exact; 4], p: Vec3x16<S>) -> [Vec3x16<S>; 4] {
+    [a.seen_from(simd, p), b.seen_from(simd, p), c.seen_from(simd, p), d.seen_from(simd, p)]
+}
+
+/// An interval of x on each of sixteen rows; empty where it ends before it begins.
+#[derive(Clone, Copy)]
+pub(crate) struct Interval16<S: Simd> {
+    pub from: f32x16<S>,
+    pub to: f32x16<S>,
+}
+
+/// Farther than any x that is asked about.
+pub(crate) const FAR: f32 = 1e30;
+/// Slopes below this are none: their reciprocals have no bound.
+const FLAT: f32 = 1e-30;
+
+impl<S: Simd> Interval16<S> {
+    #[inline(always)]
+    pub fn all(simd: S) -> Self {
+        Interval16 { from: simd.splat_f32x16(-FAR), to: simd.splat_f32x16(FAR) }
+    }
+
+    /// What is left where `slope` x + `c` >= 0.
+    #[inline(always)]
+    pub fn clip(&mut self, c: f32x16<S>, slope: f32x16<S>) {
+        let simd = c.token();
+        let (far, zero) = (simd.splat_f32x16(FAR), simd.splat_f32x16(0.0));
+        let (rises, falls) = (slope.simd_gt(FLAT), slope.simd_lt(-FLAT));
+        let is_level = !(rises | falls);
+        let edge = -c / is_level.select(simd.splat_f32x16(1.0), slope);
+        self.from = rises.select(self.from.max(edge), self.from);
+        self.to = falls.select(self.to.min(edge), self.to);
+        self.to = (is_level & c.simd_lt(zero)).select(-far, self.to);
+    }
+}
+
+/// c + 2 (x X + y Y) + x^2 XX + 2 x y XY + y^2 YY, in lanes.
+#[derive(Clone, Copy)]
+pub(crate) struct Quadratic16<S: Simd> {
+    c: f32x16<S>,
+    x: f32x16<S>,
+    y: f32x16<S>,
+    xx: f32x16<S>,
+    xy: f32x16<S>,
+    yy: f32x16<S>,
+}
+
+/// Real roots: the smaller and the larger, and where there are any.
+#[derive(Clone, Copy)]
+struct Roots<S: Simd> {
+    low: f32x16<S>,
+    high: f32x16<S>,
+    any: mask32x16<S>,
+}
+
+/// Where a y^2 + 2 b y + c is 0. Not quite 0 stands for a = 0, so that one root may be far away and nothing is divided
+/// by 0.
+#[inline(always)]
+fn roots<S: Simd>(a: f32x16<S>, b: f32x16<S>, c: f32x16<S>) -> Roots<S> {
+    let simd = a.token();
+    let (zero, one) = (simd.splat_f32x16(0.0), simd.splat_f32x16(1.0));
+    let least = (b.abs() + c.abs()) * 1e-12 + f32::MIN_POSITIVE;
+    let a = a.abs().simd_lt(least).select(least.copysign(a), a);
+    let discriminant = b * b - c * a;
+    let root = discriminant.max(zero).sqrt();
+    // -(b + sign(b) root): nothing cancels
+    let q = b.simd_lt(zero).select(root - b, -(root + b));
+    let first = q / a;
+    let is_zero = q.simd_eq(zero);
+    let second = is_zero.select(zero, c / is_zero.select(one, q));
+    Roots { low: first.min(second), high: first.max(second), any: discriminant.simd_gt(zero) }
+}
+
+impl<S: Simd> Quadratic16<S> {
+    /// The product of two vectors that are linear over the light.
+    #[inline(always)]
+    fn dot(p: [Vec3x16<S>; 3], q: [Vec3x16<S>; 3]) -> Self {
+        Quadratic16 {
+            c: p[0].dot(q[0]),
+            x: (p[0].dot(q[1]) + p[1].dot(q[0])) * 0.5,
+            y: (p[0].dot(q[2]) + p[2].dot(q[0])) * 0.5,
+            xx: p[1].dot(q[1]),
+            xy: (p[1].dot(q[2]) + p[2].dot(q[1])) * 0.5,
+            yy: p[2].dot(q[2]),
+        }
+    }
+
+    #[inline(always)]
+    fn combined(self, k: f32x16<S>, o: Self, m: f32x16<S>) -> Self {
+        Quadratic16 {
+            c: self.c * k + o.c * m,
+            x: self.x * k + o.x * m,
+            y: self.y * k + o.y * m,
+            xx: self.xx * k + o.xx * m,
+            xy: self.xy * k + o.xy * m,
+            yy: self.yy * k + o.yy * m,
+        }
+    }
+
+    #[inline(always)]
+    fn select(is: mask32x16<S>, a: Self, b: Self) -> Self {
+        Quadratic16 {
+            c: is.select(a.c, b.c),
+            x: is.select(a.x, b.x),
+            y: is.select(a.y, b.y),
+            xx: is.select(a.xx, b.xx),
+            xy: is.select(a.xy, b.xy),
+            yy: is.select(a.yy, b.yy),
+        }
+    }
+
+    #[inline(always)]
+    pub fn at(&self, x: f32x16<S>, y: f32x16<S>) -> f32x16<S> {
+        self.c + (x * self.x + y * self.y) * 2.0 + x * x * self.xx + x * y * self.xy * 2.0 + y * y * self.yy
+    }
+
+    #[inline(always)]
+    fn on_row(&self, y: f32x16<S>) -> Roots<S> {
+        roots(self.xx, y * self.xy + self.x, y * (y * self.yy + self.y * 2.0) + self.c)
+    }
+
+    /// The rows on which the line x = `x` crosses 0.
+    #[inline(always)]
+    fn crossings(&self, x: f32x16<S>) -> Roots<S> {
+        roots(self.yy, x * self.xy + self.y, x * (x * self.xx + self.x * 2.0) + self.c)
+    }
+
+    /// The rows that only touch 0.
+    #[inline(always)]
+    fn tangents(&self) -> Roots<S> {
+        roots(
+            self.xy * self.xy - self.xx * self.yy,
+            self.x * self.xy - self.xx * self.y,
+            self.x * self.x - self.xx * self.c,
+        )
+    }
+}
+
+/// Rows at which something begins, ends, has a corner, or meets the sides of cells; not a number where there is none.
+pub(crate) struct Breaks<'a, S: Simd> {
+    /// The sides of the cells.
+    pub x: [f32x16<S>; 2],
+    /// Whose rows are looked for.
+    pub of: mask32x16<S>,
+    pub rows: &'a mut Vec<Block>,
+}
+
+impl<S: Simd> Breaks<'_, S> {
+    #[inline(always)]
+    fn tell_if(&mut self, row: f32x16<S>, is: mask32x16<S>) {
+        self.rows.push((is & self.of).select(row, row.token().splat_f32x16(f32::NAN)).to_array());
+    }
+
+    #[inline(always)]
+    pub fn quadratic(&mut self, quadratic: &Quadratic16<S>, of: mask32x16<S>) {
+        let tangents = quadratic.tangents();
+        for y in [tangents.low, tangents.high] {
+            // Where the row touches
+            let x = -(y * quadratic.xy + quadratic.x) / quadratic.xx;
+            let room = (self.x[1] - self.x[0]) * 1e-3;
+            self.tell_if(y, of & tangents.any & x.simd_gt(self.x[0] - room) & x.simd_lt(self.x[1] + room));
+        }
+        for x in self.x {
+            let crossings = quadratic.crossings(x);
+            self.tell_if(crossings.low, of & crossings.any);
+            self.tell_if(crossings.high, of & crossings.any);
+        }
+    }
+
+    /// Where a line crosses the sides of a cell.
+    #[inline(always)]
+    pub fn line(&mut self, line: &Linear16<S>) {
+        let all = self.of;
+        for x in self.x {
+            self.tell_if(-(line.c + x * line.x) / line.y, all);
+        }
+    }
+}
+
+/// A convex thing as sixteen points see it on a light.
+pub(crate) enum Shadow<S: Simd> {
+    /// Of a sphere.
+    Cone {
+        quadratic: Quadratic16<S>,
+        ahead: Linear16<S>,
+        /// Where the light's plane cuts the sphere of any of the points: what is behind the light's places, and what is
+        /// inside of the sphere; and whose it is.
+        cut: Option<([Quadratic16<S>; 2], mask32x16<S>)>,
+        /// Inside of the sphere, for points within it.
+        inside: Quadratic16<S>,
+    },
+    /// Of a flat thing: above 0 on all of these lines. The first is that of its plane.
+    Edges { lines: [Linear16<S>; 5] },
+}
+
+/// Whether a place is inside of all lines but two, or nearly so.
+#[inline(always)]
+fn is_inside<S: Simd>(lines: &[Linear16<S>; 5], x: f32x16<S>, y: f32x16<S>, but: [usize; 2]) -> mask32x16<S> {
+    let mut is = x.simd_eq(x);
+    for (i, line) in lines.iter().enumerate() {
+        if i != but[0] && i != but[1] {
+            is &= line.at(x, y).simd_ge((line.c.abs() + line.x.abs() + line.y.abs()) * -1e-6);
+        }
+    }
+    is
+}
+
+/// The three vectors of a view.
+#[inline(always)]
+pub(crate) fn ways<S: Simd>(simd: S, members: &Members) -> [Vec3x16<S>; 3] {
+    use Seen::*;
+    // Written out, here and below: a map of an array is not inlined, and each operation becomes a call
+    [members.vectors(simd, [L0x, L0y, L0z]), members.vectors(simd, [Ax, Ay, Az]), members.vectors(simd, [Bx, By, Bz])]
+}
+
+impl<S: Simd> Shadow<S> {
+    /// What `occluder` does to lights with these ways, from `p`.
+    #[inline(always)]
+    pub fn new(simd: S, occluder: &Occluder, p: Vec3x16<S>, l: &[Vec3x16<S>; 3]) -> Shadow<S> {
+        match occluder {
+            Occluder::Sphere { center, radius } => Shadow::cone(simd, center.seen_from(simd, p), *radius, l),
+            Occluder::Flat { corners } => Shadow::edges(corners_from(simd, corners, p), l),
+        }
+    }
+
+    #[inline(always)]
+    fn cone(simd: S, s: Vec3x16<S>, r: f32, l: &[Vec3x16<S>; 3]) -> Shadow<S> {
+        let r2 = r * r;
+        let cross = [l[0].cross(s), l[1].cross(s), l[2].cross(s)];
+        let ll = Quadratic16::dot(*l, *l);
+        let ahead = Linear16 { c: s.dot(l[0]), x: s.dot(l[1]), y: s.dot(l[2]) };
+        // r^2 |l|^2 - |l x s|^2 is (r^2 - |s|^2) |l|^2 + (l.s)^2, which is small by itself where the point is close
+        let power = simd.splat_f32x16(r2) - s.dot(s);
+        let squared = Quadratic16 {
+            c: ahead.c * ahead.c,
+            x: ahead.c * ahead.x,
+            y: ahead.c * ahead.y,
+            xx: ahead.x * ahead.x,
+            xy: ahead.x * ahead.y,
+            yy: ahead.y * ahead.y,
+        };
+        let (one, minus) = (simd.splat_f32x16(1.0), simd.splat_f32x16(-1.0));
+        let near = ll.combined(power, squared, one);
+        let far = ll.combined(simd.splat_f32x16(r2), Quadratic16::dot(cross, cross), minus);
+        let quadratic = Quadratic16::select(power.abs().simd_lt(0.5 * r2), near, far);
+        // r^2 - |l - s|^2
+        let from_center = [l[0] - s, l[1], l[2]];
+        let inside = Quadratic16::dot(from_center, from_center);
+        let inside = Quadratic16 {
+            c: simd.splat_f32x16(r2) - inside.c,
+            x: -inside.x,
+            y: -inside.y,
+            xx: -inside.xx,
+            xy: -inside.xy,
+            yy: -inside.yy,
+        };
+        // How far the middle is from the light's plane
+        let n = l[1].cross(l[2]);
+        let off = n.dot(from_center[0]);
+        let cuts = (off * off).simd_lt(n.dot(n) * r2);
+        let cut = if cuts.any_true() {
+            let zero = simd.splat_f32x16(0.0);
+            let ls = Quadratic16 { c: ahead.c, x: ahead.x * 0.5, y: ahead.y * 0.5, xx: zero, xy: zero, yy: zero };
+            Some(([ll.combined(one, ls, minus), inside], cuts))
+        } else {
+            None
+        };
+        Shadow::Cone { quadratic, ahead, cut, inside }
+    }
+
+    #[inline(always)]
+    fn edges(q: [Vec3x16<S>; 4], l: &[Vec3x16<S>; 3]) -> Shadow<S> {
+        let simd = q[0].x.token();
+        let zero = simd.splat_f32x16(0.0);
+        // The plane: l has to pass it. The sides turn with it
+        let n = (q[1] - q[0]).cross(q[3] - q[0]);
+        let distance = n.dot(q[0]);
+        let sign = distance.simd_lt(zero).select(simd.splat_f32x16(-1.0), simd.splat_f32x16(1.0));
+        let mut lines = [Linear16::along(n * sign, l); 5];
+        lines[0].c -= distance.abs();
+        for i in 0..4 {
+            lines[i + 1] = Linear16::along(q[i].cross(q[(i + 1) % 4]) * sign, l);
+        }
+        Shadow::Edges { lines }
+    }
+
+    /// What is hidden of sixteen rows, seen from outside.
+    #[inline(always)]
+    pub fn hidden(&self, simd: S, y: f32x16<S>) -> Interval16<S> {
+        match self {
+            Shadow::Edges { lines } => {
+                let mut interval = Interval16::all(simd);
+                for line in lines {
+                    interval.clip(y * line.y + line.c, line.x);
+                }
+                interval
+            }
+            Shadow::Cone { quadratic, ahead, cut, .. } => {
+                let (zero, far) = (simd.splat_f32x16(0.0), simd.splat_f32x16(FAR));
+                let Roots { low, high, any } = quadratic.on_row(y);
+                // Between the roots, or beyond one of them
+                let is_between = quadratic.xx.simd_lt(zero);
+                let is_ahead = ahead.x.simd_gt(zero);
+                let all = Interval16::all(simd);
+                let mut interval = Interval16 {
+                    from: is_between.select(any.select(low, far), (any & is_ahead).select(high, all.from)),
+                    to: is_between.select(any.select(high, -far), (any & !is_ahead).select(low, all.to)),
+                };
+                interval.clip(y * ahead.y + ahead.c, ahead.x);
+                let Some(([before, inside], cuts)) = cut else { return interval };
+                // Without what is behind the light, and with what is inside the sphere: together they are convex again
+                let b = before.on_row(y);
+                let any = b.any & *cuts;
+                let from =
+                    (any & interval.from.simd_gt(b.low) & interval.from.simd_lt(b.high)).select(b.high, interval.from);
+                let to = (any & interval.to.simd_gt(b.low) & interval.to.simd_lt(b.high)).select(b.low, interval.to);
+                let is_left = from.simd_lt(to);
+                let i = inside.on_row(y);
+                let any = i.any & *cuts;
+                let (i0, i1) = (any.select(i.low, far), any.select(i.high, -far));
+                Interval16 { from: is_left.select(from, far).min(i0), to: is_left.select(to, -far).max(i1) }
+            }
+        }
+    }
+
+    /// What is seen of sixteen rows from within a sphere.
+    #[inline(always)]
+    pub fn within(&self, simd: S, y: f32x16<S>) -> Interval16<S> {
+        let far = simd.splat_f32x16(FAR);
+        match self {
+            Shadow::Edges { .. } => Interval16::all(simd),
+            Shadow::Cone { inside, .. } => {
+                let i = inside.on_row(y);
+                Interval16 { from: i.any.select(i.low, far), to: i.any.select(i.high, -far) }
+            }
+        }
+    }
+
+    /// Whether a place of the light is hidden, seen from outside.
+    #[inline(always)]
+    pub fn hides(&self, x: f32x16<S>, y: f32x16<S>) -> mask32x16<S> {
+        let zero = x.token().splat_f32x16(0.0);
+        match self {
+            Shadow::Edges { lines } => {
+                let mut all = x.simd_eq(x);
+                for line in lines {
+                    all &= line.at(x, y).simd_ge(zero);
+                }
+                all
+            }
+            Shadow::Cone { quadratic, ahead, cut, .. } => {
+                let on_line = quadratic.at(x, y).simd_ge(zero) & ahead.at(x, y).simd_gt(zero);
+                match cut {
+                    None => on_line,
+                    Some(([before, inside], cuts)) => {
+                        on_line & (before.at(x, y).simd_gt(zero) | !*cuts) | inside.at(x, y).simd_ge(zero) & *cuts
+                    }
+                }
+            }
+        }
+    }
+
+    /// Of a disk light, counted from (`x`, `y`): x^2 + y^2 <= 1.
+    #[inline(always)]
+    pub fn rim(origin: [f32x16<S>; 2]) -> Quadratic16<S> {
+        let [x, y] = origin;
+        let simd = x.token();
+        let (zero, minus) = (simd.splat_f32x16(0.0), simd.splat_f32x16(-1.0));
+        Quadratic16 { c: simd.splat_f32x16(1.0) - (x * x + y * y), x: -x, y: -y, xx: minus, xy: zero, yy: minus }
+    }
+
+    /// Whether a place of the light is inside of a sphere; of flat things nothing is.
+    #[inline(always)]
+    pub fn holds(&self, x: f32x16<S>, y: f32x16<S>) -> mask32x16<S> {
+        let zero = x.token().splat_f32x16(0.0);
+        match self {
+            Shadow::Edges { .. } => x.simd_lt(x),
+            Shadow::Cone { inside, .. } => inside.at(x, y).simd_gt(zero),
+        }
+    }
+
+    /// Tells the rows at which the hidden part begins, ends, has a corner or meets the sides of a cell; some in vain.
+    #[inline(always)]
+    pub fn breaks(&self, breaks: &mut Breaks<S>) {
+        match self {
+            Shadow::Cone { quadratic, cut, .. } => {
+                breaks.quadratic(quadratic, breaks.of);
+                if let Some(([before, inside], cuts)) = cut {
+                    breaks.quadratic(before, *cuts);
+                    breaks.quadratic(inside, *cuts);
+                }
+            }
+            Shadow::Edges { lines } => {
+                let zero = lines[0].c.token().splat_f32x16(0.0);
+                for (i, p) in lines.iter().enumerate() {
+                    for x in breaks.x {
+                        let y = -(p.c + x * p.x) / p.y;
+                        breaks.tell_if(y, is_inside(lines, x, y, [i, i]));
+                    }
+                }
+                for (i, j) in [(0, 1), (0, 2), (0, 3), (0, 4), (1, 2), (2, 3), (3, 4), (4, 1)] {
+                    let (p, q) = (&lines[i], &lines[j]);
+                    let area = p.x * q.y - p.y * q.x;
+                    let (x, y) = ((p.y * q.c - p.c * q.y) / area, (p.c * q.x - q.c * p.x) / area);
+                    let is_beside = x.simd_ge(breaks.x[0]) & x.simd_le(breaks.x[1]);
+                    breaks.tell_if(y, !area.simd_eq(zero) & is_beside & is_inside(lines, x, y, [i, j]));
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,343 @@
+//! What is seen of a light's cells, row by row, for sixteen panels at once.
+//!
+//! A panel is a range of rows of one cell on which the outline of what is seen changes smoothly. On each of seven rows,
+//! the nodes of a Kronrod rule, the intervals that occluders hide are united, and the antiderivative of the cell's
+//! polynomial is summed over the ends of what is left: nothing is shaded again. The Gauss rule of three inside says how
+//! far the panel can be wrong. Where a panel ends, outlines begin as roots do, so rows are spread by y^2 (3 - 2 y).
+//!
+//! Source of the rule: Kronrod, "Nodes and Weights of Quadrature Formulas", 1965; of the spread: Davis, Rabinowitz,
+//! "Methods of Numerical Integration", 1984, section 2.12.
+
+use arrayvec::ArrayVec;
+use fearless_simd::{f32x16, mask32x16, prelude::*};
+
+use super::batch::{Block, Members, Seen};
+use super::fit::{Cell, MOMENTS, Polynomial};
+use super::occluder::{Breaks, FAR, Interval16, Occluder, Shadow, ways};
+use super::view::Outline;
+use crate::math::{LANES, Vec3x16};
+
+/// Rows of a panel: the Kronrod rule of seven on [0, 1], spread.
+const ROWS: usize = 7;
+const KRONROD: [(f64, f64, f64); 4] = [
+    // Node, weight, weight in the Gauss rule of three
+    (0.960_491_268_708_020_3, 0.104_656_226_026_467_3, 0.0),
+    (0.774_596_669_241_483_4, 0.268_488_089_868_333_4, 0.555_555_555_555_555_6),
+    (0.434_243_749_346_802_6, 0.401_397_414_775_962_2, 0.0),
+    (0.0, 0.450_916_538_658_474_1, 0.888_888_888_888_889),
+];
+
+/// Where on a panel a row lies, 0 to 1, and what it counts in both rules.
+const SPREAD: [[f32; 3]; ROWS] = {
+    let mut rows = [[0.0; 3]; ROWS];
+    let mut i = 0;
+    while i < ROWS {
+        let (node, fine, coarse) = KRONROD[if i < 4 { i } else { 6 - i }];
+        let t = 0.5 + if i < 4 { -0.5 * node } else { 0.5 * node };
+        let dense = 0.5 * (6.0 * t * (1.0 - t));
+        rows[i] = [(t * t * (3.0 - 2.0 * t)) as f32, (fine * dense) as f32, (coarse * dense) as f32];
+        i += 1;
+    }
+    rows
+};
+
+/// Rows of one cell.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Panel {
+    /// Of the cells that are cut.
+    pub cell: u32,
+    pub y: [f32; 2],
+    /// How often it was halved.
+    pub depth: u32,
+}
+
+/// What of a light's occluders matters to one point: bits of those it sees from outside, and of spheres it is in.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) struct Between {
+    pub outside: u64,
+    pub within: u64,
+}
+
+/// A light and what is in the way, for all that asks.
+#[derive(Clone, Copy)]
+pub(crate) struct Blocked<'a> {
+    pub occluders: &'a [Occluder],
+    pub outline: Outline,
+    /// Point by point.
+    pub between: &'a [Between],
+}
+
+/// What sixteen panels send, how far both rules differ, and how much of the light's square is seen.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct PanelSums {
+    pub sums: [Block; MOMENTS],
+    pub differences: [Block; MOMENTS],
+    pub seen: Block,
+}
+
+/// The most things that may hide a part of a light from one batch.
+pub(crate) const MAX_BETWEEN: usize = 24;
+
+/// What may be in the way of a batch: the occluders that any of its points sees, and for which of them.
+struct Batch<'a, S: Simd> {
+    blocked: &'a Blocked<'a>,
+    between: [Between; LANES],
+    p: Vec3x16<S>,
+    l: [Vec3x16<S>; 3],
+}
+
+impl<'a, S: Simd> Batch<'a, S> {
+    #[inline(always)]
+    fn new(simd: S, blocked: &'a Blocked<'a>, members: &Members, point: impl Fn(usize) -> u32) -> Self {
+        use Seen::*;
+        let mut between = [Between::default(); LANES];
+        for (k, between) in between.iter_mut().enumerate() {
+            *between = blocked.between[point(k) as usize];
+        }
+        Batch { blocked, between, p: members.vectors(simd, [Px, Py, Pz]), l: ways(simd, members) }
+    }
+
+    /// Which of the occluders any point sees.
+    #[inline(always)]
+    fn occluders(&self) -> impl Iterator<Item = usize> + use<S> {
+        let mut any = 0;
+        for between in &self.between {
+            any |= between.outside | between.within;
+        }
+        std::iter::from_fn(move || {
+            let first = (any != 0).then_some(any.trailing_zeros() as usize);
+            any &= any.wrapping_sub(1);
+            first
+        })
+        .take(MAX_BETWEEN)
+    }
+
+    /// One of them as they see it, and who sees it from outside and from within.
+    #[inline(always)]
+    fn shadow(&self, simd: S, occluder: usize) -> (Shadow<S>, mask32x16<S>, mask32x16<S>) {
+        let (mut outside, mut within) = (0, 0);
+        for (k, between) in self.between.iter().enumerate() {
+            outside |= (between.outside >> occluder & 1) << k;
+            within |= (between.within >> occluder & 1) << k;
+        }
+        (
+            Shadow::new(simd, &self.blocked.occluders[occluder], self.p, &self.l),
+            mask32x16::from_bitmask(simd, outside),
+            mask32x16::from_bitmask(simd, within),
+        )
+    }
+}
+
+/// The panels of up to sixteen cells: they end where something begins, ends or has a corner. `spare` is memory.
+#[inline(never)]
+pub(crate) fn cut<S: Simd>(
+    simd: S,
+    blocked: &Blocked,
+    members: &Members,
+    cells: &[Cell],
+    first: u32,
+    spare: &mut Vec<Block>,
+    panels: &mut Vec<Panel>,
+) {
+    spare.clear();
+    simd.vectorize(
+        #[inline(always)]
+        || breaks(simd, blocked, members, cells, spare),
+    );
+    for (k, cell) in cells.iter().enumerate() {
+        let least = (cell.y[1] - cell.y[0]) * LEAST;
+        let is_inside = |y: &f32| *y > cell.y[0] + least && *y < cell.y[1] - least;
+        let mut rows: ArrayVec<f32, MAX_PANELS> =
+            spare.iter().map(|rows| rows[k]).filter(is_inside).take(MAX_PANELS - 1).collect();
+        rows.sort_unstable_by(f32::total_cmp);
+        rows.push(cell.y[1]);
+        let mut from = cell.y[0];
+        for to in rows {
+            if to - from > least || to == cell.y[1] {
+                panels.push(Panel { cell: first + k as u32, y: [from, to], depth: 0 });
+                from = to;
+            }
+        }
+    }
+}
+
+#[inline(always)]
+fn breaks<S: Simd>(simd: S, blocked: &Blocked, members: &Members, cells: &[Cell], rows: &mut Vec<Block>) {
+    use Seen::*;
+    let side = |end: usize| std::array::from_fn::<f32, LANES, _>(|k| cells[k.min(cells.len() - 1)].x[end]);
+    let x = [f32x16::simd_from(simd, side(0)), f32x16::simd_from(simd, side(1))];
+    let batch = Batch::new(simd, blocked, members, |k| cells[k.min(cells.len() - 1)].point);
+    for occluder in batch.occluders() {
+        let (shadow, outside, within) = batch.shadow(simd, occluder);
+        shadow.breaks(&mut Breaks { x, of: outside | within, rows });
+    }
+    let all = x[0].simd_eq(x[0]);
+    let mut breaks = Breaks { x, of: all, rows };
+    breaks.line(&members.linear(simd, [CosC, CosX, CosY]));
+    breaks.line(&members.linear(simd, [HorizonC, HorizonX, HorizonY]));
+    if blocked.outline == Outline::Disk {
+        let origin = [members.lanes(simd, OriginX), members.lanes(simd, OriginY)];
+        breaks.quadratic(&Shadow::rim(origin), all);
+    }
+}
+
+/// The most panels of a new cell.
+const MAX_PANELS: usize = 48;
+/// Panels shorter than this part of their cell are not worth their rows.
+const LEAST: f32 = 1e-4;
+
+/// What up to sixteen panels send.
+/// Not inlined: one copy for each instruction set is enough.
+#[inline(never)]
+pub(crate) fn rows<S: Simd>(
+    simd: S,
+    blocked: &Blocked,
+    members: &Members,
+    cells: &[Cell],
+    polynomials: &[[Polynomial; MOMENTS]],
+    panels: &[Panel],
+    moments: usize,
+) -> PanelSums {
+    simd.vectorize(
+        #[inline(always)]
+        || rows_now(simd, blocked, members, cells, polynomials, panels, moments),
+    )
+}
+
+#[inline(always)]
+fn antiderivative<S: Simd>([a, b, c, d, e]: &[f32x16<S>; 5], u: f32x16<S>) -> f32x16<S> {
+    u * (*a + u * (*b + u * (*c + u * (*d + u * *e))))
+}
+
+#[inline(always)]
+fn rows_now<S: Simd>(
+    simd: S,
+    blocked: &Blocked,
+    members: &Members,
+    cells: &[Cell],
+    polynomials: &[[Polynomial; MOMENTS]],
+    panels: &[Panel],
+    moments: usize,
+) -> PanelSums {
+    use Seen::*;
+    let splat = |v: f32| simd.splat_f32x16(v);
+    let panel: [&Panel; LANES] = std::array::from_fn(|k| &panels[k.min(panels.len() - 1)]);
+    let cell = panel.map(|panel| &cells[panel.cell as usize]);
+    macro_rules! numbers {
+        ($f:expr) => {{
+            let numbers: [f32; LANES] = std::array::from_fn($f);
+            f32x16::simd_from(simd, numbers)
+        }};
+    }
+    let (zero, one, far) = (splat(0.0), splat(1.0), splat(FAR));
+    let [x0, x1] = [numbers!(|k| cell[k].x[0]), numbers!(|k| cell[k].x[1])];
+    let [y0, y1] = [numbers!(|k| cell[k].y[0]), numbers!(|k| cell[k].y[1])];
+    let [from, to] = [numbers!(|k| panel[k].y[0]), numbers!(|k| panel[k].y[1])];
+    let (xm, xh) = ((x0 + x1) * 0.5, (x1 - x0) * 0.5);
+    let (ym, yh) = ((y0 + y1) * 0.5, (y1 - y0) * 0.5);
+    let batch = Batch::new(simd, blocked, members, |k| cell[k].point);
+    let cos = members.linear(simd, [CosC, CosX, CosY]);
+    let horizon = members.linear(simd, [HorizonC, HorizonX, HorizonY]);
+    let origin = [members.lanes(simd, OriginX), members.lanes(simd, OriginY)];
+    // The polynomials: [moment][power of x][power of y]
+    let polynomial: [&[Polynomial; MOMENTS]; LANES] = panel.map(|panel| &polynomials[panel.cell as usize]);
+    let mut powers = [[[zero; 5]; 5]; MOMENTS];
+    for (moment, powers) in powers.iter_mut().enumerate().take(moments) {
+        for (x, powers) in powers.iter_mut().enumerate() {
+            for (y, power) in powers.iter_mut().enumerate() {
+                *power = numbers!(|k| polynomial[k][moment][x][y]);
+            }
+        }
+    }
+    // What of each row is above the horizon, and in the light
+    let mut open = [Interval16 { from: x0, to: x1 }; ROWS];
+    for (all, [place, ..]) in open.iter_mut().zip(SPREAD) {
+        let y = (to - from) * place + from;
+        all.clip(y * cos.y + cos.c, cos.x);
+        all.clip(y * horizon.y + horizon.c, horizon.x);
+        if blocked.outline == Outline::Disk {
+            let across = y + origin[1];
+            let reach = (1.0 - across * across).max(zero).sqrt();
+            all.from = all.from.max(-reach - origin[0]);
+            all.to = all.to.min(reach - origin[0]);
+        }
+    }
+    // What is hidden of them, sorted by where it begins
+    let mut hidden = [const { ArrayVec::<Interval16<S>, MAX_BETWEEN>::new_const() }; ROWS];
+    for occluder in batch.occluders() {
+        let (shadow, outside, within) = batch.shadow(simd, occluder);
+        let (some_outside, some_within) = (outside.any_true(), within.any_true());
+        for (row, [place, ..]) in SPREAD.into_iter().enumerate() {
+            let y = (to - from) * place + from;
+            if some_within {
+                let (all, inside) = (&mut open[row], shadow.within(simd, y));
+                all.from = within.select(all.from.max(inside.from), all.from);
+                all.to = within.select(all.to.min(inside.to), all.to);
+            }
+            if some_outside {
+                let mut interval = shadow.hidden(simd, y);
+                let is_there = outside & interval.from.simd_lt(interval.to);
+                interval.from = is_there.select(interval.from, far);
+                interval.to = is_there.select(interval.to, far);
+                for before in hidden[row].iter_mut() {
+                    let swap = interval.from.simd_lt(before.from);
+                    let (f, t) = (before.from, before.to);
+                    before.from = swap.select(interval.from, f);
+                    before.to = swap.select(interval.to, t);
+                    interval.from = swap.select(f, interval.from);
+                    interval.to = swap.select(t, interval.to);
+                }
+                hidden[row].push(interval);
+            }
+        }
+    }
+    let mut fine = [zero; MOMENTS];
+    let mut coarse = [zero; MOMENTS];
+    let mut seen = zero;
+    let inverse = 1.0 / xh;
+    for ((all, hidden), [place, weight, inner]) in open.iter().zip(&hidden).zip(SPREAD) {
+        let y = (to - from) * place + from;
+        // Sum the antiderivative over the ends of what is left
+        let v = (y - ym) / yh;
+        let mut row = [[zero; 5]; MOMENTS];
+        for moment in 0..moments {
+            for (power, [a, b, c, d, e]) in row[moment].iter_mut().zip(&powers[moment]) {
+                *power = *a + v * (*b + v * (*c + v * (*d + v * *e)));
+            }
+        }
+        let mut sums = [zero; MOMENTS];
+        let mut length = zero;
+        let mut begin = all.from;
+        for k in 0..=hidden.len() {
+            // Up to the next thing that hides, or to the end
+            let (end, next) = match hidden.get(k) {
+                Some(interval) => (interval.from.min(all.to), begin.max(interval.to)),
+                None => (all.to, begin),
+            };
+            let is_there = begin.simd_lt(end);
+            // On nothing, both ends are the same
+            let from = ((begin - xm) * inverse).max(-one).min(one);
+            let to = is_there.select(((end - xm) * inverse).max(-one).min(one), from);
+            for moment in 0..moments {
+                let row = &row[moment];
+                sums[moment] += antiderivative(row, to) - antiderivative(row, from);
+            }
+            length += to - from;
+            begin = next;
+        }
+        for moment in 0..moments {
+            fine[moment] += sums[moment] * weight;
+            coarse[moment] += sums[moment] * inner;
+        }
+        seen += length * weight;
+    }
+    // Rows count as much as the panel is a part of the cell, which is 2 wide in its own coordinates
+    let share = (to - from) / yh;
+    let mut result = PanelSums::default();
+    for moment in 0..moments {
+        result.sums[moment] = (fine[moment] * share).to_array();
+        result.differences[moment] = ((fine[moment] - coarse[moment]).abs() * share).to_array();
+    }
+    result.seen = (seen * share * 0.25).to_array();
+    result
+}

@@ -1,0 +1,587 @@
+//! The renderer that pictures are made with. A cell of 32 x 32 pixels goes through its stations as a whole:
+//!
+//! ```text
+//! primary    squares of pixels that are proved to see one surface; the rays of all others
+//! grid       light over such squares, from nine places of each: 16, 8, 4, 2 pixels wide
+//! quadrants  what a surface in a pixel gets of a light, from four places of it
+//! rays       the same, from all of its camera rays
+//! resolve    the pixel's sum, once
+//! ```
+//!
+//! Each station asks [`LightQueue`] for all of its places together; what its judge refuses is asked by the next. Cells
+//! lie on a grid of the film and are always rendered whole, so no decision depends on tiles, crops or threads.
+
+use std::ops::{ControlFlow, Range};
+
+use super::film::FilmTile;
+use super::fragment::{Fragment, Fragments, Quadrant, RayHit};
+use super::grid::{Block, Grid};
+use super::hits::camera_ray;
+use super::light_queue::{Answer, LightQueue, Place, Request};
+use super::patch::Contrast;
+use super::solo::{self, Candidate, Pyramid};
+use super::square::Square;
+use super::tile::Tile;
+use super::{AaMode, Counts, Heat};
+use crate::color::Rgb;
+use crate::integrate::{ShadingPoint, Sums};
+use crate::material::Bsdf;
+use crate::scene::Scene;
+
+/// Pixels across a cell.
+pub(crate) const CELL: u32 = 32;
+const PIXELS: usize = (CELL * CELL) as usize;
+/// Lists of candidates: of the cell, its quarters, their quarters, down to one pixel.
+const DEPTHS: usize = CELL.ilog2() as usize + 2;
+/// Pixels across the largest square whose colours are looked up one by one.
+const PATCHWORK: u32 = 8;
+
+/// In display steps: how far the places of a surface in a pixel may differ, where light is smooth and where shadows are
+/// cut.
+const SPREAD_SMOOTH: f32 = 10.0;
+const SPREAD_CUT: f32 = 5.0;
+/// How far outlines may move on the light over a quadrant, and light may turn.
+const QUADRANT_MOTION: f32 = 0.3;
+const QUADRANT_TURN: f32 = 1.0;
+/// In display steps: what colours that differ may make together with light that does.
+const MINGLED: f32 = 0.4;
+
+/// What is known of a pixel.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum State {
+    /// Its colour, or that nobody asks for it.
+    Done,
+    /// It is in this of the blocks.
+    Block(u32),
+    /// All of its rays meet this shape.
+    Only(Candidate),
+    /// Its rays were traced.
+    Traced,
+}
+
+/// A pixel whose rays were traced, and what it sees beside fragments.
+#[derive(Clone, Copy, Debug, Default)]
+struct Pixel {
+    /// Its number in the cell.
+    index: u32,
+    /// Rays that meet nothing, and what lights are seen.
+    background: u32,
+    emission: Rgb,
+    ambient: Rgb,
+}
+
+/// A fragment that wants a light.
+#[derive(Clone, Copy, Debug)]
+struct Wanted {
+    fragment: u32,
+    light: u32,
+}
+
+/// One thread's way from tiles to film.
+pub(crate) struct Cells<'a> {
+    scene: &'a Scene,
+    mode: AaMode,
+    lights: LightQueue<'a>,
+    /// All that can be seen, and what squares may see of it.
+    listed: Vec<Candidate>,
+    near: [Vec<Candidate>; DEPTHS],
+    corner: [u32; 2],
+    /// Pixel by pixel of the cell.
+    states: Vec<State>,
+    colors: Vec<[f32; 4]>,
+    work: Vec<f32>,
+    blocks: Vec<Block>,
+    /// The materials of blocks whose pixels differ, pixel by pixel.
+    patchwork: Vec<(Option<Bsdf>, Contrast)>,
+    /// Those whose rays were traced, and their sums: light by light, diffuse and specular.
+    pixels: Vec<Pixel>,
+    terms: Vec<[Rgb; 2]>,
+    grid: Grid,
+    places: Vec<Place>,
+    requests: Vec<Request>,
+    answers: Vec<Answer>,
+    fragments: Fragments,
+    /// The rays of one pixel, each with the number of what it meets.
+    rays: Vec<(u32, RayHit)>,
+    wanted: Vec<Wanted>,
+    refused: Vec<Wanted>,
+}
+
+impl<'a> Cells<'a> {
+    pub fn new(scene: &'a Scene, mode: AaMode, lights: LightQueue<'a>) -> Self {
+        Cells {
+            scene,
+            mode,
+            lights,
+            listed: solo::all(scene),
+            near: Default::default(),
+            corner: [0; 2],
+            states: vec![State::Done; PIXELS],
+            colors: vec![[0.0; 4]; PIXELS],
+            work: vec![0.0; PIXELS],
+            blocks: Vec::new(),
+            patchwork: Vec::new(),
+            pixels: Vec::new(),
+            terms: Vec::new(),
+            grid: Grid::new(scene.lights.len()),
+            places: Vec::new(),
+            requests: Vec::new(),
+            answers: Vec::new(),
+            fragments: Fragments::new(scene),
+            rays: Vec::new(),
+            wanted: Vec::new(),
+            refused: Vec::new(),
+        }
+    }
+
+    /// Renders one tile. `go_on` is asked now and then.
+    pub fn render(&mut self, tile: &Tile, go_on: &impl Fn() -> ControlFlow<()>) -> ControlFlow<(), (FilmTile, Counts)> {
+        let mut film = FilmTile::new(tile);
+        let mut counts = Counts::default();
+        let cells = |from: u32, length: u32| (from / CELL..(from + length).div_ceil(CELL)).map(|cell| cell * CELL);
+        for y in cells(tile.y, tile.height) {
+            for x in cells(tile.x, tile.width) {
+                go_on()?;
+                self.cell([x, y], &mut counts, go_on)?;
+                self.deliver(tile, &mut film, &mut counts);
+            }
+        }
+        ControlFlow::Continue((film, counts))
+    }
+
+    /// Renders a cell.
+    fn cell(&mut self, corner: [u32; 2], counts: &mut Counts, go_on: &impl Fn() -> ControlFlow<()>) -> ControlFlow<()> {
+        self.begin(corner);
+        self.primary(counts);
+        go_on()?;
+        self.grid.light(self.scene, &mut self.lights, &self.blocks, counts, go_on)?;
+        self.work.iter_mut().zip(self.grid.work()).for_each(|(work, more)| *work += more);
+        self.fragments(counts);
+        self.quadrants(counts, go_on)?;
+        self.rays(counts, go_on)?;
+        self.resolve();
+        ControlFlow::Continue(())
+    }
+
+    fn begin(&mut self, corner: [u32; 2]) {
+        self.corner = corner;
+        self.states.fill(State::Done);
+        self.work.fill(0.0);
+        self.blocks.clear();
+        self.patchwork.clear();
+        self.pixels.clear();
+        self.terms.clear();
+        self.grid.begin(corner);
+        self.fragments.clear();
+        self.wanted.clear();
+        self.refused.clear();
+    }
+
+    fn index(&self, [i, j]: [u32; 2]) -> usize {
+        ((j - self.corner[1]) * CELL + i - self.corner[0]) as usize
+    }
+
+    /// Finds out what the pixels of the cell see.
+    fn primary(&mut self, counts: &mut Counts) {
+        let [x, y] = self.corner;
+        let square = Square { x, y, side: CELL };
+        let pyramid = Pyramid::new(self.scene, x as f32, y as f32, CELL as f32);
+        let mut near = std::mem::take(&mut self.near[0]);
+        pyramid.candidates(self.scene, &self.listed, &mut near);
+        self.near[0] = near;
+        self.split(square, 1, counts);
+    }
+
+    /// Finds out what the pixels of a square see. `depth` is that of the list for its candidates, those before it hold
+    /// those of what it is a quarter of.
+    fn split(&mut self, square: Square, depth: usize, counts: &mut Counts) {
+        let scene = self.scene;
+        let pyramid = Pyramid::new(scene, square.x as f32, square.y as f32, square.side as f32);
+        let (outer, inner) = self.near.split_at_mut(depth);
+        let near = &mut inner[0];
+        pyramid.candidates(scene, &outer[depth - 1], near);
+        let n = scene.antialiasing;
+        if near.is_empty() {
+            let color = Pixel { background: n * n, ..Pixel::default() }.color(scene, &[]);
+            for at in square.pixels().filter(|[i, j]| *i < scene.width && *j < scene.height) {
+                let index = self.index(at);
+                self.colors[index] = color;
+            }
+            return;
+        }
+        if self.mode == AaMode::Adaptive
+            && let Some(only) = pyramid.only(scene, near)
+        {
+            return self.block(square, only);
+        }
+        if square.side > SMALLEST {
+            for quarter in square.quarters_on([scene.width, scene.height]) {
+                self.split(quarter, depth + 1, counts);
+            }
+            return;
+        }
+        let near = std::mem::take(&mut self.near[depth]);
+        for at in square.pixels().filter(|[i, j]| *i < scene.width && *j < scene.height) {
+            self.trace(at, &near, counts);
+        }
+        self.near[depth] = near;
+    }
+
+    /// Finds out what the rays of a pixel see that meet nothing but these.
+    fn trace(&mut self, [i, j]: [u32; 2], near: &[Candidate], counts: &mut Counts) {
+        let scene = self.scene;
+        let n = scene.antialiasing;
+        let index = self.index([i, j]);
+        self.work[index] += (n * n) as f32;
+        counts.looks += (n * n) as u64;
+        self.states[index] = State::Traced;
+        let number = self.pixels.len() as u32;
+        self.terms.resize(self.terms.len() + scene.lights.len(), [Rgb::BLACK; 2]);
+        let mut pixel = Pixel { index: index as u32, ..Pixel::default() };
+        // Which of them each ray meets first: of several at the same distance, the one with the lowest id
+        self.rays.clear();
+        for (row, column) in (0..n).flat_map(|row| (0..n).map(move |column| (row, column))) {
+            let (ray, _) = camera_ray(scene, i * n + column, j * n + row);
+            let mut first: Option<(usize, f64)> = None;
+            for (place, of) in near.iter().enumerate() {
+                if let Some(t) = of.intersect(scene, &ray)
+                    && first.is_none_or(|(before, nearest)| {
+                        t < nearest || t == nearest && of.surface(scene) < near[before].surface(scene)
+                    })
+                {
+                    first = Some((place, t));
+                }
+            }
+            match first {
+                None => pixel.background += 1,
+                Some((place, t)) => match near[place] {
+                    Candidate::Light(light) => pixel.emission += scene.lights[light as usize].radiance,
+                    _ => self.rays.push((place as u32, RayHit { ray, t, at: [column as u16, row as u16] })),
+                },
+            }
+        }
+        self.pixels.push(pixel);
+        // Shape by shape; without adaptive antialiasing ray by ray
+        let rays = (n * n) as f32;
+        let share = |count: usize| if self.mode == AaMode::Full { 1.0 } else { count as f32 / rays };
+        if self.mode == AaMode::Full {
+            for (place, ray) in &self.rays {
+                let one = std::iter::once(*ray);
+                self.fragments.add(scene, number, [i, j], near[*place as usize], one, share);
+            }
+            return;
+        }
+        let mut done = 0u64;
+        for k in 0..self.rays.len() {
+            let place = self.rays[k].0;
+            // Those that are told by a bit; of others the first tells all
+            let is_first = if place < 64 {
+                done >> place & 1 == 0
+            } else {
+                self.rays[..k].iter().all(|(before, _)| *before != place)
+            };
+            if is_first {
+                done |= if place < 64 { 1 << place } else { 0 };
+                let same = self.rays[k..].iter().filter(|(of, _)| *of == place).map(|(_, ray)| *ray);
+                self.fragments.add(scene, number, [i, j], near[place as usize], same, share);
+            }
+        }
+    }
+
+    /// Notes a square that is proved to see one shape.
+    fn block(&mut self, square: Square, only: Candidate) {
+        let scene = self.scene;
+        let even = self.fragments.plain.get(only).or_else(|| only.even(scene, square));
+        if even.is_none() && square.side > PATCHWORK {
+            for quarter in square.quarters_on([scene.width, scene.height]) {
+                self.block(quarter, only);
+            }
+            return;
+        }
+        let first = self.patchwork.len();
+        if even.is_none() {
+            self.patchwork.resize(first + (square.side * square.side) as usize, (None, Contrast::default()));
+            let patchwork = &mut self.patchwork[first..];
+            // Beyond the film's edge as well: it is a part of the square
+            each_mean(scene, only, square, &mut |[i, j], bsdf, contrast| {
+                patchwork[((j - square.y) * square.side + i - square.x) as usize] = (Some(bsdf), contrast);
+            });
+        }
+        let block = match even {
+            Some(bsdf) => Some(Block::even(square, only, bsdf)),
+            None => Block::new(square, only, first, self.patchwork[first..].iter().map(|(bsdf, _)| *bsdf)),
+        };
+        let state = match block {
+            Some(block) => {
+                self.blocks.push(block);
+                State::Block(self.blocks.len() as u32 - 1)
+            }
+            None => State::Only(only),
+        };
+        for at in square.pixels() {
+            let index = self.index(at);
+            self.states[index] = state;
+        }
+    }
+
+    /// Queues what light the grid does not tell.
+    fn fragments(&mut self, counts: &mut Counts) {
+        let scene = self.scene;
+        let [x, y] = self.corner;
+        let lights = 0..scene.lights.len() as u32;
+        // Those whose rays were traced want all lights
+        for fragment in 0..self.fragments.all.len() as u32 {
+            self.wanted.extend(lights.clone().map(|light| Wanted { fragment, light }));
+        }
+        for at in (Square { x, y, side: CELL }).pixels().filter(|[i, j]| *i < scene.width && *j < scene.height) {
+            let index = self.index(at);
+            let only = match self.states[index] {
+                State::Done | State::Traced => continue,
+                State::Only(only) => only,
+                State::Block(block) => {
+                    let block = self.blocks[block as usize];
+                    if self.is_told(at, &block) {
+                        continue;
+                    }
+                    block.of
+                }
+            };
+            let fragment = self.fragments.all.len();
+            self.trace(at, &[only], counts);
+            if fragment == self.fragments.all.len() {
+                continue;
+            }
+            let is_even = self.fragments.all[fragment].bsdfs.is_none();
+            for light in lights.clone() {
+                match self.grid.arrived(light as usize, at).filter(|_| is_even) {
+                    Some(sums) => self.add(fragment, light as usize, sums),
+                    None => self.wanted.push(Wanted { fragment: fragment as u32, light }),
+                }
+            }
+        }
+    }
+
+    /// Whether a pixel of a block needs nothing beside the grid; then its colour is set.
+    fn is_told(&mut self, at: [u32; 2], block: &Block) -> bool {
+        let scene = self.scene;
+        let index = self.index(at);
+        let (bsdf, contrast) = match block.first {
+            None => (block.bsdf, Contrast::default()),
+            Some(first) => {
+                let Square { x, y, side } = block.square;
+                let (bsdf, contrast) = self.patchwork[first + ((at[1] - y) * side + at[0] - x) as usize];
+                let Some(bsdf) = bsdf else { return false };
+                (bsdf, contrast)
+            }
+        };
+        let mut color = scene.ambient * bsdf.ambient;
+        let mut slopes = Rgb::BLACK;
+        for light in 0..scene.lights.len() {
+            let Some(sums) = self.grid.arrived(light, at) else { return false };
+            let scale = self.lights.arrivals.scale(light);
+            color += scale * bsdf.diffuse * sums.diffuse;
+            color += scale * bsdf.specular * sums.specular;
+            if contrast != Contrast::default() {
+                let Some(slope) = self.grid.slope(light, at, block.square) else { return false };
+                slopes += scale * (contrast.diffuse * slope.diffuse + contrast.specular * slope.specular) * 0.125;
+            }
+        }
+        if contrast != Contrast::default() && self.lights.arrivals.steps(color, slopes) > MINGLED {
+            return false;
+        }
+        self.colors[index] = [color.r, color.g, color.b, 1.0];
+        self.states[index] = State::Done;
+        true
+    }
+
+    /// Adds what arrives of a light all over a fragment.
+    fn add(&mut self, fragment: usize, light: usize, sums: Sums) {
+        let fragment = &self.fragments.all[fragment];
+        let scale = self.lights.arrivals.scale(light) * fragment.count() as f32;
+        let term = &mut self.terms[fragment.pixel as usize * self.scene.lights.len() + light];
+        term[0] += scale * fragment.bsdf.diffuse * sums.diffuse;
+        term[1] += scale * fragment.bsdf.specular * sums.specular;
+    }
+
+    /// The share of a pixel that so many of its rays have, where each surface is lit once.
+    fn share(&self, rays: usize) -> f32 {
+        match self.mode {
+            AaMode::Adaptive => rays as f32 / (self.scene.antialiasing * self.scene.antialiasing) as f32,
+            AaMode::Full => 1.0,
+        }
+    }
+
+    /// Where a pixel of the cell is on the film.
+    fn at(&self, index: usize) -> [u32; 2] {
+        [self.corner[0] + index as u32 % CELL, self.corner[1] + index as u32 / CELL]
+    }
+
+    /// Asks for the light of fragments, from the middles of their quadrants.
+    fn quadrants(&mut self, counts: &mut Counts, go_on: &dyn Fn() -> ControlFlow<()>) -> ControlFlow<()> {
+        let scene = self.scene;
+        self.requests.clear();
+        let fragments = &self.fragments;
+        for wanted in &self.wanted {
+            let quadrants = &fragments.quadrants[fragments.all[wanted.fragment as usize].quadrants.clone()];
+            self.requests.extend(quadrants.iter().map(|q| Request { place: q.place, light: wanted.light }));
+        }
+        self.lights.ask(&fragments.places, &self.requests, &mut self.answers, counts, go_on)?;
+        let mut next = 0;
+        for wanted in &self.wanted {
+            let fragment = &fragments.all[wanted.fragment as usize];
+            let answers = &self.answers[next..next + fragment.quadrants.len()];
+            next += answers.len();
+            self.work[self.pixels[fragment.pixel as usize].index as usize] += Heat::PLACE * answers.len() as f32;
+            if answers.is_empty() || !self.is_even(fragment, wanted.light as usize, answers) {
+                self.refused.push(*wanted);
+                continue;
+            }
+            let scale = self.lights.arrivals.scale(wanted.light as usize);
+            let term = &mut self.terms[fragment.pixel as usize * scene.lights.len() + wanted.light as usize];
+            for (quadrant, answer) in fragments.quadrants[fragment.quadrants.clone()].iter().zip(answers) {
+                let (scale, bsdf) = (scale * quadrant.rays as f32, &fragments.places[quadrant.place as usize].bsdf);
+                term[0] += scale * bsdf.diffuse * answer.sums.diffuse;
+                term[1] += scale * bsdf.specular * answer.sums.specular;
+            }
+        }
+        ControlFlow::Continue(())
+    }
+
+    /// Whether a light is even enough over the quadrants of a fragment.
+    fn is_even(&self, fragment: &Fragment, light: usize, answers: &[Answer]) -> bool {
+        let scene = self.scene;
+        if answers.iter().any(|answer| answer.motion > QUADRANT_MOTION || answer.turn > QUADRANT_TURN) {
+            return false;
+        }
+        let scale = self.lights.arrivals.scale(light);
+        let (mut least, mut most) = (answers[0].sums, answers[0].sums);
+        for answer in answers {
+            least.diffuse = least.diffuse.min(answer.sums.diffuse);
+            least.specular = least.specular.min(answer.sums.specular);
+            most.diffuse = most.diffuse.max(answer.sums.diffuse);
+            most.specular = most.specular.max(answer.sums.specular);
+        }
+        let apart = Sums { diffuse: most.diffuse - least.diffuse, specular: most.specular - least.specular };
+        let bsdf = &fragment.bsdf;
+        let [diffuse, specular] = [scale * bsdf.diffuse, scale * bsdf.specular];
+        let value = scene.ambient * bsdf.ambient + diffuse * most.diffuse + specular * most.specular;
+        let spread = self.lights.arrivals.steps(value, diffuse * apart.diffuse + specular * apart.specular);
+        let allowed = if answers.iter().all(|answer| answer.smooth) { SPREAD_SMOOTH } else { SPREAD_CUT };
+        let weight = self.share(fragment.count()) * (scene.lights.len() as f32).sqrt();
+        if spread * weight > allowed {
+            return false;
+        }
+        // Fewer than four quadrants do not tell how light changes along both axes
+        self.fragments.quadrants[fragment.quadrants.clone()].iter().all(|Quadrant { contrast, .. }| {
+            let mingled = contrast.diffuse * apart.diffuse + contrast.specular * apart.specular;
+            *contrast == Contrast::default()
+                || answers.len() == 4 && self.lights.arrivals.steps(value, scale * mingled * 0.125) * weight <= MINGLED
+        })
+    }
+
+    /// Asks for the light of fragments at each of their rays.
+    fn rays(&mut self, counts: &mut Counts, go_on: &dyn Fn() -> ControlFlow<()>) -> ControlFlow<()> {
+        let scene = self.scene;
+        let refused = std::mem::take(&mut self.refused);
+        self.places.clear();
+        self.requests.clear();
+        // Places of a fragment serve all lights
+        let mut last: Option<(u32, Range<usize>)> = None;
+        for Wanted { fragment: number, light } in &refused {
+            let fragment = &self.fragments.all[*number as usize];
+            if last.as_ref().is_none_or(|(before, _)| before != number) {
+                let first = self.places.len();
+                let share = self.share(fragment.count());
+                for (k, ray) in self.fragments.rays[fragment.rays.clone()].iter().enumerate() {
+                    let point = ShadingPoint { share, ..fragment.of.point(scene, &ray.ray, ray.t) };
+                    let bsdf = self.fragments.bsdf(fragment, k);
+                    self.places.push(Place::new(scene, point, fragment.of.surface(scene), bsdf));
+                }
+                last = Some((*number, first..self.places.len()));
+            }
+            let places = last.as_ref().map_or(0..0, |(_, places)| places.clone());
+            self.requests.extend(places.map(|place| Request { place: place as u32, light: *light }));
+        }
+        self.lights.ask(&self.places, &self.requests, &mut self.answers, counts, go_on)?;
+        // Requests of a fragment lie together
+        let mut answers = self.requests.iter().zip(&self.answers);
+        for Wanted { fragment, light } in &refused {
+            let fragment = &self.fragments.all[*fragment as usize];
+            self.work[self.pixels[fragment.pixel as usize].index as usize] += Heat::PLACE * fragment.count() as f32;
+            let scale = self.lights.arrivals.scale(*light as usize);
+            let term = &mut self.terms[fragment.pixel as usize * scene.lights.len() + *light as usize];
+            for (request, answer) in answers.by_ref().take(fragment.count()) {
+                let bsdf = &self.places[request.place as usize].bsdf;
+                term[0] += scale * bsdf.diffuse * answer.sums.diffuse;
+                term[1] += scale * bsdf.specular * answer.sums.specular;
+            }
+        }
+        self.refused = refused;
+        ControlFlow::Continue(())
+    }
+
+    /// Makes colours of what is known.
+    fn resolve(&mut self) {
+        let scene = self.scene;
+        let lights = scene.lights.len();
+        for fragment in &self.fragments.all {
+            let pixel = &mut self.pixels[fragment.pixel as usize];
+            pixel.ambient += scene.ambient * fragment.bsdf.ambient * fragment.count() as f32;
+        }
+        for (number, pixel) in self.pixels.iter().enumerate() {
+            self.colors[pixel.index as usize] = pixel.color(scene, &self.terms[number * lights..][..lights]);
+        }
+    }
+
+    /// Hands over the part of the cell that is in the tile.
+    fn deliver(&mut self, tile: &Tile, film: &mut FilmTile, counts: &mut Counts) {
+        let rays = (self.scene.antialiasing * self.scene.antialiasing) as u64;
+        for index in 0..PIXELS {
+            let [i, j] = self.at(index);
+            let inside = |at: u32, from: u32, length: u32| at >= from && at < from + length;
+            if inside(i, tile.x, tile.width) && inside(j, tile.y, tile.height) {
+                counts.camera_rays += rays;
+                film.set(i - tile.x, j - tile.y, self.colors[index]);
+                film.spend(i - tile.x, j - tile.y, self.work[index]);
+            }
+        }
+    }
+}
+
+impl Pixel {
+    /// Red, green, blue premultiplied, alpha: the sum in its one order.
+    fn color(&self, scene: &Scene, terms: &[[Rgb; 2]]) -> [f32; 4] {
+        let rays = (scene.antialiasing * scene.antialiasing) as f32;
+        let mean = |sum: Rgb| Rgb::new(sum.r / rays, sum.g / rays, sum.b / rays);
+        let uncovered = self.background as f32 / rays;
+        let mut color = if scene.transparent { Rgb::BLACK } else { scene.background * uncovered };
+        color += mean(self.emission);
+        color += mean(self.ambient);
+        for [diffuse, specular] in terms {
+            color += mean(*diffuse);
+            color += mean(*specular);
+        }
+        let alpha = if scene.transparent { 1.0 - uncovered } else { 1.0 };
+        [color.r, color.g, color.b, alpha]
+    }
+}
+
+/// Tells the material at each pixel of a square that sees only this, the mean over its rays; nothing for pixels over
+/// which more than colours change.
+fn each_mean(scene: &Scene, only: Candidate, square: Square, tell: &mut impl FnMut([u32; 2], Bsdf, Contrast)) {
+    if square.side == 1 {
+        let at = [square.x, square.y];
+        if let Some((bsdf, contrast)) = only.mean(scene, at) {
+            tell(at, bsdf, contrast);
+        }
+    } else if let Some(bsdf) = only.even(scene, square) {
+        square.pixels().for_each(|at| tell(at, bsdf, Contrast::default()));
+    } else {
+        for quarter in square.quarters() {
+            each_mean(scene, only, quarter, tell);
+        }
+    }
+}
+
+/// Pixels across the smallest squares that are asked whether they hold one surface.
+const SMALLEST: u32 = 2;

@@ -1,0 +1,352 @@
+//! One surface in one pixel, and what of it wants light: its camera rays, and the middles of its quadrants.
+
+use std::ops::Range;
+
+use arrayvec::ArrayVec;
+
+use super::hits::camera_ray;
+use super::light_queue::Place;
+use super::patch::Contrast;
+use super::solo::Candidate;
+use crate::color::Rgb;
+use crate::ids::SurfaceId;
+use crate::integrate::ShadingPoint;
+use crate::material::{Bsdf, Lobe};
+use crate::math::{DVec3, ErrorBound, Ray, Vec3};
+use crate::scene::Scene;
+
+/// Fragments whose normals turn farther from the middle of a quadrant, in radians, are lit at each ray.
+const MAX_TURN: f32 = 0.2;
+/// Fragments of so few rays are lit at each.
+const FEW_RAYS: usize = 4;
+
+/// A camera ray and what it meets.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct RayHit {
+    pub ray: Ray,
+    pub t: f64,
+    /// Column and row in its pixel.
+    pub at: [u16; 2],
+}
+
+/// A surface in a pixel.
+#[derive(Clone, Debug)]
+pub(crate) struct Fragment {
+    pub pixel: u32,
+    pub of: Candidate,
+    /// Its material; the colours are the means over its rays.
+    pub bsdf: Bsdf,
+    /// Its rays among all of the cell, and their materials, if they are not all the same.
+    pub rays: Range<usize>,
+    pub bsdfs: Option<Range<usize>>,
+    /// Its quadrants among all of the cell; none where it is lit at each ray.
+    pub quadrants: Range<usize>,
+}
+
+/// The part of a fragment in a quarter of its pixel.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Quadrant {
+    pub place: u32,
+    pub rays: u32,
+    pub contrast: Contrast,
+}
+
+/// The materials of listed shapes that have no textures.
+pub(crate) struct PlainMaterials {
+    spheres: Vec<Option<Bsdf>>,
+    parallelograms: Vec<Option<Bsdf>>,
+}
+
+impl PlainMaterials {
+    pub fn new(scene: &Scene) -> Self {
+        let of = |surface: SurfaceId| {
+            let material = &scene.materials[scene.geometry.surfaces[surface.index()].material?.index()];
+            let point = ShadingPoint::new(Vec3::ZERO, ErrorBound(Vec3::ZERO), Vec3::Z, Vec3::Z);
+            let bsdf = Bsdf { diffuse: Rgb::BLACK, specular: Rgb::BLACK, ambient: Rgb::BLACK, lobe: Lobe::None };
+            let si = Place::new(scene, point, surface, &bsdf).surface();
+            material.is_plain().then(|| material.bsdf(&si, &scene.textures))
+        };
+        PlainMaterials {
+            spheres: scene.geometry.spheres.iter().map(|sphere| of(sphere.surface)).collect(),
+            parallelograms: scene.geometry.parallelograms.iter().map(|flat| of(flat.surface)).collect(),
+        }
+    }
+
+    /// That of a shape, if it has no textures.
+    pub fn get(&self, of: Candidate) -> Option<Bsdf> {
+        match of {
+            Candidate::Sphere(i) => self.spheres[i as usize],
+            Candidate::Parallelogram(i) => self.parallelograms[i as usize],
+            Candidate::Light(_) => None,
+        }
+    }
+}
+
+/// The fragments of a cell.
+pub(crate) struct Fragments {
+    pub plain: PlainMaterials,
+    pub all: Vec<Fragment>,
+    pub rays: Vec<RayHit>,
+    pub bsdfs: Vec<Bsdf>,
+    pub quadrants: Vec<Quadrant>,
+    /// The middles of the quadrants.
+    pub places: Vec<Place>,
+}
+
+impl Fragment {
+    /// How many of the pixel's rays see it.
+    pub fn count(&self) -> usize {
+        self.rays.len()
+    }
+}
+
+impl Fragments {
+    pub fn new(scene: &Scene) -> Self {
+        Fragments {
+            plain: PlainMaterials::new(scene),
+            all: Vec::new(),
+            rays: Vec::new(),
+            bsdfs: Vec::new(),
+            quadrants: Vec::new(),
+            places: Vec::new(),
+        }
+    }
+
+    pub fn clear(&mut self) {
+        self.all.clear();
+        self.rays.clear();
+        self.bsdfs.clear();
+        self.quadrants.clear();
+        self.places.clear();
+    }
+
+    /// Adds what some rays of pixel (`i`, `j`), number `pixel` of its cell, see, which all meet one shape. `share` is
+    /// that of the pixel by which errors are judged.
+    pub fn add(
+        &mut self,
+        scene: &Scene,
+        pixel: u32,
+        [i, j]: [u32; 2],
+        of: Candidate,
+        rays: impl Iterator<Item = RayHit>,
+        share: impl Fn(usize) -> f32,
+    ) {
+        let n = scene.antialiasing;
+        let first = self.rays.len();
+        self.rays.extend(rays);
+        let all = std::mem::take(&mut self.rays);
+        let rays = &all[first..];
+        let share = share(rays.len());
+        let (bsdf, even) = self.material(scene, [i, j], of, rays);
+        let bsdfs = (!even).then(|| {
+            let first = self.bsdfs.len();
+            let of_ray = |ray: &RayHit| {
+                let [x, y] = ray.on_film(n, [i, j]);
+                of.bsdf(scene, ray, &camera_ray(scene, x, y).1)
+            };
+            self.bsdfs.extend(rays.iter().map(of_ray));
+            first..self.bsdfs.len()
+        });
+        let mean = match &bsdfs {
+            None => Mean { bsdf, contrast: Contrast::default(), uneven: false },
+            Some(range) => Mean::of(self.bsdfs[range.clone()].iter()),
+        };
+        let quadrants = self.quadrants.len();
+        if rays.len() > FEW_RAYS
+            && !mean.uneven
+            && !self.add_quadrants(scene, of, rays, bsdfs.as_ref(), &mean.bsdf, share)
+        {
+            self.quadrants.truncate(quadrants);
+        }
+        self.all.push(Fragment {
+            pixel,
+            of,
+            bsdf: mean.bsdf,
+            rays: first..all.len(),
+            bsdfs,
+            quadrants: quadrants..self.quadrants.len(),
+        });
+        self.rays = all;
+    }
+
+    /// The material in the middle of a pixel, and whether it is that of all its rays.
+    fn material(&self, scene: &Scene, [i, j]: [u32; 2], of: Candidate, rays: &[RayHit]) -> (Bsdf, bool) {
+        if let Some(plain) = self.plain.get(of) {
+            return (plain, true);
+        }
+        if let [ray] = rays {
+            let n = scene.antialiasing;
+            let [x, y] = ray.on_film(n, [i, j]);
+            return (of.bsdf(scene, ray, &camera_ray(scene, x, y).1), true);
+        }
+        let (ray, whole) = scene.camera.local_ray(i as f32 + 0.5, j as f32 + 0.5, 1.0);
+        let middle = match of.hit(scene, &ray) {
+            Some(hit) => RayHit { ray, t: hit.t, at: [0; 2] },
+            None => rays[0],
+        };
+        let si = scene.local_surface(&middle.ray, &of.hit_at(scene, middle.t), &whole);
+        let material = &scene.materials[si.material.index()];
+        let even = of.is_flat_over(scene, &si, &middle.ray, middle.t, &whole) && material.is_even(&si, &scene.textures);
+        (material.bsdf(&si, &scene.textures), even)
+    }
+
+    /// Adds the parts of a fragment in the quarters of its pixel; `false` if it has to be lit at each ray.
+    fn add_quadrants(
+        &mut self,
+        scene: &Scene,
+        of: Candidate,
+        rays: &[RayHit],
+        bsdfs: Option<&Range<usize>>,
+        bsdf: &Bsdf,
+        share: f32,
+    ) -> bool {
+        let n = scene.antialiasing;
+        let half = n.div_ceil(2) as u16;
+        let quadrant = |ray: &RayHit| (ray.at[1] / half * 2 + ray.at[0] / half) as usize;
+        // How many rays each has, and the mean of where they end and of where they come from
+        let mut sums = [(0u32, DVec3::ZERO, Vec3::ZERO); 4];
+        let end = |ray: &RayHit| ray.ray.o.as_dvec3() + ray.ray.d.as_dvec3() * ray.t;
+        for ray in rays {
+            let (count, q, d) = &mut sums[quadrant(ray)];
+            (*count, *q, *d) = (*count + 1, *q + end(ray), *d + ray.ray.d);
+        }
+        for (number, (count, q, d)) in sums.into_iter().enumerate().filter(|(_, (count, ..))| *count > 0) {
+            // In the middle of what they see, not of the rays: on a rim the surface runs away
+            let mut point = of.point_near(scene, q / f64::from(count), -d.normalize());
+            let mut reach2 = 0.0f32;
+            for ray in rays.iter().filter(|ray| quadrant(ray) == number) {
+                reach2 = reach2.max((end(ray).as_vec3() - point.p).length_squared());
+            }
+            point.reach = reach2.sqrt();
+            point.turn = point.reach * of.curvature(scene);
+            point.share = share;
+            if point.turn > MAX_TURN {
+                return false;
+            }
+            let mean = match bsdfs {
+                None => Mean { bsdf: *bsdf, contrast: Contrast::default(), uneven: false },
+                Some(range) => {
+                    let bsdfs = rays.iter().zip(&self.bsdfs[range.clone()]);
+                    Mean::of(bsdfs.filter(|(ray, _)| quadrant(ray) == number).map(|(_, bsdf)| bsdf))
+                }
+            };
+            self.quadrants.push(Quadrant { place: self.places.len() as u32, rays: count, contrast: mean.contrast });
+            self.places.push(Place::new(scene, point, of.surface(scene), &mean.bsdf));
+        }
+        true
+    }
+
+    /// The material that a ray of a fragment sees.
+    pub fn bsdf<'b>(&'b self, fragment: &'b Fragment, ray: usize) -> &'b Bsdf {
+        match &fragment.bsdfs {
+            Some(range) => &self.bsdfs[range.start + ray],
+            None => &fragment.bsdf,
+        }
+    }
+}
+
+impl RayHit {
+    /// Which ray of the film it is, in a pixel with n x n.
+    fn on_film(&self, n: u32, [i, j]: [u32; 2]) -> [u32; 2] {
+        [i * n + u32::from(self.at[0]), j * n + u32::from(self.at[1])]
+    }
+}
+
+impl Candidate {
+    /// Where a ray that meets it at `t` wants light.
+    #[inline(always)]
+    pub fn point(self, scene: &Scene, ray: &Ray, t: f64) -> ShadingPoint {
+        turned(
+            match self {
+                Candidate::Sphere(i) => scene.geometry.spheres[i as usize].shape.place(ray, t),
+                Candidate::Parallelogram(i) => scene.geometry.parallelograms[i as usize].shape.place(ray, t),
+                Candidate::Light(_) => unreachable!("a light has no material"),
+            },
+            -ray.d,
+        )
+    }
+
+    /// The same for the point of it that is nearest to `q`, seen along `wo`.
+    fn point_near(self, scene: &Scene, q: DVec3, wo: Vec3) -> ShadingPoint {
+        turned(
+            match self {
+                Candidate::Sphere(i) => scene.geometry.spheres[i as usize].shape.nearest_place(q),
+                Candidate::Parallelogram(i) => scene.geometry.parallelograms[i as usize].shape.nearest_place(q),
+                Candidate::Light(_) => unreachable!("a light has no material"),
+            },
+            wo,
+        )
+    }
+
+    /// The material that a ray sees which meets it.
+    fn bsdf(self, scene: &Scene, ray: &RayHit, differential: &crate::shape::RayDifferential) -> Bsdf {
+        let si = scene.local_surface(&ray.ray, &self.hit_at(scene, ray.t), differential);
+        scene.materials[si.material.index()].bsdf(&si, &scene.textures)
+    }
+
+    /// The mean material over the rays of a pixel that sees only this; `None` where more than colours change.
+    pub fn mean(self, scene: &Scene, [i, j]: [u32; 2]) -> Option<(Bsdf, Contrast)> {
+        let n = scene.antialiasing;
+        let mut bsdfs = ArrayVec::<Bsdf, MAX_MEAN>::new();
+        for (row, column) in (0..n).flat_map(|row| (0..n).map(move |column| (row, column))) {
+            let (ray, differential) = camera_ray(scene, i * n + column, j * n + row);
+            // It is proved that it meets it; a rounding may say otherwise
+            let Some(t) = self.intersect(scene, &ray) else { continue };
+            bsdfs.try_push(self.bsdf(scene, &RayHit { ray, t, at: [0; 2] }, &differential)).ok()?;
+        }
+        let mean = Mean::of(bsdfs.iter());
+        (!mean.uneven && !bsdfs.is_empty()).then_some((mean.bsdf, mean.contrast))
+    }
+}
+
+/// The most rays whose mean is taken at once.
+const MAX_MEAN: usize = 64;
+/// A place with its normal on the viewer's side.
+#[inline(always)]
+fn turned((p, error, normal): (Vec3, ErrorBound, Vec3), wo: Vec3) -> ShadingPoint {
+    ShadingPoint::new(p, error, if normal.dot(wo) < 0.0 { -normal } else { normal }, wo)
+}
+
+/// The mean of some materials in numbers.
+struct Mean {
+    bsdf: Bsdf,
+    contrast: Contrast,
+    /// Whether highlights differ in more than colour.
+    uneven: bool,
+}
+
+impl Mean {
+    fn of<'a>(bsdfs: impl Iterator<Item = &'a Bsdf>) -> Mean {
+        let mut sum = Bsdf { diffuse: Rgb::BLACK, specular: Rgb::BLACK, ambient: Rgb::BLACK, lobe: Lobe::None };
+        let (mut count, mut uneven) = (0.0f32, false);
+        let infinite = Rgb::gray(f32::INFINITY);
+        let (mut least, mut most) = ([infinite; 2], [Rgb::BLACK; 2]);
+        for bsdf in bsdfs {
+            sum.diffuse += bsdf.diffuse;
+            sum.specular += bsdf.specular;
+            sum.ambient += bsdf.ambient;
+            count += 1.0;
+            for (k, color) in [bsdf.diffuse, bsdf.specular].into_iter().enumerate() {
+                (least[k], most[k]) = (least[k].min(color), most[k].max(color));
+            }
+            // Any ray that sees a highlight says what it is like
+            match (sum.lobe, bsdf.lobe) {
+                (_, Lobe::None) => {}
+                (Lobe::None, lobe) => sum.lobe = lobe,
+                (one, other) => uneven |= one != other,
+            }
+        }
+        let inverse = 1.0 / count;
+        let apart = |k: usize| Rgb::new(most[k].r - least[k].r, most[k].g - least[k].g, most[k].b - least[k].b);
+        Mean {
+            bsdf: Bsdf {
+                diffuse: sum.diffuse * inverse,
+                specular: sum.specular * inverse,
+                ambient: sum.ambient * inverse,
+                lobe: sum.lobe,
+            },
+            contrast: Contrast { diffuse: apart(0), specular: apart(1) },
+            uneven,
+        }
+    }
+}

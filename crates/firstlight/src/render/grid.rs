@@ -1,0 +1,453 @@
+//! Light over squares of pixels that see one surface, from few places.
+//!
+//! Where nothing that a light does is narrow beside the square, nine places tell it all: the corners, the middles of
+//! the sides and the middle. The corners alone foretell what the other five hold, as if light changed evenly. Where
+//! that shows no error, the quadratic through all nine is nearer still, and every pixel takes its light from it.
+//! Elsewhere the square is quartered, down to two pixels. Squares of one size are asked together.
+//!
+//! Source: Ward, Heckbert, "Irradiance gradients", 1992, for taking light between few places; the nine places and what
+//! they foretell are ours.
+
+use std::ops::ControlFlow;
+
+use super::cell::CELL;
+use super::light_queue::{Answer, LightQueue, Place, Request};
+use super::solo::Candidate;
+use super::square::Square;
+use super::{Counts, Heat};
+use crate::color::Rgb;
+use crate::integrate::{ShadingPoint, Sums};
+use crate::material::{Bsdf, Lobe};
+use crate::scene::Scene;
+
+/// In display steps: what the corners of a square may be wrong about its other places: where the light is seen as a
+/// whole, the same under a highlight that is not wide, and where shadows cut it.
+const FORETOLD_SMOOTH: f32 = 1.0;
+const FORETOLD_SHARP: f32 = 0.1;
+const FORETOLD_CUT: f32 = 0.5;
+/// The same of the smallest squares.
+const SMALLEST_SMOOTH: f32 = 2.0;
+const SMALLEST_CUT: f32 = 1.0;
+/// From here on a highlight is not wide; and beyond, narrow beside the square.
+const SHARP: f32 = 0.4;
+const NARROW: f32 = 1.0;
+/// How far outlines of shadows may move on a light over a square.
+const MOTION: f32 = 0.5;
+const SMALLEST_MOTION: f32 = 1.0;
+/// Pixels across the largest and the smallest square that is lit from nine places.
+const LARGEST: u32 = 16;
+const SMALLEST: u32 = 2;
+/// Places across a cell: at the corners of pixels.
+const ACROSS: usize = CELL as usize + 1;
+const PIXELS: usize = (CELL * CELL) as usize;
+
+/// A square of pixels that see one surface.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Block {
+    pub square: Square,
+    pub of: Candidate,
+    /// One for all its pixels: the brightest colours, the darkest ambient one.
+    pub bsdf: Bsdf,
+    /// Where the materials of its pixels begin, if they differ.
+    pub first: Option<usize>,
+}
+
+impl Block {
+    /// Of pixels that all have the same material.
+    pub fn even(square: Square, of: Candidate, bsdf: Bsdf) -> Block {
+        Block { square, of, bsdf, first: None }
+    }
+
+    /// Of pixels with these materials, the first of which has that number; `None` if one is not known, or if their
+    /// highlights differ in more than colour.
+    pub fn new(
+        square: Square,
+        of: Candidate,
+        first: usize,
+        mut bsdfs: impl Iterator<Item = Option<Bsdf>>,
+    ) -> Option<Block> {
+        let mut all = bsdfs.next()??;
+        for bsdf in bsdfs {
+            let bsdf = bsdf?;
+            match (all.lobe, bsdf.lobe) {
+                (_, Lobe::None) => {}
+                (Lobe::None, lobe) => all.lobe = lobe,
+                (one, other) if one == other => {}
+                _ => return None,
+            }
+            all.diffuse = all.diffuse.max(bsdf.diffuse);
+            all.specular = all.specular.max(bsdf.specular);
+            all.ambient = all.ambient.min(bsdf.ambient);
+        }
+        Some(Block { square, of, bsdf: all, first: Some(first) })
+    }
+}
+
+/// What is not known.
+const UNKNOWN: Sums = Sums { diffuse: f32::NAN, specular: f32::NAN };
+/// No node.
+const NONE: u32 = u32::MAX;
+
+/// A corner of pixels, where a ray meets a shape.
+struct Node {
+    of: Candidate,
+    lobe: Lobe,
+    /// The next at the same corner.
+    next: u32,
+    /// Its place, without reach; [`NONE`] where the ray misses the shape.
+    place: u32,
+}
+
+/// One light over one square.
+#[derive(Clone, Copy)]
+struct Item {
+    square: Square,
+    block: u32,
+    light: u32,
+    /// The nodes, row by row.
+    nodes: [u32; 9],
+    center: u32,
+}
+
+/// Light over the squares of a cell.
+pub(crate) struct Grid {
+    corner: [u32; 2],
+    lights: usize,
+    /// Light by light, pixel by pixel: what arrives, no number where that is not known.
+    arrived: Vec<Sums>,
+    /// The first node at each corner of pixels.
+    first: Vec<u32>,
+    nodes: Vec<Node>,
+    /// Node by node, light by light: what arrives.
+    sums: Vec<Sums>,
+    wanted: Vec<bool>,
+    /// Which of them the requests are for.
+    asked_of: Vec<usize>,
+    places: Vec<Place>,
+    /// Pixel by pixel: see [`Heat`].
+    work: Vec<f32>,
+    asked: Vec<Place>,
+    requests: Vec<Request>,
+    answers: Vec<Answer>,
+}
+
+impl Grid {
+    pub fn new(lights: usize) -> Self {
+        Grid {
+            corner: [0; 2],
+            lights,
+            arrived: vec![UNKNOWN; lights * PIXELS],
+            first: vec![NONE; ACROSS * ACROSS],
+            nodes: Vec::new(),
+            sums: Vec::new(),
+            wanted: Vec::new(),
+            asked_of: Vec::new(),
+            places: Vec::new(),
+            work: vec![0.0; PIXELS],
+            asked: Vec::new(),
+            requests: Vec::new(),
+            answers: Vec::new(),
+        }
+    }
+
+    /// Forgets all, for the cell at `corner`.
+    pub fn begin(&mut self, corner: [u32; 2]) {
+        self.corner = corner;
+        self.arrived.fill(UNKNOWN);
+        self.first.fill(NONE);
+        self.nodes.clear();
+        self.sums.clear();
+        self.wanted.clear();
+        self.places.clear();
+        self.work.fill(0.0);
+    }
+
+    /// What each pixel of the cell took; see [`Heat`].
+    pub fn work(&self) -> &[f32] {
+        &self.work
+    }
+
+    /// Shares the work of so many places among the pixels of a square.
+    fn spend(&mut self, square: Square, places: usize) {
+        let each = Heat::PLACE * places as f32 / (square.side * square.side) as f32;
+        for [i, j] in square.pixels() {
+            self.work[((j - self.corner[1]) * CELL + i - self.corner[0]) as usize] += each;
+        }
+    }
+
+    fn pixel(&self, light: usize, [i, j]: [u32; 2]) -> usize {
+        light * PIXELS + ((j - self.corner[1]) * CELL + i - self.corner[0]) as usize
+    }
+
+    /// What arrives of a light at a pixel of the cell, if that is known.
+    pub fn arrived(&self, light: usize, at: [u32; 2]) -> Option<Sums> {
+        let sums = self.arrived[self.pixel(light, at)];
+        (!sums.diffuse.is_nan()).then_some(sums)
+    }
+
+    /// How far it changes from a pixel to its neighbours in a square, along both axes together; `None` where they do
+    /// not know.
+    pub fn slope(&self, light: usize, at: [u32; 2], square: Square) -> Option<Sums> {
+        let here = self.arrived(light, at)?;
+        let mut slope = Sums::default();
+        for (axis, from) in [square.x, square.y].into_iter().enumerate() {
+            let mut most: Option<Sums> = None;
+            for to in [at[axis].wrapping_sub(1), at[axis] + 1] {
+                if to.wrapping_sub(from) < square.side {
+                    let mut beside = at;
+                    beside[axis] = to;
+                    let there = self.arrived(light, beside)?;
+                    let before = most.unwrap_or_default();
+                    most = Some(Sums {
+                        diffuse: before.diffuse.max((there.diffuse - here.diffuse).abs()),
+                        specular: before.specular.max((there.specular - here.specular).abs()),
+                    });
+                }
+            }
+            slope = slope + most?;
+        }
+        Some(slope)
+    }
+
+    /// Finds the light over all blocks.
+    pub fn light(
+        &mut self,
+        scene: &Scene,
+        lights: &mut LightQueue,
+        blocks: &[Block],
+        counts: &mut Counts,
+        go_on: &dyn Fn() -> ControlFlow<()>,
+    ) -> ControlFlow<()> {
+        let mut items: Vec<Item> = Vec::new();
+        let mut waiting: Vec<Item> = Vec::new();
+        for (k, block) in blocks.iter().enumerate() {
+            let mut squares = vec![block.square];
+            while let Some(square) = squares.pop() {
+                if square.side > LARGEST {
+                    squares
+                        .extend(square.quarters_on([scene.width, scene.height]).collect::<Vec<_>>().into_iter().rev());
+                } else if square.side >= SMALLEST {
+                    for light in 0..self.lights as u32 {
+                        waiting.push(Item { square, block: k as u32, light, nodes: [NONE; 9], center: NONE });
+                    }
+                }
+            }
+        }
+        let mut side = LARGEST;
+        while side >= SMALLEST {
+            items.extend(waiting.extract_if(.., |item| item.square.side == side));
+            self.round(scene, lights, blocks, &mut items, counts, go_on)?;
+            let refused = std::mem::take(&mut items);
+            if side > SMALLEST {
+                for item in refused {
+                    for square in item.square.quarters_on([scene.width, scene.height]) {
+                        items.push(Item { square, ..item });
+                    }
+                }
+            }
+            side /= 2;
+        }
+        ControlFlow::Continue(())
+    }
+
+    /// Lights squares of one size from nine places each, where those tell all; leaves the others in `items`.
+    fn round(
+        &mut self,
+        scene: &Scene,
+        lights: &mut LightQueue,
+        blocks: &[Block],
+        items: &mut Vec<Item>,
+        counts: &mut Counts,
+        go_on: &dyn Fn() -> ControlFlow<()>,
+    ) -> ControlFlow<()> {
+        // How each square sees its light from its middle
+        self.asked.clear();
+        self.requests.clear();
+        let mut last: Option<(Square, u32, [u32; 9], Option<Place>)> = None;
+        let mut kept: Vec<Item> = Vec::new();
+        let mut failed: Vec<Item> = Vec::new();
+        for mut item in items.drain(..) {
+            let block = &blocks[item.block as usize];
+            if last.as_ref().is_none_or(|(square, of, ..)| (*square, *of) != (item.square, item.block)) {
+                let nodes = self.nine(scene, block, item.square);
+                let place = self.middle(block, &nodes);
+                last = Some((item.square, item.block, nodes, place));
+            }
+            let Some((_, _, nodes, Some(place))) = last else {
+                failed.push(item);
+                continue;
+            };
+            (item.nodes, item.center) = (nodes, self.requests.len() as u32);
+            self.requests.push(Request { place: self.asked.len() as u32, light: item.light });
+            self.asked.push(place);
+            self.spend(item.square, 1);
+            kept.push(item);
+        }
+        lights.ask(&self.asked, &self.requests, &mut self.answers, counts, go_on)?;
+        let centers = std::mem::take(&mut self.answers);
+        // Those that do not fail at once ask their nodes
+        self.requests.clear();
+        let mut open: Vec<Item> = Vec::new();
+        for item in kept {
+            let answer = &centers[item.center as usize];
+            if answer.smooth && answer.sums == Sums::default() {
+                self.fill(scene, &item, &[Sums::default(); 9]);
+                continue;
+            }
+            let is_smallest = item.square.side == SMALLEST;
+            let motion = if is_smallest { SMALLEST_MOTION } else { MOTION };
+            if !(answer.motion <= motion && answer.turn <= NARROW) {
+                failed.push(item);
+                continue;
+            }
+            self.sums[item.nodes[4] as usize * self.lights + item.light as usize] = answer.sums;
+            open.push(item);
+        }
+        for item in &open {
+            let before = self.requests.len();
+            for node in item.nodes {
+                let known = node as usize * self.lights + item.light as usize;
+                if self.sums[known].diffuse.is_nan() && !self.wanted[known] {
+                    self.wanted[known] = true;
+                    self.requests.push(Request { place: self.nodes[node as usize].place, light: item.light });
+                    self.asked_of.push(known);
+                }
+            }
+            self.spend(item.square, self.requests.len() - before);
+        }
+        lights.ask(&self.places, &self.requests, &mut self.answers, counts, go_on)?;
+        for (known, answer) in self.asked_of.drain(..).zip(&self.answers) {
+            self.sums[known] = answer.sums;
+        }
+        for item in open {
+            let nodes = item.nodes.map(|node| self.sums[node as usize * self.lights + item.light as usize]);
+            let block = &blocks[item.block as usize];
+            if self.is_foretold(scene, lights, block, &item, &nodes, &centers[item.center as usize]) {
+                self.fill(scene, &item, &nodes);
+            } else {
+                failed.push(item);
+            }
+        }
+        self.answers = centers;
+        failed.sort_by_key(|item| (item.block, item.square.y, item.square.x, item.light));
+        *items = failed;
+        ControlFlow::Continue(())
+    }
+
+    /// The nodes of a square; [`NONE`] where the ray misses the shape.
+    fn nine(&mut self, scene: &Scene, block: &Block, Square { x, y, side }: Square) -> [u32; 9] {
+        let half = side / 2;
+        std::array::from_fn(|k| {
+            let at = [x + k as u32 % 3 * half, y + k as u32 / 3 * half];
+            self.node(scene, block, at)
+        })
+    }
+
+    fn node(&mut self, scene: &Scene, block: &Block, at: [u32; 2]) -> u32 {
+        let corner = (at[1] - self.corner[1]) as usize * ACROSS + (at[0] - self.corner[0]) as usize;
+        let mut node = self.first[corner];
+        while node != NONE {
+            let known = &self.nodes[node as usize];
+            if known.of == block.of && known.lobe == block.bsdf.lobe {
+                return if known.place == NONE { NONE } else { node };
+            }
+            node = known.next;
+        }
+        let (ray, _) = scene.camera.local_ray(at[0] as f32, at[1] as f32, 1.0);
+        let node = self.nodes.len() as u32;
+        let place = match block.of.hit(scene, &ray) {
+            Some(hit) => {
+                let point = block.of.point(scene, &ray, hit.t);
+                self.places.push(Place::new(scene, point, hit.surface, &block.bsdf));
+                self.places.len() as u32 - 1
+            }
+            None => NONE,
+        };
+        self.nodes.push(Node { of: block.of, lobe: block.bsdf.lobe, next: self.first[corner], place });
+        self.first[corner] = node;
+        self.sums.resize(self.nodes.len() * self.lights, UNKNOWN);
+        self.wanted.resize(self.nodes.len() * self.lights, false);
+        if place == NONE { NONE } else { node }
+    }
+
+    /// The middle of a square, which stands for all of it.
+    fn middle(&self, block: &Block, nodes: &[u32; 9]) -> Option<Place> {
+        if nodes.contains(&NONE) {
+            return None;
+        }
+        let point = |k: usize| &self.places[self.nodes[nodes[k] as usize].place as usize].point;
+        let middle = point(4);
+        let (mut reach, mut turn) = (0.0f32, 0.0f32);
+        for k in [0, 2, 6, 8] {
+            reach = reach.max((point(k).p - middle.p).length());
+            turn = turn.max((point(k).ns - middle.ns).length());
+        }
+        // The arc, not the chord
+        let middle = ShadingPoint { reach: reach * 1.01, turn: turn * 1.05, ..*middle };
+        let node = &self.places[self.nodes[nodes[4] as usize].place as usize];
+        Some(Place { point: middle, bsdf: block.bsdf, ..*node })
+    }
+
+    /// Whether the corners foretell the other five.
+    fn is_foretold(
+        &self,
+        scene: &Scene,
+        lights: &LightQueue,
+        block: &Block,
+        item: &Item,
+        nodes: &[Sums; 9],
+        center: &Answer,
+    ) -> bool {
+        let scale = lights.arrivals.scale(item.light as usize);
+        let [diffuse, specular] = [scale * block.bsdf.diffuse, scale * block.bsdf.specular];
+        let base = scene.ambient * block.bsdf.ambient;
+        let allowed = match (center.turn > SHARP, item.square.side == SMALLEST, center.smooth) {
+            (true, false, _) => FORETOLD_SHARP,
+            (_, true, true) => SMALLEST_SMOOTH,
+            (_, true, false) => SMALLEST_CUT,
+            (_, false, true) => FORETOLD_SMOOTH,
+            (_, false, false) => FORETOLD_CUT,
+        };
+        let allowed = allowed / (self.lights as f32).sqrt();
+        let mean = |a: Sums, b: Sums| (a + b) * 0.5;
+        let [nw, n, ne, w, m, e, sw, s, se] = *nodes;
+        let middle = mean(mean(nw, ne), mean(sw, se));
+        let foretold = [(n, mean(nw, ne)), (w, mean(nw, sw)), (m, middle), (e, mean(ne, se)), (s, mean(sw, se))];
+        foretold.iter().all(|(is, said)| {
+            let value: Rgb = base + diffuse * is.diffuse + specular * is.specular;
+            let error = diffuse * (is.diffuse - said.diffuse).abs() + specular * (is.specular - said.specular).abs();
+            lights.arrivals.steps(value, error) <= allowed
+        })
+    }
+
+    /// Lays the quadratic through nine sums over the pixels of a square: its mean over their rays.
+    fn fill(&mut self, scene: &Scene, item: &Item, nodes: &[Sums; 9]) {
+        let Square { x, y, side } = item.square;
+        let n = scene.antialiasing as f32;
+        // A regular grid of n x n in a pixel of width h: x^2 is (1 - 1/n^2) h^2 / 12 more than in its middle
+        let h = 1.0 / side as f32;
+        let more = (1.0 - 1.0 / (n * n)) * h * h / 12.0;
+        let mut weights = [[0.0f32; 3]; LARGEST as usize];
+        for (i, weights) in weights.iter_mut().enumerate().take(side as usize) {
+            let t = (i as f32 + 0.5) * h;
+            *weights = [
+                (2.0 * t - 1.0) * (t - 1.0) + 2.0 * more,
+                4.0 * t * (1.0 - t) - 4.0 * more,
+                t * (2.0 * t - 1.0) + 2.0 * more,
+            ];
+        }
+        let start = self.pixel(item.light as usize, [x, y]);
+        for (row, [a, b, c]) in weights[..side as usize].iter().enumerate() {
+            let column = |k: usize| {
+                let [n, m, s] = [nodes[k], nodes[3 + k], nodes[6 + k]];
+                [n.diffuse * a + m.diffuse * b + s.diffuse * c, n.specular * a + m.specular * b + s.specular * c]
+            };
+            let [w, m, e] = [column(0), column(1), column(2)];
+            let line = &mut self.arrived[start + row * CELL as usize..][..side as usize];
+            for (sums, [a, b, c]) in line.iter_mut().zip(&weights) {
+                sums.diffuse = (w[0] * a + m[0] * b + e[0] * c).max(0.0);
+                sums.specular = (w[1] * a + m[1] * b + e[1] * c).max(0.0);
+            }
+        }
+    }
+}

@@ -1,0 +1,289 @@
+//! Light at many places: each light of a scene is asked for all that want it together.
+
+use std::ops::ControlFlow;
+
+use super::Counts;
+use super::arrival::{Arrivals, Lights, Place as OldPlace};
+use super::change::Arrival;
+use super::tiled::BEND;
+use crate::color::Rgb;
+use crate::ids::{LightId, MaterialId, SurfaceId};
+use crate::integrate::{Asked, Evaluator, Obstacles, ShadingPoint, Sums, Tolerance, Visibility};
+use crate::light::LightKind;
+use crate::material::{Bsdf, Lobe};
+use crate::math::{Facet, Vec2};
+use crate::scene::Scene;
+use crate::shape::{Footprint, SurfaceInteraction, UvEdge};
+use crate::visibility::Visibility as OldVisibility;
+
+/// A place of a surface that wants light.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Place {
+    /// Where, and what it stands for; the colours in it are filled in light by light.
+    pub point: ShadingPoint,
+    pub surface: SurfaceId,
+    pub receives_shadow: bool,
+    /// Its material; of what it stands for, the brightest colours and the darkest ambient one.
+    pub bsdf: Bsdf,
+}
+
+impl Place {
+    pub fn new(scene: &Scene, point: ShadingPoint, surface: SurfaceId, bsdf: &Bsdf) -> Place {
+        let receives_shadow = scene.geometry.surfaces[surface.index()].receives_shadow;
+        Place { point, surface, receives_shadow, bsdf: *bsdf }
+    }
+
+    /// The same as a surface, without its texture.
+    pub fn surface(&self) -> SurfaceInteraction {
+        let ShadingPoint { p, error, horizon, ns, wo, .. } = self.point;
+        SurfaceInteraction {
+            p,
+            error,
+            ng: horizon,
+            ns,
+            lit_from: p,
+            horizon,
+            facet: Facet::NONE,
+            wo,
+            uv: Vec2::ZERO,
+            footprint: Footprint { dx: Vec2::ZERO, dy: Vec2::ZERO, edges: [UvEdge::Unbounded; 2] },
+            color: Rgb::WHITE,
+            surface: self.surface,
+            material: MaterialId(0),
+            receives_shadow: self.receives_shadow,
+        }
+    }
+}
+
+/// The shadows of one of fewer points than this show by themselves.
+const FEW_SAMPLES: usize = 256;
+
+/// One light at one place.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Request {
+    pub place: u32,
+    pub light: u32,
+}
+
+/// What arrives of one light at one place.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Answer {
+    pub sums: Sums,
+    /// Whether the light is seen as a whole, or not at all, from all within the place's reach.
+    pub smooth: bool,
+    /// How far outlines of shadows move on the light within the reach, as a part of its size.
+    pub motion: f32,
+    /// How much light turns and grows within the reach: angles by which its direction turns, in radians, with what a
+    /// highlight makes of it; more than any bound where the place is near the light or its plane.
+    pub turn: f32,
+}
+
+/// The lights of a scene as batches ask for them; see [`Lights`].
+pub(crate) struct BatchLights<'a> {
+    obstacles: Vec<Option<Obstacles<'a>>>,
+    tolerance: Tolerance,
+    allowed: f32,
+    least: f32,
+}
+
+impl<'a> BatchLights<'a> {
+    pub fn new(scene: &'a Scene, lights: &Lights) -> Self {
+        let closed = |index: usize| lights.emitters[index].as_ref().is_some_and(|emitter| emitter.is_closed());
+        let obstacles = (0..scene.lights.len())
+            .map(|index| closed(index).then(|| Obstacles::new(scene, index)).flatten())
+            .collect();
+        let tolerance = Tolerance::DEFAULT;
+        let allowed = tolerance.point / (scene.lights.len().max(1) as f32).sqrt();
+        BatchLights { obstacles, tolerance, allowed, least: lights.steps.value_of(allowed) }
+    }
+}
+
+/// Asks for light.
+pub(crate) struct LightQueue<'a> {
+    scene: &'a Scene,
+    lights: &'a Lights,
+    batch: &'a BatchLights<'a>,
+    pub arrivals: Arrivals<'a>,
+    pub evaluator: Evaluator,
+    lobes: Vec<Lobe>,
+    /// Requests in the order in which they are asked: those of one light, one highlight, with or without shadows.
+    groups: Vec<Vec<u32>>,
+    points: Vec<ShadingPoint>,
+    arrived: Vec<crate::integrate::Arrived>,
+}
+
+impl<'a> LightQueue<'a> {
+    pub fn new(scene: &'a Scene, lights: &'a Lights, batch: &'a BatchLights<'a>, arrivals: Arrivals<'a>) -> Self {
+        LightQueue {
+            scene,
+            lights,
+            batch,
+            arrivals,
+            evaluator: Evaluator::default(),
+            lobes: Vec::new(),
+            groups: Vec::new(),
+            points: Vec::new(),
+            arrived: Vec::new(),
+        }
+    }
+
+    /// Answers each request.
+    pub fn ask(
+        &mut self,
+        places: &[Place],
+        requests: &[Request],
+        answers: &mut Vec<Answer>,
+        counts: &mut Counts,
+        go_on: &dyn Fn() -> ControlFlow<()>,
+    ) -> ControlFlow<()> {
+        let scene = self.scene;
+        answers.clear();
+        answers.resize(requests.len(), Answer { smooth: true, ..Answer::default() });
+        // Sort them by light, highlight and shadows
+        self.lobes.clear();
+        self.groups.iter_mut().for_each(Vec::clear);
+        for (k, request) in requests.iter().enumerate() {
+            let place = &places[request.place as usize];
+            let links = scene.geometry.lights_of(place.surface);
+            if !scene.geometry.links.contains(links, LightId(request.light)) {
+                continue;
+            }
+            let lobe = self.lobes.iter().position(|lobe| *lobe == place.bsdf.lobe).unwrap_or_else(|| {
+                self.lobes.push(place.bsdf.lobe);
+                self.lobes.len() - 1
+            });
+            let group = (lobe * scene.lights.len() + request.light as usize) * 2 + usize::from(place.receives_shadow);
+            if group >= self.groups.len() {
+                self.groups.resize_with(group + 1, Vec::new);
+            }
+            self.groups[group].push(k as u32);
+        }
+        for group in 0..self.groups.len() {
+            if self.groups[group].is_empty() {
+                continue;
+            }
+            let light = group / 2 % scene.lights.len();
+            let lobe = self.lobes[group / 2 / scene.lights.len()];
+            let members = std::mem::take(&mut self.groups[group]);
+            match (&self.lights.emitters[light], &self.batch.obstacles[light]) {
+                (Some(emitter), Some(obstacles)) => {
+                    let asked = Asked {
+                        emitter,
+                        obstacles,
+                        lobe: &lobe,
+                        steps: &self.lights.steps,
+                        tolerance: &self.batch.tolerance,
+                        allowed: self.batch.allowed,
+                        least: self.batch.least,
+                        shadows: scene.lights[light].shadows && group % 2 == 1,
+                    };
+                    self.points.clear();
+                    let scale = self.arrivals.scale(light);
+                    self.points.extend(members.iter().map(|k| {
+                        let place = &places[requests[*k as usize].place as usize];
+                        ShadingPoint {
+                            worth: [scale * place.bsdf.diffuse, scale * place.bsdf.specular],
+                            base: scene.ambient * place.bsdf.ambient,
+                            ..place.point
+                        }
+                    }));
+                    self.arrived.clear();
+                    self.evaluator.evaluate(self.arrivals.level(), &asked, &self.points, &mut self.arrived);
+                    for (i, k) in members.iter().enumerate() {
+                        let place = &places[requests[*k as usize].place as usize];
+                        let arrived = self.arrived[i];
+                        let settled = &mut counts.settled.visibility;
+                        match arrived.visibility {
+                            Visibility::Below => settled[OldVisibility::BelowHorizon as usize] += 1,
+                            Visibility::Hidden => settled[OldVisibility::Hidden as usize] += 1,
+                            Visibility::Full => settled[OldVisibility::Lit as usize] += 1,
+                            Visibility::Partial => counts.closed_form += 1,
+                            Visibility::Unknown => go_on()?,
+                        }
+                        answers[*k as usize] = if arrived.visibility == Visibility::Unknown {
+                            self.one(light, place, counts)
+                        } else {
+                            let is_near = place.point.reach > 0.4 * arrived.distance
+                                || emitter.is_one_sided() && arrived.height <= place.point.reach;
+                            Answer {
+                                sums: arrived.sums,
+                                smooth: arrived.proved,
+                                motion: arrived.motion,
+                                turn: if is_near && !arrived.proved {
+                                    f32::INFINITY
+                                } else {
+                                    self.turn(place, &lobe, arrived.distance)
+                                },
+                            }
+                        };
+                    }
+                }
+                _ => {
+                    for k in &members {
+                        go_on()?;
+                        let place = &places[requests[*k as usize].place as usize];
+                        answers[*k as usize] = self.one(light, place, counts);
+                    }
+                }
+            }
+            self.groups[group] = members;
+        }
+        ControlFlow::Continue(())
+    }
+
+    /// How far directions turn within a place's reach, times how fast a highlight falls.
+    fn turn(&self, place: &Place, lobe: &Lobe, distance: f32) -> f32 {
+        if place.point.reach == 0.0 {
+            return 0.0;
+        }
+        let sway = self.scene.camera.sway(place.point.p, place.point.reach);
+        let angle = place.point.turn + 0.5 * (place.point.reach / distance + sway);
+        // As the exponent of Blinn's model
+        angle * (8.0 * lobe.sharpness(1.0)).max(1.0).sqrt()
+    }
+
+    /// One light at one place, by itself.
+    fn one(&mut self, light: usize, place: &Place, counts: &mut Counts) -> Answer {
+        let si = place.surface();
+        let old = OldPlace {
+            reach: place.point.reach,
+            turn: place.point.turn,
+            share: place.point.share,
+            ..self.arrivals.place(light, &si, &place.bsdf)
+        };
+        let arrival = self.arrivals.arrival(light, &old, counts);
+        // A light of one point sets in at once where it passes the horizon
+        let kind = &self.scene.lights[light];
+        let ShadingPoint { p, ns, horizon, reach, turn, .. } = place.point;
+        let is_sampled = matches!(kind.kind, LightKind::Area(_)) && self.lights.emitters[light].is_none();
+        let is_kinked = !matches!(kind.kind, LightKind::Area(_)) && {
+            let to = kind.towards(0, p).l;
+            ns.dot(to).min(horizon.dot(to)).abs() < reach + turn * to.length()
+        };
+        Answer {
+            sums: arrival.sums,
+            smooth: arrival.smooth || place.point.reach == 0.0,
+            // Each of a fixed set of points throws a hard shadow, which shows where they are few
+            motion: if is_sampled && kind.samples() < FEW_SAMPLES && arrival.drift > 0.0 {
+                f32::INFINITY
+            } else {
+                arrival.drift
+            },
+            turn: if is_kinked || !arrival.resolved && !self.is_even(&old, &arrival) {
+                f32::INFINITY
+            } else if arrival.sharp {
+                0.5
+            } else {
+                0.0
+            },
+        }
+    }
+
+    /// Whether what a light sends changes so little within a place's reach that nothing of that shows.
+    fn is_even(&self, place: &OldPlace, arrival: &Arrival) -> bool {
+        let [diffuse, specular] = place.colors;
+        let value = place.base + diffuse * arrival.sums.diffuse + specular * arrival.sums.specular;
+        let error = diffuse * arrival.bend.diffuse + specular * arrival.bend.specular;
+        self.arrivals.steps(value, error) <= BEND / (self.scene.lights.len() as f32).sqrt()
+    }
+}
