@@ -27,6 +27,7 @@ const FORETOLD_SHARP: f32 = 0.1;
 const FORETOLD_CUT: f32 = 0.5;
 /// The same of the smallest squares.
 const SMALLEST_SMOOTH: f32 = 2.0;
+const SMALLEST_SHARP: f32 = 0.25;
 const SMALLEST_CUT: f32 = 1.0;
 /// From here on a highlight is not wide; and beyond, narrow beside the square.
 const SHARP: f32 = 0.4;
@@ -403,10 +404,11 @@ impl Grid {
         let base = scene.ambient * block.bsdf.ambient;
         let allowed = match (center.turn > SHARP, item.square.side == SMALLEST, center.smooth) {
             (true, false, _) => FORETOLD_SHARP,
-            (_, true, true) => SMALLEST_SMOOTH,
-            (_, true, false) => SMALLEST_CUT,
-            (_, false, true) => FORETOLD_SMOOTH,
-            (_, false, false) => FORETOLD_CUT,
+            (true, true, _) => SMALLEST_SHARP,
+            (false, true, true) => SMALLEST_SMOOTH,
+            (false, true, false) => SMALLEST_CUT,
+            (false, false, true) => FORETOLD_SMOOTH,
+            (false, false, false) => FORETOLD_CUT,
         };
         let allowed = allowed / (self.lights as f32).sqrt();
         let mean = |a: Sums, b: Sums| (a + b) * 0.5;
