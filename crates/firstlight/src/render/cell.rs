@@ -138,13 +138,10 @@ impl<'a> Cells<'a> {
     pub fn render(&mut self, tile: &Tile, go_on: &impl Fn() -> ControlFlow<()>) -> ControlFlow<(), (FilmTile, Counts)> {
         let mut film = FilmTile::new(tile);
         let mut counts = Counts::default();
-        let cells = |from: u32, length: u32| (from / CELL..(from + length).div_ceil(CELL)).map(|cell| cell * CELL);
-        for y in cells(tile.y, tile.height) {
-            for x in cells(tile.x, tile.width) {
-                go_on()?;
-                self.cell([x, y], &mut counts, go_on)?;
-                self.deliver(tile, &mut film, &mut counts);
-            }
+        for corner in tile.cells(CELL) {
+            go_on()?;
+            self.cell(corner, &mut counts, go_on)?;
+            self.deliver(tile, &mut film, &mut counts);
         }
         ControlFlow::Continue((film, counts))
     }

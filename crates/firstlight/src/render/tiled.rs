@@ -121,12 +121,9 @@ impl<'a> Tiled<'a> {
     pub fn render(&mut self, tile: &Tile, go_on: &impl Fn() -> ControlFlow<()>) -> ControlFlow<(), (FilmTile, Counts)> {
         let mut film = FilmTile::new(tile);
         let mut counts = Counts::default();
-        let cells = |from: u32, length: u32| (from / CELL..(from + length).div_ceil(CELL)).map(|cell| cell * CELL);
-        for y in cells(tile.y, tile.height) {
-            for x in cells(tile.x, tile.width) {
-                go_on()?;
-                self.cell(tile, [x, y], &mut film, &mut counts, go_on)?;
-            }
+        for corner in tile.cells(CELL) {
+            go_on()?;
+            self.cell(tile, corner, &mut film, &mut counts, go_on)?;
         }
         ControlFlow::Continue((film, counts))
     }
