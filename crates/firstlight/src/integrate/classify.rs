@@ -224,25 +224,10 @@ impl<S: Simd> Sight<S> {
     }
 }
 
-/// The classes of up to sixteen points, whose views `members` are; of those whose bits are in `asked`.
-/// Not inlined: one copy for each instruction set is enough.
-#[inline(never)]
-pub(crate) fn classify<S: Simd>(
-    simd: S,
-    obstacles: &Obstacles,
-    emitter: &Emitter,
-    members: &Members,
-    points: &[ShadingPoint],
-    asked: u64,
-) -> [Class; LANES] {
-    simd.vectorize(
-        #[inline(always)]
-        || classify_now(simd, obstacles, emitter, members, points, asked),
-    )
-}
-
+/// The classes of up to sixteen points, whose views `members` are; of those whose bits are in `asked`. To be called
+/// within `vectorize`.
 #[inline(always)]
-fn classify_now<S: Simd>(
+pub(crate) fn classify<S: Simd>(
     simd: S,
     obstacles: &Obstacles,
     emitter: &Emitter,

@@ -16,7 +16,7 @@
 //! of the cell is (two rules for the rows of each panel). What is asked again is asked with everything else that is.
 
 use arrayvec::ArrayVec;
-use fearless_simd::Level;
+use fearless_simd::{Level, Simd};
 
 use super::Sums;
 use super::batch::{Block, Members, ShadingPoint, ViewBlock};
@@ -164,7 +164,10 @@ impl Evaluator {
                 let views = &self.views;
                 classes = dispatch_wide!(level, simd => {
                     let members = Members::new(views, |k| (start + k) as u32);
-                    classify(simd, light.obstacles, light.emitter, &members, points, arriving)
+                    simd.vectorize(
+                        #[inline(always)]
+                        || classify(simd, light.obstacles, light.emitter, &members, points, arriving),
+                    )
                 });
             }
             for (k, view) in seen.iter().enumerate() {
@@ -216,22 +219,33 @@ impl Evaluator {
         self.panel_sums.clear();
         let (fits, cut_fits, panel_sums) = (&mut self.fits, &mut self.cut_fits, &mut self.panel_sums);
         self.cells_asked += (whole.len() + cut_cells.len()) as u64;
+        // Those of the cut cells that are new; others have their polynomials
+        let new = cut_cells[polynomials.len()..].chunks(LANES).map(|cells| (cells, true));
+        let asked = whole.chunks(LANES).map(|cells| (cells, false)).chain(new);
+        // Each kernel is called at one place: so there is one copy of it for each instruction set
         dispatch_wide!(level, simd => {
-            for cells in whole.chunks(LANES) {
+            for (cells, is_cut) in asked {
                 let members = Members::new(views, |k| cells[k.min(cells.len() - 1)].point);
-                fits.push(fit(simd, light.lobe, physical, &members, cells, None));
-            }
-            // Those that are new; others have their polynomials
-            let first = polynomials.len();
-            for (i, cells) in cut_cells[first..].chunks(LANES).enumerate() {
-                let members = Members::new(views, |k| cells[k.min(cells.len() - 1)].point);
-                cut_fits.push(fit(simd, light.lobe, physical, &members, cells, Some(polynomials)));
-                cut(simd, &blocked, &members, cells, (first + i * LANES) as u32, spare, panels);
+                let first = polynomials.len() as u32;
+                let wanted = is_cut.then_some(&mut *polynomials);
+                let fitted = simd.vectorize(
+                    #[inline(always)]
+                    || fit(simd, light.lobe, physical, &members, cells, wanted),
+                );
+                if is_cut {
+                    cut_fits.push(fitted);
+                    cut(simd, &blocked, &members, cells, first, spare, panels);
+                } else {
+                    fits.push(fitted);
+                }
             }
             for some in panels.chunks(LANES) {
                 let point = |k: usize| cut_cells[some[k.min(some.len() - 1)].cell as usize].point;
                 let members = Members::new(views, point);
-                panel_sums.push(rows(simd, &blocked, &members, cut_cells, polynomials, some, moments));
+                panel_sums.push(simd.vectorize(
+                    #[inline(always)]
+                    || rows(simd, &blocked, &members, cut_cells, polynomials, some, moments),
+                ));
             }
         });
         self.panels_asked += self.panels.len() as u64;

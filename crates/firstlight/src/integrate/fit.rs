@@ -125,25 +125,10 @@ pub(crate) struct Fits {
     pub tails: [[Block; MOMENTS]; 2],
 }
 
-/// The fit of up to sixteen cells. With `polynomials`, the antiderivatives along x: of each cell, moment by moment.
-/// Not inlined: one copy for each instruction set is enough.
-#[inline(never)]
-pub(crate) fn fit<S: Simd>(
-    simd: S,
-    lobe: &Lobe,
-    physical: bool,
-    members: &Members,
-    cells: &[Cell],
-    polynomials: Option<&mut Vec<[Polynomial; MOMENTS]>>,
-) -> Fits {
-    simd.vectorize(
-        #[inline(always)]
-        || fit_now(simd, lobe, physical, members, cells, polynomials),
-    )
-}
-
+/// The fit of up to sixteen cells. With `polynomials`, the antiderivatives along x: of each cell, moment by moment. To
+/// be called within `vectorize`.
 #[inline(always)]
-fn fit_now<S: Simd>(
+pub(crate) fn fit<S: Simd>(
     simd: S,
     lobe: &Lobe,
     physical: bool,

@@ -186,31 +186,14 @@ const MAX_PANELS: usize = 48;
 /// Panels shorter than this part of their cell are not worth their rows.
 const LEAST: f32 = 1e-4;
 
-/// What up to sixteen panels send.
-/// Not inlined: one copy for each instruction set is enough.
-#[inline(never)]
-pub(crate) fn rows<S: Simd>(
-    simd: S,
-    blocked: &Blocked,
-    members: &Members,
-    cells: &[Cell],
-    polynomials: &[[Polynomial; MOMENTS]],
-    panels: &[Panel],
-    moments: usize,
-) -> PanelSums {
-    simd.vectorize(
-        #[inline(always)]
-        || rows_now(simd, blocked, members, cells, polynomials, panels, moments),
-    )
-}
-
 #[inline(always)]
 fn antiderivative<S: Simd>([a, b, c, d, e]: &[f32x16<S>; 5], u: f32x16<S>) -> f32x16<S> {
     u * (*a + u * (*b + u * (*c + u * (*d + u * *e))))
 }
 
+/// What up to sixteen panels send. To be called within `vectorize`.
 #[inline(always)]
-fn rows_now<S: Simd>(
+pub(crate) fn rows<S: Simd>(
     simd: S,
     blocked: &Blocked,
     members: &Members,
