@@ -255,7 +255,6 @@ impl Evaluator {
     /// first time.
     fn judge(&mut self, light: &Asked, points: &[ShadingPoint], new: usize, round: u32) {
         let tolerance = light.tolerance;
-        let lane = |block: &[Block; MOMENTS], k: usize| block.map(|b| b[k % LANES]);
         // What arrives as far as is known now, and how much of each new cell is seen
         for (k, cell) in self.whole.iter().enumerate() {
             self.state[cell.point as usize].expect(lane(&self.fits[k / LANES].sums, k), round);
@@ -288,21 +287,13 @@ impl Evaluator {
         for (k, cell) in self.whole.iter().enumerate() {
             let fits = &self.fits[k / LANES];
             let state = &mut self.state[cell.point as usize];
-            // A series that falls slowly says less of what comes after its end
-            let sums = lane(&fits.sums, k);
-            let error = fits.tails.map(|tails| {
-                let tails = lane(&tails, k);
-                state.weight.of(std::array::from_fn(|moment| {
-                    let slow = (tails[moment] / sums[moment].abs()).min(1.0);
-                    tails[moment] * (tolerance.fit_seen + tolerance.fit_seen_slow * slow)
-                }))
-            });
+            let error = fit_error(state.weight, fits, k, 1.0, [tolerance.fit_seen, tolerance.fit_seen_slow]);
             let is_off = error[0] + error[1] > state.part(tolerance) && state.may_halve(cell, tolerance);
             if let Some(halves) = halves(cell, error[1] > error[0]).filter(|_| is_off) {
                 state.cells += 1;
                 self.next_whole.extend(halves);
             } else {
-                state.accept(sums);
+                state.accept(lane(&fits.sums, k));
             }
         }
         // Cells that are seen in part: those whose light is not known well enough are asked anew
@@ -311,14 +302,8 @@ impl Evaluator {
             let cell = self.cut[k];
             let fits = &self.cut_fits[(k - new) / LANES];
             let state = &mut self.state[cell.point as usize];
-            let (seen, sums) = (self.seen[k], lane(&fits.sums, k - new));
-            let error = fits.tails.map(|tails| {
-                let tails = lane(&tails, k - new);
-                state.weight.of(std::array::from_fn(|moment| {
-                    let slow = (tails[moment] / sums[moment].abs()).min(1.0);
-                    seen * tails[moment] * (tolerance.fit_cut + tolerance.fit_cut_slow * slow)
-                }))
-            });
+            let shares = [tolerance.fit_cut, tolerance.fit_cut_slow];
+            let error = fit_error(state.weight, fits, k - new, self.seen[k], shares);
             let is_off = error[0] + error[1] > state.part(tolerance) && state.may_halve(&cell, tolerance);
             if let Some(halves) = halves(&cell, error[1] > error[0]).filter(|_| is_off) {
                 state.cells += 1;
@@ -356,6 +341,25 @@ impl Evaluator {
         std::mem::swap(&mut self.whole, &mut self.next_whole);
         std::mem::swap(&mut self.panels, &mut self.next_panels);
     }
+}
+
+/// The numbers of the `k`-th of all that was asked in a round, from the block it is in.
+fn lane(block: &[Block; MOMENTS], k: usize) -> [f32; MOMENTS] {
+    block.map(|numbers| numbers[k % LANES])
+}
+
+/// How far the fit of the `k`-th cell can be wrong along x and along y, as parts of what is allowed, where so much of
+/// it is `seen`: so much of the end of its series, and more where the series falls slowly, which says less of what
+/// comes after its end.
+fn fit_error(weight: Weight, fits: &Fits, k: usize, seen: f32, [share, slow_share]: [f32; 2]) -> [f32; 2] {
+    let sums = lane(&fits.sums, k);
+    fits.tails.map(|tails| {
+        let tails = lane(&tails, k);
+        weight.of(std::array::from_fn(|moment| {
+            let slow = (tails[moment] / sums[moment].abs()).min(1.0);
+            seen * tails[moment] * (share + slow_share * slow)
+        }))
+    })
 }
 
 /// Added to the number of a round once the weight is known.
