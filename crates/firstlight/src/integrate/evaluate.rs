@@ -96,9 +96,6 @@ pub(crate) struct Evaluator {
     next_whole: Vec<Cell>,
     next_panels: Vec<Panel>,
     spare: Vec<Block>,
-    /// All that was asked so far.
-    pub cells_asked: u64,
-    pub panels_asked: u64,
 }
 
 /// What is known of one point.
@@ -218,7 +215,6 @@ impl Evaluator {
         self.cut_fits.clear();
         self.panel_sums.clear();
         let (fits, cut_fits, panel_sums) = (&mut self.fits, &mut self.cut_fits, &mut self.panel_sums);
-        self.cells_asked += (whole.len() + cut_cells.len()) as u64;
         // Those of the cut cells that are new; others have their polynomials
         let new = cut_cells[polynomials.len()..].chunks(LANES).map(|cells| (cells, true));
         let asked = whole.chunks(LANES).map(|cells| (cells, false)).chain(new);
@@ -248,7 +244,6 @@ impl Evaluator {
                 ));
             }
         });
-        self.panels_asked += self.panels.len() as u64;
     }
 
     /// Accepts what is good enough, and queues the halves of what is not. Cut cells from `new` on were asked for the
