@@ -226,7 +226,7 @@ impl<'a> Cells<'a> {
 
     /// Finds out what the rays of a pixel see that meet nothing but these.
     fn trace(&mut self, [i, j]: [u32; 2], near: &[Candidate], counts: &mut Counts) {
-        let scene = self.scene;
+        let (scene, mode) = (self.scene, self.mode);
         let n = scene.antialiasing;
         let index = self.index([i, j]);
         self.work[index] += (n * n) as f32;
@@ -259,26 +259,21 @@ impl<'a> Cells<'a> {
         }
         self.pixels.push(pixel);
         // Shape by shape; without adaptive antialiasing ray by ray
-        let rays = (n * n) as f32;
-        let share = |count: usize| if self.mode == AaMode::Full { 1.0 } else { count as f32 / rays };
-        if self.mode == AaMode::Full {
+        let share = |count: usize| share(scene, mode, count);
+        if mode == AaMode::Full {
             for (place, ray) in &self.rays {
                 let one = std::iter::once(*ray);
                 self.fragments.add(scene, number, [i, j], near[*place as usize], one, share);
             }
             return;
         }
+        // Lists are short: 48 shapes and 16 lights at most
+        debug_assert!(near.len() <= u64::BITS as usize);
         let mut done = 0u64;
         for k in 0..self.rays.len() {
             let place = self.rays[k].0;
-            // Those that are told by a bit; of others the first tells all
-            let is_first = if place < 64 {
-                done >> place & 1 == 0
-            } else {
-                self.rays[..k].iter().all(|(before, _)| *before != place)
-            };
-            if is_first {
-                done |= if place < 64 { 1 << place } else { 0 };
+            if done >> place & 1 == 0 {
+                done |= 1 << place;
                 let same = self.rays[k..].iter().filter(|(of, _)| *of == place).map(|(_, ray)| *ray);
                 self.fragments.add(scene, number, [i, j], near[place as usize], same, share);
             }
@@ -400,14 +395,6 @@ impl<'a> Cells<'a> {
         term[1] += scale * fragment.bsdf.specular * sums.specular;
     }
 
-    /// The share of a pixel that so many of its rays have, where each surface is lit once.
-    fn share(&self, rays: usize) -> f32 {
-        match self.mode {
-            AaMode::Adaptive => rays as f32 / (self.scene.antialiasing * self.scene.antialiasing) as f32,
-            AaMode::Full => 1.0,
-        }
-    }
-
     /// Where a pixel of the cell is on the film.
     fn at(&self, index: usize) -> [u32; 2] {
         [self.corner[0] + index as u32 % CELL, self.corner[1] + index as u32 / CELL]
@@ -464,7 +451,7 @@ impl<'a> Cells<'a> {
         let value = scene.ambient * bsdf.ambient + diffuse * most.diffuse + specular * most.specular;
         let spread = self.lights.arrivals.steps(value, diffuse * apart.diffuse + specular * apart.specular);
         let allowed = if answers.iter().all(|answer| answer.smooth) { SPREAD_SMOOTH } else { SPREAD_CUT };
-        let weight = self.share(fragment.count()) * (scene.lights.len() as f32).sqrt();
+        let weight = share(scene, self.mode, fragment.count()) * (scene.lights.len() as f32).sqrt();
         if spread * weight > allowed {
             return false;
         }
@@ -488,7 +475,7 @@ impl<'a> Cells<'a> {
             let fragment = &self.fragments.all[*number as usize];
             if last.as_ref().is_none_or(|(before, _)| before != number) {
                 let first = self.places.len();
-                let share = self.share(fragment.count());
+                let share = share(scene, self.mode, fragment.count());
                 for (k, ray) in self.fragments.rays[fragment.rays.clone()].iter().enumerate() {
                     let point = ShadingPoint { share, ..fragment.of.point(scene, &ray.ray, ray.t) };
                     let bsdf = self.fragments.bsdf(fragment, k);
@@ -560,6 +547,14 @@ impl Pixel {
         }
         let alpha = if scene.transparent { 1.0 - uncovered } else { 1.0 };
         [color.r, color.g, color.b, alpha]
+    }
+}
+
+/// The share of a pixel that so many of its rays have, where each surface is lit once.
+fn share(scene: &Scene, mode: AaMode, rays: usize) -> f32 {
+    match mode {
+        AaMode::Adaptive => rays as f32 / (scene.antialiasing * scene.antialiasing) as f32,
+        AaMode::Full => 1.0,
     }
 }
 
