@@ -225,8 +225,8 @@ impl Grid {
             let mut squares = vec![block.square];
             while let Some(square) = squares.pop() {
                 if square.side > LARGEST {
-                    squares
-                        .extend(square.quarters_on([scene.width, scene.height]).collect::<Vec<_>>().into_iter().rev());
+                    // The first of them is taken next
+                    squares.extend(square.quarters_on([scene.width, scene.height]).rev());
                 } else if square.side >= SMALLEST {
                     for light in 0..self.lights as u32 {
                         waiting.push(Item { square, block: k as u32, light, nodes: [NONE; 9], center: NONE });

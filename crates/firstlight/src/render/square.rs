@@ -16,7 +16,7 @@ impl Square {
     }
 
     /// Those of them that a film of `size` pixels has a part of.
-    pub fn quarters_on(self, size: [u32; 2]) -> impl Iterator<Item = Square> {
+    pub fn quarters_on(self, size: [u32; 2]) -> impl DoubleEndedIterator<Item = Square> {
         self.quarters().into_iter().filter(move |quarter| quarter.x < size[0] && quarter.y < size[1])
     }
 
