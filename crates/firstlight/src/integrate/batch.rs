@@ -55,9 +55,9 @@ impl ShadingPoint {
     }
 }
 
-/// What one point sees of a flat light, number by number; see [`View`].
+/// One number of what a point sees of a flat light; see [`View`].
 #[derive(Clone, Copy, Debug)]
-pub(crate) enum Seen {
+pub(crate) enum ViewNumber {
     /// The point.
     Px,
     Py,
@@ -100,7 +100,7 @@ pub(crate) enum Seen {
     Measure,
 }
 
-const NUMBERS: usize = Seen::Measure as usize + 1;
+const NUMBERS: usize = ViewNumber::Measure as usize + 1;
 
 /// What sixteen points see of a flat light.
 #[derive(Clone, Debug)]
@@ -146,20 +146,20 @@ impl<'a> Members<'a> {
 
     /// One number of each.
     #[inline(always)]
-    pub fn lanes<S: Simd>(&self, simd: S, of: Seen) -> f32x16<S> {
+    pub fn lanes<S: Simd>(&self, simd: S, of: ViewNumber) -> f32x16<S> {
         let one = |k: usize| self.blocks[k].0[of as usize][self.lanes[k] % LANES];
         f32x16::simd_from(simd, std::array::from_fn(one))
     }
 
     /// Three numbers of each, as vectors.
     #[inline(always)]
-    pub fn vectors<S: Simd>(&self, simd: S, [x, y, z]: [Seen; 3]) -> Vec3x16<S> {
+    pub fn vectors<S: Simd>(&self, simd: S, [x, y, z]: [ViewNumber; 3]) -> Vec3x16<S> {
         Vec3x16 { x: self.lanes(simd, x), y: self.lanes(simd, y), z: self.lanes(simd, z) }
     }
 
     /// A quantity that changes linearly over the light, of each.
     #[inline(always)]
-    pub fn linear<S: Simd>(&self, simd: S, [c, x, y]: [Seen; 3]) -> Linear16<S> {
+    pub fn linear<S: Simd>(&self, simd: S, [c, x, y]: [ViewNumber; 3]) -> Linear16<S> {
         Linear16 { c: self.lanes(simd, c), x: self.lanes(simd, x), y: self.lanes(simd, y) }
     }
 }

@@ -6,7 +6,7 @@
 
 use fearless_simd::{f32x16, prelude::*};
 
-use super::batch::{Linear16, Members, Seen, ShadingPoint};
+use super::batch::{Linear16, Members, ShadingPoint, ViewNumber};
 use super::emitter::Emitter;
 use super::occluder::{Exact, Occluder, Shadow, corners_from, ways};
 use super::panels::{Between, MAX_BETWEEN};
@@ -138,7 +138,7 @@ fn way<S: Simd>(l: &[Vec3x16<S>; 3], x: f32x16<S>, y: f32x16<S>) -> Vec3x16<S> {
 impl<S: Simd> Sight<S> {
     #[inline(always)]
     fn new(simd: S, members: &Members, points: &[ShadingPoint]) -> Sight<S> {
-        use Seen::*;
+        use ViewNumber::*;
         let point = |f: fn(&ShadingPoint) -> f32| {
             let mut numbers = [0.0; LANES];
             for (number, point) in numbers.iter_mut().zip(points) {

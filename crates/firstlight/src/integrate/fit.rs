@@ -9,7 +9,7 @@
 
 use fearless_simd::{f32x16, prelude::*};
 
-use super::batch::{Block, Members, Seen};
+use super::batch::{Block, Members, ViewNumber};
 use crate::material::Lobe;
 use crate::math::LANES;
 
@@ -136,7 +136,7 @@ pub(crate) fn fit<S: Simd>(
     cells: &[Cell],
     polynomials: Option<&mut Vec<[Polynomial; MOMENTS]>>,
 ) -> Fits {
-    use Seen::*;
+    use ViewNumber::*;
     let splat = |v: f32| simd.splat_f32x16(v);
     let cell =
         |f: &dyn Fn(&Cell) -> f32| f32x16::simd_from(simd, std::array::from_fn(|k| f(&cells[k.min(cells.len() - 1)])));

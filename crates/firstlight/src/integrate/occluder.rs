@@ -8,7 +8,7 @@
 
 use fearless_simd::{f32x16, mask32x16, prelude::*};
 
-use super::batch::{Block, Linear16, Members, Seen};
+use super::batch::{Block, Linear16, Members, ViewNumber};
 use crate::math::{DVec3, Vec3, Vec3x16};
 
 /// A vector of doubles as two of floats: the difference to a point loses nothing where the two are close.
@@ -257,7 +257,7 @@ fn is_inside<S: Simd>(lines: &[Linear16<S>; 5], x: f32x16<S>, y: f32x16<S>, but:
 /// The three vectors of a view.
 #[inline(always)]
 pub(crate) fn ways<S: Simd>(simd: S, members: &Members) -> [Vec3x16<S>; 3] {
-    use Seen::*;
+    use ViewNumber::*;
     // Written out, here and below: a map of an array is not inlined, and each operation becomes a call
     [members.vectors(simd, [L0x, L0y, L0z]), members.vectors(simd, [Ax, Ay, Az]), members.vectors(simd, [Bx, By, Bz])]
 }

@@ -11,7 +11,7 @@
 use arrayvec::ArrayVec;
 use fearless_simd::{f32x16, mask32x16, prelude::*};
 
-use super::batch::{Block, Members, Seen};
+use super::batch::{Block, Members, ViewNumber};
 use super::fit::{Cell, MOMENTS, Polynomial};
 use super::occluder::{Breaks, FAR, Interval16, Occluder, Shadow, ways};
 use super::view::Outline;
@@ -89,7 +89,7 @@ struct Batch<'a, S: Simd> {
 impl<'a, S: Simd> Batch<'a, S> {
     #[inline(always)]
     fn new(simd: S, blocked: &'a Blocked<'a>, members: &Members, point: impl Fn(usize) -> u32) -> Self {
-        use Seen::*;
+        use ViewNumber::*;
         let mut between = [Between::default(); LANES];
         for (k, between) in between.iter_mut().enumerate() {
             *between = blocked.between[point(k) as usize];
@@ -163,7 +163,7 @@ pub(crate) fn cut<S: Simd>(
 
 #[inline(always)]
 fn breaks<S: Simd>(simd: S, blocked: &Blocked, members: &Members, cells: &[Cell], rows: &mut Vec<Block>) {
-    use Seen::*;
+    use ViewNumber::*;
     let side = |end: usize| std::array::from_fn::<f32, LANES, _>(|k| cells[k.min(cells.len() - 1)].x[end]);
     let x = [f32x16::simd_from(simd, side(0)), f32x16::simd_from(simd, side(1))];
     let batch = Batch::new(simd, blocked, members, |k| cells[k.min(cells.len() - 1)].point);
@@ -202,7 +202,7 @@ pub(crate) fn rows<S: Simd>(
     panels: &[Panel],
     moments: usize,
 ) -> PanelSums {
-    use Seen::*;
+    use ViewNumber::*;
     let splat = |v: f32| simd.splat_f32x16(v);
     let panel: [&Panel; LANES] = std::array::from_fn(|k| &panels[k.min(panels.len() - 1)]);
     let cell = panel.map(|panel| &cells[panel.cell as usize]);
