@@ -30,12 +30,12 @@ use crate::color::DisplaySteps;
 use crate::material::Lobe;
 use crate::math::{LANES, dispatch_wide, square};
 
-/// How a point sees a light.
+/// How much of a light shines on a point.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Visibility {
-    /// It does not: all is below a horizon, or behind the light.
+pub(crate) enum Illumination {
+    /// Nothing: all is below a horizon, or the point is behind the light.
     Below,
-    /// Something hides all of it.
+    /// Nothing: something hides all of it.
     Hidden,
     /// All of it is seen.
     Full,
@@ -49,7 +49,7 @@ pub(crate) enum Visibility {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Arrived {
     pub sums: Sums,
-    pub visibility: Visibility,
+    pub illumination: Illumination,
     /// Whether the same is proved for all places within the point's reach.
     pub proved: bool,
     /// See [`Class::motion`].
@@ -171,7 +171,7 @@ impl Evaluator {
                 let class = &classes[k];
                 let mut one = Arrived {
                     sums: Sums::default(),
-                    visibility: Visibility::Below,
+                    illumination: Illumination::Below,
                     proved: false,
                     motion: 0.0,
                     distance: 0.0,
@@ -184,13 +184,13 @@ impl Evaluator {
                 if let Some(view) = view.as_ref().filter(|view| view.arrives()) {
                     one.motion = class.motion;
                     between = class.between;
-                    one.visibility = match class {
-                        Class { hidden: true, .. } => Visibility::Hidden,
-                        Class { other: true, .. } => Visibility::Unknown,
-                        _ if between == Between::default() && view.is_above_horizon() => Visibility::Full,
-                        _ => Visibility::Partial,
+                    one.illumination = match class {
+                        Class { hidden: true, .. } => Illumination::Hidden,
+                        Class { other: true, .. } => Illumination::Unknown,
+                        _ if between == Between::default() && view.is_above_horizon() => Illumination::Full,
+                        _ => Illumination::Partial,
                     };
-                    if matches!(one.visibility, Visibility::Full | Visibility::Partial) {
+                    if matches!(one.illumination, Illumination::Full | Illumination::Partial) {
                         let is_open = between == Between::default();
                         self.state[start + k].cells = self.grade(light, view, (start + k) as u32, is_open);
                     }
@@ -483,20 +483,20 @@ impl Evaluator {
 /// The most cells that wait to be halved: each halving leaves one behind.
 const MAX_GRADED: usize = 72;
 
-/// Whether a point's visibility is that of all places within its reach.
+/// Whether a point's illumination is that of all places within its reach.
 fn is_proved(view: &View, point: &ShadingPoint, arrived: &Arrived) -> bool {
     let far = view.corners().iter().fold(0.0f32, |far, l| far.max(l.length()));
     let room = point.reach + point.turn * (far + point.reach);
     let is_beside = view.height > point.reach || (view.facing.is_infinite() && !view.physical);
-    match arrived.visibility {
-        Visibility::Below => {
+    match arrived.illumination {
+        Illumination::Below => {
             view.max(&view.horizon) < -room || view.max(&view.cos) < -room || view.facing < -point.reach
         }
-        Visibility::Hidden => arrived.motion == 0.0 && is_beside,
-        Visibility::Full => {
+        Illumination::Hidden => arrived.motion == 0.0 && is_beside,
+        Illumination::Full => {
             arrived.motion == 0.0 && is_beside && view.min(&view.horizon) > room && view.min(&view.cos) > room
         }
-        Visibility::Partial | Visibility::Unknown => false,
+        Illumination::Partial | Illumination::Unknown => false,
     }
 }
 

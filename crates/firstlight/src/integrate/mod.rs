@@ -40,7 +40,7 @@ pub(crate) use batch::ShadingPoint;
 pub(crate) use between::{Asker, Between};
 pub(crate) use classify::Obstacles;
 pub(crate) use emitter::Emitter;
-pub(crate) use evaluate::{Arrived, Asked, Evaluator, Visibility};
+pub(crate) use evaluate::{Arrived, Asked, Evaluator, Illumination};
 use hider::Hider;
 pub(crate) use mask::Masked;
 use rows::{MAX_HIDERS, Region};

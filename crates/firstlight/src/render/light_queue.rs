@@ -8,13 +8,13 @@ use super::change::Arrival;
 use super::tiled::BEND;
 use crate::color::Rgb;
 use crate::ids::{LightId, MaterialId, SurfaceId};
-use crate::integrate::{Asked, Evaluator, Obstacles, ShadingPoint, Sums, Tolerance, Visibility};
+use crate::integrate::{Asked, Evaluator, Illumination, Obstacles, ShadingPoint, Sums, Tolerance};
 use crate::light::LightKind;
 use crate::material::{Bsdf, Lobe};
 use crate::math::{Facet, Vec2};
 use crate::scene::Scene;
 use crate::shape::{Footprint, SurfaceInteraction, UvEdge};
-use crate::visibility::Visibility as OldVisibility;
+use crate::visibility::Visibility;
 
 /// A place of a surface that wants light.
 #[derive(Clone, Copy, Debug)]
@@ -193,14 +193,14 @@ impl<'a> LightQueue<'a> {
                         let place = &places[requests[*k as usize].place as usize];
                         let arrived = self.arrived[i];
                         let settled = &mut counts.settled.visibility;
-                        match arrived.visibility {
-                            Visibility::Below => settled[OldVisibility::BelowHorizon as usize] += 1,
-                            Visibility::Hidden => settled[OldVisibility::Hidden as usize] += 1,
-                            Visibility::Full => settled[OldVisibility::Lit as usize] += 1,
-                            Visibility::Partial => counts.closed_form += 1,
-                            Visibility::Unknown => go_on()?,
+                        match arrived.illumination {
+                            Illumination::Below => settled[Visibility::BelowHorizon as usize] += 1,
+                            Illumination::Hidden => settled[Visibility::Hidden as usize] += 1,
+                            Illumination::Full => settled[Visibility::Lit as usize] += 1,
+                            Illumination::Partial => counts.closed_form += 1,
+                            Illumination::Unknown => go_on()?,
                         }
-                        answers[*k as usize] = if arrived.visibility == Visibility::Unknown {
+                        answers[*k as usize] = if arrived.illumination == Illumination::Unknown {
                             self.one(light, place, counts)
                         } else {
                             let is_near = place.point.reach > 0.4 * arrived.distance
