@@ -22,9 +22,9 @@ use crate::scene::Scene;
 use crate::shape::SurfaceInteraction;
 use crate::visibility::{Occluders, Settler, Target, View as ShadowView, Viewpoint, Visibility};
 
-/// A place of a surface that asks for light.
+/// A place of a surface that asks for one light, by itself.
 #[derive(Clone, Copy)]
-pub(crate) struct Place<'a> {
+pub(crate) struct ArrivalPlace<'a> {
     pub si: &'a SurfaceInteraction,
     pub lobe: &'a Lobe,
     /// How far the patch reaches from its middle, in metres; 0 for a point.
@@ -46,10 +46,10 @@ pub(crate) struct Place<'a> {
     pub colors: [Rgb; 2],
 }
 
-impl<'a> Place<'a> {
+impl<'a> ArrivalPlace<'a> {
     /// One point, by itself; `base` and `colors` as in the struct.
     pub fn point(si: &'a SurfaceInteraction, lobe: &'a Lobe, base: Rgb, colors: [Rgb; 2]) -> Self {
-        Place {
+        ArrivalPlace {
             si,
             lobe,
             reach: 0.0,
@@ -66,7 +66,7 @@ impl<'a> Place<'a> {
 
     /// The same for all of a patch that is shaded there.
     pub fn over(self, patch: &Patch) -> Self {
-        Place { reach: patch.reach, turn: patch.turn, off: patch.off, ..self }
+        ArrivalPlace { reach: patch.reach, turn: patch.turn, off: patch.off, ..self }
     }
 }
 
@@ -182,7 +182,7 @@ impl<'a> Arrivals<'a> {
     }
 
     /// What of light `index` arrives.
-    pub fn arrival(&mut self, index: usize, place: &Place, counts: &mut Counts) -> Arrival {
+    pub fn arrival(&mut self, index: usize, place: &ArrivalPlace, counts: &mut Counts) -> Arrival {
         let light = &self.scene.lights[index];
         let links = self.scene.geometry.lights_of(place.si.surface);
         if !self.scene.geometry.links.contains(links, LightId(index as u32)) {
@@ -216,10 +216,10 @@ impl<'a> Arrivals<'a> {
     }
 
     /// A point that asks for light `index`, beside nothing but ambient light.
-    pub fn place<'p>(&self, index: usize, si: &'p SurfaceInteraction, bsdf: &'p Bsdf) -> Place<'p> {
+    pub fn place<'p>(&self, index: usize, si: &'p SurfaceInteraction, bsdf: &'p Bsdf) -> ArrivalPlace<'p> {
         let scale = self.scale(index);
         let colors = [scale * bsdf.diffuse, scale * bsdf.specular];
-        Place::point(si, &bsdf.lobe, self.scene.ambient * bsdf.ambient, colors)
+        ArrivalPlace::point(si, &bsdf.lobe, self.scene.ambient * bsdf.ambient, colors)
     }
 
     /// What light `index` sends to one point, which stands for `share` of a pixel: diffuse and specular, with all
@@ -232,12 +232,12 @@ impl<'a> Arrivals<'a> {
         share: f32,
         counts: &mut Counts,
     ) -> [Rgb; 2] {
-        let place = Place { share, ..self.place(index, si, bsdf) };
+        let place = ArrivalPlace { share, ..self.place(index, si, bsdf) };
         let sums = self.arrival(index, &place, counts).sums;
         [place.colors[0] * sums.diffuse, place.colors[1] * sums.specular]
     }
 
-    fn view(&self, emitter: &Emitter, place: &Place) -> Option<View> {
+    fn view(&self, emitter: &Emitter, place: &ArrivalPlace) -> Option<View> {
         let si = place.si;
         let flat = emitter.flat(si.lit_from)?;
         Some(View::new(
@@ -247,7 +247,7 @@ impl<'a> Arrivals<'a> {
     }
 
     /// What of light `index` arrives at one point, if that is known without a mask over points of the light.
-    pub fn seen(&mut self, index: usize, place: &Place, counts: &mut Counts) -> Seen {
+    pub fn seen(&mut self, index: usize, place: &ArrivalPlace, counts: &mut Counts) -> Seen {
         let links = self.scene.geometry.lights_of(place.si.surface);
         match &self.lights.emitters[index] {
             Some(emitter) if self.scene.geometry.links.contains(links, LightId(index as u32)) => {
@@ -258,7 +258,7 @@ impl<'a> Arrivals<'a> {
     }
 
     /// Looks at an area light that is integrated.
-    fn look(&mut self, index: usize, emitter: &Emitter, place: &Place, counts: &mut Counts) -> (Change, Seen) {
+    fn look(&mut self, index: usize, emitter: &Emitter, place: &ArrivalPlace, counts: &mut Counts) -> (Change, Seen) {
         let (scene, si) = (self.scene, place.si);
         let light = &scene.lights[index];
         let Some(view) = self.view(emitter, place) else {
@@ -295,7 +295,7 @@ impl<'a> Arrivals<'a> {
     }
 
     /// Whether sums with such an error will do for one light at a place.
-    pub fn enough<'b>(&self, place: &'b Place) -> impl Fn(&Sums, &Sums) -> bool + use<'a, 'b> {
+    pub fn enough<'b>(&self, place: &'b ArrivalPlace) -> impl Fn(&Sums, &Sums) -> bool + use<'a, 'b> {
         let (steps, tolerance) = (&self.lights.steps, self.tolerance_of(place.share));
         let [diffuse, specular] = place.colors;
         let base = place.base;
@@ -347,7 +347,7 @@ impl<'a> Arrivals<'a> {
         &mut self,
         together: &mut Together,
         index: usize,
-        place: &Place,
+        place: &ArrivalPlace,
         view: ShadowView,
         counts: &mut Counts,
     ) {
@@ -364,7 +364,7 @@ impl<'a> Arrivals<'a> {
             }
             // One ray tells
             None => {
-                let sums = self.of_single(index, &Place { lit: false, ..*place });
+                let sums = self.of_single(index, &ArrivalPlace { lit: false, ..*place });
                 counts.points += 1;
                 together.know(place, &sums);
                 self.keep(view);
@@ -373,7 +373,7 @@ impl<'a> Arrivals<'a> {
     }
 
     /// What arrives at one point, past what is in the way.
-    fn one(&mut self, index: usize, place: &Place, whole: Option<Sums>, counts: &mut Counts) -> Sums {
+    fn one(&mut self, index: usize, place: &ArrivalPlace, whole: Option<Sums>, counts: &mut Counts) -> Sums {
         let Some(view) = self.settle(index, place.si, counts) else { return Sums::default() };
         let mut together = Together::new(index, 1, place.share, 0);
         together.behind(self, place, whole, view);
@@ -392,7 +392,7 @@ impl<'a> Arrivals<'a> {
 
     /// Whether points spread evenly over a sphere light may miss most of what it sends to a place: what is near sends
     /// far more than the rest where light weakens on its way, and a highlight may lie on it that is narrow beside it.
-    pub fn may_miss(&self, index: usize, place: &Place) -> bool {
+    pub fn may_miss(&self, index: usize, place: &ArrivalPlace) -> bool {
         let LightKind::Area(Area { shape: AreaShape::Sphere(sphere), physical, .. }) = &self.scene.lights[index].kind
         else {
             return false;
@@ -448,12 +448,12 @@ impl<'a> Arrivals<'a> {
     }
 
     /// What arrives at one point, past anything, by cells of the light: where few of its points send nearly all.
-    pub fn by_cells(&self, index: usize, place: &Place, counts: &mut Counts) -> Sums {
+    pub fn by_cells(&self, index: usize, place: &ArrivalPlace, counts: &mut Counts) -> Sums {
         let emitter = self.lights.emitters[index].as_ref().expect("only lights that are integrated are asked by cells");
         let light = &self.scene.lights[index];
         let ask = light.shadows && place.si.receives_shadow;
         let between = Between { ask, ask_trees: ask && self.scene.geometry.has_trees(), ..Between::default() };
-        let Place { si, lobe, .. } = *place;
+        let ArrivalPlace { si, lobe, .. } = *place;
         let asked = Cell::new(0);
         let masked = Masked { scene: self.scene, light: index, emitter, si, lobe, between: &between, asked: &asked };
         let enough = self.enough(place);
@@ -471,14 +471,14 @@ impl<'a> Arrivals<'a> {
     }
 
     /// What stands between a place and an area light.
-    fn between(&mut self, index: usize, emitter: &Emitter, view: &View, place: &Place) -> Between {
+    fn between(&mut self, index: usize, emitter: &Emitter, view: &View, place: &ArrivalPlace) -> Between {
         let trees = !place.clear && self.gather(index, place);
         let asker = Asker { si: place.si, reach: place.reach };
         Between::look(self.scene, index, emitter, view, &asker, trees.then_some(&self.occluders))
     }
 
     /// Gathers what of the trees may be in the way of a light; whether there are any.
-    pub(super) fn gather(&mut self, index: usize, place: &Place) -> bool {
+    pub(super) fn gather(&mut self, index: usize, place: &ArrivalPlace) -> bool {
         if !self.scene.geometry.has_trees() {
             return false;
         }
@@ -488,7 +488,7 @@ impl<'a> Arrivals<'a> {
     }
 
     /// How an area light would change if it were integrated.
-    fn change_of(&mut self, index: usize, emitter: &Emitter, place: &Place) -> Change {
+    fn change_of(&mut self, index: usize, emitter: &Emitter, place: &ArrivalPlace) -> Change {
         let light = &self.scene.lights[index];
         let Some(view) = self.view(emitter, place) else { return unseen(emitter, place) };
         if !view.arrives() {

@@ -1,6 +1,6 @@
 //! What of one light arrives at a place, and how much that bends over the patch around it.
 
-use super::arrival::Place;
+use super::arrival::ArrivalPlace;
 use crate::integrate::{Between, Emitter, Sums, View, sharpness};
 use crate::material::Lobe;
 use crate::math::{Vec3, square};
@@ -89,7 +89,7 @@ pub(super) fn is_sharp(lobe: f32) -> bool {
 }
 
 /// Of a light that nothing is seen of, or that has no view: from inside of a ball nothing of its outside.
-pub(super) fn unseen(emitter: &Emitter, place: &Place) -> Change {
+pub(super) fn unseen(emitter: &Emitter, place: &ArrivalPlace) -> Change {
     let is_known = match emitter {
         Emitter::Flat(_) => true,
         Emitter::Ball { center, radius } => {
@@ -105,7 +105,7 @@ pub(super) fn unseen(emitter: &Emitter, place: &Place) -> Change {
 }
 
 /// What arrives on a patch whose middle sees nothing of a light, at most.
-pub(super) fn horizon_change(view: &View, place: &Place) -> Change {
+pub(super) fn horizon_change(view: &View, place: &ArrivalPlace) -> Change {
     if place.reach == 0.0 {
         return Change::NONE;
     }
@@ -125,7 +125,7 @@ pub(super) fn horizon_change(view: &View, place: &Place) -> Change {
 
 /// How far the mean over a patch can be from what arrives at its middle, and so on. `sway` is by how much the way to
 /// the viewer turns over it.
-pub(super) fn change(view: &View, place: &Place, between: &Between, sway: f32) -> Change {
+pub(super) fn change(view: &View, place: &ArrivalPlace, between: &Between, sway: f32) -> Change {
     let drift = between.drift;
     if place.reach == 0.0 || between.hidden && drift == 0.0 {
         return Change::NONE;

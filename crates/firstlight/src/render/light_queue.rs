@@ -3,7 +3,7 @@
 use std::ops::ControlFlow;
 
 use super::Counts;
-use super::arrival::{Arrivals, Lights, Place as OldPlace};
+use super::arrival::{ArrivalPlace, Arrivals, Lights};
 use super::change::Arrival;
 use super::tiled::BEND;
 use crate::color::Rgb;
@@ -245,13 +245,13 @@ impl<'a> LightQueue<'a> {
     /// One light at one place, by itself.
     fn one(&mut self, light: usize, place: &Place, counts: &mut Counts) -> Answer {
         let si = place.surface();
-        let old = OldPlace {
+        let wanted = ArrivalPlace {
             reach: place.point.reach,
             turn: place.point.turn,
             share: place.point.share,
             ..self.arrivals.place(light, &si, &place.bsdf)
         };
-        let arrival = self.arrivals.arrival(light, &old, counts);
+        let arrival = self.arrivals.arrival(light, &wanted, counts);
         // A light of one point sets in at once where it passes the horizon
         let kind = &self.scene.lights[light];
         let ShadingPoint { p, ns, horizon, reach, turn, .. } = place.point;
@@ -269,7 +269,7 @@ impl<'a> LightQueue<'a> {
             } else {
                 arrival.drift
             },
-            turn: if is_kinked || !arrival.resolved && !self.is_even(&old, &arrival) {
+            turn: if is_kinked || !arrival.resolved && !self.is_even(&wanted, &arrival) {
                 f32::INFINITY
             } else if arrival.sharp {
                 0.5
@@ -280,7 +280,7 @@ impl<'a> LightQueue<'a> {
     }
 
     /// Whether what a light sends changes so little within a place's reach that nothing of that shows.
-    fn is_even(&self, place: &OldPlace, arrival: &Arrival) -> bool {
+    fn is_even(&self, place: &ArrivalPlace, arrival: &Arrival) -> bool {
         let [diffuse, specular] = place.colors;
         let value = place.base + diffuse * arrival.sums.diffuse + specular * arrival.sums.specular;
         let error = diffuse * arrival.bend.diffuse + specular * arrival.bend.specular;

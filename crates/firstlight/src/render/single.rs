@@ -1,7 +1,7 @@
 //! Lights of one point.
 
 use super::Counts;
-use super::arrival::{Arrivals, Place};
+use super::arrival::{ArrivalPlace, Arrivals};
 use super::change::{Arrival, Change, RESOLVED, RESOLVED_SWING, is_sharp, is_smooth};
 use super::pixel::Lighting;
 use super::plain::Plain;
@@ -14,7 +14,7 @@ use crate::shape::{PlaneSide, SurfaceInteraction};
 
 impl Arrivals<'_> {
     /// What arrives of a light of one point.
-    pub(super) fn single(&mut self, index: usize, light: &Light, place: &Place, counts: &mut Counts) -> Arrival {
+    pub(super) fn single(&mut self, index: usize, light: &Light, place: &ArrivalPlace, counts: &mut Counts) -> Arrival {
         let si = place.si;
         let sums = self.of_single(index, place);
         counts.points += u64::from(!place.lit);
@@ -61,7 +61,7 @@ impl Arrivals<'_> {
     }
 
     /// What arrives at one point of a light of one point.
-    pub(super) fn of_single(&self, index: usize, place: &Place) -> Sums {
+    pub(super) fn of_single(&self, index: usize, place: &ArrivalPlace) -> Sums {
         let unshadowed = SurfaceInteraction { receives_shadow: false, ..*place.si };
         let si = if place.lit { &unshadowed } else { place.si };
         let sums = Plain.gather(self.scene, index, si, place.lobe, &mut Counts::default());
@@ -69,7 +69,7 @@ impl Arrivals<'_> {
     }
 
     /// Whether the edge of a shadow, of a light of one point, may run through the patch: 1, or 0 if that is excluded.
-    fn edge(&mut self, light: usize, l: Vec3, finite: bool, place: &Place) -> f32 {
+    fn edge(&mut self, light: usize, l: Vec3, finite: bool, place: &ArrivalPlace) -> f32 {
         let (scene, si) = (self.scene, place.si);
         if !scene.light_obstacles.disks.is_empty()
             || !place.clear && self.gather(light, place) && (self.occluders.too_many || self.occluders.count() > 0)

@@ -18,7 +18,7 @@ mod mean;
 
 use std::ops::ControlFlow;
 
-use super::arrival::{Arrivals, Place};
+use super::arrival::{ArrivalPlace, Arrivals};
 use super::cell::CELL;
 use super::change::Arrival;
 use super::film::FilmTile;
@@ -340,7 +340,7 @@ impl<'a> Tiled<'a> {
             let place = self.arrivals.place(index, &patch.si, &patch.bsdf).over(patch);
             let lit = matches!(outlook, Outlook::Lit);
             let clear = lit || matches!(outlook, Outlook::Clear);
-            let place = Place { share, parted: true, lit, clear, ..place };
+            let place = ArrivalPlace { share, parted: true, lit, clear, ..place };
             let arrival = match outlook {
                 Outlook::Dark => Arrival::even(Sums::default()),
                 Outlook::Parted | Outlook::Settled(_) => Arrival::PARTED,

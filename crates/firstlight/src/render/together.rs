@@ -6,7 +6,7 @@
 //! few of them send nearly all, is left to cells.
 
 use super::Counts;
-use super::arrival::{Arrivals, Place, Seen};
+use super::arrival::{ArrivalPlace, Arrivals, Seen};
 use super::ladder::{Asker, FIRST, GROWTH, LAST, Tally, of_edge};
 use crate::color::Rgb;
 use crate::integrate::Sums;
@@ -130,7 +130,7 @@ impl Together {
         counts: &mut Counts,
     ) {
         // What is integrated is wrong alike at all rays: that much by no more than if one stood for all
-        let place = Place { share: self.share, lit, clear, ..arrivals.place(self.light, si, bsdf) };
+        let place = ArrivalPlace { share: self.share, lit, clear, ..arrivals.place(self.light, si, bsdf) };
         match arrivals.seen(self.light, &place, counts) {
             Seen::Known(sums) => self.know(&place, &sums),
             Seen::Behind(whole) => match arrivals.settle(self.light, si, counts) {
@@ -141,7 +141,7 @@ impl Together {
     }
 
     /// Hears what one ray sees.
-    pub fn know(&mut self, place: &Place, sums: &Sums) {
+    pub fn know(&mut self, place: &ArrivalPlace, sums: &Sums) {
         self.rays += 1;
         self.value += place.base;
         self.add(&place.colors, sums);
@@ -149,11 +149,11 @@ impl Together {
 
     /// Asks for what one ray sees past what is in `view`. `whole` is what would arrive if nothing were in the way, if
     /// that is known.
-    pub fn behind(&mut self, arrivals: &Arrivals, place: &Place, whole: Option<Sums>, view: View) {
+    pub fn behind(&mut self, arrivals: &Arrivals, place: &ArrivalPlace, whole: Option<Sums>, view: View) {
         let series = self.series ^ (self.rays % SERIES);
         self.rays += 1;
         self.value += place.base;
-        let Place { si, lobe, base, colors, .. } = *place;
+        let ArrivalPlace { si, lobe, base, colors, .. } = *place;
         let tally = Tally::default();
         let may_miss = whole.is_none() && arrivals.may_miss(self.light, place);
         self.asking.push(Asking {
@@ -185,7 +185,7 @@ impl Together {
             let all_settled = self.points(arrivals, &mut asking, counts);
             let measure = arrivals.measure(self.light);
             for Asking { si, lobe, base, colors, tally, whole, view, settled, .. } in asking {
-                let place = Place { share: self.each, ..Place::point(&si, &lobe, base, colors) };
+                let place = ArrivalPlace { share: self.each, ..ArrivalPlace::point(&si, &lobe, base, colors) };
                 let sums = if all_settled || settled {
                     tally.sums(whole.as_ref(), measure)
                 } else {

@@ -9,7 +9,7 @@ use crate::ids::LightId;
 use crate::light::{Held, LightKind, LightNode, LightTree, Sends, Sent};
 use crate::material::Lobe;
 use crate::math::Vec3;
-use crate::render::arrival::{Arrivals, Place};
+use crate::render::arrival::{ArrivalPlace, Arrivals};
 use crate::render::cell::CELL;
 use crate::render::counts::Counts;
 use crate::render::crowd::By;
@@ -169,7 +169,7 @@ impl<'a> Many<'a> {
             arrivals.tolerate(INTEGRALS / (singles.len() as f32).sqrt());
         }
         for index in singles {
-            let place = Place { base: stored.value, ..arrivals.place(*index as usize, si, bsdf).over(patch) };
+            let place = ArrivalPlace { base: stored.value, ..arrivals.place(*index as usize, si, bsdf).over(patch) };
             let arrival = arrivals.arrival(*index as usize, &place, counts);
             light += arrivals.scale(*index as usize) * arrival.sums.diffuse;
             stored.value += place.colors[0] * arrival.sums.diffuse + place.colors[1] * arrival.sums.specular;

@@ -15,7 +15,7 @@ mod places;
 
 use std::ops::{ControlFlow, Range};
 
-use super::arrival::{Arrivals, Place};
+use super::arrival::{ArrivalPlace, Arrivals};
 use super::cell::CELL;
 use super::change::Arrival;
 use super::counts::Counts;
@@ -332,7 +332,7 @@ impl<'a> Many<'a> {
                     outlook.look(level, scene, node.shine.low, node.shine.high, LightId(light))
                 },
                 &mut |light, value| {
-                    let place = Place { base: value, ..arrivals.place(light as usize, si, bsdf).over(patch) };
+                    let place = ArrivalPlace { base: value, ..arrivals.place(light as usize, si, bsdf).over(patch) };
                     let arrival = arrivals.arrival(light as usize, &place, counts);
                     singles.push(Single { light, arrival });
                     place.colors[0] * arrival.sums.diffuse + place.colors[1] * arrival.sums.specular

@@ -9,7 +9,7 @@ use crate::color::Rgb;
 use crate::ids::LightId;
 use crate::integrate::Sums;
 use crate::render::Counts;
-use crate::render::arrival::{Arrivals, Place};
+use crate::render::arrival::{ArrivalPlace, Arrivals};
 use crate::render::patch::{Member, PixelPatches, Rays};
 use crate::render::tile::Tile;
 use crate::render::together::Together;
@@ -208,7 +208,7 @@ impl Block {
             }
             Sight::Behind => {
                 let view = self.views[k].take().expect("what is behind things has a view");
-                let place = Place { share, lit: true, clear: true, ..arrivals.place(light, si, bsdf) };
+                let place = ArrivalPlace { share, lit: true, clear: true, ..arrivals.place(light, si, bsdf) };
                 arrivals.ask_behind(together, light, &place, view, counts);
             }
         }

@@ -7,7 +7,7 @@ use super::{ACROSS, Outlook, Tiled};
 use crate::color::Rgb;
 use crate::integrate::Sums;
 use crate::material::Bsdf;
-use crate::render::arrival::Place;
+use crate::render::arrival::ArrivalPlace;
 use crate::render::change::Arrival;
 use crate::render::patch::{Contrast, Patch, PixelPatches};
 use crate::render::together::Together;
@@ -189,7 +189,7 @@ impl Tiled<'_> {
             .iter()
             .map(|quarter| {
                 let place = self.arrivals.place(light, &quarter.si, &quarter.bsdf).over(quarter);
-                let place = Place { share, parted: true, ..place };
+                let place = ArrivalPlace { share, parted: true, ..place };
                 self.arrivals.arrival(light, &place, counts)
             })
             .collect();
