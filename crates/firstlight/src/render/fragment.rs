@@ -148,8 +148,8 @@ impl Fragments {
             first..self.bsdfs.len()
         });
         let mean = match &bsdfs {
-            None => Mean { bsdf, contrast: Contrast::default(), uneven: false },
-            Some(range) => Mean::of(self.bsdfs[range.clone()].iter()),
+            None => MeanBsdf { bsdf, contrast: Contrast::default(), uneven: false },
+            Some(range) => MeanBsdf::of(self.bsdfs[range.clone()].iter()),
         };
         let quadrants = self.quadrants.len();
         if rays.len() > FEW_RAYS
@@ -224,10 +224,10 @@ impl Fragments {
                 return false;
             }
             let mean = match bsdfs {
-                None => Mean { bsdf: *bsdf, contrast: Contrast::default(), uneven: false },
+                None => MeanBsdf { bsdf: *bsdf, contrast: Contrast::default(), uneven: false },
                 Some(range) => {
                     let bsdfs = rays.iter().zip(&self.bsdfs[range.clone()]);
-                    Mean::of(bsdfs.filter(|(ray, _)| quadrant(ray) == number).map(|(_, bsdf)| bsdf))
+                    MeanBsdf::of(bsdfs.filter(|(ray, _)| quadrant(ray) == number).map(|(_, bsdf)| bsdf))
                 }
             };
             self.quadrants.push(Quadrant { place: self.places.len() as u32, rays: count, contrast: mean.contrast });
@@ -294,7 +294,7 @@ impl Candidate {
             let Some(t) = self.intersect(scene, &ray) else { continue };
             bsdfs.try_push(self.bsdf(scene, &RayHit { ray, t, at: [0; 2] }, &differential)).ok()?;
         }
-        let mean = Mean::of(bsdfs.iter());
+        let mean = MeanBsdf::of(bsdfs.iter());
         (!mean.uneven && !bsdfs.is_empty()).then_some((mean.bsdf, mean.contrast))
     }
 }
@@ -308,15 +308,15 @@ fn turned((p, error, normal): (Vec3, ErrorBound, Vec3), wo: Vec3) -> ShadingPoin
 }
 
 /// The mean of some materials in numbers.
-struct Mean {
+struct MeanBsdf {
     bsdf: Bsdf,
     contrast: Contrast,
     /// Whether highlights differ in more than colour.
     uneven: bool,
 }
 
-impl Mean {
-    fn of<'a>(bsdfs: impl Iterator<Item = &'a Bsdf>) -> Mean {
+impl MeanBsdf {
+    fn of<'a>(bsdfs: impl Iterator<Item = &'a Bsdf>) -> MeanBsdf {
         let mut sum = Bsdf { diffuse: Rgb::BLACK, specular: Rgb::BLACK, ambient: Rgb::BLACK, lobe: Lobe::None };
         let (mut count, mut uneven) = (0.0f32, false);
         let infinite = Rgb::gray(f32::INFINITY);
@@ -338,7 +338,7 @@ impl Mean {
         }
         let inverse = 1.0 / count;
         let apart = |k: usize| Rgb::new(most[k].r - least[k].r, most[k].g - least[k].g, most[k].b - least[k].b);
-        Mean {
+        MeanBsdf {
             bsdf: Bsdf {
                 diffuse: sum.diffuse * inverse,
                 specular: sum.specular * inverse,
