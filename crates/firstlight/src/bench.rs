@@ -278,11 +278,8 @@ impl Soft {
         hidden.clear();
         for point in &self.points {
             for first in (0..self.count()).step_by(LANES) {
-                let mut shadows = ShadowRays {
-                    from: point.ray(self.target.light, Vec3::ZERO, true),
-                    rays: RayPacket16::ZERO,
-                    t_end: [0.0; LANES],
-                };
+                let from = [point.ray(self.target.light, Vec3::ZERO, true)];
+                let mut shadows = ShadowRays { from: &from, rays: RayPacket16::ZERO, t_end: [0.0; LANES] };
                 let mut active = 0;
                 for k in first..(first + LANES).min(self.count()) {
                     let l = light.towards(k, point.p).l;

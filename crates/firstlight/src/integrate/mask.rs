@@ -66,7 +66,7 @@ impl Masked<'_> {
             return hidden;
         }
         let from = self.si.shadow_ray(LightId(self.light as u32), Vec3::ZERO, 1.0);
-        let mut shadows = ShadowRays { from, rays: RayPacket16::ZERO, t_end: [0.0; LANES] };
+        let mut shadows = ShadowRays { from: &[from], rays: RayPacket16::ZERO, t_end: [0.0; LANES] };
         for (lane, way) in ways.iter().enumerate() {
             shadows.rays.set(lane, from.start, *way);
             shadows.t_end[lane] = ShadowRay { l: *way, ..from }.end();

@@ -189,7 +189,7 @@ fn hidden_by_trees(
 ) -> u16 {
     let from = si.shadow_ray(light, Vec3::ZERO, 1.0);
     let o = from.start.to_array().map(|o| [o; LANES]);
-    let mut shadows = ShadowRays { from, rays: RayPacket16 { o, d: l }, t_end: [0.0; LANES] };
+    let mut shadows = ShadowRays { from: &[from], rays: RayPacket16 { o, d: l }, t_end: [0.0; LANES] };
     for (lane, end) in shadows.t_end.iter_mut().enumerate() {
         *end = ShadowRay { l: shadows.rays.d(lane), ..from }.end();
     }

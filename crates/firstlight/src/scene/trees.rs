@@ -268,7 +268,8 @@ impl Geometry {
         )
     }
 
-    /// Which of sixteen rays a mesh blocks, `but` for one of its triangles, in the mesh's space.
+    /// Which of sixteen rays a mesh blocks, but for the triangles that they leave. `rays` are those of `shadows` in the
+    /// mesh's space; its place is number `source`.
     #[inline(never)]
     #[allow(clippy::too_many_arguments, reason = "a mesh with its place, rays with their reach")]
     fn lanes_blocked_by_mesh<S: Simd>(
@@ -277,20 +278,22 @@ impl Geometry {
         mesh: &Mesh,
         first: SurfaceId,
         meets: Meets,
-        light: LightId,
-        but: u32,
+        source: u32,
+        shadows: &ShadowRays,
         rays: &RayPacket16,
-        t_end: &[f32; 16],
         active: u16,
     ) -> u16 {
         if meets == Meets::None || active == 0 {
             return 0;
         }
-        let asks =
-            |triangle| triangle != but && (meets == Meets::All || self.triangle_casts(mesh, first, triangle, light));
+        let light = shadows.light();
+        let asks = |triangle, lanes: u64| {
+            let casts = meets == Meets::All || self.triangle_casts(mesh, first, triangle, light);
+            if casts { lanes & !shadows.leaving(source, triangle) } else { 0 }
+        };
         simd.vectorize(
             #[inline(always)]
-            || mesh.tree.any16(simd, rays, t_end, active, &asks),
+            || mesh.tree.any16(simd, rays, &shadows.t_end, active, &asks),
         )
     }
 
@@ -377,19 +380,38 @@ impl Geometry {
     }
 }
 
-/// Sixteen rays from one surface towards a light, each ending at a point of it.
-pub(crate) struct ShadowRays {
-    /// Where they start, and the surface they leave: `l` and `t_max` are of no account.
-    pub from: ShadowRay,
+/// Sixteen rays from one surface, or from sixteen places, towards a light, each ending at a point of it.
+pub(crate) struct ShadowRays<'a> {
+    /// The surface they leave, one for all of them or one for each: `l` and `t_max` are of no account.
+    pub from: &'a [ShadowRay],
     /// Origins and ways, as the trees want them.
     pub rays: RayPacket16,
     /// [`ShadowRay::end`] of each.
     pub t_end: [f32; 16],
 }
 
-impl ShadowRays {
+impl ShadowRays<'_> {
+    /// The surface that a ray leaves.
+    fn origin(&self, lane: usize) -> &ShadowRay {
+        &self.from[lane.min(self.from.len() - 1)]
+    }
+
     fn ray(&self, lane: usize) -> ShadowRay {
-        ShadowRay { l: self.rays.d(lane), ..self.from }
+        ShadowRay { l: self.rays.d(lane), ..*self.origin(lane) }
+    }
+
+    /// The light they lead to.
+    fn light(&self) -> LightId {
+        self.from[0].light
+    }
+
+    /// The rays that leave a triangle of a mesh, which does not stand in their way.
+    fn leaving(&self, source: u32, triangle: u32) -> u64 {
+        let mut lanes = 0;
+        for (lane, from) in self.from.iter().enumerate() {
+            lanes |= u64::from(from.but.of(source) == triangle) << lane;
+        }
+        if self.from.len() == 1 { lanes * 0xffff } else { lanes }
     }
 }
 
@@ -431,18 +453,8 @@ impl Geometry {
     fn blocked_lanes<S: Simd>(&self, simd: S, shadows: &ShadowRays, active: u16) -> u16 {
         let mut done = 0;
         if let Some(world) = &self.world {
-            let (mesh, rays, t_end) = (&world.mesh, &shadows.rays, &shadows.t_end);
-            done |= self.lanes_blocked_by_mesh(
-                simd,
-                mesh,
-                SurfaceId(0),
-                world.shadow,
-                shadows.from.light,
-                shadows.from.but.of(0),
-                rays,
-                t_end,
-                active,
-            );
+            let (mesh, rays) = (&world.mesh, &shadows.rays);
+            done |= self.lanes_blocked_by_mesh(simd, mesh, SurfaceId(0), world.shadow, 0, shadows, rays, active);
         }
         for &thing in &self.unbounded {
             done |= self.placed_blocks_lanes(simd, thing, shadows, active & !done);
@@ -454,23 +466,28 @@ impl Geometry {
             let one_by_one = |blocks: &dyn Fn(&ShadowRay) -> bool| {
                 lanes(asking).filter(|lane| blocks(&shadows.ray(*lane))).fold(0, |mask, lane| mask | 1 << lane)
             };
-            let (p, error) = (shadows.from.p, shadows.from.error);
             match self.items[item as usize] {
                 Item::Sphere(i) => {
                     let sphere = &self.spheres[i as usize];
-                    if !self.casts(sphere.surface, shadows.from.light) {
+                    if !self.casts(sphere.surface, shadows.light()) {
                         return 0;
                     }
-                    let shadow = sphere.shape.shadow(p, error);
-                    one_by_one(&|ray| shadow.blocks(ray.l, ray.is_finite()))
+                    if let [ShadowRay { p, error, .. }] = shadows.from {
+                        let shadow = sphere.shape.shadow(*p, *error);
+                        return one_by_one(&|ray| shadow.blocks(ray.l, ray.is_finite()));
+                    }
+                    one_by_one(&|ray| sphere.shape.shadow(ray.p, ray.error).blocks(ray.l, ray.is_finite()))
                 }
                 Item::Parallelogram(i) => {
                     let flat = &self.parallelograms[i as usize];
-                    if !self.casts(flat.surface, shadows.from.light) {
+                    if !self.casts(flat.surface, shadows.light()) {
                         return 0;
                     }
-                    let shadow = flat.shape.shadow(p, error);
-                    one_by_one(&|ray| shadow.blocks(ray.l, ray.is_finite()))
+                    if let [ShadowRay { p, error, .. }] = shadows.from {
+                        let shadow = flat.shape.shadow(*p, *error);
+                        return one_by_one(&|ray| shadow.blocks(ray.l, ray.is_finite()));
+                    }
+                    one_by_one(&|ray| flat.shape.shadow(ray.p, ray.error).blocks(ray.l, ray.is_finite()))
                 }
                 Item::Placed(i) => self.placed_blocks_lanes(simd, i, shadows, asking),
             }
@@ -493,7 +510,6 @@ impl Geometry {
             let line = thing.placement.line(shadows.rays.o(lane), shadows.rays.d(lane));
             own.set(lane, line.o.as_vec3(), line.d.as_vec3());
         }
-        let (light, but) = (shadows.from.light, shadows.from.but.of(index + 1));
-        self.lanes_blocked_by_mesh(simd, mesh, thing.surface, thing.shadow, light, but, &own, &shadows.t_end, active)
+        self.lanes_blocked_by_mesh(simd, mesh, thing.surface, thing.shadow, index + 1, shadows, &own, active)
     }
 }

@@ -8,7 +8,7 @@ use super::target::{SampleBlock, Target};
 use super::view::View;
 use crate::accel::{RayPacket16, dispatch_all};
 use crate::ids::LightId;
-use crate::math::{LANES, UNIT_ROUNDOFF, Vec3};
+use crate::math::{LANES, ShadowRay, UNIT_ROUNDOFF, Vec3};
 use crate::scene::{Scene, ShadowRays};
 use crate::shape::SeenTriangle;
 
@@ -104,13 +104,14 @@ impl View {
     /// Asks the trees, or only what is no mesh, ray by ray.
     fn trace(&mut self, level: Level, scene: &Scene, target: &Target, point: &Viewpoint) -> u64 {
         let mut traced = 0;
+        let from = [point.ray(target.light, Vec3::ZERO, true)];
         for (block, hidden) in target.blocks.iter().zip(&mut self.in_space) {
             let asking = !*hidden;
             if asking == 0 {
                 continue;
             }
             traced += u64::from(asking.count_ones());
-            let shadows = dispatch!(level, simd => shadow_rays(simd, target.light, point, block));
+            let shadows = dispatch!(level, simd => shadow_rays(simd, &from, point, block));
             *hidden |= if self.trees {
                 scene.geometry.are_blocked(level, &shadows, asking)
             } else {
@@ -123,9 +124,13 @@ impl View {
 
 /// The rays from a point to a block of samples.
 #[inline(always)]
-fn shadow_rays<S: Simd>(simd: S, light: LightId, point: &Viewpoint, block: &SampleBlock) -> ShadowRays {
-    let mut shadows =
-        ShadowRays { from: point.ray(light, Vec3::ZERO, true), rays: RayPacket16::ZERO, t_end: [0.0; LANES] };
+fn shadow_rays<'a, S: Simd>(
+    simd: S,
+    from: &'a [ShadowRay; 1],
+    point: &Viewpoint,
+    block: &SampleBlock,
+) -> ShadowRays<'a> {
+    let mut shadows = ShadowRays { from, rays: RayPacket16::ZERO, t_end: [0.0; LANES] };
     let l = [
         f32x16::load_array_ref(simd, &block.point[0]) - point.p.x,
         f32x16::load_array_ref(simd, &block.point[1]) - point.p.y,
@@ -158,7 +163,8 @@ fn by_kernel<S: Simd>(
         #[inline(always)]
         || {
             let Some(mesh) = ShadowMesh::of(&scene.geometry, triangle.source, light) else { return 0 };
-            let mut shadows = shadow_rays(simd, light, point, block);
+            let from = [point.ray(light, Vec3::ZERO, true)];
+            let mut shadows = shadow_rays(simd, &from, point, block);
             if let Some(placement) = mesh.placement {
                 for lane in (0..LANES).filter(|lane| unsure >> lane & 1 == 1) {
                     let line = placement.line(shadows.rays.o(lane), shadows.rays.d(lane));

@@ -324,7 +324,8 @@ impl TriangleTree {
         )
     }
 
-    /// Which of the rays in `active` meet any triangle that `filter` lets count, 0 < t <= `t_max` of each.
+    /// Which of the rays in `active` meet any triangle, 0 < t <= `t_max` of each. `filter` hears of a triangle and of
+    /// rays that meet it, and says for which of them it counts.
     #[inline(always)]
     pub fn any16<S: Simd>(
         &self,
@@ -332,12 +333,13 @@ impl TriangleTree {
         rays: &RayPacket16,
         t_max: &[f32; 16],
         active: u16,
-        filter: &impl Fn(u32) -> bool,
+        filter: &impl Fn(u32, u64) -> u64,
     ) -> u16 {
         let mut done = 0;
         if S::f32s::LEN < WIDE {
             for place in bits(u64::from(active)) {
-                done |= u16::from(self.any(simd, &rays.ray(place), t_max[place], filter)) << place;
+                done |= u16::from(self.any(simd, &rays.ray(place), t_max[place], &|id| filter(id, 1 << place) != 0))
+                    << place;
             }
             return done;
         }
@@ -347,7 +349,9 @@ impl TriangleTree {
             }
             if group.count_ones() < FEW {
                 for place in bits(group) {
-                    done |= u16::from(self.any(simd, &rays.ray(place), t_max[place], filter)) << place;
+                    done |=
+                        u16::from(self.any(simd, &rays.ray(place), t_max[place], &|id| filter(id, 1 << place) != 0))
+                            << place;
                 }
                 continue;
             }
@@ -379,8 +383,8 @@ impl TriangleTree {
                             hit = hit & !(1 << lane) | u64::from(is_hit) << lane;
                         }
                         hit &= asking & !done;
-                        if hit != 0 && filter(id) {
-                            done |= hit;
+                        if hit != 0 {
+                            done |= filter(id, hit);
                             if asking == done {
                                 break;
                             }
@@ -393,7 +397,8 @@ impl TriangleTree {
                     let mut done = 0;
                     for lane in bits(asking) {
                         let ray = rays.ray(lane);
-                        let is_hit = self.any_below(simd, child, &ray, &self.slabs(&ray), t_max[lane], filter);
+                        let counts = |id| filter(id, 1 << lane) != 0;
+                        let is_hit = self.any_below(simd, child, &ray, &self.slabs(&ray), t_max[lane], &counts);
                         done |= u64::from(is_hit) << lane;
                     }
                     done
@@ -577,7 +582,8 @@ impl TriangleTree {
         active: u16,
         filter: &impl Fn(u32) -> bool,
     ) -> u16 {
-        dispatch_sixteen!(level, simd => self.any16(simd, rays, t_max, active, filter), else {
+        let lanes = |id, lanes| if filter(id) { lanes } else { 0 };
+        dispatch_sixteen!(level, simd => self.any16(simd, rays, t_max, active, &lanes), else {
             let hit = |place: &usize| self.any_at(level, &rays.ray(*place), t_max[*place], filter);
             bits(u64::from(active)).filter(hit).fold(0, |hits, place| hits | 1 << place)
         })
