@@ -1,6 +1,7 @@
 //! Area lights: what all of them say beside their shape, and what runs.
 
 use std::f64::consts::PI;
+use std::ops::Range;
 use std::sync::{Arc, OnceLock};
 
 use fearless_simd::{f32x16, prelude::*};
@@ -333,8 +334,8 @@ impl Area {
     }
 
     /// The first points of one of the series that are stratified together.
-    pub(crate) fn points_of_series(&self, series: usize, count: u32) -> Points {
-        Points::new(&self.shape, (0..count).map(|k| point_of_series(k, series)))
+    pub(crate) fn points_of_series(&self, series: usize, range: Range<u32>) -> Points {
+        Points::new(&self.shape, range.map(|k| point_of_series(k, series)))
     }
 
     /// Sampled point `k`, world space.

@@ -127,6 +127,7 @@ pub(crate) struct Arrivals<'a> {
     pub(super) occluders: Occluders,
     /// Views that are not used any more.
     views: Vec<ShadowView>,
+    indices: Vec<u32>,
     tolerance: f32,
 }
 
@@ -146,6 +147,7 @@ impl<'a> Arrivals<'a> {
             settler: Settler::default(),
             occluders: Occluders::default(),
             views: Vec::new(),
+            indices: Vec::new(),
             tolerance: lights.tolerance,
         }
     }
@@ -323,6 +325,32 @@ impl<'a> Arrivals<'a> {
         self.lights.emitters[index].is_some() || !is_area
     }
 
+    /// What light `index` would send to a place if nothing were in the way, with all colours; black where that is not
+    /// known in closed form.
+    pub fn unshadowed(&self, index: usize, place: &ArrivalPlace) -> Rgb {
+        let Some(emitter) = &self.lights.emitters[index] else { return Rgb::BLACK };
+        let Some(view) = self.view(emitter, place).filter(View::arrives) else { return Rgb::BLACK };
+        let enough = self.enough(place);
+        let sums = dispatch_wide!(self.level, simd => unshadowed(simd, &view, &enough)).unwrap_or_default();
+        place.colors[0] * sums.diffuse + place.colors[1] * sums.specular
+    }
+
+    /// Whether a light is integrated and can be hidden: then points of it are asked behind what is in trees.
+    pub fn is_behind(&self, index: usize) -> bool {
+        self.lights.emitters[index].is_some() && self.scene.lights[index].shadows
+    }
+
+    /// Whether anything in trees may be in the way of light `index` from some points, and else whether nothing at all
+    /// is.
+    pub fn gather_for(&mut self, index: usize, points: &[Viewpoint], counts: &mut Counts) -> (bool, bool) {
+        self.indices.clear();
+        self.indices.extend(0..points.len() as u32);
+        let occluders = &mut self.occluders;
+        occluders.gather(self.level, self.scene, &self.lights.targets[index], points, &self.indices, 0);
+        counts.settled.shafts += 1;
+        (occluders.has_trees(), occluders.count() == 0)
+    }
+
     /// Hears what of light `index` is seen from those `points` whose numbers are in `order`. `each` may take what is in
     /// the way, if something in trees is.
     pub fn sights(
@@ -375,9 +403,9 @@ impl<'a> Arrivals<'a> {
     /// What arrives at one point, past what is in the way.
     fn one(&mut self, index: usize, place: &ArrivalPlace, whole: Option<Sums>, counts: &mut Counts) -> Sums {
         let Some(view) = self.settle(index, place.si, counts) else { return Sums::default() };
-        let mut together = Together::new(index, 1, place.share, 0);
+        let mut together = Together::new(index, 1, place.share, 0, Rgb::BLACK);
         together.behind(self, place, whole, view);
-        together.finish(self, counts).1
+        together.finish(self, counts).sums
     }
 
     /// Area light `index`, as its points are asked for.

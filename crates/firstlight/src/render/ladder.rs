@@ -17,38 +17,44 @@ use fearless_simd::{Level, dispatch, f32x16, mask32x16, prelude::*};
 
 use super::lanes::Obstacles;
 use crate::integrate::Sums;
-use crate::light::{Area, MIN_DISTANCE2, Points, SERIES};
+use crate::light::{Area, MIN_DISTANCE2, Points, SERIES, series_by_cell};
 use crate::material::Lobe;
-use crate::math::{LANES, Vec3x16};
+use crate::math::{LANES, Vec3, Vec3x16};
 use crate::scene::Scene;
 use crate::shape::SurfaceInteraction;
 use crate::visibility::{Target, View, Viewpoint};
 
 /// The points of the first rung, and of the last: all of a series.
-pub(super) const FIRST: usize = 64;
-pub(super) const LAST: usize = FIRST * GROWTH.pow(RUNGS as u32 - 1);
-/// How many times as many there are with each rung.
-pub(super) const GROWTH: usize = 4;
-const RUNGS: usize = 4;
+pub(super) const FIRST: usize = 16;
+pub(super) const LAST: usize = 1 << 12;
+/// The ends that a rung can have.
+const ENDS: usize = (LAST / FIRST).ilog2() as usize + 1;
 
-/// The points of one light, series by series, each rung made when it is first asked for.
+/// The points of one light, series by series, each rung made when it is first asked for: by where it ends, and whether
+/// it begins at the start of the series, at half of its end or at a quarter.
 #[derive(Default)]
 pub(super) struct Ladder {
-    series: [[OnceLock<Rung>; RUNGS]; SERIES],
+    series: [[[OnceLock<Box<Rung>>; 3]; ENDS]; SERIES],
 }
 
 /// Some points of one light.
-struct Rung {
-    points: Points,
-    target: Target,
+pub(super) struct Rung {
+    pub points: Points,
+    /// The points in the order of the light's cells, one in each, if they are 2^m: see [`series_by_cell`].
+    pub by_cell: Vec<u16>,
+    target: OnceLock<Target>,
 }
 
 impl Ladder {
-    /// The first so many points of a series, [`FIRST`] or [`GROWTH`] times as many once and again, up to [`LAST`].
-    fn rung(&self, area: &Area, target: &Target, series: usize, count: usize) -> &Rung {
-        self.series[series][(count / FIRST).ilog(GROWTH) as usize].get_or_init(|| {
-            let points = area.points_of_series(series, count as u32);
-            Rung { target: target.with(&points), points }
+    /// Some points of a series: up to [`FIRST`], or two, four, eight times as many, and so on up to [`LAST`].
+    fn rung(&self, area: &Area, series: usize, range: Range<usize>) -> &Rung {
+        let Range { start, end } = range;
+        let begin = end.checked_div(start).map_or(0, |times| times.ilog2() as usize);
+        self.series[series][(end / FIRST).ilog2() as usize][begin].get_or_init(|| {
+            let (first, count) = (start as u32, (end - start) as u32);
+            let by_cell = if count.is_power_of_two() { series_by_cell(series, first, count) } else { Vec::new() };
+            let points = area.points_of_series(series, first..first + count);
+            Box::new(Rung { points, by_cell, target: OnceLock::new() })
         })
     }
 }
@@ -61,6 +67,33 @@ pub(super) struct Asker<'a> {
     pub area: &'a Area,
     pub target: &'a Target,
     pub ladder: &'a Ladder,
+}
+
+impl<'a> Asker<'a> {
+    /// What is asked next of a series where `count` points are asked already and `to` are wanted: all of them at first,
+    /// then up to `growth` times, two or four, what came before, or, beyond [`LAST`], the whole of another series,
+    /// every `stride`-th.
+    pub fn rung(&self, series: usize, stride: usize, count: usize, to: usize, growth: usize) -> &'a Rung {
+        let series = series ^ ((count / LAST * stride) % SERIES);
+        let range = match count {
+            0 => 0..to.min(LAST),
+            count if count < LAST => count..to.min(count * growth),
+            _ => 0..LAST,
+        };
+        self.ladder.rung(self.area, series, range)
+    }
+
+    /// The point of a series of `count` that lies in one of its cells.
+    pub fn point(&self, series: usize, count: usize, cell: usize) -> Vec3 {
+        let rung = self.ladder.rung(self.area, series, 0..count);
+        rung.points.get(usize::from(rung.by_cell[cell]))
+    }
+
+    /// Which points of a rung are hidden from a point, by what is in its view; says how many rays were traced.
+    pub fn mask(&self, rung: &Rung, view: &mut View, point: &Viewpoint) -> u64 {
+        let target = rung.target.get_or_init(|| self.target.with(&rung.points));
+        view.mask(self.level, self.scene, target, point)
+    }
 }
 
 /// What points of a light say, from one place: sums of what they would send, and of what of it arrives.
@@ -101,38 +134,28 @@ impl Tally {
         [0, 1].map(|k| if self.squares[k] > 0.0 { self.all[k] * self.all[k] / self.squares[k] } else { 0.0 })
     }
 
-    /// Asks the first so many points of a series, a rung of it. Beyond [`LAST`] it goes on with other series, every
-    /// `stride`-th, as a whole. Answers with what half as many said, and the number of points that rays were traced to.
+    /// Adds the points of a rung, of which `view` says what is hidden. Answers with what `half` of all points said.
     pub fn ask(
         &mut self,
         asker: &Asker,
-        view: &mut View,
+        rung: &Rung,
+        view: &View,
         si: &SurfaceInteraction,
         lobe: &Lobe,
-        (series, stride): (usize, usize),
-        to: usize,
-    ) -> (Tally, u64) {
-        if to <= LAST {
-            *self = Tally::default();
-        }
-        let point = Viewpoint::of(si);
-        let (mut half, mut traced) = (*self, 0);
-        while self.count < to {
-            let series = series ^ ((self.count / LAST * stride) % SERIES);
-            let rung = asker.ladder.rung(asker.area, asker.target, series, to.min(LAST));
-            traced += view.mask(asker.level, asker.scene, &rung.target, &point);
-            let obstacles = Obstacles::of(view);
-            let middle = (to / 2).saturating_sub(self.count) / LANES;
-            let middle = middle.min(rung.points.blocks.len());
-            for blocks in [0..middle, middle..rung.points.blocks.len()] {
-                if self.count == to / 2 {
-                    half = *self;
-                }
-                self.count += blocks.len() * LANES;
-                dispatch!(asker.level, simd => self.add(simd, asker.area, &rung.points, blocks, si, lobe, &obstacles));
+        half: usize,
+    ) -> Option<Tally> {
+        let obstacles = Obstacles::of(view);
+        let middle = half.saturating_sub(self.count) / LANES;
+        let middle = middle.min(rung.points.blocks.len());
+        let mut told = None;
+        for blocks in [0..middle, middle..rung.points.blocks.len()] {
+            if self.count == half {
+                told = Some(*self);
             }
+            self.count += blocks.len() * LANES;
+            dispatch!(asker.level, simd => self.add(simd, asker.area, &rung.points, blocks, si, lobe, &obstacles));
         }
-        (half, traced)
+        told
     }
 
     /// Adds what some blocks of the points of an area light send.

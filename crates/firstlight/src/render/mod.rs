@@ -9,6 +9,7 @@
 //! [`tiled`](tiled/index.html) integrates lights and lights a surface once where that is enough; all else is as above.
 
 mod arrival;
+mod beams;
 mod cell;
 mod change;
 mod counts;

@@ -15,6 +15,7 @@
 
 mod behind;
 mod mean;
+mod squares;
 
 use std::ops::ControlFlow;
 
@@ -32,7 +33,10 @@ use super::{AaMode, Counts};
 use crate::color::Rgb;
 use crate::integrate::Sums;
 use crate::scene::Scene;
-use behind::{Block, Outlook};
+use crate::visibility::Viewpoint;
+use behind::{Block, Outlook, Sights};
+use squares::Node;
+
 pub(super) use mean::{BEND, second_difference, within};
 
 /// With its rim.
@@ -83,6 +87,13 @@ pub(crate) struct Tiled<'a> {
     outlooks: Vec<Outlook>,
     seen: Vec<usize>,
     block: Block,
+    sights: Vec<Sights>,
+    /// Which share of each light pixels see at least, as a few of their rays say, light by light; and which were asked.
+    votes: Vec<f32>,
+    voted: Vec<bool>,
+    /// The rays of a square, and the pixels of the cell that were asked for squares, light by light.
+    points: Vec<Viewpoint>,
+    nodes: Vec<(usize, usize, Node)>,
     /// In place of `arrived`, `values` where lights are many.
     many: Option<Many<'a>>,
 }
@@ -113,6 +124,11 @@ impl<'a> Tiled<'a> {
             outlooks: Vec::new(),
             seen: vec![UNLIT; ACROSS * ACROSS],
             block: Block::default(),
+            sights: Vec::new(),
+            votes: vec![f32::NAN; ACROSS * ACROSS * scene.lights.len()],
+            voted: vec![false; ACROSS * ACROSS * scene.lights.len()],
+            points: Vec::new(),
+            nodes: Vec::new(),
             many,
         }
     }
@@ -146,6 +162,9 @@ impl<'a> Tiled<'a> {
         self.arrived.clear();
         self.values.clear();
         self.outlooks.clear();
+        self.nodes.clear();
+        self.voted.fill(false);
+        self.votes.fill(f32::NAN);
         self.seen.fill(UNLIT);
         if let Some(listed) = &self.listed {
             let [x, y] = corner.map(|at| at as f32 - 1.0);
@@ -259,9 +278,20 @@ impl<'a> Tiled<'a> {
                     self.work[index] = rays as f32;
                     counts.looks += rays;
                 }
-                if scene.geometry.has_trees() && self.many.is_none() {
-                    self.look(tile, [block_x, block_y], [w, h], counts);
-                }
+            }
+            go_on()?;
+        }
+        if !scene.geometry.has_trees() || self.many.is_some() {
+            return ControlFlow::Continue(());
+        }
+        self.begin_looking();
+        if once {
+            self.squares(counts, go_on)?;
+        }
+        for block_y in (top..bottom).step_by(side as usize) {
+            for block_x in (left..right).step_by(side as usize) {
+                let (w, h) = ((right - block_x).min(side), (bottom - block_y).min(side));
+                self.look(tile, [block_x, block_y], [w, h], counts);
             }
             go_on()?;
         }

@@ -7,14 +7,29 @@
 
 use super::Counts;
 use super::arrival::{ArrivalPlace, Arrivals, Seen};
-use super::ladder::{Asker, FIRST, GROWTH, LAST, Tally, of_edge};
+use super::beams::{self, Beam, Traced};
+use super::ladder::{Asker, FIRST, LAST, Tally, of_edge};
 use crate::color::Rgb;
 use crate::integrate::Sums;
 use crate::light::SERIES;
 use crate::material::{Bsdf, Lobe};
 use crate::shape::SurfaceInteraction;
-use crate::visibility::View;
+use crate::visibility::{View, Viewpoint};
 
+/// The points that a ray asks first where masks tell what is hidden, and how many times as many it asks next.
+const MASKED: usize = 64;
+const GROWTH: usize = 4;
+/// The deviation of the share that a packet sees which some edge runs through: of sixteen points in as many parts of a
+/// cell of the light the edge cuts about four, each of which it parts anywhere.
+const MIXED: f32 = 0.035;
+/// The deviation of the share that n stratified points find behind an edge, times n^3/4.
+const EDGE: f32 = 0.46;
+/// How many times that is where the points of a packet do not lie in different parts of a cell.
+const APART: f32 = 3.5;
+/// The part of what chance makes of an edge that is wrong at the least, where no packet says so.
+const UNANIMOUS: f32 = 0.1;
+/// How many times what is allowed by chance a deviation may be.
+const BY_BEAMS: f32 = 1.9;
 /// Points that find what is in the way of a pixel.
 const POINTS: f32 = 512.0;
 /// The effective part of them, none of which is hidden where nothing is.
@@ -61,22 +76,13 @@ struct Asking {
     /// Whether it needs no more points.
     settled: bool,
     tally: Tally,
+    /// What half of the points said.
+    half: Tally,
     /// What a quarter of the points said, or fewer.
     before: Option<Rgb>,
 }
 
 impl Asking {
-    /// Asks the first so many points; answers with what half of them say.
-    fn ask(&mut self, asker: &Asker, stride: usize, to: usize, counts: &mut Counts) -> Tally {
-        let before = self.tally.count;
-        let (half, traced) = self.tally.ask(asker, &mut self.view, &self.si, &self.lobe, (self.series, stride), to);
-        counts.settled.traced += traced;
-        let more = (self.tally.count - before) as u64;
-        counts.shadow_rays += more;
-        counts.shadow_rays_skipped += more;
-        half
-    }
-
     /// What arrives, as far as points tell, and what would if nothing were in the way.
     fn sums(&self, measure: f32) -> (Sums, Sums) {
         (self.tally.sums(self.whole.as_ref(), measure), self.whole.unwrap_or_else(|| self.tally.whole(measure)))
@@ -93,6 +99,58 @@ impl Asking {
     }
 }
 
+/// Has all that are not settled ask so many points. `traced` hears of the packets of those behind what is in trees.
+fn ask(asker: &Asker, asking: &mut [Asking], stride: usize, to: usize, traced: &mut Traced, counts: &mut Counts) {
+    for one in asking.iter_mut().filter(|one| !one.settled) {
+        one.half = one.tally;
+    }
+    // Masks take little longer for many points than for few; packets of rays want a point in each cell
+    let by_beams = asking.iter().any(|one| !one.settled && one.view.trees);
+    let growth = if by_beams { 2 } else { GROWTH };
+    // All that are open have asked as many
+    while let Some(count) = asking.iter().find(|one| !one.settled).map(|one| one.tally.count)
+        && count < to
+    {
+        let rung = |series: usize| asker.rung(series, stride, count, to, growth);
+        let mut beams: Vec<Beam> = Vec::new();
+        for one in asking.iter_mut().filter(|one| !one.settled && one.view.trees) {
+            beams.push(Beam { point: Viewpoint::of(&one.si), rung: rung(one.series), hidden: &mut one.view.hidden });
+        }
+        let now = beams::trace(asker.scene, asker.target.light, &mut beams);
+        counts.settled.traced += now.rays;
+        traced.packets += now.packets;
+        traced.mixed += now.mixed;
+        for one in asking.iter_mut().filter(|one| !one.settled) {
+            let rung = rung(one.series);
+            if !one.view.trees {
+                counts.settled.traced += asker.mask(rung, &mut one.view, &Viewpoint::of(&one.si));
+            }
+            if let Some(half) = one.tally.ask(asker, rung, &one.view, &one.si, &one.lobe, to / 2) {
+                one.half = half;
+            }
+            let more = (one.tally.count - count) as u64;
+            counts.shadow_rays += more;
+            counts.shadow_rays_skipped += more;
+        }
+    }
+}
+
+/// How much farther off the sum of all rays may be than if all saw the same: rays that see different shares of the
+/// light are not stratified together.
+fn apart(asking: &[Asking]) -> f32 {
+    let (mut count, mut sum, mut squares, mut points) = (0.0f32, 0.0, 0.0, 0);
+    for one in asking.iter().filter(|one| one.tally.sending > 0) {
+        let share = one.tally.hidden as f32 / one.tally.sending as f32;
+        (count, sum, squares, points) = (count + 1.0, sum + share, squares + share * share, points + one.tally.sending);
+    }
+    if count < 2.0 {
+        return 1.0;
+    }
+    let deviation = ((squares - sum * sum / count) / count).max(0.0).sqrt();
+    let by_chance = EDGE * of_edge(points as f64 / f64::from(count));
+    1.0 + (APART - 1.0) * (0.5 * (deviation / by_chance - 1.0)).clamp(0.0, 1.0)
+}
+
 /// What the rays of one patch ask of one light.
 pub(crate) struct Together {
     light: usize,
@@ -107,16 +165,48 @@ pub(crate) struct Together {
     sums: Sums,
     known: [Rgb; 2],
     value: Rgb,
+    /// What other lights send to each ray, at least: errors of packets show less beside it.
+    others: Rgb,
+    /// How much of the light is not hidden from the rays that see any of it but for that, added up, and their number;
+    /// no number where that is not known.
+    shares: f32,
+    sharing: u32,
+}
+
+/// What all rays of a patch see of a light.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Outcome {
+    /// Added up, with all colours: diffuse and specular.
+    pub terms: [Rgb; 2],
+    /// Added up, without colours.
+    pub sums: Sums,
+    /// The part of the light that is not hidden, by its points, the mean over the rays; no number where that is not
+    /// known.
+    pub share: f32,
 }
 
 impl Together {
-    /// Of a patch with so many rays, `share` of its pixel. `salt` is anything that other pixels have other values of.
-    pub fn new(light: usize, rays: usize, share: f32, salt: u32) -> Self {
+    /// Of a patch with so many rays, `share` of its pixel. `salt` is anything that other pixels have other values of,
+    /// `others` what other lights send to a ray, at least.
+    pub fn new(light: usize, rays: usize, share: f32, salt: u32, others: Rgb) -> Self {
         // Which of the series is first: any, but not by a pattern
         let series = (salt.wrapping_mul(0x9e37_79b9) >> 16) as usize % SERIES;
         let each = share / rays as f32;
         let (sums, known) = (Sums::default(), [Rgb::BLACK; 2]);
-        Together { light, each, share, series, rays: 0, asking: Vec::new(), sums, known, value: Rgb::BLACK }
+        Together {
+            light,
+            each,
+            share,
+            series,
+            rays: 0,
+            asking: Vec::new(),
+            sums,
+            known,
+            value: Rgb::BLACK,
+            others,
+            shares: 0.0,
+            sharing: 0,
+        }
     }
 
     /// Asks for what one ray sees. It may be known that nothing is in the way, or nothing in trees: `lit`, `clear`.
@@ -132,10 +222,14 @@ impl Together {
         // What is integrated is wrong alike at all rays: that much by no more than if one stood for all
         let place = ArrivalPlace { share: self.share, lit, clear, ..arrivals.place(self.light, si, bsdf) };
         match arrivals.seen(self.light, &place, counts) {
-            Seen::Known(sums) => self.know(&place, &sums),
+            Seen::Known(sums) => {
+                self.know(&place, &sums);
+                self.shares += if lit { 1.0 } else { f32::NAN };
+                self.sharing += 1;
+            }
             Seen::Behind(whole) => match arrivals.settle(self.light, si, counts) {
                 Some(view) => self.behind(arrivals, &place, whole, view),
-                None => self.know(&place, &Sums::default()),
+                None => self.dark(&place),
             },
         }
     }
@@ -145,6 +239,12 @@ impl Together {
         self.rays += 1;
         self.value += place.base;
         self.add(&place.colors, sums);
+    }
+
+    /// Hears that something hides all of the light from a ray.
+    pub fn dark(&mut self, place: &ArrivalPlace) {
+        self.know(place, &Sums::default());
+        self.sharing += 1;
     }
 
     /// Asks for what one ray sees past what is in `view`. `whole` is what would arrive if nothing were in the way, if
@@ -167,6 +267,7 @@ impl Together {
             may_miss,
             settled: false,
             tally,
+            half: tally,
             before: None,
         });
     }
@@ -178,8 +279,8 @@ impl Together {
         self.sums = self.sums + *sums;
     }
 
-    /// What all rays see of the light, added up: diffuse and specular, with all colours and without.
-    pub fn finish(mut self, arrivals: &mut Arrivals, counts: &mut Counts) -> ([Rgb; 2], Sums) {
+    /// What all rays see of the light.
+    pub fn finish(mut self, arrivals: &mut Arrivals, counts: &mut Counts) -> Outcome {
         if !self.asking.is_empty() {
             let mut asking = std::mem::take(&mut self.asking);
             let all_settled = self.points(arrivals, &mut asking, counts);
@@ -191,11 +292,15 @@ impl Together {
                 } else {
                     arrivals.by_cells(self.light, &place, counts)
                 };
+                if tally.sending > 0 {
+                    self.shares += 1.0 - tally.hidden as f32 / tally.sending as f32;
+                    self.sharing += 1;
+                }
                 self.add(&colors, &sums);
                 arrivals.keep(view);
             }
         }
-        (self.known, self.sums)
+        Outcome { terms: self.known, sums: self.sums, share: self.shares / self.sharing.max(1) as f32 }
     }
 
     /// Asks points of the light, more and more, until what they say together will do; whether it does in the end.
@@ -208,24 +313,31 @@ impl Together {
         let wanted = POINTS * self.share.sqrt();
         let stride = asking.len().next_power_of_two();
         let most = MOST / stride;
-        let first = (0.5 * wanted / asking.len() as f32) as usize;
-        let mut to = if first <= FIRST { FIRST } else { FIRST * GROWTH };
+        let by_beams = asking.iter().all(|one| one.view.trees);
+        let (mut to, growth, part) = if by_beams { (FIRST, 2, 2.0) } else { (MASKED, GROWTH, 0.5) };
+        let first = (part * wanted / asking.len() as f32) as usize;
+        while to < first {
+            to *= growth;
+        }
         let tolerance = arrivals.tolerance_by_chance(self.share);
         let allowed = |to: usize| {
             let coarser = if to * stride >= MANY_OF_ALL { COARSER } else { 1.0 };
             tolerance * (1.0 + (COARSE - 1.0) * (to.min(MANY) as f32 / MANY as f32)) * coarser
         };
         let part = 1.0 / self.rays as f32;
+        let mut traced = Traced::default();
         loop {
-            let (mut value, mut moved, mut squares) = (self.value, Rgb::BLACK, Rgb::BLACK);
+            let beside = if by_beams { self.others * self.rays as f32 } else { Rgb::BLACK };
+            let (mut value, mut moved, mut squares) = (self.value + beside, Rgb::BLACK, Rgb::BLACK);
             let (mut moved_more, mut squares_more) = (Rgb::BLACK, Rgb::BLACK);
             // What would arrive if nothing were in the way, of each kind, and by how many effective points that is told
             let (mut all, mut effective) = ([Rgb::BLACK; 2], [0.0; 2]);
             // The same of those rays only that may meet the edge of a shadow
             let (mut all_edge, mut effective_edge) = ([Rgb::BLACK; 2], [0.0; 2]);
             let (mut sending, mut hidden, mut is_known) = (0, 0, true);
+            ask(&asker, asking, stride, to, &mut traced, counts);
             for one in asking.iter_mut() {
-                let half = if one.settled { one.tally } else { one.ask(&asker, stride, to, counts) };
+                let half = if one.settled { &one.tally } else { &one.half };
                 let (now, whole) = one.sums(measure);
                 let off = one.color(&now) + one.color(&half.sums(one.whole.as_ref(), measure)) * -1.0;
                 let color = one.color(&now);
@@ -244,6 +356,7 @@ impl Together {
                 is_known &= one.whole.is_some();
             }
             let shows = |error: Rgb| arrivals.steps(value * part, error * part);
+            let mixed = traced.mixed as f32 / traced.packets.max(1) as f32;
             // What few points send, or none, can be anything
             let least = [TOLD.max(sending as f64 * UNEVEN), TOLD];
             let untold = [0, 1].map(|k| if effective[k] < least[k] { all[k] } else { Rgb::BLACK });
@@ -260,7 +373,21 @@ impl Together {
             let off = off.max(more * one);
             let [diffuse, specular] = [0, 1].map(|k| all_edge[k] * of_edge(effective_edge[k]));
             let edge = (diffuse + specular) * OF_EDGE;
-            let error = shows(off.max(edge));
+            let error = if by_beams {
+                // As many points of each packet that some edge runs through are on its wrong side
+                let apart = apart(asking);
+                let wrong = |k: usize| {
+                    let packets = (effective[k] / 16.0).max(1.0) as f32;
+                    // Few packets send nearly all of a highlight: the edges may run through just those
+                    let mixed = (mixed * sending as f32 / effective[k].max(1.0) as f32).min(1.0);
+                    let of_edge = of_edge(effective[k]);
+                    all[k] * (MIXED * apart * (mixed / packets).sqrt()).max(UNANIMOUS * of_edge)
+                };
+                shows(wrong(0) + wrong(1))
+            } else {
+                shows(off.max(edge))
+            };
+            let allowed = |to: usize| if by_beams { tolerance * BY_BEAMS } else { allowed(to) };
             if is_told && error <= allowed(to) {
                 return true;
             }
@@ -276,9 +403,9 @@ impl Together {
             if to == most || error * ratio(most) > allowed(most) {
                 return false;
             }
-            to *= GROWTH;
+            to *= growth;
             while to < MANY && error * ratio(to) > allowed(to) {
-                to *= GROWTH;
+                to *= growth;
             }
             to = to.min(most);
         }

@@ -166,6 +166,16 @@ impl Occluders {
         self.too_many = false;
     }
 
+    /// Whether something in trees may be in the way.
+    pub fn has_trees(&self) -> bool {
+        let is_in_tree = |which: &Which| matches!(which, Which::InTree(_));
+        self.too_many
+            || !self.leaves.is_empty()
+            || !self.others.is_empty()
+            || self.spheres.iter().any(is_in_tree)
+            || self.flats.iter().any(|(which, _)| is_in_tree(which))
+    }
+
     /// How many things it holds: shapes and leaves.
     pub fn count(&self) -> usize {
         self.spheres.len() + self.flats.len() + self.disks.len() + self.leaves.len() + self.others.len()

@@ -21,6 +21,8 @@ const ONE: usize = 16;
 const ONE_MORE: usize = 1;
 /// Blocks of samples of a light that is integrated, for that.
 const UNKNOWN: usize = 64;
+/// Leaves in the way of a light that is integrated, of few points together: where there are more, rays are traced.
+const TRACED: usize = 32;
 
 /// Settles what is seen of lights, points together as long as little stands in the way. Keeps its memory.
 #[derive(Debug, Default)]
@@ -68,7 +70,18 @@ impl Settler {
             let cap = if part.len() > 1 { MANY } else { ONE + ONE_MORE * blocks };
             self.occluders.gather(level, scene, target, points, part, cap);
             counts.shafts += 1;
-            if self.occluders.too_many && part.len() > 1 {
+            // What too much is in the way of is left to whoever traces rays, past what is in lists
+            let mut is_traced = false;
+            if self.occluders.too_many && part.len() <= FEW && target.blocks.is_empty() {
+                if part.len() > 1 {
+                    self.occluders.gather(level, scene, target, points, part, TRACED);
+                    counts.shafts += 1;
+                }
+                is_traced = self.occluders.too_many;
+            }
+            if is_traced {
+                self.occluders.leaves.clear();
+            } else if self.occluders.too_many && part.len() > 1 {
                 if part.len() <= FEW {
                     parts.extend((start..end).map(|i| (i, i + 1)));
                     continue;
@@ -90,7 +103,7 @@ impl Settler {
             for k in part.iter().map(|k| *k as usize) {
                 let visibility = self.view.classify(level, scene, target, &self.occluders, &points[k]);
                 counts.visibility[visibility as usize] += 1;
-                if visibility == Visibility::Mask {
+                if visibility == Visibility::Mask && !target.blocks.is_empty() {
                     counts.traced += self.view.mask(level, scene, target, &points[k]);
                 }
                 each(k, visibility, &mut self.view);

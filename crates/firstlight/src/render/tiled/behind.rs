@@ -4,7 +4,7 @@
 
 use std::ops::Range;
 
-use super::{CELL, Tiled};
+use super::{ACROSS, CELL, Tiled};
 use crate::color::Rgb;
 use crate::ids::LightId;
 use crate::integrate::Sums;
@@ -12,7 +12,7 @@ use crate::render::Counts;
 use crate::render::arrival::{ArrivalPlace, Arrivals};
 use crate::render::patch::{Member, PixelPatches, Rays};
 use crate::render::tile::Tile;
-use crate::render::together::Together;
+use crate::render::together::{Outcome, Together};
 use crate::visibility::{View, Viewpoint, Visibility};
 
 /// What the rays of one patch see of one light.
@@ -47,11 +47,18 @@ enum Sight {
 #[derive(Default)]
 pub(super) struct Block {
     points: Vec<Viewpoint>,
+    patches: Vec<BlockPatch>,
+}
+
+/// What the rays of a block see of one light. Keeps its memory.
+#[derive(Default)]
+pub(super) struct Sights {
+    /// Which patches are asked.
+    open: Vec<bool>,
     order: Vec<u32>,
     sights: Vec<Sight>,
     /// Of those that are behind things, what is in the way.
     views: Vec<Option<View>>,
-    patches: Vec<BlockPatch>,
 }
 
 /// A patch of a pixel of the block.
@@ -66,94 +73,155 @@ struct BlockPatch {
 }
 
 impl Tiled<'_> {
-    /// Looks from all rays of the pixels from `from`, `size` of them across and down, for all lights.
+    /// Makes room for what the rays of each patch of the cell see.
+    pub(super) fn begin_looking(&mut self) {
+        for (pixel, seen) in self.pixels.iter().zip(&mut self.seen) {
+            *seen = self.outlooks.len();
+            let count = self.outlooks.len() + pixel.patches.len() * self.scene.lights.len();
+            self.outlooks.resize(count, Outlook::Unknown);
+        }
+    }
+
+    /// Looks from all rays of the pixels from `from`, `size` of them across and down, for all lights that nothing is
+    /// known of yet.
     pub(super) fn look(&mut self, tile: &Tile, from: [u32; 2], size: [u32; 2], counts: &mut Counts) {
         let mut block = std::mem::take(&mut self.block);
-        block.points.clear();
-        block.patches.clear();
-        let lights = self.scene.lights.len();
+        block.clear();
         for (y, x) in (0..size[1]).flat_map(|y| (0..size[0]).map(move |x| (y, x))) {
             let index = self.index([from[0] + x, from[1] + y]);
-            self.seen[index] = self.outlooks.len();
-            for (k, patch) in self.pixels[index].patches.iter().enumerate() {
-                let Rays::Some(members) = &patch.rays else { continue };
-                let (first, count) = (block.points.len() as u32, members.len() as u32);
-                block.patches.push(BlockPatch { pixel: index as u32, patch: k as u32, first, count });
-                block.points.extend(members.iter().map(|member| Viewpoint::of(&member.si)));
-                self.outlooks.extend(std::iter::repeat_n(Outlook::Unknown, lights));
-            }
+            block.add(&self.pixels[index], index);
         }
-        let first = self.outlooks.len() - block.patches.len() * lights;
-        for light in 0..lights {
-            if !self.arrivals.looks_for(light) {
+        let lights = self.scene.lights.len();
+        let mut sights = std::mem::take(&mut self.sights);
+        sights.resize_with(lights, Sights::default);
+        for (light, sights) in sights.iter_mut().enumerate() {
+            sights.open.clear();
+            let is_open = |patch: &BlockPatch| {
+                let outlook = self.outlook(patch.pixel as usize, patch.patch as usize, light);
+                self.arrivals.looks_for(light) && matches!(outlook, Outlook::Unknown)
+            };
+            sights.open.extend(block.patches.iter().map(is_open));
+            if !sights.open.contains(&true) {
                 continue;
             }
-            self.sights(&mut block, light, counts);
-            for k in 0..block.patches.len() {
-                let patch = block.patches[k];
-                let (index, range) = (patch.pixel as usize, patch.rays());
-                let of = |sight: Sight| block.sights[range.clone()].iter().filter(|s| **s == sight).count();
-                let dark = of(Sight::Dark);
-                let outlook = if dark + of(Sight::BelowHorizon) == patch.count as usize {
-                    Outlook::Dark
-                } else if dark > 0 || of(Sight::Behind) > 0 {
-                    let at = [0, 1].map(|axis| {
-                        let place = [index % super::ACROSS, index / super::ACROSS][axis];
-                        (self.corner[axis] + place as u32).wrapping_sub(1)
-                    });
-                    let inside = [0, 1].into_iter().all(|axis| {
-                        let (start, length) = [(tile.x, tile.width), (tile.y, tile.height)][axis];
-                        (start..start + length).contains(&at[axis])
-                            && (self.corner[axis]..self.corner[axis] + CELL).contains(&at[axis])
-                    });
-                    if inside {
-                        let members = patch.members(&self.pixels);
-                        let share = self.share_of(patch.count);
-                        let salt = at[0] ^ at[1].rotate_left(16) ^ members[0].si.surface.index() as u32;
-                        let before = counts.work();
-                        let mut together = Together::new(light, members.len(), share, salt);
-                        for (member, k) in members.iter().zip(range.clone()) {
-                            block.settle(k, member, &mut self.arrivals, light, share, &mut together, counts);
-                        }
-                        let (terms, _) = together.finish(&mut self.arrivals, counts);
-                        self.work[index] += counts.work() - before;
-                        Outlook::Settled(terms)
-                    } else {
-                        Outlook::Parted
-                    }
-                } else if of(Sight::Clear) > 0 {
-                    Outlook::Clear
-                } else {
-                    Outlook::Lit
-                };
-                block.views[range].iter_mut().filter_map(Option::take).for_each(|view| self.arrivals.keep(view));
-                self.outlooks[first + k * lights + light] = outlook;
+            self.look_for(&block, light, sights, counts);
+            for (patch, _) in block.patches.iter().zip(&sights.open).filter(|(_, is_open)| **is_open) {
+                let first = self.seen[patch.pixel as usize] + patch.patch as usize * lights;
+                self.outlooks[first + light] = sights.outlook(patch);
             }
         }
+        // With all that is known of other lights
+        for (light, sights) in sights.iter_mut().enumerate() {
+            for (k, patch) in block.patches.iter().enumerate() {
+                let first = self.seen[patch.pixel as usize] + patch.patch as usize * lights;
+                if sights.open[k]
+                    && matches!(self.outlooks[first + light], Outlook::Parted)
+                    && self.is_asked(tile, patch.pixel as usize)
+                {
+                    let terms = self.settle(&block, k, light, sights, counts).terms;
+                    self.outlooks[first + light] = Outlook::Settled(terms);
+                }
+            }
+            sights.views.iter_mut().filter_map(Option::take).for_each(|view| self.arrivals.keep(view));
+        }
+        self.sights = sights;
         self.block = block;
     }
 
+    /// What lights other than one send to each ray of a patch, at least, as far as that is known by now.
+    pub(super) fn others(&self, index: usize, k: usize, light: usize) -> Rgb {
+        let scene = self.scene;
+        let patch = &self.pixels[index].patches[k];
+        let mut others = Rgb::BLACK;
+        for other in (0..scene.lights.len()).filter(|other| *other != light) {
+            let whole = || self.arrivals.unshadowed(other, &self.arrivals.place(other, &patch.si, &patch.bsdf));
+            others += match self.outlook(index, k, other) {
+                Outlook::Settled([diffuse, specular]) => (diffuse + specular) * (1.0 / patch.count(scene) as f32),
+                Outlook::Lit => whole(),
+                Outlook::Unknown => match self.share_seen(index, other) {
+                    share if share > 0.0 => whole() * share,
+                    _ => Rgb::BLACK,
+                },
+                Outlook::Clear | Outlook::Dark | Outlook::Parted => Rgb::BLACK,
+            };
+        }
+        others
+    }
+
+    /// What all rays of a pixel's only patch see of a light, ray by ray.
+    pub(super) fn settled(&mut self, index: usize, light: usize, counts: &mut Counts) -> Outcome {
+        let mut block = std::mem::take(&mut self.block);
+        block.clear();
+        block.add(&self.pixels[index], index);
+        let mut sights = self.sights.pop().unwrap_or_default();
+        sights.open.clear();
+        sights.open.push(true);
+        self.look_for(&block, light, &mut sights, counts);
+        let outcome = self.settle(&block, 0, light, &mut sights, counts);
+        sights.views.iter_mut().filter_map(Option::take).for_each(|view| self.arrivals.keep(view));
+        self.sights.push(sights);
+        self.block = block;
+        outcome
+    }
+
+    /// Whether a pixel of the cell, by its place in it, is in a tile.
+    fn is_asked(&self, tile: &Tile, index: usize) -> bool {
+        let at = self.at(index);
+        [0, 1].into_iter().all(|axis| {
+            let (start, length) = [(tile.x, tile.width), (tile.y, tile.height)][axis];
+            (start..start + length).contains(&at[axis])
+                && (self.corner[axis]..self.corner[axis] + CELL).contains(&at[axis])
+        })
+    }
+
+    /// Where a pixel of the cell or its rim is on the film.
+    fn at(&self, index: usize) -> [u32; 2] {
+        [0, 1].map(|axis| {
+            let place = [index % ACROSS, index / ACROSS][axis];
+            (self.corner[axis] + place as u32).wrapping_sub(1)
+        })
+    }
+
+    /// Asks for a light at all rays of a patch of the block.
+    fn settle(&mut self, block: &Block, k: usize, light: usize, sights: &mut Sights, counts: &mut Counts) -> Outcome {
+        let patch = block.patches[k];
+        let index = patch.pixel as usize;
+        let at = self.at(index);
+        let others = self.others(index, patch.patch as usize, light);
+        let members = patch.members(&self.pixels);
+        let share = self.share_of(patch.count);
+        let salt = at[0] ^ at[1].rotate_left(16) ^ members[0].si.surface.index() as u32;
+        let before = counts.work();
+        let mut together = Together::new(light, members.len(), share, salt, others);
+        for (member, k) in members.iter().zip(patch.rays()) {
+            sights.settle(k, member, &mut self.arrivals, light, share, &mut together, counts);
+        }
+        let outcome = together.finish(&mut self.arrivals, counts);
+        self.work[index] += counts.work() - before;
+        outcome
+    }
+
     /// Finds out what each ray of the block sees of a light.
-    fn sights(&mut self, block: &mut Block, light: usize, counts: &mut Counts) {
+    fn look_for(&mut self, block: &Block, light: usize, sights: &mut Sights, counts: &mut Counts) {
         let scene = self.scene;
         let shadows = scene.lights[light].shadows;
-        block.order.clear();
-        block.sights.clear();
-        block.views.clear();
-        block.views.resize_with(block.points.len(), || None);
-        for patch in &block.patches {
+        let Sights { open, order, sights, views } = sights;
+        order.clear();
+        sights.clear();
+        views.clear();
+        views.resize_with(block.points.len(), || None);
+        for (patch, is_open) in block.patches.iter().zip(open) {
             // A patch is of one surface
             let surface = self.pixels[patch.pixel as usize].patches[patch.patch as usize].si.surface;
             let shines = scene.geometry.links.contains(scene.geometry.lights_of(surface), LightId(light as u32));
             for (member, k) in patch.members(&self.pixels).iter().zip(patch.first..) {
-                block.sights.push(if shines { Sight::Lit } else { Sight::BelowHorizon });
-                if shines && shadows && member.si.receives_shadow {
-                    block.order.push(k);
+                sights.push(if shines { Sight::Lit } else { Sight::BelowHorizon });
+                if *is_open && shines && shadows && member.si.receives_shadow {
+                    order.push(k);
                 }
             }
         }
-        let Block { points, order, sights, views, .. } = block;
-        self.arrivals.sights(light, points, order, counts, |k, visibility, take| {
+        self.arrivals.sights(light, &block.points, order, counts, |k, visibility, take| {
             sights[k] = match visibility {
                 Visibility::Lit => Sight::Lit,
                 Visibility::Hidden => Sight::Dark,
@@ -186,6 +254,39 @@ impl BlockPatch {
 }
 
 impl Block {
+    fn clear(&mut self) {
+        self.points.clear();
+        self.patches.clear();
+    }
+
+    /// Adds the patches of a pixel, number `index` of the cell.
+    fn add(&mut self, pixel: &PixelPatches, index: usize) {
+        for (k, patch) in pixel.patches.iter().enumerate() {
+            let Rays::Some(members) = &patch.rays else { continue };
+            let (first, count) = (self.points.len() as u32, members.len() as u32);
+            let (pixel, patch) = (index as u32, k as u32);
+            self.patches.push(BlockPatch { pixel, patch, first, count });
+            self.points.extend(members.iter().map(|member| Viewpoint::of(&member.si)));
+        }
+    }
+}
+
+impl Sights {
+    /// What the rays of a patch see together.
+    fn outlook(&self, patch: &BlockPatch) -> Outlook {
+        let of = |sight: Sight| self.sights[patch.rays()].iter().filter(|s| **s == sight).count();
+        let dark = of(Sight::Dark);
+        if dark + of(Sight::BelowHorizon) == patch.count as usize {
+            Outlook::Dark
+        } else if dark > 0 || of(Sight::Behind) > 0 {
+            Outlook::Parted
+        } else if of(Sight::Clear) > 0 {
+            Outlook::Clear
+        } else {
+            Outlook::Lit
+        }
+    }
+
     /// Adds what ray `k` of the block sees of a light to that of the others of its patch.
     #[allow(clippy::too_many_arguments, reason = "a ray of a patch, a light, and where it goes")]
     fn settle(
@@ -199,10 +300,8 @@ impl Block {
         counts: &mut Counts,
     ) {
         match self.sights[k] {
-            Sight::Dark | Sight::BelowHorizon => {
-                let place = arrivals.place(light, si, bsdf);
-                together.know(&place, &Sums::default());
-            }
+            Sight::Dark => together.dark(&arrivals.place(light, si, bsdf)),
+            Sight::BelowHorizon => together.know(&arrivals.place(light, si, bsdf), &Sums::default()),
             sight @ (Sight::Lit | Sight::Clear) => {
                 together.ask(arrivals, si, bsdf, sight == Sight::Lit, true, counts);
             }

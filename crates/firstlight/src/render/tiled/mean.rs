@@ -244,11 +244,11 @@ impl Tiled<'_> {
     ) {
         let rays = patch.count(self.scene) as usize;
         let salt = at[0] ^ at[1].rotate_left(16) ^ patch.si.surface.index() as u32;
-        let mut together = Together::new(light, rays, share, salt);
+        let mut together = Together::new(light, rays, share, salt, Rgb::BLACK);
         let lit = matches!(outlook, Outlook::Lit);
         let clear = lit || matches!(outlook, Outlook::Clear);
         patch.for_each(self.scene, at, |si, bsdf| together.ask(&mut self.arrivals, si, bsdf, lit, clear, counts));
-        let ([diffuse, specular], _) = together.finish(&mut self.arrivals, counts);
+        let [diffuse, specular] = together.finish(&mut self.arrivals, counts).terms;
         self.terms[light][0] += diffuse;
         self.terms[light][1] += specular;
     }

@@ -1,0 +1,123 @@
+//! Shadow rays of many places to the same small part of a light, sixteen at a time.
+//!
+//! The camera rays of a pixel ask different points of a light, of which each small cell of the light holds one for each
+//! ray. The shadow rays to one cell are all but the same, so a packet of them meets the same nodes and triangles of the
+//! trees, which sixteen rays of one place to sixteen cells do not.
+//!
+//! Source of packets of shadow rays: Wald, Benthin, Slusallek, Wagner, "Interactive rendering with coherent ray
+//! tracing", 2001.
+
+use super::ladder::Rung;
+use crate::accel::RayPacket16;
+use crate::ids::LightId;
+use crate::math::{LANES, ShadowRay, Vec3};
+use crate::scene::{Scene, ShadowRays};
+use crate::visibility::Viewpoint;
+
+/// A place that asks for its points of a light.
+pub(super) struct Beam<'a> {
+    pub point: Viewpoint,
+    pub rung: &'a Rung,
+    /// What is found: a bit for each point that is hidden, in the light's order.
+    pub hidden: &'a mut Vec<u16>,
+}
+
+/// What was traced.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Traced {
+    pub rays: u64,
+    pub packets: u64,
+    /// Packets of which some rays are hidden and some are not.
+    pub mixed: u64,
+}
+
+/// Up to sixteen shadow rays towards one light, each with what the caller knows it by.
+pub(super) struct Packet {
+    light: LightId,
+    from: [ShadowRay; LANES],
+    /// The numbers of the places that `from` holds: those of the last packet are often those of the next.
+    places: [u32; LANES],
+    rays: RayPacket16,
+    points: [u32; LANES],
+    count: usize,
+}
+
+impl Packet {
+    /// `point` is any place, for want of a ray.
+    pub fn new(light: LightId, point: &Viewpoint) -> Packet {
+        let from = [point.ray(light, Vec3::ZERO, true); LANES];
+        let (places, points) = ([u32::MAX; LANES], [0; LANES]);
+        Packet { light, from, places, rays: RayPacket16::ZERO, points, count: 0 }
+    }
+
+    /// Adds a ray from place `number` along `l` to a point, by its number; whether the packet is full now.
+    #[inline(always)]
+    pub fn add(&mut self, number: u32, place: &Viewpoint, l: Vec3, point: u32) -> bool {
+        let lane = self.count % LANES;
+        if self.places[lane] != number {
+            self.places[lane] = number;
+            self.from[lane] = place.ray(self.light, l, true);
+            for axis in 0..3 {
+                self.rays.o[axis][lane] = place.start[axis];
+            }
+        }
+        for axis in 0..3 {
+            self.rays.d[axis][lane] = l[axis];
+        }
+        self.points[lane] = point;
+        self.count += 1;
+        self.count == LANES
+    }
+
+    /// Traces the rays through the trees and begins anew. `each` hears of those that are hidden: which place, which
+    /// point.
+    pub fn trace(&mut self, scene: &Scene, traced: &mut Traced, mut each: impl FnMut(u32, u32)) {
+        let count = std::mem::take(&mut self.count);
+        if count == 0 {
+            return;
+        }
+        let mut t_end = [0.0; LANES];
+        for (lane, t_end) in t_end.iter_mut().enumerate().take(count) {
+            *t_end = ShadowRay { l: self.rays.d(lane), ..self.from[lane] }.end();
+        }
+        let shadows = ShadowRays { from: &self.from, rays: self.rays.clone(), t_end };
+        let all = ((1u32 << count) - 1) as u16;
+        let mut hidden = scene.geometry.are_blocked(scene.level, &shadows, all);
+        traced.rays += count as u64;
+        traced.packets += 1;
+        traced.mixed += u64::from(hidden != 0 && hidden != all);
+        while hidden != 0 {
+            let lane = hidden.trailing_zeros() as usize % LANES;
+            hidden &= hidden - 1;
+            each(self.places[lane], self.points[lane]);
+        }
+    }
+}
+
+/// Finds what points things in trees hide from some places, all of which ask as many. What is below a place's horizon
+/// is not asked.
+pub(super) fn trace(scene: &Scene, light: LightId, beams: &mut [Beam]) -> Traced {
+    let mut traced = Traced::default();
+    let Some(first) = beams.first() else { return traced };
+    let cells = first.rung.by_cell.len();
+    let mut packet = Packet::new(light, &first.point);
+    for beam in beams.iter_mut() {
+        beam.hidden.clear();
+        beam.hidden.resize(cells.div_ceil(LANES), 0);
+    }
+    let note = |beams: &mut [Beam], place: u32, k: u32| {
+        beams[place as usize].hidden[k as usize / LANES] |= 1 << (k as usize % LANES);
+    };
+    for cell in 0..cells {
+        for place in 0..beams.len() {
+            let Beam { point, rung, .. } = &beams[place];
+            let k = usize::from(rung.by_cell[cell]);
+            let l = rung.points.get(k) - point.p;
+            if point.horizon.dot(l) > 0.0 && packet.add(place as u32, point, l, k as u32) {
+                packet.trace(scene, &mut traced, |place, k| note(beams, place, k));
+            }
+        }
+    }
+    packet.trace(scene, &mut traced, |place, k| note(beams, place, k));
+    traced
+}

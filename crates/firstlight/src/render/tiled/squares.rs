@@ -1,0 +1,423 @@
+//! Light behind what is in trees over squares of pixels: where shadows are wider than pixels, nine pixels of a square
+//! tell what the others see.
+//!
+//! A square of one smooth surface is asked in nine pixels, each at all of its rays: its corner, those of the squares
+//! beside it, and those half way. If the four in the corners foretell the other five, and a few rays from each pixel
+//! agree with what the nine make of it, the rest lie on the parabola through the nine. Else its quarters are asked,
+//! down to four pixels across.
+
+use std::ops::ControlFlow;
+
+use arrayvec::ArrayVec;
+
+use super::behind::Outlook;
+use super::{CELL, Counts, Tiled};
+use crate::color::Rgb;
+use crate::ids::LightId;
+use crate::integrate::Sums;
+use crate::math::{LANES, Vec3};
+use crate::render::beams::{Packet, Traced};
+use crate::render::many::FEW;
+use crate::render::patch::{Contrast, Member, Patch, Rays};
+use crate::render::square::Square;
+use crate::visibility::Viewpoint;
+
+/// Pixels across the largest and the smallest squares.
+const LARGEST: u32 = 16;
+const SMALLEST: u32 = 4;
+/// How far normals may turn from the middle of a square, as a cosine, and how far from what nine of them foretell.
+const SAME_NORMAL: f32 = 0.9;
+const EVEN: f32 = 0.01;
+/// How far a surface may be off the plane in the middle of a square, as a part of the way there.
+const OFF_PLANE: f32 = 0.2;
+/// In display steps: how far the five may be from what the corners foretell, in the smallest squares; less in larger
+/// ones, where more can lie between.
+const FORETOLD: f32 = 0.8;
+/// How far what a few rays of one pixel see may be from what the nine make of it, as a part of the light, and how far
+/// all of them together, times the pixels across.
+const ONE_OFF: f32 = 0.3;
+const ALL_OFF: f32 = 0.28;
+/// Rays of a pixel that look for what the nine do not see.
+const LOOKING: usize = 16;
+/// Pixels across a block, of which those rays go together.
+const BLOCK: u32 = 4;
+/// By how much the share that so few rays see may be too large.
+const AT_LEAST: f32 = 0.25;
+/// In display steps: what colours that differ may make together with light that does.
+const MINGLED: f32 = 0.4;
+
+/// What a pixel that was asked sees of a light: the mean over its rays.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Node {
+    sums: Sums,
+    share: f32,
+}
+
+/// The three pixels of a row of a square that are asked, counted from its first.
+#[derive(Clone, Copy)]
+struct Places([u32; 3]);
+
+impl Places {
+    /// Of a square that begins at `from` on a film so long: the last is the next square's first, where there is one.
+    fn new(from: u32, side: u32, film: u32) -> Places {
+        Places([0, side / 2, if from + side < film { side } else { side - 1 }])
+    }
+
+    /// What each is worth for a pixel, on the parabola through them.
+    fn weights(self, at: u32) -> [f32; 3] {
+        let ([a, b, c], t) = (self.0.map(|place| place as f32), at as f32);
+        [
+            (t - b) * (t - c) / ((a - b) * (a - c)),
+            (t - a) * (t - c) / ((b - a) * (b - c)),
+            (t - a) * (t - b) / ((c - a) * (c - b)),
+        ]
+    }
+
+    /// What the first and the last make of each, on the line through them.
+    fn line(self) -> [[f32; 2]; 3] {
+        let t = self.0[1] as f32 / self.0[2] as f32;
+        [[1.0, 0.0], [1.0 - t, t], [0.0, 1.0]]
+    }
+}
+
+impl Tiled<'_> {
+    /// Lights what squares of the cell tell.
+    pub(super) fn squares(&mut self, counts: &mut Counts, go_on: &impl Fn() -> ControlFlow<()>) -> ControlFlow<()> {
+        let scene = self.scene;
+        let [x, y] = self.corner;
+        let cell = Square { x, y, side: CELL };
+        let mut squares = vec![cell];
+        while let Some(square) = squares.pop() {
+            if square.side > LARGEST {
+                squares.extend(square.quarters_on([scene.width, scene.height]));
+                continue;
+            }
+            let lights: ArrayVec<usize, FEW> =
+                (0..scene.lights.len()).filter(|light| self.arrivals.is_behind(*light)).collect();
+            self.square(square, &lights, counts);
+            go_on()?;
+        }
+        ControlFlow::Continue(())
+    }
+
+    /// Asks for some lights over a square, or over those of its quarters that tell.
+    fn square(&mut self, square: Square, lights: &[usize], counts: &mut Counts) {
+        let mut left = ArrayVec::<usize, FEW>::new();
+        if self.is_smooth(square) {
+            let behind: ArrayVec<usize, FEW> =
+                lights.iter().copied().filter(|light| !self.is_clear(square, *light, counts)).collect();
+            behind.iter().for_each(|light| self.look_around(square, *light, counts));
+            let mut is_told =
+                |light: &usize| !self.is_on_border(square, *light) && self.is_foretold(square, *light, counts);
+            left.extend(behind.into_iter().filter(|light| !is_told(light)));
+        } else {
+            left.extend(lights.iter().copied());
+        }
+        if left.is_empty() || square.side == SMALLEST {
+            return;
+        }
+        for quarter in square.quarters_on([self.scene.width, self.scene.height]) {
+            self.square(quarter, &left, counts);
+        }
+    }
+
+    /// The patch that fills a pixel and has all of its rays.
+    fn whole(&self, at: [u32; 2]) -> Option<&Patch> {
+        if at[0] >= self.scene.width || at[1] >= self.scene.height {
+            return None;
+        }
+        match &self.pixels[self.index(at)].patches[..] {
+            [patch] if !patch.uneven && patch.is_whole(self.scene) && matches!(patch.rays, Rays::Some(_)) => {
+                Some(patch)
+            }
+            _ => None,
+        }
+    }
+
+    /// Whether one smooth surface fills all pixels of a square, and those that are asked for it.
+    fn is_smooth(&self, square: Square) -> bool {
+        let Square { x, y, side } = square;
+        if x + side > self.scene.width || y + side > self.scene.height {
+            return false;
+        }
+        let Some(middle) = self.whole([x + side / 2, y + side / 2]) else { return false };
+        let is_like = |patch: &Patch| {
+            let (one, other) = (&middle.si, &patch.si);
+            let way = other.p - one.p;
+            one.surface == other.surface
+                && one.material == other.material
+                && one.receives_shadow == other.receives_shadow
+                && middle.bsdf.lobe == patch.bsdf.lobe
+                && one.ns.dot(other.ns) > SAME_NORMAL
+                && way.dot(one.ng).abs() <= OFF_PLANE * way.length()
+        };
+        let is_whole = |at: [u32; 2]| self.whole(at).is_some_and(is_like);
+        let [columns, rows] = self.places(square);
+        let mut all = square.pixels().chain(rows.0.into_iter().flat_map(|j| columns.0.map(|i| [x + i, y + j])));
+        if !all.all(is_whole) {
+            return false;
+        }
+        let normal = |i: u32, j: u32| self.whole([x + i, y + j]).map_or(Vec3::ZERO, |patch| patch.si.ns);
+        let nodes = rows.0.map(|j| columns.0.map(|i| normal(i, j)));
+        (0..side).all(|j| {
+            let down = rows.weights(j);
+            (0..side).all(|i| {
+                let mut foretold = Vec3::ZERO;
+                for (row, down) in nodes.iter().zip(down) {
+                    for (n, across) in row.iter().zip(columns.weights(i)) {
+                        foretold += *n * (across * down);
+                    }
+                }
+                (foretold - normal(i, j)).length() <= EVEN
+            })
+        })
+    }
+
+    /// Which columns and rows of a square are asked.
+    fn places(&self, Square { x, y, side }: Square) -> [Places; 2] {
+        [Places::new(x, side, self.scene.width), Places::new(y, side, self.scene.height)]
+    }
+
+    /// Whether nothing in trees is in the way of a light from a square, which is noted, or it does not shine there.
+    fn is_clear(&mut self, square: Square, light: usize, counts: &mut Counts) -> bool {
+        let scene = self.scene;
+        let Some(patch) = self.whole([square.x, square.y]) else { return true };
+        let lights = scene.geometry.lights_of(patch.si.surface);
+        if !scene.geometry.links.contains(lights, LightId(light as u32)) || !patch.si.receives_shadow {
+            return true;
+        }
+        let mut points = std::mem::take(&mut self.points);
+        self.viewpoints(square, &mut points);
+        let (is_behind, is_lit) = self.arrivals.gather_for(light, &points, counts);
+        self.points = points;
+        if !is_behind {
+            for at in square.pixels() {
+                self.note(at, light, if is_lit { Outlook::Lit } else { Outlook::Clear });
+            }
+        }
+        !is_behind
+    }
+
+    /// Where the rays of a square end, pixel by pixel.
+    fn viewpoints(&self, square: Square, points: &mut Vec<Viewpoint>) {
+        points.clear();
+        for at in square.pixels() {
+            if let Some(Patch { rays: Rays::Some(members), .. }) = self.whole(at) {
+                points.extend(members.iter().map(|member| Viewpoint::of(&member.si)));
+            }
+        }
+    }
+
+    /// Notes what a pixel's only patch sees of a light.
+    fn note(&mut self, at: [u32; 2], light: usize, outlook: Outlook) {
+        let index = self.index(at);
+        self.outlooks[self.seen[index] + light] = outlook;
+    }
+
+    /// Finds out which share of a light each pixel of a square sees, and those around it in the cell, by a few of its
+    /// rays.
+    fn look_around(&mut self, square: Square, light: usize, counts: &mut Counts) {
+        let blocks = |axis: usize| {
+            let (from, start) = ([square.x, square.y][axis], self.corner[axis]);
+            let first = from.saturating_sub(1).max(start) / BLOCK;
+            first..((from + square.side).min(start + CELL - 1) / BLOCK + 1)
+        };
+        for (j, i) in blocks(1).flat_map(|j| blocks(0).map(move |i| (j, i))).collect::<ArrayVec<_, 64>>() {
+            let at = [i * BLOCK, j * BLOCK];
+            let known = self.index(at) * self.scene.lights.len() + light;
+            if !self.voted[known] {
+                self.voted[known] = true;
+                self.vote(at, light, counts);
+            }
+        }
+    }
+
+    /// Asks a few rays of each pixel of a block for a light: every pixel a point of one cell of the light after the
+    /// other.
+    fn vote(&mut self, [x, y]: [u32; 2], light: usize, counts: &mut Counts) {
+        let scene = self.scene;
+        let asker = self.arrivals.asker(light);
+        let at = |inner: usize| [x + inner as u32 % BLOCK, y + inner as u32 / BLOCK];
+        let members = |inner: usize| match self.whole(at(inner)) {
+            Some(Patch { rays: Rays::Some(members), .. }) => Some(members),
+            _ => None,
+        };
+        let pixels: [Option<&Vec<Member>>; LANES] = std::array::from_fn(members);
+        let mut packet: Option<Packet> = None;
+        let mut traced = Traced::default();
+        let mut asked = [[0u32; 2]; LANES];
+        for cell in 0..LOOKING {
+            for (inner, members) in pixels.iter().enumerate() {
+                let Some(members) = members else { continue };
+                // Each ray once, if there are as many
+                let turn = (at(inner)[0] * 7 + at(inner)[1] * 3) as usize % LOOKING;
+                let point = Viewpoint::of(&members[(cell ^ turn) % members.len()].si);
+                let l = asker.point(inner, LOOKING, cell) - point.p;
+                if point.horizon.dot(l) > 0.0 && point.ns.dot(l) > 0.0 {
+                    asked[inner][0] += 1;
+                    if scene.occluded_by_lists(&point.ray(asker.target.light, l, true)) {
+                        asked[inner][1] += 1;
+                    } else {
+                        let packet = packet.get_or_insert_with(|| Packet::new(asker.target.light, &point));
+                        packet.add((inner * LOOKING + cell) as u32, &point, l, inner as u32);
+                    }
+                }
+            }
+            if let Some(packet) = &mut packet {
+                packet.trace(scene, &mut traced, |_, inner| asked[inner as usize][1] += 1);
+            }
+        }
+        counts.settled.traced += traced.rays;
+        for (inner, [asked, hidden]) in asked.into_iter().enumerate() {
+            let index = self.index(at(inner));
+            self.votes[index * scene.lights.len() + light] = (asked - hidden) as f32 / asked as f32;
+        }
+    }
+
+    /// Whether the border of a penumbra runs through a square: pixels around which all rays see a light, or none does,
+    /// and others.
+    fn is_on_border(&self, square: Square, light: usize) -> bool {
+        let vote = |at: [u32; 2]| self.votes[self.index(at) * self.scene.lights.len() + light];
+        let inside = |at: [u32; 2]| {
+            (0..2).all(|axis| (self.corner[axis]..self.corner[axis] + CELL).contains(&at[axis]))
+                && self.whole(at).is_some()
+        };
+        let mut kinds = [false; 3];
+        for [i, j] in square.pixels() {
+            let around = (0..9).map(|k| [(i + k % 3).wrapping_sub(1), (j + k / 3).wrapping_sub(1)]);
+            let (mut lit, mut dark) = (true, true);
+            for share in around.filter(|at| inside(*at)).map(vote).filter(|share| !share.is_nan()) {
+                (lit, dark) = (lit && share == 1.0, dark && share == 0.0);
+            }
+            kinds[if lit { 0 } else { 1 + usize::from(dark) }] = true;
+        }
+        kinds.into_iter().filter(|kind| *kind).count() > 1
+    }
+
+    /// The share of a light that a pixel sees at least, by its few rays; not a number where none were asked.
+    pub(super) fn share_seen(&self, index: usize, light: usize) -> f32 {
+        self.votes[index * self.scene.lights.len() + light] - AT_LEAST
+    }
+
+    /// Whether nine pixels of a square tell what the others see of a light, which agrees with what a few rays of those
+    /// say; then all is noted.
+    fn is_foretold(&mut self, square: Square, light: usize, counts: &mut Counts) -> bool {
+        let Square { x, y, side } = square;
+        let rays = (self.scene.antialiasing * self.scene.antialiasing) as f32;
+        let mut nodes = [[Node::default(); 3]; 3];
+        let [columns, rows] = self.places(square);
+        for (row, j) in nodes.iter_mut().zip(rows.0) {
+            for (node, i) in row.iter_mut().zip(columns.0) {
+                *node = self.node([x + i, y + j], light, counts);
+            }
+        }
+        // Where nothing is in the way, each pixel has its closed form
+        let vote = |at: [u32; 2]| self.votes[self.index(at) * self.scene.lights.len() + light];
+        if nodes.as_flattened().iter().all(|node| node.share == 1.0) && square.pixels().all(|at| vote(at) == 1.0) {
+            for at in square.pixels() {
+                if !matches!(self.outlook(self.index(at), 0, light), Outlook::Settled(_)) {
+                    self.note(at, light, Outlook::Clear);
+                }
+            }
+            return true;
+        }
+        let wide = (side / SMALLEST) as f32;
+        let foretold_to = FORETOLD / (wide * self.scene.lights.len() as f32).sqrt();
+        // What the corners foretell
+        for ((row, j), down) in nodes.iter().zip(rows.0).zip(rows.line()) {
+            for ((node, i), across) in row.iter().zip(columns.0).zip(columns.line()) {
+                let mut foretold = Sums::default();
+                for (corners, down) in [nodes[0], nodes[2]].iter().zip(down) {
+                    for (corner, across) in [corners[0], corners[2]].iter().zip(across) {
+                        foretold = foretold + corner.sums * (across * down);
+                    }
+                }
+                let off = Sums {
+                    diffuse: (foretold.diffuse - node.sums.diffuse).abs(),
+                    specular: (foretold.specular - node.sums.specular).abs(),
+                };
+                if self.steps_of([x + i, y + j], light, &node.sums, &off) > foretold_to {
+                    return false;
+                }
+            }
+        }
+        // What the others see
+        let (mut off, mut counted) = (0.0, 0.0f32);
+        let mut told = [Sums::default(); (LARGEST * LARGEST) as usize];
+        for (number, at) in square.pixels().enumerate() {
+            let share = self.votes[self.index(at) * self.scene.lights.len() + light];
+            let [across, down] = [columns.weights(number as u32 % side), rows.weights(number as u32 / side)];
+            let (mut sums, mut foretold) = (Sums::default(), 0.0);
+            for (row, down) in nodes.iter().zip(down) {
+                for (node, across) in row.iter().zip(across) {
+                    sums = sums + node.sums * (across * down);
+                    foretold += node.share * (across * down);
+                }
+            }
+            told[number] = Sums { diffuse: sums.diffuse.max(0.0), specular: sums.specular.max(0.0) };
+            if !share.is_nan() {
+                if !((share - foretold).abs() <= ONE_OFF) {
+                    return false;
+                }
+                (off, counted) = (off + share - foretold, counted + 1.0);
+            }
+        }
+        if !(off.abs() <= counted * ALL_OFF / side as f32) {
+            return false;
+        }
+        for (at, sums) in square.pixels().zip(told) {
+            let index = self.index(at);
+            if matches!(self.outlook(index, 0, light), Outlook::Settled(_)) {
+                continue;
+            }
+            let patch = &self.pixels[index].patches[0];
+            // Of two colours that meet different light the mean is no product of means
+            if patch.contrast != Contrast::default() {
+                let number = ((at[1] - y) * side + at[0] - x) as usize;
+                let beside =
+                    |step: usize, place: u32| told[if place + 1 < side { number + step } else { number - step }];
+                let mut slope = Sums::default();
+                for other in [beside(1, at[0] - x), beside(side as usize, at[1] - y)] {
+                    slope.diffuse += (other.diffuse - sums.diffuse).abs();
+                    slope.specular += (other.specular - sums.specular).abs();
+                }
+                let Contrast { diffuse, specular } = patch.contrast;
+                let mingled = (diffuse * slope.diffuse + specular * slope.specular) * 0.125;
+                let scale = self.arrivals.scale(light);
+                let value = scale * (patch.bsdf.diffuse * sums.diffuse + patch.bsdf.specular * sums.specular);
+                if self.arrivals.steps(value, scale * mingled) > MINGLED {
+                    continue;
+                }
+            }
+            let scale = self.arrivals.scale(light) * rays;
+            let terms = [scale * patch.bsdf.diffuse * sums.diffuse, scale * patch.bsdf.specular * sums.specular];
+            self.note(at, light, Outlook::Settled(terms));
+        }
+        true
+    }
+
+    /// What a pixel sees of a light by all of its rays.
+    fn node(&mut self, at: [u32; 2], light: usize, counts: &mut Counts) -> Node {
+        let index = self.index(at);
+        let rays = (self.scene.antialiasing * self.scene.antialiasing) as f32;
+        let known = self.nodes.iter().find(|(of, by, _)| (*of, *by) == (index, light)).map(|(_, _, node)| *node);
+        if let Some(node) = known {
+            return node;
+        }
+        let outcome = self.settled(index, light, counts);
+        self.note(at, light, Outlook::Settled(outcome.terms));
+        let node = Node { sums: outcome.sums * (1.0 / rays), share: outcome.share };
+        self.nodes.push((index, light, node));
+        node
+    }
+
+    /// How many display steps an error makes of what a light sends to a pixel.
+    fn steps_of(&self, at: [u32; 2], light: usize, sums: &Sums, error: &Sums) -> f32 {
+        let Some(patch) = self.whole(at) else { return f32::INFINITY };
+        let scale = self.arrivals.scale(light);
+        let color = |sums: &Sums| scale * (patch.bsdf.diffuse * sums.diffuse + patch.bsdf.specular * sums.specular);
+        let others = self.others(self.index(at), 0, light);
+        let value: Rgb = self.scene.ambient * patch.bsdf.ambient + others + color(sums);
+        self.arrivals.steps(value, color(error))
+    }
+}
