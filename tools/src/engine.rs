@@ -54,15 +54,15 @@ pub(crate) const THREADS: usize = 2;
 /// Camera rays across a pixel.
 pub(crate) const AA: u32 = 4;
 /// Points on each light of the picture that errors are measured against: on config 11, and on the mesh.
-const CONVERGED: [u32; 2] = [4096, 1024];
+pub(crate) const CONVERGED: [u32; 2] = [4096, 1024];
 /// Runs of the whole program.
 const PROCESSES: usize = 11;
 
 /// One way of rendering a picture.
-struct Way {
+pub(crate) struct Way {
     name: &'static str,
     samples: SamplesDesc,
-    settings: RenderSettings,
+    pub settings: RenderSettings,
     seconds: Vec<f64>,
     error: Option<Difference>,
 }
@@ -72,7 +72,7 @@ pub(crate) fn settings(visibility: VisibilityMode, aa_mode: AaMode) -> RenderSet
     RenderSettings { threads: NonZeroUsize::new(THREADS), visibility, aa_mode, ..RenderSettings::default() }
 }
 
-fn way(name: &'static str, samples: SamplesDesc, visibility: VisibilityMode, aa_mode: AaMode) -> Way {
+pub(crate) fn way(name: &'static str, samples: SamplesDesc, visibility: VisibilityMode, aa_mode: AaMode) -> Way {
     Way { name, samples, settings: settings(visibility, aa_mode), seconds: Vec::new(), error: None }
 }
 
@@ -142,7 +142,7 @@ pub fn run(options: &Options) -> Outcome {
 
 /// Runs all ways in turns, then compares their pictures with one of many samples. Says whether the first two, which
 /// have the same samples, made the same bits.
-fn measure(
+pub(crate) fn measure(
     ways: &mut [Way],
     rounds: usize,
     converged: u32,
@@ -309,7 +309,7 @@ fn page(
     page
 }
 
-fn table(page: &mut String, ways: &[Way]) {
+pub(crate) fn table(page: &mut String, ways: &[Way]) {
     let head =
         "| way | seconds | least to most | times the first | worst error | rms error | pixels off by more than 1 |";
     let _ = writeln!(page, "{head}");

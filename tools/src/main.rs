@@ -6,6 +6,7 @@ mod engine;
 mod exact;
 mod generate;
 mod lights;
+mod meshes;
 mod models;
 mod peers;
 mod pictures;
@@ -48,6 +49,8 @@ enum Task {
     /// Measures what each part of the light engine gains, on config 11 and on a mesh, and writes a page under
     /// docs/benchmarks.
     Engine(engine::Options),
+    /// Measures integrated light behind meshes, against 256 points traced and 1,024 by shafts.
+    Meshes(meshes::Options),
     /// Measures a hall full of small lights, or writes it as a scene.
     Lights(lights::Options),
     /// Measures rays through meshes, against Embree where it is installed, and writes a page under docs/benchmarks.
@@ -80,6 +83,7 @@ fn main() -> ExitCode {
         Task::Pictures { filter } => pictures::run(filter.as_deref()),
         Task::Bench(options) => bench::run(&options),
         Task::Engine(options) => engine::run(&options),
+        Task::Meshes(options) => meshes::run(&options),
         Task::Lights(options) => lights::run(&options),
         Task::Rays(options) => rays::run(&options),
         Task::Models(options) => models::run(&options),
