@@ -58,8 +58,9 @@ pub fn install() {
 
 /// What a request does, on a thread of its own.
 fn on_request() {
-    let watched = WATCHED.load(Ordering::SeqCst);
-    if REQUESTED.swap(true, Ordering::SeqCst) || !watched {
+    // In this order: who begins to watch after nobody did finds the request before there is anything to tidy up
+    let again = REQUESTED.swap(true, Ordering::SeqCst);
+    if again || !WATCHED.load(Ordering::SeqCst) {
         std::process::exit(130);
     }
 }
