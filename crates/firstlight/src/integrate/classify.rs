@@ -277,7 +277,7 @@ pub(crate) fn classify<S: Simd>(
             class.between.outside |= (told.outside >> k & 1) << i;
             class.between.within |= (told.within >> k & 1) << i;
             let is_cut = (told.outside | told.within) >> k & 1 == 1;
-            class.other |= is_cut && cuts_ball(emitter, exact, &points[k]);
+            class.other |= is_cut && cuts_ball(emitter, exact);
         }
     }
     for (class, point) in classes.iter_mut().zip(points) {
@@ -299,7 +299,7 @@ pub(crate) fn classify<S: Simd>(
 
 /// Whether something reaches into a light that is a ball: what of it is behind the light's surface does not show on the
 /// disk that stands for the light.
-fn cuts_ball(emitter: &Emitter, exact: &ExactShape, _: &ShadingPoint) -> bool {
+fn cuts_ball(emitter: &Emitter, exact: &ExactShape) -> bool {
     let Emitter::Ball { center, radius } = emitter else { return false };
     match exact {
         ExactShape::Sphere(sphere) => (*center - sphere.c).length() < radius + sphere.r,
@@ -320,6 +320,13 @@ struct Told<S: Simd> {
     motion: f32x16<S>,
 }
 
+impl<S: Simd> Told<S> {
+    #[inline(always)]
+    fn nothing(zero: f32x16<S>) -> Self {
+        Told { outside: 0, within: 0, hidden: 0, firm: 0, moving: 0, motion: zero }
+    }
+}
+
 #[allow(clippy::too_many_arguments, reason = "a sphere twice, and sixteen points")]
 #[inline(always)]
 fn sphere_between<S: Simd>(
@@ -333,7 +340,7 @@ fn sphere_between<S: Simd>(
     asked: u64,
 ) -> Told<S> {
     let zero = simd.splat_f32x16(0.0);
-    let mut told = Told { outside: 0, within: 0, hidden: 0, firm: 0, moving: 0, motion: zero };
+    let mut told = Told::nothing(zero);
     let distance2 = s.dot(s);
     let distance = distance2.sqrt();
     // On which side of the sphere the points are: where that is close, to the last bit
@@ -466,7 +473,7 @@ fn flat_between<S: Simd>(
     asked: u64,
 ) -> Told<S> {
     let zero = simd.splat_f32x16(0.0);
-    let mut told = Told { outside: 0, within: 0, hidden: 0, firm: 0, moving: 0, motion: zero };
+    let mut told = Told::nothing(zero);
     let mut size2 = zero;
     let mut rises = simd.splat_f32x16(f32::NEG_INFINITY);
     for q in &q {

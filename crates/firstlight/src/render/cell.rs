@@ -522,8 +522,7 @@ impl<'a> Cells<'a> {
         let rays = (self.scene.antialiasing * self.scene.antialiasing) as u64;
         for index in 0..PIXELS {
             let [i, j] = self.at(index);
-            let inside = |at: u32, from: u32, length: u32| at >= from && at < from + length;
-            if inside(i, tile.x, tile.width) && inside(j, tile.y, tile.height) {
+            if tile.contains([i, j]) {
                 counts.camera_rays += rays;
                 film.set(i - tile.x, j - tile.y, self.colors[index]);
                 film.spend(i - tile.x, j - tile.y, self.work[index]);

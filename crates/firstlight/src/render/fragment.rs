@@ -301,6 +301,7 @@ impl Candidate {
 
 /// The most rays whose mean is taken at once.
 const MAX_MEAN: usize = 64;
+
 /// A place with its normal on the viewer's side.
 #[inline(always)]
 fn turned((p, error, normal): (Vec3, ErrorBound, Vec3), wo: Vec3) -> ShadingPoint {

@@ -8,7 +8,7 @@ use super::change::Arrival;
 use super::tiled::BEND;
 use crate::color::Rgb;
 use crate::ids::{LightId, MaterialId, SurfaceId};
-use crate::integrate::{Asked, Evaluator, Illumination, Obstacles, ShadingPoint, Sums, Tolerance};
+use crate::integrate::{Arrived, Asked, Evaluator, Illumination, Obstacles, ShadingPoint, Sums, Tolerance};
 use crate::light::LightKind;
 use crate::material::{Bsdf, Lobe};
 use crate::math::{Facet, Vec2};
@@ -109,7 +109,7 @@ pub(crate) struct LightQueue<'a> {
     /// Requests in the order in which they are asked: those of one light, one highlight, with or without shadows.
     groups: Vec<Vec<u32>>,
     points: Vec<ShadingPoint>,
-    arrived: Vec<crate::integrate::Arrived>,
+    arrived: Vec<Arrived>,
 }
 
 impl<'a> LightQueue<'a> {

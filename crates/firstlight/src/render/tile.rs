@@ -43,6 +43,11 @@ impl Tile {
         tiles
     }
 
+    /// Whether it has this pixel.
+    pub fn contains(&self, [i, j]: [u32; 2]) -> bool {
+        (self.x..self.x + self.width).contains(&i) && (self.y..self.y + self.height).contains(&j)
+    }
+
     /// The upper left corners of the cells of a grid of the film that the tile has a part of, row by row.
     pub fn cells(self, side: u32) -> impl Iterator<Item = [u32; 2]> {
         let starts =

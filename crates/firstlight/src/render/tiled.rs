@@ -181,8 +181,7 @@ impl<'a> Tiled<'a> {
         for y in 0..CELL {
             for x in 0..CELL {
                 let [i, j] = [corner[0] + x, corner[1] + y];
-                let inside = |at: u32, from: u32, length: u32| at >= from && at < from + length;
-                if inside(i, tile.x, tile.width) && inside(j, tile.y, tile.height) {
+                if tile.contains([i, j]) {
                     counts.camera_rays += rays;
                     let index = (y as usize + 1) * ACROSS + x as usize + 1;
                     let before = counts.work();

@@ -166,12 +166,10 @@ impl Tiled<'_> {
 
     /// Whether a pixel of the cell, by its place in it, is in a tile.
     fn is_asked(&self, tile: &Tile, index: usize) -> bool {
+        let [x, y] = self.corner;
+        let cell = Tile { x, y, width: CELL, height: CELL };
         let at = self.at(index);
-        [0, 1].into_iter().all(|axis| {
-            let (start, length) = [(tile.x, tile.width), (tile.y, tile.height)][axis];
-            (start..start + length).contains(&at[axis])
-                && (self.corner[axis]..self.corner[axis] + CELL).contains(&at[axis])
-        })
+        tile.contains(at) && cell.contains(at)
     }
 
     /// Where a pixel of the cell or its rim is on the film.

@@ -20,6 +20,7 @@ use crate::render::beams::{Packet, Traced};
 use crate::render::many::FEW;
 use crate::render::patch::{Contrast, Member, Patch, Rays};
 use crate::render::square::Square;
+use crate::render::tile::Tile;
 use crate::visibility::Viewpoint;
 
 /// Pixels across the largest and the smallest squares.
@@ -278,10 +279,9 @@ impl Tiled<'_> {
     /// and others.
     fn is_on_border(&self, square: Square, light: usize) -> bool {
         let vote = |at: [u32; 2]| self.votes[self.index(at) * self.scene.lights.len() + light];
-        let inside = |at: [u32; 2]| {
-            (0..2).all(|axis| (self.corner[axis]..self.corner[axis] + CELL).contains(&at[axis]))
-                && self.whole(at).is_some()
-        };
+        let [x, y] = self.corner;
+        let cell = Tile { x, y, width: CELL, height: CELL };
+        let inside = |at: [u32; 2]| cell.contains(at) && self.whole(at).is_some();
         let mut kinds = [false; 3];
         for [i, j] in square.pixels() {
             let around = (0..9).map(|k| [(i + k % 3).wrapping_sub(1), (j + k / 3).wrapping_sub(1)]);
