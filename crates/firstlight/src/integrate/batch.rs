@@ -97,6 +97,8 @@ pub(crate) enum ViewNumber {
     /// Where places are counted from, from the light's middle.
     OriginX,
     OriginY,
+    Ratio,
+    Behind2,
     Measure,
 }
 
@@ -122,7 +124,8 @@ impl ViewBlock {
             p.x, p.y, p.z, l0.x, l0.y, l0.z, a.x, a.y, a.z, b.x, b.y, b.z,
             v.fa, v.la, v.skew, v.fb, v.lb, v.height,
             v.cos.c, v.cos.x, v.cos.y, v.horizon.c, v.horizon.x, v.horizon.y, v.out.c, v.out.x, v.out.y, v.cos_o,
-            v.x[0], v.x[1], v.y[0], v.y[1], v.origin[0], v.origin[1], v.measure,
+            v.x[0], v.x[1], v.y[0], v.y[1], v.origin[0], v.origin[1],
+            v.ratio, v.behind2, v.measure,
         ];
         for (block, number) in self.0.iter_mut().zip(numbers) {
             block[lane] = number;

@@ -298,7 +298,7 @@ impl Between {
             return true;
         }
         let ball = match emitter {
-            Emitter::Ball { center, radius } => {
+            Emitter::Ball { center, radius, .. } => {
                 distance(corners, (*center - asker.si.lit_from.as_dvec3()).as_vec3()) < *radius as f32
             }
             _ => false,
@@ -474,7 +474,7 @@ impl Between {
         if !is_met {
             return;
         }
-        if let Emitter::Ball { center, radius } = emitter
+        if let Emitter::Ball { center, radius, .. } = emitter
             && flat.distance(*center) < *radius
         {
             self.ask = true;
@@ -557,7 +557,7 @@ fn triangle_distance([a, b, c]: &[Vec3; 3]) -> f32 {
 /// does not show on the disk that stands for the light.
 fn touches(emitter: &Emitter, to: DVec3, r: f64, p: Vec3) -> bool {
     match emitter {
-        Emitter::Ball { center, radius } => (*center - p.as_dvec3() - to).length() < radius + r,
+        Emitter::Ball { center, radius, .. } => (*center - p.as_dvec3() - to).length() < radius + r,
         _ => false,
     }
 }

@@ -300,7 +300,7 @@ pub(crate) fn classify<S: Simd>(
 /// Whether something reaches into a light that is a ball: what of it is behind the light's surface does not show on the
 /// disk that stands for the light.
 fn cuts_ball(emitter: &Emitter, exact: &ExactShape) -> bool {
-    let Emitter::Ball { center, radius } = emitter else { return false };
+    let Emitter::Ball { center, radius, .. } = emitter else { return false };
     match exact {
         ExactShape::Sphere(sphere) => (*center - sphere.c).length() < radius + sphere.r,
         ExactShape::Flat { flat, .. } => flat.distance(*center) < *radius,

@@ -1,5 +1,6 @@
 //! Area lights as they are integrated.
 
+use super::fit::Falloff;
 use super::view::{FlatLight, Outline};
 use crate::light::{Area, AreaShape};
 use crate::math::{DVec3, Vec3};
@@ -9,11 +10,9 @@ use crate::math::{DVec3, Vec3};
 pub(crate) enum Emitter {
     /// A rectangle or a disk.
     Flat(FlatLight),
-    /// A sphere whose outside emits as light does. From any point outside it looks like the disk in which the cone
-    /// around it touches it: the same directions, and the same radiance in each.
-    Ball { center: DVec3, radius: f64 },
-    /// Any other sphere: [`points`](super::points).
-    Points,
+    /// A sphere. From any point outside it looks like the disk in which the cone around it touches it: the same
+    /// directions, and, where light weakens on its way, the same radiance in each.
+    Ball { center: DVec3, radius: f64, physical: bool, both_sides: bool },
 }
 
 impl Emitter {
@@ -23,10 +22,12 @@ impl Emitter {
         match &area.shape {
             AreaShape::Rectangle(r) => flat(r.center, r.e0 * 0.5, r.e1 * 0.5, r.n, Outline::Parallelogram),
             AreaShape::Disk(disk) => flat(disk.center, disk.a, disk.b, disk.n, Outline::Disk),
-            AreaShape::Sphere(sphere) if area.physical && !area.both_sides => {
-                Emitter::Ball { center: sphere.center, radius: sphere.radius }
-            }
-            AreaShape::Sphere(_) => Emitter::Points,
+            AreaShape::Sphere(sphere) => Emitter::Ball {
+                center: sphere.center,
+                radius: sphere.radius,
+                physical: area.physical,
+                both_sides: area.both_sides,
+            },
         }
     }
 
@@ -34,20 +35,34 @@ impl Emitter {
     pub fn is_physical(&self) -> bool {
         match self {
             Emitter::Flat(flat) => flat.physical,
-            Emitter::Ball { .. } | Emitter::Points => true,
+            Emitter::Ball { physical, .. } => *physical,
         }
     }
 
-    /// Whether a flat light stands for it everywhere.
-    pub fn is_closed(&self) -> bool {
-        !matches!(self, Emitter::Points)
+    /// What its places count for.
+    pub fn falloff(&self) -> Falloff {
+        match (self.outline(), self.is_physical()) {
+            (Outline::Sphere, _) => Falloff::Sphere,
+            (_, true) => Falloff::Physical,
+            (_, false) => Falloff::Constant,
+        }
+    }
+
+    /// Whether `p` is inside of a ball that shines inwards: no flat light stands for it there.
+    pub fn surrounds(&self, p: Vec3) -> bool {
+        match self {
+            Emitter::Flat(_) => false,
+            Emitter::Ball { center, radius, both_sides, .. } => {
+                *both_sides && !((*center - p.as_dvec3()).length_squared() > radius * radius)
+            }
+        }
     }
 
     /// Whether what it sends changes at once where a point passes its plane.
     pub fn is_one_sided(&self) -> bool {
         match self {
             Emitter::Flat(flat) => flat.physical || !flat.both_sides,
-            Emitter::Ball { .. } | Emitter::Points => false,
+            Emitter::Ball { .. } => false,
         }
     }
 
@@ -55,7 +70,8 @@ impl Emitter {
     pub fn outline(&self) -> Outline {
         match self {
             Emitter::Flat(flat) => flat.outline,
-            Emitter::Ball { .. } | Emitter::Points => Outline::Disk,
+            Emitter::Ball { physical: true, .. } => Outline::Disk,
+            Emitter::Ball { physical: false, .. } => Outline::Sphere,
         }
     }
 
@@ -63,7 +79,7 @@ impl Emitter {
     pub fn flat(&self, p: Vec3) -> Option<FlatLight> {
         match self {
             Emitter::Flat(flat) => Some(*flat),
-            Emitter::Ball { center, radius } => {
+            Emitter::Ball { center, radius, physical, both_sides } => {
                 let to = *center - p.as_dvec3();
                 let distance2 = to.length_squared();
                 let share = radius * radius / distance2;
@@ -74,9 +90,19 @@ impl Emitter {
                 let a = n.any_orthonormal_vector();
                 let r = radius * (1.0 - share).sqrt();
                 let c = p.as_dvec3() + to * (1.0 - share);
-                Some(FlatLight::new(c, a * r, a.cross(n) * r, -n, Outline::Disk, true, false))
+                let disk = FlatLight::new(c, a * r, a.cross(n) * r, -n, self.outline(), *physical, false);
+                Some(match (physical, both_sides) {
+                    (true, false) => disk,
+                    // Both where a ray enters the ball and where it leaves it
+                    (true, true) => FlatLight { times: 2.0, ..disk },
+                    (false, _) => FlatLight {
+                        times: (1.0 - share) as f32,
+                        ratio: share.sqrt() as f32,
+                        behind2: if *both_sides { (distance2 - radius * radius) as f32 } else { 0.0 },
+                        ..disk
+                    },
+                })
             }
-            Emitter::Points => None,
         }
     }
 }

@@ -177,6 +177,9 @@ impl Evaluator {
                     distance: 0.0,
                     height: 0.0,
                 };
+                if light.emitter.surrounds(points[k].p) {
+                    one.illumination = Illumination::Unknown;
+                }
                 let mut between = Between::default();
                 if let Some(view) = view {
                     (one.distance, one.height) = (view.nearest(), view.height);
@@ -207,7 +210,7 @@ impl Evaluator {
     /// Asks all cells and panels of this round.
     fn ask(&mut self, level: Level, light: &Asked) {
         let Evaluator { views, between, whole, cut: cut_cells, polynomials, panels, spare, .. } = self;
-        let physical = light.emitter.is_physical();
+        let falloff = light.emitter.falloff();
         let outline = light.emitter.outline();
         let blocked = Blocked { occluders: &light.obstacles.occluders, outline, between };
         let moments = if matches!(light.lobe, Lobe::None) { 1 } else { MOMENTS };
@@ -226,7 +229,7 @@ impl Evaluator {
                 let wanted = is_cut.then_some(&mut *polynomials);
                 let fitted = simd.vectorize(
                     #[inline(always)]
-                    || fit(simd, light.lobe, physical, &members, cells, wanted),
+                    || fit(simd, light.lobe, falloff, &members, cells, wanted),
                 );
                 if is_cut {
                     cut_fits.push(fitted);
@@ -441,9 +444,10 @@ impl Evaluator {
         let mirror = if sharpness > 0.0 { view.mirror() } else { None };
         let (mut count, mut halved) = (0, 0);
         let mut open: ArrayVec<Cell, { MAX_GRADED + 2 }> = ArrayVec::new();
-        open.push(Cell { point, x: view.x, y: view.y, depth: 0 });
+        let [x, y] = view.whole();
+        open.push(Cell { point, x, y, depth: 0 });
         while let Some(cell) = open.pop() {
-            let ([x0, x1], [y0, y1]) = (cell.x, cell.y);
+            let [[x0, x1], [y0, y1]] = view.around([cell.x, cell.y]);
             let (half_x, half_y) = (0.5 * (x1 - x0) * view.la, 0.5 * (y1 - y0) * view.lb);
             let lean = 0.5 * (y1 - y0) * view.skew.abs();
             let (x, y) = (0.5 * (x0 + x1), 0.5 * (y0 + y1));
@@ -460,13 +464,16 @@ impl Evaluator {
                 let apart = (2.0 * (1.0 - cos)).sqrt() - (size2 / l.length_squared()).sqrt();
                 is_wide |= sharpness * square(apart.max(0.0)) < tolerance.highlight_end;
             }
-            let part = Part::of(view, cell.x, cell.y);
+            let part = Part::of(view, [x0, x1], [y0, y1]);
             if part == Part::None {
                 continue;
             }
             is_wide &= cell.depth < tolerance.cell_depth && halved < tolerance.most_cells && open.len() < MAX_GRADED;
-            // The longer edge, in metres
-            let along_y = square(half_y) + square(lean) > square(half_x);
+            // The longer edge, in metres, or on the sphere
+            let along_y = match view.outline {
+                Outline::Sphere => cell.y[1] - cell.y[0] > cell.x[1] - cell.x[0],
+                Outline::Parallelogram | Outline::Disk => square(half_y) + square(lean) > square(half_x),
+            };
             if let Some([one, other]) = halves(&cell, along_y).filter(|_| is_wide) {
                 halved += 1;
                 open.extend([other, one]);

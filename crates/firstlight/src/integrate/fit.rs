@@ -11,7 +11,7 @@ use fearless_simd::{f32x16, prelude::*};
 
 use super::batch::{Block, Members, ViewNumber};
 use crate::material::Lobe;
-use crate::math::LANES;
+use crate::math::{LANES, sin_cos};
 
 /// Moments of a light: the cosine, and the highlight.
 pub(crate) const MOMENTS: usize = 2;
@@ -106,6 +106,17 @@ const NODES_32: [f32; NODES] = {
     nodes
 };
 
+/// What a place of a light counts for, beside the cosine at the surface.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Falloff {
+    /// All places alike.
+    Constant,
+    /// By the square of the distance and the cosine at the light.
+    Physical,
+    /// All places of a sphere alike: [`Outline::Sphere`](super::view::Outline::Sphere).
+    Sphere,
+}
+
 /// A rectangle of a light's square, of one point.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Cell {
@@ -131,7 +142,7 @@ pub(crate) struct Fits {
 pub(crate) fn fit<S: Simd>(
     simd: S,
     lobe: &Lobe,
-    physical: bool,
+    falloff: Falloff,
     members: &Members,
     cells: &[Cell],
     polynomials: Option<&mut Vec<[Polynomial; MOMENTS]>>,
@@ -158,19 +169,40 @@ pub(crate) fn fit<S: Simd>(
     let has_lobe = !matches!(lobe, Lobe::None);
     // Ask the light at all nodes
     let mut values = [[[zero; NODES]; NODES]; MOMENTS];
+    let is_sphere = falloff == Falloff::Sphere;
+    let (ratio, behind2) = (members.lanes(simd, Ratio), members.lanes(simd, Behind2));
+    let (mut places, mut deep) = ([zero; NODES], [splat(1.0); NODES]);
+    for (i, node) in NODES_32.iter().enumerate() {
+        places[i] = xh * *node + xm;
+        if is_sphere {
+            (places[i], deep[i]) = sin_cos(places[i]);
+        }
+    }
     for (j, node) in NODES_32.iter().enumerate() {
-        let y = yh * *node + ym;
+        let (mut y, mut wide) = (yh * *node + ym, splat(1.0));
+        if is_sphere {
+            (y, wide) = sin_cos(y);
+        }
         let along_row = y * skew + fa;
         let across = y * lb + fb;
         let rest = across * across + height2;
         let (cos_row, out_row) = (y * cos.y + cos.c, y * out.y + out.c);
         let (mut cos_i, mut cos_io, mut weights) = ([zero; NODES], [zero; NODES], [splat(1.0); NODES]);
-        for (i, node) in NODES_32.iter().enumerate() {
-            let x = xh * *node + xm;
+        for i in 0..NODES {
+            let x = if is_sphere { places[i] * wide } else { places[i] };
             let along = x * la + along_row;
             let inverse = 1.0 / (along * along + rest).sqrt();
-            if physical {
-                weights[i] = inverse * inverse * (inverse * height);
+            match falloff {
+                Falloff::Constant => {}
+                Falloff::Physical => weights[i] = inverse * inverse * (inverse * height),
+                Falloff::Sphere => {
+                    // With q = sqrt(1 - x^2 - y^2), the areas of the sphere before and behind a place of the disk are
+                    // as 1 / (1 + ratio q)^2 and 1 / (1 - ratio q)^2, over q; and 1 - (ratio q)^2 is |l|^2 over the
+                    // square of the way to where the sphere is touched
+                    let near = deep[i] * wide * ratio + 1.0;
+                    let far = near * (behind2 * inverse * inverse);
+                    weights[i] = wide * (1.0 / (near * near) + far * far);
+                }
             }
             cos_i[i] = (x * cos.x + cos_row) * inverse;
             cos_io[i] = (x * out.x + out_row) * inverse;

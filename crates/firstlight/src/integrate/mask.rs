@@ -35,7 +35,7 @@ impl Masked<'_> {
 
     fn seen<'b>(&'b self, view: &'b View) -> Seen<'b> {
         let ball = match self.emitter {
-            Emitter::Ball { center, radius } => {
+            Emitter::Ball { center, radius, .. } => {
                 let to = *center - self.si.lit_from.as_dvec3();
                 Some((to.as_vec3(), (to.length_squared() - radius * radius).max(0.0) as f32))
             }
@@ -117,7 +117,7 @@ impl Seen<'_> {
         let square = at.map(|w| 2.0 * w - 1.0);
         let place = match self.view.outline {
             Outline::Parallelogram => square,
-            Outline::Disk => crate::light::concentric(square.map(f64::from)).map(|w| w as f32),
+            Outline::Disk | Outline::Sphere => crate::light::concentric(square.map(f64::from)).map(|w| w as f32),
         };
         (self.counted(place), 1.0)
     }

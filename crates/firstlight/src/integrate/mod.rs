@@ -46,8 +46,7 @@ pub(crate) use mask::Masked;
 use rows::{MAX_HIDERS, Region};
 pub(crate) use tensor::sharpness;
 pub(crate) use tolerance::Tolerance;
-use view::Outline;
-pub(crate) use view::{Receiver, View};
+pub(crate) use view::{Outline, Receiver, View};
 
 use crate::material::Lobe;
 

@@ -68,7 +68,7 @@ impl Near {
         let [y, dy] = self.rows.at(f64::from(v));
         let (reach, area) = match self.outline {
             Outline::Parallelogram => (1.0, 4.0),
-            Outline::Disk => {
+            Outline::Disk | Outline::Sphere => {
                 let row = y + self.origin[1];
                 ((1.0 - row * row).max(0.0).sqrt(), std::f64::consts::PI)
             }

@@ -15,7 +15,7 @@ use super::batch::{Block, Members, ViewNumber};
 use super::fit::{Cell, MOMENTS, Polynomial};
 use super::occluder::{Breaks, FAR, Interval16, Occluder, Shadow, ways};
 use super::view::Outline;
-use crate::math::{LANES, Vec3x16};
+use crate::math::{LANES, Vec3x16, asin, sin_cos};
 
 /// Rows of a panel: the Kronrod rule of seven on [0, 1], spread.
 const ROWS: usize = 7;
@@ -171,6 +171,12 @@ fn breaks<S: Simd>(simd: S, blocked: &Blocked, members: &Members, cells: &[Cell]
         let (shadow, outside, within) = batch.shadow(simd, occluder);
         shadow.breaks(&mut Breaks { x, of: outside | within, rows });
     }
+    if blocked.outline == Outline::Sphere {
+        for row in rows.iter_mut() {
+            *row = asin(f32x16::simd_from(simd, *row)).to_array();
+        }
+        return;
+    }
     let all = x[0].simd_eq(x[0]);
     let mut breaks = Breaks { x, of: all, rows };
     breaks.line(&members.linear(simd, [CosC, CosX, CosY]));
@@ -232,10 +238,23 @@ pub(crate) fn rows<S: Simd>(
             }
         }
     }
+    let is_sphere = blocked.outline == Outline::Sphere;
+    // Where each row lies on the light's plane, and half of how long it is, if that differs
+    let (mut y_of, mut wide) = ([zero; ROWS], [one; ROWS]);
+    for (row, [place, ..]) in SPREAD.into_iter().enumerate() {
+        y_of[row] = (to - from) * place + from;
+        if is_sphere {
+            (y_of[row], wide[row]) = sin_cos(y_of[row]);
+        }
+    }
+    let [west, east] = if is_sphere { [sin_cos(x0).0, sin_cos(x1).0] } else { [x0, x1] };
     // What of each row is above the horizon, and in the light
-    let mut open = [Interval16 { from: x0, to: x1 }; ROWS];
-    for (all, [place, ..]) in open.iter_mut().zip(SPREAD) {
-        let y = (to - from) * place + from;
+    let mut open = [Interval16 { from: west, to: east }; ROWS];
+    for (row, all) in open.iter_mut().enumerate() {
+        let y = y_of[row];
+        if is_sphere {
+            *all = Interval16 { from: west * wide[row], to: east * wide[row] };
+        }
         all.clip(y * cos.y + cos.c, cos.x);
         all.clip(y * horizon.y + horizon.c, horizon.x);
         if blocked.outline == Outline::Disk {
@@ -250,8 +269,7 @@ pub(crate) fn rows<S: Simd>(
     for occluder in batch.occluders() {
         let (shadow, outside, within) = batch.shadow(simd, occluder);
         let (some_outside, some_within) = (outside.any_true(), within.any_true());
-        for (row, [place, ..]) in SPREAD.into_iter().enumerate() {
-            let y = (to - from) * place + from;
+        for (row, y) in y_of.into_iter().enumerate() {
             if some_within {
                 let (all, inside) = (&mut open[row], shadow.within(simd, y));
                 all.from = within.select(all.from.max(inside.from), all.from);
@@ -278,7 +296,7 @@ pub(crate) fn rows<S: Simd>(
     let mut coarse = [zero; MOMENTS];
     let mut seen = zero;
     let inverse = 1.0 / xh;
-    for ((all, hidden), [place, weight, inner]) in open.iter().zip(&hidden).zip(SPREAD) {
+    for (row_of, ((all, hidden), [place, weight, inner])) in open.iter().zip(&hidden).zip(SPREAD).enumerate() {
         let y = (to - from) * place + from;
         // Sum the antiderivative over the ends of what is left
         let v = (y - ym) / yh;
@@ -298,9 +316,13 @@ pub(crate) fn rows<S: Simd>(
                 None => (all.to, begin),
             };
             let is_there = begin.simd_lt(end);
+            let (mut first, mut last) = (begin, end);
+            if is_sphere {
+                (first, last) = (asin(begin / wide[row_of]), asin(end / wide[row_of]));
+            }
             // On nothing, both ends are the same
-            let from = ((begin - xm) * inverse).max(-one).min(one);
-            let to = is_there.select(((end - xm) * inverse).max(-one).min(one), from);
+            let from = ((first - xm) * inverse).max(-one).min(one);
+            let to = is_there.select(((last - xm) * inverse).max(-one).min(one), from);
             for moment in 0..moments {
                 let row = &row[moment];
                 sums[moment] += antiderivative(row, to) - antiderivative(row, from);

@@ -245,15 +245,19 @@ struct Spread {
 impl Spread {
     fn new(view: &View) -> Spread {
         let y = view.origin[1];
-        Spread { outline: view.outline, y, t: if view.outline == Outline::Disk { parameter_of_disk(y) } else { y } }
+        Spread {
+            outline: view.outline,
+            y,
+            t: if view.outline != Outline::Parallelogram { parameter_of_disk(y) } else { y },
+        }
     }
 
     /// The parameter of row `y`.
     fn parameter(&self, y: f32) -> f32 {
         match self.outline {
             Outline::Parallelogram => y,
-            Outline::Disk if self.t == 0.0 => parameter_of_disk(y),
-            Outline::Disk => {
+            Outline::Disk | Outline::Sphere if self.t == 0.0 => parameter_of_disk(y),
+            Outline::Disk | Outline::Sphere => {
                 let (low, high) = (-1.0 - self.t, 1.0 - self.t);
                 if y <= -1.0 - self.y {
                     return low;
@@ -361,7 +365,7 @@ fn sixteen_rows_now<S: Simd>(simd: S, lit: &Lit, rows: &Rows) -> [[f32; LANES]; 
     // The rows, and how densely they lie
     let (y, [from, to], density) = match view.outline {
         Outline::Parallelogram => (t_rows, view.x.map(splat), half),
-        Outline::Disk => {
+        Outline::Disk | Outline::Sphere => {
             let spread = Spread::new(view);
             let y = t_rows * (spread.straight() - t_rows * spread.bent() - t_rows * t_rows) * 0.5;
             let t = t_rows + spread.t;

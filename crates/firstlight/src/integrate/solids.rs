@@ -72,7 +72,7 @@ impl Between {
         let (distance, n) = if distance < 0.0 { (-distance, -n) } else { (distance, n) };
         let heights = match emitter {
             // All of it, not what stands for it
-            Emitter::Ball { center, radius } => {
+            Emitter::Ball { center, radius, .. } => {
                 let middle = n.dot(*center - asker.si.lit_from.as_dvec3());
                 [middle - radius, middle + radius]
             }

@@ -67,7 +67,7 @@ pub(crate) fn order(view: &View, region: &Region) -> Option<usize> {
     let far = if distance2 > 0.0 { distance2.sqrt() / size } else { 0.0 };
     let table = match view.outline {
         Outline::Parallelogram => &FAR_ENOUGH,
-        Outline::Disk => &FAR_ENOUGH_DISK,
+        Outline::Disk | Outline::Sphere => &FAR_ENOUGH_DISK,
     };
     let by_distance = table.iter().position(|least| far >= *least)?;
     let sharp = sharpness(view) * (size * size) / distance2;
@@ -113,7 +113,7 @@ fn integrate_now<S: Simd>(simd: S, view: &View, region: &Region, wanted: Wanted,
         let (x, y) = match view.outline {
             Outline::Parallelogram => (x * x_half + x_middle, y * y_half + y_middle),
             // Rows of the whole disk
-            Outline::Disk => {
+            Outline::Disk | Outline::Sphere => {
                 let yy = y * y;
                 let inside = 1.0 - yy;
                 let reach = inside * (4.0 - yy).sqrt() * 0.5;

@@ -256,3 +256,113 @@ fn batches_agree_with_rows_asked_one_by_one() {
     // As a rule they are far better than that
     assert!(over * 100 < cases.len() as u32, "{over} of {}", cases.len());
 }
+
+/// A light that is a ball, above a point at the origin, and spheres between them.
+struct BallCase {
+    center: DVec3,
+    radius: f64,
+    physical: bool,
+    both_sides: bool,
+    point: ShadingPoint,
+    lobe: Lobe,
+    spheres: Vec<Sphere>,
+}
+
+impl BallCase {
+    fn new(seed: u64) -> BallCase {
+        let mut random = Random::new(seed);
+        let distance = random.between(1.0, 6.0);
+        let center = random.direction() * distance;
+        let radius = distance * random.scale(0.05, 0.95);
+        let to = center / distance;
+        let mut ns = to + random.direction() * 1.2;
+        if ns.dot(to) < -radius / distance {
+            ns = -ns;
+        }
+        let ns = ns.normalize().as_vec3();
+        let wo = random.direction().as_vec3();
+        let wo = if wo.dot(ns) < 0.0 { -wo } else { wo };
+        let lobe = match (random.unit() * 2.0) as u32 {
+            0 => Lobe::None,
+            _ => Lobe::Phong(PhongLobe::new(random.scale(1.0, 40.0).round() as f32)),
+        };
+        let mut spheres = Vec::new();
+        for _ in 0..(seed % 3) {
+            let c = center * random.between(0.1, 1.0) + random.direction() * random.unit();
+            let r = random.scale(0.05, 0.6);
+            let is_between = c.length() > r * 1.01 && (center - c).length() > (radius + r) * 1.01;
+            if is_between && c.dot(ns.as_dvec3()) > -r {
+                spheres.push(Sphere { c, r, uv: SphereUv::Angles, single_sided: false });
+            }
+        }
+        let worth = [Rgb::gray(0.5), Rgb::gray(0.5)];
+        let point = ShadingPoint { worth, ..ShadingPoint::new(Vec3::ZERO, ErrorBound(Vec3::ZERO), ns, wo) };
+        let (physical, both_sides) = (random.unit() < 0.3, random.unit() < 0.5);
+        BallCase { center, radius, physical, both_sides, point, lobe, spheres }
+    }
+
+    /// The mean over `n` x 2 `n` points of the sphere, in f64.
+    fn brute(&self, n: usize) -> Sums {
+        let (ns, wo) = (self.point.ns.as_dvec3(), self.point.wo.as_dvec3());
+        let (mut diffuse, mut specular) = (0.0, 0.0);
+        for (i, j) in (0..n).flat_map(|i| (0..2 * n).map(move |j| (i, j))) {
+            let z = (2 * i + 1) as f64 / n as f64 - 1.0;
+            let (sin, cos) = pxfm::f_sincos(std::f64::consts::PI * j as f64 / n as f64);
+            let across = (1.0 - z * z).sqrt();
+            let out = DVec3::new(across * cos, across * sin, z);
+            let l = self.center + out * self.radius;
+            let (height, facing, distance) = (ns.dot(l), -out.dot(l), l.length());
+            if height <= 0.0 || facing <= 0.0 && !self.both_sides || self.spheres.iter().any(|s| is_hidden(s, l)) {
+                continue;
+            }
+            let mut weight = 1.0 / (2 * n * n) as f64;
+            if self.physical {
+                let area = 4.0 * std::f64::consts::PI * self.radius * self.radius;
+                weight *= area * facing.abs() / (distance * distance * distance);
+            }
+            let [cos_i, cos_o, cos_io] = [height / distance, ns.dot(wo), wo.dot(l) / distance].map(|v| v as f32);
+            diffuse += weight * f64::from(cos_i);
+            specular += weight * f64::from(self.lobe.eval(cos_i, cos_o, cos_io));
+        }
+        Sums { diffuse: diffuse as f32, specular: specular as f32 }
+    }
+
+    fn batched(&self, steps: &DisplaySteps) -> Sums {
+        let tolerance = Tolerance::DEFAULT;
+        let BallCase { center, radius, physical, both_sides, .. } = *self;
+        let asked = Asked {
+            emitter: &Emitter::Ball { center, radius, physical, both_sides },
+            obstacles: &Obstacles::of_spheres(&self.spheres),
+            lobe: &self.lobe,
+            steps,
+            tolerance: &tolerance,
+            allowed: tolerance.point,
+            least: steps.value_of(tolerance.point),
+            shadows: true,
+        };
+        let mut arrived = Vec::new();
+        Evaluator::default().evaluate(Level::new(), &asked, &[self.point], &mut arrived);
+        assert_ne!(arrived[0].illumination, Illumination::Unknown);
+        arrived[0].sums
+    }
+}
+
+/// Whether a sphere is in the way from the origin to `l`.
+fn is_hidden(sphere: &Sphere, l: DVec3) -> bool {
+    let t = (sphere.c.dot(l) / l.length_squared()).clamp(0.0, 1.0);
+    (l * t - sphere.c).length() < sphere.r
+}
+
+#[test]
+fn batches_know_spheres_of_any_kind() {
+    let steps = DisplaySteps::new(&Display::default());
+    for seed in 7000..7300 {
+        let case = BallCase::new(seed);
+        let (found, truth) = (case.batched(&steps), case.brute(300));
+        let value = Rgb::gray(0.5 * (truth.diffuse + truth.specular));
+        let error = 0.5 * ((found.diffuse - truth.diffuse).abs() + (found.specular - truth.specular).abs());
+        let off: f32 = steps.of_color(value, Rgb::gray(error));
+        let what = (case.physical, case.both_sides, case.radius / case.center.length(), case.spheres.len());
+        assert!(off < 0.4, "seed {seed}, {what:?}: {found:?} is not {truth:?}: {off} steps");
+    }
+}

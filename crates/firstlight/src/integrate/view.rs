@@ -1,5 +1,9 @@
 //! A flat light, and how one point sees it.
 
+use std::f32::consts::{FRAC_PI_2, PI};
+
+use pxfm::f_sincos;
+
 use crate::light::way_error;
 use crate::material::Lobe;
 use crate::math::{DVec3, ErrorBound, UNIT_ROUNDOFF, Vec3};
@@ -11,6 +15,9 @@ pub(crate) enum Outline {
     Parallelogram,
     /// x^2 + y^2 <= 1.
     Disk,
+    /// The same, as the part of a sphere that a point sees: not the places of its disk count alike, but those of the
+    /// sphere. Integrated over longitude and latitude, the poles in the plane of the disk: x = cos y' sin x', y = sin y'.
+    Sphere,
 }
 
 /// A flat light: the points c + x a + y b.
@@ -25,7 +32,7 @@ pub(crate) struct FlatLight {
     /// Unit normal of the front.
     pub n: Vec3,
     /// `a`, `b` and `n` as they were given.
-    deep: [DVec3; 3],
+    pub(super) deep: [DVec3; 3],
     /// The length of `a`, and `a` as a unit vector.
     pub la: f32,
     pub ua: Vec3,
@@ -38,6 +45,12 @@ pub(crate) struct FlatLight {
     pub physical: bool,
     /// Whether the side behind emits as well.
     pub both_sides: bool,
+    /// How many times it is there.
+    pub times: f32,
+    /// Of a [`Outline::Sphere`]: its radius over the distance of its middle; and, if the part of it that is turned away
+    /// counts as well, the square of the way to where it is touched, else 0.
+    pub ratio: f32,
+    pub behind2: f32,
 }
 
 impl FlatLight {
@@ -60,6 +73,9 @@ impl FlatLight {
             outline,
             physical,
             both_sides,
+            times: 1.0,
+            ratio: 0.0,
+            behind2: 0.0,
         }
     }
 }
@@ -139,6 +155,9 @@ pub(crate) struct View {
     pub outline: Outline,
     /// What dx dy is multiplied with: an area (physical), or a share of the whole.
     pub measure: f32,
+    /// See [`FlatLight::ratio`].
+    pub ratio: f32,
+    pub behind2: f32,
 }
 
 impl View {
@@ -150,7 +169,8 @@ impl View {
         horizon.c -= at.horizon.abs().dot(way_error(light.c.as_vec3(), light.a.abs() + light.b.abs(), at.p, at.error));
         let area = match light.outline {
             Outline::Parallelogram => 4.0,
-            Outline::Disk => std::f32::consts::PI,
+            Outline::Disk => PI,
+            Outline::Sphere => 4.0 * PI,
         };
         let view = View {
             is_near: false,
@@ -176,7 +196,9 @@ impl View {
             lobe: at.lobe,
             physical: light.physical,
             outline: light.outline,
-            measure: if light.physical { light.la * light.lb } else { 1.0 / area },
+            measure: light.times * if light.physical { light.la * light.lb } else { 1.0 / area },
+            ratio: light.ratio,
+            behind2: light.behind2,
         };
         if view.nearest() < NEAR * view.la.max(view.lb) { view.near(light, at) } else { view }
     }
@@ -193,7 +215,7 @@ impl View {
         let x = place(-(middle.dot(ua) + y * skew) / a.length());
         let [x, y] = match light.outline {
             Outline::Parallelogram => [x, y],
-            Outline::Disk => {
+            Outline::Disk | Outline::Sphere => {
                 let outside = (x * x + y * y).sqrt().max(1.0);
                 [place(x / outside), place(y / outside)]
             }
@@ -221,6 +243,27 @@ impl View {
             out: linear(at.wo),
             ..self
         }
+    }
+
+    /// From where to where the coordinates go by which the light is cut into cells.
+    pub fn whole(&self) -> [[f32; 2]; 2] {
+        match self.outline {
+            Outline::Parallelogram | Outline::Disk => [self.x, self.y],
+            Outline::Sphere => [[-FRAC_PI_2, FRAC_PI_2]; 2],
+        }
+    }
+
+    /// A box of the light's square around a cell.
+    pub fn around(&self, [x, y]: [[f32; 2]; 2]) -> [[f32; 2]; 2] {
+        if self.outline != Outline::Sphere {
+            return [x, y];
+        }
+        let [west, east] = x.map(|x| f_sincos(f64::from(x)).0 as f32);
+        let [(south, first), (north, last)] = y.map(|y| f_sincos(f64::from(y)));
+        let least = first.min(last) as f32;
+        let most = if y[0] < 0.0 && y[1] > 0.0 { 1.0 } else { first.max(last) as f32 };
+        let wide = |w: f32, is_more: bool| w * if is_more { most } else { least };
+        [[wide(west, west < 0.0), wide(east, east > 0.0)], [south as f32, north as f32]]
     }
 
     /// The corners of the light's square, around.

@@ -10,6 +10,7 @@ mod pow;
 mod ray;
 mod roots;
 mod sum;
+mod trig;
 
 pub(crate) use arc::Arc;
 pub(crate) use frame::Frame;
@@ -20,6 +21,7 @@ pub(crate) use ray::{DRay, ErrorBound, Facet, Ray};
 pub use ray::{ShadowRay, WorldRay};
 pub(crate) use roots::{bracketed, depressed_cubic};
 pub(crate) use sum::{LANES, LaneSum};
+pub(crate) use trig::{asin, sin_cos};
 
 pub use glam::{DAffine3, DMat3, DQuat, DVec3, Vec2, Vec3};
 

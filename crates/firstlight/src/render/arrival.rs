@@ -14,7 +14,10 @@ use super::sampled::Sampled;
 use super::together::Together;
 use crate::color::{DisplaySteps, Rgb};
 use crate::ids::LightId;
-use crate::integrate::{Asker, Between, Emitter, Masked, Receiver, Sums, View, integrate, unshadowed};
+use crate::integrate::{
+    Arrived, Asked, Asker, Between, Emitter, Evaluator, Illumination, Masked, Obstacles, Outline, Receiver,
+    ShadingPoint, Sums, Tolerance, View, integrate, unshadowed,
+};
 use crate::light::{Area, AreaShape, Light, LightKind, LightTree};
 use crate::material::{Bsdf, Lobe};
 use crate::math::dispatch_wide;
@@ -80,7 +83,7 @@ pub(crate) enum Seen {
 }
 
 /// What all tiles share: the lights as they are integrated, and how errors show.
-pub(crate) struct Lights {
+pub(crate) struct Lights<'a> {
     /// For each light, if it is integrated.
     pub emitters: Vec<Option<Emitter>>,
     pub steps: DisplaySteps,
@@ -92,6 +95,12 @@ pub(crate) struct Lights {
     targets: Vec<Target>,
     /// The points of those that are integrated.
     ladders: Vec<Ladder>,
+    /// What may stand in the way of those in closed form, where that is not too much.
+    obstacles: Vec<Option<Obstacles<'a>>>,
+    /// In display steps: how far one light may be wrong at a point that stands for a pixel; and the value that many
+    /// steps above black.
+    allowed: f32,
+    least: f32,
 }
 
 /// Parts of a pixel smaller than this are judged as if they were as large.
@@ -102,8 +111,8 @@ const TOLERANCE: f32 = 0.1;
 const BY_CHANCE: f32 = 0.2;
 const LEAST_SHARE_BY_CHANCE: f32 = 1.0 / 16.0;
 
-impl Lights {
-    pub fn new(scene: &Scene) -> Lights {
+impl<'a> Lights<'a> {
+    pub fn new(scene: &'a Scene) -> Lights<'a> {
         let emitter = |light: &Light| match &light.kind {
             LightKind::Area(area) if light.exact => Some(Emitter::new(area)),
             _ => None,
@@ -113,15 +122,39 @@ impl Lights {
         let targets = Target::of_all(scene);
         let ladders = emitters.iter().map(|_| Ladder::default()).collect();
         let tree = (scene.lights.len() > FEW).then(|| LightTree::new(&scene.lights));
-        Lights { emitters, steps: DisplaySteps::new(&scene.display), tolerance, tree, targets, ladders }
+        let is_integrated = |index: usize| emitters[index].is_some();
+        let obstacles = (0..scene.lights.len())
+            .map(|index| is_integrated(index).then(|| Obstacles::new(scene, index)).flatten())
+            .collect();
+        let steps = DisplaySteps::new(&scene.display);
+        let allowed = Tolerance::DEFAULT.point / (scene.lights.len().max(1) as f32).sqrt();
+        let least = steps.value_of(allowed);
+        Lights { emitters, steps, tolerance, tree, targets, ladders, obstacles, allowed, least }
+    }
+
+    /// Light `index` as batches ask for it, with one highlight, with or without what stands in its way; `None` if that
+    /// is not known in closed form.
+    pub fn asked<'b>(&'b self, index: usize, lobe: &'b Lobe, shadows: bool) -> Option<Asked<'b>> {
+        Some(Asked {
+            emitter: self.emitters[index].as_ref()?,
+            obstacles: self.obstacles[index].as_ref()?,
+            lobe,
+            steps: &self.steps,
+            tolerance: &Tolerance::DEFAULT,
+            allowed: self.allowed,
+            least: self.least,
+            shadows,
+        })
     }
 }
 
 /// The lights, as one thread asks for them.
 pub(crate) struct Arrivals<'a> {
     pub(super) scene: &'a Scene,
-    lights: &'a Lights,
+    pub(super) lights: &'a Lights<'a>,
     level: Level,
+    evaluator: Evaluator,
+    arrived: Vec<Arrived>,
     /// Of lights that are sampled.
     settler: Settler,
     pub(super) occluders: Occluders,
@@ -139,11 +172,13 @@ const NARROW: f32 = 1.0 / 6.0;
 const LEAVES: usize = 12;
 
 impl<'a> Arrivals<'a> {
-    pub fn new(scene: &'a Scene, lights: &'a Lights, level: Level) -> Self {
+    pub fn new(scene: &'a Scene, lights: &'a Lights<'a>, level: Level) -> Self {
         Arrivals {
             scene,
             lights,
             level,
+            evaluator: Evaluator::default(),
+            arrived: Vec::new(),
             settler: Settler::default(),
             occluders: Occluders::default(),
             views: Vec::new(),
@@ -264,15 +299,15 @@ impl<'a> Arrivals<'a> {
         let (scene, si) = (self.scene, place.si);
         let light = &scene.lights[index];
         let Some(view) = self.view(emitter, place) else {
-            let seen = match emitter {
-                Emitter::Points => Seen::Behind(None),
-                Emitter::Flat(_) | Emitter::Ball { .. } => Seen::Known(Sums::default()),
-            };
+            let seen = if emitter.surrounds(si.lit_from) { Seen::Behind(None) } else { Seen::Known(Sums::default()) };
             return (unseen(emitter, place), seen);
         };
         if !view.arrives() {
             counts.settled.visibility[Visibility::BelowHorizon as usize] += 1;
             return (horizon_change(&view, place), Seen::Known(Sums::default()));
+        }
+        if view.outline == Outline::Sphere {
+            return self.look_in_lanes(index, &view, place, counts);
         }
         let between = if light.shadows && si.receives_shadow && !place.lit {
             self.between(index, emitter, &view, place)
@@ -294,6 +329,82 @@ impl<'a> Arrivals<'a> {
         let enough = self.enough(place);
         let (whole, _) = dispatch_wide!(self.level, simd => integrate(simd, &view, hiders, &enough));
         (change, if behind { Seen::Behind(Some(whole)) } else { Seen::Known(whole) })
+    }
+
+    /// The same of a light that only batches know.
+    fn look_in_lanes(
+        &mut self,
+        index: usize,
+        view: &View,
+        place: &ArrivalPlace,
+        counts: &mut Counts,
+    ) -> (Change, Seen) {
+        let (scene, si) = (self.scene, place.si);
+        let shadows = scene.lights[index].shadows && si.receives_shadow && !place.lit;
+        let Some(arrived) = self.in_lanes(index, place, shadows) else { return (Change::UNKNOWN, Seen::Behind(None)) };
+        let hidden = arrived.illumination == Illumination::Hidden;
+        let trees = shadows && !hidden && !place.clear && self.gather(index, place) && self.occluders.count() > 0;
+        let behind = trees || arrived.illumination == Illumination::Unknown;
+        let ask = behind || arrived.illumination == Illumination::Partial;
+        let drift = if behind { f32::INFINITY } else { arrived.motion };
+        let between = Between { hidden, ask, drift, ..Between::default() };
+        let change = change(view, place, &between, scene.camera.sway(si.lit_from, place.reach));
+        let visibility = match arrived.illumination {
+            _ if behind => Visibility::Mask,
+            Illumination::Below => Visibility::BelowHorizon,
+            Illumination::Hidden => Visibility::Hidden,
+            _ => Visibility::Lit,
+        };
+        if arrived.illumination == Illumination::Partial && !behind {
+            counts.closed_form += 1;
+        } else {
+            counts.settled.visibility[visibility as usize] += 1;
+        }
+        (change, if behind { Seen::Behind(self.whole(index, place)) } else { Seen::Known(arrived.sums) })
+    }
+
+    /// What a batch of one knows of light `index`, if it is known in closed form at all.
+    fn in_lanes(&mut self, index: usize, place: &ArrivalPlace, shadows: bool) -> Option<Arrived> {
+        let asked = self.lights.asked(index, place.lobe, shadows)?;
+        let point = ShadingPoint {
+            p: place.si.lit_from,
+            error: place.si.error,
+            horizon: place.si.horizon,
+            ns: place.si.ns,
+            wo: place.si.wo,
+            reach: place.reach,
+            turn: place.turn,
+            worth: place.colors,
+            base: place.base,
+            share: place.share,
+        };
+        self.arrived.clear();
+        self.evaluator.evaluate(self.level, &asked, &[point], &mut self.arrived);
+        self.arrived.first().copied()
+    }
+
+    /// Adds to `arrived` what arrives of a light at many points.
+    pub fn evaluate(&mut self, asked: &Asked, points: &[ShadingPoint], arrived: &mut Vec<Arrived>) {
+        self.evaluator.evaluate(self.level, asked, points, arrived);
+    }
+
+    /// What light `index` would send to a place if nothing were in the way, if it is better to know that than to ask
+    /// points alone.
+    fn whole(&mut self, index: usize, place: &ArrivalPlace) -> Option<Sums> {
+        let emitter = self.lights.emitters[index].as_ref()?;
+        match self.view(emitter, place) {
+            None if emitter.surrounds(place.si.lit_from) => None,
+            None => Some(Sums::default()),
+            Some(view) if !view.arrives() => Some(Sums::default()),
+            Some(View { outline: Outline::Sphere, .. }) => {
+                let arrived = self.in_lanes(index, place, false)?;
+                (arrived.illumination != Illumination::Unknown).then_some(arrived.sums)
+            }
+            Some(view) => {
+                let enough = self.enough(place);
+                dispatch_wide!(self.level, simd => unshadowed(simd, &view, &enough))
+            }
+        }
     }
 
     /// Whether sums with such an error will do for one light at a place.
@@ -327,11 +438,8 @@ impl<'a> Arrivals<'a> {
 
     /// What light `index` would send to a place if nothing were in the way, with all colours; black where that is not
     /// known in closed form.
-    pub fn unshadowed(&self, index: usize, place: &ArrivalPlace) -> Rgb {
-        let Some(emitter) = &self.lights.emitters[index] else { return Rgb::BLACK };
-        let Some(view) = self.view(emitter, place).filter(View::arrives) else { return Rgb::BLACK };
-        let enough = self.enough(place);
-        let sums = dispatch_wide!(self.level, simd => unshadowed(simd, &view, &enough)).unwrap_or_default();
+    pub fn unshadowed(&mut self, index: usize, place: &ArrivalPlace) -> Rgb {
+        let sums = self.whole(index, place).unwrap_or_default();
         place.colors[0] * sums.diffuse + place.colors[1] * sums.specular
     }
 
@@ -380,14 +488,8 @@ impl<'a> Arrivals<'a> {
         counts: &mut Counts,
     ) {
         match &self.lights.emitters[index] {
-            Some(emitter) => {
-                let enough = self.enough(place);
-                let whole = match self.view(emitter, place) {
-                    Some(seen) if !seen.arrives() => Some(Sums::default()),
-                    Some(seen) => dispatch_wide!(self.level, simd => unshadowed(simd, &seen, &enough)),
-                    None if matches!(emitter, Emitter::Points) => None,
-                    None => Some(Sums::default()),
-                };
+            Some(_) => {
+                let whole = self.whole(index, place);
                 together.behind(self, place, whole, view);
             }
             // One ray tells
@@ -485,14 +587,16 @@ impl<'a> Arrivals<'a> {
         let asked = Cell::new(0);
         let masked = Masked { scene: self.scene, light: index, emitter, si, lobe, between: &between, asked: &asked };
         let enough = self.enough(place);
+        let is_round = matches!(emitter, Emitter::Ball { physical, both_sides, .. } if !physical || *both_sides);
         let sums = match self.view(emitter, place) {
+            None if !emitter.surrounds(si.lit_from) => Sums::default(),
             Some(view) if !view.arrives() => Sums::default(),
+            _ if is_round => masked.by_points(light, &enough),
+            None => Sums::default(),
             Some(view) => {
                 let (whole, _) = dispatch_wide!(self.level, simd => integrate(simd, &view, &[], &enough));
                 masked.by_cells(&view, &whole, &enough)
             }
-            None if matches!(emitter, Emitter::Points) => masked.by_points(light, &enough),
-            None => Sums::default(),
         };
         counts.points += asked.get();
         sums

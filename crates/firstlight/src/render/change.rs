@@ -92,10 +92,10 @@ pub(super) fn is_sharp(lobe: f32) -> bool {
 pub(super) fn unseen(emitter: &Emitter, place: &ArrivalPlace) -> Change {
     let is_known = match emitter {
         Emitter::Flat(_) => true,
-        Emitter::Ball { center, radius } => {
+        Emitter::Ball { both_sides: true, .. } => false,
+        Emitter::Ball { center, radius, .. } => {
             (*center - place.si.lit_from.as_dvec3()).length() + f64::from(place.reach) < radius * (1.0 - 1e-6)
         }
-        Emitter::Points => false,
     };
     if is_known || place.reach == 0.0 {
         Change { drift: f32::INFINITY, resolved: false, smooth: false, ..Change::NONE }

@@ -3,12 +3,12 @@
 use std::ops::ControlFlow;
 
 use super::Counts;
-use super::arrival::{ArrivalPlace, Arrivals, Lights};
+use super::arrival::{ArrivalPlace, Arrivals};
 use super::change::Arrival;
 use super::tiled::BEND;
 use crate::color::Rgb;
 use crate::ids::{LightId, MaterialId, SurfaceId};
-use crate::integrate::{Arrived, Asked, Evaluator, Illumination, Obstacles, ShadingPoint, Sums, Tolerance};
+use crate::integrate::{Arrived, Illumination, ShadingPoint, Sums};
 use crate::light::LightKind;
 use crate::material::{Bsdf, Lobe};
 use crate::math::{Facet, Vec2};
@@ -78,33 +78,10 @@ pub(crate) struct Answer {
     pub turn: f32,
 }
 
-/// The lights of a scene as batches ask for them; see [`Lights`].
-pub(crate) struct BatchLights<'a> {
-    obstacles: Vec<Option<Obstacles<'a>>>,
-    tolerance: Tolerance,
-    allowed: f32,
-    least: f32,
-}
-
-impl<'a> BatchLights<'a> {
-    pub fn new(scene: &'a Scene, lights: &Lights) -> Self {
-        let closed = |index: usize| lights.emitters[index].as_ref().is_some_and(|emitter| emitter.is_closed());
-        let obstacles = (0..scene.lights.len())
-            .map(|index| closed(index).then(|| Obstacles::new(scene, index)).flatten())
-            .collect();
-        let tolerance = Tolerance::DEFAULT;
-        let allowed = tolerance.point / (scene.lights.len().max(1) as f32).sqrt();
-        BatchLights { obstacles, tolerance, allowed, least: lights.steps.value_of(allowed) }
-    }
-}
-
 /// Asks for light.
 pub(crate) struct LightQueue<'a> {
     scene: &'a Scene,
-    lights: &'a Lights,
-    batch: &'a BatchLights<'a>,
     pub arrivals: Arrivals<'a>,
-    pub evaluator: Evaluator,
     lobes: Vec<Lobe>,
     /// Requests in the order in which they are asked: those of one light, one highlight, with or without shadows.
     groups: Vec<Vec<u32>>,
@@ -113,18 +90,8 @@ pub(crate) struct LightQueue<'a> {
 }
 
 impl<'a> LightQueue<'a> {
-    pub fn new(scene: &'a Scene, lights: &'a Lights, batch: &'a BatchLights<'a>, arrivals: Arrivals<'a>) -> Self {
-        LightQueue {
-            scene,
-            lights,
-            batch,
-            arrivals,
-            evaluator: Evaluator::default(),
-            lobes: Vec::new(),
-            groups: Vec::new(),
-            points: Vec::new(),
-            arrived: Vec::new(),
-        }
+    pub fn new(scene: &'a Scene, arrivals: Arrivals<'a>) -> Self {
+        LightQueue { scene, arrivals, lobes: Vec::new(), groups: Vec::new(), points: Vec::new(), arrived: Vec::new() }
     }
 
     /// Answers each request.
@@ -165,18 +132,9 @@ impl<'a> LightQueue<'a> {
             let light = group / 2 % scene.lights.len();
             let lobe = self.lobes[group / 2 / scene.lights.len()];
             let members = std::mem::take(&mut self.groups[group]);
-            match (&self.lights.emitters[light], &self.batch.obstacles[light]) {
-                (Some(emitter), Some(obstacles)) => {
-                    let asked = Asked {
-                        emitter,
-                        obstacles,
-                        lobe: &lobe,
-                        steps: &self.lights.steps,
-                        tolerance: &self.batch.tolerance,
-                        allowed: self.batch.allowed,
-                        least: self.batch.least,
-                        shadows: scene.lights[light].shadows && group % 2 == 1,
-                    };
+            match self.arrivals.lights.asked(light, &lobe, scene.lights[light].shadows && group % 2 == 1) {
+                Some(asked) => {
+                    let emitter = asked.emitter;
                     self.points.clear();
                     let scale = self.arrivals.scale(light);
                     self.points.extend(members.iter().map(|k| {
@@ -188,7 +146,7 @@ impl<'a> LightQueue<'a> {
                         }
                     }));
                     self.arrived.clear();
-                    self.evaluator.evaluate(self.arrivals.level(), &asked, &self.points, &mut self.arrived);
+                    self.arrivals.evaluate(&asked, &self.points, &mut self.arrived);
                     for (i, k) in members.iter().enumerate() {
                         let place = &places[requests[*k as usize].place as usize];
                         let arrived = self.arrived[i];
@@ -218,7 +176,7 @@ impl<'a> LightQueue<'a> {
                         };
                     }
                 }
-                _ => {
+                None => {
                     for k in &members {
                         go_on()?;
                         let place = &places[requests[*k as usize].place as usize];
@@ -255,7 +213,7 @@ impl<'a> LightQueue<'a> {
         // A light of one point sets in at once where it passes the horizon
         let kind = &self.scene.lights[light];
         let ShadingPoint { p, ns, horizon, reach, turn, .. } = place.point;
-        let is_sampled = matches!(kind.kind, LightKind::Area(_)) && self.lights.emitters[light].is_none();
+        let is_sampled = matches!(kind.kind, LightKind::Area(_)) && self.arrivals.lights.emitters[light].is_none();
         let is_kinked = !matches!(kind.kind, LightKind::Area(_)) && {
             let to = kind.towards(0, p).l;
             ns.dot(to).min(horizon.dot(to)).abs() < reach + turn * to.length()

@@ -63,7 +63,7 @@ pub(crate) use counts::Counts;
 use film::FilmTile;
 use hits::PixelHits;
 use lanes::Lanes;
-use light_queue::{BatchLights, LightQueue};
+use light_queue::LightQueue;
 use many::FEW;
 use pixel::{Lighting, PixelSum};
 use plain::Plain;
@@ -244,7 +244,6 @@ pub fn render(
     let nothing = Counts::default().stats(simd, threads);
     let result = Mutex::new((Film::new([scene.width, scene.height], window, settings.heat), nothing));
     let lights = Lights::new(scene);
-    let batch = BatchLights::new(scene, &lights);
     // Where every light is sampled at every ray, the bits are those of the plain renderer
     let every_ray =
         settings.samples_all() || settings.aa_mode == AaMode::Full && lights.emitters.iter().all(Option::is_none);
@@ -280,9 +279,8 @@ pub fn render(
             if by_cells {
                 // Their memory goes from tile to tile
                 let used = spare.lock().expect("no thread panics while it holds a renderer").pop();
-                let mut cells = used.unwrap_or_else(|| {
-                    Cells::new(scene, settings.aa_mode, LightQueue::new(scene, &lights, &batch, arrivals))
-                });
+                let mut cells =
+                    used.unwrap_or_else(|| Cells::new(scene, settings.aa_mode, LightQueue::new(scene, arrivals)));
                 let rendered = cells.render(tile, &go_on);
                 spare.lock().expect("no thread panics while it holds a renderer").push(cells);
                 rendered

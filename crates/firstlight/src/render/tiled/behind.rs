@@ -10,7 +10,7 @@ use crate::ids::LightId;
 use crate::integrate::Sums;
 use crate::render::Counts;
 use crate::render::arrival::{ArrivalPlace, Arrivals};
-use crate::render::patch::{Member, PixelPatches, Rays};
+use crate::render::patch::{Member, Patch, PixelPatches, Rays};
 use crate::render::tile::Tile;
 use crate::render::together::{Outcome, Together};
 use crate::visibility::{View, Viewpoint, Visibility};
@@ -129,21 +129,24 @@ impl Tiled<'_> {
     }
 
     /// What lights other than one send to each ray of a patch, at least, as far as that is known by now.
-    pub(super) fn others(&self, index: usize, k: usize, light: usize) -> Rgb {
+    pub(super) fn others(&mut self, index: usize, k: usize, light: usize) -> Rgb {
         let scene = self.scene;
-        let patch = &self.pixels[index].patches[k];
+        let Patch { si, bsdf, .. } = self.pixels[index].patches[k];
+        let rays = self.pixels[index].patches[k].count(scene) as f32;
         let mut others = Rgb::BLACK;
         for other in (0..scene.lights.len()).filter(|other| *other != light) {
-            let whole = || self.arrivals.unshadowed(other, &self.arrivals.place(other, &patch.si, &patch.bsdf));
-            others += match self.outlook(index, k, other) {
-                Outlook::Settled([diffuse, specular]) => (diffuse + specular) * (1.0 / patch.count(scene) as f32),
-                Outlook::Lit => whole(),
-                Outlook::Unknown => match self.share_seen(index, other) {
-                    share if share > 0.0 => whole() * share,
-                    _ => Rgb::BLACK,
-                },
-                Outlook::Clear | Outlook::Dark | Outlook::Parted => Rgb::BLACK,
+            let share = match self.outlook(index, k, other) {
+                Outlook::Settled([diffuse, specular]) => {
+                    others += (diffuse + specular) * (1.0 / rays);
+                    continue;
+                }
+                Outlook::Lit => 1.0,
+                Outlook::Unknown => self.share_seen(index, other),
+                Outlook::Clear | Outlook::Dark | Outlook::Parted => 0.0,
             };
+            if share > 0.0 {
+                others += self.arrivals.unshadowed(other, &self.arrivals.place(other, &si, &bsdf)) * share;
+            }
         }
         others
     }

@@ -412,12 +412,12 @@ impl Tiled<'_> {
     }
 
     /// How many display steps an error makes of what a light sends to a pixel.
-    fn steps_of(&self, at: [u32; 2], light: usize, sums: &Sums, error: &Sums) -> f32 {
-        let Some(patch) = self.whole(at) else { return f32::INFINITY };
+    fn steps_of(&mut self, at: [u32; 2], light: usize, sums: &Sums, error: &Sums) -> f32 {
+        let Some(bsdf) = self.whole(at).map(|patch| patch.bsdf) else { return f32::INFINITY };
         let scale = self.arrivals.scale(light);
-        let color = |sums: &Sums| scale * (patch.bsdf.diffuse * sums.diffuse + patch.bsdf.specular * sums.specular);
+        let color = |sums: &Sums| scale * (bsdf.diffuse * sums.diffuse + bsdf.specular * sums.specular);
         let others = self.others(self.index(at), 0, light);
-        let value: Rgb = self.scene.ambient * patch.bsdf.ambient + others + color(sums);
+        let value: Rgb = self.scene.ambient * bsdf.ambient + others + color(sums);
         self.arrivals.steps(value, color(error))
     }
 }
