@@ -245,7 +245,7 @@ pub(crate) fn classify<S: Simd>(
         if asked == 0 {
             break;
         }
-        let told = match (occluder, exact) {
+        let mut told = match (occluder, exact) {
             (Occluder::Sphere { center, radius }, ExactShape::Sphere(sphere)) => {
                 sphere_between(simd, &sight, center.seen_from(simd, sight.p), *radius, sphere, occluder, points, asked)
             }
@@ -257,6 +257,11 @@ pub(crate) fn classify<S: Simd>(
         };
         if (told.outside | told.within | told.hidden | told.moving) & asked == 0 {
             continue;
+        }
+        let touch = Touch::of(emitter, exact);
+        if touch == Touch::Holds {
+            told.hidden |= told.outside;
+            (told.outside, told.within) = (0, 0);
         }
         let motion = told.motion.to_array();
         for (k, class) in classes.iter_mut().enumerate().take(points.len()) {
@@ -277,7 +282,7 @@ pub(crate) fn classify<S: Simd>(
             class.between.outside |= (told.outside >> k & 1) << i;
             class.between.within |= (told.within >> k & 1) << i;
             let is_cut = (told.outside | told.within) >> k & 1 == 1;
-            class.other |= is_cut && cuts_ball(emitter, exact);
+            class.other |= is_cut && touch == Touch::Cuts;
         }
     }
     for (class, point) in classes.iter_mut().zip(points) {
@@ -297,13 +302,33 @@ pub(crate) fn classify<S: Simd>(
     classes
 }
 
-/// Whether something reaches into a light that is a ball: what of it is behind the light's surface does not show on the
-/// disk that stands for the light.
-fn cuts_ball(emitter: &Emitter, exact: &ExactShape) -> bool {
-    let Emitter::Ball { center, radius, .. } = emitter else { return false };
-    match exact {
-        ExactShape::Sphere(sphere) => (*center - sphere.c).length() < radius + sphere.r,
-        ExactShape::Flat { flat, .. } => flat.distance(*center) < *radius,
+/// How something lies to a light that is a ball.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Touch {
+    Apart,
+    /// It reaches into it: what of it is behind the light's surface does not show on the disk that stands for the light.
+    Cuts,
+    /// The light is inside of it.
+    Holds,
+}
+
+impl Touch {
+    fn of(emitter: &Emitter, exact: &ExactShape) -> Touch {
+        let Emitter::Ball { center, radius, .. } = emitter else { return Touch::Apart };
+        match exact {
+            ExactShape::Sphere(sphere) => {
+                let distance = (*center - sphere.c).length();
+                if distance >= radius + sphere.r {
+                    Touch::Apart
+                } else if distance + radius <= sphere.r * (1.0 - 1e-9) {
+                    Touch::Holds
+                } else {
+                    Touch::Cuts
+                }
+            }
+            ExactShape::Flat { flat, .. } if flat.distance(*center) < *radius => Touch::Cuts,
+            ExactShape::Flat { .. } => Touch::Apart,
+        }
     }
 }
 

@@ -396,7 +396,7 @@ impl<'a> Arrivals<'a> {
             None if emitter.surrounds(place.si.lit_from) => None,
             None => Some(Sums::default()),
             Some(view) if !view.arrives() => Some(Sums::default()),
-            Some(View { outline: Outline::Sphere, .. }) => {
+            Some(_) if matches!(emitter, Emitter::Ball { .. }) && self.lights.obstacles[index].is_some() => {
                 let arrived = self.in_lanes(index, place, false)?;
                 (arrived.illumination != Illumination::Unknown).then_some(arrived.sums)
             }

@@ -58,6 +58,8 @@ const COARSE: f32 = 2.5;
 const MANY: usize = 1 << 10;
 const COARSER: f32 = 2.0;
 const MANY_OF_ALL: usize = MANY * SERIES;
+/// How many times as far off as is allowed the most points may be before cells are asked, which take far longer.
+const WORTH_CELLS: f32 = 2.0;
 /// The most points of a pixel.
 const MOST: usize = LAST * SERIES;
 
@@ -397,10 +399,14 @@ impl Together {
             if agree >= f64::from(wanted) * CLEAR {
                 asking.iter_mut().filter(|one| is_clear(one)).for_each(|one| one.settled = true);
             }
-            // Errors shrink as they do where an edge is: what the most will not settle, cells do
+            // Errors shrink as they do where an edge is: what the most will not settle by far, cells do
             let asked = to;
             let ratio = |next: usize| of_edge(next as f64) / of_edge(asked as f64);
-            if to == most || error * ratio(most) > allowed(most) {
+            if to == most {
+                return is_told;
+            }
+            let worth = if is_told { WORTH_CELLS } else { 1.0 };
+            if error * ratio(most) > allowed(most) * worth {
                 return false;
             }
             to *= growth;
