@@ -4,6 +4,8 @@
 //! it. With a radius it is a proof of the same for all places within it, and a bound on how far the outline of a shadow
 //! moves on the light from one of them to another.
 
+mod solid;
+
 use fearless_simd::{f32x16, prelude::*};
 
 use super::batch::{Linear16, Members, ShadingPoint, ViewNumber};
@@ -12,8 +14,9 @@ use super::occluder::{Exact, Occluder, Shadow, corners_from, ways};
 use super::panels::{Between, MAX_BETWEEN};
 use crate::ids::LightId;
 use crate::math::{LANES, Vec3x16};
-use crate::scene::Scene;
+use crate::scene::{Meets, Scene, Target};
 use crate::shape::{Disk, Parallelogram, PlaneSide, Sphere};
+use solid::{ConvexSolid, solid_between};
 
 /// All listed things that may stand in the way of one light.
 pub(crate) struct Obstacles<'a> {
@@ -22,6 +25,8 @@ pub(crate) struct Obstacles<'a> {
     exact: Vec<ExactShape<'a>>,
     /// The disk lights that block, which are not told row by row.
     disks: Vec<&'a Disk>,
+    /// Which placed things are among them.
+    placed: Vec<u32>,
 }
 
 /// What decides on which side a point is.
@@ -34,6 +39,7 @@ enum ExactShape<'a> {
         /// The same if the camera sees it: then nobody sees what is behind it.
         seen_side: PlaneSide,
     },
+    Solid(ConvexSolid<'a>),
 }
 
 /// The most obstacles of a light.
@@ -41,9 +47,10 @@ pub(crate) const MAX_OBSTACLES: usize = 64;
 
 impl<'a> Obstacles<'a> {
     /// Those of light `index`; `None` if they are too many.
-    pub fn new(scene: &'a Scene, index: usize) -> Option<Obstacles<'a>> {
+    pub fn new(scene: &'a Scene, index: usize, emitter: &Emitter) -> Option<Obstacles<'a>> {
         let id = LightId(index as u32);
-        let mut obstacles = Obstacles { occluders: Vec::new(), exact: Vec::new(), disks: Vec::new() };
+        let mut obstacles =
+            Obstacles { occluders: Vec::new(), exact: Vec::new(), disks: Vec::new(), placed: Vec::new() };
         if !scene.lights[index].shadows {
             return Some(obstacles);
         }
@@ -63,7 +70,37 @@ impl<'a> Obstacles<'a> {
         }
         let disks = scene.light_obstacles.disks.iter().filter(|(light, _)| *light != index);
         obstacles.disks.extend(disks.map(|(_, disk)| disk));
-        (obstacles.occluders.len() <= MAX_OBSTACLES).then_some(obstacles)
+        if obstacles.occluders.len() > MAX_OBSTACLES {
+            return None;
+        }
+        for (k, thing) in scene.geometry.placed.iter().enumerate() {
+            let Target::Solid(solid) = thing.target else { continue };
+            let casts = match thing.shadow {
+                Meets::All => true,
+                Meets::None => false,
+                Meets::Some => scene.geometry.casts(thing.surface, id),
+            };
+            if !casts || obstacles.occluders.len() == MAX_OBSTACLES {
+                continue;
+            }
+            let solid = &scene.geometry.solids[solid as usize];
+            if let Some((shape, occluder)) = ConvexSolid::new(thing, solid, emitter) {
+                obstacles.occluders.push(Occluder::Solid(occluder));
+                obstacles.exact.push(ExactShape::Solid(shape));
+                obstacles.placed.push(k as u32);
+            }
+        }
+        Some(obstacles)
+    }
+
+    /// Whether a placed thing is among them.
+    pub fn has_placed(&self, thing: u32) -> bool {
+        self.placed.binary_search(&thing).is_ok()
+    }
+
+    /// Whether any is.
+    pub fn has_solids(&self) -> bool {
+        !self.placed.is_empty()
     }
 }
 
@@ -76,6 +113,7 @@ impl<'a> Obstacles<'a> {
             occluders: spheres.iter().map(occluder).collect(),
             exact: spheres.iter().map(ExactShape::Sphere).collect(),
             disks: Vec::new(),
+            placed: Vec::new(),
         }
     }
 }
@@ -215,6 +253,39 @@ impl<S: Simd> Sight<S> {
         hidden
     }
 
+    /// Which of some points may see the ball of radius `r` around `s` between themselves and the light: from anywhere
+    /// within their reach, and from themselves.
+    #[inline(always)]
+    fn meets(&self, s: Vec3x16<S>, distance: f32x16<S>, r: f32, of: u64) -> [u64; 2] {
+        if of == 0 {
+            return [0; 2];
+        }
+        let simd = distance.token();
+        let zero = simd.splat_f32x16(0.0);
+        // The cone around the light, and its pyramid
+        let along = s.dot(self.axis);
+        let aside = (distance * distance - along * along).max(zero).sqrt();
+        let misses = (aside * self.cos - along * self.sin)
+            .simd_gt((self.reach + r) * 1.001 + (along.abs() + aside) * SLACK)
+            & self.sin.simd_lt(1.0);
+        let mut around = of & !misses.to_bitmask();
+        if around == 0 {
+            return [0; 2];
+        }
+        let mut gap = simd.splat_f32x16(f32::NEG_INFINITY);
+        for n in &self.sides {
+            gap = gap.max(n.dot(s));
+        }
+        let gap = gap - r;
+        let rounding = distance * SLACK;
+        // Behind the light's plane
+        let to_plane = self.normal.dot(self.ways[0]);
+        let beyond = (self.normal.dot(s) - to_plane)
+            * to_plane.simd_lt(zero).select(simd.splat_f32x16(-1.0), simd.splat_f32x16(1.0));
+        around &= gap.simd_le(rounding + self.reach).to_bitmask() & !beyond.simd_gt(self.reach + r).to_bitmask();
+        [around, around & gap.simd_le(rounding).to_bitmask() & !beyond.simd_gt(r).to_bitmask()]
+    }
+
     /// How far the outline of a shadow moves on the light that something casts which is `near` to the point.
     #[inline(always)]
     fn motion(&self, near: f32x16<S>) -> f32x16<S> {
@@ -253,9 +324,12 @@ pub(crate) fn classify<S: Simd>(
                 let corners = corners_from(simd, corners, sight.p);
                 flat_between(simd, &sight, corners, (flat, *side, *seen_side), occluder, points, asked)
             }
+            (Occluder::Solid(_), ExactShape::Solid(shape)) => {
+                solid_between(simd, &sight, shape, occluder, points, asked)
+            }
             _ => unreachable!("both lists hold the same things"),
         };
-        if (told.outside | told.within | told.hidden | told.moving) & asked == 0 {
+        if (told.outside | told.within | told.hidden | told.moving | told.other) & asked == 0 {
             continue;
         }
         let touch = Touch::of(emitter, exact);
@@ -279,6 +353,7 @@ pub(crate) fn classify<S: Simd>(
                 asked &= !(1 << k);
                 continue;
             }
+            class.other |= told.other >> k & 1 == 1;
             class.between.outside |= (told.outside >> k & 1) << i;
             class.between.within |= (told.within >> k & 1) << i;
             let is_cut = (told.outside | told.within) >> k & 1 == 1;
@@ -327,7 +402,7 @@ impl Touch {
                 }
             }
             ExactShape::Flat { flat, .. } if flat.distance(*center) < *radius => Touch::Cuts,
-            ExactShape::Flat { .. } => Touch::Apart,
+            ExactShape::Flat { .. } | ExactShape::Solid(_) => Touch::Apart,
         }
     }
 }
@@ -338,6 +413,8 @@ struct Told<S: Simd> {
     outside: u64,
     within: u64,
     hidden: u64,
+    /// It does what is not told row by row.
+    other: u64,
     /// It hides all from everywhere around the point.
     firm: u64,
     /// The outline of its shadow moves so far.
@@ -348,7 +425,7 @@ struct Told<S: Simd> {
 impl<S: Simd> Told<S> {
     #[inline(always)]
     fn nothing(zero: f32x16<S>) -> Self {
-        Told { outside: 0, within: 0, hidden: 0, firm: 0, moving: 0, motion: zero }
+        Told { outside: 0, within: 0, hidden: 0, other: 0, firm: 0, moving: 0, motion: zero }
     }
 }
 
@@ -416,33 +493,8 @@ fn sphere_between<S: Simd>(
         told.moving |= moving & !all_in;
         told.motion = simd.splat_f32x16(f32::INFINITY);
     }
-    // The cone around the light, and its pyramid
-    let mut near = outside & !below_all;
-    if near == 0 {
-        return told;
-    }
-    let along = s.dot(sight.axis);
-    let aside = (distance2 - along * along).max(zero).sqrt();
-    let misses = (aside * sight.cos - along * sight.sin)
-        .simd_gt((sight.reach + r) * 1.001 + (along.abs() + aside) * SLACK)
-        & sight.sin.simd_lt(1.0);
-    near &= !misses.to_bitmask();
-    if near == 0 {
-        return told;
-    }
-    let mut gap = simd.splat_f32x16(f32::NEG_INFINITY);
-    for n in &sight.sides {
-        gap = gap.max(n.dot(s));
-    }
-    let gap = gap - r;
-    let rounding = distance * SLACK;
-    near &= gap.simd_le(rounding + sight.reach).to_bitmask();
-    // Behind the light's plane
-    let to_plane = sight.normal.dot(sight.ways[0]);
-    let beyond = (sight.normal.dot(s) - to_plane)
-        * to_plane.simd_lt(zero).select(simd.splat_f32x16(-1.0), simd.splat_f32x16(1.0));
-    near &= !beyond.simd_gt(sight.reach + r).to_bitmask();
-    if near == 0 {
+    let [around, mut near] = sight.meets(s, distance, r, outside & !below_all);
+    if around == 0 {
         return told;
     }
     let toward = (distance - sight.reach).max(simd.splat_f32x16(r));
@@ -454,8 +506,8 @@ fn sphere_between<S: Simd>(
     } else {
         motion
     };
-    told.moving |= near & sight.reach.simd_gt(zero).to_bitmask();
-    near &= !below & gap.simd_le(rounding).to_bitmask() & !beyond.simd_gt(r).to_bitmask();
+    told.moving |= around & sight.reach.simd_gt(zero).to_bitmask();
+    near &= !below;
     if near == 0 {
         return told;
     }

@@ -18,6 +18,7 @@ mod emitter;
 mod evaluate;
 mod fit;
 mod hider;
+mod hull;
 mod lobe;
 mod mask;
 mod near;

@@ -9,7 +9,9 @@
 use fearless_simd::{f32x16, mask32x16, prelude::*};
 
 use super::batch::{Block, Linear16, Members, ViewNumber};
+use super::hull::{Hull, SolidOccluder};
 use crate::math::{DVec3, Vec3, Vec3x16};
+use crate::shape::Canonical;
 
 /// A vector of doubles as two of floats: the difference to a point loses nothing where the two are close.
 #[derive(Clone, Copy, Debug)]
@@ -43,6 +45,7 @@ pub(crate) enum Occluder {
     Flat {
         corners: [Exact; 4],
     },
+    Solid(SolidOccluder),
 }
 
 /// The ways to four corners from sixteen points.
@@ -64,6 +67,14 @@ pub(crate) const FAR: f32 = 1e30;
 const FLAT: f32 = 1e-30;
 
 impl<S: Simd> Interval16<S> {
+    /// The hull of two intervals, empty ones aside.
+    #[inline(always)]
+    pub fn join(&mut self, other: &Self) {
+        let is_there = other.from.simd_lt(other.to);
+        self.from = is_there.select(self.from.min(other.from), self.from);
+        self.to = is_there.select(self.to.max(other.to), self.to);
+    }
+
     #[inline(always)]
     pub fn all(simd: S) -> Self {
         Interval16 { from: simd.splat_f32x16(-FAR), to: simd.splat_f32x16(FAR) }
@@ -134,8 +145,21 @@ impl<S: Simd> Quadratic16<S> {
         }
     }
 
+    /// The square of what is linear over the light.
     #[inline(always)]
-    fn combined(self, k: f32x16<S>, o: Self, m: f32x16<S>) -> Self {
+    pub fn square(line: &Linear16<S>) -> Self {
+        Quadratic16 {
+            c: line.c * line.c,
+            x: line.c * line.x,
+            y: line.c * line.y,
+            xx: line.x * line.x,
+            xy: line.x * line.y,
+            yy: line.y * line.y,
+        }
+    }
+
+    #[inline(always)]
+    pub fn combined(self, k: f32x16<S>, o: Self, m: f32x16<S>) -> Self {
         Quadratic16 {
             c: self.c * k + o.c * m,
             x: self.x * k + o.x * m,
@@ -161,6 +185,23 @@ impl<S: Simd> Quadratic16<S> {
     #[inline(always)]
     pub fn at(&self, x: f32x16<S>, y: f32x16<S>) -> f32x16<S> {
         self.c + (x * self.x + y * self.y) * 2.0 + x * x * self.xx + x * y * self.xy * 2.0 + y * y * self.yy
+    }
+
+    /// What is inside of a cone on sixteen rows: where the quadratic is above 0 and `ahead` as well.
+    #[inline(always)]
+    pub fn cone_on_row(&self, simd: S, ahead: &Linear16<S>, y: f32x16<S>) -> Interval16<S> {
+        let (zero, far) = (simd.splat_f32x16(0.0), simd.splat_f32x16(FAR));
+        let Roots { low, high, any } = self.on_row(y);
+        // Between the roots, or beyond one of them
+        let is_between = self.xx.simd_lt(zero);
+        let is_ahead = ahead.x.simd_gt(zero);
+        let all = Interval16::all(simd);
+        let mut interval = Interval16 {
+            from: is_between.select(any.select(low, far), (any & is_ahead).select(high, all.from)),
+            to: is_between.select(any.select(high, -far), (any & !is_ahead).select(low, all.to)),
+        };
+        interval.clip(y * ahead.y + ahead.c, ahead.x);
+        interval
     }
 
     #[inline(always)]
@@ -216,6 +257,25 @@ impl<S: Simd> Breaks<'_, S> {
         }
     }
 
+    /// The corners of a flat thing, and where its sides cross those of a cell.
+    #[inline(always)]
+    pub fn polygon(&mut self, lines: &[Linear16<S>; 5]) {
+        let zero = lines[0].c.token().splat_f32x16(0.0);
+        for (i, p) in lines.iter().enumerate() {
+            for x in self.x {
+                let y = -(p.c + x * p.x) / p.y;
+                self.tell_if(y, is_inside(lines, x, y, [i, i]));
+            }
+        }
+        for (i, j) in [(0, 1), (0, 2), (0, 3), (0, 4), (1, 2), (2, 3), (3, 4), (4, 1)] {
+            let (p, q) = (&lines[i], &lines[j]);
+            let area = p.x * q.y - p.y * q.x;
+            let (x, y) = ((p.y * q.c - p.c * q.y) / area, (p.c * q.x - q.c * p.x) / area);
+            let is_beside = x.simd_ge(self.x[0]) & x.simd_le(self.x[1]);
+            self.tell_if(y, !area.simd_eq(zero) & is_beside & is_inside(lines, x, y, [i, j]));
+        }
+    }
+
     /// Where a line crosses the sides of a cell.
     #[inline(always)]
     pub fn line(&mut self, line: &Linear16<S>) {
@@ -239,7 +299,28 @@ pub(crate) enum Shadow<S: Simd> {
         inside: Quadratic16<S>,
     },
     /// Of a flat thing: above 0 on all of these lines. The first is that of its plane.
-    Edges { lines: [Linear16<S>; 5] },
+    Edges {
+        lines: [Linear16<S>; 5],
+    },
+    Hull(Hull<S>),
+}
+
+/// What has to be 0 or more on a light for a flat thing with these corners, around, to be in the way: behind its plane,
+/// inside of all its sides.
+#[inline(always)]
+pub(crate) fn edges<S: Simd>(q: [Vec3x16<S>; 4], l: &[Vec3x16<S>; 3]) -> [Linear16<S>; 5] {
+    let simd = q[0].x.token();
+    let zero = simd.splat_f32x16(0.0);
+    // The plane: l has to pass it. The sides turn with it
+    let n = (q[1] - q[0]).cross(q[3] - q[0]);
+    let distance = n.dot(q[0]);
+    let sign = distance.simd_lt(zero).select(simd.splat_f32x16(-1.0), simd.splat_f32x16(1.0));
+    let mut lines = [Linear16::along(n * sign, l); 5];
+    lines[0].c -= distance.abs();
+    for i in 0..4 {
+        lines[i + 1] = Linear16::along(q[i].cross(q[(i + 1) % 4]) * sign, l);
+    }
+    lines
 }
 
 /// Whether a place is inside of all lines but two, or nearly so.
@@ -268,7 +349,14 @@ impl<S: Simd> Shadow<S> {
     pub fn new(simd: S, occluder: &Occluder, p: Vec3x16<S>, l: &[Vec3x16<S>; 3]) -> Shadow<S> {
         match occluder {
             Occluder::Sphere { center, radius } => Shadow::cone(simd, center.seen_from(simd, p), *radius, l),
-            Occluder::Flat { corners } => Shadow::edges(corners_from(simd, corners, p), l),
+            Occluder::Flat { corners } => Shadow::Edges { lines: edges(corners_from(simd, corners, p), l) },
+            Occluder::Solid(solid) => {
+                let (to, l) = solid.seen_from(simd, p, l);
+                match solid.kind {
+                    Canonical::Ball => Shadow::cone(simd, to, 1.0, &l),
+                    kind => Shadow::Hull(Hull::new(kind, to, &l)),
+                }
+            }
         }
     }
 
@@ -280,14 +368,7 @@ impl<S: Simd> Shadow<S> {
         let ahead = Linear16 { c: s.dot(l[0]), x: s.dot(l[1]), y: s.dot(l[2]) };
         // r^2 |l|^2 - |l x s|^2 is (r^2 - |s|^2) |l|^2 + (l.s)^2, which is small by itself where the point is close
         let power = simd.splat_f32x16(r2) - s.dot(s);
-        let squared = Quadratic16 {
-            c: ahead.c * ahead.c,
-            x: ahead.c * ahead.x,
-            y: ahead.c * ahead.y,
-            xx: ahead.x * ahead.x,
-            xy: ahead.x * ahead.y,
-            yy: ahead.y * ahead.y,
-        };
+        let squared = Quadratic16::square(&ahead);
         let (one, minus) = (simd.splat_f32x16(1.0), simd.splat_f32x16(-1.0));
         let near = ll.combined(power, squared, one);
         let far = ll.combined(simd.splat_f32x16(r2), Quadratic16::dot(cross, cross), minus);
@@ -317,26 +398,11 @@ impl<S: Simd> Shadow<S> {
         Shadow::Cone { quadratic, ahead, cut, inside }
     }
 
-    #[inline(always)]
-    fn edges(q: [Vec3x16<S>; 4], l: &[Vec3x16<S>; 3]) -> Shadow<S> {
-        let simd = q[0].x.token();
-        let zero = simd.splat_f32x16(0.0);
-        // The plane: l has to pass it. The sides turn with it
-        let n = (q[1] - q[0]).cross(q[3] - q[0]);
-        let distance = n.dot(q[0]);
-        let sign = distance.simd_lt(zero).select(simd.splat_f32x16(-1.0), simd.splat_f32x16(1.0));
-        let mut lines = [Linear16::along(n * sign, l); 5];
-        lines[0].c -= distance.abs();
-        for i in 0..4 {
-            lines[i + 1] = Linear16::along(q[i].cross(q[(i + 1) % 4]) * sign, l);
-        }
-        Shadow::Edges { lines }
-    }
-
     /// What is hidden of sixteen rows, seen from outside.
     #[inline(always)]
     pub fn hidden(&self, simd: S, y: f32x16<S>) -> Interval16<S> {
         match self {
+            Shadow::Hull(hull) => hull.hidden(simd, y),
             Shadow::Edges { lines } => {
                 let mut interval = Interval16::all(simd);
                 for line in lines {
@@ -345,17 +411,8 @@ impl<S: Simd> Shadow<S> {
                 interval
             }
             Shadow::Cone { quadratic, ahead, cut, .. } => {
-                let (zero, far) = (simd.splat_f32x16(0.0), simd.splat_f32x16(FAR));
-                let Roots { low, high, any } = quadratic.on_row(y);
-                // Between the roots, or beyond one of them
-                let is_between = quadratic.xx.simd_lt(zero);
-                let is_ahead = ahead.x.simd_gt(zero);
-                let all = Interval16::all(simd);
-                let mut interval = Interval16 {
-                    from: is_between.select(any.select(low, far), (any & is_ahead).select(high, all.from)),
-                    to: is_between.select(any.select(high, -far), (any & !is_ahead).select(low, all.to)),
-                };
-                interval.clip(y * ahead.y + ahead.c, ahead.x);
+                let far = simd.splat_f32x16(FAR);
+                let interval = quadratic.cone_on_row(simd, ahead, y);
                 let Some(([before, inside], cuts)) = cut else { return interval };
                 // Without what is behind the light, and with what is inside the sphere: together they are convex again
                 let b = before.on_row(y);
@@ -377,7 +434,7 @@ impl<S: Simd> Shadow<S> {
     pub fn within(&self, simd: S, y: f32x16<S>) -> Interval16<S> {
         let far = simd.splat_f32x16(FAR);
         match self {
-            Shadow::Edges { .. } => Interval16::all(simd),
+            Shadow::Edges { .. } | Shadow::Hull(_) => Interval16::all(simd),
             Shadow::Cone { inside, .. } => {
                 let i = inside.on_row(y);
                 Interval16 { from: i.any.select(i.low, far), to: i.any.select(i.high, -far) }
@@ -397,6 +454,7 @@ impl<S: Simd> Shadow<S> {
                 }
                 all
             }
+            Shadow::Hull(hull) => hull.hides(x, y),
             Shadow::Cone { quadratic, ahead, cut, .. } => {
                 let on_line = quadratic.at(x, y).simd_ge(zero) & ahead.at(x, y).simd_gt(zero);
                 match cut {
@@ -423,7 +481,7 @@ impl<S: Simd> Shadow<S> {
     pub fn holds(&self, x: f32x16<S>, y: f32x16<S>) -> mask32x16<S> {
         let zero = x.token().splat_f32x16(0.0);
         match self {
-            Shadow::Edges { .. } => x.simd_lt(x),
+            Shadow::Edges { .. } | Shadow::Hull(_) => x.simd_lt(x),
             Shadow::Cone { inside, .. } => inside.at(x, y).simd_gt(zero),
         }
     }
@@ -439,22 +497,8 @@ impl<S: Simd> Shadow<S> {
                     breaks.quadratic(inside, *cuts);
                 }
             }
-            Shadow::Edges { lines } => {
-                let zero = lines[0].c.token().splat_f32x16(0.0);
-                for (i, p) in lines.iter().enumerate() {
-                    for x in breaks.x {
-                        let y = -(p.c + x * p.x) / p.y;
-                        breaks.tell_if(y, is_inside(lines, x, y, [i, i]));
-                    }
-                }
-                for (i, j) in [(0, 1), (0, 2), (0, 3), (0, 4), (1, 2), (2, 3), (3, 4), (4, 1)] {
-                    let (p, q) = (&lines[i], &lines[j]);
-                    let area = p.x * q.y - p.y * q.x;
-                    let (x, y) = ((p.y * q.c - p.c * q.y) / area, (p.c * q.x - q.c * p.x) / area);
-                    let is_beside = x.simd_ge(breaks.x[0]) & x.simd_le(breaks.x[1]);
-                    breaks.tell_if(y, !area.simd_eq(zero) & is_beside & is_inside(lines, x, y, [i, j]));
-                }
-            }
+            Shadow::Edges { lines } => breaks.polygon(lines),
+            Shadow::Hull(hull) => hull.breaks(breaks),
         }
     }
 }

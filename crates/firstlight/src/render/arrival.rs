@@ -122,14 +122,19 @@ impl<'a> Lights<'a> {
         let targets = Target::of_all(scene);
         let ladders = emitters.iter().map(|_| Ladder::default()).collect();
         let tree = (scene.lights.len() > FEW).then(|| LightTree::new(&scene.lights));
-        let is_integrated = |index: usize| emitters[index].is_some();
         let obstacles = (0..scene.lights.len())
-            .map(|index| is_integrated(index).then(|| Obstacles::new(scene, index)).flatten())
+            .map(|index| emitters[index].as_ref().and_then(|emitter| Obstacles::new(scene, index, emitter)))
             .collect();
         let steps = DisplaySteps::new(&scene.display);
         let allowed = Tolerance::DEFAULT.point / (scene.lights.len().max(1) as f32).sqrt();
         let least = steps.value_of(allowed);
         Lights { emitters, steps, tolerance, tree, targets, ladders, obstacles, allowed, least }
+    }
+
+    /// Whether all of these placed things are told row by row where they are in the way of light `index`.
+    fn know(&self, index: usize, placed: &[u32]) -> bool {
+        let knows = |obstacles: &Obstacles| placed.iter().all(|thing| obstacles.has_placed(*thing));
+        placed.is_empty() || self.obstacles[index].as_ref().is_some_and(knows)
     }
 
     /// Light `index` as batches ask for it, with one highlight, with or without what stands in its way; `None` if that
@@ -306,7 +311,7 @@ impl<'a> Arrivals<'a> {
             counts.settled.visibility[Visibility::BelowHorizon as usize] += 1;
             return (horizon_change(&view, place), Seen::Known(Sums::default()));
         }
-        if view.outline == Outline::Sphere {
+        if view.outline == Outline::Sphere || self.lights.obstacles[index].as_ref().is_some_and(Obstacles::has_solids) {
             return self.look_in_lanes(index, &view, place, counts);
         }
         let between = if light.shadows && si.receives_shadow && !place.lit {
@@ -343,7 +348,11 @@ impl<'a> Arrivals<'a> {
         let shadows = scene.lights[index].shadows && si.receives_shadow && !place.lit;
         let Some(arrived) = self.in_lanes(index, place, shadows) else { return (Change::UNKNOWN, Seen::Behind(None)) };
         let hidden = arrived.illumination == Illumination::Hidden;
-        let trees = shadows && !hidden && !place.clear && self.gather(index, place) && self.occluders.count() > 0;
+        let trees = shadows && !hidden && !place.clear && self.gather(index, place) && {
+            let Occluders { spheres, flats, leaves, others, too_many, .. } = &self.occluders;
+            let is_known = spheres.is_empty() && flats.is_empty() && leaves.is_empty() && !too_many;
+            !(is_known && self.lights.know(index, others))
+        };
         let behind = trees || arrived.illumination == Illumination::Unknown;
         let ask = behind || arrived.illumination == Illumination::Partial;
         let drift = if behind { f32::INFINITY } else { arrived.motion };
@@ -456,7 +465,8 @@ impl<'a> Arrivals<'a> {
         let occluders = &mut self.occluders;
         occluders.gather(self.level, self.scene, &self.lights.targets[index], points, &self.indices, 0);
         counts.settled.shafts += 1;
-        (occluders.has_trees(), occluders.count() == 0)
+        let is_known = self.lights.know(index, &occluders.others) && !occluders.has_meshes();
+        (occluders.has_trees() && !is_known, occluders.count() == 0)
     }
 
     /// Hears what of light `index` is seen from those `points` whose numbers are in `order`. `each` may take what is in
@@ -469,11 +479,14 @@ impl<'a> Arrivals<'a> {
         counts: &mut Counts,
         mut each: impl FnMut(usize, Visibility, &mut dyn FnMut() -> Option<ShadowView>),
     ) {
-        let (target, views) = (&self.lights.targets[index], &mut self.views);
+        let (lights, views) = (self.lights, &mut self.views);
+        let (target, listed) = (&lights.targets[index], self.scene.geometry.listed);
         let settled = &mut counts.settled;
         self.settler.settle(self.level, self.scene, target, points, order, settled, |k, visibility, view| {
             each(k, visibility, &mut || {
-                view.has_trees().then(|| std::mem::replace(view, views.pop().unwrap_or_default()))
+                let in_tree = !listed && !(view.spheres.is_empty() && view.flats.is_empty());
+                let is_known = !in_tree && !view.has_meshes() && lights.know(index, &view.others);
+                (!is_known).then(|| std::mem::replace(view, views.pop().unwrap_or_default()))
             });
         });
     }

@@ -445,6 +445,10 @@ impl<'a> Cells<'a> {
             most.diffuse = most.diffuse.max(answer.sums.diffuse);
             most.specular = most.specular.max(answer.sums.specular);
         }
+        // Between places that see nothing a light can come in
+        if most == Sums::default() && !answers.iter().all(|answer| answer.smooth) {
+            return false;
+        }
         let apart = Sums { diffuse: most.diffuse - least.diffuse, specular: most.specular - least.specular };
         let bsdf = &fragment.bsdf;
         let [diffuse, specular] = [scale * bsdf.diffuse, scale * bsdf.specular];

@@ -34,6 +34,8 @@ const BY_BEAMS: f32 = 1.9;
 const POINTS: f32 = 512.0;
 /// The effective part of them, none of which is hidden where nothing is.
 const CLEAR: f64 = 0.75;
+/// In display steps: what one point may send where none is hidden.
+const UNMET: f32 = 1.0;
 /// How much farther off the sums may be than two numbers of points tell: of many rays, and of one more, which can agree
 /// by chance.
 const DOUBT: [f32; 2] = [2.0, 4.0];
@@ -59,7 +61,7 @@ const MANY: usize = 1 << 10;
 const COARSER: f32 = 2.0;
 const MANY_OF_ALL: usize = MANY * SERIES;
 /// How many times as far off as is allowed the most points may be before cells are asked, which take far longer.
-const WORTH_CELLS: f32 = 2.0;
+const WORTH_CELLS: f32 = 1.7;
 /// The most points of a pixel.
 const MOST: usize = LAST * SERIES;
 
@@ -364,7 +366,10 @@ impl Together {
             let untold = [0, 1].map(|k| if effective[k] < least[k] { all[k] } else { Rgb::BLACK });
             let is_told = shows(untold[0] + untold[1]) <= tolerance * UNTOLD;
             let found = effective[0].max(effective[1]);
-            if is_told && is_known && hidden == 0 && (found >= f64::from(wanted) * CLEAR || to >= MANY) {
+            // What none of so many points meets may hide what one of them sends
+            let one = |k: usize| all[k] * (1.0 / effective[k].max(1.0) as f32);
+            let is_clear = found >= f64::from(wanted) * CLEAR && shows(one(0) + one(1)) <= UNMET;
+            if is_told && is_known && hidden == 0 && (is_clear || to >= MANY) {
                 return true;
             }
             // By how much the sum moved, or by as much as its parts would together if they moved by chance

@@ -85,6 +85,11 @@ impl Cuboid {
         Some([self.low, self.high])
     }
 
+    /// From the middle to the corner of all largest coordinates.
+    pub fn half(&self) -> DVec3 {
+        self.size * 0.5
+    }
+
     pub fn middle(&self) -> DVec3 {
         (self.low + self.high) * 0.5
     }

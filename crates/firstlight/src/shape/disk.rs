@@ -10,7 +10,7 @@ use super::placement::Placement;
 use super::solid::{Solid, SolidHit, SolidPoint, turn};
 use super::surface::UvEdge;
 use crate::context::CompileContext;
-use crate::math::{DRay, DVec3, ErrorBound, Frame, UNIT_ROUNDOFF, Vec3, Vec3x16};
+use crate::math::{DAffine3, DMat3, DRay, DVec3, ErrorBound, Frame, UNIT_ROUNDOFF, Vec3, Vec3x16};
 
 shape_table! {
     /// A flat disk, or a ring. u runs around it counterclockwise as seen from the front, v from 0 at the rim to 1 at
@@ -71,6 +71,13 @@ impl Disk {
     /// Its middle and its radius.
     pub fn ball(&self) -> (DVec3, f64) {
         (self.center, self.radius)
+    }
+
+    /// The map from the unit disk across z; `None` if it has a hole.
+    pub fn canonical(&self) -> Option<DAffine3> {
+        let Frame { x, y, z } = self.frame;
+        let axes = DMat3::from_cols(x * self.radius, y * self.radius, z * self.radius);
+        (self.inner == 0.0).then(|| DAffine3::from_mat3_translation(axes, self.center))
     }
 
     /// The disk that it is in the world; `None` if it has a hole, or is no disk there.

@@ -5,10 +5,10 @@ use std::f64::consts::PI;
 use glam::DVec2;
 
 use super::disk::ring_point;
-use super::solid::{Chord, SolidHit, SolidPoint, turn};
+use super::solid::{Canonical, Chord, SolidHit, SolidPoint, turn};
 use super::surface::UvEdge;
 use crate::context::{CompileContext, show};
-use crate::math::{DRay, DVec3, Frame};
+use crate::math::{DAffine3, DMat3, DRay, DVec3, Frame};
 
 /// A cylinder or a cone, ready to be hit.
 #[derive(Clone, Copy, Debug)]
@@ -181,6 +181,15 @@ impl Frustum {
             edges,
             terms,
         }
+    }
+
+    /// See [`Solid::canonical`](super::solid::Solid::canonical); `None` if its ends are open.
+    pub fn canonical(&self) -> Option<(DAffine3, Canonical)> {
+        let widest = self.radii[0].max(self.radii[1]);
+        let Frame { x, y, z } = self.frame;
+        let axes = DMat3::from_cols(x * widest, y * widest, z * self.height);
+        let radii = self.radii.map(|r| (r / widest) as f32);
+        self.capped.then(|| (DAffine3::from_mat3_translation(axes, self.p0), Canonical::Frustum(radii)))
     }
 
     pub fn bounds(&self) -> Option<[DVec3; 2]> {

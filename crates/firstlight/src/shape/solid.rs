@@ -9,7 +9,7 @@ use super::frustum::Frustum;
 use super::plane::Plane;
 use super::surface::UvEdge;
 use super::torus::Torus;
-use crate::math::{DRay, DVec3};
+use crate::math::{DAffine3, DMat3, DRay, DVec3, Frame};
 
 /// A shape, ready to be hit.
 #[derive(Clone, Copy, Debug)]
@@ -21,6 +21,41 @@ pub(crate) enum Solid {
     Frustum(Frustum),
     Torus(Torus),
     Ball(Ball),
+}
+
+/// What a convex solid is an affine image of.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Canonical {
+    /// z = 0.
+    Plane,
+    /// x^2 + y^2 <= 1, z = 0.
+    Disk,
+    /// All coordinates from -1 to 1.
+    Box,
+    /// x^2 + y^2 + z^2 <= 1.
+    Ball,
+    /// z from 0 to 1, with these radii at both ends.
+    Frustum([f32; 2]),
+}
+
+impl Canonical {
+    /// Whether a point is inside.
+    pub fn holds(&self, p: DVec3) -> bool {
+        match self {
+            Canonical::Plane | Canonical::Disk => false,
+            Canonical::Box => p.abs().max_element() < 1.0,
+            Canonical::Ball => p.length_squared() < 1.0,
+            Canonical::Frustum(radii) => {
+                let [first, last] = radii.map(f64::from);
+                p.z > 0.0 && p.z < 1.0 && p.truncate().length() < first + (last - first) * p.z
+            }
+        }
+    }
+
+    /// Whether it has no inside: its plane is z = 0.
+    pub fn is_flat(&self) -> bool {
+        matches!(self, Canonical::Plane | Canonical::Disk)
+    }
 }
 
 /// Where a ray meets a shape.
@@ -102,6 +137,27 @@ impl Solid {
     #[inline]
     pub fn point(&self, ray: &DRay, hit: &SolidHit) -> SolidPoint {
         each!(self, shape => shape.point(ray, hit))
+    }
+
+    /// What it is an image of, and by which map; `None` if it is not convex.
+    pub fn canonical(&self) -> Option<(DAffine3, Canonical)> {
+        let map = |x, y, z, to| DAffine3::from_mat3_translation(DMat3::from_cols(x, y, z), to);
+        match self {
+            Solid::Plane(plane) => {
+                let (at, n) = plane.place();
+                let Frame { x, y, z } = Frame::around(n);
+                Some((map(x, y, z, at), Canonical::Plane))
+            }
+            Solid::Disk(disk) => disk.canonical().map(|disk| (disk, Canonical::Disk)),
+            Solid::Cuboid(cuboid) => {
+                let half = cuboid.half();
+                let [x, y, z] = [DVec3::X * half.x, DVec3::Y * half.y, DVec3::Z * half.z];
+                Some((map(x, y, z, cuboid.middle()), Canonical::Box))
+            }
+            Solid::Frustum(frustum) => frustum.canonical(),
+            Solid::Ball(_) => Some((DAffine3::IDENTITY, Canonical::Ball)),
+            Solid::Torus(_) => None,
+        }
     }
 
     /// A point of an infinite plane, and its normal.

@@ -168,10 +168,14 @@ impl Occluders {
 
     /// Whether something in trees may be in the way.
     pub fn has_trees(&self) -> bool {
+        self.has_meshes() || !self.others.is_empty()
+    }
+
+    /// Whether something in trees may be that is neither a solid nor a point set.
+    pub fn has_meshes(&self) -> bool {
         let is_in_tree = |which: &Which| matches!(which, Which::InTree(_));
         self.too_many
             || !self.leaves.is_empty()
-            || !self.others.is_empty()
             || self.spheres.iter().any(is_in_tree)
             || self.flats.iter().any(|(which, _)| is_in_tree(which))
     }

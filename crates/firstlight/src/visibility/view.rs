@@ -57,9 +57,9 @@ impl View {
         self.trees = false;
     }
 
-    /// Whether something in trees may be in the way.
-    pub fn has_trees(&self) -> bool {
-        self.trees || !self.triangles.is_empty() || !self.others.is_empty()
+    /// Whether triangles may be in the way, or all trees have to be asked.
+    pub fn has_meshes(&self) -> bool {
+        self.trees || !self.triangles.is_empty()
     }
 
     /// What of a light is seen from `point`, past `occluders`, which were gathered for it. What is left to ask for the

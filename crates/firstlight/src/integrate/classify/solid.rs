@@ -1,0 +1,187 @@
+//! What a convex solid does to a light, for sixteen points.
+
+use fearless_simd::{f32x16, prelude::*};
+
+use super::{SLACK, Sight, Told};
+use crate::integrate::batch::ShadingPoint;
+use crate::integrate::emitter::Emitter;
+use crate::integrate::hull::SolidOccluder;
+use crate::integrate::occluder::{Exact, Occluder, Shadow};
+use crate::math::{DAffine3, DVec3, LANES, Vec3x16};
+use crate::scene::Placed;
+use crate::shape::{Canonical, Solid};
+
+/// A convex solid as it is placed.
+pub(super) struct ConvexSolid<'a> {
+    thing: &'a Placed,
+    solid: &'a Solid,
+    kind: Canonical,
+    canonical_from_world: DAffine3,
+    /// The box around it, if it has an end.
+    bounds: Option<[DVec3; 2]>,
+    /// Whether it may reach into the light.
+    pub touches: bool,
+}
+
+/// How far a point is from a box.
+fn distance([low, high]: &[DVec3; 2], p: DVec3) -> f64 {
+    (*low - p).max(p - *high).max(DVec3::ZERO).length()
+}
+
+impl<'a> ConvexSolid<'a> {
+    /// `None` if it is not convex.
+    pub fn new(thing: &'a Placed, solid: &'a Solid, emitter: &Emitter) -> Option<(ConvexSolid<'a>, SolidOccluder)> {
+        let (object_from_canonical, kind) = solid.canonical()?;
+        let world_from_canonical = thing.placement.world_from_object * object_from_canonical;
+        let bounds = solid.bounds().map(|bounds| thing.placement.bounds(bounds));
+        let canonical_from_world = world_from_canonical.inverse();
+        let mut made = ConvexSolid { thing, solid, kind, canonical_from_world, bounds, touches: false };
+        made.touches = made.may_touch(emitter);
+        Some((made, SolidOccluder::new(&world_from_canonical, kind)))
+    }
+
+    fn may_touch(&self, emitter: &Emitter) -> bool {
+        match emitter {
+            Emitter::Ball { center, radius, .. } => match &self.bounds {
+                Some(bounds) => distance(bounds, *center) < *radius,
+                None => self.height(*center).abs() < *radius,
+            },
+            // What is flat has no inside
+            Emitter::Flat(_) if self.kind.is_flat() => false,
+            Emitter::Flat(flat) => {
+                let Some([low, high]) = self.bounds else { return true };
+                let (a, b) = (flat.a.as_dvec3(), flat.b.as_dvec3());
+                let reach = a.abs() + b.abs();
+                let is_apart = (flat.c + reach).cmplt(low).any() || (flat.c - reach).cmpgt(high).any();
+                // All of it on one side of the light's plane
+                let n = flat.n.as_dvec3();
+                let plane = n.dot(flat.c);
+                !is_apart && self.reach(n) > plane && self.reach(-n) > -plane
+            }
+        }
+    }
+
+    /// How far it reaches in a direction.
+    fn reach(&self, n: DVec3) -> f64 {
+        let to_world = &self.thing.placement.world_from_object;
+        self.solid.support(to_world.matrix3.transpose() * n) + n.dot(to_world.translation)
+    }
+
+    /// How far a point is off the plane of a flat one, in metres.
+    fn height(&self, p: DVec3) -> f64 {
+        let row = self.canonical_from_world.matrix3.transpose().z_axis;
+        self.canonical_from_world.transform_point3(p).z / row.length()
+    }
+
+    /// Whether a point is on the plane of a flat one, as far as it can be told.
+    fn is_under(&self, point: &ShadingPoint) -> bool {
+        let row = self.canonical_from_world.matrix3.transpose().z_axis;
+        let p = point.p.as_dvec3();
+        let height = self.canonical_from_world.transform_point3(p).z;
+        let sizes = row.abs().dot(p.abs()) + self.canonical_from_world.translation.z.abs();
+        self.kind.is_flat() && height.abs() <= 2.0 * row.abs().dot(point.error.0.as_dvec3()) + 2e-7 * sizes
+    }
+}
+
+/// How a solid lies to a point that may see it in the way.
+enum Lies {
+    /// It hides nothing.
+    Aside,
+    /// It hides nothing from the point, but may from near it.
+    Near,
+    /// The point is inside.
+    Around,
+    Between,
+}
+
+impl ConvexSolid<'_> {
+    fn lies(&self, point: &ShadingPoint) -> Lies {
+        let p = point.p.as_dvec3();
+        let far = match &self.bounds {
+            Some([low, high]) => (*low - p).abs().max((*high - p).abs()).length(),
+            None => p.length(),
+        };
+        let room = f64::from(SLACK) * far;
+        let above = self.reach(point.horizon.as_dvec3()) - point.horizon.as_dvec3().dot(p);
+        let around = f64::from(point.reach) + f64::from(point.turn) * (far + f64::from(point.reach));
+        if above < -(room + around) || self.is_under(point) {
+            Lies::Aside
+        } else if above < -room {
+            Lies::Near
+        } else if above <= room {
+            // It touches the horizon: what the point is on, for one
+            Lies::Aside
+        } else if self.kind.holds(self.canonical_from_world.transform_point3(p)) {
+            Lies::Around
+        } else {
+            Lies::Between
+        }
+    }
+}
+
+/// Which of the points asked see some of the light past the solid, or nothing of it.
+#[inline(always)]
+pub(super) fn solid_between<S: Simd>(
+    simd: S,
+    sight: &Sight<S>,
+    shape: &ConvexSolid,
+    occluder: &Occluder,
+    points: &[ShadingPoint],
+    asked: u64,
+) -> Told<S> {
+    let zero = simd.splat_f32x16(0.0);
+    let mut told = Told::nothing(zero);
+    let (mut around, mut near) = (asked, asked);
+    if let Some([low, high]) = shape.bounds {
+        let s: Vec3x16<S> = Exact::new((low + high) * 0.5).seen_from(simd, sight.p);
+        [around, near] = sight.meets(s, s.dot(s).sqrt(), ((high - low).length() * 0.5) as f32, asked);
+    }
+    if around == 0 {
+        return told;
+    }
+    let mut distances = [0.0f32; LANES];
+    for (k, point) in points.iter().enumerate() {
+        let bit = 1 << k;
+        if around & bit == 0 {
+            continue;
+        }
+        match shape.lies(point) {
+            Lies::Aside => {
+                around &= !bit;
+                near &= !bit;
+            }
+            Lies::Near => near &= !bit,
+            Lies::Around => told.other |= bit,
+            Lies::Between => {
+                let p = point.p.as_dvec3();
+                let apart = shape.bounds.as_ref().map_or_else(|| shape.height(p).abs(), |bounds| distance(bounds, p));
+                distances[k] = (apart as f32 - point.reach).max(0.0);
+            }
+        }
+    }
+    near &= around;
+    if around == 0 {
+        return told;
+    }
+    let shadow = Shadow::new(simd, occluder, sight.p, &sight.ways);
+    if shape.kind == Canonical::Plane {
+        // From within reach no more of the light is beyond a plane than from the point, if that is farther off
+        let mut some = 0;
+        for [x, y] in sight.square() {
+            some |= shadow.hides(x, y).to_bitmask();
+        }
+        let close = f32x16::simd_from(simd, distances).simd_le(zero).to_bitmask();
+        near &= some;
+        around &= some | close;
+    }
+    told.moving = around & sight.reach.simd_gt(zero).to_bitmask();
+    told.motion = sight.motion(f32x16::simd_from(simd, distances));
+    if !shape.touches {
+        // It is convex: what hides all corners hides all
+        told.hidden = sight.hidden(&shadow, near);
+        told.firm = told.hidden & !told.moving;
+    }
+    told.other |= if shape.touches { near } else { 0 };
+    told.outside = near & !told.hidden;
+    told
+}

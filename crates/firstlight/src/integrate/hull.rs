@@ -1,0 +1,217 @@
+//! Convex solids in the way of a light, for sixteen points at once.
+//!
+//! A solid is seen in a space of its own, in which it is a unit box, ball, disk or a frustum about z: lines stay lines
+//! there, so that nothing else changes. What a point sees of it is the hull of a few flat things: of a box, three faces;
+//! of a frustum, its ends and the band between the two lines in which planes through the point touch its mantle.
+
+use fearless_simd::{f32x16, mask32x16, prelude::*};
+
+use super::batch::Linear16;
+use super::occluder::{Breaks, Exact, FAR, Interval16, Quadratic16, edges};
+use crate::math::{DAffine3, DVec3, Vec3, Vec3x16};
+use crate::shape::Canonical;
+
+/// A convex solid that may stand in the way.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct SolidOccluder {
+    /// Where its own space begins in the world, and the rows of the matrix that leads there.
+    center: Exact,
+    rows: [Vec3; 3],
+    pub kind: Canonical,
+}
+
+impl SolidOccluder {
+    pub fn new(world_from_canonical: &DAffine3, kind: Canonical) -> SolidOccluder {
+        let inverse = world_from_canonical.matrix3.inverse().transpose();
+        let rows = [inverse.x_axis, inverse.y_axis, inverse.z_axis].map(|row: DVec3| row.as_vec3());
+        SolidOccluder { center: Exact::new(world_from_canonical.translation), rows, kind }
+    }
+
+    #[inline(always)]
+    fn local<S: Simd>(&self, simd: S, v: Vec3x16<S>) -> Vec3x16<S> {
+        let [x, y, z] = &self.rows;
+        Vec3x16 {
+            x: Vec3x16::splat(simd, *x).dot(v),
+            y: Vec3x16::splat(simd, *y).dot(v),
+            z: Vec3x16::splat(simd, *z).dot(v),
+        }
+    }
+
+    /// The ways to its middle and those of the light in its own space, from `p`.
+    #[inline(always)]
+    pub fn seen_from<S: Simd>(&self, simd: S, p: Vec3x16<S>, l: &[Vec3x16<S>; 3]) -> (Vec3x16<S>, [Vec3x16<S>; 3]) {
+        let to = self.local(simd, self.center.seen_from(simd, p));
+        (to, [self.local(simd, l[0]), self.local(simd, l[1]), self.local(simd, l[2])])
+    }
+}
+
+/// A disk as sixteen points see it: inside of its cone, and behind its plane.
+#[derive(Clone, Copy)]
+pub(crate) struct Rim<S: Simd> {
+    quadratic: Quadratic16<S>,
+    ahead: Linear16<S>,
+    plane: Linear16<S>,
+}
+
+impl<S: Simd> Rim<S> {
+    /// Of a disk across z of radius `r`, `to` its middle.
+    #[inline(always)]
+    fn new(to: Vec3x16<S>, r: f32, l: &[Vec3x16<S>; 3]) -> Rim<S> {
+        let simd = to.x.token();
+        let zero = simd.splat_f32x16(0.0);
+        let sign = to.z.simd_lt(zero).select(simd.splat_f32x16(-1.0), simd.splat_f32x16(1.0));
+        // Where the plane is met, the way from the disk's middle is l D / l.z - to: all times l.z
+        let ahead = Linear16 { c: l[0].z * sign, x: l[1].z * sign, y: l[2].z * sign };
+        let mut across = [ahead; 2];
+        for (axis, line) in across.iter_mut().enumerate() {
+            let of = |v: &Vec3x16<S>| if axis == 0 { v.x } else { v.y };
+            let side = of(&to);
+            line.c = of(&l[0]) * to.z - l[0].z * side;
+            line.x = of(&l[1]) * to.z - l[1].z * side;
+            line.y = of(&l[2]) * to.z - l[2].z * side;
+        }
+        let one = simd.splat_f32x16(1.0);
+        let quadratic = Quadratic16::square(&ahead)
+            .combined(simd.splat_f32x16(r * r), Quadratic16::square(&across[0]), -one)
+            .combined(one, Quadratic16::square(&across[1]), -one);
+        let plane = Linear16 { c: ahead.c - to.z.abs(), ..ahead };
+        Rim { quadratic, ahead, plane }
+    }
+
+    #[inline(always)]
+    fn hidden(&self, simd: S, y: f32x16<S>) -> Interval16<S> {
+        let mut interval = self.quadratic.cone_on_row(simd, &self.ahead, y);
+        interval.clip(y * self.plane.y + self.plane.c, self.plane.x);
+        interval
+    }
+
+    #[inline(always)]
+    fn hides(&self, x: f32x16<S>, y: f32x16<S>) -> mask32x16<S> {
+        let zero = x.token().splat_f32x16(0.0);
+        self.quadratic.at(x, y).simd_ge(zero) & self.plane.at(x, y).simd_ge(zero)
+    }
+}
+
+/// The most faces and rims.
+const FACES: usize = 3;
+const RIMS: usize = 2;
+
+/// A convex solid as sixteen points see it from outside.
+#[derive(Clone, Copy)]
+pub(crate) struct Hull<S: Simd> {
+    faces: [[Linear16<S>; 5]; FACES],
+    rims: [Rim<S>; RIMS],
+    count: [usize; 2],
+}
+
+impl<S: Simd> Hull<S> {
+    /// `to` is the way to the middle of its own space, `l` are the light's in it. Not of a ball.
+    #[inline(always)]
+    pub fn new(kind: Canonical, to: Vec3x16<S>, l: &[Vec3x16<S>; 3]) -> Hull<S> {
+        let simd = to.x.token();
+        let (zero, one) = (simd.splat_f32x16(0.0), simd.splat_f32x16(1.0));
+        let nothing = Linear16 { c: zero, x: zero, y: zero };
+        let empty = Rim { quadratic: Quadratic16::square(&nothing), ahead: nothing, plane: nothing };
+        let mut hull = Hull { faces: [[nothing; 5]; FACES], rims: [empty; RIMS], count: [0; 2] };
+        match kind {
+            Canonical::Plane => {
+                let sign = to.z.simd_lt(zero).select(-one, one);
+                hull.faces[0][0] = Linear16 { c: l[0].z * sign - to.z.abs(), x: l[1].z * sign, y: l[2].z * sign };
+                hull.count = [1, 0];
+            }
+            Canonical::Disk => {
+                hull.rims[0] = Rim::new(to, 1.0, l);
+                hull.count = [0, 1];
+            }
+            Canonical::Box => {
+                // On each axis the face on the point's side; where it is beside both, either
+                let s = Vec3x16 {
+                    x: to.x.simd_gt(zero).select(-one, one),
+                    y: to.y.simd_gt(zero).select(-one, one),
+                    z: to.z.simd_gt(zero).select(-one, one),
+                };
+                let at = |x: f32x16<S>, y: f32x16<S>, z: f32x16<S>| Vec3x16 { x: to.x + x, y: to.y + y, z: to.z + z };
+                let x = [at(s.x, -one, -one), at(s.x, one, -one), at(s.x, one, one), at(s.x, -one, one)];
+                let y = [at(-one, s.y, -one), at(one, s.y, -one), at(one, s.y, one), at(-one, s.y, one)];
+                let z = [at(-one, -one, s.z), at(one, -one, s.z), at(one, one, s.z), at(-one, one, s.z)];
+                hull.faces = [edges(x, l), edges(y, l), edges(z, l)];
+                hull.count = [3, 0];
+            }
+            Canonical::Frustum([first, last]) => {
+                let top = Vec3x16 { z: to.z + one, ..to };
+                hull.rims = [Rim::new(to, first, l), Rim::new(top, last, l)];
+                hull.count = [1, 2];
+                // Across the axis, in a frame that leads to the point: planes through it touch the mantle where it is
+                // as far out as the mantle is wide at its height
+                let wide = to.z * (first - last) + first;
+                let distance2 = to.x * to.x + to.y * to.y;
+                let touches = distance2.simd_gt(wide * wide);
+                let inverse = 1.0 / touches.select(distance2, one).sqrt();
+                let cos = touches.select(wide * inverse, zero);
+                let sin = (1.0 - cos * cos).max(zero).sqrt();
+                let (ux, uy) = (-to.x * inverse, -to.y * inverse);
+                let out = [(ux * cos - uy * sin, uy * cos + ux * sin), (ux * cos + uy * sin, uy * cos - ux * sin)];
+                let on = |(x, y): (f32x16<S>, f32x16<S>), r: f32, z: f32x16<S>| Vec3x16 {
+                    x: to.x + x * r,
+                    y: to.y + y * r,
+                    z: to.z + z,
+                };
+                let corners =
+                    [on(out[0], first, zero), on(out[1], first, zero), on(out[1], last, one), on(out[0], last, one)];
+                hull.faces[0] = edges(corners, l);
+                // No such planes: only an end is seen
+                hull.faces[0][0].c = touches.select(hull.faces[0][0].c, simd.splat_f32x16(-FAR));
+            }
+            Canonical::Ball => unreachable!("a ball is a cone"),
+        }
+        hull
+    }
+
+    /// What is hidden of sixteen rows.
+    #[inline(always)]
+    pub fn hidden(&self, simd: S, y: f32x16<S>) -> Interval16<S> {
+        let far = simd.splat_f32x16(FAR);
+        let mut all = Interval16 { from: far, to: -far };
+        for face in &self.faces[..self.count[0]] {
+            let mut interval = Interval16::all(simd);
+            for line in face {
+                interval.clip(y * line.y + line.c, line.x);
+            }
+            all.join(&interval);
+        }
+        for rim in &self.rims[..self.count[1]] {
+            all.join(&rim.hidden(simd, y));
+        }
+        all
+    }
+
+    /// Whether a place of the light is hidden.
+    #[inline(always)]
+    pub fn hides(&self, x: f32x16<S>, y: f32x16<S>) -> mask32x16<S> {
+        let zero = x.token().splat_f32x16(0.0);
+        let mut any = x.simd_lt(x);
+        for face in &self.faces[..self.count[0]] {
+            let mut all = x.simd_eq(x);
+            for line in face {
+                all &= line.at(x, y).simd_ge(zero);
+            }
+            any |= all;
+        }
+        for rim in &self.rims[..self.count[1]] {
+            any |= rim.hides(x, y);
+        }
+        any
+    }
+
+    /// See [`Shadow::breaks`](super::occluder::Shadow::breaks).
+    #[inline(always)]
+    pub fn breaks(&self, breaks: &mut Breaks<S>) {
+        for face in &self.faces[..self.count[0]] {
+            breaks.polygon(face);
+        }
+        for rim in &self.rims[..self.count[1]] {
+            breaks.quadratic(&rim.quadratic, breaks.of);
+            breaks.line(&rim.plane);
+        }
+    }
+}
