@@ -182,6 +182,12 @@ impl<S: Simd> Linear16<S> {
         Linear16 { c: v.dot(l[0]), x: v.dot(l[1]), y: v.dot(l[2]) }
     }
 
+    /// `factor` times it, and `more`.
+    #[inline(always)]
+    pub fn times(&self, factor: f32, more: f32) -> Self {
+        Linear16 { c: self.c * factor + more, x: self.x * factor, y: self.y * factor }
+    }
+
     #[inline(always)]
     pub fn at(&self, x: f32x16<S>, y: f32x16<S>) -> f32x16<S> {
         self.c + x * self.x + y * self.y

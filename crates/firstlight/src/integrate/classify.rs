@@ -329,10 +329,14 @@ pub(crate) fn classify<S: Simd>(
             }
             _ => unreachable!("both lists hold the same things"),
         };
+        let touch = Touch::of(emitter, exact);
+        if touch == Touch::Cuts && matches!(emitter, Emitter::Ball { both_sides: true, .. }) {
+            // What is behind the disk shines as well
+            told.other = asked;
+        }
         if (told.outside | told.within | told.hidden | told.moving | told.other) & asked == 0 {
             continue;
         }
-        let touch = Touch::of(emitter, exact);
         if touch == Touch::Holds {
             told.hidden |= told.outside;
             (told.outside, told.within) = (0, 0);

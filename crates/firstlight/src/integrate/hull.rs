@@ -2,7 +2,8 @@
 //!
 //! A solid is seen in a space of its own, in which it is a unit box, ball, disk or a frustum about z: lines stay lines
 //! there, so that nothing else changes. What a point sees of it is the hull of a few flat things: of a box, three faces;
-//! of a frustum, its ends and the band between the two lines in which planes through the point touch its mantle.
+//! of a frustum, its ends and the band between the two lines in which planes through the point touch its mantle. A ring
+//! hides what is inside of its rim but not of its hole; a tube, what is in its hull but not in both of its ends.
 
 use fearless_simd::{f32x16, mask32x16, prelude::*};
 
@@ -18,13 +19,15 @@ pub(crate) struct SolidOccluder {
     center: Exact,
     rows: [Vec3; 3],
     pub kind: Canonical,
+    /// Whether a part of the light may be inside.
+    touches: bool,
 }
 
 impl SolidOccluder {
-    pub fn new(world_from_canonical: &DAffine3, kind: Canonical) -> SolidOccluder {
+    pub fn new(world_from_canonical: &DAffine3, kind: Canonical, touches: bool) -> SolidOccluder {
         let inverse = world_from_canonical.matrix3.inverse().transpose();
         let rows = [inverse.x_axis, inverse.y_axis, inverse.z_axis].map(|row: DVec3| row.as_vec3());
-        SolidOccluder { center: Exact::new(world_from_canonical.translation), rows, kind }
+        SolidOccluder { center: Exact::new(world_from_canonical.translation), rows, kind, touches }
     }
 
     #[inline(always)]
@@ -102,26 +105,115 @@ pub(crate) struct Hull<S: Simd> {
     faces: [[Linear16<S>; 5]; FACES],
     rims: [Rim<S>; RIMS],
     count: [usize; 2],
+    hole: Hole,
+    inside: Option<Inside<S>>,
+}
+
+/// The part of a light's plane that is inside of a solid.
+#[derive(Clone, Copy)]
+struct Inside<S: Simd> {
+    /// All of them have to be 0 or more.
+    lines: [Linear16<S>; 6],
+    /// The same of what is inside of the mantle, and in front of the apex.
+    mantle: Option<(Quadratic16<S>, Linear16<S>)>,
+}
+
+impl<S: Simd> Inside<S> {
+    #[inline(always)]
+    fn new(kind: Canonical, to: Vec3x16<S>, l: &[Vec3x16<S>; 3]) -> Option<Inside<S>> {
+        let simd = to.x.token();
+        let nothing = Linear16 { c: simd.splat_f32x16(0.0), x: simd.splat_f32x16(0.0), y: simd.splat_f32x16(0.0) };
+        let [x, y, z] = [
+            Linear16 { c: l[0].x - to.x, x: l[1].x, y: l[2].x },
+            Linear16 { c: l[0].y - to.y, x: l[1].y, y: l[2].y },
+            Linear16 { c: l[0].z - to.z, x: l[1].z, y: l[2].z },
+        ];
+        let mut lines = [nothing; 6];
+        match kind {
+            Canonical::Box => {
+                for (axis, w) in [x, y, z].iter().enumerate() {
+                    lines[2 * axis] = w.times(1.0, 1.0);
+                    lines[2 * axis + 1] = w.times(-1.0, 1.0);
+                }
+                Some(Inside { lines, mantle: None })
+            }
+            Canonical::Frustum { radii: [first, last], open: false } => {
+                (lines[0], lines[1]) = (z, z.times(-1.0, 1.0));
+                let wide = z.times(last - first, first);
+                let one = simd.splat_f32x16(1.0);
+                let mantle = Quadratic16::square(&wide).combined(one, Quadratic16::square(&x), -one).combined(
+                    one,
+                    Quadratic16::square(&y),
+                    -one,
+                );
+                Some(Inside { lines, mantle: Some((mantle, wide)) })
+            }
+            Canonical::Frustum { .. } | Canonical::Plane | Canonical::Disk { .. } | Canonical::Ball => None,
+        }
+    }
+
+    #[inline(always)]
+    fn on_row(&self, simd: S, y: f32x16<S>) -> Interval16<S> {
+        let mut interval = match &self.mantle {
+            None => Interval16::all(simd),
+            Some((quadratic, wide)) => quadratic.cone_on_row(simd, wide, y),
+        };
+        for line in &self.lines {
+            interval.clip(y * line.y + line.c, line.x);
+        }
+        interval
+    }
+
+    #[inline(always)]
+    fn holds(&self, x: f32x16<S>, y: f32x16<S>) -> mask32x16<S> {
+        let zero = x.token().splat_f32x16(0.0);
+        let mut all = x.simd_eq(x);
+        for line in &self.lines {
+            all &= line.at(x, y).simd_ge(zero);
+        }
+        if let Some((quadratic, wide)) = &self.mantle {
+            all &= quadratic.at(x, y).simd_ge(zero) & wide.at(x, y).simd_ge(zero);
+        }
+        all
+    }
+}
+
+/// What of a hull light passes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Hole {
+    None,
+    /// Inside of the second rim, which is not part of the hull.
+    Ring,
+    /// Inside of both.
+    Tube,
 }
 
 impl<S: Simd> Hull<S> {
     /// `to` is the way to the middle of its own space, `l` are the light's in it. Not of a ball.
     #[inline(always)]
-    pub fn new(kind: Canonical, to: Vec3x16<S>, l: &[Vec3x16<S>; 3]) -> Hull<S> {
+    pub fn new(solid: &SolidOccluder, to: Vec3x16<S>, l: &[Vec3x16<S>; 3]) -> Hull<S> {
         let simd = to.x.token();
         let (zero, one) = (simd.splat_f32x16(0.0), simd.splat_f32x16(1.0));
         let nothing = Linear16 { c: zero, x: zero, y: zero };
         let empty = Rim { quadratic: Quadratic16::square(&nothing), ahead: nothing, plane: nothing };
-        let mut hull = Hull { faces: [[nothing; 5]; FACES], rims: [empty; RIMS], count: [0; 2] };
-        match kind {
+        let mut hull =
+            Hull { faces: [[nothing; 5]; FACES], rims: [empty; RIMS], count: [0; 2], hole: Hole::None, inside: None };
+        if solid.touches {
+            hull.inside = Inside::new(solid.kind, to, l);
+        }
+        match solid.kind {
             Canonical::Plane => {
                 let sign = to.z.simd_lt(zero).select(-one, one);
                 hull.faces[0][0] = Linear16 { c: l[0].z * sign - to.z.abs(), x: l[1].z * sign, y: l[2].z * sign };
                 hull.count = [1, 0];
             }
-            Canonical::Disk => {
+            Canonical::Disk { hole } => {
                 hull.rims[0] = Rim::new(to, 1.0, l);
                 hull.count = [0, 1];
+                if hole > 0.0 {
+                    hull.rims[1] = Rim::new(to, hole, l);
+                    hull.hole = Hole::Ring;
+                }
             }
             Canonical::Box => {
                 // On each axis the face on the point's side; where it is beside both, either
@@ -137,7 +229,8 @@ impl<S: Simd> Hull<S> {
                 hull.faces = [edges(x, l), edges(y, l), edges(z, l)];
                 hull.count = [3, 0];
             }
-            Canonical::Frustum([first, last]) => {
+            Canonical::Frustum { radii: [first, last], open } => {
+                hull.hole = if open { Hole::Tube } else { Hole::None };
                 let top = Vec3x16 { z: to.z + one, ..to };
                 hull.rims = [Rim::new(to, first, l), Rim::new(top, last, l)];
                 hull.count = [1, 2];
@@ -167,11 +260,11 @@ impl<S: Simd> Hull<S> {
         hull
     }
 
-    /// What is hidden of sixteen rows.
+    /// What is hidden of sixteen rows: before a hole, and after it.
     #[inline(always)]
-    pub fn hidden(&self, simd: S, y: f32x16<S>) -> Interval16<S> {
+    pub fn hidden(&self, simd: S, y: f32x16<S>) -> [Interval16<S>; 2] {
         let far = simd.splat_f32x16(FAR);
-        let mut all = Interval16 { from: far, to: -far };
+        let mut all = Interval16::none(simd);
         for face in &self.faces[..self.count[0]] {
             let mut interval = Interval16::all(simd);
             for line in face {
@@ -182,7 +275,25 @@ impl<S: Simd> Hull<S> {
         for rim in &self.rims[..self.count[1]] {
             all.join(&rim.hidden(simd, y));
         }
-        all
+        if let Some(inside) = &self.inside {
+            // With what is inside, what is hidden is convex as well
+            all.join(&inside.on_row(simd, y));
+        }
+        let none = Interval16::none(simd);
+        let mut hole = match self.hole {
+            Hole::None => return [all, none],
+            Hole::Ring => Interval16::all(simd),
+            Hole::Tube => self.rims[0].hidden(simd, y),
+        };
+        let other = self.rims[1].hidden(simd, y);
+        (hole.from, hole.to) = (hole.from.max(other.from), hole.to.min(other.to));
+        let is_there = hole.from.simd_lt(hole.to);
+        let before = Interval16 { from: all.from, to: is_there.select(all.to.min(hole.from), all.to) };
+        [before, Interval16 { from: is_there.select(all.from.max(hole.to), far), to: all.to }]
+    }
+
+    pub fn has_hole(&self) -> bool {
+        self.hole != Hole::None
     }
 
     /// Whether a place of the light is hidden.
@@ -200,7 +311,14 @@ impl<S: Simd> Hull<S> {
         for rim in &self.rims[..self.count[1]] {
             any |= rim.hides(x, y);
         }
-        any
+        if let Some(inside) = &self.inside {
+            any |= inside.holds(x, y);
+        }
+        match self.hole {
+            Hole::None => any,
+            Hole::Ring => any & !self.rims[1].hides(x, y),
+            Hole::Tube => any & !(self.rims[0].hides(x, y) & self.rims[1].hides(x, y)),
+        }
     }
 
     /// See [`Shadow::breaks`](super::occluder::Shadow::breaks).
@@ -209,9 +327,18 @@ impl<S: Simd> Hull<S> {
         for face in &self.faces[..self.count[0]] {
             breaks.polygon(face);
         }
-        for rim in &self.rims[..self.count[1]] {
+        let rims = if self.hole == Hole::None { self.count[1] } else { RIMS };
+        for rim in &self.rims[..rims] {
             breaks.quadratic(&rim.quadratic, breaks.of);
             breaks.line(&rim.plane);
+        }
+        if let Some(inside) = &self.inside {
+            for line in &inside.lines {
+                breaks.line(line);
+            }
+            if let Some((quadratic, _)) = &inside.mantle {
+                breaks.quadratic(quadratic, breaks.of);
+            }
         }
     }
 }

@@ -67,6 +67,11 @@ pub(crate) const FAR: f32 = 1e30;
 const FLAT: f32 = 1e-30;
 
 impl<S: Simd> Interval16<S> {
+    #[inline(always)]
+    pub fn none(simd: S) -> Self {
+        Interval16 { from: simd.splat_f32x16(FAR), to: simd.splat_f32x16(-FAR) }
+    }
+
     /// The hull of two intervals, empty ones aside.
     #[inline(always)]
     pub fn join(&mut self, other: &Self) {
@@ -354,7 +359,7 @@ impl<S: Simd> Shadow<S> {
                 let (to, l) = solid.seen_from(simd, p, l);
                 match solid.kind {
                     Canonical::Ball => Shadow::cone(simd, to, 1.0, &l),
-                    kind => Shadow::Hull(Hull::new(kind, to, &l)),
+                    _ => Shadow::Hull(Hull::new(solid, to, &l)),
                 }
             }
         }
@@ -398,11 +403,25 @@ impl<S: Simd> Shadow<S> {
         Shadow::Cone { quadratic, ahead, cut, inside }
     }
 
-    /// What is hidden of sixteen rows, seen from outside.
+    /// What is hidden of sixteen rows, seen from outside: one interval, or two around a hole.
     #[inline(always)]
-    pub fn hidden(&self, simd: S, y: f32x16<S>) -> Interval16<S> {
+    pub fn hidden(&self, simd: S, y: f32x16<S>) -> [Interval16<S>; 2] {
         match self {
             Shadow::Hull(hull) => hull.hidden(simd, y),
+            Shadow::Edges { .. } | Shadow::Cone { .. } => [self.interval(simd, y), Interval16::none(simd)],
+        }
+    }
+
+    /// Whether what is hidden may have a hole.
+    pub fn has_hole(&self) -> bool {
+        matches!(self, Shadow::Hull(hull) if hull.has_hole())
+    }
+
+    /// What a convex thing hides of sixteen rows.
+    #[inline(always)]
+    fn interval(&self, simd: S, y: f32x16<S>) -> Interval16<S> {
+        match self {
+            Shadow::Hull(hull) => hull.hidden(simd, y)[0],
             Shadow::Edges { lines } => {
                 let mut interval = Interval16::all(simd);
                 for line in lines {

@@ -77,6 +77,8 @@ pub(crate) struct PanelSums {
 
 /// The most things that may hide a part of a light from one batch.
 pub(crate) const MAX_BETWEEN: usize = 24;
+/// Of which some have holes.
+const MAX_INTERVALS: usize = 2 * MAX_BETWEEN;
 
 /// What may be in the way of a batch: the occluders that any of its points sees, and for which of them.
 struct Batch<'a, S: Simd> {
@@ -265,7 +267,7 @@ pub(crate) fn rows<S: Simd>(
         }
     }
     // What is hidden of them, sorted by where it begins
-    let mut hidden = [const { ArrayVec::<Interval16<S>, MAX_BETWEEN>::new_const() }; ROWS];
+    let mut hidden = [const { ArrayVec::<Interval16<S>, MAX_INTERVALS>::new_const() }; ROWS];
     for occluder in batch.occluders() {
         let (shadow, outside, within) = batch.shadow(simd, occluder);
         let (some_outside, some_within) = (outside.any_true(), within.any_true());
@@ -276,19 +278,22 @@ pub(crate) fn rows<S: Simd>(
                 all.to = within.select(all.to.min(inside.to), all.to);
             }
             if some_outside {
-                let mut interval = shadow.hidden(simd, y);
-                let is_there = outside & interval.from.simd_lt(interval.to);
-                interval.from = is_there.select(interval.from, far);
-                interval.to = is_there.select(interval.to, far);
-                for before in hidden[row].iter_mut() {
-                    let swap = interval.from.simd_lt(before.from);
-                    let (f, t) = (before.from, before.to);
-                    before.from = swap.select(interval.from, f);
-                    before.to = swap.select(interval.to, t);
-                    interval.from = swap.select(f, interval.from);
-                    interval.to = swap.select(t, interval.to);
+                let intervals = shadow.hidden(simd, y);
+                let parts = if shadow.has_hole() { 2 } else { 1 };
+                for mut interval in intervals.into_iter().take(parts) {
+                    let is_there = outside & interval.from.simd_lt(interval.to);
+                    interval.from = is_there.select(interval.from, far);
+                    interval.to = is_there.select(interval.to, far);
+                    for before in hidden[row].iter_mut() {
+                        let swap = interval.from.simd_lt(before.from);
+                        let (f, t) = (before.from, before.to);
+                        before.from = swap.select(interval.from, f);
+                        before.to = swap.select(interval.to, t);
+                        interval.from = swap.select(f, interval.from);
+                        interval.to = swap.select(t, interval.to);
+                    }
+                    hidden[row].push(interval);
                 }
-                hidden[row].push(interval);
             }
         }
     }

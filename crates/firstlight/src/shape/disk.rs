@@ -7,7 +7,7 @@ use glam::DVec2;
 
 use super::common::shape_table;
 use super::placement::Placement;
-use super::solid::{Solid, SolidHit, SolidPoint, turn};
+use super::solid::{Canonical, Solid, SolidHit, SolidPoint, turn};
 use super::surface::UvEdge;
 use crate::context::CompileContext;
 use crate::math::{DAffine3, DMat3, DRay, DVec3, ErrorBound, Frame, UNIT_ROUNDOFF, Vec3, Vec3x16};
@@ -73,11 +73,12 @@ impl Disk {
         (self.center, self.radius)
     }
 
-    /// The map from the unit disk across z; `None` if it has a hole.
-    pub fn canonical(&self) -> Option<DAffine3> {
+    /// See [`Solid::canonical`].
+    pub fn canonical(&self) -> (DAffine3, Canonical) {
         let Frame { x, y, z } = self.frame;
         let axes = DMat3::from_cols(x * self.radius, y * self.radius, z * self.radius);
-        (self.inner == 0.0).then(|| DAffine3::from_mat3_translation(axes, self.center))
+        let hole = (self.inner / self.radius) as f32;
+        (DAffine3::from_mat3_translation(axes, self.center), Canonical::Disk { hole })
     }
 
     /// The disk that it is in the world; `None` if it has a hole, or is no disk there.

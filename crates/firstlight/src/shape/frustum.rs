@@ -183,13 +183,14 @@ impl Frustum {
         }
     }
 
-    /// See [`Solid::canonical`](super::solid::Solid::canonical); `None` if its ends are open.
-    pub fn canonical(&self) -> Option<(DAffine3, Canonical)> {
+    /// See [`Solid::canonical`](super::solid::Solid::canonical).
+    pub fn canonical(&self) -> (DAffine3, Canonical) {
         let widest = self.radii[0].max(self.radii[1]);
         let Frame { x, y, z } = self.frame;
         let axes = DMat3::from_cols(x * widest, y * widest, z * self.height);
         let radii = self.radii.map(|r| (r / widest) as f32);
-        self.capped.then(|| (DAffine3::from_mat3_translation(axes, self.p0), Canonical::Frustum(radii)))
+        let kind = Canonical::Frustum { radii, open: !self.capped };
+        (DAffine3::from_mat3_translation(axes, self.p0), kind)
     }
 
     pub fn bounds(&self) -> Option<[DVec3; 2]> {

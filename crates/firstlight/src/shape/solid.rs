@@ -23,38 +23,47 @@ pub(crate) enum Solid {
     Ball(Ball),
 }
 
-/// What a convex solid is an affine image of.
+/// What a convex solid is an affine image of, or one with a straight hole.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Canonical {
     /// z = 0.
     Plane,
-    /// x^2 + y^2 <= 1, z = 0.
-    Disk,
+    /// From `hole`^2 to 1 is x^2 + y^2, z = 0.
+    Disk { hole: f32 },
     /// All coordinates from -1 to 1.
     Box,
     /// x^2 + y^2 + z^2 <= 1.
     Ball,
-    /// z from 0 to 1, with these radii at both ends.
-    Frustum([f32; 2]),
+    /// z from 0 to 1, with these radii at both ends, which may be open.
+    Frustum { radii: [f32; 2], open: bool },
 }
 
 impl Canonical {
     /// Whether a point is inside.
     pub fn holds(&self, p: DVec3) -> bool {
         match self {
-            Canonical::Plane | Canonical::Disk => false,
+            Canonical::Plane | Canonical::Disk { .. } => false,
             Canonical::Box => p.abs().max_element() < 1.0,
             Canonical::Ball => p.length_squared() < 1.0,
-            Canonical::Frustum(radii) => {
+            Canonical::Frustum { radii, .. } => {
                 let [first, last] = radii.map(f64::from);
                 p.z > 0.0 && p.z < 1.0 && p.truncate().length() < first + (last - first) * p.z
             }
         }
     }
 
+    /// Whether light can pass through it.
+    pub fn has_hole(&self) -> bool {
+        match self {
+            Canonical::Disk { hole } => *hole > 0.0,
+            Canonical::Frustum { open, .. } => *open,
+            Canonical::Plane | Canonical::Box | Canonical::Ball => false,
+        }
+    }
+
     /// Whether it has no inside: its plane is z = 0.
     pub fn is_flat(&self) -> bool {
-        matches!(self, Canonical::Plane | Canonical::Disk)
+        matches!(self, Canonical::Plane | Canonical::Disk { .. })
     }
 }
 
@@ -139,7 +148,7 @@ impl Solid {
         each!(self, shape => shape.point(ray, hit))
     }
 
-    /// What it is an image of, and by which map; `None` if it is not convex.
+    /// What it is an image of, and by which map; `None` of a torus.
     pub fn canonical(&self) -> Option<(DAffine3, Canonical)> {
         let map = |x, y, z, to| DAffine3::from_mat3_translation(DMat3::from_cols(x, y, z), to);
         match self {
@@ -148,13 +157,13 @@ impl Solid {
                 let Frame { x, y, z } = Frame::around(n);
                 Some((map(x, y, z, at), Canonical::Plane))
             }
-            Solid::Disk(disk) => disk.canonical().map(|disk| (disk, Canonical::Disk)),
+            Solid::Disk(disk) => Some(disk.canonical()),
             Solid::Cuboid(cuboid) => {
                 let half = cuboid.half();
                 let [x, y, z] = [DVec3::X * half.x, DVec3::Y * half.y, DVec3::Z * half.z];
                 Some((map(x, y, z, cuboid.middle()), Canonical::Box))
             }
-            Solid::Frustum(frustum) => frustum.canonical(),
+            Solid::Frustum(frustum) => Some(frustum.canonical()),
             Solid::Ball(_) => Some((DAffine3::IDENTITY, Canonical::Ball)),
             Solid::Torus(_) => None,
         }

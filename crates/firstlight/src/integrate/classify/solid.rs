@@ -11,7 +11,7 @@ use crate::math::{DAffine3, DVec3, LANES, Vec3x16};
 use crate::scene::Placed;
 use crate::shape::{Canonical, Solid};
 
-/// A convex solid as it is placed.
+/// A convex solid as it is placed, or one with a straight hole.
 pub(super) struct ConvexSolid<'a> {
     thing: &'a Placed,
     solid: &'a Solid,
@@ -19,8 +19,8 @@ pub(super) struct ConvexSolid<'a> {
     canonical_from_world: DAffine3,
     /// The box around it, if it has an end.
     bounds: Option<[DVec3; 2]>,
-    /// Whether it may reach into the light.
-    pub touches: bool,
+    /// Whether a part of the light may be in it where rows do not tell.
+    touches: bool,
 }
 
 /// How far a point is from a box.
@@ -29,15 +29,16 @@ fn distance([low, high]: &[DVec3; 2], p: DVec3) -> f64 {
 }
 
 impl<'a> ConvexSolid<'a> {
-    /// `None` if it is not convex.
+    /// `None` of what no row tells.
     pub fn new(thing: &'a Placed, solid: &'a Solid, emitter: &Emitter) -> Option<(ConvexSolid<'a>, SolidOccluder)> {
         let (object_from_canonical, kind) = solid.canonical()?;
         let world_from_canonical = thing.placement.world_from_object * object_from_canonical;
         let bounds = solid.bounds().map(|bounds| thing.placement.bounds(bounds));
         let canonical_from_world = world_from_canonical.inverse();
         let mut made = ConvexSolid { thing, solid, kind, canonical_from_world, bounds, touches: false };
-        made.touches = made.may_touch(emitter);
-        Some((made, SolidOccluder::new(&world_from_canonical, kind)))
+        let touches = made.may_touch(emitter);
+        made.touches = touches && (matches!(emitter, Emitter::Ball { .. }) || kind.has_hole());
+        Some((made, SolidOccluder::new(&world_from_canonical, kind, touches)))
     }
 
     fn may_touch(&self, emitter: &Emitter) -> bool {
@@ -176,7 +177,7 @@ pub(super) fn solid_between<S: Simd>(
     }
     told.moving = around & sight.reach.simd_gt(zero).to_bitmask();
     told.motion = sight.motion(f32x16::simd_from(simd, distances));
-    if !shape.touches {
+    if !(shape.touches || shape.kind.has_hole()) {
         // It is convex: what hides all corners hides all
         told.hidden = sight.hidden(&shadow, near);
         told.firm = told.hidden & !told.moving;
