@@ -9,22 +9,27 @@ mod solid;
 use fearless_simd::{f32x16, prelude::*};
 
 use super::batch::{Linear16, Members, ShadingPoint, ViewNumber};
+use super::cut;
 use super::emitter::Emitter;
+use super::hull::SolidOccluder;
 use super::occluder::{Exact, Occluder, Shadow, corners_from, ways};
-use super::panels::{Between, MAX_BETWEEN};
+use super::panels::{Between, MAX_BETWEEN, MAX_CUTS};
 use crate::ids::LightId;
-use crate::math::{LANES, Vec3x16};
+use crate::math::{DAffine3, LANES, Vec3x16};
 use crate::scene::{Meets, Scene, Target};
-use crate::shape::{Disk, Parallelogram, PlaneSide, Sphere};
+use crate::shape::{Parallelogram, Placement, PlaneSide, Solid, Sphere};
 use solid::{ConvexSolid, solid_between};
 
-/// All listed things that may stand in the way of one light.
+/// All things that may stand in the way of one light.
+#[derive(Default)]
 pub(crate) struct Obstacles<'a> {
     /// As they are met row by row, and as they are; number by number the same.
     pub occluders: Vec<Occluder>,
     exact: Vec<ExactShape<'a>>,
-    /// The disk lights that block, which are not told row by row.
-    disks: Vec<&'a Disk>,
+    /// How each lies to the light, if that is a ball; that ball, and which of them reach into it, bit by bit.
+    touches: Vec<Touch>,
+    pub ball: Option<(Exact, f32)>,
+    pub cuts: u64,
     /// Which placed things are among them.
     placed: Vec<u32>,
 }
@@ -39,7 +44,7 @@ enum ExactShape<'a> {
         /// The same if the camera sees it: then nobody sees what is behind it.
         seen_side: PlaneSide,
     },
-    Solid(ConvexSolid<'a>),
+    Solid(Box<ConvexSolid>),
 }
 
 /// The most obstacles of a light.
@@ -49,8 +54,7 @@ impl<'a> Obstacles<'a> {
     /// Those of light `index`; `None` if they are too many.
     pub fn new(scene: &'a Scene, index: usize, emitter: &Emitter) -> Option<Obstacles<'a>> {
         let id = LightId(index as u32);
-        let mut obstacles =
-            Obstacles { occluders: Vec::new(), exact: Vec::new(), disks: Vec::new(), placed: Vec::new() };
+        let mut obstacles = Obstacles::default();
         if !scene.lights[index].shadows {
             return Some(obstacles);
         }
@@ -68,8 +72,9 @@ impl<'a> Obstacles<'a> {
             obstacles.occluders.push(Occluder::Flat { corners: flat.deep_corners().map(Exact::new) });
             obstacles.exact.push(ExactShape::Flat { flat, side, seen_side });
         }
-        let disks = scene.light_obstacles.disks.iter().filter(|(light, _)| *light != index);
-        obstacles.disks.extend(disks.map(|(_, disk)| disk));
+        for (_, disk) in scene.light_obstacles.disks.iter().filter(|(light, _)| *light != index) {
+            obstacles.add(ConvexSolid::new(Solid::Disk(*disk), Placement::new(DAffine3::IDENTITY), emitter));
+        }
         if obstacles.occluders.len() > MAX_OBSTACLES {
             return None;
         }
@@ -83,14 +88,33 @@ impl<'a> Obstacles<'a> {
             if !casts || obstacles.occluders.len() == MAX_OBSTACLES {
                 continue;
             }
-            let solid = &scene.geometry.solids[solid as usize];
-            if let Some((shape, occluder)) = ConvexSolid::new(thing, solid, emitter) {
-                obstacles.occluders.push(Occluder::Solid(occluder));
-                obstacles.exact.push(ExactShape::Solid(shape));
+            let solid = scene.geometry.solids[solid as usize];
+            if obstacles.add(ConvexSolid::new(solid, thing.placement.clone(), emitter)) {
                 obstacles.placed.push(k as u32);
             }
         }
+        obstacles.touch(emitter);
         Some(obstacles)
+    }
+
+    /// Finds out what reaches into a light that is a ball.
+    fn touch(&mut self, emitter: &Emitter) {
+        if let Emitter::Ball { center, radius, .. } = emitter {
+            self.ball = Some((Exact::new(*center), *radius as f32));
+        }
+        for (i, (exact, occluder)) in self.exact.iter().zip(&self.occluders).enumerate() {
+            let touch = Touch::of(emitter, exact);
+            self.touches.push(touch);
+            self.cuts |= u64::from(touch == Touch::Cuts && cut::knows(occluder)) << i;
+        }
+    }
+
+    /// Adds a solid, if rows tell it.
+    fn add(&mut self, solid: Option<(ConvexSolid, SolidOccluder)>) -> bool {
+        let Some((shape, occluder)) = solid else { return false };
+        self.occluders.push(Occluder::Solid(occluder));
+        self.exact.push(ExactShape::Solid(Box::new(shape)));
+        true
     }
 
     /// Whether a placed thing is among them.
@@ -107,14 +131,15 @@ impl<'a> Obstacles<'a> {
 #[cfg(test)]
 impl<'a> Obstacles<'a> {
     /// Spheres alone.
-    pub fn of_spheres(spheres: &'a [Sphere]) -> Obstacles<'a> {
+    pub fn of_spheres(spheres: &'a [Sphere], emitter: &Emitter) -> Obstacles<'a> {
         let occluder = |sphere: &Sphere| Occluder::Sphere { center: Exact::new(sphere.c), radius: sphere.r as f32 };
-        Obstacles {
+        let mut obstacles = Obstacles {
             occluders: spheres.iter().map(occluder).collect(),
             exact: spheres.iter().map(ExactShape::Sphere).collect(),
-            disks: Vec::new(),
-            placed: Vec::new(),
-        }
+            ..Obstacles::default()
+        };
+        obstacles.touch(emitter);
+        obstacles
     }
 }
 
@@ -329,10 +354,18 @@ pub(crate) fn classify<S: Simd>(
             }
             _ => unreachable!("both lists hold the same things"),
         };
-        let touch = Touch::of(emitter, exact);
-        if touch == Touch::Cuts && matches!(emitter, Emitter::Ball { both_sides: true, .. }) {
-            // What is behind the disk shines as well
-            told.other = asked;
+        let touch = obstacles.touches[i];
+        if touch == Touch::Cuts {
+            // Of the ball more may be seen than of its disk
+            (told.outside, told.hidden, told.firm) = (told.outside | told.hidden, 0, 0);
+            told.other |= if matches!(emitter, Emitter::Ball { both_sides: true, .. }) {
+                // What is behind the disk shines as well
+                asked
+            } else if obstacles.cuts >> i & 1 == 1 {
+                told.within
+            } else {
+                told.outside | told.within
+            };
         }
         if (told.outside | told.within | told.hidden | told.moving | told.other) & asked == 0 {
             continue;
@@ -360,23 +393,12 @@ pub(crate) fn classify<S: Simd>(
             class.other |= told.other >> k & 1 == 1;
             class.between.outside |= (told.outside >> k & 1) << i;
             class.between.within |= (told.within >> k & 1) << i;
-            let is_cut = (told.outside | told.within) >> k & 1 == 1;
-            class.other |= is_cut && touch == Touch::Cuts;
         }
     }
-    for (class, point) in classes.iter_mut().zip(points) {
+    for class in &mut classes {
         let many = class.between.outside.count_ones() + class.between.within.count_ones();
-        class.other |= many as usize > MAX_BETWEEN;
-        if !class.hidden {
-            for disk in &obstacles.disks {
-                let (center, r) = disk.ball();
-                let to = (center - point.p.as_dvec3()).as_vec3();
-                let rises = point.horizon.dot(to) + r as f32 >= -(point.reach + point.turn * to.length());
-                if rises {
-                    (class.other, class.motion) = (true, f32::INFINITY);
-                }
-            }
-        }
+        let cuts = (class.between.outside & obstacles.cuts).count_ones();
+        class.other |= many as usize > MAX_BETWEEN || cuts as usize > MAX_CUTS;
     }
     classes
 }
@@ -406,6 +428,7 @@ impl Touch {
                 }
             }
             ExactShape::Flat { flat, .. } if flat.distance(*center) < *radius => Touch::Cuts,
+            ExactShape::Solid(solid) if solid.may_touch => Touch::Cuts,
             ExactShape::Flat { .. } | ExactShape::Solid(_) => Touch::Apart,
         }
     }

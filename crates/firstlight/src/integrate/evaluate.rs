@@ -212,7 +212,8 @@ impl Evaluator {
         let Evaluator { views, between, whole, cut: cut_cells, polynomials, panels, spare, .. } = self;
         let falloff = light.emitter.falloff();
         let outline = light.emitter.outline();
-        let blocked = Blocked { occluders: &light.obstacles.occluders, outline, between };
+        let Obstacles { occluders, ball, cuts, .. } = light.obstacles;
+        let blocked = Blocked { occluders, ball: *ball, cuts: *cuts, outline, between };
         let moments = if matches!(light.lobe, Lobe::None) { 1 } else { MOMENTS };
         self.fits.clear();
         self.cut_fits.clear();

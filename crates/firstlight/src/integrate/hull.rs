@@ -51,8 +51,8 @@ impl SolidOccluder {
 /// A disk as sixteen points see it: inside of its cone, and behind its plane.
 #[derive(Clone, Copy)]
 pub(crate) struct Rim<S: Simd> {
-    quadratic: Quadratic16<S>,
-    ahead: Linear16<S>,
+    pub quadratic: Quadratic16<S>,
+    pub ahead: Linear16<S>,
     plane: Linear16<S>,
 }
 
@@ -102,8 +102,8 @@ const RIMS: usize = 2;
 /// A convex solid as sixteen points see it from outside.
 #[derive(Clone, Copy)]
 pub(crate) struct Hull<S: Simd> {
-    faces: [[Linear16<S>; 5]; FACES],
-    rims: [Rim<S>; RIMS],
+    pub faces: [[Linear16<S>; 5]; FACES],
+    pub rims: [Rim<S>; RIMS],
     count: [usize; 2],
     hole: Hole,
     inside: Option<Inside<S>>,

@@ -14,6 +14,7 @@ mod batch;
 mod between;
 mod cells;
 mod classify;
+mod cut;
 mod emitter;
 mod evaluate;
 mod fit;

@@ -112,10 +112,10 @@ pub(crate) struct Quadratic16<S: Simd> {
 
 /// Real roots: the smaller and the larger, and where there are any.
 #[derive(Clone, Copy)]
-struct Roots<S: Simd> {
-    low: f32x16<S>,
-    high: f32x16<S>,
-    any: mask32x16<S>,
+pub(crate) struct Roots<S: Simd> {
+    pub low: f32x16<S>,
+    pub high: f32x16<S>,
+    pub any: mask32x16<S>,
 }
 
 /// Where a y^2 + 2 b y + c is 0. Not quite 0 stands for a = 0, so that one root may be far away and nothing is divided
@@ -139,7 +139,7 @@ fn roots<S: Simd>(a: f32x16<S>, b: f32x16<S>, c: f32x16<S>) -> Roots<S> {
 impl<S: Simd> Quadratic16<S> {
     /// The product of two vectors that are linear over the light.
     #[inline(always)]
-    fn dot(p: [Vec3x16<S>; 3], q: [Vec3x16<S>; 3]) -> Self {
+    pub fn dot(p: [Vec3x16<S>; 3], q: [Vec3x16<S>; 3]) -> Self {
         Quadratic16 {
             c: p[0].dot(q[0]),
             x: (p[0].dot(q[1]) + p[1].dot(q[0])) * 0.5,
@@ -147,6 +147,19 @@ impl<S: Simd> Quadratic16<S> {
             xx: p[1].dot(q[1]),
             xy: (p[1].dot(q[2]) + p[2].dot(q[1])) * 0.5,
             yy: p[2].dot(q[2]),
+        }
+    }
+
+    /// The product of two things that are linear over the light.
+    #[inline(always)]
+    pub fn product(p: &Linear16<S>, q: &Linear16<S>) -> Self {
+        Quadratic16 {
+            c: p.c * q.c,
+            x: (p.c * q.x + p.x * q.c) * 0.5,
+            y: (p.c * q.y + p.y * q.c) * 0.5,
+            xx: p.x * q.x,
+            xy: (p.x * q.y + p.y * q.x) * 0.5,
+            yy: p.y * q.y,
         }
     }
 
@@ -210,7 +223,7 @@ impl<S: Simd> Quadratic16<S> {
     }
 
     #[inline(always)]
-    fn on_row(&self, y: f32x16<S>) -> Roots<S> {
+    pub fn on_row(&self, y: f32x16<S>) -> Roots<S> {
         roots(self.xx, y * self.xy + self.x, y * (y * self.yy + self.y * 2.0) + self.c)
     }
 

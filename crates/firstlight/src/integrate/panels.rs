@@ -12,8 +12,9 @@ use arrayvec::ArrayVec;
 use fearless_simd::{f32x16, mask32x16, prelude::*};
 
 use super::batch::{Block, Members, ViewNumber};
+use super::cut::{self, Cut};
 use super::fit::{Cell, MOMENTS, Polynomial};
-use super::occluder::{Breaks, FAR, Interval16, Occluder, Shadow, ways};
+use super::occluder::{Breaks, Exact, FAR, Interval16, Occluder, Shadow, ways};
 use super::view::Outline;
 use crate::math::{LANES, Vec3x16, asin, sin_cos};
 
@@ -62,6 +63,9 @@ pub(crate) struct Between {
 #[derive(Clone, Copy)]
 pub(crate) struct Blocked<'a> {
     pub occluders: &'a [Occluder],
+    /// The light, if it is a ball, and which of them reach into it, bit by bit.
+    pub ball: Option<(Exact, f32)>,
+    pub cuts: u64,
     pub outline: Outline,
     /// Point by point.
     pub between: &'a [Between],
@@ -79,6 +83,8 @@ pub(crate) struct PanelSums {
 pub(crate) const MAX_BETWEEN: usize = 24;
 /// Of which some have holes.
 const MAX_INTERVALS: usize = 2 * MAX_BETWEEN;
+/// The most of them that may reach into a ball.
+pub(crate) const MAX_CUTS: usize = MAX_INTERVALS / cut::MOST;
 
 /// What may be in the way of a batch: the occluders that any of its points sees, and for which of them.
 struct Batch<'a, S: Simd> {
@@ -112,6 +118,13 @@ impl<'a, S: Simd> Batch<'a, S> {
             first
         })
         .take(MAX_BETWEEN)
+    }
+
+    /// The same of one that reaches into a light that is a ball.
+    #[inline(always)]
+    fn cut(&self, simd: S, occluder: usize) -> Option<Cut<S>> {
+        let ball = self.blocked.ball.filter(|_| self.blocked.cuts >> occluder & 1 == 1)?;
+        Cut::new(simd, &self.blocked.occluders[occluder], ball, self.p, &self.l)
     }
 
     /// One of them as they see it, and who sees it from outside and from within.
@@ -171,7 +184,11 @@ fn breaks<S: Simd>(simd: S, blocked: &Blocked, members: &Members, cells: &[Cell]
     let batch = Batch::new(simd, blocked, members, |k| cells[k.min(cells.len() - 1)].point);
     for occluder in batch.occluders() {
         let (shadow, outside, within) = batch.shadow(simd, occluder);
-        shadow.breaks(&mut Breaks { x, of: outside | within, rows });
+        let mut breaks = Breaks { x, of: outside | within, rows };
+        match batch.cut(simd, occluder) {
+            Some(cut) => cut.breaks(&mut breaks),
+            None => shadow.breaks(&mut breaks),
+        }
     }
     if blocked.outline == Outline::Sphere {
         for row in rows.iter_mut() {
@@ -271,6 +288,7 @@ pub(crate) fn rows<S: Simd>(
     for occluder in batch.occluders() {
         let (shadow, outside, within) = batch.shadow(simd, occluder);
         let (some_outside, some_within) = (outside.any_true(), within.any_true());
+        let cut = batch.cut(simd, occluder);
         for (row, y) in y_of.into_iter().enumerate() {
             if some_within {
                 let (all, inside) = (&mut open[row], shadow.within(simd, y));
@@ -278,8 +296,18 @@ pub(crate) fn rows<S: Simd>(
                 all.to = within.select(all.to.min(inside.to), all.to);
             }
             if some_outside {
-                let intervals = shadow.hidden(simd, y);
-                let parts = if shadow.has_hole() { 2 } else { 1 };
+                let mut intervals = [Interval16::none(simd); cut::MOST];
+                let parts = match &cut {
+                    Some(cut) => {
+                        let reach = if is_sphere { wide[row] } else { (1.0 - y * y).max(zero).sqrt() };
+                        intervals = cut.hidden(simd, y, &Interval16 { from: -reach, to: reach });
+                        cut::MOST
+                    }
+                    None => {
+                        [intervals[0], intervals[1]] = shadow.hidden(simd, y);
+                        if shadow.has_hole() { 2 } else { 1 }
+                    }
+                };
                 for mut interval in intervals.into_iter().take(parts) {
                     let is_there = outside & interval.from.simd_lt(interval.to);
                     interval.from = is_there.select(interval.from, far);
@@ -292,7 +320,10 @@ pub(crate) fn rows<S: Simd>(
                         interval.from = swap.select(f, interval.from);
                         interval.to = swap.select(t, interval.to);
                     }
-                    hidden[row].push(interval);
+                    // Of cuts most are empty; what is last begins last
+                    if parts <= 2 || interval.from.simd_lt(far).any_true() {
+                        hidden[row].push(interval);
+                    }
                 }
             }
         }

@@ -200,7 +200,7 @@ fn batched(cases: &[(Case, Vec<Sphere>)], steps: &DisplaySteps) -> Vec<Sums> {
         let point = ShadingPoint { worth, ..ShadingPoint::new(p, error, ns, wo) };
         let asked = Asked {
             emitter: &Emitter::Flat(case.light),
-            obstacles: &Obstacles::of_spheres(spheres),
+            obstacles: &Obstacles::of_spheres(spheres, &Emitter::Flat(case.light)),
             lobe: &case.receiver.lobe,
             steps,
             tolerance: &tolerance,
@@ -286,18 +286,19 @@ impl BallCase {
             0 => Lobe::None,
             _ => Lobe::Phong(PhongLobe::new(random.scale(1.0, 40.0).round() as f32)),
         };
+        let (physical, both_sides) = (random.unit() < 0.3, random.unit() < 0.4);
         let mut spheres = Vec::new();
         for _ in 0..(seed % 3) {
             let c = center * random.between(0.1, 1.0) + random.direction() * random.unit();
             let r = random.scale(0.05, 0.6);
-            let is_between = c.length() > r * 1.01 && (center - c).length() > (radius + r) * 1.01;
-            if is_between && c.dot(ns.as_dvec3()) > -r {
+            // Some reach into the light
+            let room = if both_sides { radius + r } else { 0.0 };
+            if c.length() > r * 1.01 && (center - c).length() > room * 1.01 && c.dot(ns.as_dvec3()) > -r {
                 spheres.push(Sphere { c, r, uv: SphereUv::Angles, single_sided: false });
             }
         }
         let worth = [Rgb::gray(0.5), Rgb::gray(0.5)];
         let point = ShadingPoint { worth, ..ShadingPoint::new(Vec3::ZERO, ErrorBound(Vec3::ZERO), ns, wo) };
-        let (physical, both_sides) = (random.unit() < 0.3, random.unit() < 0.5);
         BallCase { center, radius, physical, both_sides, point, lobe, spheres }
     }
 
@@ -330,9 +331,10 @@ impl BallCase {
     fn batched(&self, steps: &DisplaySteps) -> Sums {
         let tolerance = Tolerance::DEFAULT;
         let BallCase { center, radius, physical, both_sides, .. } = *self;
+        let emitter = Emitter::Ball { center, radius, physical, both_sides };
         let asked = Asked {
-            emitter: &Emitter::Ball { center, radius, physical, both_sides },
-            obstacles: &Obstacles::of_spheres(&self.spheres),
+            emitter: &emitter,
+            obstacles: &Obstacles::of_spheres(&self.spheres, &emitter),
             lobe: &self.lobe,
             steps,
             tolerance: &tolerance,

@@ -8,19 +8,18 @@ use crate::integrate::emitter::Emitter;
 use crate::integrate::hull::SolidOccluder;
 use crate::integrate::occluder::{Exact, Occluder, Shadow};
 use crate::math::{DAffine3, DVec3, LANES, Vec3x16};
-use crate::scene::Placed;
-use crate::shape::{Canonical, Solid};
+use crate::shape::{Canonical, Placement, Solid};
 
 /// A convex solid as it is placed, or one with a straight hole.
-pub(super) struct ConvexSolid<'a> {
-    thing: &'a Placed,
-    solid: &'a Solid,
+pub(super) struct ConvexSolid {
+    placement: Placement,
+    solid: Solid,
     kind: Canonical,
     canonical_from_world: DAffine3,
     /// The box around it, if it has an end.
     bounds: Option<[DVec3; 2]>,
-    /// Whether a part of the light may be in it where rows do not tell.
-    touches: bool,
+    /// Whether a part of the light may be in it.
+    pub may_touch: bool,
 }
 
 /// How far a point is from a box.
@@ -28,20 +27,20 @@ fn distance([low, high]: &[DVec3; 2], p: DVec3) -> f64 {
     (*low - p).max(p - *high).max(DVec3::ZERO).length()
 }
 
-impl<'a> ConvexSolid<'a> {
+impl ConvexSolid {
     /// `None` of what no row tells.
-    pub fn new(thing: &'a Placed, solid: &'a Solid, emitter: &Emitter) -> Option<(ConvexSolid<'a>, SolidOccluder)> {
+    pub fn new(solid: Solid, placement: Placement, emitter: &Emitter) -> Option<(ConvexSolid, SolidOccluder)> {
         let (object_from_canonical, kind) = solid.canonical()?;
-        let world_from_canonical = thing.placement.world_from_object * object_from_canonical;
-        let bounds = solid.bounds().map(|bounds| thing.placement.bounds(bounds));
+        let world_from_canonical = placement.world_from_object * object_from_canonical;
+        let bounds = solid.bounds().map(|bounds| placement.bounds(bounds));
         let canonical_from_world = world_from_canonical.inverse();
-        let mut made = ConvexSolid { thing, solid, kind, canonical_from_world, bounds, touches: false };
-        let touches = made.may_touch(emitter);
-        made.touches = touches && (matches!(emitter, Emitter::Ball { .. }) || kind.has_hole());
-        Some((made, SolidOccluder::new(&world_from_canonical, kind, touches)))
+        let mut made = ConvexSolid { placement, solid, kind, canonical_from_world, bounds, may_touch: false };
+        made.may_touch = made.touches(emitter);
+        let occluder = SolidOccluder::new(&world_from_canonical, kind, made.may_touch);
+        Some((made, occluder))
     }
 
-    fn may_touch(&self, emitter: &Emitter) -> bool {
+    fn touches(&self, emitter: &Emitter) -> bool {
         match emitter {
             Emitter::Ball { center, radius, .. } => match &self.bounds {
                 Some(bounds) => distance(bounds, *center) < *radius,
@@ -64,7 +63,7 @@ impl<'a> ConvexSolid<'a> {
 
     /// How far it reaches in a direction.
     fn reach(&self, n: DVec3) -> f64 {
-        let to_world = &self.thing.placement.world_from_object;
+        let to_world = &self.placement.world_from_object;
         self.solid.support(to_world.matrix3.transpose() * n) + n.dot(to_world.translation)
     }
 
@@ -95,7 +94,7 @@ enum Lies {
     Between,
 }
 
-impl ConvexSolid<'_> {
+impl ConvexSolid {
     fn lies(&self, point: &ShadingPoint) -> Lies {
         let p = point.p.as_dvec3();
         let far = match &self.bounds {
@@ -177,12 +176,12 @@ pub(super) fn solid_between<S: Simd>(
     }
     told.moving = around & sight.reach.simd_gt(zero).to_bitmask();
     told.motion = sight.motion(f32x16::simd_from(simd, distances));
-    if !(shape.touches || shape.kind.has_hole()) {
+    if !shape.kind.has_hole() {
         // It is convex: what hides all corners hides all
         told.hidden = sight.hidden(&shadow, near);
         told.firm = told.hidden & !told.moving;
     }
-    told.other |= if shape.touches { near } else { 0 };
+    told.other |= if shape.may_touch && shape.kind.has_hole() { near } else { 0 };
     told.outside = near & !told.hidden;
     told
 }
