@@ -130,3 +130,90 @@ fn what_took_too_long_is_right() {
         assert!(off < 1.0, "{name}: {off} steps off");
     }
 }
+
+/// What is seen of this text by default, and by how many steps 4,096 points for each camera ray differ from it at most.
+fn off_by(text: &str) -> f64 {
+    let desc = SceneDesc::parse("s.toml", text.as_bytes(), &firstlight::NoAssets);
+    assert!(desc.faults().is_empty(), "{:?}", desc.faults());
+    let desc = desc.desc;
+    apart(&compile(&desc), &exact(&desc), &sampled(&desc, SampleSet::Sobol, 4096))
+}
+
+const ROOM: &str = r#"
+[render]
+width = 32
+height = 32
+[camera]
+position = [0, 3, 9]
+look_at = [0, 0.5, 0]
+fov_y_deg = 45
+[material.phong.m]
+diffuse = 0.7
+[[plane]]
+point = [0, 0, 0]
+normal = [0, 1, 0]
+material = "m"
+"#;
+
+#[test]
+fn more_shapes_than_are_listed_cast_shadows_all_the_same() {
+    let light = "[[light.rectangle]]\ncenter = [2, 5, 2]\ne0 = [1.5, 0, 0]\ne1 = [0, 0, 1.5]\nstrength = 8\n";
+    let sphere = |k: i32| {
+        let (x, y, z) = (k % 8 - 4, k % 3, k / 8 - 4);
+        format!("[[sphere]]\ncenter = [{x}, 0.{}, {z}]\nradius = 0.25\nmaterial = \"m\"\n", 3 + 2 * y)
+    };
+    let spheres: String = (0..60).map(sphere).collect();
+    let off = off_by(&format!("{ROOM}{light}{spheres}"));
+    assert!(off < 1.0, "{off} steps off");
+}
+
+#[test]
+fn solids_cast_shadows_of_closed_form() {
+    let solids = r#"
+[[box]]
+center = [-1.6, 0.4, 0]
+size = [0.8, 0.8, 0.8]
+transform = { rotate_deg = [10, 30, 0] }
+material = "m"
+[[disk]]
+center = [0, 1.2, 0.4]
+normal = [0.2, 1, 0.1]
+radius = 0.7
+inner_radius = 0.3
+material = "m"
+[[cylinder]]
+p0 = [1.4, 0.7, 0.3]
+p1 = [2.3, 1.0, -0.3]
+radius = 0.35
+capped = false
+material = "m"
+[[cylinder]]
+p0 = [-2.8, 0, -0.9]
+p1 = [-2.8, 1.1, -0.9]
+radius = 0.4
+material = "m"
+[[cone]]
+p0 = [0.3, 0, 1.6]
+p1 = [0.4, 0.9, 1.5]
+radius0 = 0.4
+material = "m"
+[[sphere]]
+center = [-0.6, 0.4, 1.4]
+radius = 0.3
+transform = { scale = [1, 0.5, 1.5] }
+material = "m"
+"#;
+    let lights = [
+        "[[light.rectangle]]\ncenter = [1, 4, 1]\ne0 = [1.5, 0, 0]\ne1 = [0, 0, 1.5]\nstrength = 8\n",
+        // It cuts the box
+        "[[light.rectangle]]\ncenter = [-1.4, 0.9, 0]\ne0 = [0.9, 0.3, 0]\ne1 = [0, 0, 0.9]\nstrength = 3\n",
+        "[[light.sphere]]\ncenter = [1, 3, 1]\nradius = 0.5\nstrength = 8\n",
+        "[[light.sphere]]\ncenter = [1, 3, 1]\nradius = 0.5\nstrength = 1\nfalloff = \"constant\"\n",
+        // The box and the ring reach into it
+        "[[light.sphere]]\ncenter = [-1, 1.2, 0.2]\nradius = 0.5\nsides = \"front\"\nstrength = 3\n",
+    ];
+    for light in lights {
+        let off = off_by(&format!("{ROOM}{light}{solids}"));
+        assert!(off < 1.0, "{off} steps off with {light}");
+    }
+}

@@ -407,7 +407,8 @@ pub(crate) fn classify<S: Simd>(
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Touch {
     Apart,
-    /// It reaches into it: what of it is behind the light's surface does not show on the disk that stands for the light.
+    /// It reaches into it: what of it is behind the light's surface does not show on the disk that stands for the
+    /// light.
     Cuts,
     /// The light is inside of it.
     Holds,

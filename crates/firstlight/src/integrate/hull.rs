@@ -1,9 +1,9 @@
 //! Convex solids in the way of a light, for sixteen points at once.
 //!
 //! A solid is seen in a space of its own, in which it is a unit box, ball, disk or a frustum about z: lines stay lines
-//! there, so that nothing else changes. What a point sees of it is the hull of a few flat things: of a box, three faces;
-//! of a frustum, its ends and the band between the two lines in which planes through the point touch its mantle. A ring
-//! hides what is inside of its rim but not of its hole; a tube, what is in its hull but not in both of its ends.
+//! there, so that nothing else changes. What a point sees of it is the hull of a few flat things: of a box, three
+//! faces; of a frustum, its ends and the band between the two lines in which planes through the point touch its mantle.
+//! A ring hides what is inside of its rim but not of its hole; a tube, what is in its hull but not in both of its ends.
 
 use fearless_simd::{f32x16, mask32x16, prelude::*};
 

@@ -72,10 +72,11 @@ impl<S: Simd> Interval16<S> {
         Interval16 { from: simd.splat_f32x16(FAR), to: simd.splat_f32x16(-FAR) }
     }
 
-    /// The hull of two intervals, empty ones aside.
+    /// The hull of two intervals, those aside that are as good as empty: rounding makes such where a rim is seen edge
+    /// on, far from all else.
     #[inline(always)]
     pub fn join(&mut self, other: &Self) {
-        let is_there = other.from.simd_lt(other.to);
+        let is_there = (other.to - other.from).simd_gt((other.from.abs() + other.to.abs()) * 1e-3);
         self.from = is_there.select(self.from.min(other.from), self.from);
         self.to = is_there.select(self.to.max(other.to), self.to);
     }

@@ -16,7 +16,8 @@ pub(crate) enum Outline {
     /// x^2 + y^2 <= 1.
     Disk,
     /// The same, as the part of a sphere that a point sees: not the places of its disk count alike, but those of the
-    /// sphere. Integrated over longitude and latitude, the poles in the plane of the disk: x = cos y' sin x', y = sin y'.
+    /// sphere. It is integrated over longitude and latitude, with the poles in the plane of the disk: x = cos y' sin
+    /// x', y = sin y'.
     Sphere,
 }
 
