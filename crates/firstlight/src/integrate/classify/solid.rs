@@ -76,10 +76,10 @@ impl ConvexSolid {
     /// Whether a point is on the plane of a flat one, as far as it can be told.
     fn is_under(&self, point: &ShadingPoint) -> bool {
         let row = self.canonical_from_world.matrix3.transpose().z_axis;
-        let p = point.p.as_dvec3();
-        let height = self.canonical_from_world.transform_point3(p).z;
-        let sizes = row.abs().dot(p.abs()) + self.canonical_from_world.translation.z.abs();
-        self.kind.is_flat() && height.abs() <= 2.0 * row.abs().dot(point.error.0.as_dvec3()) + 2e-7 * sizes
+        let at = self.canonical_from_world.transform_point3(point.p.as_dvec3());
+        // What a point is on is met to within its rounding, and that of the way along the plane
+        let room = 2.0 * row.abs().dot(point.error.0.as_dvec3()) + 4e-7 * at.truncate().length();
+        self.kind.is_flat() && at.z.abs() <= room
     }
 }
 
