@@ -77,7 +77,13 @@ impl<S: Simd> Rim<S> {
         let quadratic = Quadratic16::square(&ahead)
             .combined(simd.splat_f32x16(r * r), Quadratic16::square(&across[0]), -one)
             .combined(one, Quadratic16::square(&across[1]), -one);
-        let plane = Linear16 { c: ahead.c - to.z.abs(), ..ahead };
+        // Seen edge on it hides nothing, and its quadratic is 0 along rows that are parallel to it
+        let is_edge = to.z.abs().simd_le((to.x.abs() + to.y.abs() + r) * 1e-6);
+        let plane = Linear16 {
+            c: is_edge.select(simd.splat_f32x16(-FAR), ahead.c - to.z.abs()),
+            x: is_edge.select(zero, ahead.x),
+            y: is_edge.select(zero, ahead.y),
+        };
         Rim { quadratic, ahead, plane }
     }
 

@@ -45,9 +45,11 @@ impl Canonical {
             Canonical::Plane | Canonical::Disk { .. } => false,
             Canonical::Box => p.abs().max_element() < 1.0,
             Canonical::Ball => p.length_squared() < 1.0,
-            Canonical::Frustum { radii, .. } => {
+            Canonical::Frustum { radii, open } => {
                 let [first, last] = radii.map(f64::from);
-                p.z > 0.0 && p.z < 1.0 && p.truncate().length() < first + (last - first) * p.z
+                // A tube is left from its inner wall as well
+                let room = if *open { 1e-4 } else { 0.0 };
+                p.z > -room && p.z < 1.0 + room && p.truncate().length() < first + (last - first) * p.z + room
             }
         }
     }
