@@ -12,7 +12,7 @@ use super::batch::{Linear16, Members, ShadingPoint, ViewNumber};
 use super::cut;
 use super::emitter::Emitter;
 use super::hull::SolidOccluder;
-use super::occluder::{Exact, Occluder, Shadow, corners_from, ways};
+use super::occluder::{Exact, Occluder, Shadow, corners_from, edges, ways};
 use super::panels::{Between, MAX_BETWEEN, MAX_CUTS};
 use crate::ids::LightId;
 use crate::math::{DAffine3, LANES, Vec3x16};
@@ -89,7 +89,7 @@ impl<'a> Obstacles<'a> {
                 continue;
             }
             let solid = scene.geometry.solids[solid as usize];
-            if obstacles.add(ConvexSolid::new(solid, thing.placement.clone(), emitter)) {
+            if obstacles.add(ConvexSolid::new(solid, thing.placement, emitter)) {
                 obstacles.placed.push(k as u32);
             }
         }
@@ -343,11 +343,11 @@ pub(crate) fn classify<S: Simd>(
         }
         let mut told = match (occluder, exact) {
             (Occluder::Sphere { center, radius }, ExactShape::Sphere(sphere)) => {
-                sphere_between(simd, &sight, center.seen_from(simd, sight.p), *radius, sphere, occluder, points, asked)
+                sphere_between(simd, &sight, center.seen_from(simd, sight.p), *radius, sphere, points, asked)
             }
             (Occluder::Flat { corners }, ExactShape::Flat { flat, side, seen_side }) => {
                 let corners = corners_from(simd, corners, sight.p);
-                flat_between(simd, &sight, corners, (flat, *side, *seen_side), occluder, points, asked)
+                flat_between(simd, &sight, corners, (flat, *side, *seen_side), points, asked)
             }
             (Occluder::Solid(_), ExactShape::Solid(shape)) => {
                 solid_between(simd, &sight, shape, occluder, points, asked)
@@ -457,7 +457,6 @@ impl<S: Simd> Told<S> {
     }
 }
 
-#[allow(clippy::too_many_arguments, reason = "a sphere twice, and sixteen points")]
 #[inline(always)]
 fn sphere_between<S: Simd>(
     simd: S,
@@ -465,7 +464,6 @@ fn sphere_between<S: Simd>(
     s: Vec3x16<S>,
     r: f32,
     sphere: &Sphere,
-    occluder: &Occluder,
     points: &[ShadingPoint],
     asked: u64,
 ) -> Told<S> {
@@ -503,8 +501,8 @@ fn sphere_between<S: Simd>(
     if within != 0 {
         let mut all_in = within;
         let mut none_in = within;
-        let smaller = Shadow::new(simd, &resized(occluder, r * (1.0 - 1e-6)), sight.p, &sight.ways);
-        let larger = Shadow::new(simd, &resized(occluder, r * (1.0 + 1e-6)), sight.p, &sight.ways);
+        let smaller = Shadow::cone(simd, s, r * (1.0 - 1e-6), &sight.ways);
+        let larger = Shadow::cone(simd, s, r * (1.0 + 1e-6), &sight.ways);
         for [x, y] in sight.square() {
             all_in &= smaller.holds(x, y).to_bitmask();
             none_in &= !larger.holds(x, y).to_bitmask();
@@ -540,7 +538,7 @@ fn sphere_between<S: Simd>(
         return told;
     }
     // One convex thing hides all of the light if it hides its corners
-    let shadow = Shadow::new(simd, occluder, sight.p, &sight.ways);
+    let shadow = Shadow::cone(simd, s, r, &sight.ways);
     let hidden = sight.hidden(&shadow, near);
     told.hidden |= hidden;
     told.outside = near & !hidden;
@@ -553,18 +551,11 @@ fn sphere_between<S: Simd>(
         patches &= patches - 1;
         let smaller = r - points[k].reach;
         if smaller > 0.0 {
-            let shadow = Shadow::new(simd, &resized(occluder, smaller), sight.p, &sight.ways);
+            let shadow = Shadow::cone(simd, s, smaller, &sight.ways);
             told.firm |= sight.hidden(&shadow, 1 << k);
         }
     }
     told
-}
-
-fn resized(occluder: &Occluder, radius: f32) -> Occluder {
-    match occluder {
-        Occluder::Sphere { center, .. } => Occluder::Sphere { center: *center, radius },
-        flat => *flat,
-    }
 }
 
 #[inline(always)]
@@ -573,7 +564,6 @@ fn flat_between<S: Simd>(
     sight: &Sight<S>,
     q: [Vec3x16<S>; 4],
     (flat, side, seen_side): (&Parallelogram, PlaneSide, PlaneSide),
-    occluder: &Occluder,
     points: &[ShadingPoint],
     asked: u64,
 ) -> Told<S> {
@@ -619,7 +609,7 @@ fn flat_between<S: Simd>(
         return told;
     }
     // In the light's own plane nothing is before it
-    let Shadow::Edges { lines } = Shadow::new(simd, occluder, sight.p, &sight.ways) else { return told };
+    let lines = edges(q, &sight.ways);
     let n = (q[1] - q[0]).cross(q[3] - q[0]);
     let length = n.dot(n).sqrt();
     let mut in_plane = near;

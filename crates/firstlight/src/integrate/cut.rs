@@ -116,10 +116,13 @@ pub(crate) struct Cut<S: Simd> {
     shape: CutShape<S>,
 }
 
+/// The lines of a flat thing, and where its plane cuts the ball; or nothing.
+type Face<S> = ([Linear16<S>; 5], Option<Arc<S>>);
+
 enum CutShape<S: Simd> {
     /// What is inside of the sides of flat things, behind their planes.
     Flat {
-        faces: [([Linear16<S>; 5], Option<Arc<S>>); FACES],
+        faces: [Face<S>; FACES],
     },
     Rim {
         cone: Quadratic16<S>,
@@ -145,9 +148,24 @@ pub(crate) fn knows(occluder: &Occluder) -> bool {
 }
 
 impl<S: Simd> Cut<S> {
-    /// `None` if that is not known.
-    #[inline(always)]
+    /// `None` if that is not known. Not inlined, as what it is asked is not: one copy of each for each instruction set
+    /// is enough.
+    #[inline(never)]
     pub fn new(
+        simd: S,
+        occluder: &Occluder,
+        ball: (Exact, f32),
+        p: Vec3x16<S>,
+        l: &[Vec3x16<S>; 3],
+    ) -> Option<Cut<S>> {
+        simd.vectorize(
+            #[inline(always)]
+            || Cut::new_now(simd, occluder, ball, p, l),
+        )
+    }
+
+    #[inline(always)]
+    fn new_now(
         simd: S,
         occluder: &Occluder,
         (center, radius): (Exact, f32),
@@ -203,8 +221,16 @@ impl<S: Simd> Cut<S> {
     }
 
     /// Hands over what is hidden of sixteen rows, of which `rim` is what is on the ball.
-    #[inline(always)]
+    #[inline(never)]
     pub fn hidden(&self, simd: S, y: f32x16<S>, rim: &Interval16<S>) -> [Interval16<S>; MOST] {
+        simd.vectorize(
+            #[inline(always)]
+            || self.hidden_now(simd, y, rim),
+        )
+    }
+
+    #[inline(always)]
+    fn hidden_now(&self, simd: S, y: f32x16<S>, rim: &Interval16<S>) -> [Interval16<S>; MOST] {
         let mut all = [Interval16::none(simd); MOST];
         let zero = simd.splat_f32x16(0.0);
         match &self.shape {
@@ -240,8 +266,16 @@ impl<S: Simd> Cut<S> {
     }
 
     /// See [`Shadow::breaks`](super::occluder::Shadow::breaks).
-    #[inline(always)]
+    #[inline(never)]
     pub fn breaks(&self, breaks: &mut Breaks<S>) {
+        breaks.of.token().vectorize(
+            #[inline(always)]
+            || self.breaks_now(breaks),
+        );
+    }
+
+    #[inline(always)]
+    fn breaks_now(&self, breaks: &mut Breaks<S>) {
         let of = breaks.of;
         match &self.shape {
             CutShape::Flat { faces } => {

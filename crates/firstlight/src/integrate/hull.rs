@@ -195,9 +195,18 @@ enum Hole {
 }
 
 impl<S: Simd> Hull<S> {
-    /// `to` is the way to the middle of its own space, `l` are the light's in it. Not of a ball.
-    #[inline(always)]
+    /// `to` is the way to the middle of its own space, `l` are the light's in it. Not of a ball. Not inlined, as what
+    /// it is asked is not: one copy of each for each instruction set is enough.
+    #[inline(never)]
     pub fn new(solid: &SolidOccluder, to: Vec3x16<S>, l: &[Vec3x16<S>; 3]) -> Hull<S> {
+        to.x.token().vectorize(
+            #[inline(always)]
+            || Hull::new_now(solid, to, l),
+        )
+    }
+
+    #[inline(always)]
+    fn new_now(solid: &SolidOccluder, to: Vec3x16<S>, l: &[Vec3x16<S>; 3]) -> Hull<S> {
         let simd = to.x.token();
         let (zero, one) = (simd.splat_f32x16(0.0), simd.splat_f32x16(1.0));
         let nothing = Linear16 { c: zero, x: zero, y: zero };
@@ -267,8 +276,16 @@ impl<S: Simd> Hull<S> {
     }
 
     /// What is hidden of sixteen rows: before a hole, and after it.
-    #[inline(always)]
+    #[inline(never)]
     pub fn hidden(&self, simd: S, y: f32x16<S>) -> [Interval16<S>; 2] {
+        simd.vectorize(
+            #[inline(always)]
+            || self.hidden_now(simd, y),
+        )
+    }
+
+    #[inline(always)]
+    fn hidden_now(&self, simd: S, y: f32x16<S>) -> [Interval16<S>; 2] {
         let far = simd.splat_f32x16(FAR);
         let mut all = Interval16::none(simd);
         for face in &self.faces[..self.count[0]] {
@@ -303,8 +320,16 @@ impl<S: Simd> Hull<S> {
     }
 
     /// Whether a place of the light is hidden.
-    #[inline(always)]
+    #[inline(never)]
     pub fn hides(&self, x: f32x16<S>, y: f32x16<S>) -> mask32x16<S> {
+        x.token().vectorize(
+            #[inline(always)]
+            || self.hides_now(x, y),
+        )
+    }
+
+    #[inline(always)]
+    fn hides_now(&self, x: f32x16<S>, y: f32x16<S>) -> mask32x16<S> {
         let zero = x.token().splat_f32x16(0.0);
         let mut any = x.simd_lt(x);
         for face in &self.faces[..self.count[0]] {
@@ -328,8 +353,16 @@ impl<S: Simd> Hull<S> {
     }
 
     /// See [`Shadow::breaks`](super::occluder::Shadow::breaks).
-    #[inline(always)]
+    #[inline(never)]
     pub fn breaks(&self, breaks: &mut Breaks<S>) {
+        breaks.of.token().vectorize(
+            #[inline(always)]
+            || self.breaks_now(breaks),
+        );
+    }
+
+    #[inline(always)]
+    fn breaks_now(&self, breaks: &mut Breaks<S>) {
         for face in &self.faces[..self.count[0]] {
             breaks.polygon(face);
         }

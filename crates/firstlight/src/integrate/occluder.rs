@@ -379,8 +379,17 @@ impl<S: Simd> Shadow<S> {
         }
     }
 
+    /// Of a sphere, `s` the way to its middle. Not inlined: one copy for each instruction set is enough.
+    #[inline(never)]
+    pub fn cone(simd: S, s: Vec3x16<S>, r: f32, l: &[Vec3x16<S>; 3]) -> Shadow<S> {
+        simd.vectorize(
+            #[inline(always)]
+            || Shadow::cone_now(simd, s, r, l),
+        )
+    }
+
     #[inline(always)]
-    fn cone(simd: S, s: Vec3x16<S>, r: f32, l: &[Vec3x16<S>; 3]) -> Shadow<S> {
+    fn cone_now(simd: S, s: Vec3x16<S>, r: f32, l: &[Vec3x16<S>; 3]) -> Shadow<S> {
         let r2 = r * r;
         let cross = [l[0].cross(s), l[1].cross(s), l[2].cross(s)];
         let ll = Quadratic16::dot(*l, *l);

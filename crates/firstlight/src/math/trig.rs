@@ -27,7 +27,7 @@ pub(crate) fn sin_cos<S: Simd>(a: f32x16<S>) -> (f32x16<S>, f32x16<S>) {
 /// Mathematical Functions", 1964, 4.3.20.
 #[inline(always)]
 pub(crate) fn asin<S: Simd>(v: f32x16<S>) -> f32x16<S> {
-    const ARC: [f32; 5] = [4.216_32e-2, 2.418_131_1e-2, 4.547_002_6e-2, 7.495_300_3e-2, 1.666_675_2e-1];
+    const ARC: [f32; 5] = [4.216_32e-2, 2.418_131e-2, 4.547_002_6e-2, 7.495_300_3e-2, 1.666_675_2e-1];
     let simd = v.token();
     let size = v.abs().min(simd.splat_f32x16(1.0));
     let is_large = size.simd_gt(0.5);

@@ -484,8 +484,8 @@ impl<'a> Arrivals<'a> {
         let settled = &mut counts.settled;
         self.settler.settle(self.level, self.scene, target, points, order, settled, |k, visibility, view| {
             each(k, visibility, &mut || {
-                let in_tree = !listed && !(view.spheres.is_empty() && view.flats.is_empty());
-                let is_known = !in_tree && !view.has_meshes() && lights.know(index, &view.others);
+                let is_listed = listed || view.spheres.is_empty() && view.flats.is_empty();
+                let is_known = is_listed && !view.has_meshes() && lights.know(index, &view.others);
                 (!is_known).then(|| std::mem::replace(view, views.pop().unwrap_or_default()))
             });
         });
