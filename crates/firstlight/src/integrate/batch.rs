@@ -7,7 +7,7 @@ use fearless_simd::{f32x16, prelude::*};
 
 use super::view::View;
 use crate::color::Rgb;
-use crate::math::{ErrorBound, LANES, Vec3, Vec3x16};
+use crate::math::{ErrorBound, Facet, LANES, Vec3, Vec3x16};
 
 /// Sixteen numbers, one of each member of a batch.
 pub(crate) type Block = [f32; LANES];
@@ -20,6 +20,9 @@ pub(crate) struct ShadingPoint {
     pub error: ErrorBound,
     /// Light from below the plane with this normal does not count.
     pub horizon: Vec3,
+    /// Geometric normal, to the viewer's side, and the facet that the point was lifted off.
+    pub ng: Vec3,
+    pub facet: Facet,
     /// Shading normal.
     pub ns: Vec3,
     /// To the viewer.
@@ -44,6 +47,8 @@ impl ShadingPoint {
             p,
             error,
             horizon: n,
+            ng: n,
+            facet: Facet::NONE,
             ns: n,
             wo,
             reach: 0.0,

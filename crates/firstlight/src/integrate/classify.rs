@@ -4,6 +4,7 @@
 //! it. With a radius it is a proof of the same for all places within it, and a bound on how far the outline of a shadow
 //! moves on the light from one of them to another.
 
+mod flat;
 mod solid;
 
 use fearless_simd::{f32x16, prelude::*};
@@ -12,12 +13,14 @@ use super::batch::{Linear16, Members, ShadingPoint, ViewNumber};
 use super::cut;
 use super::emitter::Emitter;
 use super::hull::SolidOccluder;
-use super::occluder::{Exact, Occluder, Shadow, corners_from, edges, ways};
-use super::panels::{Between, MAX_BETWEEN, MAX_CUTS};
+use super::occluder::{Exact, Occluder, Shadow, corners_from, ways};
+use super::panels::{Between, MAX_INTERVALS};
 use crate::ids::LightId;
-use crate::math::{DAffine3, LANES, Vec3x16};
+use crate::math::{DAffine3, Facet, LANES, Vec3, Vec3x16};
 use crate::scene::{Meets, Scene, Target};
 use crate::shape::{Parallelogram, Placement, PlaneSide, Solid, Sphere};
+use crate::visibility::{Occluders, ShadowMesh};
+use flat::{FacetShape, Own, facet_between, flat_between};
 use solid::{ConvexSolid, solid_between};
 
 /// All things that may stand in the way of one light.
@@ -32,6 +35,8 @@ pub(crate) struct Obstacles<'a> {
     pub cuts: u64,
     /// Which placed things are among them.
     placed: Vec<u32>,
+    /// Whether there is more than that.
+    has_more: bool,
 }
 
 /// What decides on which side a point is.
@@ -45,39 +50,38 @@ enum ExactShape<'a> {
         seen_side: PlaneSide,
     },
     Solid(Box<ConvexSolid>),
+    Facet(FacetShape),
 }
 
-/// The most obstacles of a light.
+/// The most obstacles of a light, those in lists and those in trees.
 pub(crate) const MAX_OBSTACLES: usize = 64;
 
 impl<'a> Obstacles<'a> {
-    /// Those of light `index`; `None` if they are too many.
-    pub fn new(scene: &'a Scene, index: usize, emitter: &Emitter) -> Option<Obstacles<'a>> {
+    /// Those of light `index` that are in lists, and solids.
+    pub fn new(scene: &'a Scene, index: usize, emitter: &Emitter) -> Obstacles<'a> {
         let id = LightId(index as u32);
         let mut obstacles = Obstacles::default();
         if !scene.lights[index].shadows {
-            return Some(obstacles);
+            return obstacles;
         }
         let [sphere_links, flat_links] = &scene.obstacle_links;
         let listed = scene.obstacles.iter().enumerate().filter(|(i, _)| scene.casts(sphere_links, *i, id));
         let lights = scene.light_obstacles.spheres.iter().filter(|(light, _)| *light != index);
         for sphere in listed.map(|(_, sphere)| sphere).chain(lights.map(|(_, sphere)| sphere)) {
-            obstacles.occluders.push(Occluder::Sphere { center: Exact::new(sphere.c), radius: sphere.r as f32 });
-            obstacles.exact.push(ExactShape::Sphere(sphere));
+            obstacles.sphere(sphere);
         }
         let sides = &scene.light_sides[index];
         for (i, flat) in scene.flat_obstacles.iter().enumerate().filter(|(i, _)| scene.casts(flat_links, *i, id)) {
             let side = sides.get(i).copied().unwrap_or(PlaneSide::Both);
             let seen_side = if scene.flats_seen.get(i) == Some(&true) { side } else { PlaneSide::Both };
-            obstacles.occluders.push(Occluder::Flat { corners: flat.deep_corners().map(Exact::new) });
-            obstacles.exact.push(ExactShape::Flat { flat, side, seen_side });
+            obstacles.flat(flat, side, seen_side);
         }
         for (_, disk) in scene.light_obstacles.disks.iter().filter(|(light, _)| *light != index) {
-            obstacles.add(ConvexSolid::new(Solid::Disk(*disk), Placement::new(DAffine3::IDENTITY), emitter));
+            obstacles.solid(ConvexSolid::new(Solid::Disk(*disk), Placement::new(DAffine3::IDENTITY), emitter));
         }
-        if obstacles.occluders.len() > MAX_OBSTACLES {
-            return None;
-        }
+        obstacles.has_more = obstacles.occluders.len() > MAX_OBSTACLES;
+        obstacles.occluders.truncate(MAX_OBSTACLES);
+        obstacles.exact.truncate(MAX_OBSTACLES);
         for (k, thing) in scene.geometry.placed.iter().enumerate() {
             let Target::Solid(solid) = thing.target else { continue };
             let casts = match thing.shadow {
@@ -89,12 +93,66 @@ impl<'a> Obstacles<'a> {
                 continue;
             }
             let solid = scene.geometry.solids[solid as usize];
-            if obstacles.add(ConvexSolid::new(solid, thing.placement, emitter)) {
+            if obstacles.solid(ConvexSolid::new(solid, thing.placement, emitter)) {
                 obstacles.placed.push(k as u32);
             }
         }
         obstacles.touch(emitter);
-        Some(obstacles)
+        obstacles
+    }
+
+    /// Takes what was gathered in trees in the way of light `id`, but for placed things, in place of what it was;
+    /// `false` if it is more than can be told beside so many others.
+    pub fn gather(
+        &mut self,
+        scene: &'a Scene,
+        id: LightId,
+        emitter: &Emitter,
+        trees: &Occluders,
+        others: usize,
+    ) -> bool {
+        *self = Obstacles {
+            occluders: std::mem::take(&mut self.occluders),
+            exact: std::mem::take(&mut self.exact),
+            touches: std::mem::take(&mut self.touches),
+            ..Obstacles::default()
+        };
+        self.occluders.clear();
+        self.exact.clear();
+        self.touches.clear();
+        for which in &trees.spheres {
+            self.sphere(scene.sphere(*which));
+        }
+        for (which, _) in &trees.flats {
+            self.flat(scene.flat(*which), PlaneSide::Both, PlaneSide::Both);
+        }
+        for (source, leaf) in &trees.leaves {
+            let Some(mesh) = ShadowMesh::of(&scene.geometry, *source, id) else { continue };
+            for (triangle, corners) in mesh.mesh.tree.leaf(*leaf) {
+                if !mesh.casts(triangle) {
+                    continue;
+                }
+                let corners = corners.map(|q: Vec3| match mesh.placement {
+                    Some(placement) => placement.world_from_object.transform_point3(q.as_dvec3()),
+                    None => q.as_dvec3(),
+                });
+                let shape = FacetShape::new(Facet { source: *source, triangle }, corners);
+                self.occluders.push(Occluder::Flat { corners: shape.corners() });
+                self.exact.push(ExactShape::Facet(shape));
+            }
+        }
+        self.touch(emitter);
+        self.occluders.len() + others <= MAX_OBSTACLES
+    }
+
+    fn sphere(&mut self, sphere: &'a Sphere) {
+        self.occluders.push(Occluder::Sphere { center: Exact::new(sphere.c), radius: sphere.r as f32 });
+        self.exact.push(ExactShape::Sphere(sphere));
+    }
+
+    fn flat(&mut self, flat: &'a Parallelogram, side: PlaneSide, seen_side: PlaneSide) {
+        self.occluders.push(Occluder::Flat { corners: flat.deep_corners().map(Exact::new) });
+        self.exact.push(ExactShape::Flat { flat, side, seen_side });
     }
 
     /// Finds out what reaches into a light that is a ball.
@@ -110,34 +168,33 @@ impl<'a> Obstacles<'a> {
     }
 
     /// Adds a solid, if rows tell it.
-    fn add(&mut self, solid: Option<(ConvexSolid, SolidOccluder)>) -> bool {
+    fn solid(&mut self, solid: Option<(ConvexSolid, SolidOccluder)>) -> bool {
         let Some((shape, occluder)) = solid else { return false };
         self.occluders.push(Occluder::Solid(occluder));
         self.exact.push(ExactShape::Solid(Box::new(shape)));
         true
     }
 
+    /// Each, and whether it reaches into a ball as rows tell.
+    #[inline(always)]
+    fn each(&self) -> impl Iterator<Item = (&Occluder, &ExactShape<'a>, Touch, bool)> {
+        let all = self.occluders.iter().zip(&self.exact).zip(&self.touches).enumerate();
+        all.map(|(i, ((occluder, exact), touch))| (occluder, exact, *touch, self.cuts >> i & 1 == 1))
+    }
+
     /// Whether a placed thing is among them.
     pub fn has_placed(&self, thing: u32) -> bool {
         self.placed.binary_search(&thing).is_ok()
-    }
-
-    /// Whether any is.
-    pub fn has_solids(&self) -> bool {
-        !self.placed.is_empty()
     }
 }
 
 #[cfg(test)]
 impl<'a> Obstacles<'a> {
-    /// Spheres alone.
-    pub fn of_spheres(spheres: &'a [Sphere], emitter: &Emitter) -> Obstacles<'a> {
-        let occluder = |sphere: &Sphere| Occluder::Sphere { center: Exact::new(sphere.c), radius: sphere.r as f32 };
-        let mut obstacles = Obstacles {
-            occluders: spheres.iter().map(occluder).collect(),
-            exact: spheres.iter().map(ExactShape::Sphere).collect(),
-            ..Obstacles::default()
-        };
+    /// Spheres alone, and parallelograms.
+    pub fn of(spheres: &'a [Sphere], flats: &'a [Parallelogram], emitter: &Emitter) -> Obstacles<'a> {
+        let mut obstacles = Obstacles::default();
+        spheres.iter().for_each(|sphere| obstacles.sphere(sphere));
+        flats.iter().for_each(|flat| obstacles.flat(flat, PlaneSide::Both, PlaneSide::Both));
         obstacles.touch(emitter);
         obstacles
     }
@@ -259,6 +316,43 @@ impl<S: Simd> Sight<S> {
         }
     }
 
+    /// The way to a place of the light.
+    #[inline(always)]
+    fn way(&self, x: f32x16<S>, y: f32x16<S>) -> Vec3x16<S> {
+        way(&self.ways, x, y)
+    }
+
+    /// How far the hull of some points lies outside of one side of the pyramid over the light, at most.
+    #[inline(always)]
+    fn gap(&self, hull: &[Vec3x16<S>]) -> f32x16<S> {
+        let mut gap = self.far.token().splat_f32x16(f32::NEG_INFINITY);
+        for n in &self.sides {
+            let mut least = n.dot(hull[0]);
+            for q in &hull[1..] {
+                least = least.min(n.dot(*q));
+            }
+            gap = gap.max(least);
+        }
+        gap
+    }
+
+    /// Those of some points from which something of the light's square is on the inner side of each line, and those
+    /// from which all of it is on that of all.
+    #[inline(always)]
+    fn covered(&self, lines: &[Linear16<S>; 5], of: u64) -> [u64; 2] {
+        let zero = self.far.token().splat_f32x16(0.0);
+        let (mut some, mut all) = (of, of);
+        for line in lines {
+            let Linear16 { c, x, y } = *line;
+            let ([left, right], [low, high]) = (self.x, self.y);
+            let most = c + (left * x).max(right * x) + (low * y).max(high * y);
+            let least = c + (left * x).min(right * x) + (low * y).min(high * y);
+            some &= most.simd_ge(zero).to_bitmask();
+            all &= least.simd_ge(zero).to_bitmask();
+        }
+        [some, some & all]
+    }
+
     /// The corners of the light's square.
     #[inline(always)]
     fn square(&self) -> [[f32x16<S>; 2]; 4] {
@@ -320,12 +414,13 @@ impl<S: Simd> Sight<S> {
     }
 }
 
-/// The classes of up to sixteen points, whose views `members` are; of those whose bits are in `asked`. To be called
-/// within `vectorize`.
+/// The classes of up to sixteen points, whose views `members` are; of those whose bits are in `asked`. What is in trees
+/// is `near` and counted after what is in lists. To be called within `vectorize`.
 #[inline(always)]
 pub(crate) fn classify<S: Simd>(
     simd: S,
     obstacles: &Obstacles,
+    near: Option<&Obstacles>,
     emitter: &Emitter,
     members: &Members,
     points: &[ShadingPoint],
@@ -336,8 +431,11 @@ pub(crate) fn classify<S: Simd>(
         return classes;
     }
     let sight = Sight::new(simd, members, points);
+    let own = near.is_some().then(|| Own::new(simd, &sight, points));
     let mut asked = asked;
-    for (i, (occluder, exact)) in obstacles.occluders.iter().zip(&obstacles.exact).enumerate() {
+    for (i, (occluder, exact, touch, cuts)) in
+        obstacles.each().chain(near.into_iter().flat_map(Obstacles::each)).enumerate()
+    {
         if asked == 0 {
             break;
         }
@@ -352,16 +450,21 @@ pub(crate) fn classify<S: Simd>(
             (Occluder::Solid(_), ExactShape::Solid(shape)) => {
                 solid_between(simd, &sight, shape, occluder, points, asked)
             }
+            (Occluder::Flat { corners }, ExactShape::Facet(shape)) => match &own {
+                Some(own) => {
+                    facet_between(simd, &sight, corners_from(simd, corners, sight.p), shape, own, points, asked)
+                }
+                None => unreachable!("no triangle is in lists"),
+            },
             _ => unreachable!("both lists hold the same things"),
         };
-        let touch = obstacles.touches[i];
         if touch == Touch::Cuts {
             // Of the ball more may be seen than of its disk
             (told.outside, told.hidden, told.firm) = (told.outside | told.hidden, 0, 0);
             told.other |= if matches!(emitter, Emitter::Ball { both_sides: true, .. }) {
                 // What is behind the disk shines as well
                 asked
-            } else if obstacles.cuts >> i & 1 == 1 {
+            } else if cuts {
                 told.within
             } else {
                 told.outside | told.within
@@ -395,10 +498,12 @@ pub(crate) fn classify<S: Simd>(
             class.between.within |= (told.within >> k & 1) << i;
         }
     }
+    let cuts = obstacles.cuts | near.map_or(0, |near| near.cuts << obstacles.occluders.len());
     for class in &mut classes {
-        let many = class.between.outside.count_ones() + class.between.within.count_ones();
-        let cuts = (class.between.outside & obstacles.cuts).count_ones();
-        class.other |= many as usize > MAX_BETWEEN || cuts as usize > MAX_CUTS;
+        let Between { outside, within } = class.between;
+        let many = 2 * (outside.count_ones() + within.count_ones()) as usize;
+        let more = (cut::MOST - 2) * (outside & cuts).count_ones() as usize;
+        class.other |= many + more > MAX_INTERVALS || obstacles.has_more;
     }
     classes
 }
@@ -430,7 +535,8 @@ impl Touch {
             }
             ExactShape::Flat { flat, .. } if flat.distance(*center) < *radius => Touch::Cuts,
             ExactShape::Solid(solid) if solid.may_touch => Touch::Cuts,
-            ExactShape::Flat { .. } | ExactShape::Solid(_) => Touch::Apart,
+            ExactShape::Facet(shape) if f64::from(shape.distance(*center)) < *radius => Touch::Cuts,
+            ExactShape::Flat { .. } | ExactShape::Solid(_) | ExactShape::Facet(_) => Touch::Apart,
         }
     }
 }
@@ -553,125 +659,6 @@ fn sphere_between<S: Simd>(
         if smaller > 0.0 {
             let shadow = Shadow::cone(simd, s, smaller, &sight.ways);
             told.firm |= sight.hidden(&shadow, 1 << k);
-        }
-    }
-    told
-}
-
-#[inline(always)]
-fn flat_between<S: Simd>(
-    simd: S,
-    sight: &Sight<S>,
-    q: [Vec3x16<S>; 4],
-    (flat, side, seen_side): (&Parallelogram, PlaneSide, PlaneSide),
-    points: &[ShadingPoint],
-    asked: u64,
-) -> Told<S> {
-    let zero = simd.splat_f32x16(0.0);
-    let mut told = Told::nothing(zero);
-    let mut size2 = zero;
-    let mut rises = simd.splat_f32x16(f32::NEG_INFINITY);
-    for q in &q {
-        size2 = size2.max(q.dot(*q));
-        rises = rises.max(sight.horizon.dot(*q));
-    }
-    let rounding = size2.sqrt() * SLACK;
-    // Above whose horizon it rises
-    let around = sight.reach + sight.turn * (size2.sqrt() + sight.reach);
-    let mut near = asked & rises.simd_ge(-rounding - around).to_bitmask();
-    if near == 0 {
-        return told;
-    }
-    // In the pyramid over the light
-    let mut gap = simd.splat_f32x16(f32::NEG_INFINITY);
-    for n in &sight.sides {
-        let mut least = n.dot(q[0]);
-        for q in &q[1..] {
-            least = least.min(n.dot(*q));
-        }
-        gap = gap.max(least);
-    }
-    near &= gap.simd_le(rounding + sight.reach).to_bitmask();
-    // On which side of it the points are, to the last bit; and a part of what is around them may be on the other side
-    let (mut left, mut through, mut beside) = (near, 0u64, 0u64);
-    while left != 0 {
-        let k = left.trailing_zeros() as usize;
-        left &= left - 1;
-        let ShadingPoint { p, error, reach, .. } = points[k];
-        if !flat.is_one_sided(p, error, side) {
-            through |= 1 << k;
-        } else if reach > 0.0 && flat.plane_cuts(p, error, reach) {
-            beside |= 1 << k;
-        }
-    }
-    near = through | beside;
-    if near == 0 {
-        return told;
-    }
-    // In the light's own plane nothing is before it
-    let lines = edges(q, &sight.ways);
-    let n = (q[1] - q[0]).cross(q[3] - q[0]);
-    let length = n.dot(n).sqrt();
-    let mut in_plane = near;
-    for [x, y] in sight.square() {
-        in_plane &= lines[0].at(x, y).abs().simd_le(length * sight.far * SLACK).to_bitmask();
-    }
-    near &= !in_plane;
-    // How far away it is decides how far its shadow moves
-    let mut motion = [0.0f32; LANES];
-    let mut left = near & sight.reach.simd_gt(zero).to_bitmask();
-    while left != 0 {
-        let k = left.trailing_zeros() as usize;
-        left &= left - 1;
-        let point = &points[k];
-        let distance = flat.distance(point.p.as_dvec3()) as f32;
-        let is_screen =
-            beside >> k & 1 == 1 && distance <= point.reach && flat.screens(point.p, point.wo, point.reach, seen_side);
-        if !is_screen {
-            motion[k] = (distance - point.reach).max(0.0);
-            told.moving |= 1 << k;
-        }
-    }
-    told.motion = sight.motion(f32x16::simd_from(simd, motion));
-    near &= through & gap.simd_le(rounding).to_bitmask() & rises.simd_ge(-rounding).to_bitmask();
-    if near == 0 {
-        return told;
-    }
-    // What is wholly outside of one of its edges is not hidden; what is inside of all, wholly
-    let mut hidden = near;
-    for line in &lines {
-        let Linear16 { c, x, y } = *line;
-        let ([left, right], [low, high]) = (sight.x, sight.y);
-        let most = c + (left * x).max(right * x) + (low * y).max(high * y);
-        let least = c + (left * x).min(right * x) + (low * y).min(high * y);
-        near &= most.simd_ge(zero).to_bitmask();
-        hidden &= least.simd_ge(zero).to_bitmask();
-    }
-    hidden &= near;
-    told.hidden = hidden;
-    told.outside = near & !hidden;
-    // From everywhere around: all ways to the corners pass far inside of the edges
-    let mut patches = hidden;
-    while patches != 0 {
-        let k = patches.trailing_zeros() as usize;
-        patches &= patches - 1;
-        let point = &points[k];
-        if point.reach == 0.0 {
-            told.firm |= 1 << k;
-            continue;
-        }
-        let share = (motion[k] + point.reach) / sight.far.to_array()[k];
-        let corners = flat.deep_corners().map(|q| (q - point.p.as_dvec3()).as_vec3());
-        let edge = |i: usize| corners[i].cross(corners[(i + 1) % 4]).length();
-        let lengths = [length.to_array()[k], edge(0), edge(1), edge(2), edge(3)];
-        let mut depth = f32::INFINITY;
-        for (line, length) in lines.iter().zip(lengths) {
-            for [x, y] in sight.square() {
-                depth = depth.min(line.at(x, y).to_array()[k] / length);
-            }
-        }
-        if depth * share.min(1.0) > point.reach {
-            told.firm |= 1 << k;
         }
     }
     told

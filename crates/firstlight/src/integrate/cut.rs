@@ -151,13 +151,7 @@ impl<S: Simd> Cut<S> {
     /// `None` if that is not known. Not inlined, as what it is asked is not: one copy of each for each instruction set
     /// is enough.
     #[inline(never)]
-    pub fn new(
-        simd: S,
-        occluder: &Occluder,
-        ball: (Exact, f32),
-        p: Vec3x16<S>,
-        l: &[Vec3x16<S>; 3],
-    ) -> Option<Cut<S>> {
+    pub fn new(simd: S, occluder: &Occluder, ball: (Exact, f32), p: Vec3x16<S>, l: &[Vec3x16<S>; 3]) -> Option<Cut<S>> {
         simd.vectorize(
             #[inline(always)]
             || Cut::new_now(simd, occluder, ball, p, l),

@@ -1,5 +1,7 @@
 //! Area lights as they are integrated.
 
+use arrayvec::ArrayVec;
+
 use super::fit::Falloff;
 use super::view::{FlatLight, Outline};
 use crate::light::{Area, AreaShape};
@@ -45,6 +47,21 @@ impl Emitter {
             (Outline::Sphere, _) => Falloff::Sphere,
             (_, true) => Falloff::Physical,
             (_, false) => Falloff::Constant,
+        }
+    }
+
+    /// Corners of a box or a parallelogram around it.
+    pub fn corners(&self) -> ArrayVec<DVec3, 8> {
+        match self {
+            Emitter::Flat(flat) => {
+                let (a, b) = (flat.a.as_dvec3(), flat.b.as_dvec3());
+                [flat.c - a - b, flat.c + a - b, flat.c + a + b, flat.c - a + b].into_iter().collect()
+            }
+            Emitter::Ball { center, radius, .. } => (0..8)
+                .map(|k| {
+                    *center + DVec3::from([0, 1, 2].map(|axis| if k >> axis & 1 == 0 { -radius } else { *radius }))
+                })
+                .collect(),
         }
     }
 

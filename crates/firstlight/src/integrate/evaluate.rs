@@ -22,7 +22,7 @@ use super::Sums;
 use super::batch::{Block, Members, ShadingPoint, ViewBlock};
 use super::classify::{Class, Obstacles, classify};
 use super::emitter::Emitter;
-use super::fit::{Cell, Fits, MOMENTS, Polynomial, fit};
+use super::fit::{Cell, Fits, MOMENTS, Polynomial, coarse, fit};
 use super::panels::{Between, Blocked, Panel, PanelSums, cut, rows};
 use super::tolerance::{Tolerance, Weight};
 use super::view::{Outline, Receiver, View};
@@ -63,6 +63,8 @@ pub(crate) struct Arrived {
 pub(crate) struct Asked<'a> {
     pub emitter: &'a Emitter,
     pub obstacles: &'a Obstacles<'a>,
+    /// What of trees may be in the way, if anything is.
+    pub near: Option<&'a Obstacles<'a>>,
     pub lobe: &'a Lobe,
     pub steps: &'a DisplaySteps,
     pub tolerance: &'a Tolerance,
@@ -81,7 +83,9 @@ pub(crate) struct Evaluator {
     views: Vec<ViewBlock>,
     between: Vec<Between>,
     state: Vec<State>,
-    /// Cells that are seen whole, to be asked.
+    /// Cells that are seen whole, to be asked: those on which light is smooth enough that few nodes may tell it, and
+    /// others.
+    smooth: Vec<Cell>,
     whole: Vec<Cell>,
     /// All cells that are seen in part, with their polynomials as far as they were asked, and how much is seen of each.
     cut: Vec<Cell>,
@@ -90,6 +94,7 @@ pub(crate) struct Evaluator {
     /// Panels to be asked.
     panels: Vec<Panel>,
     /// What was asked in one round.
+    smooth_fits: Vec<Fits>,
     fits: Vec<Fits>,
     cut_fits: Vec<Fits>,
     panel_sums: Vec<PanelSums>,
@@ -117,7 +122,11 @@ impl Evaluator {
         self.look(level, light, points, arrived);
         let arrived = &mut arrived[first..];
         let mut round = 0;
-        while !(self.whole.is_empty() && self.polynomials.len() == self.cut.len() && self.panels.is_empty()) {
+        while !(self.smooth.is_empty()
+            && self.whole.is_empty()
+            && self.polynomials.len() == self.cut.len()
+            && self.panels.is_empty())
+        {
             round += 1;
             let new = self.polynomials.len();
             self.ask(level, light);
@@ -138,6 +147,7 @@ impl Evaluator {
         self.between.clear();
         self.state.clear();
         self.state.resize(points.len(), State::default());
+        self.smooth.clear();
         self.whole.clear();
         self.cut.clear();
         self.panels.clear();
@@ -163,7 +173,7 @@ impl Evaluator {
                     let members = Members::new(views, |k| (start + k) as u32);
                     simd.vectorize(
                         #[inline(always)]
-                        || classify(simd, light.obstacles, light.emitter, &members, points, arriving),
+                        || classify(simd, light.obstacles, light.near, light.emitter, &members, points, arriving),
                     )
                 });
             }
@@ -209,21 +219,32 @@ impl Evaluator {
 
     /// Asks all cells and panels of this round.
     fn ask(&mut self, level: Level, light: &Asked) {
-        let Evaluator { views, between, whole, cut: cut_cells, polynomials, panels, spare, .. } = self;
+        let Evaluator { views, between, smooth, whole, cut: cut_cells, polynomials, panels, spare, .. } = self;
         let falloff = light.emitter.falloff();
         let outline = light.emitter.outline();
         let Obstacles { occluders, ball, cuts, .. } = light.obstacles;
-        let blocked = Blocked { occluders, ball: *ball, cuts: *cuts, outline, between };
+        let near = light.near.map_or(&[][..], |near| &near.occluders);
+        let cuts = cuts | light.near.map_or(0, |near| near.cuts << occluders.len());
+        let blocked = Blocked { occluders: [occluders, near], ball: *ball, cuts, outline, between };
         let moments = if matches!(light.lobe, Lobe::None) { 1 } else { MOMENTS };
+        self.smooth_fits.clear();
         self.fits.clear();
         self.cut_fits.clear();
         self.panel_sums.clear();
-        let (fits, cut_fits, panel_sums) = (&mut self.fits, &mut self.cut_fits, &mut self.panel_sums);
+        let (smooth_fits, fits) = (&mut self.smooth_fits, &mut self.fits);
+        let (cut_fits, panel_sums) = (&mut self.cut_fits, &mut self.panel_sums);
         // Those of the cut cells that are new; others have their polynomials
         let new = cut_cells[polynomials.len()..].chunks(LANES).map(|cells| (cells, true));
         let asked = whole.chunks(LANES).map(|cells| (cells, false)).chain(new);
         // Each kernel is called at one place: so there is one copy of it for each instruction set
         dispatch_wide!(level, simd => {
+            for cells in smooth.chunks(LANES) {
+                let members = Members::new(views, |k| cells[k.min(cells.len() - 1)].point);
+                smooth_fits.push(simd.vectorize(
+                    #[inline(always)]
+                    || coarse(simd, light.lobe, falloff, &members, cells),
+                ));
+            }
             for (cells, is_cut) in asked {
                 let members = Members::new(views, |k| cells[k.min(cells.len() - 1)].point);
                 let first = polynomials.len() as u32;
@@ -255,6 +276,9 @@ impl Evaluator {
     fn judge(&mut self, light: &Asked, points: &[ShadingPoint], new: usize, round: u32) {
         let tolerance = light.tolerance;
         // What arrives as far as is known now, and how much of each new cell is seen
+        for (k, cell) in self.smooth.iter().enumerate() {
+            self.state[cell.point as usize].expect(lane(&self.smooth_fits[k / LANES].sums, k), round);
+        }
         for (k, cell) in self.whole.iter().enumerate() {
             self.state[cell.point as usize].expect(lane(&self.fits[k / LANES].sums, k), round);
         }
@@ -268,9 +292,9 @@ impl Evaluator {
             }
         }
         // How much errors weigh at such a brightness
-        let (states, whole, cut, panels) = (&mut self.state, &self.whole, &self.cut, &self.panels);
-        let asked =
-            whole.iter().map(|cell| cell.point).chain(panels.iter().map(|panel| cut[panel.cell as usize].point));
+        let (states, cut) = (&mut self.state, &self.cut);
+        let asked = self.smooth.iter().chain(&self.whole).map(|cell| cell.point);
+        let asked = asked.chain(self.panels.iter().map(|panel| cut[panel.cell as usize].point));
         for point in asked {
             let state = &mut states[point as usize];
             if state.round == round {
@@ -283,6 +307,16 @@ impl Evaluator {
         }
         // Cells that are seen whole
         self.next_whole.clear();
+        for (k, cell) in self.smooth.iter().enumerate() {
+            let fits = &self.smooth_fits[k / LANES];
+            let state = &mut self.state[cell.point as usize];
+            if coarse_error(state.weight, fits, k) * tolerance.fit_coarse > state.part(tolerance) {
+                self.next_whole.push(*cell);
+            } else {
+                state.accept(lane(&fits.sums, k));
+            }
+        }
+        self.smooth.clear();
         for (k, cell) in self.whole.iter().enumerate() {
             let fits = &self.fits[k / LANES];
             let state = &mut self.state[cell.point as usize];
@@ -359,6 +393,17 @@ fn fit_error(weight: Weight, fits: &Fits, k: usize, seen: f32, [share, slow_shar
             seen * tails[moment] * (share + slow_share * slow)
         }))
     })
+}
+
+/// The same by few nodes, along both axes: what they miss is the third power of the end of the series, where that is
+/// small beside the sum.
+fn coarse_error(weight: Weight, fits: &Fits, k: usize) -> f32 {
+    let sums = lane(&fits.sums, k);
+    let [x, y] = fits.tails.map(|tails| {
+        let tails = lane(&tails, k);
+        weight.of(std::array::from_fn(|moment| tails[moment] * square((tails[moment] / sums[moment].abs()).min(1.0))))
+    });
+    x + y
 }
 
 /// Added to the number of a round once the weight is known.
@@ -458,12 +503,17 @@ impl Evaluator {
             let distance2 = square(gap_x) + square(gap_y) + square(view.height);
             let size2 = square(half_x + lean) + square(half_y);
             let mut is_wide = size2 > square(tolerance.widest_cell) * distance2;
-            if let Some(mirror) = mirror.filter(|_| sharpness * size2 > tolerance.widest_highlight * distance2) {
+            let mut is_smooth = size2 < tolerance.smooth_cell * distance2;
+            if sharpness * size2 > tolerance.smooth_cell * distance2 {
                 // How far off the highlight's middle the cell begins
-                let l = view.l(x, y);
-                let cos = (l.dot(mirror) / l.length()).clamp(-1.0, 1.0);
-                let apart = (2.0 * (1.0 - cos)).sqrt() - (size2 / l.length_squared()).sqrt();
-                is_wide |= sharpness * square(apart.max(0.0)) < tolerance.highlight_end;
+                let is_far = mirror.is_some_and(|mirror| {
+                    let l = view.l(x, y);
+                    let cos = (l.dot(mirror) / l.length()).clamp(-1.0, 1.0);
+                    let apart = (2.0 * (1.0 - cos)).sqrt() - (size2 / l.length_squared()).sqrt();
+                    sharpness * square(apart.max(0.0)) >= tolerance.highlight_end
+                });
+                is_wide |= mirror.is_some() && !is_far && sharpness * size2 > tolerance.widest_highlight * distance2;
+                is_smooth &= is_far;
             }
             let part = Part::of(view, [x0, x1], [y0, y1]);
             if part == Part::None {
@@ -480,7 +530,11 @@ impl Evaluator {
                 open.extend([other, one]);
             } else {
                 count += 1;
-                let queue = if is_open && part == Part::All { &mut self.whole } else { &mut self.cut };
+                let queue = match is_open && part == Part::All {
+                    true if is_smooth => &mut self.smooth,
+                    true => &mut self.whole,
+                    false => &mut self.cut,
+                };
                 queue.push(cell);
             }
         }

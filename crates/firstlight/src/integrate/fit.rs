@@ -31,24 +31,40 @@ const WEIGHTS: [f64; NODES] = [
     0.236_926_885_056_189_08,
 ];
 
-/// P3 and P4 at `x`.
-const fn legendre(x: f64) -> [f64; 2] {
-    let xx = x * x;
-    [0.5 * x * (5.0 * xx - 3.0), 0.125 * (xx * (35.0 * xx - 30.0) + 3.0)]
+/// A Gauss-Legendre rule of `N` nodes on [-1, 1], with what each node counts in the coefficients of the last two
+/// Legendre polynomials that it knows.
+struct Rule<const N: usize> {
+    nodes: [f32; N],
+    weights: [f32; N],
+    tails: [[f32; N]; 2],
 }
 
-/// What each node counts in the coefficients of P3 and P4.
-const TAILS: [[f32; NODES]; 2] = {
-    let mut tails = [[0.0; NODES]; 2];
-    let mut i = 0;
-    while i < NODES {
-        let [p3, p4] = legendre(GAUSS[i]);
-        tails[0][i] = (3.5 * WEIGHTS[i] * p3) as f32;
-        tails[1][i] = (4.5 * WEIGHTS[i] * p4) as f32;
-        i += 1;
+impl<const N: usize> Rule<N> {
+    const fn new(nodes: [f64; N], weights: [f64; N]) -> Rule<N> {
+        let mut rule = Rule { nodes: [0.0; N], weights: [0.0; N], tails: [[0.0; N]; 2] };
+        let mut i = 0;
+        while i < N {
+            let x = nodes[i];
+            // Bonnet's recursion
+            let (mut before, mut p, mut k) = (1.0, x, 1);
+            while k + 1 < N {
+                (before, p) = (p, ((2 * k + 1) as f64 * x * p - k as f64 * before) / (k + 1) as f64);
+                k += 1;
+            }
+            rule.nodes[i] = x as f32;
+            rule.weights[i] = weights[i] as f32;
+            rule.tails[0][i] = ((k as f64 - 0.5) * weights[i] * before) as f32;
+            rule.tails[1][i] = ((k as f64 + 0.5) * weights[i] * p) as f32;
+            i += 1;
+        }
+        rule
     }
-    tails
-};
+}
+
+const FINE: Rule<NODES> = Rule::new(GAUSS, WEIGHTS);
+/// Three nodes, which tell the mean of what is smooth on a cell.
+const COARSE: Rule<3> =
+    Rule::new([-0.774_596_669_241_483_4, 0.0, 0.774_596_669_241_483_4], [5.0 / 9.0, 8.0 / 9.0, 5.0 / 9.0]);
 
 /// Coefficients of x^0 to x^4 of the polynomial that is 1 at a node and 0 at the others.
 const LAGRANGE: [[f64; NODES]; NODES] = {
@@ -96,15 +112,6 @@ const fn matrix(antiderivative: bool) -> [[f32; NODES]; NODES] {
 }
 const ANTIDERIVATIVE: [[f32; NODES]; NODES] = matrix(true);
 const MONOMIALS: [[f32; NODES]; NODES] = matrix(false);
-const NODES_32: [f32; NODES] = {
-    let mut nodes = [0.0; NODES];
-    let mut i = 0;
-    while i < NODES {
-        nodes[i] = GAUSS[i] as f32;
-        i += 1;
-    }
-    nodes
-};
 
 /// What a place of a light counts for, beside the cosine at the surface.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -136,17 +143,19 @@ pub(crate) struct Fits {
     pub tails: [[Block; MOMENTS]; 2],
 }
 
-/// The fit of up to sixteen cells. With `polynomials`, the antiderivatives along x: of each cell, moment by moment. To
-/// be called within `vectorize`.
+/// What sixteen cells send at the nodes of a rule: [moment][row][column].
+type Values<S, const N: usize> = [[[f32x16<S>; N]; N]; MOMENTS];
+
+/// What up to sixteen cells send at the nodes of a rule, and what they count for. To be called within `vectorize`.
 #[inline(always)]
-pub(crate) fn fit<S: Simd>(
+fn values<S: Simd, const N: usize>(
     simd: S,
+    rule: &Rule<N>,
     lobe: &Lobe,
     falloff: Falloff,
     members: &Members,
     cells: &[Cell],
-    polynomials: Option<&mut Vec<[Polynomial; MOMENTS]>>,
-) -> Fits {
+) -> (Values<S, N>, f32x16<S>) {
     use ViewNumber::*;
     let splat = |v: f32| simd.splat_f32x16(v);
     let cell =
@@ -167,18 +176,17 @@ pub(crate) fn fit<S: Simd>(
     let zero = splat(0.0);
     let height2 = height * height;
     let has_lobe = !matches!(lobe, Lobe::None);
-    // Ask the light at all nodes
-    let mut values = [[[zero; NODES]; NODES]; MOMENTS];
+    let mut values = [[[zero; N]; N]; MOMENTS];
     let is_sphere = falloff == Falloff::Sphere;
     let (ratio, behind2) = (members.lanes(simd, Ratio), members.lanes(simd, Behind2));
-    let (mut places, mut deep) = ([zero; NODES], [splat(1.0); NODES]);
-    for (i, node) in NODES_32.iter().enumerate() {
+    let (mut places, mut deep) = ([zero; N], [splat(1.0); N]);
+    for (i, node) in rule.nodes.iter().enumerate() {
         places[i] = xh * *node + xm;
         if is_sphere {
             (places[i], deep[i]) = sin_cos(places[i]);
         }
     }
-    for (j, node) in NODES_32.iter().enumerate() {
+    for (j, node) in rule.nodes.iter().enumerate() {
         let (mut y, mut wide) = (yh * *node + ym, splat(1.0));
         if is_sphere {
             (y, wide) = sin_cos(y);
@@ -187,8 +195,8 @@ pub(crate) fn fit<S: Simd>(
         let across = y * lb + fb;
         let rest = across * across + height2;
         let (cos_row, out_row) = (y * cos.y + cos.c, y * out.y + out.c);
-        let (mut cos_i, mut cos_io, mut weights) = ([zero; NODES], [zero; NODES], [splat(1.0); NODES]);
-        for i in 0..NODES {
+        let (mut cos_i, mut cos_io, mut weights) = ([zero; N], [zero; N], [splat(1.0); N]);
+        for i in 0..N {
             let x = if is_sphere { places[i] * wide } else { places[i] };
             let along = x * la + along_row;
             let inverse = 1.0 / (along * along + rest).sqrt();
@@ -207,41 +215,88 @@ pub(crate) fn fit<S: Simd>(
             cos_i[i] = (x * cos.x + cos_row) * inverse;
             cos_io[i] = (x * out.x + out_row) * inverse;
         }
-        for i in 0..NODES {
+        for i in 0..N {
             values[0][j][i] = cos_i[i] * weights[i];
         }
         if has_lobe {
             let lobes = lobe.eval_lanes(cos_i, cos_o, cos_io);
-            for i in 0..NODES {
+            for i in 0..N {
                 values[1][j][i] = lobes[i] * weights[i];
             }
         }
     }
-    // Sum them, and look at the ends of their series
-    let area = xh * yh * members.lanes(simd, Measure);
-    let mut fits = Fits::default();
-    let weights = WEIGHTS.map(|w| w as f32);
-    let moments = if has_lobe { MOMENTS } else { 1 };
-    for (moment, values) in values.iter().enumerate().take(moments) {
-        let (mut sum, mut tail_x, mut tail_y) = (zero, zero, zero);
-        for j in 0..NODES {
-            let row = &values[j];
-            let (mut total, mut c3, mut c4) = (zero, zero, zero);
-            let (mut d3, mut d4) = (zero, zero);
-            for i in 0..NODES {
-                total += row[i] * weights[i];
-                c3 += row[i] * TAILS[0][i];
-                c4 += row[i] * TAILS[1][i];
-                d3 += values[i][j] * TAILS[0][i];
-                d4 += values[i][j] * TAILS[1][i];
+    (values, xh * yh * members.lanes(simd, Measure))
+}
+
+/// The sum of a moment over a cell, and the last two coefficients of its series along x and along y, as much as they
+/// make of that.
+#[inline(always)]
+fn sum<S: Simd, const N: usize>(
+    simd: S,
+    rule: &Rule<N>,
+    values: &[[f32x16<S>; N]; N],
+) -> (f32x16<S>, [[f32x16<S>; 2]; 2]) {
+    let zero = simd.splat_f32x16(0.0);
+    let (mut sum, mut tails) = (zero, [[zero; 2]; 2]);
+    for (j, row) in values.iter().enumerate() {
+        let (mut total, mut c, mut d) = (zero, [zero; 2], [zero; 2]);
+        for i in 0..N {
+            total += row[i] * rule.weights[i];
+            for k in 0..2 {
+                c[k] += row[i] * rule.tails[k][i];
+                d[k] += values[i][j] * rule.tails[k][i];
             }
-            sum += total * weights[j];
-            tail_x += (c4.abs() + c3.abs() * 0.3) * (2.0 * weights[j]);
-            tail_y += (d4.abs() + d3.abs() * 0.3) * (2.0 * weights[j]);
         }
+        sum += total * rule.weights[j];
+        for k in 0..2 {
+            tails[0][k] += c[k].abs() * (2.0 * rule.weights[j]);
+            tails[1][k] += d[k].abs() * (2.0 * rule.weights[j]);
+        }
+    }
+    (sum, tails)
+}
+
+/// The sums of up to sixteen cells by three nodes along each axis, and how large what comes next in their series is: as
+/// their last coefficient, or, where that is 0 by chance, as the square of the one before. To be called within
+/// `vectorize`.
+#[inline(always)]
+pub(crate) fn coarse<S: Simd>(simd: S, lobe: &Lobe, falloff: Falloff, members: &Members, cells: &[Cell]) -> Fits {
+    let (values, area) = values(simd, &COARSE, lobe, falloff, members, cells);
+    let mut fits = Fits::default();
+    let moments = if matches!(lobe, Lobe::None) { 1 } else { MOMENTS };
+    for (moment, values) in values.iter().enumerate().take(moments) {
+        let (sum, tails) = sum(simd, &COARSE, values);
         fits.sums[moment] = (sum * area).to_array();
-        fits.tails[0][moment] = (tail_x * area).to_array();
-        fits.tails[1][moment] = (tail_y * area).to_array();
+        let least = simd.splat_f32x16(f32::MIN_POSITIVE);
+        for (axis, [before, last]) in tails.into_iter().enumerate() {
+            let tail = last + before * (before / sum.abs().max(least)).min(simd.splat_f32x16(1.0));
+            fits.tails[axis][moment] = (tail * area).to_array();
+        }
+    }
+    fits
+}
+
+/// The fit of up to sixteen cells. With `polynomials`, the antiderivatives along x: of each cell, moment by moment. To
+/// be called within `vectorize`.
+#[inline(always)]
+pub(crate) fn fit<S: Simd>(
+    simd: S,
+    lobe: &Lobe,
+    falloff: Falloff,
+    members: &Members,
+    cells: &[Cell],
+    polynomials: Option<&mut Vec<[Polynomial; MOMENTS]>>,
+) -> Fits {
+    let (values, area) = values(simd, &FINE, lobe, falloff, members, cells);
+    let zero = simd.splat_f32x16(0.0);
+    let mut fits = Fits::default();
+    let moments = if matches!(lobe, Lobe::None) { 1 } else { MOMENTS };
+    for (moment, values) in values.iter().enumerate().take(moments) {
+        let (sum, tails) = sum(simd, &FINE, values);
+        fits.sums[moment] = (sum * area).to_array();
+        for (axis, [before, last]) in tails.into_iter().enumerate() {
+            fits.tails[axis][moment] = ((last + before * 0.3) * area).to_array();
+        }
     }
     let Some(polynomials) = polynomials else { return fits };
     let mut lanes = [[[[0.0f32; LANES]; NODES]; NODES]; MOMENTS];

@@ -3,7 +3,6 @@
 use std::cell::Cell;
 
 use super::Sums;
-use super::between::Between;
 use super::cells::{self, Sent, Source};
 use super::emitter::Emitter;
 use super::near::Near;
@@ -22,7 +21,8 @@ pub(crate) struct Masked<'a> {
     pub emitter: &'a Emitter,
     pub si: &'a SurfaceInteraction,
     pub lobe: &'a Lobe,
-    pub between: &'a Between,
+    /// Whether anything can be in the way.
+    pub shadows: bool,
     /// How many points were asked.
     pub asked: &'a Cell<u64>,
 }
@@ -45,24 +45,20 @@ impl Masked<'_> {
     }
 
     /// Which of sixteen ways something stands in.
-    pub(super) fn hidden(&self, places: &[[f32; 2]], ways: &[Vec3; LANES], active: u16) -> u16 {
+    pub(super) fn hidden(&self, ways: &[Vec3; LANES], active: u16) -> u16 {
         let lanes = |mask: u16| (0..LANES).filter(move |lane| mask >> lane & 1 == 1);
         self.asked.set(self.asked.get() + u64::from(active.count_ones()));
+        if !self.shadows {
+            return 0;
+        }
         let mut hidden = 0;
-        if self.between.ask {
-            for lane in lanes(active) {
-                let ray = self.si.shadow_ray(LightId(self.light as u32), ways[lane], 1.0);
-                hidden |= u16::from(self.scene.occluded_by_lists(&ray)) << lane;
-            }
-        } else {
-            for lane in lanes(active) {
-                let [x, y] = places[lane];
-                hidden |= u16::from(self.between.hiders.iter().any(|hider| hider.hides(x, y))) << lane;
-            }
+        for lane in lanes(active) {
+            let ray = self.si.shadow_ray(LightId(self.light as u32), ways[lane], 1.0);
+            hidden |= u16::from(self.scene.occluded_by_lists(&ray)) << lane;
         }
         let geometry = &self.scene.geometry;
         let asking = active & !hidden;
-        if asking == 0 || !self.between.ask_trees {
+        if asking == 0 || !geometry.has_trees() {
             return hidden;
         }
         let from = self.si.shadow_ray(LightId(self.light as u32), Vec3::ZERO, 1.0);
@@ -134,7 +130,7 @@ impl Source for Seen<'_> {
         self.point(place, part)
     }
 
-    fn hidden(&self, places: &[[f32; 2]; LANES], ways: &[Vec3; LANES], active: u16) -> u16 {
-        self.masked.hidden(&places.map(|at| self.place(at).0), ways, active)
+    fn hidden(&self, _: &[[f32; 2]; LANES], ways: &[Vec3; LANES], active: u16) -> u16 {
+        self.masked.hidden(ways, active)
     }
 }

@@ -62,7 +62,8 @@ pub(crate) struct Between {
 /// A light and what is in the way, for all that asks.
 #[derive(Clone, Copy)]
 pub(crate) struct Blocked<'a> {
-    pub occluders: &'a [Occluder],
+    /// In lists, and of trees: counted together.
+    pub occluders: [&'a [Occluder]; 2],
     /// The light, if it is a ball, and which of them reach into it, bit by bit.
     pub ball: Option<(Exact, f32)>,
     pub cuts: u64,
@@ -79,12 +80,9 @@ pub(crate) struct PanelSums {
     pub seen: Block,
 }
 
-/// The most things that may hide a part of a light from one batch.
-pub(crate) const MAX_BETWEEN: usize = 24;
-/// Of which some have holes.
-const MAX_INTERVALS: usize = 2 * MAX_BETWEEN;
-/// The most of them that may reach into a ball.
-pub(crate) const MAX_CUTS: usize = MAX_INTERVALS / cut::MOST;
+/// The most intervals of a row that may be hidden from one point: one for each thing, two if it has a hole, more if it
+/// reaches into a ball.
+pub(crate) const MAX_INTERVALS: usize = 48;
 
 /// What may be in the way of a batch: the occluders that any of its points sees, and for which of them.
 struct Batch<'a, S: Simd> {
@@ -117,14 +115,19 @@ impl<'a, S: Simd> Batch<'a, S> {
             any &= any.wrapping_sub(1);
             first
         })
-        .take(MAX_BETWEEN)
+    }
+
+    #[inline(always)]
+    fn occluder(&self, number: usize) -> &'a Occluder {
+        let [listed, near] = self.blocked.occluders;
+        listed.get(number).unwrap_or_else(|| &near[number - listed.len()])
     }
 
     /// The same of one that reaches into a light that is a ball.
     #[inline(always)]
     fn cut(&self, simd: S, occluder: usize) -> Option<Cut<S>> {
         let ball = self.blocked.ball.filter(|_| self.blocked.cuts >> occluder & 1 == 1)?;
-        Cut::new(simd, &self.blocked.occluders[occluder], ball, self.p, &self.l)
+        Cut::new(simd, self.occluder(occluder), ball, self.p, &self.l)
     }
 
     /// One of them as they see it, and who sees it from outside and from within.
@@ -136,7 +139,7 @@ impl<'a, S: Simd> Batch<'a, S> {
             within |= (between.within >> occluder & 1) << k;
         }
         (
-            Shadow::new(simd, &self.blocked.occluders[occluder], self.p, &self.l),
+            Shadow::new(simd, self.occluder(occluder), self.p, &self.l),
             mask32x16::from_bitmask(simd, outside),
             mask32x16::from_bitmask(simd, within),
         )
@@ -320,8 +323,8 @@ pub(crate) fn rows<S: Simd>(
                         interval.from = swap.select(f, interval.from);
                         interval.to = swap.select(t, interval.to);
                     }
-                    // Of cuts most are empty; what is last begins last
-                    if parts <= 2 || interval.from.simd_lt(far).any_true() {
+                    // What is last begins last: so none has more than there may be between the light and one point
+                    if interval.from.simd_lt(far).any_true() && !hidden[row].is_full() {
                         hidden[row].push(interval);
                     }
                 }

@@ -69,8 +69,8 @@ impl<F: Fn([f32; 2]) -> Option<Way>> Source for Ways<'_, F> {
         (sharpness > 0.0 && spread < WIDE).then(|| Highlight { way: ns * (2.0 * cos_o) - wo, spread })
     }
 
-    fn hidden(&self, places: &[[f32; 2]; LANES], ways: &[Vec3; LANES], active: u16) -> u16 {
-        self.masked.hidden(places, ways, active)
+    fn hidden(&self, _: &[[f32; 2]; LANES], ways: &[Vec3; LANES], active: u16) -> u16 {
+        self.masked.hidden(ways, active)
     }
 }
 

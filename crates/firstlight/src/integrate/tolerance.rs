@@ -24,6 +24,11 @@ pub(crate) struct Tolerance {
     /// The same for each share of the cell that those coefficients are: a series that falls slowly goes on beyond them.
     pub fit_seen_slow: f32,
     pub fit_cut_slow: f32,
+    /// The same where few nodes are asked, for the third power of the end of the series.
+    pub fit_coarse: f32,
+    /// In half diagonals over distances, squared, or the exponent of the highlight's fall: cells narrower than that are
+    /// asked by few nodes first.
+    pub smooth_cell: f32,
     /// How often cells and panels are halved at most.
     pub cell_depth: u32,
     pub panel_depth: u32,
@@ -49,6 +54,8 @@ impl Tolerance {
         fit_cut: 0.25,
         fit_seen_slow: 0.2,
         fit_cut_slow: 2.0,
+        fit_coarse: 1.0,
+        smooth_cell: 0.7,
         cell_depth: 64,
         panel_depth: 12,
         widest_cell: 1.5,

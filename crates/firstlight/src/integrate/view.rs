@@ -348,14 +348,21 @@ impl View {
         self.square().map(|[x, y]| self.l(x, y))
     }
 
+    /// The direction of a highlight's middle: the viewer's, mirrored at the shading normal.
+    pub fn mirror(&self) -> Option<Vec3> {
+        let m = self.ns * (2.0 * self.cos_o) - self.wo;
+        let length = m.length();
+        (length > 0.5).then(|| m / length)
+    }
+
+    /// [`Lobe::sharpness`] as the point sees it.
+    pub fn sharpness(&self) -> f32 {
+        self.lobe.sharpness(self.cos_o)
+    }
+
     /// Whether all of the light is above the horizon.
     #[inline(always)]
     pub fn is_above_horizon(&self) -> bool {
         self.min(&self.cos) > 0.0 && self.min(&self.horizon) > 0.0
-    }
-
-    /// Whether the light reaches at least as far above the horizon as below it.
-    pub fn is_half_above_horizon(&self) -> bool {
-        [&self.cos, &self.horizon].into_iter().all(|height| self.max(height) + self.min(height) >= 0.0)
     }
 }

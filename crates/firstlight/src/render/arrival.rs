@@ -15,12 +15,10 @@ use super::together::Together;
 use crate::color::{DisplaySteps, Rgb};
 use crate::ids::LightId;
 use crate::integrate::{
-    Arrived, Asked, Asker, Between, Emitter, Evaluator, Illumination, Masked, Obstacles, Outline, Receiver,
-    ShadingPoint, Sums, Tolerance, View, integrate, unshadowed,
+    Arrived, Asked, Emitter, Evaluator, Illumination, Masked, Obstacles, Receiver, ShadingPoint, Sums, Tolerance, View,
 };
 use crate::light::{Area, AreaShape, Light, LightKind, LightTree};
 use crate::material::{Bsdf, Lobe};
-use crate::math::dispatch_wide;
 use crate::scene::Scene;
 use crate::shape::SurfaceInteraction;
 use crate::visibility::{Occluders, Settler, Target, View as ShadowView, Viewpoint, Visibility};
@@ -71,9 +69,38 @@ impl<'a> ArrivalPlace<'a> {
     pub fn over(self, patch: &Patch) -> Self {
         ArrivalPlace { reach: patch.reach, turn: patch.turn, off: patch.off, ..self }
     }
+
+    fn point_of_surface(&self) -> ShadingPoint {
+        let SurfaceInteraction { lit_from, error, horizon, ng, facet, ns, wo, .. } = *self.si;
+        ShadingPoint {
+            p: lit_from,
+            error,
+            horizon,
+            ng,
+            facet,
+            ns,
+            wo,
+            reach: self.reach,
+            turn: self.turn,
+            worth: self.colors,
+            base: self.base,
+            share: self.share,
+        }
+    }
+}
+
+/// What of the trees may be in the way.
+pub(super) enum Trees {
+    /// Nothing that batches do not know anyway.
+    Nothing,
+    /// So little that a batch is asked past it.
+    Known,
+    /// More, or something that has no closed form.
+    Unknown,
 }
 
 /// What one place sees of an area light that is integrated.
+#[derive(Clone, Copy, Debug)]
 pub(crate) enum Seen {
     /// This arrives.
     Known(Sums),
@@ -87,16 +114,14 @@ pub(crate) struct Lights<'a> {
     /// For each light, if it is integrated.
     pub emitters: Vec<Option<Emitter>>,
     pub steps: DisplaySteps,
-    /// In display steps: how far one light may be wrong at a place.
-    tolerance: f32,
     /// Where there are many.
     tree: Option<LightTree>,
     /// The lights as shafts lead to them.
     targets: Vec<Target>,
     /// The points of those that are integrated.
     ladders: Vec<Ladder>,
-    /// What may stand in the way of those in closed form, where that is not too much.
-    obstacles: Vec<Option<Obstacles<'a>>>,
+    /// What may stand in the way of those that are integrated.
+    obstacles: Vec<Obstacles<'a>>,
     /// In display steps: how far one light may be wrong at a point that stands for a pixel; and the value that many
     /// steps above black.
     allowed: f32,
@@ -105,10 +130,9 @@ pub(crate) struct Lights<'a> {
 
 /// Parts of a pixel smaller than this are judged as if they were as large.
 const LEAST_SHARE: f32 = 1.0 / 8.0;
-/// In display steps: how far all lights together may be wrong.
-const TOLERANCE: f32 = 0.1;
-/// The same where each place is wrong by itself, as by chance: nothing of that shows as a step or an edge.
-const BY_CHANCE: f32 = 0.2;
+/// How many times what is allowed may be wrong where each place is wrong by itself, as by chance: nothing of that shows
+/// as a step or an edge.
+const BY_CHANCE: f32 = 4.0 / 3.0;
 const LEAST_SHARE_BY_CHANCE: f32 = 1.0 / 16.0;
 
 impl<'a> Lights<'a> {
@@ -118,38 +142,44 @@ impl<'a> Lights<'a> {
             _ => None,
         };
         let emitters: Vec<_> = scene.lights.iter().map(emitter).collect();
-        let tolerance = TOLERANCE / (emitters.len().max(1) as f32).sqrt();
         let targets = Target::of_all(scene);
         let ladders = emitters.iter().map(|_| Ladder::default()).collect();
         let tree = (scene.lights.len() > FEW).then(|| LightTree::new(&scene.lights));
         let obstacles = (0..scene.lights.len())
-            .map(|index| emitters[index].as_ref().and_then(|emitter| Obstacles::new(scene, index, emitter)))
+            .map(|index| match &emitters[index] {
+                Some(emitter) => Obstacles::new(scene, index, emitter),
+                None => Obstacles::default(),
+            })
             .collect();
         let steps = DisplaySteps::new(&scene.display);
         let allowed = Tolerance::DEFAULT.point / (scene.lights.len().max(1) as f32).sqrt();
         let least = steps.value_of(allowed);
-        Lights { emitters, steps, tolerance, tree, targets, ladders, obstacles, allowed, least }
+        Lights { emitters, steps, tree, targets, ladders, obstacles, allowed, least }
     }
 
     /// Whether all of these placed things are told row by row where they are in the way of light `index`.
     fn know(&self, index: usize, placed: &[u32]) -> bool {
-        let knows = |obstacles: &Obstacles| placed.iter().all(|thing| obstacles.has_placed(*thing));
-        placed.is_empty() || self.obstacles[index].as_ref().is_some_and(knows)
+        placed.iter().all(|thing| self.obstacles[index].has_placed(*thing))
     }
 
-    /// Light `index` as batches ask for it, with one highlight, with or without what stands in its way; `None` if that
-    /// is not known in closed form.
+    /// Light `index` as batches ask for it, with one highlight, with or without what stands in its way; `None` if it is
+    /// not integrated.
     pub fn asked<'b>(&'b self, index: usize, lobe: &'b Lobe, shadows: bool) -> Option<Asked<'b>> {
-        Some(Asked {
-            emitter: self.emitters[index].as_ref()?,
-            obstacles: self.obstacles[index].as_ref()?,
+        self.emitters[index].as_ref().map(|emitter| self.asked_of(index, emitter, lobe, shadows))
+    }
+
+    fn asked_of<'b>(&'b self, index: usize, emitter: &'b Emitter, lobe: &'b Lobe, shadows: bool) -> Asked<'b> {
+        Asked {
+            emitter,
+            obstacles: &self.obstacles[index],
+            near: None,
             lobe,
             steps: &self.steps,
             tolerance: &Tolerance::DEFAULT,
             allowed: self.allowed,
             least: self.least,
             shadows,
-        })
+        }
     }
 }
 
@@ -160,13 +190,19 @@ pub(crate) struct Arrivals<'a> {
     level: Level,
     evaluator: Evaluator,
     arrived: Vec<Arrived>,
+    points: Vec<ShadingPoint>,
+    seen: Vec<(Change, Seen)>,
+    found: Vec<Arrival>,
+    /// What of trees is in the way of one place.
+    near: Obstacles<'a>,
     /// Of lights that are sampled.
     settler: Settler,
     pub(super) occluders: Occluders,
     /// Views that are not used any more.
     views: Vec<ShadowView>,
     indices: Vec<u32>,
-    tolerance: f32,
+    /// In display steps: how far one light may be wrong at a place.
+    allowed: f32,
 }
 
 /// Patches whose normal turns by less than this, in radians, are flat.
@@ -184,11 +220,15 @@ impl<'a> Arrivals<'a> {
             level,
             evaluator: Evaluator::default(),
             arrived: Vec::new(),
+            points: Vec::new(),
+            seen: Vec::new(),
+            found: Vec::new(),
+            near: Obstacles::default(),
             settler: Settler::default(),
             occluders: Occluders::default(),
             views: Vec::new(),
             indices: Vec::new(),
-            tolerance: lights.tolerance,
+            allowed: lights.allowed,
         }
     }
 
@@ -208,8 +248,8 @@ impl<'a> Arrivals<'a> {
     }
 
     /// From now on each light may be wrong by so many display steps.
-    pub fn tolerate(&mut self, tolerance: f32) {
-        self.tolerance = tolerance;
+    pub fn tolerate(&mut self, allowed: f32) {
+        self.allowed = allowed;
     }
 
     /// How many display steps a value can be off by an error.
@@ -225,36 +265,66 @@ impl<'a> Arrivals<'a> {
 
     /// What of light `index` arrives.
     pub fn arrival(&mut self, index: usize, place: &ArrivalPlace, counts: &mut Counts) -> Arrival {
+        let mut found = std::mem::take(&mut self.found);
+        self.arrivals(index, std::slice::from_ref(place), &mut found, counts);
+        let arrival = found[0];
+        self.found = found;
+        arrival
+    }
+
+    /// What of light `index` arrives at each place, in place of what was in `found`.
+    pub fn arrivals(&mut self, index: usize, places: &[ArrivalPlace], found: &mut Vec<Arrival>, counts: &mut Counts) {
+        found.clear();
+        if self.lights.emitters[index].is_none() {
+            found.extend(places.iter().map(|place| self.of_other(index, place, counts)));
+            return;
+        }
+        let mut seen = std::mem::take(&mut self.seen);
+        self.look(index, places, &mut seen, counts);
+        found.extend(places.iter().zip(&seen).map(|(place, seen)| self.arrival_of(index, place, *seen, counts)));
+        self.seen = seen;
+    }
+
+    /// What arrives of a light that is integrated where so much is known.
+    pub fn arrival_of(
+        &mut self,
+        index: usize,
+        place: &ArrivalPlace,
+        (change, seen): (Change, Seen),
+        counts: &mut Counts,
+    ) -> Arrival {
+        match seen {
+            Seen::Known(sums) => change.with(sums),
+            Seen::Behind(_) if place.parted => Arrival { skipped: true, ..change.with(Sums::default()) },
+            Seen::Behind(whole) => change.with(self.one(index, place, whole, counts)),
+        }
+    }
+
+    /// The same of a light that is not integrated.
+    fn of_other(&mut self, index: usize, place: &ArrivalPlace, counts: &mut Counts) -> Arrival {
         let light = &self.scene.lights[index];
-        let links = self.scene.geometry.lights_of(place.si.surface);
-        if !self.scene.geometry.links.contains(links, LightId(index as u32)) {
+        if !self.is_linked(index, place) {
             return Arrival::even(Sums::default());
         }
-        match (&self.lights.emitters[index], &light.kind) {
-            (Some(emitter), _) => {
-                let (change, seen) = self.look(index, emitter, place, counts);
-                match seen {
-                    Seen::Known(sums) => change.with(sums),
-                    Seen::Behind(_) if place.parted => Arrival { skipped: true, ..change.with(Sums::default()) },
-                    Seen::Behind(whole) => change.with(self.one(index, place, whole, counts)),
-                }
-            }
-            (None, LightKind::Area(area)) => {
-                let light = Sampled::new(self.scene, self.level, index, &self.lights.targets);
-                let [diffuse, specular] = light.to_point(&mut self.settler, place.si, place.lobe, counts);
-                let sums = Sums { diffuse, specular };
-                if place.reach == 0.0 {
-                    return Arrival::even(sums);
-                }
-                // As it would be if it were integrated, in the unit of samples
-                let emitter = Emitter::new(area);
-                let one = area.samples() as f32 / if area.physical { area.measure() as f32 } else { 1.0 };
-                let mut change = self.change_of(index, &emitter, place);
-                change.bend = change.bend * one;
-                change.with(sums)
-            }
-            (None, _) => self.single(index, light, place, counts),
+        let LightKind::Area(area) = &light.kind else { return self.single(index, light, place, counts) };
+        let light = Sampled::new(self.scene, self.level, index, &self.lights.targets);
+        let [diffuse, specular] = light.to_point(&mut self.settler, place.si, place.lobe, counts);
+        let sums = Sums { diffuse, specular };
+        if place.reach == 0.0 {
+            return Arrival::even(sums);
         }
+        // As it would be if it were integrated, in the unit of samples
+        let emitter = Emitter::new(area);
+        let one = area.samples() as f32 / if area.physical { area.measure() as f32 } else { 1.0 };
+        let mut change = self.change_if_integrated(index, &emitter, place);
+        change.bend = change.bend * one;
+        change.with(sums)
+    }
+
+    /// Whether a light shines on the surface of a place.
+    fn is_linked(&self, index: usize, place: &ArrivalPlace) -> bool {
+        let geometry = &self.scene.geometry;
+        geometry.links.contains(geometry.lights_of(place.si.surface), LightId(index as u32))
     }
 
     /// A point that asks for light `index`, beside nothing but ambient light.
@@ -288,108 +358,146 @@ impl<'a> Arrivals<'a> {
         ))
     }
 
-    /// What of light `index` arrives at one point, if that is known without a mask over points of the light.
-    pub fn seen(&mut self, index: usize, place: &ArrivalPlace, counts: &mut Counts) -> Seen {
-        let links = self.scene.geometry.lights_of(place.si.surface);
-        match &self.lights.emitters[index] {
-            Some(emitter) if self.scene.geometry.links.contains(links, LightId(index as u32)) => {
-                self.look(index, emitter, place, counts).1
-            }
-            _ => Seen::Known(self.arrival(index, place, counts).sums),
-        }
-    }
-
-    /// Looks at an area light that is integrated.
-    fn look(&mut self, index: usize, emitter: &Emitter, place: &ArrivalPlace, counts: &mut Counts) -> (Change, Seen) {
-        let (scene, si) = (self.scene, place.si);
-        let light = &scene.lights[index];
-        let Some(view) = self.view(emitter, place) else {
-            let seen = if emitter.surrounds(si.lit_from) { Seen::Behind(None) } else { Seen::Known(Sums::default()) };
-            return (unseen(emitter, place), seen);
-        };
-        if !view.arrives() {
-            counts.settled.visibility[Visibility::BelowHorizon as usize] += 1;
-            return (horizon_change(&view, place), Seen::Known(Sums::default()));
-        }
-        if view.outline == Outline::Sphere || self.lights.obstacles[index].as_ref().is_some_and(Obstacles::has_solids) {
-            return self.look_in_lanes(index, &view, place, counts);
-        }
-        let between = if light.shadows && si.receives_shadow && !place.lit {
-            self.between(index, emitter, &view, place)
-        } else {
-            Between::default()
-        };
-        let change = change(&view, place, &between, scene.camera.sway(si.lit_from, place.reach));
-        if between.hidden {
-            counts.settled.visibility[Visibility::Hidden as usize] += 1;
-            return (change, Seen::Known(Sums::default()));
-        }
-        let behind = between.ask || between.ask_trees;
-        match (behind, between.hiders.is_empty()) {
-            (true, _) => counts.settled.visibility[Visibility::Mask as usize] += 1,
-            (false, true) => counts.settled.visibility[Visibility::Lit as usize] += 1,
-            (false, false) => counts.closed_form += 1,
-        }
-        let hiders = if behind { &[][..] } else { &between.hiders[..] };
-        let enough = self.enough(place);
-        let (whole, _) = dispatch_wide!(self.level, simd => integrate(simd, &view, hiders, &enough));
-        (change, if behind { Seen::Behind(Some(whole)) } else { Seen::Known(whole) })
-    }
-
-    /// The same of a light that only batches know.
-    fn look_in_lanes(
+    /// What places see of area light `index`, which is integrated, without asking points of it; in place of what was in
+    /// `found`.
+    pub fn look(
         &mut self,
         index: usize,
-        view: &View,
-        place: &ArrivalPlace,
+        places: &[ArrivalPlace],
+        found: &mut Vec<(Change, Seen)>,
         counts: &mut Counts,
-    ) -> (Change, Seen) {
-        let (scene, si) = (self.scene, place.si);
-        let shadows = scene.lights[index].shadows && si.receives_shadow && !place.lit;
-        let Some(arrived) = self.in_lanes(index, place, shadows) else { return (Change::UNKNOWN, Seen::Behind(None)) };
-        let hidden = arrived.illumination == Illumination::Hidden;
-        let trees = shadows && !hidden && !place.clear && self.gather(index, place) && {
-            let Occluders { spheres, flats, leaves, others, too_many, .. } = &self.occluders;
-            let is_known = spheres.is_empty() && flats.is_empty() && leaves.is_empty() && !too_many;
-            !(is_known && self.lights.know(index, others))
-        };
-        let behind = trees || arrived.illumination == Illumination::Unknown;
-        let ask = behind || arrived.illumination == Illumination::Partial;
-        let drift = if behind { f32::INFINITY } else { arrived.motion };
-        let between = Between { hidden, ask, drift, ..Between::default() };
-        let change = change(view, place, &between, scene.camera.sway(si.lit_from, place.reach));
-        let visibility = match arrived.illumination {
-            _ if behind => Visibility::Mask,
-            Illumination::Below => Visibility::BelowHorizon,
-            Illumination::Hidden => Visibility::Hidden,
-            _ => Visibility::Lit,
-        };
-        if arrived.illumination == Illumination::Partial && !behind {
-            counts.closed_form += 1;
-        } else {
-            counts.settled.visibility[visibility as usize] += 1;
+    ) {
+        let (scene, lights) = (self.scene, self.lights);
+        let Some(emitter) = &lights.emitters[index] else { unreachable!("lights that are sampled have no cells") };
+        found.clear();
+        found.resize(places.len(), (Change::NONE, Seen::Known(Sums::default())));
+        // Those that are asked: past what nothing in trees is added to, and without shadows
+        let mut asked: [Vec<u32>; 2] = Default::default();
+        for (k, place) in places.iter().enumerate() {
+            if !self.is_linked(index, place) {
+                continue;
+            }
+            let shadows = scene.lights[index].shadows && place.si.receives_shadow && !place.lit;
+            let trees = if shadows && !place.clear { self.gather(index, place) } else { Trees::Nothing };
+            match trees {
+                Trees::Known => {
+                    let arrived = self.in_lanes(index, emitter, place, true, true);
+                    found[k] = self.found(index, place, arrived, counts);
+                }
+                Trees::Nothing => asked[usize::from(!shadows)].push(k as u32),
+                Trees::Unknown => {
+                    asked[1].push(k as u32);
+                    found[k].1 = Seen::Behind(None);
+                }
+            }
         }
-        (change, if behind { Seen::Behind(self.whole(index, place)) } else { Seen::Known(arrived.sums) })
+        let mut arrived = std::mem::take(&mut self.arrived);
+        for (numbers, shadows) in asked.iter().zip([true, false]) {
+            arrived.clear();
+            self.ask(index, emitter, numbers.iter().map(|k| &places[*k as usize]), shadows, &mut arrived);
+            for (k, arrived) in numbers.iter().zip(&arrived) {
+                let (k, mut arrived) = (*k as usize, *arrived);
+                if matches!(found[k].1, Seen::Behind(_)) && arrived.illumination != Illumination::Below {
+                    arrived.motion = f32::INFINITY;
+                    let whole = (arrived.illumination != Illumination::Unknown).then_some(arrived.sums);
+                    counts.settled.visibility[Visibility::Mask as usize] += 1;
+                    found[k] = (self.change(index, &places[k], &arrived), Seen::Behind(whole));
+                } else {
+                    found[k] = self.found(index, &places[k], arrived, counts);
+                }
+            }
+        }
+        self.arrived = arrived;
     }
 
-    /// What a batch of one knows of light `index`, if it is known in closed form at all.
-    fn in_lanes(&mut self, index: usize, place: &ArrivalPlace, shadows: bool) -> Option<Arrived> {
-        let asked = self.lights.asked(index, place.lobe, shadows)?;
-        let point = ShadingPoint {
-            p: place.si.lit_from,
-            error: place.si.error,
-            horizon: place.si.horizon,
-            ns: place.si.ns,
-            wo: place.si.wo,
-            reach: place.reach,
-            turn: place.turn,
-            worth: place.colors,
-            base: place.base,
-            share: place.share,
+    /// Adds what batches know of some places, with or without what is in lists.
+    fn ask<'p, 'q: 'p>(
+        &mut self,
+        index: usize,
+        emitter: &Emitter,
+        places: impl Iterator<Item = &'p ArrivalPlace<'q>> + Clone,
+        shadows: bool,
+        arrived: &mut Vec<Arrived>,
+    ) {
+        // Batches are of one highlight
+        let mut places = places.peekable();
+        while let Some(lobe) = places.peek().map(|place| place.lobe) {
+            let asked = Asked { allowed: self.allowed, ..self.lights.asked_of(index, emitter, lobe, shadows) };
+            self.points.clear();
+            while let Some(place) = places.next_if(|place| place.lobe == lobe) {
+                self.points.push(place.point_of_surface());
+            }
+            self.evaluator.evaluate(self.level, &asked, &self.points, arrived);
+        }
+    }
+
+    /// What a batch says of a place.
+    pub fn found(
+        &mut self,
+        index: usize,
+        place: &ArrivalPlace,
+        mut arrived: Arrived,
+        counts: &mut Counts,
+    ) -> (Change, Seen) {
+        let settled = &mut counts.settled.visibility;
+        match arrived.illumination {
+            Illumination::Below => settled[Visibility::BelowHorizon as usize] += 1,
+            Illumination::Hidden => settled[Visibility::Hidden as usize] += 1,
+            Illumination::Full => settled[Visibility::Lit as usize] += 1,
+            Illumination::Partial => counts.closed_form += 1,
+            Illumination::Unknown => {
+                settled[Visibility::Mask as usize] += 1;
+                arrived.motion = f32::INFINITY;
+                let whole = self.wholes(index, std::slice::from_ref(place))[0];
+                let whole = (whole.illumination != Illumination::Unknown).then_some(whole.sums);
+                return (self.change(index, place, &arrived), Seen::Behind(whole));
+            }
+        }
+        (self.change(index, place, &arrived), Seen::Known(arrived.sums))
+    }
+
+    /// How a light that is integrated changes over a patch.
+    fn change(&self, index: usize, place: &ArrivalPlace, arrived: &Arrived) -> Change {
+        let Some(emitter) = self.lights.emitters[index].as_ref().filter(|_| place.reach > 0.0) else {
+            return Change::NONE;
+        };
+        self.change_of(emitter, place, arrived)
+    }
+
+    fn change_of(&self, emitter: &Emitter, place: &ArrivalPlace, arrived: &Arrived) -> Change {
+        match self.view(emitter, place) {
+            None => unseen(emitter, place),
+            Some(view) if !view.arrives() => horizon_change(&view, place),
+            Some(view) => change(&view, place, arrived, self.scene.camera.sway(place.si.lit_from, place.reach)),
+        }
+    }
+
+    /// What of a light that is integrated would arrive at each place if nothing were in the way.
+    pub fn wholes(&mut self, index: usize, places: &[ArrivalPlace]) -> Vec<Arrived> {
+        let lights = self.lights;
+        let Some(emitter) = &lights.emitters[index] else { unreachable!("lights that are sampled have no whole") };
+        let mut arrived = Vec::with_capacity(places.len());
+        self.ask(index, emitter, places.iter(), false, &mut arrived);
+        arrived
+    }
+
+    /// What a batch of one knows of light `index`; `near` says whether it is asked past what was gathered in trees.
+    fn in_lanes(
+        &mut self,
+        index: usize,
+        emitter: &Emitter,
+        place: &ArrivalPlace,
+        shadows: bool,
+        near: bool,
+    ) -> Arrived {
+        let asked = Asked {
+            near: near.then_some(&self.near),
+            allowed: self.allowed,
+            ..self.lights.asked_of(index, emitter, place.lobe, shadows)
         };
         self.arrived.clear();
-        self.evaluator.evaluate(self.level, &asked, &[point], &mut self.arrived);
-        self.arrived.first().copied()
+        self.evaluator.evaluate(self.level, &asked, &[place.point_of_surface()], &mut self.arrived);
+        self.arrived[0]
     }
 
     /// Adds to `arrived` what arrives of a light at many points.
@@ -397,27 +505,8 @@ impl<'a> Arrivals<'a> {
         self.evaluator.evaluate(self.level, asked, points, arrived);
     }
 
-    /// What light `index` would send to a place if nothing were in the way, if it is better to know that than to ask
-    /// points alone.
-    fn whole(&mut self, index: usize, place: &ArrivalPlace) -> Option<Sums> {
-        let emitter = self.lights.emitters[index].as_ref()?;
-        match self.view(emitter, place) {
-            None if emitter.surrounds(place.si.lit_from) => None,
-            None => Some(Sums::default()),
-            Some(view) if !view.arrives() => Some(Sums::default()),
-            Some(_) if matches!(emitter, Emitter::Ball { .. }) && self.lights.obstacles[index].is_some() => {
-                let arrived = self.in_lanes(index, place, false)?;
-                (arrived.illumination != Illumination::Unknown).then_some(arrived.sums)
-            }
-            Some(view) => {
-                let enough = self.enough(place);
-                dispatch_wide!(self.level, simd => unshadowed(simd, &view, &enough))
-            }
-        }
-    }
-
     /// Whether sums with such an error will do for one light at a place.
-    pub fn enough<'b>(&self, place: &'b ArrivalPlace) -> impl Fn(&Sums, &Sums) -> bool + use<'a, 'b> {
+    fn enough<'b>(&self, place: &'b ArrivalPlace) -> impl Fn(&Sums, &Sums) -> bool + use<'a, 'b> {
         let (steps, tolerance) = (&self.lights.steps, self.tolerance_of(place.share));
         let [diffuse, specular] = place.colors;
         let base = place.base;
@@ -429,13 +518,13 @@ impl<'a> Arrivals<'a> {
     }
 
     /// In display steps: how far one light may be wrong at a place that stands for such a share of a pixel.
-    pub fn tolerance_of(&self, share: f32) -> f32 {
-        self.tolerance / share.max(LEAST_SHARE).sqrt()
+    fn tolerance_of(&self, share: f32) -> f32 {
+        self.allowed / share.max(LEAST_SHARE).sqrt()
     }
 
     /// The same where the errors of neighbours are as good as independent.
     pub fn tolerance_by_chance(&self, share: f32) -> f32 {
-        self.tolerance * (BY_CHANCE / TOLERANCE) / share.max(LEAST_SHARE_BY_CHANCE).sqrt()
+        self.allowed * BY_CHANCE / share.max(LEAST_SHARE_BY_CHANCE).sqrt()
     }
 
     /// Whether it is worth to look for light `index` from all rays of a block of pixels together: not where its samples
@@ -443,13 +532,6 @@ impl<'a> Arrivals<'a> {
     pub fn looks_for(&self, index: usize) -> bool {
         let is_area = matches!(self.scene.lights[index].kind, LightKind::Area(_));
         self.lights.emitters[index].is_some() || !is_area
-    }
-
-    /// What light `index` would send to a place if nothing were in the way, with all colours; black where that is not
-    /// known in closed form.
-    pub fn unshadowed(&mut self, index: usize, place: &ArrivalPlace) -> Rgb {
-        let sums = self.whole(index, place).unwrap_or_default();
-        place.colors[0] * sums.diffuse + place.colors[1] * sums.specular
     }
 
     /// Whether a light is integrated and can be hidden: then points of it are asked behind what is in trees.
@@ -501,10 +583,7 @@ impl<'a> Arrivals<'a> {
         counts: &mut Counts,
     ) {
         match &self.lights.emitters[index] {
-            Some(_) => {
-                let whole = self.whole(index, place);
-                together.behind(self, place, whole, view);
-            }
+            Some(_) => together.behind(place, view),
             // One ray tells
             None => {
                 let sums = self.of_single(index, &ArrivalPlace { lit: false, ..*place });
@@ -519,8 +598,9 @@ impl<'a> Arrivals<'a> {
     fn one(&mut self, index: usize, place: &ArrivalPlace, whole: Option<Sums>, counts: &mut Counts) -> Sums {
         let Some(view) = self.settle(index, place.si, counts) else { return Sums::default() };
         let mut together = Together::new(index, 1, place.share, 0, Rgb::BLACK);
-        together.behind(self, place, whole, view);
-        together.finish(self, counts).sums
+        together.behind(place, view);
+        together.hear_whole(self, whole);
+        together.settle(self, counts).sums
     }
 
     /// Area light `index`, as its points are asked for.
@@ -591,14 +671,15 @@ impl<'a> Arrivals<'a> {
     }
 
     /// What arrives at one point, past anything, by cells of the light: where few of its points send nearly all.
-    pub fn by_cells(&self, index: usize, place: &ArrivalPlace, counts: &mut Counts) -> Sums {
-        let emitter = self.lights.emitters[index].as_ref().expect("only lights that are integrated are asked by cells");
+    pub fn by_cells(&mut self, index: usize, place: &ArrivalPlace, counts: &mut Counts) -> Sums {
+        let lights = self.lights;
+        let emitter = lights.emitters[index].as_ref().expect("only lights that are integrated are asked by cells");
         let light = &self.scene.lights[index];
-        let ask = light.shadows && place.si.receives_shadow;
-        let between = Between { ask, ask_trees: ask && self.scene.geometry.has_trees(), ..Between::default() };
+        let shadows = light.shadows && place.si.receives_shadow;
         let ArrivalPlace { si, lobe, .. } = *place;
         let asked = Cell::new(0);
-        let masked = Masked { scene: self.scene, light: index, emitter, si, lobe, between: &between, asked: &asked };
+        let masked = Masked { scene: self.scene, light: index, emitter, si, lobe, shadows, asked: &asked };
+        let whole = self.wholes(index, std::slice::from_ref(place))[0];
         let enough = self.enough(place);
         let is_round = matches!(emitter, Emitter::Ball { physical, both_sides, .. } if !physical || *both_sides);
         let sums = match self.view(emitter, place) {
@@ -606,44 +687,41 @@ impl<'a> Arrivals<'a> {
             Some(view) if !view.arrives() => Sums::default(),
             _ if is_round => masked.by_points(light, &enough),
             None => Sums::default(),
-            Some(view) => {
-                let (whole, _) = dispatch_wide!(self.level, simd => integrate(simd, &view, &[], &enough));
-                masked.by_cells(&view, &whole, &enough)
-            }
+            Some(view) => masked.by_cells(&view, &whole.sums, &enough),
         };
         counts.points += asked.get();
         sums
     }
 
-    /// What stands between a place and an area light.
-    fn between(&mut self, index: usize, emitter: &Emitter, view: &View, place: &ArrivalPlace) -> Between {
-        let trees = !place.clear && self.gather(index, place);
-        let asker = Asker { si: place.si, reach: place.reach };
-        Between::look(self.scene, index, emitter, view, &asker, trees.then_some(&self.occluders))
-    }
-
-    /// Gathers what of the trees may be in the way of a light; whether there are any.
-    pub(super) fn gather(&mut self, index: usize, place: &ArrivalPlace) -> bool {
-        if !self.scene.geometry.has_trees() {
-            return false;
+    /// Gathers what of the trees may be in the way of a light.
+    pub(super) fn gather(&mut self, index: usize, place: &ArrivalPlace) -> Trees {
+        let (scene, lights) = (self.scene, self.lights);
+        if !scene.geometry.has_trees() {
+            return Trees::Nothing;
         }
-        let (target, point) = (&self.lights.targets[index], Viewpoint::of(place.si));
-        self.occluders.gather_around(self.level, self.scene, target, &point, place.reach, place.turn > FLAT, LEAVES);
-        true
+        let (target, point, trees) = (&lights.targets[index], Viewpoint::of(place.si), &mut self.occluders);
+        trees.gather_around(self.level, scene, target, &point, place.reach, place.turn > FLAT, LEAVES);
+        if !trees.has_meshes() && lights.know(index, &trees.others) {
+            Trees::Nothing
+        } else if trees.too_many || !lights.know(index, &trees.others) {
+            Trees::Unknown
+        } else if let Some(emitter) = &lights.emitters[index]
+            && self.near.gather(scene, target.light, emitter, trees, lights.obstacles[index].occluders.len())
+        {
+            Trees::Known
+        } else {
+            Trees::Unknown
+        }
     }
 
     /// How an area light would change if it were integrated.
-    fn change_of(&mut self, index: usize, emitter: &Emitter, place: &ArrivalPlace) -> Change {
-        let light = &self.scene.lights[index];
-        let Some(view) = self.view(emitter, place) else { return unseen(emitter, place) };
-        if !view.arrives() {
-            return horizon_change(&view, place);
+    fn change_if_integrated(&mut self, index: usize, emitter: &Emitter, place: &ArrivalPlace) -> Change {
+        let shadows = self.scene.lights[index].shadows && place.si.receives_shadow;
+        let trees = if shadows { self.gather(index, place) } else { Trees::Nothing };
+        let mut arrived = self.in_lanes(index, emitter, place, shadows, matches!(trees, Trees::Known));
+        if matches!(trees, Trees::Unknown) || arrived.illumination == Illumination::Unknown {
+            arrived.motion = f32::INFINITY;
         }
-        let between = if light.shadows && place.si.receives_shadow {
-            self.between(index, emitter, &view, place)
-        } else {
-            Between::default()
-        };
-        change(&view, place, &between, self.scene.camera.sway(place.si.lit_from, place.reach))
+        self.change_of(emitter, place, &arrived)
     }
 }

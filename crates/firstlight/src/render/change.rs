@@ -1,7 +1,7 @@
 //! What of one light arrives at a place, and how much that bends over the patch around it.
 
 use super::arrival::ArrivalPlace;
-use crate::integrate::{Between, Emitter, Sums, View, sharpness};
+use crate::integrate::{Arrived, Emitter, Illumination, Sums, View};
 use crate::material::Lobe;
 use crate::math::{Vec3, square};
 
@@ -13,7 +13,7 @@ pub(crate) struct Arrival {
     pub skipped: bool,
     /// How far the mean over the patch can be from what arrives at its middle.
     pub bend: Sums,
-    /// Over how much of the light's size the outlines of shadows move across the patch; see [`Between::drift`].
+    /// Over how much of the light's size the outlines of shadows move across the patch; see [`Arrived::motion`].
     pub drift: f32,
     /// Whether all that light does here is wide beside the patch, so that neighbours tell what it does.
     pub resolved: bool,
@@ -125,9 +125,9 @@ pub(super) fn horizon_change(view: &View, place: &ArrivalPlace) -> Change {
 
 /// How far the mean over a patch can be from what arrives at its middle, and so on. `sway` is by how much the way to
 /// the viewer turns over it.
-pub(super) fn change(view: &View, place: &ArrivalPlace, between: &Between, sway: f32) -> Change {
-    let drift = between.drift;
-    if place.reach == 0.0 || between.hidden && drift == 0.0 {
+pub(super) fn change(view: &View, place: &ArrivalPlace, arrived: &Arrived, sway: f32) -> Change {
+    let (drift, illumination) = (arrived.motion, arrived.illumination);
+    if place.reach == 0.0 || illumination == Illumination::Hidden && drift == 0.0 {
         return Change::NONE;
     }
     let (most, nearest, crossing) = (view.most(place.reach), view.nearest(), view.crossing(place.reach));
@@ -141,13 +141,13 @@ pub(super) fn change(view: &View, place: &ArrivalPlace, between: &Between, sway:
     let smooth = smooth + 2.0 * swing * place.off;
     let diffuse = most * (cos * (kink + smooth.min(1.0) + crossing) + horizon).min(1.0);
     let resolved = drift < RESOLVED && swing < RESOLVED_SWING && crossing == 0.0;
-    let is_clear = resolved && drift == 0.0 && between.hiders.is_empty() && !between.ask && !between.ask_trees && !cuts;
+    let is_clear = resolved && drift == 0.0 && illumination == Illumination::Full && !cuts;
     if matches!(view.lobe, Lobe::None) {
         let bend = Sums { diffuse, specular: 0.0 };
         return Change { bend, drift, resolved, smooth: is_clear && is_smooth(swing, 0.0), sharp: false };
     }
     let moved = 2.0 * place.turn + place.reach / nearest.max(place.reach) + sway;
-    let lobe = sharpness(view) * moved * moved;
+    let lobe = view.sharpness() * moved * moved;
     let narrow = lobe.min(1.0);
     let narrow = (narrow + 2.0 * narrow.sqrt() * place.off).min(1.0);
     let specular = most * brightest(view, lobe) * (kink + smooth + narrow + horizon + crossing).min(1.0);
@@ -161,7 +161,7 @@ pub(super) fn change(view: &View, place: &ArrivalPlace, between: &Between, sway:
 fn brightest(view: &View, moved: f32) -> f32 {
     let size2 = square(view.la.max(view.lb));
     let distance2 = square(view.nearest());
-    let sharp = sharpness(view) * size2;
+    let sharp = view.sharpness() * size2;
     if sharp > 0.5 * distance2 || moved > 1.0 {
         return 1.0;
     }

@@ -1,7 +1,7 @@
 //! Lights of one point.
 
 use super::Counts;
-use super::arrival::{ArrivalPlace, Arrivals};
+use super::arrival::{ArrivalPlace, Arrivals, Trees};
 use super::change::{Arrival, Change, RESOLVED, RESOLVED_SWING, is_sharp, is_smooth};
 use super::pixel::Lighting;
 use super::plain::Plain;
@@ -72,7 +72,7 @@ impl Arrivals<'_> {
     fn edge(&mut self, light: usize, l: Vec3, finite: bool, place: &ArrivalPlace) -> f32 {
         let (scene, si) = (self.scene, place.si);
         if !scene.light_obstacles.disks.is_empty()
-            || !place.clear && self.gather(light, place) && (self.occluders.too_many || self.occluders.count() > 0)
+            || !place.clear && !matches!(self.gather(light, place), Trees::Nothing)
         {
             return 1.0;
         }

@@ -31,7 +31,7 @@ use super::square::Square;
 use super::tile::Tile;
 use super::{AaMode, Counts};
 use crate::color::Rgb;
-use crate::integrate::Sums;
+use crate::integrate::{Arrived, Sums};
 use crate::scene::Scene;
 use crate::visibility::Viewpoint;
 use behind::{Block, Outlook, Sights};
@@ -81,6 +81,7 @@ pub(crate) struct Tiled<'a> {
     /// What arrived at each patch, light by light, and what that makes.
     arrived: Vec<Arrival>,
     values: Vec<Rgb>,
+    found: Vec<Arrival>,
     /// Diffuse and specular of each light at one pixel, in scene order.
     terms: Vec<[Rgb; 2]>,
     /// What the rays of each pixel's patches see of each light past what is in trees, and where those of a pixel begin.
@@ -88,6 +89,8 @@ pub(crate) struct Tiled<'a> {
     seen: Vec<usize>,
     block: Block,
     sights: Vec<Sights>,
+    /// What each light would send to each patch of the cell if nothing were in the way, once that is known.
+    wholes: Vec<Vec<Arrived>>,
     /// Which share of each light pixels see at least, as a few of their rays say, light by light; and which were asked.
     votes: Vec<f32>,
     voted: Vec<bool>,
@@ -120,11 +123,13 @@ impl<'a> Tiled<'a> {
             first: vec![UNLIT; ACROSS * ACROSS],
             arrived: Vec::new(),
             values: Vec::new(),
+            found: Vec::new(),
             terms: Vec::new(),
             outlooks: Vec::new(),
             seen: vec![UNLIT; ACROSS * ACROSS],
             block: Block::default(),
             sights: Vec::new(),
+            wholes: vec![Vec::new(); scene.lights.len()],
             votes: vec![f32::NAN; ACROSS * ACROSS * scene.lights.len()],
             voted: vec![false; ACROSS * ACROSS * scene.lights.len()],
             points: Vec::new(),
@@ -176,6 +181,9 @@ impl<'a> Tiled<'a> {
         }
         if self.many.is_some() {
             self.look_at_all(counts, go_on)?;
+        } else {
+            self.ask_all(tile, counts);
+            go_on()?;
         }
         let rays = (scene.antialiasing * scene.antialiasing) as u64;
         for y in 0..CELL {
@@ -329,13 +337,7 @@ impl<'a> Tiled<'a> {
         if !self.hold(at, counts) {
             return false;
         }
-        let index = self.index(at);
-        self.first[index] = self.values.len();
-        let patches = std::mem::take(&mut self.pixels[index].patches);
-        for (k, patch) in patches.iter().enumerate() {
-            self.once(patch, k, at, counts);
-        }
-        self.pixels[index].patches = patches;
+        self.middles(&[self.index(at)], counts);
         true
     }
 
@@ -357,31 +359,74 @@ impl<'a> Tiled<'a> {
         ControlFlow::Continue(())
     }
 
-    /// What arrives at the middle of a patch of a pixel.
-    fn once(&mut self, patch: &Patch, k: usize, at: [u32; 2], counts: &mut Counts) {
-        let scene = self.scene;
-        let base = scene.ambient * patch.bsdf.ambient;
-        let mut value = base;
-        let share = self.share(patch);
-        let pixel = self.index(at);
-        for index in 0..scene.lights.len() {
-            let outlook = self.outlook(pixel, k, index);
-            let place = self.arrivals.place(index, &patch.si, &patch.bsdf).over(patch);
-            let lit = matches!(outlook, Outlook::Lit);
-            let clear = lit || matches!(outlook, Outlook::Clear);
-            let place = ArrivalPlace { share, parted: true, lit, clear, ..place };
-            let arrival = match outlook {
-                Outlook::Dark => Arrival::even(Sums::default()),
-                Outlook::Parted | Outlook::Settled(_) => Arrival::PARTED,
-                _ => self.arrivals.arrival(index, &place, counts),
-            };
-            value += place.colors[0] * arrival.sums.diffuse + place.colors[1] * arrival.sums.specular;
-            if let Outlook::Settled([diffuse, specular]) = outlook {
-                value += (diffuse + specular) * (1.0 / patch.count(scene) as f32);
+    /// Makes sure that it is known what arrives at the middles of all patches of the part of the cell that is in a
+    /// tile.
+    fn ask_all(&mut self, tile: &Tile, counts: &mut Counts) {
+        let [x, y] = self.corner;
+        let mut asked = Vec::new();
+        for at in (Square { x, y, side: CELL }).pixels().filter(|at| tile.contains(*at)) {
+            let index = self.index(at);
+            if self.colors[index].is_none() && self.first[index] == UNLIT && self.hold(at, counts) {
+                asked.push(index);
             }
-            self.arrived.push(arrival);
         }
-        self.values.push(value);
+        let before = counts.work();
+        self.middles(&asked, counts);
+        let each = (counts.work() - before) / asked.len().max(1) as f32;
+        asked.iter().for_each(|index| self.work[*index] += each);
+    }
+
+    /// Finds out what arrives at the middles of the patches of some pixels.
+    fn middles(&mut self, pixels: &[usize], counts: &mut Counts) {
+        let (scene, lights) = (self.scene, self.scene.lights.len());
+        for index in pixels {
+            self.first[*index] = self.values.len();
+            self.values.extend(self.pixels[*index].patches.iter().map(|patch| scene.ambient * patch.bsdf.ambient));
+        }
+        self.arrived.resize(self.values.len() * lights, Arrival::even(Sums::default()));
+        for light in 0..lights {
+            let (mut places, mut asked, mut told) = (Vec::new(), Vec::new(), Vec::new());
+            for index in pixels {
+                for (k, patch) in self.pixels[*index].patches.iter().enumerate() {
+                    let number = self.first[*index] + k;
+                    let outlook = self.outlook(*index, k, light);
+                    match outlook {
+                        Outlook::Dark => continue,
+                        Outlook::Parted => self.arrived[number * lights + light] = Arrival::PARTED,
+                        Outlook::Settled([diffuse, specular]) => {
+                            self.arrived[number * lights + light] = Arrival::PARTED;
+                            self.values[number] += (diffuse + specular) * (1.0 / patch.count(scene) as f32);
+                        }
+                        Outlook::Lit | Outlook::Clear | Outlook::Unknown => {
+                            let lit = matches!(outlook, Outlook::Lit);
+                            let clear = lit || matches!(outlook, Outlook::Clear);
+                            let place = self.arrivals.place(light, &patch.si, &patch.bsdf).over(patch);
+                            let share = self.share(patch);
+                            let place = ArrivalPlace { share, parted: true, lit, clear, ..place };
+                            let whole = || self.wholes[light].get(self.seen[*index] / lights + k).copied();
+                            match lit.then(whole).flatten() {
+                                Some(arrived) => {
+                                    let found = self.arrivals.found(light, &place, arrived, counts);
+                                    let arrival = self.arrivals.arrival_of(light, &place, found, counts);
+                                    told.push((number, place.colors, arrival));
+                                }
+                                None => {
+                                    places.push(place);
+                                    asked.push(number);
+                                }
+                            }
+                        }
+                    }
+                }
+            }
+            self.arrivals.arrivals(light, &places, &mut self.found, counts);
+            let asked = asked.into_iter().zip(&places).zip(&self.found);
+            told.extend(asked.map(|((number, place), arrival)| (number, place.colors, *arrival)));
+            for (number, [diffuse, specular], arrival) in told {
+                self.values[number] += diffuse * arrival.sums.diffuse + specular * arrival.sums.specular;
+                self.arrived[number * lights + light] = arrival;
+            }
+        }
     }
 
     /// What the rays of a pixel's patch, its `k`-th, see of a light past what is in trees.

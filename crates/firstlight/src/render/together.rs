@@ -10,7 +10,7 @@ use super::arrival::{ArrivalPlace, Arrivals, Seen};
 use super::beams::{self, Beam, Traced};
 use super::ladder::{Asker, FIRST, LAST, Tally, of_edge};
 use crate::color::Rgb;
-use crate::integrate::Sums;
+use crate::integrate::{Arrived, Illumination, Sums};
 use crate::light::SERIES;
 use crate::material::{Bsdf, Lobe};
 use crate::shape::SurfaceInteraction;
@@ -62,6 +62,8 @@ const COARSER: f32 = 2.0;
 const MANY_OF_ALL: usize = MANY * SERIES;
 /// How many times as far off as is allowed the most points may be before cells are asked, which take far longer.
 const WORTH_CELLS: f32 = 1.7;
+/// In display steps: how far what would arrive may differ between the rays in the middle of a pixel, to tell it of all.
+const EVEN: f32 = 0.5;
 /// The most points of a pixel.
 const MOST: usize = LAST * SERIES;
 
@@ -86,7 +88,19 @@ struct Asking {
     before: Option<Rgb>,
 }
 
+/// A ray of which nothing is known yet but that nothing is in the way, if that is, or nothing in trees.
+struct Looking {
+    si: SurfaceInteraction,
+    bsdf: Bsdf,
+    lit: bool,
+    clear: bool,
+}
+
 impl Asking {
+    fn place(&self, share: f32) -> ArrivalPlace<'_> {
+        ArrivalPlace { share, ..ArrivalPlace::point(&self.si, &self.lobe, self.base, self.colors) }
+    }
+
     /// What arrives, as far as points tell, and what would if nothing were in the way.
     fn sums(&self, measure: f32) -> (Sums, Sums) {
         (self.tally.sums(self.whole.as_ref(), measure), self.whole.unwrap_or_else(|| self.tally.whole(measure)))
@@ -164,6 +178,8 @@ pub(crate) struct Together {
     /// Which series the first ray asks.
     series: usize,
     rays: usize,
+    /// Those of which nothing is known yet, and those that are behind things.
+    looking: Vec<Looking>,
     asking: Vec<Asking>,
     /// What is known, all rays together: the light, before colours and with them, and with what is there beside it.
     sums: Sums,
@@ -203,6 +219,7 @@ impl Together {
             share,
             series,
             rays: 0,
+            looking: Vec::new(),
             asking: Vec::new(),
             sums,
             known,
@@ -223,18 +240,14 @@ impl Together {
         clear: bool,
         counts: &mut Counts,
     ) {
-        // What is integrated is wrong alike at all rays: that much by no more than if one stood for all
-        let place = ArrivalPlace { share: self.share, lit, clear, ..arrivals.place(self.light, si, bsdf) };
-        match arrivals.seen(self.light, &place, counts) {
-            Seen::Known(sums) => {
-                self.know(&place, &sums);
-                self.shares += if lit { 1.0 } else { f32::NAN };
-                self.sharing += 1;
-            }
-            Seen::Behind(whole) => match arrivals.settle(self.light, si, counts) {
-                Some(view) => self.behind(arrivals, &place, whole, view),
-                None => self.dark(&place),
-            },
+        if arrivals.lights.emitters[self.light].is_some() {
+            self.looking.push(Looking { si: *si, bsdf: *bsdf, lit, clear });
+        } else {
+            let place = ArrivalPlace { share: self.share, lit, clear, ..arrivals.place(self.light, si, bsdf) };
+            let sums = arrivals.arrival(self.light, &place, counts).sums;
+            self.know(&place, &sums);
+            self.shares += if lit { 1.0 } else { f32::NAN };
+            self.sharing += 1;
         }
     }
 
@@ -251,15 +264,21 @@ impl Together {
         self.sharing += 1;
     }
 
-    /// Asks for what one ray sees past what is in `view`. `whole` is what would arrive if nothing were in the way, if
-    /// that is known.
-    pub fn behind(&mut self, arrivals: &Arrivals, place: &ArrivalPlace, whole: Option<Sums>, view: View) {
+    /// Hears what would arrive at the only ray if nothing were in the way, if that is known.
+    pub fn hear_whole(&mut self, arrivals: &Arrivals, whole: Option<Sums>) {
+        for one in &mut self.asking {
+            one.whole = whole;
+            one.may_miss = whole.is_none() && arrivals.may_miss(self.light, &one.place(self.share));
+        }
+    }
+
+    /// Asks for what one ray sees past what is in `view`.
+    pub fn behind(&mut self, place: &ArrivalPlace, view: View) {
         let series = self.series ^ (self.rays % SERIES);
         self.rays += 1;
         self.value += place.base;
         let ArrivalPlace { si, lobe, base, colors, .. } = *place;
         let tally = Tally::default();
-        let may_miss = whole.is_none() && arrivals.may_miss(self.light, place);
         self.asking.push(Asking {
             si: *si,
             lobe: *lobe,
@@ -267,8 +286,8 @@ impl Together {
             colors,
             series,
             view,
-            whole,
-            may_miss,
+            whole: None,
+            may_miss: false,
             settled: false,
             tally,
             half: tally,
@@ -284,7 +303,117 @@ impl Together {
     }
 
     /// What all rays see of the light.
-    pub fn finish(mut self, arrivals: &mut Arrivals, counts: &mut Counts) -> Outcome {
+    pub fn finish(self, arrivals: &mut Arrivals, counts: &mut Counts) -> Outcome {
+        let mut one = [self];
+        Together::tell(&mut one, arrivals, counts);
+        let [one] = one;
+        one.settle(arrivals, counts)
+    }
+
+    /// Has the rays of some patches, which ask the same light, told all that batches know of it.
+    pub fn tell(all: &mut [Together], arrivals: &mut Arrivals, counts: &mut Counts) {
+        let Some(light) = all.first().map(|one| one.light) else { return };
+        let looking: Vec<Vec<Looking>> = all.iter_mut().map(|one| std::mem::take(&mut one.looking)).collect();
+        let mut places = Vec::new();
+        for (one, looking) in all.iter().zip(&looking) {
+            places.extend(looking.iter().map(|Looking { si, bsdf, lit, clear }| {
+                // What is integrated is wrong alike at all rays: that much by no more than if one stood for all
+                ArrivalPlace { share: one.share, lit: *lit, clear: *clear, ..arrivals.place(light, si, bsdf) }
+            }));
+        }
+        if !places.is_empty() {
+            let mut seen = Vec::new();
+            arrivals.look(light, &places, &mut seen, counts);
+            let mut seen = places.iter().zip(seen);
+            for (one, looking) in all.iter_mut().zip(&looking) {
+                for (place, (_, seen)) in seen.by_ref().take(looking.len()) {
+                    one.hear(place, seen, arrivals, counts);
+                }
+            }
+        }
+        // What would arrive behind things: where the rays in the middle of a pixel tell that of all, from those
+        let rays = arrivals.scene.antialiasing as usize;
+        let mut wanted = Vec::new();
+        for (k, one) in all.iter().enumerate() {
+            match one.middle(rays) {
+                Some(middle) => wanted.extend(middle.map(|ray| (k, ray))),
+                None => wanted.extend((0..one.asking.len()).map(|ray| (k, ray))),
+            }
+        }
+        Together::ask_wholes(all, &wanted, arrivals);
+        wanted.clear();
+        for (k, one) in all.iter_mut().enumerate() {
+            if let Some(middle) = one.middle(rays)
+                && !one.spread(rays, middle, arrivals)
+            {
+                wanted.extend((0..one.asking.len()).filter(|ray| !middle.contains(ray)).map(|ray| (k, ray)));
+            }
+        }
+        Together::ask_wholes(all, &wanted, arrivals);
+    }
+
+    fn hear(&mut self, place: &ArrivalPlace, seen: Seen, arrivals: &mut Arrivals, counts: &mut Counts) {
+        match seen {
+            Seen::Known(sums) => {
+                self.know(place, &sums);
+                self.shares += if place.lit { 1.0 } else { f32::NAN };
+                self.sharing += 1;
+            }
+            Seen::Behind(_) => match arrivals.settle(self.light, place.si, counts) {
+                Some(view) => self.behind(place, view),
+                None => self.dark(place),
+            },
+        }
+    }
+
+    /// The rays around the middle of a pixel with `n` x `n`, if all of them are behind things.
+    fn middle(&self, n: usize) -> Option<[usize; 4]> {
+        let half = n / 2;
+        let first = half.checked_sub(1)? * (n + 1);
+        (n > 2 && n.is_multiple_of(2) && self.asking.len() == n * n).then_some([
+            first,
+            first + 1,
+            first + n,
+            first + n + 1,
+        ])
+    }
+
+    /// Gives each ray what would arrive at the nearest of those in the middle; `false` if those differ too much.
+    fn spread(&mut self, n: usize, middle: [usize; 4], arrivals: &Arrivals) -> bool {
+        let (mut least, mut most) = (Rgb::gray(f32::INFINITY), Rgb::BLACK);
+        for ray in middle {
+            let one = &self.asking[ray];
+            let Some(whole) = &one.whole else { return false };
+            let color = one.base + one.color(whole);
+            (least, most) = (least.min(color), most.max(color));
+        }
+        if arrivals.steps(most, most + least * -1.0) > EVEN {
+            return false;
+        }
+        for ray in 0..self.asking.len() {
+            let side = |at: usize| usize::from(at >= n / 2);
+            let nearest = middle[2 * side(ray / n) + side(ray % n)];
+            self.asking[ray].whole = self.asking[nearest].whole;
+        }
+        true
+    }
+
+    /// Asks what would arrive at some rays if nothing were in the way: of which patch, and which of its rays.
+    fn ask_wholes(all: &mut [Together], wanted: &[(usize, usize)], arrivals: &mut Arrivals) {
+        let Some(light) = all.first().map(|one| one.light).filter(|_| !wanted.is_empty()) else { return };
+        let places: Vec<_> = wanted.iter().map(|(k, ray)| all[*k].asking[*ray].place(all[*k].share)).collect();
+        let known = |arrived: Arrived| (arrived.illumination != Illumination::Unknown).then_some(arrived.sums);
+        let wholes: Vec<_> = arrivals.wholes(light, &places).into_iter().map(known).collect();
+        let may_miss = |(place, whole): (_, &Option<Sums>)| whole.is_none() && arrivals.may_miss(light, place);
+        let may_miss: Vec<bool> = places.iter().zip(&wholes).map(may_miss).collect();
+        for (((k, ray), whole), may_miss) in wanted.iter().zip(wholes).zip(may_miss) {
+            let one = &mut all[*k].asking[*ray];
+            (one.whole, one.may_miss) = (whole, may_miss);
+        }
+    }
+
+    /// Asks points of the light, as it is known by now what batches know.
+    pub fn settle(mut self, arrivals: &mut Arrivals, counts: &mut Counts) -> Outcome {
         if !self.asking.is_empty() {
             let mut asking = std::mem::take(&mut self.asking);
             let all_settled = self.points(arrivals, &mut asking, counts);

@@ -94,15 +94,6 @@ impl Cuboid {
         (self.low + self.high) * 0.5
     }
 
-    /// The corners of each face, around.
-    pub fn faces(&self) -> [[DVec3; 4]; 6] {
-        let corner =
-            |k: usize| DVec3::from([0, 1, 2].map(|i| if k >> i & 1 == 0 { self.low[i] } else { self.high[i] }));
-        // A face has one coordinate in common
-        [[0, 2, 6, 4], [1, 3, 7, 5], [0, 1, 5, 4], [2, 3, 7, 6], [0, 1, 3, 2], [4, 5, 7, 6]]
-            .map(|face| face.map(corner))
-    }
-
     /// The most that `d` . x is over it, to within rounding.
     pub fn support(&self, d: DVec3) -> f64 {
         (self.low * d).max(self.high * d).element_sum()

@@ -6,7 +6,6 @@ use fearless_simd::{mask32x16, prelude::*};
 use glam::DVec2;
 
 use super::common::shape_table;
-use super::placement::Placement;
 use super::solid::{Canonical, Solid, SolidHit, SolidPoint, turn};
 use super::surface::UvEdge;
 use crate::context::CompileContext;
@@ -68,29 +67,12 @@ impl Disk {
         Disk { center, frame, radius, inner: 0.0 }
     }
 
-    /// Its middle and its radius.
-    pub fn ball(&self) -> (DVec3, f64) {
-        (self.center, self.radius)
-    }
-
     /// See [`Solid::canonical`].
     pub fn canonical(&self) -> (DAffine3, Canonical) {
         let Frame { x, y, z } = self.frame;
         let axes = DMat3::from_cols(x * self.radius, y * self.radius, z * self.radius);
         let hole = (self.inner / self.radius) as f32;
         (DAffine3::from_mat3_translation(axes, self.center), Canonical::Disk { hole })
-    }
-
-    /// The disk that it is in the world; `None` if it has a hole, or is no disk there.
-    pub fn placed(&self, placement: &Placement) -> Option<Disk> {
-        let to_world = &placement.world_from_object;
-        let [x, y] = [self.frame.x, self.frame.y].map(|axis| to_world.transform_vector3(axis));
-        let (long, other) = (x.length(), y.length());
-        let is_round = (long - other).abs() <= 1e-9 * long && x.dot(y).abs() <= 1e-9 * long * long;
-        let [x, y] = [x / long, y / other];
-        let frame = Frame { x, y, z: x.cross(y) };
-        let disk = Disk::new(to_world.transform_point3(self.center), frame, self.radius * long);
-        (is_round && self.inner == 0.0).then_some(disk)
     }
 
     /// What this disk, without its hole, needs to know of a point that asks for light.

@@ -43,7 +43,7 @@ pub use torus::TorusDesc;
 
 pub(crate) use common::Common;
 pub(crate) use cover::Cover;
-pub(crate) use disk::{Disk, DiskBounds, DiskShadow};
+pub(crate) use disk::{Disk, DiskShadow};
 pub(crate) use mesh::{Mesh, MeshBuilder, MeshSource, TrianglePoint};
 pub(crate) use parallelogram::{ParallelogramShadow, PlaneSide};
 pub(crate) use placement::Placement;

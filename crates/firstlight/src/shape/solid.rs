@@ -39,16 +39,14 @@ pub(crate) enum Canonical {
 }
 
 impl Canonical {
-    /// Whether a point is inside.
-    pub fn holds(&self, p: DVec3) -> bool {
+    /// Whether a point is inside, or no farther outside than `room`, which may be below 0.
+    pub fn holds(&self, p: DVec3, room: f64) -> bool {
         match self {
             Canonical::Plane | Canonical::Disk { .. } => false,
-            Canonical::Box => p.abs().max_element() < 1.0,
-            Canonical::Ball => p.length_squared() < 1.0,
-            Canonical::Frustum { radii, open } => {
+            Canonical::Box => p.abs().max_element() < 1.0 + room,
+            Canonical::Ball => p.length() < 1.0 + room,
+            Canonical::Frustum { radii, .. } => {
                 let [first, last] = radii.map(f64::from);
-                // A tube is left from its inner wall as well
-                let room = if *open { 1e-4 } else { 0.0 };
                 p.z > -room && p.z < 1.0 + room && p.truncate().length() < first + (last - first) * p.z + room
             }
         }

@@ -18,8 +18,9 @@ pub(super) struct ConvexSolid {
     canonical_from_world: DAffine3,
     /// The box around it, if it has an end.
     bounds: Option<[DVec3; 2]>,
-    /// Whether a part of the light may be in it.
+    /// Whether a part of the light may be in it, and whether all is.
     pub may_touch: bool,
+    contains: bool,
 }
 
 /// How far a point is from a box.
@@ -34,7 +35,15 @@ impl ConvexSolid {
         let world_from_canonical = placement.world_from_object * object_from_canonical;
         let bounds = solid.bounds().map(|bounds| placement.bounds(bounds));
         let canonical_from_world = world_from_canonical.inverse();
-        let mut made = ConvexSolid { placement, solid, kind, canonical_from_world, bounds, may_touch: false };
+        let mut made = ConvexSolid {
+            placement,
+            solid,
+            kind,
+            canonical_from_world,
+            bounds,
+            may_touch: false,
+            contains: emitter.corners().iter().all(|q| kind.holds(canonical_from_world.transform_point3(*q), ROUNDING)),
+        };
         made.may_touch = made.touches(emitter);
         let occluder = SolidOccluder::new(&world_from_canonical, kind, made.may_touch);
         Some((made, occluder))
@@ -83,14 +92,19 @@ impl ConvexSolid {
     }
 }
 
+/// Points no farther out than this part of a solid's size are on its surface, as far as single precision tells.
+const ROUNDING: f64 = 1e-6;
+
 /// How a solid lies to a point that may see it in the way.
 enum Lies {
     /// It hides nothing.
     Aside,
     /// It hides nothing from the point, but may from near it.
     Near,
-    /// The point is inside.
-    Around,
+    /// The point is inside, and what surrounds it, or it is where the surface is.
+    Inside,
+    /// The point is inside, and what surrounds it may be outside.
+    NearlyInside,
     Between,
 }
 
@@ -111,10 +125,20 @@ impl ConvexSolid {
         } else if above <= room {
             // It touches the horizon: what the point is on, for one
             Lies::Aside
-        } else if self.kind.holds(self.canonical_from_world.transform_point3(p)) {
-            Lies::Around
         } else {
-            Lies::Between
+            let at = self.canonical_from_world.transform_point3(p);
+            let rows = self.canonical_from_world.matrix3.transpose();
+            let size = |v: DVec3| [rows.x_axis, rows.y_axis, rows.z_axis].map(|row| row.abs().dot(v));
+            let largest = |sizes: [f64; 3]| sizes.into_iter().fold(0.0, f64::max);
+            let room = ROUNDING + 2.0 * largest(size(point.error.0.as_dvec3()));
+            let around = 2.0 * largest(size(DVec3::splat(f64::from(point.reach))));
+            if !self.kind.holds(at, room) {
+                Lies::Between
+            } else if self.kind.holds(at, -room) && !self.kind.holds(at, -around) {
+                Lies::NearlyInside
+            } else {
+                Lies::Inside
+            }
         }
     }
 }
@@ -140,6 +164,7 @@ pub(super) fn solid_between<S: Simd>(
         return told;
     }
     let mut distances = [0.0f32; LANES];
+    let (mut hidden, mut firm) = (0, 0);
     for (k, point) in points.iter().enumerate() {
         let bit = 1 << k;
         if around & bit == 0 {
@@ -151,7 +176,19 @@ pub(super) fn solid_between<S: Simd>(
                 near &= !bit;
             }
             Lies::Near => near &= !bit,
-            Lies::Around => told.other |= bit,
+            lies @ (Lies::Inside | Lies::NearlyInside) => {
+                near &= !bit;
+                if shape.kind.has_hole() || shape.may_touch && !shape.contains {
+                    told.other |= bit;
+                    continue;
+                }
+                // All of the light is inside, or none of it
+                hidden |= if shape.contains { 0 } else { bit };
+                if matches!(lies, Lies::Inside) {
+                    around &= !bit;
+                    firm |= bit;
+                }
+            }
             Lies::Between => {
                 let p = point.p.as_dvec3();
                 let apart = shape.bounds.as_ref().map_or_else(|| shape.height(p).abs(), |bounds| distance(bounds, p));
@@ -160,6 +197,7 @@ pub(super) fn solid_between<S: Simd>(
         }
     }
     near &= around;
+    (told.hidden, told.firm) = (hidden, hidden & firm);
     if around == 0 {
         return told;
     }
@@ -178,8 +216,8 @@ pub(super) fn solid_between<S: Simd>(
     told.motion = sight.motion(f32x16::simd_from(simd, distances));
     if !shape.kind.has_hole() {
         // It is convex: what hides all corners hides all
-        told.hidden = sight.hidden(&shadow, near);
-        told.firm = told.hidden & !told.moving;
+        told.hidden |= sight.hidden(&shadow, near);
+        told.firm |= told.hidden & !told.moving;
     }
     told.other |= if shape.may_touch && shape.kind.has_hole() { near } else { 0 };
     told.outside = near & !told.hidden;

@@ -58,7 +58,7 @@ const ANYTHING: f32 = 1e30;
 const ONE: u32 = 1 << 31;
 /// In display steps: how far all lights that are integrated one by one may be wrong together, if their errors are
 /// independent.
-const INTEGRALS: f32 = 0.15;
+const INTEGRALS: f32 = 0.225;
 /// Pixels across a block.
 const BLOCK: usize = 8;
 const BLOCKS: usize = CELL as usize / BLOCK;

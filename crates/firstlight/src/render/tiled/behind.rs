@@ -75,6 +75,7 @@ struct BlockPatch {
 impl Tiled<'_> {
     /// Makes room for what the rays of each patch of the cell see.
     pub(super) fn begin_looking(&mut self) {
+        self.wholes.iter_mut().for_each(Vec::clear);
         for (pixel, seen) in self.pixels.iter().zip(&mut self.seen) {
             *seen = self.outlooks.len();
             let count = self.outlooks.len() + pixel.patches.len() * self.scene.lights.len();
@@ -112,15 +113,26 @@ impl Tiled<'_> {
         }
         // With all that is known of other lights
         for (light, sights) in sights.iter_mut().enumerate() {
-            for (k, patch) in block.patches.iter().enumerate() {
+            let is_wanted = |k: &usize| {
+                let patch = &block.patches[*k];
                 let first = self.seen[patch.pixel as usize] + patch.patch as usize * lights;
-                if sights.open[k]
+                sights.open[*k]
                     && matches!(self.outlooks[first + light], Outlook::Parted)
                     && self.is_asked(tile, patch.pixel as usize)
-                {
-                    let terms = self.settle(&block, k, light, sights, counts).terms;
-                    self.outlooks[first + light] = Outlook::Settled(terms);
-                }
+            };
+            let wanted: Vec<usize> = (0..block.patches.len()).filter(is_wanted).collect();
+            let before = counts.work();
+            let ask = |k: &usize| self.together(&block, *k, light, sights, counts);
+            let mut all: Vec<Together> = wanted.iter().map(ask).collect();
+            Together::tell(&mut all, &mut self.arrivals, counts);
+            let each = (counts.work() - before) / wanted.len().max(1) as f32;
+            for (k, together) in wanted.into_iter().zip(all) {
+                let patch = &block.patches[k];
+                let first = self.seen[patch.pixel as usize] + patch.patch as usize * lights;
+                let before = counts.work();
+                let terms = together.settle(&mut self.arrivals, counts).terms;
+                self.work[patch.pixel as usize] += each + counts.work() - before;
+                self.outlooks[first + light] = Outlook::Settled(terms);
             }
             sights.views.iter_mut().filter_map(Option::take).for_each(|view| self.arrivals.keep(view));
         }
@@ -131,7 +143,6 @@ impl Tiled<'_> {
     /// What lights other than one send to each ray of a patch, at least, as far as that is known by now.
     pub(super) fn others(&mut self, index: usize, k: usize, light: usize) -> Rgb {
         let scene = self.scene;
-        let Patch { si, bsdf, .. } = self.pixels[index].patches[k];
         let rays = self.pixels[index].patches[k].count(scene) as f32;
         let mut others = Rgb::BLACK;
         for other in (0..scene.lights.len()).filter(|other| *other != light) {
@@ -145,10 +156,29 @@ impl Tiled<'_> {
                 Outlook::Clear | Outlook::Dark | Outlook::Parted => 0.0,
             };
             if share > 0.0 {
-                others += self.arrivals.unshadowed(other, &self.arrivals.place(other, &si, &bsdf)) * share;
+                others += self.unshadowed(index, k, other) * share;
             }
         }
         others
+    }
+
+    /// What a light would send to the middle of a pixel's patch if nothing were in the way, with all colours; black
+    /// where that is not known. All patches of the cell are asked together.
+    fn unshadowed(&mut self, index: usize, k: usize, light: usize) -> Rgb {
+        if self.arrivals.lights.emitters[light].is_none() {
+            return Rgb::BLACK;
+        }
+        if self.wholes[light].is_empty() {
+            let arrivals = &mut self.arrivals;
+            let patches = self.pixels.iter().flat_map(|pixel| &pixel.patches);
+            let places: Vec<_> = patches.map(|patch| arrivals.place(light, &patch.si, &patch.bsdf)).collect();
+            self.wholes[light] = arrivals.wholes(light, &places);
+        }
+        let Patch { si, bsdf, .. } = &self.pixels[index].patches[k];
+        let colors = self.arrivals.place(light, si, bsdf).colors;
+        let number = self.seen[index] / self.scene.lights.len() + k;
+        let Sums { diffuse, specular } = self.wholes[light][number].sums;
+        colors[0] * diffuse + colors[1] * specular
     }
 
     /// What all rays of a pixel's only patch see of a light, ray by ray.
@@ -160,7 +190,10 @@ impl Tiled<'_> {
         sights.open.clear();
         sights.open.push(true);
         self.look_for(&block, light, &mut sights, counts);
-        let outcome = self.settle(&block, 0, light, &mut sights, counts);
+        let before = counts.work();
+        let together = self.together(&block, 0, light, &mut sights, counts);
+        let outcome = together.finish(&mut self.arrivals, counts);
+        self.work[index] += counts.work() - before;
         sights.views.iter_mut().filter_map(Option::take).for_each(|view| self.arrivals.keep(view));
         self.sights.push(sights);
         self.block = block;
@@ -184,7 +217,14 @@ impl Tiled<'_> {
     }
 
     /// Asks for a light at all rays of a patch of the block.
-    fn settle(&mut self, block: &Block, k: usize, light: usize, sights: &mut Sights, counts: &mut Counts) -> Outcome {
+    fn together(
+        &mut self,
+        block: &Block,
+        k: usize,
+        light: usize,
+        sights: &mut Sights,
+        counts: &mut Counts,
+    ) -> Together {
         let patch = block.patches[k];
         let index = patch.pixel as usize;
         let at = self.at(index);
@@ -192,14 +232,11 @@ impl Tiled<'_> {
         let members = patch.members(&self.pixels);
         let share = self.share_of(patch.count);
         let salt = at[0] ^ at[1].rotate_left(16) ^ members[0].si.surface.index() as u32;
-        let before = counts.work();
         let mut together = Together::new(light, members.len(), share, salt, others);
         for (member, k) in members.iter().zip(patch.rays()) {
             sights.settle(k, member, &mut self.arrivals, light, share, &mut together, counts);
         }
-        let outcome = together.finish(&mut self.arrivals, counts);
-        self.work[index] += counts.work() - before;
-        outcome
+        together
     }
 
     /// Finds out what each ray of the block sees of a light.

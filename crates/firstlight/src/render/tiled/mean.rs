@@ -185,14 +185,13 @@ impl Tiled<'_> {
             self.at_rays(patch, at, light, outlook, self.share(patch), counts);
         }
         let share = self.share(patch);
-        let arrivals: ArrayVec<Arrival, 4> = quarters
-            .iter()
-            .map(|quarter| {
-                let place = self.arrivals.place(light, &quarter.si, &quarter.bsdf).over(quarter);
-                let place = ArrivalPlace { share, parted: true, ..place };
-                self.arrivals.arrival(light, &place, counts)
-            })
-            .collect();
+        let mut places: ArrayVec<ArrivalPlace, 4> = ArrayVec::new();
+        for quarter in &quarters {
+            let place = self.arrivals.place(light, &quarter.si, &quarter.bsdf).over(quarter);
+            places.push(ArrivalPlace { share, parted: true, ..place });
+        }
+        let mut arrivals = Vec::new();
+        self.arrivals.arrivals(light, &places, &mut arrivals, counts);
         for (quarter, arrival) in quarters.iter().zip(&arrivals) {
             // The others are as far away as it is wide
             let slope = arrivals.iter().fold(Sums::default(), |most, other| {

@@ -1,0 +1,267 @@
+//! What flat things do to a light, for sixteen points: parallelograms, and triangles of meshes.
+
+use fearless_simd::{f32x16, prelude::*};
+
+use super::{SLACK, Sight, Told};
+use crate::integrate::batch::ShadingPoint;
+use crate::integrate::occluder::{Exact, edges};
+use crate::math::{DVec3, Facet, LANES, Vec3, Vec3x16};
+use crate::shape::{Parallelogram, PlaneSide};
+
+#[inline(always)]
+pub(super) fn flat_between<S: Simd>(
+    simd: S,
+    sight: &Sight<S>,
+    q: [Vec3x16<S>; 4],
+    (flat, side, seen_side): (&Parallelogram, PlaneSide, PlaneSide),
+    points: &[ShadingPoint],
+    asked: u64,
+) -> Told<S> {
+    let zero = simd.splat_f32x16(0.0);
+    let mut told = Told::nothing(zero);
+    let mut size2 = zero;
+    let mut rises = simd.splat_f32x16(f32::NEG_INFINITY);
+    for q in &q {
+        size2 = size2.max(q.dot(*q));
+        rises = rises.max(sight.horizon.dot(*q));
+    }
+    let rounding = size2.sqrt() * SLACK;
+    // Above whose horizon it rises
+    let around = sight.reach + sight.turn * (size2.sqrt() + sight.reach);
+    let mut near = asked & rises.simd_ge(-rounding - around).to_bitmask();
+    if near == 0 {
+        return told;
+    }
+    let gap = sight.gap(&q);
+    near &= gap.simd_le(rounding + sight.reach).to_bitmask();
+    // On which side of it the points are, to the last bit; and a part of what is around them may be on the other side
+    let (mut left, mut through, mut beside) = (near, 0u64, 0u64);
+    while left != 0 {
+        let k = left.trailing_zeros() as usize;
+        left &= left - 1;
+        let ShadingPoint { p, error, reach, .. } = points[k];
+        if !flat.is_one_sided(p, error, side) {
+            through |= 1 << k;
+        } else if reach > 0.0 && flat.plane_cuts(p, error, reach) {
+            beside |= 1 << k;
+        }
+    }
+    near = through | beside;
+    if near == 0 {
+        return told;
+    }
+    // In the light's own plane nothing is before it
+    let lines = edges(q, &sight.ways);
+    let n = (q[1] - q[0]).cross(q[3] - q[0]);
+    let length = n.dot(n).sqrt();
+    let mut in_plane = near;
+    for [x, y] in sight.square() {
+        in_plane &= lines[0].at(x, y).abs().simd_le(length * sight.far * SLACK).to_bitmask();
+    }
+    near &= !in_plane;
+    // How far away it is decides how far its shadow moves
+    let mut motion = [0.0f32; LANES];
+    let mut left = near & sight.reach.simd_gt(zero).to_bitmask();
+    while left != 0 {
+        let k = left.trailing_zeros() as usize;
+        left &= left - 1;
+        let point = &points[k];
+        let distance = flat.distance(point.p.as_dvec3()) as f32;
+        let is_screen =
+            beside >> k & 1 == 1 && distance <= point.reach && flat.screens(point.p, point.wo, point.reach, seen_side);
+        if !is_screen {
+            motion[k] = (distance - point.reach).max(0.0);
+            told.moving |= 1 << k;
+        }
+    }
+    told.motion = sight.motion(f32x16::simd_from(simd, motion));
+    near &= through & gap.simd_le(rounding).to_bitmask() & rises.simd_ge(-rounding).to_bitmask();
+    if near == 0 {
+        return told;
+    }
+    let [near, hidden] = sight.covered(&lines, near);
+    told.hidden = hidden;
+    told.outside = near & !hidden;
+    // From everywhere around: all ways to the corners pass far inside of the edges
+    let mut patches = hidden;
+    while patches != 0 {
+        let k = patches.trailing_zeros() as usize;
+        patches &= patches - 1;
+        let point = &points[k];
+        if point.reach == 0.0 {
+            told.firm |= 1 << k;
+            continue;
+        }
+        let share = (motion[k] + point.reach) / sight.far.to_array()[k];
+        let corners = flat.deep_corners().map(|q| (q - point.p.as_dvec3()).as_vec3());
+        let edge = |i: usize| corners[i].cross(corners[(i + 1) % 4]).length();
+        let lengths = [length.to_array()[k], edge(0), edge(1), edge(2), edge(3)];
+        let mut depth = f32::INFINITY;
+        for (line, length) in lines.iter().zip(lengths) {
+            for [x, y] in sight.square() {
+                depth = depth.min(line.at(x, y).to_array()[k] / length);
+            }
+        }
+        if depth * share.min(1.0) > point.reach {
+            told.firm |= 1 << k;
+        }
+    }
+    told
+}
+
+/// A triangle of a mesh as it is placed.
+pub(super) struct FacetShape {
+    pub facet: Facet,
+    corners: [DVec3; 3],
+    /// The longer of the edges from the first corner.
+    edge: f32,
+}
+
+/// Points no farther off the plane of a facet than this part of its edges are in it.
+const IN_PLANE: f32 = 1e-5;
+/// Triangles that rise no higher than this part of their edges do not rise.
+const LEVEL: f32 = 1e-4;
+
+impl FacetShape {
+    pub fn new(facet: Facet, corners: [DVec3; 3]) -> FacetShape {
+        let [a, b, c] = corners;
+        FacetShape { facet, corners, edge: (b - a).length().max((c - a).length()) as f32 }
+    }
+
+    /// Around, as a parallelogram whose last two are one.
+    pub fn corners(&self) -> [Exact; 4] {
+        let [a, b, c] = self.corners.map(Exact::new);
+        [a, b, c, c]
+    }
+
+    /// How far it is from a point.
+    pub fn distance(&self, p: DVec3) -> f32 {
+        triangle_distance(&self.corners.map(|q| (q - p).as_vec3()))
+    }
+}
+
+/// The facets that points are on.
+pub(super) struct Own<S: Simd> {
+    /// Unit, to the viewer's side.
+    ng: Vec3x16<S>,
+    /// Which points are lifted off facets that stand for something round, and which of those see some of the light from
+    /// below their facet.
+    lifted: u64,
+    sees_below: u64,
+}
+
+impl<S: Simd> Own<S> {
+    #[inline(always)]
+    pub fn new(simd: S, sight: &Sight<S>, points: &[ShadingPoint]) -> Own<S> {
+        let mut numbers = [[0.0; LANES]; 3];
+        let mut lifted = 0;
+        for (k, point) in points.iter().enumerate() {
+            let Vec3 { x, y, z } = point.ng;
+            (numbers[0][k], numbers[1][k], numbers[2][k]) = (x, y, z);
+            lifted |= u64::from(point.facet != Facet::NONE) << k;
+        }
+        let [x, y, z] = numbers;
+        let ng =
+            Vec3x16 { x: f32x16::simd_from(simd, x), y: f32x16::simd_from(simd, y), z: f32x16::simd_from(simd, z) };
+        let mut least = simd.splat_f32x16(f32::INFINITY);
+        for [x, y] in sight.square() {
+            least = least.min(ng.dot(sight.way(x, y)));
+        }
+        Own { ng, lifted, sees_below: lifted & !least.simd_gt(simd.splat_f32x16(0.0)).to_bitmask() }
+    }
+}
+
+#[allow(clippy::too_many_arguments, reason = "a triangle, sixteen points and what they are on")]
+#[inline(always)]
+pub(super) fn facet_between<S: Simd>(
+    simd: S,
+    sight: &Sight<S>,
+    q: [Vec3x16<S>; 4],
+    shape: &FacetShape,
+    own: &Own<S>,
+    points: &[ShadingPoint],
+    asked: u64,
+) -> Told<S> {
+    let zero = simd.splat_f32x16(0.0);
+    let mut told = Told::nothing(zero);
+    let mut size2 = zero;
+    let mut rises = simd.splat_f32x16(f32::NEG_INFINITY);
+    let mut over_own = rises;
+    for q in &q[..3] {
+        size2 = size2.max(q.dot(*q));
+        rises = rises.max(sight.horizon.dot(*q));
+        over_own = over_own.max(own.ng.dot(*q));
+    }
+    let rounding = size2.sqrt() * SLACK;
+    let room = sight.error.dot(sight.error).sqrt() * 4.0 + shape.edge * LEVEL;
+    let mut near = asked & rises.simd_gt(room).to_bitmask();
+    // One that goes on as a lifted point's own facet does, or falls off from it, hides nothing that is above that; and
+    // one in the same plane nothing at all: what comes from below has passed that plane before it gets there
+    let level = near & own.lifted & over_own.simd_le(room).to_bitmask();
+    if level != 0 {
+        let n = (q[1] - q[0]).cross(q[2] - q[0]);
+        let in_plane = n.dot(q[0]).abs().simd_le(n.dot(n).sqrt() * (shape.edge * IN_PLANE)).to_bitmask();
+        near &= !level | own.sees_below & !in_plane;
+    }
+    let gap = sight.gap(&q[..3]);
+    near &= gap.simd_le(rounding + sight.reach).to_bitmask();
+    if near == 0 {
+        return told;
+    }
+    let mut distances = [0.0f32; LANES];
+    for (k, point) in points.iter().enumerate() {
+        let bit = 1 << k;
+        if near & bit == 0 {
+            continue;
+        }
+        if point.facet == shape.facet {
+            near &= !bit;
+        } else if point.reach > 0.0 {
+            distances[k] = (shape.distance(point.p.as_dvec3()) - point.reach).max(0.0);
+            told.moving |= bit;
+        }
+    }
+    told.motion = sight.motion(f32x16::simd_from(simd, distances));
+    near &= gap.simd_le(rounding).to_bitmask();
+    if near == 0 {
+        return told;
+    }
+    let [near, hidden] = sight.covered(&edges(q, &sight.ways), near);
+    told.hidden = hidden;
+    told.firm = hidden & !told.moving;
+    told.outside = near & !hidden;
+    told
+}
+
+/// How far a triangle is from the origin.
+///
+/// Source: Ericson, "Real-Time Collision Detection", 2005, section 5.1.5.
+fn triangle_distance([a, b, c]: &[Vec3; 3]) -> f32 {
+    let (ab, ac) = (*b - *a, *c - *a);
+    let (d1, d2) = (-ab.dot(*a), -ac.dot(*a));
+    if d1 <= 0.0 && d2 <= 0.0 {
+        return a.length();
+    }
+    let (d3, d4) = (-ab.dot(*b), -ac.dot(*b));
+    if d3 >= 0.0 && d4 <= d3 {
+        return b.length();
+    }
+    let vc = d1 * d4 - d3 * d2;
+    if vc <= 0.0 && d1 >= 0.0 && d3 <= 0.0 {
+        return (*a + ab * (d1 / (d1 - d3))).length();
+    }
+    let (d5, d6) = (-ab.dot(*c), -ac.dot(*c));
+    if d6 >= 0.0 && d5 <= d6 {
+        return c.length();
+    }
+    let vb = d5 * d2 - d1 * d6;
+    if vb <= 0.0 && d2 >= 0.0 && d6 <= 0.0 {
+        return (*a + ac * (d2 / (d2 - d6))).length();
+    }
+    let va = d3 * d6 - d5 * d4;
+    if va <= 0.0 && d4 - d3 >= 0.0 && d5 - d6 >= 0.0 {
+        return (*b + (*c - *b) * ((d4 - d3) / ((d4 - d3) + (d5 - d6)))).length();
+    }
+    let n = ab.cross(ac);
+    (n.dot(*a) / n.length()).abs()
+}
