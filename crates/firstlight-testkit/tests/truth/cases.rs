@@ -217,3 +217,69 @@ material = "m"
         assert!(off < 1.0, "{off} steps off with {light}");
     }
 }
+
+/// A cube and a corner of two walls, as meshes.
+const MESHES: &str = r#"
+[[mesh]]
+positions = [[-0.5, 0, -0.5], [0.5, 0, -0.5], [0.5, 0, 0.5], [-0.5, 0, 0.5], [-0.5, 1, -0.5], [0.5, 1, -0.5], [0.5, 1, 0.5], [-0.5, 1, 0.5]]
+triangles = [[0, 1, 2], [0, 2, 3], [4, 7, 6], [4, 6, 5], [0, 4, 5], [0, 5, 1], [1, 5, 6], [1, 6, 2], [2, 6, 7], [2, 7, 3], [3, 7, 4], [3, 4, 0]]
+transform = { rotate_deg = [0, 25, 0], translate = [-1, 0, 0] }
+material = "m"
+[[mesh]]
+positions = [[0, 0, 0], [2, 0, 0], [2, 1, 0], [0, 1, 0], [0, 0, 2], [0, 1, 2]]
+triangles = [[0, 1, 2], [0, 2, 3], [0, 4, 5], [0, 5, 3]]
+material = "m"
+"#;
+
+#[test]
+fn few_triangles_cast_shadows_of_closed_form() {
+    let lights = [
+        "[[light.rectangle]]\ncenter = [1, 4, 1]\ne0 = [1.5, 0, 0]\ne1 = [0, 0, 1.5]\nstrength = 8\n",
+        "[[light.disk]]\ncenter = [1, 2.5, 2]\nnormal = [0, -1, -0.3]\nradius = 1\nstrength = 4\n",
+        "[[light.sphere]]\ncenter = [1, 2.5, 2]\nradius = 0.8\nstrength = 4\nfalloff = \"constant\"\n",
+    ];
+    for light in lights {
+        let off = off_by(&format!("{ROOM}{light}{MESHES}"));
+        assert!(off < 0.5, "{off} steps off under {light}");
+    }
+}
+
+#[test]
+fn a_sliver_of_a_ball_light_is_seen_past_a_ball() {
+    // Far behind the ball, where its shadow on the floor ends
+    let scene = r#"
+[render]
+width = 96
+height = 24
+[camera]
+position = [-4.4, 0.6, -1]
+look_at = [-2.6, 0, -3]
+fov_y_deg = 12
+[material.phong.m]
+diffuse = 0.8
+[[sphere]]
+center = [-0.9, 0.9, 0]
+radius = 0.9
+material = "m"
+[[plane]]
+point = [0, 0, 0]
+normal = [0, 1, 0]
+material = "m"
+[[light.sphere]]
+center = [0.3, 1.9, 0.2]
+radius = 0.25
+strength = 0.9
+falloff = "constant"
+"#;
+    let off = off_by(scene);
+    assert!(off < 0.8, "{off} steps off");
+}
+
+#[test]
+fn a_box_around_a_light_and_all_else_hides_nothing() {
+    let light = "[[light.rectangle]]\ncenter = [1, 4, 1]\ne0 = [1.5, 0, 0]\ne1 = [0, 0, 1.5]\nstrength = 8\n";
+    let ball = "[[sphere]]\ncenter = [0, 0.5, 0]\nradius = 0.5\nmaterial = \"m\"\n";
+    let walls = "[[box]]\ncenter = [0, 4, 0]\nsize = [12, 8.2, 24]\nmaterial = \"m\"\n";
+    let off = off_by(&format!("{ROOM}{light}{ball}{walls}"));
+    assert!(off < 0.5, "{off} steps off");
+}

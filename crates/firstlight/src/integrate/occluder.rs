@@ -6,11 +6,14 @@
 //! Source of the quadratic of a sphere: the cone that touches it, r^2 |l|^2 - |l x s|^2 >= 0, as in Heidrich, Brabec,
 //! Seidel, "Soft Shadow Maps for Linear Lights", 2000, for one row; the rest is ours.
 
+use std::f32::consts::PI;
+
+use arrayvec::ArrayVec;
 use fearless_simd::{f32x16, mask32x16, prelude::*};
 
 use super::batch::{Block, Linear16, Members, ViewNumber};
 use super::hull::{Hull, SolidOccluder};
-use crate::math::{DVec3, Vec3, Vec3x16};
+use crate::math::{DVec3, Vec3, Vec3x16, sin_cos};
 use crate::shape::Canonical;
 
 /// A vector of doubles as two of floats: the difference to a point loses nothing where the two are close.
@@ -164,6 +167,13 @@ impl<S: Simd> Quadratic16<S> {
         }
     }
 
+    /// What is linear over the light.
+    #[inline(always)]
+    fn line(line: &Linear16<S>) -> Self {
+        let zero = line.c.token().splat_f32x16(0.0);
+        Quadratic16 { c: line.c, x: line.x * 0.5, y: line.y * 0.5, xx: zero, xy: zero, yy: zero }
+    }
+
     /// The square of what is linear over the light.
     #[inline(always)]
     pub fn square(line: &Linear16<S>) -> Self {
@@ -245,16 +255,54 @@ impl<S: Simd> Quadratic16<S> {
     }
 }
 
+/// Sides of cells that are halves of ellipses: x + `origin[0]` = `width` sqrt(1 - (y + `origin[1]`)^2), one on each side.
+#[derive(Clone, Copy)]
+pub(crate) struct RoundSides<S: Simd> {
+    pub width: [f32x16<S>; 2],
+    pub origin: [f32x16<S>; 2],
+}
+
 /// Rows at which something begins, ends, has a corner, or meets the sides of cells; not a number where there is none.
 pub(crate) struct Breaks<'a, S: Simd> {
-    /// The sides of the cells.
+    /// The sides of the cells, if they are straight, or of boxes around them.
     pub x: [f32x16<S>; 2],
+    pub is_straight: bool,
+    pub round: Option<RoundSides<S>>,
     /// Whose rows are looked for.
     pub of: mask32x16<S>,
     pub rows: &'a mut Vec<Block>,
 }
 
+/// Round sides are looked at in so many places, evenly in their angle.
+const PLACES: usize = 13;
+/// Sine and cosine of those angles, from -pi/2 to pi/2: steps of 15 degrees.
+const ANGLES: [[f32; 2]; PLACES] = {
+    const QUARTER: [f32; 7] = [0.0, 0.258_819_04, 0.5, 0.707_106_77, 0.866_025_4, 0.965_925_8, 1.0];
+    let mut angles = [[0.0; 2]; PLACES];
+    let mut i = 0;
+    while i < 7 {
+        angles[6 + i] = [QUARTER[i], QUARTER[6 - i]];
+        angles[6 - i] = [-QUARTER[i], QUARTER[6 - i]];
+        i += 1;
+    }
+    angles
+};
+
+/// In radians: from one of those angles to the next; and how often a root between two of them is looked for.
+const STEP: f32 = PI / (PLACES - 1) as f32;
+const REFINED: usize = 4;
+
 impl<S: Simd> Breaks<'_, S> {
+    /// The sides that are straight.
+    #[inline(always)]
+    fn straight(&self) -> ArrayVec<f32x16<S>, 2> {
+        let mut sides = ArrayVec::new();
+        if self.is_straight {
+            sides.extend(self.x);
+        }
+        sides
+    }
+
     #[inline(always)]
     fn tell_if(&mut self, row: f32x16<S>, is: mask32x16<S>) {
         self.rows.push((is & self.of).select(row, row.token().splat_f32x16(f32::NAN)).to_array());
@@ -269,10 +317,68 @@ impl<S: Simd> Breaks<'_, S> {
             let room = (self.x[1] - self.x[0]) * 1e-3;
             self.tell_if(y, of & tangents.any & x.simd_gt(self.x[0] - room) & x.simd_lt(self.x[1] + room));
         }
-        for x in self.x {
+        for x in self.straight() {
             let crossings = quadratic.crossings(x);
             self.tell_if(crossings.low, of & crossings.any);
             self.tell_if(crossings.high, of & crossings.any);
+        }
+        self.on_round_sides(quadratic, of, &[]);
+    }
+
+    /// Where a quadratic is 0 on round sides, and some lines are above it. Not inlined: one copy for each instruction
+    /// set is enough.
+    #[inline(never)]
+    fn on_round_sides(&mut self, quadratic: &Quadratic16<S>, of: mask32x16<S>, inside: &[Linear16<S>]) {
+        let Some(sides) = self.round else { return };
+        self.of.token().vectorize(
+            #[inline(always)]
+            || {
+                for width in sides.width {
+                    self.on_side(quadratic, of, inside, width, sides.origin);
+                }
+            },
+        );
+    }
+
+    #[inline(always)]
+    fn on_side(
+        &mut self,
+        quadratic: &Quadratic16<S>,
+        of: mask32x16<S>,
+        inside: &[Linear16<S>],
+        width: f32x16<S>,
+        origin: [f32x16<S>; 2],
+    ) {
+        let simd = width.token();
+        let zero = simd.splat_f32x16(0.0);
+        let mut before = zero;
+        for (k, [sin, cos]) in ANGLES.iter().enumerate() {
+            let here = quadratic.at(width * *cos - origin[0], *sin - origin[1]);
+            let changes = of & (here.simd_lt(zero) ^ before.simd_lt(zero));
+            if k > 0 && changes.any_true() {
+                // Between the two angles, by the line through the ends, one of which counts half if it stays
+                let (mut a, mut b) = (simd.splat_f32x16(0.0), simd.splat_f32x16(STEP));
+                let (mut fa, mut fb) = (before, here);
+                let [from_sin, from_cos] = ANGLES[k - 1];
+                let (mut x, mut y) = (zero, zero);
+                for _ in 0..REFINED {
+                    let t = a + (b - a) * (fa / (fa - fb));
+                    let (s, c) = sin_cos(t);
+                    (y, x) =
+                        (s * from_cos + c * from_sin - origin[1], width * (c * from_cos - s * from_sin) - origin[0]);
+                    let f = quadratic.at(x, y);
+                    let is_first = f.simd_lt(zero) ^ fa.simd_lt(zero);
+                    // The root is before t, or after it
+                    (b, fb) = (is_first.select(t, b), is_first.select(f, fb * 0.5));
+                    (a, fa) = (is_first.select(a, t), is_first.select(fa * 0.5, f));
+                }
+                let mut is = changes;
+                for line in inside {
+                    is &= line.at(x, y).simd_ge((line.c.abs() + line.x.abs() + line.y.abs()) * -1e-3);
+                }
+                self.tell_if(y, is);
+            }
+            before = here;
         }
     }
 
@@ -281,9 +387,12 @@ impl<S: Simd> Breaks<'_, S> {
     pub fn polygon(&mut self, lines: &[Linear16<S>; 5]) {
         let zero = lines[0].c.token().splat_f32x16(0.0);
         for (i, p) in lines.iter().enumerate() {
-            for x in self.x {
+            for x in self.straight() {
                 let y = -(p.c + x * p.x) / p.y;
                 self.tell_if(y, is_inside(lines, x, y, [i, i]));
+            }
+            if self.round.is_some() {
+                self.on_round_sides(&Quadratic16::line(p), self.of, lines);
             }
         }
         for (i, j) in [(0, 1), (0, 2), (0, 3), (0, 4), (1, 2), (2, 3), (3, 4), (4, 1)] {
@@ -299,8 +408,11 @@ impl<S: Simd> Breaks<'_, S> {
     #[inline(always)]
     pub fn line(&mut self, line: &Linear16<S>) {
         let all = self.of;
-        for x in self.x {
+        for x in self.straight() {
             self.tell_if(-(line.c + x * line.x) / line.y, all);
+        }
+        if self.round.is_some() {
+            self.on_round_sides(&Quadratic16::line(line), all, &[]);
         }
     }
 }

@@ -14,7 +14,7 @@ use fearless_simd::{f32x16, mask32x16, prelude::*};
 use super::batch::{Block, Members, ViewNumber};
 use super::cut::{self, Cut};
 use super::fit::{Cell, MOMENTS, Polynomial};
-use super::occluder::{Breaks, Exact, FAR, Interval16, Occluder, Shadow, ways};
+use super::occluder::{Breaks, Exact, FAR, Interval16, Occluder, RoundSides, Shadow, ways};
 use super::view::Outline;
 use crate::math::{LANES, Vec3x16, asin, sin_cos};
 
@@ -184,28 +184,41 @@ fn breaks<S: Simd>(simd: S, blocked: &Blocked, members: &Members, cells: &[Cell]
     use ViewNumber::*;
     let side = |end: usize| std::array::from_fn::<f32, LANES, _>(|k| cells[k.min(cells.len() - 1)].x[end]);
     let x = [f32x16::simd_from(simd, side(0)), f32x16::simd_from(simd, side(1))];
+    let zero = simd.splat_f32x16(0.0);
+    let (x, round) = match blocked.outline {
+        Outline::Parallelogram => (x, None),
+        Outline::Disk => {
+            let origin = [members.lanes(simd, OriginX), members.lanes(simd, OriginY)];
+            (x, Some(RoundSides { width: [simd.splat_f32x16(-1.0), simd.splat_f32x16(1.0)], origin }))
+        }
+        Outline::Sphere => {
+            let width = [sin_cos(x[0]).0, sin_cos(x[1]).0];
+            ([width[0].min(zero), width[1].max(zero)], Some(RoundSides { width, origin: [zero; 2] }))
+        }
+    };
+    let is_straight = blocked.outline != Outline::Sphere;
     let batch = Batch::new(simd, blocked, members, |k| cells[k.min(cells.len() - 1)].point);
     for occluder in batch.occluders() {
         let (shadow, outside, within) = batch.shadow(simd, occluder);
-        let mut breaks = Breaks { x, of: outside | within, rows };
+        let mut breaks = Breaks { x, is_straight, round, of: outside | within, rows };
         match batch.cut(simd, occluder) {
             Some(cut) => cut.breaks(&mut breaks),
             None => shadow.breaks(&mut breaks),
         }
     }
-    if blocked.outline == Outline::Sphere {
-        for row in rows.iter_mut() {
-            *row = asin(f32x16::simd_from(simd, *row)).to_array();
-        }
-        return;
-    }
     let all = x[0].simd_eq(x[0]);
-    let mut breaks = Breaks { x, of: all, rows };
+    let mut breaks = Breaks { x, is_straight, round, of: all, rows };
     breaks.line(&members.linear(simd, [CosC, CosX, CosY]));
     breaks.line(&members.linear(simd, [HorizonC, HorizonX, HorizonY]));
     if blocked.outline == Outline::Disk {
         let origin = [members.lanes(simd, OriginX), members.lanes(simd, OriginY)];
+        breaks.round = None;
         breaks.quadratic(&Shadow::rim(origin), all);
+    }
+    if blocked.outline == Outline::Sphere {
+        for row in rows.iter_mut() {
+            *row = asin(f32x16::simd_from(simd, *row)).to_array();
+        }
     }
 }
 

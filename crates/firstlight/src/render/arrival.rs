@@ -19,9 +19,10 @@ use crate::integrate::{
 };
 use crate::light::{Area, AreaShape, Light, LightKind, LightTree};
 use crate::material::{Bsdf, Lobe};
+use crate::math::LANES;
 use crate::scene::Scene;
 use crate::shape::SurfaceInteraction;
-use crate::visibility::{Occluders, Settler, Target, View as ShadowView, Viewpoint, Visibility};
+use crate::visibility::{Occluders, Settler, Shaft, Target, View as ShadowView, Viewpoint, Visibility};
 
 /// A place of a surface that asks for one light, by itself.
 #[derive(Clone, Copy)]
@@ -97,6 +98,16 @@ pub(super) enum Trees {
     Known,
     /// More, or something that has no closed form.
     Unknown,
+}
+
+/// What of the trees is in the way from one point.
+pub(super) enum Past {
+    /// Nothing that batches do not know anyway.
+    Nothing,
+    /// So little that a batch is asked past it.
+    Known,
+    /// This has to be asked.
+    Unknown(ShadowView),
 }
 
 /// What one place sees of an area light that is integrated.
@@ -209,6 +220,8 @@ pub(crate) struct Arrivals<'a> {
 const FLAT: f32 = 1e-4;
 /// Highlights narrower than this part of a sphere light, both as angles, are not found by points all over it.
 const NARROW: f32 = 1.0 / 6.0;
+/// The most triangles in the way of a ray that batches are asked past.
+const FEW_TRIANGLES: usize = 6;
 /// Leaves of triangles that are worth looking at one by one.
 const LEAVES: usize = 12;
 
@@ -373,28 +386,54 @@ impl<'a> Arrivals<'a> {
         found.resize(places.len(), (Change::NONE, Seen::Known(Sums::default())));
         // Those that are asked: past what nothing in trees is added to, and without shadows
         let mut asked: [Vec<u32>; 2] = Default::default();
-        for (k, place) in places.iter().enumerate() {
+        let mut next = 0;
+        while next < places.len() {
+            let (from, place) = (next, &places[next]);
+            next += 1;
             if !self.is_linked(index, place) {
                 continue;
             }
-            let shadows = scene.lights[index].shadows && place.si.receives_shadow && !place.lit;
-            let trees = if shadows && !place.clear { self.gather(index, place) } else { Trees::Nothing };
+            let shadows = |place: &ArrivalPlace| scene.lights[index].shadows && place.si.receives_shadow && !place.lit;
+            if !shadows(place) || place.clear || !scene.geometry.has_trees() {
+                asked[usize::from(!shadows(place))].push(from as u32);
+                continue;
+            }
+            // What is in trees is gathered for rays of one surface together
+            let is_like = |other: &ArrivalPlace| {
+                other.reach + place.reach == 0.0
+                    && shadows(other)
+                    && !other.clear
+                    && (other.si.surface, other.lobe) == (place.si.surface, place.lobe)
+            };
+            let rest = &places[from..places.len().min(from + LANES)];
+            let mut run = 1 + rest[1..].iter().take_while(|other| is_like(other)).count();
+            let mut trees = self.gather(index, &places[from..from + run]);
+            if run > 1 && matches!(trees, Trees::Unknown) {
+                run = 1;
+                trees = self.gather(index, &places[from..=from]);
+            }
+            next = from + run;
             match trees {
                 Trees::Known => {
-                    let arrived = self.in_lanes(index, emitter, place, true, true);
-                    found[k] = self.found(index, place, arrived, counts);
+                    let mut arrived = std::mem::take(&mut self.arrived);
+                    arrived.clear();
+                    self.ask(index, emitter, places[from..next].iter(), [true, true], &mut arrived);
+                    for (k, arrived) in (from..next).zip(&arrived) {
+                        found[k] = self.found(index, &places[k], *arrived, counts);
+                    }
+                    self.arrived = arrived;
                 }
-                Trees::Nothing => asked[usize::from(!shadows)].push(k as u32),
+                Trees::Nothing => asked[0].extend(from as u32..next as u32),
                 Trees::Unknown => {
-                    asked[1].push(k as u32);
-                    found[k].1 = Seen::Behind(None);
+                    asked[1].push(from as u32);
+                    found[from].1 = Seen::Behind(None);
                 }
             }
         }
         let mut arrived = std::mem::take(&mut self.arrived);
         for (numbers, shadows) in asked.iter().zip([true, false]) {
             arrived.clear();
-            self.ask(index, emitter, numbers.iter().map(|k| &places[*k as usize]), shadows, &mut arrived);
+            self.ask(index, emitter, numbers.iter().map(|k| &places[*k as usize]), [shadows, false], &mut arrived);
             for (k, arrived) in numbers.iter().zip(&arrived) {
                 let (k, mut arrived) = (*k as usize, *arrived);
                 if matches!(found[k].1, Seen::Behind(_)) && arrived.illumination != Illumination::Below {
@@ -410,19 +449,20 @@ impl<'a> Arrivals<'a> {
         self.arrived = arrived;
     }
 
-    /// Adds what batches know of some places, with or without what is in lists.
+    /// Adds what batches know of some places, with or without what is in lists, and in what was gathered in trees.
     fn ask<'p, 'q: 'p>(
         &mut self,
         index: usize,
         emitter: &Emitter,
         places: impl Iterator<Item = &'p ArrivalPlace<'q>> + Clone,
-        shadows: bool,
+        [shadows, near]: [bool; 2],
         arrived: &mut Vec<Arrived>,
     ) {
+        let near = near.then_some(&self.near);
         // Batches are of one highlight
         let mut places = places.peekable();
         while let Some(lobe) = places.peek().map(|place| place.lobe) {
-            let asked = Asked { allowed: self.allowed, ..self.lights.asked_of(index, emitter, lobe, shadows) };
+            let asked = Asked { near, allowed: self.allowed, ..self.lights.asked_of(index, emitter, lobe, shadows) };
             self.points.clear();
             while let Some(place) = places.next_if(|place| place.lobe == lobe) {
                 self.points.push(place.point_of_surface());
@@ -477,27 +517,8 @@ impl<'a> Arrivals<'a> {
         let lights = self.lights;
         let Some(emitter) = &lights.emitters[index] else { unreachable!("lights that are sampled have no whole") };
         let mut arrived = Vec::with_capacity(places.len());
-        self.ask(index, emitter, places.iter(), false, &mut arrived);
+        self.ask(index, emitter, places.iter(), [false; 2], &mut arrived);
         arrived
-    }
-
-    /// What a batch of one knows of light `index`; `near` says whether it is asked past what was gathered in trees.
-    fn in_lanes(
-        &mut self,
-        index: usize,
-        emitter: &Emitter,
-        place: &ArrivalPlace,
-        shadows: bool,
-        near: bool,
-    ) -> Arrived {
-        let asked = Asked {
-            near: near.then_some(&self.near),
-            allowed: self.allowed,
-            ..self.lights.asked_of(index, emitter, place.lobe, shadows)
-        };
-        self.arrived.clear();
-        self.evaluator.evaluate(self.level, &asked, &[place.point_of_surface()], &mut self.arrived);
-        self.arrived[0]
     }
 
     /// Adds to `arrived` what arrives of a light at many points.
@@ -551,15 +572,15 @@ impl<'a> Arrivals<'a> {
         (occluders.has_trees() && !is_known, occluders.count() == 0)
     }
 
-    /// Hears what of light `index` is seen from those `points` whose numbers are in `order`. `each` may take what is in
-    /// the way, if something in trees is.
+    /// Hears what of light `index` is seen from those `points` whose numbers are in `order`. `each` may ask what of trees
+    /// is in the way.
     pub fn sights(
         &mut self,
         index: usize,
         points: &[Viewpoint],
         order: &mut [u32],
         counts: &mut Counts,
-        mut each: impl FnMut(usize, Visibility, &mut dyn FnMut() -> Option<ShadowView>),
+        mut each: impl FnMut(usize, Visibility, &mut dyn FnMut() -> Past),
     ) {
         let (lights, views) = (self.lights, &mut self.views);
         let (target, listed) = (&lights.targets[index], self.scene.geometry.listed);
@@ -567,8 +588,13 @@ impl<'a> Arrivals<'a> {
         self.settler.settle(self.level, self.scene, target, points, order, settled, |k, visibility, view| {
             each(k, visibility, &mut || {
                 let is_listed = listed || view.spheres.is_empty() && view.flats.is_empty();
-                let is_known = is_listed && !view.has_meshes() && lights.know(index, &view.others);
-                (!is_known).then(|| std::mem::replace(view, views.pop().unwrap_or_default()))
+                if view.trees || !lights.know(index, &view.others) || view.triangles.len() > FEW_TRIANGLES {
+                    Past::Unknown(std::mem::replace(view, views.pop().unwrap_or_default()))
+                } else if is_listed && view.triangles.is_empty() {
+                    Past::Nothing
+                } else {
+                    Past::Known
+                }
             });
         });
     }
@@ -693,14 +719,26 @@ impl<'a> Arrivals<'a> {
         sums
     }
 
-    /// Gathers what of the trees may be in the way of a light.
-    pub(super) fn gather(&mut self, index: usize, place: &ArrivalPlace) -> Trees {
+    /// Gathers what of the trees may be in the way of a light: from a place and what lies around it, or from several
+    /// points.
+    pub(super) fn gather(&mut self, index: usize, places: &[ArrivalPlace]) -> Trees {
         let (scene, lights) = (self.scene, self.lights);
         if !scene.geometry.has_trees() {
             return Trees::Nothing;
         }
-        let (target, point, trees) = (&lights.targets[index], Viewpoint::of(place.si), &mut self.occluders);
-        trees.gather_around(self.level, scene, target, &point, place.reach, place.turn > FLAT, LEAVES);
+        let (target, trees) = (&lights.targets[index], &mut self.occluders);
+        match places {
+            [place] => {
+                let point = Viewpoint::of(place.si);
+                trees.gather_around(self.level, scene, target, &point, place.reach, place.turn > FLAT, LEAVES);
+            }
+            places => {
+                let points: Vec<_> = places.iter().map(|place| Viewpoint::of(place.si)).collect();
+                let numbers: Vec<_> = (0..points.len() as u32).collect();
+                let shaft = Shaft::of(&points, &numbers, &target.hull);
+                trees.gather_in(self.level, scene, target, &shaft, &points, &numbers, LEAVES);
+            }
+        }
         if !trees.has_meshes() && lights.know(index, &trees.others) {
             Trees::Nothing
         } else if trees.too_many || !lights.know(index, &trees.others) {
@@ -717,8 +755,10 @@ impl<'a> Arrivals<'a> {
     /// How an area light would change if it were integrated.
     fn change_if_integrated(&mut self, index: usize, emitter: &Emitter, place: &ArrivalPlace) -> Change {
         let shadows = self.scene.lights[index].shadows && place.si.receives_shadow;
-        let trees = if shadows { self.gather(index, place) } else { Trees::Nothing };
-        let mut arrived = self.in_lanes(index, emitter, place, shadows, matches!(trees, Trees::Known));
+        let trees = if shadows { self.gather(index, std::slice::from_ref(place)) } else { Trees::Nothing };
+        let mut arrived = Vec::new();
+        self.ask(index, emitter, std::iter::once(place), [shadows, matches!(trees, Trees::Known)], &mut arrived);
+        let mut arrived = arrived[0];
         if matches!(trees, Trees::Unknown) || arrived.illumination == Illumination::Unknown {
             arrived.motion = f32::INFINITY;
         }

@@ -23,6 +23,7 @@ mod view;
 pub(crate) use occluders::{Occluders, ShadowMesh};
 pub(crate) use outlook::{Outlook, Seen};
 pub(crate) use settle::{Settled, Settler};
+pub(crate) use shaft::Shaft;
 pub(crate) use target::Target;
 pub(crate) use view::{View, Visibility};
 

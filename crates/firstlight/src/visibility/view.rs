@@ -57,11 +57,6 @@ impl View {
         self.trees = false;
     }
 
-    /// Whether triangles may be in the way, or all trees have to be asked.
-    pub fn has_meshes(&self) -> bool {
-        self.trees || !self.triangles.is_empty()
-    }
-
     /// What of a light is seen from `point`, past `occluders`, which were gathered for it. What is left to ask for the
     /// samples is in this view then.
     pub fn classify(

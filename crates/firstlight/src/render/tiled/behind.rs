@@ -9,7 +9,7 @@ use crate::color::Rgb;
 use crate::ids::LightId;
 use crate::integrate::Sums;
 use crate::render::Counts;
-use crate::render::arrival::{ArrivalPlace, Arrivals};
+use crate::render::arrival::{ArrivalPlace, Arrivals, Past};
 use crate::render::patch::{Member, Patch, PixelPatches, Rays};
 use crate::render::tile::Tile;
 use crate::render::together::{Outcome, Together};
@@ -38,6 +38,8 @@ pub(super) enum Outlook {
 enum Sight {
     Lit,
     Clear,
+    /// Something in trees is in the way that batches know.
+    Near,
     Dark,
     BelowHorizon,
     Behind,
@@ -265,11 +267,12 @@ impl Tiled<'_> {
                 Visibility::Hidden => Sight::Dark,
                 Visibility::BelowHorizon => Sight::BelowHorizon,
                 Visibility::Mask => match take() {
-                    Some(view) => {
+                    Past::Unknown(view) => {
                         views[k] = Some(view);
                         Sight::Behind
                     }
-                    None => Sight::Clear,
+                    Past::Known => Sight::Near,
+                    Past::Nothing => Sight::Clear,
                 },
             };
         });
@@ -318,6 +321,8 @@ impl Sights {
             Outlook::Dark
         } else if dark > 0 || of(Sight::Behind) > 0 {
             Outlook::Parted
+        } else if of(Sight::Near) > 0 {
+            Outlook::Unknown
         } else if of(Sight::Clear) > 0 {
             Outlook::Clear
         } else {
@@ -340,8 +345,8 @@ impl Sights {
         match self.sights[k] {
             Sight::Dark => together.dark(&arrivals.place(light, si, bsdf)),
             Sight::BelowHorizon => together.know(&arrivals.place(light, si, bsdf), &Sums::default()),
-            sight @ (Sight::Lit | Sight::Clear) => {
-                together.ask(arrivals, si, bsdf, sight == Sight::Lit, true, counts);
+            sight @ (Sight::Lit | Sight::Clear | Sight::Near) => {
+                together.ask(arrivals, si, bsdf, sight == Sight::Lit, sight != Sight::Near, counts);
             }
             Sight::Behind => {
                 let view = self.views[k].take().expect("what is behind things has a view");
