@@ -221,8 +221,14 @@ material = "m"
 /// A cube and a corner of two walls, as meshes.
 const MESHES: &str = r#"
 [[mesh]]
-positions = [[-0.5, 0, -0.5], [0.5, 0, -0.5], [0.5, 0, 0.5], [-0.5, 0, 0.5], [-0.5, 1, -0.5], [0.5, 1, -0.5], [0.5, 1, 0.5], [-0.5, 1, 0.5]]
-triangles = [[0, 1, 2], [0, 2, 3], [4, 7, 6], [4, 6, 5], [0, 4, 5], [0, 5, 1], [1, 5, 6], [1, 6, 2], [2, 6, 7], [2, 7, 3], [3, 7, 4], [3, 4, 0]]
+positions = [
+    [-0.5, 0, -0.5], [0.5, 0, -0.5], [0.5, 0, 0.5], [-0.5, 0, 0.5],
+    [-0.5, 1, -0.5], [0.5, 1, -0.5], [0.5, 1, 0.5], [-0.5, 1, 0.5],
+]
+triangles = [
+    [0, 1, 2], [0, 2, 3], [4, 7, 6], [4, 6, 5], [0, 4, 5], [0, 5, 1],
+    [1, 5, 6], [1, 6, 2], [2, 6, 7], [2, 7, 3], [3, 7, 4], [3, 4, 0],
+]
 transform = { rotate_deg = [0, 25, 0], translate = [-1, 0, 0] }
 material = "m"
 [[mesh]]
@@ -282,4 +288,14 @@ fn a_box_around_a_light_and_all_else_hides_nothing() {
     let walls = "[[box]]\ncenter = [0, 4, 0]\nsize = [12, 8.2, 24]\nmaterial = \"m\"\n";
     let off = off_by(&format!("{ROOM}{light}{ball}{walls}"));
     assert!(off < 0.5, "{off} steps off");
+}
+
+#[test]
+fn things_that_reach_into_a_ball_light_of_both_sides_are_told() {
+    let light = "[[light.sphere]]\ncenter = [0.6, 1.1, 0]\nradius = 0.5\nstrength = 2\nsides = \"both\"\n\
+        falloff = \"constant\"\n";
+    let things = "[[sphere]]\ncenter = [0.3, 1.3, 0.2]\nradius = 0.4\nmaterial = \"m\"\n\
+        [[parallelogram]]\np = [0.5, 0.9, -1]\ne0 = [1, 0.3, 0]\ne1 = [0, 0, 2]\nmaterial = \"m\"\n";
+    let off = off_by(&format!("{ROOM}{light}{things}"));
+    assert!(off < 0.7, "{off} steps off");
 }

@@ -182,6 +182,11 @@ impl<'a> Obstacles<'a> {
         all.map(|(i, ((occluder, exact), touch))| (occluder, exact, *touch, self.cuts >> i & 1 == 1))
     }
 
+    /// Whether any reaches into a ball.
+    pub fn touch_ball(&self) -> bool {
+        self.touches.contains(&Touch::Cuts)
+    }
+
     /// Whether a placed thing is among them.
     pub fn has_placed(&self, thing: u32) -> bool {
         self.placed.binary_search(&thing).is_ok()
@@ -237,6 +242,8 @@ struct Sight<S: Simd> {
     error: Vec3x16<S>,
     reach: f32x16<S>,
     turn: f32x16<S>,
+    /// How far behind its plane the light may be, as far as what is asked for may be in the way of that.
+    depth: f32,
 }
 
 /// Unit, or 0 where `v` is.
@@ -313,6 +320,7 @@ impl<S: Simd> Sight<S> {
             },
             reach: f32x16::simd_from(simd, point(|p| p.reach)),
             turn: f32x16::simd_from(simd, point(|p| p.turn)),
+            depth: 0.0,
         }
     }
 
@@ -336,13 +344,13 @@ impl<S: Simd> Sight<S> {
         gap
     }
 
-    /// Those of some points from which something of the light's square is on the inner side of each line, and those
-    /// from which all of it is on that of all.
+    /// Those of some points from which something of the light's square is on the inner side of each line, the first of
+    /// which is the plane of what is in the way, and those from which all of it is on that of all.
     #[inline(always)]
     fn covered(&self, lines: &[Linear16<S>; 5], of: u64) -> [u64; 2] {
         let zero = self.far.token().splat_f32x16(0.0);
-        let (mut some, mut all) = (of, of);
-        for line in lines {
+        let (mut some, mut all) = (of, if self.depth > 0.0 { 0 } else { of });
+        for line in &lines[usize::from(self.depth > 0.0)..] {
             let Linear16 { c, x, y } = *line;
             let ([left, right], [low, high]) = (self.x, self.y);
             let most = c + (left * x).max(right * x) + (low * y).max(high * y);
@@ -401,8 +409,9 @@ impl<S: Simd> Sight<S> {
         let to_plane = self.normal.dot(self.ways[0]);
         let beyond = (self.normal.dot(s) - to_plane)
             * to_plane.simd_lt(zero).select(simd.splat_f32x16(-1.0), simd.splat_f32x16(1.0));
-        around &= gap.simd_le(rounding + self.reach).to_bitmask() & !beyond.simd_gt(self.reach + r).to_bitmask();
-        [around, around & gap.simd_le(rounding).to_bitmask() & !beyond.simd_gt(r).to_bitmask()]
+        let far = r + self.depth;
+        around &= gap.simd_le(rounding + self.reach).to_bitmask() & !beyond.simd_gt(self.reach + far).to_bitmask();
+        [around, around & gap.simd_le(rounding).to_bitmask() & !beyond.simd_gt(far).to_bitmask()]
     }
 
     /// How far the outline of a shadow moves on the light that something casts which is `near` to the point.
@@ -430,7 +439,7 @@ pub(crate) fn classify<S: Simd>(
     if asked == 0 {
         return classes;
     }
-    let sight = Sight::new(simd, members, points);
+    let mut sight = Sight::new(simd, members, points);
     let own = near.is_some().then(|| Own::new(simd, &sight, points));
     let mut asked = asked;
     for (i, (occluder, exact, touch, cuts)) in
@@ -439,6 +448,11 @@ pub(crate) fn classify<S: Simd>(
         if asked == 0 {
             break;
         }
+        // What reaches into a ball may hide some of its far half
+        sight.depth = match emitter {
+            Emitter::Ball { radius, .. } if touch == Touch::Cuts && emitter.shows_far_half() => 2.0 * *radius as f32,
+            Emitter::Ball { .. } | Emitter::Flat(_) => 0.0,
+        };
         let mut told = match (occluder, exact) {
             (Occluder::Sphere { center, radius }, ExactShape::Sphere(sphere)) => {
                 sphere_between(simd, &sight, center.seen_from(simd, sight.p), *radius, sphere, points, asked)
@@ -461,8 +475,8 @@ pub(crate) fn classify<S: Simd>(
         if touch == Touch::Cuts {
             // Of the ball more may be seen than of its disk
             (told.outside, told.hidden, told.firm) = (told.outside | told.hidden, 0, 0);
-            told.other |= if matches!(emitter, Emitter::Ball { both_sides: true, .. }) {
-                // What is behind the disk shines as well
+            told.other |= if emitter.halves().is_some() {
+                // They are asked one by one
                 asked
             } else if cuts {
                 told.within

@@ -1,8 +1,9 @@
 //! Things that reach into a light that is a ball, for sixteen points at once.
 //!
 //! The disk that stands for a ball has its directions, but not its depth: what is behind a thing has to be asked of the
-//! ball's own surface. On a row, a plane cuts it in two places at most, where it meets the circle in which plane and
-//! ball meet; so does the surface of another ball, in the circle of both. Between them nothing changes.
+//! ball's own surface, the near half of it or the far one. On a row, a plane cuts it in two places at most, where it
+//! meets the circle in which plane and ball meet; so does the surface of another ball, in the circle of both. Between
+//! them nothing changes.
 
 use fearless_simd::{f32x16, mask32x16, prelude::*};
 
@@ -38,13 +39,16 @@ impl<S: Simd> Ball<S> {
         }
     }
 
-    /// How many times l leads to where a ray enters it.
+    /// How many times l leads to where a ray enters it, or to where it leaves it.
     #[inline(always)]
-    fn enters(&self, x: f32x16<S>, y: f32x16<S>) -> f32x16<S> {
+    fn meets(&self, half: Half, x: f32x16<S>, y: f32x16<S>) -> f32x16<S> {
         let (length2, along) = (self.length2.at(x, y), self.along.at(x, y));
         let half2 = along * along - length2 * self.touch2;
         let root = half2.max(x.token().splat_f32x16(0.0)).sqrt();
-        self.touch2 / (along + root)
+        match half {
+            Half::Near => self.touch2 / (along + root),
+            Half::Far => (along + root) / length2,
+        }
     }
 
     /// Where l leads to the circle in which a plane, `plane` = `height` on it, meets the ball.
@@ -60,16 +64,28 @@ impl<S: Simd> Ball<S> {
         )
     }
 
-    /// Whether the way to the plane along l ends on the near side.
+    /// Whether the way to the plane along l ends on that half.
     #[inline(always)]
-    fn is_near(&self, plane: &Linear16<S>, height: f32x16<S>, x: f32x16<S>, y: f32x16<S>) -> mask32x16<S> {
+    fn is_on(&self, half: Half, plane: &Linear16<S>, height: f32x16<S>, x: f32x16<S>, y: f32x16<S>) -> mask32x16<S> {
         let along = plane.at(x, y);
         let zero = x.token().splat_f32x16(0.0);
-        (height * along).simd_gt(zero) & (height * height * self.length2.at(x, y)).simd_le(self.touch2 * along * along)
+        let (way2, touch2) = (height * height * self.length2.at(x, y), self.touch2 * along * along);
+        let is_on = match half {
+            Half::Near => way2.simd_le(touch2),
+            Half::Far => way2.simd_ge(touch2),
+        };
+        (height * along).simd_gt(zero) & is_on
     }
 }
 
-/// Where on the rows of a ball something changes: at both places of a circle that are on its near side.
+/// Which half of a ball, as a point sees it.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Half {
+    Near,
+    Far,
+}
+
+/// Where on the rows of a ball something changes: at both places of a circle that are on one half of it.
 struct Arc<S: Simd> {
     plane: Linear16<S>,
     height: f32x16<S>,
@@ -88,7 +104,7 @@ impl<S: Simd> Arc<S> {
     fn parts(
         &self,
         simd: S,
-        balls: &[&Ball<S>],
+        balls: &[(&Ball<S>, Half)],
         y: f32x16<S>,
         range: &Interval16<S>,
         begins: mask32x16<S>,
@@ -97,9 +113,9 @@ impl<S: Simd> Arc<S> {
         let Roots { low, high, any } = self.circle.on_row(y);
         let mut is_low = any & low.simd_gt(range.from) & low.simd_lt(range.to);
         let mut is_high = any & high.simd_gt(range.from) & high.simd_lt(range.to);
-        for ball in balls {
-            is_low &= ball.is_near(&self.plane, self.height, low, y);
-            is_high &= ball.is_near(&self.plane, self.height, high, y);
+        for (ball, half) in balls {
+            is_low &= ball.is_on(*half, &self.plane, self.height, low, y);
+            is_high &= ball.is_on(*half, &self.plane, self.height, high, y);
         }
         // The first change, and the one after it
         let first = is_low.select(low, is_high.select(high, far));
@@ -113,6 +129,7 @@ impl<S: Simd> Arc<S> {
 /// A thing that reaches into a ball, as sixteen points see both.
 pub(crate) struct Cut<S: Simd> {
     ball: Ball<S>,
+    half: Half,
     shape: CutShape<S>,
 }
 
@@ -151,7 +168,13 @@ impl<S: Simd> Cut<S> {
     /// `None` if that is not known. Not inlined, as what it is asked is not: one copy of each for each instruction set
     /// is enough.
     #[inline(never)]
-    pub fn new(simd: S, occluder: &Occluder, ball: (Exact, f32), p: Vec3x16<S>, l: &[Vec3x16<S>; 3]) -> Option<Cut<S>> {
+    pub fn new(
+        simd: S,
+        occluder: &Occluder,
+        ball: (Exact, f32, bool),
+        p: Vec3x16<S>,
+        l: &[Vec3x16<S>; 3],
+    ) -> Option<Cut<S>> {
         simd.vectorize(
             #[inline(always)]
             || Cut::new_now(simd, occluder, ball, p, l),
@@ -162,7 +185,7 @@ impl<S: Simd> Cut<S> {
     fn new_now(
         simd: S,
         occluder: &Occluder,
-        (center, radius): (Exact, f32),
+        (center, radius, is_far): (Exact, f32, bool),
         p: Vec3x16<S>,
         l: &[Vec3x16<S>; 3],
     ) -> Option<Cut<S>> {
@@ -211,7 +234,7 @@ impl<S: Simd> Cut<S> {
                 CutShape::Sphere { other, cone, arc }
             }
         };
-        Some(Cut { ball, shape })
+        Some(Cut { ball, half: if is_far { Half::Far } else { Half::Near }, shape })
     }
 
     /// Hands over what is hidden of sixteen rows, of which `rim` is what is on the ball.
@@ -232,7 +255,7 @@ impl<S: Simd> Cut<S> {
                 for (k, (lines, arc)) in faces.iter().enumerate() {
                     let Some(arc) = arc else { break };
                     let begins = lines[0].at(rim.from, y).simd_ge(zero);
-                    let parts = arc.parts(simd, &[&self.ball], y, rim, begins);
+                    let parts = arc.parts(simd, &[(&self.ball, self.half)], y, rim, begins);
                     for (i, mut part) in parts.into_iter().enumerate() {
                         for line in &lines[1..] {
                             part.clip(y * line.y + line.c, line.x);
@@ -244,15 +267,15 @@ impl<S: Simd> Cut<S> {
             CutShape::Rim { cone, arc } => {
                 let inside = cone.cone_on_row(simd, &arc.plane, y);
                 let begins = (arc.plane.at(rim.from, y) - arc.height).simd_ge(zero);
-                for (i, part) in arc.parts(simd, &[&self.ball], y, rim, begins).into_iter().enumerate() {
+                for (i, part) in arc.parts(simd, &[(&self.ball, self.half)], y, rim, begins).into_iter().enumerate() {
                     all[i] = Interval16 { from: part.from.max(inside.from), to: part.to.min(inside.to) };
                 }
             }
             CutShape::Sphere { other, cone, arc } => {
                 let inside = cone.cone_on_row(simd, &other.along, y);
                 let range = Interval16 { from: rim.from.max(inside.from), to: rim.to.min(inside.to) };
-                let begins = other.enters(range.from, y).simd_lt(self.ball.enters(range.from, y));
-                let parts = arc.parts(simd, &[&self.ball, other], y, &range, begins);
+                let begins = other.meets(Half::Near, range.from, y).simd_lt(self.ball.meets(self.half, range.from, y));
+                let parts = arc.parts(simd, &[(&self.ball, self.half), (other, Half::Near)], y, &range, begins);
                 (all[0], all[1]) = (parts[0], parts[1]);
             }
         }

@@ -14,7 +14,15 @@ pub(crate) enum Emitter {
     Flat(FlatLight),
     /// A sphere. From any point outside it looks like the disk in which the cone around it touches it: the same
     /// directions, and, where light weakens on its way, the same radiance in each.
-    Ball { center: DVec3, radius: f64, physical: bool, both_sides: bool },
+    Ball { center: DVec3, radius: f64, physical: bool, sides: BallSides },
+}
+
+/// Which sides of a ball shine: from outside, its near half shows the outer one, its far half the inner one.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum BallSides {
+    Outer,
+    Inner,
+    Both,
 }
 
 impl Emitter {
@@ -28,7 +36,7 @@ impl Emitter {
                 center: sphere.center,
                 radius: sphere.radius,
                 physical: area.physical,
-                both_sides: area.both_sides,
+                sides: if area.both_sides { BallSides::Both } else { BallSides::Outer },
             },
         }
     }
@@ -44,6 +52,7 @@ impl Emitter {
     /// What its places count for.
     pub fn falloff(&self) -> Falloff {
         match (self.outline(), self.is_physical()) {
+            (Outline::Sphere, _) if self.shows_far_half() => Falloff::SphereInside,
             (Outline::Sphere, _) => Falloff::Sphere,
             (_, true) => Falloff::Physical,
             (_, false) => Falloff::Constant,
@@ -69,9 +78,29 @@ impl Emitter {
     pub fn surrounds(&self, p: Vec3) -> bool {
         match self {
             Emitter::Flat(_) => false,
-            Emitter::Ball { center, radius, both_sides, .. } => {
-                *both_sides && !((*center - p.as_dvec3()).length_squared() > radius * radius)
+            Emitter::Ball { center, radius, sides, .. } => {
+                *sides != BallSides::Outer && !((*center - p.as_dvec3()).length_squared() > radius * radius)
             }
+        }
+    }
+
+    /// Whether all that shines, seen from outside, is the far half of a ball.
+    pub fn shows_far_half(&self) -> bool {
+        matches!(self, Emitter::Ball { sides: BallSides::Inner, .. })
+    }
+
+    /// Both sides of a ball that shines on both.
+    pub fn halves(&self) -> Option<[Emitter; 2]> {
+        match *self {
+            Emitter::Ball { center, radius, physical, sides: BallSides::Both } => {
+                Some([BallSides::Outer, BallSides::Inner].map(|sides| Emitter::Ball {
+                    center,
+                    radius,
+                    physical,
+                    sides,
+                }))
+            }
+            Emitter::Flat(_) | Emitter::Ball { .. } => None,
         }
     }
 
@@ -96,7 +125,7 @@ impl Emitter {
     pub fn flat(&self, p: Vec3) -> Option<FlatLight> {
         match self {
             Emitter::Flat(flat) => Some(*flat),
-            Emitter::Ball { center, radius, physical, both_sides } => {
+            Emitter::Ball { center, radius, physical, sides } => {
                 let to = *center - p.as_dvec3();
                 let distance2 = to.length_squared();
                 let share = radius * radius / distance2;
@@ -108,14 +137,14 @@ impl Emitter {
                 let r = radius * (1.0 - share).sqrt();
                 let c = p.as_dvec3() + to * (1.0 - share);
                 let disk = FlatLight::new(c, a * r, a.cross(n) * r, -n, self.outline(), *physical, false);
-                Some(match (physical, both_sides) {
-                    (true, false) => disk,
+                Some(match (physical, sides) {
                     // Both where a ray enters the ball and where it leaves it
-                    (true, true) => FlatLight { times: 2.0, ..disk },
+                    (true, BallSides::Both) => FlatLight { times: 2.0, ..disk },
+                    (true, BallSides::Outer | BallSides::Inner) => disk,
                     (false, _) => FlatLight {
                         times: (1.0 - share) as f32,
                         ratio: share.sqrt() as f32,
-                        behind2: if *both_sides { (distance2 - radius * radius) as f32 } else { 0.0 },
+                        behind2: if *sides == BallSides::Outer { 0.0 } else { (distance2 - radius * radius) as f32 },
                         ..disk
                     },
                 })

@@ -15,6 +15,8 @@
 //! Two certificates stand apart: whether the light is known on a cell (the end of its series), and whether what is seen
 //! of the cell is (two rules for the rows of each panel). What is asked again is asked with everything else that is.
 
+use std::f32::consts::FRAC_1_SQRT_2;
+
 use arrayvec::ArrayVec;
 use fearless_simd::{Level, Simd};
 
@@ -59,7 +61,26 @@ pub(crate) struct Arrived {
     pub height: f32,
 }
 
+impl Arrived {
+    /// What arrives of two parts of a light.
+    fn and(&self, other: &Arrived) -> Arrived {
+        let illumination = match (self.illumination, other.illumination) {
+            (one, other) if one == other => one,
+            (Illumination::Unknown, _) | (_, Illumination::Unknown) => Illumination::Unknown,
+            _ => Illumination::Partial,
+        };
+        Arrived {
+            sums: self.sums + other.sums,
+            illumination,
+            proved: self.proved && other.proved && illumination != Illumination::Partial,
+            motion: self.motion.max(other.motion),
+            ..*self
+        }
+    }
+}
+
 /// A light as it is asked.
+#[derive(Clone, Copy)]
 pub(crate) struct Asked<'a> {
     pub emitter: &'a Emitter,
     pub obstacles: &'a Obstacles<'a>,
@@ -101,6 +122,8 @@ pub(crate) struct Evaluator {
     next_whole: Vec<Cell>,
     next_panels: Vec<Panel>,
     spare: Vec<Block>,
+    /// Of the far half of a ball.
+    far: Vec<Arrived>,
 }
 
 /// What is known of one point.
@@ -118,6 +141,24 @@ struct State {
 impl Evaluator {
     /// Adds to `arrived` what of a light arrives at each point.
     pub fn evaluate(&mut self, level: Level, light: &Asked, points: &[ShadingPoint], arrived: &mut Vec<Arrived>) {
+        let is_cut = || light.obstacles.touch_ball() || light.near.is_some_and(Obstacles::touch_ball);
+        let Some([near, far]) = light.emitter.halves().filter(|_| light.shadows && is_cut()) else {
+            return self.evaluate_one(level, light, points, arrived);
+        };
+        // Both halves of a ball: what reaches into it hides more of the far one
+        let half = |emitter| Asked { emitter, allowed: light.allowed * FRAC_1_SQRT_2, ..*light };
+        let first = arrived.len();
+        self.evaluate_one(level, &half(&near), points, arrived);
+        let mut behind = std::mem::take(&mut self.far);
+        behind.clear();
+        self.evaluate_one(level, &half(&far), points, &mut behind);
+        for (one, other) in arrived[first..].iter_mut().zip(&behind) {
+            *one = one.and(other);
+        }
+        self.far = behind;
+    }
+
+    fn evaluate_one(&mut self, level: Level, light: &Asked, points: &[ShadingPoint], arrived: &mut Vec<Arrived>) {
         let first = arrived.len();
         self.look(level, light, points, arrived);
         let arrived = &mut arrived[first..];
@@ -225,7 +266,8 @@ impl Evaluator {
         let Obstacles { occluders, ball, cuts, .. } = light.obstacles;
         let near = light.near.map_or(&[][..], |near| &near.occluders);
         let cuts = cuts | light.near.map_or(0, |near| near.cuts << occluders.len());
-        let blocked = Blocked { occluders: [occluders, near], ball: *ball, cuts, outline, between };
+        let ball = ball.map(|(center, radius)| (center, radius, light.emitter.shows_far_half()));
+        let blocked = Blocked { occluders: [occluders, near], ball, cuts, outline, between };
         let moments = if matches!(light.lobe, Lobe::None) { 1 } else { MOMENTS };
         self.smooth_fits.clear();
         self.fits.clear();

@@ -122,6 +122,8 @@ pub(crate) enum Falloff {
     Physical,
     /// All places of a sphere alike: [`Outline::Sphere`](super::view::Outline::Sphere).
     Sphere,
+    /// The same of its far half alone.
+    SphereInside,
 }
 
 /// A rectangle of a light's square, of one point.
@@ -177,7 +179,7 @@ fn values<S: Simd, const N: usize>(
     let height2 = height * height;
     let has_lobe = !matches!(lobe, Lobe::None);
     let mut values = [[[zero; N]; N]; MOMENTS];
-    let is_sphere = falloff == Falloff::Sphere;
+    let is_sphere = matches!(falloff, Falloff::Sphere | Falloff::SphereInside);
     let (ratio, behind2) = (members.lanes(simd, Ratio), members.lanes(simd, Behind2));
     let (mut places, mut deep) = ([zero; N], [splat(1.0); N]);
     for (i, node) in rule.nodes.iter().enumerate() {
@@ -203,13 +205,14 @@ fn values<S: Simd, const N: usize>(
             match falloff {
                 Falloff::Constant => {}
                 Falloff::Physical => weights[i] = inverse * inverse * (inverse * height),
-                Falloff::Sphere => {
+                Falloff::Sphere | Falloff::SphereInside => {
                     // With q = sqrt(1 - x^2 - y^2), the areas of the sphere before and behind a place of the disk are
                     // as 1 / (1 + ratio q)^2 and 1 / (1 - ratio q)^2, over q; and 1 - (ratio q)^2 is |l|^2 over the
                     // square of the way to where the sphere is touched
                     let near = deep[i] * wide * ratio + 1.0;
                     let far = near * (behind2 * inverse * inverse);
-                    weights[i] = wide * (1.0 / (near * near) + far * far);
+                    let front = if falloff == Falloff::Sphere { 1.0 / (near * near) } else { zero };
+                    weights[i] = wide * (front + far * far);
                 }
             }
             cos_i[i] = (x * cos.x + cos_row) * inverse;

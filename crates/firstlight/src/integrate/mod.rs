@@ -25,7 +25,7 @@ use std::ops::{Add, Mul};
 
 pub(crate) use batch::ShadingPoint;
 pub(crate) use classify::Obstacles;
-pub(crate) use emitter::Emitter;
+pub(crate) use emitter::{BallSides, Emitter};
 pub(crate) use evaluate::{Arrived, Asked, Evaluator, Illumination};
 pub(crate) use mask::Masked;
 pub(crate) use tolerance::Tolerance;

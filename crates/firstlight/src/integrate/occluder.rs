@@ -255,7 +255,8 @@ impl<S: Simd> Quadratic16<S> {
     }
 }
 
-/// Sides of cells that are halves of ellipses: x + `origin[0]` = `width` sqrt(1 - (y + `origin[1]`)^2), one on each side.
+/// Sides of cells that are halves of ellipses: x + `origin[0]` = `width` sqrt(1 - (y + `origin[1]`)^2), one on each
+/// side.
 #[derive(Clone, Copy)]
 pub(crate) struct RoundSides<S: Simd> {
     pub width: [f32x16<S>; 2],

@@ -64,8 +64,8 @@ pub(crate) struct Between {
 pub(crate) struct Blocked<'a> {
     /// In lists, and of trees: counted together.
     pub occluders: [&'a [Occluder]; 2],
-    /// The light, if it is a ball, and which of them reach into it, bit by bit.
-    pub ball: Option<(Exact, f32)>,
+    /// The light, if it is a ball, with whether its far half is asked, and which of them reach into it, bit by bit.
+    pub ball: Option<(Exact, f32, bool)>,
     pub cuts: u64,
     pub outline: Outline,
     /// Point by point.

@@ -263,8 +263,7 @@ impl BallCase {
             let c = center * random.between(0.1, 1.0) + random.direction() * random.unit();
             let r = random.scale(0.05, 0.6);
             // Some reach into the light
-            let room = if both_sides { radius + r } else { 0.0 };
-            if c.length() > r * 1.01 && (center - c).length() > room * 1.01 && c.dot(ns.as_dvec3()) > -r {
+            if c.length() > r * 1.01 && c.dot(ns.as_dvec3()) > -r {
                 spheres.push(Sphere { c, r, uv: SphereUv::Angles, single_sided: false });
             }
         }
@@ -302,7 +301,8 @@ impl BallCase {
     fn batched(&self, steps: &DisplaySteps) -> Sums {
         let tolerance = Tolerance::DEFAULT;
         let BallCase { center, radius, physical, both_sides, .. } = *self;
-        let emitter = Emitter::Ball { center, radius, physical, both_sides };
+        let sides = if both_sides { BallSides::Both } else { BallSides::Outer };
+        let emitter = Emitter::Ball { center, radius, physical, sides };
         let asked = Asked {
             emitter: &emitter,
             obstacles: &Obstacles::of(&self.spheres, &[], &emitter),

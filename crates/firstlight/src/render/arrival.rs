@@ -15,7 +15,8 @@ use super::together::Together;
 use crate::color::{DisplaySteps, Rgb};
 use crate::ids::LightId;
 use crate::integrate::{
-    Arrived, Asked, Emitter, Evaluator, Illumination, Masked, Obstacles, Receiver, ShadingPoint, Sums, Tolerance, View,
+    Arrived, Asked, BallSides, Emitter, Evaluator, Illumination, Masked, Obstacles, Receiver, ShadingPoint, Sums,
+    Tolerance, View,
 };
 use crate::light::{Area, AreaShape, Light, LightKind, LightTree};
 use crate::material::{Bsdf, Lobe};
@@ -572,8 +573,8 @@ impl<'a> Arrivals<'a> {
         (occluders.has_trees() && !is_known, occluders.count() == 0)
     }
 
-    /// Hears what of light `index` is seen from those `points` whose numbers are in `order`. `each` may ask what of trees
-    /// is in the way.
+    /// Hears what of light `index` is seen from those `points` whose numbers are in `order`. `each` may ask what of
+    /// trees is in the way.
     pub fn sights(
         &mut self,
         index: usize,
@@ -707,7 +708,8 @@ impl<'a> Arrivals<'a> {
         let masked = Masked { scene: self.scene, light: index, emitter, si, lobe, shadows, asked: &asked };
         let whole = self.wholes(index, std::slice::from_ref(place))[0];
         let enough = self.enough(place);
-        let is_round = matches!(emitter, Emitter::Ball { physical, both_sides, .. } if !physical || *both_sides);
+        let is_round =
+            matches!(emitter, Emitter::Ball { physical, sides, .. } if !physical || *sides != BallSides::Outer);
         let sums = match self.view(emitter, place) {
             None if !emitter.surrounds(si.lit_from) => Sums::default(),
             Some(view) if !view.arrives() => Sums::default(),

@@ -1,7 +1,7 @@
 //! What of one light arrives at a place, and how much that bends over the patch around it.
 
 use super::arrival::ArrivalPlace;
-use crate::integrate::{Arrived, Emitter, Illumination, Sums, View};
+use crate::integrate::{Arrived, BallSides, Emitter, Illumination, Sums, View};
 use crate::material::Lobe;
 use crate::math::{Vec3, square};
 
@@ -92,7 +92,7 @@ pub(super) fn is_sharp(lobe: f32) -> bool {
 pub(super) fn unseen(emitter: &Emitter, place: &ArrivalPlace) -> Change {
     let is_known = match emitter {
         Emitter::Flat(_) => true,
-        Emitter::Ball { both_sides: true, .. } => false,
+        Emitter::Ball { sides: BallSides::Both | BallSides::Inner, .. } => false,
         Emitter::Ball { center, radius, .. } => {
             (*center - place.si.lit_from.as_dvec3()).length() + f64::from(place.reach) < radius * (1.0 - 1e-6)
         }

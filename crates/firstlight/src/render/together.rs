@@ -62,8 +62,10 @@ const COARSER: f32 = 2.0;
 const MANY_OF_ALL: usize = MANY * SERIES;
 /// How many times as far off as is allowed the most points may be before cells are asked, which take far longer.
 const WORTH_CELLS: f32 = 1.7;
-/// In display steps: how far what would arrive may differ between the rays in the middle of a pixel, to tell it of all.
-const EVEN: f32 = 0.5;
+/// In display steps: how far what would arrive at a ray in the middle of a pixel may be off what those in the corners
+/// say, to tell it of all; and how far they may differ.
+const EVEN: f32 = 0.1;
+const EVEN_CORNERS: f32 = 4.0;
 /// The most points of a pixel.
 const MOST: usize = LAST * SERIES;
 
@@ -331,22 +333,25 @@ impl Together {
                 }
             }
         }
-        // What would arrive behind things: where the rays in the middle of a pixel tell that of all, from those
-        let rays = arrivals.scene.antialiasing as usize;
+        // What would arrive behind things: where the rays in the corners of a pixel tell that of all, from those
+        let n = arrivals.scene.antialiasing as usize;
+        let mut corners: Vec<Option<[usize; 5]>> = Vec::new();
         let mut wanted = Vec::new();
-        for (k, one) in all.iter().enumerate() {
-            match one.middle(rays) {
-                Some(middle) => wanted.extend(middle.map(|ray| (k, ray))),
+        for (k, (one, looking)) in all.iter().zip(&looking).enumerate() {
+            let is_in_order = looking.is_empty() || one.asking.len() == looking.len();
+            corners.push(Some(n).filter(|n| is_in_order && *n > 2 && one.asking.len() == n * n).map(Together::corners));
+            match &corners[k] {
+                Some(corners) => wanted.extend(corners.map(|ray| (k, ray))),
                 None => wanted.extend((0..one.asking.len()).map(|ray| (k, ray))),
             }
         }
         Together::ask_wholes(all, &wanted, arrivals);
         wanted.clear();
-        for (k, one) in all.iter_mut().enumerate() {
-            if let Some(middle) = one.middle(rays)
-                && !one.spread(rays, middle, arrivals)
+        for (k, (one, corners)) in all.iter_mut().zip(&corners).enumerate() {
+            if let Some(corners) = corners
+                && !one.spread(n, corners, arrivals)
             {
-                wanted.extend((0..one.asking.len()).filter(|ray| !middle.contains(ray)).map(|ray| (k, ray)));
+                wanted.extend((0..one.asking.len()).filter(|ray| !corners.contains(ray)).map(|ray| (k, ray)));
             }
         }
         Together::ask_wholes(all, &wanted, arrivals);
@@ -366,34 +371,33 @@ impl Together {
         }
     }
 
-    /// The rays around the middle of a pixel with `n` x `n`, if all of them are behind things.
-    fn middle(&self, n: usize) -> Option<[usize; 4]> {
-        let half = n / 2;
-        let first = half.checked_sub(1)? * (n + 1);
-        (n > 2 && n.is_multiple_of(2) && self.asking.len() == n * n).then_some([
-            first,
-            first + 1,
-            first + n,
-            first + n + 1,
-        ])
+    /// The rays in the corners of a pixel with `n` x `n`, and one near its middle.
+    fn corners(n: usize) -> [usize; 5] {
+        [0, n - 1, n * (n - 1), n * n - 1, (n + 1) * ((n - 1) / 2)]
     }
 
-    /// Gives each ray what would arrive at the nearest of those in the middle; `false` if those differ too much.
-    fn spread(&mut self, n: usize, middle: [usize; 4], arrivals: &Arrivals) -> bool {
-        let (mut least, mut most) = (Rgb::gray(f32::INFINITY), Rgb::BLACK);
-        for ray in middle {
-            let one = &self.asking[ray];
-            let Some(whole) = &one.whole else { return false };
-            let color = one.base + one.color(whole);
-            (least, most) = (least.min(color), most.max(color));
+    /// Gives each ray the mean of what would arrive in the corners, by its place; `false` if that is not what would
+    /// arrive in the middle.
+    fn spread(&mut self, n: usize, corners: &[usize; 5], arrivals: &Arrivals) -> bool {
+        let mut wholes = [Sums::default(); 5];
+        for (whole, ray) in wholes.iter_mut().zip(corners) {
+            let Some(found) = self.asking[*ray].whole else { return false };
+            *whole = found;
         }
-        if arrivals.steps(most, most + least * -1.0) > EVEN {
+        let [a, b, c, d, middle] = wholes;
+        let mean = |ray: usize| {
+            let [x, y] = [ray % n, ray / n].map(|k| k as f32 / (n - 1) as f32);
+            (a * (1.0 - x) + b * x) * (1.0 - y) + (c * (1.0 - x) + d * x) * y
+        };
+        let one = &self.asking[corners[4]];
+        let colors = [a, b, c, d, middle, mean(corners[4])].map(|sums| one.base + one.color(&sums));
+        let (least, most) = colors.iter().fold((colors[0], colors[0]), |(l, m), c| (l.min(*c), m.max(*c)));
+        let off = Rgb::max(colors[4] + colors[5] * -1.0, colors[5] + colors[4] * -1.0);
+        if arrivals.steps(most, most + least * -1.0) > EVEN_CORNERS || arrivals.steps(colors[4], off) > EVEN {
             return false;
         }
-        for ray in 0..self.asking.len() {
-            let side = |at: usize| usize::from(at >= n / 2);
-            let nearest = middle[2 * side(ray / n) + side(ray % n)];
-            self.asking[ray].whole = self.asking[nearest].whole;
+        for (ray, one) in self.asking.iter_mut().enumerate().filter(|(ray, _)| !corners.contains(ray)) {
+            one.whole = Some(mean(ray));
         }
         true
     }

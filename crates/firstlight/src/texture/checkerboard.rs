@@ -243,10 +243,13 @@ impl Wave {
     fn sign(&self, x: f64) -> f64 {
         let square = match self.edge {
             UvEdge::Bounded | UvEdge::Folded => x.floor().clamp(0.0, self.count - 1.0),
+            // Once around is what is asked for as a rule
+            UvEdge::Periodic if x >= 0.0 && x < self.count => x.floor(),
             UvEdge::Periodic => x.floor().rem_euclid(self.count),
             UvEdge::Unbounded => x.floor(),
         };
-        if square.rem_euclid(2.0) == 0.0 { 1.0 } else { -1.0 }
+        let half = 0.5 * square;
+        if half == half.floor() { 1.0 } else { -1.0 }
     }
 
     /// The integral of the wave from 0 to `x`.

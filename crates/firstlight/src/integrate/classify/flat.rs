@@ -58,7 +58,7 @@ pub(super) fn flat_between<S: Simd>(
     for [x, y] in sight.square() {
         in_plane &= lines[0].at(x, y).abs().simd_le(length * sight.far * SLACK).to_bitmask();
     }
-    near &= !in_plane;
+    near &= if sight.depth > 0.0 { near } else { !in_plane };
     // How far away it is decides how far its shadow moves
     let mut motion = [0.0f32; LANES];
     let mut left = near & sight.reach.simd_gt(zero).to_bitmask();

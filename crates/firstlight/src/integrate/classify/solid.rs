@@ -131,15 +131,28 @@ impl ConvexSolid {
             let size = |v: DVec3| [rows.x_axis, rows.y_axis, rows.z_axis].map(|row| row.abs().dot(v));
             let largest = |sizes: [f64; 3]| sizes.into_iter().fold(0.0, f64::max);
             let room = ROUNDING + 2.0 * largest(size(point.error.0.as_dvec3()));
-            let around = 2.0 * largest(size(DVec3::splat(f64::from(point.reach))));
             if !self.kind.holds(at, room) {
                 Lies::Between
-            } else if self.kind.holds(at, -room) && !self.kind.holds(at, -around) {
-                Lies::NearlyInside
-            } else {
+            } else if self.surrounds(point, room + largest(size(DVec3::splat(f64::from(point.turn * point.reach))))) {
                 Lies::Inside
+            } else {
+                Lies::NearlyInside
             }
         }
+    }
+
+    /// Whether all that lies around a point on its surface is inside, but for so much.
+    fn surrounds(&self, point: &ShadingPoint, room: f64) -> bool {
+        let reach = f64::from(point.reach);
+        if reach == 0.0 {
+            return true;
+        }
+        // A square around them: what is convex holds all of it with its corners
+        let (n, p) = (point.horizon.as_dvec3(), point.p.as_dvec3());
+        let u = n.any_orthonormal_vector() * reach;
+        let v = n.cross(u);
+        let corners = [u + v, u - v, v - u, -u - v];
+        corners.iter().all(|way| self.kind.holds(self.canonical_from_world.transform_point3(p + *way), room))
     }
 }
 
@@ -202,7 +215,7 @@ pub(super) fn solid_between<S: Simd>(
         return told;
     }
     let shadow = Shadow::new(simd, occluder, sight.p, &sight.ways);
-    if shape.kind == Canonical::Plane {
+    if shape.kind == Canonical::Plane && sight.depth == 0.0 {
         // From within reach no more of the light is beyond a plane than from the point, if that is farther off
         let mut some = 0;
         for [x, y] in sight.square() {
