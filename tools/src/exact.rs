@@ -10,13 +10,15 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Instant;
 
 use firstlight::SceneDesc;
-use firstlight_testkit::converged::{Converged, PROMISED, Report};
+use firstlight_testkit::converged::{Bounds, Converged, PROMISED, Report};
 use firstlight_testkit::{exact_scenes, kept};
 
 use crate::{Outcome, root, write};
 
 /// The share of pixels that may stay open where sets have up to 2^20 points.
 const OPEN: f64 = 1e-4;
+/// The same where the tolerance is below 1: they have to agree so much better.
+const OPEN_FINER: f64 = 0.02;
 
 /// Which scenes, and how far to go.
 #[derive(clap::Args)]
@@ -30,6 +32,10 @@ pub struct Options {
     /// The converged picture takes up to 2^CAP points on each light, in each of four sets.
     #[arg(long, default_value_t = 20, value_parser = clap::value_parser!(u32).range(8..=20))]
     cap: u32,
+    /// The scenes' tolerance, in display steps: the bounds scale with it, and below 1 so does how far converged
+    /// pictures have converged.
+    #[arg(long, default_value_t = 1.0, conflicts_with = "write")]
+    tolerance: f64,
     /// Where converged pictures are kept, and taken from while the scene is the same and they had as many points. They
     /// depend on nothing that integrates; after a change of what sampled light looks like, empty it.
     #[arg(long, value_name = "DIR", default_value = "target/converged")]
@@ -129,8 +135,8 @@ impl Row {
     }
 
     /// Worth a look: out of bounds, near them, or not settled.
-    fn is_notable(&self) -> bool {
-        !self.fault.is_empty() || self.over > 0 || self.worst > 0.75 * PROMISED.worst || 200 * self.open > self.pixels
+    fn is_notable(&self, bounds: &Bounds) -> bool {
+        !self.fault.is_empty() || self.over > 0 || self.worst > 0.75 * bounds.worst || 200 * self.open > self.pixels
     }
 }
 
@@ -140,7 +146,19 @@ const TABLE: &str = "| seed | worst | over 1 | rms | rms, 400 `sobol` | rms, 400
 
 impl Options {
     fn kept(&self, seed: u64) -> PathBuf {
-        root().join(&self.kept).join(format!("{seed:04}-{}.png", self.size))
+        // A smaller tolerance wants another converged picture
+        let finer = if self.tolerance < 1.0 { format!("-{}", self.tolerance) } else { String::new() };
+        root().join(&self.kept).join(format!("{seed:04}-{}{finer}.png", self.size))
+    }
+
+    fn scene(&self, seed: u64) -> SceneDesc {
+        let mut desc = exact_scenes::scene(seed, self.size);
+        desc.render.tolerance = self.tolerance;
+        desc
+    }
+
+    fn bounds(&self) -> Bounds {
+        PROMISED.times(self.tolerance)
     }
 }
 
@@ -157,7 +175,7 @@ fn converged(seed: u64, desc: &SceneDesc, options: &Options) -> Converged {
 fn row(seed: u64, options: &Options, commit: &str) -> Row {
     let start = Instant::now();
     let report = catch_unwind(AssertUnwindSafe(|| {
-        let desc = exact_scenes::scene(seed, options.size);
+        let desc = options.scene(seed);
         let mut truth = converged(seed, &desc, options);
         let levels = truth.levels.clone();
         let report = Report::beside(&mut truth, &desc);
@@ -184,7 +202,7 @@ fn row(seed: u64, options: &Options, commit: &str) -> Row {
         fault: "panic".to_owned(),
     };
     if let Ok(report) = report {
-        row.fault = report.fault(&PROMISED).unwrap_or_default();
+        row.fault = report.fault(&options.bounds()).unwrap_or_default();
         let Report { exact, sobol, uniform, open, doubt } = report;
         (row.pixels, row.open, row.over) = (exact.pixels, open as u64, exact.over);
         (row.worst, row.rms, row.doubt) = (exact.worst, exact.rms, doubt);
@@ -200,7 +218,9 @@ struct Summary {
     faults: Vec<String>,
 }
 
-fn summary<'a>(rows: impl Iterator<Item = &'a Row> + Clone) -> Summary {
+fn summary<'a>(rows: impl Iterator<Item = &'a Row> + Clone, tolerance: f64) -> Summary {
+    let bounds = PROMISED.times(tolerance);
+    let most_open = if tolerance < 1.0 { OPEN_FINER } else { OPEN };
     let sum = |of: fn(&Row) -> f64| rows.clone().map(of).filter(|x| x.is_finite()).sum::<f64>();
     let greatest = |of: fn(&Row) -> f64| rows.clone().map(of).fold(0.0, f64::max);
     let scenes = rows.clone().count();
@@ -217,19 +237,19 @@ fn summary<'a>(rows: impl Iterator<Item = &'a Row> + Clone) -> Summary {
     commits.dedup();
     let mut lines = String::new();
     let _ = writeln!(lines, "| {scenes} scenes, {pixels} pixels | measured | allowed |\n|---|---|---|");
-    let _ = writeln!(lines, "| worst pixel | {:.2} | {} |", greatest(|r| r.worst), PROMISED.worst);
+    let _ = writeln!(lines, "| worst pixel | {:.2} | {} |", greatest(|r| r.worst), bounds.worst);
     let _ = writeln!(
         lines,
-        "| pixels off by more than 1 | {over} ({:.4} %) | {} % |",
+        "| pixels off by more than {tolerance} | {over} ({:.4} %) | {} % |",
         100.0 * over_share,
-        100.0 * PROMISED.over
+        100.0 * bounds.over
     );
-    let _ = writeln!(lines, "| pixels left open | {open} ({:.4} %) | {} % |", 100.0 * open_share, 100.0 * OPEN);
+    let _ = writeln!(lines, "| pixels left open | {open} ({:.4} %) | {} % |", 100.0 * open_share, 100.0 * most_open);
     let _ = writeln!(
         lines,
         "| root mean square, integrated | {:.4} | in each scene that of 400 `sobol` points, or {} |",
         together(|r| r.rms),
-        PROMISED.rms
+        bounds.rms
     );
     let _ = writeln!(lines, "| the same, 400 `sobol` points | {:.4} | |", together(|r| r.sobol_rms));
     let _ = writeln!(lines, "| the same, 400 `uniform` points | {:.4} | |", together(|r| r.uniform_rms));
@@ -237,10 +257,10 @@ fn summary<'a>(rows: impl Iterator<Item = &'a Row> + Clone) -> Summary {
     let _ = writeln!(lines, "\nCommit {}; {:.0} s of one core.", commits.join(", "), sum(|r| r.seconds));
     let mut faults: Vec<String> =
         rows.clone().filter(|r| !r.fault.is_empty()).map(|r| format!("scene {}: {}", r.seed, r.fault)).collect();
-    if over_share > PROMISED.over {
-        faults.push(format!("{over} of {pixels} pixels are off by more than one step"));
+    if over_share > bounds.over {
+        faults.push(format!("{over} of {pixels} pixels are off by more than the tolerance"));
     }
-    if open_share > OPEN {
+    if open_share > most_open {
         faults.push(format!("{open} of {} pixels are open", pixels + open));
     }
     Summary { lines, faults }
@@ -281,9 +301,9 @@ fn store(rows: &BTreeMap<u64, Row>) -> Outcome {
         return Err(format!("{}: the marks {start:?} and {end:?} are not there", path.display()));
     };
     let (head, tail) = (&page[..from + start.len()], &page[to..]);
-    let mut notable: Vec<&Row> = rows.values().filter(|row| row.is_notable()).collect();
+    let mut notable: Vec<&Row> = rows.values().filter(|row| row.is_notable(&PROMISED)).collect();
     notable.sort_by(|a, b| b.worst.total_cmp(&a.worst));
-    let mut measured = format!("\n{}\n", summary(rows.values()).lines);
+    let mut measured = format!("\n{}\n", summary(rows.values(), 1.0).lines);
     if !notable.is_empty() {
         let _ =
             writeln!(measured, "The scenes that come near a bound, or are out of it, the furthest first:\n\n{TABLE}");
@@ -299,7 +319,7 @@ pub fn run(options: &Options) -> Outcome {
     if let Some(folder) = &options.dump {
         std::fs::create_dir_all(folder).map_err(|fault| format!("{}: {fault}", folder.display()))?;
         for seed in options.seeds.iter().cloned().flatten() {
-            let text = exact_scenes::scene(seed, options.size).to_toml();
+            let text = options.scene(seed).to_toml();
             let file = folder.join(format!("{seed}.toml"));
             std::fs::write(&file, text).map_err(|fault| format!("{}: {fault}", file.display()))?;
         }
@@ -321,7 +341,7 @@ pub fn run(options: &Options) -> Outcome {
         let work = || {
             while let Some(seed) = part.get(next.fetch_add(1, Ordering::Relaxed)) {
                 if options.converge {
-                    let desc = exact_scenes::scene(*seed, options.size);
+                    let desc = options.scene(*seed);
                     let start = Instant::now();
                     let truth = converged(*seed, &desc, options);
                     let seconds = start.elapsed().as_secs_f64();
@@ -329,7 +349,7 @@ pub fn run(options: &Options) -> Outcome {
                     continue;
                 }
                 let row = row(*seed, options, &commit);
-                if options.all || row.is_notable() {
+                if options.all || row.is_notable(&options.bounds()) {
                     println!("{}", row.markdown());
                 }
                 rows.lock().expect("no thread panics while it holds the rows").insert(*seed, row);
@@ -355,7 +375,7 @@ pub fn run(options: &Options) -> Outcome {
         return Ok(());
     }
     let rows = rows.into_inner().expect("no thread panics while it holds the rows");
-    let Summary { lines, faults } = summary(rows.values());
+    let Summary { lines, faults } = summary(rows.values(), options.tolerance);
     println!("\n{lines}");
     if faults.is_empty() {
         return Ok(());

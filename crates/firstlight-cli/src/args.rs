@@ -228,6 +228,10 @@ pub struct RenderArgs {
     /// enough [default: adaptive]
     #[arg(long, value_name = "MODE", help_heading = "Quality")]
     pub aa_mode: Option<AntialiasingMode>,
+    /// How far a pixel may be off the converged picture, 0.25 to 16, in steps of an 8-bit picture: 4 is a faster
+    /// preview [default: the scene's, which is 1 unless it says otherwise]
+    #[arg(long, value_name = "T", value_parser = tolerance, help_heading = "Quality")]
+    pub tolerance: Option<f64>,
     /// What is made of the border of light and dark on meshes with smooth normals [default: the scene's]
     #[arg(long, value_name = "WORD", help_heading = "Quality")]
     pub shadow_terminator: Option<Terminator>,
@@ -367,6 +371,14 @@ fn exposure(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(ev) if (-64.0..=64.0).contains(&ev) => Ok(ev),
         _ => Err("a number of stops from -64 to 64 is needed".into()),
+    }
+}
+
+/// Reads a tolerance in display steps.
+fn tolerance(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(steps) if (0.25..=16.0).contains(&steps) => Ok(steps),
+        _ => Err("a number of display steps from 0.25 to 16 is needed".into()),
     }
 }
 
@@ -567,6 +579,14 @@ mod tests {
         assert_eq!(exposure("-1.5"), Ok(-1.5));
         for bad in ["", "nan", "inf", "65", "-64.1", "1,5"] {
             assert!(exposure(bad).is_err(), "{bad}");
+        }
+    }
+
+    #[test]
+    fn a_tolerance_is_in_range() {
+        assert_eq!((tolerance("4"), tolerance("0.25")), (Ok(4.0), Ok(0.25)));
+        for bad in ["", "nan", "inf", "0", "0.2", "16.1", "-1", "1/4"] {
+            assert!(tolerance(bad).is_err(), "{bad}");
         }
     }
 }

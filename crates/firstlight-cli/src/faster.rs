@@ -6,6 +6,8 @@ use firstlight::{AaMode, RenderDesc, RenderSettings, SamplesDesc, Scene, Visibil
 
 /// Points of a light that are enough for a first look.
 const FEW_SAMPLES: u32 = 64;
+/// In display steps: what does for a preview.
+const PREVIEW: f64 = 4.0;
 /// n of the n x n camera rays that are.
 const FEW_RAYS: u32 = 2;
 /// A side of a picture that is small.
@@ -30,7 +32,13 @@ pub fn faster(scene: &Scene, settings: &RenderSettings, render: &RenderDesc) -> 
         SamplesDesc::Exact => u32::MAX,
         SamplesDesc::Count(count) => *count,
     });
-    if most.max().is_some_and(|most| most > FEW_SAMPLES) {
+    let most = most.max();
+    // What is judged: light that is integrated, and what is lit once for several rays
+    let is_judged = most == Some(u32::MAX) || most.is_some() && settings.aa_mode == AaMode::Adaptive;
+    if is_judged && !settings.reference && !is_traced && render.tolerance < PREVIEW {
+        ways.push(format!("--tolerance {PREVIEW}"));
+    }
+    if most.is_some_and(|most| most > FEW_SAMPLES) {
         ways.push(format!("--samples {FEW_SAMPLES}"));
     }
     if render.antialiasing > FEW_RAYS {
@@ -55,9 +63,9 @@ mod tests {
         let scene = parsed.compile(&NoAssets, &CompileOptions::default()).unwrap().scene;
         let mut settings = RenderSettings::default();
         let say = |settings: &RenderSettings| faster(&scene, settings, &parsed.desc.render);
-        assert_eq!(say(&settings), "--samples 64, --aa 2, --width 256");
+        assert_eq!(say(&settings), "--tolerance 4, --samples 64, --aa 2, --width 256");
         settings.aa_mode = AaMode::Full;
-        assert_eq!(say(&settings), "--aa-mode adaptive, --samples 64, --aa 2, --width 256");
+        assert_eq!(say(&settings), "--aa-mode adaptive, --tolerance 4, --samples 64, --aa 2, --width 256");
         settings.reference = true;
         assert!(say(&settings).starts_with("--aa-mode full with --samples instead of --reference"));
         // A small picture with few rays, lit by nothing: there is no way

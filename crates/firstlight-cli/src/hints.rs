@@ -19,6 +19,10 @@ const OPTIONS: &[(&[&str], &str)] = &[
         &["--quality", "-Q", "--preset"],
         "edges are --aa N and --aa-mode full, area lights --samples N or --samples exact",
     ),
+    (
+        &["--error", "--noise-threshold", "--adaptive-threshold", "--epsilon", "--precision"],
+        "how far a pixel may be off is --tolerance T, in steps of an 8-bit picture",
+    ),
     (&["--quick", "--fast", "--draft", "--preview"], "a quick look is --width 320 --aa 1 --samples 16"),
     (&["-j", "--jobs", "-t", "--num-threads", "--nthreads", "--cores", "--cpus"], "threads are --threads N"),
     (&["--resolution", "--res", "--dimensions", "-w", "-W", "-H", "-r"], "the picture's size is --width and --height"),

@@ -128,6 +128,7 @@ fn gather(name: &str, desc: &SceneDesc, compiled: &Compiled) -> Value {
             "width": scene.width(),
             "height": scene.height(),
             "antialiasing": render.antialiasing,
+            "tolerance": render.tolerance,
             "transparent": render.transparent,
             "display": display,
         },

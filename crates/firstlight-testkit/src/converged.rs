@@ -14,7 +14,8 @@ use firstlight::{AaMode, Falloff, Image, LightDesc, RenderSettings, SampleSet, S
 use crate::graded;
 use crate::scenes::*;
 
-/// Steps of an 8-bit picture by which the mean of two sets may differ from the mean of the other two.
+/// Steps of an 8-bit picture by which the mean of two sets may differ from the mean of the other two; as a part of the
+/// scene's tolerance where that is below 1, as are [`SPREAD`] and [`DISPUTED`].
 const AGREEMENT: f64 = 0.25;
 /// Steps by which one set may differ from the mean of all.
 const SPREAD: f64 = 0.5;
@@ -114,8 +115,9 @@ fn opinion(scene: &Scene, films: &[[f32; 4]; SETS as usize]) -> Opinion {
         displayed(scene, sum.map(|x| (x / films.len() as f64) as f32))
     };
     let (one, other, mean) = (mean_of(&films[..2]), mean_of(&films[2..]), mean_of(films));
-    let agreed =
-        furthest(one, other) <= AGREEMENT && films.iter().all(|film| furthest(displayed(scene, *film), mean) <= SPREAD);
+    let part = scene.tolerance().min(1.0);
+    let is_near = |film: &[f32; 4]| furthest(displayed(scene, *film), mean) <= part * SPREAD;
+    let agreed = furthest(one, other) <= part * AGREEMENT && films.iter().all(is_near);
     Opinion { mean, half_difference: std::array::from_fn(|k| 0.5 * (one[k] - other[k])), agreed }
 }
 
@@ -294,9 +296,9 @@ impl Converged {
     /// by chance shall be nobody's fault.
     #[track_caller]
     pub fn doubt(&mut self, image: &Image) {
-        let disputed: Vec<bool> = (0..self.pixels.len())
-            .map(|i| !self.open[i] && !(furthest(self.pixels[i], displayed(&self.scene, image.pixels[i])) <= DISPUTED))
-            .collect();
+        let allowed = DISPUTED * self.scene.tolerance().min(1.0);
+        let off = |i: usize| furthest(self.pixels[i], displayed(&self.scene, image.pixels[i]));
+        let disputed: Vec<bool> = (0..self.pixels.len()).map(|i| !self.open[i] && !(off(i) <= allowed)).collect();
         let Some(level) = (0..disputed.len()).filter(|i| disputed[*i]).map(|i| self.levels[i]).max() else { return };
         let unsettled = std::mem::replace(&mut self.open, disputed);
         self.settle((level + 2).min(LAST), (level + 4).min(LAST));
@@ -354,7 +356,7 @@ impl Converged {
                 (deviation.worst, deviation.at) = (off, [i as u32 % self.width, i as u32 / self.width]);
             }
             deviation.pixels += 1;
-            deviation.over += u64::from(off > 1.0);
+            deviation.over += u64::from(off > self.desc.render.tolerance);
             squares += (0..3).map(|k| (truth[k] - is[k]) * (truth[k] - is[k])).sum::<f64>();
         }
         deviation.rms = (squares / (3 * deviation.pixels.max(1)) as f64).sqrt();
@@ -371,7 +373,7 @@ pub struct Deviation {
     pub worst: f64,
     /// Column and row of it.
     pub at: [u32; 2],
-    /// Pixels of which a channel is off by more than one step.
+    /// Pixels of which a channel is off by more than the scene's tolerance.
     pub over: u64,
     /// Root of the mean square, over all channels.
     pub rms: f64,
@@ -382,14 +384,26 @@ pub struct Deviation {
 pub struct Bounds {
     /// Steps, at any pixel.
     pub worst: f64,
-    /// The share of pixels that may be off by more than one step, over all scenes together.
+    /// The share of pixels that may be off by more than the tolerance, over all scenes together.
     pub over: f64,
     /// The root mean square that a scene may always have; beyond it, that of 400 samples.
     pub rms: f64,
 }
 
-/// What is promised of integrated light.
+/// What is promised of integrated light at the default tolerance.
 pub const PROMISED: Bounds = Bounds { worst: 2.0, over: 1e-4, rms: 0.1 };
+
+impl Bounds {
+    /// What is promised of a scene: it scales with its tolerance.
+    pub fn promised(desc: &SceneDesc) -> Bounds {
+        PROMISED.times(desc.render.tolerance)
+    }
+
+    /// So many times as far off.
+    pub fn times(&self, tolerance: f64) -> Bounds {
+        Bounds { worst: tolerance * self.worst, over: self.over, rms: tolerance * self.rms }
+    }
+}
 
 /// All that is asked of one scene.
 pub struct Report {
@@ -425,7 +439,8 @@ impl Report {
             doubt: truth.own_error(),
         };
         let first = report(truth);
-        if first.fault(&PROMISED).is_none() || !(first.exact.worst <= PROMISED.worst) {
+        let bounds = Bounds::promised(desc);
+        if first.fault(&bounds).is_none() || !(first.exact.worst <= bounds.worst) {
             return first;
         }
         truth.again(AGAIN);

@@ -16,8 +16,10 @@ const SCENE: &str = "firstlight:scene";
 const CAP: &str = "firstlight:cap";
 const DOUBT: &str = "firstlight:doubt";
 
-/// Which scene it is: the same text has the same name.
+/// Which scene it is: the same text has the same name, with any tolerance of 1 or more.
 fn name(desc: &SceneDesc) -> String {
+    let mut desc = desc.clone();
+    desc.render.tolerance = desc.render.tolerance.min(1.0);
     blake3::hash(desc.to_toml().as_bytes()).to_hex()[..32].to_owned()
 }
 

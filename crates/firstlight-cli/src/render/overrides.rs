@@ -18,6 +18,7 @@ pub(super) struct Overrides<'a> {
     pub antialiasing: Option<u32>,
     pub samples: Option<SamplesDesc>,
     pub camera: Option<&'a str>,
+    pub tolerance: Option<f64>,
     pub terminator: Option<ShadowTerminator>,
 }
 
@@ -37,6 +38,7 @@ impl Overrides<'_> {
         }
         render.transparent |= self.transparent;
         render.antialiasing = self.antialiasing.unwrap_or(render.antialiasing);
+        render.tolerance = self.tolerance.unwrap_or(render.tolerance);
         render.shadow_terminator = self.terminator.unwrap_or(render.shadow_terminator);
         if let Some(name) = self.camera {
             if !desc.cameras.iter().any(|(known, _)| known == name) {

@@ -121,6 +121,7 @@ impl<'a> Plan<'a> {
             antialiasing: args.aa,
             samples: args.samples,
             camera: args.camera.as_deref(),
+            tolerance: args.tolerance,
             terminator: args.shadow_terminator.map(|word| match word {
                 Terminator::Smooth => ShadowTerminator::Smooth,
                 Terminator::Hard => ShadowTerminator::Hard,

@@ -212,3 +212,26 @@ fn the_border_of_light_and_dark_can_be_left_hard() {
     assert!(default != hard);
     folder.run("render stone.toml --shadow-terminator soft").exits(2);
 }
+
+#[test]
+fn a_tolerance_is_that_of_the_command_line() {
+    let folder = Folder::new();
+    let scene = "[render]\nwidth = 24\nheight = 24\n[camera]\nposition = [0, 2, 6]\nlook_at = [0, 0.5, 0]\n\
+        [[light.rectangle]]\ncenter = [1, 3, 1]\ne0 = [1, 0, 0]\ne1 = [0, 0, 1]\nstrength = 4\n\
+        [[sphere]]\ncenter = [0, 0.5, 0]\nradius = 0.5\n[[plane]]\npoint = [0, 0, 0]\nnormal = [0, 1, 0]\n";
+    folder.put("s.toml", scene);
+    folder.put("t.toml", scene.replace("[camera]", "tolerance = 16\n[camera]"));
+    let shot = |options: &str| {
+        folder.run(&format!("render {options} -o out.png")).done();
+        Picture::decode(&folder.get("out.png")).data
+    };
+    let default = shot("s.toml");
+    assert!(default == shot("s.toml --tolerance 1") && default == shot("t.toml --tolerance 1"));
+    assert!(shot("t.toml") == shot("s.toml --tolerance 16"));
+    assert!(default != shot("t.toml"));
+    for bad in ["0", "0.2", "17", "much"] {
+        folder.run(&format!("render s.toml --tolerance {bad}")).exits(2);
+    }
+    folder.put("bad.toml", scene.replace("[camera]", "tolerance = 0.1\n[camera]"));
+    folder.run("render bad.toml").exits(1);
+}

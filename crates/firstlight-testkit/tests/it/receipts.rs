@@ -128,6 +128,9 @@ fn renderers_of_the_same_bits_say_the_same() {
     let light = by_light.lights.iter_mut().find(|light| light.samples().is_some_and(|(own, _)| own.is_none()));
     light.expect("one says nothing of samples").set_samples(SamplesDesc::Count(400));
     assert!(shoot(&by_light, &full) == reference);
+    // What is sampled at every ray knows no tolerance
+    sampled.render.tolerance = 9.0;
+    assert!(shoot(&sampled, &full) == reference);
 }
 
 #[test]
@@ -160,6 +163,7 @@ fn what_changes_the_film_changes_the_receipt() {
         ("width", shoot(&with(&|desc| desc.render.width = 34), &base)),
         ("height", shoot(&with(&|desc| desc.render.height = 24), &base)),
         ("camera", shoot(&with(&|desc| desc.render.camera = Some("side".into())), &base)),
+        ("tolerance", shoot(&with(&|desc| desc.render.tolerance = 8.0), &base)),
         ("terminator", shoot(&with(&|desc| desc.render.shadow_terminator = ShadowTerminator::Hard), &base)),
         ("transparent", shoot(&with(&|desc| desc.render.transparent = true), &base)),
         ("time", shoot_at(&desc, &base, 1.0)),

@@ -9,15 +9,16 @@ const FIRST: i32 = -40;
 const LAST: i32 = 24;
 const ENTRIES: usize = ((LAST - FIRST) as u32 * PER_OCTAVE) as usize + 1;
 
-/// The display encoding as a table, for judging errors: in steps of an 8-bit picture. Beyond white it goes on as steep
-/// as it is there, over the value: what a picture cuts off may still be wanted in a file of floats.
+/// The display encoding as a table, for judging errors: in display steps, which are those of an 8-bit picture times the
+/// scene's tolerance. What is judged by it scales with the tolerance. Beyond white it goes on as steep as it is there,
+/// over the value: what a picture cuts off may still be wanted in a file of floats.
 #[derive(Clone, Debug)]
 pub(crate) struct DisplaySteps {
     encoded: Vec<f32>,
 }
 
 impl DisplaySteps {
-    pub fn new(display: &Display) -> Self {
+    pub fn new(display: &Display, tolerance: f64) -> Self {
         let encoding = display.encoding;
         // Of the curve at white
         let slope = match encoding {
@@ -30,7 +31,7 @@ impl DisplaySteps {
             let (octave, part) = (i as i32 / PER_OCTAVE as i32 + FIRST, i as u32 % PER_OCTAVE);
             let value = pxfm::f_exp2(f64::from(octave)) * (1.0 + f64::from(part) / f64::from(PER_OCTAVE)) * factor;
             let value = if value < 1.0 { encoding.encode(value) } else { 1.0 + slope * pxfm::f_log(value) };
-            (255.0 * value) as f32
+            (255.0 / tolerance * value) as f32
         };
         DisplaySteps { encoded: (0..ENTRIES).map(encode).collect() }
     }
@@ -91,12 +92,13 @@ mod tests {
     fn steps_are_those_of_the_encoding() {
         for encoding in [Encoding::Srgb, Encoding::Gamma(2.2), Encoding::Linear] {
             let display = Display { encoding, exposure: -1.0 };
-            let steps = DisplaySteps::new(&display);
+            let [steps, larger] = [1.0, 4.0].map(|tolerance| DisplaySteps::new(&display, tolerance));
             for i in 0..200 {
                 let root = (i as f32 / 200.0) * (i as f32 / 200.0);
                 let value = 1.9 * root * root;
                 let truth = display.encode(value) * 255.0;
                 assert!((f64::from(steps.encode(value)) - truth).abs() < 0.12, "{encoding:?} {value}");
+                assert!((steps.encode(value) - 4.0 * larger.encode(value)).abs() < 1e-4, "{encoding:?} {value}");
             }
             assert_eq!(steps.of_error(0.3, 0.0), 0.0);
             // Where nothing is lit an error shows as much as it can

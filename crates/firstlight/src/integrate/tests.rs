@@ -189,7 +189,7 @@ fn off(steps: &DisplaySteps, found: &Sums, truth: &Sums) -> f32 {
 
 /// `allowed` is in display steps, with the error of `n` x `n` points.
 fn check(seeds: std::ops::Range<u64>, things: usize, sharpest: f64, n: usize, allowed: f32) {
-    let steps = DisplaySteps::new(&Display::default());
+    let steps = DisplaySteps::new(&Display::default(), 1.0);
     let (mut asked, mut worst) = (0, 0.0f32);
     for seed in seeds {
         let Some(case) = case(seed, things, sharpest) else { continue };
@@ -329,7 +329,7 @@ fn is_hidden(sphere: &Sphere, l: DVec3) -> bool {
 
 #[test]
 fn batches_know_spheres_of_any_kind() {
-    let steps = DisplaySteps::new(&Display::default());
+    let steps = DisplaySteps::new(&Display::default(), 1.0);
     for seed in 7000..7300 {
         let case = BallCase::new(seed);
         let (found, truth) = (case.batched(&steps), case.brute(300));

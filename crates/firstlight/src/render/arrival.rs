@@ -163,7 +163,7 @@ impl<'a> Lights<'a> {
                 None => Obstacles::default(),
             })
             .collect();
-        let steps = DisplaySteps::new(&scene.display);
+        let steps = DisplaySteps::new(&scene.display, scene.tolerance);
         let allowed = Tolerance::DEFAULT.point / (scene.lights.len().max(1) as f32).sqrt();
         let least = steps.value_of(allowed);
         Lights { emitters, steps, tree, targets, ladders, obstacles, allowed, least }

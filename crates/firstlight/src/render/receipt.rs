@@ -1,7 +1,7 @@
 //! What a picture says of itself: all that decides its pixels, and nothing else.
 
-use super::RenderSettings;
 use super::many::SINGLY;
+use super::{AaMode, RenderSettings};
 use crate::camera::Projection;
 use crate::describe::SamplesDesc;
 use crate::image::Receipt;
@@ -30,6 +30,11 @@ impl Scene {
             ("light_samples", light_samples(&self.lights, settings)),
             ("color_space", "linear Rec. 709, alpha premultiplied, before display encoding".to_owned()),
         ];
+        // What is neither integrated nor lit once for several rays is not judged
+        let is_integrated = |light: &Light| light.said_samples() == SamplesDesc::Exact && !settings.samples_all();
+        if settings.effective_aa_mode() != AaMode::Full || self.lights.iter().any(is_integrated) {
+            entries.push(("tolerance", self.tolerance.to_string()));
+        }
         if let Some(time) = self.time {
             entries.push(("time", time.to_string()));
         }

@@ -60,6 +60,9 @@ pub struct Compiled {
 /// The largest side of a picture, in pixels.
 pub(crate) const MAX_SIDE: u32 = 65536;
 const MAX_ANTIALIASING: u32 = 64;
+/// Of the tolerance: below it the converged pictures that it was tested with are not good enough themselves.
+const MIN_TOLERANCE: f64 = 0.25;
+const MAX_TOLERANCE: f64 = 16.0;
 const MIN_FPS: f64 = 0.001;
 const MAX_FPS: f64 = 1e6;
 /// The largest picture file read as a texture, in bytes.
@@ -125,6 +128,7 @@ impl SceneDesc {
             width: picture.width,
             height: picture.height,
             antialiasing: picture.antialiasing,
+            tolerance: picture.tolerance,
             camera,
             origin,
             background: picture.background,
@@ -203,6 +207,8 @@ impl SceneDesc {
             let hint = "n of the n x n camera rays in each pixel";
             let antialiasing = cx.count("antialiasing", render.antialiasing, 1, MAX_ANTIALIASING, Some(hint));
             check_samples(cx, render.samples, "points on each area light");
+            let hint = "in display steps; 1 is usual, 4 is a preview";
+            let tolerance = cx.between("tolerance", render.tolerance, MIN_TOLERANCE, MAX_TOLERANCE, Some(hint));
             let gamma = cx.between("gamma", render.gamma, 0.1, 10.0, Some("2.2 is usual"));
             let exposure = cx.between("exposure", render.exposure, -64.0, 64.0, Some("in stops: each doubles"));
             cx.between("fps", render.fps, MIN_FPS, MAX_FPS, Some("frames in a second"));
@@ -215,6 +221,7 @@ impl SceneDesc {
                 width,
                 height,
                 antialiasing,
+                tolerance,
                 background: cx.color("background", render.background),
                 ambient: cx.color("ambient", render.ambient),
                 display: Display { encoding, exposure },
@@ -355,17 +362,18 @@ impl SceneDesc {
         }
     }
 
-    /// BLAKE3 of all that decides the picture, but for the samples of lights. What follows from a default is hashed as
-    /// if it were said.
+    /// BLAKE3 of all that decides the picture, but for the samples of lights and the tolerance. What follows from a
+    /// default is hashed as if it were said.
     fn hash(&self, textures: &Textures, meshes: &[(String, [u8; 32])], added: &Added) -> String {
         let mut said = self.clone();
         added.add_to(&mut said);
         said.render.camera = said.chosen_camera().map(|i| said.cameras[i].0.clone());
-        // How lights are sampled is a choice of who renders: receipts say what is in effect, light by light
+        // How lights are sampled and judged is a choice of who renders: receipts say what is in effect
         let default = RenderDesc::default().samples;
         said.lights.iter_mut().for_each(|light| light.set_samples(default));
         said.render.samples = default;
         said.render.fps = RenderDesc::default().fps;
+        said.render.tolerance = RenderDesc::default().tolerance;
         let mut hasher = blake3::Hasher::new();
         hasher.update(said.to_json().as_bytes());
         for (file, hash) in textures.file_hashes() {
@@ -409,6 +417,7 @@ struct Picture {
     width: u32,
     height: u32,
     antialiasing: u32,
+    tolerance: f64,
     background: Rgb,
     ambient: Rgb,
     display: Display,

@@ -56,6 +56,8 @@ pub struct Scene {
     pub(crate) height: u32,
     /// n of the n x n camera rays in a pixel.
     pub(crate) antialiasing: u32,
+    /// In steps of an 8-bit picture.
+    pub(crate) tolerance: f64,
     pub(crate) camera: Camera,
     /// Where all coordinates count from, in world space: that of the middle of what is far from 0, so that 32 bits are
     /// enough.
@@ -152,6 +154,11 @@ impl Scene {
     /// n of the n x n camera rays in each pixel.
     pub fn antialiasing(&self) -> u32 {
         self.antialiasing
+    }
+
+    /// How far a pixel may be off the converged picture, in steps of an 8-bit picture.
+    pub fn tolerance(&self) -> f64 {
+        self.tolerance
     }
 
     /// How 8- and 16-bit files show it.
