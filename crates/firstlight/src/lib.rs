@@ -93,7 +93,9 @@ pub use light::{
 };
 pub use material::{BlinnPhongDesc, MaterialDesc, PhongDesc};
 pub use math::{DVec3, ShadowRay, Vec2, Vec3, WorldRay};
-pub use render::{AaMode, Film, Heat, LightCounts, RenderSettings, RenderStats, VisibilityMode, render, render_image};
+pub use render::{
+    AaMode, Film, Heat, LightCounts, Plane, RenderSettings, RenderStats, VisibilityMode, render, render_image,
+};
 pub use scene::{
     Added, CameraHit, CompileOptions, Compiled, DisplayEncoding, Framing, Hit, ModelSettings, RenderDesc, Scene,
     SceneDesc, SceneSummary, SurfacePoint, UpAxis, View,

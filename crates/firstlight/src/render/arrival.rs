@@ -10,6 +10,7 @@ use super::change::{Arrival, Change, change, horizon_change, unseen};
 use super::ladder::{Asker as LadderAsker, Ladder};
 use super::many::FEW;
 use super::patch::Patch;
+use super::resolve::LightTerm;
 use super::sampled::Sampled;
 use super::together::Together;
 use crate::color::{DisplaySteps, Rgb};
@@ -45,13 +46,14 @@ pub(crate) struct ArrivalPlace<'a> {
     pub parted: bool,
     /// What is there beside this light, at least.
     pub base: Rgb,
-    /// What the two sums are multiplied with.
-    pub colors: [Rgb; 2],
+    /// What the two sums are multiplied with: the light's scale, and the surface's colours.
+    pub scale: Rgb,
+    pub reflected: [Rgb; 2],
 }
 
 impl<'a> ArrivalPlace<'a> {
-    /// One point, by itself; `base` and `colors` as in the struct.
-    pub fn point(si: &'a SurfaceInteraction, lobe: &'a Lobe, base: Rgb, colors: [Rgb; 2]) -> Self {
+    /// One point, by itself; `base` and what follows as in the struct.
+    pub fn point(si: &'a SurfaceInteraction, lobe: &'a Lobe, base: Rgb, scale: Rgb, reflected: [Rgb; 2]) -> Self {
         ArrivalPlace {
             si,
             lobe,
@@ -63,8 +65,20 @@ impl<'a> ArrivalPlace<'a> {
             clear: false,
             parted: false,
             base,
-            colors,
+            scale,
+            reflected,
         }
+    }
+
+    /// What sums of the light send.
+    pub fn color(&self, sums: &Sums) -> Rgb {
+        let [diffuse, specular] = self.colors();
+        diffuse * sums.diffuse + specular * sums.specular
+    }
+
+    /// What the two sums are multiplied with, all in all.
+    pub fn colors(&self) -> [Rgb; 2] {
+        self.reflected.map(|color| self.scale * color)
     }
 
     /// The same for all of a patch that is shaded there.
@@ -84,7 +98,7 @@ impl<'a> ArrivalPlace<'a> {
             wo,
             reach: self.reach,
             turn: self.turn,
-            worth: self.colors,
+            worth: self.colors(),
             base: self.base,
             share: self.share,
         }
@@ -125,6 +139,8 @@ pub(crate) enum Seen {
 pub(crate) struct Lights<'a> {
     /// For each light, if it is integrated.
     pub emitters: Vec<Option<Emitter>>,
+    /// What the sums of each are multiplied with, before the colours of the surface.
+    scales: Vec<Rgb>,
     pub steps: DisplaySteps,
     /// Where there are many.
     tree: Option<LightTree>,
@@ -154,6 +170,11 @@ impl<'a> Lights<'a> {
             _ => None,
         };
         let emitters: Vec<_> = scene.lights.iter().map(emitter).collect();
+        let scale = |(light, emitter): (&Light, &Option<Emitter>)| match emitter {
+            Some(_) => light.intensity,
+            None => light.scale,
+        };
+        let scales = scene.lights.iter().zip(&emitters).map(scale).collect();
         let targets = Target::of_all(scene);
         let ladders = emitters.iter().map(|_| Ladder::default()).collect();
         let tree = (scene.lights.len() > FEW).then(|| LightTree::new(&scene.lights));
@@ -166,7 +187,7 @@ impl<'a> Lights<'a> {
         let steps = DisplaySteps::new(&scene.display, scene.tolerance);
         let allowed = Tolerance::DEFAULT.point / (scene.lights.len().max(1) as f32).sqrt();
         let least = steps.value_of(allowed);
-        Lights { emitters, steps, tree, targets, ladders, obstacles, allowed, least }
+        Lights { emitters, scales, steps, tree, targets, ladders, obstacles, allowed, least }
     }
 
     /// Whether all of these placed things are told row by row where they are in the way of light `index`.
@@ -273,8 +294,12 @@ impl<'a> Arrivals<'a> {
 
     /// What the sums of light `index` are multiplied with, before the colours of the surface.
     pub fn scale(&self, index: usize) -> Rgb {
-        let light = &self.scene.lights[index];
-        if self.lights.emitters[index].is_some() { light.intensity } else { light.scale }
+        self.lights.scales[index]
+    }
+
+    /// The same of all lights.
+    pub fn scales(&self) -> &'a [Rgb] {
+        &self.lights.scales
     }
 
     /// What of light `index` arrives.
@@ -343,13 +368,11 @@ impl<'a> Arrivals<'a> {
 
     /// A point that asks for light `index`, beside nothing but ambient light.
     pub fn place<'p>(&self, index: usize, si: &'p SurfaceInteraction, bsdf: &'p Bsdf) -> ArrivalPlace<'p> {
-        let scale = self.scale(index);
-        let colors = [scale * bsdf.diffuse, scale * bsdf.specular];
-        ArrivalPlace::point(si, &bsdf.lobe, self.scene.ambient * bsdf.ambient, colors)
+        let base = self.scene.ambient * bsdf.ambient;
+        ArrivalPlace::point(si, &bsdf.lobe, base, self.scale(index), [bsdf.diffuse, bsdf.specular])
     }
 
-    /// What light `index` sends to one point, which stands for `share` of a pixel: diffuse and specular, with all
-    /// colours.
+    /// What light `index` sends to one point, which stands for `share` of a pixel, but for the light's scale.
     pub fn at_point(
         &mut self,
         index: usize,
@@ -357,10 +380,10 @@ impl<'a> Arrivals<'a> {
         bsdf: &Bsdf,
         share: f32,
         counts: &mut Counts,
-    ) -> [Rgb; 2] {
+    ) -> LightTerm {
         let place = ArrivalPlace { share, ..self.place(index, si, bsdf) };
         let sums = self.arrival(index, &place, counts).sums;
-        [place.colors[0] * sums.diffuse, place.colors[1] * sums.specular]
+        [place.reflected[0] * sums.diffuse, place.reflected[1] * sums.specular]
     }
 
     fn view(&self, emitter: &Emitter, place: &ArrivalPlace) -> Option<View> {
@@ -530,7 +553,7 @@ impl<'a> Arrivals<'a> {
     /// Whether sums with such an error will do for one light at a place.
     fn enough<'b>(&self, place: &'b ArrivalPlace) -> impl Fn(&Sums, &Sums) -> bool + use<'a, 'b> {
         let (steps, tolerance) = (&self.lights.steps, self.tolerance_of(place.share));
-        let [diffuse, specular] = place.colors;
+        let [diffuse, specular] = place.colors();
         let base = place.base;
         move |sums, error| {
             let value = base + diffuse * sums.diffuse + specular * sums.specular;

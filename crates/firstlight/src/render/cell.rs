@@ -19,6 +19,7 @@ use super::grid::{Block, Grid};
 use super::hits::camera_ray;
 use super::light_queue::{Answer, LightQueue, Place, Request};
 use super::patch::Contrast;
+use super::resolve::{LightTerm, PixelTerms};
 use super::solo::{self, Candidate, Pyramid};
 use super::square::Square;
 use super::tile::Tile;
@@ -64,10 +65,7 @@ enum State {
 struct Pixel {
     /// Its number in the cell.
     index: u32,
-    /// Rays that meet nothing, and what lights are seen.
-    background: u32,
-    emission: Rgb,
-    ambient: Rgb,
+    terms: PixelTerms,
 }
 
 /// A fragment that wants a light.
@@ -95,7 +93,7 @@ pub(crate) struct Cells<'a> {
     patchwork: Vec<(Option<Bsdf>, Contrast)>,
     /// Those whose rays were traced, and their sums: light by light, diffuse and specular.
     pixels: Vec<Pixel>,
-    terms: Vec<[Rgb; 2]>,
+    terms: Vec<LightTerm>,
     grid: Grid,
     places: Vec<Place>,
     requests: Vec<Request>,
@@ -135,15 +133,15 @@ impl<'a> Cells<'a> {
     }
 
     /// Renders one tile. `go_on` is asked now and then.
-    pub fn render(&mut self, tile: &Tile, go_on: &impl Fn() -> ControlFlow<()>) -> ControlFlow<(), (FilmTile, Counts)> {
-        let mut film = FilmTile::new(tile);
+    pub fn render(&mut self, film: &mut FilmTile, go_on: &impl Fn() -> ControlFlow<()>) -> ControlFlow<(), Counts> {
+        let tile = &{ film.tile };
         let mut counts = Counts::default();
         for corner in tile.cells(CELL) {
             go_on()?;
             self.cell(corner, &mut counts, go_on)?;
-            self.deliver(tile, &mut film, &mut counts);
+            self.deliver(tile, film, &mut counts);
         }
-        ControlFlow::Continue((film, counts))
+        ControlFlow::Continue(counts)
     }
 
     /// Renders a cell.
@@ -199,7 +197,7 @@ impl<'a> Cells<'a> {
         pyramid.candidates(scene, &outer[depth - 1], near);
         let n = scene.antialiasing;
         if near.is_empty() {
-            let color = Pixel { background: n * n, ..Pixel::default() }.color(scene, &[]);
+            let color = PixelTerms { background: n * n, ..PixelTerms::default() }.resolve(scene, std::iter::empty());
             for at in square.pixels().filter(|[i, j]| *i < scene.width && *j < scene.height) {
                 let index = self.index(at);
                 self.colors[index] = color;
@@ -250,9 +248,9 @@ impl<'a> Cells<'a> {
                 }
             }
             match first {
-                None => pixel.background += 1,
+                None => pixel.terms.background += 1,
                 Some((place, t)) => match near[place] {
-                    Candidate::Light(light) => pixel.emission += scene.lights[light as usize].radiance,
+                    Candidate::Light(light) => pixel.terms.emission += scene.lights[light as usize].radiance,
                     _ => self.rays.push((place as u32, RayHit { ray, t, at: [column as u16, row as u16] })),
                 },
             }
@@ -371,8 +369,8 @@ impl<'a> Cells<'a> {
         for light in 0..scene.lights.len() {
             let Some(sums) = self.grid.arrived(light, at) else { return false };
             let scale = self.lights.arrivals.scale(light);
-            color += scale * bsdf.diffuse * sums.diffuse;
-            color += scale * bsdf.specular * sums.specular;
+            color += scale * (bsdf.diffuse * sums.diffuse);
+            color += scale * (bsdf.specular * sums.specular);
             if contrast != Contrast::default() {
                 let Some(slope) = self.grid.slope(light, at, block.square) else { return false };
                 slopes += scale * (contrast.diffuse * slope.diffuse + contrast.specular * slope.specular) * 0.125;
@@ -389,10 +387,10 @@ impl<'a> Cells<'a> {
     /// Adds what arrives of a light all over a fragment.
     fn add(&mut self, fragment: usize, light: usize, sums: Sums) {
         let fragment = &self.fragments.all[fragment];
-        let scale = self.lights.arrivals.scale(light) * fragment.count() as f32;
+        let sums = sums * fragment.count() as f32;
         let term = &mut self.terms[fragment.pixel as usize * self.scene.lights.len() + light];
-        term[0] += scale * fragment.bsdf.diffuse * sums.diffuse;
-        term[1] += scale * fragment.bsdf.specular * sums.specular;
+        term[0] += fragment.bsdf.diffuse * sums.diffuse;
+        term[1] += fragment.bsdf.specular * sums.specular;
     }
 
     /// Where a pixel of the cell is on the film.
@@ -420,12 +418,12 @@ impl<'a> Cells<'a> {
                 self.refused.push(*wanted);
                 continue;
             }
-            let scale = self.lights.arrivals.scale(wanted.light as usize);
             let term = &mut self.terms[fragment.pixel as usize * scene.lights.len() + wanted.light as usize];
             for (quadrant, answer) in fragments.quadrants[fragment.quadrants.clone()].iter().zip(answers) {
-                let (scale, bsdf) = (scale * quadrant.rays as f32, &fragments.places[quadrant.place as usize].bsdf);
-                term[0] += scale * bsdf.diffuse * answer.sums.diffuse;
-                term[1] += scale * bsdf.specular * answer.sums.specular;
+                let (sums, bsdf) =
+                    (answer.sums * quadrant.rays as f32, &fragments.places[quadrant.place as usize].bsdf);
+                term[0] += bsdf.diffuse * sums.diffuse;
+                term[1] += bsdf.specular * sums.specular;
             }
         }
         ControlFlow::Continue(())
@@ -496,12 +494,11 @@ impl<'a> Cells<'a> {
         for Wanted { fragment, light } in &refused {
             let fragment = &self.fragments.all[*fragment as usize];
             self.work[self.pixels[fragment.pixel as usize].index as usize] += Heat::PLACE * fragment.count() as f32;
-            let scale = self.lights.arrivals.scale(*light as usize);
             let term = &mut self.terms[fragment.pixel as usize * scene.lights.len() + *light as usize];
             for (request, answer) in answers.by_ref().take(fragment.count()) {
                 let bsdf = &self.places[request.place as usize].bsdf;
-                term[0] += scale * bsdf.diffuse * answer.sums.diffuse;
-                term[1] += scale * bsdf.specular * answer.sums.specular;
+                term[0] += bsdf.diffuse * answer.sums.diffuse;
+                term[1] += bsdf.specular * answer.sums.specular;
             }
         }
         self.refused = refused;
@@ -514,10 +511,12 @@ impl<'a> Cells<'a> {
         let lights = scene.lights.len();
         for fragment in &self.fragments.all {
             let pixel = &mut self.pixels[fragment.pixel as usize];
-            pixel.ambient += scene.ambient * fragment.bsdf.ambient * fragment.count() as f32;
+            pixel.terms.ambient += scene.ambient * fragment.bsdf.ambient * fragment.count() as f32;
         }
         for (number, pixel) in self.pixels.iter().enumerate() {
-            self.colors[pixel.index as usize] = pixel.color(scene, &self.terms[number * lights..][..lights]);
+            let terms = self.terms[number * lights..][..lights].iter().copied();
+            let scales = self.lights.arrivals.scales().iter().copied();
+            self.colors[pixel.index as usize] = pixel.terms.resolve(scene, scales.zip(terms));
         }
     }
 
@@ -528,28 +527,9 @@ impl<'a> Cells<'a> {
             let [i, j] = self.at(index);
             if tile.contains([i, j]) {
                 counts.camera_rays += rays;
-                film.set(i - tile.x, j - tile.y, self.colors[index]);
-                film.spend(i - tile.x, j - tile.y, self.work[index]);
+                film.set(i - tile.x, j - tile.y, self.colors[index], self.work[index]);
             }
         }
-    }
-}
-
-impl Pixel {
-    /// Red, green, blue premultiplied, alpha: the sum in its one order.
-    fn color(&self, scene: &Scene, terms: &[[Rgb; 2]]) -> [f32; 4] {
-        let rays = (scene.antialiasing * scene.antialiasing) as f32;
-        let mean = |sum: Rgb| Rgb::new(sum.r / rays, sum.g / rays, sum.b / rays);
-        let uncovered = self.background as f32 / rays;
-        let mut color = if scene.transparent { Rgb::BLACK } else { scene.background * uncovered };
-        color += mean(self.emission);
-        color += mean(self.ambient);
-        for [diffuse, specular] in terms {
-            color += mean(*diffuse);
-            color += mean(*specular);
-        }
-        let alpha = if scene.transparent { 1.0 - uncovered } else { 1.0 };
-        [color.r, color.g, color.b, alpha]
     }
 }
 

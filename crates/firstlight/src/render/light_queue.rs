@@ -239,7 +239,7 @@ impl<'a> LightQueue<'a> {
 
     /// Whether what a light sends changes so little within a place's reach that nothing of that shows.
     fn is_even(&self, place: &ArrivalPlace, arrival: &Arrival) -> bool {
-        let [diffuse, specular] = place.colors;
+        let [diffuse, specular] = place.colors();
         let value = place.base + diffuse * arrival.sums.diffuse + specular * arrival.sums.specular;
         let error = diffuse * arrival.bend.diffuse + specular * arrival.bend.specular;
         self.arrivals.steps(value, error) <= BEND / (self.scene.lights.len() as f32).sqrt()

@@ -31,6 +31,7 @@ mod patch;
 pub(crate) mod pixel;
 mod plain;
 mod receipt;
+mod resolve;
 mod sampled;
 mod shafts;
 mod single;
@@ -46,7 +47,7 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
 pub use counts::{LightCounts, RenderStats};
-pub use film::Film;
+pub use film::{Film, Plane};
 pub use heat::Heat;
 
 use crate::accel::SimdLevel;
@@ -162,7 +163,7 @@ impl RenderSettings {
     /// # Errors
     /// How much it takes, and what to do.
     pub fn check_memory(&self, scene: &Scene) -> Result<(), String> {
-        if self.samples_all() {
+        if self.renderer().samples_all() {
             let points = |light: &Light| if light.exact { light.samples() as u64 } else { 0 };
             let points: u64 = scene.lights.iter().map(points).sum();
             if points > MAX_POINTS {
@@ -173,7 +174,7 @@ impl RenderSettings {
             }
         }
         let window = self.window(scene);
-        let pixel = size_of::<[f32; 4]>() + if self.heat { size_of::<f32>() } else { 0 };
+        let pixel: usize = self.planes().iter().map(|plane| plane.bytes()).sum();
         let film = window.width as usize * window.height as usize * pixel;
         Vec::<u8>::new().try_reserve_exact(film + film / 2).map_err(|_| {
             let Window { width, height, .. } = window;
@@ -184,19 +185,51 @@ impl RenderSettings {
         })
     }
 
-    /// Whether all lights are sampled, and that at every camera ray, whatever they and `aa_mode` say.
-    fn samples_all(&self) -> bool {
-        self.reference || self.visibility == VisibilityMode::Traced
+    /// What renders by these settings.
+    fn renderer(&self) -> Renderer {
+        match (self.reference, self.visibility, self.aa_mode) {
+            (true, ..) => Renderer::Reference,
+            (false, VisibilityMode::Traced, _) => Renderer::Traced,
+            (false, VisibilityMode::Shafts, AaMode::Full) => Renderer::Full,
+            (false, VisibilityMode::Shafts, AaMode::Adaptive) => Renderer::Adaptive,
+        }
     }
 
-    /// How edges are smoothed in effect: where every light is sampled at every camera ray, each is lit by itself.
-    fn effective_aa_mode(&self) -> AaMode {
-        if self.samples_all() { AaMode::Full } else { self.aa_mode }
+    /// The planes of the film.
+    fn planes(&self) -> Vec<Plane> {
+        let mut planes = vec![Plane::Color];
+        planes.extend(self.heat.then_some(Plane::Rays));
+        planes
     }
 
     /// The part of the film to render.
     fn window(&self, scene: &Scene) -> Window {
         self.crop.unwrap_or(Window { x: 0, y: 0, width: scene.width, height: scene.height })
+    }
+}
+
+/// The rules by which a picture is made.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Renderer {
+    /// The plain code, which is the specification.
+    Reference,
+    /// Sixteen samples at once, all of them traced: its bits.
+    Traced,
+    /// Each camera ray is lit by itself. Its bits where lights are sampled; others are integrated.
+    Full,
+    /// Each surface is lit as often as it needs.
+    Adaptive,
+}
+
+impl Renderer {
+    /// Whether all lights are sampled, and that at every camera ray, whatever they say.
+    fn samples_all(self) -> bool {
+        matches!(self, Renderer::Reference | Renderer::Traced)
+    }
+
+    /// How edges are smoothed.
+    fn aa_mode(self) -> AaMode {
+        if self == Renderer::Adaptive { AaMode::Adaptive } else { AaMode::Full }
     }
 }
 
@@ -240,13 +273,16 @@ pub fn render(
     }
     let window = settings.window(scene);
     let threads = settings.threads.map_or_else(available_threads, NonZeroUsize::get);
-    let simd = if settings.reference { SimdLevel::Fallback } else { settings.simd.resolve() };
+    let renderer = settings.renderer();
+    let level = settings.simd.resolve();
+    let simd = if renderer == Renderer::Reference { SimdLevel::Fallback } else { level };
     let nothing = Counts::default().stats(simd, threads);
-    let result = Mutex::new((Film::new([scene.width, scene.height], window, settings.heat), nothing));
+    let planes = settings.planes();
+    let result = Mutex::new((Film::new([scene.width, scene.height], window, &planes), nothing));
     let lights = Lights::new(scene);
     // Where every light is sampled at every ray, the bits are those of the plain renderer
-    let every_ray =
-        settings.samples_all() || settings.aa_mode == AaMode::Full && lights.emitters.iter().all(Option::is_none);
+    let is_sampled = lights.emitters.iter().all(Option::is_none);
+    let every_ray = renderer.samples_all() || renderer == Renderer::Full && is_sampled;
     let tiles = if every_ray {
         Tile::cover(window, settings.tile_size)
     } else {
@@ -255,9 +291,8 @@ pub fn render(
     let tiles = tile::spread(&tiles);
     let all = window.width as u64 * window.height as u64;
     let (done, stop) = (AtomicU64::new(0), AtomicBool::new(false));
-    let by_shafts = every_ray && !settings.samples_all();
+    let by_shafts = every_ray && renderer == Renderer::Full;
     let targets = if by_shafts { Target::of_all(scene) } else { Vec::new() };
-    let level = settings.simd.resolve();
     let by_cells = scene.geometry.listed && !scene.geometry.has_trees() && scene.lights.len() <= FEW;
     let spare: Mutex<Vec<Cells>> = Mutex::new(Vec::new());
     let render_one = |tile: &Tile| {
@@ -271,31 +306,34 @@ pub fn render(
             }
             if stop.load(Ordering::Relaxed) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
         };
-        let rendered = if settings.reference {
-            render_tile(scene, tile, &mut Plain, None, &go_on)
-        } else if !every_ray {
-            let token = level.token();
-            let arrivals = Arrivals::new(scene, &lights, token);
-            if by_cells {
+        let mut film_tile = FilmTile::new(tile, &planes);
+        let film = &mut film_tile;
+        let token = level.token();
+        let rendered = match renderer {
+            Renderer::Reference => render_tile(scene, film, &mut Plain, None, &go_on),
+            Renderer::Traced => {
+                let hits = scene.geometry.has_trees().then(|| PixelHits::new(token, scene.antialiasing));
+                render_tile(scene, film, &mut Lanes::new(token), hits, &go_on)
+            }
+            Renderer::Full if is_sampled => Shafts::new(scene, &targets, token).render(film, &go_on),
+            Renderer::Full | Renderer::Adaptive if by_cells => {
                 // Their memory goes from tile to tile
                 let used = spare.lock().expect("no thread panics while it holds a renderer").pop();
-                let mut cells =
-                    used.unwrap_or_else(|| Cells::new(scene, settings.aa_mode, LightQueue::new(scene, arrivals)));
-                let rendered = cells.render(tile, &go_on);
+                let mut cells = used.unwrap_or_else(|| {
+                    let queue = LightQueue::new(scene, Arrivals::new(scene, &lights, token));
+                    Cells::new(scene, renderer.aa_mode(), queue)
+                });
+                let rendered = cells.render(film, &go_on);
                 spare.lock().expect("no thread panics while it holds a renderer").push(cells);
                 rendered
-            } else {
-                Tiled::new(scene, settings.aa_mode, PixelHits::new(token, scene.antialiasing), arrivals)
-                    .render(tile, &go_on)
             }
-        } else if by_shafts {
-            Shafts::new(scene, &targets, level.token()).render(tile, &go_on)
-        } else {
-            let token = level.token();
-            let hits = scene.geometry.has_trees().then(|| PixelHits::new(token, scene.antialiasing));
-            render_tile(scene, tile, &mut Lanes::new(token), hits, &go_on)
+            Renderer::Full | Renderer::Adaptive => {
+                let (hits, arrivals) =
+                    (PixelHits::new(token, scene.antialiasing), Arrivals::new(scene, &lights, token));
+                Tiled::new(scene, renderer.aa_mode(), hits, arrivals).render(film, &go_on)
+            }
         };
-        let ControlFlow::Continue((film_tile, counts)) = rendered else { return };
+        let ControlFlow::Continue(counts) = rendered else { return };
         {
             let (film, stats) = &mut *result.lock().expect("no thread panics while it holds the film");
             film.merge(&film_tile);
@@ -336,12 +374,12 @@ fn available_threads() -> usize {
 /// the camera rays of neighbouring pixels are traced together. `go_on` is asked now and then.
 fn render_tile(
     scene: &Scene,
-    tile: &Tile,
+    film: &mut FilmTile,
     lighting: &mut impl Lighting,
     mut hits: Option<PixelHits>,
     go_on: &impl Fn() -> ControlFlow<()>,
-) -> ControlFlow<(), (FilmTile, Counts)> {
-    let mut film = FilmTile::new(tile);
+) -> ControlFlow<(), Counts> {
+    let tile = film.tile;
     let mut counts = Counts::default();
     let mut pixel = PixelSum::new(scene);
     let rays = (scene.antialiasing * scene.antialiasing) as f32;
@@ -361,10 +399,9 @@ fn render_tile(
                 let at = [tile.x + left + x, tile.y + top + y];
                 let before = counts.work();
                 pixel.sample(scene, at, lighting, hit, &mut counts, go_on)?;
-                film.set(left + x, top + y, pixel.color(scene));
-                film.spend(left + x, top + y, rays + counts.work() - before);
+                film.set(left + x, top + y, pixel.color(scene), rays + counts.work() - before);
             }
         }
     }
-    ControlFlow::Continue((film, counts))
+    ControlFlow::Continue(counts)
 }

@@ -3,6 +3,7 @@
 use arrayvec::ArrayVec;
 
 use super::hits::camera_ray;
+use super::resolve::PixelTerms;
 use super::solo::{self, Candidate};
 use crate::color::Rgb;
 use crate::material::Bsdf;
@@ -24,6 +25,8 @@ pub(crate) struct Patch {
     pub turn: f32,
     /// How far off its middle it is shaded, as a part of `reach`.
     pub off: f32,
+    /// How far the mean of its normals is from that where it is shaded: far where facets make a crease.
+    pub skew: f32,
     /// Whether more than colours change over it: then it is shaded at each of its rays.
     pub uneven: bool,
     /// How far its colours differ.
@@ -124,6 +127,7 @@ impl Patch {
             reach,
             turn,
             off: 0.0,
+            skew: 0.0,
             uneven: false,
             contrast: Contrast::default(),
         };
@@ -179,7 +183,8 @@ impl Patch {
         let material = &scene.materials[si.material.index()];
         let bsdf = material.bsdf(&si, &scene.textures);
         let rays = Rays::Mask(candidate, mask);
-        let mut patch = Patch { si, bsdf, rays, reach, turn, off, uneven: false, contrast: Contrast::default() };
+        let mut patch =
+            Patch { si, bsdf, rays, reach, turn, off, skew: 0.0, uneven: false, contrast: Contrast::default() };
         // Over all of the pixel
         let (ray, whole) = scene.camera.local_ray(pixel[0] as f32 + 0.5, pixel[1] as f32 + 0.5, 1.0);
         let even = candidate.hit(scene, &ray).is_some_and(|hit| {
@@ -241,15 +246,18 @@ impl Patch {
     /// Has it shaded at `si`.
     fn place(&mut self, si: SurfaceInteraction) {
         let Rays::Some(members) = &self.rays else { return };
-        let mut middle = Vec3::ZERO;
+        let (mut middle, mut normals) = (Vec3::ZERO, Vec3::ZERO);
         let (mut reach, mut turn, mut uneven) = (0.0f32, 0.0f32, false);
         for member in members {
             uneven |= member.si.receives_shadow != si.receives_shadow;
             reach = reach.max((member.si.lit_from - si.lit_from).length());
             turn = turn.max((member.si.ns - si.ns).length()).max((member.si.horizon - si.horizon).length());
             middle += member.si.lit_from - si.lit_from;
+            normals += member.si.ns - si.ns;
         }
-        let off = middle.length() / members.len() as f32;
+        let count = members.len() as f32;
+        let off = middle.length() / count;
+        self.skew = normals.length() / count;
         self.off = if reach > 0.0 { off / reach } else { 0.0 };
         (self.si, self.reach, self.turn, self.uneven) = (si, reach, turn, uneven);
     }
@@ -329,8 +337,8 @@ const KINDS: usize = 8;
 #[derive(Default)]
 pub(crate) struct PixelPatches {
     pub patches: Vec<Patch>,
-    pub background: u32,
-    pub emission: Rgb,
+    /// But for ambient light, which is that of the patches.
+    pub terms: PixelTerms,
     /// Lists that are not used any more, for their memory.
     pub spare: Vec<Vec<Member>>,
 }
@@ -342,7 +350,7 @@ impl PixelPatches {
             Rays::Some(members) => Some(members),
             _ => None,
         }));
-        (self.background, self.emission) = (0, Rgb::BLACK);
+        self.terms = PixelTerms::default();
     }
 
     /// Sorts what the rays of a pixel see that meet nothing but these. `once`: see [`collect`](Self::collect).
@@ -362,11 +370,11 @@ impl PixelPatches {
         let mut masks: ArrayVec<(usize, u64), KINDS> = ArrayVec::new();
         for k in 0..n * n {
             let Some((place, _)) = first(k) else {
-                self.background += 1;
+                self.terms.background += 1;
                 continue;
             };
             if let Candidate::Light(light) = candidates[place] {
-                self.emission += scene.lights[light as usize].radiance;
+                self.terms.emission += scene.lights[light as usize].radiance;
                 continue;
             }
             match masks.iter().position(|(known, _)| *known == place) {
@@ -383,35 +391,17 @@ impl PixelPatches {
         }
     }
 
-    /// The pixel's colour, from what its surfaces send of ambient light and of each light, diffuse and specular, all
-    /// rays together: red, green, blue premultiplied, alpha.
-    pub fn color(&self, scene: &Scene, ambient: Rgb, terms: &[[Rgb; 2]]) -> [f32; 4] {
-        let rays = (scene.antialiasing * scene.antialiasing) as f32;
-        // The sum in its one order
-        let mean = |sum: Rgb| Rgb::new(sum.r / rays, sum.g / rays, sum.b / rays);
-        let uncovered = self.background as f32 / rays;
-        let mut color = if scene.transparent { Rgb::BLACK } else { scene.background * uncovered };
-        color += mean(self.emission);
-        color += mean(ambient);
-        for [diffuse, specular] in terms {
-            color += mean(*diffuse);
-            color += mean(*specular);
-        }
-        let alpha = if scene.transparent { 1.0 - uncovered } else { 1.0 };
-        [color.r, color.g, color.b, alpha]
-    }
-
     /// Sorts what the rays of a pixel see. `once` puts what is one surface together; without it each ray is a patch.
     pub fn collect(&mut self, scene: &Scene, [i, j]: [u32; 2], once: bool, hit: impl Fn(u32, u32) -> Option<Hit>) {
         self.clear();
         let n = scene.antialiasing;
         for (row, column) in (0..n).flat_map(|row| (0..n).map(move |column| (row, column))) {
             let Some(hit) = hit(column, row) else {
-                self.background += 1;
+                self.terms.background += 1;
                 continue;
             };
             if let Some(light) = hit.surface.index().checked_sub(scene.geometry.surfaces.len()) {
-                self.emission += scene.lights[light].radiance;
+                self.terms.emission += scene.lights[light].radiance;
                 continue;
             }
             let (ray, differential) = camera_ray(scene, i * n + column, j * n + row);
@@ -433,6 +423,7 @@ impl PixelPatches {
                         reach: 0.0,
                         turn: 0.0,
                         off: 0.0,
+                        skew: 0.0,
                         uneven: false,
                         contrast: Contrast::default(),
                     });

@@ -3,6 +3,7 @@
 use std::ops::ControlFlow;
 
 use super::hits::camera_ray;
+use super::resolve::{LightTerm, PixelTerms};
 use super::{Counts, QUESTION_EVERY};
 use crate::color::Rgb;
 use crate::ids::LightId;
@@ -34,25 +35,20 @@ pub(crate) struct LobeSums {
     pub specular: LaneSum,
 }
 
-/// What a pixel's camera rays add up to, term by term: a picture is the sum of these in one fixed order.
+/// What a pixel's camera rays add up to, term by term.
 pub(crate) struct PixelSum {
-    background: u32,
-    emission: Rgb,
-    ambient: Rgb,
-    /// Diffuse and specular of each light, in scene order.
-    lights: Vec<[Rgb; 2]>,
+    terms: PixelTerms,
+    /// In scene order.
+    lights: Vec<LightTerm>,
 }
 
 impl PixelSum {
     pub fn new(scene: &Scene) -> Self {
-        let lights = vec![[Rgb::BLACK; 2]; scene.lights.len()];
-        PixelSum { background: 0, emission: Rgb::BLACK, ambient: Rgb::BLACK, lights }
+        PixelSum { terms: PixelTerms::default(), lights: vec![[Rgb::BLACK; 2]; scene.lights.len()] }
     }
 
     pub fn clear(&mut self) {
-        self.background = 0;
-        self.emission = Rgb::BLACK;
-        self.ambient = Rgb::BLACK;
+        self.terms = PixelTerms::default();
         self.lights.fill([Rgb::BLACK; 2]);
     }
 
@@ -89,12 +85,12 @@ impl PixelSum {
     /// [`light`](Self::light).
     pub fn see(&mut self, scene: &Scene, seen: Seen) -> Option<(SurfaceInteraction, Bsdf)> {
         match seen {
-            Seen::Background => self.background += 1,
-            Seen::Emission(color) => self.emission += color,
+            Seen::Background => self.terms.background += 1,
+            Seen::Emission(color) => self.terms.emission += color,
             Seen::Surface(si) => {
                 // Look the material's textures up
                 let bsdf = scene.materials[si.material.index()].bsdf(&si, &scene.textures);
-                self.ambient += scene.ambient * bsdf.ambient;
+                self.terms.ambient += scene.ambient * bsdf.ambient;
                 return Some((si, bsdf));
             }
         }
@@ -103,10 +99,9 @@ impl PixelSum {
 
     /// Adds what light `index` sends to a surface: the totals of [`LobeSums`].
     #[inline(always)]
-    pub fn light(&mut self, scene: &Scene, index: usize, bsdf: &Bsdf, [diffuse, specular]: [f32; 2]) {
-        let light = &scene.lights[index];
-        self.lights[index][0] += light.scale * bsdf.diffuse * diffuse;
-        self.lights[index][1] += light.scale * bsdf.specular * specular;
+    pub fn light(&mut self, index: usize, bsdf: &Bsdf, [diffuse, specular]: [f32; 2]) {
+        self.lights[index][0] += bsdf.diffuse * diffuse;
+        self.lights[index][1] += bsdf.specular * specular;
     }
 
     /// Adds what each light sends.
@@ -125,23 +120,13 @@ impl PixelSum {
                 continue;
             }
             let sums = lighting.gather(scene, index, si, &bsdf.lobe, counts);
-            self.light(scene, index, bsdf, [sums.diffuse.total(), sums.specular.total()]);
+            self.light(index, bsdf, [sums.diffuse.total(), sums.specular.total()]);
         }
     }
 
     /// The mean, as film: red, green, blue premultiplied, alpha.
     pub fn color(&self, scene: &Scene) -> [f32; 4] {
-        let rays = (scene.antialiasing * scene.antialiasing) as f32;
-        let uncovered = self.background as f32 / rays;
-        let mean = |sum: Rgb| Rgb::new(sum.r / rays, sum.g / rays, sum.b / rays);
-        let mut color = if scene.transparent { Rgb::BLACK } else { scene.background * uncovered };
-        color += mean(self.emission);
-        color += mean(self.ambient);
-        for [diffuse, specular] in &self.lights {
-            color += mean(*diffuse);
-            color += mean(*specular);
-        }
-        let alpha = if scene.transparent { 1.0 - uncovered } else { 1.0 };
-        [color.r, color.g, color.b, alpha]
+        let scales = scene.lights.iter().map(|light| light.scale);
+        self.terms.resolve(scene, scales.zip(self.lights.iter().copied()))
     }
 }

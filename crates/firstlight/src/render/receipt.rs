@@ -1,7 +1,7 @@
 //! What a picture says of itself: all that decides its pixels, and nothing else.
 
 use super::many::SINGLY;
-use super::{AaMode, RenderSettings};
+use super::{RenderSettings, Renderer};
 use crate::camera::Projection;
 use crate::describe::SamplesDesc;
 use crate::image::Receipt;
@@ -10,7 +10,7 @@ use crate::scene::Scene;
 
 /// How many entries **Pixels** has in the changelog, over all versions. It is part of the version in a receipt, so that
 /// two builds whose pictures differ never say the same. The test below compares it with the changelog.
-const PIXELS_ENTRIES: u32 = 28;
+const PIXELS_ENTRIES: u32 = 29;
 
 impl Scene {
     /// What a picture of this scene says of itself: all that decides the film, by the rules that are in effect, so that
@@ -23,7 +23,7 @@ impl Scene {
             ("width", self.width.to_string()),
             ("height", self.height.to_string()),
             ("antialiasing", self.antialiasing.to_string()),
-            ("aa_mode", settings.effective_aa_mode().name().to_owned()),
+            ("aa_mode", settings.renderer().aa_mode().name().to_owned()),
             ("camera", self.summary.camera.clone()),
             ("world_from_camera", matrix(self.camera.world_from_camera())),
             ("film_half_size", numbers(self.camera.film_half_size())),
@@ -31,8 +31,9 @@ impl Scene {
             ("color_space", "linear Rec. 709, alpha premultiplied, before display encoding".to_owned()),
         ];
         // What is neither integrated nor lit once for several rays is not judged
-        let is_integrated = |light: &Light| light.said_samples() == SamplesDesc::Exact && !settings.samples_all();
-        if settings.effective_aa_mode() != AaMode::Full || self.lights.iter().any(is_integrated) {
+        let is_integrated =
+            |light: &Light| light.said_samples() == SamplesDesc::Exact && !settings.renderer().samples_all();
+        if settings.renderer() == Renderer::Adaptive || self.lights.iter().any(is_integrated) {
             entries.push(("tolerance", self.tolerance.to_string()));
         }
         if let Some(time) = self.time {
@@ -59,7 +60,7 @@ impl Scene {
 fn light_samples(lights: &[Light], settings: &RenderSettings) -> String {
     // Where every sample is traced, every light is sampled
     let said = |light: &Light| match light.said_samples() {
-        SamplesDesc::Exact if settings.samples_all() => light.samples().to_string(),
+        SamplesDesc::Exact if settings.renderer().samples_all() => light.samples().to_string(),
         said => said.to_string(),
     };
     let counts: Vec<String> = lights.iter().map(said).collect();

@@ -12,7 +12,6 @@ use super::film::FilmTile;
 use super::hits::{PixelHits, camera_ray};
 use super::pixel::PixelSum;
 use super::sampled::Sampled;
-use super::tile::Tile;
 use super::{Counts, QUESTION_EVERY};
 use crate::ids::LightId;
 use crate::material::Bsdf;
@@ -51,8 +50,8 @@ impl<'a> Shafts<'a> {
     }
 
     /// Renders one tile.
-    pub fn render(&mut self, tile: &Tile, go_on: &impl Fn() -> ControlFlow<()>) -> ControlFlow<(), (FilmTile, Counts)> {
-        let mut film = FilmTile::new(tile);
+    pub fn render(&mut self, film: &mut FilmTile, go_on: &impl Fn() -> ControlFlow<()>) -> ControlFlow<(), Counts> {
+        let tile = &{ film.tile };
         let mut counts = Counts::default();
         let side = self.hits.side();
         let rays = (self.scene.antialiasing * self.scene.antialiasing) as f32;
@@ -67,12 +66,11 @@ impl<'a> Shafts<'a> {
                 let work = rays + (counts.work() - before) / pixels.len() as f32;
                 for (i, (pixel, _)) in pixels.iter().enumerate() {
                     let (x, y) = (i as u32 % w, i as u32 / w);
-                    film.set(left + x, top + y, pixel.color(self.scene));
-                    film.spend(left + x, top + y, work);
+                    film.set(left + x, top + y, pixel.color(self.scene), work);
                 }
             }
         }
-        ControlFlow::Continue((film, counts))
+        ControlFlow::Continue(counts)
     }
 
     /// Renders the pixels from (`i`, `j`), row by row. Each goes with the number of points of those up to it.
@@ -113,7 +111,7 @@ impl<'a> Shafts<'a> {
                 for k in start..*end {
                     let (si, bsdf) = &self.surfaces[k];
                     if shines_on(scene, index, si) {
-                        pixel.light(scene, index, bsdf, self.sums[k]);
+                        pixel.light(index, bsdf, self.sums[k]);
                     }
                 }
                 start = *end;

@@ -51,6 +51,8 @@ impl Arrivals<'_> {
         let share = (edge + rim + terminator + smooth).min(1.0);
         let moved = 2.0 * place.turn + place.reach / distance + self.scene.camera.sway(si.lit_from, place.reach);
         let lobe = (place.lobe.sharpness(si.ns.dot(si.wo)) * square(moved)).min(1.0);
+        // Shaded aside of its middle, a patch is lit otherwise than in the mean at once
+        let lobe = (lobe + 2.0 * lobe.sqrt() * place.off).min(1.0);
         let specular =
             if matches!(place.lobe, Lobe::None) { 0.0 } else { weight * (edge + rim + terminator + lobe).min(1.0) };
         let resolved = edge == 0.0 && rim == 0.0 && swing < RESOLVED_SWING && lobe < RESOLVED;

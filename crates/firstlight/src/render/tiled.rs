@@ -26,6 +26,7 @@ use super::film::FilmTile;
 use super::hits::PixelHits;
 use super::many::Many;
 use super::patch::{Patch, PixelPatches};
+use super::resolve::{LightTerm, PixelTerms};
 use super::solo::{self, Candidate, Pyramid};
 use super::square::Square;
 use super::tile::Tile;
@@ -83,7 +84,9 @@ pub(crate) struct Tiled<'a> {
     values: Vec<Rgb>,
     found: Vec<Arrival>,
     /// Diffuse and specular of each light at one pixel, in scene order.
-    terms: Vec<[Rgb; 2]>,
+    terms: Vec<LightTerm>,
+    /// The same of many lights, each with its scale.
+    scaled_terms: Vec<(Rgb, LightTerm)>,
     /// What the rays of each pixel's patches see of each light past what is in trees, and where those of a pixel begin.
     outlooks: Vec<Outlook>,
     seen: Vec<usize>,
@@ -125,6 +128,7 @@ impl<'a> Tiled<'a> {
             values: Vec::new(),
             found: Vec::new(),
             terms: Vec::new(),
+            scaled_terms: Vec::new(),
             outlooks: Vec::new(),
             seen: vec![UNLIT; ACROSS * ACROSS],
             block: Block::default(),
@@ -139,14 +143,14 @@ impl<'a> Tiled<'a> {
     }
 
     /// Renders one tile. `go_on` is asked now and then.
-    pub fn render(&mut self, tile: &Tile, go_on: &impl Fn() -> ControlFlow<()>) -> ControlFlow<(), (FilmTile, Counts)> {
-        let mut film = FilmTile::new(tile);
+    pub fn render(&mut self, film: &mut FilmTile, go_on: &impl Fn() -> ControlFlow<()>) -> ControlFlow<(), Counts> {
+        let tile = &{ film.tile };
         let mut counts = Counts::default();
         for corner in tile.cells(CELL) {
             go_on()?;
-            self.cell(tile, corner, &mut film, &mut counts, go_on)?;
+            self.cell(tile, corner, film, &mut counts, go_on)?;
         }
-        ControlFlow::Continue((film, counts))
+        ControlFlow::Continue(counts)
     }
 
     /// Renders the part of a cell that is in the tile.
@@ -197,8 +201,7 @@ impl<'a> Tiled<'a> {
                         Some(color) => color,
                         None => self.finish([i, j], counts),
                     };
-                    film.set(i - tile.x, j - tile.y, color);
-                    film.spend(i - tile.x, j - tile.y, self.work[index] + counts.work() - before);
+                    film.set(i - tile.x, j - tile.y, color, self.work[index] + counts.work() - before);
                 }
             }
             go_on()?;
@@ -227,8 +230,7 @@ impl<'a> Tiled<'a> {
         pyramid.candidates(scene, &outer[depth - 1], near);
         let n = scene.antialiasing;
         if near.is_empty() {
-            let background = PixelPatches { background: n * n, ..PixelPatches::default() };
-            let color = background.color(scene, Rgb::BLACK, &[]);
+            let color = PixelTerms { background: n * n, ..PixelTerms::default() }.resolve(scene, std::iter::empty());
             square.pixels().for_each(|at| self.learn(at, Known::Nothing, Some(color), 0.0));
             return ControlFlow::Continue(());
         }
@@ -408,7 +410,7 @@ impl<'a> Tiled<'a> {
                                 Some(arrived) => {
                                     let found = self.arrivals.found(light, &place, arrived, counts);
                                     let arrival = self.arrivals.arrival_of(light, &place, found, counts);
-                                    told.push((number, place.colors, arrival));
+                                    told.push((number, place.colors(), arrival));
                                 }
                                 None => {
                                     places.push(place);
@@ -421,7 +423,7 @@ impl<'a> Tiled<'a> {
             }
             self.arrivals.arrivals(light, &places, &mut self.found, counts);
             let asked = asked.into_iter().zip(&places).zip(&self.found);
-            told.extend(asked.map(|((number, place), arrival)| (number, place.colors, *arrival)));
+            told.extend(asked.map(|((number, place), arrival)| (number, place.colors(), *arrival)));
             for (number, [diffuse, specular], arrival) in told {
                 self.values[number] += diffuse * arrival.sums.diffuse + specular * arrival.sums.specular;
                 self.arrived[number * lights + light] = arrival;
@@ -441,19 +443,19 @@ impl<'a> Tiled<'a> {
     fn finish(&mut self, at: [u32; 2], counts: &mut Counts) -> [f32; 4] {
         let scene = self.scene;
         let index = self.index(at);
-        self.terms.clear();
+        let mut terms = self.pixels[index].terms;
+        for patch in &self.pixels[index].patches {
+            terms.ambient += scene.ambient * patch.bsdf.ambient * patch.count(scene) as f32;
+        }
         if let Some(many) = &mut self.many {
-            let terms = &mut self.terms;
-            many.finish(&self.pixels, &self.first, index, at, &mut self.arrivals, counts, |term| terms.push(term));
-        } else {
-            self.terms.resize(scene.lights.len(), [Rgb::BLACK; 2]);
-            self.light_by_light(at, counts);
+            let scaled = &mut self.scaled_terms;
+            scaled.clear();
+            many.finish(&self.pixels, &self.first, index, at, &mut self.arrivals, counts, |term| scaled.push(term));
+            return terms.resolve(scene, scaled.iter().copied());
         }
-        let pixel = &self.pixels[index];
-        let mut ambient = Rgb::BLACK;
-        for patch in &pixel.patches {
-            ambient += scene.ambient * patch.bsdf.ambient * patch.count(scene) as f32;
-        }
-        pixel.color(scene, ambient, &self.terms)
+        self.terms.clear();
+        self.terms.resize(scene.lights.len(), [Rgb::BLACK; 2]);
+        self.light_by_light(at, counts);
+        terms.resolve(scene, self.arrivals.scales().iter().copied().zip(self.terms.iter().copied()))
     }
 }

@@ -9,6 +9,7 @@ use super::Counts;
 use super::arrival::{ArrivalPlace, Arrivals, Seen};
 use super::beams::{self, Beam, Traced};
 use super::ladder::{Asker, FIRST, LAST, Tally, of_edge};
+use super::resolve::LightTerm;
 use crate::color::Rgb;
 use crate::integrate::{Arrived, Illumination, Sums};
 use crate::light::SERIES;
@@ -74,7 +75,8 @@ struct Asking {
     si: SurfaceInteraction,
     lobe: Lobe,
     base: Rgb,
-    colors: [Rgb; 2],
+    scale: Rgb,
+    reflected: [Rgb; 2],
     series: usize,
     view: View,
     /// What would arrive if nothing were in the way, if that is known.
@@ -100,7 +102,8 @@ struct Looking {
 
 impl Asking {
     fn place(&self, share: f32) -> ArrivalPlace<'_> {
-        ArrivalPlace { share, ..ArrivalPlace::point(&self.si, &self.lobe, self.base, self.colors) }
+        let place = ArrivalPlace::point(&self.si, &self.lobe, self.base, self.scale, self.reflected);
+        ArrivalPlace { share, ..place }
     }
 
     /// What arrives, as far as points tell, and what would if nothing were in the way.
@@ -110,7 +113,7 @@ impl Asking {
 
     /// The diffuse part and the highlight, with their colours.
     fn each(&self, sums: &Sums) -> [Rgb; 2] {
-        [self.colors[0] * sums.diffuse, self.colors[1] * sums.specular]
+        [self.scale * self.reflected[0] * sums.diffuse, self.scale * self.reflected[1] * sums.specular]
     }
 
     fn color(&self, sums: &Sums) -> Rgb {
@@ -183,9 +186,10 @@ pub(crate) struct Together {
     /// Those of which nothing is known yet, and those that are behind things.
     looking: Vec<Looking>,
     asking: Vec<Asking>,
-    /// What is known, all rays together: the light, before colours and with them, and with what is there beside it.
+    /// What is known, all rays together: the light, before colours and with those of the surfaces, and all that is
+    /// there.
     sums: Sums,
-    known: [Rgb; 2],
+    terms: LightTerm,
     value: Rgb,
     /// What other lights send to each ray, at least: errors of packets show less beside it.
     others: Rgb,
@@ -198,8 +202,8 @@ pub(crate) struct Together {
 /// What all rays of a patch see of a light.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Outcome {
-    /// Added up, with all colours: diffuse and specular.
-    pub terms: [Rgb; 2],
+    /// Added up.
+    pub terms: LightTerm,
     /// Added up, without colours.
     pub sums: Sums,
     /// The part of the light that is not hidden, by its points, the mean over the rays; no number where that is not
@@ -214,7 +218,7 @@ impl Together {
         // Which of the series is first: any, but not by a pattern
         let series = (salt.wrapping_mul(0x9e37_79b9) >> 16) as usize % SERIES;
         let each = share / rays as f32;
-        let (sums, known) = (Sums::default(), [Rgb::BLACK; 2]);
+        let (sums, terms) = (Sums::default(), [Rgb::BLACK; 2]);
         Together {
             light,
             each,
@@ -224,7 +228,7 @@ impl Together {
             looking: Vec::new(),
             asking: Vec::new(),
             sums,
-            known,
+            terms,
             value: Rgb::BLACK,
             others,
             shares: 0.0,
@@ -257,7 +261,7 @@ impl Together {
     pub fn know(&mut self, place: &ArrivalPlace, sums: &Sums) {
         self.rays += 1;
         self.value += place.base;
-        self.add(&place.colors, sums);
+        self.add(place, sums);
     }
 
     /// Hears that something hides all of the light from a ray.
@@ -279,13 +283,14 @@ impl Together {
         let series = self.series ^ (self.rays % SERIES);
         self.rays += 1;
         self.value += place.base;
-        let ArrivalPlace { si, lobe, base, colors, .. } = *place;
+        let ArrivalPlace { si, lobe, base, scale, reflected, .. } = *place;
         let tally = Tally::default();
         self.asking.push(Asking {
             si: *si,
             lobe: *lobe,
             base,
-            colors,
+            scale,
+            reflected,
             series,
             view,
             whole: None,
@@ -297,10 +302,10 @@ impl Together {
         });
     }
 
-    fn add(&mut self, colors: &[Rgb; 2], sums: &Sums) {
-        let light = [colors[0] * sums.diffuse, colors[1] * sums.specular];
-        self.known = [self.known[0] + light[0], self.known[1] + light[1]];
-        self.value += light[0] + light[1];
+    fn add(&mut self, place: &ArrivalPlace, sums: &Sums) {
+        self.terms[0] += place.reflected[0] * sums.diffuse;
+        self.terms[1] += place.reflected[1] * sums.specular;
+        self.value += place.color(sums);
         self.sums = self.sums + *sums;
     }
 
@@ -422,22 +427,22 @@ impl Together {
             let mut asking = std::mem::take(&mut self.asking);
             let all_settled = self.points(arrivals, &mut asking, counts);
             let measure = arrivals.measure(self.light);
-            for Asking { si, lobe, base, colors, tally, whole, view, settled, .. } in asking {
-                let place = ArrivalPlace { share: self.each, ..ArrivalPlace::point(&si, &lobe, base, colors) };
-                let sums = if all_settled || settled {
-                    tally.sums(whole.as_ref(), measure)
+            for one in asking {
+                let place = one.place(self.each);
+                let sums = if all_settled || one.settled {
+                    one.tally.sums(one.whole.as_ref(), measure)
                 } else {
                     arrivals.by_cells(self.light, &place, counts)
                 };
-                if tally.sending > 0 {
-                    self.shares += 1.0 - tally.hidden as f32 / tally.sending as f32;
+                if one.tally.sending > 0 {
+                    self.shares += 1.0 - one.tally.hidden as f32 / one.tally.sending as f32;
                     self.sharing += 1;
                 }
-                self.add(&colors, &sums);
-                arrivals.keep(view);
+                self.add(&place, &sums);
+                arrivals.keep(one.view);
             }
         }
-        Outcome { terms: self.known, sums: self.sums, share: self.shares / self.sharing.max(1) as f32 }
+        Outcome { terms: self.terms, sums: self.sums, share: self.shares / self.sharing.max(1) as f32 }
     }
 
     /// Asks points of the light, more and more, until what they say together will do; whether it does in the end.

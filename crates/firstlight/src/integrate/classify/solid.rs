@@ -115,8 +115,9 @@ impl ConvexSolid {
             Some([low, high]) => (*low - p).abs().max((*high - p).abs()).length(),
             None => p.length(),
         };
-        let room = f64::from(SLACK) * far;
-        let above = self.reach(point.horizon.as_dvec3()) - point.horizon.as_dvec3().dot(p);
+        let (n, error) = (point.horizon.as_dvec3(), point.error.0.as_dvec3());
+        let room = f64::from(SLACK) * far + 2.0 * n.abs().dot(error);
+        let above = self.reach(n) - n.dot(p);
         let around = f64::from(point.reach) + f64::from(point.turn) * (far + f64::from(point.reach));
         if above < -(room + around) || self.is_under(point) {
             Lies::Aside
@@ -130,7 +131,7 @@ impl ConvexSolid {
             let rows = self.canonical_from_world.matrix3.transpose();
             let size = |v: DVec3| [rows.x_axis, rows.y_axis, rows.z_axis].map(|row| row.abs().dot(v));
             let largest = |sizes: [f64; 3]| sizes.into_iter().fold(0.0, f64::max);
-            let room = ROUNDING + 2.0 * largest(size(point.error.0.as_dvec3()));
+            let room = ROUNDING + 2.0 * largest(size(error));
             if !self.kind.holds(at, room) {
                 Lies::Between
             } else if self.surrounds(point, room + largest(size(DVec3::splat(f64::from(point.turn * point.reach))))) {

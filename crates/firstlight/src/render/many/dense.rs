@@ -172,7 +172,7 @@ impl<'a> Many<'a> {
             let place = ArrivalPlace { base: stored.value, ..arrivals.place(*index as usize, si, bsdf).over(patch) };
             let arrival = arrivals.arrival(*index as usize, &place, counts);
             light += arrivals.scale(*index as usize) * arrival.sums.diffuse;
-            stored.value += place.colors[0] * arrival.sums.diffuse + place.colors[1] * arrival.sums.specular;
+            stored.value += place.color(&arrival.sums);
             self.singles.push(Single { light: *index, arrival });
         }
         stored.singles = from..self.singles.len() as u32;

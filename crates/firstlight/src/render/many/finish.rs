@@ -12,6 +12,7 @@ use crate::render::arrival::Arrivals;
 use crate::render::counts::Counts;
 use crate::render::fence::Fence;
 use crate::render::patch::PixelPatches;
+use crate::render::resolve::LightTerm;
 use crate::render::tiled::{BEND, second_difference, within};
 use crate::shape::SurfaceInteraction;
 
@@ -36,7 +37,7 @@ impl<'a> Many<'a> {
         at: [u32; 2],
         arrivals: &mut Arrivals<'a>,
         counts: &mut Counts,
-        mut add: impl FnMut([Rgb; 2]),
+        mut add: impl FnMut((Rgb, LightTerm)),
     ) {
         let scene = self.scene;
         let mut terms = std::mem::take(&mut self.terms);
@@ -58,9 +59,8 @@ impl<'a> Many<'a> {
             for i in stored.singles.clone() {
                 if !in_doubt(Some(i)) {
                     let Single { light, arrival } = self.singles[i as usize];
-                    let scale = arrivals.scale(light as usize) * count;
-                    let diffuse = scale * bsdf.diffuse * arrival.sums.diffuse;
-                    terms.push((light, [diffuse, scale * bsdf.specular * arrival.sums.specular]));
+                    let sums = arrival.sums * count;
+                    terms.push((light, [bsdf.diffuse * sums.diffuse, bsdf.specular * sums.specular]));
                 }
             }
             if !doubts.is_empty() {
@@ -86,9 +86,11 @@ impl<'a> Many<'a> {
         // In scene order
         terms.sort_by_key(|(light, _)| *light);
         for same in terms.chunk_by(|a, b| a.0 == b.0) {
-            add(same.iter().fold([Rgb::BLACK; 2], |sum, (_, term)| [sum[0] + term[0], sum[1] + term[1]]));
+            let term = same.iter().fold([Rgb::BLACK; 2], |sum, (_, term)| [sum[0] + term[0], sum[1] + term[1]]);
+            add((arrivals.scale(same[0].0 as usize), term));
         }
-        add(together);
+        // Of many scales
+        add((Rgb::WHITE, together));
         (self.terms, self.fence) = (terms, fence);
     }
 

@@ -335,7 +335,7 @@ impl<'a> Many<'a> {
                     let place = ArrivalPlace { base: value, ..arrivals.place(light as usize, si, bsdf).over(patch) };
                     let arrival = arrivals.arrival(light as usize, &place, counts);
                     singles.push(Single { light, arrival });
-                    place.colors[0] * arrival.sums.diffuse + place.colors[1] * arrival.sums.specular
+                    place.color(&arrival.sums)
                 },
             );
             let start = self.lit.len() as u32;

@@ -177,7 +177,7 @@ impl Tiled<'_> {
             self.wholes[light] = arrivals.wholes(light, &places);
         }
         let Patch { si, bsdf, .. } = &self.pixels[index].patches[k];
-        let colors = self.arrivals.place(light, si, bsdf).colors;
+        let colors = self.arrivals.place(light, si, bsdf).colors();
         let number = self.seen[index] / self.scene.lights.len() + k;
         let Sums { diffuse, specular } = self.wholes[light][number].sums;
         colors[0] * diffuse + colors[1] * specular

@@ -22,6 +22,8 @@ const FINE: f32 = 0.1;
 const MINGLED: f32 = 0.5;
 /// By how much the normals of three pixels in a row may differ from turning evenly, in radians.
 const EVEN: f32 = 0.02;
+/// The same of what normals make whose mean is not the one it is shaded with.
+const SKEWED: f32 = 1.0;
 /// What light does within a pixel, at most, as a part of its second difference over three: a corner in the middle of
 /// the pixel makes an eighth, the onset of a root nearly a fourth.
 const WITHIN: f32 = 0.2;
@@ -40,9 +42,9 @@ impl Tiled<'_> {
                     self.terms[light][0] += diffuse;
                     self.terms[light][1] += specular;
                 } else if let Some(sums) = self.at_once(&patches, at, k, light, counts) {
-                    let scale = self.arrivals.scale(light) * count;
-                    self.terms[light][0] += scale * patch.bsdf.diffuse * sums.diffuse;
-                    self.terms[light][1] += scale * patch.bsdf.specular * sums.specular;
+                    let sums = sums * count;
+                    self.terms[light][0] += patch.bsdf.diffuse * sums.diffuse;
+                    self.terms[light][1] += patch.bsdf.specular * sums.specular;
                 } else {
                     self.in_quarters(patch, at, k, light, counts);
                 }
@@ -79,6 +81,16 @@ impl Tiled<'_> {
             // Light and dark colours get what arrives in the middle only if that is what arrives everywhere
             let slope = self.slope(patch, at, light, counts)?;
             if self.mingles(light, &patch.contrast, value, &slope) {
+                return None;
+            }
+        }
+        // A crease between facets is no parabola
+        let Patch { skew, bsdf, si, .. } = *patch;
+        if skew > 0.0 {
+            let sharp = (2.0 * bsdf.lobe.sharpness(si.ns.dot(si.wo))).sqrt();
+            let Sums { diffuse, specular } = here.sums;
+            let off = Sums { diffuse: diffuse * skew, specular: specular * skew * sharp };
+            if self.shown(light, &bsdf, value, &off) > SKEWED * allowed {
                 return None;
             }
         }
@@ -205,9 +217,9 @@ impl Tiled<'_> {
             {
                 self.at_rays(quarter, at, light, Outlook::Unknown, share, counts);
             } else {
-                let scale = self.arrivals.scale(light) * quarter.count(scene) as f32;
-                self.terms[light][0] += scale * quarter.bsdf.diffuse * arrival.sums.diffuse;
-                self.terms[light][1] += scale * quarter.bsdf.specular * arrival.sums.specular;
+                let sums = arrival.sums * quarter.count(scene) as f32;
+                self.terms[light][0] += quarter.bsdf.diffuse * sums.diffuse;
+                self.terms[light][1] += quarter.bsdf.specular * sums.specular;
             }
         }
     }

@@ -389,8 +389,8 @@ impl Tiled<'_> {
                     continue;
                 }
             }
-            let scale = self.arrivals.scale(light) * rays;
-            let terms = [scale * patch.bsdf.diffuse * sums.diffuse, scale * patch.bsdf.specular * sums.specular];
+            let all = sums * rays;
+            let terms = [patch.bsdf.diffuse * all.diffuse, patch.bsdf.specular * all.specular];
             self.note(at, light, Outlook::Settled(terms));
         }
         true
