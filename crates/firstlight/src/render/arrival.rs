@@ -1,5 +1,7 @@
 //! How much of one light arrives at one place of a surface, and how much that bends over the patch around it.
 
+mod place;
+
 use std::cell::Cell;
 use std::f32::consts::FRAC_PI_2;
 
@@ -7,103 +9,24 @@ use fearless_simd::Level;
 
 use super::Counts;
 use super::change::{Arrival, Change, change, horizon_change, unseen};
-use super::ladder::{Asker as LadderAsker, Ladder};
-use super::many::FEW;
-use super::patch::Patch;
+use super::ladder::Asker as LadderAsker;
+use super::lights::Lights;
 use super::resolve::LightTerm;
 use super::sampled::Sampled;
 use super::together::Together;
 use crate::color::{DisplaySteps, Rgb};
 use crate::ids::LightId;
 use crate::integrate::{
-    Arrived, Asked, BallSides, Emitter, Evaluator, Illumination, Masked, Obstacles, Receiver, ShadingPoint, Sums,
-    Tolerance, View,
+    Arrived, Asked, BallSides, Emitter, Evaluator, Illumination, Masked, Obstacles, Receiver, ShadingPoint, Sums, View,
 };
-use crate::light::{Area, AreaShape, Light, LightKind, LightTree};
-use crate::material::{Bsdf, Lobe};
+use crate::light::{Area, AreaShape, LightKind, LightTree};
+use crate::material::Bsdf;
 use crate::math::LANES;
 use crate::scene::Scene;
 use crate::shape::SurfaceInteraction;
-use crate::visibility::{Occluders, Settler, Shaft, Target, View as ShadowView, Viewpoint, Visibility};
+use crate::visibility::{Occluders, Settler, Shaft, View as ShadowView, Viewpoint, Visibility};
 
-/// A place of a surface that asks for one light, by itself.
-#[derive(Clone, Copy)]
-pub(crate) struct ArrivalPlace<'a> {
-    pub si: &'a SurfaceInteraction,
-    pub lobe: &'a Lobe,
-    /// How far the patch reaches from its middle, in metres; 0 for a point.
-    pub reach: f32,
-    /// How far the normal turns on the way, in radians.
-    pub turn: f32,
-    /// How far off the patch's middle the place is, as a part of `reach`.
-    pub off: f32,
-    /// The share of the pixel that it stands for: errors of its parts are as good as independent.
-    pub share: f32,
-    /// Whether it is known that nothing is in the way of the light, or nothing in trees.
-    pub lit: bool,
-    pub clear: bool,
-    /// Whether it stands for a patch, of which points of the light are asked at each ray, if at all.
-    pub parted: bool,
-    /// What is there beside this light, at least.
-    pub base: Rgb,
-    /// What the two sums are multiplied with: the light's scale, and the surface's colours.
-    pub scale: Rgb,
-    pub reflected: [Rgb; 2],
-}
-
-impl<'a> ArrivalPlace<'a> {
-    /// One point, by itself; `base` and what follows as in the struct.
-    pub fn point(si: &'a SurfaceInteraction, lobe: &'a Lobe, base: Rgb, scale: Rgb, reflected: [Rgb; 2]) -> Self {
-        ArrivalPlace {
-            si,
-            lobe,
-            reach: 0.0,
-            turn: 0.0,
-            off: 0.0,
-            share: 1.0,
-            lit: false,
-            clear: false,
-            parted: false,
-            base,
-            scale,
-            reflected,
-        }
-    }
-
-    /// What sums of the light send.
-    pub fn color(&self, sums: &Sums) -> Rgb {
-        let [diffuse, specular] = self.colors();
-        diffuse * sums.diffuse + specular * sums.specular
-    }
-
-    /// What the two sums are multiplied with, all in all.
-    pub fn colors(&self) -> [Rgb; 2] {
-        self.reflected.map(|color| self.scale * color)
-    }
-
-    /// The same for all of a patch that is shaded there.
-    pub fn over(self, patch: &Patch) -> Self {
-        ArrivalPlace { reach: patch.reach, turn: patch.turn, off: patch.off, ..self }
-    }
-
-    fn point_of_surface(&self) -> ShadingPoint {
-        let SurfaceInteraction { lit_from, error, horizon, ng, facet, ns, wo, .. } = *self.si;
-        ShadingPoint {
-            p: lit_from,
-            error,
-            horizon,
-            ng,
-            facet,
-            ns,
-            wo,
-            reach: self.reach,
-            turn: self.turn,
-            worth: self.colors(),
-            base: self.base,
-            share: self.share,
-        }
-    }
-}
+pub(crate) use place::ArrivalPlace;
 
 /// What of the trees may be in the way.
 pub(super) enum Trees {
@@ -135,86 +58,12 @@ pub(crate) enum Seen {
     Behind(Option<Sums>),
 }
 
-/// What all tiles share: the lights as they are integrated, and how errors show.
-pub(crate) struct Lights<'a> {
-    /// For each light, if it is integrated.
-    pub emitters: Vec<Option<Emitter>>,
-    /// What the sums of each are multiplied with, before the colours of the surface.
-    scales: Vec<Rgb>,
-    pub steps: DisplaySteps,
-    /// Where there are many.
-    tree: Option<LightTree>,
-    /// The lights as shafts lead to them.
-    targets: Vec<Target>,
-    /// The points of those that are integrated.
-    ladders: Vec<Ladder>,
-    /// What may stand in the way of those that are integrated.
-    obstacles: Vec<Obstacles<'a>>,
-    /// In display steps: how far one light may be wrong at a point that stands for a pixel; and the value that many
-    /// steps above black.
-    allowed: f32,
-    least: f32,
-}
-
 /// Parts of a pixel smaller than this are judged as if they were as large.
 const LEAST_SHARE: f32 = 1.0 / 8.0;
 /// How many times what is allowed may be wrong where each place is wrong by itself, as by chance: nothing of that shows
 /// as a step or an edge.
 const BY_CHANCE: f32 = 4.0 / 3.0;
 const LEAST_SHARE_BY_CHANCE: f32 = 1.0 / 16.0;
-
-impl<'a> Lights<'a> {
-    pub fn new(scene: &'a Scene) -> Lights<'a> {
-        let emitter = |light: &Light| match &light.kind {
-            LightKind::Area(area) if light.exact => Some(Emitter::new(area)),
-            _ => None,
-        };
-        let emitters: Vec<_> = scene.lights.iter().map(emitter).collect();
-        let scale = |(light, emitter): (&Light, &Option<Emitter>)| match emitter {
-            Some(_) => light.intensity,
-            None => light.scale,
-        };
-        let scales = scene.lights.iter().zip(&emitters).map(scale).collect();
-        let targets = Target::of_all(scene);
-        let ladders = emitters.iter().map(|_| Ladder::default()).collect();
-        let tree = (scene.lights.len() > FEW).then(|| LightTree::new(&scene.lights));
-        let obstacles = (0..scene.lights.len())
-            .map(|index| match &emitters[index] {
-                Some(emitter) => Obstacles::new(scene, index, emitter),
-                None => Obstacles::default(),
-            })
-            .collect();
-        let steps = DisplaySteps::new(&scene.display, scene.tolerance);
-        let allowed = Tolerance::DEFAULT.point / (scene.lights.len().max(1) as f32).sqrt();
-        let least = steps.value_of(allowed);
-        Lights { emitters, scales, steps, tree, targets, ladders, obstacles, allowed, least }
-    }
-
-    /// Whether all of these placed things are told row by row where they are in the way of light `index`.
-    fn know(&self, index: usize, placed: &[u32]) -> bool {
-        placed.iter().all(|thing| self.obstacles[index].has_placed(*thing))
-    }
-
-    /// Light `index` as batches ask for it, with one highlight, with or without what stands in its way; `None` if it is
-    /// not integrated.
-    pub fn asked<'b>(&'b self, index: usize, lobe: &'b Lobe, shadows: bool) -> Option<Asked<'b>> {
-        self.emitters[index].as_ref().map(|emitter| self.asked_of(index, emitter, lobe, shadows))
-    }
-
-    fn asked_of<'b>(&'b self, index: usize, emitter: &'b Emitter, lobe: &'b Lobe, shadows: bool) -> Asked<'b> {
-        Asked {
-            emitter,
-            obstacles: &self.obstacles[index],
-            near: None,
-            lobe,
-            steps: &self.steps,
-            tolerance: &Tolerance::DEFAULT,
-            allowed: self.allowed,
-            least: self.least,
-            shadows,
-        }
-    }
-}
 
 /// The lights, as one thread asks for them.
 pub(crate) struct Arrivals<'a> {

@@ -1,0 +1,86 @@
+//! Where light is asked for.
+
+use crate::color::Rgb;
+use crate::integrate::{ShadingPoint, Sums};
+use crate::material::Lobe;
+use crate::render::patch::Patch;
+use crate::shape::SurfaceInteraction;
+
+/// A place of a surface that asks for one light, by itself.
+#[derive(Clone, Copy)]
+pub(crate) struct ArrivalPlace<'a> {
+    pub si: &'a SurfaceInteraction,
+    pub lobe: &'a Lobe,
+    /// How far the patch reaches from its middle, in metres; 0 for a point.
+    pub reach: f32,
+    /// How far the normal turns on the way, in radians.
+    pub turn: f32,
+    /// How far off the patch's middle the place is, as a part of `reach`.
+    pub off: f32,
+    /// The share of the pixel that it stands for: errors of its parts are as good as independent.
+    pub share: f32,
+    /// Whether it is known that nothing is in the way of the light, or nothing in trees.
+    pub lit: bool,
+    pub clear: bool,
+    /// Whether it stands for a patch, of which points of the light are asked at each ray, if at all.
+    pub parted: bool,
+    /// What is there beside this light, at least.
+    pub base: Rgb,
+    /// What the two sums are multiplied with: the light's scale, and the surface's colours.
+    pub scale: Rgb,
+    pub reflected: [Rgb; 2],
+}
+
+impl<'a> ArrivalPlace<'a> {
+    /// One point, by itself; `base` and what follows as in the struct.
+    pub fn point(si: &'a SurfaceInteraction, lobe: &'a Lobe, base: Rgb, scale: Rgb, reflected: [Rgb; 2]) -> Self {
+        ArrivalPlace {
+            si,
+            lobe,
+            reach: 0.0,
+            turn: 0.0,
+            off: 0.0,
+            share: 1.0,
+            lit: false,
+            clear: false,
+            parted: false,
+            base,
+            scale,
+            reflected,
+        }
+    }
+
+    /// What sums of the light send.
+    pub fn color(&self, sums: &Sums) -> Rgb {
+        let [diffuse, specular] = self.colors();
+        diffuse * sums.diffuse + specular * sums.specular
+    }
+
+    /// What the two sums are multiplied with, all in all.
+    pub fn colors(&self) -> [Rgb; 2] {
+        self.reflected.map(|color| self.scale * color)
+    }
+
+    /// The same for all of a patch that is shaded there.
+    pub fn over(self, patch: &Patch) -> Self {
+        ArrivalPlace { reach: patch.reach, turn: patch.turn, off: patch.off, ..self }
+    }
+
+    pub(super) fn point_of_surface(&self) -> ShadingPoint {
+        let SurfaceInteraction { lit_from, error, horizon, ng, facet, ns, wo, .. } = *self.si;
+        ShadingPoint {
+            p: lit_from,
+            error,
+            horizon,
+            ng,
+            facet,
+            ns,
+            wo,
+            reach: self.reach,
+            turn: self.turn,
+            worth: self.colors(),
+            base: self.base,
+            share: self.share,
+        }
+    }
+}

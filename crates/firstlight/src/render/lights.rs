@@ -1,0 +1,84 @@
+//! The lights of a scene as they are asked: what all threads share.
+
+use super::ladder::Ladder;
+use super::many::FEW;
+use crate::color::{DisplaySteps, Rgb};
+use crate::integrate::{Asked, Emitter, Obstacles, Tolerance};
+use crate::light::{Light, LightKind, LightTree};
+use crate::material::Lobe;
+use crate::scene::Scene;
+use crate::visibility::Target;
+
+/// What all tiles share: the lights as they are integrated, and how errors show.
+pub(crate) struct Lights<'a> {
+    /// For each light, if it is integrated.
+    pub emitters: Vec<Option<Emitter>>,
+    /// What the sums of each are multiplied with, before the colours of the surface.
+    pub scales: Vec<Rgb>,
+    pub steps: DisplaySteps,
+    /// Where there are many.
+    pub tree: Option<LightTree>,
+    /// The lights as shafts lead to them.
+    pub targets: Vec<Target>,
+    /// The points of those that are integrated.
+    pub ladders: Vec<Ladder>,
+    /// What may stand in the way of those that are integrated.
+    pub obstacles: Vec<Obstacles<'a>>,
+    /// In display steps: how far one light may be wrong at a point that stands for a pixel; and the value that many
+    /// steps above black.
+    pub allowed: f32,
+    pub least: f32,
+}
+
+impl<'a> Lights<'a> {
+    pub fn new(scene: &'a Scene) -> Lights<'a> {
+        let emitter = |light: &Light| match &light.kind {
+            LightKind::Area(area) if light.exact => Some(Emitter::new(area)),
+            _ => None,
+        };
+        let emitters: Vec<_> = scene.lights.iter().map(emitter).collect();
+        let scale = |(light, emitter): (&Light, &Option<Emitter>)| match emitter {
+            Some(_) => light.intensity,
+            None => light.scale,
+        };
+        let scales = scene.lights.iter().zip(&emitters).map(scale).collect();
+        let targets = Target::of_all(scene);
+        let ladders = emitters.iter().map(|_| Ladder::default()).collect();
+        let tree = (scene.lights.len() > FEW).then(|| LightTree::new(&scene.lights));
+        let obstacles = (0..scene.lights.len())
+            .map(|index| match &emitters[index] {
+                Some(emitter) => Obstacles::new(scene, index, emitter),
+                None => Obstacles::default(),
+            })
+            .collect();
+        let steps = DisplaySteps::new(&scene.display, scene.tolerance);
+        let allowed = Tolerance::DEFAULT.point / (scene.lights.len().max(1) as f32).sqrt();
+        let least = steps.value_of(allowed);
+        Lights { emitters, scales, steps, tree, targets, ladders, obstacles, allowed, least }
+    }
+
+    /// Whether all of these placed things are told row by row where they are in the way of light `index`.
+    pub fn know(&self, index: usize, placed: &[u32]) -> bool {
+        placed.iter().all(|thing| self.obstacles[index].has_placed(*thing))
+    }
+
+    /// Light `index` as batches ask for it, with one highlight, with or without what stands in its way; `None` if it is
+    /// not integrated.
+    pub fn asked<'b>(&'b self, index: usize, lobe: &'b Lobe, shadows: bool) -> Option<Asked<'b>> {
+        self.emitters[index].as_ref().map(|emitter| self.asked_of(index, emitter, lobe, shadows))
+    }
+
+    pub fn asked_of<'b>(&'b self, index: usize, emitter: &'b Emitter, lobe: &'b Lobe, shadows: bool) -> Asked<'b> {
+        Asked {
+            emitter,
+            obstacles: &self.obstacles[index],
+            near: None,
+            lobe,
+            steps: &self.steps,
+            tolerance: &Tolerance::DEFAULT,
+            allowed: self.allowed,
+            least: self.least,
+            shadows,
+        }
+    }
+}
