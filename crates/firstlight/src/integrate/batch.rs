@@ -7,6 +7,7 @@ use fearless_simd::{f32x16, prelude::*};
 
 use super::view::View;
 use crate::color::Rgb;
+use crate::material::Colors;
 use crate::math::{ErrorBound, Facet, LANES, Vec3, Vec3x16};
 
 /// Sixteen numbers, one of each member of a batch.
@@ -32,7 +33,7 @@ pub(crate) struct ShadingPoint {
     pub reach: f32,
     pub turn: f32,
     /// What one unit of each moment is worth: linear colours, the light's scale included.
-    pub worth: [Rgb; 2],
+    pub worth: Colors,
     /// What is there beside this light, at least.
     pub base: Rgb,
     /// The share of a pixel that it stands for.
@@ -53,7 +54,7 @@ impl ShadingPoint {
             wo,
             reach: 0.0,
             turn: 0.0,
-            worth: [Rgb::BLACK; 2],
+            worth: Colors::BLACK,
             base: Rgb::BLACK,
             share: 1.0,
         }

@@ -8,6 +8,7 @@
 //! rays for that.
 
 use super::Sums;
+use crate::material::{MOMENTS, Moments};
 use crate::math::{LANES, Vec3};
 
 /// Cells along a side to begin with; as many as there may be all over the light, so that nothing small is overlooked;
@@ -38,7 +39,7 @@ pub(super) struct Sent {
     /// The way to it.
     pub way: Vec3,
     /// For each part of the light's measure: diffuse and specular.
-    pub sums: [f32; 2],
+    pub sums: [f32; MOMENTS],
 }
 
 /// A light whose points are those of the unit square, equal areas for equal areas.
@@ -98,9 +99,9 @@ struct Cell {
     at: [u32; 2],
     state: State,
     /// What its middle sends, each for all of the light's measure.
-    sums: [f32; 2],
+    sums: [f32; MOMENTS],
     /// How far that is from the mean over it.
-    rough: [f32; 2],
+    rough: [f32; MOMENTS],
     /// The way to its middle; zero where nothing is sent.
     way: Vec3,
 }
@@ -108,9 +109,9 @@ struct Cell {
 impl Cell {
     /// How rough cells are whose four middles send this together, where the middle of all four sends `middle`: it is
     /// off by four times as much as they are.
-    fn roughness(four: &[Cell], middle: [f32; 2]) -> [f32; 2] {
+    fn roughness(four: &[Cell], middle: [f32; MOMENTS]) -> [f32; MOMENTS] {
         let mean = |k: usize| four.iter().map(|cell| cell.sums[k]).sum::<f32>() * 0.25;
-        [0, 1].map(|k| (mean(k) - middle[k]).abs() * (1.0 / 3.0))
+        std::array::from_fn(|k| (mean(k) - middle[k]).abs() * (1.0 / 3.0))
     }
 }
 
@@ -152,10 +153,10 @@ impl Grid {
 /// Sums over cells, in parts of the light's measure.
 #[derive(Clone, Copy, Default)]
 struct Totals {
-    all: [f64; 2],
-    lit: [f64; 2],
+    all: [f64; MOMENTS],
+    lit: [f64; MOMENTS],
     /// How far they may be off because cells are rough: what is lit of them, what is hidden.
-    rough: [[f64; 2]; 2],
+    rough: [[f64; MOMENTS]; 2],
 }
 
 impl Totals {
@@ -198,7 +199,8 @@ fn ask(source: &impl Source, side: usize, places: &[[u32; 2]], cells: &mut Vec<C
         for (lane, at) in places.iter().enumerate() {
             let point = [0, 1].map(|k| (at[k] as f32 + chance(*at, side, k as u32)) * width);
             let middle = at.map(|w| (w as f32 + 0.5) * width);
-            let mut cell = Cell { at: *at, state: State::Dark, sums: [0.0; 2], rough: [0.0; 2], way: Vec3::ZERO };
+            let mut cell =
+                Cell { at: *at, state: State::Dark, sums: [0.0; MOMENTS], rough: [0.0; MOMENTS], way: Vec3::ZERO };
             if let Some(sent) = source.sent(point) {
                 (points[lane], ways[lane]) = (point, sent.way);
                 active |= 1 << lane;
@@ -233,7 +235,7 @@ pub(super) fn integrate(
     loop {
         let area = 1.0 / (grid.side * grid.side) as f64;
         let mut totals = settled;
-        let mut doubt = [0.0f64; 2];
+        let mut doubt = [0.0f64; MOMENTS];
         let mut doubtful = vec![false; cells.len()];
         for (cell, doubtful) in cells.iter().zip(&mut doubtful) {
             totals.add(cell, area);
@@ -247,19 +249,14 @@ pub(super) fn integrate(
         // A cell that an edge runs through at random is wrong by a root of a sixth, and about half of these have one
         let edges = doubt.map(|doubt| SURE * (doubt * (1.0 / 12.0)).sqrt());
         let [lit, hidden] = totals.rough;
-        let rough = [0, 1].map(|k| {
+        let rough = std::array::from_fn(|k| {
             let share = totals.share(k, totals.lit[k]);
             // Where the whole is known, only the share is in doubt: what is lit of it against what is not
             if whole.is_some() { lit[k] * (1.0 - share) + hidden[k] * share } else { lit[k] }
         });
-        let whole = whole.copied().unwrap_or_else(|| {
-            let [diffuse, specular] = totals.all.map(|sum| sum as f32);
-            Sums { diffuse, specular }
-        });
-        let part = |part: [f64; 2]| Sums {
-            diffuse: whole.diffuse * totals.share(0, part[0]) as f32,
-            specular: whole.specular * totals.share(1, part[1]) as f32,
-        };
+        let whole = whole.copied().unwrap_or_else(|| Moments(totals.all.map(|sum| sum as f32)));
+        let part =
+            |part: [f64; MOMENTS]| Moments(std::array::from_fn(|k| whole.0[k] * totals.share(k, part[k]) as f32));
         let (sums, by_edges, by_roughness) = (part(totals.lit), part(edges), part(rough));
         let error = by_edges + by_roughness;
         // What stands in one more cell, and was not met by its point
@@ -278,8 +275,8 @@ pub(super) fn integrate(
             } else if !enough(&sums, &(by_roughness + by_roughness)) {
                 // Those that are not much smoother than the mean
                 let roughness = |cell: &Cell| {
-                    let [diffuse, specular] = cell.rough.map(f64::from);
-                    if cell.state == State::Dark { 0.0 } else { totals.share(0, diffuse) + totals.share(1, specular) }
+                    let shares = cell.rough.iter().enumerate().map(|(k, rough)| totals.share(k, f64::from(*rough)));
+                    if cell.state == State::Dark { 0.0 } else { shares.sum() }
                 };
                 let mean = cells.iter().map(roughness).sum::<f64>() / cells.len() as f64;
                 for (cell, doubtful) in cells.iter().zip(&mut doubtful) {
@@ -288,10 +285,9 @@ pub(super) fn integrate(
             }
             // One that sends far more than others is looked at more closely
             for (cell, doubtful) in cells.iter().zip(&mut doubtful) {
-                let [diffuse, specular] = cell.sums.map(f64::from);
-                let is_heavy = totals.share(0, diffuse).max(totals.share(1, specular)) > HEAVY;
+                let is_heavy = (0..MOMENTS).any(|k| totals.share(k, f64::from(cell.sums[k])) > HEAVY);
                 if is_heavy && cell.state != State::Dark && !*doubtful {
-                    *doubtful = !enough(&sums, &part([diffuse * area, specular * area]));
+                    *doubtful = !enough(&sums, &part(cell.sums.map(|sum| f64::from(sum) * area)));
                 }
             }
             if let Some(highlight) = &highlight {
@@ -314,7 +310,7 @@ fn all(source: &impl Source, side: u32) -> Vec<Cell> {
     let mut cells = Vec::with_capacity(places.len());
     ask(source, side as usize, &places, &mut cells);
     for (four, at) in cells.chunks_exact_mut(4).zip(squares) {
-        let middle = source.sent(at.map(|w| (w as f32 + 0.5) / half as f32)).map_or([0.0; 2], |sent| sent.sums);
+        let middle = source.sent(at.map(|w| (w as f32 + 0.5) / half as f32)).map_or([0.0; MOMENTS], |sent| sent.sums);
         let rough = Cell::roughness(four, middle);
         four.iter_mut().for_each(|cell| cell.rough = rough);
     }
@@ -396,13 +392,13 @@ mod tests {
 
     #[track_caller]
     fn check(shape: impl Fn(f32, f32) -> bool, truth: f64, wanted: f32) {
-        let whole = Sums { diffuse: 1.0, specular: 1.0 };
+        let whole = Sums::bounds(1.0, 1.0);
         for whole in [None, Some(&whole)] {
-            let (sums, error) = integrate(&Through(&shape), whole, &|_, error| error.diffuse <= wanted);
-            let off = f64::from(sums.diffuse) - truth;
-            assert!(error.diffuse <= wanted, "an error of {} remains", error.diffuse);
+            let (sums, error) = integrate(&Through(&shape), whole, &|_, error| error.cosine() <= wanted);
+            let off = f64::from(sums.cosine()) - truth;
+            assert!(error.cosine() <= wanted, "an error of {} remains", error.cosine());
             // Three standard deviations
-            assert!(off.abs() <= f64::from(wanted), "{} is off by {off:e}", sums.diffuse);
+            assert!(off.abs() <= f64::from(wanted), "{} is off by {off:e}", sums.cosine());
         }
     }
 

@@ -29,7 +29,7 @@ use super::panels::{Between, Blocked, Panel, PanelSums, cut, rows};
 use super::tolerance::{Tolerance, Weight};
 use super::view::{Outline, Receiver, View};
 use crate::color::DisplaySteps;
-use crate::material::Lobe;
+use crate::material::{Lobe, Moments};
 use crate::math::{LANES, dispatch_wide, square};
 
 /// How much of a light shines on a point.
@@ -129,9 +129,9 @@ pub(crate) struct Evaluator {
 /// What is known of one point.
 #[derive(Clone, Copy, Debug, Default)]
 struct State {
-    accepted: [f32; MOMENTS],
+    accepted: Sums,
     /// With all that is not accepted yet.
-    estimate: [f32; MOMENTS],
+    estimate: Sums,
     weight: Weight,
     /// The round that the last two are of.
     round: u32,
@@ -174,8 +174,7 @@ impl Evaluator {
             self.judge(light, points, new, round);
         }
         for (arrived, state) in arrived.iter_mut().zip(&self.state) {
-            let [diffuse, specular] = state.accepted;
-            arrived.sums = Sums { diffuse: diffuse.max(0.0), specular: specular.max(0.0) };
+            arrived.sums = state.accepted.at_least_0();
         }
     }
 
@@ -268,7 +267,7 @@ impl Evaluator {
         let cuts = cuts | light.near.map_or(0, |near| near.cuts << occluders.len());
         let ball = ball.map(|(center, radius)| (center, radius, light.emitter.shows_far_half()));
         let blocked = Blocked { occluders: [occluders, near], ball, cuts, outline, between };
-        let moments = if matches!(light.lobe, Lobe::None) { 1 } else { MOMENTS };
+        let moments = light.lobe.moment_count();
         self.smooth_fits.clear();
         self.fits.clear();
         self.cut_fits.clear();
@@ -342,7 +341,7 @@ impl Evaluator {
             if state.round == round {
                 state.round += WEIGHED;
                 let ShadingPoint { worth, base, share, .. } = &points[point as usize];
-                let value = *base + worth[0] * state.estimate[0] + worth[1] * state.estimate[1];
+                let value = worth.onto(*base, &state.estimate);
                 let allowed = light.allowed / share.max(tolerance.least_share).sqrt();
                 state.weight = Weight::new(light.steps, value, worth, allowed, light.least);
             }
@@ -398,7 +397,7 @@ impl Evaluator {
             // The finer rule is better than the difference says, the more the closer both are
             let error = std::array::from_fn(|moment| {
                 let (difference, value) = (differences[moment], value[moment].abs());
-                let rounding = tolerance.rounding * state.estimate[moment].abs();
+                let rounding = tolerance.rounding * state.estimate.0[moment].abs();
                 if difference <= rounding { 0.0 } else { difference * (2.0 * (difference / value).sqrt()).min(1.0) }
             });
             let middle = 0.5 * (panel.y[0] + panel.y[1]);
@@ -457,13 +456,11 @@ impl State {
         if self.round != round {
             (self.round, self.estimate) = (round, self.accepted);
         }
-        self.estimate[0] += sums[0];
-        self.estimate[1] += sums[1];
+        self.estimate += Moments(sums);
     }
 
     fn accept(&mut self, sums: [f32; MOMENTS]) {
-        self.accepted[0] += sums[0];
-        self.accepted[1] += sums[1];
+        self.accepted += Moments(sums);
     }
 
     /// What one part of the light may use up: where there are many, their errors add up.

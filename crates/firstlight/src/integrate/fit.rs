@@ -14,7 +14,7 @@ use crate::material::Lobe;
 use crate::math::{LANES, sin_cos};
 
 /// Moments of a light: the cosine, and the highlight.
-pub(crate) const MOMENTS: usize = 2;
+pub(crate) use crate::material::MOMENTS;
 /// Nodes along an axis.
 const NODES: usize = 5;
 /// A polynomial along both axes: [power of x][power of y].
@@ -177,7 +177,6 @@ fn values<S: Simd, const N: usize>(
     let out = members.linear(simd, [OutC, OutX, OutY]);
     let zero = splat(0.0);
     let height2 = height * height;
-    let has_lobe = !matches!(lobe, Lobe::None);
     let mut values = [[[zero; N]; N]; MOMENTS];
     let is_sphere = matches!(falloff, Falloff::Sphere | Falloff::SphereInside);
     let (ratio, behind2) = (members.lanes(simd, Ratio), members.lanes(simd, Behind2));
@@ -218,14 +217,8 @@ fn values<S: Simd, const N: usize>(
             cos_i[i] = (x * cos.x + cos_row) * inverse;
             cos_io[i] = (x * out.x + out_row) * inverse;
         }
-        for i in 0..N {
-            values[0][j][i] = cos_i[i] * weights[i];
-        }
-        if has_lobe {
-            let lobes = lobe.eval_lanes(cos_i, cos_o, cos_io);
-            for i in 0..N {
-                values[1][j][i] = lobes[i] * weights[i];
-            }
+        for (values, moment) in values.iter_mut().zip(lobe.moments_lanes(cos_i, cos_o, cos_io, weights)) {
+            values[j] = moment;
         }
     }
     (values, xh * yh * members.lanes(simd, Measure))
@@ -266,7 +259,7 @@ fn sum<S: Simd, const N: usize>(
 pub(crate) fn coarse<S: Simd>(simd: S, lobe: &Lobe, falloff: Falloff, members: &Members, cells: &[Cell]) -> Fits {
     let (values, area) = values(simd, &COARSE, lobe, falloff, members, cells);
     let mut fits = Fits::default();
-    let moments = if matches!(lobe, Lobe::None) { 1 } else { MOMENTS };
+    let moments = lobe.moment_count();
     for (moment, values) in values.iter().enumerate().take(moments) {
         let (sum, tails) = sum(simd, &COARSE, values);
         fits.sums[moment] = (sum * area).to_array();
@@ -293,7 +286,7 @@ pub(crate) fn fit<S: Simd>(
     let (values, area) = values(simd, &FINE, lobe, falloff, members, cells);
     let zero = simd.splat_f32x16(0.0);
     let mut fits = Fits::default();
-    let moments = if matches!(lobe, Lobe::None) { 1 } else { MOMENTS };
+    let moments = lobe.moment_count();
     for (moment, values) in values.iter().enumerate().take(moments) {
         let (sum, tails) = sum(simd, &FINE, values);
         fits.sums[moment] = (sum * area).to_array();

@@ -93,7 +93,7 @@ impl Seen<'_> {
         let inverse = 1.0 / l.length();
         let weight = part * if view.physical { view.height * inverse * (inverse * inverse) } else { 1.0 };
         let cos_i = cos * inverse;
-        let lobe = self.masked.lobe.eval(cos_i, view.cos_o, view.wo.dot(l) * inverse);
+        let moments = self.masked.lobe.moments(cos_i, view.cos_o, view.wo.dot(l) * inverse, weight);
         let way = match self.ball {
             None => l,
             // On to the ball's surface
@@ -102,7 +102,7 @@ impl Seen<'_> {
                 l * ((b - (b * b - a * cc).max(0.0).sqrt()) / a)
             }
         };
-        Some(Sent { way, sums: [weight * cos_i, weight * lobe] })
+        Some(Sent { way, sums: moments.0 })
     }
 
     /// From the unit square, and for how much of the light a place stands.

@@ -21,8 +21,6 @@ mod points;
 mod tolerance;
 mod view;
 
-use std::ops::{Add, Mul};
-
 pub(crate) use batch::ShadingPoint;
 pub(crate) use classify::Obstacles;
 pub(crate) use emitter::{BallSides, Emitter};
@@ -31,30 +29,7 @@ pub(crate) use mask::Masked;
 pub(crate) use tolerance::Tolerance;
 pub(crate) use view::{Receiver, View};
 
-/// What arrives from one light, before all colours: the weight times the cosine, and the weight times the highlight.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(crate) struct Sums {
-    pub diffuse: f32,
-    pub specular: f32,
-}
-
-impl Add for Sums {
-    type Output = Sums;
-
-    #[inline(always)]
-    fn add(self, other: Sums) -> Sums {
-        Sums { diffuse: self.diffuse + other.diffuse, specular: self.specular + other.specular }
-    }
-}
-
-impl Mul<f32> for Sums {
-    type Output = Sums;
-
-    #[inline(always)]
-    fn mul(self, times: f32) -> Sums {
-        Sums { diffuse: self.diffuse * times, specular: self.specular * times }
-    }
-}
+pub(crate) use crate::material::Moments as Sums;
 
 #[cfg(test)]
 mod tests;

@@ -57,8 +57,8 @@ impl<F: Fn([f32; 2]) -> Option<Way>> Source for Ways<'_, F> {
             return None;
         }
         let cos_i = height * inverse;
-        let lobe = self.masked.lobe.eval(cos_i, si.ns.dot(si.wo), si.wo.dot(way) * inverse);
-        Some(Sent { way, sums: [weight * cos_i, weight * lobe] })
+        let moments = self.masked.lobe.moments(cos_i, si.ns.dot(si.wo), si.wo.dot(way) * inverse, weight);
+        Some(Sent { way, sums: moments.0 })
     }
 
     fn highlight(&self) -> Option<Highlight> {

@@ -5,7 +5,7 @@ use fearless_simd::Level;
 use super::view::{FlatLight, Outline};
 use super::*;
 use crate::color::{Display, DisplaySteps, Rgb};
-use crate::material::{BlinnPhongLobe, Lobe, PhongLobe};
+use crate::material::{BlinnPhongLobe, Colors, Lobe, PhongLobe};
 use crate::math::{DVec3, ErrorBound, Vec3};
 use crate::shape::{Parallelogram, Sphere, SphereUv};
 
@@ -146,14 +146,14 @@ fn brute(case: &Case, n: usize) -> Sums {
             specular += weight * f64::from(at.lobe.eval(cos_i, at.ns.dot(at.wo), at.wo.dot(l) / distance));
         }
     }
-    Sums { diffuse: diffuse as f32, specular: specular as f32 }
+    Sums::bounds(diffuse as f32, specular as f32)
 }
 
 /// What batches say: the same for whoever shares one, and with every instruction set.
 fn batched(case: &Case, steps: &DisplaySteps) -> Sums {
     let tolerance = Tolerance::DEFAULT;
     let Receiver { p, error, ns, wo, .. } = case.receiver;
-    let worth = [Rgb::gray(0.5), Rgb::gray(0.5)];
+    let worth = Colors::default().map(|_| Rgb::gray(0.5));
     let point = ShadingPoint { worth, ..ShadingPoint::new(p, error, ns, wo) };
     let emitter = Emitter::Flat(case.light);
     let asked = Asked {
@@ -182,9 +182,8 @@ fn batched(case: &Case, steps: &DisplaySteps) -> Sums {
 
 /// In display steps, beside what the sum of both is worth.
 fn off(steps: &DisplaySteps, found: &Sums, truth: &Sums) -> f32 {
-    let value = Rgb::gray(0.5 * (truth.diffuse + truth.specular));
-    let error = 0.5 * ((found.diffuse - truth.diffuse).abs() + (found.specular - truth.specular).abs());
-    steps.of_color(value, Rgb::gray(error))
+    let half = Colors::default().map(|_| Rgb::gray(0.5));
+    steps.of_color(half.of(truth), half.of(&found.apart(*truth)))
 }
 
 /// `allowed` is in display steps, with the error of `n` x `n` points.
@@ -267,7 +266,7 @@ impl BallCase {
                 spheres.push(Sphere { c, r, uv: SphereUv::Angles, single_sided: false });
             }
         }
-        let worth = [Rgb::gray(0.5), Rgb::gray(0.5)];
+        let worth = Colors::default().map(|_| Rgb::gray(0.5));
         let point = ShadingPoint { worth, ..ShadingPoint::new(Vec3::ZERO, ErrorBound(Vec3::ZERO), ns, wo) };
         BallCase { center, radius, physical, both_sides, point, lobe, spheres }
     }
@@ -295,7 +294,7 @@ impl BallCase {
             diffuse += weight * f64::from(cos_i);
             specular += weight * f64::from(self.lobe.eval(cos_i, cos_o, cos_io));
         }
-        Sums { diffuse: diffuse as f32, specular: specular as f32 }
+        Sums::bounds(diffuse as f32, specular as f32)
     }
 
     fn batched(&self, steps: &DisplaySteps) -> Sums {

@@ -1,6 +1,7 @@
 //! How wrong a picture may be, and every number that decides it.
 
 use crate::color::{DisplaySteps, Rgb};
+use crate::material::{Colors, MOMENTS};
 
 /// What decides whether an estimate is good enough. Errors are in display steps unless a comment says otherwise; those
 /// of the default tolerance of 1 are listed, others scale with it.
@@ -68,19 +69,20 @@ impl Tolerance {
 
 /// What a unit of each moment's error uses up of what is allowed, at one point.
 #[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct Weight(pub [f32; 2]);
+pub(crate) struct Weight(pub [f32; MOMENTS]);
 
 impl Weight {
     /// Where light of `worth` times moments is added to what makes `value` together, and may be off by `allowed` steps.
     /// `least`: see [`DisplaySteps::slope`].
-    pub fn new(steps: &DisplaySteps, value: Rgb, worth: &[Rgb; 2], allowed: f32, least: f32) -> Weight {
+    pub fn new(steps: &DisplaySteps, value: Rgb, worth: &Colors, allowed: f32, least: f32) -> Weight {
         let used = [value.r, value.g, value.b].map(|value| steps.slope(value, least) / allowed);
-        Weight(worth.map(|worth| (worth.r * used[0]).max(worth.g * used[1]).max(worth.b * used[2])))
+        Weight(worth.0.map(|worth| (worth.r * used[0]).max(worth.g * used[1]).max(worth.b * used[2])))
     }
 
     /// The share of what is allowed that errors use up.
     #[inline(always)]
-    pub fn of(self, errors: [f32; 2]) -> f32 {
-        self.0[0] * errors[0] + self.0[1] * errors[1]
+    pub fn of(self, errors: [f32; MOMENTS]) -> f32 {
+        let used: [f32; MOMENTS] = std::array::from_fn(|k| self.0[k] * errors[k]);
+        used[1..].iter().fold(used[0], |sum, used| sum + used)
     }
 }

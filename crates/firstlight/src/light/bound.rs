@@ -3,8 +3,9 @@
 //! Everything here is in the unit of integrated light: what is multiplied with
 //! [`Light::intensity`](super::Light::intensity).
 
-use super::zone::{Highlight, Zone};
+use super::zone::Zone;
 use super::{AreaShape, Light, LightKind};
+use crate::material::Highlight;
 use crate::math::{Arc, DVec3, Vec3, square};
 
 /// How light leaves a source.

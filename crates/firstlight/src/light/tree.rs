@@ -13,7 +13,7 @@
 use super::bound::{MOST, Sends, Shine, Sight};
 use super::{AreaShape, Light, LightKind};
 use crate::color::Rgb;
-use crate::material::Lobe;
+use crate::material::{Colors, Lobe, Moments};
 use crate::math::{DVec3, Vec3};
 
 /// All lights of a scene, in a tree for each way of sending light.
@@ -63,7 +63,7 @@ pub(crate) enum Held {
 }
 
 /// What arrives of a node, in colour, before the colours of the surface: diffuse and specular.
-pub(crate) type Sent = [Rgb; 2];
+pub(crate) type Sent = Colors;
 
 /// No second derivative of 1 / d^2 is above this over d^4, nor one of cos' / d^2.
 const CURVE: f32 = 6.0;
@@ -288,14 +288,13 @@ impl LightNode {
     /// What its lights send at most, as `sight` says, whatever stands in the way.
     pub fn most(&self, sight: &Sight) -> Sent {
         let cut = |color: Rgb| Rgb::new(color.r.min(MOST), color.g.min(MOST), color.b.min(MOST));
-        [cut(self.power * sight.diffuse), cut(self.power * (sight.weight * sight.highlight.most))]
+        Moments::bounds(sight.diffuse, sight.weight * sight.highlight.most).colors(|most| cut(self.power * most))
     }
 
     /// How far what [`send`](Self::send) says can be from what its lights send, where a zone sees all of them whole.
     pub fn error(&self, sight: &Sight) -> Sent {
-        let most = self.most(sight);
         if self.spread.is_black() {
-            return [Rgb::BLACK; 2];
+            return Sent::BLACK;
         }
         let one = 1.0 / sight.near;
         let two = one * one;
@@ -307,13 +306,12 @@ impl LightNode {
             let crossed = [3.0, 3.0 * glint.most + glint.slope].map(|c| c * two * one);
             (TWIST / 6.0 * two * two * one, 0.5 * curve * two * two, crossed)
         };
-        let of = |spread: Rgb, factor: f32, crossed: f32, most: Rgb| {
-            let error = spread * factor + self.cross * crossed;
-            // No number is no bound
-            let least = |error: f32, most: f32| if error < most { error } else { most };
-            Rgb::new(least(error.r, most.r), least(error.g, most.g), least(error.b, most.b))
-        };
-        [of(self.cubes, diffuse, crossed[0], most[0]), of(self.spread, specular, crossed[1], most[1])]
+        let of = |spread: Rgb, factor: f32, crossed: f32| spread * factor + self.cross * crossed;
+        // No number is no bound
+        let least = |error: f32, most: f32| if error < most { error } else { most };
+        let least = |e: Rgb, m: Rgb| Rgb::new(least(e.r, m.r), least(e.g, m.g), least(e.b, m.b));
+        Sent::bounds(of(self.cubes, diffuse, crossed[0]), of(self.spread, specular, crossed[1]))
+            .zip(self.most(sight), least)
     }
 
     /// What its lights, taken for one, send to a place that sees all of them whole.
@@ -321,16 +319,14 @@ impl LightNode {
     pub fn send(&self, p: Vec3, ns: Vec3, wo: Vec3, lobe: &Lobe) -> Sent {
         let one = |channel: usize| self.send_channel(channel, p, ns, wo, lobe);
         if self.gray {
-            let [diffuse, specular] = one(0);
-            return [self.power * diffuse, self.power * specular];
+            return one(0).colors(|sent| self.power * sent);
         }
         let [r, g, b] = [one(0), one(1), one(2)];
-        let color = |i: usize| Rgb::new(self.power.r * r[i], self.power.g * g[i], self.power.b * b[i]);
-        [color(0), color(1)]
+        Colors(std::array::from_fn(|i| Rgb::new(self.power.r * r.0[i], self.power.g * g.0[i], self.power.b * b.0[i])))
     }
 
     #[inline(always)]
-    fn send_channel(&self, channel: usize, p: Vec3, ns: Vec3, wo: Vec3, lobe: &Lobe) -> [f32; 2] {
+    fn send_channel(&self, channel: usize, p: Vec3, ns: Vec3, wo: Vec3, lobe: &Lobe) -> Moments {
         let middle = self.middle[channel];
         let l = if self.shine.sends == Sends::Parallel { middle } else { middle - p };
         let one = 1.0 / l.length().max(f32::MIN_POSITIVE);
@@ -357,15 +353,11 @@ impl LightNode {
             // cos / d^2
             _ => (two, (cos + two * (cos * (7.5 * deep - 1.5 * trace) - 3.0 * across)) * two),
         };
-        let specular = match lobe {
-            Lobe::None => 0.0,
-            lobe => weight * lobe.eval(cos.max(0.0), ns.dot(wo), wo.dot(d)),
-        };
-        [diffuse.max(0.0), specular]
+        lobe.moments_around(diffuse.max(0.0), cos.max(0.0), ns.dot(wo), wo.dot(d), weight)
     }
 
     /// What arrives of a power of 1 in its middle: diffuse and specular.
-    pub fn send_one(&self, p: Vec3, ns: Vec3, wo: Vec3, lobe: &Lobe) -> [f32; 2] {
+    pub fn send_one(&self, p: Vec3, ns: Vec3, wo: Vec3, lobe: &Lobe) -> Moments {
         self.send_channel(0, p, ns, wo, lobe)
     }
 
@@ -571,7 +563,7 @@ mod tests {
                             *sum += one;
                         }
                     }
-                    let flat = |sent: Sent| sent.map(|color| channels(color).map(f64::from));
+                    let flat = |sent: Sent| sent.0.map(|color| channels(color).map(f64::from));
                     let most = flat(node.most(&sight));
                     for (sum, most) in sum.iter().flatten().zip(most.iter().flatten()) {
                         assert!(*sum <= most * 1.001 + 1e-12, "{round}: {sum} is more than {most}, {node:?}");

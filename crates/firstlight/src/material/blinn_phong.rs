@@ -2,8 +2,11 @@
 
 use fearless_simd::{f32x16, prelude::*};
 
+use super::{LobeKind, Material};
+use crate::context::CompileContext;
 use crate::describe::{ColorParam, NumberParam, table};
 use crate::math::Exponent;
+use crate::texture::Params;
 
 table! {
     /// Blinn-Phong: f = diffuse max(n.wi, 0) + specular max(n.h, 0)^shininess, h = normalize(wi + wo); the specular
@@ -26,6 +29,19 @@ table! {
         pub ambient: Option<ColorParam> = None,
         /// The highlight's exponent, 0 to 1000000: the larger, the smaller the highlight.
         pub shininess: NumberParam = NumberParam::constant(16.0),
+    }
+}
+
+impl BlinnPhongDesc {
+    pub(crate) fn compile(&self, cx: &mut CompileContext, params: &mut impl Params) -> Material {
+        Material::classic(
+            cx,
+            params,
+            [&self.diffuse, &self.specular],
+            &self.ambient,
+            &self.shininess,
+            LobeKind::BlinnPhong,
+        )
     }
 }
 

@@ -1,18 +1,24 @@
 //! Materials: how a surface turns the light that arrives into the light that leaves.
 
 mod blinn_phong;
+mod highlight;
+mod moments;
 mod phong;
 
 use fearless_simd::{f32x16, prelude::*};
 
 pub use blinn_phong::{BlinnPhongDesc, BlinnPhongLobe};
+pub(crate) use highlight::Highlight;
+pub(crate) use moments::{Colors, MOMENTS, Moments};
 pub use phong::{PhongDesc, PhongLobe};
 
 use crate::color::Rgb;
-use crate::describe::family;
+use crate::context::CompileContext;
+use crate::describe::{ColorParam, NumberParam, family};
 use crate::ids::TextureId;
+use crate::math::Arc;
 use crate::shape::SurfaceInteraction;
-use crate::texture::{Param, Texture};
+use crate::texture::{Param, Params, Texture};
 
 family! {
     /// A material as a scene may say it.
@@ -21,6 +27,15 @@ family! {
         Phong(PhongDesc) = "phong",
         /// `[material.blinn-phong.NAME]`
         BlinnPhong(BlinnPhongDesc) = "blinn-phong",
+    }
+}
+
+impl MaterialDesc {
+    pub(crate) fn compile(&self, cx: &mut CompileContext, params: &mut impl Params) -> Material {
+        match self {
+            MaterialDesc::Phong(desc) => desc.compile(cx, params),
+            MaterialDesc::BlinnPhong(desc) => desc.compile(cx, params),
+        }
     }
 }
 
@@ -52,6 +67,35 @@ pub struct Material {
 pub(crate) const MAX_SHININESS: f32 = 1e6;
 
 impl Material {
+    /// A diffuse part and a highlight of some shape.
+    fn classic(
+        cx: &mut CompileContext,
+        params: &mut impl Params,
+        [diffuse, specular]: [&ColorParam; 2],
+        ambient: &Option<ColorParam>,
+        shininess: &NumberParam,
+        lobe: LobeKind,
+    ) -> Material {
+        Material {
+            diffuse: params.color(cx, "diffuse", diffuse),
+            specular: params.color(cx, "specular", specular),
+            ambient: ambient.as_ref().map(|a| params.color(cx, "ambient", a)),
+            shininess: params.number(cx, "shininess", shininess, [0.0, MAX_SHININESS as f64]),
+            lobe,
+        }
+    }
+
+    /// That of shapes that name none.
+    pub(crate) fn matte() -> Material {
+        Material {
+            diffuse: Param::constant(Rgb::gray(0.8)),
+            specular: Param::constant(Rgb::BLACK),
+            ambient: None,
+            shininess: Param::constant(1.0),
+            lobe: LobeKind::Phong,
+        }
+    }
+
     /// The material in numbers at one surface.
     #[inline]
     pub fn bsdf(&self, si: &SurfaceInteraction, textures: &[Texture]) -> Bsdf {
@@ -71,7 +115,7 @@ impl Material {
             }
         };
         let ambient = self.ambient.map_or(diffuse, |a| a.color(si, textures) * si.color);
-        Bsdf { diffuse, specular, ambient, lobe }
+        Bsdf { colors: Colors([diffuse, specular]), ambient, lobe }
     }
 }
 
@@ -80,6 +124,14 @@ impl Material {
     pub(crate) fn is_plain(&self) -> bool {
         let ambient = self.ambient.and_then(|ambient| ambient.texture);
         [self.diffuse.texture, self.specular.texture, self.shininess.texture, ambient] == [None; 4]
+    }
+
+    /// Whether its colours are the means over the footprint of a surface, whatever its size, and nothing else changes.
+    pub(crate) fn is_exact_mean(&self, textures: &[Texture]) -> bool {
+        let is_exact = |texture: Option<TextureId>| texture.is_none_or(|id| textures[id.index()].is_exact_mean());
+        let ambient = self.ambient.and_then(|ambient| ambient.texture);
+        [self.diffuse.texture, self.specular.texture, ambient].into_iter().all(is_exact)
+            && self.shininess.texture.is_none()
     }
 
     /// Whether it is the same all over the footprint of a surface, and a little beyond.
@@ -96,10 +148,8 @@ impl Material {
 /// f = diffuse x `Lobes::diffuse` + specular x `Lobes::specular`, which is pi x BRDF x cosine.
 #[derive(Clone, Copy, Debug)]
 pub struct Bsdf {
-    /// Linear colour of the diffuse part.
-    pub diffuse: Rgb,
-    /// Linear colour of the highlight.
-    pub specular: Rgb,
+    /// What each moment of the light is worth: the diffuse part, the highlight.
+    pub(crate) colors: Colors,
     /// Linear colour of the answer to ambient light.
     pub ambient: Rgb,
     /// The highlight.
@@ -136,6 +186,76 @@ impl Lobe {
             Lobe::Phong(lobe) => 0.5 * lobe.exponent(),
             // The half vector moves half as fast; at grazing angles it is quicker to turn sideways
             Lobe::BlinnPhong(lobe) => 0.125 * lobe.exponent() / (cos_o * cos_o).max(0.01),
+        }
+    }
+
+    /// The moments of light of such a weight.
+    #[inline(always)]
+    pub(crate) fn moments(&self, cos_i: f32, cos_o: f32, cos_io: f32, weight: f32) -> Moments {
+        Moments([cos_i * weight, self.eval(cos_i, cos_o, cos_io) * weight])
+    }
+
+    /// The same where it is known what the cosine makes of many lights together.
+    #[inline(always)]
+    pub(crate) fn moments_around(&self, cosine: f32, cos_i: f32, cos_o: f32, cos_io: f32, weight: f32) -> Moments {
+        Moments([cosine, if matches!(self, Lobe::None) { 0.0 } else { weight * self.eval(cos_i, cos_o, cos_io) }])
+    }
+
+    /// How many moments are not always 0.
+    #[inline(always)]
+    pub(crate) fn moment_count(&self) -> usize {
+        if matches!(self, Lobe::None) { 1 } else { MOMENTS }
+    }
+
+    /// [`moments`](Self::moments) in lanes: the same bits.
+    #[inline(always)]
+    pub(crate) fn moments_lanes<S: Simd, const N: usize>(
+        &self,
+        cos_i: [f32x16<S>; N],
+        cos_o: f32x16<S>,
+        cos_io: [f32x16<S>; N],
+        weight: [f32x16<S>; N],
+    ) -> [[f32x16<S>; N]; MOMENTS] {
+        let times = |v: [f32x16<S>; N]| std::array::from_fn(|i| v[i] * weight[i]);
+        if matches!(self, Lobe::None) {
+            return [times(cos_i), [cos_o.token().splat_f32x16(0.0); N]];
+        }
+        [times(cos_i), times(self.eval_lanes(cos_i, cos_o, cos_io))]
+    }
+
+    /// What it is, at most, where the light is off the mirror's direction by these angles at least and at most, and
+    /// off the viewer by `apart` at most.
+    pub(crate) fn highlight(&self, [nearest, farthest]: [Arc; 2], apart: impl FnOnce() -> Arc) -> Highlight {
+        match self {
+            Lobe::None => Highlight::default(),
+            Lobe::Phong(lobe) => {
+                let at = |cos: f32| self.eval(0.0, 0.0, -cos.max(0.0));
+                let sin = if farthest.cos > 0.0 { farthest.sin } else { 1.0 };
+                Highlight::of_power(lobe.exponent(), at, nearest.cos, sin, [1.0, 1.0])
+            }
+            Lobe::BlinnPhong(lobe) => {
+                // The half vector is off the normal by half of what the light is off the mirror's direction
+                let half = |arc: Arc| (0.5 * (1.0 + arc.cos)).max(0.0).sqrt();
+                let at = |cos: f32| {
+                    let twice = 2.0 * cos.max(0.0) * cos.max(0.0) - 1.0;
+                    self.eval(1.0 + twice, 0.0, twice)
+                };
+                let sin = (0.5 * (1.0 - farthest.cos)).max(0.0).sqrt();
+                // 1 / |wi + wo|: how fast the half vector turns with the light
+                let k = 1.0 / (2.0 * half(apart())).max(1e-3);
+                Highlight::of_power(lobe.exponent(), at, half(nearest), sin, [k, 2.0 * k + 3.0 * k * k])
+            }
+        }
+    }
+
+    /// [`sharpness`](Self::sharpness) in lanes.
+    #[inline(always)]
+    pub(crate) fn sharpness_lanes<S: Simd>(&self, cos_o: f32x16<S>) -> f32x16<S> {
+        let simd = cos_o.token();
+        match self {
+            Lobe::None => simd.splat_f32x16(0.0),
+            Lobe::Phong(lobe) => simd.splat_f32x16(0.5 * lobe.exponent()),
+            Lobe::BlinnPhong(lobe) => 0.125 * lobe.exponent() / (cos_o * cos_o).max(simd.splat_f32x16(0.01)),
         }
     }
 

@@ -11,7 +11,7 @@ pub struct LaneSum([f32; LANES]);
 impl LaneSum {
     /// Nothing yet.
     #[inline(always)]
-    pub fn new() -> Self {
+    pub const fn new() -> Self {
         LaneSum([0.0; LANES])
     }
 

@@ -196,8 +196,7 @@ impl<'a> Arrivals<'a> {
         }
         let LightKind::Area(area) = &light.kind else { return self.single(index, light, place, counts) };
         let light = Sampled::new(self.scene, self.level, index, &self.lights.targets);
-        let [diffuse, specular] = light.to_point(&mut self.settler, place.si, place.lobe, counts);
-        let sums = Sums { diffuse, specular };
+        let sums = light.to_point(&mut self.settler, place.si, place.lobe, counts);
         if place.reach == 0.0 {
             return Arrival::even(sums);
         }
@@ -218,7 +217,7 @@ impl<'a> Arrivals<'a> {
     /// A point that asks for light `index`, beside nothing but ambient light.
     pub fn place<'p>(&self, index: usize, si: &'p SurfaceInteraction, bsdf: &'p Bsdf) -> ArrivalPlace<'p> {
         let base = self.scene.ambient * bsdf.ambient;
-        ArrivalPlace::point(si, &bsdf.lobe, base, self.scale(index), [bsdf.diffuse, bsdf.specular])
+        ArrivalPlace::point(si, &bsdf.lobe, base, self.scale(index), bsdf.colors)
     }
 
     /// What light `index` sends to one point, which stands for `share` of a pixel, but for the light's scale.
@@ -232,7 +231,7 @@ impl<'a> Arrivals<'a> {
     ) -> LightTerm {
         let place = ArrivalPlace { share, ..self.place(index, si, bsdf) };
         let sums = self.arrival(index, &place, counts).sums;
-        [place.reflected[0] * sums.diffuse, place.reflected[1] * sums.specular]
+        place.reflected.each(&sums)
     }
 
     fn view(&self, emitter: &Emitter, place: &ArrivalPlace) -> Option<View> {
@@ -402,11 +401,11 @@ impl<'a> Arrivals<'a> {
     /// Whether sums with such an error will do for one light at a place.
     fn enough<'b>(&self, place: &'b ArrivalPlace) -> impl Fn(&Sums, &Sums) -> bool + use<'a, 'b> {
         let (steps, tolerance) = (&self.lights.steps, self.tolerance_of(place.share));
-        let [diffuse, specular] = place.colors();
+        let colors = place.colors();
         let base = place.base;
         move |sums, error| {
-            let value = base + diffuse * sums.diffuse + specular * sums.specular;
-            let wrong = diffuse * error.diffuse + specular * error.specular;
+            let value = colors.onto(base, sums);
+            let wrong = colors.of(error);
             steps.of_color(value, wrong) <= tolerance
         }
     }

@@ -231,7 +231,7 @@ impl<'a> Cells<'a> {
         counts.looks += (n * n) as u64;
         self.states[index] = State::Traced;
         let number = self.pixels.len() as u32;
-        self.terms.resize(self.terms.len() + scene.lights.len(), [Rgb::BLACK; 2]);
+        self.terms.resize(self.terms.len() + scene.lights.len(), LightTerm::BLACK);
         let mut pixel = Pixel { index: index as u32, ..Pixel::default() };
         // Which of them each ray meets first: of several at the same distance, the one with the lowest id
         self.rays.clear();
@@ -369,11 +369,12 @@ impl<'a> Cells<'a> {
         for light in 0..scene.lights.len() {
             let Some(sums) = self.grid.arrived(light, at) else { return false };
             let scale = self.lights.arrivals.scale(light);
-            color += scale * (bsdf.diffuse * sums.diffuse);
-            color += scale * (bsdf.specular * sums.specular);
+            for part in bsdf.colors.each(&sums).0 {
+                color += scale * part;
+            }
             if contrast != Contrast::default() {
                 let Some(slope) = self.grid.slope(light, at, block.square) else { return false };
-                slopes += scale * (contrast.diffuse * slope.diffuse + contrast.specular * slope.specular) * 0.125;
+                slopes += scale * contrast.of(&slope) * 0.125;
             }
         }
         if contrast != Contrast::default() && self.lights.arrivals.steps(color, slopes) > MINGLED {
@@ -389,8 +390,7 @@ impl<'a> Cells<'a> {
         let fragment = &self.fragments.all[fragment];
         let sums = sums * fragment.count() as f32;
         let term = &mut self.terms[fragment.pixel as usize * self.scene.lights.len() + light];
-        term[0] += fragment.bsdf.diffuse * sums.diffuse;
-        term[1] += fragment.bsdf.specular * sums.specular;
+        *term += fragment.bsdf.colors.each(&sums);
     }
 
     /// Where a pixel of the cell is on the film.
@@ -422,8 +422,7 @@ impl<'a> Cells<'a> {
             for (quadrant, answer) in fragments.quadrants[fragment.quadrants.clone()].iter().zip(answers) {
                 let (sums, bsdf) =
                     (answer.sums * quadrant.rays as f32, &fragments.places[quadrant.place as usize].bsdf);
-                term[0] += bsdf.diffuse * sums.diffuse;
-                term[1] += bsdf.specular * sums.specular;
+                *term += bsdf.colors.each(&sums);
             }
         }
         ControlFlow::Continue(())
@@ -438,20 +437,17 @@ impl<'a> Cells<'a> {
         let scale = self.lights.arrivals.scale(light);
         let (mut least, mut most) = (answers[0].sums, answers[0].sums);
         for answer in answers {
-            least.diffuse = least.diffuse.min(answer.sums.diffuse);
-            least.specular = least.specular.min(answer.sums.specular);
-            most.diffuse = most.diffuse.max(answer.sums.diffuse);
-            most.specular = most.specular.max(answer.sums.specular);
+            (least, most) = (least.min(answer.sums), most.max(answer.sums));
         }
         // Between places that see nothing a light can come in
         if most == Sums::default() && !answers.iter().all(|answer| answer.smooth) {
             return false;
         }
-        let apart = Sums { diffuse: most.diffuse - least.diffuse, specular: most.specular - least.specular };
+        let apart = most + least * -1.0;
         let bsdf = &fragment.bsdf;
-        let [diffuse, specular] = [scale * bsdf.diffuse, scale * bsdf.specular];
-        let value = scene.ambient * bsdf.ambient + diffuse * most.diffuse + specular * most.specular;
-        let spread = self.lights.arrivals.steps(value, diffuse * apart.diffuse + specular * apart.specular);
+        let colors = scale * bsdf.colors;
+        let value = colors.onto(scene.ambient * bsdf.ambient, &most);
+        let spread = self.lights.arrivals.steps(value, colors.of(&apart));
         let allowed = if answers.iter().all(|answer| answer.smooth) { SPREAD_SMOOTH } else { SPREAD_CUT };
         let weight = share(scene, self.mode, fragment.count()) * (scene.lights.len() as f32).sqrt();
         if spread * weight > allowed {
@@ -459,7 +455,7 @@ impl<'a> Cells<'a> {
         }
         // Fewer than four quadrants do not tell how light changes along both axes
         self.fragments.quadrants[fragment.quadrants.clone()].iter().all(|Quadrant { contrast, .. }| {
-            let mingled = contrast.diffuse * apart.diffuse + contrast.specular * apart.specular;
+            let mingled = contrast.of(&apart);
             *contrast == Contrast::default()
                 || answers.len() == 4 && self.lights.arrivals.steps(value, scale * mingled * 0.125) * weight <= MINGLED
         })
@@ -497,8 +493,7 @@ impl<'a> Cells<'a> {
             let term = &mut self.terms[fragment.pixel as usize * scene.lights.len() + *light as usize];
             for (request, answer) in answers.by_ref().take(fragment.count()) {
                 let bsdf = &self.places[request.place as usize].bsdf;
-                term[0] += bsdf.diffuse * answer.sums.diffuse;
-                term[1] += bsdf.specular * answer.sums.specular;
+                *term += bsdf.colors.each(&answer.sums);
             }
         }
         self.refused = refused;

@@ -36,16 +36,10 @@ pub(super) struct Change {
 
 impl Change {
     /// Not at all.
-    pub const NONE: Change =
-        Change { bend: Sums { diffuse: 0.0, specular: 0.0 }, drift: 0.0, resolved: true, smooth: true, sharp: false };
+    pub const NONE: Change = Change { bend: Sums::ZERO, drift: 0.0, resolved: true, smooth: true, sharp: false };
     /// Nobody knows.
-    pub const UNKNOWN: Change = Change {
-        bend: Sums { diffuse: f32::MAX, specular: f32::MAX },
-        drift: f32::INFINITY,
-        resolved: false,
-        smooth: false,
-        sharp: true,
-    };
+    pub const UNKNOWN: Change =
+        Change { bend: Sums::MOST, drift: f32::INFINITY, resolved: false, smooth: false, sharp: true };
 
     pub fn with(self, sums: Sums) -> Arrival {
         let Change { bend, drift, resolved, smooth, sharp } = self;
@@ -56,9 +50,9 @@ impl Change {
 impl Arrival {
     /// Of a patch whose rays are asked, not its middle.
     pub const PARTED: Arrival = Arrival {
-        sums: Sums { diffuse: 0.0, specular: 0.0 },
+        sums: Sums::ZERO,
         skipped: true,
-        bend: Sums { diffuse: f32::MAX, specular: f32::MAX },
+        bend: Sums::MOST,
         drift: f32::INFINITY,
         resolved: false,
         smooth: false,
@@ -118,7 +112,7 @@ pub(super) fn horizon_change(view: &View, place: &ArrivalPlace) -> Change {
     let crossing = view.crossing(place.reach);
     let cos = (view.max(&view.cos).max(0.0) / view.middle().length() + swing).min(1.0);
     let all = view.most(place.reach) * (swing.min(1.0) * 0.5 + cos * crossing).min(1.0);
-    let bend = Sums { diffuse: all, specular: all };
+    let bend = Sums::bounds(all, all);
     let resolved = swing < RESOLVED_SWING && crossing == 0.0;
     Change { bend, drift: 0.0, resolved, smooth: false, sharp: false }
 }
@@ -143,7 +137,7 @@ pub(super) fn change(view: &View, place: &ArrivalPlace, arrived: &Arrived, sway:
     let resolved = drift < RESOLVED && swing < RESOLVED_SWING && crossing == 0.0;
     let is_clear = resolved && drift == 0.0 && illumination == Illumination::Full && !cuts;
     if matches!(view.lobe, Lobe::None) {
-        let bend = Sums { diffuse, specular: 0.0 };
+        let bend = Sums::bounds(diffuse, 0.0);
         return Change { bend, drift, resolved, smooth: is_clear && is_smooth(swing, 0.0), sharp: false };
     }
     let moved = 2.0 * place.turn + place.reach / nearest.max(place.reach) + sway;
@@ -151,7 +145,7 @@ pub(super) fn change(view: &View, place: &ArrivalPlace, arrived: &Arrived, sway:
     let narrow = lobe.min(1.0);
     let narrow = (narrow + 2.0 * narrow.sqrt() * place.off).min(1.0);
     let specular = most * brightest(view, lobe) * (kink + smooth + narrow + horizon + crossing).min(1.0);
-    let bend = Sums { diffuse, specular };
+    let bend = Sums::bounds(diffuse, specular);
     let resolved = resolved && narrow < RESOLVED;
     Change { bend, drift, resolved, smooth: is_clear && is_smooth(swing, lobe), sharp: is_sharp(lobe) }
 }

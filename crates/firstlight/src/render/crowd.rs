@@ -10,6 +10,7 @@ use std::collections::BinaryHeap;
 use super::cut::{Tone, Walk};
 use crate::color::Rgb;
 use crate::light::{Held, LightNode, Sent, Sight};
+use crate::material::MOMENTS;
 use crate::visibility::Seen;
 
 /// How a node counts at all places of a block.
@@ -40,7 +41,21 @@ struct Item {
 }
 
 /// Sums of products of errors, channel by channel: diffuse with itself, with highlights, highlights with themselves.
-type Squares = [[f64; 3]; 3];
+type Squares = [[f64; 3]; PAIRS.len()];
+/// Each moment with each, once.
+const PAIRS: [[usize; 2]; MOMENTS * (MOMENTS + 1) / 2] = {
+    let mut pairs = [[0; 2]; MOMENTS * (MOMENTS + 1) / 2];
+    let (mut k, mut a) = (0, 0);
+    while a < MOMENTS {
+        let mut b = a;
+        while b < MOMENTS {
+            pairs[k] = [a, b];
+            (k, b) = (k + 1, b + 1);
+        }
+        a += 1;
+    }
+    pairs
+};
 
 /// The lights of a block. Keeps its memory.
 #[derive(Default)]
@@ -111,7 +126,7 @@ impl Crowd {
             // Asked at each place, it is what it is
             (_, Held::Light(_)) if node.is_point() => Sent::default(),
             // Between nothing and the most nothing is farther off its mean, in the mean, than half of that
-            _ => node.most(sight).map(|most| most * 0.5),
+            _ => node.most(sight) * 0.5,
         };
         let typical = 0.5 * (sight.least + sight.diffuse.min(1e3 * sight.least));
         item.typical = if matches!(item.by, By::Middle | By::One) { typical } else { MAYBE * typical };
@@ -123,12 +138,12 @@ impl Crowd {
     }
 
     fn count(&mut self, walk: &Walk, item: &Item, sign: f64) {
-        let (d, s) = (of(item.error[0]), of(item.error[1]));
+        let errors = item.error.0.map(of);
         let power = of(walk.tree.nodes[item.node as usize].power);
         for i in 0..3 {
-            self.squares[0][i] += d[i] * d[i] * sign;
-            self.squares[1][i] += d[i] * s[i] * sign;
-            self.squares[2][i] += s[i] * s[i] * sign;
+            for (squares, [a, b]) in self.squares.iter_mut().zip(PAIRS) {
+                squares[i] += errors[a][i] * errors[b][i] * sign;
+            }
             self.known[i] += power[i] * f64::from(item.typical) * sign;
         }
     }
@@ -151,11 +166,14 @@ impl Crowd {
 
     /// How far all that counts can be wrong together where diffuse light and highlights are multiplied with `colors`:
     /// the root of the sum of squares.
-    pub fn error(&self, colors: [Rgb; 2]) -> Rgb {
-        let (d, s) = (of(colors[0]), of(colors[1]));
+    pub fn error(&self, colors: &Sent) -> Rgb {
+        let colors = colors.0.map(of);
         let [r, g, b] = std::array::from_fn(|i| {
-            let [dd, ds, ss] = self.squares.map(|sum| sum[i].max(0.0));
-            (d[i] * d[i] * dd + 2.0 * d[i] * s[i] * ds + s[i] * s[i] * ss).sqrt() as f32
+            let parts = self.squares.iter().zip(PAIRS).map(|(sum, [a, b])| {
+                let twice = if a == b { 1.0 } else { 2.0 };
+                twice * colors[a][i] * colors[b][i] * sum[i].max(0.0)
+            });
+            parts.sum::<f64>().sqrt() as f32
         });
         Rgb::new(r, g, b)
     }
@@ -163,7 +181,7 @@ impl Crowd {
     fn shown(&self, walk: &Walk, tones: &[Tone], guess: Option<Rgb>) -> f32 {
         let known = guess.unwrap_or_else(|| self.known());
         tones.iter().fold(0.0, |worst, tone| {
-            walk.steps.of_color(tone.base + tone.known * known, self.error(tone.error)).max(worst)
+            walk.steps.of_color(tone.base + tone.known * known, self.error(&tone.error)).max(worst)
         })
     }
 

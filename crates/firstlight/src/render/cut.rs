@@ -11,6 +11,7 @@ use std::collections::BinaryHeap;
 
 use crate::color::{DisplaySteps, Rgb};
 use crate::light::{Held, LightNode, LightTree, Sent, Sight, Zone};
+use crate::material::{Colors, MOMENTS};
 use crate::visibility::Seen;
 
 /// The colours that a zone's places make of light.
@@ -21,7 +22,7 @@ pub(super) struct Tone {
     /// What diffuse light is multiplied with, at least.
     pub known: Rgb,
     /// What an error of diffuse light and of highlights is multiplied with, at most.
-    pub error: [Rgb; 2],
+    pub error: Sent,
 }
 
 /// A node in question.
@@ -63,7 +64,7 @@ impl Ord for Item {
 pub(super) struct Cut {
     heap: BinaryHeap<Item>,
     /// The sum of all errors in question, kept up to date roughly.
-    error: [[f64; 3]; 2],
+    error: [[f64; 3]; MOMENTS],
     /// What is sent, thereabouts, by what is seen whole, and a part of what may be.
     known: [f64; 3],
     /// That part of it.
@@ -114,7 +115,7 @@ fn typical(sight: &Sight) -> f32 {
 impl Walk<'_> {
     pub fn key(&self, error: &Sent) -> f32 {
         self.tones.iter().fold(0.0, |key, tone| {
-            let shown = tone.error[0] * error[0] + tone.error[1] * error[1];
+            let shown = (tone.error * *error).sum();
             shown.r.max(shown.g).max(shown.b).max(key)
         })
     }
@@ -165,14 +166,14 @@ impl Cut {
 
     /// How far what is settled can be wrong: diffuse and specular, before the colours of the surface.
     pub fn error(&self) -> Sent {
-        [color(&self.error[0]), color(&self.error[1])]
+        Colors(std::array::from_fn(|k| color(&self.error[k])))
     }
 
     fn clear(&mut self) {
         self.heap.clear();
         self.lit.clear();
         self.open.clear();
-        (self.error, self.known, self.maybe) = ([[0.0; 3]; 2], [0.0; 3], [0.0; 3]);
+        (self.error, self.known, self.maybe) = ([[0.0; 3]; MOMENTS], [0.0; 3], [0.0; 3]);
     }
 
     fn push(&mut self, walk: &Walk, item: Option<Item>) {
@@ -182,8 +183,7 @@ impl Cut {
     }
 
     fn count(&mut self, walk: &Walk, item: &Item, sign: f64) {
-        add(&mut self.error[0], item.error[0], sign);
-        add(&mut self.error[1], item.error[1], sign);
+        self.error.iter_mut().zip(item.error.0).for_each(|(sum, error)| add(sum, error, sign));
         if item.typical > 0.0 {
             add(&mut self.known, walk.tree.nodes[item.node as usize].power * item.typical, sign);
         }
@@ -191,7 +191,7 @@ impl Cut {
 
     /// Sums up anew: what was taken away leaves rounding behind.
     fn recount(&mut self, walk: &Walk, done: &[f64; 3]) {
-        (self.error, self.known) = ([[0.0; 3]; 2], *done);
+        (self.error, self.known) = ([[0.0; 3]; MOMENTS], *done);
         let heap = std::mem::take(&mut self.heap);
         for item in &heap {
             self.count(walk, item, 1.0);
@@ -209,10 +209,10 @@ impl Cut {
     }
 
     fn shown(&self, walk: &Walk, value: Option<Rgb>) -> f32 {
-        let (diffuse, specular, known) = (color(&self.error[0]), color(&self.error[1]), color(&self.known));
+        let (all, known) = (self.error(), color(&self.known));
         let mut worst: f32 = 0.0;
         for tone in walk.tones {
-            let error = tone.error[0] * diffuse + tone.error[1] * specular;
+            let error = (tone.error * all).sum();
             let value = value.unwrap_or_else(|| tone.base + tone.known * known);
             worst = worst.max(walk.steps.of_color(value, error));
         }

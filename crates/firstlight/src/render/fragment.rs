@@ -11,7 +11,7 @@ use super::solo::Candidate;
 use crate::color::Rgb;
 use crate::ids::SurfaceId;
 use crate::integrate::ShadingPoint;
-use crate::material::{Bsdf, Lobe};
+use crate::material::{Bsdf, Colors, Lobe};
 use crate::math::{DVec3, ErrorBound, Ray, Vec3};
 use crate::scene::Scene;
 
@@ -62,7 +62,7 @@ impl PlainMaterials {
         let of = |surface: SurfaceId| {
             let material = &scene.materials[scene.geometry.surfaces[surface.index()].material?.index()];
             let point = ShadingPoint::new(Vec3::ZERO, ErrorBound(Vec3::ZERO), Vec3::Z, Vec3::Z);
-            let bsdf = Bsdf { diffuse: Rgb::BLACK, specular: Rgb::BLACK, ambient: Rgb::BLACK, lobe: Lobe::None };
+            let bsdf = Bsdf { colors: Colors::BLACK, ambient: Rgb::BLACK, lobe: Lobe::None };
             let si = Place::new(scene, point, surface, &bsdf).surface();
             material.is_plain().then(|| material.bsdf(&si, &scene.textures))
         };
@@ -285,19 +285,50 @@ impl Candidate {
     }
 
     /// The mean material over the rays of a pixel that sees only this; `None` where more than colours change.
-    pub fn mean(self, scene: &Scene, [i, j]: [u32; 2]) -> Option<(Bsdf, Contrast)> {
+    pub fn mean(self, scene: &Scene, at: [u32; 2]) -> Option<(Bsdf, Contrast)> {
+        if let Some(mean) = self.mean_of_quarters(scene, at) {
+            return Some(mean);
+        }
         let n = scene.antialiasing;
+        let mean = self.mean_of_parts(scene, at, n)?;
+        (!mean.uneven).then_some((mean.bsdf, mean.contrast))
+    }
+
+    /// The same from the quarters of a pixel, where they are as exact as its rays: where textures tell the mean over any
+    /// area, and the whole pixel says the same.
+    fn mean_of_quarters(self, scene: &Scene, at: [u32; 2]) -> Option<(Bsdf, Contrast)> {
+        let surface = &scene.geometry.surfaces[self.surface(scene).index()];
+        let is_exact = scene.materials[surface.material?.index()].is_exact_mean(&scene.textures);
+        if scene.antialiasing <= 2 || !is_exact {
+            return None;
+        }
+        let [whole, quarters] = [self.mean_of_parts(scene, at, 1)?, self.mean_of_parts(scene, at, 2)?];
+        let is_same = |one: Rgb, other: Rgb| {
+            let (off, allowed) = ((one + other * -1.0).map(f32::abs), other * SAME_MEAN);
+            off.r <= allowed.r && off.g <= allowed.g && off.b <= allowed.b
+        };
+        let is_same = is_same(whole.bsdf.ambient, quarters.bsdf.ambient)
+            && whole.bsdf.colors.0.into_iter().zip(quarters.bsdf.colors.0).all(|(one, other)| is_same(one, other));
+        // Rays differ by more than quarters, the means of some of them: by twice as much at most, along each axis
+        (is_same && !quarters.uneven).then_some((quarters.bsdf, quarters.contrast * 2.0))
+    }
+
+    /// The mean material over the n x n parts of a pixel that sees only this.
+    fn mean_of_parts(self, scene: &Scene, [i, j]: [u32; 2], n: u32) -> Option<MeanBsdf> {
         let mut bsdfs = ArrayVec::<Bsdf, MAX_MEAN>::new();
         for (row, column) in (0..n).flat_map(|row| (0..n).map(move |column| (row, column))) {
-            let (ray, differential) = camera_ray(scene, i * n + column, j * n + row);
+            let middle = |from: u32, part: u32| from as f32 + (part as f32 + 0.5) / n as f32;
+            let (ray, differential) = scene.camera.local_ray(middle(i, column), middle(j, row), 1.0 / n as f32);
             // It is proved that it meets it; a rounding may say otherwise
             let Some(t) = self.intersect(scene, &ray) else { continue };
             bsdfs.try_push(self.bsdf(scene, &RayHit { ray, t, at: [0; 2] }, &differential)).ok()?;
         }
-        let mean = MeanBsdf::of(bsdfs.iter());
-        (!mean.uneven && !bsdfs.is_empty()).then_some((mean.bsdf, mean.contrast))
+        (!bsdfs.is_empty()).then(|| MeanBsdf::of(bsdfs.iter()))
     }
 }
+
+/// How far the mean material of a pixel may be from that of its quarters, as a part of it: these are nearer still.
+const SAME_MEAN: f32 = 0.004;
 
 /// The most rays whose mean is taken at once.
 const MAX_MEAN: usize = 64;
@@ -318,18 +349,15 @@ struct MeanBsdf {
 
 impl MeanBsdf {
     fn of<'a>(bsdfs: impl Iterator<Item = &'a Bsdf>) -> MeanBsdf {
-        let mut sum = Bsdf { diffuse: Rgb::BLACK, specular: Rgb::BLACK, ambient: Rgb::BLACK, lobe: Lobe::None };
+        let mut sum = Bsdf { colors: Colors::BLACK, ambient: Rgb::BLACK, lobe: Lobe::None };
         let (mut count, mut uneven) = (0.0f32, false);
         let infinite = Rgb::gray(f32::INFINITY);
-        let (mut least, mut most) = ([infinite; 2], [Rgb::BLACK; 2]);
+        let (mut least, mut most) = (Colors::BLACK.map(|_| infinite), Colors::BLACK);
         for bsdf in bsdfs {
-            sum.diffuse += bsdf.diffuse;
-            sum.specular += bsdf.specular;
+            sum.colors += bsdf.colors;
             sum.ambient += bsdf.ambient;
             count += 1.0;
-            for (k, color) in [bsdf.diffuse, bsdf.specular].into_iter().enumerate() {
-                (least[k], most[k]) = (least[k].min(color), most[k].max(color));
-            }
+            (least, most) = (least.min(bsdf.colors), most.max(bsdf.colors));
             // Any ray that sees a highlight says what it is like
             match (sum.lobe, bsdf.lobe) {
                 (_, Lobe::None) => {}
@@ -338,15 +366,9 @@ impl MeanBsdf {
             }
         }
         let inverse = 1.0 / count;
-        let apart = |k: usize| Rgb::new(most[k].r - least[k].r, most[k].g - least[k].g, most[k].b - least[k].b);
         MeanBsdf {
-            bsdf: Bsdf {
-                diffuse: sum.diffuse * inverse,
-                specular: sum.specular * inverse,
-                ambient: sum.ambient * inverse,
-                lobe: sum.lobe,
-            },
-            contrast: Contrast { diffuse: apart(0), specular: apart(1) },
+            bsdf: Bsdf { colors: sum.colors * inverse, ambient: sum.ambient * inverse, lobe: sum.lobe },
+            contrast: most + least * -1.0,
             uneven,
         }
     }

@@ -5,7 +5,7 @@ use super::Counts;
 use super::pixel::{Lighting, LobeSums};
 use super::plain::{Facing, Plain};
 use crate::light::{LightKind, LightSample, Towards};
-use crate::material::Lobe;
+use crate::material::{Lobe, MOMENTS};
 use crate::math::LaneSum;
 use crate::scene::Scene;
 use crate::shape::SurfaceInteraction;
@@ -50,19 +50,18 @@ impl Lighting for Given<'_, '_> {
         (self.choose)(index, from, &|uv| area.position(uv), &mut self.points);
         // A light's scale has its number of samples in it
         let count = facing.light.samples() as f64;
-        let mut sums = [0.0f64; 2];
+        let mut sums = [0.0f64; MOMENTS];
         for (uv, share) in &self.points {
             let (l, inverse_distance, weight) = area.at(*uv, si.lit_from);
             let sample = || inverse_distance.is_finite().then_some(LightSample { inverse_distance, weight });
             if let Some(arriving) = facing.arriving(Towards { l, finite: true }, sample, counts) {
-                sums = [0, 1].map(|k| sums[k] + f64::from(arriving[k]) * share);
+                sums = std::array::from_fn(|k| sums[k] + f64::from(arriving.0[k]) * share);
             }
         }
-        let [diffuse, specular] = sums.map(|sum| {
+        LobeSums(sums.map(|sum| {
             let mut total = LaneSum::new();
             total.add(0, (sum * count) as f32);
             total
-        });
-        LobeSums { diffuse, specular }
+        }))
     }
 }

@@ -15,7 +15,6 @@ use super::light_queue::{Answer, LightQueue, Place, Request};
 use super::solo::Candidate;
 use super::square::Square;
 use super::{Counts, Heat};
-use crate::color::Rgb;
 use crate::integrate::{ShadingPoint, Sums};
 use crate::material::{Bsdf, Lobe};
 use crate::scene::Scene;
@@ -76,8 +75,7 @@ impl Block {
                 (one, other) if one == other => {}
                 _ => return None,
             }
-            all.diffuse = all.diffuse.max(bsdf.diffuse);
-            all.specular = all.specular.max(bsdf.specular);
+            all.colors = all.colors.max(bsdf.colors);
             all.ambient = all.ambient.min(bsdf.ambient);
         }
         Some(Block { square, of, bsdf: all, first: Some(first) })
@@ -85,7 +83,7 @@ impl Block {
 }
 
 /// What is not known.
-const UNKNOWN: Sums = Sums { diffuse: f32::NAN, specular: f32::NAN };
+const UNKNOWN: Sums = Sums::UNKNOWN;
 /// No node.
 const NONE: u32 = u32::MAX;
 
@@ -183,7 +181,7 @@ impl Grid {
     /// What arrives of a light at a pixel of the cell, if that is known.
     pub fn arrived(&self, light: usize, at: [u32; 2]) -> Option<Sums> {
         let sums = self.arrived[self.pixel(light, at)];
-        (!sums.diffuse.is_nan()).then_some(sums)
+        sums.is_known().then_some(sums)
     }
 
     /// How far it changes from a pixel to its neighbours in a square, along both axes together; `None` where they do
@@ -199,10 +197,7 @@ impl Grid {
                     beside[axis] = to;
                     let there = self.arrived(light, beside)?;
                     let before = most.unwrap_or_default();
-                    most = Some(Sums {
-                        diffuse: before.diffuse.max((there.diffuse - here.diffuse).abs()),
-                        specular: before.specular.max((there.specular - here.specular).abs()),
-                    });
+                    most = Some(before.max(there.apart(here)));
                 }
             }
             slope = slope + most?;
@@ -308,7 +303,7 @@ impl Grid {
             let before = self.requests.len();
             for node in item.nodes {
                 let known = node as usize * self.lights + item.light as usize;
-                if self.sums[known].diffuse.is_nan() && !self.wanted[known] {
+                if !self.sums[known].is_known() && !self.wanted[known] {
                     self.wanted[known] = true;
                     self.requests.push(Request { place: self.nodes[node as usize].place, light: item.light });
                     self.asked_of.push(known);
@@ -400,7 +395,7 @@ impl Grid {
         center: &Answer,
     ) -> bool {
         let scale = lights.arrivals.scale(item.light as usize);
-        let [diffuse, specular] = [scale * block.bsdf.diffuse, scale * block.bsdf.specular];
+        let colors = scale * block.bsdf.colors;
         let base = scene.ambient * block.bsdf.ambient;
         let allowed = match (center.turn > SHARP, item.square.side == SMALLEST, center.smooth) {
             (true, false, _) => FORETOLD_SHARP,
@@ -416,8 +411,8 @@ impl Grid {
         let middle = mean(mean(nw, ne), mean(sw, se));
         let foretold = [(n, mean(nw, ne)), (w, mean(nw, sw)), (m, middle), (e, mean(ne, se)), (s, mean(sw, se))];
         foretold.iter().all(|(is, said)| {
-            let value: Rgb = base + diffuse * is.diffuse + specular * is.specular;
-            let error = diffuse * (is.diffuse - said.diffuse).abs() + specular * (is.specular - said.specular).abs();
+            let value = colors.onto(base, is);
+            let error = colors.of(&is.apart(*said));
             lights.arrivals.steps(value, error) <= allowed
         })
     }
@@ -442,13 +437,12 @@ impl Grid {
         for (row, [a, b, c]) in weights[..side as usize].iter().enumerate() {
             let column = |k: usize| {
                 let [n, m, s] = [nodes[k], nodes[3 + k], nodes[6 + k]];
-                [n.diffuse * a + m.diffuse * b + s.diffuse * c, n.specular * a + m.specular * b + s.specular * c]
+                n * *a + m * *b + s * *c
             };
             let [w, m, e] = [column(0), column(1), column(2)];
             let line = &mut self.arrived[start + row * CELL as usize..][..side as usize];
             for (sums, [a, b, c]) in line.iter_mut().zip(&weights) {
-                sums.diffuse = (w[0] * a + m[0] * b + e[0] * c).max(0.0);
-                sums.specular = (w[1] * a + m[1] * b + e[1] * c).max(0.0);
+                *sums = (w * *a + m * *b + e * *c).at_least_0();
             }
         }
     }

@@ -18,7 +18,7 @@ use fearless_simd::{Level, dispatch, f32x16, mask32x16, prelude::*};
 use super::lanes::Obstacles;
 use crate::integrate::Sums;
 use crate::light::{Area, MIN_DISTANCE2, Points, SERIES, series_by_cell};
-use crate::material::Lobe;
+use crate::material::{Lobe, MOMENTS, Moments};
 use crate::math::{LANES, Vec3, Vec3x16};
 use crate::scene::Scene;
 use crate::shape::SurfaceInteraction;
@@ -99,10 +99,10 @@ impl<'a> Asker<'a> {
 /// What points of a light say, from one place: sums of what they would send, and of what of it arrives.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Tally {
-    all: [f64; 2],
-    lit: [f64; 2],
+    all: [f64; MOMENTS],
+    lit: [f64; MOMENTS],
     /// Of the squares of what they would send.
-    squares: [f64; 2],
+    squares: [f64; MOMENTS],
     /// How many points were asked, how many of them would send anything, and how many of those are hidden.
     pub count: usize,
     pub sending: usize,
@@ -115,23 +115,23 @@ impl Tally {
     pub fn sums(&self, whole: Option<&Sums>, measure: f32) -> Sums {
         let Some(whole) = whole else {
             let one = f64::from(measure) / self.count.max(1) as f64;
-            return Sums { diffuse: (self.lit[0] * one) as f32, specular: (self.lit[1] * one) as f32 };
+            return Moments(self.lit.map(|lit| (lit * one) as f32));
         };
         let share =
             |i: usize, whole: f32| if self.all[i] > 0.0 { whole * (self.lit[i] / self.all[i]) as f32 } else { 0.0 };
-        Sums { diffuse: share(0, whole.diffuse), specular: share(1, whole.specular) }
+        Moments(std::array::from_fn(|k| share(k, whole.0[k])))
     }
 
     /// What would arrive if nothing were in the way, as far as points tell.
     pub fn whole(&self, measure: f32) -> Sums {
         let one = f64::from(measure) / self.count.max(1) as f64;
-        Sums { diffuse: (self.all[0] * one) as f32, specular: (self.all[1] * one) as f32 }
+        Moments(self.all.map(|all| (all * one) as f32))
     }
 
     /// The effective number of points, of the diffuse part and of the highlight: as many that send alike would be as
     /// good.
-    pub fn effective(&self) -> [f64; 2] {
-        [0, 1].map(|k| if self.squares[k] > 0.0 { self.all[k] * self.all[k] / self.squares[k] } else { 0.0 })
+    pub fn effective(&self) -> [f64; MOMENTS] {
+        std::array::from_fn(|k| if self.squares[k] > 0.0 { self.all[k] * self.all[k] / self.squares[k] } else { 0.0 })
     }
 
     /// Adds the points of a rung, of which `view` says what is hidden. Answers with what `half` of all points said.
@@ -178,7 +178,7 @@ impl Tally {
         let horizon = Vec3x16::splat(simd, si.horizon);
         let floor = area.floor(si.lit_from, si.error, si.horizon);
         let cos_o = splat(si.ns.dot(si.wo));
-        let mut sums = [[zero; 3]; 2];
+        let mut sums = [[zero; 3]; MOMENTS];
         for index in blocks {
             let block = &points.blocks[index];
             let q = block.lanes(simd);
@@ -213,12 +213,9 @@ impl Tally {
                 *arrives += lit.select(sent, zero);
                 *squares += sent * sent;
             };
-            let [diffuse, specular] = &mut sums;
-            add(above.select(cos_i * weight, zero), diffuse);
-            if !matches!(lobe, Lobe::None) {
-                let cos_io = wo.dot(l) * inverse_distance;
-                let [lobe] = lobe.eval_lanes([cos_i], cos_o, [cos_io]);
-                add(above.select(lobe * weight, zero), specular);
+            let cos_io = wo.dot(l) * inverse_distance;
+            for (sum, [moment]) in sums.iter_mut().zip(lobe.moments_lanes([cos_i], cos_o, [cos_io], [weight])) {
+                add(above.select(moment, zero), sum);
             }
         }
         for (k, [all, arrives, squares]) in sums.iter().enumerate() {

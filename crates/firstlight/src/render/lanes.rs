@@ -12,7 +12,7 @@ use super::plain::Plain;
 use crate::accel::RayPacket16;
 use crate::ids::LightId;
 use crate::light::{Area, LightKind, MIN_DISTANCE2, Points};
-use crate::material::Lobe;
+use crate::material::{Lobe, MOMENTS};
 use crate::math::{LANES, LaneSum, ShadowRay, Vec3, Vec3x16};
 use crate::scene::{Geometry, LinkId, Scene, ShadowRays};
 use crate::shape::{DiskShadow, ParallelogramShadow, PlaneSide, SphereShadow, SurfaceInteraction};
@@ -118,7 +118,7 @@ fn gather_area<S: Simd>(
     let floor = area.floor(si.lit_from, si.error, si.horizon);
     let least = if one_horizon { floor } else { 0.0 };
     let cos_o = si.ns.dot(si.wo);
-    let (mut diffuse, mut specular) = (zero, zero);
+    let mut sums = [zero; MOMENTS];
     for (index, block) in points.blocks.iter().enumerate() {
         let q = block.lanes(simd);
         let l = Vec3x16 { x: q.x - p.x, y: q.y - p.y, z: q.z - p.z };
@@ -167,13 +167,11 @@ fn gather_area<S: Simd>(
         let weight = area.weight_lanes(points, index, l, inverse_distance);
         let cos_i = height * inverse_distance;
         let cos_io = wo.dot(l) * inverse_distance;
-        diffuse += lit.select(cos_i * weight, zero);
-        if !matches!(lobe, Lobe::None) {
-            let [lobe] = lobe.eval_lanes([cos_i], splat(cos_o), [cos_io]);
-            specular += lit.select(lobe * weight, zero);
+        for (sum, [moment]) in sums.iter_mut().zip(lobe.moments_lanes([cos_i], splat(cos_o), [cos_io], [weight])) {
+            *sum += lit.select(moment, zero);
         }
     }
-    LobeSums { diffuse: partials(diffuse), specular: partials(specular) }
+    LobeSums(sums.map(partials))
 }
 
 /// Which of the lanes in `active` something in the trees hides on the ways `l` from a surface. Not inlined: scenes

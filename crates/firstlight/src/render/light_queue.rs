@@ -140,7 +140,7 @@ impl<'a> LightQueue<'a> {
                     self.points.extend(members.iter().map(|k| {
                         let place = &places[requests[*k as usize].place as usize];
                         ShadingPoint {
-                            worth: [scale * place.bsdf.diffuse, scale * place.bsdf.specular],
+                            worth: scale * place.bsdf.colors,
                             base: scene.ambient * place.bsdf.ambient,
                             ..place.point
                         }
@@ -239,9 +239,9 @@ impl<'a> LightQueue<'a> {
 
     /// Whether what a light sends changes so little within a place's reach that nothing of that shows.
     fn is_even(&self, place: &ArrivalPlace, arrival: &Arrival) -> bool {
-        let [diffuse, specular] = place.colors();
-        let value = place.base + diffuse * arrival.sums.diffuse + specular * arrival.sums.specular;
-        let error = diffuse * arrival.bend.diffuse + specular * arrival.bend.specular;
+        let colors = place.colors();
+        let value = colors.onto(place.base, &arrival.sums);
+        let error = colors.of(&arrival.bend);
         self.arrivals.steps(value, error) <= BEND / (self.scene.lights.len() as f32).sqrt()
     }
 }

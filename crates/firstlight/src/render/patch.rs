@@ -6,7 +6,7 @@ use super::hits::camera_ray;
 use super::resolve::PixelTerms;
 use super::solo::{self, Candidate};
 use crate::color::Rgb;
-use crate::material::Bsdf;
+use crate::material::{Bsdf, Colors, Lobe};
 use crate::math::{Vec3, square};
 use crate::scene::{Hit, Scene};
 use crate::shape::SurfaceInteraction;
@@ -34,11 +34,7 @@ pub(crate) struct Patch {
 }
 
 /// How far colours of the rays of a patch differ, channel by channel.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(crate) struct Contrast {
-    pub diffuse: Rgb,
-    pub specular: Rgb,
-}
+pub(crate) type Contrast = Colors;
 
 /// The camera rays that see a patch.
 #[derive(Clone)]
@@ -266,29 +262,24 @@ impl Patch {
 /// The mean of materials in numbers.
 #[derive(Default)]
 struct Mean {
-    diffuse: Rgb,
-    specular: Rgb,
+    colors: Colors,
     ambient: Rgb,
     count: u32,
     /// The least and the most of diffuse, of specular.
-    range: Option<[[Rgb; 2]; 2]>,
+    range: Option<[Colors; 2]>,
     lobe: Option<crate::material::Lobe>,
     uneven: bool,
 }
 
 impl Mean {
     fn add(&mut self, bsdf: &Bsdf) {
-        self.diffuse += bsdf.diffuse;
-        self.specular += bsdf.specular;
+        self.colors += bsdf.colors;
         self.ambient += bsdf.ambient;
         self.count += 1;
-        let colors = [bsdf.diffuse, bsdf.specular];
-        let range = self.range.get_or_insert([[colors[0]; 2], [colors[1]; 2]]);
-        for ([least, most], color) in range.iter_mut().zip(colors) {
-            (*least, *most) = (least.min(color), most.max(color));
-        }
+        let [least, most] = self.range.get_or_insert([bsdf.colors; 2]);
+        (*least, *most) = (least.min(bsdf.colors), most.max(bsdf.colors));
         // Any ray that sees a highlight says what it is like
-        if !bsdf.specular.is_black() {
+        if bsdf.lobe != Lobe::None {
             match self.lobe {
                 None => self.lobe = Some(bsdf.lobe),
                 Some(lobe) => self.uneven |= lobe != bsdf.lobe,
@@ -299,12 +290,10 @@ impl Mean {
     fn apply(self, patch: &mut Patch) {
         let mean = |sum: Rgb| sum * (1.0 / self.count as f32);
         let lobe = self.lobe.unwrap_or(patch.bsdf.lobe);
-        let (diffuse, specular, ambient) = (mean(self.diffuse), mean(self.specular), mean(self.ambient));
-        patch.bsdf = Bsdf { diffuse, specular, ambient, lobe };
+        patch.bsdf = Bsdf { colors: self.colors.map(mean), ambient: mean(self.ambient), lobe };
         patch.uneven |= self.uneven;
-        if let Some([diffuse, specular]) = self.range {
-            let between = |[least, most]: [Rgb; 2]| Rgb::new(most.r - least.r, most.g - least.g, most.b - least.b);
-            patch.contrast = Contrast { diffuse: between(diffuse), specular: between(specular) };
+        if let Some([least, most]) = self.range {
+            patch.contrast = most + least * -1.0;
         }
     }
 }

@@ -5,9 +5,8 @@ use std::ops::ControlFlow;
 use super::hits::camera_ray;
 use super::resolve::{LightTerm, PixelTerms};
 use super::{Counts, QUESTION_EVERY};
-use crate::color::Rgb;
 use crate::ids::LightId;
-use crate::material::{Bsdf, Lobe};
+use crate::material::{Bsdf, Lobe, MOMENTS, Moments};
 use crate::math::{LaneSum, Ray};
 use crate::scene::{Hit, Scene, Seen};
 use crate::shape::SurfaceInteraction;
@@ -30,9 +29,12 @@ pub(crate) trait Lighting {
 }
 
 /// What arrives from one light, before all colours.
-pub(crate) struct LobeSums {
-    pub diffuse: LaneSum,
-    pub specular: LaneSum,
+pub(crate) struct LobeSums(pub [LaneSum; MOMENTS]);
+
+impl LobeSums {
+    pub fn total(&self) -> Moments {
+        Moments(std::array::from_fn(|k| self.0[k].total()))
+    }
 }
 
 /// What a pixel's camera rays add up to, term by term.
@@ -44,12 +46,12 @@ pub(crate) struct PixelSum {
 
 impl PixelSum {
     pub fn new(scene: &Scene) -> Self {
-        PixelSum { terms: PixelTerms::default(), lights: vec![[Rgb::BLACK; 2]; scene.lights.len()] }
+        PixelSum { terms: PixelTerms::default(), lights: vec![LightTerm::BLACK; scene.lights.len()] }
     }
 
     pub fn clear(&mut self) {
         self.terms = PixelTerms::default();
-        self.lights.fill([Rgb::BLACK; 2]);
+        self.lights.fill(LightTerm::BLACK);
     }
 
     /// Sends the n x n camera rays of pixel (`i`, `j`), row by row, and adds what they see. `hit` says what the ray of
@@ -99,9 +101,8 @@ impl PixelSum {
 
     /// Adds what light `index` sends to a surface: the totals of [`LobeSums`].
     #[inline(always)]
-    pub fn light(&mut self, index: usize, bsdf: &Bsdf, [diffuse, specular]: [f32; 2]) {
-        self.lights[index][0] += bsdf.diffuse * diffuse;
-        self.lights[index][1] += bsdf.specular * specular;
+    pub fn light(&mut self, index: usize, bsdf: &Bsdf, moments: &Moments) {
+        self.lights[index] += bsdf.colors.each(moments);
     }
 
     /// Adds what each light sends.
@@ -120,7 +121,7 @@ impl PixelSum {
                 continue;
             }
             let sums = lighting.gather(scene, index, si, &bsdf.lobe, counts);
-            self.light(index, bsdf, [sums.diffuse.total(), sums.specular.total()]);
+            self.light(index, bsdf, &sums.total());
         }
     }
 

@@ -4,7 +4,7 @@ use super::Counts;
 use super::pixel::{Lighting, LobeSums};
 use crate::ids::LightId;
 use crate::light::{Light, LightSample, Towards};
-use crate::material::Lobe;
+use crate::material::{Lobe, MOMENTS, Moments};
 use crate::math::LaneSum;
 use crate::scene::Scene;
 use crate::shape::SurfaceInteraction;
@@ -24,15 +24,14 @@ impl Lighting for Plain {
         counts: &mut Counts,
     ) -> LobeSums {
         let facing = Facing::new(scene, index, si, lobe);
-        let (mut diffuse, mut specular) = (LaneSum::new(), LaneSum::new());
+        let mut sums = [const { LaneSum::new() }; MOMENTS];
         for k in 0..facing.light.samples() {
             let to = facing.light.towards(k, si.lit_from);
             if let Some(arriving) = facing.arriving(to, || facing.light.sample(k, to.l), counts) {
-                diffuse.add(k, arriving[0]);
-                specular.add(k, arriving[1]);
+                sums.iter_mut().zip(arriving.0).for_each(|(sum, term)| sum.add(k, term));
             }
         }
-        LobeSums { diffuse, specular }
+        LobeSums(sums)
     }
 }
 
@@ -63,7 +62,7 @@ impl<'a> Facing<'a> {
         to: Towards,
         sample: impl FnOnce() -> Option<LightSample>,
         counts: &mut Counts,
-    ) -> Option<[f32; 2]> {
+    ) -> Option<Moments> {
         let si = self.si;
         counts.shadow_rays += 1;
         // Light from below the surface does not count, nor what rounding alone may have lifted above it
@@ -85,6 +84,6 @@ impl<'a> Facing<'a> {
         // What the surface makes of it
         let cos_i = height * sample.inverse_distance;
         let cos_io = si.wo.dot(to.l) * sample.inverse_distance;
-        Some([cos_i * sample.weight, self.lobe.eval(cos_i, self.cos_o, cos_io) * sample.weight])
+        Some(self.lobe.moments(cos_i, self.cos_o, cos_io, sample.weight))
     }
 }

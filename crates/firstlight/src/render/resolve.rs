@@ -1,6 +1,7 @@
 //! From what the camera rays of a pixel see to its colour: a picture is the sum of these terms in one fixed order.
 
 use crate::color::Rgb;
+use crate::material::Colors;
 use crate::scene::Scene;
 
 /// What the rays of a pixel see beside the light of lights, added up.
@@ -15,7 +16,7 @@ pub(crate) struct PixelTerms {
 
 /// What one light sends to the surfaces that they see, added up, with the surfaces' colours and without the light's
 /// scale: diffuse and specular.
-pub(crate) type LightTerm = [Rgb; 2];
+pub(crate) type LightTerm = Colors;
 
 impl PixelTerms {
     /// The mean over the rays, as film: red, green, blue premultiplied, alpha. `lights` come in scene order, each with
@@ -27,9 +28,10 @@ impl PixelTerms {
         let mut color = if scene.transparent { Rgb::BLACK } else { scene.background * uncovered };
         color += mean(self.emission);
         color += mean(self.ambient);
-        for (scale, [diffuse, specular]) in lights {
-            color += scale * mean(diffuse);
-            color += scale * mean(specular);
+        for (scale, term) in lights {
+            for part in term.0 {
+                color += scale * mean(part);
+            }
         }
         let alpha = if scene.transparent { 1.0 - uncovered } else { 1.0 };
         [color.r, color.g, color.b, alpha]

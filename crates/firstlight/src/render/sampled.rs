@@ -9,7 +9,7 @@ use super::lanes::{Obstacles, sum_area};
 use super::pixel::{Lighting, LobeSums};
 use super::plain::Plain;
 use crate::light::{Light, LightKind};
-use crate::material::Lobe;
+use crate::material::{Lobe, Moments};
 use crate::scene::Scene;
 use crate::shape::SurfaceInteraction;
 use crate::visibility::{Settler, Target, View, Viewpoint, Visibility};
@@ -49,11 +49,11 @@ impl<'a> Sampled<'a> {
         si: &SurfaceInteraction,
         lobe: &Lobe,
         counts: &mut Counts,
-    ) -> [f32; 2] {
+    ) -> Moments {
         if !self.is_shadowed(si) {
             return self.unshadowed(si, lobe, counts);
         }
-        let mut sums = [0.0; 2];
+        let mut sums = Moments::ZERO;
         self.settle(settler, &[Viewpoint::of(si)], &mut [0], counts, |_, visibility, view| {
             sums = self.sent(si, lobe, visibility, view);
         });
@@ -61,7 +61,7 @@ impl<'a> Sampled<'a> {
     }
 
     /// What it sends to a point that nothing shadows.
-    pub fn unshadowed(&self, si: &SurfaceInteraction, lobe: &Lobe, counts: &mut Counts) -> [f32; 2] {
+    pub fn unshadowed(&self, si: &SurfaceInteraction, lobe: &Lobe, counts: &mut Counts) -> Moments {
         counts.shadow_rays += self.samples();
         counts.shadow_rays_skipped += self.samples();
         self.lit(si, lobe)
@@ -90,9 +90,9 @@ impl<'a> Sampled<'a> {
 
     /// What it sends to a point that sees so much of it.
     #[inline(always)]
-    pub fn sent(&self, si: &SurfaceInteraction, lobe: &Lobe, visibility: Visibility, view: &View) -> [f32; 2] {
+    pub fn sent(&self, si: &SurfaceInteraction, lobe: &Lobe, visibility: Visibility, view: &View) -> Moments {
         match visibility {
-            Visibility::Hidden | Visibility::BelowHorizon => [0.0; 2],
+            Visibility::Hidden | Visibility::BelowHorizon => Moments::ZERO,
             Visibility::Lit => self.lit(si, lobe),
             Visibility::Mask => self.masked(si, lobe, view),
         }
@@ -100,7 +100,7 @@ impl<'a> Sampled<'a> {
 
     /// Where nothing hides any of it.
     #[inline(always)]
-    fn lit(&self, si: &SurfaceInteraction, lobe: &Lobe) -> [f32; 2] {
+    fn lit(&self, si: &SurfaceInteraction, lobe: &Lobe) -> Moments {
         totals(match &self.light().kind {
             LightKind::Area(area) => sum_area(self.level, area, si, lobe, &Obstacles::default()),
             _ => {
@@ -112,7 +112,7 @@ impl<'a> Sampled<'a> {
 
     /// Past what is in `view`.
     #[inline(always)]
-    fn masked(&self, si: &SurfaceInteraction, lobe: &Lobe, view: &View) -> [f32; 2] {
+    fn masked(&self, si: &SurfaceInteraction, lobe: &Lobe, view: &View) -> Moments {
         totals(match &self.light().kind {
             LightKind::Area(area) => sum_area(self.level, area, si, lobe, &Obstacles::of(view)),
             _ => Plain.gather(self.scene, self.index, si, lobe, &mut Counts::default()),
@@ -120,6 +120,6 @@ impl<'a> Sampled<'a> {
     }
 }
 
-fn totals(sums: LobeSums) -> [f32; 2] {
-    [sums.diffuse.total(), sums.specular.total()]
+fn totals(sums: LobeSums) -> Moments {
+    sums.total()
 }

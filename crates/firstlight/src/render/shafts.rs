@@ -14,7 +14,7 @@ use super::pixel::PixelSum;
 use super::sampled::Sampled;
 use super::{Counts, QUESTION_EVERY};
 use crate::ids::LightId;
-use crate::material::Bsdf;
+use crate::material::{Bsdf, Moments};
 use crate::scene::Scene;
 use crate::shape::SurfaceInteraction;
 use crate::visibility::{Settler, Target, Viewpoint};
@@ -28,7 +28,7 @@ pub(crate) struct Shafts<'a> {
     points: Vec<Viewpoint>,
     surfaces: Vec<(SurfaceInteraction, Bsdf)>,
     /// What one light sends to each point.
-    sums: Vec<[f32; 2]>,
+    sums: Vec<Moments>,
     /// The points that are being lit, part by part.
     order: Vec<u32>,
     settler: Settler,
@@ -111,7 +111,7 @@ impl<'a> Shafts<'a> {
                 for k in start..*end {
                     let (si, bsdf) = &self.surfaces[k];
                     if shines_on(scene, index, si) {
-                        pixel.light(index, bsdf, self.sums[k]);
+                        pixel.light(index, bsdf, &self.sums[k]);
                     }
                 }
                 start = *end;
@@ -126,7 +126,7 @@ impl<'a> Shafts<'a> {
         let light = Sampled::new(scene, self.level, index, self.targets);
         let (surfaces, sums) = (&self.surfaces, &mut self.sums);
         sums.clear();
-        sums.resize(surfaces.len(), [0.0; 2]);
+        sums.resize(surfaces.len(), Moments::ZERO);
         // Those that nothing can shadow
         self.order.clear();
         for (k, (si, bsdf)) in surfaces.iter().enumerate() {

@@ -32,7 +32,7 @@ impl Arrivals<'_> {
         let Some(sample) = light.sample(0, to.l) else {
             return Change::UNKNOWN.with(sums);
         };
-        let weight = sample.weight.max(sums.diffuse) * 1.2;
+        let weight = sample.weight.max(sums.cosine()) * 1.2;
         // A spot's rim, a terminator, a shadow's edge
         let rim = match &light.kind {
             LightKind::Spot(spot) => {
@@ -58,7 +58,7 @@ impl Arrivals<'_> {
         let resolved = edge == 0.0 && rim == 0.0 && swing < RESOLVED_SWING && lobe < RESOLVED;
         let drift = if edge == 0.0 { 0.0 } else { f32::INFINITY };
         let smooth = resolved && terminator == 0.0 && is_smooth(swing, lobe);
-        Change { bend: Sums { diffuse: weight * share, specular }, drift, resolved, smooth, sharp: is_sharp(lobe) }
+        Change { bend: Sums::bounds(weight * share, specular), drift, resolved, smooth, sharp: is_sharp(lobe) }
             .with(sums)
     }
 
@@ -67,7 +67,7 @@ impl Arrivals<'_> {
         let unshadowed = SurfaceInteraction { receives_shadow: false, ..*place.si };
         let si = if place.lit { &unshadowed } else { place.si };
         let sums = Plain.gather(self.scene, index, si, place.lobe, &mut Counts::default());
-        Sums { diffuse: sums.diffuse.total(), specular: sums.specular.total() }
+        sums.total()
     }
 
     /// Whether the edge of a shadow, of a light of one point, may run through the patch: 1, or 0 if that is excluded.

@@ -395,9 +395,9 @@ impl<'a> Tiled<'a> {
                     match outlook {
                         Outlook::Dark => continue,
                         Outlook::Parted => self.arrived[number * lights + light] = Arrival::PARTED,
-                        Outlook::Settled([diffuse, specular]) => {
+                        Outlook::Settled(terms) => {
                             self.arrived[number * lights + light] = Arrival::PARTED;
-                            self.values[number] += (diffuse + specular) * (1.0 / patch.count(scene) as f32);
+                            self.values[number] += terms.sum() * (1.0 / patch.count(scene) as f32);
                         }
                         Outlook::Lit | Outlook::Clear | Outlook::Unknown => {
                             let lit = matches!(outlook, Outlook::Lit);
@@ -424,8 +424,8 @@ impl<'a> Tiled<'a> {
             self.arrivals.arrivals(light, &places, &mut self.found, counts);
             let asked = asked.into_iter().zip(&places).zip(&self.found);
             told.extend(asked.map(|((number, place), arrival)| (number, place.colors(), *arrival)));
-            for (number, [diffuse, specular], arrival) in told {
-                self.values[number] += diffuse * arrival.sums.diffuse + specular * arrival.sums.specular;
+            for (number, colors, arrival) in told {
+                self.values[number] += colors.of(&arrival.sums);
                 self.arrived[number * lights + light] = arrival;
             }
         }
@@ -454,7 +454,7 @@ impl<'a> Tiled<'a> {
             return terms.resolve(scene, scaled.iter().copied());
         }
         self.terms.clear();
-        self.terms.resize(scene.lights.len(), [Rgb::BLACK; 2]);
+        self.terms.resize(scene.lights.len(), LightTerm::BLACK);
         self.light_by_light(at, counts);
         terms.resolve(scene, self.arrivals.scales().iter().copied().zip(self.terms.iter().copied()))
     }

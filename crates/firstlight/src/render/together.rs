@@ -13,7 +13,7 @@ use super::resolve::LightTerm;
 use crate::color::Rgb;
 use crate::integrate::{Arrived, Illumination, Sums};
 use crate::light::SERIES;
-use crate::material::{Bsdf, Lobe};
+use crate::material::{Bsdf, Lobe, MOMENTS};
 use crate::shape::SurfaceInteraction;
 use crate::visibility::{View, Viewpoint};
 
@@ -76,7 +76,7 @@ struct Asking {
     lobe: Lobe,
     base: Rgb,
     scale: Rgb,
-    reflected: [Rgb; 2],
+    reflected: LightTerm,
     series: usize,
     view: View,
     /// What would arrive if nothing were in the way, if that is known.
@@ -112,13 +112,12 @@ impl Asking {
     }
 
     /// The diffuse part and the highlight, with their colours.
-    fn each(&self, sums: &Sums) -> [Rgb; 2] {
-        [self.scale * self.reflected[0] * sums.diffuse, self.scale * self.reflected[1] * sums.specular]
+    fn each(&self, sums: &Sums) -> LightTerm {
+        (self.scale * self.reflected).each(sums)
     }
 
     fn color(&self, sums: &Sums) -> Rgb {
-        let [diffuse, specular] = self.each(sums);
-        diffuse + specular
+        self.each(sums).sum()
     }
 }
 
@@ -218,7 +217,7 @@ impl Together {
         // Which of the series is first: any, but not by a pattern
         let series = (salt.wrapping_mul(0x9e37_79b9) >> 16) as usize % SERIES;
         let each = share / rays as f32;
-        let (sums, terms) = (Sums::default(), [Rgb::BLACK; 2]);
+        let (sums, terms) = (Sums::default(), LightTerm::BLACK);
         Together {
             light,
             each,
@@ -303,8 +302,7 @@ impl Together {
     }
 
     fn add(&mut self, place: &ArrivalPlace, sums: &Sums) {
-        self.terms[0] += place.reflected[0] * sums.diffuse;
-        self.terms[1] += place.reflected[1] * sums.specular;
+        self.terms += place.reflected.each(sums);
         self.value += place.color(sums);
         self.sums = self.sums + *sums;
     }
@@ -473,9 +471,9 @@ impl Together {
             let (mut value, mut moved, mut squares) = (self.value + beside, Rgb::BLACK, Rgb::BLACK);
             let (mut moved_more, mut squares_more) = (Rgb::BLACK, Rgb::BLACK);
             // What would arrive if nothing were in the way, of each kind, and by how many effective points that is told
-            let (mut all, mut effective) = ([Rgb::BLACK; 2], [0.0; 2]);
+            let (mut all, mut effective) = ([Rgb::BLACK; MOMENTS], [0.0; MOMENTS]);
             // The same of those rays only that may meet the edge of a shadow
-            let (mut all_edge, mut effective_edge) = ([Rgb::BLACK; 2], [0.0; 2]);
+            let (mut all_edge, mut effective_edge) = ([Rgb::BLACK; MOMENTS], [0.0; MOMENTS]);
             let (mut sending, mut hidden, mut is_known) = (0, 0, true);
             ask(&asker, asking, stride, to, &mut traced, counts);
             for one in asking.iter_mut() {
@@ -487,7 +485,7 @@ impl Together {
                 let more = one.before.map_or(Rgb::BLACK, |before| color + before * -1.0);
                 (moved_more, squares_more) = (moved_more + more, squares_more + more * more);
                 one.before = Some(color);
-                for (k, (color, points)) in one.each(&whole).into_iter().zip(one.tally.effective()).enumerate() {
+                for (k, (color, points)) in one.each(&whole).0.into_iter().zip(one.tally.effective()).enumerate() {
                     (all[k], effective[k]) = (all[k] + color, effective[k] + points);
                     if !one.settled {
                         (all_edge[k], effective_edge[k]) = (all_edge[k] + color, effective_edge[k] + points);
@@ -500,13 +498,14 @@ impl Together {
             let shows = |error: Rgb| arrivals.steps(value * part, error * part);
             let mixed = traced.mixed as f32 / traced.packets.max(1) as f32;
             // What few points send, or none, can be anything
-            let least = [TOLD.max(sending as f64 * UNEVEN), TOLD];
-            let untold = [0, 1].map(|k| if effective[k] < least[k] { all[k] } else { Rgb::BLACK });
-            let is_told = shows(untold[0] + untold[1]) <= tolerance * UNTOLD;
-            let found = effective[0].max(effective[1]);
+            let sum = |of: &dyn Fn(usize) -> Rgb| (1..MOMENTS).fold(of(0), |sum, k| sum + of(k));
+            let least = |k: usize| if k == 0 { TOLD.max(sending as f64 * UNEVEN) } else { TOLD };
+            let untold = |k: usize| if effective[k] < least(k) { all[k] } else { Rgb::BLACK };
+            let is_told = shows(sum(&untold)) <= tolerance * UNTOLD;
+            let found = effective.iter().copied().fold(0.0, f64::max);
             // What none of so many points meets may hide what one of them sends
             let one = |k: usize| all[k] * (1.0 / effective[k].max(1.0) as f32);
-            let is_clear = found >= f64::from(wanted) * CLEAR && shows(one(0) + one(1)) <= UNMET;
+            let is_clear = found >= f64::from(wanted) * CLEAR && shows(sum(&one)) <= UNMET;
             if is_told && is_known && hidden == 0 && (is_clear || to >= MANY) {
                 return true;
             }
@@ -516,8 +515,7 @@ impl Together {
             let one = DOUBT_OF_QUARTER / asking.len() as f32;
             let more = Rgb::max(moved_more.map(f32::abs) * DOUBT[1], squares_more.map(f32::sqrt) * DOUBT_BY_CHANCE[1]);
             let off = off.max(more * one);
-            let [diffuse, specular] = [0, 1].map(|k| all_edge[k] * of_edge(effective_edge[k]));
-            let edge = (diffuse + specular) * OF_EDGE;
+            let edge = sum(&|k| all_edge[k] * of_edge(effective_edge[k])) * OF_EDGE;
             let error = if by_beams {
                 // As many points of each packet that some edge runs through are on its wrong side
                 let apart = apart(asking);
@@ -528,7 +526,7 @@ impl Together {
                     let of_edge = of_edge(effective[k]);
                     all[k] * (MIXED * apart * (mixed / packets).sqrt()).max(UNANIMOUS * of_edge)
                 };
-                shows(wrong(0) + wrong(1))
+                shows(sum(&wrong))
             } else {
                 shows(off.max(edge))
             };

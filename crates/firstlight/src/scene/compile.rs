@@ -22,10 +22,10 @@ use crate::error::{Diagnostic, SceneError, Severity};
 use crate::ids::TextureId;
 use crate::image::read::{Limits, TexelData, Texels, decode};
 use crate::light::{AreaShape, Light, LightDesc, LightKind, check_samples};
-use crate::material::{LobeKind, MAX_SHININESS, Material, MaterialDesc};
+use crate::material::Material;
 use crate::math::DVec3;
 use crate::shape::{Parallelogram, PlaneSide, ShapeDesc};
-use crate::texture::{Param, Texture, TextureDesc, TextureSpace};
+use crate::texture::{Param, Params, Texture, TextureDesc, TextureSpace};
 use crate::transform::MAX_TIME;
 
 /// How strict compiling is, and which moment is compiled.
@@ -269,30 +269,10 @@ impl SceneDesc {
         let mut materials = Vec::with_capacity(self.materials.len() + 1);
         for (name, desc) in &self.materials {
             let path = format!("material.{}.{name}", desc.kind());
-            materials.push(cx.within(&path, |cx| {
-                let (diffuse, specular, ambient, shininess, lobe) = match desc {
-                    MaterialDesc::Phong(m) => (&m.diffuse, &m.specular, &m.ambient, &m.shininess, LobeKind::Phong),
-                    MaterialDesc::BlinnPhong(m) => {
-                        (&m.diffuse, &m.specular, &m.ambient, &m.shininess, LobeKind::BlinnPhong)
-                    }
-                };
-                Material {
-                    diffuse: textures.color_param(cx, "diffuse", diffuse),
-                    specular: textures.color_param(cx, "specular", specular),
-                    ambient: ambient.as_ref().map(|a| textures.color_param(cx, "ambient", a)),
-                    shininess: textures.number_param(cx, "shininess", shininess, 0.0, MAX_SHININESS as f64),
-                    lobe,
-                }
-            }));
+            materials.push(cx.within(&path, |cx| desc.compile(cx, textures)));
         }
         // The last one is for shapes that name none
-        materials.push(Material {
-            diffuse: Param { texture: None, factor: Rgb::gray(0.8) },
-            specular: Param { texture: None, factor: Rgb::BLACK },
-            ambient: None,
-            shininess: Param { texture: None, factor: 1.0 },
-            lobe: LobeKind::Phong,
-        });
+        materials.push(Material::matte());
         materials
     }
 
@@ -532,25 +512,6 @@ impl<'a> Textures<'a> {
         }
     }
 
-    fn color_param(&mut self, cx: &mut CompileContext, field: &str, param: &ColorParam) -> Param<Rgb> {
-        let path = factor_path(field, &param.texture);
-        let factor = cx.color(&path, param.factor);
-        advise_reflectance(cx, &path, param.factor.linear);
-        Param { texture: self.resolve(cx, field, &param.texture, TextureSpace::Srgb), factor }
-    }
-
-    fn number_param(
-        &mut self,
-        cx: &mut CompileContext,
-        field: &str,
-        param: &NumberParam,
-        low: f64,
-        high: f64,
-    ) -> Param<f32> {
-        let factor = cx.between(&factor_path(field, &param.texture), param.factor, low, high, None);
-        Param { texture: self.resolve(cx, field, &param.texture, TextureSpace::Raw), factor: factor as f32 }
-    }
-
     /// The texture called `name`, read as `space` where it does not say itself.
     fn resolve(
         &mut self,
@@ -655,6 +616,20 @@ impl<'a> Textures<'a> {
         let mut hashes: Vec<_> = self.files.iter().map(|(file, (_, hash))| (*file, *hash)).collect();
         hashes.sort_unstable();
         hashes
+    }
+}
+
+impl Params for Textures<'_> {
+    fn color(&mut self, cx: &mut CompileContext, field: &str, param: &ColorParam) -> Param<Rgb> {
+        let path = factor_path(field, &param.texture);
+        let factor = cx.color(&path, param.factor);
+        advise_reflectance(cx, &path, param.factor.linear);
+        Param { texture: self.resolve(cx, field, &param.texture, TextureSpace::Srgb), factor }
+    }
+
+    fn number(&mut self, cx: &mut CompileContext, field: &str, param: &NumberParam, range: [f64; 2]) -> Param<f32> {
+        let factor = cx.between(&factor_path(field, &param.texture), param.factor, range[0], range[1], None);
+        Param { texture: self.resolve(cx, field, &param.texture, TextureSpace::Raw), factor: factor as f32 }
     }
 }
 

@@ -7,7 +7,8 @@ pub use checkerboard::{Checkerboard, CheckerboardDesc};
 pub use image::{Filter, ImageTexture, ImageTextureDesc, TextureSpace, Wrap};
 
 use crate::color::Rgb;
-use crate::describe::family;
+use crate::context::CompileContext;
+use crate::describe::{ColorParam, NumberParam, family};
 use crate::ids::TextureId;
 use crate::shape::SurfaceInteraction;
 
@@ -40,6 +41,11 @@ impl Texture {
         }
     }
 
+    /// Whether its value is the area mean over the footprint, whatever its size.
+    pub(crate) fn is_exact_mean(&self) -> bool {
+        matches!(self, Texture::Checkerboard(_))
+    }
+
     /// Whether it is proved to be the same all over the footprint, and a little beyond.
     pub(crate) fn is_even(&self, si: &SurfaceInteraction) -> bool {
         match self {
@@ -47,6 +53,12 @@ impl Texture {
             Texture::Image(_) => false,
         }
     }
+}
+
+/// Where the parameters of materials come from: numbers, and textures by name.
+pub(crate) trait Params {
+    fn color(&mut self, cx: &mut CompileContext, field: &str, param: &ColorParam) -> Param<Rgb>;
+    fn number(&mut self, cx: &mut CompileContext, field: &str, param: &NumberParam, range: [f64; 2]) -> Param<f32>;
 }
 
 /// A parameter of a material: the same everywhere, or a texture times a factor. `Param<Rgb>` is colour, `Param<f32>`
@@ -57,6 +69,13 @@ pub struct Param<T> {
     pub texture: Option<TextureId>,
     /// The constant, or the texture's factor.
     pub factor: T,
+}
+
+impl<T> Param<T> {
+    /// The same everywhere.
+    pub(crate) fn constant(factor: T) -> Self {
+        Param { texture: None, factor }
+    }
 }
 
 impl Param<Rgb> {

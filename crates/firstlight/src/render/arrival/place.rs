@@ -2,7 +2,7 @@
 
 use crate::color::Rgb;
 use crate::integrate::{ShadingPoint, Sums};
-use crate::material::Lobe;
+use crate::material::{Colors, Lobe};
 use crate::render::patch::Patch;
 use crate::shape::SurfaceInteraction;
 
@@ -28,12 +28,12 @@ pub(crate) struct ArrivalPlace<'a> {
     pub base: Rgb,
     /// What the two sums are multiplied with: the light's scale, and the surface's colours.
     pub scale: Rgb,
-    pub reflected: [Rgb; 2],
+    pub reflected: Colors,
 }
 
 impl<'a> ArrivalPlace<'a> {
     /// One point, by itself; `base` and what follows as in the struct.
-    pub fn point(si: &'a SurfaceInteraction, lobe: &'a Lobe, base: Rgb, scale: Rgb, reflected: [Rgb; 2]) -> Self {
+    pub fn point(si: &'a SurfaceInteraction, lobe: &'a Lobe, base: Rgb, scale: Rgb, reflected: Colors) -> Self {
         ArrivalPlace {
             si,
             lobe,
@@ -52,13 +52,12 @@ impl<'a> ArrivalPlace<'a> {
 
     /// What sums of the light send.
     pub fn color(&self, sums: &Sums) -> Rgb {
-        let [diffuse, specular] = self.colors();
-        diffuse * sums.diffuse + specular * sums.specular
+        self.colors().of(sums)
     }
 
     /// What the two sums are multiplied with, all in all.
-    pub fn colors(&self) -> [Rgb; 2] {
-        self.reflected.map(|color| self.scale * color)
+    pub fn colors(&self) -> Colors {
+        self.scale * self.reflected
     }
 
     /// The same for all of a patch that is shaded there.

@@ -7,7 +7,7 @@ use super::{At, BLOCK, CLOSE, CROWD, INTEGRALS, LENIENT, LEVELS, Many, ONE, PILO
 use crate::color::Rgb;
 use crate::ids::LightId;
 use crate::light::{Held, LightKind, LightNode, LightTree, Sends, Sent};
-use crate::material::Lobe;
+use crate::material::{Lobe, Moments};
 use crate::math::Vec3;
 use crate::render::arrival::{ArrivalPlace, Arrivals};
 use crate::render::cell::CELL;
@@ -74,7 +74,7 @@ impl<'a> Many<'a> {
                         if matches!(by, By::Middle | By::One)
                             || Dot::new(tree, entry).arrives(scene, fence, &patch.si) =>
                     {
-                        sum + sent(scene, tree, entry, &patch.si, &patch.bsdf.lobe)[0]
+                        sum + sent(scene, tree, entry, &patch.si, &patch.bsdf.lobe).cosine()
                     }
                     _ => sum,
                 })
@@ -102,7 +102,7 @@ impl<'a> Many<'a> {
                 let singles = self.singles.len();
                 let lists = [lit.clone(), maybe.clone()];
                 let (stored, light) = self.in_crowd(patch, &crowd.singles, lists, arrivals, counts);
-                let error = crowd.error([patch.bsdf.diffuse, patch.bsdf.specular]);
+                let error = crowd.error(&patch.bsdf.colors);
                 if arrivals.steps(stored.value, error) > CROWD * LENIENT && guess != Rgb::BLACK {
                     // Darker than was guessed
                     self.singles.truncate(singles);
@@ -162,16 +162,17 @@ impl<'a> Many<'a> {
         stored.lit[LEVELS] = start..self.lit.len() as u32;
         self.add(patch, 0, &mut stored);
         self.add(patch, LEVELS, &mut stored);
-        stored.value = scene.ambient * bsdf.ambient + bsdf.diffuse * stored.sent[0] + bsdf.specular * stored.sent[1];
+        stored.value =
+            (bsdf.colors * stored.sent).0.into_iter().fold(scene.ambient * bsdf.ambient, |sum, part| sum + part);
         let from = self.singles.len() as u32;
-        let mut light = stored.sent[0];
+        let mut light = stored.sent.cosine();
         if !singles.is_empty() {
             arrivals.tolerate(INTEGRALS / (singles.len() as f32).sqrt());
         }
         for index in singles {
             let place = ArrivalPlace { base: stored.value, ..arrivals.place(*index as usize, si, bsdf).over(patch) };
             let arrival = arrivals.arrival(*index as usize, &place, counts);
-            light += arrivals.scale(*index as usize) * arrival.sums.diffuse;
+            light += arrivals.scale(*index as usize) * arrival.sums.cosine();
             stored.value += place.color(&arrival.sums);
             self.singles.push(Single { light: *index, arrival });
         }
@@ -216,24 +217,23 @@ pub(super) fn sent(scene: &Scene, tree: &LightTree, entry: u32, si: &SurfaceInte
     if entry & ONE == 0 {
         return node.send(si.lit_from, si.ns, si.wo, lobe);
     }
-    let [diffuse, specular] = sent_by_one(scene, &tree.nodes[node.one as usize], si, lobe);
-    [node.power * diffuse, node.power * specular]
+    sent_by_one(scene, &tree.nodes[node.one as usize], si, lobe).colors(|sent| node.power * sent)
 }
 
 /// What one light would send if its power were 1.
-pub(super) fn sent_by_one(scene: &Scene, one: &LightNode, si: &SurfaceInteraction, lobe: &Lobe) -> [f32; 2] {
-    let Held::Light(light) = one.held else { return [0.0; 2] };
+pub(super) fn sent_by_one(scene: &Scene, one: &LightNode, si: &SurfaceInteraction, lobe: &Lobe) -> Moments {
+    let Held::Light(light) = one.held else { return Moments::ZERO };
     let light = &scene.lights[light as usize];
     let k = light.samples() / 2;
     let l = light.towards(k, si.lit_from).l;
     let height = si.ns.dot(l);
     if !(si.horizon.dot(l) > 0.0 && height > 0.0) {
-        return [0.0; 2];
+        return Moments::ZERO;
     }
     if matches!(light.kind, LightKind::Area(_)) && one.is_smooth() {
         return one.send_one(si.lit_from, si.ns, si.wo, lobe);
     }
-    let Some(sample) = light.sample(k, l) else { return [0.0; 2] };
+    let Some(sample) = light.sample(k, l) else { return Moments::ZERO };
     let (cos_i, cos_io) = (height * sample.inverse_distance, si.wo.dot(l) * sample.inverse_distance);
-    [cos_i * sample.weight, lobe.eval(cos_i, si.ns.dot(si.wo), cos_io) * sample.weight]
+    lobe.moments(cos_i, si.ns.dot(si.wo), cos_io, sample.weight)
 }

@@ -7,7 +7,7 @@ use super::{ANYTHING, At, INTEGRALS, Many, Single, Stored};
 use crate::color::Rgb;
 use crate::integrate::Sums;
 use crate::light::Sent;
-use crate::material::Lobe;
+use crate::material::{Lobe, Moments};
 use crate::render::arrival::Arrivals;
 use crate::render::counts::Counts;
 use crate::render::fence::Fence;
@@ -43,7 +43,7 @@ impl<'a> Many<'a> {
         let mut terms = std::mem::take(&mut self.terms);
         let mut fence = std::mem::take(&mut self.fence);
         terms.clear();
-        let mut together = [Rgb::BLACK; 2];
+        let mut together = Sent::BLACK;
         for (k, patch) in pixels[index].patches.iter().enumerate() {
             let count = patch.count(scene) as f32;
             let stored = &self.patches[first[index] + k];
@@ -53,14 +53,13 @@ impl<'a> Many<'a> {
             let in_doubt = |single: Option<u32>| doubts.binary_search_by_key(&single, |doubt| doubt.single).is_ok();
             let bsdf = &patch.bsdf;
             if !in_doubt(None) {
-                together[0] += bsdf.diffuse * stored.sent[0] * count;
-                together[1] += bsdf.specular * stored.sent[1] * count;
+                together += bsdf.colors * stored.sent * count;
             }
             for i in stored.singles.clone() {
                 if !in_doubt(Some(i)) {
                     let Single { light, arrival } = self.singles[i as usize];
                     let sums = arrival.sums * count;
-                    terms.push((light, [bsdf.diffuse * sums.diffuse, bsdf.specular * sums.specular]));
+                    terms.push((light, bsdf.colors.each(&sums)));
                 }
             }
             if !doubts.is_empty() {
@@ -73,9 +72,7 @@ impl<'a> Many<'a> {
                                 terms.push((light, arrivals.at_point(light as usize, si, bsdf, 1.0, counts)));
                             }
                             None => {
-                                let [diffuse, specular] = self.sent_at(stored, &mut fence, si, &bsdf.lobe);
-                                together[0] += bsdf.diffuse * diffuse;
-                                together[1] += bsdf.specular * specular;
+                                together += bsdf.colors * self.sent_at(stored, &mut fence, si, &bsdf.lobe);
                             }
                         }
                     }
@@ -86,7 +83,7 @@ impl<'a> Many<'a> {
         // In scene order
         terms.sort_by_key(|(light, _)| *light);
         for same in terms.chunk_by(|a, b| a.0 == b.0) {
-            let term = same.iter().fold([Rgb::BLACK; 2], |sum, (_, term)| [sum[0] + term[0], sum[1] + term[1]]);
+            let term = same.iter().fold(Sent::BLACK, |sum, (_, term)| sum + *term);
             add((arrivals.scale(same[0].0 as usize), term));
         }
         // Of many scales
@@ -97,10 +94,9 @@ impl<'a> Many<'a> {
     /// What nodes send to where one camera ray ends.
     pub(super) fn sent_at(&self, stored: &Stored, fence: &mut Fence, si: &SurfaceInteraction, lobe: &Lobe) -> Sent {
         let (scene, tree) = (self.scene, self.tree);
-        let mut sum = [Rgb::BLACK; 2];
+        let mut sum = Sent::BLACK;
         let mut add = |entry: u32| {
-            let sent = sent(scene, tree, entry, si, lobe);
-            sum = [sum[0] + sent[0], sum[1] + sent[1]];
+            sum += sent(scene, tree, entry, si, lobe);
         };
         if stored.maybe.is_empty() {
             self.nodes(stored).for_each(&mut add);
@@ -129,7 +125,7 @@ impl<'a> Many<'a> {
         let mut all = Rgb::BLACK;
         for channel in 0..3 {
             let of = |color: Rgb| [color.r, color.g, color.b][channel];
-            let sums = |stored: &Stored| Sums { diffuse: of(stored.sent[0]), specular: of(stored.sent[1]) };
+            let sums = |stored: &Stored| Moments(stored.sent.0.map(of));
             let arrived = |index: usize| Some(sums(&self.patches[first[index]]));
             let Some(differences) = second_difference(self.scene, pixels, index, patch, &sums(stored), arrived) else {
                 return anything;
@@ -137,7 +133,7 @@ impl<'a> Many<'a> {
             let bend = within(&differences);
             let one = |channel_of: usize| if channel_of == channel { 1.0 } else { 0.0 };
             let mask = Rgb::new(one(0), one(1), one(2));
-            all += mask * (patch.bsdf.diffuse * bend.diffuse + patch.bsdf.specular * bend.specular);
+            all += mask * patch.bsdf.colors.of(&bend);
         }
         all
     }
@@ -162,12 +158,12 @@ impl<'a> Many<'a> {
             doubts.push(Doubt { shown: 0.0, single, error });
         };
         if stored.lit.iter().any(|range| !range.is_empty()) {
-            let smooth = bsdf.diffuse * stored.bend[0] + bsdf.specular * stored.bend[1];
+            let smooth = (bsdf.colors * stored.bend).sum();
             doubt(None, smooth + self.flicker(pixels, first, (index, k)));
         }
         let shown = |light: u32, bend: &Sums| {
             let scale = arrivals.scale(light as usize);
-            scale * bsdf.diffuse * bend.diffuse + scale * bsdf.specular * bend.specular
+            (scale * bsdf.colors).of(bend)
         };
         for i in stored.singles.clone() {
             let Single { light, arrival } = &self.singles[i as usize];

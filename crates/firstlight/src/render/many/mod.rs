@@ -88,7 +88,7 @@ pub(super) struct Many<'a> {
     lit: Vec<u32>,
     /// Nodes that count where they are seen, block by block.
     dots: Vec<Dot>,
-    terms: Vec<(u32, [Rgb; 2])>,
+    terms: Vec<(u32, Sent)>,
     doubts: Vec<Doubt>,
 }
 
@@ -172,7 +172,7 @@ impl<'a> Many<'a> {
             level: 0,
             open: self.tree.roots.clone(),
             known: [0.0; 3],
-            error: [Rgb::BLACK; 2],
+            error: Sent::BLACK,
             lit: Default::default(),
         };
         for block in 0..BLOCKS * BLOCKS {
@@ -252,7 +252,7 @@ impl<'a> Many<'a> {
             level: above.level + 1,
             open: std::mem::take(&mut self.cut.open),
             known: self.cut.known(),
-            error: [above.error[0] + error[0], above.error[1] + error[1]],
+            error: above.error + error,
             lit,
         };
         if here.level == LEVELS || here.open.is_empty() {
@@ -280,7 +280,7 @@ impl<'a> Many<'a> {
         let singles = self.singles.len();
         let mut stored = self.patch(patch, &above.lit, &above.open, arrivals, counts);
         let bsdf = &patch.bsdf;
-        let shown = arrivals.steps(stored.value, bsdf.diffuse * above.error[0] + bsdf.specular * above.error[1]);
+        let shown = arrivals.steps(stored.value, (bsdf.colors * above.error).sum());
         if shown > BLOCK_BUDGET {
             // Darker than was guessed: by itself, from the beginning
             self.singles.truncate(singles);
@@ -306,7 +306,7 @@ impl<'a> Many<'a> {
             self.add(patch, list, &mut stored);
         }
         let base = scene.ambient * bsdf.ambient;
-        let value = base + bsdf.diffuse * stored.sent[0] + bsdf.specular * stored.sent[1];
+        let value = (bsdf.colors * stored.sent).0.into_iter().fold(base, |sum, part| sum + part);
         let from = self.singles.len();
         stored.value = value;
         if !open.is_empty() {
@@ -343,8 +343,8 @@ impl<'a> Many<'a> {
             stored.lit[LEVELS] = start..self.lit.len() as u32;
             let before = stored.sent;
             self.add(patch, LEVELS, &mut stored);
-            for (color, i) in [(bsdf.diffuse, 0), (bsdf.specular, 1)] {
-                stored.value += color * (stored.sent[i] + before[i] * -1.0);
+            for part in (bsdf.colors * (stored.sent + before * -1.0)).0 {
+                stored.value += part;
             }
         }
         self.singles[from..].sort_unstable_by_key(|single| single.light);
@@ -372,7 +372,7 @@ impl<'a> Many<'a> {
         for entry in &self.lit[range.start as usize..range.end as usize] {
             let sent = sent(self.scene, self.tree, *entry, si, lobe);
             let node = &self.tree.nodes[(entry & !ONE) as usize];
-            stored.sent = [stored.sent[0] + sent[0], stored.sent[1] + sent[1]];
+            stored.sent += sent;
             if patch.reach > 0.0 {
                 let swing = patch.turn + patch.reach / node.distance(si.lit_from).max(patch.reach);
                 let smooth = (swing * swing + 2.0 * swing * patch.off).min(1.0) * SMOOTH;
@@ -381,10 +381,7 @@ impl<'a> Many<'a> {
                 let narrow = (lobe.sharpness(si.ns.dot(si.wo)) * square(moved)).min(1.0);
                 let narrow = (narrow + 2.0 * narrow.sqrt() * patch.off).min(1.0);
                 let specular = if matches!(lobe, Lobe::None) { 0.0 } else { (narrow + smooth).min(1.0) };
-                stored.bend = [
-                    stored.bend[0] + node.power * (weight * smooth),
-                    stored.bend[1] + node.power * (weight * specular),
-                ];
+                stored.bend += Sent::bounds(node.power * (weight * smooth), node.power * (weight * specular));
             }
         }
     }

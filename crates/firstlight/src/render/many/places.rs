@@ -58,7 +58,7 @@ pub(super) fn zone<'p>(patches: impl Iterator<Item = &'p Patch> + Clone, eye: Ve
 }
 
 pub(super) fn tone(scene: &Scene, bsdf: &Bsdf) -> Tone {
-    Tone { base: scene.ambient * bsdf.ambient, known: bsdf.diffuse, error: [bsdf.diffuse, bsdf.specular] }
+    Tone { base: scene.ambient * bsdf.ambient, known: bsdf.colors.cosine(), error: bsdf.colors }
 }
 
 /// The colours of some patches: each once, or where they are too many the rest as one.
@@ -75,11 +75,8 @@ pub(super) fn tones<'p>(scene: &Scene, patches: impl Iterator<Item = &'p Patch>)
             continue;
         }
         let last = &mut tones[TONES - 1];
-        *last = Tone {
-            base: last.base.min(new.base),
-            known: last.known.min(new.known),
-            error: [last.error[0].max(new.error[0]), last.error[1].max(new.error[1])],
-        };
+        *last =
+            Tone { base: last.base.min(new.base), known: last.known.min(new.known), error: last.error.max(new.error) };
     }
     tones
 }

@@ -11,6 +11,7 @@ use crate::integrate::Sums;
 use crate::render::Counts;
 use crate::render::arrival::{ArrivalPlace, Arrivals, Past};
 use crate::render::patch::{Member, Patch, PixelPatches, Rays};
+use crate::render::resolve::LightTerm;
 use crate::render::tile::Tile;
 use crate::render::together::{Outcome, Together};
 use crate::visibility::{View, Viewpoint, Visibility};
@@ -30,7 +31,7 @@ pub(super) enum Outlook {
     /// Rays differ, and nobody asked.
     Parted,
     /// Rays differ, and were asked: what all of them see, added up, diffuse and specular.
-    Settled([Rgb; 2]),
+    Settled(LightTerm),
 }
 
 /// What one ray sees of one light.
@@ -149,8 +150,8 @@ impl Tiled<'_> {
         let mut others = Rgb::BLACK;
         for other in (0..scene.lights.len()).filter(|other| *other != light) {
             let share = match self.outlook(index, k, other) {
-                Outlook::Settled([diffuse, specular]) => {
-                    others += (diffuse + specular) * (1.0 / rays);
+                Outlook::Settled(terms) => {
+                    others += terms.sum() * (1.0 / rays);
                     continue;
                 }
                 Outlook::Lit => 1.0,
@@ -179,8 +180,7 @@ impl Tiled<'_> {
         let Patch { si, bsdf, .. } = &self.pixels[index].patches[k];
         let colors = self.arrivals.place(light, si, bsdf).colors();
         let number = self.seen[index] / self.scene.lights.len() + k;
-        let Sums { diffuse, specular } = self.wholes[light][number].sums;
-        colors[0] * diffuse + colors[1] * specular
+        colors.of(&self.wholes[light][number].sums)
     }
 
     /// What all rays of a pixel's only patch see of a light, ray by ray.

@@ -38,13 +38,11 @@ impl Tiled<'_> {
         for (k, patch) in patches.iter().enumerate() {
             let count = patch.count(scene) as f32;
             for light in 0..scene.lights.len() {
-                if let Outlook::Settled([diffuse, specular]) = self.outlook(index, k, light) {
-                    self.terms[light][0] += diffuse;
-                    self.terms[light][1] += specular;
+                if let Outlook::Settled(terms) = self.outlook(index, k, light) {
+                    self.terms[light] += terms;
                 } else if let Some(sums) = self.at_once(&patches, at, k, light, counts) {
                     let sums = sums * count;
-                    self.terms[light][0] += patch.bsdf.diffuse * sums.diffuse;
-                    self.terms[light][1] += patch.bsdf.specular * sums.specular;
+                    self.terms[light] += patch.bsdf.colors.each(&sums);
                 } else {
                     self.in_quarters(patch, at, k, light, counts);
                 }
@@ -88,8 +86,7 @@ impl Tiled<'_> {
         let Patch { skew, bsdf, si, .. } = *patch;
         if skew > 0.0 {
             let sharp = (2.0 * bsdf.lobe.sharpness(si.ns.dot(si.wo))).sqrt();
-            let Sums { diffuse, specular } = here.sums;
-            let off = Sums { diffuse: diffuse * skew, specular: specular * skew * sharp };
+            let off = (here.sums * skew).zip(Sums::bounds(1.0, sharp), |sum, times| sum * times);
             if self.shown(light, &bsdf, value, &off) > SKEWED * allowed {
                 return None;
             }
@@ -127,15 +124,12 @@ impl Tiled<'_> {
         let n = scene.antialiasing as f32;
         let part = (1.0 - 1.0 / (n * n)) / 24.0;
         let [x, y] = differences;
-        let (diffuse, specular) = ((x.diffuse + y.diffuse) * part, (x.specular + y.specular) * part);
+        let more = (x + y) * part;
         // More than it bends here: something ends between this pixel and the next, the edge of a hard shadow for one
-        if self.shown(light, &patch.bsdf, value, &Sums { diffuse: diffuse.abs(), specular: specular.abs() }) > shown {
+        if self.shown(light, &patch.bsdf, value, &more.map(f32::abs)) > shown {
             return Some(here.sums);
         }
-        Some(Sums {
-            diffuse: (here.sums.diffuse + diffuse).max(0.0),
-            specular: (here.sums.specular + specular).max(0.0),
-        })
+        Some((here.sums + more).at_least_0())
     }
 
     /// How much what arrives changes over a pixel, along both axes together, by its neighbours; `None` where they do
@@ -168,7 +162,7 @@ impl Tiled<'_> {
     /// colours differ that much, and what arrives changes by `slope` along both axes together: two halves, one of each
     /// colour, make an eighth of both.
     fn mingled(&self, light: usize, contrast: &Contrast, slope: &Sums) -> Rgb {
-        let colors = contrast.diffuse * slope.diffuse + contrast.specular * slope.specular;
+        let colors = contrast.of(slope);
         self.arrivals.scale(light) * colors * 0.125
     }
 
@@ -206,10 +200,7 @@ impl Tiled<'_> {
         self.arrivals.arrivals(light, &places, &mut arrivals, counts);
         for (quarter, arrival) in quarters.iter().zip(&arrivals) {
             // The others are as far away as it is wide
-            let slope = arrivals.iter().fold(Sums::default(), |most, other| {
-                let apart = apart(&other.sums, &arrival.sums);
-                Sums { diffuse: most.diffuse.max(apart.diffuse), specular: most.specular.max(apart.specular) }
-            });
+            let slope = arrivals.iter().fold(Sums::default(), |most, other| most.max(other.sums.apart(arrival.sums)));
             if quarter.uneven
                 || arrival.skipped
                 || self.shown(light, &quarter.bsdf, value, &arrival.bend) > allowed
@@ -218,8 +209,7 @@ impl Tiled<'_> {
                 self.at_rays(quarter, at, light, Outlook::Unknown, share, counts);
             } else {
                 let sums = arrival.sums * quarter.count(scene) as f32;
-                self.terms[light][0] += quarter.bsdf.diffuse * sums.diffuse;
-                self.terms[light][1] += quarter.bsdf.specular * sums.specular;
+                self.terms[light] += quarter.bsdf.colors.each(&sums);
             }
         }
     }
@@ -240,7 +230,7 @@ impl Tiled<'_> {
     /// How many display steps an error of the sums of a light makes.
     fn shown(&self, light: usize, bsdf: &Bsdf, value: Rgb, error: &Sums) -> f32 {
         let scale = self.arrivals.scale(light);
-        self.arrivals.steps(value, scale * bsdf.diffuse * error.diffuse + scale * bsdf.specular * error.specular)
+        self.arrivals.steps(value, (scale * bsdf.colors).of(error))
     }
 
     /// Adds what one light sends to a patch, asked at each of its rays. It is as good as `share` of the pixel.
@@ -259,9 +249,7 @@ impl Tiled<'_> {
         let lit = matches!(outlook, Outlook::Lit);
         let clear = lit || matches!(outlook, Outlook::Clear);
         patch.for_each(self.scene, at, |si, bsdf| together.ask(&mut self.arrivals, si, bsdf, lit, clear, counts));
-        let [diffuse, specular] = together.finish(&mut self.arrivals, counts).terms;
-        self.terms[light][0] += diffuse;
-        self.terms[light][1] += specular;
+        self.terms[light] += together.finish(&mut self.arrivals, counts).terms;
     }
 }
 
@@ -272,7 +260,7 @@ fn is_same(scene: &Scene, beside: &Patch, patch: &Patch) -> bool {
 
 /// How far two sums are apart.
 fn apart(one: &Sums, other: &Sums) -> Sums {
-    Sums { diffuse: (one.diffuse - other.diffuse).abs(), specular: (one.specular - other.specular).abs() }
+    one.apart(*other)
 }
 
 /// How far neighbours along each axis differ from what they foretell of a pixel in their middle, by what arrives `here`
@@ -298,9 +286,8 @@ pub(in crate::render) fn second_difference(
             return None;
         }
         let (before, after) = (arrived(neighbours[0])?, arrived(neighbours[1])?);
-        let second = |a: f32, b: f32, c: f32| a - b + (c - b);
-        difference.diffuse = second(before.diffuse, here.diffuse, after.diffuse);
-        difference.specular = second(before.specular, here.specular, after.specular);
+        let less = |a: Sums, b: Sums| a.zip(b, |a, b| a - b);
+        *difference = less(before, *here) + less(after, *here);
     }
     Some(differences)
 }
@@ -308,8 +295,5 @@ pub(in crate::render) fn second_difference(
 /// How far what light does within a pixel can make its mean another, by its second differences.
 pub(in crate::render) fn within(differences: &[Sums; 2]) -> Sums {
     let [x, y] = differences;
-    Sums {
-        diffuse: (x.diffuse.abs() + y.diffuse.abs()) * WITHIN,
-        specular: (x.specular.abs() + y.specular.abs()) * WITHIN,
-    }
+    x.zip(*y, |x, y| (x.abs() + y.abs()) * WITHIN)
 }

@@ -332,10 +332,7 @@ impl Tiled<'_> {
                         foretold = foretold + corner.sums * (across * down);
                     }
                 }
-                let off = Sums {
-                    diffuse: (foretold.diffuse - node.sums.diffuse).abs(),
-                    specular: (foretold.specular - node.sums.specular).abs(),
-                };
+                let off = foretold.apart(node.sums);
                 if self.steps_of([x + i, y + j], light, &node.sums, &off) > foretold_to {
                     return false;
                 }
@@ -354,7 +351,7 @@ impl Tiled<'_> {
                     foretold += node.share * (across * down);
                 }
             }
-            told[number] = Sums { diffuse: sums.diffuse.max(0.0), specular: sums.specular.max(0.0) };
+            told[number] = sums.at_least_0();
             if !share.is_nan() {
                 if !((share - foretold).abs() <= ONE_OFF) {
                     return false;
@@ -378,19 +375,17 @@ impl Tiled<'_> {
                     |step: usize, place: u32| told[if place + 1 < side { number + step } else { number - step }];
                 let mut slope = Sums::default();
                 for other in [beside(1, at[0] - x), beside(side as usize, at[1] - y)] {
-                    slope.diffuse += (other.diffuse - sums.diffuse).abs();
-                    slope.specular += (other.specular - sums.specular).abs();
+                    slope += other.apart(sums);
                 }
-                let Contrast { diffuse, specular } = patch.contrast;
-                let mingled = (diffuse * slope.diffuse + specular * slope.specular) * 0.125;
+                let mingled = patch.contrast.of(&slope) * 0.125;
                 let scale = self.arrivals.scale(light);
-                let value = scale * (patch.bsdf.diffuse * sums.diffuse + patch.bsdf.specular * sums.specular);
+                let value = scale * patch.bsdf.colors.of(&sums);
                 if self.arrivals.steps(value, scale * mingled) > MINGLED {
                     continue;
                 }
             }
             let all = sums * rays;
-            let terms = [patch.bsdf.diffuse * all.diffuse, patch.bsdf.specular * all.specular];
+            let terms = patch.bsdf.colors.each(&all);
             self.note(at, light, Outlook::Settled(terms));
         }
         true
@@ -415,7 +410,7 @@ impl Tiled<'_> {
     fn steps_of(&mut self, at: [u32; 2], light: usize, sums: &Sums, error: &Sums) -> f32 {
         let Some(bsdf) = self.whole(at).map(|patch| patch.bsdf) else { return f32::INFINITY };
         let scale = self.arrivals.scale(light);
-        let color = |sums: &Sums| scale * (bsdf.diffuse * sums.diffuse + bsdf.specular * sums.specular);
+        let color = |sums: &Sums| scale * bsdf.colors.of(sums);
         let others = self.others(self.index(at), 0, light);
         let value: Rgb = self.scene.ambient * bsdf.ambient + others + color(sums);
         self.arrivals.steps(value, color(error))
