@@ -5,10 +5,11 @@
 
 use fearless_simd::{f32x16, prelude::*};
 
-use super::view::View;
+use super::occluder::Exact;
+use super::view::{FlatLight, NEAR, View};
 use crate::color::Rgb;
 use crate::material::Colors;
-use crate::math::{ErrorBound, Facet, LANES, Vec3, Vec3x16};
+use crate::math::{ErrorBound, Facet, LANES, UNIT_ROUNDOFF, Vec3, Vec3x16};
 
 /// Sixteen numbers, one of each member of a batch.
 pub(crate) type Block = [f32; LANES];
@@ -84,6 +85,12 @@ pub(crate) enum ViewNumber {
     Fb,
     Lb,
     Height,
+    /// How far the point is in front of a side that emits; infinite where both do.
+    Facing,
+    /// The direction of a highlight's middle, or 0.
+    MirrorX,
+    MirrorY,
+    MirrorZ,
     /// Heights over the surface's two horizons, and the cosine to the viewer, times |l|: linear over the light.
     CosC,
     CosX,
@@ -125,10 +132,11 @@ impl ViewBlock {
     #[inline(always)]
     pub fn set(&mut self, lane: usize, p: Vec3, v: &View) {
         let (l0, a, b) = (v.l0, v.a, v.b);
+        let mirror = v.mirror().unwrap_or_default();
         #[rustfmt::skip]
         let numbers: [f32; NUMBERS] = [
             p.x, p.y, p.z, l0.x, l0.y, l0.z, a.x, a.y, a.z, b.x, b.y, b.z,
-            v.fa, v.la, v.skew, v.fb, v.lb, v.height,
+            v.fa, v.la, v.skew, v.fb, v.lb, v.height, v.facing, mirror.x, mirror.y, mirror.z,
             v.cos.c, v.cos.x, v.cos.y, v.horizon.c, v.horizon.x, v.horizon.y, v.out.c, v.out.x, v.out.y, v.cos_o,
             v.x[0], v.x[1], v.y[0], v.y[1], v.origin[0], v.origin[1],
             v.ratio, v.behind2, v.measure,
@@ -136,6 +144,75 @@ impl ViewBlock {
         for (block, number) in self.0.iter_mut().zip(numbers) {
             block[lane] = number;
         }
+    }
+}
+
+impl ViewBlock {
+    /// Puts what up to sixteen points see of one flat light into the lanes, as [`View::new`] does; but for those whose
+    /// bits are returned: they are so near that they count its places from the nearest. To be called within
+    /// `vectorize`.
+    #[inline(always)]
+    pub fn see<S: Simd>(&mut self, simd: S, light: &FlatLight, points: &[ShadingPoint]) -> u64 {
+        use ViewNumber::*;
+        macro_rules! vectors {
+            ($of:expr) => {{
+                let mut numbers = [[0.0f32; LANES]; 3];
+                for (k, point) in points.iter().enumerate() {
+                    let v: Vec3 = $of(point);
+                    (numbers[0][k], numbers[1][k], numbers[2][k]) = (v.x, v.y, v.z);
+                }
+                let [x, y, z] = numbers.map(|numbers| f32x16::simd_from(simd, numbers));
+                Vec3x16 { x, y, z }
+            }};
+        }
+        let splat = |v: f32| simd.splat_f32x16(v);
+        let p = vectors!(|point: &ShadingPoint| point.p);
+        let [error, horizon] =
+            [vectors!(|point: &ShadingPoint| point.error.0), vectors!(|point: &ShadingPoint| point.horizon)];
+        let [ns, wo] = [vectors!(|point: &ShadingPoint| point.ns), vectors!(|point: &ShadingPoint| point.wo)];
+        let [a, b, n] = [light.a, light.b, light.n].map(|v| Vec3x16::splat(simd, v));
+        let l0 = Exact::new(light.c).seen_from(simd, p);
+        let side = -n.dot(l0);
+        let (fa, fb) = (Vec3x16::splat(simd, light.ua).dot(l0), Vec3x16::splat(simd, light.ub).dot(l0));
+        // As `way_error`
+        let half = Vec3x16::splat(simd, light.a.abs() + light.b.abs());
+        let middle = Vec3x16::splat(simd, light.c.as_vec3());
+        let (far, way) = (middle.abs() + half, (middle - p).abs() + half);
+        let slack = error + (far + way * splat(4.0)) * splat(UNIT_ROUNDOFF);
+        let cos_o = ns.dot(wo);
+        let mirror = ns * (cos_o * 2.0) - wo;
+        let length = mirror.dot(mirror).sqrt();
+        let is_long = length.simd_gt(0.5);
+        let mirror = mirror * is_long.select(1.0 / length, splat(0.0));
+        let facing = if light.both_sides { splat(f32::INFINITY) } else { side };
+        let line = |v: Vec3x16<S>| [v.dot(l0), v.dot(a), v.dot(b)];
+        let (cos, out) = (line(ns), line(wo));
+        let mut above = line(horizon);
+        above[0] = above[0] - horizon.abs().dot(slack);
+        let mut put = |of: ViewNumber, number: f32x16<S>| self.0[of as usize] = number.to_array();
+        for (of, v) in [([Px, Py, Pz], p), ([L0x, L0y, L0z], l0), ([Ax, Ay, Az], a), ([Bx, By, Bz], b)] {
+            (put(of[0], v.x), put(of[1], v.y), put(of[2], v.z));
+        }
+        (put(MirrorX, mirror.x), put(MirrorY, mirror.y), put(MirrorZ, mirror.z));
+        (put(Fa, fa), put(Fb, fb), put(Height, side.abs()), put(Facing, facing), put(CosO, cos_o));
+        (put(La, splat(light.la)), put(Lb, splat(light.lb)), put(Skew, splat(light.skew)));
+        (put(CosC, cos[0]), put(CosX, cos[1]), put(CosY, cos[2]));
+        (put(HorizonC, above[0]), put(HorizonX, above[1]), put(HorizonY, above[2]));
+        (put(OutC, out[0]), put(OutX, out[1]), put(OutY, out[2]));
+        (put(X0, splat(-1.0)), put(X1, splat(1.0)), put(Y0, splat(-1.0)), put(Y1, splat(1.0)));
+        (put(OriginX, splat(0.0)), put(OriginY, splat(0.0)));
+        (put(Ratio, splat(light.ratio)), put(Behind2, splat(light.behind2)), put(Measure, splat(light.measure())));
+        // The distance to the light's square, or a little less
+        let gap = |foot: f32x16<S>, half: f32| (foot.abs() - half).max(splat(0.0));
+        let (gap_x, gap_y) = (gap(fa, light.la + light.skew.abs()), gap(fb, light.lb));
+        let nearest = (gap_x * gap_x + gap_y * gap_y + side * side).sqrt();
+        nearest.simd_lt(NEAR * light.la.max(light.lb)).to_bitmask()
+    }
+
+    /// From where to where a lane's light goes.
+    pub fn square(&self, lane: usize) -> [[f32; 2]; 2] {
+        use ViewNumber::*;
+        [[X0, X1], [Y0, Y1]].map(|sides| sides.map(|of| self.0[of as usize][lane]))
     }
 }
 

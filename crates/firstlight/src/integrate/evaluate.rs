@@ -17,7 +17,6 @@
 
 use std::f32::consts::FRAC_1_SQRT_2;
 
-use arrayvec::ArrayVec;
 use fearless_simd::{Level, Simd};
 
 use super::Sums;
@@ -25,9 +24,10 @@ use super::batch::{Block, Members, ShadingPoint, ViewBlock};
 use super::classify::{Class, Obstacles, classify};
 use super::emitter::Emitter;
 use super::fit::{Cell, Fits, MOMENTS, Polynomial, coarse, fit};
+use super::grade::{Grades, grade, halves, survey, whole};
 use super::panels::{Between, Blocked, Panel, PanelSums, cut, rows};
 use super::tolerance::{Tolerance, Weight};
-use super::view::{Outline, Receiver, View};
+use super::view::{Receiver, View};
 use crate::color::DisplaySteps;
 use crate::material::{Lobe, Moments};
 use crate::math::{LANES, dispatch_wide, square};
@@ -104,6 +104,10 @@ pub(crate) struct Evaluator {
     views: Vec<ViewBlock>,
     between: Vec<Between>,
     state: Vec<State>,
+    /// Cells to be graded, their grades, and the halves of those that are too wide.
+    grading: Vec<Cell>,
+    grades: Vec<Grades>,
+    next_grading: Vec<Cell>,
     /// Cells that are seen whole, to be asked: those on which light is smooth enough that few nodes may tell it, and
     /// others.
     smooth: Vec<Cell>,
@@ -193,67 +197,126 @@ impl Evaluator {
         self.panels.clear();
         self.polynomials.clear();
         self.seen.clear();
+        let outline = light.emitter.outline();
         for (block, points) in points.chunks(LANES).enumerate() {
             let start = block * LANES;
-            let mut seen: ArrayVec<Option<View>, LANES> = ArrayVec::new();
-            for (k, point) in points.iter().enumerate() {
-                seen.push(view(light, point));
-                if let Some(view) = &seen[k] {
-                    self.views[block].set(k, point.p, view);
-                }
-            }
-            let mut classes = [Class::default(); LANES];
-            if light.shadows {
-                let mut arriving = 0;
-                for (k, view) in seen.iter().enumerate() {
-                    arriving |= u64::from(view.as_ref().is_some_and(View::arrives)) << k;
-                }
-                let views = &self.views;
-                classes = dispatch_wide!(level, simd => {
-                    let members = Members::new(views, |k| (start + k) as u32);
-                    simd.vectorize(
-                        #[inline(always)]
-                        || classify(simd, light.obstacles, light.near, light.emitter, &members, points, arriving),
-                    )
-                });
-            }
-            for (k, view) in seen.iter().enumerate() {
-                let class = &classes[k];
+            let there = self.see(level, light, block, points);
+            let views = &self.views;
+            let (survey, classes) = dispatch_wide!(level, simd => {
+                let members = Members::new(views, |k| (start + k) as u32);
+                simd.vectorize(
+                    #[inline(always)]
+                    || {
+                        let mut survey = survey(simd, &members, light.emitter.is_physical(), points);
+                        survey.arrives &= there;
+                        let asked = if light.shadows { survey.arrives } else { 0 };
+                        let classes = classify(simd, light.obstacles, light.near, light.emitter, &members, points, asked);
+                        (survey, classes)
+                    },
+                )
+            });
+            for (k, (point, class)) in points.iter().zip(&classes).enumerate() {
+                let is = |bits: u64| bits >> k & 1 == 1;
                 let mut one = Arrived {
                     sums: Sums::default(),
                     illumination: Illumination::Below,
-                    proved: false,
+                    proved: point.reach == 0.0,
                     motion: 0.0,
-                    distance: 0.0,
-                    height: 0.0,
+                    distance: if is(there) { survey.nearest[k] } else { 0.0 },
+                    height: if is(there) { survey.height[k] } else { 0.0 },
                 };
-                if light.emitter.surrounds(points[k].p) {
-                    one.illumination = Illumination::Unknown;
-                }
-                let mut between = Between::default();
-                if let Some(view) = view {
-                    (one.distance, one.height) = (view.nearest(), view.height);
-                }
-                if let Some(view) = view.as_ref().filter(|view| view.arrives()) {
+                let is_open = class.between == Between::default();
+                if is(survey.arrives) {
                     one.motion = class.motion;
-                    between = class.between;
                     one.illumination = match class {
                         Class { hidden: true, .. } => Illumination::Hidden,
                         Class { other: true, .. } => Illumination::Unknown,
-                        _ if between == Between::default() && view.is_above_horizon() => Illumination::Full,
+                        _ if is_open && is(survey.above) => Illumination::Full,
                         _ => Illumination::Partial,
                     };
                     if matches!(one.illumination, Illumination::Full | Illumination::Partial) {
-                        let is_open = between == Between::default();
-                        self.state[start + k].cells = self.grade(light, view, (start + k) as u32, is_open);
+                        let number = (start + k) as u32;
+                        self.state[start + k].cells = 1;
+                        self.grading.push(whole(outline, number, self.views[block].square(k)));
                     }
+                } else if light.emitter.surrounds(point.p) {
+                    one.illumination = Illumination::Unknown;
                 }
-                if let Some(view) = view {
-                    one.proved = points[k].reach == 0.0 || is_proved(view, &points[k], &one);
-                }
-                self.between.push(between);
+                // The same for all places within the point's reach
+                one.proved |= match one.illumination {
+                    Illumination::Below => is(there & survey.below_around),
+                    Illumination::Hidden => is(survey.beside_around) && one.motion == 0.0,
+                    Illumination::Full => is(survey.above_around) && one.motion == 0.0,
+                    Illumination::Partial | Illumination::Unknown => false,
+                };
+                self.between.push(class.between);
                 arrived.push(one);
             }
+        }
+        self.grade(level, light);
+    }
+
+    /// Puts what a block of points sees of the light into its lanes. Returns those that see anything of it, bit by bit.
+    fn see(&mut self, level: Level, light: &Asked, block: usize, points: &[ShadingPoint]) -> u64 {
+        let views = &mut self.views[block];
+        let (mut there, mut one_by_one) = (0, u64::MAX);
+        if let Emitter::Flat(flat) = light.emitter {
+            there = u64::MAX;
+            one_by_one = dispatch_wide!(level, simd => simd.vectorize(
+                #[inline(always)]
+                || views.see(simd, flat, points),
+            ));
+        }
+        for (k, point) in points.iter().enumerate().filter(|(k, _)| one_by_one >> k & 1 == 1) {
+            if let Some(flat) = light.emitter.flat(point.p) {
+                there |= 1 << k;
+                let ShadingPoint { p, error, horizon, ns, wo, .. } = *point;
+                views.set(k, p, &View::new(&flat, &Receiver { p, error, horizon, ns, wo, lobe: *light.lobe }));
+            }
+        }
+        there
+    }
+
+    /// Queues the cells that the light is asked by at first. Where nothing is in the way, those of which all is seen are
+    /// told apart.
+    fn grade(&mut self, level: Level, light: &Asked) {
+        let (tolerance, outline) = (light.tolerance, light.emitter.outline());
+        while !self.grading.is_empty() {
+            self.grades.clear();
+            let (grades, views) = (&mut self.grades, &self.views);
+            dispatch_wide!(level, simd => {
+                for cells in self.grading.chunks(LANES) {
+                    let members = Members::new(views, |k| cells[k.min(cells.len() - 1)].point);
+                    grades.push(simd.vectorize(
+                        #[inline(always)]
+                        || grade(simd, light.lobe, tolerance, outline, &members, cells),
+                    ));
+                }
+            });
+            for (k, cell) in self.grading.iter().enumerate() {
+                let grades = &self.grades[k / LANES];
+                let is = |bits: u64| bits >> (k % LANES) & 1 == 1;
+                let state = &mut self.state[cell.point as usize];
+                if is(grades.nothing) {
+                    state.cells -= 1;
+                    continue;
+                }
+                let is_wide = is(grades.wide) && state.may_halve(cell, tolerance);
+                if let Some(halves) = halves(cell, is(grades.along_y)).filter(|_| is_wide) {
+                    state.cells += 1;
+                    self.next_grading.extend(halves);
+                    continue;
+                }
+                let is_open = self.between[cell.point as usize] == Between::default();
+                let queue = match is_open && is(grades.all) {
+                    true if is(grades.smooth) => &mut self.smooth,
+                    true => &mut self.whole,
+                    false => &mut self.cut,
+                };
+                queue.push(*cell);
+            }
+            self.grading.clear();
+            std::mem::swap(&mut self.grading, &mut self.next_grading);
         }
     }
 
@@ -471,139 +534,4 @@ impl State {
     fn may_halve(&self, cell: &Cell, tolerance: &Tolerance) -> bool {
         cell.depth < tolerance.cell_depth && self.cells < tolerance.most_cells
     }
-}
-
-/// Both halves of a cell, along x or along y: at 0, from where places are counted, or in the middle. `None` where no
-/// number is left between.
-fn halves(cell: &Cell, along_y: bool) -> Option<[Cell; 2]> {
-    let [from, to] = if along_y { cell.y } else { cell.x };
-    let middle = if from < 0.0 && to > 0.0 { 0.0 } else { 0.5 * (from + to) };
-    let half = |range: [f32; 2]| {
-        let depth = cell.depth + 1;
-        if along_y { Cell { y: range, depth, ..*cell } } else { Cell { x: range, depth, ..*cell } }
-    };
-    (from < middle && middle < to).then(|| [half([from, middle]), half([middle, to])])
-}
-
-/// How much of a cell is seen where nothing is in the way.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Part {
-    None,
-    Some,
-    All,
-}
-
-impl Part {
-    /// Of a rectangle of a light's square.
-    fn of(view: &View, x: [f32; 2], y: [f32; 2]) -> Part {
-        let corners = [[x[0], y[0]], [x[1], y[0]], [x[1], y[1]], [x[0], y[1]]];
-        let mut part = Part::All;
-        for line in [&view.cos, &view.horizon] {
-            let above = corners.map(|[x, y]| line.at(x, y) > 0.0);
-            if above == [false; 4] {
-                return Part::None;
-            } else if above != [true; 4] {
-                part = Part::Some;
-            }
-        }
-        if view.outline == Outline::Disk {
-            let [ox, oy] = view.origin;
-            let far2 = corners.into_iter().fold(0.0f32, |far, [x, y]| far.max(square(x + ox) + square(y + oy)));
-            let gap = |[from, to]: [f32; 2], o: f32| (from + o).max(-(to + o)).max(0.0);
-            if square(gap(x, ox)) + square(gap(y, oy)) >= 1.0 {
-                return Part::None;
-            } else if far2 > 1.0 {
-                part = Part::Some;
-            }
-        }
-        part
-    }
-}
-
-impl Evaluator {
-    /// Queues the cells that a light is asked by at first: none is wide beside its distance, or beside a highlight on
-    /// it. With nothing in the way (`is_open`), those of which all is seen are told apart. Returns how many there are.
-    fn grade(&mut self, light: &Asked, view: &View, point: u32, is_open: bool) -> u32 {
-        let tolerance = light.tolerance;
-        let sharpness = view.lobe.sharpness(view.cos_o);
-        let mirror = if sharpness > 0.0 { view.mirror() } else { None };
-        let (mut count, mut halved) = (0, 0);
-        let mut open: ArrayVec<Cell, { MAX_GRADED + 2 }> = ArrayVec::new();
-        let [x, y] = view.whole();
-        open.push(Cell { point, x, y, depth: 0 });
-        while let Some(cell) = open.pop() {
-            let [[x0, x1], [y0, y1]] = view.around([cell.x, cell.y]);
-            let (half_x, half_y) = (0.5 * (x1 - x0) * view.la, 0.5 * (y1 - y0) * view.lb);
-            let lean = 0.5 * (y1 - y0) * view.skew.abs();
-            let (x, y) = (0.5 * (x0 + x1), 0.5 * (y0 + y1));
-            let gap = |off: f32, half: f32| (off.abs() - half).max(0.0);
-            let gap_x = gap(view.fa + x * view.la + y * view.skew, half_x + lean);
-            let gap_y = gap(view.fb + y * view.lb, half_y);
-            let distance2 = square(gap_x) + square(gap_y) + square(view.height);
-            let size2 = square(half_x + lean) + square(half_y);
-            let mut is_wide = size2 > square(tolerance.widest_cell) * distance2;
-            let mut is_smooth = size2 < tolerance.smooth_cell * distance2;
-            if sharpness * size2 > tolerance.smooth_cell * distance2 {
-                // How far off the highlight's middle the cell begins
-                let is_far = mirror.is_some_and(|mirror| {
-                    let l = view.l(x, y);
-                    let cos = (l.dot(mirror) / l.length()).clamp(-1.0, 1.0);
-                    let apart = (2.0 * (1.0 - cos)).sqrt() - (size2 / l.length_squared()).sqrt();
-                    sharpness * square(apart.max(0.0)) >= tolerance.highlight_end
-                });
-                is_wide |= mirror.is_some() && !is_far && sharpness * size2 > tolerance.widest_highlight * distance2;
-                is_smooth &= is_far;
-            }
-            let part = Part::of(view, [x0, x1], [y0, y1]);
-            if part == Part::None {
-                continue;
-            }
-            is_wide &= cell.depth < tolerance.cell_depth && halved < tolerance.most_cells && open.len() < MAX_GRADED;
-            // The longer edge, in metres, or on the sphere
-            let along_y = match view.outline {
-                Outline::Sphere => cell.y[1] - cell.y[0] > cell.x[1] - cell.x[0],
-                Outline::Parallelogram | Outline::Disk => square(half_y) + square(lean) > square(half_x),
-            };
-            if let Some([one, other]) = halves(&cell, along_y).filter(|_| is_wide) {
-                halved += 1;
-                open.extend([other, one]);
-            } else {
-                count += 1;
-                let queue = match is_open && part == Part::All {
-                    true if is_smooth => &mut self.smooth,
-                    true => &mut self.whole,
-                    false => &mut self.cut,
-                };
-                queue.push(cell);
-            }
-        }
-        count
-    }
-}
-
-/// The most cells that wait to be halved: each halving leaves one behind.
-const MAX_GRADED: usize = 72;
-
-/// Whether a point's illumination is that of all places within its reach.
-fn is_proved(view: &View, point: &ShadingPoint, arrived: &Arrived) -> bool {
-    let far = view.corners().iter().fold(0.0f32, |far, l| far.max(l.length()));
-    let room = point.reach + point.turn * (far + point.reach);
-    let is_beside = view.height > point.reach || (view.facing.is_infinite() && !view.physical);
-    match arrived.illumination {
-        Illumination::Below => {
-            view.max(&view.horizon) < -room || view.max(&view.cos) < -room || view.facing < -point.reach
-        }
-        Illumination::Hidden => arrived.motion == 0.0 && is_beside,
-        Illumination::Full => {
-            arrived.motion == 0.0 && is_beside && view.min(&view.horizon) > room && view.min(&view.cos) > room
-        }
-        Illumination::Partial | Illumination::Unknown => false,
-    }
-}
-
-/// The light as one point sees it.
-fn view(light: &Asked, point: &ShadingPoint) -> Option<View> {
-    let flat = light.emitter.flat(point.p)?;
-    let ShadingPoint { p, error, horizon, ns, wo, .. } = *point;
-    Some(View::new(&flat, &Receiver { p, error, horizon, ns, wo, lobe: *light.lobe }))
 }

@@ -12,6 +12,7 @@ mod cut;
 mod emitter;
 mod evaluate;
 mod fit;
+mod grade;
 mod hull;
 mod mask;
 mod near;

@@ -1,8 +1,6 @@
 //! A flat light, and how one point sees it.
 
-use std::f32::consts::{FRAC_PI_2, PI};
-
-use pxfm::f_sincos;
+use std::f32::consts::PI;
 
 use crate::light::way_error;
 use crate::material::Lobe;
@@ -79,6 +77,16 @@ impl FlatLight {
             behind2: 0.0,
         }
     }
+
+    /// What dx dy is multiplied with: an area (physical), or a share of the whole.
+    pub(super) fn measure(&self) -> f32 {
+        let area = match self.outline {
+            Outline::Parallelogram => 4.0,
+            Outline::Disk => PI,
+            Outline::Sphere => 4.0 * PI,
+        };
+        self.times * if self.physical { self.la * self.lb } else { 1.0 / area }
+    }
 }
 
 /// A point that asks for light.
@@ -112,7 +120,7 @@ impl Linear {
 
 /// Points nearer to a light than this, in its half size, count its places from the nearest: from the middle, numbers
 /// would cancel.
-const NEAR: f32 = 0.03;
+pub(super) const NEAR: f32 = 0.03;
 
 /// A flat light as one point sees it: l = l0 + x a + y b leads from the point to the light.
 ///
@@ -154,7 +162,7 @@ pub(crate) struct View {
     pub lobe: Lobe,
     pub physical: bool,
     pub outline: Outline,
-    /// What dx dy is multiplied with: an area (physical), or a share of the whole.
+    /// See [`FlatLight::measure`].
     pub measure: f32,
     /// See [`FlatLight::ratio`].
     pub ratio: f32,
@@ -168,11 +176,6 @@ impl View {
         let linear = |v: Vec3| Linear { c: v.dot(l0), x: v.dot(light.a), y: v.dot(light.b) };
         let (cos, mut horizon) = (linear(at.ns), linear(at.horizon));
         horizon.c -= at.horizon.abs().dot(way_error(light.c.as_vec3(), light.a.abs() + light.b.abs(), at.p, at.error));
-        let area = match light.outline {
-            Outline::Parallelogram => 4.0,
-            Outline::Disk => PI,
-            Outline::Sphere => 4.0 * PI,
-        };
         let view = View {
             is_near: false,
             origin: [0.0; 2],
@@ -197,7 +200,7 @@ impl View {
             lobe: at.lobe,
             physical: light.physical,
             outline: light.outline,
-            measure: light.times * if light.physical { light.la * light.lb } else { 1.0 / area },
+            measure: light.measure(),
             ratio: light.ratio,
             behind2: light.behind2,
         };
@@ -244,27 +247,6 @@ impl View {
             out: linear(at.wo),
             ..self
         }
-    }
-
-    /// From where to where the coordinates go by which the light is cut into cells.
-    pub fn whole(&self) -> [[f32; 2]; 2] {
-        match self.outline {
-            Outline::Parallelogram | Outline::Disk => [self.x, self.y],
-            Outline::Sphere => [[-FRAC_PI_2, FRAC_PI_2]; 2],
-        }
-    }
-
-    /// A box of the light's square around a cell.
-    pub fn around(&self, [x, y]: [[f32; 2]; 2]) -> [[f32; 2]; 2] {
-        if self.outline != Outline::Sphere {
-            return [x, y];
-        }
-        let [west, east] = x.map(|x| f_sincos(f64::from(x)).0 as f32);
-        let [(south, first), (north, last)] = y.map(|y| f_sincos(f64::from(y)));
-        let least = first.min(last) as f32;
-        let most = if y[0] < 0.0 && y[1] > 0.0 { 1.0 } else { first.max(last) as f32 };
-        let wide = |w: f32, is_more: bool| w * if is_more { most } else { least };
-        [[wide(west, west < 0.0), wide(east, east > 0.0)], [south as f32, north as f32]]
     }
 
     /// The corners of the light's square, around.

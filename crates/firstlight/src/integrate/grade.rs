@@ -1,0 +1,241 @@
+//! How sixteen points see a light before anything is in the way, and the cells that it is asked by at first: none is
+//! wide beside its distance, or beside a highlight on it.
+
+use std::f32::consts::FRAC_PI_2;
+
+use fearless_simd::{f32x16, mask32x16, prelude::*};
+
+use super::batch::{Block, Linear16, Members, ShadingPoint, ViewNumber};
+use super::fit::Cell;
+use super::occluder::ways;
+use super::tolerance::Tolerance;
+use super::view::Outline;
+use crate::material::Lobe;
+use crate::math::{LANES, Vec3x16, sin_cos, square};
+
+/// What sixteen points see of a light with nothing in the way, each a bit.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Survey {
+    /// Some of it can arrive: a side that emits faces the point, and some of the light is above its horizons.
+    pub arrives: u64,
+    /// All of it is above them.
+    pub above: u64,
+    /// The same for all places within a point's reach: nothing arrives, all is above; and none of them passes the
+    /// light's plane.
+    pub below_around: u64,
+    pub above_around: u64,
+    pub beside_around: u64,
+    /// The distance to the nearest place of the light's square, or a little less; and to its plane.
+    pub nearest: Block,
+    pub height: Block,
+}
+
+/// Looks at a light from up to sixteen points. To be called within `vectorize`.
+#[inline(always)]
+pub(super) fn survey<S: Simd>(simd: S, members: &Members, is_physical: bool, points: &[ShadingPoint]) -> Survey {
+    use ViewNumber::*;
+    let zero = simd.splat_f32x16(0.0);
+    let (mut reach, mut turn) = ([0.0; LANES], [0.0; LANES]);
+    for (k, point) in points.iter().enumerate() {
+        (reach[k], turn[k]) = (point.reach, point.turn);
+    }
+    let (reach, turn) = (f32x16::simd_from(simd, reach), f32x16::simd_from(simd, turn));
+    let [x0, x1] = [members.lanes(simd, X0), members.lanes(simd, X1)];
+    let [y0, y1] = [members.lanes(simd, Y0), members.lanes(simd, Y1)];
+    let (height, facing) = (members.lanes(simd, Height), members.lanes(simd, Facing));
+    let l = ways(simd, members);
+    let mut far2 = zero;
+    for [x, y] in [[x0, y0], [x1, y0], [x1, y1], [x0, y1]] {
+        let corner = l[0] + (l[1] * x + l[2] * y);
+        far2 = far2.max(corner.dot(corner));
+    }
+    let room = reach + turn * (far2.sqrt() + reach);
+    let is_beside =
+        if is_physical { height.simd_gt(reach) } else { height.simd_gt(reach) | facing.simd_eq(f32::INFINITY) };
+    let mut arrives = facing.simd_gt(zero);
+    if is_physical {
+        arrives &= height.simd_gt(zero);
+    }
+    let mut above = arrives;
+    let mut below_around = facing.simd_lt(-reach);
+    let mut above_around = is_beside;
+    for line in [members.linear(simd, [CosC, CosX, CosY]), members.linear(simd, [HorizonC, HorizonX, HorizonY])] {
+        let most = line.c + (line.x * x0).max(line.x * x1) + (line.y * y0).max(line.y * y1);
+        let least = line.c + (line.x * x0).min(line.x * x1) + (line.y * y0).min(line.y * y1);
+        arrives &= most.simd_gt(zero);
+        above &= least.simd_gt(zero);
+        below_around |= most.simd_lt(-room);
+        above_around &= least.simd_gt(room);
+    }
+    let [gap_x, gap_y] = gaps(members, simd);
+    Survey {
+        arrives: arrives.to_bitmask(),
+        above: (arrives & above).to_bitmask(),
+        below_around: below_around.to_bitmask(),
+        above_around: above_around.to_bitmask(),
+        beside_around: is_beside.to_bitmask(),
+        nearest: (gap_x * gap_x + gap_y * gap_y + height * height).sqrt().to_array(),
+        height: height.to_array(),
+    }
+}
+
+/// How far beside the light's square the feet of points are, along its edges, or a little less.
+#[inline(always)]
+pub(super) fn gaps<S: Simd>(members: &Members, simd: S) -> [f32x16<S>; 2] {
+    use ViewNumber::*;
+    let [x0, x1] = [members.lanes(simd, X0), members.lanes(simd, X1)];
+    let [y0, y1] = [members.lanes(simd, Y0), members.lanes(simd, Y1)];
+    let (fa, la, fb, lb) =
+        (members.lanes(simd, Fa), members.lanes(simd, La), members.lanes(simd, Fb), members.lanes(simd, Lb));
+    let lean = members.lanes(simd, Skew).abs() * y1.max(-y0);
+    let zero = simd.splat_f32x16(0.0);
+    let gap_x = (fa - (lean - la * x0)).max(-fa - (la * x1 + lean)).max(zero);
+    let gap_y = (fb + lb * y0).max(-fb - lb * y1).max(zero);
+    [gap_x, gap_y]
+}
+
+/// A light as one cell, as `point` asks it: in the coordinates by which it is cut.
+pub(super) fn whole(outline: Outline, point: u32, [x, y]: [[f32; 2]; 2]) -> Cell {
+    match outline {
+        Outline::Parallelogram | Outline::Disk => Cell { point, x, y, depth: 0 },
+        Outline::Sphere => {
+            let all = [-FRAC_PI_2, FRAC_PI_2];
+            Cell { point, x: all, y: all, depth: 0 }
+        }
+    }
+}
+
+/// What becomes of sixteen cells, each a bit.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Grades {
+    /// Nothing of it is in the light and above the horizons; all of it is.
+    pub nothing: u64,
+    pub all: u64,
+    /// It is too wide, and longer along y than along x; it is so narrow that few nodes may tell it.
+    pub wide: u64,
+    pub along_y: u64,
+    pub smooth: u64,
+}
+
+/// Grades up to sixteen cells. To be called within `vectorize`.
+#[inline(always)]
+pub(super) fn grade<S: Simd>(
+    simd: S,
+    lobe: &Lobe,
+    tolerance: &Tolerance,
+    outline: Outline,
+    members: &Members,
+    cells: &[Cell],
+) -> Grades {
+    use ViewNumber::*;
+    let zero = simd.splat_f32x16(0.0);
+    let mut sides = [[0.0f32; LANES]; 4];
+    for (k, cell) in cells.iter().enumerate() {
+        (sides[0][k], sides[1][k], sides[2][k], sides[3][k]) = (cell.x[0], cell.x[1], cell.y[0], cell.y[1]);
+    }
+    let [u0, u1, v0, v1] = sides.map(|side| f32x16::simd_from(simd, side));
+    let ([x0, x1], [y0, y1]) = match outline {
+        Outline::Parallelogram | Outline::Disk => ([u0, u1], [v0, v1]),
+        Outline::Sphere => around(simd, [u0, u1], [v0, v1]),
+    };
+    let (la, lb, skew) = (members.lanes(simd, La), members.lanes(simd, Lb), members.lanes(simd, Skew));
+    let (half_x, half_y) = ((x1 - x0) * 0.5 * la, (y1 - y0) * 0.5 * lb);
+    let lean = (y1 - y0) * 0.5 * skew.abs();
+    let (x, y) = ((x0 + x1) * 0.5, (y0 + y1) * 0.5);
+    let off_x = (members.lanes(simd, Fa) + x * la + y * skew).abs();
+    let off_y = (members.lanes(simd, Fb) + y * lb).abs();
+    let (gap_x, gap_y) = ((off_x - (half_x + lean)).max(zero), (off_y - half_y).max(zero));
+    let height = members.lanes(simd, Height);
+    let distance2 = gap_x * gap_x + gap_y * gap_y + height * height;
+    let (half_x2, half_y2) = ((half_x + lean) * (half_x + lean), half_y * half_y);
+    let size2 = half_x2 + half_y2;
+    let mut wide = size2.simd_gt(distance2 * square(tolerance.widest_cell));
+    let mut smooth = size2.simd_lt(distance2 * tolerance.smooth_cell);
+    let sharpness = lobe.sharpness_lanes(members.lanes(simd, CosO));
+    let is_sharp = (sharpness * size2).simd_gt(distance2 * tolerance.smooth_cell);
+    if is_sharp.any_true() {
+        // How far off the highlight's middle the cell begins
+        let mirror = members.vectors(simd, [MirrorX, MirrorY, MirrorZ]);
+        let has_mirror = mirror.dot(mirror).simd_gt(zero);
+        let [l0, a, b] = ways(simd, members);
+        let l: Vec3x16<S> = l0 + (a * x + b * y);
+        let length2 = l.dot(l);
+        let cos = (l.dot(mirror) / length2.sqrt()).max(simd.splat_f32x16(-1.0)).min(simd.splat_f32x16(1.0));
+        let apart = (((1.0 - cos) * 2.0).sqrt() - (size2 / length2).sqrt()).max(zero);
+        let is_far = has_mirror & (sharpness * apart * apart).simd_ge(tolerance.highlight_end);
+        let is_across = (sharpness * size2).simd_gt(distance2 * tolerance.widest_highlight);
+        wide |= is_sharp & has_mirror & !is_far & is_across;
+        smooth &= !is_sharp | is_far;
+    }
+    let [nothing, all] = seen(simd, outline, members, [x0, x1], [y0, y1]);
+    let along_y = match outline {
+        // The longer edge, in metres, or on the sphere
+        Outline::Sphere => (v1 - v0).simd_gt(u1 - u0),
+        Outline::Parallelogram | Outline::Disk => (half_y2 + lean * lean).simd_gt(half_x * half_x),
+    };
+    Grades {
+        nothing: nothing.to_bitmask(),
+        all: all.to_bitmask(),
+        wide: wide.to_bitmask(),
+        along_y: along_y.to_bitmask(),
+        smooth: smooth.to_bitmask(),
+    }
+}
+
+/// Boxes of the light's square around cells of a sphere.
+#[inline(always)]
+fn around<S: Simd>(simd: S, [u0, u1]: [f32x16<S>; 2], [v0, v1]: [f32x16<S>; 2]) -> ([f32x16<S>; 2], [f32x16<S>; 2]) {
+    let (zero, one) = (simd.splat_f32x16(0.0), simd.splat_f32x16(1.0));
+    let ((west, _), (east, _)) = (sin_cos(u0), sin_cos(u1));
+    let ((south, first), (north, last)) = (sin_cos(v0), sin_cos(v1));
+    let least = first.min(last).max(zero);
+    let most = (v0.simd_lt(zero) & v1.simd_gt(zero)).select(one, first.max(last));
+    let from = west * west.simd_lt(zero).select(most, least);
+    let to = east * east.simd_gt(zero).select(most, least);
+    ([from, to], [south, north])
+}
+
+/// Of which rectangles of a light's square nothing is in the light and above the horizons, and of which all.
+#[inline(always)]
+fn seen<S: Simd>(
+    simd: S,
+    outline: Outline,
+    members: &Members,
+    [x0, x1]: [f32x16<S>; 2],
+    [y0, y1]: [f32x16<S>; 2],
+) -> [mask32x16<S>; 2] {
+    use ViewNumber::*;
+    let (zero, one) = (simd.splat_f32x16(0.0), simd.splat_f32x16(1.0));
+    let lines: [Linear16<S>; 2] =
+        [members.linear(simd, [CosC, CosX, CosY]), members.linear(simd, [HorizonC, HorizonX, HorizonY])];
+    let [mut nothing, mut all] = [one.simd_lt(zero), one.simd_gt(zero)];
+    for line in &lines {
+        let mut any = one.simd_lt(zero);
+        for [x, y] in [[x0, y0], [x1, y0], [x1, y1], [x0, y1]] {
+            let above = line.at(x, y).simd_gt(zero);
+            (any, all) = (any | above, all & above);
+        }
+        nothing |= !any;
+    }
+    if outline == Outline::Disk {
+        let [ox, oy] = [members.lanes(simd, OriginX), members.lanes(simd, OriginY)];
+        let ([w, e], [s, n]) = ([x0 + ox, x1 + ox], [y0 + oy, y1 + oy]);
+        let far2 = (w * w).max(e * e) + (s * s).max(n * n);
+        let (gap_x, gap_y) = (w.max(-e).max(zero), s.max(-n).max(zero));
+        nothing |= (gap_x * gap_x + gap_y * gap_y).simd_ge(one);
+        all &= !far2.simd_gt(one);
+    }
+    [nothing, all]
+}
+
+/// Both halves of a cell, along x or along y: at 0, from where places are counted, or in the middle. `None` where no
+/// number is left between.
+pub(super) fn halves(cell: &Cell, along_y: bool) -> Option<[Cell; 2]> {
+    let [from, to] = if along_y { cell.y } else { cell.x };
+    let middle = if from < 0.0 && to > 0.0 { 0.0 } else { 0.5 * (from + to) };
+    let half = |range: [f32; 2]| {
+        let depth = cell.depth + 1;
+        if along_y { Cell { y: range, depth, ..*cell } } else { Cell { x: range, depth, ..*cell } }
+    };
+    (from < middle && middle < to).then(|| [half([from, middle]), half([middle, to])])
+}
