@@ -229,24 +229,42 @@ impl<'a> Members<'a> {
         let numbers: [u32; LANES] = std::array::from_fn(numbers);
         Members { blocks: numbers.map(|n| &blocks[n as usize / LANES]), lanes: numbers.map(|n| n as usize % LANES) }
     }
+}
 
+/// What sixteen points see of a flat light, number by number: the points of one block, or those that a batch takes from
+/// many.
+pub(crate) trait Views {
     /// One number of each.
-    #[inline(always)]
-    pub fn lanes<S: Simd>(&self, simd: S, of: ViewNumber) -> f32x16<S> {
-        let one = |k: usize| self.blocks[k].0[of as usize][self.lanes[k] % LANES];
-        f32x16::simd_from(simd, std::array::from_fn(one))
-    }
+    fn lanes<S: Simd>(&self, simd: S, of: ViewNumber) -> f32x16<S>;
 
     /// Three numbers of each, as vectors.
     #[inline(always)]
-    pub fn vectors<S: Simd>(&self, simd: S, [x, y, z]: [ViewNumber; 3]) -> Vec3x16<S> {
+    fn vectors<S: Simd>(&self, simd: S, [x, y, z]: [ViewNumber; 3]) -> Vec3x16<S> {
         Vec3x16 { x: self.lanes(simd, x), y: self.lanes(simd, y), z: self.lanes(simd, z) }
     }
 
     /// A quantity that changes linearly over the light, of each.
     #[inline(always)]
-    pub fn linear<S: Simd>(&self, simd: S, [c, x, y]: [ViewNumber; 3]) -> Linear16<S> {
+    fn linear<S: Simd>(&self, simd: S, [c, x, y]: [ViewNumber; 3]) -> Linear16<S> {
         Linear16 { c: self.lanes(simd, c), x: self.lanes(simd, x), y: self.lanes(simd, y) }
+    }
+}
+
+impl Views for Members<'_> {
+    #[inline(always)]
+    fn lanes<S: Simd>(&self, simd: S, of: ViewNumber) -> f32x16<S> {
+        let mut numbers = [0.0; LANES];
+        for (k, number) in numbers.iter_mut().enumerate() {
+            *number = self.blocks[k].0[of as usize][self.lanes[k] % LANES];
+        }
+        f32x16::simd_from(simd, numbers)
+    }
+}
+
+impl Views for ViewBlock {
+    #[inline(always)]
+    fn lanes<S: Simd>(&self, simd: S, of: ViewNumber) -> f32x16<S> {
+        f32x16::simd_from(simd, self.0[of as usize])
     }
 }
 

@@ -9,7 +9,7 @@ mod solid;
 
 use fearless_simd::{f32x16, prelude::*};
 
-use super::batch::{Linear16, Members, ShadingPoint, ViewNumber};
+use super::batch::{Linear16, ShadingPoint, ViewBlock, ViewNumber, Views};
 use super::cut;
 use super::emitter::Emitter;
 use super::hull::SolidOccluder;
@@ -264,7 +264,7 @@ fn way<S: Simd>(l: &[Vec3x16<S>; 3], x: f32x16<S>, y: f32x16<S>) -> Vec3x16<S> {
 
 impl<S: Simd> Sight<S> {
     #[inline(always)]
-    fn new(simd: S, members: &Members, points: &[ShadingPoint]) -> Sight<S> {
+    fn new(simd: S, views: &ViewBlock, points: &[ShadingPoint]) -> Sight<S> {
         use ViewNumber::*;
         let point = |f: fn(&ShadingPoint) -> f32| {
             let mut numbers = [0.0; LANES];
@@ -273,9 +273,8 @@ impl<S: Simd> Sight<S> {
             }
             numbers
         };
-        let l = ways(simd, members);
-        let (x, y) =
-            ([members.lanes(simd, X0), members.lanes(simd, X1)], [members.lanes(simd, Y0), members.lanes(simd, Y1)]);
+        let l = ways(simd, views);
+        let (x, y) = ([views.lanes(simd, X0), views.lanes(simd, X1)], [views.lanes(simd, Y0), views.lanes(simd, Y1)]);
         let corners = [way(&l, x[0], y[0]), way(&l, x[1], y[0]), way(&l, x[1], y[1]), way(&l, x[0], y[1])];
         let middle = way(&l, (x[0] + x[1]) * 0.5, (y[0] + y[1]) * 0.5);
         let zero = simd.splat_f32x16(0.0);
@@ -294,10 +293,10 @@ impl<S: Simd> Sight<S> {
             far = far.max(l.dot(*l));
         }
         let far = far.sqrt();
-        let slant = members.lanes(simd, Height) / distance;
-        let size = members.lanes(simd, La).min(members.lanes(simd, Lb)) * slant.max(simd.splat_f32x16(0.02)) * 2.0;
+        let slant = views.lanes(simd, Height) / distance;
+        let size = views.lanes(simd, La).min(views.lanes(simd, Lb)) * slant.max(simd.splat_f32x16(0.02)) * 2.0;
         Sight {
-            p: members.vectors(simd, [Px, Py, Pz]),
+            p: views.vectors(simd, [Px, Py, Pz]),
             ways: l,
             x,
             y,
@@ -423,7 +422,7 @@ impl<S: Simd> Sight<S> {
     }
 }
 
-/// The classes of up to sixteen points, whose views `members` are; of those whose bits are in `asked`. What is in trees
+/// The classes of up to sixteen points, whose `views` are in a block; of those whose bits are in `asked`. What is in trees
 /// is `near` and counted after what is in lists. To be called within `vectorize`.
 #[inline(always)]
 pub(crate) fn classify<S: Simd>(
@@ -431,7 +430,7 @@ pub(crate) fn classify<S: Simd>(
     obstacles: &Obstacles,
     near: Option<&Obstacles>,
     emitter: &Emitter,
-    members: &Members,
+    views: &ViewBlock,
     points: &[ShadingPoint],
     asked: u64,
 ) -> [Class; LANES] {
@@ -439,7 +438,7 @@ pub(crate) fn classify<S: Simd>(
     if asked == 0 {
         return classes;
     }
-    let mut sight = Sight::new(simd, members, points);
+    let mut sight = Sight::new(simd, views, points);
     let own = near.is_some().then(|| Own::new(simd, &sight, points));
     let mut asked = asked;
     for (i, (occluder, exact, touch, cuts)) in

@@ -30,7 +30,7 @@ use super::tolerance::{Tolerance, Weight};
 use super::view::{Receiver, View};
 use crate::color::DisplaySteps;
 use crate::material::{Lobe, Moments};
-use crate::math::{LANES, dispatch_wide, square};
+use crate::math::{LANES, dispatch_wide};
 
 /// How much of a light shines on a point.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -201,16 +201,15 @@ impl Evaluator {
         for (block, points) in points.chunks(LANES).enumerate() {
             let start = block * LANES;
             let there = self.see(level, light, block, points);
-            let views = &self.views;
+            let views = &self.views[block];
             let (survey, classes) = dispatch_wide!(level, simd => {
-                let members = Members::new(views, |k| (start + k) as u32);
                 simd.vectorize(
                     #[inline(always)]
                     || {
-                        let mut survey = survey(simd, &members, light.emitter.is_physical(), points);
+                        let mut survey = survey(simd, views, light.emitter.is_physical(), points);
                         survey.arrives &= there;
                         let asked = if light.shadows { survey.arrives } else { 0 };
-                        let classes = classify(simd, light.obstacles, light.near, light.emitter, &members, points, asked);
+                        let classes = classify(simd, light.obstacles, light.near, light.emitter, views, points, asked);
                         (survey, classes)
                     },
                 )
@@ -331,6 +330,9 @@ impl Evaluator {
         let ball = ball.map(|(center, radius)| (center, radius, light.emitter.shows_far_half()));
         let blocked = Blocked { occluders: [occluders, near], ball, cuts, outline, between };
         let moments = light.lobe.moment_count();
+        let tolerance = light.tolerance;
+        let whole_shares = [tolerance.fit_seen, tolerance.fit_seen_slow];
+        let cut_shares = [tolerance.fit_cut, tolerance.fit_cut_slow];
         self.smooth_fits.clear();
         self.fits.clear();
         self.cut_fits.clear();
@@ -351,11 +353,12 @@ impl Evaluator {
             }
             for (cells, is_cut) in asked {
                 let members = Members::new(views, |k| cells[k.min(cells.len() - 1)].point);
+                let shares = if is_cut { cut_shares } else { whole_shares };
                 let first = polynomials.len() as u32;
                 let wanted = is_cut.then_some(&mut *polynomials);
                 let fitted = simd.vectorize(
                     #[inline(always)]
-                    || fit(simd, light.lobe, falloff, &members, cells, wanted),
+                    || fit(simd, light.lobe, falloff, &members, cells, shares, wanted),
                 );
                 if is_cut {
                     cut_fits.push(fitted);
@@ -414,7 +417,8 @@ impl Evaluator {
         for (k, cell) in self.smooth.iter().enumerate() {
             let fits = &self.smooth_fits[k / LANES];
             let state = &mut self.state[cell.point as usize];
-            if coarse_error(state.weight, fits, k) * tolerance.fit_coarse > state.part(tolerance) {
+            let [x, y] = fit_error(state.weight, fits, k);
+            if (x + y) * tolerance.fit_coarse > state.part(tolerance) {
                 self.next_whole.push(*cell);
             } else {
                 state.accept(lane(&fits.sums, k));
@@ -424,7 +428,7 @@ impl Evaluator {
         for (k, cell) in self.whole.iter().enumerate() {
             let fits = &self.fits[k / LANES];
             let state = &mut self.state[cell.point as usize];
-            let error = fit_error(state.weight, fits, k, 1.0, [tolerance.fit_seen, tolerance.fit_seen_slow]);
+            let error = fit_error(state.weight, fits, k);
             let is_off = error[0] + error[1] > state.part(tolerance) && state.may_halve(cell, tolerance);
             if let Some(halves) = halves(cell, error[1] > error[0]).filter(|_| is_off) {
                 state.cells += 1;
@@ -439,8 +443,7 @@ impl Evaluator {
             let cell = self.cut[k];
             let fits = &self.cut_fits[(k - new) / LANES];
             let state = &mut self.state[cell.point as usize];
-            let shares = [tolerance.fit_cut, tolerance.fit_cut_slow];
-            let error = fit_error(state.weight, fits, k - new, self.seen[k], shares);
+            let error = fit_error(state.weight, fits, k - new).map(|error| error * self.seen[k]);
             let is_off = error[0] + error[1] > state.part(tolerance) && state.may_halve(&cell, tolerance);
             if let Some(halves) = halves(&cell, error[1] > error[0]).filter(|_| is_off) {
                 state.cells += 1;
@@ -458,13 +461,17 @@ impl Evaluator {
             let value = lane(&sums.sums, k);
             let differences = lane(&sums.differences, k);
             // The finer rule is better than the difference says, the more the closer both are
-            let error = std::array::from_fn(|moment| {
-                let (difference, value) = (differences[moment], value[moment].abs());
-                let rounding = tolerance.rounding * state.estimate.0[moment].abs();
-                if difference <= rounding { 0.0 } else { difference * (2.0 * (difference / value).sqrt()).min(1.0) }
-            });
+            let error = || {
+                std::array::from_fn(|moment| {
+                    let (difference, value) = (differences[moment], value[moment].abs());
+                    let rounding = tolerance.rounding * state.estimate.0[moment].abs();
+                    if difference <= rounding { 0.0 } else { difference * (2.0 * (difference / value).sqrt()).min(1.0) }
+                })
+            };
             let middle = 0.5 * (panel.y[0] + panel.y[1]);
-            if state.weight.of(error) > state.part(tolerance)
+            let part = state.part(tolerance);
+            if state.weight.of(differences) > part
+                && state.weight.of(error()) > part
                 && panel.depth < tolerance.panel_depth
                 && panel.y[0] < middle
                 && middle < panel.y[1]
@@ -485,29 +492,9 @@ fn lane(block: &[Block; MOMENTS], k: usize) -> [f32; MOMENTS] {
     block.map(|numbers| numbers[k % LANES])
 }
 
-/// How far the fit of the `k`-th cell can be wrong along x and along y, as parts of what is allowed, where so much of
-/// it is `seen`: so much of the end of its series, and more where the series falls slowly, which says less of what
-/// comes after its end.
-fn fit_error(weight: Weight, fits: &Fits, k: usize, seen: f32, [share, slow_share]: [f32; 2]) -> [f32; 2] {
-    let sums = lane(&fits.sums, k);
-    fits.tails.map(|tails| {
-        let tails = lane(&tails, k);
-        weight.of(std::array::from_fn(|moment| {
-            let slow = (tails[moment] / sums[moment].abs()).min(1.0);
-            seen * tails[moment] * (share + slow_share * slow)
-        }))
-    })
-}
-
-/// The same by few nodes, along both axes: what they miss is the third power of the end of the series, where that is
-/// small beside the sum.
-fn coarse_error(weight: Weight, fits: &Fits, k: usize) -> f32 {
-    let sums = lane(&fits.sums, k);
-    let [x, y] = fits.tails.map(|tails| {
-        let tails = lane(&tails, k);
-        weight.of(std::array::from_fn(|moment| tails[moment] * square((tails[moment] / sums[moment].abs()).min(1.0))))
-    });
-    x + y
+/// How far the fit of the `k`-th cell can be wrong along x and along y, as parts of what is allowed.
+fn fit_error(weight: Weight, fits: &Fits, k: usize) -> [f32; 2] {
+    fits.errors.map(|errors| weight.of(lane(&errors, k)))
 }
 
 /// Added to the number of a round once the weight is known.
@@ -528,7 +515,8 @@ impl State {
 
     /// What one part of the light may use up: where there are many, their errors add up.
     fn part(&self, tolerance: &Tolerance) -> f32 {
-        tolerance.part / (self.cells as f32 / tolerance.few_cells).max(1.0).sqrt()
+        let many = self.cells as f32 / tolerance.few_cells;
+        if many > 1.0 { tolerance.part / many.sqrt() } else { tolerance.part }
     }
 
     fn may_halve(&self, cell: &Cell, tolerance: &Tolerance) -> bool {

@@ -9,7 +9,7 @@
 
 use fearless_simd::{f32x16, prelude::*};
 
-use super::batch::{Block, Members, ViewNumber};
+use super::batch::{Block, Members, ViewNumber, Views};
 use crate::material::Lobe;
 use crate::math::{LANES, sin_cos};
 
@@ -138,11 +138,11 @@ pub(crate) struct Cell {
     pub depth: u32,
 }
 
-/// What sixteen cells send, and how far their polynomials can be off along x and along y; each for both moments.
+/// What sixteen cells send, and how far that can be wrong along x and along y; each for both moments.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Fits {
     pub sums: [Block; MOMENTS],
-    pub tails: [[Block; MOMENTS]; 2],
+    pub errors: [[Block; MOMENTS]; 2],
 }
 
 /// What sixteen cells send at the nodes of a rule: [moment][row][column].
@@ -252,9 +252,9 @@ fn sum<S: Simd, const N: usize>(
     (sum, tails)
 }
 
-/// The sums of up to sixteen cells by three nodes along each axis, and how large what comes next in their series is: as
-/// their last coefficient, or, where that is 0 by chance, as the square of the one before. To be called within
-/// `vectorize`.
+/// The sums of up to sixteen cells by three nodes along each axis. What comes next in their series is as large as their
+/// last coefficient, or, where that is 0 by chance, as the square of the one before; what nodes miss is the third power
+/// of that, where it is small beside the sum. To be called within `vectorize`.
 #[inline(always)]
 pub(crate) fn coarse<S: Simd>(simd: S, lobe: &Lobe, falloff: Falloff, members: &Members, cells: &[Cell]) -> Fits {
     let (values, area) = values(simd, &COARSE, lobe, falloff, members, cells);
@@ -263,17 +263,19 @@ pub(crate) fn coarse<S: Simd>(simd: S, lobe: &Lobe, falloff: Falloff, members: &
     for (moment, values) in values.iter().enumerate().take(moments) {
         let (sum, tails) = sum(simd, &COARSE, values);
         fits.sums[moment] = (sum * area).to_array();
-        let least = simd.splat_f32x16(f32::MIN_POSITIVE);
+        let (least, one) = (simd.splat_f32x16(f32::MIN_POSITIVE), simd.splat_f32x16(1.0));
         for (axis, [before, last]) in tails.into_iter().enumerate() {
-            let tail = last + before * (before / sum.abs().max(least)).min(simd.splat_f32x16(1.0));
-            fits.tails[axis][moment] = (tail * area).to_array();
+            let tail = last + before * (before / sum.abs().max(least)).min(one);
+            let part = (tail / sum.abs().max(least)).min(one);
+            fits.errors[axis][moment] = (tail * (part * part) * area).to_array();
         }
     }
     fits
 }
 
-/// The fit of up to sixteen cells. With `polynomials`, the antiderivatives along x: of each cell, moment by moment. To
-/// be called within `vectorize`.
+/// The fit of up to sixteen cells, which can be wrong by so much of the end of its series, and by more where the series
+/// falls slowly, which says less of what comes after its end. With `polynomials`, the antiderivatives along x: of each
+/// cell, moment by moment. To be called within `vectorize`.
 #[inline(always)]
 pub(crate) fn fit<S: Simd>(
     simd: S,
@@ -281,17 +283,20 @@ pub(crate) fn fit<S: Simd>(
     falloff: Falloff,
     members: &Members,
     cells: &[Cell],
+    [share, slow_share]: [f32; 2],
     polynomials: Option<&mut Vec<[Polynomial; MOMENTS]>>,
 ) -> Fits {
     let (values, area) = values(simd, &FINE, lobe, falloff, members, cells);
-    let zero = simd.splat_f32x16(0.0);
+    let (zero, one, least) = (simd.splat_f32x16(0.0), simd.splat_f32x16(1.0), simd.splat_f32x16(f32::MIN_POSITIVE));
     let mut fits = Fits::default();
     let moments = lobe.moment_count();
     for (moment, values) in values.iter().enumerate().take(moments) {
         let (sum, tails) = sum(simd, &FINE, values);
         fits.sums[moment] = (sum * area).to_array();
         for (axis, [before, last]) in tails.into_iter().enumerate() {
-            fits.tails[axis][moment] = ((last + before * 0.3) * area).to_array();
+            let tail = last + before * 0.3;
+            let slow = (tail / sum.abs().max(least)).min(one);
+            fits.errors[axis][moment] = (tail * (slow * slow_share + share) * area).to_array();
         }
     }
     let Some(polynomials) = polynomials else { return fits };

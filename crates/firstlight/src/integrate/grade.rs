@@ -5,7 +5,7 @@ use std::f32::consts::FRAC_PI_2;
 
 use fearless_simd::{f32x16, mask32x16, prelude::*};
 
-use super::batch::{Block, Linear16, Members, ShadingPoint, ViewNumber};
+use super::batch::{Block, Linear16, Members, ShadingPoint, ViewBlock, ViewNumber, Views};
 use super::fit::Cell;
 use super::occluder::ways;
 use super::tolerance::Tolerance;
@@ -32,7 +32,7 @@ pub(super) struct Survey {
 
 /// Looks at a light from up to sixteen points. To be called within `vectorize`.
 #[inline(always)]
-pub(super) fn survey<S: Simd>(simd: S, members: &Members, is_physical: bool, points: &[ShadingPoint]) -> Survey {
+pub(super) fn survey<S: Simd>(simd: S, views: &ViewBlock, is_physical: bool, points: &[ShadingPoint]) -> Survey {
     use ViewNumber::*;
     let zero = simd.splat_f32x16(0.0);
     let (mut reach, mut turn) = ([0.0; LANES], [0.0; LANES]);
@@ -40,10 +40,10 @@ pub(super) fn survey<S: Simd>(simd: S, members: &Members, is_physical: bool, poi
         (reach[k], turn[k]) = (point.reach, point.turn);
     }
     let (reach, turn) = (f32x16::simd_from(simd, reach), f32x16::simd_from(simd, turn));
-    let [x0, x1] = [members.lanes(simd, X0), members.lanes(simd, X1)];
-    let [y0, y1] = [members.lanes(simd, Y0), members.lanes(simd, Y1)];
-    let (height, facing) = (members.lanes(simd, Height), members.lanes(simd, Facing));
-    let l = ways(simd, members);
+    let [x0, x1] = [views.lanes(simd, X0), views.lanes(simd, X1)];
+    let [y0, y1] = [views.lanes(simd, Y0), views.lanes(simd, Y1)];
+    let (height, facing) = (views.lanes(simd, Height), views.lanes(simd, Facing));
+    let l = ways(simd, views);
     let mut far2 = zero;
     for [x, y] in [[x0, y0], [x1, y0], [x1, y1], [x0, y1]] {
         let corner = l[0] + (l[1] * x + l[2] * y);
@@ -59,7 +59,7 @@ pub(super) fn survey<S: Simd>(simd: S, members: &Members, is_physical: bool, poi
     let mut above = arrives;
     let mut below_around = facing.simd_lt(-reach);
     let mut above_around = is_beside;
-    for line in [members.linear(simd, [CosC, CosX, CosY]), members.linear(simd, [HorizonC, HorizonX, HorizonY])] {
+    for line in [views.linear(simd, [CosC, CosX, CosY]), views.linear(simd, [HorizonC, HorizonX, HorizonY])] {
         let most = line.c + (line.x * x0).max(line.x * x1) + (line.y * y0).max(line.y * y1);
         let least = line.c + (line.x * x0).min(line.x * x1) + (line.y * y0).min(line.y * y1);
         arrives &= most.simd_gt(zero);
@@ -67,7 +67,7 @@ pub(super) fn survey<S: Simd>(simd: S, members: &Members, is_physical: bool, poi
         below_around |= most.simd_lt(-room);
         above_around &= least.simd_gt(room);
     }
-    let [gap_x, gap_y] = gaps(members, simd);
+    let [gap_x, gap_y] = gaps(simd, views);
     Survey {
         arrives: arrives.to_bitmask(),
         above: (arrives & above).to_bitmask(),
@@ -81,13 +81,12 @@ pub(super) fn survey<S: Simd>(simd: S, members: &Members, is_physical: bool, poi
 
 /// How far beside the light's square the feet of points are, along its edges, or a little less.
 #[inline(always)]
-pub(super) fn gaps<S: Simd>(members: &Members, simd: S) -> [f32x16<S>; 2] {
+fn gaps<S: Simd>(simd: S, views: &ViewBlock) -> [f32x16<S>; 2] {
     use ViewNumber::*;
-    let [x0, x1] = [members.lanes(simd, X0), members.lanes(simd, X1)];
-    let [y0, y1] = [members.lanes(simd, Y0), members.lanes(simd, Y1)];
-    let (fa, la, fb, lb) =
-        (members.lanes(simd, Fa), members.lanes(simd, La), members.lanes(simd, Fb), members.lanes(simd, Lb));
-    let lean = members.lanes(simd, Skew).abs() * y1.max(-y0);
+    let [x0, x1] = [views.lanes(simd, X0), views.lanes(simd, X1)];
+    let [y0, y1] = [views.lanes(simd, Y0), views.lanes(simd, Y1)];
+    let (fa, la, fb, lb) = (views.lanes(simd, Fa), views.lanes(simd, La), views.lanes(simd, Fb), views.lanes(simd, Lb));
+    let lean = views.lanes(simd, Skew).abs() * y1.max(-y0);
     let zero = simd.splat_f32x16(0.0);
     let gap_x = (fa - (lean - la * x0)).max(-fa - (la * x1 + lean)).max(zero);
     let gap_y = (fb + lb * y0).max(-fb - lb * y1).max(zero);

@@ -11,7 +11,7 @@ use std::f32::consts::PI;
 use arrayvec::ArrayVec;
 use fearless_simd::{f32x16, mask32x16, prelude::*};
 
-use super::batch::{Block, Linear16, Members, ViewNumber};
+use super::batch::{Block, Linear16, ViewNumber, Views};
 use super::hull::{Hull, SolidOccluder};
 use crate::math::{DVec3, Vec3, Vec3x16, sin_cos};
 use crate::shape::Canonical;
@@ -469,10 +469,10 @@ fn is_inside<S: Simd>(lines: &[Linear16<S>; 5], x: f32x16<S>, y: f32x16<S>, but:
 
 /// The three vectors of a view.
 #[inline(always)]
-pub(crate) fn ways<S: Simd>(simd: S, members: &Members) -> [Vec3x16<S>; 3] {
+pub(crate) fn ways<S: Simd>(simd: S, views: &impl Views) -> [Vec3x16<S>; 3] {
     use ViewNumber::*;
     // Written out, here and below: a map of an array is not inlined, and each operation becomes a call
-    [members.vectors(simd, [L0x, L0y, L0z]), members.vectors(simd, [Ax, Ay, Az]), members.vectors(simd, [Bx, By, Bz])]
+    [views.vectors(simd, [L0x, L0y, L0z]), views.vectors(simd, [Ax, Ay, Az]), views.vectors(simd, [Bx, By, Bz])]
 }
 
 impl<S: Simd> Shadow<S> {

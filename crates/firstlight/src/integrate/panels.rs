@@ -11,7 +11,7 @@
 use arrayvec::ArrayVec;
 use fearless_simd::{f32x16, mask32x16, prelude::*};
 
-use super::batch::{Block, Members, ViewNumber};
+use super::batch::{Block, Members, ViewNumber, Views};
 use super::cut::{self, Cut};
 use super::fit::{Cell, MOMENTS, Polynomial};
 use super::occluder::{Breaks, Exact, FAR, Interval16, Occluder, RoundSides, Shadow, ways};
@@ -300,7 +300,7 @@ pub(crate) fn rows<S: Simd>(
         }
     }
     // What is hidden of them, sorted by where it begins
-    let mut hidden = [const { ArrayVec::<Interval16<S>, MAX_INTERVALS>::new_const() }; ROWS];
+    let mut hidden: [ArrayVec<Interval16<S>, MAX_INTERVALS>; ROWS] = std::array::from_fn(|_| ArrayVec::new());
     for occluder in batch.occluders() {
         let (shadow, outside, within) = batch.shadow(simd, occluder);
         let (some_outside, some_within) = (outside.any_true(), within.any_true());

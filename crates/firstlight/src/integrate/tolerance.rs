@@ -56,11 +56,11 @@ impl Tolerance {
         fit_seen_slow: 0.2,
         fit_cut_slow: 2.0,
         fit_coarse: 1.0,
-        smooth_cell: 0.7,
+        smooth_cell: 1.0,
         cell_depth: 64,
         panel_depth: 12,
-        widest_cell: 1.5,
-        widest_highlight: 3.0,
+        widest_cell: 2.0,
+        widest_highlight: 8.0,
         highlight_end: 12.0,
         most_cells: 2048,
         rounding: 3e-7,
@@ -75,7 +75,11 @@ impl Weight {
     /// Where light of `worth` times moments is added to what makes `value` together, and may be off by `allowed` steps.
     /// `least`: see [`DisplaySteps::slope`].
     pub fn new(steps: &DisplaySteps, value: Rgb, worth: &Colors, allowed: f32, least: f32) -> Weight {
-        let used = [value.r, value.g, value.b].map(|value| steps.slope(value, least) / allowed);
+        let used = if value.r == value.g && value.g == value.b {
+            [steps.slope(value.r, least) / allowed; 3]
+        } else {
+            [value.r, value.g, value.b].map(|value| steps.slope(value, least) / allowed)
+        };
         Weight(worth.0.map(|worth| (worth.r * used[0]).max(worth.g * used[1]).max(worth.b * used[2])))
     }
 

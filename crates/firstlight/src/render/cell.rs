@@ -222,17 +222,22 @@ impl<'a> Cells<'a> {
         self.near[depth] = near;
     }
 
+    /// A pixel whose terms are to be summed, from so many rays.
+    fn pixel(&mut self, at: [u32; 2], rays: u32, counts: &mut Counts) -> Pixel {
+        let index = self.index(at);
+        self.work[index] += rays as f32;
+        counts.looks += u64::from(rays);
+        self.states[index] = State::Traced;
+        self.terms.resize(self.terms.len() + self.scene.lights.len(), LightTerm::BLACK);
+        Pixel { index: index as u32, ..Pixel::default() }
+    }
+
     /// Finds out what the rays of a pixel see that meet nothing but these.
     fn trace(&mut self, [i, j]: [u32; 2], near: &[Candidate], counts: &mut Counts) {
         let (scene, mode) = (self.scene, self.mode);
         let n = scene.antialiasing;
-        let index = self.index([i, j]);
-        self.work[index] += (n * n) as f32;
-        counts.looks += (n * n) as u64;
-        self.states[index] = State::Traced;
+        let mut pixel = self.pixel([i, j], n * n, counts);
         let number = self.pixels.len() as u32;
-        self.terms.resize(self.terms.len() + scene.lights.len(), LightTerm::BLACK);
-        let mut pixel = Pixel { index: index as u32, ..Pixel::default() };
         // Which of them each ray meets first: of several at the same distance, the one with the lowest id
         self.rays.clear();
         for (row, column) in (0..n).flat_map(|row| (0..n).map(move |column| (row, column))) {
@@ -325,19 +330,26 @@ impl<'a> Cells<'a> {
         }
         for at in (Square { x, y, side: CELL }).pixels().filter(|[i, j]| *i < scene.width && *j < scene.height) {
             let index = self.index(at);
-            let only = match self.states[index] {
+            let (only, even) = match self.states[index] {
                 State::Done | State::Traced => continue,
-                State::Only(only) => only,
+                State::Only(only) => (only, None),
                 State::Block(block) => {
                     let block = self.blocks[block as usize];
                     if self.is_told(at, &block) {
                         continue;
                     }
-                    block.of
+                    (block.of, block.first.is_none().then_some(block.bsdf))
                 }
             };
             let fragment = self.fragments.all.len();
-            self.trace(at, &[only], counts);
+            let number = self.pixels.len() as u32;
+            match even {
+                Some(bsdf) if self.fragments.add_whole(scene, number, at, only, bsdf) => {
+                    let pixel = self.pixel(at, QUADRANTS, counts);
+                    self.pixels.push(pixel);
+                }
+                _ => self.trace(at, &[only], counts),
+            }
             if fragment == self.fragments.all.len() {
                 continue;
             }
@@ -470,6 +482,12 @@ impl<'a> Cells<'a> {
         // Places of a fragment serve all lights
         let mut last: Option<(u32, Range<usize>)> = None;
         for Wanted { fragment: number, light } in &refused {
+            if self.fragments.all[*number as usize].rays.is_empty() {
+                let index = self.pixels[self.fragments.all[*number as usize].pixel as usize].index as usize;
+                self.fragments.trace(scene, *number as usize, self.at(index));
+                self.work[index] += self.fragments.all[*number as usize].count() as f32;
+                counts.looks += self.fragments.all[*number as usize].count() as u64;
+            }
             let fragment = &self.fragments.all[*number as usize];
             if last.as_ref().is_none_or(|(before, _)| before != number) {
                 let first = self.places.len();
@@ -553,5 +571,7 @@ fn each_mean(scene: &Scene, only: Candidate, square: Square, tell: &mut impl FnM
     }
 }
 
+/// Rays of a pixel that is asked for its quadrants alone.
+const QUADRANTS: u32 = 4;
 /// Pixels across the smallest squares that are asked whether they hold one surface.
 const SMALLEST: u32 = 2;

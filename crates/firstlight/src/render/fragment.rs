@@ -8,6 +8,7 @@ use super::hits::camera_ray;
 use super::light_queue::Place;
 use super::patch::Contrast;
 use super::solo::Candidate;
+use super::square::Square;
 use crate::color::Rgb;
 use crate::ids::SurfaceId;
 use crate::integrate::ShadingPoint;
@@ -36,7 +37,9 @@ pub(crate) struct Fragment {
     pub of: Candidate,
     /// Its material; the colours are the means over its rays.
     pub bsdf: Bsdf,
-    /// Its rays among all of the cell, and their materials, if they are not all the same.
+    /// How many of the pixel's rays see it.
+    pub count: u32,
+    /// They among all of the cell, none while nobody needs them; and their materials, if they are not all the same.
     pub rays: Range<usize>,
     pub bsdfs: Option<Range<usize>>,
     /// Its quadrants among all of the cell; none where it is lit at each ray.
@@ -96,7 +99,7 @@ pub(crate) struct Fragments {
 impl Fragment {
     /// How many of the pixel's rays see it.
     pub fn count(&self) -> usize {
-        self.rays.len()
+        self.count as usize
     }
 }
 
@@ -162,11 +165,63 @@ impl Fragments {
             pixel,
             of,
             bsdf: mean.bsdf,
+            count: (all.len() - first) as u32,
             rays: first..all.len(),
             bsdfs,
             quadrants: quadrants..self.quadrants.len(),
         });
         self.rays = all;
+    }
+
+    /// Adds a pixel that is proved to see one shape of one material, from the middles of its quadrants alone; `false` if
+    /// it is to be asked for its rays.
+    pub fn add_whole(&mut self, scene: &Scene, pixel: u32, [i, j]: [u32; 2], of: Candidate, bsdf: Bsdf) -> bool {
+        let n = scene.antialiasing;
+        if n % 2 == 1 || (n * n) as usize <= FEW_RAYS {
+            return false;
+        }
+        let mut points = ArrayVec::<ShadingPoint, 4>::new();
+        for [x, y] in [[0.25, 0.25], [0.75, 0.25], [0.25, 0.75], [0.75, 0.75]] {
+            let (ray, _) = scene.camera.local_ray(i as f32 + x, j as f32 + y, 1.0);
+            match of.intersect(scene, &ray) {
+                Some(t) => points.push(of.point(scene, &ray, t)),
+                None => return false,
+            }
+        }
+        // From the middle of a quadrant to the farthest of its rays, as a part of the way to that of the opposite one
+        let part = 0.5 - 1.0 / n as f32;
+        let apart = |one: usize, other: usize| (points[one].p - points[other].p).length();
+        let reach = part * apart(0, 3).max(apart(1, 2));
+        let turn = reach * of.curvature(scene);
+        if turn > MAX_TURN {
+            return false;
+        }
+        let first = self.quadrants.len();
+        for point in points {
+            let (place, rays) = (self.places.len() as u32, n * n / 4);
+            self.quadrants.push(Quadrant { place, rays, contrast: Contrast::default() });
+            self.places.push(Place::new(scene, ShadingPoint { reach, turn, ..point }, of.surface(scene), &bsdf));
+        }
+        let quadrants = first..self.quadrants.len();
+        self.all.push(Fragment { pixel, of, bsdf, count: n * n, rays: 0..0, bsdfs: None, quadrants });
+        true
+    }
+
+    /// Finds the rays of a fragment that was added whole, in pixel (`i`, `j`). Where a rounding lets one miss, the last
+    /// that does not stands for it.
+    pub fn trace(&mut self, scene: &Scene, fragment: usize, [i, j]: [u32; 2]) {
+        let n = scene.antialiasing;
+        let (of, first) = (self.all[fragment].of, self.rays.len());
+        for (row, column) in (0..n).flat_map(|row| (0..n).map(move |column| (row, column))) {
+            let (ray, _) = camera_ray(scene, i * n + column, j * n + row);
+            let hit = of.intersect(scene, &ray).map(|t| RayHit { ray, t, at: [column as u16, row as u16] });
+            self.rays.extend(hit);
+        }
+        if let Some(last) = self.rays[first..].last().copied() {
+            self.rays.resize(first + (n * n) as usize, last);
+        }
+        let fragment = &mut self.all[fragment];
+        (fragment.rays, fragment.count) = (first..self.rays.len(), (self.rays.len() - first) as u32);
     }
 
     /// The material in the middle of a pixel, and whether it is that of all its rays.
@@ -286,29 +341,32 @@ impl Candidate {
 
     /// The mean material over the rays of a pixel that sees only this; `None` where more than colours change.
     pub fn mean(self, scene: &Scene, at: [u32; 2]) -> Option<(Bsdf, Contrast)> {
-        if let Some(mean) = self.mean_of_quarters(scene, at) {
+        let whole = self.of_square(scene, Square { x: at[0], y: at[1], side: 1 });
+        if let Some((bsdf, true)) = whole {
+            return Some((bsdf, Contrast::default()));
+        }
+        if let Some(mean) = whole.and_then(|(whole, _)| self.mean_of_quarters(scene, at, &whole)) {
             return Some(mean);
         }
-        let n = scene.antialiasing;
-        let mean = self.mean_of_parts(scene, at, n)?;
+        let mean = self.mean_of_parts(scene, at, scene.antialiasing)?;
         (!mean.uneven).then_some((mean.bsdf, mean.contrast))
     }
 
     /// The same from the quarters of a pixel, where they are as exact as its rays: where textures tell the mean over any
-    /// area, and the whole pixel says the same.
-    fn mean_of_quarters(self, scene: &Scene, at: [u32; 2]) -> Option<(Bsdf, Contrast)> {
+    /// area, and the `whole` pixel says the same.
+    fn mean_of_quarters(self, scene: &Scene, at: [u32; 2], whole: &Bsdf) -> Option<(Bsdf, Contrast)> {
         let surface = &scene.geometry.surfaces[self.surface(scene).index()];
         let is_exact = scene.materials[surface.material?.index()].is_exact_mean(&scene.textures);
         if scene.antialiasing <= 2 || !is_exact {
             return None;
         }
-        let [whole, quarters] = [self.mean_of_parts(scene, at, 1)?, self.mean_of_parts(scene, at, 2)?];
+        let quarters = self.mean_of_parts(scene, at, 2)?;
         let is_same = |one: Rgb, other: Rgb| {
             let (off, allowed) = ((one + other * -1.0).map(f32::abs), other * SAME_MEAN);
             off.r <= allowed.r && off.g <= allowed.g && off.b <= allowed.b
         };
-        let is_same = is_same(whole.bsdf.ambient, quarters.bsdf.ambient)
-            && whole.bsdf.colors.0.into_iter().zip(quarters.bsdf.colors.0).all(|(one, other)| is_same(one, other));
+        let is_same = is_same(whole.ambient, quarters.bsdf.ambient)
+            && whole.colors.0.into_iter().zip(quarters.bsdf.colors.0).all(|(one, other)| is_same(one, other));
         // Rays differ by more than quarters, the means of some of them: by twice as much at most, along each axis
         (is_same && !quarters.uneven).then_some((quarters.bsdf, quarters.contrast * 2.0))
     }

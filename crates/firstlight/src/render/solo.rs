@@ -257,8 +257,8 @@ impl Candidate {
         self.intersect(scene, ray).map(|t| self.hit_at(scene, t))
     }
 
-    /// The material over a square of pixels that see only this, if it is the same all over it.
-    pub fn even(self, scene: &Scene, square: Square) -> Option<Bsdf> {
+    /// The material of a square of pixels that see only this, in its middle, and whether it is the same all over it.
+    pub fn of_square(self, scene: &Scene, square: Square) -> Option<(Bsdf, bool)> {
         let middle = |from: u32| from as f32 + 0.5 * square.side as f32;
         let (ray, differential) = scene.camera.local_ray(middle(square.x), middle(square.y), square.side as f32);
         let hit = self.hit(scene, &ray)?;
@@ -266,7 +266,12 @@ impl Candidate {
         let material = &scene.materials[si.material.index()];
         let is_even =
             self.is_flat_over(scene, &si, &ray, hit.t, &differential) && material.is_even(&si, &scene.textures);
-        is_even.then(|| material.bsdf(&si, &scene.textures))
+        Some((material.bsdf(&si, &scene.textures), is_even))
+    }
+
+    /// The same, if it is the same all over it.
+    pub fn even(self, scene: &Scene, square: Square) -> Option<Bsdf> {
+        self.of_square(scene, square).and_then(|(bsdf, is_even)| is_even.then_some(bsdf))
     }
 
     /// Whether the steps of a ray to its neighbours say within a half what lies between them: at the rim of what is
