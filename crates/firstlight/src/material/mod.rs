@@ -134,7 +134,7 @@ impl Material {
             && self.shininess.texture.is_none()
     }
 
-    /// Whether it is the same all over the footprint of a surface, and a little beyond.
+    /// Whether it is the same all within a step of the footprint of a surface.
     pub(crate) fn is_even(&self, si: &SurfaceInteraction, textures: &[Texture]) -> bool {
         let even = |texture: Option<TextureId>| texture.is_none_or(|id| textures[id.index()].is_even(si));
         even(self.diffuse.texture)

@@ -536,12 +536,12 @@ impl<'a> Cells<'a> {
     /// Hands over the part of the cell that is in the tile.
     fn deliver(&mut self, tile: &Tile, film: &mut FilmTile, counts: &mut Counts) {
         let rays = (self.scene.antialiasing * self.scene.antialiasing) as u64;
-        for index in 0..PIXELS {
-            let [i, j] = self.at(index);
-            if tile.contains([i, j]) {
-                counts.camera_rays += rays;
-                film.set(i - tile.x, j - tile.y, self.colors[index], self.work[index]);
-            }
+        let [left, top] = self.corner;
+        let columns = left.max(tile.x)..(left + CELL).min(tile.x + tile.width);
+        for j in top.max(tile.y)..(top + CELL).min(tile.y + tile.height) {
+            let row = self.index([columns.start, j])..self.index([columns.start, j]) + columns.len();
+            counts.camera_rays += rays * columns.len() as u64;
+            film.set_row(columns.start - tile.x, j - tile.y, &self.colors[row.clone()], &self.work[row]);
         }
     }
 }

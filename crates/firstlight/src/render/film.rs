@@ -141,11 +141,17 @@ impl FilmTile {
     /// it took.
     #[inline(always)]
     pub fn set(&mut self, x: u32, y: u32, rgba: [f32; 4], work: f32) {
+        self.set_row(x, y, &[rgba], &[work]);
+    }
+
+    /// The same of pixels side by side.
+    #[inline(always)]
+    pub fn set_row(&mut self, x: u32, y: u32, rgba: &[[f32; 4]], work: &[f32]) {
         let index = (y * self.tile.width + x) as usize;
         for (plane, values) in &mut self.planes {
             match (plane, values) {
-                (Plane::Color, Values::Four(pixels)) => pixels[index] = rgba,
-                (Plane::Rays, Values::One(pixels)) => pixels[index] = work,
+                (Plane::Color, Values::Four(pixels)) => pixels[index..index + rgba.len()].copy_from_slice(rgba),
+                (Plane::Rays, Values::One(pixels)) => pixels[index..index + work.len()].copy_from_slice(work),
                 _ => unreachable!("each plane has its numbers"),
             }
         }

@@ -235,13 +235,11 @@ impl Fragments {
             return (of.bsdf(scene, ray, &camera_ray(scene, x, y).1), true);
         }
         let (ray, whole) = scene.camera.local_ray(i as f32 + 0.5, j as f32 + 0.5, 1.0);
-        let middle = match of.hit(scene, &ray) {
-            Some(hit) => RayHit { ray, t: hit.t, at: [0; 2] },
-            None => rays[0],
-        };
+        let is_seen = of.intersect(scene, &ray);
+        let middle = is_seen.map_or(rays[0], |t| RayHit { ray, t, at: [0; 2] });
         let si = scene.local_surface(&middle.ray, &of.hit_at(scene, middle.t), &whole);
         let material = &scene.materials[si.material.index()];
-        let even = of.is_flat_over(scene, &si, &middle.ray, middle.t, &whole) && material.is_even(&si, &scene.textures);
+        let even = is_seen.is_some() && of.is_even_over(scene, &si, &middle.ray, middle.t, &whole);
         (material.bsdf(&si, &scene.textures), even)
     }
 

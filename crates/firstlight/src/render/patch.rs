@@ -131,9 +131,7 @@ impl Patch {
             // The pixel's only ray is that of its middle
             let (ray, differential) = camera_ray(scene, pixel[0], pixel[1]);
             patch.si = scene.local_surface(&ray, &hit, &differential);
-        } else if !(candidate.is_flat_over(scene, &si, &ray, hit.t, &differential)
-            && material.is_even(&si, &scene.textures))
-        {
+        } else if !candidate.is_even_over(scene, &si, &ray, hit.t, &differential) {
             let mut mean = Mean::default();
             patch.for_each(scene, pixel, |_, bsdf| mean.add(bsdf));
             mean.apply(&mut patch);
@@ -185,7 +183,7 @@ impl Patch {
         let (ray, whole) = scene.camera.local_ray(pixel[0] as f32 + 0.5, pixel[1] as f32 + 0.5, 1.0);
         let even = candidate.hit(scene, &ray).is_some_and(|hit| {
             let si = scene.local_surface(&ray, &hit, &whole);
-            candidate.is_flat_over(scene, &si, &ray, hit.t, &whole) && material.is_even(&si, &scene.textures)
+            candidate.is_even_over(scene, &si, &ray, hit.t, &whole)
         });
         if mask.count_ones() > 1 && !even {
             let mut mean = Mean::default();

@@ -4,13 +4,15 @@
 //! through the corners all meet one convex shape, so do all between them; and if it is nearer there than anything else
 //! can be, it is all that is seen.
 
+use std::f32::consts::PI;
+
 use super::square::Square;
 use crate::ids::SurfaceId;
 use crate::light::{AreaShape, LightKind};
 use crate::material::Bsdf;
 use crate::math::{DVec3, Ray, Vec3};
 use crate::scene::{At, Hit, Scene};
-use crate::shape::{Parallelogram, RayDifferential, Sphere, SurfaceInteraction};
+use crate::shape::{Footprint, Parallelogram, RayDifferential, Sphere, SurfaceInteraction};
 
 /// Something that a block's rays may meet.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -264,9 +266,7 @@ impl Candidate {
         let hit = self.hit(scene, &ray)?;
         let si = scene.local_surface(&ray, &hit, &differential);
         let material = &scene.materials[si.material.index()];
-        let is_even =
-            self.is_flat_over(scene, &si, &ray, hit.t, &differential) && material.is_even(&si, &scene.textures);
-        Some((material.bsdf(&si, &scene.textures), is_even))
+        Some((material.bsdf(&si, &scene.textures), self.is_even_over(scene, &si, &ray, hit.t, &differential)))
     }
 
     /// The same, if it is the same all over it.
@@ -274,9 +274,10 @@ impl Candidate {
         self.of_square(scene, square).and_then(|(bsdf, is_even)| is_even.then_some(bsdf))
     }
 
-    /// Whether the steps of a ray to its neighbours say within a half what lies between them: at the rim of what is
-    /// round, nothing is as wide as it seems.
-    pub fn is_flat_over(
+    /// Whether the material is the same all over what a ray stands for, by its steps to its neighbours: they grow with
+    /// the distance, where the surface turns away, and around the poles of its uv. At the rim of what is round, nothing
+    /// is as wide as it seems.
+    pub fn is_even_over(
         self,
         scene: &Scene,
         si: &SurfaceInteraction,
@@ -284,13 +285,18 @@ impl Candidate {
         t: f64,
         step: &RayDifferential,
     ) -> bool {
-        let curvature = self.curvature(scene);
-        if curvature == 0.0 {
-            return true;
-        }
         let [across, down] = step.on_plane(ray.d, t as f32, si.ng, f32::MAX.sqrt() * 0.25);
-        let turn = 0.5 * curvature * (across.length() + down.length());
-        turn < 0.25 * si.ng.dot(si.wo)
+        let (length, cos) = (across.length() + down.length(), si.ng.dot(si.wo));
+        let turn = 0.5 * self.curvature(scene) * length;
+        if !(turn < 0.25 * cos) {
+            return false;
+        }
+        let Footprint { dx, dy, edges } = si.footprint;
+        let growth = turn / cos + length / t as f32 + PI * (dx.abs() + dy.abs()).max_element();
+        // Of the steps: a half leads to the border
+        let part = (0.5 + 2.0 * growth).min(1.0);
+        let si = SurfaceInteraction { footprint: Footprint { dx: dx * part, dy: dy * part, edges }, ..*si };
+        scene.materials[si.material.index()].is_even(&si, &scene.textures)
     }
 
     /// How much its normal turns over a metre, in radians.

@@ -64,7 +64,7 @@ impl Checkerboard {
         self.colors[0] * (0.5 * (1.0 + mean)) + self.colors[1] * (0.5 * (1.0 - mean))
     }
 
-    /// Whether the footprint, widened by as much again for what curves, lies in one square.
+    /// Whether all within a step of the footprint lies in one square: the footprint itself reaches half as far.
     pub(crate) fn is_even(&self, uv: Vec2, footprint: &Footprint) -> bool {
         let scale = Vec2::new(self.counts[0] as f32, self.counts[1] as f32);
         let (center, reach) = (uv * scale, (footprint.dx.abs() + footprint.dy.abs()) * scale);

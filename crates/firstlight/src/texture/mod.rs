@@ -46,7 +46,7 @@ impl Texture {
         matches!(self, Texture::Checkerboard(_))
     }
 
-    /// Whether it is proved to be the same all over the footprint, and a little beyond.
+    /// Whether it is proved to be the same all within a step of the footprint.
     pub(crate) fn is_even(&self, si: &SurfaceInteraction) -> bool {
         match self {
             Texture::Checkerboard(board) => board.is_even(si.uv, &si.footprint),
