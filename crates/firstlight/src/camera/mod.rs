@@ -10,9 +10,11 @@ pub use frame::Frame;
 pub use orthographic::Orthographic;
 pub use pinhole::Pinhole;
 
+use fearless_simd::{f32x16, prelude::*};
+
 use crate::context::CompileContext;
 use crate::describe::{table, words};
-use crate::math::{Ray, Vec3, WorldRay};
+use crate::math::{Ray, Vec3, Vec3x16, WorldRay};
 use crate::shape::RayDifferential;
 use crate::transform::TransformDesc;
 
@@ -101,6 +103,16 @@ impl Camera {
         match self {
             Camera::Pinhole(pinhole) => pinhole.ray(x, y, step),
             Camera::Orthographic(orthographic) => orthographic.ray(x, y, step),
+        }
+    }
+
+    /// The rays through sixteen places of the film, from where and in which directions: the bits of
+    /// [`local_ray`](Self::local_ray). To be called within `vectorize`.
+    #[inline(always)]
+    pub(crate) fn ray_lanes<S: Simd>(&self, simd: S, x: f32x16<S>, y: f32x16<S>) -> [Vec3x16<S>; 2] {
+        match self {
+            Camera::Pinhole(pinhole) => pinhole.ray_lanes(simd, x, y),
+            Camera::Orthographic(orthographic) => orthographic.ray_lanes(simd, x, y),
         }
     }
 

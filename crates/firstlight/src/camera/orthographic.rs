@@ -1,8 +1,10 @@
 //! The orthographic camera: parallel rays, so that what is farther away is as large, and parallel lines stay parallel.
 
+use fearless_simd::{f32x16, prelude::*};
+
 use super::{CameraDesc, FilmPlane, Frame};
 use crate::context::CompileContext;
-use crate::math::{Ray, Vec3};
+use crate::math::{Ray, Vec3, Vec3x16};
 use crate::shape::RayDifferential;
 
 /// An orthographic camera, ready to look.
@@ -47,5 +49,14 @@ impl Orthographic {
         let differential =
             RayDifferential { dx: Vec3::ZERO, dy: Vec3::ZERO, origin_dx: right * step_x, origin_dy: up * step_y };
         (Ray { o: eye + right * film_x + up * film_y, d: forward }, differential)
+    }
+
+    /// The rays through sixteen places, from where and in which directions: the same bits.
+    #[inline(always)]
+    pub(super) fn ray_lanes<S: Simd>(&self, simd: S, x: f32x16<S>, y: f32x16<S>) -> [Vec3x16<S>; 2] {
+        let [eye, right, up, forward] =
+            [self.frame.eye, self.frame.right, self.frame.up, self.frame.forward].map(|v| Vec3x16::splat(simd, v));
+        let [film_x, film_y] = self.film.place_lanes(x, y);
+        [eye + right * film_x + up * film_y, forward]
     }
 }

@@ -1,10 +1,11 @@
 //! The pinhole camera.
 
+use fearless_simd::{f32x16, prelude::*};
 use pxfm::{f_atan, f_tan};
 
 use super::{CameraDesc, FilmPlane, Frame};
 use crate::context::CompileContext;
-use crate::math::{Ray, Vec3};
+use crate::math::{Ray, Vec3, Vec3x16};
 use crate::shape::RayDifferential;
 
 /// A pinhole camera in front of a film, ready to look.
@@ -46,6 +47,17 @@ impl Pinhole {
             origin_dy: Vec3::ZERO,
         };
         (Ray { o: eye, d: towards / length }, differential)
+    }
+
+    /// The rays through sixteen places, from where and in which directions: the same bits.
+    #[inline(always)]
+    pub(super) fn ray_lanes<S: Simd>(&self, simd: S, x: f32x16<S>, y: f32x16<S>) -> [Vec3x16<S>; 2] {
+        let [eye, right, up, forward] =
+            [self.frame.eye, self.frame.right, self.frame.up, self.frame.forward].map(|v| Vec3x16::splat(simd, v));
+        let [film_x, film_y] = self.film.place_lanes(x, y);
+        let towards = right * film_x + up * film_y + forward;
+        let length = towards.dot(towards).sqrt();
+        [eye, Vec3x16 { x: towards.x / length, y: towards.y / length, z: towards.z / length }]
     }
 }
 

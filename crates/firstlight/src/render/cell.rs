@@ -16,7 +16,7 @@ use std::ops::{ControlFlow, Range};
 use super::film::FilmTile;
 use super::fragment::{Fragment, Fragments, Quadrant, RayHit};
 use super::grid::{Block, Grid};
-use super::hits::camera_ray;
+use super::hits::PixelRays;
 use super::light_queue::{Answer, LightQueue, Place, Request};
 use super::patch::Contrast;
 use super::resolve::{LightTerm, PixelTerms};
@@ -99,6 +99,7 @@ pub(crate) struct Cells<'a> {
     requests: Vec<Request>,
     answers: Vec<Answer>,
     fragments: Fragments,
+    pixel_rays: PixelRays,
     /// The rays of one pixel, each with the number of what it meets.
     rays: Vec<(u32, RayHit)>,
     wanted: Vec<Wanted>,
@@ -107,6 +108,7 @@ pub(crate) struct Cells<'a> {
 
 impl<'a> Cells<'a> {
     pub fn new(scene: &'a Scene, mode: AaMode, lights: LightQueue<'a>) -> Self {
+        let pixel_rays = PixelRays::new(lights.arrivals.level(), scene.antialiasing);
         Cells {
             scene,
             mode,
@@ -126,6 +128,7 @@ impl<'a> Cells<'a> {
             requests: Vec::new(),
             answers: Vec::new(),
             fragments: Fragments::new(scene),
+            pixel_rays,
             rays: Vec::new(),
             wanted: Vec::new(),
             refused: Vec::new(),
@@ -240,8 +243,8 @@ impl<'a> Cells<'a> {
         let number = self.pixels.len() as u32;
         // Which of them each ray meets first: of several at the same distance, the one with the lowest id
         self.rays.clear();
-        for (row, column) in (0..n).flat_map(|row| (0..n).map(move |column| (row, column))) {
-            let (ray, _) = camera_ray(scene, i * n + column, j * n + row);
+        for (k, ray) in self.pixel_rays.of(scene, [i, j]).iter().enumerate() {
+            let (ray, at) = (*ray, [k as u32 % n, k as u32 / n].map(|at| at as u16));
             let mut first: Option<(usize, f64)> = None;
             for (place, of) in near.iter().enumerate() {
                 if let Some(t) = of.intersect(scene, &ray)
@@ -256,7 +259,7 @@ impl<'a> Cells<'a> {
                 None => pixel.terms.background += 1,
                 Some((place, t)) => match near[place] {
                     Candidate::Light(light) => pixel.terms.emission += scene.lights[light as usize].radiance,
-                    _ => self.rays.push((place as u32, RayHit { ray, t, at: [column as u16, row as u16] })),
+                    _ => self.rays.push((place as u32, RayHit { ray, t, at })),
                 },
             }
         }
@@ -328,17 +331,23 @@ impl<'a> Cells<'a> {
         for fragment in 0..self.fragments.all.len() as u32 {
             self.wanted.extend(lights.clone().map(|light| Wanted { fragment, light }));
         }
+        for block in 0..self.blocks.len() {
+            let block = self.blocks[block];
+            if block.first.is_none() {
+                self.tell(&block);
+            }
+        }
         for at in (Square { x, y, side: CELL }).pixels().filter(|[i, j]| *i < scene.width && *j < scene.height) {
             let index = self.index(at);
             let (only, even) = match self.states[index] {
                 State::Done | State::Traced => continue,
                 State::Only(only) => (only, None),
                 State::Block(block) => {
-                    let block = self.blocks[block as usize];
-                    if self.is_told(at, &block) {
+                    let Block { square, of, bsdf, first } = self.blocks[block as usize];
+                    if first.is_some_and(|first| self.is_told(at, square, first)) {
                         continue;
                     }
-                    (block.of, block.first.is_none().then_some(block.bsdf))
+                    (of, first.is_none().then_some(bsdf))
                 }
             };
             let fragment = self.fragments.all.len();
@@ -363,19 +372,40 @@ impl<'a> Cells<'a> {
         }
     }
 
-    /// Whether a pixel of a block needs nothing beside the grid; then its colour is set.
-    fn is_told(&mut self, at: [u32; 2], block: &Block) -> bool {
+    /// Sets the colours of those pixels of a block of one material that need nothing beside the grid.
+    fn tell(&mut self, block: &Block) {
+        let scene = self.scene;
+        let Square { x, y, side } = block.square;
+        let columns = side.min(scene.width - x) as usize;
+        for j in y..(y + side).min(scene.height) {
+            let mut colors = [scene.ambient * block.bsdf.ambient; CELL as usize];
+            let mut told = [true; CELL as usize];
+            for light in 0..scene.lights.len() {
+                let scale = self.lights.arrivals.scale(light);
+                let row = self.grid.row(light, [x, j], columns);
+                for ((color, told), sums) in colors.iter_mut().zip(&mut told).zip(row) {
+                    *told &= sums.is_known();
+                    for part in block.bsdf.colors.each(sums).0 {
+                        *color += scale * part;
+                    }
+                }
+            }
+            let first = self.index([x, j]);
+            for (k, color) in colors.iter().enumerate().take(columns).filter(|(k, _)| told[*k]) {
+                self.colors[first + k] = [color.r, color.g, color.b, 1.0];
+                self.states[first + k] = State::Done;
+            }
+        }
+    }
+
+    /// Whether a pixel of a block whose materials differ, the first of which has that number, needs nothing beside the
+    /// grid; then its colour is set.
+    fn is_told(&mut self, at: [u32; 2], square: Square, first: usize) -> bool {
         let scene = self.scene;
         let index = self.index(at);
-        let (bsdf, contrast) = match block.first {
-            None => (block.bsdf, Contrast::default()),
-            Some(first) => {
-                let Square { x, y, side } = block.square;
-                let (bsdf, contrast) = self.patchwork[first + ((at[1] - y) * side + at[0] - x) as usize];
-                let Some(bsdf) = bsdf else { return false };
-                (bsdf, contrast)
-            }
-        };
+        let Square { x, y, side } = square;
+        let (bsdf, contrast) = self.patchwork[first + ((at[1] - y) * side + at[0] - x) as usize];
+        let Some(bsdf) = bsdf else { return false };
         let mut color = scene.ambient * bsdf.ambient;
         let mut slopes = Rgb::BLACK;
         for light in 0..scene.lights.len() {
@@ -385,7 +415,7 @@ impl<'a> Cells<'a> {
                 color += scale * part;
             }
             if contrast != Contrast::default() {
-                let Some(slope) = self.grid.slope(light, at, block.square) else { return false };
+                let Some(slope) = self.grid.slope(light, at, square) else { return false };
                 slopes += scale * contrast.of(&slope) * 0.125;
             }
         }
@@ -484,7 +514,8 @@ impl<'a> Cells<'a> {
         for Wanted { fragment: number, light } in &refused {
             if self.fragments.all[*number as usize].rays.is_empty() {
                 let index = self.pixels[self.fragments.all[*number as usize].pixel as usize].index as usize;
-                self.fragments.trace(scene, *number as usize, self.at(index));
+                let at = self.at(index);
+                self.fragments.trace(scene, *number as usize, self.pixel_rays.of(scene, at));
                 self.work[index] += self.fragments.all[*number as usize].count() as f32;
                 counts.looks += self.fragments.all[*number as usize].count() as u64;
             }

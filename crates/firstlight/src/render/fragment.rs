@@ -207,18 +207,17 @@ impl Fragments {
         true
     }
 
-    /// Finds the rays of a fragment that was added whole, in pixel (`i`, `j`). Where a rounding lets one miss, the last
+    /// Finds where the rays of its pixel meet a fragment that was added whole. Where a rounding lets one miss, the last
     /// that does not stands for it.
-    pub fn trace(&mut self, scene: &Scene, fragment: usize, [i, j]: [u32; 2]) {
+    pub fn trace(&mut self, scene: &Scene, fragment: usize, rays: &[Ray]) {
         let n = scene.antialiasing;
         let (of, first) = (self.all[fragment].of, self.rays.len());
-        for (row, column) in (0..n).flat_map(|row| (0..n).map(move |column| (row, column))) {
-            let (ray, _) = camera_ray(scene, i * n + column, j * n + row);
-            let hit = of.intersect(scene, &ray).map(|t| RayHit { ray, t, at: [column as u16, row as u16] });
-            self.rays.extend(hit);
+        for (k, ray) in rays.iter().enumerate() {
+            let at = [k as u32 % n, k as u32 / n].map(|at| at as u16);
+            self.rays.extend(of.intersect(scene, ray).map(|t| RayHit { ray: *ray, t, at }));
         }
         if let Some(last) = self.rays[first..].last().copied() {
-            self.rays.resize(first + (n * n) as usize, last);
+            self.rays.resize(first + rays.len(), last);
         }
         let fragment = &mut self.all[fragment];
         (fragment.rays, fragment.count) = (first..self.rays.len(), (self.rays.len() - first) as u32);

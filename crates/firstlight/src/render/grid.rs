@@ -184,6 +184,12 @@ impl Grid {
         sums.is_known().then_some(sums)
     }
 
+    /// The same of pixels side by side, from `at` on.
+    pub fn row(&self, light: usize, at: [u32; 2], length: usize) -> &[Sums] {
+        let first = self.pixel(light, at);
+        &self.arrived[first..first + length]
+    }
+
     /// How far it changes from a pixel to its neighbours in a square, along both axes together; `None` where they do
     /// not know.
     pub fn slope(&self, light: usize, at: [u32; 2], square: Square) -> Option<Sums> {

@@ -3,10 +3,10 @@
 //! Rays of one block of 8 x 8 go through the mesh of the world as a bundle; everything else is asked ray by ray. The
 //! answers are those of [`Scene::intersect`], to the bit.
 
-use fearless_simd::Level;
+use fearless_simd::{Level, f32x16, prelude::*};
 
 use crate::accel::RayTile;
-use crate::math::Ray;
+use crate::math::{LANES, Ray, Vec3, dispatch_wide};
 use crate::scene::{Hit, Nearest, Scene};
 use crate::shape::{RayDifferential, TileHits};
 
@@ -111,4 +111,75 @@ pub(crate) fn camera_ray(scene: &Scene, x: u32, y: u32) -> (Ray, RayDifferential
     // The middle of the sub-pixel
     let at = |ray: u32| (ray / n) as f32 + ((ray % n) as f32 + 0.5) / n as f32;
     scene.camera.local_ray(at(x), at(y), 1.0 / n as f32)
+}
+
+/// The camera rays of one pixel, row by row.
+pub(crate) struct PixelRays {
+    level: Level,
+    /// Where in the pixel they are, sixteen by sixteen: across and down.
+    places: Vec<[[f32; LANES]; 2]>,
+    rays: Vec<Ray>,
+}
+
+impl PixelRays {
+    /// For a scene whose pixels have `n` x `n` rays.
+    pub fn new(level: Level, n: u32) -> Self {
+        let ray = Ray { o: Vec3::ZERO, d: Vec3::ZERO };
+        let place = |number: u32| [number % n, number / n].map(|k| (k as f32 + 0.5) / n as f32);
+        let places = (0..n * n).step_by(LANES).map(|first| {
+            let mut places = [[0.0; LANES]; 2];
+            for k in 0..LANES {
+                [places[0][k], places[1][k]] = place((first + k as u32).min(n * n - 1));
+            }
+            places
+        });
+        PixelRays { level, places: places.collect(), rays: vec![ray; (n * n) as usize] }
+    }
+
+    /// Those of pixel (`i`, `j`): the bits of [`camera_ray`].
+    pub fn of(&mut self, scene: &Scene, [i, j]: [u32; 2]) -> &[Ray] {
+        let PixelRays { places, rays, .. } = self;
+        for (places, rays) in places.iter().zip(rays.chunks_mut(LANES)) {
+            let [o, d] = dispatch_wide!(self.level, simd => simd.vectorize(
+                #[inline(always)]
+                || {
+                    let [x, y] = places.map(|places| f32x16::simd_from(simd, places));
+                    scene.camera.ray_lanes(simd, x + i as f32, y + j as f32).map(|v| [v.x.to_array(), v.y.to_array(), v.z.to_array()])
+                },
+            ));
+            for (k, ray) in rays.iter_mut().enumerate() {
+                *ray = Ray { o: Vec3::new(o[0][k], o[1][k], o[2][k]), d: Vec3::new(d[0][k], d[1][k], d[2][k]) };
+            }
+        }
+        &self.rays
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::accel::SimdLevel;
+    use crate::context::NoAssets;
+    use crate::scene::{CompileOptions, SceneDesc};
+
+    #[test]
+    fn the_rays_of_a_pixel_are_those_that_are_made_one_by_one() {
+        let level = SimdLevel::Auto.resolve().token();
+        for projection in ["", "projection = \"orthographic\"\nheight = 3"] {
+            for n in [1, 2, 3, 4, 5, 8] {
+                let text = format!(
+                    "[render]\nwidth = 70\nheight = 50\nantialiasing = {n}\n[camera]\nposition = [1, 2, 3]\nlook_at = [0, 0.3, 0]\n{projection}\n"
+                );
+                let parsed = SceneDesc::parse("s.toml", text.as_bytes(), &NoAssets);
+                let scene = parsed.compile(&NoAssets, &CompileOptions::default()).expect("is a scene").scene;
+                let mut rays = PixelRays::new(level, n);
+                for (i, j) in [(0, 0), (69, 49), (33, 7)] {
+                    for (k, ray) in rays.of(&scene, [i, j]).iter().enumerate() {
+                        let (one, _) = camera_ray(&scene, i * n + k as u32 % n, j * n + k as u32 / n);
+                        assert_eq!((ray.o, ray.d), (one.o, one.d), "{n} {i} {j} {k}");
+                    }
+                }
+            }
+        }
+    }
 }
