@@ -3,7 +3,8 @@
 //! ```text
 //! primary    squares of pixels that are proved to see one surface; the rays of all others
 //! grid       light over such squares, from nine places of each: 16, 8, 4, 2 pixels wide
-//! quadrants  what a surface in a pixel gets of a light, from four places of it
+//! middles    what a surface in a pixel gets of a light, from its middle
+//! quadrants  the same, from four places of it
 //! rays       the same, from all of its camera rays
 //! resolve    the pixel's sum, once
 //! ```
@@ -44,6 +45,8 @@ const SPREAD_CUT: f32 = 5.0;
 /// How far outlines may move on the light over a quadrant, and light may turn.
 const QUADRANT_MOTION: f32 = 0.3;
 const QUADRANT_TURN: f32 = 1.0;
+/// The same, turns alone, where the middle of a fragment stands for all of it.
+const MIDDLE_TURN: f32 = 0.03;
 /// In display steps: what colours that differ may make together with light that does.
 const MINGLED: f32 = 0.4;
 
@@ -102,7 +105,9 @@ pub(crate) struct Cells<'a> {
     pixel_rays: PixelRays,
     /// The rays of one pixel, each with the number of what it meets.
     rays: Vec<(u32, RayHit)>,
+    /// What is to be asked by middles, by quadrants and by rays.
     wanted: Vec<Wanted>,
+    parted: Vec<Wanted>,
     refused: Vec<Wanted>,
 }
 
@@ -131,6 +136,7 @@ impl<'a> Cells<'a> {
             pixel_rays,
             rays: Vec::new(),
             wanted: Vec::new(),
+            parted: Vec::new(),
             refused: Vec::new(),
         }
     }
@@ -155,6 +161,7 @@ impl<'a> Cells<'a> {
         self.grid.light(self.scene, &mut self.lights, &self.blocks, counts, go_on)?;
         self.work.iter_mut().zip(self.grid.work()).for_each(|(work, more)| *work += more);
         self.fragments(counts);
+        self.middles(counts, go_on)?;
         self.quadrants(counts, go_on)?;
         self.rays(counts, go_on)?;
         self.resolve();
@@ -172,6 +179,7 @@ impl<'a> Cells<'a> {
         self.grid.begin(corner);
         self.fragments.clear();
         self.wanted.clear();
+        self.parted.clear();
         self.refused.clear();
     }
 
@@ -366,7 +374,7 @@ impl<'a> Cells<'a> {
             for light in lights.clone() {
                 match self.grid.arrived(light as usize, at).filter(|_| is_even) {
                     Some(sums) => self.add(fragment, light as usize, sums),
-                    None => self.wanted.push(Wanted { fragment: fragment as u32, light }),
+                    None => self.parted.push(Wanted { fragment: fragment as u32, light }),
                 }
             }
         }
@@ -440,20 +448,54 @@ impl<'a> Cells<'a> {
         [self.corner[0] + index as u32 % CELL, self.corner[1] + index as u32 / CELL]
     }
 
+    /// Asks for the light of fragments, from their middles.
+    fn middles(&mut self, counts: &mut Counts, go_on: &dyn Fn() -> ControlFlow<()>) -> ControlFlow<()> {
+        let wanted = std::mem::take(&mut self.wanted);
+        let middle = |wanted: &Wanted, fragments: &Fragments| fragments.all[wanted.fragment as usize].middle;
+        self.requests.clear();
+        for wanted in &wanted {
+            let light = wanted.light;
+            self.requests.extend(middle(wanted, &self.fragments).map(|place| Request { place, light }));
+        }
+        self.lights.ask(&self.fragments.places, &self.requests, &mut self.answers, counts, go_on)?;
+        let mut next = 0;
+        for wanted in &wanted {
+            let Wanted { fragment, light } = *wanted;
+            if middle(wanted, &self.fragments).is_none() {
+                self.parted.push(*wanted);
+                continue;
+            }
+            let answer = self.answers[next];
+            next += 1;
+            let Fragment { pixel, count, .. } = self.fragments.all[fragment as usize];
+            self.work[self.pixels[pixel as usize].index as usize] += Heat::PLACE;
+            if count == 1 || answer.smooth && answer.turn <= MIDDLE_TURN {
+                self.add(fragment as usize, light as usize, answer.sums);
+            } else {
+                self.parted.push(*wanted);
+            }
+        }
+        self.wanted = wanted;
+        ControlFlow::Continue(())
+    }
+
     /// Asks for the light of fragments, from the middles of their quadrants.
     fn quadrants(&mut self, counts: &mut Counts, go_on: &dyn Fn() -> ControlFlow<()>) -> ControlFlow<()> {
         let scene = self.scene;
+        let wanted = std::mem::take(&mut self.parted);
         self.requests.clear();
-        let fragments = &self.fragments;
-        for wanted in &self.wanted {
-            let quadrants = &fragments.quadrants[fragments.all[wanted.fragment as usize].quadrants.clone()];
-            self.requests.extend(quadrants.iter().map(|q| Request { place: q.place, light: wanted.light }));
+        for Wanted { fragment, light } in &wanted {
+            self.fragments.find_quadrants(scene, *fragment as usize);
+            let quadrants = self.fragments.quadrants(&self.fragments.all[*fragment as usize]);
+            self.requests.extend(quadrants.iter().map(|q| Request { place: q.place, light: *light }));
         }
+        let fragments = &self.fragments;
         self.lights.ask(&fragments.places, &self.requests, &mut self.answers, counts, go_on)?;
         let mut next = 0;
-        for wanted in &self.wanted {
+        for wanted in &wanted {
             let fragment = &fragments.all[wanted.fragment as usize];
-            let answers = &self.answers[next..next + fragment.quadrants.len()];
+            let quadrants = fragments.quadrants(fragment);
+            let answers = &self.answers[next..next + quadrants.len()];
             next += answers.len();
             self.work[self.pixels[fragment.pixel as usize].index as usize] += Heat::PLACE * answers.len() as f32;
             if answers.is_empty() || !self.is_even(fragment, wanted.light as usize, answers) {
@@ -461,12 +503,13 @@ impl<'a> Cells<'a> {
                 continue;
             }
             let term = &mut self.terms[fragment.pixel as usize * scene.lights.len() + wanted.light as usize];
-            for (quadrant, answer) in fragments.quadrants[fragment.quadrants.clone()].iter().zip(answers) {
+            for (quadrant, answer) in quadrants.iter().zip(answers) {
                 let (sums, bsdf) =
                     (answer.sums * quadrant.rays as f32, &fragments.places[quadrant.place as usize].bsdf);
                 *term += bsdf.colors.each(&sums);
             }
         }
+        self.parted = wanted;
         ControlFlow::Continue(())
     }
 
@@ -491,12 +534,12 @@ impl<'a> Cells<'a> {
         let value = colors.onto(scene.ambient * bsdf.ambient, &most);
         let spread = self.lights.arrivals.steps(value, colors.of(&apart));
         let allowed = if answers.iter().all(|answer| answer.smooth) { SPREAD_SMOOTH } else { SPREAD_CUT };
-        let weight = share(scene, self.mode, fragment.count()) * (scene.lights.len() as f32).sqrt();
+        let weight = fragment.share * (scene.lights.len() as f32).sqrt();
         if spread * weight > allowed {
             return false;
         }
         // Fewer than four quadrants do not tell how light changes along both axes
-        self.fragments.quadrants[fragment.quadrants.clone()].iter().all(|Quadrant { contrast, .. }| {
+        self.fragments.quadrants(fragment).iter().all(|Quadrant { contrast, .. }| {
             let mingled = contrast.of(&apart);
             *contrast == Contrast::default()
                 || answers.len() == 4 && self.lights.arrivals.steps(value, scale * mingled * 0.125) * weight <= MINGLED
@@ -522,7 +565,7 @@ impl<'a> Cells<'a> {
             let fragment = &self.fragments.all[*number as usize];
             if last.as_ref().is_none_or(|(before, _)| before != number) {
                 let first = self.places.len();
-                let share = share(scene, self.mode, fragment.count());
+                let share = fragment.share;
                 for (k, ray) in self.fragments.rays[fragment.rays.clone()].iter().enumerate() {
                     let point = ShadingPoint { share, ..fragment.of.point(scene, &ray.ray, ray.t) };
                     let bsdf = self.fragments.bsdf(fragment, k);

@@ -1,4 +1,4 @@
-//! One surface in one pixel, and what of it wants light: its camera rays, and the middles of its quadrants.
+//! One surface in one pixel, and what of it wants light: its middle, the middles of its quadrants, its camera rays.
 
 use std::ops::Range;
 
@@ -16,7 +16,7 @@ use crate::material::{Bsdf, Colors, Lobe};
 use crate::math::{DVec3, ErrorBound, Ray, Vec3};
 use crate::scene::Scene;
 
-/// Fragments whose normals turn farther from the middle of a quadrant, in radians, are lit at each ray.
+/// Where normals turn farther from a middle, in radians, it does not stand for what is around it.
 const MAX_TURN: f32 = 0.2;
 /// Fragments of so few rays are lit at each.
 const FEW_RAYS: usize = 4;
@@ -42,8 +42,14 @@ pub(crate) struct Fragment {
     /// They among all of the cell, none while nobody needs them; and their materials, if they are not all the same.
     pub rays: Range<usize>,
     pub bsdfs: Option<Range<usize>>,
-    /// Its quadrants among all of the cell; none where it is lit at each ray.
-    pub quadrants: Range<usize>,
+    /// Whether those differ in more than colours.
+    uneven: bool,
+    /// The share of a pixel by which its errors are judged.
+    pub share: f32,
+    /// Its middle among all places of the cell, if that may stand for all of it.
+    pub middle: Option<u32>,
+    /// Its quadrants among all of the cell, once somebody asks: none where it is lit at each ray.
+    quadrants: Option<Range<usize>>,
 }
 
 /// The part of a fragment in a quarter of its pixel.
@@ -91,8 +97,8 @@ pub(crate) struct Fragments {
     pub all: Vec<Fragment>,
     pub rays: Vec<RayHit>,
     pub bsdfs: Vec<Bsdf>,
-    pub quadrants: Vec<Quadrant>,
-    /// The middles of the quadrants.
+    quadrants: Vec<Quadrant>,
+    /// The middles of fragments and of quadrants.
     pub places: Vec<Place>,
 }
 
@@ -154,13 +160,18 @@ impl Fragments {
             None => MeanBsdf { bsdf, contrast: Contrast::default(), uneven: false },
             Some(range) => MeanBsdf::of(self.bsdfs[range.clone()].iter()),
         };
-        let quadrants = self.quadrants.len();
-        if rays.len() > FEW_RAYS
-            && !mean.uneven
-            && !self.add_quadrants(scene, of, rays, bsdfs.as_ref(), &mean.bsdf, share)
-        {
-            self.quadrants.truncate(quadrants);
-        }
+        let middle = if mean.uneven || mean.contrast != Contrast::default() {
+            None
+        } else {
+            let point = match rays {
+                [ray] => Some(of.point(scene, &ray.ray, ray.t)),
+                _ => middle(scene, of, rays.iter()),
+            };
+            point.map(|point| {
+                self.places.push(Place::new(scene, ShadingPoint { share, ..point }, of.surface(scene), &mean.bsdf));
+                self.places.len() as u32 - 1
+            })
+        };
         self.all.push(Fragment {
             pixel,
             of,
@@ -168,7 +179,10 @@ impl Fragments {
             count: (all.len() - first) as u32,
             rays: first..all.len(),
             bsdfs,
-            quadrants: quadrants..self.quadrants.len(),
+            uneven: mean.uneven,
+            share,
+            middle,
+            quadrants: None,
         });
         self.rays = all;
     }
@@ -202,8 +216,20 @@ impl Fragments {
             self.quadrants.push(Quadrant { place, rays, contrast: Contrast::default() });
             self.places.push(Place::new(scene, ShadingPoint { reach, turn, ..point }, of.surface(scene), &bsdf));
         }
-        let quadrants = first..self.quadrants.len();
-        self.all.push(Fragment { pixel, of, bsdf, count: n * n, rays: 0..0, bsdfs: None, quadrants });
+        let quadrants = Some(first..self.quadrants.len());
+        let (count, rays) = (n * n, 0..0);
+        self.all.push(Fragment {
+            pixel,
+            of,
+            bsdf,
+            count,
+            rays,
+            bsdfs: None,
+            uneven: false,
+            share: 1.0,
+            middle: None,
+            quadrants,
+        });
         true
     }
 
@@ -242,47 +268,47 @@ impl Fragments {
         (material.bsdf(&si, &scene.textures), even)
     }
 
-    /// Adds the parts of a fragment in the quarters of its pixel; `false` if it has to be lit at each ray.
-    fn add_quadrants(
-        &mut self,
-        scene: &Scene,
-        of: Candidate,
-        rays: &[RayHit],
-        bsdfs: Option<&Range<usize>>,
-        bsdf: &Bsdf,
-        share: f32,
-    ) -> bool {
-        let n = scene.antialiasing;
-        let half = n.div_ceil(2) as u16;
-        let quadrant = |ray: &RayHit| (ray.at[1] / half * 2 + ray.at[0] / half) as usize;
-        // How many rays each has, and the mean of where they end and of where they come from
-        let mut sums = [(0u32, DVec3::ZERO, Vec3::ZERO); 4];
-        let end = |ray: &RayHit| ray.ray.o.as_dvec3() + ray.ray.d.as_dvec3() * ray.t;
-        for ray in rays {
-            let (count, q, d) = &mut sums[quadrant(ray)];
-            (*count, *q, *d) = (*count + 1, *q + end(ray), *d + ray.ray.d);
+    /// Finds the parts of a fragment in the quarters of its pixel.
+    pub fn find_quadrants(&mut self, scene: &Scene, fragment: usize) {
+        if self.all[fragment].quadrants.is_none() {
+            let first = self.quadrants.len();
+            if !self.add_quadrants(scene, fragment) {
+                self.quadrants.truncate(first);
+            }
+            self.all[fragment].quadrants = Some(first..self.quadrants.len());
         }
-        for (number, (count, q, d)) in sums.into_iter().enumerate().filter(|(_, (count, ..))| *count > 0) {
-            // In the middle of what they see, not of the rays: on a rim the surface runs away
-            let mut point = of.point_near(scene, q / f64::from(count), -d.normalize());
-            let mut reach2 = 0.0f32;
-            for ray in rays.iter().filter(|ray| quadrant(ray) == number) {
-                reach2 = reach2.max((end(ray).as_vec3() - point.p).length_squared());
+    }
+
+    /// Those that were found; none where it has to be lit at each ray.
+    pub fn quadrants(&self, fragment: &Fragment) -> &[Quadrant] {
+        fragment.quadrants.clone().map_or(&[], |range| &self.quadrants[range])
+    }
+
+    fn add_quadrants(&mut self, scene: &Scene, fragment: usize) -> bool {
+        let Fragment { of, bsdf, rays, bsdfs, uneven, share, .. } = self.all[fragment].clone();
+        if uneven || rays.len() <= FEW_RAYS {
+            return false;
+        }
+        let half = scene.antialiasing.div_ceil(2) as u16;
+        let rays = &self.rays[rays];
+        let quadrant = |ray: &RayHit| ray.at[1] / half * 2 + ray.at[0] / half;
+        for number in 0..4 {
+            let count = rays.iter().filter(|ray| quadrant(ray) == number).count() as u32;
+            if count == 0 {
+                continue;
             }
-            point.reach = reach2.sqrt();
-            point.turn = point.reach * of.curvature(scene);
-            point.share = share;
-            if point.turn > MAX_TURN {
+            let Some(point) = middle(scene, of, rays.iter().filter(|ray| quadrant(ray) == number)) else {
                 return false;
-            }
-            let mean = match bsdfs {
-                None => MeanBsdf { bsdf: *bsdf, contrast: Contrast::default(), uneven: false },
+            };
+            let mean = match &bsdfs {
+                None => MeanBsdf { bsdf, contrast: Contrast::default(), uneven: false },
                 Some(range) => {
                     let bsdfs = rays.iter().zip(&self.bsdfs[range.clone()]);
                     MeanBsdf::of(bsdfs.filter(|(ray, _)| quadrant(ray) == number).map(|(_, bsdf)| bsdf))
                 }
             };
             self.quadrants.push(Quadrant { place: self.places.len() as u32, rays: count, contrast: mean.contrast });
+            let point = ShadingPoint { share, ..point };
             self.places.push(Place::new(scene, point, of.surface(scene), &mean.bsdf));
         }
         true
@@ -297,7 +323,30 @@ impl Fragments {
     }
 }
 
+/// The middle of what some rays see of a shape, with its reach to their ends; `None` if normals turn too far on the
+/// way.
+fn middle<'a>(scene: &Scene, of: Candidate, rays: impl Iterator<Item = &'a RayHit> + Clone) -> Option<ShadingPoint> {
+    let (mut count, mut q, mut d) = (0.0, DVec3::ZERO, Vec3::ZERO);
+    for ray in rays.clone() {
+        (count, q, d) = (count + 1.0, q + ray.end(), d + ray.ray.d);
+    }
+    // In the middle of what they see, not of the rays: on a rim the surface runs away
+    let mut point = of.point_near(scene, q / count, -d.normalize());
+    let mut reach2 = 0.0f32;
+    for ray in rays {
+        reach2 = reach2.max((ray.end().as_vec3() - point.p).length_squared());
+    }
+    point.reach = reach2.sqrt();
+    point.turn = point.reach * of.curvature(scene);
+    (point.turn <= MAX_TURN).then_some(point)
+}
+
 impl RayHit {
+    /// Where it ends.
+    fn end(&self) -> DVec3 {
+        self.ray.o.as_dvec3() + self.ray.d.as_dvec3() * self.t
+    }
+
     /// Which ray of the film it is, in a pixel with n x n.
     fn on_film(&self, n: u32, [i, j]: [u32; 2]) -> [u32; 2] {
         [i * n + u32::from(self.at[0]), j * n + u32::from(self.at[1])]
