@@ -24,20 +24,23 @@ fn build_book() -> Outcome {
     }
 }
 
-/// The numbers of the page that walks through config 11, from a script that shares no code with the renderer.
-fn check_walk() -> Outcome {
+/// The numbers of the pages that walk through config 11, from scripts that share no code with the renderer.
+fn check_walks() -> Outcome {
     let mut python = std::process::Command::new("python3");
     if python.arg("--version").output().is_err() {
-        eprintln!("\nno python3: docs/walk.py --check is left out");
+        eprintln!("\nno python3: the numbers of docs/walk.py and docs/default_pixel.py are not checked");
         return Ok(());
     }
-    run_to_end(std::process::Command::new("python3").current_dir(root()).args(["docs/walk.py", "--check"]))
+    for script in ["docs/walk.py", "docs/default_pixel.py"] {
+        run_to_end(std::process::Command::new("python3").current_dir(root()).args([script, "--check"]))?;
+    }
+    Ok(())
 }
 
 fn test() -> Outcome {
     run_command(&["fmt", "--all", "--check"])?;
     build_book()?;
-    check_walk()?;
+    check_walks()?;
     run_command(&["clippy", "--workspace", "--all-targets", "--quiet", "--", "-D", "warnings"])?;
     run_to_end(cargo().env("RUSTDOCFLAGS", "-D warnings").args(["doc", "--workspace", "--no-deps", "--quiet"]))?;
     // The library alone, without what can be left out
