@@ -341,13 +341,16 @@ def node(x, y):
 
 
 def quadrant(column, row):
-    """The middle of what four rays of the pixel see, with the direction to the viewer, and how far they end from it."""
+    """Where the ray through the middle of a quarter of the pixel ends, and the direction to the viewer."""
     i, j = PIXEL
-    rays = [
-        floor_at(i + column / 2 + (c + 0.5) / 4, j + row / 2 + (r + 0.5) / 4) for r in range(2) for c in range(2)
-    ]
-    p = mean([end for end, _ in rays])
-    return (p, normalize(mul(mean([d for _, d in rays]), -1))), max(length(sub(end, p)) for end, _ in rays)
+    end, d = floor_at(i + 0.25 + column / 2, j + 0.25 + row / 2)
+    return end, mul(d, -1)
+
+
+def reach_of_quadrants():
+    """How far rays end from the middle of their quadrant: a quarter of the way to that of the opposite one."""
+    ends = {(column, row): quadrant(column, row)[0] for column in range(2) for row in range(2)}
+    return 0.25 * max(length(sub(ends[0, 0], ends[1, 1])), length(sub(ends[1, 0], ends[0, 1])))
 
 
 def motion(view, reach):
@@ -449,7 +452,7 @@ def facts():
     """Every number of the page, as (what it is, how the page writes it)."""
     yield from facts_of_primary()
     yield from facts_of_grid()
-    followed = Evaluation(*quadrant(0, 0)[0])
+    followed = Evaluation(*quadrant(0, 0))
     yield from facts_of_view(followed.view)
     yield from facts_of_fit(followed)
     yield from facts_of_rows(followed)
@@ -596,7 +599,7 @@ def facts_of_panels(followed):
 def facts_of_pixel():
     i, j = PIXEL
     fours = [quadrant(c, r) for r in range(2) for c in range(2)]
-    quadrants = [Evaluation(*place) for place, _ in fours]
+    quadrants = [Evaluation(*place) for place in fours]
     for r in range(2):
         yield "quadrants", line(*(number(q.sums[0], 5) for q in quadrants[2 * r : 2 * r + 2]))
     yield "quadrants with a halved panel", f"{COUNTS[sum(q.halved() > 0 for q in quadrants)]} of the four"
@@ -604,7 +607,8 @@ def facts_of_pixel():
     apart = COLOR * sum(a - b for a, b in zip(most, least))
     spread_of_quadrants = shows(film(most), apart)
     assert spread_of_quadrants > SPREAD_CUT
-    moves = [motion(q.view, reach)[0] for q, (_, reach) in zip(quadrants, fours)]
+    reach = reach_of_quadrants()
+    moves = [motion(q.view, reach)[0] for q in quadrants]
     yield "motion over a quadrant", f"at most {number(max(moves), 3)}"
     yield "brightest quadrant: film", number(film(most), 4)
     yield "quadrants apart", f"{number(spread_of_quadrants, 2)} display steps"

@@ -1,9 +1,10 @@
 //! What is seen of a light's cells, row by row, for sixteen panels at once.
 //!
-//! A panel is a range of rows of one cell on which the outline of what is seen changes smoothly. On each of seven rows,
-//! the nodes of a Kronrod rule, the intervals that occluders hide are united, and the antiderivative of the cell's
-//! polynomial is summed over the ends of what is left: nothing is shaded again. The Gauss rule of three inside says how
-//! far the panel can be wrong. Where a panel ends, outlines begin as roots do, so rows are spread by y^2 (3 - 2 y).
+//! A panel is a range of rows of one cell on which the outline of each occluder changes smoothly; where the outlines of
+//! two cross, two rules differ, and the panel is halved. On each of seven rows, the nodes of a Kronrod rule, the
+//! intervals that occluders hide are united, and the antiderivative of the cell's polynomial is summed over the ends of
+//! what is left: nothing is shaded again. The Gauss rule of three inside says how far the panel can be wrong. Where a
+//! panel ends, outlines begin as roots do, so rows are spread by y^2 (3 - 2 y).
 //!
 //! Source of the rule: Kronrod, "Nodes and Weights of Quadrature Formulas", 1965; of the spread: Davis, Rabinowitz,
 //! "Methods of Numerical Integration", 1984, section 2.12.
