@@ -34,6 +34,18 @@ pub(crate) fn vec3(v: [f64; 3]) -> Vec3 {
     Vec3::new(v[0] as f32, v[1] as f32, v[2] as f32)
 }
 
+/// The largest whole number that is not above `x`: what `f64::floor` says, which is a call where the processor is not
+/// known to have an instruction for it.
+#[inline(always)]
+pub(crate) fn floor(x: f64) -> f64 {
+    // From here on all numbers are whole; also no number, and infinity
+    if !(x.abs() < (1u64 << 52) as f64) {
+        return x;
+    }
+    let whole = x as i64 as f64;
+    if whole > x { whole - 1.0 } else { whole }
+}
+
 /// x^2.
 #[inline(always)]
 pub(crate) fn square(x: f32) -> f32 {

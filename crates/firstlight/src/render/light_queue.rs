@@ -218,6 +218,7 @@ impl<'a> LightQueue<'a> {
             let to = kind.towards(0, p).l;
             ns.dot(to).min(horizon.dot(to)).abs() < reach + turn * to.length()
         };
+        let is_even = self.is_even(&wanted, &arrival);
         Answer {
             sums: arrival.sums,
             smooth: arrival.smooth || place.point.reach == 0.0,
@@ -227,12 +228,15 @@ impl<'a> LightQueue<'a> {
             } else {
                 arrival.drift
             },
-            turn: if is_kinked || !arrival.resolved && !self.is_even(&wanted, &arrival) {
+            turn: if is_kinked || !is_even && !arrival.resolved {
                 f32::INFINITY
             } else if arrival.sharp {
                 0.5
-            } else {
+            } else if is_even {
                 0.0
+            } else {
+                // One place does not tell what it does, but some do together
+                0.1
             },
         }
     }

@@ -6,7 +6,7 @@ use glam::DVec2;
 use crate::color::Rgb;
 use crate::context::CompileContext;
 use crate::describe::{ColorDesc, table};
-use crate::math::Vec2;
+use crate::math::{Vec2, floor};
 use crate::shape::{Footprint, UvEdge};
 
 table! {
@@ -66,23 +66,33 @@ impl Checkerboard {
 
     /// Whether all within a step of the footprint lies in one square: the footprint itself reaches half as far.
     pub(crate) fn is_even(&self, uv: Vec2, footprint: &Footprint) -> bool {
-        let scale = Vec2::new(self.counts[0] as f32, self.counts[1] as f32);
-        let (center, reach) = (uv * scale, (footprint.dx.abs() + footprint.dy.abs()) * scale);
-        (center - reach).floor() == (center + reach).floor()
+        let scale = self.scale();
+        let reach = (footprint.dx.abs() + footprint.dy.abs()).as_dvec2() * scale;
+        Self::square(uv.as_dvec2() * scale - reach) == Self::square(uv.as_dvec2() * scale + reach)
+    }
+
+    /// Squares in a unit of u and of v.
+    fn scale(&self) -> DVec2 {
+        DVec2::new(f64::from(self.counts[0]), f64::from(self.counts[1]))
+    }
+
+    /// Which square a place is in, counted in squares.
+    #[inline(always)]
+    fn square(p: DVec2) -> [f64; 2] {
+        [floor(p.x), floor(p.y)]
     }
 
     /// The mean over the footprint, as far as the surface goes, of +1 on the first colour's squares and -1 on the
     /// second's. In f64: the integral is a small difference of larger numbers where the footprint is thin.
     fn mean(&self, uv: Vec2, footprint: &Footprint) -> f64 {
         // Count in squares: the lines of the board are the whole numbers
-        let scale = DVec2::new(self.counts[0] as f64, self.counts[1] as f64);
+        let scale = self.scale();
         let waves = [0, 1].map(|i| Wave::new(self.counts[i], footprint.edges[i]));
         let center = uv.as_dvec2() * scale;
         let (a, b) = (footprint.dx.as_dvec2() * scale, footprint.dy.as_dvec2() * scale);
         // All in one square: from near, nearly always
         let reach = (a.abs() + b.abs()) * 0.5;
-        let (low, high) = ((center - reach).floor(), (center + reach).floor());
-        if low == high {
+        if Self::square(center - reach) == Self::square(center + reach) {
             return waves[0].sign(center.x) * waves[1].sign(center.y);
         }
         let leaves = |i: usize| center[i] - reach[i] < 0.0 || center[i] + reach[i] > scale[i];
@@ -204,7 +214,7 @@ fn for_each_piece(from: DVec2, to: DVec2, mut piece: impl FnMut(DVec2, DVec2)) {
         if along[axis] == 0.0 {
             return f64::INFINITY;
         }
-        let first = if along[axis] > 0.0 { from[axis].floor() + 1.0 } else { from[axis].ceil() - 1.0 };
+        let first = if along[axis] > 0.0 { floor(from[axis]) + 1.0 } else { -floor(-from[axis]) - 1.0 };
         (first + k * along[axis].signum() - from[axis]) / along[axis]
     };
     let (mut kx, mut ky, mut start) = (0.0, 0.0, from);
@@ -242,14 +252,14 @@ impl Wave {
     /// +1 or -1: the square that holds `x`.
     fn sign(&self, x: f64) -> f64 {
         let square = match self.edge {
-            UvEdge::Bounded | UvEdge::Folded => x.floor().clamp(0.0, self.count - 1.0),
+            UvEdge::Bounded | UvEdge::Folded => floor(x).clamp(0.0, self.count - 1.0),
             // Once around is what is asked for as a rule
-            UvEdge::Periodic if x >= 0.0 && x < self.count => x.floor(),
-            UvEdge::Periodic => x.floor().rem_euclid(self.count),
-            UvEdge::Unbounded => x.floor(),
+            UvEdge::Periodic if x >= 0.0 && x < self.count => floor(x),
+            UvEdge::Periodic => floor(x).rem_euclid(self.count),
+            UvEdge::Unbounded => floor(x),
         };
         let half = 0.5 * square;
-        if half == half.floor() { 1.0 } else { -1.0 }
+        if half == floor(half) { 1.0 } else { -1.0 }
     }
 
     /// The integral of the wave from 0 to `x`.
@@ -263,7 +273,7 @@ impl Wave {
             UvEdge::Bounded | UvEdge::Folded | UvEdge::Unbounded => triangle(x),
             // An odd count leaves one square over in each round
             UvEdge::Periodic => {
-                let round = (x / self.count).floor();
+                let round = floor(x / self.count);
                 round * triangle(self.count) + triangle(x - round * self.count)
             }
         }
@@ -272,7 +282,7 @@ impl Wave {
 
 /// The integral from 0 to `x` of the wave without edges: 0 at even numbers, 1 at odd ones, straight between.
 fn triangle(x: f64) -> f64 {
-    let phase = x - 2.0 * (x * 0.5).floor();
+    let phase = x - 2.0 * floor(x * 0.5);
     if phase <= 1.0 { phase } else { 2.0 - phase }
 }
 
