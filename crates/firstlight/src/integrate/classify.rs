@@ -422,8 +422,8 @@ impl<S: Simd> Sight<S> {
     }
 }
 
-/// The classes of up to sixteen points, whose `views` are in a block; of those whose bits are in `asked`. What is in trees
-/// is `near` and counted after what is in lists. To be called within `vectorize`.
+/// The classes of up to sixteen points, whose `views` are in a block; of those whose bits are in `asked`. What is in
+/// trees is `near` and counted after what is in lists. To be called within `vectorize`.
 #[inline(always)]
 pub(crate) fn classify<S: Simd>(
     simd: S,

@@ -276,8 +276,8 @@ impl Evaluator {
         there
     }
 
-    /// Queues the cells that the light is asked by at first. Where nothing is in the way, those of which all is seen are
-    /// told apart.
+    /// Queues the cells that the light is asked by at first. Where nothing is in the way, those of which all is seen
+    /// are told apart.
     fn grade(&mut self, level: Level, light: &Asked) {
         let (tolerance, outline) = (light.tolerance, light.emitter.outline());
         while !self.grading.is_empty() {

@@ -187,8 +187,8 @@ impl Fragments {
         self.rays = all;
     }
 
-    /// Adds a pixel that is proved to see one shape of one material, from the middles of its quadrants alone; `false` if
-    /// it is to be asked for its rays.
+    /// Adds a pixel that is proved to see one shape of one material, from the middles of its quadrants alone; `false`
+    /// if it is to be asked for its rays.
     pub fn add_whole(&mut self, scene: &Scene, pixel: u32, [i, j]: [u32; 2], of: Candidate, bsdf: Bsdf) -> bool {
         let n = scene.antialiasing;
         if n % 2 == 1 || (n * n) as usize <= FEW_RAYS {
@@ -398,8 +398,8 @@ impl Candidate {
         (!mean.uneven).then_some((mean.bsdf, mean.contrast))
     }
 
-    /// The same from the quarters of a pixel, where they are as exact as its rays: where textures tell the mean over any
-    /// area, and the `whole` pixel says the same.
+    /// The same from the quarters of a pixel, where they are as exact as its rays: where textures tell the mean over
+    /// any area, and the `whole` pixel says the same.
     fn mean_of_quarters(self, scene: &Scene, at: [u32; 2], whole: &Bsdf) -> Option<(Bsdf, Contrast)> {
         let surface = &scene.geometry.surfaces[self.surface(scene).index()];
         let is_exact = scene.materials[surface.material?.index()].is_exact_mean(&scene.textures);

@@ -221,7 +221,7 @@ impl<'a> LightQueue<'a> {
         let is_even = self.is_even(&wanted, &arrival);
         Answer {
             sums: arrival.sums,
-            smooth: arrival.smooth || place.point.reach == 0.0,
+            smooth: place.point.reach == 0.0 || arrival.smooth && arrival.drift == 0.0,
             // Each of a fixed set of points throws a hard shadow, which shows where they are few
             motion: if is_sampled && kind.samples() < FEW_SAMPLES && arrival.drift > 0.0 {
                 f32::INFINITY

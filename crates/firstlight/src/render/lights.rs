@@ -22,7 +22,7 @@ pub(crate) struct Lights<'a> {
     pub targets: Vec<Target>,
     /// The points of those that are integrated.
     pub ladders: Vec<Ladder>,
-    /// What may stand in the way of those that are integrated.
+    /// What may stand in the way of those that have an area.
     pub obstacles: Vec<Obstacles<'a>>,
     /// In display steps: how far one light may be wrong at a point that stands for a pixel; and the value that many
     /// steps above black.
@@ -45,12 +45,11 @@ impl<'a> Lights<'a> {
         let targets = Target::of_all(scene);
         let ladders = emitters.iter().map(|_| Ladder::default()).collect();
         let tree = (scene.lights.len() > FEW).then(|| LightTree::new(&scene.lights));
-        let obstacles = (0..scene.lights.len())
-            .map(|index| match &emitters[index] {
-                Some(emitter) => Obstacles::new(scene, index, emitter),
-                None => Obstacles::default(),
-            })
-            .collect();
+        let obstacles = scene.lights.iter().enumerate().map(|(index, light)| match &light.kind {
+            LightKind::Area(area) => Obstacles::new(scene, index, &Emitter::new(area)),
+            _ => Obstacles::default(),
+        });
+        let obstacles = obstacles.collect();
         let steps = DisplaySteps::new(&scene.display, scene.tolerance);
         let allowed = Tolerance::DEFAULT.point / (scene.lights.len().max(1) as f32).sqrt();
         let least = steps.value_of(allowed);
