@@ -188,20 +188,29 @@ impl ViewBlock {
         let line = |v: Vec3x16<S>| [v.dot(l0), v.dot(a), v.dot(b)];
         let (cos, out) = (line(ns), line(wo));
         let mut above = line(horizon);
-        above[0] = above[0] - horizon.abs().dot(slack);
-        let mut put = |of: ViewNumber, number: f32x16<S>| self.0[of as usize] = number.to_array();
-        for (of, v) in [([Px, Py, Pz], p), ([L0x, L0y, L0z], l0), ([Ax, Ay, Az], a), ([Bx, By, Bz], b)] {
-            (put(of[0], v.x), put(of[1], v.y), put(of[2], v.z));
+        above[0] -= horizon.abs().dot(slack);
+        let [zero, one] = [splat(0.0), splat(1.0)];
+        let threes = [
+            ([Px, Py, Pz], [p.x, p.y, p.z]),
+            ([L0x, L0y, L0z], [l0.x, l0.y, l0.z]),
+            ([Ax, Ay, Az], [a.x, a.y, a.z]),
+            ([Bx, By, Bz], [b.x, b.y, b.z]),
+            ([Fa, Fb, Height], [fa, fb, side.abs()]),
+            ([La, Lb, Skew], [splat(light.la), splat(light.lb), splat(light.skew)]),
+            ([MirrorX, MirrorY, MirrorZ], [mirror.x, mirror.y, mirror.z]),
+            ([CosC, CosX, CosY], cos),
+            ([HorizonC, HorizonX, HorizonY], above),
+            ([OutC, OutX, OutY], out),
+            ([X0, Y0, CosO], [-one, -one, cos_o]),
+            ([X1, Y1, Facing], [one, one, facing]),
+            ([OriginX, OriginY, Measure], [zero, zero, splat(light.measure())]),
+            ([Ratio, Behind2, Behind2], [splat(light.ratio), splat(light.behind2), splat(light.behind2)]),
+        ];
+        for (numbers, values) in threes {
+            for (of, value) in numbers.into_iter().zip(values) {
+                self.0[of as usize] = value.to_array();
+            }
         }
-        (put(MirrorX, mirror.x), put(MirrorY, mirror.y), put(MirrorZ, mirror.z));
-        (put(Fa, fa), put(Fb, fb), put(Height, side.abs()), put(Facing, facing), put(CosO, cos_o));
-        (put(La, splat(light.la)), put(Lb, splat(light.lb)), put(Skew, splat(light.skew)));
-        (put(CosC, cos[0]), put(CosX, cos[1]), put(CosY, cos[2]));
-        (put(HorizonC, above[0]), put(HorizonX, above[1]), put(HorizonY, above[2]));
-        (put(OutC, out[0]), put(OutX, out[1]), put(OutY, out[2]));
-        (put(X0, splat(-1.0)), put(X1, splat(1.0)), put(Y0, splat(-1.0)), put(Y1, splat(1.0)));
-        (put(OriginX, splat(0.0)), put(OriginY, splat(0.0)));
-        (put(Ratio, splat(light.ratio)), put(Behind2, splat(light.behind2)), put(Measure, splat(light.measure())));
         // The distance to the light's square, or a little less
         let gap = |foot: f32x16<S>, half: f32| (foot.abs() - half).max(splat(0.0));
         let (gap_x, gap_y) = (gap(fa, light.la + light.skew.abs()), gap(fb, light.lb));

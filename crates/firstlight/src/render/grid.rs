@@ -205,7 +205,7 @@ impl Grid {
                     most = Some(before.max(there.apart(here)));
                 }
             }
-            slope = slope + most?;
+            slope += most?;
         }
         Some(slope)
     }

@@ -127,11 +127,8 @@ impl PixelRays {
         let ray = Ray { o: Vec3::ZERO, d: Vec3::ZERO };
         let place = |number: u32| [number % n, number / n].map(|k| (k as f32 + 0.5) / n as f32);
         let places = (0..n * n).step_by(LANES).map(|first| {
-            let mut places = [[0.0; LANES]; 2];
-            for k in 0..LANES {
-                [places[0][k], places[1][k]] = place((first + k as u32).min(n * n - 1));
-            }
-            places
+            let number = |k: usize| (first + k as u32).min(n * n - 1);
+            [std::array::from_fn(|k| place(number(k))[0]), std::array::from_fn(|k| place(number(k))[1])]
         });
         PixelRays { level, places: places.collect(), rays: vec![ray; (n * n) as usize] }
     }
@@ -144,7 +141,8 @@ impl PixelRays {
                 #[inline(always)]
                 || {
                     let [x, y] = places.map(|places| f32x16::simd_from(simd, places));
-                    scene.camera.ray_lanes(simd, x + i as f32, y + j as f32).map(|v| [v.x.to_array(), v.y.to_array(), v.z.to_array()])
+                    let ways = scene.camera.ray_lanes(simd, x + i as f32, y + j as f32);
+                    ways.map(|v| [v.x.to_array(), v.y.to_array(), v.z.to_array()])
                 },
             ));
             for (k, ray) in rays.iter_mut().enumerate() {
@@ -168,7 +166,8 @@ mod tests {
         for projection in ["", "projection = \"orthographic\"\nheight = 3"] {
             for n in [1, 2, 3, 4, 5, 8] {
                 let text = format!(
-                    "[render]\nwidth = 70\nheight = 50\nantialiasing = {n}\n[camera]\nposition = [1, 2, 3]\nlook_at = [0, 0.3, 0]\n{projection}\n"
+                    "[render]\nwidth = 70\nheight = 50\nantialiasing = {n}\n\
+                     [camera]\nposition = [1, 2, 3]\nlook_at = [0, 0.3, 0]\n{projection}\n"
                 );
                 let parsed = SceneDesc::parse("s.toml", text.as_bytes(), &NoAssets);
                 let scene = parsed.compile(&NoAssets, &CompileOptions::default()).expect("is a scene").scene;

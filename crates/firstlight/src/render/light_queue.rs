@@ -55,9 +55,6 @@ impl Place {
     }
 }
 
-/// The shadows of one of fewer points than this show by themselves.
-const FEW_SAMPLES: usize = 256;
-
 /// One light at one place.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Request {
@@ -213,7 +210,6 @@ impl<'a> LightQueue<'a> {
         // A light of one point sets in at once where it passes the horizon
         let kind = &self.scene.lights[light];
         let ShadingPoint { p, ns, horizon, reach, turn, .. } = place.point;
-        let is_sampled = matches!(kind.kind, LightKind::Area(_)) && self.arrivals.lights.emitters[light].is_none();
         let is_kinked = !matches!(kind.kind, LightKind::Area(_)) && {
             let to = kind.towards(0, p).l;
             ns.dot(to).min(horizon.dot(to)).abs() < reach + turn * to.length()
@@ -222,12 +218,7 @@ impl<'a> LightQueue<'a> {
         Answer {
             sums: arrival.sums,
             smooth: place.point.reach == 0.0 || arrival.smooth && arrival.drift == 0.0,
-            // Each of a fixed set of points throws a hard shadow, which shows where they are few
-            motion: if is_sampled && kind.samples() < FEW_SAMPLES && arrival.drift > 0.0 {
-                f32::INFINITY
-            } else {
-                arrival.drift
-            },
+            motion: arrival.drift,
             turn: if is_kinked || !is_even && !arrival.resolved {
                 f32::INFINITY
             } else if arrival.sharp {

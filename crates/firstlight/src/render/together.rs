@@ -304,7 +304,7 @@ impl Together {
     fn add(&mut self, place: &ArrivalPlace, sums: &Sums) {
         self.terms += place.reflected.each(sums);
         self.value += place.color(sums);
-        self.sums = self.sums + *sums;
+        self.sums += *sums;
     }
 
     /// What all rays see of the light.

@@ -153,7 +153,7 @@ impl Tiled<'_> {
                 }
                 *sums = arrival.sums;
             }
-            slope = slope + apart(&arrived[0], &arrived[1]) * 0.5;
+            slope += apart(&arrived[0], &arrived[1]) * 0.5;
         }
         Some(slope)
     }

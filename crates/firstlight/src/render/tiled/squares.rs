@@ -329,7 +329,7 @@ impl Tiled<'_> {
                 let mut foretold = Sums::default();
                 for (corners, down) in [nodes[0], nodes[2]].iter().zip(down) {
                     for (corner, across) in [corners[0], corners[2]].iter().zip(across) {
-                        foretold = foretold + corner.sums * (across * down);
+                        foretold += corner.sums * (across * down);
                     }
                 }
                 let off = foretold.apart(node.sums);
@@ -347,7 +347,7 @@ impl Tiled<'_> {
             let (mut sums, mut foretold) = (Sums::default(), 0.0);
             for (row, down) in nodes.iter().zip(down) {
                 for (node, across) in row.iter().zip(across) {
-                    sums = sums + node.sums * (across * down);
+                    sums += node.sums * (across * down);
                     foretold += node.share * (across * down);
                 }
             }
