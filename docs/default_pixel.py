@@ -435,7 +435,7 @@ def converged(view, between):
 CELL = (736, 960)  # where the pixel's cell of 32 x 32 pixels begins
 SQUARES = ((752, 976, 16), (752, 984, 8), (752, 984, 4), (752, 984, 2))  # those of the grid that hold the pixel
 MOTION = {16: 0.5, 8: 0.5, 4: 0.5, 2: 1.0}  # what the grid allows, as a part of the light's size
-FORETOLD = {4: 0.5, 2: 1.0}  # and in steps
+FORETOLD = {4: 0.5, 2: 1.5}  # and in steps
 FOLLOWED = 3  # the row of the first panel that is worked out, counted from 0
 
 

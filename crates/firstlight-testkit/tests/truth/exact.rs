@@ -489,3 +489,21 @@ fn a_light_in_the_plane_of_a_surface_sends_nothing_to_it() {
         }
     }
 }
+
+/// Of a fixed set of points each throws a hard shadow of its own: where pixels share places, none of them may be lost.
+#[test]
+fn sampled_lights_keep_the_shadow_of_each_point_where_pixels_share_places() {
+    for seed in [10, 13, 29, 32, 38, 42] {
+        for count in [16, 400] {
+            let desc = exact_scenes::scene(seed, 32);
+            let scene = compile(&with_samples(&desc, count, SampleSet::Sobol, 1));
+            let (shared, each) = (picture(&scene, &integrated()), sampled(&desc, SampleSet::Sobol, count));
+            let off = shared.pixels.iter().zip(&each.pixels).map(|(a, b)| {
+                let [a, b] = [a, b].map(|pixel| displayed(&scene, *pixel));
+                (0..3).map(|k| (a[k] - b[k]).abs()).fold(0.0, f64::max)
+            });
+            let worst = off.fold(0.0, f64::max);
+            assert!(worst <= 1.0, "scene {seed}, {count} points: {worst} steps off");
+        }
+    }
+}

@@ -25,8 +25,9 @@ const FORETOLD_SMOOTH: f32 = 1.0;
 const FORETOLD_SHARP: f32 = 0.1;
 const FORETOLD_CUT: f32 = 0.5;
 /// The same of the smallest squares.
-const SMALLEST_FORETOLD: f32 = 2.0;
+const SMALLEST_SMOOTH: f32 = 2.0;
 const SMALLEST_SHARP: f32 = 0.25;
+const SMALLEST_CUT: f32 = 1.5;
 /// From here on a highlight is not wide; and beyond, narrow beside the square.
 const SHARP: f32 = 0.4;
 const NARROW: f32 = 1.0;
@@ -405,7 +406,8 @@ impl Grid {
         let allowed = match (center.turn > SHARP, item.square.side == SMALLEST, center.smooth) {
             (true, false, _) => FORETOLD_SHARP,
             (true, true, _) => SMALLEST_SHARP,
-            (false, true, _) => SMALLEST_FORETOLD,
+            (false, true, true) => SMALLEST_SMOOTH,
+            (false, true, false) => SMALLEST_CUT,
             (false, false, true) => FORETOLD_SMOOTH,
             (false, false, false) => FORETOLD_CUT,
         };
