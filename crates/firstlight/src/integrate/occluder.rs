@@ -199,6 +199,13 @@ impl<S: Simd> Quadratic16<S> {
         }
     }
 
+    /// One that is below 0 everywhere.
+    #[inline(always)]
+    fn below_0(simd: S) -> Self {
+        let (zero, minus) = (simd.splat_f32x16(0.0), simd.splat_f32x16(-1.0));
+        Quadratic16 { c: minus, x: zero, y: zero, xx: minus, xy: zero, yy: minus }
+    }
+
     #[inline(always)]
     fn select(is: mask32x16<S>, a: Self, b: Self) -> Self {
         Quadratic16 {
@@ -529,6 +536,9 @@ impl<S: Simd> Shadow<S> {
         let n = l[1].cross(l[2]);
         let off = n.dot(from_center[0]);
         let cuts = (off * off).simd_lt(n.dot(n) * r2);
+        // What is all beyond that plane hides nothing
+        let is_beyond = (off * n.dot(l[0])).simd_lt(0.0) & !cuts;
+        let quadratic = Quadratic16::select(is_beyond, Quadratic16::below_0(simd), quadratic);
         let cut = if cuts.any_true() {
             let zero = simd.splat_f32x16(0.0);
             let ls = Quadratic16 { c: ahead.c, x: ahead.x * 0.5, y: ahead.y * 0.5, xx: zero, xy: zero, yy: zero };
