@@ -211,11 +211,21 @@ impl ViewBlock {
                 self.0[of as usize] = value.to_array();
             }
         }
-        // The distance to the light's square, or a little less
-        let gap = |foot: f32x16<S>, half: f32| (foot.abs() - half).max(splat(0.0));
-        let (gap_x, gap_y) = (gap(fa, light.la + light.skew.abs()), gap(fb, light.lb));
-        let nearest = (gap_x * gap_x + gap_y * gap_y + side * side).sqrt();
-        nearest.simd_lt(NEAR * light.la.max(light.lb)).to_bitmask()
+        self.nearest(simd).simd_lt(NEAR * light.la.max(light.lb)).to_bitmask()
+    }
+
+    /// The distance to the nearest place of the light's square, or a little less.
+    #[inline(always)]
+    pub fn nearest<S: Simd>(&self, simd: S) -> f32x16<S> {
+        use ViewNumber::*;
+        let [x0, x1] = [self.lanes(simd, X0), self.lanes(simd, X1)];
+        let [y0, y1] = [self.lanes(simd, Y0), self.lanes(simd, Y1)];
+        let (fa, la, fb, lb) = (self.lanes(simd, Fa), self.lanes(simd, La), self.lanes(simd, Fb), self.lanes(simd, Lb));
+        let (lean, height) = (self.lanes(simd, Skew).abs() * y1.max(-y0), self.lanes(simd, Height));
+        let zero = simd.splat_f32x16(0.0);
+        let gap_x = (fa - (lean - la * x0)).max(-fa - (la * x1 + lean)).max(zero);
+        let gap_y = (fb + lb * y0).max(-fb - lb * y1).max(zero);
+        (gap_x * gap_x + gap_y * gap_y + height * height).sqrt()
     }
 
     /// From where to where a lane's light goes.

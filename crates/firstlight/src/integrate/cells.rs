@@ -7,7 +7,6 @@
 //! Points that are doubled in number all over the light (tried, and still the way to begin with) need 2^(2 k) times the
 //! rays for that.
 
-use super::Sums;
 use crate::material::{MOMENTS, Moments};
 use crate::math::{LANES, Vec3};
 
@@ -150,7 +149,7 @@ impl Grid {
     }
 }
 
-/// Sums over cells, in parts of the light's measure.
+/// Moments over cells, in parts of the light's measure.
 #[derive(Clone, Copy, Default)]
 struct Totals {
     all: [f64; MOMENTS],
@@ -224,9 +223,9 @@ fn ask(source: &impl Source, side: usize, places: &[[u32; 2]], cells: &mut Vec<C
 /// that makes.
 pub(super) fn integrate(
     source: &impl Source,
-    whole: Option<&Sums>,
-    enough: &dyn Fn(&Sums, &Sums) -> bool,
-) -> (Sums, Sums) {
+    whole: Option<&Moments>,
+    enough: &dyn Fn(&Moments, &Moments) -> bool,
+) -> (Moments, Moments) {
     let mut cells = all(source, FIRST as u32);
     let mut grid = Grid { side: FIRST, states: vec![State::Dark; FIRST * FIRST] };
     cells.iter().for_each(|cell| grid.set(cell.at, cell.state));
@@ -392,7 +391,7 @@ mod tests {
 
     #[track_caller]
     fn check(shape: impl Fn(f32, f32) -> bool, truth: f64, wanted: f32) {
-        let whole = Sums::bounds(1.0, 1.0);
+        let whole = Moments::bounds(1.0, 1.0);
         for whole in [None, Some(&whole)] {
             let (sums, error) = integrate(&Through(&shape), whole, &|_, error| error.cosine() <= wanted);
             let off = f64::from(sums.cosine()) - truth;

@@ -19,7 +19,6 @@ use std::f32::consts::FRAC_1_SQRT_2;
 
 use fearless_simd::{Level, Simd};
 
-use super::Sums;
 use super::batch::{Block, Members, ShadingPoint, ViewBlock};
 use super::classify::{Class, Obstacles, classify};
 use super::emitter::Emitter;
@@ -50,7 +49,7 @@ pub(crate) enum Illumination {
 /// What arrives at a point.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Arrived {
-    pub sums: Sums,
+    pub sums: Moments,
     pub illumination: Illumination,
     /// Whether the same is proved for all places within the point's reach.
     pub proved: bool,
@@ -133,9 +132,9 @@ pub(crate) struct Evaluator {
 /// What is known of one point.
 #[derive(Clone, Copy, Debug, Default)]
 struct State {
-    accepted: Sums,
+    accepted: Moments,
     /// With all that is not accepted yet.
-    estimate: Sums,
+    estimate: Moments,
     weight: Weight,
     /// The round that the last two are of.
     round: u32,
@@ -217,7 +216,7 @@ impl Evaluator {
             for (k, (point, class)) in points.iter().zip(&classes).enumerate() {
                 let is = |bits: u64| bits >> k & 1 == 1;
                 let mut one = Arrived {
-                    sums: Sums::default(),
+                    sums: Moments::default(),
                     illumination: Illumination::Below,
                     proved: point.reach == 0.0,
                     motion: 0.0,

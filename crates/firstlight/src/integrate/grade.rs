@@ -67,30 +67,15 @@ pub(super) fn survey<S: Simd>(simd: S, views: &ViewBlock, is_physical: bool, poi
         below_around |= most.simd_lt(-room);
         above_around &= least.simd_gt(room);
     }
-    let [gap_x, gap_y] = gaps(simd, views);
     Survey {
         arrives: arrives.to_bitmask(),
         above: (arrives & above).to_bitmask(),
         below_around: below_around.to_bitmask(),
         above_around: above_around.to_bitmask(),
         beside_around: is_beside.to_bitmask(),
-        nearest: (gap_x * gap_x + gap_y * gap_y + height * height).sqrt().to_array(),
+        nearest: views.nearest(simd).to_array(),
         height: height.to_array(),
     }
-}
-
-/// How far beside the light's square the feet of points are, along its edges, or a little less.
-#[inline(always)]
-fn gaps<S: Simd>(simd: S, views: &ViewBlock) -> [f32x16<S>; 2] {
-    use ViewNumber::*;
-    let [x0, x1] = [views.lanes(simd, X0), views.lanes(simd, X1)];
-    let [y0, y1] = [views.lanes(simd, Y0), views.lanes(simd, Y1)];
-    let (fa, la, fb, lb) = (views.lanes(simd, Fa), views.lanes(simd, La), views.lanes(simd, Fb), views.lanes(simd, Lb));
-    let lean = views.lanes(simd, Skew).abs() * y1.max(-y0);
-    let zero = simd.splat_f32x16(0.0);
-    let gap_x = (fa - (lean - la * x0)).max(-fa - (la * x1 + lean)).max(zero);
-    let gap_y = (fb + lb * y0).max(-fb - lb * y1).max(zero);
-    [gap_x, gap_y]
 }
 
 /// A light as one cell, as `point` asks it: in the coordinates by which it is cut.

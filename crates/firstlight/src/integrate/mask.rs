@@ -2,14 +2,13 @@
 
 use std::cell::Cell;
 
-use super::Sums;
 use super::cells::{self, Sent, Source};
 use super::emitter::Emitter;
 use super::near::Near;
 use super::view::{Outline, View};
 use crate::accel::RayPacket16;
 use crate::ids::LightId;
-use crate::material::Lobe;
+use crate::material::{Lobe, Moments};
 use crate::math::{LANES, ShadowRay, Vec3};
 use crate::scene::{Scene, ShadowRays};
 use crate::shape::SurfaceInteraction;
@@ -29,7 +28,7 @@ pub(crate) struct Masked<'a> {
 
 impl Masked<'_> {
     /// What arrives, by cells from the beginning.
-    pub fn by_cells(&self, view: &View, whole: &Sums, enough: &dyn Fn(&Sums, &Sums) -> bool) -> Sums {
+    pub fn by_cells(&self, view: &View, whole: &Moments, enough: &dyn Fn(&Moments, &Moments) -> bool) -> Moments {
         cells::integrate(&self.seen(view), Some(whole), enough).0
     }
 

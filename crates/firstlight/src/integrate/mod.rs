@@ -30,7 +30,5 @@ pub(crate) use mask::Masked;
 pub(crate) use tolerance::Tolerance;
 pub(crate) use view::{Receiver, View};
 
-pub(crate) use crate::material::Moments as Sums;
-
 #[cfg(test)]
 mod tests;

@@ -6,16 +6,16 @@ use std::f64::consts::TAU;
 
 use pxfm::{f_exp, f_log, f_sincos};
 
-use super::Sums;
 use super::cells::{self, Highlight, Sent, Source};
 use super::mask::Masked;
 use crate::light::{Area, AreaShape, Light, LightKind, Sphere, concentric};
+use crate::material::Moments;
 use crate::math::{DVec3, LANES, Vec3};
 use crate::shape::SurfaceInteraction;
 
 impl Masked<'_> {
     /// What arrives from a sphere for which there is no [`View`](super::View).
-    pub fn by_points(&self, light: &Light, enough: &dyn Fn(&Sums, &Sums) -> bool) -> Sums {
+    pub fn by_points(&self, light: &Light, enough: &dyn Fn(&Moments, &Moments) -> bool) -> Moments {
         let LightKind::Area(Area { shape: AreaShape::Sphere(sphere), physical, both_sides, .. }) = &light.kind else {
             unreachable!("what is flat has a view")
         };

@@ -5,7 +5,7 @@ use fearless_simd::Level;
 use super::view::{FlatLight, Outline};
 use super::*;
 use crate::color::{Display, DisplaySteps, Rgb};
-use crate::material::{BlinnPhongLobe, Colors, Lobe, PhongLobe};
+use crate::material::{BlinnPhongLobe, Colors, Lobe, Moments, PhongLobe};
 use crate::math::{DVec3, ErrorBound, Vec3};
 use crate::shape::{Parallelogram, Sphere, SphereUv};
 
@@ -117,7 +117,7 @@ fn is_behind(flat: &Parallelogram, l: DVec3) -> bool {
 }
 
 /// The mean of `n` x `n` points, in f64.
-fn brute(case: &Case, n: usize) -> Sums {
+fn brute(case: &Case, n: usize) -> Moments {
     let (light, at) = (&case.light, &case.receiver);
     let (mut diffuse, mut specular) = (0.0, 0.0);
     for i in 0..n {
@@ -146,11 +146,11 @@ fn brute(case: &Case, n: usize) -> Sums {
             specular += weight * f64::from(at.lobe.eval(cos_i, at.ns.dot(at.wo), at.wo.dot(l) / distance));
         }
     }
-    Sums::bounds(diffuse as f32, specular as f32)
+    Moments::bounds(diffuse as f32, specular as f32)
 }
 
 /// What batches say: the same for whoever shares one, and with every instruction set.
-fn batched(case: &Case, steps: &DisplaySteps) -> Sums {
+fn batched(case: &Case, steps: &DisplaySteps) -> Moments {
     let tolerance = Tolerance::DEFAULT;
     let Receiver { p, error, ns, wo, .. } = case.receiver;
     let worth = Colors::default().map(|_| Rgb::gray(0.5));
@@ -181,7 +181,7 @@ fn batched(case: &Case, steps: &DisplaySteps) -> Sums {
 }
 
 /// In display steps, beside what the sum of both is worth.
-fn off(steps: &DisplaySteps, found: &Sums, truth: &Sums) -> f32 {
+fn off(steps: &DisplaySteps, found: &Moments, truth: &Moments) -> f32 {
     let half = Colors::default().map(|_| Rgb::gray(0.5));
     steps.of_color(half.of(truth), half.of(&found.apart(*truth)))
 }
@@ -272,7 +272,7 @@ impl BallCase {
     }
 
     /// The mean over `n` x 2 `n` points of the sphere, in f64.
-    fn brute(&self, n: usize) -> Sums {
+    fn brute(&self, n: usize) -> Moments {
         let (ns, wo) = (self.point.ns.as_dvec3(), self.point.wo.as_dvec3());
         let (mut diffuse, mut specular) = (0.0, 0.0);
         for (i, j) in (0..n).flat_map(|i| (0..2 * n).map(move |j| (i, j))) {
@@ -294,10 +294,10 @@ impl BallCase {
             diffuse += weight * f64::from(cos_i);
             specular += weight * f64::from(self.lobe.eval(cos_i, cos_o, cos_io));
         }
-        Sums::bounds(diffuse as f32, specular as f32)
+        Moments::bounds(diffuse as f32, specular as f32)
     }
 
-    fn batched(&self, steps: &DisplaySteps) -> Sums {
+    fn batched(&self, steps: &DisplaySteps) -> Moments {
         let tolerance = Tolerance::DEFAULT;
         let BallCase { center, radius, physical, both_sides, .. } = *self;
         let sides = if both_sides { BallSides::Both } else { BallSides::Outer };

@@ -145,7 +145,7 @@ impl Material {
 }
 
 /// A material in numbers, at one surface. Light arriving from `wi` leaves towards `wo` as
-/// f = diffuse x `Lobes::diffuse` + specular x `Lobes::specular`, which is pi x BRDF x cosine.
+/// f, the sum of each moment times its colour, which is pi x BRDF x cosine.
 #[derive(Clone, Copy, Debug)]
 pub struct Bsdf {
     /// What each moment of the light is worth: the diffuse part, the highlight.

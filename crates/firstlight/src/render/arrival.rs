@@ -17,10 +17,10 @@ use super::together::Together;
 use crate::color::{DisplaySteps, Rgb};
 use crate::ids::LightId;
 use crate::integrate::{
-    Arrived, Asked, BallSides, Emitter, Evaluator, Illumination, Masked, Obstacles, Receiver, ShadingPoint, Sums, View,
+    Arrived, Asked, BallSides, Emitter, Evaluator, Illumination, Masked, Obstacles, Receiver, ShadingPoint, View,
 };
 use crate::light::{Area, AreaShape, LightKind, LightTree};
-use crate::material::Bsdf;
+use crate::material::{Bsdf, Moments};
 use crate::math::LANES;
 use crate::scene::Scene;
 use crate::shape::SurfaceInteraction;
@@ -52,10 +52,10 @@ pub(super) enum Past {
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Seen {
     /// This arrives.
-    Known(Sums),
+    Known(Moments),
     /// Things are in the way; points of the light have to be asked. This would arrive if nothing were, if that is
     /// known.
-    Behind(Option<Sums>),
+    Behind(Option<Moments>),
 }
 
 /// Parts of a pixel smaller than this are judged as if they were as large.
@@ -185,7 +185,7 @@ impl<'a> Arrivals<'a> {
     ) -> Arrival {
         match seen {
             Seen::Known(sums) => change.with(sums),
-            Seen::Behind(_) if place.parted => Arrival { skipped: true, ..change.with(Sums::default()) },
+            Seen::Behind(_) if place.parted => Arrival { skipped: true, ..change.with(Moments::default()) },
             Seen::Behind(whole) => change.with(self.one(index, place, whole, counts)),
         }
     }
@@ -194,7 +194,7 @@ impl<'a> Arrivals<'a> {
     fn of_other(&mut self, index: usize, place: &ArrivalPlace, counts: &mut Counts) -> Arrival {
         let light = &self.scene.lights[index];
         if !self.is_linked(index, place) {
-            return Arrival::even(Sums::default());
+            return Arrival::even(Moments::default());
         }
         let LightKind::Area(area) = &light.kind else { return self.single(index, light, place, counts) };
         let light = Sampled::new(self.scene, self.level, index, &self.lights.targets);
@@ -261,7 +261,7 @@ impl<'a> Arrivals<'a> {
         let (scene, lights) = (self.scene, self.lights);
         let Some(emitter) = &lights.emitters[index] else { unreachable!("lights that are sampled have no cells") };
         found.clear();
-        found.resize(places.len(), (Change::NONE, Seen::Known(Sums::default())));
+        found.resize(places.len(), (Change::NONE, Seen::Known(Moments::default())));
         // Those that are asked: past what nothing in trees is added to, and without shadows
         let mut asked: [Vec<u32>; 2] = Default::default();
         let mut next = 0;
@@ -405,7 +405,7 @@ impl<'a> Arrivals<'a> {
     }
 
     /// Whether sums with such an error will do for one light at a place.
-    fn enough<'b>(&self, place: &'b ArrivalPlace) -> impl Fn(&Sums, &Sums) -> bool + use<'a, 'b> {
+    fn enough<'b>(&self, place: &'b ArrivalPlace) -> impl Fn(&Moments, &Moments) -> bool + use<'a, 'b> {
         let (steps, tolerance) = (&self.lights.steps, self.tolerance_of(place.share));
         let colors = place.colors();
         let base = place.base;
@@ -499,8 +499,8 @@ impl<'a> Arrivals<'a> {
     }
 
     /// What arrives at one point, past what is in the way.
-    fn one(&mut self, index: usize, place: &ArrivalPlace, whole: Option<Sums>, counts: &mut Counts) -> Sums {
-        let Some(view) = self.settle(index, place.si, counts) else { return Sums::default() };
+    fn one(&mut self, index: usize, place: &ArrivalPlace, whole: Option<Moments>, counts: &mut Counts) -> Moments {
+        let Some(view) = self.settle(index, place.si, counts) else { return Moments::default() };
         let mut together = Together::new(index, 1, place.share, 0, Rgb::BLACK);
         together.behind(place, view);
         together.hear_whole(self, whole);
@@ -575,7 +575,7 @@ impl<'a> Arrivals<'a> {
     }
 
     /// What arrives at one point, past anything, by cells of the light: where few of its points send nearly all.
-    pub fn by_cells(&mut self, index: usize, place: &ArrivalPlace, counts: &mut Counts) -> Sums {
+    pub fn by_cells(&mut self, index: usize, place: &ArrivalPlace, counts: &mut Counts) -> Moments {
         let lights = self.lights;
         let emitter = lights.emitters[index].as_ref().expect("only lights that are integrated are asked by cells");
         let light = &self.scene.lights[index];
@@ -588,10 +588,10 @@ impl<'a> Arrivals<'a> {
         let is_round =
             matches!(emitter, Emitter::Ball { physical, sides, .. } if !physical || *sides != BallSides::Outer);
         let sums = match self.view(emitter, place) {
-            None if !emitter.surrounds(si.lit_from) => Sums::default(),
-            Some(view) if !view.arrives() => Sums::default(),
+            None if !emitter.surrounds(si.lit_from) => Moments::default(),
+            Some(view) if !view.arrives() => Moments::default(),
             _ if is_round => masked.by_points(light, &enough),
-            None => Sums::default(),
+            None => Moments::default(),
             Some(view) => masked.by_cells(&view, &whole.sums, &enough),
         };
         counts.points += asked.get();

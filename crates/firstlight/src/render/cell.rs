@@ -26,8 +26,8 @@ use super::square::Square;
 use super::tile::Tile;
 use super::{AaMode, Counts, Heat};
 use crate::color::Rgb;
-use crate::integrate::{ShadingPoint, Sums};
-use crate::material::Bsdf;
+use crate::integrate::ShadingPoint;
+use crate::material::{Bsdf, Moments};
 use crate::scene::Scene;
 
 /// Pixels across a cell.
@@ -436,7 +436,7 @@ impl<'a> Cells<'a> {
     }
 
     /// Adds what arrives of a light all over a fragment.
-    fn add(&mut self, fragment: usize, light: usize, sums: Sums) {
+    fn add(&mut self, fragment: usize, light: usize, sums: Moments) {
         let fragment = &self.fragments.all[fragment];
         let sums = sums * fragment.count() as f32;
         let term = &mut self.terms[fragment.pixel as usize * self.scene.lights.len() + light];
@@ -525,7 +525,7 @@ impl<'a> Cells<'a> {
             (least, most) = (least.min(answer.sums), most.max(answer.sums));
         }
         // Between places that see nothing a light can come in
-        if most == Sums::default() && !answers.iter().all(|answer| answer.smooth) {
+        if most == Moments::default() && !answers.iter().all(|answer| answer.smooth) {
             return false;
         }
         let apart = most + least * -1.0;

@@ -1,18 +1,18 @@
 //! What of one light arrives at a place, and how much that bends over the patch around it.
 
 use super::arrival::ArrivalPlace;
-use crate::integrate::{Arrived, BallSides, Emitter, Illumination, Sums, View};
-use crate::material::Lobe;
+use crate::integrate::{Arrived, BallSides, Emitter, Illumination, View};
+use crate::material::{Lobe, Moments};
 use crate::math::{Vec3, square};
 
 /// What of one light arrives.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Arrival {
-    pub sums: Sums,
+    pub sums: Moments,
     /// Whether that was not asked, since rays of the patch are.
     pub skipped: bool,
     /// How far the mean over the patch can be from what arrives at its middle.
-    pub bend: Sums,
+    pub bend: Moments,
     /// Over how much of the light's size the outlines of shadows move across the patch; see [`Arrived::motion`].
     pub drift: f32,
     /// Whether all that light does here is wide beside the patch, so that neighbours tell what it does.
@@ -27,7 +27,7 @@ pub(crate) struct Arrival {
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Change {
     /// See [`Arrival::bend`], and so on.
-    pub bend: Sums,
+    pub bend: Moments,
     pub drift: f32,
     pub resolved: bool,
     pub smooth: bool,
@@ -36,12 +36,12 @@ pub(super) struct Change {
 
 impl Change {
     /// Not at all.
-    pub const NONE: Change = Change { bend: Sums::ZERO, drift: 0.0, resolved: true, smooth: true, sharp: false };
+    pub const NONE: Change = Change { bend: Moments::ZERO, drift: 0.0, resolved: true, smooth: true, sharp: false };
     /// Nobody knows.
     pub const UNKNOWN: Change =
-        Change { bend: Sums::MOST, drift: f32::INFINITY, resolved: false, smooth: false, sharp: true };
+        Change { bend: Moments::MOST, drift: f32::INFINITY, resolved: false, smooth: false, sharp: true };
 
-    pub fn with(self, sums: Sums) -> Arrival {
+    pub fn with(self, sums: Moments) -> Arrival {
         let Change { bend, drift, resolved, smooth, sharp } = self;
         Arrival { sums, skipped: false, bend, drift, resolved, smooth, sharp }
     }
@@ -50,9 +50,9 @@ impl Change {
 impl Arrival {
     /// Of a patch whose rays are asked, not its middle.
     pub const PARTED: Arrival = Arrival {
-        sums: Sums::ZERO,
+        sums: Moments::ZERO,
         skipped: true,
-        bend: Sums::MOST,
+        bend: Moments::MOST,
         drift: f32::INFINITY,
         resolved: false,
         smooth: false,
@@ -60,7 +60,7 @@ impl Arrival {
     };
 
     /// At a point, or where nothing bends.
-    pub fn even(sums: Sums) -> Arrival {
+    pub fn even(sums: Moments) -> Arrival {
         Change::NONE.with(sums)
     }
 }
@@ -112,7 +112,7 @@ pub(super) fn horizon_change(view: &View, place: &ArrivalPlace) -> Change {
     let crossing = view.crossing(place.reach);
     let cos = (view.max(&view.cos).max(0.0) / view.middle().length() + swing).min(1.0);
     let all = view.most(place.reach) * (swing.min(1.0) * 0.5 + cos * crossing).min(1.0);
-    let bend = Sums::bounds(all, all);
+    let bend = Moments::bounds(all, all);
     let resolved = swing < RESOLVED_SWING && crossing == 0.0;
     Change { bend, drift: 0.0, resolved, smooth: false, sharp: false }
 }
@@ -137,7 +137,7 @@ pub(super) fn change(view: &View, place: &ArrivalPlace, arrived: &Arrived, sway:
     let resolved = drift < RESOLVED && swing < RESOLVED_SWING && crossing == 0.0;
     let is_clear = resolved && drift == 0.0 && illumination == Illumination::Full && !cuts;
     if matches!(view.lobe, Lobe::None) {
-        let bend = Sums::bounds(diffuse, 0.0);
+        let bend = Moments::bounds(diffuse, 0.0);
         return Change { bend, drift, resolved, smooth: is_clear && is_smooth(swing, 0.0), sharp: false };
     }
     let moved = 2.0 * place.turn + place.reach / nearest.max(place.reach) + sway;
@@ -145,7 +145,7 @@ pub(super) fn change(view: &View, place: &ArrivalPlace, arrived: &Arrived, sway:
     let narrow = lobe.min(1.0);
     let narrow = (narrow + 2.0 * narrow.sqrt() * place.off).min(1.0);
     let specular = most * brightest(view, lobe) * (kink + smooth + narrow + horizon + crossing).min(1.0);
-    let bend = Sums::bounds(diffuse, specular);
+    let bend = Moments::bounds(diffuse, specular);
     let resolved = resolved && narrow < RESOLVED;
     Change { bend, drift, resolved, smooth: is_clear && is_smooth(swing, lobe), sharp: is_sharp(lobe) }
 }

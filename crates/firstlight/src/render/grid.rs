@@ -15,8 +15,8 @@ use super::light_queue::{Answer, LightQueue, Place, Request};
 use super::solo::Candidate;
 use super::square::Square;
 use super::{Counts, Heat};
-use crate::integrate::{ShadingPoint, Sums};
-use crate::material::{Bsdf, Lobe};
+use crate::integrate::ShadingPoint;
+use crate::material::{Bsdf, Lobe, Moments};
 use crate::scene::Scene;
 
 /// In display steps: what the corners of a square may be wrong about its other places: where the light is seen as a
@@ -83,7 +83,7 @@ impl Block {
 }
 
 /// What is not known.
-const UNKNOWN: Sums = Sums::UNKNOWN;
+const UNKNOWN: Moments = Moments::UNKNOWN;
 /// No node.
 const NONE: u32 = u32::MAX;
 
@@ -113,12 +113,12 @@ pub(crate) struct Grid {
     corner: [u32; 2],
     lights: usize,
     /// Light by light, pixel by pixel: what arrives, no number where that is not known.
-    arrived: Vec<Sums>,
+    arrived: Vec<Moments>,
     /// The first node at each corner of pixels.
     first: Vec<u32>,
     nodes: Vec<Node>,
     /// Node by node, light by light: what arrives.
-    sums: Vec<Sums>,
+    sums: Vec<Moments>,
     wanted: Vec<bool>,
     /// Which of them the requests are for.
     asked_of: Vec<usize>,
@@ -179,24 +179,24 @@ impl Grid {
     }
 
     /// What arrives of a light at a pixel of the cell, if that is known.
-    pub fn arrived(&self, light: usize, at: [u32; 2]) -> Option<Sums> {
+    pub fn arrived(&self, light: usize, at: [u32; 2]) -> Option<Moments> {
         let sums = self.arrived[self.pixel(light, at)];
         sums.is_known().then_some(sums)
     }
 
     /// The same of pixels side by side, from `at` on.
-    pub fn row(&self, light: usize, at: [u32; 2], length: usize) -> &[Sums] {
+    pub fn row(&self, light: usize, at: [u32; 2], length: usize) -> &[Moments] {
         let first = self.pixel(light, at);
         &self.arrived[first..first + length]
     }
 
     /// How far it changes from a pixel to its neighbours in a square, along both axes together; `None` where they do
     /// not know.
-    pub fn slope(&self, light: usize, at: [u32; 2], square: Square) -> Option<Sums> {
+    pub fn slope(&self, light: usize, at: [u32; 2], square: Square) -> Option<Moments> {
         let here = self.arrived(light, at)?;
-        let mut slope = Sums::default();
+        let mut slope = Moments::default();
         for (axis, from) in [square.x, square.y].into_iter().enumerate() {
-            let mut most: Option<Sums> = None;
+            let mut most: Option<Moments> = None;
             for to in [at[axis].wrapping_sub(1), at[axis] + 1] {
                 if to.wrapping_sub(from) < square.side {
                     let mut beside = at;
@@ -292,8 +292,8 @@ impl Grid {
         let mut open: Vec<Item> = Vec::new();
         for item in kept {
             let answer = &centers[item.center as usize];
-            if answer.smooth && answer.sums == Sums::default() {
-                self.fill(scene, &item, &[Sums::default(); 9]);
+            if answer.smooth && answer.sums == Moments::default() {
+                self.fill(scene, &item, &[Moments::default(); 9]);
                 continue;
             }
             let is_smallest = item.square.side == SMALLEST;
@@ -397,7 +397,7 @@ impl Grid {
         lights: &LightQueue,
         block: &Block,
         item: &Item,
-        nodes: &[Sums; 9],
+        nodes: &[Moments; 9],
         center: &Answer,
     ) -> bool {
         let scale = lights.arrivals.scale(item.light as usize);
@@ -412,7 +412,7 @@ impl Grid {
             (false, false, false) => FORETOLD_CUT,
         };
         let allowed = allowed / (self.lights as f32).sqrt();
-        let mean = |a: Sums, b: Sums| (a + b) * 0.5;
+        let mean = |a: Moments, b: Moments| (a + b) * 0.5;
         let [nw, n, ne, w, m, e, sw, s, se] = *nodes;
         let middle = mean(mean(nw, ne), mean(sw, se));
         let foretold = [(n, mean(nw, ne)), (w, mean(nw, sw)), (m, middle), (e, mean(ne, se)), (s, mean(sw, se))];
@@ -424,7 +424,7 @@ impl Grid {
     }
 
     /// Lays the quadratic through nine sums over the pixels of a square: its mean over their rays.
-    fn fill(&mut self, scene: &Scene, item: &Item, nodes: &[Sums; 9]) {
+    fn fill(&mut self, scene: &Scene, item: &Item, nodes: &[Moments; 9]) {
         let Square { x, y, side } = item.square;
         let n = scene.antialiasing as f32;
         // A regular grid of n x n in a pixel of width h: x^2 is (1 - 1/n^2) h^2 / 12 more than in its middle

@@ -16,7 +16,6 @@ use std::sync::OnceLock;
 use fearless_simd::{Level, dispatch, f32x16, mask32x16, prelude::*};
 
 use super::lanes::Obstacles;
-use crate::integrate::Sums;
 use crate::light::{Area, MIN_DISTANCE2, Points, SERIES, series_by_cell};
 use crate::material::{Lobe, MOMENTS, Moments};
 use crate::math::{LANES, Vec3, Vec3x16};
@@ -112,7 +111,7 @@ pub(super) struct Tally {
 impl Tally {
     /// What arrives. `whole` is what would if nothing were in the way, if that is known; else points alone tell, each
     /// of which stands for `measure` over their number.
-    pub fn sums(&self, whole: Option<&Sums>, measure: f32) -> Sums {
+    pub fn sums(&self, whole: Option<&Moments>, measure: f32) -> Moments {
         let Some(whole) = whole else {
             let one = f64::from(measure) / self.count.max(1) as f64;
             return Moments(self.lit.map(|lit| (lit * one) as f32));
@@ -123,7 +122,7 @@ impl Tally {
     }
 
     /// What would arrive if nothing were in the way, as far as points tell.
-    pub fn whole(&self, measure: f32) -> Sums {
+    pub fn whole(&self, measure: f32) -> Moments {
         let one = f64::from(measure) / self.count.max(1) as f64;
         Moments(self.all.map(|all| (all * one) as f32))
     }

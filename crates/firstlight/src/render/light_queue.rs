@@ -8,9 +8,9 @@ use super::change::Arrival;
 use super::tiled::BEND;
 use crate::color::Rgb;
 use crate::ids::{LightId, MaterialId, SurfaceId};
-use crate::integrate::{Arrived, Illumination, ShadingPoint, Sums};
+use crate::integrate::{Arrived, Illumination, ShadingPoint};
 use crate::light::LightKind;
-use crate::material::{Bsdf, Lobe};
+use crate::material::{Bsdf, Lobe, Moments};
 use crate::math::{Facet, Vec2};
 use crate::scene::Scene;
 use crate::shape::{Footprint, SurfaceInteraction, UvEdge};
@@ -65,7 +65,7 @@ pub(crate) struct Request {
 /// What arrives of one light at one place.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Answer {
-    pub sums: Sums,
+    pub sums: Moments,
     /// Whether the light is seen as a whole, or not at all, from all within the place's reach.
     pub smooth: bool,
     /// How far outlines of shadows move on the light within the reach, as a part of its size.

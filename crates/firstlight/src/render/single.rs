@@ -6,9 +6,8 @@ use super::change::{Arrival, Change, RESOLVED, RESOLVED_SWING, is_sharp, is_smoo
 use super::pixel::Lighting;
 use super::plain::Plain;
 use crate::ids::LightId;
-use crate::integrate::Sums;
 use crate::light::{Light, LightKind};
-use crate::material::Lobe;
+use crate::material::{Lobe, Moments};
 use crate::math::{Vec3, square};
 use crate::shape::{PlaneSide, SurfaceInteraction};
 
@@ -58,12 +57,12 @@ impl Arrivals<'_> {
         let resolved = edge == 0.0 && rim == 0.0 && swing < RESOLVED_SWING && lobe < RESOLVED;
         let drift = if edge == 0.0 { 0.0 } else { f32::INFINITY };
         let smooth = resolved && terminator == 0.0 && is_smooth(swing, lobe);
-        Change { bend: Sums::bounds(weight * share, specular), drift, resolved, smooth, sharp: is_sharp(lobe) }
+        Change { bend: Moments::bounds(weight * share, specular), drift, resolved, smooth, sharp: is_sharp(lobe) }
             .with(sums)
     }
 
     /// What arrives at one point of a light of one point.
-    pub(super) fn of_single(&self, index: usize, place: &ArrivalPlace) -> Sums {
+    pub(super) fn of_single(&self, index: usize, place: &ArrivalPlace) -> Moments {
         let unshadowed = SurfaceInteraction { receives_shadow: false, ..*place.si };
         let si = if place.lit { &unshadowed } else { place.si };
         let sums = Plain.gather(self.scene, index, si, place.lobe, &mut Counts::default());

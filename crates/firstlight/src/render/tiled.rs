@@ -32,7 +32,8 @@ use super::square::Square;
 use super::tile::Tile;
 use super::{AaMode, Counts};
 use crate::color::Rgb;
-use crate::integrate::{Arrived, Sums};
+use crate::integrate::Arrived;
+use crate::material::Moments;
 use crate::scene::Scene;
 use crate::visibility::Viewpoint;
 use behind::{Block, Outlook, Sights};
@@ -385,7 +386,7 @@ impl<'a> Tiled<'a> {
             self.first[*index] = self.values.len();
             self.values.extend(self.pixels[*index].patches.iter().map(|patch| scene.ambient * patch.bsdf.ambient));
         }
-        self.arrived.resize(self.values.len() * lights, Arrival::even(Sums::default()));
+        self.arrived.resize(self.values.len() * lights, Arrival::even(Moments::default()));
         for light in 0..lights {
             let (mut places, mut asked, mut told) = (Vec::new(), Vec::new(), Vec::new());
             for index in pixels {

@@ -11,9 +11,9 @@ use super::beams::{self, Beam, Traced};
 use super::ladder::{Asker, FIRST, LAST, Tally, of_edge};
 use super::resolve::LightTerm;
 use crate::color::Rgb;
-use crate::integrate::{Arrived, Illumination, Sums};
+use crate::integrate::{Arrived, Illumination};
 use crate::light::SERIES;
-use crate::material::{Bsdf, Lobe, MOMENTS};
+use crate::material::{Bsdf, Lobe, MOMENTS, Moments};
 use crate::shape::SurfaceInteraction;
 use crate::visibility::{View, Viewpoint};
 
@@ -80,7 +80,7 @@ struct Asking {
     series: usize,
     view: View,
     /// What would arrive if nothing were in the way, if that is known.
-    whole: Option<Sums>,
+    whole: Option<Moments>,
     /// Whether points of the light may miss most of what it sends.
     may_miss: bool,
     /// Whether it needs no more points.
@@ -107,16 +107,16 @@ impl Asking {
     }
 
     /// What arrives, as far as points tell, and what would if nothing were in the way.
-    fn sums(&self, measure: f32) -> (Sums, Sums) {
+    fn sums(&self, measure: f32) -> (Moments, Moments) {
         (self.tally.sums(self.whole.as_ref(), measure), self.whole.unwrap_or_else(|| self.tally.whole(measure)))
     }
 
     /// The diffuse part and the highlight, with their colours.
-    fn each(&self, sums: &Sums) -> LightTerm {
+    fn each(&self, sums: &Moments) -> LightTerm {
         (self.scale * self.reflected).each(sums)
     }
 
-    fn color(&self, sums: &Sums) -> Rgb {
+    fn color(&self, sums: &Moments) -> Rgb {
         self.each(sums).sum()
     }
 }
@@ -187,7 +187,7 @@ pub(crate) struct Together {
     asking: Vec<Asking>,
     /// What is known, all rays together: the light, before colours and with those of the surfaces, and all that is
     /// there.
-    sums: Sums,
+    sums: Moments,
     terms: LightTerm,
     value: Rgb,
     /// What other lights send to each ray, at least: errors of packets show less beside it.
@@ -204,7 +204,7 @@ pub(super) struct Outcome {
     /// Added up.
     pub terms: LightTerm,
     /// Added up, without colours.
-    pub sums: Sums,
+    pub sums: Moments,
     /// The part of the light that is not hidden, by its points, the mean over the rays; no number where that is not
     /// known.
     pub share: f32,
@@ -217,7 +217,7 @@ impl Together {
         // Which of the series is first: any, but not by a pattern
         let series = (salt.wrapping_mul(0x9e37_79b9) >> 16) as usize % SERIES;
         let each = share / rays as f32;
-        let (sums, terms) = (Sums::default(), LightTerm::BLACK);
+        let (sums, terms) = (Moments::default(), LightTerm::BLACK);
         Together {
             light,
             each,
@@ -257,7 +257,7 @@ impl Together {
     }
 
     /// Hears what one ray sees.
-    pub fn know(&mut self, place: &ArrivalPlace, sums: &Sums) {
+    pub fn know(&mut self, place: &ArrivalPlace, sums: &Moments) {
         self.rays += 1;
         self.value += place.base;
         self.add(place, sums);
@@ -265,12 +265,12 @@ impl Together {
 
     /// Hears that something hides all of the light from a ray.
     pub fn dark(&mut self, place: &ArrivalPlace) {
-        self.know(place, &Sums::default());
+        self.know(place, &Moments::default());
         self.sharing += 1;
     }
 
     /// Hears what would arrive at the only ray if nothing were in the way, if that is known.
-    pub fn hear_whole(&mut self, arrivals: &Arrivals, whole: Option<Sums>) {
+    pub fn hear_whole(&mut self, arrivals: &Arrivals, whole: Option<Moments>) {
         for one in &mut self.asking {
             one.whole = whole;
             one.may_miss = whole.is_none() && arrivals.may_miss(self.light, &one.place(self.share));
@@ -301,7 +301,7 @@ impl Together {
         });
     }
 
-    fn add(&mut self, place: &ArrivalPlace, sums: &Sums) {
+    fn add(&mut self, place: &ArrivalPlace, sums: &Moments) {
         self.terms += place.reflected.each(sums);
         self.value += place.color(sums);
         self.sums += *sums;
@@ -382,7 +382,7 @@ impl Together {
     /// Gives each ray the mean of what would arrive in the corners, by its place; `false` if that is not what would
     /// arrive in the middle.
     fn spread(&mut self, n: usize, corners: &[usize; 5], arrivals: &Arrivals) -> bool {
-        let mut wholes = [Sums::default(); 5];
+        let mut wholes = [Moments::default(); 5];
         for (whole, ray) in wholes.iter_mut().zip(corners) {
             let Some(found) = self.asking[*ray].whole else { return false };
             *whole = found;
@@ -411,7 +411,7 @@ impl Together {
         let places: Vec<_> = wanted.iter().map(|(k, ray)| all[*k].asking[*ray].place(all[*k].share)).collect();
         let known = |arrived: Arrived| (arrived.illumination != Illumination::Unknown).then_some(arrived.sums);
         let wholes: Vec<_> = arrivals.wholes(light, &places).into_iter().map(known).collect();
-        let may_miss = |(place, whole): (_, &Option<Sums>)| whole.is_none() && arrivals.may_miss(light, place);
+        let may_miss = |(place, whole): (_, &Option<Moments>)| whole.is_none() && arrivals.may_miss(light, place);
         let may_miss: Vec<bool> = places.iter().zip(&wholes).map(may_miss).collect();
         for (((k, ray), whole), may_miss) in wanted.iter().zip(wholes).zip(may_miss) {
             let one = &mut all[*k].asking[*ray];

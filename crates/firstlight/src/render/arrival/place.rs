@@ -1,8 +1,8 @@
 //! Where light is asked for.
 
 use crate::color::Rgb;
-use crate::integrate::{ShadingPoint, Sums};
-use crate::material::{Colors, Lobe};
+use crate::integrate::ShadingPoint;
+use crate::material::{Colors, Lobe, Moments};
 use crate::render::patch::Patch;
 use crate::shape::SurfaceInteraction;
 
@@ -51,7 +51,7 @@ impl<'a> ArrivalPlace<'a> {
     }
 
     /// What sums of the light send.
-    pub fn color(&self, sums: &Sums) -> Rgb {
+    pub fn color(&self, sums: &Moments) -> Rgb {
         self.colors().of(sums)
     }
 

@@ -5,7 +5,6 @@ use std::ops::Range;
 use super::dense::sent;
 use super::{ANYTHING, At, INTEGRALS, Many, Single, Stored};
 use crate::color::Rgb;
-use crate::integrate::Sums;
 use crate::light::Sent;
 use crate::material::{Lobe, Moments};
 use crate::render::arrival::Arrivals;
@@ -161,7 +160,7 @@ impl<'a> Many<'a> {
             let smooth = (bsdf.colors * stored.bend).sum();
             doubt(None, smooth + self.flicker(pixels, first, (index, k)));
         }
-        let shown = |light: u32, bend: &Sums| {
+        let shown = |light: u32, bend: &Moments| {
             let scale = arrivals.scale(light as usize);
             (scale * bsdf.colors).of(bend)
         };

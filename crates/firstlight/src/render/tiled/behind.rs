@@ -7,7 +7,7 @@ use std::ops::Range;
 use super::{ACROSS, CELL, Tiled};
 use crate::color::Rgb;
 use crate::ids::LightId;
-use crate::integrate::Sums;
+use crate::material::Moments;
 use crate::render::Counts;
 use crate::render::arrival::{ArrivalPlace, Arrivals, Past};
 use crate::render::patch::{Member, Patch, PixelPatches, Rays};
@@ -344,7 +344,7 @@ impl Sights {
     ) {
         match self.sights[k] {
             Sight::Dark => together.dark(&arrivals.place(light, si, bsdf)),
-            Sight::BelowHorizon => together.know(&arrivals.place(light, si, bsdf), &Sums::default()),
+            Sight::BelowHorizon => together.know(&arrivals.place(light, si, bsdf), &Moments::default()),
             sight @ (Sight::Lit | Sight::Clear | Sight::Near) => {
                 together.ask(arrivals, si, bsdf, sight == Sight::Lit, sight != Sight::Near, counts);
             }

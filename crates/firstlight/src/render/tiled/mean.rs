@@ -5,8 +5,7 @@ use arrayvec::ArrayVec;
 
 use super::{ACROSS, Outlook, Tiled};
 use crate::color::Rgb;
-use crate::integrate::Sums;
-use crate::material::Bsdf;
+use crate::material::{Bsdf, Moments};
 use crate::render::arrival::ArrivalPlace;
 use crate::render::change::Arrival;
 use crate::render::patch::{Contrast, Patch, PixelPatches};
@@ -60,7 +59,7 @@ impl Tiled<'_> {
         k: usize,
         light: usize,
         counts: &mut Counts,
-    ) -> Option<Sums> {
+    ) -> Option<Moments> {
         let scene = self.scene;
         let patch = &patches[k];
         if patch.uneven {
@@ -74,7 +73,7 @@ impl Tiled<'_> {
         if here.skipped {
             return None;
         }
-        let is_dark = here.sums == Sums::default() && here.bend == Sums::default();
+        let is_dark = here.sums == Moments::default() && here.bend == Moments::default();
         if patch.contrast != Contrast::default() && !is_dark {
             // Light and dark colours get what arrives in the middle only if that is what arrives everywhere
             let slope = self.slope(patch, at, light, counts)?;
@@ -86,7 +85,7 @@ impl Tiled<'_> {
         let Patch { skew, bsdf, si, .. } = *patch;
         if skew > 0.0 {
             let sharp = (2.0 * bsdf.lobe.sharpness(si.ns.dot(si.wo))).sqrt();
-            let off = (here.sums * skew).zip(Sums::bounds(1.0, sharp), |sum, times| sum * times);
+            let off = (here.sums * skew).zip(Moments::bounds(1.0, sharp), |sum, times| sum * times);
             if self.shown(light, &bsdf, value, &off) > SKEWED * allowed {
                 return None;
             }
@@ -134,13 +133,13 @@ impl Tiled<'_> {
 
     /// How much what arrives changes over a pixel, along both axes together, by its neighbours; `None` where they do
     /// not tell.
-    fn slope(&mut self, patch: &Patch, [i, j]: [u32; 2], light: usize, counts: &mut Counts) -> Option<Sums> {
+    fn slope(&mut self, patch: &Patch, [i, j]: [u32; 2], light: usize, counts: &mut Counts) -> Option<Moments> {
         if !patch.is_whole(self.scene) {
             return None;
         }
-        let mut slope = Sums::default();
+        let mut slope = Moments::default();
         for [before, after] in [[[i.wrapping_sub(1), j], [i + 1, j]], [[i, j.wrapping_sub(1)], [i, j + 1]]] {
-            let mut arrived = [Sums::default(); 2];
+            let mut arrived = [Moments::default(); 2];
             for (sums, at) in arrived.iter_mut().zip([before, after]) {
                 if !self.ask(at, counts) {
                     return None;
@@ -161,13 +160,13 @@ impl Tiled<'_> {
     /// By how much the mean of colours times light can differ from the mean of colours times that of light, where
     /// colours differ that much, and what arrives changes by `slope` along both axes together: two halves, one of each
     /// colour, make an eighth of both.
-    fn mingled(&self, light: usize, contrast: &Contrast, slope: &Sums) -> Rgb {
+    fn mingled(&self, light: usize, contrast: &Contrast, slope: &Moments) -> Rgb {
         let colors = contrast.of(slope);
         self.arrivals.scale(light) * colors * 0.125
     }
 
     /// Whether that shows.
-    fn mingles(&self, light: usize, contrast: &Contrast, value: Rgb, slope: &Sums) -> bool {
+    fn mingles(&self, light: usize, contrast: &Contrast, value: Rgb, slope: &Moments) -> bool {
         let allowed = BEND / (self.scene.lights.len() as f32).sqrt();
         self.arrivals.steps(value, self.mingled(light, contrast, slope)) > MINGLED * allowed
     }
@@ -200,7 +199,8 @@ impl Tiled<'_> {
         self.arrivals.arrivals(light, &places, &mut arrivals, counts);
         for (quarter, arrival) in quarters.iter().zip(&arrivals) {
             // The others are as far away as it is wide
-            let slope = arrivals.iter().fold(Sums::default(), |most, other| most.max(other.sums.apart(arrival.sums)));
+            let slope =
+                arrivals.iter().fold(Moments::default(), |most, other| most.max(other.sums.apart(arrival.sums)));
             if quarter.uneven
                 || arrival.skipped
                 || self.shown(light, &quarter.bsdf, value, &arrival.bend) > allowed
@@ -228,7 +228,7 @@ impl Tiled<'_> {
     }
 
     /// How many display steps an error of the sums of a light makes.
-    fn shown(&self, light: usize, bsdf: &Bsdf, value: Rgb, error: &Sums) -> f32 {
+    fn shown(&self, light: usize, bsdf: &Bsdf, value: Rgb, error: &Moments) -> f32 {
         let scale = self.arrivals.scale(light);
         self.arrivals.steps(value, (scale * bsdf.colors).of(error))
     }
@@ -259,7 +259,7 @@ fn is_same(scene: &Scene, beside: &Patch, patch: &Patch) -> bool {
 }
 
 /// How far two sums are apart.
-fn apart(one: &Sums, other: &Sums) -> Sums {
+fn apart(one: &Moments, other: &Moments) -> Moments {
     one.apart(*other)
 }
 
@@ -270,10 +270,10 @@ pub(in crate::render) fn second_difference(
     pixels: &[PixelPatches],
     index: usize,
     patch: &Patch,
-    here: &Sums,
-    arrived: impl Fn(usize) -> Option<Sums>,
-) -> Option<[Sums; 2]> {
-    let mut differences = [Sums::default(); 2];
+    here: &Moments,
+    arrived: impl Fn(usize) -> Option<Moments>,
+) -> Option<[Moments; 2]> {
+    let mut differences = [Moments::default(); 2];
     for (difference, step) in differences.iter_mut().zip([1, ACROSS]) {
         let neighbours = [index - step, index + step];
         let same = |i: &usize| matches!(&pixels[*i].patches[..], [beside] if is_same(scene, beside, patch));
@@ -286,14 +286,14 @@ pub(in crate::render) fn second_difference(
             return None;
         }
         let (before, after) = (arrived(neighbours[0])?, arrived(neighbours[1])?);
-        let less = |a: Sums, b: Sums| a.zip(b, |a, b| a - b);
+        let less = |a: Moments, b: Moments| a.zip(b, |a, b| a - b);
         *difference = less(before, *here) + less(after, *here);
     }
     Some(differences)
 }
 
 /// How far what light does within a pixel can make its mean another, by its second differences.
-pub(in crate::render) fn within(differences: &[Sums; 2]) -> Sums {
+pub(in crate::render) fn within(differences: &[Moments; 2]) -> Moments {
     let [x, y] = differences;
     x.zip(*y, |x, y| (x.abs() + y.abs()) * WITHIN)
 }

@@ -14,7 +14,7 @@ use super::behind::Outlook;
 use super::{CELL, Counts, Tiled};
 use crate::color::Rgb;
 use crate::ids::LightId;
-use crate::integrate::Sums;
+use crate::material::Moments;
 use crate::math::{LANES, Vec3};
 use crate::render::beams::{Packet, Traced};
 use crate::render::many::FEW;
@@ -50,7 +50,7 @@ const MINGLED: f32 = 0.4;
 /// What a pixel that was asked sees of a light: the mean over its rays.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Node {
-    sums: Sums,
+    sums: Moments,
     share: f32,
 }
 
@@ -326,7 +326,7 @@ impl Tiled<'_> {
         // What the corners foretell
         for ((row, j), down) in nodes.iter().zip(rows.0).zip(rows.line()) {
             for ((node, i), across) in row.iter().zip(columns.0).zip(columns.line()) {
-                let mut foretold = Sums::default();
+                let mut foretold = Moments::default();
                 for (corners, down) in [nodes[0], nodes[2]].iter().zip(down) {
                     for (corner, across) in [corners[0], corners[2]].iter().zip(across) {
                         foretold += corner.sums * (across * down);
@@ -340,11 +340,11 @@ impl Tiled<'_> {
         }
         // What the others see
         let (mut off, mut counted) = (0.0, 0.0f32);
-        let mut told = [Sums::default(); (LARGEST * LARGEST) as usize];
+        let mut told = [Moments::default(); (LARGEST * LARGEST) as usize];
         for (number, at) in square.pixels().enumerate() {
             let share = self.votes[self.index(at) * self.scene.lights.len() + light];
             let [across, down] = [columns.weights(number as u32 % side), rows.weights(number as u32 / side)];
-            let (mut sums, mut foretold) = (Sums::default(), 0.0);
+            let (mut sums, mut foretold) = (Moments::default(), 0.0);
             for (row, down) in nodes.iter().zip(down) {
                 for (node, across) in row.iter().zip(across) {
                     sums += node.sums * (across * down);
@@ -373,7 +373,7 @@ impl Tiled<'_> {
                 let number = ((at[1] - y) * side + at[0] - x) as usize;
                 let beside =
                     |step: usize, place: u32| told[if place + 1 < side { number + step } else { number - step }];
-                let mut slope = Sums::default();
+                let mut slope = Moments::default();
                 for other in [beside(1, at[0] - x), beside(side as usize, at[1] - y)] {
                     slope += other.apart(sums);
                 }
@@ -407,10 +407,10 @@ impl Tiled<'_> {
     }
 
     /// How many display steps an error makes of what a light sends to a pixel.
-    fn steps_of(&mut self, at: [u32; 2], light: usize, sums: &Sums, error: &Sums) -> f32 {
+    fn steps_of(&mut self, at: [u32; 2], light: usize, sums: &Moments, error: &Moments) -> f32 {
         let Some(bsdf) = self.whole(at).map(|patch| patch.bsdf) else { return f32::INFINITY };
         let scale = self.arrivals.scale(light);
-        let color = |sums: &Sums| scale * bsdf.colors.of(sums);
+        let color = |sums: &Moments| scale * bsdf.colors.of(sums);
         let others = self.others(self.index(at), 0, light);
         let value: Rgb = self.scene.ambient * bsdf.ambient + others + color(sums);
         self.arrivals.steps(value, color(error))
