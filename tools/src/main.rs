@@ -12,6 +12,7 @@ mod peers;
 mod pictures;
 mod plot;
 mod rays;
+mod slow;
 mod verify;
 
 use std::path::Path;
