@@ -33,6 +33,11 @@ pub(crate) struct ShadingPoint {
     /// point alone.
     pub reach: f32,
     pub turn: f32,
+    /// How far outlines of shadows may move on the light within its reach, see [`Arrived::motion`]: where they move
+    /// farther, and nothing is proved, what arrives is not wanted.
+    ///
+    /// [`Arrived::motion`]: super::Arrived::motion
+    pub most_motion: f32,
     /// What one unit of each moment is worth: linear colours, the light's scale included.
     pub worth: Colors,
     /// What is there beside this light, at least.
@@ -55,6 +60,7 @@ impl ShadingPoint {
             wo,
             reach: 0.0,
             turn: 0.0,
+            most_motion: f32::INFINITY,
             worth: Colors::BLACK,
             base: Rgb::BLACK,
             share: 1.0,
@@ -190,26 +196,30 @@ impl ViewBlock {
         let mut above = line(horizon);
         above[0] -= horizon.abs().dot(slack);
         let [zero, one] = [splat(0.0), splat(1.0)];
-        let threes = [
-            ([Px, Py, Pz], [p.x, p.y, p.z]),
-            ([L0x, L0y, L0z], [l0.x, l0.y, l0.z]),
-            ([Ax, Ay, Az], [a.x, a.y, a.z]),
-            ([Bx, By, Bz], [b.x, b.y, b.z]),
-            ([Fa, Fb, Height], [fa, fb, side.abs()]),
-            ([La, Lb, Skew], [splat(light.la), splat(light.lb), splat(light.skew)]),
-            ([MirrorX, MirrorY, MirrorZ], [mirror.x, mirror.y, mirror.z]),
-            ([CosC, CosX, CosY], cos),
-            ([HorizonC, HorizonX, HorizonY], above),
-            ([OutC, OutX, OutY], out),
-            ([X0, Y0, CosO], [-one, -one, cos_o]),
-            ([X1, Y1, Facing], [one, one, facing]),
-            ([OriginX, OriginY, Measure], [zero, zero, splat(light.measure())]),
-            ([Ratio, Behind2, Behind2], [splat(light.ratio), splat(light.behind2), splat(light.behind2)]),
-        ];
-        for (numbers, values) in threes {
-            for (of, value) in numbers.into_iter().zip(values) {
-                self.0[of as usize] = value.to_array();
-            }
+        // One store for each: a list of them would be copied first
+        macro_rules! put {
+            ($($numbers:expr => $values:expr;)*) => {$(
+                let (numbers, [x, y, z]) = ($numbers, $values);
+                self.0[numbers[0] as usize] = x.to_array();
+                self.0[numbers[1] as usize] = y.to_array();
+                self.0[numbers[2] as usize] = z.to_array();
+            )*};
+        }
+        put! {
+            [Px, Py, Pz] => [p.x, p.y, p.z];
+            [L0x, L0y, L0z] => [l0.x, l0.y, l0.z];
+            [Ax, Ay, Az] => [a.x, a.y, a.z];
+            [Bx, By, Bz] => [b.x, b.y, b.z];
+            [Fa, Fb, Height] => [fa, fb, side.abs()];
+            [La, Lb, Skew] => [splat(light.la), splat(light.lb), splat(light.skew)];
+            [MirrorX, MirrorY, MirrorZ] => [mirror.x, mirror.y, mirror.z];
+            [CosC, CosX, CosY] => cos;
+            [HorizonC, HorizonX, HorizonY] => above;
+            [OutC, OutX, OutY] => out;
+            [X0, Y0, CosO] => [-one, -one, cos_o];
+            [X1, Y1, Facing] => [one, one, facing];
+            [OriginX, OriginY, Measure] => [zero, zero, splat(light.measure())];
+            [Ratio, Behind2, Behind2] => [splat(light.ratio), splat(light.behind2), splat(light.behind2)];
         }
         self.nearest(simd).simd_lt(NEAR * light.la.max(light.lb)).to_bitmask()
     }
@@ -239,14 +249,21 @@ impl ViewBlock {
 pub(crate) struct Members<'a> {
     blocks: [&'a ViewBlock; LANES],
     lanes: [usize; LANES],
+    /// Whether they lie as in one block: then nothing has to be gathered.
+    in_line: bool,
 }
 
 impl<'a> Members<'a> {
-    /// The points of these numbers, counted through all blocks.
+    /// As many points as are asked, of these numbers, counted through all blocks; the last stands for what is missing.
     #[inline(always)]
-    pub fn new(blocks: &'a [ViewBlock], numbers: impl Fn(usize) -> u32) -> Self {
-        let numbers: [u32; LANES] = std::array::from_fn(numbers);
-        Members { blocks: numbers.map(|n| &blocks[n as usize / LANES]), lanes: numbers.map(|n| n as usize % LANES) }
+    pub fn new(blocks: &'a [ViewBlock], count: usize, number: impl Fn(usize) -> u32) -> Self {
+        let numbers: [usize; LANES] = std::array::from_fn(|k| number(k.min(count - 1)) as usize);
+        let lanes = numbers.map(|n| n % LANES);
+        let mut in_line = lanes[0] == 0;
+        for (k, n) in numbers.iter().enumerate().take(count) {
+            in_line &= *n == numbers[0] + k;
+        }
+        Members { blocks: numbers.map(|n| &blocks[n / LANES]), lanes, in_line }
     }
 }
 
@@ -272,6 +289,9 @@ pub(crate) trait Views {
 impl Views for Members<'_> {
     #[inline(always)]
     fn lanes<S: Simd>(&self, simd: S, of: ViewNumber) -> f32x16<S> {
+        if self.in_line {
+            return f32x16::simd_from(simd, self.blocks[0].0[of as usize]);
+        }
         let mut numbers = [0.0; LANES];
         for (k, number) in numbers.iter_mut().enumerate() {
             *number = self.blocks[k].0[of as usize][self.lanes[k] % LANES];

@@ -49,6 +49,7 @@ pub(crate) enum Illumination {
 /// What arrives at a point.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Arrived {
+    /// Nothing where it is not wanted: see [`ShadingPoint::most_motion`].
     pub sums: Moments,
     pub illumination: Illumination,
     /// Whether the same is proved for all places within the point's reach.
@@ -232,11 +233,6 @@ impl Evaluator {
                         _ if is_open && is(survey.above) => Illumination::Full,
                         _ => Illumination::Partial,
                     };
-                    if matches!(one.illumination, Illumination::Full | Illumination::Partial) {
-                        let number = (start + k) as u32;
-                        self.state[start + k].cells = 1;
-                        self.grading.push(whole(outline, number, self.views[block].square(k)));
-                    }
                 } else if light.emitter.surrounds(point.p) {
                     one.illumination = Illumination::Unknown;
                 }
@@ -247,6 +243,12 @@ impl Evaluator {
                     Illumination::Full => is(survey.above_around) && one.motion == 0.0,
                     Illumination::Partial | Illumination::Unknown => false,
                 };
+                let is_wanted = one.proved || one.motion <= point.most_motion;
+                if is_wanted && matches!(one.illumination, Illumination::Full | Illumination::Partial) {
+                    let number = (start + k) as u32;
+                    self.state[start + k].cells = 1;
+                    self.grading.push(whole(outline, number, self.views[block].square(k)));
+                }
                 self.between.push(class.between);
                 arrived.push(one);
             }
@@ -284,7 +286,7 @@ impl Evaluator {
             let (grades, views) = (&mut self.grades, &self.views);
             dispatch_wide!(level, simd => {
                 for cells in self.grading.chunks(LANES) {
-                    let members = Members::new(views, |k| cells[k.min(cells.len() - 1)].point);
+                    let members = Members::new(views, cells.len(), |k| cells[k].point);
                     grades.push(simd.vectorize(
                         #[inline(always)]
                         || grade(simd, light.lobe, tolerance, outline, &members, cells),
@@ -344,14 +346,14 @@ impl Evaluator {
         // Each kernel is called at one place: so there is one copy of it for each instruction set
         dispatch_wide!(level, simd => {
             for cells in smooth.chunks(LANES) {
-                let members = Members::new(views, |k| cells[k.min(cells.len() - 1)].point);
+                let members = Members::new(views, cells.len(), |k| cells[k].point);
                 smooth_fits.push(simd.vectorize(
                     #[inline(always)]
                     || coarse(simd, light.lobe, falloff, &members, cells),
                 ));
             }
             for (cells, is_cut) in asked {
-                let members = Members::new(views, |k| cells[k.min(cells.len() - 1)].point);
+                let members = Members::new(views, cells.len(), |k| cells[k].point);
                 let shares = if is_cut { cut_shares } else { whole_shares };
                 let first = polynomials.len() as u32;
                 let wanted = is_cut.then_some(&mut *polynomials);
@@ -367,8 +369,7 @@ impl Evaluator {
                 }
             }
             for some in panels.chunks(LANES) {
-                let point = |k: usize| cut_cells[some[k.min(some.len() - 1)].cell as usize].point;
-                let members = Members::new(views, point);
+                let members = Members::new(views, some.len(), |k| cut_cells[some[k].cell as usize].point);
                 panel_sums.push(simd.vectorize(
                     #[inline(always)]
                     || rows(simd, &blocked, &members, cut_cells, polynomials, some, moments),

@@ -306,7 +306,8 @@ pub(crate) fn rows<S: Simd>(
         let (shadow, outside, within) = batch.shadow(simd, occluder);
         let (some_outside, some_within) = (outside.any_true(), within.any_true());
         let cut = batch.cut(simd, occluder);
-        for (row, y) in y_of.into_iter().enumerate() {
+        for row in 0..ROWS {
+            let y = y_of[row];
             if some_within {
                 let (all, inside) = (&mut open[row], shadow.within(simd, y));
                 all.from = within.select(all.from.max(inside.from), all.from);
@@ -325,7 +326,8 @@ pub(crate) fn rows<S: Simd>(
                         if shadow.has_hole() { 2 } else { 1 }
                     }
                 };
-                for mut interval in intervals.into_iter().take(parts) {
+                for interval in &intervals[..parts] {
+                    let mut interval = *interval;
                     let is_there = outside & interval.from.simd_lt(interval.to);
                     interval.from = is_there.select(interval.from, far);
                     interval.to = is_there.select(interval.to, far);

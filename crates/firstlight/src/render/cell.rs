@@ -43,10 +43,10 @@ const PATCHWORK: u32 = 8;
 const SPREAD_SMOOTH: f32 = 10.0;
 const SPREAD_CUT: f32 = 5.0;
 /// How far outlines may move on the light over a quadrant, and light may turn.
-const QUADRANT_MOTION: f32 = 0.3;
+pub(super) const QUADRANT_MOTION: f32 = 0.3;
 const QUADRANT_TURN: f32 = 1.0;
 /// The same, turns alone, where the middle of a fragment stands for all of it.
-const MIDDLE_TURN: f32 = 0.03;
+const MIDDLE_TURN: f32 = 0.06;
 /// In display steps: what colours that differ may make together with light that does.
 const MINGLED: f32 = 0.4;
 
@@ -469,7 +469,8 @@ impl<'a> Cells<'a> {
             next += 1;
             let Fragment { pixel, count, .. } = self.fragments.all[fragment as usize];
             self.work[self.pixels[pixel as usize].index as usize] += Heat::PLACE;
-            if count == 1 || answer.smooth && answer.turn <= MIDDLE_TURN {
+            let is_dark = answer.sums == Moments::default();
+            if count == 1 || answer.smooth && (is_dark || answer.turn <= MIDDLE_TURN) {
                 self.add(fragment as usize, light as usize, answer.sums);
             } else {
                 self.parted.push(*wanted);

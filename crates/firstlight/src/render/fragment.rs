@@ -4,6 +4,7 @@ use std::ops::Range;
 
 use arrayvec::ArrayVec;
 
+use super::cell::QUADRANT_MOTION;
 use super::hits::camera_ray;
 use super::light_queue::Place;
 use super::patch::Contrast;
@@ -168,7 +169,9 @@ impl Fragments {
                 _ => middle(scene, of, rays.iter()),
             };
             point.map(|point| {
-                self.places.push(Place::new(scene, ShadingPoint { share, ..point }, of.surface(scene), &mean.bsdf));
+                // It tells nothing beside what is proved
+                let point = ShadingPoint { share, most_motion: -1.0, ..point };
+                self.places.push(Place::new(scene, point, of.surface(scene), &mean.bsdf));
                 self.places.len() as u32 - 1
             })
         };
@@ -214,7 +217,8 @@ impl Fragments {
         for point in points {
             let (place, rays) = (self.places.len() as u32, n * n / 4);
             self.quadrants.push(Quadrant { place, rays, contrast: Contrast::default() });
-            self.places.push(Place::new(scene, ShadingPoint { reach, turn, ..point }, of.surface(scene), &bsdf));
+            let point = ShadingPoint { reach, turn, most_motion: QUADRANT_MOTION, ..point };
+            self.places.push(Place::new(scene, point, of.surface(scene), &bsdf));
         }
         let quadrants = Some(first..self.quadrants.len());
         let (count, rays) = (n * n, 0..0);
@@ -308,7 +312,7 @@ impl Fragments {
                 }
             };
             self.quadrants.push(Quadrant { place: self.places.len() as u32, rays: count, contrast: mean.contrast });
-            let point = ShadingPoint { share, ..point };
+            let point = ShadingPoint { share, most_motion: QUADRANT_MOTION, ..point };
             self.places.push(Place::new(scene, point, of.surface(scene), &mean.bsdf));
         }
         true

@@ -272,7 +272,7 @@ impl Grid {
             let block = &blocks[item.block as usize];
             if last.as_ref().is_none_or(|(square, of, ..)| (*square, *of) != (item.square, item.block)) {
                 let nodes = self.nine(scene, block, item.square);
-                let place = self.middle(block, &nodes);
+                let place = self.middle(block, item.square.side, &nodes);
                 last = Some((item.square, item.block, nodes, place));
             }
             let Some((_, _, nodes, Some(place))) = last else {
@@ -296,9 +296,8 @@ impl Grid {
                 self.fill(scene, &item, &[Moments::default(); 9]);
                 continue;
             }
-            let is_smallest = item.square.side == SMALLEST;
-            let motion = if is_smallest { SMALLEST_MOTION } else { MOTION };
-            if !(answer.motion <= motion && answer.turn <= NARROW) {
+            let most_motion = self.asked[item.center as usize].point.most_motion;
+            if !(answer.motion <= most_motion && answer.turn <= NARROW) {
                 failed.push(item);
                 continue;
             }
@@ -373,7 +372,7 @@ impl Grid {
     }
 
     /// The middle of a square, which stands for all of it.
-    fn middle(&self, block: &Block, nodes: &[u32; 9]) -> Option<Place> {
+    fn middle(&self, block: &Block, side: u32, nodes: &[u32; 9]) -> Option<Place> {
         if nodes.contains(&NONE) {
             return None;
         }
@@ -385,7 +384,9 @@ impl Grid {
             turn = turn.max((point(k).ns - middle.ns).length());
         }
         // The arc, not the chord
-        let middle = ShadingPoint { reach: reach * 1.01, turn: turn * 1.05, ..*middle };
+        let (reach, turn) = (reach * 1.01, turn * 1.05);
+        let most_motion = if side == SMALLEST { SMALLEST_MOTION } else { MOTION };
+        let middle = ShadingPoint { reach, turn, most_motion, ..*middle };
         let node = &self.places[self.nodes[nodes[4] as usize].place as usize];
         Some(Place { point: middle, bsdf: block.bsdf, ..*node })
     }

@@ -75,6 +75,11 @@ pub(crate) struct Answer {
     pub turn: f32,
 }
 
+impl Answer {
+    /// Where one place says nothing of what is around it.
+    const UNKNOWN: Answer = Answer { sums: Moments::ZERO, smooth: false, motion: f32::INFINITY, turn: f32::INFINITY };
+}
+
 /// Asks for light.
 pub(crate) struct LightQueue<'a> {
     scene: &'a Scene,
@@ -156,7 +161,8 @@ impl<'a> LightQueue<'a> {
                             Illumination::Unknown => go_on()?,
                         }
                         answers[*k as usize] = if arrived.illumination == Illumination::Unknown {
-                            self.one(light, place, counts)
+                            // One place tells nothing of those around it
+                            if place.point.reach > 0.0 { Answer::UNKNOWN } else { self.one(light, place, counts) }
                         } else {
                             let is_near = place.point.reach > 0.4 * arrived.distance
                                 || emitter.is_one_sided() && arrived.height <= place.point.reach;

@@ -77,6 +77,7 @@ impl<'a> ArrivalPlace<'a> {
             wo,
             reach: self.reach,
             turn: self.turn,
+            most_motion: f32::INFINITY,
             worth: self.colors(),
             base: self.base,
             share: self.share,
