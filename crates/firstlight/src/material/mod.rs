@@ -126,12 +126,16 @@ impl Material {
         [self.diffuse.texture, self.specular.texture, self.shininess.texture, ambient] == [None; 4]
     }
 
-    /// Whether its colours are the means over the footprint of a surface, whatever its size, and nothing else changes.
-    pub(crate) fn is_exact_mean(&self, textures: &[Texture]) -> bool {
-        let is_exact = |texture: Option<TextureId>| texture.is_none_or(|id| textures[id.index()].is_exact_mean());
-        let ambient = self.ambient.and_then(|ambient| ambient.texture);
-        [self.diffuse.texture, self.specular.texture, ambient].into_iter().all(is_exact)
-            && self.shininess.texture.is_none()
+    /// How far its colours differ all over it, and that of its answer to ambient light, if they are the means over the
+    /// footprint of a surface, whatever its size, and nothing else changes.
+    pub(crate) fn contrast(&self, textures: &[Texture]) -> Option<(Colors, Rgb)> {
+        let contrast = |param: &Param<Rgb>| match param.texture {
+            None => Some(Rgb::BLACK),
+            Some(id) => Some(textures[id.index()].contrast()? * param.factor),
+        };
+        let [diffuse, specular] = [contrast(&self.diffuse)?, contrast(&self.specular)?];
+        let ambient = self.ambient.as_ref().map_or(Some(diffuse), contrast)?;
+        self.shininess.texture.is_none().then_some((Colors([diffuse, specular]), ambient))
     }
 
     /// Whether it is the same all within a step of the footprint of a surface.

@@ -8,7 +8,7 @@ use super::cell::QUADRANT_MOTION;
 use super::hits::camera_ray;
 use super::light_queue::Place;
 use super::patch::Contrast;
-use super::solo::Candidate;
+use super::solo::{Candidate, SquareBsdf};
 use super::square::Square;
 use crate::color::Rgb;
 use crate::ids::SurfaceId;
@@ -391,32 +391,42 @@ impl Candidate {
 
     /// The mean material over the rays of a pixel that sees only this; `None` where more than colours change.
     pub fn mean(self, scene: &Scene, at: [u32; 2]) -> Option<(Bsdf, Contrast)> {
-        let whole = self.of_square(scene, Square { x: at[0], y: at[1], side: 1 });
-        if let Some((bsdf, true)) = whole {
-            return Some((bsdf, Contrast::default()));
-        }
-        if let Some(mean) = whole.and_then(|(whole, _)| self.mean_of_quarters(scene, at, &whole)) {
-            return Some(mean);
+        if let Some(whole) = self.of_square(scene, Square { x: at[0], y: at[1], side: 1 }) {
+            if whole.is_even {
+                return Some((whole.bsdf, Contrast::default()));
+            }
+            if let Some(mean) = self.mean_of_area(scene, at, &whole) {
+                return Some(mean);
+            }
         }
         let mean = self.mean_of_parts(scene, at, scene.antialiasing)?;
         (!mean.uneven).then_some((mean.bsdf, mean.contrast))
     }
 
-    /// The same from the quarters of a pixel, where they are as exact as its rays: where textures tell the mean over
-    /// any area, and the `whole` pixel says the same.
-    fn mean_of_quarters(self, scene: &Scene, at: [u32; 2], whole: &Bsdf) -> Option<(Bsdf, Contrast)> {
+    /// The same where textures tell the mean over any area: from the `whole` pixel, if it is a parallelogram on the
+    /// surface, or nearly so, else from its quarters, if it says the same.
+    fn mean_of_area(self, scene: &Scene, at: [u32; 2], whole: &SquareBsdf) -> Option<(Bsdf, Contrast)> {
         let surface = &scene.geometry.surfaces[self.surface(scene).index()];
-        let is_exact = scene.materials[surface.material?.index()].is_exact_mean(&scene.textures);
-        if scene.antialiasing <= 2 || !is_exact {
+        let (contrast, ambient) = scene.materials[surface.material?.index()].contrast(&scene.textures)?;
+        if scene.antialiasing <= 2 {
             return None;
         }
-        let quarters = self.mean_of_parts(scene, at, 2)?;
-        let is_same = |one: Rgb, other: Rgb| {
-            let (off, allowed) = ((one + other * -1.0).map(f32::abs), other * SAME_MEAN);
+        let is_within = |off: Rgb, mean: Rgb| {
+            let allowed = mean * SAME_MEAN;
             off.r <= allowed.r && off.g <= allowed.g && off.b <= allowed.b
         };
-        let is_same = is_same(whole.ambient, quarters.bsdf.ambient)
-            && whole.colors.0.into_iter().zip(quarters.bsdf.colors.0).all(|(one, other)| is_same(one, other));
+        let SquareBsdf { bsdf, growth, .. } = *whole;
+        // An edge between two colours is off by an eighth of what the pixel grows, at most
+        let off = 0.125 * growth;
+        if is_within(ambient * off, bsdf.ambient)
+            && contrast.0.into_iter().zip(bsdf.colors.0).all(|(contrast, mean)| is_within(contrast * off, mean))
+        {
+            return Some((bsdf, contrast));
+        }
+        let quarters = self.mean_of_parts(scene, at, 2)?;
+        let is_same = |one: Rgb, other: Rgb| is_within((one + other * -1.0).map(f32::abs), other);
+        let is_same = is_same(bsdf.ambient, quarters.bsdf.ambient)
+            && bsdf.colors.0.into_iter().zip(quarters.bsdf.colors.0).all(|(one, other)| is_same(one, other));
         // Rays differ by more than quarters, the means of some of them: by twice as much at most, along each axis
         (is_same && !quarters.uneven).then_some((quarters.bsdf, quarters.contrast * 2.0))
     }
@@ -435,7 +445,8 @@ impl Candidate {
     }
 }
 
-/// How far the mean material of a pixel may be from that of its quarters, as a part of it: these are nearer still.
+/// How far the mean material of a pixel may be from that of its rays, or of its quarters, which are nearer, as a part of
+/// it.
 const SAME_MEAN: f32 = 0.004;
 
 /// The most rays whose mean is taken at once.

@@ -219,6 +219,15 @@ pub(crate) fn all(scene: &Scene) -> Vec<Candidate> {
     all
 }
 
+/// The material of a square of pixels.
+pub(crate) struct SquareBsdf {
+    /// In its middle, over all of it.
+    pub bsdf: Bsdf,
+    pub is_even: bool,
+    /// By which part of itself what a pixel sees of the surface grows over the square.
+    pub growth: f32,
+}
+
 impl Candidate {
     /// How far along a ray that meets only this it ends.
     #[inline(always)]
@@ -259,24 +268,24 @@ impl Candidate {
         self.intersect(scene, ray).map(|t| self.hit_at(scene, t))
     }
 
-    /// The material of a square of pixels that see only this, in its middle, and whether it is the same all over it.
-    pub fn of_square(self, scene: &Scene, square: Square) -> Option<(Bsdf, bool)> {
+    /// The material of a square of pixels that see only this, in its middle.
+    pub fn of_square(self, scene: &Scene, square: Square) -> Option<SquareBsdf> {
         let middle = |from: u32| from as f32 + 0.5 * square.side as f32;
         let (ray, differential) = scene.camera.local_ray(middle(square.x), middle(square.y), square.side as f32);
         let hit = self.hit(scene, &ray)?;
         let si = scene.local_surface(&ray, &hit, &differential);
         let material = &scene.materials[si.material.index()];
-        Some((material.bsdf(&si, &scene.textures), self.is_even_over(scene, &si, &ray, hit.t, &differential)))
+        let growth = self.growth(scene, &si, &ray, hit.t, &differential);
+        let is_even = self.is_even_within(scene, &si, growth);
+        Some(SquareBsdf { bsdf: material.bsdf(&si, &scene.textures), is_even, growth })
     }
 
     /// The same, if it is the same all over it.
     pub fn even(self, scene: &Scene, square: Square) -> Option<Bsdf> {
-        self.of_square(scene, square).and_then(|(bsdf, is_even)| is_even.then_some(bsdf))
+        self.of_square(scene, square).and_then(|of| of.is_even.then_some(of.bsdf))
     }
 
-    /// Whether the material is the same all over what a ray stands for, by its steps to its neighbours: they grow with
-    /// the distance, where the surface turns away, and around the poles of its uv. At the rim of what is round, nothing
-    /// is as wide as it seems.
+    /// Whether the material is the same all over what a ray stands for, by its steps to its neighbours.
     pub fn is_even_over(
         self,
         scene: &Scene,
@@ -285,14 +294,29 @@ impl Candidate {
         t: f64,
         step: &RayDifferential,
     ) -> bool {
+        self.is_even_within(scene, si, self.growth(scene, si, ray, t, step))
+    }
+
+    /// By which part of themselves the steps of a ray to its neighbours grow on the way: with the distance, and on what
+    /// is round, where it turns away, and around the poles of its uv. Infinite at its rim, where nothing is as wide as
+    /// it seems.
+    fn growth(self, scene: &Scene, si: &SurfaceInteraction, ray: &Ray, t: f64, step: &RayDifferential) -> f32 {
         let [across, down] = step.on_plane(ray.d, t as f32, si.ng, f32::MAX.sqrt() * 0.25);
-        let (length, cos) = (across.length() + down.length(), si.ng.dot(si.wo));
-        let turn = 0.5 * self.curvature(scene) * length;
-        if !(turn < 0.25 * cos) {
+        let length = across.length() + down.length();
+        let (curvature, away) = (self.curvature(scene), length / t as f32);
+        if curvature == 0.0 {
+            return away;
+        }
+        let (turn, cos) = (0.5 * curvature * length, si.ng.dot(si.wo));
+        let Footprint { dx, dy, .. } = si.footprint;
+        if turn < 0.25 * cos { turn / cos + away + PI * (dx.abs() + dy.abs()).max_element() } else { f32::INFINITY }
+    }
+
+    fn is_even_within(self, scene: &Scene, si: &SurfaceInteraction, growth: f32) -> bool {
+        if growth == f32::INFINITY {
             return false;
         }
         let Footprint { dx, dy, edges } = si.footprint;
-        let growth = turn / cos + length / t as f32 + PI * (dx.abs() + dy.abs()).max_element();
         // Of the steps: a half leads to the border
         let part = (0.5 + 2.0 * growth).min(1.0);
         let si = SurfaceInteraction { footprint: Footprint { dx: dx * part, dy: dy * part, edges }, ..*si };

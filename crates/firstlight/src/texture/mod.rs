@@ -41,9 +41,12 @@ impl Texture {
         }
     }
 
-    /// Whether its value is the area mean over the footprint, whatever its size.
-    pub(crate) fn is_exact_mean(&self) -> bool {
-        matches!(self, Texture::Checkerboard(_))
+    /// How far its colours differ, if its value is the area mean over the footprint, whatever its size.
+    pub(crate) fn contrast(&self) -> Option<Rgb> {
+        match self {
+            Texture::Checkerboard(board) => Some(board.contrast()),
+            Texture::Image(_) => None,
+        }
     }
 
     /// Whether it is proved to be the same all within a step of the footprint.
