@@ -23,7 +23,7 @@ use crate::scene::Scene;
 /// whole, the same under a highlight that is not wide, and where shadows cut it.
 const FORETOLD_SMOOTH: f32 = 1.0;
 const FORETOLD_SHARP: f32 = 0.1;
-const FORETOLD_CUT: f32 = 0.5;
+const FORETOLD_CUT: f32 = 0.75;
 /// The same of the smallest squares.
 const SMALLEST_SMOOTH: f32 = 2.0;
 const SMALLEST_SHARP: f32 = 0.25;
