@@ -159,7 +159,7 @@ pub(crate) fn knows(occluder: &Occluder) -> bool {
         Occluder::Solid(solid) => match solid.kind {
             Canonical::Plane | Canonical::Box => true,
             Canonical::Disk { hole } => hole == 0.0,
-            Canonical::Ball | Canonical::Frustum { .. } => false,
+            Canonical::Ball | Canonical::Frustum { .. } | Canonical::Torus { .. } => false,
         },
     }
 }
@@ -220,7 +220,9 @@ impl<S: Simd> Cut<S> {
                         let rim = hull.rims[0];
                         CutShape::Rim { cone: rim.quadratic, arc: Arc::new(&ball, rim.ahead, to.z.abs()) }
                     }
-                    Canonical::Disk { .. } | Canonical::Ball | Canonical::Frustum { .. } => return None,
+                    Canonical::Disk { .. } | Canonical::Ball | Canonical::Frustum { .. } | Canonical::Torus { .. } => {
+                        return None;
+                    }
                 }
             }
             Occluder::Sphere { center, radius } => {

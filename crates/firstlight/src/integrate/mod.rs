@@ -20,6 +20,7 @@ mod occluder;
 mod panels;
 mod points;
 mod tolerance;
+mod torus;
 mod view;
 
 pub(crate) use batch::ShadingPoint;

@@ -13,6 +13,7 @@ use fearless_simd::{f32x16, mask32x16, prelude::*};
 
 use super::batch::{Block, Linear16, ViewNumber, Views};
 use super::hull::{Hull, SolidOccluder};
+use super::torus::TorusShadow;
 use crate::math::{DVec3, Vec3, Vec3x16, sin_cos};
 use crate::shape::Canonical;
 
@@ -275,6 +276,8 @@ pub(crate) struct Breaks<'a, S: Simd> {
     /// The sides of the cells, if they are straight, or of boxes around them.
     pub x: [f32x16<S>; 2],
     pub is_straight: bool,
+    /// Their first and last rows.
+    pub y: [f32x16<S>; 2],
     pub round: Option<RoundSides<S>>,
     /// Whose rows are looked for.
     pub of: mask32x16<S>,
@@ -312,7 +315,7 @@ impl<S: Simd> Breaks<'_, S> {
     }
 
     #[inline(always)]
-    fn tell_if(&mut self, row: f32x16<S>, is: mask32x16<S>) {
+    pub fn tell_if(&mut self, row: f32x16<S>, is: mask32x16<S>) {
         self.rows.push((is & self.of).select(row, row.token().splat_f32x16(f32::NAN)).to_array());
     }
 
@@ -442,6 +445,7 @@ pub(crate) enum Shadow<S: Simd> {
         lines: [Linear16<S>; 5],
     },
     Hull(Hull<S>),
+    Torus(TorusShadow<S>),
 }
 
 /// What has to be 0 or more on a light for a flat thing with these corners, around, to be in the way: behind its plane,
@@ -493,6 +497,7 @@ impl<S: Simd> Shadow<S> {
                 let (to, l) = solid.seen_from(simd, p, l);
                 match solid.kind {
                     Canonical::Ball => Shadow::cone(simd, to, 1.0, &l),
+                    Canonical::Torus { tube } => Shadow::Torus(TorusShadow::new(to, &l, tube)),
                     _ => Shadow::Hull(Hull::new(solid, to, &l)),
                 }
             }
@@ -554,13 +559,18 @@ impl<S: Simd> Shadow<S> {
     pub fn hidden(&self, simd: S, y: f32x16<S>) -> [Interval16<S>; 2] {
         match self {
             Shadow::Hull(hull) => hull.hidden(simd, y),
+            Shadow::Torus(torus) => torus.hidden(simd, y),
             Shadow::Edges { .. } | Shadow::Cone { .. } => [self.interval(simd, y), Interval16::none(simd)],
         }
     }
 
     /// Whether what is hidden may have a hole.
     pub fn has_hole(&self) -> bool {
-        matches!(self, Shadow::Hull(hull) if hull.has_hole())
+        match self {
+            Shadow::Hull(hull) => hull.has_hole(),
+            Shadow::Torus(_) => true,
+            Shadow::Cone { .. } | Shadow::Edges { .. } => false,
+        }
     }
 
     /// What a convex thing hides of sixteen rows.
@@ -568,6 +578,7 @@ impl<S: Simd> Shadow<S> {
     fn interval(&self, simd: S, y: f32x16<S>) -> Interval16<S> {
         match self {
             Shadow::Hull(hull) => hull.hidden(simd, y)[0],
+            Shadow::Torus(torus) => torus.hidden(simd, y)[0],
             Shadow::Edges { lines } => {
                 let mut interval = Interval16::all(simd);
                 for line in lines {
@@ -599,7 +610,7 @@ impl<S: Simd> Shadow<S> {
     pub fn within(&self, simd: S, y: f32x16<S>) -> Interval16<S> {
         let far = simd.splat_f32x16(FAR);
         match self {
-            Shadow::Edges { .. } | Shadow::Hull(_) => Interval16::all(simd),
+            Shadow::Edges { .. } | Shadow::Hull(_) | Shadow::Torus(_) => Interval16::all(simd),
             Shadow::Cone { inside, .. } => {
                 let i = inside.on_row(y);
                 Interval16 { from: i.any.select(i.low, far), to: i.any.select(i.high, -far) }
@@ -620,6 +631,7 @@ impl<S: Simd> Shadow<S> {
                 all
             }
             Shadow::Hull(hull) => hull.hides(x, y),
+            Shadow::Torus(torus) => torus.hides(x, y),
             Shadow::Cone { quadratic, ahead, cut, .. } => {
                 let on_line = quadratic.at(x, y).simd_ge(zero) & ahead.at(x, y).simd_gt(zero);
                 match cut {
@@ -646,7 +658,7 @@ impl<S: Simd> Shadow<S> {
     pub fn holds(&self, x: f32x16<S>, y: f32x16<S>) -> mask32x16<S> {
         let zero = x.token().splat_f32x16(0.0);
         match self {
-            Shadow::Edges { .. } | Shadow::Hull(_) => x.simd_lt(x),
+            Shadow::Edges { .. } | Shadow::Hull(_) | Shadow::Torus(_) => x.simd_lt(x),
             Shadow::Cone { inside, .. } => inside.at(x, y).simd_gt(zero),
         }
     }
@@ -664,6 +676,7 @@ impl<S: Simd> Shadow<S> {
             }
             Shadow::Edges { lines } => breaks.polygon(lines),
             Shadow::Hull(hull) => hull.breaks(breaks),
+            Shadow::Torus(torus) => torus.breaks(breaks),
         }
     }
 }

@@ -185,6 +185,8 @@ fn breaks<S: Simd>(simd: S, blocked: &Blocked, members: &Members, cells: &[Cell]
     use ViewNumber::*;
     let side = |end: usize| std::array::from_fn::<f32, LANES, _>(|k| cells[k.min(cells.len() - 1)].x[end]);
     let x = [f32x16::simd_from(simd, side(0)), f32x16::simd_from(simd, side(1))];
+    let row = |end: usize| std::array::from_fn::<f32, LANES, _>(|k| cells[k.min(cells.len() - 1)].y[end]);
+    let mut y = [f32x16::simd_from(simd, row(0)), f32x16::simd_from(simd, row(1))];
     let zero = simd.splat_f32x16(0.0);
     let (x, round) = match blocked.outline {
         Outline::Parallelogram => (x, None),
@@ -193,6 +195,7 @@ fn breaks<S: Simd>(simd: S, blocked: &Blocked, members: &Members, cells: &[Cell]
             (x, Some(RoundSides { width: [simd.splat_f32x16(-1.0), simd.splat_f32x16(1.0)], origin }))
         }
         Outline::Sphere => {
+            y = [sin_cos(y[0]).0, sin_cos(y[1]).0];
             let width = [sin_cos(x[0]).0, sin_cos(x[1]).0];
             ([width[0].min(zero), width[1].max(zero)], Some(RoundSides { width, origin: [zero; 2] }))
         }
@@ -201,14 +204,14 @@ fn breaks<S: Simd>(simd: S, blocked: &Blocked, members: &Members, cells: &[Cell]
     let batch = Batch::new(simd, blocked, members, |k| cells[k.min(cells.len() - 1)].point);
     for occluder in batch.occluders() {
         let (shadow, outside, within) = batch.shadow(simd, occluder);
-        let mut breaks = Breaks { x, is_straight, round, of: outside | within, rows };
+        let mut breaks = Breaks { x, is_straight, y, round, of: outside | within, rows };
         match batch.cut(simd, occluder) {
             Some(cut) => cut.breaks(&mut breaks),
             None => shadow.breaks(&mut breaks),
         }
     }
     let all = x[0].simd_eq(x[0]);
-    let mut breaks = Breaks { x, is_straight, round, of: all, rows };
+    let mut breaks = Breaks { x, is_straight, y, round, of: all, rows };
     breaks.line(&members.linear(simd, [CosC, CosX, CosY]));
     breaks.line(&members.linear(simd, [HorizonC, HorizonX, HorizonY]));
     if blocked.outline == Outline::Disk {

@@ -23,7 +23,7 @@ pub(crate) enum Solid {
     Ball(Ball),
 }
 
-/// What a convex solid is an affine image of, or one with a straight hole.
+/// What a solid is an affine image of.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Canonical {
     /// z = 0.
@@ -36,6 +36,8 @@ pub(crate) enum Canonical {
     Ball,
     /// z from 0 to 1, with these radii at both ends, which may be open.
     Frustum { radii: [f32; 2], open: bool },
+    /// No farther than `tube`, below 1, from the circle x^2 + y^2 = 1, z = 0.
+    Torus { tube: f32 },
 }
 
 impl Canonical {
@@ -49,6 +51,15 @@ impl Canonical {
                 let [first, last] = radii.map(f64::from);
                 p.z > -room && p.z < 1.0 + room && p.truncate().length() < first + (last - first) * p.z + room
             }
+            Canonical::Torus { .. } => self.outside(p) < room,
+        }
+    }
+
+    /// How far a point is outside of a torus; of others 0.
+    pub fn outside(&self, p: DVec3) -> f64 {
+        match self {
+            Canonical::Torus { tube } => (p.truncate().length() - 1.0).hypot(p.z) - f64::from(*tube),
+            _ => 0.0,
         }
     }
 
@@ -58,6 +69,7 @@ impl Canonical {
             Canonical::Disk { hole } => *hole > 0.0,
             Canonical::Frustum { open, .. } => *open,
             Canonical::Plane | Canonical::Box | Canonical::Ball => false,
+            Canonical::Torus { .. } => true,
         }
     }
 
@@ -148,7 +160,7 @@ impl Solid {
         each!(self, shape => shape.point(ray, hit))
     }
 
-    /// What it is an image of, and by which map; `None` of a torus.
+    /// What it is an image of, and by which map; `None` of a torus with next to no hole.
     pub fn canonical(&self) -> Option<(DAffine3, Canonical)> {
         let map = |x, y, z, to| DAffine3::from_mat3_translation(DMat3::from_cols(x, y, z), to);
         match self {
@@ -165,7 +177,7 @@ impl Solid {
             }
             Solid::Frustum(frustum) => Some(frustum.canonical()),
             Solid::Ball(_) => Some((DAffine3::IDENTITY, Canonical::Ball)),
-            Solid::Torus(_) => None,
+            Solid::Torus(torus) => torus.canonical(),
         }
     }
 

@@ -5,10 +5,10 @@ use std::f64::consts::PI;
 use glam::DVec2;
 
 use super::common::shape_table;
-use super::solid::{Solid, SolidHit, SolidPoint, turn};
+use super::solid::{Canonical, Solid, SolidHit, SolidPoint, turn};
 use super::surface::UvEdge;
 use crate::context::CompileContext;
-use crate::math::{DRay, DVec3, Frame, bracketed, depressed_cubic};
+use crate::math::{DAffine3, DMat3, DRay, DVec3, Frame, bracketed, depressed_cubic};
 
 shape_table! {
     /// A ring: a tube bent round into a circle. Where the tube is thicker than the circle the ring has no hole, and
@@ -46,6 +46,9 @@ pub(crate) struct Torus {
     major: f64,
     minor: f64,
 }
+
+/// Tubes thicker than this part of the circle's radius leave next to no hole.
+const THICK: f64 = 0.95;
 
 impl TorusDesc {
     pub(crate) fn compile(&self, cx: &mut CompileContext) -> Solid {
@@ -142,6 +145,15 @@ impl Torus {
             edges: [UvEdge::Periodic; 2],
             terms: self.center.abs() + DVec3::splat(self.major + self.minor),
         }
+    }
+
+    /// What it is an image of, and by which map; `None` if the tube fills the hole, or nearly so.
+    pub fn canonical(&self) -> Option<(DAffine3, Canonical)> {
+        let tube = self.minor / self.major;
+        let Frame { x, y, z } = self.frame;
+        let axes = DMat3::from_cols(x, y, z) * self.major;
+        (tube < THICK)
+            .then(|| (DAffine3::from_mat3_translation(axes, self.center), Canonical::Torus { tube: tube as f32 }))
     }
 
     pub fn bounds(&self) -> Option<[DVec3; 2]> {

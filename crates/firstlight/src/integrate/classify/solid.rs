@@ -1,4 +1,4 @@
-//! What a convex solid does to a light, for sixteen points.
+//! What a solid does to a light, for sixteen points.
 
 use fearless_simd::{f32x16, prelude::*};
 
@@ -10,7 +10,7 @@ use crate::integrate::occluder::{Exact, Occluder, Shadow};
 use crate::math::{DAffine3, DVec3, LANES, Vec3x16};
 use crate::shape::{Canonical, Placement, Solid};
 
-/// A convex solid as it is placed, or one with a straight hole.
+/// A solid as it is placed: a convex one, one with a straight hole, or a torus.
 pub(super) struct ConvexSolid {
     placement: Placement,
     solid: Solid,
@@ -80,6 +80,18 @@ impl ConvexSolid {
     fn height(&self, p: DVec3) -> f64 {
         let row = self.canonical_from_world.matrix3.transpose().z_axis;
         self.canonical_from_world.transform_point3(p).z / row.length()
+    }
+
+    /// How far a point is from it, at least, in metres.
+    fn apart(&self, p: DVec3) -> f64 {
+        let apart = self.bounds.as_ref().map_or_else(|| self.height(p).abs(), |bounds| distance(bounds, p));
+        if !matches!(self.kind, Canonical::Torus { .. }) {
+            return apart;
+        }
+        // A metre is no longer in its own space than the columns together
+        let [x, y, z] = self.canonical_from_world.matrix3.to_cols_array_2d().map(DVec3::from);
+        let longest = (x.length_squared() + y.length_squared() + z.length_squared()).sqrt();
+        apart.max(self.kind.outside(self.canonical_from_world.transform_point3(p)) / longest)
     }
 
     /// Whether a point is on the plane of a flat one, as far as it can be told.
@@ -204,9 +216,7 @@ pub(super) fn solid_between<S: Simd>(
                 }
             }
             Lies::Between => {
-                let p = point.p.as_dvec3();
-                let apart = shape.bounds.as_ref().map_or_else(|| shape.height(p).abs(), |bounds| distance(bounds, p));
-                distances[k] = (apart as f32 - point.reach).max(0.0);
+                distances[k] = (shape.apart(point.p.as_dvec3()) as f32 - point.reach).max(0.0);
             }
         }
     }
