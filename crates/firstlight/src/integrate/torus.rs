@@ -83,8 +83,6 @@ pub(crate) struct TorusShadow<S: Simd> {
     l: [Vec3x16<S>; 3],
     /// The radius of the tube.
     tube: f32,
-    /// The light is on this side of it.
-    beyond: mask32x16<S>,
 }
 
 /// The plane of a point and a row.
@@ -112,11 +110,7 @@ impl<S: Simd> TorusShadow<S> {
     /// `to` is the way to the middle, `l` are the light's.
     #[inline(always)]
     pub fn new(to: Vec3x16<S>, l: &[Vec3x16<S>; 3], tube: f32) -> Self {
-        let zero = to.x.token().splat_f32x16(0.0);
-        let o = Vec3x16 { x: -to.x, y: -to.y, z: -to.z };
-        let n = l[1].cross(l[2]);
-        let beyond = (n.dot(to - l[0]) * n.dot(l[0])).simd_gt(zero);
-        TorusShadow { o, l: *l, tube, beyond }
+        TorusShadow { o: Vec3x16 { x: -to.x, y: -to.y, z: -to.z }, l: *l, tube }
     }
 
     /// What is hidden of sixteen rows. Not inlined: one copy for each instruction set is enough.
@@ -145,7 +139,7 @@ impl<S: Simd> TorusShadow<S> {
         let rest = 1.0 - self.tube * self.tube;
         let root = (off * off + n.z * n.z * rest).max(zero).sqrt() * self.tube;
         let (low, high) = ((off - root) * (1.0 / rest), (off + root) * (1.0 / rest));
-        let is_there = low.simd_le(h) & high.simd_ge(-h) & !self.beyond;
+        let is_there = low.simd_le(h) & high.simd_ge(-h);
         let [none, other] = [Interval16::none(simd); 2];
         if !is_there.any_true() {
             return [none, other];
@@ -193,19 +187,20 @@ impl<S: Simd> TorusShadow<S> {
         let (zero, far) = (simd.splat_f32x16(0.0), simd.splat_f32x16(FAR));
         let mut places = [[zero; 2]; PLACES];
         let mut on_row = [zero; PLACES];
-        let mut ahead = zero.simd_eq(zero);
+        let mut all = zero.simd_eq(zero);
         for (k, Place { cos, side, .. }) in AROUND.iter().enumerate() {
             let cos = plane.half * *cos + plane.middle;
             places[k] = self.place(simd, plane, cos, mirror, simd.splat_f32x16(*side));
             on_row[k] = places[k][1] / places[k][0].max(simd.splat_f32x16(AHEAD));
-            ahead &= places[k][0].simd_gt(AHEAD);
+            all &= is_between(places[k][0]);
         }
         let from = self.least(simd, plane, mirror, &places, &on_row, 1.0);
         let to = -self.least(simd, plane, mirror, &places, &on_row, -1.0);
-        if ahead.all_true() {
+        if all.all_true() {
             return Extent { from, to };
         }
-        // Where it runs from before the point to behind it, no row ends before it does
+        // Where it runs from before the point to behind it, no row ends before it does; nor, where it runs through the
+        // light's plane, before that place
         let (mut from, mut to) = (from, to);
         for k in 0..PLACES {
             let [[t0, x0], [t1, x1]] = [places[k], places[AROUND[k].after]];
@@ -213,6 +208,10 @@ impl<S: Simd> TorusShadow<S> {
             let x = (x0 * t1 - x1 * t0) * (t1 - t0);
             from = (crosses & x.simd_lt(zero)).select(-far, from);
             to = (crosses & x.simd_gt(zero)).select(far, to);
+            let crosses = t0.simd_lt(1.0) ^ t1.simd_lt(1.0);
+            let x = (x0 * (t1 - 1.0) + x1 * (1.0 - t0)) / (t1 - t0);
+            from = crosses.select(from.min(x), from);
+            to = crosses.select(to.max(x), to);
         }
         Extent { from, to }
     }
@@ -233,7 +232,7 @@ impl<S: Simd> TorusShadow<S> {
         let (mut x, mut s) = ([zero, far, zero], [zero; 3]);
         for (k, Place { part, before, after, apart, .. }) in AROUND.iter().enumerate() {
             let here = on_row[k] * sign;
-            let is = places[k][0].simd_gt(AHEAD) & here.simd_lt(x[1]);
+            let is = is_between(places[k][0]) & here.simd_lt(x[1]);
             x[0] = is.select(on_row[*before] * sign, x[0]);
             x[1] = is.select(here, x[1]);
             x[2] = is.select(on_row[*after] * sign, x[2]);
@@ -257,7 +256,7 @@ impl<S: Simd> TorusShadow<S> {
             let cos = sin_cos(turned).0;
             let [t, across] = self.place(simd, plane, plane.half * cos + plane.middle, mirror, side);
             let there = (across / t.max(simd.splat_f32x16(AHEAD))) * sign;
-            let is_less = t.simd_gt(AHEAD) & there.simd_lt(x[1]);
+            let is_less = is_between(t) & there.simd_lt(x[1]);
             let is_after = part.simd_gt(s[1]);
             // What lies on the other side of the lesser one is the new end there
             let (above, below) = (is_less ^ is_after, is_less ^ !is_after);
@@ -319,6 +318,12 @@ impl<S: Simd> TorusShadow<S> {
     }
 }
 
+/// Whether a place so far along the first way of a row is between the point and the light.
+#[inline(always)]
+fn is_between<S: Simd>(t: f32x16<S>) -> mask32x16<S> {
+    t.simd_gt(AHEAD) & t.simd_lt(1.0)
+}
+
 /// How far the plane of a row is from touching a torus, times the length of its normal.
 #[inline(always)]
 fn gap<S: Simd>(normal: &[Linear16<S>; 3], off: &Linear16<S>, y: f32x16<S>, [circle, tube]: [f32; 2]) -> f32x16<S> {
@@ -370,9 +375,7 @@ mod tests {
             }
             let to = if round % 5 == 0 { Vec3::new(0.0, 0.0, 6.0) + vector(2.0) } else { vector(0.5) - o * 1.5 };
             let (c, a, b) = (o + to, vector(3.0), vector(3.0));
-            // All of the torus on one side of the light
-            let n = a.cross(b).normalize();
-            if n.dot(c).abs() < n.truncate().length() + tube || n.dot(c - o).abs() < 0.01 {
+            if a.cross(b).normalize().dot(c - o).abs() < 0.01 {
                 continue;
             }
             let y: [f32; LANES] = std::array::from_fn(|k| k as f32 / 7.5 - 1.0);
@@ -382,6 +385,12 @@ mod tests {
                 shadow.hidden(simd, f32x16::simd_from(simd, y)).map(|i| [i.from.to_array(), i.to.to_array()])
             });
             for row in 0..LANES {
+                // No part of the light is inside
+                let at = |x: f32| c + a * x + b * y[row];
+                let outside = |q: Vec3| (q.truncate().length() - 1.0).hypot(q.z) - tube;
+                if (0..=40).any(|k| outside(at(k as f32 / 20.0 - 1.0)) < 0.15 * a.length()) {
+                    continue;
+                }
                 for k in 0..=20 {
                     let x = k as f32 / 10.0 - 1.0;
                     let Some(is) = is_hidden(o, c - o + a * x + b * y[row], tube) else { continue };

@@ -51,12 +51,10 @@ impl ConvexSolid {
 
     fn touches(&self, emitter: &Emitter) -> bool {
         match emitter {
-            Emitter::Ball { center, radius, .. } => match &self.bounds {
-                Some(bounds) => distance(bounds, *center) < *radius,
-                None => self.height(*center).abs() < *radius,
-            },
+            Emitter::Ball { center, radius, .. } => self.apart(*center) < *radius,
             // What is flat has no inside
             Emitter::Flat(_) if self.kind.is_flat() => false,
+            Emitter::Flat(flat) if self.apart(flat.c) > f64::from(flat.a.length() + flat.b.length()) => false,
             Emitter::Flat(flat) => {
                 let Some([low, high]) = self.bounds else { return true };
                 let (a, b) = (flat.a.as_dvec3(), flat.b.as_dvec3());
