@@ -435,7 +435,7 @@ def converged(view, between):
 CELL = (736, 960)  # where the pixel's cell of 32 x 32 pixels begins
 SQUARES = ((752, 976, 16), (752, 984, 8), (752, 984, 4), (752, 984, 2))  # those of the grid that hold the pixel
 MOTION = {16: 0.5, 8: 0.5, 4: 0.5, 2: 1.0}  # what the grid allows, as a part of the light's size
-FORETOLD = {4: 0.5, 2: 1.5}  # and in steps
+FORETOLD = {4: 0.75, 2: 1.5}  # and in steps
 FOLLOWED = 3  # the row of the first panel that is worked out, counted from 0
 
 
@@ -487,7 +487,7 @@ def facts_of_grid():
         if moves <= MOTION[side]:
             nine, wrong = foretold(x, y, side)
             assert max(wrong.values()) > FORETOLD[side]
-            told = (number(max(wrong.values()), 2), number(FORETOLD[side], 1), "not foretold")
+            told = (number(max(wrong.values()), 2), f"{FORETOLD[side]:g}", "not foretold")
         yield f"square of {side}", line(
             str(side), f"({x}, {y})", number(reach, 3), number(moves, 2), number(MOTION[side], 1), *told
         )
