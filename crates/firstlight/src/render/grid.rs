@@ -28,6 +28,9 @@ const FORETOLD_CUT: f32 = 0.75;
 const SMALLEST_SMOOTH: f32 = 2.0;
 const SMALLEST_SHARP: f32 = 0.25;
 const SMALLEST_CUT: f32 = 1.5;
+/// The part of them where some of the nine places see nothing: a light that sets in between bends at once, and the
+/// quadratic is farther off than the corners are.
+const SETS_IN: f32 = 0.35;
 /// From here on a highlight is not wide; and beyond, narrow beside the square.
 const SHARP: f32 = 0.4;
 const NARROW: f32 = 1.0;
@@ -412,7 +415,8 @@ impl Grid {
             (false, false, true) => FORETOLD_SMOOTH,
             (false, false, false) => FORETOLD_CUT,
         };
-        let allowed = allowed / (self.lights as f32).sqrt();
+        let sets_in = nodes.contains(&Moments::default());
+        let allowed = if sets_in { allowed * SETS_IN } else { allowed } / (self.lights as f32).sqrt();
         let mean = |a: Moments, b: Moments| (a + b) * 0.5;
         let [nw, n, ne, w, m, e, sw, s, se] = *nodes;
         let middle = mean(mean(nw, ne), mean(sw, se));
