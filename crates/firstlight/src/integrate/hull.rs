@@ -199,8 +199,8 @@ enum Hole {
 }
 
 impl<S: Simd> Hull<S> {
-    /// `to` is the way to the middle of its own space, `l` are the light's in it. Not of a ball or a torus. Not inlined, as what
-    /// it is asked is not: one copy of each for each instruction set is enough.
+    /// `to` is the way to the middle of its own space, `l` are the light's in it. Not of a ball or a torus. Not
+    /// inlined, as what it is asked is not: one copy of each for each instruction set is enough.
     #[inline(never)]
     pub fn new(solid: &SolidOccluder, to: Vec3x16<S>, l: &[Vec3x16<S>; 3]) -> Hull<S> {
         to.x.token().vectorize(

@@ -445,8 +445,8 @@ impl Candidate {
     }
 }
 
-/// How far the mean material of a pixel may be from that of its rays, or of its quarters, which are nearer, as a part of
-/// it.
+/// How far the mean material of a pixel may be from that of its rays, or of its quarters, which are nearer, as a part
+/// of it.
 const SAME_MEAN: f32 = 0.004;
 
 /// The most rays whose mean is taken at once.
