@@ -53,7 +53,7 @@ fn plates_above_a_floor_have_lamberts_form() {
 /// The mean of h / r over the light.
 fn mean_cosine(h: f64, [x, z]: [f64; 2]) -> f64 {
     let row = |dz: f64| {
-        let width = dz.hypot(h);
+        let width = (dz * dz + h * h).sqrt();
         h * (asinh((1.0 - x) / width) - asinh((-1.0 - x) / width))
     };
     // Rows by the hyperbolic sine
@@ -136,7 +136,7 @@ fn balls_that_nearly_touch_shine_as_far_ones_do() {
         for gap in [1e-6, 1e-4, 1e-2, 0.5] {
             for aside in [0.0, 1e-3, 0.1, 1.0] {
                 let (up, aside) = (radius * (1.0 + gap), radius * aside);
-                let d: f64 = f64::hypot(aside, up);
+                let d = f64::sqrt(aside * aside + up * up);
                 let light = SphereLightDesc { visible: false, ..SphereLightDesc::new([0.3 + aside, up, 0.2], radius) };
                 let is = shine(LightDesc::Sphere(light), &[], [0.3, 0.2]);
                 let should = (radius / d) * (radius / d) * (up / d);

@@ -80,7 +80,7 @@ fn steps(facets: &Image, round: &Image) -> [f32; 2] {
         let mut before = f32::INFINITY;
         for x in (0..SIZE).rev() {
             let place = |i: u32| 2.2 * ((i as f32 + 0.5) / SIZE as f32 - 0.5);
-            if place(x).hypot(place(y)) > 0.75 {
+            if (place(x) * place(x) + place(y) * place(y)).sqrt() > 0.75 {
                 continue;
             }
             let (now, there) = (value(facets, x, y), value(round, x, y));

@@ -37,13 +37,13 @@ struct Place {
 const AROUND: [Place; PLACES] = {
     const STEPS: [(f32, f32); 9] = [
         (1.0 / 96.0, 0.999_464_6),
-        (1.0 / 24.0, 0.991_444_86),
+        (1.0 / 24.0, 0.991_444_9),
         (1.0 / 6.0, 0.866_025_4),
         (1.0 / 3.0, 0.5),
         (0.5, 0.0),
         (2.0 / 3.0, -0.5),
         (5.0 / 6.0, -0.866_025_4),
-        (23.0 / 24.0, -0.991_444_86),
+        (23.0 / 24.0, -0.991_444_9),
         (95.0 / 96.0, -0.999_464_6),
     ];
     const NONE: Place = Place { part: 0.0, cos: 0.0, side: 0.0, before: 0, after: 0, apart: [0.0; 2] };
@@ -335,16 +335,17 @@ fn gap<S: Simd>(normal: &[Linear16<S>; 3], off: &Linear16<S>, y: f32x16<S>, [cir
 #[cfg(test)]
 mod tests {
     use fearless_simd::{Level, dispatch};
+    use glam::DVec2;
 
     use super::*;
-    use crate::math::{LANES, Vec3};
+    use crate::math::{LANES, Vec2, Vec3};
 
     /// Whether the way from `o` to `o` + `l` passes within the tube, by many places on it.
     fn is_hidden(o: Vec3, l: Vec3, tube: f32) -> Option<bool> {
         let (o, l) = (o.as_dvec3(), l.as_dvec3());
         let distance = |t: f64| {
             let p = o + l * t;
-            ((p.truncate().length() - 1.0).powi(2) + p.z * p.z).sqrt() - f64::from(tube)
+            DVec2::new(p.truncate().length() - 1.0, p.z).length() - f64::from(tube)
         };
         let mut nearest = f64::INFINITY;
         let steps = 4000;
@@ -370,7 +371,7 @@ mod tests {
             if round % 3 == 0 {
                 o = Vec3::new(o.x, o.y, -tube * 1.001);
             }
-            if (o.truncate().length() - 1.0).hypot(o.z) < tube * 1.0005 {
+            if Vec2::new(o.truncate().length() - 1.0, o.z).length() < tube * 1.0005 {
                 continue;
             }
             let to = if round % 5 == 0 { Vec3::new(0.0, 0.0, 6.0) + vector(2.0) } else { vector(0.5) - o * 1.5 };
@@ -387,7 +388,7 @@ mod tests {
             for row in 0..LANES {
                 // No part of the light is inside
                 let at = |x: f32| c + a * x + b * y[row];
-                let outside = |q: Vec3| (q.truncate().length() - 1.0).hypot(q.z) - tube;
+                let outside = |q: Vec3| Vec2::new(q.truncate().length() - 1.0, q.z).length() - tube;
                 if (0..=40).any(|k| outside(at(k as f32 / 20.0 - 1.0)) < 0.15 * a.length()) {
                     continue;
                 }

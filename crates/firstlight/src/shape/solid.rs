@@ -58,7 +58,7 @@ impl Canonical {
     /// How far a point is outside of a torus; of others 0.
     pub fn outside(&self, p: DVec3) -> f64 {
         match self {
-            Canonical::Torus { tube } => (p.truncate().length() - 1.0).hypot(p.z) - f64::from(*tube),
+            Canonical::Torus { tube } => DVec2::new(p.truncate().length() - 1.0, p.z).length() - f64::from(*tube),
             _ => 0.0,
         }
     }
