@@ -334,11 +334,11 @@ fn gap<S: Simd>(normal: &[Linear16<S>; 3], off: &Linear16<S>, y: f32x16<S>, [cir
 
 #[cfg(test)]
 mod tests {
-    use fearless_simd::{Level, dispatch};
+    use fearless_simd::Level;
     use glam::DVec2;
 
     use super::*;
-    use crate::math::{LANES, Vec2, Vec3};
+    use crate::math::{LANES, Vec2, Vec3, dispatch_wide};
 
     /// Whether the way from `o` to `o` + `l` passes within the tube, by many places on it.
     fn is_hidden(o: Vec3, l: Vec3, tube: f32) -> Option<bool> {
@@ -380,7 +380,7 @@ mod tests {
                 continue;
             }
             let y: [f32; LANES] = std::array::from_fn(|k| k as f32 / 7.5 - 1.0);
-            let intervals: [[[f32; LANES]; 2]; 2] = dispatch!(Level::new(), simd => {
+            let intervals: [[[f32; LANES]; 2]; 2] = dispatch_wide!(Level::new(), simd => {
                 let splat = |v: Vec3| Vec3x16::splat(simd, v);
                 let shadow = TorusShadow::new(splat(-o), &[splat(c - o), splat(a), splat(b)], tube);
                 shadow.hidden(simd, f32x16::simd_from(simd, y)).map(|i| [i.from.to_array(), i.to.to_array()])
