@@ -24,6 +24,7 @@ use super::resolve::{LightTerm, PixelTerms};
 use super::solo::{self, Candidate, Pyramid};
 use super::square::Square;
 use super::tile::Tile;
+use super::together::Together;
 use super::{AaMode, Counts, Heat};
 use crate::color::Rgb;
 use crate::integrate::ShadingPoint;
@@ -470,7 +471,8 @@ impl<'a> Cells<'a> {
             let Fragment { pixel, count, .. } = self.fragments.all[fragment as usize];
             self.work[self.pixels[pixel as usize].index as usize] += Heat::PLACE;
             let is_dark = answer.sums == Moments::default();
-            if count == 1 || answer.smooth && (is_dark || answer.turn <= MIDDLE_TURN) {
+            let is_known = answer.sums.is_known();
+            if is_known && (count == 1 || answer.smooth && (is_dark || answer.turn <= MIDDLE_TURN)) {
                 self.add(fragment as usize, light as usize, answer.sums);
             } else {
                 self.parted.push(*wanted);
@@ -582,11 +584,29 @@ impl<'a> Cells<'a> {
         let mut answers = self.requests.iter().zip(&self.answers);
         for Wanted { fragment, light } in &refused {
             let fragment = &self.fragments.all[*fragment as usize];
-            self.work[self.pixels[fragment.pixel as usize].index as usize] += Heat::PLACE * fragment.count() as f32;
+            let index = self.pixels[fragment.pixel as usize].index as usize;
+            self.work[index] += Heat::PLACE * fragment.count() as f32;
             let term = &mut self.terms[fragment.pixel as usize * scene.lights.len() + *light as usize];
+            // Rays of which no batch knows what they see ask points of the light together
+            let mut unknown = None;
             for (request, answer) in answers.by_ref().take(fragment.count()) {
-                let bsdf = &self.places[request.place as usize].bsdf;
-                *term += bsdf.colors.each(&answer.sums);
+                let place = &self.places[request.place as usize];
+                if answer.sums.is_known() {
+                    *term += place.bsdf.colors.each(&answer.sums);
+                    continue;
+                }
+                let [x, y] = [index as u32 % CELL, index as u32 / CELL];
+                let salt = (self.corner[0] + x) ^ (self.corner[1] + y).rotate_left(16) ^ place.surface.index() as u32;
+                let (light, rays, share) = (*light as usize, fragment.count(), fragment.share);
+                let together = unknown.get_or_insert_with(|| Together::new(light, rays, share, salt, Rgb::BLACK));
+                let arrivals = &mut self.lights.arrivals;
+                together.ask(arrivals, &place.surface(), &place.bsdf, false, false, counts);
+            }
+            if let Some(together) = unknown {
+                go_on()?;
+                let before = counts.work();
+                *term += together.finish(&mut self.lights.arrivals, counts).terms;
+                self.work[index] += counts.work() - before;
             }
         }
         self.refused = refused;

@@ -65,6 +65,7 @@ pub(crate) struct Request {
 /// What arrives of one light at one place.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Answer {
+    /// No number where no batch knows it.
     pub sums: Moments,
     /// Whether the light is seen as a whole, or not at all, from all within the place's reach.
     pub smooth: bool,
@@ -76,8 +77,9 @@ pub(crate) struct Answer {
 }
 
 impl Answer {
-    /// Where one place says nothing of what is around it.
-    const UNKNOWN: Answer = Answer { sums: Moments::ZERO, smooth: false, motion: f32::INFINITY, turn: f32::INFINITY };
+    /// Of what no batch knows.
+    const UNKNOWN: Answer =
+        Answer { sums: Moments::UNKNOWN, smooth: false, motion: f32::INFINITY, turn: f32::INFINITY };
 }
 
 /// Asks for light.
@@ -158,11 +160,10 @@ impl<'a> LightQueue<'a> {
                             Illumination::Hidden => settled[Visibility::Hidden as usize] += 1,
                             Illumination::Full => settled[Visibility::Lit as usize] += 1,
                             Illumination::Partial => counts.closed_form += 1,
-                            Illumination::Unknown => go_on()?,
+                            Illumination::Unknown => {}
                         }
                         answers[*k as usize] = if arrived.illumination == Illumination::Unknown {
-                            // One place tells nothing of those around it
-                            if place.point.reach > 0.0 { Answer::UNKNOWN } else { self.one(light, place, counts) }
+                            Answer::UNKNOWN
                         } else {
                             let is_near = place.point.reach > 0.4 * arrived.distance
                                 || emitter.is_one_sided() && arrived.height <= place.point.reach;
