@@ -55,7 +55,7 @@ pub struct Options {
     all: bool,
     /// Compares times in place of pictures: with those of 1,024 points on every light at every camera ray. Prints the
     /// scenes that take the longest.
-    #[arg(long, conflicts_with_all = ["write", "converge", "dump"])]
+    #[arg(long, conflicts_with_all = ["write", "converge", "dump", "cap", "kept", "all"])]
     slow: bool,
 }
 

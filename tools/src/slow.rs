@@ -9,6 +9,7 @@ use firstlight_testkit::converged::{displayed, integrated, with_samples};
 use firstlight_testkit::scenes::{compile, picture};
 
 use crate::Outcome;
+use crate::bench::median;
 
 /// Points on each light.
 const POINTS: u32 = 1024;
@@ -48,8 +49,7 @@ fn timed(scene: &Scene, settings: &RenderSettings) -> (f64, Image) {
         image = Some(picture(scene, settings));
         *seconds = start.elapsed().as_secs_f64();
     }
-    seconds.sort_by(f64::total_cmp);
-    (seconds[1], image.expect("there were three"))
+    (median(&seconds), image.expect("there were three"))
 }
 
 fn times(seed: u64, desc: &SceneDesc) -> Times {

@@ -149,7 +149,7 @@ impl Grid {
     }
 }
 
-/// Moments over cells, in parts of the light's measure.
+/// Sums over cells, in parts of the light's measure.
 #[derive(Clone, Copy, Default)]
 struct Totals {
     all: [f64; MOMENTS],

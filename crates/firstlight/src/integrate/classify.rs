@@ -1,6 +1,6 @@
 //! What may stand between points and a light: for sixteen points at once, and for all within a radius of each.
 //!
-//! With radius 0 it is the class of a point: it sees all of the light, none of it, or what these convex things leave of
+//! With radius 0 it is the class of a point: it sees all of the light, none of it, or what these things leave of
 //! it. With a radius it is a proof of the same for all places within it, and a bound on how far the outline of a shadow
 //! moves on the light from one of them to another.
 
@@ -21,7 +21,7 @@ use crate::scene::{Meets, Scene, Target};
 use crate::shape::{Parallelogram, Placement, PlaneSide, Solid, Sphere};
 use crate::visibility::{Occluders, ShadowMesh};
 use flat::{FacetShape, Own, facet_between, flat_between};
-use solid::{ConvexSolid, solid_between};
+use solid::{PlacedSolid, solid_between};
 
 /// All things that may stand in the way of one light.
 #[derive(Default)]
@@ -49,7 +49,7 @@ enum ExactShape<'a> {
         /// The same if the camera sees it: then nobody sees what is behind it.
         seen_side: PlaneSide,
     },
-    Solid(Box<ConvexSolid>),
+    Solid(Box<PlacedSolid>),
     Facet(FacetShape),
 }
 
@@ -77,7 +77,7 @@ impl<'a> Obstacles<'a> {
             obstacles.flat(flat, side, seen_side);
         }
         for (_, disk) in scene.light_obstacles.disks.iter().filter(|(light, _)| *light != index) {
-            obstacles.solid(ConvexSolid::new(Solid::Disk(*disk), Placement::new(DAffine3::IDENTITY), emitter));
+            obstacles.solid(PlacedSolid::new(Solid::Disk(*disk), Placement::new(DAffine3::IDENTITY), emitter));
         }
         obstacles.has_more = obstacles.occluders.len() > MAX_OBSTACLES;
         obstacles.occluders.truncate(MAX_OBSTACLES);
@@ -93,7 +93,7 @@ impl<'a> Obstacles<'a> {
                 continue;
             }
             let solid = scene.geometry.solids[solid as usize];
-            if obstacles.solid(ConvexSolid::new(solid, thing.placement, emitter)) {
+            if obstacles.solid(PlacedSolid::new(solid, thing.placement, emitter)) {
                 obstacles.placed.push(k as u32);
             }
         }
@@ -168,7 +168,7 @@ impl<'a> Obstacles<'a> {
     }
 
     /// Adds a solid, if rows tell it.
-    fn solid(&mut self, solid: Option<(ConvexSolid, SolidOccluder)>) -> bool {
+    fn solid(&mut self, solid: Option<(PlacedSolid, SolidOccluder)>) -> bool {
         let Some((shape, occluder)) = solid else { return false };
         self.occluders.push(Occluder::Solid(occluder));
         self.exact.push(ExactShape::Solid(Box::new(shape)));

@@ -12,7 +12,7 @@ use super::occluder::{Breaks, Exact, FAR, Interval16, Quadratic16, edges};
 use crate::math::{DAffine3, DVec3, Vec3, Vec3x16};
 use crate::shape::Canonical;
 
-/// A convex solid that may stand in the way.
+/// A solid that may stand in the way.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct SolidOccluder {
     /// Where its own space begins in the world, and the rows of the matrix that leads there.

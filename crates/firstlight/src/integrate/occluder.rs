@@ -1,7 +1,7 @@
-//! Convex things in the way of a light: what they hide of it, row by row, for sixteen points at once.
+//! Things in the way of a light: what they hide of it, row by row, for sixteen points at once.
 //!
 //! What a point sees of a convex thing on a light's plane is convex, so a row of the light has one hidden interval at
-//! most, and its ends are roots of a linear function or of a quadratic.
+//! most, and its ends are roots of a linear function or of a quadratic. What has a hole hides two.
 //!
 //! Source of the quadratic of a sphere: the cone that touches it, r^2 |l|^2 - |l x s|^2 >= 0, as in Heidrich, Brabec,
 //! Seidel, "Soft Shadow Maps for Linear Lights", 2000, for one row; the rest is ours.
@@ -38,7 +38,7 @@ impl Exact {
     }
 }
 
-/// A convex thing that may stand in the way.
+/// A thing that may stand in the way.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Occluder {
     Sphere {
@@ -299,9 +299,44 @@ const ANGLES: [[f32; 2]; PLACES] = {
     angles
 };
 
-/// In radians: from one of those angles to the next; and how often a root between two of them is looked for.
+/// In radians: from one of those angles to the next.
 const STEP: f32 = PI / (PLACES - 1) as f32;
+/// How often a root between two places is looked for.
 const REFINED: usize = 4;
+
+/// The place of a round side that lies so far on, in radians, from an angle with that sine and cosine.
+#[inline(always)]
+fn on_arc<S: Simd>(
+    t: f32x16<S>,
+    [from_sin, from_cos]: [f32; 2],
+    width: f32x16<S>,
+    origin: [f32x16<S>; 2],
+) -> [f32x16<S>; 2] {
+    let (s, c) = sin_cos(t);
+    [width * (c * from_cos - s * from_sin) - origin[0], s * from_cos + c * from_sin - origin[1]]
+}
+
+/// Where `f` is 0 between two places at which it has different signs, and these values.
+///
+/// Source: the Illinois method, Dowell, Jarratt, "A modified regula falsi method for computing the root of an equation",
+/// 1971.
+#[inline(always)]
+pub(super) fn root_between<S: Simd>(
+    [mut a, mut b]: [f32x16<S>; 2],
+    [mut fa, mut fb]: [f32x16<S>; 2],
+    f: impl Fn(f32x16<S>) -> f32x16<S>,
+) -> f32x16<S> {
+    let (zero, mut t) = (a.token().splat_f32x16(0.0), a);
+    for _ in 0..REFINED {
+        t = a + (b - a) * (fa / (fa - fb));
+        let ft = f(t);
+        // The root is before t, or after it; the end that stays counts half
+        let is_first = ft.simd_lt(zero) ^ fa.simd_lt(zero);
+        (b, fb) = (is_first.select(t, b), is_first.select(ft, fb * 0.5));
+        (a, fa) = (is_first.select(a, t), is_first.select(fa * 0.5, ft));
+    }
+    t
+}
 
 impl<S: Simd> Breaks<'_, S> {
     /// The sides that are straight.
@@ -367,22 +402,17 @@ impl<S: Simd> Breaks<'_, S> {
             let here = quadratic.at(width * *cos - origin[0], *sin - origin[1]);
             let changes = of & (here.simd_lt(zero) ^ before.simd_lt(zero));
             if k > 0 && changes.any_true() {
-                // Between the two angles, by the line through the ends, one of which counts half if it stays
-                let (mut a, mut b) = (simd.splat_f32x16(0.0), simd.splat_f32x16(STEP));
-                let (mut fa, mut fb) = (before, here);
-                let [from_sin, from_cos] = ANGLES[k - 1];
-                let (mut x, mut y) = (zero, zero);
-                for _ in 0..REFINED {
-                    let t = a + (b - a) * (fa / (fa - fb));
-                    let (s, c) = sin_cos(t);
-                    (y, x) =
-                        (s * from_cos + c * from_sin - origin[1], width * (c * from_cos - s * from_sin) - origin[0]);
-                    let f = quadratic.at(x, y);
-                    let is_first = f.simd_lt(zero) ^ fa.simd_lt(zero);
-                    // The root is before t, or after it
-                    (b, fb) = (is_first.select(t, b), is_first.select(f, fb * 0.5));
-                    (a, fa) = (is_first.select(a, t), is_first.select(fa * 0.5, f));
-                }
+                let from = ANGLES[k - 1];
+                let root = root_between(
+                    [zero, simd.splat_f32x16(STEP)],
+                    [before, here],
+                    #[inline(always)]
+                    |t| {
+                        let [x, y] = on_arc(t, from, width, origin);
+                        quadratic.at(x, y)
+                    },
+                );
+                let [x, y] = on_arc(root, from, width, origin);
                 let mut is = changes;
                 for line in inside {
                     is &= line.at(x, y).simd_ge((line.c.abs() + line.x.abs() + line.y.abs()) * -1e-3);
@@ -428,7 +458,7 @@ impl<S: Simd> Breaks<'_, S> {
     }
 }
 
-/// A convex thing as sixteen points see it on a light.
+/// A thing as sixteen points see it on a light.
 pub(crate) enum Shadow<S: Simd> {
     /// Of a sphere.
     Cone {

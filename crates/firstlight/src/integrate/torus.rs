@@ -8,13 +8,13 @@
 //!
 //! In the torus' own space its circle has radius 1 around z.
 
+use std::f32::consts::{FRAC_PI_2, PI};
+
 use fearless_simd::{f32x16, mask32x16, prelude::*};
 
 use super::batch::Linear16;
-use super::occluder::{Breaks, FAR, Interval16};
+use super::occluder::{Breaks, FAR, Interval16, root_between};
 use crate::math::{Vec3x16, sin_cos};
-
-use std::f32::consts::{FRAC_PI_2, PI};
 
 /// Places around a part at which it is looked at, by an angle whose cosine is that around the axis as it goes from one
 /// end of the part to the other and back: steps of 30 degrees, and closer to the ends, where the tube turns quickly if
@@ -68,8 +68,6 @@ const AROUND: [Place; PLACES] = {
 };
 /// Rows at which the parts of a cell's rows are looked at, to find where they begin, end and meet.
 const LOOKS: usize = 8;
-/// How often such a row is looked for between two.
-const REFINED: usize = 4;
 /// How often the end of a part is looked for between three places.
 const TURNS: usize = 3;
 /// In ways to the light: what is nearer to a point than this, or behind it, is not in front of it.
@@ -98,12 +96,6 @@ struct RowPlane<S: Simd> {
     /// From where to where the cosine goes around a part, as its middle and half of its length.
     middle: f32x16<S>,
     half: f32x16<S>,
-}
-
-/// What of a row a part hides.
-struct Extent<S: Simd> {
-    from: f32x16<S>,
-    to: f32x16<S>,
 }
 
 impl<S: Simd> TorusShadow<S> {
@@ -140,9 +132,8 @@ impl<S: Simd> TorusShadow<S> {
         let root = (off * off + n.z * n.z * rest).max(zero).sqrt() * self.tube;
         let (low, high) = ((off - root) * (1.0 / rest), (off + root) * (1.0 / rest));
         let is_there = low.simd_le(h) & high.simd_ge(-h);
-        let [none, other] = [Interval16::none(simd); 2];
         if !is_there.any_true() {
-            return [none, other];
+            return [Interval16::none(simd); 2];
         }
         let meets = low.simd_le(-h) | high.simd_ge(h);
         let least = low.simd_le(-h).select(-one, low * inverse);
@@ -150,16 +141,12 @@ impl<S: Simd> TorusShadow<S> {
         let (middle, half) = ((most + least) * 0.5, (most - least) * 0.5);
         let plane = RowPlane { n, h, e, off, along, middle, half };
         let (left, right) = (self.extent(simd, &plane, 1.0), self.extent(simd, &plane, -1.0));
-        let joined = Extent { from: left.from.min(right.from), to: left.to.max(right.to) };
+        let from = meets.select(left.from.min(right.from), left.from);
+        let to = meets.select(left.to.max(right.to), left.to);
+        let is_other = is_there & !meets;
         [
-            Interval16 {
-                from: is_there.select(meets.select(joined.from, left.from), far),
-                to: is_there.select(meets.select(joined.to, left.to), -far),
-            },
-            Interval16 {
-                from: (is_there & !meets).select(right.from, far),
-                to: (is_there & !meets).select(right.to, -far),
-            },
+            Interval16 { from: is_there.select(from, far), to: is_there.select(to, -far) },
+            Interval16 { from: is_other.select(right.from, far), to: is_other.select(right.to, -far) },
         ]
     }
 
@@ -183,7 +170,7 @@ impl<S: Simd> TorusShadow<S> {
 
     /// From where to where on the row one part is seen.
     #[inline(always)]
-    fn extent(&self, simd: S, plane: &RowPlane<S>, mirror: f32) -> Extent<S> {
+    fn extent(&self, simd: S, plane: &RowPlane<S>, mirror: f32) -> Interval16<S> {
         let (zero, far) = (simd.splat_f32x16(0.0), simd.splat_f32x16(FAR));
         let mut places = [[zero; 2]; PLACES];
         let mut on_row = [zero; PLACES];
@@ -194,14 +181,13 @@ impl<S: Simd> TorusShadow<S> {
             on_row[k] = places[k][1] / places[k][0].max(simd.splat_f32x16(AHEAD));
             all &= is_between(places[k][0]);
         }
-        let from = self.least(simd, plane, mirror, &places, &on_row, 1.0);
-        let to = -self.least(simd, plane, mirror, &places, &on_row, -1.0);
+        let mut from = self.least(simd, plane, mirror, &places, &on_row, 1.0);
+        let mut to = -self.least(simd, plane, mirror, &places, &on_row, -1.0);
         if all.all_true() {
-            return Extent { from, to };
+            return Interval16 { from, to };
         }
         // Where it runs from before the point to behind it, no row ends before it does; nor, where it runs through the
         // light's plane, before that place
-        let (mut from, mut to) = (from, to);
         for k in 0..PLACES {
             let [[t0, x0], [t1, x1]] = [places[k], places[AROUND[k].after]];
             let crosses = t0.simd_gt(AHEAD) ^ t1.simd_gt(AHEAD);
@@ -213,7 +199,7 @@ impl<S: Simd> TorusShadow<S> {
             from = crosses.select(from.min(x), from);
             to = crosses.select(to.max(x), to);
         }
-        Extent { from, to }
+        Interval16 { from, to }
     }
 
     /// The least place of a part on the row, or, with `sign` -1, the opposite of the greatest: from the least of those
@@ -296,21 +282,20 @@ impl<S: Simd> TorusShadow<S> {
         let step = (high - low) * (1.0 / LOOKS as f32);
         // The plane is as far from the middle as the circle reaches, more or less the tube
         for [of_circle, of_tube] in [[1.0, 1.0], [1.0, -1.0], [-1.0, 1.0], [-1.0, -1.0]] {
+            let touch = [of_circle, of_tube * self.tube];
             let mut before = zero;
             for k in 0..=LOOKS {
-                let here = gap(&normal, &off, low + step * k as f32, [of_circle, of_tube * self.tube]);
+                let here = gap(&normal, &off, low + step * k as f32, touch);
                 let changes = breaks.of & (here.simd_lt(zero) ^ before.simd_lt(zero));
                 if k > 0 && changes.any_true() {
-                    let (mut a, mut b) = (low + step * (k as f32 - 1.0), low + step * k as f32);
-                    let (mut fa, mut fb, mut y) = (before, here, zero);
-                    for _ in 0..REFINED {
-                        y = a + (b - a) * (fa / (fa - fb));
-                        let f = gap(&normal, &off, y, [of_circle, of_tube * self.tube]);
-                        let is_first = f.simd_lt(zero) ^ fa.simd_lt(zero);
-                        (b, fb) = (is_first.select(y, b), is_first.select(f, fb * 0.5));
-                        (a, fa) = (is_first.select(a, y), is_first.select(fa * 0.5, f));
-                    }
-                    breaks.tell_if(y, changes);
+                    let between = [low + step * (k as f32 - 1.0), low + step * k as f32];
+                    let root = root_between(
+                        between,
+                        [before, here],
+                        #[inline(always)]
+                        |y| gap(&normal, &off, y, touch),
+                    );
+                    breaks.tell_if(root, changes);
                 }
                 before = here;
             }
@@ -338,7 +323,7 @@ mod tests {
     use glam::DVec2;
 
     use super::*;
-    use crate::math::{LANES, Vec2, Vec3, dispatch_wide};
+    use crate::math::{DVec3, LANES, Vec2, Vec3, dispatch_wide};
 
     /// Whether the way from `o` to `o` + `l` passes within the tube, by many places on it.
     fn is_hidden(o: Vec3, l: Vec3, tube: f32) -> Option<bool> {
@@ -357,15 +342,11 @@ mod tests {
 
     #[test]
     fn rows_are_hidden_as_rays_are() {
-        let mut state = 12345u32;
-        let mut random = || {
-            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-            (state >> 8) as f32 / (1 << 24) as f32 * 2.0 - 1.0
-        };
+        let mut random = firstlight_testkit::Random::new(1);
         let (mut asked, mut seen) = (0, 0);
         for round in 0..400 {
-            let tube = 0.05 + 0.8 * random().abs();
-            let mut vector = |scale: f32| Vec3::new(random(), random(), random()) * scale;
+            let tube = random.between(0.05, 0.85) as f32;
+            let mut vector = |reach: f64| DVec3::from(random.vector(reach)).as_vec3();
             // From far away, from near, and from the plane that the torus lies on
             let mut o = vector(if round % 2 == 0 { 8.0 } else { 2.5 });
             if round % 3 == 0 {

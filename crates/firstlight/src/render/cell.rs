@@ -5,7 +5,7 @@
 //! grid       light over such squares, from nine places of each: 16, 8, 4, 2 pixels wide
 //! middles    what a surface in a pixel gets of a light, from its middle
 //! quadrants  the same, from four places of it
-//! rays       the same, from all of its camera rays
+//! rays       the same, from all of its camera rays; where no batch knows it, they ask points of the light together
 //! resolve    the pixel's sum, once
 //! ```
 //!
@@ -24,7 +24,7 @@ use super::resolve::{LightTerm, PixelTerms};
 use super::solo::{self, Candidate, Pyramid};
 use super::square::Square;
 use super::tile::Tile;
-use super::together::Together;
+use super::together::{Together, salt};
 use super::{AaMode, Counts, Heat};
 use crate::color::Rgb;
 use crate::integrate::ShadingPoint;
@@ -586,6 +586,7 @@ impl<'a> Cells<'a> {
             let fragment = &self.fragments.all[*fragment as usize];
             let index = self.pixels[fragment.pixel as usize].index as usize;
             self.work[index] += Heat::PLACE * fragment.count() as f32;
+            let at = self.at(index);
             let term = &mut self.terms[fragment.pixel as usize * scene.lights.len() + *light as usize];
             // Rays of which no batch knows what they see ask points of the light together
             let mut unknown = None;
@@ -595,8 +596,7 @@ impl<'a> Cells<'a> {
                     *term += place.bsdf.colors.each(&answer.sums);
                     continue;
                 }
-                let [x, y] = [index as u32 % CELL, index as u32 / CELL];
-                let salt = (self.corner[0] + x) ^ (self.corner[1] + y).rotate_left(16) ^ place.surface.index() as u32;
+                let salt = salt(at, place.surface);
                 let (light, rays, share) = (*light as usize, fragment.count(), fragment.share);
                 let together = unknown.get_or_insert_with(|| Together::new(light, rays, share, salt, Rgb::BLACK));
                 let arrivals = &mut self.lights.arrivals;

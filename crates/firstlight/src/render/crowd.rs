@@ -40,7 +40,7 @@ struct Item {
     sight: Sight,
 }
 
-/// Moments of products of errors, channel by channel: diffuse with itself, with highlights, highlights with themselves.
+/// Sums of products of errors, channel by channel: diffuse with itself, with highlights, highlights with themselves.
 type Squares = [[f64; 3]; PAIRS.len()];
 /// Each moment with each, once.
 const PAIRS: [[usize; 2]; MOMENTS * (MOMENTS + 1) / 2] = {
@@ -82,7 +82,7 @@ const MAYBE: f32 = 0.3;
 const WORTH_A_LOOK: usize = 6;
 /// So many nodes are taken apart between two looks at the sum.
 const STRIDE: u32 = 8;
-/// Moments are made anew where the worst in question has become so much less.
+/// Sums are made anew where the worst in question has become so much less.
 const AGAIN: f32 = 1e-4;
 
 fn of(color: Rgb) -> [f64; 3] {
@@ -148,7 +148,7 @@ impl Crowd {
         }
     }
 
-    /// Moments up anew: what was taken away leaves rounding behind.
+    /// Sums up anew: what was taken away leaves rounding behind.
     fn recount(&mut self, walk: &Walk) {
         (self.squares, self.known) = Default::default();
         let (items, heap) = (std::mem::take(&mut self.items), std::mem::take(&mut self.heap));

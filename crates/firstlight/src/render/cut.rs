@@ -93,7 +93,7 @@ const WORTH: f32 = 0.25;
 const WIDE: f32 = 0.7;
 /// The part of what nothing is known of that is guessed to arrive.
 const MAYBE: f32 = 0.3;
-/// Moments are made anew where what is in question has become so much less: what was taken away has left its rounding
+/// Sums are made anew where what is in question has become so much less: what was taken away has left its rounding
 /// behind.
 const AGAIN: f32 = 1e-8;
 
@@ -189,7 +189,7 @@ impl Cut {
         }
     }
 
-    /// Moments up anew: what was taken away leaves rounding behind.
+    /// Sums up anew: what was taken away leaves rounding behind.
     fn recount(&mut self, walk: &Walk, done: &[f64; 3]) {
         (self.error, self.known) = ([[0.0; 3]; MOMENTS], *done);
         let heap = std::mem::take(&mut self.heap);
@@ -199,7 +199,7 @@ impl Cut {
         self.heap = heap;
     }
 
-    /// Moments up anew where that is due. `worst` was the worst in question when it was done last.
+    /// Sums up anew where that is due. `worst` was the worst in question when it was done last.
     fn keep_exact(&mut self, walk: &Walk, done: &[f64; 3], worst: &mut f32) {
         let now = self.heap.peek().map_or(0.0, |item| item.key);
         if now < *worst * AGAIN {

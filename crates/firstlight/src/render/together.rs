@@ -11,6 +11,7 @@ use super::beams::{self, Beam, Traced};
 use super::ladder::{Asker, FIRST, LAST, Tally, of_edge};
 use super::resolve::LightTerm;
 use crate::color::Rgb;
+use crate::ids::SurfaceId;
 use crate::integrate::{Arrived, Illumination};
 use crate::light::SERIES;
 use crate::material::{Bsdf, Lobe, MOMENTS, Moments};
@@ -210,9 +211,14 @@ pub(super) struct Outcome {
     pub share: f32,
 }
 
+/// Anything that other pixels have other values of, and other surfaces in them.
+pub(crate) fn salt([i, j]: [u32; 2], surface: SurfaceId) -> u32 {
+    i ^ j.rotate_left(16) ^ surface.index() as u32
+}
+
 impl Together {
-    /// Of a patch with so many rays, `share` of its pixel. `salt` is anything that other pixels have other values of,
-    /// `others` what other lights send to a ray, at least.
+    /// Of a patch with so many rays, `share` of its pixel. By its [`salt`] it asks other points than others; `others`
+    /// is what other lights send to a ray, at least.
     pub fn new(light: usize, rays: usize, share: f32, salt: u32, others: Rgb) -> Self {
         // Which of the series is first: any, but not by a pattern
         let series = (salt.wrapping_mul(0x9e37_79b9) >> 16) as usize % SERIES;

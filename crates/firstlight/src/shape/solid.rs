@@ -51,16 +51,14 @@ impl Canonical {
                 let [first, last] = radii.map(f64::from);
                 p.z > -room && p.z < 1.0 + room && p.truncate().length() < first + (last - first) * p.z + room
             }
-            Canonical::Torus { .. } => self.outside(p) < room,
+            Canonical::Torus { .. } => self.outside(p).is_some_and(|outside| outside < room),
         }
     }
 
-    /// How far a point is outside of a torus; of others 0.
-    pub fn outside(&self, p: DVec3) -> f64 {
-        match self {
-            Canonical::Torus { tube } => DVec2::new(p.truncate().length() - 1.0, p.z).length() - f64::from(*tube),
-            _ => 0.0,
-        }
+    /// How far a point is outside of a torus, below 0 inside; of others a box around them says enough.
+    pub fn outside(&self, p: DVec3) -> Option<f64> {
+        let Canonical::Torus { tube } = self else { return None };
+        Some(DVec2::new(p.truncate().length() - 1.0, p.z).length() - f64::from(*tube))
     }
 
     /// Whether light can pass through it.

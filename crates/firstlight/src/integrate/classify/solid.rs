@@ -11,7 +11,7 @@ use crate::math::{DAffine3, DVec3, LANES, Vec3x16};
 use crate::shape::{Canonical, Placement, Solid};
 
 /// A solid as it is placed: a convex one, one with a straight hole, or a torus.
-pub(super) struct ConvexSolid {
+pub(super) struct PlacedSolid {
     placement: Placement,
     solid: Solid,
     kind: Canonical,
@@ -28,14 +28,14 @@ fn distance([low, high]: &[DVec3; 2], p: DVec3) -> f64 {
     (*low - p).max(p - *high).max(DVec3::ZERO).length()
 }
 
-impl ConvexSolid {
+impl PlacedSolid {
     /// `None` of what no row tells.
-    pub fn new(solid: Solid, placement: Placement, emitter: &Emitter) -> Option<(ConvexSolid, SolidOccluder)> {
+    pub fn new(solid: Solid, placement: Placement, emitter: &Emitter) -> Option<(PlacedSolid, SolidOccluder)> {
         let (object_from_canonical, kind) = solid.canonical()?;
         let world_from_canonical = placement.world_from_object * object_from_canonical;
         let bounds = solid.bounds().map(|bounds| placement.bounds(bounds));
         let canonical_from_world = world_from_canonical.inverse();
-        let mut made = ConvexSolid {
+        let mut made = PlacedSolid {
             placement,
             solid,
             kind,
@@ -83,13 +83,11 @@ impl ConvexSolid {
     /// How far a point is from it, at least, in metres.
     fn apart(&self, p: DVec3) -> f64 {
         let apart = self.bounds.as_ref().map_or_else(|| self.height(p).abs(), |bounds| distance(bounds, p));
-        if !matches!(self.kind, Canonical::Torus { .. }) {
-            return apart;
-        }
+        let Some(outside) = self.kind.outside(self.canonical_from_world.transform_point3(p)) else { return apart };
         // A metre is no longer in its own space than the columns together
         let [x, y, z] = self.canonical_from_world.matrix3.to_cols_array_2d().map(DVec3::from);
         let longest = (x.length_squared() + y.length_squared() + z.length_squared()).sqrt();
-        apart.max(self.kind.outside(self.canonical_from_world.transform_point3(p)) / longest)
+        apart.max(outside / longest)
     }
 
     /// Whether a point is on the plane of a flat one, as far as it can be told.
@@ -118,7 +116,7 @@ enum Lies {
     Between,
 }
 
-impl ConvexSolid {
+impl PlacedSolid {
     fn lies(&self, point: &ShadingPoint) -> Lies {
         let p = point.p.as_dvec3();
         let far = match &self.bounds {
@@ -172,7 +170,7 @@ impl ConvexSolid {
 pub(super) fn solid_between<S: Simd>(
     simd: S,
     sight: &Sight<S>,
-    shape: &ConvexSolid,
+    shape: &PlacedSolid,
     occluder: &Occluder,
     points: &[ShadingPoint],
     asked: u64,

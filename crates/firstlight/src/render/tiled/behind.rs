@@ -13,7 +13,7 @@ use crate::render::arrival::{ArrivalPlace, Arrivals, Past};
 use crate::render::patch::{Member, Patch, PixelPatches, Rays};
 use crate::render::resolve::LightTerm;
 use crate::render::tile::Tile;
-use crate::render::together::{Outcome, Together};
+use crate::render::together::{Outcome, Together, salt};
 use crate::visibility::{View, Viewpoint, Visibility};
 
 /// What the rays of one patch see of one light.
@@ -229,11 +229,10 @@ impl Tiled<'_> {
     ) -> Together {
         let patch = block.patches[k];
         let index = patch.pixel as usize;
-        let at = self.at(index);
         let others = self.others(index, patch.patch as usize, light);
         let members = patch.members(&self.pixels);
         let share = self.share_of(patch.count);
-        let salt = at[0] ^ at[1].rotate_left(16) ^ members[0].si.surface.index() as u32;
+        let salt = salt(self.at(index), members[0].si.surface);
         let mut together = Together::new(light, members.len(), share, salt, others);
         for (member, k) in members.iter().zip(patch.rays()) {
             sights.settle(k, member, &mut self.arrivals, light, share, &mut together, counts);

@@ -9,7 +9,7 @@ use crate::material::{Bsdf, Moments};
 use crate::render::arrival::ArrivalPlace;
 use crate::render::change::Arrival;
 use crate::render::patch::{Contrast, Patch, PixelPatches};
-use crate::render::together::Together;
+use crate::render::together::{Together, salt};
 use crate::render::{AaMode, Counts};
 use crate::scene::Scene;
 
@@ -244,7 +244,7 @@ impl Tiled<'_> {
         counts: &mut Counts,
     ) {
         let rays = patch.count(self.scene) as usize;
-        let salt = at[0] ^ at[1].rotate_left(16) ^ patch.si.surface.index() as u32;
+        let salt = salt(at, patch.si.surface);
         let mut together = Together::new(light, rays, share, salt, Rgb::BLACK);
         let lit = matches!(outlook, Outlook::Lit);
         let clear = lit || matches!(outlook, Outlook::Clear);
