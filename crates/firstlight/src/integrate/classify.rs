@@ -10,7 +10,7 @@ mod solid;
 use fearless_simd::{f32x16, prelude::*};
 
 use super::batch::{Linear16, ShadingPoint, ViewBlock, ViewNumber, Views};
-use super::cut;
+use super::cut::{self, Half};
 use super::emitter::Emitter;
 use super::hull::SolidOccluder;
 use super::occluder::{Exact, Occluder, Shadow, corners_from, ways};
@@ -449,8 +449,10 @@ pub(crate) fn classify<S: Simd>(
         }
         // What reaches into a ball may hide some of its far half
         sight.depth = match emitter {
-            Emitter::Ball { radius, .. } if touch == Touch::Cuts && emitter.shows_far_half() => 2.0 * *radius as f32,
-            Emitter::Ball { .. } | Emitter::Flat(_) => 0.0,
+            Emitter::Ball { radius, .. } if touch == Touch::Cuts && emitter.half() == Half::Far => 2.0 * *radius as f32,
+            // From inside nothing else is between
+            Emitter::Face { .. } if touch != Touch::Cuts => continue,
+            Emitter::Ball { .. } | Emitter::Flat(_) | Emitter::Face { .. } => 0.0,
         };
         let mut told = match (occluder, exact) {
             (Occluder::Sphere { center, radius }, ExactShape::Sphere(sphere)) => {

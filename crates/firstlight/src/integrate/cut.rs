@@ -48,6 +48,8 @@ impl<S: Simd> Ball<S> {
         match half {
             Half::Near => self.touch2 / (along + root),
             Half::Far => (along + root) / length2,
+            // Nothing cancels
+            Half::Around => along.simd_lt(0.0).select(-self.touch2 / (root - along), (along + root) / length2),
         }
     }
 
@@ -72,17 +74,19 @@ impl<S: Simd> Ball<S> {
         let (way2, touch2) = (height * height * self.length2.at(x, y), self.touch2 * along * along);
         let is_on = match half {
             Half::Near => way2.simd_le(touch2),
-            Half::Far => way2.simd_ge(touch2),
+            Half::Far | Half::Around => way2.simd_ge(touch2),
         };
         (height * along).simd_gt(zero) & is_on
     }
 }
 
 /// Which half of a ball, as a point sees it.
-#[derive(Clone, Copy, PartialEq, Eq)]
-enum Half {
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Half {
     Near,
     Far,
+    /// All of it: the point is inside.
+    Around,
 }
 
 /// Where on the rows of a ball something changes: at both places of a circle that are on one half of it.
@@ -171,7 +175,7 @@ impl<S: Simd> Cut<S> {
     pub fn new(
         simd: S,
         occluder: &Occluder,
-        ball: (Exact, f32, bool),
+        ball: (Exact, f32, Half),
         p: Vec3x16<S>,
         l: &[Vec3x16<S>; 3],
     ) -> Option<Cut<S>> {
@@ -185,7 +189,7 @@ impl<S: Simd> Cut<S> {
     fn new_now(
         simd: S,
         occluder: &Occluder,
-        (center, radius, is_far): (Exact, f32, bool),
+        (center, radius, half): (Exact, f32, Half),
         p: Vec3x16<S>,
         l: &[Vec3x16<S>; 3],
     ) -> Option<Cut<S>> {
@@ -236,7 +240,7 @@ impl<S: Simd> Cut<S> {
                 CutShape::Sphere { other, cone, arc }
             }
         };
-        Some(Cut { ball, half: if is_far { Half::Far } else { Half::Near }, shape })
+        Some(Cut { ball, half, shape })
     }
 
     /// Hands over what is hidden of sixteen rows, of which `rim` is what is on the ball.
@@ -251,12 +255,11 @@ impl<S: Simd> Cut<S> {
     #[inline(always)]
     fn hidden_now(&self, simd: S, y: f32x16<S>, rim: &Interval16<S>) -> [Interval16<S>; MOST] {
         let mut all = [Interval16::none(simd); MOST];
-        let zero = simd.splat_f32x16(0.0);
         match &self.shape {
             CutShape::Flat { faces } => {
                 for (k, (lines, arc)) in faces.iter().enumerate() {
                     let Some(arc) = arc else { break };
-                    let begins = lines[0].at(rim.from, y).simd_ge(zero);
+                    let begins = self.is_before(&arc.plane, arc.height, rim.from, y);
                     let parts = arc.parts(simd, &[(&self.ball, self.half)], y, rim, begins);
                     for (i, mut part) in parts.into_iter().enumerate() {
                         for line in &lines[1..] {
@@ -268,7 +271,7 @@ impl<S: Simd> Cut<S> {
             }
             CutShape::Rim { cone, arc } => {
                 let inside = cone.cone_on_row(simd, &arc.plane, y);
-                let begins = (arc.plane.at(rim.from, y) - arc.height).simd_ge(zero);
+                let begins = self.is_before(&arc.plane, arc.height, rim.from, y);
                 for (i, part) in arc.parts(simd, &[(&self.ball, self.half)], y, rim, begins).into_iter().enumerate() {
                     all[i] = Interval16 { from: part.from.max(inside.from), to: part.to.min(inside.to) };
                 }
@@ -282,6 +285,16 @@ impl<S: Simd> Cut<S> {
             }
         }
         all
+    }
+
+    /// Whether a plane is before the ball where a row begins: at the rim, if points are outside.
+    #[inline(always)]
+    fn is_before(&self, plane: &Linear16<S>, height: f32x16<S>, x: f32x16<S>, y: f32x16<S>) -> mask32x16<S> {
+        let along = plane.at(x, y);
+        match self.half {
+            Half::Near | Half::Far => along.simd_ge(height),
+            Half::Around => (along * self.ball.meets(self.half, x, y)).simd_ge(height),
+        }
     }
 
     /// See [`Shadow::breaks`](super::occluder::Shadow::breaks).

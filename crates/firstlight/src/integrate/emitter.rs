@@ -1,11 +1,18 @@
 //! Area lights as they are integrated.
 
+use std::f64::consts::PI;
+
 use arrayvec::ArrayVec;
 
+use super::cut::Half;
 use super::fit::Falloff;
+use super::occluder::Exact;
 use super::view::{FlatLight, Outline};
 use crate::light::{Area, AreaShape};
 use crate::math::{DVec3, Vec3};
+
+/// Of a cube.
+const FACES: usize = 6;
 
 /// An area light, ready to be integrated.
 #[derive(Clone, Copy, Debug)]
@@ -15,6 +22,9 @@ pub(crate) enum Emitter {
     /// A sphere. From any point outside it looks like the disk in which the cone around it touches it: the same
     /// directions, and, where light weakens on its way, the same radiance in each.
     Ball { center: DVec3, radius: f64, physical: bool, sides: BallSides },
+    /// What of a sphere a point inside of it sees through one face of a cube around itself, which stands beyond all of
+    /// the sphere: the same directions and radiance.
+    Face { center: DVec3, radius: f64, physical: bool, face: usize },
 }
 
 /// Which sides of a ball shine: from outside, its near half shows the outer one, its far half the inner one.
@@ -45,17 +55,22 @@ impl Emitter {
     pub fn is_physical(&self) -> bool {
         match self {
             Emitter::Flat(flat) => flat.physical,
-            Emitter::Ball { physical, .. } => *physical,
+            Emitter::Ball { physical, .. } | Emitter::Face { physical, .. } => *physical,
         }
     }
 
     /// What its places count for.
     pub fn falloff(&self) -> Falloff {
         match (self.outline(), self.is_physical()) {
-            (Outline::Sphere, _) if self.shows_far_half() => Falloff::SphereInside,
+            (Outline::Sphere, _) if self.half() == Half::Far => Falloff::SphereInside,
             (Outline::Sphere, _) => Falloff::Sphere,
             (_, true) => Falloff::Physical,
-            (_, false) => Falloff::Constant,
+            (_, false) => match self {
+                Emitter::Face { center, radius, .. } => {
+                    Falloff::Around { center: Exact::new(*center), radius: *radius as f32 }
+                }
+                Emitter::Flat(_) | Emitter::Ball { .. } => Falloff::Constant,
+            },
         }
     }
 
@@ -66,7 +81,7 @@ impl Emitter {
                 let (a, b) = (flat.a.as_dvec3(), flat.b.as_dvec3());
                 [flat.c - a - b, flat.c + a - b, flat.c + a + b, flat.c - a + b].into_iter().collect()
             }
-            Emitter::Ball { center, radius, .. } => (0..8)
+            Emitter::Ball { center, radius, .. } | Emitter::Face { center, radius, .. } => (0..8)
                 .map(|k| {
                     *center + DVec3::from([0, 1, 2].map(|axis| if k >> axis & 1 == 0 { -radius } else { *radius }))
                 })
@@ -77,16 +92,30 @@ impl Emitter {
     /// Whether `p` is inside of a ball that shines inwards: no flat light stands for it there.
     pub fn surrounds(&self, p: Vec3) -> bool {
         match self {
-            Emitter::Flat(_) => false,
+            Emitter::Flat(_) | Emitter::Face { .. } => false,
             Emitter::Ball { center, radius, sides, .. } => {
                 *sides != BallSides::Outer && !((*center - p.as_dvec3()).length_squared() > radius * radius)
             }
         }
     }
 
-    /// Whether all that shines, seen from outside, is the far half of a ball.
-    pub fn shows_far_half(&self) -> bool {
-        matches!(self, Emitter::Ball { sides: BallSides::Inner, .. })
+    /// Which half of a ball shines, as a point sees it.
+    pub fn half(&self) -> Half {
+        match self {
+            Emitter::Ball { sides: BallSides::Inner, .. } => Half::Far,
+            Emitter::Face { .. } => Half::Around,
+            Emitter::Flat(_) | Emitter::Ball { .. } => Half::Near,
+        }
+    }
+
+    /// What of a ball that shines inwards points inside of it see, by the faces of a cube.
+    pub fn faces(&self) -> Option<[Emitter; FACES]> {
+        match *self {
+            Emitter::Ball { center, radius, physical, sides: BallSides::Both | BallSides::Inner } => {
+                Some(std::array::from_fn(|face| Emitter::Face { center, radius, physical, face }))
+            }
+            Emitter::Flat(_) | Emitter::Ball { .. } | Emitter::Face { .. } => None,
+        }
     }
 
     /// Both sides of a ball that shines on both.
@@ -100,7 +129,7 @@ impl Emitter {
                     sides,
                 }))
             }
-            Emitter::Flat(_) | Emitter::Ball { .. } => None,
+            Emitter::Flat(_) | Emitter::Ball { .. } | Emitter::Face { .. } => None,
         }
     }
 
@@ -108,7 +137,7 @@ impl Emitter {
     pub fn is_one_sided(&self) -> bool {
         match self {
             Emitter::Flat(flat) => flat.physical || !flat.both_sides,
-            Emitter::Ball { .. } => false,
+            Emitter::Ball { .. } | Emitter::Face { .. } => false,
         }
     }
 
@@ -116,6 +145,7 @@ impl Emitter {
     pub fn outline(&self) -> Outline {
         match self {
             Emitter::Flat(flat) => flat.outline,
+            Emitter::Face { .. } => Outline::Parallelogram,
             Emitter::Ball { physical: true, .. } => Outline::Disk,
             Emitter::Ball { physical: false, .. } => Outline::Sphere,
         }
@@ -125,6 +155,19 @@ impl Emitter {
     pub fn flat(&self, p: Vec3) -> Option<FlatLight> {
         match self {
             Emitter::Flat(flat) => Some(*flat),
+            Emitter::Face { center, radius, physical, face } => {
+                let p = p.as_dvec3();
+                if (*center - p).length_squared() > radius * radius {
+                    return None;
+                }
+                let axes = [DVec3::X, DVec3::Y, DVec3::Z].map(|axis| axis * (2.0 * radius));
+                let side = if face % 2 == 0 { 1.0 } else { -1.0 };
+                let [to, a, b] = [0, 1, 2].map(|k| axes[(face / 2 + k) % 3]);
+                let n = to * (-side / (2.0 * radius));
+                let square = FlatLight::new(p + to * side, a, b, n, Outline::Parallelogram, *physical, false);
+                // Of the sphere's area, 4 pi r^2, in place of the square's
+                Some(if *physical { square } else { FlatLight { times: (4.0 / PI) as f32, ..square } })
+            }
             Emitter::Ball { center, radius, physical, sides } => {
                 let to = *center - p.as_dvec3();
                 let distance2 = to.length_squared();

@@ -97,6 +97,9 @@ pub(crate) struct Asked<'a> {
     pub shadows: bool,
 }
 
+/// The part of what is allowed of a ball that each face of a cube may be wrong by: 1 / sqrt(6).
+const FACE: f32 = 0.408;
+
 /// The memory of [`evaluate`](Evaluator::evaluate), used again and again.
 #[derive(Default)]
 pub(crate) struct Evaluator {
@@ -126,8 +129,8 @@ pub(crate) struct Evaluator {
     next_whole: Vec<Cell>,
     next_panels: Vec<Panel>,
     spare: Vec<Block>,
-    /// Of the far half of a ball.
-    far: Vec<Arrived>,
+    /// Of a part of a ball.
+    part: Vec<Arrived>,
 }
 
 /// What is known of one point.
@@ -145,6 +148,36 @@ struct State {
 impl Evaluator {
     /// Adds to `arrived` what of a light arrives at each point.
     pub fn evaluate(&mut self, level: Level, light: &Asked, points: &[ShadingPoint], arrived: &mut Vec<Arrived>) {
+        let first = arrived.len();
+        self.evaluate_outside(level, light, points, arrived);
+        let (Some(faces), Emitter::Ball { center, radius, .. }) = (light.emitter.faces(), light.emitter) else { return };
+        let is_inside = |point: &ShadingPoint| light.emitter.surrounds(point.p);
+        let inside: Vec<ShadingPoint> = points.iter().filter(|point| is_inside(point)).copied().collect();
+        if inside.is_empty() {
+            return;
+        }
+        let mut seen: Vec<Arrived> = Vec::new();
+        for emitter in &faces {
+            let mut through = std::mem::take(&mut self.part);
+            through.clear();
+            let face = Asked { emitter, allowed: light.allowed * FACE, ..*light };
+            self.evaluate_one(level, &face, &inside, &mut through);
+            if seen.is_empty() {
+                seen.extend_from_slice(&through);
+            } else {
+                seen.iter_mut().zip(&through).for_each(|(one, other)| *one = one.and(other));
+            }
+            self.part = through;
+        }
+        let places = arrived[first..].iter_mut().zip(points).filter(|(_, point)| is_inside(point));
+        for ((place, point), seen) in places.zip(seen) {
+            let distance = (radius - (*center - point.p.as_dvec3()).length()) as f32;
+            *place = Arrived { distance, height: distance, ..seen };
+        }
+    }
+
+    /// The same, but for points inside of a ball: those have answers that say so.
+    fn evaluate_outside(&mut self, level: Level, light: &Asked, points: &[ShadingPoint], arrived: &mut Vec<Arrived>) {
         let is_cut = || light.obstacles.touch_ball() || light.near.is_some_and(Obstacles::touch_ball);
         let Some([near, far]) = light.emitter.halves().filter(|_| light.shadows && is_cut()) else {
             return self.evaluate_one(level, light, points, arrived);
@@ -153,13 +186,13 @@ impl Evaluator {
         let half = |emitter| Asked { emitter, allowed: light.allowed * FRAC_1_SQRT_2, ..*light };
         let first = arrived.len();
         self.evaluate_one(level, &half(&near), points, arrived);
-        let mut behind = std::mem::take(&mut self.far);
+        let mut behind = std::mem::take(&mut self.part);
         behind.clear();
         self.evaluate_one(level, &half(&far), points, &mut behind);
         for (one, other) in arrived[first..].iter_mut().zip(&behind) {
             *one = one.and(other);
         }
-        self.far = behind;
+        self.part = behind;
     }
 
     fn evaluate_one(&mut self, level: Level, light: &Asked, points: &[ShadingPoint], arrived: &mut Vec<Arrived>) {
@@ -328,7 +361,7 @@ impl Evaluator {
         let Obstacles { occluders, ball, cuts, .. } = light.obstacles;
         let near = light.near.map_or(&[][..], |near| &near.occluders);
         let cuts = cuts | light.near.map_or(0, |near| near.cuts << occluders.len());
-        let ball = ball.map(|(center, radius)| (center, radius, light.emitter.shows_far_half()));
+        let ball = ball.map(|(center, radius)| (center, radius, light.emitter.half()));
         let blocked = Blocked { occluders: [occluders, near], ball, cuts, outline, between };
         let moments = light.lobe.moment_count();
         let tolerance = light.tolerance;

@@ -9,7 +9,8 @@
 
 use fearless_simd::{f32x16, prelude::*};
 
-use super::batch::{Block, Members, ViewNumber, Views};
+use super::batch::{Block, Linear16, Members, ViewNumber, Views};
+use super::occluder::{Exact, ways};
 use crate::material::Lobe;
 use crate::math::{LANES, sin_cos};
 
@@ -114,7 +115,7 @@ const ANTIDERIVATIVE: [[f32; NODES]; NODES] = matrix(true);
 const MONOMIALS: [[f32; NODES]; NODES] = matrix(false);
 
 /// What a place of a light counts for, beside the cosine at the surface.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum Falloff {
     /// All places alike.
     Constant,
@@ -124,6 +125,8 @@ pub(crate) enum Falloff {
     Sphere,
     /// The same of its far half alone.
     SphereInside,
+    /// The same of a sphere that points are inside of, seen through the faces of a cube.
+    Around { center: Exact, radius: f32 },
 }
 
 /// A rectangle of a light's square, of one point.
@@ -180,6 +183,16 @@ fn values<S: Simd, const N: usize>(
     let mut values = [[[zero; N]; N]; MOMENTS];
     let is_sphere = matches!(falloff, Falloff::Sphere | Falloff::SphereInside);
     let (ratio, behind2) = (members.lanes(simd, Ratio), members.lanes(simd, Behind2));
+    // The way to the middle of a sphere, and the square of the way to where it is touched, as if there were one
+    let around = match falloff {
+        Falloff::Around { center, radius } => {
+            let to = center.seen_from(simd, members.vectors(simd, [Px, Py, Pz]));
+            let distance = to.dot(to).sqrt();
+            let touch2 = ((distance - radius) * (distance + radius)).min(zero);
+            (Linear16::along(to, &ways(simd, members)), touch2, height * radius)
+        }
+        _ => (Linear16 { c: zero, x: zero, y: zero }, zero, zero),
+    };
     let (mut places, mut deep) = ([zero; N], [splat(1.0); N]);
     for (i, node) in rule.nodes.iter().enumerate() {
         places[i] = xh * *node + xm;
@@ -204,6 +217,15 @@ fn values<S: Simd, const N: usize>(
             match falloff {
                 Falloff::Constant => {}
                 Falloff::Physical => weights[i] = inverse * inverse * (inverse * height),
+                Falloff::Around { .. } => {
+                    // The square of the way to the sphere, over its cosine there: t^2 |l|^2 and root / (|l| radius)
+                    let (to, touch2, size) = around;
+                    let (length2, to) = (along * along + rest, to.at(x, y));
+                    let root = (to * to - length2 * touch2).sqrt().max(splat(f32::MIN_POSITIVE));
+                    // Nothing cancels
+                    let t = to.simd_lt(zero).select(-touch2 / (root - to), (to + root) / length2);
+                    weights[i] = t * t * size / root;
+                }
                 Falloff::Sphere | Falloff::SphereInside => {
                     // With q = sqrt(1 - x^2 - y^2), the areas of the sphere before and behind a place of the disk are
                     // as 1 / (1 + ratio q)^2 and 1 / (1 - ratio q)^2, over q; and 1 - (ratio q)^2 is |l|^2 over the

@@ -18,7 +18,7 @@ use crate::math::{DVec3, Vec3, Vec3x16, sin_cos};
 use crate::shape::Canonical;
 
 /// A vector of doubles as two of floats: the difference to a point loses nothing where the two are close.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Exact {
     high: Vec3,
     low: Vec3,

@@ -13,7 +13,7 @@ use arrayvec::ArrayVec;
 use fearless_simd::{f32x16, mask32x16, prelude::*};
 
 use super::batch::{Block, Members, ViewNumber, Views};
-use super::cut::{self, Cut};
+use super::cut::{self, Cut, Half};
 use super::fit::{Cell, MOMENTS, Polynomial};
 use super::occluder::{Breaks, Exact, FAR, Interval16, Occluder, RoundSides, Shadow, ways};
 use super::view::Outline;
@@ -65,8 +65,8 @@ pub(crate) struct Between {
 pub(crate) struct Blocked<'a> {
     /// In lists, and of trees: counted together.
     pub occluders: [&'a [Occluder]; 2],
-    /// The light, if it is a ball, with whether its far half is asked, and which of them reach into it, bit by bit.
-    pub ball: Option<(Exact, f32, bool)>,
+    /// The light, if it is a ball, with the half that is asked, and which of them reach into it, bit by bit.
+    pub ball: Option<(Exact, f32, Half)>,
     pub cuts: u64,
     pub outline: Outline,
     /// Point by point.
@@ -320,7 +320,11 @@ pub(crate) fn rows<S: Simd>(
                 let mut intervals = [Interval16::none(simd); cut::MOST];
                 let parts = match &cut {
                     Some(cut) => {
-                        let reach = if is_sphere { wide[row] } else { (1.0 - y * y).max(zero).sqrt() };
+                        let reach = match blocked.outline {
+                            Outline::Parallelogram => one,
+                            Outline::Disk => (1.0 - y * y).max(zero).sqrt(),
+                            Outline::Sphere => wide[row],
+                        };
                         intervals = cut.hidden(simd, y, &Interval16 { from: -reach, to: reach });
                         cut::MOST
                     }

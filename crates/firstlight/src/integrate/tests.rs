@@ -227,7 +227,7 @@ fn several_things_in_the_way() {
     check(3000..3400, 5, 100.0, 500, 0.5);
 }
 
-/// A light that is a ball, above a point at the origin, and spheres between them.
+/// A light that is a ball, and a point at the origin, with things around them.
 struct BallCase {
     center: DVec3,
     radius: f64,
@@ -236,6 +236,7 @@ struct BallCase {
     point: ShadingPoint,
     lobe: Lobe,
     spheres: Vec<Sphere>,
+    flats: Vec<Parallelogram>,
 }
 
 impl BallCase {
@@ -268,7 +269,32 @@ impl BallCase {
         }
         let worth = Colors::default().map(|_| Rgb::gray(0.5));
         let point = ShadingPoint { worth, ..ShadingPoint::new(Vec3::ZERO, ErrorBound(Vec3::ZERO), ns, wo) };
-        BallCase { center, radius, physical, both_sides, point, lobe, spheres }
+        BallCase { center, radius, physical, both_sides, point, lobe, spheres, flats: Vec::new() }
+    }
+
+    /// With the point inside of the ball.
+    fn inside(seed: u64) -> BallCase {
+        let mut case = BallCase::new(seed);
+        let mut random = Random::new(seed ^ 0x5bd1);
+        let distance = case.center.length();
+        case.radius = distance * random.scale(1.02, 20.0);
+        case.both_sides = true;
+        case.spheres.clear();
+        for k in 0..seed % 3 {
+            let at = random.direction() * case.radius * random.scale(0.1, 1.5);
+            if k == 0 {
+                let [e0, e1] = [0; 2].map(|_| random.direction() * case.radius * random.scale(0.1, 1.0));
+                case.flats.push(Parallelogram::new(at - (e0 + e1) * 0.5, e0, e1, 1.0, false));
+            } else if at.dot(case.point.ns.as_dvec3()) > -0.1 * case.radius {
+                let r = at.length() * random.scale(0.1, 0.9);
+                case.spheres.push(Sphere { c: at, r, uv: SphereUv::Angles, single_sided: false });
+            }
+        }
+        case
+    }
+
+    fn is_hidden(&self, l: DVec3) -> bool {
+        self.spheres.iter().any(|s| is_hidden(s, l)) || self.flats.iter().any(|flat| is_behind(flat, l))
     }
 
     /// The mean over `n` x 2 `n` points of the sphere, in f64.
@@ -282,7 +308,7 @@ impl BallCase {
             let out = DVec3::new(across * cos, across * sin, z);
             let l = self.center + out * self.radius;
             let (height, facing, distance) = (ns.dot(l), -out.dot(l), l.length());
-            if height <= 0.0 || facing <= 0.0 && !self.both_sides || self.spheres.iter().any(|s| is_hidden(s, l)) {
+            if height <= 0.0 || facing <= 0.0 && !self.both_sides || self.is_hidden(l) {
                 continue;
             }
             let mut weight = 1.0 / (2 * n * n) as f64;
@@ -304,7 +330,7 @@ impl BallCase {
         let emitter = Emitter::Ball { center, radius, physical, sides };
         let asked = Asked {
             emitter: &emitter,
-            obstacles: &Obstacles::of(&self.spheres, &[], &emitter),
+            obstacles: &Obstacles::of(&self.spheres, &self.flats, &emitter),
             near: None,
             lobe: &self.lobe,
             steps,
@@ -335,5 +361,21 @@ fn batches_know_spheres_of_any_kind() {
         let off = off(&steps, &found, &truth);
         let what = (case.physical, case.both_sides, case.radius / case.center.length(), case.spheres.len());
         assert!(off < 0.4, "seed {seed}, {what:?}: {found:?} is not {truth:?}: {off} steps");
+    }
+}
+
+#[test]
+fn batches_know_spheres_from_inside() {
+    let steps = DisplaySteps::new(&Display::default(), 1.0);
+    for seed in 8000..8300 {
+        let case = BallCase::inside(seed);
+        let (found, truth) = (case.batched(&steps), case.brute(400));
+        let off = off(&steps, &found, &truth);
+        let what = (case.physical, case.radius / case.center.length(), case.spheres.len(), case.flats.len());
+        assert!(off < 0.4, "seed {seed}, {what:?}: {found:?} is not {truth:?}: {off} steps");
+        // A half space of such light is more than white
+        for (found, truth) in found.0.into_iter().zip(truth.0) {
+            assert!((found - truth).abs() <= 0.01 * truth + 0.004, "seed {seed}, {what:?}: {found} is not {truth}");
+        }
     }
 }

@@ -86,7 +86,7 @@ pub(super) fn is_sharp(lobe: f32) -> bool {
 pub(super) fn unseen(emitter: &Emitter, place: &ArrivalPlace) -> Change {
     let is_known = match emitter {
         Emitter::Flat(_) => true,
-        Emitter::Ball { sides: BallSides::Both | BallSides::Inner, .. } => false,
+        Emitter::Ball { sides: BallSides::Both | BallSides::Inner, .. } | Emitter::Face { .. } => false,
         Emitter::Ball { center, radius, .. } => {
             (*center - place.si.lit_from.as_dvec3()).length() + f64::from(place.reach) < radius * (1.0 - 1e-6)
         }

@@ -51,7 +51,7 @@ impl PlacedSolid {
 
     fn touches(&self, emitter: &Emitter) -> bool {
         match emitter {
-            Emitter::Ball { center, radius, .. } => self.apart(*center) < *radius,
+            Emitter::Ball { center, radius, .. } | Emitter::Face { center, radius, .. } => self.apart(*center) < *radius,
             // What is flat has no inside
             Emitter::Flat(_) if self.kind.is_flat() => false,
             Emitter::Flat(flat) if self.apart(flat.c) > f64::from(flat.a.length() + flat.b.length()) => false,
