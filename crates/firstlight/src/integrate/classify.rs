@@ -41,7 +41,7 @@ pub(crate) struct Obstacles<'a> {
 
 /// What decides on which side a point is.
 enum ExactShape<'a> {
-    Sphere(&'a Sphere),
+    Sphere(Sphere),
     Flat {
         flat: &'a Parallelogram,
         /// On which side all of the light is.
@@ -93,9 +93,12 @@ impl<'a> Obstacles<'a> {
                 continue;
             }
             let solid = scene.geometry.solids[solid as usize];
-            if obstacles.solid(PlacedSolid::new(solid, thing.placement, emitter)) {
-                obstacles.placed.push(k as u32);
+            match solid::sphere(&solid, &thing.placement) {
+                Some(sphere) => obstacles.sphere(&sphere),
+                None if obstacles.solid(PlacedSolid::new(solid, thing.placement, emitter)) => {}
+                None => continue,
             }
+            obstacles.placed.push(k as u32);
         }
         obstacles.touch(emitter);
         obstacles
@@ -145,9 +148,9 @@ impl<'a> Obstacles<'a> {
         self.occluders.len() + others <= MAX_OBSTACLES
     }
 
-    fn sphere(&mut self, sphere: &'a Sphere) {
+    fn sphere(&mut self, sphere: &Sphere) {
         self.occluders.push(Occluder::Sphere { center: Exact::new(sphere.c), radius: sphere.r as f32 });
-        self.exact.push(ExactShape::Sphere(sphere));
+        self.exact.push(ExactShape::Sphere(*sphere));
     }
 
     fn flat(&mut self, flat: &'a Parallelogram, side: PlaneSide, seen_side: PlaneSide) {
@@ -474,16 +477,17 @@ pub(crate) fn classify<S: Simd>(
             _ => unreachable!("both lists hold the same things"),
         };
         if touch == Touch::Cuts {
-            // Of the ball more may be seen than of its disk
-            (told.outside, told.hidden, told.firm) = (told.outside | told.hidden, 0, 0);
-            told.other |= if emitter.halves().is_some() {
+            // Of the ball more may be seen than of its disk, and of the far half less
+            told.within =
+                if emitter.half() == Half::Near { told.within | told.hidden & told.around } else { told.around };
+            told.outside |= told.hidden & !told.around;
+            (told.hidden, told.firm) = (0, 0);
+            if emitter.halves().is_some() {
                 // They are asked one by one
-                asked
-            } else if cuts {
-                told.within
-            } else {
-                told.outside | told.within
-            };
+                told.other |= asked;
+            } else if !cuts {
+                told.other |= told.outside | told.within;
+            }
         }
         if (told.outside | told.within | told.hidden | told.moving | told.other) & asked == 0 {
             continue;
@@ -561,6 +565,8 @@ struct Told<S: Simd> {
     /// It may hide a part of the light, from outside of it or from within.
     outside: u64,
     within: u64,
+    /// It is around the point.
+    around: u64,
     hidden: u64,
     /// It does what is not told row by row.
     other: u64,
@@ -574,7 +580,7 @@ struct Told<S: Simd> {
 impl<S: Simd> Told<S> {
     #[inline(always)]
     fn nothing(zero: f32x16<S>) -> Self {
-        Told { outside: 0, within: 0, hidden: 0, other: 0, firm: 0, moving: 0, motion: zero }
+        Told { outside: 0, within: 0, around: 0, hidden: 0, other: 0, firm: 0, moving: 0, motion: zero }
     }
 }
 
@@ -634,6 +640,7 @@ fn sphere_between<S: Simd>(
         // What is hidden is the same from everywhere inside
         let deep = (r - distance).simd_gt(sight.reach * 2.0).to_bitmask();
         let moving = within & inside & !deep & sight.reach.simd_gt(zero).to_bitmask();
+        told.around = within;
         told.hidden |= none_in;
         told.firm |= none_in & !moving;
         told.within = within & !all_in & !none_in;

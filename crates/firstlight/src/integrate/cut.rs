@@ -3,13 +3,15 @@
 //! The disk that stands for a ball has its directions, but not its depth: what is behind a thing has to be asked of the
 //! ball's own surface, the near half of it or the far one. On a row, a plane cuts it in two places at most, where it
 //! meets the circle in which plane and ball meet; so does the surface of another ball, in the circle of both. Between
-//! them nothing changes.
+//! them nothing changes. Where what is round meets it in no circle, those places are looked for.
 
 use fearless_simd::{f32x16, mask32x16, prelude::*};
 
 use super::batch::Linear16;
-use super::hull::Hull;
-use super::occluder::{Breaks, Exact, FAR, Interval16, Occluder, Quadratic16, Roots, corners_from, edges};
+use super::hull::{Hull, Rim};
+use super::occluder::{
+    Breaks, Exact, FAR, Interval16, Occluder, Quadratic16, Roots, corners_from, edges, root_between,
+};
 use crate::math::Vec3x16;
 use crate::shape::Canonical;
 
@@ -28,7 +30,7 @@ struct Ball<S: Simd> {
 
 impl<S: Simd> Ball<S> {
     #[inline(always)]
-    fn new(middle: Vec3x16<S>, r: f32, l: &[Vec3x16<S>; 3]) -> Ball<S> {
+    fn new(middle: Vec3x16<S>, r: f32x16<S>, l: &[Vec3x16<S>; 3]) -> Ball<S> {
         let distance2 = middle.dot(middle);
         let distance = distance2.sqrt();
         Ball {
@@ -51,6 +53,13 @@ impl<S: Simd> Ball<S> {
             // Nothing cancels
             Half::Around => along.simd_lt(0.0).select(-self.touch2 / (root - along), (along + root) / length2),
         }
+    }
+
+    /// Where l meets it: (l.s)^2 - |l|^2 (|s|^2 - r^2) >= 0.
+    #[inline(always)]
+    fn cone(&self) -> Quadratic16<S> {
+        let one = self.touch2.token().splat_f32x16(1.0);
+        Quadratic16::square(&self.along).combined(one, self.length2, -self.touch2)
     }
 
     /// Where l leads to the circle in which a plane, `plane` = `height` on it, meets the ball.
@@ -112,14 +121,17 @@ impl<S: Simd> Arc<S> {
         y: f32x16<S>,
         range: &Interval16<S>,
         begins: mask32x16<S>,
+        within: mask32x16<S>,
     ) -> [Interval16<S>; 2] {
         let far = simd.splat_f32x16(FAR);
         let Roots { low, high, any } = self.circle.on_row(y);
         let mut is_low = any & low.simd_gt(range.from) & low.simd_lt(range.to);
         let mut is_high = any & high.simd_gt(range.from) & high.simd_lt(range.to);
-        for (ball, half) in balls {
-            is_low &= ball.is_on(*half, &self.plane, self.height, low, y);
-            is_high &= ball.is_on(*half, &self.plane, self.height, high, y);
+        for (k, (ball, half)) in balls.iter().enumerate() {
+            // All of what a point is within is around it
+            let around = if k > 0 { within } else { low.simd_lt(low) };
+            is_low &= around | ball.is_on(*half, &self.plane, self.height, low, y);
+            is_high &= around | ball.is_on(*half, &self.plane, self.height, high, y);
         }
         // The first change, and the one after it
         let first = is_low.select(low, is_high.select(high, far));
@@ -145,8 +157,10 @@ enum CutShape<S: Simd> {
     Flat {
         faces: [Face<S>; FACES],
     },
+    /// A disk; what is inside of its hole, if it has one, is not hidden.
     Rim {
-        cone: Quadratic16<S>,
+        rim: Rim<S>,
+        hole: Option<Rim<S>>,
         arc: Arc<S>,
     },
     Sphere {
@@ -154,6 +168,93 @@ enum CutShape<S: Simd> {
         cone: Quadratic16<S>,
         arc: Arc<S>,
     },
+    /// What is round otherwise.
+    Round {
+        entry: Entry<S>,
+    },
+}
+
+/// Where ways to a light enter something convex, in a space of its own.
+enum Entry<S: Simd> {
+    Ball {
+        ball: Ball<S>,
+        cone: Quadratic16<S>,
+    },
+    Frustum {
+        hull: Hull<S>,
+        radii: [f32; 2],
+        /// From its origin to the points, and the light's ways.
+        from: Vec3x16<S>,
+        l: [Vec3x16<S>; 3],
+    },
+}
+
+/// Places of a row at which it is asked whether what is round is entered before the light is met: from one end of what
+/// it fills to the other, closer at the ends.
+const PLACES: usize = 13;
+const ALONG: [f32; PLACES] = [-1.0, -0.985, -0.94, -0.866, -0.707, -0.5, 0.0, 0.5, 0.707, 0.866, 0.94, 0.985, 1.0];
+
+impl<S: Simd> Entry<S> {
+    /// From where to where a row goes through it.
+    #[inline(always)]
+    fn on_row(&self, simd: S, y: f32x16<S>) -> Interval16<S> {
+        match self {
+            Entry::Ball { ball, cone } => cone.cone_on_row(simd, &ball.along, y),
+            Entry::Frustum { hull, .. } => {
+                let mut band = Interval16::all(simd);
+                for line in &hull.faces[0][1..] {
+                    band.clip(y * line.y + line.c, line.x);
+                }
+                // Nothing where no planes touch the mantle
+                let touches = hull.faces[0][0].c.simd_gt(-FAR);
+                band.to = touches.select(band.to, simd.splat_f32x16(-FAR));
+                let mut all = Interval16::none(simd);
+                all.join(&band);
+                for rim in &hull.rims {
+                    all.join(&rim.quadratic.cone_on_row(simd, &rim.ahead, y));
+                }
+                all
+            }
+        }
+    }
+
+    /// How many times l leads to where it is entered.
+    #[inline(always)]
+    fn enters(&self, x: f32x16<S>, y: f32x16<S>) -> f32x16<S> {
+        match self {
+            Entry::Ball { ball, .. } => ball.meets(Half::Near, x, y),
+            Entry::Frustum { radii: [first, last], from: o, l, .. } => {
+                let simd = x.token();
+                let (zero, one, far) = (simd.splat_f32x16(0.0), simd.splat_f32x16(1.0), simd.splat_f32x16(FAR));
+                let d: Vec3x16<S> = l[0] + (l[1] * x + l[2] * y);
+                // The end that is met first
+                let flat = d.z.simd_eq(zero);
+                let inverse = one / flat.select(one, d.z);
+                let end = flat.select(-far, (-o.z * inverse).min((one - o.z) * inverse));
+                let wider = last - first;
+                let (wide, grows) = (o.z * wider + *first, d.z * wider);
+                let a = d.x * d.x + d.y * d.y - grows * grows;
+                let b = o.x * d.x + o.y * d.y - wide * grows;
+                let c = o.x * o.x + o.y * o.y - wide * wide;
+                let root = (b * b - a * c).max(zero).sqrt();
+                // From outside of the mantle, of it, or of what it is beyond its apex
+                let beyond = wide.simd_lt(zero).select(-(b + root) / a.min(-f32::MIN_POSITIVE), -far);
+                end.max(c.simd_gt(zero).select(c / (root - b), beyond))
+            }
+        }
+    }
+}
+
+/// Puts intervals into the first of some that are empty, in those lanes.
+#[inline(always)]
+fn put<S: Simd>(parts: &mut [Interval16<S>; MOST], of: mask32x16<S>, interval: Interval16<S>) {
+    let mut of = of;
+    for part in parts {
+        let is_free = of & part.from.simd_ge(FAR);
+        part.from = is_free.select(interval.from, part.from);
+        part.to = is_free.select(interval.to, part.to);
+        of &= !is_free;
+    }
 }
 
 /// Whether rows tell what `occluder` hides of a ball that it reaches into.
@@ -161,9 +262,9 @@ pub(crate) fn knows(occluder: &Occluder) -> bool {
     match occluder {
         Occluder::Sphere { .. } | Occluder::Flat { .. } => true,
         Occluder::Solid(solid) => match solid.kind {
-            Canonical::Plane | Canonical::Box => true,
-            Canonical::Disk { hole } => hole == 0.0,
-            Canonical::Ball | Canonical::Frustum { .. } | Canonical::Torus { .. } => false,
+            Canonical::Plane | Canonical::Box | Canonical::Disk { .. } | Canonical::Ball => true,
+            Canonical::Frustum { open, .. } => !open,
+            Canonical::Torus { .. } => false,
         },
     }
 }
@@ -193,49 +294,67 @@ impl<S: Simd> Cut<S> {
         p: Vec3x16<S>,
         l: &[Vec3x16<S>; 3],
     ) -> Option<Cut<S>> {
-        let ball = Ball::new(center.seen_from(simd, p), radius, l);
-        let face = |lines: [Linear16<S>; 5], height: f32x16<S>| {
-            let plane = Linear16 { c: lines[0].c + height, ..lines[0] };
-            (lines, Some(Arc::new(&ball, plane, height)))
+        let (zero, one) = (simd.splat_f32x16(0.0), simd.splat_f32x16(1.0));
+        // Where the light is counts, not how far off: powers of that would be too large
+        let middle = center.seen_from(simd, p);
+        let scale = one / middle.dot(middle).sqrt().max(simd.splat_f32x16(radius));
+        let near = &[l[0] * scale, l[1] * scale, l[2] * scale];
+        let ball = Ball::new(middle * scale, scale * radius, near);
+        let face = |lines: [Linear16<S>; 5], height: f32x16<S>, length: f32x16<S>| {
+            let inverse = one / length.max(simd.splat_f32x16(f32::MIN_POSITIVE));
+            let Linear16 { c, x, y } = lines[0];
+            let plane = Linear16 { c: (c + height) * inverse, x: x * inverse, y: y * inverse };
+            (lines, Some(Arc::new(&ball, plane, height * inverse)))
         };
-        let zero = simd.splat_f32x16(0.0);
         let nothing = [Linear16 { c: zero, x: zero, y: zero }; 5];
         let shape = match occluder {
             Occluder::Flat { corners } => {
-                let q = corners_from(simd, corners, p);
-                let height = (q[1] - q[0]).cross(q[3] - q[0]).dot(q[0]).abs();
-                CutShape::Flat { faces: [face(edges(q, l), height), (nothing, None), (nothing, None)] }
+                let mut q = corners_from(simd, corners, p);
+                for q in &mut q {
+                    *q = *q * scale;
+                }
+                let n = (q[1] - q[0]).cross(q[3] - q[0]);
+                let face = face(edges(q, near), n.dot(q[0]).abs(), n.dot(n).sqrt());
+                CutShape::Flat { faces: [face, (nothing, None), (nothing, None)] }
+            }
+            Occluder::Solid(solid) if solid.kind == Canonical::Ball => {
+                let (to, local) = solid.seen_from(simd, p, l);
+                let other = Ball::new(to, one, &local);
+                let cone = other.cone();
+                CutShape::Round { entry: Entry::Ball { ball: other, cone } }
             }
             Occluder::Solid(solid) => {
                 let (to, local) = solid.seen_from(simd, p, l);
                 let hull = Hull::new(solid, to, &local);
                 match solid.kind {
                     Canonical::Plane => {
-                        CutShape::Flat { faces: [face(hull.faces[0], to.z.abs()), (nothing, None), (nothing, None)] }
+                        let face = face(hull.faces[0], to.z.abs(), one);
+                        CutShape::Flat { faces: [face, (nothing, None), (nothing, None)] }
                     }
                     Canonical::Box => {
                         let [x, y, z] = hull.faces;
-                        let one = simd.splat_f32x16(1.0);
                         // Four times as far as in its own space, by the length of its edges
                         let height = |w: f32x16<S>| ((w.abs() - one) * 4.0).abs();
-                        CutShape::Flat { faces: [face(x, height(to.x)), face(y, height(to.y)), face(z, height(to.z))] }
+                        CutShape::Flat {
+                            faces: [face(x, height(to.x), one), face(y, height(to.y), one), face(z, height(to.z), one)],
+                        }
                     }
-                    Canonical::Disk { hole: 0.0 } => {
-                        let rim = hull.rims[0];
-                        CutShape::Rim { cone: rim.quadratic, arc: Arc::new(&ball, rim.ahead, to.z.abs()) }
+                    Canonical::Disk { hole } => {
+                        let [rim, inner] = hull.rims;
+                        let arc = Arc::new(&ball, rim.ahead, to.z.abs());
+                        CutShape::Rim { rim, hole: (hole > 0.0).then_some(inner), arc }
                     }
-                    Canonical::Disk { .. } | Canonical::Ball | Canonical::Frustum { .. } | Canonical::Torus { .. } => {
-                        return None;
-                    }
+                    Canonical::Frustum { radii, open: false } => CutShape::Round {
+                        entry: Entry::Frustum { hull, radii, from: to * simd.splat_f32x16(-1.0), l: local },
+                    },
+                    Canonical::Ball | Canonical::Frustum { .. } | Canonical::Torus { .. } => return None,
                 }
             }
             Occluder::Sphere { center, radius } => {
-                let other = Ball::new(center.seen_from(simd, p), *radius, l);
-                let one = simd.splat_f32x16(1.0);
-                // (l.s)^2 - |l|^2 (|s|^2 - r^2)
-                let cone = Quadratic16::square(&other.along).combined(one, other.length2, -other.touch2);
+                let other = Ball::new(center.seen_from(simd, p) * scale, scale * *radius, near);
+                let cone = other.cone();
                 let between = ball.middle - other.middle;
-                let plane = Linear16::along(between, l);
+                let plane = Linear16::along(between, near);
                 let arc = Arc::new(&ball, plane, (ball.touch2 - other.touch2) * 0.5);
                 CutShape::Sphere { other, cone, arc }
             }
@@ -243,24 +362,25 @@ impl<S: Simd> Cut<S> {
         Some(Cut { ball, half, shape })
     }
 
-    /// Hands over what is hidden of sixteen rows, of which `rim` is what is on the ball.
+    /// Hands over what is hidden of sixteen rows, of which `rim` is what is on the ball; from inside of a sphere, of
+    /// those points that are `within`.
     #[inline(never)]
-    pub fn hidden(&self, simd: S, y: f32x16<S>, rim: &Interval16<S>) -> [Interval16<S>; MOST] {
+    pub fn hidden(&self, simd: S, y: f32x16<S>, rim: &Interval16<S>, within: mask32x16<S>) -> [Interval16<S>; MOST] {
         simd.vectorize(
             #[inline(always)]
-            || self.hidden_now(simd, y, rim),
+            || self.hidden_now(simd, y, rim, within),
         )
     }
 
     #[inline(always)]
-    fn hidden_now(&self, simd: S, y: f32x16<S>, rim: &Interval16<S>) -> [Interval16<S>; MOST] {
+    fn hidden_now(&self, simd: S, y: f32x16<S>, rim: &Interval16<S>, within: mask32x16<S>) -> [Interval16<S>; MOST] {
         let mut all = [Interval16::none(simd); MOST];
         match &self.shape {
             CutShape::Flat { faces } => {
                 for (k, (lines, arc)) in faces.iter().enumerate() {
                     let Some(arc) = arc else { break };
                     let begins = self.is_before(&arc.plane, arc.height, rim.from, y);
-                    let parts = arc.parts(simd, &[(&self.ball, self.half)], y, rim, begins);
+                    let parts = arc.parts(simd, &[(&self.ball, self.half)], y, rim, begins, within);
                     for (i, mut part) in parts.into_iter().enumerate() {
                         for line in &lines[1..] {
                             part.clip(y * line.y + line.c, line.x);
@@ -269,22 +389,90 @@ impl<S: Simd> Cut<S> {
                     }
                 }
             }
-            CutShape::Rim { cone, arc } => {
-                let inside = cone.cone_on_row(simd, &arc.plane, y);
+            CutShape::Rim { rim: outer, hole, arc } => {
+                let inside = outer.quadratic.cone_on_row(simd, &arc.plane, y);
                 let begins = self.is_before(&arc.plane, arc.height, rim.from, y);
-                for (i, part) in arc.parts(simd, &[(&self.ball, self.half)], y, rim, begins).into_iter().enumerate() {
+                let parts = arc.parts(simd, &[(&self.ball, self.half)], y, rim, begins, within);
+                for (i, part) in parts.into_iter().enumerate() {
                     all[i] = Interval16 { from: part.from.max(inside.from), to: part.to.min(inside.to) };
+                }
+                if let Some(hole) = hole {
+                    let hole = hole.quadratic.cone_on_row(simd, &arc.plane, y);
+                    let is_there = hole.from.simd_lt(hole.to);
+                    let far = simd.splat_f32x16(FAR);
+                    for i in 0..2 {
+                        let Interval16 { from, to } = all[i];
+                        all[i].to = is_there.select(to.min(hole.from), to);
+                        all[i + 2] = Interval16 { from: is_there.select(from.max(hole.to), far), to };
+                    }
                 }
             }
             CutShape::Sphere { other, cone, arc } => {
                 let inside = cone.cone_on_row(simd, &other.along, y);
-                let range = Interval16 { from: rim.from.max(inside.from), to: rim.to.min(inside.to) };
-                let begins = other.meets(Half::Near, range.from, y).simd_lt(self.ball.meets(self.half, range.from, y));
-                let parts = arc.parts(simd, &[(&self.ball, self.half), (other, Half::Near)], y, &range, begins);
+                // From inside it hides what is beyond it
+                let range = Interval16 {
+                    from: within.select(rim.from, rim.from.max(inside.from)),
+                    to: within.select(rim.to, rim.to.min(inside.to)),
+                };
+                let meets = self.ball.meets(self.half, range.from, y);
+                let near = other.meets(Half::Near, range.from, y).simd_lt(meets);
+                let begins = if within.any_true() {
+                    within & other.meets(Half::Around, range.from, y).simd_lt(meets) | !within & near
+                } else {
+                    near
+                };
+                let parts = arc.parts(simd, &[(&self.ball, self.half), (other, Half::Near)], y, &range, begins, within);
                 (all[0], all[1]) = (parts[0], parts[1]);
+            }
+            CutShape::Round { entry } => {
+                let inside = entry.on_row(simd, y);
+                let range = Interval16 { from: rim.from.max(inside.from), to: rim.to.min(inside.to) };
+                self.look_for(simd, entry, y, &range, &mut all);
             }
         }
         all
+    }
+
+    /// Finds the parts of a range of each row on which something is entered before the ball is met.
+    #[inline(always)]
+    fn look_for(
+        &self,
+        simd: S,
+        entry: &Entry<S>,
+        y: f32x16<S>,
+        range: &Interval16<S>,
+        parts: &mut [Interval16<S>; MOST],
+    ) {
+        let is_there = range.from.simd_lt(range.to);
+        if !is_there.any_true() {
+            return;
+        }
+        let (zero, far) = (simd.splat_f32x16(0.0), simd.splat_f32x16(FAR));
+        let from = is_there.select(range.from, zero);
+        let (middle, half) = ((from + range.to) * 0.5, (range.to - from) * 0.5);
+        // By how much later: below 0 where it hides
+        let later = |x: f32x16<S>| entry.enters(x, y) - self.ball.meets(self.half, x, y);
+        let mut before = later(middle - half);
+        let mut x_before = middle - half;
+        let mut begun = (is_there & before.simd_lt(zero)).select(range.from, far);
+        for along in &ALONG[1..] {
+            let x = middle + half * *along;
+            let here = later(x);
+            let changes = is_there & (here.simd_lt(zero) ^ before.simd_lt(zero));
+            if changes.any_true() {
+                let root = root_between(
+                    [x_before, x],
+                    [before, here],
+                    #[inline(always)]
+                    |x| entry.enters(x, y) - self.ball.meets(self.half, x, y),
+                );
+                let ends = changes & begun.simd_lt(far);
+                put(parts, ends, Interval16 { from: begun, to: root });
+                begun = ends.select(far, (changes & !ends).select(root, begun));
+            }
+            (before, x_before) = (here, x);
+        }
+        put(parts, begun.simd_lt(far), Interval16 { from: begun, to: range.to });
     }
 
     /// Whether a plane is before the ball where a row begins: at the rim, if points are outside.
@@ -318,9 +506,23 @@ impl<S: Simd> Cut<S> {
                     }
                 }
             }
-            CutShape::Rim { cone, arc } | CutShape::Sphere { cone, arc, .. } => {
+            CutShape::Rim { rim, hole, arc } => {
+                breaks.quadratic(&rim.quadratic, of);
+                if let Some(hole) = hole {
+                    breaks.quadratic(&hole.quadratic, of);
+                }
+                breaks.quadratic(&arc.circle, of);
+            }
+            CutShape::Sphere { cone, arc, .. } => {
                 breaks.quadratic(cone, of);
                 breaks.quadratic(&arc.circle, of);
+            }
+            CutShape::Round { entry: Entry::Ball { cone, .. } } => breaks.quadratic(cone, of),
+            CutShape::Round { entry: Entry::Frustum { hull, .. } } => {
+                breaks.polygon(&hull.faces[0]);
+                for rim in &hull.rims {
+                    breaks.quadratic(&rim.quadratic, of);
+                }
             }
         }
     }

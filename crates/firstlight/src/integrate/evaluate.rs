@@ -150,7 +150,9 @@ impl Evaluator {
     pub fn evaluate(&mut self, level: Level, light: &Asked, points: &[ShadingPoint], arrived: &mut Vec<Arrived>) {
         let first = arrived.len();
         self.evaluate_outside(level, light, points, arrived);
-        let (Some(faces), Emitter::Ball { center, radius, .. }) = (light.emitter.faces(), light.emitter) else { return };
+        let (Some(faces), Emitter::Ball { center, radius, .. }) = (light.emitter.faces(), light.emitter) else {
+            return;
+        };
         let is_inside = |point: &ShadingPoint| light.emitter.surrounds(point.p);
         let inside: Vec<ShadingPoint> = points.iter().filter(|point| is_inside(point)).copied().collect();
         if inside.is_empty() {

@@ -309,14 +309,15 @@ pub(crate) fn rows<S: Simd>(
         let (shadow, outside, within) = batch.shadow(simd, occluder);
         let (some_outside, some_within) = (outside.any_true(), within.any_true());
         let cut = batch.cut(simd, occluder);
+        let asked = if cut.is_some() { outside | within } else { outside };
         for row in 0..ROWS {
             let y = y_of[row];
-            if some_within {
+            if some_within && cut.is_none() {
                 let (all, inside) = (&mut open[row], shadow.within(simd, y));
                 all.from = within.select(all.from.max(inside.from), all.from);
                 all.to = within.select(all.to.min(inside.to), all.to);
             }
-            if some_outside {
+            if some_outside || cut.is_some() {
                 let mut intervals = [Interval16::none(simd); cut::MOST];
                 let parts = match &cut {
                     Some(cut) => {
@@ -325,7 +326,7 @@ pub(crate) fn rows<S: Simd>(
                             Outline::Disk => (1.0 - y * y).max(zero).sqrt(),
                             Outline::Sphere => wide[row],
                         };
-                        intervals = cut.hidden(simd, y, &Interval16 { from: -reach, to: reach });
+                        intervals = cut.hidden(simd, y, &Interval16 { from: -reach, to: reach }, within);
                         cut::MOST
                     }
                     None => {
@@ -335,7 +336,7 @@ pub(crate) fn rows<S: Simd>(
                 };
                 for interval in &intervals[..parts] {
                     let mut interval = *interval;
-                    let is_there = outside & interval.from.simd_lt(interval.to);
+                    let is_there = asked & interval.from.simd_lt(interval.to);
                     interval.from = is_there.select(interval.from, far);
                     interval.to = is_there.select(interval.to, far);
                     for before in hidden[row].iter_mut() {

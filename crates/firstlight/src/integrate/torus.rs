@@ -69,7 +69,7 @@ const AROUND: [Place; PLACES] = {
 /// Rows at which the parts of a cell's rows are looked at, to find where they begin, end and meet.
 const LOOKS: usize = 8;
 /// How often the end of a part is looked for between three places.
-const TURNS: usize = 3;
+const TURNS: usize = 4;
 /// In ways to the light: what is nearer to a point than this, or behind it, is not in front of it.
 const AHEAD: f32 = 1e-6;
 

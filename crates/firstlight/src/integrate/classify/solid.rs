@@ -7,8 +7,8 @@ use crate::integrate::batch::ShadingPoint;
 use crate::integrate::emitter::Emitter;
 use crate::integrate::hull::SolidOccluder;
 use crate::integrate::occluder::{Exact, Occluder, Shadow};
-use crate::math::{DAffine3, DVec3, LANES, Vec3x16};
-use crate::shape::{Canonical, Placement, Solid};
+use crate::math::{DAffine3, DMat3, DVec3, LANES, Vec3x16};
+use crate::shape::{Canonical, Placement, Solid, Sphere, SphereUv};
 
 /// A solid as it is placed: a convex one, one with a straight hole, or a torus.
 pub(super) struct PlacedSolid {
@@ -22,6 +22,21 @@ pub(super) struct PlacedSolid {
     pub may_touch: bool,
     contains: bool,
 }
+
+/// What a placed solid is if it is a sphere in the world as well.
+pub(super) fn sphere(solid: &Solid, placement: &Placement) -> Option<Sphere> {
+    let (object_from_canonical, Canonical::Ball) = solid.canonical()? else { return None };
+    let DAffine3 { matrix3, translation } = placement.world_from_object * object_from_canonical;
+    let product = matrix3.transpose() * matrix3;
+    let r2 = product.x_axis.x;
+    let [x, y, z] = (product - DMat3::from_diagonal(DVec3::splat(r2))).to_cols_array_2d().map(DVec3::from);
+    let off = x.abs().max(y.abs()).max(z.abs()).max_element();
+    let uv = SphereUv::Angles;
+    (off <= r2 * ROUND).then(|| Sphere { c: translation, r: r2.sqrt(), uv, single_sided: false })
+}
+
+/// By which part of itself the square of a sphere's radius may differ with the direction.
+const ROUND: f64 = 1e-12;
 
 /// How far a point is from a box.
 fn distance([low, high]: &[DVec3; 2], p: DVec3) -> f64 {
@@ -51,7 +66,9 @@ impl PlacedSolid {
 
     fn touches(&self, emitter: &Emitter) -> bool {
         match emitter {
-            Emitter::Ball { center, radius, .. } | Emitter::Face { center, radius, .. } => self.apart(*center) < *radius,
+            Emitter::Ball { center, radius, .. } | Emitter::Face { center, radius, .. } => {
+                self.apart(*center) < *radius
+            }
             // What is flat has no inside
             Emitter::Flat(_) if self.kind.is_flat() => false,
             Emitter::Flat(flat) if self.apart(flat.c) > f64::from(flat.a.length() + flat.b.length()) => false,
@@ -239,7 +256,7 @@ pub(super) fn solid_between<S: Simd>(
         told.hidden |= sight.hidden(&shadow, near);
         told.firm |= told.hidden & !told.moving;
     }
-    told.other |= if shape.may_touch && shape.kind.has_hole() { near } else { 0 };
+    told.other |= if shape.may_touch && shape.kind.has_hole() && !shape.kind.is_flat() { near } else { 0 };
     told.outside = near & !told.hidden;
     told
 }
