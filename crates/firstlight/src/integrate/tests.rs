@@ -304,7 +304,7 @@ impl BallCase {
 
     /// With one solid that may reach into the light, and a sphere around the point.
     fn with_solid(seed: u64) -> BallCase {
-        let mut case = if seed % 2 == 0 { BallCase::new(seed) } else { BallCase::inside(seed) };
+        let mut case = if seed.is_multiple_of(2) { BallCase::new(seed) } else { BallCase::inside(seed) };
         let mut random = Random::new(seed ^ 0x9d7);
         let list = |v: DVec3| format!("[{}, {}, {}]", v.x, v.y, v.z);
         let size = case.radius * random.scale(0.2, 1.0);
