@@ -318,8 +318,8 @@ fn on_arc<S: Simd>(
 
 /// Where `f` is 0 between two places at which it has different signs, and these values.
 ///
-/// Source: the Illinois method, Dowell, Jarratt, "A modified regula falsi method for computing the root of an equation",
-/// 1971.
+/// Source: the Illinois method, Dowell, Jarratt, "A modified regula falsi method for computing the root of an
+/// equation", 1971.
 #[inline(always)]
 pub(super) fn root_between<S: Simd>(
     [mut a, mut b]: [f32x16<S>; 2],
