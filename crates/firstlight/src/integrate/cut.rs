@@ -257,6 +257,18 @@ fn put<S: Simd>(parts: &mut [Interval16<S>; MOST], of: mask32x16<S>, interval: I
     }
 }
 
+/// How many intervals of a row `occluder` may hide of a ball that it reaches into.
+pub(crate) fn parts(occluder: &Occluder) -> usize {
+    match occluder {
+        Occluder::Sphere { .. } | Occluder::Flat { .. } => 2,
+        Occluder::Solid(solid) => match solid.kind {
+            Canonical::Plane => 2,
+            Canonical::Disk { hole: 0.0 } => 2,
+            _ => MOST,
+        },
+    }
+}
+
 /// Whether rows tell what `occluder` hides of a ball that it reaches into.
 pub(crate) fn knows(occluder: &Occluder) -> bool {
     match occluder {

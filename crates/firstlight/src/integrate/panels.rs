@@ -327,7 +327,7 @@ pub(crate) fn rows<S: Simd>(
                             Outline::Sphere => wide[row],
                         };
                         intervals = cut.hidden(simd, y, &Interval16 { from: -reach, to: reach }, within);
-                        cut::MOST
+                        cut::parts(batch.occluder(occluder))
                     }
                     None => {
                         [intervals[0], intervals[1]] = shadow.hidden(simd, y);
