@@ -5,11 +5,10 @@
 
 use fearless_simd::{f32x16, prelude::*};
 
-use super::occluder::Exact;
 use super::view::{FlatLight, NEAR, View};
 use crate::color::Rgb;
 use crate::material::Colors;
-use crate::math::{ErrorBound, Facet, LANES, UNIT_ROUNDOFF, Vec3, Vec3x16};
+use crate::math::{DVec3, ErrorBound, Facet, LANES, UNIT_ROUNDOFF, Vec3, Vec3x16};
 
 /// Sixteen numbers, one of each member of a batch.
 pub(crate) type Block = [f32; LANES];
@@ -332,4 +331,33 @@ impl<S: Simd> Linear16<S> {
     pub fn at(&self, x: f32x16<S>, y: f32x16<S>) -> f32x16<S> {
         self.c + x * self.x + y * self.y
     }
+}
+
+/// A vector of doubles as two of floats: the difference to a point loses nothing where the two are close.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Exact {
+    high: Vec3,
+    low: Vec3,
+}
+
+impl Exact {
+    pub fn new(v: DVec3) -> Exact {
+        let high = v.as_vec3();
+        Exact { high, low: (v - high.as_dvec3()).as_vec3() }
+    }
+
+    /// The way there from sixteen points.
+    #[inline(always)]
+    pub fn seen_from<S: Simd>(self, simd: S, p: Vec3x16<S>) -> Vec3x16<S> {
+        let (h, l) = (Vec3x16::splat(simd, self.high), Vec3x16::splat(simd, self.low));
+        Vec3x16 { x: (h.x - p.x) + l.x, y: (h.y - p.y) + l.y, z: (h.z - p.z) + l.z }
+    }
+}
+
+/// The three vectors of a view.
+#[inline(always)]
+pub(crate) fn ways<S: Simd>(simd: S, views: &impl Views) -> [Vec3x16<S>; 3] {
+    use ViewNumber::*;
+    // Written out, here and below: a map of an array is not inlined, and each operation becomes a call
+    [views.vectors(simd, [L0x, L0y, L0z]), views.vectors(simd, [Ax, Ay, Az]), views.vectors(simd, [Bx, By, Bz])]
 }

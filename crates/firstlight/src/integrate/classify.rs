@@ -9,11 +9,11 @@ mod solid;
 
 use fearless_simd::{f32x16, prelude::*};
 
-use super::batch::{Linear16, ShadingPoint, ViewBlock, ViewNumber, Views};
+use super::batch::{Exact, Linear16, ShadingPoint, ViewBlock, ViewNumber, Views, ways};
 use super::cut::{self, Half};
 use super::emitter::Emitter;
 use super::hull::SolidOccluder;
-use super::occluder::{Exact, Occluder, Shadow, corners_from, ways};
+use super::occluder::{Occluder, Shadow, corners_from};
 use super::panels::{Between, MAX_INTERVALS};
 use crate::ids::LightId;
 use crate::math::{DAffine3, Facet, LANES, Vec3, Vec3x16};

@@ -7,11 +7,11 @@
 
 use fearless_simd::{f32x16, mask32x16, prelude::*};
 
-use super::batch::Linear16;
+use super::batch::{Exact, Linear16};
+use super::breaks::Breaks;
 use super::hull::{Hull, Rim};
-use super::occluder::{
-    Breaks, Exact, FAR, Interval16, Occluder, Quadratic16, Roots, corners_from, edges, root_between,
-};
+use super::occluder::{Occluder, corners_from};
+use super::row::{FAR, Interval16, Quadratic16, Roots, edges, root_between};
 use crate::math::Vec3x16;
 use crate::shape::Canonical;
 

@@ -4,9 +4,9 @@ use std::f64::consts::PI;
 
 use arrayvec::ArrayVec;
 
+use super::batch::Exact;
 use super::cut::Half;
 use super::fit::Falloff;
-use super::occluder::Exact;
 use super::view::{FlatLight, Outline};
 use crate::light::{Area, AreaShape};
 use crate::math::{DVec3, Vec3};

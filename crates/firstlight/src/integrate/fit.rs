@@ -9,8 +9,7 @@
 
 use fearless_simd::{f32x16, prelude::*};
 
-use super::batch::{Block, Linear16, Members, ViewNumber, Views};
-use super::occluder::{Exact, ways};
+use super::batch::{Block, Exact, Linear16, Members, ViewNumber, Views, ways};
 use crate::material::Lobe;
 use crate::math::{LANES, sin_cos};
 

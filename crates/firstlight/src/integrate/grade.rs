@@ -5,9 +5,8 @@ use std::f32::consts::FRAC_PI_2;
 
 use fearless_simd::{f32x16, mask32x16, prelude::*};
 
-use super::batch::{Block, Linear16, Members, ShadingPoint, ViewBlock, ViewNumber, Views};
+use super::batch::{Block, Linear16, Members, ShadingPoint, ViewBlock, ViewNumber, Views, ways};
 use super::fit::Cell;
-use super::occluder::ways;
 use super::tolerance::Tolerance;
 use super::view::Outline;
 use crate::material::Lobe;

@@ -7,8 +7,9 @@
 
 use fearless_simd::{f32x16, mask32x16, prelude::*};
 
-use super::batch::Linear16;
-use super::occluder::{Breaks, Exact, FAR, Interval16, Quadratic16, edges};
+use super::batch::{Exact, Linear16};
+use super::breaks::Breaks;
+use super::row::{FAR, Interval16, Quadratic16, edges};
 use crate::math::{DAffine3, DVec3, Vec3, Vec3x16};
 use crate::shape::Canonical;
 

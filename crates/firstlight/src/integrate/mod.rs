@@ -6,6 +6,7 @@
 //! have their edges ([`cells`], [`mask`]).
 
 mod batch;
+mod breaks;
 mod cells;
 mod classify;
 mod cut;
@@ -19,6 +20,7 @@ mod near;
 mod occluder;
 mod panels;
 mod points;
+mod row;
 mod tolerance;
 mod torus;
 mod view;

@@ -12,10 +12,12 @@
 use arrayvec::ArrayVec;
 use fearless_simd::{f32x16, mask32x16, prelude::*};
 
-use super::batch::{Block, Members, ViewNumber, Views};
+use super::batch::{Block, Exact, Members, ViewNumber, Views, ways};
+use super::breaks::{Breaks, RoundSides};
 use super::cut::{self, Cut, Half};
 use super::fit::{Cell, MOMENTS, Polynomial};
-use super::occluder::{Breaks, Exact, FAR, Interval16, Occluder, RoundSides, Shadow, ways};
+use super::occluder::{Occluder, Shadow};
+use super::row::{FAR, Interval16};
 use super::view::Outline;
 use crate::math::{LANES, Vec3x16, asin, sin_cos};
 

@@ -13,7 +13,8 @@ use std::f32::consts::{FRAC_PI_2, PI};
 use fearless_simd::{f32x16, mask32x16, prelude::*};
 
 use super::batch::Linear16;
-use super::occluder::{Breaks, FAR, Interval16, root_between};
+use super::breaks::Breaks;
+use super::row::{FAR, Interval16, root_between};
 use crate::math::{Vec3x16, sin_cos};
 
 /// Places around a part at which it is looked at, by an angle whose cosine is that around the axis as it goes from one

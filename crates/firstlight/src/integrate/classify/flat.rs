@@ -3,8 +3,8 @@
 use fearless_simd::{f32x16, prelude::*};
 
 use super::{SLACK, Sight, Told};
-use crate::integrate::batch::ShadingPoint;
-use crate::integrate::occluder::{Exact, edges};
+use crate::integrate::batch::{Exact, ShadingPoint};
+use crate::integrate::row::edges;
 use crate::math::{DVec3, Facet, LANES, Vec3, Vec3x16};
 use crate::shape::{Parallelogram, PlaneSide};
 
