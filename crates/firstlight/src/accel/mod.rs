@@ -92,6 +92,7 @@ mod build;
 mod gather;
 mod level;
 mod node;
+mod planes;
 mod ray;
 mod traverse;
 
@@ -101,6 +102,7 @@ pub(crate) use beam::{Beam, groups};
 pub(crate) use build::{Built, Leaf, build};
 pub use level::SimdLevel;
 pub(crate) use node::{LEAF, Node, Tree};
+pub(crate) use planes::{Plane, Planes};
 pub(crate) use ray::{BEAM_PAD, LaneSlabs, Lanes, RayPacket16, RayTile, Slabs, TraceRay};
 
 use node::WIDTH;

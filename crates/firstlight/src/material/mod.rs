@@ -150,7 +150,7 @@ impl Material {
 
 /// A material in numbers, at one surface. Light arriving from `wi` leaves towards `wo` as
 /// f, the sum of each moment times its colour, which is pi x BRDF x cosine.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Bsdf {
     /// What each moment of the light is worth: the diffuse part, the highlight.
     pub(crate) colors: Colors,

@@ -5,6 +5,7 @@ mod place;
 use std::cell::Cell;
 use std::f32::consts::FRAC_PI_2;
 
+use arrayvec::ArrayVec;
 use fearless_simd::Level;
 
 use super::Counts;
@@ -20,7 +21,7 @@ use crate::integrate::{
     Arrived, Asked, BallSides, Emitter, Evaluator, Illumination, Masked, Obstacles, Receiver, ShadingPoint, View,
 };
 use crate::light::{Area, AreaShape, LightKind, LightTree};
-use crate::material::{Bsdf, Moments};
+use crate::material::{Bsdf, Lobe, Moments};
 use crate::math::LANES;
 use crate::scene::Scene;
 use crate::shape::SurfaceInteraction;
@@ -185,7 +186,6 @@ impl<'a> Arrivals<'a> {
     ) -> Arrival {
         match seen {
             Seen::Known(sums) => change.with(sums),
-            Seen::Behind(_) if place.parted => Arrival { skipped: true, ..change.with(Moments::default()) },
             Seen::Behind(whole) => change.with(self.one(index, place, whole, counts)),
         }
     }
@@ -285,10 +285,10 @@ impl<'a> Arrivals<'a> {
             };
             let rest = &places[from..places.len().min(from + LANES)];
             let mut run = 1 + rest[1..].iter().take_while(|other| is_like(other)).count();
-            let mut trees = self.gather(index, &places[from..from + run]);
+            let mut trees = self.gather_places(index, &places[from..from + run]);
             if run > 1 && matches!(trees, Trees::Unknown) {
                 run = 1;
-                trees = self.gather(index, &places[from..=from]);
+                trees = self.gather_places(index, &places[from..=from]);
             }
             next = from + run;
             match trees {
@@ -399,9 +399,21 @@ impl<'a> Arrivals<'a> {
         arrived
     }
 
-    /// Adds to `arrived` what arrives of a light at many points.
-    pub fn evaluate(&mut self, asked: &Asked, points: &[ShadingPoint], arrived: &mut Vec<Arrived>) {
-        self.evaluator.evaluate(self.level, asked, points, arrived);
+    /// Adds to `arrived` what arrives at many points of light `index`, which is integrated: with or without shadows, and
+    /// with what was gathered in trees.
+    pub fn evaluate(
+        &mut self,
+        index: usize,
+        lobe: &Lobe,
+        [shadows, near]: [bool; 2],
+        points: &[ShadingPoint],
+        arrived: &mut Vec<Arrived>,
+    ) {
+        let Some(asked) = self.lights.asked(index, lobe, shadows) else {
+            unreachable!("lights that are sampled have no cells")
+        };
+        let asked = Asked { near: near.then_some(&self.near), allowed: self.allowed, ..asked };
+        self.evaluator.evaluate(self.level, &asked, points, arrived);
     }
 
     /// Whether sums with such an error will do for one light at a place.
@@ -598,24 +610,21 @@ impl<'a> Arrivals<'a> {
         sums
     }
 
-    /// Gathers what of the trees may be in the way of a light: from a place and what lies around it, or from several
-    /// points.
-    pub(super) fn gather(&mut self, index: usize, places: &[ArrivalPlace]) -> Trees {
+    /// Gathers what of the trees may be in the way of a light: from one point and what lies within `reach` of it, over
+    /// which normals turn by `turn`; or from several points.
+    pub(super) fn gather(&mut self, index: usize, points: &[Viewpoint], reach: f32, turn: f32) -> Trees {
         let (scene, lights) = (self.scene, self.lights);
         if !scene.geometry.has_trees() {
             return Trees::Nothing;
         }
         let (target, trees) = (&lights.targets[index], &mut self.occluders);
-        match places {
-            [place] => {
-                let point = Viewpoint::of(place.si);
-                trees.gather_around(self.level, scene, target, &point, place.reach, place.turn > FLAT, LEAVES);
-            }
-            places => {
-                let points: Vec<_> = places.iter().map(|place| Viewpoint::of(place.si)).collect();
-                let numbers: Vec<_> = (0..points.len() as u32).collect();
-                let shaft = Shaft::of(&points, &numbers, &target.hull);
-                trees.gather_in(self.level, scene, target, &shaft, &points, &numbers, LEAVES);
+        match points {
+            [point] => trees.gather_around(self.level, scene, target, point, reach, turn > FLAT, LEAVES),
+            points => {
+                self.indices.clear();
+                self.indices.extend(0..points.len() as u32);
+                let shaft = Shaft::of(points, &self.indices, &target.hull);
+                trees.gather_in(self.level, scene, target, &shaft, points, &self.indices, LEAVES);
             }
         }
         if !trees.has_meshes() && lights.know(index, &trees.others) {
@@ -631,10 +640,16 @@ impl<'a> Arrivals<'a> {
         }
     }
 
+    /// The same of places: one, or several points.
+    pub(super) fn gather_places(&mut self, index: usize, places: &[ArrivalPlace]) -> Trees {
+        let points: ArrayVec<Viewpoint, LANES> = places.iter().map(|place| Viewpoint::of(place.si)).collect();
+        self.gather(index, &points, places[0].reach, places[0].turn)
+    }
+
     /// How an area light would change if it were integrated.
     fn change_if_integrated(&mut self, index: usize, emitter: &Emitter, place: &ArrivalPlace) -> Change {
         let shadows = self.scene.lights[index].shadows && place.si.receives_shadow;
-        let trees = if shadows { self.gather(index, std::slice::from_ref(place)) } else { Trees::Nothing };
+        let trees = if shadows { self.gather_places(index, std::slice::from_ref(place)) } else { Trees::Nothing };
         let mut arrived = Vec::new();
         self.ask(index, emitter, std::iter::once(place), [shadows, matches!(trees, Trees::Known)], &mut arrived);
         let mut arrived = arrived[0];

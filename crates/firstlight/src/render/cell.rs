@@ -12,13 +12,16 @@
 //! Each station asks [`LightQueue`] for all of its places together; what its judge refuses is asked by the next. Cells
 //! lie on a grid of the film and are always rendered whole, so no decision depends on tiles, crops or threads.
 
+mod behind;
+mod squares;
+
 use std::ops::{ControlFlow, Range};
 
 use super::film::FilmTile;
-use super::fragment::{Fragment, Fragments, Quadrant, RayHit};
+use super::fragment::{Fragment, Fragments, Member, Quadrant, RayHit};
 use super::grid::{Block, Grid};
-use super::hits::PixelRays;
-use super::light_queue::{Answer, LightQueue, Place, Request};
+use super::hits::{PixelHits, PixelRays, camera_ray};
+use super::light_queue::{Answer, LightQueue, Place, Request, Sight};
 use super::patch::Contrast;
 use super::resolve::{LightTerm, PixelTerms};
 use super::solo::{self, Candidate, Pyramid};
@@ -27,9 +30,9 @@ use super::tile::Tile;
 use super::together::{Together, salt};
 use super::{AaMode, Counts, Heat};
 use crate::color::Rgb;
-use crate::integrate::ShadingPoint;
 use crate::material::{Bsdf, Moments};
 use crate::scene::Scene;
+use behind::Behind;
 
 /// Pixels across a cell.
 pub(crate) const CELL: u32 = 32;
@@ -48,6 +51,8 @@ pub(super) const QUADRANT_MOTION: f32 = 0.3;
 const QUADRANT_TURN: f32 = 1.0;
 /// The same, turns alone, where the middle of a fragment stands for all of it.
 const MIDDLE_TURN: f32 = 0.06;
+/// In display steps: by how much that may change it.
+const MIDDLE_BEND: f32 = 0.4;
 /// In display steps: what colours that differ may make together with light that does.
 const MINGLED: f32 = 0.4;
 
@@ -77,6 +82,7 @@ struct Pixel {
 struct Wanted {
     fragment: u32,
     light: u32,
+    sight: Sight,
 }
 
 /// One thread's way from tiles to film.
@@ -104,17 +110,22 @@ pub(crate) struct Cells<'a> {
     answers: Vec<Answer>,
     fragments: Fragments,
     pixel_rays: PixelRays,
-    /// The rays of one pixel, each with the number of what it meets.
+    hits: PixelHits,
+    /// The rays of one pixel, each with what it meets: a candidate by its number, or something in trees.
     rays: Vec<(u32, RayHit)>,
+    seen: Vec<(Member, Bsdf)>,
+    shapes: Vec<Candidate>,
     /// What is to be asked by middles, by quadrants and by rays.
     wanted: Vec<Wanted>,
     parted: Vec<Wanted>,
     refused: Vec<Wanted>,
+    behind: Behind,
 }
 
 impl<'a> Cells<'a> {
     pub fn new(scene: &'a Scene, mode: AaMode, lights: LightQueue<'a>) -> Self {
         let pixel_rays = PixelRays::new(lights.arrivals.level(), scene.antialiasing);
+        let hits = PixelHits::new(lights.arrivals.level(), scene.antialiasing);
         Cells {
             scene,
             mode,
@@ -135,10 +146,14 @@ impl<'a> Cells<'a> {
             answers: Vec::new(),
             fragments: Fragments::new(scene),
             pixel_rays,
+            hits,
             rays: Vec::new(),
+            seen: Vec::new(),
+            shapes: Vec::new(),
             wanted: Vec::new(),
             parted: Vec::new(),
             refused: Vec::new(),
+            behind: Behind::new(scene),
         }
     }
 
@@ -162,6 +177,7 @@ impl<'a> Cells<'a> {
         self.grid.light(self.scene, &mut self.lights, &self.blocks, counts, go_on)?;
         self.work.iter_mut().zip(self.grid.work()).for_each(|(work, more)| *work += more);
         self.fragments(counts);
+        self.behind(counts, go_on)?;
         self.middles(counts, go_on)?;
         self.quadrants(counts, go_on)?;
         self.rays(counts, go_on)?;
@@ -221,17 +237,82 @@ impl<'a> Cells<'a> {
         {
             return self.block(square, only);
         }
-        if square.side > SMALLEST {
+        let by_bundles = near.contains(&Candidate::Trees);
+        if square.side > if by_bundles { SMALLEST.max(self.hits.side()) } else { SMALLEST } {
             for quarter in square.quarters_on([scene.width, scene.height]) {
                 self.split(quarter, depth + 1, counts);
             }
             return;
+        }
+        if by_bundles {
+            return self.trace_bundles(square, counts);
         }
         let near = std::mem::take(&mut self.near[depth]);
         for at in square.pixels().filter(|[i, j]| *i < scene.width && *j < scene.height) {
             self.trace(at, &near, counts);
         }
         self.near[depth] = near;
+    }
+
+    /// Finds out what the rays of a square see that may meet anything.
+    fn trace_bundles(&mut self, Square { x, y, side }: Square, counts: &mut Counts) {
+        let scene = self.scene;
+        let step = self.hits.side().min(side);
+        let [right, bottom] = [(x + side).min(scene.width), (y + side).min(scene.height)];
+        for (top, left) in (y..bottom)
+            .step_by(step as usize)
+            .flat_map(|top| (x..right).step_by(step as usize).map(move |left| (top, left)))
+        {
+            let (w, h) = ((right - left).min(step), (bottom - top).min(step));
+            self.hits.trace(scene, left, top, w, h);
+            for (row, column) in (0..h).flat_map(|row| (0..w).map(move |column| (row, column))) {
+                self.sort_hits([left, top], [column, row], counts);
+            }
+        }
+    }
+
+    /// Sorts what the rays of a pixel meet, which was found together with its neighbours from `first` on.
+    fn sort_hits(&mut self, first: [u32; 2], [column, row]: [u32; 2], counts: &mut Counts) {
+        let scene = self.scene;
+        let n = scene.antialiasing;
+        let [i, j] = [first[0] + column, first[1] + row];
+        let mut pixel = self.pixel([i, j], n * n, counts);
+        let number = self.pixels.len() as u32;
+        self.rays.clear();
+        self.seen.clear();
+        let mut shapes = std::mem::take(&mut self.shapes);
+        shapes.clear();
+        for at in (0..n).flat_map(|y| (0..n).map(move |x| [x, y])) {
+            let Some(hit) = self.hits.get(n, column, row, at[0], at[1]) else {
+                pixel.terms.background += 1;
+                continue;
+            };
+            if let Some(light) = hit.surface.index().checked_sub(scene.geometry.surfaces.len()) {
+                pixel.terms.emission += scene.lights[light].radiance;
+                continue;
+            }
+            let (ray, differential) = camera_ray(scene, i * n + at[0], j * n + at[1]);
+            let at = at.map(|at| at as u16);
+            match Candidate::of(&hit) {
+                Some(shape) => {
+                    let place = shapes.iter().position(|other| *other == shape).unwrap_or_else(|| {
+                        shapes.push(shape);
+                        shapes.len() - 1
+                    });
+                    self.rays.push((place as u32, RayHit { ray, t: hit.t, at }));
+                }
+                None => {
+                    let si = scene.local_surface(&ray, &hit, &differential);
+                    let bsdf = scene.materials[si.material.index()].bsdf(&si, &scene.textures);
+                    self.seen.push((Member::new(si, at), bsdf));
+                }
+            }
+        }
+        self.pixels.push(pixel);
+        self.group(number, [i, j], &shapes);
+        self.shapes = shapes;
+        let (mode, once) = (self.mode, self.mode == AaMode::Adaptive);
+        self.fragments.add_seen(scene, number, [i, j], &mut self.seen, once, |count| share(scene, mode, count));
     }
 
     /// A pixel whose terms are to be summed, from so many rays.
@@ -246,7 +327,7 @@ impl<'a> Cells<'a> {
 
     /// Finds out what the rays of a pixel see that meet nothing but these.
     fn trace(&mut self, [i, j]: [u32; 2], near: &[Candidate], counts: &mut Counts) {
-        let (scene, mode) = (self.scene, self.mode);
+        let scene = self.scene;
         let n = scene.antialiasing;
         let mut pixel = self.pixel([i, j], n * n, counts);
         let number = self.pixels.len() as u32;
@@ -273,24 +354,22 @@ impl<'a> Cells<'a> {
             }
         }
         self.pixels.push(pixel);
-        // Shape by shape; without adaptive antialiasing ray by ray
+        self.group(number, [i, j], near);
+    }
+
+    /// Makes fragments of the rays of a pixel that meet these shapes: one of each, in the order in which they are met;
+    /// without adaptive antialiasing one of each ray.
+    fn group(&mut self, number: u32, at: [u32; 2], shapes: &[Candidate]) {
+        let (scene, mode) = (self.scene, self.mode);
         let share = |count: usize| share(scene, mode, count);
-        if mode == AaMode::Full {
-            for (place, ray) in &self.rays {
-                let one = std::iter::once(*ray);
-                self.fragments.add(scene, number, [i, j], near[*place as usize], one, share);
-            }
-            return;
-        }
-        // Lists are short: 48 shapes and 16 lights at most
-        debug_assert!(near.len() <= u64::BITS as usize);
-        let mut done = 0u64;
         for k in 0..self.rays.len() {
-            let place = self.rays[k].0;
-            if done >> place & 1 == 0 {
-                done |= 1 << place;
+            let (place, ray) = self.rays[k];
+            let shape = shapes[place as usize];
+            if mode == AaMode::Full {
+                self.fragments.add(scene, number, at, shape, std::iter::once(ray), share);
+            } else if self.rays[..k].iter().all(|(before, _)| *before != place) {
                 let same = self.rays[k..].iter().filter(|(of, _)| *of == place).map(|(_, ray)| *ray);
-                self.fragments.add(scene, number, [i, j], near[place as usize], same, share);
+                self.fragments.add(scene, number, at, shape, same, share);
             }
         }
     }
@@ -338,7 +417,7 @@ impl<'a> Cells<'a> {
         let lights = 0..scene.lights.len() as u32;
         // Those whose rays were traced want all lights
         for fragment in 0..self.fragments.all.len() as u32 {
-            self.wanted.extend(lights.clone().map(|light| Wanted { fragment, light }));
+            self.wanted.extend(lights.clone().map(|light| Wanted { fragment, light, sight: Sight::Unknown }));
         }
         for block in 0..self.blocks.len() {
             let block = self.blocks[block];
@@ -375,7 +454,7 @@ impl<'a> Cells<'a> {
             for light in lights.clone() {
                 match self.grid.arrived(light as usize, at).filter(|_| is_even) {
                     Some(sums) => self.add(fragment, light as usize, sums),
-                    None => self.parted.push(Wanted { fragment: fragment as u32, light }),
+                    None => self.parted.push(Wanted { fragment: fragment as u32, light, sight: Sight::Unknown }),
                 }
             }
         }
@@ -455,13 +534,13 @@ impl<'a> Cells<'a> {
         let middle = |wanted: &Wanted, fragments: &Fragments| fragments.all[wanted.fragment as usize].middle;
         self.requests.clear();
         for wanted in &wanted {
-            let light = wanted.light;
-            self.requests.extend(middle(wanted, &self.fragments).map(|place| Request { place, light }));
+            let Wanted { light, sight, .. } = *wanted;
+            self.requests.extend(middle(wanted, &self.fragments).map(|place| Request { place, light, sight }));
         }
         self.lights.ask(&self.fragments.places, &self.requests, &mut self.answers, counts, go_on)?;
         let mut next = 0;
         for wanted in &wanted {
-            let Wanted { fragment, light } = *wanted;
+            let Wanted { fragment, light, .. } = *wanted;
             if middle(wanted, &self.fragments).is_none() {
                 self.parted.push(*wanted);
                 continue;
@@ -472,10 +551,10 @@ impl<'a> Cells<'a> {
             self.work[self.pixels[pixel as usize].index as usize] += Heat::PLACE;
             let is_dark = answer.sums == Moments::default();
             let is_known = answer.sums.is_known();
-            if is_known && (count == 1 || answer.smooth && (is_dark || answer.turn <= MIDDLE_TURN)) {
+            if is_known && (count == 1 || answer.smooth && (is_dark || self.is_nearly_even(fragment, light, &answer))) {
                 self.add(fragment as usize, light as usize, answer.sums);
             } else {
-                self.parted.push(*wanted);
+                self.parted.push(Wanted { sight: answer.sight, ..*wanted });
             }
         }
         self.wanted = wanted;
@@ -487,10 +566,12 @@ impl<'a> Cells<'a> {
         let scene = self.scene;
         let wanted = std::mem::take(&mut self.parted);
         self.requests.clear();
-        for Wanted { fragment, light } in &wanted {
-            self.fragments.find_quadrants(scene, *fragment as usize);
-            let quadrants = self.fragments.quadrants(&self.fragments.all[*fragment as usize]);
-            self.requests.extend(quadrants.iter().map(|q| Request { place: q.place, light: *light }));
+        for Wanted { fragment, light, sight } in wanted.iter().copied() {
+            let pixel = self.fragments.all[fragment as usize].pixel;
+            let at = self.at(self.pixels[pixel as usize].index as usize);
+            self.fragments.find_quadrants(scene, fragment as usize, at);
+            let quadrants = self.fragments.quadrants(&self.fragments.all[fragment as usize]);
+            self.requests.extend(quadrants.iter().map(|q| Request { place: q.place, light, sight }));
         }
         let fragments = &self.fragments;
         self.lights.ask(&fragments.places, &self.requests, &mut self.answers, counts, go_on)?;
@@ -514,6 +595,16 @@ impl<'a> Cells<'a> {
         }
         self.parted = wanted;
         ControlFlow::Continue(())
+    }
+
+    /// Whether the middle of a fragment stands for all of it: what it sees of a light changes but by what that turns.
+    fn is_nearly_even(&self, fragment: u32, light: u32, answer: &Answer) -> bool {
+        let bend = 0.5 * answer.turn * answer.turn * answer.most;
+        let Fragment { bsdf, .. } = &self.fragments.all[fragment as usize];
+        let colors = self.lights.arrivals.scale(light as usize) * bsdf.colors;
+        let value = colors.onto(self.scene.ambient * bsdf.ambient, &answer.sums);
+        let shown = self.lights.arrivals.steps(value, colors.of(&Moments::bounds(bend, bend)));
+        answer.turn <= MIDDLE_TURN && shown <= MIDDLE_BEND
     }
 
     /// Whether a light is even enough over the quadrants of a fragment.
@@ -557,32 +648,21 @@ impl<'a> Cells<'a> {
         self.requests.clear();
         // Places of a fragment serve all lights
         let mut last: Option<(u32, Range<usize>)> = None;
-        for Wanted { fragment: number, light } in &refused {
-            if self.fragments.all[*number as usize].rays.is_empty() {
-                let index = self.pixels[self.fragments.all[*number as usize].pixel as usize].index as usize;
-                let at = self.at(index);
-                self.fragments.trace(scene, *number as usize, self.pixel_rays.of(scene, at));
-                self.work[index] += self.fragments.all[*number as usize].count() as f32;
-                counts.looks += self.fragments.all[*number as usize].count() as u64;
-            }
+        for Wanted { fragment: number, light, sight } in &refused {
+            self.trace_rays(*number as usize, counts);
             let fragment = &self.fragments.all[*number as usize];
             if last.as_ref().is_none_or(|(before, _)| before != number) {
                 let first = self.places.len();
-                let share = fragment.share;
-                for (k, ray) in self.fragments.rays[fragment.rays.clone()].iter().enumerate() {
-                    let point = ShadingPoint { share, ..fragment.of.point(scene, &ray.ray, ray.t) };
-                    let bsdf = self.fragments.bsdf(fragment, k);
-                    self.places.push(Place::new(scene, point, fragment.of.surface(scene), bsdf));
-                }
+                self.places.extend((0..fragment.rays.len()).map(|k| self.fragments.place(scene, fragment, k)));
                 last = Some((*number, first..self.places.len()));
             }
             let places = last.as_ref().map_or(0..0, |(_, places)| places.clone());
-            self.requests.extend(places.map(|place| Request { place: place as u32, light: *light }));
+            self.requests.extend(places.map(|place| Request { place: place as u32, light: *light, sight: *sight }));
         }
         self.lights.ask(&self.places, &self.requests, &mut self.answers, counts, go_on)?;
         // Requests of a fragment lie together
         let mut answers = self.requests.iter().zip(&self.answers);
-        for Wanted { fragment, light } in &refused {
+        for Wanted { fragment, light, .. } in &refused {
             let fragment = &self.fragments.all[*fragment as usize];
             let index = self.pixels[fragment.pixel as usize].index as usize;
             self.work[index] += Heat::PLACE * fragment.count() as f32;
@@ -600,7 +680,7 @@ impl<'a> Cells<'a> {
                 let (light, rays, share) = (*light as usize, fragment.count(), fragment.share);
                 let together = unknown.get_or_insert_with(|| Together::new(light, rays, share, salt, Rgb::BLACK));
                 let arrivals = &mut self.lights.arrivals;
-                together.ask(arrivals, &place.surface(), &place.bsdf, false, false, counts);
+                together.ask_points(arrivals, &place.surface(), &place.bsdf, counts);
             }
             if let Some(together) = unknown {
                 go_on()?;
@@ -611,6 +691,17 @@ impl<'a> Cells<'a> {
         }
         self.refused = refused;
         ControlFlow::Continue(())
+    }
+
+    /// Makes sure that it is known where the rays of a fragment end.
+    fn trace_rays(&mut self, fragment: usize, counts: &mut Counts) {
+        if self.fragments.all[fragment].rays.is_empty() {
+            let index = self.pixels[self.fragments.all[fragment].pixel as usize].index as usize;
+            let at = self.at(index);
+            self.fragments.trace(self.scene, fragment, self.pixel_rays.of(self.scene, at));
+            self.work[index] += self.fragments.all[fragment].count() as f32;
+            counts.looks += self.fragments.all[fragment].count() as u64;
+        }
     }
 
     /// Makes colours of what is known.

@@ -9,8 +9,6 @@ use crate::math::{Vec3, square};
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Arrival {
     pub sums: Moments,
-    /// Whether that was not asked, since rays of the patch are.
-    pub skipped: bool,
     /// How far the mean over the patch can be from what arrives at its middle.
     pub bend: Moments,
     /// Over how much of the light's size the outlines of shadows move across the patch; see [`Arrived::motion`].
@@ -43,22 +41,11 @@ impl Change {
 
     pub fn with(self, sums: Moments) -> Arrival {
         let Change { bend, drift, resolved, smooth, sharp } = self;
-        Arrival { sums, skipped: false, bend, drift, resolved, smooth, sharp }
+        Arrival { sums, bend, drift, resolved, smooth, sharp }
     }
 }
 
 impl Arrival {
-    /// Of a patch whose rays are asked, not its middle.
-    pub const PARTED: Arrival = Arrival {
-        sums: Moments::ZERO,
-        skipped: true,
-        bend: Moments::MOST,
-        drift: f32::INFINITY,
-        resolved: false,
-        smooth: false,
-        sharp: true,
-    };
-
     /// At a point, or where nothing bends.
     pub fn even(sums: Moments) -> Arrival {
         Change::NONE.with(sums)

@@ -7,7 +7,7 @@ use arrayvec::ArrayVec;
 use super::cell::QUADRANT_MOTION;
 use super::hits::camera_ray;
 use super::light_queue::Place;
-use super::patch::Contrast;
+pub(crate) use super::patch::Contrast;
 use super::solo::{Candidate, SquareBsdf};
 use super::square::Square;
 use crate::color::Rgb;
@@ -16,9 +16,16 @@ use crate::integrate::ShadingPoint;
 use crate::material::{Bsdf, Colors, Lobe};
 use crate::math::{DVec3, ErrorBound, Ray, Vec3};
 use crate::scene::Scene;
+use crate::shape::SurfaceInteraction;
 
 /// Where normals turn farther from a middle, in radians, it does not stand for what is around it.
 const MAX_TURN: f32 = 0.2;
+/// Normals that differ by more than this cosine are of different surfaces.
+const SAME_NORMAL: f32 = 0.9;
+/// How far the mean of normals may be from that in the middle of a fragment, and of a quadrant of one: farther off it
+/// is where facets make a crease.
+const SKEW: f32 = 0.002;
+const SKEW_OF_QUADRANT: f32 = 0.01;
 /// Fragments of so few rays are lit at each.
 const FEW_RAYS: usize = 4;
 
@@ -31,20 +38,32 @@ pub(crate) struct RayHit {
     pub at: [u16; 2],
 }
 
+/// What a camera ray sees of what lies in trees.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Member {
+    pub si: SurfaceInteraction,
+    /// Column and row in its pixel.
+    at: [u16; 2],
+}
+
 /// A surface in a pixel.
 #[derive(Clone, Debug)]
 pub(crate) struct Fragment {
     pub pixel: u32,
-    pub of: Candidate,
+    /// Its shape; `None` for what lies in trees.
+    pub of: Option<Candidate>,
+    pub surface: SurfaceId,
     /// Its material; the colours are the means over its rays.
     pub bsdf: Bsdf,
     /// How many of the pixel's rays see it.
     pub count: u32,
-    /// They among all of the cell, none while nobody needs them; and their materials, if they are not all the same.
+    /// They among all of the cell, or what they see among all that is in trees, none while nobody needs them; and their
+    /// materials, if they are not all the same.
     pub rays: Range<usize>,
     pub bsdfs: Option<Range<usize>>,
-    /// Whether those differ in more than colours.
-    uneven: bool,
+    /// Whether those differ in more than colours, and how far those differ.
+    pub uneven: bool,
+    pub contrast: Contrast,
     /// The share of a pixel by which its errors are judged.
     pub share: f32,
     /// Its middle among all places of the cell, if that may stand for all of it.
@@ -87,7 +106,7 @@ impl PlainMaterials {
         match of {
             Candidate::Sphere(i) => self.spheres[i as usize],
             Candidate::Parallelogram(i) => self.parallelograms[i as usize],
-            Candidate::Light(_) => None,
+            Candidate::Light(_) | Candidate::Trees => None,
         }
     }
 }
@@ -96,8 +115,9 @@ impl PlainMaterials {
 pub(crate) struct Fragments {
     pub plain: PlainMaterials,
     pub all: Vec<Fragment>,
-    pub rays: Vec<RayHit>,
-    pub bsdfs: Vec<Bsdf>,
+    rays: Vec<RayHit>,
+    members: Vec<Member>,
+    bsdfs: Vec<Bsdf>,
     quadrants: Vec<Quadrant>,
     /// The middles of fragments and of quadrants.
     pub places: Vec<Place>,
@@ -116,6 +136,7 @@ impl Fragments {
             plain: PlainMaterials::new(scene),
             all: Vec::new(),
             rays: Vec::new(),
+            members: Vec::new(),
             bsdfs: Vec::new(),
             quadrants: Vec::new(),
             places: Vec::new(),
@@ -125,6 +146,7 @@ impl Fragments {
     pub fn clear(&mut self) {
         self.all.clear();
         self.rays.clear();
+        self.members.clear();
         self.bsdfs.clear();
         self.quadrants.clear();
         self.places.clear();
@@ -164,30 +186,88 @@ impl Fragments {
         let middle = if mean.uneven || mean.contrast != Contrast::default() {
             None
         } else {
-            let point = match rays {
+            match rays {
                 [ray] => Some(of.point(scene, &ray.ray, ray.t)),
                 _ => middle(scene, of, rays.iter()),
-            };
-            point.map(|point| {
-                // It tells nothing beside what is proved
-                let point = ShadingPoint { share, most_motion: -1.0, ..point };
-                self.places.push(Place::new(scene, point, of.surface(scene), &mean.bsdf));
-                self.places.len() as u32 - 1
-            })
+            }
         };
+        let surface = of.surface(scene);
+        let middle = middle.map(|point| self.add_middle(scene, surface, &mean.bsdf, point, share));
         self.all.push(Fragment {
             pixel,
-            of,
+            of: Some(of),
+            surface,
             bsdf: mean.bsdf,
             count: (all.len() - first) as u32,
             rays: first..all.len(),
             bsdfs,
             uneven: mean.uneven,
+            contrast: mean.contrast,
             share,
             middle,
             quadrants: None,
         });
         self.rays = all;
+    }
+
+    /// Adds the middle of a fragment that fills a share of its pixel: which of all places it is.
+    fn add_middle(&mut self, scene: &Scene, surface: SurfaceId, bsdf: &Bsdf, point: ShadingPoint, share: f32) -> u32 {
+        // It tells nothing beside what is proved
+        let point = ShadingPoint { share, most_motion: -1.0, ..point };
+        self.places.push(Place::new(scene, point, surface, bsdf));
+        self.places.len() as u32 - 1
+    }
+
+    /// Adds what some rays of pixel (`i`, `j`), number `pixel` of its cell, see of what lies in trees: those of one
+    /// surface together, or each by itself. `share` as in [`add`](Self::add).
+    pub fn add_seen(
+        &mut self,
+        scene: &Scene,
+        pixel: u32,
+        at: [u32; 2],
+        seen: &mut Vec<(Member, Bsdf)>,
+        once: bool,
+        share: impl Fn(usize) -> f32,
+    ) {
+        while let Some((Member { si, .. }, bsdf)) = seen.first().copied() {
+            let (members, bsdfs) = (self.members.len(), self.bsdfs.len());
+            let mut is_first = true;
+            for (member, bsdf) in seen
+                .extract_if(.., |(member, _)| std::mem::take(&mut is_first) || once && is_one_surface(&si, &member.si))
+            {
+                self.members.push(member);
+                self.bsdfs.push(bsdf);
+            }
+            let count = self.members.len() - members;
+            let even = self.bsdfs[bsdfs..].iter().all(|other| *other == bsdf);
+            let mean = if even {
+                self.bsdfs.truncate(bsdfs);
+                MeanBsdf { bsdf, contrast: Contrast::default(), uneven: false }
+            } else {
+                MeanBsdf::of(self.bsdfs[bsdfs..].iter())
+            };
+            let share = share(count);
+            let middle = if mean.uneven || mean.contrast != Contrast::default() {
+                None
+            } else {
+                seen_middle(scene, at, self.members[members..].iter(), SKEW)
+            };
+            let middle = middle.map(|point| self.add_middle(scene, si.surface, &mean.bsdf, point, share));
+            self.all.push(Fragment {
+                pixel,
+                of: None,
+                surface: si.surface,
+                bsdf: mean.bsdf,
+                count: count as u32,
+                rays: members..self.members.len(),
+                bsdfs: (!even).then_some(bsdfs..self.bsdfs.len()),
+                uneven: mean.uneven,
+                contrast: mean.contrast,
+                share,
+                middle,
+                quadrants: None,
+            });
+        }
     }
 
     /// Adds a pixel that is proved to see one shape of one material, from the middles of its quadrants alone; `false`
@@ -224,12 +304,14 @@ impl Fragments {
         let (count, rays) = (n * n, 0..0);
         self.all.push(Fragment {
             pixel,
-            of,
+            of: Some(of),
+            surface: of.surface(scene),
             bsdf,
             count,
             rays,
             bsdfs: None,
             uneven: false,
+            contrast: Contrast::default(),
             share: 1.0,
             middle: None,
             quadrants,
@@ -241,7 +323,8 @@ impl Fragments {
     /// that does not stands for it.
     pub fn trace(&mut self, scene: &Scene, fragment: usize, rays: &[Ray]) {
         let n = scene.antialiasing;
-        let (of, first) = (self.all[fragment].of, self.rays.len());
+        let first = self.rays.len();
+        let of = self.all[fragment].of.expect("what lies in trees is traced at once");
         for (k, ray) in rays.iter().enumerate() {
             let at = [k as u32 % n, k as u32 / n].map(|at| at as u16);
             self.rays.extend(of.intersect(scene, ray).map(|t| RayHit { ray: *ray, t, at }));
@@ -272,11 +355,11 @@ impl Fragments {
         (material.bsdf(&si, &scene.textures), even)
     }
 
-    /// Finds the parts of a fragment in the quarters of its pixel.
-    pub fn find_quadrants(&mut self, scene: &Scene, fragment: usize) {
+    /// Finds the parts of a fragment in the quarters of its pixel, `pixel` of the film.
+    pub fn find_quadrants(&mut self, scene: &Scene, fragment: usize, pixel: [u32; 2]) {
         if self.all[fragment].quadrants.is_none() {
             let first = self.quadrants.len();
-            if !self.add_quadrants(scene, fragment) {
+            if !self.add_quadrants(scene, fragment, pixel) {
                 self.quadrants.truncate(first);
             }
             self.all[fragment].quadrants = Some(first..self.quadrants.len());
@@ -288,38 +371,65 @@ impl Fragments {
         fragment.quadrants.clone().map_or(&[], |range| &self.quadrants[range])
     }
 
-    fn add_quadrants(&mut self, scene: &Scene, fragment: usize) -> bool {
-        let Fragment { of, bsdf, rays, bsdfs, uneven, share, .. } = self.all[fragment].clone();
-        if uneven || rays.len() <= FEW_RAYS {
+    fn add_quadrants(&mut self, scene: &Scene, fragment: usize, pixel: [u32; 2]) -> bool {
+        let Fragment { of, surface, bsdf, bsdfs, rays, uneven, share, count, .. } = self.all[fragment].clone();
+        if uneven || count as usize <= FEW_RAYS {
             return false;
         }
         let half = scene.antialiasing.div_ceil(2) as u16;
-        let rays = &self.rays[rays];
-        let quadrant = |ray: &RayHit| ray.at[1] / half * 2 + ray.at[0] / half;
-        for number in 0..4 {
-            let count = rays.iter().filter(|ray| quadrant(ray) == number).count() as u32;
+        for number in [[0, 0], [1, 0], [0, 1], [1, 1]] {
+            let is_in = |at: [u16; 2]| at.map(|at| at / half) == number;
+            let (count, point) = match of {
+                Some(of) => {
+                    let rays = self.rays[rays.clone()].iter().filter(|ray| is_in(ray.at));
+                    (rays.clone().count(), middle(scene, of, rays))
+                }
+                None => {
+                    let members = self.members[rays.clone()].iter().filter(|member| is_in(member.at));
+                    (members.clone().count(), seen_middle(scene, pixel, members, SKEW_OF_QUADRANT))
+                }
+            };
             if count == 0 {
                 continue;
             }
-            let Some(point) = middle(scene, of, rays.iter().filter(|ray| quadrant(ray) == number)) else {
-                return false;
-            };
+            let Some(point) = point else { return false };
             let mean = match &bsdfs {
                 None => MeanBsdf { bsdf, contrast: Contrast::default(), uneven: false },
                 Some(range) => {
-                    let bsdfs = rays.iter().zip(&self.bsdfs[range.clone()]);
-                    MeanBsdf::of(bsdfs.filter(|(ray, _)| quadrant(ray) == number).map(|(_, bsdf)| bsdf))
+                    let bsdfs = self.bsdfs[range.clone()].iter().enumerate();
+                    let is_in = |k: usize| is_in(self.ray_at(of, rays.start + k));
+                    MeanBsdf::of(bsdfs.filter(|(k, _)| is_in(*k)).map(|(_, bsdf)| bsdf))
                 }
             };
-            self.quadrants.push(Quadrant { place: self.places.len() as u32, rays: count, contrast: mean.contrast });
+            let (place, contrast) = (self.places.len() as u32, mean.contrast);
+            self.quadrants.push(Quadrant { place, rays: count as u32, contrast });
             let point = ShadingPoint { share, most_motion: QUADRANT_MOTION, ..point };
-            self.places.push(Place::new(scene, point, of.surface(scene), &mean.bsdf));
+            self.places.push(Place::new(scene, point, surface, &mean.bsdf));
         }
         true
     }
 
+    /// Where in its pixel a ray is, by its number among all of the cell.
+    fn ray_at(&self, of: Option<Candidate>, ray: usize) -> [u16; 2] {
+        match of {
+            Some(_) => self.rays[ray].at,
+            None => self.members[ray].at,
+        }
+    }
+
+    /// Where a ray of a fragment, its `k`-th, wants light.
+    pub fn place(&self, scene: &Scene, fragment: &Fragment, k: usize) -> Place {
+        let ray = fragment.rays.start + k;
+        let bsdf = self.bsdf(fragment, k);
+        let point = match fragment.of {
+            Some(of) => of.point(scene, &self.rays[ray].ray, self.rays[ray].t),
+            None => point_of(&self.members[ray].si),
+        };
+        Place::new(scene, ShadingPoint { share: fragment.share, ..point }, fragment.surface, bsdf)
+    }
+
     /// The material that a ray of a fragment sees.
-    pub fn bsdf<'b>(&'b self, fragment: &'b Fragment, ray: usize) -> &'b Bsdf {
+    fn bsdf<'b>(&'b self, fragment: &'b Fragment, ray: usize) -> &'b Bsdf {
         match &fragment.bsdfs {
             Some(range) => &self.bsdfs[range.start + ray],
             None => &fragment.bsdf,
@@ -345,6 +455,66 @@ fn middle<'a>(scene: &Scene, of: Candidate, rays: impl Iterator<Item = &'a RayHi
     (point.turn <= MAX_TURN).then_some(point)
 }
 
+/// Whether two camera rays of a pixel see one surface in trees, which may be lit as one.
+fn is_one_surface(one: &SurfaceInteraction, other: &SurfaceInteraction) -> bool {
+    if one.surface != other.surface || one.material != other.material || !(one.ns.dot(other.ns) > SAME_NORMAL) {
+        return false;
+    }
+    let apart = other.p - one.p;
+    // Neither is far off the other's tangent plane
+    let off = apart.dot(one.ng).abs().max(apart.dot(other.ng).abs());
+    off <= 0.5 * apart.length()
+}
+
+/// Where what a ray sees in trees wants light.
+fn point_of(si: &SurfaceInteraction) -> ShadingPoint {
+    let SurfaceInteraction { lit_from, error, horizon, ng, facet, ns, wo, .. } = *si;
+    ShadingPoint { horizon, ng, facet, ..ShadingPoint::new(lit_from, error, ns, wo) }
+}
+
+/// The middle of what some rays of pixel (`i`, `j`) see of a surface in trees, with its reach to their ends; `None` if
+/// something else is there, if normals turn too far on the way, or if their mean is farther than `skew` from that in the
+/// middle.
+fn seen_middle<'a>(
+    scene: &Scene,
+    [i, j]: [u32; 2],
+    members: impl Iterator<Item = &'a Member> + Clone,
+    skew: f32,
+) -> Option<ShadingPoint> {
+    let n = scene.antialiasing;
+    let (mut count, mut x, mut y) = (0.0f32, 0.0, 0.0);
+    for member in members.clone() {
+        (count, x, y) = (count + 1.0, x + f32::from(member.at[0]), y + f32::from(member.at[1]));
+    }
+    let first = &members.clone().next()?.si;
+    if count == 1.0 {
+        return Some(point_of(first));
+    }
+    let at = |from: u32, sum: f32| from as f32 + (sum / count + 0.5) / n as f32;
+    let (ray, differential) = scene.camera.local_ray(at(i, x), at(j, y), 1.0 / n as f32);
+    let hit = scene.intersect_local(&ray).filter(|hit| hit.surface == first.surface)?;
+    let si = scene.local_surface(&ray, &hit, &differential);
+    if !is_one_surface(&si, first) {
+        return None;
+    }
+    let mut point = point_of(&si);
+    let mut normals = Vec3::ZERO;
+    for Member { si, .. } in members {
+        point.reach = point.reach.max((si.lit_from - point.p).length());
+        let turn = (si.ns - point.ns).length().max((si.horizon - point.horizon).length());
+        point.turn = point.turn.max(turn);
+        normals += si.ns - point.ns;
+    }
+    (point.turn <= MAX_TURN && normals.length() <= skew * count).then_some(point)
+}
+
+impl Member {
+    /// What the ray at `at` of its pixel sees.
+    pub fn new(si: SurfaceInteraction, at: [u16; 2]) -> Member {
+        Member { si, at }
+    }
+}
+
 impl RayHit {
     /// Where it ends.
     fn end(&self) -> DVec3 {
@@ -365,7 +535,7 @@ impl Candidate {
             match self {
                 Candidate::Sphere(i) => scene.geometry.spheres[i as usize].shape.place(ray, t),
                 Candidate::Parallelogram(i) => scene.geometry.parallelograms[i as usize].shape.place(ray, t),
-                Candidate::Light(_) => unreachable!("a light has no material"),
+                Candidate::Light(_) | Candidate::Trees => unreachable!("it has no material of its own"),
             },
             -ray.d,
         )
@@ -377,7 +547,7 @@ impl Candidate {
             match self {
                 Candidate::Sphere(i) => scene.geometry.spheres[i as usize].shape.nearest_place(q),
                 Candidate::Parallelogram(i) => scene.geometry.parallelograms[i as usize].shape.nearest_place(q),
-                Candidate::Light(_) => unreachable!("a light has no material"),
+                Candidate::Light(_) | Candidate::Trees => unreachable!("it has no material of its own"),
             },
             wo,
         )

@@ -11,7 +11,7 @@
 use std::ops::ControlFlow;
 
 use super::cell::CELL;
-use super::light_queue::{Answer, LightQueue, Place, Request};
+use super::light_queue::{Answer, LightQueue, Place, Request, Sight};
 use super::solo::Candidate;
 use super::square::Square;
 use super::{Counts, Heat};
@@ -283,7 +283,7 @@ impl Grid {
                 continue;
             };
             (item.nodes, item.center) = (nodes, self.requests.len() as u32);
-            self.requests.push(Request { place: self.asked.len() as u32, light: item.light });
+            self.requests.push(Request { place: self.asked.len() as u32, light: item.light, sight: Sight::Unknown });
             self.asked.push(place);
             self.spend(item.square, 1);
             kept.push(item);
@@ -308,12 +308,12 @@ impl Grid {
             open.push(item);
         }
         for item in &open {
-            let before = self.requests.len();
+            let (before, sight) = (self.requests.len(), centers[item.center as usize].sight);
             for node in item.nodes {
                 let known = node as usize * self.lights + item.light as usize;
                 if !self.sums[known].is_known() && !self.wanted[known] {
                     self.wanted[known] = true;
-                    self.requests.push(Request { place: self.nodes[node as usize].place, light: item.light });
+                    self.requests.push(Request { place: self.nodes[node as usize].place, light: item.light, sight });
                     self.asked_of.push(known);
                 }
             }
@@ -326,7 +326,8 @@ impl Grid {
         for item in open {
             let nodes = item.nodes.map(|node| self.sums[node as usize * self.lights + item.light as usize]);
             let block = &blocks[item.block as usize];
-            if self.is_foretold(scene, lights, block, &item, &nodes, &centers[item.center as usize]) {
+            let is_known = nodes.iter().all(Moments::is_known);
+            if is_known && self.is_foretold(scene, lights, block, &item, &nodes, &centers[item.center as usize]) {
                 self.fill(scene, &item, &nodes);
             } else {
                 failed.push(item);

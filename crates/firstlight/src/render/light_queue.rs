@@ -2,19 +2,21 @@
 
 use std::ops::ControlFlow;
 
+use arrayvec::ArrayVec;
+
 use super::Counts;
-use super::arrival::{ArrivalPlace, Arrivals};
+use super::arrival::{ArrivalPlace, Arrivals, Trees};
 use super::change::Arrival;
 use super::tiled::BEND;
 use crate::color::Rgb;
 use crate::ids::{LightId, MaterialId, SurfaceId};
-use crate::integrate::{Arrived, Illumination, ShadingPoint};
+use crate::integrate::{Arrived, Emitter, Illumination, ShadingPoint};
 use crate::light::LightKind;
 use crate::material::{Bsdf, Lobe, Moments};
-use crate::math::{Facet, Vec2};
+use crate::math::{LANES, Vec2};
 use crate::scene::Scene;
 use crate::shape::{Footprint, SurfaceInteraction, UvEdge};
-use crate::visibility::Visibility;
+use crate::visibility::{Viewpoint, Visibility};
 
 /// A place of a surface that wants light.
 #[derive(Clone, Copy, Debug)]
@@ -33,17 +35,23 @@ impl Place {
         Place { point, surface, receives_shadow, bsdf: *bsdf }
     }
 
+    /// Where its rays begin.
+    pub fn viewpoint(&self) -> Viewpoint {
+        let ShadingPoint { p, error, horizon, ng, facet, ns, .. } = self.point;
+        Viewpoint { p, error, start: error.offset(p, ng).as_vec3(), horizon, ns, but: facet }
+    }
+
     /// The same as a surface, without its texture.
     pub fn surface(&self) -> SurfaceInteraction {
-        let ShadingPoint { p, error, horizon, ns, wo, .. } = self.point;
+        let ShadingPoint { p, error, horizon, ng, facet, ns, wo, .. } = self.point;
         SurfaceInteraction {
             p,
             error,
-            ng: horizon,
+            ng,
             ns,
             lit_from: p,
             horizon,
-            facet: Facet::NONE,
+            facet,
             wo,
             uv: Vec2::ZERO,
             footprint: Footprint { dx: Vec2::ZERO, dy: Vec2::ZERO, edges: [UvEdge::Unbounded; 2] },
@@ -55,11 +63,24 @@ impl Place {
     }
 }
 
+/// What is known of the ways from a place, and from all that it stands for, to a light.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) enum Sight {
+    /// Nothing.
+    #[default]
+    Unknown,
+    /// Nothing in trees is in the way.
+    Clear,
+    /// Nothing at all is in the way.
+    Lit,
+}
+
 /// One light at one place.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Request {
     pub place: u32,
     pub light: u32,
+    pub sight: Sight,
 }
 
 /// What arrives of one light at one place.
@@ -74,12 +95,22 @@ pub(crate) struct Answer {
     /// How much light turns and grows within the reach: angles by which its direction turns, in radians, with what a
     /// highlight makes of it; more than any bound where the place is near the light or its plane.
     pub turn: f32,
+    /// How much of the light could arrive there at most, thereabouts: what turns it away takes its share of that.
+    pub most: f32,
+    /// What is known by now of the ways to the light, from all within the reach.
+    pub sight: Sight,
 }
 
 impl Answer {
     /// Of what no batch knows.
-    const UNKNOWN: Answer =
-        Answer { sums: Moments::UNKNOWN, smooth: false, motion: f32::INFINITY, turn: f32::INFINITY };
+    const UNKNOWN: Answer = Answer {
+        sums: Moments::UNKNOWN,
+        smooth: false,
+        motion: f32::INFINITY,
+        turn: f32::INFINITY,
+        most: 0.0,
+        sight: Sight::Unknown,
+    };
 }
 
 /// Asks for light.
@@ -91,11 +122,21 @@ pub(crate) struct LightQueue<'a> {
     groups: Vec<Vec<u32>>,
     points: Vec<ShadingPoint>,
     arrived: Vec<Arrived>,
+    /// Of a group: what is asked past nothing in trees.
+    clear: Vec<u32>,
 }
 
 impl<'a> LightQueue<'a> {
     pub fn new(scene: &'a Scene, arrivals: Arrivals<'a>) -> Self {
-        LightQueue { scene, arrivals, lobes: Vec::new(), groups: Vec::new(), points: Vec::new(), arrived: Vec::new() }
+        LightQueue {
+            scene,
+            arrivals,
+            lobes: Vec::new(),
+            groups: Vec::new(),
+            points: Vec::new(),
+            arrived: Vec::new(),
+            clear: Vec::new(),
+        }
     }
 
     /// Answers each request.
@@ -123,7 +164,8 @@ impl<'a> LightQueue<'a> {
                 self.lobes.push(place.bsdf.lobe);
                 self.lobes.len() - 1
             });
-            let group = (lobe * scene.lights.len() + request.light as usize) * 2 + usize::from(place.receives_shadow);
+            let shadows = place.receives_shadow && request.sight != Sight::Lit;
+            let group = (lobe * scene.lights.len() + request.light as usize) * 2 + usize::from(shadows);
             if group >= self.groups.len() {
                 self.groups.resize_with(group + 1, Vec::new);
             }
@@ -136,61 +178,142 @@ impl<'a> LightQueue<'a> {
             let light = group / 2 % scene.lights.len();
             let lobe = self.lobes[group / 2 / scene.lights.len()];
             let members = std::mem::take(&mut self.groups[group]);
-            match self.arrivals.lights.asked(light, &lobe, scene.lights[light].shadows && group % 2 == 1) {
-                Some(asked) => {
-                    let emitter = asked.emitter;
-                    self.points.clear();
-                    let scale = self.arrivals.scale(light);
-                    self.points.extend(members.iter().map(|k| {
-                        let place = &places[requests[*k as usize].place as usize];
-                        ShadingPoint {
-                            worth: scale * place.bsdf.colors,
-                            base: scene.ambient * place.bsdf.ambient,
-                            ..place.point
-                        }
-                    }));
-                    self.arrived.clear();
-                    self.arrivals.evaluate(&asked, &self.points, &mut self.arrived);
-                    for (i, k) in members.iter().enumerate() {
-                        let place = &places[requests[*k as usize].place as usize];
-                        let arrived = self.arrived[i];
-                        let settled = &mut counts.settled.visibility;
-                        match arrived.illumination {
-                            Illumination::Below => settled[Visibility::BelowHorizon as usize] += 1,
-                            Illumination::Hidden => settled[Visibility::Hidden as usize] += 1,
-                            Illumination::Full => settled[Visibility::Lit as usize] += 1,
-                            Illumination::Partial => counts.closed_form += 1,
-                            Illumination::Unknown => {}
-                        }
-                        answers[*k as usize] = if arrived.illumination == Illumination::Unknown {
-                            Answer::UNKNOWN
-                        } else {
-                            let is_near = place.point.reach > 0.4 * arrived.distance
-                                || emitter.is_one_sided() && arrived.height <= place.point.reach;
-                            Answer {
-                                sums: arrived.sums,
-                                smooth: arrived.proved,
-                                motion: arrived.motion,
-                                turn: if is_near && !arrived.proved {
-                                    f32::INFINITY
-                                } else {
-                                    self.turn(place, &lobe, arrived.distance)
-                                },
-                            }
-                        };
-                    }
+            let shadows = scene.lights[light].shadows && group % 2 == 1;
+            if self.arrivals.lights.emitters[light].is_none() {
+                for k in &members {
+                    go_on()?;
+                    let Request { place, sight, .. } = requests[*k as usize];
+                    answers[*k as usize] = self.one(light, &places[place as usize], sight, counts);
                 }
-                None => {
-                    for k in &members {
-                        go_on()?;
-                        let place = &places[requests[*k as usize].place as usize];
-                        answers[*k as usize] = self.one(light, place, counts);
-                    }
-                }
+            } else if shadows && scene.geometry.has_trees() {
+                self.past_trees(light, &lobe, places, requests, &members, answers, counts, go_on)?;
+            } else {
+                self.batch(light, &lobe, [shadows, false], places, requests, &members, answers, counts);
             }
             self.groups[group] = members;
         }
         ControlFlow::Continue(())
+    }
+
+    /// Asks some places of one highlight for a light, by batches: with or without shadows, and with what was gathered in
+    /// trees.
+    #[allow(clippy::too_many_arguments, reason = "what is asked, of whom, and where it goes")]
+    fn batch(
+        &mut self,
+        light: usize,
+        lobe: &Lobe,
+        [shadows, near]: [bool; 2],
+        places: &[Place],
+        requests: &[Request],
+        members: &[u32],
+        answers: &mut [Answer],
+        counts: &mut Counts,
+    ) {
+        let scene = self.scene;
+        let scale = self.arrivals.scale(light);
+        self.points.clear();
+        self.points.extend(members.iter().map(|k| {
+            let place = &places[requests[*k as usize].place as usize];
+            let (worth, base) = (scale * place.bsdf.colors, scene.ambient * place.bsdf.ambient);
+            ShadingPoint { worth, base, ..place.point }
+        }));
+        self.arrived.clear();
+        self.arrivals.evaluate(light, lobe, [shadows, near], &self.points, &mut self.arrived);
+        let measure = self.arrivals.measure(light);
+        let is_physical = matches!(&scene.lights[light].kind, LightKind::Area(area) if area.physical);
+        let is_one_sided = self.arrivals.lights.emitters[light].as_ref().is_some_and(Emitter::is_one_sided);
+        for (arrived, k) in self.arrived.iter().zip(members) {
+            let place = &places[requests[*k as usize].place as usize];
+            let settled = &mut counts.settled.visibility;
+            match arrived.illumination {
+                Illumination::Below => settled[Visibility::BelowHorizon as usize] += 1,
+                Illumination::Hidden => settled[Visibility::Hidden as usize] += 1,
+                Illumination::Full => settled[Visibility::Lit as usize] += 1,
+                Illumination::Partial => counts.closed_form += 1,
+                Illumination::Unknown => {}
+            }
+            let sight = match (shadows, near) {
+                (false, _) => Sight::Lit,
+                (true, false) => Sight::Clear,
+                (true, true) => Sight::Unknown,
+            };
+            answers[*k as usize] = if arrived.illumination == Illumination::Unknown {
+                Answer { sight, ..Answer::UNKNOWN }
+            } else {
+                let is_near =
+                    place.point.reach > 0.4 * arrived.distance || is_one_sided && arrived.height <= place.point.reach;
+                Answer {
+                    sums: arrived.sums,
+                    smooth: arrived.proved,
+                    motion: arrived.motion,
+                    turn: if is_near && !arrived.proved {
+                        f32::INFINITY
+                    } else {
+                        self.turn(place, lobe, arrived.distance)
+                    },
+                    most: if is_physical { measure / (arrived.distance * arrived.distance) } else { 1.0 },
+                    sight,
+                }
+            };
+        }
+    }
+
+    /// The same past what is in trees: what that is, is gathered for each place, and for neighbours that are points of
+    /// one surface together. Nobody knows what arrives where that is too much.
+    #[allow(clippy::too_many_arguments, reason = "what is asked, of whom, and where it goes")]
+    fn past_trees(
+        &mut self,
+        light: usize,
+        lobe: &Lobe,
+        places: &[Place],
+        requests: &[Request],
+        members: &[u32],
+        answers: &mut [Answer],
+        counts: &mut Counts,
+        go_on: &dyn Fn() -> ControlFlow<()>,
+    ) -> ControlFlow<()> {
+        let request = |k: u32| &requests[k as usize];
+        let place = |k: u32| &places[request(k).place as usize];
+        let mut clear = std::mem::take(&mut self.clear);
+        clear.clear();
+        let mut rest = members;
+        while let Some(first) = rest.first().copied() {
+            if request(first).sight == Sight::Clear {
+                clear.push(first);
+                rest = &rest[1..];
+                continue;
+            }
+            go_on()?;
+            let is_like = |k: &&u32| {
+                place(first).point.reach + place(**k).point.reach == 0.0
+                    && request(**k).sight == Sight::Unknown
+                    && place(**k).surface == place(first).surface
+            };
+            let mut run = 1 + rest[1..].iter().take(LANES - 1).take_while(is_like).count();
+            let mut trees = self.gather(light, places, requests, &rest[..run]);
+            while run > 1 && matches!(trees, Trees::Unknown) {
+                run /= 2;
+                trees = self.gather(light, places, requests, &rest[..run]);
+            }
+            let (now, later) = rest.split_at(run);
+            match trees {
+                Trees::Nothing => clear.extend(now),
+                Trees::Known => self.batch(light, lobe, [true, true], places, requests, now, answers, counts),
+                Trees::Unknown => answers[first as usize] = Answer::UNKNOWN,
+            }
+            rest = later;
+        }
+        self.batch(light, lobe, [true, false], places, requests, &clear, answers, counts);
+        self.clear = clear;
+        ControlFlow::Continue(())
+    }
+
+    /// Gathers what of the trees may be in the way of a light.
+    fn gather(&mut self, light: usize, places: &[Place], requests: &[Request], members: &[u32]) -> Trees {
+        let points = members.iter().map(|k| places[requests[*k as usize].place as usize].viewpoint());
+        let points: ArrayVec<Viewpoint, LANES> = points.collect();
+        let ShadingPoint { reach, turn, .. } = places[requests[members[0] as usize].place as usize].point;
+        self.arrivals.gather(light, &points, reach, turn)
     }
 
     /// How far directions turn within a place's reach, times how fast a highlight falls.
@@ -205,9 +328,11 @@ impl<'a> LightQueue<'a> {
     }
 
     /// One light at one place, by itself.
-    fn one(&mut self, light: usize, place: &Place, counts: &mut Counts) -> Answer {
+    fn one(&mut self, light: usize, place: &Place, sight: Sight, counts: &mut Counts) -> Answer {
         let si = place.surface();
         let wanted = ArrivalPlace {
+            lit: sight == Sight::Lit,
+            clear: sight != Sight::Unknown,
             reach: place.point.reach,
             turn: place.point.turn,
             share: place.point.share,
@@ -236,6 +361,8 @@ impl<'a> LightQueue<'a> {
                 // One place does not tell what it does, but some do together
                 0.1
             },
+            most: 0.0,
+            sight,
         }
     }
 

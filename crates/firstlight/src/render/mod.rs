@@ -295,7 +295,7 @@ pub fn render(
     let (done, stop) = (AtomicU64::new(0), AtomicBool::new(false));
     let by_shafts = every_ray && renderer == Renderer::Full;
     let targets = if by_shafts { Target::of_all(scene) } else { Vec::new() };
-    let by_cells = scene.geometry.listed && !scene.geometry.has_trees() && scene.lights.len() <= FEW;
+    let by_cells = scene.lights.len() <= FEW;
     let spare: Mutex<Vec<Cells>> = Mutex::new(Vec::new());
     let render_one = |tile: &Tile| {
         if stop.load(Ordering::Relaxed) {

@@ -193,28 +193,6 @@ impl Patch {
         Some(patch)
     }
 
-    /// The parts of it in the quarters of its pixel; none if it is too small, or not of one listed shape.
-    pub fn quarters(&self, scene: &Scene, pixel: [u32; 2]) -> ArrayVec<Patch, 4> {
-        let n = scene.antialiasing;
-        let (candidate, mask) = match &self.rays {
-            Rays::Mask(candidate, mask) => (*candidate, *mask),
-            Rays::All(candidate) if n <= MASKED => (*candidate, u64::MAX),
-            _ => return ArrayVec::new(),
-        };
-        if self.count(scene) <= 4 {
-            return ArrayVec::new();
-        }
-        let half = n.div_ceil(2);
-        let mut parts = [0u64; 4];
-        for k in (0..n * n).filter(|k| mask >> k & 1 == 1) {
-            parts[(k / n / half * 2 + k % n / half) as usize] |= 1 << k;
-        }
-        let parts = parts.into_iter().filter(|part| *part != 0);
-        let quarters: Option<ArrayVec<Patch, 4>> =
-            parts.map(|part| Patch::masked(scene, pixel, candidate, part)).collect();
-        quarters.unwrap_or_default()
-    }
-
     /// Finds the middle of the members, and how far they reach.
     fn settle(&mut self) {
         let Rays::Some(members) = &self.rays else { return };

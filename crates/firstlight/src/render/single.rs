@@ -73,7 +73,7 @@ impl Arrivals<'_> {
     fn edge(&mut self, light: usize, l: Vec3, finite: bool, place: &ArrivalPlace) -> f32 {
         let (scene, si) = (self.scene, place.si);
         if !scene.light_obstacles.disks.is_empty()
-            || !place.clear && !matches!(self.gather(light, std::slice::from_ref(place)), Trees::Nothing)
+            || !place.clear && !matches!(self.gather_places(light, std::slice::from_ref(place)), Trees::Nothing)
         {
             return 1.0;
         }

@@ -7,6 +7,7 @@
 use std::f32::consts::PI;
 
 use super::square::Square;
+use crate::accel::{Plane, Planes};
 use crate::ids::SurfaceId;
 use crate::light::{AreaShape, LightKind};
 use crate::material::Bsdf;
@@ -21,6 +22,8 @@ pub(crate) enum Candidate {
     Parallelogram(u32),
     /// A light's shape.
     Light(u32),
+    /// All that lies in trees.
+    Trees,
 }
 
 /// The rays of a rectangle of the film.
@@ -114,7 +117,15 @@ impl Pyramid {
                 },
                 _ => false,
             },
+            Candidate::Trees => geometry.may_meet(scene.level, &self.planes()),
         }));
+    }
+
+    /// What it lies between.
+    fn planes(&self) -> Planes {
+        let eye = Plane { n: -self.forward.as_dvec3(), p: self.eye.as_dvec3() };
+        let side = |i: usize| Plane { n: self.sides[i], p: self.corners[i].o.as_dvec3() };
+        Planes([side(0), side(1), side(2), side(3), eye])
     }
 
     /// The depths, at most and at least, at which all the rays meet a shape; `None` if not all are proved to.
@@ -142,7 +153,7 @@ impl Pyramid {
                 depths(&|ray| sphere.intersect(ray))?;
                 Some([self.nearest(scene, candidate), self.depth(sphere.c)])
             }
-            Candidate::Light(_) => None,
+            Candidate::Light(_) | Candidate::Trees => None,
         }
     }
 
@@ -170,6 +181,15 @@ impl Pyramid {
                 },
                 _ => f64::INFINITY,
             },
+            Candidate::Trees if scene.geometry.unbounded.is_empty() => {
+                let (forward, planes) = (self.forward.as_dvec3(), self.planes());
+                let boxes = scene.geometry.tree_bounds().filter(|bounds| planes.may_meet(*bounds));
+                boxes.fold(f64::INFINITY, |nearest, bounds| {
+                    let [min, max] = [bounds.min, bounds.max].map(|q| q.as_dvec3() - self.eye.as_dvec3());
+                    nearest.min(forward.max(DVec3::ZERO).dot(min) + forward.min(DVec3::ZERO).dot(max))
+                })
+            }
+            Candidate::Trees => f64::NEG_INFINITY,
         }
     }
 
@@ -207,13 +227,17 @@ impl Pyramid {
     }
 }
 
-/// All that is listed, in a scene where nothing else can be seen.
+/// All that can be seen.
 pub(crate) fn all(scene: &Scene) -> Vec<Candidate> {
     let geometry = &scene.geometry;
     let mut all = Vec::new();
-    all.extend((0..geometry.spheres.len()).filter(|i| geometry.spheres[*i].seen).map(|i| Candidate::Sphere(i as u32)));
-    let flats = &geometry.parallelograms;
-    all.extend((0..flats.len()).filter(|i| flats[*i].seen).map(|i| Candidate::Parallelogram(i as u32)));
+    if geometry.listed {
+        let spheres = 0..geometry.spheres.len();
+        all.extend(spheres.filter(|i| geometry.spheres[*i].seen).map(|i| Candidate::Sphere(i as u32)));
+        let flats = &geometry.parallelograms;
+        all.extend((0..flats.len()).filter(|i| flats[*i].seen).map(|i| Candidate::Parallelogram(i as u32)));
+    }
+    all.extend(geometry.has_trees().then_some(Candidate::Trees));
     let visible = |i: &usize| matches!(&scene.lights[*i].kind, LightKind::Area(area) if area.visible);
     all.extend((0..scene.lights.len()).filter(visible).map(|i| Candidate::Light(i as u32)));
     all
@@ -239,6 +263,17 @@ impl Candidate {
                 LightKind::Area(area) => area.shape.intersect(ray),
                 _ => None,
             },
+            Candidate::Trees => unreachable!("what lies in trees is not one shape"),
+        }
+    }
+
+    /// The shape that a ray ends at, if it is one by itself.
+    #[inline(always)]
+    pub fn of(hit: &Hit) -> Option<Candidate> {
+        match hit.at {
+            At::Sphere(i) => Some(Candidate::Sphere(i)),
+            At::Parallelogram(i) => Some(Candidate::Parallelogram(i)),
+            _ => None,
         }
     }
 
@@ -249,6 +284,7 @@ impl Candidate {
             Candidate::Sphere(i) => scene.geometry.spheres[i as usize].surface,
             Candidate::Parallelogram(i) => scene.geometry.parallelograms[i as usize].surface,
             Candidate::Light(i) => SurfaceId(scene.geometry.surfaces.len() as u32 + i),
+            Candidate::Trees => unreachable!("what lies in trees is not one shape"),
         }
     }
 
@@ -259,6 +295,7 @@ impl Candidate {
             Candidate::Sphere(i) => At::Sphere(i),
             Candidate::Parallelogram(i) => At::Parallelogram(i),
             Candidate::Light(_) => At::Light,
+            Candidate::Trees => unreachable!("what lies in trees is not one shape"),
         };
         Hit { t, surface: self.surface(scene), at }
     }
@@ -327,7 +364,7 @@ impl Candidate {
     pub fn curvature(self, scene: &Scene) -> f32 {
         match self {
             Candidate::Sphere(i) => (1.0 / scene.geometry.spheres[i as usize].shape.r) as f32,
-            Candidate::Parallelogram(_) | Candidate::Light(_) => 0.0,
+            Candidate::Parallelogram(_) | Candidate::Light(_) | Candidate::Trees => 0.0,
         }
     }
 }

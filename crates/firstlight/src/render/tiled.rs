@@ -1,27 +1,17 @@
-//! The renderer of scenes that batches do not know yet, with meshes and other things in trees or with many lights: a
-//! cell of pixels goes through the same stations together, and each surface in a pixel is shaded once where that is
-//! shown to be enough.
+//! The renderer of scenes with many lights: each surface in a pixel of a cell is shaded once where that is shown to be
+//! enough.
 //!
-//! - Which surfaces pixels hold: squares that hold one are proved without a ray for each ([`solo`](super::solo)), else
-//!   all n x n camera rays say it ([`patch`](super::patch)). Where lights are many, [`many`](super::many) takes the
-//!   place of the next.
-//! - What arrives of each light at the middle of each patch, with a bound of how much it bends over it
-//!   ([`arrival`](super::arrival)).
-//! - Where the bound would show, the neighbours are asked: where shadows and highlights are wider than a pixel, what
-//!   light does over a pixel shows in the second difference of three. Where that would show as well, or tells nothing,
-//!   the light is asked for at every ray.
+//! Squares of pixels that hold one surface are proved without a ray for each ([`solo`](super::solo)), else all n x n
+//! camera rays say it ([`patch`](super::patch)); what the lights do there, [`many`](super::many) says.
 //!
 //! Cells lie on a grid of the film, with a rim of one pixel around each, so that no decision depends on tiles or crops.
 
-mod behind;
 mod mean;
-mod squares;
 
 use std::ops::ControlFlow;
 
-use super::arrival::{ArrivalPlace, Arrivals};
+use super::arrival::Arrivals;
 use super::cell::CELL;
-use super::change::Arrival;
 use super::film::FilmTile;
 use super::hits::PixelHits;
 use super::many::Many;
@@ -32,12 +22,7 @@ use super::square::Square;
 use super::tile::Tile;
 use super::{AaMode, Counts};
 use crate::color::Rgb;
-use crate::integrate::Arrived;
-use crate::material::Moments;
 use crate::scene::Scene;
-use crate::visibility::Viewpoint;
-use behind::{Block, Outlook, Sights};
-use squares::Node;
 
 pub(super) use mean::{BEND, second_difference, within};
 
@@ -80,38 +65,15 @@ pub(crate) struct Tiled<'a> {
     work: Vec<f32>,
     /// Where the light of each pixel's patches begins among all of the cell, once it is known.
     first: Vec<usize>,
-    /// What arrived at each patch, light by light, and what that makes.
-    arrived: Vec<Arrival>,
-    values: Vec<Rgb>,
-    found: Vec<Arrival>,
-    /// Diffuse and specular of each light at one pixel, in scene order.
-    terms: Vec<LightTerm>,
-    /// The same of many lights, each with its scale.
+    /// Diffuse and specular of each light at one pixel, with its scale.
     scaled_terms: Vec<(Rgb, LightTerm)>,
-    /// What the rays of each pixel's patches see of each light past what is in trees, and where those of a pixel begin.
-    outlooks: Vec<Outlook>,
-    seen: Vec<usize>,
-    block: Block,
-    sights: Vec<Sights>,
-    /// What each light would send to each patch of the cell if nothing were in the way, once that is known.
-    wholes: Vec<Vec<Arrived>>,
-    /// Which share of each light pixels see at least, as a few of their rays say, light by light; and which were asked.
-    votes: Vec<f32>,
-    voted: Vec<bool>,
-    /// The rays of a square, and the pixels of the cell that were asked for squares, light by light.
-    points: Vec<Viewpoint>,
-    nodes: Vec<(usize, usize, Node)>,
-    /// In place of `arrived`, `values` where lights are many.
-    many: Option<Many<'a>>,
+    many: Many<'a>,
 }
-
-/// Of a pixel whose light is not known.
-const UNLIT: usize = usize::MAX;
 
 impl<'a> Tiled<'a> {
     pub fn new(scene: &'a Scene, mode: AaMode, hits: PixelHits, arrivals: Arrivals<'a>) -> Self {
         let listed = scene.geometry.listed && !scene.geometry.has_trees();
-        let many = arrivals.tree().map(|tree| Many::new(scene, tree));
+        let many = Many::new(scene, arrivals.tree().expect("scenes with many lights have a tree"));
         Tiled {
             scene,
             mode,
@@ -124,21 +86,8 @@ impl<'a> Tiled<'a> {
             colors: vec![None; ACROSS * ACROSS],
             work: vec![0.0; ACROSS * ACROSS],
             pixels: (0..ACROSS * ACROSS).map(|_| PixelPatches::default()).collect(),
-            first: vec![UNLIT; ACROSS * ACROSS],
-            arrived: Vec::new(),
-            values: Vec::new(),
-            found: Vec::new(),
-            terms: Vec::new(),
+            first: vec![0; ACROSS * ACROSS],
             scaled_terms: Vec::new(),
-            outlooks: Vec::new(),
-            seen: vec![UNLIT; ACROSS * ACROSS],
-            block: Block::default(),
-            sights: Vec::new(),
-            wholes: vec![Vec::new(); scene.lights.len()],
-            votes: vec![f32::NAN; ACROSS * ACROSS * scene.lights.len()],
-            voted: vec![false; ACROSS * ACROSS * scene.lights.len()],
-            points: Vec::new(),
-            nodes: Vec::new(),
             many,
         }
     }
@@ -168,28 +117,15 @@ impl<'a> Tiled<'a> {
         self.known.fill(Known::Nothing);
         self.colors.fill(None);
         self.work.fill(0.0);
-        self.first.fill(UNLIT);
-        self.arrived.clear();
-        self.values.clear();
-        self.outlooks.clear();
-        self.nodes.clear();
-        self.voted.fill(false);
-        self.votes.fill(f32::NAN);
-        self.seen.fill(UNLIT);
         if let Some(listed) = &self.listed {
             let [x, y] = corner.map(|at| at as f32 - 1.0);
             Pyramid::new(scene, x, y, ACROSS as f32).candidates(scene, listed, &mut self.near[0]);
             // All of the cell, also where it is not in the tile: what is found must not depend on that
             self.split(Square { x: corner[0], y: corner[1], side: CELL }, 1, counts, go_on)?;
         } else {
-            self.trace(tile, counts, go_on)?;
+            self.trace(counts, go_on)?;
         }
-        if self.many.is_some() {
-            self.look_at_all(counts, go_on)?;
-        } else {
-            self.ask_all(tile, counts);
-            go_on()?;
-        }
+        self.look_at_all(counts, go_on)?;
         let rays = (scene.antialiasing * scene.antialiasing) as u64;
         for y in 0..CELL {
             for x in 0..CELL {
@@ -266,8 +202,8 @@ impl<'a> Tiled<'a> {
         }
     }
 
-    /// Traces all rays of a cell and its rim, and looks for lights from what they meet.
-    fn trace(&mut self, tile: &Tile, counts: &mut Counts, go_on: &impl Fn() -> ControlFlow<()>) -> ControlFlow<()> {
+    /// Traces all rays of a cell and its rim.
+    fn trace(&mut self, counts: &mut Counts, go_on: &impl Fn() -> ControlFlow<()>) -> ControlFlow<()> {
         let scene = self.scene;
         let once = self.mode == AaMode::Adaptive;
         let rays = (scene.antialiasing * scene.antialiasing) as u64;
@@ -288,20 +224,6 @@ impl<'a> Tiled<'a> {
                     self.work[index] = rays as f32;
                     counts.looks += rays;
                 }
-            }
-            go_on()?;
-        }
-        if !scene.geometry.has_trees() || self.many.is_some() {
-            return ControlFlow::Continue(());
-        }
-        self.begin_looking();
-        if once {
-            self.squares(counts, go_on)?;
-        }
-        for block_y in (top..bottom).step_by(side as usize) {
-            for block_x in (left..right).step_by(side as usize) {
-                let (w, h) = ((right - block_x).min(side), (bottom - block_y).min(side));
-                self.look(tile, [block_x, block_y], [w, h], counts);
             }
             go_on()?;
         }
@@ -331,19 +253,6 @@ impl<'a> Tiled<'a> {
         true
     }
 
-    /// Makes sure that the patches of a pixel of the cell or its rim are known, and what arrives at them; `false` if
-    /// the film ends before it.
-    fn ask(&mut self, at: [u32; 2], counts: &mut Counts) -> bool {
-        if at[0] < self.scene.width && at[1] < self.scene.height && self.first[self.index(at)] != UNLIT {
-            return true;
-        }
-        if !self.hold(at, counts) {
-            return false;
-        }
-        self.middles(&[self.index(at)], counts);
-        true
-    }
-
     /// Finds out what many lights do at all patches of the cell and its rim.
     fn look_at_all(&mut self, counts: &mut Counts, go_on: &impl Fn() -> ControlFlow<()>) -> ControlFlow<()> {
         let before = counts.work();
@@ -354,90 +263,10 @@ impl<'a> Tiled<'a> {
                 self.pixels[y as usize * ACROSS + x as usize].clear();
             }
         }
-        if let Some(many) = &mut self.many {
-            many.look(&self.pixels, &mut self.first, &mut self.arrivals, counts, go_on)?;
-        }
+        self.many.look(&self.pixels, &mut self.first, &mut self.arrivals, counts, go_on)?;
         let each = (counts.work() - before) / (CELL * CELL) as f32;
         self.work.iter_mut().for_each(|work| *work += each);
         ControlFlow::Continue(())
-    }
-
-    /// Makes sure that it is known what arrives at the middles of all patches of the part of the cell that is in a
-    /// tile.
-    fn ask_all(&mut self, tile: &Tile, counts: &mut Counts) {
-        let [x, y] = self.corner;
-        let mut asked = Vec::new();
-        for at in (Square { x, y, side: CELL }).pixels().filter(|at| tile.contains(*at)) {
-            let index = self.index(at);
-            if self.colors[index].is_none() && self.first[index] == UNLIT && self.hold(at, counts) {
-                asked.push(index);
-            }
-        }
-        let before = counts.work();
-        self.middles(&asked, counts);
-        let each = (counts.work() - before) / asked.len().max(1) as f32;
-        asked.iter().for_each(|index| self.work[*index] += each);
-    }
-
-    /// Finds out what arrives at the middles of the patches of some pixels.
-    fn middles(&mut self, pixels: &[usize], counts: &mut Counts) {
-        let (scene, lights) = (self.scene, self.scene.lights.len());
-        for index in pixels {
-            self.first[*index] = self.values.len();
-            self.values.extend(self.pixels[*index].patches.iter().map(|patch| scene.ambient * patch.bsdf.ambient));
-        }
-        self.arrived.resize(self.values.len() * lights, Arrival::even(Moments::default()));
-        for light in 0..lights {
-            let (mut places, mut asked, mut told) = (Vec::new(), Vec::new(), Vec::new());
-            for index in pixels {
-                for (k, patch) in self.pixels[*index].patches.iter().enumerate() {
-                    let number = self.first[*index] + k;
-                    let outlook = self.outlook(*index, k, light);
-                    match outlook {
-                        Outlook::Dark => continue,
-                        Outlook::Parted => self.arrived[number * lights + light] = Arrival::PARTED,
-                        Outlook::Settled(terms) => {
-                            self.arrived[number * lights + light] = Arrival::PARTED;
-                            self.values[number] += terms.sum() * (1.0 / patch.count(scene) as f32);
-                        }
-                        Outlook::Lit | Outlook::Clear | Outlook::Unknown => {
-                            let lit = matches!(outlook, Outlook::Lit);
-                            let clear = lit || matches!(outlook, Outlook::Clear);
-                            let place = self.arrivals.place(light, &patch.si, &patch.bsdf).over(patch);
-                            let share = self.share(patch);
-                            let place = ArrivalPlace { share, parted: true, lit, clear, ..place };
-                            let whole = || self.wholes[light].get(self.seen[*index] / lights + k).copied();
-                            match lit.then(whole).flatten() {
-                                Some(arrived) => {
-                                    let found = self.arrivals.found(light, &place, arrived, counts);
-                                    let arrival = self.arrivals.arrival_of(light, &place, found, counts);
-                                    told.push((number, place.colors(), arrival));
-                                }
-                                None => {
-                                    places.push(place);
-                                    asked.push(number);
-                                }
-                            }
-                        }
-                    }
-                }
-            }
-            self.arrivals.arrivals(light, &places, &mut self.found, counts);
-            let asked = asked.into_iter().zip(&places).zip(&self.found);
-            told.extend(asked.map(|((number, place), arrival)| (number, place.colors(), *arrival)));
-            for (number, colors, arrival) in told {
-                self.values[number] += colors.of(&arrival.sums);
-                self.arrived[number * lights + light] = arrival;
-            }
-        }
-    }
-
-    /// What the rays of a pixel's patch, its `k`-th, see of a light past what is in trees.
-    fn outlook(&self, pixel: usize, k: usize, light: usize) -> Outlook {
-        match self.seen[pixel] {
-            UNLIT => Outlook::Unknown,
-            first => self.outlooks[first + k * self.scene.lights.len() + light],
-        }
     }
 
     /// The colour of a pixel: red, green, blue premultiplied, alpha.
@@ -448,15 +277,10 @@ impl<'a> Tiled<'a> {
         for patch in &self.pixels[index].patches {
             terms.ambient += scene.ambient * patch.bsdf.ambient * patch.count(scene) as f32;
         }
-        if let Some(many) = &mut self.many {
-            let scaled = &mut self.scaled_terms;
-            scaled.clear();
-            many.finish(&self.pixels, &self.first, index, at, &mut self.arrivals, counts, |term| scaled.push(term));
-            return terms.resolve(scene, scaled.iter().copied());
-        }
-        self.terms.clear();
-        self.terms.resize(scene.lights.len(), LightTerm::BLACK);
-        self.light_by_light(at, counts);
-        terms.resolve(scene, self.arrivals.scales().iter().copied().zip(self.terms.iter().copied()))
+        let scaled = &mut self.scaled_terms;
+        scaled.clear();
+        let arrivals = &mut self.arrivals;
+        self.many.finish(&self.pixels, &self.first, index, at, arrivals, counts, |term| scaled.push(term));
+        terms.resolve(scene, scaled.iter().copied())
     }
 }

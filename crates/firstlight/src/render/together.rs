@@ -16,7 +16,7 @@ use crate::integrate::{Arrived, Illumination};
 use crate::light::SERIES;
 use crate::material::{Bsdf, Lobe, MOMENTS, Moments};
 use crate::shape::SurfaceInteraction;
-use crate::visibility::{View, Viewpoint};
+use crate::visibility::{View, Viewpoint, Visibility};
 
 /// The points that a ray asks first where masks tell what is hidden, and how many times as many it asks next.
 const MASKED: usize = 64;
@@ -260,6 +260,13 @@ impl Together {
             self.shares += if lit { 1.0 } else { f32::NAN };
             self.sharing += 1;
         }
+    }
+
+    /// Asks points of the light for one ray, as nobody knows what it sees.
+    pub fn ask_points(&mut self, arrivals: &mut Arrivals, si: &SurfaceInteraction, bsdf: &Bsdf, counts: &mut Counts) {
+        let place = ArrivalPlace { share: self.share, ..arrivals.place(self.light, si, bsdf) };
+        counts.settled.visibility[Visibility::Mask as usize] += 1;
+        self.hear(&place, Seen::Behind(None), arrivals, counts);
     }
 
     /// Hears what one ray sees.

@@ -3,7 +3,7 @@
 use fearless_simd::{Level, Simd};
 
 use super::geometry::{At, Geometry, Hit, Item, Meets, Nearest, Placed, Spot, Target};
-use crate::accel::{RayPacket16, RayTile, TraceRay, dispatch_eight, dispatch_sixteen};
+use crate::accel::{Aabb, Planes, RayPacket16, RayTile, TraceRay, dispatch_eight, dispatch_sixteen};
 use crate::ids::{LightId, MaterialId, SurfaceId};
 use crate::math::{DVec3, Ray, ShadowRay, Vec3};
 use crate::shape::{Mesh, RayDifferential, ShapePoint, SolidHit, TileHits, TrianglePoint, every};
@@ -13,6 +13,32 @@ impl Geometry {
     #[inline(always)]
     pub fn has_trees(&self) -> bool {
         self.world.is_some() || !self.items.is_empty() || !self.unbounded.is_empty()
+    }
+
+    /// The boxes around all that lies in trees and has an end.
+    pub fn tree_bounds(&self) -> impl Iterator<Item = Aabb> {
+        let upper = (!self.items.is_empty()).then(|| self.upper.bounds());
+        self.world.iter().map(|world| world.mesh.tree.bounds()).chain(upper)
+    }
+
+    /// Whether camera rays inside of `planes` may meet anything that lies in trees.
+    pub fn may_meet(&self, level: Level, planes: &Planes) -> bool {
+        let is_seen = |thing: &u32| self.placed[*thing as usize].camera != Meets::None;
+        self.unbounded.iter().any(is_seen)
+            || self.tree_bounds().any(|bounds| planes.may_meet(bounds))
+                && dispatch_eight!(level, simd => self.reaches(simd, planes))
+    }
+
+    #[inline(always)]
+    fn reaches<S: Simd>(&self, simd: S, planes: &Planes) -> bool {
+        let meet = |center: Vec3, half: f32| {
+            let planes = planes.within(center, half);
+            #[inline(always)]
+            move |simd, node: &_| planes.meet(simd, node)
+        };
+        let of_world = self.world.as_ref().filter(|world| world.camera != Meets::None);
+        of_world.is_some_and(|world| !world.mesh.tree.gather(simd, meet, |_| false))
+            || !self.upper.gather(simd, meet, |_| false)
     }
 
     /// Offers what a camera ray meets in the trees.

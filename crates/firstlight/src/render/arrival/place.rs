@@ -22,8 +22,6 @@ pub(crate) struct ArrivalPlace<'a> {
     /// Whether it is known that nothing is in the way of the light, or nothing in trees.
     pub lit: bool,
     pub clear: bool,
-    /// Whether it stands for a patch, of which points of the light are asked at each ray, if at all.
-    pub parted: bool,
     /// What is there beside this light, at least.
     pub base: Rgb,
     /// What the two sums are multiplied with: the light's scale, and the surface's colours.
@@ -43,7 +41,6 @@ impl<'a> ArrivalPlace<'a> {
             share: 1.0,
             lit: false,
             clear: false,
-            parted: false,
             base,
             scale,
             reflected,

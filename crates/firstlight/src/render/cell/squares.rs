@@ -10,15 +10,17 @@ use std::ops::ControlFlow;
 
 use arrayvec::ArrayVec;
 
-use super::behind::Outlook;
-use super::{CELL, Counts, Tiled};
+use super::behind::{NONE, Outlook};
+use super::{CELL, Cells};
 use crate::color::Rgb;
 use crate::ids::LightId;
 use crate::material::Moments;
 use crate::math::{LANES, Vec3};
+use crate::render::Counts;
 use crate::render::beams::{Packet, Traced};
+use crate::render::fragment::{Contrast, Fragment};
+use crate::render::light_queue::Place;
 use crate::render::many::FEW;
-use crate::render::patch::{Contrast, Member, Patch, Rays};
 use crate::render::square::Square;
 use crate::render::tile::Tile;
 use crate::visibility::Viewpoint;
@@ -59,9 +61,10 @@ pub(super) struct Node {
 struct Places([u32; 3]);
 
 impl Places {
-    /// Of a square that begins at `from` on a film so long: the last is the next square's first, where there is one.
-    fn new(from: u32, side: u32, film: u32) -> Places {
-        Places([0, side / 2, if from + side < film { side } else { side - 1 }])
+    /// Of a square that begins at `from` in a cell that ends there: the last is the next square's first, where there is
+    /// one.
+    fn new(from: u32, side: u32, end: u32) -> Places {
+        Places([0, side / 2, if from + side < end { side } else { side - 1 }])
     }
 
     /// What each is worth for a pixel, on the parabola through them.
@@ -81,7 +84,7 @@ impl Places {
     }
 }
 
-impl Tiled<'_> {
+impl Cells<'_> {
     /// Lights what squares of the cell tell.
     pub(super) fn squares(&mut self, counts: &mut Counts, go_on: &impl Fn() -> ControlFlow<()>) -> ControlFlow<()> {
         let scene = self.scene;
@@ -94,7 +97,7 @@ impl Tiled<'_> {
                 continue;
             }
             let lights: ArrayVec<usize, FEW> =
-                (0..scene.lights.len()).filter(|light| self.arrivals.is_behind(*light)).collect();
+                (0..scene.lights.len()).filter(|light| self.lights.arrivals.is_behind(*light)).collect();
             self.square(square, &lights, counts);
             go_on()?;
         }
@@ -104,6 +107,11 @@ impl Tiled<'_> {
     /// Asks for some lights over a square, or over those of its quarters that tell.
     fn square(&mut self, square: Square, lights: &[usize], counts: &mut Counts) {
         let mut left = ArrayVec::<usize, FEW>::new();
+        let is_open = |light: &usize| square.pixels().any(|at| self.is_unknown(at, *light));
+        let lights: ArrayVec<usize, FEW> = lights.iter().copied().filter(is_open).collect();
+        if lights.is_empty() {
+            return;
+        }
         if self.is_smooth(square) {
             let behind: ArrayVec<usize, FEW> =
                 lights.iter().copied().filter(|light| !self.is_clear(square, *light, counts)).collect();
@@ -122,17 +130,33 @@ impl Tiled<'_> {
         }
     }
 
-    /// The patch that fills a pixel and has all of its rays.
-    fn whole(&self, at: [u32; 2]) -> Option<&Patch> {
-        if at[0] >= self.scene.width || at[1] >= self.scene.height {
+    /// The fragment that fills a pixel of the cell and has all of its rays.
+    fn whole(&self, at: [u32; 2]) -> Option<(usize, &Fragment)> {
+        let [x, y] = self.corner;
+        if !(Tile { x, y, width: CELL, height: CELL }).contains(at) {
             return None;
         }
-        match &self.pixels[self.index(at)].patches[..] {
-            [patch] if !patch.uneven && patch.is_whole(self.scene) && matches!(patch.rays, Rays::Some(_)) => {
-                Some(patch)
-            }
-            _ => None,
+        match self.behind.only[self.index(at)] {
+            NONE => None,
+            number => Some((number as usize, &self.fragments.all[number as usize])),
         }
+    }
+
+    /// Whether nothing is known of what a pixel's only fragment sees of a light.
+    fn is_unknown(&self, at: [u32; 2], light: usize) -> bool {
+        self.whole(at).is_some_and(|(number, _)| matches!(self.outlook(number, light), Outlook::Unknown))
+    }
+
+    /// The middle between two opposite rays of a pixel that is filled.
+    fn standing(&self, at: [u32; 2]) -> Option<Place> {
+        let (_, fragment) = self.whole(at)?;
+        let [one, other] = [0, fragment.rays.len() - 1].map(|k| self.fragments.place(self.scene, fragment, k));
+        let mean = |a: Vec3, b: Vec3| (a + b) * 0.5;
+        let mut place = one;
+        place.point.p = mean(one.point.p, other.point.p);
+        place.point.ns = mean(one.point.ns, other.point.ns).normalize_or_zero();
+        place.point.ng = mean(one.point.ng, other.point.ng).normalize_or_zero();
+        Some(place)
     }
 
     /// Whether one smooth surface fills all pixels of a square, and those that are asked for it.
@@ -141,24 +165,32 @@ impl Tiled<'_> {
         if x + side > self.scene.width || y + side > self.scene.height {
             return false;
         }
-        let Some(middle) = self.whole([x + side / 2, y + side / 2]) else { return false };
-        let is_like = |patch: &Patch| {
-            let (one, other) = (&middle.si, &patch.si);
+        let at = |i: u32, j: u32| self.standing([x + i, y + j]);
+        let Some(middle) = at(side / 2, side / 2) else { return false };
+        let is_like = |place: &Place| {
+            let (one, other) = (&middle.point, &place.point);
             let way = other.p - one.p;
-            one.surface == other.surface
-                && one.material == other.material
-                && one.receives_shadow == other.receives_shadow
-                && middle.bsdf.lobe == patch.bsdf.lobe
+            middle.surface == place.surface
+                && middle.bsdf.lobe == place.bsdf.lobe
                 && one.ns.dot(other.ns) > SAME_NORMAL
                 && way.dot(one.ng).abs() <= OFF_PLANE * way.length()
         };
-        let is_whole = |at: [u32; 2]| self.whole(at).is_some_and(is_like);
+        // With the first of what lies beside it
+        let across = side + 1;
+        let mut normals = Vec::with_capacity((across * across) as usize);
         let [columns, rows] = self.places(square);
-        let mut all = square.pixels().chain(rows.0.into_iter().flat_map(|j| columns.0.map(|i| [x + i, y + j])));
-        if !all.all(is_whole) {
-            return false;
+        for (j, i) in (0..across).flat_map(|j| (0..across).map(move |i| (j, i))) {
+            let is_asked = columns.0.contains(&i) && rows.0.contains(&j);
+            if (i == side || j == side) && !is_asked {
+                normals.push(Vec3::ZERO);
+                continue;
+            }
+            match at(i, j) {
+                Some(place) if is_like(&place) => normals.push(place.point.ns),
+                _ => return false,
+            }
         }
-        let normal = |i: u32, j: u32| self.whole([x + i, y + j]).map_or(Vec3::ZERO, |patch| patch.si.ns);
+        let normal = |i: u32, j: u32| normals[(j * across + i) as usize];
         let nodes = rows.0.map(|j| columns.0.map(|i| normal(i, j)));
         (0..side).all(|j| {
             let down = rows.weights(j);
@@ -176,24 +208,26 @@ impl Tiled<'_> {
 
     /// Which columns and rows of a square are asked.
     fn places(&self, Square { x, y, side }: Square) -> [Places; 2] {
-        [Places::new(x, side, self.scene.width), Places::new(y, side, self.scene.height)]
+        let end = |axis: usize| (self.corner[axis] + CELL).min([self.scene.width, self.scene.height][axis]);
+        [Places::new(x, side, end(0)), Places::new(y, side, end(1))]
     }
 
     /// Whether nothing in trees is in the way of a light from a square, which is noted, or it does not shine there.
     fn is_clear(&mut self, square: Square, light: usize, counts: &mut Counts) -> bool {
         let scene = self.scene;
-        let Some(patch) = self.whole([square.x, square.y]) else { return true };
-        let lights = scene.geometry.lights_of(patch.si.surface);
-        if !scene.geometry.links.contains(lights, LightId(light as u32)) || !patch.si.receives_shadow {
+        let Some((_, fragment)) = self.whole([square.x, square.y]) else { return true };
+        let lights = scene.geometry.lights_of(fragment.surface);
+        let receives_shadow = scene.geometry.surfaces[fragment.surface.index()].receives_shadow;
+        if !scene.geometry.links.contains(lights, LightId(light as u32)) || !receives_shadow {
             return true;
         }
-        let mut points = std::mem::take(&mut self.points);
+        let mut points = std::mem::take(&mut self.behind.points);
         self.viewpoints(square, &mut points);
-        let (is_behind, is_lit) = self.arrivals.gather_for(light, &points, counts);
-        self.points = points;
+        let (is_behind, is_lit) = self.lights.arrivals.gather_for(light, &points, counts);
+        self.behind.points = points;
         if !is_behind {
             for at in square.pixels() {
-                self.note(at, light, if is_lit { Outlook::Lit } else { Outlook::Clear });
+                self.note_at(at, light, if is_lit { Outlook::Lit } else { Outlook::Clear });
             }
         }
         !is_behind
@@ -203,16 +237,18 @@ impl Tiled<'_> {
     fn viewpoints(&self, square: Square, points: &mut Vec<Viewpoint>) {
         points.clear();
         for at in square.pixels() {
-            if let Some(Patch { rays: Rays::Some(members), .. }) = self.whole(at) {
-                points.extend(members.iter().map(|member| Viewpoint::of(&member.si)));
+            if let Some((_, fragment)) = self.whole(at) {
+                let rays = 0..fragment.rays.len();
+                points.extend(rays.map(|k| self.fragments.place(self.scene, fragment, k).viewpoint()));
             }
         }
     }
 
-    /// Notes what a pixel's only patch sees of a light.
-    fn note(&mut self, at: [u32; 2], light: usize, outlook: Outlook) {
-        let index = self.index(at);
-        self.outlooks[self.seen[index] + light] = outlook;
+    /// Notes what a pixel's only fragment sees of a light, if that is not known.
+    fn note_at(&mut self, at: [u32; 2], light: usize, outlook: Outlook) {
+        if let Some((number, _)) = self.whole(at) {
+            self.note(number, light, outlook);
+        }
     }
 
     /// Finds out which share of a light each pixel of a square sees, and those around it in the cell, by a few of its
@@ -226,8 +262,8 @@ impl Tiled<'_> {
         for (j, i) in blocks(1).flat_map(|j| blocks(0).map(move |i| (j, i))).collect::<ArrayVec<_, 64>>() {
             let at = [i * BLOCK, j * BLOCK];
             let known = self.index(at) * self.scene.lights.len() + light;
-            if !self.voted[known] {
-                self.voted[known] = true;
+            if !self.behind.voted[known] {
+                self.behind.voted[known] = true;
                 self.vote(at, light, counts);
             }
         }
@@ -237,22 +273,19 @@ impl Tiled<'_> {
     /// other.
     fn vote(&mut self, [x, y]: [u32; 2], light: usize, counts: &mut Counts) {
         let scene = self.scene;
-        let asker = self.arrivals.asker(light);
+        let asker = self.lights.arrivals.asker(light);
         let at = |inner: usize| [x + inner as u32 % BLOCK, y + inner as u32 / BLOCK];
-        let members = |inner: usize| match self.whole(at(inner)) {
-            Some(Patch { rays: Rays::Some(members), .. }) => Some(members),
-            _ => None,
-        };
-        let pixels: [Option<&Vec<Member>>; LANES] = std::array::from_fn(members);
+        let pixels: [Option<(usize, &Fragment)>; LANES] = std::array::from_fn(|inner| self.whole(at(inner)));
         let mut packet: Option<Packet> = None;
         let mut traced = Traced::default();
         let mut asked = [[0u32; 2]; LANES];
         for cell in 0..LOOKING {
-            for (inner, members) in pixels.iter().enumerate() {
-                let Some(members) = members else { continue };
+            for (inner, pixel) in pixels.iter().enumerate() {
+                let Some((_, fragment)) = pixel else { continue };
                 // Each ray once, if there are as many
                 let turn = (at(inner)[0] * 7 + at(inner)[1] * 3) as usize % LOOKING;
-                let point = Viewpoint::of(&members[(cell ^ turn) % members.len()].si);
+                let ray = (cell ^ turn) % fragment.rays.len();
+                let point = self.fragments.place(scene, fragment, ray).viewpoint();
                 let l = asker.point(inner, LOOKING, cell) - point.p;
                 if point.horizon.dot(l) > 0.0 && point.ns.dot(l) > 0.0 {
                     asked[inner][0] += 1;
@@ -271,14 +304,14 @@ impl Tiled<'_> {
         counts.settled.traced += traced.rays;
         for (inner, [asked, hidden]) in asked.into_iter().enumerate() {
             let index = self.index(at(inner));
-            self.votes[index * scene.lights.len() + light] = (asked - hidden) as f32 / asked as f32;
+            self.behind.votes[index * scene.lights.len() + light] = (asked - hidden) as f32 / asked as f32;
         }
     }
 
     /// Whether the border of a penumbra runs through a square: pixels around which all rays see a light, or none does,
     /// and others.
     fn is_on_border(&self, square: Square, light: usize) -> bool {
-        let vote = |at: [u32; 2]| self.votes[self.index(at) * self.scene.lights.len() + light];
+        let vote = |at: [u32; 2]| self.behind.votes[self.index(at) * self.scene.lights.len() + light];
         let [x, y] = self.corner;
         let cell = Tile { x, y, width: CELL, height: CELL };
         let inside = |at: [u32; 2]| cell.contains(at) && self.whole(at).is_some();
@@ -294,9 +327,13 @@ impl Tiled<'_> {
         kinds.into_iter().filter(|kind| *kind).count() > 1
     }
 
-    /// The share of a light that a pixel sees at least, by its few rays; not a number where none were asked.
-    pub(super) fn share_seen(&self, index: usize, light: usize) -> f32 {
-        self.votes[index * self.scene.lights.len() + light] - AT_LEAST
+    /// The share of a light that a fragment sees at least, by a few rays of its pixel; not a number where none were asked.
+    pub(super) fn share_seen(&self, fragment: usize, light: usize) -> f32 {
+        let index = self.pixels[self.fragments.all[fragment].pixel as usize].index as usize;
+        if self.behind.only[index] != fragment as u32 {
+            return f32::NAN;
+        }
+        self.behind.votes[index * self.scene.lights.len() + light] - AT_LEAST
     }
 
     /// Whether nine pixels of a square tell what the others see of a light, which agrees with what a few rays of those
@@ -312,12 +349,10 @@ impl Tiled<'_> {
             }
         }
         // Where nothing is in the way, each pixel has its closed form
-        let vote = |at: [u32; 2]| self.votes[self.index(at) * self.scene.lights.len() + light];
+        let vote = |at: [u32; 2]| self.behind.votes[self.index(at) * self.scene.lights.len() + light];
         if nodes.as_flattened().iter().all(|node| node.share == 1.0) && square.pixels().all(|at| vote(at) == 1.0) {
             for at in square.pixels() {
-                if !matches!(self.outlook(self.index(at), 0, light), Outlook::Settled(_)) {
-                    self.note(at, light, Outlook::Clear);
-                }
+                self.note_at(at, light, Outlook::Clear);
             }
             return true;
         }
@@ -342,7 +377,7 @@ impl Tiled<'_> {
         let (mut off, mut counted) = (0.0, 0.0f32);
         let mut told = [Moments::default(); (LARGEST * LARGEST) as usize];
         for (number, at) in square.pixels().enumerate() {
-            let share = self.votes[self.index(at) * self.scene.lights.len() + light];
+            let share = self.behind.votes[self.index(at) * self.scene.lights.len() + light];
             let [across, down] = [columns.weights(number as u32 % side), rows.weights(number as u32 / side)];
             let (mut sums, mut foretold) = (Moments::default(), 0.0);
             for (row, down) in nodes.iter().zip(down) {
@@ -363,13 +398,12 @@ impl Tiled<'_> {
             return false;
         }
         for (at, sums) in square.pixels().zip(told) {
-            let index = self.index(at);
-            if matches!(self.outlook(index, 0, light), Outlook::Settled(_)) {
+            let Some((fragment, of)) = self.whole(at) else { continue };
+            if matches!(self.outlook(fragment, light), Outlook::Settled(_) | Outlook::Told) {
                 continue;
             }
-            let patch = &self.pixels[index].patches[0];
             // Of two colours that meet different light the mean is no product of means
-            if patch.contrast != Contrast::default() {
+            if of.contrast != Contrast::default() {
                 let number = ((at[1] - y) * side + at[0] - x) as usize;
                 let beside =
                     |step: usize, place: u32| told[if place + 1 < side { number + step } else { number - step }];
@@ -377,16 +411,16 @@ impl Tiled<'_> {
                 for other in [beside(1, at[0] - x), beside(side as usize, at[1] - y)] {
                     slope += other.apart(sums);
                 }
-                let mingled = patch.contrast.of(&slope) * 0.125;
-                let scale = self.arrivals.scale(light);
-                let value = scale * patch.bsdf.colors.of(&sums);
-                if self.arrivals.steps(value, scale * mingled) > MINGLED {
+                let mingled = of.contrast.of(&slope) * 0.125;
+                let scale = self.lights.arrivals.scale(light);
+                let value = scale * of.bsdf.colors.of(&sums);
+                if self.lights.arrivals.steps(value, scale * mingled) > MINGLED {
                     continue;
                 }
             }
             let all = sums * rays;
-            let terms = patch.bsdf.colors.each(&all);
-            self.note(at, light, Outlook::Settled(terms));
+            let terms = of.bsdf.colors.each(&all);
+            self.note(fragment, light, Outlook::Settled(terms));
         }
         true
     }
@@ -395,24 +429,25 @@ impl Tiled<'_> {
     fn node(&mut self, at: [u32; 2], light: usize, counts: &mut Counts) -> Node {
         let index = self.index(at);
         let rays = (self.scene.antialiasing * self.scene.antialiasing) as f32;
-        let known = self.nodes.iter().find(|(of, by, _)| (*of, *by) == (index, light)).map(|(_, _, node)| *node);
+        let known = self.behind.nodes.iter().find(|(of, by, _)| (*of, *by) == (index, light)).map(|(_, _, node)| *node);
         if let Some(node) = known {
             return node;
         }
-        let outcome = self.settled(index, light, counts);
-        self.note(at, light, Outlook::Settled(outcome.terms));
+        let Some((fragment, _)) = self.whole(at) else { unreachable!("smooth squares are filled") };
+        let outcome = self.settled(fragment, light, counts);
+        self.note(fragment, light, Outlook::Settled(outcome.terms));
         let node = Node { sums: outcome.sums * (1.0 / rays), share: outcome.share };
-        self.nodes.push((index, light, node));
+        self.behind.nodes.push((index, light, node));
         node
     }
 
     /// How many display steps an error makes of what a light sends to a pixel.
     fn steps_of(&mut self, at: [u32; 2], light: usize, sums: &Moments, error: &Moments) -> f32 {
-        let Some(bsdf) = self.whole(at).map(|patch| patch.bsdf) else { return f32::INFINITY };
-        let scale = self.arrivals.scale(light);
+        let Some((fragment, bsdf)) = self.whole(at).map(|(number, of)| (number, of.bsdf)) else { return f32::INFINITY };
+        let scale = self.lights.arrivals.scale(light);
         let color = |sums: &Moments| scale * bsdf.colors.of(sums);
-        let others = self.others(self.index(at), 0, light);
+        let others = self.others(fragment, light);
         let value: Rgb = self.scene.ambient * bsdf.ambient + others + color(sums);
-        self.arrivals.steps(value, color(error))
+        self.lights.arrivals.steps(value, color(error))
     }
 }

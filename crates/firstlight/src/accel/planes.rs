@@ -1,0 +1,60 @@
+//! What lies inside of some planes.
+
+use fearless_simd::{f32x8, prelude::*};
+
+use super::Aabb;
+use super::node::Node;
+use crate::math::{DVec3, Vec3};
+
+/// A part of space that planes bound: a pyramid and the plane it begins at.
+pub(crate) struct Planes(pub [Plane; 5]);
+
+/// A plane, by its unit normal, which points outward, and a point on it.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Plane {
+    pub n: DVec3,
+    pub p: DVec3,
+}
+
+/// Planes as one tree sees them: outside is n.x > c.
+pub(crate) struct TreePlanes([(Vec3, f32); 5]);
+
+/// How far beyond a plane a box has to lie, as a part of how far off it is.
+const SLACK: f64 = 1e-5;
+
+impl Planes {
+    /// In a tree around `center` that reaches `half` from it.
+    pub fn within(&self, center: Vec3, half: f32) -> TreePlanes {
+        TreePlanes(self.0.map(|Plane { n, p }| {
+            let way = p - center.as_dvec3();
+            let slack = (way.abs().max_element() + f64::from(half) + p.abs().max_element()) * SLACK;
+            (n.as_vec3(), (n.dot(way) + slack) as f32)
+        }))
+    }
+
+    /// Whether a box may reach inside.
+    pub fn may_meet(&self, Aabb { min, max }: Aabb) -> bool {
+        let (min, max) = (min.as_dvec3(), max.as_dvec3());
+        self.0.iter().all(|Plane { n, p }| {
+            let least = n.max(DVec3::ZERO).dot(min - p) + n.min(DVec3::ZERO).dot(max - p);
+            let size = (min - p).abs().max((max - p).abs()).max_element() + p.abs().max_element();
+            least <= size * SLACK
+        })
+    }
+}
+
+impl TreePlanes {
+    /// The children of a node that may reach inside: a bit for each, and no order.
+    #[inline(always)]
+    pub fn meet<S: Simd>(&self, simd: S, node: &Node) -> (u32, f32x8<S>) {
+        let mut met = 0xff;
+        for (n, c) in &self.0 {
+            // The corner that is farthest inside
+            let side =
+                |axis: usize| f32x8::load_array_ref(simd, &node.planes[axis][usize::from(n[axis] < 0.0)]) * n[axis];
+            // Of what does not exist this is infinite, or no number
+            met &= (side(0) + side(1) + side(2)).simd_le(*c).to_bitmask() as u32;
+        }
+        (met, simd.splat_f32x8(0.0))
+    }
+}

@@ -1,0 +1,478 @@
+//! What of each light the rays of some fragments see past what lies in trees: gathered for all of them together, so that
+//! a fragment is asked once where nothing is in the way from any of its rays, and its rays are asked together where
+//! something is.
+
+use std::ops::{ControlFlow, Range};
+
+use super::{Cells, PIXELS, Pixel, Wanted};
+use crate::color::Rgb;
+use crate::ids::LightId;
+use crate::integrate::Arrived;
+use crate::material::Moments;
+use crate::render::arrival::{ArrivalPlace, Arrivals, Past};
+use crate::render::fragment::{Fragment, Fragments};
+use crate::render::light_queue::{Place, Sight as KnownSight};
+use crate::render::resolve::LightTerm;
+use crate::render::together::{Outcome, Together, salt};
+use crate::render::{AaMode, Counts};
+use crate::scene::Scene;
+use crate::visibility::{View, Viewpoint, Visibility};
+
+/// What the rays of one fragment see of one light.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) enum Outlook {
+    /// Nobody asks: what arrives is told already.
+    #[default]
+    Told,
+    /// Nobody looked: nothing is known.
+    Unknown,
+    /// All of it, but for what is below the horizon.
+    Lit,
+    /// Nothing in trees is in the way; what is in lists may be.
+    Clear,
+    /// Nothing of it.
+    Dark,
+    /// Rays differ: each asks for itself.
+    Parted,
+    /// Rays differ, and were asked: what all of them see, added up, diffuse and specular.
+    Settled(LightTerm),
+}
+
+/// What is known of the ways past trees. Keeps its memory.
+pub(super) struct Behind {
+    /// Fragment by fragment, light by light.
+    outlooks: Vec<Outlook>,
+    /// The fragment that fills a pixel of the cell, or [`NONE`].
+    pub(super) only: Vec<u32>,
+    block: Block,
+    sights: Vec<Sights>,
+    /// What each light would send to each fragment of the cell if nothing were in the way, once that is known.
+    wholes: Vec<Vec<Arrived>>,
+    /// Which share of each light pixels see at least, as a few of their rays say, light by light; and which were asked.
+    pub(super) votes: Vec<f32>,
+    pub(super) voted: Vec<bool>,
+    /// The rays of a square, and the pixels of the cell that were asked for squares, light by light.
+    pub(super) points: Vec<Viewpoint>,
+    pub(super) nodes: Vec<(usize, usize, super::squares::Node)>,
+}
+
+/// No fragment.
+pub(super) const NONE: u32 = u32::MAX;
+/// Rays that look for lights together, if none of their fragments has more.
+const TOGETHER: usize = 64;
+
+impl Behind {
+    pub fn new(scene: &Scene) -> Self {
+        let lights = scene.lights.len();
+        let across = if scene.geometry.has_trees() { PIXELS * lights } else { 0 };
+        Behind {
+            outlooks: Vec::new(),
+            only: vec![NONE; PIXELS],
+            block: Block::default(),
+            sights: Vec::new(),
+            wholes: vec![Vec::new(); lights],
+            votes: vec![f32::NAN; across],
+            voted: vec![false; across],
+            points: Vec::new(),
+            nodes: Vec::new(),
+        }
+    }
+}
+
+/// What one ray sees of one light.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Sight {
+    Lit,
+    Clear,
+    /// Something in trees is in the way that batches know.
+    Near,
+    Dark,
+    BelowHorizon,
+    Behind,
+}
+
+/// The rays of some fragments, as they look for lights. Keeps its memory.
+#[derive(Default)]
+struct Block {
+    places: Vec<Place>,
+    points: Vec<Viewpoint>,
+    fragments: Vec<BlockFragment>,
+}
+
+/// What the rays of a block see of one light. Keeps its memory.
+#[derive(Default)]
+struct Sights {
+    /// Which fragments are asked.
+    open: Vec<bool>,
+    order: Vec<u32>,
+    sights: Vec<Sight>,
+    /// Of those that are behind things, what is in the way.
+    views: Vec<Option<View>>,
+}
+
+/// A fragment of the block.
+#[derive(Clone, Copy)]
+struct BlockFragment {
+    /// Its number in the cell.
+    fragment: u32,
+    /// The first of its rays in the block, and how many.
+    first: u32,
+    count: u32,
+}
+
+impl Cells<'_> {
+    /// Finds out what rays see of the lights that are wanted, past what lies in trees. What is told by that is wanted no
+    /// more.
+    pub(super) fn behind(&mut self, counts: &mut Counts, go_on: &impl Fn() -> ControlFlow<()>) -> ControlFlow<()> {
+        if !self.scene.geometry.has_trees() {
+            return ControlFlow::Continue(());
+        }
+        self.begin_looking(counts);
+        if self.mode == AaMode::Adaptive {
+            self.squares(counts, go_on)?;
+        }
+        let mut next = 0;
+        while next < self.fragments.all.len() {
+            next = self.look(next, counts);
+            go_on()?;
+        }
+        for list in [false, true] {
+            let mut wanted = std::mem::take(if list { &mut self.parted } else { &mut self.wanted });
+            wanted.retain_mut(|Wanted { fragment, light, sight }| {
+                *sight = match self.outlook(*fragment as usize, *light as usize) {
+                    Outlook::Unknown | Outlook::Told => KnownSight::Unknown,
+                    Outlook::Parted => {
+                        self.refused.push(Wanted { fragment: *fragment, light: *light, sight: KnownSight::Unknown });
+                        return false;
+                    }
+                    Outlook::Clear => KnownSight::Clear,
+                    Outlook::Lit => KnownSight::Lit,
+                    Outlook::Dark => return false,
+                    Outlook::Settled(terms) => {
+                        let pixel = self.fragments.all[*fragment as usize].pixel as usize;
+                        self.terms[pixel * self.scene.lights.len() + *light as usize] += terms;
+                        return false;
+                    }
+                };
+                true
+            });
+            *(if list { &mut self.parted } else { &mut self.wanted }) = wanted;
+        }
+        ControlFlow::Continue(())
+    }
+
+    /// Makes room for what the rays of each fragment of the cell see.
+    fn begin_looking(&mut self, counts: &mut Counts) {
+        let scene = self.scene;
+        let lights = scene.lights.len();
+        self.behind.wholes.iter_mut().for_each(Vec::clear);
+        self.behind.nodes.clear();
+        self.behind.voted.fill(false);
+        self.behind.votes.fill(f32::NAN);
+        self.behind.only.fill(NONE);
+        self.behind.outlooks.clear();
+        self.behind.outlooks.resize(self.fragments.all.len() * lights, Outlook::Told);
+        for Wanted { fragment, light, .. } in self.wanted.iter().chain(&self.parted) {
+            self.behind.outlooks[*fragment as usize * lights + *light as usize] = Outlook::Unknown;
+        }
+        for number in 0..self.fragments.all.len() {
+            let Fragment { pixel, .. } = self.fragments.all[number];
+            let Pixel { index, .. } = self.pixels[pixel as usize];
+            if self.is_open(number) {
+                self.trace_rays(number, counts);
+            }
+            let fragment = &self.fragments.all[number];
+            if fragment.count == scene.antialiasing * scene.antialiasing
+                && !fragment.uneven
+                && !fragment.rays.is_empty()
+            {
+                self.behind.only[index as usize] = number as u32;
+            }
+        }
+    }
+
+    /// Whether a fragment wants any light.
+    fn is_open(&self, fragment: usize) -> bool {
+        let lights = self.scene.lights.len();
+        let outlooks = &self.behind.outlooks[fragment * lights..][..lights];
+        outlooks.iter().any(|outlook| matches!(outlook, Outlook::Unknown))
+    }
+
+    /// Looks from all rays of some fragments, from number `from` on, for all lights that nothing is known of yet; the
+    /// number of the next.
+    fn look(&mut self, from: usize, counts: &mut Counts) -> usize {
+        let scene = self.scene;
+        let lights = scene.lights.len();
+        let mut block = std::mem::take(&mut self.behind.block);
+        block.clear();
+        let mut next = from;
+        while next < self.fragments.all.len()
+            && (block.points.is_empty() || block.points.len() + self.fragments.all[next].count() <= TOGETHER)
+        {
+            if self.is_open(next) {
+                block.add(scene, &self.fragments, next);
+            }
+            next += 1;
+        }
+        let mut sights = std::mem::take(&mut self.behind.sights);
+        sights.resize_with(lights, Sights::default);
+        for (light, sights) in sights.iter_mut().enumerate() {
+            sights.open.clear();
+            let is_open = |of: &BlockFragment| {
+                let outlook = self.outlook(of.fragment as usize, light);
+                self.lights.arrivals.looks_for(light) && matches!(outlook, Outlook::Unknown)
+            };
+            sights.open.extend(block.fragments.iter().map(is_open));
+            if !sights.open.contains(&true) {
+                continue;
+            }
+            self.look_for(&block, light, sights, counts);
+            for (of, _) in block.fragments.iter().zip(&sights.open).filter(|(_, is_open)| **is_open) {
+                self.behind.outlooks[of.fragment as usize * lights + light] = sights.outlook(of);
+            }
+        }
+        // With all that is known of other lights
+        for (light, sights) in sights.iter_mut().enumerate() {
+            let is_wanted = |k: &usize| {
+                sights.open[*k]
+                    && sights.is_crowded(&block.fragments[*k])
+                    && matches!(self.outlook(block.fragments[*k].fragment as usize, light), Outlook::Parted)
+            };
+            let wanted: Vec<usize> = (0..block.fragments.len()).filter(is_wanted).collect();
+            let before = counts.work();
+            let ask = |k: &usize| self.together(&block, *k, light, sights, counts);
+            let mut all: Vec<Together> = wanted.iter().map(ask).collect();
+            Together::tell(&mut all, &mut self.lights.arrivals, counts);
+            let each = (counts.work() - before) / wanted.len().max(1) as f32;
+            for (k, together) in wanted.into_iter().zip(all) {
+                let fragment = block.fragments[k].fragment as usize;
+                let index = self.pixel_of(fragment);
+                let before = counts.work();
+                let terms = together.settle(&mut self.lights.arrivals, counts).terms;
+                self.work[index] += each + counts.work() - before;
+                self.behind.outlooks[fragment * lights + light] = Outlook::Settled(terms);
+            }
+            sights.views.iter_mut().filter_map(Option::take).for_each(|view| self.lights.arrivals.keep(view));
+        }
+        self.behind.sights = sights;
+        self.behind.block = block;
+        next
+    }
+
+    /// What the rays of a fragment see of a light past what is in trees.
+    pub(super) fn outlook(&self, fragment: usize, light: usize) -> Outlook {
+        self.behind.outlooks[fragment * self.scene.lights.len() + light]
+    }
+
+    /// Notes that, if nothing is known of it yet.
+    pub(super) fn note(&mut self, fragment: usize, light: usize, outlook: Outlook) {
+        let known = &mut self.behind.outlooks[fragment * self.scene.lights.len() + light];
+        if matches!(known, Outlook::Unknown | Outlook::Clear) {
+            *known = outlook;
+        }
+    }
+
+    /// The pixel of a fragment, as the cell counts them.
+    fn pixel_of(&self, fragment: usize) -> usize {
+        self.pixels[self.fragments.all[fragment].pixel as usize].index as usize
+    }
+
+    /// What lights other than one send to each ray of a fragment, at least, as far as that is known by now.
+    pub(super) fn others(&mut self, fragment: usize, light: usize) -> Rgb {
+        let lights = self.scene.lights.len();
+        let Fragment { pixel, count, .. } = self.fragments.all[fragment];
+        let rays = count as f32;
+        let mut others = Rgb::BLACK;
+        for other in (0..lights).filter(|other| *other != light) {
+            let scale = self.lights.arrivals.scale(other);
+            let share = match self.outlook(fragment, other) {
+                Outlook::Settled(terms) => {
+                    others += scale * terms.sum() * (1.0 / rays);
+                    continue;
+                }
+                Outlook::Told => {
+                    others += scale * self.terms[pixel as usize * lights + other].sum() * (1.0 / rays);
+                    continue;
+                }
+                Outlook::Lit => 1.0,
+                Outlook::Unknown => self.share_seen(fragment, other),
+                Outlook::Clear | Outlook::Dark | Outlook::Parted => 0.0,
+            };
+            if share > 0.0 {
+                others += self.unshadowed(fragment, other) * share;
+            }
+        }
+        others
+    }
+
+    /// What a light would send to a fragment if nothing were in the way, with all colours; black where that is not
+    /// known. All fragments of the cell are asked together.
+    fn unshadowed(&mut self, fragment: usize, light: usize) -> Rgb {
+        let (scene, arrivals) = (self.scene, &mut self.lights.arrivals);
+        if arrivals.lights.emitters[light].is_none() {
+            return Rgb::BLACK;
+        }
+        let (fragments, wholes) = (&self.fragments, &mut self.behind.wholes[light]);
+        if wholes.is_empty() {
+            let surfaces = fragments.all.iter().map(|fragment| match fragment.rays.is_empty() {
+                true => fragments.places[fragments.quadrants(fragment)[0].place as usize],
+                false => fragments.place(scene, fragment, 0),
+            });
+            let surfaces: Vec<_> = surfaces.map(|place| (place.surface(), place.bsdf)).collect();
+            let places: Vec<_> = surfaces.iter().map(|(si, bsdf)| arrivals.place(light, si, bsdf)).collect();
+            *wholes = arrivals.wholes(light, &places);
+        }
+        arrivals.scale(light) * fragments.all[fragment].bsdf.colors.of(&wholes[fragment].sums)
+    }
+
+    /// What all rays of a fragment see of a light, ray by ray.
+    pub(super) fn settled(&mut self, fragment: usize, light: usize, counts: &mut Counts) -> Outcome {
+        let mut block = std::mem::take(&mut self.behind.block);
+        block.clear();
+        block.add(self.scene, &self.fragments, fragment);
+        let mut sights = self.behind.sights.pop().unwrap_or_default();
+        sights.open.clear();
+        sights.open.push(true);
+        self.look_for(&block, light, &mut sights, counts);
+        let before = counts.work();
+        let together = self.together(&block, 0, light, &mut sights, counts);
+        let outcome = together.finish(&mut self.lights.arrivals, counts);
+        let index = self.pixel_of(fragment);
+        self.work[index] += counts.work() - before;
+        sights.views.iter_mut().filter_map(Option::take).for_each(|view| self.lights.arrivals.keep(view));
+        self.behind.sights.push(sights);
+        self.behind.block = block;
+        outcome
+    }
+
+    /// Asks for a light at all rays of a fragment of the block.
+    fn together(
+        &mut self,
+        block: &Block,
+        k: usize,
+        light: usize,
+        sights: &mut Sights,
+        counts: &mut Counts,
+    ) -> Together {
+        let of = block.fragments[k];
+        let others = self.others(of.fragment as usize, light);
+        let Fragment { surface, share, .. } = self.fragments.all[of.fragment as usize];
+        let salt = salt(self.at(self.pixel_of(of.fragment as usize)), surface);
+        let mut together = Together::new(light, of.count as usize, share, salt, others);
+        for (place, k) in block.places[of.rays()].iter().zip(of.rays()) {
+            sights.settle(k, place, &mut self.lights.arrivals, light, share, &mut together, counts);
+        }
+        together
+    }
+
+    /// Finds out what each ray of the block sees of a light.
+    fn look_for(&mut self, block: &Block, light: usize, sights: &mut Sights, counts: &mut Counts) {
+        let scene = self.scene;
+        let shadows = scene.lights[light].shadows;
+        let Sights { open, order, sights, views } = sights;
+        order.clear();
+        sights.clear();
+        views.clear();
+        views.resize_with(block.points.len(), || None);
+        for (of, is_open) in block.fragments.iter().zip(open) {
+            let Place { surface, receives_shadow, .. } = block.places[of.first as usize];
+            let shines = scene.geometry.links.contains(scene.geometry.lights_of(surface), LightId(light as u32));
+            for k in of.first..of.first + of.count {
+                sights.push(if shines { Sight::Lit } else { Sight::BelowHorizon });
+                if *is_open && shines && shadows && receives_shadow {
+                    order.push(k);
+                }
+            }
+        }
+        self.lights.arrivals.sights(light, &block.points, order, counts, |k, visibility, take| {
+            sights[k] = match visibility {
+                Visibility::Lit => Sight::Lit,
+                Visibility::Hidden => Sight::Dark,
+                Visibility::BelowHorizon => Sight::BelowHorizon,
+                Visibility::Mask => match take() {
+                    Past::Unknown(view) => {
+                        views[k] = Some(view);
+                        Sight::Behind
+                    }
+                    Past::Known => Sight::Near,
+                    Past::Nothing => Sight::Clear,
+                },
+            };
+        });
+    }
+}
+
+impl BlockFragment {
+    /// Its rays, as the block counts them.
+    fn rays(&self) -> Range<usize> {
+        self.first as usize..(self.first + self.count) as usize
+    }
+}
+
+impl Block {
+    fn clear(&mut self) {
+        self.places.clear();
+        self.points.clear();
+        self.fragments.clear();
+    }
+
+    /// Adds a fragment of the cell.
+    fn add(&mut self, scene: &Scene, fragments: &Fragments, number: usize) {
+        let fragment = &fragments.all[number];
+        let (first, count) = (self.points.len() as u32, fragment.count);
+        self.fragments.push(BlockFragment { fragment: number as u32, first, count });
+        self.places.extend((0..fragment.rays.len()).map(|k| fragments.place(scene, fragment, k)));
+        self.points.extend(self.places[first as usize..].iter().map(Place::viewpoint));
+    }
+}
+
+impl Sights {
+    /// What the rays of a fragment see together.
+    fn outlook(&self, fragment: &BlockFragment) -> Outlook {
+        let of = |sight: Sight| self.sights[fragment.rays()].iter().filter(|s| **s == sight).count();
+        let dark = of(Sight::Dark);
+        if dark + of(Sight::BelowHorizon) == fragment.count as usize {
+            Outlook::Dark
+        } else if dark > 0 || of(Sight::Behind) > 0 {
+            Outlook::Parted
+        } else if of(Sight::Near) > 0 {
+            Outlook::Unknown
+        } else if of(Sight::Clear) > 0 {
+            Outlook::Clear
+        } else {
+            Outlook::Lit
+        }
+    }
+
+    /// Whether so much is in the way of some ray of a fragment that points of the light have to be asked.
+    fn is_crowded(&self, fragment: &BlockFragment) -> bool {
+        self.views[fragment.rays()].iter().flatten().any(|view| view.trees)
+    }
+
+    /// Adds what ray `k` of the block sees of a light to that of the others of its fragment.
+    #[allow(clippy::too_many_arguments, reason = "a ray of a fragment, a light, and where it goes")]
+    fn settle(
+        &mut self,
+        k: usize,
+        place: &Place,
+        arrivals: &mut Arrivals,
+        light: usize,
+        share: f32,
+        together: &mut Together,
+        counts: &mut Counts,
+    ) {
+        let (si, bsdf) = (&place.surface(), &place.bsdf);
+        match self.sights[k] {
+            Sight::Dark => together.dark(&arrivals.place(light, si, bsdf)),
+            Sight::BelowHorizon => together.know(&arrivals.place(light, si, bsdf), &Moments::default()),
+            sight @ (Sight::Lit | Sight::Clear | Sight::Near) => {
+                together.ask(arrivals, si, bsdf, sight == Sight::Lit, sight != Sight::Near, counts);
+            }
+            Sight::Behind => {
+                let view = self.views[k].take().expect("what is behind things has a view");
+                let place = ArrivalPlace { share, lit: true, clear: true, ..arrivals.place(light, si, bsdf) };
+                arrivals.ask_behind(together, light, &place, view, counts);
+            }
+        }
+    }
+}
