@@ -399,8 +399,8 @@ impl<'a> Arrivals<'a> {
         arrived
     }
 
-    /// Adds to `arrived` what arrives at many points of light `index`, which is integrated: with or without shadows, and
-    /// with what was gathered in trees.
+    /// Adds to `arrived` what arrives at many points of light `index`, which is integrated: with or without shadows,
+    /// and with what was gathered in trees.
     pub fn evaluate(
         &mut self,
         index: usize,

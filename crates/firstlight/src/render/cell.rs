@@ -3,6 +3,7 @@
 //! ```text
 //! primary    squares of pixels that are proved to see one surface; the rays of all others
 //! grid       light over such squares, from nine places of each: 16, 8, 4, 2 pixels wide
+//! behind     what rays see of the lights past what lies in trees, and light over squares of pixels behind that
 //! middles    what a surface in a pixel gets of a light, from its middle
 //! quadrants  the same, from four places of it
 //! rays       the same, from all of its camera rays; where no batch knows it, they ask points of the light together

@@ -473,8 +473,8 @@ fn point_of(si: &SurfaceInteraction) -> ShadingPoint {
 }
 
 /// The middle of what some rays of pixel (`i`, `j`) see of a surface in trees, with its reach to their ends; `None` if
-/// something else is there, if normals turn too far on the way, or if their mean is farther than `skew` from that in the
-/// middle.
+/// something else is there, if normals turn too far on the way, or if their mean is farther than `skew` from that in
+/// the middle.
 fn seen_middle<'a>(
     scene: &Scene,
     [i, j]: [u32; 2],

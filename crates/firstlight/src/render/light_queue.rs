@@ -195,8 +195,8 @@ impl<'a> LightQueue<'a> {
         ControlFlow::Continue(())
     }
 
-    /// Asks some places of one highlight for a light, by batches: with or without shadows, and with what was gathered in
-    /// trees.
+    /// Asks some places of one highlight for a light, by batches: with or without shadows, and with what was gathered
+    /// in trees.
     #[allow(clippy::too_many_arguments, reason = "what is asked, of whom, and where it goes")]
     fn batch(
         &mut self,

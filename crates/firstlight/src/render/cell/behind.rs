@@ -1,6 +1,6 @@
-//! What of each light the rays of some fragments see past what lies in trees: gathered for all of them together, so that
-//! a fragment is asked once where nothing is in the way from any of its rays, and its rays are asked together where
-//! something is.
+//! What of each light the rays of some fragments see past what lies in trees: gathered for all of them together, so
+//! that a fragment is asked once where nothing is in the way from any of its rays, and its rays are asked together
+//! where something is.
 
 use std::ops::{ControlFlow, Range};
 
@@ -121,8 +121,8 @@ struct BlockFragment {
 }
 
 impl Cells<'_> {
-    /// Finds out what rays see of the lights that are wanted, past what lies in trees. What is told by that is wanted no
-    /// more.
+    /// Finds out what rays see of the lights that are wanted, past what lies in trees. What is told by that is wanted
+    /// no more.
     pub(super) fn behind(&mut self, counts: &mut Counts, go_on: &impl Fn() -> ControlFlow<()>) -> ControlFlow<()> {
         if !self.scene.geometry.has_trees() {
             return ControlFlow::Continue(());

@@ -327,7 +327,8 @@ impl Cells<'_> {
         kinds.into_iter().filter(|kind| *kind).count() > 1
     }
 
-    /// The share of a light that a fragment sees at least, by a few rays of its pixel; not a number where none were asked.
+    /// The share of a light that a fragment sees at least, by a few rays of its pixel; not a number where none were
+    /// asked.
     pub(super) fn share_seen(&self, fragment: usize, light: usize) -> f32 {
         let index = self.pixels[self.fragments.all[fragment].pixel as usize].index as usize;
         if self.behind.only[index] != fragment as u32 {
