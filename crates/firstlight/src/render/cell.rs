@@ -20,7 +20,7 @@ use std::ops::{ControlFlow, Range};
 
 use super::film::FilmTile;
 use super::fragment::{Fragment, Fragments, Member, Quadrant, RayHit};
-use super::grid::{Block, Grid};
+use super::grid::{Block, Grid, SETS_IN};
 use super::hits::{PixelHits, PixelRays, camera_ray};
 use super::light_queue::{Answer, LightQueue, Place, Request, Sight};
 use super::patch::Contrast;
@@ -629,6 +629,8 @@ impl<'a> Cells<'a> {
         let value = colors.onto(scene.ambient * bsdf.ambient, &most);
         let spread = self.lights.arrivals.steps(value, colors.of(&apart));
         let allowed = if answers.iter().all(|answer| answer.smooth) { SPREAD_SMOOTH } else { SPREAD_CUT };
+        let sets_in = answers.iter().any(|answer| answer.sums == Moments::default());
+        let allowed = if sets_in { allowed * SETS_IN } else { allowed };
         let weight = fragment.share * (scene.lights.len() as f32).sqrt();
         if spread * weight > allowed {
             return false;

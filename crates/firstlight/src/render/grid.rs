@@ -30,7 +30,9 @@ const SMALLEST_SHARP: f32 = 0.25;
 const SMALLEST_CUT: f32 = 1.5;
 /// The part of them where some of the nine places see nothing: a light that sets in between bends at once, and the
 /// quadratic is farther off than the corners are.
-const SETS_IN: f32 = 0.35;
+pub(super) const SETS_IN: f32 = 0.35;
+/// By how much less where things in trees are in the way: their shadows have corners.
+const BEHIND: f32 = 0.5;
 /// From here on a highlight is not wide; and beyond, narrow beside the square.
 const SHARP: f32 = 0.4;
 const NARROW: f32 = 1.0;
@@ -418,6 +420,8 @@ impl Grid {
         };
         let sets_in = nodes.contains(&Moments::default());
         let allowed = if sets_in { allowed * SETS_IN } else { allowed } / (self.lights as f32).sqrt();
+        let is_behind = scene.geometry.has_trees() && center.sight == Sight::Unknown;
+        let allowed = if is_behind { allowed * BEHIND } else { allowed };
         let mean = |a: Moments, b: Moments| (a + b) * 0.5;
         let [nw, n, ne, w, m, e, sw, s, se] = *nodes;
         let middle = mean(mean(nw, ne), mean(sw, se));
