@@ -19,6 +19,7 @@ use crate::math::{LANES, Vec3};
 use crate::render::Counts;
 use crate::render::beams::{Packet, Traced};
 use crate::render::fragment::{Contrast, Fragment};
+use crate::render::grid::SETS_IN;
 use crate::render::light_queue::Place;
 use crate::render::many::FEW;
 use crate::render::square::Square;
@@ -358,7 +359,10 @@ impl Cells<'_> {
             return true;
         }
         let wide = (side / SMALLEST) as f32;
-        let foretold_to = FORETOLD / (wide * self.scene.lights.len() as f32).sqrt();
+        // Where a light sets in between them it bends at once
+        let sets_in = nodes.as_flattened().iter().any(|node| node.sums == Moments::default());
+        let allowed = if sets_in { FORETOLD * SETS_IN } else { FORETOLD };
+        let foretold_to = allowed / (wide * self.scene.lights.len() as f32).sqrt();
         // What the corners foretell
         for ((row, j), down) in nodes.iter().zip(rows.0).zip(rows.line()) {
             for ((node, i), across) in row.iter().zip(columns.0).zip(columns.line()) {
