@@ -28,9 +28,10 @@ const FORETOLD_CUT: f32 = 0.75;
 const SMALLEST_SMOOTH: f32 = 2.0;
 const SMALLEST_SHARP: f32 = 0.25;
 const SMALLEST_CUT: f32 = 1.5;
-/// The part of them where some of the nine places see nothing: a light that sets in between bends at once, and the
+/// The part of them where some of the nine places see as good as nothing, beside the brightest: a light that sets in between bends at once, and the
 /// quadratic is farther off than the corners are.
 pub(super) const SETS_IN: f32 = 0.35;
+const DIM: f32 = 1.0 / 16.0;
 /// By how much less where things in trees are in the way: their shadows have corners.
 const BEHIND: f32 = 0.5;
 /// From here on a highlight is not wide; and beyond, narrow beside the square.
@@ -418,7 +419,8 @@ impl Grid {
             (false, false, true) => FORETOLD_SMOOTH,
             (false, false, false) => FORETOLD_CUT,
         };
-        let sets_in = nodes.contains(&Moments::default());
+        let most = nodes.iter().fold(0.0f32, |most, node| most.max(node.cosine()));
+        let sets_in = nodes.iter().any(|node| node.cosine() <= most * DIM);
         let allowed = if sets_in { allowed * SETS_IN } else { allowed } / (self.lights as f32).sqrt();
         let is_behind = scene.geometry.has_trees() && center.sight == Sight::Unknown;
         let allowed = if is_behind { allowed * BEHIND } else { allowed };
