@@ -28,8 +28,8 @@ const FORETOLD_CUT: f32 = 0.75;
 const SMALLEST_SMOOTH: f32 = 2.0;
 const SMALLEST_SHARP: f32 = 0.25;
 const SMALLEST_CUT: f32 = 1.5;
-/// The part of them where some of the nine places see as good as nothing, beside the brightest: a light that sets in between bends at once, and the
-/// quadratic is farther off than the corners are.
+/// The part of them where some of the nine places see as good as nothing, beside the brightest: a light that sets in
+/// between bends at once, and the quadratic is farther off than the corners are.
 pub(super) const SETS_IN: f32 = 0.35;
 const DIM: f32 = 1.0 / 16.0;
 /// By how much less where things in trees are in the way: their shadows have corners.
