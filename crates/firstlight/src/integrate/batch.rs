@@ -9,6 +9,7 @@ use super::view::{FlatLight, NEAR, View};
 use crate::color::Rgb;
 use crate::material::Colors;
 use crate::math::{DVec3, ErrorBound, Facet, LANES, UNIT_ROUNDOFF, Vec3, Vec3x16};
+use crate::shape::SurfaceInteraction;
 
 /// Sixteen numbers, one of each member of a batch.
 pub(crate) type Block = [f32; LANES];
@@ -64,6 +65,12 @@ impl ShadingPoint {
             base: Rgb::BLACK,
             share: 1.0,
         }
+    }
+
+    /// The same where a ray meets a surface.
+    pub fn of(si: &SurfaceInteraction) -> ShadingPoint {
+        let SurfaceInteraction { lit_from, error, horizon, ng, facet, ns, wo, .. } = *si;
+        ShadingPoint { horizon, ng, facet, ..ShadingPoint::new(lit_from, error, ns, wo) }
     }
 }
 

@@ -357,19 +357,13 @@ impl<'a> Arrivals<'a> {
         mut arrived: Arrived,
         counts: &mut Counts,
     ) -> (Change, Seen) {
-        let settled = &mut counts.settled.visibility;
-        match arrived.illumination {
-            Illumination::Below => settled[Visibility::BelowHorizon as usize] += 1,
-            Illumination::Hidden => settled[Visibility::Hidden as usize] += 1,
-            Illumination::Full => settled[Visibility::Lit as usize] += 1,
-            Illumination::Partial => counts.closed_form += 1,
-            Illumination::Unknown => {
-                settled[Visibility::Mask as usize] += 1;
-                arrived.motion = f32::INFINITY;
-                let whole = self.wholes(index, std::slice::from_ref(place))[0];
-                let whole = (whole.illumination != Illumination::Unknown).then_some(whole.sums);
-                return (self.change(index, place, &arrived), Seen::Behind(whole));
-            }
+        counts.note(arrived.illumination);
+        if arrived.illumination == Illumination::Unknown {
+            counts.settled.visibility[Visibility::Mask as usize] += 1;
+            arrived.motion = f32::INFINITY;
+            let whole = self.wholes(index, std::slice::from_ref(place))[0];
+            let whole = (whole.illumination != Illumination::Unknown).then_some(whole.sums);
+            return (self.change(index, place, &arrived), Seen::Behind(whole));
         }
         (self.change(index, place, &arrived), Seen::Known(arrived.sums))
     }

@@ -2,7 +2,8 @@
 
 use super::SimdLevel;
 use super::heat::Heat;
-use crate::visibility::Settled;
+use crate::integrate::Illumination;
+use crate::visibility::{Settled, Visibility};
 
 /// What a render did.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -102,6 +103,18 @@ impl Counts {
             lights,
             simd,
             threads,
+        }
+    }
+
+    /// Notes what a batch says of a place.
+    pub fn note(&mut self, illumination: Illumination) {
+        let settled = &mut self.settled.visibility;
+        match illumination {
+            Illumination::Below => settled[Visibility::BelowHorizon as usize] += 1,
+            Illumination::Hidden => settled[Visibility::Hidden as usize] += 1,
+            Illumination::Full => settled[Visibility::Lit as usize] += 1,
+            Illumination::Partial => self.closed_form += 1,
+            Illumination::Unknown => {}
         }
     }
 

@@ -423,7 +423,7 @@ impl Fragments {
         let bsdf = self.bsdf(fragment, k);
         let point = match fragment.of {
             Some(of) => of.point(scene, &self.rays[ray].ray, self.rays[ray].t),
-            None => point_of(&self.members[ray].si),
+            None => ShadingPoint::of(&self.members[ray].si),
         };
         Place::new(scene, ShadingPoint { share: fragment.share, ..point }, fragment.surface, bsdf)
     }
@@ -466,12 +466,6 @@ fn is_one_surface(one: &SurfaceInteraction, other: &SurfaceInteraction) -> bool 
     off <= 0.5 * apart.length()
 }
 
-/// Where what a ray sees in trees wants light.
-fn point_of(si: &SurfaceInteraction) -> ShadingPoint {
-    let SurfaceInteraction { lit_from, error, horizon, ng, facet, ns, wo, .. } = *si;
-    ShadingPoint { horizon, ng, facet, ..ShadingPoint::new(lit_from, error, ns, wo) }
-}
-
 /// The middle of what some rays of pixel (`i`, `j`) see of a surface in trees, with its reach to their ends; `None` if
 /// something else is there, if normals turn too far on the way, or if their mean is farther than `skew` from that in
 /// the middle.
@@ -488,7 +482,7 @@ fn seen_middle<'a>(
     }
     let first = &members.clone().next()?.si;
     if count == 1.0 {
-        return Some(point_of(first));
+        return Some(ShadingPoint::of(first));
     }
     let at = |from: u32, sum: f32| from as f32 + (sum / count + 0.5) / n as f32;
     let (ray, differential) = scene.camera.local_ray(at(i, x), at(j, y), 1.0 / n as f32);
@@ -497,7 +491,7 @@ fn seen_middle<'a>(
     if !is_one_surface(&si, first) {
         return None;
     }
-    let mut point = point_of(&si);
+    let mut point = ShadingPoint::of(&si);
     let mut normals = Vec3::ZERO;
     for Member { si, .. } in members {
         point.reach = point.reach.max((si.lit_from - point.p).length());

@@ -16,7 +16,7 @@ use crate::material::{Bsdf, Lobe, Moments};
 use crate::math::{LANES, Vec2};
 use crate::scene::Scene;
 use crate::shape::{Footprint, SurfaceInteraction, UvEdge};
-use crate::visibility::{Viewpoint, Visibility};
+use crate::visibility::Viewpoint;
 
 /// A place of a surface that wants light.
 #[derive(Clone, Copy, Debug)]
@@ -37,8 +37,7 @@ impl Place {
 
     /// Where its rays begin.
     pub fn viewpoint(&self) -> Viewpoint {
-        let ShadingPoint { p, error, horizon, ng, facet, ns, .. } = self.point;
-        Viewpoint { p, error, start: error.offset(p, ng).as_vec3(), horizon, ns, but: facet }
+        Viewpoint::of(&self.surface())
     }
 
     /// The same as a surface, without its texture.
@@ -113,6 +112,24 @@ impl Answer {
     };
 }
 
+/// Requests for one light at places of one highlight.
+struct Group<'p> {
+    light: usize,
+    lobe: Lobe,
+    places: &'p [Place],
+    requests: &'p [Request],
+}
+
+impl<'p> Group<'p> {
+    fn request(&self, k: u32) -> &'p Request {
+        &self.requests[k as usize]
+    }
+
+    fn place(&self, k: u32) -> &'p Place {
+        &self.places[self.request(k).place as usize]
+    }
+}
+
 /// Asks for light.
 pub(crate) struct LightQueue<'a> {
     scene: &'a Scene,
@@ -176,19 +193,18 @@ impl<'a> LightQueue<'a> {
                 continue;
             }
             let light = group / 2 % scene.lights.len();
-            let lobe = self.lobes[group / 2 / scene.lights.len()];
+            let of = Group { light, lobe: self.lobes[group / 2 / scene.lights.len()], places, requests };
             let members = std::mem::take(&mut self.groups[group]);
             let shadows = scene.lights[light].shadows && group % 2 == 1;
             if self.arrivals.lights.emitters[light].is_none() {
                 for k in &members {
                     go_on()?;
-                    let Request { place, sight, .. } = requests[*k as usize];
-                    answers[*k as usize] = self.one(light, &places[place as usize], sight, counts);
+                    answers[*k as usize] = self.one(light, of.place(*k), of.request(*k).sight, counts);
                 }
             } else if shadows && scene.geometry.has_trees() {
-                self.past_trees(light, &lobe, places, requests, &members, answers, counts, go_on)?;
+                self.past_trees(&of, &members, answers, counts, go_on)?;
             } else {
-                self.batch(light, &lobe, [shadows, false], places, requests, &members, answers, counts);
+                self.batch(&of, [shadows, false], &members, answers, counts);
             }
             self.groups[group] = members;
         }
@@ -197,41 +213,30 @@ impl<'a> LightQueue<'a> {
 
     /// Asks some places of one highlight for a light, by batches: with or without shadows, and with what was gathered
     /// in trees.
-    #[allow(clippy::too_many_arguments, reason = "what is asked, of whom, and where it goes")]
     fn batch(
         &mut self,
-        light: usize,
-        lobe: &Lobe,
+        of: &Group,
         [shadows, near]: [bool; 2],
-        places: &[Place],
-        requests: &[Request],
         members: &[u32],
         answers: &mut [Answer],
         counts: &mut Counts,
     ) {
-        let scene = self.scene;
+        let (scene, light) = (self.scene, of.light);
         let scale = self.arrivals.scale(light);
         self.points.clear();
         self.points.extend(members.iter().map(|k| {
-            let place = &places[requests[*k as usize].place as usize];
+            let place = of.place(*k);
             let (worth, base) = (scale * place.bsdf.colors, scene.ambient * place.bsdf.ambient);
             ShadingPoint { worth, base, ..place.point }
         }));
         self.arrived.clear();
-        self.arrivals.evaluate(light, lobe, [shadows, near], &self.points, &mut self.arrived);
+        self.arrivals.evaluate(light, &of.lobe, [shadows, near], &self.points, &mut self.arrived);
         let measure = self.arrivals.measure(light);
         let is_physical = matches!(&scene.lights[light].kind, LightKind::Area(area) if area.physical);
         let is_one_sided = self.arrivals.lights.emitters[light].as_ref().is_some_and(Emitter::is_one_sided);
         for (arrived, k) in self.arrived.iter().zip(members) {
-            let place = &places[requests[*k as usize].place as usize];
-            let settled = &mut counts.settled.visibility;
-            match arrived.illumination {
-                Illumination::Below => settled[Visibility::BelowHorizon as usize] += 1,
-                Illumination::Hidden => settled[Visibility::Hidden as usize] += 1,
-                Illumination::Full => settled[Visibility::Lit as usize] += 1,
-                Illumination::Partial => counts.closed_form += 1,
-                Illumination::Unknown => {}
-            }
+            let place = of.place(*k);
+            counts.note(arrived.illumination);
             let sight = match (shadows, near) {
                 (false, _) => Sight::Lit,
                 (true, false) => Sight::Clear,
@@ -249,7 +254,7 @@ impl<'a> LightQueue<'a> {
                     turn: if is_near && !arrived.proved {
                         f32::INFINITY
                     } else {
-                        self.turn(place, lobe, arrived.distance)
+                        self.turn(place, &of.lobe, arrived.distance)
                     },
                     most: if is_physical { measure / (arrived.distance * arrived.distance) } else { 1.0 },
                     sight,
@@ -260,60 +265,53 @@ impl<'a> LightQueue<'a> {
 
     /// The same past what is in trees: what that is, is gathered for each place, and for neighbours that are points of
     /// one surface together. Nobody knows what arrives where that is too much.
-    #[allow(clippy::too_many_arguments, reason = "what is asked, of whom, and where it goes")]
     fn past_trees(
         &mut self,
-        light: usize,
-        lobe: &Lobe,
-        places: &[Place],
-        requests: &[Request],
+        of: &Group,
         members: &[u32],
         answers: &mut [Answer],
         counts: &mut Counts,
         go_on: &dyn Fn() -> ControlFlow<()>,
     ) -> ControlFlow<()> {
-        let request = |k: u32| &requests[k as usize];
-        let place = |k: u32| &places[request(k).place as usize];
         let mut clear = std::mem::take(&mut self.clear);
         clear.clear();
         let mut rest = members;
         while let Some(first) = rest.first().copied() {
-            if request(first).sight == Sight::Clear {
+            if of.request(first).sight == Sight::Clear {
                 clear.push(first);
                 rest = &rest[1..];
                 continue;
             }
             go_on()?;
             let is_like = |k: &&u32| {
-                place(first).point.reach + place(**k).point.reach == 0.0
-                    && request(**k).sight == Sight::Unknown
-                    && place(**k).surface == place(first).surface
+                of.place(first).point.reach + of.place(**k).point.reach == 0.0
+                    && of.request(**k).sight == Sight::Unknown
+                    && of.place(**k).surface == of.place(first).surface
             };
             let mut run = 1 + rest[1..].iter().take(LANES - 1).take_while(is_like).count();
-            let mut trees = self.gather(light, places, requests, &rest[..run]);
+            let mut trees = self.gather(of, &rest[..run]);
             while run > 1 && matches!(trees, Trees::Unknown) {
                 run /= 2;
-                trees = self.gather(light, places, requests, &rest[..run]);
+                trees = self.gather(of, &rest[..run]);
             }
             let (now, later) = rest.split_at(run);
             match trees {
                 Trees::Nothing => clear.extend(now),
-                Trees::Known => self.batch(light, lobe, [true, true], places, requests, now, answers, counts),
+                Trees::Known => self.batch(of, [true, true], now, answers, counts),
                 Trees::Unknown => answers[first as usize] = Answer::UNKNOWN,
             }
             rest = later;
         }
-        self.batch(light, lobe, [true, false], places, requests, &clear, answers, counts);
+        self.batch(of, [true, false], &clear, answers, counts);
         self.clear = clear;
         ControlFlow::Continue(())
     }
 
     /// Gathers what of the trees may be in the way of a light.
-    fn gather(&mut self, light: usize, places: &[Place], requests: &[Request], members: &[u32]) -> Trees {
-        let points = members.iter().map(|k| places[requests[*k as usize].place as usize].viewpoint());
-        let points: ArrayVec<Viewpoint, LANES> = points.collect();
-        let ShadingPoint { reach, turn, .. } = places[requests[members[0] as usize].place as usize].point;
-        self.arrivals.gather(light, &points, reach, turn)
+    fn gather(&mut self, of: &Group, members: &[u32]) -> Trees {
+        let points: ArrayVec<Viewpoint, LANES> = members.iter().map(|k| of.place(*k).viewpoint()).collect();
+        let ShadingPoint { reach, turn, .. } = of.place(members[0]).point;
+        self.arrivals.gather(of.light, &points, reach, turn)
     }
 
     /// How far directions turn within a place's reach, times how fast a highlight falls.

@@ -63,21 +63,13 @@ impl<'a> ArrivalPlace<'a> {
     }
 
     pub(super) fn point_of_surface(&self) -> ShadingPoint {
-        let SurfaceInteraction { lit_from, error, horizon, ng, facet, ns, wo, .. } = *self.si;
         ShadingPoint {
-            p: lit_from,
-            error,
-            horizon,
-            ng,
-            facet,
-            ns,
-            wo,
             reach: self.reach,
             turn: self.turn,
-            most_motion: f32::INFINITY,
             worth: self.colors(),
             base: self.base,
             share: self.share,
+            ..ShadingPoint::of(self.si)
         }
     }
 }

@@ -11,7 +11,7 @@ use crate::integrate::Arrived;
 use crate::material::Moments;
 use crate::render::arrival::{ArrivalPlace, Arrivals, Past};
 use crate::render::fragment::{Fragment, Fragments};
-use crate::render::light_queue::{Place, Sight as KnownSight};
+use crate::render::light_queue::{Place, Sight};
 use crate::render::resolve::LightTerm;
 use crate::render::together::{Outcome, Together, salt};
 use crate::render::{AaMode, Counts};
@@ -20,7 +20,7 @@ use crate::visibility::{View, Viewpoint, Visibility};
 
 /// What the rays of one fragment see of one light.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) enum Outlook {
+pub(super) enum FragmentSight {
     /// Nobody asks: what arrives is told already.
     #[default]
     Told,
@@ -41,11 +41,11 @@ pub(super) enum Outlook {
 /// What is known of the ways past trees. Keeps its memory.
 pub(super) struct Behind {
     /// Fragment by fragment, light by light.
-    outlooks: Vec<Outlook>,
+    known: Vec<FragmentSight>,
     /// The fragment that fills a pixel of the cell, or [`NONE`].
     pub(super) only: Vec<u32>,
-    block: Block,
-    sights: Vec<Sights>,
+    block: RayBlock,
+    sights: Vec<RaySights>,
     /// What each light would send to each fragment of the cell if nothing were in the way, once that is known.
     wholes: Vec<Vec<Arrived>>,
     /// Which share of each light pixels see at least, as a few of their rays say, light by light; and which were asked.
@@ -53,7 +53,7 @@ pub(super) struct Behind {
     pub(super) voted: Vec<bool>,
     /// The rays of a square, and the pixels of the cell that were asked for squares, light by light.
     pub(super) points: Vec<Viewpoint>,
-    pub(super) nodes: Vec<(usize, usize, super::squares::Node)>,
+    pub(super) nodes: Vec<(usize, usize, super::squares::SquareNode)>,
 }
 
 /// No fragment.
@@ -66,9 +66,9 @@ impl Behind {
         let lights = scene.lights.len();
         let across = if scene.geometry.has_trees() { PIXELS * lights } else { 0 };
         Behind {
-            outlooks: Vec::new(),
+            known: Vec::new(),
             only: vec![NONE; PIXELS],
-            block: Block::default(),
+            block: RayBlock::default(),
             sights: Vec::new(),
             wholes: vec![Vec::new(); lights],
             votes: vec![f32::NAN; across],
@@ -81,7 +81,7 @@ impl Behind {
 
 /// What one ray sees of one light.
 #[derive(Clone, Copy, Debug, PartialEq)]
-enum Sight {
+enum RaySight {
     Lit,
     Clear,
     /// Something in trees is in the way that batches know.
@@ -93,26 +93,26 @@ enum Sight {
 
 /// The rays of some fragments, as they look for lights. Keeps its memory.
 #[derive(Default)]
-struct Block {
+struct RayBlock {
     places: Vec<Place>,
     points: Vec<Viewpoint>,
-    fragments: Vec<BlockFragment>,
+    fragments: Vec<FragmentRays>,
 }
 
 /// What the rays of a block see of one light. Keeps its memory.
 #[derive(Default)]
-struct Sights {
+struct RaySights {
     /// Which fragments are asked.
     open: Vec<bool>,
     order: Vec<u32>,
-    sights: Vec<Sight>,
+    sights: Vec<RaySight>,
     /// Of those that are behind things, what is in the way.
     views: Vec<Option<View>>,
 }
 
 /// A fragment of the block.
 #[derive(Clone, Copy)]
-struct BlockFragment {
+struct FragmentRays {
     /// Its number in the cell.
     fragment: u32,
     /// The first of its rays in the block, and how many.
@@ -136,29 +136,35 @@ impl Cells<'_> {
             next = self.look(next, counts);
             go_on()?;
         }
-        for list in [false, true] {
-            let mut wanted = std::mem::take(if list { &mut self.parted } else { &mut self.wanted });
-            wanted.retain_mut(|Wanted { fragment, light, sight }| {
-                *sight = match self.outlook(*fragment as usize, *light as usize) {
-                    Outlook::Unknown | Outlook::Told => KnownSight::Unknown,
-                    Outlook::Parted => {
-                        self.refused.push(Wanted { fragment: *fragment, light: *light, sight: KnownSight::Unknown });
-                        return false;
-                    }
-                    Outlook::Clear => KnownSight::Clear,
-                    Outlook::Lit => KnownSight::Lit,
-                    Outlook::Dark => return false,
-                    Outlook::Settled(terms) => {
-                        let pixel = self.fragments.all[*fragment as usize].pixel as usize;
-                        self.terms[pixel * self.scene.lights.len() + *light as usize] += terms;
-                        return false;
-                    }
-                };
-                true
-            });
-            *(if list { &mut self.parted } else { &mut self.wanted }) = wanted;
-        }
+        let mut wanted = std::mem::take(&mut self.wanted);
+        self.tell_wanted(&mut wanted);
+        self.wanted = wanted;
+        let mut parted = std::mem::take(&mut self.parted);
+        self.tell_wanted(&mut parted);
+        self.parted = parted;
         ControlFlow::Continue(())
+    }
+
+    /// Leaves of what is wanted that of which too little is known by now, and tells the rest.
+    fn tell_wanted(&mut self, wanted: &mut Vec<Wanted>) {
+        wanted.retain_mut(|Wanted { fragment, light, sight }| {
+            *sight = match self.fragment_sight(*fragment as usize, *light as usize) {
+                FragmentSight::Unknown | FragmentSight::Told => Sight::Unknown,
+                FragmentSight::Parted => {
+                    self.refused.push(Wanted { fragment: *fragment, light: *light, sight: Sight::Unknown });
+                    return false;
+                }
+                FragmentSight::Clear => Sight::Clear,
+                FragmentSight::Lit => Sight::Lit,
+                FragmentSight::Dark => return false,
+                FragmentSight::Settled(terms) => {
+                    let pixel = self.fragments.all[*fragment as usize].pixel as usize;
+                    self.terms[pixel * self.scene.lights.len() + *light as usize] += terms;
+                    return false;
+                }
+            };
+            true
+        });
     }
 
     /// Makes room for what the rays of each fragment of the cell see.
@@ -170,10 +176,10 @@ impl Cells<'_> {
         self.behind.voted.fill(false);
         self.behind.votes.fill(f32::NAN);
         self.behind.only.fill(NONE);
-        self.behind.outlooks.clear();
-        self.behind.outlooks.resize(self.fragments.all.len() * lights, Outlook::Told);
+        self.behind.known.clear();
+        self.behind.known.resize(self.fragments.all.len() * lights, FragmentSight::Told);
         for Wanted { fragment, light, .. } in self.wanted.iter().chain(&self.parted) {
-            self.behind.outlooks[*fragment as usize * lights + *light as usize] = Outlook::Unknown;
+            self.behind.known[*fragment as usize * lights + *light as usize] = FragmentSight::Unknown;
         }
         for number in 0..self.fragments.all.len() {
             let Fragment { pixel, .. } = self.fragments.all[number];
@@ -194,8 +200,8 @@ impl Cells<'_> {
     /// Whether a fragment wants any light.
     fn is_open(&self, fragment: usize) -> bool {
         let lights = self.scene.lights.len();
-        let outlooks = &self.behind.outlooks[fragment * lights..][..lights];
-        outlooks.iter().any(|outlook| matches!(outlook, Outlook::Unknown))
+        let known = &self.behind.known[fragment * lights..][..lights];
+        known.iter().any(|sight| matches!(sight, FragmentSight::Unknown))
     }
 
     /// Looks from all rays of some fragments, from number `from` on, for all lights that nothing is known of yet; the
@@ -209,18 +215,19 @@ impl Cells<'_> {
         while next < self.fragments.all.len()
             && (block.points.is_empty() || block.points.len() + self.fragments.all[next].count() <= TOGETHER)
         {
-            if self.is_open(next) {
+            // Roundings may let all rays of one miss
+            if self.is_open(next) && self.fragments.all[next].count > 0 {
                 block.add(scene, &self.fragments, next);
             }
             next += 1;
         }
         let mut sights = std::mem::take(&mut self.behind.sights);
-        sights.resize_with(lights, Sights::default);
+        sights.resize_with(lights, RaySights::default);
         for (light, sights) in sights.iter_mut().enumerate() {
             sights.open.clear();
-            let is_open = |of: &BlockFragment| {
-                let outlook = self.outlook(of.fragment as usize, light);
-                self.lights.arrivals.looks_for(light) && matches!(outlook, Outlook::Unknown)
+            let is_open = |of: &FragmentRays| {
+                let sight = self.fragment_sight(of.fragment as usize, light);
+                self.lights.arrivals.looks_for(light) && matches!(sight, FragmentSight::Unknown)
             };
             sights.open.extend(block.fragments.iter().map(is_open));
             if !sights.open.contains(&true) {
@@ -228,7 +235,7 @@ impl Cells<'_> {
             }
             self.look_for(&block, light, sights, counts);
             for (of, _) in block.fragments.iter().zip(&sights.open).filter(|(_, is_open)| **is_open) {
-                self.behind.outlooks[of.fragment as usize * lights + light] = sights.outlook(of);
+                self.behind.known[of.fragment as usize * lights + light] = sights.all(of);
             }
         }
         // With all that is known of other lights
@@ -236,7 +243,10 @@ impl Cells<'_> {
             let is_wanted = |k: &usize| {
                 sights.open[*k]
                     && sights.is_crowded(&block.fragments[*k])
-                    && matches!(self.outlook(block.fragments[*k].fragment as usize, light), Outlook::Parted)
+                    && matches!(
+                        self.fragment_sight(block.fragments[*k].fragment as usize, light),
+                        FragmentSight::Parted
+                    )
             };
             let wanted: Vec<usize> = (0..block.fragments.len()).filter(is_wanted).collect();
             let before = counts.work();
@@ -250,7 +260,7 @@ impl Cells<'_> {
                 let before = counts.work();
                 let terms = together.settle(&mut self.lights.arrivals, counts).terms;
                 self.work[index] += each + counts.work() - before;
-                self.behind.outlooks[fragment * lights + light] = Outlook::Settled(terms);
+                self.behind.known[fragment * lights + light] = FragmentSight::Settled(terms);
             }
             sights.views.iter_mut().filter_map(Option::take).for_each(|view| self.lights.arrivals.keep(view));
         }
@@ -260,15 +270,15 @@ impl Cells<'_> {
     }
 
     /// What the rays of a fragment see of a light past what is in trees.
-    pub(super) fn outlook(&self, fragment: usize, light: usize) -> Outlook {
-        self.behind.outlooks[fragment * self.scene.lights.len() + light]
+    pub(super) fn fragment_sight(&self, fragment: usize, light: usize) -> FragmentSight {
+        self.behind.known[fragment * self.scene.lights.len() + light]
     }
 
     /// Notes that, if nothing is known of it yet.
-    pub(super) fn note(&mut self, fragment: usize, light: usize, outlook: Outlook) {
-        let known = &mut self.behind.outlooks[fragment * self.scene.lights.len() + light];
-        if matches!(known, Outlook::Unknown | Outlook::Clear) {
-            *known = outlook;
+    pub(super) fn note(&mut self, fragment: usize, light: usize, sight: FragmentSight) {
+        let known = &mut self.behind.known[fragment * self.scene.lights.len() + light];
+        if matches!(known, FragmentSight::Unknown | FragmentSight::Clear) {
+            *known = sight;
         }
     }
 
@@ -285,18 +295,18 @@ impl Cells<'_> {
         let mut others = Rgb::BLACK;
         for other in (0..lights).filter(|other| *other != light) {
             let scale = self.lights.arrivals.scale(other);
-            let share = match self.outlook(fragment, other) {
-                Outlook::Settled(terms) => {
+            let share = match self.fragment_sight(fragment, other) {
+                FragmentSight::Settled(terms) => {
                     others += scale * terms.sum() * (1.0 / rays);
                     continue;
                 }
-                Outlook::Told => {
+                FragmentSight::Told => {
                     others += scale * self.terms[pixel as usize * lights + other].sum() * (1.0 / rays);
                     continue;
                 }
-                Outlook::Lit => 1.0,
-                Outlook::Unknown => self.share_seen(fragment, other),
-                Outlook::Clear | Outlook::Dark | Outlook::Parted => 0.0,
+                FragmentSight::Lit => 1.0,
+                FragmentSight::Unknown => self.share_seen(fragment, other),
+                FragmentSight::Clear | FragmentSight::Dark | FragmentSight::Parted => 0.0,
             };
             if share > 0.0 {
                 others += self.unshadowed(fragment, other) * share;
@@ -348,10 +358,10 @@ impl Cells<'_> {
     /// Asks for a light at all rays of a fragment of the block.
     fn together(
         &mut self,
-        block: &Block,
+        block: &RayBlock,
         k: usize,
         light: usize,
-        sights: &mut Sights,
+        sights: &mut RaySights,
         counts: &mut Counts,
     ) -> Together {
         let of = block.fragments[k];
@@ -366,10 +376,10 @@ impl Cells<'_> {
     }
 
     /// Finds out what each ray of the block sees of a light.
-    fn look_for(&mut self, block: &Block, light: usize, sights: &mut Sights, counts: &mut Counts) {
+    fn look_for(&mut self, block: &RayBlock, light: usize, sights: &mut RaySights, counts: &mut Counts) {
         let scene = self.scene;
         let shadows = scene.lights[light].shadows;
-        let Sights { open, order, sights, views } = sights;
+        let RaySights { open, order, sights, views } = sights;
         order.clear();
         sights.clear();
         views.clear();
@@ -378,7 +388,7 @@ impl Cells<'_> {
             let Place { surface, receives_shadow, .. } = block.places[of.first as usize];
             let shines = scene.geometry.links.contains(scene.geometry.lights_of(surface), LightId(light as u32));
             for k in of.first..of.first + of.count {
-                sights.push(if shines { Sight::Lit } else { Sight::BelowHorizon });
+                sights.push(if shines { RaySight::Lit } else { RaySight::BelowHorizon });
                 if *is_open && shines && shadows && receives_shadow {
                     order.push(k);
                 }
@@ -386,30 +396,30 @@ impl Cells<'_> {
         }
         self.lights.arrivals.sights(light, &block.points, order, counts, |k, visibility, take| {
             sights[k] = match visibility {
-                Visibility::Lit => Sight::Lit,
-                Visibility::Hidden => Sight::Dark,
-                Visibility::BelowHorizon => Sight::BelowHorizon,
+                Visibility::Lit => RaySight::Lit,
+                Visibility::Hidden => RaySight::Dark,
+                Visibility::BelowHorizon => RaySight::BelowHorizon,
                 Visibility::Mask => match take() {
                     Past::Unknown(view) => {
                         views[k] = Some(view);
-                        Sight::Behind
+                        RaySight::Behind
                     }
-                    Past::Known => Sight::Near,
-                    Past::Nothing => Sight::Clear,
+                    Past::Known => RaySight::Near,
+                    Past::Nothing => RaySight::Clear,
                 },
             };
         });
     }
 }
 
-impl BlockFragment {
+impl FragmentRays {
     /// Its rays, as the block counts them.
     fn rays(&self) -> Range<usize> {
         self.first as usize..(self.first + self.count) as usize
     }
 }
 
-impl Block {
+impl RayBlock {
     fn clear(&mut self) {
         self.places.clear();
         self.points.clear();
@@ -420,32 +430,32 @@ impl Block {
     fn add(&mut self, scene: &Scene, fragments: &Fragments, number: usize) {
         let fragment = &fragments.all[number];
         let (first, count) = (self.points.len() as u32, fragment.count);
-        self.fragments.push(BlockFragment { fragment: number as u32, first, count });
+        self.fragments.push(FragmentRays { fragment: number as u32, first, count });
         self.places.extend((0..fragment.rays.len()).map(|k| fragments.place(scene, fragment, k)));
         self.points.extend(self.places[first as usize..].iter().map(Place::viewpoint));
     }
 }
 
-impl Sights {
+impl RaySights {
     /// What the rays of a fragment see together.
-    fn outlook(&self, fragment: &BlockFragment) -> Outlook {
-        let of = |sight: Sight| self.sights[fragment.rays()].iter().filter(|s| **s == sight).count();
-        let dark = of(Sight::Dark);
-        if dark + of(Sight::BelowHorizon) == fragment.count as usize {
-            Outlook::Dark
-        } else if dark > 0 || of(Sight::Behind) > 0 {
-            Outlook::Parted
-        } else if of(Sight::Near) > 0 {
-            Outlook::Unknown
-        } else if of(Sight::Clear) > 0 {
-            Outlook::Clear
+    fn all(&self, fragment: &FragmentRays) -> FragmentSight {
+        let of = |sight: RaySight| self.sights[fragment.rays()].iter().filter(|s| **s == sight).count();
+        let dark = of(RaySight::Dark);
+        if dark + of(RaySight::BelowHorizon) == fragment.count as usize {
+            FragmentSight::Dark
+        } else if dark > 0 || of(RaySight::Behind) > 0 {
+            FragmentSight::Parted
+        } else if of(RaySight::Near) > 0 {
+            FragmentSight::Unknown
+        } else if of(RaySight::Clear) > 0 {
+            FragmentSight::Clear
         } else {
-            Outlook::Lit
+            FragmentSight::Lit
         }
     }
 
     /// Whether so much is in the way of some ray of a fragment that points of the light have to be asked.
-    fn is_crowded(&self, fragment: &BlockFragment) -> bool {
+    fn is_crowded(&self, fragment: &FragmentRays) -> bool {
         self.views[fragment.rays()].iter().flatten().any(|view| view.trees)
     }
 
@@ -463,12 +473,12 @@ impl Sights {
     ) {
         let (si, bsdf) = (&place.surface(), &place.bsdf);
         match self.sights[k] {
-            Sight::Dark => together.dark(&arrivals.place(light, si, bsdf)),
-            Sight::BelowHorizon => together.know(&arrivals.place(light, si, bsdf), &Moments::default()),
-            sight @ (Sight::Lit | Sight::Clear | Sight::Near) => {
-                together.ask(arrivals, si, bsdf, sight == Sight::Lit, sight != Sight::Near, counts);
+            RaySight::Dark => together.dark(&arrivals.place(light, si, bsdf)),
+            RaySight::BelowHorizon => together.know(&arrivals.place(light, si, bsdf), &Moments::default()),
+            sight @ (RaySight::Lit | RaySight::Clear | RaySight::Near) => {
+                together.ask(arrivals, si, bsdf, sight == RaySight::Lit, sight != RaySight::Near, counts);
             }
-            Sight::Behind => {
+            RaySight::Behind => {
                 let view = self.views[k].take().expect("what is behind things has a view");
                 let place = ArrivalPlace { share, lit: true, clear: true, ..arrivals.place(light, si, bsdf) };
                 arrivals.ask_behind(together, light, &place, view, counts);

@@ -10,7 +10,7 @@ use std::ops::ControlFlow;
 
 use arrayvec::ArrayVec;
 
-use super::behind::{NONE, Outlook};
+use super::behind::{FragmentSight, NONE};
 use super::{CELL, Cells};
 use crate::color::Rgb;
 use crate::ids::LightId;
@@ -52,7 +52,7 @@ const MINGLED: f32 = 0.4;
 
 /// What a pixel that was asked sees of a light: the mean over its rays.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Node {
+pub(super) struct SquareNode {
     sums: Moments,
     share: f32,
 }
@@ -145,7 +145,7 @@ impl Cells<'_> {
 
     /// Whether nothing is known of what a pixel's only fragment sees of a light.
     fn is_unknown(&self, at: [u32; 2], light: usize) -> bool {
-        self.whole(at).is_some_and(|(number, _)| matches!(self.outlook(number, light), Outlook::Unknown))
+        self.whole(at).is_some_and(|(number, _)| matches!(self.fragment_sight(number, light), FragmentSight::Unknown))
     }
 
     /// The middle between two opposite rays of a pixel that is filled.
@@ -228,7 +228,7 @@ impl Cells<'_> {
         self.behind.points = points;
         if !is_behind {
             for at in square.pixels() {
-                self.note_at(at, light, if is_lit { Outlook::Lit } else { Outlook::Clear });
+                self.note_at(at, light, if is_lit { FragmentSight::Lit } else { FragmentSight::Clear });
             }
         }
         !is_behind
@@ -246,9 +246,9 @@ impl Cells<'_> {
     }
 
     /// Notes what a pixel's only fragment sees of a light, if that is not known.
-    fn note_at(&mut self, at: [u32; 2], light: usize, outlook: Outlook) {
+    fn note_at(&mut self, at: [u32; 2], light: usize, sight: FragmentSight) {
         if let Some((number, _)) = self.whole(at) {
-            self.note(number, light, outlook);
+            self.note(number, light, sight);
         }
     }
 
@@ -343,7 +343,7 @@ impl Cells<'_> {
     fn is_foretold(&mut self, square: Square, light: usize, counts: &mut Counts) -> bool {
         let Square { x, y, side } = square;
         let rays = (self.scene.antialiasing * self.scene.antialiasing) as f32;
-        let mut nodes = [[Node::default(); 3]; 3];
+        let mut nodes = [[SquareNode::default(); 3]; 3];
         let [columns, rows] = self.places(square);
         for (row, j) in nodes.iter_mut().zip(rows.0) {
             for (node, i) in row.iter_mut().zip(columns.0) {
@@ -354,7 +354,7 @@ impl Cells<'_> {
         let vote = |at: [u32; 2]| self.behind.votes[self.index(at) * self.scene.lights.len() + light];
         if nodes.as_flattened().iter().all(|node| node.share == 1.0) && square.pixels().all(|at| vote(at) == 1.0) {
             for at in square.pixels() {
-                self.note_at(at, light, Outlook::Clear);
+                self.note_at(at, light, FragmentSight::Clear);
             }
             return true;
         }
@@ -404,7 +404,7 @@ impl Cells<'_> {
         }
         for (at, sums) in square.pixels().zip(told) {
             let Some((fragment, of)) = self.whole(at) else { continue };
-            if matches!(self.outlook(fragment, light), Outlook::Settled(_) | Outlook::Told) {
+            if matches!(self.fragment_sight(fragment, light), FragmentSight::Settled(_) | FragmentSight::Told) {
                 continue;
             }
             // Of two colours that meet different light the mean is no product of means
@@ -425,13 +425,13 @@ impl Cells<'_> {
             }
             let all = sums * rays;
             let terms = of.bsdf.colors.each(&all);
-            self.note(fragment, light, Outlook::Settled(terms));
+            self.note(fragment, light, FragmentSight::Settled(terms));
         }
         true
     }
 
     /// What a pixel sees of a light by all of its rays.
-    fn node(&mut self, at: [u32; 2], light: usize, counts: &mut Counts) -> Node {
+    fn node(&mut self, at: [u32; 2], light: usize, counts: &mut Counts) -> SquareNode {
         let index = self.index(at);
         let rays = (self.scene.antialiasing * self.scene.antialiasing) as f32;
         let known = self.behind.nodes.iter().find(|(of, by, _)| (*of, *by) == (index, light)).map(|(_, _, node)| *node);
@@ -440,8 +440,8 @@ impl Cells<'_> {
         }
         let Some((fragment, _)) = self.whole(at) else { unreachable!("smooth squares are filled") };
         let outcome = self.settled(fragment, light, counts);
-        self.note(fragment, light, Outlook::Settled(outcome.terms));
-        let node = Node { sums: outcome.sums * (1.0 / rays), share: outcome.share };
+        self.note(fragment, light, FragmentSight::Settled(outcome.terms));
+        let node = SquareNode { sums: outcome.sums * (1.0 / rays), share: outcome.share };
         self.behind.nodes.push((index, light, node));
         node
     }
