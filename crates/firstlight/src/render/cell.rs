@@ -10,8 +10,9 @@
 //! resolve    the pixel's sum, once
 //! ```
 //!
-//! Each station asks [`LightQueue`] for all of its places together; what its judge refuses is asked by the next. Cells
-//! lie on a grid of the film and are always rendered whole, so no decision depends on tiles, crops or threads.
+//! Each station asks [`LightQueue`] for all of its places together; what its judge refuses is asked by the next. Where
+//! lights are many, [`Many`] stands for all stations after the first. Cells lie on a grid of the film and are always
+//! rendered whole, so no decision depends on tiles, crops or threads.
 
 mod behind;
 mod primary;
@@ -20,11 +21,11 @@ mod squares;
 use std::ops::{ControlFlow, Range};
 
 use super::film::FilmTile;
-use super::fragment::{Fragment, Fragments, Member, Quadrant, RayHit};
+use super::fragment::{Contrast, Fragment, Fragments, Member, Quadrant, RayHit};
 use super::grid::{Block, Grid, SETS_IN};
 use super::hits::{PixelHits, PixelRays};
 use super::light_queue::{Answer, LightQueue, Place, Request, Sight};
-use super::patch::Contrast;
+use super::many::Many;
 use super::resolve::{LightTerm, PixelTerms};
 use super::solo::{self, Candidate};
 use super::square::Square;
@@ -101,9 +102,11 @@ pub(crate) struct Cells<'a> {
     blocks: Vec<Block>,
     /// The materials of blocks whose pixels differ, pixel by pixel.
     patchwork: Vec<(Option<Bsdf>, Contrast)>,
-    /// Those whose rays were traced, and their sums: light by light, diffuse and specular.
+    /// Those whose rays were traced, and their sums: light by light, diffuse and specular, of so few lights; none where
+    /// they are many.
     pixels: Vec<Pixel>,
     terms: Vec<LightTerm>,
+    few: usize,
     grid: Grid,
     places: Vec<Place>,
     requests: Vec<Request>,
@@ -120,12 +123,16 @@ pub(crate) struct Cells<'a> {
     parted: Vec<Wanted>,
     refused: Vec<Wanted>,
     behind: Behind,
+    /// What arrives where lights are many, in place of the stations after the first.
+    many: Option<Many<'a>>,
 }
 
 impl<'a> Cells<'a> {
     pub fn new(scene: &'a Scene, mode: AaMode, lights: LightQueue<'a>) -> Self {
         let pixel_rays = PixelRays::new(lights.arrivals.level(), scene.antialiasing);
         let hits = PixelHits::new(lights.arrivals.level(), scene.antialiasing);
+        let many = lights.arrivals.tree().map(|tree| Many::new(scene, tree));
+        let few = if many.is_some() { 0 } else { scene.lights.len() };
         Cells {
             scene,
             mode,
@@ -140,11 +147,12 @@ impl<'a> Cells<'a> {
             patchwork: Vec::new(),
             pixels: Vec::new(),
             terms: Vec::new(),
-            grid: Grid::new(scene.lights.len()),
+            few,
+            grid: Grid::new(few),
             places: Vec::new(),
             requests: Vec::new(),
             answers: Vec::new(),
-            fragments: Fragments::new(scene),
+            fragments: Fragments::new(scene, many.is_some()),
             pixel_rays,
             hits,
             rays: Vec::new(),
@@ -153,7 +161,8 @@ impl<'a> Cells<'a> {
             wanted: Vec::new(),
             parted: Vec::new(),
             refused: Vec::new(),
-            behind: Behind::new(scene),
+            behind: Behind::new(scene, few),
+            many,
         }
     }
 
@@ -174,6 +183,11 @@ impl<'a> Cells<'a> {
         self.begin(corner);
         self.primary(counts);
         go_on()?;
+        if let Some(mut many) = self.many.take() {
+            let lit = self.many(&mut many, counts, go_on);
+            self.many = Some(many);
+            return lit;
+        }
         self.grid.light(self.scene, &mut self.lights, &self.blocks, counts, go_on)?;
         self.work.iter_mut().zip(self.grid.work()).for_each(|(work, more)| *work += more);
         self.fragments(counts);
@@ -202,6 +216,36 @@ impl<'a> Cells<'a> {
 
     fn index(&self, [i, j]: [u32; 2]) -> usize {
         ((j - self.corner[1]) * CELL + i - self.corner[0]) as usize
+    }
+
+    /// Lights the fragments of a scene with many lights.
+    fn many(
+        &mut self,
+        many: &mut Many<'a>,
+        counts: &mut Counts,
+        go_on: &impl Fn() -> ControlFlow<()>,
+    ) -> ControlFlow<()> {
+        let scene = self.scene;
+        let [x, y] = self.corner;
+        let size = [(scene.width - x).min(CELL), (scene.height - y).min(CELL)];
+        for at in (Square { x, y, side: CELL }).pixels().filter(|[i, j]| *i < scene.width && *j < scene.height) {
+            let index = self.index(at);
+            if let State::Only(only) = self.states[index] {
+                self.trace(at, &[only], counts);
+            }
+        }
+        self.add_ambient();
+        let Cells { fragments, pixels, colors, work, lights, .. } = self;
+        for Pixel { index, terms } in pixels.iter() {
+            colors[*index as usize] = terms.resolve(scene, std::iter::empty());
+        }
+        let pixel = |fragment: usize| &pixels[fragments.all[fragment].pixel as usize];
+        many.begin(fragments, size, |fragment| pixel(fragment).index);
+        many.light(fragments, &mut lights.arrivals, counts, go_on, |fragment, sent, took| {
+            let Pixel { index, terms } = *pixel(fragment);
+            colors[index as usize] = terms.resolve(scene, sent.iter().copied());
+            work[index as usize] += took;
+        })
     }
 
     /// Queues what light the grid does not tell.
@@ -500,14 +544,19 @@ impl<'a> Cells<'a> {
         }
     }
 
-    /// Makes colours of what is known.
-    fn resolve(&mut self) {
-        let scene = self.scene;
-        let lights = scene.lights.len();
+    /// Adds ambient light to the sums of pixels.
+    fn add_ambient(&mut self) {
         for fragment in &self.fragments.all {
             let pixel = &mut self.pixels[fragment.pixel as usize];
-            pixel.terms.ambient += scene.ambient * fragment.bsdf.ambient * fragment.count() as f32;
+            pixel.terms.ambient += self.scene.ambient * fragment.bsdf.ambient * fragment.count() as f32;
         }
+    }
+
+    /// Makes colours of what is known.
+    fn resolve(&mut self) {
+        self.add_ambient();
+        let scene = self.scene;
+        let lights = scene.lights.len();
         for (number, pixel) in self.pixels.iter().enumerate() {
             let terms = self.terms[number * lights..][..lights].iter().copied();
             let scales = self.lights.arrivals.scales().iter().copied();

@@ -52,6 +52,8 @@ impl Arrival {
     }
 }
 
+/// In display steps: how much may bend over a patch that is lit once.
+pub(super) const BEND: f32 = 0.25;
 /// Outlines that move over a larger part of the light than this, and highlights that move by more of their width,
 /// squared, are not wide beside the patch.
 pub(super) const RESOLVED: f32 = 0.5;
@@ -115,11 +117,10 @@ pub(super) fn change(view: &View, place: &ArrivalPlace, arrived: &Arrived, sway:
     let swing = place.turn + place.reach / nearest.max(place.reach);
     let cuts = !view.is_above_horizon() || view.min(&view.cos) < place.reach + place.turn * view.middle().length();
     // Where the outline of a shadow comes in, the share it hides begins to grow at once: an eighth of the way it moves
-    let kink = (drift * (0.125 + 0.5 * place.off)).min(1.0);
+    let kink = (drift * 0.125).min(1.0);
     let cos = (view.max(&view.cos) / view.middle().length()).min(1.0) + swing;
     let horizon = if cuts { swing * swing.min(1.0) } else { 0.0 };
     let smooth = square(place.reach / nearest.max(place.reach)) * 2.0 + place.turn * place.turn * 0.5;
-    let smooth = smooth + 2.0 * swing * place.off;
     let diffuse = most * (cos * (kink + smooth.min(1.0) + crossing) + horizon).min(1.0);
     let resolved = drift < RESOLVED && swing < RESOLVED_SWING && crossing == 0.0;
     let is_clear = resolved && drift == 0.0 && illumination == Illumination::Full && !cuts;
@@ -130,7 +131,6 @@ pub(super) fn change(view: &View, place: &ArrivalPlace, arrived: &Arrived, sway:
     let moved = 2.0 * place.turn + place.reach / nearest.max(place.reach) + sway;
     let lobe = view.sharpness() * moved * moved;
     let narrow = lobe.min(1.0);
-    let narrow = (narrow + 2.0 * narrow.sqrt() * place.off).min(1.0);
     let specular = most * brightest(view, lobe) * (kink + smooth + narrow + horizon + crossing).min(1.0);
     let bend = Moments::bounds(diffuse, specular);
     let resolved = resolved && narrow < RESOLVED;

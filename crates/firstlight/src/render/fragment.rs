@@ -7,7 +7,6 @@ use arrayvec::ArrayVec;
 use super::cell::QUADRANT_MOTION;
 use super::hits::camera_ray;
 use super::light_queue::Place;
-pub(crate) use super::patch::Contrast;
 use super::solo::{Candidate, SquareBsdf};
 use super::square::Square;
 use crate::color::Rgb;
@@ -26,6 +25,9 @@ const SAME_NORMAL: f32 = 0.9;
 /// is where facets make a crease.
 const SKEW: f32 = 0.002;
 const SKEW_OF_QUADRANT: f32 = 0.01;
+/// How far colours of some rays differ, channel by channel.
+pub(crate) type Contrast = Colors;
+
 /// Fragments of so few rays are lit at each.
 const FEW_RAYS: usize = 4;
 
@@ -114,6 +116,8 @@ impl PlainMaterials {
 /// The fragments of a cell.
 pub(crate) struct Fragments {
     pub plain: PlainMaterials,
+    /// Whether the middle stands for rays of different colours, by their mean.
+    by_means: bool,
     pub all: Vec<Fragment>,
     rays: Vec<RayHit>,
     members: Vec<Member>,
@@ -131,9 +135,10 @@ impl Fragment {
 }
 
 impl Fragments {
-    pub fn new(scene: &Scene) -> Self {
+    pub fn new(scene: &Scene, by_means: bool) -> Self {
         Fragments {
             plain: PlainMaterials::new(scene),
+            by_means,
             all: Vec::new(),
             rays: Vec::new(),
             members: Vec::new(),
@@ -183,13 +188,10 @@ impl Fragments {
             None => MeanBsdf { bsdf, contrast: Contrast::default(), uneven: false },
             Some(range) => MeanBsdf::of(self.bsdfs[range.clone()].iter()),
         };
-        let middle = if mean.uneven || mean.contrast != Contrast::default() {
-            None
-        } else {
-            match rays {
-                [ray] => Some(of.point(scene, &ray.ray, ray.t)),
-                _ => middle(scene, of, rays.iter()),
-            }
+        let middle = match rays {
+            [ray] => Some(of.point(scene, &ray.ray, ray.t)),
+            _ if self.has_no_middle(&mean) => None,
+            _ => middle(scene, of, rays.iter()),
         };
         let surface = of.surface(scene);
         let middle = middle.map(|point| self.add_middle(scene, surface, &mean.bsdf, point, share));
@@ -208,6 +210,11 @@ impl Fragments {
             quadrants: None,
         });
         self.rays = all;
+    }
+
+    /// Whether no place stands for all rays of such materials.
+    fn has_no_middle(&self, mean: &MeanBsdf) -> bool {
+        mean.uneven || mean.contrast != Contrast::default() && !self.by_means
     }
 
     /// Adds the middle of a fragment that fills a share of its pixel: which of all places it is.
@@ -247,10 +254,9 @@ impl Fragments {
                 MeanBsdf::of(self.bsdfs[bsdfs..].iter())
             };
             let share = share(count);
-            let middle = if mean.uneven || mean.contrast != Contrast::default() {
-                None
-            } else {
-                seen_middle(scene, at, self.members[members..].iter(), SKEW)
+            let middle = match self.has_no_middle(&mean) {
+                true => None,
+                false => seen_middle(scene, at, self.members[members..].iter(), SKEW),
             };
             let middle = middle.map(|point| self.add_middle(scene, si.surface, &mean.bsdf, point, share));
             self.all.push(Fragment {
@@ -455,8 +461,8 @@ fn middle<'a>(scene: &Scene, of: Candidate, rays: impl Iterator<Item = &'a RayHi
     (point.turn <= MAX_TURN).then_some(point)
 }
 
-/// Whether two camera rays of a pixel see one surface in trees, which may be lit as one.
-fn is_one_surface(one: &SurfaceInteraction, other: &SurfaceInteraction) -> bool {
+/// Whether two places that camera rays see are of one surface, which may be lit as one.
+pub(crate) fn is_one_surface(one: &SurfaceInteraction, other: &SurfaceInteraction) -> bool {
     if one.surface != other.surface || one.material != other.material || !(one.ns.dot(other.ns) > SAME_NORMAL) {
         return false;
     }

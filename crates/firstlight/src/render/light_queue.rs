@@ -6,8 +6,7 @@ use arrayvec::ArrayVec;
 
 use super::Counts;
 use super::arrival::{ArrivalPlace, Arrivals, Trees};
-use super::change::Arrival;
-use super::tiled::BEND;
+use super::change::{Arrival, BEND};
 use crate::color::Rgb;
 use crate::ids::{LightId, MaterialId, SurfaceId};
 use crate::integrate::{Arrived, Emitter, Illumination, ShadingPoint};

@@ -6,7 +6,7 @@
 //! can for many points together. They share the way from pixel to surface and from light to film; what differs is how
 //! the light of one source is summed at one surface, the trait [`Lighting`].
 //!
-//! [`tiled`](tiled/index.html) integrates lights and lights a surface once where that is enough; all else is as above.
+//! [`cell`](cell/index.html) integrates lights and lights a surface once where that is enough; all else is as above.
 
 mod arrival;
 mod beams;
@@ -28,7 +28,6 @@ mod lanes;
 mod light_queue;
 mod lights;
 mod many;
-mod patch;
 pub(crate) mod pixel;
 mod plain;
 mod receipt;
@@ -39,7 +38,6 @@ mod single;
 mod solo;
 mod square;
 mod tile;
-mod tiled;
 mod together;
 
 use std::num::NonZeroUsize;
@@ -67,12 +65,10 @@ use hits::PixelHits;
 use lanes::Lanes;
 use light_queue::LightQueue;
 use lights::Lights;
-use many::FEW;
 use pixel::{Lighting, PixelSum};
 use plain::Plain;
 use shafts::Shafts;
 use tile::Tile;
-use tiled::Tiled;
 
 words! {
     /// How the edges of what a pixel holds are smoothed.
@@ -295,7 +291,6 @@ pub fn render(
     let (done, stop) = (AtomicU64::new(0), AtomicBool::new(false));
     let by_shafts = every_ray && renderer == Renderer::Full;
     let targets = if by_shafts { Target::of_all(scene) } else { Vec::new() };
-    let by_cells = scene.lights.len() <= FEW;
     let spare: Mutex<Vec<Cells>> = Mutex::new(Vec::new());
     let render_one = |tile: &Tile| {
         if stop.load(Ordering::Relaxed) {
@@ -318,7 +313,7 @@ pub fn render(
                 render_tile(scene, film, &mut Lanes::new(token), hits, &go_on)
             }
             Renderer::Full if is_sampled => Shafts::new(scene, &targets, token).render(film, &go_on),
-            Renderer::Full | Renderer::Adaptive if by_cells => {
+            Renderer::Full | Renderer::Adaptive => {
                 // Their memory goes from tile to tile
                 let used = spare.lock().expect("no thread panics while it holds a renderer").pop();
                 let mut cells = used.unwrap_or_else(|| {
@@ -328,11 +323,6 @@ pub fn render(
                 let rendered = cells.render(film, &go_on);
                 spare.lock().expect("no thread panics while it holds a renderer").push(cells);
                 rendered
-            }
-            Renderer::Full | Renderer::Adaptive => {
-                let (hits, arrivals) =
-                    (PixelHits::new(token, scene.antialiasing), Arrivals::new(scene, &lights, token));
-                Tiled::new(scene, renderer.aa_mode(), hits, arrivals).render(film, &go_on)
             }
         };
         let ControlFlow::Continue(counts) = rendered else { return };

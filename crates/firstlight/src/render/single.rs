@@ -46,12 +46,10 @@ impl Arrivals<'_> {
         let edge = if light.shadows && si.receives_shadow { self.edge(index, to.l, to.finite, place) } else { 0.0 };
         let swing = place.turn + place.reach / distance;
         let terminator = if height < behind { swing * 0.5 } else { 0.0 };
-        let smooth = swing * swing + 2.0 * swing * place.off;
+        let smooth = swing * swing;
         let share = (edge + rim + terminator + smooth).min(1.0);
         let moved = 2.0 * place.turn + place.reach / distance + self.scene.camera.sway(si.lit_from, place.reach);
         let lobe = (place.lobe.sharpness(si.ns.dot(si.wo)) * square(moved)).min(1.0);
-        // Shaded aside of its middle, a patch is lit otherwise than in the mean at once
-        let lobe = (lobe + 2.0 * lobe.sqrt() * place.off).min(1.0);
         let specular =
             if matches!(place.lobe, Lobe::None) { 0.0 } else { weight * (edge + rim + terminator + lobe).min(1.0) };
         let resolved = edge == 0.0 && rim == 0.0 && swing < RESOLVED_SWING && lobe < RESOLVED;

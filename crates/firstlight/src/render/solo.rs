@@ -368,17 +368,3 @@ impl Candidate {
         }
     }
 }
-
-/// The first of some things on a ray, and its place among them: of several at the same distance, the one with the
-/// lowest id.
-pub(crate) fn first(scene: &Scene, candidates: &[Candidate], ray: &Ray) -> Option<(usize, Hit)> {
-    let mut first: Option<(usize, Hit)> = None;
-    for (i, candidate) in candidates.iter().enumerate() {
-        if let Some(hit) = candidate.hit(scene, ray)
-            && first.is_none_or(|(_, before)| (hit.t, hit.surface) < (before.t, before.surface))
-        {
-            first = Some((i, hit));
-        }
-    }
-    first
-}

@@ -3,7 +3,6 @@
 use crate::color::Rgb;
 use crate::integrate::ShadingPoint;
 use crate::material::{Colors, Lobe, Moments};
-use crate::render::patch::Patch;
 use crate::shape::SurfaceInteraction;
 
 /// A place of a surface that asks for one light, by itself.
@@ -15,8 +14,6 @@ pub(crate) struct ArrivalPlace<'a> {
     pub reach: f32,
     /// How far the normal turns on the way, in radians.
     pub turn: f32,
-    /// How far off the patch's middle the place is, as a part of `reach`.
-    pub off: f32,
     /// The share of the pixel that it stands for: errors of its parts are as good as independent.
     pub share: f32,
     /// Whether it is known that nothing is in the way of the light, or nothing in trees.
@@ -32,19 +29,7 @@ pub(crate) struct ArrivalPlace<'a> {
 impl<'a> ArrivalPlace<'a> {
     /// One point, by itself; `base` and what follows as in the struct.
     pub fn point(si: &'a SurfaceInteraction, lobe: &'a Lobe, base: Rgb, scale: Rgb, reflected: Colors) -> Self {
-        ArrivalPlace {
-            si,
-            lobe,
-            reach: 0.0,
-            turn: 0.0,
-            off: 0.0,
-            share: 1.0,
-            lit: false,
-            clear: false,
-            base,
-            scale,
-            reflected,
-        }
+        ArrivalPlace { si, lobe, reach: 0.0, turn: 0.0, share: 1.0, lit: false, clear: false, base, scale, reflected }
     }
 
     /// What sums of the light send.
@@ -55,11 +40,6 @@ impl<'a> ArrivalPlace<'a> {
     /// What the two sums are multiplied with, all in all.
     pub fn colors(&self) -> Colors {
         self.scale * self.reflected
-    }
-
-    /// The same for all of a patch that is shaded there.
-    pub fn over(self, patch: &Patch) -> Self {
-        ArrivalPlace { reach: patch.reach, turn: patch.turn, off: patch.off, ..self }
     }
 
     pub(super) fn point_of_surface(&self) -> ShadingPoint {

@@ -62,8 +62,7 @@ pub(super) const NONE: u32 = u32::MAX;
 const TOGETHER: usize = 64;
 
 impl Behind {
-    pub fn new(scene: &Scene) -> Self {
-        let lights = scene.lights.len();
+    pub fn new(scene: &Scene, lights: usize) -> Self {
         let across = if scene.geometry.has_trees() { PIXELS * lights } else { 0 };
         Behind {
             known: Vec::new(),

@@ -49,7 +49,7 @@ impl Cells<'_> {
         if self.mode == AaMode::Adaptive
             && let Some(only) = pyramid.only(scene, near)
         {
-            return self.block(square, only);
+            return if self.many.is_some() { self.mark(square, State::Only(only)) } else { self.block(square, only) };
         }
         let by_bundles = near.contains(&Candidate::Trees);
         if square.side > if by_bundles { SMALLEST.max(self.hits.side()) } else { SMALLEST } {
@@ -135,7 +135,7 @@ impl Cells<'_> {
         self.work[index] += rays as f32;
         counts.looks += u64::from(rays);
         self.states[index] = State::Traced;
-        self.terms.resize(self.terms.len() + self.scene.lights.len(), LightTerm::BLACK);
+        self.terms.resize(self.terms.len() + self.few, LightTerm::BLACK);
         Pixel { index: index as u32, ..Pixel::default() }
     }
 
@@ -218,6 +218,11 @@ impl Cells<'_> {
             }
             None => State::Only(only),
         };
+        self.mark(square, state);
+    }
+
+    /// Notes what is known of the pixels of a square.
+    fn mark(&mut self, square: Square, state: State) {
         for at in square.pixels() {
             let index = self.index(at);
             self.states[index] = state;

@@ -2,21 +2,19 @@
 
 use std::ops::Range;
 
+use super::patch::Patch;
 use super::places::{standing, tones, zone};
-use super::{At, BLOCK, CLOSE, CROWD, INTEGRALS, LENIENT, LEVELS, Many, ONE, PILOT, SURE, Single, Stored};
+use super::{BLOCK, CLOSE, CROWD, INTEGRALS, LENIENT, LEVELS, Many, ONE, PILOT, SURE, Single, Stored};
 use crate::color::Rgb;
 use crate::ids::LightId;
 use crate::light::{Held, LightKind, LightNode, LightTree, Sends, Sent};
 use crate::material::{Lobe, Moments};
 use crate::math::Vec3;
 use crate::render::arrival::{ArrivalPlace, Arrivals};
-use crate::render::cell::CELL;
 use crate::render::counts::Counts;
 use crate::render::crowd::By;
 use crate::render::cut::Walk;
 use crate::render::fence::Fence;
-use crate::render::patch::{Patch, PixelPatches};
-use crate::render::tiled::ACROSS;
 use crate::scene::Scene;
 use crate::shape::SurfaceInteraction;
 use crate::visibility::Seen;
@@ -38,16 +36,15 @@ impl<'a> Many<'a> {
     #[allow(clippy::too_many_arguments, reason = "a block of a cell, and what it asks with")]
     pub(super) fn crowd(
         &mut self,
-        pixels: &[PixelPatches],
-        first: &[usize],
-        group: &[At],
+        patches: &[Patch],
+        group: &[usize],
         level: usize,
         guess: Option<Rgb>,
         arrivals: &mut Arrivals<'a>,
         counts: &mut Counts,
     ) {
         let (scene, tree) = (self.scene, self.tree);
-        let patch = |(index, k): &At| &pixels[*index].patches[*k];
+        let patch = |number: &usize| &patches[*number];
         let zone = zone(group.iter().map(patch), self.eye);
         let tones = tones(scene, group.iter().map(patch));
         let receives = group.iter().any(|at| patch(at).si.receives_shadow);
@@ -111,7 +108,7 @@ impl<'a> Many<'a> {
                     continue;
                 }
                 self.count(&stored, counts);
-                self.patches[first[at.0] + at.1] = stored;
+                self.stored[*at] = stored;
             }
             darkest = if level < LEVELS {
                 found.unwrap_or(guess) * SURE
@@ -125,15 +122,11 @@ impl<'a> Many<'a> {
         if again.is_empty() {
             return;
         }
-        let half = (BLOCK >> (level + 1)).max(1);
+        let half = (BLOCK as u32 >> (level + 1)).max(1);
         for quarter in 0..4 {
-            let is_in = |(index, _): &&At| {
-                let part = |v: usize| (v.clamp(1, CELL as usize) - 1) / half % 2;
-                part(index / ACROSS) * 2 + part(index % ACROSS) == quarter
-            };
-            let part: Vec<At> = again.iter().filter(is_in).copied().collect();
+            let part: Vec<usize> = again.iter().filter(|at| patch(at).quarter(half) == quarter).copied().collect();
             if !part.is_empty() {
-                self.crowd(pixels, first, &part, level + 1, Some(darkest), arrivals, counts);
+                self.crowd(patches, &part, level + 1, Some(darkest), arrivals, counts);
             }
         }
     }
@@ -170,7 +163,12 @@ impl<'a> Many<'a> {
             arrivals.tolerate(INTEGRALS / (singles.len() as f32).sqrt());
         }
         for index in singles {
-            let place = ArrivalPlace { base: stored.value, ..arrivals.place(*index as usize, si, bsdf).over(patch) };
+            let place = ArrivalPlace {
+                base: stored.value,
+                reach: patch.reach,
+                turn: patch.turn,
+                ..arrivals.place(*index as usize, si, bsdf)
+            };
             let arrival = arrivals.arrival(*index as usize, &place, counts);
             light += arrivals.scale(*index as usize) * arrival.sums.cosine();
             stored.value += place.color(&arrival.sums);

@@ -3,16 +3,17 @@
 use std::ops::Range;
 
 use super::dense::sent;
-use super::{ANYTHING, At, INTEGRALS, Many, Single, Stored};
+use super::patch::Patches;
+use super::{ANYTHING, INTEGRALS, Many, Single, Stored};
 use crate::color::Rgb;
 use crate::light::Sent;
 use crate::material::{Lobe, Moments};
 use crate::render::arrival::Arrivals;
+use crate::render::change::BEND;
 use crate::render::counts::Counts;
 use crate::render::fence::Fence;
-use crate::render::patch::PixelPatches;
+use crate::render::fragment::Fragments;
 use crate::render::resolve::LightTerm;
-use crate::render::tiled::{BEND, second_difference, within};
 use crate::shape::SurfaceInteraction;
 
 /// A light, or all that are taken together, whose mean over a patch is in doubt.
@@ -25,29 +26,28 @@ pub(super) struct Doubt {
 }
 
 impl<'a> Many<'a> {
-    /// The colour of a pixel's surfaces, but for emission and ambient light: what each ray sees, added up. `add` hears
-    /// each light's diffuse part and highlight, in scene order, and last what is taken together.
-    #[allow(clippy::too_many_arguments, reason = "a pixel among those of a cell, and what it asks with")]
-    pub fn finish(
+    /// What lights send to the patches of a pixel, by their numbers: what each ray sees, added up. `scaled` gets each
+    /// light's diffuse part and highlight with its scale, in scene order, and last what is taken together.
+    pub(super) fn finish(
         &mut self,
-        pixels: &[PixelPatches],
-        first: &[usize],
-        index: usize,
-        at: [u32; 2],
+        fragments: &Fragments,
+        patches: &Patches,
+        pixel: Range<usize>,
         arrivals: &mut Arrivals<'a>,
         counts: &mut Counts,
-        mut add: impl FnMut((Rgb, LightTerm)),
+        scaled: &mut Vec<(Rgb, LightTerm)>,
     ) {
         let scene = self.scene;
         let mut terms = std::mem::take(&mut self.terms);
         let mut fence = std::mem::take(&mut self.fence);
+        let mut doubts = std::mem::take(&mut self.doubts);
         terms.clear();
         let mut together = Sent::BLACK;
-        for (k, patch) in pixels[index].patches.iter().enumerate() {
-            let count = patch.count(scene) as f32;
-            let stored = &self.patches[first[index] + k];
-            let mut doubts = std::mem::take(&mut self.doubts);
-            self.doubts_of(pixels, first, (index, k), arrivals, &mut doubts);
+        for number in pixel {
+            let patch = &patches.all[number];
+            let count = patch.count as f32;
+            let stored = &self.stored[number];
+            self.doubts_of(patches, number, arrivals, &mut doubts);
             doubts.sort_unstable_by_key(|doubt| doubt.single);
             let in_doubt = |single: Option<u32>| doubts.binary_search_by_key(&single, |doubt| doubt.single).is_ok();
             let bsdf = &patch.bsdf;
@@ -61,33 +61,31 @@ impl<'a> Many<'a> {
                     terms.push((light, bsdf.colors.each(&sums)));
                 }
             }
-            if !doubts.is_empty() {
-                arrivals.tolerate(INTEGRALS / (doubts.len() as f32).sqrt());
-                patch.for_each(scene, at, |si, bsdf| {
-                    for doubt in &doubts {
-                        match doubt.single {
-                            Some(i) => {
-                                let light = self.singles[i as usize].light;
-                                terms.push((light, arrivals.at_point(light as usize, si, bsdf, 1.0, counts)));
-                            }
-                            None => {
-                                together += bsdf.colors * self.sent_at(stored, &mut fence, si, &bsdf.lobe);
-                            }
-                        }
-                    }
-                });
+            if doubts.is_empty() {
+                continue;
             }
-            self.doubts = doubts;
+            arrivals.tolerate(INTEGRALS / (doubts.len() as f32).sqrt());
+            patch.for_each(scene, fragments, |si, bsdf| {
+                for doubt in &doubts {
+                    match doubt.single {
+                        Some(i) => {
+                            let light = self.singles[i as usize].light;
+                            terms.push((light, arrivals.at_point(light as usize, si, bsdf, 1.0, counts)));
+                        }
+                        None => together += bsdf.colors * self.sent_at(stored, &mut fence, si, &bsdf.lobe),
+                    }
+                }
+            });
         }
         // In scene order
         terms.sort_by_key(|(light, _)| *light);
         for same in terms.chunk_by(|a, b| a.0 == b.0) {
             let term = same.iter().fold(Sent::BLACK, |sum, (_, term)| sum + *term);
-            add((arrivals.scale(same[0].0 as usize), term));
+            scaled.push((arrivals.scale(same[0].0 as usize), term));
         }
         // Of many scales
-        add((Rgb::WHITE, together));
-        (self.terms, self.fence) = (terms, fence);
+        scaled.push((Rgb::WHITE, together));
+        (self.terms, self.fence, self.doubts) = (terms, fence, doubts);
     }
 
     /// What nodes send to where one camera ray ends.
@@ -111,25 +109,20 @@ impl<'a> Many<'a> {
 
     /// How far the mean over a patch can be from what arrives at its middle because other lights are seen from
     /// elsewhere on it: as its neighbours tell, and anything where they do not.
-    pub(super) fn flicker(&self, pixels: &[PixelPatches], first: &[usize], (index, k): At) -> Rgb {
-        let patch = &pixels[index].patches[k];
-        let stored = &self.patches[first[index] + k];
+    fn flicker(&self, patches: &Patches, number: usize) -> Rgb {
+        let (patch, stored) = (&patches.all[number], &self.stored[number]);
         if patch.reach == 0.0 || stored.maybe.is_empty() {
             return Rgb::BLACK;
         }
         let anything = Rgb::new(ANYTHING, ANYTHING, ANYTHING);
-        if !patch.is_whole(self.scene) {
+        if !patch.is_whole {
             return anything;
         }
         let mut all = Rgb::BLACK;
         for channel in 0..3 {
             let of = |color: Rgb| [color.r, color.g, color.b][channel];
-            let sums = |stored: &Stored| Moments(stored.sent.0.map(of));
-            let arrived = |index: usize| Some(sums(&self.patches[first[index]]));
-            let Some(differences) = second_difference(self.scene, pixels, index, patch, &sums(stored), arrived) else {
-                return anything;
-            };
-            let bend = within(&differences);
+            let arrived = |number: usize| Some(Moments(self.stored[number].sent.0.map(of)));
+            let Some(bend) = patches.within(patch, arrived) else { return anything };
             let one = |channel_of: usize| if channel_of == channel { 1.0 } else { 0.0 };
             let mask = Rgb::new(one(0), one(1), one(2));
             all += mask * patch.bsdf.colors.of(&bend);
@@ -139,17 +132,9 @@ impl<'a> Many<'a> {
 
     /// What of the light at a patch has to be asked for at each ray. All the rest may together bend by as much as one
     /// may.
-    pub(super) fn doubts_of(
-        &self,
-        pixels: &[PixelPatches],
-        first: &[usize],
-        (index, k): At,
-        arrivals: &Arrivals,
-        doubts: &mut Vec<Doubt>,
-    ) {
+    fn doubts_of(&self, patches: &Patches, number: usize, arrivals: &Arrivals, doubts: &mut Vec<Doubt>) {
         doubts.clear();
-        let patch = &pixels[index].patches[k];
-        let stored = &self.patches[first[index] + k];
+        let (patch, stored) = (&patches.all[number], &self.stored[number]);
         let (bsdf, value) = (&patch.bsdf, stored.value);
         let mut all = Rgb::BLACK;
         let mut doubt = |single: Option<u32>, error: Rgb| {
@@ -158,7 +143,7 @@ impl<'a> Many<'a> {
         };
         if stored.lit.iter().any(|range| !range.is_empty()) {
             let smooth = (bsdf.colors * stored.bend).sum();
-            doubt(None, smooth + self.flicker(pixels, first, (index, k)));
+            doubt(None, smooth + self.flicker(patches, number));
         }
         let shown = |light: u32, bend: &Moments| {
             let scale = arrivals.scale(light as usize);
@@ -167,9 +152,6 @@ impl<'a> Many<'a> {
         for i in stored.singles.clone() {
             let Single { light, arrival } = &self.singles[i as usize];
             doubt(Some(i), shown(*light, &arrival.bend));
-        }
-        if patch.uneven {
-            return;
         }
         if arrivals.steps(value, all) <= BEND {
             doubts.clear();
@@ -184,27 +166,6 @@ impl<'a> Many<'a> {
         doubts.retain(|doubt| {
             if arrivals.steps(value, sum + doubt.error) <= BEND {
                 sum += doubt.error;
-                return false;
-            }
-            let Some(i) = doubt.single else { return true };
-            let here = &self.singles[i as usize];
-            if !here.arrival.resolved || !patch.is_whole(self.scene) {
-                return true;
-            }
-            let arrived = |index: usize| {
-                let stored = &self.patches[first[index]];
-                let range = stored.singles.start as usize..stored.singles.end as usize;
-                let singles = &self.singles[range];
-                let found = singles.binary_search_by_key(&here.light, |single| single.light).ok()?;
-                Some(singles[found].arrival.sums)
-            };
-            let Some(differences) = second_difference(self.scene, pixels, index, patch, &here.arrival.sums, arrived)
-            else {
-                return true;
-            };
-            let error = shown(here.light, &within(&differences));
-            if arrivals.steps(value, sum + error) <= BEND {
-                sum += error;
                 return false;
             }
             true

@@ -1,4 +1,4 @@
-//! Many lights: what arrives at the patches of a cell where not every light is asked for at every one.
+//! More than [`FEW`] lights: what arrives at the fragments of a cell where not every light is asked for at every one.
 //!
 //! For each block of pixels, and for its quarters and theirs, a [`Cut`] says which lights count: nodes of the
 //! [`LightTree`](crate::light::LightTree) that are seen whole from all of it, and nodes that have to be looked at from
@@ -11,6 +11,8 @@
 
 mod dense;
 mod finish;
+mod neighbours;
+mod patch;
 mod places;
 
 use std::ops::{ControlFlow, Range};
@@ -22,8 +24,8 @@ use super::counts::Counts;
 use super::crowd::Crowd;
 use super::cut::{Cut, Walk};
 use super::fence::Fence;
-use super::patch::{Patch, PixelPatches};
-use super::tiled::ACROSS;
+use super::fragment::Fragments;
+use super::resolve::LightTerm;
 use crate::color::Rgb;
 use crate::ids::LightId;
 use crate::light::{LightTree, Sent};
@@ -33,6 +35,7 @@ use crate::scene::Scene;
 use crate::visibility::{Outlook, Seen};
 use dense::{Dot, sent};
 use finish::Doubt;
+use patch::{Patch, Patches};
 use places::{is_alike, standing, tone, tones, zone};
 
 /// So few lights are all asked for everywhere, and none is left out.
@@ -70,9 +73,10 @@ const SHARES: [f32; LEVELS] = [0.3, 0.15, 0.15];
 /// Colours of a block that are told apart.
 const TONES: usize = 8;
 
-/// What arrives at the patches of one cell. Keeps its memory.
+/// What arrives at the fragments of one cell. Keeps its memory.
 pub(super) struct Many<'a> {
     scene: &'a Scene,
+    patches: Patches,
     tree: &'a LightTree,
     together: bool,
     eye: Vec3,
@@ -80,8 +84,8 @@ pub(super) struct Many<'a> {
     cut: Cut,
     crowd: Crowd,
     fence: Fence,
-    /// Of each patch of the cell, in the order of pixels.
-    patches: Vec<Stored>,
+    /// What arrives at each patch.
+    stored: Vec<Stored>,
     /// The lights that were asked for one by one, patch by patch, in scene order.
     singles: Vec<Single>,
     /// Nodes that are taken for one, list by list.
@@ -124,9 +128,6 @@ struct Above {
     lit: [Range<u32>; LEVELS + 1],
 }
 
-/// Where a patch is: its pixel in the cell with its rim, and which of the pixel's it is.
-type At = (usize, usize);
-
 impl<'a> Many<'a> {
     pub fn new(scene: &'a Scene, tree: &'a LightTree) -> Self {
         Many {
@@ -138,7 +139,8 @@ impl<'a> Many<'a> {
             cut: Cut::default(),
             crowd: Crowd::default(),
             fence: Fence::default(),
-            patches: Vec::new(),
+            patches: Patches::default(),
+            stored: Vec::new(),
             singles: Vec::new(),
             lit: Vec::new(),
             dots: Vec::new(),
@@ -147,27 +149,53 @@ impl<'a> Many<'a> {
         }
     }
 
-    /// Finds out what arrives at the middle of each patch of a cell and its rim. `first` says where each pixel's
-    /// patches begin among all.
-    pub fn look(
+    /// Begins a cell of which the film has so much; `pixel` says where in it a fragment is.
+    pub fn begin(&mut self, fragments: &Fragments, size: [u32; 2], pixel: impl Fn(usize) -> u32) {
+        self.patches.begin(self.scene, fragments, size, pixel);
+    }
+
+    /// Lights the fragments of the cell. `add` hears, pixel by pixel, one of its fragments; of each light in scene
+    /// order what it sends and its scale, and last what is taken together; and the work that this took.
+    pub fn light(
         &mut self,
-        pixels: &[PixelPatches],
-        first: &mut [usize],
+        fragments: &Fragments,
+        arrivals: &mut Arrivals<'a>,
+        counts: &mut Counts,
+        go_on: &impl Fn() -> ControlFlow<()>,
+        mut add: impl FnMut(usize, &[(Rgb, LightTerm)], f32),
+    ) -> ControlFlow<()> {
+        let patches = std::mem::take(&mut self.patches);
+        let before = counts.work();
+        let looked = self.look(&patches, arrivals, counts, go_on);
+        if looked.is_continue() {
+            let each = (counts.work() - before) / (CELL * CELL) as f32;
+            let mut terms = Vec::new();
+            let mut first = 0;
+            for same in patches.all.chunk_by(|a, b| a.pixel == b.pixel) {
+                let before = counts.work();
+                terms.clear();
+                self.finish(fragments, &patches, first..first + same.len(), arrivals, counts, &mut terms);
+                add(same[0].fragment as usize, &terms, each + counts.work() - before);
+                first += same.len();
+            }
+        }
+        self.patches = patches;
+        looked
+    }
+
+    /// Finds out what arrives at each patch of a cell.
+    fn look(
+        &mut self,
+        patches: &Patches,
         arrivals: &mut Arrivals<'a>,
         counts: &mut Counts,
         go_on: &impl Fn() -> ControlFlow<()>,
     ) -> ControlFlow<()> {
-        let mut all = 0;
-        for (first, pixel) in first.iter_mut().zip(pixels) {
-            *first = all;
-            all += pixel.patches.len();
-        }
-        self.patches.clear();
-        self.patches.resize(all, Stored::default());
+        self.stored.clear();
+        self.stored.resize(patches.all.len(), Stored::default());
         self.singles.clear();
         self.lit.clear();
         self.dots.clear();
-        let mut groups: Vec<Vec<At>> = Vec::new();
         let all = Above {
             level: 0,
             open: self.tree.roots.clone(),
@@ -175,33 +203,27 @@ impl<'a> Many<'a> {
             error: Sent::BLACK,
             lit: Default::default(),
         };
-        for block in 0..BLOCKS * BLOCKS {
+        let mut blocks: [Vec<usize>; BLOCKS * BLOCKS] = Default::default();
+        for (number, patch) in patches.all.iter().enumerate() {
+            let [x, y] = patch.at().map(|at| at as usize / BLOCK);
+            blocks[y * BLOCKS + x].push(number);
+        }
+        let mut groups: Vec<Vec<usize>> = Vec::new();
+        for block in &blocks {
             go_on()?;
-            groups.iter_mut().for_each(Vec::clear);
-            // The rim belongs to the blocks beside it
-            let side = |b: usize| {
-                let from = if b == 0 { 0 } else { 1 + b * BLOCK };
-                from..if b + 1 == BLOCKS { ACROSS } else { 1 + (b + 1) * BLOCK }
-            };
-            for y in side(block / BLOCKS) {
-                for x in side(block % BLOCKS) {
-                    let index = y * ACROSS + x;
-                    for (k, patch) in pixels[index].patches.iter().enumerate() {
-                        let same = |group: &&mut Vec<At>| {
-                            group.first().is_none_or(|(i, k)| is_alike(&pixels[*i].patches[*k], patch))
-                        };
-                        match groups.iter_mut().find(same) {
-                            Some(group) => group.push((index, k)),
-                            None => groups.push(vec![(index, k)]),
-                        }
-                    }
+            groups.clear();
+            for number in block {
+                let same = |group: &&mut Vec<usize>| is_alike(&patches.all[group[0]], &patches.all[*number]);
+                match groups.iter_mut().find(same) {
+                    Some(group) => group.push(*number),
+                    None => groups.push(vec![*number]),
                 }
             }
-            for group in groups.iter().filter(|group| !group.is_empty()) {
+            for group in &groups {
                 if self.together {
-                    self.crowd(pixels, first, group, 0, None, arrivals, counts);
+                    self.crowd(&patches.all, group, 0, None, arrivals, counts);
                 } else {
-                    self.group(pixels, first, group, &all, arrivals, counts);
+                    self.group(&patches.all, group, &all, arrivals, counts);
                 }
             }
         }
@@ -211,15 +233,14 @@ impl<'a> Many<'a> {
     /// The places of a block that lie on one surface.
     fn group(
         &mut self,
-        pixels: &[PixelPatches],
-        first: &[usize],
-        group: &[At],
+        patches: &[Patch],
+        group: &[usize],
         above: &Above,
         arrivals: &mut Arrivals<'a>,
         counts: &mut Counts,
     ) {
         let (scene, tree) = (self.scene, self.tree);
-        let patch = |(index, k): &At| &pixels[*index].patches[*k];
+        let patch = |number: &usize| &patches[*number];
         let zone = zone(group.iter().map(patch), self.eye);
         let tones = tones(scene, group.iter().map(patch));
         let one = patch(&group[0]);
@@ -257,20 +278,15 @@ impl<'a> Many<'a> {
         };
         if here.level == LEVELS || here.open.is_empty() {
             for at in group {
-                self.patches[first[at.0] + at.1] = self.settle(patch(at), &here, arrivals, counts);
+                self.stored[*at] = self.settle(patch(at), &here, arrivals, counts);
             }
             return;
         }
-        // In four, by where they are in the block
-        let half = BLOCK >> here.level;
+        let half = BLOCK as u32 >> here.level;
         for quarter in 0..4 {
-            let is_in = |(index, _): &&At| {
-                let part = |v: usize| (v.clamp(1, CELL as usize) - 1) / half % 2;
-                part(index / ACROSS) * 2 + part(index % ACROSS) == quarter
-            };
-            let part: Vec<At> = group.iter().filter(is_in).copied().collect();
+            let part: Vec<usize> = group.iter().filter(|at| patch(at).quarter(half) == quarter).copied().collect();
             if !part.is_empty() {
-                self.group(pixels, first, &part, &here, arrivals, counts);
+                self.group(patches, &part, &here, arrivals, counts);
             }
         }
     }
@@ -332,7 +348,12 @@ impl<'a> Many<'a> {
                     outlook.look(level, scene, node.shine.low, node.shine.high, LightId(light))
                 },
                 &mut |light, value| {
-                    let place = ArrivalPlace { base: value, ..arrivals.place(light as usize, si, bsdf).over(patch) };
+                    let place = ArrivalPlace {
+                        base: value,
+                        reach: patch.reach,
+                        turn: patch.turn,
+                        ..arrivals.place(light as usize, si, bsdf)
+                    };
                     let arrival = arrivals.arrival(light as usize, &place, counts);
                     singles.push(Single { light, arrival });
                     place.color(&arrival.sums)
@@ -375,11 +396,10 @@ impl<'a> Many<'a> {
             stored.sent += sent;
             if patch.reach > 0.0 {
                 let swing = patch.turn + patch.reach / node.distance(si.lit_from).max(patch.reach);
-                let smooth = (swing * swing + 2.0 * swing * patch.off).min(1.0) * SMOOTH;
+                let smooth = (swing * swing).min(1.0) * SMOOTH;
                 let weight = node.weight(si.lit_from);
                 let moved = swing + patch.turn;
                 let narrow = (lobe.sharpness(si.ns.dot(si.wo)) * square(moved)).min(1.0);
-                let narrow = (narrow + 2.0 * narrow.sqrt() * patch.off).min(1.0);
                 let specular = if matches!(lobe, Lobe::None) { 0.0 } else { (narrow + smooth).min(1.0) };
                 stored.bend += Sent::bounds(node.power * (weight * smooth), node.power * (weight * specular));
             }

@@ -1,11 +1,11 @@
 //! Patches that are looked at together: their zone and their colours.
 
 use super::TONES;
+use super::patch::Patch;
 use crate::light::Zone;
 use crate::material::{Bsdf, Lobe};
 use crate::math::{Arc, Vec3};
 use crate::render::cut::Tone;
-use crate::render::patch::Patch;
 use crate::scene::Scene;
 use crate::shape::SurfaceInteraction;
 use crate::visibility::Viewpoint;

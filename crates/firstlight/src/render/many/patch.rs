@@ -1,0 +1,117 @@
+//! What is lit together: a fragment, or one of its rays.
+
+use crate::material::Bsdf;
+use crate::render::cell::CELL;
+use crate::render::fragment::{Fragments, is_one_surface};
+use crate::render::light_queue::Place;
+use crate::scene::Scene;
+use crate::shape::SurfaceInteraction;
+
+/// A fragment of which one place may stand for all, or a ray of one that has no such place.
+#[derive(Clone, Copy)]
+pub(super) struct Patch {
+    /// Where it is lit.
+    pub si: SurfaceInteraction,
+    /// Its material; the colours are the mean over its rays.
+    pub bsdf: Bsdf,
+    /// How far it reaches from there, in metres, and how far its normal turns on the way, in radians.
+    pub reach: f32,
+    pub turn: f32,
+    /// How many rays of its pixel see it, and whether all of them do.
+    pub count: u32,
+    pub is_whole: bool,
+    /// Its pixel in the cell, row by row, and which of the cell's fragments it is of.
+    pub pixel: u32,
+    pub fragment: u32,
+}
+
+/// The patches of one cell. Keeps its memory.
+#[derive(Default)]
+pub(super) struct Patches {
+    /// In the order of the cell's fragments: those of a pixel lie together.
+    pub all: Vec<Patch>,
+    /// Which of them fills each pixel of the cell.
+    pub whole: Vec<Option<usize>>,
+    /// Columns and rows of the cell that the film has.
+    pub size: [u32; 2],
+}
+
+impl Patches {
+    /// Those of all fragments of a cell, of which the film has so much. `pixel` says where in the cell a fragment is.
+    pub fn begin(&mut self, scene: &Scene, fragments: &Fragments, size: [u32; 2], pixel: impl Fn(usize) -> u32) {
+        self.all.clear();
+        self.whole.clear();
+        self.whole.resize((CELL * CELL) as usize, None);
+        self.size = size;
+        for fragment in 0..fragments.all.len() {
+            for patch in Patch::of(scene, fragments, fragment, pixel(fragment)) {
+                if patch.is_whole {
+                    self.whole[patch.pixel as usize] = Some(self.all.len());
+                }
+                self.all.push(patch);
+            }
+        }
+    }
+}
+
+impl Patch {
+    fn new(place: &Place) -> Patch {
+        Patch {
+            si: place.surface(),
+            bsdf: place.bsdf,
+            reach: place.point.reach,
+            turn: place.point.turn,
+            count: 1,
+            is_whole: false,
+            pixel: 0,
+            fragment: 0,
+        }
+    }
+
+    /// Those of a fragment, which is in such a pixel of the cell.
+    pub fn of<'f>(
+        scene: &'f Scene,
+        fragments: &'f Fragments,
+        fragment: usize,
+        pixel: u32,
+    ) -> impl Iterator<Item = Patch> + 'f {
+        let of = &fragments.all[fragment];
+        let rays = scene.antialiasing * scene.antialiasing;
+        let middle = of.middle.map(|place| Patch {
+            count: of.count,
+            is_whole: of.count == rays,
+            ..Patch::new(&fragments.places[place as usize])
+        });
+        let alone = if middle.is_some() { 0 } else { of.rays.len() };
+        let each = (0..alone).map(move |k| Patch::new(&fragments.place(scene, of, k)));
+        middle.into_iter().chain(each).map(move |patch| Patch { pixel, fragment: fragment as u32, ..patch })
+    }
+
+    /// Where it is in the cell: column and row.
+    pub fn at(&self) -> [u32; 2] {
+        [self.pixel % CELL, self.pixel / CELL]
+    }
+
+    /// Which quarter of a block twice as wide as `half` it is in.
+    pub fn quarter(&self, half: u32) -> u32 {
+        let [x, y] = self.at().map(|at| at / half % 2);
+        y * 2 + x
+    }
+
+    /// Whether another patch is of the same surface.
+    pub fn holds(&self, other: &Patch) -> bool {
+        is_one_surface(&self.si, &other.si)
+    }
+
+    /// Calls `each` with what every ray of it sees.
+    pub fn for_each(&self, scene: &Scene, fragments: &Fragments, mut each: impl FnMut(&SurfaceInteraction, &Bsdf)) {
+        if self.reach == 0.0 && self.count == 1 {
+            return each(&self.si, &self.bsdf);
+        }
+        let of = &fragments.all[self.fragment as usize];
+        for k in 0..of.rays.len() {
+            let place = fragments.place(scene, of, k);
+            each(&place.surface(), &place.bsdf);
+        }
+    }
+}
