@@ -3,7 +3,7 @@
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
-use firstlight::bench::{Sight, sights};
+use firstlight::bench::{ShareSeen, sights};
 use firstlight::{
     Assets, CompileOptions, Display, Encoding, Film, FolderAssets, Format, Image, NoAssets, Parsed, RenderSettings,
     SamplesDesc, Scene, SceneDesc, Window, builtin_scenes, render,
@@ -71,18 +71,18 @@ const BLOCK: u32 = 4;
 fn visibility() -> Outcome {
     let scene = config11(INSIDE, 1, 400.into())?;
     let kinds = [
-        (Sight::Empty, [0.99, 0.86, 0.42]),
-        (Sight::Lit, [0.93, 0.55, 0.14]),
-        (Sight::Hidden, [0.16, 0.22, 0.42]),
-        (Sight::BelowHorizon, [0.45, 0.45, 0.45]),
-        (Sight::Cut, [0.78, 0.16, 0.28]),
+        (ShareSeen::Empty, [0.99, 0.86, 0.42]),
+        (ShareSeen::Lit, [0.93, 0.55, 0.14]),
+        (ShareSeen::Hidden, [0.16, 0.22, 0.42]),
+        (ShareSeen::BelowHorizon, [0.45, 0.45, 0.45]),
+        (ShareSeen::Cut, [0.78, 0.16, 0.28]),
     ];
     let sights = sights(&scene, 0, BLOCK);
     for (kind, _) in kinds {
         let count = sights.iter().filter(|sight| **sight == Some(kind)).count();
         eprintln!("{kind:?}: {:.1} %", 100.0 * count as f64 / sights.len() as f64);
     }
-    let color = |sight: &Option<Sight>| {
+    let color = |sight: &Option<ShareSeen>| {
         let found = kinds.iter().find(|(kind, _)| Some(*kind) == *sight);
         let [r, g, b] = found.map_or([0.0; 3], |(_, color)| color.map(|c| Encoding::Srgb.decode(c) as f32));
         [r, g, b, 1.0]

@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, ChildStdin, ChildStdout, Command, Stdio};
 use std::time::Instant;
 
-use firstlight::bench::{HitBits, Instances, Mesh, RayBits, Soft};
+use firstlight::bench::{HitBits, Instances, MeshTree, RayBits, Soft};
 use serde_json::json;
 
 use crate::bench::{commit, median, processor};
@@ -393,7 +393,7 @@ fn measure(scene: &Scene, options: &Options, folder: &Path, program: Option<&Pat
     let millions = scene.triangles.len() as f64 / 1e6;
     let (one, two) = (pool(1)?, pool(2)?);
     let mut builds = [Vec::new(), Vec::new()];
-    let build = || drop(Mesh::build(&scene.positions, &scene.triangles));
+    let build = || drop(MeshTree::build(&scene.positions, &scene.triangles));
     for _ in 0..3 {
         // Processor time as Embree's; of two threads only the clock knows
         builds[0].push(millions / one.install(|| time(build)));
@@ -401,7 +401,7 @@ fn measure(scene: &Scene, options: &Options, folder: &Path, program: Option<&Pat
         two.install(build);
         builds[1].push(millions / start.elapsed().as_secs_f64());
     }
-    let mesh = Mesh::build(&scene.positions, &scene.triangles);
+    let mesh = MeshTree::build(&scene.positions, &scene.triangles);
     let copies = (!scene.offsets.is_empty()).then(|| Instances::build(&mesh, &scene.offsets));
     // Make the rays
     let camera = camera_rays(scene, if options.quick { 256 } else { 1024 });

@@ -12,9 +12,9 @@ use crate::render::Counts;
 use crate::render::given::Given;
 pub use crate::render::given::{ChoosePoints, LightPoint};
 use crate::render::pixel::PixelSum;
-use crate::scene::{CompileOptions, Scene, SceneDesc, Seen, ShadowRays};
+use crate::scene::{CompileOptions, Scene, SceneDesc, ShadowRays, TracedHit};
 use crate::shape::{RayDifferential, TileHits, TriangleTree, every};
-use crate::visibility::{Occluders, Settled, Settler, Target, View, Viewpoint, Visibility};
+use crate::visibility::{Occluders, Settled, Settler, ShadowView, Target, Viewpoint, Visibility};
 
 /// Origin and direction of a ray.
 pub type RayBits = [f32; 6];
@@ -30,12 +30,12 @@ fn parts(ray: &RayBits) -> (Vec3, Vec3) {
 }
 
 /// A mesh with its tree.
-pub struct Mesh(TriangleTree);
+pub struct MeshTree(TriangleTree);
 
-impl Mesh {
+impl MeshTree {
     /// Builds the tree.
-    pub fn build(positions: &[[f32; 3]], triangles: &[[u32; 3]]) -> Mesh {
-        Mesh(TriangleTree::build(positions, triangles))
+    pub fn build(positions: &[[f32; 3]], triangles: &[[u32; 3]]) -> MeshTree {
+        MeshTree(TriangleTree::build(positions, triangles))
     }
 
     /// Memory of the tree, in bytes.
@@ -112,14 +112,14 @@ impl Mesh {
 
 /// Many copies of one mesh: moved, not turned.
 pub struct Instances<'a> {
-    mesh: &'a Mesh,
+    mesh: &'a MeshTree,
     offsets: &'a [[f32; 3]],
     bvh: Bvh,
 }
 
 impl<'a> Instances<'a> {
     /// Builds the tree over the copies.
-    pub fn build(mesh: &'a Mesh, offsets: &'a [[f32; 3]]) -> Self {
+    pub fn build(mesh: &'a MeshTree, offsets: &'a [[f32; 3]]) -> Self {
         let Aabb { min, max } = mesh.0.bounds();
         let boxes: Vec<_> = offsets
             .iter()
@@ -260,7 +260,7 @@ impl Soft {
             order.clear();
             order.extend(tile.clone());
             let (scene, settled) = (&self.scene, &mut self.settled);
-            let each = |k: usize, visibility, view: &mut crate::visibility::View| {
+            let each = |k: usize, visibility, view: &mut crate::visibility::ShadowView| {
                 let hidden = &mut hidden[k * blocks..(k + 1) * blocks];
                 match visibility {
                     Visibility::Lit => {}
@@ -329,7 +329,7 @@ impl Soft {
 
 /// How much of a light is seen, and how that was found out.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Sight {
+pub enum ShareSeen {
     /// Nothing lies between the points of a block and the light: all of it, for all of them.
     Empty,
     /// Something lies there, but not before this point: all of it.
@@ -344,9 +344,9 @@ pub enum Sight {
 
 /// What is seen of a light, which is sampled, from where the ray through the middle of each pixel ends, row by row;
 /// `None` where that is nowhere, or at a light. Each `block` x `block` pixels have a shaft together.
-pub fn sights(scene: &Scene, light: u32, block: u32) -> Vec<Option<Sight>> {
+pub fn sights(scene: &Scene, light: u32, block: u32) -> Vec<Option<ShareSeen>> {
     let (level, target) = (Level::new(), Target::new(scene, LightId(light)));
-    let (mut occluders, mut view) = (Occluders::default(), View::default());
+    let (mut occluders, mut view) = (Occluders::default(), ShadowView::default());
     let mut sights = vec![None; (scene.width * scene.height) as usize];
     let (mut points, mut pixels, mut order) = (Vec::new(), Vec::new(), Vec::new());
     for top in (0..scene.height).step_by(block as usize) {
@@ -357,7 +357,7 @@ pub fn sights(scene: &Scene, light: u32, block: u32) -> Vec<Option<Sight>> {
             for y in top..(top + block).min(scene.height) {
                 for x in left..(left + block).min(scene.width) {
                     let (ray, differential) = scene.camera.local_ray(x as f32 + 0.5, y as f32 + 0.5, 1.0);
-                    if let Seen::Surface(si) = scene.see(&ray, scene.intersect_local(&ray), &differential) {
+                    if let TracedHit::Surface(si) = scene.see(&ray, scene.intersect_local(&ray), &differential) {
                         points.push(Viewpoint::of(&si));
                         pixels.push((y * scene.width + x) as usize);
                     }
@@ -372,11 +372,11 @@ pub fn sights(scene: &Scene, light: u32, block: u32) -> Vec<Option<Sight>> {
             occluders.gather(level, scene, &target, &points, &order, usize::MAX);
             for (point, pixel) in points.iter().zip(&pixels) {
                 sights[*pixel] = Some(match view.classify(level, scene, &target, &occluders, point) {
-                    Visibility::Lit if occluders.count() == 0 => Sight::Empty,
-                    Visibility::Lit => Sight::Lit,
-                    Visibility::Hidden => Sight::Hidden,
-                    Visibility::BelowHorizon => Sight::BelowHorizon,
-                    Visibility::Mask => Sight::Cut,
+                    Visibility::Lit if occluders.count() == 0 => ShareSeen::Empty,
+                    Visibility::Lit => ShareSeen::Lit,
+                    Visibility::Hidden => ShareSeen::Hidden,
+                    Visibility::BelowHorizon => ShareSeen::BelowHorizon,
+                    Visibility::Mask => ShareSeen::Cut,
                 });
             }
         }

@@ -101,10 +101,10 @@ pub use scene::{
     SceneDesc, SceneSummary, SurfacePoint, UpAxis, View,
 };
 pub use scene::{Builtin, Parsed, builtin_scenes, reference, schema};
-pub use shape::RectangleDesc as RectangleShapeDesc;
 pub use shape::{
     BoxDesc, ConeDesc, CylinderDesc, DiskDesc, Footprint, GroupDesc, InstanceDesc, MeshDesc, ParallelogramDesc,
-    PlaneDesc, PointSetDesc, RayDifferential, ShadowTerminator, ShapeDesc, SphereDesc, SphereUv, TorusDesc, UvEdge,
+    PlaneDesc, PointSetDesc, RayDifferential, RectangleShapeDesc, ShadowTerminator, ShapeDesc, SphereDesc, SphereUv,
+    TorusDesc, UvEdge,
 };
 pub use texture::{CheckerboardDesc, Filter, ImageTextureDesc, TextureDesc, TextureSpace, Wrap};
 pub use transform::{Interpolation, TransformDesc, TransformKeyDesc};

@@ -1,6 +1,6 @@
-//! How the source is kept: in which order its modules stand, and how long its lines are.
+//! How the source is kept: in which order its modules stand, what its types are called, and how long its lines are.
 
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 use std::path::{Path, PathBuf};
 
 fn root() -> PathBuf {
@@ -193,4 +193,49 @@ fn lines_have_up_to_120_columns() {
         "\n{}\nFIRSTLIGHT_BLESS=1 wraps comments, rustfmt code; strings go on after a `\\`",
         wrong.join("\n")
     );
+}
+
+/// The types that a file defines, but for those of its tests and those that traits have.
+fn types(text: &str) -> impl Iterator<Item = &str> {
+    let tests = text.find("\n#[cfg(test)]\nmod ").unwrap_or(text.len());
+    text[..tests].lines().filter_map(|line| {
+        let words = line.trim_start();
+        let words = match words.strip_prefix("pub") {
+            Some(rest) if rest.starts_with('(') => rest.split_once(')')?.1,
+            Some(rest) => rest,
+            None => words,
+        };
+        let (kind, rest) = words.trim_start().split_once(' ')?;
+        let defines = match kind {
+            "struct" | "enum" | "trait" | "union" => true,
+            "type" => !line.starts_with(' '),
+            _ => false,
+        };
+        let name = rest.split(|c: char| !c.is_alphanumeric() && c != '_').next()?;
+        (defines && name.starts_with(|c: char| c.is_ascii_uppercase())).then_some(name)
+    })
+}
+
+#[test]
+fn types_are_found() {
+    let text = "struct A(u8);\n    pub(in crate::x) enum B<T> {\n    type Output = A;\npub type C = A;\n\
+                pub struct Dd {\npub struct $name {\n// struct E is not\n#[cfg(test)]\nmod tests {\n    struct F;\n";
+    assert_eq!(types(text).collect::<Vec<_>>(), ["A", "B", "C", "Dd"]);
+}
+
+/// A reader who has met a type by its name need not ask which of that name is meant.
+#[test]
+fn a_type_name_has_one_meaning() {
+    let mut all = Vec::new();
+    sources(&root().join("crates/firstlight/src"), &mut all);
+    let mut found: BTreeMap<&str, Vec<String>> = BTreeMap::new();
+    for (path, text) in all.iter().filter(|(path, _)| !path.ends_with("tests.rs")) {
+        for name in types(text) {
+            found.entry(name).or_default().push(path.display().to_string());
+        }
+    }
+    assert!(found.len() > 500, "only {} types", found.len());
+    found.retain(|_, paths| paths.len() > 1);
+    let wrong: Vec<String> = found.iter().map(|(name, paths)| format!("{name}: {}", paths.join(", "))).collect();
+    assert!(wrong.is_empty(), "\n{}", wrong.join("\n"));
 }

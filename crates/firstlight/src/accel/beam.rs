@@ -8,16 +8,16 @@
 
 use fearless_simd::{f32x8, f32x16, mask32x16, prelude::*};
 
-use super::node::{Node, WIDTH};
+use super::node::{BoxNode, WIDTH};
 use super::ray::{
-    BEAM_PAD, LaneSlabs, Lanes, MAX_COORDINATE, MAX_DIRECTION, MIN_DIRECTION, NODE_PAD, OWN_PAD, RayTile, Rays,
+    BEAM_PAD, LaneSlabs, MAX_COORDINATE, MAX_DIRECTION, MIN_DIRECTION, NODE_PAD, OWN_PAD, RayLanes, RayTile, Rays,
     SMALLEST,
 };
 use crate::math::Vec3;
 
 /// A line that bounds rays on one side: x = a + b z.
 #[derive(Clone, Copy, Debug)]
-struct Line {
+struct BeamEdge {
     a: f32,
     b: f32,
 }
@@ -28,8 +28,8 @@ pub(crate) struct Beam {
     /// kx, ky, kz: the rays run along kz.
     pub axes: [usize; 3],
     /// The lines below and above, along kx and ky.
-    lower: [Line; 2],
-    upper: [Line; 2],
+    lower: [BeamEdge; 2],
+    upper: [BeamEdge; 2],
     /// Along the rays: z = sign * coordinate + start.
     sign: f32,
     start: f32,
@@ -110,13 +110,20 @@ impl<const N: usize> Rays<N> {
 
     /// Sixteen of the rays, which share their largest axis, ready for triangles.
     #[inline(always)]
-    pub fn lanes<S: Simd>(&self, simd: S, block: usize, [kx, ky, kz]: [usize; 3], center: Vec3, half: f32) -> Lanes<S> {
+    pub fn lanes<S: Simd>(
+        &self,
+        simd: S,
+        block: usize,
+        [kx, ky, kz]: [usize; 3],
+        center: Vec3,
+        half: f32,
+    ) -> RayLanes<S> {
         let o = self.block(simd, &self.o, block);
         let d = self.block(simd, &self.d, block);
         let least = d[kz].abs() * SMALLEST;
         let rd = [reciprocal(simd, d[kx], least), reciprocal(simd, d[ky], least), reciprocal(simd, d[kz], least)];
         let pad = (reach(o, center) + half) * OWN_PAD;
-        Lanes {
+        RayLanes {
             o: [o[kx], o[ky], o[kz]],
             shear: [d[kx] / d[kz], d[ky] / d[kz], simd.splat_f32x16(1.0) / d[kz]],
             rd,
@@ -128,7 +135,7 @@ impl<const N: usize> Rays<N> {
 impl<S: Simd> LaneSlabs<S> {
     /// Of rays as far as `t_max`.
     #[inline(always)]
-    pub fn new(simd: S, lanes: &Lanes<S>, [kx, ky, kz]: [usize; 3], center: Vec3, t_max: f32x16<S>) -> Self {
+    pub fn new(simd: S, lanes: &RayLanes<S>, [kx, ky, kz]: [usize; 3], center: Vec3, t_max: f32x16<S>) -> Self {
         let (x_lo, x_hi) = plus(simd, lanes.o[0] - center[kx], lanes.rd[0], lanes.own[0]);
         let (y_lo, y_hi) = plus(simd, lanes.o[1] - center[ky], lanes.rd[1], lanes.own[1]);
         let (z_lo, z_hi) = plus(simd, lanes.o[2] - center[kz], lanes.rd[2], lanes.own[2]);
@@ -137,7 +144,7 @@ impl<S: Simd> LaneSlabs<S> {
 
     /// Which rays meet a child of a node.
     #[inline(always)]
-    pub fn meet(&self, simd: S, node: &Node, place: usize, [kx, ky, kz]: [usize; 3]) -> u64 {
+    pub fn meet(&self, simd: S, node: &BoxNode, place: usize, [kx, ky, kz]: [usize; 3]) -> u64 {
         assert!(kx < 3 && ky < 3 && kz < 3, "axes are axes");
         let (near_x, far_x) = self.between(simd, 0, &node.planes[kx], place);
         let (near_y, far_y) = self.between(simd, 1, &node.planes[ky], place);
@@ -284,17 +291,17 @@ impl Beam {
             }
         }
         let mut pad = reach * BEAM_PAD;
-        let line = Line { a: 0.0, b: 0.0 };
+        let line = BeamEdge { a: 0.0, b: 0.0 };
         let (mut lower, mut upper) = ([line; 2], [line; 2]);
         for i in 0..2 {
             let (slope, first, last) = (slopes[i].get(), first[i].get(), last[i].get());
             if z_length < MAX_COORDINATE && last.1 - last.0 < first.1 - first.0 {
-                lower[i] = Line { a: last.0 - slope.1 * z_length, b: slope.1 };
-                upper[i] = Line { a: last.1 - slope.0 * z_length, b: slope.0 };
+                lower[i] = BeamEdge { a: last.0 - slope.1 * z_length, b: slope.1 };
+                upper[i] = BeamEdge { a: last.1 - slope.0 * z_length, b: slope.0 };
                 pad = pad.max((reach + z_length) * BEAM_PAD);
             } else {
-                lower[i] = Line { a: first.0, b: slope.0 };
-                upper[i] = Line { a: first.1, b: slope.1 };
+                lower[i] = BeamEdge { a: first.0, b: slope.0 };
+                upper[i] = BeamEdge { a: first.1, b: slope.1 };
             }
         }
         for i in 0..2 {
@@ -333,7 +340,7 @@ impl Beam {
 
     /// The children of a node that the beam meets: a bit for each, and where along the beam they begin.
     #[inline(always)]
-    pub fn meet<S: Simd>(&self, simd: S, node: &Node, z_max: f32) -> (u32, f32x8<S>) {
+    pub fn meet<S: Simd>(&self, simd: S, node: &BoxNode, z_max: f32) -> (u32, f32x8<S>) {
         let [kx, ky, kz] = self.axes;
         assert!(kx < 3 && ky < 3 && kz < 3, "axes are axes");
         let side = self.side & 1;

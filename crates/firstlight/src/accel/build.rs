@@ -15,7 +15,7 @@ use glam::{BVec4A, UVec4, Vec4, Vec4Swizzles};
 use rayon::prelude::*;
 
 use super::Aabb;
-use super::node::{LEAF, Node, Tree, WIDTH};
+use super::node::{BoxNode, LEAF, Tree, WIDTH};
 use crate::math::Vec3;
 use crate::parallel::{self, CHUNK};
 
@@ -83,7 +83,7 @@ impl Bounds {
 
 /// A node of the binary tree: a box, and either a run of primitives or two nodes, one right after this and `second`.
 #[derive(Clone, Copy)]
-struct Binary {
+struct BinaryNode {
     bounds: Bounds,
     /// The first primitive of a leaf, or the second child.
     first: u32,
@@ -94,8 +94,8 @@ struct Binary {
 /// A finished part of the tree, its indices counted from its own beginning.
 struct Part {
     bounds: Bounds,
-    nodes: Vec<Node>,
-    leaves: Vec<Leaf>,
+    nodes: Vec<BoxNode>,
+    leaves: Vec<LeafRange>,
     /// A node or leaf of this part.
     root: u32,
     stack: usize,
@@ -118,7 +118,7 @@ impl Top {
 
 /// A run of the order of primitives.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Leaf {
+pub(crate) struct LeafRange {
     pub first: u32,
     pub count: u32,
 }
@@ -127,7 +127,7 @@ pub(crate) struct Leaf {
 pub(crate) struct Built {
     pub tree: Tree,
     pub order: Vec<u32>,
-    pub leaves: Vec<Leaf>,
+    pub leaves: Vec<LeafRange>,
 }
 
 /// Builds the tree over those of `count` boxes that are sound, with at most 2 to the power of `leaf_bits` of them in a
@@ -185,7 +185,7 @@ pub(crate) fn build<K: Ord>(
     let all = top.bounds();
     let (root, mut stack) = join.take(top);
     if root & LEAF != 0 {
-        let mut node = Node::EMPTY;
+        let mut node = BoxNode::EMPTY;
         node.set(0, all.lo.xyz().to_array(), all.hi.xyz().to_array(), root);
         join.nodes.push(node);
         stack = 1;
@@ -229,7 +229,7 @@ struct Settings<'a> {
 
 /// Where and how to cut: the bin of each primitive, and the first bin that goes to the right.
 #[derive(Clone, Copy)]
-struct Cut {
+struct Partition {
     binning: Binning,
     axis: usize,
     bin: u32,
@@ -307,7 +307,7 @@ impl Bins {
     }
 
     /// The cheapest cut, if there is one that leaves something on both sides. Whole leaves are what costs.
-    fn best(&self, binning: &Binning, leaf_bits: u32) -> Option<Cut> {
+    fn best(&self, binning: &Binning, leaf_bits: u32) -> Option<Partition> {
         let leaves = |count: u32| ((count + (1 << leaf_bits) - 1) >> leaf_bits) as f32;
         let mut best = None;
         let mut least = f32::INFINITY;
@@ -333,7 +333,7 @@ impl Bins {
                 let cost = bounds.area() * leaves(count) + right;
                 if cost < least {
                     least = cost;
-                    best = Some(Cut { binning: *binning, axis, bin: bin as u32 });
+                    best = Some(Partition { binning: *binning, axis, bin: bin as u32 });
                 }
             }
         }
@@ -366,7 +366,7 @@ fn centers_of(prims: &[Prim]) -> Bounds {
 }
 
 /// Brings those left of the cut to the front, and says how many they are and where the centres on both sides are.
-fn partition(prims: &mut [Prim], cut: &Cut) -> (usize, Bounds, Bounds) {
+fn partition(prims: &mut [Prim], cut: &Partition) -> (usize, Bounds, Bounds) {
     let mut count = 0;
     let (mut left, mut right) = (Bounds::EMPTY, Bounds::EMPTY);
     let (lo, scale) = (cut.binning.lo[cut.axis], cut.binning.scale[cut.axis]);
@@ -444,17 +444,17 @@ impl Settings<'_> {
         centers: Bounds,
         base: u32,
         depth: usize,
-        binary: &mut Vec<Binary>,
+        binary: &mut Vec<BinaryNode>,
         bins: &mut Bins,
     ) -> Bounds {
         let prims = self.without_copies(prims, centers);
         let place = binary.len();
         if prims.len() <= self.leaf {
             let bounds = bounds_of(prims);
-            binary.push(Binary { bounds, first: base, count: prims.len() as u32 });
+            binary.push(BinaryNode { bounds, first: base, count: prims.len() as u32 });
             return bounds;
         }
-        binary.push(Binary { bounds: Bounds::EMPTY, first: 0, count: 0 });
+        binary.push(BinaryNode { bounds: Bounds::EMPTY, first: 0, count: 0 });
         let mut cut = None;
         if depth < MAX_DEPTH {
             let binning = Binning::new(centers, prims.len());
@@ -477,17 +477,17 @@ impl Settings<'_> {
 
 /// Makes nodes of eight from a task's binary tree.
 struct Gather {
-    binary: Vec<Binary>,
-    nodes: Vec<Node>,
-    leaves: Vec<Leaf>,
+    binary: Vec<BinaryNode>,
+    nodes: Vec<BoxNode>,
+    leaves: Vec<LeafRange>,
 }
 
 impl Gather {
     /// The child that stands for a binary node, and the stack needed below it.
     fn take(&mut self, index: u32) -> (u32, usize) {
-        let Binary { first, count, .. } = self.binary[index as usize];
+        let BinaryNode { first, count, .. } = self.binary[index as usize];
         if count > 0 {
-            self.leaves.push(Leaf { first, count });
+            self.leaves.push(LeafRange { first, count });
             return (LEAF | (self.leaves.len() - 1) as u32, 0);
         }
         // Open the largest box until there are eight
@@ -505,7 +505,7 @@ impl Gather {
         // In the order of the primitives, that what is near in space is near in memory
         open[..len].sort();
         let node = self.nodes.len();
-        self.nodes.push(Node::EMPTY);
+        self.nodes.push(BoxNode::EMPTY);
         let mut stack = 0;
         for (place, &child) in open[..len].iter().enumerate() {
             let bounds = self.binary[child as usize].bounds;
@@ -531,8 +531,8 @@ impl Top {
 
 /// Joins the parts under the top of the tree.
 struct Join {
-    nodes: Vec<Node>,
-    leaves: Vec<Leaf>,
+    nodes: Vec<BoxNode>,
+    leaves: Vec<LeafRange>,
 }
 
 impl Join {
@@ -552,7 +552,7 @@ impl Join {
             open.splice(place..place, [a, b]);
         }
         let node = self.nodes.len();
-        self.nodes.push(Node::EMPTY);
+        self.nodes.push(BoxNode::EMPTY);
         let (mut stack, len) = (0, open.len());
         for (place, child) in open.into_iter().enumerate() {
             let bounds = child.bounds();

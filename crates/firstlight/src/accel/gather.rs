@@ -2,7 +2,7 @@
 
 use fearless_simd::{f32x8, prelude::*};
 
-use super::node::{LEAF, Node, Tree};
+use super::node::{BoxNode, LEAF, Tree};
 
 /// Entries of the stack that lives in the frame.
 const STACK: usize = 96;
@@ -14,7 +14,7 @@ impl Tree {
     pub fn gather<S: Simd>(
         &self,
         simd: S,
-        meet: impl Fn(S, &Node) -> (u32, f32x8<S>),
+        meet: impl Fn(S, &BoxNode) -> (u32, f32x8<S>),
         mut leaf: impl FnMut(u32) -> bool,
     ) -> bool {
         if self.nodes.is_empty() {

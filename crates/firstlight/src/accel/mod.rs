@@ -99,11 +99,11 @@ mod traverse;
 use fearless_simd::{Level, f32x8, prelude::*};
 
 pub(crate) use beam::{Beam, groups};
-pub(crate) use build::{Built, Leaf, build};
+pub(crate) use build::{Built, LeafRange, build};
 pub use level::SimdLevel;
-pub(crate) use node::{LEAF, Node, Tree};
-pub(crate) use planes::{Plane, Planes};
-pub(crate) use ray::{BEAM_PAD, LaneSlabs, Lanes, RayPacket16, RayTile, Slabs, TraceRay};
+pub(crate) use node::{BoxNode, LEAF, Tree};
+pub(crate) use planes::{HalfSpace, Planes};
+pub(crate) use ray::{BEAM_PAD, LaneSlabs, RayLanes, RayPacket16, RayTile, Slabs, TraceRay};
 
 use node::WIDTH;
 
@@ -235,7 +235,7 @@ impl Bvh {
     /// Visits what lies in boxes that `meet` says yes to, until `leaf` says no. `meet` is made from the tree's centre
     /// and how far it reaches. Says whether all was visited.
     #[inline(always)]
-    pub fn gather<S: Simd, M: Fn(S, &Node) -> (u32, f32x8<S>)>(
+    pub fn gather<S: Simd, M: Fn(S, &BoxNode) -> (u32, f32x8<S>)>(
         &self,
         simd: S,
         meet: impl FnOnce(Vec3, f32) -> M,
@@ -247,7 +247,7 @@ impl Bvh {
     /// How many things are in it.
     #[cfg(test)]
     pub fn len(&self) -> usize {
-        let is_leaf = |node: &Node, place: usize| {
+        let is_leaf = |node: &BoxNode, place: usize| {
             node.planes[0][0][place] <= node.planes[0][1][place] && node.children[place] & LEAF != 0
         };
         self.tree.nodes.iter().map(|node| (0..WIDTH).filter(|place| is_leaf(node, *place)).count()).sum()

@@ -14,16 +14,16 @@ pub(crate) const LEAF: u32 = 1 << 31;
 /// Of a child that does not exist the low planes are at plus, the high planes at minus infinity: no ray meets it.
 #[derive(Clone)]
 #[repr(C, align(64))]
-pub(crate) struct Node {
+pub(crate) struct BoxNode {
     /// By axis, then low or high side, then child; seen from the tree's centre.
     pub planes: [[[f32; WIDTH]; 2]; 3],
     /// A node, or with [`LEAF`] a leaf.
     pub children: [u32; WIDTH],
 }
 
-impl Node {
-    pub const EMPTY: Node =
-        Node { planes: [[[f32::INFINITY; WIDTH], [f32::NEG_INFINITY; WIDTH]]; 3], children: [LEAF; WIDTH] };
+impl BoxNode {
+    pub const EMPTY: BoxNode =
+        BoxNode { planes: [[[f32::INFINITY; WIDTH], [f32::NEG_INFINITY; WIDTH]]; 3], children: [LEAF; WIDTH] };
 
     /// Puts a box into a place.
     pub fn set(&mut self, place: usize, lo: [f32; 3], hi: [f32; 3], child: u32) {
@@ -38,7 +38,7 @@ impl Node {
 /// A tree over boxes. Knows neither what is in the boxes nor what a leaf is.
 pub(crate) struct Tree {
     /// Depth first, the root first. Empty if there is nothing in the tree.
-    pub nodes: Vec<Node>,
+    pub nodes: Vec<BoxNode>,
     /// What the planes of the nodes are measured from: the middle of all boxes.
     pub center: Vec3,
     /// The largest distance from the centre along any axis.
@@ -51,6 +51,6 @@ pub(crate) struct Tree {
 
 impl Tree {
     pub fn bytes(&self) -> usize {
-        self.nodes.capacity() * size_of::<Node>()
+        self.nodes.capacity() * size_of::<BoxNode>()
     }
 }

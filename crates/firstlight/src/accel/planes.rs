@@ -3,15 +3,15 @@
 use fearless_simd::{f32x8, prelude::*};
 
 use super::Aabb;
-use super::node::Node;
+use super::node::BoxNode;
 use crate::math::{DVec3, Vec3};
 
 /// A part of space that planes bound: a pyramid and the plane it begins at.
-pub(crate) struct Planes(pub [Plane; 5]);
+pub(crate) struct Planes(pub [HalfSpace; 5]);
 
 /// A plane, by its unit normal, which points outward, and a point on it.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Plane {
+pub(crate) struct HalfSpace {
     pub n: DVec3,
     pub p: DVec3,
 }
@@ -25,7 +25,7 @@ const SLACK: f64 = 1e-5;
 impl Planes {
     /// In a tree around `center` that reaches `half` from it.
     pub fn within(&self, center: Vec3, half: f32) -> TreePlanes {
-        TreePlanes(self.0.map(|Plane { n, p }| {
+        TreePlanes(self.0.map(|HalfSpace { n, p }| {
             let way = p - center.as_dvec3();
             let slack = (way.abs().max_element() + f64::from(half) + p.abs().max_element()) * SLACK;
             (n.as_vec3(), (n.dot(way) + slack) as f32)
@@ -35,7 +35,7 @@ impl Planes {
     /// Whether a box may reach inside.
     pub fn may_meet(&self, Aabb { min, max }: Aabb) -> bool {
         let (min, max) = (min.as_dvec3(), max.as_dvec3());
-        self.0.iter().all(|Plane { n, p }| {
+        self.0.iter().all(|HalfSpace { n, p }| {
             let least = n.max(DVec3::ZERO).dot(min - p) + n.min(DVec3::ZERO).dot(max - p);
             let size = (min - p).abs().max((max - p).abs()).max_element() + p.abs().max_element();
             least <= size * SLACK
@@ -46,7 +46,7 @@ impl Planes {
 impl TreePlanes {
     /// The children of a node that may reach inside: a bit for each, and no order.
     #[inline(always)]
-    pub fn meet<S: Simd>(&self, simd: S, node: &Node) -> (u32, f32x8<S>) {
+    pub fn meet<S: Simd>(&self, simd: S, node: &BoxNode) -> (u32, f32x8<S>) {
         let mut met = 0xff;
         for (n, c) in &self.0 {
             // The corner that is farthest inside

@@ -158,7 +158,7 @@ impl<const N: usize> Rays<N> {
 /// Sixteen rays with one largest axis, ready for triangles: what [`TraceRay`] and [`Slabs`] hold, operation by
 /// operation.
 #[derive(Clone, Copy)]
-pub(crate) struct Lanes<S: Simd> {
+pub(crate) struct RayLanes<S: Simd> {
     /// Origins along kx, ky, kz.
     pub o: [f32x16<S>; 3],
     /// Sx, Sy, Sz.

@@ -3,7 +3,7 @@
 use fearless_simd::{f32x8, prelude::*};
 
 use super::beam::Beam;
-use super::node::{LEAF, Node, Tree};
+use super::node::{BoxNode, LEAF, Tree};
 use super::ray::{LaneSlabs, Slabs};
 
 /// Entries of the stack that lives in the frame; deeper trees, which nothing but malice makes, take one from the heap.
@@ -21,7 +21,7 @@ fn cross<S: Simd>(simd: S, planes: &[f32; 8], rd: f32, plus: f32) -> f32x8<S> {
 
 /// The children of a node that a ray meets: a bit for each, and where it enters them.
 #[inline(always)]
-fn meet<S: Simd>(simd: S, node: &Node, slabs: &Slabs, t_max: f32) -> (u32, f32x8<S>) {
+fn meet<S: Simd>(simd: S, node: &BoxNode, slabs: &Slabs, t_max: f32) -> (u32, f32x8<S>) {
     let [x, y, z] = slabs.side.map(|side| side & 1);
     let planes = &node.planes;
     let enter = cross(simd, &planes[0][x], slabs.rd[0], slabs.near[0])

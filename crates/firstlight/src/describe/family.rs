@@ -2,7 +2,7 @@
 
 use super::node::Node;
 use super::read::Reader;
-use super::{FieldInfo, Table, Written, info};
+use super::{FieldInfo, Table, TextValue, info};
 
 /// A table as the schema and the reference show it.
 #[derive(Clone, Debug)]
@@ -31,7 +31,7 @@ pub(crate) trait Family: Sized {
     /// Reads one of the kind of that index.
     fn read(kind: usize, node: &Node, reader: &mut Reader<'_>) -> Self;
     /// The fields that differ from their defaults.
-    fn write(&self) -> Vec<(&'static str, Written)>;
+    fn write(&self) -> Vec<(&'static str, TextValue)>;
     /// All kinds.
     fn tables() -> Vec<TableInfo>;
 }
@@ -86,7 +86,7 @@ macro_rules! family {
                 }
             }
 
-            fn write(&self) -> Vec<(&'static str, $crate::describe::Written)> {
+            fn write(&self) -> Vec<(&'static str, $crate::describe::TextValue)> {
                 use $crate::describe::Table;
                 match self {
                     $family::$variant0(desc) => desc.write(),

@@ -4,7 +4,7 @@ use serde_json::{Map, Value as Json, json};
 
 use super::TableInfo;
 use super::read::{Table, Value};
-use super::write::Written;
+use super::write::TextValue;
 
 /// One word of a closed set, and what it means.
 #[derive(Debug)]
@@ -23,7 +23,7 @@ pub(crate) struct FieldInfo {
     /// What it takes, in words.
     pub words: String,
     /// `None`: it is required.
-    pub default: Option<Written>,
+    pub default: Option<TextValue>,
     pub schema: Json,
     pub choices: &'static [Choice],
     /// The tables it holds, and those within them.
@@ -31,7 +31,7 @@ pub(crate) struct FieldInfo {
 }
 
 impl FieldInfo {
-    pub(crate) fn of<T: Value>(name: &'static str, doc: &'static [&'static str], default: Option<Written>) -> Self {
+    pub(crate) fn of<T: Value>(name: &'static str, doc: &'static [&'static str], default: Option<TextValue>) -> Self {
         let mut schema = T::schema();
         if let Some(range) = range(&sentence(doc)) {
             // Ranges are of plain numbers; those of an array hold for each element
@@ -98,7 +98,7 @@ pub(crate) fn table_schema<T: Table>() -> Json {
         schema["description"] = sentence(field.doc).into();
         match &field.default {
             None => required.push(field.name),
-            Some(Written::Absent) => {}
+            Some(TextValue::Absent) => {}
             Some(default) => schema["default"] = default.to_json_value(),
         }
         properties.insert(field.name.to_owned(), schema);

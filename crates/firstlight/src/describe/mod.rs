@@ -78,7 +78,7 @@ macro_rules! table {
                 Self { $( $field: $crate::describe::table!(@read fields, $field $(, $default)?), )* }
             }
 
-            fn write(&self) -> Vec<(&'static str, $crate::describe::Written)> {
+            fn write(&self) -> Vec<(&'static str, $crate::describe::TextValue)> {
                 let mut written = Vec::new();
                 $(
                     if !($crate::describe::table!(@is_default self, $field: $ty $(, $default)?)) {
@@ -127,8 +127,8 @@ macro_rules! table {
                 reader.inner_table(node)
             }
 
-            fn write(&self) -> $crate::describe::Written {
-                $crate::describe::Written::Table($crate::describe::Table::write(self))
+            fn write(&self) -> $crate::describe::TextValue {
+                $crate::describe::TextValue::Table($crate::describe::Table::write(self))
             }
         }
 
@@ -161,7 +161,7 @@ macro_rules! table {
                 reader.inner_table(node).map(Box::new)
             }
 
-            fn write(&self) -> $crate::describe::Written {
+            fn write(&self) -> $crate::describe::TextValue {
                 $crate::describe::Value::write(&**self)
             }
         }
@@ -233,4 +233,4 @@ pub(crate) use family::{Family, TableInfo, family};
 pub(crate) use info::{Choice, FieldInfo};
 pub(crate) use read::{Fields, Table, Value, Words, nearest};
 pub use value::{ColorDesc, ColorParam, FilePath, NumberParam, ParamDesc, SamplesDesc, ScaleDesc};
-pub(crate) use write::Written;
+pub(crate) use write::TextValue;

@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 use jsonc_parser::ast;
 
-use super::scan::{Numbers, Piece, Scan};
+use super::scan::{Numbers, Scan, TextPiece};
 
 /// A range of bytes of a text.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -155,7 +155,7 @@ impl Numbers {
 
 fn parse_json(text: &str) -> Result<Node, SyntaxFault> {
     let whole = Scan::new(text, Syntax::Json).next()?.unwrap_or_default();
-    let piece = Piece::new(text, &whole);
+    let piece = TextPiece::new(text, &whole);
     let strict = jsonc_parser::ParseOptions {
         allow_comments: false,
         allow_loose_object_property_names: false,
@@ -184,7 +184,7 @@ fn parse_json(text: &str) -> Result<Node, SyntaxFault> {
     }
 }
 
-fn json_node(value: ast::Value<'_>, piece: &Piece<'_>) -> Result<Node, SyntaxFault> {
+fn json_node(value: ast::Value<'_>, piece: &TextPiece<'_>) -> Result<Node, SyntaxFault> {
     let range = piece.span(ast_range(&value));
     let data = match value {
         ast::Value::StringLit(s) => Data::String(s.value.into_owned()),

@@ -11,7 +11,7 @@ use serde_json::{Value as Json, json};
 use super::TableInfo;
 use super::info::{Choice, FieldInfo, inner_name};
 use super::node::{Data, Entry, Node, Span, quoted, shortened};
-use super::write::{Written, key};
+use super::write::{TextValue, key};
 
 /// What a field of the scene text can be.
 pub(crate) trait Value: Sized + PartialEq {
@@ -34,7 +34,7 @@ pub(crate) trait Value: Sized + PartialEq {
     /// Reads one; `None` when it is none, and then the fault is recorded.
     fn read(node: &Node, reader: &mut Reader<'_>) -> Option<Self>;
     /// For the writer.
-    fn write(&self) -> Written;
+    fn write(&self) -> TextValue;
 }
 
 /// A table of the scene text; made by the `table!` macro.
@@ -48,7 +48,7 @@ pub(crate) trait Table: Sized {
     /// From the fields of the text.
     fn read(fields: &mut Fields<'_, '_, '_>) -> Self;
     /// The fields that differ from their defaults.
-    fn write(&self) -> Vec<(&'static str, Written)>;
+    fn write(&self) -> Vec<(&'static str, TextValue)>;
     /// What its fields are.
     fn info() -> Vec<FieldInfo>;
 }
@@ -338,8 +338,8 @@ impl Value for f64 {
         Some(value)
     }
 
-    fn write(&self) -> Written {
-        Written::Number(*self)
+    fn write(&self) -> TextValue {
+        TextValue::Number(*self)
     }
 }
 
@@ -378,8 +378,8 @@ impl Value for u32 {
         None
     }
 
-    fn write(&self) -> Written {
-        Written::Number(f64::from(*self))
+    fn write(&self) -> TextValue {
+        TextValue::Number(f64::from(*self))
     }
 }
 
@@ -412,8 +412,8 @@ impl Value for bool {
         Some(value)
     }
 
-    fn write(&self) -> Written {
-        Written::Bool(*self)
+    fn write(&self) -> TextValue {
+        TextValue::Bool(*self)
     }
 }
 
@@ -442,8 +442,8 @@ impl Value for String {
         Some(value.clone())
     }
 
-    fn write(&self) -> Written {
-        Written::Text(self.clone())
+    fn write(&self) -> TextValue {
+        TextValue::Text(self.clone())
     }
 }
 
@@ -476,8 +476,8 @@ impl<T: Value> Value for Option<T> {
         T::read(node, reader).map(Some)
     }
 
-    fn write(&self) -> Written {
-        self.as_ref().map_or(Written::Absent, T::write)
+    fn write(&self) -> TextValue {
+        self.as_ref().map_or(TextValue::Absent, T::write)
     }
 }
 
@@ -520,8 +520,8 @@ impl<T: Value, const N: usize> Value for [T; N] {
         values.iter().all(Option::is_some).then(|| values.map(|value| value.unwrap_or_else(T::placeholder)))
     }
 
-    fn write(&self) -> Written {
-        Written::List(self.iter().map(T::write).collect())
+    fn write(&self) -> TextValue {
+        TextValue::List(self.iter().map(T::write).collect())
     }
 }
 
@@ -561,8 +561,8 @@ impl<T: Value> Value for Vec<T> {
         (values.len() == length).then_some(values)
     }
 
-    fn write(&self) -> Written {
-        Written::list(self.iter().map(T::write))
+    fn write(&self) -> TextValue {
+        TextValue::list(self.iter().map(T::write))
     }
 }
 
@@ -605,7 +605,7 @@ impl<T: Words> Value for T {
         value
     }
 
-    fn write(&self) -> Written {
-        Written::Text(self.word().to_owned())
+    fn write(&self) -> TextValue {
+        TextValue::Text(self.word().to_owned())
     }
 }

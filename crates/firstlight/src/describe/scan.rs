@@ -41,7 +41,7 @@ pub(super) struct Expression {
 }
 
 /// A piece of the text as the parser sees it: long lists of numbers are empty.
-pub(super) struct Piece<'t> {
+pub(super) struct TextPiece<'t> {
     pub text: Cow<'t, str>,
     /// Where its text starts, or goes on after a list: there, and in the whole text.
     starts: Vec<[usize; 2]>,
@@ -49,9 +49,9 @@ pub(super) struct Piece<'t> {
     lists: HashMap<usize, Numbers>,
 }
 
-impl<'t> Piece<'t> {
+impl<'t> TextPiece<'t> {
     pub fn new(text: &'t str, expression: &Expression) -> Self {
-        let mut piece = Piece { text: Cow::Borrowed(""), starts: Vec::new(), lists: HashMap::new() };
+        let mut piece = TextPiece { text: Cow::Borrowed(""), starts: Vec::new(), lists: HashMap::new() };
         let mut start = expression.range.start;
         for (list, numbers) in &expression.lists {
             piece.starts.push([piece.text.len(), start]);

@@ -10,7 +10,7 @@ use std::sync::Arc;
 use toml::de::{DeTable, DeValue};
 
 use super::node::{Data, Entry, Node, Span, Syntax, SyntaxFault, quoted, twice};
-use super::scan::{Expression, Piece, Scan};
+use super::scan::{Expression, Scan, TextPiece};
 
 /// Expressions under one header are parsed together up to so many bytes.
 const BATCH: usize = 1 << 14;
@@ -64,7 +64,7 @@ pub(super) fn parse(text: &str) -> Result<Node, Vec<SyntaxFault>> {
 /// Reads an expression, or several without a header, into the tree.
 fn read(text: &str, expression: &Expression, builder: &mut Builder, faults: &mut Vec<SyntaxFault>) {
     let Span { start, end } = expression.range;
-    let piece = Piece::new(text, expression);
+    let piece = TextPiece::new(text, expression);
     match DeTable::parse(&piece.text) {
         Ok(table) if expression.is_header => builder.header(table.into_inner(), &piece, faults),
         Ok(table) => {
@@ -85,7 +85,7 @@ fn read(text: &str, expression: &Expression, builder: &mut Builder, faults: &mut
     }
 }
 
-impl Piece<'_> {
+impl TextPiece<'_> {
     fn node(&self, value: toml::Spanned<DeValue<'_>>, keys: &mut Keys) -> Node {
         let span = self.span(value.span());
         let data = match value.into_inner() {
@@ -137,14 +137,14 @@ impl Keys {
 /// The tree while it grows.
 struct Builder {
     /// The root, and every table that more can be said of.
-    tables: Vec<Table>,
+    tables: Vec<TomlTable>,
     /// The table of the last header.
     section: usize,
     keys: Keys,
 }
 
-struct Table {
-    items: Vec<Item>,
+struct TomlTable {
+    items: Vec<TomlItem>,
     made: Made,
     /// Where its keys are, once they are many.
     #[allow(clippy::box_collection, reason = "most tables are small and have none: a word, not six")]
@@ -162,13 +162,13 @@ enum Made {
     Dotted,
 }
 
-struct Item {
+struct TomlItem {
     key: Arc<str>,
     key_span: Span,
-    value: Value,
+    value: TomlValue,
 }
 
-enum Value {
+enum TomlValue {
     Leaf(Node),
     Table(usize, Span),
     Tables(Vec<(usize, Span)>, Span),
@@ -177,7 +177,7 @@ enum Value {
 /// Tables of more keys find them by a map.
 const FEW_KEYS: usize = 16;
 
-impl Table {
+impl TomlTable {
     fn find(&self, key: &str) -> Option<usize> {
         match &self.places {
             Some(places) => places.get(key).copied(),
@@ -185,7 +185,7 @@ impl Table {
         }
     }
 
-    fn push(&mut self, item: Item) {
+    fn push(&mut self, item: TomlItem) {
         if let Some(places) = &mut self.places {
             places.insert(item.key.clone(), self.items.len());
         } else if self.items.len() == FEW_KEYS {
@@ -202,17 +202,17 @@ impl Table {
 
 impl Builder {
     fn new() -> Self {
-        let root = Table { items: Vec::new(), made: Made::Said, places: None };
+        let root = TomlTable { items: Vec::new(), made: Made::Said, places: None };
         Builder { tables: vec![root], section: 0, keys: Keys::default() }
     }
 
     fn add_table(&mut self, made: Made) -> usize {
-        self.tables.push(Table { items: Vec::new(), made, places: None });
+        self.tables.push(TomlTable { items: Vec::new(), made, places: None });
         self.tables.len() - 1
     }
 
     /// Goes on with the table of a header: the innermost of `header`, which holds nothing.
-    fn header(&mut self, header: DeTable<'_>, piece: &Piece<'_>, faults: &mut Vec<SyntaxFault>) {
+    fn header(&mut self, header: DeTable<'_>, piece: &TextPiece<'_>, faults: &mut Vec<SyntaxFault>) {
         // What follows a header that cannot be is read all the same, for its errors
         let mut at = 0;
         let mut rest = header;
@@ -245,11 +245,11 @@ impl Builder {
         match self.tables[at].find(&key).map(|place| &mut self.tables[at].items[place]) {
             None => {
                 let table = self.add_table(Made::Said);
-                self.tables[at].push(Item { key, key_span, value: Value::Table(table, span) });
+                self.tables[at].push(TomlItem { key, key_span, value: TomlValue::Table(table, span) });
                 table
             }
             Some(item) => {
-                if let Value::Table(table, old) = &mut item.value {
+                if let TomlValue::Table(table, old) = &mut item.value {
                     let table = *table;
                     (*old, item.key_span) = (span, key_span);
                     if self.tables[table].made == Made::OnTheWay {
@@ -274,9 +274,11 @@ impl Builder {
     ) -> usize {
         let table = self.add_table(Made::Said);
         match self.tables[at].find(&key) {
-            None => self.tables[at].push(Item { key, key_span, value: Value::Tables(vec![(table, span)], span) }),
+            None => {
+                self.tables[at].push(TomlItem { key, key_span, value: TomlValue::Tables(vec![(table, span)], span) })
+            }
             Some(place) => match &mut self.tables[at].items[place].value {
-                Value::Tables(tables, _) => tables.push((table, span)),
+                TomlValue::Tables(tables, _) => tables.push((table, span)),
                 _ => faults.push(twice(key_span, &key)),
             },
         }
@@ -294,11 +296,11 @@ impl Builder {
     ) -> Option<usize> {
         let Some(place) = self.tables[at].find(&key) else {
             let table = self.add_table(made);
-            self.tables[at].push(Item { key, key_span, value: Value::Table(table, key_span) });
+            self.tables[at].push(TomlItem { key, key_span, value: TomlValue::Table(table, key_span) });
             return Some(table);
         };
         match &self.tables[at].items[place].value {
-            Value::Table(table, _) => {
+            TomlValue::Table(table, _) => {
                 let table = *table;
                 if made == Made::Dotted {
                     // A table with a header of its own takes no more from elsewhere
@@ -310,7 +312,7 @@ impl Builder {
                 }
                 Some(table)
             }
-            Value::Tables(tables, _) => {
+            TomlValue::Tables(tables, _) => {
                 let last = tables.last().map(|(table, _)| *table);
                 if made == Made::Dotted {
                     faults.push(twice(key_span, &key));
@@ -318,7 +320,7 @@ impl Builder {
                 }
                 last
             }
-            Value::Leaf(node) => {
+            TomlValue::Leaf(node) => {
                 let kind = node.kind();
                 let message = format!("not TOML: {} is {kind} already, and takes no keys here", quoted(&key));
                 faults.push(SyntaxFault { span: key_span, message, hint: None });
@@ -328,7 +330,7 @@ impl Builder {
     }
 
     /// Adds keys and their values to a table.
-    fn merge(&mut self, at: usize, from: DeTable<'_>, piece: &Piece<'_>, faults: &mut Vec<SyntaxFault>) {
+    fn merge(&mut self, at: usize, from: DeTable<'_>, piece: &TextPiece<'_>, faults: &mut Vec<SyntaxFault>) {
         // In the order of the text, in which places are told, not that of names
         let mut from: Vec<_> = from.into_iter().collect();
         from.sort_by_key(|(key, _)| key.span().start);
@@ -347,8 +349,8 @@ impl Builder {
             } else if self.tables[at].find(&name).is_some() {
                 faults.push(twice(key_span, &name));
             } else {
-                let value = Value::Leaf(piece.node(value, &mut self.keys));
-                self.tables[at].push(Item { key: name, key_span, value });
+                let value = TomlValue::Leaf(piece.node(value, &mut self.keys));
+                self.tables[at].push(TomlItem { key: name, key_span, value });
             }
         }
     }
@@ -358,13 +360,13 @@ impl Builder {
     }
 
     fn node(&mut self, table: usize, span: Span) -> Node {
-        let Table { items, .. } =
-            std::mem::replace(&mut self.tables[table], Table { items: Vec::new(), made: Made::Said, places: None });
-        let entry = |Item { key, key_span, value }| {
+        let TomlTable { items, .. } =
+            std::mem::replace(&mut self.tables[table], TomlTable { items: Vec::new(), made: Made::Said, places: None });
+        let entry = |TomlItem { key, key_span, value }| {
             let value = match value {
-                Value::Leaf(node) => node,
-                Value::Table(table, span) => self.node(table, span),
-                Value::Tables(tables, span) => {
+                TomlValue::Leaf(node) => node,
+                TomlValue::Table(table, span) => self.node(table, span),
+                TomlValue::Tables(tables, span) => {
                     let elements = tables.into_iter().map(|(table, span)| self.node(table, span)).collect();
                     Node { span, data: Data::Array(elements) }
                 }

@@ -5,7 +5,7 @@ use serde_json::{Value as Json, json};
 
 use super::node::{Data, Node, quoted};
 use super::read::{Reader, Value, nearest};
-use super::write::Written;
+use super::write::TextValue;
 
 /// A colour: linear Rec. 709. In text `[r, g, b]` is linear, `"#rrggbb"` sRGB, and a number is that much gray (linear).
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -103,7 +103,7 @@ impl Value for ColorDesc {
         }
     }
 
-    fn write(&self) -> Written {
+    fn write(&self) -> TextValue {
         let [r, g, b] = self.linear;
         if r == g && g == b { r.write() } else { self.linear.write() }
     }
@@ -163,7 +163,7 @@ impl Value for ScaleDesc {
         }
     }
 
-    fn write(&self) -> Written {
+    fn write(&self) -> TextValue {
         let [x, y, z] = self.xyz;
         // By their bits: -0 is 0, but is written differently
         let same = x.to_bits() == y.to_bits() && y.to_bits() == z.to_bits();
@@ -237,9 +237,9 @@ impl Value for SamplesDesc {
         }
     }
 
-    fn write(&self) -> Written {
+    fn write(&self) -> TextValue {
         match self {
-            Self::Exact => Written::Text(EXACT.to_owned()),
+            Self::Exact => TextValue::Text(EXACT.to_owned()),
             Self::Count(count) => count.write(),
         }
     }
@@ -356,7 +356,7 @@ impl<T: Factor> Value for ParamDesc<T> {
         Some(Self { texture: Some(texture?), factor: factor? })
     }
 
-    fn write(&self) -> Written {
+    fn write(&self) -> TextValue {
         match &self.texture {
             None => self.factor.write(),
             Some(name) => {
@@ -364,7 +364,7 @@ impl<T: Factor> Value for ParamDesc<T> {
                 if self.factor != T::ONE {
                     fields.push(("factor", self.factor.write()));
                 }
-                Written::Table(fields)
+                TextValue::Table(fields)
             }
         }
     }
@@ -434,7 +434,7 @@ impl Value for FilePath {
         Some(Self(join_path(reader.folder(), &path)))
     }
 
-    fn write(&self) -> Written {
+    fn write(&self) -> TextValue {
         self.0.write()
     }
 }

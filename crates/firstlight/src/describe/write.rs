@@ -2,20 +2,20 @@
 
 /// A value on its way to text.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) enum Written {
+pub(crate) enum TextValue {
     /// Nothing: the key is left out.
     Absent,
     Number(f64),
     Bool(bool),
     Text(String),
-    List(Vec<Written>),
+    List(Vec<TextValue>),
     /// A list of lists of as many numbers each, one after another: there may be millions.
     Rows {
         width: usize,
         numbers: Vec<f64>,
     },
     /// An inline table.
-    Table(Vec<(&'static str, Written)>),
+    Table(Vec<(&'static str, TextValue)>),
 }
 
 /// The shortest decimal that reads back to the same bits; whole numbers without a point.
@@ -73,16 +73,16 @@ fn rows(width: usize, numbers: &[f64], write: impl Fn(f64) -> String) -> String 
     out + "]"
 }
 
-impl Written {
+impl TextValue {
     /// A list of any length.
-    pub(crate) fn list(elements: impl Iterator<Item = Written>) -> Self {
+    pub(crate) fn list(elements: impl Iterator<Item = TextValue>) -> Self {
         let mut elements = elements.peekable();
-        let numbers_of = |element: &Written| -> Option<Vec<f64>> {
-            let Written::List(row) = element else { return None };
-            row.iter().map(|v| if let Written::Number(v) = v { Some(*v) } else { None }).collect()
+        let numbers_of = |element: &TextValue| -> Option<Vec<f64>> {
+            let TextValue::List(row) = element else { return None };
+            row.iter().map(|v| if let TextValue::Number(v) = v { Some(*v) } else { None }).collect()
         };
         let Some(width) = elements.peek().and_then(numbers_of).map(|row| row.len()).filter(|width| *width > 0) else {
-            return Written::List(elements.collect());
+            return TextValue::List(elements.collect());
         };
         let mut numbers = Vec::new();
         while let Some(row) = elements.peek().and_then(numbers_of).filter(|row| row.len() == width) {
@@ -90,23 +90,23 @@ impl Written {
             elements.next();
         }
         if elements.peek().is_none() {
-            return Written::Rows { width, numbers };
+            return TextValue::Rows { width, numbers };
         }
-        let row = |row: &[f64]| Written::List(row.iter().map(|v| Written::Number(*v)).collect());
-        Written::List(numbers.chunks(width).map(row).chain(elements).collect())
+        let row = |row: &[f64]| TextValue::List(row.iter().map(|v| TextValue::Number(*v)).collect());
+        TextValue::List(numbers.chunks(width).map(row).chain(elements).collect())
     }
 
     /// On one line, as TOML.
     pub(crate) fn to_toml(&self) -> String {
         match self {
-            Written::Absent => String::new(),
-            Written::Number(v) if v.is_nan() => "nan".into(),
-            Written::Number(v) => number(*v),
-            Written::Bool(v) => v.to_string(),
-            Written::Text(v) => toml_string(v),
-            Written::List(v) => format!("[{}]", v.iter().map(Self::to_toml).collect::<Vec<_>>().join(", ")),
-            Written::Rows { width, numbers } => rows(*width, numbers, |v| Written::Number(v).to_toml()),
-            Written::Table(v) => {
+            TextValue::Absent => String::new(),
+            TextValue::Number(v) if v.is_nan() => "nan".into(),
+            TextValue::Number(v) => number(*v),
+            TextValue::Bool(v) => v.to_string(),
+            TextValue::Text(v) => toml_string(v),
+            TextValue::List(v) => format!("[{}]", v.iter().map(Self::to_toml).collect::<Vec<_>>().join(", ")),
+            TextValue::Rows { width, numbers } => rows(*width, numbers, |v| TextValue::Number(v).to_toml()),
+            TextValue::Table(v) => {
                 let pairs: Vec<String> = v.iter().map(|(k, v)| format!("{} = {}", key(k), v.to_toml())).collect();
                 if pairs.is_empty() {
                     return "{}".into();
@@ -119,14 +119,14 @@ impl Written {
     /// On one line, as JSON, which has no words for numbers that are not finite: they become `null`.
     pub(crate) fn to_json(&self) -> String {
         match self {
-            Written::Absent => "null".into(),
-            Written::Number(v) if !v.is_finite() => "null".into(),
-            Written::Number(v) => number(*v),
-            Written::Bool(v) => v.to_string(),
-            Written::Text(v) => json_string(v),
-            Written::List(v) => format!("[{}]", v.iter().map(Self::to_json).collect::<Vec<_>>().join(", ")),
-            Written::Rows { width, numbers } => rows(*width, numbers, |v| Written::Number(v).to_json()),
-            Written::Table(v) => {
+            TextValue::Absent => "null".into(),
+            TextValue::Number(v) if !v.is_finite() => "null".into(),
+            TextValue::Number(v) => number(*v),
+            TextValue::Bool(v) => v.to_string(),
+            TextValue::Text(v) => json_string(v),
+            TextValue::List(v) => format!("[{}]", v.iter().map(Self::to_json).collect::<Vec<_>>().join(", ")),
+            TextValue::Rows { width, numbers } => rows(*width, numbers, |v| TextValue::Number(v).to_json()),
+            TextValue::Table(v) => {
                 let pairs: Vec<String> =
                     v.iter().map(|(k, v)| format!("{}: {}", json_string(k), v.to_json())).collect();
                 if pairs.is_empty() {
@@ -160,20 +160,20 @@ mod tests {
 
     #[test]
     fn rows_are_written_as_the_lists_they_are() {
-        let list = |numbers: &[f64]| Written::List(numbers.iter().map(|v| Written::Number(*v)).collect());
+        let list = |numbers: &[f64]| TextValue::List(numbers.iter().map(|v| TextValue::Number(*v)).collect());
         let even = [list(&[1.0, f64::NAN]), list(&[-0.0, 2.5])];
-        let rows = Written::list(even.iter().cloned());
-        assert!(matches!(&rows, Written::Rows { width: 2, numbers } if numbers.len() == 4));
+        let rows = TextValue::list(even.iter().cloned());
+        assert!(matches!(&rows, TextValue::Rows { width: 2, numbers } if numbers.len() == 4));
         assert_eq!(
             (rows.to_toml(), rows.to_json()),
             ("[[1, nan], [-0.0, 2.5]]".into(), "[[1, null], [-0.0, 2.5]]".into())
         );
-        assert_eq!(rows.to_toml(), Written::List(even.to_vec()).to_toml());
-        for odd in [list(&[]), list(&[1.0]), Written::Number(1.0), Written::List(vec![Written::Bool(true); 2])] {
+        assert_eq!(rows.to_toml(), TextValue::List(even.to_vec()).to_toml());
+        for odd in [list(&[]), list(&[1.0]), TextValue::Number(1.0), TextValue::List(vec![TextValue::Bool(true); 2])] {
             let all = [even[0].clone(), even[0].clone(), odd];
-            assert_eq!(Written::list(all.iter().cloned()).to_toml(), Written::List(all.to_vec()).to_toml());
+            assert_eq!(TextValue::list(all.iter().cloned()).to_toml(), TextValue::List(all.to_vec()).to_toml());
         }
-        assert_eq!(Written::list(std::iter::empty()), Written::List(Vec::new()));
+        assert_eq!(TextValue::list(std::iter::empty()), TextValue::List(Vec::new()));
     }
 
     #[test]

@@ -32,7 +32,7 @@ pub(super) fn in_png(bytes: &[u8]) -> Result<(), String> {
 /// # Errors
 /// What is wrong.
 pub(super) fn in_jpeg(bytes: &[u8]) -> Result<(), String> {
-    let mut frame: Option<Frame> = None;
+    let mut frame: Option<JpegFrame> = None;
     let mut at = 2;
     // What does not begin a segment belongs to the pixels, or is passed over by the decoder too
     while let Some(found) = bytes.get(at..).and_then(|rest| rest.iter().position(|b| *b == 0xff)) {
@@ -50,7 +50,7 @@ pub(super) fn in_jpeg(bytes: &[u8]) -> Result<(), String> {
         let Some(segment) = bytes.get(at + 3..at + 1 + length) else { break };
         match marker {
             0xc0..=0xc2 if frame.is_some() => return Err("it has two frames".into()),
-            0xc0..=0xc2 => frame = Some(Frame::read(segment, marker == 0xc2)?),
+            0xc0..=0xc2 => frame = Some(JpegFrame::read(segment, marker == 0xc2)?),
             0xc4 => check_codes(segment)?,
             0xda => match &frame {
                 None => return Err("its pixels come before its frame".into()),
@@ -64,13 +64,13 @@ pub(super) fn in_jpeg(bytes: &[u8]) -> Result<(), String> {
 }
 
 /// What a frame's header says.
-struct Frame {
+struct JpegFrame {
     progressive: bool,
     /// The number and the sampling factors of each component, across and down.
     components: Vec<[u8; 3]>,
 }
 
-impl Frame {
+impl JpegFrame {
     fn read(segment: &[u8], progressive: bool) -> Result<Self, String> {
         let Some((&[_, _, _, _, _, count], rest)) = segment.split_first_chunk::<6>() else {
             return Err("its frame is cut short".into());

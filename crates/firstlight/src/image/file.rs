@@ -53,7 +53,7 @@ enum Rest<'a> {
 
 /// Where the bytes go in the end.
 #[derive(Clone, Debug)]
-enum Target {
+enum Destination {
     /// A name that a file can be renamed to, no longer a link; the permissions of the file there.
     Name(PathBuf, Option<Permissions>),
     /// Something that can only be written to.
@@ -81,7 +81,7 @@ impl PendingFile {
     /// Those of [`write_whole`].
     pub fn new(path: &Path) -> Result<Self, ImageError> {
         let pending = Self::unchecked(path)?;
-        if let Target::Name(name, _) = resolve(path, &pending.absolute)? {
+        if let Destination::Name(name, _) = resolve(path, &pending.absolute)? {
             temporary(&name).map_err(|e| refused(path, e))?;
         }
         Ok(pending)
@@ -108,8 +108,8 @@ impl PendingFile {
     pub fn stage(self, bytes: &[u8]) -> Result<StagedFile<'_>, ImageError> {
         let Self { path, absolute } = self;
         let rest = match resolve(&path, &absolute)? {
-            Target::Direct(to) => Rest::Write(bytes, to),
-            Target::Name(name, permissions) => {
+            Destination::Direct(to) => Rest::Write(bytes, to),
+            Destination::Name(name, permissions) => {
                 let fill = || {
                     let mut file = temporary(&name)?;
                     // By itself, for its errors name the file that is asked for, not this one
@@ -174,7 +174,7 @@ impl StagedFile<'_> {
 }
 
 /// Finds where `absolute` leads, without changing anything.
-fn resolve(path: &Path, absolute: &Path) -> Result<Target, ImageError> {
+fn resolve(path: &Path, absolute: &Path) -> Result<Destination, ImageError> {
     let folder = || ImageError::IsFolder { path: path.to_path_buf() };
     // "out/" and "out/.." name no file, whether or not they exist
     let ends_in_separator =
@@ -190,7 +190,7 @@ fn resolve(path: &Path, absolute: &Path) -> Result<Target, ImageError> {
     };
     match &there {
         Some(meta) if meta.is_dir() => return Err(folder()),
-        Some(meta) if !meta.is_file() => return Ok(Target::Direct(absolute.to_path_buf())),
+        Some(meta) if !meta.is_file() => return Ok(Destination::Direct(absolute.to_path_buf())),
         _ => {}
     }
     // Follow links one by one, since the last may point to nothing yet
@@ -206,7 +206,7 @@ fn resolve(path: &Path, absolute: &Path) -> Result<Target, ImageError> {
         };
         // What stands for an open file of a process is not a name that can be replaced
         if cfg!(target_os = "linux") && real.starts_with("/proc") {
-            return Ok(Target::Direct(absolute.to_path_buf()));
+            return Ok(Destination::Direct(absolute.to_path_buf()));
         }
         let Some(name) = at.file_name() else { return Err(folder()) };
         let here = real.join(name);
@@ -219,7 +219,7 @@ fn resolve(path: &Path, absolute: &Path) -> Result<Target, ImageError> {
         if permissions.as_ref().is_some_and(Permissions::readonly) {
             return Err(ImageError::ReadOnly { path: path.to_path_buf() });
         }
-        return Ok(Target::Name(here, permissions));
+        return Ok(Destination::Name(here, permissions));
     }
     Err(refused(path, io::Error::other("too many links")))
 }

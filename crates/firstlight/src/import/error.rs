@@ -77,7 +77,7 @@ pub(super) const WRITE_ANEW: &str = "the file is damaged or cut off: write or fe
 
 /// An [`ImportError`] before the file's name and the line are known.
 #[derive(Clone, Debug)]
-pub(super) enum Fault {
+pub(super) enum ImportFault {
     /// At a byte, in text or not.
     At {
         offset: usize,
@@ -93,7 +93,7 @@ pub(super) enum Fault {
     Stopped,
 }
 
-impl Fault {
+impl ImportFault {
     /// A fault of text, whose place is a line.
     pub(super) fn text(offset: usize, message: impl Into<String>, hint: &'static str) -> Self {
         Self::At { offset, text: true, message: message.into(), hint }
@@ -107,7 +107,7 @@ impl Fault {
     /// The byte it stands at, for those that have one.
     pub(super) fn offset(&self) -> Option<usize> {
         match self {
-            Fault::At { offset, .. } => Some(*offset),
+            ImportFault::At { offset, .. } => Some(*offset),
             _ => None,
         }
     }
@@ -115,12 +115,12 @@ impl Fault {
     pub(super) fn into_error(self, file: &str, bytes: &[u8]) -> ImportError {
         let file = file.to_owned();
         match self {
-            Fault::At { offset, text, message, hint } => {
+            ImportFault::At { offset, text, message, hint } => {
                 let place = if text { MeshPlace::Line(line_of(bytes, offset)) } else { MeshPlace::Byte(offset as u64) };
                 ImportError::Damaged { file, place, message, hint: hint.into() }
             }
-            Fault::TooMany { what, count, limit } => ImportError::TooMany { file, what, count, limit },
-            Fault::Stopped => ImportError::Stopped { file },
+            ImportFault::TooMany { what, count, limit } => ImportError::TooMany { file, what, count, limit },
+            ImportFault::Stopped => ImportError::Stopped { file },
         }
     }
 }

@@ -8,12 +8,12 @@ use super::{obj, ply, stl};
 pub(crate) struct Foreign {
     /// With its article: "a PNG picture".
     pub kind: &'static str,
-    family: Family,
+    family: FileFamily,
 }
 
 /// What is to be done about it goes by families.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Family {
+enum FileFamily {
     /// A mesh that is read, where a scene is wanted.
     Mesh,
     /// A model or scene of which only meshes could be used, once exported.
@@ -33,97 +33,97 @@ enum Family {
 
 /// What a file was to be.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Wanted {
+pub(crate) enum WantedFile {
     Scene,
     Mesh,
 }
 
 impl Foreign {
     /// `looks like a PNG picture, not like a firstlight scene`
-    pub fn message(self, wanted: Wanted) -> String {
+    pub fn message(self, wanted: WantedFile) -> String {
         let wanted = match wanted {
-            Wanted::Scene => "a firstlight scene",
-            Wanted::Mesh => "a mesh",
+            WantedFile::Scene => "a firstlight scene",
+            WantedFile::Mesh => "a mesh",
         };
         format!("looks like {}, not like {wanted}", self.kind)
     }
 
     /// What to do.
-    pub fn hint(self, wanted: Wanted) -> &'static str {
+    pub fn hint(self, wanted: WantedFile) -> &'static str {
         match (self.family, wanted) {
-            (Family::Mesh, _) => "give it as a model, or name it as the file of a [[mesh]] or [[point_set]]",
-            (Family::Model, _) => "that kind is not read yet; export it as PLY, STL or OBJ",
-            (Family::Cloud, _) => "that kind is not read yet; convert it to PLY",
-            (Family::Scene, _) => "scenes of other programs are not read; export their meshes as PLY or OBJ",
-            (Family::Picture, Wanted::Scene) => {
+            (FileFamily::Mesh, _) => "give it as a model, or name it as the file of a [[mesh]] or [[point_set]]",
+            (FileFamily::Model, _) => "that kind is not read yet; export it as PLY, STL or OBJ",
+            (FileFamily::Cloud, _) => "that kind is not read yet; convert it to PLY",
+            (FileFamily::Scene, _) => "scenes of other programs are not read; export their meshes as PLY or OBJ",
+            (FileFamily::Picture, WantedFile::Scene) => {
                 "a scene is TOML or JSON text; it names pictures in [texture.image.NAME]"
             }
-            (Family::Archive, _) => "unpack it first",
-            (Family::Encoding, _) => "save it as UTF-8",
-            (Family::Materials, _) => "give the OBJ file that belongs to it; materials are described in a scene",
-            (Family::Picture | Family::Other, Wanted::Mesh) => "a mesh is a PLY, STL or OBJ file",
-            (Family::Other, Wanted::Scene) => "a scene is TOML or JSON text, a model a PLY, STL or OBJ file",
+            (FileFamily::Archive, _) => "unpack it first",
+            (FileFamily::Encoding, _) => "save it as UTF-8",
+            (FileFamily::Materials, _) => "give the OBJ file that belongs to it; materials are described in a scene",
+            (FileFamily::Picture | FileFamily::Other, WantedFile::Mesh) => "a mesh is a PLY, STL or OBJ file",
+            (FileFamily::Other, WantedFile::Scene) => "a scene is TOML or JSON text, a model a PLY, STL or OBJ file",
         }
     }
 }
 
 /// First bytes, and what they are the first bytes of.
-const MAGIC: &[(&[u8], &str, Family)] = &[
-    (b"glTF", "a binary glTF model (GLB)", Family::Model),
-    (b"BLENDER", "a Blender file", Family::Model),
-    (b"Kaydara FBX Binary", "an FBX model", Family::Model),
-    (b"; FBX ", "an FBX model", Family::Model),
-    (b"PXR-USDC", "a USD scene", Family::Model),
-    (b"#usda", "a USD scene", Family::Model),
-    (b"#VRML", "a VRML scene", Family::Model),
-    (b"#X3D", "an X3D scene", Family::Model),
-    (b"Ogawa", "an Alembic scene", Family::Model),
-    (b"DRACO", "a Draco mesh", Family::Model),
-    (b"ISO-10303-21", "a STEP model", Family::Model),
-    (b"3D Geometry File Format", "a Rhino model", Family::Model),
-    (b"//Maya ASCII", "a Maya scene", Family::Model),
-    (b"OFF\n", "an OFF mesh", Family::Model),
-    (b"OFF\r", "an OFF mesh", Family::Model),
-    (b"OFF ", "an OFF mesh", Family::Model),
-    (b"COFF", "an OFF mesh", Family::Model),
-    (b"NOFF", "an OFF mesh", Family::Model),
-    (b"\x20BDV", "an OpenVDB volume", Family::Model),
-    (b"# .PCD", "a PCD point cloud", Family::Cloud),
-    (b"LASF", "a LAS point cloud", Family::Cloud),
-    (b"ASTM-E57", "an E57 point cloud", Family::Cloud),
-    (b"\x89PNG\r\n\x1a\n", "a PNG picture", Family::Picture),
-    (b"\xff\xd8\xff", "a JPEG picture", Family::Picture),
-    (b"GIF8", "a GIF picture", Family::Picture),
-    (b"II*\0", "a TIFF picture", Family::Picture),
-    (b"MM\0*", "a TIFF picture", Family::Picture),
-    (b"\x76\x2f\x31\x01", "an OpenEXR picture", Family::Picture),
-    (b"#?RADIANCE", "a Radiance picture (HDR)", Family::Picture),
-    (b"#?RGBE", "a Radiance picture (HDR)", Family::Picture),
-    (b"8BPS", "a Photoshop picture", Family::Picture),
-    (b"DDS ", "a DDS picture", Family::Picture),
-    (b"qoif", "a QOI picture", Family::Picture),
-    (b"\xabKTX ", "a KTX texture", Family::Picture),
-    (b"PK\x05\x06", "an empty zip archive", Family::Archive),
-    (b"\x1f\x8b", "gzip-compressed data", Family::Archive),
-    (b"BZh", "bzip2-compressed data", Family::Archive),
-    (b"\xfd7zXZ\0", "xz-compressed data", Family::Archive),
-    (b"\x28\xb5\x2f\xfd", "zstd-compressed data (newer Blender files are)", Family::Archive),
-    (b"7z\xbc\xaf\x27\x1c", "a 7z archive", Family::Archive),
-    (b"Rar!\x1a\x07", "a RAR archive", Family::Archive),
-    (b"%PDF", "a PDF document", Family::Other),
-    (b"%!PS", "a PostScript document", Family::Other),
-    (b"{\\rtf", "an RTF document", Family::Other),
-    (b"\x7fELF", "a program (ELF)", Family::Other),
-    (b"MZ\x90\0", "a program for Windows", Family::Other),
-    (b"\xcf\xfa\xed\xfe", "a program (Mach-O)", Family::Other),
-    (b"\xca\xfe\xba\xbe", "a program (Mach-O or Java)", Family::Other),
-    (b"\0asm", "a program (WebAssembly)", Family::Other),
-    (b"#!/", "a script", Family::Other),
-    (b"SQLite format 3\0", "a database (SQLite)", Family::Other),
-    (b"\x93NUMPY", "a NumPy array", Family::Other),
-    (b"\x89HDF", "an HDF5 file", Family::Other),
-    (b"\xff\xfe", "text in UTF-16", Family::Encoding),
-    (b"\xfe\xff", "text in UTF-16", Family::Encoding),
+const MAGIC: &[(&[u8], &str, FileFamily)] = &[
+    (b"glTF", "a binary glTF model (GLB)", FileFamily::Model),
+    (b"BLENDER", "a Blender file", FileFamily::Model),
+    (b"Kaydara FBX Binary", "an FBX model", FileFamily::Model),
+    (b"; FBX ", "an FBX model", FileFamily::Model),
+    (b"PXR-USDC", "a USD scene", FileFamily::Model),
+    (b"#usda", "a USD scene", FileFamily::Model),
+    (b"#VRML", "a VRML scene", FileFamily::Model),
+    (b"#X3D", "an X3D scene", FileFamily::Model),
+    (b"Ogawa", "an Alembic scene", FileFamily::Model),
+    (b"DRACO", "a Draco mesh", FileFamily::Model),
+    (b"ISO-10303-21", "a STEP model", FileFamily::Model),
+    (b"3D Geometry File Format", "a Rhino model", FileFamily::Model),
+    (b"//Maya ASCII", "a Maya scene", FileFamily::Model),
+    (b"OFF\n", "an OFF mesh", FileFamily::Model),
+    (b"OFF\r", "an OFF mesh", FileFamily::Model),
+    (b"OFF ", "an OFF mesh", FileFamily::Model),
+    (b"COFF", "an OFF mesh", FileFamily::Model),
+    (b"NOFF", "an OFF mesh", FileFamily::Model),
+    (b"\x20BDV", "an OpenVDB volume", FileFamily::Model),
+    (b"# .PCD", "a PCD point cloud", FileFamily::Cloud),
+    (b"LASF", "a LAS point cloud", FileFamily::Cloud),
+    (b"ASTM-E57", "an E57 point cloud", FileFamily::Cloud),
+    (b"\x89PNG\r\n\x1a\n", "a PNG picture", FileFamily::Picture),
+    (b"\xff\xd8\xff", "a JPEG picture", FileFamily::Picture),
+    (b"GIF8", "a GIF picture", FileFamily::Picture),
+    (b"II*\0", "a TIFF picture", FileFamily::Picture),
+    (b"MM\0*", "a TIFF picture", FileFamily::Picture),
+    (b"\x76\x2f\x31\x01", "an OpenEXR picture", FileFamily::Picture),
+    (b"#?RADIANCE", "a Radiance picture (HDR)", FileFamily::Picture),
+    (b"#?RGBE", "a Radiance picture (HDR)", FileFamily::Picture),
+    (b"8BPS", "a Photoshop picture", FileFamily::Picture),
+    (b"DDS ", "a DDS picture", FileFamily::Picture),
+    (b"qoif", "a QOI picture", FileFamily::Picture),
+    (b"\xabKTX ", "a KTX texture", FileFamily::Picture),
+    (b"PK\x05\x06", "an empty zip archive", FileFamily::Archive),
+    (b"\x1f\x8b", "gzip-compressed data", FileFamily::Archive),
+    (b"BZh", "bzip2-compressed data", FileFamily::Archive),
+    (b"\xfd7zXZ\0", "xz-compressed data", FileFamily::Archive),
+    (b"\x28\xb5\x2f\xfd", "zstd-compressed data (newer Blender files are)", FileFamily::Archive),
+    (b"7z\xbc\xaf\x27\x1c", "a 7z archive", FileFamily::Archive),
+    (b"Rar!\x1a\x07", "a RAR archive", FileFamily::Archive),
+    (b"%PDF", "a PDF document", FileFamily::Other),
+    (b"%!PS", "a PostScript document", FileFamily::Other),
+    (b"{\\rtf", "an RTF document", FileFamily::Other),
+    (b"\x7fELF", "a program (ELF)", FileFamily::Other),
+    (b"MZ\x90\0", "a program for Windows", FileFamily::Other),
+    (b"\xcf\xfa\xed\xfe", "a program (Mach-O)", FileFamily::Other),
+    (b"\xca\xfe\xba\xbe", "a program (Mach-O or Java)", FileFamily::Other),
+    (b"\0asm", "a program (WebAssembly)", FileFamily::Other),
+    (b"#!/", "a script", FileFamily::Other),
+    (b"SQLite format 3\0", "a database (SQLite)", FileFamily::Other),
+    (b"\x93NUMPY", "a NumPy array", FileFamily::Other),
+    (b"\x89HDF", "an HDF5 file", FileFamily::Other),
+    (b"\xff\xfe", "text in UTF-16", FileFamily::Encoding),
+    (b"\xfe\xff", "text in UTF-16", FileFamily::Encoding),
 ];
 
 /// Bytes that are looked at for words.
@@ -133,9 +133,9 @@ const JSON_ENDS: usize = 1 << 20;
 
 /// What `bytes` are, if they are nothing that could be a scene, nor a mesh if one is wanted. `None` where nothing
 /// speaks against it.
-pub(crate) fn foreign(bytes: &[u8], wanted: Wanted) -> Option<Foreign> {
+pub(crate) fn foreign(bytes: &[u8], wanted: WantedFile) -> Option<Foreign> {
     let is = |kind, family| Some(Foreign { kind, family });
-    let mesh = |kind| if wanted == Wanted::Scene { is(kind, Family::Mesh) } else { None };
+    let mesh = |kind| if wanted == WantedFile::Scene { is(kind, FileFamily::Mesh) } else { None };
     // Meshes first: the header of a binary STL file may begin with anything
     if ply::looks_like(bytes) {
         return mesh("a PLY model");
@@ -157,27 +157,31 @@ pub(crate) fn foreign(bytes: &[u8], wanted: Wanted) -> Option<Foreign> {
         return archive(bytes);
     }
     if at(0, b"RIFF") && at(8, b"WEBP") {
-        return is("a WebP picture", Family::Picture);
+        return is("a WebP picture", FileFamily::Picture);
     }
     if at(4, b"ftypavif") || at(4, b"ftypheic") || at(4, b"ftypmif1") {
-        return is("an AVIF or HEIC picture", Family::Picture);
+        return is("an AVIF or HEIC picture", FileFamily::Picture);
     }
     if at(4, b"ftyp") {
-        return is("a film (MP4)", Family::Other);
+        return is("a film (MP4)", FileFamily::Other);
     }
     if at(0, b"BM") && matches!(length(14), Some(12 | 40 | 52 | 56 | 64 | 108 | 124)) {
-        return is("a BMP picture", Family::Picture);
+        return is("a BMP picture", FileFamily::Picture);
     }
     if at(0, b"MM") && length(2) == Some(bytes.len()) {
-        return is("a 3DS model", Family::Model);
+        return is("a 3DS model", FileFamily::Model);
     }
     if at(257, b"ustar") {
-        return is("a tar archive", Family::Archive);
+        return is("a tar archive", FileFamily::Archive);
     }
     let head = &bytes[..bytes.len().min(HEAD)];
     // No text has a zero byte. A mesh may well, and its reader says what is wrong with it
     if head.contains(&0) {
-        return if wanted == Wanted::Scene { is("binary data of an unknown kind", Family::Other) } else { None };
+        return if wanted == WantedFile::Scene {
+            is("binary data of an unknown kind", FileFamily::Other)
+        } else {
+            None
+        };
     }
     text(bytes, head, wanted)
 }
@@ -186,17 +190,17 @@ pub(crate) fn foreign(bytes: &[u8], wanted: Wanted) -> Option<Foreign> {
 fn archive(bytes: &[u8]) -> Option<Foreign> {
     let head = &bytes[..bytes.len().min(4096)];
     let (kind, family) = if has(head, b"3D/3dmodel") || has(head, b"3dmodel.model") {
-        ("a 3MF model", Family::Model)
+        ("a 3MF model", FileFamily::Model)
     } else if has(&head[..head.len().min(256)], b".usd") {
-        ("a USD scene (USDZ)", Family::Model)
+        ("a USD scene (USDZ)", FileFamily::Model)
     } else {
-        ("a zip archive", Family::Archive)
+        ("a zip archive", FileFamily::Archive)
     };
     Some(Foreign { kind, family })
 }
 
 /// Text of another language.
-fn text(bytes: &[u8], head: &[u8], wanted: Wanted) -> Option<Foreign> {
+fn text(bytes: &[u8], head: &[u8], wanted: WantedFile) -> Option<Foreign> {
     let is = |kind, family| Some(Foreign { kind, family });
     let head = head.strip_prefix(b"\xef\xbb\xbf").unwrap_or(head).trim_ascii_start();
     if head.starts_with(b"{") {
@@ -204,26 +208,26 @@ fn text(bytes: &[u8], head: &[u8], wanted: Wanted) -> Option<Foreign> {
         let has = |word: &[u8]| has(first, word) || has(last, word);
         let parts: [&[u8]; 5] = [b"\"meshes\"", b"\"nodes\"", b"\"buffers\"", b"\"accessors\"", b"\"scenes\""];
         if has(b"\"asset\"") && parts.iter().any(|part| has(part)) {
-            return is("a glTF model", Family::Model);
+            return is("a glTF model", FileFamily::Model);
         }
-        return if wanted == Wanted::Mesh { is("JSON text", Family::Other) } else { None };
+        return if wanted == WantedFile::Mesh { is("JSON text", FileFamily::Other) } else { None };
     }
     if head.starts_with(b"<") {
         let low = head.to_ascii_lowercase();
         return if has(&low, b"<collada") {
-            is("a COLLADA model", Family::Model)
+            is("a COLLADA model", FileFamily::Model)
         } else if has(&low, b"<x3d") {
-            is("an X3D scene", Family::Model)
+            is("an X3D scene", FileFamily::Model)
         } else if has(&low, b"<amf") {
-            is("an AMF model", Family::Model)
+            is("an AMF model", FileFamily::Model)
         } else if has(&low, b"<scene version") {
-            is("a Mitsuba scene", Family::Scene)
+            is("a Mitsuba scene", FileFamily::Scene)
         } else if has(&low, b"<svg") {
-            is("an SVG drawing", Family::Picture)
+            is("an SVG drawing", FileFamily::Picture)
         } else if has(&low, b"<!doctype html") || has(&low, b"<html") {
-            is("a web page (HTML)", Family::Other)
+            is("a web page (HTML)", FileFamily::Other)
         } else {
-            is("XML", Family::Other)
+            is("XML", FileFamily::Other)
         };
     }
     // The first words of lines; comments begin as those of TOML do
@@ -232,17 +236,21 @@ fn text(bytes: &[u8], head: &[u8], wanted: Wanted) -> Option<Foreign> {
         let word = line.split(|b| b.is_ascii_whitespace() || *b == b'{').next().unwrap_or_default();
         let braced = line[word.len()..].trim_ascii_start().starts_with(b"{");
         match word {
-            b"newmtl" if line.len() > word.len() => return is("the materials of an OBJ file (MTL)", Family::Materials),
+            b"newmtl" if line.len() > word.len() => {
+                return is("the materials of an OBJ file (MTL)", FileFamily::Materials);
+            }
             b"#version" | b"#include" | b"#declare" | b"#local" | b"global_settings" | b"light_source"
                 if braced || line.starts_with(b"#") =>
             {
-                return is("a POV-Ray scene", Family::Scene);
+                return is("a POV-Ray scene", FileFamily::Scene);
             }
-            b"camera" | b"sphere" | b"plane" | b"background" if braced => return is("a POV-Ray scene", Family::Scene),
+            b"camera" | b"sphere" | b"plane" | b"background" if braced => {
+                return is("a POV-Ray scene", FileFamily::Scene);
+            }
             b"WorldBegin" | b"LookAt" | b"Film" | b"Integrator" | b"Sampler" | b"Camera"
                 if line == b"WorldBegin" || has(line, b"\"") || word == b"LookAt" && !has(line, b"=") =>
             {
-                return is("a pbrt scene", Family::Scene);
+                return is("a pbrt scene", FileFamily::Scene);
             }
             _ => {}
         }
@@ -318,10 +326,10 @@ mod tests {
             (b"OFF\n8 6 0\n", "an OFF mesh"),
         ];
         for (bytes, kind) in expected {
-            let found = foreign(bytes, Wanted::Scene);
+            let found = foreign(bytes, WantedFile::Scene);
             let start = String::from_utf8_lossy(&bytes[..bytes.len().min(20)]).into_owned();
             assert_eq!(found.map(|found| found.kind), Some(*kind), "{start:?}");
-            let as_mesh = foreign(bytes, Wanted::Mesh);
+            let as_mesh = foreign(bytes, WantedFile::Mesh);
             let is_mesh = ["a PLY model", "an STL model", "an OBJ model"].contains(kind);
             let is_unknown = *kind == "binary data of an unknown kind";
             assert_eq!(as_mesh.map(|found| found.kind), (!is_mesh && !is_unknown).then_some(*kind), "{start:?}");
@@ -344,7 +352,7 @@ mod tests {
             b"\xe4\xf6",
         ];
         for text in texts {
-            assert_eq!(foreign(text, Wanted::Scene), None, "{:?}", String::from_utf8_lossy(text));
+            assert_eq!(foreign(text, WantedFile::Scene), None, "{:?}", String::from_utf8_lossy(text));
         }
     }
 }

@@ -28,9 +28,9 @@ use std::ops::{ControlFlow, Range};
 use std::sync::atomic::{AtomicU64, Ordering};
 
 use crate::math::{DVec3, origin_for};
-use error::Fault;
+use error::ImportFault;
 pub use error::{ImportError, MeshPlace};
-pub(crate) use foreign::{Foreign, Wanted, foreign};
+pub(crate) use foreign::{Foreign, WantedFile, foreign};
 pub use report::MeshReport;
 
 /// Vertices and triangles are counted in 32 bits, with one number to spare for "none".
@@ -160,8 +160,8 @@ pub fn read_mesh(
     progress: &(dyn Fn(u64, u64) -> ControlFlow<()> + Sync),
 ) -> Result<MeshData, ImportError> {
     // Whatever its ending says
-    if let Some(foreign) = foreign(bytes, Wanted::Mesh) {
-        let (message, hint) = (foreign.message(Wanted::Mesh), foreign.hint(Wanted::Mesh).to_owned());
+    if let Some(foreign) = foreign(bytes, WantedFile::Mesh) {
+        let (message, hint) = (foreign.message(WantedFile::Mesh), foreign.hint(WantedFile::Mesh).to_owned());
         return Err(ImportError::Foreign { file: name.to_owned(), message, hint });
     }
     match MeshFormat::detect(name, bytes) {
@@ -225,16 +225,16 @@ pub(crate) struct Progress<'a> {
 
 impl Progress<'_> {
     /// So many bytes more are read.
-    fn advance(&self, bytes: usize) -> Result<(), Fault> {
+    fn advance(&self, bytes: usize) -> Result<(), ImportFault> {
         let done = self.done.fetch_add(bytes as u64, Ordering::Relaxed) + bytes as u64;
         match (self.report)(done.min(self.total), self.total) {
             ControlFlow::Continue(()) => Ok(()),
-            ControlFlow::Break(()) => Err(Fault::Stopped),
+            ControlFlow::Break(()) => Err(ImportFault::Stopped),
         }
     }
 }
 
 /// The first fault in order, whichever thread was first to meet one.
-fn all<T>(results: Vec<Result<T, Fault>>) -> Result<Vec<T>, Fault> {
+fn all<T>(results: Vec<Result<T, ImportFault>>) -> Result<Vec<T>, ImportFault> {
     results.into_iter().collect()
 }

@@ -21,10 +21,10 @@ use std::ops::Range;
 use std::sync::Mutex;
 
 use super::error::{WRITE_ANEW, shown};
-use super::polygon::{self, Counts, triangles_of};
+use super::polygon::{self, PolygonCounts, triangles_of};
 use super::text::{Cursor, pieces};
 use super::weld::weld;
-use super::{Fault, MAX_COUNT, MeshData, MeshPart, Progress, all};
+use super::{ImportFault, MAX_COUNT, MeshData, MeshPart, Progress, all};
 use crate::parallel::{self, CHUNK};
 use piece::{Event, MAX_INDEX, NONE, Piece, RELATIVE, corner, skip_blanks, skip_line};
 
@@ -32,7 +32,7 @@ use piece::{Event, MAX_INDEX, NONE, Piece, RELATIVE, corner, skip_blanks, skip_l
 const PIECE: usize = 1 << 20;
 
 /// Reads an OBJ file; positions less `origin`.
-pub(super) fn read(file: &[u8], origin: [f64; 3], progress: &Progress) -> Result<MeshData, Fault> {
+pub(super) fn read(file: &[u8], origin: [f64; 3], progress: &Progress) -> Result<MeshData, ImportFault> {
     let start = if file.starts_with(b"\xef\xbb\xbf") { 3 } else { 0 };
     // A piece does not begin with a line that goes on from the one before
     let pieces = pieces(file, start, PIECE, |at| {
@@ -83,7 +83,7 @@ struct Known {
 }
 
 /// Moves the lists of all pieces together.
-fn join(parts: &mut [Piece]) -> Result<Known, Fault> {
+fn join(parts: &mut [Piece]) -> Result<Known, ImportFault> {
     let mut known = Known::default();
     let colored = parts.iter().any(|p| !p.colors.is_empty());
     for part in parts {
@@ -99,14 +99,19 @@ fn join(parts: &mut [Piece]) -> Result<Known, Fault> {
     known.counts.push([known.positions.len(), known.uvs.len(), known.normals.len()]);
     let count = known.positions.len().max(known.uvs.len()).max(known.normals.len()) as u64;
     if count > MAX_INDEX as u64 {
-        return Err(Fault::TooMany { what: "vertices", count, limit: MAX_INDEX as u64 });
+        return Err(ImportFault::TooMany { what: "vertices", count, limit: MAX_INDEX as u64 });
     }
     Ok(known)
 }
 
 /// Makes all indices count from 1 in the whole file, and checks that they are in range.
 /// Texture coordinates and normals of files that have none are left out.
-fn resolve(file: &[u8], pieces: &[Range<usize>], parts: &mut [Piece], counts: &[[usize; 3]]) -> Result<(), Fault> {
+fn resolve(
+    file: &[u8],
+    pieces: &[Range<usize>],
+    parts: &mut [Piece],
+    counts: &[[usize; 3]],
+) -> Result<(), ImportFault> {
     let all_counts = counts.last().copied().unwrap_or_default();
     let resolve = |(n, corner): (usize, &mut [i32; 3]), before: &[usize; 3]| {
         for (kind, index) in corner.iter_mut().enumerate().filter(|(_, index)| **index != NONE) {
@@ -138,7 +143,7 @@ fn resolve(file: &[u8], pieces: &[Range<usize>], parts: &mut [Piece], counts: &[
     let what = ["positions (v)", "texture coordinates (vt)", "normals (vn)"][kind];
     let points = if absolute < 1 { "before the first" } else { "beyond the last" };
     let message = format!("corner {} points {points} of {} {what}", shown(word), all_counts[kind]);
-    Err(Fault::text(at, message, WRITE_ANEW))
+    Err(ImportFault::text(at, message, WRITE_ANEW))
 }
 
 /// Where corner number `wanted` of a piece stands.
@@ -172,24 +177,24 @@ fn place_of(bytes: &[u8], start: usize, wanted: usize) -> usize {
 }
 
 /// Makes a mesh of the pieces, whose indices are all right.
-fn build(mut parts: Vec<Piece>, known: Known) -> Result<MeshData, Fault> {
+fn build(mut parts: Vec<Piece>, known: Known) -> Result<MeshData, ImportFault> {
     let mut mesh = MeshData::default();
     let corners: usize = parts.iter().map(|p| p.corners.len()).sum();
     if corners as u64 > MAX_COUNT {
-        return Err(Fault::TooMany { what: "corners of faces", count: corners as u64, limit: MAX_COUNT });
+        return Err(ImportFault::TooMany { what: "corners of faces", count: corners as u64, limit: MAX_COUNT });
     }
     // Something else altogether
     let known_statements = corners > 0 || !known.positions.is_empty() || parts.iter().any(|p| !p.events.is_empty());
     if let (false, Some(part)) = (known_statements, parts.iter().find(|p| !p.unknown.is_empty())) {
         let word = part.unknown.keys().next().expect("not empty");
         let message = format!("{} and no statement of an OBJ file", shown(word));
-        return Err(Fault::text(0, message, "an OBJ file has lines that begin with v and f"));
+        return Err(ImportFault::text(0, message, "an OBJ file has lines that begin with v and f"));
     }
     // Names, materials and groups
     attributes(&parts, &mut mesh);
     statements(&parts, &mut mesh);
     // Triangles, as numbers of corners
-    let mut counts = Counts::default();
+    let mut counts = PolygonCounts::default();
     let mut triangles: Vec<[u32; 3]> = Vec::new();
     let mut keys: Vec<[i32; 3]> = Vec::with_capacity(corners);
     for part in &mut parts {

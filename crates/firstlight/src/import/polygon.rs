@@ -16,15 +16,15 @@ const SMALL: usize = 64;
 
 /// What was done to the polygons of a file, for its notes.
 #[derive(Clone, Copy, Default)]
-pub(super) struct Counts {
+pub(super) struct PolygonCounts {
     /// Faces of less than 3 corners, left out.
     pub(super) small: u64,
     /// Large polygons that cross themselves.
     pub(super) tangled: u64,
 }
 
-impl Counts {
-    pub(super) fn add(&mut self, other: Counts) {
+impl PolygonCounts {
+    pub(super) fn add(&mut self, other: PolygonCounts) {
         self.small += other.small;
         self.tangled += other.tangled;
     }
@@ -49,7 +49,10 @@ pub(super) fn triangles_of(corners: u32) -> usize {
 }
 
 /// Triangles of polygons that lie one after another, as numbers of corners. `position`: of a corner.
-pub(super) fn triangulate(sizes: &[u32], position: impl Fn(usize) -> [f32; 3] + Sync) -> (Vec<[u32; 3]>, Counts) {
+pub(super) fn triangulate(
+    sizes: &[u32],
+    position: impl Fn(usize) -> [f32; 3] + Sync,
+) -> (Vec<[u32; 3]>, PolygonCounts) {
     const BLOCK: usize = 4096;
     // Where each block of polygons begins
     let mut start = 0usize;
@@ -61,10 +64,10 @@ pub(super) fn triangulate(sizes: &[u32], position: impl Fn(usize) -> [f32; 3] + 
             begin
         })
         .collect();
-    let parts: Vec<(Vec<[u32; 3]>, Counts)> = parallel::collect(blocks.len(), |i| {
+    let parts: Vec<(Vec<[u32; 3]>, PolygonCounts)> = parallel::collect(blocks.len(), |i| {
         let (mut start, block) = blocks[i];
         let mut triangles = Vec::with_capacity(block.iter().map(|&s| triangles_of(s)).sum());
-        let mut counts = Counts::default();
+        let mut counts = PolygonCounts::default();
         let mut work = Ears::default();
         for &size in block {
             work.polygon(start, size as usize, &position, &mut triangles, &mut counts);
@@ -72,7 +75,7 @@ pub(super) fn triangulate(sizes: &[u32], position: impl Fn(usize) -> [f32; 3] + 
         }
         (triangles, counts)
     });
-    let mut counts = Counts::default();
+    let mut counts = PolygonCounts::default();
     let mut triangles = Vec::with_capacity(parts.iter().map(|p| p.0.len()).sum());
     for (part, count) in parts {
         triangles.extend_from_slice(&part);
@@ -81,17 +84,17 @@ pub(super) fn triangulate(sizes: &[u32], position: impl Fn(usize) -> [f32; 3] + 
     (triangles, counts)
 }
 
-type Point = [f64; 2];
+type FlatPoint = [f64; 2];
 
 /// Twice the signed area of a triangle.
-fn area(a: Point, b: Point, c: Point) -> f64 {
+fn area(a: FlatPoint, b: FlatPoint, c: FlatPoint) -> f64 {
     (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
 }
 
 /// Room for one polygon at a time.
 #[derive(Default)]
 struct Ears {
-    points: Vec<Point>,
+    points: Vec<FlatPoint>,
     next: Vec<u32>,
     previous: Vec<u32>,
     ear: Vec<bool>,
@@ -106,7 +109,7 @@ impl Ears {
         size: usize,
         position: &impl Fn(usize) -> [f32; 3],
         triangles: &mut Vec<[u32; 3]>,
-        counts: &mut Counts,
+        counts: &mut PolygonCounts,
     ) {
         counts.small += u64::from(size < 3);
         if size > 3 && self.lay(start, size, position) {
@@ -209,7 +212,7 @@ impl Ears {
         }
     }
 
-    fn corner(&self, i: u32) -> [Point; 3] {
+    fn corner(&self, i: u32) -> [FlatPoint; 3] {
         [self.previous[i as usize], i, self.next[i as usize]].map(|i| self.points[i as usize])
     }
 

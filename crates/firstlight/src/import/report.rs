@@ -58,7 +58,7 @@ impl MeshReport {
 
 /// What one triangle is.
 #[derive(Clone, Copy, PartialEq, Eq, Default)]
-enum Face {
+enum TriangleFate {
     #[default]
     Fine,
     Degenerate,
@@ -135,18 +135,18 @@ impl MeshData {
         let kind = |t: &[u32; 3]| {
             let [a, b, c] = t.map(|v| self.positions[v as usize]);
             if ![a, b, c].iter().flatten().all(|x| x.is_finite()) {
-                return Face::NonFinite;
+                return TriangleFate::NonFinite;
             }
             let [a, b, c] = [a, b, c].map(|p| DVec3::from(p.map(f64::from)));
             let area = (b - a).cross(c - a).length();
-            if area > 0.0 { Face::Fine } else { Face::Degenerate }
+            if area > 0.0 { TriangleFate::Fine } else { TriangleFate::Degenerate }
         };
         let kinds = parallel::map(self.triangles.len(), CHUNK, |i| kind(&self.triangles[i]));
-        let of_kind = |kind: Face| kinds.iter().filter(|k| **k == kind).count() as u64;
-        report.non_finite_triangles = of_kind(Face::NonFinite);
-        report.degenerate_triangles = of_kind(Face::Degenerate);
+        let of_kind = |kind: TriangleFate| kinds.iter().filter(|k| **k == kind).count() as u64;
+        report.non_finite_triangles = of_kind(TriangleFate::NonFinite);
+        report.degenerate_triangles = of_kind(TriangleFate::Degenerate);
         // The faces that have an area
-        let faces = self.triangles.iter().zip(&kinds).filter(|(_, kind)| **kind == Face::Fine);
+        let faces = self.triangles.iter().zip(&kinds).filter(|(_, kind)| **kind == TriangleFate::Fine);
         let mut fine: Vec<[u32; 3]> = faces.map(|(t, _)| at(t)).collect();
         // Edges with their lower end first, and whether that turns them round
         let edge = |i: usize| {

@@ -20,7 +20,7 @@
 use super::error::{WRITE_ANEW, shown};
 use super::text::{Cursor, is_blank, is_line_end, pieces};
 use super::weld::{Welded, weld};
-use super::{Fault, MAX_COUNT, MeshData, MeshPart, Progress, all};
+use super::{ImportFault, MAX_COUNT, MeshData, MeshPart, Progress, all};
 use crate::parallel::{self, CHUNK};
 
 /// Bytes before the first facet.
@@ -33,7 +33,7 @@ const PIECE: usize = 1 << 20;
 const MAX_FACETS: u64 = MAX_COUNT / 3;
 
 /// Reads an STL file of either kind.
-pub(super) fn read(file: &[u8], progress: &Progress) -> Result<MeshData, Fault> {
+pub(super) fn read(file: &[u8], progress: &Progress) -> Result<MeshData, ImportFault> {
     let counted = counted(file);
     if counted.is_some_and(|count| HEADER as u64 + count * FACET as u64 == file.len() as u64) {
         return read_binary(file, counted.unwrap_or_default(), None, progress);
@@ -44,7 +44,7 @@ pub(super) fn read(file: &[u8], progress: &Progress) -> Result<MeshData, Fault> 
     let Some(count) = counted else {
         let message = format!("begins with {}, and has {} bytes", shown(&file[..file.len().min(8)]), file.len());
         let hint = "an STL file begins with `solid`, or has a header of 84 bytes";
-        return Err(Fault::binary(0, message, hint));
+        return Err(ImportFault::binary(0, message, hint));
     };
     let bytes = (file.len() - HEADER) as u64;
     let held = bytes / FACET as u64;
@@ -55,7 +55,7 @@ pub(super) fn read(file: &[u8], progress: &Progress) -> Result<MeshData, Fault> 
     }
     if count > held {
         let message = format!("the header counts {count} facets, but the file has room for {held}");
-        return Err(Fault::binary(80, message, WRITE_ANEW));
+        return Err(ImportFault::binary(80, message, WRITE_ANEW));
     }
     let note = format!("{} bytes after the last of {count} facets are ignored", bytes - count * FACET as u64);
     read_binary(file, count, Some(note), progress)
@@ -96,7 +96,7 @@ fn start(file: &[u8]) -> Cursor<'_> {
     text
 }
 
-fn read_binary(file: &[u8], count: u64, note: Option<String>, progress: &Progress) -> Result<MeshData, Fault> {
+fn read_binary(file: &[u8], count: u64, note: Option<String>, progress: &Progress) -> Result<MeshData, ImportFault> {
     check_count(count)?;
     let position = |corner: usize| {
         let at = HEADER + corner / 3 * FACET + 12 + corner % 3 * 12;
@@ -109,9 +109,9 @@ fn read_binary(file: &[u8], count: u64, note: Option<String>, progress: &Progres
     Ok(mesh)
 }
 
-fn check_count(count: u64) -> Result<(), Fault> {
+fn check_count(count: u64) -> Result<(), ImportFault> {
     if count > MAX_FACETS {
-        return Err(Fault::TooMany { what: "triangles", count, limit: MAX_FACETS });
+        return Err(ImportFault::TooMany { what: "triangles", count, limit: MAX_FACETS });
     }
     Ok(())
 }
@@ -132,7 +132,7 @@ fn join(corners: usize, position: impl Fn(usize) -> [f32; 3] + Sync) -> MeshData
 
 /// What one thread has read.
 #[derive(Default)]
-struct Piece<'a> {
+struct StlPiece<'a> {
     corners: Vec<[f32; 3]>,
     /// The names of solids, and how many facets of the piece stand before each.
     solids: Vec<(usize, &'a [u8])>,
@@ -140,7 +140,7 @@ struct Piece<'a> {
     ended: bool,
 }
 
-fn read_text(file: &[u8], progress: &Progress) -> Result<MeshData, Fault> {
+fn read_text(file: &[u8], progress: &Progress) -> Result<MeshData, ImportFault> {
     // A piece begins with a facet, so that it can be read by itself
     let begins = |at: usize| {
         let mut text = Cursor { bytes: file, at };
@@ -183,9 +183,9 @@ fn read_text(file: &[u8], progress: &Progress) -> Result<MeshData, Fault> {
 }
 
 /// Reads solids and facets, from a word to the end.
-fn read_piece(bytes: &[u8], start: usize) -> Result<Piece<'_>, Fault> {
+fn read_piece(bytes: &[u8], start: usize) -> Result<StlPiece<'_>, ImportFault> {
     let mut text = Cursor { bytes, at: start };
-    let mut piece = Piece::default();
+    let mut piece = StlPiece::default();
     loop {
         text.skip_space();
         let at = text.at;
@@ -202,7 +202,7 @@ fn read_piece(bytes: &[u8], start: usize) -> Result<Piece<'_>, Fault> {
             return Ok(piece);
         } else {
             let message = format!("{} where `facet`, `solid` or `endsolid` is needed", shown(word));
-            return Err(Fault::text(at, message, WRITE_ANEW));
+            return Err(ImportFault::text(at, message, WRITE_ANEW));
         }
     }
 }
@@ -226,7 +226,7 @@ fn name<'a>(text: &mut Cursor<'a>) -> &'a [u8] {
 
 /// Reads a facet after its first word.
 #[inline(always)]
-fn facet(text: &mut Cursor, corners: &mut Vec<[f32; 3]>) -> Result<(), Fault> {
+fn facet(text: &mut Cursor, corners: &mut Vec<[f32; 3]>) -> Result<(), ImportFault> {
     expect(text, b"normal")?;
     for _ in 0..3 {
         number(text)?;
@@ -242,7 +242,7 @@ fn facet(text: &mut Cursor, corners: &mut Vec<[f32; 3]>) -> Result<(), Fault> {
 }
 
 #[inline(always)]
-fn expect(text: &mut Cursor, needed: &'static [u8]) -> Result<(), Fault> {
+fn expect(text: &mut Cursor, needed: &'static [u8]) -> Result<(), ImportFault> {
     text.skip_space();
     let at = text.at;
     let word = text.word();
@@ -253,7 +253,7 @@ fn expect(text: &mut Cursor, needed: &'static [u8]) -> Result<(), Fault> {
 }
 
 #[inline(always)]
-fn number(text: &mut Cursor) -> Result<f32, Fault> {
+fn number(text: &mut Cursor) -> Result<f32, ImportFault> {
     text.skip_space();
     match text.f32() {
         Some(number) => Ok(number),
@@ -262,13 +262,13 @@ fn number(text: &mut Cursor) -> Result<f32, Fault> {
 }
 
 #[cold]
-fn missing(text: &Cursor, at: usize, needed: &str) -> Fault {
+fn missing(text: &Cursor, at: usize, needed: &str) -> ImportFault {
     let word = Cursor { bytes: text.bytes, at }.word();
     if word.is_empty() {
-        return Fault::text(at, format!("the file ends where {needed} is needed"), WRITE_ANEW);
+        return ImportFault::text(at, format!("the file ends where {needed} is needed"), WRITE_ANEW);
     }
     let hint = "a facet is `facet normal x y z outer loop`, three times `vertex x y z`, `endloop endfacet`";
-    Fault::text(at, format!("{} where {needed} is needed", shown(word)), hint)
+    ImportFault::text(at, format!("{} where {needed} is needed", shown(word)), hint)
 }
 
 #[cfg(test)]

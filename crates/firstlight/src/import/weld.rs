@@ -11,7 +11,7 @@ use std::sync::atomic::{AtomicU32, Ordering};
 use crate::parallel::{self, CHUNK};
 
 /// What is the same in corners that become one vertex.
-pub(super) type Key = [u32; 4];
+pub(super) type CornerKey = [u32; 4];
 
 /// Corners made to vertices.
 pub(super) struct Welded {
@@ -30,7 +30,7 @@ const EMPTY: u32 = u32::MAX;
 /// Numbers the different keys of corners `0..count` in the order of their first appearance.
 ///
 /// `count` below 2^32 - 1.
-pub(super) fn weld(count: usize, key: impl Fn(usize) -> Key + Sync) -> Welded {
+pub(super) fn weld(count: usize, key: impl Fn(usize) -> CornerKey + Sync) -> Welded {
     debug_assert!(count < EMPTY as usize);
     let hash = Hash::new();
     let buckets = (count / BUCKET).next_power_of_two().clamp(1, 1 << 14);
@@ -136,7 +136,7 @@ impl Hash {
     }
 
     #[inline(always)]
-    fn of(&self, key: Key) -> u64 {
+    fn of(&self, key: CornerKey) -> u64 {
         let fold = |a: u64, b: u64| {
             let product = u128::from(a) * u128::from(b);
             product as u64 ^ (product >> 64) as u64

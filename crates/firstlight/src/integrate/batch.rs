@@ -5,14 +5,14 @@
 
 use fearless_simd::{f32x16, prelude::*};
 
-use super::view::{FlatLight, NEAR, View};
+use super::view::{FlatLight, FlatView, NEAR};
 use crate::color::Rgb;
 use crate::material::Colors;
 use crate::math::{DVec3, ErrorBound, Facet, LANES, UNIT_ROUNDOFF, Vec3, Vec3x16};
 use crate::shape::SurfaceInteraction;
 
 /// Sixteen numbers, one of each member of a batch.
-pub(crate) type Block = [f32; LANES];
+pub(crate) type LaneNumbers = [f32; LANES];
 
 /// What lighting needs to know of a surface at one point.
 #[derive(Clone, Copy, Debug)]
@@ -74,7 +74,7 @@ impl ShadingPoint {
     }
 }
 
-/// One number of what a point sees of a flat light; see [`View`].
+/// One number of what a point sees of a flat light; see [`FlatView`].
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum ViewNumber {
     /// The point.
@@ -131,7 +131,7 @@ const NUMBERS: usize = ViewNumber::Measure as usize + 1;
 
 /// What sixteen points see of a flat light.
 #[derive(Clone, Debug)]
-pub(crate) struct ViewBlock([Block; NUMBERS]);
+pub(crate) struct ViewBlock([LaneNumbers; NUMBERS]);
 
 impl Default for ViewBlock {
     fn default() -> Self {
@@ -142,7 +142,7 @@ impl Default for ViewBlock {
 impl ViewBlock {
     /// Puts what one point sees into a lane.
     #[inline(always)]
-    pub fn set(&mut self, lane: usize, p: Vec3, v: &View) {
+    pub fn set(&mut self, lane: usize, p: Vec3, v: &FlatView) {
         let (l0, a, b) = (v.l0, v.a, v.b);
         let mirror = v.mirror().unwrap_or_default();
         #[rustfmt::skip]
@@ -160,8 +160,8 @@ impl ViewBlock {
 }
 
 impl ViewBlock {
-    /// Puts what up to sixteen points see of one flat light into the lanes, as [`View::new`] does; but for those whose
-    /// bits are returned: they are so near that they count its places from the nearest. To be called within
+    /// Puts what up to sixteen points see of one flat light into the lanes, as [`FlatView::new`] does; but for those
+    /// whose bits are returned: they are so near that they count its places from the nearest. To be called within
     /// `vectorize`.
     #[inline(always)]
     pub fn see<S: Simd>(&mut self, simd: S, light: &FlatLight, points: &[ShadingPoint]) -> u64 {

@@ -5,7 +5,7 @@ use std::f32::consts::PI;
 use arrayvec::ArrayVec;
 use fearless_simd::{f32x16, mask32x16, prelude::*};
 
-use super::batch::{Block, Linear16};
+use super::batch::{LaneNumbers, Linear16};
 use super::row::{Quadratic16, root_between};
 use crate::math::sin_cos;
 
@@ -27,7 +27,7 @@ pub(crate) struct Breaks<'a, S: Simd> {
     pub round: Option<RoundSides<S>>,
     /// Whose rows are looked for.
     pub of: mask32x16<S>,
-    pub rows: &'a mut Vec<Block>,
+    pub rows: &'a mut Vec<LaneNumbers>,
 }
 
 /// Round sides are looked at in so many places, evenly in their angle.

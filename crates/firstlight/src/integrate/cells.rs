@@ -34,7 +34,7 @@ const FINE: f32 = 0.5;
 
 /// What a point of a light would send, before anything is in the way.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Sent {
+pub(super) struct PointSent {
     /// The way to it.
     pub way: Vec3,
     /// For each part of the light's measure: diffuse and specular.
@@ -42,13 +42,13 @@ pub(super) struct Sent {
 }
 
 /// A light whose points are those of the unit square, equal areas for equal areas.
-pub(super) trait Source {
+pub(super) trait PointSource {
     /// What the point would send; `None` from below the horizon, or from a side that does not emit.
-    fn sent(&self, at: [f32; 2]) -> Option<Sent>;
+    fn sent(&self, at: [f32; 2]) -> Option<PointSent>;
 
     /// The highlight that its points make, if that may be narrow beside the first cells, and nothing else says what it
     /// makes in all.
-    fn highlight(&self) -> Option<Highlight> {
+    fn highlight(&self) -> Option<MirrorSpot> {
         None
     }
 
@@ -58,16 +58,16 @@ pub(super) trait Source {
 
 /// Where a highlight comes from.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Highlight {
+pub(super) struct MirrorSpot {
     /// The way to its middle: unit.
     pub way: Vec3,
     /// Its standard deviation, in radians.
     pub spread: f32,
 }
 
-impl Highlight {
+impl MirrorSpot {
     /// Marks those of some cells, four of them a square, that have to be cut for it.
-    fn mark(&self, cells: &[Cell], side: usize, marks: &mut [bool]) {
+    fn mark(&self, cells: &[PointCell], side: usize, marks: &mut [bool]) {
         for (four, marks) in cells.chunks_exact(4).zip(marks.chunks_exact_mut(4)) {
             let ways: [Vec3; 4] = std::array::from_fn(|k| four[k].way.normalize_or_zero());
             let there = || ways.iter().filter(|way| **way != Vec3::ZERO);
@@ -86,7 +86,7 @@ impl Highlight {
 
 /// What a cell's point says.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum State {
+enum PointState {
     Lit,
     Hidden,
     /// It sends nothing.
@@ -94,9 +94,9 @@ enum State {
 }
 
 #[derive(Clone, Copy, Debug)]
-struct Cell {
+struct PointCell {
     at: [u32; 2],
-    state: State,
+    state: PointState,
     /// What its middle sends, each for all of the light's measure.
     sums: [f32; MOMENTS],
     /// How far that is from the mean over it.
@@ -105,32 +105,32 @@ struct Cell {
     way: Vec3,
 }
 
-impl Cell {
+impl PointCell {
     /// How rough cells are whose four middles send this together, where the middle of all four sends `middle`: it is
     /// off by four times as much as they are.
-    fn roughness(four: &[Cell], middle: [f32; MOMENTS]) -> [f32; MOMENTS] {
+    fn roughness(four: &[PointCell], middle: [f32; MOMENTS]) -> [f32; MOMENTS] {
         let mean = |k: usize| four.iter().map(|cell| cell.sums[k]).sum::<f32>() * 0.25;
         std::array::from_fn(|k| (mean(k) - middle[k]).abs() * (1.0 / 3.0))
     }
 }
 
 /// The states of all cells of one size, `side` along each side; where none was asked, those of larger ones.
-struct Grid {
+struct CellStates {
     side: usize,
-    states: Vec<State>,
+    states: Vec<PointState>,
 }
 
-impl Grid {
-    fn get(&self, at: [u32; 2]) -> State {
+impl CellStates {
+    fn get(&self, at: [u32; 2]) -> PointState {
         self.states[at[1] as usize * self.side + at[0] as usize]
     }
 
-    fn set(&mut self, at: [u32; 2], state: State) {
+    fn set(&mut self, at: [u32; 2], state: PointState) {
         self.states[at[1] as usize * self.side + at[0] as usize] = state;
     }
 
     /// With cells half as wide.
-    fn halved(&self) -> Grid {
+    fn halved(&self) -> CellStates {
         let side = 2 * self.side;
         let mut states = Vec::with_capacity(side * side);
         for row in self.states.chunks_exact(self.side) {
@@ -138,7 +138,7 @@ impl Grid {
                 states.extend(row.iter().flat_map(|state| [*state; 2]));
             }
         }
-        Grid { side, states }
+        CellStates { side, states }
     }
 
     /// The cells next to one, over corners as well.
@@ -159,16 +159,16 @@ struct Totals {
 }
 
 impl Totals {
-    fn add(&mut self, cell: &Cell, area: f64) {
-        if cell.state == State::Dark {
+    fn add(&mut self, cell: &PointCell, area: f64) {
+        if cell.state == PointState::Dark {
             return;
         }
         for (k, sum) in cell.sums.iter().enumerate() {
             self.all[k] += f64::from(*sum) * area;
-            if cell.state == State::Lit {
+            if cell.state == PointState::Lit {
                 self.lit[k] += f64::from(*sum) * area;
             }
-            self.rough[usize::from(cell.state == State::Hidden)][k] += f64::from(cell.rough[k]) * area;
+            self.rough[usize::from(cell.state == PointState::Hidden)][k] += f64::from(cell.rough[k]) * area;
         }
     }
 
@@ -190,7 +190,7 @@ fn chance([x, y]: [u32; 2], side: usize, dimension: u32) -> f32 {
 }
 
 /// Asks the points of some cells, four of them a square.
-fn ask(source: &impl Source, side: usize, places: &[[u32; 2]], cells: &mut Vec<Cell>) {
+fn ask(source: &impl PointSource, side: usize, places: &[[u32; 2]], cells: &mut Vec<PointCell>) {
     let width = 1.0 / side as f32;
     for places in places.chunks(LANES) {
         let (mut points, mut ways, mut active) = ([[0.0; 2]; LANES], [Vec3::ZERO; LANES], 0u16);
@@ -198,21 +198,26 @@ fn ask(source: &impl Source, side: usize, places: &[[u32; 2]], cells: &mut Vec<C
         for (lane, at) in places.iter().enumerate() {
             let point = [0, 1].map(|k| (at[k] as f32 + chance(*at, side, k as u32)) * width);
             let middle = at.map(|w| (w as f32 + 0.5) * width);
-            let mut cell =
-                Cell { at: *at, state: State::Dark, sums: [0.0; MOMENTS], rough: [0.0; MOMENTS], way: Vec3::ZERO };
+            let mut cell = PointCell {
+                at: *at,
+                state: PointState::Dark,
+                sums: [0.0; MOMENTS],
+                rough: [0.0; MOMENTS],
+                way: Vec3::ZERO,
+            };
             if let Some(sent) = source.sent(point) {
                 (points[lane], ways[lane]) = (point, sent.way);
                 active |= 1 << lane;
                 // A middle below the horizon is near it
                 let sent = source.sent(middle).unwrap_or(sent);
-                (cell.state, cell.sums, cell.way) = (State::Lit, sent.sums, sent.way);
+                (cell.state, cell.sums, cell.way) = (PointState::Lit, sent.sums, sent.way);
             }
             cells.push(cell);
         }
         let hidden = if active == 0 { 0 } else { source.hidden(&points, &ways, active) };
         for (lane, cell) in cells[from..].iter_mut().enumerate() {
             if hidden & active & (1 << lane) != 0 {
-                cell.state = State::Hidden;
+                cell.state = PointState::Hidden;
             }
         }
     }
@@ -222,12 +227,12 @@ fn ask(source: &impl Source, side: usize, places: &[[u32; 2]], cells: &mut Vec<C
 /// Both are parts of the light's measure; or, where `whole` says what would arrive with nothing in the way, as much as
 /// that makes.
 pub(super) fn integrate(
-    source: &impl Source,
+    source: &impl PointSource,
     whole: Option<&Moments>,
     enough: &dyn Fn(&Moments, &Moments) -> bool,
 ) -> (Moments, Moments) {
     let mut cells = all(source, FIRST as u32);
-    let mut grid = Grid { side: FIRST, states: vec![State::Dark; FIRST * FIRST] };
+    let mut grid = CellStates { side: FIRST, states: vec![PointState::Dark; FIRST * FIRST] };
     cells.iter().for_each(|cell| grid.set(cell.at, cell.state));
     let mut settled = Totals::default();
     let highlight = source.highlight();
@@ -273,9 +278,9 @@ pub(super) fn integrate(
                 doubtful.fill(false);
             } else if !enough(&sums, &(by_roughness + by_roughness)) {
                 // Those that are not much smoother than the mean
-                let roughness = |cell: &Cell| {
+                let roughness = |cell: &PointCell| {
                     let shares = cell.rough.iter().enumerate().map(|(k, rough)| totals.share(k, f64::from(*rough)));
-                    if cell.state == State::Dark { 0.0 } else { shares.sum() }
+                    if cell.state == PointState::Dark { 0.0 } else { shares.sum() }
                 };
                 let mean = cells.iter().map(roughness).sum::<f64>() / cells.len() as f64;
                 for (cell, doubtful) in cells.iter().zip(&mut doubtful) {
@@ -285,7 +290,7 @@ pub(super) fn integrate(
             // One that sends far more than others is looked at more closely
             for (cell, doubtful) in cells.iter().zip(&mut doubtful) {
                 let is_heavy = (0..MOMENTS).any(|k| totals.share(k, f64::from(cell.sums[k])) > HEAVY);
-                if is_heavy && cell.state != State::Dark && !*doubtful {
+                if is_heavy && cell.state != PointState::Dark && !*doubtful {
                     *doubtful = !enough(&sums, &part(cell.sums.map(|sum| f64::from(sum) * area)));
                 }
             }
@@ -302,7 +307,7 @@ pub(super) fn integrate(
 }
 
 /// All cells of one size.
-fn all(source: &impl Source, side: u32) -> Vec<Cell> {
+fn all(source: &impl PointSource, side: u32) -> Vec<PointCell> {
     let half = side / 2;
     let squares = (0..half * half).map(|k| [k % half, k / half]);
     let places: Vec<[u32; 2]> = squares.clone().flat_map(four).collect();
@@ -310,7 +315,7 @@ fn all(source: &impl Source, side: u32) -> Vec<Cell> {
     ask(source, side as usize, &places, &mut cells);
     for (four, at) in cells.chunks_exact_mut(4).zip(squares) {
         let middle = source.sent(at.map(|w| (w as f32 + 0.5) / half as f32)).map_or([0.0; MOMENTS], |sent| sent.sums);
-        let rough = Cell::roughness(four, middle);
+        let rough = PointCell::roughness(four, middle);
         four.iter_mut().for_each(|cell| cell.rough = rough);
     }
     cells
@@ -325,14 +330,14 @@ fn four([x, y]: [u32; 2]) -> [[u32; 2]; 4] {
 /// Cuts the doubtful cells into four, and those next to them where the new ones bring doubt. What is not cut is
 /// settled.
 fn cut(
-    source: &impl Source,
-    cells: &[Cell],
+    source: &impl PointSource,
+    cells: &[PointCell],
     mut doubtful: Vec<bool>,
-    grid: &Grid,
+    grid: &CellStates,
     settled: &mut Totals,
-) -> (Vec<Cell>, Grid) {
+) -> (Vec<PointCell>, CellStates) {
     let mut finer = grid.halved();
-    let mut new: Vec<Cell> = Vec::new();
+    let mut new: Vec<PointCell> = Vec::new();
     // Where each cell of this level stands in `cells`
     const NONE: u32 = u32::MAX;
     let mut number = vec![NONE; grid.states.len()];
@@ -348,7 +353,7 @@ fn cut(
         let from = new.len();
         ask(source, finer.side, &places, &mut new);
         for (four, i) in new[from..].chunks_exact_mut(4).zip(queue.drain(..)) {
-            let rough = Cell::roughness(four, cells[i].sums);
+            let rough = PointCell::roughness(four, cells[i].sums);
             four.iter_mut().for_each(|cell| cell.rough = rough);
         }
         for cell in &new[from..] {
@@ -378,9 +383,9 @@ mod tests {
     /// A light of which nothing is seen but where this is so.
     struct Through<F: Fn(f32, f32) -> bool>(F);
 
-    impl<F: Fn(f32, f32) -> bool> Source for Through<F> {
-        fn sent(&self, [x, y]: [f32; 2]) -> Option<Sent> {
-            Some(Sent { way: Vec3::Z, sums: [1.0, x + y] })
+    impl<F: Fn(f32, f32) -> bool> PointSource for Through<F> {
+        fn sent(&self, [x, y]: [f32; 2]) -> Option<PointSent> {
+            Some(PointSent { way: Vec3::Z, sums: [1.0, x + y] })
         }
 
         fn hidden(&self, places: &[[f32; 2]; LANES], _: &[Vec3; LANES], active: u16) -> u16 {

@@ -17,7 +17,7 @@ use super::occluder::{Occluder, Shadow, corners_from};
 use super::panels::{Between, MAX_INTERVALS};
 use crate::ids::LightId;
 use crate::math::{DAffine3, Facet, LANES, Vec3, Vec3x16};
-use crate::scene::{Meets, Scene, Target};
+use crate::scene::{Meets, PlacedTarget, Scene};
 use crate::shape::{Parallelogram, Placement, PlaneSide, Solid, Sphere};
 use crate::visibility::{Occluders, ShadowMesh};
 use flat::{FacetShape, Own, facet_between, flat_between};
@@ -83,7 +83,7 @@ impl<'a> Obstacles<'a> {
         obstacles.occluders.truncate(MAX_OBSTACLES);
         obstacles.exact.truncate(MAX_OBSTACLES);
         for (k, thing) in scene.geometry.placed.iter().enumerate() {
-            let Target::Solid(solid) = thing.target else { continue };
+            let PlacedTarget::Solid(solid) = thing.target else { continue };
             let casts = match thing.shadow {
                 Meets::All => true,
                 Meets::None => false,
@@ -226,7 +226,7 @@ pub(crate) struct Class {
 const SLACK: f32 = 1e-5;
 
 /// The light as sixteen points see it: the pyramid over it, and the cone around it.
-struct Sight<S: Simd> {
+struct LanesSight<S: Simd> {
     p: Vec3x16<S>,
     ways: [Vec3x16<S>; 3],
     x: [f32x16<S>; 2],
@@ -265,9 +265,9 @@ fn way<S: Simd>(l: &[Vec3x16<S>; 3], x: f32x16<S>, y: f32x16<S>) -> Vec3x16<S> {
     l[0] + (l[1] * x + l[2] * y)
 }
 
-impl<S: Simd> Sight<S> {
+impl<S: Simd> LanesSight<S> {
     #[inline(always)]
-    fn new(simd: S, views: &ViewBlock, points: &[ShadingPoint]) -> Sight<S> {
+    fn new(simd: S, views: &ViewBlock, points: &[ShadingPoint]) -> LanesSight<S> {
         use ViewNumber::*;
         let point = |f: fn(&ShadingPoint) -> f32| {
             let mut numbers = [0.0; LANES];
@@ -298,7 +298,7 @@ impl<S: Simd> Sight<S> {
         let far = far.sqrt();
         let slant = views.lanes(simd, Height) / distance;
         let size = views.lanes(simd, La).min(views.lanes(simd, Lb)) * slant.max(simd.splat_f32x16(0.02)) * 2.0;
-        Sight {
+        LanesSight {
             p: views.vectors(simd, [Px, Py, Pz]),
             ways: l,
             x,
@@ -441,7 +441,7 @@ pub(crate) fn classify<S: Simd>(
     if asked == 0 {
         return classes;
     }
-    let mut sight = Sight::new(simd, views, points);
+    let mut sight = LanesSight::new(simd, views, points);
     let own = near.is_some().then(|| Own::new(simd, &sight, points));
     let mut asked = asked;
     for (i, (occluder, exact, touch, cuts)) in
@@ -587,7 +587,7 @@ impl<S: Simd> Told<S> {
 #[inline(always)]
 fn sphere_between<S: Simd>(
     simd: S,
-    sight: &Sight<S>,
+    sight: &LanesSight<S>,
     s: Vec3x16<S>,
     r: f32,
     sphere: &Sphere,

@@ -20,7 +20,7 @@ pub(crate) const MOST: usize = 2 * FACES;
 const FACES: usize = 3;
 
 /// A ball as sixteen points see it: the way to its middle, and the square of the way to where it is touched.
-struct Ball<S: Simd> {
+struct BallView<S: Simd> {
     middle: Vec3x16<S>,
     touch2: f32x16<S>,
     /// |l|^2, and the product of l with the way to the middle.
@@ -28,12 +28,12 @@ struct Ball<S: Simd> {
     along: Linear16<S>,
 }
 
-impl<S: Simd> Ball<S> {
+impl<S: Simd> BallView<S> {
     #[inline(always)]
-    fn new(middle: Vec3x16<S>, r: f32x16<S>, l: &[Vec3x16<S>; 3]) -> Ball<S> {
+    fn new(middle: Vec3x16<S>, r: f32x16<S>, l: &[Vec3x16<S>; 3]) -> BallView<S> {
         let distance2 = middle.dot(middle);
         let distance = distance2.sqrt();
-        Ball {
+        BallView {
             middle,
             touch2: (distance - r) * (distance + r),
             length2: Quadratic16::dot(*l, *l),
@@ -99,16 +99,16 @@ pub(crate) enum Half {
 }
 
 /// Where on the rows of a ball something changes: at both places of a circle that are on one half of it.
-struct Arc<S: Simd> {
+struct HalfCircle<S: Simd> {
     plane: Linear16<S>,
     height: f32x16<S>,
     circle: Quadratic16<S>,
 }
 
-impl<S: Simd> Arc<S> {
+impl<S: Simd> HalfCircle<S> {
     #[inline(always)]
-    fn new(ball: &Ball<S>, plane: Linear16<S>, height: f32x16<S>) -> Arc<S> {
-        Arc { plane, height, circle: ball.circle(&plane, height) }
+    fn new(ball: &BallView<S>, plane: Linear16<S>, height: f32x16<S>) -> HalfCircle<S> {
+        HalfCircle { plane, height, circle: ball.circle(&plane, height) }
     }
 
     /// The parts of a range of each row that are hidden, where its beginning is (`begins`) or is not, and that changes
@@ -117,7 +117,7 @@ impl<S: Simd> Arc<S> {
     fn parts(
         &self,
         simd: S,
-        balls: &[(&Ball<S>, Half)],
+        balls: &[(&BallView<S>, Half)],
         y: f32x16<S>,
         range: &Interval16<S>,
         begins: mask32x16<S>,
@@ -143,41 +143,41 @@ impl<S: Simd> Arc<S> {
 }
 
 /// A thing that reaches into a ball, as sixteen points see both.
-pub(crate) struct Cut<S: Simd> {
-    ball: Ball<S>,
+pub(crate) struct BallCut<S: Simd> {
+    ball: BallView<S>,
     half: Half,
     shape: CutShape<S>,
 }
 
 /// The lines of a flat thing, and where its plane cuts the ball; or nothing.
-type Face<S> = ([Linear16<S>; 5], Option<Arc<S>>);
+type FlatLines<S> = ([Linear16<S>; 5], Option<HalfCircle<S>>);
 
 enum CutShape<S: Simd> {
     /// What is inside of the sides of flat things, behind their planes.
     Flat {
-        faces: [Face<S>; FACES],
+        faces: [FlatLines<S>; FACES],
     },
     /// A disk; what is inside of its hole, if it has one, is not hidden.
     Rim {
         rim: Rim<S>,
         hole: Option<Rim<S>>,
-        arc: Arc<S>,
+        arc: HalfCircle<S>,
     },
     Sphere {
-        other: Ball<S>,
+        other: BallView<S>,
         cone: Quadratic16<S>,
-        arc: Arc<S>,
+        arc: HalfCircle<S>,
     },
     /// What is round otherwise.
     Round {
-        entry: Entry<S>,
+        entry: Entrance<S>,
     },
 }
 
 /// Where ways to a light enter something convex, in a space of its own.
-enum Entry<S: Simd> {
+enum Entrance<S: Simd> {
     Ball {
-        ball: Ball<S>,
+        ball: BallView<S>,
         cone: Quadratic16<S>,
     },
     Frustum {
@@ -194,13 +194,13 @@ enum Entry<S: Simd> {
 const PLACES: usize = 13;
 const ALONG: [f32; PLACES] = [-1.0, -0.985, -0.94, -0.866, -0.707, -0.5, 0.0, 0.5, 0.707, 0.866, 0.94, 0.985, 1.0];
 
-impl<S: Simd> Entry<S> {
+impl<S: Simd> Entrance<S> {
     /// From where to where a row goes through it.
     #[inline(always)]
     fn on_row(&self, simd: S, y: f32x16<S>) -> Interval16<S> {
         match self {
-            Entry::Ball { ball, cone } => cone.cone_on_row(simd, &ball.along, y),
-            Entry::Frustum { hull, .. } => {
+            Entrance::Ball { ball, cone } => cone.cone_on_row(simd, &ball.along, y),
+            Entrance::Frustum { hull, .. } => {
                 let mut band = Interval16::all(simd);
                 for line in &hull.faces[0][1..] {
                     band.clip(y * line.y + line.c, line.x);
@@ -222,8 +222,8 @@ impl<S: Simd> Entry<S> {
     #[inline(always)]
     fn enters(&self, x: f32x16<S>, y: f32x16<S>) -> f32x16<S> {
         match self {
-            Entry::Ball { ball, .. } => ball.meets(Half::Near, x, y),
-            Entry::Frustum { radii: [first, last], from: o, l, .. } => {
+            Entrance::Ball { ball, .. } => ball.meets(Half::Near, x, y),
+            Entrance::Frustum { radii: [first, last], from: o, l, .. } => {
                 let simd = x.token();
                 let (zero, one, far) = (simd.splat_f32x16(0.0), simd.splat_f32x16(1.0), simd.splat_f32x16(FAR));
                 let d: Vec3x16<S> = l[0] + (l[1] * x + l[2] * y);
@@ -281,7 +281,7 @@ pub(crate) fn knows(occluder: &Occluder) -> bool {
     }
 }
 
-impl<S: Simd> Cut<S> {
+impl<S: Simd> BallCut<S> {
     /// `None` if that is not known. Not inlined, as what it is asked is not: one copy of each for each instruction set
     /// is enough.
     #[inline(never)]
@@ -291,10 +291,10 @@ impl<S: Simd> Cut<S> {
         ball: (Exact, f32, Half),
         p: Vec3x16<S>,
         l: &[Vec3x16<S>; 3],
-    ) -> Option<Cut<S>> {
+    ) -> Option<BallCut<S>> {
         simd.vectorize(
             #[inline(always)]
-            || Cut::new_now(simd, occluder, ball, p, l),
+            || BallCut::new_now(simd, occluder, ball, p, l),
         )
     }
 
@@ -305,18 +305,18 @@ impl<S: Simd> Cut<S> {
         (center, radius, half): (Exact, f32, Half),
         p: Vec3x16<S>,
         l: &[Vec3x16<S>; 3],
-    ) -> Option<Cut<S>> {
+    ) -> Option<BallCut<S>> {
         let (zero, one) = (simd.splat_f32x16(0.0), simd.splat_f32x16(1.0));
         // Where the light is counts, not how far off: powers of that would be too large
         let middle = center.seen_from(simd, p);
         let scale = one / middle.dot(middle).sqrt().max(simd.splat_f32x16(radius));
         let near = &[l[0] * scale, l[1] * scale, l[2] * scale];
-        let ball = Ball::new(middle * scale, scale * radius, near);
+        let ball = BallView::new(middle * scale, scale * radius, near);
         let face = |lines: [Linear16<S>; 5], height: f32x16<S>, length: f32x16<S>| {
             let inverse = one / length.max(simd.splat_f32x16(f32::MIN_POSITIVE));
             let Linear16 { c, x, y } = lines[0];
             let plane = Linear16 { c: (c + height) * inverse, x: x * inverse, y: y * inverse };
-            (lines, Some(Arc::new(&ball, plane, height * inverse)))
+            (lines, Some(HalfCircle::new(&ball, plane, height * inverse)))
         };
         let nothing = [Linear16 { c: zero, x: zero, y: zero }; 5];
         let shape = match occluder {
@@ -331,9 +331,9 @@ impl<S: Simd> Cut<S> {
             }
             Occluder::Solid(solid) if solid.kind == Canonical::Ball => {
                 let (to, local) = solid.seen_from(simd, p, l);
-                let other = Ball::new(to, one, &local);
+                let other = BallView::new(to, one, &local);
                 let cone = other.cone();
-                CutShape::Round { entry: Entry::Ball { ball: other, cone } }
+                CutShape::Round { entry: Entrance::Ball { ball: other, cone } }
             }
             Occluder::Solid(solid) => {
                 let (to, local) = solid.seen_from(simd, p, l);
@@ -353,25 +353,25 @@ impl<S: Simd> Cut<S> {
                     }
                     Canonical::Disk { hole } => {
                         let [rim, inner] = hull.rims;
-                        let arc = Arc::new(&ball, rim.ahead, to.z.abs());
+                        let arc = HalfCircle::new(&ball, rim.ahead, to.z.abs());
                         CutShape::Rim { rim, hole: (hole > 0.0).then_some(inner), arc }
                     }
                     Canonical::Frustum { radii, open: false } => CutShape::Round {
-                        entry: Entry::Frustum { hull, radii, from: to * simd.splat_f32x16(-1.0), l: local },
+                        entry: Entrance::Frustum { hull, radii, from: to * simd.splat_f32x16(-1.0), l: local },
                     },
                     Canonical::Ball | Canonical::Frustum { .. } | Canonical::Torus { .. } => return None,
                 }
             }
             Occluder::Sphere { center, radius } => {
-                let other = Ball::new(center.seen_from(simd, p) * scale, scale * *radius, near);
+                let other = BallView::new(center.seen_from(simd, p) * scale, scale * *radius, near);
                 let cone = other.cone();
                 let between = ball.middle - other.middle;
                 let plane = Linear16::along(between, near);
-                let arc = Arc::new(&ball, plane, (ball.touch2 - other.touch2) * 0.5);
+                let arc = HalfCircle::new(&ball, plane, (ball.touch2 - other.touch2) * 0.5);
                 CutShape::Sphere { other, cone, arc }
             }
         };
-        Some(Cut { ball, half, shape })
+        Some(BallCut { ball, half, shape })
     }
 
     /// Hands over what is hidden of sixteen rows, of which `rim` is what is on the ball; from inside of a sphere, of
@@ -450,7 +450,7 @@ impl<S: Simd> Cut<S> {
     fn look_for(
         &self,
         simd: S,
-        entry: &Entry<S>,
+        entry: &Entrance<S>,
         y: f32x16<S>,
         range: &Interval16<S>,
         parts: &mut [Interval16<S>; MOST],
@@ -529,8 +529,8 @@ impl<S: Simd> Cut<S> {
                 breaks.quadratic(cone, of);
                 breaks.quadratic(&arc.circle, of);
             }
-            CutShape::Round { entry: Entry::Ball { cone, .. } } => breaks.quadratic(cone, of),
-            CutShape::Round { entry: Entry::Frustum { hull, .. } } => {
+            CutShape::Round { entry: Entrance::Ball { cone, .. } } => breaks.quadratic(cone, of),
+            CutShape::Round { entry: Entrance::Frustum { hull, .. } } => {
                 breaks.polygon(&hull.faces[0]);
                 for rim in &hull.rims {
                     breaks.quadratic(&rim.quadratic, of);

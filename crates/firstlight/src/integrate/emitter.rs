@@ -6,7 +6,7 @@ use arrayvec::ArrayVec;
 
 use super::batch::Exact;
 use super::cut::Half;
-use super::fit::Falloff;
+use super::fit::AreaWeight;
 use super::view::{FlatLight, Outline};
 use crate::light::{Area, AreaShape};
 use crate::math::{DVec3, Vec3};
@@ -60,16 +60,16 @@ impl Emitter {
     }
 
     /// What its places count for.
-    pub fn falloff(&self) -> Falloff {
+    pub fn falloff(&self) -> AreaWeight {
         match (self.outline(), self.is_physical()) {
-            (Outline::Sphere, _) if self.half() == Half::Far => Falloff::SphereInside,
-            (Outline::Sphere, _) => Falloff::Sphere,
-            (_, true) => Falloff::Physical,
+            (Outline::Sphere, _) if self.half() == Half::Far => AreaWeight::SphereInside,
+            (Outline::Sphere, _) => AreaWeight::Sphere,
+            (_, true) => AreaWeight::Physical,
             (_, false) => match self {
                 Emitter::Face { center, radius, .. } => {
-                    Falloff::Around { center: Exact::new(*center), radius: *radius as f32 }
+                    AreaWeight::Around { center: Exact::new(*center), radius: *radius as f32 }
                 }
-                Emitter::Flat(_) | Emitter::Ball { .. } => Falloff::Constant,
+                Emitter::Flat(_) | Emitter::Ball { .. } => AreaWeight::Constant,
             },
         }
     }

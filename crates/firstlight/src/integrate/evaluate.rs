@@ -19,14 +19,14 @@ use std::f32::consts::FRAC_1_SQRT_2;
 
 use fearless_simd::{Level, Simd};
 
-use super::batch::{Block, Members, ShadingPoint, ViewBlock};
+use super::batch::{LaneNumbers, Members, ShadingPoint, ViewBlock};
 use super::classify::{Class, Obstacles, classify};
 use super::emitter::Emitter;
 use super::fit::{Cell, Fits, MOMENTS, Polynomial, coarse, fit};
 use super::grade::{Grades, grade, halves, survey, whole};
 use super::panels::{Between, Blocked, Panel, PanelSums, cut, rows};
 use super::tolerance::{Tolerance, Weight};
-use super::view::{Receiver, View};
+use super::view::{FlatView, Receiver};
 use crate::color::DisplaySteps;
 use crate::material::{Lobe, Moments};
 use crate::math::{LANES, dispatch_wide};
@@ -106,7 +106,7 @@ pub(crate) struct Evaluator {
     /// Point by point.
     views: Vec<ViewBlock>,
     between: Vec<Between>,
-    state: Vec<State>,
+    state: Vec<PointSum>,
     /// Cells to be graded, their grades, and the halves of those that are too wide.
     grading: Vec<Cell>,
     grades: Vec<Grades>,
@@ -128,14 +128,14 @@ pub(crate) struct Evaluator {
     panel_sums: Vec<PanelSums>,
     next_whole: Vec<Cell>,
     next_panels: Vec<Panel>,
-    spare: Vec<Block>,
+    spare: Vec<LaneNumbers>,
     /// Of a part of a ball.
     part: Vec<Arrived>,
 }
 
 /// What is known of one point.
 #[derive(Clone, Copy, Debug, Default)]
-struct State {
+struct PointSum {
     accepted: Moments,
     /// With all that is not accepted yet.
     estimate: Moments,
@@ -225,7 +225,7 @@ impl Evaluator {
         }
         self.between.clear();
         self.state.clear();
-        self.state.resize(points.len(), State::default());
+        self.state.resize(points.len(), PointSum::default());
         self.smooth.clear();
         self.whole.clear();
         self.cut.clear();
@@ -306,7 +306,7 @@ impl Evaluator {
             if let Some(flat) = light.emitter.flat(point.p) {
                 there |= 1 << k;
                 let ShadingPoint { p, error, horizon, ns, wo, .. } = *point;
-                views.set(k, p, &View::new(&flat, &Receiver { p, error, horizon, ns, wo, lobe: *light.lobe }));
+                views.set(k, p, &FlatView::new(&flat, &Receiver { p, error, horizon, ns, wo, lobe: *light.lobe }));
             }
         }
         there
@@ -523,7 +523,7 @@ impl Evaluator {
 }
 
 /// The numbers of the `k`-th of all that was asked in a round, from the block it is in.
-fn lane(block: &[Block; MOMENTS], k: usize) -> [f32; MOMENTS] {
+fn lane(block: &[LaneNumbers; MOMENTS], k: usize) -> [f32; MOMENTS] {
     block.map(|numbers| numbers[k % LANES])
 }
 
@@ -535,7 +535,7 @@ fn fit_error(weight: Weight, fits: &Fits, k: usize) -> [f32; 2] {
 /// Added to the number of a round once the weight is known.
 const WEIGHED: u32 = 1 << 31;
 
-impl State {
+impl PointSum {
     /// Counts on what was asked in a round.
     fn expect(&mut self, sums: [f32; MOMENTS], round: u32) {
         if self.round != round {

@@ -9,7 +9,7 @@
 
 use fearless_simd::{f32x16, prelude::*};
 
-use super::batch::{Block, Exact, Linear16, Members, ViewNumber, Views, ways};
+use super::batch::{Exact, LaneNumbers, Linear16, Members, ViewNumber, Views, ways};
 use crate::material::Lobe;
 use crate::math::{LANES, sin_cos};
 
@@ -115,7 +115,7 @@ const MONOMIALS: [[f32; NODES]; NODES] = matrix(false);
 
 /// What a place of a light counts for, beside the cosine at the surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) enum Falloff {
+pub(crate) enum AreaWeight {
     /// All places alike.
     Constant,
     /// By the square of the distance and the cosine at the light.
@@ -143,12 +143,12 @@ pub(crate) struct Cell {
 /// What sixteen cells send, and how far that can be wrong along x and along y; each for both moments.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Fits {
-    pub sums: [Block; MOMENTS],
-    pub errors: [[Block; MOMENTS]; 2],
+    pub sums: [LaneNumbers; MOMENTS],
+    pub errors: [[LaneNumbers; MOMENTS]; 2],
 }
 
 /// What sixteen cells send at the nodes of a rule: [moment][row][column].
-type Values<S, const N: usize> = [[[f32x16<S>; N]; N]; MOMENTS];
+type NodeValues<S, const N: usize> = [[[f32x16<S>; N]; N]; MOMENTS];
 
 /// What up to sixteen cells send at the nodes of a rule, and what they count for. To be called within `vectorize`.
 #[inline(always)]
@@ -156,10 +156,10 @@ fn values<S: Simd, const N: usize>(
     simd: S,
     rule: &Rule<N>,
     lobe: &Lobe,
-    falloff: Falloff,
+    falloff: AreaWeight,
     members: &Members,
     cells: &[Cell],
-) -> (Values<S, N>, f32x16<S>) {
+) -> (NodeValues<S, N>, f32x16<S>) {
     use ViewNumber::*;
     let splat = |v: f32| simd.splat_f32x16(v);
     let cell =
@@ -180,11 +180,11 @@ fn values<S: Simd, const N: usize>(
     let zero = splat(0.0);
     let height2 = height * height;
     let mut values = [[[zero; N]; N]; MOMENTS];
-    let is_sphere = matches!(falloff, Falloff::Sphere | Falloff::SphereInside);
+    let is_sphere = matches!(falloff, AreaWeight::Sphere | AreaWeight::SphereInside);
     let (ratio, behind2) = (members.lanes(simd, Ratio), members.lanes(simd, Behind2));
     // The way to the middle of a sphere, and the square of the way to where it is touched, as if there were one
     let around = match falloff {
-        Falloff::Around { center, radius } => {
+        AreaWeight::Around { center, radius } => {
             let to = center.seen_from(simd, members.vectors(simd, [Px, Py, Pz]));
             let distance = to.dot(to).sqrt();
             let touch2 = ((distance - radius) * (distance + radius)).min(zero);
@@ -214,9 +214,9 @@ fn values<S: Simd, const N: usize>(
             let along = x * la + along_row;
             let inverse = 1.0 / (along * along + rest).sqrt();
             match falloff {
-                Falloff::Constant => {}
-                Falloff::Physical => weights[i] = inverse * inverse * (inverse * height),
-                Falloff::Around { .. } => {
+                AreaWeight::Constant => {}
+                AreaWeight::Physical => weights[i] = inverse * inverse * (inverse * height),
+                AreaWeight::Around { .. } => {
                     // The square of the way to the sphere, over its cosine there: t^2 |l|^2 and root / (|l| radius)
                     let (to, touch2, size) = around;
                     let (length2, to) = (along * along + rest, to.at(x, y));
@@ -225,13 +225,13 @@ fn values<S: Simd, const N: usize>(
                     let t = to.simd_lt(zero).select(-touch2 / (root - to), (to + root) / length2);
                     weights[i] = t * t * size / root;
                 }
-                Falloff::Sphere | Falloff::SphereInside => {
+                AreaWeight::Sphere | AreaWeight::SphereInside => {
                     // With q = sqrt(1 - x^2 - y^2), the areas of the sphere before and behind a place of the disk are
                     // as 1 / (1 + ratio q)^2 and 1 / (1 - ratio q)^2, over q; and 1 - (ratio q)^2 is |l|^2 over the
                     // square of the way to where the sphere is touched
                     let near = deep[i] * wide * ratio + 1.0;
                     let far = near * (behind2 * inverse * inverse);
-                    let front = if falloff == Falloff::Sphere { 1.0 / (near * near) } else { zero };
+                    let front = if falloff == AreaWeight::Sphere { 1.0 / (near * near) } else { zero };
                     weights[i] = wide * (front + far * far);
                 }
             }
@@ -277,7 +277,7 @@ fn sum<S: Simd, const N: usize>(
 /// last coefficient, or, where that is 0 by chance, as the square of the one before; what nodes miss is the third power
 /// of that, where it is small beside the sum. To be called within `vectorize`.
 #[inline(always)]
-pub(crate) fn coarse<S: Simd>(simd: S, lobe: &Lobe, falloff: Falloff, members: &Members, cells: &[Cell]) -> Fits {
+pub(crate) fn coarse<S: Simd>(simd: S, lobe: &Lobe, falloff: AreaWeight, members: &Members, cells: &[Cell]) -> Fits {
     let (values, area) = values(simd, &COARSE, lobe, falloff, members, cells);
     let mut fits = Fits::default();
     let moments = lobe.moment_count();
@@ -301,7 +301,7 @@ pub(crate) fn coarse<S: Simd>(simd: S, lobe: &Lobe, falloff: Falloff, members: &
 pub(crate) fn fit<S: Simd>(
     simd: S,
     lobe: &Lobe,
-    falloff: Falloff,
+    falloff: AreaWeight,
     members: &Members,
     cells: &[Cell],
     [share, slow_share]: [f32; 2],

@@ -5,7 +5,7 @@ use std::f32::consts::FRAC_PI_2;
 
 use fearless_simd::{f32x16, mask32x16, prelude::*};
 
-use super::batch::{Block, Linear16, Members, ShadingPoint, ViewBlock, ViewNumber, Views, ways};
+use super::batch::{LaneNumbers, Linear16, Members, ShadingPoint, ViewBlock, ViewNumber, Views, ways};
 use super::fit::Cell;
 use super::tolerance::Tolerance;
 use super::view::Outline;
@@ -25,8 +25,8 @@ pub(super) struct Survey {
     pub above_around: u64,
     pub beside_around: u64,
     /// The distance to the nearest place of the light's square, or a little less; and to its plane.
-    pub nearest: Block,
-    pub height: Block,
+    pub nearest: LaneNumbers,
+    pub height: LaneNumbers,
 }
 
 /// Looks at a light from up to sixteen points. To be called within `vectorize`.

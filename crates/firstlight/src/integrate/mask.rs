@@ -2,10 +2,10 @@
 
 use std::cell::Cell;
 
-use super::cells::{self, Sent, Source};
+use super::cells::{self, PointSent, PointSource};
 use super::emitter::Emitter;
 use super::near::Near;
-use super::view::{Outline, View};
+use super::view::{FlatView, Outline};
 use crate::accel::RayPacket16;
 use crate::ids::LightId;
 use crate::material::{Lobe, Moments};
@@ -28,11 +28,11 @@ pub(crate) struct Masked<'a> {
 
 impl Masked<'_> {
     /// What arrives, by cells from the beginning.
-    pub fn by_cells(&self, view: &View, whole: &Moments, enough: &dyn Fn(&Moments, &Moments) -> bool) -> Moments {
+    pub fn by_cells(&self, view: &FlatView, whole: &Moments, enough: &dyn Fn(&Moments, &Moments) -> bool) -> Moments {
         cells::integrate(&self.seen(view), Some(whole), enough).0
     }
 
-    fn seen<'b>(&'b self, view: &'b View) -> Seen<'b> {
+    fn seen<'b>(&'b self, view: &'b FlatView) -> MaskedView<'b> {
         let ball = match self.emitter {
             Emitter::Ball { center, radius, .. } => {
                 let to = *center - self.si.lit_from.as_dvec3();
@@ -40,7 +40,7 @@ impl Masked<'_> {
             }
             _ => None,
         };
-        Seen { masked: self, view, ball, near: Near::new(view) }
+        MaskedView { masked: self, view, ball, near: Near::new(view) }
     }
 
     /// Which of sixteen ways something stands in.
@@ -71,18 +71,18 @@ impl Masked<'_> {
 }
 
 /// A flat light behind things, as one point sees it.
-struct Seen<'a> {
+struct MaskedView<'a> {
     masked: &'a Masked<'a>,
-    view: &'a View,
+    view: &'a FlatView,
     /// Of a ball: the way to its middle, and the square of the way to where it is touched.
     ball: Option<(Vec3, f32)>,
     /// How points are spread over a light that is very near.
     near: Option<Near>,
 }
 
-impl Seen<'_> {
+impl MaskedView<'_> {
     /// What a place of the light would send, if it stands for so much of it.
-    fn point(&self, [x, y]: [f32; 2], part: f32) -> Option<Sent> {
+    fn point(&self, [x, y]: [f32; 2], part: f32) -> Option<PointSent> {
         let view = self.view;
         let (height, cos) = (view.horizon.at(x, y), view.cos.at(x, y));
         if !(height > 0.0 && cos > 0.0) {
@@ -101,7 +101,7 @@ impl Seen<'_> {
                 l * ((b - (b * b - a * cc).max(0.0).sqrt()) / a)
             }
         };
-        Some(Sent { way, sums: moments.0 })
+        Some(PointSent { way, sums: moments.0 })
     }
 
     /// From the unit square, and for how much of the light a place stands.
@@ -123,8 +123,8 @@ impl Seen<'_> {
     }
 }
 
-impl Source for Seen<'_> {
-    fn sent(&self, at: [f32; 2]) -> Option<Sent> {
+impl PointSource for MaskedView<'_> {
+    fn sent(&self, at: [f32; 2]) -> Option<PointSent> {
         let (place, part) = self.place(at);
         self.point(place, part)
     }

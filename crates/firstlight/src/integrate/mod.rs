@@ -31,7 +31,7 @@ pub(crate) use emitter::{BallSides, Emitter};
 pub(crate) use evaluate::{Arrived, Asked, Evaluator, Illumination};
 pub(crate) use mask::Masked;
 pub(crate) use tolerance::Tolerance;
-pub(crate) use view::{Receiver, View};
+pub(crate) use view::{FlatView, Receiver};
 
 #[cfg(test)]
 mod tests;

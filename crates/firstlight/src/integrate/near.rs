@@ -2,7 +2,7 @@
 
 use pxfm::{f_exp, f_log};
 
-use super::view::{Outline, View};
+use super::view::{FlatView, Outline};
 
 /// How the points of the unit square are spread over a light: rows by the hyperbolic sine of their parameter, in the
 /// distance of the point; and places along a row in the same way, in the distance of the row.
@@ -11,7 +11,7 @@ pub(super) struct Near {
     outline: Outline,
     origin: [f64; 2],
     height2: f64,
-    /// Along the light's edges; see [`View`].
+    /// Along the light's edges; see [`FlatView`].
     feet: [f64; 2],
     lengths: [f64; 2],
     skew: f64,
@@ -45,7 +45,7 @@ fn asinh(x: f64) -> f64 {
 
 impl Near {
     /// `None` if the light is not very near, or the point is on it.
-    pub fn new(view: &View) -> Option<Near> {
+    pub fn new(view: &FlatView) -> Option<Near> {
         let distance = f64::from(view.l0.length());
         if !view.is_near || !(distance > 0.0) {
             return None;

@@ -12,9 +12,9 @@
 use arrayvec::ArrayVec;
 use fearless_simd::{f32x16, mask32x16, prelude::*};
 
-use super::batch::{Block, Exact, Members, ViewNumber, Views, ways};
+use super::batch::{Exact, LaneNumbers, Members, ViewNumber, Views, ways};
 use super::breaks::{Breaks, RoundSides};
-use super::cut::{self, Cut, Half};
+use super::cut::{self, BallCut, Half};
 use super::fit::{Cell, MOMENTS, Polynomial};
 use super::occluder::{Occluder, Shadow};
 use super::row::{FAR, Interval16};
@@ -78,9 +78,9 @@ pub(crate) struct Blocked<'a> {
 /// What sixteen panels send, how far both rules differ, and how much of the light's square is seen.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct PanelSums {
-    pub sums: [Block; MOMENTS],
-    pub differences: [Block; MOMENTS],
-    pub seen: Block,
+    pub sums: [LaneNumbers; MOMENTS],
+    pub differences: [LaneNumbers; MOMENTS],
+    pub seen: LaneNumbers,
 }
 
 /// The most intervals of a row that may be hidden from one point: one for each thing, two if it has a hole, more if it
@@ -128,9 +128,9 @@ impl<'a, S: Simd> Batch<'a, S> {
 
     /// The same of one that reaches into a light that is a ball.
     #[inline(always)]
-    fn cut(&self, simd: S, occluder: usize) -> Option<Cut<S>> {
+    fn cut(&self, simd: S, occluder: usize) -> Option<BallCut<S>> {
         let ball = self.blocked.ball.filter(|_| self.blocked.cuts >> occluder & 1 == 1)?;
-        Cut::new(simd, self.occluder(occluder), ball, self.p, &self.l)
+        BallCut::new(simd, self.occluder(occluder), ball, self.p, &self.l)
     }
 
     /// One of them as they see it, and who sees it from outside and from within.
@@ -157,7 +157,7 @@ pub(crate) fn cut<S: Simd>(
     members: &Members,
     cells: &[Cell],
     first: u32,
-    spare: &mut Vec<Block>,
+    spare: &mut Vec<LaneNumbers>,
     panels: &mut Vec<Panel>,
 ) {
     spare.clear();
@@ -183,7 +183,7 @@ pub(crate) fn cut<S: Simd>(
 }
 
 #[inline(always)]
-fn breaks<S: Simd>(simd: S, blocked: &Blocked, members: &Members, cells: &[Cell], rows: &mut Vec<Block>) {
+fn breaks<S: Simd>(simd: S, blocked: &Blocked, members: &Members, cells: &[Cell], rows: &mut Vec<LaneNumbers>) {
     use ViewNumber::*;
     let side = |end: usize| std::array::from_fn::<f32, LANES, _>(|k| cells[k.min(cells.len() - 1)].x[end]);
     let x = [f32x16::simd_from(simd, side(0)), f32x16::simd_from(simd, side(1))];

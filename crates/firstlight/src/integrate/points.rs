@@ -6,15 +6,15 @@ use std::f64::consts::TAU;
 
 use pxfm::{f_exp, f_log, f_sincos};
 
-use super::cells::{self, Highlight, Sent, Source};
+use super::cells::{self, MirrorSpot, PointSent, PointSource};
 use super::mask::Masked;
-use crate::light::{Area, AreaShape, Light, LightKind, Sphere, concentric};
+use crate::light::{Area, AreaShape, Light, LightKind, SphereLight, concentric};
 use crate::material::Moments;
 use crate::math::{DVec3, LANES, Vec3};
 use crate::shape::SurfaceInteraction;
 
 impl Masked<'_> {
-    /// What arrives from a sphere for which there is no [`View`](super::View).
+    /// What arrives from a sphere for which there is no [`FlatView`](super::FlatView).
     pub fn by_points(&self, light: &Light, enough: &dyn Fn(&Moments, &Moments) -> bool) -> Moments {
         let LightKind::Area(Area { shape: AreaShape::Sphere(sphere), physical, both_sides, .. }) = &light.kind else {
             unreachable!("what is flat has a view")
@@ -47,8 +47,8 @@ struct Ways<'a, F> {
     ways: F,
 }
 
-impl<F: Fn([f32; 2]) -> Option<Way>> Source for Ways<'_, F> {
-    fn sent(&self, at: [f32; 2]) -> Option<Sent> {
+impl<F: Fn([f32; 2]) -> Option<Way>> PointSource for Ways<'_, F> {
+    fn sent(&self, at: [f32; 2]) -> Option<PointSent> {
         let Way { way, weight } = (self.ways)(at)?;
         let (inverse, way, weight) = ((1.0 / way.length()) as f32, way.as_vec3(), weight as f32);
         let si = self.masked.si;
@@ -58,15 +58,15 @@ impl<F: Fn([f32; 2]) -> Option<Way>> Source for Ways<'_, F> {
         }
         let cos_i = height * inverse;
         let moments = self.masked.lobe.moments(cos_i, si.ns.dot(si.wo), si.wo.dot(way) * inverse, weight);
-        Some(Sent { way, sums: moments.0 })
+        Some(PointSent { way, sums: moments.0 })
     }
 
-    fn highlight(&self) -> Option<Highlight> {
+    fn highlight(&self) -> Option<MirrorSpot> {
         let SurfaceInteraction { ns, wo, .. } = *self.masked.si;
         let cos_o = ns.dot(wo);
         let sharpness = self.masked.lobe.sharpness(cos_o);
         let spread = 1.0 / (2.0 * sharpness).sqrt();
-        (sharpness > 0.0 && spread < WIDE).then(|| Highlight { way: ns * (2.0 * cos_o) - wo, spread })
+        (sharpness > 0.0 && spread < WIDE).then(|| MirrorSpot { way: ns * (2.0 * cos_o) - wo, spread })
     }
 
     fn hidden(&self, _: &[[f32; 2]; LANES], ways: &[Vec3; LANES], active: u16) -> u16 {
@@ -89,7 +89,7 @@ struct Rings {
 }
 
 impl Rings {
-    fn new(masked: &Masked, sphere: &Sphere, both_sides: bool) -> Self {
+    fn new(masked: &Masked, sphere: &SphereLight, both_sides: bool) -> Self {
         let to = sphere.center - masked.si.lit_from.as_dvec3();
         let (distance, radius) = (to.length(), sphere.radius);
         let axis = (to / -distance).try_normalize().unwrap_or(DVec3::Z);
@@ -129,7 +129,7 @@ struct Directions {
 }
 
 impl Directions {
-    fn new(masked: &Masked, sphere: &Sphere) -> Self {
+    fn new(masked: &Masked, sphere: &SphereLight) -> Self {
         let si = masked.si;
         let to = sphere.center - si.lit_from.as_dvec3();
         let distance = to.length();

@@ -45,7 +45,7 @@ impl Random {
 struct Case {
     light: FlatLight,
     receiver: Receiver,
-    view: View,
+    view: FlatView,
     spheres: Vec<Sphere>,
     flats: Vec<Parallelogram>,
 }
@@ -87,7 +87,7 @@ fn case(seed: u64, things: usize, sharpest: f64) -> Option<Case> {
     let p = Vec3::ZERO;
     let (ns, wo) = (ns.as_vec3(), wo.as_vec3());
     let receiver = Receiver { p, error: ErrorBound(Vec3::ZERO), horizon: ns, ns, wo, lobe };
-    let view = View::new(&light, &receiver);
+    let view = FlatView::new(&light, &receiver);
     if !view.arrives() {
         return None;
     }

@@ -23,7 +23,7 @@ use crate::math::{Vec3x16, sin_cos};
 const PLACES: usize = 18;
 
 /// One of them.
-struct Place {
+struct AroundPlace {
     /// Its angle, as a part of pi, and the cosine of that.
     part: f32,
     cos: f32,
@@ -35,7 +35,7 @@ struct Place {
     apart: [f32; 2],
 }
 
-const AROUND: [Place; PLACES] = {
+const AROUND: [AroundPlace; PLACES] = {
     const STEPS: [(f32, f32); 9] = [
         (1.0 / 96.0, 0.999_464_6),
         (1.0 / 24.0, 0.991_444_9),
@@ -47,7 +47,7 @@ const AROUND: [Place; PLACES] = {
         (23.0 / 24.0, -0.991_444_9),
         (95.0 / 96.0, -0.999_464_6),
     ];
-    const NONE: Place = Place { part: 0.0, cos: 0.0, side: 0.0, before: 0, after: 0, apart: [0.0; 2] };
+    const NONE: AroundPlace = AroundPlace { part: 0.0, cos: 0.0, side: 0.0, before: 0, after: 0, apart: [0.0; 2] };
     let mut all = [NONE; PLACES];
     let mut k = 0;
     while k < PLACES {
@@ -55,7 +55,7 @@ const AROUND: [Place; PLACES] = {
         let (part, cos) = if k < 9 { STEPS[k] } else { STEPS[17 - k] };
         let (part, side) = if k < 9 { (part, 1.0) } else { (2.0 - part, -1.0) };
         let (before, after) = ((k + PLACES - 1) % PLACES, (k + 1) % PLACES);
-        all[k] = Place { part, cos, side, before, after, apart: [0.0; 2] };
+        all[k] = AroundPlace { part, cos, side, before, after, apart: [0.0; 2] };
         k += 1;
     }
     k = 0;
@@ -176,7 +176,7 @@ impl<S: Simd> TorusShadow<S> {
         let mut places = [[zero; 2]; PLACES];
         let mut on_row = [zero; PLACES];
         let mut all = zero.simd_eq(zero);
-        for (k, Place { cos, side, .. }) in AROUND.iter().enumerate() {
+        for (k, AroundPlace { cos, side, .. }) in AROUND.iter().enumerate() {
             let cos = plane.half * *cos + plane.middle;
             places[k] = self.place(simd, plane, cos, mirror, simd.splat_f32x16(*side));
             on_row[k] = places[k][1] / places[k][0].max(simd.splat_f32x16(AHEAD));
@@ -217,7 +217,7 @@ impl<S: Simd> TorusShadow<S> {
     ) -> f32x16<S> {
         let (zero, far) = (simd.splat_f32x16(0.0), simd.splat_f32x16(FAR));
         let (mut x, mut s) = ([zero, far, zero], [zero; 3]);
-        for (k, Place { part, before, after, apart, .. }) in AROUND.iter().enumerate() {
+        for (k, AroundPlace { part, before, after, apart, .. }) in AROUND.iter().enumerate() {
             let here = on_row[k] * sign;
             let is = is_between(places[k][0]) & here.simd_lt(x[1]);
             x[0] = is.select(on_row[*before] * sign, x[0]);

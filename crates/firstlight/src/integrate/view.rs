@@ -130,7 +130,7 @@ pub(super) const NEAR: f32 = 0.03;
 /// Distances are computed in a frame of the light's plane, where nothing cancels near it:
 /// |l|^2 = (fa + la x + skew y)^2 + (fb + lb y)^2 + height^2.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct View {
+pub(crate) struct FlatView {
     /// Whether places are counted from the nearest.
     pub is_near: bool,
     /// Where they are counted from, from the middle.
@@ -169,14 +169,14 @@ pub(crate) struct View {
     pub behind2: f32,
 }
 
-impl View {
-    pub fn new(light: &FlatLight, at: &Receiver) -> View {
+impl FlatView {
+    pub fn new(light: &FlatLight, at: &Receiver) -> FlatView {
         let l0 = (light.c - at.p.as_dvec3()).as_vec3();
         let side = -light.n.dot(l0);
         let linear = |v: Vec3| Linear { c: v.dot(l0), x: v.dot(light.a), y: v.dot(light.b) };
         let (cos, mut horizon) = (linear(at.ns), linear(at.horizon));
         horizon.c -= at.horizon.abs().dot(way_error(light.c.as_vec3(), light.a.abs() + light.b.abs(), at.p, at.error));
-        let view = View {
+        let view = FlatView {
             is_near: false,
             origin: [0.0; 2],
             x: [-1.0, 1.0],
@@ -208,7 +208,7 @@ impl View {
     }
 
     /// The same with places counted from the nearest.
-    fn near(self, light: &FlatLight, at: &Receiver) -> View {
+    fn near(self, light: &FlatLight, at: &Receiver) -> FlatView {
         let [a, b, n] = light.deep;
         let middle = light.c - at.p.as_dvec3();
         let (ua, ub) = (a.normalize(), (b - a * (a.dot(b) / a.length_squared())).normalize());
@@ -232,7 +232,7 @@ impl View {
         };
         let mut horizon = linear(at.horizon);
         horizon.c -= at.horizon.abs().dot(at.error.0 + l0.abs().as_vec3() * UNIT_ROUNDOFF);
-        View {
+        FlatView {
             is_near: true,
             origin: [x as f32, y as f32],
             x: [(-1.0 - x) as f32, (1.0 - x) as f32],

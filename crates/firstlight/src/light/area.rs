@@ -7,7 +7,8 @@ use std::sync::{Arc, OnceLock};
 use fearless_simd::{f32x16, prelude::*};
 
 use super::{
-    Disk, EmitSides, Falloff, Light, LightKind, Rectangle, SampleSet, Sphere, point_of_series, scaled, way_error,
+    DiskLight, EmitSides, Falloff, Light, LightKind, Rectangle, SampleSet, SphereLight, point_of_series, scaled,
+    way_error,
 };
 use crate::color::Rgb;
 use crate::context::{CompileContext, show};
@@ -59,8 +60,8 @@ macro_rules! area_table {
 
         impl $name {
             /// What it says that every area light can say.
-            pub(super) fn emitter(&self) -> $crate::light::area::Emitter {
-                $crate::light::area::Emitter {
+            pub(super) fn emitter(&self) -> $crate::light::area::AreaCommon {
+                $crate::light::area::AreaCommon {
                     color: self.color,
                     strength: self.strength,
                     falloff: self.falloff,
@@ -111,7 +112,7 @@ const MIN_DISTANCE: f64 = 1e-9;
 
 /// What every area light says beside its name and its shape.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Emitter {
+pub(super) struct AreaCommon {
     pub color: ColorDesc,
     pub strength: f64,
     pub falloff: Falloff,
@@ -132,7 +133,7 @@ pub(crate) fn check_samples(cx: &mut CompileContext, samples: SamplesDesc, hint:
     samples
 }
 
-impl Emitter {
+impl AreaCommon {
     /// Whether both sides emit.
     pub fn both_sides(&self) -> bool {
         match self.sides {
@@ -237,9 +238,9 @@ pub enum AreaShape {
     /// `[[light.rectangle]]`; a transform can make a parallelogram of it.
     Rectangle(Rectangle),
     /// `[[light.disk]]`
-    Disk(Disk),
+    Disk(DiskLight),
     /// `[[light.sphere]]`
-    Sphere(Sphere),
+    Sphere(SphereLight),
 }
 
 impl AreaShape {
@@ -250,7 +251,7 @@ impl AreaShape {
             AreaShape::Rectangle(rectangle) => (rectangle.point(uv), None),
             AreaShape::Disk(disk) => (disk.point(uv), None),
             AreaShape::Sphere(sphere) => {
-                let n = Sphere::normal(uv);
+                let n = SphereLight::normal(uv);
                 (sphere.center + n * sphere.radius, Some(n))
             }
         }

@@ -44,7 +44,7 @@ pub(crate) struct Shine {
 
 /// How a zone sees what shines.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Sight {
+pub(crate) struct ZoneSight {
     /// What a light of strength 1 sends, at most: before the cosine at the surface, and with it, and with the
     /// highlight.
     pub weight: f32,
@@ -60,9 +60,9 @@ pub(crate) struct Sight {
     pub width: f32,
 }
 
-impl Sight {
+impl ZoneSight {
     /// Of what sends nothing.
-    const NOTHING: Sight = Sight {
+    const NOTHING: ZoneSight = ZoneSight {
         weight: 0.0,
         diffuse: 0.0,
         highlight: Highlight { most: 0.0, slope: 0.0, curve: 0.0 },
@@ -168,7 +168,7 @@ impl Shine {
     }
 
     /// How a zone sees it.
-    pub fn sight(&self, zone: &Zone) -> Sight {
+    pub fn sight(&self, zone: &Zone) -> ZoneSight {
         if self.sends == Sends::Parallel {
             return self.parallel(zone);
         }
@@ -186,7 +186,7 @@ impl Shine {
         let shift = spread.plus(zone.turn);
         let (steepest, flattest) = (off.minus(shift).cos + COS_ROOM, off.plus(shift).cos - COS_ROOM);
         if steepest <= 0.0 {
-            return Sight::NOTHING;
+            return ZoneSight::NOTHING;
         }
         // At the light
         let away = Arc::between(-d, self.axis);
@@ -216,7 +216,7 @@ impl Shine {
             Sends::Parallel => unreachable!("seen to before"),
         }
         if emits == 0.0 {
-            return Sight::NOTHING;
+            return ZoneSight::NOTHING;
         }
         let far = (distance + reach) * ROOM;
         let (weight, least) = if self.constant {
@@ -227,17 +227,17 @@ impl Shine {
         let weight = (weight * ROOM).min(MOST);
         let diffuse = weight * steepest.min(1.0);
         let highlight = zone.highlight(d, spread);
-        Sight { weight, diffuse, highlight, least: least * flattest.max(0.0), near, whole, width }
+        ZoneSight { weight, diffuse, highlight, least: least * flattest.max(0.0), near, whole, width }
     }
 
-    fn parallel(&self, zone: &Zone) -> Sight {
+    fn parallel(&self, zone: &Zone) -> ZoneSight {
         let d = self.low;
         let off = Arc::between(d, zone.n);
         let (steepest, flattest) = (off.minus(zone.turn).cos + COS_ROOM, off.plus(zone.turn).cos - COS_ROOM);
         if steepest <= 0.0 {
-            return Sight::NOTHING;
+            return ZoneSight::NOTHING;
         }
-        Sight {
+        ZoneSight {
             weight: ROOM,
             diffuse: steepest.min(1.0) * ROOM,
             highlight: zone.highlight(d, Arc::ZERO),

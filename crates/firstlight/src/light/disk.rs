@@ -8,8 +8,8 @@ use super::Light;
 use super::area::{AreaShape, area_table, front};
 use crate::context::{CompileContext, show};
 use crate::describe::SamplesDesc;
-use crate::math::{DRay, DVec3, Frame, Ray};
-use crate::shape::Disk as DiskShape;
+use crate::math::{Axes, DRay, DVec3, Ray};
+use crate::shape::Disk;
 use crate::transform::TransformDesc;
 
 area_table! {
@@ -45,7 +45,7 @@ area_table! {
 
 /// The shape of a disk light, in world space.
 #[derive(Clone, Copy, Debug)]
-pub struct Disk {
+pub struct DiskLight {
     /// The middle.
     pub center: DVec3,
     /// Unit normal of the front.
@@ -57,7 +57,7 @@ pub struct Disk {
     /// The length of `a` and of `b`.
     pub radius: f64,
     /// What the camera sees, and what stands in the way of other lights if it blocks.
-    pub(crate) shape: DiskShape,
+    pub(crate) shape: Disk,
     /// Whether camera rays pass through from behind.
     single_sided: bool,
 }
@@ -92,7 +92,7 @@ impl DiskLightDesc {
     pub(crate) fn compile(&self, cx: &mut CompileContext, samples: SamplesDesc) -> Light {
         cx.point("center", self.center);
         let mut frame =
-            Frame::around(DVec3::from(front(cx, self.center, self.look_at, self.normal)).normalize_or(DVec3::Y));
+            Axes::around(DVec3::from(front(cx, self.center, self.look_at, self.normal)).normalize_or(DVec3::Y));
         let mut radius = self.radius(cx);
         let mut center = DVec3::from(self.center);
         if let Some(world_from_object) = TransformDesc::compile_field(self.transform.as_deref(), cx) {
@@ -109,16 +109,16 @@ impl DiskLightDesc {
             }
             let n = x.cross(y).normalize_or(frame.z) * world_from_object.matrix3.determinant().signum();
             let x = x.normalize_or(frame.x);
-            (radius, frame) = (long, Frame { x, y: n.cross(x), z: n });
+            (radius, frame) = (long, Axes { x, y: n.cross(x), z: n });
         }
         let (emitter, center) = (self.emitter(), cx.local(center));
-        let disk = Disk {
+        let disk = DiskLight {
             center,
             n: frame.z,
             a: frame.x * radius,
             b: frame.y * radius,
             radius,
-            shape: DiskShape::new(center, frame, radius),
+            shape: Disk::new(center, frame, radius),
             single_sided: !emitter.both_sides(),
         };
         emitter.compile(cx, AreaShape::Disk(disk), samples)
@@ -135,7 +135,7 @@ pub(crate) fn concentric([x, y]: [f64; 2]) -> [f64; 2] {
     [r * cos, r * sin]
 }
 
-impl Disk {
+impl DiskLight {
     /// The point that stands for `uv` of the unit square: squares around its middle become circles.
     ///
     /// Source: Shirley, Chiu, "A low distortion map between disk and square", Journal of Graphics Tools 2(3), 1997.

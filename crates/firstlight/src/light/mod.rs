@@ -21,16 +21,16 @@ use crate::transform::TransformDesc;
 pub use area::{Area, AreaShape};
 pub use directional::{Directional, DirectionalDesc};
 pub(crate) use disk::concentric;
-pub use disk::{Disk, DiskLightDesc};
+pub use disk::{DiskLight, DiskLightDesc};
 pub use point::{Point, PointDesc};
 pub use rectangle::{Rectangle, RectangleDesc};
 pub use samples::SampleSet;
 pub(crate) use samples::{SERIES, point_of_series, series_by_cell};
-pub use sphere::{Sphere, SphereLightDesc};
+pub use sphere::{SphereLight, SphereLightDesc};
 pub use spot::{Spot, SpotDesc};
 
 pub(crate) use area::{Points, check_samples};
-pub(crate) use bound::{Sends, Sight};
+pub(crate) use bound::{Sends, ZoneSight};
 pub(crate) use tree::{Held, LightNode, LightTree, Sent};
 pub(crate) use zone::Zone;
 

@@ -9,7 +9,7 @@ use super::area::{AreaShape, area_table};
 use crate::context::{CompileContext, show};
 use crate::describe::SamplesDesc;
 use crate::math::DVec3;
-use crate::shape::{Sphere as SphereShape, SphereUv};
+use crate::shape::{Sphere, SphereUv};
 use crate::transform::TransformDesc;
 
 area_table! {
@@ -37,13 +37,13 @@ area_table! {
 
 /// The shape of a sphere light, in world space.
 #[derive(Clone, Copy, Debug)]
-pub struct Sphere {
+pub struct SphereLight {
     /// The centre.
     pub center: DVec3,
     /// The radius.
     pub radius: f64,
     /// What the camera sees, and what stands in the way of other lights if it blocks.
-    pub(crate) shape: SphereShape,
+    pub(crate) shape: Sphere,
 }
 
 /// A transform whose axes are farther from right angles than this sine, or whose lengths have a larger relative
@@ -74,12 +74,12 @@ impl SphereLightDesc {
         }
         let (emitter, center) = (self.emitter(), cx.local(center));
         let single_sided = !emitter.both_sides();
-        let shape = SphereShape { c: center, r: radius, uv: SphereUv::Equirectangular, single_sided };
-        emitter.compile(cx, AreaShape::Sphere(Sphere { center, radius, shape }), samples)
+        let shape = Sphere { c: center, r: radius, uv: SphereUv::Equirectangular, single_sided };
+        emitter.compile(cx, AreaShape::Sphere(SphereLight { center, radius, shape }), samples)
     }
 }
 
-impl Sphere {
+impl SphereLight {
     /// The outward unit normal of the point that stands for `uv` of the unit square: rings of equal height have equal
     /// areas, as Archimedes found.
     pub(super) fn normal([a, b]: [f64; 2]) -> DVec3 {

@@ -10,7 +10,7 @@
 //!
 //! Nothing here depends on the camera: what a node stands for is settled when the tree is built.
 
-use super::bound::{MOST, Sends, Shine, Sight};
+use super::bound::{MOST, Sends, Shine, ZoneSight};
 use super::{AreaShape, Light, LightKind};
 use crate::color::Rgb;
 use crate::material::{Colors, Lobe, Moments};
@@ -108,9 +108,9 @@ impl LightTree {
     }
 
     /// Grows the node of some lights, and says which it is and which lights it holds, in its order.
-    fn grow(&mut self, lights: &[Light], seeds: &mut [Seed]) -> (u32, Vec<Source>) {
+    fn grow(&mut self, lights: &[Light], seeds: &mut [Seed]) -> (u32, Vec<TreeLight>) {
         if let [seed] = seeds {
-            let source = Source::of(seed.light, &lights[seed.light as usize], seed.shine);
+            let source = TreeLight::of(seed.light, &lights[seed.light as usize], seed.shine);
             let sources = vec![source];
             let held = Held::Light(seed.light);
             let one = self.nodes.len() as u32;
@@ -156,7 +156,7 @@ fn chance(place: u64) -> f64 {
 
 /// One light, as its nodes count it.
 #[derive(Clone, Copy)]
-struct Source {
+struct TreeLight {
     power: Rgb,
     at: Vec3,
     n: Vec3,
@@ -167,8 +167,8 @@ struct Source {
     shadows: bool,
 }
 
-impl Source {
-    fn of(_: u32, light: &Light, shine: Shine) -> Source {
+impl TreeLight {
+    fn of(_: u32, light: &Light, shine: Shine) -> TreeLight {
         let (_, strength) = Shine::of(light);
         let product = |v: DVec3| [v.x * v.x, v.y * v.y, v.z * v.z, v.x * v.y, v.y * v.z, v.z * v.x];
         let sum = |a: DVec3, b: DVec3, factor: f64| {
@@ -190,7 +190,7 @@ impl Source {
         };
         let at = if shine.sends == Sends::Parallel { shine.low } else { shine.ball().0 };
         let power = light.intensity * strength;
-        Source { power, at, n: shine.axis, own, reach, shadows: light.shadows }
+        TreeLight { power, at, n: shine.axis, own, reach, shadows: light.shadows }
     }
 }
 
@@ -200,7 +200,7 @@ fn channels(color: Rgb) -> [f32; 3] {
 }
 
 impl LightNode {
-    fn of(shine: Shine, held: Held, sources: &[Source]) -> LightNode {
+    fn of(shine: Shine, held: Held, sources: &[TreeLight]) -> LightNode {
         let (mut middle, mut facing) = ([Vec3::ZERO; 3], [Vec3::ZERO; 3]);
         let (mut power, mut spread, mut cubes, mut cross) = ([0.0f32; 3], [0.0f32; 3], [0.0f32; 3], [0.0f32; 3]);
         let mut square = [[0.0f32; 6]; 3];
@@ -286,13 +286,13 @@ impl LightNode {
     }
 
     /// What its lights send at most, as `sight` says, whatever stands in the way.
-    pub fn most(&self, sight: &Sight) -> Sent {
+    pub fn most(&self, sight: &ZoneSight) -> Sent {
         let cut = |color: Rgb| Rgb::new(color.r.min(MOST), color.g.min(MOST), color.b.min(MOST));
         Moments::bounds(sight.diffuse, sight.weight * sight.highlight.most).colors(|most| cut(self.power * most))
     }
 
     /// How far what [`send`](Self::send) says can be from what its lights send, where a zone sees all of them whole.
-    pub fn error(&self, sight: &Sight) -> Sent {
+    pub fn error(&self, sight: &ZoneSight) -> Sent {
         if self.spread.is_black() {
             return Sent::BLACK;
         }

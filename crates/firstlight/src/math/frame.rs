@@ -4,7 +4,7 @@ use super::DVec3;
 
 /// Three unit vectors at right angles, x cross y = z. In f64, and exact where they are axes of the world.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Frame {
+pub(crate) struct Axes {
     pub x: DVec3,
     pub y: DVec3,
     pub z: DVec3,
@@ -16,13 +16,13 @@ const NEAR_X: f64 = 0.9;
 /// A direction whose sine with another is smaller than this is parallel to it.
 const MIN_SINE: f64 = 1e-6;
 
-impl Frame {
+impl Axes {
     /// For what is round about `axis` (unit): z is the axis, x is where angles are counted from: world +x, or world +y
     /// where the axis is within 26 degrees of +x or -x, made perpendicular to the axis.
     pub fn around(axis: DVec3) -> Self {
         let from = if axis.x.abs() > NEAR_X { DVec3::Y } else { DVec3::X };
         let x = (from - axis * axis.dot(from)).normalize_or(DVec3::X);
-        Frame { x, y: axis.cross(x), z: axis }
+        Axes { x, y: axis.cross(x), z: axis }
     }
 
     /// For what is flat and faces `normal` (unit): z is the normal, y is `up` made perpendicular to it, x is to the
@@ -35,7 +35,7 @@ impl Frame {
             let x = up.cross(normal);
             (x.length() > MIN_SINE * up.length()).then(|| {
                 let x = x.normalize();
-                Frame { x, y: normal.cross(x), z: normal }
+                Axes { x, y: normal.cross(x), z: normal }
             })
         };
         match up {
@@ -76,25 +76,25 @@ mod tests {
     #[test]
     fn frames_are_right_handed_and_exact_along_the_axes() {
         for axis in [DVec3::X, DVec3::Y, DVec3::Z, DVec3::NEG_X, DVec3::NEG_Y, DVec3::new(1.0, 2.0, -3.0).normalize()] {
-            for frame in [Frame::around(axis), Frame::facing(axis, None).expect("there is always an up")] {
+            for frame in [Axes::around(axis), Axes::facing(axis, None).expect("there is always an up")] {
                 assert_eq!(frame.z, axis);
                 assert!((frame.x.cross(frame.y) - frame.z).length() < 1e-15);
                 let v = DVec3::new(0.3, -4.0, 5.5);
                 assert!((frame.world(frame.local(v)) - v).length() < 1e-14);
             }
         }
-        let upright = Frame::around(DVec3::Y);
+        let upright = Axes::around(DVec3::Y);
         assert_eq!((upright.x, upright.y), (DVec3::X, DVec3::NEG_Z));
     }
 
     #[test]
     fn flat_things_stand_upright() {
-        let of = |n| Frame::facing(n, None).map(|f| (f.x, f.y)).expect("there is always an up");
+        let of = |n| Axes::facing(n, None).map(|f| (f.x, f.y)).expect("there is always an up");
         assert_eq!(of(DVec3::Z), (DVec3::X, DVec3::Y));
         assert_eq!(of(DVec3::X), (DVec3::NEG_Z, DVec3::Y));
         assert_eq!(of(DVec3::NEG_Z), (DVec3::NEG_X, DVec3::Y));
         assert_eq!(of(DVec3::Y), (DVec3::X, DVec3::NEG_Z));
         assert_eq!(of(DVec3::NEG_Y), (DVec3::X, DVec3::Z));
-        assert!(Frame::facing(DVec3::Y, Some(DVec3::NEG_Y)).is_none());
+        assert!(Axes::facing(DVec3::Y, Some(DVec3::NEG_Y)).is_none());
     }
 }

@@ -13,7 +13,7 @@ mod sum;
 mod trig;
 
 pub(crate) use arc::Arc;
-pub(crate) use frame::Frame;
+pub(crate) use frame::Axes;
 pub(crate) use lanes::{Vec3x16, dispatch_wide};
 pub(crate) use origin::origin_for;
 pub(crate) use pow::Exponent;

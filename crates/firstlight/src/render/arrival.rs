@@ -18,14 +18,14 @@ use super::together::Together;
 use crate::color::{DisplaySteps, Rgb};
 use crate::ids::LightId;
 use crate::integrate::{
-    Arrived, Asked, BallSides, Emitter, Evaluator, Illumination, Masked, Obstacles, Receiver, ShadingPoint, View,
+    Arrived, Asked, BallSides, Emitter, Evaluator, FlatView, Illumination, Masked, Obstacles, Receiver, ShadingPoint,
 };
 use crate::light::{Area, AreaShape, LightKind, LightTree};
 use crate::material::{Bsdf, Lobe, Moments};
 use crate::math::LANES;
 use crate::scene::Scene;
 use crate::shape::SurfaceInteraction;
-use crate::visibility::{Occluders, Settler, Shaft, View as ShadowView, Viewpoint, Visibility};
+use crate::visibility::{Occluders, Settler, ShadowView, Shaft, Viewpoint, Visibility};
 
 pub(crate) use place::ArrivalPlace;
 
@@ -51,7 +51,7 @@ pub(super) enum Past {
 
 /// What one place sees of an area light that is integrated.
 #[derive(Clone, Copy, Debug)]
-pub(crate) enum Seen {
+pub(crate) enum Sighting {
     /// This arrives.
     Known(Moments),
     /// Things are in the way; points of the light have to be asked. This would arrive if nothing were, if that is
@@ -74,7 +74,7 @@ pub(crate) struct Arrivals<'a> {
     evaluator: Evaluator,
     arrived: Vec<Arrived>,
     points: Vec<ShadingPoint>,
-    seen: Vec<(Change, Seen)>,
+    seen: Vec<(Change, Sighting)>,
     found: Vec<Arrival>,
     /// What of trees is in the way of one place.
     near: Obstacles<'a>,
@@ -181,12 +181,12 @@ impl<'a> Arrivals<'a> {
         &mut self,
         index: usize,
         place: &ArrivalPlace,
-        (change, seen): (Change, Seen),
+        (change, seen): (Change, Sighting),
         counts: &mut Counts,
     ) -> Arrival {
         match seen {
-            Seen::Known(sums) => change.with(sums),
-            Seen::Behind(whole) => change.with(self.one(index, place, whole, counts)),
+            Sighting::Known(sums) => change.with(sums),
+            Sighting::Behind(whole) => change.with(self.one(index, place, whole, counts)),
         }
     }
 
@@ -240,10 +240,10 @@ impl<'a> Arrivals<'a> {
         place.reflected.each(&sums)
     }
 
-    fn view(&self, emitter: &Emitter, place: &ArrivalPlace) -> Option<View> {
+    fn view(&self, emitter: &Emitter, place: &ArrivalPlace) -> Option<FlatView> {
         let si = place.si;
         let flat = emitter.flat(si.lit_from)?;
-        Some(View::new(
+        Some(FlatView::new(
             &flat,
             &Receiver { p: si.lit_from, error: si.error, horizon: si.horizon, ns: si.ns, wo: si.wo, lobe: *place.lobe },
         ))
@@ -255,13 +255,13 @@ impl<'a> Arrivals<'a> {
         &mut self,
         index: usize,
         places: &[ArrivalPlace],
-        found: &mut Vec<(Change, Seen)>,
+        found: &mut Vec<(Change, Sighting)>,
         counts: &mut Counts,
     ) {
         let (scene, lights) = (self.scene, self.lights);
         let Some(emitter) = &lights.emitters[index] else { unreachable!("lights that are sampled have no cells") };
         found.clear();
-        found.resize(places.len(), (Change::NONE, Seen::Known(Moments::default())));
+        found.resize(places.len(), (Change::NONE, Sighting::Known(Moments::default())));
         // Those that are asked: past what nothing in trees is added to, and without shadows
         let mut asked: [Vec<u32>; 2] = Default::default();
         let mut next = 0;
@@ -304,7 +304,7 @@ impl<'a> Arrivals<'a> {
                 Trees::Nothing => asked[0].extend(from as u32..next as u32),
                 Trees::Unknown => {
                     asked[1].push(from as u32);
-                    found[from].1 = Seen::Behind(None);
+                    found[from].1 = Sighting::Behind(None);
                 }
             }
         }
@@ -314,11 +314,11 @@ impl<'a> Arrivals<'a> {
             self.ask(index, emitter, numbers.iter().map(|k| &places[*k as usize]), [shadows, false], &mut arrived);
             for (k, arrived) in numbers.iter().zip(&arrived) {
                 let (k, mut arrived) = (*k as usize, *arrived);
-                if matches!(found[k].1, Seen::Behind(_)) && arrived.illumination != Illumination::Below {
+                if matches!(found[k].1, Sighting::Behind(_)) && arrived.illumination != Illumination::Below {
                     arrived.motion = f32::INFINITY;
                     let whole = (arrived.illumination != Illumination::Unknown).then_some(arrived.sums);
                     counts.settled.visibility[Visibility::Mask as usize] += 1;
-                    found[k] = (self.change(index, &places[k], &arrived), Seen::Behind(whole));
+                    found[k] = (self.change(index, &places[k], &arrived), Sighting::Behind(whole));
                 } else {
                     found[k] = self.found(index, &places[k], arrived, counts);
                 }
@@ -356,16 +356,16 @@ impl<'a> Arrivals<'a> {
         place: &ArrivalPlace,
         mut arrived: Arrived,
         counts: &mut Counts,
-    ) -> (Change, Seen) {
+    ) -> (Change, Sighting) {
         counts.note(arrived.illumination);
         if arrived.illumination == Illumination::Unknown {
             counts.settled.visibility[Visibility::Mask as usize] += 1;
             arrived.motion = f32::INFINITY;
             let whole = self.wholes(index, std::slice::from_ref(place))[0];
             let whole = (whole.illumination != Illumination::Unknown).then_some(whole.sums);
-            return (self.change(index, place, &arrived), Seen::Behind(whole));
+            return (self.change(index, place, &arrived), Sighting::Behind(whole));
         }
-        (self.change(index, place, &arrived), Seen::Known(arrived.sums))
+        (self.change(index, place, &arrived), Sighting::Known(arrived.sums))
     }
 
     /// How a light that is integrated changes over a patch.

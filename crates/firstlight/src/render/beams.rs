@@ -15,7 +15,7 @@ use crate::scene::{Scene, ShadowRays};
 use crate::visibility::Viewpoint;
 
 /// A place that asks for its points of a light.
-pub(super) struct Beam<'a> {
+pub(super) struct RungRays<'a> {
     pub point: Viewpoint,
     pub rung: &'a Rung,
     /// What is found: a bit for each point that is hidden, in the light's order.
@@ -96,7 +96,7 @@ impl Packet {
 
 /// Finds what points things in trees hide from some places, all of which ask as many. What is below a place's horizon
 /// is not asked.
-pub(super) fn trace(scene: &Scene, light: LightId, beams: &mut [Beam]) -> Traced {
+pub(super) fn trace(scene: &Scene, light: LightId, beams: &mut [RungRays]) -> Traced {
     let mut traced = Traced::default();
     let Some(first) = beams.first() else { return traced };
     let cells = first.rung.by_cell.len();
@@ -105,12 +105,12 @@ pub(super) fn trace(scene: &Scene, light: LightId, beams: &mut [Beam]) -> Traced
         beam.hidden.clear();
         beam.hidden.resize(cells.div_ceil(LANES), 0);
     }
-    let note = |beams: &mut [Beam], place: u32, k: u32| {
+    let note = |beams: &mut [RungRays], place: u32, k: u32| {
         beams[place as usize].hidden[k as usize / LANES] |= 1 << (k as usize % LANES);
     };
     for cell in 0..cells {
         for place in 0..beams.len() {
-            let Beam { point, rung, .. } = &beams[place];
+            let RungRays { point, rung, .. } = &beams[place];
             let k = usize::from(rung.by_cell[cell]);
             let l = rung.points.get(k) - point.p;
             if point.horizon.dot(l) > 0.0 && packet.add(place as u32, point, l, k as u32) {

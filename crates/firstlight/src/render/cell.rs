@@ -24,7 +24,7 @@ use super::film::FilmTile;
 use super::fragment::{Contrast, Fragment, Fragments, Member, Quadrant, RayHit};
 use super::grid::{Block, Grid, SETS_IN};
 use super::hits::{PixelHits, PixelRays};
-use super::light_queue::{Answer, LightQueue, Place, Request, Sight};
+use super::light_queue::{Answer, LightQueue, LitPlace, Request, Sight};
 use super::many::Many;
 use super::resolve::{LightTerm, PixelTerms};
 use super::solo::{self, Candidate};
@@ -59,7 +59,7 @@ const MINGLED: f32 = 0.4;
 
 /// What is known of a pixel.
 #[derive(Clone, Copy, Debug, PartialEq)]
-enum State {
+enum PixelState {
     /// Its colour, or that nobody asks for it.
     Done,
     /// It is in this of the blocks.
@@ -96,7 +96,7 @@ pub(crate) struct Cells<'a> {
     near: [Vec<Candidate>; DEPTHS],
     corner: [u32; 2],
     /// Pixel by pixel of the cell.
-    states: Vec<State>,
+    states: Vec<PixelState>,
     colors: Vec<[f32; 4]>,
     work: Vec<f32>,
     blocks: Vec<Block>,
@@ -108,7 +108,7 @@ pub(crate) struct Cells<'a> {
     terms: Vec<LightTerm>,
     few: usize,
     grid: Grid,
-    places: Vec<Place>,
+    places: Vec<LitPlace>,
     requests: Vec<Request>,
     answers: Vec<Answer>,
     fragments: Fragments,
@@ -140,7 +140,7 @@ impl<'a> Cells<'a> {
             listed: solo::all(scene),
             near: Default::default(),
             corner: [0; 2],
-            states: vec![State::Done; PIXELS],
+            states: vec![PixelState::Done; PIXELS],
             colors: vec![[0.0; 4]; PIXELS],
             work: vec![0.0; PIXELS],
             blocks: Vec::new(),
@@ -201,7 +201,7 @@ impl<'a> Cells<'a> {
 
     fn begin(&mut self, corner: [u32; 2]) {
         self.corner = corner;
-        self.states.fill(State::Done);
+        self.states.fill(PixelState::Done);
         self.work.fill(0.0);
         self.blocks.clear();
         self.patchwork.clear();
@@ -230,7 +230,7 @@ impl<'a> Cells<'a> {
         let size = [(scene.width - x).min(CELL), (scene.height - y).min(CELL)];
         for at in (Square { x, y, side: CELL }).pixels().filter(|[i, j]| *i < scene.width && *j < scene.height) {
             let index = self.index(at);
-            if let State::Only(only) = self.states[index] {
+            if let PixelState::Only(only) = self.states[index] {
                 self.trace(at, &[only], counts);
             }
         }
@@ -266,9 +266,9 @@ impl<'a> Cells<'a> {
         for at in (Square { x, y, side: CELL }).pixels().filter(|[i, j]| *i < scene.width && *j < scene.height) {
             let index = self.index(at);
             let (only, even) = match self.states[index] {
-                State::Done | State::Traced => continue,
-                State::Only(only) => (only, None),
-                State::Block(block) => {
+                PixelState::Done | PixelState::Traced => continue,
+                PixelState::Only(only) => (only, None),
+                PixelState::Block(block) => {
                     let Block { square, of, bsdf, first } = self.blocks[block as usize];
                     if first.is_some_and(|first| self.is_told(at, square, first)) {
                         continue;
@@ -319,7 +319,7 @@ impl<'a> Cells<'a> {
             let first = self.index([x, j]);
             for (k, color) in colors.iter().enumerate().take(columns).filter(|(k, _)| told[*k]) {
                 self.colors[first + k] = [color.r, color.g, color.b, 1.0];
-                self.states[first + k] = State::Done;
+                self.states[first + k] = PixelState::Done;
             }
         }
     }
@@ -349,7 +349,7 @@ impl<'a> Cells<'a> {
             return false;
         }
         self.colors[index] = [color.r, color.g, color.b, 1.0];
-        self.states[index] = State::Done;
+        self.states[index] = PixelState::Done;
         true
     }
 

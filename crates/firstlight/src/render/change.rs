@@ -1,7 +1,7 @@
 //! What of one light arrives at a place, and how much that bends over the patch around it.
 
 use super::arrival::ArrivalPlace;
-use crate::integrate::{Arrived, BallSides, Emitter, Illumination, View};
+use crate::integrate::{Arrived, BallSides, Emitter, FlatView, Illumination};
 use crate::material::{Lobe, Moments};
 use crate::math::{Vec3, square};
 
@@ -88,7 +88,7 @@ pub(super) fn unseen(emitter: &Emitter, place: &ArrivalPlace) -> Change {
 }
 
 /// What arrives on a patch whose middle sees nothing of a light, at most.
-pub(super) fn horizon_change(view: &View, place: &ArrivalPlace) -> Change {
+pub(super) fn horizon_change(view: &FlatView, place: &ArrivalPlace) -> Change {
     if place.reach == 0.0 {
         return Change::NONE;
     }
@@ -108,7 +108,7 @@ pub(super) fn horizon_change(view: &View, place: &ArrivalPlace) -> Change {
 
 /// How far the mean over a patch can be from what arrives at its middle, and so on. `sway` is by how much the way to
 /// the viewer turns over it.
-pub(super) fn change(view: &View, place: &ArrivalPlace, arrived: &Arrived, sway: f32) -> Change {
+pub(super) fn change(view: &FlatView, place: &ArrivalPlace, arrived: &Arrived, sway: f32) -> Change {
     let (drift, illumination) = (arrived.motion, arrived.illumination);
     if place.reach == 0.0 || illumination == Illumination::Hidden && drift == 0.0 {
         return Change::NONE;
@@ -139,7 +139,7 @@ pub(super) fn change(view: &View, place: &ArrivalPlace, arrived: &Arrived, sway:
 
 /// How bright a highlight can be on a light, at most, or thereabouts, from all over a patch; `moved` is what the
 /// highlight moves by over the patch, as a part of its width, squared.
-fn brightest(view: &View, moved: f32) -> f32 {
+fn brightest(view: &FlatView, moved: f32) -> f32 {
     let size2 = square(view.la.max(view.lb));
     let distance2 = square(view.nearest());
     let sharp = view.sharpness() * size2;

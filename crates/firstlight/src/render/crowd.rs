@@ -7,9 +7,9 @@
 
 use std::collections::BinaryHeap;
 
-use super::cut::{Tone, Walk};
+use super::cut::{CutRules, Tone};
 use crate::color::Rgb;
-use crate::light::{Held, LightNode, Sent, Sight};
+use crate::light::{Held, LightNode, Sent, ZoneSight};
 use crate::material::MOMENTS;
 use crate::visibility::Seen;
 
@@ -28,7 +28,7 @@ pub(super) enum By {
 
 /// A node in question.
 #[derive(Clone, Copy)]
-struct Item {
+struct CrowdItem {
     node: u32,
     /// How far it can be wrong to take it as it is.
     error: Sent,
@@ -37,7 +37,7 @@ struct Item {
     by: By,
     /// Whether it was asked what is seen of it.
     looked: bool,
-    sight: Sight,
+    sight: ZoneSight,
 }
 
 /// Sums of products of errors, channel by channel: diffuse with itself, with highlights, highlights with themselves.
@@ -60,7 +60,7 @@ const PAIRS: [[usize; 2]; MOMENTS * (MOMENTS + 1) / 2] = {
 /// The lights of a block. Keeps its memory.
 #[derive(Default)]
 pub(super) struct Crowd {
-    items: Vec<Item>,
+    items: Vec<CrowdItem>,
     /// The worst first: the bits of its key, and which item, the first one first.
     heap: BinaryHeap<u64>,
     squares: Squares,
@@ -91,7 +91,7 @@ fn of(color: Rgb) -> [f64; 3] {
 
 impl Crowd {
     /// Begins a block with all lights.
-    pub fn begin(&mut self, walk: &Walk) {
+    pub fn begin(&mut self, walk: &CutRules) {
         self.items.clear();
         self.heap.clear();
         self.singles.clear();
@@ -102,7 +102,7 @@ impl Crowd {
     }
 
     /// Adds a node, and says nothing of one that sends nothing.
-    fn push(&mut self, walk: &Walk, index: u32, lit: bool) {
+    fn push(&mut self, walk: &CutRules, index: u32, lit: bool) {
         let node = &walk.tree.nodes[index as usize];
         let sight = node.shine.sight(walk.zone);
         if sight.weight == 0.0 {
@@ -115,10 +115,10 @@ impl Crowd {
             (false, true) => By::MiddleIfSeen,
             (false, false) => By::OneIfSeen,
         };
-        self.add(walk, Item { node: index, error: Default::default(), typical: 0.0, by, looked: lit, sight });
+        self.add(walk, CrowdItem { node: index, error: Default::default(), typical: 0.0, by, looked: lit, sight });
     }
 
-    fn add(&mut self, walk: &Walk, mut item: Item) {
+    fn add(&mut self, walk: &CutRules, mut item: CrowdItem) {
         let node = &walk.tree.nodes[item.node as usize];
         let sight = &item.sight;
         item.error = match (item.by, node.held) {
@@ -137,7 +137,7 @@ impl Crowd {
         self.items.push(item);
     }
 
-    fn count(&mut self, walk: &Walk, item: &Item, sign: f64) {
+    fn count(&mut self, walk: &CutRules, item: &CrowdItem, sign: f64) {
         let errors = item.error.0.map(of);
         let power = of(walk.tree.nodes[item.node as usize].power);
         for i in 0..3 {
@@ -149,7 +149,7 @@ impl Crowd {
     }
 
     /// Sums up anew: what was taken away leaves rounding behind.
-    fn recount(&mut self, walk: &Walk) {
+    fn recount(&mut self, walk: &CutRules) {
         (self.squares, self.known) = Default::default();
         let (items, heap) = (std::mem::take(&mut self.items), std::mem::take(&mut self.heap));
         for place in &heap {
@@ -178,7 +178,7 @@ impl Crowd {
         Rgb::new(r, g, b)
     }
 
-    fn shown(&self, walk: &Walk, tones: &[Tone], guess: Option<Rgb>) -> f32 {
+    fn shown(&self, walk: &CutRules, tones: &[Tone], guess: Option<Rgb>) -> f32 {
         let known = guess.unwrap_or_else(|| self.known());
         tones.iter().fold(0.0, |worst, tone| {
             walk.steps.of_color(tone.base + tone.known * known, self.error(&tone.error)).max(worst)
@@ -187,7 +187,7 @@ impl Crowd {
 
     /// Takes nodes apart until what is wrong shows by no more than `walk.budget`. `guess` is what is known to be sent;
     /// else it is guessed. `look` says what is seen of a node.
-    pub fn refine(&mut self, walk: &Walk, guess: Option<Rgb>, look: &mut dyn FnMut(&LightNode, u32) -> Seen) {
+    pub fn refine(&mut self, walk: &CutRules, guess: Option<Rgb>, look: &mut dyn FnMut(&LightNode, u32) -> Seen) {
         let mut counted = f32::INFINITY;
         for turn in 0u32.. {
             let worst = self.heap.peek().map_or(0.0, |place| f32::from_bits((place >> 32) as u32));
@@ -213,7 +213,7 @@ impl Crowd {
                     Seen::Whole => {
                         lit = true;
                         if item.by == By::MiddleIfSeen {
-                            self.add(walk, Item { by: By::Middle, looked: true, ..item });
+                            self.add(walk, CrowdItem { by: By::Middle, looked: true, ..item });
                             continue;
                         }
                     }
@@ -227,7 +227,7 @@ impl Crowd {
         }
     }
 
-    fn is_worth_it(&self, walk: &Walk, item: &Item, node: &LightNode) -> bool {
+    fn is_worth_it(&self, walk: &CutRules, item: &CrowdItem, node: &LightNode) -> bool {
         item.sight.width < WIDE
             || item.by == By::MiddleIfSeen && walk.key(&node.error(&item.sight)) <= WORTH * walk.key(&item.error)
     }
@@ -235,7 +235,7 @@ impl Crowd {
     /// Looks at what was not looked at yet, and says how all nodes count.
     ///
     /// Where `places` are few, asking from each is less work than looking.
-    pub fn settle(&mut self, walk: &Walk, places: usize, look: &mut dyn FnMut(&LightNode, u32) -> Seen) {
+    pub fn settle(&mut self, walk: &CutRules, places: usize, look: &mut dyn FnMut(&LightNode, u32) -> Seen) {
         self.nodes.clear();
         let heap = std::mem::take(&mut self.heap);
         for place in &heap {
@@ -251,7 +251,7 @@ impl Crowd {
                     Seen::Whole if by == By::MiddleIfSeen => {
                         self.count(walk, &item, -1.0);
                         by = By::Middle;
-                        self.count(walk, &Item { error: node.error(&item.sight), ..item }, 1.0);
+                        self.count(walk, &CrowdItem { error: node.error(&item.sight), ..item }, 1.0);
                     }
                     Seen::Whole => by = By::One,
                     Seen::Unknown => {}

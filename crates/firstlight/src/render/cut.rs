@@ -10,7 +10,7 @@ use std::cmp::Ordering;
 use std::collections::BinaryHeap;
 
 use crate::color::{DisplaySteps, Rgb};
-use crate::light::{Held, LightNode, LightTree, Sent, Sight, Zone};
+use crate::light::{Held, LightNode, LightTree, Sent, Zone, ZoneSight};
 use crate::material::{Colors, MOMENTS};
 use crate::visibility::Seen;
 
@@ -26,7 +26,7 @@ pub(super) struct Tone {
 }
 
 /// A node in question.
-struct Item {
+struct CutItem {
     key: f32,
     node: u32,
     /// How far it can be wrong to take it as it is.
@@ -35,24 +35,24 @@ struct Item {
     typical: f32,
     /// Whether it is seen whole.
     lit: bool,
-    sight: Sight,
+    sight: ZoneSight,
 }
 
-impl PartialEq for Item {
+impl PartialEq for CutItem {
     fn eq(&self, other: &Self) -> bool {
         self.cmp(other) == Ordering::Equal
     }
 }
 
-impl Eq for Item {}
+impl Eq for CutItem {}
 
-impl PartialOrd for Item {
+impl PartialOrd for CutItem {
     fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
         Some(self.cmp(other))
     }
 }
 
-impl Ord for Item {
+impl Ord for CutItem {
     /// The worst is the greatest; of equals, the one that was made first.
     fn cmp(&self, other: &Self) -> Ordering {
         self.key.total_cmp(&other.key).then(other.node.cmp(&self.node))
@@ -62,7 +62,7 @@ impl Ord for Item {
 /// A walk through the tree. Keeps its memory.
 #[derive(Default)]
 pub(super) struct Cut {
-    heap: BinaryHeap<Item>,
+    heap: BinaryHeap<CutItem>,
     /// The sum of all errors in question, kept up to date roughly.
     error: [[f64; 3]; MOMENTS],
     /// What is sent, thereabouts, by what is seen whole, and a part of what may be.
@@ -77,7 +77,7 @@ pub(super) struct Cut {
 
 /// What the walk goes through, and by which rules.
 #[derive(Clone, Copy)]
-pub(super) struct Walk<'a> {
+pub(super) struct CutRules<'a> {
     pub tree: &'a LightTree,
     pub steps: &'a DisplaySteps,
     pub zone: &'a Zone,
@@ -108,11 +108,11 @@ fn color([r, g, b]: &[f64; 3]) -> Rgb {
 }
 
 /// What a node of power 1 sends to a place of a zone that sees it whole, thereabouts.
-fn typical(sight: &Sight) -> f32 {
+fn typical(sight: &ZoneSight) -> f32 {
     0.5 * (sight.least + sight.diffuse)
 }
 
-impl Walk<'_> {
+impl CutRules<'_> {
     pub fn key(&self, error: &Sent) -> f32 {
         self.tones.iter().fold(0.0, |key, tone| {
             let shown = (tone.error * *error).sum();
@@ -120,7 +120,7 @@ impl Walk<'_> {
         })
     }
 
-    fn item(&self, index: u32, lit: bool) -> Option<Item> {
+    fn item(&self, index: u32, lit: bool) -> Option<CutItem> {
         let node = &self.tree.nodes[index as usize];
         let sight = node.shine.sight(self.zone);
         if sight.weight == 0.0 {
@@ -132,11 +132,11 @@ impl Walk<'_> {
         if key == 0.0 && !lit {
             return None;
         }
-        Some(Item { key, node: index, error, typical: if lit { typical(&sight) } else { 0.0 }, lit, sight })
+        Some(CutItem { key, node: index, error, typical: if lit { typical(&sight) } else { 0.0 }, lit, sight })
     }
 
     /// The node as one that is seen whole, and whether that would be worth the look.
-    fn as_lit(&self, item: &Item, node: &LightNode) -> Option<Item> {
+    fn as_lit(&self, item: &CutItem, node: &LightNode) -> Option<CutItem> {
         if !node.is_smooth() || node.count > 1 {
             return None;
         }
@@ -146,7 +146,7 @@ impl Walk<'_> {
         }
         let error = node.error(&sight);
         let key = self.key(&error);
-        (key <= WORTH * item.key).then_some(Item {
+        (key <= WORTH * item.key).then_some(CutItem {
             key,
             node: item.node,
             error,
@@ -176,13 +176,13 @@ impl Cut {
         (self.error, self.known, self.maybe) = ([[0.0; 3]; MOMENTS], [0.0; 3], [0.0; 3]);
     }
 
-    fn push(&mut self, walk: &Walk, item: Option<Item>) {
+    fn push(&mut self, walk: &CutRules, item: Option<CutItem>) {
         let Some(item) = item else { return };
         self.count(walk, &item, 1.0);
         self.heap.push(item);
     }
 
-    fn count(&mut self, walk: &Walk, item: &Item, sign: f64) {
+    fn count(&mut self, walk: &CutRules, item: &CutItem, sign: f64) {
         self.error.iter_mut().zip(item.error.0).for_each(|(sum, error)| add(sum, error, sign));
         if item.typical > 0.0 {
             add(&mut self.known, walk.tree.nodes[item.node as usize].power * item.typical, sign);
@@ -190,7 +190,7 @@ impl Cut {
     }
 
     /// Sums up anew: what was taken away leaves rounding behind.
-    fn recount(&mut self, walk: &Walk, done: &[f64; 3]) {
+    fn recount(&mut self, walk: &CutRules, done: &[f64; 3]) {
         (self.error, self.known) = ([[0.0; 3]; MOMENTS], *done);
         let heap = std::mem::take(&mut self.heap);
         for item in &heap {
@@ -200,7 +200,7 @@ impl Cut {
     }
 
     /// Sums up anew where that is due. `worst` was the worst in question when it was done last.
-    fn keep_exact(&mut self, walk: &Walk, done: &[f64; 3], worst: &mut f32) {
+    fn keep_exact(&mut self, walk: &CutRules, done: &[f64; 3], worst: &mut f32) {
         let now = self.heap.peek().map_or(0.0, |item| item.key);
         if now < *worst * AGAIN {
             self.recount(walk, done);
@@ -208,7 +208,7 @@ impl Cut {
         }
     }
 
-    fn shown(&self, walk: &Walk, value: Option<Rgb>) -> f32 {
+    fn shown(&self, walk: &CutRules, value: Option<Rgb>) -> f32 {
         let (all, known) = (self.error(), color(&self.known));
         let mut worst: f32 = 0.0;
         for tone in walk.tones {
@@ -224,7 +224,7 @@ impl Cut {
     /// Of the nodes `from`; `known` is what larger blocks around it know already.
     pub fn of_block(
         &mut self,
-        walk: &Walk,
+        walk: &CutRules,
         from: &[u32],
         known: [f64; 3],
         look: &mut dyn FnMut(&LightNode, u32) -> Seen,
@@ -236,7 +236,7 @@ impl Cut {
         for node in from {
             self.push(walk, walk.item(*node, false));
         }
-        let later = |done: &mut [f64; 3], [known, maybe]: [&mut [f64; 3]; 2], node: &LightNode, sight: &Sight| {
+        let later = |done: &mut [f64; 3], [known, maybe]: [&mut [f64; 3]; 2], node: &LightNode, sight: &ZoneSight| {
             let share = MAYBE * typical(sight);
             add(done, node.power * share, 1.0);
             add(maybe, node.power * share, 1.0);
@@ -324,7 +324,7 @@ impl Cut {
     /// light and says what it adds.
     pub fn of_patch(
         &mut self,
-        walk: &Walk,
+        walk: &CutRules,
         open: &[u32],
         mut value: Rgb,
         look: &mut dyn FnMut(&LightNode, u32) -> Seen,

@@ -6,7 +6,7 @@ use arrayvec::ArrayVec;
 
 use super::cell::QUADRANT_MOTION;
 use super::hits::camera_ray;
-use super::light_queue::Place;
+use super::light_queue::LitPlace;
 use super::solo::{Candidate, SquareBsdf};
 use super::square::Square;
 use crate::color::Rgb;
@@ -94,7 +94,7 @@ impl PlainMaterials {
             let material = &scene.materials[scene.geometry.surfaces[surface.index()].material?.index()];
             let point = ShadingPoint::new(Vec3::ZERO, ErrorBound(Vec3::ZERO), Vec3::Z, Vec3::Z);
             let bsdf = Bsdf { colors: Colors::BLACK, ambient: Rgb::BLACK, lobe: Lobe::None };
-            let si = Place::new(scene, point, surface, &bsdf).surface();
+            let si = LitPlace::new(scene, point, surface, &bsdf).surface();
             material.is_plain().then(|| material.bsdf(&si, &scene.textures))
         };
         PlainMaterials {
@@ -124,7 +124,7 @@ pub(crate) struct Fragments {
     bsdfs: Vec<Bsdf>,
     quadrants: Vec<Quadrant>,
     /// The middles of fragments and of quadrants.
-    pub places: Vec<Place>,
+    pub places: Vec<LitPlace>,
 }
 
 impl Fragment {
@@ -221,7 +221,7 @@ impl Fragments {
     fn add_middle(&mut self, scene: &Scene, surface: SurfaceId, bsdf: &Bsdf, point: ShadingPoint, share: f32) -> u32 {
         // It tells nothing beside what is proved
         let point = ShadingPoint { share, most_motion: -1.0, ..point };
-        self.places.push(Place::new(scene, point, surface, bsdf));
+        self.places.push(LitPlace::new(scene, point, surface, bsdf));
         self.places.len() as u32 - 1
     }
 
@@ -304,7 +304,7 @@ impl Fragments {
             let (place, rays) = (self.places.len() as u32, n * n / 4);
             self.quadrants.push(Quadrant { place, rays, contrast: Contrast::default() });
             let point = ShadingPoint { reach, turn, most_motion: QUADRANT_MOTION, ..point };
-            self.places.push(Place::new(scene, point, of.surface(scene), &bsdf));
+            self.places.push(LitPlace::new(scene, point, of.surface(scene), &bsdf));
         }
         let quadrants = Some(first..self.quadrants.len());
         let (count, rays) = (n * n, 0..0);
@@ -410,7 +410,7 @@ impl Fragments {
             let (place, contrast) = (self.places.len() as u32, mean.contrast);
             self.quadrants.push(Quadrant { place, rays: count as u32, contrast });
             let point = ShadingPoint { share, most_motion: QUADRANT_MOTION, ..point };
-            self.places.push(Place::new(scene, point, surface, &mean.bsdf));
+            self.places.push(LitPlace::new(scene, point, surface, &mean.bsdf));
         }
         true
     }
@@ -424,14 +424,14 @@ impl Fragments {
     }
 
     /// Where a ray of a fragment, its `k`-th, wants light.
-    pub fn place(&self, scene: &Scene, fragment: &Fragment, k: usize) -> Place {
+    pub fn place(&self, scene: &Scene, fragment: &Fragment, k: usize) -> LitPlace {
         let ray = fragment.rays.start + k;
         let bsdf = self.bsdf(fragment, k);
         let point = match fragment.of {
             Some(of) => of.point(scene, &self.rays[ray].ray, self.rays[ray].t),
             None => ShadingPoint::of(&self.members[ray].si),
         };
-        Place::new(scene, ShadingPoint { share: fragment.share, ..point }, fragment.surface, bsdf)
+        LitPlace::new(scene, ShadingPoint { share: fragment.share, ..point }, fragment.surface, bsdf)
     }
 
     /// The material that a ray of a fragment sees.

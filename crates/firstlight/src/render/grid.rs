@@ -11,7 +11,7 @@
 use std::ops::ControlFlow;
 
 use super::cell::CELL;
-use super::light_queue::{Answer, LightQueue, Place, Request, Sight};
+use super::light_queue::{Answer, LightQueue, LitPlace, Request, Sight};
 use super::solo::Candidate;
 use super::square::Square;
 use super::{Counts, Heat};
@@ -94,7 +94,7 @@ const UNKNOWN: Moments = Moments::UNKNOWN;
 const NONE: u32 = u32::MAX;
 
 /// A corner of pixels, where a ray meets a shape.
-struct Node {
+struct GridNode {
     of: Candidate,
     lobe: Lobe,
     /// The next at the same corner.
@@ -105,7 +105,7 @@ struct Node {
 
 /// One light over one square.
 #[derive(Clone, Copy)]
-struct Item {
+struct GridItem {
     square: Square,
     block: u32,
     light: u32,
@@ -122,16 +122,16 @@ pub(crate) struct Grid {
     arrived: Vec<Moments>,
     /// The first node at each corner of pixels.
     first: Vec<u32>,
-    nodes: Vec<Node>,
+    nodes: Vec<GridNode>,
     /// Node by node, light by light: what arrives.
     sums: Vec<Moments>,
     wanted: Vec<bool>,
     /// Which of them the requests are for.
     asked_of: Vec<usize>,
-    places: Vec<Place>,
+    places: Vec<LitPlace>,
     /// Pixel by pixel: see [`Heat`].
     work: Vec<f32>,
-    asked: Vec<Place>,
+    asked: Vec<LitPlace>,
     requests: Vec<Request>,
     answers: Vec<Answer>,
 }
@@ -226,8 +226,8 @@ impl Grid {
         counts: &mut Counts,
         go_on: &dyn Fn() -> ControlFlow<()>,
     ) -> ControlFlow<()> {
-        let mut items: Vec<Item> = Vec::new();
-        let mut waiting: Vec<Item> = Vec::new();
+        let mut items: Vec<GridItem> = Vec::new();
+        let mut waiting: Vec<GridItem> = Vec::new();
         for (k, block) in blocks.iter().enumerate() {
             let mut squares = vec![block.square];
             while let Some(square) = squares.pop() {
@@ -236,7 +236,7 @@ impl Grid {
                     squares.extend(square.quarters_on([scene.width, scene.height]).rev());
                 } else if square.side >= SMALLEST {
                     for light in 0..self.lights as u32 {
-                        waiting.push(Item { square, block: k as u32, light, nodes: [NONE; 9], center: NONE });
+                        waiting.push(GridItem { square, block: k as u32, light, nodes: [NONE; 9], center: NONE });
                     }
                 }
             }
@@ -249,7 +249,7 @@ impl Grid {
             if side > SMALLEST {
                 for item in refused {
                     for square in item.square.quarters_on([scene.width, scene.height]) {
-                        items.push(Item { square, ..item });
+                        items.push(GridItem { square, ..item });
                     }
                 }
             }
@@ -264,16 +264,16 @@ impl Grid {
         scene: &Scene,
         lights: &mut LightQueue,
         blocks: &[Block],
-        items: &mut Vec<Item>,
+        items: &mut Vec<GridItem>,
         counts: &mut Counts,
         go_on: &dyn Fn() -> ControlFlow<()>,
     ) -> ControlFlow<()> {
         // How each square sees its light from its middle
         self.asked.clear();
         self.requests.clear();
-        let mut last: Option<(Square, u32, [u32; 9], Option<Place>)> = None;
-        let mut kept: Vec<Item> = Vec::new();
-        let mut failed: Vec<Item> = Vec::new();
+        let mut last: Option<(Square, u32, [u32; 9], Option<LitPlace>)> = None;
+        let mut kept: Vec<GridItem> = Vec::new();
+        let mut failed: Vec<GridItem> = Vec::new();
         for mut item in items.drain(..) {
             let block = &blocks[item.block as usize];
             if last.as_ref().is_none_or(|(square, of, ..)| (*square, *of) != (item.square, item.block)) {
@@ -295,7 +295,7 @@ impl Grid {
         let centers = std::mem::take(&mut self.answers);
         // Those that do not fail at once ask their nodes
         self.requests.clear();
-        let mut open: Vec<Item> = Vec::new();
+        let mut open: Vec<GridItem> = Vec::new();
         for item in kept {
             let answer = &centers[item.center as usize];
             if answer.smooth && answer.sums == Moments::default() {
@@ -366,12 +366,12 @@ impl Grid {
         let place = match block.of.hit(scene, &ray) {
             Some(hit) => {
                 let point = block.of.point(scene, &ray, hit.t);
-                self.places.push(Place::new(scene, point, hit.surface, &block.bsdf));
+                self.places.push(LitPlace::new(scene, point, hit.surface, &block.bsdf));
                 self.places.len() as u32 - 1
             }
             None => NONE,
         };
-        self.nodes.push(Node { of: block.of, lobe: block.bsdf.lobe, next: self.first[corner], place });
+        self.nodes.push(GridNode { of: block.of, lobe: block.bsdf.lobe, next: self.first[corner], place });
         self.first[corner] = node;
         self.sums.resize(self.nodes.len() * self.lights, UNKNOWN);
         self.wanted.resize(self.nodes.len() * self.lights, false);
@@ -379,7 +379,7 @@ impl Grid {
     }
 
     /// The middle of a square, which stands for all of it.
-    fn middle(&self, block: &Block, side: u32, nodes: &[u32; 9]) -> Option<Place> {
+    fn middle(&self, block: &Block, side: u32, nodes: &[u32; 9]) -> Option<LitPlace> {
         if nodes.contains(&NONE) {
             return None;
         }
@@ -395,7 +395,7 @@ impl Grid {
         let most_motion = if side == SMALLEST { SMALLEST_MOTION } else { MOTION };
         let middle = ShadingPoint { reach, turn, most_motion, ..*middle };
         let node = &self.places[self.nodes[nodes[4] as usize].place as usize];
-        Some(Place { point: middle, bsdf: block.bsdf, ..*node })
+        Some(LitPlace { point: middle, bsdf: block.bsdf, ..*node })
     }
 
     /// Whether the corners foretell the other five.
@@ -404,7 +404,7 @@ impl Grid {
         scene: &Scene,
         lights: &LightQueue,
         block: &Block,
-        item: &Item,
+        item: &GridItem,
         nodes: &[Moments; 9],
         center: &Answer,
     ) -> bool {
@@ -436,7 +436,7 @@ impl Grid {
     }
 
     /// Lays the quadratic through nine sums over the pixels of a square: its mean over their rays.
-    fn fill(&mut self, scene: &Scene, item: &Item, nodes: &[Moments; 9]) {
+    fn fill(&mut self, scene: &Scene, item: &GridItem, nodes: &[Moments; 9]) {
         let Square { x, y, side } = item.square;
         let n = scene.antialiasing as f32;
         // A regular grid of n x n in a pixel of width h: x^2 is (1 - 1/n^2) h^2 / 12 more than in its middle

@@ -3,9 +3,9 @@
 //! longer than to mask few: most of it goes by the number of occluders.
 //!
 //! Each rung holds all its points, ready for shafts and masks, so that any may be the next: how much of them is hidden
-//! is found as for lights that are sampled ([`View::mask`]). What they send is tallied with and without what is hidden,
-//! so that where all that a light would send is known exactly, the points only say which share of it arrives: a ratio
-//! estimate.
+//! is found as for lights that are sampled ([`ShadowView::mask`]). What they send is tallied with and without what is
+//! hidden, so that where all that a light would send is known exactly, the points only say which share of it arrives: a
+//! ratio estimate.
 //!
 //! Sources: of the masks, Haines and Wallace 1991 (shaft culling); of ratio estimates, Cochran, "Sampling Techniques",
 //! 1977, chapter 6; of the effective number of points, Kish 1965.
@@ -15,13 +15,13 @@ use std::sync::OnceLock;
 
 use fearless_simd::{Level, dispatch, f32x16, mask32x16, prelude::*};
 
-use super::lanes::Obstacles;
+use super::lanes::PointObstacles;
 use crate::light::{Area, MIN_DISTANCE2, Points, SERIES, series_by_cell};
 use crate::material::{Lobe, MOMENTS, Moments};
 use crate::math::{LANES, Vec3, Vec3x16};
 use crate::scene::Scene;
 use crate::shape::SurfaceInteraction;
-use crate::visibility::{Target, View, Viewpoint};
+use crate::visibility::{ShadowView, Target, Viewpoint};
 
 /// The points of the first rung, and of the last: all of a series.
 pub(super) const FIRST: usize = 16;
@@ -89,7 +89,7 @@ impl<'a> Asker<'a> {
     }
 
     /// Which points of a rung are hidden from a point, by what is in its view; says how many rays were traced.
-    pub fn mask(&self, rung: &Rung, view: &mut View, point: &Viewpoint) -> u64 {
+    pub fn mask(&self, rung: &Rung, view: &mut ShadowView, point: &Viewpoint) -> u64 {
         let target = rung.target.get_or_init(|| self.target.with(&rung.points));
         view.mask(self.level, self.scene, target, point)
     }
@@ -138,12 +138,12 @@ impl Tally {
         &mut self,
         asker: &Asker,
         rung: &Rung,
-        view: &View,
+        view: &ShadowView,
         si: &SurfaceInteraction,
         lobe: &Lobe,
         half: usize,
     ) -> Option<Tally> {
-        let obstacles = Obstacles::of(view);
+        let obstacles = PointObstacles::of(view);
         let middle = half.saturating_sub(self.count) / LANES;
         let middle = middle.min(rung.points.blocks.len());
         let mut told = None;
@@ -168,7 +168,7 @@ impl Tally {
         blocks: Range<usize>,
         si: &SurfaceInteraction,
         lobe: &Lobe,
-        obstacles: &Obstacles,
+        obstacles: &PointObstacles,
     ) {
         let splat = |v: f32| simd.splat_f32x16(v);
         let zero = splat(0.0);

@@ -16,7 +16,7 @@ use crate::material::{Lobe, MOMENTS};
 use crate::math::{LANES, LaneSum, ShadowRay, Vec3, Vec3x16};
 use crate::scene::{Geometry, LinkId, Scene, ShadowRays};
 use crate::shape::{DiskShadow, ParallelogramShadow, PlaneSide, SphereShadow, SurfaceInteraction};
-use crate::visibility::View;
+use crate::visibility::ShadowView;
 
 /// Light, sixteen samples at a time.
 pub(crate) struct Lanes {
@@ -58,7 +58,7 @@ impl Lanes {
 
 /// What can stand in the way of one light, seen from one surface.
 #[derive(Clone, Copy, Default)]
-pub(super) struct Obstacles<'a> {
+pub(super) struct PointObstacles<'a> {
     pub spheres: &'a [SphereShadow],
     pub flats: &'a [ParallelogramShadow],
     /// Other lights that block, where they are not among the former.
@@ -70,11 +70,11 @@ pub(super) struct Obstacles<'a> {
     pub hidden: &'a [u16],
 }
 
-impl<'a> Obstacles<'a> {
+impl<'a> PointObstacles<'a> {
     /// What is in a view whose samples are masked.
-    pub fn of(view: &'a View) -> Self {
-        let View { spheres, flats, disks, hidden, .. } = view;
-        Obstacles { spheres, flats, disks, hidden, ..Obstacles::default() }
+    pub fn of(view: &'a ShadowView) -> Self {
+        let ShadowView { spheres, flats, disks, hidden, .. } = view;
+        PointObstacles { spheres, flats, disks, hidden, ..PointObstacles::default() }
     }
 
     fn are_none(&self) -> bool {
@@ -94,7 +94,7 @@ pub(super) fn sum_area(
     area: &Area,
     si: &SurfaceInteraction,
     lobe: &Lobe,
-    obstacles: &Obstacles,
+    obstacles: &PointObstacles,
 ) -> LobeSums {
     dispatch!(level, simd => gather_area(simd, area, area.points(), si, lobe, obstacles))
 }
@@ -107,7 +107,7 @@ fn gather_area<S: Simd>(
     points: &Points,
     si: &SurfaceInteraction,
     lobe: &Lobe,
-    obstacles: &Obstacles,
+    obstacles: &PointObstacles,
 ) -> LobeSums {
     let splat = |v: f32| simd.splat_f32x16(v);
     let zero = splat(0.0);
@@ -273,7 +273,7 @@ impl Lighting for Lanes {
         self.other_disks.extend(others.map(|(_, shadow)| *shadow));
         let trees = scene.geometry.has_trees().then_some((&*scene.geometry, id));
         let obstacles = if light.shadows && si.receives_shadow {
-            Obstacles {
+            PointObstacles {
                 spheres,
                 flats: &self.between,
                 light_spheres: &self.other_spheres,
@@ -282,7 +282,7 @@ impl Lighting for Lanes {
                 hidden: &[],
             }
         } else {
-            Obstacles::default()
+            PointObstacles::default()
         };
         let samples = area.samples() as u64;
         counts.shadow_rays += samples;

@@ -19,7 +19,7 @@ use crate::visibility::Viewpoint;
 
 /// A place of a surface that wants light.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Place {
+pub(crate) struct LitPlace {
     /// Where, and what it stands for; the colours in it are filled in light by light.
     pub point: ShadingPoint,
     pub surface: SurfaceId,
@@ -28,10 +28,10 @@ pub(crate) struct Place {
     pub bsdf: Bsdf,
 }
 
-impl Place {
-    pub fn new(scene: &Scene, point: ShadingPoint, surface: SurfaceId, bsdf: &Bsdf) -> Place {
+impl LitPlace {
+    pub fn new(scene: &Scene, point: ShadingPoint, surface: SurfaceId, bsdf: &Bsdf) -> LitPlace {
         let receives_shadow = scene.geometry.surfaces[surface.index()].receives_shadow;
-        Place { point, surface, receives_shadow, bsdf: *bsdf }
+        LitPlace { point, surface, receives_shadow, bsdf: *bsdf }
     }
 
     /// Where its rays begin.
@@ -115,7 +115,7 @@ impl Answer {
 struct Group<'p> {
     light: usize,
     lobe: Lobe,
-    places: &'p [Place],
+    places: &'p [LitPlace],
     requests: &'p [Request],
 }
 
@@ -124,7 +124,7 @@ impl<'p> Group<'p> {
         &self.requests[k as usize]
     }
 
-    fn place(&self, k: u32) -> &'p Place {
+    fn place(&self, k: u32) -> &'p LitPlace {
         &self.places[self.request(k).place as usize]
     }
 }
@@ -158,7 +158,7 @@ impl<'a> LightQueue<'a> {
     /// Answers each request.
     pub fn ask(
         &mut self,
-        places: &[Place],
+        places: &[LitPlace],
         requests: &[Request],
         answers: &mut Vec<Answer>,
         counts: &mut Counts,
@@ -314,7 +314,7 @@ impl<'a> LightQueue<'a> {
     }
 
     /// How far directions turn within a place's reach, times how fast a highlight falls.
-    fn turn(&self, place: &Place, lobe: &Lobe, distance: f32) -> f32 {
+    fn turn(&self, place: &LitPlace, lobe: &Lobe, distance: f32) -> f32 {
         if place.point.reach == 0.0 {
             return 0.0;
         }
@@ -325,7 +325,7 @@ impl<'a> LightQueue<'a> {
     }
 
     /// One light at one place, by itself.
-    fn one(&mut self, light: usize, place: &Place, sight: Sight, counts: &mut Counts) -> Answer {
+    fn one(&mut self, light: usize, place: &LitPlace, sight: Sight, counts: &mut Counts) -> Answer {
         let si = place.surface();
         let wanted = ArrivalPlace {
             lit: sight == Sight::Lit,

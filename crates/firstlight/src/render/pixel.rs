@@ -8,7 +8,7 @@ use super::{Counts, QUESTION_EVERY};
 use crate::ids::LightId;
 use crate::material::{Bsdf, Lobe, MOMENTS, Moments};
 use crate::math::{LaneSum, Ray};
-use crate::scene::{Hit, Scene, Seen};
+use crate::scene::{Hit, Scene, TracedHit};
 use crate::shape::SurfaceInteraction;
 
 /// How the light of one source is summed at one surface: the only thing in which the renderers differ.
@@ -85,11 +85,11 @@ impl PixelSum {
 
     /// Adds what a camera ray ends at, but for the light of lights: that of a surface is added by
     /// [`light`](Self::light).
-    pub fn see(&mut self, scene: &Scene, seen: Seen) -> Option<(SurfaceInteraction, Bsdf)> {
+    pub fn see(&mut self, scene: &Scene, seen: TracedHit) -> Option<(SurfaceInteraction, Bsdf)> {
         match seen {
-            Seen::Background => self.terms.background += 1,
-            Seen::Emission(color) => self.terms.emission += color,
-            Seen::Surface(si) => {
+            TracedHit::Background => self.terms.background += 1,
+            TracedHit::Emission(color) => self.terms.emission += color,
+            TracedHit::Surface(si) => {
                 // Look the material's textures up
                 let bsdf = scene.materials[si.material.index()].bsdf(&si, &scene.textures);
                 self.terms.ambient += scene.ambient * bsdf.ambient;

@@ -5,14 +5,14 @@
 use fearless_simd::Level;
 
 use super::Counts;
-use super::lanes::{Obstacles, sum_area};
+use super::lanes::{PointObstacles, sum_area};
 use super::pixel::{Lighting, LobeSums};
 use super::plain::Plain;
 use crate::light::{Light, LightKind};
 use crate::material::{Lobe, Moments};
 use crate::scene::Scene;
 use crate::shape::SurfaceInteraction;
-use crate::visibility::{Settler, Target, View, Viewpoint, Visibility};
+use crate::visibility::{Settler, ShadowView, Target, Viewpoint, Visibility};
 
 /// A light, and how shafts lead to it.
 pub(super) struct Sampled<'a> {
@@ -74,7 +74,7 @@ impl<'a> Sampled<'a> {
         points: &[Viewpoint],
         part: &mut [u32],
         counts: &mut Counts,
-        each: impl FnMut(usize, Visibility, &mut View),
+        each: impl FnMut(usize, Visibility, &mut ShadowView),
     ) {
         let all = self.samples() * part.len() as u64;
         let settled = &mut counts.settled;
@@ -90,7 +90,7 @@ impl<'a> Sampled<'a> {
 
     /// What it sends to a point that sees so much of it.
     #[inline(always)]
-    pub fn sent(&self, si: &SurfaceInteraction, lobe: &Lobe, visibility: Visibility, view: &View) -> Moments {
+    pub fn sent(&self, si: &SurfaceInteraction, lobe: &Lobe, visibility: Visibility, view: &ShadowView) -> Moments {
         match visibility {
             Visibility::Hidden | Visibility::BelowHorizon => Moments::ZERO,
             Visibility::Lit => self.lit(si, lobe),
@@ -102,7 +102,7 @@ impl<'a> Sampled<'a> {
     #[inline(always)]
     fn lit(&self, si: &SurfaceInteraction, lobe: &Lobe) -> Moments {
         totals(match &self.light().kind {
-            LightKind::Area(area) => sum_area(self.level, area, si, lobe, &Obstacles::default()),
+            LightKind::Area(area) => sum_area(self.level, area, si, lobe, &PointObstacles::default()),
             _ => {
                 let unshadowed = SurfaceInteraction { receives_shadow: false, ..*si };
                 Plain.gather(self.scene, self.index, &unshadowed, lobe, &mut Counts::default())
@@ -112,9 +112,9 @@ impl<'a> Sampled<'a> {
 
     /// Past what is in `view`.
     #[inline(always)]
-    fn masked(&self, si: &SurfaceInteraction, lobe: &Lobe, view: &View) -> Moments {
+    fn masked(&self, si: &SurfaceInteraction, lobe: &Lobe, view: &ShadowView) -> Moments {
         totals(match &self.light().kind {
-            LightKind::Area(area) => sum_area(self.level, area, si, lobe, &Obstacles::of(view)),
+            LightKind::Area(area) => sum_area(self.level, area, si, lobe, &PointObstacles::of(view)),
             _ => Plain.gather(self.scene, self.index, si, lobe, &mut Counts::default()),
         })
     }

@@ -7,7 +7,7 @@
 use std::f32::consts::PI;
 
 use super::square::Square;
-use crate::accel::{Plane, Planes};
+use crate::accel::{HalfSpace, Planes};
 use crate::ids::SurfaceId;
 use crate::light::{AreaShape, LightKind};
 use crate::material::Bsdf;
@@ -123,8 +123,8 @@ impl Pyramid {
 
     /// What it lies between.
     fn planes(&self) -> Planes {
-        let eye = Plane { n: -self.forward.as_dvec3(), p: self.eye.as_dvec3() };
-        let side = |i: usize| Plane { n: self.sides[i], p: self.corners[i].o.as_dvec3() };
+        let eye = HalfSpace { n: -self.forward.as_dvec3(), p: self.eye.as_dvec3() };
+        let side = |i: usize| HalfSpace { n: self.sides[i], p: self.corners[i].o.as_dvec3() };
         Planes([side(0), side(1), side(2), side(3), eye])
     }
 

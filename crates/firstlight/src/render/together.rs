@@ -6,8 +6,8 @@
 //! few of them send nearly all, is left to cells.
 
 use super::Counts;
-use super::arrival::{ArrivalPlace, Arrivals, Seen};
-use super::beams::{self, Beam, Traced};
+use super::arrival::{ArrivalPlace, Arrivals, Sighting};
+use super::beams::{self, RungRays, Traced};
 use super::ladder::{Asker, FIRST, LAST, Tally, of_edge};
 use super::resolve::LightTerm;
 use crate::color::Rgb;
@@ -16,7 +16,7 @@ use crate::integrate::{Arrived, Illumination};
 use crate::light::SERIES;
 use crate::material::{Bsdf, Lobe, MOMENTS, Moments};
 use crate::shape::SurfaceInteraction;
-use crate::visibility::{View, Viewpoint, Visibility};
+use crate::visibility::{ShadowView, Viewpoint, Visibility};
 
 /// The points that a ray asks first where masks tell what is hidden, and how many times as many it asks next.
 const MASKED: usize = 64;
@@ -79,7 +79,7 @@ struct Asking {
     scale: Rgb,
     reflected: LightTerm,
     series: usize,
-    view: View,
+    view: ShadowView,
     /// What would arrive if nothing were in the way, if that is known.
     whole: Option<Moments>,
     /// Whether points of the light may miss most of what it sends.
@@ -135,9 +135,13 @@ fn ask(asker: &Asker, asking: &mut [Asking], stride: usize, to: usize, traced: &
         && count < to
     {
         let rung = |series: usize| asker.rung(series, stride, count, to, growth);
-        let mut beams: Vec<Beam> = Vec::new();
+        let mut beams: Vec<RungRays> = Vec::new();
         for one in asking.iter_mut().filter(|one| !one.settled && one.view.trees) {
-            beams.push(Beam { point: Viewpoint::of(&one.si), rung: rung(one.series), hidden: &mut one.view.hidden });
+            beams.push(RungRays {
+                point: Viewpoint::of(&one.si),
+                rung: rung(one.series),
+                hidden: &mut one.view.hidden,
+            });
         }
         let now = beams::trace(asker.scene, asker.target.light, &mut beams);
         counts.settled.traced += now.rays;
@@ -266,7 +270,7 @@ impl Together {
     pub fn ask_points(&mut self, arrivals: &mut Arrivals, si: &SurfaceInteraction, bsdf: &Bsdf, counts: &mut Counts) {
         let place = ArrivalPlace { share: self.share, ..arrivals.place(self.light, si, bsdf) };
         counts.settled.visibility[Visibility::Mask as usize] += 1;
-        self.hear(&place, Seen::Behind(None), arrivals, counts);
+        self.hear(&place, Sighting::Behind(None), arrivals, counts);
     }
 
     /// Hears what one ray sees.
@@ -291,7 +295,7 @@ impl Together {
     }
 
     /// Asks for what one ray sees past what is in `view`.
-    pub fn behind(&mut self, place: &ArrivalPlace, view: View) {
+    pub fn behind(&mut self, place: &ArrivalPlace, view: ShadowView) {
         let series = self.series ^ (self.rays % SERIES);
         self.rays += 1;
         self.value += place.base;
@@ -373,14 +377,14 @@ impl Together {
         Together::ask_wholes(all, &wanted, arrivals);
     }
 
-    fn hear(&mut self, place: &ArrivalPlace, seen: Seen, arrivals: &mut Arrivals, counts: &mut Counts) {
+    fn hear(&mut self, place: &ArrivalPlace, seen: Sighting, arrivals: &mut Arrivals, counts: &mut Counts) {
         match seen {
-            Seen::Known(sums) => {
+            Sighting::Known(sums) => {
                 self.know(place, &sums);
                 self.shares += if place.lit { 1.0 } else { f32::NAN };
                 self.sharing += 1;
             }
-            Seen::Behind(_) => match arrivals.settle(self.light, place.si, counts) {
+            Sighting::Behind(_) => match arrivals.settle(self.light, place.si, counts) {
                 Some(view) => self.behind(place, view),
                 None => self.dark(place),
             },

@@ -3,7 +3,7 @@
 
 use pxfm::{f_acos, f_asin};
 
-use super::geometry::{Geometry, Target};
+use super::geometry::{Geometry, PlacedTarget};
 use super::{Scene, SceneDesc};
 use crate::camera::Projection;
 use crate::context::{CompileContext, show};
@@ -135,7 +135,7 @@ fn faces_away(area: &Area, geometry: &Geometry) -> bool {
     let is_behind = |q: DVec3| (q - p).dot(n) <= room(q);
     let planes = geometry.unbounded.iter().map(|placed| &geometry.placed[*placed as usize]);
     let mut planes = planes.filter_map(|placed| match placed.target {
-        Target::Solid(solid) => match &geometry.solids[solid as usize] {
+        PlacedTarget::Solid(solid) => match &geometry.solids[solid as usize] {
             Solid::Plane(plane) => Some((placed.placement, plane.place())),
             _ => None,
         },

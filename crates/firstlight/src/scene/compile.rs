@@ -10,7 +10,7 @@ use super::advice::{advise, advise_reflectance};
 use super::geometry::Geometry;
 use super::light_spheres::LightSpheres;
 use super::model::{Added, Framing};
-use super::outline::Outline;
+use super::outline::ShapeOutline;
 use super::place::compile_shapes;
 use super::seen_lights::SeenLights;
 use super::{DisplayEncoding, LightObstacles, RenderDesc, Scene, SceneDesc, SceneSummary};
@@ -180,7 +180,7 @@ impl SceneDesc {
             None
         };
         let origin = still.as_ref().map_or(cx.origin, |(_, origin)| *origin);
-        let outline = still.as_ref().map(|(still, _)| still).or(geometry).map(|seen| Outline::new(seen, origin));
+        let outline = still.as_ref().map(|(still, _)| still).or(geometry).map(|seen| ShapeOutline::new(seen, origin));
         self.lacks(outline.as_ref(), &options.framing, options.light)
     }
 

@@ -59,7 +59,7 @@ impl Surface {
 
 /// A thing with a space of its own.
 #[derive(Clone, Copy, Debug)]
-pub(crate) enum Target {
+pub(crate) enum PlacedTarget {
     /// The mesh of that index of [`Geometry::meshes`].
     Mesh(u32),
     /// The point set of that index of [`Geometry::point_sets`].
@@ -72,7 +72,7 @@ pub(crate) enum Target {
 #[derive(Clone, Debug)]
 pub(crate) struct Placed {
     pub placement: Placement,
-    pub target: Target,
+    pub target: PlacedTarget,
     /// Its surface; the first of several in a joined mesh.
     pub surface: SurfaceId,
     pub camera: Meets,
@@ -91,13 +91,13 @@ pub(crate) enum At {
     /// On the mesh of the world.
     World(TrianglePoint),
     /// On something placed.
-    Placed(u32, Spot),
+    Placed(u32, PlacedSpot),
 }
 
 /// Where on something placed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[repr(u32)]
-pub(crate) enum Spot {
+pub(crate) enum PlacedSpot {
     Triangle(TrianglePoint),
     /// The point of a point set.
     Point(u32),
@@ -129,8 +129,8 @@ impl Hit {
     /// The triangle of a mesh or the point of a point set, in the order of its file; 0 for all else.
     pub fn primitive(&self) -> u32 {
         match self.at {
-            At::World(point) | At::Placed(_, Spot::Triangle(point)) => point.triangle,
-            At::Placed(_, Spot::Point(point)) => point,
+            At::World(point) | At::Placed(_, PlacedSpot::Triangle(point)) => point.triangle,
+            At::Placed(_, PlacedSpot::Point(point)) => point,
             _ => 0,
         }
     }
@@ -139,7 +139,7 @@ impl Hit {
     pub(crate) fn facet(&self) -> Facet {
         match self.at {
             At::World(point) => Facet { source: 0, triangle: point.triangle },
-            At::Placed(index, Spot::Triangle(point)) => Facet { source: index + 1, triangle: point.triangle },
+            At::Placed(index, PlacedSpot::Triangle(point)) => Facet { source: index + 1, triangle: point.triangle },
             _ => Facet::NONE,
         }
     }
@@ -166,7 +166,7 @@ impl Nearest {
 
 /// What lies in the upper tree.
 #[derive(Clone, Copy, Debug)]
-pub(crate) enum Item {
+pub(crate) enum UpperItem {
     Sphere(u32),
     Parallelogram(u32),
     Placed(u32),
@@ -200,7 +200,7 @@ pub(crate) struct Geometry {
     pub solids: Vec<Solid>,
     /// What has no box: planes.
     pub unbounded: Vec<u32>,
-    pub items: Vec<Item>,
+    pub items: Vec<UpperItem>,
     /// Over the boxes of `items`.
     pub upper: Bvh,
     /// Where light is gathered on meshes with smooth normals.
@@ -248,12 +248,12 @@ fn same_to_rays(thing: &Placed, surfaces: &[Surface], meshes: &[Mesh], solids: &
     let rules = |of: u32| surfaces[(thing.surface.0 + of) as usize].ray_rules();
     // Numbers are written so that different ones differ
     let what = match thing.target {
-        Target::Mesh(mesh) => {
+        PlacedTarget::Mesh(mesh) => {
             let rules: Vec<RayRules> = meshes[mesh as usize].parts.iter().map(|part| rules(part.surface)).collect();
             format!("mesh {mesh} {rules:?}")
         }
-        Target::Points(points) => format!("points {points} {:?}", rules(0)),
-        Target::Solid(solid) => format!("{:?} {:?}", solids[solid as usize], rules(0)),
+        PlacedTarget::Points(points) => format!("points {points} {:?}", rules(0)),
+        PlacedTarget::Solid(solid) => format!("{:?} {:?}", solids[solid as usize], rules(0)),
     };
     let mut hash = blake3::Hasher::new();
     hash.update(what.as_bytes());
@@ -289,26 +289,26 @@ impl Geometry {
         let (mut items, mut boxes, mut unbounded) = (Vec::new(), Vec::new(), Vec::new());
         if !listed {
             for (i, sphere) in spheres.iter().enumerate() {
-                items.push(Item::Sphere(i as u32));
+                items.push(UpperItem::Sphere(i as u32));
                 boxes.push(widened(sphere.shape.bounds()));
             }
             for (i, flat) in parallelograms.iter().enumerate() {
-                items.push(Item::Parallelogram(i as u32));
+                items.push(UpperItem::Parallelogram(i as u32));
                 boxes.push(widened(flat.shape.bounds()));
             }
         }
         for (i, thing) in placed.iter().enumerate() {
             let own = match thing.target {
                 // Nothing in it can be hit
-                Target::Mesh(mesh) if meshes[mesh as usize].tree.len() == 0 => continue,
-                Target::Points(points) if point_sets[points as usize].bounds().is_none() => continue,
-                Target::Mesh(mesh) => meshes[mesh as usize].bounds(),
-                Target::Points(points) => point_sets[points as usize].bounds(),
-                Target::Solid(solid) => solids[solid as usize].bounds(),
+                PlacedTarget::Mesh(mesh) if meshes[mesh as usize].tree.len() == 0 => continue,
+                PlacedTarget::Points(points) if point_sets[points as usize].bounds().is_none() => continue,
+                PlacedTarget::Mesh(mesh) => meshes[mesh as usize].bounds(),
+                PlacedTarget::Points(points) => point_sets[points as usize].bounds(),
+                PlacedTarget::Solid(solid) => solids[solid as usize].bounds(),
             };
             match own {
                 Some(own) => {
-                    items.push(Item::Placed(i as u32));
+                    items.push(UpperItem::Placed(i as u32));
                     boxes.push(widened(thing.placement.bounds(own)));
                 }
                 None => unbounded.push(i as u32),
@@ -317,7 +317,7 @@ impl Geometry {
         drop_copies(&mut unbounded, |i| same_to_rays(&placed[*i as usize], &surfaces, &meshes, &solids));
         // Where things cannot be told apart by their boxes; what is left of spheres and parallelograms can
         let key = |item: u32| match items[item as usize] {
-            Item::Placed(i) => Err(same_to_rays(&placed[i as usize], &surfaces, &meshes, &solids)),
+            UpperItem::Placed(i) => Err(same_to_rays(&placed[i as usize], &surfaces, &meshes, &solids)),
             _ => Ok(item),
         };
         let upper = Bvh::build_distinct(&boxes, key);
@@ -402,11 +402,11 @@ impl Geometry {
     }
 
     /// The box around something placed, in its own space; `None` if it is empty or has no end.
-    pub fn bounds_of(&self, target: Target) -> Option<[DVec3; 2]> {
+    pub fn bounds_of(&self, target: PlacedTarget) -> Option<[DVec3; 2]> {
         match target {
-            Target::Mesh(mesh) => self.meshes[mesh as usize].bounds(),
-            Target::Points(points) => self.point_sets[points as usize].bounds(),
-            Target::Solid(solid) => self.solids[solid as usize].bounds(),
+            PlacedTarget::Mesh(mesh) => self.meshes[mesh as usize].bounds(),
+            PlacedTarget::Points(points) => self.point_sets[points as usize].bounds(),
+            PlacedTarget::Solid(solid) => self.solids[solid as usize].bounds(),
         }
     }
 

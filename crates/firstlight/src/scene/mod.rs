@@ -24,7 +24,7 @@ pub use description::{DisplayEncoding, RenderDesc, SceneDesc};
 pub use model::{Added, Framing, ModelSettings, UpAxis, View};
 pub use text::{Parsed, reference, schema};
 pub use trace::Hit;
-pub(crate) use trace::Seen;
+pub(crate) use trace::TracedHit;
 pub use world::{CameraHit, SurfacePoint};
 
 use std::sync::Arc;
@@ -41,7 +41,7 @@ use crate::math::DVec3;
 use crate::shape::{Disk, Parallelogram, PlaneSide, Sphere};
 
 use crate::texture::Texture;
-pub(crate) use geometry::{At, Geometry, Item, Meets, Nearest, Placed, Target};
+pub(crate) use geometry::{At, Geometry, Meets, Nearest, Placed, PlacedTarget, UpperItem};
 use light_spheres::LightSpheres;
 pub(crate) use links::LinkId;
 use seen_lights::SeenLights;

@@ -1,7 +1,7 @@
 //! What a scene is given that it does not say: a camera that sees all of it, and for a bare model a light.
 
 use super::SceneDesc;
-use super::outline::Outline;
+use super::outline::ShapeOutline;
 use crate::camera::CameraDesc;
 use crate::describe::{ColorDesc, FilePath};
 use crate::light::{DirectionalDesc, LightDesc};
@@ -146,7 +146,7 @@ impl SceneDesc {
     }
 
     /// What it lacks. `seen` is what a camera sees; `None` where that is not known, and then nothing is found.
-    pub(super) fn lacks(&self, seen: Option<&Outline>, framing: &Framing, light: bool) -> Added {
+    pub(super) fn lacks(&self, seen: Option<&ShapeOutline>, framing: &Framing, light: bool) -> Added {
         let mut added = Added::default();
         if self.cameras.is_empty() {
             let size = [self.render.width, self.render.height].map(|n| f64::from(n.max(1)));

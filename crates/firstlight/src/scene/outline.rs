@@ -1,11 +1,11 @@
 //! How far what a camera sees reaches in each direction: the support function of its convex hull.
 
-use super::geometry::{Geometry, Meets, Target};
+use super::geometry::{Geometry, Meets, PlacedTarget};
 use crate::math::DVec3;
 use crate::shape::Mesh;
 
 /// What a camera can see of the shapes that have an end.
-pub(super) struct Outline<'a> {
+pub(super) struct ShapeOutline<'a> {
     geometry: &'a Geometry,
     /// Where its coordinates, and all answers, count from.
     pub origin: DVec3,
@@ -36,19 +36,19 @@ fn farthest(points: &[DVec3], d: DVec3) -> f64 {
     points.iter().map(|p| p.dot(d)).fold(f64::NEG_INFINITY, f64::max)
 }
 
-impl<'a> Outline<'a> {
+impl<'a> ShapeOutline<'a> {
     pub fn new(geometry: &'a Geometry, origin: DVec3) -> Self {
         let world = geometry.world.as_ref().map(|world| corners(geometry, &world.mesh, 0)).unwrap_or_default();
         let mut meshes = vec![Vec::new(); geometry.meshes.len()];
         // What an instance hides is hidden as a whole, and so one that is seen speaks for all
         for thing in geometry.placed.iter().filter(|thing| thing.camera != Meets::None) {
-            if let Target::Mesh(mesh) = thing.target
+            if let PlacedTarget::Mesh(mesh) = thing.target
                 && meshes[mesh as usize].is_empty()
             {
                 meshes[mesh as usize] = corners(geometry, &geometry.meshes[mesh as usize], thing.surface.0);
             }
         }
-        Outline { geometry, origin, world, meshes }
+        ShapeOutline { geometry, origin, world, meshes }
     }
 
     /// The smallest box around all of it, but for rounding; `None` if there is nothing.
@@ -76,9 +76,9 @@ impl<'a> Outline<'a> {
             }
             let there = placement.world_from_object.matrix3.transpose() * d;
             let reach = match thing.target {
-                Target::Mesh(mesh) => farthest(&self.meshes[mesh as usize], there),
-                Target::Points(points) => point_sets[points as usize].support(there),
-                Target::Solid(solid) => solids[solid as usize].support(there),
+                PlacedTarget::Mesh(mesh) => farthest(&self.meshes[mesh as usize], there),
+                PlacedTarget::Points(points) => point_sets[points as usize].support(there),
+                PlacedTarget::Solid(solid) => solids[solid as usize].support(there),
             };
             most = most.max(reach + placement.world_from_object.translation.dot(d));
         }
@@ -98,7 +98,7 @@ mod tests {
         let parsed = SceneDesc::parse("s.toml", scene.as_bytes(), &NoAssets);
         let compiled = parsed.compile(&NoAssets, &CompileOptions::default());
         let scene = compiled.map(|compiled| compiled.scene).map_err(|e| e.to_string()).expect("a scene");
-        Outline::new(&scene.geometry, DVec3::ZERO).bounds()
+        ShapeOutline::new(&scene.geometry, DVec3::ZERO).bounds()
     }
 
     #[test]

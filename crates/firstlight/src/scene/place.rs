@@ -1,8 +1,8 @@
 //! From described shapes to placed ones: groups are flattened, transforms joined, surfaces numbered.
 //!
-//! Two steps. First every group, and the scene itself, is compiled once in its own space ([`Group`]): a list of leaves
-//! in scene order, and one mesh joined from all its meshes. Then the scene is walked ([`Walk`]), instances with it, and
-//! every leaf that is come across is given a surface and a place in the world.
+//! Two steps. First every group, and the scene itself, is compiled once in its own space ([`GroupSpace`]): a list of
+//! leaves in scene order, and one mesh joined from all its meshes. Then the scene is walked ([`SceneWalk`]), instances
+//! with it, and every leaf that is come across is given a surface and a place in the world.
 
 use std::collections::HashMap;
 use std::sync::Arc;
@@ -10,7 +10,7 @@ use std::sync::Arc;
 use glam::DAffine3;
 
 use super::SceneDesc;
-use super::geometry::{Geometry, Joined, Meets, Owned, Parts, Placed, RayRules, Surface, Target};
+use super::geometry::{Geometry, Joined, Meets, Owned, Parts, Placed, PlacedTarget, RayRules, Surface};
 use super::links::{LinkId, Links};
 use crate::context::{Assets, CompileContext};
 use crate::describe::Family;
@@ -71,7 +71,7 @@ fn first_names(names: &[&str]) -> String {
 }
 
 /// A shape in the space of its group.
-struct Leaf {
+struct PlacedShape {
     form: Form,
     transform: Option<DAffine3>,
     surface: Surface,
@@ -93,8 +93,8 @@ enum Form {
 }
 
 /// A group, or the scene itself, in its own space.
-struct Group {
-    leaves: Vec<Leaf>,
+struct GroupSpace {
+    leaves: Vec<PlacedShape>,
     /// All its meshes, to be joined.
     builder: MeshBuilder,
     /// All its meshes, joined, once it is known where they count from.
@@ -103,7 +103,7 @@ struct Group {
     origin: DVec3,
 }
 
-impl Group {
+impl GroupSpace {
     /// Joins the meshes; they count from `origin`.
     fn join(&mut self, cx: &CompileContext, origin: DVec3) {
         self.mesh = std::mem::take(&mut self.builder).build(cx, origin);
@@ -113,7 +113,7 @@ impl Group {
 
 /// Finds the boxes around groups.
 struct Extents<'a> {
-    groups: &'a [Group],
+    groups: &'a [GroupSpace],
     solids: &'a [Solid],
     point_sets: &'a [PointSet],
     /// Those that are known.
@@ -122,7 +122,7 @@ struct Extents<'a> {
 
 impl Extents<'_> {
     /// The box around all of a group that has an end, in its own space. Groups are without circles and not deep.
-    fn of(&mut self, group: &Group) -> Option<[DVec3; 2]> {
+    fn of(&mut self, group: &GroupSpace) -> Option<[DVec3; 2]> {
         let mut all = group.builder.bounds();
         for leaf in &group.leaves {
             let own = match &leaf.form {
@@ -187,7 +187,7 @@ impl Over {
     }
 
     /// What an instance within says, under this.
-    fn within(&self, leaf: &Leaf, links: &mut Links) -> Over {
+    fn within(&self, leaf: &PlacedShape, links: &mut Links) -> Over {
         Over {
             name: self.path(&leaf.surface.name),
             material: self.material.or(leaf.surface.material.filter(|_| leaf.has_material)),
@@ -273,11 +273,11 @@ pub(super) fn compile_shapes(
     });
     let mesh_of = mesh_of.collect();
     let parts = Parts { solids, point_sets, ..Parts::default() };
-    let mut walk = Walk { groups: &groups, meshes, mesh_of, parts, links, name_bytes: 0 };
+    let mut walk = SceneWalk { groups: &groups, meshes, mesh_of, parts, links, name_bytes: 0 };
     let scene_from_world = DAffine3 { translation: -cx.origin, ..DAffine3::IDENTITY };
     let is_shifted = cx.origin != DVec3::ZERO;
     walk.group(&root, None, if is_shifted { scene_from_world } else { DAffine3::IDENTITY }, &Over::NONE);
-    let Walk { mut parts, links, name_bytes, .. } = walk;
+    let SceneWalk { mut parts, links, name_bytes, .. } = walk;
     if name_bytes > MAX_NAMES {
         let message = format!("the names of what the instances place have more than {MAX_NAMES} bytes");
         cx.error("instance", message, Some("give shorter names, or fewer"));
@@ -314,8 +314,8 @@ struct Compiler<'a> {
 
 impl Compiler<'_> {
     /// Compiles the shapes of a group, or of the scene, whose paths begin with `prefix`.
-    fn group(&mut self, cx: &mut CompileContext, prefix: &str, shapes: &[ShapeDesc]) -> Group {
-        let mut leaves: Vec<Leaf> = Vec::with_capacity(shapes.len());
+    fn group(&mut self, cx: &mut CompileContext, prefix: &str, shapes: &[ShapeDesc]) -> GroupSpace {
+        let mut leaves: Vec<PlacedShape> = Vec::with_capacity(shapes.len());
         let mut mesh = MeshBuilder::default();
         // Scene order: kind by kind, in each the order of the text
         for (kind, word) in ShapeDesc::KINDS.iter().enumerate() {
@@ -328,10 +328,10 @@ impl Compiler<'_> {
                 leaves.push(leaf);
             }
         }
-        Group { leaves, builder: mesh, mesh: None, origin: DVec3::ZERO }
+        GroupSpace { leaves, builder: mesh, mesh: None, origin: DVec3::ZERO }
     }
 
-    fn leaf(&mut self, cx: &mut CompileContext, shape: &ShapeDesc, number: u32, mesh: &mut MeshBuilder) -> Leaf {
+    fn leaf(&mut self, cx: &mut CompileContext, shape: &ShapeDesc, number: u32, mesh: &mut MeshBuilder) -> PlacedShape {
         let common = shape.common();
         let Common { name, material, transform, visible, casts_shadow, receives_shadow, single_sided, .. } = common;
         let Common { lights, shadows, .. } = common;
@@ -387,7 +387,7 @@ impl Compiler<'_> {
                 }
             },
         };
-        Leaf { form, transform, surface, has_material: named.is_some() }
+        PlacedShape { form, transform, surface, has_material: named.is_some() }
     }
 
     /// A number for what a surface says of rays: of shapes at the same place, those of one number are the same to them.
@@ -431,9 +431,9 @@ impl Compiler<'_> {
     }
 
     /// A group that holds an instance of itself would never end. Without recursion: groups may be many.
-    fn refuse_circles(&self, cx: &mut CompileContext, groups: &[Group]) {
+    fn refuse_circles(&self, cx: &mut CompileContext, groups: &[GroupSpace]) {
         let instances = |group: usize| -> Vec<usize> {
-            let of = |leaf: &Leaf| if let Form::Instance(of) = leaf.form { Some(of) } else { None };
+            let of = |leaf: &PlacedShape| if let Form::Instance(of) = leaf.form { Some(of) } else { None };
             groups[group].leaves.iter().filter_map(of).collect()
         };
         // How deep the groups below each are, once that is known; those whose depth is being found are on the path
@@ -475,7 +475,7 @@ impl Compiler<'_> {
 
 /// The shapes and instances that a group places, with all that is in them. `known` are those of other groups; the
 /// groups are without circles and not deep.
-fn count_things(group: &Group, groups: &[Group], known: &mut [Option<u64>]) -> u64 {
+fn count_things(group: &GroupSpace, groups: &[GroupSpace], known: &mut [Option<u64>]) -> u64 {
     let mut things = 0u64;
     for leaf in &group.leaves {
         let within = match leaf.form {
@@ -495,8 +495,8 @@ fn count_things(group: &Group, groups: &[Group], known: &mut [Option<u64>]) -> u
 }
 
 /// Walks a scene through all its instances.
-struct Walk<'a> {
-    groups: &'a [Group],
+struct SceneWalk<'a> {
+    groups: &'a [GroupSpace],
     /// The meshes of the groups that have one.
     meshes: Vec<&'a Mesh>,
     /// Which of them each group has.
@@ -507,12 +507,12 @@ struct Walk<'a> {
     name_bytes: usize,
 }
 
-impl Walk<'_> {
+impl SceneWalk<'_> {
     /// Places what a group holds. `index` is that of the group, `None` for the scene itself.
-    fn group(&mut self, group: &Group, index: Option<usize>, world_from_group: DAffine3, over: &Over) {
+    fn group(&mut self, group: &GroupSpace, index: Option<usize>, world_from_group: DAffine3, over: &Over) {
         let outer = over.name.as_ref().map_or(0, |name| name.len());
         if outer > 0 {
-            let own = |leaf: &Leaf| leaf.surface.name.as_ref().map_or(0, |name| outer + 1 + name.len());
+            let own = |leaf: &PlacedShape| leaf.surface.name.as_ref().map_or(0, |name| outer + 1 + name.len());
             self.name_bytes += group.leaves.iter().map(own).sum::<usize>();
         }
         if self.name_bytes > MAX_NAMES {
@@ -535,7 +535,7 @@ impl Walk<'_> {
                     }
                     None => {
                         self.parts.solids.push(Solid::Ball(sphere.ball()));
-                        let target = Target::Solid(self.parts.solids.len() as u32 - 1);
+                        let target = PlacedTarget::Solid(self.parts.solids.len() as u32 - 1);
                         self.place(world * sphere.world_from_ball(), target, surface);
                     }
                 },
@@ -544,10 +544,10 @@ impl Walk<'_> {
                     shape.single_sided |= over.single_sided;
                     self.parts.parallelograms.push(Owned { seen, shape, surface });
                 }
-                Form::Solid(solid) => self.place(world, Target::Solid(*solid), surface),
+                Form::Solid(solid) => self.place(world, PlacedTarget::Solid(*solid), surface),
                 Form::Points(points) => {
                     let origin = self.parts.point_sets[*points as usize].origin();
-                    self.place(from(world, origin), Target::Points(*points), surface);
+                    self.place(from(world, origin), PlacedTarget::Points(*points), surface);
                 }
                 Form::Instance(of) => {
                     let groups = self.groups;
@@ -558,14 +558,14 @@ impl Walk<'_> {
         }
         // The mesh of the scene itself is in the world already
         if let Some(mesh) = index.and_then(|index| self.mesh_of[index]) {
-            self.place(from(world_from_group, group.origin), Target::Mesh(mesh), SurfaceId(first));
+            self.place(from(world_from_group, group.origin), PlacedTarget::Mesh(mesh), SurfaceId(first));
         }
     }
 
-    fn place(&mut self, world_from_object: DAffine3, target: Target, surface: SurfaceId) {
+    fn place(&mut self, world_from_object: DAffine3, target: PlacedTarget, surface: SurfaceId) {
         let (camera, shadow) = match target {
-            Target::Mesh(mesh) => meets(&self.parts.surfaces, surface.0, self.meshes[mesh as usize]),
-            Target::Points(_) | Target::Solid(_) => {
+            PlacedTarget::Mesh(mesh) => meets(&self.parts.surfaces, surface.0, self.meshes[mesh as usize]),
+            PlacedTarget::Points(_) | PlacedTarget::Solid(_) => {
                 let own = &self.parts.surfaces[surface.index()];
                 let of = |met: bool| if met { Meets::All } else { Meets::None };
                 let shadow = if own.shadows.is_some() && own.casts_shadow { Meets::Some } else { of(own.casts_shadow) };

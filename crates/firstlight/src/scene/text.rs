@@ -21,7 +21,7 @@ use crate::describe::Family;
 use crate::describe::node::Span;
 use crate::describe::read::Faults;
 use crate::error::{Diagnostic, SceneError, Severity};
-use crate::import::{Foreign, Wanted, foreign};
+use crate::import::{Foreign, WantedFile, foreign};
 use crate::scene::compile::{CompileOptions, Compiled};
 use crate::scene::model::ModelSettings;
 
@@ -125,7 +125,7 @@ impl SceneDesc {
     /// includes them. The lists of the description come in scene order: kinds in the order of their enums, then the
     /// order of the text, included files first.
     pub fn parse(name: &str, text: &[u8], assets: &dyn Assets) -> Parsed {
-        if let Some(foreign) = foreign(text, Wanted::Scene) {
+        if let Some(foreign) = foreign(text, WantedFile::Scene) {
             return Parsed::foreign(name, foreign);
         }
         if course::is_course(name, text) {
@@ -154,8 +154,8 @@ impl Parsed {
             severity: Severity::Error,
             place: None,
             path: String::new(),
-            message: format!("{name} {}", foreign.message(Wanted::Scene)),
-            hint: Some(foreign.hint(Wanted::Scene).to_owned()),
+            message: format!("{name} {}", foreign.message(WantedFile::Scene)),
+            hint: Some(foreign.hint(WantedFile::Scene).to_owned()),
         };
         let nothing = Self::from(SceneDesc::default());
         Self { faults: vec![fault], positions: vec![(0, 0)], incomplete: true, ..nothing }
@@ -245,7 +245,7 @@ mod tests {
             assert_eq!(error.err().map(|e| e.to_string()), Some(format!("{name} {said}")));
         }
         for builtin in crate::scene::builtin_scenes() {
-            assert_eq!(foreign(builtin.text.as_bytes(), Wanted::Scene), None, "{}", builtin.name);
+            assert_eq!(foreign(builtin.text.as_bytes(), WantedFile::Scene), None, "{}", builtin.name);
         }
     }
 

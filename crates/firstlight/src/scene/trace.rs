@@ -15,7 +15,7 @@ pub use super::geometry::Hit;
 
 /// What a camera ray ends at, in the scene's own coordinates.
 #[derive(Clone, Copy, Debug)]
-pub(crate) enum Seen {
+pub(crate) enum TracedHit {
     /// A surface to be lit.
     Surface(SurfaceInteraction),
     /// A light, seen as its colour.
@@ -184,12 +184,12 @@ impl Scene {
 
     /// What the camera sees of a hit.
     #[inline(always)]
-    pub(crate) fn see(&self, ray: &Ray, hit: Option<Hit>, differential: &RayDifferential) -> Seen {
+    pub(crate) fn see(&self, ray: &Ray, hit: Option<Hit>, differential: &RayDifferential) -> TracedHit {
         match hit {
-            None => Seen::Background,
+            None => TracedHit::Background,
             Some(hit) => match hit.surface.index().checked_sub(self.geometry.surfaces.len()) {
-                Some(light) => Seen::Emission(self.lights[light].radiance),
-                None => Seen::Surface(self.local_surface(ray, &hit, differential)),
+                Some(light) => TracedHit::Emission(self.lights[light].radiance),
+                None => TracedHit::Surface(self.local_surface(ray, &hit, differential)),
             },
         }
     }

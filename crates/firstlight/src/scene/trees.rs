@@ -2,7 +2,7 @@
 
 use fearless_simd::{Level, Simd};
 
-use super::geometry::{At, Geometry, Hit, Item, Meets, Nearest, Placed, Spot, Target};
+use super::geometry::{At, Geometry, Hit, Meets, Nearest, Placed, PlacedSpot, PlacedTarget, UpperItem};
 use crate::accel::{Aabb, Planes, RayPacket16, RayTile, TraceRay, dispatch_eight, dispatch_sixteen};
 use crate::ids::{LightId, MaterialId, SurfaceId};
 use crate::math::{DVec3, Ray, ShadowRay, Vec3};
@@ -104,7 +104,7 @@ impl Geometry {
         let mut limit = nearest.limit();
         self.upper.closest(simd, &TraceRay::new(ray.o, ray.d), &mut limit, |item, limit| {
             match self.items[item as usize] {
-                Item::Sphere(i) => {
+                UpperItem::Sphere(i) => {
                     let sphere = &self.spheres[i as usize];
                     if sphere.seen
                         && let Some(t) = sphere.shape.intersect(ray)
@@ -112,7 +112,7 @@ impl Geometry {
                         nearest.offer(t, sphere.surface, At::Sphere(i));
                     }
                 }
-                Item::Parallelogram(i) => {
+                UpperItem::Parallelogram(i) => {
                     let flat = &self.parallelograms[i as usize];
                     if flat.seen
                         && let Some(t) = flat.shape.intersect(ray)
@@ -120,7 +120,7 @@ impl Geometry {
                         nearest.offer(t, flat.surface, At::Parallelogram(i));
                     }
                 }
-                Item::Placed(i) => self.meet_placed(simd, i, ray, nearest),
+                UpperItem::Placed(i) => self.meet_placed(simd, i, ray, nearest),
             }
             *limit = nearest.limit();
         });
@@ -135,25 +135,25 @@ impl Geometry {
         let single_sided = || self.surfaces[thing.surface.index()].single_sided;
         let own = thing.placement.ray(ray);
         match thing.target {
-            Target::Mesh(mesh) => {
+            PlacedTarget::Mesh(mesh) => {
                 let mesh = &self.meshes[mesh as usize];
                 let (o, d) = (own.o.as_vec3(), own.d.as_vec3());
                 let hit = self.meet_mesh(simd, mesh, thing.surface, thing.camera, o, d, nearest.limit());
                 if let Some((t, point)) = hit {
                     let surface = SurfaceId(thing.surface.0 + mesh.part(point.triangle).surface);
-                    nearest.offer(t as f64, surface, At::Placed(index, Spot::Triangle(point)));
+                    nearest.offer(t as f64, surface, At::Placed(index, PlacedSpot::Triangle(point)));
                 }
             }
-            Target::Points(points) => {
+            PlacedTarget::Points(points) => {
                 let points = &self.point_sets[points as usize];
                 if let Some((t, point)) = points.intersect(simd, &own, nearest.limit(), single_sided()) {
-                    nearest.offer(t, thing.surface, At::Placed(index, Spot::Point(point)));
+                    nearest.offer(t, thing.surface, At::Placed(index, PlacedSpot::Point(point)));
                 }
             }
-            Target::Solid(solid) => {
+            PlacedTarget::Solid(solid) => {
                 let solid = &self.solids[solid as usize];
                 if let Some(hit) = solid.intersect(&own, 0.0, f64::INFINITY, single_sided()) {
-                    nearest.offer(hit.t, thing.surface, At::Placed(index, Spot::Part(hit.part)));
+                    nearest.offer(hit.t, thing.surface, At::Placed(index, PlacedSpot::Part(hit.part)));
                 }
             }
         }
@@ -196,17 +196,17 @@ impl Geometry {
             return false;
         }
         self.upper.any(simd, &TraceRay::new(o, ray.l), t_end, |item| match self.items[item as usize] {
-            Item::Sphere(i) => {
+            UpperItem::Sphere(i) => {
                 let sphere = &self.spheres[i as usize];
                 self.casts(sphere.surface, ray.light)
                     && sphere.shape.shadow(ray.p, ray.error).blocks(ray.l, ray.is_finite())
             }
-            Item::Parallelogram(i) => {
+            UpperItem::Parallelogram(i) => {
                 let flat = &self.parallelograms[i as usize];
                 self.casts(flat.surface, ray.light)
                     && flat.shape.shadow(ray.p, ray.error).blocks(ray.l, ray.is_finite())
             }
-            Item::Placed(i) => self.blocked_by_placed(simd, i, ray, t_end),
+            UpperItem::Placed(i) => self.blocked_by_placed(simd, i, ray, t_end),
         })
     }
 
@@ -219,7 +219,7 @@ impl Geometry {
         let casts = || thing.shadow == Meets::All || self.casts(thing.surface, ray.light);
         let own = thing.placement.line(ray.start, ray.l);
         match thing.target {
-            Target::Mesh(mesh) => {
+            PlacedTarget::Mesh(mesh) => {
                 let mesh = &self.meshes[mesh as usize];
                 let (o, l) = (own.o.as_vec3(), own.d.as_vec3());
                 self.blocked_by_mesh(
@@ -234,8 +234,8 @@ impl Geometry {
                     t_end,
                 )
             }
-            Target::Points(points) => casts() && self.point_sets[points as usize].blocks(simd, &own, t_end),
-            Target::Solid(solid) => casts() && self.solids[solid as usize].blocks(&own, 0.0, t_end as f64),
+            PlacedTarget::Points(points) => casts() && self.point_sets[points as usize].blocks(simd, &own, t_end),
+            PlacedTarget::Solid(solid) => casts() && self.solids[solid as usize].blocks(&own, 0.0, t_end as f64),
         }
     }
 
@@ -344,14 +344,14 @@ impl Geometry {
             At::Placed(index, spot) => {
                 let thing = &self.placed[index as usize];
                 match (thing.target, spot) {
-                    (Target::Mesh(mesh), Spot::Triangle(point)) => {
+                    (PlacedTarget::Mesh(mesh), PlacedSpot::Triangle(point)) => {
                         let mesh = &self.meshes[mesh as usize];
                         mesh.point(Some(&thing.placement), point, ray, hit.t, differential, self.terminator)
                     }
-                    (Target::Points(points), Spot::Point(point)) => {
+                    (PlacedTarget::Points(points), PlacedSpot::Point(point)) => {
                         self.point_sets[points as usize].point(&thing.placement, point, ray, hit.t, differential)
                     }
-                    (Target::Solid(solid), Spot::Part(part)) => {
+                    (PlacedTarget::Solid(solid), PlacedSpot::Part(part)) => {
                         let hit = SolidHit { t: hit.t, part };
                         thing.placement.solid_point(&self.solids[solid as usize], &hit, ray, differential)
                     }
@@ -374,13 +374,13 @@ impl Geometry {
             At::Placed(index, spot) => {
                 let Placed { placement, target, .. } = &self.placed[index as usize];
                 match (*target, spot) {
-                    (Target::Mesh(mesh), Spot::Triangle(point)) => {
+                    (PlacedTarget::Mesh(mesh), PlacedSpot::Triangle(point)) => {
                         self.meshes[mesh as usize].tangents(Some(placement), point.triangle)
                     }
-                    (Target::Points(points), Spot::Point(point)) => {
+                    (PlacedTarget::Points(points), PlacedSpot::Point(point)) => {
                         self.point_sets[points as usize].tangents(placement, point, ray, hit.t)
                     }
-                    (Target::Solid(solid), Spot::Part(part)) => {
+                    (PlacedTarget::Solid(solid), PlacedSpot::Part(part)) => {
                         placement.solid_tangents(&self.solids[solid as usize], &SolidHit { t: hit.t, part }, ray)
                     }
                     _ => unreachable!("a spot is on the kind of thing that was hit"),
@@ -394,8 +394,8 @@ impl Geometry {
     pub fn face_material(&self, hit: &Hit) -> MaterialId {
         let (mesh, triangle) = match hit.at {
             At::World(point) => (&self.world.as_ref().expect("the hit is on it").mesh, point.triangle),
-            At::Placed(index, Spot::Triangle(point)) => {
-                let Target::Mesh(mesh) = self.placed[index as usize].target else {
+            At::Placed(index, PlacedSpot::Triangle(point)) => {
+                let PlacedTarget::Mesh(mesh) = self.placed[index as usize].target else {
                     unreachable!("only meshes have triangles")
                 };
                 (&self.meshes[mesh as usize], point.triangle)
@@ -493,7 +493,7 @@ impl Geometry {
                 lanes(asking).filter(|lane| blocks(&shadows.ray(*lane))).fold(0, |mask, lane| mask | 1 << lane)
             };
             match self.items[item as usize] {
-                Item::Sphere(i) => {
+                UpperItem::Sphere(i) => {
                     let sphere = &self.spheres[i as usize];
                     if !self.casts(sphere.surface, shadows.light()) {
                         return 0;
@@ -504,7 +504,7 @@ impl Geometry {
                     }
                     one_by_one(&|ray| sphere.shape.shadow(ray.p, ray.error).blocks(ray.l, ray.is_finite()))
                 }
-                Item::Parallelogram(i) => {
+                UpperItem::Parallelogram(i) => {
                     let flat = &self.parallelograms[i as usize];
                     if !self.casts(flat.surface, shadows.light()) {
                         return 0;
@@ -515,7 +515,7 @@ impl Geometry {
                     }
                     one_by_one(&|ray| flat.shape.shadow(ray.p, ray.error).blocks(ray.l, ray.is_finite()))
                 }
-                Item::Placed(i) => self.placed_blocks_lanes(simd, i, shadows, asking),
+                UpperItem::Placed(i) => self.placed_blocks_lanes(simd, i, shadows, asking),
             }
         })
     }
@@ -526,7 +526,7 @@ impl Geometry {
         if thing.shadow == Meets::None || active == 0 {
             return 0;
         }
-        let Target::Mesh(mesh) = thing.target else {
+        let PlacedTarget::Mesh(mesh) = thing.target else {
             let blocks = |lane: &usize| self.blocked_by_placed(simd, index, &shadows.ray(*lane), shadows.t_end[*lane]);
             return lanes(active).filter(blocks).fold(0, |mask, lane| mask | 1 << lane);
         };

@@ -5,7 +5,7 @@
 
 use super::Scene;
 use super::geometry::Hit;
-use super::trace::Seen;
+use super::trace::TracedHit;
 use crate::color::Rgb;
 use crate::ids::{LightId, MaterialId, SurfaceId};
 use crate::math::{DVec3, ShadowRay, Vec2, Vec3, WorldRay};
@@ -88,9 +88,9 @@ impl Scene {
     pub fn look(&self, ray: &WorldRay, differential: &RayDifferential) -> CameraHit {
         let ray = ray.within(self.origin);
         match self.see(&ray, self.intersect_local(&ray), differential) {
-            Seen::Surface(si) => CameraHit::Surface(self.in_world(si)),
-            Seen::Emission(color) => CameraHit::Emission(color),
-            Seen::Background => CameraHit::Background,
+            TracedHit::Surface(si) => CameraHit::Surface(self.in_world(si)),
+            TracedHit::Emission(color) => CameraHit::Emission(color),
+            TracedHit::Background => CameraHit::Background,
         }
     }
 

@@ -76,7 +76,7 @@ impl Ball {
 
 #[cfg(test)]
 mod tests {
-    use super::super::check::{Known, never};
+    use super::super::check::{KnownSolid, never};
     use super::super::solid::Solid;
     use super::*;
 
@@ -84,7 +84,8 @@ mod tests {
     fn it_keeps_what_solids_promise() {
         for uv in [SphereUv::Equirectangular, SphereUv::Angles] {
             let distance = |p: DVec3| p.length() - 1.0;
-            let known = Known { solid: Solid::Ball(Ball { uv }), distance: &distance, center: DVec3::ZERO, size: 1.0 };
+            let known =
+                KnownSolid { solid: Solid::Ball(Ball { uv }), distance: &distance, center: DVec3::ZERO, size: 1.0 };
             known.meets_rays(10_000);
             known.is_left_by_rays(10_000, &never);
             if uv == SphereUv::Equirectangular {

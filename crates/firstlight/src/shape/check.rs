@@ -73,7 +73,7 @@ pub(super) fn faults<T>(compile: impl FnOnce(&mut CompileContext) -> T) -> Vec<(
 }
 
 /// A solid with what is known of it otherwise.
-pub(super) struct Known<'a> {
+pub(super) struct KnownSolid<'a> {
     pub solid: Solid,
     /// A function of points that is negative inside, no greater than the distance to the surface, and near it that
     /// distance.
@@ -83,7 +83,7 @@ pub(super) struct Known<'a> {
     pub size: f64,
 }
 
-impl Known<'_> {
+impl KnownSolid<'_> {
     /// How far a point of the surface can be off by rounding alone.
     fn rounding(&self, ray: &DRay) -> f64 {
         1e-14 * (self.size + self.center.length() + (ray.o - self.center).length())

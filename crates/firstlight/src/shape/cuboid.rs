@@ -6,7 +6,7 @@ use super::common::shape_table;
 use super::solid::{Chord, Solid, SolidHit, SolidPoint};
 use super::surface::UvEdge;
 use crate::context::CompileContext;
-use crate::math::{DRay, DVec3, Frame};
+use crate::math::{Axes, DRay, DVec3};
 
 shape_table! {
     /// A box along the axes of the world, with an outside and an inside. Each of its six faces carries the whole
@@ -65,7 +65,7 @@ impl Cuboid {
         let mut normal = DVec3::ZERO;
         normal[axis] = if positive { 1.0 } else { -1.0 };
         // As on a rectangle that faces the same way
-        let face = Frame::facing(normal, None).unwrap_or(Frame::around(normal));
+        let face = Axes::facing(normal, None).unwrap_or(Axes::around(normal));
         let along = |way: DVec3| {
             let from = if way.element_sum() > 0.0 { p - self.low } else { p - self.high };
             from.dot(way) / self.size.dot(way.abs())
@@ -102,7 +102,7 @@ impl Cuboid {
 
 #[cfg(test)]
 mod tests {
-    use super::super::check::{Known, Random, faults, made, never};
+    use super::super::check::{KnownSolid, Random, faults, made, never};
     use super::*;
 
     fn cuboid(center: DVec3, size: DVec3) -> Solid {
@@ -123,7 +123,7 @@ mod tests {
                 let size = (DVec3::ONE + random.in_ball() * 0.7) * scale;
                 let reach = 0.5 * size.length();
                 let distance = |p| distance(p, center, size);
-                let known = Known { solid: cuboid(center, size), distance: &distance, center, size: reach };
+                let known = KnownSolid { solid: cuboid(center, size), distance: &distance, center, size: reach };
                 let corner = |x: f64, i: u32| if (x * 8.0) as u32 >> i & 1 == 1 { 0.5 } else { -0.5 };
                 let rims = |x: f64| {
                     // A place on one of the edges
@@ -149,7 +149,7 @@ mod tests {
             let scale = random.magnitude(1e-6, 1e6);
             let center = random.in_ball() * random.magnitude(1e-8, 1e8);
             let size = (DVec3::ONE + random.in_ball() * 0.9) * scale;
-            let known = Known { solid: cuboid(center, size), distance: &|_| 0.0, center, size: size.length() };
+            let known = KnownSolid { solid: cuboid(center, size), distance: &|_| 0.0, center, size: size.length() };
             known.is_left_by_rays(50, &never);
         }
     }

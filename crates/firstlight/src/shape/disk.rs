@@ -9,7 +9,7 @@ use super::common::shape_table;
 use super::solid::{Canonical, Solid, SolidHit, SolidPoint, turn};
 use super::surface::UvEdge;
 use crate::context::CompileContext;
-use crate::math::{DAffine3, DMat3, DRay, DVec3, ErrorBound, Frame, UNIT_ROUNDOFF, Vec3, Vec3x16};
+use crate::math::{Axes, DAffine3, DMat3, DRay, DVec3, ErrorBound, UNIT_ROUNDOFF, Vec3, Vec3x16};
 
 shape_table! {
     /// A flat disk, or a ring. u runs around it counterclockwise as seen from the front, v from 0 at the rim to 1 at
@@ -40,7 +40,7 @@ shape_table! {
 pub(crate) struct Disk {
     center: DVec3,
     /// z is the normal, angles are counted from x.
-    frame: Frame,
+    frame: Axes,
     radius: f64,
     inner: f64,
 }
@@ -56,20 +56,20 @@ impl DiskDesc {
             let message = format!("{inner} is outside [0, {radius})");
             cx.error("inner_radius", message, Some("the hole is smaller than the disk; 0 is no hole"));
         }
-        let frame = Frame::around(DVec3::from(self.normal).normalize_or(DVec3::Y));
+        let frame = Axes::around(DVec3::from(self.normal).normalize_or(DVec3::Y));
         Solid::Disk(Disk { center: self.center.into(), frame, radius, inner })
     }
 }
 
 impl Disk {
     /// Without a hole. z of the frame is the normal.
-    pub fn new(center: DVec3, frame: Frame, radius: f64) -> Self {
+    pub fn new(center: DVec3, frame: Axes, radius: f64) -> Self {
         Disk { center, frame, radius, inner: 0.0 }
     }
 
     /// See [`Solid::canonical`].
     pub fn canonical(&self) -> (DAffine3, Canonical) {
-        let Frame { x, y, z } = self.frame;
+        let Axes { x, y, z } = self.frame;
         let axes = DMat3::from_cols(x * self.radius, y * self.radius, z * self.radius);
         let hole = (self.inner / self.radius) as f32;
         (DAffine3::from_mat3_translation(axes, self.center), Canonical::Disk { hole })
@@ -238,7 +238,7 @@ pub(super) fn ring_point(p: DVec2, radius: f64, inner: f64) -> RingPoint {
 
 #[cfg(test)]
 mod tests {
-    use super::super::check::{Known, Random, faults, made, never};
+    use super::super::check::{KnownSolid, Random, faults, made, never};
     use super::*;
 
     fn disk(center: DVec3, normal: DVec3, radius: f64, inner_radius: f64) -> Solid {
@@ -301,7 +301,7 @@ mod tests {
             let center = random.in_ball() * random.magnitude(1e-8, 1e8);
             let normal = random.direction();
             let solid = disk(center, normal, size, size * 0.3);
-            let known = Known { solid, distance: &|_| 0.0, center, size };
+            let known = KnownSolid { solid, distance: &|_| 0.0, center, size };
             known.is_left_by_rays(40, &never);
             if center.length() < 10.0 * size {
                 known.derivatives_hold(500);

@@ -8,7 +8,7 @@ use super::disk::ring_point;
 use super::solid::{Canonical, Chord, SolidHit, SolidPoint, turn};
 use super::surface::UvEdge;
 use crate::context::{CompileContext, show};
-use crate::math::{DAffine3, DMat3, DRay, DVec3, Frame};
+use crate::math::{Axes, DAffine3, DMat3, DRay, DVec3};
 
 /// A cylinder or a cone, ready to be hit.
 #[derive(Clone, Copy, Debug)]
@@ -16,7 +16,7 @@ pub(crate) struct Frustum {
     /// The end where z = 0.
     p0: DVec3,
     /// z is the axis, angles are counted from x.
-    frame: Frame,
+    frame: Axes,
     /// The length of the axis.
     height: f64,
     /// The radii at z = 0 and at z = `height`.
@@ -53,7 +53,7 @@ impl Frustum {
         let height = axis.length();
         Frustum {
             p0: p0.into(),
-            frame: Frame::around(axis.normalize_or(DVec3::Y)),
+            frame: Axes::around(axis.normalize_or(DVec3::Y)),
             height,
             radii,
             slope: (radii[1] - radii[0]) / height,
@@ -186,7 +186,7 @@ impl Frustum {
     /// See [`Solid::canonical`](super::solid::Solid::canonical).
     pub fn canonical(&self) -> (DAffine3, Canonical) {
         let widest = self.radii[0].max(self.radii[1]);
-        let Frame { x, y, z } = self.frame;
+        let Axes { x, y, z } = self.frame;
         let axes = DMat3::from_cols(x * widest, y * widest, z * self.height);
         let radii = self.radii.map(|r| (r / widest) as f32);
         let kind = Canonical::Frustum { radii, open: !self.capped };
@@ -208,7 +208,7 @@ impl Frustum {
 
 #[cfg(test)]
 mod tests {
-    use super::super::check::{Known, Random, made, never};
+    use super::super::check::{KnownSolid, Random, made, never};
     use super::super::cone::ConeDesc;
     use super::super::solid::Solid;
     use super::*;
@@ -305,7 +305,7 @@ mod tests {
             let made = Made::random(&mut random, center, scale);
             let distance = |p| made.distance(p);
             let (solid, size) = (made.solid(true), made.size());
-            let known = Known { solid, distance: &distance, center: made.center(), size };
+            let known = KnownSolid { solid, distance: &distance, center: made.center(), size };
             known.is_closed(10_000, &|x| made.rim(x), &|x| made.inside(x));
             if center.length() < 1e3 * scale {
                 known.meets_rays(3000);
@@ -356,7 +356,7 @@ mod tests {
             if made.p0 == made.p1 || (made.p1 - made.p0).length() < 1e-3 * scale {
                 continue;
             }
-            let known = Known { solid: made.solid(true), distance: &|_| 0.0, center, size: made.size() };
+            let known = KnownSolid { solid: made.solid(true), distance: &|_| 0.0, center, size: made.size() };
             known.is_left_by_rays(50, &never);
         }
     }

@@ -35,7 +35,7 @@ pub use mesh::MeshDesc;
 pub use parallelogram::{Parallelogram, ParallelogramDesc};
 pub use plane::PlaneDesc;
 pub use point_set::PointSetDesc;
-pub use rectangle::RectangleDesc;
+pub use rectangle::RectangleShapeDesc;
 pub(crate) use rectangle::facing;
 pub use sphere::{Sphere, SphereDesc, SphereUv};
 pub use surface::{Footprint, RayDifferential, ShadowTerminator, SurfaceInteraction, UvEdge};
@@ -67,7 +67,7 @@ family! {
         /// `[[disk]]`
         Disk(DiskDesc) = "disk",
         /// `[[rectangle]]`
-        Rectangle(RectangleDesc) = "rectangle",
+        Rectangle(RectangleShapeDesc) = "rectangle",
         /// `[[box]]`
         Box(BoxDesc) = "box",
         /// `[[cylinder]]`

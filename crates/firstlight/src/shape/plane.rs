@@ -5,7 +5,7 @@ use super::rectangle::facing;
 use super::solid::{Solid, SolidHit, SolidPoint};
 use super::surface::UvEdge;
 use crate::context::CompileContext;
-use crate::math::{DRay, DVec3, Frame};
+use crate::math::{Axes, DRay, DVec3};
 
 shape_table! {
     /// A plane without end (it is let go 1e9 m from `point`). The texture coordinate is the distance from `point` in
@@ -31,17 +31,17 @@ shape_table! {
 
 /// A plane, ready to be hit.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Plane {
+pub(crate) struct UnboundedPlane {
     /// Where u = v = 0.
     point: DVec3,
     /// u, v and the normal.
-    frame: Frame,
+    frame: Axes,
 }
 
 impl PlaneDesc {
     pub(crate) fn compile(&self, cx: &mut CompileContext) -> Solid {
         cx.point("point", self.point);
-        Solid::Plane(Plane { point: self.point.into(), frame: facing(cx, self.normal, self.up) })
+        Solid::Plane(UnboundedPlane { point: self.point.into(), frame: facing(cx, self.normal, self.up) })
     }
 }
 
@@ -49,7 +49,7 @@ impl PlaneDesc {
 /// finite in f32. Far beyond where any pixel could tell.
 const REACH: f64 = 1e9;
 
-impl Plane {
+impl UnboundedPlane {
     #[inline(always)]
     pub fn intersect(&self, ray: &DRay, t_min: f64, t_max: f64, single_sided: bool) -> Option<SolidHit> {
         let cos = self.frame.z.dot(ray.d);
@@ -99,7 +99,7 @@ impl Plane {
 
 #[cfg(test)]
 mod tests {
-    use super::super::check::{Known, Random, faults, made, never};
+    use super::super::check::{KnownSolid, Random, faults, made, never};
     use super::*;
 
     fn plane(point: DVec3, normal: DVec3) -> Solid {
@@ -153,7 +153,7 @@ mod tests {
             let center = random.in_ball() * random.magnitude(1e-8, 1e8);
             let solid = plane(center, random.direction());
             let size = random.magnitude(1e-8, 1e8);
-            Known { solid, distance: &|_| 0.0, center, size }.is_left_by_rays(40, &never);
+            KnownSolid { solid, distance: &|_| 0.0, center, size }.is_left_by_rays(40, &never);
         }
     }
 

@@ -197,12 +197,12 @@ fn advise_radius(cx: &mut CompileContext, radius: f64, spacing: f64) {
 }
 
 /// One sphere, in f64.
-struct Ball {
+struct PointBall {
     c: DVec3,
     r: f64,
 }
 
-impl Ball {
+impl PointBall {
     /// Where the line of a ray enters and leaves, if it meets the ball; the ray's direction is of any length. See
     /// `Sphere::intersect` for the form.
     #[inline(always)]
@@ -278,9 +278,9 @@ impl PointSet {
         there.map(|sphere| reach(sphere.map(f64::from))).fold(f64::NEG_INFINITY, f64::max)
     }
 
-    fn ball(&self, index: u32) -> Ball {
+    fn ball(&self, index: u32) -> PointBall {
         let [x, y, z, r] = self.spheres[index as usize].map(f64::from);
-        Ball { c: DVec3::new(x, y, z), r }
+        PointBall { c: DVec3::new(x, y, z), r }
     }
 
     /// The first sphere on a ray of the set's own space: its distance, at most `limit`, and its number. Of several at
@@ -342,7 +342,7 @@ impl PointSet {
         t: f64,
         differential: &RayDifferential,
     ) -> ShapePoint {
-        let Ball { c, r } = self.ball(index);
+        let PointBall { c, r } = self.ball(index);
         let own = placement.ray(ray);
         // From the centre outwards: the point lies on the sphere however far away the camera is
         let outwards = (own.o - c + own.d * t).normalize_or(DVec3::Y);
@@ -372,7 +372,7 @@ impl PointSet {
 
     /// How the point of sphere `index` that `ray` met at `t` moves with u and with v.
     pub fn tangents(&self, placement: &Placement, index: u32, ray: &Ray, t: f64) -> [DVec3; 2] {
-        let Ball { c, r } = self.ball(index);
+        let PointBall { c, r } = self.ball(index);
         let own = placement.ray(ray);
         let outwards = (own.o - c + own.d * t).normalize_or(DVec3::Y);
         let tangents = ball_tangents(SphereUv::Equirectangular, outwards);

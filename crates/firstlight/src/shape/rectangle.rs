@@ -3,7 +3,7 @@
 use super::common::shape_table;
 use super::parallelogram::Parallelogram;
 use crate::context::{CompileContext, show};
-use crate::math::{DVec3, Frame};
+use crate::math::{Axes, DVec3};
 
 shape_table! {
     /// A flat rectangle around a centre. The texture coordinate runs from 0 to 1 to the right and up, as seen from the
@@ -16,7 +16,7 @@ shape_table! {
     /// normal = [0, 0, 1]
     /// material = "poster"
     /// ```
-    pub struct RectangleDesc {
+    pub struct RectangleShapeDesc {
         /// Centre, in metres, world space.
         pub center: [f64; 3],
         /// Width and height in metres, along u and v, 1e-9 to 2.5e8 each.
@@ -29,7 +29,7 @@ shape_table! {
     }
 }
 
-impl RectangleDesc {
+impl RectangleShapeDesc {
     pub(crate) fn compile(&self, cx: &mut CompileContext) -> Parallelogram {
         cx.point("center", self.center);
         for (i, size) in self.size.iter().enumerate() {
@@ -42,18 +42,18 @@ impl RectangleDesc {
 }
 
 /// The frame of what is flat, from its `normal` and `up`.
-pub(crate) fn facing(cx: &mut CompileContext, normal: [f64; 3], up: Option<[f64; 3]>) -> Frame {
+pub(crate) fn facing(cx: &mut CompileContext, normal: [f64; 3], up: Option<[f64; 3]>) -> Axes {
     let mut fine = cx.edge("normal", normal);
     if let Some(up) = up {
         fine &= cx.edge("up", up);
     }
     let unit = DVec3::from(normal).normalize_or(DVec3::Y);
-    let frame = Frame::facing(unit, up.map(DVec3::from));
+    let frame = Axes::facing(unit, up.map(DVec3::from));
     if let (true, None, Some(up)) = (fine, frame, up) {
         let message = format!("{} is parallel to the normal {}", show(&up), show(&normal));
         cx.error("up", message, Some("give a direction that lies in the surface, or leave it out"));
     }
-    frame.unwrap_or(Frame::around(unit))
+    frame.unwrap_or(Axes::around(unit))
 }
 
 #[cfg(test)]
@@ -65,7 +65,7 @@ mod tests {
     #[test]
     fn it_is_the_parallelogram_around_the_centre() {
         let of = |normal| {
-            let desc = RectangleDesc { normal, ..RectangleDesc::new([1.0, 2.0, 3.0], [4.0, 2.0]) };
+            let desc = RectangleShapeDesc { normal, ..RectangleShapeDesc::new([1.0, 2.0, 3.0], [4.0, 2.0]) };
             made(|cx| desc.compile(cx))
         };
         // Facing the viewer: u to the right, v up
@@ -80,10 +80,10 @@ mod tests {
 
     #[test]
     fn up_is_made_perpendicular() {
-        let desc = RectangleDesc {
+        let desc = RectangleShapeDesc {
             normal: [0.0, 0.0, 1.0],
             up: Some([3.0, 0.0, 7.0]),
-            ..RectangleDesc::new([0.0; 3], [1.0, 1.0])
+            ..RectangleShapeDesc::new([0.0; 3], [1.0, 1.0])
         };
         let turned = made(|cx| desc.compile(cx));
         assert_eq!((turned.v_axis, turned.u_axis, turned.n), (DVec3::X, DVec3::NEG_Y, DVec3::Z));
@@ -91,12 +91,13 @@ mod tests {
 
     #[test]
     fn faults_are_told() {
-        let flat = RectangleDesc::new([0.0; 3], [1.0, 0.0]);
+        let flat = RectangleShapeDesc::new([0.0; 3], [1.0, 0.0]);
         assert_eq!(faults(|cx| flat.compile(cx))[0].0, "size[1]");
-        let parallel = RectangleDesc { up: Some([0.0, 1.0, 0.0]), ..RectangleDesc::new([0.0; 3], [1.0, 1.0]) };
+        let parallel =
+            RectangleShapeDesc { up: Some([0.0, 1.0, 0.0]), ..RectangleShapeDesc::new([0.0; 3], [1.0, 1.0]) };
         let found = faults(|cx| parallel.compile(cx));
         assert!(found.len() == 1 && found[0].0 == "up", "{found:?}");
-        let no_up = RectangleDesc { up: Some([0.0; 3]), ..parallel };
+        let no_up = RectangleShapeDesc { up: Some([0.0; 3]), ..parallel };
         assert!(faults(|cx| no_up.compile(cx))[0].1.contains("has no length"));
     }
 }

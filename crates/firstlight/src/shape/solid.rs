@@ -6,15 +6,15 @@ use super::ball::Ball;
 use super::cuboid::Cuboid;
 use super::disk::Disk;
 use super::frustum::Frustum;
-use super::plane::Plane;
+use super::plane::UnboundedPlane;
 use super::surface::UvEdge;
 use super::torus::Torus;
-use crate::math::{DAffine3, DMat3, DRay, DVec3, Frame};
+use crate::math::{Axes, DAffine3, DMat3, DRay, DVec3};
 
 /// A shape, ready to be hit.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Solid {
-    Plane(Plane),
+    Plane(UnboundedPlane),
     Disk(Disk),
     Cuboid(Cuboid),
     /// Cylinders and cones.
@@ -164,7 +164,7 @@ impl Solid {
         match self {
             Solid::Plane(plane) => {
                 let (at, n) = plane.place();
-                let Frame { x, y, z } = Frame::around(n);
+                let Axes { x, y, z } = Axes::around(n);
                 Some((map(x, y, z, at), Canonical::Plane))
             }
             Solid::Disk(disk) => Some(disk.canonical()),
@@ -357,14 +357,15 @@ mod tests {
     #[test]
     fn no_description_breaks_compiling() {
         use super::super::check::faults;
-        use super::super::{BoxDesc, ConeDesc, CylinderDesc, DiskDesc, PlaneDesc, RectangleDesc, TorusDesc};
+        use super::super::{BoxDesc, ConeDesc, CylinderDesc, DiskDesc, PlaneDesc, RectangleShapeDesc, TorusDesc};
         let numbers = [0.0, -1.0, 1e-300, 1e30, 1e308, f64::INFINITY, f64::NAN];
         for x in numbers {
             for y in numbers {
                 let (v, w) = ([x, y, 0.0], [y, 1.0, x]);
                 let plane = PlaneDesc { point: v, normal: w, up: Some([x; 3]), ..PlaneDesc::default() };
                 let disk = DiskDesc { normal: v, inner_radius: y, ..DiskDesc::new(w, x) };
-                let rectangle = RectangleDesc { normal: w, up: Some([y; 3]), ..RectangleDesc::new(v, [x, y]) };
+                let rectangle =
+                    RectangleShapeDesc { normal: w, up: Some([y; 3]), ..RectangleShapeDesc::new(v, [x, y]) };
                 let cuboid = BoxDesc { size: v, ..BoxDesc::new(w) };
                 let cone = ConeDesc { radius1: y, ..ConeDesc::new(v, w, x) };
                 let torus = TorusDesc { axis: v, ..TorusDesc::new(w, x, y) };

@@ -8,7 +8,7 @@ use super::common::shape_table;
 use super::solid::{Canonical, Solid, SolidHit, SolidPoint, turn};
 use super::surface::UvEdge;
 use crate::context::CompileContext;
-use crate::math::{DAffine3, DMat3, DRay, DVec3, Frame, bracketed, depressed_cubic};
+use crate::math::{Axes, DAffine3, DMat3, DRay, DVec3, bracketed, depressed_cubic};
 
 shape_table! {
     /// A ring: a tube bent round into a circle. Where the tube is thicker than the circle the ring has no hole, and
@@ -42,7 +42,7 @@ shape_table! {
 pub(crate) struct Torus {
     center: DVec3,
     /// z is the axis, angles are counted from x.
-    frame: Frame,
+    frame: Axes,
     major: f64,
     minor: f64,
 }
@@ -57,7 +57,7 @@ impl TorusDesc {
         let major =
             cx.positive("major_radius", self.major_radius, "from the centre to the middle of the tube, in metres");
         let minor = cx.positive("minor_radius", self.minor_radius, "the radius of the tube, in metres");
-        let frame = Frame::around(DVec3::from(self.axis).normalize_or(DVec3::Y));
+        let frame = Axes::around(DVec3::from(self.axis).normalize_or(DVec3::Y));
         Solid::Torus(Torus { center: self.center.into(), frame, major, minor })
     }
 }
@@ -150,7 +150,7 @@ impl Torus {
     /// What it is an image of, and by which map; `None` if the tube fills the hole, or nearly so.
     pub fn canonical(&self) -> Option<(DAffine3, Canonical)> {
         let tube = self.minor / self.major;
-        let Frame { x, y, z } = self.frame;
+        let Axes { x, y, z } = self.frame;
         let axes = DMat3::from_cols(x, y, z) * self.major;
         (tube < THICK)
             .then(|| (DAffine3::from_mat3_translation(axes, self.center), Canonical::Torus { tube: tube as f32 }))
@@ -169,7 +169,7 @@ impl Torus {
 
 #[cfg(test)]
 mod tests {
-    use super::super::check::{Known, Random, faults, made};
+    use super::super::check::{KnownSolid, Random, faults, made};
     use super::*;
 
     fn torus(center: DVec3, axis: DVec3, major: f64, minor: f64) -> Solid {
@@ -192,7 +192,7 @@ mod tests {
             let (major, minor) = (scale, scale * [0.01, 0.3, 0.9, 1.0, 1.7][round % 5]);
             let distance = |p| distance(p - center, axis, major, minor);
             let size = major + minor;
-            let known = Known { solid: torus(center, axis, major, minor), distance: &distance, center, size };
+            let known = KnownSolid { solid: torus(center, axis, major, minor), distance: &distance, center, size };
             let side = axis.any_orthonormal_vector();
             let around = |x: f64| {
                 let (sin, cos) = pxfm::f_sincos(x * 2.0 * PI);
@@ -285,7 +285,7 @@ mod tests {
             let (scale, center) = (random.magnitude(1e-6, 1e6), random.in_ball() * random.magnitude(1e-8, 1e8));
             let minor = random.magnitude(0.1, 0.8);
             let solid = torus(center, random.direction(), scale, minor * scale);
-            let known = Known { solid, distance: &|_| 0.0, center, size: (1.0 + minor) * scale };
+            let known = KnownSolid { solid, distance: &|_| 0.0, center, size: (1.0 + minor) * scale };
             // Around the hole the surface curves towards the ray, no more than a circle of that radius
             known.is_left_by_rays(50, &|cos| 0.9 * cos * (1.0 - minor) / (1.0 + minor));
         }

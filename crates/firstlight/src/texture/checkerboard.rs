@@ -123,13 +123,13 @@ fn corners(c: DVec2, a: DVec2, b: DVec2) -> [DVec2; 4] {
 }
 
 /// A parallelogram, cut at both ends of both axes: no more than 8 corners, but what rounding adds.
-type Outline = ArrayVec<DVec2, 16>;
+type Polygon = ArrayVec<DVec2, 16>;
 
 /// The mean over what of a footprint lies on the surface, where that ends within it.
 fn mean_within(waves: &[Wave; 2], c: DVec2, a: DVec2, b: DVec2) -> f64 {
     // The line along the footprint, for one that is no more than that
     let along = if a.length_squared() > b.length_squared() { a } else { b };
-    let (mut outline, mut line) = (Outline::new(), Outline::new());
+    let (mut outline, mut line) = (Polygon::new(), Polygon::new());
     outline.extend(corners(c, a, b));
     line.extend([c - along * 0.5, c + along * 0.5]);
     if !outline.iter().all(|p| p.abs().max_element() < MAX_REACH) {
@@ -160,8 +160,8 @@ fn mean_within(waves: &[Wave; 2], c: DVec2, a: DVec2, b: DVec2) -> f64 {
 /// What of an outline, closed or not, lies where (p[axis] - end) `sign` >= 0.
 ///
 /// Source: Sutherland and Hodgman, "Reentrant polygon clipping", 1974.
-fn cut(outline: &[DVec2], axis: usize, end: f64, sign: f64, closed: bool) -> Outline {
-    let mut left = Outline::new();
+fn cut(outline: &[DVec2], axis: usize, end: f64, sign: f64, closed: bool) -> Polygon {
+    let mut left = Polygon::new();
     let height = |p: DVec2| (p[axis] - end) * sign;
     for (i, &p) in outline.iter().enumerate() {
         if height(p) >= 0.0 {

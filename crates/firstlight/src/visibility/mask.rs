@@ -5,14 +5,14 @@ use fearless_simd::{Level, dispatch, f32x16, prelude::*};
 use super::Viewpoint;
 use super::occluders::ShadowMesh;
 use super::target::{SampleBlock, Target};
-use super::view::View;
+use super::view::ShadowView;
 use crate::accel::{RayPacket16, dispatch_all};
 use crate::ids::LightId;
 use crate::math::{LANES, ShadowRay, UNIT_ROUNDOFF, Vec3};
 use crate::scene::{Scene, ShadowRays};
 use crate::shape::SeenTriangle;
 
-impl View {
+impl ShadowView {
     /// Fills [`hidden`](Self::hidden): what triangles, solids and point sets hide, and what is below the horizon for
     /// sure. Spheres and parallelograms are left to their own tests.
     ///

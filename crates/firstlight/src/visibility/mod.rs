@@ -2,8 +2,8 @@
 //!
 //! A [`Shaft`] is the space between some points and a light. [`Occluders::gather`] finds what lies in it, once for all
 //! the points: mostly nothing, and then all of the light arrives. What is left is looked at from each point by
-//! [`View::classify`]: below the horizon, lit by all of the light, hidden from all of it, or cut by some edge. In the
-//! last case [`View::mask`] says which of the light's sampled points are hidden, a bit for each.
+//! [`ShadowView::classify`]: below the horizon, lit by all of the light, hidden from all of it, or cut by some edge. In
+//! the last case [`ShadowView::mask`] says which of the light's sampled points are hidden, a bit for each.
 //!
 //! Every answer is a proof that the plain renderer's own tests would all have answered the same, rounding included;
 //! where a proof fails by a hair's breadth, that test itself is asked. So pictures have the same bits with and without.
@@ -25,7 +25,7 @@ pub(crate) use outlook::{Outlook, Seen};
 pub(crate) use settle::{Settled, Settler};
 pub(crate) use shaft::Shaft;
 pub(crate) use target::Target;
-pub(crate) use view::{View, Visibility};
+pub(crate) use view::{ShadowView, Visibility};
 
 use crate::ids::LightId;
 use crate::math::{ErrorBound, Facet, ShadowRay, Vec3};

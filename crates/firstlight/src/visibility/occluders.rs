@@ -8,7 +8,7 @@ use super::target::{LightHull, Target};
 use crate::accel::{Aabb, dispatch_all};
 use crate::ids::{LightId, SurfaceId};
 use crate::math::Vec3;
-use crate::scene::{Geometry, Item, Meets, Placed, Scene, Target as PlacedTarget};
+use crate::scene::{Geometry, Meets, Placed, PlacedTarget, Scene, UpperItem};
 use crate::shape::{Mesh, Parallelogram, Placement, PlaneSide, Sphere};
 
 /// A sphere or parallelogram: of the lists of obstacles, of the upper tree, or of the round lights that block.
@@ -20,7 +20,7 @@ pub(crate) enum Which {
 }
 
 /// A mesh in its place: 0 is that of the world, others are what is placed, counted from 1.
-pub(crate) type Source = u32;
+pub(crate) type MeshNumber = u32;
 
 /// All that may stand between the points of a group and one light. What is not here does not, whatever rounding says.
 #[derive(Debug, Default)]
@@ -30,13 +30,13 @@ pub(crate) struct Occluders {
     /// Disk lights, as the scene lists them.
     pub disks: Vec<u32>,
     /// Leaves of the trees of meshes.
-    pub leaves: Vec<(Source, u32)>,
+    pub leaves: Vec<(MeshNumber, u32)>,
     /// Solids and point sets, as they are placed.
     pub others: Vec<u32>,
     /// Whether the trees held more than was asked for: then they have to be asked ray by ray.
     pub too_many: bool,
     /// Meshes that the shaft leads through.
-    meshes: Vec<Source>,
+    meshes: Vec<MeshNumber>,
 }
 
 /// A mesh that casts shadows, in its place.
@@ -51,7 +51,7 @@ pub(crate) struct ShadowMesh<'a> {
 
 impl<'a> ShadowMesh<'a> {
     /// With what of it stands in the way of a light.
-    pub fn of(geometry: &'a Geometry, source: Source, light: LightId) -> Option<Self> {
+    pub fn of(geometry: &'a Geometry, source: MeshNumber, light: LightId) -> Option<Self> {
         if source == 0 {
             let world = geometry.world.as_ref()?;
             let mesh = &world.mesh;
@@ -288,13 +288,13 @@ impl Occluders {
             |item| {
                 found += 1;
                 match geometry.items[item as usize] {
-                    Item::Sphere(i) if casts(geometry.spheres[i as usize].surface) => {
+                    UpperItem::Sphere(i) if casts(geometry.spheres[i as usize].surface) => {
                         self.spheres.push(Which::InTree(i));
                     }
-                    Item::Parallelogram(i) if casts(geometry.parallelograms[i as usize].surface) => {
+                    UpperItem::Parallelogram(i) if casts(geometry.parallelograms[i as usize].surface) => {
                         self.flats.push((Which::InTree(i), PlaneSide::Both));
                     }
-                    Item::Placed(i) if stands(i) => match geometry.placed[i as usize].target {
+                    UpperItem::Placed(i) if stands(i) => match geometry.placed[i as usize].target {
                         PlacedTarget::Mesh(_) => self.meshes.push(i + 1),
                         PlacedTarget::Points(_) | PlacedTarget::Solid(_) => self.others.push(i),
                     },
@@ -377,7 +377,7 @@ impl Occluders {
         &mut self,
         simd: S,
         geometry: &Geometry,
-        source: Source,
+        source: MeshNumber,
         light: LightId,
         shaft: &Shaft,
         cap: usize,

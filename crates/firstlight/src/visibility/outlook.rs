@@ -1,7 +1,7 @@
 //! What a zone of places sees of a box: all of it, nothing, or what is not known.
 //!
-//! Coarser than [`View`](super::View), and for places and lights by the hundred: it proves that nothing stands between,
-//! or that one convex thing stands before it all, and leaves everything else to who looks from nearer.
+//! Coarser than [`ShadowView`](super::ShadowView), and for places and lights by the hundred: it proves that nothing
+//! stands between, or that one convex thing stands before it all, and leaves everything else to who looks from nearer.
 
 use arrayvec::ArrayVec;
 use fearless_simd::Level;
@@ -13,7 +13,7 @@ use super::target::{LightHull, Target};
 use crate::accel::Aabb;
 use crate::ids::LightId;
 use crate::math::{DVec3, ErrorBound, Vec3};
-use crate::scene::{Placed, Scene, Target as PlacedTarget};
+use crate::scene::{Placed, PlacedTarget, Scene};
 use crate::shape::{Parallelogram, Solid, Sphere};
 
 /// What is seen of a box.

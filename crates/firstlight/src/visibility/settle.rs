@@ -5,7 +5,7 @@ use fearless_simd::Level;
 use super::Viewpoint;
 use super::occluders::Occluders;
 use super::target::Target;
-use super::view::{View, Visibility};
+use super::view::{ShadowView, Visibility};
 use crate::accel::Aabb;
 use crate::scene::Scene;
 
@@ -28,7 +28,7 @@ const TRACED: usize = 32;
 #[derive(Debug, Default)]
 pub(crate) struct Settler {
     pub occluders: Occluders,
-    pub view: View,
+    pub view: ShadowView,
     parts: Vec<(usize, usize)>,
 }
 
@@ -57,7 +57,7 @@ impl Settler {
         points: &[Viewpoint],
         order: &mut [u32],
         counts: &mut Settled,
-        mut each: impl FnMut(usize, Visibility, &mut View),
+        mut each: impl FnMut(usize, Visibility, &mut ShadowView),
     ) {
         let mut parts = std::mem::take(&mut self.parts);
         parts.clear();

@@ -13,7 +13,7 @@
 use fearless_simd::{f32x8, prelude::*};
 
 use super::target::LightHull;
-use crate::accel::{Aabb, BEAM_PAD, Node};
+use crate::accel::{Aabb, BEAM_PAD, BoxNode};
 use crate::math::{DVec3, Vec3};
 
 /// What lies below is not lit from above: no way to a light that counts leads through n.x < `least`.
@@ -149,7 +149,7 @@ impl TreeShaft {
     /// The children of a node that the shaft meets: a bit for each, and where they begin. Padding makes up for every
     /// rounding; no instruction set multiplies and adds at once, so that all find the same.
     #[inline(always)]
-    pub fn meet<S: Simd>(&self, simd: S, node: &Node) -> (u32, f32x8<S>) {
+    pub fn meet<S: Simd>(&self, simd: S, node: &BoxNode) -> (u32, f32x8<S>) {
         let planes = &node.planes;
         let line = |planes: &[f32; 8], r: f32, c: f32x8<S>| {
             let planes = f32x8::load_array_ref(simd, planes);

@@ -45,7 +45,7 @@ pub(crate) struct SampleBlock {
 /// Where the points of sixteen blocks lie: the middle and half the size of each along the hull's axes.
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(64))]
-pub(crate) struct Cells {
+pub(crate) struct BlockBounds {
     pub middle: [[f32; LANES]; 3],
     pub half: [[f32; LANES]; 3],
 }
@@ -59,7 +59,7 @@ pub(crate) struct Target {
     /// The sampled points, neighbours together; none of a light that is integrated.
     pub blocks: Vec<SampleBlock>,
     /// Where the blocks lie, sixteen at a time.
-    pub cells: Vec<Cells>,
+    pub cells: Vec<BlockBounds>,
 }
 
 /// Axes are this much longer than they need to be, and no shorter than this against the others: more than single
@@ -219,7 +219,7 @@ impl Target {
             target.blocks.push(block);
         }
         for blocks in target.blocks.chunks(LANES) {
-            let mut cells = Cells { middle: [[0.0; LANES]; 3], half: [[0.0; LANES]; 3] };
+            let mut cells = BlockBounds { middle: [[0.0; LANES]; 3], half: [[0.0; LANES]; 3] };
             for (place, block) in blocks.iter().enumerate() {
                 for axis in 0..3 {
                     let (low, high) = block.at[axis]

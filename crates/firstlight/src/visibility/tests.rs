@@ -3,7 +3,7 @@ use fearless_simd::Level;
 use super::shaft::{Horizon, Shaft};
 use super::target::LightHull;
 use super::*;
-use crate::accel::{Aabb, LEAF, Node, SimdLevel, dispatch_eight};
+use crate::accel::{Aabb, BoxNode, LEAF, SimdLevel, dispatch_eight};
 use crate::math::{DVec3, Ray};
 use crate::scene::{CompileOptions, Scene, SceneDesc};
 use crate::shape::RayDifferential;
@@ -96,7 +96,7 @@ fn a_shaft_leaves_out_no_box_that_a_way_to_the_light_meets() {
             shaft.horizon = Some(Horizon { n, least });
         }
         // Boxes around places on ways to the light, and anywhere
-        let mut node = Node::EMPTY;
+        let mut node = BoxNode::EMPTY;
         let center = at(random, 2.0);
         let mut half = 0.0f32;
         let mut boxes = Vec::new();

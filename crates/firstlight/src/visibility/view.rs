@@ -3,12 +3,12 @@
 use fearless_simd::{Level, Simd};
 
 use super::Viewpoint;
-use super::occluders::{Occluders, ShadowMesh, Source};
+use super::occluders::{MeshNumber, Occluders, ShadowMesh};
 use super::shaft::Shaft;
 use super::target::{LightSeen, Target};
 use crate::accel::dispatch_all;
 use crate::math::{DVec3, UNIT_ROUNDOFF, Vec3};
-use crate::scene::{Scene, Target as Placed};
+use crate::scene::{PlacedTarget, Scene};
 use crate::shape::{Cover, DiskShadow, Eye, ParallelogramShadow, Placement, SeenTriangle, SphereShadow, TOGETHER};
 
 /// How much of a light reaches a point.
@@ -26,7 +26,7 @@ pub(crate) enum Visibility {
 
 /// What may hide some of a light from one point.
 #[derive(Debug, Default)]
-pub(crate) struct View {
+pub(crate) struct ShadowView {
     pub spheres: Vec<SphereShadow>,
     pub flats: Vec<ParallelogramShadow>,
     pub disks: Vec<DiskShadow>,
@@ -45,7 +45,7 @@ pub(crate) struct View {
 /// Products of three numbers with sum are wrong by less than this, in the sum of their sizes.
 const DOT: f32 = 16.0 * UNIT_ROUNDOFF;
 
-impl View {
+impl ShadowView {
     /// Nothing is in the way.
     pub fn clear(&mut self) {
         self.spheres.clear();
@@ -140,7 +140,7 @@ impl View {
         let shaft = Shaft::of(&own, &[0], &target.hull);
         for &index in &occluders.others {
             let thing = &scene.geometry.placed[index as usize];
-            if let Placed::Solid(solid) = thing.target {
+            if let PlacedTarget::Solid(solid) = thing.target {
                 let solid = &scene.geometry.solids[solid as usize];
                 if let Some((on, n)) = solid.plane() {
                     if stays_before(&thing.placement, on, n, light, point) {
@@ -198,7 +198,7 @@ fn look_at<S: Simd>(
     mesh: &ShadowMesh,
     eye: &Eye,
     leaves: &[u32],
-    source: Source,
+    source: MeshNumber,
     but: u32,
     seen: &mut Vec<SeenTriangle>,
 ) -> bool {

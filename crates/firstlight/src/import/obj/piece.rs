@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use crate::import::Fault;
+use crate::import::ImportFault;
 use crate::import::error::shown;
 use crate::import::text::{Cursor, is_blank};
 
@@ -71,7 +71,7 @@ pub(super) fn skip_line(text: &mut Cursor) {
 
 impl<'a> Piece<'a> {
     /// Reads statements from a line's start to the end.
-    pub fn read(&mut self, bytes: &'a [u8], start: usize) -> Result<(), Fault> {
+    pub fn read(&mut self, bytes: &'a [u8], start: usize) -> Result<(), ImportFault> {
         let mut text = Cursor { bytes, at: start };
         while !text.at_end() {
             skip_blanks(&mut text);
@@ -119,7 +119,7 @@ impl<'a> Piece<'a> {
     }
 
     #[inline(always)]
-    pub fn position(&mut self, text: &mut Cursor) -> Result<(), Fault> {
+    pub fn position(&mut self, text: &mut Cursor) -> Result<(), ImportFault> {
         let at = text.at;
         if self.origin == [0.0; 3] {
             let mut of = |n| number(text, at, "v", n);
@@ -151,7 +151,7 @@ impl<'a> Piece<'a> {
     }
 
     #[inline(always)]
-    pub fn face(&mut self, text: &mut Cursor) -> Result<(), Fault> {
+    pub fn face(&mut self, text: &mut Cursor) -> Result<(), ImportFault> {
         let start = self.corners.len();
         let counts = [self.positions.len(), self.uvs.len(), self.normals.len()];
         loop {
@@ -173,7 +173,7 @@ impl<'a> Piece<'a> {
         Ok(())
     }
 
-    pub fn smoothing(&mut self, text: &mut Cursor) -> Result<(), Fault> {
+    pub fn smoothing(&mut self, text: &mut Cursor) -> Result<(), ImportFault> {
         skip_blanks(text);
         let at = text.at;
         let group = match text.word() {
@@ -183,7 +183,7 @@ impl<'a> Piece<'a> {
                 Some(group) => group,
                 None => {
                     let message = format!("smoothing group {}", shown(word));
-                    return Err(Fault::text(at, message, "give a whole number from 0 to 4294967295, or `off`"));
+                    return Err(ImportFault::text(at, message, "give a whole number from 0 to 4294967295, or `off`"));
                 }
             },
         };
@@ -207,7 +207,7 @@ fn rest<'a>(text: &mut Cursor<'a>) -> &'a [u8] {
 
 /// The next number of a statement; `n`: which, for messages.
 #[inline(always)]
-fn number(text: &mut Cursor, at: usize, statement: &str, n: usize) -> Result<f32, Fault> {
+fn number(text: &mut Cursor, at: usize, statement: &str, n: usize) -> Result<f32, ImportFault> {
     skip_blanks(text);
     match text.f32() {
         Some(number) => Ok(number),
@@ -216,7 +216,7 @@ fn number(text: &mut Cursor, at: usize, statement: &str, n: usize) -> Result<f32
 }
 
 #[cold]
-fn no_number(text: &Cursor, at: usize, statement: &str, n: usize) -> Fault {
+fn no_number(text: &Cursor, at: usize, statement: &str, n: usize) -> ImportFault {
     let word = text.next_word();
     let hint = "a position has 3 numbers, texture coordinates have 1 to 3, a normal has 3";
     let message = if word.is_empty() {
@@ -224,12 +224,12 @@ fn no_number(text: &Cursor, at: usize, statement: &str, n: usize) -> Fault {
     } else {
         format!("{statement}: {} where number {n} is needed", shown(word))
     };
-    Fault::text(at, message, hint)
+    ImportFault::text(at, message, hint)
 }
 
 /// One corner: `1`, `1/2`, `1//3` or `1/2/3`.
 #[inline(always)]
-pub(super) fn corner(text: &mut Cursor, counts: [usize; 3]) -> Result<[i32; 3], Fault> {
+pub(super) fn corner(text: &mut Cursor, counts: [usize; 3]) -> Result<[i32; 3], ImportFault> {
     let at = text.at;
     let mut corner = [NONE; 3];
     for (i, place) in corner.iter_mut().enumerate() {
@@ -268,21 +268,21 @@ pub(super) fn corner(text: &mut Cursor, counts: [usize; 3]) -> Result<[i32; 3], 
 }
 
 #[cold]
-fn bad_corner(text: &Cursor, at: usize) -> Fault {
+fn bad_corner(text: &Cursor, at: usize) -> ImportFault {
     let word = Cursor { bytes: text.bytes, at }.word();
     let hint = "a corner is `position`, `position/uv`, `position//normal` or `position/uv/normal`";
-    Fault::text(at, format!("{} is not a corner of a face", shown(word)), hint)
+    ImportFault::text(at, format!("{} is not a corner of a face", shown(word)), hint)
 }
 
 #[cold]
-fn zero(text: &Cursor, at: usize) -> Fault {
+fn zero(text: &Cursor, at: usize) -> ImportFault {
     let word = Cursor { bytes: text.bytes, at }.word();
-    Fault::text(at, format!("index 0 in {}", shown(word)), "indices begin at 1, or at -1 from the last")
+    ImportFault::text(at, format!("index 0 in {}", shown(word)), "indices begin at 1, or at -1 from the last")
 }
 
 #[cold]
-fn far(text: &Cursor, at: usize, index: i64) -> Fault {
+fn far(text: &Cursor, at: usize, index: i64) -> ImportFault {
     let word = Cursor { bytes: text.bytes, at }.word();
     let hint = "indices are from -536870911 to 2147483647";
-    Fault::text(at, format!("index {index} in {}", shown(word)), hint)
+    ImportFault::text(at, format!("index {index} in {}", shown(word)), hint)
 }

@@ -1,16 +1,16 @@
 //! From faces as they stand in a PLY file to the triangles of a mesh.
 
-use super::super::polygon::{self, Counts};
+use super::super::polygon::{self, PolygonCounts};
 use super::super::weld::weld;
-use super::super::{Fault, MAX_COUNT, MeshData};
+use super::super::{ImportFault, MAX_COUNT, MeshData};
 use super::body::Faces;
 use super::header::Scalar;
-use super::plan::{Colors, Plan};
+use super::plan::{ColorScale, Plan};
 
 /// Makes triangles of the faces, and parts vertices where faces have texture coordinates or colours of their own.
-pub(super) fn assemble(mut parts: Vec<Faces>, plan: &Plan, mesh: &mut MeshData) -> Result<(), Fault> {
+pub(super) fn assemble(mut parts: Vec<Faces>, plan: &Plan, mesh: &mut MeshData) -> Result<(), ImportFault> {
     let parted = plan.wedges || plan.face_colors;
-    let mut counts = Counts::default();
+    let mut counts = PolygonCounts::default();
     let positions = std::mem::take(&mut mesh.positions);
     // Triangles of a part, as numbers of its corners where it is not triangles already
     let mut split = |part: &Faces| {
@@ -88,7 +88,7 @@ pub(super) fn assemble(mut parts: Vec<Faces>, plan: &Plan, mesh: &mut MeshData) 
         mesh.uvs.insert(0, welded.first.iter().map(|&i| wedges[i as usize]).collect());
     }
     if plan.face_colors {
-        let table = Colors::new(Scalar::U8);
+        let table = ColorScale::new(Scalar::U8);
         let linear = |&i: &u32| table.linear(colors[i as usize].to_le_bytes().map(f32::from));
         mesh.colors = welded.first.iter().map(linear).collect();
     }
@@ -104,9 +104,9 @@ fn pick<T: Copy>(list: &mut Vec<T>, first: &[u32], vertex: impl Fn(&u32) -> usiz
     }
 }
 
-fn check_count(triangles: usize) -> Result<(), Fault> {
+fn check_count(triangles: usize) -> Result<(), ImportFault> {
     match triangles as u64 {
-        count if count > MAX_COUNT => Err(Fault::TooMany { what: "triangles", count, limit: MAX_COUNT }),
+        count if count > MAX_COUNT => Err(ImportFault::TooMany { what: "triangles", count, limit: MAX_COUNT }),
         _ => Ok(()),
     }
 }

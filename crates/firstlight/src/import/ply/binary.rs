@@ -3,9 +3,9 @@
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use super::super::{Fault, Progress};
+use super::super::{ImportFault, Progress};
 use super::body::{Body, Faces, PIECE, Row};
-use super::header::{Element, Encoding, Header, Kind, Scalar};
+use super::header::{DataEncoding, Element, Header, PropertyKind, Scalar};
 use super::plan::{NX, Plan, Purpose, RADIUS, RED, SLOTS, U, Use, X};
 use super::source::{Binary, Source, binary_value};
 use crate::parallel::{self, CHUNK};
@@ -15,9 +15,9 @@ pub(super) fn read_binary(
     file: &[u8],
     header: &Header,
     plan: &Plan,
-    encoding: Encoding,
+    encoding: DataEncoding,
     progress: &Progress,
-) -> Result<Body, Fault> {
+) -> Result<Body, ImportFault> {
     let mut body = Body::default();
     let mut source = Binary::new(file, header.body, encoding);
     progress.advance(header.body)?;
@@ -52,7 +52,7 @@ fn read_uniform(
     number: usize,
     body: &mut Body,
     progress: &Progress,
-) -> Result<bool, Fault> {
+) -> Result<bool, ImportFault> {
     // The layout of the first row
     let mut lists: Vec<(usize, Scalar, u64)> = Vec::new();
     let mut slots: [Option<(usize, Scalar)>; SLOTS] = [None; SLOTS];
@@ -61,13 +61,13 @@ fn read_uniform(
     for (property, &what) in element.properties.iter().zip(&plan.uses[number]) {
         let offset = first.at - source.at;
         match property.kind {
-            Kind::Scalar(scalar) => {
+            PropertyKind::Scalar(scalar) => {
                 if let Use::Slot(slot) = what {
                     slots[slot] = Some((offset, scalar));
                 }
                 first.skip(scalar, 1)?;
             }
-            Kind::List { count, item } => {
+            PropertyKind::List { count, item } => {
                 let Ok(length) = u64::try_from(first.whole(count)?) else { return Ok(false) };
                 lists.push((offset, count, length));
                 match what {

@@ -2,9 +2,9 @@
 
 use super::super::error::WRITE_ANEW;
 use super::super::text::{Cursor, is_blank, is_line_end, pieces};
-use super::super::{Fault, MeshData, Progress, all};
-use super::header::{Element, Header, Kind, Scalar};
-use super::plan::{ALPHA, Colors, NX, Plan, Purpose, RADIUS, RED, SLOTS, U, Use, X};
+use super::super::{ImportFault, MeshData, Progress, all};
+use super::header::{Element, Header, PropertyKind, Scalar};
+use super::plan::{ALPHA, ColorScale, NX, Plan, Purpose, RADIUS, RED, SLOTS, U, Use, X};
 use super::source::{Source, Text};
 use crate::parallel;
 
@@ -111,7 +111,7 @@ pub(super) struct Row {
 impl Row {
     pub fn new(plan: &Plan) -> Self {
         let mut slots = [0.0; SLOTS];
-        slots[ALPHA] = plan.colors.as_ref().map_or(255.0, Colors::opaque);
+        slots[ALPHA] = plan.colors.as_ref().map_or(255.0, ColorScale::opaque);
         Self { slots, indices: Vec::new(), coordinates: Vec::new(), strip: Vec::new() }
     }
 
@@ -125,17 +125,17 @@ impl Row {
         element: usize,
         vertices: &mut Vertices,
         faces: &mut Faces,
-    ) -> Result<(), Fault> {
+    ) -> Result<(), ImportFault> {
         let purpose = plan.purposes[element];
         self.indices.clear();
         self.coordinates.clear();
         for (property, &what) in elements[element].properties.iter().zip(&plan.uses[element]) {
             match (property.kind, what) {
-                (Kind::Scalar(scalar), Use::Slot(slot)) => {
+                (PropertyKind::Scalar(scalar), Use::Slot(slot)) => {
                     self.slots[slot] = (source.value(scalar)? - plan.offsets[slot]) as f32;
                 }
-                (Kind::Scalar(scalar), _) => source.skip(scalar, 1)?,
-                (Kind::List { count, item }, _) => {
+                (PropertyKind::Scalar(scalar), _) => source.skip(scalar, 1)?,
+                (PropertyKind::List { count, item }, _) => {
                     let at = source.offset();
                     let length = source.whole(count)?;
                     let Ok(length) = u64::try_from(length) else {
@@ -173,7 +173,13 @@ impl Row {
         Ok(())
     }
 
-    fn read_strip(&mut self, source: &mut impl Source, item: Scalar, length: u64, plan: &Plan) -> Result<(), Fault> {
+    fn read_strip(
+        &mut self,
+        source: &mut impl Source,
+        item: Scalar,
+        length: u64,
+        plan: &Plan,
+    ) -> Result<(), ImportFault> {
         self.strip.clear();
         for _ in 0..length {
             let at = source.offset();
@@ -221,7 +227,7 @@ impl Row {
 }
 
 #[cold]
-fn outside(source: &impl Source, at: usize, index: i64, vertices: u64) -> Fault {
+fn outside(source: &impl Source, at: usize, index: i64, vertices: u64) -> ImportFault {
     let message = match vertices {
         0 => format!("vertex {index}, but the file has no vertices"),
         n => format!("vertex {index} is outside 0 to {}", n - 1),
@@ -230,10 +236,10 @@ fn outside(source: &impl Source, at: usize, index: i64, vertices: u64) -> Fault 
 }
 
 /// Reads text: on all threads where each row has a line, otherwise as one stream of numbers.
-pub(super) fn read_text(file: &[u8], header: &Header, plan: &Plan, progress: &Progress) -> Result<Body, Fault> {
+pub(super) fn read_text(file: &[u8], header: &Header, plan: &Plan, progress: &Progress) -> Result<Body, ImportFault> {
     match read_lines(file, header, plan, progress) {
         Ok(body) => Ok(body),
-        Err(Fault::Stopped) => Err(Fault::Stopped),
+        Err(ImportFault::Stopped) => Err(ImportFault::Stopped),
         Err(lines) => {
             // An empty line alone is no fault
             let empty = lines.offset().is_none_or(|at| is_empty_line(file, at));
@@ -255,7 +261,7 @@ fn is_empty_line(file: &[u8], at: usize) -> bool {
 }
 
 /// Reads text with one row to a line, on all threads.
-fn read_lines(file: &[u8], header: &Header, plan: &Plan, progress: &Progress) -> Result<Body, Fault> {
+fn read_lines(file: &[u8], header: &Header, plan: &Plan, progress: &Progress) -> Result<Body, ImportFault> {
     // The number of the first row after each element
     let mut ends = Vec::new();
     let mut rows = 0u64;
@@ -303,13 +309,13 @@ fn read_lines(file: &[u8], header: &Header, plan: &Plan, progress: &Progress) ->
         body.faces.push(faces);
     }
     if done < rows {
-        return Err(Fault::text(file.len(), "the file ends before its last row", WRITE_ANEW));
+        return Err(ImportFault::text(file.len(), "the file ends before its last row", WRITE_ANEW));
     }
     Ok(body)
 }
 
 /// Reads text as one stream of numbers.
-fn read_stream(file: &[u8], header: &Header, plan: &Plan) -> Result<Body, Fault> {
+fn read_stream(file: &[u8], header: &Header, plan: &Plan) -> Result<Body, ImportFault> {
     let mut body = Body::default();
     let mut faces = Faces::default();
     let mut row = Row::new(plan);

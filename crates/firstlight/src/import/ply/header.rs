@@ -1,12 +1,12 @@
 //! The header of a PLY file.
 
-use super::super::Fault;
+use super::super::ImportFault;
 use super::super::error::{WRITE_ANEW, shown};
 use super::super::text::Cursor;
 
 /// How the values after the header are written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Encoding {
+pub(super) enum DataEncoding {
     Ascii,
     Little,
     Big,
@@ -57,7 +57,7 @@ impl Scalar {
 
 /// One value, or a list of values after their number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Kind {
+pub(super) enum PropertyKind {
     Scalar(Scalar),
     List { count: Scalar, item: Scalar },
 }
@@ -65,7 +65,7 @@ pub(super) enum Kind {
 #[derive(Clone, Debug)]
 pub(super) struct Property<'a> {
     pub(super) name: &'a [u8],
-    pub(super) kind: Kind,
+    pub(super) kind: PropertyKind,
 }
 
 #[derive(Clone, Debug)]
@@ -79,12 +79,12 @@ pub(super) struct Element<'a> {
 
 impl Element<'_> {
     /// The fewest bytes that a row takes.
-    pub(super) fn least_row(&self, encoding: Encoding) -> u64 {
+    pub(super) fn least_row(&self, encoding: DataEncoding) -> u64 {
         let size = |p: &Property| match (encoding, p.kind) {
             // A digit, and what parts it from the next
-            (Encoding::Ascii, _) => 2,
-            (_, Kind::Scalar(scalar)) => scalar.size() as u64,
-            (_, Kind::List { count, .. }) => count.size() as u64,
+            (DataEncoding::Ascii, _) => 2,
+            (_, PropertyKind::Scalar(scalar)) => scalar.size() as u64,
+            (_, PropertyKind::List { count, .. }) => count.size() as u64,
         };
         self.properties.iter().map(size).sum()
     }
@@ -92,7 +92,7 @@ impl Element<'_> {
 
 #[derive(Clone, Debug)]
 pub(super) struct Header<'a> {
-    pub(super) encoding: Encoding,
+    pub(super) encoding: DataEncoding,
     pub(super) elements: Vec<Element<'a>>,
     /// The first byte after the header.
     pub(super) body: usize,
@@ -102,12 +102,12 @@ const SCALARS: &str = "types are char, uchar, short, ushort, int, uint, float, d
 
 impl<'a> Header<'a> {
     /// Reads up to and with `end_header` and its line end.
-    pub(super) fn read(file: &'a [u8]) -> Result<Self, Fault> {
+    pub(super) fn read(file: &'a [u8]) -> Result<Self, ImportFault> {
         let mut text = Cursor { bytes: file, at: 0 };
         let first = text.rest_of_line();
         if first.trim_ascii() != b"ply" {
             let message = format!("the first line is {}, not `ply`", shown(first));
-            return Err(Fault::text(0, message, "give a PLY file"));
+            return Err(ImportFault::text(0, message, "give a PLY file"));
         }
         // What ends the first line ends the last: data that begins like a line end is no part of it
         let only_cr = text.peek() == Some(b'\r') && text.bytes.get(text.at + 1) != Some(&b'\n');
@@ -117,7 +117,7 @@ impl<'a> Header<'a> {
         loop {
             let line = text.at;
             if text.at_end() {
-                return Err(Fault::text(line, "the header has no `end_header`", WRITE_ANEW));
+                return Err(ImportFault::text(line, "the header has no `end_header`", WRITE_ANEW));
             }
             text.skip_blanks();
             match text.word() {
@@ -136,53 +136,57 @@ impl<'a> Header<'a> {
                     let element = Self::element(&mut text, line)?;
                     if let Some(twice) = elements.iter().find(|e| e.name == element.name) {
                         let message = format!("a second element {}", shown(twice.name));
-                        return Err(Fault::text(line, message, "each element stands once in a header"));
+                        return Err(ImportFault::text(line, message, "each element stands once in a header"));
                     }
                     elements.push(element);
                     // Looking through all names for each new one must stay cheap
                     if elements.len() > 256 {
-                        return Err(Fault::text(line, "more than 256 elements", "leave some out"));
+                        return Err(ImportFault::text(line, "more than 256 elements", "leave some out"));
                     }
                 }
                 b"property" => {
                     let property = Self::property(&mut text, line)?;
                     let Some(element) = elements.last_mut() else {
-                        return Err(Fault::text(line, "a property before any element", WRITE_ANEW));
+                        return Err(ImportFault::text(line, "a property before any element", WRITE_ANEW));
                     };
                     element.properties.push(property);
                     if element.properties.len() > 4096 {
-                        return Err(Fault::text(line, "more than 4096 properties of one element", "leave some out"));
+                        return Err(ImportFault::text(
+                            line,
+                            "more than 4096 properties of one element",
+                            "leave some out",
+                        ));
                     }
                 }
                 other => {
                     let message = format!("{} in the header", shown(other));
                     let hint = "lines begin with format, comment, obj_info, element, property or end_header";
-                    return Err(Fault::text(line, message, hint));
+                    return Err(ImportFault::text(line, message, hint));
                 }
             }
             text.rest_of_line();
             text.pass_line_end();
         }
         let Some(encoding) = encoding else {
-            return Err(Fault::text(0, "the header has no `format`", WRITE_ANEW));
+            return Err(ImportFault::text(0, "the header has no `format`", WRITE_ANEW));
         };
         Ok(Self { encoding, elements, body: text.at })
     }
 
-    fn format(text: &mut Cursor, line: usize) -> Result<Encoding, Fault> {
+    fn format(text: &mut Cursor, line: usize) -> Result<DataEncoding, ImportFault> {
         text.skip_blanks();
         match text.word() {
-            b"ascii" => Ok(Encoding::Ascii),
-            b"binary_little_endian" => Ok(Encoding::Little),
-            b"binary_big_endian" => Ok(Encoding::Big),
+            b"ascii" => Ok(DataEncoding::Ascii),
+            b"binary_little_endian" => Ok(DataEncoding::Little),
+            b"binary_big_endian" => Ok(DataEncoding::Big),
             other => {
                 let message = format!("format {}", shown(other));
-                Err(Fault::text(line, message, "formats are ascii, binary_little_endian and binary_big_endian"))
+                Err(ImportFault::text(line, message, "formats are ascii, binary_little_endian and binary_big_endian"))
             }
         }
     }
 
-    fn element(text: &mut Cursor<'a>, line: usize) -> Result<Element<'a>, Fault> {
+    fn element(text: &mut Cursor<'a>, line: usize) -> Result<Element<'a>, ImportFault> {
         text.skip_blanks();
         let name = text.word();
         text.skip_blanks();
@@ -191,32 +195,32 @@ impl<'a> Header<'a> {
             Some(count) => Ok(Element { name, count, properties: Vec::new(), at: line }),
             None => {
                 let message = format!("element {} has the count {}", shown(name), shown(number));
-                Err(Fault::text(line, message, "a count is a whole number from 0 to 2^64 - 1"))
+                Err(ImportFault::text(line, message, "a count is a whole number from 0 to 2^64 - 1"))
             }
         }
     }
 
-    fn property(text: &mut Cursor<'a>, line: usize) -> Result<Property<'a>, Fault> {
+    fn property(text: &mut Cursor<'a>, line: usize) -> Result<Property<'a>, ImportFault> {
         let mut word = || {
             text.skip_blanks();
             text.word()
         };
         let scalar = |word: &[u8]| {
-            Scalar::named(word).ok_or_else(|| Fault::text(line, format!("the type {}", shown(word)), SCALARS))
+            Scalar::named(word).ok_or_else(|| ImportFault::text(line, format!("the type {}", shown(word)), SCALARS))
         };
         let kind = match word() {
             b"list" => {
                 let count = scalar(word())?;
                 if count.is_float() {
                     let hint = "a list is counted by char, uchar, short, ushort, int or uint";
-                    return Err(Fault::text(line, "a list counted by fractions", hint));
+                    return Err(ImportFault::text(line, "a list counted by fractions", hint));
                 }
-                Kind::List { count, item: scalar(word())? }
+                PropertyKind::List { count, item: scalar(word())? }
             }
-            other => Kind::Scalar(scalar(other)?),
+            other => PropertyKind::Scalar(scalar(other)?),
         };
         match word() {
-            b"" => Err(Fault::text(line, "a property without a name", WRITE_ANEW)),
+            b"" => Err(ImportFault::text(line, "a property without a name", WRITE_ANEW)),
             name => Ok(Property { name, kind }),
         }
     }

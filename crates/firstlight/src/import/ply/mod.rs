@@ -24,8 +24,8 @@ mod header;
 mod plan;
 mod source;
 
-use super::{Fault, MeshData, Progress};
-use header::{Encoding, Header};
+use super::{ImportFault, MeshData, Progress};
+use header::{DataEncoding, Header};
 use plan::{Plan, X};
 
 /// Whether a file of any name is PLY: its first line.
@@ -34,12 +34,12 @@ pub(super) fn looks_like(file: &[u8]) -> bool {
 }
 
 /// Reads a PLY file; positions less `origin`.
-pub(super) fn read(file: &[u8], origin: [f64; 3], progress: &Progress) -> Result<MeshData, Fault> {
+pub(super) fn read(file: &[u8], origin: [f64; 3], progress: &Progress) -> Result<MeshData, ImportFault> {
     let header = Header::read(file)?;
     let mut plan = Plan::new(&header, file.len())?;
     plan.offsets[X..X + 3].copy_from_slice(&origin);
     let mut body = match header.encoding {
-        Encoding::Ascii => body::read_text(file, &header, &plan, progress)?,
+        DataEncoding::Ascii => body::read_text(file, &header, &plan, progress)?,
         encoding => binary::read_binary(file, &header, &plan, encoding, progress)?,
     };
     let mut mesh = MeshData::default();

@@ -1,9 +1,9 @@
 //! What is read of a PLY file: which property of which element is what.
 
 use super::super::error::{WRITE_ANEW, shown};
-use super::super::{Fault, MAX_COUNT};
-use super::header::{Element, Encoding, Header, Kind, Scalar};
-use crate::color::Encoding as ColorEncoding;
+use super::super::{ImportFault, MAX_COUNT};
+use super::header::{DataEncoding, Element, Header, PropertyKind, Scalar};
+use crate::color::Encoding;
 use crate::parallel;
 
 /// The attributes of a vertex, as places in a row.
@@ -37,8 +37,8 @@ pub(super) fn find(element: &Element, slot: usize) -> Option<(usize, Scalar)> {
     let scalar = |name: &&str| {
         let position = element.properties.iter().position(|p| p.name == name.as_bytes())?;
         match element.properties[position].kind {
-            Kind::Scalar(scalar) => Some((position, scalar)),
-            Kind::List { .. } => None,
+            PropertyKind::Scalar(scalar) => Some((position, scalar)),
+            PropertyKind::List { .. } => None,
         }
     };
     NAMES[slot].iter().find_map(scalar)
@@ -64,19 +64,19 @@ pub(super) enum Purpose {
 
 /// How colours become linear.
 #[derive(Clone, Debug)]
-pub(super) struct Colors {
+pub(super) struct ColorScale {
     /// Linear values of whole numbers; empty if the file has fractions.
     table: Vec<f32>,
 }
 
-impl Colors {
+impl ColorScale {
     pub fn new(scalar: Scalar) -> Self {
         let largest = match scalar {
             Scalar::F32 | Scalar::F64 => return Self { table: Vec::new() },
             Scalar::U16 => 65535,
             _ => 255,
         };
-        let decode = |i: usize| ColorEncoding::Srgb.decode(i as f64 / largest as f64) as f32;
+        let decode = |i: usize| Encoding::Srgb.decode(i as f64 / largest as f64) as f32;
         Self { table: parallel::map(largest + 1, 256, decode) }
     }
 
@@ -105,7 +105,7 @@ pub(super) struct Plan {
     pub vertices: u64,
     pub normals: bool,
     pub uvs: bool,
-    pub colors: Option<Colors>,
+    pub colors: Option<ColorScale>,
     pub radii: bool,
     /// Faces have texture coordinates of their own.
     pub wedges: bool,
@@ -116,10 +116,10 @@ pub(super) struct Plan {
 }
 
 impl Plan {
-    pub fn new(header: &Header, file: usize) -> Result<Self, Fault> {
+    pub fn new(header: &Header, file: usize) -> Result<Self, ImportFault> {
         // No element can have more rows than there are bytes for; the last row of a text needs nothing after it
         let left = (file - header.body) as u64;
-        let mut room = left + u64::from(header.encoding == Encoding::Ascii);
+        let mut room = left + u64::from(header.encoding == DataEncoding::Ascii);
         for element in &header.elements {
             let least = element.least_row(header.encoding);
             match element.count.checked_mul(least).and_then(|bytes| room.checked_sub(bytes)) {
@@ -131,23 +131,23 @@ impl Plan {
                         element.count,
                         room / least
                     );
-                    return Err(Fault::text(element.at, message, WRITE_ANEW));
+                    return Err(ImportFault::text(element.at, message, WRITE_ANEW));
                 }
             }
         }
         let Some(at) = header.elements.iter().position(|e| e.name == b"vertex") else {
             let hint = "firstlight reads the elements vertex, face and tristrips";
-            return Err(Fault::text(0, "the header has no element vertex", hint));
+            return Err(ImportFault::text(0, "the header has no element vertex", hint));
         };
         let vertex = &header.elements[at];
         for (slot, name) in ["x", "y", "z"].into_iter().enumerate() {
             if find(vertex, slot).is_none() {
                 let message = format!("element vertex has no property {name}");
-                return Err(Fault::text(vertex.at, message, "a vertex has x, y and z, each a number"));
+                return Err(ImportFault::text(vertex.at, message, "a vertex has x, y and z, each a number"));
             }
         }
         if vertex.count > MAX_COUNT {
-            return Err(Fault::TooMany { what: "vertices", count: vertex.count, limit: MAX_COUNT });
+            return Err(ImportFault::TooMany { what: "vertices", count: vertex.count, limit: MAX_COUNT });
         }
         let has = |slots: std::ops::Range<usize>| slots.clone().all(|s| find(vertex, s).is_some());
         let (normals, uvs, colors) = (has(NX..U), has(U..RED), has(RED..ALPHA));
@@ -158,7 +158,7 @@ impl Plan {
             vertices: vertex.count,
             normals,
             uvs,
-            colors: color_type.map(Colors::new),
+            colors: color_type.map(ColorScale::new),
             radii: has(RADIUS..SLOTS),
             offsets: [0.0; SLOTS],
             wedges: false,
@@ -174,7 +174,10 @@ impl Plan {
         let mut uses = vec![Use::None; element.properties.len()];
         let list = |names: &[&str]| {
             let of = |name: &&str| {
-                element.properties.iter().position(|p| p.name == name.as_bytes() && matches!(p.kind, Kind::List { .. }))
+                element
+                    .properties
+                    .iter()
+                    .position(|p| p.name == name.as_bytes() && matches!(p.kind, PropertyKind::List { .. }))
             };
             names.iter().find_map(of)
         };

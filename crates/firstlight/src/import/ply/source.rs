@@ -1,9 +1,9 @@
 //! Where the values of a PLY file come from, one after another: text, or binary data of either byte order.
 
-use super::super::Fault;
+use super::super::ImportFault;
 use super::super::error::{WRITE_ANEW, shown};
 use super::super::text::Cursor;
-use super::header::{Encoding, Scalar};
+use super::header::{DataEncoding, Scalar};
 
 /// Values in their order.
 pub(super) trait Source {
@@ -11,19 +11,19 @@ pub(super) trait Source {
     fn offset(&self) -> usize;
 
     /// The next value.
-    fn value(&mut self, scalar: Scalar) -> Result<f64, Fault>;
+    fn value(&mut self, scalar: Scalar) -> Result<f64, ImportFault>;
 
     /// The next value, which must be whole.
-    fn whole(&mut self, scalar: Scalar) -> Result<i64, Fault>;
+    fn whole(&mut self, scalar: Scalar) -> Result<i64, ImportFault>;
 
     /// Goes past `count` values.
-    fn skip(&mut self, scalar: Scalar, count: u64) -> Result<(), Fault>;
+    fn skip(&mut self, scalar: Scalar, count: u64) -> Result<(), ImportFault>;
 
     /// A row is done.
-    fn end_row(&mut self) -> Result<(), Fault>;
+    fn end_row(&mut self) -> Result<(), ImportFault>;
 
     /// A fault at a byte.
-    fn fault(&self, offset: usize, message: String, hint: &'static str) -> Fault;
+    fn fault(&self, offset: usize, message: String, hint: &'static str) -> ImportFault;
 }
 
 /// One binary value at the start of `bytes`.
@@ -55,13 +55,13 @@ pub(super) struct Binary<'a> {
 }
 
 impl<'a> Binary<'a> {
-    pub(super) fn new(bytes: &'a [u8], at: usize, encoding: Encoding) -> Self {
-        Self { bytes, at, big: encoding == Encoding::Big }
+    pub(super) fn new(bytes: &'a [u8], at: usize, encoding: DataEncoding) -> Self {
+        Self { bytes, at, big: encoding == DataEncoding::Big }
     }
 
     #[cold]
-    fn ended(&self) -> Fault {
-        Fault::binary(self.bytes.len(), "the file ends within a row", WRITE_ANEW)
+    fn ended(&self) -> ImportFault {
+        ImportFault::binary(self.bytes.len(), "the file ends within a row", WRITE_ANEW)
     }
 }
 
@@ -71,7 +71,7 @@ impl Source for Binary<'_> {
     }
 
     #[inline(always)]
-    fn value(&mut self, scalar: Scalar) -> Result<f64, Fault> {
+    fn value(&mut self, scalar: Scalar) -> Result<f64, ImportFault> {
         let rest = &self.bytes[self.at..];
         if rest.len() < scalar.size() {
             return Err(self.ended());
@@ -81,7 +81,7 @@ impl Source for Binary<'_> {
     }
 
     #[inline(always)]
-    fn whole(&mut self, scalar: Scalar) -> Result<i64, Fault> {
+    fn whole(&mut self, scalar: Scalar) -> Result<i64, ImportFault> {
         let at = self.at;
         let value = self.value(scalar)?;
         if value as i64 as f64 != value {
@@ -91,7 +91,7 @@ impl Source for Binary<'_> {
     }
 
     #[inline(always)]
-    fn skip(&mut self, scalar: Scalar, count: u64) -> Result<(), Fault> {
+    fn skip(&mut self, scalar: Scalar, count: u64) -> Result<(), ImportFault> {
         let left = (self.bytes.len() - self.at) as u64;
         match count.checked_mul(scalar.size() as u64).filter(|&size| size <= left) {
             Some(size) => self.at += size as usize,
@@ -101,13 +101,13 @@ impl Source for Binary<'_> {
     }
 
     #[inline(always)]
-    fn end_row(&mut self) -> Result<(), Fault> {
+    fn end_row(&mut self) -> Result<(), ImportFault> {
         Ok(())
     }
 
     #[cold]
-    fn fault(&self, offset: usize, message: String, hint: &'static str) -> Fault {
-        Fault::binary(offset, message, hint)
+    fn fault(&self, offset: usize, message: String, hint: &'static str) -> ImportFault {
+        ImportFault::binary(offset, message, hint)
     }
 }
 
@@ -124,14 +124,14 @@ impl Text<'_> {
     }
 
     #[cold]
-    fn no_number(&self, needed: &str) -> Fault {
+    fn no_number(&self, needed: &str) -> ImportFault {
         let (at, word) = (self.cursor.at, self.cursor.next_word());
         if self.cursor.at_end() {
-            Fault::text(at, "the file ends within a row", WRITE_ANEW)
+            ImportFault::text(at, "the file ends within a row", WRITE_ANEW)
         } else if word.is_empty() {
-            Fault::text(at, "the line ends, but its row has more values", "write each row on a line of its own")
+            ImportFault::text(at, "the line ends, but its row has more values", "write each row on a line of its own")
         } else {
-            Fault::text(at, format!("{} where {needed} is needed", shown(word)), WRITE_ANEW)
+            ImportFault::text(at, format!("{} where {needed} is needed", shown(word)), WRITE_ANEW)
         }
     }
 }
@@ -142,7 +142,7 @@ impl Source for Text<'_> {
     }
 
     #[inline(always)]
-    fn value(&mut self, scalar: Scalar) -> Result<f64, Fault> {
+    fn value(&mut self, scalar: Scalar) -> Result<f64, ImportFault> {
         self.go_to_value();
         // A double is what its text says, rounded to a double first: as in the binary formats
         let value = if scalar == Scalar::F32 { self.cursor.f32().map(f64::from) } else { self.cursor.f64() };
@@ -150,7 +150,7 @@ impl Source for Text<'_> {
     }
 
     #[inline(always)]
-    fn whole(&mut self, _: Scalar) -> Result<i64, Fault> {
+    fn whole(&mut self, _: Scalar) -> Result<i64, ImportFault> {
         self.go_to_value();
         if let Some(value) = self.cursor.whole() {
             return Ok(value);
@@ -166,7 +166,7 @@ impl Source for Text<'_> {
         }
     }
 
-    fn skip(&mut self, _: Scalar, count: u64) -> Result<(), Fault> {
+    fn skip(&mut self, _: Scalar, count: u64) -> Result<(), ImportFault> {
         for _ in 0..count {
             self.go_to_value();
             if self.cursor.word().is_empty() {
@@ -177,21 +177,21 @@ impl Source for Text<'_> {
     }
 
     #[inline(always)]
-    fn end_row(&mut self) -> Result<(), Fault> {
+    fn end_row(&mut self) -> Result<(), ImportFault> {
         if self.free {
             return Ok(());
         }
         self.cursor.skip_blanks();
         if !self.cursor.at_line_end() {
             let message = format!("{} after the last value of the row", shown(self.cursor.next_word()));
-            return Err(Fault::text(self.cursor.at, message, "write each row on a line of its own"));
+            return Err(ImportFault::text(self.cursor.at, message, "write each row on a line of its own"));
         }
         self.cursor.pass_line_end();
         Ok(())
     }
 
     #[cold]
-    fn fault(&self, offset: usize, message: String, hint: &'static str) -> Fault {
-        Fault::text(offset, message, hint)
+    fn fault(&self, offset: usize, message: String, hint: &'static str) -> ImportFault {
+        ImportFault::text(offset, message, hint)
     }
 }

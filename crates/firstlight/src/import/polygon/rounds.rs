@@ -8,7 +8,7 @@
 //! corners that turn backwards, which alone can lie in its triangle. So n corners take n log n steps, where they are
 //! not made to take more.
 
-use super::{Point, area};
+use super::{FlatPoint, area};
 
 /// Steps for each corner, on average, before the rest is cut without looking: a few hundred are usual.
 const STEPS: u64 = 2048;
@@ -31,7 +31,7 @@ const GONE: u32 = u32::MAX;
 impl Rounds {
     /// Adds the triangles of a polygon that lies in a plane, counter-clockwise, as numbers of corners counted from
     /// `start`.
-    pub(super) fn cut(&mut self, points: &[Point], start: u32, triangles: &mut Vec<[u32; 3]>) -> Looked {
+    pub(super) fn cut(&mut self, points: &[FlatPoint], start: u32, triangles: &mut Vec<[u32; 3]>) -> Looked {
         let size = points.len() as u32;
         self.next.clear();
         self.next.extend((0..size).map(|i| (i + 1) % size));
@@ -70,13 +70,13 @@ impl Rounds {
         [self.previous[i as usize], i, self.next[i as usize]]
     }
 
-    fn is_forward(&self, points: &[Point], i: u32) -> bool {
+    fn is_forward(&self, points: &[FlatPoint], i: u32) -> bool {
         let [a, b, c] = self.corner(i).map(|i| points[i as usize]);
         area(a, b, c) > 0.0
     }
 
     /// Whether the triangle at a corner is forward and no other corner is in it.
-    fn is_ear(&self, points: &[Point], i: u32, looked: &mut Looked) -> bool {
+    fn is_ear(&self, points: &[FlatPoint], i: u32, looked: &mut Looked) -> bool {
         let corner = self.corner(i).map(|i| points[i as usize]);
         let [a, b, c] = corner;
         area(a, b, c) > 0.0
@@ -85,7 +85,7 @@ impl Rounds {
     }
 
     /// Cuts a corner off; its neighbours are to be looked at in the coming round.
-    fn take(&mut self, points: &[Point], i: u32, start: u32, round: u32, coming: &mut Vec<u32>) -> [u32; 3] {
+    fn take(&mut self, points: &[FlatPoint], i: u32, start: u32, round: u32, coming: &mut Vec<u32>) -> [u32; 3] {
         let [before, _, after] = self.corner(i);
         let triangle = [start + before, start + i, start + after];
         self.next[before as usize] = after;
@@ -109,7 +109,7 @@ impl Rounds {
     #[expect(clippy::too_many_arguments, reason = "the rest of `cut`")]
     fn force(
         &mut self,
-        points: &[Point],
+        points: &[FlatPoint],
         start: u32,
         left: usize,
         round: u32,
@@ -164,14 +164,14 @@ pub(super) struct Looked {
 #[derive(Default)]
 struct Backward {
     corners: Vec<u32>,
-    nodes: Vec<Node>,
+    nodes: Vec<LeafNode>,
     /// The leaf of each corner of the polygon; none where it turns forwards.
     leaf: Vec<Option<u32>>,
 }
 
-struct Node {
-    low: Point,
-    high: Point,
+struct LeafNode {
+    low: FlatPoint,
+    high: FlatPoint,
     /// Of `corners`.
     range: [u32; 2],
     /// How many of them are still there.
@@ -182,7 +182,7 @@ struct Node {
 }
 
 impl Backward {
-    fn build(&mut self, points: &[Point], corners: Vec<u32>) {
+    fn build(&mut self, points: &[FlatPoint], corners: Vec<u32>) {
         self.leaf.clear();
         self.leaf.resize(points.len(), None);
         self.nodes.clear();
@@ -192,7 +192,7 @@ impl Backward {
         }
     }
 
-    fn node(&mut self, points: &[Point], range: [u32; 2], parent: u32) {
+    fn node(&mut self, points: &[FlatPoint], range: [u32; 2], parent: u32) {
         let own = range[0] as usize..range[1] as usize;
         let (mut low, mut high) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
         for &i in &self.corners[own.clone()] {
@@ -200,7 +200,7 @@ impl Backward {
             (low, high) = ([low[0].min(p[0]), low[1].min(p[1])], [high[0].max(p[0]), high[1].max(p[1])]);
         }
         let place = self.nodes.len();
-        self.nodes.push(Node { low, high, range, left: range[1] - range[0], parent, second: None });
+        self.nodes.push(LeafNode { low, high, range, left: range[1] - range[0], parent, second: None });
         if own.len() <= LEAF {
             for &i in &self.corners[own] {
                 self.leaf[i as usize] = Some(place as u32);
@@ -231,7 +231,7 @@ impl Backward {
 
     /// Whether any is in a triangle, on its edges too, but not at the place of one of its corners: polygons with holes
     /// have such seams.
-    fn is_any_in(&self, points: &[Point], triangle: [Point; 3], steps: &mut u64) -> bool {
+    fn is_any_in(&self, points: &[FlatPoint], triangle: [FlatPoint; 3], steps: &mut u64) -> bool {
         if self.nodes.is_empty() {
             return false;
         }
@@ -263,9 +263,9 @@ impl Backward {
     }
 }
 
-impl Node {
+impl LeafNode {
     /// Whether all of the box is clearly on the right of a line.
-    fn is_right_of(&self, p: Point, q: Point) -> bool {
+    fn is_right_of(&self, p: FlatPoint, q: FlatPoint) -> bool {
         let d = [q[0] - p[0], q[1] - p[1]];
         // The corner of the box that is farthest to the left
         let x = if d[1] > 0.0 { self.low[0] } else { self.high[0] } - p[0];
@@ -281,7 +281,7 @@ mod tests {
     use std::f64::consts::TAU;
 
     /// Cuts a polygon that does not cross itself, and checks what must hold of any: its area is covered once.
-    fn check(points: &[Point]) -> (Vec<[u32; 3]>, u64) {
+    fn check(points: &[FlatPoint]) -> (Vec<[u32; 3]>, u64) {
         let mut triangles = Vec::new();
         let looked = Rounds::default().cut(points, 0, &mut triangles);
         assert!(!looked.tangled);
@@ -299,7 +299,7 @@ mod tests {
     }
 
     /// Around the origin, `radius` away.
-    fn around(size: usize, radius: impl Fn(usize) -> f64) -> Vec<Point> {
+    fn around(size: usize, radius: impl Fn(usize) -> f64) -> Vec<FlatPoint> {
         let at = |i: usize| {
             let (sin, cos) = pxfm::f_sincos(TAU * i as f64 / size as f64);
             [cos * radius(i), sin * radius(i)]
@@ -318,7 +318,7 @@ mod tests {
             let radius = 10.0 + i as f64 * 0.01 + out;
             [cos * radius, sin * radius]
         };
-        let mut spiral: Vec<Point> = (0..SIZE / 2).map(|i| winding(i, 0.0)).collect();
+        let mut spiral: Vec<FlatPoint> = (0..SIZE / 2).map(|i| winding(i, 0.0)).collect();
         spiral.extend((0..SIZE / 2).rev().map(|i| winding(i, -0.6)));
         let star = around(SIZE, |i| if i % 2 == 0 { 0.7 } else { 1.0 });
         for polygon in [star, around(SIZE, |i| 0.5 + 0.5 * random(i)), comb, spiral] {
@@ -345,7 +345,7 @@ mod tests {
 
     #[test]
     fn what_crosses_itself_ends_and_is_told() {
-        let wild: Vec<Point> = (0..5000u64)
+        let wild: Vec<FlatPoint> = (0..5000u64)
             .map(|i| [i.wrapping_mul(48_271) % 1009, i.wrapping_mul(69_621) % 997].map(|x| x as f64))
             .collect();
         let mut triangles = Vec::new();
@@ -354,7 +354,7 @@ mod tests {
         assert_eq!(triangles.len(), wild.len() - 2);
         assert!(triangles.iter().flatten().all(|&i| (7..7 + 5000).contains(&i)));
         // All in a line: nothing overlaps, for nothing has an area
-        let line: Vec<Point> = (0..1000).map(|i| [f64::from(i), 0.0]).collect();
+        let line: Vec<FlatPoint> = (0..1000).map(|i| [f64::from(i), 0.0]).collect();
         triangles.clear();
         assert!(!Rounds::default().cut(&line, 0, &mut triangles).tangled);
         assert_eq!(triangles.len(), 998);

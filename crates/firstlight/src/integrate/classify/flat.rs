@@ -2,7 +2,7 @@
 
 use fearless_simd::{f32x16, prelude::*};
 
-use super::{SLACK, Sight, Told};
+use super::{LanesSight, SLACK, Told};
 use crate::integrate::batch::{Exact, ShadingPoint};
 use crate::integrate::row::edges;
 use crate::math::{DVec3, Facet, LANES, Vec3, Vec3x16};
@@ -11,7 +11,7 @@ use crate::shape::{Parallelogram, PlaneSide};
 #[inline(always)]
 pub(super) fn flat_between<S: Simd>(
     simd: S,
-    sight: &Sight<S>,
+    sight: &LanesSight<S>,
     q: [Vec3x16<S>; 4],
     (flat, side, seen_side): (&Parallelogram, PlaneSide, PlaneSide),
     points: &[ShadingPoint],
@@ -152,7 +152,7 @@ pub(super) struct Own<S: Simd> {
 
 impl<S: Simd> Own<S> {
     #[inline(always)]
-    pub fn new(simd: S, sight: &Sight<S>, points: &[ShadingPoint]) -> Own<S> {
+    pub fn new(simd: S, sight: &LanesSight<S>, points: &[ShadingPoint]) -> Own<S> {
         let mut numbers = [[0.0; LANES]; 3];
         let mut lifted = 0;
         for (k, point) in points.iter().enumerate() {
@@ -175,7 +175,7 @@ impl<S: Simd> Own<S> {
 #[inline(always)]
 pub(super) fn facet_between<S: Simd>(
     simd: S,
-    sight: &Sight<S>,
+    sight: &LanesSight<S>,
     q: [Vec3x16<S>; 4],
     shape: &FacetShape,
     own: &Own<S>,

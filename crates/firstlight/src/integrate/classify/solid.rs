@@ -2,7 +2,7 @@
 
 use fearless_simd::{f32x16, prelude::*};
 
-use super::{SLACK, Sight, Told};
+use super::{LanesSight, SLACK, Told};
 use crate::integrate::batch::{Exact, ShadingPoint};
 use crate::integrate::emitter::Emitter;
 use crate::integrate::hull::SolidOccluder;
@@ -186,7 +186,7 @@ impl PlacedSolid {
 #[inline(always)]
 pub(super) fn solid_between<S: Simd>(
     simd: S,
-    sight: &Sight<S>,
+    sight: &LanesSight<S>,
     shape: &PlacedSolid,
     occluder: &Occluder,
     points: &[ShadingPoint],

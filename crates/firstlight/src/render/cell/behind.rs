@@ -11,12 +11,12 @@ use crate::integrate::Arrived;
 use crate::material::Moments;
 use crate::render::arrival::{ArrivalPlace, Arrivals, Past};
 use crate::render::fragment::{Fragment, Fragments};
-use crate::render::light_queue::{Place, Sight};
+use crate::render::light_queue::{LitPlace, Sight};
 use crate::render::resolve::LightTerm;
 use crate::render::together::{Outcome, Together, salt};
 use crate::render::{AaMode, Counts};
 use crate::scene::Scene;
-use crate::visibility::{View, Viewpoint, Visibility};
+use crate::visibility::{ShadowView, Viewpoint, Visibility};
 
 /// What the rays of one fragment see of one light.
 #[derive(Clone, Copy, Debug, Default)]
@@ -93,7 +93,7 @@ enum RaySight {
 /// The rays of some fragments, as they look for lights. Keeps its memory.
 #[derive(Default)]
 struct RayBlock {
-    places: Vec<Place>,
+    places: Vec<LitPlace>,
     points: Vec<Viewpoint>,
     fragments: Vec<FragmentRays>,
 }
@@ -106,7 +106,7 @@ struct RaySights {
     order: Vec<u32>,
     sights: Vec<RaySight>,
     /// Of those that are behind things, what is in the way.
-    views: Vec<Option<View>>,
+    views: Vec<Option<ShadowView>>,
 }
 
 /// A fragment of the block.
@@ -384,7 +384,7 @@ impl Cells<'_> {
         views.clear();
         views.resize_with(block.points.len(), || None);
         for (of, is_open) in block.fragments.iter().zip(open) {
-            let Place { surface, receives_shadow, .. } = block.places[of.first as usize];
+            let LitPlace { surface, receives_shadow, .. } = block.places[of.first as usize];
             let shines = scene.geometry.links.contains(scene.geometry.lights_of(surface), LightId(light as u32));
             for k in of.first..of.first + of.count {
                 sights.push(if shines { RaySight::Lit } else { RaySight::BelowHorizon });
@@ -431,7 +431,7 @@ impl RayBlock {
         let (first, count) = (self.points.len() as u32, fragment.count);
         self.fragments.push(FragmentRays { fragment: number as u32, first, count });
         self.places.extend((0..fragment.rays.len()).map(|k| fragments.place(scene, fragment, k)));
-        self.points.extend(self.places[first as usize..].iter().map(Place::viewpoint));
+        self.points.extend(self.places[first as usize..].iter().map(LitPlace::viewpoint));
     }
 }
 
@@ -463,7 +463,7 @@ impl RaySights {
     fn settle(
         &mut self,
         k: usize,
-        place: &Place,
+        place: &LitPlace,
         arrivals: &mut Arrivals,
         light: usize,
         share: f32,

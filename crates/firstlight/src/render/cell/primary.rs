@@ -1,7 +1,7 @@
 //! What the pixels of a cell see: squares that are proved to see one surface are found without a ray for each; the rays
 //! of all others are traced, those that may meet something in trees as bundles.
 
-use super::{CELL, Cells, Pixel, State};
+use super::{CELL, Cells, Pixel, PixelState};
 use crate::material::Bsdf;
 use crate::render::fragment::{Contrast, Member, RayHit};
 use crate::render::grid::Block;
@@ -49,7 +49,11 @@ impl Cells<'_> {
         if self.mode == AaMode::Adaptive
             && let Some(only) = pyramid.only(scene, near)
         {
-            return if self.many.is_some() { self.mark(square, State::Only(only)) } else { self.block(square, only) };
+            return if self.many.is_some() {
+                self.mark(square, PixelState::Only(only))
+            } else {
+                self.block(square, only)
+            };
         }
         let by_bundles = near.contains(&Candidate::Trees);
         if square.side > if by_bundles { SMALLEST.max(self.hits.side()) } else { SMALLEST } {
@@ -134,7 +138,7 @@ impl Cells<'_> {
         let index = self.index(at);
         self.work[index] += rays as f32;
         counts.looks += u64::from(rays);
-        self.states[index] = State::Traced;
+        self.states[index] = PixelState::Traced;
         self.terms.resize(self.terms.len() + self.few, LightTerm::BLACK);
         Pixel { index: index as u32, ..Pixel::default() }
     }
@@ -214,15 +218,15 @@ impl Cells<'_> {
         let state = match block {
             Some(block) => {
                 self.blocks.push(block);
-                State::Block(self.blocks.len() as u32 - 1)
+                PixelState::Block(self.blocks.len() as u32 - 1)
             }
-            None => State::Only(only),
+            None => PixelState::Only(only),
         };
         self.mark(square, state);
     }
 
     /// Notes what is known of the pixels of a square.
-    fn mark(&mut self, square: Square, state: State) {
+    fn mark(&mut self, square: Square, state: PixelState) {
         for at in square.pixels() {
             let index = self.index(at);
             self.states[index] = state;

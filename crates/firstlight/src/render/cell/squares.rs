@@ -20,7 +20,7 @@ use crate::render::Counts;
 use crate::render::beams::{Packet, Traced};
 use crate::render::fragment::{Contrast, Fragment};
 use crate::render::grid::SETS_IN;
-use crate::render::light_queue::Place;
+use crate::render::light_queue::LitPlace;
 use crate::render::many::FEW;
 use crate::render::square::Square;
 use crate::render::tile::Tile;
@@ -149,7 +149,7 @@ impl Cells<'_> {
     }
 
     /// The middle between two opposite rays of a pixel that is filled.
-    fn standing(&self, at: [u32; 2]) -> Option<Place> {
+    fn standing(&self, at: [u32; 2]) -> Option<LitPlace> {
         let (_, fragment) = self.whole(at)?;
         let [one, other] = [0, fragment.rays.len() - 1].map(|k| self.fragments.place(self.scene, fragment, k));
         let mean = |a: Vec3, b: Vec3| (a + b) * 0.5;
@@ -168,7 +168,7 @@ impl Cells<'_> {
         }
         let at = |i: u32, j: u32| self.standing([x + i, y + j]);
         let Some(middle) = at(side / 2, side / 2) else { return false };
-        let is_like = |place: &Place| {
+        let is_like = |place: &LitPlace| {
             let (one, other) = (&middle.point, &place.point);
             let way = other.p - one.p;
             middle.surface == place.surface

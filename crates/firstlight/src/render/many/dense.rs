@@ -13,7 +13,7 @@ use crate::math::Vec3;
 use crate::render::arrival::{ArrivalPlace, Arrivals};
 use crate::render::counts::Counts;
 use crate::render::crowd::By;
-use crate::render::cut::Walk;
+use crate::render::cut::CutRules;
 use crate::render::fence::Fence;
 use crate::scene::Scene;
 use crate::shape::SurfaceInteraction;
@@ -50,7 +50,7 @@ impl<'a> Many<'a> {
         let receives = group.iter().any(|at| patch(at).si.receives_shadow);
         self.outlook.stand(scene, group.iter().map(|at| standing(patch(at))));
         let steps = arrivals.display_steps();
-        let walk = Walk { tree, steps, zone: &zone, tones: &tones, budget: CROWD };
+        let walk = CutRules { tree, steps, zone: &zone, tones: &tones, budget: CROWD };
         let mut crowd = std::mem::take(&mut self.crowd);
         let (simd, outlook, fence) = (arrivals.level(), &mut self.outlook, &mut self.fence);
         let mut look = |node: &LightNode, light: u32| {
@@ -61,7 +61,7 @@ impl<'a> Many<'a> {
         };
         crowd.begin(&walk);
         let guess = guess.unwrap_or_else(|| {
-            crowd.refine(&Walk { budget: CROWD * PILOT, ..walk }, None, &mut look);
+            crowd.refine(&CutRules { budget: CROWD * PILOT, ..walk }, None, &mut look);
             crowd.peek();
             let some = [0, group.len() / 2, group.len() - 1].map(|i| patch(&group[i]));
             let all = some.map(|patch| {

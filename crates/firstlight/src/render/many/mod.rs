@@ -22,7 +22,7 @@ use super::cell::CELL;
 use super::change::Arrival;
 use super::counts::Counts;
 use super::crowd::Crowd;
-use super::cut::{Cut, Walk};
+use super::cut::{Cut, CutRules};
 use super::fence::Fence;
 use super::fragment::Fragments;
 use super::resolve::LightTerm;
@@ -249,7 +249,7 @@ impl<'a> Many<'a> {
         self.outlook.stand(scene, places);
         let (outlook, level) = (&mut self.outlook, arrivals.level());
         let (steps, budget) = (arrivals.display_steps(), BLOCK_BUDGET * SHARES[above.level]);
-        let walk = Walk { tree, steps, zone: &zone, tones: &tones, budget };
+        let walk = CutRules { tree, steps, zone: &zone, tones: &tones, budget };
         let links = scene.geometry.lights_of(one.si.surface);
         let shines = |light: u32| scene.geometry.links.contains(links, LightId(light));
         self.cut.of_block(
@@ -330,7 +330,7 @@ impl<'a> Many<'a> {
             let zone = zone(std::iter::once(patch), self.eye);
             let tones = [tone(scene, bsdf)];
             let steps = arrivals.display_steps();
-            let walk = Walk { tree, steps, zone: &zone, tones: &tones, budget: PATCH_BUDGET };
+            let walk = CutRules { tree, steps, zone: &zone, tones: &tones, budget: PATCH_BUDGET };
             let (outlook, singles, level) = (&mut self.outlook, &mut self.singles, arrivals.level());
             let mut stands = false;
             stored.value = self.cut.of_patch(

@@ -3,7 +3,7 @@
 use crate::material::Bsdf;
 use crate::render::cell::CELL;
 use crate::render::fragment::{Fragments, is_one_surface};
-use crate::render::light_queue::Place;
+use crate::render::light_queue::LitPlace;
 use crate::scene::Scene;
 use crate::shape::SurfaceInteraction;
 
@@ -55,7 +55,7 @@ impl Patches {
 }
 
 impl Patch {
-    fn new(place: &Place) -> Patch {
+    fn new(place: &LitPlace) -> Patch {
         Patch {
             si: place.surface(),
             bsdf: place.bsdf,

@@ -10,7 +10,7 @@ use crate::describe::Family;
 use crate::describe::node::{self, Data, Node, Span, Syntax, quoted};
 use crate::describe::read::{Fault, Faults, Reader, nearest};
 use crate::describe::value::{join_path, normalized};
-use crate::import::{Wanted, foreign};
+use crate::import::{WantedFile, foreign};
 use crate::light::LightDesc;
 use crate::material::MaterialDesc;
 use crate::scene::description::{RenderDesc, SceneDesc};
@@ -202,9 +202,9 @@ impl Loader<'_> {
                     continue;
                 }
             };
-            if let Some(foreign) = foreign(&bytes, Wanted::Scene) {
-                let message = format!("{shown} {}", foreign.message(Wanted::Scene));
-                fault(message, Some(foreign.hint(Wanted::Scene).to_owned()), None);
+            if let Some(foreign) = foreign(&bytes, WantedFile::Scene) {
+                let message = format!("{shown} {}", foreign.message(WantedFile::Scene));
+                fault(message, Some(foreign.hint(WantedFile::Scene).to_owned()), None);
                 continue;
             }
             self.included.insert(path.clone(), (file, element.span));

@@ -3,7 +3,7 @@
 use crate::camera::CameraDesc;
 use crate::describe::info::sentence;
 use crate::describe::{Family, TableInfo};
-use crate::describe::{FieldInfo, Written};
+use crate::describe::{FieldInfo, TextValue};
 use crate::light::LightDesc;
 use crate::material::MaterialDesc;
 use crate::scene::description::RenderDesc;
@@ -114,7 +114,7 @@ fn table(page: &mut String, title: &str, info: &TableInfo) {
         let cell = |text: &str| text.replace('|', "\\|");
         let default = match &field.default {
             None => "required".to_owned(),
-            Some(Written::Absent) => "none".to_owned(),
+            Some(TextValue::Absent) => "none".to_owned(),
             Some(value) => format!("`{}`", value.to_toml()),
         };
         let meaning = cell(&sentence(field.doc));

@@ -2,17 +2,17 @@
 
 use crate::describe::Family;
 use crate::describe::write::{json_string, key};
-use crate::describe::{Table, Written};
+use crate::describe::{Table, TextValue};
 use crate::scene::description::SceneDesc;
 
-type Fields = Vec<(&'static str, Written)>;
+type WrittenFields = Vec<(&'static str, TextValue)>;
 
 impl SceneDesc {
     /// The description as TOML. It reads back to an equal one, its lists in scene order (see [`SceneDesc::sort`]);
     /// fields that have their default are left out.
     pub fn to_toml(&self) -> String {
         let mut out = String::new();
-        let mut table = |header: String, fields: Fields| {
+        let mut table = |header: String, fields: WrittenFields| {
             if !out.is_empty() {
                 out.push('\n');
             }
@@ -109,7 +109,7 @@ fn braces(pairs: &[(String, String)], depth: usize) -> String {
     format!("{{\n{}\n{}}}", lines.join(",\n"), "  ".repeat(depth))
 }
 
-fn object(fields: &Fields, depth: usize) -> String {
+fn object(fields: &WrittenFields, depth: usize) -> String {
     let pairs: Vec<(String, String)> = fields.iter().map(|(k, v)| ((*k).to_owned(), v.to_json())).collect();
     braces(&pairs, depth)
 }

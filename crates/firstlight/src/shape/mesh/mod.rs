@@ -8,7 +8,7 @@ use std::ops::ControlFlow;
 
 use glam::DAffine3;
 
-pub(crate) use surface::{Mesh, MeshPart, TrianglePoint};
+pub(crate) use surface::{JoinedPart, Mesh, TrianglePoint};
 
 use super::common::shape_table;
 use super::placement::Placement;
@@ -253,7 +253,7 @@ pub(crate) fn from_own_origin(positions: &[[f64; 3]]) -> (Vec<[f32; 3]>, [f64; 3
 #[derive(Default)]
 pub(crate) struct MeshBuilder {
     /// As they came.
-    sources: Vec<Source>,
+    sources: Vec<JoinedSource>,
     /// Vertices and triangles of all of them.
     counts: [usize; 2],
     bounds: Option<[DVec3; 2]>,
@@ -261,7 +261,7 @@ pub(crate) struct MeshBuilder {
 }
 
 /// A mesh that is to be joined with others, and its part of them.
-struct Source {
+struct JoinedSource {
     data: MeshData,
     uv_set: usize,
     transform: Option<DAffine3>,
@@ -278,7 +278,7 @@ struct Lists {
     normals: Vec<[f32; 3]>,
     uvs: Vec<[f32; 2]>,
     colors: Vec<[f32; 3]>,
-    parts: Vec<MeshPart>,
+    parts: Vec<JoinedPart>,
     /// Of each part: rays treat parts of one class alike.
     classes: Vec<u32>,
 }
@@ -332,7 +332,7 @@ impl MeshBuilder {
             (Some([low, high]), Some([a, b])) => Some([low.min(a), high.max(b)]),
             (all, own) => all.or(own),
         };
-        self.sources.push(Source { data, uv_set, transform, surface, class, materials });
+        self.sources.push(JoinedSource { data, uv_set, transform, surface, class, materials });
     }
 
     /// The box around all meshes so far, in the space that they are joined in.
@@ -361,15 +361,15 @@ impl MeshBuilder {
 }
 
 impl Lists {
-    fn add(&mut self, source: Source, origin: DVec3) {
-        let Source { mut data, uv_set, transform, surface, class, materials } = source;
+    fn add(&mut self, source: JoinedSource, origin: DVec3) {
+        let JoinedSource { mut data, uv_set, transform, surface, class, materials } = source;
         move_mesh(&mut data, transform, origin);
         let (vertices, first) = (self.positions.len(), self.triangles.len());
         let MeshData { positions, mut triangles, normals, mut uvs, colors, face_materials, .. } = data;
         let added = positions.len();
         let own_uvs = if uv_set < uvs.len() { uvs.swap_remove(uv_set) } else { Vec::new() };
         self.classes.push(class);
-        self.parts.push(MeshPart {
+        self.parts.push(JoinedPart {
             first_triangle: first as u32,
             surface,
             face_materials,

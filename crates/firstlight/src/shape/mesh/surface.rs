@@ -21,13 +21,13 @@ pub(crate) struct Mesh {
     /// Linear Rec. 709, one for each position; empty if no part has any. The colours of parts without are white.
     pub colors: Vec<[f32; 3]>,
     /// The meshes it was joined from, in scene order, by their first triangle.
-    pub parts: Vec<MeshPart>,
+    pub parts: Vec<JoinedPart>,
     pub tree: TriangleTree,
 }
 
 /// One mesh of several that were joined.
 #[derive(Clone, Debug)]
-pub(crate) struct MeshPart {
+pub(crate) struct JoinedPart {
     /// Its first triangle; it ends where the next begins.
     pub first_triangle: u32,
     /// Its surface, counted from that of the group it lies in.
@@ -40,7 +40,7 @@ pub(crate) struct MeshPart {
     pub has_uvs: bool,
 }
 
-impl MeshPart {
+impl JoinedPart {
     /// The material of a triangle of the joined mesh.
     pub fn material(&self, triangle: u32) -> MaterialId {
         let index = self.face_materials.get((triangle - self.first_triangle) as usize).copied().unwrap_or(0);
@@ -92,7 +92,7 @@ impl Mesh {
 
     /// The part that a triangle belongs to.
     #[inline]
-    pub fn part(&self, triangle: u32) -> &MeshPart {
+    pub fn part(&self, triangle: u32) -> &JoinedPart {
         &self.parts[self.part_index(triangle)]
     }
 

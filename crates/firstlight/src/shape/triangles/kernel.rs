@@ -19,7 +19,7 @@
 
 use fearless_simd::{f32x16, mask32x16, prelude::*};
 
-use crate::accel::{Lanes, Slabs, TraceRay};
+use crate::accel::{RayLanes, Slabs, TraceRay};
 use crate::math::Vec3;
 
 /// What the test of one ray and one triangle finds: u and v weigh the second and third vertex.
@@ -87,7 +87,7 @@ pub(super) struct Crossings<S: Simd> {
 
 /// A vertex as the rays see it; z is not yet divided by their length along it.
 #[inline(always)]
-fn shear<S: Simd>(simd: S, rays: &Lanes<S>, v: [f32; 3]) -> (f32x16<S>, f32x16<S>, f32x16<S>) {
+fn shear<S: Simd>(simd: S, rays: &RayLanes<S>, v: [f32; 3]) -> (f32x16<S>, f32x16<S>, f32x16<S>) {
     let z = simd.splat_f32x16(v[2]) - rays.o[2];
     let x = (simd.splat_f32x16(v[0]) - rays.o[0]) - rays.shear[0] * z;
     let y = (simd.splat_f32x16(v[1]) - rays.o[1]) - rays.shear[1] * z;
@@ -96,7 +96,7 @@ fn shear<S: Simd>(simd: S, rays: &Lanes<S>, v: [f32; 3]) -> (f32x16<S>, f32x16<S
 
 /// [`intersect`] for sixteen rays; the coordinates of the triangle are along kx, ky, kz.
 #[inline(always)]
-pub(super) fn intersect_lanes<S: Simd>(simd: S, rays: &Lanes<S>, triangle: [[f32; 3]; 3]) -> Option<Crossings<S>> {
+pub(super) fn intersect_lanes<S: Simd>(simd: S, rays: &RayLanes<S>, triangle: [[f32; 3]; 3]) -> Option<Crossings<S>> {
     let zero = simd.splat_f32x16(0.0);
     let sz = rays.shear[2];
     let (ax, ay, az) = shear(simd, rays, triangle[0]);

@@ -158,7 +158,7 @@ impl TriangleTree {
             None => Aabb::EMPTY,
         };
         let Built { tree, order, leaves } = build(triangles.len(), bounds, PACK.ilog2(), key);
-        let pack = |leaf: &crate::accel::Leaf| {
+        let pack = |leaf: &crate::accel::LeafRange| {
             let mut pack = Pack { vertices: [[[f32::NAN; PACK]; 3]; 3], ids: [NONE; PACK] };
             let run = &order[leaf.first as usize..(leaf.first + leaf.count) as usize];
             for (place, &id) in run.iter().enumerate() {
@@ -179,7 +179,7 @@ impl TriangleTree {
 
     /// Visits the leaves whose boxes `meet` says yes to, until `leaf` says no; see [`Tree::gather`].
     #[inline(always)]
-    pub fn gather<S: Simd, M: Fn(S, &crate::accel::Node) -> (u32, f32x8<S>)>(
+    pub fn gather<S: Simd, M: Fn(S, &crate::accel::BoxNode) -> (u32, f32x8<S>)>(
         &self,
         simd: S,
         meet: impl FnOnce(Vec3, f32) -> M,

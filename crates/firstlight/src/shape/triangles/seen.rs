@@ -157,18 +157,18 @@ fn largest<S: Simd>(a: V<S>) -> f32x16<S> {
 /// A number that is linear in the way, of sixteen triangles: towards the light's middle, its slopes, and how far it
 /// goes.
 #[derive(Clone, Copy)]
-struct Linear<S: Simd> {
+struct LinearWay<S: Simd> {
     middle: f32x16<S>,
     slopes: V<S>,
     reach: f32x16<S>,
 }
 
-impl<S: Simd> Linear<S> {
+impl<S: Simd> LinearWay<S> {
     /// f.l, with the other sign for those in `behind`.
     #[inline(always)]
     fn new(f: V<S>, eye: &Eye, behind: mask32x16<S>) -> Self {
         let (m, a, b, c) = (dot(f, eye.l), dot(f, eye.axes[0]), dot(f, eye.axes[1]), dot(f, eye.axes[2]));
-        Linear { middle: behind.select(-m, m), slopes: [a, b, c], reach: a.abs() + b.abs() + c.abs() }
+        LinearWay { middle: behind.select(-m, m), slopes: [a, b, c], reach: a.abs() + b.abs() + c.abs() }
     }
 
     #[inline(always)]
@@ -222,10 +222,10 @@ impl TriangleTree {
         let zero = simd.splat_f32x16(0.0);
         let behind = height.simd_lt(zero);
         let height = height.abs();
-        let u = Linear::new(cross(c, bc), eye, behind);
-        let v = Linear::new(cross(a, ca), eye, behind);
-        let w = Linear::new(cross(b, ab), eye, behind);
-        let d = Linear::new(n, eye, behind);
+        let u = LinearWay::new(cross(c, bc), eye, behind);
+        let v = LinearWay::new(cross(a, ca), eye, behind);
+        let w = LinearWay::new(cross(b, ab), eye, behind);
+        let d = LinearWay::new(n, eye, behind);
         // How far each can be wrong
         let (side2, side3) = (side * side, side * side * side);
         let longest = simd.splat_f32x16(eye.longest);
