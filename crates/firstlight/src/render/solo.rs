@@ -151,10 +151,27 @@ impl Pyramid {
                     return None;
                 }
                 depths(&|ray| sphere.intersect(ray))?;
-                Some([self.nearest(scene, candidate), self.depth(sphere.c)])
+                Some([self.nearest(scene, candidate), self.middle_depth(sphere.c)])
             }
             Candidate::Light(_) | Candidate::Trees => None,
         }
+    }
+
+    /// The greatest depth at which a ray comes nearest to a point: where it meets a sphere around that from outside, it
+    /// is not as deep. That may be deeper than the point itself, beside the axis of a wide view.
+    fn middle_depth(&self, c: DVec3) -> f64 {
+        // Of rays as long as they are deep, both are linear over the film
+        let forward = self.forward.as_dvec3();
+        let along = |ray: &Ray| ray.d.as_dvec3() / forward.dot(ray.d.as_dvec3());
+        let middle = along(&self.middle).normalize();
+        let (mut most, mut least) = (f64::NEG_INFINITY, f64::INFINITY);
+        for ray in &self.corners {
+            let (o, d) = (ray.o.as_dvec3(), along(ray));
+            most = most.max(d.dot(c - o));
+            least = least.min(d.dot(middle));
+        }
+        let origin = self.corners.iter().fold(f64::NEG_INFINITY, |z, ray| z.max(self.depth(ray.o.as_dvec3())));
+        origin + most / (least * least)
     }
 
     /// The least depth at which the rays can meet a shape.
