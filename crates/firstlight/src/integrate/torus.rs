@@ -3,8 +3,8 @@
 //! A point and a row of the light lie in a plane. A half plane that ends in the torus' axis meets that plane in a line,
 //! and the tube in a disk: what they have in common is a chord, and the chords of all half planes are what the plane
 //! cuts out of the torus. Where there is one is told by a quadratic in the cosine of the angle around the axis; so the
-//! plane cuts out two parts that mirror each other, or one if they meet on the mirror. The ends of chords run around
-//! each part, and where the way to them turns around, the part begins and ends as the point sees it.
+//! plane cuts out two parts that mirror each other, which may meet on the mirror. The ends of chords run around each
+//! part, and where the way to them turns around, the part begins and ends as the point sees it.
 //!
 //! In the torus' own space its circle has radius 1 around z.
 
@@ -71,6 +71,8 @@ const AROUND: [AroundPlace; PLACES] = {
 const LOOKS: usize = 8;
 /// How often the end of a part is looked for between three places.
 const TURNS: usize = 4;
+/// Beyond any x of a light.
+const BESIDE: f32 = 4.0;
 /// In ways to the light: what is nearer to a point than this, or behind it, is not in front of it.
 const AHEAD: f32 = 1e-6;
 
@@ -136,15 +138,32 @@ impl<S: Simd> TorusShadow<S> {
         if !is_there.any_true() {
             return [Interval16::none(simd); 2];
         }
-        let meets = low.simd_le(-h) | high.simd_ge(h);
-        let least = low.simd_le(-h).select(-one, low * inverse);
-        let most = high.simd_ge(h).select(one, high * inverse);
+        let (first, last) = (low.simd_le(-h), high.simd_ge(h));
+        let least = first.select(-one, low * inverse);
+        let most = last.select(one, high * inverse);
         let (middle, half) = ((most + least) * 0.5, (most - least) * 0.5);
         let plane = RowPlane { n, h, e, off, along, middle, half };
+        // Where the chord in which they meet is not seen on the light they are seen apart: one may run around the point,
+        // from one side to the other
+        let mut is_one = zero.simd_gt(zero);
+        for (cos, is_end) in [(-one, first), (one, last)] {
+            let chord = [one, -one].map(
+                #[inline(always)]
+                |side| self.place(simd, &plane, cos, 1.0, side),
+            );
+            let mut seen = Interval16 { from: far, to: -far };
+            for [t, x] in chord {
+                let on_row = x / t.max(simd.splat_f32x16(AHEAD));
+                seen.from = is_between(t).select(seen.from.min(on_row), seen.from);
+                seen.to = is_between(t).select(seen.to.max(on_row), seen.to);
+            }
+            pass(&mut seen, chord);
+            is_one |= is_end & seen.from.simd_lt(BESIDE) & seen.to.simd_gt(-BESIDE);
+        }
         let (left, right) = (self.extent(simd, &plane, 1.0), self.extent(simd, &plane, -1.0));
-        let from = meets.select(left.from.min(right.from), left.from);
-        let to = meets.select(left.to.max(right.to), left.to);
-        let is_other = is_there & !meets;
+        let from = is_one.select(left.from.min(right.from), left.from);
+        let to = is_one.select(left.to.max(right.to), left.to);
+        let is_other = is_there & !is_one;
         [
             Interval16 { from: is_there.select(from, far), to: is_there.select(to, -far) },
             Interval16 { from: is_other.select(right.from, far), to: is_other.select(right.to, -far) },
@@ -172,7 +191,7 @@ impl<S: Simd> TorusShadow<S> {
     /// From where to where on the row one part is seen.
     #[inline(always)]
     fn extent(&self, simd: S, plane: &RowPlane<S>, mirror: f32) -> Interval16<S> {
-        let (zero, far) = (simd.splat_f32x16(0.0), simd.splat_f32x16(FAR));
+        let zero = simd.splat_f32x16(0.0);
         let mut places = [[zero; 2]; PLACES];
         let mut on_row = [zero; PLACES];
         let mut all = zero.simd_eq(zero);
@@ -182,25 +201,16 @@ impl<S: Simd> TorusShadow<S> {
             on_row[k] = places[k][1] / places[k][0].max(simd.splat_f32x16(AHEAD));
             all &= is_between(places[k][0]);
         }
-        let mut from = self.least(simd, plane, mirror, &places, &on_row, 1.0);
-        let mut to = -self.least(simd, plane, mirror, &places, &on_row, -1.0);
+        let from = self.least(simd, plane, mirror, &places, &on_row, 1.0);
+        let to = -self.least(simd, plane, mirror, &places, &on_row, -1.0);
         if all.all_true() {
             return Interval16 { from, to };
         }
-        // Where it runs from before the point to behind it, no row ends before it does; nor, where it runs through the
-        // light's plane, before that place
+        let mut extent = Interval16 { from, to };
         for k in 0..PLACES {
-            let [[t0, x0], [t1, x1]] = [places[k], places[AROUND[k].after]];
-            let crosses = t0.simd_gt(AHEAD) ^ t1.simd_gt(AHEAD);
-            let x = (x0 * t1 - x1 * t0) * (t1 - t0);
-            from = (crosses & x.simd_lt(zero)).select(-far, from);
-            to = (crosses & x.simd_gt(zero)).select(far, to);
-            let crosses = t0.simd_lt(1.0) ^ t1.simd_lt(1.0);
-            let x = (x0 * (t1 - 1.0) + x1 * (1.0 - t0)) / (t1 - t0);
-            from = crosses.select(from.min(x), from);
-            to = crosses.select(to.max(x), to);
+            pass(&mut extent, [places[k], places[AROUND[k].after]]);
         }
-        Interval16 { from, to }
+        extent
     }
 
     /// The least place of a part on the row, or, with `sign` -1, the opposite of the greatest: from the least of those
@@ -308,6 +318,22 @@ impl<S: Simd> TorusShadow<S> {
 #[inline(always)]
 fn is_between<S: Simd>(t: f32x16<S>) -> mask32x16<S> {
     t.simd_gt(AHEAD) & t.simd_lt(1.0)
+}
+
+/// Extends what is seen of something that runs between two places straight on: from before the point to behind it, no
+/// row ends before it does; nor, through the light's plane, before it gets there.
+#[inline(always)]
+fn pass<S: Simd>(seen: &mut Interval16<S>, [[t0, x0], [t1, x1]]: [[f32x16<S>; 2]; 2]) {
+    let simd = t0.token();
+    let (zero, far) = (simd.splat_f32x16(0.0), simd.splat_f32x16(FAR));
+    let crosses = t0.simd_gt(AHEAD) ^ t1.simd_gt(AHEAD);
+    let x = (x0 * t1 - x1 * t0) * (t1 - t0);
+    seen.from = (crosses & x.simd_lt(zero)).select(-far, seen.from);
+    seen.to = (crosses & x.simd_gt(zero)).select(far, seen.to);
+    let crosses = t0.simd_lt(1.0) ^ t1.simd_lt(1.0);
+    let x = (x0 * (t1 - 1.0) + x1 * (1.0 - t0)) / (t1 - t0);
+    seen.from = crosses.select(seen.from.min(x), seen.from);
+    seen.to = crosses.select(seen.to.max(x), seen.to);
 }
 
 /// How far the plane of a row is from touching a torus, times the length of its normal.

@@ -54,6 +54,9 @@ const QUADRANT_TURN: f32 = 1.0;
 const MIDDLE_TURN: f32 = 0.06;
 /// In display steps: by how much that may change it.
 const MIDDLE_BEND: f32 = 0.4;
+/// The part of what a light sends, turned by an angle, that all places of a quadrant see where its middle is on the
+/// line where the light sets in.
+const COMES_IN: f32 = 0.25;
 /// In display steps: what colours that differ may make together with light that does.
 const MINGLED: f32 = 0.4;
 
@@ -460,7 +463,13 @@ impl<'a> Cells<'a> {
         if most == Moments::default() && !answers.iter().all(|answer| answer.smooth) {
             return false;
         }
-        let apart = most + least * -1.0;
+        // Where it sets in, a place of a quadrant may see more than its middle does
+        let more = |answer: &Answer| match answer.smooth {
+            true => 0.0,
+            false => (answer.turn * answer.most * COMES_IN - answer.sums.cosine()).max(0.0),
+        };
+        let more = answers.iter().map(more).fold(0.0, f32::max);
+        let apart = most + least * -1.0 + Moments::bounds(more, more);
         let bsdf = &fragment.bsdf;
         let colors = scale * bsdf.colors;
         let value = colors.onto(scene.ambient * bsdf.ambient, &most);
