@@ -143,8 +143,8 @@ impl<S: Simd> TorusShadow<S> {
         let most = last.select(one, high * inverse);
         let (middle, half) = ((most + least) * 0.5, (most - least) * 0.5);
         let plane = RowPlane { n, h, e, off, along, middle, half };
-        // Where the chord in which they meet is not seen on the light they are seen apart: one may run around the point,
-        // from one side to the other
+        // Where the chord in which they meet is not seen on the light they are seen apart: they may run around the
+        // point
         let mut is_one = zero.simd_gt(zero);
         for (cos, is_end) in [(-one, first), (one, last)] {
             let chord = [one, -one].map(

@@ -54,9 +54,8 @@ const QUADRANT_TURN: f32 = 1.0;
 const MIDDLE_TURN: f32 = 0.06;
 /// In display steps: by how much that may change it.
 const MIDDLE_BEND: f32 = 0.4;
-/// The part of what a light sends, turned by an angle, that all places of a quadrant see where its middle is on the
-/// line where the light sets in.
-const COMES_IN: f32 = 0.25;
+/// Less than this part of what a light sends, turned by an angle, is as good as nothing.
+const NOTHING: f32 = 1e-5;
 /// In display steps: what colours that differ may make together with light that does.
 const MINGLED: f32 = 0.4;
 
@@ -459,17 +458,13 @@ impl<'a> Cells<'a> {
         for answer in answers {
             (least, most) = (least.min(answer.sums), most.max(answer.sums));
         }
-        // Between places that see nothing a light can come in
-        if most == Moments::default() && !answers.iter().all(|answer| answer.smooth) {
+        // Between places that see nothing a light can come in; and where it sets in, that see as good as nothing
+        let sets_in = answers.iter().filter(|answer| !answer.smooth && answer.motion == 0.0);
+        let turned = sets_in.map(|answer| answer.turn * answer.most).fold(0.0, f32::max);
+        if most.cosine() <= turned * NOTHING && !answers.iter().all(|answer| answer.smooth) {
             return false;
         }
-        // Where it sets in, a place of a quadrant may see more than its middle does
-        let more = |answer: &Answer| match answer.smooth {
-            true => 0.0,
-            false => (answer.turn * answer.most * COMES_IN - answer.sums.cosine()).max(0.0),
-        };
-        let more = answers.iter().map(more).fold(0.0, f32::max);
-        let apart = most + least * -1.0 + Moments::bounds(more, more);
+        let apart = most + least * -1.0;
         let bsdf = &fragment.bsdf;
         let colors = scale * bsdf.colors;
         let value = colors.onto(scene.ambient * bsdf.ambient, &most);
