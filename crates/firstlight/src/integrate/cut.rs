@@ -11,7 +11,7 @@ use super::batch::{Exact, Linear16};
 use super::breaks::Breaks;
 use super::hull::{Hull, Rim};
 use super::occluder::{Occluder, corners_from};
-use super::row::{FAR, Interval16, Quadratic16, Roots, edges, root_between};
+use super::row::{FAR, Interval16, Quadratic16, Roots, edges, root_between, roots};
 use crate::math::Vec3x16;
 use crate::shape::Canonical;
 
@@ -75,17 +75,26 @@ impl<S: Simd> BallView<S> {
         )
     }
 
-    /// Whether the way to the plane along l ends on that half.
+    /// The places of that circle on a row, counted from where the row is nearest to the plane's own trace: both lie
+    /// close to it where a point is close to the plane, and all that differs is lost in numbers that are counted from
+    /// elsewhere.
     #[inline(always)]
-    fn is_on(&self, half: Half, plane: &Linear16<S>, height: f32x16<S>, x: f32x16<S>, y: f32x16<S>) -> mask32x16<S> {
-        let along = plane.at(x, y);
-        let zero = x.token().splat_f32x16(0.0);
-        let (way2, touch2) = (height * height * self.length2.at(x, y), self.touch2 * along * along);
-        let is_on = match half {
-            Half::Near => way2.simd_le(touch2),
-            Half::Far | Half::Around => way2.simd_ge(touch2),
-        };
-        (height * along).simd_gt(zero) & is_on
+    fn circle_on_row(&self, plane: &Linear16<S>, height: f32x16<S>, y: f32x16<S>) -> Roots<S> {
+        let simd = height.token();
+        let (zero, one) = (simd.splat_f32x16(0.0), simd.splat_f32x16(1.0));
+        let is_level = plane.x.abs().simd_lt(f32::MIN_POSITIVE);
+        let trace = -(y * plane.y + plane.c) / is_level.select(one, plane.x);
+        let x = is_level.select(zero, trace.max(-one).min(one));
+        let (plane_at, along_at) = (plane.at(x, y), self.along.at(x, y));
+        let (length2, t) = (&self.length2, self.touch2);
+        let slope = length2.x + y * length2.xy + x * length2.xx;
+        let (h2, xt) = (height * height, plane.x * t);
+        let Roots { low, high, any } = roots(
+            h2 * length2.xx - height * plane.x * self.along.x * 2.0 + plane.x * xt,
+            h2 * slope - height * (plane.x * along_at + plane_at * self.along.x) + plane_at * xt,
+            h2 * length2.at(x, y) - height * plane_at * along_at * 2.0 + plane_at * plane_at * t,
+        );
+        Roots { low: low + x, high: high + x, any }
     }
 }
 
@@ -111,33 +120,30 @@ impl<S: Simd> HalfCircle<S> {
         HalfCircle { plane, height, circle: ball.circle(&plane, height) }
     }
 
-    /// The parts of a range of each row that are hidden, where its beginning is (`begins`) or is not, and that changes
-    /// at each place of the circle.
+    /// The parts of a range of each row that are hidden: between the places of the circle all is hidden or nothing is,
+    /// as `hides` says of the middle. So what rounding makes of a place near an end changes no more than what lies
+    /// between them.
     #[inline(always)]
     fn parts(
         &self,
         simd: S,
-        balls: &[(&BallView<S>, Half)],
+        ball: &BallView<S>,
         y: f32x16<S>,
         range: &Interval16<S>,
-        begins: mask32x16<S>,
-        within: mask32x16<S>,
+        hides: impl Fn(f32x16<S>) -> mask32x16<S>,
     ) -> [Interval16<S>; 2] {
+        let Interval16 { from, to } = *range;
         let far = simd.splat_f32x16(FAR);
-        let Roots { low, high, any } = self.circle.on_row(y);
-        let mut is_low = any & low.simd_gt(range.from) & low.simd_lt(range.to);
-        let mut is_high = any & high.simd_gt(range.from) & high.simd_lt(range.to);
-        for (k, (ball, half)) in balls.iter().enumerate() {
-            // All of what a point is within is around it
-            let around = if k > 0 { within } else { low.simd_lt(low) };
-            is_low &= around | ball.is_on(*half, &self.plane, self.height, low, y);
-            is_high &= around | ball.is_on(*half, &self.plane, self.height, high, y);
-        }
-        // The first change, and the one after it
-        let first = is_low.select(low, is_high.select(high, far));
-        let second = (is_low & is_high).select(high, far);
-        let one = Interval16 { from: begins.select(range.from, first), to: range.to.min(begins.select(first, second)) };
-        let other = Interval16 { from: begins.select(second, far), to: range.to };
+        let Roots { low, high, any } = ball.circle_on_row(&self.plane, self.height, y);
+        let [low, high] = [low, high].map(|root| any.select(root.max(from).min(to), from));
+        let first = hides((from + low) * 0.5);
+        let middle = hides((low + high) * 0.5);
+        let last = hides((high + to) * 0.5);
+        let one = Interval16 {
+            from: first.select(from, middle.select(low, last.select(high, far))),
+            to: (first & !middle).select(low, (middle & !last).select(high, to)),
+        };
+        let other = Interval16 { from: (first & !middle & last).select(high, far), to };
         [one, other]
     }
 }
@@ -391,8 +397,7 @@ impl<S: Simd> BallCut<S> {
             CutShape::Flat { faces } => {
                 for (k, (lines, arc)) in faces.iter().enumerate() {
                     let Some(arc) = arc else { break };
-                    let begins = self.is_before(&arc.plane, arc.height, rim.from, y);
-                    let parts = arc.parts(simd, &[(&self.ball, self.half)], y, rim, begins, within);
+                    let parts = arc.parts(simd, &self.ball, y, rim, |x| self.is_before(arc, x, y));
                     for (i, mut part) in parts.into_iter().enumerate() {
                         for line in &lines[1..] {
                             part.clip(y * line.y + line.c, line.x);
@@ -403,8 +408,7 @@ impl<S: Simd> BallCut<S> {
             }
             CutShape::Rim { rim: outer, hole, arc } => {
                 let inside = outer.quadratic.cone_on_row(simd, &arc.plane, y);
-                let begins = self.is_before(&arc.plane, arc.height, rim.from, y);
-                let parts = arc.parts(simd, &[(&self.ball, self.half)], y, rim, begins, within);
+                let parts = arc.parts(simd, &self.ball, y, rim, |x| self.is_before(arc, x, y));
                 for (i, part) in parts.into_iter().enumerate() {
                     all[i] = Interval16 { from: part.from.max(inside.from), to: part.to.min(inside.to) };
                 }
@@ -426,14 +430,15 @@ impl<S: Simd> BallCut<S> {
                     from: within.select(rim.from, rim.from.max(inside.from)),
                     to: within.select(rim.to, rim.to.min(inside.to)),
                 };
-                let meets = self.ball.meets(self.half, range.from, y);
-                let near = other.meets(Half::Near, range.from, y).simd_lt(meets);
-                let begins = if within.any_true() {
-                    within & other.meets(Half::Around, range.from, y).simd_lt(meets) | !within & near
-                } else {
-                    near
-                };
-                let parts = arc.parts(simd, &[(&self.ball, self.half), (other, Half::Near)], y, &range, begins, within);
+                let some_within = within.any_true();
+                let parts = arc.parts(simd, &self.ball, y, &range, |x| {
+                    let meets = self.ball.meets(self.half, x, y);
+                    let outside = other.meets(Half::Near, x, y).simd_lt(meets);
+                    if !some_within {
+                        return outside;
+                    }
+                    within & other.meets(Half::Around, x, y).simd_lt(meets) | !within & outside
+                });
                 (all[0], all[1]) = (parts[0], parts[1]);
             }
             CutShape::Round { entry } => {
@@ -487,14 +492,10 @@ impl<S: Simd> BallCut<S> {
         put(parts, begun.simd_lt(far), Interval16 { from: begun, to: range.to });
     }
 
-    /// Whether a plane is before the ball where a row begins: at the rim, if points are outside.
+    /// Whether a plane is before the ball at a place of a row.
     #[inline(always)]
-    fn is_before(&self, plane: &Linear16<S>, height: f32x16<S>, x: f32x16<S>, y: f32x16<S>) -> mask32x16<S> {
-        let along = plane.at(x, y);
-        match self.half {
-            Half::Near | Half::Far => along.simd_ge(height),
-            Half::Around => (along * self.ball.meets(self.half, x, y)).simd_ge(height),
-        }
+    fn is_before(&self, arc: &HalfCircle<S>, x: f32x16<S>, y: f32x16<S>) -> mask32x16<S> {
+        (arc.plane.at(x, y) * self.ball.meets(self.half, x, y)).simd_ge(arc.height)
     }
 
     /// See [`Shadow::breaks`](super::occluder::Shadow::breaks).

@@ -74,7 +74,7 @@ pub(crate) struct Roots<S: Simd> {
 /// Where a y^2 + 2 b y + c is 0. Not quite 0 stands for a = 0, so that one root may be far away and nothing is divided
 /// by 0.
 #[inline(always)]
-fn roots<S: Simd>(a: f32x16<S>, b: f32x16<S>, c: f32x16<S>) -> Roots<S> {
+pub(super) fn roots<S: Simd>(a: f32x16<S>, b: f32x16<S>, c: f32x16<S>) -> Roots<S> {
     let simd = a.token();
     let (zero, one) = (simd.splat_f32x16(0.0), simd.splat_f32x16(1.0));
     let least = (b.abs() + c.abs()) * 1e-12 + f32::MIN_POSITIVE;
