@@ -22,15 +22,6 @@ pub(super) struct RungRays<'a> {
     pub hidden: &'a mut Vec<u16>,
 }
 
-/// What was traced.
-#[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Traced {
-    pub rays: u64,
-    pub packets: u64,
-    /// Packets of which some rays are hidden and some are not.
-    pub mixed: u64,
-}
-
 /// Up to sixteen shadow rays towards one light, each with what the caller knows it by.
 pub(super) struct Packet {
     light: LightId,
@@ -69,12 +60,12 @@ impl Packet {
         self.count == LANES
     }
 
-    /// Traces the rays through the trees and begins anew. `each` hears of those that are hidden: which place, which
-    /// point.
-    pub fn trace(&mut self, scene: &Scene, traced: &mut Traced, mut each: impl FnMut(u32, u32)) {
+    /// Traces the rays through the trees and begins anew; their number. `each` hears of those that are hidden: which
+    /// place, which point.
+    pub fn trace(&mut self, scene: &Scene, mut each: impl FnMut(u32, u32)) -> u64 {
         let count = std::mem::take(&mut self.count);
         if count == 0 {
-            return;
+            return 0;
         }
         let mut t_end = [0.0; LANES];
         for (lane, t_end) in t_end.iter_mut().enumerate().take(count) {
@@ -83,21 +74,19 @@ impl Packet {
         let shadows = ShadowRays { from: &self.from, rays: self.rays.clone(), t_end };
         let all = ((1u32 << count) - 1) as u16;
         let mut hidden = scene.geometry.are_blocked(scene.level, &shadows, all);
-        traced.rays += count as u64;
-        traced.packets += 1;
-        traced.mixed += u64::from(hidden != 0 && hidden != all);
         while hidden != 0 {
             let lane = hidden.trailing_zeros() as usize % LANES;
             hidden &= hidden - 1;
             each(self.places[lane], self.points[lane]);
         }
+        count as u64
     }
 }
 
 /// Finds what points things in trees hide from some places, all of which ask as many. What is below a place's horizon
-/// is not asked.
-pub(super) fn trace(scene: &Scene, light: LightId, beams: &mut [RungRays]) -> Traced {
-    let mut traced = Traced::default();
+/// is not asked. Says how many rays were traced.
+pub(super) fn trace(scene: &Scene, light: LightId, beams: &mut [RungRays]) -> u64 {
+    let mut traced = 0;
     let Some(first) = beams.first() else { return traced };
     let cells = first.rung.by_cell.len();
     let mut packet = Packet::new(light, &first.point);
@@ -114,10 +103,9 @@ pub(super) fn trace(scene: &Scene, light: LightId, beams: &mut [RungRays]) -> Tr
             let k = usize::from(rung.by_cell[cell]);
             let l = rung.points.get(k) - point.p;
             if point.horizon.dot(l) > 0.0 && packet.add(place as u32, point, l, k as u32) {
-                packet.trace(scene, &mut traced, |place, k| note(beams, place, k));
+                traced += packet.trace(scene, |place, k| note(beams, place, k));
             }
         }
     }
-    packet.trace(scene, &mut traced, |place, k| note(beams, place, k));
-    traced
+    traced + packet.trace(scene, |place, k| note(beams, place, k))
 }

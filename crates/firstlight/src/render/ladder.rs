@@ -95,6 +95,28 @@ impl<'a> Asker<'a> {
     }
 }
 
+/// What the points of one rung said: a bit for each that would send anything, and for each of those that is hidden.
+#[derive(Debug, Default)]
+pub(super) struct Said {
+    sends: Vec<u16>,
+    hidden: Vec<u16>,
+}
+
+impl Said {
+    fn begin(&mut self, blocks: usize) {
+        for bits in [&mut self.sends, &mut self.hidden] {
+            bits.clear();
+            bits.resize(blocks, 0);
+        }
+    }
+
+    /// Whether a point is hidden, if it would send anything.
+    pub fn of(&self, point: u16) -> Option<bool> {
+        let [block, bit] = [usize::from(point) / LANES, usize::from(point) % LANES];
+        (self.sends[block] >> bit & 1 == 1).then(|| self.hidden[block] >> bit & 1 == 1)
+    }
+}
+
 /// What points of a light say, from one place: sums of what they would send, and of what of it arrives.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Tally {
@@ -133,7 +155,9 @@ impl Tally {
         std::array::from_fn(|k| if self.squares[k] > 0.0 { self.all[k] * self.all[k] / self.squares[k] } else { 0.0 })
     }
 
-    /// Adds the points of a rung, of which `view` says what is hidden. Answers with what `half` of all points said.
+    /// Adds the points of a rung, of which `view` says what is hidden; in place of that, `said` says it of all of them
+    /// then. Answers with what `half` of all points said.
+    #[allow(clippy::too_many_arguments, reason = "points of a light, a surface that it shines on, and two answers")]
     pub fn ask(
         &mut self,
         asker: &Asker,
@@ -142,8 +166,10 @@ impl Tally {
         si: &SurfaceInteraction,
         lobe: &Lobe,
         half: usize,
+        said: &mut Said,
     ) -> Option<Tally> {
         let obstacles = PointObstacles::of(view);
+        said.begin(rung.points.blocks.len());
         let middle = half.saturating_sub(self.count) / LANES;
         let middle = middle.min(rung.points.blocks.len());
         let mut told = None;
@@ -152,7 +178,7 @@ impl Tally {
                 told = Some(*self);
             }
             self.count += blocks.len() * LANES;
-            dispatch!(asker.level, simd => self.add(simd, asker.area, &rung.points, blocks, si, lobe, &obstacles));
+            dispatch!(asker.level, simd => self.add(simd, asker.area, &rung.points, blocks, si, lobe, &obstacles, said));
         }
         told
     }
@@ -169,6 +195,7 @@ impl Tally {
         si: &SurfaceInteraction,
         lobe: &Lobe,
         obstacles: &PointObstacles,
+        said: &mut Said,
     ) {
         let splat = |v: f32| simd.splat_f32x16(v);
         let zero = splat(0.0);
@@ -205,8 +232,10 @@ impl Tally {
             for disk in obstacles.disks {
                 lit &= !disk.blocks_lanes(l);
             }
+            let hidden = sends & !lit.to_bitmask();
             self.sending += sends.count_ones() as usize;
-            self.hidden += (sends & !lit.to_bitmask()).count_ones() as usize;
+            self.hidden += hidden.count_ones() as usize;
+            (said.sends[index], said.hidden[index]) = (sends as u16, hidden as u16);
             let add = |sent: f32x16<S>, [all, arrives, squares]: &mut [f32x16<S>; 3]| {
                 *all += sent;
                 *arrives += lit.select(sent, zero);

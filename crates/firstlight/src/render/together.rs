@@ -7,14 +7,15 @@
 
 use super::Counts;
 use super::arrival::{ArrivalPlace, Arrivals, Sighting};
-use super::beams::{self, RungRays, Traced};
-use super::ladder::{Asker, FIRST, LAST, Tally, of_edge};
+use super::beams::{self, RungRays};
+use super::ladder::{Asker, FIRST, LAST, Rung, Said, Tally, of_edge};
 use super::resolve::LightTerm;
 use crate::color::Rgb;
 use crate::ids::SurfaceId;
 use crate::integrate::{Arrived, Illumination};
 use crate::light::SERIES;
 use crate::material::{Bsdf, Lobe, MOMENTS, Moments};
+use crate::math::LANES;
 use crate::shape::SurfaceInteraction;
 use crate::visibility::{ShadowView, Viewpoint, Visibility};
 
@@ -26,8 +27,10 @@ const GROWTH: usize = 4;
 const MIXED: f32 = 0.035;
 /// The deviation of the share that n stratified points find behind an edge, times n^3/4.
 const EDGE: f32 = 0.46;
-/// How many times that is where the points of a packet do not lie in different parts of a cell.
+/// How many times that is where the points of a packet do not lie in different parts of a cell; and what is counted of
+/// it for a ray alone, none of whose errors is made good by others.
 const APART: f32 = 3.5;
+const ALONE: f32 = 1.5;
 /// The part of what chance makes of an edge that is wrong at the least, where no packet says so.
 const UNANIMOUS: f32 = 0.1;
 /// How many times what is allowed by chance a deviation may be.
@@ -57,7 +60,8 @@ const UNEVEN: f64 = 1.0 / 16.0;
 /// The part of what chance makes of an edge that is wrong at the least: two numbers of points may agree for no reason.
 const OF_EDGE: f32 = 0.4;
 /// Points cost more the more there are: the tolerance grows with their number, to so many times what it is for few at
-/// [`MANY`] of a ray; and to so many times that at [`MANY_OF_ALL`] of a pixel.
+/// [`MANY`] of a ray; and to so many times that at [`MANY_OF_ALL`] of a pixel with several: two numbers of points of
+/// one ray agree by chance too often.
 const COARSE: f32 = 2.5;
 const MANY: usize = 1 << 10;
 const COARSER: f32 = 2.0;
@@ -87,6 +91,8 @@ struct Asking {
     /// Whether it needs no more points.
     settled: bool,
     tally: Tally,
+    /// What the points asked last said.
+    said: Said,
     /// What half of the points said.
     half: Tally,
     /// What a quarter of the points said, or fewer.
@@ -122,8 +128,8 @@ impl Asking {
     }
 }
 
-/// Has all that are not settled ask so many points. `traced` hears of the packets of those behind what is in trees.
-fn ask(asker: &Asker, asking: &mut [Asking], stride: usize, to: usize, traced: &mut Traced, counts: &mut Counts) {
+/// Has all that are not settled ask so many points. `edges` hears of the packets of points behind what is in trees.
+fn ask(asker: &Asker, asking: &mut [Asking], stride: usize, to: usize, edges: &mut PacketEdges, counts: &mut Counts) {
     for one in asking.iter_mut().filter(|one| !one.settled) {
         one.half = one.tally;
     }
@@ -143,22 +149,53 @@ fn ask(asker: &Asker, asking: &mut [Asking], stride: usize, to: usize, traced: &
                 hidden: &mut one.view.hidden,
             });
         }
-        let now = beams::trace(asker.scene, asker.target.light, &mut beams);
-        counts.settled.traced += now.rays;
-        traced.packets += now.packets;
-        traced.mixed += now.mixed;
+        counts.settled.traced += beams::trace(asker.scene, asker.target.light, &mut beams);
         for one in asking.iter_mut().filter(|one| !one.settled) {
             let rung = rung(one.series);
             if !one.view.trees {
                 counts.settled.traced += asker.mask(rung, &mut one.view, &Viewpoint::of(&one.si));
             }
-            if let Some(half) = one.tally.ask(asker, rung, &one.view, &one.si, &one.lobe, to / 2) {
+            let Asking { tally, view, si, lobe, said, .. } = one;
+            if let Some(half) = tally.ask(asker, rung, view, si, lobe, to / 2, said) {
                 one.half = half;
             }
             let more = (one.tally.count - count) as u64;
             counts.shadow_rays += more;
             counts.shadow_rays_skipped += more;
         }
+        if by_beams {
+            edges.add(asking.iter().filter(|one| !one.settled).map(|one| (rung(one.series), &one.said)));
+        }
+    }
+}
+
+/// How many packets of points there were, sixteen neighbours on the light each, and how many of them the edge of a
+/// shadow runs through, of whatever that is.
+#[derive(Clone, Copy, Debug, Default)]
+struct PacketEdges {
+    packets: u32,
+    mixed: u32,
+}
+
+impl PacketEdges {
+    /// Adds what all rays were told by the points of a rung, cell by cell of the light.
+    fn add<'a>(&mut self, said: impl Iterator<Item = (&'a Rung, &'a Said)> + Clone) {
+        let Some((first, _)) = said.clone().next() else { return };
+        let (mut points, mut hidden) = (0, 0);
+        for cell in 0..first.by_cell.len() {
+            for is_hidden in said.clone().filter_map(|(rung, said)| said.of(rung.by_cell[cell])) {
+                (points, hidden) = (points + 1, hidden + u32::from(is_hidden));
+                if points == LANES as u32 {
+                    self.packets += 1;
+                    self.mixed += u32::from(hidden != 0 && hidden != points);
+                    (points, hidden) = (0, 0);
+                }
+            }
+        }
+    }
+
+    fn share(self) -> f32 {
+        self.mixed as f32 / self.packets.max(1) as f32
     }
 }
 
@@ -171,7 +208,7 @@ fn apart(asking: &[Asking]) -> f32 {
         (count, sum, squares, points) = (count + 1.0, sum + share, squares + share * share, points + one.tally.sending);
     }
     if count < 2.0 {
-        return 1.0;
+        return ALONE;
     }
     let deviation = ((squares - sum * sum / count) / count).max(0.0).sqrt();
     let by_chance = EDGE * of_edge(points as f64 / f64::from(count));
@@ -313,6 +350,7 @@ impl Together {
             may_miss: false,
             settled: false,
             tally,
+            said: Said::default(),
             half: tally,
             before: None,
         });
@@ -478,11 +516,11 @@ impl Together {
         }
         let tolerance = arrivals.tolerance_by_chance(self.share);
         let allowed = |to: usize| {
-            let coarser = if to * stride >= MANY_OF_ALL { COARSER } else { 1.0 };
+            let coarser = if stride > 1 && to * stride >= MANY_OF_ALL { COARSER } else { 1.0 };
             tolerance * (1.0 + (COARSE - 1.0) * (to.min(MANY) as f32 / MANY as f32)) * coarser
         };
         let part = 1.0 / self.rays as f32;
-        let mut traced = Traced::default();
+        let mut edges = PacketEdges::default();
         loop {
             let beside = if by_beams { self.others * self.rays as f32 } else { Rgb::BLACK };
             let (mut value, mut moved, mut squares) = (self.value + beside, Rgb::BLACK, Rgb::BLACK);
@@ -492,7 +530,7 @@ impl Together {
             // The same of those rays only that may meet the edge of a shadow
             let (mut all_edge, mut effective_edge) = ([Rgb::BLACK; MOMENTS], [0.0; MOMENTS]);
             let (mut sending, mut hidden, mut is_known) = (0, 0, true);
-            ask(&asker, asking, stride, to, &mut traced, counts);
+            ask(&asker, asking, stride, to, &mut edges, counts);
             for one in asking.iter_mut() {
                 let half = if one.settled { &one.tally } else { &one.half };
                 let (now, whole) = one.sums(measure);
@@ -513,7 +551,7 @@ impl Together {
                 is_known &= one.whole.is_some();
             }
             let shows = |error: Rgb| arrivals.steps(value * part, error * part);
-            let mixed = traced.mixed as f32 / traced.packets.max(1) as f32;
+            let mixed = edges.share();
             // What few points send, or none, can be anything
             let sum = |of: &dyn Fn(usize) -> Rgb| (1..MOMENTS).fold(of(0), |sum, k| sum + of(k));
             let least = |k: usize| if k == 0 { TOLD.max(sending as f64 * UNEVEN) } else { TOLD };
@@ -563,7 +601,7 @@ impl Together {
             if to == most {
                 return is_told;
             }
-            let worth = if is_told { WORTH_CELLS } else { 1.0 };
+            let worth = if is_told && !by_beams { WORTH_CELLS } else { 1.0 };
             if error * ratio(most) > allowed(most) * worth {
                 return false;
             }

@@ -17,7 +17,7 @@ use crate::ids::LightId;
 use crate::material::Moments;
 use crate::math::{LANES, Vec3};
 use crate::render::Counts;
-use crate::render::beams::{Packet, Traced};
+use crate::render::beams::Packet;
 use crate::render::fragment::{Contrast, Fragment};
 use crate::render::grid::SETS_IN;
 use crate::render::light_queue::LitPlace;
@@ -278,7 +278,6 @@ impl Cells<'_> {
         let at = |inner: usize| [x + inner as u32 % BLOCK, y + inner as u32 / BLOCK];
         let pixels: [Option<(usize, &Fragment)>; LANES] = std::array::from_fn(|inner| self.whole(at(inner)));
         let mut packet: Option<Packet> = None;
-        let mut traced = Traced::default();
         let mut asked = [[0u32; 2]; LANES];
         for cell in 0..LOOKING {
             for (inner, pixel) in pixels.iter().enumerate() {
@@ -299,10 +298,9 @@ impl Cells<'_> {
                 }
             }
             if let Some(packet) = &mut packet {
-                packet.trace(scene, &mut traced, |_, inner| asked[inner as usize][1] += 1);
+                counts.settled.traced += packet.trace(scene, |_, inner| asked[inner as usize][1] += 1);
             }
         }
-        counts.settled.traced += traced.rays;
         for (inner, [asked, hidden]) in asked.into_iter().enumerate() {
             let index = self.index(at(inner));
             self.behind.votes[index * scene.lights.len() + light] = (asked - hidden) as f32 / asked as f32;
