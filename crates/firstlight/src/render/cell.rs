@@ -52,8 +52,10 @@ pub(super) const QUADRANT_MOTION: f32 = 0.3;
 const QUADRANT_TURN: f32 = 1.0;
 /// The same, turns alone, where the middle of a fragment stands for all of it.
 const MIDDLE_TURN: f32 = 0.06;
-/// In display steps: by how much that may change it.
-const MIDDLE_BEND: f32 = 0.4;
+/// In display steps: by how much that may bend it at most, from a middle to the farthest ray, and from that of a
+/// quadrant. The mean over the rays is off by far less of what bends over a quadrant: some of it lies below.
+const MIDDLE_BEND: f32 = 0.1;
+const QUADRANT_BEND: f32 = 3.0;
 /// Less than this part of what a light sends, turned by an angle, is as good as nothing.
 const NOTHING: f32 = 1e-5;
 /// In display steps: what colours that differ may make together with light that does.
@@ -439,18 +441,27 @@ impl<'a> Cells<'a> {
 
     /// Whether the middle of a fragment stands for all of it: what it sees of a light changes but by what that turns.
     fn is_nearly_even(&self, fragment: u32, light: u32, answer: &Answer) -> bool {
+        let fragment = &self.fragments.all[fragment as usize];
+        answer.turn <= MIDDLE_TURN && self.bend(fragment, light as usize, answer) <= MIDDLE_BEND
+    }
+
+    /// In display steps: by how much what turns a light may bend it within the reach of a place of a fragment.
+    fn bend(&self, fragment: &Fragment, light: usize, answer: &Answer) -> f32 {
         let bend = 0.5 * answer.turn * answer.turn * answer.most;
-        let Fragment { bsdf, .. } = &self.fragments.all[fragment as usize];
-        let colors = self.lights.arrivals.scale(light as usize) * bsdf.colors;
+        let bsdf = &fragment.bsdf;
+        let colors = self.lights.arrivals.scale(light) * bsdf.colors;
         let value = colors.onto(self.scene.ambient * bsdf.ambient, &answer.sums);
-        let shown = self.lights.arrivals.steps(value, colors.of(&Moments::bounds(bend, bend)));
-        answer.turn <= MIDDLE_TURN && shown <= MIDDLE_BEND
+        self.lights.arrivals.steps(value, colors.of(&Moments::bounds(bend, bend)))
     }
 
     /// Whether a light is even enough over the quadrants of a fragment.
     fn is_even(&self, fragment: &Fragment, light: usize, answers: &[Answer]) -> bool {
         let scene = self.scene;
         if answers.iter().any(|answer| answer.motion > QUADRANT_MOTION || answer.turn > QUADRANT_TURN) {
+            return false;
+        }
+        let bends = |answer: &Answer| self.bend(fragment, light, answer) * fragment.share > QUADRANT_BEND;
+        if answers.iter().any(|answer| answer.sums != Moments::default() && bends(answer)) {
             return false;
         }
         let scale = self.lights.arrivals.scale(light);
