@@ -38,6 +38,8 @@ pub(crate) struct ShadingPoint {
     ///
     /// [`Arrived::motion`]: super::Arrived::motion
     pub most_motion: f32,
+    /// The most cells of a light and panels of their rows that it is asked by: beyond that, what arrives is not known.
+    pub most_asked: u32,
     /// What one unit of each moment is worth: linear colours, the light's scale included.
     pub worth: Colors,
     /// What is there beside this light, at least.
@@ -61,6 +63,7 @@ impl ShadingPoint {
             reach: 0.0,
             turn: 0.0,
             most_motion: f32::INFINITY,
+            most_asked: u32::MAX,
             worth: Colors::BLACK,
             base: Rgb::BLACK,
             share: 1.0,

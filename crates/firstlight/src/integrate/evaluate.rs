@@ -17,6 +17,7 @@
 
 use std::f32::consts::FRAC_1_SQRT_2;
 
+use arrayvec::ArrayVec;
 use fearless_simd::{Level, Simd};
 
 use super::batch::{LaneNumbers, Members, ShadingPoint, ViewBlock};
@@ -143,6 +144,8 @@ struct PointSum {
     /// The round that the last two are of.
     round: u32,
     cells: u32,
+    /// Cells and panels that were asked.
+    asked: u32,
 }
 
 impl Evaluator {
@@ -208,6 +211,7 @@ impl Evaluator {
             && self.panels.is_empty())
         {
             round += 1;
+            self.give_up(points, arrived);
             let new = self.polynomials.len();
             self.ask(level, light);
             self.judge(light, points, new, round);
@@ -355,6 +359,36 @@ impl Evaluator {
         }
     }
 
+    /// Leaves those points out that were asked by more cells and panels than is worth it.
+    fn give_up(&mut self, points: &[ShadingPoint], arrived: &mut [Arrived]) {
+        if points.iter().all(|point| point.most_asked == u32::MAX) {
+            return;
+        }
+        let new = self.polynomials.len();
+        let cells = self.smooth.iter().chain(&self.whole).chain(&self.cut[new..]).map(|cell| cell.point);
+        let panels = self.panels.iter().map(|panel| self.cut[panel.cell as usize].point);
+        let mut is_over = false;
+        for point in cells.chain(panels) {
+            let asked = &mut self.state[point as usize].asked;
+            *asked += 1;
+            is_over |= *asked > points[point as usize].most_asked;
+        }
+        if !is_over {
+            return;
+        }
+        let state = &self.state;
+        let is_asked = |point: u32| state[point as usize].asked <= points[point as usize].most_asked;
+        self.smooth.retain(|cell| is_asked(cell.point));
+        self.whole.retain(|cell| is_asked(cell.point));
+        self.panels.retain(|panel| is_asked(self.cut[panel.cell as usize].point));
+        let mut kept = self.cut.split_off(new);
+        kept.retain(|cell| is_asked(cell.point));
+        self.cut.append(&mut kept);
+        for (k, arrived) in arrived.iter_mut().enumerate().filter(|(k, _)| !is_asked(*k as u32)) {
+            arrived.illumination = Illumination::Unknown;
+        }
+    }
+
     /// Asks all cells and panels of this round.
     fn ask(&mut self, level: Level, light: &Asked) {
         let Evaluator { views, between, smooth, whole, cut: cut_cells, polynomials, panels, spare, .. } = self;
@@ -463,14 +497,11 @@ impl Evaluator {
         for (k, cell) in self.whole.iter().enumerate() {
             let fits = &self.fits[k / LANES];
             let state = &mut self.state[cell.point as usize];
-            let error = fit_error(state.weight, fits, k);
-            let is_off = error[0] + error[1] > state.part(tolerance) && state.may_halve(cell, tolerance);
-            if let Some(halves) = halves(cell, error[1] > error[0]).filter(|_| is_off) {
-                state.cells += 1;
-                self.next_whole.extend(halves);
-            } else {
+            let parts = state.refused(cell, fit_error(state.weight, fits, k), tolerance);
+            if parts.is_empty() {
                 state.accept(lane(&fits.sums, k));
             }
+            self.next_whole.extend(parts);
         }
         // Cells that are seen in part: those whose light is not known well enough are asked anew
         let asked = self.cut.len();
@@ -479,12 +510,11 @@ impl Evaluator {
             let fits = &self.cut_fits[(k - new) / LANES];
             let state = &mut self.state[cell.point as usize];
             let error = fit_error(state.weight, fits, k - new).map(|error| error * self.seen[k]);
-            let is_off = error[0] + error[1] > state.part(tolerance) && state.may_halve(&cell, tolerance);
-            if let Some(halves) = halves(&cell, error[1] > error[0]).filter(|_| is_off) {
-                state.cells += 1;
-                self.cut.extend(halves);
+            let parts = state.refused(&cell, error, tolerance);
+            if !parts.is_empty() {
                 self.seen[k] = f32::NAN;
             }
+            self.cut.extend(parts);
         }
         self.next_panels.clear();
         for (k, panel) in self.panels.iter().enumerate() {
@@ -552,6 +582,27 @@ impl PointSum {
     fn part(&self, tolerance: &Tolerance) -> f32 {
         let many = self.cells as f32 / tolerance.few_cells;
         if many > 1.0 { tolerance.part / many.sqrt() } else { tolerance.part }
+    }
+
+    /// The parts that a cell is asked by next whose fit may be wrong by so much along x and along y; none where that will
+    /// do. These are its halves along the worse axis, or, where those would be refused as well, halves of them.
+    fn refused(&mut self, cell: &Cell, [x, y]: [f32; 2], tolerance: &Tolerance) -> ArrayVec<Cell, 4> {
+        let (mut parts, allowed) = (ArrayVec::new(), self.part(tolerance));
+        if !(x + y > allowed && self.may_halve(cell, tolerance)) {
+            return parts;
+        }
+        let is_along_y = y > x;
+        // What is left of them in a half
+        let (same, other) = (x.max(y) * tolerance.halved_along, x.min(y) * tolerance.halved_across);
+        let again = (same + other > allowed).then_some(if same > other { is_along_y } else { !is_along_y });
+        for half in halves(cell, is_along_y).into_iter().flatten() {
+            match again.and_then(|is_along_y| halves(&half, is_along_y)) {
+                Some(quarters) => parts.extend(quarters),
+                None => parts.push(half),
+            }
+        }
+        self.cells += (parts.len() as u32).saturating_sub(1);
+        parts
     }
 
     fn may_halve(&self, cell: &Cell, tolerance: &Tolerance) -> bool {

@@ -27,6 +27,9 @@ pub(crate) struct Tolerance {
     pub fit_cut_slow: f32,
     /// The same where few nodes are asked, for the third power of the end of the series.
     pub fit_coarse: f32,
+    /// What is left of the end of a series in half of a cell, along the axis that was halved and along the other.
+    pub halved_along: f32,
+    pub halved_across: f32,
     /// In half diagonals over distances, squared, or the exponent of the highlight's fall: cells narrower than that are
     /// asked by few nodes first.
     pub smooth_cell: f32,
@@ -56,6 +59,8 @@ impl Tolerance {
         fit_seen_slow: 0.2,
         fit_cut_slow: 2.0,
         fit_coarse: 1.0,
+        halved_along: 1.0 / 16.0,
+        halved_across: 0.5,
         smooth_cell: 1.0,
         cell_depth: 64,
         panel_depth: 12,

@@ -1,15 +1,11 @@
 //! Area lights: what all of them say beside their shape, and what runs.
 
 use std::f64::consts::PI;
-use std::ops::Range;
 use std::sync::{Arc, OnceLock};
 
 use fearless_simd::{f32x16, prelude::*};
 
-use super::{
-    DiskLight, EmitSides, Falloff, Light, LightKind, Rectangle, SampleSet, SphereLight, point_of_series, scaled,
-    way_error,
-};
+use super::{DiskLight, EmitSides, Falloff, Light, LightKind, Rectangle, SampleSet, SphereLight, scaled, way_error};
 use crate::color::Rgb;
 use crate::context::{CompileContext, show};
 use crate::describe::{ColorDesc, SamplesDesc};
@@ -334,9 +330,9 @@ impl Area {
             .get_or_init(|| Points::new(&self.shape, (0..self.count).map(|k| self.set.point(k, self.count, self.seed))))
     }
 
-    /// The first points of one of the series that are stratified together.
-    pub(crate) fn points_of_series(&self, series: usize, range: Range<u32>) -> Points {
-        Points::new(&self.shape, range.map(|k| point_of_series(k, series)))
+    /// The points that stand for some places of the unit square.
+    pub(crate) fn points_at(&self, places: &[[f64; 2]]) -> Points {
+        Points::new(&self.shape, places.iter().copied())
     }
 
     /// Sampled point `k`, world space.

@@ -580,8 +580,21 @@ impl<'a> Arrivals<'a> {
         self.views.push(view);
     }
 
-    /// What arrives at one point, past anything, by cells of the light: where few of its points send nearly all.
-    pub fn by_cells(&mut self, index: usize, place: &ArrivalPlace, counts: &mut Counts) -> Moments {
+    /// What arrives at one point, past anything, where points of the light do not tell: in closed form if there is one,
+    /// or by cells.
+    pub fn beyond_points(&mut self, index: usize, place: &ArrivalPlace, counts: &mut Counts) -> Moments {
+        let mut seen = std::mem::take(&mut self.seen);
+        self.look(index, std::slice::from_ref(place), &mut seen, counts);
+        let (_, sighting) = seen[0];
+        self.seen = seen;
+        match sighting {
+            Sighting::Known(sums) => sums,
+            Sighting::Behind(_) => self.by_cells(index, place, counts),
+        }
+    }
+
+    /// The same by cells of the light: where few of its points send nearly all.
+    fn by_cells(&mut self, index: usize, place: &ArrivalPlace, counts: &mut Counts) -> Moments {
         let lights = self.lights;
         let emitter = lights.emitters[index].as_ref().expect("only lights that are integrated are asked by cells");
         let light = &self.scene.lights[index];

@@ -88,7 +88,7 @@ impl Packet {
 pub(super) fn trace(scene: &Scene, light: LightId, beams: &mut [RungRays]) -> u64 {
     let mut traced = 0;
     let Some(first) = beams.first() else { return traced };
-    let cells = first.rung.by_cell.len();
+    let cells = first.rung.points.blocks.len() * LANES;
     let mut packet = Packet::new(light, &first.point);
     for beam in beams.iter_mut() {
         beam.hidden.clear();
@@ -100,9 +100,8 @@ pub(super) fn trace(scene: &Scene, light: LightId, beams: &mut [RungRays]) -> u6
     for cell in 0..cells {
         for place in 0..beams.len() {
             let RungRays { point, rung, .. } = &beams[place];
-            let k = usize::from(rung.by_cell[cell]);
-            let l = rung.points.get(k) - point.p;
-            if point.horizon.dot(l) > 0.0 && packet.add(place as u32, point, l, k as u32) {
+            let l = rung.points.get(cell) - point.p;
+            if point.horizon.dot(l) > 0.0 && packet.add(place as u32, point, l, cell as u32) {
                 traced += packet.trace(scene, |place, k| note(beams, place, k));
             }
         }

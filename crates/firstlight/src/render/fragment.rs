@@ -31,6 +31,16 @@ pub(crate) type Contrast = Colors;
 /// Fragments of so few rays are lit at each.
 const FEW_RAYS: usize = 4;
 
+/// See [`ShadingPoint::most_asked`]: of one of so many rays of a fragment, beyond which it takes less to ask points of
+/// the light. Rays that ask together need fewer each the more they are.
+pub(crate) fn most_asked(rays: usize) -> u32 {
+    match rays {
+        0..4 => u32::MAX,
+        4..9 => 60,
+        _ => 20,
+    }
+}
+
 /// A camera ray and what it meets.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct RayHit {
@@ -431,7 +441,8 @@ impl Fragments {
             Some(of) => of.point(scene, &self.rays[ray].ray, self.rays[ray].t),
             None => ShadingPoint::of(&self.members[ray].si),
         };
-        LitPlace::new(scene, ShadingPoint { share: fragment.share, ..point }, fragment.surface, bsdf)
+        let (share, most_asked) = (fragment.share, most_asked(fragment.count()));
+        LitPlace::new(scene, ShadingPoint { share, most_asked, ..point }, fragment.surface, bsdf)
     }
 
     /// The material that a ray of a fragment sees.

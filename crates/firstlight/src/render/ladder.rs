@@ -36,11 +36,10 @@ pub(super) struct Ladder {
     series: [[[OnceLock<Box<Rung>>; 3]; ENDS]; SERIES],
 }
 
-/// Some points of one light.
+/// Some points of one light, in the order of its cells, each of which holds one: see [`series_by_cell`]. Of three
+/// quarters of a series, the second of four comes first, then the half after it.
 pub(super) struct Rung {
     pub points: Points,
-    /// The points in the order of the light's cells, one in each, if they are 2^m: see [`series_by_cell`].
-    pub by_cell: Vec<u16>,
     target: OnceLock<Target>,
 }
 
@@ -50,10 +49,13 @@ impl Ladder {
         let Range { start, end } = range;
         let begin = end.checked_div(start).map_or(0, |times| times.ilog2() as usize);
         self.series[series][(end / FIRST).ilog2() as usize][begin].get_or_init(|| {
-            let (first, count) = (start as u32, (end - start) as u32);
-            let by_cell = if count.is_power_of_two() { series_by_cell(series, first, count) } else { Vec::new() };
-            let points = area.points_of_series(series, first..first + count);
-            Box::new(Rung { points, by_cell, target: OnceLock::new() })
+            let (mut first, mut places) = (start, Vec::with_capacity(end - start));
+            while first < end {
+                let next = if first == 0 { end } else { 2 * first };
+                places.extend(series_by_cell(series, first as u32, (next - first) as u32));
+                first = next;
+            }
+            Box::new(Rung { points: area.points_at(&places), target: OnceLock::new() })
         })
     }
 }
@@ -85,7 +87,7 @@ impl<'a> Asker<'a> {
     /// The point of a series of `count` that lies in one of its cells.
     pub fn point(&self, series: usize, count: usize, cell: usize) -> Vec3 {
         let rung = self.ladder.rung(self.area, series, 0..count);
-        rung.points.get(usize::from(rung.by_cell[cell]))
+        rung.points.get(cell)
     }
 
     /// Which points of a rung are hidden from a point, by what is in its view; says how many rays were traced.
@@ -95,27 +97,9 @@ impl<'a> Asker<'a> {
     }
 }
 
-/// What the points of one rung said: a bit for each that would send anything, and for each of those that is hidden.
-#[derive(Debug, Default)]
-pub(super) struct Said {
-    sends: Vec<u16>,
-    hidden: Vec<u16>,
-}
-
-impl Said {
-    fn begin(&mut self, blocks: usize) {
-        for bits in [&mut self.sends, &mut self.hidden] {
-            bits.clear();
-            bits.resize(blocks, 0);
-        }
-    }
-
-    /// Whether a point is hidden, if it would send anything.
-    pub fn of(&self, point: u16) -> Option<bool> {
-        let [block, bit] = [usize::from(point) / LANES, usize::from(point) % LANES];
-        (self.sends[block] >> bit & 1 == 1).then(|| self.hidden[block] >> bit & 1 == 1)
-    }
-}
+/// What the points of one rung said, sixteen by sixteen: a bit for each that would send anything, and for each of those
+/// that is hidden.
+pub(super) type Said = Vec<[u16; 2]>;
 
 /// What points of a light say, from one place: sums of what they would send, and of what of it arrives.
 #[derive(Clone, Copy, Debug, Default)]
@@ -155,9 +139,7 @@ impl Tally {
         std::array::from_fn(|k| if self.squares[k] > 0.0 { self.all[k] * self.all[k] / self.squares[k] } else { 0.0 })
     }
 
-    /// Adds the points of a rung, of which `view` says what is hidden; in place of that, `said` says it of all of them
-    /// then. Answers with what `half` of all points said.
-    #[allow(clippy::too_many_arguments, reason = "points of a light, a surface that it shines on, and two answers")]
+    /// Adds the points of a rung, of which `view` says what is hidden in trees. `said` says it of all that hides then.
     pub fn ask(
         &mut self,
         asker: &Asker,
@@ -165,25 +147,16 @@ impl Tally {
         view: &ShadowView,
         si: &SurfaceInteraction,
         lobe: &Lobe,
-        half: usize,
         said: &mut Said,
-    ) -> Option<Tally> {
+    ) {
         let obstacles = PointObstacles::of(view);
-        said.begin(rung.points.blocks.len());
-        let middle = half.saturating_sub(self.count) / LANES;
-        let middle = middle.min(rung.points.blocks.len());
-        let mut told = None;
-        for blocks in [0..middle, middle..rung.points.blocks.len()] {
-            if self.count == half {
-                told = Some(*self);
-            }
-            self.count += blocks.len() * LANES;
-            dispatch!(asker.level, simd => self.add(simd, asker.area, &rung.points, blocks, si, lobe, &obstacles, said));
-        }
-        told
+        said.clear();
+        said.resize(rung.points.blocks.len(), [0; 2]);
+        self.count += rung.points.blocks.len() * LANES;
+        dispatch!(asker.level, simd => self.add(simd, asker.area, &rung.points, si, lobe, &obstacles, said));
     }
 
-    /// Adds what some blocks of the points of an area light send.
+    /// Adds what some points of an area light send.
     #[inline(always)]
     #[allow(clippy::too_many_arguments, reason = "a light, and a surface that it shines on")]
     fn add<S: Simd>(
@@ -191,11 +164,10 @@ impl Tally {
         simd: S,
         area: &Area,
         points: &Points,
-        blocks: Range<usize>,
         si: &SurfaceInteraction,
         lobe: &Lobe,
         obstacles: &PointObstacles,
-        said: &mut Said,
+        said: &mut [[u16; 2]],
     ) {
         let splat = |v: f32| simd.splat_f32x16(v);
         let zero = splat(0.0);
@@ -205,8 +177,7 @@ impl Tally {
         let floor = area.floor(si.lit_from, si.error, si.horizon);
         let cos_o = splat(si.ns.dot(si.wo));
         let mut sums = [[zero; 3]; MOMENTS];
-        for index in blocks {
-            let block = &points.blocks[index];
+        for (index, block) in points.blocks.iter().enumerate() {
             let q = block.lanes(simd);
             let l = Vec3x16 { x: q.x - p.x, y: q.y - p.y, z: q.z - p.z };
             let height = ns.dot(l);
@@ -235,7 +206,7 @@ impl Tally {
             let hidden = sends & !lit.to_bitmask();
             self.sending += sends.count_ones() as usize;
             self.hidden += hidden.count_ones() as usize;
-            (said.sends[index], said.hidden[index]) = (sends as u16, hidden as u16);
+            said[index] = [sends as u16, hidden as u16];
             let add = |sent: f32x16<S>, [all, arrives, squares]: &mut [f32x16<S>; 3]| {
                 *all += sent;
                 *arrives += lit.select(sent, zero);

@@ -8,7 +8,8 @@
 use super::Counts;
 use super::arrival::{ArrivalPlace, Arrivals, Sighting};
 use super::beams::{self, RungRays};
-use super::ladder::{Asker, FIRST, LAST, Rung, Said, Tally, of_edge};
+use super::fragment::most_asked;
+use super::ladder::{Asker, FIRST, LAST, Said, Tally, of_edge};
 use super::resolve::LightTerm;
 use crate::color::Rgb;
 use crate::ids::SurfaceId;
@@ -28,28 +29,20 @@ const MIXED: f32 = 0.035;
 /// The deviation of the share that n stratified points find behind an edge, times n^3/4.
 const EDGE: f32 = 0.46;
 /// How many times that is where the points of a packet do not lie in different parts of a cell; and what is counted of
-/// it for a ray alone, none of whose errors is made good by others.
+/// it for few rays, the errors of which are made good by few others.
 const APART: f32 = 3.5;
-const ALONE: f32 = 1.5;
+const FEW: u32 = 9;
+const OF_FEW: f32 = 1.5;
 /// The part of what chance makes of an edge that is wrong at the least, where no packet says so.
 const UNANIMOUS: f32 = 0.1;
 /// How many times what is allowed by chance a deviation may be.
-const BY_BEAMS: f32 = 1.9;
+const DEVIATION: f32 = 1.25;
 /// Points that find what is in the way of a pixel.
 const POINTS: f32 = 512.0;
 /// The effective part of them, none of which is hidden where nothing is.
 const CLEAR: f64 = 0.75;
 /// In display steps: what one point may send where none is hidden.
 const UNMET: f32 = 1.0;
-/// How much farther off the sums may be than two numbers of points tell: of many rays, and of one more, which can agree
-/// by chance.
-const DOUBT: [f32; 2] = [2.0, 4.0];
-/// The same of what the rays would make together by chance. Points of different series share a light better than by
-/// chance: behind the same straight edge sixteen are wrong by half as much.
-const DOUBT_BY_CHANCE: [f32; 2] = [1.0, 5.0];
-/// The same of one ray, against a quarter of its points in place of half of them, which is wrong by more: that both
-/// agree by chance is rare.
-const DOUBT_OF_QUARTER: f32 = 0.9;
 /// The part of what may be wrong that points may tell nothing about.
 const UNTOLD: f32 = 0.5;
 /// Effective points of all rays together that tell something.
@@ -57,17 +50,8 @@ const TOLD: f64 = 32.0;
 /// The same of the diffuse part, as a part of all points that send: fewer, and the light is so near that its points
 /// miss where it is nearest.
 const UNEVEN: f64 = 1.0 / 16.0;
-/// The part of what chance makes of an edge that is wrong at the least: two numbers of points may agree for no reason.
-const OF_EDGE: f32 = 0.4;
-/// Points cost more the more there are: the tolerance grows with their number, to so many times what it is for few at
-/// [`MANY`] of a ray; and to so many times that at [`MANY_OF_ALL`] of a pixel with several: two numbers of points of
-/// one ray agree by chance too often.
-const COARSE: f32 = 2.5;
+/// So many points of a ray tell that nothing is hidden.
 const MANY: usize = 1 << 10;
-const COARSER: f32 = 2.0;
-const MANY_OF_ALL: usize = MANY * SERIES;
-/// How many times as far off as is allowed the most points may be before cells are asked, which take far longer.
-const WORTH_CELLS: f32 = 1.7;
 /// In display steps: how far what would arrive at a ray in the middle of a pixel may be off what those in the corners
 /// say, to tell it of all; and how far they may differ.
 const EVEN: f32 = 0.1;
@@ -93,10 +77,6 @@ struct Asking {
     tally: Tally,
     /// What the points asked last said.
     said: Said,
-    /// What half of the points said.
-    half: Tally,
-    /// What a quarter of the points said, or fewer.
-    before: Option<Rgb>,
 }
 
 /// A ray of which nothing is known yet but that nothing is in the way, if that is, or nothing in trees.
@@ -130,9 +110,6 @@ impl Asking {
 
 /// Has all that are not settled ask so many points. `edges` hears of the packets of points behind what is in trees.
 fn ask(asker: &Asker, asking: &mut [Asking], stride: usize, to: usize, edges: &mut PacketEdges, counts: &mut Counts) {
-    for one in asking.iter_mut().filter(|one| !one.settled) {
-        one.half = one.tally;
-    }
     // Masks take little longer for many points than for few; packets of rays want a point in each cell
     let by_beams = asking.iter().any(|one| !one.settled && one.view.trees);
     let growth = if by_beams { 2 } else { GROWTH };
@@ -156,46 +133,73 @@ fn ask(asker: &Asker, asking: &mut [Asking], stride: usize, to: usize, edges: &m
                 counts.settled.traced += asker.mask(rung, &mut one.view, &Viewpoint::of(&one.si));
             }
             let Asking { tally, view, si, lobe, said, .. } = one;
-            if let Some(half) = tally.ask(asker, rung, view, si, lobe, to / 2, said) {
-                one.half = half;
-            }
+            tally.ask(asker, rung, view, si, lobe, said);
             let more = (one.tally.count - count) as u64;
             counts.shadow_rays += more;
             counts.shadow_rays_skipped += more;
         }
-        if by_beams {
-            edges.add(asking.iter().filter(|one| !one.settled).map(|one| (rung(one.series), &one.said)));
-        }
+        edges.add(asking.iter().filter(|one| !one.settled).map(|one| &one.said));
     }
 }
 
-/// How many packets of points there were, sixteen neighbours on the light each, and how many of them the edge of a
-/// shadow runs through, of whatever that is.
+/// How many packets of points, neighbours on the light, the edge of a shadow runs through, of whatever that is.
 #[derive(Clone, Copy, Debug, Default)]
 struct PacketEdges {
-    packets: u32,
     mixed: u32,
+    /// The same of packets of sixteen points of one ray.
+    mixed_alone: u32,
+    /// Points that send anything.
+    sending: u32,
+    /// Rays that ask, and points of a packet: those of all of them in some cells of the light, sixteen or more in all.
+    rays: u32,
+    points: u32,
 }
 
 impl PacketEdges {
-    /// Adds what all rays were told by the points of a rung, cell by cell of the light.
-    fn add<'a>(&mut self, said: impl Iterator<Item = (&'a Rung, &'a Said)> + Clone) {
-        let Some((first, _)) = said.clone().next() else { return };
-        let (mut points, mut hidden) = (0, 0);
-        for cell in 0..first.by_cell.len() {
-            for is_hidden in said.clone().filter_map(|(rung, said)| said.of(rung.by_cell[cell])) {
-                (points, hidden) = (points + 1, hidden + u32::from(is_hidden));
-                if points == LANES as u32 {
-                    self.packets += 1;
-                    self.mixed += u32::from(hidden != 0 && hidden != points);
-                    (points, hidden) = (0, 0);
-                }
+    /// Adds what all rays were told by the points of a rung.
+    fn add<'a>(&mut self, said: impl Iterator<Item = &'a Said> + Clone) {
+        let rays = said.clone().count();
+        let Some(blocks) = said.clone().next().map(Vec::len) else { return };
+        let cells = (LANES / rays.min(LANES)).next_power_of_two();
+        (self.rays, self.points) = (rays as u32, (cells * rays) as u32);
+        for block in 0..blocks {
+            let (mut lit, mut hidden) = (0u16, 0u16);
+            for [sends, hides] in said.clone().map(|said| said[block]) {
+                (lit, hidden) = (lit | sends & !hides, hidden | hides);
+                self.sending += sends.count_ones();
+                self.mixed_alone += u32::from(hides != 0 && hides != sends);
             }
+            // Cell by cell, or some cells together, told by their first
+            let mut wide = 1;
+            while wide < cells {
+                (lit, hidden) = (lit | lit >> wide, hidden | hidden >> wide);
+                wide *= 2;
+            }
+            let first = match cells {
+                1 => 0xffff,
+                2 => 0x5555,
+                4 => 0x1111,
+                8 => 0x0101,
+                _ => 0x0001,
+            };
+            self.mixed += (lit & hidden & first).count_ones();
         }
     }
 
-    fn share(self) -> f32 {
-        self.mixed as f32 / self.packets.max(1) as f32
+    /// The deviation of the share of the light that `effective` points find, if each packet is wrong by itself: those of
+    /// all rays, `apart` times as wrong as if all saw the same, or, if that is less, those of each.
+    fn deviation(&self, effective: f64, sending: usize, apart: f32) -> f32 {
+        // Few packets send nearly all of a highlight: the edges may run through just those
+        let heavier = sending as f32 / effective.max(1.0) as f32;
+        let of = |mixed: u32, points: f32| {
+            let mixed = ((mixed as f32 * points) / self.sending.max(1) as f32 * heavier).min(1.0);
+            let packets = (effective as f32 / points).max(1.0);
+            // Of one packet as that of sixteen points
+            MIXED * of_edge(f64::from(points)) / of_edge(LANES as f64) * (mixed / packets).sqrt()
+        };
+        let alone = of(self.mixed_alone, LANES as f32);
+        let together = alone.min(apart * of(self.mixed, self.points as f32));
+        if self.rays <= FEW { together * OF_FEW } else { together }
     }
 }
 
@@ -208,7 +212,7 @@ fn apart(asking: &[Asking]) -> f32 {
         (count, sum, squares, points) = (count + 1.0, sum + share, squares + share * share, points + one.tally.sending);
     }
     if count < 2.0 {
-        return ALONE;
+        return 1.0;
     }
     let deviation = ((squares - sum * sum / count) / count).max(0.0).sqrt();
     let by_chance = EDGE * of_edge(points as f64 / f64::from(count));
@@ -351,8 +355,6 @@ impl Together {
             settled: false,
             tally,
             said: Said::default(),
-            half: tally,
-            before: None,
         });
     }
 
@@ -376,9 +378,11 @@ impl Together {
         let looking: Vec<Vec<Looking>> = all.iter_mut().map(|one| std::mem::take(&mut one.looking)).collect();
         let mut places = Vec::new();
         for (one, looking) in all.iter().zip(&looking) {
+            let most_asked = most_asked(one.asking.len() + looking.len());
             places.extend(looking.iter().map(|Looking { si, bsdf, lit, clear }| {
                 // What is integrated is wrong alike at all rays: that much by no more than if one stood for all
-                ArrivalPlace { share: one.share, lit: *lit, clear: *clear, ..arrivals.place(light, si, bsdf) }
+                let (share, lit, clear) = (one.share, *lit, *clear);
+                ArrivalPlace { share, lit, clear, most_asked, ..arrivals.place(light, si, bsdf) }
             }));
         }
         if !places.is_empty() {
@@ -485,7 +489,7 @@ impl Together {
                 let sums = if all_settled || one.settled {
                     one.tally.sums(one.whole.as_ref(), measure)
                 } else {
-                    arrivals.by_cells(self.light, &place, counts)
+                    arrivals.beyond_points(self.light, &place, counts)
                 };
                 if one.tally.sending > 0 {
                     self.shares += 1.0 - one.tally.hidden as f32 / one.tally.sending as f32;
@@ -515,31 +519,20 @@ impl Together {
             to *= growth;
         }
         let tolerance = arrivals.tolerance_by_chance(self.share);
-        let allowed = |to: usize| {
-            let coarser = if stride > 1 && to * stride >= MANY_OF_ALL { COARSER } else { 1.0 };
-            tolerance * (1.0 + (COARSE - 1.0) * (to.min(MANY) as f32 / MANY as f32)) * coarser
-        };
+        let allowed = tolerance * DEVIATION;
         let part = 1.0 / self.rays as f32;
         let mut edges = PacketEdges::default();
         loop {
-            let beside = if by_beams { self.others * self.rays as f32 } else { Rgb::BLACK };
-            let (mut value, mut moved, mut squares) = (self.value + beside, Rgb::BLACK, Rgb::BLACK);
-            let (mut moved_more, mut squares_more) = (Rgb::BLACK, Rgb::BLACK);
+            let mut value = self.value + self.others * self.rays as f32;
             // What would arrive if nothing were in the way, of each kind, and by how many effective points that is told
             let (mut all, mut effective) = ([Rgb::BLACK; MOMENTS], [0.0; MOMENTS]);
             // The same of those rays only that may meet the edge of a shadow
             let (mut all_edge, mut effective_edge) = ([Rgb::BLACK; MOMENTS], [0.0; MOMENTS]);
             let (mut sending, mut hidden, mut is_known) = (0, 0, true);
             ask(&asker, asking, stride, to, &mut edges, counts);
-            for one in asking.iter_mut() {
-                let half = if one.settled { &one.tally } else { &one.half };
+            for one in asking.iter() {
                 let (now, whole) = one.sums(measure);
-                let off = one.color(&now) + one.color(&half.sums(one.whole.as_ref(), measure)) * -1.0;
-                let color = one.color(&now);
-                (value, moved, squares) = (value + color, moved + off, squares + off * off);
-                let more = one.before.map_or(Rgb::BLACK, |before| color + before * -1.0);
-                (moved_more, squares_more) = (moved_more + more, squares_more + more * more);
-                one.before = Some(color);
+                value += one.color(&now);
                 for (k, (color, points)) in one.each(&whole).0.into_iter().zip(one.tally.effective()).enumerate() {
                     (all[k], effective[k]) = (all[k] + color, effective[k] + points);
                     if !one.settled {
@@ -551,7 +544,6 @@ impl Together {
                 is_known &= one.whole.is_some();
             }
             let shows = |error: Rgb| arrivals.steps(value * part, error * part);
-            let mixed = edges.share();
             // What few points send, or none, can be anything
             let sum = |of: &dyn Fn(usize) -> Rgb| (1..MOMENTS).fold(of(0), |sum, k| sum + of(k));
             let least = |k: usize| if k == 0 { TOLD.max(sending as f64 * UNEVEN) } else { TOLD };
@@ -564,29 +556,15 @@ impl Together {
             if is_told && is_known && hidden == 0 && (is_clear || to >= MANY) {
                 return true;
             }
-            // By how much the sum moved, or by as much as its parts would together if they moved by chance
-            let doubt = |[many, one]: [f32; 2]| many + one / asking.len() as f32;
-            let off = Rgb::max(moved.map(f32::abs) * doubt(DOUBT), squares.map(f32::sqrt) * doubt(DOUBT_BY_CHANCE));
-            let one = DOUBT_OF_QUARTER / asking.len() as f32;
-            let more = Rgb::max(moved_more.map(f32::abs) * DOUBT[1], squares_more.map(f32::sqrt) * DOUBT_BY_CHANCE[1]);
-            let off = off.max(more * one);
-            let edge = sum(&|k| all_edge[k] * of_edge(effective_edge[k])) * OF_EDGE;
-            let error = if by_beams {
-                // As many points of each packet that some edge runs through are on its wrong side
-                let apart = apart(asking);
-                let wrong = |k: usize| {
-                    let packets = (effective[k] / 16.0).max(1.0) as f32;
-                    // Few packets send nearly all of a highlight: the edges may run through just those
-                    let mixed = (mixed * sending as f32 / effective[k].max(1.0) as f32).min(1.0);
-                    let of_edge = of_edge(effective[k]);
-                    all[k] * (MIXED * apart * (mixed / packets).sqrt()).max(UNANIMOUS * of_edge)
-                };
-                shows(sum(&wrong))
-            } else {
-                shows(off.max(edge))
+            // As much as packets that some edge runs through are wrong by; or a part of what one edge through all may be
+            let apart = apart(asking);
+            let least = if is_known { UNANIMOUS } else { EDGE };
+            let wrong = |k: usize| {
+                let (of, points) = (all_edge[k], effective_edge[k]);
+                of * edges.deviation(points, sending, apart).max(least * of_edge(points))
             };
-            let allowed = |to: usize| if by_beams { tolerance * BY_BEAMS } else { allowed(to) };
-            if is_told && error <= allowed(to) {
+            let error = shows(sum(&wrong));
+            if is_told && error <= allowed {
                 return true;
             }
             // Rays are settled that nothing is in the way of, if enough points of them agree
@@ -595,18 +573,17 @@ impl Together {
             if agree >= f64::from(wanted) * CLEAR {
                 asking.iter_mut().filter(|one| is_clear(one)).for_each(|one| one.settled = true);
             }
-            // Errors shrink as they do where an edge is: what the most will not settle by far, cells do
+            // Errors shrink as they do where an edge is: what the most will not settle, cells do
             let asked = to;
             let ratio = |next: usize| of_edge(next as f64) / of_edge(asked as f64);
             if to == most {
-                return is_told;
+                return false;
             }
-            let worth = if is_told && !by_beams { WORTH_CELLS } else { 1.0 };
-            if error * ratio(most) > allowed(most) * worth {
+            if error * ratio(most) > allowed {
                 return false;
             }
             to *= growth;
-            while to < MANY && error * ratio(to) > allowed(to) {
+            while to < most && error * ratio(to) > allowed {
                 to *= growth;
             }
             to = to.min(most);

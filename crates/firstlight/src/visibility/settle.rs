@@ -29,6 +29,7 @@ const TRACED: usize = 32;
 pub(crate) struct Settler {
     pub occluders: Occluders,
     pub view: ShadowView,
+    alone: Occluders,
     parts: Vec<(usize, usize)>,
 }
 
@@ -78,6 +79,13 @@ impl Settler {
                     counts.shafts += 1;
                 }
                 is_traced = self.occluders.too_many;
+                // It may be in the ways of all together that so much is, not in those of each
+                if is_traced && part.len() > 1 {
+                    let cap = ONE + ONE_MORE * UNKNOWN;
+                    self.alone.gather(level, scene, target, points, &part[part.len() / 2..][..1], cap);
+                    counts.shafts += 1;
+                    is_traced = self.alone.too_many;
+                }
             }
             if is_traced {
                 self.occluders.leaves.clear();
