@@ -384,7 +384,7 @@ impl Evaluator {
         let mut kept = self.cut.split_off(new);
         kept.retain(|cell| is_asked(cell.point));
         self.cut.append(&mut kept);
-        for (k, arrived) in arrived.iter_mut().enumerate().filter(|(k, _)| !is_asked(*k as u32)) {
+        for (_, arrived) in arrived.iter_mut().enumerate().filter(|(k, _)| !is_asked(*k as u32)) {
             arrived.illumination = Illumination::Unknown;
         }
     }
@@ -584,8 +584,8 @@ impl PointSum {
         if many > 1.0 { tolerance.part / many.sqrt() } else { tolerance.part }
     }
 
-    /// The parts that a cell is asked by next whose fit may be wrong by so much along x and along y; none where that will
-    /// do. These are its halves along the worse axis, or, where those would be refused as well, halves of them.
+    /// The parts that a cell is asked by next whose fit may be wrong by so much along x and along y; none where that
+    /// will do. These are its halves along the worse axis, or, where those would be refused as well, halves of them.
     fn refused(&mut self, cell: &Cell, [x, y]: [f32; 2], tolerance: &Tolerance) -> ArrayVec<Cell, 4> {
         let (mut parts, allowed) = (ArrayVec::new(), self.part(tolerance));
         if !(x + y > allowed && self.may_halve(cell, tolerance)) {

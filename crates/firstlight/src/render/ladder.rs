@@ -99,7 +99,7 @@ impl<'a> Asker<'a> {
 
 /// What the points of one rung said, sixteen by sixteen: a bit for each that would send anything, and for each of those
 /// that is hidden.
-pub(super) type Said = Vec<[u16; 2]>;
+pub(super) type PointAnswers = Vec<[u16; 2]>;
 
 /// What points of a light say, from one place: sums of what they would send, and of what of it arrives.
 #[derive(Clone, Copy, Debug, Default)]
@@ -147,7 +147,7 @@ impl Tally {
         view: &ShadowView,
         si: &SurfaceInteraction,
         lobe: &Lobe,
-        said: &mut Said,
+        said: &mut PointAnswers,
     ) {
         let obstacles = PointObstacles::of(view);
         said.clear();

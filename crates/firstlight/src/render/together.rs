@@ -9,7 +9,7 @@ use super::Counts;
 use super::arrival::{ArrivalPlace, Arrivals, Sighting};
 use super::beams::{self, RungRays};
 use super::fragment::most_asked;
-use super::ladder::{Asker, FIRST, LAST, Said, Tally, of_edge};
+use super::ladder::{Asker, FIRST, LAST, PointAnswers, Tally, of_edge};
 use super::resolve::LightTerm;
 use crate::color::Rgb;
 use crate::ids::SurfaceId;
@@ -34,7 +34,7 @@ const APART: f32 = 3.5;
 const FEW: u32 = 9;
 const OF_FEW: f32 = 1.5;
 /// The part of what chance makes of an edge that is wrong at the least, where no packet says so.
-const UNANIMOUS: f32 = 0.1;
+const UNANIMOUS: f32 = 0.25;
 /// How many times what is allowed by chance a deviation may be.
 const DEVIATION: f32 = 1.25;
 /// Points that find what is in the way of a pixel.
@@ -76,7 +76,7 @@ struct Asking {
     settled: bool,
     tally: Tally,
     /// What the points asked last said.
-    said: Said,
+    said: PointAnswers,
 }
 
 /// A ray of which nothing is known yet but that nothing is in the way, if that is, or nothing in trees.
@@ -157,7 +157,7 @@ struct PacketEdges {
 
 impl PacketEdges {
     /// Adds what all rays were told by the points of a rung.
-    fn add<'a>(&mut self, said: impl Iterator<Item = &'a Said> + Clone) {
+    fn add<'a>(&mut self, said: impl Iterator<Item = &'a PointAnswers> + Clone) {
         let rays = said.clone().count();
         let Some(blocks) = said.clone().next().map(Vec::len) else { return };
         let cells = (LANES / rays.min(LANES)).next_power_of_two();
@@ -186,8 +186,8 @@ impl PacketEdges {
         }
     }
 
-    /// The deviation of the share of the light that `effective` points find, if each packet is wrong by itself: those of
-    /// all rays, `apart` times as wrong as if all saw the same, or, if that is less, those of each.
+    /// The deviation of the share of the light that `effective` points find, if each packet is wrong by itself: those
+    /// of all rays, `apart` times as wrong as if all saw the same, or, if that is less, those of each.
     fn deviation(&self, effective: f64, sending: usize, apart: f32) -> f32 {
         // Few packets send nearly all of a highlight: the edges may run through just those
         let heavier = sending as f32 / effective.max(1.0) as f32;
@@ -354,7 +354,7 @@ impl Together {
             may_miss: false,
             settled: false,
             tally,
-            said: Said::default(),
+            said: PointAnswers::default(),
         });
     }
 
