@@ -38,7 +38,7 @@ pub struct Options {
     tolerance: f64,
     /// Where converged pictures are kept, and taken from while the scene is the same and they had as many points. They
     /// depend on nothing that integrates; after a change of what sampled light looks like, empty it.
-    #[arg(long, value_name = "DIR", default_value = "target/converged")]
+    #[arg(long, value_name = "DIR", default_value = "crates/firstlight-testkit/tests/truth/converged")]
     kept: PathBuf,
     /// Only makes the converged pictures that are not kept yet.
     #[arg(long)]
