@@ -65,9 +65,9 @@ pub(crate) fn point_of_series(k: u32, series: usize) -> [f64; 2] {
     [unit(owen(x, SCRAMBLE[0])), unit(owen(y, SCRAMBLE[1]))]
 }
 
-/// The points of a series that are counted from `first` on, 2^m of them where `first` is a multiple of 2^m, in the order
-/// of the cells of the square that each holds one of. Halves of halves of the square follow each other, so that cells
-/// next to each other in that order are near each other.
+/// The points of a series that are counted from `first` on, 2^m of them where `first` is a multiple of 2^m, in the
+/// order of the cells of the square that each holds one of. Halves of halves of the square follow each other, so that
+/// cells next to each other in that order are near each other.
 pub(crate) fn series_by_cell(series: usize, first: u32, count: u32) -> Vec<[f64; 2]> {
     let bits = count.ilog2();
     let mut points = vec![[f64::NAN; 2]; count as usize];

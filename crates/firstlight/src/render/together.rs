@@ -556,7 +556,7 @@ impl Together {
             if is_told && is_known && hidden == 0 && (is_clear || to >= MANY) {
                 return true;
             }
-            // As much as packets that some edge runs through are wrong by; or a part of what one edge through all may be
+            // As much as packets that some edge runs through are wrong by; or a part of what one edge may be
             let apart = apart(asking);
             let least = if is_known { UNANIMOUS } else { EDGE };
             let wrong = |k: usize| {
