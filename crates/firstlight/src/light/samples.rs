@@ -65,16 +65,54 @@ pub(crate) fn point_of_series(k: u32, series: usize) -> [f64; 2] {
     [unit(owen(x, SCRAMBLE[0])), unit(owen(y, SCRAMBLE[1]))]
 }
 
+/// A cell of the unit square, by which points are told apart: halves of halves of the square, along x and along y in
+/// turn, follow each other, so that cells next to each other are near each other, and the first digits of a cell are
+/// the larger cell that it is a part of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct FineCell(u32);
+
+impl FineCell {
+    const DIGITS: u32 = 24;
+
+    /// The one that a point lies in.
+    pub fn of(point: [f64; 2]) -> FineCell {
+        let digits = point.map(|v| (v * f64::from(1u32 << (Self::DIGITS / 2))) as u32);
+        let last = Self::DIGITS / 2 - 1;
+        FineCell((0..Self::DIGITS).fold(0, |cell, bit| cell << 1 | digits[bit as usize % 2] >> (last - bit / 2) & 1))
+    }
+
+    /// Which of `count` larger cells, a power of two, it is a part of.
+    pub fn part_of(self, count: usize) -> usize {
+        (self.0 >> (Self::DIGITS - count.ilog2())) as usize
+    }
+
+    /// Its middle.
+    pub fn middle(self) -> [f64; 2] {
+        let digit = |bit: u32| self.0 >> (Self::DIGITS - 1 - bit) & 1;
+        let axis = |axis: u32| (0..Self::DIGITS / 2).fold(0, |digits, k| digits << 1 | digit(2 * k + axis));
+        [0, 1].map(|k| (f64::from(axis(k)) + 0.5) / f64::from(1u32 << (Self::DIGITS / 2)))
+    }
+
+    /// Where one more point goes in one of `count` cells, each of which has one: into the other half of it. The point
+    /// that it has is `kept`, if that is in it; else it was chosen just as this one.
+    pub fn second(kept: FineCell, series: usize, count: usize, cell: usize) -> FineCell {
+        let half = |digits: u32, cell: u32| {
+            let kept = kept.part_of(2 << digits) as u32;
+            let any = || mix(u64::from(digits) << 56 | (series as u64) << 48 | u64::from(cell)) as u32 & 1;
+            if kept / 2 == cell { kept & 1 } else { any() }
+        };
+        let (digits, cell) = (count.ilog2(), cell as u32);
+        let other = 2 * cell + 1 - half(digits, cell);
+        FineCell((digits + 1..Self::DIGITS).fold(other, |cell, digits| 2 * cell + half(digits, cell)))
+    }
+}
+
 /// The points of a series that are counted from `first` on, 2^m of them where `first` is a multiple of 2^m, in the
-/// order of the cells of the square that each holds one of. Halves of halves of the square follow each other, so that
-/// cells next to each other in that order are near each other.
+/// order of the cells of the square that each holds one of.
 pub(crate) fn series_by_cell(series: usize, first: u32, count: u32) -> Vec<[f64; 2]> {
-    let bits = count.ilog2();
     let mut points = vec![[f64::NAN; 2]; count as usize];
     for point in (first..first + count).map(|k| point_of_series(k, series)) {
-        let digits = point.map(|v| (v * f64::from(1u32 << 16)) as u32);
-        let cell = (0..bits).fold(0, |cell, bit| cell << 1 | digits[bit as usize % 2] >> (15 - bit / 2) & 1);
-        points[cell as usize] = point;
+        points[FineCell::of(point).part_of(count as usize)] = point;
     }
     points
 }
@@ -182,6 +220,22 @@ mod tests {
                 let points = series_by_cell(series, first, count);
                 assert!(points.iter().all(|point| !point[0].is_nan()), "{count} points of series {series}");
             }
+        }
+    }
+
+    #[test]
+    fn more_points_lie_in_the_other_halves() {
+        let (series, mut count) = (3, 64);
+        let kept: Vec<_> = series_by_cell(series, 0, 64).into_iter().map(FineCell::of).collect();
+        let mut points = kept.clone();
+        while count < 1024 {
+            let more = (0..count).map(|cell| FineCell::second(kept[cell * 64 / count], series, count, cell));
+            points.extend(more.collect::<Vec<_>>());
+            count *= 2;
+            let mut cells: Vec<_> = points.iter().map(|point| point.part_of(count)).collect();
+            cells.sort_unstable();
+            assert!(cells.into_iter().eq(0..count), "{count}");
+            assert!(points.iter().all(|point| FineCell::of(point.middle()) == *point));
         }
     }
 

@@ -7,7 +7,7 @@
 //! Source of packets of shadow rays: Wald, Benthin, Slusallek, Wagner, "Interactive rendering with coherent ray
 //! tracing", 2001.
 
-use super::ladder::Rung;
+use super::ladder::{Rung, cells_in};
 use crate::accel::RayPacket16;
 use crate::ids::LightId;
 use crate::math::{LANES, ShadowRay, Vec3};
@@ -83,21 +83,20 @@ impl Packet {
     }
 }
 
-/// Finds what points things in trees hide from some places, all of which ask as many. What is below a place's horizon
-/// is not asked. Says how many rays were traced.
-pub(super) fn trace(scene: &Scene, light: LightId, beams: &mut [RungRays]) -> u64 {
+/// Finds which of the points that are `asked` things in trees hide from some places. What is below a place's horizon is
+/// not asked. Says how many rays were traced.
+pub(super) fn trace(scene: &Scene, light: LightId, asked: &[u16], beams: &mut [RungRays]) -> u64 {
     let mut traced = 0;
     let Some(first) = beams.first() else { return traced };
-    let cells = first.rung.points.blocks.len() * LANES;
     let mut packet = Packet::new(light, &first.point);
     for beam in beams.iter_mut() {
         beam.hidden.clear();
-        beam.hidden.resize(cells.div_ceil(LANES), 0);
+        beam.hidden.resize(asked.len(), 0);
     }
     let note = |beams: &mut [RungRays], place: u32, k: u32| {
         beams[place as usize].hidden[k as usize / LANES] |= 1 << (k as usize % LANES);
     };
-    for cell in 0..cells {
+    for cell in cells_in(asked) {
         for place in 0..beams.len() {
             let RungRays { point, rung, .. } = &beams[place];
             let l = rung.points.get(cell) - point.p;

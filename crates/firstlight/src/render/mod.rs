@@ -28,6 +28,7 @@ mod lanes;
 mod light_queue;
 mod lights;
 mod many;
+mod packets;
 pub(crate) mod pixel;
 mod plain;
 mod receipt;
@@ -37,6 +38,7 @@ mod shafts;
 mod single;
 mod solo;
 mod square;
+mod tally;
 mod tile;
 mod together;
 

@@ -9,8 +9,10 @@ use super::Counts;
 use super::arrival::{ArrivalPlace, Arrivals, Sighting};
 use super::beams::{self, RungRays};
 use super::fragment::most_asked;
-use super::ladder::{Asker, FIRST, LAST, PointAnswers, Tally, of_edge};
+use super::ladder::{AskedRung, Asker, CellBits, FIRST, is_in};
+use super::packets::{PacketErrors, by_chance, of_edge};
 use super::resolve::LightTerm;
+use super::tally::Tally;
 use crate::color::Rgb;
 use crate::ids::SurfaceId;
 use crate::integrate::{Arrived, Illumination};
@@ -20,19 +22,6 @@ use crate::math::LANES;
 use crate::shape::SurfaceInteraction;
 use crate::visibility::{ShadowView, Viewpoint, Visibility};
 
-/// The points that a ray asks first where masks tell what is hidden, and how many times as many it asks next.
-const MASKED: usize = 64;
-const GROWTH: usize = 4;
-/// The deviation of the share that a packet sees which some edge runs through: of sixteen points in as many parts of a
-/// cell of the light the edge cuts about four, each of which it parts anywhere.
-const MIXED: f32 = 0.035;
-/// The deviation of the share that n stratified points find behind an edge, times n^3/4.
-const EDGE: f32 = 0.46;
-/// How many times that is where the points of a packet do not lie in different parts of a cell; and what is counted of
-/// it for few rays, the errors of which are made good by few others.
-const APART: f32 = 3.5;
-const FEW: u32 = 9;
-const OF_FEW: f32 = 1.5;
 /// The part of what chance makes of an edge that is wrong at the least, where no packet says so.
 const UNANIMOUS: f32 = 0.25;
 /// How many times what is allowed by chance a deviation may be.
@@ -56,8 +45,10 @@ const MANY: usize = 1 << 10;
 /// say, to tell it of all; and how far they may differ.
 const EVEN: f32 = 0.1;
 const EVEN_CORNERS: f32 = 4.0;
-/// The most points of a pixel.
-const MOST: usize = LAST * SERIES;
+/// Where more points seem to be of no help, there are this part of as many as elsewhere.
+const BEHIND: usize = 4;
+/// The cells that a light is told by at most, of all rays of a pixel.
+const MOST: usize = 1 << 16;
 
 /// A ray whose light is behind things.
 struct Asking {
@@ -72,11 +63,7 @@ struct Asking {
     whole: Option<Moments>,
     /// Whether points of the light may miss most of what it sends.
     may_miss: bool,
-    /// Whether it needs no more points.
-    settled: bool,
     tally: Tally,
-    /// What the points asked last said.
-    said: PointAnswers,
 }
 
 /// A ray of which nothing is known yet but that nothing is in the way, if that is, or nothing in trees.
@@ -93,9 +80,10 @@ impl Asking {
         ArrivalPlace { share, ..place }
     }
 
-    /// What arrives, as far as points tell, and what would if nothing were in the way.
-    fn sums(&self, measure: f32) -> (Moments, Moments) {
-        (self.tally.sums(self.whole.as_ref(), measure), self.whole.unwrap_or_else(|| self.tally.whole(measure)))
+    /// What arrives, as far as points tell, and what would if nothing were in the way; `shares`: see [`Tally::sums`].
+    fn sums(&self, measure: f32, shares: &[f32; MOMENTS]) -> (Moments, Moments) {
+        let arrives = self.tally.sums(self.whole.as_ref(), measure, shares);
+        (arrives, self.whole.unwrap_or_else(|| self.tally.whole(measure)))
     }
 
     /// The diffuse part and the highlight, with their colours.
@@ -108,115 +96,103 @@ impl Asking {
     }
 }
 
-/// Has all that are not settled ask so many points. `edges` hears of the packets of points behind what is in trees.
-fn ask(asker: &Asker, asking: &mut [Asking], stride: usize, to: usize, edges: &mut PacketEdges, counts: &mut Counts) {
-    // Masks take little longer for many points than for few; packets of rays want a point in each cell
-    let by_beams = asking.iter().any(|one| !one.settled && one.view.trees);
-    let growth = if by_beams { 2 } else { GROWTH };
-    // All that are open have asked as many
-    while let Some(count) = asking.iter().find(|one| !one.settled).map(|one| one.tally.count)
-        && count < to
-    {
-        let rung = |series: usize| asker.rung(series, stride, count, to, growth);
-        let mut beams: Vec<RungRays> = Vec::new();
-        for one in asking.iter_mut().filter(|one| !one.settled && one.view.trees) {
-            beams.push(RungRays {
-                point: Viewpoint::of(&one.si),
-                rung: rung(one.series),
-                hidden: &mut one.view.hidden,
-            });
-        }
-        counts.settled.traced += beams::trace(asker.scene, asker.target.light, &mut beams);
-        for one in asking.iter_mut().filter(|one| !one.settled) {
-            let rung = rung(one.series);
-            if !one.view.trees {
-                counts.settled.traced += asker.mask(rung, &mut one.view, &Viewpoint::of(&one.si));
-            }
-            let Asking { tally, view, si, lobe, said, .. } = one;
-            tally.ask(asker, rung, view, si, lobe, said);
-            let more = (one.tally.count - count) as u64;
-            counts.shadow_rays += more;
-            counts.shadow_rays_skipped += more;
-        }
-        edges.add(asking.iter().filter(|one| !one.settled).map(|one| &one.said));
-    }
+/// The cells of a light that rays ask points in.
+struct AskedCells<'a> {
+    asker: Asker<'a>,
+    /// How many there were at first, and now.
+    first: usize,
+    count: usize,
+    /// How often each was halved since a point in it was asked.
+    ages: Vec<u8>,
+    /// As many as these were asked everywhere, at least.
+    everywhere: usize,
 }
 
-/// How many packets of points, neighbours on the light, the edge of a shadow runs through, of whatever that is.
-#[derive(Clone, Copy, Debug, Default)]
-struct PacketEdges {
-    mixed: u32,
-    /// The same of packets of sixteen points of one ray.
-    mixed_alone: u32,
-    /// Points that send anything.
-    sending: u32,
-    /// Rays that ask, and points of a packet: those of all of them in some cells of the light, sixteen or more in all.
-    rays: u32,
-    points: u32,
-}
-
-impl PacketEdges {
-    /// Adds what all rays were told by the points of a rung.
-    fn add<'a>(&mut self, said: impl Iterator<Item = &'a PointAnswers> + Clone) {
-        let rays = said.clone().count();
-        let Some(blocks) = said.clone().next().map(Vec::len) else { return };
-        let cells = (LANES / rays.min(LANES)).next_power_of_two();
-        (self.rays, self.points) = (rays as u32, (cells * rays) as u32);
-        for block in 0..blocks {
-            let (mut lit, mut hidden) = (0u16, 0u16);
-            for [sends, hides] in said.clone().map(|said| said[block]) {
-                (lit, hidden) = (lit | sends & !hides, hidden | hides);
-                self.sending += sends.count_ones();
-                self.mixed_alone += u32::from(hides != 0 && hides != sends);
-            }
-            // Cell by cell, or some cells together, told by their first
-            let mut wide = 1;
-            while wide < cells {
-                (lit, hidden) = (lit | lit >> wide, hidden | hidden >> wide);
-                wide *= 2;
-            }
-            let first = match cells {
-                1 => 0xffff,
-                2 => 0x5555,
-                4 => 0x1111,
-                8 => 0x0101,
-                _ => 0x0001,
-            };
-            self.mixed += (lit & hidden & first).count_ones();
-        }
+impl<'a> AskedCells<'a> {
+    /// Has all rays ask a point in each of so many.
+    fn new(asker: Asker<'a>, count: usize, asking: &mut [Asking], counts: &mut Counts) -> Self {
+        let cells = AskedCells { asker, first: count, count, ages: vec![0; count], everywhere: count };
+        asking.iter_mut().for_each(|one| one.tally.part(count));
+        let first: Vec<AskedRung> = asking.iter().map(|one| asker.first(one.series, count)).collect();
+        cells.ask(&first, count, &vec![u16::MAX; count / LANES], asking, counts);
+        cells
     }
 
-    /// The deviation of the share of the light that `effective` points find, if each packet is wrong by itself: those
-    /// of all rays, `apart` times as wrong as if all saw the same, or, if that is less, those of each.
-    fn deviation(&self, effective: f64, sending: usize, apart: f32) -> f32 {
-        // Few packets send nearly all of a highlight: the edges may run through just those
-        let heavier = sending as f32 / effective.max(1.0) as f32;
-        let of = |mixed: u32, points: f32| {
-            let mixed = ((mixed as f32 * points) / self.sending.max(1) as f32 * heavier).min(1.0);
-            let packets = (effective as f32 / points).max(1.0);
-            // Of one packet as that of sixteen points
-            MIXED * of_edge(f64::from(points)) / of_edge(LANES as f64) * (mixed / packets).sqrt()
+    fn all(&self) -> CellBits {
+        vec![u16::MAX; self.count / LANES]
+    }
+
+    /// Halves all cells and has all rays ask one more point in each that is in `asked`, and as many fewer elsewhere as
+    /// [`BEHIND`] says.
+    fn halve(&mut self, asked: &CellBits, asking: &mut [Asking], counts: &mut Counts) {
+        let left = if self.count >= BEHIND * self.first { self.left_behind(asked) } else { CellBits::new() };
+        asking.iter_mut().for_each(|one| one.tally.part(2 * self.count));
+        self.ask_next(self.count, asked, asking, counts);
+        if left.iter().any(|bits| *bits != 0) {
+            self.ask_next(self.count / BEHIND, &left, asking, counts);
+        }
+        let age = |cell: usize| match (is_in(asked, cell), !left.is_empty() && is_in(&left, cell / BEHIND)) {
+            (true, _) => 0,
+            (_, true) => BEHIND.ilog2() as u8,
+            _ => self.ages[cell] + 1,
         };
-        let alone = of(self.mixed_alone, LANES as f32);
-        let together = alone.min(apart * of(self.mixed, self.points as f32));
-        if self.rays <= FEW { together * OF_FEW } else { together }
+        self.ages = (0..self.count).flat_map(|cell| [age(cell); 2]).collect();
+        self.count *= 2;
+        let behind = if asked.iter().all(|bits| *bits == u16::MAX) { 1 } else { BEHIND };
+        self.everywhere = self.everywhere.max(self.count / behind);
+    }
+
+    /// Those of larger cells that none of `asked` is a part of, and that were halved as often as that since a point in
+    /// them was asked.
+    fn left_behind(&self, asked: &CellBits) -> CellBits {
+        let mut left = vec![0; asked.len().div_ceil(BEHIND)];
+        for (k, ages) in self.ages.chunks(BEHIND).enumerate() {
+            let is_left = (k * BEHIND..(k + 1) * BEHIND).all(|cell| !is_in(asked, cell));
+            if is_left && ages.iter().all(|age| 1 << age >= BEHIND) {
+                left[k / LANES] |= 1 << (k % LANES);
+            }
+        }
+        left
+    }
+
+    fn ask_next(&self, count: usize, asked: &CellBits, asking: &mut [Asking], counts: &mut Counts) {
+        let next: Vec<AskedRung> = asking.iter().map(|one| self.asker.next(one.series, count, asked)).collect();
+        // What is made for what is asked holds nothing else
+        if let AskedRung::Made(rung) = &next[0] {
+            let asked = vec![u16::MAX; rung.points.blocks.len()];
+            self.ask(&next, 2 * count, &asked, asking, counts);
+        } else {
+            self.ask(&next, 2 * count, asked, asking, counts);
+        }
+    }
+
+    /// Has each ray ask those of the points of its rung that are `asked`, each of which tells one of `count` cells.
+    fn ask(&self, rungs: &[AskedRung], count: usize, asked: &[u16], asking: &mut [Asking], counts: &mut Counts) {
+        let asker = &self.asker;
+        let mut beams: Vec<RungRays> = Vec::new();
+        for (one, rung) in asking.iter_mut().zip(rungs).filter(|(one, _)| one.view.trees) {
+            beams.push(RungRays { point: Viewpoint::of(&one.si), rung, hidden: &mut one.view.hidden });
+        }
+        counts.settled.traced += beams::trace(asker.scene, asker.target.light, asked, &mut beams);
+        for (one, rung) in asking.iter_mut().zip(rungs) {
+            if !one.view.trees {
+                counts.settled.traced += asker.mask(rung, asked, &mut one.view, &Viewpoint::of(&one.si));
+            }
+            one.tally.ask(asker, rung, count, asked, &one.view, &one.si, &one.lobe);
+        }
+        let points = asked.iter().map(|bits| u64::from(bits.count_ones())).sum::<u64>() * asking.len() as u64;
+        counts.shadow_rays += points;
+        counts.shadow_rays_skipped += points;
     }
 }
 
-/// How much farther off the sum of all rays may be than if all saw the same: rays that see different shares of the
-/// light are not stratified together.
-fn apart(asking: &[Asking]) -> f32 {
-    let (mut count, mut sum, mut squares, mut points) = (0.0f32, 0.0, 0.0, 0);
-    for one in asking.iter().filter(|one| one.tally.sending > 0) {
-        let share = one.tally.hidden as f32 / one.tally.sending as f32;
-        (count, sum, squares, points) = (count + 1.0, sum + share, squares + share * share, points + one.tally.sending);
-    }
-    if count < 2.0 {
-        return 1.0;
-    }
-    let deviation = ((squares - sum * sum / count) / count).max(0.0).sqrt();
-    let by_chance = EDGE * of_edge(points as f64 / f64::from(count));
-    1.0 + (APART - 1.0) * (0.5 * (deviation / by_chance - 1.0)).clamp(0.0, 1.0)
+/// The parts of what points of all rays send that arrive.
+fn shares(asking: &[Asking]) -> [f32; MOMENTS] {
+    std::array::from_fn(|k| {
+        let sum = |of: fn(&Tally) -> &[f64; MOMENTS]| asking.iter().map(|one| of(&one.tally)[k]).sum::<f64>();
+        let (lit, all) = (sum(|tally| &tally.lit), sum(|tally| &tally.all));
+        if all > 0.0 { (lit / all) as f32 } else { 0.0 }
+    })
 }
 
 /// What the rays of one patch ask of one light.
@@ -341,7 +317,6 @@ impl Together {
         self.rays += 1;
         self.value += place.base;
         let ArrivalPlace { si, lobe, base, scale, reflected, .. } = *place;
-        let tally = Tally::default();
         self.asking.push(Asking {
             si: *si,
             lobe: *lobe,
@@ -352,9 +327,7 @@ impl Together {
             view,
             whole: None,
             may_miss: false,
-            settled: false,
-            tally,
-            said: PointAnswers::default(),
+            tally: Tally::default(),
         });
     }
 
@@ -482,14 +455,13 @@ impl Together {
     pub fn settle(mut self, arrivals: &mut Arrivals, counts: &mut Counts) -> Outcome {
         if !self.asking.is_empty() {
             let mut asking = std::mem::take(&mut self.asking);
-            let all_settled = self.points(arrivals, &mut asking, counts);
-            let measure = arrivals.measure(self.light);
+            let is_told = self.points(arrivals, &mut asking, counts);
+            let (measure, shares) = (arrivals.measure(self.light), shares(&asking));
             for one in asking {
                 let place = one.place(self.each);
-                let sums = if all_settled || one.settled {
-                    one.tally.sums(one.whole.as_ref(), measure)
-                } else {
-                    arrivals.beyond_points(self.light, &place, counts)
+                let sums = match is_told {
+                    true => one.tally.sums(one.whole.as_ref(), measure, &shares),
+                    false => arrivals.beyond_points(self.light, &place, counts),
                 };
                 if one.tally.sending > 0 {
                     self.shares += 1.0 - one.tally.hidden as f32 / one.tally.sending as f32;
@@ -510,83 +482,70 @@ impl Together {
         let asker = arrivals.asker(self.light);
         let measure = arrivals.measure(self.light);
         let wanted = POINTS * self.share.sqrt();
-        let stride = asking.len().next_power_of_two();
-        let most = MOST / stride;
-        let by_beams = asking.iter().all(|one| one.view.trees);
-        let (mut to, growth, part) = if by_beams { (FIRST, 2, 2.0) } else { (MASKED, GROWTH, 0.5) };
-        let first = (part * wanted / asking.len() as f32) as usize;
-        while to < first {
-            to *= growth;
-        }
+        let most = MOST / asking.len().next_power_of_two();
+        let first = ((wanted / asking.len() as f32) as usize).next_power_of_two().max(FIRST);
         let tolerance = arrivals.tolerance_by_chance(self.share);
         let allowed = tolerance * DEVIATION;
         let part = 1.0 / self.rays as f32;
-        let mut edges = PacketEdges::default();
+        let mut cells = AskedCells::new(asker, first, asking, counts);
+        // By how many effective points each part of the light is told, of so many
+        let (mut effective, mut told) = ([0.0; MOMENTS], 0);
         loop {
+            asking.iter_mut().for_each(|one| one.tally.sum(asker.level));
+            if cells.everywhere == cells.count {
+                (effective, told) = ([0.0; MOMENTS], 0);
+            }
+            let shares = shares(asking);
             let mut value = self.value + self.others * self.rays as f32;
-            // What would arrive if nothing were in the way, of each kind, and by how many effective points that is told
-            let (mut all, mut effective) = ([Rgb::BLACK; MOMENTS], [0.0; MOMENTS]);
-            // The same of those rays only that may meet the edge of a shadow
-            let (mut all_edge, mut effective_edge) = ([Rgb::BLACK; MOMENTS], [0.0; MOMENTS]);
+            // What would arrive if nothing were in the way, of each kind
+            let mut all = [Rgb::BLACK; MOMENTS];
             let (mut sending, mut hidden, mut is_known) = (0, 0, true);
-            ask(&asker, asking, stride, to, &mut edges, counts);
             for one in asking.iter() {
-                let (now, whole) = one.sums(measure);
+                let (now, whole) = one.sums(measure, &shares);
                 value += one.color(&now);
                 for (k, (color, points)) in one.each(&whole).0.into_iter().zip(one.tally.effective()).enumerate() {
-                    (all[k], effective[k]) = (all[k] + color, effective[k] + points);
-                    if !one.settled {
-                        (all_edge[k], effective_edge[k]) = (all_edge[k] + color, effective_edge[k] + points);
-                    }
+                    all[k] += color;
+                    effective[k] += if told == 0 { points } else { 0.0 };
                 }
                 sending += one.tally.sending;
                 hidden += one.tally.hidden;
                 is_known &= one.whole.is_some();
             }
+            // Where fewer points are asked, as good as fewer everywhere
+            let more = if told == 0 { 1.0 } else { cells.everywhere as f64 / told as f64 };
+            effective.iter_mut().for_each(|points| *points *= more);
+            told = cells.everywhere;
             let shows = |error: Rgb| arrivals.steps(value * part, error * part);
             // What few points send, or none, can be anything
             let sum = |of: &dyn Fn(usize) -> Rgb| (1..MOMENTS).fold(of(0), |sum, k| sum + of(k));
-            let least = |k: usize| if k == 0 { TOLD.max(sending as f64 * UNEVEN) } else { TOLD };
+            let sending = sending as f64 * told as f64 / cells.count as f64;
+            let least = |k: usize| if k == 0 { TOLD.max(sending * UNEVEN) } else { TOLD };
             let untold = |k: usize| if effective[k] < least(k) { all[k] } else { Rgb::BLACK };
             let is_told = shows(sum(&untold)) <= tolerance * UNTOLD;
             let found = effective.iter().copied().fold(0.0, f64::max);
             // What none of so many points meets may hide what one of them sends
             let one = |k: usize| all[k] * (1.0 / effective[k].max(1.0) as f32);
             let is_clear = found >= f64::from(wanted) * CLEAR && shows(sum(&one)) <= UNMET;
-            if is_told && is_known && hidden == 0 && (is_clear || to >= MANY) {
+            if is_told && is_known && hidden == 0 && (is_clear || cells.count >= MANY) {
                 return true;
             }
-            // As much as packets that some edge runs through are wrong by; or a part of what one edge may be
-            let apart = apart(asking);
-            let least = if is_known { UNANIMOUS } else { EDGE };
-            let wrong = |k: usize| {
-                let (of, points) = (all_edge[k], effective_edge[k]);
-                of * edges.deviation(points, sending, apart).max(least * of_edge(points))
-            };
-            let error = shows(sum(&wrong));
+            // As much as packets are wrong by; or a part of what an edge may be that none of them tells
+            let tallies: Vec<&Tally> = asking.iter().map(|one| &one.tally).collect();
+            let mut sent = Moments::default();
+            asking.iter().filter_map(|one| one.whole).for_each(|whole| sent += whole);
+            let packets = PacketErrors::of(asker.level, &tallies, &cells.ages, measure, is_known.then_some(sent));
+            let least = if is_known { UNANIMOUS } else { 1.0 };
+            let unmet = shows(sum(&|k| all[k] * (least * by_chance(effective[k])).max(packets.smooth[k])));
+            let error = shows(sum(&|k| all[k] * packets.edges[k])).max(unmet);
             if is_told && error <= allowed {
                 return true;
             }
-            // Rays are settled that nothing is in the way of, if enough points of them agree
-            let is_clear = |one: &Asking| one.whole.is_some() && one.tally.hidden == 0;
-            let agree: f64 = asking.iter().filter(|one| is_clear(one)).map(|one| one.tally.effective()[0]).sum();
-            if agree >= f64::from(wanted) * CLEAR {
-                asking.iter_mut().filter(|one| is_clear(one)).for_each(|one| one.settled = true);
-            }
             // Errors shrink as they do where an edge is: what the most will not settle, cells do
-            let asked = to;
-            let ratio = |next: usize| of_edge(next as f64) / of_edge(asked as f64);
-            if to == most {
+            if cells.count == most || error * of_edge(most as f64) > allowed * of_edge(cells.count as f64) {
                 return false;
             }
-            if error * ratio(most) > allowed {
-                return false;
-            }
-            to *= growth;
-            while to < most && error * ratio(to) > allowed {
-                to *= growth;
-            }
-            to = to.min(most);
+            let asked = if is_told && unmet <= allowed { packets.cells } else { cells.all() };
+            cells.halve(&asked, asking, counts);
         }
     }
 }

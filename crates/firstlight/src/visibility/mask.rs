@@ -16,8 +16,16 @@ impl ShadowView {
     /// Fills [`hidden`](Self::hidden): what triangles, solids and point sets hide, and what is below the horizon for
     /// sure. Spheres and parallelograms are left to their own tests.
     ///
-    /// Answers with the number of samples that were asked for one by one.
-    pub fn mask(&mut self, level: Level, scene: &Scene, target: &Target, point: &Viewpoint) -> u64 {
+    /// Only those samples are asked for that `asked` names, a bit for each, if it is there. Answers with the number of
+    /// samples that were asked for one by one.
+    pub fn mask(
+        &mut self,
+        level: Level,
+        scene: &Scene,
+        target: &Target,
+        asked: Option<&[u16]>,
+        point: &Viewpoint,
+    ) -> u64 {
         let count = target.blocks.len();
         let mut traced = 0;
         self.hidden.clear();
@@ -25,7 +33,13 @@ impl ShadowView {
             return 0;
         }
         self.in_space.clear();
-        self.in_space.extend(target.blocks.iter().map(|block| !block.present));
+        // What is not asked is as good as hidden
+        self.in_space.extend(target.blocks.iter().map(|block| {
+            let Some(asked) = asked else { return !block.present };
+            let is_asked = |k: u32| asked[k as usize / LANES] >> (k as usize % LANES) & 1;
+            let lanes = block.sample.iter().enumerate();
+            !lanes.fold(0, |lanes, (lane, k)| lanes | is_asked(*k) << lane) | !block.present
+        }));
         dispatch_all!(level, simd => self.mask_triangles(simd, scene, target, point));
         if self.trees || !self.others.is_empty() {
             traced = self.trace(level, scene, target, point);

@@ -112,7 +112,7 @@ impl Settler {
                 let visibility = self.view.classify(level, scene, target, &self.occluders, &points[k]);
                 counts.visibility[visibility as usize] += 1;
                 if visibility == Visibility::Mask && !target.blocks.is_empty() {
-                    counts.traced += self.view.mask(level, scene, target, &points[k]);
+                    counts.traced += self.view.mask(level, scene, target, None, &points[k]);
                 }
                 each(k, visibility, &mut self.view);
             }

@@ -1,0 +1,238 @@
+//! How far off what points of a light say may be, and where on the light more of them would help.
+//!
+//! Points are judged by packets of them that are neighbours on the light: those of all rays in one of its cells, or in
+//! as many as make sixteen. An edge of a shadow runs through a packet if some of its points are hidden and some are
+//! not; then what it sends is wrong by chance, each packet by itself. Where no edge is, what its points send may still
+//! vary more than they tell, next to a light or in a highlight.
+
+use fearless_simd::{Level, dispatch, f32x16, mask32x16, prelude::*};
+
+use super::ladder::CellBits;
+use super::tally::Tally;
+use crate::material::{MOMENTS, Moments};
+use crate::math::LANES;
+
+/// The deviation of the share that a packet of sixteen sees which some edge runs through: of sixteen points in as many
+/// parts of a cell of the light the edge cuts about four, each of which it parts anywhere.
+const MIXED: f32 = 0.07;
+/// The same where there is one ray only, whose points lie in parts of their own.
+const ALONE: f32 = 0.05;
+/// The deviation of the share that n stratified points find behind an edge, times n^3/4.
+const EDGE: f32 = 0.46;
+/// How many times that of a packet is where its points do not lie in different parts of a cell; and what is counted of
+/// it for few rays, the errors of which are made good by few others.
+const APART: f32 = 3.5;
+const FEW: usize = 9;
+const OF_FEW: f32 = 1.5;
+/// An edge is looked for in so many packets around one that it runs through.
+const AROUND: usize = 4;
+
+/// A root of the least number in single precision.
+const LEAST: f64 = 1e-19;
+
+/// What the packets of all rays say.
+#[derive(Clone, Debug, Default)]
+pub(super) struct PacketErrors {
+    /// The cells near edges.
+    pub cells: CellBits,
+    /// The deviations of what arrives, as parts of what would if nothing were in the way: by edges, which more points
+    /// in those cells make less, and by what varies everywhere.
+    pub edges: OfKind,
+    pub smooth: OfKind,
+}
+
+/// Of each kind of light.
+type OfKind = [f32; MOMENTS];
+
+impl PacketErrors {
+    /// Of rays that asked points in the same cells, each of which was halved as often as `ages` says since; all
+    /// together stand for `measure`. `sent` is what would arrive if nothing were in the way, if that is known exactly.
+    pub fn of(level: Level, tallies: &[&Tally], ages: &[u8], measure: f32, sent: Option<Moments>) -> PacketErrors {
+        dispatch!(level, simd => PacketErrors::of_lanes(simd, tallies, ages, measure, sent))
+    }
+
+    #[inline(always)]
+    fn of_lanes<S: Simd>(
+        simd: S,
+        tallies: &[&Tally],
+        ages: &[u8],
+        measure: f32,
+        sent: Option<Moments>,
+    ) -> PacketErrors {
+        let Some(blocks) = tallies.first().map(|tally| tally.sends.len()) else { return PacketErrors::default() };
+        let rays = tallies.len();
+        let per_packet = (LANES / rays.min(LANES)).next_power_of_two();
+        let all = sum_of(tallies, |tally| tally.all);
+        let lit = sum_of(tallies, |tally| tally.lit);
+        // As parts of all that is sent; of what is as good as nothing, squares are nothing
+        let part: OfKind = all.map(|all| if all > LEAST { (1.0 / all) as f32 } else { 0.0 });
+        let share: OfKind = std::array::from_fn(|k| lit[k] as f32 * part[k]);
+        // What is known to be sent is parted wrong only, that which is lit and that which is hidden
+        let weighs = match sent {
+            Some(_) => [share.map(|share| 1.0 - share), share],
+            None => [[1.0; MOMENTS], [0.0; MOMENTS]],
+        };
+        let count = (per_packet * rays) as f32;
+        let mut seen = Vec::with_capacity(blocks);
+        // Squares of what is sent: by mixed packets of all rays, and of one ray each; and of what varies in the others
+        let (mut together, mut alone, mut smooth) = (OfKind::default(), OfKind::default(), OfKind::default());
+        for block in 0..blocks {
+            let (mut lit, mut hidden) = (0u16, 0u16);
+            let zero = simd.splat_f32x16(0.0);
+            let (mut sums, mut squares) = ([zero; MOMENTS], [zero; MOMENTS]);
+            for tally in tallies {
+                let (sends, hides) = (tally.sends[block], tally.hides[block]);
+                (lit, hidden) = (lit | sends & !hides, hidden | hides);
+                let is_mixed = hides != 0 && hides != sends;
+                for (k, sent) in tally.sent(block).into_iter().enumerate() {
+                    let sent = f32x16::load_array_ref(simd, sent) * part[k];
+                    sums[k] += sent;
+                    squares[k] += sent * sent;
+                    if is_mixed {
+                        alone[k] += squared(total(sent));
+                    }
+                }
+            }
+            seen.push([lit, hidden]);
+            if lit | hidden == 0 {
+                continue;
+            }
+            let mixed = spread(lit, per_packet) & spread(hidden, per_packet);
+            // How often cells were halved, those of packets whose points are not mixed
+            let halved: [f32; LANES] = std::array::from_fn(|lane| {
+                let age = ages[block * LANES + lane].min(31);
+                if mixed >> lane & 1 == 1 { 0.0 } else { (1u32 << age) as f32 }
+            });
+            let halved = f32x16::simd_from(simd, halved) * (1.0 / per_packet as f32);
+            let is_mixed = mask32x16::from_bitmask(simd, mixed.into());
+            let is_lit = mask32x16::from_bitmask(simd, spread(lit, per_packet).into());
+            for k in 0..MOMENTS {
+                let sum = sum_of_runs(simd, sums[k], per_packet);
+                let sum2 = sum * sum;
+                together[k] += total(is_mixed.select(sum2, zero)) / per_packet as f32;
+                // Points vary smoothly: n of them stand for parts that are narrower by a root of n, so that their sum
+                // is wrong by as much as one of them is off their mean
+                let square = (sum_of_runs(simd, squares[k], per_packet) - sum2 * (1.0 / count)) * (1.0 / count);
+                let [lit, hidden] = [0, 1].map(|which: usize| simd.splat_f32x16(squared(weighs[which][k])));
+                smooth[k] += total(square.max(zero) * is_lit.select(lit, hidden) * halved);
+            }
+        }
+        let apart = squared(apart(tallies) * of_edge(count.into()) / of_edge(LANES as f64));
+        let mixed = match rays {
+            1 => ALONE,
+            2..=FEW => MIXED * OF_FEW,
+            _ => MIXED,
+        };
+        let edges = std::array::from_fn(|k| mixed * (apart * together[k]).min(alone[k]).sqrt());
+        let mut smooth = smooth.map(f32::sqrt);
+        // Points that do not find what is sent do not find which part of it arrives
+        if let Some(sent) = sent {
+            let one = measure / tallies[0].cells() as f32;
+            for k in (0..MOMENTS).filter(|k| sent.0[*k] > 0.0) {
+                let found = all[k] as f32 * one / sent.0[k];
+                smooth[k] = smooth[k].max(2.0 * share[k] * (1.0 - share[k]) * (found - 1.0).abs());
+            }
+        }
+        PacketErrors { cells: around(&seen, per_packet * AROUND), edges, smooth }
+    }
+}
+
+/// The sum of sixteen numbers, in the same order with every instruction set.
+#[inline(always)]
+fn total<S: Simd>(of: f32x16<S>) -> f32 {
+    let of = of.as_slice();
+    let eight: [f32; 8] = std::array::from_fn(|k| of[k] + of[k + 8]);
+    let [a, b, c, d] = std::array::from_fn(|k| eight[k] + eight[k + 4]);
+    (a + c) + (b + d)
+}
+
+/// For each aligned run of so many numbers, a power of two, their sum in all of them.
+#[inline(always)]
+fn sum_of_runs<S: Simd>(simd: S, of: f32x16<S>, run: usize) -> f32x16<S> {
+    match run {
+        1 => of,
+        LANES => simd.splat_f32x16(total(of)),
+        _ => {
+            let of = of.as_slice();
+            let sums: [f32; LANES] = std::array::from_fn(|lane| of[lane / run * run..][..run].iter().sum());
+            f32x16::simd_from(simd, sums)
+        }
+    }
+}
+
+fn squared(v: f32) -> f32 {
+    v * v
+}
+
+fn sum_of(tallies: &[&Tally], of: impl Fn(&Tally) -> [f64; MOMENTS]) -> [f64; MOMENTS] {
+    tallies.iter().fold([0.0; MOMENTS], |sum, tally| {
+        let of = of(tally);
+        std::array::from_fn(|k| sum[k] + of[k])
+    })
+}
+
+/// For each aligned run of so many bits, a power of two, whether any of them is set: in all of them.
+fn spread(bits: u16, run: usize) -> u16 {
+    let (mut bits, mut wide) = (bits, 1);
+    while wide < run {
+        // Each half of a run that is twice as wide has what either has
+        let low = u16::MAX / ((1 << wide) + 1);
+        bits |= (bits & low) << wide | bits >> wide & low;
+        wide *= 2;
+    }
+    bits
+}
+
+/// The cells of those runs in which something is hidden, and something is not.
+fn around(seen: &[[u16; 2]], run: usize) -> CellBits {
+    let mut cells = Vec::with_capacity(seen.len());
+    for blocks in seen.chunks(run.div_ceil(LANES)) {
+        if let [[lit, hidden]] = *blocks {
+            cells.push(spread(lit, run.min(LANES)) & spread(hidden, run.min(LANES)));
+        } else {
+            let (lit, hidden) = blocks.iter().fold((0, 0), |(a, b), [lit, hidden]| (a | lit, b | hidden));
+            cells.extend(blocks.iter().map(|_| if lit != 0 && hidden != 0 { 0xffff } else { 0 }));
+        }
+    }
+    cells
+}
+
+/// How much farther off the sum of all rays may be than if all saw the same: rays that see different shares of the
+/// light are not stratified together.
+fn apart(tallies: &[&Tally]) -> f32 {
+    let (mut count, mut sum, mut squares, mut cells) = (0.0f32, 0.0, 0.0, 0);
+    for tally in tallies.iter().filter(|tally| tally.sending > 0) {
+        let share = tally.hidden as f32 / tally.sending as f32;
+        (count, sum, squares, cells) = (count + 1.0, sum + share, squares + share * share, cells + tally.sending);
+    }
+    if count < 2.0 {
+        return 1.0;
+    }
+    let deviation = ((squares - sum * sum / count) / count).max(0.0).sqrt();
+    let by_chance = by_chance(cells as f64 / f64::from(count));
+    1.0 + (APART - 1.0) * (0.5 * (deviation / by_chance - 1.0)).clamp(0.0, 1.0)
+}
+
+/// The deviation of what so many stratified points say of an edge that runs anywhere.
+pub(super) fn by_chance(points: f64) -> f32 {
+    EDGE * of_edge(points)
+}
+
+/// How that falls with their number: the edge runs through a root of as many squares.
+pub(super) fn of_edge(points: f64) -> f32 {
+    let root = points.max(1e-9).sqrt();
+    (1.0 / (root * root.sqrt())) as f32
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bits_spread_over_their_runs() {
+        assert_eq!([1, 2, 4, 8, 16].map(|run| spread(0x0410, run)), [0x0410, 0x0c30, 0x0ff0, 0xffff, 0xffff]);
+        assert_eq!(spread(0, 16), 0);
+        assert_eq!(around(&[[1, 2], [0x10, 0x10], [0, 0]], 4), [0x000f, 0x00f0, 0]);
+        assert_eq!(around(&[[1, 0], [0, 1], [1, 0], [1, 0]], 32), [0xffff, 0xffff, 0, 0]);
+    }
+}
