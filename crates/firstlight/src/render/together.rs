@@ -99,8 +99,6 @@ impl Asking {
 /// The cells of a light that rays ask points in.
 struct AskedCells<'a> {
     asker: Asker<'a>,
-    /// How many there were at first, and now.
-    first: usize,
     count: usize,
     /// How often each was halved since a point in it was asked.
     ages: Vec<u8>,
@@ -111,10 +109,10 @@ struct AskedCells<'a> {
 impl<'a> AskedCells<'a> {
     /// Has all rays ask a point in each of so many.
     fn new(asker: Asker<'a>, count: usize, asking: &mut [Asking], counts: &mut Counts) -> Self {
-        let cells = AskedCells { asker, first: count, count, ages: vec![0; count], everywhere: count };
+        let cells = AskedCells { asker, count, ages: vec![0; count], everywhere: count };
         asking.iter_mut().for_each(|one| one.tally.part(count));
         let first: Vec<AskedRung> = asking.iter().map(|one| asker.first(one.series, count)).collect();
-        cells.ask(&first, count, &vec![u16::MAX; count / LANES], asking, counts);
+        cells.ask(&first, count, &cells.all(), asking, counts);
         cells
     }
 
@@ -125,13 +123,13 @@ impl<'a> AskedCells<'a> {
     /// Halves all cells and has all rays ask one more point in each that is in `asked`, and as many fewer elsewhere as
     /// [`BEHIND`] says.
     fn halve(&mut self, asked: &CellBits, asking: &mut [Asking], counts: &mut Counts) {
-        let left = if self.count >= BEHIND * self.first { self.left_behind(asked) } else { CellBits::new() };
+        let left = self.left_behind(asked);
         asking.iter_mut().for_each(|one| one.tally.part(2 * self.count));
         self.ask_next(self.count, asked, asking, counts);
         if left.iter().any(|bits| *bits != 0) {
             self.ask_next(self.count / BEHIND, &left, asking, counts);
         }
-        let age = |cell: usize| match (is_in(asked, cell), !left.is_empty() && is_in(&left, cell / BEHIND)) {
+        let age = |cell: usize| match (is_in(asked, cell), is_in(&left, cell / BEHIND)) {
             (true, _) => 0,
             (_, true) => BEHIND.ilog2() as u8,
             _ => self.ages[cell] + 1,
@@ -159,7 +157,11 @@ impl<'a> AskedCells<'a> {
         let next: Vec<AskedRung> = asking.iter().map(|one| self.asker.next(one.series, count, asked)).collect();
         // What is made for what is asked holds nothing else
         if let AskedRung::Made(rung) = &next[0] {
-            let asked = vec![u16::MAX; rung.points.blocks.len()];
+            let mut asked = vec![u16::MAX; rung.points.blocks.len()];
+            // The last sixteen may be fewer
+            if let (Some(last), more @ 1..) = (asked.last_mut(), rung.cells.len() % LANES) {
+                *last = (1 << more) - 1;
+            }
             self.ask(&next, 2 * count, &asked, asking, counts);
         } else {
             self.ask(&next, 2 * count, asked, asking, counts);
