@@ -7,7 +7,6 @@
 
 mod batch;
 mod breaks;
-mod cells;
 mod classify;
 mod cut;
 mod emitter;
@@ -15,11 +14,8 @@ mod evaluate;
 mod fit;
 mod grade;
 mod hull;
-mod mask;
-mod near;
 mod occluder;
 mod panels;
-mod points;
 mod row;
 mod tolerance;
 mod torus;
@@ -29,7 +25,6 @@ pub(crate) use batch::ShadingPoint;
 pub(crate) use classify::Obstacles;
 pub(crate) use emitter::{BallSides, Emitter};
 pub(crate) use evaluate::{Arrived, Asked, Evaluator, Illumination};
-pub(crate) use mask::Masked;
 pub(crate) use tolerance::Tolerance;
 pub(crate) use view::{FlatView, Receiver};
 

@@ -111,13 +111,6 @@ pub(crate) struct Linear {
     pub y: f32,
 }
 
-impl Linear {
-    #[inline(always)]
-    pub fn at(&self, x: f32, y: f32) -> f32 {
-        self.c + x * self.x + y * self.y
-    }
-}
-
 /// Points nearer to a light than this, in its half size, count its places from the nearest: from the middle, numbers
 /// would cancel.
 pub(super) const NEAR: f32 = 0.03;
@@ -131,8 +124,6 @@ pub(super) const NEAR: f32 = 0.03;
 /// |l|^2 = (fa + la x + skew y)^2 + (fb + lb y)^2 + height^2.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct FlatView {
-    /// Whether places are counted from the nearest.
-    pub is_near: bool,
     /// Where they are counted from, from the middle.
     pub origin: [f32; 2],
     /// From where to where the light's square goes: -1 to 1 if they are counted from the middle.
@@ -161,7 +152,6 @@ pub(crate) struct FlatView {
     pub wo: Vec3,
     pub lobe: Lobe,
     pub physical: bool,
-    pub outline: Outline,
     /// See [`FlatLight::measure`].
     pub measure: f32,
     /// See [`FlatLight::ratio`].
@@ -177,7 +167,6 @@ impl FlatView {
         let (cos, mut horizon) = (linear(at.ns), linear(at.horizon));
         horizon.c -= at.horizon.abs().dot(way_error(light.c.as_vec3(), light.a.abs() + light.b.abs(), at.p, at.error));
         let view = FlatView {
-            is_near: false,
             origin: [0.0; 2],
             x: [-1.0, 1.0],
             y: [-1.0, 1.0],
@@ -199,7 +188,6 @@ impl FlatView {
             wo: at.wo,
             lobe: at.lobe,
             physical: light.physical,
-            outline: light.outline,
             measure: light.measure(),
             ratio: light.ratio,
             behind2: light.behind2,
@@ -233,7 +221,6 @@ impl FlatView {
         let mut horizon = linear(at.horizon);
         horizon.c -= at.horizon.abs().dot(at.error.0 + l0.abs().as_vec3() * UNIT_ROUNDOFF);
         FlatView {
-            is_near: true,
             origin: [x as f32, y as f32],
             x: [(-1.0 - x) as f32, (1.0 - x) as f32],
             y: [(-1.0 - y) as f32, (1.0 - y) as f32],

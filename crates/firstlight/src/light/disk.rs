@@ -126,7 +126,7 @@ impl DiskLightDesc {
 }
 
 /// The point of the unit disk that stands for a point of the square [-1, 1]^2.
-pub(crate) fn concentric([x, y]: [f64; 2]) -> [f64; 2] {
+fn concentric([x, y]: [f64; 2]) -> [f64; 2] {
     if x == 0.0 && y == 0.0 {
         return [0.0; 2];
     }

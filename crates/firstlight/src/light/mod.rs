@@ -20,7 +20,6 @@ use crate::transform::TransformDesc;
 
 pub use area::{Area, AreaShape};
 pub use directional::{Directional, DirectionalDesc};
-pub(crate) use disk::concentric;
 pub use disk::{DiskLight, DiskLightDesc};
 pub use point::{Point, PointDesc};
 pub use rectangle::{Rectangle, RectangleDesc};

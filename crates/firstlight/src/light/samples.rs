@@ -68,15 +68,15 @@ pub(crate) fn point_of_series(k: u32, series: usize) -> [f64; 2] {
 /// A cell of the unit square, by which points are told apart: halves of halves of the square, along x and along y in
 /// turn, follow each other, so that cells next to each other are near each other, and the first digits of a cell are
 /// the larger cell that it is a part of.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct FineCell(u32);
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) struct FineCell(u64);
 
 impl FineCell {
-    const DIGITS: u32 = 24;
+    pub const DIGITS: u32 = 48;
 
     /// The one that a point lies in.
     pub fn of(point: [f64; 2]) -> FineCell {
-        let digits = point.map(|v| (v * f64::from(1u32 << (Self::DIGITS / 2))) as u32);
+        let digits = point.map(|v| (v * (1u64 << (Self::DIGITS / 2)) as f64) as u64);
         let last = Self::DIGITS / 2 - 1;
         FineCell((0..Self::DIGITS).fold(0, |cell, bit| cell << 1 | digits[bit as usize % 2] >> (last - bit / 2) & 1))
     }
@@ -88,23 +88,55 @@ impl FineCell {
 
     /// Its middle.
     pub fn middle(self) -> [f64; 2] {
-        let digit = |bit: u32| self.0 >> (Self::DIGITS - 1 - bit) & 1;
-        let axis = |axis: u32| (0..Self::DIGITS / 2).fold(0, |digits, k| digits << 1 | digit(2 * k + axis));
-        [0, 1].map(|k| (f64::from(axis(k)) + 0.5) / f64::from(1u32 << (Self::DIGITS / 2)))
+        [self.0 >> 1, self.0].map(|of| (every_second(of) as f64 + 0.5) / (1u64 << (Self::DIGITS / 2)) as f64)
     }
 
-    /// Where one more point goes in one of `count` cells, each of which has one: into the other half of it. The point
-    /// that it has is `kept`, if that is in it; else it was chosen just as this one.
-    pub fn second(kept: FineCell, series: usize, count: usize, cell: usize) -> FineCell {
-        let half = |digits: u32, cell: u32| {
-            let kept = kept.part_of(2 << digits) as u32;
-            let any = || mix(u64::from(digits) << 56 | (series as u64) << 48 | u64::from(cell)) as u32 & 1;
-            if kept / 2 == cell { kept & 1 } else { any() }
+    /// The cell of one of 2^`level` larger ones, whose first is `first`, that is nearest to this one.
+    pub fn nearest_in(self, first: FineCell, level: u32) -> FineCell {
+        let axis = |axis: u32, halvings: u32| {
+            let [to, least] = [self.0 >> axis, first.0 >> axis].map(every_second);
+            to.clamp(least, least + (1 << (Self::DIGITS / 2 - halvings)) - 1)
         };
-        let (digits, cell) = (count.ilog2(), cell as u32);
-        let other = 2 * cell + 1 - half(digits, cell);
-        FineCell((digits + 1..Self::DIGITS).fold(other, |cell, digits| 2 * cell + half(digits, cell)))
+        FineCell(with_gaps(axis(1, level.div_ceil(2))) << 1 | with_gaps(axis(0, level / 2)))
     }
+
+    /// The first of those that are part of one of 2^`level` larger cells.
+    pub fn first_of(cell: u64, level: u32) -> FineCell {
+        FineCell(cell << (Self::DIGITS - level))
+    }
+
+    /// Where one more point of a series goes into the one of 2^`level` cells that this one is part of: anywhere into
+    /// the other half of it.
+    pub fn second(self, series: usize, level: u32) -> FineCell {
+        let rest = Self::DIGITS - level - 1;
+        let other = self.0 >> rest ^ 1;
+        let any = mix(u64::from(level) << 56 | (series as u64) << 48 | other);
+        FineCell(other << rest | any & ((1 << rest) - 1))
+    }
+
+    /// Which half of the one of 2^`level` larger cells that it is part of it lies in.
+    pub fn half(self, level: u32) -> usize {
+        (self.0 >> (Self::DIGITS - level - 1)) as usize & 1
+    }
+}
+
+/// A number whose every second digit, from the last on, are those of another.
+fn with_gaps(digits: u64) -> u64 {
+    let mut digits = (digits | digits << 16) & 0x0000_ffff_0000_ffff;
+    digits = (digits | digits << 8) & 0x00ff_00ff_00ff_00ff;
+    digits = (digits | digits << 4) & 0x0f0f_0f0f_0f0f_0f0f;
+    digits = (digits | digits << 2) & 0x3333_3333_3333_3333;
+    (digits | digits << 1) & 0x5555_5555_5555_5555
+}
+
+/// Every second of the digits of a number, from the last on.
+fn every_second(digits: u64) -> u64 {
+    let mut digits = digits & 0x5555_5555_5555_5555;
+    digits = (digits | digits >> 1) & 0x3333_3333_3333_3333;
+    digits = (digits | digits >> 2) & 0x0f0f_0f0f_0f0f_0f0f;
+    digits = (digits | digits >> 4) & 0x00ff_00ff_00ff_00ff;
+    digits = (digits | digits >> 8) & 0x0000_ffff_0000_ffff;
+    (digits | digits >> 16) & 0xffff_ffff
 }
 
 /// The points of a series that are counted from `first` on, 2^m of them where `first` is a multiple of 2^m, in the
@@ -224,18 +256,15 @@ mod tests {
     }
 
     #[test]
-    fn more_points_lie_in_the_other_halves() {
-        let (series, mut count) = (3, 64);
-        let kept: Vec<_> = series_by_cell(series, 0, 64).into_iter().map(FineCell::of).collect();
-        let mut points = kept.clone();
-        while count < 1024 {
-            let more = (0..count).map(|cell| FineCell::second(kept[cell * 64 / count], series, count, cell));
-            points.extend(more.collect::<Vec<_>>());
-            count *= 2;
-            let mut cells: Vec<_> = points.iter().map(|point| point.part_of(count)).collect();
-            cells.sort_unstable();
-            assert!(cells.into_iter().eq(0..count), "{count}");
-            assert!(points.iter().all(|point| FineCell::of(point.middle()) == *point));
+    fn one_more_point_lies_in_the_other_half() {
+        for level in 4..FineCell::DIGITS {
+            for cell in series_by_cell(3, 0, 64).into_iter().map(FineCell::of) {
+                let second = cell.second(3, level);
+                assert_eq!(second.part_of(1 << level), cell.part_of(1 << level));
+                assert_eq!(second.half(level) + cell.half(level), 1);
+                assert_eq!(FineCell::of(second.middle()), second);
+                assert!(FineCell::first_of(cell.part_of(1 << level) as u64, level) <= cell);
+            }
         }
     }
 

@@ -2,9 +2,6 @@
 
 mod place;
 
-use std::cell::Cell;
-use std::f32::consts::FRAC_PI_2;
-
 use arrayvec::ArrayVec;
 use fearless_simd::Level;
 
@@ -17,10 +14,8 @@ use super::sampled::Sampled;
 use super::together::Together;
 use crate::color::{DisplaySteps, Rgb};
 use crate::ids::LightId;
-use crate::integrate::{
-    Arrived, Asked, BallSides, Emitter, Evaluator, FlatView, Illumination, Masked, Obstacles, Receiver, ShadingPoint,
-};
-use crate::light::{Area, AreaShape, LightKind, LightTree};
+use crate::integrate::{Arrived, Asked, Emitter, Evaluator, FlatView, Illumination, Obstacles, Receiver, ShadingPoint};
+use crate::light::{LightKind, LightTree};
 use crate::material::{Bsdf, Lobe, Moments};
 use crate::math::LANES;
 use crate::scene::Scene;
@@ -54,16 +49,14 @@ pub(super) enum Past {
 pub(crate) enum Sighting {
     /// This arrives.
     Known(Moments),
-    /// Things are in the way; points of the light have to be asked. This would arrive if nothing were, if that is
-    /// known.
-    Behind(Option<Moments>),
+    /// Things are in the way; points of the light have to be asked. This would arrive if nothing were.
+    Behind(Moments),
 }
 
-/// Parts of a pixel smaller than this are judged as if they were as large.
-const LEAST_SHARE: f32 = 1.0 / 8.0;
 /// How many times what is allowed may be wrong where each place is wrong by itself, as by chance: nothing of that shows
 /// as a step or an edge.
 const BY_CHANCE: f32 = 4.0 / 3.0;
+/// Parts of a pixel smaller than this are judged as if they were as large.
 const LEAST_SHARE_BY_CHANCE: f32 = 1.0 / 16.0;
 
 /// The lights, as one thread asks for them.
@@ -92,8 +85,6 @@ pub(crate) struct Arrivals<'a> {
 const FEW_SAMPLES: usize = 256;
 /// Patches whose normal turns by less than this, in radians, are flat.
 const FLAT: f32 = 1e-4;
-/// Highlights narrower than this part of a sphere light, both as angles, are not found by points all over it.
-const NARROW: f32 = 1.0 / 6.0;
 /// The most triangles in the way of a ray that batches are asked past.
 const FEW_TRIANGLES: usize = 6;
 /// Leaves of triangles that are worth looking at one by one.
@@ -304,7 +295,7 @@ impl<'a> Arrivals<'a> {
                 Trees::Nothing => asked[0].extend(from as u32..next as u32),
                 Trees::Unknown => {
                     asked[1].push(from as u32);
-                    found[from].1 = Sighting::Behind(None);
+                    found[from].1 = Sighting::Behind(Moments::ZERO);
                 }
             }
         }
@@ -316,9 +307,8 @@ impl<'a> Arrivals<'a> {
                 let (k, mut arrived) = (*k as usize, *arrived);
                 if matches!(found[k].1, Sighting::Behind(_)) && arrived.illumination != Illumination::Below {
                     arrived.motion = f32::INFINITY;
-                    let whole = (arrived.illumination != Illumination::Unknown).then_some(arrived.sums);
                     counts.settled.visibility[Visibility::Mask as usize] += 1;
-                    found[k] = (self.change(index, &places[k], &arrived), Sighting::Behind(whole));
+                    found[k] = (self.change(index, &places[k], &arrived), Sighting::Behind(arrived.sums));
                 } else {
                     found[k] = self.found(index, &places[k], arrived, counts);
                 }
@@ -362,7 +352,6 @@ impl<'a> Arrivals<'a> {
             counts.settled.visibility[Visibility::Mask as usize] += 1;
             arrived.motion = f32::INFINITY;
             let whole = self.wholes(index, std::slice::from_ref(place))[0];
-            let whole = (whole.illumination != Illumination::Unknown).then_some(whole.sums);
             return (self.change(index, place, &arrived), Sighting::Behind(whole));
         }
         (self.change(index, place, &arrived), Sighting::Known(arrived.sums))
@@ -385,12 +374,12 @@ impl<'a> Arrivals<'a> {
     }
 
     /// What of a light that is integrated would arrive at each place if nothing were in the way.
-    pub fn wholes(&mut self, index: usize, places: &[ArrivalPlace]) -> Vec<Arrived> {
+    pub fn wholes(&mut self, index: usize, places: &[ArrivalPlace]) -> Vec<Moments> {
         let lights = self.lights;
         let Some(emitter) = &lights.emitters[index] else { unreachable!("lights that are sampled have no whole") };
         let mut arrived = Vec::with_capacity(places.len());
         self.ask(index, emitter, places.iter(), [false; 2], &mut arrived);
-        arrived
+        arrived.into_iter().map(|arrived| arrived.sums).collect()
     }
 
     /// Adds to `arrived` what arrives at many points of light `index`, which is integrated: with or without shadows,
@@ -410,24 +399,8 @@ impl<'a> Arrivals<'a> {
         self.evaluator.evaluate(self.level, &asked, points, arrived);
     }
 
-    /// Whether sums with such an error will do for one light at a place.
-    fn enough<'b>(&self, place: &'b ArrivalPlace) -> impl Fn(&Moments, &Moments) -> bool + use<'a, 'b> {
-        let (steps, tolerance) = (&self.lights.steps, self.tolerance_of(place.share));
-        let colors = place.colors();
-        let base = place.base;
-        move |sums, error| {
-            let value = colors.onto(base, sums);
-            let wrong = colors.of(error);
-            steps.of_color(value, wrong) <= tolerance
-        }
-    }
-
-    /// In display steps: how far one light may be wrong at a place that stands for such a share of a pixel.
-    fn tolerance_of(&self, share: f32) -> f32 {
-        self.allowed / share.max(LEAST_SHARE).sqrt()
-    }
-
-    /// The same where the errors of neighbours are as good as independent.
+    /// In display steps: how far one light may be wrong at a place that stands for such a share of a pixel, where the
+    /// errors of neighbours are as good as independent.
     pub fn tolerance_by_chance(&self, share: f32) -> f32 {
         self.allowed * BY_CHANCE / share.max(LEAST_SHARE_BY_CHANCE).sqrt()
     }
@@ -505,11 +478,11 @@ impl<'a> Arrivals<'a> {
     }
 
     /// What arrives at one point, past what is in the way.
-    fn one(&mut self, index: usize, place: &ArrivalPlace, whole: Option<Moments>, counts: &mut Counts) -> Moments {
+    fn one(&mut self, index: usize, place: &ArrivalPlace, whole: Moments, counts: &mut Counts) -> Moments {
         let Some(view) = self.settle(index, place.si, counts) else { return Moments::default() };
         let mut together = Together::new(index, 1, place.share, 0, Rgb::BLACK);
         together.behind(place, view);
-        together.hear_whole(self, whole);
+        together.hear_whole(whole);
         together.settle(self, counts).sums
     }
 
@@ -521,27 +494,6 @@ impl<'a> Arrivals<'a> {
         };
         let (target, ladder) = (&self.lights.targets[index], &self.lights.ladders[index]);
         LadderAsker { scene, level, area, target, ladder }
-    }
-
-    /// Whether points spread evenly over a sphere light may miss most of what it sends to a place: what is near sends
-    /// far more than the rest where light weakens on its way, and a highlight may lie on it that is narrow beside it.
-    pub fn may_miss(&self, index: usize, place: &ArrivalPlace) -> bool {
-        let LightKind::Area(Area { shape: AreaShape::Sphere(sphere), physical, .. }) = &self.scene.lights[index].kind
-        else {
-            return false;
-        };
-        let SurfaceInteraction { ns, wo, lit_from, .. } = *place.si;
-        let cos_o = ns.dot(wo);
-        let spread = 1.0 / (2.0 * place.lobe.sharpness(cos_o)).sqrt();
-        let to = (sphere.center - lit_from.as_dvec3()).as_vec3();
-        let wide = sphere.radius as f32 / to.length();
-        if *physical || wide >= 1.0 {
-            return *physical || spread < NARROW;
-        }
-        // The chord of the angle between the mirrored direction and the light's middle is at most that angle; at the
-        // end of its reach a highlight has fallen to e^-18
-        let apart = (ns * (2.0 * cos_o) - wo - to.normalize()).length();
-        spread < NARROW * wide && apart < wide * FRAC_PI_2 + 6.0 * spread
     }
 
     /// What all points of area light `index` together stand for.
@@ -580,41 +532,16 @@ impl<'a> Arrivals<'a> {
         self.views.push(view);
     }
 
-    /// What arrives at one point, past anything, where points of the light do not tell: in closed form if there is one,
-    /// or by cells.
-    pub fn beyond_points(&mut self, index: usize, place: &ArrivalPlace, counts: &mut Counts) -> Moments {
+    /// What arrives at one point, past anything, if that has a closed form.
+    pub fn in_closed_form(&mut self, index: usize, place: &ArrivalPlace, counts: &mut Counts) -> Option<Moments> {
         let mut seen = std::mem::take(&mut self.seen);
         self.look(index, std::slice::from_ref(place), &mut seen, counts);
         let (_, sighting) = seen[0];
         self.seen = seen;
         match sighting {
-            Sighting::Known(sums) => sums,
-            Sighting::Behind(_) => self.by_cells(index, place, counts),
+            Sighting::Known(sums) => Some(sums),
+            Sighting::Behind(_) => None,
         }
-    }
-
-    /// The same by cells of the light: where few of its points send nearly all.
-    fn by_cells(&mut self, index: usize, place: &ArrivalPlace, counts: &mut Counts) -> Moments {
-        let lights = self.lights;
-        let emitter = lights.emitters[index].as_ref().expect("only lights that are integrated are asked by cells");
-        let light = &self.scene.lights[index];
-        let shadows = light.shadows && place.si.receives_shadow;
-        let ArrivalPlace { si, lobe, .. } = *place;
-        let asked = Cell::new(0);
-        let masked = Masked { scene: self.scene, light: index, emitter, si, lobe, shadows, asked: &asked };
-        let whole = self.wholes(index, std::slice::from_ref(place))[0];
-        let enough = self.enough(place);
-        let is_round =
-            matches!(emitter, Emitter::Ball { physical, sides, .. } if !physical || *sides != BallSides::Outer);
-        let sums = match self.view(emitter, place) {
-            None if !emitter.surrounds(si.lit_from) => Moments::default(),
-            Some(view) if !view.arrives() => Moments::default(),
-            _ if is_round => masked.by_points(light, &enough),
-            None => Moments::default(),
-            Some(view) => masked.by_cells(&view, &whole.sums, &enough),
-        };
-        counts.points += asked.get();
-        sums
     }
 
     /// Gathers what of the trees may be in the way of a light: from one point and what lies within `reach` of it, over

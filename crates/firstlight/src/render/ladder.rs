@@ -8,6 +8,7 @@ use std::sync::OnceLock;
 
 use fearless_simd::Level;
 
+use super::leaves::Halved;
 use crate::light::{Area, FineCell, Points, SERIES, series_by_cell};
 use crate::math::{LANES, Vec3};
 use crate::scene::Scene;
@@ -68,8 +69,7 @@ pub(super) fn is_in(bits: &[u16], cell: usize) -> bool {
 }
 
 impl Rung {
-    fn new(area: &Area, places: &[[f64; 2]]) -> Box<Rung> {
-        let cells = places.iter().copied().map(FineCell::of).collect();
+    fn new(area: &Area, cells: Vec<FineCell>, places: &[[f64; 2]]) -> Box<Rung> {
         Box::new(Rung { points: area.points_at(places), cells, target: OnceLock::new() })
     }
 }
@@ -90,15 +90,33 @@ impl<'a> Asker<'a> {
         self.rung(series, 0, cells)
     }
 
-    /// One more point in each of those of `cells` that are asked, or in more of them: what is asked may be left out.
-    pub fn next(&self, series: usize, cells: usize, asked: &CellBits) -> AskedRung<'a> {
-        if 2 * cells <= LAST {
-            return self.rung(series, cells, cells);
+    /// One more point of a series in each of those cells that were halved, where each has its point in one of `at`; and
+    /// which of its points those are.
+    pub fn next(&self, series: usize, halved: &Halved, at: &[FineCell]) -> AskedRung<'a> {
+        if Self::keeps(halved) {
+            return self.rung(series, 1 << halved.level, 1 << halved.level);
         }
-        let kept = self.first(series, LAST);
-        let second = |cell| FineCell::second(kept.cells[cell / (cells / LAST)], series, cells, cell).middle();
-        let places: Vec<_> = cells_in(asked).map(second).collect();
-        AskedRung::Made(Rung::new(self.area, &places))
+        let second = |first: &u32| at[*first as usize].second(series, halved.level);
+        let cells: Vec<_> = halved.first.iter().map(second).collect();
+        let places: Vec<_> = cells.iter().map(|cell| cell.middle()).collect();
+        AskedRung::Made(Rung::new(self.area, cells, &places))
+    }
+
+    /// Which of the points of [`next`](Self::next) are asked.
+    pub fn asked(halved: &Halved) -> CellBits {
+        if Self::keeps(halved) {
+            return halved.bits();
+        }
+        let mut bits = vec![u16::MAX; halved.cells.len().div_ceil(LANES)];
+        // The last sixteen may be fewer
+        if let (Some(last), more @ 1..) = (bits.last_mut(), halved.cells.len() % LANES) {
+            *last = (1 << more) - 1;
+        }
+        bits
+    }
+
+    fn keeps(halved: &Halved) -> bool {
+        2 << halved.level <= LAST
     }
 
     /// The first point of a series in one of so many cells.
@@ -110,14 +128,18 @@ impl<'a> Asker<'a> {
         let kept = &self.ladder.series[series][(count / FIRST).ilog2() as usize][usize::from(first > 0)];
         AskedRung::Kept(kept.get_or_init(|| {
             let places = series_by_cell(series, first as u32, count as u32);
-            Rung::new(self.area, &places)
+            Rung::new(self.area, places.iter().copied().map(FineCell::of).collect(), &places)
         }))
     }
 
     /// Which of a rung's points that are `asked` are hidden from a point, by what is in its view; says how many rays
     /// were traced.
     pub fn mask(&self, rung: &Rung, asked: &[u16], view: &mut ShadowView, point: &Viewpoint) -> u64 {
-        let target = rung.target.get_or_init(|| self.target.with(&rung.points));
+        if !view.asks_points() {
+            view.hidden.clear();
+            return 0;
+        }
+        let target = rung.target.get_or_init(|| self.target.with_neighbours(&rung.points));
         view.mask(self.level, self.scene, target, Some(asked), point)
     }
 }

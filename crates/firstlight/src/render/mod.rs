@@ -9,6 +9,7 @@
 //! [`cell`](cell/index.html) integrates lights and lights a surface once where that is enough; all else is as above.
 
 mod arrival;
+mod asking;
 mod beams;
 mod cell;
 mod change;
@@ -25,6 +26,7 @@ mod heat;
 mod hits;
 mod ladder;
 mod lanes;
+mod leaves;
 mod light_queue;
 mod lights;
 mod many;

@@ -1,6 +1,6 @@
 //! How far off what points of a light say may be, and where on the light more of them would help.
 //!
-//! Points are judged by packets of them that are neighbours on the light: those of all rays in one of its cells, or in
+//! Points are judged by packets of them that are neighbours on the light: those of all rays in one of its leaves, or in
 //! as many as make sixteen. An edge of a shadow runs through a packet if some of its points are hidden and some are
 //! not; then what it sends is wrong by chance, each packet by itself. Where no edge is, what its points send may still
 //! vary more than they tell, next to a light or in a highlight.
@@ -8,7 +8,8 @@
 use fearless_simd::{Level, dispatch, f32x16, mask32x16, prelude::*};
 
 use super::ladder::CellBits;
-use super::tally::Tally;
+use super::leaves::Leaves;
+use super::tally::{LeafLanes, Tally};
 use crate::material::{MOMENTS, Moments};
 use crate::math::LANES;
 
@@ -24,6 +25,8 @@ const EDGE: f32 = 0.46;
 const APART: f32 = 3.5;
 const FEW: usize = 9;
 const OF_FEW: f32 = 1.5;
+/// How many times what varies smoothly counts: points of neighbours are wrong alike.
+const ALIKE: f32 = 2.0;
 /// An edge is looked for in so many packets around one that it runs through.
 const AROUND: usize = 4;
 
@@ -33,10 +36,10 @@ const LEAST: f64 = 1e-19;
 /// What the packets of all rays say.
 #[derive(Clone, Debug, Default)]
 pub(super) struct PacketErrors {
-    /// The cells near edges.
-    pub cells: CellBits,
+    /// The leaves near edges.
+    pub leaves: CellBits,
     /// The deviations of what arrives, as parts of what would if nothing were in the way: by edges, which more points
-    /// in those cells make less, and by what varies everywhere.
+    /// in those leaves make less, and by what varies everywhere.
     pub edges: OfKind,
     pub smooth: OfKind,
 }
@@ -45,49 +48,42 @@ pub(super) struct PacketErrors {
 type OfKind = [f32; MOMENTS];
 
 impl PacketErrors {
-    /// Of rays that asked points in the same cells, each of which was halved as often as `ages` says since; all
-    /// together stand for `measure`. `sent` is what would arrive if nothing were in the way, if that is known exactly.
-    pub fn of(level: Level, tallies: &[&Tally], ages: &[u8], measure: f32, sent: Option<Moments>) -> PacketErrors {
-        dispatch!(level, simd => PacketErrors::of_lanes(simd, tallies, ages, measure, sent))
+    /// Of rays that asked points in the same leaves of a light of such a `measure`. `sent` is what would arrive if
+    /// nothing were in the way.
+    pub fn of(level: Level, tallies: &[&Tally], leaves: &Leaves, measure: f32, sent: &Moments) -> PacketErrors {
+        dispatch!(level, simd => PacketErrors::of_lanes(simd, tallies, &leaves.parts, measure, sent))
     }
 
     #[inline(always)]
-    fn of_lanes<S: Simd>(
-        simd: S,
-        tallies: &[&Tally],
-        ages: &[u8],
-        measure: f32,
-        sent: Option<Moments>,
-    ) -> PacketErrors {
-        let Some(blocks) = tallies.first().map(|tally| tally.sends.len()) else { return PacketErrors::default() };
+    fn of_lanes<S: Simd>(simd: S, tallies: &[&Tally], parts: &[f32], measure: f32, sent: &Moments) -> PacketErrors {
         let rays = tallies.len();
-        let per_packet = (LANES / rays.min(LANES)).next_power_of_two();
+        let per_packet = (LANES / rays.clamp(1, LANES)).next_power_of_two();
         let all = sum_of(tallies, |tally| tally.all);
         let lit = sum_of(tallies, |tally| tally.lit);
         // As parts of all that is sent; of what is as good as nothing, squares are nothing
-        let part: OfKind = all.map(|all| if all > LEAST { (1.0 / all) as f32 } else { 0.0 });
-        let share: OfKind = std::array::from_fn(|k| lit[k] as f32 * part[k]);
-        // What is known to be sent is parted wrong only, that which is lit and that which is hidden
-        let weighs = match sent {
-            Some(_) => [share.map(|share| 1.0 - share), share],
-            None => [[1.0; MOMENTS], [0.0; MOMENTS]],
-        };
+        let one: OfKind = all.map(|all| if all > LEAST { (1.0 / all) as f32 } else { 0.0 });
+        let share: OfKind = std::array::from_fn(|k| lit[k] as f32 * one[k]);
+        // What is sent is parted wrong only, that which is lit and that which is hidden
+        let weighs = [share.map(|share| 1.0 - share), share];
         let count = (per_packet * rays) as f32;
-        let mut seen = Vec::with_capacity(blocks);
+        let zero = simd.splat_f32x16(0.0);
+        let mut seen = Vec::with_capacity(parts.len() / LANES);
         // Squares of what is sent: by mixed packets of all rays, and of one ray each; and of what varies in the others
         let (mut together, mut alone, mut smooth) = (OfKind::default(), OfKind::default(), OfKind::default());
-        for block in 0..blocks {
+        for (block, parts) in parts.chunks_exact(LANES).enumerate() {
+            let part = f32x16::from_slice(simd, parts);
             let (mut lit, mut hidden) = (0u16, 0u16);
-            let zero = simd.splat_f32x16(0.0);
-            let (mut sums, mut squares) = ([zero; MOMENTS], [zero; MOMENTS]);
+            let mut moments = [[zero; 3]; MOMENTS];
             for tally in tallies {
-                let (sends, hides) = (tally.sends[block], tally.hides[block]);
+                let LeafLanes { sent, sends, hides } = tally.lanes(simd, block);
+                let [sends, hides] = [sends, hides].map(|is| is.simd_gt(zero).to_bitmask() as u16);
                 (lit, hidden) = (lit | sends & !hides, hidden | hides);
                 let is_mixed = hides != 0 && hides != sends;
-                for (k, sent) in tally.sent(block).into_iter().enumerate() {
-                    let sent = f32x16::load_array_ref(simd, sent) * part[k];
-                    sums[k] += sent;
-                    squares[k] += sent * sent;
+                for (k, sent) in sent.into_iter().enumerate() {
+                    let sent = sent * part * one[k];
+                    moments[k][0] += sent;
+                    moments[k][1] += sent * part;
+                    moments[k][2] += sent * sent;
                     if is_mixed {
                         alone[k] += squared(total(sent));
                     }
@@ -97,24 +93,21 @@ impl PacketErrors {
             if lit | hidden == 0 {
                 continue;
             }
-            let mixed = spread(lit, per_packet) & spread(hidden, per_packet);
-            // How often cells were halved, those of packets whose points are not mixed
-            let halved: [f32; LANES] = std::array::from_fn(|lane| {
-                let age = ages[block * LANES + lane].min(31);
-                if mixed >> lane & 1 == 1 { 0.0 } else { (1u32 << age) as f32 }
-            });
-            let halved = f32x16::simd_from(simd, halved) * (1.0 / per_packet as f32);
-            let is_mixed = mask32x16::from_bitmask(simd, mixed.into());
+            let is_mixed = mask32x16::from_bitmask(simd, (spread(lit, per_packet) & spread(hidden, per_packet)).into());
             let is_lit = mask32x16::from_bitmask(simd, spread(lit, per_packet).into());
+            let all = sum_of_runs(simd, part, per_packet) * rays as f32;
+            let all = all.simd_gt(zero).select(all, simd.splat_f32x16(1.0));
+            let squares = sum_of_runs(simd, part * part, per_packet) * rays as f32;
             for k in 0..MOMENTS {
-                let sum = sum_of_runs(simd, sums[k], per_packet);
-                let sum2 = sum * sum;
-                together[k] += total(is_mixed.select(sum2, zero)) / per_packet as f32;
+                let [sum, by_part, square] = moments[k].map(|moment| sum_of_runs(simd, moment, per_packet));
+                together[k] += total(is_mixed.select(sum * sum, zero)) / per_packet as f32;
                 // Points vary smoothly: n of them stand for parts that are narrower by a root of n, so that their sum
                 // is wrong by as much as one of them is off their mean
-                let square = (sum_of_runs(simd, squares[k], per_packet) - sum2 * (1.0 / count)) * (1.0 / count);
+                let mean = sum / all;
+                let square = (square + mean * (mean * squares - by_part * 2.0)) * (1.0 / count);
                 let [lit, hidden] = [0, 1].map(|which: usize| simd.splat_f32x16(squared(weighs[which][k])));
-                smooth[k] += total(square.max(zero) * is_lit.select(lit, hidden) * halved);
+                let weight = is_mixed.select(zero, is_lit.select(lit, hidden));
+                smooth[k] += total(square.max(zero) * weight) / per_packet as f32;
             }
         }
         let apart = squared(apart(tallies) * of_edge(count.into()) / of_edge(LANES as f64));
@@ -124,40 +117,39 @@ impl PacketErrors {
             _ => MIXED,
         };
         let edges = std::array::from_fn(|k| mixed * (apart * together[k]).min(alone[k]).sqrt());
-        let mut smooth = smooth.map(f32::sqrt);
+        let mut smooth = smooth.map(|smooth| ALIKE * smooth.sqrt());
         // Points that do not find what is sent do not find which part of it arrives
-        if let Some(sent) = sent {
-            let one = measure / tallies[0].cells() as f32;
-            for k in (0..MOMENTS).filter(|k| sent.0[*k] > 0.0) {
-                let found = all[k] as f32 * one / sent.0[k];
-                smooth[k] = smooth[k].max(2.0 * share[k] * (1.0 - share[k]) * (found - 1.0).abs());
-            }
+        for k in (0..MOMENTS).filter(|k| sent.0[*k] > 0.0) {
+            let found = all[k] as f32 * measure / sent.0[k];
+            smooth[k] = smooth[k].max(2.0 * share[k] * (1.0 - share[k]) * (found - 1.0).abs());
         }
-        PacketErrors { cells: around(&seen, per_packet * AROUND), edges, smooth }
+        PacketErrors { leaves: around(&seen, per_packet * AROUND), edges, smooth }
     }
 }
 
 /// The sum of sixteen numbers, in the same order with every instruction set.
 #[inline(always)]
 fn total<S: Simd>(of: f32x16<S>) -> f32 {
-    let of = of.as_slice();
-    let eight: [f32; 8] = std::array::from_fn(|k| of[k] + of[k + 8]);
-    let [a, b, c, d] = std::array::from_fn(|k| eight[k] + eight[k + 4]);
-    (a + c) + (b + d)
+    sum_of_runs(of.token(), of, LANES).as_slice()[0]
 }
 
 /// For each aligned run of so many numbers, a power of two, their sum in all of them.
 #[inline(always)]
 fn sum_of_runs<S: Simd>(simd: S, of: f32x16<S>, run: usize) -> f32x16<S> {
-    match run {
-        1 => of,
-        LANES => simd.splat_f32x16(total(of)),
-        _ => {
-            let of = of.as_slice();
-            let sums: [f32; LANES] = std::array::from_fn(|lane| of[lane / run * run..][..run].iter().sum());
-            f32x16::simd_from(simd, sums)
-        }
+    let mut sums = of.to_array();
+    macro_rules! with {
+        ($other:literal) => {
+            if run > $other {
+                let half = sums;
+                sums = std::array::from_fn(|lane| half[lane] + half[lane ^ $other]);
+            }
+        };
     }
+    with!(1);
+    with!(2);
+    with!(4);
+    with!(8);
+    f32x16::simd_from(simd, sums)
 }
 
 fn squared(v: f32) -> f32 {
@@ -183,7 +175,7 @@ fn spread(bits: u16, run: usize) -> u16 {
     bits
 }
 
-/// The cells of those runs in which something is hidden, and something is not.
+/// The leaves of those runs in which something is hidden, and something is not.
 fn around(seen: &[[u16; 2]], run: usize) -> CellBits {
     let mut cells = Vec::with_capacity(seen.len());
     for blocks in seen.chunks(run.div_ceil(LANES)) {
@@ -200,21 +192,22 @@ fn around(seen: &[[u16; 2]], run: usize) -> CellBits {
 /// How much farther off the sum of all rays may be than if all saw the same: rays that see different shares of the
 /// light are not stratified together.
 fn apart(tallies: &[&Tally]) -> f32 {
-    let (mut count, mut sum, mut squares, mut cells) = (0.0f32, 0.0, 0.0, 0);
-    for tally in tallies.iter().filter(|tally| tally.sending > 0) {
-        let share = tally.hidden as f32 / tally.sending as f32;
-        (count, sum, squares, cells) = (count + 1.0, sum + share, squares + share * share, cells + tally.sending);
+    let (mut count, mut sum, mut squares, mut points) = (0.0f32, 0.0, 0.0, 0.0);
+    for tally in tallies.iter().filter(|tally| tally.sending > 0.0) {
+        let share = (tally.hidden / tally.sending) as f32;
+        (count, sum, squares) = (count + 1.0, sum + share, squares + share * share);
+        points += tally.effective_sending();
     }
     if count < 2.0 {
         return 1.0;
     }
     let deviation = ((squares - sum * sum / count) / count).max(0.0).sqrt();
-    let by_chance = by_chance(cells as f64 / f64::from(count));
+    let by_chance = by_chance(points / f64::from(count));
     1.0 + (APART - 1.0) * (0.5 * (deviation / by_chance - 1.0)).clamp(0.0, 1.0)
 }
 
 /// The deviation of what so many stratified points say of an edge that runs anywhere.
-pub(super) fn by_chance(points: f64) -> f32 {
+fn by_chance(points: f64) -> f32 {
     EDGE * of_edge(points)
 }
 

@@ -1,9 +1,9 @@
-//! What points of an area light say, from one place, cell by cell of the light.
+//! What points of an area light say, from one place, leaf by leaf of the light.
 //!
-//! Each cell holds what the point in it says; where cells were halved without a new point in one of them, both halves
-//! hold the same. So every cell counts alike, and it is enough to ask anew where the edge of a shadow is. What points
-//! would send is tallied with and without what is hidden: where all that a light would send is known exactly, the
-//! points only say which share of it arrives, a ratio estimate.
+//! Each leaf holds what the point in it says; where one was halved without a new point in one of the halves, both hold
+//! the same. A leaf counts for the part of the light that it is, so it is enough to ask anew where the edge of a shadow
+//! is. What points would send is tallied with and without what is hidden: all that a light would send is known exactly,
+//! so the points only say which share of it arrives, a ratio estimate.
 //!
 //! Sources: of ratio estimates, Cochran, "Sampling Techniques", 1977, chapter 6; of the effective number of points,
 //! Kish 1965.
@@ -12,29 +12,44 @@ use fearless_simd::{Level, dispatch, f32x16, mask32x16, prelude::*};
 
 use super::ladder::{Asker, Rung};
 use super::lanes::PointObstacles;
-use crate::light::{Area, MIN_DISTANCE2, Points};
+use super::leaves::{Halved, Leaves, follow};
+use crate::light::{Area, FineCell, MIN_DISTANCE2, Points};
 use crate::material::{Lobe, MOMENTS, Moments};
 use crate::math::{LANES, Vec3x16};
 use crate::shape::SurfaceInteraction;
 use crate::visibility::ShadowView;
 
-/// Cells whose sums are added up in single precision.
+/// Leaves whose sums are added up in single precision.
 const RUN: usize = 1 << 12;
 
-/// What points of a light say, from one place: by cell, and sums of what they would send, and of what of it arrives.
+/// Light is peaked where so many times more points send anything than there are effective ones, if that is more than
+/// this part of all.
+const PEAKED: f64 = 4.0;
+const PART: f64 = 1.0 / 16.0;
+
+/// What points of a light say, from one place: by leaf, and sums of what they would send, and of what of it arrives.
 #[derive(Debug, Default)]
 pub(super) struct Tally {
+    /// Leaf by leaf, and 0 up to a multiple of sixteen: what its point would send from all of the light.
     sent: [Vec<f32>; MOMENTS],
-    /// Sixteen by sixteen: a bit for each cell whose point would send anything, and for each of those that is hidden.
-    pub sends: Vec<u16>,
-    pub hides: Vec<u16>,
+    /// 1 where it would send anything, and where that is hidden; else 0.
+    sends: Vec<f32>,
+    hides: Vec<f32>,
+    /// Where the point is.
+    pub at: Vec<FineCell>,
+    /// What would be sent, and what of it arrives.
     pub all: [f64; MOMENTS],
     pub lit: [f64; MOMENTS],
-    /// Of the squares of what they would send.
+    /// The sum of squares of what each leaf would send.
     squares: [f64; MOMENTS],
-    /// How many cells would send anything, and how many of those are hidden.
-    pub sending: usize,
-    pub hidden: usize,
+    /// Parts of the light: what would send anything, and what of it is hidden. With the sum of the squares of the parts
+    /// that leaves are of the former.
+    pub sending: f64,
+    pub hidden: f64,
+    squared_parts: f64,
+    /// What points sent that were asked in leaves thought to be away from edges, and found the contrary of what those
+    /// held; added up until somebody forgets it.
+    pub surprises: [f64; MOMENTS],
 }
 
 /// What sixteen points say.
@@ -45,77 +60,97 @@ struct BlockAnswers {
     hides: u16,
 }
 
-impl Tally {
-    /// The cells, each of which counts alike.
-    pub fn cells(&self) -> usize {
-        self.sent[0].len()
-    }
+/// What sixteen leaves hold.
+pub(super) struct LeafLanes<S: Simd> {
+    pub sent: [f32x16<S>; MOMENTS],
+    pub sends: f32x16<S>,
+    pub hides: f32x16<S>,
+}
 
-    /// What arrives. `whole` is what would if nothing were in the way, if that is known; else points alone tell, each
-    /// of which stands for `measure` over their number. `shares` are the parts of it that arrive where none sends
-    /// anything.
-    pub fn sums(&self, whole: Option<&Moments>, measure: f32, shares: &[f32; MOMENTS]) -> Moments {
-        let Some(whole) = whole else {
-            let one = f64::from(measure) / self.cells().max(1) as f64;
-            return Moments(self.lit.map(|lit| (lit * one) as f32));
-        };
+impl Tally {
+    /// What arrives, where `whole` would if nothing were in the way. `shares` are the parts of it that do where no
+    /// point sends anything.
+    pub fn arrives(&self, whole: &Moments, shares: &[f32; MOMENTS]) -> Moments {
         let share = |k: usize| if self.all[k] > 0.0 { (self.lit[k] / self.all[k]) as f32 } else { shares[k] };
         Moments(std::array::from_fn(|k| whole.0[k] * share(k)))
     }
 
-    /// What would arrive if nothing were in the way, as far as points tell.
-    pub fn whole(&self, measure: f32) -> Moments {
-        let one = f64::from(measure) / self.cells().max(1) as f64;
-        Moments(self.all.map(|all| (all * one) as f32))
-    }
-
-    /// The effective number of cells, of the diffuse part and of the highlight: as many that send alike would be as
+    /// The effective number of points, of the diffuse part and of the highlight: as many that send alike would be as
     /// good.
     pub fn effective(&self) -> [f64; MOMENTS] {
         std::array::from_fn(|k| if self.squares[k] > 0.0 { self.all[k] * self.all[k] / self.squares[k] } else { 0.0 })
     }
 
-    /// What sixteen cells send.
-    pub fn sent(&self, block: usize) -> [&[f32; LANES]; MOMENTS] {
-        let block = block * LANES;
-        std::array::from_fn(|k| self.sent[k][block..block + LANES].try_into().expect("a block has as many"))
+    /// The same of those that send anything, if all sent alike.
+    pub fn effective_sending(&self) -> f64 {
+        if self.squared_parts > 0.0 { self.sending * self.sending / self.squared_parts } else { 0.0 }
     }
 
-    /// Asks for that many cells from now on: of none, or of as many halves. They hold what the larger ones did.
-    pub fn part(&mut self, cells: usize) {
-        for sent in &mut self.sent {
-            let count = sent.len();
-            sent.resize(cells, 0.0);
-            for cell in (0..count).rev() {
-                (sent[2 * cell], sent[2 * cell + 1]) = (sent[cell], sent[cell]);
-            }
-        }
-        for bits in [&mut self.sends, &mut self.hides] {
-            *bits = bits.iter().flat_map(|bits| [twice(*bits as u8), twice((*bits >> 8) as u8)]).collect();
-            bits.resize(cells / LANES, 0);
+    /// Whether few points send much of it, where each kind of light counts for so much.
+    pub fn is_peaked(&self, weights: &[f32; MOMENTS]) -> bool {
+        let (effective, sending) = (self.effective(), self.effective_sending());
+        let sent: [f64; MOMENTS] = std::array::from_fn(|k| self.all[k] * f64::from(weights[k]));
+        let much = PART * sent.iter().sum::<f64>();
+        (0..MOMENTS).any(|k| sent[k] > much && effective[k] * PEAKED < sending)
+    }
+
+    /// What the point in a leaf would send from all of the light.
+    pub fn sent(&self, leaf: usize) -> Moments {
+        Moments(std::array::from_fn(|k| self.sent[k][leaf]))
+    }
+
+    /// What sixteen leaves hold.
+    #[inline(always)]
+    pub fn lanes<S: Simd>(&self, simd: S, block: usize) -> LeafLanes<S> {
+        let lanes = |of: &[f32]| f32x16::from_slice(simd, &of[block * LANES..][..LANES]);
+        LeafLanes {
+            sent: std::array::from_fn(|k| lanes(&self.sent[k])),
+            sends: lanes(&self.sends),
+            hides: lanes(&self.hides),
         }
     }
 
-    /// Adds what those points of a rung say that are `asked`, each in place of all that is held in its one of so many
-    /// cells. `view` says what is hidden in trees, point by point.
+    /// Asks for that many leaves from now on, each of which holds a point at one of these places.
+    pub fn begin(&mut self, places: &[FineCell]) {
+        self.at.extend_from_slice(places);
+        self.numbers().for_each(|numbers| numbers.resize(places.len().next_multiple_of(LANES), 0.0));
+    }
+
+    /// Follows leaves that were halved, each of which comes from one of these.
+    pub fn halve(&mut self, from: &[u32]) {
+        self.at.resize(from.len(), FineCell::default());
+        follow(&mut self.at, from);
+        for numbers in self.numbers() {
+            numbers.resize(from.len().next_multiple_of(LANES), 0.0);
+            follow(numbers, from);
+        }
+    }
+
+    fn numbers(&mut self) -> impl Iterator<Item = &mut Vec<f32>> {
+        self.sent.iter_mut().chain([&mut self.sends, &mut self.hides])
+    }
+
+    /// Hears what those points of a rung say that are `asked`: of each leaf the first time, or one for each of those
+    /// that were halved, in place of what the half that it is in holds. `view` says what is hidden in trees, point by
+    /// point.
     #[allow(clippy::too_many_arguments, reason = "points of a light, and a surface that it shines on")]
     pub fn ask(
         &mut self,
         asker: &Asker,
         rung: &Rung,
-        cells: usize,
+        halved: Option<&Halved>,
         asked: &[u16],
         view: &ShadowView,
         si: &SurfaceInteraction,
         lobe: &Lobe,
     ) {
         let obstacles = PointObstacles::of(view);
-        dispatch!(asker.level, simd => self.add(simd, asker.area, rung, cells, asked, si, lobe, &obstacles));
+        dispatch!(asker.level, simd => self.add(simd, asker.area, rung, halved, asked, si, lobe, &obstacles));
     }
 
-    /// Sums up what all cells hold.
-    pub fn sum(&mut self, level: Level) {
-        dispatch!(level, simd => self.sum_lanes(simd));
+    /// Sums up what all leaves hold.
+    pub fn sum(&mut self, level: Level, leaves: &Leaves) {
+        dispatch!(level, simd => self.sum_lanes(simd, &leaves.parts));
     }
 
     #[inline(always)]
@@ -125,65 +160,82 @@ impl Tally {
         simd: S,
         area: &Area,
         rung: &Rung,
-        cells: usize,
+        halved: Option<&Halved>,
         asked: &[u16],
         si: &SurfaceInteraction,
         lobe: &Lobe,
         obstacles: &PointObstacles,
     ) {
-        let (place, span) = (PlaceLanes::new(simd, area, si), self.cells() / cells);
+        let (place, mut next) = (PlaceLanes::new(simd, area, si), 0);
         for (block, asked) in asked.iter().enumerate().filter(|(_, asked)| **asked != 0) {
             let answers = place.ask(simd, area, &rung.points, block, lobe, obstacles);
             let mut rest = *asked;
             while rest != 0 {
                 let lane = rest.trailing_zeros() as usize % LANES;
                 rest &= rest - 1;
-                let Some(cell) = rung.cells.get(block * LANES + lane).map(|cell| cell.part_of(cells)) else { break };
-                for cell in cell * span..(cell + 1) * span {
-                    for (sent, new) in self.sent.iter_mut().zip(&answers.sent) {
-                        sent[cell] = new[lane];
-                    }
-                    let (block, bit) = (cell / LANES, 1 << (cell % LANES));
-                    for (bits, new) in [(&mut self.sends, answers.sends), (&mut self.hides, answers.hides)] {
-                        bits[block] = bits[block] & !bit | if new >> lane & 1 == 1 { bit } else { 0 };
-                    }
+                let at = rung.cells[block * LANES + lane];
+                let leaf = halved.map_or(next, |halved| halved.first[next] as usize + at.half(halved.level));
+                next += 1;
+                self.at[leaf] = at;
+                let [sends, hides] = [answers.sends, answers.hides].map(|bits| f32::from(bits >> lane & 1));
+                let is_surprise = sends == self.sends[leaf] && hides != self.hides[leaf];
+                if let Some(halved) = halved.filter(|halved| is_surprise && halved.away[next - 1]) {
+                    let part = 0.5 / (1u64 << halved.level) as f64;
+                    self.surprises
+                        .iter_mut()
+                        .zip(&answers.sent)
+                        .for_each(|(sum, sent)| *sum += f64::from(sent[lane]) * part);
                 }
+                for (sent, new) in self.sent.iter_mut().zip(&answers.sent) {
+                    sent[leaf] = new[lane];
+                }
+                (self.sends[leaf], self.hides[leaf]) = (sends, hides);
             }
         }
     }
 
     #[inline(always)]
-    fn sum_lanes<S: Simd>(&mut self, simd: S) {
+    fn sum_lanes<S: Simd>(&mut self, simd: S, parts: &[f32]) {
         let zero = simd.splat_f32x16(0.0);
-        let count = |bits: &[u16]| bits.iter().map(|bits| bits.count_ones() as usize).sum();
-        (self.sending, self.hidden) = (count(&self.sends), count(&self.hides));
-        for (k, sent) in self.sent.iter().enumerate() {
-            let mut totals = [0.0; 3];
-            for (sent, hides) in sent.chunks(RUN).zip(self.hides.chunks(RUN / LANES)) {
-                let mut sums = [zero; 3];
-                for (sent, hides) in sent.chunks_exact(LANES).zip(hides) {
-                    let sent = f32x16::from_slice(simd, sent);
-                    let is_hidden = mask32x16::from_bitmask(simd, u64::from(*hides));
+        let mut totals = [0.0; 3 + 3 * MOMENTS];
+        for (run, parts) in parts.chunks(RUN).enumerate() {
+            let mut sums = [zero; 3 + 3 * MOMENTS];
+            for (block, part) in parts.chunks_exact(LANES).enumerate() {
+                let part = f32x16::from_slice(simd, part);
+                let LeafLanes { sent, sends, hides } = self.lanes(simd, run * (RUN / LANES) + block);
+                sums[0] += sends * part;
+                sums[1] += hides * part;
+                sums[2] += sends * part * part;
+                for (sums, sent) in sums[3..].chunks_exact_mut(3).zip(sent) {
+                    let sent = sent * part;
                     sums[0] += sent;
-                    sums[1] += is_hidden.select(zero, sent);
+                    sums[1] += sent * (sends - hides);
                     sums[2] += sent * sent;
                 }
-                for (total, sum) in totals.iter_mut().zip(sums) {
-                    *total += sum.as_slice().iter().map(|v| f64::from(*v)).sum::<f64>();
-                }
             }
-            [self.all[k], self.lit[k], self.squares[k]] = totals;
+            for (total, sum) in totals.iter_mut().zip(&sums) {
+                *total += sum.as_slice().iter().map(|v| f64::from(*v)).sum::<f64>();
+            }
+        }
+        let [sending, hidden, squared_parts, moments @ ..] = totals;
+        (self.sending, self.hidden, self.squared_parts) = (sending, hidden, squared_parts);
+        for (k, moment) in moments.chunks_exact(3).enumerate() {
+            (self.all[k], self.lit[k], self.squares[k]) = (moment[0], moment[1], moment[2]);
         }
     }
 }
 
-/// Each of eight bits twice.
-fn twice(bits: u8) -> u16 {
-    let mut bits = u16::from(bits);
-    bits = (bits | bits << 4) & 0x0f0f;
-    bits = (bits | bits << 2) & 0x3333;
-    bits = (bits | bits << 1) & 0x5555;
-    bits | bits << 1
+/// What each of some points of a light would send to a place, from all of it.
+pub(super) fn would_send(asker: &Asker, points: &Points, si: &SurfaceInteraction, lobe: &Lobe) -> Vec<Moments> {
+    let mut sent = Vec::with_capacity(points.blocks.len() * LANES);
+    dispatch!(asker.level, simd => {
+        let place = PlaceLanes::new(simd, asker.area, si);
+        for block in 0..points.blocks.len() {
+            let answers = place.ask(simd, asker.area, points, block, lobe, &PointObstacles::default());
+            sent.extend((0..LANES).map(|lane| Moments(answers.sent.map(|sent| sent[lane]))));
+        }
+    });
+    sent
 }
 
 /// A place, in all lanes.

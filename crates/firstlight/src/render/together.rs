@@ -2,30 +2,27 @@
 //!
 //! Behind things a light is asked point by point ([`ladder`](super::ladder)). The rays ask different points, which are
 //! stratified together: n rays need far fewer each than one that stands for all of them, and what one ray's points pass
-//! by, those of others meet. Their number grows until what they say together will do. What points cannot settle, since
-//! few of them send nearly all, is left to cells.
+//! by, those of others meet. Their number grows until what they say together will do.
 
 use super::Counts;
 use super::arrival::{ArrivalPlace, Arrivals, Sighting};
-use super::beams::{self, RungRays};
+use super::asking::{AskedLeaves, Asking, DEEPEST, MOST, parts};
 use super::fragment::most_asked;
-use super::ladder::{AskedRung, Asker, CellBits, FIRST, is_in};
-use super::packets::{PacketErrors, by_chance, of_edge};
+use super::ladder::FIRST;
+use super::packets::{PacketErrors, of_edge};
 use super::resolve::LightTerm;
 use super::tally::Tally;
 use crate::color::Rgb;
 use crate::ids::SurfaceId;
-use crate::integrate::{Arrived, Illumination};
 use crate::light::SERIES;
-use crate::material::{Bsdf, Lobe, MOMENTS, Moments};
-use crate::math::LANES;
+use crate::material::{Bsdf, MOMENTS, Moments};
 use crate::shape::SurfaceInteraction;
-use crate::visibility::{ShadowView, Viewpoint, Visibility};
+use crate::visibility::{ShadowView, Visibility};
 
-/// The part of what chance makes of an edge that is wrong at the least, where no packet says so.
-const UNANIMOUS: f32 = 0.25;
 /// How many times what is allowed by chance a deviation may be.
 const DEVIATION: f32 = 1.25;
+/// How many times what is overlooked behind edges counts: it is off to one side everywhere.
+const OVERLOOKED: f32 = 2.0;
 /// Points that find what is in the way of a pixel.
 const POINTS: f32 = 512.0;
 /// The effective part of them, none of which is hidden where nothing is.
@@ -45,26 +42,6 @@ const MANY: usize = 1 << 10;
 /// say, to tell it of all; and how far they may differ.
 const EVEN: f32 = 0.1;
 const EVEN_CORNERS: f32 = 4.0;
-/// Where more points seem to be of no help, there are this part of as many as elsewhere.
-const BEHIND: usize = 4;
-/// The cells that a light is told by at most, of all rays of a pixel.
-const MOST: usize = 1 << 16;
-
-/// A ray whose light is behind things.
-struct Asking {
-    si: SurfaceInteraction,
-    lobe: Lobe,
-    base: Rgb,
-    scale: Rgb,
-    reflected: LightTerm,
-    series: usize,
-    view: ShadowView,
-    /// What would arrive if nothing were in the way, if that is known.
-    whole: Option<Moments>,
-    /// Whether points of the light may miss most of what it sends.
-    may_miss: bool,
-    tally: Tally,
-}
 
 /// A ray of which nothing is known yet but that nothing is in the way, if that is, or nothing in trees.
 struct Looking {
@@ -72,129 +49,6 @@ struct Looking {
     bsdf: Bsdf,
     lit: bool,
     clear: bool,
-}
-
-impl Asking {
-    fn place(&self, share: f32) -> ArrivalPlace<'_> {
-        let place = ArrivalPlace::point(&self.si, &self.lobe, self.base, self.scale, self.reflected);
-        ArrivalPlace { share, ..place }
-    }
-
-    /// What arrives, as far as points tell, and what would if nothing were in the way; `shares`: see [`Tally::sums`].
-    fn sums(&self, measure: f32, shares: &[f32; MOMENTS]) -> (Moments, Moments) {
-        let arrives = self.tally.sums(self.whole.as_ref(), measure, shares);
-        (arrives, self.whole.unwrap_or_else(|| self.tally.whole(measure)))
-    }
-
-    /// The diffuse part and the highlight, with their colours.
-    fn each(&self, sums: &Moments) -> LightTerm {
-        (self.scale * self.reflected).each(sums)
-    }
-
-    fn color(&self, sums: &Moments) -> Rgb {
-        self.each(sums).sum()
-    }
-}
-
-/// The cells of a light that rays ask points in.
-struct AskedCells<'a> {
-    asker: Asker<'a>,
-    count: usize,
-    /// How often each was halved since a point in it was asked.
-    ages: Vec<u8>,
-    /// As many as these were asked everywhere, at least.
-    everywhere: usize,
-}
-
-impl<'a> AskedCells<'a> {
-    /// Has all rays ask a point in each of so many.
-    fn new(asker: Asker<'a>, count: usize, asking: &mut [Asking], counts: &mut Counts) -> Self {
-        let cells = AskedCells { asker, count, ages: vec![0; count], everywhere: count };
-        asking.iter_mut().for_each(|one| one.tally.part(count));
-        let first: Vec<AskedRung> = asking.iter().map(|one| asker.first(one.series, count)).collect();
-        cells.ask(&first, count, &cells.all(), asking, counts);
-        cells
-    }
-
-    fn all(&self) -> CellBits {
-        vec![u16::MAX; self.count / LANES]
-    }
-
-    /// Halves all cells and has all rays ask one more point in each that is in `asked`, and as many fewer elsewhere as
-    /// [`BEHIND`] says.
-    fn halve(&mut self, asked: &CellBits, asking: &mut [Asking], counts: &mut Counts) {
-        let left = self.left_behind(asked);
-        asking.iter_mut().for_each(|one| one.tally.part(2 * self.count));
-        self.ask_next(self.count, asked, asking, counts);
-        if left.iter().any(|bits| *bits != 0) {
-            self.ask_next(self.count / BEHIND, &left, asking, counts);
-        }
-        let age = |cell: usize| match (is_in(asked, cell), is_in(&left, cell / BEHIND)) {
-            (true, _) => 0,
-            (_, true) => BEHIND.ilog2() as u8,
-            _ => self.ages[cell] + 1,
-        };
-        self.ages = (0..self.count).flat_map(|cell| [age(cell); 2]).collect();
-        self.count *= 2;
-        let behind = if asked.iter().all(|bits| *bits == u16::MAX) { 1 } else { BEHIND };
-        self.everywhere = self.everywhere.max(self.count / behind);
-    }
-
-    /// Those of larger cells that none of `asked` is a part of, and that were halved as often as that since a point in
-    /// them was asked.
-    fn left_behind(&self, asked: &CellBits) -> CellBits {
-        let mut left = vec![0; asked.len().div_ceil(BEHIND)];
-        for (k, ages) in self.ages.chunks(BEHIND).enumerate() {
-            let is_left = (k * BEHIND..(k + 1) * BEHIND).all(|cell| !is_in(asked, cell));
-            if is_left && ages.iter().all(|age| 1 << age >= BEHIND) {
-                left[k / LANES] |= 1 << (k % LANES);
-            }
-        }
-        left
-    }
-
-    fn ask_next(&self, count: usize, asked: &CellBits, asking: &mut [Asking], counts: &mut Counts) {
-        let next: Vec<AskedRung> = asking.iter().map(|one| self.asker.next(one.series, count, asked)).collect();
-        // What is made for what is asked holds nothing else
-        if let AskedRung::Made(rung) = &next[0] {
-            let mut asked = vec![u16::MAX; rung.points.blocks.len()];
-            // The last sixteen may be fewer
-            if let (Some(last), more @ 1..) = (asked.last_mut(), rung.cells.len() % LANES) {
-                *last = (1 << more) - 1;
-            }
-            self.ask(&next, 2 * count, &asked, asking, counts);
-        } else {
-            self.ask(&next, 2 * count, asked, asking, counts);
-        }
-    }
-
-    /// Has each ray ask those of the points of its rung that are `asked`, each of which tells one of `count` cells.
-    fn ask(&self, rungs: &[AskedRung], count: usize, asked: &[u16], asking: &mut [Asking], counts: &mut Counts) {
-        let asker = &self.asker;
-        let mut beams: Vec<RungRays> = Vec::new();
-        for (one, rung) in asking.iter_mut().zip(rungs).filter(|(one, _)| one.view.trees) {
-            beams.push(RungRays { point: Viewpoint::of(&one.si), rung, hidden: &mut one.view.hidden });
-        }
-        counts.settled.traced += beams::trace(asker.scene, asker.target.light, asked, &mut beams);
-        for (one, rung) in asking.iter_mut().zip(rungs) {
-            if !one.view.trees {
-                counts.settled.traced += asker.mask(rung, asked, &mut one.view, &Viewpoint::of(&one.si));
-            }
-            one.tally.ask(asker, rung, count, asked, &one.view, &one.si, &one.lobe);
-        }
-        let points = asked.iter().map(|bits| u64::from(bits.count_ones())).sum::<u64>() * asking.len() as u64;
-        counts.shadow_rays += points;
-        counts.shadow_rays_skipped += points;
-    }
-}
-
-/// The parts of what points of all rays send that arrive.
-fn shares(asking: &[Asking]) -> [f32; MOMENTS] {
-    std::array::from_fn(|k| {
-        let sum = |of: fn(&Tally) -> &[f64; MOMENTS]| asking.iter().map(|one| of(&one.tally)[k]).sum::<f64>();
-        let (lit, all) = (sum(|tally| &tally.lit), sum(|tally| &tally.all));
-        if all > 0.0 { (lit / all) as f32 } else { 0.0 }
-    })
 }
 
 /// What the rays of one patch ask of one light.
@@ -289,7 +143,7 @@ impl Together {
     pub fn ask_points(&mut self, arrivals: &mut Arrivals, si: &SurfaceInteraction, bsdf: &Bsdf, counts: &mut Counts) {
         let place = ArrivalPlace { share: self.share, ..arrivals.place(self.light, si, bsdf) };
         counts.settled.visibility[Visibility::Mask as usize] += 1;
-        self.hear(&place, Sighting::Behind(None), arrivals, counts);
+        self.hear(&place, Sighting::Behind(Moments::ZERO), arrivals, counts);
     }
 
     /// Hears what one ray sees.
@@ -305,12 +159,9 @@ impl Together {
         self.sharing += 1;
     }
 
-    /// Hears what would arrive at the only ray if nothing were in the way, if that is known.
-    pub fn hear_whole(&mut self, arrivals: &Arrivals, whole: Option<Moments>) {
-        for one in &mut self.asking {
-            one.whole = whole;
-            one.may_miss = whole.is_none() && arrivals.may_miss(self.light, &one.place(self.share));
-        }
+    /// Hears what would arrive at the only ray if nothing were in the way.
+    pub fn hear_whole(&mut self, whole: Moments) {
+        self.asking.iter_mut().for_each(|one| one.whole = whole);
     }
 
     /// Asks for what one ray sees past what is in `view`.
@@ -327,8 +178,8 @@ impl Together {
             reflected,
             series,
             view,
-            whole: None,
-            may_miss: false,
+            whole: Moments::ZERO,
+            known: None,
             tally: Tally::default(),
         });
     }
@@ -416,12 +267,7 @@ impl Together {
     /// Gives each ray the mean of what would arrive in the corners, by its place; `false` if that is not what would
     /// arrive in the middle.
     fn spread(&mut self, n: usize, corners: &[usize; 5], arrivals: &Arrivals) -> bool {
-        let mut wholes = [Moments::default(); 5];
-        for (whole, ray) in wholes.iter_mut().zip(corners) {
-            let Some(found) = self.asking[*ray].whole else { return false };
-            *whole = found;
-        }
-        let [a, b, c, d, middle] = wholes;
+        let [a, b, c, d, middle] = corners.map(|ray| self.asking[ray].whole);
         let mean = |ray: usize| {
             let [x, y] = [ray % n, ray / n].map(|k| k as f32 / (n - 1) as f32);
             (a * (1.0 - x) + b * x) * (1.0 - y) + (c * (1.0 - x) + d * x) * y
@@ -434,7 +280,7 @@ impl Together {
             return false;
         }
         for (ray, one) in self.asking.iter_mut().enumerate().filter(|(ray, _)| !corners.contains(ray)) {
-            one.whole = Some(mean(ray));
+            one.whole = mean(ray);
         }
         true
     }
@@ -443,13 +289,8 @@ impl Together {
     fn ask_wholes(all: &mut [Together], wanted: &[(usize, usize)], arrivals: &mut Arrivals) {
         let Some(light) = all.first().map(|one| one.light).filter(|_| !wanted.is_empty()) else { return };
         let places: Vec<_> = wanted.iter().map(|(k, ray)| all[*k].asking[*ray].place(all[*k].share)).collect();
-        let known = |arrived: Arrived| (arrived.illumination != Illumination::Unknown).then_some(arrived.sums);
-        let wholes: Vec<_> = arrivals.wholes(light, &places).into_iter().map(known).collect();
-        let may_miss = |(place, whole): (_, &Option<Moments>)| whole.is_none() && arrivals.may_miss(light, place);
-        let may_miss: Vec<bool> = places.iter().zip(&wholes).map(may_miss).collect();
-        for (((k, ray), whole), may_miss) in wanted.iter().zip(wholes).zip(may_miss) {
-            let one = &mut all[*k].asking[*ray];
-            (one.whole, one.may_miss) = (whole, may_miss);
+        for ((k, ray), whole) in wanted.iter().zip(arrivals.wholes(light, &places)) {
+            all[*k].asking[*ray].whole = whole;
         }
     }
 
@@ -457,16 +298,13 @@ impl Together {
     pub fn settle(mut self, arrivals: &mut Arrivals, counts: &mut Counts) -> Outcome {
         if !self.asking.is_empty() {
             let mut asking = std::mem::take(&mut self.asking);
-            let is_told = self.points(arrivals, &mut asking, counts);
-            let (measure, shares) = (arrivals.measure(self.light), shares(&asking));
+            self.points(arrivals, &mut asking, counts);
+            let shares = parts(&asking, |tally| &tally.lit);
             for one in asking {
                 let place = one.place(self.each);
-                let sums = match is_told {
-                    true => one.tally.sums(one.whole.as_ref(), measure, &shares),
-                    false => arrivals.beyond_points(self.light, &place, counts),
-                };
-                if one.tally.sending > 0 {
-                    self.shares += 1.0 - one.tally.hidden as f32 / one.tally.sending as f32;
+                let sums = one.known.unwrap_or_else(|| one.tally.arrives(&one.whole, &shares));
+                if one.tally.sending > 0.0 {
+                    self.shares += 1.0 - (one.tally.hidden / one.tally.sending) as f32;
                     self.sharing += 1;
                 }
                 self.add(&place, &sums);
@@ -476,78 +314,90 @@ impl Together {
         Outcome { terms: self.terms, sums: self.sums, share: self.shares / self.sharing.max(1) as f32 }
     }
 
-    /// Asks points of the light, more and more, until what they say together will do; whether it does in the end.
-    fn points(&self, arrivals: &Arrivals, asking: &mut [Asking], counts: &mut Counts) -> bool {
-        if asking.iter().any(|one| one.may_miss) {
-            return false;
-        }
+    /// Asks points of the light, more and more, until what they say together will do. What the most will not
+    /// settle is asked in closed form.
+    fn points(&self, arrivals: &mut Arrivals, asking: &mut [Asking], counts: &mut Counts) {
         let asker = arrivals.asker(self.light);
         let measure = arrivals.measure(self.light);
         let wanted = POINTS * self.share.sqrt();
-        let most = MOST / asking.len().next_power_of_two();
-        let first = ((wanted / asking.len() as f32) as usize).next_power_of_two().max(FIRST);
+        let first = ((0.5 * wanted / asking.len() as f32) as usize).next_power_of_two().max(FIRST);
         let tolerance = arrivals.tolerance_by_chance(self.share);
         let allowed = tolerance * DEVIATION;
         let part = 1.0 / self.rays as f32;
-        let mut cells = AskedCells::new(asker, first, asking, counts);
-        // By how many effective points each part of the light is told, of so many
-        let (mut effective, mut told) = ([0.0; MOMENTS], 0);
+        let mut is_tried = false;
+        let mut asked = AskedLeaves::new(asker, measure, first, asking, counts);
         loop {
-            asking.iter_mut().for_each(|one| one.tally.sum(asker.level));
-            if cells.everywhere == cells.count {
-                (effective, told) = ([0.0; MOMENTS], 0);
-            }
-            let shares = shares(asking);
+            asking.iter_mut().for_each(|one| one.tally.sum(asker.level, &asked.leaves));
+            let shares = parts(asking, |tally| &tally.lit);
             let mut value = self.value + self.others * self.rays as f32;
-            // What would arrive if nothing were in the way, of each kind
+            // What would arrive if nothing were in the way, of each kind; by how many effective points that is told,
+            // and how many send anything
             let mut all = [Rgb::BLACK; MOMENTS];
-            let (mut sending, mut hidden, mut is_known) = (0, 0, true);
+            let (mut effective, mut sending, mut is_hidden) = ([0.0; MOMENTS], 0.0, false);
+            // That of rays whose points find less than half of it
+            let mut missing = [Rgb::BLACK; MOMENTS];
+            let mut sent = Moments::default();
             for one in asking.iter() {
-                let (now, whole) = one.sums(measure, &shares);
-                value += one.color(&now);
-                for (k, (color, points)) in one.each(&whole).0.into_iter().zip(one.tally.effective()).enumerate() {
+                value += one.color(&one.tally.arrives(&one.whole, &shares));
+                for (k, (color, points)) in one.each(&one.whole).0.into_iter().zip(one.tally.effective()).enumerate() {
                     all[k] += color;
-                    effective[k] += if told == 0 { points } else { 0.0 };
+                    effective[k] += points;
+                    if one.tally.all[k] as f32 * measure < 0.5 * one.whole.0[k] {
+                        missing[k] += color;
+                    }
                 }
-                sending += one.tally.sending;
-                hidden += one.tally.hidden;
-                is_known &= one.whole.is_some();
+                sending += one.tally.effective_sending();
+                is_hidden |= one.tally.hidden > 0.0;
+                sent += one.whole;
             }
-            // Where fewer points are asked, as good as fewer everywhere
-            let more = if told == 0 { 1.0 } else { cells.everywhere as f64 / told as f64 };
-            effective.iter_mut().for_each(|points| *points *= more);
-            told = cells.everywhere;
-            let shows = |error: Rgb| arrivals.steps(value * part, error * part);
+            let steps = arrivals.display_steps();
+            let shows = |error: Rgb| steps.of_color(value * part, error * part);
             // What few points send, or none, can be anything
             let sum = |of: &dyn Fn(usize) -> Rgb| (1..MOMENTS).fold(of(0), |sum, k| sum + of(k));
-            let sending = sending as f64 * told as f64 / cells.count as f64;
             let least = |k: usize| if k == 0 { TOLD.max(sending * UNEVEN) } else { TOLD };
-            let untold = |k: usize| if effective[k] < least(k) { all[k] } else { Rgb::BLACK };
+            let untold = |k: usize| if effective[k] < least(k) { all[k] } else { missing[k] };
             let is_told = shows(sum(&untold)) <= tolerance * UNTOLD;
             let found = effective.iter().copied().fold(0.0, f64::max);
             // What none of so many points meets may hide what one of them sends
             let one = |k: usize| all[k] * (1.0 / effective[k].max(1.0) as f32);
             let is_clear = found >= f64::from(wanted) * CLEAR && shows(sum(&one)) <= UNMET;
-            if is_told && is_known && hidden == 0 && (is_clear || cells.count >= MANY) {
-                return true;
+            if is_told && !is_hidden && (is_clear || asked.leaves.count() >= MANY) {
+                return;
             }
-            // As much as packets are wrong by; or a part of what an edge may be that none of them tells
+            // As much as packets are wrong by, and what nobody met. Of small things that are in the way each point says
+            // what it sends; where leaves near those that were found are smaller, all that were not found are missing
             let tallies: Vec<&Tally> = asking.iter().map(|one| &one.tally).collect();
-            let mut sent = Moments::default();
-            asking.iter().filter_map(|one| one.whole).for_each(|whole| sent += whole);
-            let packets = PacketErrors::of(asker.level, &tallies, &cells.ages, measure, is_known.then_some(sent));
-            let least = if is_known { UNANIMOUS } else { 1.0 };
-            let unmet = shows(sum(&|k| all[k] * (least * by_chance(effective[k])).max(packets.smooth[k])));
-            let error = shows(sum(&|k| all[k] * packets.edges[k])).max(unmet);
+            let packets = PacketErrors::of(asker.level, &tallies, &asked.leaves, measure, &sent);
+            let surprises = parts(asking, |tally| &tally.surprises);
+            let met = |k: usize| surprises[k] + 1.0 / effective[k].max(1.0) as f32;
+            let noise = |k: usize| (met(k) / effective[k].max(1.0) as f32).sqrt();
+            let overlooked = OVERLOOKED * shows(sum(&|k| all[k] * met(k)));
+            let unmet = shows(sum(&|k| all[k] * noise(k).max(packets.smooth[k])));
+            let unmet = if asked.deep == asked.everywhere { unmet } else { unmet.max(overlooked) };
+            let edges = shows(sum(&|k| all[k] * packets.edges[k]));
+            let points = asked.leaves.count() * asking.len();
+            let error = edges.max(unmet);
             if is_told && error <= allowed {
-                return true;
+                return;
             }
-            // Errors shrink as they do where an edge is: what the most will not settle, cells do
-            if cells.count == most || error * of_edge(most as f64) > allowed * of_edge(cells.count as f64) {
-                return false;
+            // Errors shrink as they do where an edge is
+            if !is_tried && error * of_edge(MOST as f64) > allowed * of_edge(points as f64) {
+                is_tried = true;
+                for one in asking.iter_mut() {
+                    let sums = arrivals.in_closed_form(self.light, &one.place(self.each), counts);
+                    one.known = sums;
+                }
+                if asking.iter().all(|one| one.known.is_some()) {
+                    return;
+                }
             }
-            let asked = if is_told && unmet <= allowed { packets.cells } else { cells.all() };
-            cells.halve(&asked, asking, counts);
+            if points >= MOST || asked.deep > DEEPEST {
+                return;
+            }
+            // More everywhere as long as there is room for more near edges
+            let is_raised = !is_told || unmet.max(overlooked) > allowed || !asked.is_raised;
+            let is_raised = is_raised && (4 * points <= MOST || edges <= allowed);
+            asked.halve(&packets.leaves, is_raised, asking, counts);
         }
     }
 }

@@ -29,7 +29,7 @@ impl ShadowView {
         let count = target.blocks.len();
         let mut traced = 0;
         self.hidden.clear();
-        if count == 0 || self.triangles.is_empty() && self.others.is_empty() && !self.trees {
+        if count == 0 || !self.asks_points() {
             return 0;
         }
         self.in_space.clear();

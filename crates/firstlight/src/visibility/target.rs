@@ -195,12 +195,23 @@ impl Target {
 
     /// The same light with these points of it.
     pub fn with(&self, points: &Points) -> Self {
-        let hull = self.hull;
-        let mut target = Target { light: self.light, hull, blocks: Vec::new(), cells: Vec::new() };
-        let coordinates = hull.all_coordinates();
-        let mut samples: Vec<(u32, Vec3, DVec3)> =
-            (0..points.count()).map(|k| (k as u32, points.get(k), coordinates(points.get(k).as_dvec3()))).collect();
+        let mut samples = self.samples(points);
         gather_neighbours(&mut samples);
+        self.with_samples(&samples)
+    }
+
+    /// The same light with these points of it, of which those that follow each other are neighbours.
+    pub fn with_neighbours(&self, points: &Points) -> Self {
+        self.with_samples(&self.samples(points))
+    }
+
+    fn samples(&self, points: &Points) -> Vec<Sample> {
+        let coordinates = self.hull.all_coordinates();
+        (0..points.count()).map(|k| (k as u32, points.get(k), coordinates(points.get(k).as_dvec3()))).collect()
+    }
+
+    fn with_samples(&self, samples: &[Sample]) -> Self {
+        let mut target = Target { light: self.light, hull: self.hull, blocks: Vec::new(), cells: Vec::new() };
         for chunk in samples.chunks(LANES) {
             let mut block = SampleBlock {
                 at: [[0.0; LANES]; 3],
@@ -235,8 +246,11 @@ impl Target {
     }
 }
 
+/// A sampled point: its number, where it is, and its coordinates along the hull's axes.
+type Sample = (u32, Vec3, DVec3);
+
 /// Orders samples so that each sixteen are neighbours: halves them along their longest side again and again.
-fn gather_neighbours(samples: &mut [(u32, Vec3, DVec3)]) {
+fn gather_neighbours(samples: &mut [Sample]) {
     if samples.len() <= LANES {
         return;
     }

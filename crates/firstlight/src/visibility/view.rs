@@ -57,6 +57,11 @@ impl ShadowView {
         self.trees = false;
     }
 
+    /// Whether anything in it is asked point by point, but for what is in lists.
+    pub fn asks_points(&self) -> bool {
+        self.trees || !self.triangles.is_empty() || !self.others.is_empty()
+    }
+
     /// What of a light is seen from `point`, past `occluders`, which were gathered for it. What is left to ask for the
     /// samples is in this view then.
     pub fn classify(

@@ -7,7 +7,6 @@ use std::ops::{ControlFlow, Range};
 use super::{Cells, PIXELS, Pixel, Wanted};
 use crate::color::Rgb;
 use crate::ids::LightId;
-use crate::integrate::Arrived;
 use crate::material::Moments;
 use crate::render::arrival::{ArrivalPlace, Arrivals, Past};
 use crate::render::fragment::{Fragment, Fragments};
@@ -47,7 +46,7 @@ pub(super) struct Behind {
     block: RayBlock,
     sights: Vec<RaySights>,
     /// What each light would send to each fragment of the cell if nothing were in the way, once that is known.
-    wholes: Vec<Vec<Arrived>>,
+    wholes: Vec<Vec<Moments>>,
     /// Which share of each light pixels see at least, as a few of their rays say, light by light; and which were asked.
     pub(super) votes: Vec<f32>,
     pub(super) voted: Vec<bool>,
@@ -331,7 +330,7 @@ impl Cells<'_> {
             let places: Vec<_> = surfaces.iter().map(|(si, bsdf)| arrivals.place(light, si, bsdf)).collect();
             *wholes = arrivals.wholes(light, &places);
         }
-        arrivals.scale(light) * fragments.all[fragment].bsdf.colors.of(&wholes[fragment].sums)
+        arrivals.scale(light) * fragments.all[fragment].bsdf.colors.of(&wholes[fragment])
     }
 
     /// What all rays of a fragment see of a light, ray by ray.

@@ -1,0 +1,236 @@
+//! Rays that ask points of a light, each in the same leaves of it.
+
+use super::Counts;
+use super::arrival::ArrivalPlace;
+use super::beams::{self, RungRays};
+use super::ladder::{AskedRung, Asker, CellBits, is_in};
+use super::leaves::{Halved, Leaves, follow};
+use super::resolve::LightTerm;
+use super::tally::{Tally, would_send};
+use crate::color::Rgb;
+use crate::light::FineCell;
+use crate::material::{Lobe, MOMENTS, Moments};
+use crate::math::LANES;
+use crate::shape::SurfaceInteraction;
+use crate::visibility::{ShadowView, Viewpoint};
+
+/// Leaves that send so many times as much as others do in the mean are halved first.
+const HEAVY: f32 = 2.0;
+/// The points that a light is told by at most, of all rays of a pixel.
+pub(super) const MOST: usize = 1 << 16;
+/// The level of the smallest leaves.
+pub(super) const DEEPEST: u32 = 44;
+
+/// A ray whose light is behind things.
+pub(super) struct Asking {
+    pub si: SurfaceInteraction,
+    pub lobe: Lobe,
+    pub base: Rgb,
+    pub scale: Rgb,
+    pub reflected: LightTerm,
+    pub series: usize,
+    pub view: ShadowView,
+    /// What would arrive if nothing were in the way.
+    pub whole: Moments,
+    /// What arrives, if that was asked in closed form and there is one.
+    pub known: Option<Moments>,
+    pub tally: Tally,
+}
+
+impl Asking {
+    pub fn place(&self, share: f32) -> ArrivalPlace<'_> {
+        let place = ArrivalPlace::point(&self.si, &self.lobe, self.base, self.scale, self.reflected);
+        ArrivalPlace { share, ..place }
+    }
+
+    /// The diffuse part and the highlight, with their colours.
+    pub fn each(&self, sums: &Moments) -> LightTerm {
+        (self.scale * self.reflected).each(sums)
+    }
+
+    pub fn color(&self, sums: &Moments) -> Rgb {
+        self.each(sums).sum()
+    }
+}
+
+/// The leaves of a light that rays ask points in.
+pub(super) struct AskedLeaves<'a> {
+    pub asker: Asker<'a>,
+    pub leaves: Leaves,
+    /// What all of the light stands for.
+    measure: f32,
+    /// How often the light was halved to make all of them, at least.
+    pub everywhere: u32,
+    /// The same of those near edges.
+    pub deep: u32,
+    /// Whether all were halved once, so that it is known what first points overlook.
+    pub is_raised: bool,
+}
+
+impl<'a> AskedLeaves<'a> {
+    /// Has all rays ask a point in each of so many.
+    pub fn new(asker: Asker<'a>, measure: f32, count: usize, asking: &mut [Asking], counts: &mut Counts) -> Self {
+        let level = count.ilog2();
+        let asked =
+            AskedLeaves { asker, leaves: Leaves::of(level), measure, everywhere: level, deep: level, is_raised: false };
+        let first: Vec<AskedRung> = asking.iter().map(|one| asker.first(one.series, count)).collect();
+        asking.iter_mut().zip(&first).for_each(|(one, rung)| one.tally.begin(&rung.cells));
+        asked.ask(&first, None, &vec![u16::MAX; count / LANES], asking, counts);
+        asked
+    }
+
+    /// Halves leaves, and has all rays ask one more point in each that is halved: those `near` edges down to one size,
+    /// and then to a smaller one; or, to raise the number of all, heavy ones, and if there is none, the largest.
+    pub fn halve(&mut self, near: &CellBits, is_raised: bool, asking: &mut [Asking], counts: &mut Counts) {
+        if is_raised && self.halve_heavy(asking, counts) {
+            return;
+        }
+        let is_near = |leaf: usize| is_in(near, leaf);
+        if is_raised {
+            self.everywhere += 1;
+            self.is_raised = true;
+            asking.iter_mut().for_each(|one| one.tally.surprises = Default::default());
+        } else if (0..self.leaves.count()).all(|leaf| !is_near(leaf) || self.leaves.levels[leaf] >= self.deep) {
+            self.deep += 1;
+        }
+        self.deep = self.deep.max(self.everywhere);
+        let (deep, everywhere) = (self.deep, self.everywhere);
+        self.halve_those(asking, counts, |leaf, level| {
+            let is_near = is_near(leaf);
+            (level < if is_near { deep } else { everywhere }).then_some(!is_near)
+        });
+    }
+
+    /// Halves leaves as [`Leaves::halve`] says, and has all rays ask one more point in each.
+    fn halve_those(
+        &mut self,
+        asking: &mut [Asking],
+        counts: &mut Counts,
+        is: impl Fn(usize, u32) -> Option<bool>,
+    ) -> (Vec<u32>, Vec<Halved>) {
+        let (from, halved) = self.leaves.halve(is);
+        asking.iter_mut().for_each(|one| one.tally.halve(&from));
+        for halved in &halved {
+            let next = |one: &Asking| self.asker.next(one.series, halved, &one.tally.at);
+            let next: Vec<AskedRung> = asking.iter().map(next).collect();
+            self.ask(&next, Some(halved), &Asker::asked(halved), asking, counts);
+        }
+        (from, halved)
+    }
+
+    /// Halves those leaves, and their halves, that send so much more to all rays together than others as [`HEAVY`]
+    /// says; whether there were any. That is told not by the points that were asked in them, but by others: to look
+    /// closer at what is found to send much makes what is found less, and nothing makes it more.
+    fn halve_heavy(&mut self, asking: &mut [Asking], counts: &mut Counts) -> bool {
+        let peaks: Vec<Peak> = Peak::of(asking, self.measure);
+        let all: f32 = peaks.iter().map(|peak| peak.sends).sum();
+        let heavy = HEAVY * all / (1u32 << self.everywhere) as f32;
+        let every: Vec<u32> = (0..self.leaves.count() as u32).collect();
+        let mut worth = self.worth(&peaks, asking, &every);
+        let mut is_any = false;
+        while self.leaves.count() * asking.len() < MOST {
+            let is_heavy = |leaf: usize, level: u32| (worth[leaf] > heavy && level < DEEPEST).then_some(false);
+            let (from, halved) = self.halve_those(asking, counts, is_heavy);
+            if halved.is_empty() {
+                break;
+            }
+            is_any = true;
+            worth.resize(from.len(), 0.0);
+            follow(&mut worth, &from);
+            let first = halved.iter().flat_map(|halved| &halved.first);
+            let halves: Vec<u32> = first.flat_map(|first| [*first, first + 1]).collect();
+            for (leaf, new) in halves.iter().zip(self.worth(&peaks, asking, &halves)) {
+                worth[*leaf as usize] = new;
+            }
+        }
+        is_any
+    }
+
+    /// What some leaves send to all rays, told by the place in each that is nearest to where the most was found.
+    fn worth(&self, peaks: &[Peak], asking: &[Asking], leaves: &[u32]) -> Vec<f32> {
+        let mut worth = vec![0.0; leaves.len()];
+        for peak in peaks {
+            let one = &asking[peak.ray];
+            let places: Vec<_> = leaves.iter().map(|leaf| self.leaves.nearest(*leaf as usize, peak.at)).collect();
+            let sent = would_send(&self.asker, &self.asker.area.points_at(&places), &one.si, &one.lobe);
+            for ((worth, leaf), sent) in worth.iter_mut().zip(leaves).zip(&sent) {
+                *worth += peak.weigh(sent) * self.leaves.parts[*leaf as usize];
+            }
+        }
+        worth
+    }
+
+    /// Has each ray ask those of the points of its rung that are `asked`.
+    fn ask(
+        &self,
+        rungs: &[AskedRung],
+        halved: Option<&Halved>,
+        asked: &[u16],
+        asking: &mut [Asking],
+        counts: &mut Counts,
+    ) {
+        let asker = &self.asker;
+        let mut beams: Vec<RungRays> = Vec::new();
+        for (one, rung) in asking.iter_mut().zip(rungs).filter(|(one, _)| one.view.trees) {
+            beams.push(RungRays { point: Viewpoint::of(&one.si), rung, hidden: &mut one.view.hidden });
+        }
+        counts.settled.traced += beams::trace(asker.scene, asker.target.light, asked, &mut beams);
+        for (one, rung) in asking.iter_mut().zip(rungs) {
+            if !one.view.trees {
+                counts.settled.traced += asker.mask(rung, asked, &mut one.view, &Viewpoint::of(&one.si));
+            }
+            one.tally.ask(asker, rung, halved, asked, &one.view, &one.si, &one.lobe);
+        }
+        let points = asked.iter().map(|bits| u64::from(bits.count_ones())).sum::<u64>() * asking.len() as u64;
+        counts.shadow_rays += points;
+        counts.shadow_rays_skipped += points;
+    }
+}
+
+/// Where a ray finds the most, which stands for rays that find it thereabouts.
+struct Peak {
+    ray: usize,
+    at: FineCell,
+    /// What each kind of light counts for, all those rays together.
+    weights: [f32; MOMENTS],
+    /// What the light sends to them.
+    sends: f32,
+}
+
+impl Peak {
+    /// Each ray to which few points send much has one of its own; of the others one has.
+    fn of(asking: &[Asking], measure: f32) -> Vec<Peak> {
+        let weights = |one: &Asking| -> [f32; MOMENTS] { (one.scale * one.reflected).0.map(largest) };
+        let is_peaked = |ray: &usize| asking[*ray].tally.is_peaked(&weights(&asking[*ray]));
+        let (peaked, even): (Vec<usize>, Vec<usize>) = (0..asking.len()).partition(is_peaked);
+        let rays = peaked.iter().map(|ray| (*ray, 1)).chain(even.first().map(|ray| (*ray, even.len())));
+        rays.map(|(ray, many)| {
+            let Asking { tally, whole, .. } = &asking[ray];
+            let weights = weights(&asking[ray]).map(|weight| weight * many as f32);
+            let mut peak = Peak { ray, at: FineCell::default(), weights, sends: 0.0 };
+            peak.sends = peak.weigh(whole) / measure;
+            let sent = |leaf: &usize| peak.weigh(&tally.sent(*leaf));
+            let most = (0..tally.at.len()).max_by(|a, b| sent(a).total_cmp(&sent(b)));
+            peak.at = tally.at[most.unwrap_or(0)];
+            peak
+        })
+        .collect()
+    }
+
+    fn weigh(&self, sent: &Moments) -> f32 {
+        sent.0.iter().zip(&self.weights).map(|(sent, weight)| sent * weight).sum()
+    }
+}
+
+fn largest(color: Rgb) -> f32 {
+    color.r.max(color.g).max(color.b)
+}
+
+/// What some of the points of all rays send, as parts of what all do.
+pub(super) fn parts(asking: &[Asking], of: fn(&Tally) -> &[f64; MOMENTS]) -> [f32; MOMENTS] {
+    std::array::from_fn(|k| {
+        let sum = |of: fn(&Tally) -> &[f64; MOMENTS]| asking.iter().map(|one| of(&one.tally)[k]).sum::<f64>();
+        let all = sum(|tally| &tally.all);
+        if all > 0.0 { (sum(of) / all) as f32 } else { 0.0 }
+    })
+}
