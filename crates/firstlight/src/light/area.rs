@@ -318,6 +318,11 @@ impl Area {
         self.shape.measure()
     }
 
+    /// What all of its points together stand for.
+    pub(crate) fn stands_for(&self) -> f32 {
+        if self.physical { self.measure() as f32 } else { 1.0 }
+    }
+
     /// Unit normal of the front, where all of it faces one way.
     pub(crate) fn normal(&self) -> Option<Vec3> {
         self.n

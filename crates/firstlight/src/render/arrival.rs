@@ -195,7 +195,7 @@ impl<'a> Arrivals<'a> {
         }
         // As it would be if it were integrated, in the unit of samples
         let emitter = Emitter::new(area);
-        let one = area.samples() as f32 / if area.physical { area.measure() as f32 } else { 1.0 };
+        let one = area.samples() as f32 / area.stands_for();
         let mut change = self.change_if_integrated(index, &emitter, place);
         change.bend = change.bend * one;
         // Each of a fixed set of points throws a hard shadow, which shows where they are few
@@ -499,7 +499,7 @@ impl<'a> Arrivals<'a> {
     /// What all points of area light `index` together stand for.
     pub fn measure(&self, index: usize) -> f32 {
         match &self.scene.lights[index].kind {
-            LightKind::Area(area) if area.physical => area.measure() as f32,
+            LightKind::Area(area) => area.stands_for(),
             _ => 1.0,
         }
     }
@@ -532,16 +532,22 @@ impl<'a> Arrivals<'a> {
         self.views.push(view);
     }
 
-    /// What arrives at one point, past anything, if that has a closed form.
-    pub fn in_closed_form(&mut self, index: usize, place: &ArrivalPlace, counts: &mut Counts) -> Option<Moments> {
+    /// What arrives at each place, past anything, if that has a closed form.
+    pub fn in_closed_form(
+        &mut self,
+        index: usize,
+        places: &[ArrivalPlace],
+        counts: &mut Counts,
+    ) -> Vec<Option<Moments>> {
         let mut seen = std::mem::take(&mut self.seen);
-        self.look(index, std::slice::from_ref(place), &mut seen, counts);
-        let (_, sighting) = seen[0];
-        self.seen = seen;
-        match sighting {
-            Sighting::Known(sums) => Some(sums),
+        self.look(index, places, &mut seen, counts);
+        let known = |(_, sighting): &(Change, Sighting)| match sighting {
+            Sighting::Known(sums) => Some(*sums),
             Sighting::Behind(_) => None,
-        }
+        };
+        let found = seen.iter().map(known).collect();
+        self.seen = seen;
+        found
     }
 
     /// Gathers what of the trees may be in the way of a light: from one point and what lies within `reach` of it, over

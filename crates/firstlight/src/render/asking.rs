@@ -55,10 +55,8 @@ impl Asking {
 
 /// The leaves of a light that rays ask points in.
 pub(super) struct AskedLeaves<'a> {
-    pub asker: Asker<'a>,
+    asker: Asker<'a>,
     pub leaves: Leaves,
-    /// What all of the light stands for.
-    measure: f32,
     /// How often the light was halved to make all of them, at least.
     pub everywhere: u32,
     /// The same of those near edges.
@@ -69,10 +67,9 @@ pub(super) struct AskedLeaves<'a> {
 
 impl<'a> AskedLeaves<'a> {
     /// Has all rays ask a point in each of so many.
-    pub fn new(asker: Asker<'a>, measure: f32, count: usize, asking: &mut [Asking], counts: &mut Counts) -> Self {
+    pub fn new(asker: Asker<'a>, count: usize, asking: &mut [Asking], counts: &mut Counts) -> Self {
         let level = count.ilog2();
-        let asked =
-            AskedLeaves { asker, leaves: Leaves::of(level), measure, everywhere: level, deep: level, is_raised: false };
+        let asked = AskedLeaves { asker, leaves: Leaves::of(level), everywhere: level, deep: level, is_raised: false };
         let first: Vec<AskedRung> = asking.iter().map(|one| asker.first(one.series, count)).collect();
         asking.iter_mut().zip(&first).for_each(|(one, rung)| one.tally.begin(&rung.cells));
         asked.ask(&first, None, &vec![u16::MAX; count / LANES], asking, counts);
@@ -122,7 +119,7 @@ impl<'a> AskedLeaves<'a> {
     /// says; whether there were any. That is told not by the points that were asked in them, but by others: to look
     /// closer at what is found to send much makes what is found less, and nothing makes it more.
     fn halve_heavy(&mut self, asking: &mut [Asking], counts: &mut Counts) -> bool {
-        let peaks: Vec<Peak> = Peak::of(asking, self.measure);
+        let peaks: Vec<Peak> = Peak::of(asking, self.asker.area.stands_for());
         let all: f32 = peaks.iter().map(|peak| peak.sends).sum();
         let heavy = HEAVY * all / (1u32 << self.everywhere) as f32;
         let every: Vec<u32> = (0..self.leaves.count() as u32).collect();

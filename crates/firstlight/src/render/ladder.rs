@@ -90,8 +90,8 @@ impl<'a> Asker<'a> {
         self.rung(series, 0, cells)
     }
 
-    /// One more point of a series in each of those cells that were halved, where each has its point in one of `at`; and
-    /// which of its points those are.
+    /// One more point of a series in each of those cells that were halved, or in more of them: see
+    /// [`asked`](Self::asked). `at` is where each leaf has its point.
     pub fn next(&self, series: usize, halved: &Halved, at: &[FineCell]) -> AskedRung<'a> {
         if Self::keeps(halved) {
             return self.rung(series, 1 << halved.level, 1 << halved.level);

@@ -137,19 +137,20 @@ fn total<S: Simd>(of: f32x16<S>) -> f32 {
 #[inline(always)]
 fn sum_of_runs<S: Simd>(simd: S, of: f32x16<S>, run: usize) -> f32x16<S> {
     let mut sums = of.to_array();
-    macro_rules! with {
-        ($other:literal) => {
-            if run > $other {
-                let half = sums;
-                sums = std::array::from_fn(|lane| half[lane] + half[lane ^ $other]);
-            }
-        };
-    }
-    with!(1);
-    with!(2);
-    with!(4);
-    with!(8);
+    add_halves::<1>(&mut sums, run);
+    add_halves::<2>(&mut sums, run);
+    add_halves::<4>(&mut sums, run);
+    add_halves::<8>(&mut sums, run);
     f32x16::simd_from(simd, sums)
+}
+
+/// Where runs are longer than `HALF`, adds what is in the other half of each run that is twice as long as that.
+#[inline(always)]
+fn add_halves<const HALF: usize>(sums: &mut [f32; LANES], run: usize) {
+    if run > HALF {
+        let half = *sums;
+        *sums = std::array::from_fn(|lane| half[lane] + half[lane ^ HALF]);
+    }
 }
 
 fn squared(v: f32) -> f32 {

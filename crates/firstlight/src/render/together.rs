@@ -318,14 +318,15 @@ impl Together {
     /// settle is asked in closed form.
     fn points(&self, arrivals: &mut Arrivals, asking: &mut [Asking], counts: &mut Counts) {
         let asker = arrivals.asker(self.light);
-        let measure = arrivals.measure(self.light);
+        let measure = asker.area.stands_for();
         let wanted = POINTS * self.share.sqrt();
+        // Half of them, as all are asked once more before edges are followed
         let first = ((0.5 * wanted / asking.len() as f32) as usize).next_power_of_two().max(FIRST);
         let tolerance = arrivals.tolerance_by_chance(self.share);
         let allowed = tolerance * DEVIATION;
         let part = 1.0 / self.rays as f32;
         let mut is_tried = false;
-        let mut asked = AskedLeaves::new(asker, measure, first, asking, counts);
+        let mut asked = AskedLeaves::new(asker, first, asking, counts);
         loop {
             asking.iter_mut().for_each(|one| one.tally.sum(asker.level, &asked.leaves));
             let shares = parts(asking, |tally| &tally.lit);
@@ -383,10 +384,9 @@ impl Together {
             // Errors shrink as they do where an edge is
             if !is_tried && error * of_edge(MOST as f64) > allowed * of_edge(points as f64) {
                 is_tried = true;
-                for one in asking.iter_mut() {
-                    let sums = arrivals.in_closed_form(self.light, &one.place(self.each), counts);
-                    one.known = sums;
-                }
+                let places: Vec<_> = asking.iter().map(|one| one.place(self.each)).collect();
+                let known = arrivals.in_closed_form(self.light, &places, counts);
+                asking.iter_mut().zip(known).for_each(|(one, known)| one.known = known);
                 if asking.iter().all(|one| one.known.is_some()) {
                     return;
                 }
