@@ -483,7 +483,7 @@ impl<'a> Arrivals<'a> {
         let mut together = Together::new(index, 1, place.share, 0, Rgb::BLACK);
         together.behind(place, view);
         together.hear_whole(whole);
-        together.settle(self, counts).sums
+        together.settle(&[], self, counts).sums
     }
 
     /// Area light `index`, as its points are asked for.

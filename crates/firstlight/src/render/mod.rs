@@ -16,6 +16,7 @@ mod change;
 mod counts;
 mod crowd;
 mod cut;
+mod evidence;
 mod fence;
 mod film;
 mod fragment;

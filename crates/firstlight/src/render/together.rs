@@ -7,6 +7,7 @@
 use super::Counts;
 use super::arrival::{ArrivalPlace, Arrivals, Sighting};
 use super::asking::{AskedLeaves, Asking, DEEPEST, MOST, parts};
+use super::evidence::{Evidence, Met};
 use super::fragment::most_asked;
 use super::ladder::FIRST;
 use super::packets::{PacketErrors, of_edge};
@@ -77,7 +78,7 @@ pub(crate) struct Together {
 }
 
 /// What all rays of a patch see of a light.
-#[derive(Clone, Copy, Debug)]
+#[derive(Debug)]
 pub(super) struct Outcome {
     /// Added up.
     pub terms: LightTerm,
@@ -86,6 +87,8 @@ pub(super) struct Outcome {
     /// The part of the light that is not hidden, by its points, the mean over the rays; no number where that is not
     /// known.
     pub share: f32,
+    /// What its points met, if any were asked.
+    pub evidence: Evidence,
 }
 
 /// Anything that other pixels have other values of, and other surfaces in them.
@@ -195,7 +198,7 @@ impl Together {
         let mut one = [self];
         Together::tell(&mut one, arrivals, counts);
         let [one] = one;
-        one.settle(arrivals, counts)
+        one.settle(&[], arrivals, counts)
     }
 
     /// Has the rays of some patches, which ask the same light, told all that batches know of it.
@@ -294,11 +297,12 @@ impl Together {
         }
     }
 
-    /// Asks points of the light, as it is known by now what batches know.
-    pub fn settle(mut self, arrivals: &mut Arrivals, counts: &mut Counts) -> Outcome {
+    /// Asks points of the light, as it is known by now what batches know, and what the points of patches `around` met.
+    pub fn settle(mut self, around: &[&Evidence], arrivals: &mut Arrivals, counts: &mut Counts) -> Outcome {
+        let mut evidence = Evidence::default();
         if !self.asking.is_empty() {
             let mut asking = std::mem::take(&mut self.asking);
-            self.points(arrivals, &mut asking, counts);
+            evidence = self.points(around, arrivals, &mut asking, counts);
             let shares = parts(&asking, |tally| &tally.lit);
             for one in asking {
                 let place = one.place(self.each);
@@ -311,12 +315,19 @@ impl Together {
                 arrivals.keep(one.view);
             }
         }
-        Outcome { terms: self.terms, sums: self.sums, share: self.shares / self.sharing.max(1) as f32 }
+        let share = self.shares / self.sharing.max(1) as f32;
+        Outcome { terms: self.terms, sums: self.sums, share, evidence }
     }
 
-    /// Asks points of the light, more and more, until what they say together will do. What the most will not
-    /// settle is asked in closed form.
-    fn points(&self, arrivals: &mut Arrivals, asking: &mut [Asking], counts: &mut Counts) {
+    /// Asks points of the light, more and more, until what they say together will do, and says what they met. What the
+    /// most will not settle is asked in closed form.
+    fn points(
+        &self,
+        around: &[&Evidence],
+        arrivals: &mut Arrivals,
+        asking: &mut [Asking],
+        counts: &mut Counts,
+    ) -> Evidence {
         let asker = arrivals.asker(self.light);
         let measure = asker.area.stands_for();
         let wanted = POINTS * self.share.sqrt();
@@ -326,6 +337,7 @@ impl Together {
         let allowed = tolerance * DEVIATION;
         let part = 1.0 / self.rays as f32;
         let mut is_tried = false;
+        let mut evidence = Evidence::new(asking[0].si.p);
         let mut asked = AskedLeaves::new(asker, first, asking, counts);
         loop {
             asking.iter_mut().for_each(|one| one.tally.sum(asker.level, &asked.leaves));
@@ -351,6 +363,11 @@ impl Together {
                 is_hidden |= one.tally.hidden > 0.0;
                 sent += one.whole;
             }
+            let met = Met {
+                points: effective.map(|points| points as f32),
+                surprises: parts(asking, |tally| &tally.surprises),
+            };
+            evidence.note(asked.everywhere, met);
             let steps = arrivals.display_steps();
             let shows = |error: Rgb| steps.of_color(value * part, error * part);
             // What few points send, or none, can be anything
@@ -363,23 +380,23 @@ impl Together {
             let one = |k: usize| all[k] * (1.0 / effective[k].max(1.0) as f32);
             let is_clear = found >= f64::from(wanted) * CLEAR && shows(sum(&one)) <= UNMET;
             if is_told && !is_hidden && (is_clear || asked.leaves.count() >= MANY) {
-                return;
+                return evidence;
             }
             // As much as packets are wrong by, and what nobody met. Of small things that are in the way each point says
             // what it sends; where leaves near those that were found are smaller, all that were not found are missing
             let tallies: Vec<&Tally> = asking.iter().map(|one| &one.tally).collect();
             let packets = PacketErrors::of(asker.level, &tallies, &asked.leaves, measure, &sent);
-            let surprises = parts(asking, |tally| &tally.surprises);
-            let met = |k: usize| surprises[k] + 1.0 / effective[k].max(1.0) as f32;
-            let noise = |k: usize| (met(k) / effective[k].max(1.0) as f32).sqrt();
-            let overlooked = OVERLOOKED * shows(sum(&|k| all[k] * met(k)));
+            let leaf = asker.area.measure() as f32 / (1u64 << asked.everywhere) as f32;
+            let met: [f32; MOMENTS] = std::array::from_fn(|k| evidence.overlooked(k, around, leaf));
+            let noise = |k: usize| (met[k] / effective[k].max(1.0) as f32).sqrt();
+            let overlooked = OVERLOOKED * shows(sum(&|k| all[k] * met[k]));
             let unmet = shows(sum(&|k| all[k] * noise(k).max(packets.smooth[k])));
             let unmet = if asked.deep == asked.everywhere { unmet } else { unmet.max(overlooked) };
             let edges = shows(sum(&|k| all[k] * packets.edges[k]));
             let points = asked.leaves.count() * asking.len();
             let error = edges.max(unmet);
             if is_told && error <= allowed {
-                return;
+                return evidence;
             }
             // Errors shrink as they do where an edge is
             if !is_tried && error * of_edge(MOST as f64) > allowed * of_edge(points as f64) {
@@ -388,11 +405,11 @@ impl Together {
                 let known = arrivals.in_closed_form(self.light, &places, counts);
                 asking.iter_mut().zip(known).for_each(|(one, known)| one.known = known);
                 if asking.iter().all(|one| one.known.is_some()) {
-                    return;
+                    return evidence;
                 }
             }
             if points >= MOST || asked.deep > DEEPEST {
-                return;
+                return evidence;
             }
             // More everywhere as long as there is room for more near edges
             let is_raised = !is_told || unmet.max(overlooked) > allowed || !asked.is_raised;
