@@ -336,8 +336,8 @@ impl Area {
     }
 
     /// The points that stand for some places of the unit square.
-    pub(crate) fn points_at(&self, places: &[[f64; 2]]) -> Points {
-        Points::new(&self.shape, places.iter().copied())
+    pub(crate) fn points_at(&self, places: impl ExactSizeIterator<Item = [f64; 2]>) -> Points {
+        Points::new(&self.shape, places)
     }
 
     /// Sampled point `k`, world space.

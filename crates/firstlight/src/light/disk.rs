@@ -1,14 +1,10 @@
 //! Disk lights.
 
-use std::f64::consts::FRAC_PI_4;
-
-use pxfm::f_sincos;
-
 use super::Light;
 use super::area::{AreaShape, area_table, front};
 use crate::context::{CompileContext, show};
 use crate::describe::SamplesDesc;
-use crate::math::{Axes, DRay, DVec3, Ray};
+use crate::math::{Axes, DRay, DVec3, Ray, sin_cos_of_turns};
 use crate::shape::Disk;
 use crate::transform::TransformDesc;
 
@@ -130,8 +126,8 @@ fn concentric([x, y]: [f64; 2]) -> [f64; 2] {
     if x == 0.0 && y == 0.0 {
         return [0.0; 2];
     }
-    let (r, angle) = if x.abs() > y.abs() { (x, FRAC_PI_4 * (y / x)) } else { (y, FRAC_PI_4 * (2.0 - x / y)) };
-    let (sin, cos) = f_sincos(angle);
+    let (r, turns) = if x.abs() > y.abs() { (x, 0.125 * (y / x)) } else { (y, 0.125 * (2.0 - x / y)) };
+    let (sin, cos) = sin_cos_of_turns(turns);
     [r * cos, r * sin]
 }
 

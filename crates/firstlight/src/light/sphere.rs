@@ -1,14 +1,10 @@
 //! Sphere lights.
 
-use std::f64::consts::TAU;
-
-use pxfm::f_sincos;
-
 use super::Light;
 use super::area::{AreaShape, area_table};
 use crate::context::{CompileContext, show};
 use crate::describe::SamplesDesc;
-use crate::math::DVec3;
+use crate::math::{DVec3, sin_cos_of_turns};
 use crate::shape::{Sphere, SphereUv};
 use crate::transform::TransformDesc;
 
@@ -85,7 +81,7 @@ impl SphereLight {
     pub(super) fn normal([a, b]: [f64; 2]) -> DVec3 {
         let z = 1.0 - 2.0 * a;
         let ring = (4.0 * a * (1.0 - a)).sqrt();
-        let (sin, cos) = f_sincos(TAU * b);
+        let (sin, cos) = sin_cos_of_turns(b);
         DVec3::new(ring * cos, ring * sin, z)
     }
 }

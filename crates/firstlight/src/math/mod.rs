@@ -21,7 +21,7 @@ pub(crate) use ray::{DRay, ErrorBound, Facet, Ray};
 pub use ray::{ShadowRay, WorldRay};
 pub(crate) use roots::{bracketed, depressed_cubic};
 pub(crate) use sum::{LANES, LaneSum};
-pub(crate) use trig::{asin, sin_cos};
+pub(crate) use trig::{asin, sin_cos, sin_cos_of_turns};
 
 pub use glam::{DAffine3, DMat3, DQuat, DVec3, Vec2, Vec3};
 
