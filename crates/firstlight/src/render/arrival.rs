@@ -11,6 +11,7 @@ use super::ladder::Asker as LadderAsker;
 use super::lights::Lights;
 use super::resolve::LightTerm;
 use super::sampled::Sampled;
+use super::tally::Tally;
 use super::together::Together;
 use crate::color::{DisplaySteps, Rgb};
 use crate::ids::LightId;
@@ -76,6 +77,8 @@ pub(crate) struct Arrivals<'a> {
     pub(super) occluders: Occluders,
     /// Views that are not used any more.
     views: Vec<ShadowView>,
+    /// Tallies as well.
+    tallies: Vec<Tally>,
     indices: Vec<u32>,
     /// In display steps: how far one light may be wrong at a place.
     allowed: f32,
@@ -105,6 +108,7 @@ impl<'a> Arrivals<'a> {
             settler: Settler::default(),
             occluders: Occluders::default(),
             views: Vec::new(),
+            tallies: Vec::new(),
             indices: Vec::new(),
             allowed: lights.allowed,
         }
@@ -530,6 +534,16 @@ impl<'a> Arrivals<'a> {
     /// Takes a view back, for its memory.
     pub fn keep(&mut self, view: ShadowView) {
         self.views.push(view);
+    }
+
+    /// An empty tally.
+    pub fn tally(&mut self) -> Tally {
+        self.tallies.pop().unwrap_or_default()
+    }
+
+    /// Takes a tally back, for its memory.
+    pub fn keep_tally(&mut self, tally: Tally) {
+        self.tallies.push(tally);
     }
 
     /// What arrives at each place, past anything, if that has a closed form.

@@ -16,6 +16,8 @@ use crate::visibility::{ShadowView, Viewpoint};
 
 /// Leaves that send so many times as much as others do in the mean are halved first.
 const HEAVY: f32 = 2.0;
+/// The points of all rays up to which all leaves are of one size.
+const EVENLY: usize = 1 << 12;
 /// The points that a light is told by at most, of all rays of a pixel.
 pub(super) const MOST: usize = 1 << 16;
 /// The level of the smallest leaves.
@@ -71,15 +73,24 @@ impl<'a> AskedLeaves<'a> {
         let level = count.ilog2();
         let asked = AskedLeaves { asker, leaves: Leaves::of(level), everywhere: level, deep: level, is_raised: false };
         let first: Vec<AskedRung> = asking.iter().map(|one| asker.first(one.series, count)).collect();
-        asking.iter_mut().zip(&first).for_each(|(one, rung)| one.tally.begin(&rung.cells));
-        asked.ask(&first, None, &vec![u16::MAX; count / LANES], asking, counts);
+        asked.look(&first, &vec![u16::MAX; count / LANES], asking, counts);
+        for (one, rung) in asking.iter_mut().zip(&first) {
+            one.tally.fill(&asker, rung, &one.view, &one.si, &one.lobe);
+        }
         asked
     }
 
     /// Halves leaves, and has all rays ask one more point in each that is halved: those `near` edges down to one size,
-    /// and then to a smaller one; or, to raise the number of all, heavy ones, and if there is none, the largest.
+    /// and then to a smaller one; or, to raise the number of all, the largest, once there are many heavy ones first.
     pub fn halve(&mut self, near: &CellBits, is_raised: bool, asking: &mut [Asking], counts: &mut Counts) {
-        if is_raised && self.halve_heavy(asking, counts) {
+        // What many points say is worth more than which of few say much, and in leaves of one size they cost little
+        let is_even = self.leaves.count() == 1 << self.everywhere && Asker::keeps(self.everywhere);
+        let are_few = self.leaves.count() * asking.len() < EVENLY;
+        if is_raised && !(is_even && are_few) && self.halve_heavy(asking, counts) {
+            return;
+        }
+        if is_raised && is_even {
+            self.double(near, asking, counts);
             return;
         }
         let is_near = |leaf: usize| is_in(near, leaf);
@@ -98,6 +109,21 @@ impl<'a> AskedLeaves<'a> {
         });
     }
 
+    /// Halves all leaves, where they are of one size.
+    fn double(&mut self, near: &CellBits, asking: &mut [Asking], counts: &mut Counts) {
+        let count = self.leaves.count();
+        let second: Vec<AskedRung> = asking.iter().map(|one| self.asker.second(one.series, count)).collect();
+        self.look(&second, &vec![u16::MAX; count / LANES], asking, counts);
+        for (one, second) in asking.iter_mut().zip(&second) {
+            let both = self.asker.first(one.series, 2 * count);
+            one.tally.double(&self.asker, second, &both, near, &mut one.view, &one.si, &one.lobe);
+        }
+        self.everywhere += 1;
+        self.deep = self.deep.max(self.everywhere);
+        self.is_raised = true;
+        self.leaves = Leaves::of(self.everywhere);
+    }
+
     /// Halves leaves as [`Leaves::halve`] says, and has all rays ask one more point in each.
     fn halve_those(
         &mut self,
@@ -105,14 +131,18 @@ impl<'a> AskedLeaves<'a> {
         counts: &mut Counts,
         is: impl Fn(usize, u32) -> Option<bool>,
     ) -> (Vec<u32>, Vec<Halved>) {
-        let (from, halved) = self.leaves.halve(is);
-        asking.iter_mut().for_each(|one| one.tally.halve(&from));
+        let (parted, halved) = self.leaves.halve(is);
+        asking.iter_mut().for_each(|one| one.tally.halve(&parted));
         for halved in &halved {
             let next = |one: &Asking| self.asker.next(one.series, halved, &one.tally.at);
             let next: Vec<AskedRung> = asking.iter().map(next).collect();
-            self.ask(&next, Some(halved), &Asker::asked(halved), asking, counts);
+            let points = Asker::asked(halved);
+            self.look(&next, &points, asking, counts);
+            for (one, rung) in asking.iter_mut().zip(&next) {
+                one.tally.ask(&self.asker, rung, halved, &points, &one.view, &one.si, &one.lobe);
+            }
         }
-        (from, halved)
+        (parted, halved)
     }
 
     /// Halves those leaves, and their halves, that send so much more to all rays together than others as [`HEAVY`]
@@ -127,13 +157,14 @@ impl<'a> AskedLeaves<'a> {
         let mut is_any = false;
         while self.leaves.count() * asking.len() < MOST {
             let is_heavy = |leaf: usize, level: u32| (worth[leaf] > heavy && level < DEEPEST).then_some(false);
-            let (from, halved) = self.halve_those(asking, counts, is_heavy);
+            let (parted, halved) = self.halve_those(asking, counts, is_heavy);
             if halved.is_empty() {
                 break;
             }
             is_any = true;
-            worth.resize(from.len(), 0.0);
-            follow(&mut worth, &from);
+            let before = worth.len();
+            worth.resize(before + parted.len(), 0.0);
+            follow(&mut worth, before, &parted);
             let first = halved.iter().flat_map(|halved| &halved.first);
             let halves: Vec<u32> = first.flat_map(|first| [*first, first + 1]).collect();
             for (leaf, new) in halves.iter().zip(self.worth(&peaks, asking, &halves)) {
@@ -148,8 +179,8 @@ impl<'a> AskedLeaves<'a> {
         let mut worth = vec![0.0; leaves.len()];
         for peak in peaks {
             let one = &asking[peak.ray];
-            let places: Vec<_> = leaves.iter().map(|leaf| self.leaves.nearest(*leaf as usize, peak.at)).collect();
-            let sent = would_send(&self.asker, &self.asker.area.points_at(&places), &one.si, &one.lobe);
+            let places = leaves.iter().map(|leaf| self.leaves.nearest(*leaf as usize, peak.at));
+            let sent = would_send(&self.asker, &self.asker.area.points_at(places), &one.si, &one.lobe);
             for ((worth, leaf), sent) in worth.iter_mut().zip(leaves).zip(&sent) {
                 *worth += peak.weigh(sent) * self.leaves.parts[*leaf as usize];
             }
@@ -157,26 +188,16 @@ impl<'a> AskedLeaves<'a> {
         worth
     }
 
-    /// Has each ray ask those of the points of its rung that are `asked`.
-    fn ask(
-        &self,
-        rungs: &[AskedRung],
-        halved: Option<&Halved>,
-        asked: &[u16],
-        asking: &mut [Asking],
-        counts: &mut Counts,
-    ) {
+    /// Finds what lies in trees and hides those of the points of each ray's rung that are `asked`.
+    fn look(&self, rungs: &[AskedRung], asked: &[u16], asking: &mut [Asking], counts: &mut Counts) {
         let asker = &self.asker;
         let mut beams: Vec<RungRays> = Vec::new();
         for (one, rung) in asking.iter_mut().zip(rungs).filter(|(one, _)| one.view.trees) {
             beams.push(RungRays { point: Viewpoint::of(&one.si), rung, hidden: &mut one.view.hidden });
         }
         counts.settled.traced += beams::trace(asker.scene, asker.target.light, asked, &mut beams);
-        for (one, rung) in asking.iter_mut().zip(rungs) {
-            if !one.view.trees {
-                counts.settled.traced += asker.mask(rung, asked, &mut one.view, &Viewpoint::of(&one.si));
-            }
-            one.tally.ask(asker, rung, halved, asked, &one.view, &one.si, &one.lobe);
+        for (one, rung) in asking.iter_mut().zip(rungs).filter(|(one, _)| !one.view.trees) {
+            counts.settled.traced += asker.mask(rung, asked, &mut one.view, &Viewpoint::of(&one.si));
         }
         let points = asked.iter().map(|bits| u64::from(bits.count_ones())).sum::<u64>() * asking.len() as u64;
         counts.shadow_rays += points;

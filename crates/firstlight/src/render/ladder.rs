@@ -31,6 +31,8 @@ pub(super) struct Rung {
     pub points: Points,
     /// Where they are.
     pub cells: Vec<FineCell>,
+    /// Which half of its cell each point lies in, as bits.
+    pub halves: CellBits,
     target: OnceLock<Target>,
 }
 
@@ -63,14 +65,30 @@ pub(super) fn cells_in(bits: &[u16]) -> impl Iterator<Item = usize> {
     bits.iter().enumerate().flat_map(lanes)
 }
 
+/// Bits of a block of cells as those of two blocks of halves: of each cell the first or, where `second` says so, the
+/// second.
+pub(super) fn to_halves(bits: u16, second: u16) -> [u16; 2] {
+    let halves = spaced(bits & !second) | spaced(bits & second) << 1;
+    [halves as u16, (halves >> LANES) as u16]
+}
+
+/// A number whose every second digit, from the last on, are those of another.
+fn spaced(digits: u16) -> u32 {
+    let mut digits = u32::from(digits);
+    digits = (digits | digits << 8) & 0x00ff_00ff;
+    digits = (digits | digits << 4) & 0x0f0f_0f0f;
+    digits = (digits | digits << 2) & 0x3333_3333;
+    (digits | digits << 1) & 0x5555_5555
+}
+
 /// Whether a cell is in a set.
 pub(super) fn is_in(bits: &[u16], cell: usize) -> bool {
     bits[cell / LANES] >> (cell % LANES) & 1 == 1
 }
 
 impl Rung {
-    fn new(area: &Area, cells: Vec<FineCell>, places: &[[f64; 2]]) -> Box<Rung> {
-        Box::new(Rung { points: area.points_at(places), cells, target: OnceLock::new() })
+    fn new(cells: Vec<FineCell>, halves: CellBits, points: Points) -> Box<Rung> {
+        Box::new(Rung { points, cells, halves, target: OnceLock::new() })
     }
 }
 
@@ -90,21 +108,26 @@ impl<'a> Asker<'a> {
         self.rung(series, 0, cells)
     }
 
+    /// One more point of a series in each of so many cells, where the first ones are asked.
+    pub fn second(&self, series: usize, cells: usize) -> AskedRung<'a> {
+        self.rung(series, cells, cells)
+    }
+
     /// One more point of a series in each of those cells that were halved, or in more of them: see
     /// [`asked`](Self::asked). `at` is where each leaf has its point.
     pub fn next(&self, series: usize, halved: &Halved, at: &[FineCell]) -> AskedRung<'a> {
-        if Self::keeps(halved) {
-            return self.rung(series, 1 << halved.level, 1 << halved.level);
+        if Self::keeps(halved.level) {
+            return self.second(series, 1 << halved.level);
         }
         let second = |first: &u32| at[*first as usize].second(series, halved.level);
         let cells: Vec<_> = halved.first.iter().map(second).collect();
-        let places: Vec<_> = cells.iter().map(|cell| cell.middle()).collect();
-        AskedRung::Made(Rung::new(self.area, cells, &places))
+        let points = self.area.points_at(cells.iter().map(|cell| cell.middle()));
+        AskedRung::Made(Rung::new(cells, CellBits::new(), points))
     }
 
     /// Which of the points of [`next`](Self::next) are asked.
     pub fn asked(halved: &Halved) -> CellBits {
-        if Self::keeps(halved) {
+        if Self::keeps(halved.level) {
             return halved.bits();
         }
         let mut bits = vec![u16::MAX; halved.cells.len().div_ceil(LANES)];
@@ -115,8 +138,9 @@ impl<'a> Asker<'a> {
         bits
     }
 
-    fn keeps(halved: &Halved) -> bool {
-        2 << halved.level <= LAST
+    /// Whether points in all cells of a level, and one more in each, are kept.
+    pub fn keeps(level: u32) -> bool {
+        2 << level <= LAST
     }
 
     /// The first point of a series in one of so many cells.
@@ -128,7 +152,14 @@ impl<'a> Asker<'a> {
         let kept = &self.ladder.series[series][(count / FIRST).ilog2() as usize][usize::from(first > 0)];
         AskedRung::Kept(kept.get_or_init(|| {
             let places = series_by_cell(series, first as u32, count as u32);
-            Rung::new(self.area, places.iter().copied().map(FineCell::of).collect(), &places)
+            let points = self.area.points_at(places.iter().copied());
+            let cells: Vec<FineCell> = places.into_iter().map(FineCell::of).collect();
+            let half = |block: &[FineCell]| {
+                let bits = block.iter().enumerate().map(|(lane, cell)| (cell.half(count.ilog2()) as u16) << lane);
+                bits.fold(0, |all, bit| all | bit)
+            };
+            let halves = cells.chunks(LANES).map(half).collect();
+            Rung::new(cells, halves, points)
         }))
     }
 
@@ -141,5 +172,18 @@ impl<'a> Asker<'a> {
         }
         let target = rung.target.get_or_init(|| self.target.with_neighbours(&rung.points));
         view.mask(self.level, self.scene, target, Some(asked), point)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bits_of_cells_become_those_of_halves() {
+        assert_eq!(to_halves(0b1011, 0b0010), [0b0100_1001, 0]);
+        assert_eq!(to_halves(0x8001, 0x8000), [1, 0x8000]);
+        let [first, second] = [0, u16::MAX].map(|second| to_halves(u16::MAX, second));
+        assert_eq!((first, second), ([0x5555; 2], [0xaaaa; 2]));
     }
 }

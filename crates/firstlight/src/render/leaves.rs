@@ -55,27 +55,26 @@ impl Leaves {
         self.parts.resize(self.count().next_multiple_of(LANES), 0.0);
     }
 
-    /// Halves those leaves of which `is` says whether they are away from edges, by their number and level. Says from
-    /// which leaf each comes, and which of each size were halved.
+    /// Halves those leaves of which `is` says whether they are away from edges, by their number and level. Says which
+    /// they were, and which of each size.
     pub fn halve(&mut self, is: impl Fn(usize, u32) -> Option<bool>) -> (Vec<u32>, Vec<Halved>) {
-        let (mut from, mut halved) = (Vec::with_capacity(2 * self.count()), Vec::<Halved>::new());
+        let (mut parted, mut halved) = (Vec::new(), Vec::<Halved>::new());
         for (leaf, (cell, level)) in self.cells.iter().zip(&self.levels).enumerate() {
-            if let Some(away) = is(leaf, *level) {
-                let of = halved.iter().position(|halved| halved.level == *level).unwrap_or_else(|| {
-                    halved.push(Halved { level: *level, ..Halved::default() });
-                    halved.len() - 1
-                });
-                halved[of].cells.push(cell.part_of(1 << level) as u64);
-                halved[of].first.push(from.len() as u32);
-                halved[of].away.push(away);
-                from.push(leaf as u32);
-            }
-            from.push(leaf as u32);
+            let Some(away) = is(leaf, *level) else { continue };
+            let of = halved.iter().position(|halved| halved.level == *level).unwrap_or_else(|| {
+                halved.push(Halved { level: *level, ..Halved::default() });
+                halved.len() - 1
+            });
+            halved[of].cells.push(cell.part_of(1 << level) as u64);
+            halved[of].first.push((leaf + parted.len()) as u32);
+            halved[of].away.push(away);
+            parted.push(leaf as u32);
         }
-        self.cells.resize(from.len(), FineCell::default());
-        self.levels.resize(from.len(), 0);
-        follow(&mut self.cells, &from);
-        follow(&mut self.levels, &from);
+        let before = self.count();
+        self.cells.resize(before + parted.len(), FineCell::default());
+        self.levels.resize(before + parted.len(), 0);
+        follow(&mut self.cells, before, &parted);
+        follow(&mut self.levels, before, &parted);
         for Halved { level, cells, first, .. } in &halved {
             for (cell, first) in cells.iter().zip(first) {
                 for half in 0..2 {
@@ -86,7 +85,7 @@ impl Leaves {
             }
         }
         self.weigh();
-        (from, halved)
+        (parted, halved)
     }
 }
 
@@ -101,10 +100,16 @@ impl Halved {
     }
 }
 
-/// Moves numbers, leaf by leaf, to where halved leaves have them: each new one is that of `from`.
-pub(super) fn follow<T: Copy>(of: &mut [T], from: &[u32]) {
-    for (leaf, from) in from.iter().enumerate().rev().take_while(|(leaf, from)| *leaf != **from as usize) {
-        of[leaf] = of[*from as usize];
+/// Moves the numbers of so many leaves to where these are once some are `parted`, and gives both halves those of the
+/// whole.
+pub(super) fn follow<T: Copy>(of: &mut [T], count: usize, parted: &[u32]) {
+    let mut end = count;
+    for (before, leaf) in parted.iter().enumerate().rev() {
+        let leaf = *leaf as usize;
+        of.copy_within(leaf + 1..end, leaf + before + 2);
+        let whole = of[leaf];
+        of[leaf + before..leaf + before + 2].fill(whole);
+        end = leaf;
     }
 }
 
@@ -115,12 +120,14 @@ mod tests {
     #[test]
     fn leaves_fill_the_light_in_order() {
         let mut leaves = Leaves::of(4);
-        let (from, halved) = leaves.halve(|leaf, _| [0, 5, 15].contains(&leaf).then_some(true));
+        let mut numbers: Vec<usize> = (0..19).collect();
+        let (parted, halved) = leaves.halve(|leaf, _| [0, 5, 15].contains(&leaf).then_some(true));
+        follow(&mut numbers, 16, &parted);
         assert_eq!(
             (halved[0].level, &halved[0].cells[..], &halved[0].first[..]),
             (4, &[0, 5, 15][..], &[0, 6, 17][..])
         );
-        assert_eq!((&from[..3], &from[17..]), (&[0, 0, 1][..], &[15, 15][..]));
+        assert_eq!((&numbers[..9], &numbers[17..]), (&[0, 0, 1, 2, 3, 4, 5, 5, 6][..], &[15, 15][..]));
         let (_, halved) = leaves.halve(|leaf, _| [1, 6, 8].contains(&leaf).then_some(true));
         assert_eq!(
             halved.iter().map(|halved| (halved.level, halved.cells.len())).collect::<Vec<_>>(),

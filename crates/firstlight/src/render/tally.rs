@@ -10,7 +10,7 @@
 
 use fearless_simd::{Level, dispatch, f32x16, mask32x16, prelude::*};
 
-use super::ladder::{Asker, Rung};
+use super::ladder::{Asker, CellBits, Rung, cells_in, to_halves};
 use super::lanes::PointObstacles;
 use super::leaves::{Halved, Leaves, follow};
 use crate::light::{Area, FineCell, MIN_DISTANCE2, Points};
@@ -110,19 +110,103 @@ impl Tally {
         }
     }
 
-    /// Asks for that many leaves from now on, each of which holds a point at one of these places.
-    pub fn begin(&mut self, places: &[FineCell]) {
-        self.at.extend_from_slice(places);
-        self.numbers().for_each(|numbers| numbers.resize(places.len().next_multiple_of(LANES), 0.0));
+    /// Hears what all points of a rung say, one in each of as many leaves, and forgets what was known. `view` says what
+    /// is hidden in trees, point by point.
+    pub fn fill(&mut self, asker: &Asker, rung: &Rung, view: &ShadowView, si: &SurfaceInteraction, lobe: &Lobe) {
+        let count = rung.cells.len();
+        self.at.clear();
+        self.at.extend_from_slice(&rung.cells);
+        self.numbers().for_each(|numbers| numbers.resize(count, 0.0));
+        self.surprises = Default::default();
+        let obstacles = PointObstacles::of(view);
+        dispatch!(asker.level, simd => self.fill_lanes(simd, asker.area, &rung.points, si, lobe, &obstacles));
     }
 
-    /// Follows leaves that were halved, each of which comes from one of these.
-    pub fn halve(&mut self, from: &[u32]) {
-        self.at.resize(from.len(), FineCell::default());
-        follow(&mut self.at, from);
+    #[inline(always)]
+    fn fill_lanes<S: Simd>(
+        &mut self,
+        simd: S,
+        area: &Area,
+        points: &Points,
+        si: &SurfaceInteraction,
+        lobe: &Lobe,
+        obstacles: &PointObstacles,
+    ) {
+        let place = PlaceLanes::new(simd, area, si);
+        for block in 0..points.blocks.len() {
+            let BlockAnswers { sent, sends, hides } = place.ask(simd, area, points, block, lobe, obstacles);
+            let lanes = block * LANES..(block + 1) * LANES;
+            for (all, sent) in self.sent.iter_mut().zip(&sent) {
+                all[lanes.clone()].copy_from_slice(sent);
+            }
+            let one_where = |bits: u16| {
+                let is = mask32x16::from_bitmask(simd, bits.into());
+                is.select(simd.splat_f32x16(1.0), simd.splat_f32x16(0.0))
+            };
+            one_where(sends).store_slice(&mut self.sends[lanes.clone()]);
+            one_where(hides).store_slice(&mut self.hides[lanes]);
+        }
+    }
+
+    /// Which leaves send, and which are hidden.
+    fn bits(&self) -> [CellBits; 2] {
+        [&self.sends, &self.hides].map(|numbers| {
+            let bit = |(lane, v): (usize, &f32)| u16::from(*v > 0.0) << lane;
+            let block = |block: &[f32]| block.iter().enumerate().map(bit).fold(0, |all, bit| all | bit);
+            numbers.chunks_exact(LANES).map(block).collect()
+        })
+    }
+
+    /// Hears one more point in each leaf, where all are cells of one size: `second`, of which `view` says what is
+    /// hidden in trees. `both` are those and the ones that are known, in half as large cells. `near` are leaves near
+    /// edges.
+    #[allow(clippy::too_many_arguments, reason = "points of a light, and a surface that it shines on")]
+    pub fn double(
+        &mut self,
+        asker: &Asker,
+        second: &Rung,
+        both: &Rung,
+        near: &[u16],
+        view: &mut ShadowView,
+        si: &SurfaceInteraction,
+        lobe: &Lobe,
+    ) {
+        let [sends, hides] = self.bits();
+        if !view.hidden.is_empty() {
+            let new = view.hidden.iter().zip(&second.halves).map(|(hidden, halves)| to_halves(*hidden, *halves));
+            let old = hides.iter().zip(&second.halves).map(|(hidden, halves)| to_halves(*hidden, !halves));
+            view.hidden = new.zip(old).flat_map(|(new, old)| [new[0] | old[0], new[1] | old[1]]).collect();
+        }
+        self.fill(asker, both, view, si, lobe);
+        // What contradicts what leaves held that were thought to be away from edges
+        let [new_sends, new_hides] = self.bits();
+        let whole = |bits: u16| {
+            let [first, second] = [0, u16::MAX].map(|second| to_halves(bits, second));
+            [first[0] | second[0], first[1] | second[1]]
+        };
+        let part = 1.0 / self.at.len() as f64;
+        for (block, near) in near.iter().enumerate() {
+            let [sends, hides, near] = [sends[block], hides[block], *near].map(whole);
+            for half in 0..2 {
+                let leaves = 2 * block + half;
+                let is_other = !(sends[half] ^ new_sends[leaves]) & (hides[half] ^ new_hides[leaves]) & !near[half];
+                for leaf in cells_in(&[is_other]) {
+                    let sent = self.sent(leaves * LANES + leaf);
+                    self.surprises.iter_mut().zip(sent.0).for_each(|(sum, sent)| *sum += f64::from(sent) * part);
+                }
+            }
+        }
+    }
+
+    /// Follows leaves that were halved.
+    pub fn halve(&mut self, parted: &[u32]) {
+        let before = self.at.len();
+        let count = before + parted.len();
+        self.at.resize(count, FineCell::default());
+        follow(&mut self.at, before, parted);
         for numbers in self.numbers() {
-            numbers.resize(from.len().next_multiple_of(LANES), 0.0);
-            follow(numbers, from);
+            numbers.resize(count.next_multiple_of(LANES), 0.0);
+            follow(numbers, before, parted);
         }
     }
 
@@ -130,15 +214,14 @@ impl Tally {
         self.sent.iter_mut().chain([&mut self.sends, &mut self.hides])
     }
 
-    /// Hears what those points of a rung say that are `asked`: of each leaf the first time, or one for each of those
-    /// that were halved, in place of what the half that it is in holds. `view` says what is hidden in trees, point by
-    /// point.
+    /// Hears what those points of a rung say that are `asked`, one for each of the leaves that were halved, in place of
+    /// what the half that it is in holds. `view` says what is hidden in trees, point by point.
     #[allow(clippy::too_many_arguments, reason = "points of a light, and a surface that it shines on")]
     pub fn ask(
         &mut self,
         asker: &Asker,
         rung: &Rung,
-        halved: Option<&Halved>,
+        halved: &Halved,
         asked: &[u16],
         view: &ShadowView,
         si: &SurfaceInteraction,
@@ -160,7 +243,7 @@ impl Tally {
         simd: S,
         area: &Area,
         rung: &Rung,
-        halved: Option<&Halved>,
+        halved: &Halved,
         asked: &[u16],
         si: &SurfaceInteraction,
         lobe: &Lobe,
@@ -174,12 +257,12 @@ impl Tally {
                 let lane = rest.trailing_zeros() as usize % LANES;
                 rest &= rest - 1;
                 let at = rung.cells[block * LANES + lane];
-                let leaf = halved.map_or(next, |halved| halved.first[next] as usize + at.half(halved.level));
+                let leaf = halved.first[next] as usize + at.half(halved.level);
                 next += 1;
                 self.at[leaf] = at;
                 let [sends, hides] = [answers.sends, answers.hides].map(|bits| f32::from(bits >> lane & 1));
                 let is_surprise = sends == self.sends[leaf] && hides != self.hides[leaf];
-                if let Some(halved) = halved.filter(|halved| is_surprise && halved.away[next - 1]) {
+                if is_surprise && halved.away[next - 1] {
                     let part = 0.5 / (1u64 << halved.level) as f64;
                     self.surprises
                         .iter_mut()

@@ -302,6 +302,7 @@ impl Together {
         let mut evidence = Evidence::default();
         if !self.asking.is_empty() {
             let mut asking = std::mem::take(&mut self.asking);
+            asking.iter_mut().for_each(|one| one.tally = arrivals.tally());
             evidence = self.points(around, arrivals, &mut asking, counts);
             let shares = parts(&asking, |tally| &tally.lit);
             for one in asking {
@@ -313,6 +314,7 @@ impl Together {
                 }
                 self.add(&place, &sums);
                 arrivals.keep(one.view);
+                arrivals.keep_tally(one.tally);
             }
         }
         let share = self.shares / self.sharing.max(1) as f32;
