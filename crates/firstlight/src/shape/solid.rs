@@ -149,7 +149,10 @@ impl Solid {
     /// Whether there is any hit, from either side, with `t_min` < t < `t_max`.
     #[inline]
     pub fn blocks(&self, ray: &DRay, t_min: f64, t_max: f64) -> bool {
-        self.intersect(ray, t_min, t_max, false).is_some()
+        match self {
+            Solid::Torus(torus) => torus.blocks(ray, t_min, t_max),
+            _ => self.intersect(ray, t_min, t_max, false).is_some(),
+        }
     }
 
     /// The point of a hit of [`intersect`](Self::intersect) with the same ray.
