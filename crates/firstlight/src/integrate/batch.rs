@@ -38,7 +38,8 @@ pub(crate) struct ShadingPoint {
     ///
     /// [`Arrived::motion`]: super::Arrived::motion
     pub most_motion: f32,
-    /// The most cells of a light and panels of their rows that it is asked by: beyond that, what arrives is not known.
+    /// What the cells of a light and panels of their rows that it is asked by may take, 1 for each that has nothing
+    /// special in the way: beyond that, what arrives is not known.
     pub most_asked: u32,
     /// What one unit of each moment is worth: linear colours, the light's scale included.
     pub worth: Colors,

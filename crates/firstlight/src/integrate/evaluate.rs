@@ -25,12 +25,14 @@ use super::classify::{Class, Obstacles, classify};
 use super::emitter::Emitter;
 use super::fit::{Cell, Fits, MOMENTS, Polynomial, coarse, fit};
 use super::grade::{Grades, grade, halves, survey, whole};
+use super::occluder::Occluder;
 use super::panels::{Between, Blocked, Panel, PanelSums, cut, rows};
 use super::tolerance::{Tolerance, Weight};
 use super::view::{FlatView, Receiver};
 use crate::color::DisplaySteps;
 use crate::material::{Lobe, Moments};
 use crate::math::{LANES, dispatch_wide};
+use crate::shape::Canonical;
 
 /// How much of a light shines on a point.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -98,6 +100,30 @@ pub(crate) struct Asked<'a> {
     pub shadows: bool,
 }
 
+/// How much more a cell or a panel takes for each thing in the way that reaches into a light that is a ball, and for
+/// each torus.
+const CUT: u32 = 2;
+const TORUS: u32 = 1;
+
+impl Asked<'_> {
+    /// What a cell or a panel takes that is asked from a point with this in the way: 1 for most things.
+    fn price(&self, between: &Between) -> u32 {
+        let listed = self.obstacles;
+        let near = self.near.map_or(&[][..], |near| &near.occluders);
+        let cuts = listed.cuts | self.near.map_or(0, |near| near.cuts << listed.occluders.len());
+        let any = between.outside | between.within;
+        let all = listed.occluders.iter().chain(near).enumerate().filter(|(number, _)| any >> number & 1 == 1);
+        all.fold(1, |price, (number, occluder)| {
+            price
+                + match occluder {
+                    _ if cuts >> number & 1 == 1 => CUT,
+                    Occluder::Solid(solid) if matches!(solid.kind, Canonical::Torus { .. }) => TORUS,
+                    _ => 0,
+                }
+        })
+    }
+}
+
 /// The part of what is allowed of a ball that each face of a cube may be wrong by: 1 / sqrt(6).
 const FACE: f32 = 0.408;
 
@@ -144,8 +170,9 @@ struct PointSum {
     /// The round that the last two are of.
     round: u32,
     cells: u32,
-    /// Cells and panels that were asked.
+    /// What cells and panels took that were asked, and what each takes.
     asked: u32,
+    price: u32,
 }
 
 impl Evaluator {
@@ -288,6 +315,9 @@ impl Evaluator {
                     self.state[start + k].cells = 1;
                     self.grading.push(whole(outline, number, self.views[block].square(k)));
                 }
+                if point.most_asked != u32::MAX {
+                    self.state[start + k].price = light.price(&class.between);
+                }
                 self.between.push(class.between);
                 arrived.push(one);
             }
@@ -369,8 +399,8 @@ impl Evaluator {
         let panels = self.panels.iter().map(|panel| self.cut[panel.cell as usize].point);
         let mut is_over = false;
         for point in cells.chain(panels) {
-            let asked = &mut self.state[point as usize].asked;
-            *asked += 1;
+            let PointSum { asked, price, .. } = &mut self.state[point as usize];
+            *asked += *price;
             is_over |= *asked > points[point as usize].most_asked;
         }
         if !is_over {
