@@ -4,12 +4,13 @@
 //! that it could not have answered "blocked": a flat one that has the point and all of the light on one side of its
 //! plane, the sphere the point itself lies on the outside of, a sphere that is wholly below the point's horizon.
 
-use fearless_simd::{Level, dispatch, f32x16, mask32x16, prelude::*};
+use fearless_simd::{Level, f32x16, mask32x16, prelude::*};
 
 use super::Counts;
 use super::pixel::{Lighting, LobeSums};
 use super::plain::Plain;
 use crate::accel::RayPacket16;
+use crate::accel::dispatch_all;
 use crate::ids::LightId;
 use crate::light::{Area, LightKind, MIN_DISTANCE2, Points};
 use crate::material::{Lobe, MOMENTS};
@@ -96,7 +97,7 @@ pub(super) fn sum_area(
     lobe: &Lobe,
     obstacles: &PointObstacles,
 ) -> LobeSums {
-    dispatch!(level, simd => gather_area(simd, area, area.points(), si, lobe, obstacles))
+    dispatch_all!(level, simd => gather_area(simd, area, area.points(), si, lobe, obstacles))
 }
 
 /// The sums over the `points` of an area light.

@@ -5,11 +5,12 @@
 //! not; then what it sends is wrong by chance, each packet by itself. Where no edge is, what its points send may still
 //! vary more than they tell, next to a light or in a highlight.
 
-use fearless_simd::{Level, dispatch, f32x16, mask32x16, prelude::*};
+use fearless_simd::{Level, f32x16, mask32x16, prelude::*};
 
 use super::ladder::CellBits;
 use super::leaves::Leaves;
 use super::tally::{LeafLanes, Tally};
+use crate::accel::dispatch_all;
 use crate::material::{MOMENTS, Moments};
 use crate::math::LANES;
 
@@ -51,7 +52,7 @@ impl PacketErrors {
     /// Of rays that asked points in the same leaves of a light of such a `measure`. `sent` is what would arrive if
     /// nothing were in the way.
     pub fn of(level: Level, tallies: &[&Tally], leaves: &Leaves, measure: f32, sent: &Moments) -> PacketErrors {
-        dispatch!(level, simd => PacketErrors::of_lanes(simd, tallies, &leaves.parts, measure, sent))
+        dispatch_all!(level, simd => PacketErrors::of_lanes(simd, tallies, &leaves.parts, measure, sent))
     }
 
     #[inline(always)]

@@ -8,11 +8,12 @@
 //! Sources: of ratio estimates, Cochran, "Sampling Techniques", 1977, chapter 6; of the effective number of points,
 //! Kish 1965.
 
-use fearless_simd::{Level, dispatch, f32x16, mask32x16, prelude::*};
+use fearless_simd::{Level, f32x16, mask32x16, prelude::*};
 
 use super::ladder::{Asker, CellBits, Rung, cells_in, to_halves};
 use super::lanes::PointObstacles;
 use super::leaves::{Halved, Leaves, follow};
+use crate::accel::dispatch_all;
 use crate::light::{Area, FineCell, MIN_DISTANCE2, Points};
 use crate::material::{Lobe, MOMENTS, Moments};
 use crate::math::{LANES, Vec3x16};
@@ -119,7 +120,7 @@ impl Tally {
         self.numbers().for_each(|numbers| numbers.resize(count, 0.0));
         self.surprises = Default::default();
         let obstacles = PointObstacles::of(view);
-        dispatch!(asker.level, simd => self.fill_lanes(simd, asker.area, &rung.points, si, lobe, &obstacles));
+        dispatch_all!(asker.level, simd => self.fill_lanes(simd, asker.area, &rung.points, si, lobe, &obstacles));
     }
 
     #[inline(always)]
@@ -228,12 +229,12 @@ impl Tally {
         lobe: &Lobe,
     ) {
         let obstacles = PointObstacles::of(view);
-        dispatch!(asker.level, simd => self.add(simd, asker.area, rung, halved, asked, si, lobe, &obstacles));
+        dispatch_all!(asker.level, simd => self.add(simd, asker.area, rung, halved, asked, si, lobe, &obstacles));
     }
 
     /// Sums up what all leaves hold.
     pub fn sum(&mut self, level: Level, leaves: &Leaves) {
-        dispatch!(level, simd => self.sum_lanes(simd, &leaves.parts));
+        dispatch_all!(level, simd => self.sum_lanes(simd, &leaves.parts));
     }
 
     #[inline(always)]
@@ -311,7 +312,7 @@ impl Tally {
 /// What each of some points of a light would send to a place, from all of it.
 pub(super) fn would_send(asker: &Asker, points: &Points, si: &SurfaceInteraction, lobe: &Lobe) -> Vec<Moments> {
     let mut sent = Vec::with_capacity(points.blocks.len() * LANES);
-    dispatch!(asker.level, simd => {
+    dispatch_all!(asker.level, simd => {
         let place = PlaceLanes::new(simd, asker.area, si);
         for block in 0..points.blocks.len() {
             let answers = place.ask(simd, asker.area, points, block, lobe, &PointObstacles::default());

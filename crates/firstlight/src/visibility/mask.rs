@@ -1,6 +1,6 @@
 //! Which samples of a light are hidden, a bit for each.
 
-use fearless_simd::{Level, dispatch, f32x16, prelude::*};
+use fearless_simd::{Level, f32x16, prelude::*};
 
 use super::Viewpoint;
 use super::occluders::ShadowMesh;
@@ -125,7 +125,7 @@ impl ShadowView {
                 continue;
             }
             traced += u64::from(asking.count_ones());
-            let shadows = dispatch!(level, simd => shadow_rays(simd, &from, point, block));
+            let shadows = dispatch_all!(level, simd => shadow_rays(simd, &from, point, block));
             *hidden |= if self.trees {
                 scene.geometry.are_blocked(level, &shadows, asking)
             } else {
