@@ -106,11 +106,17 @@ const CUT: u32 = 2;
 const TORUS: u32 = 1;
 
 impl Asked<'_> {
+    /// Which of all that may be in the way reach into the light, if that is a ball: in lists, and then of trees.
+    fn cuts(&self) -> u64 {
+        let Obstacles { occluders, cuts, .. } = self.obstacles;
+        cuts | self.near.map_or(0, |near| near.cuts << occluders.len())
+    }
+
     /// What a cell or a panel takes that is asked from a point with this in the way: 1 for most things.
     fn price(&self, between: &Between) -> u32 {
         let listed = self.obstacles;
         let near = self.near.map_or(&[][..], |near| &near.occluders);
-        let cuts = listed.cuts | self.near.map_or(0, |near| near.cuts << listed.occluders.len());
+        let cuts = self.cuts();
         let any = between.outside | between.within;
         let all = listed.occluders.iter().chain(near).enumerate().filter(|(number, _)| any >> number & 1 == 1);
         all.fold(1, |price, (number, occluder)| {
@@ -424,9 +430,9 @@ impl Evaluator {
         let Evaluator { views, between, smooth, whole, cut: cut_cells, polynomials, panels, spare, .. } = self;
         let falloff = light.emitter.falloff();
         let outline = light.emitter.outline();
-        let Obstacles { occluders, ball, cuts, .. } = light.obstacles;
+        let Obstacles { occluders, ball, .. } = light.obstacles;
         let near = light.near.map_or(&[][..], |near| &near.occluders);
-        let cuts = cuts | light.near.map_or(0, |near| near.cuts << occluders.len());
+        let cuts = light.cuts();
         let ball = ball.map(|(center, radius)| (center, radius, light.emitter.half()));
         let blocked = Blocked { occluders: [occluders, near], ball, cuts, outline, between };
         let moments = light.lobe.moment_count();

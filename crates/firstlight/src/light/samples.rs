@@ -121,7 +121,7 @@ impl FineCell {
 }
 
 /// A number whose every second digit, from the last on, are those of another.
-fn with_gaps(digits: u64) -> u64 {
+pub(crate) fn with_gaps(digits: u64) -> u64 {
     let mut digits = (digits | digits << 16) & 0x0000_ffff_0000_ffff;
     digits = (digits | digits << 8) & 0x00ff_00ff_00ff_00ff;
     digits = (digits | digits << 4) & 0x0f0f_0f0f_0f0f_0f0f;

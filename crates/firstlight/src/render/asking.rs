@@ -89,10 +89,6 @@ impl<'a> AskedLeaves<'a> {
         if is_raised && !(is_even && are_few) && self.halve_heavy(asking, counts) {
             return;
         }
-        if is_raised && is_even {
-            self.double(near, asking, counts);
-            return;
-        }
         let is_near = |leaf: usize| is_in(near, leaf);
         if is_raised {
             self.everywhere += 1;
@@ -102,6 +98,9 @@ impl<'a> AskedLeaves<'a> {
             self.deep += 1;
         }
         self.deep = self.deep.max(self.everywhere);
+        if is_raised && is_even {
+            return self.double(near, asking, counts);
+        }
         let (deep, everywhere) = (self.deep, self.everywhere);
         self.halve_those(asking, counts, |leaf, level| {
             let is_near = is_near(leaf);
@@ -118,9 +117,6 @@ impl<'a> AskedLeaves<'a> {
             let both = self.asker.first(one.series, 2 * count);
             one.tally.double(&self.asker, second, &both, near, &mut one.view, &one.si, &one.lobe);
         }
-        self.everywhere += 1;
-        self.deep = self.deep.max(self.everywhere);
-        self.is_raised = true;
         self.leaves = Leaves::of(self.everywhere);
     }
 

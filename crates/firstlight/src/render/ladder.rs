@@ -9,7 +9,7 @@ use std::sync::OnceLock;
 use fearless_simd::Level;
 
 use super::leaves::Halved;
-use crate::light::{Area, FineCell, Points, SERIES, series_by_cell};
+use crate::light::{Area, FineCell, Points, SERIES, series_by_cell, with_gaps};
 use crate::math::{LANES, Vec3};
 use crate::scene::Scene;
 use crate::visibility::{ShadowView, Target, Viewpoint};
@@ -68,17 +68,8 @@ pub(super) fn cells_in(bits: &[u16]) -> impl Iterator<Item = usize> {
 /// Bits of a block of cells as those of two blocks of halves: of each cell the first or, where `second` says so, the
 /// second.
 pub(super) fn to_halves(bits: u16, second: u16) -> [u16; 2] {
-    let halves = spaced(bits & !second) | spaced(bits & second) << 1;
+    let halves = with_gaps((bits & !second).into()) | with_gaps((bits & second).into()) << 1;
     [halves as u16, (halves >> LANES) as u16]
-}
-
-/// A number whose every second digit, from the last on, are those of another.
-fn spaced(digits: u16) -> u32 {
-    let mut digits = u32::from(digits);
-    digits = (digits | digits << 8) & 0x00ff_00ff;
-    digits = (digits | digits << 4) & 0x0f0f_0f0f;
-    digits = (digits | digits << 2) & 0x3333_3333;
-    (digits | digits << 1) & 0x5555_5555
 }
 
 /// Whether a cell is in a set.
