@@ -242,6 +242,7 @@ pub enum AreaShape {
 impl AreaShape {
     /// The point that stands for `uv` of the unit square, and, where each point has a normal of its own, the unit
     /// normal there. Equal areas of the square become equal areas of the shape.
+    #[cfg(any(test, feature = "bench"))]
     fn point(&self, uv: [f64; 2]) -> (DVec3, Option<DVec3>) {
         match self {
             AreaShape::Rectangle(rectangle) => (rectangle.point(uv), None),
@@ -335,9 +336,13 @@ impl Area {
             .get_or_init(|| Points::new(&self.shape, (0..self.count).map(|k| self.set.point(k, self.count, self.seed))))
     }
 
-    /// The points that stand for some places of the unit square.
-    pub(crate) fn points_at(&self, places: impl ExactSizeIterator<Item = [f64; 2]>) -> Points {
-        Points::new(&self.shape, places)
+    /// The points that stand for some places of the unit square, sixteen by sixteen. In lanes where it is called within
+    /// `vectorize`.
+    #[inline(always)]
+    pub(crate) fn points_at(&self, places: impl Iterator<Item = [[f64; LANES]; 2]>) -> Points {
+        let mut points = Points { blocks: Vec::with_capacity(places.size_hint().0), normals: Vec::new() };
+        places.for_each(|[x, y]| points.push(&self.shape, &x, &y));
+        points
     }
 
     /// Sampled point `k`, world space.
@@ -453,16 +458,19 @@ impl Points {
 }
 
 impl PointBlock {
-    const NONE: PointBlock = PointBlock { x: [f32::NAN; LANES], y: [f32::NAN; LANES], z: [f32::NAN; LANES] };
+    #[inline(always)]
+    fn of(point: impl Fn(usize) -> DVec3) -> PointBlock {
+        let mut block = PointBlock { x: [0.0; LANES], y: [0.0; LANES], z: [0.0; LANES] };
+        for k in 0..LANES {
+            let v = point(k).as_vec3();
+            (block.x[k], block.y[k], block.z[k]) = (v.x, v.y, v.z);
+        }
+        block
+    }
 
     #[inline(always)]
     fn get(&self, lane: usize) -> Vec3 {
         Vec3::new(self.x[lane], self.y[lane], self.z[lane])
-    }
-
-    fn set(&mut self, lane: usize, v: DVec3) {
-        let v = v.as_vec3();
-        (self.x[lane], self.y[lane], self.z[lane]) = (v.x, v.y, v.z);
     }
 
     #[inline(always)]
@@ -477,18 +485,29 @@ impl PointBlock {
 
 impl Points {
     /// The points that stand for some of the unit square.
-    fn new(shape: &AreaShape, places: impl ExactSizeIterator<Item = [f64; 2]>) -> Self {
-        let blocks = places.len().div_ceil(LANES);
-        let normals = if shape.flat_normal().is_none() { blocks } else { 0 };
-        let mut points = Points { blocks: vec![PointBlock::NONE; blocks], normals: vec![PointBlock::NONE; normals] };
-        for (k, place) in places.enumerate() {
-            let (block, lane) = (k / LANES, k % LANES);
-            let (q, n) = shape.point(place);
-            points.blocks[block].set(lane, q);
-            if let Some(n) = n {
-                points.normals[block].set(lane, n);
+    fn new(shape: &AreaShape, mut places: impl ExactSizeIterator<Item = [f64; 2]>) -> Self {
+        let mut points = Points { blocks: Vec::with_capacity(places.len().div_ceil(LANES)), normals: Vec::new() };
+        while places.len() > 0 {
+            let [mut x, mut y] = [[f64::NAN; LANES]; 2];
+            for (lane, place) in places.by_ref().take(LANES).enumerate() {
+                [x[lane], y[lane]] = place;
             }
+            points.push(shape, &x, &y);
         }
         points
+    }
+
+    /// Adds the points that stand for sixteen places of the unit square; none for those that are NaN.
+    #[inline(always)]
+    fn push(&mut self, shape: &AreaShape, x: &[f64; LANES], y: &[f64; LANES]) {
+        match shape {
+            AreaShape::Rectangle(rectangle) => self.blocks.push(PointBlock::of(|k| rectangle.point([x[k], y[k]]))),
+            AreaShape::Disk(disk) => self.blocks.push(PointBlock::of(|k| disk.point([x[k], y[k]]))),
+            AreaShape::Sphere(sphere) => {
+                let normal = |k: usize| SphereLight::normal([x[k], y[k]]);
+                self.blocks.push(PointBlock::of(|k| sphere.center + normal(k) * sphere.radius));
+                self.normals.push(PointBlock::of(normal));
+            }
+        }
     }
 }

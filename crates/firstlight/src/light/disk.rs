@@ -122,12 +122,12 @@ impl DiskLightDesc {
 }
 
 /// The point of the unit disk that stands for a point of the square [-1, 1]^2.
+#[inline(always)]
 fn concentric([x, y]: [f64; 2]) -> [f64; 2] {
-    if x == 0.0 && y == 0.0 {
-        return [0.0; 2];
-    }
-    let (r, turns) = if x.abs() > y.abs() { (x, 0.125 * (y / x)) } else { (y, 0.125 * (2.0 - x / y)) };
-    let (sin, cos) = sin_cos_of_turns(turns);
+    let is_flat = x.abs() > y.abs();
+    let (r, other) = if is_flat { (x, y) } else { (y, x) };
+    let part = if r == 0.0 { 0.0 } else { other / r };
+    let (sin, cos) = sin_cos_of_turns(0.125 * if is_flat { part } else { 2.0 - part });
     [r * cos, r * sin]
 }
 
@@ -135,6 +135,7 @@ impl DiskLight {
     /// The point that stands for `uv` of the unit square: squares around its middle become circles.
     ///
     /// Source: Shirley, Chiu, "A low distortion map between disk and square", Journal of Graphics Tools 2(3), 1997.
+    #[inline(always)]
     pub(super) fn point(&self, uv: [f64; 2]) -> DVec3 {
         let [x, y] = uv.map(|w| 2.0 * w - 1.0);
         let [x, y] = concentric([x, y]);

@@ -151,6 +151,7 @@ impl RectangleDesc {
 
 impl Rectangle {
     /// The point of the coordinates `a` along `e0` and `b` along `e1`.
+    #[inline(always)]
     pub(super) fn point(&self, [a, b]: [f64; 2]) -> DVec3 {
         self.shape.p + self.e0 * a + self.e1 * b
     }

@@ -78,6 +78,7 @@ impl SphereLightDesc {
 impl SphereLight {
     /// The outward unit normal of the point that stands for `uv` of the unit square: rings of equal height have equal
     /// areas, as Archimedes found.
+    #[inline(always)]
     pub(super) fn normal([a, b]: [f64; 2]) -> DVec3 {
         let z = 1.0 - 2.0 * a;
         let ring = (4.0 * a * (1.0 - a)).sqrt();

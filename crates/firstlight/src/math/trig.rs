@@ -23,7 +23,7 @@ pub(crate) fn sin_cos<S: Simd>(a: f32x16<S>) -> (f32x16<S>, f32x16<S>) {
 }
 
 /// Sine and cosine of so many full turns, from -1 to 1, to within 4e-16, by their Taylor series.
-#[inline]
+#[inline(always)]
 pub(crate) fn sin_cos_of_turns(turns: f64) -> (f64, f64) {
     // Factors of the squares of angles up to an eighth of a turn, from the last
     const SIN: [f64; 7] = [
@@ -50,12 +50,10 @@ pub(crate) fn sin_cos_of_turns(turns: f64) -> (f64, f64) {
     let aa = a * a;
     let series = |factors: &[f64]| factors.iter().fold(0.0, |sum, factor| sum * aa + factor);
     let (sin, cos) = (a - a * (aa * series(&SIN)), series(&COS) * aa + 1.0);
-    match quarters as i32 & 3 {
-        0 => (sin, cos),
-        1 => (cos, -sin),
-        2 => (-sin, -cos),
-        _ => (-cos, sin),
-    }
+    // Without branches, so that loops become lanes
+    let quarter = quarters as i32;
+    let (sin, cos) = if quarter & 1 == 0 { (sin, cos) } else { (cos, sin) };
+    (if quarter & 2 == 0 { sin } else { -sin }, if (quarter + 1) & 2 == 0 { cos } else { -cos })
 }
 
 /// The angle from -pi/2 to pi/2 whose sine is `v`, from -1 to 1; beyond, that of the nearer end.

@@ -3,8 +3,8 @@
 use super::Counts;
 use super::arrival::ArrivalPlace;
 use super::beams::{self, RungRays};
-use super::ladder::{AskedRung, Asker, CellBits, is_in};
-use super::leaves::{Halved, Leaves, follow};
+use super::ladder::{AskedRung, Asker};
+use super::leaves::{LeafBlock, Leaves};
 use super::resolve::LightTerm;
 use super::tally::{Tally, would_send};
 use crate::color::Rgb;
@@ -80,105 +80,94 @@ impl<'a> AskedLeaves<'a> {
         asked
     }
 
-    /// Halves leaves, and has all rays ask one more point in each that is halved: those `near` edges down to one size,
-    /// and then to a smaller one; or, to raise the number of all, the largest, once there are many heavy ones first.
-    pub fn halve(&mut self, near: &CellBits, is_raised: bool, asking: &mut [Asking], counts: &mut Counts) {
+    /// Halves blocks of leaves, and has all rays ask one more point in each leaf: in those `near` edges down to one
+    /// size, and then to a smaller one; or, to raise the number of all, in the largest, once there are many heavy ones
+    /// first.
+    pub fn halve(&mut self, near: &[bool], is_raised: bool, asking: &mut [Asking], counts: &mut Counts) {
         // What many points say is worth more than which of few say much, and in leaves of one size they cost little
         let is_even = self.leaves.count() == 1 << self.everywhere && Asker::keeps(self.everywhere);
         let are_few = self.leaves.count() * asking.len() < EVENLY;
         if is_raised && !(is_even && are_few) && self.halve_heavy(asking, counts) {
             return;
         }
-        let is_near = |leaf: usize| is_in(near, leaf);
         if is_raised {
             self.everywhere += 1;
             self.is_raised = true;
             asking.iter_mut().for_each(|one| one.tally.surprises = Default::default());
-        } else if (0..self.leaves.count()).all(|leaf| !is_near(leaf) || self.leaves.levels[leaf] >= self.deep) {
+        } else if self.leaves.blocks.iter().zip(near).all(|(block, is_near)| !is_near || block.level >= self.deep) {
             self.deep += 1;
         }
         self.deep = self.deep.max(self.everywhere);
-        if is_raised && is_even {
-            return self.double(near, asking, counts);
-        }
         let (deep, everywhere) = (self.deep, self.everywhere);
-        self.halve_those(asking, counts, |leaf, level| {
-            let is_near = is_near(leaf);
-            (level < if is_near { deep } else { everywhere }).then_some(!is_near)
+        self.halve_those(asking, counts, |number, block| {
+            let is_near = near[number];
+            (block.level < if is_near { deep } else { everywhere }).then_some(!is_near)
         });
     }
 
-    /// Halves all leaves, where they are of one size.
-    fn double(&mut self, near: &CellBits, asking: &mut [Asking], counts: &mut Counts) {
-        let count = self.leaves.count();
-        let second: Vec<AskedRung> = asking.iter().map(|one| self.asker.second(one.series, count)).collect();
-        self.look(&second, &vec![u16::MAX; count / LANES], asking, counts);
-        for (one, second) in asking.iter_mut().zip(&second) {
-            let both = self.asker.first(one.series, 2 * count);
-            one.tally.double(&self.asker, second, &both, near, &mut one.view, &one.si, &one.lobe);
-        }
-        self.leaves = Leaves::of(self.everywhere);
-    }
-
-    /// Halves leaves as [`Leaves::halve`] says, and has all rays ask one more point in each.
+    /// Halves blocks as [`Leaves::halve`] says, and has all rays ask one more point in each leaf; the numbers of the
+    /// halves.
     fn halve_those(
         &mut self,
         asking: &mut [Asking],
         counts: &mut Counts,
-        is: impl Fn(usize, u32) -> Option<bool>,
-    ) -> (Vec<u32>, Vec<Halved>) {
-        let (parted, halved) = self.leaves.halve(is);
-        asking.iter_mut().for_each(|one| one.tally.halve(&parted));
+        is: impl Fn(usize, &LeafBlock) -> Option<bool>,
+    ) -> Vec<u32> {
+        let halved = self.leaves.halve(is);
         for halved in &halved {
-            let next = |one: &Asking| self.asker.next(one.series, halved, &one.tally.at);
+            let next =
+                |one: &Asking| self.asker.next(one.series, halved, |number| &one.tally.block(number as usize).at);
             let next: Vec<AskedRung> = asking.iter().map(next).collect();
-            let points = Asker::asked(halved);
-            self.look(&next, &points, asking, counts);
+            self.look(&next, &next[0].asked(halved), asking, counts);
             for (one, rung) in asking.iter_mut().zip(&next) {
-                one.tally.ask(&self.asker, rung, halved, &points, &one.view, &one.si, &one.lobe);
+                one.tally.halve(&self.asker, (rung, halved), &one.view, &one.si, &one.lobe);
             }
         }
-        (parted, halved)
+        halved.iter().flat_map(|halved| &halved.blocks).flat_map(|block| block.halves).collect()
     }
 
-    /// Halves those leaves, and their halves, that send so much more to all rays together than others as [`HEAVY`]
-    /// says; whether there were any. That is told not by the points that were asked in them, but by others: to look
-    /// closer at what is found to send much makes what is found less, and nothing makes it more.
+    /// Halves those blocks, and their halves, in which leaves may send so much more to all rays together than others as
+    /// [`HEAVY`] says; whether there were any. That is told not by the points that were asked in them, but by others:
+    /// to look closer at what is found to send much makes what is found less, and nothing makes it more.
     fn halve_heavy(&mut self, asking: &mut [Asking], counts: &mut Counts) -> bool {
         let peaks: Vec<Peak> = Peak::of(asking, self.asker.area.stands_for());
         let all: f32 = peaks.iter().map(|peak| peak.sends).sum();
         let heavy = HEAVY * all / (1u32 << self.everywhere) as f32;
-        let every: Vec<u32> = (0..self.leaves.count() as u32).collect();
+        let every: Vec<u32> = (0..self.leaves.blocks.len() as u32).collect();
         let mut worth = self.worth(&peaks, asking, &every);
         let mut is_any = false;
         while self.leaves.count() * asking.len() < MOST {
-            let is_heavy = |leaf: usize, level: u32| (worth[leaf] > heavy && level < DEEPEST).then_some(false);
-            let (parted, halved) = self.halve_those(asking, counts, is_heavy);
-            if halved.is_empty() {
+            let is_heavy =
+                |number: usize, block: &LeafBlock| (worth[number] > heavy && block.level < DEEPEST).then_some(false);
+            let halves = self.halve_those(asking, counts, is_heavy);
+            if halves.is_empty() {
                 break;
             }
             is_any = true;
-            let before = worth.len();
-            worth.resize(before + parted.len(), 0.0);
-            follow(&mut worth, before, &parted);
-            let first = halved.iter().flat_map(|halved| &halved.first);
-            let halves: Vec<u32> = first.flat_map(|first| [*first, first + 1]).collect();
-            for (leaf, new) in halves.iter().zip(self.worth(&peaks, asking, &halves)) {
-                worth[*leaf as usize] = new;
+            worth.resize(self.leaves.blocks.len(), 0.0);
+            for (number, new) in halves.iter().zip(self.worth(&peaks, asking, &halves)) {
+                worth[*number as usize] = new;
             }
         }
         is_any
     }
 
-    /// What some leaves send to all rays, told by the place in each that is nearest to where the most was found.
-    fn worth(&self, peaks: &[Peak], asking: &[Asking], leaves: &[u32]) -> Vec<f32> {
-        let mut worth = vec![0.0; leaves.len()];
+    /// What a leaf of each of some blocks sends to all rays, told by the place in the block that is nearest to where
+    /// the most was found.
+    fn worth(&self, peaks: &[Peak], asking: &[Asking], blocks: &[u32]) -> Vec<f32> {
+        let mut worth = vec![0.0; blocks.len()];
         for peak in peaks {
             let one = &asking[peak.ray];
-            let places = leaves.iter().map(|leaf| self.leaves.nearest(*leaf as usize, peak.at));
-            let sent = would_send(&self.asker, &self.asker.area.points_at(places), &one.si, &one.lobe);
-            for ((worth, leaf), sent) in worth.iter_mut().zip(leaves).zip(&sent) {
-                *worth += peak.weigh(sent) * self.leaves.parts[*leaf as usize];
+            let places = blocks.chunks(LANES).map(|blocks| {
+                let [mut x, mut y] = [[f64::NAN; LANES]; 2];
+                for (lane, number) in blocks.iter().enumerate() {
+                    [x[lane], y[lane]] = self.leaves.blocks[*number as usize].nearest(peak.at);
+                }
+                [x, y]
+            });
+            let sent = would_send(&self.asker, places, &one.si, &one.lobe);
+            for ((worth, number), sent) in worth.iter_mut().zip(blocks).zip(&sent) {
+                *worth += peak.weigh(sent) * self.leaves.blocks[*number as usize].part();
             }
         }
         worth
@@ -221,11 +210,9 @@ impl Peak {
         rays.map(|(ray, many)| {
             let Asking { tally, whole, .. } = &asking[ray];
             let weights = weights(&asking[ray]).map(|weight| weight * many as f32);
-            let mut peak = Peak { ray, at: FineCell::default(), weights, sends: 0.0 };
+            let mut peak = Peak { ray, at: FineCell::FIRST, weights, sends: 0.0 };
             peak.sends = peak.weigh(whole) / measure;
-            let sent = |leaf: &usize| peak.weigh(&tally.sent(*leaf));
-            let most = (0..tally.at.len()).max_by(|a, b| sent(a).total_cmp(&sent(b)));
-            peak.at = tally.at[most.unwrap_or(0)];
+            peak.at = tally.most(|sent| peak.weigh(sent));
             peak
         })
         .collect()

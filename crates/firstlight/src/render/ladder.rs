@@ -1,14 +1,16 @@
 //! The points of area lights that are integrated behind things: for each light sixteen series of them, which are
 //! stratified together, in rungs that each double their number. A rung holds one point in each of as many cells of the
-//! light as there are points before it, so that any of its cells may be asked alone. Up to [`LAST`] the points of a
-//! series are those of a sequence, and kept; beyond, where few cells are asked, they are made as they are.
+//! light as there are points before it, sixteen cells in a block, so that any of its blocks may be asked alone. Up to
+//! [`LAST`] the points of a series are those of a sequence, and kept; beyond, where few blocks are asked, they are made
+//! as they are.
 
 use std::ops::Deref;
 use std::sync::OnceLock;
 
 use fearless_simd::Level;
 
-use super::leaves::Halved;
+use super::leaves::{Halved, HalvedBlock};
+use crate::accel::dispatch_all;
 use crate::light::{Area, FineCell, Points, SERIES, series_by_cell, with_gaps};
 use crate::math::{LANES, Vec3};
 use crate::scene::Scene;
@@ -29,10 +31,10 @@ pub(super) struct Ladder {
 /// Some points of one light, in the order of its cells, each of which holds one.
 pub(super) struct Rung {
     pub points: Points,
-    /// Where they are.
-    pub cells: Vec<FineCell>,
-    /// Which half of its cell each point lies in, as bits.
-    pub halves: CellBits,
+    /// Where they are, block by block.
+    pub cells: Vec<[FineCell; LANES]>,
+    /// Whether each point lies in the second half of its cell, as bits.
+    pub halves: Vec<u16>,
     target: OnceLock<Target>,
 }
 
@@ -53,10 +55,24 @@ impl Deref for AskedRung<'_> {
     }
 }
 
-/// Some cells of a light: a bit for each, sixteen by sixteen.
-pub(super) type CellBits = Vec<u16>;
+impl AskedRung<'_> {
+    /// Which of its blocks holds one more point for each leaf of the `k`-th block that was halved.
+    pub fn block_of(&self, k: usize, block: &HalvedBlock) -> usize {
+        match self {
+            AskedRung::Kept(_) => block.cell as usize,
+            AskedRung::Made(_) => k,
+        }
+    }
 
-/// The numbers of the cells that are in a set.
+    /// Which of its points are asked, block by block, where those blocks were halved.
+    pub fn asked(&self, halved: &Halved) -> Vec<u16> {
+        let mut asked = vec![0; self.cells.len()];
+        halved.blocks.iter().enumerate().for_each(|(k, block)| asked[self.block_of(k, block)] = u16::MAX);
+        asked
+    }
+}
+
+/// The numbers of those that are in a set, sixteen bits by sixteen.
 pub(super) fn cells_in(bits: &[u16]) -> impl Iterator<Item = usize> {
     let lanes = |(block, bits): (usize, &u16)| {
         let bits = *bits;
@@ -72,13 +88,12 @@ pub(super) fn to_halves(bits: u16, second: u16) -> [u16; 2] {
     [halves as u16, (halves >> LANES) as u16]
 }
 
-/// Whether a cell is in a set.
-pub(super) fn is_in(bits: &[u16], cell: usize) -> bool {
-    bits[cell / LANES] >> (cell % LANES) & 1 == 1
-}
-
 impl Rung {
-    fn new(cells: Vec<FineCell>, halves: CellBits, points: Points) -> Box<Rung> {
+    /// Of points in cells that are parts of cells of such a level.
+    fn new(cells: Vec<[FineCell; LANES]>, level: u32, points: Points) -> Box<Rung> {
+        let bit = |(lane, cell): (usize, &FineCell)| (cell.half(level) as u16) << lane;
+        let half = |block: &[FineCell; LANES]| block.iter().enumerate().map(bit).fold(0, |all, bit| all | bit);
+        let halves = cells.iter().map(half).collect();
         Box::new(Rung { points, cells, halves, target: OnceLock::new() })
     }
 }
@@ -99,34 +114,19 @@ impl<'a> Asker<'a> {
         self.rung(series, 0, cells)
     }
 
-    /// One more point of a series in each of so many cells, where the first ones are asked.
-    pub fn second(&self, series: usize, cells: usize) -> AskedRung<'a> {
-        self.rung(series, cells, cells)
-    }
-
-    /// One more point of a series in each of those cells that were halved, or in more of them: see
-    /// [`asked`](Self::asked). `at` is where each leaf has its point.
-    pub fn next(&self, series: usize, halved: &Halved, at: &[FineCell]) -> AskedRung<'a> {
+    /// One more point of a series in each leaf of those blocks that were halved, or in more of them. `at` is where each
+    /// of their leaves has its point, by the number of their first half.
+    pub fn next<'t>(&self, series: usize, halved: &Halved, at: impl Fn(u32) -> &'t [FineCell; LANES]) -> AskedRung<'a> {
         if Self::keeps(halved.level) {
-            return self.second(series, 1 << halved.level);
+            return self.rung(series, 1 << halved.level, 1 << halved.level);
         }
-        let second = |first: &u32| at[*first as usize].second(series, halved.level);
-        let cells: Vec<_> = halved.first.iter().map(second).collect();
-        let points = self.area.points_at(cells.iter().map(|cell| cell.middle()));
-        AskedRung::Made(Rung::new(cells, CellBits::new(), points))
-    }
-
-    /// Which of the points of [`next`](Self::next) are asked.
-    pub fn asked(halved: &Halved) -> CellBits {
-        if Self::keeps(halved.level) {
-            return halved.bits();
-        }
-        let mut bits = vec![u16::MAX; halved.cells.len().div_ceil(LANES)];
-        // The last sixteen may be fewer
-        if let (Some(last), more @ 1..) = (bits.last_mut(), halved.cells.len() % LANES) {
-            *last = (1 << more) - 1;
-        }
-        bits
+        let mut cells = Vec::with_capacity(halved.blocks.len());
+        let points = dispatch_all!(self.level, _simd => {
+            let second = |block: &HalvedBlock| FineCell::seconds(at(block.halves[0]), series, halved.level);
+            cells.extend(halved.blocks.iter().map(second));
+            self.area.points_at(cells.iter().map(FineCell::middles))
+        });
+        AskedRung::Made(Rung::new(cells, halved.level, points))
     }
 
     /// Whether points in all cells of a level, and one more in each, are kept.
@@ -143,14 +143,10 @@ impl<'a> Asker<'a> {
         let kept = &self.ladder.series[series][(count / FIRST).ilog2() as usize][usize::from(first > 0)];
         AskedRung::Kept(kept.get_or_init(|| {
             let places = series_by_cell(series, first as u32, count as u32);
-            let points = self.area.points_at(places.iter().copied());
-            let cells: Vec<FineCell> = places.into_iter().map(FineCell::of).collect();
-            let half = |block: &[FineCell]| {
-                let bits = block.iter().enumerate().map(|(lane, cell)| (cell.half(count.ilog2()) as u16) << lane);
-                bits.fold(0, |all, bit| all | bit)
-            };
-            let halves = cells.chunks(LANES).map(half).collect();
-            Rung::new(cells, halves, points)
+            let (places, _) = places.as_chunks::<LANES>();
+            let cells = places.iter().map(|block| block.map(FineCell::of)).collect();
+            let points = self.area.points_at(places.iter().map(|block| [0, 1].map(|axis| block.map(|at| at[axis]))));
+            Rung::new(cells, count.ilog2(), points)
         }))
     }
 

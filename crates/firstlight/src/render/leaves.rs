@@ -1,115 +1,100 @@
 //! The cells of a light that rays ask points in: halves of halves of it, large where nothing happens and small where
-//! the edge of a shadow runs. The cells of a rung lie in one order, that of [`FineCell`], and so do leaves.
+//! the edge of a shadow runs. Sixteen that are neighbours, a larger cell of their own, are a block: blocks are halved
+//! as a whole, so that all that is told of them is told in lanes.
 
-use super::ladder::CellBits;
 use crate::light::FineCell;
 use crate::math::LANES;
 
-/// What is left of a light once cells were halved: each leaf holds one point of each ray.
-#[derive(Debug)]
-pub(super) struct Leaves {
-    cells: Vec<FineCell>,
-    /// How often the light was halved to make each of them.
-    pub levels: Vec<u32>,
-    /// The part of the light that each of them is, and 0 up to a multiple of sixteen.
-    pub parts: Vec<f32>,
+/// How often a block is halved to make its leaves.
+const WITHIN: u32 = LANES.ilog2();
+
+/// Sixteen leaves: one larger cell of the light.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct LeafBlock {
+    /// The number of that cell among all of its size.
+    pub cell: u64,
+    /// How often the light was halved to make the leaves.
+    pub level: u32,
 }
 
-/// Leaves of one size that were halved.
-#[derive(Debug, Default)]
+impl LeafBlock {
+    /// The part of the light that each of its leaves is.
+    pub fn part(&self) -> f32 {
+        1.0 / (1u64 << self.level) as f32
+    }
+
+    /// The place of the block that is nearest to one.
+    pub fn nearest(&self, to: FineCell) -> [f64; 2] {
+        let level = self.level - WITHIN;
+        to.nearest_in(FineCell::first_of(self.cell, level), level).middle()
+    }
+
+    fn half(&self, half: u64) -> LeafBlock {
+        LeafBlock { cell: 2 * self.cell + half, level: self.level + 1 }
+    }
+}
+
+/// What is left of a light once blocks were halved: each leaf holds one point of each ray.
+#[derive(Debug)]
+pub(super) struct Leaves {
+    /// The first half of a block takes its place, and the second one goes to the end.
+    pub blocks: Vec<LeafBlock>,
+    /// Their numbers, in the order of the light.
+    pub order: Vec<u32>,
+}
+
+/// Blocks of leaves of one size that were halved.
+#[derive(Debug)]
 pub(super) struct Halved {
+    /// That of the leaves before.
     pub level: u32,
-    /// Their numbers among all cells of that size.
-    pub cells: Vec<u64>,
-    /// The numbers of their first halves, which the second ones follow, among all leaves that are there now.
-    pub first: Vec<u32>,
-    /// Whether they were thought to be away from edges.
-    pub away: Vec<bool>,
+    pub blocks: Vec<HalvedBlock>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct HalvedBlock {
+    /// The number of its cell among all of its size.
+    pub cell: u64,
+    /// The numbers of its halves.
+    pub halves: [u32; 2],
+    /// Whether it was thought to be away from edges.
+    pub is_away: bool,
 }
 
 impl Leaves {
     /// All cells of one size.
     pub fn of(level: u32) -> Leaves {
-        let count = 1u64 << level;
-        let mut leaves = Leaves {
-            cells: (0..count).map(|cell| FineCell::first_of(cell, level)).collect(),
-            levels: vec![level; count as usize],
-            parts: Vec::new(),
-        };
-        leaves.weigh();
-        leaves
+        let blocks = (0..1 << (level - WITHIN)).map(|cell| LeafBlock { cell, level });
+        let blocks: Vec<_> = blocks.collect();
+        Leaves { order: (0..blocks.len() as u32).collect(), blocks }
     }
 
+    /// How many leaves there are.
     pub fn count(&self) -> usize {
-        self.cells.len()
+        self.blocks.len() * LANES
     }
 
-    /// The place of a leaf that is nearest to one.
-    pub fn nearest(&self, leaf: usize, to: FineCell) -> [f64; 2] {
-        to.nearest_in(self.cells[leaf], self.levels[leaf]).middle()
-    }
-
-    fn weigh(&mut self) {
-        self.parts.clear();
-        self.parts.extend(self.levels.iter().map(|level| 1.0 / (1u64 << level) as f32));
-        self.parts.resize(self.count().next_multiple_of(LANES), 0.0);
-    }
-
-    /// Halves those leaves of which `is` says whether they are away from edges, by their number and level. Says which
-    /// they were, and which of each size.
-    pub fn halve(&mut self, is: impl Fn(usize, u32) -> Option<bool>) -> (Vec<u32>, Vec<Halved>) {
-        let (mut parted, mut halved) = (Vec::new(), Vec::<Halved>::new());
-        for (leaf, (cell, level)) in self.cells.iter().zip(&self.levels).enumerate() {
-            let Some(away) = is(leaf, *level) else { continue };
-            let of = halved.iter().position(|halved| halved.level == *level).unwrap_or_else(|| {
-                halved.push(Halved { level: *level, ..Halved::default() });
-                halved.len() - 1
-            });
-            halved[of].cells.push(cell.part_of(1 << level) as u64);
-            halved[of].first.push((leaf + parted.len()) as u32);
-            halved[of].away.push(away);
-            parted.push(leaf as u32);
-        }
-        let before = self.count();
-        self.cells.resize(before + parted.len(), FineCell::default());
-        self.levels.resize(before + parted.len(), 0);
-        follow(&mut self.cells, before, &parted);
-        follow(&mut self.levels, before, &parted);
-        for Halved { level, cells, first, .. } in &halved {
-            for (cell, first) in cells.iter().zip(first) {
-                for half in 0..2 {
-                    let leaf = *first as usize + half;
-                    self.levels[leaf] = level + 1;
-                    self.cells[leaf] = FineCell::first_of(2 * cell + half as u64, level + 1);
-                }
+    /// Halves those blocks of which `is` says whether they are away from edges, by their number. Says which they were,
+    /// by their size.
+    pub fn halve(&mut self, is: impl Fn(usize, &LeafBlock) -> Option<bool>) -> Vec<Halved> {
+        let mut halved = Vec::<Halved>::new();
+        let mut order = Vec::with_capacity(self.order.len());
+        for number in std::mem::take(&mut self.order) {
+            order.push(number);
+            let block = self.blocks[number as usize];
+            let Some(is_away) = is(number as usize, &block) else { continue };
+            let halves = [number, self.blocks.len() as u32];
+            order.push(halves[1]);
+            self.blocks[number as usize] = block.half(0);
+            self.blocks.push(block.half(1));
+            let one = HalvedBlock { cell: block.cell, halves, is_away };
+            match halved.iter_mut().find(|halved| halved.level == block.level) {
+                Some(halved) => halved.blocks.push(one),
+                None => halved.push(Halved { level: block.level, blocks: vec![one] }),
             }
         }
-        self.weigh();
-        (parted, halved)
-    }
-}
-
-impl Halved {
-    /// The cells as a set of all of that size.
-    pub fn bits(&self) -> CellBits {
-        let mut bits = vec![0; (1usize << self.level).div_ceil(LANES)];
-        for cell in &self.cells {
-            bits[*cell as usize / LANES] |= 1 << (*cell as usize % LANES);
-        }
-        bits
-    }
-}
-
-/// Moves the numbers of so many leaves to where these are once some are `parted`, and gives both halves those of the
-/// whole.
-pub(super) fn follow<T: Copy>(of: &mut [T], count: usize, parted: &[u32]) {
-    let mut end = count;
-    for (before, leaf) in parted.iter().enumerate().rev() {
-        let leaf = *leaf as usize;
-        of.copy_within(leaf + 1..end, leaf + before + 2);
-        let whole = of[leaf];
-        of[leaf + before..leaf + before + 2].fill(whole);
-        end = leaf;
+        self.order = order;
+        halved
     }
 }
 
@@ -119,22 +104,17 @@ mod tests {
 
     #[test]
     fn leaves_fill_the_light_in_order() {
-        let mut leaves = Leaves::of(4);
-        let mut numbers: Vec<usize> = (0..19).collect();
-        let (parted, halved) = leaves.halve(|leaf, _| [0, 5, 15].contains(&leaf).then_some(true));
-        follow(&mut numbers, 16, &parted);
-        assert_eq!(
-            (halved[0].level, &halved[0].cells[..], &halved[0].first[..]),
-            (4, &[0, 5, 15][..], &[0, 6, 17][..])
-        );
-        assert_eq!((&numbers[..9], &numbers[17..]), (&[0, 0, 1, 2, 3, 4, 5, 5, 6][..], &[15, 15][..]));
-        let (_, halved) = leaves.halve(|leaf, _| [1, 6, 8].contains(&leaf).then_some(true));
-        assert_eq!(
-            halved.iter().map(|halved| (halved.level, halved.cells.len())).collect::<Vec<_>>(),
-            [(5, 2), (4, 1)]
-        );
-        assert_eq!(leaves.parts.iter().sum::<f32>(), 1.0);
-        assert!((1..leaves.count()).all(|k| leaves.cells[k - 1] < leaves.cells[k]));
-        assert_eq!(leaves.parts.len(), 32);
+        let mut leaves = Leaves::of(6);
+        let halved = leaves.halve(|number, _| [0, 3].contains(&number).then_some(true));
+        let numbers = |halved: &Halved| halved.blocks.iter().map(|block| block.halves).collect::<Vec<_>>();
+        assert_eq!((halved[0].level, numbers(&halved[0])), (6, vec![[0, 4], [3, 5]]));
+        assert_eq!(leaves.order, [0, 4, 1, 2, 3, 5]);
+        let halved = leaves.halve(|number, _| [4, 1].contains(&number).then_some(false));
+        let sizes: Vec<_> = halved.iter().map(|halved| (halved.level, numbers(halved))).collect();
+        assert_eq!(sizes, [(7, vec![[4, 6]]), (6, vec![[1, 7]])]);
+        let ordered = || leaves.order.iter().map(|number| leaves.blocks[*number as usize]);
+        assert_eq!(ordered().map(|block| block.part()).sum::<f32>() * LANES as f32, 1.0);
+        let first = ordered().map(|block| FineCell::first_of(block.cell, block.level - WITHIN));
+        assert!(first.clone().zip(first.skip(1)).all(|(one, other)| one < other));
     }
 }

@@ -7,9 +7,8 @@
 
 use fearless_simd::{Level, f32x16, mask32x16, prelude::*};
 
-use super::ladder::CellBits;
 use super::leaves::Leaves;
-use super::tally::{LeafLanes, Tally};
+use super::tally::{Tally, only};
 use crate::accel::dispatch_all;
 use crate::material::{MOMENTS, Moments};
 use crate::math::LANES;
@@ -37,8 +36,8 @@ const LEAST: f64 = 1e-19;
 /// What the packets of all rays say.
 #[derive(Clone, Debug, Default)]
 pub(super) struct PacketErrors {
-    /// The leaves near edges.
-    pub leaves: CellBits,
+    /// Which blocks of leaves are near edges, by their numbers.
+    pub near: Vec<bool>,
     /// The deviations of what arrives, as parts of what would if nothing were in the way: by edges, which more points
     /// in those leaves make less, and by what varies everywhere.
     pub edges: OfKind,
@@ -52,11 +51,11 @@ impl PacketErrors {
     /// Of rays that asked points in the same leaves of a light of such a `measure`. `sent` is what would arrive if
     /// nothing were in the way.
     pub fn of(level: Level, tallies: &[&Tally], leaves: &Leaves, measure: f32, sent: &Moments) -> PacketErrors {
-        dispatch_all!(level, simd => PacketErrors::of_lanes(simd, tallies, &leaves.parts, measure, sent))
+        dispatch_all!(level, simd => PacketErrors::of_lanes(simd, tallies, leaves, measure, sent))
     }
 
     #[inline(always)]
-    fn of_lanes<S: Simd>(simd: S, tallies: &[&Tally], parts: &[f32], measure: f32, sent: &Moments) -> PacketErrors {
+    fn of_lanes<S: Simd>(simd: S, tallies: &[&Tally], leaves: &Leaves, measure: f32, sent: &Moments) -> PacketErrors {
         let rays = tallies.len();
         let per_packet = (LANES / rays.clamp(1, LANES)).next_power_of_two();
         let all = sum_of(tallies, |tally| tally.all);
@@ -68,23 +67,21 @@ impl PacketErrors {
         let weighs = [share.map(|share| 1.0 - share), share];
         let count = (per_packet * rays) as f32;
         let zero = simd.splat_f32x16(0.0);
-        let mut seen = Vec::with_capacity(parts.len() / LANES);
+        let mut seen = Vec::with_capacity(leaves.order.len());
         // Squares of what is sent: by mixed packets of all rays, and of one ray each; and of what varies in the others
         let (mut together, mut alone, mut smooth) = (OfKind::default(), OfKind::default(), OfKind::default());
-        for (block, parts) in parts.chunks_exact(LANES).enumerate() {
-            let part = f32x16::from_slice(simd, parts);
+        for number in &leaves.order {
+            let part = leaves.blocks[*number as usize].part();
             let (mut lit, mut hidden) = (0u16, 0u16);
-            let mut moments = [[zero; 3]; MOMENTS];
+            let mut moments = [[zero; 2]; MOMENTS];
             for tally in tallies {
-                let LeafLanes { sent, sends, hides } = tally.lanes(simd, block);
-                let [sends, hides] = [sends, hides].map(|is| is.simd_gt(zero).to_bitmask() as u16);
-                (lit, hidden) = (lit | sends & !hides, hidden | hides);
-                let is_mixed = hides != 0 && hides != sends;
-                for (k, sent) in sent.into_iter().enumerate() {
-                    let sent = sent * part * one[k];
+                let block = tally.block(*number as usize);
+                (lit, hidden) = (lit | block.lit(), hidden | block.hides);
+                let is_mixed = block.hides != 0 && block.hides != block.sends;
+                for (k, sent) in block.lanes(simd).into_iter().enumerate() {
+                    let sent = sent * (part * one[k]);
                     moments[k][0] += sent;
-                    moments[k][1] += sent * part;
-                    moments[k][2] += sent * sent;
+                    moments[k][1] += sent * sent;
                     if is_mixed {
                         alone[k] += squared(total(sent));
                     }
@@ -94,21 +91,17 @@ impl PacketErrors {
             if lit | hidden == 0 {
                 continue;
             }
-            let is_mixed = mask32x16::from_bitmask(simd, (spread(lit, per_packet) & spread(hidden, per_packet)).into());
+            let is_mixed = spread(lit, per_packet) & spread(hidden, per_packet);
             let is_lit = mask32x16::from_bitmask(simd, spread(lit, per_packet).into());
-            let all = sum_of_runs(simd, part, per_packet) * rays as f32;
-            let all = all.simd_gt(zero).select(all, simd.splat_f32x16(1.0));
-            let squares = sum_of_runs(simd, part * part, per_packet) * rays as f32;
             for k in 0..MOMENTS {
-                let [sum, by_part, square] = moments[k].map(|moment| sum_of_runs(simd, moment, per_packet));
-                together[k] += total(is_mixed.select(sum * sum, zero)) / per_packet as f32;
+                let [sum, square] = moments[k].map(|moment| sum_of_runs(simd, moment, per_packet));
+                together[k] += total(only(simd, is_mixed, sum * sum)) / per_packet as f32;
                 // Points vary smoothly: n of them stand for parts that are narrower by a root of n, so that their sum
                 // is wrong by as much as one of them is off their mean
-                let mean = sum / all;
-                let square = (square + mean * (mean * squares - by_part * 2.0)) * (1.0 / count);
+                let square = (square - sum * sum * (1.0 / count)) * (1.0 / count);
                 let [lit, hidden] = [0, 1].map(|which: usize| simd.splat_f32x16(squared(weighs[which][k])));
-                let weight = is_mixed.select(zero, is_lit.select(lit, hidden));
-                smooth[k] += total(square.max(zero) * weight) / per_packet as f32;
+                let weight = is_lit.select(lit, hidden);
+                smooth[k] += total(only(simd, !is_mixed, square.max(zero) * weight)) / per_packet as f32;
             }
         }
         let apart = squared(apart(tallies) * of_edge(count.into()) / of_edge(LANES as f64));
@@ -124,13 +117,16 @@ impl PacketErrors {
             let found = all[k] as f32 * measure / sent.0[k];
             smooth[k] = smooth[k].max(2.0 * share[k] * (1.0 - share[k]) * (found - 1.0).abs());
         }
-        PacketErrors { leaves: around(&seen, per_packet * AROUND), edges, smooth }
+        let mut near = vec![false; leaves.order.len()];
+        let around = around(&seen, per_packet * AROUND);
+        leaves.order.iter().zip(around).for_each(|(number, is_near)| near[*number as usize] = is_near);
+        PacketErrors { near, edges, smooth }
     }
 }
 
 /// The sum of sixteen numbers, in the same order with every instruction set.
 #[inline(always)]
-fn total<S: Simd>(of: f32x16<S>) -> f32 {
+pub(super) fn total<S: Simd>(of: f32x16<S>) -> f32 {
     sum_of_runs(of.token(), of, LANES).as_slice()[0]
 }
 
@@ -177,18 +173,20 @@ fn spread(bits: u16, run: usize) -> u16 {
     bits
 }
 
-/// The leaves of those runs in which something is hidden, and something is not.
-fn around(seen: &[[u16; 2]], run: usize) -> CellBits {
-    let mut cells = Vec::with_capacity(seen.len());
+/// Which blocks of leaves are near runs in which something is hidden, and something is not.
+fn around(seen: &[[u16; 2]], run: usize) -> Vec<bool> {
+    let mut near = Vec::with_capacity(seen.len());
     for blocks in seen.chunks(run.div_ceil(LANES)) {
-        if let [[lit, hidden]] = *blocks {
-            cells.push(spread(lit, run.min(LANES)) & spread(hidden, run.min(LANES)));
-        } else {
-            let (lit, hidden) = blocks.iter().fold((0, 0), |(a, b), [lit, hidden]| (a | lit, b | hidden));
-            cells.extend(blocks.iter().map(|_| if lit != 0 && hidden != 0 { 0xffff } else { 0 }));
-        }
+        let is_mixed = match *blocks {
+            [[lit, hidden]] => spread(lit, run.min(LANES)) & spread(hidden, run.min(LANES)) != 0,
+            _ => {
+                let (lit, hidden) = blocks.iter().fold((0, 0), |(a, b), [lit, hidden]| (a | lit, b | hidden));
+                lit != 0 && hidden != 0
+            }
+        };
+        near.resize(near.len() + blocks.len(), is_mixed);
     }
-    cells
+    near
 }
 
 /// How much farther off the sum of all rays may be than if all saw the same: rays that see different shares of the
@@ -227,7 +225,7 @@ mod tests {
     fn bits_spread_over_their_runs() {
         assert_eq!([1, 2, 4, 8, 16].map(|run| spread(0x0410, run)), [0x0410, 0x0c30, 0x0ff0, 0xffff, 0xffff]);
         assert_eq!(spread(0, 16), 0);
-        assert_eq!(around(&[[1, 2], [0x10, 0x10], [0, 0]], 4), [0x000f, 0x00f0, 0]);
-        assert_eq!(around(&[[1, 0], [0, 1], [1, 0], [1, 0]], 32), [0xffff, 0xffff, 0, 0]);
+        assert_eq!(around(&[[1, 2], [0x10, 0x20], [1, 0x10], [0, 0]], 4), [true, true, false, false]);
+        assert_eq!(around(&[[1, 0], [0, 1], [1, 0], [1, 0]], 32), [true, true, false, false]);
     }
 }

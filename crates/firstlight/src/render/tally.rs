@@ -1,8 +1,7 @@
 //! What points of an area light say, from one place, leaf by leaf of the light.
 //!
-//! Each leaf holds what the point in it says; where one was halved without a new point in one of the halves, both hold
-//! the same. A leaf counts for the part of the light that it is, so it is enough to ask anew where the edge of a shadow
-//! is. What points would send is tallied with and without what is hidden: all that a light would send is known exactly,
+//! Each leaf holds what the point in it says. Where leaves are halved, one half keeps the point, and the other has a new
+//! one. A leaf counts for the part of the light that it is, so it is enough to ask anew where the edge of a shadow is. What points would send is tallied with and without what is hidden: all that a light would send is known exactly,
 //! so the points only say which share of it arrives, a ratio estimate.
 //!
 //! Sources: of ratio estimates, Cochran, "Sampling Techniques", 1977, chapter 6; of the effective number of points,
@@ -10,9 +9,10 @@
 
 use fearless_simd::{Level, f32x16, mask32x16, prelude::*};
 
-use super::ladder::{Asker, CellBits, Rung, cells_in, to_halves};
+use super::ladder::{AskedRung, Asker, Rung, to_halves};
 use super::lanes::PointObstacles;
-use super::leaves::{Halved, Leaves, follow};
+use super::leaves::{Halved, Leaves};
+use super::packets::total;
 use crate::accel::dispatch_all;
 use crate::light::{Area, FineCell, MIN_DISTANCE2, Points};
 use crate::material::{Lobe, MOMENTS, Moments};
@@ -20,24 +20,20 @@ use crate::math::{LANES, Vec3x16};
 use crate::shape::SurfaceInteraction;
 use crate::visibility::ShadowView;
 
-/// Leaves whose sums are added up in single precision.
-const RUN: usize = 1 << 12;
+/// Blocks whose sums are added up in single precision.
+const RUN: usize = 1 << 8;
 
 /// Light is peaked where so many times more points send anything than there are effective ones, if that is more than
 /// this part of all.
 const PEAKED: f64 = 4.0;
 const PART: f64 = 1.0 / 16.0;
 
-/// What points of a light say, from one place: by leaf, and sums of what they would send, and of what of it arrives.
+/// What points of a light say, from one place: leaf by leaf, and sums of what they would send, and of what of it
+/// arrives.
 #[derive(Debug, Default)]
 pub(super) struct Tally {
-    /// Leaf by leaf, and 0 up to a multiple of sixteen: what its point would send from all of the light.
-    sent: [Vec<f32>; MOMENTS],
-    /// 1 where it would send anything, and where that is hidden; else 0.
-    sends: Vec<f32>,
-    hides: Vec<f32>,
-    /// Where the point is.
-    pub at: Vec<FineCell>,
+    /// By the number of the block.
+    blocks: Vec<BlockAnswers>,
     /// What would be sent, and what of it arrives.
     pub all: [f64; MOMENTS],
     pub lit: [f64; MOMENTS],
@@ -53,19 +49,16 @@ pub(super) struct Tally {
     pub surprises: [f64; MOMENTS],
 }
 
-/// What sixteen points say.
-#[derive(Clone, Copy)]
-struct BlockAnswers {
+/// What the points of sixteen leaves say.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct BlockAnswers {
+    /// Where they are.
+    pub at: [FineCell; LANES],
+    /// What each would send from all of the light.
     sent: [[f32; LANES]; MOMENTS],
-    sends: u16,
-    hides: u16,
-}
-
-/// What sixteen leaves hold.
-pub(super) struct LeafLanes<S: Simd> {
-    pub sent: [f32x16<S>; MOMENTS],
-    pub sends: f32x16<S>,
-    pub hides: f32x16<S>,
+    /// Which would send anything, and of which that is hidden, as bits.
+    pub sends: u16,
+    pub hides: u16,
 }
 
 impl Tally {
@@ -95,228 +88,175 @@ impl Tally {
         (0..MOMENTS).any(|k| sent[k] > much && effective[k] * PEAKED < sending)
     }
 
-    /// What the point in a leaf would send from all of the light.
-    pub fn sent(&self, leaf: usize) -> Moments {
-        Moments(std::array::from_fn(|k| self.sent[k][leaf]))
+    /// What the points in the leaves of a block say.
+    pub fn block(&self, number: usize) -> &BlockAnswers {
+        &self.blocks[number]
     }
 
-    /// What sixteen leaves hold.
-    #[inline(always)]
-    pub fn lanes<S: Simd>(&self, simd: S, block: usize) -> LeafLanes<S> {
-        let lanes = |of: &[f32]| f32x16::from_slice(simd, &of[block * LANES..][..LANES]);
-        LeafLanes {
-            sent: std::array::from_fn(|k| lanes(&self.sent[k])),
-            sends: lanes(&self.sends),
-            hides: lanes(&self.hides),
-        }
+    /// Where the point is that sends most, as `weigh` has it.
+    pub fn most(&self, weigh: impl Fn(&Moments) -> f32) -> FineCell {
+        let leaves = self.blocks.iter().flat_map(|block| (0..LANES).map(move |lane| (block, lane)));
+        let sent = |(block, lane): &(&BlockAnswers, usize)| weigh(&block.moments(*lane));
+        let most = leaves.map(|leaf| (sent(&leaf), leaf)).max_by(|(one, _), (other, _)| one.total_cmp(other));
+        most.map_or(FineCell::FIRST, |(_, (block, lane))| block.at[lane])
     }
 
     /// Hears what all points of a rung say, one in each of as many leaves, and forgets what was known. `view` says what
     /// is hidden in trees, point by point.
     pub fn fill(&mut self, asker: &Asker, rung: &Rung, view: &ShadowView, si: &SurfaceInteraction, lobe: &Lobe) {
-        let count = rung.cells.len();
-        self.at.clear();
-        self.at.extend_from_slice(&rung.cells);
-        self.numbers().for_each(|numbers| numbers.resize(count, 0.0));
-        self.surprises = Default::default();
         let obstacles = PointObstacles::of(view);
-        dispatch_all!(asker.level, simd => self.fill_lanes(simd, asker.area, &rung.points, si, lobe, &obstacles));
-    }
-
-    #[inline(always)]
-    fn fill_lanes<S: Simd>(
-        &mut self,
-        simd: S,
-        area: &Area,
-        points: &Points,
-        si: &SurfaceInteraction,
-        lobe: &Lobe,
-        obstacles: &PointObstacles,
-    ) {
-        let place = PlaceLanes::new(simd, area, si);
-        for block in 0..points.blocks.len() {
-            let BlockAnswers { sent, sends, hides } = place.ask(simd, area, points, block, lobe, obstacles);
-            let lanes = block * LANES..(block + 1) * LANES;
-            for (all, sent) in self.sent.iter_mut().zip(&sent) {
-                all[lanes.clone()].copy_from_slice(sent);
-            }
-            let one_where = |bits: u16| {
-                let is = mask32x16::from_bitmask(simd, bits.into());
-                is.select(simd.splat_f32x16(1.0), simd.splat_f32x16(0.0))
+        self.blocks.clear();
+        self.surprises = Default::default();
+        dispatch_all!(asker.level, simd => {
+            let place = PlaceLanes::new(simd, asker.area, si);
+            let answers = |(block, at): (usize, &[FineCell; LANES])| {
+                BlockAnswers { at: *at, ..place.ask(simd, asker.area, &rung.points, block, lobe, &obstacles) }
             };
-            one_where(sends).store_slice(&mut self.sends[lanes.clone()]);
-            one_where(hides).store_slice(&mut self.hides[lanes]);
-        }
+            self.blocks.extend(rung.cells.iter().enumerate().map(answers));
+        });
     }
 
-    /// Which leaves send, and which are hidden.
-    fn bits(&self) -> [CellBits; 2] {
-        [&self.sends, &self.hides].map(|numbers| {
-            let bit = |(lane, v): (usize, &f32)| u16::from(*v > 0.0) << lane;
-            let block = |block: &[f32]| block.iter().enumerate().map(bit).fold(0, |all, bit| all | bit);
-            numbers.chunks_exact(LANES).map(block).collect()
-        })
-    }
-
-    /// Hears one more point in each leaf, where all are cells of one size: `second`, of which `view` says what is
-    /// hidden in trees. `both` are those and the ones that are known, in half as large cells. `near` are leaves near
-    /// edges.
-    #[allow(clippy::too_many_arguments, reason = "points of a light, and a surface that it shines on")]
-    pub fn double(
+    /// Hears what one more point says in each leaf of those blocks that were halved, in place of what the half that it
+    /// is in holds. `view` says what is hidden in trees, point by point.
+    pub fn halve(
         &mut self,
         asker: &Asker,
-        second: &Rung,
-        both: &Rung,
-        near: &[u16],
-        view: &mut ShadowView,
-        si: &SurfaceInteraction,
-        lobe: &Lobe,
-    ) {
-        let [sends, hides] = self.bits();
-        if !view.hidden.is_empty() {
-            let new = view.hidden.iter().zip(&second.halves).map(|(hidden, halves)| to_halves(*hidden, *halves));
-            let old = hides.iter().zip(&second.halves).map(|(hidden, halves)| to_halves(*hidden, !halves));
-            view.hidden = new.zip(old).flat_map(|(new, old)| [new[0] | old[0], new[1] | old[1]]).collect();
-        }
-        self.fill(asker, both, view, si, lobe);
-        // What contradicts what leaves held that were thought to be away from edges
-        let [new_sends, new_hides] = self.bits();
-        let whole = |bits: u16| {
-            let [first, second] = [0, u16::MAX].map(|second| to_halves(bits, second));
-            [first[0] | second[0], first[1] | second[1]]
-        };
-        let part = 1.0 / self.at.len() as f64;
-        for (block, near) in near.iter().enumerate() {
-            let [sends, hides, near] = [sends[block], hides[block], *near].map(whole);
-            for half in 0..2 {
-                let leaves = 2 * block + half;
-                let is_other = !(sends[half] ^ new_sends[leaves]) & (hides[half] ^ new_hides[leaves]) & !near[half];
-                for leaf in cells_in(&[is_other]) {
-                    let sent = self.sent(leaves * LANES + leaf);
-                    self.surprises.iter_mut().zip(sent.0).for_each(|(sum, sent)| *sum += f64::from(sent) * part);
-                }
-            }
-        }
-    }
-
-    /// Follows leaves that were halved.
-    pub fn halve(&mut self, parted: &[u32]) {
-        let before = self.at.len();
-        let count = before + parted.len();
-        self.at.resize(count, FineCell::default());
-        follow(&mut self.at, before, parted);
-        for numbers in self.numbers() {
-            numbers.resize(count.next_multiple_of(LANES), 0.0);
-            follow(numbers, before, parted);
-        }
-    }
-
-    fn numbers(&mut self) -> impl Iterator<Item = &mut Vec<f32>> {
-        self.sent.iter_mut().chain([&mut self.sends, &mut self.hides])
-    }
-
-    /// Hears what those points of a rung say that are `asked`, one for each of the leaves that were halved, in place of
-    /// what the half that it is in holds. `view` says what is hidden in trees, point by point.
-    #[allow(clippy::too_many_arguments, reason = "points of a light, and a surface that it shines on")]
-    pub fn ask(
-        &mut self,
-        asker: &Asker,
-        rung: &Rung,
-        halved: &Halved,
-        asked: &[u16],
+        (rung, halved): (&AskedRung, &Halved),
         view: &ShadowView,
         si: &SurfaceInteraction,
         lobe: &Lobe,
     ) {
         let obstacles = PointObstacles::of(view);
-        dispatch_all!(asker.level, simd => self.add(simd, asker.area, rung, halved, asked, si, lobe, &obstacles));
+        let most = halved.blocks.last().map_or(0, |block| block.halves[1] as usize + 1);
+        self.blocks.resize(self.blocks.len().max(most), BlockAnswers::NONE);
+        let part = 0.5 / (1u64 << halved.level) as f32;
+        dispatch_all!(asker.level, simd => {
+            let place = PlaceLanes::new(simd, asker.area, si);
+            let mut surprises = [simd.splat_f32x16(0.0); MOMENTS];
+            for (k, block) in halved.blocks.iter().enumerate() {
+                let from = rung.block_of(k, block);
+                let answers = place.ask(simd, asker.area, &rung.points, from, lobe, &obstacles);
+                let new = BlockAnswers { at: rung.cells[from], ..answers };
+                let old = self.blocks[block.halves[0] as usize];
+                if block.is_away {
+                    let is_surprise = !(new.sends ^ old.sends) & (new.hides ^ old.hides);
+                    for (sum, sent) in surprises.iter_mut().zip(&new.sent) {
+                        *sum += only(simd, is_surprise, f32x16::from_slice(simd, sent));
+                    }
+                }
+                let halves = BlockAnswers::halves(simd, &old, &new, rung.halves[from]);
+                for (number, half) in block.halves.iter().zip(halves) {
+                    self.blocks[*number as usize] = half;
+                }
+            }
+            for (sum, new) in self.surprises.iter_mut().zip(surprises) {
+                *sum += f64::from(total(new) * part);
+            }
+        });
     }
 
     /// Sums up what all leaves hold.
     pub fn sum(&mut self, level: Level, leaves: &Leaves) {
-        dispatch_all!(level, simd => self.sum_lanes(simd, &leaves.parts));
+        dispatch_all!(level, simd => self.sum_lanes(simd, leaves));
     }
 
     #[inline(always)]
-    #[allow(clippy::too_many_arguments, reason = "points of a light, and a surface that it shines on")]
-    fn add<S: Simd>(
-        &mut self,
-        simd: S,
-        area: &Area,
-        rung: &Rung,
-        halved: &Halved,
-        asked: &[u16],
-        si: &SurfaceInteraction,
-        lobe: &Lobe,
-        obstacles: &PointObstacles,
-    ) {
-        let (place, mut next) = (PlaceLanes::new(simd, area, si), 0);
-        for (block, asked) in asked.iter().enumerate().filter(|(_, asked)| **asked != 0) {
-            let answers = place.ask(simd, area, &rung.points, block, lobe, obstacles);
-            let mut rest = *asked;
-            while rest != 0 {
-                let lane = rest.trailing_zeros() as usize % LANES;
-                rest &= rest - 1;
-                let at = rung.cells[block * LANES + lane];
-                let leaf = halved.first[next] as usize + at.half(halved.level);
-                next += 1;
-                self.at[leaf] = at;
-                let [sends, hides] = [answers.sends, answers.hides].map(|bits| f32::from(bits >> lane & 1));
-                let is_surprise = sends == self.sends[leaf] && hides != self.hides[leaf];
-                if is_surprise && halved.away[next - 1] {
-                    let part = 0.5 / (1u64 << halved.level) as f64;
-                    self.surprises
-                        .iter_mut()
-                        .zip(&answers.sent)
-                        .for_each(|(sum, sent)| *sum += f64::from(sent[lane]) * part);
-                }
-                for (sent, new) in self.sent.iter_mut().zip(&answers.sent) {
-                    sent[leaf] = new[lane];
-                }
-                (self.sends[leaf], self.hides[leaf]) = (sends, hides);
-            }
-        }
-    }
-
-    #[inline(always)]
-    fn sum_lanes<S: Simd>(&mut self, simd: S, parts: &[f32]) {
-        let zero = simd.splat_f32x16(0.0);
-        let mut totals = [0.0; 3 + 3 * MOMENTS];
-        for (run, parts) in parts.chunks(RUN).enumerate() {
-            let mut sums = [zero; 3 + 3 * MOMENTS];
-            for (block, part) in parts.chunks_exact(LANES).enumerate() {
-                let part = f32x16::from_slice(simd, part);
-                let LeafLanes { sent, sends, hides } = self.lanes(simd, run * (RUN / LANES) + block);
-                sums[0] += sends * part;
-                sums[1] += hides * part;
-                sums[2] += sends * part * part;
-                for (sums, sent) in sums[3..].chunks_exact_mut(3).zip(sent) {
+    fn sum_lanes<S: Simd>(&mut self, simd: S, leaves: &Leaves) {
+        let (mut parts, mut moments) = ([0.0; 3], [0.0; 3 * MOMENTS]);
+        for (blocks, answers) in leaves.blocks.chunks(RUN).zip(self.blocks.chunks(RUN)) {
+            let mut sums = [simd.splat_f32x16(0.0); 3 * MOMENTS];
+            for (block, answers) in blocks.iter().zip(answers) {
+                let part = block.part();
+                let [sends, hides] = [answers.sends, answers.hides].map(|bits| f64::from(bits.count_ones()));
+                parts[0] += sends * f64::from(part);
+                parts[1] += hides * f64::from(part);
+                parts[2] += sends * f64::from(part) * f64::from(part);
+                for (sums, sent) in sums.chunks_exact_mut(3).zip(answers.lanes(simd)) {
                     let sent = sent * part;
                     sums[0] += sent;
-                    sums[1] += sent * (sends - hides);
+                    sums[1] += only(simd, answers.lit(), sent);
                     sums[2] += sent * sent;
                 }
             }
-            for (total, sum) in totals.iter_mut().zip(&sums) {
+            for (total, sum) in moments.iter_mut().zip(&sums) {
                 *total += sum.as_slice().iter().map(|v| f64::from(*v)).sum::<f64>();
             }
         }
-        let [sending, hidden, squared_parts, moments @ ..] = totals;
-        (self.sending, self.hidden, self.squared_parts) = (sending, hidden, squared_parts);
+        [self.sending, self.hidden, self.squared_parts] = parts;
         for (k, moment) in moments.chunks_exact(3).enumerate() {
             (self.all[k], self.lit[k], self.squares[k]) = (moment[0], moment[1], moment[2]);
         }
     }
 }
 
+impl BlockAnswers {
+    const NONE: BlockAnswers =
+        BlockAnswers { at: [FineCell::FIRST; LANES], sent: [[0.0; LANES]; MOMENTS], sends: 0, hides: 0 };
+
+    /// Those that send, and are not hidden.
+    pub fn lit(&self) -> u16 {
+        self.sends & !self.hides
+    }
+
+    /// What each would send from all of the light.
+    #[inline(always)]
+    pub fn lanes<S: Simd>(&self, simd: S) -> [f32x16<S>; MOMENTS] {
+        std::array::from_fn(|k| f32x16::from_slice(simd, &self.sent[k]))
+    }
+
+    fn moments(&self, lane: usize) -> Moments {
+        Moments(std::array::from_fn(|k| self.sent[k][lane]))
+    }
+
+    /// What is held of both halves of each leaf: of one what a new point says, of the `second` where bits say so, and
+    /// of the other what was known.
+    #[inline(always)]
+    fn halves<S: Simd>(simd: S, old: &BlockAnswers, new: &BlockAnswers, second: u16) -> [BlockAnswers; 2] {
+        let mut halves = [BlockAnswers::NONE; 2];
+        let is_second = mask32x16::from_bitmask(simd, second.into());
+        for k in 0..MOMENTS {
+            let [old, new] = [old, new].map(|one| f32x16::from_slice(simd, &one.sent[k]));
+            let (low, high) = simd.interleave_f32x16(is_second.select(old, new), is_second.select(new, old));
+            low.store_slice(&mut halves[0].sent[k]);
+            high.store_slice(&mut halves[1].sent[k]);
+        }
+        for (leaf, (old, new)) in old.at.iter().zip(&new.at).enumerate() {
+            let is_second = second >> leaf & 1 == 1;
+            let pair = if is_second { [*old, *new] } else { [*new, *old] };
+            halves[2 * leaf / LANES].at[2 * leaf % LANES..][..2].copy_from_slice(&pair);
+        }
+        let bits = |of: fn(&BlockAnswers) -> u16| {
+            let [new, old] = [to_halves(of(new), second), to_halves(of(old), !second)];
+            [new[0] | old[0], new[1] | old[1]]
+        };
+        let [sends, hides] = [bits(|one| one.sends), bits(|one| one.hides)];
+        for (k, half) in halves.iter_mut().enumerate() {
+            (half.sends, half.hides) = (sends[k], hides[k]);
+        }
+        halves
+    }
+}
+
+/// Numbers where bits are set, and else 0.
+#[inline(always)]
+pub(super) fn only<S: Simd>(simd: S, bits: u16, of: f32x16<S>) -> f32x16<S> {
+    mask32x16::from_bitmask(simd, bits.into()).select(of, simd.splat_f32x16(0.0))
+}
+
 /// What each of some points of a light would send to a place, from all of it.
-pub(super) fn would_send(asker: &Asker, points: &Points, si: &SurfaceInteraction, lobe: &Lobe) -> Vec<Moments> {
-    let mut sent = Vec::with_capacity(points.blocks.len() * LANES);
+pub(super) fn would_send(
+    asker: &Asker,
+    places: impl Iterator<Item = [[f64; LANES]; 2]>,
+    si: &SurfaceInteraction,
+    lobe: &Lobe,
+) -> Vec<Moments> {
+    let mut sent = Vec::new();
     dispatch_all!(asker.level, simd => {
         let place = PlaceLanes::new(simd, asker.area, si);
+        let points = asker.area.points_at(places);
         for block in 0..points.blocks.len() {
-            let answers = place.ask(simd, asker.area, points, block, lobe, &PointObstacles::default());
-            sent.extend((0..LANES).map(|lane| Moments(answers.sent.map(|sent| sent[lane]))));
+            let answers = place.ask(simd, asker.area, &points, block, lobe, &PointObstacles::default());
+            sent.extend((0..LANES).map(|lane| answers.moments(lane)));
         }
     });
     sent
@@ -345,7 +285,7 @@ impl<S: Simd> PlaceLanes<S> {
         }
     }
 
-    /// What sixteen points of an area light send.
+    /// What sixteen points of an area light send, wherever they are.
     #[inline(always)]
     fn ask(
         &self,
@@ -365,7 +305,7 @@ impl<S: Simd> PlaceLanes<S> {
         let is_above = height.simd_gt(zero)
             & self.horizon.dot(l).simd_gt(self.floor)
             & distance2.simd_ge(simd.splat_f32x16(MIN_DISTANCE2));
-        let mut answers = BlockAnswers { sent: [[0.0; LANES]; MOMENTS], sends: 0, hides: 0 };
+        let mut answers = BlockAnswers::NONE;
         if is_above.all_false() {
             return answers;
         }

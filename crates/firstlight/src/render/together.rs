@@ -416,7 +416,7 @@ impl Together {
             // More everywhere as long as there is room for more near edges
             let is_raised = !is_told || unmet.max(overlooked) > allowed || !asked.is_raised;
             let is_raised = is_raised && (4 * points <= MOST || edges <= allowed);
-            asked.halve(&packets.leaves, is_raised, asking, counts);
+            asked.halve(&packets.near, is_raised, asking, counts);
         }
     }
 }
