@@ -341,7 +341,9 @@ impl Area {
     #[inline(always)]
     pub(crate) fn points_at(&self, places: impl Iterator<Item = [[f64; LANES]; 2]>) -> Points {
         let mut points = Points { blocks: Vec::with_capacity(places.size_hint().0), normals: Vec::new() };
-        places.for_each(|[x, y]| points.push(&self.shape, &x, &y));
+        for [x, y] in places {
+            points.push(&self.shape, &x, &y);
+        }
         points
     }
 
@@ -501,12 +503,27 @@ impl Points {
     #[inline(always)]
     fn push(&mut self, shape: &AreaShape, x: &[f64; LANES], y: &[f64; LANES]) {
         match shape {
-            AreaShape::Rectangle(rectangle) => self.blocks.push(PointBlock::of(|k| rectangle.point([x[k], y[k]]))),
-            AreaShape::Disk(disk) => self.blocks.push(PointBlock::of(|k| disk.point([x[k], y[k]]))),
+            AreaShape::Rectangle(rectangle) => self.blocks.push(PointBlock::of(
+                #[inline(always)]
+                |k| rectangle.point([x[k], y[k]]),
+            )),
+            AreaShape::Disk(disk) => self.blocks.push(PointBlock::of(
+                #[inline(always)]
+                |k| disk.point([x[k], y[k]]),
+            )),
             AreaShape::Sphere(sphere) => {
-                let normal = |k: usize| SphereLight::normal([x[k], y[k]]);
-                self.blocks.push(PointBlock::of(|k| sphere.center + normal(k) * sphere.radius));
-                self.normals.push(PointBlock::of(normal));
+                let mut normals = [DVec3::ZERO; LANES];
+                for k in 0..LANES {
+                    normals[k] = SphereLight::normal([x[k], y[k]]);
+                }
+                self.normals.push(PointBlock::of(
+                    #[inline(always)]
+                    |k| normals[k],
+                ));
+                self.blocks.push(PointBlock::of(
+                    #[inline(always)]
+                    |k| sphere.center + normals[k] * sphere.radius,
+                ));
             }
         }
     }

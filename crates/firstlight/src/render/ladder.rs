@@ -122,9 +122,13 @@ impl<'a> Asker<'a> {
         }
         let mut cells = Vec::with_capacity(halved.blocks.len());
         let points = dispatch_all!(self.level, _simd => {
-            let second = |block: &HalvedBlock| FineCell::seconds(at(block.halves[0]), series, halved.level);
-            cells.extend(halved.blocks.iter().map(second));
-            self.area.points_at(cells.iter().map(FineCell::middles))
+            for block in &halved.blocks {
+                cells.push(FineCell::seconds(at(block.halves[0]), series, halved.level));
+            }
+            self.area.points_at(cells.iter().map(
+                #[inline(always)]
+                |cells| FineCell::middles(cells),
+            ))
         });
         AskedRung::Made(Rung::new(cells, halved.level, points))
     }

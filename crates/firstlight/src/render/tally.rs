@@ -109,10 +109,10 @@ impl Tally {
         self.surprises = Default::default();
         dispatch_all!(asker.level, simd => {
             let place = PlaceLanes::new(simd, asker.area, si);
-            let answers = |(block, at): (usize, &[FineCell; LANES])| {
-                BlockAnswers { at: *at, ..place.ask(simd, asker.area, &rung.points, block, lobe, &obstacles) }
-            };
-            self.blocks.extend(rung.cells.iter().enumerate().map(answers));
+            for (block, at) in rung.cells.iter().enumerate() {
+                let answers = place.ask(simd, asker.area, &rung.points, block, lobe, &obstacles);
+                self.blocks.push(BlockAnswers { at: *at, ..answers });
+            }
         });
     }
 
@@ -256,7 +256,9 @@ pub(super) fn would_send(
         let points = asker.area.points_at(places);
         for block in 0..points.blocks.len() {
             let answers = place.ask(simd, asker.area, &points, block, lobe, &PointObstacles::default());
-            sent.extend((0..LANES).map(|lane| answers.moments(lane)));
+            for lane in 0..LANES {
+                sent.push(answers.moments(lane));
+            }
         }
     });
     sent
