@@ -102,8 +102,8 @@ pub(crate) struct Asked<'a> {
 
 /// How much more a cell or a panel takes for each thing in the way that reaches into a light that is a ball, and for
 /// each torus.
-const CUT: u32 = 2;
-const TORUS: u32 = 1;
+const CUT: u32 = 15;
+const TORUS: u32 = 5;
 
 impl Asked<'_> {
     /// Which of all that may be in the way reach into the light, if that is a ball: in lists, and then of trees.

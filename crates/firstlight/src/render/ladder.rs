@@ -125,10 +125,7 @@ impl<'a> Asker<'a> {
             for block in &halved.blocks {
                 cells.push(FineCell::seconds(at(block.halves[0]), series, halved.level));
             }
-            self.area.points_at(cells.iter().map(
-                #[inline(always)]
-                |cells| FineCell::middles(cells),
-            ))
+            self.area.points_at(cells.iter().map(FineCell::middles))
         });
         AskedRung::Made(Rung::new(cells, halved.level, points))
     }

@@ -6,7 +6,7 @@ use super::geometry::{At, Geometry, Hit, Meets, Nearest, Placed, PlacedSpot, Pla
 use crate::accel::{Aabb, Planes, RayPacket16, RayTile, TraceRay, dispatch_eight, dispatch_sixteen};
 use crate::ids::{LightId, MaterialId, SurfaceId};
 use crate::math::{DVec3, Ray, ShadowRay, Vec3};
-use crate::shape::{Mesh, RayDifferential, ShapePoint, SolidHit, TileHits, TrianglePoint, every};
+use crate::shape::{LineLanes, Mesh, RayDifferential, ShapePoint, SolidHit, TileHits, TrianglePoint, every};
 
 impl Geometry {
     /// Whether there is anything beside the lists.
@@ -526,9 +526,20 @@ impl Geometry {
         if thing.shadow == Meets::None || active == 0 {
             return 0;
         }
-        let PlacedTarget::Mesh(mesh) = thing.target else {
-            let blocks = |lane: &usize| self.blocked_by_placed(simd, index, &shadows.ray(*lane), shadows.t_end[*lane]);
-            return lanes(active).filter(blocks).fold(0, |mask, lane| mask | 1 << lane);
+        let mesh = match thing.target {
+            PlacedTarget::Mesh(mesh) => mesh,
+            PlacedTarget::Solid(solid) => {
+                if thing.shadow == Meets::Some && !self.casts(thing.surface, shadows.light()) {
+                    return 0;
+                }
+                let lines = LineLanes::new(&thing.placement, &shadows.rays, &shadows.t_end);
+                return self.solids[solid as usize].blocks_lanes(&lines, active);
+            }
+            PlacedTarget::Points(_) => {
+                let blocks =
+                    |lane: &usize| self.blocked_by_placed(simd, index, &shadows.ray(*lane), shadows.t_end[*lane]);
+                return lanes(active).filter(blocks).fold(0, |mask, lane| mask | 1 << lane);
+            }
         };
         let mesh = &self.meshes[mesh as usize];
         let mut own = RayPacket16::ZERO;

@@ -50,6 +50,17 @@ impl Ball {
         Chord { enter: at(-half), leave: at(half) }.first(shift, t_min, t_max, single_sided)
     }
 
+    /// Whether [`intersect`](Self::intersect) finds anything, from either side. Without branches.
+    #[inline(always)]
+    pub fn blocks(&self, ray: &DRay, t_min: f64, t_max: f64) -> bool {
+        let (near, shift) = ray.nearest_to(DVec3::ZERO);
+        let distance = near.o.length();
+        let half2 = (1.0 - distance) * (1.0 + distance) / near.d.length_squared();
+        let half = half2.max(0.0).sqrt();
+        let [enter, leave] = [-half + shift, half + shift];
+        (half2 >= 0.0) & ((enter > t_min) & (enter < t_max) | (leave > t_min) & (leave < t_max))
+    }
+
     pub fn point(&self, ray: &DRay, hit: &SolidHit) -> SolidPoint {
         let n = ray.at(hit.t).normalize_or(DVec3::Y);
         let (from_x, from_y) = ((n.y * n.y + n.z * n.z).sqrt(), (n.x * n.x + n.z * n.z).sqrt());

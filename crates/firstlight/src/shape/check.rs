@@ -2,10 +2,10 @@
 
 use glam::DVec2;
 
-use super::solid::{Solid, SolidHit};
+use super::solid::{LineLanes, Solid, SolidHit};
 use super::surface::UvEdge;
 use crate::context::CompileContext;
-use crate::math::{DRay, DVec3, ErrorBound};
+use crate::math::{DRay, DVec3, ErrorBound, LANES};
 
 /// Numbers that are the same on every run.
 pub(crate) struct Random(firstlight_testkit::Random);
@@ -126,6 +126,27 @@ impl KnownSolid<'_> {
         None
     }
 
+    /// Sixteen rays like one get the answers that each gets by itself, whichever of them are asked.
+    fn lanes_agree(&self, ray: &DRay, random: &mut Random) {
+        let mut lines = [*ray; LANES];
+        for line in &mut lines[1..] {
+            // Along an axis of the shape now and then
+            let d = ray.d + random.in_ball() * ray.d.length();
+            let d = if random.unit() < 0.2 {
+                [DVec3::X, DVec3::Y, DVec3::Z][(3.0 * random.unit()) as usize % 3]
+            } else {
+                d
+            };
+            *line = DRay { o: ray.o + random.in_ball() * (0.1 * self.size), d };
+        }
+        let (end, asked) = (random.magnitude(0.1, 10.0) * self.size / ray.d.length(), (65536.0 * random.unit()) as u16);
+        let answers = self.solid.blocks_lanes(&LineLanes::of(&lines, end), asked);
+        for (k, line) in lines.iter().enumerate() {
+            let is_met = asked >> k & 1 == 1 && self.solid.intersect(line, 0.0, end, false).is_some();
+            assert_eq!(answers >> k & 1 == 1, is_met, "{line:?} {:?}", self.solid);
+        }
+    }
+
     /// Hits are where the distance function changes its sign for the first time; normals are its gradient.
     pub fn meets_rays(&self, rays: usize) {
         let mut random = Random::new(7);
@@ -140,6 +161,7 @@ impl KnownSolid<'_> {
             let truth = self.march(&ray);
             let hit = self.solid.intersect(&ray, 0.0, f64::INFINITY, false);
             assert_eq!(hit.is_some(), self.solid.blocks(&ray, 0.0, f64::INFINITY));
+            self.lanes_agree(&ray, &mut random);
             if let Some(truth) = truth {
                 let deep = (self.distance)(ray.at(truth + 1e-7 * self.size / ray.d.length())).abs();
                 let Some(hit) = hit else {

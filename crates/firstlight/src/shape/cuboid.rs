@@ -58,6 +58,16 @@ impl Cuboid {
         chord.first(0.0, t_min, t_max, single_sided)
     }
 
+    /// Whether [`intersect`](Self::intersect) finds anything, from either side. Without branches.
+    #[inline(always)]
+    pub fn blocks(&self, ray: &DRay, t_min: f64, t_max: f64) -> bool {
+        let mut way = [f64::NEG_INFINITY, f64::INFINITY];
+        for axis in 0..3 {
+            way = Chord::slab_ends(way, [ray.o[axis], ray.d[axis]], [self.low[axis], self.high[axis]]);
+        }
+        Chord::has_end(way, 0.0, t_min, t_max)
+    }
+
     pub fn point(&self, ray: &DRay, hit: &SolidHit) -> SolidPoint {
         let (axis, positive) = (hit.part as usize / 2, hit.part % 2 == 1);
         let mut p = ray.at(hit.t).max(self.low).min(self.high);

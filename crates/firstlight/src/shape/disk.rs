@@ -110,6 +110,16 @@ impl Disk {
         inside.then_some(SolidHit { t, part: 0 })
     }
 
+    /// Whether [`intersect`](Self::intersect) finds anything, from either side. Without branches.
+    #[inline(always)]
+    pub fn blocks(&self, ray: &DRay, t_min: f64, t_max: f64) -> bool {
+        let from = ray.o - self.center;
+        let t = -self.frame.z.dot(from) / self.frame.z.dot(ray.d);
+        let distance2 = (from + ray.d * t).length_squared();
+        let inside = (distance2 <= self.radius * self.radius) & (distance2 >= self.inner * self.inner);
+        (t > t_min) & (t < t_max) & inside
+    }
+
     pub fn point(&self, ray: &DRay, hit: &SolidHit) -> SolidPoint {
         let hit = self.frame.local(ray.o - self.center + ray.d * hit.t).truncate();
         let on = ring_point(hit, self.radius, self.inner);

@@ -95,6 +95,56 @@ impl Frustum {
         within(mantle.enter).or_else(|| if single_sided { None } else { within(mantle.leave) })
     }
 
+    /// Whether [`intersect`](Self::intersect) finds anything, from either side. Without branches.
+    #[inline(always)]
+    pub fn blocks(&self, ray: &DRay, t_min: f64, t_max: f64) -> bool {
+        let middle = self.p0 + self.frame.z * (0.5 * self.height);
+        let (near, shift) = ray.nearest_to(middle);
+        let (mut o, d) = (self.frame.local(near.o), self.frame.local(near.d));
+        o.z += 0.5 * self.height;
+        let mantle = self.mantle_ends(o, d);
+        if self.capped {
+            let way = Chord::slab_ends([f64::NEG_INFINITY, f64::INFINITY], [o.z, d.z], [0.0, self.height]);
+            return Chord::has_end(Chord::cut_ends(way, mantle), shift, t_min, t_max);
+        }
+        let slack = 8.0 * f64::EPSILON * (self.height + (ray.o - middle).length());
+        let within = |end: f64| {
+            let (z, t) = (o.z + d.z * end, end + shift);
+            (z >= -slack) & (z <= self.height + slack) & (t > t_min) & (t < t_max)
+        };
+        (mantle[0] <= mantle[1]) & (within(mantle[0]) | within(mantle[1]))
+    }
+
+    /// The ends of [`mantle`](Self::mantle), without branches.
+    #[inline(always)]
+    fn mantle_ends(&self, o: DVec3, d: DVec3) -> [f64; 2] {
+        const NOTHING: [f64; 2] = [f64::INFINITY, f64::NEG_INFINITY];
+        let choose = |is: bool, one: [f64; 2], other: [f64; 2]| {
+            [if is { one[0] } else { other[0] }, if is { one[1] } else { other[1] }]
+        };
+        let (radius, change) = (self.radius(o.z), self.slope * d.z);
+        let (o, d) = (o.truncate(), d.truncate());
+        let (width, speed) = (o.length(), d.length());
+        let a = (speed - change.abs()) * (speed + change.abs());
+        let b = o.dot(d) - change * radius;
+        let c = (width - radius) * (width + radius);
+        let (reach, miss) = ((d * radius - o * change).length(), o.perp_dot(d).abs());
+        let discriminant = (reach - miss) * (reach + miss);
+        let (none, all) = (f64::NEG_INFINITY, f64::INFINITY);
+        let end = -0.5 * c / b;
+        let is_in = (c <= 0.0) & (radius >= 0.0);
+        let along = choose(b < 0.0, [end, all], choose(is_in, [none, all], NOTHING));
+        let along = choose(b > 0.0, [none, end], along);
+        let root = discriminant.max(0.0).sqrt();
+        let q = if b > 0.0 { -b - root } else { root - b };
+        let [t0, t1] = choose(q == 0.0, [0.0; 2], [q / a, c / q]);
+        let (first, last) = (t0.min(t1), t0.max(t1));
+        let is_there = (radius + change * (-b / a) >= 0.0) | (self.slope == 0.0);
+        let between = choose(is_there & (discriminant >= 0.0), [first, last], NOTHING);
+        let steep = choose(change > 0.0, [last, all], [none, first]);
+        choose(a == 0.0, along, choose(a > 0.0, between, steep))
+    }
+
     /// The part of the line o + t d inside the mantle, which is thought to go on beyond the ends, up to the apex.
     ///
     /// In the plane across the axis, with the radius R + D t: |o + t d| = R + D t, or a t^2 + 2 b t + c = 0 with

@@ -48,7 +48,7 @@ pub(crate) use mesh::{Mesh, MeshBuilder, MeshSource, TrianglePoint};
 pub(crate) use parallelogram::{ParallelogramShadow, PlaneSide};
 pub(crate) use placement::Placement;
 pub(crate) use point_set::PointSet;
-pub(crate) use solid::{Canonical, Solid, SolidHit};
+pub(crate) use solid::{Canonical, LineLanes, Solid, SolidHit};
 pub(crate) use sphere::SphereShadow;
 pub(crate) use surface::ShapePoint;
 pub(crate) use triangles::{Eye, SeenTriangle, TOGETHER, TileHits, TriangleTree, every};

@@ -2,6 +2,7 @@
 
 use glam::DVec2;
 
+use super::Placement;
 use super::ball::Ball;
 use super::cuboid::Cuboid;
 use super::disk::Disk;
@@ -9,7 +10,8 @@ use super::frustum::Frustum;
 use super::plane::UnboundedPlane;
 use super::surface::UvEdge;
 use super::torus::Torus;
-use crate::math::{Axes, DAffine3, DMat3, DRay, DVec3};
+use crate::accel::RayPacket16;
+use crate::math::{Axes, DAffine3, DMat3, DRay, DVec3, LANES};
 
 /// A shape, ready to be hit.
 #[derive(Clone, Copy, Debug)]
@@ -150,9 +152,45 @@ impl Solid {
     #[inline]
     pub fn blocks(&self, ray: &DRay, t_min: f64, t_max: f64) -> bool {
         match self {
+            Solid::Plane(plane) => plane.intersect(ray, t_min, t_max, false).is_some(),
+            Solid::Disk(disk) => disk.blocks(ray, t_min, t_max),
+            Solid::Cuboid(cuboid) => cuboid.blocks(ray, t_min, t_max),
+            Solid::Frustum(frustum) => frustum.blocks(ray, t_min, t_max),
             Solid::Torus(torus) => torus.blocks(ray, t_min, t_max),
-            _ => self.intersect(ray, t_min, t_max, false).is_some(),
+            Solid::Ball(ball) => ball.blocks(ray, t_min, t_max),
         }
+    }
+
+    /// Which of sixteen lines that are `asked` it blocks between 0 and the ends of each, bit by bit: the same answers
+    /// as those of [`blocks`](Self::blocks). In lanes where it is called within `vectorize`.
+    #[inline(always)]
+    pub fn blocks_lanes(&self, lines: &LineLanes, asked: u16) -> u16 {
+        let [blocked, is_told] = match self {
+            Solid::Plane(_) => [0, 0],
+            Solid::Disk(disk) => lines.each(
+                #[inline(always)]
+                |ray, end| [disk.blocks(ray, 0.0, end), true],
+            ),
+            Solid::Cuboid(cuboid) => lines.each(
+                #[inline(always)]
+                |ray, end| [cuboid.blocks(ray, 0.0, end), true],
+            ),
+            Solid::Frustum(frustum) => lines.each(
+                #[inline(always)]
+                |ray, end| [frustum.blocks(ray, 0.0, end), true],
+            ),
+            Solid::Torus(torus) => lines.each(
+                #[inline(always)]
+                |ray, end| torus.blocks_at_once(ray, 0.0, end),
+            ),
+            Solid::Ball(ball) => lines.each(
+                #[inline(always)]
+                |ray, end| [ball.blocks(ray, 0.0, end), true],
+            ),
+        };
+        let rest = (0..LANES).filter(|k| (asked & !is_told) >> k & 1 == 1);
+        let blocks = |k: usize| self.blocks(&lines.line(k), 0.0, lines.end[k]);
+        asked & blocked | rest.fold(0, |bits, k| bits | u16::from(blocks(k)) << k)
     }
 
     /// The point of a hit of [`intersect`](Self::intersect) with the same ray.
@@ -215,6 +253,51 @@ impl Solid {
     }
 }
 
+/// Sixteen lines in the space of a shape.
+pub(crate) struct LineLanes {
+    o: [[f64; LANES]; 3],
+    d: [[f64; LANES]; 3],
+    /// Where each ends.
+    end: [f64; LANES],
+}
+
+impl LineLanes {
+    /// Rays of the world in the space of what is placed so. In lanes where it is called within `vectorize`.
+    #[inline(always)]
+    pub fn new(placement: &Placement, rays: &RayPacket16, t_end: &[f32; LANES]) -> LineLanes {
+        let mut lines = LineLanes { o: [[0.0; LANES]; 3], d: [[0.0; LANES]; 3], end: t_end.map(f64::from) };
+        for k in 0..LANES {
+            let DRay { o, d } = placement.line(rays.o(k), rays.d(k));
+            for axis in 0..3 {
+                (lines.o[axis][k], lines.d[axis][k]) = (o[axis], d[axis]);
+            }
+        }
+        lines
+    }
+
+    #[inline(always)]
+    fn line(&self, k: usize) -> DRay {
+        let [o, d] = [&self.o, &self.d].map(|v| DVec3::new(v[0][k], v[1][k], v[2][k]));
+        DRay { o, d }
+    }
+
+    /// For which of them each of two things is true, bit by bit, up to the end of each.
+    #[inline(always)]
+    fn each(&self, is: impl Fn(&DRay, f64) -> [bool; 2]) -> [u16; 2] {
+        let [mut one, mut other] = [[0u64; LANES]; 2];
+        for k in 0..LANES {
+            [one[k], other[k]] = is(&self.line(k), self.end[k]).map(u64::from);
+        }
+        [one, other].map(|lanes| lanes.iter().enumerate().fold(0, |bits, (k, lane)| bits | (*lane as u16) << k))
+    }
+
+    #[cfg(test)]
+    pub fn of(lines: &[DRay; LANES], end: f64) -> LineLanes {
+        let each = |of: fn(&DRay) -> DVec3| std::array::from_fn(|axis| std::array::from_fn(|k| of(&lines[k])[axis]));
+        LineLanes { o: each(|line| line.o), d: each(|line| line.d), end: [end; LANES] }
+    }
+}
+
 /// The part of a line inside a convex shape, made by cutting away what is outside of one side after another. A line
 /// through the inside has both ends, so no ray slips out where sides meet.
 #[derive(Clone, Copy, Debug)]
@@ -255,6 +338,30 @@ impl Chord {
         let at_low = SolidHit { t: (low - o) / d, part: part_low };
         let at_high = SolidHit { t: (high - o) / d, part: part_high };
         if d > 0.0 { self.cut(at_low, at_high) } else { self.cut(at_high, at_low) }
+    }
+
+    /// The ends alone, without branches: what is left of a part of the line between two planes, as by
+    /// [`cut_slab`](Self::cut_slab).
+    #[inline(always)]
+    pub fn slab_ends(way: [f64; 2], [o, d]: [f64; 2], [low, high]: [f64; 2]) -> [f64; 2] {
+        let (at_low, at_high) = ((low - o) / d, (high - o) / d);
+        let (enter, leave) = if d > 0.0 { (at_low, at_high) } else { (at_high, at_low) };
+        let is_between = (o >= low) & (o <= high);
+        let along = if is_between { f64::NEG_INFINITY } else { f64::INFINITY };
+        Self::cut_ends(way, if d == 0.0 { [along, -along] } else { [enter, leave] })
+    }
+
+    /// The same of [`cut`](Self::cut).
+    #[inline(always)]
+    pub fn cut_ends(way: [f64; 2], [enter, leave]: [f64; 2]) -> [f64; 2] {
+        [if enter > way[0] { enter } else { way[0] }, if leave < way[1] { leave } else { way[1] }]
+    }
+
+    /// Whether [`first`](Self::first) finds an end of such a part, from either side.
+    #[inline(always)]
+    pub fn has_end([enter, leave]: [f64; 2], shift: f64, t_min: f64, t_max: f64) -> bool {
+        let within = |t: f64| (t + shift > t_min) & (t + shift < t_max);
+        (enter <= leave) & (within(enter) | within(leave))
     }
 
     /// Whether nothing is left.

@@ -59,6 +59,34 @@ struct Way {
     shift: f64,
 }
 
+impl Way {
+    /// The part of it between two values of t, in metres.
+    #[inline(always)]
+    fn ends(&self, t_min: f64, t_max: f64) -> [f64; 2] {
+        let at = |t: f64| (t - self.shift) * self.speed;
+        [self.low.max(at(t_min)), self.high.min(at(t_max))]
+    }
+}
+
+/// What the Bernstein coefficients of a polynomial say of its signs: that it is negative somewhere, or positive, or one
+/// of them everywhere.
+struct Signs {
+    is_in: bool,
+    is_out: bool,
+    is_one: bool,
+}
+
+impl Signs {
+    #[inline(always)]
+    fn of(coefficients: &[f64; 5], margin: f64) -> Signs {
+        let [a, b, c, d, e] = *coefficients;
+        let (below, above) = (|v: f64| v < -margin, |v: f64| v > margin);
+        let all_below = below(a) & below(b) & below(c) & below(d) & below(e);
+        let all_above = above(a) & above(b) & above(c) & above(d) & above(e);
+        Signs { is_in: below(a) | below(e), is_out: above(a) | above(e), is_one: all_below | all_above }
+    }
+}
+
 /// The part of its size, and that to the fourth, to which polynomials are not trusted.
 const CLOSE: f64 = 1e-9;
 /// How often a way is halved to find out whether it meets the tube.
@@ -90,31 +118,37 @@ impl Torus {
         (distance - self.minor, slope)
     }
 
+    /// How far a point is from the surface, negative inside the tube.
+    #[inline(always)]
+    fn height(&self, p: DVec3) -> f64 {
+        DVec2::new(p.truncate().length() - self.major, p.z).length() - self.minor
+    }
+
     /// The part of a line on which it may be in the tube; `None` if there is none.
     #[inline]
     fn way(&self, ray: &DRay) -> Option<Way> {
+        let (way, is_any) = self.way_there(ray);
+        is_any.then_some(way)
+    }
+
+    /// The same, and whether there is any; without branches.
+    #[inline(always)]
+    fn way_there(&self, ray: &DRay) -> (Way, bool) {
         let (near, shift) = ray.nearest_to(self.center);
         // The line's way through the ball around the torus, in metres
         let outer = (self.major + self.minor) * (1.0 + 1e-9);
         let half2 = outer * outer - near.o.length_squared();
-        if !(half2 >= 0.0) {
-            return None;
-        }
         let speed = near.d.length();
         let (o, d) = (self.frame.local(near.o), self.frame.local(near.d) / speed);
-        let (mut low, mut high) = (-half2.sqrt(), half2.sqrt());
+        let half = half2.max(0.0).sqrt();
         // And through the slab that it fills
         let thick = self.minor * (1.0 + 1e-9);
-        if d.z == 0.0 {
-            if o.z.abs() > thick {
-                return None;
-            }
-        } else {
-            let (a, b) = ((-thick - o.z) / d.z, (thick - o.z) / d.z);
-            low = low.max(a.min(b));
-            high = high.min(a.max(b));
-        }
-        (low < high).then_some(Way { o, d, low, high, speed, shift })
+        let (a, b) = ((-thick - o.z) / d.z, (thick - o.z) / d.z);
+        let is_level = d.z == 0.0;
+        let low = if is_level { -half } else { (-half).max(a.min(b)) };
+        let high = if is_level { half } else { half.min(a.max(b)) };
+        let is_any = (half2 >= 0.0) & !(is_level & (o.z.abs() > thick)) & (low < high);
+        (Way { o, d, low, high, speed, shift }, is_any)
     }
 
     /// The line meets the torus where a polynomial of degree four is 0. Its coefficients know the roots badly where two
@@ -160,12 +194,60 @@ impl Torus {
     #[inline]
     pub fn blocks(&self, ray: &DRay, t_min: f64, t_max: f64) -> bool {
         let Some(way) = self.way(ray) else { return false };
-        let from = way.low.max((t_min - way.shift) * way.speed);
-        let to = way.high.min((t_max - way.shift) * way.speed);
-        match self.changes_sides(&way, from, to) {
+        match self.changes_sides(&way, way.ends(t_min, t_max)) {
             Some(changes) => changes,
             None => self.meet(&way, t_min, t_max, false).is_some(),
         }
+    }
+
+    /// What [`blocks`](Self::blocks) says where that is seen at once, and whether it is; without branches.
+    #[inline(always)]
+    pub fn blocks_at_once(&self, ray: &DRay, t_min: f64, t_max: f64) -> [bool; 2] {
+        let (way, is_any) = self.way_there(ray);
+        let [from, to] = way.ends(t_min, t_max);
+        let signs = Signs::of(&self.bernstein(&way, from, to), self.margin());
+        let least = CLOSE * (self.major + self.minor);
+        let is_known = (to - from > least) & self.is_known(&way, [from, to]);
+        let is_through = is_any & is_known & signs.is_in & (signs.is_out | self.fills_hole());
+        let is_past = !is_any | (from - to > least) | is_known & signs.is_one;
+        [is_through, is_through | is_past]
+    }
+
+    /// A tube that fills the hole has another sheet within it.
+    #[inline(always)]
+    fn fills_hole(&self) -> bool {
+        self.minor >= self.major
+    }
+
+    /// Whether the signs of the polynomial tell on which side a line is: of a tube that fills the hole, where both ends
+    /// are outside of it for sure.
+    #[inline(always)]
+    fn is_known(&self, way: &Way, ends: [f64; 2]) -> bool {
+        let least = CLOSE * (self.major + self.minor);
+        let [first, last] = ends.map(|s| self.height(way.o + way.d * s) > least);
+        !self.fills_hole() | first & last
+    }
+
+    /// The part of F to which it is not trusted.
+    #[inline(always)]
+    fn margin(&self) -> f64 {
+        let size = self.major + self.minor;
+        CLOSE * (size * size * size * size)
+    }
+
+    /// F between two places of a line, as the sum of Bernstein's polynomials of degree four.
+    #[inline(always)]
+    fn bernstein(&self, way: &Way, from: f64, to: f64) -> [f64; 5] {
+        let (across, o) = (way.d.truncate(), way.o.truncate());
+        let major2 = 4.0 * self.major * self.major;
+        let k = way.o.length_squared() + (self.major - self.minor) * (self.major + self.minor);
+        // F and its derivatives at `from`, by powers of the part of the way
+        let (h, s2) = (to - from, from * from + k);
+        let a = s2 * s2 - major2 * (o + across * from).length_squared();
+        let b = (4.0 * from * s2 - 2.0 * major2 * (o.dot(across) + across.length_squared() * from)) * h;
+        let c = (4.0 * from * from + 2.0 * s2 - major2 * across.length_squared()) * (h * h);
+        let (d, e) = (4.0 * from * (h * h * h), h * h * h * h);
+        [a, a + 0.25 * b, a + 0.5 * b + c / 6.0, a + 0.75 * b + 0.5 * c + 0.25 * d, a + b + c + d + e]
     }
 
     /// Whether a line is in the tube on some part of its way from one place to another, and not on another; `None` if
@@ -173,41 +255,26 @@ impl Torus {
     ///
     /// Source of the bounds: Farin, "Curves and Surfaces for CAGD", 2002, sections 5.1 and 4.2: a polynomial lies
     /// between the least and the greatest of its Bernstein coefficients, and de Casteljau's way halves it.
-    fn changes_sides(&self, way: &Way, from: f64, to: f64) -> Option<bool> {
-        let size = self.major + self.minor;
-        // A tube that fills the hole has another sheet within it
-        if !((to - from).abs() > CLOSE * size) || self.minor >= self.major {
+    fn changes_sides(&self, way: &Way, [from, to]: [f64; 2]) -> Option<bool> {
+        if !((to - from).abs() > CLOSE * (self.major + self.minor)) {
             return None;
         }
         if to < from {
             return Some(false);
         }
-        let (across, o) = (way.d.truncate(), way.o.truncate());
-        let major2 = 4.0 * self.major * self.major;
-        let k = way.o.length_squared() + (self.major - self.minor) * (self.major + self.minor);
-        // F and its derivatives at `from`, by powers of the part of the way
-        let (h, s2) = (to - from, from * from + k);
-        let whole = [
-            s2 * s2 - major2 * (o + across * from).length_squared(),
-            (4.0 * from * s2 - 2.0 * major2 * (o.dot(across) + across.length_squared() * from)) * h,
-            (4.0 * from * from + 2.0 * s2 - major2 * across.length_squared()) * (h * h),
-            4.0 * from * (h * h * h),
-            h * h * h * h,
-        ];
-        let [a, b, c, d, e] = whole;
-        let bernstein = [a, a + 0.25 * b, a + 0.5 * b + c / 6.0, a + 0.75 * b + 0.5 * c + 0.25 * d, a + b + c + d + e];
-        let margin = CLOSE * (size * size * size * size);
-        let (mut is_in, mut is_out) = (false, false);
-        let mut rest: ArrayVec<[f64; 5], HALVINGS> = ArrayVec::from_iter([bernstein]);
+        if !self.is_known(way, [from, to]) {
+            return None;
+        }
+        let margin = self.margin();
+        let (mut is_in, mut is_out) = (false, self.fills_hole());
+        let mut rest: ArrayVec<[f64; 5], HALVINGS> = ArrayVec::from_iter([self.bernstein(way, from, to)]);
         while let Some(of) = rest.pop() {
-            for end in [of[0], of[4]] {
-                is_in |= end < -margin;
-                is_out |= end > margin;
-            }
+            let signs = Signs::of(&of, margin);
+            (is_in, is_out) = (is_in | signs.is_in, is_out | signs.is_out);
             if is_in && is_out {
                 return Some(true);
             }
-            if of.iter().all(|v| *v > margin) || of.iter().all(|v| *v < -margin) {
+            if signs.is_one {
                 continue;
             }
             if rest.remaining_capacity() < 2 {
@@ -368,8 +435,11 @@ mod tests {
             let is_met = solid.intersect(&ray, 0.0, t_max, false).is_some();
             assert_eq!(of.blocks(&ray, 0.0, t_max), is_met, "{round}");
             met += usize::from(is_met);
+            let [is_through, is_told] = of.blocks_at_once(&ray, 0.0, t_max);
+            assert!(!is_told || is_through == is_met, "{round}");
             if let Some(way) = of.way(&ray) {
-                close += usize::from(of.changes_sides(&way, way.low.max(0.0), way.high).is_none() && minor < 1.0);
+                let is_told = of.changes_sides(&way, way.ends(0.0, f64::INFINITY)).is_some();
+                close += usize::from(!is_told && minor < 1.0);
             }
         }
         // Roots are looked for where there are any doubts, and those are few
