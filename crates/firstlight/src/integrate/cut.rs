@@ -397,7 +397,14 @@ impl<S: Simd> BallCut<S> {
             CutShape::Flat { faces } => {
                 for (k, (lines, arc)) in faces.iter().enumerate() {
                     let Some(arc) = arc else { break };
-                    let parts = arc.parts(simd, &self.ball, y, rim, |x| self.is_before(arc, x, y));
+                    let parts = arc.parts(
+                        simd,
+                        &self.ball,
+                        y,
+                        rim,
+                        #[inline(always)]
+                        |x| self.is_before(arc, x, y),
+                    );
                     for (i, mut part) in parts.into_iter().enumerate() {
                         for line in &lines[1..] {
                             part.clip(y * line.y + line.c, line.x);
@@ -408,7 +415,14 @@ impl<S: Simd> BallCut<S> {
             }
             CutShape::Rim { rim: outer, hole, arc } => {
                 let inside = outer.quadratic.cone_on_row(simd, &arc.plane, y);
-                let parts = arc.parts(simd, &self.ball, y, rim, |x| self.is_before(arc, x, y));
+                let parts = arc.parts(
+                    simd,
+                    &self.ball,
+                    y,
+                    rim,
+                    #[inline(always)]
+                    |x| self.is_before(arc, x, y),
+                );
                 for (i, part) in parts.into_iter().enumerate() {
                     all[i] = Interval16 { from: part.from.max(inside.from), to: part.to.min(inside.to) };
                 }
@@ -431,14 +445,21 @@ impl<S: Simd> BallCut<S> {
                     to: within.select(rim.to, rim.to.min(inside.to)),
                 };
                 let some_within = within.any_true();
-                let parts = arc.parts(simd, &self.ball, y, &range, |x| {
-                    let meets = self.ball.meets(self.half, x, y);
-                    let outside = other.meets(Half::Near, x, y).simd_lt(meets);
-                    if !some_within {
-                        return outside;
-                    }
-                    within & other.meets(Half::Around, x, y).simd_lt(meets) | !within & outside
-                });
+                let parts = arc.parts(
+                    simd,
+                    &self.ball,
+                    y,
+                    &range,
+                    #[inline(always)]
+                    |x| {
+                        let meets = self.ball.meets(self.half, x, y);
+                        let outside = other.meets(Half::Near, x, y).simd_lt(meets);
+                        if !some_within {
+                            return outside;
+                        }
+                        within & other.meets(Half::Around, x, y).simd_lt(meets) | !within & outside
+                    },
+                );
                 (all[0], all[1]) = (parts[0], parts[1]);
             }
             CutShape::Round { entry } => {
@@ -467,21 +488,19 @@ impl<S: Simd> BallCut<S> {
         let (zero, far) = (simd.splat_f32x16(0.0), simd.splat_f32x16(FAR));
         let from = is_there.select(range.from, zero);
         let (middle, half) = ((from + range.to) * 0.5, (range.to - from) * 0.5);
-        // By how much later: below 0 where it hides
-        let later = |x: f32x16<S>| entry.enters(x, y) - self.ball.meets(self.half, x, y);
-        let mut before = later(middle - half);
+        let mut before = self.later(entry, middle - half, y);
         let mut x_before = middle - half;
         let mut begun = (is_there & before.simd_lt(zero)).select(range.from, far);
         for along in &ALONG[1..] {
             let x = middle + half * *along;
-            let here = later(x);
+            let here = self.later(entry, x, y);
             let changes = is_there & (here.simd_lt(zero) ^ before.simd_lt(zero));
             if changes.any_true() {
                 let root = root_between(
                     [x_before, x],
                     [before, here],
                     #[inline(always)]
-                    |x| entry.enters(x, y) - self.ball.meets(self.half, x, y),
+                    |x| self.later(entry, x, y),
                 );
                 let ends = changes & begun.simd_lt(far);
                 put(parts, ends, Interval16 { from: begun, to: root });
@@ -490,6 +509,12 @@ impl<S: Simd> BallCut<S> {
             (before, x_before) = (here, x);
         }
         put(parts, begun.simd_lt(far), Interval16 { from: begun, to: range.to });
+    }
+
+    /// By how much later something is entered than the ball is met: below 0 where it hides.
+    #[inline(always)]
+    fn later(&self, entry: &Entrance<S>, x: f32x16<S>, y: f32x16<S>) -> f32x16<S> {
+        entry.enters(x, y) - self.ball.meets(self.half, x, y)
     }
 
     /// Whether a plane is before the ball at a place of a row.

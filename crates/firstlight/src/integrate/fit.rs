@@ -162,10 +162,12 @@ fn values<S: Simd, const N: usize>(
 ) -> (NodeValues<S, N>, f32x16<S>) {
     use ViewNumber::*;
     let splat = |v: f32| simd.splat_f32x16(v);
-    let cell =
-        |f: &dyn Fn(&Cell) -> f32| f32x16::simd_from(simd, std::array::from_fn(|k| f(&cells[k.min(cells.len() - 1)])));
-    let [x0, x1] = [cell(&|c| c.x[0]), cell(&|c| c.x[1])];
-    let [y0, y1] = [cell(&|c| c.y[0]), cell(&|c| c.y[1])];
+    let mut sides = [[0.0; LANES]; 4];
+    for k in 0..LANES {
+        let Cell { x, y, .. } = &cells[k.min(cells.len() - 1)];
+        [sides[0][k], sides[1][k], sides[2][k], sides[3][k]] = [x[0], x[1], y[0], y[1]];
+    }
+    let [x0, x1, y0, y1] = sides.map(|side| f32x16::simd_from(simd, side));
     let (xm, xh, ym, yh) = ((x0 + x1) * 0.5, (x1 - x0) * 0.5, (y0 + y1) * 0.5, (y1 - y0) * 0.5);
     let (fa, la, skew, fb, lb) = (
         members.lanes(simd, Fa),
