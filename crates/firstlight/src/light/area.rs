@@ -471,7 +471,7 @@ impl PointBlock {
     }
 
     #[inline(always)]
-    fn get(&self, lane: usize) -> Vec3 {
+    pub fn get(&self, lane: usize) -> Vec3 {
         Vec3::new(self.x[lane], self.y[lane], self.z[lane])
     }
 

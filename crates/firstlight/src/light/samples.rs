@@ -78,9 +78,8 @@ impl FineCell {
 
     /// The one that a point lies in.
     pub fn of(point: [f64; 2]) -> FineCell {
-        let digits = point.map(|v| (v * (1u64 << (Self::DIGITS / 2)) as f64) as u64);
-        let last = Self::DIGITS / 2 - 1;
-        FineCell((0..Self::DIGITS).fold(0, |cell, bit| cell << 1 | digits[bit as usize % 2] >> (last - bit / 2) & 1))
+        let [x, y] = point.map(|v| with_gaps((v * (1u64 << (Self::DIGITS / 2)) as f64) as u64));
+        FineCell(x << 1 | y)
     }
 
     /// Which of `count` larger cells, a power of two, it is a part of.

@@ -36,6 +36,9 @@ impl ShadowView {
         // What is not asked is as good as hidden
         self.in_space.extend(target.blocks.iter().map(|block| {
             let Some(asked) = asked else { return !block.present };
+            if target.is_in_order {
+                return !asked[block.sample[0] as usize / LANES];
+            }
             let is_asked = |k: u32| asked[k as usize / LANES] >> (k as usize % LANES) & 1;
             let lanes = block.sample.iter().enumerate();
             !lanes.fold(0, |lanes, (lane, k)| lanes | is_asked(*k) << lane) | !block.present
@@ -43,6 +46,10 @@ impl ShadowView {
         dispatch_all!(level, simd => self.mask_triangles(simd, scene, target, point));
         if self.trees || !self.others.is_empty() {
             traced = self.trace(level, scene, target, point);
+        }
+        if target.is_in_order {
+            self.hidden.extend_from_slice(&self.in_space);
+            return traced;
         }
         // From the order of space to that of the light
         self.hidden.resize(count, 0);

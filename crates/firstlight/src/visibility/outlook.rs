@@ -187,7 +187,7 @@ impl Outlook {
         light: LightId,
         room: f64,
     ) -> Seen {
-        let target = Target { light, hull, blocks: Vec::new(), cells: Vec::new() };
+        let target = Target { light, hull, blocks: Vec::new(), cells: Vec::new(), is_in_order: true };
         let mut found = std::mem::take(&mut self.occluders);
         found.gather_in(level, scene, &target, shaft, &self.points, &self.indices, LEAVES);
         let seen = self.judge(scene, &found, &target, shaft, room);

@@ -60,6 +60,8 @@ pub(crate) struct Target {
     pub blocks: Vec<SampleBlock>,
     /// Where the blocks lie, sixteen at a time.
     pub cells: Vec<BlockBounds>,
+    /// Whether the light's own order is that of the blocks, each of which is full.
+    pub is_in_order: bool,
 }
 
 /// Axes are this much longer than they need to be, and no shorter than this against the others: more than single
@@ -186,7 +188,7 @@ impl Target {
     pub fn new(scene: &Scene, id: LightId) -> Self {
         let light = &scene.lights[id.index()];
         let hull = LightHull::of(light);
-        let target = Target { light: id, hull, blocks: Vec::new(), cells: Vec::new() };
+        let target = Target { light: id, hull, blocks: Vec::new(), cells: Vec::new(), is_in_order: true };
         match &light.kind {
             LightKind::Area(area) if !light.exact => target.with(area.points()),
             _ => target,
@@ -200,9 +202,27 @@ impl Target {
         self.with_samples(&samples)
     }
 
-    /// The same light with these points of it, of which those that follow each other are neighbours.
+    /// The same light with these points of it, of which each sixteen that follow each other are neighbours.
     pub fn with_neighbours(&self, points: &Points) -> Self {
-        self.with_samples(&self.samples(points))
+        let coordinates = self.hull.all_coordinates();
+        let block = |number: usize| {
+            let mut block = SampleBlock {
+                at: [[0.0; LANES]; 3],
+                point: [[0.0; LANES]; 3],
+                sample: std::array::from_fn(|lane| (number * LANES + lane) as u32),
+                present: u16::MAX,
+            };
+            for lane in 0..LANES {
+                let q = points.blocks[number].get(lane);
+                let at = coordinates(q.as_dvec3());
+                for axis in 0..3 {
+                    block.at[axis][lane] = at[axis] as f32;
+                    block.point[axis][lane] = q[axis];
+                }
+            }
+            block
+        };
+        Target { is_in_order: true, ..self.with_blocks((0..points.blocks.len()).map(block).collect()) }
     }
 
     fn samples(&self, points: &Points) -> Vec<Sample> {
@@ -211,8 +231,7 @@ impl Target {
     }
 
     fn with_samples(&self, samples: &[Sample]) -> Self {
-        let mut target = Target { light: self.light, hull: self.hull, blocks: Vec::new(), cells: Vec::new() };
-        for chunk in samples.chunks(LANES) {
+        let block = |chunk: &[Sample]| {
             let mut block = SampleBlock {
                 at: [[0.0; LANES]; 3],
                 point: [[0.0; LANES]; 3],
@@ -227,8 +246,13 @@ impl Target {
                 }
                 block.sample[lane] = k;
             }
-            target.blocks.push(block);
-        }
+            block
+        };
+        self.with_blocks(samples.chunks(LANES).map(block).collect())
+    }
+
+    fn with_blocks(&self, blocks: Vec<SampleBlock>) -> Self {
+        let mut target = Target { light: self.light, hull: self.hull, blocks, cells: Vec::new(), is_in_order: false };
         for blocks in target.blocks.chunks(LANES) {
             let mut cells = BlockBounds { middle: [[0.0; LANES]; 3], half: [[0.0; LANES]; 3] };
             for (place, block) in blocks.iter().enumerate() {
