@@ -83,43 +83,38 @@ impl ShadowView {
                 *hidden |= height.simd_lt(-wrong).to_bitmask() as u16;
             }
         }
-        let triangles = std::mem::take(&mut self.triangles);
-        for triangle in &triangles {
-            let mut all = true;
-            for (c, cells) in target.cells.iter().enumerate() {
-                let first = c * LANES;
-                let last = (first + LANES).min(target.blocks.len());
-                let there = ((1u32 << (last - first)) - 1) as u16;
-                let verdict = triangle.cells(simd, &cells.middle, &cells.half);
-                for i in first..last {
-                    if verdict.hidden >> (i - first) & 1 == 1 {
-                        self.in_space[i] = 0xffff;
-                    }
-                }
-                let mut some = verdict.unsure & there;
-                while some != 0 {
-                    let i = first + some.trailing_zeros() as usize % LANES;
-                    some &= some - 1;
-                    let asking = !self.in_space[i];
-                    if asking == 0 {
-                        continue;
-                    }
-                    let block = &target.blocks[i];
-                    let verdict = triangle.samples(simd, &block.at);
-                    let mut hidden = verdict.hidden;
-                    let unsure = verdict.unsure & asking & !hidden;
-                    if unsure != 0 {
-                        hidden |= by_kernel(simd, scene, target.light, triangle, block, point, unsure);
-                    }
-                    self.in_space[i] |= hidden;
-                }
-                all &= self.in_space[first..last].iter().all(|hidden| *hidden == 0xffff);
+        for (c, cells) in target.cells.iter().enumerate() {
+            let first = c * LANES;
+            let hidden = &mut self.in_space[first..target.blocks.len().min(first + LANES)];
+            // Blocks of which something is asked, bit by bit
+            let mut open = 0;
+            for (i, hidden) in hidden.iter().enumerate() {
+                open |= u16::from(*hidden != 0xffff) << i;
             }
-            if all {
-                break;
+            for triangle in &self.triangles {
+                if open == 0 {
+                    break;
+                }
+                let verdict = triangle.cells(simd, &cells.middle, &cells.half);
+                let mut some = (verdict.hidden | verdict.unsure) & open;
+                while some != 0 {
+                    let i = some.trailing_zeros() as usize % LANES;
+                    some &= some - 1;
+                    if verdict.hidden >> i & 1 == 1 {
+                        hidden[i] = 0xffff;
+                    } else {
+                        let block = &target.blocks[first + i];
+                        let told = triangle.samples(simd, &block.at);
+                        let unsure = told.unsure & !hidden[i] & !told.hidden;
+                        hidden[i] |= told.hidden;
+                        if unsure != 0 {
+                            hidden[i] |= by_kernel(simd, scene, target.light, triangle, block, point, unsure);
+                        }
+                    }
+                    open &= !(u16::from(hidden[i] == 0xffff) << i);
+                }
             }
         }
-        self.triangles = triangles;
     }
 
     /// Asks the trees, or only what is no mesh, ray by ray.
