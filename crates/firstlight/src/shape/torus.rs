@@ -76,6 +76,12 @@ struct Signs {
     is_one: bool,
 }
 
+/// Whether the ends of a part of a line lie on different sides of the surface, and whether signs tell of it.
+struct Ends {
+    differ: bool,
+    tell: bool,
+}
+
 impl Signs {
     #[inline(always)]
     fn of(coefficients: &[f64; 5], margin: f64) -> Signs {
@@ -207,9 +213,10 @@ impl Torus {
         let [from, to] = way.ends(t_min, t_max);
         let signs = Signs::of(&self.bernstein(&way, from, to), self.margin());
         let least = CLOSE * (self.major + self.minor);
-        let is_known = (to - from > least) & self.is_known(&way, [from, to]);
-        let is_through = is_any & is_known & signs.is_in & (signs.is_out | self.fills_hole());
-        let is_past = !is_any | (from - to > least) | is_known & signs.is_one;
+        let is_long = is_any & (to - from > least);
+        let ends = self.ends(&way, [from, to]);
+        let is_through = is_long & (ends.differ | ends.tell & signs.is_in & (signs.is_out | self.fills_hole()));
+        let is_past = !is_any | (from - to > least) | is_long & ends.tell & signs.is_one;
         [is_through, is_through | is_past]
     }
 
@@ -219,13 +226,15 @@ impl Torus {
         self.minor >= self.major
     }
 
-    /// Whether the signs of the polynomial tell on which side a line is: of a tube that fills the hole, where both ends
-    /// are outside of it for sure.
+    /// What the ends of a part of a line say, if the tube fills the hole: there the polynomial is positive outside and in
+    /// the inner sheet, so its signs tell only of a line with both ends outside for sure.
     #[inline(always)]
-    fn is_known(&self, way: &Way, ends: [f64; 2]) -> bool {
+    fn ends(&self, way: &Way, ends: [f64; 2]) -> Ends {
         let least = CLOSE * (self.major + self.minor);
-        let [first, last] = ends.map(|s| self.height(way.o + way.d * s) > least);
-        !self.fills_hole() | first & last
+        let [one, other] = ends.map(|s| self.height(way.o + way.d * s));
+        let differ = (one > least) & (other < -least) | (one < -least) & (other > least);
+        let fills = self.fills_hole();
+        Ends { differ: fills & differ, tell: !fills | (one > least) & (other > least) }
     }
 
     /// The part of F to which it is not trusted.
@@ -262,8 +271,10 @@ impl Torus {
         if to < from {
             return Some(false);
         }
-        if !self.is_known(way, [from, to]) {
-            return None;
+        match self.ends(way, [from, to]) {
+            Ends { differ: true, .. } => return Some(true),
+            Ends { tell: false, .. } => return None,
+            Ends { .. } => {}
         }
         let margin = self.margin();
         let (mut is_in, mut is_out) = (false, self.fills_hole());
