@@ -82,6 +82,20 @@ struct Ends {
     tell: bool,
 }
 
+/// The Bernstein coefficients of both halves of a polynomial, as de Casteljau found them: the first of each row of
+/// means, and the last.
+#[inline(always)]
+fn halves(of: &[f64; 5]) -> [[f64; 5]; 2] {
+    let (mut row, mut first, mut second) = (*of, *of, *of);
+    for n in 1..5 {
+        for i in 0..5 - n {
+            row[i] = 0.5 * (row[i] + row[i + 1]);
+        }
+        (first[n], second[4 - n]) = (row[0], row[4 - n]);
+    }
+    [first, second]
+}
+
 impl Signs {
     #[inline(always)]
     fn of(coefficients: &[f64; 5], margin: f64) -> Signs {
@@ -211,12 +225,14 @@ impl Torus {
     pub fn blocks_at_once(&self, ray: &DRay, t_min: f64, t_max: f64) -> [bool; 2] {
         let (way, is_any) = self.way_there(ray);
         let [from, to] = way.ends(t_min, t_max);
-        let signs = Signs::of(&self.bernstein(&way, from, to), self.margin());
+        let [one, other] = halves(&self.bernstein(&way, from, to)).map(|of| Signs::of(&of, self.margin()));
+        let (is_in, is_out) = (one.is_in | other.is_in, one.is_out | other.is_out);
+        let is_one = one.is_one & other.is_one;
         let least = CLOSE * (self.major + self.minor);
         let is_long = is_any & (to - from > least);
         let ends = self.ends(&way, [from, to]);
-        let is_through = is_long & (ends.differ | ends.tell & signs.is_in & (signs.is_out | self.fills_hole()));
-        let is_past = !is_any | (from - to > least) | is_long & ends.tell & signs.is_one;
+        let is_through = is_long & (ends.differ | ends.tell & is_in & (is_out | self.fills_hole()));
+        let is_past = !is_any | (from - to > least) | is_long & ends.tell & is_one;
         [is_through, is_through | is_past]
     }
 
@@ -291,14 +307,7 @@ impl Torus {
             if rest.remaining_capacity() < 2 {
                 return None;
             }
-            // De Casteljau: the first of each row, and the last
-            let (mut row, mut first, mut second) = (of, of, of);
-            for n in 1..5 {
-                for i in 0..5 - n {
-                    row[i] = 0.5 * (row[i] + row[i + 1]);
-                }
-                (first[n], second[4 - n]) = (row[0], row[4 - n]);
-            }
+            let [first, second] = halves(&of);
             rest.extend([second, first]);
         }
         Some(false)
