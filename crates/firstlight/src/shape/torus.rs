@@ -225,9 +225,14 @@ impl Torus {
     pub fn blocks_at_once(&self, ray: &DRay, t_min: f64, t_max: f64) -> [bool; 2] {
         let (way, is_any) = self.way_there(ray);
         let [from, to] = way.ends(t_min, t_max);
-        let [one, other] = halves(&self.bernstein(&way, from, to)).map(|of| Signs::of(&of, self.margin()));
-        let (is_in, is_out) = (one.is_in | other.is_in, one.is_out | other.is_out);
-        let is_one = one.is_one & other.is_one;
+        let [first, second] = halves(&self.bernstein(&way, from, to));
+        let (mut is_in, mut is_out, mut is_one) = (false, false, true);
+        for half in [first, second] {
+            for quarter in halves(&half) {
+                let signs = Signs::of(&quarter, self.margin());
+                (is_in, is_out, is_one) = (is_in | signs.is_in, is_out | signs.is_out, is_one & signs.is_one);
+            }
+        }
         let least = CLOSE * (self.major + self.minor);
         let is_long = is_any & (to - from > least);
         let ends = self.ends(&way, [from, to]);
