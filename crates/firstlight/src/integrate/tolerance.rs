@@ -12,7 +12,7 @@ pub(crate) struct Tolerance {
     /// How far all lights together may be wrong at a point that stands for a pixel.
     pub point: f32,
     /// The part of that which one cell of a light, or one panel of its rows, may use up. Cells are few, and their
-    /// estimates are ten and more times larger than their errors.
+    /// estimates are larger than their errors, mostly ten times and more.
     pub part: f32,
     /// Where a light is cut into more cells than this, each may use up less.
     pub few_cells: f32,
@@ -51,7 +51,7 @@ pub(crate) struct Tolerance {
 impl Tolerance {
     pub const DEFAULT: Tolerance = Tolerance {
         point: 0.15,
-        part: 1.2,
+        part: 0.9,
         few_cells: 4.0,
         least_share: 0.125,
         fit_seen: 0.02,

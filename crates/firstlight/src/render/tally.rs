@@ -1,7 +1,8 @@
 //! What points of an area light say, from one place, leaf by leaf of the light.
 //!
-//! Each leaf holds what the point in it says. Where leaves are halved, one half keeps the point, and the other has a new
-//! one. A leaf counts for the part of the light that it is, so it is enough to ask anew where the edge of a shadow is. What points would send is tallied with and without what is hidden: all that a light would send is known exactly,
+//! Each leaf holds what the point in it says. Where leaves are halved, one half keeps the point, and the other has a
+//! new one. A leaf counts for the part of the light that it is, so it is enough to ask anew where the edge of a shadow
+//! is. What points would send is tallied with and without what is hidden: all that a light would send is known exactly,
 //! so the points only say which share of it arrives, a ratio estimate.
 //!
 //! Sources: of ratio estimates, Cochran, "Sampling Techniques", 1977, chapter 6; of the effective number of points,

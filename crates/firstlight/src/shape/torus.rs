@@ -247,8 +247,8 @@ impl Torus {
         self.minor >= self.major
     }
 
-    /// What the ends of a part of a line say, if the tube fills the hole: there the polynomial is positive outside and in
-    /// the inner sheet, so its signs tell only of a line with both ends outside for sure.
+    /// What the ends of a part of a line say, if the tube fills the hole: there the polynomial is positive outside and
+    /// in the inner sheet, so its signs tell only of a line with both ends outside for sure.
     #[inline(always)]
     fn ends(&self, way: &Way, ends: [f64; 2]) -> Ends {
         let least = CLOSE * (self.major + self.minor);
