@@ -591,7 +591,7 @@ def facts_of_panels(followed):
     yield "sum of (n.h)^16", number(followed.sums[1], 5)
     truth = converged(followed.view, followed.between)
     yield "converged", number(truth, 5)
-    yield "steps off", f"{number((truth - followed.sums[0]) * COLOR * slope(film(followed.sums)), 3)} steps"
+    yield "steps off", f"{number(abs(truth - followed.sums[0]) * COLOR * slope(film(followed.sums)), 3)} steps"
 
 
 def facts_of_pixel():
