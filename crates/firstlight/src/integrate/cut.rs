@@ -397,14 +397,7 @@ impl<S: Simd> BallCut<S> {
             CutShape::Flat { faces } => {
                 for (k, (lines, arc)) in faces.iter().enumerate() {
                     let Some(arc) = arc else { break };
-                    let parts = arc.parts(
-                        simd,
-                        &self.ball,
-                        y,
-                        rim,
-                        #[inline(always)]
-                        |x| self.is_before(arc, x, y),
-                    );
+                    let parts = self.before(simd, arc, y, rim);
                     for (i, mut part) in parts.into_iter().enumerate() {
                         for line in &lines[1..] {
                             part.clip(y * line.y + line.c, line.x);
@@ -415,14 +408,7 @@ impl<S: Simd> BallCut<S> {
             }
             CutShape::Rim { rim: outer, hole, arc } => {
                 let inside = outer.quadratic.cone_on_row(simd, &arc.plane, y);
-                let parts = arc.parts(
-                    simd,
-                    &self.ball,
-                    y,
-                    rim,
-                    #[inline(always)]
-                    |x| self.is_before(arc, x, y),
-                );
+                let parts = self.before(simd, arc, y, rim);
                 for (i, part) in parts.into_iter().enumerate() {
                     all[i] = Interval16 { from: part.from.max(inside.from), to: part.to.min(inside.to) };
                 }
@@ -515,6 +501,19 @@ impl<S: Simd> BallCut<S> {
     #[inline(always)]
     fn later(&self, entry: &Entrance<S>, x: f32x16<S>, y: f32x16<S>) -> f32x16<S> {
         entry.enters(x, y) - self.ball.meets(self.half, x, y)
+    }
+
+    /// The parts of a range of each row on which a plane is before the ball.
+    #[inline(always)]
+    fn before(&self, simd: S, arc: &HalfCircle<S>, y: f32x16<S>, range: &Interval16<S>) -> [Interval16<S>; 2] {
+        arc.parts(
+            simd,
+            &self.ball,
+            y,
+            range,
+            #[inline(always)]
+            |x| self.is_before(arc, x, y),
+        )
     }
 
     /// Whether a plane is before the ball at a place of a row.

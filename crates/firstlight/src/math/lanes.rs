@@ -1,8 +1,8 @@
 //! Sixteen vectors at a time.
 
-use fearless_simd::{f32x16, prelude::*};
+use fearless_simd::{f32x16, mask32x16, prelude::*};
 
-use super::Vec3;
+use super::{LANES, Vec3};
 
 /// Runs code for sixteen numbers at a time with the instruction set that suits it: AVX-512, AVX2, NEON, or what every
 /// processor has. Three copies, not five: the code below takes the compiler seconds; and of plain numbers, sixteen to a
@@ -85,5 +85,37 @@ impl<S: Simd> std::ops::Mul<f32x16<S>> for Vec3x16<S> {
     #[inline(always)]
     fn mul(self, by: f32x16<S>) -> Self {
         Self { x: self.x * by, y: self.y * by, z: self.z * by }
+    }
+}
+
+/// Numbers where bits are set, and else 0.
+#[inline(always)]
+pub(crate) fn only<S: Simd>(simd: S, bits: u16, of: f32x16<S>) -> f32x16<S> {
+    mask32x16::from_bitmask(simd, bits.into()).select(of, simd.splat_f32x16(0.0))
+}
+
+/// The sum of sixteen numbers, in the same order with every instruction set.
+#[inline(always)]
+pub(crate) fn total<S: Simd>(of: f32x16<S>) -> f32 {
+    sum_of_runs(of.token(), of, LANES).as_slice()[0]
+}
+
+/// For each aligned run of so many numbers, a power of two, their sum in all of them.
+#[inline(always)]
+pub(crate) fn sum_of_runs<S: Simd>(simd: S, of: f32x16<S>, run: usize) -> f32x16<S> {
+    let mut sums = of.to_array();
+    add_halves::<1>(&mut sums, run);
+    add_halves::<2>(&mut sums, run);
+    add_halves::<4>(&mut sums, run);
+    add_halves::<8>(&mut sums, run);
+    f32x16::simd_from(simd, sums)
+}
+
+/// Where runs are longer than `HALF`, adds what is in the other half of each run that is twice as long as that.
+#[inline(always)]
+fn add_halves<const HALF: usize>(sums: &mut [f32; LANES], run: usize) {
+    if run > HALF {
+        let half = *sums;
+        *sums = std::array::from_fn(|lane| half[lane] + half[lane ^ HALF]);
     }
 }

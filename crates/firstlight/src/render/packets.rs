@@ -5,13 +5,13 @@
 //! not; then what it sends is wrong by chance, each packet by itself. Where no edge is, what its points send may still
 //! vary more than they tell, next to a light or in a highlight.
 
-use fearless_simd::{Level, f32x16, mask32x16, prelude::*};
+use fearless_simd::{Level, mask32x16, prelude::*};
 
 use super::leaves::Leaves;
-use super::tally::{Tally, only};
+use super::tally::Tally;
 use crate::accel::dispatch_all;
 use crate::material::{MOMENTS, Moments};
-use crate::math::LANES;
+use crate::math::{LANES, only, sum_of_runs, total};
 
 /// The deviation of the share that a packet of sixteen sees which some edge runs through: of sixteen points in as many
 /// parts of a cell of the light the edge cuts about four, each of which it parts anywhere.
@@ -121,32 +121,6 @@ impl PacketErrors {
         let around = around(&seen, per_packet * AROUND);
         leaves.order.iter().zip(around).for_each(|(number, is_near)| near[*number as usize] = is_near);
         PacketErrors { near, edges, smooth }
-    }
-}
-
-/// The sum of sixteen numbers, in the same order with every instruction set.
-#[inline(always)]
-pub(super) fn total<S: Simd>(of: f32x16<S>) -> f32 {
-    sum_of_runs(of.token(), of, LANES).as_slice()[0]
-}
-
-/// For each aligned run of so many numbers, a power of two, their sum in all of them.
-#[inline(always)]
-fn sum_of_runs<S: Simd>(simd: S, of: f32x16<S>, run: usize) -> f32x16<S> {
-    let mut sums = of.to_array();
-    add_halves::<1>(&mut sums, run);
-    add_halves::<2>(&mut sums, run);
-    add_halves::<4>(&mut sums, run);
-    add_halves::<8>(&mut sums, run);
-    f32x16::simd_from(simd, sums)
-}
-
-/// Where runs are longer than `HALF`, adds what is in the other half of each run that is twice as long as that.
-#[inline(always)]
-fn add_halves<const HALF: usize>(sums: &mut [f32; LANES], run: usize) {
-    if run > HALF {
-        let half = *sums;
-        *sums = std::array::from_fn(|lane| half[lane] + half[lane ^ HALF]);
     }
 }
 

@@ -13,11 +13,10 @@ use fearless_simd::{Level, f32x16, mask32x16, prelude::*};
 use super::ladder::{AskedRung, Asker, Rung, to_halves};
 use super::lanes::PointObstacles;
 use super::leaves::{Halved, Leaves};
-use super::packets::total;
 use crate::accel::dispatch_all;
 use crate::light::{Area, FineCell, MIN_DISTANCE2, Points};
 use crate::material::{Lobe, MOMENTS, Moments};
-use crate::math::{LANES, Vec3x16};
+use crate::math::{LANES, Vec3x16, only, total};
 use crate::shape::SurfaceInteraction;
 use crate::visibility::ShadowView;
 
@@ -236,12 +235,6 @@ impl BlockAnswers {
         }
         halves
     }
-}
-
-/// Numbers where bits are set, and else 0.
-#[inline(always)]
-pub(super) fn only<S: Simd>(simd: S, bits: u16, of: f32x16<S>) -> f32x16<S> {
-    mask32x16::from_bitmask(simd, bits.into()).select(of, simd.splat_f32x16(0.0))
 }
 
 /// What each of some points of a light would send to a place, from all of it.

@@ -39,26 +39,26 @@ impl Ball {
     /// Both roots around the point of the ray that is nearest to the centre, where nothing cancels.
     #[inline(always)]
     pub fn intersect(&self, ray: &DRay, t_min: f64, t_max: f64, single_sided: bool) -> Option<SolidHit> {
-        let (near, shift) = ray.nearest_to(DVec3::ZERO);
-        let distance = near.o.length();
-        let half2 = (1.0 - distance) * (1.0 + distance) / near.d.length_squared();
-        if !(half2 >= 0.0) {
-            return None;
-        }
-        let half = half2.sqrt();
+        let ([enter, leave], shift) = Ball::ends(ray);
         let at = |t| SolidHit { t, part: 0 };
-        Chord { enter: at(-half), leave: at(half) }.first(shift, t_min, t_max, single_sided)
+        Chord { enter: at(enter), leave: at(leave) }.first(shift, t_min, t_max, single_sided)
     }
 
     /// Whether [`intersect`](Self::intersect) finds anything, from either side. Without branches.
     #[inline(always)]
     pub fn blocks(&self, ray: &DRay, t_min: f64, t_max: f64) -> bool {
+        let (ends, shift) = Ball::ends(ray);
+        Chord::has_end(ends, shift, t_min, t_max)
+    }
+
+    /// The ends of the part of a ray in the ball, and what is added to them for its t.
+    #[inline(always)]
+    fn ends(ray: &DRay) -> ([f64; 2], f64) {
         let (near, shift) = ray.nearest_to(DVec3::ZERO);
         let distance = near.o.length();
         let half2 = (1.0 - distance) * (1.0 + distance) / near.d.length_squared();
         let half = half2.max(0.0).sqrt();
-        let [enter, leave] = [-half + shift, half + shift];
-        (half2 >= 0.0) & ((enter > t_min) & (enter < t_max) | (leave > t_min) & (leave < t_max))
+        (if half2 >= 0.0 { [-half, half] } else { Chord::NO_ENDS }, shift)
     }
 
     pub fn point(&self, ray: &DRay, hit: &SolidHit) -> SolidPoint {

@@ -63,7 +63,8 @@ impl Cuboid {
     pub fn blocks(&self, ray: &DRay, t_min: f64, t_max: f64) -> bool {
         let mut way = [f64::NEG_INFINITY, f64::INFINITY];
         for axis in 0..3 {
-            way = Chord::slab_ends(way, [ray.o[axis], ray.d[axis]], [self.low[axis], self.high[axis]]);
+            let slab = Chord::slab(ray.o[axis], ray.d[axis], self.low[axis], self.high[axis]);
+            way = Chord::cut_ends(way, slab);
         }
         Chord::has_end(way, 0.0, t_min, t_max)
     }

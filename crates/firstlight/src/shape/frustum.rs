@@ -39,6 +39,16 @@ const CAP1: u8 = 2;
 /// Ends nearer to each other than this have no axis.
 const MIN_LENGTH: f64 = 1e-9;
 
+/// A ray in the frame of the axis.
+struct Near {
+    o: DVec3,
+    d: DVec3,
+    /// What is added to t for that of the ray.
+    shift: f64,
+    /// Room for the rounding of heights.
+    slack: f64,
+}
+
 impl Frustum {
     /// From the ends of the axis, which are checked, and the radii there, which have been.
     pub(super) fn compile(cx: &mut CompileContext, p0: [f64; 3], p1: [f64; 3], radii: [f64; 2], capped: bool) -> Self {
@@ -70,44 +80,49 @@ impl Frustum {
 
     #[inline(always)]
     pub fn intersect(&self, ray: &DRay, t_min: f64, t_max: f64, single_sided: bool) -> Option<SolidHit> {
-        let middle = self.p0 + self.frame.z * (0.5 * self.height);
-        let (near, shift) = ray.nearest_to(middle);
-        let (mut o, d) = (self.frame.local(near.o), self.frame.local(near.d));
-        o.z += 0.5 * self.height;
+        let Near { o, d, shift, slack } = self.near(ray);
         let mantle = self.mantle(o, d);
         if self.capped {
             let mut chord = Chord::LINE;
             let [cap0, cap1] = self.caps;
             chord.cut_slab(o.z, d.z, 0.0, self.height, cap0, cap1);
-            chord.cut(mantle.enter, mantle.leave);
+            let [enter, leave] = mantle.map(|t| SolidHit { t, part: MANTLE });
+            chord.cut(enter, leave);
             return chord.first(shift, t_min, t_max, single_sided);
         }
         // Open: the ends of what is inside the mantle, where they lie between the ends of the axis. Two tubes that
         // share an end overlap by the rounding, so that no ray slips between them
-        if mantle.is_empty() {
+        let [enter, leave] = mantle;
+        if !(enter <= leave) {
             return None;
         }
-        let slack = 8.0 * f64::EPSILON * (self.height + (ray.o - middle).length());
-        let within = |hit: SolidHit| {
-            let (z, t) = (o.z + d.z * hit.t, hit.t + shift);
+        let within = |end: f64| {
+            let (z, t) = (o.z + d.z * end, end + shift);
             (z >= -slack && z <= self.height + slack && t > t_min && t < t_max).then_some(SolidHit { t, part: MANTLE })
         };
-        within(mantle.enter).or_else(|| if single_sided { None } else { within(mantle.leave) })
+        within(enter).or_else(|| if single_sided { None } else { within(leave) })
+    }
+
+    /// A ray in the frame of the axis, counted from its point nearest to the middle.
+    #[inline(always)]
+    fn near(&self, ray: &DRay) -> Near {
+        let middle = self.p0 + self.frame.z * (0.5 * self.height);
+        let (near, shift) = ray.nearest_to(middle);
+        let (mut o, d) = (self.frame.local(near.o), self.frame.local(near.d));
+        o.z += 0.5 * self.height;
+        let slack = 8.0 * f64::EPSILON * (self.height + (ray.o - middle).length());
+        Near { o, d, shift, slack }
     }
 
     /// Whether [`intersect`](Self::intersect) finds anything, from either side. Without branches.
     #[inline(always)]
     pub fn blocks(&self, ray: &DRay, t_min: f64, t_max: f64) -> bool {
-        let middle = self.p0 + self.frame.z * (0.5 * self.height);
-        let (near, shift) = ray.nearest_to(middle);
-        let (mut o, d) = (self.frame.local(near.o), self.frame.local(near.d));
-        o.z += 0.5 * self.height;
-        let mantle = self.mantle_ends(o, d);
+        let Near { o, d, shift, slack } = self.near(ray);
+        let mantle = self.mantle(o, d);
         if self.capped {
-            let way = Chord::slab_ends([f64::NEG_INFINITY, f64::INFINITY], [o.z, d.z], [0.0, self.height]);
-            return Chord::has_end(Chord::cut_ends(way, mantle), shift, t_min, t_max);
+            let slab = Chord::slab(o.z, d.z, 0.0, self.height);
+            return Chord::has_end(Chord::cut_ends(slab, mantle), shift, t_min, t_max);
         }
-        let slack = 8.0 * f64::EPSILON * (self.height + (ray.o - middle).length());
         let within = |end: f64| {
             let (z, t) = (o.z + d.z * end, end + shift);
             (z >= -slack) & (z <= self.height + slack) & (t > t_min) & (t < t_max)
@@ -115,10 +130,14 @@ impl Frustum {
         (mantle[0] <= mantle[1]) & (within(mantle[0]) | within(mantle[1]))
     }
 
-    /// The ends of [`mantle`](Self::mantle), without branches.
+    /// The part of the line o + t d inside the mantle, which is thought to go on beyond the ends, up to the apex.
+    ///
+    /// In the plane across the axis, with the radius R + D t: |o + t d| = R + D t, or a t^2 + 2 b t + c = 0 with
+    /// a = d.d - D^2, b = o.d - D R, c = o.o - R^2. The discriminant b^2 - a c cancels where the line grazes the
+    /// mantle, and near the apex; written as |R d - D o|^2 - |o x d|^2 it does not. The ends of it, without
+    /// branches.
     #[inline(always)]
-    fn mantle_ends(&self, o: DVec3, d: DVec3) -> [f64; 2] {
-        const NOTHING: [f64; 2] = [f64::INFINITY, f64::NEG_INFINITY];
+    fn mantle(&self, o: DVec3, d: DVec3) -> [f64; 2] {
         let choose = |is: bool, one: [f64; 2], other: [f64; 2]| {
             [if is { one[0] } else { other[0] }, if is { one[1] } else { other[1] }]
         };
@@ -131,66 +150,21 @@ impl Frustum {
         let (reach, miss) = ((d * radius - o * change).length(), o.perp_dot(d).abs());
         let discriminant = (reach - miss) * (reach + miss);
         let (none, all) = (f64::NEG_INFINITY, f64::INFINITY);
+        // Along the mantle, or along the axis of a cylinder: one end, or none
         let end = -0.5 * c / b;
         let is_in = (c <= 0.0) & (radius >= 0.0);
-        let along = choose(b < 0.0, [end, all], choose(is_in, [none, all], NOTHING));
+        let along = choose(b < 0.0, [end, all], choose(is_in, [none, all], Chord::NO_ENDS));
         let along = choose(b > 0.0, [none, end], along);
         let root = discriminant.max(0.0).sqrt();
         let q = if b > 0.0 { -b - root } else { root - b };
         let [t0, t1] = choose(q == 0.0, [0.0; 2], [q / a, c / q]);
         let (first, last) = (t0.min(t1), t0.max(t1));
+        // Both on the same side of the apex; beyond it there is nothing
         let is_there = (radius + change * (-b / a) >= 0.0) | (self.slope == 0.0);
-        let between = choose(is_there & (discriminant >= 0.0), [first, last], NOTHING);
+        let between = choose(is_there & (discriminant >= 0.0), [first, last], Chord::NO_ENDS);
+        // Steeper than the mantle: it comes in through one nappe, and the other is not part of the shape
         let steep = choose(change > 0.0, [last, all], [none, first]);
         choose(a == 0.0, along, choose(a > 0.0, between, steep))
-    }
-
-    /// The part of the line o + t d inside the mantle, which is thought to go on beyond the ends, up to the apex.
-    ///
-    /// In the plane across the axis, with the radius R + D t: |o + t d| = R + D t, or a t^2 + 2 b t + c = 0 with
-    /// a = d.d - D^2, b = o.d - D R, c = o.o - R^2. The discriminant b^2 - a c cancels where the line grazes the
-    /// mantle, and near the apex; written as |R d - D o|^2 - |o x d|^2 it does not.
-    #[inline(always)]
-    fn mantle(&self, o: DVec3, d: DVec3) -> Chord {
-        let (radius, change) = (self.radius(o.z), self.slope * d.z);
-        let (o, d) = (o.truncate(), d.truncate());
-        let (width, speed) = (o.length(), d.length());
-        let a = (speed - change.abs()) * (speed + change.abs());
-        let b = o.dot(d) - change * radius;
-        let c = (width - radius) * (width + radius);
-        let (reach, miss) = ((d * radius - o * change).length(), o.perp_dot(d).abs());
-        let discriminant = (reach - miss) * (reach + miss);
-        let at = |t: f64| SolidHit { t, part: MANTLE };
-        let none = at(f64::NEG_INFINITY);
-        let all = at(f64::INFINITY);
-        if a > 0.0 && !(discriminant >= 0.0) {
-            return Chord::NOTHING;
-        }
-        if a == 0.0 {
-            // Along the mantle, or along the axis of a cylinder: one end, or none
-            let end = at(-0.5 * c / b);
-            return match b {
-                _ if b > 0.0 => Chord { enter: none, leave: end },
-                _ if b < 0.0 => Chord { enter: end, leave: all },
-                _ if c <= 0.0 && radius >= 0.0 => Chord::LINE,
-                _ => Chord::NOTHING,
-            };
-        }
-        let root = discriminant.max(0.0).sqrt();
-        let q = if b > 0.0 { -b - root } else { root - b };
-        let (t0, t1) = if q == 0.0 { (0.0, 0.0) } else { (q / a, c / q) };
-        let (first, last) = (at(t0.min(t1)), at(t0.max(t1)));
-        if a > 0.0 {
-            // Both on the same side of the apex; beyond it there is nothing
-            let middle = -b / a;
-            return if radius + change * middle >= 0.0 || self.slope == 0.0 {
-                Chord { enter: first, leave: last }
-            } else {
-                Chord::NOTHING
-            };
-        }
-        // Steeper than the mantle: it comes in through one nappe, and the other is not part of the shape
-        if change > 0.0 { Chord { enter: last, leave: all } } else { Chord { enter: none, leave: first } }
     }
 
     pub fn point(&self, ray: &DRay, hit: &SolidHit) -> SolidPoint {

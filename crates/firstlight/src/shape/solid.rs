@@ -165,28 +165,21 @@ impl Solid {
     /// as those of [`blocks`](Self::blocks). In lanes where it is called within `vectorize`.
     #[inline(always)]
     pub fn blocks_lanes(&self, lines: &LineLanes, asked: u16) -> u16 {
+        macro_rules! each_line {
+            ($line:ident, $end:ident => $is:expr) => {
+                lines.each(
+                    #[inline(always)]
+                    |$line, $end| $is,
+                )
+            };
+        }
         let [blocked, is_told] = match self {
             Solid::Plane(_) => [0, 0],
-            Solid::Disk(disk) => lines.each(
-                #[inline(always)]
-                |ray, end| [disk.blocks(ray, 0.0, end), true],
-            ),
-            Solid::Cuboid(cuboid) => lines.each(
-                #[inline(always)]
-                |ray, end| [cuboid.blocks(ray, 0.0, end), true],
-            ),
-            Solid::Frustum(frustum) => lines.each(
-                #[inline(always)]
-                |ray, end| [frustum.blocks(ray, 0.0, end), true],
-            ),
-            Solid::Torus(torus) => lines.each(
-                #[inline(always)]
-                |ray, end| torus.blocks_at_once(ray, 0.0, end),
-            ),
-            Solid::Ball(ball) => lines.each(
-                #[inline(always)]
-                |ray, end| [ball.blocks(ray, 0.0, end), true],
-            ),
+            Solid::Disk(disk) => each_line!(line, end => [disk.blocks(line, 0.0, end), true]),
+            Solid::Cuboid(cuboid) => each_line!(line, end => [cuboid.blocks(line, 0.0, end), true]),
+            Solid::Frustum(frustum) => each_line!(line, end => [frustum.blocks(line, 0.0, end), true]),
+            Solid::Torus(torus) => each_line!(line, end => torus.blocks_at_once(line, 0.0, end)),
+            Solid::Ball(ball) => each_line!(line, end => [ball.blocks(line, 0.0, end), true]),
         };
         let rest = (0..LANES).filter(|k| (asked & !is_told) >> k & 1 == 1);
         let blocks = |k: usize| self.blocks(&lines.line(k), 0.0, lines.end[k]);
@@ -311,9 +304,8 @@ impl Chord {
     pub const LINE: Chord =
         Chord { enter: SolidHit { t: f64::NEG_INFINITY, part: 0 }, leave: SolidHit { t: f64::INFINITY, part: 0 } };
 
-    /// None of it.
-    pub const NOTHING: Chord =
-        Chord { enter: SolidHit { t: f64::INFINITY, part: 0 }, leave: SolidHit { t: f64::NEG_INFINITY, part: 0 } };
+    /// The ends of none of it.
+    pub const NO_ENDS: [f64; 2] = [f64::INFINITY, f64::NEG_INFINITY];
 
     /// What is left between the sides `enter` and `leave`.
     #[inline(always)]
@@ -329,29 +321,21 @@ impl Chord {
     /// What is left between two planes, where a coordinate that is `o` + t `d` has the values `low` and `high`.
     #[inline(always)]
     pub fn cut_slab(&mut self, o: f64, d: f64, low: f64, high: f64, part_low: u8, part_high: u8) {
-        if d == 0.0 {
-            if !(o >= low && o <= high) {
-                *self = Chord::NOTHING;
-            }
-            return;
-        }
-        let at_low = SolidHit { t: (low - o) / d, part: part_low };
-        let at_high = SolidHit { t: (high - o) / d, part: part_high };
-        if d > 0.0 { self.cut(at_low, at_high) } else { self.cut(at_high, at_low) }
+        let [enter, leave] = Self::slab(o, d, low, high);
+        let [part_enter, part_leave] = if d > 0.0 { [part_low, part_high] } else { [part_high, part_low] };
+        self.cut(SolidHit { t: enter, part: part_enter }, SolidHit { t: leave, part: part_leave });
     }
 
-    /// The ends alone, without branches: what is left of a part of the line between two planes, as by
-    /// [`cut_slab`](Self::cut_slab).
+    /// The ends of the part of a line between two planes, without branches.
     #[inline(always)]
-    pub fn slab_ends(way: [f64; 2], [o, d]: [f64; 2], [low, high]: [f64; 2]) -> [f64; 2] {
+    pub fn slab(o: f64, d: f64, low: f64, high: f64) -> [f64; 2] {
         let (at_low, at_high) = ((low - o) / d, (high - o) / d);
         let (enter, leave) = if d > 0.0 { (at_low, at_high) } else { (at_high, at_low) };
-        let is_between = (o >= low) & (o <= high);
-        let along = if is_between { f64::NEG_INFINITY } else { f64::INFINITY };
-        Self::cut_ends(way, if d == 0.0 { [along, -along] } else { [enter, leave] })
+        let along = if (o >= low) & (o <= high) { f64::NEG_INFINITY } else { f64::INFINITY };
+        if d == 0.0 { [along, -along] } else { [enter, leave] }
     }
 
-    /// The same of [`cut`](Self::cut).
+    /// What [`cut`](Self::cut) leaves of a part of a line between other ends, without branches.
     #[inline(always)]
     pub fn cut_ends(way: [f64; 2], [enter, leave]: [f64; 2]) -> [f64; 2] {
         [if enter > way[0] { enter } else { way[0] }, if leave < way[1] { leave } else { way[1] }]

@@ -162,6 +162,27 @@ impl LightHull {
     }
 }
 
+impl SampleBlock {
+    /// Some samples, at most sixteen.
+    fn of(count: usize, sample: impl Fn(usize) -> Sample) -> SampleBlock {
+        let mut block = SampleBlock {
+            at: [[0.0; LANES]; 3],
+            point: [[0.0; LANES]; 3],
+            sample: [0; LANES],
+            present: ((1u32 << count) - 1) as u16,
+        };
+        for lane in 0..LANES {
+            let (k, q, at) = sample(lane.min(count - 1));
+            for axis in 0..3 {
+                block.at[axis][lane] = at[axis] as f32;
+                block.point[axis][lane] = q[axis];
+            }
+            block.sample[lane] = k;
+        }
+        block
+    }
+}
+
 impl LightSeen {
     #[inline(always)]
     pub fn new(l: Vec3, axes: [Vec3; 3], finite: bool) -> Self {
@@ -206,21 +227,10 @@ impl Target {
     pub fn with_neighbours(&self, points: &Points) -> Self {
         let coordinates = self.hull.all_coordinates();
         let block = |number: usize| {
-            let mut block = SampleBlock {
-                at: [[0.0; LANES]; 3],
-                point: [[0.0; LANES]; 3],
-                sample: std::array::from_fn(|lane| (number * LANES + lane) as u32),
-                present: u16::MAX,
-            };
-            for lane in 0..LANES {
+            SampleBlock::of(LANES, |lane| {
                 let q = points.blocks[number].get(lane);
-                let at = coordinates(q.as_dvec3());
-                for axis in 0..3 {
-                    block.at[axis][lane] = at[axis] as f32;
-                    block.point[axis][lane] = q[axis];
-                }
-            }
-            block
+                ((number * LANES + lane) as u32, q, coordinates(q.as_dvec3()))
+            })
         };
         Target { is_in_order: true, ..self.with_blocks((0..points.blocks.len()).map(block).collect()) }
     }
@@ -231,23 +241,7 @@ impl Target {
     }
 
     fn with_samples(&self, samples: &[Sample]) -> Self {
-        let block = |chunk: &[Sample]| {
-            let mut block = SampleBlock {
-                at: [[0.0; LANES]; 3],
-                point: [[0.0; LANES]; 3],
-                sample: [0; LANES],
-                present: ((1u32 << chunk.len()) - 1) as u16,
-            };
-            for lane in 0..LANES {
-                let (k, q, at) = chunk[lane.min(chunk.len() - 1)];
-                for axis in 0..3 {
-                    block.at[axis][lane] = at[axis] as f32;
-                    block.point[axis][lane] = q[axis];
-                }
-                block.sample[lane] = k;
-            }
-            block
-        };
+        let block = |chunk: &[Sample]| SampleBlock::of(chunk.len(), |lane| chunk[lane]);
         self.with_blocks(samples.chunks(LANES).map(block).collect())
     }
 
