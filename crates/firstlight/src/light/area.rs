@@ -470,6 +470,12 @@ impl PointBlock {
         block
     }
 
+    /// The coordinates of all of them, axis by axis.
+    #[inline(always)]
+    pub fn coordinates(&self) -> [[f32; LANES]; 3] {
+        [self.x, self.y, self.z]
+    }
+
     #[inline(always)]
     pub fn get(&self, lane: usize) -> Vec3 {
         Vec3::new(self.x[lane], self.y[lane], self.z[lane])

@@ -28,7 +28,7 @@ pub(crate) use samples::{FineCell, SERIES, series_by_cell, with_gaps};
 pub use sphere::{SphereLight, SphereLightDesc};
 pub use spot::{Spot, SpotDesc};
 
-pub(crate) use area::{Points, check_samples};
+pub(crate) use area::{PointBlock, Points, check_samples};
 pub(crate) use bound::{Sends, ZoneSight};
 pub(crate) use tree::{Held, LightNode, LightTree, Sent};
 pub(crate) use zone::Zone;

@@ -94,6 +94,16 @@ pub(crate) fn only<S: Simd>(simd: S, bits: u16, of: f32x16<S>) -> f32x16<S> {
     mask32x16::from_bitmask(simd, bits.into()).select(of, simd.splat_f32x16(0.0))
 }
 
+/// The least and the most of sixteen numbers.
+#[inline(always)]
+pub(crate) fn least_and_most<S: Simd>(of: f32x16<S>) -> [f32; 2] {
+    let simd = of.token();
+    let (left, right) = simd.split_f32x16(of);
+    let (least, most) = (simd.split_f32x8(left.min(right)), simd.split_f32x8(left.max(right)));
+    let ([a, b, c, d], [e, f, g, h]) = (least.0.min(least.1).to_array(), most.0.max(most.1).to_array());
+    [a.min(b).min(c.min(d)), e.max(f).max(g.max(h))]
+}
+
 /// The sum of sixteen numbers, in the same order with every instruction set.
 #[inline(always)]
 pub(crate) fn total<S: Simd>(of: f32x16<S>) -> f32 {

@@ -158,7 +158,7 @@ impl<'a> Asker<'a> {
             view.hidden.clear();
             return 0;
         }
-        let target = rung.target.get_or_init(|| self.target.with_neighbours(&rung.points));
+        let target = rung.target.get_or_init(|| self.target.with_neighbours(self.level, &rung.points));
         view.mask(self.level, self.scene, target, Some(asked), point)
     }
 }

@@ -1,10 +1,12 @@
 //! A light as something to be seen from a surface: a box along its own axes around all that shines, and its sampled
 //! points in the order of space.
 
-use crate::accel::Aabb;
+use fearless_simd::{Level, f32x16, prelude::*};
+
+use crate::accel::{Aabb, dispatch_all};
 use crate::ids::LightId;
-use crate::light::{AreaShape, Light, LightKind, Points};
-use crate::math::{DMat3, DVec3, LANES, Vec3};
+use crate::light::{AreaShape, Light, LightKind, PointBlock, Points};
+use crate::math::{DMat3, DVec3, LANES, Vec3, least_and_most};
 use crate::scene::Scene;
 
 /// What encloses a light: the points `center` + u `axes[0]` + v `axes[1]` + w `axes[2]`, each of u, v, w from -1 to 1;
@@ -131,14 +133,13 @@ impl LightHull {
 
     /// The coordinates of a point along the axes.
     fn coordinates(&self, q: DVec3) -> DVec3 {
-        self.all_coordinates()(q)
+        self.inverse() * (q - self.center.as_dvec3())
     }
 
-    /// The same for many points.
-    fn all_coordinates(&self) -> impl Fn(DVec3) -> DVec3 + use<> {
+    /// What makes coordinates along the axes of a way from the middle.
+    fn inverse(&self) -> DMat3 {
         let [a, b, c] = self.axes.map(|v| v.as_dvec3());
-        let (inverse, center) = (DMat3::from_cols(a, b, c).inverse(), self.center.as_dvec3());
-        move |q| inverse * (q - center)
+        DMat3::from_cols(a, b, c).inverse()
     }
 
     /// How far the light reaches from its centre, along the axes of the world.
@@ -181,6 +182,43 @@ impl SampleBlock {
         }
         block
     }
+
+    /// The samples of a block of points, by the number of the first. In lanes where it is called within `vectorize`.
+    #[inline(always)]
+    fn of_points(first: usize, points: &PointBlock, inverse: &DMat3, center: DVec3) -> SampleBlock {
+        let point = points.coordinates();
+        let [x, y, z] = inverse.to_cols_array_2d();
+        let mut at = [[0.0; LANES]; 3];
+        let mut sample = [0; LANES];
+        for k in 0..LANES {
+            let (dx, dy, dz) = (
+                f64::from(point[0][k]) - center.x,
+                f64::from(point[1][k]) - center.y,
+                f64::from(point[2][k]) - center.z,
+            );
+            for axis in 0..3 {
+                at[axis][k] = ((x[axis] * dx + y[axis] * dy) + z[axis] * dz) as f32;
+            }
+            sample[k] = (first + k) as u32;
+        }
+        SampleBlock { at, point, sample, present: u16::MAX }
+    }
+}
+
+impl BlockBounds {
+    /// Of at most sixteen blocks.
+    #[inline(always)]
+    fn of<S: Simd>(simd: S, blocks: &[SampleBlock]) -> BlockBounds {
+        let mut bounds = BlockBounds { middle: [[0.0; LANES]; 3], half: [[0.0; LANES]; 3] };
+        for (place, block) in blocks.iter().enumerate() {
+            for axis in 0..3 {
+                let [low, high] = least_and_most(f32x16::load_array_ref(simd, &block.at[axis]));
+                bounds.middle[axis][place] = (low + high) * 0.5;
+                bounds.half[axis][place] = (high - low) * 0.5 + 4.0 * f32::EPSILON;
+            }
+        }
+        bounds
+    }
 }
 
 impl LightSeen {
@@ -218,49 +256,40 @@ impl Target {
 
     /// The same light with these points of it.
     pub fn with(&self, points: &Points) -> Self {
-        let mut samples = self.samples(points);
+        let (inverse, center) = (self.hull.inverse(), self.hull.center.as_dvec3());
+        let sample = |k: usize| (k as u32, points.get(k), inverse * (points.get(k).as_dvec3() - center));
+        let mut samples: Vec<Sample> = (0..points.count()).map(sample).collect();
         gather_neighbours(&mut samples);
-        self.with_samples(&samples)
+        let blocks = samples.chunks(LANES).map(|chunk| SampleBlock::of(chunk.len(), |lane| chunk[lane])).collect();
+        Target { blocks, is_in_order: false, ..self.without() }.bounded(Level::new())
     }
 
     /// The same light with these points of it, of which each sixteen that follow each other are neighbours.
-    pub fn with_neighbours(&self, points: &Points) -> Self {
-        let coordinates = self.hull.all_coordinates();
-        let block = |number: usize| {
-            SampleBlock::of(LANES, |lane| {
-                let q = points.blocks[number].get(lane);
-                ((number * LANES + lane) as u32, q, coordinates(q.as_dvec3()))
-            })
-        };
-        Target { is_in_order: true, ..self.with_blocks((0..points.blocks.len()).map(block).collect()) }
-    }
-
-    fn samples(&self, points: &Points) -> Vec<Sample> {
-        let coordinates = self.hull.all_coordinates();
-        (0..points.count()).map(|k| (k as u32, points.get(k), coordinates(points.get(k).as_dvec3()))).collect()
-    }
-
-    fn with_samples(&self, samples: &[Sample]) -> Self {
-        let block = |chunk: &[Sample]| SampleBlock::of(chunk.len(), |lane| chunk[lane]);
-        self.with_blocks(samples.chunks(LANES).map(block).collect())
-    }
-
-    fn with_blocks(&self, blocks: Vec<SampleBlock>) -> Self {
-        let mut target = Target { light: self.light, hull: self.hull, blocks, cells: Vec::new(), is_in_order: false };
-        for blocks in target.blocks.chunks(LANES) {
-            let mut cells = BlockBounds { middle: [[0.0; LANES]; 3], half: [[0.0; LANES]; 3] };
-            for (place, block) in blocks.iter().enumerate() {
-                for axis in 0..3 {
-                    let (low, high) = block.at[axis]
-                        .iter()
-                        .fold((f32::INFINITY, f32::NEG_INFINITY), |(a, b), x| (a.min(*x), b.max(*x)));
-                    cells.middle[axis][place] = (low + high) * 0.5;
-                    cells.half[axis][place] = (high - low) * 0.5 + 4.0 * f32::EPSILON;
-                }
+    pub fn with_neighbours(&self, level: Level, points: &Points) -> Self {
+        let (inverse, center) = (self.hull.inverse(), self.hull.center.as_dvec3());
+        let mut blocks = Vec::with_capacity(points.blocks.len());
+        dispatch_all!(level, _simd => {
+            for (number, block) in points.blocks.iter().enumerate() {
+                blocks.push(SampleBlock::of_points(number * LANES, block, &inverse, center));
             }
-            target.cells.push(cells);
-        }
-        target
+        });
+        Target { blocks, ..self.without() }.bounded(level)
+    }
+
+    /// The same light without points.
+    fn without(&self) -> Self {
+        Target { light: self.light, hull: self.hull, blocks: Vec::new(), cells: Vec::new(), is_in_order: true }
+    }
+
+    /// Finds where its blocks lie.
+    fn bounded(mut self, level: Level) -> Self {
+        let Target { blocks, cells, .. } = &mut self;
+        dispatch_all!(level, simd => {
+            for blocks in blocks.chunks(LANES) {
+                cells.push(BlockBounds::of(simd, blocks));
+            }
+        });
+        self
     }
 }
 
