@@ -23,8 +23,6 @@ const EDGE: f32 = 0.46;
 /// How many times that of a packet is where its points do not lie in different parts of a cell; and what is counted of
 /// it for few rays, the errors of which are made good by few others.
 const APART: f32 = 3.5;
-const FEW: usize = 9;
-const OF_FEW: f32 = 1.5;
 /// How many times what varies smoothly counts: points of neighbours are wrong alike.
 const ALIKE: f32 = 2.0;
 /// An edge is looked for in so many packets around one that it runs through.
@@ -105,12 +103,11 @@ impl PacketErrors {
             }
         }
         let apart = squared(apart(tallies) * of_edge(count.into()) / of_edge(LANES as f64));
-        let mixed = match rays {
-            1 => ALONE,
-            2..=FEW => MIXED * OF_FEW,
-            _ => MIXED,
-        };
-        let edges = std::array::from_fn(|k| mixed * (apart * together[k]).min(alone[k]).sqrt());
+        // Rays that see other things are wrong by chance, each by itself; those that see the same, together
+        let edges = std::array::from_fn(|k| {
+            let alone = squared(ALONE) * alone[k];
+            if rays == 1 { alone } else { alone.min(squared(MIXED) * apart * together[k]) }.sqrt()
+        });
         let mut smooth = smooth.map(|smooth| ALIKE * smooth.sqrt());
         // Points that do not find what is sent do not find which part of it arrives
         for k in (0..MOMENTS).filter(|k| sent.0[*k] > 0.0) {
