@@ -32,7 +32,8 @@ pub(crate) type Contrast = Colors;
 const FEW_RAYS: usize = 4;
 
 /// See [`ShadingPoint::most_asked`]: of one of so many rays of a fragment, beyond which it takes less to ask points of
-/// the light. Rays that ask together need fewer each the more they are.
+/// the light. Rays that ask together need fewer each the more they are. What stands for some of them may take as much as
+/// those.
 pub(crate) fn most_asked(rays: usize) -> u32 {
     match rays {
         0..4 => u32::MAX,
@@ -310,10 +311,11 @@ impl Fragments {
             return false;
         }
         let first = self.quadrants.len();
+        let most_asked = most_asked((n * n) as usize).saturating_mul(n * n / 4);
         for point in points {
             let (place, rays) = (self.places.len() as u32, n * n / 4);
             self.quadrants.push(Quadrant { place, rays, contrast: Contrast::default() });
-            let point = ShadingPoint { reach, turn, most_motion: QUADRANT_MOTION, ..point };
+            let point = ShadingPoint { reach, turn, most_motion: QUADRANT_MOTION, most_asked, ..point };
             self.places.push(LitPlace::new(scene, point, of.surface(scene), &bsdf));
         }
         let quadrants = Some(first..self.quadrants.len());
@@ -419,7 +421,8 @@ impl Fragments {
             };
             let (place, contrast) = (self.places.len() as u32, mean.contrast);
             self.quadrants.push(Quadrant { place, rays: count as u32, contrast });
-            let point = ShadingPoint { share, most_motion: QUADRANT_MOTION, ..point };
+            let most_asked = most_asked(rays.len()).saturating_mul(count as u32);
+            let point = ShadingPoint { share, most_motion: QUADRANT_MOTION, most_asked, ..point };
             self.places.push(LitPlace::new(scene, point, surface, &mean.bsdf));
         }
         true
