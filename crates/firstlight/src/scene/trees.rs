@@ -1,9 +1,9 @@
 //! Rays through the trees of a scene: the mesh of the world, and all that is placed.
 
-use fearless_simd::{Level, Simd};
+use fearless_simd::{Level, f32x16, prelude::*};
 
 use super::geometry::{At, Geometry, Hit, Meets, Nearest, Placed, PlacedSpot, PlacedTarget, UpperItem};
-use crate::accel::{Aabb, Planes, RayPacket16, RayTile, TraceRay, dispatch_eight, dispatch_sixteen};
+use crate::accel::{Aabb, Planes, RayPacket16, RayTile, TraceRay, dispatch_all, dispatch_eight, dispatch_sixteen};
 use crate::ids::{LightId, MaterialId, SurfaceId};
 use crate::math::{DVec3, Ray, ShadowRay, Vec3};
 use crate::shape::{LineLanes, Mesh, RayDifferential, ShapePoint, SolidHit, TileHits, TrianglePoint, every};
@@ -431,6 +431,19 @@ impl ShadowRays<'_> {
         self.from[0].light
     }
 
+    /// Those that pass through a box, but for rounding.
+    #[inline(always)]
+    fn reaching<S: Simd>(&self, simd: S, bounds: &Aabb) -> u16 {
+        let (mut near, mut far) = (simd.splat_f32x16(0.0), f32x16::load_array_ref(simd, &self.t_end));
+        for axis in 0..3 {
+            let o = f32x16::load_array_ref(simd, &self.rays.o[axis]);
+            let inverse = simd.splat_f32x16(1.0) / f32x16::load_array_ref(simd, &self.rays.d[axis]);
+            let (low, high) = ((bounds.min[axis] - o) * inverse, (bounds.max[axis] - o) * inverse);
+            (near, far) = (near.max(low.min(high)), far.min(low.max(high)));
+        }
+        !(near.simd_gt(far).to_bitmask() as u16)
+    }
+
     /// The rays that leave a triangle of a mesh, which does not stand in their way.
     fn leaving(&self, source: u32, triangle: u32) -> u64 {
         let mut lanes = 0;
@@ -458,11 +471,22 @@ impl Geometry {
         })
     }
 
-    /// [`are_blocked`](Self::are_blocked) by some of what is placed.
-    pub fn are_blocked_by(&self, level: Level, things: &[u32], shadows: &ShadowRays, active: u16) -> u16 {
+    /// [`are_blocked`](Self::are_blocked) by some of what is placed, around each of which there is one of the `boxes`.
+    pub fn are_blocked_by(
+        &self,
+        level: Level,
+        things: &[u32],
+        boxes: &[Aabb],
+        shadows: &ShadowRays,
+        active: u16,
+    ) -> u16 {
         let mut done = 0;
-        for &thing in things {
+        for (&thing, bounds) in things.iter().zip(boxes) {
             let asked = active & !done;
+            let asked = asked & dispatch_all!(level, simd => shadows.reaching(simd, bounds));
+            if asked == 0 {
+                continue;
+            }
             done |= dispatch_sixteen!(level, simd => self.placed_blocks_lanes(simd, thing, shadows, asked), else {
                 let blocked = |lane: &usize| {
                     dispatch_eight!(level, simd => {

@@ -6,7 +6,7 @@ use super::Viewpoint;
 use super::occluders::{MeshNumber, Occluders, ShadowMesh};
 use super::shaft::Shaft;
 use super::target::{LightSeen, Target};
-use crate::accel::dispatch_all;
+use crate::accel::{Aabb, dispatch_all};
 use crate::math::{DVec3, UNIT_ROUNDOFF, Vec3};
 use crate::scene::{PlacedTarget, Scene};
 use crate::shape::{Cover, DiskShadow, Eye, ParallelogramShadow, Placement, SeenTriangle, SphereShadow, TOGETHER};
@@ -31,8 +31,9 @@ pub(crate) struct ShadowView {
     pub flats: Vec<ParallelogramShadow>,
     pub disks: Vec<DiskShadow>,
     pub triangles: Vec<SeenTriangle>,
-    /// Solids and point sets, as they are placed.
+    /// Solids and point sets, as they are placed, and a box around each in the world.
     pub others: Vec<u32>,
+    pub(super) boxes: Vec<Aabb>,
     /// Whether all trees have to be asked, ray by ray.
     pub trees: bool,
     /// For each block of sixteen samples, those that are known to be hidden: in the light's order.
@@ -53,6 +54,7 @@ impl ShadowView {
         self.disks.clear();
         self.triangles.clear();
         self.others.clear();
+        self.boxes.clear();
         self.hidden.clear();
         self.trees = false;
     }
@@ -145,20 +147,32 @@ impl ShadowView {
         let shaft = Shaft::of(&own, &[0], &target.hull);
         for &index in &occluders.others {
             let thing = &scene.geometry.placed[index as usize];
-            if let PlacedTarget::Solid(solid) = thing.target {
-                let solid = &scene.geometry.solids[solid as usize];
-                if let Some((on, n)) = solid.plane() {
-                    if stays_before(&thing.placement, on, n, light, point) {
+            let bounds = match thing.target {
+                PlacedTarget::Solid(solid) => {
+                    let solid = &scene.geometry.solids[solid as usize];
+                    if let Some((on, n)) = solid.plane()
+                        && stays_before(&thing.placement, on, n, light, point)
+                    {
                         continue;
                     }
-                } else if let Some(bounds) = solid.bounds() {
-                    let [low, high] = thing.placement.bounds(bounds);
-                    let far = (high - point.start.as_dvec3()).abs().max((low - point.start.as_dvec3()).abs());
-                    if !shaft.meets(low, high, far.max_element() * 1e-5) {
-                        continue;
-                    }
+                    solid.bounds()
                 }
+                PlacedTarget::Points(points) => scene.geometry.point_sets[points as usize].bounds(),
+                PlacedTarget::Mesh(_) => None,
+            };
+            let mut around = Aabb { min: Vec3::NEG_INFINITY, max: Vec3::INFINITY };
+            if let Some(bounds) = bounds {
+                let start = point.start.as_dvec3();
+                let [low, high] = thing.placement.bounds(bounds);
+                let far = (high - start).abs().max((low - start).abs()).max_element();
+                if !shaft.meets(low, high, far * 1e-5) {
+                    continue;
+                }
+                // More than what rays in single precision lose
+                let room = (far + start.abs().max_element()) * 1e-5;
+                around = Aabb { min: (low - room).as_vec3(), max: (high + room).as_vec3() };
             }
+            self.boxes.push(around);
             self.others.push(index);
         }
     }
