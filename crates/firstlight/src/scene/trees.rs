@@ -559,10 +559,12 @@ impl Geometry {
                 let lines = LineLanes::new(&thing.placement, &shadows.rays, &shadows.t_end);
                 return self.solids[solid as usize].blocks_lanes(&lines, active);
             }
-            PlacedTarget::Points(_) => {
-                let blocks =
-                    |lane: &usize| self.blocked_by_placed(simd, index, &shadows.ray(*lane), shadows.t_end[*lane]);
-                return lanes(active).filter(blocks).fold(0, |mask, lane| mask | 1 << lane);
+            PlacedTarget::Points(points) => {
+                if thing.shadow == Meets::Some && !self.casts(thing.surface, shadows.light()) {
+                    return 0;
+                }
+                let lines = LineLanes::new(&thing.placement, &shadows.rays, &shadows.t_end);
+                return self.point_sets[points as usize].blocks_lanes(simd, &lines, &shadows.t_end, active);
             }
         };
         let mesh = &self.meshes[mesh as usize];

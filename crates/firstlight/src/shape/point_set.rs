@@ -6,6 +6,7 @@ use super::ball::ball_tangents;
 use super::common::shape_table;
 use super::mesh::{from_own_origin, read_mesh_file};
 use super::placement::Placement;
+use super::solid::LineLanes;
 use super::sphere::{SphereUv, equirectangular};
 use super::surface::{Footprint, RayDifferential, ShapePoint, UvEdge};
 use crate::accel::{Aabb, Bvh, TraceRay};
@@ -207,18 +208,31 @@ impl PointBall {
     /// `Sphere::intersect` for the form.
     #[inline(always)]
     fn roots(&self, ray: &DRay) -> Option<[f64; 2]> {
+        let (is_met, roots) = self.ends(ray);
+        is_met.then_some(roots)
+    }
+
+    /// Whether either lies between 0 and `limit`. In lanes where many lines are asked.
+    #[inline(always)]
+    fn blocks(&self, ray: &DRay, limit: f64) -> bool {
+        let (is_met, [enter, leave]) = self.ends(ray);
+        let between = |t: f64| (t > 0.0) & (t < limit);
+        is_met & (between(enter) | between(leave))
+    }
+
+    /// Whether there are [`roots`](Self::roots), and those.
+    #[inline(always)]
+    fn ends(&self, ray: &DRay) -> (bool, [f64; 2]) {
         let f = ray.o - self.c;
         let dd = ray.d.length_squared();
         let b = -f.dot(ray.d);
         let nearest = f + ray.d * (b / dd);
         let discriminant = self.r * self.r - nearest.length_squared();
-        if !(discriminant >= 0.0) {
-            return None;
-        }
-        let root = (discriminant * dd).sqrt();
+        let root = (discriminant.max(0.0) * dd).sqrt();
         let product = f.length_squared() - self.r * self.r;
         let q = if b > 0.0 { b + root } else { b - root };
-        Some(if b > 0.0 { [product / q, q / dd] } else { [q / dd, product / q] })
+        let (one, other) = (product / q, q / dd);
+        (discriminant >= 0.0, if b > 0.0 { [one, other] } else { [other, one] })
     }
 }
 
@@ -327,9 +341,18 @@ impl PointSet {
     #[inline(always)]
     fn blocks_here<S: Simd>(&self, simd: S, ray: &DRay, limit: f32) -> bool {
         let trace = TraceRay::new(ray.o.as_vec3(), ray.d.as_vec3());
-        let between = |t: f64| t > 0.0 && t < limit as f64;
-        self.tree.any(simd, &trace, limit, |index| {
-            self.ball(index).roots(ray).is_some_and(|[enter, leave]| between(enter) || between(leave))
+        self.tree.any(simd, &trace, limit, |index| self.ball(index).blocks(ray, limit.into()))
+    }
+
+    /// Which of sixteen lines of the set's own space meet any sphere before they end.
+    #[inline(always)]
+    pub fn blocks_lanes<S: Simd>(&self, simd: S, lines: &LineLanes, t_end: &[f32; 16], active: u16) -> u16 {
+        self.tree.any16(simd, &lines.rays(active), t_end, active, |index, _| {
+            let ball = self.ball(index);
+            lines.each(
+                #[inline(always)]
+                |line, end| [ball.blocks(line, end), false],
+            )[0]
         })
     }
 

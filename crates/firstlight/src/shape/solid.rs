@@ -268,6 +268,16 @@ impl LineLanes {
         lines
     }
 
+    /// Some of them in single precision, for trees.
+    pub fn rays(&self, active: u16) -> RayPacket16 {
+        let mut rays = RayPacket16::ZERO;
+        for k in (0..LANES).filter(|k| active >> k & 1 == 1) {
+            let DRay { o, d } = self.line(k);
+            rays.set(k, o.as_vec3(), d.as_vec3());
+        }
+        rays
+    }
+
     #[inline(always)]
     fn line(&self, k: usize) -> DRay {
         let [o, d] = [&self.o, &self.d].map(|v| DVec3::new(v[0][k], v[1][k], v[2][k]));
@@ -276,7 +286,7 @@ impl LineLanes {
 
     /// For which of them each of two things is true, bit by bit, up to the end of each.
     #[inline(always)]
-    fn each(&self, is: impl Fn(&DRay, f64) -> [bool; 2]) -> [u16; 2] {
+    pub fn each(&self, is: impl Fn(&DRay, f64) -> [bool; 2]) -> [u16; 2] {
         let [mut one, mut other] = [[0u64; LANES]; 2];
         for k in 0..LANES {
             [one[k], other[k]] = is(&self.line(k), self.end[k]).map(u64::from);
