@@ -63,6 +63,8 @@ pub(super) struct AskedLeaves<'a> {
     pub everywhere: u32,
     /// The same of those near edges.
     pub deep: u32,
+    /// The numbers of blocks that were asked since somebody last took them.
+    pub new: Vec<u32>,
     /// Whether all were halved once, so that it is known what first points overlook.
     pub is_raised: bool,
 }
@@ -71,7 +73,9 @@ impl<'a> AskedLeaves<'a> {
     /// Has all rays ask a point in each of so many.
     pub fn new(asker: Asker<'a>, count: usize, asking: &mut [Asking], counts: &mut Counts) -> Self {
         let level = count.ilog2();
-        let asked = AskedLeaves { asker, leaves: Leaves::of(level), everywhere: level, deep: level, is_raised: false };
+        let leaves = Leaves::of(level);
+        let new = leaves.order.clone();
+        let asked = AskedLeaves { asker, leaves, everywhere: level, deep: level, new, is_raised: false };
         let first: Vec<AskedRung> = asking.iter().map(|one| asker.first(one.series, count)).collect();
         asked.look(&first, &vec![u16::MAX; count / LANES], asking, counts);
         for (one, rung) in asking.iter_mut().zip(&first) {
@@ -123,7 +127,9 @@ impl<'a> AskedLeaves<'a> {
                 one.tally.halve(&self.asker, (rung, halved), &one.view, &one.si, &one.lobe);
             }
         }
-        halved.iter().flat_map(|halved| &halved.blocks).flat_map(|block| block.halves).collect()
+        let halves: Vec<u32> = halved.iter().flat_map(|halved| &halved.blocks).flat_map(|block| block.halves).collect();
+        self.new.extend(&halves);
+        halves
     }
 
     /// Halves those blocks, and their halves, in which leaves may send so much more to all rays together than others as

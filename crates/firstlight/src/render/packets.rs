@@ -5,7 +5,9 @@
 //! not; then what it sends is wrong by chance, each packet by itself. Where no edge is, what its points send may still
 //! vary more than they tell, next to a light or in a highlight.
 
-use fearless_simd::{Level, mask32x16, prelude::*};
+use std::ops::AddAssign;
+
+use fearless_simd::{Level, prelude::*};
 
 use super::leaves::Leaves;
 use super::tally::Tally;
@@ -45,79 +47,140 @@ pub(super) struct PacketErrors {
 /// Of each kind of light.
 type OfKind = [f32; MOMENTS];
 
-impl PacketErrors {
-    /// Of rays that asked points in the same leaves of a light of such a `measure`. `sent` is what would arrive if
-    /// nothing were in the way.
-    pub fn of(level: Level, tallies: &[&Tally], leaves: &Leaves, measure: f32, sent: &Moments) -> PacketErrors {
-        dispatch_all!(level, simd => PacketErrors::of_lanes(simd, tallies, leaves, measure, sent))
+/// The packets of rays that ask points in the same leaves of a light, block by block.
+#[derive(Debug)]
+pub(super) struct Packets {
+    /// The measure of the light, and what would arrive if nothing were in the way.
+    measure: f32,
+    sent: Moments,
+    /// By the number of the block.
+    blocks: Vec<BlockSums>,
+}
+
+/// What packets of a block make of it: squares of what is sent, as parts of what would arrive.
+#[derive(Clone, Copy, Debug, Default)]
+struct BlockSums {
+    /// In which leaves any ray finds anything lit, and anything hidden, as bits.
+    seen: [u16; 2],
+    /// By mixed packets of all rays, and of one ray each; and of what varies in those that are hidden, and lit.
+    together: OfKind,
+    alone: OfKind,
+    smooth: [OfKind; 2],
+}
+
+impl Packets {
+    pub fn new(measure: f32, sent: Moments) -> Packets {
+        Packets { measure, sent, blocks: Vec::new() }
     }
 
-    #[inline(always)]
-    fn of_lanes<S: Simd>(simd: S, tallies: &[&Tally], leaves: &Leaves, measure: f32, sent: &Moments) -> PacketErrors {
-        let rays = tallies.len();
-        let per_packet = (LANES / rays.clamp(1, LANES)).next_power_of_two();
-        let all = sum_of(tallies, |tally| tally.all);
-        let lit = sum_of(tallies, |tally| tally.lit);
+    /// How many neighbouring leaves hold a packet.
+    fn width(rays: usize) -> usize {
+        (LANES / rays.clamp(1, LANES)).next_power_of_two()
+    }
+
+    /// Hears of those blocks that were asked anew, by their numbers.
+    pub fn hear(&mut self, level: Level, tallies: &[&Tally], leaves: &Leaves, blocks: &[u32]) {
+        self.blocks.resize(leaves.blocks.len(), BlockSums::default());
+        let width = Packets::width(tallies.len());
         // As parts of all that is sent; of what is as good as nothing, squares are nothing
-        let one: OfKind = all.map(|all| if all > LEAST { (1.0 / all) as f32 } else { 0.0 });
-        let share: OfKind = std::array::from_fn(|k| lit[k] as f32 * one[k]);
-        // What is sent is parted wrong only, that which is lit and that which is hidden
-        let weighs = [share.map(|share| 1.0 - share), share];
-        let count = (per_packet * rays) as f32;
-        let zero = simd.splat_f32x16(0.0);
-        let mut seen = Vec::with_capacity(leaves.order.len());
-        // Squares of what is sent: by mixed packets of all rays, and of one ray each; and of what varies in the others
-        let (mut together, mut alone, mut smooth) = (OfKind::default(), OfKind::default(), OfKind::default());
-        for number in &leaves.order {
-            let part = leaves.blocks[*number as usize].part();
-            let (mut lit, mut hidden) = (0u16, 0u16);
-            let mut moments = [[zero; 2]; MOMENTS];
-            for tally in tallies {
-                let block = tally.block(*number as usize);
-                (lit, hidden) = (lit | block.lit(), hidden | block.hides);
-                let is_mixed = block.hides != 0 && block.hides != block.sends;
-                for (k, sent) in block.lanes(simd).into_iter().enumerate() {
-                    let sent = sent * (part * one[k]);
-                    moments[k][0] += sent;
-                    moments[k][1] += sent * sent;
-                    if is_mixed {
-                        alone[k] += squared(total(sent));
-                    }
-                }
+        let unit = self.sent.0.map(|sent| if sent > 0.0 { self.measure / sent } else { 0.0 });
+        dispatch_all!(level, simd => {
+            for number in blocks {
+                let part = leaves.blocks[*number as usize].part();
+                self.blocks[*number as usize] =
+                    BlockSums::of(simd, tallies, *number as usize, unit.map(|unit| unit * part), width);
             }
-            seen.push([lit, hidden]);
-            if lit | hidden == 0 {
-                continue;
-            }
-            let is_mixed = spread(lit, per_packet) & spread(hidden, per_packet);
-            let is_lit = mask32x16::from_bitmask(simd, spread(lit, per_packet).into());
-            for k in 0..MOMENTS {
-                let [sum, square] = moments[k].map(|moment| sum_of_runs(simd, moment, per_packet));
-                together[k] += total(only(simd, is_mixed, sum * sum)) / per_packet as f32;
-                // Points vary smoothly: n of them stand for parts that are narrower by a root of n, so that their sum
-                // is wrong by as much as one of them is off their mean
-                let square = (square - sum * sum * (1.0 / count)) * (1.0 / count);
-                let [lit, hidden] = [0, 1].map(|which: usize| simd.splat_f32x16(squared(weighs[which][k])));
-                let weight = is_lit.select(lit, hidden);
-                smooth[k] += total(only(simd, !is_mixed, square.max(zero) * weight)) / per_packet as f32;
-            }
-        }
-        let apart = squared(apart(tallies) * of_edge(count.into()) / of_edge(LANES as f64));
-        // Rays that see other things are wrong by chance, each by itself; those that see the same, together
-        let edges = std::array::from_fn(|k| {
-            let alone = squared(ALONE) * alone[k];
-            if rays == 1 { alone } else { alone.min(squared(MIXED) * apart * together[k]) }.sqrt()
         });
-        let mut smooth = smooth.map(|smooth| ALIKE * smooth.sqrt());
-        // Points that do not find what is sent do not find which part of it arrives
-        for k in (0..MOMENTS).filter(|k| sent.0[*k] > 0.0) {
-            let found = all[k] as f32 * measure / sent.0[k];
-            smooth[k] = smooth[k].max(2.0 * share[k] * (1.0 - share[k]) * (found - 1.0).abs());
+    }
+
+    /// What they say by now.
+    pub fn errors(&self, tallies: &[&Tally], leaves: &Leaves) -> PacketErrors {
+        let rays = tallies.len();
+        let mut sums = BlockSums::default();
+        let mut seen = Vec::with_capacity(leaves.order.len());
+        for number in &leaves.order {
+            let block = &self.blocks[*number as usize];
+            sums += block;
+            seen.push(block.seen);
+        }
+        let [all, lit] = [sum_of(tallies, |tally| tally.all), sum_of(tallies, |tally| tally.lit)];
+        // Rays that see other things are wrong by chance, each by itself; those that see the same, together
+        let width = Packets::width(rays);
+        let apart = squared(apart(tallies) * of_edge((width * rays) as f64) / of_edge(LANES as f64));
+        let (mut edges, mut smooth) = (OfKind::default(), OfKind::default());
+        for k in (0..MOMENTS).filter(|k| all[*k] > LEAST && self.sent.0[*k] > 0.0) {
+            // The part of what is sent that points find, and that of it which arrives
+            let found = all[k] as f32 * self.measure / self.sent.0[k];
+            let share = (lit[k] / all[k]) as f32;
+            let alone = squared(ALONE) * sums.alone[k];
+            let together = squared(MIXED) * apart * sums.together[k];
+            edges[k] = if rays == 1 { alone } else { alone.min(together) }.sqrt() / found;
+            // What is sent is parted wrong only, that which is lit and that which is hidden
+            let [hidden, lit] = [0, 1].map(|which: usize| sums.smooth[which][k]);
+            let varies = (hidden * squared(share) + lit * squared(1.0 - share)).sqrt() / found;
+            // Points that do not find what is sent do not find which part of it arrives
+            smooth[k] = (ALIKE * varies).max(2.0 * share * (1.0 - share) * (found - 1.0).abs());
         }
         let mut near = vec![false; leaves.order.len()];
-        let around = around(&seen, per_packet * AROUND);
+        let around = around(&seen, width * AROUND);
         leaves.order.iter().zip(around).for_each(|(number, is_near)| near[*number as usize] = is_near);
         PacketErrors { near, edges, smooth }
+    }
+}
+
+impl BlockSums {
+    /// Of a block whose leaves are parts of the light that count for so much, with so many in a packet.
+    #[inline(always)]
+    fn of<S: Simd>(simd: S, tallies: &[&Tally], number: usize, unit: OfKind, width: usize) -> BlockSums {
+        let zero = simd.splat_f32x16(0.0);
+        let mut sums = BlockSums::default();
+        let (mut lit, mut hidden) = (0u16, 0u16);
+        let mut moments = [[zero; 2]; MOMENTS];
+        for tally in tallies {
+            let block = tally.block(number);
+            (lit, hidden) = (lit | block.lit(), hidden | block.hides);
+            let is_mixed = block.hides != 0 && block.hides != block.sends;
+            for (k, sent) in block.lanes(simd).into_iter().enumerate() {
+                let sent = sent * unit[k];
+                moments[k][0] += sent;
+                moments[k][1] += sent * sent;
+                if is_mixed {
+                    sums.alone[k] += squared(total(sent));
+                }
+            }
+        }
+        sums.seen = [lit, hidden];
+        if lit | hidden == 0 {
+            return sums;
+        }
+        let [lit, hidden] = [spread(lit, width), spread(hidden, width)];
+        let (per_packet, count) = (1.0 / width as f32, 1.0 / (width * tallies.len()) as f32);
+        for k in 0..MOMENTS {
+            let [sum, square] = moments[k].map(|moment| sum_of_runs(simd, moment, width));
+            if lit & hidden != 0 {
+                sums.together[k] = total(only(simd, lit & hidden, sum * sum)) * per_packet;
+            }
+            // Points vary smoothly: n of them stand for parts that are narrower by a root of n, so that their sum is
+            // wrong by as much as one of them is off their mean
+            let varies = ((square - sum * sum * count) * count).max(zero);
+            for (which, packets) in [hidden & !lit, lit & !hidden].into_iter().enumerate() {
+                if packets != 0 {
+                    sums.smooth[which][k] = total(only(simd, packets, varies)) * per_packet;
+                }
+            }
+        }
+        sums
+    }
+}
+
+impl AddAssign<&BlockSums> for BlockSums {
+    fn add_assign(&mut self, other: &BlockSums) {
+        for k in 0..MOMENTS {
+            self.together[k] += other.together[k];
+            self.alone[k] += other.alone[k];
+            self.smooth[0][k] += other.smooth[0][k];
+            self.smooth[1][k] += other.smooth[1][k];
+        }
     }
 }
 

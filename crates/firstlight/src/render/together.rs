@@ -10,7 +10,7 @@ use super::asking::{AskedLeaves, Asking, DEEPEST, MOST, parts};
 use super::evidence::{Evidence, Met};
 use super::fragment::most_asked;
 use super::ladder::FIRST;
-use super::packets::{PacketErrors, of_edge};
+use super::packets::{Packets, of_edge};
 use super::resolve::LightTerm;
 use super::tally::Tally;
 use crate::color::Rgb;
@@ -341,6 +341,8 @@ impl Together {
         let mut is_tried = false;
         let mut evidence = Evidence::new(asking[0].si.p);
         let mut asked = AskedLeaves::new(asker, first, asking, counts);
+        let sent = asking.iter().fold(Moments::default(), |sum, one| sum + one.whole);
+        let mut packets = Packets::new(measure, sent);
         loop {
             asking.iter_mut().for_each(|one| one.tally.sum(asker.level, &asked.leaves));
             let shares = parts(asking, |tally| &tally.lit);
@@ -351,7 +353,6 @@ impl Together {
             let (mut effective, mut sending, mut is_hidden) = ([0.0; MOMENTS], 0.0, false);
             // That of rays whose points find less than half of it
             let mut missing = [Rgb::BLACK; MOMENTS];
-            let mut sent = Moments::default();
             for one in asking.iter() {
                 value += one.color(&one.tally.arrives(&one.whole, &shares));
                 for (k, (color, points)) in one.each(&one.whole).0.into_iter().zip(one.tally.effective()).enumerate() {
@@ -363,7 +364,6 @@ impl Together {
                 }
                 sending += one.tally.effective_sending();
                 is_hidden |= one.tally.hidden > 0.0;
-                sent += one.whole;
             }
             let met = Met {
                 points: effective.map(|points| points as f32),
@@ -387,7 +387,8 @@ impl Together {
             // As much as packets are wrong by, and what nobody met. Of small things that are in the way each point says
             // what it sends; where leaves near those that were found are smaller, all that were not found are missing
             let tallies: Vec<&Tally> = asking.iter().map(|one| &one.tally).collect();
-            let packets = PacketErrors::of(asker.level, &tallies, &asked.leaves, measure, &sent);
+            packets.hear(asker.level, &tallies, &asked.leaves, &std::mem::take(&mut asked.new));
+            let packets = packets.errors(&tallies, &asked.leaves);
             let leaf = asker.area.measure() as f32 / (1u64 << asked.everywhere) as f32;
             let met: [f32; MOMENTS] = std::array::from_fn(|k| evidence.overlooked(k, around, leaf));
             let noise = |k: usize| (met[k] / effective[k].max(1.0) as f32).sqrt();
