@@ -38,9 +38,9 @@ pub(crate) struct ShadingPoint {
     ///
     /// [`Arrived::motion`]: super::Arrived::motion
     pub most_motion: f32,
-    /// What the cells of a light and panels of their rows that it is asked by may take, 1 for each that has nothing
-    /// special in the way: beyond that, what arrives is not known.
-    pub most_asked: u32,
+    /// The part of the points of a light that it asks in place of all this, where that would take too long: 1/n of a ray
+    /// that asks together with n - 1 others. Without bound where it must be known.
+    pub part_of_points: f32,
     /// What one unit of each moment is worth: linear colours, the light's scale included.
     pub worth: Colors,
     /// What is there beside this light, at least.
@@ -64,7 +64,7 @@ impl ShadingPoint {
             reach: 0.0,
             turn: 0.0,
             most_motion: f32::INFINITY,
-            most_asked: u32::MAX,
+            part_of_points: f32::INFINITY,
             worth: Colors::BLACK,
             base: Rgb::BLACK,
             share: 1.0,

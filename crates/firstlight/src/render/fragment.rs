@@ -31,17 +31,6 @@ pub(crate) type Contrast = Colors;
 /// Fragments of so few rays are lit at each.
 const FEW_RAYS: usize = 4;
 
-/// See [`ShadingPoint::most_asked`]: of one of so many rays of a fragment, beyond which it takes less to ask points of
-/// the light. Rays that ask together need fewer each the more they are. What stands for some of them may take as much as
-/// those.
-pub(crate) fn most_asked(rays: usize) -> u32 {
-    match rays {
-        0..4 => u32::MAX,
-        4..9 => 60,
-        _ => 20,
-    }
-}
-
 /// A camera ray and what it meets.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct RayHit {
@@ -311,11 +300,10 @@ impl Fragments {
             return false;
         }
         let first = self.quadrants.len();
-        let most_asked = most_asked((n * n) as usize).saturating_mul(n * n / 4);
         for point in points {
             let (place, rays) = (self.places.len() as u32, n * n / 4);
             self.quadrants.push(Quadrant { place, rays, contrast: Contrast::default() });
-            let point = ShadingPoint { reach, turn, most_motion: QUADRANT_MOTION, most_asked, ..point };
+            let point = ShadingPoint { reach, turn, most_motion: QUADRANT_MOTION, part_of_points: 0.25, ..point };
             self.places.push(LitPlace::new(scene, point, of.surface(scene), &bsdf));
         }
         let quadrants = Some(first..self.quadrants.len());
@@ -421,8 +409,8 @@ impl Fragments {
             };
             let (place, contrast) = (self.places.len() as u32, mean.contrast);
             self.quadrants.push(Quadrant { place, rays: count as u32, contrast });
-            let most_asked = most_asked(rays.len()).saturating_mul(count as u32);
-            let point = ShadingPoint { share, most_motion: QUADRANT_MOTION, most_asked, ..point };
+            let part_of_points = count as f32 / rays.len() as f32;
+            let point = ShadingPoint { share, most_motion: QUADRANT_MOTION, part_of_points, ..point };
             self.places.push(LitPlace::new(scene, point, surface, &mean.bsdf));
         }
         true
@@ -444,8 +432,8 @@ impl Fragments {
             Some(of) => of.point(scene, &self.rays[ray].ray, self.rays[ray].t),
             None => ShadingPoint::of(&self.members[ray].si),
         };
-        let (share, most_asked) = (fragment.share, most_asked(fragment.count()));
-        LitPlace::new(scene, ShadingPoint { share, most_asked, ..point }, fragment.surface, bsdf)
+        let (share, part_of_points) = (fragment.share, 1.0 / fragment.count() as f32);
+        LitPlace::new(scene, ShadingPoint { share, part_of_points, ..point }, fragment.surface, bsdf)
     }
 
     /// The material that a ray of a fragment sees.

@@ -8,7 +8,6 @@ use super::Counts;
 use super::arrival::{ArrivalPlace, Arrivals, Sighting};
 use super::asking::{AskedLeaves, Asking, DEEPEST, MOST, parts};
 use super::evidence::{Evidence, Met};
-use super::fragment::most_asked;
 use super::ladder::FIRST;
 use super::packets::{Packets, of_edge};
 use super::resolve::LightTerm;
@@ -207,11 +206,11 @@ impl Together {
         let looking: Vec<Vec<Looking>> = all.iter_mut().map(|one| std::mem::take(&mut one.looking)).collect();
         let mut places = Vec::new();
         for (one, looking) in all.iter().zip(&looking) {
-            let most_asked = most_asked(one.asking.len() + looking.len());
+            let part_of_points = 1.0 / (one.asking.len() + looking.len()) as f32;
             places.extend(looking.iter().map(|Looking { si, bsdf, lit, clear }| {
                 // What is integrated is wrong alike at all rays: that much by no more than if one stood for all
                 let (share, lit, clear) = (one.share, *lit, *clear);
-                ArrivalPlace { share, lit, clear, most_asked, ..arrivals.place(light, si, bsdf) }
+                ArrivalPlace { share, lit, clear, part_of_points, ..arrivals.place(light, si, bsdf) }
             }));
         }
         if !places.is_empty() {

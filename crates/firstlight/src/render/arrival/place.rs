@@ -19,8 +19,8 @@ pub(crate) struct ArrivalPlace<'a> {
     /// Whether it is known that nothing is in the way of the light, or nothing in trees.
     pub lit: bool,
     pub clear: bool,
-    /// See [`ShadingPoint::most_asked`].
-    pub most_asked: u32,
+    /// See [`ShadingPoint::part_of_points`].
+    pub part_of_points: f32,
     /// What is there beside this light, at least.
     pub base: Rgb,
     /// What the two sums are multiplied with: the light's scale, and the surface's colours.
@@ -31,9 +31,9 @@ pub(crate) struct ArrivalPlace<'a> {
 impl<'a> ArrivalPlace<'a> {
     /// One point, by itself; `base` and what follows as in the struct.
     pub fn point(si: &'a SurfaceInteraction, lobe: &'a Lobe, base: Rgb, scale: Rgb, reflected: Colors) -> Self {
-        let (share, most_asked) = (1.0, u32::MAX);
+        let (share, part_of_points) = (1.0, f32::INFINITY);
         let [lit, clear] = [false; 2];
-        ArrivalPlace { si, lobe, reach: 0.0, turn: 0.0, share, lit, clear, most_asked, base, scale, reflected }
+        ArrivalPlace { si, lobe, reach: 0.0, turn: 0.0, share, lit, clear, part_of_points, base, scale, reflected }
     }
 
     /// What sums of the light send.
@@ -53,7 +53,7 @@ impl<'a> ArrivalPlace<'a> {
             worth: self.colors(),
             base: self.base,
             share: self.share,
-            most_asked: self.most_asked,
+            part_of_points: self.part_of_points,
             ..ShadingPoint::of(self.si)
         }
     }
