@@ -58,6 +58,8 @@ pub(super) struct Behind {
     evidence: Vec<Evidence>,
 }
 
+/// A pixel that tells what others in its square see counts for so many: what it is off by, they are off by alike.
+const NODE_PIXELS: f32 = 1.4;
 /// How many pixels away those are whose points tell something of a pixel.
 const AROUND: usize = 3;
 /// No fragment.
@@ -255,7 +257,7 @@ impl Cells<'_> {
             };
             let wanted: Vec<usize> = (0..block.fragments.len()).filter(is_wanted).collect();
             let before = counts.work();
-            let ask = |k: &usize| self.together(&block, *k, light, sights, counts);
+            let ask = |k: &usize| self.together(&block, *k, light, 1.0, sights, counts);
             let mut all: Vec<Together> = wanted.iter().map(ask).collect();
             Together::tell(&mut all, &mut self.lights.arrivals, counts);
             let each = (counts.work() - before) / wanted.len().max(1) as f32;
@@ -350,7 +352,7 @@ impl Cells<'_> {
         sights.open.push(true);
         self.look_for(&block, light, &mut sights, counts);
         let before = counts.work();
-        let mut together = [self.together(&block, 0, light, &mut sights, counts)];
+        let mut together = [self.together(&block, 0, light, NODE_PIXELS, &mut sights, counts)];
         Together::tell(&mut together, &mut self.lights.arrivals, counts);
         let [together] = together;
         let outcome = self.settle(together, fragment, light, counts);
@@ -375,12 +377,13 @@ impl Cells<'_> {
         outcome
     }
 
-    /// Asks for a light at all rays of a fragment of the block.
+    /// Asks for a light at all rays of a fragment of the block, which stands for so many pixels.
     fn together(
         &mut self,
         block: &RayBlock,
         k: usize,
         light: usize,
+        pixels: f32,
         sights: &mut RaySights,
         counts: &mut Counts,
     ) -> Together {
@@ -388,7 +391,7 @@ impl Cells<'_> {
         let others = self.others(of.fragment as usize, light);
         let Fragment { surface, share, .. } = self.fragments.all[of.fragment as usize];
         let salt = salt(self.at(self.pixel_of(of.fragment as usize)), surface);
-        let mut together = Together::new(light, of.count as usize, share, salt, others);
+        let mut together = Together::new(light, of.count as usize, share * pixels, salt, others);
         for (place, k) in block.places[of.rays()].iter().zip(of.rays()) {
             sights.settle(k, place, &mut self.lights.arrivals, light, share, &mut together, counts);
         }
