@@ -429,7 +429,7 @@ impl<'a> Arrivals<'a> {
         let occluders = &mut self.occluders;
         occluders.gather(self.level, self.scene, &self.lights.targets[index], points, &self.indices, 0);
         counts.settled.shafts += 1;
-        let is_known = self.lights.know(index, &occluders.others) && !occluders.has_meshes();
+        let is_known = self.lights.know(index, occluders.others.iter().copied()) && !occluders.has_meshes();
         (occluders.has_trees() && !is_known, occluders.count() == 0)
     }
 
@@ -449,7 +449,10 @@ impl<'a> Arrivals<'a> {
         self.settler.settle(self.level, self.scene, target, points, order, settled, |k, visibility, view| {
             each(k, visibility, &mut || {
                 let is_listed = listed || view.spheres.is_empty() && view.flats.is_empty();
-                if view.trees || !lights.know(index, &view.others) || view.triangles.len() > FEW_TRIANGLES {
+                if view.trees
+                    || !lights.know(index, view.others.iter().map(|(thing, _)| *thing))
+                    || view.triangles.len() > FEW_TRIANGLES
+                {
                     Past::Unknown(std::mem::replace(view, views.pop().unwrap_or_default()))
                 } else if is_listed && view.triangles.is_empty() {
                     Past::Nothing
@@ -581,9 +584,9 @@ impl<'a> Arrivals<'a> {
                 trees.gather_in(self.level, scene, target, &shaft, points, &self.indices, LEAVES);
             }
         }
-        if !trees.has_meshes() && lights.know(index, &trees.others) {
+        if !trees.has_meshes() && lights.know(index, trees.others.iter().copied()) {
             Trees::Nothing
-        } else if trees.too_many || !lights.know(index, &trees.others) {
+        } else if trees.too_many || !lights.know(index, trees.others.iter().copied()) {
             Trees::Unknown
         } else if let Some(emitter) = &lights.emitters[index]
             && self.near.gather(scene, target.light, emitter, trees, lights.obstacles[index].occluders.len())

@@ -57,8 +57,8 @@ impl<'a> Lights<'a> {
     }
 
     /// Whether all of these placed things are told row by row where they are in the way of light `index`.
-    pub fn know(&self, index: usize, placed: &[u32]) -> bool {
-        placed.iter().all(|thing| self.obstacles[index].has_placed(*thing))
+    pub fn know(&self, index: usize, placed: impl IntoIterator<Item = u32>) -> bool {
+        placed.into_iter().all(|thing| self.obstacles[index].has_placed(thing))
     }
 
     /// Light `index` as batches ask for it, with one highlight, with or without what stands in its way; `None` if it is

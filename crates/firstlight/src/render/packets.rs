@@ -155,8 +155,8 @@ impl BlockSums {
         }
         let [lit, hidden] = [spread(lit, width), spread(hidden, width)];
         let (per_packet, count) = (1.0 / width as f32, 1.0 / (width * tallies.len()) as f32);
-        for k in 0..MOMENTS {
-            let [sum, square] = moments[k].map(|moment| sum_of_runs(simd, moment, width));
+        for (k, moments) in moments.into_iter().enumerate() {
+            let [sum, square] = moments.map(|moment| sum_of_runs(simd, moment, width));
             if lit & hidden != 0 {
                 sums.together[k] = total(only(simd, lit & hidden, sum * sum)) * per_packet;
             }

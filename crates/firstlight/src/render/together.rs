@@ -396,7 +396,7 @@ impl Together {
             let unmet = if asked.deep == asked.everywhere { unmet } else { unmet.max(overlooked) };
             let edges = shows(sum(&|k| all[k] * packets.edges[k]));
             let points = asked.leaves.count() * asking.len();
-            let error = edges.hypot(unmet);
+            let error = (edges * edges + unmet * unmet).sqrt();
             if is_told && error <= allowed {
                 return evidence;
             }

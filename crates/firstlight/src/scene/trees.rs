@@ -471,26 +471,19 @@ impl Geometry {
         })
     }
 
-    /// [`are_blocked`](Self::are_blocked) by some of what is placed, around each of which there is one of the `boxes`.
-    pub fn are_blocked_by(
-        &self,
-        level: Level,
-        things: &[u32],
-        boxes: &[Aabb],
-        shadows: &ShadowRays,
-        active: u16,
-    ) -> u16 {
+    /// [`are_blocked`](Self::are_blocked) by some of what is placed, each with a box around it.
+    pub fn are_blocked_by(&self, level: Level, things: &[(u32, Aabb)], shadows: &ShadowRays, active: u16) -> u16 {
         let mut done = 0;
-        for (&thing, bounds) in things.iter().zip(boxes) {
+        for (thing, bounds) in things {
             let asked = active & !done;
             let asked = asked & dispatch_all!(level, simd => shadows.reaching(simd, bounds));
             if asked == 0 {
                 continue;
             }
-            done |= dispatch_sixteen!(level, simd => self.placed_blocks_lanes(simd, thing, shadows, asked), else {
+            done |= dispatch_sixteen!(level, simd => self.placed_blocks_lanes(simd, *thing, shadows, asked), else {
                 let blocked = |lane: &usize| {
                     dispatch_eight!(level, simd => {
-                        self.blocked_by_placed(simd, thing, &shadows.ray(*lane), shadows.t_end[*lane])
+                        self.blocked_by_placed(simd, *thing, &shadows.ray(*lane), shadows.t_end[*lane])
                     })
                 };
                 lanes(asked).filter(blocked).fold(0, |mask, lane| mask | 1 << lane)

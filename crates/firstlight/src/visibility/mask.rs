@@ -131,7 +131,7 @@ impl ShadowView {
             *hidden |= if self.trees {
                 scene.geometry.are_blocked(level, &shadows, asking)
             } else {
-                scene.geometry.are_blocked_by(level, &self.others, &self.boxes, &shadows, asking)
+                scene.geometry.are_blocked_by(level, &self.others, &shadows, asking)
             };
         }
         traced

@@ -31,9 +31,8 @@ pub(crate) struct ShadowView {
     pub flats: Vec<ParallelogramShadow>,
     pub disks: Vec<DiskShadow>,
     pub triangles: Vec<SeenTriangle>,
-    /// Solids and point sets, as they are placed, and a box around each in the world.
-    pub others: Vec<u32>,
-    pub(super) boxes: Vec<Aabb>,
+    /// Solids and point sets, as they are placed, each with a box around it in the world.
+    pub others: Vec<(u32, Aabb)>,
     /// Whether all trees have to be asked, ray by ray.
     pub trees: bool,
     /// For each block of sixteen samples, those that are known to be hidden: in the light's order.
@@ -54,7 +53,6 @@ impl ShadowView {
         self.disks.clear();
         self.triangles.clear();
         self.others.clear();
-        self.boxes.clear();
         self.hidden.clear();
         self.trees = false;
     }
@@ -172,8 +170,7 @@ impl ShadowView {
                 let room = (far + start.abs().max_element()) * 1e-5;
                 around = Aabb { min: (low - room).as_vec3(), max: (high + room).as_vec3() };
             }
-            self.boxes.push(around);
-            self.others.push(index);
+            self.others.push((index, around));
         }
     }
 
