@@ -38,8 +38,8 @@ pub(crate) struct ShadingPoint {
     ///
     /// [`Arrived::motion`]: super::Arrived::motion
     pub most_motion: f32,
-    /// The part of the points of a light that it asks in place of all this, where that would take too long: 1/n of a ray
-    /// that asks together with n - 1 others. Without bound where it must be known.
+    /// The part of the points of a light that it asks in place of all this, where that would take too long: 1/n of a
+    /// ray that asks together with n - 1 others. Without bound where it must be known.
     pub part_of_points: f32,
     /// What one unit of each moment is worth: linear colours, the light's scale included.
     pub worth: Colors,

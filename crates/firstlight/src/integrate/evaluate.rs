@@ -106,7 +106,7 @@ impl Asked<'_> {
     }
 
     /// How many cells and panels a pixel may be asked in place of points of a light that makes so many display steps:
-    /// about a quarter of what takes as long, as they are asked in vain where there are more of them.
+    /// about half of what takes as long, as they are asked in vain where there are more of them.
     fn most_asked(steps: f32) -> f32 {
         ASKED + ASKED_PER_STEP * steps
     }
@@ -122,8 +122,8 @@ impl Asked<'_> {
 
 /// See [`Asked::most_asked`]. A pixel asks some 300 points of a light, and 35 for each step that this makes (60,000
 /// pixels of 200 random scenes); a panel takes as long as about 8 of them.
-const ASKED: f32 = 16.0;
-const ASKED_PER_STEP: f32 = 1.0;
+const ASKED: f32 = 32.0;
+const ASKED_PER_STEP: f32 = 2.0;
 /// The same where nothing is known of the light: of white.
 const WHITE: f32 = 255.0;
 
