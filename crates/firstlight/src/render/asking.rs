@@ -63,8 +63,8 @@ pub(super) struct AskedLeaves<'a> {
     pub everywhere: u32,
     /// The same of those near edges.
     pub deep: u32,
-    /// The numbers of blocks that were asked since somebody last took them.
-    pub new: Vec<u32>,
+    /// The numbers of blocks that were asked since they were last taken, some of them more than once.
+    new: Vec<u32>,
     /// Whether all were halved once, so that it is known what first points overlook.
     pub is_raised: bool,
 }
@@ -82,6 +82,14 @@ impl<'a> AskedLeaves<'a> {
             one.tally.fill(&asker, rung, &one.view, &one.si, &one.lobe);
         }
         asked
+    }
+
+    /// The numbers of blocks that were asked since this was last called.
+    pub fn take_new(&mut self) -> Vec<u32> {
+        let mut new = std::mem::take(&mut self.new);
+        new.sort_unstable();
+        new.dedup();
+        new
     }
 
     /// Halves blocks of leaves, and has all rays ask one more point in each leaf: in those `near` edges down to one

@@ -18,12 +18,11 @@ use crate::math::{LANES, only, sum_of_runs, total};
 /// The deviation of the share that a packet of sixteen sees which some edge runs through: of sixteen points in as many
 /// parts of a cell of the light the edge cuts about four, each of which it parts anywhere.
 const MIXED: f32 = 0.07;
-/// The same where there is one ray only, whose points lie in parts of their own.
+/// The same of sixteen points of one ray.
 const ALONE: f32 = 0.05;
 /// The deviation of the share that n stratified points find behind an edge, times n^3/4.
 const EDGE: f32 = 0.46;
-/// How many times that of a packet is where its points do not lie in different parts of a cell; and what is counted of
-/// it for few rays, the errors of which are made good by few others.
+/// How many times that of a packet is where its points do not lie in different parts of a cell.
 const APART: f32 = 3.5;
 /// How many times what varies smoothly counts: points of neighbours are wrong alike.
 const ALIKE: f32 = 2.0;

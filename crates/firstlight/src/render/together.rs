@@ -386,7 +386,8 @@ impl Together {
             // As much as packets are wrong by, and what nobody met. Of small things that are in the way each point says
             // what it sends; where leaves near those that were found are smaller, all that were not found are missing
             let tallies: Vec<&Tally> = asking.iter().map(|one| &one.tally).collect();
-            packets.hear(asker.level, &tallies, &asked.leaves, &std::mem::take(&mut asked.new));
+            let new = asked.take_new();
+            packets.hear(asker.level, &tallies, &asked.leaves, &new);
             let packets = packets.errors(&tallies, &asked.leaves);
             let leaf = asker.area.measure() as f32 / (1u64 << asked.everywhere) as f32;
             let met: [f32; MOMENTS] = std::array::from_fn(|k| evidence.overlooked(k, around, leaf));

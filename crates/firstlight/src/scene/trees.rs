@@ -545,17 +545,16 @@ impl Geometry {
         }
         let mesh = match thing.target {
             PlacedTarget::Mesh(mesh) => mesh,
+            PlacedTarget::Solid(_) | PlacedTarget::Points(_)
+                if thing.shadow == Meets::Some && !self.casts(thing.surface, shadows.light()) =>
+            {
+                return 0;
+            }
             PlacedTarget::Solid(solid) => {
-                if thing.shadow == Meets::Some && !self.casts(thing.surface, shadows.light()) {
-                    return 0;
-                }
                 let lines = LineLanes::new(&thing.placement, &shadows.rays, &shadows.t_end);
                 return self.solids[solid as usize].blocks_lanes(&lines, active);
             }
             PlacedTarget::Points(points) => {
-                if thing.shadow == Meets::Some && !self.casts(thing.surface, shadows.light()) {
-                    return 0;
-                }
                 let lines = LineLanes::new(&thing.placement, &shadows.rays, &shadows.t_end);
                 return self.point_sets[points as usize].blocks_lanes(simd, &lines, &shadows.t_end, active);
             }

@@ -249,19 +249,19 @@ impl Target {
         let hull = LightHull::of(light);
         let target = Target { light: id, hull, blocks: Vec::new(), cells: Vec::new(), is_in_order: true };
         match &light.kind {
-            LightKind::Area(area) if !light.exact => target.with(area.points()),
+            LightKind::Area(area) if !light.exact => target.with(scene.level, area.points()),
             _ => target,
         }
     }
 
     /// The same light with these points of it.
-    pub fn with(&self, points: &Points) -> Self {
+    fn with(&self, level: Level, points: &Points) -> Self {
         let (inverse, center) = (self.hull.inverse(), self.hull.center.as_dvec3());
         let sample = |k: usize| (k as u32, points.get(k), inverse * (points.get(k).as_dvec3() - center));
         let mut samples: Vec<Sample> = (0..points.count()).map(sample).collect();
         gather_neighbours(&mut samples);
         let blocks = samples.chunks(LANES).map(|chunk| SampleBlock::of(chunk.len(), |lane| chunk[lane])).collect();
-        Target { blocks, is_in_order: false, ..self.without() }.bounded(Level::new())
+        Target { blocks, is_in_order: false, ..self.without() }.bounded(level)
     }
 
     /// The same light with these points of it, of which each sixteen that follow each other are neighbours.
