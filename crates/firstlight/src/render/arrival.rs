@@ -50,8 +50,8 @@ pub(super) enum Past {
 pub(crate) enum Sighting {
     /// This arrives.
     Known(Moments),
-    /// Things are in the way; points of the light have to be asked. This would arrive if nothing were.
-    Behind(Moments),
+    /// Things are in the way; points of the light have to be asked.
+    Behind,
 }
 
 /// How many times what is allowed may be wrong where each place is wrong by itself, as by chance: nothing of that shows
@@ -181,7 +181,7 @@ impl<'a> Arrivals<'a> {
     ) -> Arrival {
         match seen {
             Sighting::Known(sums) => change.with(sums),
-            Sighting::Behind(whole) => change.with(self.one(index, place, whole, counts)),
+            Sighting::Behind => change.with(self.one(index, place, counts)),
         }
     }
 
@@ -298,8 +298,11 @@ impl<'a> Arrivals<'a> {
                 }
                 Trees::Nothing => asked[0].extend(from as u32..next as u32),
                 Trees::Unknown => {
-                    asked[1].push(from as u32);
-                    found[from].1 = Sighting::Behind(Moments::ZERO);
+                    // Points tell all of a ray; of a patch it is asked how the light bends
+                    if place.reach > 0.0 {
+                        asked[1].push(from as u32);
+                    }
+                    found[from].1 = Sighting::Behind;
                 }
             }
         }
@@ -309,10 +312,10 @@ impl<'a> Arrivals<'a> {
             self.ask(index, emitter, numbers.iter().map(|k| &places[*k as usize]), [shadows, false], &mut arrived);
             for (k, arrived) in numbers.iter().zip(&arrived) {
                 let (k, mut arrived) = (*k as usize, *arrived);
-                if matches!(found[k].1, Sighting::Behind(_)) && arrived.illumination != Illumination::Below {
+                if matches!(found[k].1, Sighting::Behind) && arrived.illumination != Illumination::Below {
                     arrived.motion = f32::INFINITY;
                     counts.settled.visibility[Visibility::Mask as usize] += 1;
-                    found[k] = (self.change(index, &places[k], &arrived), Sighting::Behind(arrived.sums));
+                    found[k] = (self.change(index, &places[k], &arrived), Sighting::Behind);
                 } else {
                     found[k] = self.found(index, &places[k], arrived, counts);
                 }
@@ -355,8 +358,7 @@ impl<'a> Arrivals<'a> {
         if arrived.illumination == Illumination::Unknown {
             counts.settled.visibility[Visibility::Mask as usize] += 1;
             arrived.motion = f32::INFINITY;
-            let whole = self.wholes(index, std::slice::from_ref(place))[0];
-            return (self.change(index, place, &arrived), Sighting::Behind(whole));
+            return (self.change(index, place, &arrived), Sighting::Behind);
         }
         (self.change(index, place, &arrived), Sighting::Known(arrived.sums))
     }
@@ -485,11 +487,10 @@ impl<'a> Arrivals<'a> {
     }
 
     /// What arrives at one point, past what is in the way.
-    fn one(&mut self, index: usize, place: &ArrivalPlace, whole: Moments, counts: &mut Counts) -> Moments {
+    fn one(&mut self, index: usize, place: &ArrivalPlace, counts: &mut Counts) -> Moments {
         let Some(view) = self.settle(index, place.si, counts) else { return Moments::default() };
         let mut together = Together::new(index, 1, place.share, 0, Rgb::BLACK);
         together.behind(place, view);
-        together.hear_whole(whole);
         together.settle(&[], self, counts).sums
     }
 
@@ -560,7 +561,7 @@ impl<'a> Arrivals<'a> {
         self.look(index, places, &mut seen, counts);
         let known = |(_, sighting): &(Change, Sighting)| match sighting {
             Sighting::Known(sums) => Some(*sums),
-            Sighting::Behind(_) => None,
+            Sighting::Behind => None,
         };
         let found = seen.iter().map(known).collect();
         self.seen = seen;

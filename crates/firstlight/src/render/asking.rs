@@ -8,7 +8,7 @@ use super::leaves::{LeafBlock, Leaves};
 use super::resolve::LightTerm;
 use super::tally::{Tally, would_send};
 use crate::color::Rgb;
-use crate::light::FineCell;
+use crate::light::{Area, FineCell};
 use crate::material::{Lobe, MOMENTS, Moments};
 use crate::math::LANES;
 use crate::shape::SurfaceInteraction;
@@ -17,7 +17,7 @@ use crate::visibility::{ShadowView, Viewpoint};
 /// Leaves that send so many times as much as others do in the mean are halved first.
 const HEAVY: f32 = 2.0;
 /// The points of all rays up to which all leaves are of one size.
-const EVENLY: usize = 1 << 12;
+pub(super) const EVENLY: usize = 1 << 12;
 /// The points that a light is told by at most, of all rays of a pixel.
 pub(super) const MOST: usize = 1 << 16;
 /// The level of the smallest leaves.
@@ -32,8 +32,8 @@ pub(super) struct Asking {
     pub reflected: LightTerm,
     pub series: usize,
     pub view: ShadowView,
-    /// What would arrive if nothing were in the way.
-    pub whole: Moments,
+    /// What would arrive if nothing were in the way, if that was asked in closed form.
+    pub whole: Option<Moments>,
     /// What arrives, if that was asked in closed form and there is one.
     pub known: Option<Moments>,
     pub tally: Tally,
@@ -52,6 +52,22 @@ impl Asking {
 
     pub fn color(&self, sums: &Moments) -> Rgb {
         self.each(sums).sum()
+    }
+
+    /// Whether the surface reflects any light of a kind.
+    pub fn reflects(&self, kind: usize) -> bool {
+        self.each(&Moments([1.0; MOMENTS])).0[kind] != Rgb::BLACK
+    }
+
+    /// Whether what a light sends may vary over less than the way between points, of which there are so many across it.
+    pub fn is_near(&self, area: &Area, across: f32) -> bool {
+        let sharpness = self.lobe.sharpness(self.si.ns.dot(self.si.wo));
+        area.way_to_box(self.si.lit_from) * across < (1.0 + 2.0 * sharpness).sqrt()
+    }
+
+    /// What would arrive if nothing were in the way: as is known, or as points of a light of such a measure say.
+    pub fn sent(&self, measure: f32) -> Moments {
+        self.whole.unwrap_or_else(|| Moments(self.tally.all.map(|all| all as f32 * measure)))
     }
 }
 
@@ -222,10 +238,10 @@ impl Peak {
         let (peaked, even): (Vec<usize>, Vec<usize>) = (0..asking.len()).partition(is_peaked);
         let rays = peaked.iter().map(|ray| (*ray, 1)).chain(even.first().map(|ray| (*ray, even.len())));
         rays.map(|(ray, many)| {
-            let Asking { tally, whole, .. } = &asking[ray];
+            let Asking { tally, .. } = &asking[ray];
             let weights = weights(&asking[ray]).map(|weight| weight * many as f32);
             let mut peak = Peak { ray, at: FineCell::FIRST, weights, sends: 0.0 };
-            peak.sends = peak.weigh(whole) / measure;
+            peak.sends = peak.weigh(&asking[ray].sent(measure)) / measure;
             peak.at = tally.most(|sent| peak.weigh(sent));
             peak
         })

@@ -12,7 +12,7 @@ use fearless_simd::{Level, prelude::*};
 use super::leaves::Leaves;
 use super::tally::Tally;
 use crate::accel::dispatch_all;
-use crate::material::{MOMENTS, Moments};
+use crate::material::MOMENTS;
 use crate::math::{LANES, only, sum_of_runs, total};
 
 /// The deviation of the share that a packet of sixteen sees which some edge runs through: of sixteen points in as many
@@ -49,14 +49,13 @@ type OfKind = [f32; MOMENTS];
 /// The packets of rays that ask points in the same leaves of a light, block by block.
 #[derive(Debug)]
 pub(super) struct Packets {
-    /// The measure of the light, and what would arrive if nothing were in the way.
-    measure: f32,
-    sent: Moments,
+    /// One over what all rays are sent, thereabouts: of what is as good as nothing, squares are nothing.
+    unit: OfKind,
     /// By the number of the block.
     blocks: Vec<BlockSums>,
 }
 
-/// What packets of a block make of it: squares of what is sent, as parts of what would arrive.
+/// What packets of a block make of it: squares of what is sent, in that unit.
 #[derive(Clone, Copy, Debug, Default)]
 struct BlockSums {
     /// In which leaves any ray finds anything lit, and anything hidden, as bits.
@@ -68,8 +67,9 @@ struct BlockSums {
 }
 
 impl Packets {
-    pub fn new(measure: f32, sent: Moments) -> Packets {
-        Packets { measure, sent, blocks: Vec::new() }
+    /// Of rays which are sent so much, thereabouts, as points add it up.
+    pub fn new(sent: OfKind) -> Packets {
+        Packets { unit: sent.map(|sent| if sent > 0.0 { 1.0 / sent } else { 0.0 }), blocks: Vec::new() }
     }
 
     /// How many neighbouring leaves hold a packet.
@@ -81,19 +81,17 @@ impl Packets {
     pub fn hear(&mut self, level: Level, tallies: &[&Tally], leaves: &Leaves, blocks: &[u32]) {
         self.blocks.resize(leaves.blocks.len(), BlockSums::default());
         let width = Packets::width(tallies.len());
-        // As parts of all that is sent; of what is as good as nothing, squares are nothing
-        let unit = self.sent.0.map(|sent| if sent > 0.0 { self.measure / sent } else { 0.0 });
         dispatch_all!(level, simd => {
             for number in blocks {
                 let part = leaves.blocks[*number as usize].part();
                 self.blocks[*number as usize] =
-                    BlockSums::of(simd, tallies, *number as usize, unit.map(|unit| unit * part), width);
+                    BlockSums::of(simd, tallies, *number as usize, self.unit.map(|unit| unit * part), width);
             }
         });
     }
 
-    /// What they say by now.
-    pub fn errors(&self, tallies: &[&Tally], leaves: &Leaves) -> PacketErrors {
+    /// What they say by now. `found` is the part of what would arrive that points find, if that is known.
+    pub fn errors(&self, tallies: &[&Tally], leaves: &Leaves, found: Option<OfKind>) -> PacketErrors {
         let rays = tallies.len();
         let mut sums = BlockSums::default();
         let mut seen = Vec::with_capacity(leaves.order.len());
@@ -107,18 +105,22 @@ impl Packets {
         let width = Packets::width(rays);
         let apart = squared(apart(tallies) * of_edge((width * rays) as f64) / of_edge(LANES as f64));
         let (mut edges, mut smooth) = (OfKind::default(), OfKind::default());
-        for k in (0..MOMENTS).filter(|k| all[*k] > LEAST && self.sent.0[*k] > 0.0) {
-            // The part of what is sent that points find, and that of it which arrives
-            let found = all[k] as f32 * self.measure / self.sent.0[k];
+        for k in (0..MOMENTS).filter(|k| all[*k] > LEAST && self.unit[*k] > 0.0) {
+            let per_all = 1.0 / (all[k] as f32 * self.unit[k]);
+            // The part of what is sent that arrives
             let share = (lit[k] / all[k]) as f32;
             let alone = squared(ALONE) * sums.alone[k];
             let together = squared(MIXED) * apart * sums.together[k];
-            edges[k] = if rays == 1 { alone } else { alone.min(together) }.sqrt() / found;
-            // What is sent is parted wrong only, that which is lit and that which is hidden
+            edges[k] = if rays == 1 { alone } else { alone.min(together) }.sqrt() * per_all;
+            // Where it is known what is sent, that is parted wrong only, what is lit and what is hidden
             let [hidden, lit] = [0, 1].map(|which: usize| sums.smooth[which][k]);
-            let varies = (hidden * squared(share) + lit * squared(1.0 - share)).sqrt() / found;
-            // Points that do not find what is sent do not find which part of it arrives
-            smooth[k] = (ALIKE * varies).max(2.0 * share * (1.0 - share) * (found - 1.0).abs());
+            let varies = |hidden: f32, lit: f32| ALIKE * (hidden + lit).sqrt() * per_all;
+            smooth[k] = match found {
+                None => varies(0.0, lit),
+                // Points that do not find what is sent do not find which part of it arrives
+                Some(found) => varies(hidden * squared(share), lit * squared(1.0 - share))
+                    .max(2.0 * share * (1.0 - share) * (found[k] - 1.0).abs()),
+            };
         }
         let mut near = vec![false; leaves.order.len()];
         let around = around(&seen, width * AROUND);

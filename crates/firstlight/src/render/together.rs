@@ -6,7 +6,7 @@
 
 use super::Counts;
 use super::arrival::{ArrivalPlace, Arrivals, Sighting};
-use super::asking::{AskedLeaves, Asking, DEEPEST, MOST, parts};
+use super::asking::{AskedLeaves, Asking, DEEPEST, EVENLY, MOST, parts};
 use super::evidence::{Evidence, Met};
 use super::ladder::FIRST;
 use super::packets::{Packets, of_edge};
@@ -38,10 +38,8 @@ const TOLD: f64 = 32.0;
 const UNEVEN: f64 = 1.0 / 16.0;
 /// So many points of a ray tell that nothing is hidden.
 const MANY: usize = 1 << 10;
-/// In display steps: how far what would arrive at a ray in the middle of a pixel may be off what those in the corners
-/// say, to tell it of all; and how far they may differ.
-const EVEN: f32 = 0.1;
-const EVEN_CORNERS: f32 = 4.0;
+/// The part of what may be wrong by which points may be, where they are taken at their word for what would arrive.
+const PLAIN: f32 = 0.5;
 
 /// A ray of which nothing is known yet but that nothing is in the way, if that is, or nothing in trees.
 struct Looking {
@@ -145,7 +143,7 @@ impl Together {
     pub fn ask_points(&mut self, arrivals: &mut Arrivals, si: &SurfaceInteraction, bsdf: &Bsdf, counts: &mut Counts) {
         let place = ArrivalPlace { share: self.share, ..arrivals.place(self.light, si, bsdf) };
         counts.settled.visibility[Visibility::Mask as usize] += 1;
-        self.hear(&place, Sighting::Behind(Moments::ZERO), arrivals, counts);
+        self.hear(&place, Sighting::Behind, arrivals, counts);
     }
 
     /// Hears what one ray sees.
@@ -159,11 +157,6 @@ impl Together {
     pub fn dark(&mut self, place: &ArrivalPlace) {
         self.know(place, &Moments::default());
         self.sharing += 1;
-    }
-
-    /// Hears what would arrive at the only ray if nothing were in the way.
-    pub fn hear_whole(&mut self, whole: Moments) {
-        self.asking.iter_mut().for_each(|one| one.whole = whole);
     }
 
     /// Asks for what one ray sees past what is in `view`.
@@ -180,7 +173,7 @@ impl Together {
             reflected,
             series,
             view,
-            whole: Moments::ZERO,
+            whole: None,
             known: None,
             tally: Tally::default(),
         });
@@ -223,28 +216,6 @@ impl Together {
                 }
             }
         }
-        // What would arrive behind things: where the rays in the corners of a pixel tell that of all, from those
-        let n = arrivals.scene.antialiasing as usize;
-        let mut corners: Vec<Option<[usize; 5]>> = Vec::new();
-        let mut wanted = Vec::new();
-        for (k, (one, looking)) in all.iter().zip(&looking).enumerate() {
-            let is_in_order = looking.is_empty() || one.asking.len() == looking.len();
-            corners.push(Some(n).filter(|n| is_in_order && *n > 2 && one.asking.len() == n * n).map(Together::corners));
-            match &corners[k] {
-                Some(corners) => wanted.extend(corners.map(|ray| (k, ray))),
-                None => wanted.extend((0..one.asking.len()).map(|ray| (k, ray))),
-            }
-        }
-        Together::ask_wholes(all, &wanted, arrivals);
-        wanted.clear();
-        for (k, (one, corners)) in all.iter_mut().zip(&corners).enumerate() {
-            if let Some(corners) = corners
-                && !one.spread(n, corners, arrivals)
-            {
-                wanted.extend((0..one.asking.len()).filter(|ray| !corners.contains(ray)).map(|ray| (k, ray)));
-            }
-        }
-        Together::ask_wholes(all, &wanted, arrivals);
     }
 
     fn hear(&mut self, place: &ArrivalPlace, seen: Sighting, arrivals: &mut Arrivals, counts: &mut Counts) {
@@ -254,45 +225,10 @@ impl Together {
                 self.shares += if place.lit { 1.0 } else { f32::NAN };
                 self.sharing += 1;
             }
-            Sighting::Behind(_) => match arrivals.settle(self.light, place.si, counts) {
+            Sighting::Behind => match arrivals.settle(self.light, place.si, counts) {
                 Some(view) => self.behind(place, view),
                 None => self.dark(place),
             },
-        }
-    }
-
-    /// The rays in the corners of a pixel with `n` x `n`, and one near its middle.
-    fn corners(n: usize) -> [usize; 5] {
-        [0, n - 1, n * (n - 1), n * n - 1, (n + 1) * ((n - 1) / 2)]
-    }
-
-    /// Gives each ray the mean of what would arrive in the corners, by its place; `false` if that is not what would
-    /// arrive in the middle.
-    fn spread(&mut self, n: usize, corners: &[usize; 5], arrivals: &Arrivals) -> bool {
-        let [a, b, c, d, middle] = corners.map(|ray| self.asking[ray].whole);
-        let mean = |ray: usize| {
-            let [x, y] = [ray % n, ray / n].map(|k| k as f32 / (n - 1) as f32);
-            (a * (1.0 - x) + b * x) * (1.0 - y) + (c * (1.0 - x) + d * x) * y
-        };
-        let one = &self.asking[corners[4]];
-        let colors = [a, b, c, d, middle, mean(corners[4])].map(|sums| one.base + one.color(&sums));
-        let (least, most) = colors.iter().fold((colors[0], colors[0]), |(l, m), c| (l.min(*c), m.max(*c)));
-        let off = Rgb::max(colors[4] + colors[5] * -1.0, colors[5] + colors[4] * -1.0);
-        if arrivals.steps(most, most + least * -1.0) > EVEN_CORNERS || arrivals.steps(colors[4], off) > EVEN {
-            return false;
-        }
-        for (ray, one) in self.asking.iter_mut().enumerate().filter(|(ray, _)| !corners.contains(ray)) {
-            one.whole = mean(ray);
-        }
-        true
-    }
-
-    /// Asks what would arrive at some rays if nothing were in the way: of which patch, and which of its rays.
-    fn ask_wholes(all: &mut [Together], wanted: &[(usize, usize)], arrivals: &mut Arrivals) {
-        let Some(light) = all.first().map(|one| one.light).filter(|_| !wanted.is_empty()) else { return };
-        let places: Vec<_> = wanted.iter().map(|(k, ray)| all[*k].asking[*ray].place(all[*k].share)).collect();
-        for ((k, ray), whole) in wanted.iter().zip(arrivals.wholes(light, &places)) {
-            all[*k].asking[*ray].whole = whole;
         }
     }
 
@@ -302,11 +238,12 @@ impl Together {
         if !self.asking.is_empty() {
             let mut asking = std::mem::take(&mut self.asking);
             asking.iter_mut().for_each(|one| one.tally = arrivals.tally());
+            let measure = arrivals.measure(self.light);
             evidence = self.points(around, arrivals, &mut asking, counts);
             let shares = parts(&asking, |tally| &tally.lit);
             for one in asking {
                 let place = one.place(self.each);
-                let sums = one.known.unwrap_or_else(|| one.tally.arrives(&one.whole, &shares));
+                let sums = one.known.unwrap_or_else(|| one.tally.arrives(&one.sent(measure), &shares));
                 if one.tally.sending > 0.0 {
                     self.shares += 1.0 - (one.tally.hidden / one.tally.sending) as f32;
                     self.sharing += 1;
@@ -340,8 +277,8 @@ impl Together {
         let mut is_tried = false;
         let mut evidence = Evidence::new(asking[0].si.p);
         let mut asked = AskedLeaves::new(asker, first, asking, counts);
-        let sent = asking.iter().fold(Moments::default(), |sum, one| sum + one.whole);
-        let mut packets = Packets::new(measure, sent);
+        let mut packets = None;
+        let mut is_plain = true;
         loop {
             asking.iter_mut().for_each(|one| one.tally.sum(asker.level, &asked.leaves));
             let shares = parts(asking, |tally| &tally.lit);
@@ -353,11 +290,12 @@ impl Together {
             // That of rays whose points find less than half of it
             let mut missing = [Rgb::BLACK; MOMENTS];
             for one in asking.iter() {
-                value += one.color(&one.tally.arrives(&one.whole, &shares));
-                for (k, (color, points)) in one.each(&one.whole).0.into_iter().zip(one.tally.effective()).enumerate() {
+                let sent = one.sent(measure);
+                value += one.color(&one.tally.arrives(&sent, &shares));
+                for (k, (color, points)) in one.each(&sent).0.into_iter().zip(one.tally.effective()).enumerate() {
                     all[k] += color;
                     effective[k] += points;
-                    if one.tally.all[k] as f32 * measure < 0.5 * one.whole.0[k] {
+                    if one.tally.all[k] as f32 * measure < 0.5 * sent.0[k] {
                         missing[k] += color;
                     }
                 }
@@ -380,17 +318,17 @@ impl Together {
             // What none of so many points meets may hide what one of them sends
             let one = |k: usize| all[k] * (1.0 / effective[k].max(1.0) as f32);
             let is_clear = found >= f64::from(wanted) * CLEAR && shows(sum(&one)) <= UNMET;
-            if is_told && !is_hidden && (is_clear || asked.leaves.count() >= MANY) {
-                return evidence;
-            }
             // As much as packets are wrong by, and what nobody met. Of small things that are in the way each point says
             // what it sends; where leaves near those that were found are smaller, all that were not found are missing
             let tallies: Vec<&Tally> = asking.iter().map(|one| &one.tally).collect();
             let new = asked.take_new();
+            let packets = packets.get_or_insert_with(|| Packets::new(Together::sent(asking, measure)));
             packets.hear(asker.level, &tallies, &asked.leaves, &new);
-            let packets = packets.errors(&tallies, &asked.leaves);
+            let found = (!is_plain).then(|| Together::found(asking, measure));
+            let packets = packets.errors(&tallies, &asked.leaves, found);
             let leaf = asker.area.measure() as f32 / (1u64 << asked.everywhere) as f32;
             let met: [f32; MOMENTS] = std::array::from_fn(|k| evidence.overlooked(k, around, leaf));
+            let smooth = shows(sum(&|k| all[k] * packets.smooth[k]));
             let noise = |k: usize| (met[k] / effective[k].max(1.0) as f32).sqrt();
             let overlooked = OVERLOOKED * shows(sum(&|k| all[k] * met[k]));
             let unmet = shows(sum(&|k| all[k] * noise(k).max(packets.smooth[k])));
@@ -398,7 +336,23 @@ impl Together {
             let edges = shows(sum(&|k| all[k] * packets.edges[k]));
             let points = asked.leaves.count() * asking.len();
             let error = (edges * edges + unmet * unmet).sqrt();
-            if is_told && error <= allowed {
+            let is_lit = !is_hidden && (is_clear || asked.leaves.count() >= MANY);
+            let is_last = points >= MOST || asked.deep > DEEPEST;
+            let is_enough = is_last || is_told && (is_lit || error <= allowed);
+            // Points are taken at their word for what would arrive if nothing were in the way, if they cannot miss any
+            // of it
+            let is_wanted = is_enough || (!is_told || smooth > allowed) && (edges <= allowed || points >= EVENLY);
+            if is_plain && is_wanted {
+                let across = (asked.leaves.count() as f32).sqrt();
+                let is_unseen = |k: usize| effective[k] < least(k) && asking.iter().any(|one| one.reflects(k));
+                let is_near = asking.iter().any(|one| one.is_near(asker.area, across));
+                if smooth > allowed * PLAIN || is_near || (0..MOMENTS).any(is_unseen) {
+                    self.ask_wholes(asking, arrivals);
+                    is_plain = false;
+                    continue;
+                }
+            }
+            if is_enough {
                 return evidence;
             }
             // Errors shrink as they do where an edge is
@@ -411,13 +365,28 @@ impl Together {
                     return evidence;
                 }
             }
-            if points >= MOST || asked.deep > DEEPEST {
-                return evidence;
-            }
             // More everywhere as long as there is room for more near edges
             let is_raised = !is_told || unmet.max(overlooked) > allowed || !asked.is_raised;
             let is_raised = is_raised && (4 * points <= MOST || edges <= allowed);
             asked.halve(&packets.near, is_raised, asking, counts);
         }
+    }
+
+    /// Asks what would arrive at all rays if nothing were in the way.
+    fn ask_wholes(&self, asking: &mut [Asking], arrivals: &mut Arrivals) {
+        let places: Vec<_> = asking.iter().map(|one| one.place(self.share)).collect();
+        let wholes = arrivals.wholes(self.light, &places);
+        asking.iter_mut().zip(wholes).for_each(|(one, whole)| one.whole = Some(whole));
+    }
+
+    /// What would arrive at all rays if nothing were in the way, in the unit of points.
+    fn sent(asking: &[Asking], measure: f32) -> [f32; MOMENTS] {
+        std::array::from_fn(|k| asking.iter().map(|one| one.sent(measure).0[k]).sum::<f32>() / measure)
+    }
+
+    /// The part of that which points find.
+    fn found(asking: &[Asking], measure: f32) -> [f32; MOMENTS] {
+        let sent = Together::sent(asking, measure);
+        std::array::from_fn(|k| asking.iter().map(|one| one.tally.all[k]).sum::<f64>() as f32 / sent[k])
     }
 }
