@@ -319,9 +319,9 @@ impl Area {
         self.shape.measure()
     }
 
-    /// The way from a place to the box around it, as a part of the diagonal of that.
-    pub(crate) fn way_to_box(&self, p: Vec3) -> f32 {
-        ((p - self.middle).abs() - self.half).max(Vec3::ZERO).length() / (2.0 * self.half.length())
+    /// The diagonal of the box around it.
+    pub(crate) fn extent(&self) -> f32 {
+        2.0 * self.half.length()
     }
 
     /// What all of its points together stand for.

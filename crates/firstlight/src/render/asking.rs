@@ -8,7 +8,7 @@ use super::leaves::{LeafBlock, Leaves};
 use super::resolve::LightTerm;
 use super::tally::{Tally, would_send};
 use crate::color::Rgb;
-use crate::light::{Area, FineCell};
+use crate::light::FineCell;
 use crate::material::{Lobe, MOMENTS, Moments};
 use crate::math::LANES;
 use crate::shape::SurfaceInteraction;
@@ -57,12 +57,6 @@ impl Asking {
     /// Whether the surface reflects any light of a kind.
     pub fn reflects(&self, kind: usize) -> bool {
         self.each(&Moments([1.0; MOMENTS])).0[kind] != Rgb::BLACK
-    }
-
-    /// Whether what a light sends may vary over less than the way between points, of which there are so many across it.
-    pub fn is_near(&self, area: &Area, across: f32) -> bool {
-        let sharpness = self.lobe.sharpness(self.si.ns.dot(self.si.wo));
-        area.way_to_box(self.si.lit_from) * across < (1.0 + 2.0 * sharpness).sqrt()
     }
 
     /// What would arrive if nothing were in the way: as is known, or as points of a light of such a measure say.

@@ -343,9 +343,9 @@ impl Together {
             // of it
             let is_wanted = is_enough || (!is_told || smooth > allowed) && (edges <= allowed || points >= EVENLY);
             if is_plain && is_wanted {
-                let across = (asked.leaves.count() as f32).sqrt();
+                let apart = asker.area.extent() / (points as f32).sqrt();
                 let is_unseen = |k: usize| effective[k] < least(k) && asking.iter().any(|one| one.reflects(k));
-                let is_near = asking.iter().any(|one| one.is_near(asker.area, across));
+                let is_near = asking.iter().any(|one| !arrivals.varies_over(self.light, &one.place(self.each), apart));
                 if smooth > allowed * PLAIN || is_near || (0..MOMENTS).any(is_unseen) {
                     self.ask_wholes(asking, arrivals);
                     is_plain = false;
