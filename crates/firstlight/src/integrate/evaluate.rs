@@ -60,6 +60,8 @@ pub(crate) struct Arrived {
     /// How far the light is away, and the point from its plane.
     pub distance: f32,
     pub height: f32,
+    /// How many cells and panels were asked, if that is bounded and something is in the way.
+    pub asked: u32,
 }
 
 impl Arrived {
@@ -75,6 +77,7 @@ impl Arrived {
             illumination,
             proved: self.proved && other.proved && illumination != Illumination::Partial,
             motion: self.motion.max(other.motion),
+            asked: self.asked + other.asked,
             ..*self
         }
     }
@@ -302,6 +305,7 @@ impl Evaluator {
                     motion: 0.0,
                     distance: if is(there) { survey.nearest[k] } else { 0.0 },
                     height: if is(there) { survey.height[k] } else { 0.0 },
+                    asked: 0,
                 };
                 let is_open = class.between == Between::default();
                 if is(survey.arrives) {
@@ -449,6 +453,9 @@ impl Evaluator {
         let mut is_any = false;
         for ((state, between), arrived) in self.state.iter_mut().zip(&self.between).zip(arrived) {
             let is_behind = *between != Between::default() && arrived.illumination == Illumination::Partial;
+            if is_behind {
+                arrived.asked = state.asked;
+            }
             if is_behind && state.asked as f32 > state.most_asked {
                 state.cells = PointSum::GIVEN_UP;
                 arrived.illumination = Illumination::Unknown;

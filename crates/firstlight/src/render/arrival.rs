@@ -13,6 +13,7 @@ use super::resolve::LightTerm;
 use super::sampled::Sampled;
 use super::tally::Tally;
 use super::together::Together;
+use super::worth::Worth;
 use crate::color::{DisplaySteps, Rgb};
 use crate::ids::LightId;
 use crate::integrate::{Arrived, Asked, Emitter, Evaluator, FlatView, Illumination, Obstacles, Receiver, ShadingPoint};
@@ -82,6 +83,8 @@ pub(crate) struct Arrivals<'a> {
     indices: Vec<u32>,
     /// In display steps: how far one light may be wrong at a place.
     allowed: f32,
+    /// Whether closed forms pay in this cell, light by light.
+    worth: Vec<Worth>,
 }
 
 /// The shadows of one of fewer points than this show by themselves.
@@ -107,6 +110,7 @@ impl<'a> Arrivals<'a> {
             near: Obstacles::default(),
             settler: Settler::default(),
             occluders: Occluders::default(),
+            worth: vec![Worth::default(); scene.lights.len()],
             views: Vec::new(),
             tallies: Vec::new(),
             indices: Vec::new(),
@@ -244,6 +248,16 @@ impl<'a> Arrivals<'a> {
         ))
     }
 
+    /// Forgets whether closed forms pay, for another cell of pixels.
+    pub fn begin(&mut self) {
+        self.worth.fill(Worth::default());
+    }
+
+    /// Hears how many points of a light some rays took.
+    pub fn took(&mut self, index: usize, rays: usize, points: usize) {
+        self.worth[index].hear_points(rays, points);
+    }
+
     /// Whether what light `index` sends to a place varies over no less than `apart`, on the light.
     pub fn varies_over(&self, index: usize, place: &ArrivalPlace, apart: f32) -> bool {
         let view = self.lights.emitters[index].as_ref().and_then(|emitter| self.view(emitter, place));
@@ -349,7 +363,9 @@ impl<'a> Arrivals<'a> {
             while let Some(place) = places.next_if(|place| place.lobe == lobe) {
                 self.points.push(place.point_of_surface());
             }
+            let first = arrived.len();
             self.evaluator.evaluate(self.level, &asked, &self.points, arrived);
+            self.worth[index].hear_forms(true, &arrived[first..]);
         }
     }
 
@@ -402,14 +418,18 @@ impl<'a> Arrivals<'a> {
         index: usize,
         lobe: &Lobe,
         [shadows, near]: [bool; 2],
-        points: &[ShadingPoint],
+        points: &mut [ShadingPoint],
         arrived: &mut Vec<Arrived>,
     ) {
         let Some(asked) = self.lights.asked(index, lobe, shadows) else {
             unreachable!("lights that are sampled have no cells")
         };
         let asked = Asked { near: near.then_some(&self.near), allowed: self.allowed, ..asked };
+        let worth = &mut self.worth[index];
+        let (part, first) = (worth.part(), arrived.len());
+        points.iter_mut().for_each(|point| point.bound_by(part));
         self.evaluator.evaluate(self.level, &asked, points, arrived);
+        worth.hear_forms(part > 0.0, &arrived[first..]);
     }
 
     /// In display steps: how far one light may be wrong at a place that stands for such a share of a pixel, where the

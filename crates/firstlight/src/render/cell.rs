@@ -37,6 +37,8 @@ use crate::material::{Bsdf, Moments};
 use crate::scene::Scene;
 use behind::Behind;
 
+/// So many fragments, of one light each, ask at all of their rays at once.
+const AT_ONCE: usize = 8;
 /// Pixels across a cell.
 pub(crate) const CELL: u32 = 32;
 const PIXELS: usize = (CELL * CELL) as usize;
@@ -205,6 +207,7 @@ impl<'a> Cells<'a> {
 
     fn begin(&mut self, corner: [u32; 2]) {
         self.corner = corner;
+        self.lights.arrivals.begin();
         self.states.fill(PixelState::Done);
         self.work.fill(0.0);
         self.blocks.clear();
@@ -497,13 +500,27 @@ impl<'a> Cells<'a> {
 
     /// Asks for the light of fragments at each of their rays.
     fn rays(&mut self, counts: &mut Counts, go_on: &dyn Fn() -> ControlFlow<()>) -> ControlFlow<()> {
-        let scene = self.scene;
         let refused = std::mem::take(&mut self.refused);
+        // What some are asked tells how others are asked best
+        for some in refused.chunks(AT_ONCE) {
+            self.rays_of(some, counts, go_on)?;
+        }
+        self.refused = refused;
+        ControlFlow::Continue(())
+    }
+
+    fn rays_of(
+        &mut self,
+        refused: &[Wanted],
+        counts: &mut Counts,
+        go_on: &dyn Fn() -> ControlFlow<()>,
+    ) -> ControlFlow<()> {
+        let scene = self.scene;
         self.places.clear();
         self.requests.clear();
         // Places of a fragment serve all lights
         let mut last: Option<(u32, Range<usize>)> = None;
-        for Wanted { fragment: number, light, sight } in &refused {
+        for Wanted { fragment: number, light, sight } in refused {
             self.trace_rays(*number as usize, counts);
             let fragment = &self.fragments.all[*number as usize];
             if last.as_ref().is_none_or(|(before, _)| before != number) {
@@ -517,7 +534,7 @@ impl<'a> Cells<'a> {
         self.lights.ask(&self.places, &self.requests, &mut self.answers, counts, go_on)?;
         // Requests of a fragment lie together
         let mut answers = self.requests.iter().zip(&self.answers);
-        for Wanted { fragment, light, .. } in &refused {
+        for Wanted { fragment, light, .. } in refused {
             let fragment = &self.fragments.all[*fragment as usize];
             let index = self.pixels[fragment.pixel as usize].index as usize;
             self.work[index] += Heat::PLACE * fragment.count() as f32;
@@ -544,7 +561,6 @@ impl<'a> Cells<'a> {
                 self.work[index] += counts.work() - before;
             }
         }
-        self.refused = refused;
         ControlFlow::Continue(())
     }
 

@@ -60,10 +60,10 @@ pub(super) struct Packets {
 struct BlockSums {
     /// In which leaves any ray finds anything lit, and anything hidden, as bits.
     seen: [u16; 2],
-    /// By mixed packets of all rays, and of one ray each; and of what varies in those that are hidden, and lit.
+    /// By mixed packets of all rays, and of one ray each; and of what varies in those that are hidden, lit, and mixed.
     together: OfKind,
     alone: OfKind,
-    smooth: [OfKind; 2],
+    smooth: [OfKind; 3],
 }
 
 impl Packets {
@@ -113,10 +113,10 @@ impl Packets {
             let together = squared(MIXED) * apart * sums.together[k];
             edges[k] = if rays == 1 { alone } else { alone.min(together) }.sqrt() * per_all;
             // Where it is known what is sent, that is parted wrong only, what is lit and what is hidden
-            let [hidden, lit] = [0, 1].map(|which: usize| sums.smooth[which][k]);
+            let [hidden, lit, mixed] = [0, 1, 2].map(|which: usize| sums.smooth[which][k]);
             let varies = |hidden: f32, lit: f32| ALIKE * (hidden + lit).sqrt() * per_all;
             smooth[k] = match found {
-                None => varies(0.0, lit),
+                None => varies(mixed, lit),
                 // Points that do not find what is sent do not find which part of it arrives
                 Some(found) => varies(hidden * squared(share), lit * squared(1.0 - share))
                     .max(2.0 * share * (1.0 - share) * (found[k] - 1.0).abs()),
@@ -164,7 +164,7 @@ impl BlockSums {
             // Points vary smoothly: n of them stand for parts that are narrower by a root of n, so that their sum is
             // wrong by as much as one of them is off their mean
             let varies = ((square - sum * sum * count) * count).max(zero);
-            for (which, packets) in [hidden & !lit, lit & !hidden].into_iter().enumerate() {
+            for (which, packets) in [hidden & !lit, lit & !hidden, lit & hidden].into_iter().enumerate() {
                 if packets != 0 {
                     sums.smooth[which][k] = total(only(simd, packets, varies)) * per_packet;
                 }
@@ -179,8 +179,7 @@ impl AddAssign<&BlockSums> for BlockSums {
         for k in 0..MOMENTS {
             self.together[k] += other.together[k];
             self.alone[k] += other.alone[k];
-            self.smooth[0][k] += other.smooth[0][k];
-            self.smooth[1][k] += other.smooth[1][k];
+            (0..3).for_each(|which| self.smooth[which][k] += other.smooth[which][k]);
         }
     }
 }

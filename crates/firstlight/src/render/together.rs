@@ -353,6 +353,7 @@ impl Together {
                 }
             }
             if is_enough {
+                arrivals.took(self.light, asking.len(), points);
                 return evidence;
             }
             // Errors shrink as they do where an edge is

@@ -1,0 +1,91 @@
+//! Whether rays behind things are asked closed forms for a light, or points of it at once: told by what rays of the
+//! same cell of pixels were asked before, and by the points that others took.
+
+use crate::integrate::{Arrived, Illumination};
+
+/// A cell of a light, or a panel, takes as long as so many points.
+const POINTS: f32 = 12.0;
+/// So many rays tell.
+const HEARD: f32 = 8.0;
+/// The part of what was heard that counts when more is heard.
+const REMEMBERED: f32 = 0.9;
+/// The part of what was heard of closed forms that counts after places were asked none: one day they are asked again.
+const PASSED: f32 = 0.99;
+/// How much more than is usual is asked where that pays.
+const MORE: f32 = 4.0;
+
+/// What rays of a cell were asked for one light.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Worth {
+    /// Places behind things that were asked closed forms, those of them that have one, and the cells and panels asked.
+    forms: [f32; 3],
+    /// Rays that asked points, and how many.
+    points: [f32; 2],
+}
+
+impl Worth {
+    /// The part of what is usual that closed forms may ask.
+    pub fn part(&self) -> f32 {
+        let ([places, answered, asked], [rays, points]) = (self.forms, self.points);
+        if places < HEARD || rays < HEARD {
+            return 1.0;
+        }
+        if asked * POINTS * rays <= answered * points { MORE } else { 0.0 }
+    }
+
+    /// Hears what arrived at some places that were asked, or were not to be.
+    pub fn hear_forms(&mut self, is_asked: bool, arrived: &[Arrived]) {
+        let asked = || arrived.iter().filter(|one| is_asked && one.asked > 0);
+        let places = asked().count();
+        if is_asked && places == 0 {
+            return;
+        }
+        let answered = asked().filter(|one| one.illumination != Illumination::Unknown).count();
+        let cells = asked().map(|one| one.asked as usize).sum();
+        let kept = if is_asked { REMEMBERED } else { PASSED };
+        for (sum, more) in self.forms.iter_mut().zip([places, answered, cells]) {
+            *sum = *sum * kept + more as f32;
+        }
+    }
+
+    /// Hears how many points some rays took.
+    pub fn hear_points(&mut self, rays: usize, points: usize) {
+        for (sum, more) in self.points.iter_mut().zip([rays, points]) {
+            *sum = *sum * REMEMBERED + more as f32;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::material::Moments;
+
+    fn arrived(illumination: Illumination, asked: u32) -> Arrived {
+        let sums = Moments::default();
+        Arrived { sums, illumination, proved: false, motion: 0.0, distance: 1.0, height: 1.0, asked }
+    }
+
+    #[test]
+    fn closed_forms_are_asked_where_points_take_longer() {
+        let mut worth = Worth::default();
+        assert_eq!(worth.part(), 1.0);
+        worth.hear_forms(true, &[arrived(Illumination::Partial, 10); 16]);
+        assert_eq!(worth.part(), 1.0);
+        worth.hear_points(16, 16 * 200);
+        assert_eq!(worth.part(), MORE);
+        worth.hear_points(1000, 0);
+        assert_eq!(worth.part(), 0.0);
+        // Nobody hears of them as long as they are not asked, and then they are asked again
+        (0..200).for_each(|_| worth.hear_forms(false, &[arrived(Illumination::Unknown, 1)]));
+        assert_eq!(worth.part(), 1.0);
+    }
+
+    #[test]
+    fn closed_forms_that_come_to_nothing_do_not_pay() {
+        let mut worth = Worth::default();
+        worth.hear_points(16, 16 * 200);
+        worth.hear_forms(true, &[arrived(Illumination::Unknown, 10); 16]);
+        assert_eq!(worth.part(), 0.0);
+    }
+}
