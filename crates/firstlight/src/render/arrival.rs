@@ -261,8 +261,7 @@ impl<'a> Arrivals<'a> {
     /// Whether what light `index` sends to a place varies over no less than `apart`, on the light.
     pub fn varies_over(&self, index: usize, place: &ArrivalPlace, apart: f32) -> bool {
         let view = self.lights.emitters[index].as_ref().and_then(|emitter| self.view(emitter, place));
-        let sharpness = place.lobe.sharpness(place.si.ns.dot(place.si.wo));
-        view.is_some_and(|view| view.nearest() >= apart * (1.0 + 2.0 * sharpness).sqrt())
+        view.is_some_and(|view| view.nearest() >= apart)
     }
 
     /// What places see of area light `index`, which is integrated, without asking points of it; in place of what was in
