@@ -4,6 +4,8 @@
 //! stratified together: n rays need far fewer each than one that stands for all of them, and what one ray's points pass
 //! by, those of others meet. Their number grows until what they say together will do.
 
+use std::f32::consts::SQRT_2;
+
 use super::Counts;
 use super::arrival::{ArrivalPlace, Arrivals, Sighting};
 use super::asking::{AskedLeaves, Asking, DEEPEST, EVENLY, MOST, parts};
@@ -22,7 +24,7 @@ use crate::visibility::{ShadowView, Visibility};
 /// How many times what is allowed by chance a deviation may be.
 const DEVIATION: f32 = 1.25;
 /// How many times what is overlooked behind edges counts: it is off to one side everywhere.
-const OVERLOOKED: f32 = 2.0;
+const OVERLOOKED: f32 = SQRT_2;
 /// Points that find what is in the way of a pixel.
 const POINTS: f32 = 512.0;
 /// The effective part of them, none of which is hidden where nothing is.
@@ -38,6 +40,8 @@ const TOLD: f64 = 32.0;
 const UNEVEN: f64 = 1.0 / 16.0;
 /// So many points of a ray tell that nothing is hidden.
 const MANY: usize = 1 << 10;
+/// So many points of all rays tell that all of the light is hidden: near black, anything shows.
+const ALL_HIDDEN: usize = 1 << 14;
 /// The part of what may be wrong by which points may be, where they are taken at their word for what would arrive.
 const PLAIN: f32 = 0.5;
 
@@ -337,8 +341,9 @@ impl Together {
             let points = asked.leaves.count() * asking.len();
             let error = (edges * edges + unmet * unmet).sqrt();
             let is_lit = !is_hidden && (is_clear || asked.leaves.count() >= MANY);
+            let is_dark = shares.iter().all(|share| *share == 0.0) && points >= ALL_HIDDEN;
             let is_last = points >= MOST || asked.deep > DEEPEST;
-            let is_enough = is_last || is_told && (is_lit || error <= allowed);
+            let is_enough = is_last || is_told && (is_lit || is_dark || error <= allowed);
             // Points are taken at their word for what would arrive if nothing were in the way, if they cannot miss any
             // of it
             let is_wanted = is_enough || (!is_told || smooth > allowed) && (edges <= allowed || points >= EVENLY);
