@@ -33,6 +33,8 @@ const CLEAR: f64 = 0.75;
 const UNMET: f32 = 1.0;
 /// The part of what may be wrong that points may tell nothing about.
 const UNTOLD: f32 = 0.5;
+/// How many of those that send it what few points send may be off by.
+const FEW: f32 = 2.0;
 /// Effective points of all rays together that tell something.
 const TOLD: f64 = 32.0;
 /// The same of the diffuse part, as a part of all points that send: fewer, and the light is so near that its points
@@ -313,14 +315,14 @@ impl Together {
             evidence.note(asked.everywhere, met);
             let steps = arrivals.display_steps();
             let shows = |error: Rgb| steps.of_color(value * part, error * part);
-            // What few points send, or none, can be anything
+            // What few points send, or none, can be off by what some of them do
             let sum = |of: &dyn Fn(usize) -> Rgb| (1..MOMENTS).fold(of(0), |sum, k| sum + of(k));
             let least = |k: usize| if k == 0 { TOLD.max(sending * UNEVEN) } else { TOLD };
-            let untold = |k: usize| if effective[k] < least(k) { all[k] } else { missing[k] };
+            let one = |k: usize| all[k] * (1.0 / effective[k].max(1.0) as f32);
+            let untold = |k: usize| if effective[k] < least(k) { all[k].min(one(k) * FEW) } else { missing[k] };
             let is_told = shows(sum(&untold)) <= tolerance * UNTOLD;
             let found = effective.iter().copied().fold(0.0, f64::max);
             // What none of so many points meets may hide what one of them sends
-            let one = |k: usize| all[k] * (1.0 / effective[k].max(1.0) as f32);
             let is_clear = found >= f64::from(wanted) * CLEAR && shows(sum(&one)) <= UNMET;
             // As much as packets are wrong by, and what nobody met. Of small things that are in the way each point says
             // what it sends; where leaves near those that were found are smaller, all that were not found are missing
