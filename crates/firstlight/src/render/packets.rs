@@ -15,11 +15,14 @@ use crate::accel::dispatch_all;
 use crate::material::MOMENTS;
 use crate::math::{LANES, only, sum_of_runs, total};
 
-/// The deviation of the share that a packet of sixteen sees which some edge runs through: of sixteen points in as many
-/// parts of a cell of the light the edge cuts about four, each of which it parts anywhere.
-const MIXED: f32 = 0.07;
-/// The same of sixteen points of one ray.
-const ALONE: f32 = 0.05;
+/// The deviation of the share that a packet of sixteen sees which some edge runs through, where there are many of them;
+/// and that of sixteen points of one ray. Of sixteen points in as many parts of a cell of the light the edge cuts about
+/// four, each of which it parts anywhere.
+const MIXED: f32 = 0.049;
+const ALONE: f32 = 0.035;
+/// How many times more the square of that is, over a root of their effective number, where they are few: by chance, few
+/// packets say too little of how much they are off.
+const FEW: f32 = 20.0;
 /// The deviation of the share that n stratified points find behind an edge, times n^3/4.
 const EDGE: f32 = 0.46;
 /// How many times that of a packet is where its points do not lie in different parts of a cell.
@@ -63,6 +66,9 @@ struct BlockSums {
     /// By mixed packets of all rays, and of one ray each; and of what varies in those that are hidden, lit, and mixed.
     together: OfKind,
     alone: OfKind,
+    /// The sums of squares of the squares in these.
+    together_squared: OfKind,
+    alone_squared: OfKind,
     smooth: [OfKind; 3],
 }
 
@@ -109,8 +115,8 @@ impl Packets {
             let per_all = 1.0 / (all[k] as f32 * self.unit[k]);
             // The part of what is sent that arrives
             let share = (lit[k] / all[k]) as f32;
-            let alone = squared(ALONE) * sums.alone[k];
-            let together = squared(MIXED) * apart * sums.together[k];
+            let alone = squared(ALONE) * variance(sums.alone[k], sums.alone_squared[k]);
+            let together = squared(MIXED) * apart * variance(sums.together[k], sums.together_squared[k]);
             edges[k] = if rays == 1 { alone } else { alone.min(together) }.sqrt() * per_all;
             // Where it is known what is sent, that is parted wrong only, what is lit and what is hidden
             let [hidden, lit, mixed] = [0, 1, 2].map(|which: usize| sums.smooth[which][k]);
@@ -146,7 +152,9 @@ impl BlockSums {
                 moments[k][0] += sent;
                 moments[k][1] += sent * sent;
                 if is_mixed {
-                    sums.alone[k] += squared(total(sent));
+                    let square = squared(total(sent));
+                    sums.alone[k] += square;
+                    sums.alone_squared[k] += squared(square);
                 }
             }
         }
@@ -159,7 +167,9 @@ impl BlockSums {
         for (k, moments) in moments.into_iter().enumerate() {
             let [sum, square] = moments.map(|moment| sum_of_runs(simd, moment, width));
             if lit & hidden != 0 {
-                sums.together[k] = total(only(simd, lit & hidden, sum * sum)) * per_packet;
+                let square = only(simd, lit & hidden, sum * sum);
+                sums.together[k] = total(square) * per_packet;
+                sums.together_squared[k] = total(square * square) * per_packet;
             }
             // Points vary smoothly: n of them stand for parts that are narrower by a root of n, so that their sum is
             // wrong by as much as one of them is off their mean
@@ -179,9 +189,16 @@ impl AddAssign<&BlockSums> for BlockSums {
         for k in 0..MOMENTS {
             self.together[k] += other.together[k];
             self.alone[k] += other.alone[k];
+            self.together_squared[k] += other.together_squared[k];
+            self.alone_squared[k] += other.alone_squared[k];
             (0..3).for_each(|which| self.smooth[which][k] += other.smooth[which][k]);
         }
     }
+}
+
+/// A sum of squares, and what it may be off by: [`FEW`] over a root of the effective number of them.
+fn variance(squares: f32, of_squares: f32) -> f32 {
+    squares + FEW * of_squares.sqrt()
 }
 
 fn squared(v: f32) -> f32 {
