@@ -58,8 +58,9 @@ pub(super) struct Behind {
     evidence: Vec<Evidence>,
 }
 
-/// A pixel that tells what others in its square see counts for so many: what it is off by, they are off by alike.
-const NODE_PIXELS: f32 = 1.4;
+/// A pixel that tells what others in its square see counts for so many: the mean sum of squares of what the nine are
+/// worth for a pixel, so that chance puts that one off by as much as if it had been asked.
+const NODE_PIXELS: f32 = 0.64;
 /// How many pixels away those are whose points tell something of a pixel.
 const AROUND: usize = 3;
 /// No fragment.
