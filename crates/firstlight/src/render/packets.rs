@@ -18,7 +18,7 @@ use crate::math::{LANES, only, sum_of_runs, total};
 /// The deviation of the share that a packet of sixteen sees which some edge runs through, where there are many of them;
 /// and that of sixteen points of one ray. Of sixteen points in as many parts of a cell of the light the edge cuts about
 /// four, each of which it parts anywhere.
-const MIXED: f32 = 0.049;
+const MIXED: f32 = 0.044;
 const ALONE: f32 = 0.035;
 /// How many times more the square of that is, over a root of their effective number, where they are few: by chance, few
 /// packets say too little of how much they are off.
