@@ -321,6 +321,8 @@ impl<'a> Arrivals<'a> {
                     // Points tell all of a ray; of a patch it is asked how the light bends
                     if place.reach > 0.0 {
                         asked[1].push(from as u32);
+                    } else {
+                        counts.settled.visibility[Visibility::Mask as usize] += 1;
                     }
                     found[from].1 = Sighting::Behind;
                 }
