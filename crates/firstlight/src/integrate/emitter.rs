@@ -91,10 +91,16 @@ impl Emitter {
 
     /// Whether `p` is inside of a ball that shines inwards: no flat light stands for it there.
     pub fn surrounds(&self, p: Vec3) -> bool {
+        self.depth(p).is_some()
+    }
+
+    /// How far `p` is from a ball that shines inwards, if it is inside of it.
+    pub fn depth(&self, p: Vec3) -> Option<f32> {
         match self {
-            Emitter::Flat(_) | Emitter::Face { .. } => false,
+            Emitter::Flat(_) | Emitter::Face { .. } => None,
             Emitter::Ball { center, radius, sides, .. } => {
-                *sides != BallSides::Outer && !((*center - p.as_dvec3()).length_squared() > radius * radius)
+                let depth = radius - (*center - p.as_dvec3()).length();
+                (*sides != BallSides::Outer && !(depth < 0.0)).then_some(depth as f32)
             }
         }
     }

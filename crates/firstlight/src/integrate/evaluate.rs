@@ -186,9 +186,7 @@ impl Evaluator {
     pub fn evaluate(&mut self, level: Level, light: &Asked, points: &[ShadingPoint], arrived: &mut Vec<Arrived>) {
         let first = arrived.len();
         self.evaluate_outside(level, light, points, arrived);
-        let (Some(faces), Emitter::Ball { center, radius, .. }) = (light.emitter.faces(), light.emitter) else {
-            return;
-        };
+        let Some(faces) = light.emitter.faces() else { return };
         let is_inside = |point: &ShadingPoint| light.emitter.surrounds(point.p);
         let inside: Vec<ShadingPoint> = points.iter().filter(|point| is_inside(point)).copied().collect();
         if inside.is_empty() {
@@ -207,9 +205,9 @@ impl Evaluator {
             }
             self.part = through;
         }
-        let places = arrived[first..].iter_mut().zip(points).filter(|(_, point)| is_inside(point));
-        for ((place, point), seen) in places.zip(seen) {
-            let distance = (radius - (*center - point.p.as_dvec3()).length()) as f32;
+        let places = arrived[first..].iter_mut().zip(points);
+        let places = places.filter_map(|(place, point)| Some((place, light.emitter.depth(point.p)?)));
+        for ((place, distance), seen) in places.zip(seen) {
             *place = Arrived { distance, height: distance, ..seen };
         }
     }

@@ -260,8 +260,9 @@ impl<'a> Arrivals<'a> {
 
     /// Whether what light `index` sends to a place varies over no less than `apart`, on the light.
     pub fn varies_over(&self, index: usize, place: &ArrivalPlace, apart: f32) -> bool {
-        let view = self.lights.emitters[index].as_ref().and_then(|emitter| self.view(emitter, place));
-        view.is_some_and(|view| view.nearest() >= apart)
+        let Some(emitter) = &self.lights.emitters[index] else { return false };
+        let nearest = emitter.depth(place.si.lit_from);
+        nearest.or_else(|| self.view(emitter, place).map(|view| view.nearest())).is_some_and(|nearest| nearest >= apart)
     }
 
     /// What places see of area light `index`, which is integrated, without asking points of it; in place of what was in

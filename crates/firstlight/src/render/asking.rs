@@ -105,11 +105,11 @@ impl<'a> AskedLeaves<'a> {
     /// Halves blocks of leaves, and has all rays ask one more point in each leaf: in those `near` edges down to one
     /// size, and then to a smaller one; or, to raise the number of all, in the largest, once there are many heavy ones
     /// first.
-    pub fn halve(&mut self, near: &[bool], is_raised: bool, asking: &mut [Asking], counts: &mut Counts) {
+    pub fn halve(&mut self, near: &[bool], is_raised: bool, is_told: bool, asking: &mut [Asking], counts: &mut Counts) {
         // What many points say is worth more than which of few say much, and in leaves of one size they cost little
         let is_even = self.leaves.count() == 1 << self.everywhere && Asker::keeps(self.everywhere);
         let are_few = self.leaves.count() * asking.len() < EVENLY;
-        if is_raised && !(is_even && are_few) && self.halve_heavy(asking, counts) {
+        if is_raised && !(is_even && are_few && is_told) && self.halve_heavy(asking, counts) {
             return;
         }
         if is_raised {

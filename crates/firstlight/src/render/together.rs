@@ -21,16 +21,23 @@ use crate::material::{Bsdf, MOMENTS, Moments};
 use crate::shape::SurfaceInteraction;
 use crate::visibility::{ShadowView, Visibility};
 
-/// How many times what is allowed by chance a deviation may be.
+/// How many times what is allowed by chance a deviation may be, after the points that are asked [first](BEGIN); more
+/// after more, by their fourth root. A picture of so much error in all takes least where pixels that take long are off
+/// by more than others.
 const DEVIATION: f32 = 1.25;
 /// How many times what is overlooked behind edges counts: it is off to one side everywhere.
 const OVERLOOKED: f32 = SQRT_2;
+/// The points of a pixel that are asked first.
+const BEGIN: f32 = 1024.0;
 /// Points that find what is in the way of a pixel.
 const POINTS: f32 = 512.0;
 /// The effective part of them, none of which is hidden where nothing is.
 const CLEAR: f64 = 0.75;
 /// In display steps: what one point may send where none is hidden.
 const UNMET: f32 = 1.0;
+/// A pixel that tells what others in its square see counts for so many: the mean sum of squares of what the nine are
+/// worth for a pixel, so that chance puts that one off by as much as if it had been asked.
+const NODE_PIXELS: f32 = 0.64;
 /// The part of what may be wrong that points may tell nothing about.
 const UNTOLD: f32 = 0.5;
 /// How many of those that send it what few points send may be off by.
@@ -61,6 +68,8 @@ pub(crate) struct Together {
     /// The share of the pixel that a ray has, and that of the patch.
     each: f32,
     share: f32,
+    /// Whether they tell what other pixels see.
+    is_node: bool,
     /// Which series the first ray asks.
     series: usize,
     rays: usize,
@@ -111,6 +120,7 @@ impl Together {
             light,
             each,
             share,
+            is_node: false,
             series,
             rays: 0,
             looking: Vec::new(),
@@ -122,6 +132,14 @@ impl Together {
             shares: 0.0,
             sharing: 0,
         }
+    }
+
+    /// The same of a pixel that tells what others in its square see.
+    pub fn of_node(mut self) -> Self {
+        self.share *= NODE_PIXELS;
+        self.each *= NODE_PIXELS;
+        self.is_node = true;
+        self
     }
 
     /// Asks for what one ray sees. It may be known that nothing is in the way, or nothing in trees: `lit`, `clear`.
@@ -275,10 +293,9 @@ impl Together {
         let asker = arrivals.asker(self.light);
         let measure = asker.area.stands_for();
         let wanted = POINTS * self.share.sqrt();
-        // Half of them, as all are asked once more before edges are followed
-        let first = ((0.5 * wanted / asking.len() as f32) as usize).next_power_of_two().max(FIRST);
+        let first = (BEGIN * self.share.sqrt() / asking.len() as f32) as usize;
+        let first = first.next_power_of_two().max(FIRST);
         let tolerance = arrivals.tolerance_by_chance(self.share);
-        let allowed = tolerance * DEVIATION;
         let part = 1.0 / self.rays as f32;
         let mut is_tried = false;
         let mut evidence = Evidence::new(asking[0].si.p);
@@ -341,6 +358,7 @@ impl Together {
             let unmet = if asked.deep == asked.everywhere { unmet } else { unmet.max(overlooked) };
             let edges = shows(sum(&|k| all[k] * packets.edges[k]));
             let points = asked.leaves.count() * asking.len();
+            let allowed = tolerance * self.deviation(points, arrivals.scene.tolerance());
             let error = (edges * edges + unmet * unmet).sqrt();
             let is_lit = !is_hidden && (is_clear || asked.leaves.count() >= MANY);
             let is_dark = shares.iter().all(|share| *share == 0.0) && points >= ALL_HIDDEN;
@@ -376,8 +394,15 @@ impl Together {
             // More everywhere as long as there is room for more near edges
             let is_raised = !is_told || unmet.max(overlooked) > allowed || !asked.is_raised;
             let is_raised = is_raised && (4 * points <= MOST || edges <= allowed);
-            asked.halve(&packets.near, is_raised, asking, counts);
+            asked.halve(&packets.near, is_raised, is_told, asking, counts);
         }
+    }
+
+    /// How many times what is allowed by chance these rays may deviate by, after so many points.
+    fn deviation(&self, points: usize, tolerance: f64) -> f32 {
+        let long = points as f32 * tolerance as f32 / BEGIN;
+        // What is off at a node is off at all pixels that it tells
+        if self.is_node { DEVIATION } else { DEVIATION * long.max(1.0).sqrt().sqrt() }
     }
 
     /// Asks what would arrive at all rays if nothing were in the way.

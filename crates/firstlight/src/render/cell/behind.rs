@@ -58,9 +58,6 @@ pub(super) struct Behind {
     evidence: Vec<Evidence>,
 }
 
-/// A pixel that tells what others in its square see counts for so many: the mean sum of squares of what the nine are
-/// worth for a pixel, so that chance puts that one off by as much as if it had been asked.
-const NODE_PIXELS: f32 = 0.64;
 /// How many pixels away those are whose points tell something of a pixel.
 const AROUND: usize = 3;
 /// No fragment.
@@ -258,7 +255,7 @@ impl Cells<'_> {
             };
             let wanted: Vec<usize> = (0..block.fragments.len()).filter(is_wanted).collect();
             let before = counts.work();
-            let ask = |k: &usize| self.together(&block, *k, light, 1.0, sights, counts);
+            let ask = |k: &usize| self.together(&block, *k, light, false, sights, counts);
             let mut all: Vec<Together> = wanted.iter().map(ask).collect();
             Together::tell(&mut all, &mut self.lights.arrivals, counts);
             let each = (counts.work() - before) / wanted.len().max(1) as f32;
@@ -353,7 +350,7 @@ impl Cells<'_> {
         sights.open.push(true);
         self.look_for(&block, light, &mut sights, counts);
         let before = counts.work();
-        let mut together = [self.together(&block, 0, light, NODE_PIXELS, &mut sights, counts)];
+        let mut together = [self.together(&block, 0, light, true, &mut sights, counts)];
         Together::tell(&mut together, &mut self.lights.arrivals, counts);
         let [together] = together;
         let outcome = self.settle(together, fragment, light, counts);
@@ -378,13 +375,13 @@ impl Cells<'_> {
         outcome
     }
 
-    /// Asks for a light at all rays of a fragment of the block, which stands for so many pixels.
+    /// Asks for a light at all rays of a fragment of the block, which may tell what other pixels see.
     fn together(
         &mut self,
         block: &RayBlock,
         k: usize,
         light: usize,
-        pixels: f32,
+        is_node: bool,
         sights: &mut RaySights,
         counts: &mut Counts,
     ) -> Together {
@@ -392,7 +389,10 @@ impl Cells<'_> {
         let others = self.others(of.fragment as usize, light);
         let Fragment { surface, share, .. } = self.fragments.all[of.fragment as usize];
         let salt = salt(self.at(self.pixel_of(of.fragment as usize)), surface);
-        let mut together = Together::new(light, of.count as usize, share * pixels, salt, others);
+        let mut together = Together::new(light, of.count as usize, share, salt, others);
+        if is_node {
+            together = together.of_node();
+        }
         for (place, k) in block.places[of.rays()].iter().zip(of.rays()) {
             sights.settle(k, place, &mut self.lights.arrivals, light, share, &mut together, counts);
         }
