@@ -447,6 +447,11 @@ impl<'a> Arrivals<'a> {
         self.lights.emitters[index].is_some() || !is_area
     }
 
+    /// Whether a light is integrated.
+    pub fn is_integrated(&self, index: usize) -> bool {
+        self.lights.emitters[index].is_some()
+    }
+
     /// Whether a light is integrated and can be hidden: then points of it are asked behind what is in trees.
     pub fn is_behind(&self, index: usize) -> bool {
         self.lights.emitters[index].is_some() && self.scene.lights[index].shadows

@@ -5,6 +5,7 @@ use super::arrival::ArrivalPlace;
 use super::beams::{self, RungRays};
 use super::ladder::{AskedRung, Asker};
 use super::leaves::{LeafBlock, Leaves};
+use super::packets::Edge;
 use super::resolve::LightTerm;
 use super::tally::{Tally, would_send};
 use crate::color::Rgb;
@@ -21,7 +22,7 @@ pub(super) const EVENLY: usize = 1 << 12;
 /// The points that a light is told by at most, of all rays of a pixel.
 pub(super) const MOST: usize = 1 << 16;
 /// The level of the smallest leaves.
-pub(super) const DEEPEST: u32 = 44;
+const DEEPEST: u32 = 44;
 
 /// A ray whose light is behind things.
 pub(super) struct Asking {
@@ -71,8 +72,6 @@ pub(super) struct AskedLeaves<'a> {
     pub leaves: Leaves,
     /// How often the light was halved to make all of them, at least.
     pub everywhere: u32,
-    /// The same of those near edges.
-    pub deep: u32,
     /// The numbers of blocks that were asked since they were last taken, some of them more than once.
     new: Vec<u32>,
     /// Whether all were halved once, so that it is known what first points overlook.
@@ -85,7 +84,7 @@ impl<'a> AskedLeaves<'a> {
         let level = count.ilog2();
         let leaves = Leaves::of(level);
         let new = leaves.order.clone();
-        let asked = AskedLeaves { asker, leaves, everywhere: level, deep: level, new, is_raised: false };
+        let asked = AskedLeaves { asker, leaves, everywhere: level, new, is_raised: false };
         let first: Vec<AskedRung> = asking.iter().map(|one| asker.first(one.series, count)).collect();
         asked.look(&first, &vec![u16::MAX; count / LANES], asking, counts);
         for (one, rung) in asking.iter_mut().zip(&first) {
@@ -102,29 +101,39 @@ impl<'a> AskedLeaves<'a> {
         new
     }
 
-    /// Halves blocks of leaves, and has all rays ask one more point in each leaf: in those `near` edges down to one
-    /// size, and then to a smaller one; or, to raise the number of all, in the largest, once there are many heavy ones
-    /// first.
-    pub fn halve(&mut self, near: &[bool], is_raised: bool, is_told: bool, asking: &mut [Asking], counts: &mut Counts) {
+    /// Halves blocks of leaves, and has all rays ask one more point in each leaf: in those that edges make most of what
+    /// is wrong in; or, to raise the number of all, in the largest, once there are many heavy ones first, or if it is
+    /// not told which are heavy. Says whether any was halved.
+    pub fn halve(
+        &mut self,
+        edges: &[Edge],
+        is_raised: bool,
+        is_told: bool,
+        asking: &mut [Asking],
+        counts: &mut Counts,
+    ) -> bool {
         // What many points say is worth more than which of few say much, and in leaves of one size they cost little
-        let is_even = self.leaves.count() == 1 << self.everywhere && Asker::keeps(self.everywhere);
+        let is_even = self.is_even() && Asker::keeps(self.everywhere);
         let are_few = self.leaves.count() * asking.len() < EVENLY;
         if is_raised && !(is_even && are_few && is_told) && self.halve_heavy(asking, counts) {
-            return;
+            return true;
         }
         if is_raised {
             self.everywhere += 1;
             self.is_raised = true;
             asking.iter_mut().for_each(|one| one.tally.surprises = Default::default());
-        } else if self.leaves.blocks.iter().zip(near).all(|(block, is_near)| !is_near || block.level >= self.deep) {
-            self.deep += 1;
         }
-        self.deep = self.deep.max(self.everywhere);
-        let (deep, everywhere) = (self.deep, self.everywhere);
-        self.halve_those(asking, counts, |number, block| {
-            let is_near = near[number];
-            (block.level < if is_near { deep } else { everywhere }).then_some(!is_near)
+        let everywhere = self.everywhere;
+        let halves = self.halve_those(asking, counts, |number, block| {
+            let is_wanted = edges[number] == Edge::Worst && block.level < DEEPEST || block.level < everywhere;
+            is_wanted.then_some(edges[number] == Edge::Away)
         });
+        !halves.is_empty()
+    }
+
+    /// Whether all leaves are of one size.
+    pub fn is_even(&self) -> bool {
+        self.leaves.count() == 1 << self.everywhere
     }
 
     /// Halves blocks as [`Leaves::halve`] says, and has all rays ask one more point in each leaf; the numbers of the
@@ -247,7 +256,7 @@ impl Peak {
     }
 }
 
-fn largest(color: Rgb) -> f32 {
+pub(super) fn largest(color: Rgb) -> f32 {
     color.r.max(color.g).max(color.b)
 }
 

@@ -128,6 +128,8 @@ pub(crate) struct Cells<'a> {
     wanted: Vec<Wanted>,
     parted: Vec<Wanted>,
     refused: Vec<Wanted>,
+    /// How many lights each fragment asks for at its rays.
+    asked: Vec<usize>,
     behind: Behind,
     /// What arrives where lights are many, in place of the stations after the first.
     many: Option<Many<'a>>,
@@ -167,6 +169,7 @@ impl<'a> Cells<'a> {
             wanted: Vec::new(),
             parted: Vec::new(),
             refused: Vec::new(),
+            asked: Vec::new(),
             behind: Behind::new(scene, few),
             many,
         }
@@ -501,6 +504,16 @@ impl<'a> Cells<'a> {
     /// Asks for the light of fragments at each of their rays.
     fn rays(&mut self, counts: &mut Counts, go_on: &dyn Fn() -> ControlFlow<()>) -> ControlFlow<()> {
         let refused = std::mem::take(&mut self.refused);
+        self.asked.clear();
+        self.asked.resize(self.fragments.all.len(), 0);
+        for Wanted { fragment, light, .. } in &refused {
+            self.asked[*fragment as usize] += usize::from(self.lights.arrivals.is_integrated(*light as usize));
+        }
+        if self.scene.geometry.has_trees() {
+            for fragment in 0..self.fragments.all.len() {
+                self.asked[fragment] += self.count_settled(fragment);
+            }
+        }
         // What some are asked tells how others are asked best
         for some in refused.chunks(AT_ONCE) {
             self.rays_of(some, counts, go_on)?;
@@ -535,6 +548,7 @@ impl<'a> Cells<'a> {
         // Requests of a fragment lie together
         let mut answers = self.requests.iter().zip(&self.answers);
         for Wanted { fragment, light, .. } in refused {
+            let asked = self.asked[*fragment as usize];
             let fragment = &self.fragments.all[*fragment as usize];
             let index = self.pixels[fragment.pixel as usize].index as usize;
             self.work[index] += Heat::PLACE * fragment.count() as f32;
@@ -550,8 +564,9 @@ impl<'a> Cells<'a> {
                 }
                 let salt = salt(at, place.surface);
                 let (light, rays, share) = (*light as usize, fragment.count(), fragment.share);
-                let together = unknown.get_or_insert_with(|| Together::new(light, rays, share, salt, Rgb::BLACK));
                 let arrivals = &mut self.lights.arrivals;
+                let new = || Together::new(light, rays, share, salt, Rgb::BLACK).of_lights(asked, arrivals);
+                let together = unknown.get_or_insert_with(new);
                 together.ask_points(arrivals, &place.surface(), &place.bsdf, counts);
             }
             if let Some(together) = unknown {

@@ -51,7 +51,9 @@ impl<'a> Lights<'a> {
         });
         let obstacles = obstacles.collect();
         let steps = DisplaySteps::new(&scene.display, scene.tolerance);
-        let allowed = Tolerance::DEFAULT.point / (scene.lights.len().max(1) as f32).sqrt();
+        // Errors of lights that are not integrated are none, or asked for
+        let integrated = emitters.iter().flatten().count().max(1);
+        let allowed = Tolerance::DEFAULT.point / (integrated as f32).sqrt();
         let least = steps.value_of(allowed);
         Lights { emitters, scales, steps, tree, targets, ladders, obstacles, allowed, least }
     }

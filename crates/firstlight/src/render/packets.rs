@@ -35,11 +35,25 @@ const AROUND: usize = 4;
 /// A root of the least number in single precision.
 const LEAST: f64 = 1e-19;
 
+/// Blocks in which edges make half as much of what is wrong as in those that are near some in the mean, or more, are
+/// asked first.
+const WORST: f32 = 0.5;
+
+/// Where a block of leaves is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Edge {
+    /// No edge is near.
+    Away,
+    Near,
+    /// Near edges that make much of what is wrong.
+    Worst,
+}
+
 /// What the packets of all rays say.
 #[derive(Clone, Debug, Default)]
 pub(super) struct PacketErrors {
-    /// Which blocks of leaves are near edges, by their numbers.
-    pub near: Vec<bool>,
+    /// How near blocks of leaves are to edges, by their numbers.
+    pub near: Vec<Edge>,
     /// The deviations of what arrives, as parts of what would if nothing were in the way: by edges, which more points
     /// in those leaves make less, and by what varies everywhere.
     pub edges: OfKind,
@@ -96,8 +110,9 @@ impl Packets {
         });
     }
 
-    /// What they say by now. `found` is the part of what would arrive that points find, if that is known.
-    pub fn errors(&self, tallies: &[&Tally], leaves: &Leaves, found: Option<OfKind>) -> PacketErrors {
+    /// What they say by now. `found` is the part of what would arrive that points find, if that is known; each
+    /// kind `shows` so much.
+    pub fn errors(&self, tallies: &[&Tally], leaves: &Leaves, found: Option<OfKind>, shows: OfKind) -> PacketErrors {
         let rays = tallies.len();
         let mut sums = BlockSums::default();
         let mut seen = Vec::with_capacity(leaves.order.len());
@@ -110,9 +125,10 @@ impl Packets {
         // Rays that see other things are wrong by chance, each by itself; those that see the same, together
         let width = Packets::width(rays);
         let apart = squared(apart(tallies) * of_edge((width * rays) as f64) / of_edge(LANES as f64));
-        let (mut edges, mut smooth) = (OfKind::default(), OfKind::default());
+        let (mut edges, mut smooth, mut weights) = (OfKind::default(), OfKind::default(), OfKind::default());
         for k in (0..MOMENTS).filter(|k| all[*k] > LEAST && self.unit[*k] > 0.0) {
             let per_all = 1.0 / (all[k] as f32 * self.unit[k]);
+            weights[k] = squared(shows[k] * per_all);
             // The part of what is sent that arrives
             let share = (lit[k] / all[k]) as f32;
             let alone = squared(ALONE) * variance(sums.alone[k], sums.alone_squared[k]);
@@ -128,9 +144,24 @@ impl Packets {
                     .max(2.0 * share * (1.0 - share) * (found[k] - 1.0).abs()),
             };
         }
-        let mut near = vec![false; leaves.order.len()];
-        let around = around(&seen, width * AROUND);
-        leaves.order.iter().zip(around).for_each(|(number, is_near)| near[*number as usize] = is_near);
+        let mut near = vec![Edge::Away; leaves.order.len()];
+        let run = (width * AROUND).div_ceil(LANES);
+        let wrong = |blocks: &[u32]| {
+            let of = |number: &u32| {
+                let BlockSums { together, alone, .. } = &self.blocks[*number as usize];
+                let squares = if rays == 1 { alone } else { together };
+                (0..MOMENTS).map(|k| squares[k] * weights[k]).sum::<f32>()
+            };
+            blocks.iter().map(of).sum::<f32>() / blocks.len() as f32
+        };
+        let is_near = around(&seen, width * AROUND);
+        let runs: Vec<f32> = leaves.order.chunks(run).map(wrong).collect();
+        let of = |place: usize| runs[place / run];
+        let all: f32 = (0..near.len()).filter(|place| is_near[*place]).map(of).sum();
+        let worst = WORST * all / is_near.iter().filter(|is_near| **is_near).count() as f32;
+        for (place, number) in leaves.order.iter().enumerate().filter(|(place, _)| is_near[*place]) {
+            near[*number as usize] = if of(place) >= worst { Edge::Worst } else { Edge::Near };
+        }
         PacketErrors { near, edges, smooth }
     }
 }

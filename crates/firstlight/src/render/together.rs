@@ -8,7 +8,7 @@ use std::f32::consts::SQRT_2;
 
 use super::Counts;
 use super::arrival::{ArrivalPlace, Arrivals, Sighting};
-use super::asking::{AskedLeaves, Asking, DEEPEST, EVENLY, MOST, parts};
+use super::asking::{AskedLeaves, Asking, EVENLY, MOST, largest, parts};
 use super::evidence::{Evidence, Met};
 use super::ladder::FIRST;
 use super::packets::{Packets, of_edge};
@@ -21,10 +21,11 @@ use crate::material::{Bsdf, MOMENTS, Moments};
 use crate::shape::SurfaceInteraction;
 use crate::visibility::{ShadowView, Visibility};
 
-/// How many times what is allowed by chance a deviation may be, after the points that are asked [first](BEGIN); more
-/// after more, by their fourth root. A picture of so much error in all takes least where pixels that take long are off
-/// by more than others.
+/// How many times what is allowed by chance a deviation may be after the points that are asked [first](BEGIN); after more
+/// of them more, by their fourth root, up to so many times. A picture of so much error in all takes least where pixels
+/// that take long are off by more than others.
 const DEVIATION: f32 = 1.25;
+const LONGEST: f32 = 4.0;
 /// How many times what is overlooked behind edges counts: it is off to one side everywhere.
 const OVERLOOKED: f32 = SQRT_2;
 /// The points of a pixel that are asked first.
@@ -70,6 +71,9 @@ pub(crate) struct Together {
     share: f32,
     /// Whether they tell what other pixels see.
     is_node: bool,
+    /// How many times more this light may be wrong, as points of some others are not asked: their errors are none, or
+    /// small.
+    room: f32,
     /// Which series the first ray asks.
     series: usize,
     rays: usize,
@@ -121,6 +125,7 @@ impl Together {
             each,
             share,
             is_node: false,
+            room: 1.0,
             series,
             rays: 0,
             looking: Vec::new(),
@@ -139,6 +144,13 @@ impl Together {
         self.share *= NODE_PIXELS;
         self.each *= NODE_PIXELS;
         self.is_node = true;
+        self
+    }
+
+    /// The same where so many of all lights that are integrated are asked for points.
+    pub fn of_lights(mut self, asked: usize, arrivals: &Arrivals) -> Self {
+        let all = arrivals.lights.emitters.iter().flatten().count();
+        self.room = (all as f32 / asked.clamp(1, all) as f32).sqrt();
         self
     }
 
@@ -295,13 +307,13 @@ impl Together {
         let wanted = POINTS * self.share.sqrt();
         let first = (BEGIN * self.share.sqrt() / asking.len() as f32) as usize;
         let first = first.next_power_of_two().max(FIRST);
-        let tolerance = arrivals.tolerance_by_chance(self.share);
+        let tolerance = arrivals.tolerance_by_chance(self.share) * self.room;
         let part = 1.0 / self.rays as f32;
         let mut is_tried = false;
         let mut evidence = Evidence::new(asking[0].si.p);
         let mut asked = AskedLeaves::new(asker, first, asking, counts);
         let mut packets = None;
-        let mut is_plain = true;
+        let (mut is_plain, mut is_halved) = (true, true);
         loop {
             asking.iter_mut().for_each(|one| one.tally.sum(asker.level, &asked.leaves));
             let shares = parts(asking, |tally| &tally.lit);
@@ -348,21 +360,21 @@ impl Together {
             let packets = packets.get_or_insert_with(|| Packets::new(Together::sent(asking, measure)));
             packets.hear(asker.level, &tallies, &asked.leaves, &new);
             let found = (!is_plain).then(|| Together::found(asking, measure));
-            let packets = packets.errors(&tallies, &asked.leaves, found);
+            let packets = packets.errors(&tallies, &asked.leaves, found, all.map(largest));
             let leaf = asker.area.measure() as f32 / (1u64 << asked.everywhere) as f32;
             let met: [f32; MOMENTS] = std::array::from_fn(|k| evidence.overlooked(k, around, leaf));
             let smooth = shows(sum(&|k| all[k] * packets.smooth[k]));
             let noise = |k: usize| (met[k] / effective[k].max(1.0) as f32).sqrt();
             let overlooked = OVERLOOKED * shows(sum(&|k| all[k] * met[k]));
             let unmet = shows(sum(&|k| all[k] * noise(k).max(packets.smooth[k])));
-            let unmet = if asked.deep == asked.everywhere { unmet } else { unmet.max(overlooked) };
+            let unmet = if asked.is_even() { unmet } else { unmet.max(overlooked) };
             let edges = shows(sum(&|k| all[k] * packets.edges[k]));
             let points = asked.leaves.count() * asking.len();
             let allowed = tolerance * self.deviation(points, arrivals.scene.tolerance());
             let error = (edges * edges + unmet * unmet).sqrt();
             let is_lit = !is_hidden && (is_clear || asked.leaves.count() >= MANY);
             let is_dark = shares.iter().all(|share| *share == 0.0) && points >= ALL_HIDDEN;
-            let is_last = points >= MOST || asked.deep > DEEPEST;
+            let is_last = points >= MOST || !is_halved;
             let is_enough = is_last || is_told && (is_lit || is_dark || error <= allowed);
             // Points are taken at their word for what would arrive if nothing were in the way, if they cannot miss any
             // of it
@@ -394,7 +406,7 @@ impl Together {
             // More everywhere as long as there is room for more near edges
             let is_raised = !is_told || unmet.max(overlooked) > allowed || !asked.is_raised;
             let is_raised = is_raised && (4 * points <= MOST || edges <= allowed);
-            asked.halve(&packets.near, is_raised, is_told, asking, counts);
+            is_halved = asked.halve(&packets.near, is_raised, is_told, asking, counts);
         }
     }
 
@@ -402,7 +414,7 @@ impl Together {
     fn deviation(&self, points: usize, tolerance: f64) -> f32 {
         let long = points as f32 * tolerance as f32 / BEGIN;
         // What is off at a node is off at all pixels that it tells
-        if self.is_node { DEVIATION } else { DEVIATION * long.max(1.0).sqrt().sqrt() }
+        if self.is_node { DEVIATION } else { DEVIATION * long.clamp(1.0, LONGEST).sqrt().sqrt() }
     }
 
     /// Asks what would arrive at all rays if nothing were in the way.

@@ -279,6 +279,18 @@ impl Cells<'_> {
         self.behind.known[fragment * self.scene.lights.len() + light]
     }
 
+    /// How many lights that are integrated a fragment sees in such a way.
+    fn count_lights(&self, fragment: usize, is: impl Fn(FragmentSight) -> bool) -> usize {
+        let is =
+            |light: &usize| self.lights.arrivals.is_integrated(*light) && is(self.fragment_sight(fragment, *light));
+        (0..self.scene.lights.len()).filter(is).count()
+    }
+
+    /// Of how many lights the rays of a fragment were asked for points.
+    pub(super) fn count_settled(&self, fragment: usize) -> usize {
+        self.count_lights(fragment, |sight| matches!(sight, FragmentSight::Settled(_)))
+    }
+
     /// Notes that, if nothing is known of it yet.
     pub(super) fn note(&mut self, fragment: usize, light: usize, sight: FragmentSight) {
         let known = &mut self.behind.known[fragment * self.scene.lights.len() + light];
@@ -389,7 +401,12 @@ impl Cells<'_> {
         let others = self.others(of.fragment as usize, light);
         let Fragment { surface, share, .. } = self.fragments.all[of.fragment as usize];
         let salt = salt(self.at(self.pixel_of(of.fragment as usize)), surface);
-        let mut together = Together::new(light, of.count as usize, share, salt, others);
+        // Of how many lights points may be asked, as far as is known by now
+        let asked = self.count_lights(of.fragment as usize, |sight| {
+            !matches!(sight, FragmentSight::Told | FragmentSight::Lit | FragmentSight::Dark)
+        });
+        let together = Together::new(light, of.count as usize, share, salt, others);
+        let mut together = together.of_lights(asked, &self.lights.arrivals);
         if is_node {
             together = together.of_node();
         }
