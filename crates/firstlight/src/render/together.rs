@@ -52,8 +52,6 @@ const UNEVEN: f64 = 1.0 / 16.0;
 const MANY: usize = 1 << 10;
 /// So many points of all rays tell that all of the light is hidden: near black, anything shows.
 const ALL_HIDDEN: usize = 1 << 14;
-/// The part of what may be wrong by which points may be, where they are taken at their word for what would arrive.
-const PLAIN: f32 = 0.5;
 
 /// A ray of which nothing is known yet but that nothing is in the way, if that is, or nothing in trees.
 struct Looking {
@@ -383,7 +381,7 @@ impl Together {
                 let apart = asker.area.extent() / (points as f32).sqrt();
                 let is_unseen = |k: usize| effective[k] < least(k) && asking.iter().any(|one| one.reflects(k));
                 let is_near = asking.iter().any(|one| !arrivals.varies_over(self.light, &one.place(self.each), apart));
-                if smooth > allowed * PLAIN || is_near || (0..MOMENTS).any(is_unseen) {
+                if smooth > allowed || is_near || (0..MOMENTS).any(is_unseen) {
                     self.ask_wholes(asking, arrivals);
                     is_plain = false;
                     continue;
