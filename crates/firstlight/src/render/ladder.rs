@@ -18,7 +18,7 @@ use crate::visibility::{ShadowView, Target, Viewpoint};
 
 /// The cells of the first rung at least, and those of the last whose points are kept.
 pub(super) const FIRST: usize = 16;
-const LAST: usize = 1 << 11;
+pub(super) const LAST: usize = 1 << 11;
 const RUNGS: usize = (LAST / FIRST).ilog2() as usize + 1;
 
 /// The points of one light, series by series, each rung made when it is first asked for: those that begin a series, and

@@ -10,7 +10,7 @@ use super::Counts;
 use super::arrival::{ArrivalPlace, Arrivals, Sighting};
 use super::asking::{AskedLeaves, Asking, EVENLY, MOST, largest, parts};
 use super::evidence::{Evidence, Met};
-use super::ladder::FIRST;
+use super::ladder::{FIRST, LAST};
 use super::packets::{Packets, of_edge};
 use super::resolve::LightTerm;
 use super::tally::Tally;
@@ -28,7 +28,7 @@ const DEVIATION: f32 = 1.25;
 const LONGEST: f32 = 4.0;
 /// How many times what is overlooked behind edges counts: it is off to one side everywhere.
 const OVERLOOKED: f32 = SQRT_2;
-/// The points of a pixel that are asked first.
+/// The points of a pixel that are asked first, with a tolerance of 1; fewer with more.
 const BEGIN: f32 = 1024.0;
 /// Points that find what is in the way of a pixel.
 const POINTS: f32 = 512.0;
@@ -303,8 +303,9 @@ impl Together {
         let asker = arrivals.asker(self.light);
         let measure = asker.area.stands_for();
         let wanted = POINTS * self.share.sqrt();
-        let first = (BEGIN * self.share.sqrt() / asking.len() as f32) as usize;
-        let first = first.next_power_of_two().max(FIRST);
+        let begin = BEGIN / arrivals.scene.tolerance() as f32;
+        let first = (begin * self.share.sqrt() / asking.len() as f32) as usize;
+        let first = first.next_power_of_two().clamp(FIRST, LAST);
         let tolerance = arrivals.tolerance_by_chance(self.share) * self.room;
         let part = 1.0 / self.rays as f32;
         let mut is_tried = false;
@@ -368,7 +369,7 @@ impl Together {
             let unmet = if asked.is_even() { unmet } else { unmet.max(overlooked) };
             let edges = shows(sum(&|k| all[k] * packets.edges[k]));
             let points = asked.leaves.count() * asking.len();
-            let allowed = tolerance * self.deviation(points, arrivals.scene.tolerance());
+            let allowed = tolerance * self.deviation(points as f32 / begin);
             let error = (edges * edges + unmet * unmet).sqrt();
             let is_lit = !is_hidden && (is_clear || asked.leaves.count() >= MANY);
             let is_dark = shares.iter().all(|share| *share == 0.0) && points >= ALL_HIDDEN;
@@ -408,11 +409,10 @@ impl Together {
         }
     }
 
-    /// How many times what is allowed by chance these rays may deviate by, after so many points.
-    fn deviation(&self, points: usize, tolerance: f64) -> f32 {
-        let long = points as f32 * tolerance as f32 / BEGIN;
+    /// How many times what is allowed by chance these rays may deviate by, after so many times the first points.
+    fn deviation(&self, times: f32) -> f32 {
         // What is off at a node is off at all pixels that it tells
-        if self.is_node { DEVIATION } else { DEVIATION * long.clamp(1.0, LONGEST).sqrt().sqrt() }
+        if self.is_node { DEVIATION } else { DEVIATION * times.clamp(1.0, LONGEST).sqrt().sqrt() }
     }
 
     /// Asks what would arrive at all rays if nothing were in the way.
