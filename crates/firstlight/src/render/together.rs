@@ -21,14 +21,14 @@ use crate::material::{Bsdf, MOMENTS, Moments};
 use crate::shape::SurfaceInteraction;
 use crate::visibility::{ShadowView, Visibility};
 
-/// How many times what is allowed by chance a deviation may be after the points that are asked [first](BEGIN); after more
-/// of them more, by their fourth root, up to so many times. A picture of so much error in all takes least where pixels
-/// that take long are off by more than others.
+/// How many times what is allowed by chance a deviation may be after the points that are asked [first](BEGIN); after
+/// more of them more, by their fourth root, up to so many times. A picture of so much error in all takes least where
+/// pixels that take long are off by more than others.
 const DEVIATION: f32 = 1.25;
 const LONGEST: f32 = 4.0;
 /// How many times what is overlooked behind edges counts: it is off to one side everywhere.
 const OVERLOOKED: f32 = SQRT_2;
-/// The points of a pixel that are asked first, with a tolerance of 1; fewer with more.
+/// The points of a pixel that are asked first, with a tolerance of 1; with others a root of it fewer.
 const BEGIN: f32 = 1024.0;
 /// Points that find what is in the way of a pixel.
 const POINTS: f32 = 512.0;
@@ -303,7 +303,7 @@ impl Together {
         let asker = arrivals.asker(self.light);
         let measure = asker.area.stands_for();
         let wanted = POINTS * self.share.sqrt();
-        let begin = BEGIN / arrivals.scene.tolerance() as f32;
+        let begin = BEGIN / (arrivals.scene.tolerance() as f32).sqrt();
         let first = (begin * self.share.sqrt() / asking.len() as f32) as usize;
         let first = first.next_power_of_two().clamp(FIRST, LAST);
         let tolerance = arrivals.tolerance_by_chance(self.share) * self.room;
