@@ -21,10 +21,11 @@ use crate::material::{Bsdf, MOMENTS, Moments};
 use crate::shape::SurfaceInteraction;
 use crate::visibility::{ShadowView, Visibility};
 
-/// How many times what is allowed by chance a deviation may be after the points that are asked [first](BEGIN); after
-/// more of them more, by their fourth root, up to so many times. A picture of so much error in all takes least where
-/// pixels that take long are off by more than others.
+/// How many times what is allowed by chance a deviation may be; more after more than so many times the points that are
+/// asked [first](BEGIN), by the fourth root of their number, up to so many times as many again. A picture of so much
+/// error in all takes least where pixels that take long are off by more than others.
 const DEVIATION: f32 = 1.25;
+const LONG: f32 = 2.0;
 const LONGEST: f32 = 4.0;
 /// How many times what is overlooked behind edges counts: it is off to one side everywhere.
 const OVERLOOKED: f32 = SQRT_2;
@@ -412,7 +413,7 @@ impl Together {
     /// How many times what is allowed by chance these rays may deviate by, after so many times the first points.
     fn deviation(&self, times: f32) -> f32 {
         // What is off at a node is off at all pixels that it tells
-        if self.is_node { DEVIATION } else { DEVIATION * times.clamp(1.0, LONGEST).sqrt().sqrt() }
+        if self.is_node { DEVIATION } else { DEVIATION * (times / LONG).clamp(1.0, LONGEST).sqrt().sqrt() }
     }
 
     /// Asks what would arrive at all rays if nothing were in the way.
