@@ -165,7 +165,7 @@ impl<'a> Arrivals<'a> {
     /// What of light `index` arrives at each place, in place of what was in `found`.
     pub fn arrivals(&mut self, index: usize, places: &[ArrivalPlace], found: &mut Vec<Arrival>, counts: &mut Counts) {
         found.clear();
-        if self.lights.emitters[index].is_none() {
+        if !self.is_integrated(index) {
             found.extend(places.iter().map(|place| self.of_other(index, place, counts)));
             return;
         }
@@ -444,7 +444,7 @@ impl<'a> Arrivals<'a> {
     /// are fixed.
     pub fn looks_for(&self, index: usize) -> bool {
         let is_area = matches!(self.scene.lights[index].kind, LightKind::Area(_));
-        self.lights.emitters[index].is_some() || !is_area
+        self.is_integrated(index) || !is_area
     }
 
     /// Whether a light is integrated.
@@ -454,7 +454,7 @@ impl<'a> Arrivals<'a> {
 
     /// Whether a light is integrated and can be hidden: then points of it are asked behind what is in trees.
     pub fn is_behind(&self, index: usize) -> bool {
-        self.lights.emitters[index].is_some() && self.scene.lights[index].shadows
+        self.is_integrated(index) && self.scene.lights[index].shadows
     }
 
     /// Whether anything in trees may be in the way of light `index` from some points, and else whether nothing at all

@@ -195,7 +195,7 @@ impl<'a> LightQueue<'a> {
             let of = Group { light, lobe: self.lobes[group / 2 / scene.lights.len()], places, requests };
             let members = std::mem::take(&mut self.groups[group]);
             let shadows = scene.lights[light].shadows && group % 2 == 1;
-            if self.arrivals.lights.emitters[light].is_none() {
+            if !self.arrivals.is_integrated(light) {
                 for k in &members {
                     go_on()?;
                     answers[*k as usize] = self.one(light, of.place(*k), of.request(*k).sight, counts);

@@ -11,8 +11,9 @@ use crate::visibility::Target;
 
 /// What all tiles share: the lights as they are integrated, and how errors show.
 pub(crate) struct Lights<'a> {
-    /// For each light, if it is integrated.
+    /// For each light, if it is integrated; and how many are.
     pub emitters: Vec<Option<Emitter>>,
+    pub integrated: usize,
     /// What the sums of each are multiplied with, before the colours of the surface.
     pub scales: Vec<Rgb>,
     pub steps: DisplaySteps,
@@ -52,10 +53,10 @@ impl<'a> Lights<'a> {
         let obstacles = obstacles.collect();
         let steps = DisplaySteps::new(&scene.display, scene.tolerance);
         // Errors of lights that are not integrated are none, or asked for
-        let integrated = emitters.iter().flatten().count().max(1);
-        let allowed = Tolerance::DEFAULT.point / (integrated as f32).sqrt();
+        let integrated = emitters.iter().flatten().count();
+        let allowed = Tolerance::DEFAULT.point / (integrated.max(1) as f32).sqrt();
         let least = steps.value_of(allowed);
-        Lights { emitters, scales, steps, tree, targets, ladders, obstacles, allowed, least }
+        Lights { emitters, integrated, scales, steps, tree, targets, ladders, obstacles, allowed, least }
     }
 
     /// Whether all of these placed things are told row by row where they are in the way of light `index`.

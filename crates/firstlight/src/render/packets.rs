@@ -144,25 +144,32 @@ impl Packets {
                     .max(2.0 * share * (1.0 - share) * (found[k] - 1.0).abs()),
             };
         }
-        let mut near = vec![Edge::Away; leaves.order.len()];
-        let run = (width * AROUND).div_ceil(LANES);
+        let near =
+            self.rank(leaves, &around(&seen, width * AROUND), (width * AROUND).div_ceil(LANES), &weights, rays == 1);
+        PacketErrors { near, edges, smooth }
+    }
+
+    /// How near blocks are to edges, by their numbers, where `is_near` says which are near any, in the order of the light,
+    /// in runs of so many. What each kind of light sends has such weights; one ray alone has packets of its own.
+    fn rank(&self, leaves: &Leaves, is_near: &[bool], run: usize, weights: &OfKind, is_alone: bool) -> Vec<Edge> {
         let wrong = |blocks: &[u32]| {
             let of = |number: &u32| {
                 let BlockSums { together, alone, .. } = &self.blocks[*number as usize];
-                let squares = if rays == 1 { alone } else { together };
+                let squares = if is_alone { alone } else { together };
                 (0..MOMENTS).map(|k| squares[k] * weights[k]).sum::<f32>()
             };
             blocks.iter().map(of).sum::<f32>() / blocks.len() as f32
         };
-        let is_near = around(&seen, width * AROUND);
         let runs: Vec<f32> = leaves.order.chunks(run).map(wrong).collect();
-        let of = |place: usize| runs[place / run];
-        let all: f32 = (0..near.len()).filter(|place| is_near[*place]).map(of).sum();
-        let worst = WORST * all / is_near.iter().filter(|is_near| **is_near).count() as f32;
-        for (place, number) in leaves.order.iter().enumerate().filter(|(place, _)| is_near[*place]) {
-            near[*number as usize] = if of(place) >= worst { Edge::Worst } else { Edge::Near };
+        let places = || (0..is_near.len()).filter(|place| is_near[*place]);
+        let all: f32 = places().map(|place| runs[place / run]).sum();
+        let worst = WORST * all / places().count() as f32;
+        let mut near = vec![Edge::Away; leaves.order.len()];
+        for place in places() {
+            let edge = if runs[place / run] >= worst { Edge::Worst } else { Edge::Near };
+            near[leaves.order[place] as usize] = edge;
         }
-        PacketErrors { near, edges, smooth }
+        near
     }
 }
 

@@ -148,7 +148,7 @@ impl Together {
 
     /// The same where so many of all lights that are integrated are asked for points.
     pub fn of_lights(mut self, asked: usize, arrivals: &Arrivals) -> Self {
-        let all = arrivals.lights.emitters.iter().flatten().count();
+        let all = arrivals.lights.integrated.max(1);
         self.room = (all as f32 / asked.clamp(1, all) as f32).sqrt();
         self
     }
@@ -163,7 +163,7 @@ impl Together {
         clear: bool,
         counts: &mut Counts,
     ) {
-        if arrivals.lights.emitters[self.light].is_some() {
+        if arrivals.is_integrated(self.light) {
             self.looking.push(Looking { si: *si, bsdf: *bsdf, lit, clear });
         } else {
             let place = ArrivalPlace { share: self.share, lit, clear, ..arrivals.place(self.light, si, bsdf) };

@@ -336,7 +336,7 @@ impl Cells<'_> {
     /// known. All fragments of the cell are asked together.
     fn unshadowed(&mut self, fragment: usize, light: usize) -> Rgb {
         let (scene, arrivals) = (self.scene, &mut self.lights.arrivals);
-        if arrivals.lights.emitters[light].is_none() {
+        if !arrivals.is_integrated(light) {
             return Rgb::BLACK;
         }
         let (fragments, wholes) = (&self.fragments, &mut self.behind.wholes[light]);
