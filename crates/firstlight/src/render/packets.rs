@@ -149,8 +149,8 @@ impl Packets {
         PacketErrors { near, edges, smooth }
     }
 
-    /// How near blocks are to edges, by their numbers, where `is_near` says which are near any, in the order of the light,
-    /// in runs of so many. What each kind of light sends has such weights; one ray alone has packets of its own.
+    /// How near blocks are to edges, by their numbers, where `is_near` says which are near any, in the order of the
+    /// light, in runs of so many. What each kind of light sends has such weights; one ray alone has packets of its own.
     fn rank(&self, leaves: &Leaves, is_near: &[bool], run: usize, weights: &OfKind, is_alone: bool) -> Vec<Edge> {
         let wrong = |blocks: &[u32]| {
             let of = |number: &u32| {
