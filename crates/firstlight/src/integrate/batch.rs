@@ -3,7 +3,8 @@
 //! Points are kept one after the other, what they see of a flat light in blocks of sixteen; a batch takes its lanes
 //! from wherever its members lie. Lanes work element by element, so no number depends on who shares a batch.
 
-use fearless_simd::{f32x16, prelude::*};
+use arrayvec::ArrayVec;
+use fearless_simd::{f32x16, mask32x16, prelude::*};
 
 use super::view::{FlatLight, FlatView, NEAR};
 use crate::color::Rgb;
@@ -262,25 +263,63 @@ impl ViewBlock {
     }
 }
 
+/// Numbers of sixteen things, which lie in its lanes.
+pub(crate) trait Block {
+    fn numbers(&self) -> &[LaneNumbers];
+}
+
+impl Block for ViewBlock {
+    #[inline(always)]
+    fn numbers(&self) -> &[LaneNumbers] {
+        &self.0
+    }
+}
+
 /// Where the members of a batch lie: their blocks, and their lanes in them.
-pub(crate) struct Members<'a> {
-    blocks: [&'a ViewBlock; LANES],
-    lanes: [usize; LANES],
+pub(crate) struct Members<'a, B> {
+    /// Those that follow one another and lie in one block, as bits.
+    runs: ArrayVec<(&'a B, u64), LANES>,
+    /// The bytes of each member's number among those of its block.
+    bytes: [u8; LANES * size_of::<f32>()],
     /// Whether they lie as in one block: then nothing has to be gathered.
     in_line: bool,
 }
 
-impl<'a> Members<'a> {
-    /// As many points as are asked, of these numbers, counted through all blocks; the last stands for what is missing.
+impl<'a, B: Block> Members<'a, B> {
+    /// As many as are asked, of these numbers, counted through all blocks; the last stands for what is missing.
     #[inline(always)]
-    pub fn new(blocks: &'a [ViewBlock], count: usize, number: impl Fn(usize) -> u32) -> Self {
+    pub fn new(blocks: &'a [B], count: usize, number: impl Fn(usize) -> u32) -> Self {
         let numbers: [usize; LANES] = std::array::from_fn(|k| number(k.min(count - 1)) as usize);
-        let lanes = numbers.map(|n| n % LANES);
-        let mut in_line = lanes[0] == 0;
-        for (k, n) in numbers.iter().enumerate().take(count) {
-            in_line &= *n == numbers[0] + k;
+        let mut in_line = numbers[0].is_multiple_of(LANES);
+        let (mut runs, mut last) = (ArrayVec::<(&B, u64), LANES>::new(), usize::MAX);
+        let mut bytes = [[0; size_of::<f32>()]; LANES];
+        for (k, n) in numbers.iter().enumerate() {
+            in_line &= *n == numbers[0] + k || k >= count;
+            bytes[k] = std::array::from_fn(|byte| (n % LANES * size_of::<f32>() + byte) as u8);
+            if n / LANES != last {
+                last = n / LANES;
+                runs.push((&blocks[last], 0));
+            }
+            if let Some((_, bits)) = runs.last_mut() {
+                *bits |= 1 << k;
+            }
         }
-        Members { blocks: numbers.map(|n| &blocks[n / LANES]), lanes, in_line }
+        Members { runs, bytes: *bytes.as_flattened().as_array().expect("four bytes for each"), in_line }
+    }
+
+    /// One number of each.
+    #[inline(always)]
+    pub fn number<S: Simd>(&self, simd: S, of: usize) -> f32x16<S> {
+        let of_block = |block: &B| f32x16::simd_from(simd, block.numbers()[of]);
+        let first = of_block(self.runs[0].0);
+        if self.in_line {
+            return first;
+        }
+        let mut numbers = first.swizzle_dyn(self.bytes);
+        for (block, bits) in &self.runs[1..] {
+            numbers = mask32x16::from_bitmask(simd, *bits).select(of_block(block).swizzle_dyn(self.bytes), numbers);
+        }
+        numbers
     }
 }
 
@@ -303,17 +342,10 @@ pub(crate) trait Views {
     }
 }
 
-impl Views for Members<'_> {
+impl Views for Members<'_, ViewBlock> {
     #[inline(always)]
     fn lanes<S: Simd>(&self, simd: S, of: ViewNumber) -> f32x16<S> {
-        if self.in_line {
-            return f32x16::simd_from(simd, self.blocks[0].0[of as usize]);
-        }
-        let mut numbers = [0.0; LANES];
-        for (k, number) in numbers.iter_mut().enumerate() {
-            *number = self.blocks[k].0[of as usize][self.lanes[k] % LANES];
-        }
-        f32x16::simd_from(simd, numbers)
+        self.number(simd, of as usize)
     }
 }
 

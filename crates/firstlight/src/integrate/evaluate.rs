@@ -23,7 +23,7 @@ use fearless_simd::{Level, Simd};
 use super::batch::{LaneNumbers, Members, ShadingPoint, ViewBlock};
 use super::classify::{Class, Obstacles, classify};
 use super::emitter::Emitter;
-use super::fit::{Cell, Fits, MOMENTS, Polynomial, coarse, fit};
+use super::fit::{Cell, CutBlock, Fits, MOMENTS, coarse, fit};
 use super::grade::{Grades, grade, halves, survey, whole};
 use super::panels::{Between, Blocked, Panel, PanelSums, cut, rows};
 use super::tolerance::{Tolerance, Weight};
@@ -148,9 +148,10 @@ pub(crate) struct Evaluator {
     /// others.
     smooth: Vec<Cell>,
     whole: Vec<Cell>,
-    /// All cells that are seen in part, with their polynomials as far as they were asked, and how much is seen of each.
+    /// All cells that are seen in part, what is kept of those that were asked, and how much is seen of each. Those of
+    /// one round begin with a block.
     cut: Vec<Cell>,
-    polynomials: Vec<[Polynomial; MOMENTS]>,
+    kept: Vec<CutBlock>,
     seen: Vec<f32>,
     /// Panels to be asked.
     panels: Vec<Panel>,
@@ -239,11 +240,11 @@ impl Evaluator {
         let mut round = 0;
         while !(self.smooth.is_empty()
             && self.whole.is_empty()
-            && self.polynomials.len() == self.cut.len()
+            && self.kept.len() * LANES == self.cut.len()
             && self.panels.is_empty())
         {
             round += 1;
-            let new = self.polynomials.len();
+            let new = self.kept.len() * LANES;
             if is_bounded {
                 self.count_cells(arrived);
             }
@@ -275,7 +276,7 @@ impl Evaluator {
         self.whole.clear();
         self.cut.clear();
         self.panels.clear();
-        self.polynomials.clear();
+        self.kept.clear();
         self.seen.clear();
         let outline = light.emitter.outline();
         for (block, points) in points.chunks(LANES).enumerate() {
@@ -420,7 +421,7 @@ impl Evaluator {
 
     /// Counts the cells of this round, and leaves out those of points that are asked too much.
     fn count_cells(&mut self, arrived: &mut [Arrived]) {
-        let new = self.polynomials.len();
+        let new = self.kept.len() * LANES;
         for cell in self.smooth.iter().chain(&self.whole).chain(&self.cut[new..]) {
             self.state[cell.point as usize].asked += 1;
         }
@@ -470,7 +471,7 @@ impl Evaluator {
 
     /// Asks all cells of this round, and makes panels of those that are new and seen in part.
     fn ask_cells(&mut self, level: Level, light: &Asked) {
-        let Evaluator { views, between, smooth, whole, cut: cut_cells, polynomials, panels, spare, .. } = self;
+        let Evaluator { views, between, smooth, whole, cut: cut_cells, kept, panels, spare, .. } = self;
         let falloff = light.emitter.falloff();
         let blocked = light.blocked(between);
         let tolerance = light.tolerance;
@@ -480,8 +481,8 @@ impl Evaluator {
         self.fits.clear();
         self.cut_fits.clear();
         let (smooth_fits, fits, cut_fits) = (&mut self.smooth_fits, &mut self.fits, &mut self.cut_fits);
-        // Those of the cut cells that are new; others have their polynomials
-        let new = cut_cells[polynomials.len()..].chunks(LANES).map(|cells| (cells, true));
+        // Those of the cut cells that are new
+        let new = cut_cells[kept.len() * LANES..].chunks(LANES).map(|cells| (cells, true));
         let asked = whole.chunks(LANES).map(|cells| (cells, false)).chain(new);
         // Each kernel is called at one place: so there is one copy of it for each instruction set
         dispatch_wide!(level, simd => {
@@ -495,8 +496,8 @@ impl Evaluator {
             for (cells, is_cut) in asked {
                 let members = Members::new(views, cells.len(), |k| cells[k].point);
                 let shares = if is_cut { cut_shares } else { whole_shares };
-                let first = polynomials.len() as u32;
-                let wanted = is_cut.then_some(&mut *polynomials);
+                let first = (kept.len() * LANES) as u32;
+                let wanted = is_cut.then_some(&mut *kept);
                 let fitted = simd.vectorize(
                     #[inline(always)]
                     || fit(simd, light.lobe, falloff, &members, cells, shares, wanted),
@@ -513,16 +514,20 @@ impl Evaluator {
 
     /// Asks all panels of this round.
     fn ask_panels(&mut self, level: Level, light: &Asked) {
-        let Evaluator { views, between, cut: cut_cells, polynomials, panels, panel_sums, .. } = self;
+        let Evaluator { views, between, cut: cut_cells, kept, panels, panel_sums, .. } = self;
         let blocked = light.blocked(between);
         let moments = light.lobe.moment_count();
         panel_sums.clear();
         dispatch_wide!(level, simd => {
             for some in panels.chunks(LANES) {
-                let members = Members::new(views, some.len(), |k| cut_cells[some[k].cell as usize].point);
+                let cells = some.iter().map(|panel| panel.cell);
+                let points: ArrayVec<u32, LANES> = cells.map(|cell| cut_cells[cell as usize].point).collect();
+                let members = Members::new(views, some.len(), |k| points[k]);
+                let cells = Members::new(kept, some.len(), |k| some[k].cell);
+                let points = std::array::from_fn(|k| points[k.min(points.len() - 1)]);
                 panel_sums.push(simd.vectorize(
                     #[inline(always)]
-                    || rows(simd, &blocked, &members, cut_cells, polynomials, some, moments),
+                    || rows(simd, &blocked, &members, &cells, &points, some, moments),
                 ));
             }
         });
@@ -586,6 +591,7 @@ impl Evaluator {
         }
         // Cells that are seen in part: those whose light is not known well enough are asked anew
         let asked = self.cut.len();
+        self.cut.resize(self.kept.len() * LANES, Cell::default());
         for k in new..asked {
             let cell = self.cut[k];
             let fits = &self.cut_fits[(k - new) / LANES];

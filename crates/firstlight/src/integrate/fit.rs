@@ -9,7 +9,7 @@
 
 use fearless_simd::{f32x16, prelude::*};
 
-use super::batch::{Exact, LaneNumbers, Linear16, Members, ViewNumber, Views, ways};
+use super::batch::{Block, Exact, LaneNumbers, Linear16, Members, ViewBlock, ViewNumber, Views, ways};
 use crate::material::Lobe;
 use crate::math::{LANES, sin_cos};
 
@@ -17,8 +17,6 @@ use crate::math::{LANES, sin_cos};
 pub(crate) use crate::material::MOMENTS;
 /// Nodes along an axis.
 const NODES: usize = 5;
-/// A polynomial along both axes: [power of x][power of y].
-pub(crate) type Polynomial = [[f32; NODES]; NODES];
 
 /// The Gauss-Legendre rule of five nodes on [-1, 1].
 const GAUSS: [f64; NODES] =
@@ -129,7 +127,7 @@ pub(crate) enum AreaWeight {
 }
 
 /// A rectangle of a light's square, of one point.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Cell {
     /// The point it is seen from.
     pub point: u32,
@@ -147,6 +145,43 @@ pub(crate) struct Fits {
     pub errors: [[LaneNumbers; MOMENTS]; 2],
 }
 
+/// How many numbers of a polynomial along both axes.
+const POWERS: usize = NODES * NODES;
+
+/// What is kept of sixteen cells that are seen in part: the antiderivatives along x of what they send, moment by moment,
+/// and from where to where they go.
+#[derive(Clone, Debug)]
+pub(crate) struct CutBlock([LaneNumbers; MOMENTS * POWERS + 4]);
+
+impl CutBlock {
+    /// The number of a coefficient, of x^(`x` + 1) y^`y`.
+    pub const fn power(moment: usize, x: usize, y: usize) -> usize {
+        moment * POWERS + x * NODES + y
+    }
+
+    /// The numbers of the first column, the last, the first row, and the last.
+    pub const SIDES: [usize; 4] =
+        [MOMENTS * POWERS, MOMENTS * POWERS + 1, MOMENTS * POWERS + 2, MOMENTS * POWERS + 3];
+}
+
+impl Block for CutBlock {
+    #[inline(always)]
+    fn numbers(&self) -> &[LaneNumbers] {
+        &self.0
+    }
+}
+
+/// The sides of up to sixteen cells: the first column, the last, the first row, and the last.
+#[inline(always)]
+fn sides(cells: &[Cell]) -> [LaneNumbers; 4] {
+    let mut sides = [[0.0; LANES]; 4];
+    for k in 0..LANES {
+        let Cell { x, y, .. } = &cells[k.min(cells.len() - 1)];
+        [sides[0][k], sides[1][k], sides[2][k], sides[3][k]] = [x[0], x[1], y[0], y[1]];
+    }
+    sides
+}
+
 /// What sixteen cells send at the nodes of a rule: [moment][row][column].
 type NodeValues<S, const N: usize> = [[[f32x16<S>; N]; N]; MOMENTS];
 
@@ -157,17 +192,12 @@ fn values<S: Simd, const N: usize>(
     rule: &Rule<N>,
     lobe: &Lobe,
     falloff: AreaWeight,
-    members: &Members,
+    members: &Members<ViewBlock>,
     cells: &[Cell],
 ) -> (NodeValues<S, N>, f32x16<S>) {
     use ViewNumber::*;
     let splat = |v: f32| simd.splat_f32x16(v);
-    let mut sides = [[0.0; LANES]; 4];
-    for k in 0..LANES {
-        let Cell { x, y, .. } = &cells[k.min(cells.len() - 1)];
-        [sides[0][k], sides[1][k], sides[2][k], sides[3][k]] = [x[0], x[1], y[0], y[1]];
-    }
-    let [x0, x1, y0, y1] = sides.map(|side| f32x16::simd_from(simd, side));
+    let [x0, x1, y0, y1] = sides(cells).map(|side| f32x16::simd_from(simd, side));
     let (xm, xh, ym, yh) = ((x0 + x1) * 0.5, (x1 - x0) * 0.5, (y0 + y1) * 0.5, (y1 - y0) * 0.5);
     let (fa, la, skew, fb, lb) = (
         members.lanes(simd, Fa),
@@ -279,7 +309,7 @@ fn sum<S: Simd, const N: usize>(
 /// last coefficient, or, where that is 0 by chance, as the square of the one before; what nodes miss is the third power
 /// of that, where it is small beside the sum. To be called within `vectorize`.
 #[inline(always)]
-pub(crate) fn coarse<S: Simd>(simd: S, lobe: &Lobe, falloff: AreaWeight, members: &Members, cells: &[Cell]) -> Fits {
+pub(crate) fn coarse<S: Simd>(simd: S, lobe: &Lobe, falloff: AreaWeight, members: &Members<ViewBlock>, cells: &[Cell]) -> Fits {
     let (values, area) = values(simd, &COARSE, lobe, falloff, members, cells);
     let mut fits = Fits::default();
     let moments = lobe.moment_count();
@@ -297,17 +327,17 @@ pub(crate) fn coarse<S: Simd>(simd: S, lobe: &Lobe, falloff: AreaWeight, members
 }
 
 /// The fit of up to sixteen cells, which can be wrong by so much of the end of its series, and by more where the series
-/// falls slowly, which says less of what comes after its end. With `polynomials`, the antiderivatives along x: of each
-/// cell, moment by moment. To be called within `vectorize`.
+/// falls slowly, which says less of what comes after its end. With `kept`, that is what is kept of cells that are seen in
+/// part. To be called within `vectorize`.
 #[inline(always)]
 pub(crate) fn fit<S: Simd>(
     simd: S,
     lobe: &Lobe,
     falloff: AreaWeight,
-    members: &Members,
+    members: &Members<ViewBlock>,
     cells: &[Cell],
     [share, slow_share]: [f32; 2],
-    polynomials: Option<&mut Vec<[Polynomial; MOMENTS]>>,
+    kept: Option<&mut Vec<CutBlock>>,
 ) -> Fits {
     let (values, area) = values(simd, &FINE, lobe, falloff, members, cells);
     let (zero, one, least) = (simd.splat_f32x16(0.0), simd.splat_f32x16(1.0), simd.splat_f32x16(f32::MIN_POSITIVE));
@@ -322,8 +352,11 @@ pub(crate) fn fit<S: Simd>(
             fits.errors[axis][moment] = (tail * (slow * slow_share + share) * area).to_array();
         }
     }
-    let Some(polynomials) = polynomials else { return fits };
-    let mut lanes = [[[[0.0f32; LANES]; NODES]; NODES]; MOMENTS];
+    let Some(kept) = kept else { return fits };
+    let mut block = CutBlock([[0.0; LANES]; _]);
+    for (number, side) in CutBlock::SIDES.into_iter().zip(sides(cells)) {
+        block.0[number] = side;
+    }
     for moment in 0..moments {
         // Along rows: [row][power of x]
         let mut rows = [[zero; NODES]; NODES];
@@ -341,17 +374,10 @@ pub(crate) fn fit<S: Simd>(
                 for (row, factor) in rows.iter().zip(matrix) {
                     sum += row[k] * *factor;
                 }
-                lanes[moment][k][m] = (sum * area).to_array();
+                block.0[CutBlock::power(moment, k, m)] = (sum * area).to_array();
             }
         }
     }
-    let first = polynomials.len();
-    polynomials.resize(first + cells.len(), [[[0.0; NODES]; NODES]; MOMENTS]);
-    for (k, polynomial) in polynomials[first..].iter_mut().enumerate() {
-        let numbers = polynomial.as_flattened_mut().as_flattened_mut().iter_mut();
-        for (number, lanes) in numbers.zip(lanes.as_flattened().as_flattened()) {
-            *number = lanes[k];
-        }
-    }
+    kept.push(block);
     fits
 }

@@ -107,7 +107,7 @@ pub(super) fn grade<S: Simd>(
     lobe: &Lobe,
     tolerance: &Tolerance,
     outline: Outline,
-    members: &Members,
+    members: &Members<ViewBlock>,
     cells: &[Cell],
 ) -> Grades {
     use ViewNumber::*;
@@ -183,7 +183,7 @@ fn around<S: Simd>(simd: S, [u0, u1]: [f32x16<S>; 2], [v0, v1]: [f32x16<S>; 2]) 
 fn seen<S: Simd>(
     simd: S,
     outline: Outline,
-    members: &Members,
+    members: &Members<ViewBlock>,
     [x0, x1]: [f32x16<S>; 2],
     [y0, y1]: [f32x16<S>; 2],
 ) -> [mask32x16<S>; 2] {

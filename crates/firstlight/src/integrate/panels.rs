@@ -12,10 +12,10 @@
 use arrayvec::ArrayVec;
 use fearless_simd::{f32x16, mask32x16, prelude::*};
 
-use super::batch::{Exact, LaneNumbers, Members, ViewNumber, Views, ways};
+use super::batch::{Exact, LaneNumbers, Members, ViewBlock, ViewNumber, Views, ways};
 use super::breaks::{Breaks, RoundSides};
 use super::cut::{self, BallCut, Half};
-use super::fit::{Cell, MOMENTS, Polynomial};
+use super::fit::{Cell, CutBlock, MOMENTS};
 use super::occluder::{Occluder, Shadow};
 use super::row::{FAR, Interval16};
 use super::view::Outline;
@@ -97,7 +97,7 @@ struct Batch<'a, S: Simd> {
 
 impl<'a, S: Simd> Batch<'a, S> {
     #[inline(always)]
-    fn new(simd: S, blocked: &'a Blocked<'a>, members: &Members, point: impl Fn(usize) -> u32) -> Self {
+    fn new(simd: S, blocked: &'a Blocked<'a>, members: &Members<ViewBlock>, point: impl Fn(usize) -> u32) -> Self {
         use ViewNumber::*;
         let mut between = [Between::default(); LANES];
         for (k, between) in between.iter_mut().enumerate() {
@@ -154,7 +154,7 @@ impl<'a, S: Simd> Batch<'a, S> {
 pub(crate) fn cut<S: Simd>(
     simd: S,
     blocked: &Blocked,
-    members: &Members,
+    members: &Members<ViewBlock>,
     cells: &[Cell],
     first: u32,
     spare: &mut Vec<LaneNumbers>,
@@ -183,7 +183,7 @@ pub(crate) fn cut<S: Simd>(
 }
 
 #[inline(always)]
-fn breaks<S: Simd>(simd: S, blocked: &Blocked, members: &Members, cells: &[Cell], rows: &mut Vec<LaneNumbers>) {
+fn breaks<S: Simd>(simd: S, blocked: &Blocked, members: &Members<ViewBlock>, cells: &[Cell], rows: &mut Vec<LaneNumbers>) {
     use ViewNumber::*;
     let side = |end: usize| std::array::from_fn::<f32, LANES, _>(|k| cells[k.min(cells.len() - 1)].x[end]);
     let x = [f32x16::simd_from(simd, side(0)), f32x16::simd_from(simd, side(1))];
@@ -243,39 +243,33 @@ fn antiderivative<S: Simd>([a, b, c, d, e]: &[f32x16<S>; 5], u: f32x16<S>) -> f3
 pub(crate) fn rows<S: Simd>(
     simd: S,
     blocked: &Blocked,
-    members: &Members,
-    cells: &[Cell],
-    polynomials: &[[Polynomial; MOMENTS]],
+    members: &Members<ViewBlock>,
+    cells: &Members<CutBlock>,
+    points: &[u32; LANES],
     panels: &[Panel],
     moments: usize,
 ) -> PanelSums {
     use ViewNumber::*;
     let splat = |v: f32| simd.splat_f32x16(v);
-    let panel: [&Panel; LANES] = std::array::from_fn(|k| &panels[k.min(panels.len() - 1)]);
-    let cell = panel.map(|panel| &cells[panel.cell as usize]);
-    macro_rules! numbers {
-        ($f:expr) => {{
-            let numbers: [f32; LANES] = std::array::from_fn($f);
-            f32x16::simd_from(simd, numbers)
-        }};
-    }
+    let end = |end: usize| std::array::from_fn::<f32, LANES, _>(|k| panels[k.min(panels.len() - 1)].y[end]);
+    let [from, to] = [f32x16::simd_from(simd, end(0)), f32x16::simd_from(simd, end(1))];
     let (zero, one, far) = (splat(0.0), splat(1.0), splat(FAR));
-    let [x0, x1] = [numbers!(|k| cell[k].x[0]), numbers!(|k| cell[k].x[1])];
-    let [y0, y1] = [numbers!(|k| cell[k].y[0]), numbers!(|k| cell[k].y[1])];
-    let [from, to] = [numbers!(|k| panel[k].y[0]), numbers!(|k| panel[k].y[1])];
+    let [x0, x1, y0, y1] = [0, 1, 2, 3].map(
+        #[inline(always)]
+        |side| cells.number(simd, CutBlock::SIDES[side]),
+    );
     let (xm, xh) = ((x0 + x1) * 0.5, (x1 - x0) * 0.5);
     let (ym, yh) = ((y0 + y1) * 0.5, (y1 - y0) * 0.5);
-    let batch = Batch::new(simd, blocked, members, |k| cell[k].point);
+    let batch = Batch::new(simd, blocked, members, |k| points[k]);
     let cos = members.linear(simd, [CosC, CosX, CosY]);
     let horizon = members.linear(simd, [HorizonC, HorizonX, HorizonY]);
     let origin = [members.lanes(simd, OriginX), members.lanes(simd, OriginY)];
     // The polynomials: [moment][power of x][power of y]
-    let polynomial: [&[Polynomial; MOMENTS]; LANES] = panel.map(|panel| &polynomials[panel.cell as usize]);
     let mut powers = [[[zero; 5]; 5]; MOMENTS];
     for (moment, powers) in powers.iter_mut().enumerate().take(moments) {
         for (x, powers) in powers.iter_mut().enumerate() {
             for (y, power) in powers.iter_mut().enumerate() {
-                *power = numbers!(|k| polynomial[k][moment][x][y]);
+                *power = cells.number(simd, CutBlock::power(moment, x, y));
             }
         }
     }
