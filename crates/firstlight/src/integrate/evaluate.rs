@@ -440,7 +440,7 @@ impl Evaluator {
     /// The same with panels.
     fn count_panels(&mut self, arrived: &mut [Arrived]) {
         for panel in &self.panels {
-            self.state[self.cut[panel.cell as usize].point as usize].asked += 1;
+            self.state[panel.point as usize].asked += 1;
         }
         if self.give_up(arrived) {
             self.leave_panels();
@@ -465,8 +465,8 @@ impl Evaluator {
     }
 
     fn leave_panels(&mut self) {
-        let Evaluator { state, cut, panels, .. } = self;
-        panels.retain(|panel| state[cut[panel.cell as usize].point as usize].cells != PointSum::GIVEN_UP);
+        let Evaluator { state, panels, .. } = self;
+        panels.retain(|panel| state[panel.point as usize].cells != PointSum::GIVEN_UP);
     }
 
     /// Asks all cells of this round, and makes panels of those that are new and seen in part.
@@ -514,20 +514,17 @@ impl Evaluator {
 
     /// Asks all panels of this round.
     fn ask_panels(&mut self, level: Level, light: &Asked) {
-        let Evaluator { views, between, cut: cut_cells, kept, panels, panel_sums, .. } = self;
+        let Evaluator { views, between, kept, panels, panel_sums, .. } = self;
         let blocked = light.blocked(between);
         let moments = light.lobe.moment_count();
         panel_sums.clear();
         dispatch_wide!(level, simd => {
             for some in panels.chunks(LANES) {
-                let cells = some.iter().map(|panel| panel.cell);
-                let points: ArrayVec<u32, LANES> = cells.map(|cell| cut_cells[cell as usize].point).collect();
-                let members = Members::new(views, some.len(), |k| points[k]);
+                let members = Members::new(views, some.len(), |k| some[k].point);
                 let cells = Members::new(kept, some.len(), |k| some[k].cell);
-                let points = std::array::from_fn(|k| points[k.min(points.len() - 1)]);
                 panel_sums.push(simd.vectorize(
                     #[inline(always)]
-                    || rows(simd, &blocked, &members, &cells, &points, some, moments),
+                    || rows(simd, &blocked, &members, &cells, some, moments),
                 ));
             }
         });
@@ -548,15 +545,15 @@ impl Evaluator {
         for (k, panel) in self.panels.iter().enumerate() {
             let sums = &self.panel_sums[k / LANES];
             let cell = panel.cell as usize;
-            self.state[self.cut[cell].point as usize].expect(lane(&sums.sums, k), round);
+            self.state[panel.point as usize].expect(lane(&sums.sums, k), round);
             if cell >= new {
                 self.seen[cell] += sums.seen[k % LANES];
             }
         }
         // How much errors weigh at such a brightness
-        let (states, cut) = (&mut self.state, &self.cut);
+        let states = &mut self.state;
         let asked = self.smooth.iter().chain(&self.whole).map(|cell| cell.point);
-        let asked = asked.chain(self.panels.iter().map(|panel| cut[panel.cell as usize].point));
+        let asked = asked.chain(self.panels.iter().map(|panel| panel.point));
         for point in asked {
             let state = &mut states[point as usize];
             if state.round == round {
@@ -609,7 +606,7 @@ impl Evaluator {
                 continue;
             }
             let sums = &self.panel_sums[k / LANES];
-            let state = &mut self.state[self.cut[panel.cell as usize].point as usize];
+            let state = &mut self.state[panel.point as usize];
             let value = lane(&sums.sums, k);
             let differences = lane(&sums.differences, k);
             // The finer rule is better than the difference says, the more the closer both are

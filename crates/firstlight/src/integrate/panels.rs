@@ -48,8 +48,9 @@ const SPREAD: [[f32; 3]; ROWS] = {
 /// Rows of one cell.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Panel {
-    /// Of the cells that are cut.
+    /// Of the cells that are cut, and the point that this is seen from.
     pub cell: u32,
+    pub point: u32,
     pub y: [f32; 2],
     /// How often it was halved.
     pub depth: u32,
@@ -175,7 +176,7 @@ pub(crate) fn cut<S: Simd>(
         let mut from = cell.y[0];
         for to in rows {
             if to - from > least || to == cell.y[1] {
-                panels.push(Panel { cell: first + k as u32, y: [from, to], depth: 0 });
+                panels.push(Panel { cell: first + k as u32, point: cell.point, y: [from, to], depth: 0 });
                 from = to;
             }
         }
@@ -245,7 +246,6 @@ pub(crate) fn rows<S: Simd>(
     blocked: &Blocked,
     members: &Members<ViewBlock>,
     cells: &Members<CutBlock>,
-    points: &[u32; LANES],
     panels: &[Panel],
     moments: usize,
 ) -> PanelSums {
@@ -260,7 +260,7 @@ pub(crate) fn rows<S: Simd>(
     );
     let (xm, xh) = ((x0 + x1) * 0.5, (x1 - x0) * 0.5);
     let (ym, yh) = ((y0 + y1) * 0.5, (y1 - y0) * 0.5);
-    let batch = Batch::new(simd, blocked, members, |k| points[k]);
+    let batch = Batch::new(simd, blocked, members, |k| panels[k.min(panels.len() - 1)].point);
     let cos = members.linear(simd, [CosC, CosX, CosY]);
     let horizon = members.linear(simd, [HorizonC, HorizonX, HorizonY]);
     let origin = [members.lanes(simd, OriginX), members.lanes(simd, OriginY)];
