@@ -91,33 +91,47 @@ impl<S: Simd> Breaks<'_, S> {
             self.tell_if(crossings.low, of & crossings.any);
             self.tell_if(crossings.high, of & crossings.any);
         }
-        self.on_round_sides(quadratic, of, &[]);
+        self.on_round_sides(quadratic, of);
     }
 
-    /// Where a quadratic is 0 on round sides, and some lines are above it. Not inlined: one copy for each instruction
-    /// set is enough.
+    /// Where a quadratic is 0 on round sides. Not inlined: one copy for each instruction set is enough.
     #[inline(never)]
-    fn on_round_sides(&mut self, quadratic: &Quadratic16<S>, of: mask32x16<S>, inside: &[Linear16<S>]) {
+    fn on_round_sides(&mut self, quadratic: &Quadratic16<S>, of: mask32x16<S>) {
         let Some(sides) = self.round else { return };
         self.of.token().vectorize(
             #[inline(always)]
             || {
                 for width in sides.width {
-                    self.on_side(quadratic, of, inside, width, sides.origin);
+                    self.on_side(quadratic, of, width, sides.origin);
                 }
             },
         );
     }
 
+    /// Where a line crosses round sides, of those places that matter. On a side it is a cos t + b sin t + c.
     #[inline(always)]
-    fn on_side(
-        &mut self,
-        quadratic: &Quadratic16<S>,
-        of: mask32x16<S>,
-        inside: &[Linear16<S>],
-        width: f32x16<S>,
-        origin: [f32x16<S>; 2],
-    ) {
+    fn line_on_round_sides(&mut self, line: &Linear16<S>, matters: impl Fn(f32x16<S>, f32x16<S>) -> mask32x16<S>) {
+        let Some(RoundSides { width, origin }) = self.round else { return };
+        let zero = line.c.token().splat_f32x16(0.0);
+        let (b, c) = (line.y, line.c - (origin[0] * line.x + origin[1] * line.y));
+        for width in width {
+            let a = width * line.x;
+            let length2 = a * a + b * b;
+            let square = length2 - c * c;
+            let root = square.max(zero).sqrt();
+            for root in [root, -root] {
+                let (cos, sin) = (-(a * c + b * root) / length2, (a * root - b * c) / length2);
+                let (x, y) = (width * cos - origin[0], sin - origin[1]);
+                let is = square.simd_gt(zero) & cos.simd_ge(zero) & matters(x, y);
+                if is.any_true() {
+                    self.tell_if(y, is);
+                }
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn on_side(&mut self, quadratic: &Quadratic16<S>, of: mask32x16<S>, width: f32x16<S>, origin: [f32x16<S>; 2]) {
         let simd = width.token();
         let zero = simd.splat_f32x16(0.0);
         let mut before = zero;
@@ -135,12 +149,8 @@ impl<S: Simd> Breaks<'_, S> {
                         quadratic.at(x, y)
                     },
                 );
-                let [x, y] = on_arc(root, from, width, origin);
-                let mut is = changes;
-                for line in inside {
-                    is &= line.at(x, y).simd_ge((line.c.abs() + line.x.abs() + line.y.abs()) * -1e-3);
-                }
-                self.tell_if(y, is);
+                let [_, y] = on_arc(root, from, width, origin);
+                self.tell_if(y, changes);
             }
             before = here;
         }
@@ -155,9 +165,11 @@ impl<S: Simd> Breaks<'_, S> {
                 let y = -(p.c + x * p.x) / p.y;
                 self.tell_if(y, is_inside(lines, x, y, [i, i]));
             }
-            if self.round.is_some() {
-                self.on_round_sides(&Quadratic16::line(p), self.of, lines);
-            }
+            self.line_on_round_sides(
+                p,
+                #[inline(always)]
+                |x, y| is_inside(lines, x, y, [i, i]),
+            );
         }
         for (i, j) in [(0, 1), (0, 2), (0, 3), (0, 4), (1, 2), (2, 3), (3, 4), (4, 1)] {
             let (p, q) = (&lines[i], &lines[j]);
@@ -175,9 +187,11 @@ impl<S: Simd> Breaks<'_, S> {
         for x in self.straight() {
             self.tell_if(-(line.c + x * line.x) / line.y, all);
         }
-        if self.round.is_some() {
-            self.on_round_sides(&Quadratic16::line(line), all, &[]);
-        }
+        self.line_on_round_sides(
+            line,
+            #[inline(always)]
+            |_, _| all,
+        );
     }
 }
 

@@ -160,8 +160,7 @@ impl CutBlock {
     }
 
     /// The numbers of the first column, the last, the first row, and the last.
-    pub const SIDES: [usize; 4] =
-        [MOMENTS * POWERS, MOMENTS * POWERS + 1, MOMENTS * POWERS + 2, MOMENTS * POWERS + 3];
+    pub const SIDES: [usize; 4] = [MOMENTS * POWERS, MOMENTS * POWERS + 1, MOMENTS * POWERS + 2, MOMENTS * POWERS + 3];
 }
 
 impl Block for CutBlock {
@@ -309,7 +308,13 @@ fn sum<S: Simd, const N: usize>(
 /// last coefficient, or, where that is 0 by chance, as the square of the one before; what nodes miss is the third power
 /// of that, where it is small beside the sum. To be called within `vectorize`.
 #[inline(always)]
-pub(crate) fn coarse<S: Simd>(simd: S, lobe: &Lobe, falloff: AreaWeight, members: &Members<ViewBlock>, cells: &[Cell]) -> Fits {
+pub(crate) fn coarse<S: Simd>(
+    simd: S,
+    lobe: &Lobe,
+    falloff: AreaWeight,
+    members: &Members<ViewBlock>,
+    cells: &[Cell],
+) -> Fits {
     let (values, area) = values(simd, &COARSE, lobe, falloff, members, cells);
     let mut fits = Fits::default();
     let moments = lobe.moment_count();

@@ -184,7 +184,13 @@ pub(crate) fn cut<S: Simd>(
 }
 
 #[inline(always)]
-fn breaks<S: Simd>(simd: S, blocked: &Blocked, members: &Members<ViewBlock>, cells: &[Cell], rows: &mut Vec<LaneNumbers>) {
+fn breaks<S: Simd>(
+    simd: S,
+    blocked: &Blocked,
+    members: &Members<ViewBlock>,
+    cells: &[Cell],
+    rows: &mut Vec<LaneNumbers>,
+) {
     use ViewNumber::*;
     let side = |end: usize| std::array::from_fn::<f32, LANES, _>(|k| cells[k.min(cells.len() - 1)].x[end]);
     let x = [f32x16::simd_from(simd, side(0)), f32x16::simd_from(simd, side(1))];

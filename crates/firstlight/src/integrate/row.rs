@@ -116,13 +116,6 @@ impl<S: Simd> Quadratic16<S> {
         }
     }
 
-    /// What is linear over the light.
-    #[inline(always)]
-    pub(super) fn line(line: &Linear16<S>) -> Self {
-        let zero = line.c.token().splat_f32x16(0.0);
-        Quadratic16 { c: line.c, x: line.x * 0.5, y: line.y * 0.5, xx: zero, xy: zero, yy: zero }
-    }
-
     /// The square of what is linear over the light.
     #[inline(always)]
     pub fn square(line: &Linear16<S>) -> Self {

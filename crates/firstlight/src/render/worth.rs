@@ -4,7 +4,7 @@
 use crate::integrate::{Arrived, Illumination};
 
 /// A cell of a light, or a panel, takes as long as so many points.
-const POINTS: f32 = 20.0;
+const POINTS: f32 = 15.0;
 /// So many rays tell.
 const HEARD: f32 = 8.0;
 /// The part of what was heard that counts when more is heard.
