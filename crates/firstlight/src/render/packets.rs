@@ -181,12 +181,14 @@ impl BlockSums {
         let mut sums = BlockSums::default();
         let (mut lit, mut hidden) = (0u16, 0u16);
         let mut moments = [[zero; 2]; MOMENTS];
+        let kinds = || (0..MOMENTS).filter(|k| unit[*k] > 0.0);
         for tally in tallies {
             let block = tally.block(number);
             (lit, hidden) = (lit | block.lit(), hidden | block.hides);
             let is_mixed = block.hides != 0 && block.hides != block.sends;
-            for (k, sent) in block.lanes(simd).into_iter().enumerate() {
-                let sent = sent * unit[k];
+            let sent = block.lanes(simd);
+            for k in kinds() {
+                let sent = sent[k] * unit[k];
                 moments[k][0] += sent;
                 moments[k][1] += sent * sent;
                 if is_mixed {
@@ -202,9 +204,10 @@ impl BlockSums {
         }
         let [lit, hidden] = [spread(lit, width), spread(hidden, width)];
         let (per_packet, count) = (1.0 / width as f32, 1.0 / (width * tallies.len()) as f32);
-        for (k, moments) in moments.into_iter().enumerate() {
-            let [sum, square] = moments.map(|moment| sum_of_runs(simd, moment, width));
-            if lit & hidden != 0 {
+        for k in kinds() {
+            let [sum, square] = moments[k].map(|moment| sum_of_runs(simd, moment, width));
+            // One ray has packets of its own
+            if lit & hidden != 0 && tallies.len() > 1 {
                 let square = only(simd, lit & hidden, sum * sum);
                 sums.together[k] = total(square) * per_packet;
                 sums.together_squared[k] = total(square * square) * per_packet;
