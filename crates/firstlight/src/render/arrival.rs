@@ -9,7 +9,6 @@ use super::Counts;
 use super::change::{Arrival, Change, change, horizon_change, unseen};
 use super::ladder::Asker as LadderAsker;
 use super::lights::Lights;
-use super::resolve::LightTerm;
 use super::sampled::Sampled;
 use super::tally::Tally;
 use super::together::Together;
@@ -223,20 +222,6 @@ impl<'a> Arrivals<'a> {
     pub fn place<'p>(&self, index: usize, si: &'p SurfaceInteraction, bsdf: &'p Bsdf) -> ArrivalPlace<'p> {
         let base = self.scene.ambient * bsdf.ambient;
         ArrivalPlace::point(si, &bsdf.lobe, base, self.scale(index), bsdf.colors)
-    }
-
-    /// What light `index` sends to one point, which stands for `share` of a pixel, but for the light's scale.
-    pub fn at_point(
-        &mut self,
-        index: usize,
-        si: &SurfaceInteraction,
-        bsdf: &Bsdf,
-        share: f32,
-        counts: &mut Counts,
-    ) -> LightTerm {
-        let place = ArrivalPlace { share, ..self.place(index, si, bsdf) };
-        let sums = self.arrival(index, &place, counts).sums;
-        place.reflected.each(&sums)
     }
 
     fn view(&self, emitter: &Emitter, place: &ArrivalPlace) -> Option<FlatView> {

@@ -8,7 +8,7 @@ use super::{ANYTHING, INTEGRALS, Many, Single, Stored};
 use crate::color::Rgb;
 use crate::light::Sent;
 use crate::material::{Lobe, Moments};
-use crate::render::arrival::Arrivals;
+use crate::render::arrival::{ArrivalPlace, Arrivals};
 use crate::render::change::BEND;
 use crate::render::counts::Counts;
 use crate::render::fence::Fence;
@@ -42,6 +42,7 @@ impl<'a> Many<'a> {
         let mut fence = std::mem::take(&mut self.fence);
         let mut doubts = std::mem::take(&mut self.doubts);
         terms.clear();
+        let (mut rays, mut found) = (Vec::new(), Vec::new());
         let mut together = Sent::BLACK;
         for number in pixel {
             let patch = &patches.all[number];
@@ -65,17 +66,22 @@ impl<'a> Many<'a> {
                 continue;
             }
             arrivals.tolerate(INTEGRALS / (doubts.len() as f32).sqrt());
-            patch.for_each(scene, fragments, |si, bsdf| {
-                for doubt in &doubts {
-                    match doubt.single {
-                        Some(i) => {
-                            let light = self.singles[i as usize].light;
-                            terms.push((light, arrivals.at_point(light as usize, si, bsdf, 1.0, counts)));
-                        }
-                        None => together += bsdf.colors * self.sent_at(stored, &mut fence, si, &bsdf.lobe),
+            rays.clear();
+            patch.for_each(scene, fragments, |si, bsdf| rays.push((*si, *bsdf)));
+            for doubt in &doubts {
+                let Some(i) = doubt.single else {
+                    for (si, bsdf) in &rays {
+                        together += bsdf.colors * self.sent_at(stored, &mut fence, si, &bsdf.lobe);
                     }
-                }
-            });
+                    continue;
+                };
+                let light = self.singles[i as usize].light;
+                let places: Vec<ArrivalPlace> =
+                    rays.iter().map(|(si, bsdf)| arrivals.place(light as usize, si, bsdf)).collect();
+                arrivals.arrivals(light as usize, &places, &mut found, counts);
+                let sums = found.iter().map(|arrival| arrival.sums);
+                terms.extend(places.iter().zip(sums).map(|(place, sums)| (light, place.reflected.each(&sums))));
+            }
         }
         // In scene order
         terms.sort_by_key(|(light, _)| *light);
