@@ -131,6 +131,11 @@ impl<'a> AskedLeaves<'a> {
         !halves.is_empty()
     }
 
+    /// The area of the light that one of the largest leaves is.
+    pub fn leaf(&self) -> f32 {
+        self.asker.area.measure() as f32 / (1u64 << self.everywhere) as f32
+    }
+
     /// Whether all leaves are of one size.
     pub fn is_even(&self) -> bool {
         self.leaves.count() == 1 << self.everywhere

@@ -11,7 +11,7 @@ use super::arrival::{ArrivalPlace, Arrivals, Sighting};
 use super::asking::{AskedLeaves, Asking, EVENLY, MOST, largest, parts};
 use super::evidence::{Evidence, Met};
 use super::ladder::{FIRST, LAST};
-use super::packets::{Packets, of_edge};
+use super::packets::{Edge, Packets, of_edge};
 use super::resolve::LightTerm;
 use super::tally::Tally;
 use crate::color::Rgb;
@@ -302,13 +302,10 @@ impl Together {
         counts: &mut Counts,
     ) -> Evidence {
         let asker = arrivals.asker(self.light);
-        let measure = asker.area.stands_for();
-        let wanted = POINTS * self.share.sqrt();
         let begin = BEGIN / (arrivals.scene.tolerance() as f32).sqrt();
         let first = (begin * self.share.sqrt() / asking.len() as f32) as usize;
         let first = first.next_power_of_two().clamp(FIRST, LAST);
         let tolerance = arrivals.tolerance_by_chance(self.share) * self.room;
-        let part = 1.0 / self.rays as f32;
         let mut is_tried = false;
         let mut evidence = Evidence::new(asking[0].si.p);
         let mut asked = AskedLeaves::new(asker, first, asking, counts);
@@ -316,85 +313,32 @@ impl Together {
         let (mut is_plain, mut is_halved) = (true, true);
         loop {
             asking.iter_mut().for_each(|one| one.tally.sum(asker.level, &asked.leaves));
-            let shares = parts(asking, |tally| &tally.lit);
-            let mut value = self.value + self.others * self.rays as f32;
-            // What would arrive if nothing were in the way, of each kind; by how many effective points that is told,
-            // and how many send anything
-            let mut all = [Rgb::BLACK; MOMENTS];
-            let (mut effective, mut sending, mut is_hidden) = ([0.0; MOMENTS], 0.0, false);
-            // That of rays whose points find less than half of it
-            let mut missing = [Rgb::BLACK; MOMENTS];
-            for one in asking.iter() {
-                let sent = one.sent(measure);
-                value += one.color(&one.tally.arrives(&sent, &shares));
-                for (k, (color, points)) in one.each(&sent).0.into_iter().zip(one.tally.effective()).enumerate() {
-                    all[k] += color;
-                    effective[k] += points;
-                    if one.tally.all[k] as f32 * measure < 0.5 * sent.0[k] {
-                        missing[k] += color;
-                    }
-                }
-                sending += one.tally.effective_sending();
-                is_hidden |= one.tally.hidden > 0.0;
-            }
-            let met = Met {
-                points: effective.map(|points| points as f32),
-                surprises: parts(asking, |tally| &tally.surprises),
-            };
-            evidence.note(asked.everywhere, met);
-            let steps = arrivals.display_steps();
-            let shows = |error: Rgb| steps.of_color(value * part, error * part);
-            // What few points send, or none, can be off by what some of them do
-            let sum = |of: &dyn Fn(usize) -> Rgb| (1..MOMENTS).fold(of(0), |sum, k| sum + of(k));
-            let least = |k: usize| if k == 0 { TOLD.max(sending * UNEVEN) } else { TOLD };
-            let one = |k: usize| all[k] * (1.0 / effective[k].max(1.0) as f32);
-            let untold = |k: usize| if effective[k] < least(k) { all[k].min(one(k) * FEW) } else { missing[k] };
-            let is_told = shows(sum(&untold)) <= tolerance * UNTOLD;
-            let found = effective.iter().copied().fold(0.0, f64::max);
-            // What none of so many points meets may hide what one of them sends
-            let is_clear = found >= f64::from(wanted) * CLEAR && shows(sum(&one)) <= UNMET;
-            // As much as packets are wrong by, and what nobody met. Of small things that are in the way each point says
-            // what it sends; where leaves near those that were found are smaller, all that were not found are missing
-            let tallies: Vec<&Tally> = asking.iter().map(|one| &one.tally).collect();
-            let new = asked.take_new();
-            let packets = packets.get_or_insert_with(|| Packets::new(Together::sent(asking, measure)));
-            packets.hear(asker.level, &tallies, &asked.leaves, &new);
-            let found = (!is_plain).then(|| Together::found(asking, measure));
-            let packets = packets.errors(&tallies, &asked.leaves, found, all.map(largest));
-            let leaf = asker.area.measure() as f32 / (1u64 << asked.everywhere) as f32;
-            let met: [f32; MOMENTS] = std::array::from_fn(|k| evidence.overlooked(k, around, leaf));
-            let smooth = shows(sum(&|k| all[k] * packets.smooth[k]));
-            let noise = |k: usize| (met[k] / effective[k].max(1.0) as f32).sqrt();
-            let overlooked = OVERLOOKED * shows(sum(&|k| all[k] * met[k]));
-            let unmet = shows(sum(&|k| all[k] * noise(k).max(packets.smooth[k])));
-            let unmet = if asked.is_even() { unmet } else { unmet.max(overlooked) };
-            let edges = shows(sum(&|k| all[k] * packets.edges[k]));
+            let said = self.said(asking, is_plain, asker.area.stands_for());
+            evidence.note(asked.everywhere, said.met);
+            let packets = packets.get_or_insert_with(|| Packets::new(said.sent));
+            let wrong = self.wrong(&said, packets, (around, &evidence), &mut asked, asking, arrivals);
             let points = asked.leaves.count() * asking.len();
             let allowed = tolerance * self.deviation(points as f32 / begin);
-            let error = (edges * edges + unmet * unmet).sqrt();
-            let is_lit = !is_hidden && (is_clear || asked.leaves.count() >= MANY);
-            let is_dark = shares.iter().all(|share| *share == 0.0) && points >= ALL_HIDDEN;
+            let is_told = said.shows(arrivals, &|k| said.untold(k)) <= tolerance * UNTOLD;
+            let is_lit = !said.is_hidden && (self.is_clear(&said, arrivals) || asked.leaves.count() >= MANY);
+            let is_dark = said.shares.iter().all(|share| *share == 0.0) && points >= ALL_HIDDEN;
             let is_last = points >= MOST || !is_halved;
-            let is_enough = is_last || is_told && (is_lit || is_dark || error <= allowed);
+            let is_enough = is_last || is_told && (is_lit || is_dark || wrong.error() <= allowed);
             // Points are taken at their word for what would arrive if nothing were in the way, if they cannot miss any
             // of it
-            let is_wanted = is_enough || (!is_told || smooth > allowed) && (edges <= allowed || points >= EVENLY);
-            if is_plain && is_wanted {
-                let apart = asker.area.extent() / (points as f32).sqrt();
-                let is_unseen = |k: usize| effective[k] < least(k) && asking.iter().any(|one| one.reflects(k));
-                let is_near = asking.iter().any(|one| !arrivals.varies_over(self.light, &one.place(self.each), apart));
-                if smooth > allowed || is_near || (0..MOMENTS).any(is_unseen) {
-                    self.ask_wholes(asking, arrivals);
-                    is_plain = false;
-                    continue;
-                }
+            let is_wanted =
+                is_enough || (!is_told || wrong.smooth > allowed) && (wrong.edges <= allowed || points >= EVENLY);
+            if is_plain && is_wanted && (wrong.smooth > allowed || self.may_miss(&said, points, asking, arrivals)) {
+                self.ask_wholes(asking, arrivals);
+                is_plain = false;
+                continue;
             }
             if is_enough {
                 arrivals.took(self.light, asking.len(), points);
                 return evidence;
             }
             // Errors shrink as they do where an edge is
-            if !is_tried && error * of_edge(MOST as f64) > allowed * of_edge(points as f64) {
+            if !is_tried && wrong.error() * of_edge(MOST as f64) > allowed * of_edge(points as f64) {
                 is_tried = true;
                 let places: Vec<_> = asking.iter().map(|one| one.place(self.each)).collect();
                 let known = arrivals.in_closed_form(self.light, &places, counts);
@@ -404,10 +348,96 @@ impl Together {
                 }
             }
             // More everywhere as long as there is room for more near edges
-            let is_raised = !is_told || unmet.max(overlooked) > allowed || !asked.is_raised;
-            let is_raised = is_raised && (4 * points <= MOST || edges <= allowed);
-            is_halved = asked.halve(&packets.near, is_raised, is_told, asking, counts);
+            let is_raised = !is_told || wrong.unmet.max(wrong.overlooked) > allowed || !asked.is_raised;
+            let is_raised = is_raised && (4 * points <= MOST || wrong.edges <= allowed);
+            is_halved = asked.halve(&wrong.near, is_raised, is_told, asking, counts);
         }
+    }
+
+    /// What points of all rays say of a light of such a measure, and, where `is_plain`, what would arrive if nothing
+    /// were in the way.
+    fn said(&self, asking: &[Asking], is_plain: bool, measure: f32) -> Said {
+        let shares = parts(asking, |tally| &tally.lit);
+        let value = self.value + self.others * self.rays as f32;
+        let surprises = parts(asking, |tally| &tally.surprises);
+        let mut said = Said {
+            part: 1.0 / self.rays as f32,
+            value,
+            shares,
+            all: [Rgb::BLACK; MOMENTS],
+            missing: [Rgb::BLACK; MOMENTS],
+            effective: [0.0; MOMENTS],
+            sending: 0.0,
+            is_hidden: false,
+            sent: [0.0; MOMENTS],
+            found: None,
+            met: Met { points: [0.0; MOMENTS], surprises },
+        };
+        for one in asking {
+            let sent = one.sent(measure);
+            said.value += one.color(&one.tally.arrives(&sent, &shares));
+            for (k, (color, points)) in one.each(&sent).0.into_iter().zip(one.tally.effective()).enumerate() {
+                said.all[k] += color;
+                said.effective[k] += points;
+                said.sent[k] += sent.0[k];
+                if one.tally.all[k] as f32 * measure < 0.5 * sent.0[k] {
+                    said.missing[k] += color;
+                }
+            }
+            said.sending += one.tally.effective_sending();
+            said.is_hidden |= one.tally.hidden > 0.0;
+        }
+        said.sent = said.sent.map(|sent| sent / measure);
+        let found = |k: usize| asking.iter().map(|one| one.tally.all[k]).sum::<f64>() as f32 / said.sent[k];
+        said.found = (!is_plain).then(|| std::array::from_fn(found));
+        said.met.points = said.effective.map(|points| points as f32);
+        said
+    }
+
+    /// How far off that may be, by their packets and by what points of these and those around met.
+    fn wrong(
+        &self,
+        said: &Said,
+        packets: &mut Packets,
+        (around, evidence): (&[&Evidence], &Evidence),
+        asked: &mut AskedLeaves,
+        asking: &[Asking],
+        arrivals: &Arrivals,
+    ) -> Wrong {
+        let tallies: Vec<&Tally> = asking.iter().map(|one| &one.tally).collect();
+        let new = asked.take_new();
+        packets.hear(arrivals.level(), &tallies, &asked.leaves, &new);
+        let packets = packets.errors(&tallies, &asked.leaves, said.found, said.all.map(largest));
+        let leaf = asked.leaf();
+        let met: [f32; MOMENTS] = std::array::from_fn(|k| evidence.overlooked(k, around, leaf));
+        let shows = |part: &dyn Fn(usize) -> f32| said.shows(arrivals, &|k| said.all[k] * part(k));
+        // As much as packets are wrong by, and what nobody met. Of small things that are in the way each point says
+        // what it sends; where leaves near those that were found are smaller, all that were not found are missing
+        let noise = |k: usize| (met[k] / said.effective[k].max(1.0) as f32).sqrt();
+        let overlooked = OVERLOOKED * shows(&|k| met[k]);
+        let unmet = shows(&|k| noise(k).max(packets.smooth[k]));
+        Wrong {
+            edges: shows(&|k| packets.edges[k]),
+            smooth: shows(&|k| packets.smooth[k]),
+            unmet: if asked.is_even() { unmet } else { unmet.max(overlooked) },
+            overlooked,
+            near: packets.near,
+        }
+    }
+
+    /// Whether enough points are asked to find what is in the way: what none of so many meets may hide what one of them
+    /// sends.
+    fn is_clear(&self, said: &Said, arrivals: &Arrivals) -> bool {
+        let found = said.effective.iter().copied().fold(0.0, f64::max);
+        found >= f64::from(POINTS * self.share.sqrt()) * CLEAR && said.shows(arrivals, &|k| said.one(k)) <= UNMET
+    }
+
+    /// Whether so many points may miss some of what would arrive if nothing were in the way.
+    fn may_miss(&self, said: &Said, points: usize, asking: &[Asking], arrivals: &Arrivals) -> bool {
+        let apart = arrivals.asker(self.light).area.extent() / (points as f32).sqrt();
+        let is_unseen = |k: usize| said.effective[k] < said.least(k) && asking.iter().any(|one| one.reflects(k));
+        (0..MOMENTS).any(is_unseen)
+            || asking.iter().any(|one| !arrivals.varies_over(self.light, &one.place(self.each), apart))
     }
 
     /// How many times what is allowed by chance these rays may deviate by, after so many times the first points.
@@ -422,15 +452,67 @@ impl Together {
         let wholes = arrivals.wholes(self.light, &places);
         asking.iter_mut().zip(wholes).for_each(|(one, whole)| one.whole = Some(whole));
     }
+}
 
-    /// What would arrive at all rays if nothing were in the way, in the unit of points.
-    fn sent(asking: &[Asking], measure: f32) -> [f32; MOMENTS] {
-        std::array::from_fn(|k| asking.iter().map(|one| one.sent(measure).0[k]).sum::<f32>() / measure)
+/// What points of a light say, of all rays of a patch together, and of each kind.
+struct Said {
+    /// One over the rays of the patch.
+    part: f32,
+    /// All that is there.
+    value: Rgb,
+    /// Which parts of what would arrive if nothing were in the way do, that, and that of rays whose points find less
+    /// than half of it.
+    shares: [f32; MOMENTS],
+    all: [Rgb; MOMENTS],
+    missing: [Rgb; MOMENTS],
+    /// By how many effective points that is told, and how many send anything.
+    effective: [f64; MOMENTS],
+    sending: f64,
+    is_hidden: bool,
+    /// What would arrive, in the unit of points, and the part of it that they find, if they do not tell themselves.
+    sent: [f32; MOMENTS],
+    found: Option<[f32; MOMENTS]>,
+    met: Met,
+}
+
+impl Said {
+    /// How many display steps an error makes, which is so much of each kind.
+    fn shows(&self, arrivals: &Arrivals, error: &dyn Fn(usize) -> Rgb) -> f32 {
+        let sum = (1..MOMENTS).fold(error(0), |sum, k| sum + error(k));
+        arrivals.steps(self.value * self.part, sum * self.part)
     }
 
-    /// The part of that which points find.
-    fn found(asking: &[Asking], measure: f32) -> [f32; MOMENTS] {
-        let sent = Together::sent(asking, measure);
-        std::array::from_fn(|k| asking.iter().map(|one| one.tally.all[k]).sum::<f64>() as f32 / sent[k])
+    /// How many effective points tell something of a kind of light.
+    fn least(&self, k: usize) -> f64 {
+        if k == 0 { TOLD.max(self.sending * UNEVEN) } else { TOLD }
+    }
+
+    /// What one of the points sends.
+    fn one(&self, k: usize) -> Rgb {
+        self.all[k] * (1.0 / self.effective[k].max(1.0) as f32)
+    }
+
+    /// What few points send, or none, can be off by what some of them do.
+    fn untold(&self, k: usize) -> Rgb {
+        if self.effective[k] < self.least(k) { self.all[k].min(self.one(k) * FEW) } else { self.missing[k] }
+    }
+}
+
+/// In display steps: how far off what points say may be.
+struct Wrong {
+    /// By edges that they see, by what varies, by that and what they did not meet yet, and by what is overlooked in
+    /// leaves that stay as they are.
+    edges: f32,
+    smooth: f32,
+    unmet: f32,
+    overlooked: f32,
+    /// Where edges are.
+    near: Vec<Edge>,
+}
+
+impl Wrong {
+    /// All in all.
+    fn error(&self) -> f32 {
+        (self.edges * self.edges + self.unmet * self.unmet).sqrt()
     }
 }
