@@ -264,11 +264,11 @@ impl ViewBlock {
 }
 
 /// Numbers of sixteen things, which lie in its lanes.
-pub(crate) trait Block {
+pub(crate) trait LaneBlock {
     fn numbers(&self) -> &[LaneNumbers];
 }
 
-impl Block for ViewBlock {
+impl LaneBlock for ViewBlock {
     #[inline(always)]
     fn numbers(&self) -> &[LaneNumbers] {
         &self.0
@@ -285,7 +285,7 @@ pub(crate) struct Members<'a, B> {
     in_line: bool,
 }
 
-impl<'a, B: Block> Members<'a, B> {
+impl<'a, B: LaneBlock> Members<'a, B> {
     /// As many as are asked, of these numbers, counted through all blocks; the last stands for what is missing.
     #[inline(always)]
     pub fn new(blocks: &'a [B], count: usize, number: impl Fn(usize) -> u32) -> Self {

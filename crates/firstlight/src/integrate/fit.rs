@@ -9,7 +9,7 @@
 
 use fearless_simd::{f32x16, prelude::*};
 
-use super::batch::{Block, Exact, LaneNumbers, Linear16, Members, ViewBlock, ViewNumber, Views, ways};
+use super::batch::{Exact, LaneBlock, LaneNumbers, Linear16, Members, ViewBlock, ViewNumber, Views, ways};
 use crate::material::Lobe;
 use crate::math::{LANES, sin_cos};
 
@@ -148,8 +148,8 @@ pub(crate) struct Fits {
 /// How many numbers of a polynomial along both axes.
 const POWERS: usize = NODES * NODES;
 
-/// What is kept of sixteen cells that are seen in part: the antiderivatives along x of what they send, moment by moment,
-/// and from where to where they go.
+/// What is kept of sixteen cells that are seen in part: the antiderivatives along x of what they send, moment by
+/// moment, and from where to where they go.
 #[derive(Clone, Debug)]
 pub(crate) struct CutBlock([LaneNumbers; MOMENTS * POWERS + 4]);
 
@@ -163,7 +163,7 @@ impl CutBlock {
     pub const SIDES: [usize; 4] = [MOMENTS * POWERS, MOMENTS * POWERS + 1, MOMENTS * POWERS + 2, MOMENTS * POWERS + 3];
 }
 
-impl Block for CutBlock {
+impl LaneBlock for CutBlock {
     #[inline(always)]
     fn numbers(&self) -> &[LaneNumbers] {
         &self.0
@@ -332,8 +332,8 @@ pub(crate) fn coarse<S: Simd>(
 }
 
 /// The fit of up to sixteen cells, which can be wrong by so much of the end of its series, and by more where the series
-/// falls slowly, which says less of what comes after its end. With `kept`, that is what is kept of cells that are seen in
-/// part. To be called within `vectorize`.
+/// falls slowly, which says less of what comes after its end. With `kept`, that is what is kept of cells that are seen
+/// in part. To be called within `vectorize`.
 #[inline(always)]
 pub(crate) fn fit<S: Simd>(
     simd: S,

@@ -356,11 +356,11 @@ impl Together {
 
     /// What points of all rays say of a light of such a measure, and, where `is_plain`, what would arrive if nothing
     /// were in the way.
-    fn said(&self, asking: &[Asking], is_plain: bool, measure: f32) -> Said {
+    fn said(&self, asking: &[Asking], is_plain: bool, measure: f32) -> PointsSaid {
         let shares = parts(asking, |tally| &tally.lit);
         let value = self.value + self.others * self.rays as f32;
         let surprises = parts(asking, |tally| &tally.surprises);
-        let mut said = Said {
+        let mut said = PointsSaid {
             part: 1.0 / self.rays as f32,
             value,
             shares,
@@ -397,7 +397,7 @@ impl Together {
     /// How far off that may be, by their packets and by what points of these and those around met.
     fn wrong(
         &self,
-        said: &Said,
+        said: &PointsSaid,
         packets: &mut Packets,
         (around, evidence): (&[&Evidence], &Evidence),
         asked: &mut AskedLeaves,
@@ -427,13 +427,13 @@ impl Together {
 
     /// Whether enough points are asked to find what is in the way: what none of so many meets may hide what one of them
     /// sends.
-    fn is_clear(&self, said: &Said, arrivals: &Arrivals) -> bool {
+    fn is_clear(&self, said: &PointsSaid, arrivals: &Arrivals) -> bool {
         let found = said.effective.iter().copied().fold(0.0, f64::max);
         found >= f64::from(POINTS * self.share.sqrt()) * CLEAR && said.shows(arrivals, &|k| said.one(k)) <= UNMET
     }
 
     /// Whether so many points may miss some of what would arrive if nothing were in the way.
-    fn may_miss(&self, said: &Said, points: usize, asking: &[Asking], arrivals: &Arrivals) -> bool {
+    fn may_miss(&self, said: &PointsSaid, points: usize, asking: &[Asking], arrivals: &Arrivals) -> bool {
         let apart = arrivals.asker(self.light).area.extent() / (points as f32).sqrt();
         let is_unseen = |k: usize| said.effective[k] < said.least(k) && asking.iter().any(|one| one.reflects(k));
         (0..MOMENTS).any(is_unseen)
@@ -455,7 +455,7 @@ impl Together {
 }
 
 /// What points of a light say, of all rays of a patch together, and of each kind.
-struct Said {
+struct PointsSaid {
     /// One over the rays of the patch.
     part: f32,
     /// All that is there.
@@ -475,7 +475,7 @@ struct Said {
     met: Met,
 }
 
-impl Said {
+impl PointsSaid {
     /// How many display steps an error makes, which is so much of each kind.
     fn shows(&self, arrivals: &Arrivals, error: &dyn Fn(usize) -> Rgb) -> f32 {
         let sum = (1..MOMENTS).fold(error(0), |sum, k| sum + error(k));
