@@ -172,7 +172,7 @@ impl LaneBlock for CutBlock {
 
 /// The sides of up to sixteen cells: the first column, the last, the first row, and the last.
 #[inline(always)]
-fn sides(cells: &[Cell]) -> [LaneNumbers; 4] {
+pub(super) fn sides(cells: &[Cell]) -> [LaneNumbers; 4] {
     let mut sides = [[0.0; LANES]; 4];
     for k in 0..LANES {
         let Cell { x, y, .. } = &cells[k.min(cells.len() - 1)];

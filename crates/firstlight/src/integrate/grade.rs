@@ -6,7 +6,7 @@ use std::f32::consts::FRAC_PI_2;
 use fearless_simd::{f32x16, mask32x16, prelude::*};
 
 use super::batch::{LaneNumbers, Linear16, Members, ShadingPoint, ViewBlock, ViewNumber, Views, ways};
-use super::fit::Cell;
+use super::fit::{Cell, sides};
 use super::tolerance::Tolerance;
 use super::view::Outline;
 use crate::material::Lobe;
@@ -112,11 +112,7 @@ pub(super) fn grade<S: Simd>(
 ) -> Grades {
     use ViewNumber::*;
     let zero = simd.splat_f32x16(0.0);
-    let mut sides = [[0.0f32; LANES]; 4];
-    for (k, cell) in cells.iter().enumerate() {
-        (sides[0][k], sides[1][k], sides[2][k], sides[3][k]) = (cell.x[0], cell.x[1], cell.y[0], cell.y[1]);
-    }
-    let [u0, u1, v0, v1] = sides.map(|side| f32x16::simd_from(simd, side));
+    let [u0, u1, v0, v1] = sides(cells).map(|side| f32x16::simd_from(simd, side));
     let ([x0, x1], [y0, y1]) = match outline {
         Outline::Parallelogram | Outline::Disk => ([u0, u1], [v0, v1]),
         Outline::Sphere => around(simd, [u0, u1], [v0, v1]),

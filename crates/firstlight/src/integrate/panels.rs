@@ -15,7 +15,7 @@ use fearless_simd::{f32x16, mask32x16, prelude::*};
 use super::batch::{Exact, LaneNumbers, Members, ViewBlock, ViewNumber, Views, ways};
 use super::breaks::{Breaks, RoundSides};
 use super::cut::{self, BallCut, Half};
-use super::fit::{Cell, CutBlock, MOMENTS};
+use super::fit::{Cell, CutBlock, MOMENTS, sides};
 use super::occluder::{Occluder, Shadow};
 use super::row::{FAR, Interval16};
 use super::view::Outline;
@@ -192,10 +192,8 @@ fn breaks<S: Simd>(
     rows: &mut Vec<LaneNumbers>,
 ) {
     use ViewNumber::*;
-    let side = |end: usize| std::array::from_fn::<f32, LANES, _>(|k| cells[k.min(cells.len() - 1)].x[end]);
-    let x = [f32x16::simd_from(simd, side(0)), f32x16::simd_from(simd, side(1))];
-    let row = |end: usize| std::array::from_fn::<f32, LANES, _>(|k| cells[k.min(cells.len() - 1)].y[end]);
-    let mut y = [f32x16::simd_from(simd, row(0)), f32x16::simd_from(simd, row(1))];
+    let [x0, x1, y0, y1] = sides(cells).map(|side| f32x16::simd_from(simd, side));
+    let (x, mut y) = ([x0, x1], [y0, y1]);
     let zero = simd.splat_f32x16(0.0);
     let (x, round) = match blocked.outline {
         Outline::Parallelogram => (x, None),
