@@ -51,11 +51,9 @@ pub(crate) struct ShadingPoint {
 }
 
 impl ShadingPoint {
-    /// Bounds what closed forms may ask, if anything does, by so much of what it was.
-    pub fn bound_by(&mut self, part: f32) {
-        if self.part_of_points < f32::INFINITY {
-            self.part_of_points *= part;
-        }
+    /// Whether points of the light would tell as well.
+    pub fn is_bounded(&self) -> bool {
+        self.part_of_points < f32::INFINITY
     }
 
     /// A point by itself that stands for a pixel, of a surface with this unit normal on the viewer's side; colours are

@@ -236,7 +236,7 @@ impl Evaluator {
         let first = arrived.len();
         self.look(level, light, points, arrived);
         let arrived = &mut arrived[first..];
-        let is_bounded = points.iter().any(|point| point.part_of_points < f32::INFINITY);
+        let is_bounded = points.iter().any(ShadingPoint::is_bounded);
         let mut round = 0;
         while !(self.smooth.is_empty()
             && self.whole.is_empty()

@@ -350,9 +350,10 @@ impl<'a> Arrivals<'a> {
             while let Some(place) = places.next_if(|place| place.lobe == lobe) {
                 self.points.push(place.point_of_surface());
             }
-            let first = arrived.len();
-            self.evaluator.evaluate(self.level, &asked, &self.points, arrived);
-            self.worth[index].hear_forms(true, &arrived[first..]);
+            let (level, evaluator) = (self.level, &mut self.evaluator);
+            self.worth[index].ask(&mut self.points, arrived, |points, arrived| {
+                evaluator.evaluate(level, &asked, points, arrived);
+            });
         }
     }
 
@@ -412,11 +413,8 @@ impl<'a> Arrivals<'a> {
             unreachable!("lights that are sampled have no cells")
         };
         let asked = Asked { near: near.then_some(&self.near), allowed: self.allowed, ..asked };
-        let worth = &mut self.worth[index];
-        let (part, first) = (worth.part(), arrived.len());
-        points.iter_mut().for_each(|point| point.bound_by(part));
-        self.evaluator.evaluate(self.level, &asked, points, arrived);
-        worth.hear_forms(part > 0.0, &arrived[first..]);
+        let (level, evaluator) = (self.level, &mut self.evaluator);
+        self.worth[index].ask(points, arrived, |points, arrived| evaluator.evaluate(level, &asked, points, arrived));
     }
 
     /// In display steps: how far one light may be wrong at a place that stands for such a share of a pixel, where the

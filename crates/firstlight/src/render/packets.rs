@@ -22,13 +22,13 @@ const MIXED: f32 = 0.044;
 const ALONE: f32 = 0.035;
 /// How many times more the square of that is, over a root of their effective number, where they are few: by chance, few
 /// packets say too little of how much they are off.
-const FEW: f32 = 20.0;
+const FEW: f32 = 14.0;
 /// The deviation of the share that n stratified points find behind an edge, times n^3/4.
 const EDGE: f32 = 0.46;
 /// How many times that of a packet is where its points do not lie in different parts of a cell.
 const APART: f32 = 3.5;
 /// How many times what varies smoothly counts: points of neighbours are wrong alike.
-const ALIKE: f32 = 2.0;
+const ALIKE: f32 = 2.3;
 /// An edge is looked for in so many packets around one that it runs through.
 const AROUND: usize = 4;
 

@@ -4,8 +4,6 @@
 //! stratified together: n rays need far fewer each than one that stands for all of them, and what one ray's points pass
 //! by, those of others meet. Their number grows until what they say together will do.
 
-use std::f32::consts::SQRT_2;
-
 use super::Counts;
 use super::arrival::{ArrivalPlace, Arrivals, Sighting};
 use super::asking::{AskedLeaves, Asking, EVENLY, MOST, largest, parts};
@@ -27,8 +25,8 @@ use crate::visibility::{ShadowView, Visibility};
 const DEVIATION: f32 = 1.25;
 const LONG: f32 = 2.0;
 const LONGEST: f32 = 4.0;
-/// How many times what is overlooked behind edges counts: it is off to one side everywhere.
-const OVERLOOKED: f32 = SQRT_2;
+/// The part of the deviation of as many random points that those of all rays have, which are stratified.
+const STRATIFIED: f32 = 0.5;
 /// The points of a pixel that are asked first, with a tolerance of 1; with others a root of it fewer.
 const BEGIN: f32 = 1024.0;
 /// Points that find what is in the way of a pixel.
@@ -413,8 +411,8 @@ impl Together {
         let shows = |part: &dyn Fn(usize) -> f32| said.shows(arrivals, &|k| said.all[k] * part(k));
         // As much as packets are wrong by, and what nobody met. Of small things that are in the way each point says
         // what it sends; where leaves near those that were found are smaller, all that were not found are missing
-        let noise = |k: usize| (met[k] / said.effective[k].max(1.0) as f32).sqrt();
-        let overlooked = OVERLOOKED * shows(&|k| met[k]);
+        let noise = |k: usize| STRATIFIED * (met[k] / said.effective[k].max(1.0) as f32).sqrt();
+        let overlooked = shows(&|k| met[k]);
         let unmet = shows(&|k| noise(k).max(packets.smooth[k]));
         Wrong {
             edges: shows(&|k| packets.edges[k]),

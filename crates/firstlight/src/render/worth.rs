@@ -1,7 +1,7 @@
 //! Whether rays behind things are asked closed forms for a light, or points of it at once: told by what rays of the
 //! same cell of pixels were asked before, and by the points that others took.
 
-use crate::integrate::{Arrived, Illumination};
+use crate::integrate::{Arrived, Illumination, ShadingPoint};
 
 /// A cell of a light, or a panel, takes as long as so many points.
 const POINTS: f32 = 15.0;
@@ -10,7 +10,7 @@ const HEARD: f32 = 8.0;
 /// The part of what was heard that counts when more is heard.
 const REMEMBERED: f32 = 0.9;
 /// The part of what was heard of closed forms that counts after places were asked none: one day they are asked again.
-const PASSED: f32 = 0.99;
+const PASSED: f32 = 0.97;
 /// How much more than is usual is asked where that pays.
 const MORE: f32 = 4.0;
 
@@ -24,8 +24,24 @@ pub(super) struct Worth {
 }
 
 impl Worth {
+    /// Has closed forms asked at some places, as far as that pays where points of the light would tell as well.
+    pub fn ask(
+        &mut self,
+        points: &mut [ShadingPoint],
+        arrived: &mut Vec<Arrived>,
+        ask: impl FnOnce(&[ShadingPoint], &mut Vec<Arrived>),
+    ) {
+        if !points.iter().all(ShadingPoint::is_bounded) {
+            return ask(points, arrived);
+        }
+        let (part, first) = (self.part(), arrived.len());
+        points.iter_mut().for_each(|point| point.part_of_points *= part);
+        ask(points, arrived);
+        self.hear_forms(part > 0.0, &arrived[first..]);
+    }
+
     /// The part of what is usual that closed forms may ask.
-    pub fn part(&self) -> f32 {
+    fn part(&self) -> f32 {
         let ([places, answered, asked], [rays, points]) = (self.forms, self.points);
         if places < HEARD || rays < HEARD {
             return 1.0;
@@ -34,7 +50,7 @@ impl Worth {
     }
 
     /// Hears what arrived at some places that were asked, or were not to be.
-    pub fn hear_forms(&mut self, is_asked: bool, arrived: &[Arrived]) {
+    fn hear_forms(&mut self, is_asked: bool, arrived: &[Arrived]) {
         let asked = || arrived.iter().filter(|one| is_asked && one.asked > 0);
         let places = asked().count();
         if is_asked && places == 0 {
