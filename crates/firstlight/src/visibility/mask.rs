@@ -83,14 +83,31 @@ impl ShadowView {
                 *hidden |= height.simd_lt(-wrong).to_bitmask() as u16;
             }
         }
-        for (c, cells) in target.cells.iter().enumerate() {
-            let first = c * LANES;
-            let hidden = &mut self.in_space[first..target.blocks.len().min(first + LANES)];
-            // Blocks of which something is asked, bit by bit
-            let mut open = 0;
-            for (i, hidden) in hidden.iter().enumerate() {
-                open |= u16::from(*hidden != 0xffff) << i;
+        // Blocks of which something is asked, sixteen at a time
+        let mut next = 0;
+        while next < target.blocks.len() {
+            let (mut places, mut count) = ([0u32; LANES], 0);
+            while count < LANES && next < target.blocks.len() {
+                places[count] = next as u32;
+                count += usize::from(self.in_space[next] != u16::MAX);
+                next += 1;
             }
+            let gathered;
+            let cells = match target.cells.get(places[0] as usize / LANES) {
+                Some(cells)
+                    if count == LANES
+                        && places[LANES - 1] - places[0] == LANES as u32 - 1
+                        && places[0] as usize % LANES == 0 =>
+                {
+                    cells
+                }
+                _ => {
+                    gathered = target.bounds_of(&places);
+                    &gathered
+                }
+            };
+            // Bit by bit
+            let mut open = ((1u32 << count) - 1) as u16;
             for triangle in &self.triangles {
                 if open == 0 {
                     break;
@@ -100,18 +117,18 @@ impl ShadowView {
                 while some != 0 {
                     let i = some.trailing_zeros() as usize % LANES;
                     some &= some - 1;
+                    let (block, hidden) = (&target.blocks[places[i] as usize], &mut self.in_space[places[i] as usize]);
                     if verdict.hidden >> i & 1 == 1 {
-                        hidden[i] = 0xffff;
+                        *hidden = u16::MAX;
                     } else {
-                        let block = &target.blocks[first + i];
                         let told = triangle.samples(simd, &block.at);
-                        let unsure = told.unsure & !hidden[i] & !told.hidden;
-                        hidden[i] |= told.hidden;
+                        let unsure = told.unsure & !*hidden & !told.hidden;
+                        *hidden |= told.hidden;
                         if unsure != 0 {
-                            hidden[i] |= by_kernel(simd, scene, target.light, triangle, block, point, unsure);
+                            *hidden |= by_kernel(simd, scene, target.light, triangle, block, point, unsure);
                         }
                     }
-                    open &= !(u16::from(hidden[i] == 0xffff) << i);
+                    open &= !(u16::from(*hidden == u16::MAX) << i);
                 }
             }
         }

@@ -276,6 +276,19 @@ impl Target {
         Target { blocks, ..self.without() }.bounded(level)
     }
 
+    /// Where sixteen of its blocks lie, by their numbers.
+    pub fn bounds_of(&self, blocks: &[u32; LANES]) -> BlockBounds {
+        let mut bounds = BlockBounds { middle: [[0.0; LANES]; 3], half: [[0.0; LANES]; 3] };
+        for (lane, block) in blocks.iter().enumerate() {
+            let (cells, place) = (&self.cells[*block as usize / LANES], *block as usize % LANES);
+            for axis in 0..3 {
+                bounds.middle[axis][lane] = cells.middle[axis][place];
+                bounds.half[axis][lane] = cells.half[axis][place];
+            }
+        }
+        bounds
+    }
+
     /// The same light without points.
     fn without(&self) -> Self {
         Target { light: self.light, hull: self.hull, blocks: Vec::new(), cells: Vec::new(), is_in_order: true }
