@@ -1,5 +1,7 @@
 //! Rays that ask points of a light, each in the same leaves of it.
 
+use fearless_simd::Level;
+
 use super::Counts;
 use super::arrival::ArrivalPlace;
 use super::beams::{self, RungRays};
@@ -72,8 +74,8 @@ pub(super) struct AskedLeaves<'a> {
     pub leaves: Leaves,
     /// How often the light was halved to make all of them, at least.
     pub everywhere: u32,
-    /// The numbers of blocks that were asked since they were last taken, some of them more than once.
-    new: Vec<u32>,
+    /// Which blocks were asked since they were last taken, by their numbers.
+    is_new: Vec<bool>,
     /// Whether all were halved once, so that it is known what first points overlook.
     pub is_raised: bool,
 }
@@ -83,8 +85,8 @@ impl<'a> AskedLeaves<'a> {
     pub fn new(asker: Asker<'a>, count: usize, asking: &mut [Asking], counts: &mut Counts) -> Self {
         let level = count.ilog2();
         let leaves = Leaves::of(level);
-        let new = leaves.order.clone();
-        let asked = AskedLeaves { asker, leaves, everywhere: level, new, is_raised: false };
+        let is_new = vec![true; leaves.blocks.len()];
+        let asked = AskedLeaves { asker, leaves, everywhere: level, is_new, is_raised: false };
         let first: Vec<AskedRung> = asking.iter().map(|one| asker.first(one.series, count)).collect();
         asked.look(&first, &vec![u16::MAX; count / LANES], asking, counts);
         for (one, rung) in asking.iter_mut().zip(&first) {
@@ -93,12 +95,9 @@ impl<'a> AskedLeaves<'a> {
         asked
     }
 
-    /// The numbers of blocks that were asked since this was last called.
-    pub fn take_new(&mut self) -> Vec<u32> {
-        let mut new = std::mem::take(&mut self.new);
-        new.sort_unstable();
-        new.dedup();
-        new
+    /// Which blocks were asked since this was last called, by their numbers.
+    pub fn take_new(&mut self) -> Vec<bool> {
+        std::mem::take(&mut self.is_new)
     }
 
     /// Halves blocks of leaves, and has all rays ask one more point in each leaf: in those that edges make most of what
@@ -160,7 +159,8 @@ impl<'a> AskedLeaves<'a> {
             }
         }
         let halves: Vec<u32> = halved.iter().flat_map(|halved| &halved.blocks).flat_map(|block| block.halves).collect();
-        self.new.extend(&halves);
+        self.is_new.resize(self.leaves.blocks.len(), false);
+        halves.iter().for_each(|number| self.is_new[*number as usize] = true);
         halves
     }
 
@@ -168,7 +168,7 @@ impl<'a> AskedLeaves<'a> {
     /// [`HEAVY`] says; whether there were any. That is told not by the points that were asked in them, but by others:
     /// to look closer at what is found to send much makes what is found less, and nothing makes it more.
     fn halve_heavy(&mut self, asking: &mut [Asking], counts: &mut Counts) -> bool {
-        let peaks: Vec<Peak> = Peak::of(asking, self.asker.area.stands_for());
+        let peaks: Vec<Peak> = Peak::of(asking, self.asker.level, self.asker.area.stands_for());
         let all: f32 = peaks.iter().map(|peak| peak.sends).sum();
         let heavy = HEAVY * all / (1u32 << self.everywhere) as f32;
         let every: Vec<u32> = (0..self.leaves.blocks.len() as u32).collect();
@@ -240,7 +240,7 @@ struct Peak {
 
 impl Peak {
     /// Each ray to which few points send much has one of its own; of the others one has.
-    fn of(asking: &[Asking], measure: f32) -> Vec<Peak> {
+    fn of(asking: &[Asking], level: Level, measure: f32) -> Vec<Peak> {
         let weights = |one: &Asking| -> [f32; MOMENTS] { (one.scale * one.reflected).0.map(largest) };
         let is_peaked = |ray: &usize| asking[*ray].tally.is_peaked(&weights(&asking[*ray]));
         let (peaked, even): (Vec<usize>, Vec<usize>) = (0..asking.len()).partition(is_peaked);
@@ -250,7 +250,7 @@ impl Peak {
             let weights = weights(&asking[ray]).map(|weight| weight * many as f32);
             let mut peak = Peak { ray, at: FineCell::FIRST, weights, sends: 0.0 };
             peak.sends = peak.weigh(&asking[ray].sent(measure)) / measure;
-            peak.at = tally.most(|sent| peak.weigh(sent));
+            peak.at = tally.most(level, &peak.weights);
             peak
         })
         .collect()

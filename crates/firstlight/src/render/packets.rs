@@ -97,15 +97,14 @@ impl Packets {
         (LANES / rays.clamp(1, LANES)).next_power_of_two()
     }
 
-    /// Hears of those blocks that were asked anew, by their numbers.
-    pub fn hear(&mut self, level: Level, tallies: &[&Tally], leaves: &Leaves, blocks: &[u32]) {
+    /// Hears of those blocks that were asked anew, as `is_new` says by their numbers.
+    pub fn hear(&mut self, level: Level, tallies: &[&Tally], leaves: &Leaves, is_new: &[bool]) {
         self.blocks.resize(leaves.blocks.len(), BlockSums::default());
         let width = Packets::width(tallies.len());
         dispatch_all!(level, simd => {
-            for number in blocks {
-                let part = leaves.blocks[*number as usize].part();
-                self.blocks[*number as usize] =
-                    BlockSums::of(simd, tallies, *number as usize, self.unit.map(|unit| unit * part), width);
+            for number in (0..is_new.len()).filter(|number| is_new[*number]) {
+                let part = leaves.blocks[number].part();
+                self.blocks[number] = BlockSums::of(simd, tallies, number, self.unit.map(|unit| unit * part), width);
             }
         });
     }

@@ -93,12 +93,23 @@ impl Tally {
         &self.blocks[number]
     }
 
-    /// Where the point is that sends most, as `weigh` has it.
-    pub fn most(&self, weigh: impl Fn(&Moments) -> f32) -> FineCell {
-        let leaves = self.blocks.iter().flat_map(|block| (0..LANES).map(move |lane| (block, lane)));
-        let sent = |(block, lane): &(&BlockAnswers, usize)| weigh(&block.moments(*lane));
-        let most = leaves.map(|leaf| (sent(&leaf), leaf)).max_by(|(one, _), (other, _)| one.total_cmp(other));
-        most.map_or(FineCell::FIRST, |(_, (block, lane))| block.at[lane])
+    /// Where the point is that sends most, where each kind of light counts for so much.
+    pub fn most(&self, level: Level, weights: &[f32; MOMENTS]) -> FineCell {
+        let [mut most, mut of] = [[0.0f32; LANES], [0.0f32; LANES]];
+        dispatch_all!(level, simd => {
+            let [mut largest, mut number] = [simd.splat_f32x16(-1.0), simd.splat_f32x16(0.0)];
+            for (k, block) in self.blocks.iter().enumerate() {
+                let sent = block.lanes(simd).into_iter().zip(weights);
+                let sent = sent.fold(simd.splat_f32x16(0.0), |sum, (sent, weight)| sum + sent * *weight);
+                let is_more = sent.simd_gt(largest);
+                largest = is_more.select(sent, largest);
+                number = is_more.select(simd.splat_f32x16(k as f32), number);
+            }
+            largest.store_slice(&mut most);
+            number.store_slice(&mut of);
+        });
+        let lane = (0..LANES).max_by(|one, other| most[*one].total_cmp(&most[*other])).unwrap_or_default();
+        self.blocks.get(of[lane] as usize).map_or(FineCell::FIRST, |block| block.at[lane])
     }
 
     /// Hears what all points of a rung say, one in each of as many leaves, and forgets what was known. `view` says what
