@@ -163,9 +163,28 @@ fn every_second(digits: u64) -> u64 {
     (digits | digits >> 16) & 0xffff_ffff
 }
 
+/// Some points of a series: one in each of 2^m cells of the square, in their order, sixteen in a block.
+pub(crate) struct SeriesPart {
+    /// x and y.
+    pub places: Vec<[[f64; LANES]; 2]>,
+    pub cells: Vec<[FineCell; LANES]>,
+}
+
+impl SeriesPart {
+    /// Those that are counted from `first` on, as many as there are cells, where that is a multiple of them.
+    pub fn new(series: usize, first: u32, count: u32) -> SeriesPart {
+        let points = series_by_cell(series, first, count);
+        let (blocks, _) = points.as_chunks::<LANES>();
+        SeriesPart {
+            places: blocks.iter().map(|block| [0, 1].map(|axis| block.map(|at| at[axis]))).collect(),
+            cells: blocks.iter().map(|block| block.map(FineCell::of)).collect(),
+        }
+    }
+}
+
 /// The points of a series that are counted from `first` on, 2^m of them where `first` is a multiple of 2^m, in the
 /// order of the cells of the square that each holds one of.
-pub(crate) fn series_by_cell(series: usize, first: u32, count: u32) -> Vec<[f64; 2]> {
+fn series_by_cell(series: usize, first: u32, count: u32) -> Vec<[f64; 2]> {
     let mut points = vec![[f64::NAN; 2]; count as usize];
     for point in (first..first + count).map(|k| point_of_series(k, series)) {
         points[FineCell::of(point).part_of(count as usize)] = point;

@@ -11,7 +11,7 @@ use fearless_simd::Level;
 
 use super::leaves::{Halved, HalvedBlock};
 use crate::accel::dispatch_all;
-use crate::light::{Area, FineCell, Points, SERIES, series_by_cell, with_gaps};
+use crate::light::{Area, FineCell, Points, SERIES, SeriesPart, with_gaps};
 use crate::math::{LANES, Vec3};
 use crate::scene::Scene;
 use crate::visibility::{ShadowView, Target, Viewpoint};
@@ -21,11 +21,17 @@ pub(super) const FIRST: usize = 16;
 pub(super) const LAST: usize = 1 << 11;
 const RUNGS: usize = (LAST / FIRST).ilog2() as usize + 1;
 
-/// The points of one light, series by series, each rung made when it is first asked for: those that begin a series, and
-/// those that double what is asked already.
+/// For each series and each rung something that is made when it is first asked for: of the points that begin a series,
+/// and of those that double what is asked already.
+type OfRungs<T> = [[[OnceLock<T>; 2]; RUNGS]; SERIES];
+
+/// Where on any light they are.
+static PARTS: OfRungs<SeriesPart> = [const { [const { [const { OnceLock::new() }; 2] }; RUNGS] }; SERIES];
+
+/// The points of one light.
 #[derive(Default)]
 pub(super) struct Ladder {
-    series: [[[OnceLock<Box<Rung>>; 2]; RUNGS]; SERIES],
+    series: OfRungs<Box<Rung>>,
 }
 
 /// Some points of one light, in the order of its cells, each of which holds one.
@@ -143,11 +149,9 @@ impl<'a> Asker<'a> {
     fn rung(&self, series: usize, first: usize, count: usize) -> AskedRung<'a> {
         let kept = &self.ladder.series[series][(count / FIRST).ilog2() as usize][usize::from(first > 0)];
         AskedRung::Kept(kept.get_or_init(|| {
-            let places = series_by_cell(series, first as u32, count as u32);
-            let (places, _) = places.as_chunks::<LANES>();
-            let cells = places.iter().map(|block| block.map(FineCell::of)).collect();
-            let points = self.area.points_at(places.iter().map(|block| [0, 1].map(|axis| block.map(|at| at[axis]))));
-            Rung::new(cells, count.ilog2(), points)
+            let part = &PARTS[series][(count / FIRST).ilog2() as usize][usize::from(first > 0)];
+            let part = part.get_or_init(|| SeriesPart::new(series, first as u32, count as u32));
+            Rung::new(part.cells.clone(), count.ilog2(), self.area.points_at(part.places.iter().copied()))
         }))
     }
 
