@@ -92,19 +92,15 @@ impl ShadowView {
                 count += usize::from(self.in_space[next] != u16::MAX);
                 next += 1;
             }
+            let is_run = count == LANES
+                && places[0].is_multiple_of(LANES as u32)
+                && places[LANES - 1] == places[0] + LANES as u32 - 1;
             let gathered;
-            let cells = match target.cells.get(places[0] as usize / LANES) {
-                Some(cells)
-                    if count == LANES
-                        && places[LANES - 1] - places[0] == LANES as u32 - 1
-                        && places[0] as usize % LANES == 0 =>
-                {
-                    cells
-                }
-                _ => {
-                    gathered = target.bounds_of(&places);
-                    &gathered
-                }
+            let cells = if is_run {
+                &target.cells[places[0] as usize / LANES]
+            } else {
+                gathered = target.bounds_of(&places);
+                &gathered
             };
             // Bit by bit
             let mut open = ((1u32 << count) - 1) as u16;
