@@ -76,6 +76,7 @@ impl Worth {
 mod tests {
     use super::*;
     use crate::material::Moments;
+    use crate::math::{ErrorBound, Vec3};
 
     fn arrived(illumination: Illumination, asked: u32) -> Arrived {
         let sums = Moments::default();
@@ -95,6 +96,25 @@ mod tests {
         // Nobody hears of them as long as they are not asked, and then they are asked again
         (0..200).for_each(|_| worth.hear_forms(false, &[arrived(Illumination::Unknown, 1)]));
         assert_eq!(worth.part(), 1.0);
+    }
+
+    #[test]
+    fn what_points_cannot_tell_is_asked_without_bound() {
+        let mut worth = Worth::default();
+        worth.hear_points(16, 16 * 200);
+        worth.hear_forms(true, &[arrived(Illumination::Unknown, 10); 16]);
+        let up = Vec3::new(0.0, 1.0, 0.0);
+        let known = ShadingPoint::new(Vec3::ZERO, ErrorBound(Vec3::ZERO), up, up);
+        let mut points = [known, ShadingPoint { part_of_points: 0.5, ..known }];
+        let mut bounds = |points: &mut [ShadingPoint]| {
+            let mut bounds = Vec::new();
+            worth.ask(points, &mut Vec::new(), |asked, _| {
+                bounds.extend(asked.iter().map(|point| point.part_of_points));
+            });
+            bounds
+        };
+        assert_eq!(bounds(&mut points[..1]), [f32::INFINITY]);
+        assert_eq!(bounds(&mut points[1..]), [0.0]);
     }
 
     #[test]

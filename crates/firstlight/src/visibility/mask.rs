@@ -84,13 +84,16 @@ impl ShadowView {
             }
         }
         // Blocks of which something is asked, sixteen at a time
-        let mut next = 0;
+        let mut next = if self.triangles.is_empty() { target.blocks.len() } else { 0 };
         while next < target.blocks.len() {
             let (mut places, mut count) = ([0u32; LANES], 0);
             while count < LANES && next < target.blocks.len() {
                 places[count] = next as u32;
                 count += usize::from(self.in_space[next] != u16::MAX);
                 next += 1;
+            }
+            if count == 0 {
+                break;
             }
             let is_run = count == LANES
                 && places[0].is_multiple_of(LANES as u32)
