@@ -20,8 +20,6 @@ use crate::scenes::*;
 const AGREEMENT: f64 = 0.25;
 /// Steps by which one set may differ from the mean of all.
 const SPREAD: f64 = 0.5;
-/// The logarithm to base 2 of the number of points from which on sets do not agree by chance.
-const MANY: u32 = 16;
 /// Sets of points, all of one size.
 const SETS: u32 = 4;
 /// The logarithm to base 2 of the number of points of the smallest sets.
@@ -313,21 +311,20 @@ impl Converged {
         }
     }
 
-    /// Looks again at all that is settled, with 2^`more` times the points of each pixel and up to four times as many.
-    /// Where a picture is smooth all its pixels are wrong alike, and then the two halves can be nearer to each other
-    /// than to the truth in all of them at once. Pixels that took many points are not smooth, and sets of them agree by
-    /// no chance.
+    /// Looks again at all that is settled, with 2^`more` times the points of each pixel and up to four times as many, as
+    /// far as there are any. Where all pixels look at the same, all are wrong alike, and then the two halves can be
+    /// nearer to each other than to the truth in all of them at once.
     #[track_caller]
     pub fn again(&mut self, more: u32) {
         let settled: Vec<u32> = (0..self.open.len()).filter(|i| !self.open[*i]).map(|i| self.levels[i]).collect();
         let levels = BTreeSet::from_iter(settled);
         let mut unsettled = self.open.clone();
         // The finest first: what others are set to is not looked at again
-        for level in levels.into_iter().rev().filter(|level| level + more <= MANY) {
+        for level in levels.into_iter().rev().filter(|level| *level < LAST) {
             for (i, open) in self.open.iter_mut().enumerate() {
                 *open = !unsettled[i] && self.levels[i] == level;
             }
-            self.settle(level + more, level + more + 2);
+            self.settle((level + more).min(LAST), (level + more + 2).min(LAST));
             for (unsettled, open) in unsettled.iter_mut().zip(&self.open) {
                 *unsettled |= open;
             }
