@@ -311,8 +311,8 @@ impl Converged {
         }
     }
 
-    /// Looks again at all that is settled, with 2^`more` times the points of each pixel and up to four times as many, as
-    /// far as there are any. Where all pixels look at the same, all are wrong alike, and then the two halves can be
+    /// Looks again at all that is settled, with 2^`more` times the points of each pixel and up to four times as many,
+    /// as far as there are any. Where all pixels look at the same, all are wrong alike, and then the two halves can be
     /// nearer to each other than to the truth in all of them at once.
     #[track_caller]
     pub fn again(&mut self, more: u32) {
