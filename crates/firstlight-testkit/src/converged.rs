@@ -32,7 +32,7 @@ const LONG: u32 = 13;
 const AGAIN: u32 = 4;
 /// How many times the root mean square that is allowed makes the converged picture be looked at again, whatever few
 /// points make of the scene.
-const LOOKED_AT: f64 = 1.5;
+const LOOKED_AT: f64 = 2.0;
 /// Steps off at which a pixel of the converged picture is looked at again.
 const DISPUTED: f64 = 0.75;
 
