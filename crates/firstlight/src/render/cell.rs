@@ -45,21 +45,16 @@ const PIXELS: usize = (CELL * CELL) as usize;
 /// Lists of candidates: of the cell, its quarters, their quarters, down to one pixel.
 const DEPTHS: usize = CELL.ilog2() as usize + 2;
 
-/// In display steps: how far the places of a surface in a pixel may differ, where light is smooth and where shadows are
-/// cut.
-const SPREAD_SMOOTH: f32 = 10.0;
-const SPREAD_CUT: f32 = 5.0;
-/// How far outlines may move on the light over a quadrant, and light may turn.
+/// In display steps: how far the places of a surface in a pixel may differ.
+const SPREAD: f32 = 5.0;
+/// How far outlines may move on the light over a quadrant.
 pub(super) const QUADRANT_MOTION: f32 = 0.3;
-const QUADRANT_TURN: f32 = 1.0;
-/// The same, turns alone, where the middle of a fragment stands for all of it.
+/// How far light may turn where the middle of a fragment stands for all of it.
 const MIDDLE_TURN: f32 = 0.06;
 /// In display steps: by how much that may bend it at most, from a middle to the farthest ray, and from that of a
 /// quadrant. The mean over the rays is off by far less of what bends over a quadrant: some of it lies below.
 const MIDDLE_BEND: f32 = 0.1;
 const QUADRANT_BEND: f32 = 3.0;
-/// Less than this part of what a light sends, turned by an angle, is as good as nothing.
-const NOTHING: f32 = 1e-5;
 /// In display steps: what colours that differ may make together with light that does.
 const MINGLED: f32 = 0.4;
 
@@ -463,7 +458,7 @@ impl<'a> Cells<'a> {
     /// Whether a light is even enough over the quadrants of a fragment.
     fn is_even(&self, fragment: &Fragment, light: usize, answers: &[Answer]) -> bool {
         let scene = self.scene;
-        if answers.iter().any(|answer| answer.motion > QUADRANT_MOTION || answer.turn > QUADRANT_TURN) {
+        if answers.iter().any(|answer| answer.motion > QUADRANT_MOTION || answer.turn == f32::INFINITY) {
             return false;
         }
         let bends = |answer: &Answer| self.bend(fragment, light, answer) * fragment.share > QUADRANT_BEND;
@@ -475,10 +470,8 @@ impl<'a> Cells<'a> {
         for answer in answers {
             (least, most) = (least.min(answer.sums), most.max(answer.sums));
         }
-        // Between places that see nothing a light can come in; and where it sets in, that see as good as nothing
-        let sets_in = answers.iter().filter(|answer| !answer.smooth && answer.motion == 0.0);
-        let turned = sets_in.map(|answer| answer.turn * answer.most).fold(0.0, f32::max);
-        if most.cosine() <= turned * NOTHING && !answers.iter().all(|answer| answer.smooth) {
+        // Between places that see nothing a light can come in
+        if most.cosine() == 0.0 && !answers.iter().all(|answer| answer.smooth) {
             return false;
         }
         let apart = most + least * -1.0;
@@ -486,9 +479,8 @@ impl<'a> Cells<'a> {
         let colors = scale * bsdf.colors;
         let value = colors.onto(scene.ambient * bsdf.ambient, &most);
         let spread = self.lights.arrivals.steps(value, colors.of(&apart));
-        let allowed = if answers.iter().all(|answer| answer.smooth) { SPREAD_SMOOTH } else { SPREAD_CUT };
         let sets_in = answers.iter().any(|answer| answer.sums == Moments::default());
-        let allowed = if sets_in { allowed * SETS_IN } else { allowed };
+        let allowed = if sets_in { SPREAD * SETS_IN } else { SPREAD };
         let weight = fragment.share * (scene.lights.len() as f32).sqrt();
         if spread * weight > allowed {
             return false;

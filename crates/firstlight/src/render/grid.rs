@@ -19,27 +19,17 @@ use crate::integrate::ShadingPoint;
 use crate::material::{Bsdf, Lobe, Moments};
 use crate::scene::Scene;
 
-/// In display steps: what the corners of a square may be wrong about its other places: where the light is seen as a
-/// whole, the same under a highlight that is not wide, and where shadows cut it.
-const FORETOLD_SMOOTH: f32 = 1.0;
-const FORETOLD_SHARP: f32 = 0.1;
-const FORETOLD_CUT: f32 = 0.75;
-/// The same of the smallest squares.
-const SMALLEST_SMOOTH: f32 = 2.0;
-const SMALLEST_SHARP: f32 = 0.25;
-const SMALLEST_CUT: f32 = 1.5;
-/// The part of them where some of the nine places see as good as nothing, beside the brightest: a light that sets in
-/// between bends at once, and the quadratic is farther off than the corners are.
+/// In display steps: what the corners of a square may be wrong about its other places, where there is one light.
+const FORETOLD: f32 = 1.0;
+/// The part of that where what arrives bends at once, and the quadratic is farther off than the corners are: where
+/// things in trees are in the way, whose shadows have corners, and where a light sets in, which some of the places see
+/// as good as nothing of, beside the brightest.
 pub(super) const SETS_IN: f32 = 0.35;
 const DIM: f32 = 1.0 / 16.0;
-/// By how much less where things in trees are in the way: their shadows have corners.
-const BEHIND: f32 = 0.5;
-/// From here on a highlight is not wide; and beyond, narrow beside the square.
-const SHARP: f32 = 0.4;
+/// A highlight is narrow beside a square over which it turns by more of its widths.
 const NARROW: f32 = 1.0;
 /// How far outlines of shadows may move on a light over a square.
-const MOTION: f32 = 0.5;
-const SMALLEST_MOTION: f32 = 1.0;
+const MOTION: f32 = 1.0;
 /// Pixels across the largest and the smallest square that is lit from nine places.
 const LARGEST: u32 = 16;
 const SMALLEST: u32 = 2;
@@ -278,7 +268,7 @@ impl Grid {
             let block = &blocks[item.block as usize];
             if last.as_ref().is_none_or(|(square, of, ..)| (*square, *of) != (item.square, item.block)) {
                 let nodes = self.nine(scene, block, item.square);
-                let place = self.middle(block, item.square.side, &nodes);
+                let place = self.middle(block, &nodes);
                 last = Some((item.square, item.block, nodes, place));
             }
             let Some((_, _, nodes, Some(place))) = last else {
@@ -379,7 +369,7 @@ impl Grid {
     }
 
     /// The middle of a square, which stands for all of it.
-    fn middle(&self, block: &Block, side: u32, nodes: &[u32; 9]) -> Option<LitPlace> {
+    fn middle(&self, block: &Block, nodes: &[u32; 9]) -> Option<LitPlace> {
         if nodes.contains(&NONE) {
             return None;
         }
@@ -392,8 +382,7 @@ impl Grid {
         }
         // The arc, not the chord
         let (reach, turn) = (reach * 1.01, turn * 1.05);
-        let most_motion = if side == SMALLEST { SMALLEST_MOTION } else { MOTION };
-        let middle = ShadingPoint { reach, turn, most_motion, ..*middle };
+        let middle = ShadingPoint { reach, turn, most_motion: MOTION, ..*middle };
         let node = &self.places[self.nodes[nodes[4] as usize].place as usize];
         Some(LitPlace { point: middle, bsdf: block.bsdf, ..*node })
     }
@@ -411,19 +400,10 @@ impl Grid {
         let scale = lights.arrivals.scale(item.light as usize);
         let colors = scale * block.bsdf.colors;
         let base = scene.ambient * block.bsdf.ambient;
-        let allowed = match (center.turn > SHARP, item.square.side == SMALLEST, center.smooth) {
-            (true, false, _) => FORETOLD_SHARP,
-            (true, true, _) => SMALLEST_SHARP,
-            (false, true, true) => SMALLEST_SMOOTH,
-            (false, true, false) => SMALLEST_CUT,
-            (false, false, true) => FORETOLD_SMOOTH,
-            (false, false, false) => FORETOLD_CUT,
-        };
         let most = nodes.iter().fold(0.0f32, |most, node| most.max(node.cosine()));
         let sets_in = nodes.iter().any(|node| node.cosine() <= most * DIM);
-        let allowed = if sets_in { allowed * SETS_IN } else { allowed } / (self.lights as f32).sqrt();
         let is_behind = scene.geometry.has_trees() && center.sight == Sight::Unknown;
-        let allowed = if is_behind { allowed * BEHIND } else { allowed };
+        let allowed = if sets_in || is_behind { FORETOLD * SETS_IN } else { FORETOLD } / (self.lights as f32).sqrt();
         let mean = |a: Moments, b: Moments| (a + b) * 0.5;
         let [nw, n, ne, w, m, e, sw, s, se] = *nodes;
         let middle = mean(mean(nw, ne), mean(sw, se));
