@@ -508,7 +508,7 @@ impl<'a> Arrivals<'a> {
         let Some(view) = self.settle(index, place.si, counts) else { return Moments::default() };
         let mut together = Together::new(index, 1, place.share, 0, Rgb::BLACK);
         together.behind(place, view);
-        together.settle(&[], self, counts).sums
+        together.settle(self, counts).sums
     }
 
     /// Area light `index`, as its points are asked for.

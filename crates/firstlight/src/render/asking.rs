@@ -7,7 +7,6 @@ use super::arrival::ArrivalPlace;
 use super::beams::{self, RungRays};
 use super::ladder::{AskedRung, Asker};
 use super::leaves::{LeafBlock, Leaves};
-use super::packets::Edge;
 use super::resolve::LightTerm;
 use super::tally::{Tally, would_send};
 use crate::color::Rgb;
@@ -100,12 +99,12 @@ impl<'a> AskedLeaves<'a> {
         std::mem::take(&mut self.is_new)
     }
 
-    /// Halves blocks of leaves, and has all rays ask one more point in each leaf: in those that edges make most of what
-    /// is wrong in; or, to raise the number of all, in the largest, once there are many heavy ones first, or if it is
-    /// not told which are heavy. Says whether any was halved.
+    /// Halves blocks of leaves, and has all rays ask one more point in each leaf: in those that are near edges; or, to
+    /// raise the number of all, in the largest, once there are many heavy ones first, or if it is not told which are
+    /// heavy. Says whether any was halved.
     pub fn halve(
         &mut self,
-        edges: &[Edge],
+        near: &[bool],
         is_raised: bool,
         is_told: bool,
         asking: &mut [Asking],
@@ -124,15 +123,10 @@ impl<'a> AskedLeaves<'a> {
         }
         let everywhere = self.everywhere;
         let halves = self.halve_those(asking, counts, |number, block| {
-            let is_wanted = edges[number] == Edge::Worst && block.level < DEEPEST || block.level < everywhere;
-            is_wanted.then_some(edges[number] == Edge::Away)
+            let is_wanted = near[number] && block.level < DEEPEST || block.level < everywhere;
+            is_wanted.then_some(!near[number])
         });
         !halves.is_empty()
-    }
-
-    /// The area of the light that one of the largest leaves is.
-    pub fn leaf(&self) -> f32 {
-        self.asker.area.measure() as f32 / (1u64 << self.everywhere) as f32
     }
 
     /// Whether all leaves are of one size.
@@ -261,7 +255,7 @@ impl Peak {
     }
 }
 
-pub(super) fn largest(color: Rgb) -> f32 {
+fn largest(color: Rgb) -> f32 {
     color.r.max(color.g).max(color.b)
 }
 

@@ -16,7 +16,6 @@ mod change;
 mod counts;
 mod crowd;
 mod cut;
-mod evidence;
 mod fence;
 mod film;
 mod fragment;

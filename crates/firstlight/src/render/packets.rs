@@ -15,18 +15,12 @@ use crate::accel::dispatch_all;
 use crate::material::MOMENTS;
 use crate::math::{LANES, only, sum_of_runs, total};
 
-/// The deviation of the share that a packet of sixteen sees which some edge runs through, where there are many of them;
-/// and that of sixteen points of one ray. Of sixteen points in as many parts of a cell of the light the edge cuts about
-/// four, each of which it parts anywhere.
-const MIXED: f32 = 0.044;
-const ALONE: f32 = 0.035;
+/// The deviation of the share that a packet of sixteen sees which some edge runs through. Of sixteen points in as many
+/// parts of a cell of the light the edge cuts about four, each of which it parts anywhere.
+const MIXED: f32 = 0.041;
 /// How many times more the square of that is, over a root of their effective number, where they are few: by chance, few
 /// packets say too little of how much they are off.
 const FEW: f32 = 14.0;
-/// The deviation of the share that n stratified points find behind an edge, times n^3/4.
-const EDGE: f32 = 0.46;
-/// How many times that of a packet is where its points do not lie in different parts of a cell.
-const APART: f32 = 3.5;
 /// How many times what varies smoothly counts: points of neighbours are wrong alike.
 const ALIKE: f32 = 2.3;
 /// An edge is looked for in so many packets around one that it runs through.
@@ -35,25 +29,11 @@ const AROUND: usize = 4;
 /// A root of the least number in single precision.
 const LEAST: f64 = 1e-19;
 
-/// Blocks in which edges make half as much of what is wrong as in those that are near some in the mean, or more, are
-/// asked first.
-const WORST: f32 = 0.5;
-
-/// Where a block of leaves is.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Edge {
-    /// No edge is near.
-    Away,
-    Near,
-    /// Near edges that make much of what is wrong.
-    Worst,
-}
-
 /// What the packets of all rays say.
 #[derive(Clone, Debug, Default)]
 pub(super) struct PacketErrors {
-    /// How near blocks of leaves are to edges, by their numbers.
-    pub near: Vec<Edge>,
+    /// Which blocks of leaves are near edges, by their numbers.
+    pub near: Vec<bool>,
     /// The deviations of what arrives, as parts of what would if nothing were in the way: by edges, which more points
     /// in those leaves make less, and by what varies everywhere.
     pub edges: OfKind,
@@ -109,9 +89,8 @@ impl Packets {
         });
     }
 
-    /// What they say by now. `found` is the part of what would arrive that points find, if that is known; each
-    /// kind `shows` so much.
-    pub fn errors(&self, tallies: &[&Tally], leaves: &Leaves, found: Option<OfKind>, shows: OfKind) -> PacketErrors {
+    /// What they say by now. `found` is the part of what would arrive that points find, if that is known.
+    pub fn errors(&self, tallies: &[&Tally], leaves: &Leaves, found: Option<OfKind>) -> PacketErrors {
         let rays = tallies.len();
         let mut sums = BlockSums::default();
         let mut seen = Vec::with_capacity(leaves.order.len());
@@ -121,17 +100,16 @@ impl Packets {
             seen.push(block.seen);
         }
         let [all, lit] = [sum_of(tallies, |tally| tally.all), sum_of(tallies, |tally| tally.lit)];
-        // Rays that see other things are wrong by chance, each by itself; those that see the same, together
         let width = Packets::width(rays);
-        let apart = squared(apart(tallies) * of_edge((width * rays) as f64) / of_edge(LANES as f64));
-        let (mut edges, mut smooth, mut weights) = (OfKind::default(), OfKind::default(), OfKind::default());
+        let per_packet = squared(MIXED * of_edge((width * rays) as f64) / of_edge(LANES as f64));
+        let (mut edges, mut smooth) = (OfKind::default(), OfKind::default());
         for k in (0..MOMENTS).filter(|k| all[*k] > LEAST && self.unit[*k] > 0.0) {
             let per_all = 1.0 / (all[k] as f32 * self.unit[k]);
-            weights[k] = squared(shows[k] * per_all);
             // The part of what is sent that arrives
             let share = (lit[k] / all[k]) as f32;
-            let alone = squared(ALONE) * variance(sums.alone[k], sums.alone_squared[k]);
-            let together = squared(MIXED) * apart * variance(sums.together[k], sums.together_squared[k]);
+            // Rays that see other things are wrong by chance, each by itself; those that see the same, together
+            let alone = squared(MIXED) * variance(sums.alone[k], sums.alone_squared[k]);
+            let together = per_packet * variance(sums.together[k], sums.together_squared[k]);
             edges[k] = if rays == 1 { alone } else { alone.min(together) }.sqrt() * per_all;
             // Where it is known what is sent, that is parted wrong only, what is lit and what is hidden
             let [hidden, lit, mixed] = [0, 1, 2].map(|which: usize| sums.smooth[which][k]);
@@ -143,32 +121,11 @@ impl Packets {
                     .max(2.0 * share * (1.0 - share) * (found[k] - 1.0).abs()),
             };
         }
-        let near =
-            self.rank(leaves, &around(&seen, width * AROUND), (width * AROUND).div_ceil(LANES), &weights, rays == 1);
-        PacketErrors { near, edges, smooth }
-    }
-
-    /// How near blocks are to edges, by their numbers, where `is_near` says which are near any, in the order of the
-    /// light, in runs of so many. What each kind of light sends has such weights; one ray alone has packets of its own.
-    fn rank(&self, leaves: &Leaves, is_near: &[bool], run: usize, weights: &OfKind, is_alone: bool) -> Vec<Edge> {
-        let wrong = |blocks: &[u32]| {
-            let of = |number: &u32| {
-                let BlockSums { together, alone, .. } = &self.blocks[*number as usize];
-                let squares = if is_alone { alone } else { together };
-                (0..MOMENTS).map(|k| squares[k] * weights[k]).sum::<f32>()
-            };
-            blocks.iter().map(of).sum::<f32>() / blocks.len() as f32
-        };
-        let runs: Vec<f32> = leaves.order.chunks(run).map(wrong).collect();
-        let places = || (0..is_near.len()).filter(|place| is_near[*place]);
-        let all: f32 = places().map(|place| runs[place / run]).sum();
-        let worst = WORST * all / places().count() as f32;
-        let mut near = vec![Edge::Away; leaves.order.len()];
-        for place in places() {
-            let edge = if runs[place / run] >= worst { Edge::Worst } else { Edge::Near };
-            near[leaves.order[place] as usize] = edge;
+        let mut near = vec![false; leaves.order.len()];
+        for (number, is_near) in leaves.order.iter().zip(around(&seen, width * AROUND)) {
+            near[*number as usize] = is_near;
         }
-        near
+        PacketErrors { near, edges, smooth }
     }
 }
 
@@ -280,29 +237,8 @@ fn around(seen: &[[u16; 2]], run: usize) -> Vec<bool> {
     near
 }
 
-/// How much farther off the sum of all rays may be than if all saw the same: rays that see different shares of the
-/// light are not stratified together.
-fn apart(tallies: &[&Tally]) -> f32 {
-    let (mut count, mut sum, mut squares, mut points) = (0.0f32, 0.0, 0.0, 0.0);
-    for tally in tallies.iter().filter(|tally| tally.sending > 0.0) {
-        let share = (tally.hidden / tally.sending) as f32;
-        (count, sum, squares) = (count + 1.0, sum + share, squares + share * share);
-        points += tally.effective_sending();
-    }
-    if count < 2.0 {
-        return 1.0;
-    }
-    let deviation = ((squares - sum * sum / count) / count).max(0.0).sqrt();
-    let by_chance = by_chance(points / f64::from(count));
-    1.0 + (APART - 1.0) * (0.5 * (deviation / by_chance - 1.0)).clamp(0.0, 1.0)
-}
-
-/// The deviation of what so many stratified points say of an edge that runs anywhere.
-fn by_chance(points: f64) -> f32 {
-    EDGE * of_edge(points)
-}
-
-/// How that falls with their number: the edge runs through a root of as many squares.
+/// How what n stratified points say of an edge is off falls with their number: it runs through a root of as many
+/// squares.
 pub(super) fn of_edge(points: f64) -> f32 {
     let root = points.max(1e-9).sqrt();
     (1.0 / (root * root.sqrt())) as f32

@@ -6,10 +6,9 @@
 
 use super::Counts;
 use super::arrival::{ArrivalPlace, Arrivals, Sighting};
-use super::asking::{AskedLeaves, Asking, EVENLY, MOST, largest, parts};
-use super::evidence::{Evidence, Met};
+use super::asking::{AskedLeaves, Asking, EVENLY, MOST, parts};
 use super::ladder::{FIRST, LAST};
-use super::packets::{Edge, Packets, of_edge};
+use super::packets::{Packets, of_edge};
 use super::resolve::LightTerm;
 use super::tally::Tally;
 use crate::color::Rgb;
@@ -29,12 +28,8 @@ const LONGEST: f32 = 4.0;
 const STRATIFIED: f32 = 0.5;
 /// The points of a pixel that are asked first, with a tolerance of 1; with others a root of it fewer.
 const BEGIN: f32 = 1024.0;
-/// Points that find what is in the way of a pixel.
-const POINTS: f32 = 512.0;
-/// The effective part of them, none of which is hidden where nothing is.
-const CLEAR: f64 = 0.75;
-/// In display steps: what one point may send where none is hidden.
-const UNMET: f32 = 1.0;
+/// Effective points that find what is in the way of a pixel.
+const CLEAR: f32 = 384.0;
 /// A pixel that tells what others in its square see counts for so many: the mean sum of squares of what the nine are
 /// worth for a pixel, so that chance puts that one off by as much as if it had been asked.
 const NODE_PIXELS: f32 = 0.64;
@@ -44,11 +39,6 @@ const UNTOLD: f32 = 0.5;
 const FEW: f32 = 2.0;
 /// Effective points of all rays together that tell something.
 const TOLD: f64 = 32.0;
-/// The same of the diffuse part, as a part of all points that send: fewer, and the light is so near that its points
-/// miss where it is nearest.
-const UNEVEN: f64 = 1.0 / 16.0;
-/// So many points of a ray tell that nothing is hidden.
-const MANY: usize = 1 << 10;
 /// So many points of all rays tell that all of the light is hidden: near black, anything shows.
 const ALL_HIDDEN: usize = 1 << 14;
 
@@ -100,8 +90,6 @@ pub(super) struct Outcome {
     /// The part of the light that is not hidden, by its points, the mean over the rays; no number where that is not
     /// known.
     pub share: f32,
-    /// What its points met, if any were asked.
-    pub evidence: Evidence,
 }
 
 /// Anything that other pixels have other values of, and other surfaces in them.
@@ -223,7 +211,7 @@ impl Together {
         let mut one = [self];
         Together::tell(&mut one, arrivals, counts);
         let [one] = one;
-        one.settle(&[], arrivals, counts)
+        one.settle(arrivals, counts)
     }
 
     /// Has the rays of some patches, which ask the same light, told all that batches know of it.
@@ -265,14 +253,13 @@ impl Together {
         }
     }
 
-    /// Asks points of the light, as it is known by now what batches know, and what the points of patches `around` met.
-    pub fn settle(mut self, around: &[&Evidence], arrivals: &mut Arrivals, counts: &mut Counts) -> Outcome {
-        let mut evidence = Evidence::default();
+    /// Asks points of the light, as it is known by now what batches know.
+    pub fn settle(mut self, arrivals: &mut Arrivals, counts: &mut Counts) -> Outcome {
         if !self.asking.is_empty() {
             let mut asking = std::mem::take(&mut self.asking);
             asking.iter_mut().for_each(|one| one.tally = arrivals.tally());
             let measure = arrivals.measure(self.light);
-            evidence = self.points(around, arrivals, &mut asking, counts);
+            self.points(arrivals, &mut asking, counts);
             let shares = parts(&asking, |tally| &tally.lit);
             for one in asking {
                 let place = one.place(self.each);
@@ -287,39 +274,31 @@ impl Together {
             }
         }
         let share = self.shares / self.sharing.max(1) as f32;
-        Outcome { terms: self.terms, sums: self.sums, share, evidence }
+        Outcome { terms: self.terms, sums: self.sums, share }
     }
 
-    /// Asks points of the light, more and more, until what they say together will do, and says what they met. What the
-    /// most will not settle is asked in closed form.
-    fn points(
-        &self,
-        around: &[&Evidence],
-        arrivals: &mut Arrivals,
-        asking: &mut [Asking],
-        counts: &mut Counts,
-    ) -> Evidence {
+    /// Asks points of the light, more and more, until what they say together will do. What the most will not settle is
+    /// asked in closed form.
+    fn points(&self, arrivals: &mut Arrivals, asking: &mut [Asking], counts: &mut Counts) {
         let asker = arrivals.asker(self.light);
         let begin = BEGIN / (arrivals.scene.tolerance() as f32).sqrt();
         let first = (begin * self.share.sqrt() / asking.len() as f32) as usize;
         let first = first.next_power_of_two().clamp(FIRST, LAST);
         let tolerance = arrivals.tolerance_by_chance(self.share) * self.room;
         let mut is_tried = false;
-        let mut evidence = Evidence::new(asking[0].si.p);
         let mut asked = AskedLeaves::new(asker, first, asking, counts);
         let mut packets = None;
         let (mut is_plain, mut is_halved) = (true, true);
         loop {
             asking.iter_mut().for_each(|one| one.tally.sum(asker.level, &asked.leaves));
             let said = self.said(asking, is_plain, asker.area.stands_for());
-            evidence.note(asked.everywhere, said.met);
             let packets = packets.get_or_insert_with(|| Packets::new(said.sent));
-            let wrong = self.wrong(&said, packets, (around, &evidence), &mut asked, asking, arrivals);
+            let wrong = self.wrong(&said, packets, &mut asked, asking, arrivals);
             let points = asked.leaves.count() * asking.len();
             let allowed = tolerance * self.deviation(points as f32 / begin);
             let is_told = said.shows(arrivals, &|k| said.untold(k)) <= tolerance * UNTOLD;
-            let is_lit = !said.is_hidden && (self.is_clear(&said, arrivals) || asked.leaves.count() >= MANY);
-            let is_dark = said.shares.iter().all(|share| *share == 0.0) && points >= ALL_HIDDEN;
+            let is_lit = !said.is_hidden && self.is_clear(&said);
+            let is_dark = said.is_dark && points >= ALL_HIDDEN;
             let is_last = points >= MOST || !is_halved;
             let is_enough = is_last || is_told && (is_lit || is_dark || wrong.error() <= allowed);
             // Points are taken at their word for what would arrive if nothing were in the way, if they cannot miss any
@@ -333,7 +312,7 @@ impl Together {
             }
             if is_enough {
                 arrivals.took(self.light, asking.len(), points);
-                return evidence;
+                return;
             }
             // Errors shrink as they do where an edge is
             if !is_tried && wrong.error() * of_edge(MOST as f64) > allowed * of_edge(points as f64) {
@@ -342,7 +321,7 @@ impl Together {
                 let known = arrivals.in_closed_form(self.light, &places, counts);
                 asking.iter_mut().zip(known).for_each(|(one, known)| one.known = known);
                 if asking.iter().all(|one| one.known.is_some()) {
-                    return evidence;
+                    return;
                 }
             }
             // More everywhere as long as there is room for more near edges
@@ -361,15 +340,14 @@ impl Together {
         let mut said = PointsSaid {
             part: 1.0 / self.rays as f32,
             value,
-            shares,
             all: [Rgb::BLACK; MOMENTS],
             missing: [Rgb::BLACK; MOMENTS],
             effective: [0.0; MOMENTS],
-            sending: 0.0,
             is_hidden: false,
+            is_dark: shares.iter().all(|share| *share == 0.0),
             sent: [0.0; MOMENTS],
             found: None,
-            met: Met { points: [0.0; MOMENTS], surprises },
+            surprises,
         };
         for one in asking {
             let sent = one.sent(measure);
@@ -382,22 +360,19 @@ impl Together {
                     said.missing[k] += color;
                 }
             }
-            said.sending += one.tally.effective_sending();
             said.is_hidden |= one.tally.hidden > 0.0;
         }
         said.sent = said.sent.map(|sent| sent / measure);
         let found = |k: usize| asking.iter().map(|one| one.tally.all[k]).sum::<f64>() as f32 / said.sent[k];
         said.found = (!is_plain).then(|| std::array::from_fn(found));
-        said.met.points = said.effective.map(|points| points as f32);
         said
     }
 
-    /// How far off that may be, by their packets and by what points of these and those around met.
+    /// How far off that may be, by their packets and by what points met.
     fn wrong(
         &self,
         said: &PointsSaid,
         packets: &mut Packets,
-        (around, evidence): (&[&Evidence], &Evidence),
         asked: &mut AskedLeaves,
         asking: &[Asking],
         arrivals: &Arrivals,
@@ -405,13 +380,15 @@ impl Together {
         let tallies: Vec<&Tally> = asking.iter().map(|one| &one.tally).collect();
         let new = asked.take_new();
         packets.hear(arrivals.level(), &tallies, &asked.leaves, &new);
-        let packets = packets.errors(&tallies, &asked.leaves, said.found, said.all.map(largest));
-        let leaf = asked.leaf();
-        let met: [f32; MOMENTS] = std::array::from_fn(|k| evidence.overlooked(k, around, leaf));
+        let packets = packets.errors(&tallies, &asked.leaves, said.found);
+        let effective = said.effective.map(|points| points.max(1.0) as f32);
+        let met: [f32; MOMENTS] = std::array::from_fn(|k| said.surprises[k] + 1.0 / effective[k]);
         let shows = |part: &dyn Fn(usize) -> f32| said.shows(arrivals, &|k| said.all[k] * part(k));
-        // As much as packets are wrong by, and what nobody met. Of small things that are in the way each point says
-        // what it sends; where leaves near those that were found are smaller, all that were not found are missing
-        let noise = |k: usize| STRATIFIED * (met[k] / said.effective[k].max(1.0) as f32).sqrt();
+        // As much as packets are wrong by, and what nobody met: about what points found away from edges that nobody
+        // expected, and one more (Good, "The population frequencies of species and the estimation of population
+        // parameters", 1953). Of small things that are in the way each point says what it sends; where leaves near
+        // those that were found are smaller, all that were not found are missing
+        let noise = |k: usize| STRATIFIED * (met[k] / effective[k]).sqrt();
         let overlooked = shows(&|k| met[k]);
         let unmet = shows(&|k| noise(k).max(packets.smooth[k]));
         Wrong {
@@ -423,17 +400,15 @@ impl Together {
         }
     }
 
-    /// Whether enough points are asked to find what is in the way: what none of so many meets may hide what one of them
-    /// sends.
-    fn is_clear(&self, said: &PointsSaid, arrivals: &Arrivals) -> bool {
-        let found = said.effective.iter().copied().fold(0.0, f64::max);
-        found >= f64::from(POINTS * self.share.sqrt()) * CLEAR && said.shows(arrivals, &|k| said.one(k)) <= UNMET
+    /// Whether enough points are asked to find what is in the way.
+    fn is_clear(&self, said: &PointsSaid) -> bool {
+        said.effective.iter().copied().fold(0.0, f64::max) >= f64::from(CLEAR * self.share.sqrt())
     }
 
     /// Whether so many points may miss some of what would arrive if nothing were in the way.
     fn may_miss(&self, said: &PointsSaid, points: usize, asking: &[Asking], arrivals: &Arrivals) -> bool {
         let apart = arrivals.asker(self.light).area.extent() / (points as f32).sqrt();
-        let is_unseen = |k: usize| said.effective[k] < said.least(k) && asking.iter().any(|one| one.reflects(k));
+        let is_unseen = |k: usize| said.effective[k] < TOLD && asking.iter().any(|one| one.reflects(k));
         (0..MOMENTS).any(is_unseen)
             || asking.iter().any(|one| !arrivals.varies_over(self.light, &one.place(self.each), apart))
     }
@@ -458,19 +433,19 @@ struct PointsSaid {
     part: f32,
     /// All that is there.
     value: Rgb,
-    /// Which parts of what would arrive if nothing were in the way do, that, and that of rays whose points find less
-    /// than half of it.
-    shares: [f32; MOMENTS],
+    /// What would arrive if nothing were in the way, and that of rays whose points find less than half of it.
     all: [Rgb; MOMENTS],
     missing: [Rgb; MOMENTS],
-    /// By how many effective points that is told, and how many send anything.
+    /// By how many effective points that is told.
     effective: [f64; MOMENTS],
-    sending: f64,
+    /// Whether any of the light is hidden from any ray, and whether all of it is from all.
     is_hidden: bool,
+    is_dark: bool,
     /// What would arrive, in the unit of points, and the part of it that they find, if they do not tell themselves.
     sent: [f32; MOMENTS],
     found: Option<[f32; MOMENTS]>,
-    met: Met,
+    /// The part of what all send that points sent which found what nobody expected.
+    surprises: [f32; MOMENTS],
 }
 
 impl PointsSaid {
@@ -480,11 +455,6 @@ impl PointsSaid {
         arrivals.steps(self.value * self.part, sum * self.part)
     }
 
-    /// How many effective points tell something of a kind of light.
-    fn least(&self, k: usize) -> f64 {
-        if k == 0 { TOLD.max(self.sending * UNEVEN) } else { TOLD }
-    }
-
     /// What one of the points sends.
     fn one(&self, k: usize) -> Rgb {
         self.all[k] * (1.0 / self.effective[k].max(1.0) as f32)
@@ -492,7 +462,7 @@ impl PointsSaid {
 
     /// What few points send, or none, can be off by what some of them do.
     fn untold(&self, k: usize) -> Rgb {
-        if self.effective[k] < self.least(k) { self.all[k].min(self.one(k) * FEW) } else { self.missing[k] }
+        if self.effective[k] < TOLD { self.all[k].min(self.one(k) * FEW) } else { self.missing[k] }
     }
 }
 
@@ -505,7 +475,7 @@ struct Wrong {
     unmet: f32,
     overlooked: f32,
     /// Where edges are.
-    near: Vec<Edge>,
+    near: Vec<bool>,
 }
 
 impl Wrong {

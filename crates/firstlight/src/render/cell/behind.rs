@@ -4,12 +4,11 @@
 
 use std::ops::{ControlFlow, Range};
 
-use super::{CELL, Cells, PIXELS, Pixel, Wanted};
+use super::{Cells, PIXELS, Pixel, Wanted};
 use crate::color::Rgb;
 use crate::ids::LightId;
 use crate::material::Moments;
 use crate::render::arrival::{ArrivalPlace, Arrivals, Past};
-use crate::render::evidence::Evidence;
 use crate::render::fragment::{Fragment, Fragments};
 use crate::render::light_queue::{LitPlace, Sight};
 use crate::render::resolve::LightTerm;
@@ -48,18 +47,14 @@ pub(super) struct Behind {
     sights: Vec<RaySights>,
     /// What each light would send to each fragment of the cell if nothing were in the way, once that is known.
     wholes: Vec<Vec<Moments>>,
-    /// Which share of each light pixels see at least, as a few of their rays say, light by light; and which were asked.
+    /// Which share of each light pixels see, as a few of their rays say, light by light; and which were asked.
     pub(super) votes: Vec<f32>,
     pub(super) voted: Vec<bool>,
     /// The rays of a square, and the pixels of the cell that were asked for squares, light by light.
     pub(super) points: Vec<Viewpoint>,
     pub(super) nodes: Vec<(usize, usize, super::squares::SquareNode)>,
-    /// What points of each pixel met, light by light.
-    evidence: Vec<Evidence>,
 }
 
-/// How many pixels away those are whose points tell something of a pixel.
-const AROUND: usize = 3;
 /// No fragment.
 pub(super) const NONE: u32 = u32::MAX;
 /// Rays that look for lights together, if none of their fragments has more.
@@ -78,7 +73,6 @@ impl Behind {
             voted: vec![false; across],
             points: Vec::new(),
             nodes: Vec::new(),
-            evidence: vec![Evidence::default(); across],
         }
     }
 }
@@ -179,7 +173,6 @@ impl Cells<'_> {
         self.behind.nodes.clear();
         self.behind.voted.fill(false);
         self.behind.votes.fill(f32::NAN);
-        self.behind.evidence.fill(Evidence::default());
         self.behind.only.fill(NONE);
         self.behind.known.clear();
         self.behind.known.resize(self.fragments.all.len() * lights, FragmentSight::Told);
@@ -263,7 +256,7 @@ impl Cells<'_> {
                 let fragment = block.fragments[k].fragment as usize;
                 let index = self.pixel_of(fragment);
                 let before = counts.work();
-                let terms = self.settle(together, fragment, light, counts).terms;
+                let terms = together.settle(&mut self.lights.arrivals, counts).terms;
                 self.work[index] += each + counts.work() - before;
                 self.behind.known[fragment * lights + light] = FragmentSight::Settled(terms);
             }
@@ -365,25 +358,12 @@ impl Cells<'_> {
         let mut together = [self.together(&block, 0, light, true, &mut sights, counts)];
         Together::tell(&mut together, &mut self.lights.arrivals, counts);
         let [together] = together;
-        let outcome = self.settle(together, fragment, light, counts);
+        let outcome = together.settle(&mut self.lights.arrivals, counts);
         let index = self.pixel_of(fragment);
         self.work[index] += counts.work() - before;
         sights.views.iter_mut().filter_map(Option::take).for_each(|view| self.lights.arrivals.keep(view));
         self.behind.sights.push(sights);
         self.behind.block = block;
-        outcome
-    }
-
-    /// Asks points of a light for the rays of a fragment, beside what those of pixels around it met.
-    fn settle(&mut self, together: Together, fragment: usize, light: usize, counts: &mut Counts) -> Outcome {
-        let index = self.pixel_of(fragment);
-        let [x, y] = [index % CELL as usize, index / CELL as usize];
-        let near = |v: usize| v.saturating_sub(AROUND)..(v + AROUND + 1).min(CELL as usize);
-        let evidence = &self.behind.evidence[light * PIXELS..][..PIXELS];
-        let around = near(y).flat_map(|y| &evidence[y * CELL as usize..][near(x)]);
-        let around: Vec<&Evidence> = around.filter(|evidence| evidence.is_any()).collect();
-        let mut outcome = together.settle(&around, &mut self.lights.arrivals, counts);
-        self.behind.evidence[light * PIXELS + index] = std::mem::take(&mut outcome.evidence);
         outcome
     }
 
