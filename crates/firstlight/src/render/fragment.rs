@@ -17,14 +17,9 @@ use crate::math::{DVec3, ErrorBound, Ray, Vec3};
 use crate::scene::Scene;
 use crate::shape::SurfaceInteraction;
 
-/// Where normals turn farther from a middle, in radians, it does not stand for what is around it.
-const MAX_TURN: f32 = 0.2;
-/// Normals that differ by more than this cosine are of different surfaces.
-const SAME_NORMAL: f32 = 0.9;
-/// How far the mean of normals may be from that in the middle of a fragment, and of a quadrant of one: farther off it
-/// is where facets make a crease.
-const SKEW: f32 = 0.002;
-const SKEW_OF_QUADRANT: f32 = 0.01;
+/// How far the mean of normals may be from that in the middle of a fragment, or of a quadrant of one: farther off it is
+/// where facets make a crease.
+const SKEW: f32 = 0.01;
 /// How far colours of some rays differ, channel by channel.
 pub(crate) type Contrast = Colors;
 
@@ -191,7 +186,7 @@ impl Fragments {
         let middle = match rays {
             [ray] => Some(of.point(scene, &ray.ray, ray.t)),
             _ if self.has_no_middle(&mean) => None,
-            _ => middle(scene, of, rays.iter()),
+            _ => Some(middle(scene, of, rays.iter())),
         };
         let surface = of.surface(scene);
         let middle = middle.map(|point| self.add_middle(scene, surface, &mean.bsdf, point, share));
@@ -256,7 +251,7 @@ impl Fragments {
             let share = share(count);
             let middle = match self.has_no_middle(&mean) {
                 true => None,
-                false => seen_middle(scene, at, self.members[members..].iter(), SKEW),
+                false => seen_middle(scene, at, self.members[members..].iter()),
             };
             let middle = middle.map(|point| self.add_middle(scene, si.surface, &mean.bsdf, point, share));
             self.all.push(Fragment {
@@ -296,9 +291,6 @@ impl Fragments {
         let apart = |one: usize, other: usize| (points[one].p - points[other].p).length();
         let reach = part * apart(0, 3).max(apart(1, 2));
         let turn = reach * of.curvature(scene);
-        if turn > MAX_TURN {
-            return false;
-        }
         let first = self.quadrants.len();
         for point in points {
             let (place, rays) = (self.places.len() as u32, n * n / 4);
@@ -388,11 +380,11 @@ impl Fragments {
             let (count, point) = match of {
                 Some(of) => {
                     let rays = self.rays[rays.clone()].iter().filter(|ray| is_in(ray.at));
-                    (rays.clone().count(), middle(scene, of, rays))
+                    (rays.clone().count(), Some(middle(scene, of, rays)))
                 }
                 None => {
                     let members = self.members[rays.clone()].iter().filter(|member| is_in(member.at));
-                    (members.clone().count(), seen_middle(scene, pixel, members, SKEW_OF_QUADRANT))
+                    (members.clone().count(), seen_middle(scene, pixel, members))
                 }
             };
             if count == 0 {
@@ -445,9 +437,8 @@ impl Fragments {
     }
 }
 
-/// The middle of what some rays see of a shape, with its reach to their ends; `None` if normals turn too far on the
-/// way.
-fn middle<'a>(scene: &Scene, of: Candidate, rays: impl Iterator<Item = &'a RayHit> + Clone) -> Option<ShadingPoint> {
+/// The middle of what some rays see of a shape, with its reach to their ends.
+fn middle<'a>(scene: &Scene, of: Candidate, rays: impl Iterator<Item = &'a RayHit> + Clone) -> ShadingPoint {
     let (mut count, mut q, mut d) = (0.0, DVec3::ZERO, Vec3::ZERO);
     for ray in rays.clone() {
         (count, q, d) = (count + 1.0, q + ray.end(), d + ray.ray.d);
@@ -460,12 +451,12 @@ fn middle<'a>(scene: &Scene, of: Candidate, rays: impl Iterator<Item = &'a RayHi
     }
     point.reach = reach2.sqrt();
     point.turn = point.reach * of.curvature(scene);
-    (point.turn <= MAX_TURN).then_some(point)
+    point
 }
 
 /// Whether two places that camera rays see are of one surface, which may be lit as one.
 pub(crate) fn is_one_surface(one: &SurfaceInteraction, other: &SurfaceInteraction) -> bool {
-    if one.surface != other.surface || one.material != other.material || !(one.ns.dot(other.ns) > SAME_NORMAL) {
+    if one.surface != other.surface || one.material != other.material || !(one.ns.dot(other.ns) > 0.0) {
         return false;
     }
     let apart = other.p - one.p;
@@ -475,13 +466,11 @@ pub(crate) fn is_one_surface(one: &SurfaceInteraction, other: &SurfaceInteractio
 }
 
 /// The middle of what some rays of pixel (`i`, `j`) see of a surface in trees, with its reach to their ends; `None` if
-/// something else is there, if normals turn too far on the way, or if their mean is farther than `skew` from that in
-/// the middle.
+/// something else is there, or if the mean of normals is farther than [`SKEW`] from that in the middle.
 fn seen_middle<'a>(
     scene: &Scene,
     [i, j]: [u32; 2],
     members: impl Iterator<Item = &'a Member> + Clone,
-    skew: f32,
 ) -> Option<ShadingPoint> {
     let n = scene.antialiasing;
     let (mut count, mut x, mut y) = (0.0f32, 0.0, 0.0);
@@ -507,7 +496,7 @@ fn seen_middle<'a>(
         point.turn = point.turn.max(turn);
         normals += si.ns - point.ns;
     }
-    (point.turn <= MAX_TURN && normals.length() <= skew * count).then_some(point)
+    (normals.length() <= SKEW * count).then_some(point)
 }
 
 impl Member {

@@ -11,7 +11,7 @@ use std::ops::ControlFlow;
 use arrayvec::ArrayVec;
 
 use super::behind::{FragmentSight, NONE};
-use super::{CELL, Cells};
+use super::{CELL, Cells, MINGLED};
 use crate::color::Rgb;
 use crate::ids::LightId;
 use crate::material::Moments;
@@ -29,27 +29,15 @@ use crate::visibility::Viewpoint;
 /// Pixels across the largest and the smallest squares.
 const LARGEST: u32 = 16;
 const SMALLEST: u32 = 4;
-/// How far normals may turn from the middle of a square, as a cosine, and how far from what nine of them foretell.
-const SAME_NORMAL: f32 = 0.9;
+/// How far normals may be from what nine of them foretell.
 const EVEN: f32 = 0.01;
-/// How far a surface may be off the plane in the middle of a square, as a part of the way there.
-const OFF_PLANE: f32 = 0.2;
 /// In display steps: how far the five may be from what the corners foretell, in the smallest squares; less in larger
 /// ones, where more can lie between.
 const FORETOLD: f32 = 0.8;
-/// How far what a few rays of one pixel see may be from what the nine make of it, as a part of the light, and how far
-/// all of them together, times the pixels across.
-const ONE_OFF: f32 = 0.3;
-const ALL_OFF: f32 = 0.28;
 /// Rays of a pixel that look for what the nine do not see.
 const LOOKING: usize = 16;
 /// Pixels across a block, of which those rays go together.
 const BLOCK: u32 = 4;
-/// By how much the share that so few rays see may be too large.
-const AT_LEAST: f32 = 0.25;
-/// In display steps: what colours that differ may make together with light that does.
-const MINGLED: f32 = 0.4;
-
 /// What a pixel that was asked sees of a light: the mean over its rays.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct SquareNode {
@@ -168,14 +156,7 @@ impl Cells<'_> {
         }
         let at = |i: u32, j: u32| self.standing([x + i, y + j]);
         let Some(middle) = at(side / 2, side / 2) else { return false };
-        let is_like = |place: &LitPlace| {
-            let (one, other) = (&middle.point, &place.point);
-            let way = other.p - one.p;
-            middle.surface == place.surface
-                && middle.bsdf.lobe == place.bsdf.lobe
-                && one.ns.dot(other.ns) > SAME_NORMAL
-                && way.dot(one.ng).abs() <= OFF_PLANE * way.length()
-        };
+        let is_like = |place: &LitPlace| middle.surface == place.surface && middle.bsdf.lobe == place.bsdf.lobe;
         // With the first of what lies beside it
         let across = side + 1;
         let mut normals = Vec::with_capacity((across * across) as usize);
@@ -326,14 +307,14 @@ impl Cells<'_> {
         kinds.into_iter().filter(|kind| *kind).count() > 1
     }
 
-    /// The share of a light that a fragment sees at least, by a few rays of its pixel; not a number where none were
+    /// The share of a light that a fragment sees, by a few rays of its pixel; not a number where none were
     /// asked.
     pub(super) fn share_seen(&self, fragment: usize, light: usize) -> f32 {
         let index = self.pixels[self.fragments.all[fragment].pixel as usize].index as usize;
         if self.behind.only[index] != fragment as u32 {
             return f32::NAN;
         }
-        self.behind.votes[index * self.scene.lights.len() + light] - AT_LEAST
+        self.behind.votes[index * self.scene.lights.len() + light]
     }
 
     /// Whether nine pixels of a square tell what the others see of a light, which agrees with what a few rays of those
@@ -356,6 +337,9 @@ impl Cells<'_> {
             }
             return true;
         }
+        if nodes.as_flattened().iter().any(|node| node.share.is_nan()) {
+            return false;
+        }
         let wide = (side / SMALLEST) as f32;
         // Where a light sets in between them it bends at once
         let sets_in = nodes.as_flattened().iter().any(|node| node.sums == Moments::default());
@@ -377,28 +361,16 @@ impl Cells<'_> {
             }
         }
         // What the others see
-        let (mut off, mut counted) = (0.0, 0.0f32);
         let mut told = [Moments::default(); (LARGEST * LARGEST) as usize];
-        for (number, at) in square.pixels().enumerate() {
-            let share = self.behind.votes[self.index(at) * self.scene.lights.len() + light];
+        for (number, told) in told.iter_mut().enumerate().take((side * side) as usize) {
             let [across, down] = [columns.weights(number as u32 % side), rows.weights(number as u32 / side)];
-            let (mut sums, mut foretold) = (Moments::default(), 0.0);
+            let mut sums = Moments::default();
             for (row, down) in nodes.iter().zip(down) {
                 for (node, across) in row.iter().zip(across) {
                     sums += node.sums * (across * down);
-                    foretold += node.share * (across * down);
                 }
             }
-            told[number] = sums.at_least_0();
-            if !share.is_nan() {
-                if !((share - foretold).abs() <= ONE_OFF) {
-                    return false;
-                }
-                (off, counted) = (off + share - foretold, counted + 1.0);
-            }
-        }
-        if !(off.abs() <= counted * ALL_OFF / side as f32) {
-            return false;
+            *told = sums.at_least_0();
         }
         for (at, sums) in square.pixels().zip(told) {
             let Some((fragment, of)) = self.whole(at) else { continue };
