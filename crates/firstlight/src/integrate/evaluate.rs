@@ -26,7 +26,7 @@ use super::emitter::Emitter;
 use super::fit::{Cell, CutBlock, Fits, MOMENTS, coarse, fit};
 use super::grade::{Grades, grade, halves, survey, whole};
 use super::panels::{Between, Blocked, Panel, PanelSums, cut, rows};
-use super::tolerance::{Tolerance, Weight};
+use super::tolerance::{TOLERANCE, Weight};
 use super::view::{FlatView, Receiver};
 use crate::color::DisplaySteps;
 use crate::material::{Lobe, Moments};
@@ -92,7 +92,6 @@ pub(crate) struct Asked<'a> {
     pub near: Option<&'a Obstacles<'a>>,
     pub lobe: &'a Lobe,
     pub steps: &'a DisplaySteps,
-    pub tolerance: &'a Tolerance,
     /// In display steps: how far this light may be wrong at a point that stands for a pixel.
     pub allowed: f32,
     /// The value that many steps above black.
@@ -122,6 +121,11 @@ impl Asked<'_> {
         Blocked { occluders: [occluders, near], ball, cuts: self.cuts(), outline: self.emitter.outline(), between }
     }
 }
+
+/// How often cells and panels are halved at most, and the most cells that one light is cut into for one point.
+const CELL_DEPTH: u32 = 64;
+const PANEL_DEPTH: u32 = 12;
+const MOST_CELLS: u32 = 2048;
 
 /// See [`Asked::most_asked`]. A pixel asks some 300 points of a light, and 35 for each step that this makes (60,000
 /// pixels of 200 random scenes); a panel takes as long as about 8 of them.
@@ -363,7 +367,7 @@ impl Evaluator {
     /// Queues the cells that the light is asked by at first. Where nothing is in the way, those of which all is seen
     /// are told apart.
     fn grade(&mut self, level: Level, light: &Asked) {
-        let (tolerance, outline) = (light.tolerance, light.emitter.outline());
+        let outline = light.emitter.outline();
         while !self.grading.is_empty() {
             self.grades.clear();
             let (grades, views) = (&mut self.grades, &self.views);
@@ -372,7 +376,7 @@ impl Evaluator {
                     let members = Members::new(views, cells.len(), |k| cells[k].point);
                     grades.push(simd.vectorize(
                         #[inline(always)]
-                        || grade(simd, light.lobe, tolerance, outline, &members, cells),
+                        || grade(simd, light.lobe, outline, &members, cells),
                     ));
                 }
             });
@@ -384,7 +388,7 @@ impl Evaluator {
                     state.cells -= 1;
                     continue;
                 }
-                let is_wide = is(grades.wide) && state.may_halve(cell, tolerance);
+                let is_wide = is(grades.wide) && state.may_halve(cell);
                 if let Some(halves) = halves(cell, is(grades.along_y)).filter(|_| is_wide) {
                     state.cells += 1;
                     self.next_grading.extend(halves);
@@ -474,9 +478,6 @@ impl Evaluator {
         let Evaluator { views, between, smooth, whole, cut: cut_cells, kept, panels, spare, .. } = self;
         let falloff = light.emitter.falloff();
         let blocked = light.blocked(between);
-        let tolerance = light.tolerance;
-        let whole_shares = [tolerance.fit_seen, tolerance.fit_seen_slow];
-        let cut_shares = [tolerance.fit_cut, tolerance.fit_cut_slow];
         self.smooth_fits.clear();
         self.fits.clear();
         self.cut_fits.clear();
@@ -495,12 +496,11 @@ impl Evaluator {
             }
             for (cells, is_cut) in asked {
                 let members = Members::new(views, cells.len(), |k| cells[k].point);
-                let shares = if is_cut { cut_shares } else { whole_shares };
                 let first = (kept.len() * LANES) as u32;
                 let wanted = is_cut.then_some(&mut *kept);
                 let fitted = simd.vectorize(
                     #[inline(always)]
-                    || fit(simd, light.lobe, falloff, &members, cells, shares, wanted),
+                    || fit(simd, light.lobe, falloff, &members, cells, wanted),
                 );
                 if is_cut {
                     cut_fits.push(fitted);
@@ -533,7 +533,6 @@ impl Evaluator {
     /// Accepts what is good enough, and queues the halves of what is not. Cut cells from `new` on were asked for the
     /// first time.
     fn judge(&mut self, light: &Asked, points: &[ShadingPoint], new: usize, round: u32) {
-        let tolerance = light.tolerance;
         // What arrives as far as is known now, and how much of each new cell is seen
         for (k, cell) in self.smooth.iter().enumerate() {
             self.state[cell.point as usize].expect(lane(&self.smooth_fits[k / LANES].sums, k), round);
@@ -560,7 +559,7 @@ impl Evaluator {
                 state.round += WEIGHED;
                 let ShadingPoint { worth, base, share, .. } = &points[point as usize];
                 let value = worth.onto(*base, &state.estimate);
-                let allowed = light.allowed / share.max(tolerance.least_share).sqrt();
+                let allowed = light.allowed / share.max(TOLERANCE.least_share).sqrt();
                 state.weight = Weight::new(light.steps, value, worth, allowed, light.least);
             }
         }
@@ -570,7 +569,7 @@ impl Evaluator {
             let fits = &self.smooth_fits[k / LANES];
             let state = &mut self.state[cell.point as usize];
             let [x, y] = fit_error(state.weight, fits, k);
-            if (x + y) * tolerance.fit_coarse > state.part(tolerance) {
+            if x + y > TOLERANCE.part {
                 self.next_whole.push(*cell);
             } else {
                 state.accept(lane(&fits.sums, k));
@@ -580,7 +579,7 @@ impl Evaluator {
         for (k, cell) in self.whole.iter().enumerate() {
             let fits = &self.fits[k / LANES];
             let state = &mut self.state[cell.point as usize];
-            let parts = state.refused(cell, fit_error(state.weight, fits, k), tolerance);
+            let parts = state.refused(cell, fit_error(state.weight, fits, k));
             if parts.is_empty() {
                 state.accept(lane(&fits.sums, k));
             }
@@ -594,7 +593,7 @@ impl Evaluator {
             let fits = &self.cut_fits[(k - new) / LANES];
             let state = &mut self.state[cell.point as usize];
             let error = fit_error(state.weight, fits, k - new).map(|error| error * self.seen[k]);
-            let parts = state.refused(&cell, error, tolerance);
+            let parts = state.refused(&cell, error);
             if !parts.is_empty() {
                 self.seen[k] = f32::NAN;
             }
@@ -613,15 +612,13 @@ impl Evaluator {
             let error = || {
                 std::array::from_fn(|moment| {
                     let (difference, value) = (differences[moment], value[moment].abs());
-                    let rounding = tolerance.rounding * state.estimate.0[moment].abs();
-                    if difference <= rounding { 0.0 } else { difference * (2.0 * (difference / value).sqrt()).min(1.0) }
+                    difference * (2.0 * (difference / value.max(f32::MIN_POSITIVE)).sqrt()).min(1.0)
                 })
             };
             let middle = 0.5 * (panel.y[0] + panel.y[1]);
-            let part = state.part(tolerance);
-            if state.weight.of(differences) > part
-                && state.weight.of(error()) > part
-                && panel.depth < tolerance.panel_depth
+            if state.weight.of(differences) > TOLERANCE.part
+                && state.weight.of(error()) > TOLERANCE.part
+                && panel.depth < PANEL_DEPTH
                 && panel.y[0] < middle
                 && middle < panel.y[1]
             {
@@ -665,34 +662,16 @@ impl PointSum {
         self.accepted += Moments(sums);
     }
 
-    /// What one part of the light may use up: where there are many, their errors add up.
-    fn part(&self, tolerance: &Tolerance) -> f32 {
-        let many = self.cells as f32 / tolerance.few_cells;
-        if many > 1.0 { tolerance.part / many.sqrt() } else { tolerance.part }
+    /// The halves of a cell whose fit may be wrong by so much along x and along y, along the worse axis; none where that
+    /// will do.
+    fn refused(&mut self, cell: &Cell, [x, y]: [f32; 2]) -> ArrayVec<Cell, 2> {
+        let is_refused = x + y > TOLERANCE.part && self.may_halve(cell);
+        let halves = is_refused.then(|| halves(cell, y > x)).flatten();
+        self.cells += u32::from(halves.is_some());
+        halves.into_iter().flatten().collect()
     }
 
-    /// The parts that a cell is asked by next whose fit may be wrong by so much along x and along y; none where that
-    /// will do. These are its halves along the worse axis, or, where those would be refused as well, halves of them.
-    fn refused(&mut self, cell: &Cell, [x, y]: [f32; 2], tolerance: &Tolerance) -> ArrayVec<Cell, 4> {
-        let (mut parts, allowed) = (ArrayVec::new(), self.part(tolerance));
-        if !(x + y > allowed && self.may_halve(cell, tolerance)) {
-            return parts;
-        }
-        let is_along_y = y > x;
-        // What is left of them in a half
-        let (same, other) = (x.max(y) * tolerance.halved_along, x.min(y) * tolerance.halved_across);
-        let again = (same + other > allowed).then_some(if same > other { is_along_y } else { !is_along_y });
-        for half in halves(cell, is_along_y).into_iter().flatten() {
-            match again.and_then(|is_along_y| halves(&half, is_along_y)) {
-                Some(quarters) => parts.extend(quarters),
-                None => parts.push(half),
-            }
-        }
-        self.cells += (parts.len() as u32).saturating_sub(1);
-        parts
-    }
-
-    fn may_halve(&self, cell: &Cell, tolerance: &Tolerance) -> bool {
-        cell.depth < tolerance.cell_depth && self.cells < tolerance.most_cells
+    fn may_halve(&self, cell: &Cell) -> bool {
+        cell.depth < CELL_DEPTH && self.cells < MOST_CELLS
     }
 }

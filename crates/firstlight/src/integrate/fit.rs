@@ -331,9 +331,9 @@ pub(crate) fn coarse<S: Simd>(
     fits
 }
 
-/// The fit of up to sixteen cells, which can be wrong by so much of the end of its series, and by more where the series
-/// falls slowly, which says less of what comes after its end. With `kept`, that is what is kept of cells that are seen
-/// in part. To be called within `vectorize`.
+/// The fit of up to sixteen cells, which can be wrong by the end of its series, times the part of all that this is: what
+/// comes after it is as much smaller again. With `kept`, that is what is kept of cells that are seen in part. To be
+/// called within `vectorize`.
 #[inline(always)]
 pub(crate) fn fit<S: Simd>(
     simd: S,
@@ -341,7 +341,6 @@ pub(crate) fn fit<S: Simd>(
     falloff: AreaWeight,
     members: &Members<ViewBlock>,
     cells: &[Cell],
-    [share, slow_share]: [f32; 2],
     kept: Option<&mut Vec<CutBlock>>,
 ) -> Fits {
     let (values, area) = values(simd, &FINE, lobe, falloff, members, cells);
@@ -353,8 +352,8 @@ pub(crate) fn fit<S: Simd>(
         fits.sums[moment] = (sum * area).to_array();
         for (axis, [before, last]) in tails.into_iter().enumerate() {
             let tail = last + before * 0.3;
-            let slow = (tail / sum.abs().max(least)).min(one);
-            fits.errors[axis][moment] = (tail * (slow * slow_share + share) * area).to_array();
+            let part = (tail / sum.abs().max(least)).min(one);
+            fits.errors[axis][moment] = (tail * part * area).to_array();
         }
     }
     let Some(kept) = kept else { return fits };

@@ -7,10 +7,10 @@ use fearless_simd::{f32x16, mask32x16, prelude::*};
 
 use super::batch::{LaneNumbers, Linear16, Members, ShadingPoint, ViewBlock, ViewNumber, Views, ways};
 use super::fit::{Cell, sides};
-use super::tolerance::Tolerance;
+use super::tolerance::TOLERANCE;
 use super::view::Outline;
 use crate::material::Lobe;
-use crate::math::{LANES, Vec3x16, sin_cos, square};
+use crate::math::{LANES, Vec3x16, sin_cos};
 
 /// What sixteen points see of a light with nothing in the way, each a bit.
 #[derive(Clone, Copy, Debug, Default)]
@@ -105,7 +105,6 @@ pub(super) struct Grades {
 pub(super) fn grade<S: Simd>(
     simd: S,
     lobe: &Lobe,
-    tolerance: &Tolerance,
     outline: Outline,
     members: &Members<ViewBlock>,
     cells: &[Cell],
@@ -128,10 +127,10 @@ pub(super) fn grade<S: Simd>(
     let distance2 = gap_x * gap_x + gap_y * gap_y + height * height;
     let (half_x2, half_y2) = ((half_x + lean) * (half_x + lean), half_y * half_y);
     let size2 = half_x2 + half_y2;
-    let mut wide = size2.simd_gt(distance2 * square(tolerance.widest_cell));
-    let mut smooth = size2.simd_lt(distance2 * tolerance.smooth_cell);
+    let mut wide = size2.simd_gt(distance2);
+    let mut smooth = !wide;
     let sharpness = lobe.sharpness_lanes(members.lanes(simd, CosO));
-    let is_sharp = (sharpness * size2).simd_gt(distance2 * tolerance.smooth_cell);
+    let is_sharp = (sharpness * size2).simd_gt(distance2);
     if is_sharp.any_true() {
         // How far off the highlight's middle the cell begins
         let mirror = members.vectors(simd, [MirrorX, MirrorY, MirrorZ]);
@@ -141,8 +140,8 @@ pub(super) fn grade<S: Simd>(
         let length2 = l.dot(l);
         let cos = (l.dot(mirror) / length2.sqrt()).max(simd.splat_f32x16(-1.0)).min(simd.splat_f32x16(1.0));
         let apart = (((1.0 - cos) * 2.0).sqrt() - (size2 / length2).sqrt()).max(zero);
-        let is_far = has_mirror & (sharpness * apart * apart).simd_ge(tolerance.highlight_end);
-        let is_across = (sharpness * size2).simd_gt(distance2 * tolerance.widest_highlight);
+        let is_far = has_mirror & (sharpness * apart * apart).simd_ge(TOLERANCE.highlight);
+        let is_across = (sharpness * size2).simd_gt(distance2 * TOLERANCE.highlight);
         wide |= is_sharp & has_mirror & !is_far & is_across;
         smooth &= !is_sharp | is_far;
     }

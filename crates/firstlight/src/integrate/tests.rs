@@ -154,7 +154,6 @@ fn brute(case: &Case, n: usize) -> Moments {
 
 /// What batches say: the same for whoever shares one, and with every instruction set.
 fn batched(case: &Case, steps: &DisplaySteps) -> Moments {
-    let tolerance = Tolerance::DEFAULT;
     let Receiver { p, error, ns, wo, .. } = case.receiver;
     let worth = Colors::default().map(|_| Rgb::gray(0.5));
     let point = ShadingPoint { worth, ..ShadingPoint::new(p, error, ns, wo) };
@@ -165,9 +164,8 @@ fn batched(case: &Case, steps: &DisplaySteps) -> Moments {
         near: None,
         lobe: &case.receiver.lobe,
         steps,
-        tolerance: &tolerance,
-        allowed: tolerance.point,
-        least: steps.value_of(tolerance.point),
+        allowed: TOLERANCE.point,
+        least: steps.value_of(TOLERANCE.point),
         shadows: true,
     };
     let all = |level: Level, count: usize| {
@@ -385,7 +383,6 @@ impl BallCase {
     }
 
     fn batched(&self, steps: &DisplaySteps) -> Moments {
-        let tolerance = Tolerance::DEFAULT;
         let BallCase { center, radius, physical, both_sides, .. } = *self;
         let sides = if both_sides { BallSides::Both } else { BallSides::Outer };
         let emitter = Emitter::Ball { center, radius, physical, sides };
@@ -399,9 +396,8 @@ impl BallCase {
             near: None,
             lobe: &self.lobe,
             steps,
-            tolerance: &tolerance,
-            allowed: tolerance.point,
-            least: steps.value_of(tolerance.point),
+            allowed: TOLERANCE.point,
+            least: steps.value_of(TOLERANCE.point),
             shadows: true,
         };
         let mut arrived = Vec::new();

@@ -3,74 +3,135 @@
 use crate::color::{DisplaySteps, Rgb};
 use crate::material::{Colors, MOMENTS};
 
-/// What decides whether an estimate is good enough. Errors are in display steps unless a comment says otherwise; those
-/// of the default tolerance of 1 are listed, others scale with it.
+/// What decides whether an estimate is good enough, and whether one place tells what others see. Errors are in display
+/// steps unless a comment says otherwise; those of the default tolerance of 1 are listed, others scale with it.
 ///
 /// The figures come from the runs of random scenes that the page *Exactness, verified* describes.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Tolerance {
     /// How far all lights together may be wrong at a point that stands for a pixel.
     pub point: f32,
-    /// The part of that which one cell of a light, or one panel of its rows, may use up. Cells are few, and their
-    /// estimates are larger than their errors, mostly ten times and more.
-    pub part: f32,
-    /// Where a light is cut into more cells than this, each may use up less.
-    pub few_cells: f32,
+    /// How many times that may be wrong where each place is wrong by itself, as by chance: nothing of that shows as a
+    /// step or an edge.
+    pub by_chance: f32,
     /// Parts of a pixel smaller than this are judged as if they were as large.
     pub least_share: f32,
-    /// What a fit can be wrong as a part of the last coefficients of its series: where all of a cell is seen, whose
-    /// errors cancel at Gauss nodes, and where a part of it is.
-    pub fit_seen: f32,
-    pub fit_cut: f32,
-    /// The same for each share of the cell that those coefficients are: a series that falls slowly goes on beyond them.
-    pub fit_seen_slow: f32,
-    pub fit_cut_slow: f32,
-    /// The same where few nodes are asked, for the third power of the end of the series.
-    pub fit_coarse: f32,
-    /// What is left of the end of a series in half of a cell, along the axis that was halved and along the other.
-    pub halved_along: f32,
-    pub halved_across: f32,
-    /// In half diagonals over distances, squared, or the exponent of the highlight's fall: cells narrower than that are
-    /// asked by few nodes first.
-    pub smooth_cell: f32,
-    /// How often cells and panels are halved at most.
-    pub cell_depth: u32,
-    pub panel_depth: u32,
-    /// In half diagonals over distances: cells wider than that are halved before they are asked.
-    pub widest_cell: f32,
+
+    // Closed forms
+    /// The part of what is allowed that one cell of a light, or one panel of its rows, may use up: their estimates are
+    /// larger than their errors, mostly many times.
+    pub part: f32,
     /// In exponents of the highlight's fall: how far a cell may reach across a highlight, and how far from one it does
     /// not matter.
-    pub widest_highlight: f32,
-    pub highlight_end: f32,
-    /// The most cells that one light is cut into for one point.
-    pub most_cells: u32,
-    /// As a part of a cell: differences of two rules below this are rounding.
-    pub rounding: f32,
+    pub highlight: f32,
+
+    // One place for others
+    /// What the corners of a square may be wrong about its other places, where there is one light.
+    pub foretold: f32,
+    /// The part of that, and of [`spread`](Self::spread), where what arrives bends at once, and a quadratic is farther
+    /// off than the corners are: behind what is in trees, whose shadows have corners, and where a light sets in.
+    pub bends_at_once: f32,
+    /// How far the places of a surface in a pixel may differ.
+    pub spread: f32,
+    /// As a part of the light: how far outlines may move on it over a quadrant.
+    pub quadrant_motion: f32,
+    /// How far light may turn where the middle of a fragment stands for all of it, in radians or widths of a highlight.
+    pub middle_turn: f32,
+    /// By how much that may bend it at most, from a middle to the farthest ray, and from that of a quadrant. The mean
+    /// over the rays is off by far less of what bends over a quadrant: some of it lies below.
+    pub middle_bend: f32,
+    pub quadrant_bend: f32,
+    /// What colours that differ may make together with light that does.
+    pub mingled: f32,
+    /// As lengths of differences: how far normals may be from turning evenly, or from their mean. Farther off there is
+    /// a crease.
+    pub even: f32,
+    /// As a part of it: how far colours may be from their mean that are taken for one.
+    pub same_mean: f32,
+    /// Outlines that move over a larger part of the light than this, in squares of widths highlights that move by more,
+    /// and in radians light that turns by more, are not wide beside a place's reach.
+    pub resolved: f32,
+
+    // Points of a light
+    /// In points, with a tolerance of 1: those of a pixel that are asked first; with others a root of it fewer.
+    pub first_points: f32,
+    /// After more than so many times those, more may be wrong, by the fourth root of their number, up to so many times
+    /// as many again. A picture of so much error in all takes least where pixels that take long are off by more.
+    pub long: f32,
+    pub longest: f32,
+    /// In effective points: so many that find nothing in the way of a pixel find that nothing is, and so many of all
+    /// rays together tell something.
+    pub clear: f32,
+    pub told: f32,
+    /// The part of what may be wrong that points may tell nothing about.
+    pub untold: f32,
+    /// The part that a packet of points through which an edge runs is wrong by.
+    pub mixed: f32,
+    /// How many times what their points send varies other packets are wrong by.
+    pub alike: f32,
+    /// Over a root of the number of packets: the part that the square of what they say is off by.
+    pub few_packets: f32,
+    /// The part of the deviation of as many random points that those of all rays have, which are stratified.
+    pub stratified: f32,
+    /// Cells that send more than so many times the mean of as many equal ones are heavy.
+    pub heavy: f32,
+    /// A pixel that tells what others in its square see counts for so many: the mean sum of squares of what the nine
+    /// are worth for a pixel, so that chance puts that one off by as much as if it had been asked.
+    pub node_pixels: f32,
+
+    // Many lights
+    /// How far what is settled for a block may be wrong, and what is settled for a patch.
+    pub many: f32,
+    /// The root of the sum of squares of all that may be wrong where many are taken for one.
+    pub crowd: f32,
+    /// A patch that is darker than was guessed is looked at again beyond this factor of that.
+    pub lenient: f32,
+    /// The part of what a first look finds that is taken for sure.
+    pub sure: f32,
+    /// How far all lights that are integrated one by one may be wrong together, if their errors are independent.
+    pub integrals: f32,
+    /// What light does within a pixel, at most, as a part of its second difference over three: a corner in the middle
+    /// of the pixel makes an eighth, the onset of a root nearly a fourth.
+    pub within: f32,
 }
 
-impl Tolerance {
-    pub const DEFAULT: Tolerance = Tolerance {
-        point: 0.15,
-        part: 0.9,
-        few_cells: 4.0,
-        least_share: 0.125,
-        fit_seen: 0.02,
-        fit_cut: 0.25,
-        fit_seen_slow: 0.2,
-        fit_cut_slow: 2.0,
-        fit_coarse: 1.0,
-        halved_along: 1.0 / 16.0,
-        halved_across: 0.5,
-        smooth_cell: 1.0,
-        cell_depth: 64,
-        panel_depth: 12,
-        widest_cell: 2.0,
-        widest_highlight: 8.0,
-        highlight_end: 12.0,
-        most_cells: 2048,
-        rounding: 3e-7,
-    };
-}
+/// All numbers that decide an error.
+pub(crate) const TOLERANCE: Tolerance = Tolerance {
+    point: 0.15,
+    by_chance: 5.0 / 3.0,
+    least_share: 1.0 / 16.0,
+    part: 0.5,
+    highlight: 8.0,
+    foretold: 1.0,
+    bends_at_once: 0.35,
+    spread: 5.0,
+    quadrant_motion: 0.3,
+    middle_turn: 0.06,
+    middle_bend: 0.1,
+    quadrant_bend: 3.0,
+    mingled: 0.4,
+    even: 0.01,
+    same_mean: 0.004,
+    resolved: 0.2,
+    first_points: 1024.0,
+    long: 2.0,
+    longest: 4.0,
+    clear: 384.0,
+    told: 32.0,
+    untold: 0.5,
+    mixed: 0.041,
+    alike: 2.3,
+    few_packets: 14.0,
+    stratified: 0.5,
+    heavy: 2.0,
+    node_pixels: 0.64,
+    many: 0.45,
+    crowd: 1.5,
+    lenient: 1.25,
+    sure: 0.8,
+    integrals: 0.225,
+    within: 0.2,
+};
 
 /// What a unit of each moment's error uses up of what is allowed, at one point.
 #[derive(Clone, Copy, Debug, Default)]

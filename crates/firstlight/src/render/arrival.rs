@@ -15,7 +15,9 @@ use super::together::Together;
 use super::worth::Worth;
 use crate::color::{DisplaySteps, Rgb};
 use crate::ids::LightId;
-use crate::integrate::{Arrived, Asked, Emitter, Evaluator, FlatView, Illumination, Obstacles, Receiver, ShadingPoint};
+use crate::integrate::{
+    Arrived, Asked, Emitter, Evaluator, FlatView, Illumination, Obstacles, Receiver, ShadingPoint, TOLERANCE,
+};
 use crate::light::{LightKind, LightTree};
 use crate::material::{Bsdf, Lobe, Moments};
 use crate::math::LANES;
@@ -54,12 +56,6 @@ pub(crate) enum Sighting {
     Behind,
 }
 
-/// How many times what is allowed may be wrong where each place is wrong by itself, as by chance: nothing of that shows
-/// as a step or an edge.
-const BY_CHANCE: f32 = 4.0 / 3.0;
-/// Parts of a pixel smaller than this are judged as if they were as large.
-const LEAST_SHARE_BY_CHANCE: f32 = 1.0 / 16.0;
-
 /// The lights, as one thread asks for them.
 pub(crate) struct Arrivals<'a> {
     pub(super) scene: &'a Scene,
@@ -88,8 +84,6 @@ pub(crate) struct Arrivals<'a> {
 
 /// The shadows of one of fewer points than this show by themselves.
 const FEW_SAMPLES: usize = 256;
-/// Patches whose normal turns by less than this, in radians, are flat.
-const FLAT: f32 = 1e-4;
 /// The most triangles in the way of a ray that batches are asked past.
 const FEW_TRIANGLES: usize = 6;
 /// Leaves of triangles that are worth looking at one by one.
@@ -420,7 +414,7 @@ impl<'a> Arrivals<'a> {
     /// In display steps: how far one light may be wrong at a place that stands for such a share of a pixel, where the
     /// errors of neighbours are as good as independent.
     pub fn tolerance_by_chance(&self, share: f32) -> f32 {
-        self.allowed * BY_CHANCE / share.max(LEAST_SHARE_BY_CHANCE).sqrt()
+        self.allowed * TOLERANCE.by_chance / share.max(TOLERANCE.least_share).sqrt()
     }
 
     /// Whether it is worth to look for light `index` from all rays of a block of pixels together: not where its samples
@@ -594,7 +588,7 @@ impl<'a> Arrivals<'a> {
         }
         let (target, trees) = (&lights.targets[index], &mut self.occluders);
         match points {
-            [point] => trees.gather_around(self.level, scene, target, point, reach, turn > FLAT, LEAVES),
+            [point] => trees.gather_around(self.level, scene, target, point, reach, turn > 0.0, LEAVES),
             points => {
                 self.indices.clear();
                 self.indices.extend(0..points.len() as u32);

@@ -10,14 +10,13 @@ use super::leaves::{LeafBlock, Leaves};
 use super::resolve::LightTerm;
 use super::tally::{Tally, would_send};
 use crate::color::Rgb;
+use crate::integrate::TOLERANCE;
 use crate::light::FineCell;
 use crate::material::{Lobe, MOMENTS, Moments};
 use crate::math::LANES;
 use crate::shape::SurfaceInteraction;
 use crate::visibility::{ShadowView, Viewpoint};
 
-/// Leaves that send so many times as much as others do in the mean are halved first.
-const HEAVY: f32 = 2.0;
 /// The points of all rays up to which all leaves are of one size.
 pub(super) const EVENLY: usize = 1 << 12;
 /// The points that a light is told by at most, of all rays of a pixel.
@@ -159,12 +158,14 @@ impl<'a> AskedLeaves<'a> {
     }
 
     /// Halves those blocks, and their halves, in which leaves may send so much more to all rays together than others as
-    /// [`HEAVY`] says; whether there were any. That is told not by the points that were asked in them, but by others:
+    /// [`TOLERANCE.heavy`] says; whether there were any. That is told not by the points that were asked in them, but by others:
     /// to look closer at what is found to send much makes what is found less, and nothing makes it more.
     fn halve_heavy(&mut self, asking: &mut [Asking], counts: &mut Counts) -> bool {
-        let peaks: Vec<Peak> = Peak::of(asking, self.asker.level, self.asker.area.stands_for());
+        let (level, measure) = (self.asker.level, self.asker.area.stands_for());
+        let rays = asking.iter().enumerate();
+        let peaks: Vec<Peak> = rays.map(|(ray, one)| Peak::of(ray, one, level, measure)).collect();
         let all: f32 = peaks.iter().map(|peak| peak.sends).sum();
-        let heavy = HEAVY * all / (1u32 << self.everywhere) as f32;
+        let heavy = TOLERANCE.heavy * all / (1u32 << self.everywhere) as f32;
         let every: Vec<u32> = (0..self.leaves.blocks.len() as u32).collect();
         let mut worth = self.worth(&peaks, asking, &every);
         let mut is_any = false;
@@ -222,32 +223,22 @@ impl<'a> AskedLeaves<'a> {
     }
 }
 
-/// Where a ray finds the most, which stands for rays that find it thereabouts.
+/// Where a ray finds the most.
 struct Peak {
     ray: usize,
     at: FineCell,
-    /// What each kind of light counts for, all those rays together.
+    /// What each kind of light counts for.
     weights: [f32; MOMENTS],
-    /// What the light sends to them.
+    /// What the light sends to the ray.
     sends: f32,
 }
 
 impl Peak {
-    /// Each ray to which few points send much has one of its own; of the others one has.
-    fn of(asking: &[Asking], level: Level, measure: f32) -> Vec<Peak> {
-        let weights = |one: &Asking| -> [f32; MOMENTS] { (one.scale * one.reflected).0.map(largest) };
-        let is_peaked = |ray: &usize| asking[*ray].tally.is_peaked(&weights(&asking[*ray]));
-        let (peaked, even): (Vec<usize>, Vec<usize>) = (0..asking.len()).partition(is_peaked);
-        let rays = peaked.iter().map(|ray| (*ray, 1)).chain(even.first().map(|ray| (*ray, even.len())));
-        rays.map(|(ray, many)| {
-            let Asking { tally, .. } = &asking[ray];
-            let weights = weights(&asking[ray]).map(|weight| weight * many as f32);
-            let mut peak = Peak { ray, at: FineCell::FIRST, weights, sends: 0.0 };
-            peak.sends = peak.weigh(&asking[ray].sent(measure)) / measure;
-            peak.at = tally.most(level, &peak.weights);
-            peak
-        })
-        .collect()
+    fn of(ray: usize, one: &Asking, level: Level, measure: f32) -> Peak {
+        let weights = (one.scale * one.reflected).0.map(largest);
+        let mut peak = Peak { ray, at: one.tally.most(level, &weights), weights, sends: 0.0 };
+        peak.sends = peak.weigh(&one.sent(measure)) / measure;
+        peak
     }
 
     fn weigh(&self, sent: &Moments) -> f32 {

@@ -22,7 +22,7 @@ use std::ops::{ControlFlow, Range};
 
 use super::film::FilmTile;
 use super::fragment::{Contrast, Fragment, Fragments, Member, Quadrant, RayHit};
-use super::grid::{Block, Grid, SETS_IN};
+use super::grid::{Block, Grid};
 use super::hits::{PixelHits, PixelRays};
 use super::light_queue::{Answer, LightQueue, LitPlace, Request, Sight};
 use super::many::Many;
@@ -33,6 +33,7 @@ use super::tile::Tile;
 use super::together::{Together, salt};
 use super::{AaMode, Counts, Heat};
 use crate::color::Rgb;
+use crate::integrate::TOLERANCE;
 use crate::material::{Bsdf, Moments};
 use crate::scene::Scene;
 use behind::Behind;
@@ -44,19 +45,6 @@ pub(crate) const CELL: u32 = 32;
 const PIXELS: usize = (CELL * CELL) as usize;
 /// Lists of candidates: of the cell, its quarters, their quarters, down to one pixel.
 const DEPTHS: usize = CELL.ilog2() as usize + 2;
-
-/// In display steps: how far the places of a surface in a pixel may differ.
-const SPREAD: f32 = 5.0;
-/// How far outlines may move on the light over a quadrant.
-pub(super) const QUADRANT_MOTION: f32 = 0.3;
-/// How far light may turn where the middle of a fragment stands for all of it.
-const MIDDLE_TURN: f32 = 0.06;
-/// In display steps: by how much that may bend it at most, from a middle to the farthest ray, and from that of a
-/// quadrant. The mean over the rays is off by far less of what bends over a quadrant: some of it lies below.
-const MIDDLE_BEND: f32 = 0.1;
-const QUADRANT_BEND: f32 = 3.0;
-/// In display steps: what colours that differ may make together with light that does.
-const MINGLED: f32 = 0.4;
 
 /// What is known of a pixel.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -350,7 +338,7 @@ impl<'a> Cells<'a> {
                 slopes += scale * contrast.of(&slope) * 0.125;
             }
         }
-        if contrast != Contrast::default() && self.lights.arrivals.steps(color, slopes) > MINGLED {
+        if contrast != Contrast::default() && self.lights.arrivals.steps(color, slopes) > TOLERANCE.mingled {
             return false;
         }
         self.colors[index] = [color.r, color.g, color.b, 1.0];
@@ -443,7 +431,7 @@ impl<'a> Cells<'a> {
     /// Whether the middle of a fragment stands for all of it: what it sees of a light changes but by what that turns.
     fn is_nearly_even(&self, fragment: u32, light: u32, answer: &Answer) -> bool {
         let fragment = &self.fragments.all[fragment as usize];
-        answer.turn <= MIDDLE_TURN && self.bend(fragment, light as usize, answer) <= MIDDLE_BEND
+        answer.turn <= TOLERANCE.middle_turn && self.bend(fragment, light as usize, answer) <= TOLERANCE.middle_bend
     }
 
     /// In display steps: by how much what turns a light may bend it within the reach of a place of a fragment.
@@ -458,10 +446,10 @@ impl<'a> Cells<'a> {
     /// Whether a light is even enough over the quadrants of a fragment.
     fn is_even(&self, fragment: &Fragment, light: usize, answers: &[Answer]) -> bool {
         let scene = self.scene;
-        if answers.iter().any(|answer| answer.motion > QUADRANT_MOTION || answer.turn == f32::INFINITY) {
+        if answers.iter().any(|answer| answer.motion > TOLERANCE.quadrant_motion || answer.turn == f32::INFINITY) {
             return false;
         }
-        let bends = |answer: &Answer| self.bend(fragment, light, answer) * fragment.share > QUADRANT_BEND;
+        let bends = |answer: &Answer| self.bend(fragment, light, answer) * fragment.share > TOLERANCE.quadrant_bend;
         if answers.iter().any(|answer| answer.sums != Moments::default() && bends(answer)) {
             return false;
         }
@@ -480,7 +468,7 @@ impl<'a> Cells<'a> {
         let value = colors.onto(scene.ambient * bsdf.ambient, &most);
         let spread = self.lights.arrivals.steps(value, colors.of(&apart));
         let sets_in = answers.iter().any(|answer| answer.sums == Moments::default());
-        let allowed = if sets_in { SPREAD * SETS_IN } else { SPREAD };
+        let allowed = if sets_in { TOLERANCE.spread * TOLERANCE.bends_at_once } else { TOLERANCE.spread };
         let weight = fragment.share * (scene.lights.len() as f32).sqrt();
         if spread * weight > allowed {
             return false;
@@ -489,7 +477,8 @@ impl<'a> Cells<'a> {
         self.fragments.quadrants(fragment).iter().all(|Quadrant { contrast, .. }| {
             let mingled = contrast.of(&apart);
             *contrast == Contrast::default()
-                || answers.len() == 4 && self.lights.arrivals.steps(value, scale * mingled * 0.125) * weight <= MINGLED
+                || answers.len() == 4
+                    && self.lights.arrivals.steps(value, scale * mingled * 0.125) * weight <= TOLERANCE.mingled
         })
     }
 

@@ -1,7 +1,7 @@
 //! What of one light arrives at a place, and how much that bends over the patch around it.
 
 use super::arrival::ArrivalPlace;
-use crate::integrate::{Arrived, BallSides, Emitter, FlatView, Illumination};
+use crate::integrate::{Arrived, BallSides, Emitter, FlatView, Illumination, TOLERANCE};
 use crate::material::{Lobe, Moments};
 use crate::math::{Vec3, square};
 
@@ -17,8 +17,6 @@ pub(crate) struct Arrival {
     pub resolved: bool,
     /// Whether nothing of it has a corner, and what curves does so little that a quadratic in the place follows it.
     pub smooth: bool,
-    /// Whether a highlight is not wide beside the patch.
-    pub sharp: bool,
 }
 
 /// How a light changes over a patch.
@@ -29,19 +27,17 @@ pub(super) struct Change {
     pub drift: f32,
     pub resolved: bool,
     pub smooth: bool,
-    pub sharp: bool,
 }
 
 impl Change {
     /// Not at all.
-    pub const NONE: Change = Change { bend: Moments::ZERO, drift: 0.0, resolved: true, smooth: true, sharp: false };
+    pub const NONE: Change = Change { bend: Moments::ZERO, drift: 0.0, resolved: true, smooth: true };
     /// Nobody knows.
-    pub const UNKNOWN: Change =
-        Change { bend: Moments::MOST, drift: f32::INFINITY, resolved: false, smooth: false, sharp: true };
+    pub const UNKNOWN: Change = Change { bend: Moments::MOST, drift: f32::INFINITY, resolved: false, smooth: false };
 
     pub fn with(self, sums: Moments) -> Arrival {
-        let Change { bend, drift, resolved, smooth, sharp } = self;
-        Arrival { sums, bend, drift, resolved, smooth, sharp }
+        let Change { bend, drift, resolved, smooth } = self;
+        Arrival { sums, bend, drift, resolved, smooth }
     }
 }
 
@@ -50,25 +46,6 @@ impl Arrival {
     pub fn even(sums: Moments) -> Arrival {
         Change::NONE.with(sums)
     }
-}
-
-/// In display steps: how much may bend over a patch that is lit once.
-pub(super) const BEND: f32 = 0.25;
-/// Outlines that move over a larger part of the light than this, and highlights that move by more of their width,
-/// squared, are not wide beside the patch.
-pub(super) const RESOLVED: f32 = 0.5;
-/// The same for the angle by which the light's direction and the normal turn.
-pub(super) const RESOLVED_SWING: f32 = 0.2;
-
-/// Patches over which the light's direction and the normal turn by less than the first, in radians, and a highlight by
-/// less than the second of its width, squared, are followed by a quadratic: its error is that of the third order, about
-/// a hundredth of the highlight times the second to the power of 3/2.
-pub(super) fn is_smooth(swing: f32, lobe: f32) -> bool {
-    swing < 0.1 && !is_sharp(lobe)
-}
-
-pub(super) fn is_sharp(lobe: f32) -> bool {
-    lobe >= 0.05
 }
 
 /// Of a light that nothing is seen of, or that has no view: from inside of a ball nothing of its outside.
@@ -102,8 +79,8 @@ pub(super) fn horizon_change(view: &FlatView, place: &ArrivalPlace) -> Change {
     let cos = (view.max(&view.cos).max(0.0) / view.middle().length() + swing).min(1.0);
     let all = view.most(place.reach) * (swing.min(1.0) * 0.5 + cos * crossing).min(1.0);
     let bend = Moments::bounds(all, all);
-    let resolved = swing < RESOLVED_SWING && crossing == 0.0;
-    Change { bend, drift: 0.0, resolved, smooth: false, sharp: false }
+    let resolved = swing < TOLERANCE.resolved && crossing == 0.0;
+    Change { bend, drift: 0.0, resolved, smooth: false }
 }
 
 /// How far the mean over a patch can be from what arrives at its middle, and so on. `sway` is by how much the way to
@@ -122,19 +99,19 @@ pub(super) fn change(view: &FlatView, place: &ArrivalPlace, arrived: &Arrived, s
     let horizon = if cuts { swing * swing.min(1.0) } else { 0.0 };
     let smooth = square(place.reach / nearest.max(place.reach)) * 2.0 + place.turn * place.turn * 0.5;
     let diffuse = most * (cos * (kink + smooth.min(1.0) + crossing) + horizon).min(1.0);
-    let resolved = drift < RESOLVED && swing < RESOLVED_SWING && crossing == 0.0;
+    let resolved = drift < TOLERANCE.resolved && swing < TOLERANCE.resolved && crossing == 0.0;
     let is_clear = resolved && drift == 0.0 && illumination == Illumination::Full && !cuts;
     if matches!(view.lobe, Lobe::None) {
         let bend = Moments::bounds(diffuse, 0.0);
-        return Change { bend, drift, resolved, smooth: is_clear && is_smooth(swing, 0.0), sharp: false };
+        return Change { bend, drift, resolved, smooth: is_clear };
     }
     let moved = 2.0 * place.turn + place.reach / nearest.max(place.reach) + sway;
     let lobe = view.sharpness() * moved * moved;
     let narrow = lobe.min(1.0);
     let specular = most * brightest(view, lobe) * (kink + smooth + narrow + horizon + crossing).min(1.0);
     let bend = Moments::bounds(diffuse, specular);
-    let resolved = resolved && narrow < RESOLVED;
-    Change { bend, drift, resolved, smooth: is_clear && is_smooth(swing, lobe), sharp: is_sharp(lobe) }
+    let is_wide = lobe < TOLERANCE.resolved;
+    Change { bend, drift, resolved: resolved && is_wide, smooth: is_clear && is_wide }
 }
 
 /// How bright a highlight can be on a light, at most, or thereabouts, from all over a patch; `moved` is what the

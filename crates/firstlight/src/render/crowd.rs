@@ -7,7 +7,7 @@
 
 use std::collections::BinaryHeap;
 
-use super::cut::{CutRules, Tone};
+use super::cut::{CutRules, MAYBE, Tone, WIDE, WORTH};
 use crate::color::Rgb;
 use crate::light::{Held, LightNode, Sent, ZoneSight};
 use crate::material::MOMENTS;
@@ -71,13 +71,6 @@ pub(super) struct Crowd {
     pub singles: Vec<u32>,
 }
 
-/// Nodes whose error, taken for one, is no more than this part of all they send are looked at whether they are seen
-/// whole.
-const WORTH: f32 = 0.25;
-/// Nodes wider than this sine are not.
-const WIDE: f32 = 0.7;
-/// The part of what nothing is known of that is guessed to arrive.
-const MAYBE: f32 = 0.3;
 /// From fewer places than this each asks for itself.
 const WORTH_A_LOOK: usize = 6;
 /// So many nodes are taken apart between two looks at the sum.

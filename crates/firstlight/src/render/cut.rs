@@ -88,11 +88,11 @@ pub(super) struct CutRules<'a> {
 
 /// Nodes whose error, taken for one, is no more than this part of all they send are looked at whether they are seen
 /// whole.
-const WORTH: f32 = 0.25;
+pub(super) const WORTH: f32 = 0.25;
 /// Nodes wider than this sine are not.
-const WIDE: f32 = 0.7;
+pub(super) const WIDE: f32 = 0.7;
 /// The part of what nothing is known of that is guessed to arrive.
-const MAYBE: f32 = 0.3;
+pub(super) const MAYBE: f32 = 0.3;
 /// Sums are made anew where what is in question has become so much less: what was taken away has left its rounding
 /// behind.
 const AGAIN: f32 = 1e-8;

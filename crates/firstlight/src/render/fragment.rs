@@ -4,22 +4,18 @@ use std::ops::Range;
 
 use arrayvec::ArrayVec;
 
-use super::cell::QUADRANT_MOTION;
 use super::hits::camera_ray;
 use super::light_queue::LitPlace;
 use super::solo::{Candidate, SquareBsdf};
 use super::square::Square;
 use crate::color::Rgb;
 use crate::ids::SurfaceId;
-use crate::integrate::ShadingPoint;
+use crate::integrate::{ShadingPoint, TOLERANCE};
 use crate::material::{Bsdf, Colors, Lobe};
 use crate::math::{DVec3, ErrorBound, Ray, Vec3};
 use crate::scene::Scene;
 use crate::shape::SurfaceInteraction;
 
-/// How far the mean of normals may be from that in the middle of a fragment, or of a quadrant of one: farther off it is
-/// where facets make a crease.
-const SKEW: f32 = 0.01;
 /// How far colours of some rays differ, channel by channel.
 pub(crate) type Contrast = Colors;
 
@@ -295,7 +291,8 @@ impl Fragments {
         for point in points {
             let (place, rays) = (self.places.len() as u32, n * n / 4);
             self.quadrants.push(Quadrant { place, rays, contrast: Contrast::default() });
-            let point = ShadingPoint { reach, turn, most_motion: QUADRANT_MOTION, part_of_points: 0.25, ..point };
+            let point =
+                ShadingPoint { reach, turn, most_motion: TOLERANCE.quadrant_motion, part_of_points: 0.25, ..point };
             self.places.push(LitPlace::new(scene, point, of.surface(scene), &bsdf));
         }
         let quadrants = Some(first..self.quadrants.len());
@@ -402,7 +399,7 @@ impl Fragments {
             let (place, contrast) = (self.places.len() as u32, mean.contrast);
             self.quadrants.push(Quadrant { place, rays: count as u32, contrast });
             let part_of_points = count as f32 / rays.len() as f32;
-            let point = ShadingPoint { share, most_motion: QUADRANT_MOTION, part_of_points, ..point };
+            let point = ShadingPoint { share, most_motion: TOLERANCE.quadrant_motion, part_of_points, ..point };
             self.places.push(LitPlace::new(scene, point, surface, &mean.bsdf));
         }
         true
@@ -466,7 +463,7 @@ pub(crate) fn is_one_surface(one: &SurfaceInteraction, other: &SurfaceInteractio
 }
 
 /// The middle of what some rays of pixel (`i`, `j`) see of a surface in trees, with its reach to their ends; `None` if
-/// something else is there, or if the mean of normals is farther than [`SKEW`] from that in the middle.
+/// something else is there, or if the mean of normals is farther than [`Tolerance::even`] from that in the middle.
 fn seen_middle<'a>(
     scene: &Scene,
     [i, j]: [u32; 2],
@@ -496,7 +493,7 @@ fn seen_middle<'a>(
         point.turn = point.turn.max(turn);
         normals += si.ns - point.ns;
     }
-    (normals.length() <= SKEW * count).then_some(point)
+    (normals.length() <= TOLERANCE.even * count).then_some(point)
 }
 
 impl Member {
@@ -573,7 +570,7 @@ impl Candidate {
             return None;
         }
         let is_within = |off: Rgb, mean: Rgb| {
-            let allowed = mean * SAME_MEAN;
+            let allowed = mean * TOLERANCE.same_mean;
             off.r <= allowed.r && off.g <= allowed.g && off.b <= allowed.b
         };
         let SquareBsdf { bsdf, growth, .. } = *whole;
@@ -605,10 +602,6 @@ impl Candidate {
         (!bsdfs.is_empty()).then(|| MeanBsdf::of(bsdfs.iter()))
     }
 }
-
-/// How far the mean material of a pixel may be from that of its rays, or of its quarters, which are nearer, as a part
-/// of it.
-const SAME_MEAN: f32 = 0.004;
 
 /// The most rays whose mean is taken at once.
 const MAX_MEAN: usize = 64;

@@ -15,21 +15,10 @@ use super::light_queue::{Answer, LightQueue, LitPlace, Request, Sight};
 use super::solo::Candidate;
 use super::square::Square;
 use super::{Counts, Heat};
-use crate::integrate::ShadingPoint;
+use crate::integrate::{ShadingPoint, TOLERANCE};
 use crate::material::{Bsdf, Lobe, Moments};
 use crate::scene::Scene;
 
-/// In display steps: what the corners of a square may be wrong about its other places, where there is one light.
-const FORETOLD: f32 = 1.0;
-/// The part of that where what arrives bends at once, and the quadratic is farther off than the corners are: where
-/// things in trees are in the way, whose shadows have corners, and where a light sets in, which some of the places see
-/// as good as nothing of, beside the brightest.
-pub(super) const SETS_IN: f32 = 0.35;
-const DIM: f32 = 1.0 / 16.0;
-/// A highlight is narrow beside a square over which it turns by more of its widths.
-const NARROW: f32 = 1.0;
-/// How far outlines of shadows may move on a light over a square.
-const MOTION: f32 = 1.0;
 /// Pixels across the largest and the smallest square that is lit from nine places.
 const LARGEST: u32 = 16;
 const SMALLEST: u32 = 2;
@@ -292,8 +281,8 @@ impl Grid {
                 self.fill(scene, &item, &[Moments::default(); 9]);
                 continue;
             }
-            let most_motion = self.asked[item.center as usize].point.most_motion;
-            if !(answer.motion <= most_motion && answer.turn <= NARROW) {
+            // Outlines may move over all of the light, and a highlight by its width
+            if !(answer.motion <= 1.0 && answer.turn <= 1.0) {
                 failed.push(item);
                 continue;
             }
@@ -382,7 +371,7 @@ impl Grid {
         }
         // The arc, not the chord
         let (reach, turn) = (reach * 1.01, turn * 1.05);
-        let middle = ShadingPoint { reach, turn, most_motion: MOTION, ..*middle };
+        let middle = ShadingPoint { reach, turn, most_motion: 1.0, ..*middle };
         let node = &self.places[self.nodes[nodes[4] as usize].place as usize];
         Some(LitPlace { point: middle, bsdf: block.bsdf, ..*node })
     }
@@ -400,10 +389,11 @@ impl Grid {
         let scale = lights.arrivals.scale(item.light as usize);
         let colors = scale * block.bsdf.colors;
         let base = scene.ambient * block.bsdf.ambient;
-        let most = nodes.iter().fold(0.0f32, |most, node| most.max(node.cosine()));
-        let sets_in = nodes.iter().any(|node| node.cosine() <= most * DIM);
+        let sets_in = nodes.iter().any(|node| *node == Moments::default());
         let is_behind = scene.geometry.has_trees() && center.sight == Sight::Unknown;
-        let allowed = if sets_in || is_behind { FORETOLD * SETS_IN } else { FORETOLD } / (self.lights as f32).sqrt();
+        let allowed =
+            if sets_in || is_behind { TOLERANCE.foretold * TOLERANCE.bends_at_once } else { TOLERANCE.foretold }
+                / (self.lights as f32).sqrt();
         let mean = |a: Moments, b: Moments| (a + b) * 0.5;
         let [nw, n, ne, w, m, e, sw, s, se] = *nodes;
         let middle = mean(mean(nw, ne), mean(sw, se));

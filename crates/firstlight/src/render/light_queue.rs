@@ -6,10 +6,10 @@ use arrayvec::ArrayVec;
 
 use super::Counts;
 use super::arrival::{ArrivalPlace, Arrivals, Trees};
-use super::change::{Arrival, BEND};
+use super::change::Arrival;
 use crate::color::Rgb;
 use crate::ids::{LightId, MaterialId, SurfaceId};
-use crate::integrate::{Arrived, Emitter, Illumination, ShadingPoint};
+use crate::integrate::{Arrived, Emitter, Illumination, ShadingPoint, TOLERANCE};
 use crate::light::LightKind;
 use crate::material::{Bsdf, Lobe, Moments};
 use crate::math::{LANES, Vec2};
@@ -244,8 +244,7 @@ impl<'a> LightQueue<'a> {
             answers[*k as usize] = if arrived.illumination == Illumination::Unknown {
                 Answer { sight, ..Answer::UNKNOWN }
             } else {
-                let is_near =
-                    place.point.reach > 0.4 * arrived.distance || is_one_sided && arrived.height <= place.point.reach;
+                let is_near = is_one_sided && arrived.height <= place.point.reach;
                 Answer {
                     sums: arrived.sums,
                     smooth: arrived.proved,
@@ -350,13 +349,11 @@ impl<'a> LightQueue<'a> {
             motion: arrival.drift,
             turn: if is_kinked || !is_even && !arrival.resolved {
                 f32::INFINITY
-            } else if arrival.sharp {
-                0.5
             } else if is_even {
                 0.0
             } else {
                 // One place does not tell what it does, but some do together
-                0.1
+                1.0
             },
             most: 0.0,
             sight,
@@ -368,6 +365,6 @@ impl<'a> LightQueue<'a> {
         let colors = place.colors();
         let value = colors.onto(place.base, &arrival.sums);
         let error = colors.of(&arrival.bend);
-        self.arrivals.steps(value, error) <= BEND / (self.scene.lights.len() as f32).sqrt()
+        self.arrivals.steps(value, error) <= TOLERANCE.point / (self.scene.lights.len() as f32).sqrt()
     }
 }

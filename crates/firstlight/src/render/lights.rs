@@ -3,7 +3,7 @@
 use super::ladder::Ladder;
 use super::many::FEW;
 use crate::color::{DisplaySteps, Rgb};
-use crate::integrate::{Asked, Emitter, Obstacles, Tolerance};
+use crate::integrate::{Asked, Emitter, Obstacles, TOLERANCE};
 use crate::light::{Light, LightKind, LightTree};
 use crate::material::Lobe;
 use crate::scene::Scene;
@@ -54,7 +54,7 @@ impl<'a> Lights<'a> {
         let steps = DisplaySteps::new(&scene.display, scene.tolerance);
         // Errors of lights that are not integrated are none, or asked for
         let integrated = emitters.iter().flatten().count();
-        let allowed = Tolerance::DEFAULT.point / (integrated.max(1) as f32).sqrt();
+        let allowed = TOLERANCE.point / (integrated.max(1) as f32).sqrt();
         let least = steps.value_of(allowed);
         Lights { emitters, integrated, scales, steps, tree, targets, ladders, obstacles, allowed, least }
     }
@@ -77,7 +77,6 @@ impl<'a> Lights<'a> {
             near: None,
             lobe,
             steps: &self.steps,
-            tolerance: &Tolerance::DEFAULT,
             allowed: self.allowed,
             least: self.least,
             shadows,

@@ -12,17 +12,10 @@ use fearless_simd::{Level, prelude::*};
 use super::leaves::Leaves;
 use super::tally::Tally;
 use crate::accel::dispatch_all;
+use crate::integrate::TOLERANCE;
 use crate::material::MOMENTS;
 use crate::math::{LANES, only, sum_of_runs, total};
 
-/// The deviation of the share that a packet of sixteen sees which some edge runs through. Of sixteen points in as many
-/// parts of a cell of the light the edge cuts about four, each of which it parts anywhere.
-const MIXED: f32 = 0.041;
-/// How many times more the square of that is, over a root of their effective number, where they are few: by chance, few
-/// packets say too little of how much they are off.
-const FEW: f32 = 14.0;
-/// How many times what varies smoothly counts: points of neighbours are wrong alike.
-const ALIKE: f32 = 2.3;
 /// An edge is looked for in so many packets around one that it runs through.
 const AROUND: usize = 4;
 
@@ -101,19 +94,19 @@ impl Packets {
         }
         let [all, lit] = [sum_of(tallies, |tally| tally.all), sum_of(tallies, |tally| tally.lit)];
         let width = Packets::width(rays);
-        let per_packet = squared(MIXED * of_edge((width * rays) as f64) / of_edge(LANES as f64));
+        let per_packet = squared(TOLERANCE.mixed * of_edge((width * rays) as f64) / of_edge(LANES as f64));
         let (mut edges, mut smooth) = (OfKind::default(), OfKind::default());
         for k in (0..MOMENTS).filter(|k| all[*k] > LEAST && self.unit[*k] > 0.0) {
             let per_all = 1.0 / (all[k] as f32 * self.unit[k]);
             // The part of what is sent that arrives
             let share = (lit[k] / all[k]) as f32;
             // Rays that see other things are wrong by chance, each by itself; those that see the same, together
-            let alone = squared(MIXED) * variance(sums.alone[k], sums.alone_squared[k]);
+            let alone = squared(TOLERANCE.mixed) * variance(sums.alone[k], sums.alone_squared[k]);
             let together = per_packet * variance(sums.together[k], sums.together_squared[k]);
             edges[k] = if rays == 1 { alone } else { alone.min(together) }.sqrt() * per_all;
             // Where it is known what is sent, that is parted wrong only, what is lit and what is hidden
             let [hidden, lit, mixed] = [0, 1, 2].map(|which: usize| sums.smooth[which][k]);
-            let varies = |hidden: f32, lit: f32| ALIKE * (hidden + lit).sqrt() * per_all;
+            let varies = |hidden: f32, lit: f32| TOLERANCE.alike * (hidden + lit).sqrt() * per_all;
             smooth[k] = match found {
                 None => varies(mixed, lit),
                 // Points that do not find what is sent do not find which part of it arrives
@@ -193,9 +186,9 @@ impl AddAssign<&BlockSums> for BlockSums {
     }
 }
 
-/// A sum of squares, and what it may be off by: [`FEW`] over a root of the effective number of them.
+/// A sum of squares, and what it may be off by: [`TOLERANCE.few_packets`] over a root of the effective number of them.
 fn variance(squares: f32, of_squares: f32) -> f32 {
-    squares + FEW * of_squares.sqrt()
+    squares + TOLERANCE.few_packets * of_squares.sqrt()
 }
 
 fn squared(v: f32) -> f32 {

@@ -2,10 +2,11 @@
 
 use super::Counts;
 use super::arrival::{ArrivalPlace, Arrivals, Trees};
-use super::change::{Arrival, Change, RESOLVED, RESOLVED_SWING, is_sharp, is_smooth};
+use super::change::{Arrival, Change};
 use super::pixel::Lighting;
 use super::plain::Plain;
 use crate::ids::LightId;
+use crate::integrate::TOLERANCE;
 use crate::light::{Light, LightKind};
 use crate::material::{Lobe, Moments};
 use crate::math::{Vec3, square};
@@ -52,11 +53,10 @@ impl Arrivals<'_> {
         let lobe = (place.lobe.sharpness(si.ns.dot(si.wo)) * square(moved)).min(1.0);
         let specular =
             if matches!(place.lobe, Lobe::None) { 0.0 } else { weight * (edge + rim + terminator + lobe).min(1.0) };
-        let resolved = edge == 0.0 && rim == 0.0 && swing < RESOLVED_SWING && lobe < RESOLVED;
+        let resolved = edge == 0.0 && rim == 0.0 && swing < TOLERANCE.resolved && lobe < TOLERANCE.resolved;
         let drift = if edge == 0.0 { 0.0 } else { f32::INFINITY };
-        let smooth = resolved && terminator == 0.0 && is_smooth(swing, lobe);
-        Change { bend: Moments::bounds(weight * share, specular), drift, resolved, smooth, sharp: is_sharp(lobe) }
-            .with(sums)
+        let smooth = resolved && terminator == 0.0;
+        Change { bend: Moments::bounds(weight * share, specular), drift, resolved, smooth }.with(sums)
     }
 
     /// What arrives at one point of a light of one point.

@@ -23,11 +23,6 @@ use crate::visibility::ShadowView;
 /// Blocks whose sums are added up in single precision.
 const RUN: usize = 1 << 8;
 
-/// Light is peaked where so many times more points send anything than there are effective ones, if that is more than
-/// this part of all.
-const PEAKED: f64 = 4.0;
-const PART: f64 = 1.0 / 16.0;
-
 /// What points of a light say, from one place: leaf by leaf, and sums of what they would send, and of what of it
 /// arrives.
 #[derive(Debug, Default)]
@@ -39,11 +34,9 @@ pub(super) struct Tally {
     pub lit: [f64; MOMENTS],
     /// The sum of squares of what each leaf would send.
     squares: [f64; MOMENTS],
-    /// Parts of the light: what would send anything, and what of it is hidden. With the sum of the squares of the parts
-    /// that leaves are of the former.
+    /// Parts of the light: what would send anything, and what of it is hidden.
     pub sending: f64,
     pub hidden: f64,
-    squared_parts: f64,
     /// What points sent that were asked in leaves thought to be away from edges, and found the contrary of what those
     /// held; added up until somebody forgets it.
     pub surprises: [f64; MOMENTS],
@@ -73,19 +66,6 @@ impl Tally {
     /// good.
     pub fn effective(&self) -> [f64; MOMENTS] {
         std::array::from_fn(|k| if self.squares[k] > 0.0 { self.all[k] * self.all[k] / self.squares[k] } else { 0.0 })
-    }
-
-    /// The same of those that send anything, if all sent alike.
-    pub fn effective_sending(&self) -> f64 {
-        if self.squared_parts > 0.0 { self.sending * self.sending / self.squared_parts } else { 0.0 }
-    }
-
-    /// Whether few points send much of it, where each kind of light counts for so much.
-    pub fn is_peaked(&self, weights: &[f32; MOMENTS]) -> bool {
-        let (effective, sending) = (self.effective(), self.effective_sending());
-        let sent: [f64; MOMENTS] = std::array::from_fn(|k| self.all[k] * f64::from(weights[k]));
-        let much = PART * sent.iter().sum::<f64>();
-        (0..MOMENTS).any(|k| sent[k] > much && effective[k] * PEAKED < sending)
     }
 
     /// What the points in the leaves of a block say.
@@ -173,7 +153,7 @@ impl Tally {
 
     #[inline(always)]
     fn sum_lanes<S: Simd>(&mut self, simd: S, leaves: &Leaves) {
-        let (mut parts, mut moments) = ([0.0; 3], [0.0; 3 * MOMENTS]);
+        let (mut parts, mut moments) = ([0.0; 2], [0.0; 3 * MOMENTS]);
         for (blocks, answers) in leaves.blocks.chunks(RUN).zip(self.blocks.chunks(RUN)) {
             let mut sums = [simd.splat_f32x16(0.0); 3 * MOMENTS];
             for (block, answers) in blocks.iter().zip(answers) {
@@ -181,7 +161,6 @@ impl Tally {
                 let [sends, hides] = [answers.sends, answers.hides].map(|bits| f64::from(bits.count_ones()));
                 parts[0] += sends * f64::from(part);
                 parts[1] += hides * f64::from(part);
-                parts[2] += sends * f64::from(part) * f64::from(part);
                 for (sums, sent) in sums.chunks_exact_mut(3).zip(answers.lanes(simd)) {
                     let sent = sent * part;
                     sums[0] += sent;
@@ -193,7 +172,7 @@ impl Tally {
                 *total += sum.as_slice().iter().map(|v| f64::from(*v)).sum::<f64>();
             }
         }
-        [self.sending, self.hidden, self.squared_parts] = parts;
+        [self.sending, self.hidden] = parts;
         for (k, moment) in moments.chunks_exact(3).enumerate() {
             (self.all[k], self.lit[k], self.squares[k]) = (moment[0], moment[1], moment[2]);
         }

@@ -13,32 +13,12 @@ use super::resolve::LightTerm;
 use super::tally::Tally;
 use crate::color::Rgb;
 use crate::ids::SurfaceId;
+use crate::integrate::TOLERANCE;
 use crate::light::SERIES;
 use crate::material::{Bsdf, MOMENTS, Moments};
 use crate::shape::SurfaceInteraction;
 use crate::visibility::{ShadowView, Visibility};
 
-/// How many times what is allowed by chance a deviation may be; more after more than so many times the points that are
-/// asked [first](BEGIN), by the fourth root of their number, up to so many times as many again. A picture of so much
-/// error in all takes least where pixels that take long are off by more than others.
-const DEVIATION: f32 = 1.25;
-const LONG: f32 = 2.0;
-const LONGEST: f32 = 4.0;
-/// The part of the deviation of as many random points that those of all rays have, which are stratified.
-const STRATIFIED: f32 = 0.5;
-/// The points of a pixel that are asked first, with a tolerance of 1; with others a root of it fewer.
-const BEGIN: f32 = 1024.0;
-/// Effective points that find what is in the way of a pixel.
-const CLEAR: f32 = 384.0;
-/// A pixel that tells what others in its square see counts for so many: the mean sum of squares of what the nine are
-/// worth for a pixel, so that chance puts that one off by as much as if it had been asked.
-const NODE_PIXELS: f32 = 0.64;
-/// The part of what may be wrong that points may tell nothing about.
-const UNTOLD: f32 = 0.5;
-/// How many of those that send it what few points send may be off by.
-const FEW: f32 = 2.0;
-/// Effective points of all rays together that tell something.
-const TOLD: f64 = 32.0;
 /// So many points of all rays tell that all of the light is hidden: near black, anything shows.
 const ALL_HIDDEN: usize = 1 << 14;
 
@@ -126,8 +106,8 @@ impl Together {
 
     /// The same of a pixel that tells what others in its square see.
     pub fn of_node(mut self) -> Self {
-        self.share *= NODE_PIXELS;
-        self.each *= NODE_PIXELS;
+        self.share *= TOLERANCE.node_pixels;
+        self.each *= TOLERANCE.node_pixels;
         self.is_node = true;
         self
     }
@@ -281,7 +261,7 @@ impl Together {
     /// asked in closed form.
     fn points(&self, arrivals: &mut Arrivals, asking: &mut [Asking], counts: &mut Counts) {
         let asker = arrivals.asker(self.light);
-        let begin = BEGIN / (arrivals.scene.tolerance() as f32).sqrt();
+        let begin = TOLERANCE.first_points / (arrivals.scene.tolerance() as f32).sqrt();
         let first = (begin * self.share.sqrt() / asking.len() as f32) as usize;
         let first = first.next_power_of_two().clamp(FIRST, LAST);
         let tolerance = arrivals.tolerance_by_chance(self.share) * self.room;
@@ -296,7 +276,7 @@ impl Together {
             let wrong = self.wrong(&said, packets, &mut asked, asking, arrivals);
             let points = asked.leaves.count() * asking.len();
             let allowed = tolerance * self.deviation(points as f32 / begin);
-            let is_told = said.shows(arrivals, &|k| said.untold(k)) <= tolerance * UNTOLD;
+            let is_told = said.shows(arrivals, &|k| said.untold(k)) <= tolerance * TOLERANCE.untold;
             let is_lit = !said.is_hidden && self.is_clear(&said);
             let is_dark = said.is_dark && points >= ALL_HIDDEN;
             let is_last = points >= MOST || !is_halved;
@@ -388,7 +368,7 @@ impl Together {
         // expected, and one more (Good, "The population frequencies of species and the estimation of population
         // parameters", 1953). Of small things that are in the way each point says what it sends; where leaves near
         // those that were found are smaller, all that were not found are missing
-        let noise = |k: usize| STRATIFIED * (met[k] / effective[k]).sqrt();
+        let noise = |k: usize| TOLERANCE.stratified * (met[k] / effective[k]).sqrt();
         let overlooked = shows(&|k| met[k]);
         let unmet = shows(&|k| noise(k).max(packets.smooth[k]));
         Wrong {
@@ -402,13 +382,14 @@ impl Together {
 
     /// Whether enough points are asked to find what is in the way.
     fn is_clear(&self, said: &PointsSaid) -> bool {
-        said.effective.iter().copied().fold(0.0, f64::max) >= f64::from(CLEAR * self.share.sqrt())
+        said.effective.iter().copied().fold(0.0, f64::max) >= f64::from(TOLERANCE.clear * self.share.sqrt())
     }
 
     /// Whether so many points may miss some of what would arrive if nothing were in the way.
     fn may_miss(&self, said: &PointsSaid, points: usize, asking: &[Asking], arrivals: &Arrivals) -> bool {
         let apart = arrivals.asker(self.light).area.extent() / (points as f32).sqrt();
-        let is_unseen = |k: usize| said.effective[k] < TOLD && asking.iter().any(|one| one.reflects(k));
+        let is_unseen =
+            |k: usize| said.effective[k] < f64::from(TOLERANCE.told) && asking.iter().any(|one| one.reflects(k));
         (0..MOMENTS).any(is_unseen)
             || asking.iter().any(|one| !arrivals.varies_over(self.light, &one.place(self.each), apart))
     }
@@ -416,7 +397,7 @@ impl Together {
     /// How many times what is allowed by chance these rays may deviate by, after so many times the first points.
     fn deviation(&self, times: f32) -> f32 {
         // What is off at a node is off at all pixels that it tells
-        if self.is_node { DEVIATION } else { DEVIATION * (times / LONG).clamp(1.0, LONGEST).sqrt().sqrt() }
+        if self.is_node { 1.0 } else { (times / TOLERANCE.long).clamp(1.0, TOLERANCE.longest).sqrt().sqrt() }
     }
 
     /// Asks what would arrive at all rays if nothing were in the way.
@@ -462,7 +443,7 @@ impl PointsSaid {
 
     /// What few points send, or none, can be off by what some of them do.
     fn untold(&self, k: usize) -> Rgb {
-        if self.effective[k] < TOLD { self.all[k].min(self.one(k) * FEW) } else { self.missing[k] }
+        if self.effective[k] < f64::from(TOLERANCE.told) { self.all[k].min(self.one(k)) } else { self.missing[k] }
     }
 }
 

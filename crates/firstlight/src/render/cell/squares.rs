@@ -11,15 +11,15 @@ use std::ops::ControlFlow;
 use arrayvec::ArrayVec;
 
 use super::behind::{FragmentSight, NONE};
-use super::{CELL, Cells, MINGLED};
+use super::{CELL, Cells};
 use crate::color::Rgb;
 use crate::ids::LightId;
+use crate::integrate::TOLERANCE;
 use crate::material::Moments;
 use crate::math::{LANES, Vec3};
 use crate::render::Counts;
 use crate::render::beams::Packet;
 use crate::render::fragment::{Contrast, Fragment};
-use crate::render::grid::SETS_IN;
 use crate::render::light_queue::LitPlace;
 use crate::render::many::FEW;
 use crate::render::square::Square;
@@ -29,11 +29,6 @@ use crate::visibility::Viewpoint;
 /// Pixels across the largest and the smallest squares.
 const LARGEST: u32 = 16;
 const SMALLEST: u32 = 4;
-/// How far normals may be from what nine of them foretell.
-const EVEN: f32 = 0.01;
-/// In display steps: how far the five may be from what the corners foretell, in the smallest squares; less in larger
-/// ones, where more can lie between.
-const FORETOLD: f32 = 0.8;
 /// Rays of a pixel that look for what the nine do not see.
 const LOOKING: usize = 16;
 /// Pixels across a block, of which those rays go together.
@@ -183,7 +178,7 @@ impl Cells<'_> {
                         foretold += *n * (across * down);
                     }
                 }
-                (foretold - normal(i, j)).length() <= EVEN
+                (foretold - normal(i, j)).length() <= TOLERANCE.even
             })
         })
     }
@@ -343,7 +338,7 @@ impl Cells<'_> {
         let wide = (side / SMALLEST) as f32;
         // Where a light sets in between them it bends at once
         let sets_in = nodes.as_flattened().iter().any(|node| node.sums == Moments::default());
-        let allowed = if sets_in { FORETOLD * SETS_IN } else { FORETOLD };
+        let allowed = if sets_in { TOLERANCE.foretold * TOLERANCE.bends_at_once } else { TOLERANCE.foretold };
         let foretold_to = allowed / (wide * self.scene.lights.len() as f32).sqrt();
         // What the corners foretell
         for ((row, j), down) in nodes.iter().zip(rows.0).zip(rows.line()) {
@@ -389,7 +384,7 @@ impl Cells<'_> {
                 let mingled = of.contrast.of(&slope) * 0.125;
                 let scale = self.lights.arrivals.scale(light);
                 let value = scale * of.bsdf.colors.of(&sums);
-                if self.lights.arrivals.steps(value, scale * mingled) > MINGLED {
+                if self.lights.arrivals.steps(value, scale * mingled) > TOLERANCE.mingled {
                     continue;
                 }
             }

@@ -4,9 +4,10 @@ use std::ops::Range;
 
 use super::patch::Patch;
 use super::places::{standing, tones, zone};
-use super::{BLOCK, CLOSE, CROWD, INTEGRALS, LENIENT, LEVELS, Many, ONE, PILOT, SURE, Single, Stored};
+use super::{BLOCK, CLOSE, LEVELS, Many, ONE, PILOT, Single, Stored};
 use crate::color::Rgb;
 use crate::ids::LightId;
+use crate::integrate::TOLERANCE;
 use crate::light::{Held, LightKind, LightNode, LightTree, Sends, Sent};
 use crate::material::{Lobe, Moments};
 use crate::math::Vec3;
@@ -50,7 +51,7 @@ impl<'a> Many<'a> {
         let receives = group.iter().any(|at| patch(at).si.receives_shadow);
         self.outlook.stand(scene, group.iter().map(|at| standing(patch(at))));
         let steps = arrivals.display_steps();
-        let walk = CutRules { tree, steps, zone: &zone, tones: &tones, budget: CROWD };
+        let walk = CutRules { tree, steps, zone: &zone, tones: &tones, budget: TOLERANCE.crowd };
         let mut crowd = std::mem::take(&mut self.crowd);
         let (simd, outlook, fence) = (arrivals.level(), &mut self.outlook, &mut self.fence);
         let mut look = |node: &LightNode, light: u32| {
@@ -61,7 +62,7 @@ impl<'a> Many<'a> {
         };
         crowd.begin(&walk);
         let guess = guess.unwrap_or_else(|| {
-            crowd.refine(&CutRules { budget: CROWD * PILOT, ..walk }, None, &mut look);
+            crowd.refine(&CutRules { budget: TOLERANCE.crowd * PILOT, ..walk }, None, &mut look);
             crowd.peek();
             let some = [0, group.len() / 2, group.len() - 1].map(|i| patch(&group[i]));
             let all = some.map(|patch| {
@@ -76,7 +77,7 @@ impl<'a> Many<'a> {
                     _ => sum,
                 })
             });
-            all.into_iter().reduce(Rgb::min).unwrap_or(Rgb::BLACK) * SURE
+            all.into_iter().reduce(Rgb::min).unwrap_or(Rgb::BLACK) * TOLERANCE.sure
         });
         crowd.refine(&walk, Some(guess), &mut look);
         let is_close = crowd.singles.len() > CLOSE && level < LEVELS && group.len() > 1;
@@ -100,7 +101,7 @@ impl<'a> Many<'a> {
                 let lists = [lit.clone(), maybe.clone()];
                 let (stored, light) = self.in_crowd(patch, &crowd.singles, lists, arrivals, counts);
                 let error = crowd.error(&patch.bsdf.colors);
-                if arrivals.steps(stored.value, error) > CROWD * LENIENT && guess != Rgb::BLACK {
+                if arrivals.steps(stored.value, error) > TOLERANCE.crowd * TOLERANCE.lenient && guess != Rgb::BLACK {
                     // Darker than was guessed
                     self.singles.truncate(singles);
                     found = Some(found.map_or(light, |found| found.min(light)));
@@ -111,7 +112,7 @@ impl<'a> Many<'a> {
                 self.stored[*at] = stored;
             }
             darkest = if level < LEVELS {
-                found.unwrap_or(guess) * SURE
+                found.unwrap_or(guess) * TOLERANCE.sure
             } else if level < 2 * LEVELS {
                 found.unwrap_or(guess).min(guess) * 0.5
             } else {
@@ -160,7 +161,7 @@ impl<'a> Many<'a> {
         let from = self.singles.len() as u32;
         let mut light = stored.sent.cosine();
         if !singles.is_empty() {
-            arrivals.tolerate(INTEGRALS / (singles.len() as f32).sqrt());
+            arrivals.tolerate(TOLERANCE.integrals / (singles.len() as f32).sqrt());
         }
         for index in singles {
             let place = ArrivalPlace {

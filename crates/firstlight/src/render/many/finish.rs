@@ -4,12 +4,12 @@ use std::ops::Range;
 
 use super::dense::sent;
 use super::patch::Patches;
-use super::{ANYTHING, INTEGRALS, Many, Single, Stored};
+use super::{ANYTHING, Many, Single, Stored};
 use crate::color::Rgb;
+use crate::integrate::TOLERANCE;
 use crate::light::Sent;
 use crate::material::{Lobe, Moments};
 use crate::render::arrival::{ArrivalPlace, Arrivals};
-use crate::render::change::BEND;
 use crate::render::counts::Counts;
 use crate::render::fence::Fence;
 use crate::render::fragment::Fragments;
@@ -65,7 +65,7 @@ impl<'a> Many<'a> {
             if doubts.is_empty() {
                 continue;
             }
-            arrivals.tolerate(INTEGRALS / (doubts.len() as f32).sqrt());
+            arrivals.tolerate(TOLERANCE.integrals / (doubts.len() as f32).sqrt());
             rays.clear();
             patch.for_each(scene, fragments, |si, bsdf| rays.push((*si, *bsdf)));
             for doubt in &doubts {
@@ -159,7 +159,7 @@ impl<'a> Many<'a> {
             let Single { light, arrival } = &self.singles[i as usize];
             doubt(Some(i), shown(*light, &arrival.bend));
         }
-        if arrivals.steps(value, all) <= BEND {
+        if arrivals.steps(value, all) <= TOLERANCE.point {
             doubts.clear();
             return;
         }
@@ -170,7 +170,7 @@ impl<'a> Many<'a> {
         doubts.sort_unstable_by(|a, b| a.shown.total_cmp(&b.shown).then(a.single.cmp(&b.single)));
         let mut sum = Rgb::BLACK;
         doubts.retain(|doubt| {
-            if arrivals.steps(value, sum + doubt.error) <= BEND {
+            if arrivals.steps(value, sum + doubt.error) <= TOLERANCE.point {
                 sum += doubt.error;
                 return false;
             }

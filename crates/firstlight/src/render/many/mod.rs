@@ -2,11 +2,11 @@
 //!
 //! For each block of pixels, and for its quarters and theirs, a [`Cut`] says which lights count: nodes of the
 //! [`LightTree`](crate::light::LightTree) that are seen whole from all of it, and nodes that have to be looked at from
-//! each patch. What is dropped, and what is lost by taking many lights for one, stays below [`BLOCK_BUDGET`] and
-//! [`PATCH_BUDGET`] together, in display steps.
+//! each patch. What is dropped, and what is lost by taking many lights for one, stays below [`Tolerance::many`]
+//! for both, in display steps.
 //!
 //! Up to [`SINGLY`] lights are all taken one by one. Of more, one may stand for many: a [`Crowd`] says for which, for
-//! each block, and what may be wrong is [`CROWD`] as the root of a sum of squares. Cells and blocks lie on a grid of
+//! each block, and what may be wrong is [`Tolerance::crowd`] as the root of a sum of squares. Cells and blocks lie on a grid of
 //! the film, so nothing depends on tiles, crops or threads.
 
 mod dense;
@@ -28,6 +28,7 @@ use super::fragment::Fragments;
 use super::resolve::LightTerm;
 use crate::color::Rgb;
 use crate::ids::LightId;
+use crate::integrate::TOLERANCE;
 use crate::light::{LightTree, Sent};
 use crate::material::Lobe;
 use crate::math::{Vec3, square};
@@ -42,32 +43,20 @@ use places::{is_alike, standing, tone, tones, zone};
 pub(crate) const FEW: usize = 16;
 /// So many lights are at most taken one by one; of more, many may be taken for one.
 pub(crate) const SINGLY: usize = 1000;
-/// In display steps: how far what is settled for a block may be wrong, and what is settled for a patch.
-const BLOCK_BUDGET: f32 = 0.45;
-const PATCH_BUDGET: f32 = 0.4;
-/// In display steps: the root of the sum of squares of all that may be wrong where many are taken for one.
-const CROWD: f32 = 1.5;
-/// A patch that is darker than was guessed is looked at again beyond this factor of it.
-const LENIENT: f32 = 1.25;
 /// How much wider the first look at a block is, that says how bright it is.
 const PILOT: f32 = 4.0;
-/// The part of what that look finds that is taken for sure.
-const SURE: f32 = 0.8;
 /// Blocks that ask for more lights by themselves are quartered.
 const CLOSE: usize = 24;
 /// An error that shows whatever is there.
 const ANYTHING: f32 = 1e30;
 /// In a list of nodes: one light stands for this one.
 const ONE: u32 = 1 << 31;
-/// In display steps: how far all lights that are integrated one by one may be wrong together, if their errors are
-/// independent.
-const INTEGRALS: f32 = 0.225;
 /// Pixels across a block.
 const BLOCK: usize = 8;
 const BLOCKS: usize = CELL as usize / BLOCK;
 /// Sizes of blocks: each has four of the next.
 const LEVELS: usize = 3;
-/// What each of those may have of [`BLOCK_BUDGET`]. Together less than all: a patch may be darker than its block was
+/// What each of those may have of [`Tolerance::many`]. Together less than all: a patch may be darker than its block was
 /// guessed to be.
 const SHARES: [f32; LEVELS] = [0.3, 0.15, 0.15];
 /// Colours of a block that are told apart.
@@ -248,7 +237,7 @@ impl<'a> Many<'a> {
         let places = group.iter().map(|at| standing(patch(at)));
         self.outlook.stand(scene, places);
         let (outlook, level) = (&mut self.outlook, arrivals.level());
-        let (steps, budget) = (arrivals.display_steps(), BLOCK_BUDGET * SHARES[above.level]);
+        let (steps, budget) = (arrivals.display_steps(), TOLERANCE.many * SHARES[above.level]);
         let walk = CutRules { tree, steps, zone: &zone, tones: &tones, budget };
         let links = scene.geometry.lights_of(one.si.surface);
         let shines = |light: u32| scene.geometry.links.contains(links, LightId(light));
@@ -297,7 +286,7 @@ impl<'a> Many<'a> {
         let mut stored = self.patch(patch, &above.lit, &above.open, arrivals, counts);
         let bsdf = &patch.bsdf;
         let shown = arrivals.steps(stored.value, (bsdf.colors * above.error).sum());
-        if shown > BLOCK_BUDGET {
+        if shown > TOLERANCE.many {
             // Darker than was guessed: by itself, from the beginning
             self.singles.truncate(singles);
             stored = self.patch(patch, &Default::default(), &self.tree.roots, arrivals, counts);
@@ -326,11 +315,11 @@ impl<'a> Many<'a> {
         let from = self.singles.len();
         stored.value = value;
         if !open.is_empty() {
-            arrivals.tolerate(INTEGRALS / (open.len() as f32).sqrt());
+            arrivals.tolerate(TOLERANCE.integrals / (open.len() as f32).sqrt());
             let zone = zone(std::iter::once(patch), self.eye);
             let tones = [tone(scene, bsdf)];
             let steps = arrivals.display_steps();
-            let walk = CutRules { tree, steps, zone: &zone, tones: &tones, budget: PATCH_BUDGET };
+            let walk = CutRules { tree, steps, zone: &zone, tones: &tones, budget: TOLERANCE.many };
             let (outlook, singles, level) = (&mut self.outlook, &mut self.singles, arrivals.level());
             let mut stands = false;
             stored.value = self.cut.of_patch(

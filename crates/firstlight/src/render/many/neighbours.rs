@@ -1,15 +1,10 @@
 //! What the neighbours of a pixel in its cell tell of what light does within it.
 
 use super::patch::{Patch, Patches};
+use crate::integrate::TOLERANCE;
 use crate::material::Moments;
 use crate::math::Vec3;
 use crate::render::cell::CELL;
-
-/// By how much the normals of three pixels in a row may differ from turning evenly, in radians.
-const EVEN: f32 = 0.02;
-/// What light does within a pixel, at most, as a part of its second difference over three: a corner in the middle of
-/// the pixel makes an eighth, the onset of a root nearly a fourth.
-const WITHIN: f32 = 0.2;
 
 impl Patches {
     /// How far the mean of what light does over a patch that fills its pixel can be from what it does in the middle: by
@@ -26,12 +21,12 @@ impl Patches {
             }
             // Nor do they tell where an edge of the surface runs between
             let [before, here, after] = normals;
-            if !((before + after - here * 2.0).length() <= EVEN) {
+            if !((before + after - here * 2.0).length() <= TOLERANCE.even) {
                 return None;
             }
             let [before, here, after] = rows;
             let difference = (before + after).zip(here, |sides, here| sides - 2.0 * here);
-            bend += difference.map(|difference| difference.abs() * WITHIN);
+            bend += difference.map(|difference| difference.abs() * TOLERANCE.within);
         }
         Some(bend)
     }
