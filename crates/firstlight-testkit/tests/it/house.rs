@@ -239,3 +239,71 @@ fn a_type_name_has_one_meaning() {
     let wrong: Vec<String> = found.iter().map(|(name, paths)| format!("{name}: {}", paths.join(", "))).collect();
     assert!(wrong.is_empty(), "\n{}", wrong.join("\n"));
 }
+
+/// The code of a file without its tests, line by line, comments left out.
+fn code(text: &str) -> impl Iterator<Item = (usize, &str)> {
+    let tests = text.find("\n#[cfg(test)]\nmod ").unwrap_or(text.len());
+    let lines = text[..tests].lines().enumerate().map(|(number, line)| (number + 1, line));
+    lines.map(|(number, line)| (number, line.split("//").next().unwrap_or(line)))
+}
+
+/// The numbers with a point or an exponent in a line of code, but for those with more digits than anybody chooses.
+fn floats(line: &str) -> impl Iterator<Item = f64> {
+    let words = line.split(|c: char| !(c.is_alphanumeric() || "._-".contains(c)));
+    let words = words.map(|word| word.trim_start_matches('-').replace('_', "").replace("f32", "").replace("f64", ""));
+    let words = words.filter(|word| word.starts_with(|c: char| c.is_ascii_digit()));
+    words
+        .filter(|word| word.len() < 12 && (word.contains('.') || word.contains('e')))
+        .filter_map(|word| word.parse().ok())
+}
+
+/// Whether a number is so small or large that it only guards against rounding.
+fn is_guard(number: f64) -> bool {
+    number <= 1e-3 || number >= 1e3
+}
+
+/// Whether a number may be part of a formula.
+fn is_plain(number: f64) -> bool {
+    number <= 16.0 && (number * 16.0).fract() == 0.0 || is_guard(number)
+}
+
+#[test]
+fn floats_are_found() {
+    let found = floats("if a.0 < 0.35 * x.sqrt() - 1e-3 && b[7] > -1.5_f32 || 0x1e > 3 { 1_000.25f32 }");
+    assert_eq!(found.collect::<Vec<_>>(), [0.35, 1e-3, 1.5, 1000.25]);
+    assert_eq!(floats("0.478_628_670_499_366_47").count(), 0);
+    assert!([0.0, 0.5, 0.0625, 12.0, 1e-6, 1e30].into_iter().all(is_plain));
+    assert!([0.35, 0.1, 0.003, 17.0, 255.0].into_iter().all(|number| !is_plain(number)));
+}
+
+/// What decides an error stands in one place, and there are few such numbers.
+#[test]
+fn the_tolerance_holds_all_numbers_that_decide_an_error() {
+    let folder = root().join("crates/firstlight/src");
+    let tolerance = std::fs::read_to_string(folder.join("integrate/tolerance.rs")).unwrap();
+    let fields = tolerance.split("pub(crate) struct Tolerance {").nth(1).unwrap().split("\n}").next().unwrap();
+    let fields: Vec<&str> = fields.lines().filter_map(|line| line.trim().strip_prefix("pub ")).collect();
+    assert!((20..=35).contains(&fields.len()), "{} numbers decide errors", fields.len());
+    assert!(fields.iter().all(|field| field.ends_with(": f32,")), "{fields:?}");
+    let mut all = Vec::new();
+    sources(&folder.join("render"), &mut all);
+    for file in ["evaluate", "grade", "fit"] {
+        let path = folder.join("integrate").join(file).with_extension("rs");
+        let text = std::fs::read_to_string(&path).unwrap();
+        all.push((path, text));
+    }
+    let (mut wrong, mut count) = (Vec::new(), 0);
+    // What is told of colours of pictures, not of errors
+    for (path, text) in all.iter().filter(|(path, _)| !path.ends_with("heat.rs")) {
+        for (number, line) in code(text) {
+            let mut floats = floats(line).peekable();
+            count += usize::from(floats.peek().is_some());
+            let is_named = line.trim_start().trim_start_matches("pub(super) ").starts_with("const ");
+            if floats.any(|float| !is_plain(float) || is_named && !is_guard(float)) {
+                wrong.push(format!("{}:{number}: {line}", path.display()));
+            }
+        }
+    }
+    assert!(count >= 300, "only {count} lines with numbers");
+    assert!(wrong.is_empty(), "to be told by `Tolerance` or `Costs`:\n{}", wrong.join("\n"));
+}

@@ -26,7 +26,7 @@ use super::emitter::Emitter;
 use super::fit::{Cell, CutBlock, Fits, MOMENTS, coarse, fit};
 use super::grade::{Grades, grade, halves, survey, whole};
 use super::panels::{Between, Blocked, Panel, PanelSums, cut, rows};
-use super::tolerance::{TOLERANCE, Weight};
+use super::tolerance::{COSTS, TOLERANCE, Weight};
 use super::view::{FlatView, Receiver};
 use crate::color::DisplaySteps;
 use crate::material::{Lobe, Moments};
@@ -110,7 +110,7 @@ impl Asked<'_> {
     /// How many cells and panels a pixel may be asked in place of points of a light that makes so many display steps:
     /// about half of what takes as long, as they are asked in vain where there are more of them.
     fn most_asked(steps: f32) -> f32 {
-        ASKED + ASKED_PER_STEP * steps
+        COSTS.asked + COSTS.asked_per_step * steps
     }
 
     /// The light with what is between it and points.
@@ -126,16 +126,8 @@ impl Asked<'_> {
 const CELL_DEPTH: u32 = 64;
 const PANEL_DEPTH: u32 = 12;
 const MOST_CELLS: u32 = 2048;
-
-/// See [`Asked::most_asked`]. A pixel asks some 300 points of a light, and 35 for each step that this makes (60,000
-/// pixels of 200 random scenes); a panel takes as long as about 8 of them.
-const ASKED: f32 = 32.0;
-const ASKED_PER_STEP: f32 = 2.0;
-/// The same where nothing is known of the light: of white.
-const WHITE: f32 = 255.0;
-
-/// The part of what is allowed of a ball that each face of a cube may be wrong by: 1 / sqrt(6).
-const FACE: f32 = 0.408;
+/// In display steps: what a light makes at most.
+const LARGEST_CODE: f32 = u8::MAX as f32;
 
 /// The memory of [`evaluate`](Evaluator::evaluate), used again and again.
 #[derive(Default)]
@@ -201,7 +193,7 @@ impl Evaluator {
         for emitter in &faces {
             let mut through = std::mem::take(&mut self.part);
             through.clear();
-            let face = Asked { emitter, allowed: light.allowed * FACE, ..*light };
+            let face = Asked { emitter, allowed: light.allowed / 6f32.sqrt(), ..*light };
             self.evaluate_one(level, &face, &inside, &mut through);
             if seen.is_empty() {
                 seen.extend_from_slice(&through);
@@ -335,7 +327,7 @@ impl Evaluator {
                     self.state[start + k].cells = 1;
                     self.grading.push(whole(outline, number, self.views[block].square(k)));
                 }
-                self.state[start + k].most_asked = Asked::most_asked(WHITE) * point.part_of_points;
+                self.state[start + k].most_asked = Asked::most_asked(LARGEST_CODE) * point.part_of_points;
                 self.between.push(class.between);
                 arrived.push(one);
             }
@@ -662,8 +654,8 @@ impl PointSum {
         self.accepted += Moments(sums);
     }
 
-    /// The halves of a cell whose fit may be wrong by so much along x and along y, along the worse axis; none where that
-    /// will do.
+    /// The halves of a cell whose fit may be wrong by so much along x and along y, along the worse axis; none where
+    /// that will do.
     fn refused(&mut self, cell: &Cell, [x, y]: [f32; 2]) -> ArrayVec<Cell, 2> {
         let is_refused = x + y > TOLERANCE.part && self.may_halve(cell);
         let halves = is_refused.then(|| halves(cell, y > x)).flatten();

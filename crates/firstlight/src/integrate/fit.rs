@@ -331,9 +331,9 @@ pub(crate) fn coarse<S: Simd>(
     fits
 }
 
-/// The fit of up to sixteen cells, which can be wrong by the end of its series, times the part of all that this is: what
-/// comes after it is as much smaller again. With `kept`, that is what is kept of cells that are seen in part. To be
-/// called within `vectorize`.
+/// The fit of up to sixteen cells, which can be wrong by the end of its series, times the part of all that this is:
+/// what comes after it is as much smaller again. With `kept`, that is what is kept of cells that are seen in part. To
+/// be called within `vectorize`.
 #[inline(always)]
 pub(crate) fn fit<S: Simd>(
     simd: S,
@@ -351,7 +351,7 @@ pub(crate) fn fit<S: Simd>(
         let (sum, tails) = sum(simd, &FINE, values);
         fits.sums[moment] = (sum * area).to_array();
         for (axis, [before, last]) in tails.into_iter().enumerate() {
-            let tail = last + before * 0.3;
+            let tail = last + before * 0.25;
             let part = (tail / sum.abs().max(least)).min(one);
             fits.errors[axis][moment] = (tail * part * area).to_array();
         }

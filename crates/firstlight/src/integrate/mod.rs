@@ -25,7 +25,7 @@ pub(crate) use batch::ShadingPoint;
 pub(crate) use classify::Obstacles;
 pub(crate) use emitter::{BallSides, Emitter};
 pub(crate) use evaluate::{Arrived, Asked, Evaluator, Illumination};
-pub(crate) use tolerance::TOLERANCE;
+pub(crate) use tolerance::{COSTS, TOLERANCE};
 pub(crate) use view::{FlatView, Receiver};
 
 #[cfg(test)]

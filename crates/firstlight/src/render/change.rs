@@ -130,14 +130,6 @@ fn brightest(view: &FlatView, moved: f32) -> f32 {
     let [a, b, c, d] = view.corners().map(at);
     let corners = a.max(b).max(c).max(d);
     let here = (corners.max(at(view.middle())) * 1.5).min(1.0);
-    // exp(-(a - m)^2) is at most exp(-(1 - e) a^2) exp((1/e - 1) m^2), for any share e
-    let root = here.sqrt();
-    let there = if moved < 1e-3 {
-        here
-    } else if moved < 0.1 {
-        root * root.sqrt() * (1.0 + 4.0 * moved)
-    } else {
-        root * (1.0 + 2.0 * moved)
-    };
-    there.min(1.0)
+    // exp(-(a - m)^2) is at most exp(-(1 - e) a^2) exp((1/e - 1) m^2), for any share e, as for a half
+    (here.sqrt() * (1.0 + 2.0 * moved)).min(1.0)
 }

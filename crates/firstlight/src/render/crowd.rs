@@ -7,8 +7,9 @@
 
 use std::collections::BinaryHeap;
 
-use super::cut::{CutRules, MAYBE, Tone, WIDE, WORTH};
+use super::cut::{CutRules, Tone};
 use crate::color::Rgb;
+use crate::integrate::COSTS;
 use crate::light::{Held, LightNode, Sent, ZoneSight};
 use crate::material::MOMENTS;
 use crate::visibility::Seen;
@@ -122,7 +123,7 @@ impl Crowd {
             _ => node.most(sight) * 0.5,
         };
         let typical = 0.5 * (sight.least + sight.diffuse.min(1e3 * sight.least));
-        item.typical = if matches!(item.by, By::Middle | By::One) { typical } else { MAYBE * typical };
+        item.typical = if matches!(item.by, By::Middle | By::One) { typical } else { COSTS.maybe * typical };
         let key = walk.key(&item.error);
         self.count(walk, &item, 1.0);
         let index = self.items.len() as u32;
@@ -221,8 +222,9 @@ impl Crowd {
     }
 
     fn is_worth_it(&self, walk: &CutRules, item: &CrowdItem, node: &LightNode) -> bool {
-        item.sight.width < WIDE
-            || item.by == By::MiddleIfSeen && walk.key(&node.error(&item.sight)) <= WORTH * walk.key(&item.error)
+        item.sight.width < COSTS.wide
+            || item.by == By::MiddleIfSeen
+                && walk.key(&node.error(&item.sight)) <= COSTS.looked_at * walk.key(&item.error)
     }
 
     /// Looks at what was not looked at yet, and says how all nodes count.

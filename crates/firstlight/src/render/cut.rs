@@ -10,6 +10,7 @@ use std::cmp::Ordering;
 use std::collections::BinaryHeap;
 
 use crate::color::{DisplaySteps, Rgb};
+use crate::integrate::COSTS;
 use crate::light::{Held, LightNode, LightTree, Sent, Zone, ZoneSight};
 use crate::material::{Colors, MOMENTS};
 use crate::visibility::Seen;
@@ -86,13 +87,6 @@ pub(super) struct CutRules<'a> {
     pub budget: f32,
 }
 
-/// Nodes whose error, taken for one, is no more than this part of all they send are looked at whether they are seen
-/// whole.
-pub(super) const WORTH: f32 = 0.25;
-/// Nodes wider than this sine are not.
-pub(super) const WIDE: f32 = 0.7;
-/// The part of what nothing is known of that is guessed to arrive.
-pub(super) const MAYBE: f32 = 0.3;
 /// Sums are made anew where what is in question has become so much less: what was taken away has left its rounding
 /// behind.
 const AGAIN: f32 = 1e-8;
@@ -146,7 +140,7 @@ impl CutRules<'_> {
         }
         let error = node.error(&sight);
         let key = self.key(&error);
-        (key <= WORTH * item.key).then_some(CutItem {
+        (key <= COSTS.looked_at * item.key).then_some(CutItem {
             key,
             node: item.node,
             error,
@@ -237,7 +231,7 @@ impl Cut {
             self.push(walk, walk.item(*node, false));
         }
         let later = |done: &mut [f64; 3], [known, maybe]: [&mut [f64; 3]; 2], node: &LightNode, sight: &ZoneSight| {
-            let share = MAYBE * typical(sight);
+            let share = COSTS.maybe * typical(sight);
             add(done, node.power * share, 1.0);
             add(maybe, node.power * share, 1.0);
             add(known, node.power * share, 1.0);
@@ -284,7 +278,7 @@ impl Cut {
                     let (mut lit, mut hidden, mut stuck) = (item.lit, false, false);
                     if !lit {
                         let as_lit = walk.as_lit(&item, node);
-                        if as_lit.is_some() || item.sight.width < WIDE {
+                        if as_lit.is_some() || item.sight.width < COSTS.wide {
                             match look(node, node.first(walk.tree)) {
                                 Seen::Whole => match as_lit {
                                     Some(item) => {
@@ -362,7 +356,7 @@ impl Cut {
                     let mut lit = item.lit;
                     if !lit {
                         let as_lit = walk.as_lit(&item, node);
-                        if as_lit.is_some() || item.sight.width < WIDE {
+                        if as_lit.is_some() || item.sight.width < COSTS.wide {
                             match look(node, node.first(walk.tree)) {
                                 Seen::Whole => match as_lit {
                                     Some(item) => {

@@ -370,7 +370,7 @@ impl Grid {
             turn = turn.max((point(k).ns - middle.ns).length());
         }
         // The arc, not the chord
-        let (reach, turn) = (reach * 1.01, turn * 1.05);
+        let (reach, turn) = (reach * 1.0625, turn * 1.0625);
         let middle = ShadingPoint { reach, turn, most_motion: 1.0, ..*middle };
         let node = &self.places[self.nodes[nodes[4] as usize].place as usize];
         Some(LitPlace { point: middle, bsdf: block.bsdf, ..*node })

@@ -32,7 +32,7 @@ impl Arrivals<'_> {
         let Some(sample) = light.sample(0, to.l) else {
             return Change::UNKNOWN.with(sums);
         };
-        let weight = sample.weight.max(sums.cosine()) * 1.2;
+        let weight = sample.weight.max(sums.cosine()) * 1.25;
         // A spot's rim, a terminator, a shadow's edge
         let rim = match &light.kind {
             LightKind::Spot(spot) => {

@@ -1,18 +1,7 @@
 //! Whether rays behind things are asked closed forms for a light, or points of it at once: told by what rays of the
 //! same cell of pixels were asked before, and by the points that others took.
 
-use crate::integrate::{Arrived, Illumination, ShadingPoint};
-
-/// A cell of a light, or a panel, takes as long as so many points.
-const POINTS: f32 = 15.0;
-/// So many rays tell.
-const HEARD: f32 = 8.0;
-/// The part of what was heard that counts when more is heard.
-const REMEMBERED: f32 = 0.9;
-/// The part of what was heard of closed forms that counts after places were asked none: one day they are asked again.
-const PASSED: f32 = 0.97;
-/// How much more than is usual is asked where that pays.
-const MORE: f32 = 4.0;
+use crate::integrate::{Arrived, COSTS, Illumination, ShadingPoint};
 
 /// What rays of a cell were asked for one light.
 #[derive(Clone, Copy, Debug, Default)]
@@ -43,10 +32,10 @@ impl Worth {
     /// The part of what is usual that closed forms may ask.
     fn part(&self) -> f32 {
         let ([places, answered, asked], [rays, points]) = (self.forms, self.points);
-        if places < HEARD || rays < HEARD {
+        if places < COSTS.heard || rays < COSTS.heard {
             return 1.0;
         }
-        if asked * POINTS * rays <= answered * points { MORE } else { 0.0 }
+        if asked * COSTS.cell * rays <= answered * points { COSTS.more } else { 0.0 }
     }
 
     /// Hears what arrived at some places that were asked, or were not to be.
@@ -58,7 +47,7 @@ impl Worth {
         }
         let answered = asked().filter(|one| one.illumination != Illumination::Unknown).count();
         let cells = asked().map(|one| one.asked as usize).sum();
-        let kept = if is_asked { REMEMBERED } else { PASSED };
+        let kept = if is_asked { COSTS.remembered } else { COSTS.passed };
         for (sum, more) in self.forms.iter_mut().zip([places, answered, cells]) {
             *sum = *sum * kept + more as f32;
         }
@@ -67,7 +56,7 @@ impl Worth {
     /// Hears how many points some rays took.
     pub fn hear_points(&mut self, rays: usize, points: usize) {
         for (sum, more) in self.points.iter_mut().zip([rays, points]) {
-            *sum = *sum * REMEMBERED + more as f32;
+            *sum = *sum * COSTS.remembered + more as f32;
         }
     }
 }
@@ -90,7 +79,7 @@ mod tests {
         worth.hear_forms(true, &[arrived(Illumination::Partial, 10); 16]);
         assert_eq!(worth.part(), 1.0);
         worth.hear_points(16, 16 * 200);
-        assert_eq!(worth.part(), MORE);
+        assert_eq!(worth.part(), COSTS.more);
         worth.hear_points(1000, 0);
         assert_eq!(worth.part(), 0.0);
         // Nobody hears of them as long as they are not asked, and then they are asked again

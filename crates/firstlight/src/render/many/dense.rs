@@ -4,10 +4,10 @@ use std::ops::Range;
 
 use super::patch::Patch;
 use super::places::{standing, tones, zone};
-use super::{BLOCK, CLOSE, LEVELS, Many, ONE, PILOT, Single, Stored};
+use super::{BLOCK, CLOSE, LEVELS, Many, ONE, Single, Stored};
 use crate::color::Rgb;
 use crate::ids::LightId;
-use crate::integrate::TOLERANCE;
+use crate::integrate::{COSTS, TOLERANCE};
 use crate::light::{Held, LightKind, LightNode, LightTree, Sends, Sent};
 use crate::material::{Lobe, Moments};
 use crate::math::Vec3;
@@ -62,7 +62,7 @@ impl<'a> Many<'a> {
         };
         crowd.begin(&walk);
         let guess = guess.unwrap_or_else(|| {
-            crowd.refine(&CutRules { budget: TOLERANCE.crowd * PILOT, ..walk }, None, &mut look);
+            crowd.refine(&CutRules { budget: TOLERANCE.crowd * COSTS.pilot, ..walk }, None, &mut look);
             crowd.peek();
             let some = [0, group.len() / 2, group.len() - 1].map(|i| patch(&group[i]));
             let all = some.map(|patch| {

@@ -6,8 +6,8 @@
 //! for both, in display steps.
 //!
 //! Up to [`SINGLY`] lights are all taken one by one. Of more, one may stand for many: a [`Crowd`] says for which, for
-//! each block, and what may be wrong is [`Tolerance::crowd`] as the root of a sum of squares. Cells and blocks lie on a grid of
-//! the film, so nothing depends on tiles, crops or threads.
+//! each block, and what may be wrong is [`Tolerance::crowd`] as the root of a sum of squares. Cells and blocks lie on a
+//! grid of the film, so nothing depends on tiles, crops or threads.
 
 mod dense;
 mod finish;
@@ -43,8 +43,6 @@ use places::{is_alike, standing, tone, tones, zone};
 pub(crate) const FEW: usize = 16;
 /// So many lights are at most taken one by one; of more, many may be taken for one.
 pub(crate) const SINGLY: usize = 1000;
-/// How much wider the first look at a block is, that says how bright it is.
-const PILOT: f32 = 4.0;
 /// Blocks that ask for more lights by themselves are quartered.
 const CLOSE: usize = 24;
 /// An error that shows whatever is there.
@@ -56,9 +54,6 @@ const BLOCK: usize = 8;
 const BLOCKS: usize = CELL as usize / BLOCK;
 /// Sizes of blocks: each has four of the next.
 const LEVELS: usize = 3;
-/// What each of those may have of [`Tolerance::many`]. Together less than all: a patch may be darker than its block was
-/// guessed to be.
-const SHARES: [f32; LEVELS] = [0.3, 0.15, 0.15];
 /// Colours of a block that are told apart.
 const TONES: usize = 8;
 
@@ -237,7 +232,8 @@ impl<'a> Many<'a> {
         let places = group.iter().map(|at| standing(patch(at)));
         self.outlook.stand(scene, places);
         let (outlook, level) = (&mut self.outlook, arrivals.level());
-        let (steps, budget) = (arrivals.display_steps(), TOLERANCE.many * SHARES[above.level]);
+        let share = if above.level == 0 { 2.0 * TOLERANCE.block } else { TOLERANCE.block };
+        let (steps, budget) = (arrivals.display_steps(), TOLERANCE.many * share);
         let walk = CutRules { tree, steps, zone: &zone, tones: &tones, budget };
         let links = scene.geometry.lights_of(one.si.surface);
         let shines = |light: u32| scene.geometry.links.contains(links, LightId(light));
@@ -385,7 +381,9 @@ impl<'a> Many<'a> {
             stored.sent += sent;
             if patch.reach > 0.0 {
                 let swing = patch.turn + patch.reach / node.distance(si.lit_from).max(patch.reach);
-                let smooth = (swing * swing).min(1.0) * SMOOTH;
+                // No second derivative of what a far light sends is more, over the square of its distance and what it
+                // sends
+                let smooth = (swing * swing).min(1.0) * 3.0;
                 let weight = node.weight(si.lit_from);
                 let moved = swing + patch.turn;
                 let narrow = (lobe.sharpness(si.ns.dot(si.wo)) * square(moved)).min(1.0);
@@ -395,6 +393,3 @@ impl<'a> Many<'a> {
         }
     }
 }
-
-/// No second derivative of what a far light sends is above this, over the square of its distance, and what it sends.
-const SMOOTH: f32 = 3.0;

@@ -12,7 +12,7 @@ use crate::visibility::Viewpoint;
 
 /// Whether two patches can be looked at together.
 pub(super) fn is_alike(a: &Patch, b: &Patch) -> bool {
-    a.si.surface == b.si.surface && a.bsdf.lobe == b.bsdf.lobe && a.si.ns.dot(b.si.ns) > 0.8
+    a.si.surface == b.si.surface && a.bsdf.lobe == b.bsdf.lobe && a.si.ns.dot(b.si.ns) > 0.0
 }
 
 pub(super) fn standing(patch: &Patch) -> (Viewpoint, f32, bool) {
