@@ -128,7 +128,7 @@ pub(crate) const TOLERANCE: Tolerance = Tolerance {
     stratified: 0.5,
     heavy: 2.0,
     node_pixels: 0.64,
-    many: 0.45,
+    many: 0.425,
     block: 0.15,
     crowd: 1.5,
     lenient: 1.25,
