@@ -10,6 +10,7 @@
 use fearless_simd::{f32x16, prelude::*};
 
 use super::batch::{Exact, LaneBlock, LaneNumbers, Linear16, Members, ViewBlock, ViewNumber, Views, ways};
+use super::tolerance::TOLERANCE;
 use crate::material::Lobe;
 use crate::math::{LANES, sin_cos};
 
@@ -331,9 +332,9 @@ pub(crate) fn coarse<S: Simd>(
     fits
 }
 
-/// The fit of up to sixteen cells, which can be wrong by the end of its series, times the part of all that this is:
-/// what comes after it is as much smaller again. With `kept`, that is what is kept of cells that are seen in part. To
-/// be called within `vectorize`.
+/// The fit of up to sixteen cells. Where all of a cell is seen it can be wrong by the end of its series, times the part
+/// of all that this is, as errors cancel at Gauss nodes. With `kept`, that is what is kept of cells that are seen in
+/// part, where they do not. To be called within `vectorize`.
 #[inline(always)]
 pub(crate) fn fit<S: Simd>(
     simd: S,
@@ -353,6 +354,7 @@ pub(crate) fn fit<S: Simd>(
         for (axis, [before, last]) in tails.into_iter().enumerate() {
             let tail = last + before * 0.25;
             let part = (tail / sum.abs().max(least)).min(one);
+            let part = if kept.is_some() { simd.splat_f32x16(TOLERANCE.fit_cut) } else { part };
             fits.errors[axis][moment] = (tail * part * area).to_array();
         }
     }

@@ -21,6 +21,9 @@ pub(crate) struct Tolerance {
     /// The part of what is allowed that one cell of a light, or one panel of its rows, may use up: their estimates are
     /// larger than their errors, mostly many times.
     pub part: f32,
+    /// What a fit can be wrong where a part of a cell is seen, as a part of the last coefficients of its series. Where
+    /// all of it is, errors cancel at Gauss nodes.
+    pub fit_cut: f32,
     /// In exponents of the highlight's fall: how far a cell may reach across a highlight, and how far from one it does
     /// not matter.
     pub highlight: f32,
@@ -55,10 +58,10 @@ pub(crate) struct Tolerance {
     // Points of a light
     /// In points, with a tolerance of 1: those of a pixel that are asked first; with others a root of it fewer.
     pub first_points: f32,
-    /// After more than so many times those, more may be wrong, by the fourth root of their number, up to so many times
-    /// as many again. A picture of so much error in all takes least where pixels that take long are off by more.
+    /// After more than so many times those, more may be wrong, by the fourth root of their number, up to the square of
+    /// that times as many again. A picture of so much error in all takes least where pixels that take long are off by
+    /// more.
     pub long: f32,
-    pub longest: f32,
     /// In effective points: so many that find nothing in the way of a pixel find that nothing is, and so many of all
     /// rays together tell something.
     pub clear: f32,
@@ -104,8 +107,9 @@ pub(crate) const TOLERANCE: Tolerance = Tolerance {
     by_chance: 5.0 / 3.0,
     least_share: 1.0 / 16.0,
     part: 0.5,
+    fit_cut: 0.1,
     highlight: 8.0,
-    foretold: 1.0,
+    foretold: 0.8,
     bends_at_once: 0.35,
     spread: 5.0,
     quadrant_motion: 0.3,
@@ -118,10 +122,9 @@ pub(crate) const TOLERANCE: Tolerance = Tolerance {
     resolved: 0.2,
     first_points: 1024.0,
     long: 2.0,
-    longest: 4.0,
     clear: 384.0,
     told: 32.0,
-    untold: 0.5,
+    untold: 0.2,
     mixed: 0.041,
     alike: 2.3,
     few_packets: 14.0,

@@ -397,7 +397,11 @@ impl Together {
     /// How many times what is allowed by chance these rays may deviate by, after so many times the first points.
     fn deviation(&self, times: f32) -> f32 {
         // What is off at a node is off at all pixels that it tells
-        if self.is_node { 1.0 } else { (times / TOLERANCE.long).clamp(1.0, TOLERANCE.longest).sqrt().sqrt() }
+        if self.is_node {
+            1.0
+        } else {
+            (times / TOLERANCE.long).clamp(1.0, TOLERANCE.long * TOLERANCE.long).sqrt().sqrt()
+        }
     }
 
     /// Asks what would arrive at all rays if nothing were in the way.
