@@ -33,7 +33,7 @@ const AGAIN: u32 = 4;
 /// How many times the root mean square that is allowed makes the converged picture be looked at again, whatever few
 /// points make of the scene.
 const LOOKED_AT: f64 = 2.0;
-/// Steps off at which a pixel of the converged picture is looked at again.
+/// Steps off at which a pixel of the converged picture is looked at again, at a tolerance of 1.
 const DISPUTED: f64 = 0.75;
 
 /// The settings that a converged picture is made with.
@@ -300,7 +300,7 @@ impl Converged {
     /// by chance shall be nobody's fault.
     #[track_caller]
     pub fn doubt(&mut self, image: &Image) {
-        let allowed = DISPUTED * self.scene.tolerance().min(1.0);
+        let allowed = DISPUTED * self.scene.tolerance();
         let off = |i: usize| furthest(self.pixels[i], displayed(&self.scene, image.pixels[i]));
         let disputed: Vec<bool> = (0..self.pixels.len()).map(|i| !self.open[i] && !(off(i) <= allowed)).collect();
         let Some(level) = (0..disputed.len()).filter(|i| disputed[*i]).map(|i| self.levels[i]).max() else { return };

@@ -158,7 +158,7 @@ impl<'a> AskedLeaves<'a> {
     }
 
     /// Halves those blocks, and their halves, in which leaves may send so much more to all rays together than others as
-    /// [`TOLERANCE.heavy`] says; whether there were any. That is told not by the points that were asked in them, but by
+    /// `TOLERANCE.heavy` says; whether there were any. That is told not by the points that were asked in them, but by
     /// others: to look closer at what is found to send much makes what is found less, and nothing makes it more.
     fn halve_heavy(&mut self, asking: &mut [Asking], counts: &mut Counts) -> bool {
         let (level, measure) = (self.asker.level, self.asker.area.stands_for());

@@ -463,7 +463,7 @@ pub(crate) fn is_one_surface(one: &SurfaceInteraction, other: &SurfaceInteractio
 }
 
 /// The middle of what some rays of pixel (`i`, `j`) see of a surface in trees, with its reach to their ends; `None` if
-/// something else is there, or if the mean of normals is farther than [`Tolerance::even`] from that in the middle.
+/// something else is there, or if the mean of normals is farther than `TOLERANCE.even` from that in the middle.
 fn seen_middle<'a>(
     scene: &Scene,
     [i, j]: [u32; 2],

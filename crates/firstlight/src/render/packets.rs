@@ -186,7 +186,7 @@ impl AddAssign<&BlockSums> for BlockSums {
     }
 }
 
-/// A sum of squares, and what it may be off by: [`TOLERANCE.few_packets`] over a root of the effective number of them.
+/// A sum of squares, and what it may be off by: `TOLERANCE.few_packets` over a root of the effective number of them.
 fn variance(squares: f32, of_squares: f32) -> f32 {
     squares + TOLERANCE.few_packets * of_squares.sqrt()
 }

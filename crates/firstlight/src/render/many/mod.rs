@@ -2,11 +2,11 @@
 //!
 //! For each block of pixels, and for its quarters and theirs, a [`Cut`] says which lights count: nodes of the
 //! [`LightTree`](crate::light::LightTree) that are seen whole from all of it, and nodes that have to be looked at from
-//! each patch. What is dropped, and what is lost by taking many lights for one, stays below [`Tolerance::many`]
-//! for both, in display steps.
+//! each patch. What is dropped, and what is lost by taking many lights for one, stays below
+//! `TOLERANCE.many` for blocks and for patches, in display steps.
 //!
 //! Up to [`SINGLY`] lights are all taken one by one. Of more, one may stand for many: a [`Crowd`] says for which, for
-//! each block, and what may be wrong is [`Tolerance::crowd`] as the root of a sum of squares. Cells and blocks lie on a
+//! each block, and what may be wrong is `TOLERANCE.crowd` as the root of a sum of squares. Cells and blocks lie on a
 //! grid of the film, so nothing depends on tiles, crops or threads.
 
 mod dense;
