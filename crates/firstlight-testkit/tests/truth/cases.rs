@@ -2,9 +2,12 @@
 
 use std::path::Path;
 
-use firstlight::{CompileOptions, FolderAssets, Image, SampleSet, SamplesDesc, Scene, SceneDesc};
+use firstlight::{
+    CompileOptions, FolderAssets, Image, NoAssets, RenderSettings, SampleSet, SamplesDesc, Scene, SceneDesc, Window,
+    builtin_scenes,
+};
 
-use crate::converged::{displayed, exact, integrated, sampled, with_samples};
+use crate::converged::{displayed, exact, integrated, sampled, traced, with_samples};
 use crate::scenes::*;
 
 fn folder() -> &'static Path {
@@ -95,6 +98,23 @@ fn by_counting(scene: &Scene, [x, y]: [u32; 2], counts: [f64; 2]) -> Option<f64>
         }
     }
     Some(sum / count)
+}
+
+/// The floor is so flat to the eye that a pixel is long: in one half of it nothing is seen of the light, and in the
+/// other it comes out from behind a ball.
+#[test]
+fn light_that_sets_in_within_a_long_pixel_is_told() {
+    let builtin = builtin_scenes().iter().find(|builtin| builtin.name == "config31").expect("it is built in");
+    let mut desc = SceneDesc::parse(builtin.name, builtin.text.as_bytes(), &NoAssets).desc;
+    (desc.render.width, desc.render.height) = (256, 256);
+    let crop = Some(Window { x: 160, y: 236, width: 16, height: 10 });
+    let [integrated, sampled] =
+        [(SamplesDesc::Exact, integrated()), (SamplesDesc::Count(1024), traced())].map(|(samples, settings)| {
+            let scene = compile(&with_samples(&desc, samples, SampleSet::Sobol, 1));
+            picture(&scene, &RenderSettings { crop, ..settings })
+        });
+    let off = apart(&compile(&desc), &integrated, &sampled);
+    assert!(off <= 2.0, "{off} steps off");
 }
 
 #[test]

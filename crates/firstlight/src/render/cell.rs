@@ -431,12 +431,14 @@ impl<'a> Cells<'a> {
     /// Whether the middle of a fragment stands for all of it: what it sees of a light changes but by what that turns.
     fn is_nearly_even(&self, fragment: u32, light: u32, answer: &Answer) -> bool {
         let fragment = &self.fragments.all[fragment as usize];
-        answer.turn <= TOLERANCE.middle_turn && self.bend(fragment, light as usize, answer) <= TOLERANCE.middle_bend
+        answer.turn <= TOLERANCE.middle_turn
+            && self.bend(fragment, light as usize, answer, answer.turned()) <= TOLERANCE.middle_bend
     }
 
-    /// In display steps: by how much what turns a light may bend it within the reach of a place of a fragment.
-    fn bend(&self, fragment: &Fragment, light: usize, answer: &Answer) -> f32 {
-        let bend = 0.5 * answer.turn * answer.turn * answer.most;
+    /// In display steps: by how much such a part of all that a light could send may bend it within the reach of a place
+    /// of a fragment.
+    fn bend(&self, fragment: &Fragment, light: usize, answer: &Answer, part: f32) -> f32 {
+        let bend = part * answer.most;
         let bsdf = &fragment.bsdf;
         let colors = self.lights.arrivals.scale(light) * bsdf.colors;
         let value = colors.onto(self.scene.ambient * bsdf.ambient, &answer.sums);
@@ -449,8 +451,11 @@ impl<'a> Cells<'a> {
         if answers.iter().any(|answer| answer.motion > TOLERANCE.quadrant_motion || answer.turn == f32::INFINITY) {
             return false;
         }
-        let bends = |answer: &Answer| self.bend(fragment, light, answer) * fragment.share > TOLERANCE.quadrant_bend;
-        if answers.iter().any(|answer| answer.sums != Moments::default() && bends(answer)) {
+        let bends = |answer: &Answer| {
+            let part = if answer.sums == Moments::default() { answer.kink() } else { answer.turned() + answer.kink() };
+            self.bend(fragment, light, answer, part) * fragment.share > TOLERANCE.quadrant_bend
+        };
+        if answers.iter().any(bends) {
             return false;
         }
         let scale = self.lights.arrivals.scale(light);

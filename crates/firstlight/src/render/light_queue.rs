@@ -109,6 +109,18 @@ impl Answer {
         most: 0.0,
         sight: Sight::Unknown,
     };
+
+    /// How far the mean within the reach may be from what arrives in the middle because light turns, as a part of all
+    /// that could.
+    pub fn turned(&self) -> f32 {
+        0.5 * self.turn * self.turn
+    }
+
+    /// The same because the light comes out from behind an outline: what is seen of it begins to grow at once, an
+    /// eighth of the way that the outline moves.
+    pub fn kink(&self) -> f32 {
+        if self.sums.cosine() <= self.motion * self.most { 0.125 * self.motion } else { 0.0 }
+    }
 }
 
 /// Requests for one light at places of one highlight.
