@@ -60,8 +60,8 @@ pub(crate) struct Arrived {
     /// How far the light is away, and the point from its plane.
     pub distance: f32,
     pub height: f32,
-    /// How many cells and panels were asked, if that is bounded and something is in the way.
-    pub asked: u32,
+    /// What was asked, in cells, if that is bounded and something is in the way.
+    pub asked: f32,
 }
 
 impl Arrived {
@@ -173,9 +173,10 @@ struct PointSum {
     /// The round that the last two are of.
     round: u32,
     cells: u32,
-    /// How many cells and panels were asked, and may be.
-    asked: u32,
+    /// What was asked, and may be, in cells; and what a panel counts for.
+    asked: f32,
     most_asked: f32,
+    panel: f32,
 }
 
 impl Evaluator {
@@ -274,7 +275,7 @@ impl Evaluator {
         self.panels.clear();
         self.kept.clear();
         self.seen.clear();
-        let outline = light.emitter.outline();
+        let (outline, blocked) = (light.emitter.outline(), light.blocked(&[]));
         for (block, points) in points.chunks(LANES).enumerate() {
             let start = block * LANES;
             let there = self.see(level, light, block, points);
@@ -300,7 +301,7 @@ impl Evaluator {
                     motion: 0.0,
                     distance: if is(there) { survey.nearest[k] } else { 0.0 },
                     height: if is(there) { survey.height[k] } else { 0.0 },
-                    asked: 0,
+                    asked: 0.0,
                 };
                 let is_open = class.between == Between::default();
                 if is(survey.arrives) {
@@ -321,13 +322,18 @@ impl Evaluator {
                     Illumination::Full => is(survey.above_around) && one.motion == 0.0,
                     Illumination::Partial | Illumination::Unknown => false,
                 };
+                let most_asked = Asked::most_asked(LARGEST_CODE) * point.part_of_points;
+                if most_asked == 0.0 && !is_open && one.illumination == Illumination::Partial {
+                    one.illumination = Illumination::Unknown;
+                }
                 let is_wanted = one.proved || one.motion <= point.most_motion;
                 if is_wanted && matches!(one.illumination, Illumination::Full | Illumination::Partial) {
                     let number = (start + k) as u32;
                     self.state[start + k].cells = 1;
                     self.grading.push(whole(outline, number, self.views[block].square(k)));
                 }
-                self.state[start + k].most_asked = Asked::most_asked(LARGEST_CODE) * point.part_of_points;
+                let state = &mut self.state[start + k];
+                (state.most_asked, state.panel) = (most_asked, blocked.cost(class.between));
                 self.between.push(class.between);
                 arrived.push(one);
             }
@@ -419,7 +425,7 @@ impl Evaluator {
     fn count_cells(&mut self, arrived: &mut [Arrived]) {
         let new = self.kept.len() * LANES;
         for cell in self.smooth.iter().chain(&self.whole).chain(&self.cut[new..]) {
-            self.state[cell.point as usize].asked += 1;
+            self.state[cell.point as usize].asked += 1.0;
         }
         if self.give_up(arrived) {
             let state = &self.state;
@@ -436,7 +442,8 @@ impl Evaluator {
     /// The same with panels.
     fn count_panels(&mut self, arrived: &mut [Arrived]) {
         for panel in &self.panels {
-            self.state[panel.point as usize].asked += 1;
+            let state = &mut self.state[panel.point as usize];
+            state.asked += state.panel;
         }
         if self.give_up(arrived) {
             self.leave_panels();
@@ -451,7 +458,7 @@ impl Evaluator {
             if is_behind {
                 arrived.asked = state.asked;
             }
-            if is_behind && state.asked as f32 > state.most_asked {
+            if is_behind && state.asked > state.most_asked {
                 state.cells = PointSum::GIVEN_UP;
                 arrived.illumination = Illumination::Unknown;
                 is_any = true;

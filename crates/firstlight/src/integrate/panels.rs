@@ -18,8 +18,10 @@ use super::cut::{self, BallCut, Half};
 use super::fit::{Cell, CutBlock, MOMENTS, sides};
 use super::occluder::{Occluder, Shadow};
 use super::row::{FAR, Interval16};
+use super::tolerance::COSTS;
 use super::view::Outline;
 use crate::math::{LANES, Vec3x16, asin, sin_cos};
+use crate::shape::Canonical;
 
 /// Rows of a panel: the Kronrod rule of seven on [0, 1], spread.
 const ROWS: usize = 7;
@@ -63,6 +65,19 @@ pub(crate) struct Between {
     pub within: u64,
 }
 
+impl Between {
+    /// Their numbers.
+    #[inline(always)]
+    fn occluders(self) -> impl Iterator<Item = usize> {
+        let mut any = self.outside | self.within;
+        std::iter::from_fn(move || {
+            let first = (any != 0).then_some(any.trailing_zeros() as usize);
+            any &= any.wrapping_sub(1);
+            first
+        })
+    }
+}
+
 /// A light and what is in the way, for all that asks.
 #[derive(Clone, Copy)]
 pub(crate) struct Blocked<'a> {
@@ -74,6 +89,24 @@ pub(crate) struct Blocked<'a> {
     pub outline: Outline,
     /// Point by point.
     pub between: &'a [Between],
+}
+
+impl<'a> Blocked<'a> {
+    #[inline(always)]
+    fn occluder(&self, number: usize) -> &'a Occluder {
+        let [listed, near] = self.occluders;
+        listed.get(number).unwrap_or_else(|| &near[number - listed.len()])
+    }
+
+    /// How many cells a panel behind such things takes as long as.
+    pub fn cost(&self, between: Between) -> f32 {
+        let cost = |number: usize| match self.occluder(number) {
+            Occluder::Flat { .. } if self.cuts >> number & 1 == 1 => COSTS.cut,
+            Occluder::Solid(solid) if matches!(solid.kind, Canonical::Torus { .. }) => COSTS.torus,
+            _ => 0.0,
+        };
+        between.occluders().map(cost).fold(1.0, |sum, cost| sum + cost)
+    }
 }
 
 /// What sixteen panels send, how far both rules differ, and how much of the light's square is seen.
@@ -110,28 +143,19 @@ impl<'a, S: Simd> Batch<'a, S> {
     /// Which of the occluders any point sees.
     #[inline(always)]
     fn occluders(&self) -> impl Iterator<Item = usize> + use<S> {
-        let mut any = 0;
+        let mut any = Between::default();
         for between in &self.between {
-            any |= between.outside | between.within;
+            any.outside |= between.outside;
+            any.within |= between.within;
         }
-        std::iter::from_fn(move || {
-            let first = (any != 0).then_some(any.trailing_zeros() as usize);
-            any &= any.wrapping_sub(1);
-            first
-        })
-    }
-
-    #[inline(always)]
-    fn occluder(&self, number: usize) -> &'a Occluder {
-        let [listed, near] = self.blocked.occluders;
-        listed.get(number).unwrap_or_else(|| &near[number - listed.len()])
+        any.occluders()
     }
 
     /// The same of one that reaches into a light that is a ball.
     #[inline(always)]
     fn cut(&self, simd: S, occluder: usize) -> Option<BallCut<S>> {
         let ball = self.blocked.ball.filter(|_| self.blocked.cuts >> occluder & 1 == 1)?;
-        BallCut::new(simd, self.occluder(occluder), ball, self.p, &self.l)
+        BallCut::new(simd, self.blocked.occluder(occluder), ball, self.p, &self.l)
     }
 
     /// One of them as they see it, and who sees it from outside and from within.
@@ -143,7 +167,7 @@ impl<'a, S: Simd> Batch<'a, S> {
             within |= (between.within >> occluder & 1) << k;
         }
         (
-            Shadow::new(simd, self.occluder(occluder), self.p, &self.l),
+            Shadow::new(simd, self.blocked.occluder(occluder), self.p, &self.l),
             mask32x16::from_bitmask(simd, outside),
             mask32x16::from_bitmask(simd, within),
         )
@@ -327,7 +351,7 @@ pub(crate) fn rows<S: Simd>(
                             Outline::Sphere => wide[row],
                         };
                         intervals = cut.hidden(simd, y, &Interval16 { from: -reach, to: reach }, within);
-                        cut::parts(batch.occluder(occluder))
+                        cut::parts(blocked.occluder(occluder))
                     }
                     None => {
                         [intervals[0], intervals[1]] = shadow.hidden(simd, y);

@@ -150,8 +150,14 @@ pub(crate) struct Costs {
     pub asked_per_step: f32,
     /// A cell of a light, or a panel, takes as long as so many points.
     pub cell: f32,
+    /// So much longer a panel takes for each torus in the way, and for each flat thing that reaches into a light that is
+    /// a ball, in cells.
+    pub torus: f32,
+    pub cut: f32,
     /// So many rays tell whether closed forms pay.
     pub heard: f32,
+    /// The part of places that closed forms have to tell, or none are asked.
+    pub answered: f32,
     /// The part of what was heard that counts when more is heard.
     pub remembered: f32,
     /// The part of what was heard of closed forms that counts after places were asked none: one day they are asked
@@ -174,7 +180,10 @@ pub(crate) const COSTS: Costs = Costs {
     asked: 32.0,
     asked_per_step: 2.0,
     cell: 15.0,
+    torus: 3.0,
+    cut: 1.0,
     heard: 8.0,
+    answered: 0.1,
     remembered: 0.9,
     passed: 0.97,
     more: 4.0,

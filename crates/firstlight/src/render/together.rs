@@ -406,7 +406,7 @@ impl Together {
 
     /// Asks what would arrive at all rays if nothing were in the way.
     fn ask_wholes(&self, asking: &mut [Asking], arrivals: &mut Arrivals) {
-        let places: Vec<_> = asking.iter().map(|one| one.place(self.share)).collect();
+        let places: Vec<_> = asking.iter().map(|one| one.place(self.each)).collect();
         let wholes = arrivals.wholes(self.light, &places);
         asking.iter_mut().zip(wholes).for_each(|(one, whole)| one.whole = Some(whole));
     }
