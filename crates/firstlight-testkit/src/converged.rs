@@ -296,8 +296,9 @@ impl Converged {
             .flat_map(move |y| columns.clone().map(move |x| (y * width + x) as usize))
     }
 
-    /// Looks again where a picture is far off, with at least four and up to sixteen times the points, until it is not or
-    /// there are no more: sets that agreed by chance shall be nobody's fault. All of them can miss a sliver of a light.
+    /// Looks again where a picture is far off, with at least four and up to sixteen times the points, until it is not
+    /// or there are no more: sets that agreed by chance shall be nobody's fault. All of them can miss a sliver of a
+    /// light.
     #[track_caller]
     pub fn doubt(&mut self, image: &Image) {
         let allowed = DISPUTED * self.scene.tolerance();

@@ -150,8 +150,8 @@ pub(crate) struct Costs {
     pub asked_per_step: f32,
     /// A cell of a light, or a panel, takes as long as so many points.
     pub cell: f32,
-    /// So much longer a panel takes for each torus in the way, and for each flat thing that reaches into a light that is
-    /// a ball, in cells.
+    /// So much longer a panel takes for each torus in the way, and for each flat thing that reaches into a light that
+    /// is a ball, in cells.
     pub torus: f32,
     pub cut: f32,
     /// So many rays tell whether closed forms pay.
