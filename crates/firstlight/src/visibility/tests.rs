@@ -297,7 +297,7 @@ fn every_sample_is_answered_as_by_its_own_ray() {
     let mut traced = 0;
     let mut settler = Settler::default();
     let levels: Vec<Level> = SimdLevel::available().into_iter().rev().map(SimdLevel::token).collect();
-    for round in 0..160 {
+    for round in 0..600 {
         let scene = random_scene(random);
         let points = seen_points(random, &scene);
         for (light, target) in scene.lights.iter().zip(Target::of_all(&scene)) {

@@ -29,6 +29,10 @@
 //!   of one edge. With T smaller than that, one outside of one edge and inside of another is not stopped either way
 //!   round; and one outside of an edge is not if it is not edge-on (|det| > |n| L / 64) and T > 16 h D |n| + 64 x 96 h
 //!   s^3.
+//! - What the kernel calls inside lies within sqrt 2 e of the triangle, so also between the planes through o, along one
+//!   of the light's axes, that hold the triangle. With X a vertex, (X x a1).l = 0 is such a plane, and it meets the
+//!   light at u = -(X.(a1 x l0) + w X.(a1 x a2)) / X.(a1 x a0). Each of these products may be wrong by as much as U, in
+//!   D L times the size of the axis, if all vertices are on the light's side of o. So nothing is hidden beside that.
 //! - A ray is stopped if it is inside of all edges, not edge-on, and det is above T by what t can be wrong, and by what
 //!   the ray stops short of the light.
 //!
@@ -79,6 +83,53 @@ pub(crate) struct Eye {
     pub finite: bool,
 }
 
+/// What sixteen triangles may hide of a light: from where to where along its first two axes.
+struct ShadowBounds<S: Simd> {
+    low: [f32x16<S>; 2],
+    high: [f32x16<S>; 2],
+}
+
+impl<S: Simd> ShadowBounds<S> {
+    #[inline(always)]
+    fn new(simd: S, eye: &Eye, vertices: [V<S>; 3], far_off: f32x16<S>) -> Self {
+        let [a, b, c] = eye.axes;
+        let normal = b.cross(a);
+        let (one, infinite) = (simd.splat_f32x16(1.0), simd.splat_f32x16(f32::INFINITY));
+        // Whether all of the light is on one side of o, and on which
+        let (ahead, depth) = (normal.dot(eye.l), normal.dot(c).abs());
+        let size = a.abs().max(b.abs()).max_element() * eye.longest;
+        let is_apart = ahead.abs() - depth > EDGE * size * eye.longest;
+        let side = if ahead < 0.0 { -1.0 } else { 1.0 };
+        let wrong = far_off * (2.0 * EDGE * size);
+        let mut is_ahead = mask32x16::splat(simd, is_apart);
+        let mut bounds = ShadowBounds { low: [infinite; 2], high: [-infinite; 2] };
+        for x in vertices {
+            let across = dot(x, normal) * side;
+            is_ahead &= across.simd_gt(wrong);
+            let inverse = one / is_ahead.select(across, one);
+            for (axis, (along, turned)) in [(b, -side), (a, side)].into_iter().enumerate() {
+                let middle = dot(x, along.cross(eye.l)) * inverse * turned;
+                let reach = (dot(x, along.cross(c)) * inverse).abs();
+                let room = reach + wrong * inverse * (middle.abs() + reach + 2.0);
+                bounds.low[axis] = bounds.low[axis].min(middle - room);
+                bounds.high[axis] = bounds.high[axis].max(middle + room);
+            }
+        }
+        for axis in 0..2 {
+            bounds.low[axis] = is_ahead.select(bounds.low[axis], -infinite);
+            bounds.high[axis] = is_ahead.select(bounds.high[axis], infinite);
+        }
+        bounds
+    }
+
+    /// Those that are beside the light.
+    #[inline(always)]
+    fn beside(&self) -> mask32x16<S> {
+        let ([u, v], [to_u, to_v]) = (self.low, self.high);
+        u.max(v).simd_gt(1.0) | to_u.min(to_v).simd_lt(-1.0)
+    }
+}
+
 /// A triangle that may hide some of a light.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct SeenTriangle {
@@ -94,6 +145,9 @@ pub(crate) struct SeenTriangle {
     near: f32,
     /// det below this: it is not.
     far: f32,
+    /// From where to where along the light's first two axes it hides anything, at most.
+    low: [f32; 2],
+    high: [f32; 2],
     /// Which it is: the leaf, the place in it, and what the caller says.
     pub leaf: u32,
     pub place: u32,
@@ -253,6 +307,8 @@ impl TriangleTree {
             let room = area * (far_off * ratio) + sliver * (1.0 / GRAZE_ALL) + wrong + det_wrong;
             nothing |= (most + room).simd_lt(height) & height.simd_gt(room);
         }
+        let bounds = ShadowBounds::new(simd, eye, [a, b, c], far_off);
+        nothing |= bounds.beside();
         let keep = (!(nothing & sound)) & area.simd_gt(zero);
         let mut keep = keep.to_bitmask() as u32;
         if leaves.len() < TOGETHER {
@@ -288,6 +344,12 @@ impl TriangleTree {
         w.store(behind, &mut forms[2]);
         d.store(behind, &mut forms[3]);
         let (edge, graze, near, far) = (edge.to_array(), graze.to_array(), near.to_array(), far.to_array());
+        let infinite = simd.splat_f32x16(f32::INFINITY);
+        let (mut low, mut high) = ([[0.0; 16]; 2], [[0.0; 16]; 2]);
+        for axis in 0..2 {
+            sound.select(bounds.low[axis], -infinite).store_slice(&mut low[axis]);
+            sound.select(bounds.high[axis], infinite).store_slice(&mut high[axis]);
+        }
         while keep != 0 {
             let lane = keep.trailing_zeros() as usize & 15;
             keep &= keep - 1;
@@ -302,6 +364,8 @@ impl TriangleTree {
                 graze: graze[lane],
                 near: near[lane],
                 far: far[lane],
+                low: [low[0][lane], low[1][lane]],
+                high: [high[0][lane], high[1][lane]],
                 leaf: leaves[lane / PACK],
                 place: (lane % PACK) as u32,
                 source,
@@ -388,13 +452,22 @@ impl SeenTriangle {
     #[inline(always)]
     pub fn cells<S: Simd>(&self, simd: S, middle: &[[f32; 16]; 3], half: &[[f32; 16]; 3]) -> Verdict {
         let (middle, half) = (load(simd, middle), load(simd, half));
+        let mut beside = mask32x16::splat(simd, false);
+        for axis in 0..2 {
+            beside |= (middle[axis] - half[axis]).simd_gt(self.high[axis])
+                | (middle[axis] + half[axis]).simd_lt(self.low[axis]);
+        }
+        if beside.all_true() {
+            return Verdict { hidden: 0, unsure: 0 };
+        }
         let (u, v, w, d) = (self.value(0, middle), self.value(1, middle), self.value(2, middle), self.value(3, middle));
         let (ur, vr, wr, dr) = (self.reach(0, half), self.reach(1, half), self.reach(2, half), self.reach(3, half));
         let (lu, lv, lw, ld) = (u - ur, v - vr, w - wr, d - dr);
         let (hu, hv, hw, hd) = (u + ur, v + vr, w + wr, d + dr);
         let outside = hu.min(hv).min(hw).simd_lt(-self.edge);
         let other = lu.max(lv).max(lw).simd_gt(self.edge);
-        let nothing = (outside & (other | ld.simd_gt(self.graze) | hd.simd_lt(-self.graze))) | hd.simd_lt(self.far);
+        let outside = outside & (other | ld.simd_gt(self.graze) | hd.simd_lt(-self.graze));
+        let nothing = beside | outside | hd.simd_lt(self.far);
         let all = lu.min(lv).min(lw).simd_gt(self.edge) & ld.simd_gt(self.near);
         let hidden = all.to_bitmask() as u16;
         Verdict { hidden, unsure: !(nothing.to_bitmask() as u16 | hidden) }
