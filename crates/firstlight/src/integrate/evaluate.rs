@@ -323,6 +323,7 @@ impl Evaluator {
                     Illumination::Partial | Illumination::Unknown => false,
                 };
                 let most_asked = Asked::most_asked(LARGEST_CODE) * point.part_of_points;
+                // Nothing is begun that may not be asked
                 if most_asked == 0.0 && !is_open && one.illumination == Illumination::Partial {
                     one.illumination = Illumination::Unknown;
                 }

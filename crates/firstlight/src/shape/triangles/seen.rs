@@ -90,8 +90,10 @@ struct ShadowBounds<S: Simd> {
 }
 
 impl<S: Simd> ShadowBounds<S> {
+    /// Of triangles with these vertices from o, the farthest coordinates of those, and whether products of them are
+    /// `sound`.
     #[inline(always)]
-    fn new(simd: S, eye: &Eye, vertices: [V<S>; 3], far_off: f32x16<S>) -> Self {
+    fn new(simd: S, eye: &Eye, vertices: [V<S>; 3], far_off: f32x16<S>, sound: mask32x16<S>) -> Self {
         let [a, b, c] = eye.axes;
         let normal = b.cross(a);
         let (one, infinite) = (simd.splat_f32x16(1.0), simd.splat_f32x16(f32::INFINITY));
@@ -101,7 +103,7 @@ impl<S: Simd> ShadowBounds<S> {
         let is_apart = ahead.abs() - depth > EDGE * size * eye.longest;
         let side = if ahead < 0.0 { -1.0 } else { 1.0 };
         let wrong = far_off * (2.0 * EDGE * size);
-        let mut is_ahead = mask32x16::splat(simd, is_apart);
+        let mut is_ahead = sound & mask32x16::splat(simd, is_apart);
         let mut bounds = ShadowBounds { low: [infinite; 2], high: [-infinite; 2] };
         for x in vertices {
             let across = dot(x, normal) * side;
@@ -307,7 +309,7 @@ impl TriangleTree {
             let room = area * (far_off * ratio) + sliver * (1.0 / GRAZE_ALL) + wrong + det_wrong;
             nothing |= (most + room).simd_lt(height) & height.simd_gt(room);
         }
-        let bounds = ShadowBounds::new(simd, eye, [a, b, c], far_off);
+        let bounds = ShadowBounds::new(simd, eye, [a, b, c], far_off, sound);
         nothing |= bounds.beside();
         let keep = (!(nothing & sound)) & area.simd_gt(zero);
         let mut keep = keep.to_bitmask() as u32;
@@ -344,12 +346,8 @@ impl TriangleTree {
         w.store(behind, &mut forms[2]);
         d.store(behind, &mut forms[3]);
         let (edge, graze, near, far) = (edge.to_array(), graze.to_array(), near.to_array(), far.to_array());
-        let infinite = simd.splat_f32x16(f32::INFINITY);
-        let (mut low, mut high) = ([[0.0; 16]; 2], [[0.0; 16]; 2]);
-        for axis in 0..2 {
-            sound.select(bounds.low[axis], -infinite).store_slice(&mut low[axis]);
-            sound.select(bounds.high[axis], infinite).store_slice(&mut high[axis]);
-        }
+        let low = [bounds.low[0].to_array(), bounds.low[1].to_array()];
+        let high = [bounds.high[0].to_array(), bounds.high[1].to_array()];
         while keep != 0 {
             let lane = keep.trailing_zeros() as usize & 15;
             keep &= keep - 1;
