@@ -239,10 +239,11 @@ fn eye(mesh: &ShadowMesh, light: &LightSeen, point: &Viewpoint) -> Eye {
     let short = 32.0 * UNIT_ROUNDOFF * (1.01 + 1.01 * (o.x + o.y + o.z) / light.shortest) + 8.0 * UNIT_ROUNDOFF;
     let short = if short < 0.5 { 1.0 / (1.0 - short) * (1.0 + 8.0 * UNIT_ROUNDOFF) } else { f32::INFINITY };
     let finite = light.finite;
+    let horizons = [point.horizon, point.ns];
     match mesh.placement {
         None => {
             let LightSeen { l, axes, longest, shortest, .. } = *light;
-            Eye { o: point.start, l, axes, longest, shortest, short, finite }
+            Eye { o: point.start, l, axes, longest, shortest, short, finite, horizons }
         }
         Some(placement) => {
             let m = &placement.object_from_world.matrix3;
@@ -258,7 +259,9 @@ fn eye(mesh: &ShadowMesh, light: &LightSeen, point: &Viewpoint) -> Eye {
             );
             let sizes: DVec3 = size(light.l) + size(light.axes[0]) + size(light.axes[1]) + size(light.axes[2]);
             let longest = (sizes.max_element() * 1.0001) as f32;
-            Eye { o, l: own.l, axes: own.axes, longest, shortest: own.shortest * 0.9999, short, finite }
+            let upright = placement.world_from_object.matrix3.transpose();
+            let horizons = horizons.map(|n| (upright * n.as_dvec3()).as_vec3());
+            Eye { o, l: own.l, axes: own.axes, longest, shortest: own.shortest * 0.9999, short, finite, horizons }
         }
     }
 }

@@ -33,10 +33,15 @@
 //!   of the light's axes, that hold the triangle. With X a vertex, (X x a1).l = 0 is such a plane, and it meets the
 //!   light at u = -(X.(a1 x l0) + w X.(a1 x a2)) / X.(a1 x a0). Each of these products may be wrong by as much as U, in
 //!   D L times the size of the axis, if all vertices are on the light's side of o. So nothing is hidden beside that.
+//! - Ways that count lie above the horizon, h.l > 0, but for 8 h |h| L by which that is wrong. So where its ray meets X
+//!   it is no farther below o than that times t, and t is no more than 1 if the ray has an end, nor than D over the
+//!   least of the ways: a triangle whose vertices are below by that, and by 16 h |h| D, is not met. [`BELOW`].
 //! - A ray is stopped if it is inside of all edges, not edge-on, and det is above T by what t can be wrong, and by what
 //!   the ray stops short of the light.
 //!
-//! Sizes beyond which any of these products could leave the range of numbers are left to the kernel.
+//! Sizes beyond which any of these products could leave the range of numbers are left to the kernel. Numbers by cell and
+//! sample are fused where a processor can: what is decided by them is right either way, and what is not is left to the
+//! kernel.
 
 use fearless_simd::{f32x4, f32x8, f32x16, mask32x16, prelude::*};
 
@@ -58,6 +63,9 @@ const SLIVER: f32 = 96.0 * H;
 const GRAZE: f32 = 1.0 / 64.0;
 /// The same, where a triangle must not be met at all.
 const GRAZE_ALL: f32 = 1.0 / 512.0;
+
+/// By how much a ray that counts can lead below a horizon, in |h| D + |h| t L.
+const BELOW: f32 = 32.0 * H;
 
 /// Packs that are looked at together.
 pub(crate) const TOGETHER: usize = 4;
@@ -81,6 +89,8 @@ pub(crate) struct Eye {
     pub short: f32,
     /// Whether the rays have an end.
     pub finite: bool,
+    /// Ways that are not above both do not count.
+    pub horizons: [Vec3; 2],
 }
 
 /// What sixteen triangles may hide of a light: from where to where along its first two axes.
@@ -309,6 +319,13 @@ impl TriangleTree {
             let room = area * (far_off * ratio) + sliver * (1.0 / GRAZE_ALL) + wrong + det_wrong;
             nothing |= (most + room).simd_lt(height) & height.simd_gt(room);
         }
+        // How far a ray leads, up to where a triangle is
+        let led = far_off * (eye.longest / eye.shortest);
+        let led = if eye.finite { led.min(eye.longest) } else { led };
+        for horizon in eye.horizons {
+            let highest = dot(a, horizon).max(dot(b, horizon)).max(dot(c, horizon));
+            nothing |= highest.simd_lt((far_off + led) * -(BELOW * horizon.abs().element_sum()));
+        }
         let bounds = ShadowBounds::new(simd, eye, [a, b, c], far_off, sound);
         nothing |= bounds.beside();
         let keep = (!(nothing & sound)) & area.simd_gt(zero);
@@ -434,15 +451,18 @@ impl SeenTriangle {
     /// One of U, V, W, det for sixteen ways.
     #[inline(always)]
     fn value<S: Simd>(&self, i: usize, at: V<S>) -> f32x16<S> {
-        let [a, b, c] = self.slopes[i];
-        at[2] * c + (at[1] * b + (at[0] * a + self.middle[i]))
+        let ([a, b, c], simd) = (self.slopes[i], at[0].simd);
+        let middle = simd.splat_f32x16(self.middle[i]);
+        let [a, b, c] = [simd.splat_f32x16(a), simd.splat_f32x16(b), simd.splat_f32x16(c)];
+        at[2].mul_add(c, at[1].mul_add(b, at[0].mul_add(a, middle)))
     }
 
     /// How far it goes within cells of half these sizes.
     #[inline(always)]
     fn reach<S: Simd>(&self, i: usize, half: V<S>) -> f32x16<S> {
-        let [a, b, c] = self.slopes[i];
-        half[2] * c.abs() + (half[1] * b.abs() + half[0] * a.abs())
+        let ([a, b, c], simd) = (self.slopes[i], half[0].simd);
+        let [b, c] = [simd.splat_f32x16(b.abs()), simd.splat_f32x16(c.abs())];
+        half[2].mul_add(c, half[1].mul_add(b, half[0] * a.abs()))
     }
 
     /// What it hides of sixteen cells: middles and half sizes along the light's axes. `unsure` are those it may hide
