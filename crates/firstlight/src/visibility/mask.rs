@@ -4,13 +4,13 @@ use fearless_simd::{Level, f32x16, prelude::*};
 
 use super::Viewpoint;
 use super::occluders::ShadowMesh;
-use super::target::{SampleBlock, Target};
+use super::target::{LightSeen, SampleBlock, Target};
 use super::view::ShadowView;
 use crate::accel::{RayPacket16, dispatch_all};
 use crate::ids::LightId;
-use crate::math::{LANES, ShadowRay, UNIT_ROUNDOFF, Vec3};
+use crate::math::{LANES, ShadowRay, UNIT_ROUNDOFF, Vec3, least_and_most};
 use crate::scene::{Scene, ShadowRays};
-use crate::shape::SeenTriangle;
+use crate::shape::{SeenParts, SeenTriangle};
 
 impl ShadowView {
     /// Fills [`hidden`](Self::hidden): what triangles, solids and point sets hide, and what is below the horizon for
@@ -83,6 +83,8 @@ impl ShadowView {
                 *hidden |= height.simd_lt(-wrong).to_bitmask() as u16;
             }
         }
+        let ball = BallSeen::of(&seen);
+        let are_bounded = self.triangles.iter().any(SeenTriangle::is_bounded);
         // Blocks of which something is asked, sixteen at a time
         let mut next = if self.triangles.is_empty() { target.blocks.len() } else { 0 };
         while next < target.blocks.len() {
@@ -105,13 +107,18 @@ impl ShadowView {
                 gathered = target.bounds_of(&places);
                 &gathered
             };
+            let parts = match &ball {
+                _ if !are_bounded => SeenParts::NONE,
+                Some(ball) => ball.parts(simd, places[..count].iter().map(|place| &target.blocks[*place as usize])),
+                None => SeenParts::flat(simd, &cells.middle, &cells.half, count),
+            };
             // Bit by bit
             let mut open = ((1u32 << count) - 1) as u16;
             for triangle in &self.triangles {
                 if open == 0 {
                     break;
                 }
-                let verdict = triangle.cells(simd, &cells.middle, &cells.half);
+                let verdict = triangle.cells(simd, &cells.middle, &cells.half, &parts);
                 let mut some = (verdict.hidden | verdict.unsure) & open;
                 while some != 0 {
                     let i = some.trailing_zeros() as usize % LANES;
@@ -206,4 +213,39 @@ fn by_kernel<S: Simd>(
             mesh.mesh.tree.meets(simd, &shadows.rays, &shadows.t_end, triangle, unsure)
         },
     )
+}
+
+/// A ball as its points are seen, by where ways to them meet the plane through its middle that faces the point.
+struct BallSeen {
+    /// From coordinates along the light's axes to those along the frame's.
+    turn: [[f32; 3]; 3],
+    radii: f32,
+    /// By how much that may be wrong.
+    room: f32,
+}
+
+impl BallSeen {
+    fn of(light: &LightSeen) -> Option<BallSeen> {
+        let radii = light.radii?;
+        let turn = light.frame.map(|to| light.axes.map(|axis| axis.dot(to) / to.length_squared()).into());
+        // Ways are wrong by their rounding, and those that end nearest are longest in the plane
+        let nearest = radii / (radii - 1.0).max(UNIT_ROUNDOFF);
+        Some(BallSeen { turn, radii, room: 64.0 * UNIT_ROUNDOFF * (radii + 2.0) * nearest * nearest })
+    }
+
+    /// Where at most sixteen blocks are seen.
+    #[inline(always)]
+    fn parts<'a, S: Simd>(&self, simd: S, blocks: impl Iterator<Item = &'a SampleBlock>) -> SeenParts {
+        let mut parts = SeenParts::NONE;
+        for (lane, block) in blocks.enumerate() {
+            let [x, y, z] = [0, 1, 2].map(|axis: usize| f32x16::load_array_ref(simd, &block.at[axis]));
+            let along = |[a, b, c]: [f32; 3]| z * c + (y * b + x * a);
+            let longer = simd.splat_f32x16(self.radii) / (along(self.turn[2]) + self.radii);
+            for axis in 0..2 {
+                let [low, high] = least_and_most(along(self.turn[axis]) * longer);
+                (parts.low[axis][lane], parts.high[axis][lane]) = (low - self.room, high + self.room);
+            }
+        }
+        parts
+    }
 }

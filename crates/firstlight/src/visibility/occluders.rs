@@ -135,6 +135,7 @@ impl Shaft {
                 center: m.transform_point3(hull.center.as_dvec3()).as_vec3(),
                 axes: hull.axes.map(|a| m.transform_vector3(a.as_dvec3()).as_vec3()),
                 finite: true,
+                is_ball: false,
             }
         } else {
             LightHull { center: m.transform_vector3(hull.center.as_dvec3()).as_vec3(), ..*hull }

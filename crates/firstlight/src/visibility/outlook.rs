@@ -125,6 +125,7 @@ impl Outlook {
             center: middle,
             axes: [Vec3::new(half.x, 0.0, 0.0), Vec3::new(0.0, half.y, 0.0), Vec3::new(0.0, 0.0, half.z)],
             finite: true,
+            is_ball: false,
         };
         let shaft = Shaft::between(self.places, &hull, self.apart);
         let size = self.places.min.abs().max(self.places.max.abs()).max(low.abs()).max(high.abs()).max_element();

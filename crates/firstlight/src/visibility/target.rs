@@ -6,7 +6,7 @@ use fearless_simd::{Level, f32x16, prelude::*};
 use crate::accel::{Aabb, dispatch_all};
 use crate::ids::LightId;
 use crate::light::{AreaShape, Light, LightKind, PointBlock, Points};
-use crate::math::{DMat3, DVec3, LANES, Vec3, least_and_most};
+use crate::math::{Axes, DMat3, DVec3, LANES, Vec3, least_and_most};
 use crate::scene::Scene;
 
 /// What encloses a light: the points `center` + u `axes[0]` + v `axes[1]` + w `axes[2]`, each of u, v, w from -1 to 1;
@@ -17,6 +17,8 @@ pub(crate) struct LightHull {
     pub axes: [Vec3; 3],
     /// Whether it is somewhere.
     pub finite: bool,
+    /// Whether it is a ball, as wide as each axis.
+    pub is_ball: bool,
 }
 
 /// A light as it is seen from one point: the ways `l` + u `axes[0]` + v `axes[1]` + w `axes[2]` lead to it.
@@ -29,6 +31,10 @@ pub(crate) struct LightSeen {
     /// The largest coordinate of every way, at most.
     pub shortest: f32,
     pub finite: bool,
+    /// Along which what is in the way is bounded: two axes across, and a third. Those of a ball face the point.
+    pub frame: [Vec3; 3],
+    /// How far away a ball is, in radii.
+    pub radii: Option<f32>,
 }
 
 /// Sixteen sampled points, by their coordinates along the hull's axes. Where there is none, those of another one.
@@ -72,7 +78,7 @@ const ROOM: f64 = 1e-5;
 
 impl LightHull {
     fn at(center: Vec3, finite: bool) -> Self {
-        LightHull { center, axes: [Vec3::ZERO; 3], finite }
+        LightHull { center, axes: [Vec3::ZERO; 3], finite, is_ball: false }
     }
 
     /// The smallest hull with axes along `e0`, `e1` and across them, around `points`.
@@ -82,7 +88,8 @@ impl LightHull {
         let center = (low + (high - low) * 0.5).as_vec3();
         let across = e0.cross(e1).normalize_or(DVec3::Y);
         let thin = across * (e0.length() + e1.length());
-        let mut hull = LightHull { center, axes: [e0, e1, thin].map(|axis| axis.as_vec3()), finite: true };
+        let axes = [e0, e1, thin].map(|axis| axis.as_vec3());
+        let mut hull = LightHull { center, axes, finite: true, is_ball: false };
         // Fit the axes to the points, then look whether rounding lets any point out
         let mut needed = [0.0f64; 3];
         for q in points {
@@ -126,7 +133,8 @@ impl LightHull {
                 if !light.exact {
                     points.extend((0..area.samples()).map(|k| area.point(k).as_dvec3()));
                 }
-                Self::around(e0, e1, &points)
+                let is_ball = matches!(area.shape, AreaShape::Sphere(_));
+                LightHull { is_ball, ..Self::around(e0, e1, &points) }
             }
         }
     }
@@ -159,7 +167,14 @@ impl LightHull {
     #[inline(always)]
     pub fn from(&self, p: Vec3) -> LightSeen {
         let l = if self.finite { self.center - p } else { self.center };
-        LightSeen::new(l, self.axes, self.finite)
+        let seen = LightSeen::new(l, self.axes, self.finite);
+        if !self.is_ball {
+            return seen;
+        }
+        let (distance, radius) = (l.length(), self.axes[0].length());
+        let facing = Axes::around((l / distance).as_dvec3());
+        let frame = [facing.x, facing.y, facing.z].map(|axis| axis.as_vec3() * radius);
+        LightSeen { frame, radii: Some(distance / radius), ..seen }
     }
 }
 
@@ -227,7 +242,7 @@ impl LightSeen {
         let reach = axes[0].abs() + axes[1].abs() + axes[2].abs();
         let longest = (l.abs() + reach).max_element() * (1.0 + 4.0 * f32::EPSILON);
         let shortest = ((l.abs() - reach).max_element() - longest * (4.0 * f32::EPSILON)).max(0.0);
-        LightSeen { l, axes, longest, shortest, finite }
+        LightSeen { l, axes, longest, shortest, finite, frame: axes, radii: None }
     }
 
     /// Between what values f.w lies for the ways w, but for rounding: its middle and how far it goes from there.

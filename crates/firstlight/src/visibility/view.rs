@@ -238,31 +238,37 @@ fn eye(mesh: &ShadowMesh, light: &LightSeen, point: &Viewpoint) -> Eye {
     let o = point.start.abs();
     let short = 32.0 * UNIT_ROUNDOFF * (1.01 + 1.01 * (o.x + o.y + o.z) / light.shortest) + 8.0 * UNIT_ROUNDOFF;
     let short = if short < 0.5 { 1.0 / (1.0 - short) * (1.0 + 8.0 * UNIT_ROUNDOFF) } else { f32::INFINITY };
-    let finite = light.finite;
-    let horizons = [point.horizon, point.ns];
-    match mesh.placement {
-        None => {
-            let LightSeen { l, axes, longest, shortest, .. } = *light;
-            Eye { o: point.start, l, axes, longest, shortest, short, finite, horizons }
-        }
-        Some(placement) => {
-            let m = &placement.object_from_world.matrix3;
-            let size = |v: Vec3| {
-                let v = v.abs().as_dvec3();
-                m.x_axis.abs() * v.x + m.y_axis.abs() * v.y + m.z_axis.abs() * v.z
-            };
-            let o = placement.line(point.start, light.l).o.as_vec3();
-            let own = LightSeen::new(
-                (*m * light.l.as_dvec3()).as_vec3(),
-                light.axes.map(|a| (*m * a.as_dvec3()).as_vec3()),
-                finite,
-            );
-            let sizes: DVec3 = size(light.l) + size(light.axes[0]) + size(light.axes[1]) + size(light.axes[2]);
-            let longest = (sizes.max_element() * 1.0001) as f32;
-            let upright = placement.world_from_object.matrix3.transpose();
-            let horizons = horizons.map(|n| (upright * n.as_dvec3()).as_vec3());
-            Eye { o, l: own.l, axes: own.axes, longest, shortest: own.shortest * 0.9999, short, finite, horizons }
-        }
+    let own = Eye {
+        o: point.start,
+        l: light.l,
+        axes: light.axes,
+        frame: light.frame,
+        radii: light.radii,
+        longest: light.longest,
+        shortest: light.shortest,
+        short,
+        finite: light.finite,
+        horizons: [point.horizon, point.ns],
+    };
+    let Some(placement) = mesh.placement else { return own };
+    let m = &placement.object_from_world.matrix3;
+    let way = |v: Vec3| (*m * v.as_dvec3()).as_vec3();
+    let size = |v: Vec3| {
+        let v = v.abs().as_dvec3();
+        m.x_axis.abs() * v.x + m.y_axis.abs() * v.y + m.z_axis.abs() * v.z
+    };
+    let sizes: DVec3 = size(light.l) + size(light.axes[0]) + size(light.axes[1]) + size(light.axes[2]);
+    let seen = LightSeen::new(way(light.l), light.axes.map(way), light.finite);
+    let upright = placement.world_from_object.matrix3.transpose();
+    Eye {
+        o: placement.line(point.start, light.l).o.as_vec3(),
+        l: seen.l,
+        axes: seen.axes,
+        frame: light.frame.map(way),
+        longest: (sizes.max_element() * 1.0001) as f32,
+        shortest: seen.shortest * 0.9999,
+        horizons: own.horizons.map(|n| (upright * n.as_dvec3()).as_vec3()),
+        ..own
     }
 }
 

@@ -18,7 +18,7 @@ use crate::accel::{
 };
 use crate::math::{DVec3, Vec3};
 use kernel::{Crossings, intersect, intersect_lanes};
-pub(crate) use seen::{Eye, SeenTriangle, TOGETHER};
+pub(crate) use seen::{Eye, SeenParts, SeenTriangle, TOGETHER};
 
 /// Triangles in a leaf.
 const PACK: usize = 4;

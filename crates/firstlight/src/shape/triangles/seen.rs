@@ -33,15 +33,16 @@
 //!   of the light's axes, that hold the triangle. With X a vertex, (X x a1).l = 0 is such a plane, and it meets the
 //!   light at u = -(X.(a1 x l0) + w X.(a1 x a2)) / X.(a1 x a0). Each of these products may be wrong by as much as U, in
 //!   D L times the size of the axis, if all vertices are on the light's side of o. So nothing is hidden beside that.
+//!   Ways to a ball, of any length, are told by where they meet the plane through its middle that faces o, w = 0.
 //! - Ways that count lie above the horizon, h.l > 0, but for 8 h |h| L by which that is wrong. So where its ray meets X
 //!   it is no farther below o than that times t, and t is no more than 1 if the ray has an end, nor than D over the
 //!   least of the ways: a triangle whose vertices are below by that, and by 16 h |h| D, is not met. [`BELOW`].
 //! - A ray is stopped if it is inside of all edges, not edge-on, and det is above T by what t can be wrong, and by what
 //!   the ray stops short of the light.
 //!
-//! Sizes beyond which any of these products could leave the range of numbers are left to the kernel. Numbers by cell and
-//! sample are fused where a processor can: what is decided by them is right either way, and what is not is left to the
-//! kernel.
+//! Sizes beyond which any of these products could leave the range of numbers are left to the kernel. Numbers by cell
+//! and sample are fused where a processor can: what is decided by them is right either way, and what is not is left to
+//! the kernel.
 
 use fearless_simd::{f32x4, f32x8, f32x16, mask32x16, prelude::*};
 
@@ -67,6 +68,12 @@ const GRAZE_ALL: f32 = 1.0 / 512.0;
 /// By how much a ray that counts can lead below a horizon, in |h| D + |h| t L.
 const BELOW: f32 = 32.0 * H;
 
+/// In radii: balls no farther away than this bound nothing.
+const APART: f32 = 1.01;
+/// Triangles in a rectangle smaller than so many cells are small beside them: then edges are not looked at. With none a
+/// mesh of small triangles takes a quarter longer.
+const SMALL: f32 = 2.0;
+
 /// Packs that are looked at together.
 pub(crate) const TOGETHER: usize = 4;
 
@@ -79,6 +86,10 @@ pub(crate) struct Eye {
     pub l: Vec3,
     /// Half the light, along its axes.
     pub axes: [Vec3; 3],
+    /// Along which triangles are bounded: two across, and the third.
+    pub frame: [Vec3; 3],
+    /// How far away a ball is, in radii: what is bounded then are ways in the plane through its middle.
+    pub radii: Option<f32>,
     /// The largest coordinate of any way, at least; in another space also the sum of the sizes of what it was computed
     /// from.
     pub longest: f32,
@@ -93,7 +104,7 @@ pub(crate) struct Eye {
     pub horizons: [Vec3; 2],
 }
 
-/// What sixteen triangles may hide of a light: from where to where along its first two axes.
+/// What sixteen triangles may hide of a light: from where to where along two axes across.
 struct ShadowBounds<S: Simd> {
     low: [f32x16<S>; 2],
     high: [f32x16<S>; 2],
@@ -104,13 +115,14 @@ impl<S: Simd> ShadowBounds<S> {
     /// `sound`.
     #[inline(always)]
     fn new(simd: S, eye: &Eye, vertices: [V<S>; 3], far_off: f32x16<S>, sound: mask32x16<S>) -> Self {
-        let [a, b, c] = eye.axes;
+        let [a, b, c] = eye.frame;
         let normal = b.cross(a);
-        let (one, infinite) = (simd.splat_f32x16(1.0), simd.splat_f32x16(f32::INFINITY));
+        let (zero, one) = (simd.splat_f32x16(0.0), simd.splat_f32x16(1.0));
+        let infinite = simd.splat_f32x16(f32::INFINITY);
         // Whether all of the light is on one side of o, and on which
         let (ahead, depth) = (normal.dot(eye.l), normal.dot(c).abs());
         let size = a.abs().max(b.abs()).max_element() * eye.longest;
-        let is_apart = ahead.abs() - depth > EDGE * size * eye.longest;
+        let is_apart = ahead.abs() - depth > EDGE * size * eye.longest && eye.radii.is_none_or(|radii| radii > APART);
         let side = if ahead < 0.0 { -1.0 } else { 1.0 };
         let wrong = far_off * (2.0 * EDGE * size);
         let mut is_ahead = sound & mask32x16::splat(simd, is_apart);
@@ -121,7 +133,7 @@ impl<S: Simd> ShadowBounds<S> {
             let inverse = one / is_ahead.select(across, one);
             for (axis, (along, turned)) in [(b, -side), (a, side)].into_iter().enumerate() {
                 let middle = dot(x, along.cross(eye.l)) * inverse * turned;
-                let reach = (dot(x, along.cross(c)) * inverse).abs();
+                let reach = if eye.radii.is_some() { zero } else { (dot(x, along.cross(c)) * inverse).abs() };
                 let room = reach + wrong * inverse * (middle.abs() + reach + 2.0);
                 bounds.low[axis] = bounds.low[axis].min(middle - room);
                 bounds.high[axis] = bounds.high[axis].max(middle + room);
@@ -136,9 +148,43 @@ impl<S: Simd> ShadowBounds<S> {
 
     /// Those that are beside the light.
     #[inline(always)]
-    fn beside(&self) -> mask32x16<S> {
+    fn beside(&self, eye: &Eye) -> mask32x16<S> {
         let ([u, v], [to_u, to_v]) = (self.low, self.high);
-        u.max(v).simd_gt(1.0) | to_u.min(to_v).simd_lt(-1.0)
+        // Where the cone that holds a ball meets that plane
+        let rim = eye.radii.map_or(1.0, |radii| radii / (radii * radii - 1.0).max(0.0).sqrt() * (1.0 + 1e-3));
+        u.max(v).simd_gt(rim) | to_u.min(to_v).simd_lt(-rim)
+    }
+}
+
+/// Sixteen parts of a light as they are seen: from where to where along the axes that triangles are bounded along.
+pub(crate) struct SeenParts {
+    pub low: [[f32; 16]; 2],
+    pub high: [[f32; 16]; 2],
+}
+
+impl SeenParts {
+    /// None yet, and beside all.
+    pub const NONE: SeenParts = SeenParts { low: [[f32::INFINITY; 16]; 2], high: [[f32::NEG_INFINITY; 16]; 2] };
+
+    /// The first `count` of those of a flat light, with these middles and half sizes along its axes.
+    #[inline(always)]
+    pub fn flat<S: Simd>(simd: S, middle: &[[f32; 16]; 3], half: &[[f32; 16]; 3], count: usize) -> SeenParts {
+        let mut parts = SeenParts::NONE;
+        let (middle, half) = (load(simd, middle), load(simd, half));
+        for axis in 0..2 {
+            (middle[axis] - half[axis]).store_slice(&mut parts.low[axis]);
+            (middle[axis] + half[axis]).store_slice(&mut parts.high[axis]);
+            for lane in count..16 {
+                (parts.low[axis][lane], parts.high[axis][lane]) = (f32::INFINITY, f32::NEG_INFINITY);
+            }
+        }
+        parts
+    }
+
+    /// How large the first is.
+    #[inline(always)]
+    fn area(&self) -> f32 {
+        (self.high[0][0] - self.low[0][0]) * (self.high[1][0] - self.low[1][0])
     }
 }
 
@@ -157,7 +203,7 @@ pub(crate) struct SeenTriangle {
     near: f32,
     /// det below this: it is not.
     far: f32,
-    /// From where to where along the light's first two axes it hides anything, at most.
+    /// From where to where along the axes of the eye's frame it hides anything, at most.
     low: [f32; 2],
     high: [f32; 2],
     /// Which it is: the leaf, the place in it, and what the caller says.
@@ -319,19 +365,23 @@ impl TriangleTree {
             let room = area * (far_off * ratio) + sliver * (1.0 / GRAZE_ALL) + wrong + det_wrong;
             nothing |= (most + room).simd_lt(height) & height.simd_gt(room);
         }
+        let bounds = ShadowBounds::new(simd, eye, [a, b, c], far_off, sound);
+        nothing |= bounds.beside(eye);
+        let keep = (!(nothing & sound)) & area.simd_gt(zero);
+        let mut keep = keep.to_bitmask() as u32;
+        if leaves.len() < TOGETHER {
+            keep &= (1 << (PACK * leaves.len())) - 1;
+        }
+        if keep == 0 {
+            return false;
+        }
         // How far a ray leads, up to where a triangle is
         let led = far_off * (eye.longest / eye.shortest);
         let led = if eye.finite { led.min(eye.longest) } else { led };
         for horizon in eye.horizons {
             let highest = dot(a, horizon).max(dot(b, horizon)).max(dot(c, horizon));
-            nothing |= highest.simd_lt((far_off + led) * -(BELOW * horizon.abs().element_sum()));
-        }
-        let bounds = ShadowBounds::new(simd, eye, [a, b, c], far_off, sound);
-        nothing |= bounds.beside();
-        let keep = (!(nothing & sound)) & area.simd_gt(zero);
-        let mut keep = keep.to_bitmask() as u32;
-        if leaves.len() < TOGETHER {
-            keep &= (1 << (PACK * leaves.len())) - 1;
+            let room = (far_off + led) * (BELOW * horizon.abs().element_sum());
+            keep &= !(((highest + room).simd_lt(zero) & sound).to_bitmask() as u32);
         }
         if keep == 0 {
             return false;
@@ -465,19 +515,34 @@ impl SeenTriangle {
         half[2].mul_add(c, half[1].mul_add(b, half[0] * a.abs()))
     }
 
-    /// What it hides of sixteen cells: middles and half sizes along the light's axes. `unsure` are those it may hide
-    /// some of.
+    /// Whether it is known from where to where it hides anything.
     #[inline(always)]
-    pub fn cells<S: Simd>(&self, simd: S, middle: &[[f32; 16]; 3], half: &[[f32; 16]; 3]) -> Verdict {
-        let (middle, half) = (load(simd, middle), load(simd, half));
+    pub fn is_bounded(&self) -> bool {
+        self.low[0] > f32::NEG_INFINITY
+    }
+
+    /// What it hides of sixteen cells: middles and half sizes along the light's axes, and what they are seen as.
+    /// `unsure` are those it may hide some of.
+    #[inline(always)]
+    pub fn cells<S: Simd>(
+        &self,
+        simd: S,
+        middle: &[[f32; 16]; 3],
+        half: &[[f32; 16]; 3],
+        parts: &SeenParts,
+    ) -> Verdict {
         let mut beside = mask32x16::splat(simd, false);
         for axis in 0..2 {
-            beside |= (middle[axis] - half[axis]).simd_gt(self.high[axis])
-                | (middle[axis] + half[axis]).simd_lt(self.low[axis]);
+            beside |= f32x16::load_array_ref(simd, &parts.low[axis]).simd_gt(self.high[axis])
+                | f32x16::load_array_ref(simd, &parts.high[axis]).simd_lt(self.low[axis]);
         }
-        if beside.all_true() {
-            return Verdict { hidden: 0, unsure: 0 };
+        let beside = beside.to_bitmask() as u16;
+        // A small one hides no cell, and its edges part few from it
+        let area = (self.high[0] - self.low[0]) * (self.high[1] - self.low[1]);
+        if beside == u16::MAX || area < SMALL * parts.area() {
+            return Verdict { hidden: 0, unsure: !beside };
         }
+        let (middle, half) = (load(simd, middle), load(simd, half));
         let (u, v, w, d) = (self.value(0, middle), self.value(1, middle), self.value(2, middle), self.value(3, middle));
         let (ur, vr, wr, dr) = (self.reach(0, half), self.reach(1, half), self.reach(2, half), self.reach(3, half));
         let (lu, lv, lw, ld) = (u - ur, v - vr, w - wr, d - dr);
@@ -485,10 +550,10 @@ impl SeenTriangle {
         let outside = hu.min(hv).min(hw).simd_lt(-self.edge);
         let other = lu.max(lv).max(lw).simd_gt(self.edge);
         let outside = outside & (other | ld.simd_gt(self.graze) | hd.simd_lt(-self.graze));
-        let nothing = beside | outside | hd.simd_lt(self.far);
+        let nothing = outside | hd.simd_lt(self.far);
         let all = lu.min(lv).min(lw).simd_gt(self.edge) & ld.simd_gt(self.near);
         let hidden = all.to_bitmask() as u16;
-        Verdict { hidden, unsure: !(nothing.to_bitmask() as u16 | hidden) }
+        Verdict { hidden, unsure: !(nothing.to_bitmask() as u16 | hidden | beside) }
     }
 
     /// What it hides of sixteen samples. `unsure` are those the kernel has to decide.
