@@ -183,7 +183,7 @@ pub(crate) const COSTS: Costs = Costs {
     torus: 3.0,
     cut: 1.0,
     heard: 8.0,
-    answered: 0.1,
+    answered: 0.3,
     remembered: 0.9,
     passed: 0.97,
     more: 4.0,
