@@ -227,7 +227,7 @@ struct BallSeen {
 impl BallSeen {
     fn of(light: &LightSeen) -> Option<BallSeen> {
         let radii = light.radii?;
-        let turn = light.frame.map(|to| light.axes.map(|axis| axis.dot(to) / to.length_squared()).into());
+        let turn = light.frame.map(|to| light.axes.map(|axis| axis.dot(to) / to.length_squared()));
         // Ways are wrong by their rounding, and those that end nearest are longest in the plane
         let nearest = radii / (radii - 1.0).max(UNIT_ROUNDOFF);
         Some(BallSeen { turn, radii, room: 64.0 * UNIT_ROUNDOFF * (radii + 2.0) * nearest * nearest })
