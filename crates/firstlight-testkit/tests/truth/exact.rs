@@ -5,8 +5,8 @@ use std::f64::consts::PI;
 use std::path::Path;
 
 use firstlight::{
-    DiskLightDesc, EmitSides, Falloff, LightDesc, NoAssets, ParallelogramDesc, RectangleDesc, SampleSet, SamplesDesc,
-    SceneDesc, ShapeDesc, SphereLightDesc, TorusDesc, builtin_scenes,
+    DiskLightDesc, EmitSides, Falloff, LightDesc, NoAssets, ParallelogramDesc, RectangleDesc, RenderSettings,
+    SampleSet, SamplesDesc, SceneDesc, ShapeDesc, SphereLightDesc, TorusDesc, Window, builtin_scenes,
 };
 
 use crate::analytic::{corners, lambert, white};
@@ -105,6 +105,21 @@ fn random_scenes_are_within_the_bounds_where_few_pixels_are_open() {
 #[test]
 fn the_bounds_scale_with_the_tolerance() {
     hold_to(4.0, (0..40).filter(|seed| !SLOW.contains(seed)).chain(COUNTEREXAMPLES), 16);
+}
+
+#[test]
+fn shadows_whose_outlines_cross_are_told_closely() {
+    // Behind the edge of a wall and a ball: both rules of a panel agreed by chance in all of that region
+    let mut desc = exact_scenes::scene(17, 16);
+    desc.render.tolerance = 0.25;
+    let [x, y] = [1, 10];
+    let many = compile(&with_samples(&desc, 1 << 15, SampleSet::Sobol, 1));
+    let truth = picture(&many, &RenderSettings { crop: Some(Window { x, y, width: 1, height: 1 }), ..every_ray() });
+    let found = exact(&desc);
+    let pixel = found.pixels[(y * 16 + x) as usize];
+    let [found, truth] = [pixel, truth.pixels[0]].map(|pixel| displayed(&many, pixel));
+    let off = (0..3).map(|k| (found[k] - truth[k]).abs()).fold(0.0, f64::max);
+    assert!(off < 0.15, "{off} steps");
 }
 
 #[test]

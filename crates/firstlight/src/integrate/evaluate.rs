@@ -608,11 +608,12 @@ impl Evaluator {
             let state = &mut self.state[panel.point as usize];
             let value = lane(&sums.sums, k);
             let differences = lane(&sums.differences, k);
-            // The finer rule is better than the difference says, the more the closer both are
+            // The finer rule is better than the difference says, the more the closer both are; but where outlines
+            // cross, both may agree by chance
             let error = || {
                 std::array::from_fn(|moment| {
                     let (difference, value) = (differences[moment], value[moment].abs());
-                    difference * (2.0 * (difference / value.max(f32::MIN_POSITIVE)).sqrt()).min(1.0)
+                    difference * (4.0 * (difference / value.max(f32::MIN_POSITIVE)).sqrt()).min(1.0)
                 })
             };
             let middle = 0.5 * (panel.y[0] + panel.y[1]);
