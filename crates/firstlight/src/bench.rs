@@ -14,7 +14,7 @@ pub use crate::render::given::{ChoosePoints, LightPoint};
 use crate::render::pixel::PixelSum;
 use crate::scene::{CompileOptions, Scene, SceneDesc, ShadowRays, TracedHit};
 use crate::shape::{RayDifferential, TileHits, TriangleTree, every};
-use crate::visibility::{Occluders, Settled, Settler, ShadowView, Target, Viewpoint, Visibility};
+use crate::visibility::{OccluderList, Settled, Settler, ShadowView, Target, Viewpoint, Visibility};
 
 /// Origin and direction of a ray.
 pub type RayBits = [f32; 6];
@@ -346,7 +346,7 @@ pub enum ShareSeen {
 /// `None` where that is nowhere, or at a light. Each `block` x `block` pixels have a shaft together.
 pub fn sights(scene: &Scene, light: u32, block: u32) -> Vec<Option<ShareSeen>> {
     let (level, target) = (Level::new(), Target::new(scene, LightId(light)));
-    let (mut occluders, mut view) = (Occluders::default(), ShadowView::default());
+    let (mut occluders, mut view) = (OccluderList::default(), ShadowView::default());
     let mut sights = vec![None; (scene.width * scene.height) as usize];
     let (mut points, mut pixels, mut order) = (Vec::new(), Vec::new(), Vec::new());
     for top in (0..scene.height).step_by(block as usize) {

@@ -17,9 +17,9 @@ use super::occluder::{Occluder, Shadow, corners_from};
 use super::panels::{Between, MAX_INTERVALS};
 use crate::ids::LightId;
 use crate::math::{DAffine3, Facet, LANES, Vec3, Vec3x16};
-use crate::scene::{Meets, PlacedTarget, Scene};
+use crate::scene::{PlacedTarget, Scene};
 use crate::shape::{Parallelogram, Placement, PlaneSide, Solid, Sphere};
-use crate::visibility::{Occluders, ShadowMesh};
+use crate::visibility::{OccluderList, ShadowMesh};
 use flat::{FacetShape, Own, facet_between, flat_between};
 use solid::{PlacedSolid, solid_between};
 
@@ -64,32 +64,25 @@ impl<'a> Obstacles<'a> {
         if !scene.lights[index].shadows {
             return obstacles;
         }
-        let [sphere_links, flat_links] = &scene.obstacle_links;
-        let listed = scene.obstacles.iter().enumerate().filter(|(i, _)| scene.casts(sphere_links, *i, id));
-        let lights = scene.light_obstacles.spheres.iter().filter(|(light, _)| *light != index);
-        for sphere in listed.map(|(_, sphere)| sphere).chain(lights.map(|(_, sphere)| sphere)) {
-            obstacles.sphere(sphere);
+        let listed = &scene.occluders;
+        for (_, sphere) in scene.that_stop(&listed.spheres, id) {
+            obstacles.sphere(&sphere.shape);
         }
-        let sides = &scene.light_sides[index];
-        for (i, flat) in scene.flat_obstacles.iter().enumerate().filter(|(i, _)| scene.casts(flat_links, *i, id)) {
+        let sides = listed.sides(id);
+        for (i, flat) in scene.that_stop(&listed.flats, id) {
             let side = sides.get(i).copied().unwrap_or(PlaneSide::Both);
-            let seen_side = if scene.flats_seen.get(i) == Some(&true) { side } else { PlaneSide::Both };
-            obstacles.flat(flat, side, seen_side);
+            let seen_side = if listed.flats_seen.get(i) == Some(&true) { side } else { PlaneSide::Both };
+            obstacles.flat(&flat.shape, side, seen_side);
         }
-        for (_, disk) in scene.light_obstacles.disks.iter().filter(|(light, _)| *light != index) {
-            obstacles.solid(PlacedSolid::new(Solid::Disk(*disk), Placement::new(DAffine3::IDENTITY), emitter));
+        for (_, disk) in scene.that_stop(&listed.disks, id) {
+            obstacles.solid(PlacedSolid::new(Solid::Disk(disk.shape), Placement::new(DAffine3::IDENTITY), emitter));
         }
         obstacles.has_more = obstacles.occluders.len() > MAX_OBSTACLES;
         obstacles.occluders.truncate(MAX_OBSTACLES);
         obstacles.exact.truncate(MAX_OBSTACLES);
         for (k, thing) in scene.geometry.placed.iter().enumerate() {
             let PlacedTarget::Solid(solid) = thing.target else { continue };
-            let casts = match thing.shadow {
-                Meets::All => true,
-                Meets::None => false,
-                Meets::Some => scene.geometry.casts(thing.surface, id),
-            };
-            if !casts || obstacles.occluders.len() == MAX_OBSTACLES {
+            if !scene.geometry.stops(thing.shadow, id) || obstacles.occluders.len() == MAX_OBSTACLES {
                 continue;
             }
             let solid = scene.geometry.solids[solid as usize];
@@ -111,7 +104,7 @@ impl<'a> Obstacles<'a> {
         scene: &'a Scene,
         id: LightId,
         emitter: &Emitter,
-        trees: &Occluders,
+        trees: &OccluderList,
         others: usize,
     ) -> bool {
         *self = Obstacles {

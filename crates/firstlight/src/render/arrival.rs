@@ -23,7 +23,7 @@ use crate::material::{Bsdf, Lobe, Moments};
 use crate::math::LANES;
 use crate::scene::Scene;
 use crate::shape::SurfaceInteraction;
-use crate::visibility::{Occluders, Settler, ShadowView, Shaft, Viewpoint, Visibility};
+use crate::visibility::{OccluderList, Settler, ShadowView, Shaft, Viewpoint, Visibility};
 
 pub(crate) use place::ArrivalPlace;
 
@@ -70,7 +70,7 @@ pub(crate) struct Arrivals<'a> {
     near: Obstacles<'a>,
     /// Of lights that are sampled.
     settler: Settler,
-    pub(super) occluders: Occluders,
+    pub(super) occluders: OccluderList,
     /// Views that are not used any more.
     views: Vec<ShadowView>,
     /// Tallies as well.
@@ -102,7 +102,7 @@ impl<'a> Arrivals<'a> {
             found: Vec::new(),
             near: Obstacles::default(),
             settler: Settler::default(),
-            occluders: Occluders::default(),
+            occluders: OccluderList::default(),
             worth: vec![Worth::default(); scene.lights.len()],
             views: Vec::new(),
             tallies: Vec::new(),

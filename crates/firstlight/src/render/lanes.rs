@@ -15,45 +15,33 @@ use crate::ids::LightId;
 use crate::light::{Area, LightKind, MIN_DISTANCE2, Points};
 use crate::material::{Lobe, MOMENTS};
 use crate::math::{LANES, LaneSum, ShadowRay, Vec3, Vec3x16};
-use crate::scene::{Geometry, LinkId, Scene, ShadowRays};
+use crate::scene::{Geometry, Listed, Scene, ShadowRays};
 use crate::shape::{DiskShadow, ParallelogramShadow, PlaneSide, SphereShadow, SurfaceInteraction};
 use crate::visibility::ShadowView;
 
 /// Light, sixteen samples at a time.
 pub(crate) struct Lanes {
     level: Level,
-    /// Spheres that can stand between the surface looked around from and any light.
+    /// What is listed and can stand between the surface looked around from and any light: flat things all, by the
+    /// index that tells on which side of them each light lies.
+    spheres: Vec<Listed<SphereShadow>>,
+    flats: Vec<Listed<ParallelogramShadow>>,
+    disks: Vec<Listed<DiskShadow>>,
+    /// Those of them that can stand in the way of the light at hand.
+    between: BetweenShapes,
+}
+
+/// What is listed and can stand in the way of one light. Keeps its memory.
+#[derive(Default)]
+struct BetweenShapes {
     spheres: Vec<SphereShadow>,
-    /// For which lights each of `spheres` casts shadows; empty where nothing chooses.
-    sphere_links: Vec<Option<LinkId>>,
-    /// Those of `spheres` that cast shadows for the light at hand, where something chooses.
-    casting: Vec<SphereShadow>,
-    /// All that is flat, as seen from that surface, by the index that tells on which side of it each light lies.
     flats: Vec<ParallelogramShadow>,
-    /// Those of `flats` that can stand in the way of the light at hand.
-    between: Vec<ParallelogramShadow>,
-    /// Sphere lights that block, each with its index, and those of them that are not the light at hand.
-    light_spheres: Vec<(usize, SphereShadow)>,
-    other_spheres: Vec<SphereShadow>,
-    /// Disk lights that block, likewise.
-    light_disks: Vec<(usize, DiskShadow)>,
-    other_disks: Vec<DiskShadow>,
+    disks: Vec<DiskShadow>,
 }
 
 impl Lanes {
     pub fn new(level: Level) -> Self {
-        Lanes {
-            level,
-            spheres: Vec::new(),
-            sphere_links: Vec::new(),
-            casting: Vec::new(),
-            flats: Vec::new(),
-            between: Vec::new(),
-            light_spheres: Vec::new(),
-            other_spheres: Vec::new(),
-            light_disks: Vec::new(),
-            other_disks: Vec::new(),
-        }
+        Lanes { level, spheres: Vec::new(), flats: Vec::new(), disks: Vec::new(), between: BetweenShapes::default() }
     }
 }
 
@@ -62,8 +50,6 @@ impl Lanes {
 pub(super) struct PointObstacles<'a> {
     pub spheres: &'a [SphereShadow],
     pub flats: &'a [ParallelogramShadow],
-    /// Other lights that block, where they are not among the former.
-    pub light_spheres: &'a [SphereShadow],
     pub disks: &'a [DiskShadow],
     /// All that lies in trees, and the light that it stands in the way of.
     pub trees: Option<(&'a Geometry, LightId)>,
@@ -79,11 +65,7 @@ impl<'a> PointObstacles<'a> {
     }
 
     fn are_none(&self) -> bool {
-        self.spheres.is_empty()
-            && self.flats.is_empty()
-            && self.light_spheres.is_empty()
-            && self.disks.is_empty()
-            && self.trees.is_none()
+        self.spheres.is_empty() && self.flats.is_empty() && self.disks.is_empty() && self.trees.is_none()
     }
 }
 
@@ -143,9 +125,6 @@ fn gather_area<S: Simd>(
         for flat in obstacles.flats {
             lit &= !flat.blocks_lanes(l);
         }
-        for sphere in obstacles.light_spheres {
-            lit &= !sphere.blocks_lanes(l, distance2);
-        }
         for disk in obstacles.disks {
             lit &= !disk.blocks_lanes(l);
         }
@@ -204,30 +183,16 @@ fn partials<S: Simd>(v: f32x16<S>) -> LaneSum {
 
 impl Lighting for Lanes {
     fn look_around(&mut self, scene: &Scene, si: &SurfaceInteraction) {
+        let listed = &scene.occluders;
         self.spheres.clear();
-        self.sphere_links.clear();
-        let [links, _] = &scene.obstacle_links;
-        for (i, sphere) in scene.obstacles.iter().enumerate() {
-            let shadow = sphere.shadow(si.lit_from, si.error);
-            if !shadow.is_below(si.horizon) {
-                self.spheres.push(shadow);
-                if !links.is_empty() {
-                    self.sphere_links.push(links[i]);
-                }
-            }
-        }
+        let spheres = listed.spheres.iter().map(|sphere| sphere.map(|shape| shape.shadow(si.lit_from, si.error)));
+        self.spheres.extend(spheres.filter(|sphere| !sphere.shape.is_below(si.horizon)));
+        let flats = listed.flats.iter();
         self.flats.clear();
-        self.flats.extend(scene.flat_obstacles.iter().map(|flat| flat.shadow(si.lit_from, si.error)));
-        self.light_spheres.clear();
-        for (light, sphere) in &scene.light_obstacles.spheres {
-            let shadow = sphere.shadow(si.lit_from, si.error);
-            if !shadow.is_below(si.horizon) {
-                self.light_spheres.push((*light, shadow));
-            }
-        }
-        self.light_disks.clear();
-        let disks = scene.light_obstacles.disks.iter();
-        self.light_disks.extend(disks.map(|(light, disk)| (*light, disk.shadow(si.lit_from, si.error))));
+        self.flats.extend(flats.map(|flat| flat.map(|shape| shape.shadow(si.lit_from, si.error))));
+        let disks = listed.disks.iter();
+        self.disks.clear();
+        self.disks.extend(disks.map(|disk| disk.map(|shape| shape.shadow(si.lit_from, si.error))));
     }
 
     fn gather(
@@ -243,45 +208,21 @@ impl Lighting for Lanes {
         let LightKind::Area(area) = &light.kind else {
             return Plain.gather(scene, index, si, lobe, counts);
         };
-        // What casts no shadow for this light is not in its way
         let id = LightId(index as u32);
-        let spheres = if self.sphere_links.is_empty() {
-            &self.spheres
-        } else {
-            self.casting.clear();
-            for (sphere, links) in self.spheres.iter().zip(&self.sphere_links) {
-                if scene.geometry.links.contains(*links, id) {
-                    self.casting.push(*sphere);
-                }
-            }
-            &self.casting
+        let BetweenShapes { spheres, flats, disks } = &mut self.between;
+        spheres.clear();
+        spheres.extend(scene.that_stop(&self.spheres, id).map(|(_, sphere)| sphere.shape));
+        let sides = scene.occluders.sides(id);
+        let is_between = |(i, flat): &(usize, &Listed<ParallelogramShadow>)| {
+            !flat.shape.is_one_sided(sides.get(*i).copied().unwrap_or(PlaneSide::Both))
         };
-        self.between.clear();
-        let [_, flat_links] = &scene.obstacle_links;
-        let sides = &scene.light_sides[index];
-        for (i, flat) in self.flats.iter().enumerate() {
-            let side = sides.get(i).copied().unwrap_or(PlaneSide::Both);
-            if !flat.is_one_sided(side) && scene.casts(flat_links, i, id) {
-                self.between.push(*flat);
-            }
-        }
-        // Its own shape does not hide it
-        self.other_spheres.clear();
-        let others = self.light_spheres.iter().filter(|(light, _)| *light != index);
-        self.other_spheres.extend(others.map(|(_, shadow)| *shadow));
-        self.other_disks.clear();
-        let others = self.light_disks.iter().filter(|(light, _)| *light != index);
-        self.other_disks.extend(others.map(|(_, shadow)| *shadow));
+        flats.clear();
+        flats.extend(scene.that_stop(&self.flats, id).filter(is_between).map(|(_, flat)| flat.shape));
+        disks.clear();
+        disks.extend(scene.that_stop(&self.disks, id).map(|(_, disk)| disk.shape));
         let trees = scene.geometry.has_trees().then_some((&*scene.geometry, id));
         let obstacles = if light.shadows && si.receives_shadow {
-            PointObstacles {
-                spheres,
-                flats: &self.between,
-                light_spheres: &self.other_spheres,
-                disks: &self.other_disks,
-                trees,
-                hidden: &[],
-            }
+            PointObstacles { spheres, flats, disks, trees, hidden: &[] }
         } else {
             PointObstacles::default()
         };

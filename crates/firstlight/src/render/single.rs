@@ -10,6 +10,7 @@ use crate::integrate::TOLERANCE;
 use crate::light::{Light, LightKind};
 use crate::material::{Lobe, Moments};
 use crate::math::{Vec3, square};
+use crate::scene::Listed;
 use crate::shape::{PlaneSide, SurfaceInteraction};
 
 impl Arrivals<'_> {
@@ -70,7 +71,8 @@ impl Arrivals<'_> {
     /// Whether the edge of a shadow, of a light of one point, may run through the patch: 1, or 0 if that is excluded.
     fn edge(&mut self, light: usize, l: Vec3, finite: bool, place: &ArrivalPlace) -> f32 {
         let (scene, si) = (self.scene, place.si);
-        if !scene.light_obstacles.disks.is_empty()
+        let listed = &scene.occluders;
+        if !listed.disks.is_empty()
             || !place.clear && !matches!(self.gather_places(light, std::slice::from_ref(place)), Trees::Nothing)
         {
             return 1.0;
@@ -79,12 +81,7 @@ impl Arrivals<'_> {
         let d = l / length;
         let end = if finite { length } else { f32::INFINITY };
         let id = LightId(light as u32);
-        let [sphere_links, flat_links] = &scene.obstacle_links;
-        let spheres = scene.obstacles.iter().enumerate().filter(|(i, _)| scene.casts(sphere_links, *i, id));
-        let spheres = spheres.map(|(_, sphere)| sphere);
-        let lights =
-            scene.light_obstacles.spheres.iter().filter(|(index, _)| *index != light).map(|(_, sphere)| sphere);
-        for sphere in spheres.chain(lights) {
+        for (_, Listed { shape: sphere, .. }) in scene.that_stop(&listed.spheres, id) {
             let s = (sphere.c - si.lit_from.as_dvec3()).as_vec3();
             let (r, distance) = (sphere.r as f32, s.length());
             // The surface's own sphere, from outside
@@ -104,10 +101,7 @@ impl Arrivals<'_> {
             return 1.0;
         }
         let mut edge = 0.0;
-        for (i, flat) in scene.flat_obstacles.iter().enumerate() {
-            if !scene.casts(flat_links, i, id) {
-                continue;
-            }
+        for (_, Listed { shape: flat, .. }) in scene.that_stop(&listed.flats, id) {
             let n = flat.n.as_vec3();
             let height = flat.n.dot(si.lit_from.as_dvec3() - flat.p) as f32;
             let tip = if finite {

@@ -8,12 +8,12 @@ use fearless_simd::Level;
 
 use super::advice::{advise, advise_reflectance};
 use super::geometry::Geometry;
-use super::light_spheres::LightSpheres;
 use super::model::{Added, Framing};
+use super::occluders::ListedOccluders;
 use super::outline::ShapeOutline;
 use super::place::compile_shapes;
 use super::seen_lights::SeenLights;
-use super::{DisplayEncoding, LightObstacles, RenderDesc, Scene, SceneDesc, SceneSummary};
+use super::{DisplayEncoding, RenderDesc, Scene, SceneDesc, SceneSummary};
 use crate::camera::{Camera, CameraDesc};
 use crate::color::{Display, Encoding, Rgb};
 use crate::context::{AssetError, Assets, CompileContext, OnCompile};
@@ -21,10 +21,10 @@ use crate::describe::{ColorParam, Family, NumberParam, SamplesDesc};
 use crate::error::{Diagnostic, SceneError, Severity};
 use crate::ids::TextureId;
 use crate::image::read::{Limits, TexelData, Texels, decode};
-use crate::light::{AreaShape, Light, LightDesc, LightKind, check_samples};
+use crate::light::{Light, LightDesc, check_samples};
 use crate::material::Material;
 use crate::math::DVec3;
-use crate::shape::{Parallelogram, PlaneSide, ShapeDesc};
+use crate::shape::ShapeDesc;
 use crate::texture::{Param, Params, Texture, TextureDesc, TextureSpace};
 use crate::transform::MAX_TIME;
 
@@ -114,12 +114,7 @@ impl SceneDesc {
         let (Some(geometry), false) = (geometry, cx.has_errors()) else {
             return None;
         };
-        let (obstacles, flats) = geometry.listed_obstacles();
-        let obstacle_links = geometry.listed_obstacle_links();
-        let flat_obstacles: Vec<_> = flats.into_iter().chain(blocking(&lights)).collect();
-        let light_sides = sides(&lights, &flat_obstacles);
-        let light_obstacles = round_blocking(&lights);
-        let flats_seen = geometry.listed_flats_seen();
+        let occluders = ListedOccluders::new(&geometry, &lights);
         let summary = SceneSummary {
             bounds: bounds.map(|bounds| bounds.map(|corner| corner.to_array())),
             ..self.summary(desc, &geometry, &lights, &textures)
@@ -139,12 +134,7 @@ impl SceneDesc {
             seen_lights: Arc::new(SeenLights::new(&lights)),
             lights,
             materials,
-            obstacles,
-            flat_obstacles,
-            flats_seen,
-            obstacle_links,
-            light_sides,
-            light_obstacles,
+            occluders,
             level: Level::new(),
             hash: self.hash(&textures, &files, &added),
             moment: time,
@@ -402,49 +392,6 @@ struct Picture {
     ambient: Rgb,
     display: Display,
 }
-
-/// The rectangle lights that stand in the way of others.
-fn blocking(lights: &[Light]) -> impl Iterator<Item = Parallelogram> + '_ {
-    lights.iter().filter_map(|light| match &light.kind {
-        LightKind::Area(area) if area.blocks => match &area.shape {
-            AreaShape::Rectangle(rectangle) => Some(rectangle.shape),
-            AreaShape::Disk(_) | AreaShape::Sphere(_) => None,
-        },
-        _ => None,
-    })
-}
-
-/// The disk and sphere lights that stand in the way of others.
-fn round_blocking(lights: &[Light]) -> LightObstacles {
-    let mut found = LightObstacles::default();
-    for (index, light) in lights.iter().enumerate() {
-        match &light.kind {
-            LightKind::Area(area) if area.blocks => match &area.shape {
-                AreaShape::Rectangle(_) => {}
-                AreaShape::Disk(disk) => found.disks.push((index, disk.shape)),
-                AreaShape::Sphere(sphere) => found.spheres.push((index, sphere.shape)),
-            },
-            _ => {}
-        }
-    }
-    found.tree = LightSpheres::new(&found.spheres);
-    found
-}
-
-/// On which side of each flat shape a light lies. Nothing for a light of one point, which is asked about directly, nor
-/// beyond [`MAX_SIDES`]: where nothing is known, the light counts as lying on both sides.
-fn sides(lights: &[Light], flats: &[Parallelogram]) -> Vec<Vec<PlaneSide>> {
-    let areas = lights.iter().filter(|light| matches!(light.kind, LightKind::Area(_))).count();
-    let known = areas * flats.len() <= MAX_SIDES;
-    let of_light = |light: &Light| match &light.kind {
-        LightKind::Area(area) if known => flats.iter().map(|flat| area.shape.side_of(flat)).collect(),
-        _ => Vec::new(),
-    };
-    lights.iter().map(of_light).collect()
-}
-
-/// Pairs of a light and a flat shape whose sides are kept.
-const MAX_SIDES: usize = 1 << 24;
 
 /// The most points of all sampled area lights together: 12 bytes each, on spheres 24.
 const MAX_LIGHT_POINTS: u64 = 1 << 24;

@@ -14,6 +14,7 @@
 use std::sync::Arc;
 
 use super::links::{LinkId, LinkSets};
+use super::occluders::Opacity;
 use crate::accel::{Aabb, Bvh};
 use crate::ids::{LightId, MaterialId, SurfaceId};
 use crate::math::{DVec3, Facet};
@@ -45,15 +46,24 @@ pub(crate) struct Surface {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub(crate) struct RayRules {
     visible: bool,
-    casts_shadow: bool,
     single_sided: bool,
-    shadows: Option<LinkId>,
+    opacity: Opacity,
 }
 
 impl Surface {
     pub fn ray_rules(&self) -> RayRules {
-        let Surface { visible, casts_shadow, single_sided, shadows, .. } = *self;
-        RayRules { visible, casts_shadow, single_sided, shadows }
+        let Surface { visible, single_sided, .. } = *self;
+        RayRules { visible, single_sided, opacity: self.opacity() }
+    }
+
+    /// Which light it stops.
+    #[inline(always)]
+    pub fn opacity(&self) -> Opacity {
+        match self.shadows {
+            _ if !self.casts_shadow => Opacity::Clear,
+            None => Opacity::Opaque,
+            Some(lights) => Opacity::Linked(lights),
+        }
     }
 }
 
@@ -75,8 +85,9 @@ pub(crate) struct Placed {
     pub target: PlacedTarget,
     /// Its surface; the first of several in a joined mesh.
     pub surface: SurfaceId,
-    pub camera: Meets,
-    pub shadow: Meets,
+    /// To camera rays, and to light.
+    pub camera: Opacity,
+    pub shadow: Opacity,
 }
 
 /// Where on a surface a ray ended. In whole words: such a value is copied for every camera ray, and the compiler's own
@@ -103,16 +114,6 @@ pub(crate) enum PlacedSpot {
     Point(u32),
     /// The part of a solid.
     Part(u8),
-}
-
-/// Whether rays of one kind can meet something placed, or a joined mesh: all of it, none of it, or what its surfaces
-/// say.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Meets {
-    All,
-    None,
-    /// Ask each surface.
-    Some,
 }
 
 /// The first thing on a ray.
@@ -212,8 +213,8 @@ pub(crate) struct Geometry {
 /// The mesh of the world, and which rays meet it.
 pub(crate) struct Joined {
     pub mesh: Mesh,
-    pub camera: Meets,
-    pub shadow: Meets,
+    pub camera: Opacity,
+    pub shadow: Opacity,
 }
 
 /// What the walk through a scene finds.
@@ -339,51 +340,40 @@ impl Geometry {
         }
     }
 
-    /// The listed shapes that stand in the way of light.
-    pub fn listed_obstacles(&self) -> (Vec<Sphere>, Vec<Parallelogram>) {
-        if !self.listed {
-            return (Vec::new(), Vec::new());
-        }
-        let casts = |surface: SurfaceId| self.surfaces[surface.index()].casts_shadow;
-        let spheres = self.spheres.iter().filter(|sphere| casts(sphere.surface)).map(|sphere| sphere.shape);
-        let flats = self.parallelograms.iter().filter(|flat| casts(flat.surface)).map(|flat| flat.shape);
-        (spheres.collect(), flats.collect())
-    }
-
-    /// Which of the flat ones of [`listed_obstacles`](Self::listed_obstacles) the camera sees.
-    pub fn listed_flats_seen(&self) -> Vec<bool> {
-        let casts = |surface: SurfaceId| self.surfaces[surface.index()].casts_shadow;
-        let flats = self.parallelograms.iter().filter(|flat| self.listed && casts(flat.surface));
-        flats.map(|flat| flat.seen).collect()
-    }
-
-    /// For which lights each of [`listed_obstacles`](Self::listed_obstacles) casts shadows. Nothing where no surface
-    /// chooses.
-    pub fn listed_obstacle_links(&self) -> [Vec<Option<LinkId>>; 2] {
-        if !self.listed || self.links.is_empty() {
-            return [Vec::new(), Vec::new()];
-        }
-        let of = |surface: SurfaceId| &self.surfaces[surface.index()];
-        let links = |surfaces: &mut dyn Iterator<Item = SurfaceId>| {
-            surfaces.map(of).filter(|surface| surface.casts_shadow).map(|surface| surface.shadows).collect()
-        };
-        [
-            links(&mut self.spheres.iter().map(|sphere| sphere.surface)),
-            links(&mut self.parallelograms.iter().map(|flat| flat.surface)),
-        ]
-    }
-
     /// The lights that shine on a surface; `None`: all.
     #[inline(always)]
     pub fn lights_of(&self, surface: SurfaceId) -> Option<LinkId> {
         if self.links.is_empty() { None } else { self.surfaces[surface.index()].lights }
     }
 
+    /// Whether what has such an opacity stops light of a light, or some of it may.
+    #[inline(always)]
+    pub fn stops(&self, opacity: Opacity, light: LightId) -> bool {
+        match opacity {
+            Opacity::Opaque | Opacity::Mixed => true,
+            Opacity::Clear => false,
+            Opacity::Linked(lights) => self.links.contains(Some(lights), light),
+            Opacity::Light(own) => own != light,
+        }
+    }
+
     /// Whether a surface stands in the way of a light.
     #[inline]
     pub fn casts(&self, surface: SurfaceId, light: LightId) -> bool {
-        let surface = &self.surfaces[surface.index()];
-        surface.casts_shadow && self.links.contains(surface.shadows, light)
+        self.stops(self.surfaces[surface.index()].opacity(), light)
+    }
+
+    /// Whether a triangle of a mesh of that opacity, whose surfaces start at `first`, stands in the way of a light.
+    #[inline(always)]
+    pub fn triangle_casts(
+        &self,
+        mesh: &Mesh,
+        first: SurfaceId,
+        opacity: Opacity,
+        triangle: u32,
+        light: LightId,
+    ) -> bool {
+        opacity == Opacity::Opaque || self.casts(SurfaceId(first.0 + mesh.part(triangle).surface), light)
     }
 
     /// Every mesh, that of the world first.

@@ -4,6 +4,7 @@ use std::sync::Arc;
 
 use fearless_simd::Level;
 
+use super::occluders::Listed;
 use crate::accel::{Aabb, Bvh, TraceRay};
 use crate::math::{DVec3, ShadowRay};
 use crate::shape::Sphere;
@@ -31,16 +32,16 @@ impl std::fmt::Debug for LightSpheres {
 }
 
 impl LightSpheres {
-    pub fn new(spheres: &[(usize, Sphere)]) -> Option<LightSpheres> {
+    pub fn new(spheres: &[Listed<Sphere>]) -> Option<LightSpheres> {
         if spheres.len() <= LISTED {
             return None;
         }
-        let far = spheres.iter().fold(0.0f64, |far, (_, sphere)| far.max(sphere.c.length() + sphere.r)) * AROUND;
+        let far = spheres.iter().fold(0.0f64, |far, Listed { shape, .. }| far.max(shape.c.length() + shape.r)) * AROUND;
         let boxes: Vec<Aabb> = spheres
             .iter()
-            .map(|(_, sphere)| {
-                let [low, high] = sphere.bounds();
-                let room = DVec3::splat(ROOM[0] * sphere.r + ROOM[1] * far);
+            .map(|Listed { shape, .. }| {
+                let [low, high] = shape.bounds();
+                let room = DVec3::splat(ROOM[0] * shape.r + ROOM[1] * far);
                 Aabb { min: (low - room).as_vec3(), max: (high + room).as_vec3() }
             })
             .collect();

@@ -9,6 +9,7 @@ mod geometry;
 mod light_spheres;
 mod links;
 mod model;
+mod occluders;
 mod outline;
 mod place;
 mod seen_lights;
@@ -38,12 +39,10 @@ use crate::ids::SurfaceId;
 use crate::light::Light;
 use crate::material::Material;
 use crate::math::DVec3;
-use crate::shape::{Disk, Parallelogram, PlaneSide, Sphere};
-
 use crate::texture::Texture;
-pub(crate) use geometry::{At, Geometry, Meets, Nearest, Placed, PlacedTarget, UpperItem};
-use light_spheres::LightSpheres;
+pub(crate) use geometry::{At, Geometry, Nearest, Placed, PlacedTarget, UpperItem};
 pub(crate) use links::LinkId;
+pub(crate) use occluders::{Listed, ListedOccluders, Opacity};
 use seen_lights::SeenLights;
 pub(crate) use trees::ShadowRays;
 
@@ -72,19 +71,8 @@ pub struct Scene {
     pub(crate) seen_lights: Arc<SeenLights>,
     pub(crate) materials: Vec<Material>,
     pub(crate) textures: Vec<Texture>,
-    /// The listed spheres that stand in the way of light.
-    pub(crate) obstacles: Vec<Sphere>,
-    /// All that is flat, listed and in the way of light: parallelograms, then the rectangle lights that block.
-    pub(crate) flat_obstacles: Vec<Parallelogram>,
-    /// Whether the camera sees the first of `flat_obstacles`.
-    pub(crate) flats_seen: Vec<bool>,
-    /// For which lights each of `obstacles` and of the first of `flat_obstacles` casts shadows; empty where no surface
-    /// chooses.
-    pub(crate) obstacle_links: [Vec<Option<LinkId>>; 2],
-    /// The disk and sphere lights that block.
-    pub(crate) light_obstacles: LightObstacles,
-    /// For each area light, on which side of each flat obstacle it lies; where nothing is known, both.
-    pub(crate) light_sides: Vec<Vec<PlaneSide>>,
+    /// What is listed and stands in the way of light.
+    pub(crate) occluders: ListedOccluders,
     /// The best instruction set of this processor: for rays that are asked for one at a time.
     pub(crate) level: Level,
     pub(crate) hash: String,
@@ -95,16 +83,6 @@ pub struct Scene {
     /// The texture files that something stands in for.
     pub(crate) placeholders: Vec<String>,
     pub(crate) summary: SceneSummary,
-}
-
-/// The disk and sphere lights that stand in the way of others, each with its index in [`Scene::lights`]. A light's own
-/// points lie on its shape, which never hides them.
-#[derive(Clone, Debug, Default)]
-pub(crate) struct LightObstacles {
-    pub spheres: Vec<(usize, Sphere)>,
-    pub disks: Vec<(usize, Disk)>,
-    /// Over the spheres, where they are many.
-    pub tree: Option<LightSpheres>,
 }
 
 /// What a scene holds, for people.

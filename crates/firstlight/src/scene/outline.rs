@@ -1,6 +1,7 @@
 //! How far what a camera sees reaches in each direction: the support function of its convex hull.
 
-use super::geometry::{Geometry, Meets, PlacedTarget};
+use super::geometry::{Geometry, PlacedTarget};
+use super::occluders::Opacity;
 use crate::math::DVec3;
 use crate::shape::Mesh;
 
@@ -41,7 +42,7 @@ impl<'a> ShapeOutline<'a> {
         let world = geometry.world.as_ref().map(|world| corners(geometry, &world.mesh, 0)).unwrap_or_default();
         let mut meshes = vec![Vec::new(); geometry.meshes.len()];
         // What an instance hides is hidden as a whole, and so one that is seen speaks for all
-        for thing in geometry.placed.iter().filter(|thing| thing.camera != Meets::None) {
+        for thing in geometry.placed.iter().filter(|thing| thing.camera != Opacity::Clear) {
             if let PlacedTarget::Mesh(mesh) = thing.target
                 && meshes[mesh as usize].is_empty()
             {
@@ -66,7 +67,7 @@ impl<'a> ShapeOutline<'a> {
         let spheres = spheres.iter().filter(|sphere| sphere.seen).map(|s| s.shape.c.dot(d) + s.shape.r * length);
         let flats = parallelograms.iter().filter(|flat| flat.seen).map(|flat| flat.shape.support(d));
         let mut most = spheres.chain(flats).fold(farthest(&self.world, d), f64::max);
-        for thing in placed.iter().filter(|thing| thing.camera != Meets::None) {
+        for thing in placed.iter().filter(|thing| thing.camera != Opacity::Clear) {
             let Some(own) = self.geometry.bounds_of(thing.target) else { continue };
             // Of many, nearly all lie within reach of others
             let placement = &thing.placement;

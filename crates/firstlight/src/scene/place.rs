@@ -10,8 +10,9 @@ use std::sync::Arc;
 use glam::DAffine3;
 
 use super::SceneDesc;
-use super::geometry::{Geometry, Joined, Meets, Owned, Parts, Placed, PlacedTarget, RayRules, Surface};
+use super::geometry::{Geometry, Joined, Owned, Parts, Placed, PlacedTarget, RayRules, Surface};
 use super::links::{LinkId, Links};
+use super::occluders::Opacity;
 use crate::context::{Assets, CompileContext};
 use crate::describe::Family;
 use crate::describe::node::quoted;
@@ -289,7 +290,7 @@ pub(super) fn compile_shapes(
     }
     parts.meshes = groups.into_iter().filter_map(|group| group.mesh).collect();
     parts.world = root.mesh.map(|mesh| {
-        let (camera, shadow) = meets(&parts.surfaces, 0, &mesh);
+        let (camera, shadow) = opacities(&parts.surfaces, 0, &mesh);
         Joined { mesh, camera, shadow }
     });
     Some(Geometry::new(parts, desc.render.shadow_terminator))
@@ -564,12 +565,10 @@ impl SceneWalk<'_> {
 
     fn place(&mut self, world_from_object: DAffine3, target: PlacedTarget, surface: SurfaceId) {
         let (camera, shadow) = match target {
-            PlacedTarget::Mesh(mesh) => meets(&self.parts.surfaces, surface.0, self.meshes[mesh as usize]),
+            PlacedTarget::Mesh(mesh) => opacities(&self.parts.surfaces, surface.0, self.meshes[mesh as usize]),
             PlacedTarget::Points(_) | PlacedTarget::Solid(_) => {
                 let own = &self.parts.surfaces[surface.index()];
-                let of = |met: bool| if met { Meets::All } else { Meets::None };
-                let shadow = if own.shadows.is_some() && own.casts_shadow { Meets::Some } else { of(own.casts_shadow) };
-                (of(own.visible), shadow)
+                (if own.visible { Opacity::Opaque } else { Opacity::Clear }, own.opacity())
             }
         };
         let placement = Placement::new(world_from_object);
@@ -585,22 +584,16 @@ fn from(transform: DAffine3, origin: DVec3) -> DAffine3 {
     DAffine3 { translation: transform.transform_point3(origin), ..transform }
 }
 
-/// Which camera rays and which shadow rays meet a mesh whose surfaces start at `first`.
-fn meets(surfaces: &[Surface], first: u32, mesh: &Mesh) -> (Meets, Meets) {
+/// How opaque a mesh whose surfaces start at `first` is: to camera rays, and to light.
+fn opacities(surfaces: &[Surface], first: u32, mesh: &Mesh) -> (Opacity, Opacity) {
     let own = || mesh.parts.iter().map(|part| &surfaces[(first + part.surface) as usize]);
-    let camera = if own().all(|s| s.visible && !s.single_sided) {
-        Meets::All
-    } else if own().any(|s| s.visible) {
-        Meets::Some
-    } else {
-        Meets::None
+    let of = |all: bool, any: bool| match (all, any) {
+        (true, _) => Opacity::Opaque,
+        (false, true) => Opacity::Mixed,
+        (false, false) => Opacity::Clear,
     };
-    let shadow = if own().all(|s| s.casts_shadow && s.shadows.is_none()) {
-        Meets::All
-    } else if own().any(|s| s.casts_shadow) {
-        Meets::Some
-    } else {
-        Meets::None
-    };
-    (camera, shadow)
+    (
+        of(own().all(|s| s.visible && !s.single_sided), own().any(|s| s.visible)),
+        of(own().all(|s| s.opacity() == Opacity::Opaque), own().any(|s| s.opacity() != Opacity::Clear)),
+    )
 }

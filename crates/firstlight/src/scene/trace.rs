@@ -4,7 +4,7 @@ use fearless_simd::Level;
 
 use super::Scene;
 use super::geometry::{At, Nearest};
-use super::links::LinkId;
+use super::occluders::{Listed, ListedOccluders};
 use crate::color::Rgb;
 use crate::ids::{LightId, SurfaceId};
 use crate::light::LightKind;
@@ -109,11 +109,12 @@ impl Scene {
     #[inline]
     pub(crate) fn occluded_by_lists(&self, ray: &ShadowRay) -> bool {
         let finite = ray.is_finite();
-        let [sphere_links, flat_links] = &self.obstacle_links;
-        let spheres = self.obstacles.iter().enumerate().filter(|(i, _)| self.casts(sphere_links, *i, ray.light));
-        let flats = self.flat_obstacles.iter().enumerate().filter(|(i, _)| self.casts(flat_links, *i, ray.light));
-        spheres.map(|(_, sphere)| sphere.shadow(ray.p, ray.error)).any(|sphere| sphere.blocks(ray.l, finite))
-            || flats.map(|(_, flat)| flat.shadow(ray.p, ray.error)).any(|flat| flat.blocks(ray.l, finite))
+        let ListedOccluders { flats, .. } = &self.occluders;
+        let mut spheres = self.that_stop(self.occluders.surface_spheres(), ray.light);
+        spheres.any(|(_, sphere)| sphere.shape.shadow(ray.p, ray.error).blocks(ray.l, finite))
+            || self
+                .that_stop(flats, ray.light)
+                .any(|(_, flat)| flat.shape.shadow(ray.p, ray.error).blocks(ray.l, finite))
             || self.occluded_by_lights(ray)
     }
 
@@ -127,22 +128,17 @@ impl Scene {
     #[inline]
     fn occluded_by_lights(&self, ray: &ShadowRay) -> bool {
         let finite = ray.is_finite();
-        // A light's own shape does not hide it
-        let super::LightObstacles { spheres: light_spheres, disks, tree } = &self.light_obstacles;
-        let is_blocked = |(index, sphere): &(usize, Sphere)| {
-            *index != ray.light.index() && sphere.shadow(ray.p, ray.error).blocks(ray.l, finite)
+        let (spheres, disks) = (self.occluders.light_spheres(), &self.occluders.disks);
+        let by_sphere = |sphere: &Listed<Sphere>| {
+            self.geometry.stops(sphere.opacity, ray.light)
+                && sphere.shape.shadow(ray.p, ray.error).blocks(ray.l, finite)
         };
-        let mut disks = disks.iter().filter(|(index, _)| *index != ray.light.index());
-        tree.as_ref()
-            .and_then(|tree| tree.any(self.level, ray, |i| is_blocked(&light_spheres[i as usize])))
-            .unwrap_or_else(|| light_spheres.iter().any(is_blocked))
-            || disks.any(|(_, disk)| disk.shadow(ray.p, ray.error).blocks(ray.l, finite))
-    }
-
-    /// Whether obstacle `i` of a list casts shadows for a light; those beyond the end of `links` do for all.
-    #[inline(always)]
-    pub(crate) fn casts(&self, links: &[Option<LinkId>], i: usize, light: LightId) -> bool {
-        self.geometry.links.contains(links.get(i).copied().flatten(), light)
+        let tree = self.occluders.light_tree();
+        tree.and_then(|tree| tree.any(self.level, ray, |i| by_sphere(&spheres[i as usize])))
+            .unwrap_or_else(|| spheres.iter().any(by_sphere))
+            || self
+                .that_stop(disks, ray.light)
+                .any(|(_, disk)| disk.shape.shadow(ray.p, ray.error).blocks(ray.l, finite))
     }
 
     /// The surface at a hit, turned to the viewer. `differential` is that of the camera ray.

@@ -2,7 +2,8 @@
 
 use fearless_simd::{Level, f32x16, prelude::*};
 
-use super::geometry::{At, Geometry, Hit, Meets, Nearest, Placed, PlacedSpot, PlacedTarget, UpperItem};
+use super::geometry::{At, Geometry, Hit, Nearest, Placed, PlacedSpot, PlacedTarget, UpperItem};
+use super::occluders::Opacity;
 use crate::accel::{Aabb, Planes, RayPacket16, RayTile, TraceRay, dispatch_all, dispatch_eight, dispatch_sixteen};
 use crate::ids::{LightId, MaterialId, SurfaceId};
 use crate::math::{DVec3, Ray, ShadowRay, Vec3};
@@ -23,7 +24,7 @@ impl Geometry {
 
     /// Whether camera rays inside of `planes` may meet anything that lies in trees.
     pub fn may_meet(&self, level: Level, planes: &Planes) -> bool {
-        let is_seen = |thing: &u32| self.placed[*thing as usize].camera != Meets::None;
+        let is_seen = |thing: &u32| self.placed[*thing as usize].camera != Opacity::Clear;
         self.unbounded.iter().any(is_seen)
             || self.tree_bounds().any(|bounds| planes.may_meet(bounds))
                 && dispatch_eight!(level, simd => self.reaches(simd, planes))
@@ -36,7 +37,7 @@ impl Geometry {
             #[inline(always)]
             move |simd, node: &_| planes.meet(simd, node)
         };
-        let of_world = self.world.as_ref().filter(|world| world.camera != Meets::None);
+        let of_world = self.world.as_ref().filter(|world| world.camera != Opacity::Clear);
         of_world.is_some_and(|world| !world.mesh.tree.gather(simd, meet, |_| false))
             || !self.upper.gather(simd, meet, |_| false)
     }
@@ -74,7 +75,7 @@ impl Geometry {
 
     /// Whether the mesh of the world can be asked for many rays at once: where no triangle lets some rays pass.
     pub fn world_as_bundle(&self) -> bool {
-        self.world.as_ref().is_some_and(|world| world.camera == Meets::All)
+        self.world.as_ref().is_some_and(|world| world.camera == Opacity::Opaque)
     }
 
     /// What rays meet of the mesh of the world, at most as far as `hits` says: which rays meet something.
@@ -129,7 +130,7 @@ impl Geometry {
     #[inline(always)]
     fn meet_placed<S: Simd>(&self, simd: S, index: u32, ray: &Ray, nearest: &mut Nearest) {
         let thing = &self.placed[index as usize];
-        if thing.camera == Meets::None {
+        if thing.camera == Opacity::Clear {
             return;
         }
         let single_sided = || self.surfaces[thing.surface.index()].single_sided;
@@ -213,10 +214,9 @@ impl Geometry {
     #[inline(always)]
     fn blocked_by_placed<S: Simd>(&self, simd: S, index: u32, ray: &ShadowRay, t_end: f32) -> bool {
         let thing = &self.placed[index as usize];
-        if thing.shadow == Meets::None {
+        if !self.stops(thing.shadow, ray.light) {
             return false;
         }
-        let casts = || thing.shadow == Meets::All || self.casts(thing.surface, ray.light);
         let own = thing.placement.line(ray.start, ray.l);
         match thing.target {
             PlacedTarget::Mesh(mesh) => {
@@ -234,14 +234,9 @@ impl Geometry {
                     t_end,
                 )
             }
-            PlacedTarget::Points(points) => casts() && self.point_sets[points as usize].blocks(simd, &own, t_end),
-            PlacedTarget::Solid(solid) => casts() && self.solids[solid as usize].blocks(&own, 0.0, t_end as f64),
+            PlacedTarget::Points(points) => self.point_sets[points as usize].blocks(simd, &own, t_end),
+            PlacedTarget::Solid(solid) => self.solids[solid as usize].blocks(&own, 0.0, t_end as f64),
         }
-    }
-
-    /// Whether a triangle stands in the way of a light.
-    fn triangle_casts(&self, mesh: &Mesh, first: SurfaceId, triangle: u32, light: LightId) -> bool {
-        self.casts(SurfaceId(first.0 + mesh.part(triangle).surface), light)
     }
 
     /// The first triangle on a ray, in the mesh's space. Not inlined: one copy for each instruction set is enough.
@@ -252,15 +247,15 @@ impl Geometry {
         simd: S,
         mesh: &Mesh,
         first: SurfaceId,
-        meets: Meets,
+        opacity: Opacity,
         o: Vec3,
         d: Vec3,
         limit: f32,
     ) -> Option<(f32, TrianglePoint)> {
-        if meets == Meets::None {
+        if opacity == Opacity::Clear {
             return None;
         }
-        let asks = |triangle| meets == Meets::All || self.seen(mesh, first.0, triangle, d);
+        let asks = |triangle| opacity == Opacity::Opaque || self.seen(mesh, first.0, triangle, d);
         let hit = simd.vectorize(
             #[inline(always)]
             || mesh.tree.closest(simd, &TraceRay::new(o, d), limit, &asks),
@@ -276,18 +271,17 @@ impl Geometry {
         simd: S,
         mesh: &Mesh,
         first: SurfaceId,
-        meets: Meets,
+        opacity: Opacity,
         light: LightId,
         but: u32,
         o: Vec3,
         l: Vec3,
         t_end: f32,
     ) -> bool {
-        if meets == Meets::None {
+        if opacity == Opacity::Clear {
             return false;
         }
-        let asks =
-            |triangle| triangle != but && (meets == Meets::All || self.triangle_casts(mesh, first, triangle, light));
+        let asks = |triangle| triangle != but && self.triangle_casts(mesh, first, opacity, triangle, light);
         simd.vectorize(
             #[inline(always)]
             || mesh.tree.any(simd, &TraceRay::new(o, l), t_end, &asks),
@@ -303,18 +297,18 @@ impl Geometry {
         simd: S,
         mesh: &Mesh,
         first: SurfaceId,
-        meets: Meets,
+        opacity: Opacity,
         source: u32,
         shadows: &ShadowRays,
         rays: &RayPacket16,
         active: u16,
     ) -> u16 {
-        if meets == Meets::None || active == 0 {
+        if opacity == Opacity::Clear || active == 0 {
             return 0;
         }
         let light = shadows.light();
         let asks = |triangle, lanes: u64| {
-            let casts = meets == Meets::All || self.triangle_casts(mesh, first, triangle, light);
+            let casts = self.triangle_casts(mesh, first, opacity, triangle, light);
             if casts { lanes & !shadows.leaving(source, triangle) } else { 0 }
         };
         simd.vectorize(
@@ -540,16 +534,11 @@ impl Geometry {
     #[inline(always)]
     fn placed_blocks_lanes<S: Simd>(&self, simd: S, index: u32, shadows: &ShadowRays, active: u16) -> u16 {
         let thing = &self.placed[index as usize];
-        if thing.shadow == Meets::None || active == 0 {
+        if active == 0 || !self.stops(thing.shadow, shadows.light()) {
             return 0;
         }
         let mesh = match thing.target {
             PlacedTarget::Mesh(mesh) => mesh,
-            PlacedTarget::Solid(_) | PlacedTarget::Points(_)
-                if thing.shadow == Meets::Some && !self.casts(thing.surface, shadows.light()) =>
-            {
-                return 0;
-            }
             PlacedTarget::Solid(solid) => {
                 let lines = LineLanes::new(&thing.placement, &shadows.rays, &shadows.t_end);
                 return self.solids[solid as usize].blocks_lanes(&lines, active);

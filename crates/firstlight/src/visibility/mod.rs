@@ -1,7 +1,7 @@
 //! How much of a light reaches a point, settled from proof to work.
 //!
-//! A [`Shaft`] is the space between some points and a light. [`Occluders::gather`] finds what lies in it, once for all
-//! the points: mostly nothing, and then all of the light arrives. What is left is looked at from each point by
+//! A [`Shaft`] is the space between some points and a light. [`OccluderList::gather`] finds what lies in it, once for
+//! all the points: mostly nothing, and then all of the light arrives. What is left is looked at from each point by
 //! [`ShadowView::classify`]: below the horizon, lit by all of the light, hidden from all of it, or cut by some edge. In
 //! the last case [`ShadowView::mask`] says which of the light's sampled points are hidden, a bit for each.
 //!
@@ -20,7 +20,7 @@ mod target;
 mod tests;
 mod view;
 
-pub(crate) use occluders::{Occluders, ShadowMesh};
+pub(crate) use occluders::{OccluderList, ShadowMesh};
 pub(crate) use outlook::{Outlook, Seen};
 pub(crate) use settle::{Settled, Settler};
 pub(crate) use shaft::Shaft;

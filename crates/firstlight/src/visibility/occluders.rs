@@ -8,15 +8,14 @@ use super::target::{LightHull, Target};
 use crate::accel::{Aabb, dispatch_all};
 use crate::ids::{LightId, SurfaceId};
 use crate::math::Vec3;
-use crate::scene::{Geometry, Meets, Placed, PlacedTarget, Scene, UpperItem};
+use crate::scene::{Geometry, Opacity, PlacedTarget, Scene, UpperItem};
 use crate::shape::{Mesh, Parallelogram, Placement, PlaneSide, Sphere};
 
-/// A sphere or parallelogram: of the lists of obstacles, of the upper tree, or of the round lights that block.
+/// A sphere or parallelogram: of the lists of occluders, or of the upper tree.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Which {
     Listed(u32),
     InTree(u32),
-    Light(u32),
 }
 
 /// A mesh in its place: 0 is that of the world, others are what is placed, counted from 1.
@@ -24,7 +23,7 @@ pub(crate) type MeshNumber = u32;
 
 /// All that may stand between the points of a group and one light. What is not here does not, whatever rounding says.
 #[derive(Debug, Default)]
-pub(crate) struct Occluders {
+pub(crate) struct OccluderList {
     pub spheres: Vec<Which>,
     pub flats: Vec<(Which, PlaneSide)>,
     /// Disk lights, as the scene lists them.
@@ -43,8 +42,8 @@ pub(crate) struct Occluders {
 pub(crate) struct ShadowMesh<'a> {
     pub mesh: &'a Mesh,
     pub placement: Option<&'a Placement>,
-    first: u32,
-    meets: Meets,
+    first: SurfaceId,
+    opacity: Opacity,
     geometry: &'a Geometry,
     light: LightId,
 }
@@ -55,20 +54,26 @@ impl<'a> ShadowMesh<'a> {
         if source == 0 {
             let world = geometry.world.as_ref()?;
             let mesh = &world.mesh;
-            return Some(ShadowMesh { mesh, placement: None, first: 0, meets: world.shadow, geometry, light });
+            return Some(ShadowMesh {
+                mesh,
+                placement: None,
+                first: SurfaceId(0),
+                opacity: world.shadow,
+                geometry,
+                light,
+            });
         }
         let thing = &geometry.placed[source as usize - 1];
         let PlacedTarget::Mesh(mesh) = thing.target else { return None };
         let mesh = &geometry.meshes[mesh as usize];
-        let (placement, first) = (Some(&thing.placement), thing.surface.0);
-        Some(ShadowMesh { mesh, placement, first, meets: thing.shadow, geometry, light })
+        let (placement, first) = (Some(&thing.placement), thing.surface);
+        Some(ShadowMesh { mesh, placement, first, opacity: thing.shadow, geometry, light })
     }
 
-    /// Whether a triangle stands in the way of the light. What else lets light through has its place here.
+    /// Whether a triangle stands in the way of the light.
     #[inline(always)]
     pub fn casts(&self, triangle: u32) -> bool {
-        self.meets == Meets::All
-            || self.geometry.casts(SurfaceId(self.first + self.mesh.part(triangle).surface), self.light)
+        self.geometry.triangle_casts(self.mesh, self.first, self.opacity, triangle, self.light)
     }
 }
 
@@ -78,17 +83,15 @@ pub(crate) const SPHERE_ROOM: [f64; 2] = [4e-4, 1e-5];
 impl Scene {
     pub(crate) fn sphere(&self, which: Which) -> &Sphere {
         match which {
-            Which::Listed(i) => &self.obstacles[i as usize],
+            Which::Listed(i) => &self.occluders.spheres[i as usize].shape,
             Which::InTree(i) => &self.geometry.spheres[i as usize].shape,
-            Which::Light(i) => &self.light_obstacles.spheres[i as usize].1,
         }
     }
 
     pub(crate) fn flat(&self, which: Which) -> &Parallelogram {
         match which {
-            Which::Listed(i) => &self.flat_obstacles[i as usize],
+            Which::Listed(i) => &self.occluders.flats[i as usize].shape,
             Which::InTree(i) => &self.geometry.parallelograms[i as usize].shape,
-            Which::Light(_) => unreachable!("flat lights that block are listed, or disks"),
         }
     }
 }
@@ -156,7 +159,7 @@ impl Shaft {
     }
 }
 
-impl Occluders {
+impl OccluderList {
     pub fn clear(&mut self) {
         self.spheres.clear();
         self.flats.clear();
@@ -201,7 +204,6 @@ impl Occluders {
         let light = target.light;
         let shaft = Shaft::of(points, indices, &target.hull);
         let upright = Shaft { horizon: None, ..shaft };
-        let [sphere_links, flat_links] = &scene.obstacle_links;
         let meets = |sphere: &Sphere| {
             let [low, high] = sphere.bounds();
             let far = (low - shaft.points.min.as_dvec3()).abs().max((high - shaft.points.max.as_dvec3()).abs());
@@ -212,27 +214,18 @@ impl Occluders {
             };
             upright.meets(low, high, room) && !shaft.horizon.as_ref().is_some_and(below)
         };
-        for (i, sphere) in scene.obstacles.iter().enumerate() {
-            if meets(sphere) && scene.casts(sphere_links, i, light) {
-                self.spheres.push(Which::Listed(i as u32));
-            }
-        }
-        // A light's own shape does not hide it
-        for (i, (index, sphere)) in scene.light_obstacles.spheres.iter().enumerate() {
-            if *index != light.index() && meets(sphere) {
-                self.spheres.push(Which::Light(i as u32));
-            }
-        }
-        let disks = scene.light_obstacles.disks.iter().enumerate();
-        self.disks.extend(disks.filter(|(_, (index, _))| *index != light.index()).map(|(i, _)| i as u32));
-        let sides = &scene.light_sides[light.index()];
-        for (i, flat) in scene.flat_obstacles.iter().enumerate() {
+        let listed = &scene.occluders;
+        let spheres = scene.that_stop(&listed.spheres, light).filter(|(_, sphere)| meets(&sphere.shape));
+        self.spheres.extend(spheres.map(|(i, _)| Which::Listed(i as u32)));
+        self.disks.extend(scene.that_stop(&listed.disks, light).map(|(i, _)| i as u32));
+        let sides = listed.sides(light);
+        for (i, flat) in scene.that_stop(&listed.flats, light) {
             let side = sides.get(i).copied().unwrap_or(PlaneSide::Both);
             let one_sided = |k: &u32| {
                 let point = &points[*k as usize];
-                flat.is_one_sided(point.p, point.error, side)
+                flat.shape.is_one_sided(point.p, point.error, side)
             };
-            if scene.casts(flat_links, i, light) && !indices.iter().all(one_sided) {
+            if !indices.iter().all(one_sided) {
                 self.flats.push((Which::Listed(i as u32), side));
             }
         }
@@ -256,18 +249,13 @@ impl Occluders {
         cap: usize,
     ) -> bool {
         let geometry = &*scene.geometry;
-        if geometry.world.as_ref().is_some_and(|world| world.shadow != Meets::None)
+        if geometry.world.as_ref().is_some_and(|world| geometry.stops(world.shadow, target.light))
             && !self.gather_mesh(simd, geometry, 0, target.light, shaft, cap)
         {
             return false;
         }
         let casts = |surface| geometry.casts(surface, target.light);
-        let stands = |thing: u32| match &geometry.placed[thing as usize] {
-            Placed {
-                shadow: Meets::Some, target: PlacedTarget::Points(_) | PlacedTarget::Solid(_), surface, ..
-            } => casts(*surface),
-            thing => thing.shadow != Meets::None,
-        };
+        let stands = |thing: u32| geometry.stops(geometry.placed[thing as usize].shadow, target.light);
         for &thing in &geometry.unbounded {
             if stands(thing) {
                 self.others.push(thing);

@@ -7,13 +7,13 @@ use arrayvec::ArrayVec;
 use fearless_simd::Level;
 
 use super::Viewpoint;
-use super::occluders::{Occluders, ShadowMesh, Which};
+use super::occluders::{OccluderList, ShadowMesh, Which};
 use super::shaft::{Horizon, Shaft};
 use super::target::{LightHull, Target};
 use crate::accel::Aabb;
 use crate::ids::LightId;
 use crate::math::{DVec3, ErrorBound, Vec3};
-use crate::scene::{Placed, PlacedTarget, Scene};
+use crate::scene::{Listed, Opacity, Placed, PlacedTarget, Scene};
 use crate::shape::{Parallelogram, Solid, Sphere};
 
 /// What is seen of a box.
@@ -48,7 +48,7 @@ pub(crate) struct Outlook {
     room: f32,
     spheres: Vec<u32>,
     flats: Vec<(u32, Stand)>,
-    occluders: Occluders,
+    occluders: OccluderList,
     indices: Vec<u32>,
 }
 
@@ -62,7 +62,7 @@ impl Default for Outlook {
             room: 0.0,
             spheres: Vec::new(),
             flats: Vec::new(),
-            occluders: Occluders::default(),
+            occluders: OccluderList::default(),
             indices: Vec::new(),
         }
     }
@@ -107,11 +107,11 @@ impl Outlook {
         self.spheres.clear();
         let in_the_way =
             |sphere: &Sphere| !points.iter().all(|point| sphere.shadow(point.p, point.error).is_below(point.horizon));
-        let spheres = scene.obstacles.iter().enumerate();
-        self.spheres.extend(spheres.filter(|(_, sphere)| in_the_way(sphere)).map(|(i, _)| i as u32));
+        let spheres = scene.occluders.surface_spheres().iter().enumerate();
+        self.spheres.extend(spheres.filter(|(_, sphere)| in_the_way(&sphere.shape)).map(|(i, _)| i as u32));
         self.flats.clear();
-        for (i, flat) in scene.flat_obstacles.iter().enumerate() {
-            if let Some(stand) = stand(flat, points, reaches) {
+        for (i, flat) in scene.occluders.flats.iter().enumerate() {
+            if let Some(stand) = stand(&flat.shape, points, reaches) {
                 self.flats.push((i as u32, stand));
             }
         }
@@ -130,24 +130,25 @@ impl Outlook {
         let shaft = Shaft::between(self.places, &hull, self.apart);
         let size = self.places.min.abs().max(self.places.max.abs()).max(low.abs()).max(high.abs()).max_element();
         let room = f64::from(size) * SLACK;
-        let [sphere_links, flat_links] = &scene.obstacle_links;
+        let listed = &scene.occluders;
+        let stops = |opacity: Opacity| scene.geometry.stops(opacity, light);
         let hull_of = Capsule::around(&self.places, middle, half);
         let mut clear = true;
         let mut hiders: ArrayVec<Which, HIDERS> = ArrayVec::new();
         for i in &self.spheres {
-            let sphere = &scene.obstacles[*i as usize];
+            let Listed { shape: sphere, opacity } = &listed.spheres[*i as usize];
             if hull_of.misses(sphere) {
                 continue;
             }
             let [a, b] = sphere.bounds();
-            if scene.casts(sphere_links, *i as usize, light) && shaft.meets(a, b, room + sphere.r * 1e-4) {
+            if stops(*opacity) && shaft.meets(a, b, room + sphere.r * 1e-4) {
                 clear = false;
                 let _ = hiders.try_push(Which::Listed(*i));
             }
         }
         for (i, stand) in &self.flats {
-            let flat = &scene.flat_obstacles[*i as usize];
-            if !scene.casts(flat_links, *i as usize, light) || is_beside(flat, *stand, middle, half, room) {
+            let Listed { shape: flat, opacity } = &listed.flats[*i as usize];
+            if !stops(*opacity) || is_beside(flat, *stand, middle, half, room) {
                 continue;
             }
             let [a, b] = flat.bounds();
@@ -164,11 +165,10 @@ impl Outlook {
                 return Seen::Nothing;
             }
         }
-        let lights = &scene.light_obstacles;
-        clear &= lights.disks.iter().all(|(index, _)| *index == light.index());
-        for (index, sphere) in &lights.spheres {
-            let [a, b] = sphere.bounds();
-            clear &= *index == light.index() || !shaft.meets(a, b, room + sphere.r * 1e-4);
+        clear &= !listed.disks.iter().any(|disk| stops(disk.opacity));
+        for Listed { shape, opacity } in listed.light_spheres() {
+            let [a, b] = shape.bounds();
+            clear &= !stops(*opacity) || !shaft.meets(a, b, room + shape.r * 1e-4);
         }
         if !clear {
             return Seen::Unknown;
@@ -197,7 +197,7 @@ impl Outlook {
     }
 
     /// What is left of what was found in trees.
-    fn judge(&self, scene: &Scene, found: &Occluders, target: &Target, shaft: &Shaft, room: f64) -> Seen {
+    fn judge(&self, scene: &Scene, found: &OccluderList, target: &Target, shaft: &Shaft, room: f64) -> Seen {
         if found.too_many {
             return Seen::Unknown;
         }

@@ -3,7 +3,7 @@
 use fearless_simd::Level;
 
 use super::Viewpoint;
-use super::occluders::Occluders;
+use super::occluders::OccluderList;
 use super::target::Target;
 use super::view::{ShadowView, Visibility};
 use crate::accel::Aabb;
@@ -27,9 +27,9 @@ const TRACED: usize = 32;
 /// Settles what is seen of lights, points together as long as little stands in the way. Keeps its memory.
 #[derive(Debug, Default)]
 pub(crate) struct Settler {
-    pub occluders: Occluders,
+    pub occluders: OccluderList,
     pub view: ShadowView,
-    alone: Occluders,
+    alone: OccluderList,
     parts: Vec<(usize, usize)>,
 }
 

@@ -3,7 +3,7 @@
 use fearless_simd::{Level, Simd};
 
 use super::Viewpoint;
-use super::occluders::{MeshNumber, Occluders, ShadowMesh};
+use super::occluders::{MeshNumber, OccluderList, ShadowMesh};
 use super::shaft::Shaft;
 use super::target::{LightSeen, Target};
 use crate::accel::{Aabb, dispatch_all};
@@ -69,7 +69,7 @@ impl ShadowView {
         level: Level,
         scene: &Scene,
         target: &Target,
-        occluders: &Occluders,
+        occluders: &OccluderList,
         point: &Viewpoint,
     ) -> Visibility {
         self.clear();
@@ -100,7 +100,7 @@ impl ShadowView {
             }
         }
         for disk in &occluders.disks {
-            let shadow = scene.light_obstacles.disks[*disk as usize].1.shadow(point.p, point.error);
+            let shadow = scene.occluders.disks[*disk as usize].shape.shadow(point.p, point.error);
             match shadow.covers(light.l, &light.axes, light.longest, light.finite) {
                 Cover::Nothing => {}
                 Cover::All => return Visibility::Hidden,
@@ -135,7 +135,7 @@ impl ShadowView {
         scene: &Scene,
         target: &Target,
         light: &LightSeen,
-        occluders: &Occluders,
+        occluders: &OccluderList,
         point: &Viewpoint,
     ) {
         if occluders.others.is_empty() {
@@ -182,7 +182,7 @@ impl ShadowView {
         scene: &Scene,
         target: &Target,
         light: &LightSeen,
-        occluders: &Occluders,
+        occluders: &OccluderList,
         point: &Viewpoint,
     ) -> bool {
         let mut rest = &occluders.leaves[..];
