@@ -320,7 +320,7 @@ impl Area {
     }
 
     /// The diagonal of the box around it.
-    pub(crate) fn extent(&self) -> f32 {
+    pub(crate) fn diagonal(&self) -> f32 {
         2.0 * self.half.length()
     }
 

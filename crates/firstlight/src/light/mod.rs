@@ -141,6 +141,15 @@ pub enum LightKind {
     Area(Area),
 }
 
+/// From how much of a place's surroundings a light comes: what decides how it is summed up.
+#[derive(Clone, Copy, Debug)]
+pub enum Extent<'a> {
+    /// From one point, or from one direction: one sample is all of it.
+    Point,
+    /// From an area, which is sampled or integrated.
+    Area(&'a Area),
+}
+
 /// The way from a surface to one point of a light.
 #[derive(Clone, Copy, Debug)]
 pub struct Towards {
@@ -163,13 +172,28 @@ pub struct LightSample {
 pub(crate) const MIN_DISTANCE2: f32 = 1e-30;
 
 impl Light {
+    /// From how much around a place it comes.
+    #[inline(always)]
+    pub fn extent(&self) -> Extent<'_> {
+        match &self.kind {
+            LightKind::Area(area) => Extent::Area(area),
+            LightKind::Point(_) | LightKind::Directional(_) | LightKind::Spot(_) => Extent::Point,
+        }
+    }
+
+    /// Its shape in space, if it has one: what the camera can see of it, and what can stand in the way of others.
+    #[inline(always)]
+    pub fn area(&self) -> Option<&Area> {
+        match self.extent() {
+            Extent::Area(area) => Some(area),
+            Extent::Point => None,
+        }
+    }
+
     /// How many points of it are sampled, 1 or more; of a light that is `exact`, where it is sampled all the same.
     #[inline(always)]
     pub fn samples(&self) -> usize {
-        match &self.kind {
-            LightKind::Area(area) => area.samples(),
-            LightKind::Point(_) | LightKind::Directional(_) | LightKind::Spot(_) => 1,
-        }
+        self.area().map_or(1, Area::samples)
     }
 
     /// What it says of its samples: of a light without an area, that it has one.

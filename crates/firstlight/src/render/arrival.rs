@@ -18,7 +18,7 @@ use crate::ids::LightId;
 use crate::integrate::{
     Arrived, Asked, Emitter, Evaluator, FlatView, Illumination, Obstacles, Receiver, ShadingPoint, TOLERANCE,
 };
-use crate::light::{LightKind, LightTree};
+use crate::light::{Area, Extent, LightTree};
 use crate::material::{Bsdf, Lobe, Moments};
 use crate::math::LANES;
 use crate::scene::Scene;
@@ -188,7 +188,10 @@ impl<'a> Arrivals<'a> {
         if !self.is_linked(index, place) {
             return Arrival::even(Moments::default());
         }
-        let LightKind::Area(area) = &light.kind else { return self.single(index, light, place, counts) };
+        let area = match light.extent() {
+            Extent::Area(area) => area,
+            Extent::Point => return self.single(index, light, place, counts),
+        };
         let light = Sampled::new(self.scene, self.level, index, &self.lights.targets);
         let sums = light.to_point(&mut self.settler, place.si, place.lobe, counts);
         if place.reach == 0.0 {
@@ -420,8 +423,10 @@ impl<'a> Arrivals<'a> {
     /// Whether it is worth to look for light `index` from all rays of a block of pixels together: not where its samples
     /// are fixed.
     pub fn looks_for(&self, index: usize) -> bool {
-        let is_area = matches!(self.scene.lights[index].kind, LightKind::Area(_));
-        self.is_integrated(index) || !is_area
+        match self.scene.lights[index].extent() {
+            Extent::Area(_) => self.is_integrated(index),
+            Extent::Point => true,
+        }
     }
 
     /// Whether a light is integrated.
@@ -508,19 +513,14 @@ impl<'a> Arrivals<'a> {
     /// Area light `index`, as its points are asked for.
     pub fn asker(&self, index: usize) -> LadderAsker<'a> {
         let (scene, level) = (self.scene, self.level);
-        let LightKind::Area(area) = &scene.lights[index].kind else {
-            unreachable!("lights of one point are not integrated")
-        };
+        let area = scene.lights[index].area().expect("lights that are integrated have an area");
         let (target, ladder) = (&self.lights.targets[index], &self.lights.ladders[index]);
         LadderAsker { scene, level, area, target, ladder }
     }
 
     /// What all points of area light `index` together stand for.
     pub fn measure(&self, index: usize) -> f32 {
-        match &self.scene.lights[index].kind {
-            LightKind::Area(area) => area.stands_for(),
-            _ => 1.0,
-        }
+        self.scene.lights[index].area().map_or(1.0, Area::stands_for)
     }
 
     /// What may be in the way of light `index` from one point; `None` if nothing of it is seen.

@@ -4,7 +4,7 @@
 use super::Counts;
 use super::pixel::{Lighting, LobeSums};
 use super::plain::{Facing, Plain};
-use crate::light::{LightKind, LightSample, Towards};
+use crate::light::{Extent, LightSample, Towards};
 use crate::material::{Lobe, MOMENTS};
 use crate::math::LaneSum;
 use crate::scene::Scene;
@@ -42,8 +42,9 @@ impl Lighting for Given<'_, '_> {
         counts: &mut Counts,
     ) -> LobeSums {
         let facing = Facing::new(scene, index, si, lobe);
-        let LightKind::Area(area) = &facing.light.kind else {
-            return Plain.gather(scene, index, si, lobe, counts);
+        let area = match facing.light.extent() {
+            Extent::Area(area) => area,
+            Extent::Point => return Plain.gather(scene, index, si, lobe, counts),
         };
         self.points.clear();
         let from = si.lit_from.as_dvec3().to_array();

@@ -12,7 +12,7 @@ use super::plain::Plain;
 use crate::accel::RayPacket16;
 use crate::accel::dispatch_all;
 use crate::ids::LightId;
-use crate::light::{Area, LightKind, MIN_DISTANCE2, Points};
+use crate::light::{Area, Extent, MIN_DISTANCE2, Points};
 use crate::material::{Lobe, MOMENTS};
 use crate::math::{LANES, LaneSum, ShadowRay, Vec3, Vec3x16};
 use crate::scene::{Geometry, Listed, Scene, ShadowRays};
@@ -204,9 +204,10 @@ impl Lighting for Lanes {
         counts: &mut Counts,
     ) -> LobeSums {
         let light = &scene.lights[index];
-        // A single sample fills no lanes
-        let LightKind::Area(area) = &light.kind else {
-            return Plain.gather(scene, index, si, lobe, counts);
+        let area = match light.extent() {
+            Extent::Area(area) => area,
+            // A single sample fills no lanes
+            Extent::Point => return Plain.gather(scene, index, si, lobe, counts),
         };
         let id = LightId(index as u32);
         let BetweenShapes { spheres, flats, disks } = &mut self.between;

@@ -10,7 +10,7 @@ use super::change::Arrival;
 use crate::color::Rgb;
 use crate::ids::{LightId, MaterialId, SurfaceId};
 use crate::integrate::{Arrived, Emitter, Illumination, ShadingPoint, TOLERANCE};
-use crate::light::LightKind;
+use crate::light::Extent;
 use crate::material::{Bsdf, Lobe, Moments};
 use crate::math::{LANES, Vec2};
 use crate::scene::Scene;
@@ -243,7 +243,7 @@ impl<'a> LightQueue<'a> {
         self.arrived.clear();
         self.arrivals.evaluate(light, &of.lobe, [shadows, near], &mut self.points, &mut self.arrived);
         let measure = self.arrivals.measure(light);
-        let is_physical = matches!(&scene.lights[light].kind, LightKind::Area(area) if area.physical);
+        let is_physical = scene.lights[light].area().is_some_and(|area| area.physical);
         let is_one_sided = self.arrivals.lights.emitters[light].as_ref().is_some_and(Emitter::is_one_sided);
         for (arrived, k) in self.arrived.iter().zip(members) {
             let place = of.place(*k);
@@ -348,11 +348,14 @@ impl<'a> LightQueue<'a> {
         };
         let arrival = self.arrivals.arrival(light, &wanted, counts);
         // A light of one point sets in at once where it passes the horizon
-        let kind = &self.scene.lights[light];
         let ShadingPoint { p, ns, horizon, reach, turn, .. } = place.point;
-        let is_kinked = !matches!(kind.kind, LightKind::Area(_)) && {
-            let to = kind.towards(0, p).l;
-            ns.dot(to).min(horizon.dot(to)).abs() < reach + turn * to.length()
+        let light = &self.scene.lights[light];
+        let is_kinked = match light.extent() {
+            Extent::Area(_) => false,
+            Extent::Point => {
+                let to = light.towards(0, p).l;
+                ns.dot(to).min(horizon.dot(to)).abs() < reach + turn * to.length()
+            }
         };
         let is_even = self.is_even(&wanted, &arrival);
         Answer {

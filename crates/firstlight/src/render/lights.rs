@@ -4,7 +4,7 @@ use super::ladder::Ladder;
 use super::many::FEW;
 use crate::color::{DisplaySteps, Rgb};
 use crate::integrate::{Asked, Emitter, Obstacles, TOLERANCE};
-use crate::light::{Light, LightKind, LightTree};
+use crate::light::{Light, LightTree};
 use crate::material::Lobe;
 use crate::scene::Scene;
 use crate::visibility::Target;
@@ -33,10 +33,7 @@ pub(crate) struct Lights<'a> {
 
 impl<'a> Lights<'a> {
     pub fn new(scene: &'a Scene) -> Lights<'a> {
-        let emitter = |light: &Light| match &light.kind {
-            LightKind::Area(area) if light.exact => Some(Emitter::new(area)),
-            _ => None,
-        };
+        let emitter = |light: &Light| light.area().filter(|_| light.exact).map(Emitter::new);
         let emitters: Vec<_> = scene.lights.iter().map(emitter).collect();
         let scale = |(light, emitter): (&Light, &Option<Emitter>)| match emitter {
             Some(_) => light.intensity,
@@ -46,9 +43,8 @@ impl<'a> Lights<'a> {
         let targets = Target::of_all(scene);
         let ladders = emitters.iter().map(|_| Ladder::default()).collect();
         let tree = (scene.lights.len() > FEW).then(|| LightTree::new(&scene.lights));
-        let obstacles = scene.lights.iter().enumerate().map(|(index, light)| match &light.kind {
-            LightKind::Area(area) => Obstacles::new(scene, index, &Emitter::new(area)),
-            _ => Obstacles::default(),
+        let obstacles = scene.lights.iter().enumerate().map(|(index, light)| {
+            light.area().map_or_else(Obstacles::default, |area| Obstacles::new(scene, index, &Emitter::new(area)))
         });
         let obstacles = obstacles.collect();
         let steps = DisplaySteps::new(&scene.display, scene.tolerance);

@@ -8,7 +8,7 @@ use super::Counts;
 use super::lanes::{PointObstacles, sum_area};
 use super::pixel::{Lighting, LobeSums};
 use super::plain::Plain;
-use crate::light::{Light, LightKind};
+use crate::light::{Extent, Light};
 use crate::material::{Lobe, Moments};
 use crate::scene::Scene;
 use crate::shape::SurfaceInteraction;
@@ -101,9 +101,9 @@ impl<'a> Sampled<'a> {
     /// Where nothing hides any of it.
     #[inline(always)]
     fn lit(&self, si: &SurfaceInteraction, lobe: &Lobe) -> Moments {
-        totals(match &self.light().kind {
-            LightKind::Area(area) => sum_area(self.level, area, si, lobe, &PointObstacles::default()),
-            _ => {
+        totals(match self.light().extent() {
+            Extent::Area(area) => sum_area(self.level, area, si, lobe, &PointObstacles::default()),
+            Extent::Point => {
                 let unshadowed = SurfaceInteraction { receives_shadow: false, ..*si };
                 Plain.gather(self.scene, self.index, &unshadowed, lobe, &mut Counts::default())
             }
@@ -113,9 +113,9 @@ impl<'a> Sampled<'a> {
     /// Past what is in `view`.
     #[inline(always)]
     fn masked(&self, si: &SurfaceInteraction, lobe: &Lobe, view: &ShadowView) -> Moments {
-        totals(match &self.light().kind {
-            LightKind::Area(area) => sum_area(self.level, area, si, lobe, &PointObstacles::of(view)),
-            _ => Plain.gather(self.scene, self.index, si, lobe, &mut Counts::default()),
+        totals(match self.light().extent() {
+            Extent::Area(area) => sum_area(self.level, area, si, lobe, &PointObstacles::of(view)),
+            Extent::Point => Plain.gather(self.scene, self.index, si, lobe, &mut Counts::default()),
         })
     }
 }

@@ -9,7 +9,7 @@ use std::f32::consts::PI;
 use super::square::Square;
 use crate::accel::{HalfSpace, Planes};
 use crate::ids::SurfaceId;
-use crate::light::{AreaShape, LightKind};
+use crate::light::AreaShape;
 use crate::material::Bsdf;
 use crate::math::{DVec3, Ray, Vec3};
 use crate::scene::{At, Hit, Scene};
@@ -109,14 +109,11 @@ impl Pyramid {
         into.extend(from.iter().filter(|candidate| match candidate {
             Candidate::Sphere(i) => !self.misses_sphere(&geometry.spheres[*i as usize].shape),
             Candidate::Parallelogram(i) => !self.misses_flat(&geometry.parallelograms[*i as usize].shape),
-            Candidate::Light(i) => match &scene.lights[*i as usize].kind {
-                LightKind::Area(area) => match &area.shape {
-                    AreaShape::Rectangle(rectangle) => !self.misses_flat(&rectangle.shape),
-                    AreaShape::Sphere(sphere) => !self.misses_sphere(&sphere.shape),
-                    AreaShape::Disk(_) => true,
-                },
-                _ => false,
-            },
+            Candidate::Light(i) => scene.lights[*i as usize].area().is_some_and(|area| match &area.shape {
+                AreaShape::Rectangle(rectangle) => !self.misses_flat(&rectangle.shape),
+                AreaShape::Sphere(sphere) => !self.misses_sphere(&sphere.shape),
+                AreaShape::Disk(_) => true,
+            }),
             Candidate::Trees => geometry.may_meet(scene.level, &self.planes()),
         }));
     }
@@ -191,12 +188,10 @@ impl Pyramid {
                 }
             }
             Candidate::Parallelogram(i) => self.nearest_flat(&scene.geometry.parallelograms[i as usize].shape),
-            Candidate::Light(i) => match &scene.lights[i as usize].kind {
-                LightKind::Area(area) => match &area.shape {
-                    AreaShape::Rectangle(rectangle) => self.nearest_flat(&rectangle.shape),
-                    _ => f64::NEG_INFINITY,
-                },
-                _ => f64::INFINITY,
+            Candidate::Light(i) => match scene.lights[i as usize].area().map(|area| &area.shape) {
+                Some(AreaShape::Rectangle(rectangle)) => self.nearest_flat(&rectangle.shape),
+                Some(AreaShape::Disk(_) | AreaShape::Sphere(_)) => f64::NEG_INFINITY,
+                None => f64::INFINITY,
             },
             Candidate::Trees if scene.geometry.unbounded.is_empty() => {
                 let (forward, planes) = (self.forward.as_dvec3(), self.planes());
@@ -255,7 +250,7 @@ pub(crate) fn all(scene: &Scene) -> Vec<Candidate> {
         all.extend((0..flats.len()).filter(|i| flats[*i].seen).map(|i| Candidate::Parallelogram(i as u32)));
     }
     all.extend(geometry.has_trees().then_some(Candidate::Trees));
-    let visible = |i: &usize| matches!(&scene.lights[*i].kind, LightKind::Area(area) if area.visible);
+    let visible = |i: &usize| scene.lights[*i].area().is_some_and(|area| area.visible);
     all.extend((0..scene.lights.len()).filter(visible).map(|i| Candidate::Light(i as u32)));
     all
 }
@@ -276,10 +271,7 @@ impl Candidate {
         match self {
             Candidate::Sphere(i) => scene.geometry.spheres[i as usize].shape.intersect(ray),
             Candidate::Parallelogram(i) => scene.geometry.parallelograms[i as usize].shape.intersect(ray),
-            Candidate::Light(i) => match &scene.lights[i as usize].kind {
-                LightKind::Area(area) => area.shape.intersect(ray),
-                _ => None,
-            },
+            Candidate::Light(i) => scene.lights[i as usize].area()?.shape.intersect(ray),
             Candidate::Trees => unreachable!("what lies in trees is not one shape"),
         }
     }

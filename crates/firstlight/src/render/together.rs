@@ -387,7 +387,7 @@ impl Together {
 
     /// Whether so many points may miss some of what would arrive if nothing were in the way.
     fn may_miss(&self, said: &PointsSaid, points: usize, asking: &[Asking], arrivals: &Arrivals) -> bool {
-        let apart = arrivals.asker(self.light).area.extent() / (points as f32).sqrt();
+        let apart = arrivals.asker(self.light).area.diagonal() / (points as f32).sqrt();
         let is_unseen =
             |k: usize| said.effective[k] < f64::from(TOLERANCE.told) && asking.iter().any(|one| one.reflects(k));
         (0..MOMENTS).any(is_unseen)

@@ -7,7 +7,7 @@ use super::geometry::{Geometry, Owned};
 use super::light_spheres::LightSpheres;
 use super::{LinkId, Scene};
 use crate::ids::{LightId, SurfaceId};
-use crate::light::{AreaShape, Light, LightKind};
+use crate::light::{AreaShape, Light};
 use crate::shape::{Disk, Parallelogram, PlaneSide, Sphere};
 
 /// Which rays of one kind something stops: camera rays, or light on its way.
@@ -79,10 +79,7 @@ impl ListedOccluders {
         }
         listed.surfaces = listed.spheres.len();
         for (index, light) in lights.iter().enumerate() {
-            let LightKind::Area(area) = &light.kind else { continue };
-            if !area.blocks {
-                continue;
-            }
+            let Some(area) = light.area().filter(|area| area.blocks) else { continue };
             let opacity = Opacity::Light(LightId(index as u32));
             match &area.shape {
                 AreaShape::Rectangle(rectangle) => listed.flats.push(Listed { shape: rectangle.shape, opacity }),
@@ -91,10 +88,10 @@ impl ListedOccluders {
             }
         }
         listed.tree = LightSpheres::new(listed.light_spheres());
-        let areas = lights.iter().filter(|light| matches!(light.kind, LightKind::Area(_))).count();
+        let areas = lights.iter().filter_map(Light::area).count();
         let known = areas * listed.flats.len() <= MAX_SIDES;
-        let sides = |light: &Light| match &light.kind {
-            LightKind::Area(area) if known => listed.flats.iter().map(|flat| area.shape.side_of(&flat.shape)).collect(),
+        let sides = |light: &Light| match light.area() {
+            Some(area) if known => listed.flats.iter().map(|flat| area.shape.side_of(&flat.shape)).collect(),
             _ => Vec::new(),
         };
         listed.sides = lights.iter().map(sides).collect();

@@ -3,7 +3,7 @@
 use fearless_simd::Level;
 
 use crate::accel::{Aabb, Bvh, TraceRay};
-use crate::light::{Light, LightKind};
+use crate::light::Light;
 use crate::math::Ray;
 
 /// Which lights a camera can see.
@@ -27,7 +27,7 @@ impl SeenLights {
     pub fn new(lights: &[Light]) -> Self {
         let (mut all, mut boxes) = (Vec::new(), Vec::new());
         for (index, light) in lights.iter().enumerate() {
-            if let LightKind::Area(area) = &light.kind
+            if let Some(area) = light.area()
                 && area.visible
             {
                 let [low, high] = area.shape.bounds();

@@ -7,7 +7,6 @@ use super::geometry::{At, Nearest};
 use super::occluders::{Listed, ListedOccluders};
 use crate::color::Rgb;
 use crate::ids::{LightId, SurfaceId};
-use crate::light::LightKind;
 use crate::math::{Ray, ShadowRay};
 use crate::shape::{RayDifferential, ShapePoint, Sphere, SurfaceInteraction};
 
@@ -75,7 +74,7 @@ impl Scene {
     #[inline(never)]
     fn meet_lights(&self, ray: &Ray, first: u32, nearest: &mut Nearest) {
         self.seen_lights.meet(self.level, ray, nearest.limit(), |light, limit| {
-            if let LightKind::Area(area) = &self.lights[light as usize].kind
+            if let Some(area) = self.lights[light as usize].area()
                 && let Some(t) = area.shape.intersect(ray)
             {
                 nearest.offer(t, SurfaceId(first + light), At::Light);

@@ -5,7 +5,7 @@ use fearless_simd::{Level, f32x16, prelude::*};
 
 use crate::accel::{Aabb, dispatch_all};
 use crate::ids::LightId;
-use crate::light::{AreaShape, Light, LightKind, PointBlock, Points};
+use crate::light::{AreaShape, Extent, Light, LightKind, PointBlock, Points};
 use crate::math::{Axes, DMat3, DVec3, LANES, Vec3, least_and_most};
 use crate::scene::Scene;
 
@@ -263,9 +263,9 @@ impl Target {
         let light = &scene.lights[id.index()];
         let hull = LightHull::of(light);
         let target = Target { light: id, hull, blocks: Vec::new(), cells: Vec::new(), is_in_order: true };
-        match &light.kind {
-            LightKind::Area(area) if !light.exact => target.with(scene.level, area.points()),
-            _ => target,
+        match light.extent() {
+            Extent::Area(area) if !light.exact => target.with(scene.level, area.points()),
+            Extent::Area(_) | Extent::Point => target,
         }
     }
 

@@ -8,7 +8,7 @@ use super::{BLOCK, CLOSE, LEVELS, Many, ONE, Single, Stored};
 use crate::color::Rgb;
 use crate::ids::LightId;
 use crate::integrate::{COSTS, TOLERANCE};
-use crate::light::{Held, LightKind, LightNode, LightTree, Sends, Sent};
+use crate::light::{Extent, Held, LightNode, LightTree, Sends, Sent};
 use crate::material::{Lobe, Moments};
 use crate::math::Vec3;
 use crate::render::arrival::{ArrivalPlace, Arrivals};
@@ -229,8 +229,9 @@ pub(super) fn sent_by_one(scene: &Scene, one: &LightNode, si: &SurfaceInteractio
     if !(si.horizon.dot(l) > 0.0 && height > 0.0) {
         return Moments::ZERO;
     }
-    if matches!(light.kind, LightKind::Area(_)) && one.is_smooth() {
-        return one.send_one(si.lit_from, si.ns, si.wo, lobe);
+    match light.extent() {
+        Extent::Area(_) if one.is_smooth() => return one.send_one(si.lit_from, si.ns, si.wo, lobe),
+        Extent::Area(_) | Extent::Point => {}
     }
     let Some(sample) = light.sample(k, l) else { return Moments::ZERO };
     let (cos_i, cos_io) = (height * sample.inverse_distance, si.wo.dot(l) * sample.inverse_distance);
