@@ -2,7 +2,7 @@
 
 use crate::ids::LightId;
 use crate::math::Vec3;
-use crate::scene::{Listed, Scene};
+use crate::scene::{Listed, Opacity, Scene};
 use crate::shape::{ParallelogramShadow, SphereShadow, SurfaceInteraction};
 use crate::visibility::Viewpoint;
 
@@ -31,8 +31,9 @@ impl Fence {
     #[inline]
     pub fn blocks(&self, scene: &Scene, light: LightId, l: Vec3, finite: bool) -> bool {
         let Some(from) = &self.from else { return false };
-        scene.that_stop(&self.spheres, light).any(|(_, sphere)| sphere.shape.blocks(l, finite))
-            || scene.that_stop(&self.flats, light).any(|(_, flat)| flat.shape.blocks(l, finite))
+        let stops = |opacity: Opacity| scene.geometry.stops(opacity, light);
+        self.spheres.iter().any(|sphere| sphere.shape.blocks(l, finite) && stops(sphere.opacity))
+            || self.flats.iter().any(|flat| flat.shape.blocks(l, finite) && stops(flat.opacity))
             || scene.occluded_but_by_lists(&from.ray(light, l, finite))
     }
 }

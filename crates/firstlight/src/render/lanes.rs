@@ -15,7 +15,7 @@ use crate::ids::LightId;
 use crate::light::{Area, Extent, MIN_DISTANCE2, Points};
 use crate::material::{Lobe, MOMENTS};
 use crate::math::{LANES, LaneSum, ShadowRay, Vec3, Vec3x16};
-use crate::scene::{Geometry, Listed, Scene, ShadowRays};
+use crate::scene::{Geometry, Listed, Opacity, Scene, ShadowRays};
 use crate::shape::{DiskShadow, ParallelogramShadow, PlaneSide, SphereShadow, SurfaceInteraction};
 use crate::visibility::ShadowView;
 
@@ -24,7 +24,8 @@ pub(crate) struct Lanes {
     level: Level,
     /// What is listed and can stand between the surface looked around from and any light: flat things all, by the
     /// index that tells on which side of them each light lies.
-    spheres: Vec<Listed<SphereShadow>>,
+    spheres: Vec<SphereShadow>,
+    sphere_opacities: Vec<Opacity>,
     flats: Vec<Listed<ParallelogramShadow>>,
     disks: Vec<Listed<DiskShadow>>,
     /// Those of them that can stand in the way of the light at hand.
@@ -41,7 +42,14 @@ struct BetweenShapes {
 
 impl Lanes {
     pub fn new(level: Level) -> Self {
-        Lanes { level, spheres: Vec::new(), flats: Vec::new(), disks: Vec::new(), between: BetweenShapes::default() }
+        Lanes {
+            level,
+            spheres: Vec::new(),
+            sphere_opacities: Vec::new(),
+            flats: Vec::new(),
+            disks: Vec::new(),
+            between: BetweenShapes::default(),
+        }
     }
 }
 
@@ -185,8 +193,14 @@ impl Lighting for Lanes {
     fn look_around(&mut self, scene: &Scene, si: &SurfaceInteraction) {
         let listed = &scene.occluders;
         self.spheres.clear();
-        let spheres = listed.spheres.iter().map(|sphere| sphere.map(|shape| shape.shadow(si.lit_from, si.error)));
-        self.spheres.extend(spheres.filter(|sphere| !sphere.shape.is_below(si.horizon)));
+        self.sphere_opacities.clear();
+        for Listed { shape, opacity } in &listed.spheres {
+            let shadow = shape.shadow(si.lit_from, si.error);
+            if !shadow.is_below(si.horizon) {
+                self.spheres.push(shadow);
+                self.sphere_opacities.push(*opacity);
+            }
+        }
         let flats = listed.flats.iter();
         self.flats.clear();
         self.flats.extend(flats.map(|flat| flat.map(|shape| shape.shadow(si.lit_from, si.error))));
@@ -211,8 +225,14 @@ impl Lighting for Lanes {
         };
         let id = LightId(index as u32);
         let BetweenShapes { spheres, flats, disks } = &mut self.between;
-        spheres.clear();
-        spheres.extend(scene.that_stop(&self.spheres, id).map(|(_, sphere)| sphere.shape));
+        let spheres = if self.sphere_opacities.iter().all(|opacity| *opacity == Opacity::Opaque) {
+            &self.spheres
+        } else {
+            let stop = self.sphere_opacities.iter().map(|opacity| scene.geometry.stops(*opacity, id));
+            spheres.clear();
+            spheres.extend(self.spheres.iter().zip(stop).filter(|(_, stops)| *stops).map(|(sphere, _)| *sphere));
+            spheres
+        };
         let sides = scene.occluders.sides(id);
         let is_between = |(i, flat): &(usize, &Listed<ParallelogramShadow>)| {
             !flat.shape.is_one_sided(sides.get(*i).copied().unwrap_or(PlaneSide::Both))

@@ -14,7 +14,6 @@ mod beams;
 mod cell;
 mod change;
 mod counts;
-mod crowd;
 mod cut;
 mod fence;
 mod film;

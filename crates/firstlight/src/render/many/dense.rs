@@ -13,8 +13,7 @@ use crate::material::{Lobe, Moments};
 use crate::math::Vec3;
 use crate::render::arrival::{ArrivalPlace, Arrivals};
 use crate::render::counts::Counts;
-use crate::render::crowd::By;
-use crate::render::cut::CutRules;
+use crate::render::cut::{By, CutRules};
 use crate::render::fence::Fence;
 use crate::scene::Scene;
 use crate::shape::SurfaceInteraction;
@@ -51,7 +50,15 @@ impl<'a> Many<'a> {
         let receives = group.iter().any(|at| patch(at).si.receives_shadow);
         self.outlook.stand(scene, group.iter().map(|at| standing(patch(at))));
         let steps = arrivals.display_steps();
-        let walk = CutRules { tree, steps, zone: &zone, tones: &tones, budget: TOLERANCE.crowd };
+        let rules = CutRules {
+            tree,
+            steps,
+            zone: &zone,
+            tones: &tones,
+            shines: &|_| true,
+            budget: TOLERANCE.crowd,
+            leaves_open: false,
+        };
         let mut crowd = std::mem::take(&mut self.crowd);
         let (simd, outlook, fence) = (arrivals.level(), &mut self.outlook, &mut self.fence);
         let mut look = |node: &LightNode, light: u32| {
@@ -60,18 +67,15 @@ impl<'a> Many<'a> {
             }
             outlook.look(simd, scene, node.shine.low, node.shine.high, LightId(light))
         };
-        crowd.begin(&walk);
+        crowd.begin(&rules, &tree.roots, [0.0; 3]);
         let guess = guess.unwrap_or_else(|| {
-            crowd.refine(&CutRules { budget: TOLERANCE.crowd * COSTS.pilot, ..walk }, None, &mut look);
+            crowd.refine(&CutRules { budget: TOLERANCE.crowd * COSTS.pilot, ..rules }, None, &mut look);
             crowd.peek();
             let some = [0, group.len() / 2, group.len() - 1].map(|i| patch(&group[i]));
             let all = some.map(|patch| {
                 fence.stand(scene, &patch.si);
                 crowd.nodes.iter().fold(Rgb::BLACK, |sum, (node, by)| match entry(*node, *by) {
-                    entry
-                        if matches!(by, By::Middle | By::One)
-                            || Dot::new(tree, entry).arrives(scene, fence, &patch.si) =>
-                    {
+                    entry if by.is_everywhere() || Dot::new(tree, entry).arrives(scene, fence, &patch.si) => {
                         sum + sent(scene, tree, entry, &patch.si, &patch.bsdf.lobe).cosine()
                     }
                     _ => sum,
@@ -79,19 +83,19 @@ impl<'a> Many<'a> {
             });
             all.into_iter().reduce(Rgb::min).unwrap_or(Rgb::BLACK) * TOLERANCE.sure
         });
-        crowd.refine(&walk, Some(guess), &mut look);
-        let is_close = crowd.singles.len() > CLOSE && level < LEVELS && group.len() > 1;
+        crowd.refine(&rules, Some(guess), &mut look);
+        let is_close = crowd.open.len() > CLOSE && level < LEVELS && group.len() > 1;
         let (mut again, mut darkest) = (Vec::new(), guess);
         if is_close {
             again.extend_from_slice(group);
         } else {
-            crowd.settle(&walk, group.len(), &mut look);
+            crowd.settle(&rules, group.len(), &mut look);
             let start = self.lit.len() as u32;
-            let everywhere = crowd.nodes.iter().filter(|(_, by)| matches!(by, By::Middle | By::One));
+            let everywhere = crowd.nodes.iter().filter(|(_, by)| by.is_everywhere());
             self.lit.extend(everywhere.map(|(node, by)| entry(*node, *by)));
             let lit = start..self.lit.len() as u32;
             let start = self.dots.len() as u32;
-            let sometimes = crowd.nodes.iter().filter(|(_, by)| matches!(by, By::MiddleIfSeen | By::OneIfSeen));
+            let sometimes = crowd.nodes.iter().filter(|(_, by)| !by.is_everywhere());
             self.dots.extend(sometimes.map(|(node, by)| Dot::new(tree, entry(*node, *by))));
             let maybe = start..self.dots.len() as u32;
             let mut found: Option<Rgb> = None;
@@ -99,7 +103,7 @@ impl<'a> Many<'a> {
                 let patch = patch(at);
                 let singles = self.singles.len();
                 let lists = [lit.clone(), maybe.clone()];
-                let (stored, light) = self.in_crowd(patch, &crowd.singles, lists, arrivals, counts);
+                let (stored, light) = self.in_crowd(patch, &crowd.open, lists, arrivals, counts);
                 let error = crowd.error(&patch.bsdf.colors);
                 if arrivals.steps(stored.value, error) > TOLERANCE.crowd * TOLERANCE.lenient && guess != Rgb::BLACK {
                     // Darker than was guessed

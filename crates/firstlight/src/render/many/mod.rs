@@ -5,8 +5,8 @@
 //! each patch. What is dropped, and what is lost by taking many lights for one, stays below
 //! `TOLERANCE.many` for blocks and for patches, in display steps.
 //!
-//! Up to [`SINGLY`] lights are all taken one by one. Of more, one may stand for many: a [`Crowd`] says for which, for
-//! each block, and what may be wrong is `TOLERANCE.crowd` as the root of a sum of squares. Cells and blocks lie on a
+//! Up to [`SINGLY`] lights are all taken one by one. Of more, one may stand for many: for which, the cut says for each
+//! block, and what may be wrong is `TOLERANCE.crowd` as the root of a sum of squares. Cells and blocks lie on a
 //! grid of the film, so nothing depends on tiles, crops or threads.
 
 mod dense;
@@ -21,8 +21,7 @@ use super::arrival::{ArrivalPlace, Arrivals};
 use super::cell::CELL;
 use super::change::Arrival;
 use super::counts::Counts;
-use super::crowd::Crowd;
-use super::cut::{Cut, CutRules};
+use super::cut::{Cut, CutRules, Squares, Sum};
 use super::fence::Fence;
 use super::fragment::Fragments;
 use super::resolve::LightTerm;
@@ -65,8 +64,8 @@ pub(super) struct Many<'a> {
     together: bool,
     eye: Vec3,
     outlook: Outlook,
-    cut: Cut,
-    crowd: Crowd,
+    cut: Cut<Sum>,
+    crowd: Cut<Squares>,
     fence: Fence,
     /// What arrives at each patch.
     stored: Vec<Stored>,
@@ -121,7 +120,7 @@ impl<'a> Many<'a> {
             eye: scene.camera.frame().eye,
             outlook: Outlook::default(),
             cut: Cut::default(),
-            crowd: Crowd::default(),
+            crowd: Cut::default(),
             fence: Fence::default(),
             patches: Patches::default(),
             stored: Vec::new(),
@@ -227,38 +226,30 @@ impl<'a> Many<'a> {
         let patch = |number: &usize| &patches[*number];
         let zone = zone(group.iter().map(patch), self.eye);
         let tones = tones(scene, group.iter().map(patch));
-        let one = patch(&group[0]);
         let receives = group.iter().any(|at| patch(at).si.receives_shadow);
         let places = group.iter().map(|at| standing(patch(at)));
         self.outlook.stand(scene, places);
         let (outlook, level) = (&mut self.outlook, arrivals.level());
         let share = if above.level == 0 { 2.0 * TOLERANCE.block } else { TOLERANCE.block };
         let (steps, budget) = (arrivals.display_steps(), TOLERANCE.many * share);
-        let walk = CutRules { tree, steps, zone: &zone, tones: &tones, budget };
-        let links = scene.geometry.lights_of(one.si.surface);
+        let links = scene.geometry.lights_of(patch(&group[0]).si.surface);
         let shines = |light: u32| scene.geometry.links.contains(links, LightId(light));
-        self.cut.of_block(
-            &walk,
-            &above.open,
-            above.known,
-            &mut |node, light| {
-                if !(receives && node.shadows) {
-                    return Seen::Whole;
-                }
-                outlook.look(level, scene, node.shine.low, node.shine.high, LightId(light))
-            },
-            &shines,
-        );
+        let rules = CutRules { tree, steps, zone: &zone, tones: &tones, shines: &shines, budget, leaves_open: true };
+        self.cut.of_block(&rules, &above.open, above.known, &mut |node, light| {
+            if !(receives && node.shadows) {
+                return Seen::Whole;
+            }
+            outlook.look(level, scene, node.shine.low, node.shine.high, LightId(light))
+        });
         let start = self.lit.len() as u32;
-        self.lit.extend(&self.cut.lit);
+        self.lit.extend(self.cut.nodes.iter().map(|(node, _)| node));
         let mut lit = above.lit.clone();
         lit[above.level] = start..self.lit.len() as u32;
-        let error = self.cut.error();
         let here = Above {
             level: above.level + 1,
             open: std::mem::take(&mut self.cut.open),
             known: self.cut.known(),
-            error: above.error + error,
+            error: above.error + self.cut.errors(),
             lit,
         };
         if here.level == LEVELS || here.open.is_empty() {
@@ -315,11 +306,21 @@ impl<'a> Many<'a> {
             let zone = zone(std::iter::once(patch), self.eye);
             let tones = [tone(scene, bsdf)];
             let steps = arrivals.display_steps();
-            let walk = CutRules { tree, steps, zone: &zone, tones: &tones, budget: TOLERANCE.many };
+            let links = scene.geometry.lights_of(si.surface);
+            let shines = |light: u32| scene.geometry.links.contains(links, LightId(light));
+            let rules = CutRules {
+                tree,
+                steps,
+                zone: &zone,
+                tones: &tones,
+                shines: &shines,
+                budget: TOLERANCE.many,
+                leaves_open: false,
+            };
             let (outlook, singles, level) = (&mut self.outlook, &mut self.singles, arrivals.level());
             let mut stands = false;
             stored.value = self.cut.of_patch(
-                &walk,
+                &rules,
                 open,
                 value,
                 &mut |node, light| {
@@ -345,7 +346,7 @@ impl<'a> Many<'a> {
                 },
             );
             let start = self.lit.len() as u32;
-            self.lit.extend(&self.cut.lit);
+            self.lit.extend(self.cut.nodes.iter().map(|(node, _)| node));
             stored.lit[LEVELS] = start..self.lit.len() as u32;
             let before = stored.sent;
             self.add(patch, LEVELS, &mut stored);
