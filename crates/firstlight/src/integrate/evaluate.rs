@@ -65,6 +65,17 @@ pub(crate) struct Arrived {
 }
 
 impl Arrived {
+    /// Nothing is known of what is seen.
+    pub const UNKNOWN: Arrived = Arrived {
+        sums: Moments::UNKNOWN,
+        illumination: Illumination::Unknown,
+        proved: false,
+        motion: f32::INFINITY,
+        distance: 0.0,
+        height: 0.0,
+        asked: 0.0,
+    };
+
     /// What arrives of two parts of a light.
     fn and(&self, other: &Arrived) -> Arrived {
         let illumination = match (self.illumination, other.illumination) {
@@ -98,6 +109,8 @@ pub(crate) struct Asked<'a> {
     pub least: f32,
     /// Whether others can take the light away.
     pub shadows: bool,
+    /// Whether it is asked what arrives, and not only what is seen of the light.
+    pub sums: bool,
 }
 
 impl Asked<'_> {
@@ -327,7 +340,7 @@ impl Evaluator {
                 if most_asked == 0.0 && !is_open && one.illumination == Illumination::Partial {
                     one.illumination = Illumination::Unknown;
                 }
-                let is_wanted = one.proved || one.motion <= point.most_motion;
+                let is_wanted = light.sums && (one.proved || one.motion <= point.most_motion);
                 if is_wanted && matches!(one.illumination, Illumination::Full | Illumination::Partial) {
                     let number = (start + k) as u32;
                     self.state[start + k].cells = 1;

@@ -167,6 +167,7 @@ fn batched(case: &Case, steps: &DisplaySteps) -> Moments {
         allowed: TOLERANCE.point,
         least: steps.value_of(TOLERANCE.point),
         shadows: true,
+        sums: true,
     };
     let all = |level: Level, count: usize| {
         let mut arrived = Vec::new();
@@ -399,6 +400,7 @@ impl BallCase {
             allowed: TOLERANCE.point,
             least: steps.value_of(TOLERANCE.point),
             shadows: true,
+            sums: true,
         };
         let mut arrived = Vec::new();
         Evaluator::default().evaluate(Level::new(), &asked, &[self.point], &mut arrived);

@@ -159,7 +159,7 @@ impl<'a> Arrivals<'a> {
     pub fn arrivals(&mut self, index: usize, places: &[ArrivalPlace], found: &mut Vec<Arrival>, counts: &mut Counts) {
         found.clear();
         if !self.is_integrated(index) {
-            found.extend(places.iter().map(|place| self.of_other(index, place, counts)));
+            self.of_other(index, places, true, found, counts);
             return;
         }
         let mut seen = std::mem::take(&mut self.seen);
@@ -182,31 +182,99 @@ impl<'a> Arrivals<'a> {
         }
     }
 
-    /// The same of a light that is not integrated.
-    fn of_other(&mut self, index: usize, place: &ArrivalPlace, counts: &mut Counts) -> Arrival {
+    /// The same of a light that is not integrated. What is seen of its samples is settled for all places together.
+    /// Sums are unknown where one place does not tell what others see, but for those who want all: `is_summed`.
+    pub fn of_other(
+        &mut self,
+        index: usize,
+        places: &[ArrivalPlace],
+        is_summed: bool,
+        found: &mut Vec<Arrival>,
+        counts: &mut Counts,
+    ) {
         let light = &self.scene.lights[index];
-        if !self.is_linked(index, place) {
-            return Arrival::even(Moments::default());
-        }
         let area = match light.extent() {
             Extent::Area(area) => area,
-            Extent::Point => return self.single(index, light, place, counts),
+            Extent::Point => {
+                found.extend(places.iter().map(|place| match self.is_linked(index, place) {
+                    true => self.single(index, light, place, counts),
+                    false => Arrival::even(Moments::default()),
+                }));
+                return;
+            }
         };
-        let light = Sampled::new(self.scene, self.level, index, &self.lights.targets);
-        let sums = light.to_point(&mut self.settler, place.si, place.lobe, counts);
-        if place.reach == 0.0 {
-            return Arrival::even(sums);
-        }
-        // As it would be if it were integrated, in the unit of samples
+        let changes = self.changes(index, area, places);
+        let is_wanted = |change: &Change| is_summed || *change != Change::UNKNOWN;
+        let wanted: Vec<bool> = changes.iter().map(is_wanted).collect();
+        let sums = self.of_samples(index, places, &wanted, counts);
+        found.extend(changes.into_iter().zip(sums).map(|(change, sums)| change.with(sums)));
+    }
+
+    /// How area light `index`, which is sampled, changes over places: as it would if it were integrated, in the unit of
+    /// samples.
+    fn changes(&mut self, index: usize, area: &Area, places: &[ArrivalPlace]) -> Vec<Change> {
         let emitter = Emitter::new(area);
-        let one = area.samples() as f32 / area.stands_for();
-        let mut change = self.change_if_integrated(index, &emitter, place);
-        change.bend = change.bend * one;
-        // Each of a fixed set of points throws a hard shadow, which shows where they are few
-        if area.samples() < FEW_SAMPLES && change.drift > 0.0 {
-            change = Change::UNKNOWN;
+        let mut changes = vec![Change::NONE; places.len()];
+        // Past nothing in trees, and without shadows: what is seen of the light is asked for all of them at once
+        let mut asked: [Vec<usize>; 2] = Default::default();
+        for (k, place) in places.iter().enumerate() {
+            if place.reach == 0.0 || !self.is_linked(index, place) {
+                continue;
+            }
+            let shadows = self.scene.lights[index].shadows && place.si.receives_shadow;
+            match if shadows { self.gather_places(index, std::slice::from_ref(place)) } else { Trees::Nothing } {
+                Trees::Nothing => asked[usize::from(!shadows)].push(k),
+                Trees::Known => {
+                    let seen = self.seen_of(index, &emitter, std::iter::once(place), [true, true]);
+                    changes[k] = self.change_of(&emitter, place, &seen[0]);
+                }
+                Trees::Unknown => changes[k] = self.change_of(&emitter, place, &Arrived::UNKNOWN),
+            }
         }
-        change.with(sums)
+        for (numbers, shadows) in asked.iter().zip([true, false]) {
+            let seen = self.seen_of(index, &emitter, numbers.iter().map(|k| &places[*k]), [shadows, false]);
+            for (k, seen) in numbers.iter().zip(&seen) {
+                changes[*k] = self.change_of(&emitter, &places[*k], seen);
+            }
+        }
+        let one = area.samples() as f32 / area.stands_for();
+        for change in &mut changes {
+            change.bend = change.bend * one;
+            // Each of a fixed set of points throws a hard shadow, which shows where they are few
+            if area.samples() < FEW_SAMPLES && change.drift > 0.0 {
+                *change = Change::UNKNOWN;
+            }
+        }
+        changes
+    }
+
+    /// What the samples of area light `index` send to those places where it is `wanted`.
+    fn of_samples(
+        &mut self,
+        index: usize,
+        places: &[ArrivalPlace],
+        wanted: &[bool],
+        counts: &mut Counts,
+    ) -> Vec<Moments> {
+        let light = Sampled::new(self.scene, self.level, index, &self.lights.targets);
+        let points: Vec<Viewpoint> = places.iter().map(|place| Viewpoint::of(place.si)).collect();
+        let mut sums = vec![Moments::ZERO; places.len()];
+        let mut order = Vec::with_capacity(places.len());
+        for (k, place) in places.iter().enumerate() {
+            if !wanted[k] {
+                sums[k] = Moments::UNKNOWN;
+            } else if !self.is_linked(index, place) {
+                continue;
+            } else if light.is_shadowed(place.si) {
+                order.push(k as u32);
+            } else {
+                sums[k] = light.unshadowed(place.si, place.lobe, counts);
+            }
+        }
+        light.settle(&mut self.settler, &points, &mut order, counts, |k, visibility, view| {
+            sums[k] = light.sent(places[k].si, places[k].lobe, visibility, view);
+        });
+        sums
     }
 
     /// Whether a light shines on the surface of a place.
@@ -327,6 +395,24 @@ impl<'a> Arrivals<'a> {
             }
         }
         self.arrived = arrived;
+    }
+
+    /// What places see of area light `index`, which is sampled: nothing is asked of what arrives.
+    fn seen_of<'p, 'q: 'p>(
+        &mut self,
+        index: usize,
+        emitter: &Emitter,
+        places: impl Iterator<Item = &'p ArrivalPlace<'q>>,
+        [shadows, near]: [bool; 2],
+    ) -> Vec<Arrived> {
+        let points: Vec<ShadingPoint> = places.map(ArrivalPlace::point_of_surface).collect();
+        let mut seen = Vec::with_capacity(points.len());
+        let near = near.then_some(&self.near);
+        let asked = Asked { near, sums: false, ..self.lights.asked_of(index, emitter, &Lobe::None, shadows) };
+        self.evaluator.evaluate(self.level, &asked, &points, &mut seen);
+        let unknown = seen.iter_mut().filter(|seen| seen.illumination == Illumination::Unknown);
+        unknown.for_each(|seen| seen.motion = f32::INFINITY);
+        seen
     }
 
     /// Adds what batches know of some places, with or without what is in lists, and in what was gathered in trees.
@@ -613,18 +699,5 @@ impl<'a> Arrivals<'a> {
     pub(super) fn gather_places(&mut self, index: usize, places: &[ArrivalPlace]) -> Trees {
         let points: ArrayVec<Viewpoint, LANES> = places.iter().map(|place| Viewpoint::of(place.si)).collect();
         self.gather(index, &points, places[0].reach, places[0].turn)
-    }
-
-    /// How an area light would change if it were integrated.
-    fn change_if_integrated(&mut self, index: usize, emitter: &Emitter, place: &ArrivalPlace) -> Change {
-        let shadows = self.scene.lights[index].shadows && place.si.receives_shadow;
-        let trees = if shadows { self.gather_places(index, std::slice::from_ref(place)) } else { Trees::Nothing };
-        let mut arrived = Vec::new();
-        self.ask(index, emitter, std::iter::once(place), [shadows, matches!(trees, Trees::Known)], &mut arrived);
-        let mut arrived = arrived[0];
-        if matches!(trees, Trees::Unknown) || arrived.illumination == Illumination::Unknown {
-            arrived.motion = f32::INFINITY;
-        }
-        self.change_of(emitter, place, &arrived)
     }
 }

@@ -73,6 +73,14 @@ struct Wanted {
     fragment: u32,
     light: u32,
     sight: Sight,
+    /// Whether each ray asks for itself: no place of the fragment stands for others.
+    is_parted: bool,
+}
+
+impl Wanted {
+    fn new(fragment: u32, light: u32) -> Wanted {
+        Wanted { fragment, light, sight: Sight::Unknown, is_parted: false }
+    }
 }
 
 /// One thread's way from tiles to film.
@@ -248,7 +256,7 @@ impl<'a> Cells<'a> {
         let lights = 0..scene.lights.len() as u32;
         // Those whose rays were traced want all lights
         for fragment in 0..self.fragments.all.len() as u32 {
-            self.wanted.extend(lights.clone().map(|light| Wanted { fragment, light, sight: Sight::Unknown }));
+            self.wanted.extend(lights.clone().map(|light| Wanted::new(fragment, light)));
         }
         for block in 0..self.blocks.len() {
             let block = self.blocks[block];
@@ -285,7 +293,7 @@ impl<'a> Cells<'a> {
             for light in lights.clone() {
                 match self.grid.arrived(light as usize, at).filter(|_| is_even) {
                     Some(sums) => self.add(fragment, light as usize, sums),
-                    None => self.parted.push(Wanted { fragment: fragment as u32, light, sight: Sight::Unknown }),
+                    None => self.parted.push(Wanted::new(fragment as u32, light)),
                 }
             }
         }
@@ -385,7 +393,8 @@ impl<'a> Cells<'a> {
             if is_known && (count == 1 || answer.smooth && (is_dark || self.is_nearly_even(fragment, light, &answer))) {
                 self.add(fragment as usize, light as usize, answer.sums);
             } else {
-                self.parted.push(Wanted { sight: answer.sight, ..*wanted });
+                let is_parted = !is_known && !self.lights.arrivals.is_integrated(light as usize);
+                self.parted.push(Wanted { sight: answer.sight, is_parted, ..*wanted });
             }
         }
         self.wanted = wanted;
@@ -397,7 +406,7 @@ impl<'a> Cells<'a> {
         let scene = self.scene;
         let wanted = std::mem::take(&mut self.parted);
         self.requests.clear();
-        for Wanted { fragment, light, sight } in wanted.iter().copied() {
+        for Wanted { fragment, light, sight, .. } in wanted.iter().copied().filter(|wanted| !wanted.is_parted) {
             let pixel = self.fragments.all[fragment as usize].pixel;
             let at = self.at(self.pixels[pixel as usize].index as usize);
             self.fragments.find_quadrants(scene, fragment as usize, at);
@@ -408,6 +417,10 @@ impl<'a> Cells<'a> {
         self.lights.ask(&fragments.places, &self.requests, &mut self.answers, counts, go_on)?;
         let mut next = 0;
         for wanted in &wanted {
+            if wanted.is_parted {
+                self.refused.push(*wanted);
+                continue;
+            }
             let fragment = &fragments.all[wanted.fragment as usize];
             let quadrants = fragments.quadrants(fragment);
             let answers = &self.answers[next..next + quadrants.len()];
@@ -519,7 +532,7 @@ impl<'a> Cells<'a> {
         self.requests.clear();
         // Places of a fragment serve all lights
         let mut last: Option<(u32, Range<usize>)> = None;
-        for Wanted { fragment: number, light, sight } in refused {
+        for Wanted { fragment: number, light, sight, .. } in refused {
             self.trace_rays(*number as usize, counts);
             let fragment = &self.fragments.all[*number as usize];
             if last.as_ref().is_none_or(|(before, _)| before != number) {

@@ -20,7 +20,7 @@ pub(crate) struct Arrival {
 }
 
 /// How a light changes over a patch.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Change {
     /// See [`Arrival::bend`], and so on.
     pub bend: Moments,

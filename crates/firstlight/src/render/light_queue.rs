@@ -4,9 +4,9 @@ use std::ops::ControlFlow;
 
 use arrayvec::ArrayVec;
 
-use super::Counts;
 use super::arrival::{ArrivalPlace, Arrivals, Trees};
 use super::change::Arrival;
+use super::{Counts, QUESTION_EVERY};
 use crate::color::Rgb;
 use crate::ids::{LightId, MaterialId, SurfaceId};
 use crate::integrate::{Arrived, Emitter, Illumination, ShadingPoint, TOLERANCE};
@@ -16,6 +16,9 @@ use crate::math::{LANES, Vec2};
 use crate::scene::Scene;
 use crate::shape::{Footprint, SurfaceInteraction, UvEdge};
 use crate::visibility::Viewpoint;
+
+/// The most places that ask for a light that is not integrated together.
+const AT_ONCE: u64 = 256;
 
 /// A place of a surface that wants light.
 #[derive(Clone, Copy, Debug)]
@@ -208,9 +211,10 @@ impl<'a> LightQueue<'a> {
             let members = std::mem::take(&mut self.groups[group]);
             let shadows = scene.lights[light].shadows && group % 2 == 1;
             if !self.arrivals.is_integrated(light) {
-                for k in &members {
+                let at_once = (QUESTION_EVERY / scene.lights[light].samples() as u64).clamp(1, AT_ONCE) as usize;
+                for some in members.chunks(at_once) {
                     go_on()?;
-                    answers[*k as usize] = self.one(light, of.place(*k), of.request(*k).sight, counts);
+                    self.sampled(&of, some, answers, counts);
                 }
             } else if shadows && scene.geometry.has_trees() {
                 self.past_trees(&of, &members, answers, counts, go_on)?;
@@ -335,43 +339,58 @@ impl<'a> LightQueue<'a> {
         angle * (8.0 * lobe.sharpness(1.0)).max(1.0).sqrt()
     }
 
-    /// One light at one place, by itself.
-    fn one(&mut self, light: usize, place: &LitPlace, sight: Sight, counts: &mut Counts) -> Answer {
-        let si = place.surface();
-        let wanted = ArrivalPlace {
-            lit: sight == Sight::Lit,
-            clear: sight != Sight::Unknown,
-            reach: place.point.reach,
-            turn: place.point.turn,
-            share: place.point.share,
-            ..self.arrivals.place(light, &si, &place.bsdf)
-        };
-        let arrival = self.arrivals.arrival(light, &wanted, counts);
-        // A light of one point sets in at once where it passes the horizon
-        let ShadingPoint { p, ns, horizon, reach, turn, .. } = place.point;
+    /// A light that is not integrated, at some places of one highlight.
+    fn sampled(&mut self, of: &Group, members: &[u32], answers: &mut [Answer], counts: &mut Counts) {
+        let surfaces: Vec<SurfaceInteraction> = members.iter().map(|k| of.place(*k).surface()).collect();
+        let wanted = members.iter().zip(&surfaces).map(|(k, si)| {
+            let (LitPlace { point, bsdf, .. }, sight) = (of.place(*k), of.request(*k).sight);
+            ArrivalPlace {
+                lit: sight == Sight::Lit,
+                clear: sight != Sight::Unknown,
+                reach: point.reach,
+                turn: point.turn,
+                share: point.share,
+                ..self.arrivals.place(of.light, si, bsdf)
+            }
+        });
+        let wanted: Vec<ArrivalPlace> = wanted.collect();
+        let mut found = Vec::with_capacity(members.len());
+        self.arrivals.of_other(of.light, &wanted, false, &mut found, counts);
+        for ((k, wanted), arrival) in members.iter().zip(&wanted).zip(&found) {
+            let Request { sight, .. } = *of.request(*k);
+            let place = of.place(*k);
+            if !arrival.sums.is_known() {
+                answers[*k as usize] = Answer { sight, ..Answer::UNKNOWN };
+                continue;
+            }
+            let is_even = self.is_even(wanted, arrival);
+            answers[*k as usize] = Answer {
+                sums: arrival.sums,
+                smooth: place.point.reach == 0.0 || arrival.smooth && arrival.drift == 0.0,
+                motion: arrival.drift,
+                turn: if self.sets_in(of.light, &place.point) || !is_even && !arrival.resolved {
+                    f32::INFINITY
+                } else if is_even {
+                    0.0
+                } else {
+                    // One place does not tell what it does, but some do together
+                    1.0
+                },
+                most: 0.0,
+                sight,
+            };
+        }
+    }
+
+    /// Whether a light of one point may pass the horizon within a place's reach, where it sets in at once.
+    fn sets_in(&self, light: usize, ShadingPoint { p, ns, horizon, reach, turn, .. }: &ShadingPoint) -> bool {
         let light = &self.scene.lights[light];
-        let is_kinked = match light.extent() {
+        match light.extent() {
             Extent::Area(_) => false,
             Extent::Point => {
-                let to = light.towards(0, p).l;
+                let to = light.towards(0, *p).l;
                 ns.dot(to).min(horizon.dot(to)).abs() < reach + turn * to.length()
             }
-        };
-        let is_even = self.is_even(&wanted, &arrival);
-        Answer {
-            sums: arrival.sums,
-            smooth: place.point.reach == 0.0 || arrival.smooth && arrival.drift == 0.0,
-            motion: arrival.drift,
-            turn: if is_kinked || !is_even && !arrival.resolved {
-                f32::INFINITY
-            } else if is_even {
-                0.0
-            } else {
-                // One place does not tell what it does, but some do together
-                1.0
-            },
-            most: 0.0,
-            sight,
         }
     }
 

@@ -76,6 +76,7 @@ impl<'a> Lights<'a> {
             allowed: self.allowed,
             least: self.least,
             shadows,
+            sums: true,
         }
     }
 }

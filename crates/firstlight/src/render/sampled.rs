@@ -42,24 +42,6 @@ impl<'a> Sampled<'a> {
         self.light().shadows && si.receives_shadow
     }
 
-    /// What it sends to one point, diffuse and specular; it has to shine on the surface.
-    pub fn to_point(
-        &self,
-        settler: &mut Settler,
-        si: &SurfaceInteraction,
-        lobe: &Lobe,
-        counts: &mut Counts,
-    ) -> Moments {
-        if !self.is_shadowed(si) {
-            return self.unshadowed(si, lobe, counts);
-        }
-        let mut sums = Moments::ZERO;
-        self.settle(settler, &[Viewpoint::of(si)], &mut [0], counts, |_, visibility, view| {
-            sums = self.sent(si, lobe, visibility, view);
-        });
-        sums
-    }
-
     /// What it sends to a point that nothing shadows.
     pub fn unshadowed(&self, si: &SurfaceInteraction, lobe: &Lobe, counts: &mut Counts) -> Moments {
         counts.shadow_rays += self.samples();

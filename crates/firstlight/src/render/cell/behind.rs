@@ -145,11 +145,11 @@ impl Cells<'_> {
 
     /// Leaves of what is wanted that of which too little is known by now, and tells the rest.
     fn tell_wanted(&mut self, wanted: &mut Vec<Wanted>) {
-        wanted.retain_mut(|Wanted { fragment, light, sight }| {
+        wanted.retain_mut(|Wanted { fragment, light, sight, .. }| {
             *sight = match self.fragment_sight(*fragment as usize, *light as usize) {
                 FragmentSight::Unknown | FragmentSight::Told => Sight::Unknown,
                 FragmentSight::Parted => {
-                    self.refused.push(Wanted { fragment: *fragment, light: *light, sight: Sight::Unknown });
+                    self.refused.push(Wanted::new(*fragment, *light));
                     return false;
                 }
                 FragmentSight::Clear => Sight::Clear,
