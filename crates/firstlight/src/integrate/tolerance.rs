@@ -32,12 +32,14 @@ pub(crate) struct Tolerance {
     /// What the corners of a square may be wrong about its other places, where there is one light.
     pub foretold: f32,
     /// The part of that, and of [`spread`](Self::spread), where what arrives bends at once, and a quadratic is farther
-    /// off than the corners are: behind what is in trees, whose shadows have corners, and where a light sets in.
+    /// off than the corners are: behind what is in trees, whose shadows have corners, where a light sets in, and where
+    /// the edge of a penumbra may run.
     pub bends_at_once: f32,
     /// How far the places of a surface in a pixel may differ.
     pub spread: f32,
-    /// As a part of the light: how far outlines may move on it over a quadrant.
-    pub quadrant_motion: f32,
+    /// As a part of the light: how far outlines may move on it over a quadrant, and over a square of more than four
+    /// pixels that is not judged as bending at once.
+    pub motion: f32,
     /// How far light may turn where the middle of a fragment stands for all of it, in radians or widths of a highlight.
     pub middle_turn: f32,
     /// By how much that may bend it at most, from a middle to the farthest ray, and from that of a quadrant. The mean
@@ -112,7 +114,7 @@ pub(crate) const TOLERANCE: Tolerance = Tolerance {
     foretold: 0.8,
     bends_at_once: 0.35,
     spread: 5.0,
-    quadrant_motion: 0.3,
+    motion: 0.3,
     middle_turn: 0.06,
     middle_bend: 0.1,
     quadrant_bend: 3.0,

@@ -461,7 +461,7 @@ impl<'a> Cells<'a> {
     /// Whether a light is even enough over the quadrants of a fragment.
     fn is_even(&self, fragment: &Fragment, light: usize, answers: &[Answer]) -> bool {
         let scene = self.scene;
-        if answers.iter().any(|answer| answer.motion > TOLERANCE.quadrant_motion || answer.turn == f32::INFINITY) {
+        if answers.iter().any(|answer| answer.motion > TOLERANCE.motion || answer.turn == f32::INFINITY) {
             return false;
         }
         let bends = |answer: &Answer| {

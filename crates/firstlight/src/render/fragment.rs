@@ -291,8 +291,7 @@ impl Fragments {
         for point in points {
             let (place, rays) = (self.places.len() as u32, n * n / 4);
             self.quadrants.push(Quadrant { place, rays, contrast: Contrast::default() });
-            let point =
-                ShadingPoint { reach, turn, most_motion: TOLERANCE.quadrant_motion, part_of_points: 0.25, ..point };
+            let point = ShadingPoint { reach, turn, most_motion: TOLERANCE.motion, part_of_points: 0.25, ..point };
             self.places.push(LitPlace::new(scene, point, of.surface(scene), &bsdf));
         }
         let quadrants = Some(first..self.quadrants.len());
@@ -399,7 +398,7 @@ impl Fragments {
             let (place, contrast) = (self.places.len() as u32, mean.contrast);
             self.quadrants.push(Quadrant { place, rays: count as u32, contrast });
             let part_of_points = count as f32 / rays.len() as f32;
-            let point = ShadingPoint { share, most_motion: TOLERANCE.quadrant_motion, part_of_points, ..point };
+            let point = ShadingPoint { share, most_motion: TOLERANCE.motion, part_of_points, ..point };
             self.places.push(LitPlace::new(scene, point, surface, &mean.bsdf));
         }
         true

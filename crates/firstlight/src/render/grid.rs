@@ -391,9 +391,10 @@ impl Grid {
         let base = scene.ambient * block.bsdf.ambient;
         let sets_in = nodes.iter().any(|node| *node == Moments::default());
         let is_behind = scene.geometry.has_trees() && center.sight == Sight::Unknown;
-        let allowed =
-            if sets_in || is_behind { TOLERANCE.foretold * TOLERANCE.bends_at_once } else { TOLERANCE.foretold }
-                / (self.lights as f32).sqrt();
+        // Over a square that outlines move far over, the edge of a penumbra may run between the nine
+        let is_crossed = item.square.side > SMALLEST && center.motion > TOLERANCE.motion;
+        let bends = if sets_in || is_behind || is_crossed { TOLERANCE.bends_at_once } else { 1.0 };
+        let allowed = TOLERANCE.foretold * bends / (self.lights as f32).sqrt();
         let mean = |a: Moments, b: Moments| (a + b) * 0.5;
         let [nw, n, ne, w, m, e, sw, s, se] = *nodes;
         let middle = mean(mean(nw, ne), mean(sw, se));
