@@ -576,12 +576,19 @@ impl Candidate {
         let SquareBsdf { bsdf, growth, .. } = *whole;
         // An edge between two colours is off by an eighth of what the pixel grows, at most
         let off = 0.125 * growth;
-        if is_within(ambient * off, bsdf.ambient)
-            && contrast.0.into_iter().zip(bsdf.colors.0).all(|(contrast, mean)| is_within(contrast * off, mean))
-        {
+        let is_within_by = |part: f32| {
+            let mut colors = contrast.0.into_iter().zip(bsdf.colors.0);
+            is_within(ambient * (off * part), bsdf.ambient)
+                && colors.all(|(contrast, mean)| is_within(contrast * (off * part), mean))
+        };
+        if is_within_by(1.0) {
             return Some((bsdf, contrast));
         }
         let quarters = self.mean_of_parts(scene, at, 2)?;
+        // All of one colour, but beside an edge, which quarters can miss by a quarter of that
+        if quarters.contrast == Contrast::default() && !is_within_by(0.25) {
+            return None;
+        }
         let is_same = |one: Rgb, other: Rgb| is_within((one + other * -1.0).map(f32::abs), other);
         let is_same = is_same(bsdf.ambient, quarters.bsdf.ambient)
             && bsdf.colors.0.into_iter().zip(quarters.bsdf.colors.0).all(|(one, other)| is_same(one, other));
