@@ -46,7 +46,7 @@ impl<'a> ArrivalPlace<'a> {
         self.scale * self.reflected
     }
 
-    pub(super) fn point_of_surface(&self) -> ShadingPoint {
+    pub(in crate::render) fn point_of_surface(&self) -> ShadingPoint {
         ShadingPoint {
             reach: self.reach,
             turn: self.turn,
