@@ -59,7 +59,8 @@ pub struct Options {
     slow: bool,
 }
 
-fn seeds(text: &str) -> Result<Range<u64>, String> {
+/// A..B, or a number.
+pub fn seeds(text: &str) -> Result<Range<u64>, String> {
     let parsed = match text.split_once("..") {
         Some((a, b)) => a.parse().ok().zip(b.parse().ok()).map(|(a, b)| a..b),
         None => text.parse().ok().and_then(|a: u64| Some(a..a.checked_add(1)?)),

@@ -12,6 +12,7 @@ mod peers;
 mod pictures;
 mod plot;
 mod rays;
+mod shading_rate;
 mod slow;
 mod verify;
 
@@ -76,6 +77,8 @@ enum Task {
 enum Verify {
     /// Compares integrated light with the converged picture, on random scenes.
     Exact(exact::Options),
+    /// Compares pictures whose camera rays share their light, as by default, with every ray lit by itself, at real size.
+    ShadingRate(shading_rate::Options),
 }
 
 fn main() -> ExitCode {
@@ -90,6 +93,7 @@ fn main() -> ExitCode {
         Task::Models(options) => models::run(&options),
         Task::Peers(options) => peers::run(&options),
         Task::Verify { what: Some(Verify::Exact(options)), .. } => exact::run(&options),
+        Task::Verify { what: Some(Verify::ShadingRate(options)), .. } => shading_rate::run(&options),
         Task::Verify { scenes, what: None } => verify::run(scenes),
     };
     match outcome {

@@ -5,7 +5,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::time::Instant;
 
 use firstlight::{AaMode, Image, RenderSettings, SampleSet, SamplesDesc, Scene, SceneDesc};
-use firstlight_testkit::converged::{displayed, integrated, with_samples};
+use firstlight_testkit::converged::{Deviation, integrated, with_samples};
 use firstlight_testkit::scenes::{compile, picture};
 
 use crate::Outcome;
@@ -59,11 +59,7 @@ fn times(seed: u64, desc: &SceneDesc) -> Times {
     if times.ratio() > TIMES {
         let scene = compile(&with_samples(desc, POINTS, SampleSet::Sobol, 1));
         let (sampled, other) = timed(&scene, &RenderSettings { aa_mode: AaMode::Full, ..integrated() });
-        let off = image.pixels.iter().zip(&other.pixels).map(|(is, other)| {
-            let [is, other] = [is, other].map(|rgba| displayed(&scene, *rgba));
-            (0..3).map(|k| (is[k] - other[k]).abs()).fold(0.0, f64::max)
-        });
-        times.sampled = Some((sampled, off.fold(0.0, f64::max)));
+        times.sampled = Some((sampled, Deviation::between(&scene, OFF, &other, &image).worst));
     }
     times
 }

@@ -366,19 +366,9 @@ impl Converged {
     /// How far a picture is from it, the pixels that are open left out.
     pub fn deviation(&self, image: &Image) -> Deviation {
         assert_eq!(image.pixels.len(), self.pixels.len());
-        let (mut deviation, mut squares) = (Deviation::default(), 0.0);
-        for i in (0..self.pixels.len()).filter(|i| !self.open[*i]) {
-            let (truth, is) = (self.pixels[i], displayed(&self.scene, image.pixels[i]));
-            let off = furthest(truth, is);
-            if off >= deviation.worst {
-                (deviation.worst, deviation.at) = (off, [i as u32 % self.width, i as u32 / self.width]);
-            }
-            deviation.pixels += 1;
-            deviation.over += u64::from(off > self.desc.render.tolerance);
-            squares += (0..3).map(|k| (truth[k] - is[k]) * (truth[k] - is[k])).sum::<f64>();
-        }
-        deviation.rms = (squares / (3 * deviation.pixels.max(1)) as f64).sqrt();
-        deviation
+        let settled = (0..self.pixels.len()).filter(|i| !self.open[*i]);
+        let compared = settled.map(|i| (i, self.pixels[i], displayed(&self.scene, image.pixels[i])));
+        Deviation::of(self.desc.render.tolerance, self.width, compared)
     }
 }
 
@@ -395,6 +385,31 @@ pub struct Deviation {
     pub over: u64,
     /// Root of the mean square, over all channels.
     pub rms: f64,
+}
+
+impl Deviation {
+    /// Of pixels by their number in a picture `width` pixels wide: what is true of them, and what they are.
+    fn of(tolerance: f64, width: u32, pixels: impl Iterator<Item = (usize, [f64; 3], [f64; 3])>) -> Self {
+        let (mut deviation, mut squares) = (Deviation::default(), 0.0);
+        for (i, truth, is) in pixels {
+            let off = furthest(truth, is);
+            if off >= deviation.worst {
+                (deviation.worst, deviation.at) = (off, [i as u32 % width, i as u32 / width]);
+            }
+            deviation.pixels += 1;
+            deviation.over += u64::from(off > tolerance);
+            squares += (0..3).map(|k| (truth[k] - is[k]) * (truth[k] - is[k])).sum::<f64>();
+        }
+        deviation.rms = (squares / (3 * deviation.pixels.max(1)) as f64).sqrt();
+        deviation
+    }
+
+    /// Of one picture of a scene from another.
+    pub fn between(scene: &Scene, tolerance: f64, truth: &Image, image: &Image) -> Self {
+        let pixels = truth.pixels.iter().zip(&image.pixels).enumerate();
+        let shown = pixels.map(|(i, (truth, is))| (i, displayed(scene, *truth), displayed(scene, *is)));
+        Self::of(tolerance, image.window.width, shown)
+    }
 }
 
 /// How far an integrated picture may be off.
