@@ -637,7 +637,9 @@ fn sphere_between<S: Simd>(
         told.hidden |= none_in;
         told.firm |= none_in & !moving;
         told.within = within & !all_in & !none_in;
-        told.moving |= moving & !all_in;
+        // From outside it hides a light that is inside of it as well
+        let all_around = (r - distance).simd_gt(sight.reach).to_bitmask();
+        told.moving |= moving & !(all_in & all_around);
         told.motion = simd.splat_f32x16(f32::INFINITY);
     }
     let [around, mut near] = sight.meets(s, distance, r, outside & !below_all);
@@ -663,10 +665,10 @@ fn sphere_between<S: Simd>(
     let hidden = sight.hidden(&shadow, near);
     told.hidden |= hidden;
     told.outside = near & !hidden;
-    // From everywhere around: ways to the corners pass its middle nearly as closely
+    // From everywhere around: ways to the corners pass its middle nearly as closely. From inside of it, more may be seen
     let patches = hidden & sight.reach.simd_gt(zero).to_bitmask();
     told.firm |= hidden & !patches;
-    let mut patches = patches;
+    let mut patches = patches & (distance - r).simd_gt(sight.reach).to_bitmask();
     while patches != 0 {
         let k = patches.trailing_zeros() as usize;
         patches &= patches - 1;
