@@ -147,6 +147,19 @@ impl Emitter {
         }
     }
 
+    /// Whether what it sends changes at once between some of these places: they lie on both sides of it.
+    pub fn parts(&self, mut places: impl Iterator<Item = Vec3>) -> bool {
+        let is_within = |p: Vec3| match self {
+            Emitter::Flat(flat) => (p.as_dvec3() - flat.c).dot(flat.n.as_dvec3()) > 0.0,
+            Emitter::Ball { center, radius, .. } | Emitter::Face { center, radius, .. } => {
+                (p.as_dvec3() - *center).length_squared() < radius * radius
+            }
+        };
+        let is_even = matches!(self, Emitter::Flat(_)) && !self.is_one_sided();
+        let first = places.next().map(is_within);
+        !is_even && places.any(|p| Some(is_within(p)) != first)
+    }
+
     /// What it fills of its square.
     pub fn outline(&self) -> Outline {
         match self {

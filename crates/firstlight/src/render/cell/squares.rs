@@ -100,8 +100,11 @@ impl Cells<'_> {
             let behind: ArrayVec<usize, FEW> =
                 lights.iter().copied().filter(|light| !self.is_clear(square, *light, counts)).collect();
             behind.iter().for_each(|light| self.look_around(square, *light, counts));
-            let mut is_told =
-                |light: &usize| !self.is_on_border(square, *light) && self.is_foretold(square, *light, counts);
+            let mut is_told = |light: &usize| {
+                !self.is_parted(square, *light)
+                    && !self.is_on_border(square, *light)
+                    && self.is_foretold(square, *light, counts)
+            };
             left.extend(behind.into_iter().filter(|light| !is_told(light)));
         } else {
             left.extend(lights.iter().copied());
@@ -208,6 +211,17 @@ impl Cells<'_> {
             }
         }
         !is_behind
+    }
+
+    /// Whether a light runs through a square or what is asked for it, so that the nine may lie evenly by chance.
+    fn is_parted(&self, square: Square, light: usize) -> bool {
+        let [columns, rows] = self.places(square);
+        let nodes = rows.0.iter().flat_map(|j| columns.0.map(|i| [square.x + i, square.y + j]));
+        let fragments = nodes.chain(square.pixels()).filter_map(|at| self.whole(at));
+        let places = fragments.flat_map(|(_, fragment)| {
+            (0..fragment.rays.len()).map(|k| self.fragments.place(self.scene, fragment, k).point.p)
+        });
+        self.lights.arrivals.lights.emitters[light].is_some_and(|emitter| emitter.parts(places))
     }
 
     /// Where the rays of a square end, pixel by pixel.
