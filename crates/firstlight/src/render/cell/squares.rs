@@ -68,6 +68,47 @@ impl Places {
     }
 }
 
+/// How far a few rays of each pixel are from what the nine make of it: where it is more than chance explains, for a
+/// pixel, a row, a column or all of a square, something lies between the nine.
+struct Misses {
+    /// Of each row, of each column, and of all: the sum of differences, and of their variances.
+    sums: ArrayVec<[f32; 2], { 2 * LARGEST as usize + 1 }>,
+    side: usize,
+    is_missed: bool,
+}
+
+impl Misses {
+    fn new(side: u32) -> Misses {
+        let side = side as usize;
+        Misses { sums: (0..=2 * side).map(|_| [0.0; 2]).collect(), side, is_missed: false }
+    }
+
+    /// A pixel that sees a share of a light, as foretold and by its rays; the latter not a number where none say.
+    fn add(&mut self, [i, j]: [u32; 2], foretold: f32, seen: f32) {
+        if seen.is_nan() {
+            return;
+        }
+        // Of independent points; none of them is sure of what so few do not see
+        let one = 1.0 / LOOKING as f32;
+        let share = foretold.clamp(one, 1.0 - one);
+        let (off, variance) = (seen - foretold, share * (1.0 - share) * one);
+        self.is_missed |= Self::is_miss([off, variance]);
+        for sum in [i as usize, self.side + j as usize, 2 * self.side] {
+            self.sums[sum][0] += off;
+            self.sums[sum][1] += variance;
+        }
+    }
+
+    /// Whether chance does so once in a thousand times at most.
+    fn is_miss([off, variance]: [f32; 2]) -> bool {
+        off * off > 10.0 * variance
+    }
+
+    fn are_there(&self) -> bool {
+        self.is_missed || self.sums.iter().copied().any(Self::is_miss)
+    }
+}
+
 impl Cells<'_> {
     /// Lights what squares of the cell tell.
     pub(super) fn squares(&mut self, counts: &mut Counts, go_on: &impl Fn() -> ControlFlow<()>) -> ControlFlow<()> {
@@ -371,15 +412,23 @@ impl Cells<'_> {
         }
         // What the others see
         let mut told = [Moments::default(); (LARGEST * LARGEST) as usize];
+        let mut misses = Misses::new(side);
         for (number, told) in told.iter_mut().enumerate().take((side * side) as usize) {
-            let [across, down] = [columns.weights(number as u32 % side), rows.weights(number as u32 / side)];
-            let mut sums = Moments::default();
+            let [i, j] = [number as u32 % side, number as u32 / side];
+            let [across, down] = [columns.weights(i), rows.weights(j)];
+            let (mut sums, mut share) = (Moments::default(), 0.0);
             for (row, down) in nodes.iter().zip(down) {
                 for (node, across) in row.iter().zip(across) {
                     sums += node.sums * (across * down);
+                    share += node.share * (across * down);
                 }
             }
             *told = sums.at_least_0();
+            let seen = self.behind.votes[self.index([x + i, y + j]) * self.scene.lights.len() + light];
+            misses.add([i, j], share, seen);
+        }
+        if misses.are_there() {
+            return false;
         }
         for (at, sums) in square.pixels().zip(told) {
             let Some((fragment, of)) = self.whole(at) else { continue };
