@@ -107,13 +107,14 @@ impl PlacedSolid {
         apart.max(outside / longest)
     }
 
-    /// Whether a point is on the plane of a flat one, as far as it can be told.
+    /// Whether a point is on the plane of a flat one, as far as it can be told, and its surface lies in it.
     fn is_under(&self, point: &ShadingPoint) -> bool {
         let row = self.canonical_from_world.matrix3.transpose().z_axis;
         let at = self.canonical_from_world.transform_point3(point.p.as_dvec3());
         // What a point is on is met to within its rounding, and that of the way along the plane
         let room = 2.0 * row.abs().dot(point.error.0.as_dvec3()) + 4e-7 * at.truncate().length();
-        self.kind.is_flat() && at.z.abs() <= room
+        let is_along = || row.cross(point.horizon.as_dvec3()).length() <= f64::from(SLACK) * row.length();
+        self.kind.is_flat() && at.z.abs() <= room && is_along()
     }
 }
 
