@@ -127,7 +127,7 @@ enum Lies {
     Aside,
     /// It hides nothing from the point, but may from near it.
     Near,
-    /// The point is inside, and what surrounds it, or it is where the surface is.
+    /// The point is inside, and what surrounds it, or it is where the surface is; or nearly at a torus.
     Inside,
     /// The point is inside, and what surrounds it may be outside.
     NearlyInside,
@@ -158,7 +158,9 @@ impl PlacedSolid {
             let size = |v: DVec3| [rows.x_axis, rows.y_axis, rows.z_axis].map(|row| row.abs().dot(v));
             let largest = |sizes: [f64; 3]| sizes.into_iter().fold(0.0, f64::max);
             let room = ROUNDING + 2.0 * largest(size(error));
-            if !self.kind.holds(at, room) {
+            // Where a tube is as good as around a point, the ends of its chords are not told apart
+            let near = if let Canonical::Torus { tube } = self.kind { 0.125 * f64::from(tube) } else { 0.0 };
+            if !self.kind.holds(at, room.max(near)) {
                 Lies::Between
             } else if self.surrounds(point, room + largest(size(DVec3::splat(f64::from(point.turn * point.reach))))) {
                 Lies::Inside
