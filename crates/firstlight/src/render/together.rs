@@ -336,7 +336,7 @@ impl Together {
                 said.all[k] += color;
                 said.effective[k] += points;
                 said.sent[k] += sent.0[k];
-                if one.tally.all[k] as f32 * measure < 0.5 * sent.0[k] {
+                if one.tally.all[k] as f32 * measure < 0.75 * sent.0[k] {
                     said.missing[k] += color;
                 }
             }
@@ -418,7 +418,7 @@ struct PointsSaid {
     part: f32,
     /// All that is there.
     value: Rgb,
-    /// What would arrive if nothing were in the way, and that of rays whose points find less than half of it.
+    /// What would arrive if nothing were in the way, and that of rays whose points find less than three quarters of it.
     all: [Rgb; MOMENTS],
     missing: [Rgb; MOMENTS],
     /// By how many effective points that is told.
