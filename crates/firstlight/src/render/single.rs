@@ -84,8 +84,9 @@ impl Arrivals<'_> {
         for (_, Listed { shape: sphere, .. }) in scene.that_stop(&listed.spheres, id) {
             let s = (sphere.c - si.lit_from.as_dvec3()).as_vec3();
             let (r, distance) = (sphere.r as f32, s.length());
-            // The surface's own sphere, from outside
-            if (distance - r).abs() <= r * 1e-3 && s.dot(si.horizon) < 0.0 {
+            // The surface's own sphere, from outside; not one that another surface runs into
+            let is_along = s.dot(si.horizon) < -0.9375 * distance;
+            if is_along && sphere.shadow(si.lit_from, si.error).is_on() {
                 continue;
             }
             let t = s.dot(d).clamp(0.0, end);
