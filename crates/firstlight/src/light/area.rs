@@ -5,7 +5,9 @@ use std::sync::{Arc, OnceLock};
 
 use fearless_simd::{f32x16, prelude::*};
 
-use super::{DiskLight, EmitSides, Falloff, Light, LightKind, Rectangle, SampleSet, SphereLight, scaled, way_error};
+use super::{
+    DiskLight, EmitSides, Falloff, FineCell, Light, LightKind, Rectangle, SampleSet, SphereLight, scaled, way_error,
+};
 use crate::color::Rgb;
 use crate::context::{CompileContext, show};
 use crate::describe::{ColorDesc, SamplesDesc};
@@ -350,6 +352,22 @@ impl Area {
             points.push(&self.shape, &x, &y);
         }
         points
+    }
+
+    /// The place of the unit square whose point is nearest to `q`, or thereabouts: where no step leads nearer.
+    pub(crate) fn nearest(&self, q: DVec3) -> [f64; 2] {
+        let off = |at: [f64; 2]| (self.shape.point(at).0 - q).length_squared();
+        let (mut at, mut step) = ([0.5; 2], 0.25);
+        let mut least = off(at);
+        while step > FineCell::SIDE {
+            let steps = (0..9).map(|k| [k % 3, k / 3].map(|way| f64::from(way - 1) * step));
+            let next = steps.map(|[x, y]| [at[0] + x, at[1] + y].map(|v| v.clamp(0.0, 1.0 - FineCell::SIDE)));
+            match next.map(|next| (off(next), next)).min_by(|(one, _), (other, _)| one.total_cmp(other)) {
+                Some((nearer, next)) if nearer < least => (least, at) = (nearer, next),
+                _ => step *= 0.5,
+            }
+        }
+        at
     }
 
     /// Sampled point `k`, world space.

@@ -75,6 +75,8 @@ pub(crate) struct FineCell(u64);
 impl FineCell {
     pub const DIGITS: u32 = 48;
     pub const FIRST: FineCell = FineCell(0);
+    /// Of each of its sides.
+    pub const SIDE: f64 = 1.0 / (1u64 << (Self::DIGITS / 2)) as f64;
 
     /// The one that a point lies in.
     pub fn of(point: [f64; 2]) -> FineCell {

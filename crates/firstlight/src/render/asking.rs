@@ -1,7 +1,5 @@
 //! Rays that ask points of a light, each in the same leaves of it.
 
-use fearless_simd::Level;
-
 use super::Counts;
 use super::arrival::ArrivalPlace;
 use super::beams::{self, RungRays};
@@ -161,9 +159,8 @@ impl<'a> AskedLeaves<'a> {
     /// `TOLERANCE.heavy` says; whether there were any. That is told not by the points that were asked in them, but by
     /// others: to look closer at what is found to send much makes what is found less, and nothing makes it more.
     fn halve_heavy(&mut self, asking: &mut [Asking], counts: &mut Counts) -> bool {
-        let (level, measure) = (self.asker.level, self.asker.area.stands_for());
         let rays = asking.iter().enumerate();
-        let peaks: Vec<Peak> = rays.map(|(ray, one)| Peak::of(ray, one, level, measure)).collect();
+        let peaks: Vec<Peak> = rays.map(|(ray, one)| Peak::of(ray, one, &self.asker)).collect();
         let all: f32 = peaks.iter().map(|peak| peak.sends).sum();
         let heavy = TOLERANCE.heavy * all / (1u32 << self.everywhere) as f32;
         let every: Vec<u32> = (0..self.leaves.blocks.len() as u32).collect();
@@ -234,11 +231,31 @@ struct Peak {
 }
 
 impl Peak {
-    fn of(ray: usize, one: &Asking, level: Level, measure: f32) -> Peak {
+    fn of(ray: usize, one: &Asking, asker: &Asker) -> Peak {
         let weights = (one.scale * one.reflected).0.map(largest);
-        let mut peak = Peak { ray, at: one.tally.most(level, &weights), weights, sends: 0.0 };
+        let measure = asker.area.stands_for();
+        let mut peak = Peak { ray, at: one.tally.most(asker.level, &weights), weights, sends: 0.0 };
         peak.sends = peak.weigh(&one.sent(measure)) / measure;
+        if one.tally.sending == 0.0 && peak.sends > 0.0 {
+            peak.look(one, asker);
+        }
         peak
+    }
+
+    /// Looks for it where no point sends anything: beside the foot of the ray's place on a light that is near it, which
+    /// may be below the horizon. So it is looked for nearest to places above, each a quarter as high as the one before.
+    fn look(&mut self, one: &Asking, asker: &Asker) {
+        let height = |k: usize| f64::from(asker.area.diagonal()) * 0.25f64.powi(k as i32);
+        let above = |k: usize| one.si.lit_from.as_dvec3() + one.si.horizon.as_dvec3() * height(k);
+        let at: [FineCell; LANES] = std::array::from_fn(|k| FineCell::of(asker.area.nearest(above(k))));
+        let sent = would_send(asker, std::iter::once(FineCell::middles(&at)), &one.si, &one.lobe);
+        let mut most = 0.0;
+        for (at, sent) in at.into_iter().zip(&sent) {
+            let sent = self.weigh(sent);
+            if sent > most {
+                (most, self.at) = (sent, at);
+            }
+        }
     }
 
     fn weigh(&self, sent: &Moments) -> f32 {
