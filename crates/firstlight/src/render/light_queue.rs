@@ -119,10 +119,11 @@ impl Answer {
         0.5 * self.turn * self.turn
     }
 
-    /// The same because the light comes out from behind an outline: what is seen of it begins to grow at once, an
-    /// eighth of the way that the outline moves.
+    /// The same because the light comes out from behind an outline, or above the horizon: what is seen of it begins to
+    /// grow at once, an eighth of the way that the outline or the light moves.
     pub fn kink(&self) -> f32 {
-        if self.sums.cosine() <= self.motion * self.most { 0.125 * self.motion } else { 0.0 }
+        let moved = if self.smooth { self.motion } else { self.motion.max(self.turn) };
+        if self.sums.cosine() <= moved * self.most { 0.125 * moved } else { 0.0 }
     }
 }
 
