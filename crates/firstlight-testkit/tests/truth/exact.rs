@@ -11,7 +11,7 @@ use firstlight::{
 
 use crate::analytic::{corners, lambert, white};
 use crate::converged::{
-    Bounds, Converged, PROMISED, Report, displayed, exact, fault, integrated, sampled, with_samples,
+    Bounds, Converged, Deviation, PROMISED, Report, displayed, exact, fault, integrated, sampled, with_samples,
 };
 use crate::scenes::*;
 use crate::{exact_scenes, kept};
@@ -122,6 +122,16 @@ fn shadows_whose_outlines_cross_are_told_closely() {
     assert!(off < 0.15, "{off} steps");
 }
 
+/// Renders a square of a scene's film, its light shared among camera rays and not, and compares them.
+fn compare_part(name: &str, desc: &SceneDesc, [x, y]: [u32; 2], size: u32) {
+    let scene = compile(&with_samples(desc, SamplesDesc::Exact, SampleSet::Sobol, 0));
+    let crop = Some(Window { x, y, width: size, height: size });
+    let found = picture(&scene, &RenderSettings { crop, ..integrated() });
+    let truth = picture(&scene, &RenderSettings { crop, ..every_ray() });
+    let Deviation { worst, .. } = Deviation::between(&scene, 1.0, &truth, &found);
+    assert!(worst < 1.0, "{name}, from ({x}, {y}) on: {worst} steps");
+}
+
 #[test]
 fn parts_of_built_in_scenes_are_told_closely() {
     let parts = [
@@ -132,20 +142,38 @@ fn parts_of_built_in_scenes_are_told_closely() {
         ("config21", 640, [232, 248], 16),
         ("config22", 640, [304, 152], 16),
     ];
-    for (name, side, [x, y], size) in parts {
+    for (name, side, at, size) in parts {
         let builtin = builtin_scenes().iter().find(|builtin| builtin.name == name).expect("it is built in");
         let mut desc = SceneDesc::parse(builtin.name, builtin.text.as_bytes(), &NoAssets).desc;
         (desc.render.width, desc.render.height) = (side, side);
-        let scene = compile(&with_samples(&desc, SamplesDesc::Exact, SampleSet::Sobol, 0));
-        let crop = Some(Window { x, y, width: size, height: size });
-        let found = picture(&scene, &RenderSettings { crop, ..integrated() });
-        let truth = picture(&scene, &RenderSettings { crop, ..every_ray() });
-        let off = |(one, other): (&[f32; 4], &[f32; 4])| {
-            let [one, other] = [one, other].map(|pixel| displayed(&scene, *pixel));
-            (0..3).map(|k| (one[k] - other[k]).abs()).fold(0.0, f64::max)
-        };
-        let worst = found.pixels.iter().zip(&truth.pixels).map(off).fold(0.0, f64::max);
-        assert!(worst < 1.0, "{name}, from ({x}, {y}) on: {worst} steps");
+        compare_part(name, &desc, at, size);
+    }
+}
+
+#[test]
+fn parts_of_large_random_scenes_are_told_closely() {
+    let parts = [
+        // A square across the border of a ball that lights are in: 60 steps
+        (1035, 128, [0, 64], 16),
+        // A light cuts a surface in the middle row of a square: 31 steps
+        (83, 192, [116, 92], 12),
+        // The shadow of a small ball between the nine pixels of a square: 5.5 steps
+        (122, 192, [92, 64], 12),
+        // A place at the rim of a disk, within rounding of its plane: 3 steps
+        (100, 192, [16, 86], 8),
+        // Places as good as on a torus: 2.4 steps
+        (43, 192, [156, 26], 8),
+        // Points that found half of a highlight, all of it hidden: 2.6 steps
+        (48, 384, [262, 196], 4),
+        // A floor that runs into a ball was taken for it: 141 steps
+        (831, 128, [104, 80], 8),
+        // A light so near that no point finds it: 9.6 steps
+        (543, 128, [76, 80], 8),
+        // A small strong light rises over the horizon: 2.3 steps
+        (411, 128, [96, 64], 8),
+    ];
+    for (seed, side, at, size) in parts {
+        compare_part(&format!("random scene {seed}"), &exact_scenes::scene(seed, side), at, size);
     }
 }
 

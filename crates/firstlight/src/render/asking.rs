@@ -245,7 +245,7 @@ impl Peak {
     /// Looks for it where no point sends anything: beside the foot of the ray's place on a light that is near it, which
     /// may be below the horizon. So it is looked for nearest to places above, each a quarter as high as the one before.
     fn look(&mut self, one: &Asking, asker: &Asker) {
-        let height = |k: usize| f64::from(asker.area.diagonal()) * 0.25f64.powi(k as i32);
+        let height = |k: usize| f64::from(asker.area.diagonal()) / (1u64 << (2 * k)) as f64;
         let above = |k: usize| one.si.lit_from.as_dvec3() + one.si.horizon.as_dvec3() * height(k);
         let at: [FineCell; LANES] = std::array::from_fn(|k| FineCell::of(asker.area.nearest(above(k))));
         let sent = would_send(asker, std::iter::once(FineCell::middles(&at)), &one.si, &one.lobe);
