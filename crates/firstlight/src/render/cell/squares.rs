@@ -394,7 +394,7 @@ impl Cells<'_> {
         // Where a light sets in between them it bends at once
         let sets_in = nodes.as_flattened().iter().any(|node| node.sums == Moments::default());
         let allowed = if sets_in { TOLERANCE.foretold * TOLERANCE.bends_at_once } else { TOLERANCE.foretold };
-        let foretold_to = allowed / (wide * self.scene.lights.len() as f32).sqrt();
+        let foretold_to = allowed / (wide * (self.scene.lights.len() as f32).sqrt());
         // What the corners foretell
         for ((row, j), down) in nodes.iter().zip(rows.0).zip(rows.line()) {
             for ((node, i), across) in row.iter().zip(columns.0).zip(columns.line()) {
