@@ -169,6 +169,8 @@ fn parts_of_large_random_scenes_are_told_closely() {
         (831, 128, [104, 80], 8),
         // A light so near that no point finds it: 9.6 steps
         (543, 128, [76, 80], 8),
+        // The middle of a pixel sees another side of a ball: 6.9 steps
+        (221, 128, [104, 40], 8),
         // A small strong light rises over the horizon: 2.3 steps
         (411, 128, [96, 64], 8),
     ];

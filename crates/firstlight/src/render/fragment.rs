@@ -345,7 +345,8 @@ impl Fragments {
         let middle = is_seen.map_or(rays[0], |t| RayHit { ray, t, at: [0; 2] });
         let si = scene.local_surface(&middle.ray, &of.hit_at(scene, middle.t), &whole);
         let material = &scene.materials[si.material.index()];
-        let even = is_seen.is_some() && of.is_even_over(scene, &si, &middle.ray, middle.t, &whole);
+        let ends = rays.iter().map(|ray| ray.end().as_vec3());
+        let even = is_seen.is_some() && of.is_even_over(scene, &si, &middle.ray, middle.t, &whole, ends);
         (material.bsdf(&si, &scene.textures), even)
     }
 

@@ -331,7 +331,8 @@ impl Candidate {
         self.of_square(scene, square).and_then(|of| of.is_even.then_some(of.bsdf))
     }
 
-    /// Whether the material is the same all over what a ray stands for, by its steps to its neighbours.
+    /// Whether the material is the same all over what a ray stands for, by its steps to its neighbours, and at the ends
+    /// of others within that: on what is round they may see its other side.
     pub fn is_even_over(
         self,
         scene: &Scene,
@@ -339,16 +340,24 @@ impl Candidate {
         ray: &Ray,
         t: f64,
         step: &RayDifferential,
+        mut others: impl Iterator<Item = Vec3>,
     ) -> bool {
+        let within = Self::length(si, ray, t, step);
         self.is_even_within(scene, si, self.growth(scene, si, ray, t, step))
+            && (self.curvature(scene) == 0.0 || others.all(|end| (end - si.p).length() <= within))
+    }
+
+    /// How long the steps of a ray to its neighbours are on a surface, both together.
+    fn length(si: &SurfaceInteraction, ray: &Ray, t: f64, step: &RayDifferential) -> f32 {
+        let [across, down] = step.on_plane(ray.d, t as f32, si.ng, f32::MAX.sqrt() * 0.25);
+        across.length() + down.length()
     }
 
     /// By which part of themselves the steps of a ray to its neighbours grow on the way: with the distance, and on what
     /// is round, where it turns away, and around the poles of its uv. Infinite at its rim, where nothing is as wide as
     /// it seems.
     fn growth(self, scene: &Scene, si: &SurfaceInteraction, ray: &Ray, t: f64, step: &RayDifferential) -> f32 {
-        let [across, down] = step.on_plane(ray.d, t as f32, si.ng, f32::MAX.sqrt() * 0.25);
-        let length = across.length() + down.length();
+        let length = Self::length(si, ray, t, step);
         let (curvature, away) = (self.curvature(scene), length / t as f32);
         if curvature == 0.0 {
             return away;
