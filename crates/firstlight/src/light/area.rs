@@ -354,20 +354,30 @@ impl Area {
         points
     }
 
-    /// The place of the unit square whose point is nearest to `q`, or thereabouts: where no step leads nearer.
+    /// The place of the unit square whose point is nearest to `q`, or thereabouts: where no step leads nearer, from the
+    /// nearest of some places all over it. Of a few, as what is round meets itself at borders of the square.
     pub(crate) fn nearest(&self, q: DVec3) -> [f64; 2] {
+        const ACROSS: u32 = 8;
+        const FIRST: usize = 4;
         let off = |at: [f64; 2]| (self.shape.point(at).0 - q).length_squared();
-        let (mut at, mut step) = ([0.5; 2], 0.25);
-        let mut least = off(at);
-        while step > FineCell::SIDE {
-            let steps = (0..9).map(|k| [k % 3, k / 3].map(|way| f64::from(way - 1) * step));
-            let next = steps.map(|[x, y]| [at[0] + x, at[1] + y].map(|v| v.clamp(0.0, 1.0 - FineCell::SIDE)));
-            match next.map(|next| (off(next), next)).min_by(|(one, _), (other, _)| one.total_cmp(other)) {
-                Some((nearer, next)) if nearer < least => (least, at) = (nearer, next),
-                _ => step *= 0.5,
+        let nearer = |(one, _): &(f64, [f64; 2]), (other, _): &(f64, [f64; 2])| one.total_cmp(other);
+        let middle = |k: u32| (f64::from(k) + 0.5) / f64::from(ACROSS);
+        let places = (0..ACROSS * ACROSS).map(|k| [middle(k % ACROSS), middle(k / ACROSS)]);
+        let mut places: Vec<_> = places.map(|at| (off(at), at)).collect();
+        places.sort_by(nearer);
+        let found = places.into_iter().take(FIRST).map(|(mut least, mut at)| {
+            let mut step = 1.0 / f64::from(ACROSS);
+            while step > FineCell::SIDE {
+                let steps = (0..9).map(|k| [k % 3, k / 3].map(|way| f64::from(way - 1) * step));
+                let next = steps.map(|[x, y]| [at[0] + x, at[1] + y].map(|v| v.clamp(0.0, 1.0 - FineCell::SIDE)));
+                match next.map(|next| (off(next), next)).min_by(nearer) {
+                    Some((off, next)) if off < least => (least, at) = (off, next),
+                    _ => step *= 0.5,
+                }
             }
-        }
-        at
+            (least, at)
+        });
+        found.min_by(nearer).map_or([0.5; 2], |(_, at)| at)
     }
 
     /// Sampled point `k`, world space.
@@ -554,6 +564,36 @@ impl Points {
                     |k| sphere.center + normals[k] * sphere.radius,
                 ));
             }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{DiskLightDesc, RectangleDesc, SphereLightDesc};
+    use super::*;
+
+    #[test]
+    fn nothing_is_nearer_than_the_nearest_place() {
+        let cx = &mut CompileContext::default();
+        let lights = [
+            RectangleDesc::with_edges([0.3, 1.0, -0.2], [2.0, 0.5, 0.0], [0.0, 0.0, 1.0])
+                .compile(cx, SamplesDesc::Exact),
+            DiskLightDesc { normal: Some([0.2, -1.0, 0.4]), radius: Some(1.5), ..DiskLightDesc::new([0.3, 1.0, -0.2]) }
+                .compile(cx, SamplesDesc::Exact),
+            SphereLightDesc::new([0.3, 1.0, -0.2], 1.5).compile(cx, SamplesDesc::Exact),
+        ];
+        assert_eq!(cx.take_faults(), []);
+        let grid = |k: u32| (f64::from(k) + 0.5) / 128.0;
+        for (light, seed) in lights.iter().flat_map(|light| (0..200u32).map(move |seed| (light, seed))) {
+            let area = light.area().expect("they have one");
+            let coordinate =
+                |axis: u32| f64::from((3 * seed + axis).wrapping_mul(0x9e37_79b9) >> 8) / f64::from(1 << 22);
+            let q = DVec3::from([0, 1, 2].map(coordinate)) - DVec3::splat(2.0);
+            let off = |at: [f64; 2]| (area.shape.point(at).0 - q).length();
+            let found = off(area.nearest(q));
+            let best = (0..128 * 128).map(|k| off([grid(k % 128), grid(k / 128)])).fold(f64::INFINITY, f64::min);
+            assert!(found <= best + 1e-6, "{q} of {:?}: {found}, {best}", area.shape);
         }
     }
 }
