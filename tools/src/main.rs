@@ -77,7 +77,8 @@ enum Task {
 enum Verify {
     /// Compares integrated light with the converged picture, on random scenes.
     Exact(exact::Options),
-    /// Compares pictures whose camera rays share their light, as by default, with every ray lit by itself, at real size.
+    /// Compares pictures whose camera rays share their light, as by default, with every ray lit by itself, at real
+    /// size.
     ShadingRate(shading_rate::Options),
 }
 

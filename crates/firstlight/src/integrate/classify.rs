@@ -665,7 +665,8 @@ fn sphere_between<S: Simd>(
     let hidden = sight.hidden(&shadow, near);
     told.hidden |= hidden;
     told.outside = near & !hidden;
-    // From everywhere around: ways to the corners pass its middle nearly as closely. From inside of it, more may be seen
+    // From everywhere around: ways to the corners pass its middle nearly as closely. From inside of it, more may be
+    // seen
     let patches = hidden & sight.reach.simd_gt(zero).to_bitmask();
     told.firm |= hidden & !patches;
     let mut patches = patches & (distance - r).simd_gt(sight.reach).to_bitmask();
