@@ -244,7 +244,6 @@ pub enum AreaShape {
 impl AreaShape {
     /// The point that stands for `uv` of the unit square, and, where each point has a normal of its own, the unit
     /// normal there. Equal areas of the square become equal areas of the shape.
-    #[cfg(any(test, feature = "bench"))]
     fn point(&self, uv: [f64; 2]) -> (DVec3, Option<DVec3>) {
         match self {
             AreaShape::Rectangle(rectangle) => (rectangle.point(uv), None),
