@@ -14,7 +14,7 @@ use super::behind::{FragmentSight, NONE};
 use super::{CELL, Cells};
 use crate::color::Rgb;
 use crate::ids::LightId;
-use crate::integrate::TOLERANCE;
+use crate::integrate::{BallSides, Emitter, TOLERANCE};
 use crate::material::Moments;
 use crate::math::{LANES, Vec3};
 use crate::render::Counts;
@@ -413,6 +413,9 @@ impl Cells<'_> {
         // What the others see
         let mut told = [Moments::default(); (LARGEST * LARGEST) as usize];
         let mut misses = Misses::new(side);
+        // Of a ball that shines on one side, rays see points that do not shine to them
+        let emitter = &self.lights.arrivals.lights.emitters[light];
+        let is_telling = !matches!(emitter, Some(Emitter::Ball { sides: BallSides::Outer | BallSides::Inner, .. }));
         for (number, told) in told.iter_mut().enumerate().take((side * side) as usize) {
             let [i, j] = [number as u32 % side, number as u32 / side];
             let [across, down] = [columns.weights(i), rows.weights(j)];
@@ -425,7 +428,9 @@ impl Cells<'_> {
             }
             *told = sums.at_least_0();
             let seen = self.behind.votes[self.index([x + i, y + j]) * self.scene.lights.len() + light];
-            misses.add([i, j], share, seen);
+            if is_telling {
+                misses.add([i, j], share, seen);
+            }
         }
         if misses.are_there() {
             return false;
