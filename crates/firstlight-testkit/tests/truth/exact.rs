@@ -173,6 +173,8 @@ fn parts_of_large_random_scenes_are_told_closely() {
         (221, 128, [104, 40], 8),
         // A small strong light rises over the horizon: 2.3 steps
         (411, 128, [96, 64], 8),
+        // A strong light through a gap of two tori, between the rows of a panel: 7.6 steps
+        (816, 128, [40, 4], 8),
     ];
     for (seed, side, at, size) in parts {
         compare_part(&format!("random scene {seed}"), &exact_scenes::scene(seed, side), at, size);

@@ -3,8 +3,9 @@
 //! A panel is a range of rows of one cell on which the outline of each occluder changes smoothly; where the outlines of
 //! two cross, two rules differ, and the panel is halved. On each of seven rows, the nodes of a Kronrod rule, the
 //! intervals that occluders hide are united, and the antiderivative of the cell's polynomial is summed over the ends of
-//! what is left: nothing is shaded again. The Gauss rule of three inside says how far the panel can be wrong. Where a
-//! panel ends, outlines begin as roots do, so rows are spread by y^2 (3 - 2 y).
+//! what is left: nothing is shaded again. The Gauss rule of three inside says how far the panel can be wrong; and where
+//! all rows are hidden, but overlap less and less towards one of them, what a gap between it and the next may send. Where
+//! a panel ends, outlines begin as roots do, so rows are spread by y^2 (3 - 2 y).
 //!
 //! Source of the rule: Kronrod, "Nodes and Weights of Quadrature Formulas", 1965; of the spread: Davis, Rabinowitz,
 //! "Methods of Numerical Integration", 1984, section 2.12.
@@ -109,7 +110,8 @@ impl<'a> Blocked<'a> {
     }
 }
 
-/// What sixteen panels send, how far both rules differ, and how much of the light's square is seen.
+/// What sixteen panels send, how far both rules differ and gaps may be missed, and how much of the light's square is
+/// seen.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct PanelSums {
     pub sums: [LaneNumbers; MOMENTS],
@@ -383,6 +385,9 @@ pub(crate) fn rows<S: Simd>(
     let mut coarse = [zero; MOMENTS];
     let mut seen = zero;
     let inverse = 1.0 / xh;
+    // How wide the widest gap of each row is, below 0 where what hides the row overlaps; and what a unit of it sends
+    let mut gap = [-far; ROWS];
+    let mut radiant = [[zero; MOMENTS]; ROWS];
     for (row_of, ((all, hidden), [place, weight, inner])) in open.iter().zip(&hidden).zip(SPREAD).enumerate() {
         let y = (to - from) * place + from;
         // Sum the antiderivative over the ends of what is left
@@ -392,6 +397,7 @@ pub(crate) fn rows<S: Simd>(
             for (power, [a, b, c, d, e]) in row[moment].iter_mut().zip(&powers[moment]) {
                 *power = *a + v * (*b + v * (*c + v * (*d + v * *e)));
             }
+            radiant[row_of][moment] = row[moment][0].abs() * inverse * weight;
         }
         let mut sums = [zero; MOMENTS];
         let mut length = zero;
@@ -403,6 +409,7 @@ pub(crate) fn rows<S: Simd>(
                 None => (all.to, begin),
             };
             let is_there = begin.simd_lt(end);
+            gap[row_of] = gap[row_of].max(end - begin);
             let (mut first, mut last) = (begin, end);
             if is_sphere {
                 (first, last) = (asin(begin / wide[row_of]), asin(end / wide[row_of]));
@@ -423,12 +430,22 @@ pub(crate) fn rows<S: Simd>(
         }
         seen += length * weight;
     }
+    // Gaps that open and close between rows, neither of which sees them
+    let mut missed = [zero; MOMENTS];
+    for row in 1..ROWS - 1 {
+        let rises = [gap[row] - gap[row - 1], gap[row] - gap[row + 1]];
+        let is_peak = rises[0].simd_ge(zero) & rises[1].simd_ge(zero) & gap[row].simd_lt(zero);
+        let peak = is_peak.select(gap[row] + (rises[0] + rises[1]) * 0.5, zero).max(zero).min(xh);
+        for moment in 0..moments {
+            missed[moment] += radiant[row][moment] * peak;
+        }
+    }
     // Rows count as much as the panel is a part of the cell, which is 2 wide in its own coordinates
     let share = (to - from) / yh;
     let mut result = PanelSums::default();
     for moment in 0..moments {
         result.sums[moment] = (fine[moment] * share).to_array();
-        result.differences[moment] = ((fine[moment] - coarse[moment]).abs() * share).to_array();
+        result.differences[moment] = (((fine[moment] - coarse[moment]).abs() + missed[moment]) * share).to_array();
     }
     result.seen = (seen * share * 0.25).to_array();
     result
