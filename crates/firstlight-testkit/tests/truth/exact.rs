@@ -175,6 +175,8 @@ fn parts_of_large_random_scenes_are_told_closely() {
         (411, 128, [96, 64], 8),
         // A strong light through a gap of two tori, between the rows of a panel: 7.6 steps
         (816, 128, [40, 4], 8),
+        // The floor where a ball of 0.07 mm touches it was taken for the inside of the ball: 34 steps
+        (1377, 128, [80, 72], 10),
     ];
     for (seed, side, at, size) in parts {
         compare_part(&format!("random scene {seed}"), &exact_scenes::scene(seed, side), at, size);

@@ -630,9 +630,10 @@ fn sphere_between<S: Simd>(
         // All of the light is outside only if the sphere does not reach through it
         let from_center = sight.ways[0] - s;
         none_in &= sight.normal.dot(from_center).abs().simd_gt(r * (1.0 + 1e-6)).to_bitmask();
-        // What is hidden is the same from everywhere inside
+        // What is hidden is the same from everywhere inside, and on a surface that bends as the sphere does
         let deep = (r - distance).simd_gt(sight.reach * 2.0).to_bitmask();
-        let moving = within & inside & !deep & sight.reach.simd_gt(zero).to_bitmask();
+        let touches = on & (sight.turn * r).simd_lt(sight.reach * 0.5).to_bitmask();
+        let moving = within & (inside | touches) & !deep & sight.reach.simd_gt(zero).to_bitmask();
         told.around = within;
         told.hidden |= none_in;
         told.firm |= none_in & !moving;
