@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 
 use firstlight::bench::{ShareSeen, sights};
 use firstlight::{
-    Assets, CompileOptions, Display, Encoding, Film, FolderAssets, Format, Image, NoAssets, Parsed, RenderSettings,
-    SamplesDesc, Scene, SceneDesc, Window, builtin_scenes, render,
+    Assets, CompileOptions, Display, Encoding, Film, FolderAssets, Format, Image, NoAssets, Parsed, Plane,
+    RenderSettings, SamplesDesc, Scene, SceneDesc, Window, builtin_scenes, render,
 };
 
 use crate::bench::config11;
@@ -95,7 +95,7 @@ fn visibility() -> Outcome {
 /// Where the work of config 11 went: `heat.png`.
 fn heat() -> Outcome {
     let scene = config11(INSIDE, 4, SamplesDesc::Exact)?;
-    let settings = RenderSettings { heat: true, ..RenderSettings::default() };
+    let settings = RenderSettings { buffers: vec![Plane::Rays], ..RenderSettings::default() };
     let heat = rendered(&scene, &settings)?.heat().ok_or("no heat was kept")?;
     let (mean, most) = heat.mean_and_most();
     eprintln!("work: {mean:.1} in the mean, {most:.0} at most");

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Args, Parser, Subcommand, ValueEnum, ValueHint};
-use firstlight::{ColorDesc, Framing, SamplesDesc, SimdLevel, View, VisibilityMode, Window};
+use firstlight::{ColorDesc, Framing, Plane, SamplesDesc, SimdLevel, View, VisibilityMode, Window};
 
 /// The version and, where it is known, the commit: `0.1.0 (0123456789)`.
 const VERSION: &str = concat!(env!("CARGO_PKG_VERSION"), env!("FIRSTLIGHT_COMMIT"));
@@ -42,6 +42,8 @@ pub enum Command {
     Info(InfoArgs),
     /// Lists the scenes that are built in, or prints the text of one
     Scenes(ScenesArgs),
+    /// Lists what .exr and .npz files can hold of each pixel: see `render --buffers`
+    Buffers,
     /// Prints the JSON Schema of scene files, for completion in editors
     Schema,
     /// Prints a completion script for a shell
@@ -68,6 +70,8 @@ Examples:
       a quick look, in the scene's own aspect ratio
   firstlight render room.toml --crop 400,300,64,64 -o detail.png
       the same pixels as in the whole picture, only fewer of them
+  firstlight render room.toml --buffers color,depth,object-id -o room.npz
+      what is seen, how far away and which object, as arrays for numpy
   firstlight render config23 -o - | magick - config23.jpg
       to another program
   generate-scene | firstlight render - -o scene.png
@@ -154,12 +158,18 @@ pub struct RenderArgs {
     #[command(flatten)]
     pub reading: ReadingArgs,
 
-    /// A picture to write: its ending, .png, .exr or .hdr, says the format; - is standard output. {stem} in it is the
-    /// scene's file name without its ending, {name} the whole of it; with several scenes one of them is needed, in
+    /// A picture to write: its ending, .png, .exr, .npz or .hdr, says the format; - is standard output. {stem} in it is
+    /// the scene's file name without its ending, {name} the whole of it; with several scenes one of them is needed, in
     /// --heat and --stats too. May be given several times [default: the scene's name with .png, or with .render.png
     /// where that is a file not written by firstlight; a course file's output_file; in the working folder]
     #[arg(short, long = "output", value_name = "FILE", value_hint = ValueHint::FilePath, help_heading = "Output")]
     pub output: Vec<PathBuf>,
+    /// What .exr and .npz files hold of each pixel, with commas between: color,depth,normal,object-id; `firstlight
+    /// buffers` lists them all. Without color, and no other picture, no light is asked [default: the scene's, which is
+    /// color unless it says otherwise]
+    #[arg(long, value_name = "NAMES", value_parser = buffer(), value_delimiter = ',', help_heading = "Output")]
+    #[arg(hide_possible_values = true)]
+    pub buffers: Option<Vec<Plane>>,
     /// Bits of each channel of PNG files: 8 or 16 [default: 8]
     #[arg(long, value_name = "BITS", help_heading = "Output")]
     pub bits: Option<Bits>,
@@ -332,6 +342,8 @@ pub enum NamedFormat {
     Png,
     /// The film itself, in 32-bit floats
     Exr,
+    /// The film itself, as arrays for numpy
+    Npz,
     /// The film itself, in Radiance's shared exponents
     Hdr,
 }
@@ -351,6 +363,12 @@ where
 fn visibility() -> impl TypedValueParser<Value = VisibilityMode> {
     PossibleValuesParser::new(VisibilityMode::ALL.iter().map(|mode| mode.name()))
         .map(|name| VisibilityMode::from_name(&name).unwrap_or(VisibilityMode::Shafts))
+}
+
+/// Reads the name of a buffer.
+fn buffer() -> impl TypedValueParser<Value = Plane> {
+    PossibleValuesParser::new(Plane::ALL.iter().map(|plane| plane.name()))
+        .map(|name| Plane::from_name(&name).unwrap_or(Plane::Color))
 }
 
 /// Reads the number of samples, or the word for none.

@@ -1,6 +1,7 @@
 //! The program `firstlight`: a scene in, pictures out. All that needs knowing about light is in the library.
 
 mod args;
+mod buffers;
 mod check;
 mod faster;
 mod hints;
@@ -42,6 +43,7 @@ fn main() -> ExitCode {
         Command::Check(args) => ("check", check::run(args)),
         Command::Info(args) => ("info", info::run(args)),
         Command::Scenes(args) => ("scenes", scenes::run(args)),
+        Command::Buffers => ("buffers", buffers::run()),
         Command::Schema => ("schema", answer(&with_newline(firstlight::schema()))),
         Command::Completions(args) => ("completions", completions(args.shell)),
         Command::Man => ("man", man()),

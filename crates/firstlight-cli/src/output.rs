@@ -48,6 +48,13 @@ pub enum Content {
     Heat,
 }
 
+impl Output {
+    /// Whether it takes all buffers that are asked for, not the picture alone.
+    pub fn takes_buffers(&self) -> bool {
+        self.content == Content::Scene && matches!(self.format, Format::Exr | Format::Npz)
+    }
+}
+
 /// A place that can take bytes, as far as can be seen without giving it any.
 pub enum Ready {
     Stdout,
@@ -328,7 +335,7 @@ pub fn resolve(paths: &[PathBuf], bits: Option<Bits>, format: Option<NamedFormat
             (Target::File(path), _) => match Format::from_path(path) {
                 Ok(kind) => kind,
                 Err(e) if path.extension().is_none() => {
-                    return usage(format!("{e}, or say the format with --format png, exr or hdr"));
+                    return usage(format!("{e}, or say the format with --format png, exr, npz or hdr"));
                 }
                 Err(e) => return usage(e.to_string()),
             },
@@ -493,6 +500,7 @@ fn format_of(format: NamedFormat) -> Format {
     match format {
         NamedFormat::Png => Format::Png8,
         NamedFormat::Exr => Format::Exr,
+        NamedFormat::Npz => Format::Npz,
         NamedFormat::Hdr => Format::Hdr,
     }
 }

@@ -83,8 +83,8 @@ pub use describe::{ColorDesc, ColorParam, FilePath, NumberParam, ParamDesc, Samp
 pub use error::{Diagnostic, Place, SceneError, Severity, printable};
 pub use ids::{LightId, MaterialId, SurfaceId, TextureId};
 pub use image::{
-    Format, Image, ImageError, PendingFile, Receipt, StagedFile, StoredImage, Window, Written, is_decoding, write_open,
-    write_whole,
+    Format, Image, ImageError, PendingFile, Plane, PlaneNumbers, Receipt, Sampling, StagedFile, StoredImage, Window,
+    Written, is_decoding, write_open, write_whole,
 };
 pub use import::{ImportError, MeshData, MeshFormat, MeshPart, MeshPlace, MeshReport, is_point_set, read_mesh};
 pub use light::{
@@ -93,9 +93,7 @@ pub use light::{
 };
 pub use material::{BlinnPhongDesc, MaterialDesc, PhongDesc};
 pub use math::{DVec3, ShadowRay, Vec2, Vec3, WorldRay};
-pub use render::{
-    AaMode, Film, Heat, LightCounts, Plane, RenderSettings, RenderStats, VisibilityMode, render, render_image,
-};
+pub use render::{AaMode, Film, Heat, LightCounts, RenderSettings, RenderStats, VisibilityMode, render, render_image};
 pub use scene::{
     Added, CameraHit, CompileOptions, Compiled, DisplayEncoding, Framing, Hit, ModelSettings, RenderDesc, Scene,
     SceneDesc, SceneSummary, SurfacePoint, UpAxis, View,

@@ -3,7 +3,7 @@
 use std::ops::ControlFlow;
 use std::time::Duration;
 
-use firstlight::{Diagnostic, Display, RenderSettings, RenderStats, Scene, Severity, Window};
+use firstlight::{Diagnostic, Display, Film, ImageError, Plane, RenderSettings, RenderStats, Scene, Severity, Window};
 
 use super::plan::Plan;
 use super::timed;
@@ -102,6 +102,7 @@ impl Run<'_> {
             let faster = faster(scene, settings, &self.input.parsed.desc.render);
             Progress::begin(pixels, moments.len() as u64, plan.quiet, faster)
         };
+        let buffers = &self.input.parsed.desc.render.buffers;
         let progress = &*self.progress.get_or_insert_with(begin);
         progress.frame(index as u64);
         let (rendered, render) = timed(|| {
@@ -117,19 +118,7 @@ impl Run<'_> {
 
         // Encode all pictures and bring them to the disk, then let them appear
         let (written, write) = timed(|| {
-            let heat = film.heat().map(|heat| heat.picture());
-            let (image, receipt) = (film.develop(), scene.receipt(settings));
-            let own = scene.display();
-            let display = Display { exposure: plan.exposure.unwrap_or(own.exposure), ..own };
-            let encode = |output: &Output| match (output.content, &heat) {
-                (Content::Heat, Some(heat)) => heat.encode(output.format, &Display::default(), &receipt),
-                _ => image.encode(output.format, &display, &receipt),
-            };
-            let bytes: Vec<Vec<u8>> = moment
-                .outputs
-                .iter()
-                .map(encode)
-                .collect::<Result<_, _>>()
+            let bytes = encoded(plan, settings, buffers, film, scene, &moment.outputs)
                 .map_err(|e| Failure::Work(e.to_string()))?;
             watch.check()?;
             let stage = ready.into_iter().zip(&bytes).map(|(ready, bytes)| ready.stage(bytes));
@@ -161,4 +150,35 @@ impl Run<'_> {
             hint: Some(hint.into()),
         })
     }
+}
+
+/// The bytes of each output.
+fn encoded(
+    plan: &Plan,
+    settings: &RenderSettings,
+    buffers: &[Plane],
+    film: Film,
+    scene: &Scene,
+    outputs: &[Output],
+) -> Result<Vec<Vec<u8>>, ImageError> {
+    let heat = film.heat().map(|heat| heat.picture());
+    let receipt = scene.receipt(settings);
+    let of_buffers = scene.buffers_receipt(settings, buffers);
+    // Before the film becomes the picture
+    let with_buffers = outputs
+        .iter()
+        .map(|output| output.takes_buffers().then(|| film.encode(buffers, output.format, &of_buffers)))
+        .collect::<Vec<_>>();
+    let own = scene.display();
+    let display = Display { exposure: plan.exposure.unwrap_or(own.exposure), ..own };
+    let image = settings.buffers.contains(&Plane::Color).then(|| film.develop());
+    let encode = |(output, bytes): (&Output, Option<Result<Vec<u8>, ImageError>>)| match (bytes, &heat, &image) {
+        (Some(bytes), ..) => bytes,
+        (None, Some(heat), _) if output.content == Content::Heat => {
+            heat.encode(output.format, &Display::default(), &receipt)
+        }
+        (None, _, Some(image)) => image.encode(output.format, &display, &receipt),
+        (None, ..) => unreachable!("a film has what its outputs show"),
+    };
+    outputs.iter().zip(with_buffers).map(encode).collect()
 }

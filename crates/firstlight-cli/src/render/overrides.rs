@@ -1,6 +1,6 @@
 //! What the command line says in place of the scene.
 
-use firstlight::{ColorDesc, LightDesc, SampleSet, SamplesDesc, SceneDesc, ShadowTerminator};
+use firstlight::{ColorDesc, LightDesc, Plane, SampleSet, SamplesDesc, SceneDesc, ShadowTerminator};
 
 use crate::args::Size;
 use crate::report::Failure;
@@ -19,6 +19,7 @@ pub(super) struct Overrides<'a> {
     pub samples: Option<SamplesDesc>,
     pub camera: Option<&'a str>,
     pub tolerance: Option<f64>,
+    pub buffers: Option<&'a [Plane]>,
     pub terminator: Option<ShadowTerminator>,
 }
 
@@ -39,6 +40,9 @@ impl Overrides<'_> {
         render.transparent |= self.transparent;
         render.antialiasing = self.antialiasing.unwrap_or(render.antialiasing);
         render.tolerance = self.tolerance.unwrap_or(render.tolerance);
+        if let Some(buffers) = self.buffers {
+            render.buffers = buffers.to_vec();
+        }
         render.shadow_terminator = self.terminator.unwrap_or(render.shadow_terminator);
         if let Some(name) = self.camera {
             if !desc.cameras.iter().any(|(known, _)| known == name) {

@@ -5,7 +5,7 @@ use std::iter;
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 
-use firstlight::{AaMode, Format, Framing, RenderSettings, ShadowTerminator, SimdLevel, View, Window};
+use firstlight::{AaMode, Format, Framing, Plane, RenderSettings, ShadowTerminator, SimdLevel, View, Window};
 
 use super::moments::Moment;
 use super::overrides::Overrides;
@@ -103,7 +103,6 @@ impl<'a> Plan<'a> {
         settings.tile_size = args.tile_size.unwrap_or(settings.tile_size);
         settings.crop = args.crop;
         settings.reference = args.reference;
-        settings.heat = heat.is_some();
         settings.visibility = args.visibility.unwrap_or(settings.visibility);
         if let Some(mode) = args.aa_mode {
             settings.aa_mode = match mode {
@@ -122,6 +121,7 @@ impl<'a> Plan<'a> {
             samples: args.samples,
             camera: args.camera.as_deref(),
             tolerance: args.tolerance,
+            buffers: args.buffers.as_deref(),
             terminator: args.shadow_terminator.map(|word| match word {
                 Terminator::Smooth => ShadowTerminator::Smooth,
                 Terminator::Hard => ShadowTerminator::Hard,
@@ -275,6 +275,26 @@ impl<'a> Plan<'a> {
         let stats = self.stats.target().map(|target| target.of_scene(&job.names));
         output::refuse_clashes(input::file_of(job.scene), &own, stats.as_ref())?;
         Ok((outputs, settings))
+    }
+
+    /// The planes that the outputs need; `asked` is what those take that hold buffers.
+    pub fn buffers(&self, outputs: &[Output], asked: &[Plane]) -> Result<Vec<Plane>, Failure> {
+        let takes = outputs.iter().any(Output::takes_buffers);
+        if self.overrides.buffers.is_some() && !takes {
+            let message = "--buffers is for .exr and .npz files, and no output is one; name one with -o";
+            return Err(Failure::Usage(message.into()));
+        }
+        if !takes && asked != [Plane::Color] && !self.quiet {
+            say(format_args!("the scene asks for buffers, and no output takes them: .exr and .npz files do"));
+        }
+        let mut planes = if takes { asked.to_vec() } else { Vec::new() };
+        for output in outputs.iter().filter(|output| !output.takes_buffers()) {
+            let shown = if output.content == Content::Heat { Plane::Rays } else { Plane::Color };
+            if !planes.contains(&shown) {
+                planes.push(shown);
+            }
+        }
+        Ok(planes)
     }
 
     /// Has a camera that is found for the scene frame it as asked.

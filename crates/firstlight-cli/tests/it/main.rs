@@ -3,6 +3,7 @@
 mod answers;
 #[cfg(unix)]
 mod book;
+mod buffers;
 mod common;
 mod faults;
 mod files;

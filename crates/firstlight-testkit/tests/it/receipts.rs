@@ -4,8 +4,8 @@ use std::num::NonZeroUsize;
 use std::ops::ControlFlow;
 
 use firstlight::{
-    AaMode, CompileOptions, NoAssets, Receipt, RenderSettings, SamplesDesc, SceneDesc, ShadowTerminator, ShapeDesc,
-    SimdLevel, VisibilityMode, Window, render,
+    AaMode, CompileOptions, NoAssets, Plane, Receipt, RenderSettings, SamplesDesc, SceneDesc, ShadowTerminator,
+    ShapeDesc, SimdLevel, VisibilityMode, Window, render,
 };
 
 /// Everything that a setting can change: area lights with and without a word on samples, a smooth mesh, keys, two
@@ -94,7 +94,7 @@ fn how_the_work_is_done_changes_neither_film_nor_receipt() {
             RenderSettings { threads: NonZeroUsize::new(3), ..base.clone() },
             RenderSettings { tile_size: 8, ..base.clone() },
             RenderSettings { tile_size: 64, ..base.clone() },
-            RenderSettings { heat: true, ..base.clone() },
+            RenderSettings { buffers: vec![Plane::Color, Plane::Rays, Plane::Depth], ..base.clone() },
             RenderSettings { crop: Some(whole), ..base.clone() },
         ];
         others.extend(SimdLevel::available().into_iter().map(|simd| RenderSettings { simd, ..base.clone() }));

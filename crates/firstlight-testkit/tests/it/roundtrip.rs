@@ -92,11 +92,11 @@ prop_compose! {
         size in [any::<u32>(), any::<u32>(), any::<u32>()], camera in maybe(text()),
         samples in samples(), colors in [color(), color()], transparent: bool, display in select(DisplayEncoding::ALL),
         gamma in number(), exposure in number(), fps in number(), tolerance in number(),
-        shadow_terminator in select(ShadowTerminator::ALL),
+        shadow_terminator in select(ShadowTerminator::ALL), buffers in vec(select(Plane::ALL), 0..4),
     ) -> RenderDesc {
         RenderDesc {
             width: size[0], height: size[1], antialiasing: size[2], samples, camera, background: colors[0],
-            transparent, ambient: colors[1], display, gamma, exposure, fps, shadow_terminator, tolerance,
+            transparent, ambient: colors[1], display, gamma, exposure, fps, shadow_terminator, tolerance, buffers,
         }
     }
 }

@@ -547,7 +547,7 @@ fn tangents_are_the_steps_from_one_hit_to_the_next() {
             };
             let (Some((a, hit, ray)), Some((b, other, _))) = (see(x, y), see(x + step, y)) else { continue };
             // The same triangle, and not seen edge-on
-            if hit.primitive() != other.primitive() || a.ng.dot(a.wo) < 0.2 {
+            if scene.primitive(&hit) != scene.primitive(&other) || a.ng.dot(a.wo) < 0.2 {
                 continue;
             }
             let [u, v] = scene.tangents(&ray, &hit);

@@ -3,6 +3,7 @@
 
 mod analytic;
 mod area_lights;
+mod buffers;
 mod cameras;
 mod cases;
 mod checker;

@@ -7,17 +7,23 @@ use std::path::PathBuf;
 #[derive(Debug, thiserror::Error)]
 pub enum ImageError {
     /// The ending of a file's name is not that of a picture.
-    #[error("{}: {}; use .png, .exr or .hdr", path.display(), ending(path))]
+    #[error("{}: {}; use .png, .exr, .npz or .hdr", path.display(), ending(path))]
     UnknownEnding {
         /// The file's name.
         path: PathBuf,
     },
     /// The program was built without EXR.
-    #[error("this build of firstlight has no EXR; use .png or .hdr, or build it with the feature `exr`")]
+    #[error("this build of firstlight has no EXR; use .png, .npz or .hdr, or build it with the feature `exr`")]
     WithoutExr,
     /// An [`Image`](super::Image) whose pixels do not fill its window, or whose window is not in its film.
     #[error("{0}")]
     Picture(String),
+    /// A format that holds no more than the picture.
+    #[error("a {format} file holds one picture; buffers go to .exr and .npz files")]
+    OnePicture {
+        /// `PNG` or `HDR`.
+        format: &'static str,
+    },
     /// A [`Display`](crate::Display) outside what it may be.
     #[error("{0}")]
     Display(String),

@@ -1,6 +1,7 @@
-//! OpenEXR files: the film as it is, in 32-bit floats.
+//! OpenEXR files: the film as it is, in 32-bit floats, and ids in 32-bit whole numbers.
 //!
-//! Channels R, G, B, and A unless every alpha is 1; premultiplied, as the format wants. The data window is the
+//! Of the picture channels R, G, B, and A unless every alpha is 1; premultiplied, as the format wants. Of another plane
+//! one layer, `depth.Z`. The data window is the
 //! picture's window, the display window the whole film. Rec. 709 chromaticities. The receipt is in string attributes
 //! `firstlight:KEY`, UTF-8, the program in `software`. Lossless ZIP in blocks of 16 rows.
 
@@ -20,23 +21,31 @@ use codec::meta::header::Header;
 use codec::meta::{BlockDescription, attribute::Text as Name};
 use codec::prelude::{Compression, SmallVec};
 
-use super::{Image, ImageError, PREFIX, Receipt, SOFTWARE};
+use super::{ImageError, PREFIX, Plane, PlaneFile, PlaneNumbers, Receipt, SOFTWARE};
 use crate::parallel;
 
-/// The bytes of an EXR file. The picture and the receipt have been checked.
-pub(super) fn encode(picture: &Image, receipt: &Receipt) -> Result<Vec<u8>, ImageError> {
+/// One channel of a file.
+struct Channel<'a> {
+    name: String,
+    numbers: PlaneNumbers<'a>,
+    /// Which of so many numbers of a pixel it is.
+    place: usize,
+    of: usize,
+}
+
+/// The bytes of an EXR file. The planes and the receipt have been checked.
+pub(super) fn encode(file: &PlaneFile, receipt: &Receipt) -> Result<Vec<u8>, ImageError> {
     let fault = |e: Error| ImageError::Encode { format: "EXR", reason: e.to_string() };
-    let header = header(picture, receipt);
-    let width = picture.window.width as usize;
-    // In the file channels stand by name; these are their places in a pixel
-    let places: &[usize] = if header.channels.list.len() == 4 { &[3, 2, 1, 0] } else { &[2, 1, 0] };
+    let channels = channels(file);
+    let header = header(file, &channels, receipt);
+    let width = file.window.width as usize;
     // Compress all blocks of rows at once
     let headers: SmallVec<[Header; 3]> = SmallVec::from_elem(header, 1);
     let blocks: Vec<_> = enumerate_ordered_header_block_indices(&headers).collect();
     let chunks = parallel::collect(blocks.len(), |block| {
         let (i, index) = blocks[block];
         let rows = index.pixel_position.y()..index.pixel_position.y() + index.pixel_size.y();
-        let data = planes(&picture.pixels[rows.start * width..rows.end * width], width, places);
+        let data = rows_of(&channels, rows, width);
         Ok((i, UncompressedBlock { index, data }.compress_to_chunk(&headers)?))
     });
     let chunks: Vec<(usize, Chunk)> = chunks.into_iter().collect::<Result<_, Error>>().map_err(fault)?;
@@ -50,19 +59,40 @@ pub(super) fn encode(picture: &Image, receipt: &Receipt) -> Result<Vec<u8>, Imag
     Ok(bytes)
 }
 
+/// The channels of all planes, by name, as the format wants them.
+fn channels<'a>(file: &PlaneFile<'a>) -> Vec<Channel<'a>> {
+    let mut all = Vec::new();
+    for (plane, numbers) in file.planes {
+        let names = plane.channels();
+        for (place, name) in names.iter().enumerate() {
+            if *plane == Plane::Color && *name == "A" && numbers.are_opaque() {
+                continue;
+            }
+            // The picture's are those of the file itself, as readers expect it
+            let name = if *plane == Plane::Color { (*name).to_owned() } else { format!("{}.{name}", plane.name()) };
+            all.push(Channel { name, numbers: *numbers, place, of: names.len() });
+        }
+    }
+    all.sort_by(|a, b| a.name.cmp(&b.name));
+    all
+}
+
 /// Everything that the file says before its pixels.
-fn header(picture: &Image, receipt: &Receipt) -> Header {
-    let window = picture.window;
+fn header(file: &PlaneFile, channels: &[Channel], receipt: &Receipt) -> Header {
+    let window = file.window;
     let size = Vec2(window.width as usize, window.height as usize);
-    let names: &[&str] = if picture.is_opaque() { &["B", "G", "R"] } else { &["A", "B", "G", "R"] };
-    let channels = names.iter().map(|n| ChannelDescription::named(*n, SampleType::F32)).collect();
+    let kind = |channel: &Channel| match channel.numbers {
+        PlaneNumbers::Floats(_) => SampleType::F32,
+        PlaneNumbers::Wholes(_) => SampleType::U32,
+    };
+    let channels = channels.iter().map(|c| ChannelDescription::named(c.name.as_str(), kind(c))).collect();
     let mut header = Header::new(Name::from(""), size, channels).with_encoding(
         Compression::ZIP16,
         BlockDescription::ScanLines,
         LineOrder::Increasing,
     );
     header.shared_attributes.display_window =
-        IntegerBounds::from_dimensions(Vec2(picture.film[0] as usize, picture.film[1] as usize));
+        IntegerBounds::from_dimensions(Vec2(file.film[0] as usize, file.film[1] as usize));
     header.shared_attributes.chromaticities = Some(Chromaticities {
         red: Vec2(0.64, 0.33),
         green: Vec2(0.3, 0.6),
@@ -81,11 +111,19 @@ fn header(picture: &Image, receipt: &Receipt) -> Header {
 }
 
 /// One row after another, and in each one channel after another.
-fn planes(pixels: &[[f32; 4]], width: usize, places: &[usize]) -> Vec<u8> {
-    let mut data = Vec::with_capacity(pixels.len() * places.len() * 4);
-    for row in pixels.chunks_exact(width) {
-        for &place in places {
-            data.extend(row.iter().flat_map(|p| p[place].to_ne_bytes()));
+fn rows_of(channels: &[Channel], rows: Range<usize>, width: usize) -> Vec<u8> {
+    let mut data = Vec::with_capacity(rows.len() * width * channels.len() * 4);
+    for row in rows {
+        for Channel { numbers, place, of, .. } in channels {
+            let all = row * width * of..(row + 1) * width * of;
+            match numbers {
+                PlaneNumbers::Floats(numbers) => {
+                    data.extend(numbers[all].iter().skip(*place).step_by(*of).flat_map(|n| n.to_ne_bytes()));
+                }
+                PlaneNumbers::Wholes(numbers) => {
+                    data.extend(numbers[all].iter().skip(*place).step_by(*of).flat_map(|n| n.to_ne_bytes()));
+                }
+            }
         }
     }
     data
@@ -181,6 +219,29 @@ mod tests {
         let file = read_back(&encoded(&whole(2, 2, |_, _| [2.0, 0.0, 0.0, 1.0]), &Receipt::default()));
         let names: Vec<_> = file.layer_data[0].channel_data.list.iter().map(|c| c.name.to_string()).collect();
         assert_eq!(names, ["B", "G", "R"]);
+    }
+
+    #[test]
+    fn planes_are_layers_beside_the_picture() {
+        let (color, depth, ids) = ([0.5f32, 1.0, 2.0, 1.0, 0.0, 0.0, 3.0, 1.0], [f32::INFINITY, 4.0], [1u32, u32::MAX]);
+        let normal = [1.0f32, 2.0, 3.0, 4.0, 5.0, 6.0];
+        let planes = [
+            (Plane::Color, PlaneNumbers::Floats(&color)),
+            (Plane::ObjectId, PlaneNumbers::Wholes(&ids)),
+            (Plane::Depth, PlaneNumbers::Floats(&depth)),
+            (Plane::Normal, PlaneNumbers::Floats(&normal)),
+        ];
+        let window = Window { x: 0, y: 0, width: 2, height: 1 };
+        let file = PlaneFile { film: [2, 1], window, planes: &planes };
+        let file = read_back(&file.encode(Format::Exr, &Receipt::default()).unwrap());
+        let channels = &file.layer_data[0].channel_data.list;
+        let names: Vec<_> = channels.iter().map(|c| c.name.to_string()).collect();
+        assert_eq!(names, ["B", "G", "R", "depth.Z", "normal.X", "normal.Y", "normal.Z", "object-id.ID"]);
+        let numbers: Vec<_> = channels.iter().map(|c| c.sample_data.clone()).collect();
+        assert_eq!(numbers[2], FlatSamples::F32(vec![0.5, 0.0]));
+        assert_eq!(numbers[3], FlatSamples::F32(depth.to_vec()));
+        assert_eq!(numbers[5], FlatSamples::F32(vec![2.0, 5.0]));
+        assert_eq!(numbers[7], FlatSamples::U32(ids.to_vec()));
     }
 
     #[test]

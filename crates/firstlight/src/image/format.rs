@@ -13,12 +13,14 @@ pub enum Format {
     Png16,
     /// OpenEXR, 32-bit floats, the film as it is: linear Rec. 709, alpha premultiplied.
     Exr,
+    /// Arrays for numpy, 32-bit floats: as EXR.
+    Npz,
     /// Radiance RGBE: linear Rec. 709 with a shared exponent; alpha is left out.
     Hdr,
 }
 
 impl Format {
-    /// By the ending of a file's name, in capitals or not: `.png` (8 bits), `.exr`, `.hdr`.
+    /// By the ending of a file's name, in capitals or not: `.png` (8 bits), `.exr`, `.npz`, `.hdr`.
     ///
     /// # Errors
     /// [`ImageError::UnknownEnding`] for any other; [`ImageError::WithoutExr`] for `.exr` in a build without it.
@@ -28,6 +30,7 @@ impl Format {
             "png" => Ok(Format::Png8),
             "exr" if cfg!(feature = "exr") => Ok(Format::Exr),
             "exr" => Err(ImageError::WithoutExr),
+            "npz" => Ok(Format::Npz),
             "hdr" => Ok(Format::Hdr),
             _ => Err(ImageError::UnknownEnding { path: path.to_path_buf() }),
         }
@@ -48,10 +51,13 @@ mod tests {
         #[cfg(not(feature = "exr"))]
         assert!(of("b.exr").unwrap_err().to_string().contains("feature `exr`"));
         let words = |p: &str| of(p).unwrap_err().to_string();
-        assert_eq!(words("out/b.jpg"), "out/b.jpg: \".jpg\" is not the ending of a picture; use .png, .exr or .hdr");
+        assert_eq!(
+            words("out/b.jpg"),
+            "out/b.jpg: \".jpg\" is not the ending of a picture; use .png, .exr, .npz or .hdr"
+        );
         assert_eq!(
             words(".png"),
-            ".png: has no ending that says which kind of picture to write; use .png, .exr or .hdr"
+            ".png: has no ending that says which kind of picture to write; use .png, .exr, .npz or .hdr"
         );
     }
 }

@@ -11,7 +11,9 @@ mod exr;
 mod file;
 mod format;
 mod hdr;
+mod npz;
 mod patient;
+mod plane;
 mod png;
 pub(crate) mod read;
 mod stored;
@@ -21,6 +23,8 @@ pub use error::ImageError;
 pub use file::{PendingFile, StagedFile, Written, write_whole};
 pub use format::Format;
 pub use patient::write_open;
+pub(crate) use plane::PlaneFile;
+pub use plane::{Plane, PlaneNumbers, Sampling};
 pub use stored::StoredImage;
 
 use crate::color::Display;
@@ -71,7 +75,7 @@ impl Image {
     ///
     /// 8- and 16-bit formats store straight alpha, encoded for `display`; without alpha if every pixel has alpha 1.
     /// The others store the film as it is, and `display` has no part in them. NaN is stored as 0 and infinity as the
-    /// largest number, except in EXR, which has both.
+    /// largest number, except in EXR and NPZ, which have both.
     ///
     /// The receipt's entry `display` is this function's own: 8- and 16-bit files say `display` there, the others have
     /// none, whatever `receipt` says of it.
@@ -86,10 +90,10 @@ impl Image {
         match format {
             Format::Png8 => png::encode(self, png::Depth::Eight, display, &shown()),
             Format::Png16 => png::encode(self, png::Depth::Sixteen, display, &shown()),
-            #[cfg(feature = "exr")]
-            Format::Exr => exr::encode(self, &receipt.shown_by(None)),
-            #[cfg(not(feature = "exr"))]
-            Format::Exr => Err(ImageError::WithoutExr),
+            Format::Exr | Format::Npz => {
+                let planes = [(Plane::Color, PlaneNumbers::Floats(self.pixels.as_flattened()))];
+                PlaneFile { film: self.film, window: self.window, planes: &planes }.encode(format, receipt)
+            }
             Format::Hdr => Ok(hdr::encode(self, &receipt.shown_by(None))),
         }
     }

@@ -4,8 +4,8 @@
 //! two cross, two rules differ, and the panel is halved. On each of seven rows, the nodes of a Kronrod rule, the
 //! intervals that occluders hide are united, and the antiderivative of the cell's polynomial is summed over the ends of
 //! what is left: nothing is shaded again. The Gauss rule of three inside says how far the panel can be wrong; and where
-//! all rows are hidden, but overlap less and less towards one of them, what a gap between it and the next may send. Where
-//! a panel ends, outlines begin as roots do, so rows are spread by y^2 (3 - 2 y).
+//! all rows are hidden, but overlap less and less towards one of them, what a gap between it and the next may send.
+//! Where a panel ends, outlines begin as roots do, so rows are spread by y^2 (3 - 2 y).
 //!
 //! Source of the rule: Kronrod, "Nodes and Weights of Quadrature Formulas", 1965; of the spread: Davis, Rabinowitz,
 //! "Methods of Numerical Integration", 1984, section 2.12.

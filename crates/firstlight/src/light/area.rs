@@ -264,6 +264,15 @@ impl AreaShape {
         }
     }
 
+    /// Unit normal of the front at a point of it.
+    pub(crate) fn normal_at(&self, p: DVec3) -> Vec3 {
+        match self {
+            AreaShape::Rectangle(rectangle) => rectangle.n.as_vec3(),
+            AreaShape::Disk(disk) => disk.n.as_vec3(),
+            AreaShape::Sphere(sphere) => (p - sphere.center).normalize_or_zero().as_vec3(),
+        }
+    }
+
     /// Its area, in square metres; of a flat shape, that of one side.
     pub fn measure(&self) -> f64 {
         match self {

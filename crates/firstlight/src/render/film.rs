@@ -2,69 +2,51 @@
 
 use super::heat::Heat;
 use super::tile::Tile;
-use crate::image::{Image, Window};
-
-/// What a plane of the film says of each pixel.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Plane {
-    /// The picture, and how much of it is covered.
-    Color,
-    /// What the pixel took: see [`Heat`].
-    Rays,
-}
-
-impl Plane {
-    /// Its name.
-    pub fn name(self) -> &'static str {
-        match self {
-            Plane::Color => "color",
-            Plane::Rays => "rays",
-        }
-    }
-
-    /// The names of its channels, 32-bit floats.
-    pub fn channels(self) -> &'static [&'static str] {
-        match self {
-            Plane::Color => &["R", "G", "B", "A"],
-            Plane::Rays => &["rays"],
-        }
-    }
-
-    /// What its numbers are.
-    pub fn unit(self) -> &'static str {
-        match self {
-            Plane::Color => "linear Rec. 709, premultiplied with alpha, which is a share of the pixel",
-            Plane::Rays => "rays that were asked",
-        }
-    }
-
-    /// What a pixel of it takes.
-    pub(super) fn bytes(self) -> usize {
-        self.channels().len() * size_of::<f32>()
-    }
-}
+use crate::image::{Format, Image, ImageError, Plane, PlaneFile, PlaneNumbers, Receipt, Window};
 
 /// The numbers of a plane, pixel by pixel.
 #[derive(Clone, Debug)]
 enum Values {
     One(Vec<f32>),
+    Two(Vec<[f32; 2]>),
+    Three(Vec<[f32; 3]>),
     Four(Vec<[f32; 4]>),
+    Whole(Vec<u32>),
 }
 
 impl Values {
     fn new(plane: Plane, pixels: usize) -> Values {
-        match plane {
-            Plane::Color => Values::Four(vec![[0.0; 4]; pixels]),
-            Plane::Rays => Values::One(vec![0.0; pixels]),
+        match plane.channels().len() {
+            1 if plane.is_whole() => Values::Whole(vec![0; pixels]),
+            1 => Values::One(vec![0.0; pixels]),
+            2 => Values::Two(vec![[0.0; 2]; pixels]),
+            3 => Values::Three(vec![[0.0; 3]; pixels]),
+            _ => Values::Four(vec![[0.0; 4]; pixels]),
         }
     }
 
     /// Takes a row of `from`, from its number `first` on, and puts it at number `at`.
     fn take(&mut self, at: usize, from: &Values, first: usize, length: usize) {
+        fn copy<T: Copy>(to: &mut [T], at: usize, from: &[T], first: usize, length: usize) {
+            to[at..at + length].copy_from_slice(&from[first..first + length]);
+        }
         match (self, from) {
-            (Values::One(to), Values::One(from)) => to[at..at + length].copy_from_slice(&from[first..first + length]),
-            (Values::Four(to), Values::Four(from)) => to[at..at + length].copy_from_slice(&from[first..first + length]),
+            (Values::One(to), Values::One(from)) => copy(to, at, from, first, length),
+            (Values::Two(to), Values::Two(from)) => copy(to, at, from, first, length),
+            (Values::Three(to), Values::Three(from)) => copy(to, at, from, first, length),
+            (Values::Four(to), Values::Four(from)) => copy(to, at, from, first, length),
+            (Values::Whole(to), Values::Whole(from)) => copy(to, at, from, first, length),
             _ => unreachable!("a tile has the planes of its film"),
+        }
+    }
+
+    fn numbers(&self) -> PlaneNumbers<'_> {
+        match self {
+            Values::One(numbers) => PlaneNumbers::Floats(numbers),
+            Values::Two(numbers) => PlaneNumbers::Floats(numbers.as_flattened()),
+            Values::Three(numbers) => PlaneNumbers::Floats(numbers.as_flattened()),
+            Values::Four(numbers) => PlaneNumbers::Floats(numbers.as_flattened()),
+            Values::Whole(numbers) => PlaneNumbers::Wholes(numbers),
         }
     }
 }
@@ -81,6 +63,12 @@ pub struct Film {
 pub(crate) struct FilmTile {
     pub tile: Tile,
     planes: Vec<(Plane, Values)>,
+}
+
+/// What a pixel's centre ray says for a plane.
+pub(super) enum CenterValue {
+    Floats([f32; 3]),
+    Whole(u32),
 }
 
 fn empty(planes: impl IntoIterator<Item = Plane>, pixels: usize) -> Vec<(Plane, Values)> {
@@ -106,27 +94,56 @@ impl Film {
         }
     }
 
-    /// What it holds.
+    /// The width and height of the whole film.
+    pub fn size(&self) -> [u32; 2] {
+        self.size
+    }
+
+    /// The part of it that was exposed, which its planes hold.
+    pub fn window(&self) -> Window {
+        self.window
+    }
+
+    /// What it holds: [`RenderSettings::buffers`](super::RenderSettings::buffers), in their order.
     pub fn planes(&self) -> impl Iterator<Item = Plane> {
         self.planes.iter().map(|(plane, _)| *plane)
     }
 
-    /// Where the work went; `None` if [`RenderSettings::heat`](super::RenderSettings::heat) did not ask for it.
+    /// The numbers of a plane; `None` if it was not asked for.
+    pub fn numbers(&self, of: Plane) -> Option<PlaneNumbers<'_>> {
+        self.planes.iter().find(|(plane, _)| *plane == of).map(|(_, values)| values.numbers())
+    }
+
+    /// Where the work went; `None` if [`Plane::Rays`] was not asked for.
     pub fn heat(&self) -> Option<Heat> {
-        let work = self.planes.iter().find_map(|(plane, values)| match (plane, values) {
-            (Plane::Rays, Values::One(work)) => Some(work.clone()),
-            _ => None,
-        })?;
-        Some(Heat { film: self.size, window: self.window, work })
+        let PlaneNumbers::Floats(work) = self.numbers(Plane::Rays)? else { return None };
+        Some(Heat { film: self.size, window: self.window, work: work.to_vec() })
+    }
+
+    /// The bytes of a file that holds some of its planes, EXR or NPZ. The same film and receipt give the same bytes,
+    /// always. The receipt says of each plane what it is, and the hash of its bits.
+    ///
+    /// # Errors
+    /// A format that holds one picture alone; a plane that was not asked for; a receipt outside what it may be.
+    pub fn encode(&self, planes: &[Plane], format: Format, receipt: &Receipt) -> Result<Vec<u8>, ImageError> {
+        let numbers = |plane: &Plane| match self.numbers(*plane) {
+            Some(numbers) => Ok((*plane, numbers)),
+            None => Err(ImageError::Picture(format!("the film holds no {}: it was not asked for", plane.name()))),
+        };
+        let planes = planes.iter().map(numbers).collect::<Result<Vec<_>, _>>()?;
+        PlaneFile { film: self.size, window: self.window, planes: &planes }.encode(format, receipt)
     }
 
     /// The picture.
+    ///
+    /// # Panics
+    /// If [`Plane::Color`] was not asked for.
     pub fn develop(self) -> Image {
         let pixels = self.planes.into_iter().find_map(|(plane, values)| match (plane, values) {
             (Plane::Color, Values::Four(pixels)) => Some(pixels),
             _ => None,
         });
-        Image { film: self.size, window: self.window, pixels: pixels.expect("every film has the picture") }
+        Image { film: self.size, window: self.window, pixels: pixels.expect("the film has the picture") }
     }
 }
 
@@ -151,7 +168,24 @@ impl FilmTile {
         for (plane, values) in &mut self.planes {
             match (plane, values) {
                 (Plane::Color, Values::Four(pixels)) => pixels[index..index + rgba.len()].copy_from_slice(rgba),
+                (Plane::Alpha, Values::One(pixels)) => {
+                    pixels[index..index + rgba.len()].iter_mut().zip(rgba).for_each(|(to, from)| *to = from[3]);
+                }
                 (Plane::Rays, Values::One(pixels)) => pixels[index..index + work.len()].copy_from_slice(work),
+                _ => {}
+            }
+        }
+    }
+
+    /// Notes what the centre ray of a pixel says, plane by plane of those that ask it.
+    pub(super) fn set_center(&mut self, x: u32, y: u32, says: impl Fn(Plane) -> CenterValue) {
+        let index = (y * self.tile.width + x) as usize;
+        for (plane, values) in self.planes.iter_mut().filter(|(plane, _)| plane.is_of_center()) {
+            match (says(*plane), values) {
+                (CenterValue::Floats([a, ..]), Values::One(pixels)) => pixels[index] = a,
+                (CenterValue::Floats([a, b, _]), Values::Two(pixels)) => pixels[index] = [a, b],
+                (CenterValue::Floats(all), Values::Three(pixels)) => pixels[index] = all,
+                (CenterValue::Whole(number), Values::Whole(pixels)) => pixels[index] = number,
                 _ => unreachable!("each plane has its numbers"),
             }
         }

@@ -16,6 +16,8 @@ const BLOCK: u32 = 8;
 /// The camera rays of a square of pixels, and what they hit.
 pub(crate) struct PixelHits {
     level: Level,
+    /// Rays across a pixel.
+    n: u32,
     /// Pixels across.
     side: u32,
     /// Rays across.
@@ -26,12 +28,13 @@ pub(crate) struct PixelHits {
 }
 
 impl PixelHits {
-    /// For a scene whose pixels have `n` x `n` rays.
+    /// Of `n` x `n` rays in each pixel.
     pub fn new(level: Level, n: u32) -> Self {
         let side = (BLOCK / n).max(1);
         let across = side * n;
         PixelHits {
             level,
+            n,
             side,
             across,
             hits: vec![None; (across * across) as usize],
@@ -47,7 +50,7 @@ impl PixelHits {
 
     /// Traces the rays of the pixels from (`i`, `j`), `width` x `height` of them, at most [`side`](Self::side).
     pub fn trace(&mut self, scene: &Scene, i: u32, j: u32, width: u32, height: u32) {
-        let n = scene.antialiasing;
+        let n = self.n;
         let (rays_across, rays_down) = (width * n, height * n);
         for top in (0..rays_down).step_by(BLOCK as usize) {
             for left in (0..rays_across).step_by(BLOCK as usize) {
@@ -65,7 +68,7 @@ impl PixelHits {
         let mut active = 0u64;
         for row in 0..h {
             for column in 0..w {
-                let (ray, _) = camera_ray(scene, x + left + column, y + top + row);
+                let (ray, _) = grid_ray(scene, self.n, x + left + column, y + top + row);
                 let mut nearest = scene.meet_listed(&ray);
                 if bundle {
                     geometry.meet_upper(self.level, &ray, &mut nearest);
@@ -99,15 +102,20 @@ impl PixelHits {
 
     /// What the ray (`column`, `row`) of pixel (`i`, `j`), counted from the first pixel that was traced, hits.
     #[inline(always)]
-    pub fn get(&self, n: u32, i: u32, j: u32, column: u32, row: u32) -> Option<Hit> {
-        self.hits[((j * n + row) * self.across + i * n + column) as usize]
+    pub fn get(&self, i: u32, j: u32, column: u32, row: u32) -> Option<Hit> {
+        self.hits[((j * self.n + row) * self.across + i * self.n + column) as usize]
     }
 }
 
 /// The camera ray (`x`, `y`) of the film, counted in rays, and how it changes to the next.
 #[inline(always)]
 pub(crate) fn camera_ray(scene: &Scene, x: u32, y: u32) -> (Ray, RayDifferential) {
-    let n = scene.antialiasing;
+    grid_ray(scene, scene.antialiasing, x, y)
+}
+
+/// The same of a grid of `n` x `n` rays in each pixel.
+#[inline(always)]
+pub(super) fn grid_ray(scene: &Scene, n: u32, x: u32, y: u32) -> (Ray, RayDifferential) {
     // The middle of the sub-pixel
     let at = |ray: u32| (ray / n) as f32 + ((ray % n) as f32 + 0.5) / n as f32;
     scene.camera.local_ray(at(x), at(y), 1.0 / n as f32)

@@ -12,6 +12,7 @@ mod arrival;
 mod asking;
 mod beams;
 mod cell;
+mod centers;
 mod change;
 mod counts;
 mod cut;
@@ -50,12 +51,12 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
 pub use counts::{LightCounts, RenderStats};
-pub use film::{Film, Plane};
+pub use film::Film;
 pub use heat::Heat;
 
 use crate::accel::SimdLevel;
 use crate::describe::words;
-use crate::image::{Image, Window};
+use crate::image::{Image, Plane, Window};
 use crate::light::Light;
 use crate::math::Ray;
 use crate::parallel;
@@ -63,6 +64,7 @@ use crate::scene::Scene;
 use crate::visibility::Target;
 use arrival::Arrivals;
 use cell::{CELL, Cells};
+use centers::Centers;
 pub(crate) use counts::Counts;
 use film::FilmTile;
 use hits::PixelHits;
@@ -116,8 +118,8 @@ pub struct RenderSettings {
     pub reference: bool,
     /// How shadows are found.
     pub visibility: VisibilityMode,
-    /// Keeps what each pixel took, for [`Film::heat`].
-    pub heat: bool,
+    /// The planes of the film. Without those that are lit, no light is asked.
+    pub buffers: Vec<Plane>,
 }
 
 impl RenderSettings {
@@ -176,7 +178,7 @@ impl RenderSettings {
             }
         }
         let window = self.window(scene);
-        let pixel: usize = self.planes().iter().map(|plane| plane.bytes()).sum();
+        let pixel: usize = self.buffers.iter().map(|plane| plane.bytes()).sum();
         let film = window.width as usize * window.height as usize * pixel;
         Vec::<u8>::new().try_reserve_exact(film + film / 2).map_err(|_| {
             let Window { width, height, .. } = window;
@@ -195,13 +197,6 @@ impl RenderSettings {
             (false, VisibilityMode::Shafts, AaMode::Full) => Renderer::Full,
             (false, VisibilityMode::Shafts, AaMode::Adaptive) => Renderer::Adaptive,
         }
-    }
-
-    /// The planes of the film.
-    fn planes(&self) -> Vec<Plane> {
-        let mut planes = vec![Plane::Color];
-        planes.extend(self.heat.then_some(Plane::Rays));
-        planes
     }
 
     /// The part of the film to render.
@@ -245,7 +240,7 @@ impl Default for RenderSettings {
             aa_mode: AaMode::Adaptive,
             visibility: VisibilityMode::Shafts,
             reference: false,
-            heat: false,
+            buffers: vec![Plane::Color],
         }
     }
 }
@@ -279,8 +274,10 @@ pub fn render(
     let level = settings.simd.resolve();
     let simd = if renderer == Renderer::Reference { SimdLevel::Fallback } else { level };
     let nothing = Counts::default().stats(simd, threads);
-    let planes = settings.planes();
-    let result = Mutex::new((Film::new([scene.width, scene.height], window, &planes), nothing));
+    let planes = &settings.buffers;
+    let result = Mutex::new((Film::new([scene.width, scene.height], window, planes), nothing));
+    let of_centers = planes.iter().any(|plane| plane.is_of_center());
+    let is_lit = planes.iter().any(|plane| !plane.is_of_center());
     let lights = Lights::new(scene);
     // Where every light is sampled at every ray, the bits are those of the plain renderer
     let is_sampled = lights.emitters.iter().all(Option::is_none);
@@ -307,10 +304,14 @@ pub fn render(
             }
             if stop.load(Ordering::Relaxed) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
         };
-        let mut film_tile = FilmTile::new(tile, &planes);
+        let mut film_tile = FilmTile::new(tile, planes);
         let film = &mut film_tile;
         let token = level.token();
+        if of_centers {
+            Centers::new(scene, token).fill(film);
+        }
         let rendered = match renderer {
+            _ if !is_lit => ControlFlow::Continue(Counts::default()),
             Renderer::Reference => render_tile(scene, film, &mut Plain, None, &go_on),
             Renderer::Traced => {
                 let hits = scene.geometry.has_trees().then(|| PixelHits::new(token, scene.antialiasing));
@@ -388,7 +389,7 @@ fn render_tile(
             }
             for (y, x) in (0..h).flat_map(|y| (0..w).map(move |x| (y, x))) {
                 let hit = |column: u32, row: u32, ray: &Ray| match &hits {
-                    Some(hits) => hits.get(scene.antialiasing, x, y, column, row),
+                    Some(hits) => hits.get(x, y, column, row),
                     None => scene.intersect_local(ray),
                 };
                 pixel.clear();

@@ -2,10 +2,11 @@
 
 use super::many::SINGLY;
 use super::{RenderSettings, Renderer};
-use crate::camera::Projection;
+use crate::camera::{Frame, Projection};
 use crate::describe::SamplesDesc;
-use crate::image::Receipt;
+use crate::image::{Plane, Receipt};
 use crate::light::Light;
+use crate::math::Vec3;
 use crate::scene::Scene;
 
 /// How many entries **Pixels** has in the changelog, over all versions. It is part of the version in a receipt, so that
@@ -53,6 +54,53 @@ impl Scene {
             entries.push(("crop", format!("{},{},{},{}", w.x, w.y, w.width, w.height)));
         }
         Receipt { entries: entries.into_iter().map(|(key, value)| (key.to_owned(), value)).collect() }
+    }
+}
+
+impl Scene {
+    /// What a file of buffers says of itself: the [receipt](Self::receipt), and what leads from pixels to the world and
+    /// from ids to names.
+    ///
+    /// - `intrinsics`: K of a pinhole camera, row by row, in pixels, the middle of the first pixel at (0.5, 0.5), with
+    ///   x to the right and y down as OpenCV has them;
+    /// - `opencv_camera_from_world` and `opengl_camera_from_world`: 4 x 4, row by row; OpenCV's camera looks along z
+    ///   with y down, OpenGL's along -z with y up;
+    /// - `object_names`, `material_names`: JSON lists, the name of id 1 first, `null` for what has none.
+    pub fn buffers_receipt(&self, settings: &RenderSettings, buffers: &[Plane]) -> Receipt {
+        let mut receipt = self.receipt(settings);
+        if matches!(buffers, [Plane::Color]) {
+            return receipt;
+        }
+        let mut add = |key: &str, value: String| receipt.entries.push((key.to_owned(), value));
+        add("buffers", buffers.iter().map(|plane| plane.name()).collect::<Vec<_>>().join(" "));
+        if self.camera.projection() == Projection::Perspective {
+            let [hx, hy] = self.camera.film_half_size().map(f64::from);
+            let [sx, sy] = self.camera.film_shift().map(f64::from);
+            let (w, h) = (f64::from(self.width), f64::from(self.height));
+            let k = [0.5 * w / hx, 0.0, w * (0.5 - sx), 0.0, 0.5 * h / hy, h * (0.5 + sy), 0.0, 0.0, 1.0];
+            add("intrinsics", k.map(|v| v.to_string()).join(" "));
+        }
+        let Frame { position, right, up, forward, .. } = *self.camera.frame();
+        for (key, axes) in
+            [("opencv_camera_from_world", [right, -up, forward]), ("opengl_camera_from_world", [right, up, -forward])]
+        {
+            let row = |axis: Vec3| {
+                let axis = axis.as_dvec3();
+                // Never -0
+                [axis.x, axis.y, axis.z, -axis.dot(position)].map(|v| (v + 0.0).to_string()).join(" ")
+            };
+            add(key, format!("{} 0 0 0 1", axes.map(row).join(" ")));
+        }
+        let list = |names: Vec<Option<String>>| serde_json::Value::from(names).to_string();
+        if buffers.contains(&Plane::ObjectId) {
+            let shapes = self.geometry.surfaces.iter().map(|surface| surface.name.as_deref().map(str::to_owned));
+            let lights = self.summary.lights.iter().map(|(_, name, _)| name.clone());
+            add("object_names", list(shapes.chain(lights).collect()));
+        }
+        if buffers.contains(&Plane::MaterialId) {
+            add("material_names", list(self.summary.materials.iter().map(|(name, _)| Some(name.clone())).collect()));
+        }
+        receipt
     }
 }
 

@@ -95,7 +95,7 @@ impl<'a> Shafts<'a> {
                     counts.camera_rays += 1;
                     // Found anew: to keep a ray costs more than to find it
                     let (ray, differential) = camera_ray(scene, (i + x) * n + column, (j + y) * n + row);
-                    let hit = self.hits.get(n, x, y, column, row);
+                    let hit = self.hits.get(x, y, column, row);
                     if let Some((si, bsdf)) = pixel.see(scene, scene.see(&ray, hit, &differential)) {
                         self.points.push(Viewpoint::of(&si));
                         self.surfaces.push((si, bsdf));

@@ -20,6 +20,7 @@ use crate::context::{AssetError, Assets, CompileContext, OnCompile};
 use crate::describe::{ColorParam, Family, NumberParam, SamplesDesc};
 use crate::error::{Diagnostic, SceneError, Severity};
 use crate::ids::TextureId;
+use crate::image::Plane;
 use crate::image::read::{Limits, TexelData, Texels, decode};
 use crate::light::{Light, LightDesc, check_samples};
 use crate::material::Material;
@@ -198,6 +199,9 @@ impl SceneDesc {
             let antialiasing = cx.count("antialiasing", render.antialiasing, 1, MAX_ANTIALIASING, Some(hint));
             check_samples(cx, render.samples, "points on each area light");
             let hint = "in display steps; 1 is usual, 4 is a preview";
+            if let Some(fault) = Plane::fault_of(&render.buffers) {
+                cx.error("buffers", fault, Some("name each once; the picture is \"color\""));
+            }
             let tolerance = cx.between("tolerance", render.tolerance, MIN_TOLERANCE, MAX_TOLERANCE, Some(hint));
             let gamma = cx.between("gamma", render.gamma, 0.1, 10.0, Some("2.2 is usual"));
             let exposure = cx.between("exposure", render.exposure, -64.0, 64.0, Some("in stops: each doubles"));
@@ -344,6 +348,8 @@ impl SceneDesc {
         said.render.samples = default;
         said.render.fps = RenderDesc::default().fps;
         said.render.tolerance = RenderDesc::default().tolerance;
+        // What else is written of the film changes nothing of it
+        said.render.buffers = RenderDesc::default().buffers;
         let mut hasher = blake3::Hasher::new();
         hasher.update(said.to_json().as_bytes());
         for (file, hash) in textures.file_hashes() {

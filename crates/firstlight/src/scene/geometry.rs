@@ -17,7 +17,7 @@ use super::links::{LinkId, LinkSets};
 use super::occluders::Opacity;
 use crate::accel::{Aabb, Bvh};
 use crate::ids::{LightId, MaterialId, SurfaceId};
-use crate::math::{DVec3, Facet};
+use crate::math::{DVec3, Facet, Vec2};
 use crate::shape::{Mesh, Parallelogram, Placement, PointSet, ShadowTerminator, Solid, Sphere, TrianglePoint};
 
 /// What a surface id stands for.
@@ -127,12 +127,11 @@ pub struct Hit {
 }
 
 impl Hit {
-    /// The triangle of a mesh or the point of a point set, in the order of its file; 0 for all else.
-    pub fn primitive(&self) -> u32 {
+    /// How much the second and the third corner of a triangle count at the hit; 0 for all else.
+    pub fn barycentric(&self) -> Vec2 {
         match self.at {
-            At::World(point) | At::Placed(_, PlacedSpot::Triangle(point)) => point.triangle,
-            At::Placed(_, PlacedSpot::Point(point)) => point,
-            _ => 0,
+            At::World(point) | At::Placed(_, PlacedSpot::Triangle(point)) => Vec2::new(point.u, point.v),
+            _ => Vec2::ZERO,
         }
     }
 

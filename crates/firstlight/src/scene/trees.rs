@@ -7,7 +7,9 @@ use super::occluders::Opacity;
 use crate::accel::{Aabb, Planes, RayPacket16, RayTile, TraceRay, dispatch_all, dispatch_eight, dispatch_sixteen};
 use crate::ids::{LightId, MaterialId, SurfaceId};
 use crate::math::{DVec3, Ray, ShadowRay, Vec3};
-use crate::shape::{LineLanes, Mesh, RayDifferential, ShapePoint, SolidHit, TileHits, TrianglePoint, every};
+use crate::shape::{
+    JoinedPart, LineLanes, Mesh, RayDifferential, ShapePoint, SolidHit, TileHits, TrianglePoint, every,
+};
 
 impl Geometry {
     /// Whether there is anything beside the lists.
@@ -384,8 +386,8 @@ impl Geometry {
         }
     }
 
-    /// The material of the triangle that was hit, of a mesh that has several.
-    pub fn face_material(&self, hit: &Hit) -> MaterialId {
+    /// The triangle that was hit, of which of the meshes that were joined.
+    fn triangle(&self, hit: &Hit) -> Option<(&JoinedPart, u32)> {
         let (mesh, triangle) = match hit.at {
             At::World(point) => (&self.world.as_ref().expect("the hit is on it").mesh, point.triangle),
             At::Placed(index, PlacedSpot::Triangle(point)) => {
@@ -394,9 +396,23 @@ impl Geometry {
                 };
                 (&self.meshes[mesh as usize], point.triangle)
             }
-            _ => unreachable!("only meshes have more than one material"),
+            _ => return None,
         };
-        mesh.part(triangle).material(triangle)
+        Some((mesh.part(triangle), triangle))
+    }
+
+    /// The material of the triangle that was hit, of a mesh that has several.
+    pub fn face_material(&self, hit: &Hit) -> MaterialId {
+        let (part, triangle) = self.triangle(hit).expect("only meshes have more than one material");
+        part.material(triangle)
+    }
+
+    /// The triangle of a mesh or the point of a point set that was hit, in the order of its own.
+    pub fn primitive(&self, hit: &Hit) -> Option<u32> {
+        match hit.at {
+            At::Placed(_, PlacedSpot::Point(point)) => Some(point),
+            _ => self.triangle(hit).map(|(part, triangle)| triangle - part.first_triangle),
+        }
     }
 }
 

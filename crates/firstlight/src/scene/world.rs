@@ -75,6 +75,11 @@ impl Scene {
         self.in_world(self.local_surface(&ray.within(self.origin), hit, differential))
     }
 
+    /// The triangle of a mesh or the point of a point set that was hit, in the order of its file; `None` on all else.
+    pub fn primitive(&self, hit: &Hit) -> Option<u32> {
+        self.geometry.primitive(hit)
+    }
+
     /// How the point of a hit moves with u, and with v: metres for 1. Not orthogonal, and no length where uv has no
     /// direction. Asked for apart from [`surface`](Self::surface), because few need it.
     ///

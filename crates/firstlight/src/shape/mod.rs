@@ -44,7 +44,7 @@ pub use torus::TorusDesc;
 pub(crate) use common::Common;
 pub(crate) use cover::Cover;
 pub(crate) use disk::{Disk, DiskShadow};
-pub(crate) use mesh::{Mesh, MeshBuilder, MeshSource, TrianglePoint};
+pub(crate) use mesh::{JoinedPart, Mesh, MeshBuilder, MeshSource, TrianglePoint};
 pub(crate) use parallelogram::{ParallelogramShadow, PlaneSide};
 pub(crate) use placement::Placement;
 pub(crate) use point_set::PointSet;

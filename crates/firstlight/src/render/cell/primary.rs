@@ -101,7 +101,7 @@ impl Cells<'_> {
         let mut shapes = std::mem::take(&mut self.shapes);
         shapes.clear();
         for at in (0..n).flat_map(|y| (0..n).map(move |x| [x, y])) {
-            let Some(hit) = self.hits.get(n, column, row, at[0], at[1]) else {
+            let Some(hit) = self.hits.get(column, row, at[0], at[1]) else {
                 pixel.terms.background += 1;
                 continue;
             };

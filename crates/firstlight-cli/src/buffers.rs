@@ -1,0 +1,33 @@
+//! `firstlight buffers`: what files can hold of each pixel.
+
+use firstlight::Plane;
+
+use crate::report::{Failure, answer};
+
+/// Lists all buffers: name, channels, type, unit, space, how a pixel of it comes about; and what each is.
+///
+/// # Errors
+/// Standard output is closed.
+pub fn run() -> Result<(), Failure> {
+    let head = ["name", "channels", "type", "unit", "space", "sampling"].map(str::to_owned);
+    let row = |plane: &Plane| {
+        let channels = plane.channels().join(" ");
+        let words =
+            [plane.name(), &channels, plane.number_type(), plane.unit(), plane.space(), plane.sampling().name()];
+        words.map(str::to_owned)
+    };
+    let rows: Vec<[String; 6]> = std::iter::once(head).chain(Plane::ALL.iter().map(row)).collect();
+    let widths: [usize; 6] =
+        std::array::from_fn(|column| rows.iter().map(|row| row[column].chars().count()).max().unwrap_or(0));
+    let mut text = String::new();
+    for row in rows {
+        let line = row.iter().zip(widths).map(|(word, width)| format!("{word:width$}")).collect::<Vec<_>>().join("  ");
+        text.push_str(line.trim_end());
+        text.push('\n');
+    }
+    text.push('\n');
+    for plane in Plane::ALL {
+        text.push_str(&format!("{:width$}  {}\n", plane.name(), plane.about(), width = widths[0]));
+    }
+    answer(&text)
+}

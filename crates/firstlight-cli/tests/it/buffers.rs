@@ -1,0 +1,72 @@
+//! What files hold beside the picture, and what is said of those that cannot.
+
+use crate::common::{Folder, SCENE};
+
+/// Whether an archive of arrays holds one: its name stands in it as it is.
+fn holds(file: &[u8], array: &str) -> bool {
+    let name = format!("{array}.npy");
+    file.windows(name.len()).any(|part| part == name.as_bytes())
+}
+
+#[test]
+fn files_hold_what_is_asked_for() {
+    let folder = Folder::with_scene();
+    let plain = folder.png("");
+    folder.run("render scene.toml --buffers depth,object-id -o a.npz -o a.png -o a.exr").done();
+    let (arrays, exr) = (folder.get("a.npz"), folder.get("a.exr"));
+    assert!(holds(&arrays, "depth") && holds(&arrays, "object-id") && holds(&arrays, "receipt"));
+    assert!(!holds(&arrays, "color") && !holds(&arrays, "normal"));
+    let says = |word: &str| exr.windows(word.len()).any(|part| part == word.as_bytes());
+    assert!(
+        says("depth.Z") && says("object-id.ID") && says("firstlight:intrinsics") && says("firstlight:buffer.depth")
+    );
+    // The picture beside them is as ever
+    assert!(folder.get("a.png") == plain);
+    // Without --buffers it is the picture alone, and a picture says nothing of buffers
+    folder.run("render scene.toml -o b.npz -o b.exr").done();
+    let (arrays, exr) = (folder.get("b.npz"), folder.get("b.exr"));
+    assert!(holds(&arrays, "color") && !holds(&arrays, "depth"));
+    assert!(!exr.windows(9).any(|part| part == b"intrinsic"));
+    let same = folder.run("render scene.toml --buffers color -o - --format npz").done().stdout;
+    assert!(same == arrays);
+}
+
+#[test]
+fn the_scene_may_ask_for_them() {
+    let folder = Folder::new();
+    folder.put("scene.toml", SCENE.replace("[render]\n", "[render]\nbuffers = [\"color\", \"normal\"]\n"));
+    folder.run("render scene.toml -o a.npz").done();
+    assert!(holds(&folder.get("a.npz"), "normal") && holds(&folder.get("a.npz"), "color"));
+    folder.run("render scene.toml -o b.npz --buffers depth").done();
+    assert!(holds(&folder.get("b.npz"), "depth") && !holds(&folder.get("b.npz"), "normal"));
+    folder.run("render scene.toml -o a.png").done().says(&["buffers", ".exr and .npz files do"]);
+    let scene = folder.run("render scene.toml --print-scene --buffers depth,rays").done().stdout;
+    assert!(String::from_utf8(scene).unwrap().contains("buffers = [\"depth\", \"rays\"]"));
+}
+
+#[test]
+fn what_cannot_be_is_said() {
+    let folder = Folder::with_scene();
+    folder.run("render scene.toml --buffers dept -o a.npz").exits(2).says(&["dept", "'depth'"]);
+    folder.run("render scene.toml --buffers depth").exits(2).says(&["--buffers is for .exr and .npz files"]);
+    folder.run("render scene.toml --buffers depth -o a.png -o a.hdr").exits(2).says(&["name one with -o"]);
+    folder.run("render scene.toml --buffers depth,depth -o a.npz").exits(1).says(&["\"depth\" is given twice"]);
+    folder.put("none.toml", SCENE.replace("[render]\n", "[render]\nbuffers = []\n"));
+    folder.run("render none.toml -o a.npz").exits(1).says(&["render.buffers", "asks for nothing"]);
+    assert_eq!(folder.names(), ["none.toml", "scene.toml"]);
+}
+
+#[test]
+fn all_of_them_are_listed() {
+    let list = String::from_utf8(Folder::new().run("buffers").done().stdout).unwrap();
+    for plane in firstlight::Plane::ALL {
+        let mut lines = list.lines().filter(|line| line.split_whitespace().next() == Some(plane.name()));
+        let row = lines.next().unwrap();
+        assert!(
+            row.contains(&plane.channels().join(" "))
+                && row.contains(plane.number_type())
+                && row.contains(plane.unit())
+        );
+        assert!(lines.next().is_some_and(|line| line.ends_with('.')), "{}", plane.name());
+    }
+}

@@ -1,0 +1,130 @@
+//! NPZ files: an archive of arrays as numpy reads them, `numpy.load("a.npz")["depth"]`.
+//!
+//! One array for each plane, of shape (rows, columns) or (rows, columns, channels), little-endian, and `receipt`, the
+//! receipt as JSON text. Not compressed, as `numpy.savez` leaves them: they are read as fast as the disk is.
+//!
+//! Source: numpy, "NEP 1: a simple file format for numpy arrays", version 1.0.
+
+use std::io::{Cursor, Write};
+
+use zip::write::SimpleFileOptions;
+use zip::{CompressionMethod, DateTime, ZipWriter};
+
+use super::{ImageError, PlaneFile, PlaneNumbers, Receipt};
+
+/// The bytes of an NPZ file. The planes and the receipt have been checked.
+pub(super) fn encode(file: &PlaneFile, receipt: &Receipt) -> Result<Vec<u8>, ImageError> {
+    let fault = |reason: String| ImageError::Encode { format: "NPZ", reason };
+    // Without a clock: the same film gives the same bytes
+    let options = SimpleFileOptions::default()
+        .compression_method(CompressionMethod::Stored)
+        .last_modified_time(DateTime::default())
+        .large_file(true);
+    let mut archive = ZipWriter::new(Cursor::new(Vec::new()));
+    let mut add = |name: &str, array: Vec<u8>| -> Result<(), ImageError> {
+        archive.start_file(format!("{name}.npy"), options).map_err(|e| fault(e.to_string()))?;
+        archive.write_all(&array).map_err(|e| fault(e.to_string()))
+    };
+    let (rows, columns) = (file.window.height, file.window.width);
+    for (plane, numbers) in file.planes {
+        let kind = match numbers {
+            PlaneNumbers::Floats(_) => "<f4",
+            PlaneNumbers::Wholes(_) => "<u4",
+        };
+        let shape = match plane.channels().len() {
+            1 => format!("({rows}, {columns})"),
+            channels => format!("({rows}, {columns}, {channels})"),
+        };
+        add(plane.name(), array(kind, &shape, &numbers.to_le_bytes()))?;
+    }
+    let said: serde_json::Map<_, _> =
+        receipt.entries.iter().map(|(key, value)| (key.clone(), value.clone().into())).collect();
+    let text = serde_json::Value::Object(said).to_string();
+    // numpy's text is UTF-32
+    let characters: Vec<u8> = text.chars().flat_map(|c| u32::from(c).to_le_bytes()).collect();
+    add("receipt", array(&format!("<U{}", characters.len() / 4), "()", &characters))?;
+    let bytes = archive.finish().map_err(|e| fault(e.to_string()))?;
+    Ok(bytes.into_inner())
+}
+
+/// An array with its header: where the numbers begin is a multiple of 64.
+fn array(kind: &str, shape: &str, numbers: &[u8]) -> Vec<u8> {
+    let mut said = format!("{{'descr': '{kind}', 'fortran_order': False, 'shape': {shape}, }}");
+    let before = b"\x93NUMPY\x01\x00".len() + 2;
+    let all = (before + said.len() + 1).next_multiple_of(64);
+    said.extend(std::iter::repeat_n(' ', all - before - said.len() - 1));
+    said.push('\n');
+    let mut bytes = b"\x93NUMPY\x01\x00".to_vec();
+    bytes.extend((said.len() as u16).to_le_bytes());
+    bytes.extend(said.into_bytes());
+    bytes.extend(numbers);
+    bytes
+}
+
+#[cfg(test)]
+mod tests {
+    use std::io::Read;
+
+    use super::super::{Format, Plane, Window};
+    use super::*;
+
+    /// The kind, shape and numbers of an array.
+    fn read(archive: &mut zip::ZipArchive<Cursor<&[u8]>>, name: &str) -> (String, Vec<u8>) {
+        let mut bytes = Vec::new();
+        archive.by_name(&format!("{name}.npy")).unwrap().read_to_end(&mut bytes).unwrap();
+        assert!(bytes.starts_with(b"\x93NUMPY\x01\x00"));
+        let numbers = 10 + usize::from(u16::from_le_bytes([bytes[8], bytes[9]]));
+        assert_eq!(numbers % 64, 0);
+        let header = String::from_utf8(bytes[10..numbers].to_vec()).unwrap();
+        assert!(header.ends_with('\n'));
+        (header.trim_end().to_owned(), bytes[numbers..].to_vec())
+    }
+
+    #[test]
+    fn arrays_have_their_kinds_and_shapes() {
+        let window = Window { x: 1, y: 2, width: 3, height: 2 };
+        let (depth, uv, ids) =
+            ([1.5f32, f32::INFINITY, 0.0, -1.0, 2.0, 3.0], [0.25f32; 12], [7u32, 0, 1, 2, 3, u32::MAX]);
+        let planes = [
+            (Plane::Depth, PlaneNumbers::Floats(&depth)),
+            (Plane::Uv, PlaneNumbers::Floats(&uv)),
+            (Plane::ObjectId, PlaneNumbers::Wholes(&ids)),
+        ];
+        let file = PlaneFile { film: [9, 9], window, planes: &planes };
+        let receipt = Receipt { entries: vec![("name".into(), "Würfel \"1\"".into())] };
+        let bytes = file.encode(Format::Npz, &receipt).unwrap();
+        assert_eq!(bytes, file.encode(Format::Npz, &receipt).unwrap());
+        let mut archive = zip::ZipArchive::new(Cursor::new(&bytes[..])).unwrap();
+        let names: Vec<_> = archive.file_names().map(|name| name.unwrap().into_owned()).collect();
+        assert_eq!(names, ["depth.npy", "uv.npy", "object-id.npy", "receipt.npy"]);
+        let said =
+            |kind: &str, shape: &str| format!("{{'descr': '{kind}', 'fortran_order': False, 'shape': {shape}, }}");
+        for ((plane, numbers), (kind, shape)) in
+            planes.into_iter().zip([("<f4", "(2, 3)"), ("<f4", "(2, 3, 2)"), ("<u4", "(2, 3)")])
+        {
+            assert_eq!(read(&mut archive, plane.name()), (said(kind, shape), numbers.to_le_bytes()));
+        }
+        let (header, text) = read(&mut archive, "receipt");
+        let text: String =
+            text.chunks(4).map(|c| char::from_u32(u32::from_le_bytes(c.try_into().unwrap())).unwrap()).collect();
+        assert_eq!(header, said(&format!("<U{}", text.chars().count()), "()"));
+        let json: serde_json::Value = serde_json::from_str(&text).unwrap();
+        assert_eq!(json["name"], "Würfel \"1\"");
+        let hash = blake3::hash(&PlaneNumbers::Floats(&depth).to_le_bytes()).to_hex();
+        assert_eq!(
+            json["buffer.depth"],
+            format!("channels Z; float32; unit m; space camera; center; blake3 {hash}").as_str()
+        );
+    }
+
+    #[test]
+    fn formats_of_one_picture_hold_no_buffers() {
+        let window = Window { x: 0, y: 0, width: 1, height: 1 };
+        let planes = [(Plane::Depth, PlaneNumbers::Floats(&[1.0]))];
+        let file = PlaneFile { film: [1, 1], window, planes: &planes };
+        for format in [Format::Png8, Format::Png16, Format::Hdr] {
+            let error = file.encode(format, &Receipt::default()).unwrap_err();
+            assert!(matches!(error, ImageError::OnePicture { .. }), "{error}");
+        }
+    }
+}

@@ -1,0 +1,228 @@
+//! What a film can hold beside the picture: one plane of numbers for each buffer.
+
+use super::{Format, ImageError, Receipt, Window};
+use crate::describe::{Words, words};
+
+words! {
+    /// A buffer: what a plane of the film says of each pixel.
+    ///
+    /// `color` and `alpha` are means over the pixel. All others are of its centre ray, and never averaged: what it
+    /// meets first, a shape or a visible light, as the camera sees it. Where it meets nothing, `depth` and `distance`
+    /// are infinite and all others 0.
+    pub enum Plane {
+        /// The picture, with its alpha.
+        Color = "color",
+        /// The share of the pixel that is covered; 1 where the scene is not transparent.
+        Alpha = "alpha",
+        /// How far away it is along the line of sight of the camera, as in a depth map: from the eye's plane, or the
+        /// film of an orthographic camera.
+        Depth = "depth",
+        /// How far away it is along the ray.
+        Distance = "distance",
+        /// Where it is.
+        Position = "position",
+        /// Where it is, from the camera: x to the right, y up, z backwards.
+        PositionCamera = "position-camera",
+        /// The shading normal, unit, on the side that is seen: what light sees of a smooth mesh.
+        Normal = "normal",
+        /// The shading normal from the camera: x to the right, y up, z backwards.
+        NormalCamera = "normal-camera",
+        /// The geometric normal, unit, on the side that is seen: of the facet itself.
+        NormalGeometric = "normal-geometric",
+        /// The geometric normal from the camera: x to the right, y up, z backwards.
+        NormalGeometricCamera = "normal-geometric-camera",
+        /// The direction, unit, in which u grows on the surface; 0 where there is none, and on lights.
+        Tangent = "tangent",
+        /// The texture coordinate; 0 on lights.
+        Uv = "uv",
+        /// On a triangle, how much its second and its third corner count; 0 on all else.
+        Barycentric = "barycentric",
+        /// Which object it is, in scene order: 1 for the first shape, and the lights after all shapes. Each instance of
+        /// a shape is an object of its own.
+        ObjectId = "object-id",
+        /// Which material it has, in the order of the scene: 1 for the first; 0 on lights.
+        MaterialId = "material-id",
+        /// Which triangle of its mesh, or point of its point set, in the order of its file: 1 for the first; 0 on all
+        /// else.
+        PrimitiveId = "primitive-id",
+        /// Which side is seen: 1 for the front, 2 for the back.
+        FaceOrientation = "face-orientation",
+        /// How much work the pixel took, as in `--heat`: rays that were asked, from the camera and to lights.
+        Rays = "rays",
+    }
+}
+
+/// How a pixel of a plane comes about.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Sampling {
+    /// The mean over the pixel's camera rays.
+    Filtered,
+    /// What its centre ray meets.
+    Center,
+    /// Counted over all that was done for it.
+    Counted,
+}
+
+/// The numbers of a plane: the window's rows from the top, each from the left, the channels of a pixel side by side.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum PlaneNumbers<'a> {
+    /// 32-bit floats.
+    Floats(&'a [f32]),
+    /// 32-bit whole numbers: ids.
+    Wholes(&'a [u32]),
+}
+
+impl Plane {
+    /// The names of its channels, as in EXR files after `NAME.`; those of `color` stand there alone.
+    pub fn channels(self) -> &'static [&'static str] {
+        use Plane::*;
+        match self {
+            Color => &["R", "G", "B", "A"],
+            Alpha => &["A"],
+            Depth | Distance => &["Z"],
+            Position | PositionCamera => &["X", "Y", "Z"],
+            Normal | NormalCamera | NormalGeometric | NormalGeometricCamera | Tangent => &["X", "Y", "Z"],
+            Uv | Barycentric => &["U", "V"],
+            ObjectId | MaterialId | PrimitiveId | FaceOrientation => &["ID"],
+            Rays => &["N"],
+        }
+    }
+
+    /// Whether its numbers are whole.
+    pub fn is_whole(self) -> bool {
+        matches!(self, Plane::ObjectId | Plane::MaterialId | Plane::PrimitiveId | Plane::FaceOrientation)
+    }
+
+    /// The type of its numbers, as numpy names it.
+    pub fn number_type(self) -> &'static str {
+        if self.is_whole() { "uint32" } else { "float32" }
+    }
+
+    /// What its numbers count; "1" for none.
+    pub fn unit(self) -> &'static str {
+        use Plane::*;
+        match self {
+            Color => "linear Rec. 709, premultiplied",
+            Depth | Distance | Position | PositionCamera => "m",
+            Rays => "rays",
+            _ => "1",
+        }
+    }
+
+    /// The space of its coordinates; "-" for none.
+    pub fn space(self) -> &'static str {
+        use Plane::*;
+        match self {
+            Position | Normal | NormalGeometric | Tangent => "world",
+            Depth | PositionCamera | NormalCamera | NormalGeometricCamera => "camera",
+            Uv => "texture",
+            _ => "-",
+        }
+    }
+
+    /// How a pixel of it comes about.
+    pub fn sampling(self) -> Sampling {
+        match self {
+            Plane::Color | Plane::Alpha => Sampling::Filtered,
+            Plane::Rays => Sampling::Counted,
+            _ => Sampling::Center,
+        }
+    }
+
+    /// What it is, in words.
+    pub fn about(self) -> String {
+        let choice = Plane::CHOICES.iter().find(|choice| choice.word == self.name());
+        choice.map_or(String::new(), |choice| choice.doc.join(" ").split_whitespace().collect::<Vec<_>>().join(" "))
+    }
+
+    /// What is wrong with a list of planes.
+    pub(crate) fn fault_of(planes: &[Plane]) -> Option<String> {
+        if planes.is_empty() {
+            return Some("an empty list asks for nothing".into());
+        }
+        let twice = planes.iter().enumerate().find(|(i, plane)| planes[..*i].contains(plane));
+        twice.map(|(_, plane)| format!("\"{}\" is given twice", plane.name()))
+    }
+
+    /// Whether the centre ray of a pixel says it.
+    pub(crate) fn is_of_center(self) -> bool {
+        self.sampling() == Sampling::Center
+    }
+
+    /// Bytes of a pixel of it.
+    pub(crate) fn bytes(self) -> usize {
+        self.channels().len() * size_of::<f32>()
+    }
+}
+
+impl Sampling {
+    /// In a word.
+    pub fn name(self) -> &'static str {
+        match self {
+            Sampling::Filtered => "filtered",
+            Sampling::Center => "center",
+            Sampling::Counted => "counted",
+        }
+    }
+}
+
+impl PlaneNumbers<'_> {
+    /// Their bytes, the lowest of each first.
+    pub fn to_le_bytes(self) -> Vec<u8> {
+        match self {
+            PlaneNumbers::Floats(numbers) => numbers.iter().flat_map(|n| n.to_le_bytes()).collect(),
+            PlaneNumbers::Wholes(numbers) => numbers.iter().flat_map(|n| n.to_le_bytes()).collect(),
+        }
+    }
+}
+
+impl PlaneNumbers<'_> {
+    /// Whether every fourth is 1.
+    pub(super) fn are_opaque(self) -> bool {
+        matches!(self, PlaneNumbers::Floats(numbers) if numbers.iter().skip(3).step_by(4).all(|alpha| *alpha == 1.0))
+    }
+}
+
+/// Planes that go to a file together.
+pub(crate) struct PlaneFile<'a> {
+    /// The width and height of the whole film.
+    pub film: [u32; 2],
+    /// The part of it that the planes hold.
+    pub window: Window,
+    pub planes: &'a [(Plane, PlaneNumbers<'a>)],
+}
+
+impl PlaneFile<'_> {
+    /// The bytes of a file. The planes fill the window.
+    pub fn encode(&self, format: Format, receipt: &Receipt) -> Result<Vec<u8>, ImageError> {
+        receipt.check()?;
+        let receipt = self.described(receipt);
+        match format {
+            #[cfg(feature = "exr")]
+            Format::Exr => super::exr::encode(self, &receipt),
+            #[cfg(not(feature = "exr"))]
+            Format::Exr => Err(ImageError::WithoutExr),
+            Format::Npz => super::npz::encode(self, &receipt),
+            Format::Png8 | Format::Png16 => Err(ImageError::OnePicture { format: "PNG" }),
+            Format::Hdr => Err(ImageError::OnePicture { format: "HDR" }),
+        }
+    }
+
+    /// The receipt with what each plane is and the hash of its bits, where there is more than the picture.
+    fn described(&self, receipt: &Receipt) -> Receipt {
+        let mut receipt = receipt.shown_by(None);
+        if matches!(self.planes, [(Plane::Color, _)]) {
+            return receipt;
+        }
+        for (plane, numbers) in self.planes {
+            let (channels, hash) = (plane.channels().join(" "), blake3::hash(&numbers.to_le_bytes()).to_hex());
+            let (kind, unit, space) = (plane.number_type(), plane.unit(), plane.space());
+            let said = format!(
+                "channels {channels}; {kind}; unit {unit}; space {space}; {}; blake3 {hash}",
+                plane.sampling().name()
+            );
+            receipt.entries.push((format!("buffer.{}", plane.name()), said));
+        }
+        receipt
+    }
+}

@@ -1,0 +1,137 @@
+//! What the centre rays of pixels meet: depth, normals, ids and their like, which are never averaged.
+//!
+//! Apart from all that is lit: one ray through the middle of each pixel, whatever the antialiasing, and nothing of it
+//! reaches the picture.
+
+use fearless_simd::Level;
+
+use super::film::{CenterValue, FilmTile};
+use super::hits::{PixelHits, grid_ray};
+use crate::camera::Frame;
+use crate::image::Plane;
+use crate::math::{DVec3, Ray, Vec3};
+use crate::scene::{Hit, Scene};
+use crate::shape::{RayDifferential, SurfaceInteraction};
+
+/// One thread's way through the centre rays of tiles.
+pub(super) struct Centers<'a> {
+    scene: &'a Scene,
+    hits: PixelHits,
+}
+
+/// What a centre ray meets.
+struct Center<'a> {
+    scene: &'a Scene,
+    ray: Ray,
+    differential: RayDifferential,
+    hit: Hit,
+    /// `None` on a light.
+    surface: Option<SurfaceInteraction>,
+}
+
+impl<'a> Centers<'a> {
+    pub fn new(scene: &'a Scene, level: Level) -> Self {
+        Centers { scene, hits: PixelHits::new(level, 1) }
+    }
+
+    /// Fills the planes of a tile that are theirs.
+    pub fn fill(&mut self, film: &mut FilmTile) {
+        let (scene, tile, side) = (self.scene, film.tile, self.hits.side());
+        for top in (0..tile.height).step_by(side as usize) {
+            for left in (0..tile.width).step_by(side as usize) {
+                let (w, h) = ((tile.width - left).min(side), (tile.height - top).min(side));
+                self.hits.trace(scene, tile.x + left, tile.y + top, w, h);
+                for (y, x) in (0..h).flat_map(|y| (0..w).map(move |x| (y, x))) {
+                    let center = self.hits.get(x, y, 0, 0).map(|hit| {
+                        let (ray, differential) = grid_ray(scene, 1, tile.x + left + x, tile.y + top + y);
+                        Center::new(scene, ray, differential, hit)
+                    });
+                    film.set_center(left + x, top + y, |plane| match &center {
+                        Some(center) => center.says(plane),
+                        None => nothing(plane),
+                    });
+                }
+            }
+        }
+    }
+}
+
+/// What a ray says that meets nothing.
+fn nothing(plane: Plane) -> CenterValue {
+    match plane {
+        Plane::Depth | Plane::Distance => CenterValue::Floats([f32::INFINITY; 3]),
+        plane if plane.is_whole() => CenterValue::Whole(0),
+        _ => CenterValue::Floats([0.0; 3]),
+    }
+}
+
+impl<'a> Center<'a> {
+    fn new(scene: &'a Scene, ray: Ray, differential: RayDifferential, hit: Hit) -> Self {
+        let is_light = hit.surface.index() >= scene.geometry.surfaces.len();
+        let surface = (!is_light).then(|| scene.local_surface(&ray, &hit, &differential));
+        Center { scene, ray, differential, hit, surface }
+    }
+
+    /// Where it is, in the scene's own coordinates.
+    fn p(&self) -> DVec3 {
+        match &self.surface {
+            Some(surface) => surface.p.as_dvec3(),
+            None => self.ray.o.as_dvec3() + self.ray.d.as_dvec3() * self.hit.t,
+        }
+    }
+
+    /// The unit normal of the front: of a shape, or of a light.
+    fn front(&self) -> Vec3 {
+        let Scene { geometry, lights, .. } = self.scene;
+        match self.hit.surface.index().checked_sub(geometry.surfaces.len()) {
+            None => geometry.point(&self.ray, &self.hit, &self.differential).normal,
+            Some(light) => lights[light].area().map_or(Vec3::ZERO, |area| area.shape.normal_at(self.p())),
+        }
+    }
+
+    /// The geometric and the shading normal, on the side that is seen.
+    fn normals(&self) -> [Vec3; 2] {
+        match &self.surface {
+            Some(surface) => [surface.ng, surface.ns],
+            None if self.front().dot(self.ray.d) > 0.0 => [-self.front(); 2],
+            None => [self.front(); 2],
+        }
+    }
+
+    fn says(&self, plane: Plane) -> CenterValue {
+        let Scene { camera, geometry, .. } = self.scene;
+        let (d, t) = (self.ray.d.as_dvec3(), self.hit.t);
+        let float = |number: f64| CenterValue::Floats([number as f32, 0.0, 0.0]);
+        let vector = |v: Vec3| CenterValue::Floats(v.to_array());
+        let Frame { right, up, forward, origin, position, .. } = camera.frame();
+        let from_camera =
+            |v: DVec3| CenterValue::Floats([*right, *up, -*forward].map(|axis| axis.as_dvec3().dot(v) as f32));
+        let [ng, ns] = match plane {
+            Plane::Normal | Plane::NormalCamera | Plane::NormalGeometric | Plane::NormalGeometricCamera => {
+                self.normals()
+            }
+            _ => [Vec3::ZERO; 2],
+        };
+        match plane {
+            Plane::Depth => float(forward.as_dvec3().dot(d) * t),
+            Plane::Distance => float(d.length() * t),
+            Plane::Position => vector((self.p() + *origin).as_vec3()),
+            Plane::PositionCamera => from_camera(self.p() + *origin - *position),
+            Plane::Normal => vector(ns),
+            Plane::NormalCamera => from_camera(ns.as_dvec3()),
+            Plane::NormalGeometric => vector(ng),
+            Plane::NormalGeometricCamera => from_camera(ng.as_dvec3()),
+            Plane::Tangent => {
+                let along_u = self.surface.map(|_| geometry.tangents(&self.ray, &self.hit)[0]);
+                vector(along_u.map_or(Vec3::ZERO, |along| along.normalize_or_zero().as_vec3()))
+            }
+            Plane::Uv => vector(self.surface.map_or(Vec3::ZERO, |surface| surface.uv.extend(0.0))),
+            Plane::Barycentric => vector(self.hit.barycentric().extend(0.0)),
+            Plane::ObjectId => CenterValue::Whole(self.hit.surface.0 + 1),
+            Plane::MaterialId => CenterValue::Whole(self.surface.map_or(0, |surface| surface.material.0 + 1)),
+            Plane::PrimitiveId => CenterValue::Whole(geometry.primitive(&self.hit).map_or(0, |number| number + 1)),
+            Plane::FaceOrientation => CenterValue::Whole(if self.front().dot(self.ray.d) < 0.0 { 1 } else { 2 }),
+            Plane::Color | Plane::Alpha | Plane::Rays => unreachable!("they are not of the centre"),
+        }
+    }
+}
