@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use firstlight::bench::{ShareSeen, sights};
 use firstlight::{
     Assets, CompileOptions, Display, Encoding, Film, FolderAssets, Format, Image, NoAssets, Parsed, Plane,
-    RenderSettings, SamplesDesc, Scene, SceneDesc, Window, builtin_scenes, render,
+    PlaneNumbers, RenderSettings, SamplesDesc, Scene, SceneDesc, Window, builtin_scenes, render,
 };
 
 use crate::bench::config11;
@@ -48,6 +48,9 @@ pub fn run(filter: Option<&str>) -> Outcome {
     }
     if wanted("heat") {
         heat()?;
+    }
+    if wanted("buffers") {
+        buffers()?;
     }
     Ok(())
 }
@@ -100,6 +103,62 @@ fn heat() -> Outcome {
     let (mean, most) = heat.mean_and_most();
     eprintln!("work: {mean:.1} in the mean, {most:.0} at most");
     save("heat", &heat.picture(), &Display::default(), &scene, &settings)
+}
+
+/// Pixels across and down of each of the four.
+const BUFFER: u32 = 256;
+
+/// What is seen of the clockwork, how far away it is, its normals from the camera, and its objects: `buffers.png`.
+fn buffers() -> Outcome {
+    let folder = root().join("scenes/gallery");
+    let text = std::fs::read(folder.join("clockwork.toml")).map_err(|e| e.to_string())?;
+    let assets = FolderAssets::new(&folder, &[]).map_err(|(path, e)| format!("{}: {e}", path.display()))?;
+    let mut parsed = SceneDesc::parse("clockwork.toml", &text, &assets);
+    (parsed.desc.render.width, parsed.desc.render.height) = (BUFFER, BUFFER);
+    let scene = parsed.compile(&assets, &CompileOptions::default()).map_err(|e| e.to_string())?.scene;
+    let planes = vec![Plane::Color, Plane::Depth, Plane::NormalCamera, Plane::ObjectId];
+    let settings = RenderSettings { buffers: planes, ..RenderSettings::default() };
+    let film = rendered(&scene, &settings)?;
+    let floats = |plane| match film.numbers(plane) {
+        Some(PlaneNumbers::Floats(numbers)) => numbers.to_vec(),
+        _ => unreachable!("it was asked for, in floats"),
+    };
+    let Some(PlaneNumbers::Wholes(ids)) = film.numbers(Plane::ObjectId) else { unreachable!("ids are whole") };
+    let (depth, normals) = (floats(Plane::Depth), floats(Plane::NormalCamera));
+    let finite = || depth.iter().copied().filter(|depth| depth.is_finite());
+    let (near, far) = (finite().fold(f32::INFINITY, f32::min), finite().fold(0.0, f32::max));
+    let decoded = |color: [f32; 3]| {
+        let [r, g, b] = color.map(|c| Encoding::Srgb.decode(f64::from(c)) as f32);
+        [r, g, b, 1.0]
+    };
+    let shown = |pixel: usize| {
+        if !depth[pixel].is_finite() {
+            return [[0.0, 0.0, 0.0, 1.0]; 3];
+        }
+        let nearness = 1.0 - 0.9 * (depth[pixel] - near) / (far - near);
+        let normal: [f32; 3] = std::array::from_fn(|axis| normals[3 * pixel + axis] * 0.5 + 0.5);
+        // Colours that follow each other are far apart
+        let mixed = ids[pixel].wrapping_mul(2_654_435_769).to_le_bytes();
+        let object = std::array::from_fn(|channel| 0.2 + 0.8 * f32::from(mixed[channel + 1]) / 255.0);
+        [decoded([nearness; 3]), decoded(normal), decoded(object)]
+    };
+    let others: Vec<[[f32; 4]; 3]> = (0..ids.len()).map(shown).collect();
+    let display = scene.display();
+    let picture = film.develop();
+    let side = BUFFER as usize;
+    let pixels = (0..side).flat_map(|row| {
+        let line = row * side..(row + 1) * side;
+        let (picture, others) = (&picture, &others);
+        let rest = (0..3).flat_map({
+            let line = line.clone();
+            move |which| others[line.clone()].iter().map(move |views| views[which])
+        });
+        picture.pixels[line].iter().copied().chain(rest)
+    });
+    let film = [4 * BUFFER, BUFFER];
+    let window = Window { x: 0, y: 0, width: film[0], height: film[1] };
+    let image = Image { film, window, pixels: pixels.collect() };
+    save("buffers", &image, &display, &scene, &settings)
 }
 
 /// Renders one scene into `docs/src/pictures/NAME.png`.

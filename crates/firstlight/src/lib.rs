@@ -112,6 +112,8 @@ pub use transform::{Interpolation, TransformDesc, TransformKeyDesc};
 mod pages {
     #[doc = include_str!("../../../docs/src/library.md")]
     mod library {}
+    #[doc = include_str!("../../../docs/src/buffers.md")]
+    mod buffers {}
     #[doc = include_str!("../../../README.md")]
     mod readme {}
 }
