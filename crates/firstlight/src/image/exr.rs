@@ -65,7 +65,7 @@ fn channels<'a>(file: &PlaneFile<'a>) -> Vec<Channel<'a>> {
     for (plane, numbers) in file.planes {
         let names = plane.channels();
         for (place, name) in names.iter().enumerate() {
-            if *plane == Plane::Color && *name == "A" && numbers.are_opaque() {
+            if *plane == Plane::Color && *name == "A" && is_opaque(numbers) {
                 continue;
             }
             // The picture's are those of the file itself, as readers expect it
@@ -75,6 +75,11 @@ fn channels<'a>(file: &PlaneFile<'a>) -> Vec<Channel<'a>> {
     }
     all.sort_by(|a, b| a.name.cmp(&b.name));
     all
+}
+
+/// Whether every alpha of a picture is 1.
+fn is_opaque(picture: &PlaneNumbers) -> bool {
+    matches!(picture, PlaneNumbers::Floats(numbers) if numbers.iter().skip(3).step_by(4).all(|alpha| *alpha == 1.0))
 }
 
 /// Everything that the file says before its pixels.

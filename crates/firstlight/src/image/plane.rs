@@ -176,16 +176,10 @@ impl PlaneNumbers<'_> {
     }
 }
 
-impl PlaneNumbers<'_> {
-    /// Whether every fourth is 1.
-    pub(super) fn are_opaque(self) -> bool {
-        matches!(self, PlaneNumbers::Floats(numbers) if numbers.iter().skip(3).step_by(4).all(|alpha| *alpha == 1.0))
-    }
-}
-
 /// Planes that go to a file together.
 pub(crate) struct PlaneFile<'a> {
     /// The width and height of the whole film.
+    #[cfg_attr(not(feature = "exr"), allow(dead_code, reason = "only EXR files have a place for it"))]
     pub film: [u32; 2],
     /// The part of it that the planes hold.
     pub window: Window,
