@@ -5,27 +5,16 @@
 //!
 //! Source: numpy, "NEP 1: a simple file format for numpy arrays", version 1.0.
 
-use std::io::{Cursor, Write};
+use std::io::Write;
 
-use zip::write::SimpleFileOptions;
-use zip::{CompressionMethod, DateTime, ZipWriter};
+use rawzip::{CompressionMethod, ZipArchiveWriter};
 
 use super::{ImageError, PlaneFile, PlaneNumbers, Receipt};
 
 /// The bytes of an NPZ file. The planes and the receipt have been checked.
 pub(super) fn encode(file: &PlaneFile, receipt: &Receipt) -> Result<Vec<u8>, ImageError> {
-    let fault = |reason: String| ImageError::Encode { format: "NPZ", reason };
-    // Without a clock: the same film gives the same bytes
-    let options = SimpleFileOptions::default()
-        .compression_method(CompressionMethod::Stored)
-        .last_modified_time(DateTime::default())
-        .large_file(true);
-    let mut archive = ZipWriter::new(Cursor::new(Vec::new()));
-    let mut add = |name: &str, array: Vec<u8>| -> Result<(), ImageError> {
-        archive.start_file(format!("{name}.npy"), options).map_err(|e| fault(e.to_string()))?;
-        archive.write_all(&array).map_err(|e| fault(e.to_string()))
-    };
     let (rows, columns) = (file.window.height, file.window.width);
+    let mut arrays = Vec::new();
     for (plane, numbers) in file.planes {
         let kind = match numbers {
             PlaneNumbers::Floats(_) => "<f4",
@@ -35,16 +24,31 @@ pub(super) fn encode(file: &PlaneFile, receipt: &Receipt) -> Result<Vec<u8>, Ima
             1 => format!("({rows}, {columns})"),
             channels => format!("({rows}, {columns}, {channels})"),
         };
-        add(plane.name(), array(kind, &shape, &numbers.to_le_bytes()))?;
+        arrays.push((plane.name(), array(kind, &shape, &numbers.to_le_bytes())));
     }
     let said: serde_json::Map<_, _> =
         receipt.entries.iter().map(|(key, value)| (key.clone(), value.clone().into())).collect();
     let text = serde_json::Value::Object(said).to_string();
     // numpy's text is UTF-32
     let characters: Vec<u8> = text.chars().flat_map(|c| u32::from(c).to_le_bytes()).collect();
-    add("receipt", array(&format!("<U{}", characters.len() / 4), "()", &characters))?;
-    let bytes = archive.finish().map_err(|e| fault(e.to_string()))?;
-    Ok(bytes.into_inner())
+    arrays.push(("receipt", array(&format!("<U{}", characters.len() / 4), "()", &characters)));
+    archive(&arrays).map_err(|e| ImageError::Encode { format: "NPZ", reason: e.to_string() })
+}
+
+/// An archive of files `NAME.npy`. Without a clock: the same arrays give the same bytes.
+fn archive(arrays: &[(&str, Vec<u8>)]) -> Result<Vec<u8>, rawzip::Error> {
+    let mut bytes = Vec::new();
+    let mut archive = ZipArchiveWriter::new(&mut bytes);
+    for (name, array) in arrays {
+        let name = format!("{name}.npy");
+        let (mut entry, config) = archive.new_file(&name).compression_method(CompressionMethod::STORE).start()?;
+        let mut writer = config.wrap(&mut entry);
+        writer.write_all(array)?;
+        let (_, descriptor) = writer.finish()?;
+        entry.finish(descriptor)?;
+    }
+    archive.finish()?;
+    Ok(bytes)
 }
 
 /// An array with its header: where the numbers begin is a multiple of 64.
@@ -63,21 +67,31 @@ fn array(kind: &str, shape: &str, numbers: &[u8]) -> Vec<u8> {
 
 #[cfg(test)]
 mod tests {
-    use std::io::Read;
-
     use super::super::{Format, Plane, Window};
     use super::*;
 
     /// The kind, shape and numbers of an array.
-    fn read(archive: &mut zip::ZipArchive<Cursor<&[u8]>>, name: &str) -> (String, Vec<u8>) {
-        let mut bytes = Vec::new();
-        archive.by_name(&format!("{name}.npy")).unwrap().read_to_end(&mut bytes).unwrap();
+    fn read(bytes: &[u8]) -> (String, Vec<u8>) {
         assert!(bytes.starts_with(b"\x93NUMPY\x01\x00"));
         let numbers = 10 + usize::from(u16::from_le_bytes([bytes[8], bytes[9]]));
         assert_eq!(numbers % 64, 0);
         let header = String::from_utf8(bytes[10..numbers].to_vec()).unwrap();
         assert!(header.ends_with('\n'));
         (header.trim_end().to_owned(), bytes[numbers..].to_vec())
+    }
+
+    /// The files of an archive, whose sums are checked.
+    fn files(bytes: &[u8]) -> Vec<(String, Vec<u8>)> {
+        let archive = rawzip::ZipArchive::from_slice(bytes).unwrap();
+        let (mut entries, mut files) = (archive.entries(), Vec::new());
+        while let Some(entry) = entries.next_entry().unwrap() {
+            let name = entry.file_path().try_normalize().unwrap().as_ref().to_owned();
+            let entry = archive.get_entry(entry.wayfinder()).unwrap();
+            let mut data = Vec::new();
+            std::io::copy(&mut entry.verifying_reader(entry.data()), &mut data).unwrap();
+            files.push((name, data));
+        }
+        files
     }
 
     #[test]
@@ -94,17 +108,16 @@ mod tests {
         let receipt = Receipt { entries: vec![("name".into(), "Würfel \"1\"".into())] };
         let bytes = file.encode(Format::Npz, &receipt).unwrap();
         assert_eq!(bytes, file.encode(Format::Npz, &receipt).unwrap());
-        let mut archive = zip::ZipArchive::new(Cursor::new(&bytes[..])).unwrap();
-        let names: Vec<_> = archive.file_names().map(|name| name.unwrap().into_owned()).collect();
+        let files = files(&bytes);
+        let names: Vec<_> = files.iter().map(|(name, _)| name.as_str()).collect();
         assert_eq!(names, ["depth.npy", "uv.npy", "object-id.npy", "receipt.npy"]);
         let said =
             |kind: &str, shape: &str| format!("{{'descr': '{kind}', 'fortran_order': False, 'shape': {shape}, }}");
-        for ((plane, numbers), (kind, shape)) in
-            planes.into_iter().zip([("<f4", "(2, 3)"), ("<f4", "(2, 3, 2)"), ("<u4", "(2, 3)")])
-        {
-            assert_eq!(read(&mut archive, plane.name()), (said(kind, shape), numbers.to_le_bytes()));
+        let kinds = [("<f4", "(2, 3)"), ("<f4", "(2, 3, 2)"), ("<u4", "(2, 3)")];
+        for (((_, numbers), (_, file)), (kind, shape)) in planes.into_iter().zip(&files).zip(kinds) {
+            assert_eq!(read(file), (said(kind, shape), numbers.to_le_bytes()));
         }
-        let (header, text) = read(&mut archive, "receipt");
+        let (header, text) = read(&files[3].1);
         let text: String =
             text.chunks(4).map(|c| char::from_u32(u32::from_le_bytes(c.try_into().unwrap())).unwrap()).collect();
         assert_eq!(header, said(&format!("<U{}", text.chars().count()), "()"));
