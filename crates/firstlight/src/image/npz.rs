@@ -10,12 +10,13 @@ use std::io::Write;
 use rawzip::{CompressionMethod, ZipArchiveWriter};
 
 use super::{ImageError, PlaneFile, PlaneNumbers, Receipt};
+use crate::parallel;
 
 /// The bytes of an NPZ file. The planes and the receipt have been checked.
 pub(super) fn encode(file: &PlaneFile, receipt: &Receipt) -> Result<Vec<u8>, ImageError> {
     let (rows, columns) = (file.window.height, file.window.width);
-    let mut arrays = Vec::new();
-    for (plane, numbers) in file.planes {
+    let of_plane = |k: usize| {
+        let (plane, numbers) = file.planes[k];
         let kind = match numbers {
             PlaneNumbers::Floats(_) => "<f4",
             PlaneNumbers::Wholes(_) => "<u4",
@@ -24,8 +25,9 @@ pub(super) fn encode(file: &PlaneFile, receipt: &Receipt) -> Result<Vec<u8>, Ima
             1 => format!("({rows}, {columns})"),
             channels => format!("({rows}, {columns}, {channels})"),
         };
-        arrays.push((plane.name(), array(kind, &shape, &numbers.to_le_bytes())));
-    }
+        (plane.name(), array(kind, &shape, &numbers.to_le_bytes()))
+    };
+    let mut arrays = parallel::collect(file.planes.len(), of_plane);
     let said: serde_json::Map<_, _> =
         receipt.entries.iter().map(|(key, value)| (key.clone(), value.clone().into())).collect();
     let text = serde_json::Value::Object(said).to_string();
@@ -37,7 +39,7 @@ pub(super) fn encode(file: &PlaneFile, receipt: &Receipt) -> Result<Vec<u8>, Ima
 
 /// An archive of files `NAME.npy`. Without a clock: the same arrays give the same bytes.
 fn archive(arrays: &[(&str, Vec<u8>)]) -> Result<Vec<u8>, rawzip::Error> {
-    let mut bytes = Vec::new();
+    let mut bytes = Vec::with_capacity(arrays.iter().map(|(_, array)| array.len() + 256).sum());
     let mut archive = ZipArchiveWriter::new(&mut bytes);
     for (name, array) in arrays {
         let name = format!("{name}.npy");

@@ -2,6 +2,7 @@
 
 use super::{Format, ImageError, Receipt, Window};
 use crate::describe::{Words, words};
+use crate::parallel;
 
 words! {
     /// A buffer: what a plane of the film says of each pixel.
@@ -169,9 +170,12 @@ impl Sampling {
 impl PlaneNumbers<'_> {
     /// Their bytes, the lowest of each first.
     pub fn to_le_bytes(self) -> Vec<u8> {
+        fn bytes<T: Copy>(numbers: &[T], of: impl Fn(T) -> [u8; 4]) -> Vec<u8> {
+            numbers.iter().map(|n| of(*n)).collect::<Vec<[u8; 4]>>().into_flattened()
+        }
         match self {
-            PlaneNumbers::Floats(numbers) => numbers.iter().flat_map(|n| n.to_le_bytes()).collect(),
-            PlaneNumbers::Wholes(numbers) => numbers.iter().flat_map(|n| n.to_le_bytes()).collect(),
+            PlaneNumbers::Floats(numbers) => bytes(numbers, f32::to_le_bytes),
+            PlaneNumbers::Wholes(numbers) => bytes(numbers, u32::to_le_bytes),
         }
     }
 }
@@ -208,8 +212,9 @@ impl PlaneFile<'_> {
         if matches!(self.planes, [(Plane::Color, _)]) {
             return receipt;
         }
-        for (plane, numbers) in self.planes {
-            let (channels, hash) = (plane.channels().join(" "), blake3::hash(&numbers.to_le_bytes()).to_hex());
+        let hashes = parallel::collect(self.planes.len(), |k| blake3::hash(&self.planes[k].1.to_le_bytes()).to_hex());
+        for ((plane, _), hash) in self.planes.iter().zip(hashes) {
+            let channels = plane.channels().join(" ");
             let (kind, unit, space) = (plane.number_type(), plane.unit(), plane.space());
             let said = format!(
                 "channels {channels}; {kind}; unit {unit}; space {space}; {}; blake3 {hash}",
