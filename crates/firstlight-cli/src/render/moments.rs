@@ -165,20 +165,20 @@ fn encoded(
     let receipt = scene.receipt(settings);
     let of_buffers = scene.buffers_receipt(settings, buffers);
     // Before the film becomes the picture
-    let with_buffers = outputs
-        .iter()
-        .map(|output| output.takes_buffers().then(|| film.encode(buffers, output.format, &of_buffers)))
-        .collect::<Vec<_>>();
+    let mut encoded = Vec::new();
+    for output in outputs {
+        let takes = output.takes_buffers();
+        encoded.push(if takes { film.encode(buffers, output.format, &of_buffers)? } else { Vec::new() });
+    }
     let own = scene.display();
     let display = Display { exposure: plan.exposure.unwrap_or(own.exposure), ..own };
     let image = settings.buffers.contains(&Plane::Color).then(|| film.develop());
-    let encode = |(output, bytes): (&Output, Option<Result<Vec<u8>, ImageError>>)| match (bytes, &heat, &image) {
-        (Some(bytes), ..) => bytes,
-        (None, Some(heat), _) if output.content == Content::Heat => {
-            heat.encode(output.format, &Display::default(), &receipt)
-        }
-        (None, _, Some(image)) => image.encode(output.format, &display, &receipt),
-        (None, ..) => unreachable!("a film has what its outputs show"),
-    };
-    outputs.iter().zip(with_buffers).map(encode).collect()
+    for (bytes, output) in encoded.iter_mut().zip(outputs).filter(|(_, output)| !output.takes_buffers()) {
+        *bytes = match (output.content, &heat, &image) {
+            (Content::Heat, Some(heat), _) => heat.encode(output.format, &Display::default(), &receipt)?,
+            (Content::Scene, _, Some(image)) => image.encode(output.format, &display, &receipt)?,
+            _ => unreachable!("a film has what its outputs show"),
+        };
+    }
+    Ok(encoded)
 }

@@ -279,3 +279,17 @@ fn nothing_else_decides_them() {
     assert!(floats(&alpha, Plane::Alpha).iter().zip(&alone.pixels).all(|(alpha, pixel)| *alpha == pixel[3]));
     assert!(floats(&alpha, Plane::Alpha).contains(&0.0));
 }
+
+#[test]
+fn lists_that_ask_for_nothing_or_twice_are_refused_and_centre_rays_counted() {
+    let scene = scene(SCENE);
+    assert!(of(&[]).check(&scene).unwrap_err().contains("asks for nothing"));
+    assert!(of(&[Plane::Depth, Plane::Uv, Plane::Depth]).check(&scene).unwrap_err().contains("\"depth\""));
+    let rays = |settings: &RenderSettings| match render(&scene, settings, &|_, _| ControlFlow::Continue(())) {
+        ControlFlow::Continue((_, stats)) => stats.camera_rays,
+        ControlFlow::Break(()) => unreachable!("nothing stops this render"),
+    };
+    let pixels = 90 * 70;
+    assert_eq!(rays(&of(&[Plane::Depth])), pixels);
+    assert_eq!(rays(&of(&[Plane::Color, Plane::Depth])), rays(&of(&[Plane::Color])) + pixels);
+}

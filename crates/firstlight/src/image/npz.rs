@@ -10,13 +10,29 @@ use std::io::Write;
 use rawzip::{CompressionMethod, ZipArchiveWriter};
 
 use super::{ImageError, PlaneFile, PlaneNumbers, Receipt};
-use crate::parallel;
 
 /// The bytes of an NPZ file. The planes and the receipt have been checked.
 pub(super) fn encode(file: &PlaneFile, receipt: &Receipt) -> Result<Vec<u8>, ImageError> {
+    archive(file, receipt).map_err(|e| ImageError::Encode { format: "NPZ", reason: e.to_string() })
+}
+
+/// An archive of files `NAME.npy`. Without a clock: the same arrays give the same bytes.
+fn archive(file: &PlaneFile, receipt: &Receipt) -> Result<Vec<u8>, rawzip::Error> {
     let (rows, columns) = (file.window.height, file.window.width);
-    let of_plane = |k: usize| {
-        let (plane, numbers) = file.planes[k];
+    let room: usize = file.planes.iter().map(|(plane, _)| plane.bytes()).sum();
+    let mut bytes = Vec::with_capacity(room * rows as usize * columns as usize);
+    let mut archive = ZipArchiveWriter::new(&mut bytes);
+    let mut add = |name: &str, array: Vec<u8>| -> Result<(), rawzip::Error> {
+        let name = format!("{name}.npy");
+        let (mut entry, config) = archive.new_file(&name).compression_method(CompressionMethod::STORE).start()?;
+        let mut writer = config.wrap(&mut entry);
+        writer.write_all(&array)?;
+        let (_, descriptor) = writer.finish()?;
+        entry.finish(descriptor)?;
+        Ok(())
+    };
+    // One after the other: beside the archive there is a copy of one plane at a time
+    for (plane, numbers) in file.planes {
         let kind = match numbers {
             PlaneNumbers::Floats(_) => "<f4",
             PlaneNumbers::Wholes(_) => "<u4",
@@ -25,30 +41,14 @@ pub(super) fn encode(file: &PlaneFile, receipt: &Receipt) -> Result<Vec<u8>, Ima
             1 => format!("({rows}, {columns})"),
             channels => format!("({rows}, {columns}, {channels})"),
         };
-        (plane.name(), array(kind, &shape, &numbers.to_le_bytes()))
-    };
-    let mut arrays = parallel::collect(file.planes.len(), of_plane);
+        add(plane.name(), array(kind, &shape, &numbers.to_le_bytes()))?;
+    }
     let said: serde_json::Map<_, _> =
         receipt.entries.iter().map(|(key, value)| (key.clone(), value.clone().into())).collect();
     let text = serde_json::Value::Object(said).to_string();
     // numpy's text is UTF-32
     let characters: Vec<u8> = text.chars().flat_map(|c| u32::from(c).to_le_bytes()).collect();
-    arrays.push(("receipt", array(&format!("<U{}", characters.len() / 4), "()", &characters)));
-    archive(&arrays).map_err(|e| ImageError::Encode { format: "NPZ", reason: e.to_string() })
-}
-
-/// An archive of files `NAME.npy`. Without a clock: the same arrays give the same bytes.
-fn archive(arrays: &[(&str, Vec<u8>)]) -> Result<Vec<u8>, rawzip::Error> {
-    let mut bytes = Vec::with_capacity(arrays.iter().map(|(_, array)| array.len() + 256).sum());
-    let mut archive = ZipArchiveWriter::new(&mut bytes);
-    for (name, array) in arrays {
-        let name = format!("{name}.npy");
-        let (mut entry, config) = archive.new_file(&name).compression_method(CompressionMethod::STORE).start()?;
-        let mut writer = config.wrap(&mut entry);
-        writer.write_all(array)?;
-        let (_, descriptor) = writer.finish()?;
-        entry.finish(descriptor)?;
-    }
+    add("receipt", array(&format!("<U{}", characters.len() / 4), "()", &characters))?;
     archive.finish()?;
     Ok(bytes)
 }

@@ -106,21 +106,16 @@ impl<'a> Center<'a> {
         let Frame { right, up, forward, origin, position, .. } = camera.frame();
         let from_camera =
             |v: DVec3| CenterValue::Floats([*right, *up, -*forward].map(|axis| axis.as_dvec3().dot(v) as f32));
-        let [ng, ns] = match plane {
-            Plane::Normal | Plane::NormalCamera | Plane::NormalGeometric | Plane::NormalGeometricCamera => {
-                self.normals()
-            }
-            _ => [Vec3::ZERO; 2],
-        };
+        let (ng, ns) = (|| self.normals()[0], || self.normals()[1]);
         match plane {
             Plane::Depth => float(forward.as_dvec3().dot(d) * t),
             Plane::Distance => float(d.length() * t),
             Plane::Position => vector((self.p() + *origin).as_vec3()),
             Plane::PositionCamera => from_camera(self.p() + *origin - *position),
-            Plane::Normal => vector(ns),
-            Plane::NormalCamera => from_camera(ns.as_dvec3()),
-            Plane::NormalGeometric => vector(ng),
-            Plane::NormalGeometricCamera => from_camera(ng.as_dvec3()),
+            Plane::Normal => vector(ns()),
+            Plane::NormalCamera => from_camera(ns().as_dvec3()),
+            Plane::NormalGeometric => vector(ng()),
+            Plane::NormalGeometricCamera => from_camera(ng().as_dvec3()),
             Plane::Tangent => {
                 let along_u = self.surface.map(|_| geometry.tangents(&self.ray, &self.hit)[0]);
                 vector(along_u.map_or(Vec3::ZERO, |along| along.normalize_or_zero().as_vec3()))

@@ -137,6 +137,9 @@ impl RenderSettings {
         if !(min..=max).contains(&self.tile_size) {
             return Err(format!("tile size {} is outside {min} to {max}", self.tile_size));
         }
+        if let Some(fault) = Plane::fault_of(&self.buffers) {
+            return Err(format!("buffers: {fault}"));
+        }
         if !self.simd.is_available() {
             let names: Vec<_> = SimdLevel::available().iter().map(|level| level.name()).collect();
             return Err(format!("this processor has no {}; it has {}", self.simd.name(), names.join(", ")));
@@ -161,8 +164,8 @@ impl RenderSettings {
         Ok(())
     }
 
-    /// Whether there is memory for the film, and for the file that is made of it. For settings that
-    /// [`check`](Self::check) has passed.
+    /// Whether there is memory for the film, and for the largest file that can be made of it, an archive of arrays. For
+    /// settings that [`check`](Self::check) has passed.
     ///
     /// # Errors
     /// How much it takes, and what to do.
@@ -179,13 +182,10 @@ impl RenderSettings {
         }
         let window = self.window(scene);
         let pixel: usize = self.buffers.iter().map(|plane| plane.bytes()).sum();
-        let film = window.width as usize * window.height as usize * pixel;
-        Vec::<u8>::new().try_reserve_exact(film + film / 2).map_err(|_| {
+        let both = 2 * window.width as usize * window.height as usize * pixel;
+        Vec::<u8>::new().try_reserve_exact(both).map_err(|_| {
             let Window { width, height, .. } = window;
-            format!(
-                "{width} x {height} pixels take {} bytes, more than there is; render parts with a crop",
-                film + film / 2
-            )
+            format!("{width} x {height} pixels take {both} bytes, more than there is; render parts with a crop")
         })
     }
 
@@ -330,7 +330,10 @@ pub fn render(
                 rendered
             }
         };
-        let ControlFlow::Continue(counts) = rendered else { return };
+        let ControlFlow::Continue(mut counts) = rendered else { return };
+        if of_centers {
+            counts.camera_rays += tile.width as u64 * tile.height as u64;
+        }
         {
             let (film, stats) = &mut *result.lock().expect("no thread panics while it holds the film");
             film.merge(&film_tile);
