@@ -7,14 +7,24 @@ use crate::parallel;
 words! {
     /// A buffer: what a plane of the film says of each pixel.
     ///
-    /// `color` and `alpha` are means over the pixel. All others are of its centre ray, and never averaged: what it
-    /// meets first, a shape or a visible light, as the camera sees it. Where it meets nothing, `depth` and `distance`
-    /// are infinite and all others 0.
+    /// `color`, `alpha` and the terms that `color` is the sum of, `background` to `specular`, are means over the pixel.
+    /// All others are of its centre ray, and never averaged: what it meets first, a shape or a visible light, as the
+    /// camera sees it. Where it meets nothing, `depth` and `distance` are infinite and all others 0.
     pub enum Plane {
         /// The picture, with its alpha.
         Color = "color",
         /// The share of the pixel that is covered; 1 where the scene is not transparent.
         Alpha = "alpha",
+        /// What of the picture is the scene's background.
+        Background = "background",
+        /// What of it is lights that are seen.
+        Emission = "emission",
+        /// What of it is light from everywhere, the scene's `ambient`.
+        Ambient = "ambient",
+        /// What of it lights send by the diffuse reflection of surfaces, of all lights together.
+        Diffuse = "diffuse",
+        /// What of it lights send by highlights, of all lights together.
+        Specular = "specular",
         /// How far away it is along the line of sight of the camera, as in a depth map: from the eye's plane, or the
         /// film of an orthographic camera.
         Depth = "depth",
@@ -80,6 +90,7 @@ impl Plane {
         match self {
             Color => &["R", "G", "B", "A"],
             Alpha => &["A"],
+            Background | Emission | Ambient | Diffuse | Specular => &["R", "G", "B"],
             Depth | Distance => &["Z"],
             Position | PositionCamera => &["X", "Y", "Z"],
             Normal | NormalCamera | NormalGeometric | NormalGeometricCamera | Tangent => &["X", "Y", "Z"],
@@ -103,7 +114,7 @@ impl Plane {
     pub fn unit(self) -> &'static str {
         use Plane::*;
         match self {
-            Color => "linear Rec. 709, premultiplied",
+            Color | Background | Emission | Ambient | Diffuse | Specular => "linear Rec. 709, premultiplied",
             Depth | Distance | Position | PositionCamera => "m",
             Rays => "rays",
             _ => "1",
@@ -125,6 +136,7 @@ impl Plane {
     pub fn sampling(self) -> Sampling {
         match self {
             Plane::Color | Plane::Alpha => Sampling::Filtered,
+            plane if plane.is_of_terms() => Sampling::Filtered,
             Plane::Rays => Sampling::Counted,
             _ => Sampling::Center,
         }
@@ -143,6 +155,12 @@ impl Plane {
         }
         let twice = planes.iter().enumerate().find(|(i, plane)| planes[..*i].contains(plane));
         twice.map(|(_, plane)| format!("\"{}\" is given twice", plane.name()))
+    }
+
+    /// Whether it is the sum of some of the terms of `color`.
+    pub(crate) fn is_of_terms(self) -> bool {
+        use Plane::*;
+        matches!(self, Background | Emission | Ambient | Diffuse | Specular)
     }
 
     /// Whether the centre ray of a pixel says it.

@@ -18,6 +18,7 @@ mod behind;
 mod primary;
 mod squares;
 
+use std::iter;
 use std::ops::{ControlFlow, Range};
 
 use super::film::FilmTile;
@@ -26,15 +27,16 @@ use super::grid::{Block, Grid};
 use super::hits::{PixelHits, PixelRays};
 use super::light_queue::{Answer, LightQueue, LitPlace, Request, Sight};
 use super::many::Many;
-use super::resolve::{LightTerm, PixelTerms};
+use super::resolve::{LightTerm, PixelTerms, ScaledTerm, Term, TermSums};
 use super::solo::{self, Candidate};
 use super::square::Square;
 use super::tile::Tile;
 use super::together::{Together, salt};
 use super::{AaMode, Counts, Heat};
 use crate::color::Rgb;
+use crate::image::Plane;
 use crate::integrate::TOLERANCE;
-use crate::material::{Bsdf, Moments};
+use crate::material::{Bsdf, MOMENTS, Moments};
 use crate::scene::Scene;
 use behind::Behind;
 
@@ -94,8 +96,7 @@ pub(crate) struct Cells<'a> {
     corner: [u32; 2],
     /// Pixel by pixel of the cell.
     states: Vec<PixelState>,
-    colors: Vec<[f32; 4]>,
-    work: Vec<f32>,
+    sums: TermSums,
     blocks: Vec<Block>,
     /// The materials of blocks whose pixels differ, pixel by pixel.
     patchwork: Vec<(Option<Bsdf>, Contrast)>,
@@ -127,7 +128,7 @@ pub(crate) struct Cells<'a> {
 }
 
 impl<'a> Cells<'a> {
-    pub fn new(scene: &'a Scene, mode: AaMode, lights: LightQueue<'a>) -> Self {
+    pub fn new(scene: &'a Scene, mode: AaMode, lights: LightQueue<'a>, planes: &[Plane]) -> Self {
         let pixel_rays = PixelRays::new(lights.arrivals.level(), scene.antialiasing);
         let hits = PixelHits::new(lights.arrivals.level(), scene.antialiasing);
         let many = lights.arrivals.tree().map(|tree| Many::new(scene, tree));
@@ -140,8 +141,7 @@ impl<'a> Cells<'a> {
             near: Default::default(),
             corner: [0; 2],
             states: vec![PixelState::Done; PIXELS],
-            colors: vec![[0.0; 4]; PIXELS],
-            work: vec![0.0; PIXELS],
+            sums: TermSums::new(PIXELS, planes),
             blocks: Vec::new(),
             patchwork: Vec::new(),
             pixels: Vec::new(),
@@ -189,7 +189,7 @@ impl<'a> Cells<'a> {
             return lit;
         }
         self.grid.light(self.scene, &mut self.lights, &self.blocks, counts, go_on)?;
-        self.work.iter_mut().zip(self.grid.work()).for_each(|(work, more)| *work += more);
+        self.sums.work.iter_mut().zip(self.grid.work()).for_each(|(work, more)| *work += more);
         self.fragments(counts);
         self.behind(counts, go_on)?;
         self.middles(counts, go_on)?;
@@ -203,7 +203,7 @@ impl<'a> Cells<'a> {
         self.corner = corner;
         self.lights.arrivals.begin();
         self.states.fill(PixelState::Done);
-        self.work.fill(0.0);
+        self.sums.work.fill(0.0);
         self.blocks.clear();
         self.patchwork.clear();
         self.pixels.clear();
@@ -236,16 +236,16 @@ impl<'a> Cells<'a> {
             }
         }
         self.add_ambient();
-        let Cells { fragments, pixels, colors, work, lights, .. } = self;
+        let Cells { fragments, pixels, sums, lights, .. } = self;
         for Pixel { index, terms } in pixels.iter() {
-            colors[*index as usize] = terms.resolve(scene, std::iter::empty());
+            terms.resolve(scene, iter::empty(), *index as usize, sums);
         }
         let pixel = |fragment: usize| &pixels[fragments.all[fragment].pixel as usize];
         many.begin(fragments, size, |fragment| pixel(fragment).index);
         many.light(fragments, &mut lights.arrivals, counts, go_on, |fragment, sent, took| {
             let Pixel { index, terms } = *pixel(fragment);
-            colors[index as usize] = terms.resolve(scene, sent.iter().copied());
-            work[index as usize] += took;
+            terms.resolve(scene, sent.iter().copied(), index as usize, sums);
+            sums.work[index as usize] += took;
         })
     }
 
@@ -299,57 +299,58 @@ impl<'a> Cells<'a> {
         }
     }
 
-    /// Sets the colours of those pixels of a block of one material that need nothing beside the grid.
+    /// Sums the pixels of a block of one material; those that need nothing beside the grid are done.
     fn tell(&mut self, block: &Block) {
         let scene = self.scene;
         let Square { x, y, side } = block.square;
         let columns = side.min(scene.width - x) as usize;
         for j in y..(y + side).min(scene.height) {
-            let mut colors = [scene.ambient * block.bsdf.ambient; CELL as usize];
+            let first = self.index([x, j]);
             let mut told = [true; CELL as usize];
+            self.sums.begin(first..first + columns, Rgb::BLACK, 1.0);
+            self.sums.add(first, Term::Ambient, iter::repeat_n(scene.ambient * block.bsdf.ambient, columns));
             for light in 0..scene.lights.len() {
                 let scale = self.lights.arrivals.scale(light);
                 let row = self.grid.row(light, [x, j], columns);
-                for ((color, told), sums) in colors.iter_mut().zip(&mut told).zip(row) {
-                    *told &= sums.is_known();
-                    for part in block.bsdf.colors.each(sums).0 {
-                        *color += scale * part;
-                    }
+                told.iter_mut().zip(row).for_each(|(told, arrived)| *told &= arrived.is_known());
+                for moment in 0..MOMENTS {
+                    let part = |arrived: &Moments| scale * block.bsdf.colors.each(arrived).0[moment];
+                    self.sums.add(first, Term::Light(Some(light as u32), moment), row.iter().map(part));
                 }
             }
-            let first = self.index([x, j]);
-            for (k, color) in colors.iter().enumerate().take(columns).filter(|(k, _)| told[*k]) {
-                self.colors[first + k] = [color.r, color.g, color.b, 1.0];
+            for k in (0..columns).filter(|k| told[*k]) {
                 self.states[first + k] = PixelState::Done;
             }
         }
     }
 
     /// Whether a pixel of a block whose materials differ, the first of which has that number, needs nothing beside the
-    /// grid; then its colour is set.
+    /// grid; it is summed as far as that is known.
     fn is_told(&mut self, at: [u32; 2], square: Square, first: usize) -> bool {
         let scene = self.scene;
         let index = self.index(at);
         let Square { x, y, side } = square;
         let (bsdf, contrast) = self.patchwork[first + ((at[1] - y) * side + at[0] - x) as usize];
         let Some(bsdf) = bsdf else { return false };
-        let mut color = scene.ambient * bsdf.ambient;
+        self.sums.begin(index..index + 1, Rgb::BLACK, 1.0);
+        self.sums.add(index, Term::Ambient, iter::once(scene.ambient * bsdf.ambient));
         let mut slopes = Rgb::BLACK;
         for light in 0..scene.lights.len() {
-            let Some(sums) = self.grid.arrived(light, at) else { return false };
+            let Some(arrived) = self.grid.arrived(light, at) else { return false };
             let scale = self.lights.arrivals.scale(light);
-            for part in bsdf.colors.each(&sums).0 {
-                color += scale * part;
+            for (moment, part) in bsdf.colors.each(&arrived).0.into_iter().enumerate() {
+                self.sums.add(index, Term::Light(Some(light as u32), moment), iter::once(scale * part));
             }
             if contrast != Contrast::default() {
                 let Some(slope) = self.grid.slope(light, at, square) else { return false };
                 slopes += scale * contrast.of(&slope) * 0.125;
             }
         }
-        if contrast != Contrast::default() && self.lights.arrivals.steps(color, slopes) > TOLERANCE.mingled {
+        if contrast != Contrast::default()
+            && self.lights.arrivals.steps(self.sums.color(index), slopes) > TOLERANCE.mingled
+        {
             return false;
         }
-        self.colors[index] = [color.r, color.g, color.b, 1.0];
         self.states[index] = PixelState::Done;
         true
     }
@@ -387,7 +388,7 @@ impl<'a> Cells<'a> {
             let answer = self.answers[next];
             next += 1;
             let Fragment { pixel, count, .. } = self.fragments.all[fragment as usize];
-            self.work[self.pixels[pixel as usize].index as usize] += Heat::PLACE;
+            self.sums.work[self.pixels[pixel as usize].index as usize] += Heat::PLACE;
             let is_dark = answer.sums == Moments::default();
             let is_known = answer.sums.is_known();
             if is_known && (count == 1 || answer.smooth && (is_dark || self.is_nearly_even(fragment, light, &answer))) {
@@ -425,7 +426,7 @@ impl<'a> Cells<'a> {
             let quadrants = fragments.quadrants(fragment);
             let answers = &self.answers[next..next + quadrants.len()];
             next += answers.len();
-            self.work[self.pixels[fragment.pixel as usize].index as usize] += Heat::PLACE * answers.len() as f32;
+            self.sums.work[self.pixels[fragment.pixel as usize].index as usize] += Heat::PLACE * answers.len() as f32;
             if answers.is_empty() || !self.is_even(fragment, wanted.light as usize, answers) {
                 self.refused.push(*wanted);
                 continue;
@@ -550,7 +551,7 @@ impl<'a> Cells<'a> {
             let asked = self.asked[*fragment as usize];
             let fragment = &self.fragments.all[*fragment as usize];
             let index = self.pixels[fragment.pixel as usize].index as usize;
-            self.work[index] += Heat::PLACE * fragment.count() as f32;
+            self.sums.work[index] += Heat::PLACE * fragment.count() as f32;
             let at = self.at(index);
             let term = &mut self.terms[fragment.pixel as usize * scene.lights.len() + *light as usize];
             // Rays of which no batch knows what they see ask points of the light together
@@ -572,7 +573,7 @@ impl<'a> Cells<'a> {
                 go_on()?;
                 let before = counts.work();
                 *term += together.finish(&mut self.lights.arrivals, counts).terms;
-                self.work[index] += counts.work() - before;
+                self.sums.work[index] += counts.work() - before;
             }
         }
         ControlFlow::Continue(())
@@ -584,7 +585,7 @@ impl<'a> Cells<'a> {
             let index = self.pixels[self.fragments.all[fragment].pixel as usize].index as usize;
             let at = self.at(index);
             self.fragments.trace(self.scene, fragment, self.pixel_rays.of(self.scene, at));
-            self.work[index] += self.fragments.all[fragment].count() as f32;
+            self.sums.work[index] += self.fragments.all[fragment].count() as f32;
             counts.looks += self.fragments.all[fragment].count() as u64;
         }
     }
@@ -597,15 +598,15 @@ impl<'a> Cells<'a> {
         }
     }
 
-    /// Makes colours of what is known.
+    /// Sums what is known of pixels.
     fn resolve(&mut self) {
         self.add_ambient();
         let scene = self.scene;
         let lights = scene.lights.len();
         for (number, pixel) in self.pixels.iter().enumerate() {
-            let terms = self.terms[number * lights..][..lights].iter().copied();
             let scales = self.lights.arrivals.scales().iter().copied();
-            self.colors[pixel.index as usize] = pixel.terms.resolve(scene, scales.zip(terms));
+            let lit = ScaledTerm::of_all(scales, &self.terms[number * lights..][..lights]);
+            pixel.terms.resolve(scene, lit, pixel.index as usize, &mut self.sums);
         }
     }
 
@@ -617,7 +618,7 @@ impl<'a> Cells<'a> {
         for j in top.max(tile.y)..(top + CELL).min(tile.y + tile.height) {
             let row = self.index([columns.start, j])..self.index([columns.start, j]) + columns.len();
             counts.camera_rays += rays * columns.len() as u64;
-            film.set_row(columns.start - tile.x, j - tile.y, &self.colors[row.clone()], &self.work[row]);
+            film.set_row(columns.start - tile.x, j - tile.y, &self.sums, row);
         }
     }
 }

@@ -126,7 +126,7 @@ impl<'a> Center<'a> {
             Plane::MaterialId => CenterValue::Whole(self.surface.map_or(0, |surface| surface.material.0 + 1)),
             Plane::PrimitiveId => CenterValue::Whole(geometry.primitive(&self.hit).map_or(0, |number| number + 1)),
             Plane::FaceOrientation => CenterValue::Whole(if self.front().dot(self.ray.d) < 0.0 { 1 } else { 2 }),
-            Plane::Color | Plane::Alpha | Plane::Rays => unreachable!("they are not of the centre"),
+            _ => unreachable!("{} is not of the centre", plane.name()),
         }
     }
 }

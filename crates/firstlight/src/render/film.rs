@@ -1,6 +1,9 @@
 //! Where pixels are collected: planes of one size, each of one thing, those that were asked for.
 
+use std::ops::Range;
+
 use super::heat::Heat;
+use super::resolve::TermSums;
 use super::tile::Tile;
 use crate::image::{Format, Image, ImageError, Plane, PlaneFile, PlaneNumbers, Receipt, Window};
 
@@ -154,27 +157,34 @@ impl FilmTile {
         FilmTile { tile: *tile, planes: empty(planes.iter().copied(), pixels) }
     }
 
-    /// Notes what the pixel in column `x`, row `y` of the tile shows, red, green, blue premultiplied, alpha; and what
-    /// it took.
+    /// Notes what pixels side by side show, from column `x`, row `y` of the tile on: `some` of `sums`.
     #[inline(always)]
-    pub fn set(&mut self, x: u32, y: u32, rgba: [f32; 4], work: f32) {
-        self.set_row(x, y, &[rgba], &[work]);
-    }
-
-    /// The same of pixels side by side.
-    #[inline(always)]
-    pub fn set_row(&mut self, x: u32, y: u32, rgba: &[[f32; 4]], work: &[f32]) {
+    pub fn set_row(&mut self, x: u32, y: u32, sums: &TermSums, some: Range<usize>) {
         let index = (y * self.tile.width + x) as usize;
+        let here = index..index + some.len();
         for (plane, values) in &mut self.planes {
-            match (plane, values) {
-                (Plane::Color, Values::Four(pixels)) => pixels[index..index + rgba.len()].copy_from_slice(rgba),
-                (Plane::Alpha, Values::One(pixels)) => {
-                    pixels[index..index + rgba.len()].iter_mut().zip(rgba).for_each(|(to, from)| *to = from[3]);
+            match (*plane, values) {
+                (Plane::Color, Values::Four(pixels)) => {
+                    pixels[here.clone()].copy_from_slice(&sums.colors[some.clone()])
                 }
-                (Plane::Rays, Values::One(pixels)) => pixels[index..index + work.len()].copy_from_slice(work),
+                (Plane::Alpha, Values::One(pixels)) => {
+                    let colors = &sums.colors[some.clone()];
+                    pixels[here.clone()].iter_mut().zip(colors).for_each(|(to, from)| *to = from[3]);
+                }
+                (Plane::Rays, Values::One(pixels)) => pixels[here.clone()].copy_from_slice(&sums.work[some.clone()]),
+                (plane, Values::Three(pixels)) => {
+                    if let Some(kept) = sums.kept(plane) {
+                        pixels[here.clone()].copy_from_slice(&kept[some.clone()]);
+                    }
+                }
                 _ => {}
             }
         }
+    }
+
+    /// The planes it has.
+    pub fn planes(&self) -> Vec<Plane> {
+        self.planes.iter().map(|(plane, _)| *plane).collect()
     }
 
     /// Notes what the centre ray of a pixel says, plane by plane of those that ask it.

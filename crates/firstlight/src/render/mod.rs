@@ -73,6 +73,7 @@ use light_queue::LightQueue;
 use lights::Lights;
 use pixel::{Lighting, PixelSum};
 use plain::Plain;
+use resolve::TermSums;
 use shafts::Shafts;
 use tile::Tile;
 
@@ -323,7 +324,7 @@ pub fn render(
                 let used = spare.lock().expect("no thread panics while it holds a renderer").pop();
                 let mut cells = used.unwrap_or_else(|| {
                     let queue = LightQueue::new(scene, Arrivals::new(scene, &lights, token));
-                    Cells::new(scene, renderer.aa_mode(), queue)
+                    Cells::new(scene, renderer.aa_mode(), queue, planes)
                 });
                 let rendered = cells.render(film, &go_on);
                 spare.lock().expect("no thread panics while it holds a renderer").push(cells);
@@ -382,6 +383,7 @@ fn render_tile(
     let tile = film.tile;
     let mut counts = Counts::default();
     let mut pixel = PixelSum::new(scene);
+    let mut sums = TermSums::new(1, &film.planes());
     let rays = (scene.antialiasing * scene.antialiasing) as f32;
     let side = hits.as_ref().map_or(1, PixelHits::side);
     for top in (0..tile.height).step_by(side as usize) {
@@ -399,7 +401,9 @@ fn render_tile(
                 let at = [tile.x + left + x, tile.y + top + y];
                 let before = counts.work();
                 pixel.sample(scene, at, lighting, hit, &mut counts, go_on)?;
-                film.set(left + x, top + y, pixel.color(scene), rays + counts.work() - before);
+                pixel.resolve(scene, 0, &mut sums);
+                sums.work[0] = rays + counts.work() - before;
+                film.set_row(left + x, top + y, &sums, 0..1);
             }
         }
     }

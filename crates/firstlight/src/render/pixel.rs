@@ -3,7 +3,7 @@
 use std::ops::ControlFlow;
 
 use super::hits::camera_ray;
-use super::resolve::{LightTerm, PixelTerms};
+use super::resolve::{LightTerm, PixelTerms, ScaledTerm, TermSums};
 use super::{Counts, QUESTION_EVERY};
 use crate::ids::LightId;
 use crate::material::{Bsdf, Lobe, MOMENTS, Moments};
@@ -125,9 +125,9 @@ impl PixelSum {
         }
     }
 
-    /// The mean, as film: red, green, blue premultiplied, alpha.
-    pub fn color(&self, scene: &Scene) -> [f32; 4] {
+    /// Makes pixel `at` of `sums` the mean.
+    pub fn resolve(&self, scene: &Scene, at: usize, sums: &mut TermSums) {
         let scales = scene.lights.iter().map(|light| light.scale);
-        self.terms.resolve(scene, scales.zip(self.lights.iter().copied()))
+        self.terms.resolve(scene, ScaledTerm::of_all(scales, &self.lights), at, sums);
     }
 }

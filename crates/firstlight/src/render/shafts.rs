@@ -11,6 +11,7 @@ use fearless_simd::Level;
 use super::film::FilmTile;
 use super::hits::{PixelHits, camera_ray};
 use super::pixel::PixelSum;
+use super::resolve::TermSums;
 use super::sampled::Sampled;
 use super::{Counts, QUESTION_EVERY};
 use crate::ids::LightId;
@@ -56,6 +57,7 @@ impl<'a> Shafts<'a> {
         let side = self.hits.side();
         let rays = (self.scene.antialiasing * self.scene.antialiasing) as f32;
         let mut pixels: Vec<(PixelSum, usize)> = (0..side * side).map(|_| (PixelSum::new(self.scene), 0)).collect();
+        let mut sums = TermSums::new(1, &film.planes());
         for top in (0..tile.height).step_by(side as usize) {
             for left in (0..tile.width).step_by(side as usize) {
                 let (w, h) = ((tile.width - left).min(side), (tile.height - top).min(side));
@@ -66,7 +68,9 @@ impl<'a> Shafts<'a> {
                 let work = rays + (counts.work() - before) / pixels.len() as f32;
                 for (i, (pixel, _)) in pixels.iter().enumerate() {
                     let (x, y) = (i as u32 % w, i as u32 / w);
-                    film.set(left + x, top + y, pixel.color(self.scene), work);
+                    pixel.resolve(self.scene, 0, &mut sums);
+                    sums.work[0] = work;
+                    film.set_row(left + x, top + y, &sums, 0..1);
                 }
             }
         }

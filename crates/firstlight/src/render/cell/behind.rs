@@ -257,7 +257,7 @@ impl Cells<'_> {
                 let index = self.pixel_of(fragment);
                 let before = counts.work();
                 let terms = together.settle(&mut self.lights.arrivals, counts).terms;
-                self.work[index] += each + counts.work() - before;
+                self.sums.work[index] += each + counts.work() - before;
                 self.behind.known[fragment * lights + light] = FragmentSight::Settled(terms);
             }
             sights.views.iter_mut().filter_map(Option::take).for_each(|view| self.lights.arrivals.keep(view));
@@ -360,7 +360,7 @@ impl Cells<'_> {
         let [together] = together;
         let outcome = together.settle(&mut self.lights.arrivals, counts);
         let index = self.pixel_of(fragment);
-        self.work[index] += counts.work() - before;
+        self.sums.work[index] += counts.work() - before;
         sights.views.iter_mut().filter_map(Option::take).for_each(|view| self.lights.arrivals.keep(view));
         self.behind.sights.push(sights);
         self.behind.block = block;

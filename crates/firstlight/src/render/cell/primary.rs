@@ -39,10 +39,10 @@ impl Cells<'_> {
         pyramid.candidates(scene, &outer[depth - 1], near);
         let n = scene.antialiasing;
         if near.is_empty() {
-            let color = PixelTerms { background: n * n, ..PixelTerms::default() }.resolve(scene, std::iter::empty());
+            let terms = PixelTerms { background: n * n, ..PixelTerms::default() };
             for at in square.pixels().filter(|[i, j]| *i < scene.width && *j < scene.height) {
                 let index = self.index(at);
-                self.colors[index] = color;
+                terms.resolve(scene, std::iter::empty(), index, &mut self.sums);
             }
             return;
         }
@@ -136,7 +136,7 @@ impl Cells<'_> {
     /// A pixel whose terms are to be summed, from so many rays.
     pub(super) fn pixel(&mut self, at: [u32; 2], rays: u32, counts: &mut Counts) -> Pixel {
         let index = self.index(at);
-        self.work[index] += rays as f32;
+        self.sums.work[index] += rays as f32;
         counts.looks += u64::from(rays);
         self.states[index] = PixelState::Traced;
         self.terms.resize(self.terms.len() + self.few, LightTerm::BLACK);

@@ -13,7 +13,7 @@ use crate::render::arrival::{ArrivalPlace, Arrivals};
 use crate::render::counts::Counts;
 use crate::render::fence::Fence;
 use crate::render::fragment::Fragments;
-use crate::render::resolve::LightTerm;
+use crate::render::resolve::ScaledTerm;
 use crate::shape::SurfaceInteraction;
 
 /// A light, or all that are taken together, whose mean over a patch is in doubt.
@@ -35,7 +35,7 @@ impl<'a> Many<'a> {
         pixel: Range<usize>,
         arrivals: &mut Arrivals<'a>,
         counts: &mut Counts,
-        scaled: &mut Vec<(Rgb, LightTerm)>,
+        scaled: &mut Vec<ScaledTerm>,
     ) {
         let scene = self.scene;
         let mut terms = std::mem::take(&mut self.terms);
@@ -87,10 +87,11 @@ impl<'a> Many<'a> {
         terms.sort_by_key(|(light, _)| *light);
         for same in terms.chunk_by(|a, b| a.0 == b.0) {
             let term = same.iter().fold(Sent::BLACK, |sum, (_, term)| sum + *term);
-            scaled.push((arrivals.scale(same[0].0 as usize), term));
+            let light = same[0].0;
+            scaled.push(ScaledTerm { light: Some(light), scale: arrivals.scale(light as usize), term });
         }
         // Of many scales
-        scaled.push((Rgb::WHITE, together));
+        scaled.push(ScaledTerm { light: None, scale: Rgb::WHITE, term: together });
         (self.terms, self.fence, self.doubts) = (terms, fence, doubts);
     }
 

@@ -24,7 +24,7 @@ use super::counts::Counts;
 use super::cut::{Cut, CutRules, Squares, Sum};
 use super::fence::Fence;
 use super::fragment::Fragments;
-use super::resolve::LightTerm;
+use super::resolve::ScaledTerm;
 use crate::color::Rgb;
 use crate::ids::LightId;
 use crate::integrate::TOLERANCE;
@@ -145,7 +145,7 @@ impl<'a> Many<'a> {
         arrivals: &mut Arrivals<'a>,
         counts: &mut Counts,
         go_on: &impl Fn() -> ControlFlow<()>,
-        mut add: impl FnMut(usize, &[(Rgb, LightTerm)], f32),
+        mut add: impl FnMut(usize, &[ScaledTerm], f32),
     ) -> ControlFlow<()> {
         let patches = std::mem::take(&mut self.patches);
         let before = counts.work();
