@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 
 use firstlight::bench::{ShareSeen, sights};
 use firstlight::{
-    Assets, CompileOptions, Display, Encoding, Film, FolderAssets, Format, Image, NoAssets, Parsed, Plane,
-    PlaneNumbers, RenderSettings, SamplesDesc, Scene, SceneDesc, Window, builtin_scenes, render,
+    Assets, BufferDesc, CompileOptions, Display, Encoding, Film, FolderAssets, Format, Image, LightChoice, NoAssets,
+    Parsed, Plane, PlaneNumbers, RenderSettings, SamplesDesc, Scene, SceneDesc, Window, builtin_scenes, render,
 };
 
 use crate::bench::config11;
@@ -51,6 +51,9 @@ pub fn run(filter: Option<&str>) -> Outcome {
     }
     if wanted("buffers") {
         buffers()?;
+    }
+    if wanted("terms") {
+        terms()?;
     }
     Ok(())
 }
@@ -98,7 +101,7 @@ fn visibility() -> Outcome {
 /// Where the work of config 11 went: `heat.png`.
 fn heat() -> Outcome {
     let scene = config11(INSIDE, 4, SamplesDesc::Exact)?;
-    let settings = RenderSettings { buffers: vec![Plane::Rays], ..RenderSettings::default() };
+    let settings = RenderSettings { buffers: vec![Plane::Rays.into()], ..RenderSettings::default() };
     let heat = rendered(&scene, &settings)?.heat().ok_or("no heat was kept")?;
     let (mean, most) = heat.mean_and_most();
     eprintln!("work: {mean:.1} in the mean, {most:.0} at most");
@@ -108,17 +111,46 @@ fn heat() -> Outcome {
 /// Pixels across and down of each of the four.
 const BUFFER: u32 = 256;
 
+/// A scene of the gallery, so large, and its film with some buffers.
+fn film_of(name: &str, asked: &[BufferDesc]) -> Result<(Scene, RenderSettings, Film), String> {
+    let folder = root().join("scenes/gallery");
+    let text = std::fs::read(folder.join(name)).map_err(|e| e.to_string())?;
+    let assets = FolderAssets::new(&folder, &[]).map_err(|(path, e)| format!("{}: {e}", path.display()))?;
+    let mut parsed = SceneDesc::parse(name, &text, &assets);
+    (parsed.desc.render.width, parsed.desc.render.height) = (BUFFER, BUFFER);
+    parsed.desc.render.buffers = asked.to_vec();
+    let scene = parsed.compile(&assets, &CompileOptions::default()).map_err(|e| e.to_string())?.scene;
+    let settings = RenderSettings { buffers: scene.buffers().to_vec(), ..RenderSettings::default() };
+    let film = rendered(&scene, &settings)?;
+    Ok((scene, settings, film))
+}
+
+/// Pictures of `BUFFER` x `BUFFER` pixels beside each other.
+fn beside(pictures: &[Vec<[f32; 4]>]) -> Image {
+    let side = BUFFER as usize;
+    let pixels = (0..side).flat_map(|row| pictures.iter().flat_map(move |p| p[row * side..(row + 1) * side].iter()));
+    let film = [pictures.len() as u32 * BUFFER, BUFFER];
+    let window = Window { x: 0, y: 0, width: film[0], height: film[1] };
+    Image { film, window, pixels: pixels.copied().collect() }
+}
+
+/// A picture, and what each of its three lights sends: `terms.png`.
+fn terms() -> Outcome {
+    let lights = BufferDesc::Light { light: LightChoice::All, part: None };
+    let (scene, settings, film) = film_of("softboxes.toml", &[Plane::Color.into(), lights])?;
+    let mut pictures = Vec::new();
+    for buffer in scene.buffers() {
+        let Some(PlaneNumbers::Floats(numbers)) = film.numbers(*buffer) else { unreachable!("it was asked for") };
+        let channels = buffer.plane().channels().len();
+        pictures.push(numbers.chunks(channels).map(|pixel| [pixel[0], pixel[1], pixel[2], 1.0]).collect());
+    }
+    save("terms", &beside(&pictures), &scene.display(), &scene, &settings)
+}
+
 /// What is seen of the clockwork, how far away it is, its normals from the camera, and its objects: `buffers.png`.
 fn buffers() -> Outcome {
-    let folder = root().join("scenes/gallery");
-    let text = std::fs::read(folder.join("clockwork.toml")).map_err(|e| e.to_string())?;
-    let assets = FolderAssets::new(&folder, &[]).map_err(|(path, e)| format!("{}: {e}", path.display()))?;
-    let mut parsed = SceneDesc::parse("clockwork.toml", &text, &assets);
-    (parsed.desc.render.width, parsed.desc.render.height) = (BUFFER, BUFFER);
-    let scene = parsed.compile(&assets, &CompileOptions::default()).map_err(|e| e.to_string())?.scene;
-    let planes = vec![Plane::Color, Plane::Depth, Plane::NormalCamera, Plane::ObjectId];
-    let settings = RenderSettings { buffers: planes, ..RenderSettings::default() };
-    let film = rendered(&scene, &settings)?;
+    let planes = [Plane::Color, Plane::Depth, Plane::NormalCamera, Plane::ObjectId];
+    let (scene, settings, film) = film_of("clockwork.toml", &planes.map(Into::into))?;
     let floats = |plane| match film.numbers(plane) {
         Some(PlaneNumbers::Floats(numbers)) => numbers.to_vec(),
         _ => unreachable!("it was asked for, in floats"),
@@ -143,22 +175,9 @@ fn buffers() -> Outcome {
         [decoded([nearness; 3]), decoded(normal), decoded(object)]
     };
     let others: Vec<[[f32; 4]; 3]> = (0..ids.len()).map(shown).collect();
-    let display = scene.display();
-    let picture = film.develop();
-    let side = BUFFER as usize;
-    let pixels = (0..side).flat_map(|row| {
-        let line = row * side..(row + 1) * side;
-        let (picture, others) = (&picture, &others);
-        let rest = (0..3).flat_map({
-            let line = line.clone();
-            move |which| others[line.clone()].iter().map(move |views| views[which])
-        });
-        picture.pixels[line].iter().copied().chain(rest)
-    });
-    let film = [4 * BUFFER, BUFFER];
-    let window = Window { x: 0, y: 0, width: film[0], height: film[1] };
-    let image = Image { film, window, pixels: pixels.collect() };
-    save("buffers", &image, &display, &scene, &settings)
+    let mut pictures = vec![film.develop().pixels];
+    pictures.extend((0..3).map(|which| others.iter().map(|views| views[which]).collect()));
+    save("buffers", &beside(&pictures), &scene.display(), &scene, &settings)
 }
 
 /// Renders one scene into `docs/src/pictures/NAME.png`.

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Args, Parser, Subcommand, ValueEnum, ValueHint};
-use firstlight::{ColorDesc, Framing, Plane, SamplesDesc, SimdLevel, View, VisibilityMode, Window};
+use firstlight::{BufferDesc, ColorDesc, Framing, SamplesDesc, SimdLevel, View, VisibilityMode, Window};
 
 /// The version and, where it is known, the commit: `0.1.0 (0123456789)`.
 const VERSION: &str = concat!(env!("CARGO_PKG_VERSION"), env!("FIRSTLIGHT_COMMIT"));
@@ -167,9 +167,9 @@ pub struct RenderArgs {
     /// What .exr and .npz files hold of each pixel, with commas between: color,depth,normal,object-id; `firstlight
     /// buffers` lists them all. Without color, and no other picture, no light is asked [default: the scene's, which is
     /// color unless it says otherwise]
-    #[arg(long, value_name = "NAMES", value_parser = buffer(), value_delimiter = ',', help_heading = "Output")]
+    #[arg(long, value_name = "NAMES", value_parser = buffer, value_delimiter = ',', help_heading = "Output")]
     #[arg(hide_possible_values = true)]
-    pub buffers: Option<Vec<Plane>>,
+    pub buffers: Option<Vec<BufferDesc>>,
     /// Bits of each channel of PNG files: 8 or 16 [default: 8]
     #[arg(long, value_name = "BITS", help_heading = "Output")]
     pub bits: Option<Bits>,
@@ -366,9 +366,8 @@ fn visibility() -> impl TypedValueParser<Value = VisibilityMode> {
 }
 
 /// Reads the name of a buffer.
-fn buffer() -> impl TypedValueParser<Value = Plane> {
-    PossibleValuesParser::new(Plane::ALL.iter().map(|plane| plane.name()))
-        .map(|name| Plane::from_name(&name).unwrap_or(Plane::Color))
+fn buffer(name: &str) -> Result<BufferDesc, String> {
+    BufferDesc::parse(name).map_err(|(fault, hint)| hint.map_or(fault.clone(), |hint| format!("{fault}; {hint}")))
 }
 
 /// Reads the number of samples, or the word for none.

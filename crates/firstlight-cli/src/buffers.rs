@@ -29,5 +29,14 @@ pub fn run() -> Result<(), Failure> {
     for plane in Plane::ALL {
         text.push_str(&format!("{:width$}  {}\n", plane.name(), plane.about(), width = widths[0]));
     }
+    text.push_str(LIGHTS);
     answer(&text)
 }
+
+/// Those whose names hold the name of a light.
+const LIGHTS: &str = "
+Of each light, with the channels of diffuse; NAME is its name, or #3 for the third in scene order, or * for all of them, each apart:
+light:NAME           What of the picture it sends.
+light:NAME:diffuse   What of that surfaces reflect diffusely.
+light:NAME:specular  What of that highlights make.
+";

@@ -71,8 +71,8 @@ fn render(plan: &Plan, job: &Job, reading: &ReadingArgs) -> Result<(), Failure> 
     // Read the scene, and bring it together with the arguments
     let (input, parse) = timed(|| input::read(job.scene, reading));
     let mut input = input?;
-    let (outputs, mut settings) = plan.join(job, &mut input)?;
-    settings.buffers = plan.buffers(&outputs, &input.parsed.desc.render.buffers)?;
+    let (outputs, settings) = plan.join(job, &mut input)?;
+    plan.check_buffers(&outputs, &input.parsed.desc.render.buffers)?;
     let moments = plan.moments(job, &input, &outputs)?;
     if moments.len() > 1 {
         input.remember_files();

@@ -12,6 +12,7 @@ use crate::render::Counts;
 use crate::render::given::Given;
 pub use crate::render::given::{ChoosePoints, LightPoint};
 use crate::render::pixel::PixelSum;
+use crate::render::resolve::TermSums;
 use crate::scene::{CompileOptions, Scene, SceneDesc, ShadowRays, TracedHit};
 use crate::shape::{RayDifferential, TileHits, TriangleTree, every};
 use crate::visibility::{OccluderList, Settled, Settler, ShadowView, Target, Viewpoint, Visibility};
@@ -391,5 +392,7 @@ pub fn pixel(scene: &Scene, at: [u32; 2], choose: &mut ChoosePoints) -> [f32; 4]
     let hit = |_, _, ray: &Ray| scene.intersect_local(ray);
     let go_on = || ControlFlow::Continue(());
     let _ = sum.sample(scene, at, &mut Given::new(choose), hit, &mut Counts::default(), &go_on);
-    sum.color(scene)
+    let mut sums = TermSums::new(1, &[]);
+    sum.resolve(scene, 0, &mut sums);
+    sums.colors[0]
 }

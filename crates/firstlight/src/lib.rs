@@ -83,8 +83,8 @@ pub use describe::{ColorDesc, ColorParam, FilePath, NumberParam, ParamDesc, Samp
 pub use error::{Diagnostic, Place, SceneError, Severity, printable};
 pub use ids::{LightId, MaterialId, SurfaceId, TextureId};
 pub use image::{
-    Format, Image, ImageError, PendingFile, Plane, PlaneNumbers, Receipt, Sampling, StagedFile, StoredImage, Window,
-    Written, is_decoding, write_open, write_whole,
+    Buffer, BufferDesc, Format, Image, ImageError, LightChoice, LightPart, PendingFile, Plane, PlaneNumbers, Receipt,
+    Sampling, StagedFile, StoredImage, Window, Written, is_decoding, write_open, write_whole,
 };
 pub use import::{ImportError, MeshData, MeshFormat, MeshPart, MeshPlace, MeshReport, is_point_set, read_mesh};
 pub use light::{

@@ -92,6 +92,7 @@ impl Run<'_> {
             self.input.tell_added(&compiled);
         }
         let scene = &compiled.scene;
+        let settings = &RenderSettings { buffers: Plan::buffers(&moment.outputs, scene.buffers()), ..settings.clone() };
         settings.check(scene).map_err(Failure::Usage)?;
         settings.check_memory(scene).map_err(Failure::Work)?;
 
@@ -102,7 +103,6 @@ impl Run<'_> {
             let faster = faster(scene, settings, &self.input.parsed.desc.render);
             Progress::begin(pixels, moments.len() as u64, plan.quiet, faster)
         };
-        let buffers = &self.input.parsed.desc.render.buffers;
         let progress = &*self.progress.get_or_insert_with(begin);
         progress.frame(index as u64);
         let (rendered, render) = timed(|| {
@@ -118,8 +118,8 @@ impl Run<'_> {
 
         // Encode all pictures and bring them to the disk, then let them appear
         let (written, write) = timed(|| {
-            let bytes = encoded(plan, settings, buffers, film, scene, &moment.outputs)
-                .map_err(|e| Failure::Work(e.to_string()))?;
+            let bytes =
+                encoded(plan, settings, film, scene, &moment.outputs).map_err(|e| Failure::Work(e.to_string()))?;
             watch.check()?;
             let stage = ready.into_iter().zip(&bytes).map(|(ready, bytes)| ready.stage(bytes));
             let staged: Vec<Staged> = stage.collect::<Result<_, _>>()?;
@@ -156,13 +156,13 @@ impl Run<'_> {
 fn encoded(
     plan: &Plan,
     settings: &RenderSettings,
-    buffers: &[Plane],
     film: Film,
     scene: &Scene,
     outputs: &[Output],
 ) -> Result<Vec<Vec<u8>>, ImageError> {
     let heat = film.heat().map(|heat| heat.picture());
     let receipt = scene.receipt(settings);
+    let buffers = scene.buffers();
     let of_buffers = scene.buffers_receipt(settings, buffers);
     // Before the film becomes the picture
     let mut encoded = Vec::new();
@@ -172,7 +172,7 @@ fn encoded(
     }
     let own = scene.display();
     let display = Display { exposure: plan.exposure.unwrap_or(own.exposure), ..own };
-    let image = settings.buffers.contains(&Plane::Color).then(|| film.develop());
+    let image = settings.buffers.contains(&Plane::Color.into()).then(|| film.develop());
     for (bytes, output) in encoded.iter_mut().zip(outputs).filter(|(_, output)| !output.takes_buffers()) {
         *bytes = match (output.content, &heat, &image) {
             (Content::Heat, Some(heat), _) => heat.encode(output.format, &Display::default(), &receipt)?,

@@ -1,6 +1,6 @@
 //! What the command line says in place of the scene.
 
-use firstlight::{ColorDesc, LightDesc, Plane, SampleSet, SamplesDesc, SceneDesc, ShadowTerminator};
+use firstlight::{BufferDesc, ColorDesc, LightDesc, SampleSet, SamplesDesc, SceneDesc, ShadowTerminator};
 
 use crate::args::Size;
 use crate::report::Failure;
@@ -19,7 +19,7 @@ pub(super) struct Overrides<'a> {
     pub samples: Option<SamplesDesc>,
     pub camera: Option<&'a str>,
     pub tolerance: Option<f64>,
-    pub buffers: Option<&'a [Plane]>,
+    pub buffers: Option<&'a [BufferDesc]>,
     pub terminator: Option<ShadowTerminator>,
 }
 

@@ -5,7 +5,9 @@ use std::iter;
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 
-use firstlight::{AaMode, Format, Framing, Plane, RenderSettings, ShadowTerminator, SimdLevel, View, Window};
+use firstlight::{
+    AaMode, Buffer, BufferDesc, Format, Framing, Plane, RenderSettings, ShadowTerminator, SimdLevel, View, Window,
+};
 
 use super::moments::Moment;
 use super::overrides::Overrides;
@@ -277,24 +279,29 @@ impl<'a> Plan<'a> {
         Ok((outputs, settings))
     }
 
-    /// The planes that the outputs need; `asked` is what those take that hold buffers.
-    pub fn buffers(&self, outputs: &[Output], asked: &[Plane]) -> Result<Vec<Plane>, Failure> {
+    /// Says what comes of buffers that the scene asks for, where no output takes them.
+    pub fn check_buffers(&self, outputs: &[Output], asked: &[BufferDesc]) -> Result<(), Failure> {
         let takes = outputs.iter().any(Output::takes_buffers);
         if self.overrides.buffers.is_some() && !takes {
             let message = "--buffers is for .exr and .npz files, and no output is one; name one with -o";
             return Err(Failure::Usage(message.into()));
         }
-        if !takes && asked != [Plane::Color] && !self.quiet {
+        if !takes && asked != [Plane::Color.into()] && !self.quiet {
             say(format_args!("the scene asks for buffers, and no output takes them: .exr and .npz files do"));
         }
-        let mut planes = if takes { asked.to_vec() } else { Vec::new() };
+        Ok(())
+    }
+
+    /// The planes that outputs need; `asked` is what those take that hold buffers.
+    pub fn buffers(outputs: &[Output], asked: &[Buffer]) -> Vec<Buffer> {
+        let mut planes = if outputs.iter().any(Output::takes_buffers) { asked.to_vec() } else { Vec::new() };
         for output in outputs.iter().filter(|output| !output.takes_buffers()) {
-            let shown = if output.content == Content::Heat { Plane::Rays } else { Plane::Color };
+            let shown = if output.content == Content::Heat { Plane::Rays } else { Plane::Color }.into();
             if !planes.contains(&shown) {
                 planes.push(shown);
             }
         }
-        Ok(planes)
+        planes
     }
 
     /// Has a camera that is found for the scene frame it as asked.

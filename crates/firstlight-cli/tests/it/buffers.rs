@@ -32,6 +32,21 @@ fn files_hold_what_is_asked_for() {
 }
 
 #[test]
+fn lights_are_kept_apart() {
+    let folder = Folder::with_scene();
+    folder.run("render scene.toml --buffers color,ambient,light:*,light:#1:specular -o a.npz -o a.exr").done();
+    let (arrays, exr) = (folder.get("a.npz"), folder.get("a.exr"));
+    let says = |word: &str| exr.windows(word.len()).any(|part| part == word.as_bytes());
+    for name in ["color", "ambient", "light:#1", "light:#1:specular"] {
+        assert!(holds(&arrays, name), "{name}");
+        assert!(name == "color" || says(&format!("{name}.R")), "{name}");
+    }
+    assert!(says("firstlight:light_names") && says("firstlight:buffer.light:#1"));
+    let scene = folder.run("render scene.toml --print-scene --buffers light:*:diffuse,light:#1").done().stdout;
+    assert!(String::from_utf8(scene).unwrap().contains("buffers = [\"light:*:diffuse\", \"light:#1\"]"));
+}
+
+#[test]
 fn the_scene_may_ask_for_them() {
     let folder = Folder::new();
     folder.put("scene.toml", SCENE.replace("[render]\n", "[render]\nbuffers = [\"color\", \"normal\"]\n"));
@@ -47,7 +62,9 @@ fn the_scene_may_ask_for_them() {
 #[test]
 fn what_cannot_be_is_said() {
     let folder = Folder::with_scene();
-    folder.run("render scene.toml --buffers dept -o a.npz").exits(2).says(&["dept", "'depth'"]);
+    folder.run("render scene.toml --buffers dept -o a.npz").exits(2).says(&["dept", "\"depth\""]);
+    folder.run("render scene.toml --buffers light:nobody -o a.npz").exits(1).says(&["no light is called \"nobody\""]);
+    folder.run("render scene.toml --buffers light: -o a.npz").exits(2).says(&["names no light"]);
     folder.run("render scene.toml --buffers depth").exits(2).says(&["--buffers is for .exr and .npz files"]);
     folder.run("render scene.toml --buffers depth -o a.png -o a.hdr").exits(2).says(&["name one with -o"]);
     folder.run("render scene.toml --buffers depth,depth -o a.npz").exits(1).says(&["\"depth\" is given twice"]);

@@ -94,7 +94,10 @@ fn how_the_work_is_done_changes_neither_film_nor_receipt() {
             RenderSettings { threads: NonZeroUsize::new(3), ..base.clone() },
             RenderSettings { tile_size: 8, ..base.clone() },
             RenderSettings { tile_size: 64, ..base.clone() },
-            RenderSettings { buffers: vec![Plane::Color, Plane::Rays, Plane::Depth], ..base.clone() },
+            RenderSettings {
+                buffers: vec![Plane::Color.into(), Plane::Rays.into(), Plane::Depth.into()],
+                ..base.clone()
+            },
             RenderSettings { crop: Some(whole), ..base.clone() },
         ];
         others.extend(SimdLevel::available().into_iter().map(|simd| RenderSettings { simd, ..base.clone() }));

@@ -87,12 +87,22 @@ fn samples() -> impl Strategy<Value = SamplesDesc> {
     prop_oneof![Just(SamplesDesc::Exact), any::<u32>().prop_map(SamplesDesc::Count)]
 }
 
+fn buffer() -> impl Strategy<Value = BufferDesc> {
+    let light = prop_oneof![
+        Just(LightChoice::All),
+        (1..=u32::MAX).prop_map(LightChoice::Number),
+        "[a-z ]{1,8}".prop_map(LightChoice::Name)
+    ];
+    let of_light = (light, maybe(select(LightPart::ALL))).prop_map(|(light, part)| BufferDesc::Light { light, part });
+    prop_oneof![select(Plane::ALL).prop_map(BufferDesc::Plane), of_light]
+}
+
 prop_compose! {
     fn render()(
         size in [any::<u32>(), any::<u32>(), any::<u32>()], camera in maybe(text()),
         samples in samples(), colors in [color(), color()], transparent: bool, display in select(DisplayEncoding::ALL),
         gamma in number(), exposure in number(), fps in number(), tolerance in number(),
-        shadow_terminator in select(ShadowTerminator::ALL), buffers in vec(select(Plane::ALL), 0..4),
+        shadow_terminator in select(ShadowTerminator::ALL), buffers in vec(buffer(), 0..4),
     ) -> RenderDesc {
         RenderDesc {
             width: size[0], height: size[1], antialiasing: size[2], samples, camera, background: colors[0],

@@ -88,7 +88,7 @@ fn film(scene: &Scene, settings: &RenderSettings) -> Film {
 }
 
 fn of(buffers: &[Plane]) -> RenderSettings {
-    RenderSettings { buffers: buffers.to_vec(), ..RenderSettings::default() }
+    RenderSettings { buffers: buffers.iter().map(|plane| (*plane).into()).collect(), ..RenderSettings::default() }
 }
 
 fn floats(film: &Film, plane: Plane) -> &[f32] {
@@ -116,9 +116,9 @@ fn entry<const N: usize>(receipt: &Receipt, key: &str) -> [f64; N] {
 fn each_is_what_the_centre_ray_meets() {
     let scene = scene(SCENE);
     let film = film(&scene, &of(Plane::ALL));
-    assert!(film.planes().eq(Plane::ALL.iter().copied()));
+    assert!(film.planes().eq(Plane::ALL.iter().map(|plane| Buffer::from(*plane))));
     let frame = scene.camera().frame();
-    let names = scene.buffers_receipt(&RenderSettings::default(), Plane::ALL);
+    let names = scene.buffers_receipt(&RenderSettings::default(), &of(Plane::ALL).buffers);
     let names = &names.entries.iter().find(|(key, _)| key == "object_names").unwrap().1;
     let names: Vec<Option<String>> = serde_json::from_str(names).unwrap();
     let mut met = vec![0; names.len()];
@@ -205,7 +205,7 @@ fn pixels_lead_to_the_world_and_back() {
         let scene = scene(text);
         let buffers = [Plane::Position, Plane::Depth];
         let film = film(&scene, &of(&buffers));
-        let receipt = scene.buffers_receipt(&RenderSettings::default(), &buffers);
+        let receipt = scene.buffers_receipt(&RenderSettings::default(), &of(&buffers).buffers);
         let k: [f64; 9] = entry(&receipt, "intrinsics");
         let (width, mut compared) = (scene.width() as usize, 0);
         for (pixel, depth) in floats(&film, Plane::Depth).iter().enumerate().filter(|(_, depth)| depth.is_finite()) {

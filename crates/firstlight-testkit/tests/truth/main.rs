@@ -17,5 +17,6 @@ mod many_lights;
 mod near;
 mod robust;
 mod terminator;
+mod terms;
 
 use firstlight_testkit::{converged, exact_scenes, kept, random, scenes};

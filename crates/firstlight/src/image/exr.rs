@@ -21,7 +21,7 @@ use codec::meta::header::Header;
 use codec::meta::{BlockDescription, attribute::Text as Name};
 use codec::prelude::{Compression, SmallVec};
 
-use super::{ImageError, PREFIX, Plane, PlaneFile, PlaneNumbers, Receipt, SOFTWARE};
+use super::{ImageError, NamedPlane, PREFIX, Plane, PlaneFile, PlaneNumbers, Receipt, SOFTWARE};
 use crate::parallel;
 
 /// One channel of a file.
@@ -62,14 +62,14 @@ pub(super) fn encode(file: &PlaneFile, receipt: &Receipt) -> Result<Vec<u8>, Ima
 /// The channels of all planes, by name, as the format wants them.
 fn channels<'a>(file: &PlaneFile<'a>) -> Vec<Channel<'a>> {
     let mut all = Vec::new();
-    for (plane, numbers) in file.planes {
+    for NamedPlane { name: of, plane, numbers } in file.planes {
         let names = plane.channels();
         for (place, name) in names.iter().enumerate() {
             if *plane == Plane::Color && *name == "A" && is_opaque(numbers) {
                 continue;
             }
             // The picture's are those of the file itself, as readers expect it
-            let name = if *plane == Plane::Color { (*name).to_owned() } else { format!("{}.{name}", plane.name()) };
+            let name = if *plane == Plane::Color { (*name).to_owned() } else { format!("{of}.{name}") };
             all.push(Channel { name, numbers: *numbers, place, of: names.len() });
         }
     }
@@ -231,10 +231,10 @@ mod tests {
         let (color, depth, ids) = ([0.5f32, 1.0, 2.0, 1.0, 0.0, 0.0, 3.0, 1.0], [f32::INFINITY, 4.0], [1u32, u32::MAX]);
         let normal = [1.0f32, 2.0, 3.0, 4.0, 5.0, 6.0];
         let planes = [
-            (Plane::Color, PlaneNumbers::Floats(&color)),
-            (Plane::ObjectId, PlaneNumbers::Wholes(&ids)),
-            (Plane::Depth, PlaneNumbers::Floats(&depth)),
-            (Plane::Normal, PlaneNumbers::Floats(&normal)),
+            NamedPlane::new(Plane::Color, PlaneNumbers::Floats(&color)),
+            NamedPlane::new(Plane::ObjectId, PlaneNumbers::Wholes(&ids)),
+            NamedPlane::new(Plane::Depth, PlaneNumbers::Floats(&depth)),
+            NamedPlane::new(Plane::Normal, PlaneNumbers::Floats(&normal)),
         ];
         let window = Window { x: 0, y: 0, width: 2, height: 1 };
         let file = PlaneFile { film: [2, 1], window, planes: &planes };

@@ -3,6 +3,7 @@
 //! Owns the encoders (one file each), writing files whole, and decoding the pictures that textures are made of.
 //! Before it stands the film; after it, only the disk.
 
+mod buffer;
 mod contain;
 mod damage;
 mod error;
@@ -18,12 +19,13 @@ mod png;
 pub(crate) mod read;
 mod stored;
 
+pub use buffer::{Buffer, BufferDesc, LightChoice, LightPart};
 pub use contain::is_decoding;
 pub use error::ImageError;
 pub use file::{PendingFile, StagedFile, Written, write_whole};
 pub use format::Format;
 pub use patient::write_open;
-pub(crate) use plane::PlaneFile;
+pub(crate) use plane::{NamedPlane, PlaneFile};
 pub use plane::{Plane, PlaneNumbers, Sampling};
 pub use stored::StoredImage;
 
@@ -91,7 +93,7 @@ impl Image {
             Format::Png8 => png::encode(self, png::Depth::Eight, display, &shown()),
             Format::Png16 => png::encode(self, png::Depth::Sixteen, display, &shown()),
             Format::Exr | Format::Npz => {
-                let planes = [(Plane::Color, PlaneNumbers::Floats(self.pixels.as_flattened()))];
+                let planes = [NamedPlane::new(Plane::Color, PlaneNumbers::Floats(self.pixels.as_flattened()))];
                 PlaneFile { film: self.film, window: self.window, planes: &planes }.encode(format, receipt)
             }
             Format::Hdr => Ok(hdr::encode(self, &receipt.shown_by(None))),

@@ -7,24 +7,28 @@
 
 use std::io::Write;
 
+use rawzip::path::EntryPath;
 use rawzip::{CompressionMethod, ZipArchiveWriter};
 
-use super::{ImageError, PlaneFile, PlaneNumbers, Receipt};
+use super::{ImageError, NamedPlane, PlaneFile, PlaneNumbers, Receipt};
 
 /// The bytes of an NPZ file. The planes and the receipt have been checked.
 pub(super) fn encode(file: &PlaneFile, receipt: &Receipt) -> Result<Vec<u8>, ImageError> {
     archive(file, receipt).map_err(|e| ImageError::Encode { format: "NPZ", reason: e.to_string() })
 }
 
-/// An archive of files `NAME.npy`. Without a clock: the same arrays give the same bytes.
+/// An archive of files `NAME.npy`, with names as they are: `light:` is no drive. Without a clock: the same arrays give the same bytes.
 fn archive(file: &PlaneFile, receipt: &Receipt) -> Result<Vec<u8>, rawzip::Error> {
     let (rows, columns) = (file.window.height, file.window.width);
-    let room: usize = file.planes.iter().map(|(plane, _)| plane.bytes()).sum();
+    let room: usize = file.planes.iter().map(|named| named.plane.bytes()).sum();
     let mut bytes = Vec::with_capacity(room * rows as usize * columns as usize);
     let mut archive = ZipArchiveWriter::new(&mut bytes);
     let mut add = |name: &str, array: Vec<u8>| -> Result<(), rawzip::Error> {
         let name = format!("{name}.npy");
-        let (mut entry, config) = archive.new_file(&name).compression_method(CompressionMethod::STORE).start()?;
+        let (mut entry, config) = archive
+            .new_file(EntryPath::verbatim(name.as_bytes()))
+            .compression_method(CompressionMethod::STORE)
+            .start()?;
         let mut writer = config.wrap(&mut entry);
         writer.write_all(&array)?;
         let (_, descriptor) = writer.finish()?;
@@ -32,7 +36,7 @@ fn archive(file: &PlaneFile, receipt: &Receipt) -> Result<Vec<u8>, rawzip::Error
         Ok(())
     };
     // One after the other: beside the archive there is a copy of one plane at a time
-    for (plane, numbers) in file.planes {
+    for NamedPlane { name, plane, numbers } in file.planes {
         let kind = match numbers {
             PlaneNumbers::Floats(_) => "<f4",
             PlaneNumbers::Wholes(_) => "<u4",
@@ -41,7 +45,7 @@ fn archive(file: &PlaneFile, receipt: &Receipt) -> Result<Vec<u8>, rawzip::Error
             1 => format!("({rows}, {columns})"),
             channels => format!("({rows}, {columns}, {channels})"),
         };
-        add(plane.name(), array(kind, &shape, &numbers.to_le_bytes()))?;
+        add(name, array(kind, &shape, &numbers.to_le_bytes()))?;
     }
     let said: serde_json::Map<_, _> =
         receipt.entries.iter().map(|(key, value)| (key.clone(), value.clone().into())).collect();
@@ -87,7 +91,7 @@ mod tests {
         let archive = rawzip::ZipArchive::from_slice(bytes).unwrap();
         let (mut entries, mut files) = (archive.entries(), Vec::new());
         while let Some(entry) = entries.next_entry().unwrap() {
-            let name = entry.file_path().try_normalize().unwrap().as_ref().to_owned();
+            let name = String::from_utf8(entry.file_path().as_bytes().to_vec()).unwrap();
             let entry = archive.get_entry(entry.wayfinder()).unwrap();
             let mut data = Vec::new();
             std::io::copy(&mut entry.verifying_reader(entry.data()), &mut data).unwrap();
@@ -102,9 +106,9 @@ mod tests {
         let (depth, uv, ids) =
             ([1.5f32, f32::INFINITY, 0.0, -1.0, 2.0, 3.0], [0.25f32; 12], [7u32, 0, 1, 2, 3, u32::MAX]);
         let planes = [
-            (Plane::Depth, PlaneNumbers::Floats(&depth)),
-            (Plane::Uv, PlaneNumbers::Floats(&uv)),
-            (Plane::ObjectId, PlaneNumbers::Wholes(&ids)),
+            NamedPlane::new(Plane::Depth, PlaneNumbers::Floats(&depth)),
+            NamedPlane::new(Plane::Uv, PlaneNumbers::Floats(&uv)),
+            NamedPlane::new(Plane::ObjectId, PlaneNumbers::Wholes(&ids)),
         ];
         let file = PlaneFile { film: [9, 9], window, planes: &planes };
         let receipt = Receipt { entries: vec![("name".into(), "Würfel \"1\"".into())] };
@@ -116,7 +120,7 @@ mod tests {
         let said =
             |kind: &str, shape: &str| format!("{{'descr': '{kind}', 'fortran_order': False, 'shape': {shape}, }}");
         let kinds = [("<f4", "(2, 3)"), ("<f4", "(2, 3, 2)"), ("<u4", "(2, 3)")];
-        for (((_, numbers), (_, file)), (kind, shape)) in planes.into_iter().zip(&files).zip(kinds) {
+        for ((NamedPlane { numbers, .. }, (_, file)), (kind, shape)) in planes.into_iter().zip(&files).zip(kinds) {
             assert_eq!(read(file), (said(kind, shape), numbers.to_le_bytes()));
         }
         let (header, text) = read(&files[3].1);
@@ -135,7 +139,7 @@ mod tests {
     #[test]
     fn formats_of_one_picture_hold_no_buffers() {
         let window = Window { x: 0, y: 0, width: 1, height: 1 };
-        let planes = [(Plane::Depth, PlaneNumbers::Floats(&[1.0]))];
+        let planes = [NamedPlane::new(Plane::Depth, PlaneNumbers::Floats(&[1.0]))];
         let file = PlaneFile { film: [1, 1], window, planes: &planes };
         for format in [Format::Png8, Format::Png16, Format::Hdr] {
             let error = file.encode(format, &Receipt::default()).unwrap_err();

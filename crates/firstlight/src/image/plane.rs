@@ -148,15 +148,6 @@ impl Plane {
         choice.map_or(String::new(), |choice| choice.doc.join(" ").split_whitespace().collect::<Vec<_>>().join(" "))
     }
 
-    /// What is wrong with a list of planes.
-    pub(crate) fn fault_of(planes: &[Plane]) -> Option<String> {
-        if planes.is_empty() {
-            return Some("an empty list asks for nothing".into());
-        }
-        let twice = planes.iter().enumerate().find(|(i, plane)| planes[..*i].contains(plane));
-        twice.map(|(_, plane)| format!("\"{}\" is given twice", plane.name()))
-    }
-
     /// Whether it is the sum of some of the terms of `color`.
     pub(crate) fn is_of_terms(self) -> bool {
         use Plane::*;
@@ -205,7 +196,21 @@ pub(crate) struct PlaneFile<'a> {
     pub film: [u32; 2],
     /// The part of it that the planes hold.
     pub window: Window,
-    pub planes: &'a [(Plane, PlaneNumbers<'a>)],
+    pub planes: &'a [NamedPlane<'a>],
+}
+
+/// A plane with its name in files.
+pub(crate) struct NamedPlane<'a> {
+    pub name: &'a str,
+    pub plane: Plane,
+    pub numbers: PlaneNumbers<'a>,
+}
+
+impl<'a> NamedPlane<'a> {
+    /// By the name of what it is.
+    pub fn new(plane: Plane, numbers: PlaneNumbers<'a>) -> Self {
+        NamedPlane { name: plane.name(), plane, numbers }
+    }
 }
 
 impl PlaneFile<'_> {
@@ -227,18 +232,19 @@ impl PlaneFile<'_> {
     /// The receipt with what each plane is and the hash of its bits, where there is more than the picture.
     fn described(&self, receipt: &Receipt) -> Receipt {
         let mut receipt = receipt.shown_by(None);
-        if matches!(self.planes, [(Plane::Color, _)]) {
+        if matches!(self.planes, [NamedPlane { plane: Plane::Color, .. }]) {
             return receipt;
         }
-        let hashes = parallel::collect(self.planes.len(), |k| blake3::hash(&self.planes[k].1.to_le_bytes()).to_hex());
-        for ((plane, _), hash) in self.planes.iter().zip(hashes) {
+        let hashes =
+            parallel::collect(self.planes.len(), |k| blake3::hash(&self.planes[k].numbers.to_le_bytes()).to_hex());
+        for (NamedPlane { name, plane, .. }, hash) in self.planes.iter().zip(hashes) {
             let channels = plane.channels().join(" ");
             let (kind, unit, space) = (plane.number_type(), plane.unit(), plane.space());
             let said = format!(
                 "channels {channels}; {kind}; unit {unit}; space {space}; {}; blake3 {hash}",
                 plane.sampling().name()
             );
-            receipt.entries.push((format!("buffer.{}", plane.name()), said));
+            receipt.entries.push((format!("buffer.{name}"), said));
         }
         receipt
     }

@@ -74,6 +74,11 @@ family! {
 }
 
 impl LightDesc {
+    /// Lights in scene order: kind by kind, in each the order of the text.
+    pub(crate) fn in_scene_order(lights: &[LightDesc]) -> impl Iterator<Item = &LightDesc> {
+        Self::KINDS.iter().flat_map(|kind| lights.iter().filter(move |light| light.kind() == *kind))
+    }
+
     /// Its name, if it has one.
     pub fn name(&self) -> Option<String> {
         match self {

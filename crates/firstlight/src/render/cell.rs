@@ -34,7 +34,7 @@ use super::tile::Tile;
 use super::together::{Together, salt};
 use super::{AaMode, Counts, Heat};
 use crate::color::Rgb;
-use crate::image::Plane;
+use crate::image::Buffer;
 use crate::integrate::TOLERANCE;
 use crate::material::{Bsdf, MOMENTS, Moments};
 use crate::scene::Scene;
@@ -128,7 +128,7 @@ pub(crate) struct Cells<'a> {
 }
 
 impl<'a> Cells<'a> {
-    pub fn new(scene: &'a Scene, mode: AaMode, lights: LightQueue<'a>, planes: &[Plane]) -> Self {
+    pub fn new(scene: &'a Scene, mode: AaMode, lights: LightQueue<'a>, buffers: &[Buffer]) -> Self {
         let pixel_rays = PixelRays::new(lights.arrivals.level(), scene.antialiasing);
         let hits = PixelHits::new(lights.arrivals.level(), scene.antialiasing);
         let many = lights.arrivals.tree().map(|tree| Many::new(scene, tree));
@@ -141,7 +141,7 @@ impl<'a> Cells<'a> {
             near: Default::default(),
             corner: [0; 2],
             states: vec![PixelState::Done; PIXELS],
-            sums: TermSums::new(PIXELS, planes),
+            sums: TermSums::new(PIXELS, buffers),
             blocks: Vec::new(),
             patchwork: Vec::new(),
             pixels: Vec::new(),

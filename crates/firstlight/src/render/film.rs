@@ -5,7 +5,8 @@ use std::ops::Range;
 use super::heat::Heat;
 use super::resolve::TermSums;
 use super::tile::Tile;
-use crate::image::{Format, Image, ImageError, Plane, PlaneFile, PlaneNumbers, Receipt, Window};
+use crate::image::{Buffer, Format, Image, ImageError, NamedPlane, Plane, PlaneFile, PlaneNumbers, Receipt, Window};
+use crate::scene::Scene;
 
 /// The numbers of a plane, pixel by pixel.
 #[derive(Clone, Debug)]
@@ -59,13 +60,15 @@ impl Values {
 pub struct Film {
     size: [u32; 2],
     window: Window,
-    planes: Vec<(Plane, Values)>,
+    planes: Vec<(Buffer, Values)>,
+    /// The name of each in files.
+    names: Vec<String>,
 }
 
 /// The pixels of one tile.
 pub(crate) struct FilmTile {
     pub tile: Tile,
-    planes: Vec<(Plane, Values)>,
+    planes: Vec<(Buffer, Values)>,
 }
 
 /// What a pixel's centre ray says for a plane.
@@ -74,15 +77,16 @@ pub(super) enum CenterValue {
     Whole(u32),
 }
 
-fn empty(planes: impl IntoIterator<Item = Plane>, pixels: usize) -> Vec<(Plane, Values)> {
-    planes.into_iter().map(|plane| (plane, Values::new(plane, pixels))).collect()
+fn empty(planes: &[Buffer], pixels: usize) -> Vec<(Buffer, Values)> {
+    planes.iter().map(|buffer| (*buffer, Values::new(buffer.plane(), pixels))).collect()
 }
 
 impl Film {
-    /// A film of `size` pixels, of which `window` is exposed.
-    pub(crate) fn new(size: [u32; 2], window: Window, planes: &[Plane]) -> Self {
+    /// The film of a scene, of which `window` is exposed.
+    pub(crate) fn new(scene: &Scene, window: Window, planes: &[Buffer]) -> Self {
         let pixels = window.width as usize * window.height as usize;
-        Film { size, window, planes: empty(planes.iter().copied(), pixels) }
+        let names = planes.iter().map(|buffer| scene.buffer_name(*buffer)).collect();
+        Film { size: [scene.width, scene.height], window, planes: empty(planes, pixels), names }
     }
 
     /// Takes the pixels of a tile.
@@ -108,13 +112,14 @@ impl Film {
     }
 
     /// What it holds: [`RenderSettings::buffers`](super::RenderSettings::buffers), in their order.
-    pub fn planes(&self) -> impl Iterator<Item = Plane> {
-        self.planes.iter().map(|(plane, _)| *plane)
+    pub fn planes(&self) -> impl Iterator<Item = Buffer> {
+        self.planes.iter().map(|(buffer, _)| *buffer)
     }
 
     /// The numbers of a plane; `None` if it was not asked for.
-    pub fn numbers(&self, of: Plane) -> Option<PlaneNumbers<'_>> {
-        self.planes.iter().find(|(plane, _)| *plane == of).map(|(_, values)| values.numbers())
+    pub fn numbers(&self, of: impl Into<Buffer>) -> Option<PlaneNumbers<'_>> {
+        let of = of.into();
+        self.planes.iter().find(|(buffer, _)| *buffer == of).map(|(_, values)| values.numbers())
     }
 
     /// Where the work went; `None` if [`Plane::Rays`] was not asked for.
@@ -128,12 +133,12 @@ impl Film {
     ///
     /// # Errors
     /// A format that holds one picture alone; a plane that was not asked for; a receipt outside what it may be.
-    pub fn encode(&self, planes: &[Plane], format: Format, receipt: &Receipt) -> Result<Vec<u8>, ImageError> {
-        let numbers = |plane: &Plane| match self.numbers(*plane) {
-            Some(numbers) => Ok((*plane, numbers)),
-            None => Err(ImageError::Picture(format!("the film holds no {}: it was not asked for", plane.name()))),
+    pub fn encode(&self, planes: &[Buffer], format: Format, receipt: &Receipt) -> Result<Vec<u8>, ImageError> {
+        let named = |of: &Buffer| match self.planes.iter().position(|(buffer, _)| buffer == of) {
+            Some(k) => Ok(NamedPlane { name: &self.names[k], plane: of.plane(), numbers: self.planes[k].1.numbers() }),
+            None => Err(ImageError::Picture(format!("the film has no plane for {of:?}: it was not asked for"))),
         };
-        let planes = planes.iter().map(numbers).collect::<Result<Vec<_>, _>>()?;
+        let planes = planes.iter().map(named).collect::<Result<Vec<_>, _>>()?;
         PlaneFile { film: self.size, window: self.window, planes: &planes }.encode(format, receipt)
     }
 
@@ -143,7 +148,7 @@ impl Film {
     /// If [`Plane::Color`] was not asked for.
     pub fn develop(self) -> Image {
         let pixels = self.planes.into_iter().find_map(|(plane, values)| match (plane, values) {
-            (Plane::Color, Values::Four(pixels)) => Some(pixels),
+            (Buffer::Plane(Plane::Color), Values::Four(pixels)) => Some(pixels),
             _ => None,
         });
         Image { film: self.size, window: self.window, pixels: pixels.expect("the film has the picture") }
@@ -152,9 +157,9 @@ impl Film {
 
 impl FilmTile {
     /// One with the same planes.
-    pub fn new(tile: &Tile, planes: &[Plane]) -> Self {
+    pub fn new(tile: &Tile, planes: &[Buffer]) -> Self {
         let pixels = tile.width as usize * tile.height as usize;
-        FilmTile { tile: *tile, planes: empty(planes.iter().copied(), pixels) }
+        FilmTile { tile: *tile, planes: empty(planes, pixels) }
     }
 
     /// Notes what pixels side by side show, from column `x`, row `y` of the tile on: `some` of `sums`.
@@ -162,8 +167,8 @@ impl FilmTile {
     pub fn set_row(&mut self, x: u32, y: u32, sums: &TermSums, some: Range<usize>) {
         let index = (y * self.tile.width + x) as usize;
         let here = index..index + some.len();
-        for (plane, values) in &mut self.planes {
-            match (*plane, values) {
+        for (buffer, values) in &mut self.planes {
+            match (buffer.plane(), values) {
                 (Plane::Color, Values::Four(pixels)) => {
                     pixels[here.clone()].copy_from_slice(&sums.colors[some.clone()])
                 }
@@ -172,8 +177,8 @@ impl FilmTile {
                     pixels[here.clone()].iter_mut().zip(colors).for_each(|(to, from)| *to = from[3]);
                 }
                 (Plane::Rays, Values::One(pixels)) => pixels[here.clone()].copy_from_slice(&sums.work[some.clone()]),
-                (plane, Values::Three(pixels)) => {
-                    if let Some(kept) = sums.kept(plane) {
+                (_, Values::Three(pixels)) => {
+                    if let Some(kept) = sums.kept(*buffer) {
                         pixels[here.clone()].copy_from_slice(&kept[some.clone()]);
                     }
                 }
@@ -183,15 +188,15 @@ impl FilmTile {
     }
 
     /// The planes it has.
-    pub fn planes(&self) -> Vec<Plane> {
-        self.planes.iter().map(|(plane, _)| *plane).collect()
+    pub fn planes(&self) -> Vec<Buffer> {
+        self.planes.iter().map(|(buffer, _)| *buffer).collect()
     }
 
     /// Notes what the centre ray of a pixel says, plane by plane of those that ask it.
     pub(super) fn set_center(&mut self, x: u32, y: u32, says: impl Fn(Plane) -> CenterValue) {
         let index = (y * self.tile.width + x) as usize;
-        for (plane, values) in self.planes.iter_mut().filter(|(plane, _)| plane.is_of_center()) {
-            match (says(*plane), values) {
+        for (buffer, values) in self.planes.iter_mut().filter(|(buffer, _)| buffer.plane().is_of_center()) {
+            match (says(buffer.plane()), values) {
                 (CenterValue::Floats([a, ..]), Values::One(pixels)) => pixels[index] = a,
                 (CenterValue::Floats([a, b, _]), Values::Two(pixels)) => pixels[index] = [a, b],
                 (CenterValue::Floats(all), Values::Three(pixels)) => pixels[index] = all,

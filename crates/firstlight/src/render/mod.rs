@@ -34,7 +34,7 @@ mod packets;
 pub(crate) mod pixel;
 mod plain;
 mod receipt;
-mod resolve;
+pub(crate) mod resolve;
 mod sampled;
 mod shafts;
 mod single;
@@ -56,7 +56,7 @@ pub use heat::Heat;
 
 use crate::accel::SimdLevel;
 use crate::describe::words;
-use crate::image::{Image, Plane, Window};
+use crate::image::{Buffer, Image, Plane, Window};
 use crate::light::Light;
 use crate::math::Ray;
 use crate::parallel;
@@ -120,7 +120,7 @@ pub struct RenderSettings {
     /// How shadows are found.
     pub visibility: VisibilityMode,
     /// The planes of the film. Without those that are lit, no light is asked.
-    pub buffers: Vec<Plane>,
+    pub buffers: Vec<Buffer>,
 }
 
 impl RenderSettings {
@@ -138,8 +138,17 @@ impl RenderSettings {
         if !(min..=max).contains(&self.tile_size) {
             return Err(format!("tile size {} is outside {min} to {max}", self.tile_size));
         }
-        if let Some(fault) = Plane::fault_of(&self.buffers) {
+        if let Some(fault) = scene.fault_of(&self.buffers) {
             return Err(format!("buffers: {fault}"));
+        }
+        let by_light = self.buffers.iter().any(|buffer| matches!(buffer, Buffer::Light(..)));
+        if by_light && scene.lights.len() > many::FEW && !self.renderer().samples_all() {
+            return Err(format!(
+                "buffers: the lights of a scene are kept apart where there are up to {}, and it has {}; ask for diffuse \
+                 and specular, or have every light sampled, with --visibility traced",
+                many::FEW,
+                scene.lights.len()
+            ));
         }
         if !self.simd.is_available() {
             let names: Vec<_> = SimdLevel::available().iter().map(|level| level.name()).collect();
@@ -182,7 +191,7 @@ impl RenderSettings {
             }
         }
         let window = self.window(scene);
-        let pixel: usize = self.buffers.iter().map(|plane| plane.bytes()).sum();
+        let pixel: usize = self.buffers.iter().map(|buffer| buffer.plane().bytes()).sum();
         let both = 2 * window.width as usize * window.height as usize * pixel;
         Vec::<u8>::new().try_reserve_exact(both).map_err(|_| {
             let Window { width, height, .. } = window;
@@ -241,7 +250,7 @@ impl Default for RenderSettings {
             aa_mode: AaMode::Adaptive,
             visibility: VisibilityMode::Shafts,
             reference: false,
-            buffers: vec![Plane::Color],
+            buffers: vec![Plane::Color.into()],
         }
     }
 }
@@ -276,9 +285,9 @@ pub fn render(
     let simd = if renderer == Renderer::Reference { SimdLevel::Fallback } else { level };
     let nothing = Counts::default().stats(simd, threads);
     let planes = &settings.buffers;
-    let result = Mutex::new((Film::new([scene.width, scene.height], window, planes), nothing));
-    let of_centers = planes.iter().any(|plane| plane.is_of_center());
-    let is_lit = planes.iter().any(|plane| !plane.is_of_center());
+    let result = Mutex::new((Film::new(scene, window, planes), nothing));
+    let of_centers = planes.iter().any(|buffer| buffer.plane().is_of_center());
+    let is_lit = planes.iter().any(|buffer| !buffer.plane().is_of_center());
     let lights = Lights::new(scene);
     // Where every light is sampled at every ray, the bits are those of the plain renderer
     let is_sampled = lights.emitters.iter().all(Option::is_none);

@@ -4,7 +4,7 @@ use super::many::SINGLY;
 use super::{RenderSettings, Renderer};
 use crate::camera::{Frame, Projection};
 use crate::describe::SamplesDesc;
-use crate::image::{Plane, Receipt};
+use crate::image::{Buffer, Plane, Receipt};
 use crate::light::Light;
 use crate::math::Vec3;
 use crate::scene::Scene;
@@ -66,13 +66,14 @@ impl Scene {
     /// - `opencv_camera_from_world` and `opengl_camera_from_world`: 4 x 4, row by row; OpenCV's camera looks along z
     ///   with y down, OpenGL's along -z with y up;
     /// - `object_names`, `material_names`: JSON lists, the name of id 1 first, `null` for what has none.
-    pub fn buffers_receipt(&self, settings: &RenderSettings, buffers: &[Plane]) -> Receipt {
+    pub fn buffers_receipt(&self, settings: &RenderSettings, buffers: &[Buffer]) -> Receipt {
         let mut receipt = self.receipt(settings);
-        if matches!(buffers, [Plane::Color]) {
+        if matches!(buffers, [Buffer::Plane(Plane::Color)]) {
             return receipt;
         }
         let mut add = |key: &str, value: String| receipt.entries.push((key.to_owned(), value));
-        add("buffers", buffers.iter().map(|plane| plane.name()).collect::<Vec<_>>().join(" "));
+        let list = |names: Vec<Option<String>>| serde_json::Value::from(names).to_string();
+        add("buffers", list(buffers.iter().map(|buffer| Some(self.buffer_name(*buffer))).collect()));
         if self.camera.projection() == Projection::Perspective {
             let [hx, hy] = self.camera.film_half_size().map(f64::from);
             let [sx, sy] = self.camera.film_shift().map(f64::from);
@@ -91,14 +92,16 @@ impl Scene {
             };
             add(key, format!("{} 0 0 0 1", axes.map(row).join(" ")));
         }
-        let list = |names: Vec<Option<String>>| serde_json::Value::from(names).to_string();
-        if buffers.contains(&Plane::ObjectId) {
+        let asks_for = |plane: Plane| buffers.contains(&plane.into());
+        if asks_for(Plane::ObjectId) {
             let shapes = self.geometry.surfaces.iter().map(|surface| surface.name.as_deref().map(str::to_owned));
-            let lights = self.summary.lights.iter().map(|(_, name, _)| name.clone());
-            add("object_names", list(shapes.chain(lights).collect()));
+            add("object_names", list(shapes.chain(self.light_names()).collect()));
         }
-        if buffers.contains(&Plane::MaterialId) {
+        if asks_for(Plane::MaterialId) {
             add("material_names", list(self.summary.materials.iter().map(|(name, _)| Some(name.clone())).collect()));
+        }
+        if buffers.iter().any(|buffer| matches!(buffer, Buffer::Light(..))) {
+            add("light_names", list(self.light_names()));
         }
         receipt
     }

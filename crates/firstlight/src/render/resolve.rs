@@ -3,7 +3,8 @@
 use std::ops::Range;
 
 use crate::color::Rgb;
-use crate::image::Plane;
+use crate::ids::LightId;
+use crate::image::{Buffer, LightPart, Plane};
 use crate::material::Colors;
 use crate::scene::Scene;
 
@@ -24,7 +25,7 @@ pub(crate) struct TermSums {
     /// What each took.
     pub work: Vec<f32>,
     /// The sums of some terms alone.
-    kept: Vec<(Plane, Vec<[f32; 3]>)>,
+    kept: Vec<(Buffer, Vec<[f32; 3]>)>,
 }
 
 /// What the rays of a pixel see beside the light of lights, added up.
@@ -78,25 +79,29 @@ impl PixelTerms {
 }
 
 impl Term {
-    /// Whether a plane is a sum that this belongs to.
-    fn is_of(self, plane: Plane) -> bool {
-        match self {
-            Term::Background => plane == Plane::Background,
-            Term::Emission => plane == Plane::Emission,
-            Term::Ambient => plane == Plane::Ambient,
-            Term::Light(_, moment) => plane == [Plane::Diffuse, Plane::Specular][moment],
+    /// Whether a buffer is a sum that this belongs to.
+    fn is_of(self, buffer: Buffer) -> bool {
+        match (self, buffer) {
+            (Term::Background, Buffer::Plane(plane)) => plane == Plane::Background,
+            (Term::Emission, Buffer::Plane(plane)) => plane == Plane::Emission,
+            (Term::Ambient, Buffer::Plane(plane)) => plane == Plane::Ambient,
+            (Term::Light(_, moment), Buffer::Plane(plane)) => plane == [Plane::Diffuse, Plane::Specular][moment],
+            (Term::Light(light, moment), Buffer::Light(LightId(of), part)) => {
+                light == Some(of) && part.is_none_or(|part| part == [LightPart::Diffuse, LightPart::Specular][moment])
+            }
+            (_, Buffer::Light(..)) => false,
         }
     }
 }
 
 impl TermSums {
-    /// So many, with those planes that are sums of some terms.
-    pub fn new(pixels: usize, planes: &[Plane]) -> TermSums {
-        let kept = planes.iter().filter(|plane| plane.is_of_terms());
+    /// So many, with those buffers that are sums of some terms.
+    pub fn new(pixels: usize, buffers: &[Buffer]) -> TermSums {
+        let kept = buffers.iter().filter(|buffer| buffer.plane().is_of_terms());
         TermSums {
             colors: vec![[0.0; 4]; pixels],
             work: vec![0.0; pixels],
-            kept: kept.map(|plane| (*plane, vec![[0.0; 3]; pixels])).collect(),
+            kept: kept.map(|buffer| (*buffer, vec![[0.0; 3]; pixels])).collect(),
         }
     }
 
@@ -105,8 +110,8 @@ impl TermSums {
     pub fn begin(&mut self, pixels: Range<usize>, background: Rgb, alpha: f32) {
         let Rgb { r, g, b } = background;
         self.colors[pixels.clone()].fill([r, g, b, alpha]);
-        for (plane, sums) in &mut self.kept {
-            sums[pixels.clone()].fill(if Term::Background.is_of(*plane) { [r, g, b] } else { [0.0; 3] });
+        for (buffer, sums) in &mut self.kept {
+            sums[pixels.clone()].fill(if Term::Background.is_of(*buffer) { [r, g, b] } else { [0.0; 3] });
         }
     }
 
@@ -116,7 +121,7 @@ impl TermSums {
         for ([r, g, b, _], value) in self.colors[first..].iter_mut().zip(values.clone()) {
             (*r, *g, *b) = (*r + value.r, *g + value.g, *b + value.b);
         }
-        for (_, sums) in self.kept.iter_mut().filter(|(plane, _)| term.is_of(*plane)) {
+        for (_, sums) in self.kept.iter_mut().filter(|(buffer, _)| term.is_of(*buffer)) {
             for ([r, g, b], value) in sums[first..].iter_mut().zip(values.clone()) {
                 (*r, *g, *b) = (*r + value.r, *g + value.g, *b + value.b);
             }
@@ -130,7 +135,7 @@ impl TermSums {
     }
 
     /// The sums of some terms; `None` if they are not kept.
-    pub fn kept(&self, of: Plane) -> Option<&[[f32; 3]]> {
-        self.kept.iter().find(|(plane, _)| *plane == of).map(|(_, sums)| &sums[..])
+    pub fn kept(&self, of: Buffer) -> Option<&[[f32; 3]]> {
+        self.kept.iter().find(|(buffer, _)| *buffer == of).map(|(_, sums)| &sums[..])
     }
 }

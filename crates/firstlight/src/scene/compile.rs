@@ -20,7 +20,6 @@ use crate::context::{AssetError, Assets, CompileContext, OnCompile};
 use crate::describe::{ColorParam, Family, NumberParam, SamplesDesc};
 use crate::error::{Diagnostic, SceneError, Severity};
 use crate::ids::TextureId;
-use crate::image::Plane;
 use crate::image::read::{Limits, TexelData, Texels, decode};
 use crate::light::{Light, LightDesc, check_samples};
 use crate::material::Material;
@@ -112,6 +111,7 @@ impl SceneDesc {
         let desc = &*self.with(&added);
         let camera = desc.compile_camera(cx, picture.width, picture.height, geometry.is_some());
         let lights = desc.compile_lights(cx);
+        let buffers = desc.compile_buffers(cx);
         let (Some(geometry), false) = (geometry, cx.has_errors()) else {
             return None;
         };
@@ -137,6 +137,7 @@ impl SceneDesc {
             materials,
             occluders,
             level: Level::new(),
+            buffers,
             hash: self.hash(&textures, &files, &added),
             moment: time,
             time: cx.keyed.then_some(time),
@@ -199,9 +200,6 @@ impl SceneDesc {
             let antialiasing = cx.count("antialiasing", render.antialiasing, 1, MAX_ANTIALIASING, Some(hint));
             check_samples(cx, render.samples, "points on each area light");
             let hint = "in display steps; 1 is usual, 4 is a preview";
-            if let Some(fault) = Plane::fault_of(&render.buffers) {
-                cx.error("buffers", fault, Some("name each once; the picture is \"color\""));
-            }
             let tolerance = cx.between("tolerance", render.tolerance, MIN_TOLERANCE, MAX_TOLERANCE, Some(hint));
             let gamma = cx.between("gamma", render.gamma, 0.1, 10.0, Some("2.2 is usual"));
             let exposure = cx.between("exposure", render.exposure, -64.0, 64.0, Some("in stops: each doubles"));
@@ -315,10 +313,6 @@ impl SceneDesc {
     ) -> SceneSummary {
         let kinds = ShapeDesc::KINDS.iter().enumerate();
         let count = |kind: usize| self.shapes.iter().filter(|shape| shape.kind_index() == kind).count();
-        let mut described = Vec::new();
-        for kind in LightDesc::KINDS {
-            described.extend(completed.lights.iter().filter(|light| light.kind() == *kind));
-        }
         SceneSummary {
             shapes: kinds.map(|(kind, word)| (*word, count(kind))).filter(|(_, count)| *count > 0).collect(),
             groups: self.groups.iter().map(|(name, group)| (name.clone(), group.shapes.len())).collect(),
@@ -327,7 +321,10 @@ impl SceneDesc {
             triangles: geometry.all_meshes().map(|mesh| mesh.triangles.len() as u64).sum(),
             points: geometry.point_sets.iter().map(|points| points.len() as u64).sum(),
             geometry_bytes: geometry.bytes(),
-            lights: described.iter().zip(lights).map(|(d, l)| (d.kind(), d.name(), l.said_samples())).collect(),
+            lights: LightDesc::in_scene_order(&completed.lights)
+                .zip(lights)
+                .map(|(d, l)| (d.kind(), d.name(), l.said_samples()))
+                .collect(),
             materials: self.materials.iter().map(|(name, m)| (name.clone(), m.kind())).collect(),
             textures: textures.sizes(),
             texture_bytes: textures.bytes(),

@@ -2,7 +2,7 @@
 
 use crate::camera::CameraDesc;
 use crate::describe::{ColorDesc, FilePath, SamplesDesc, table, words};
-use crate::image::Plane;
+use crate::image::{BufferDesc, Plane};
 use crate::light::LightDesc;
 use crate::material::MaterialDesc;
 use crate::shape::{GroupDesc, ShadowTerminator, ShapeDesc};
@@ -64,7 +64,7 @@ table! {
         /// In stops: 8- and 16-bit pictures are multiplied by 2^exposure, from -64 to 64.
         pub exposure: f64 = 0.0,
         /// What files that hold more than a picture, .exr and .npz, are given of each pixel.
-        pub buffers: Vec<Plane> = vec![Plane::Color],
+        pub buffers: Vec<BufferDesc> = vec![BufferDesc::Plane(Plane::Color)],
         /// Frames in a second, 0.001 to 1000000: frame number n of `--frames` is the moment n / fps. Without keys it is
         /// of no account.
         pub fps: f64 = 24.0,

@@ -61,21 +61,17 @@ pub(super) struct Links {
 impl Links {
     pub fn new(described: &[LightDesc]) -> Self {
         let mut lights: HashMap<String, Vec<usize>> = HashMap::new();
-        let (mut names, mut count) = (Vec::new(), 0);
-        // Scene order
-        for kind in LightDesc::KINDS {
-            for light in described.iter().filter(|light| light.kind() == *kind) {
-                if let Some(name) = light.name() {
-                    if !lights.contains_key(&name) {
-                        names.push(name.clone());
-                    }
-                    lights.entry(name).or_default().push(count);
+        let mut names = Vec::new();
+        for (number, light) in LightDesc::in_scene_order(described).enumerate() {
+            if let Some(name) = light.name() {
+                if !lights.contains_key(&name) {
+                    names.push(name.clone());
                 }
-                count += 1;
+                lights.entry(name).or_default().push(number);
             }
         }
         // A scene without lights may be given one
-        let count = count.max(1);
+        let count = described.len().max(1);
         let sets = LinkSets { words: count.div_ceil(64), bits: Vec::new() };
         Links { names, lights, count, sets, ids: HashMap::new(), common: HashMap::new(), full: false }
     }

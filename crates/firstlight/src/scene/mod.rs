@@ -1,6 +1,7 @@
 //! Scenes: described, read, compiled.
 
 mod advice;
+mod buffers;
 mod builtin;
 mod compile;
 mod course;
@@ -36,6 +37,7 @@ use crate::camera::Camera;
 use crate::color::{Display, Rgb};
 use crate::describe::SamplesDesc;
 use crate::ids::SurfaceId;
+use crate::image::Buffer;
 use crate::light::Light;
 use crate::material::Material;
 use crate::math::DVec3;
@@ -76,6 +78,8 @@ pub struct Scene {
     /// The best instruction set of this processor: for rays that are asked for one at a time.
     pub(crate) level: Level,
     pub(crate) hash: String,
+    /// What it asks for of each pixel.
+    pub(crate) buffers: Vec<Buffer>,
     /// The moment that was compiled, in seconds.
     pub(crate) moment: f64,
     /// The moment, in seconds, if anything of the scene changes with time.
