@@ -16,10 +16,15 @@ pub struct FilmPlane {
     size: Vec2,
     /// Twice the place on the line of sight, in pixels from the upper left corner: `size`, without a shift.
     axis: Vec2,
+    /// The intrinsics as they were said in pixels, where they were.
+    pub(super) said: Option<[f64; 4]>,
 }
 
 /// The farthest that a film may be shifted, in widths and heights of it.
 const MAX_SHIFT: f64 = 100.0;
+/// The least and the largest focal length in pixels.
+const MIN_FOCAL_PX: f64 = 0.01;
+const MAX_FOCAL_PX: f64 = 1e10;
 
 impl FilmPlane {
     /// Of `width` x `height` pixels.
@@ -34,7 +39,46 @@ impl FilmPlane {
             shift: Vec2::new(right as f32, up as f32),
             size: Vec2::new(width as f32, height as f32),
             axis: Vec2::new((w * (1.0 - 2.0 * right)) as f32, (h * (1.0 + 2.0 * up)) as f32),
+            said: None,
         }
+    }
+
+    /// Of `width` x `height` pixels, by the focal lengths and the principal point (the middle of the film if `None`) of
+    /// a calibrated camera, in pixels.
+    ///
+    /// A point (X, Y, Z) before the camera, with Y down, is at x = fx X / Z + cx and y = fy Y / Z + cy. So the film at
+    /// distance 1 is W / fx wide and H / fy high, and its middle (W / 2 - cx) / fx to the right of the line of sight.
+    pub(super) fn from_pixels(
+        cx: &mut CompileContext,
+        [fx, fy]: [f64; 2],
+        point: Option<[f64; 2]>,
+        width: u32,
+        height: u32,
+    ) -> Self {
+        let (w, h) = (width as f64, height as f64);
+        let [px, py] = point.unwrap_or([0.5 * w, 0.5 * h]);
+        for (i, focal) in [fx, fy].into_iter().enumerate() {
+            let hint = "in pixels, as fx and fy of a camera matrix";
+            cx.between(&format!("focal_length_px[{i}]"), focal, MIN_FOCAL_PX, MAX_FOCAL_PX, Some(hint));
+        }
+        let (right, up) = (0.5 - px / w, py / h - 0.5);
+        if !(right.abs() <= MAX_SHIFT && up.abs() <= MAX_SHIFT) {
+            let message = format!("{} is more than 100 pictures away", crate::context::show(&[px, py]));
+            cx.error("principal_point_px", message, Some("in pixels from the upper left corner of the picture"));
+        }
+        Self {
+            half: Vec2::new((0.5 * w / fx) as f32, (0.5 * h / fy) as f32),
+            shift: Vec2::new(right as f32, up as f32),
+            size: Vec2::new(width as f32, height as f32),
+            axis: Vec2::new((2.0 * px) as f32, (2.0 * py) as f32),
+            said: Some([fx, fy, px, py]),
+        }
+    }
+
+    /// fx, fy, cx and cy of the camera matrix of a film at distance 1, in pixels.
+    pub(super) fn intrinsics(&self) -> [f64; 4] {
+        let [[hx, hy], [right, up], [w, h]] = [self.half, self.shift, self.size].map(|v| v.to_array().map(f64::from));
+        self.said.unwrap_or([0.5 * w / hx, 0.5 * h / hy, w * (0.5 - right), h * (0.5 + up)])
     }
 
     /// The place on the film at `x`, `y` in pixels from its upper left corner: to the right of the line of sight, and

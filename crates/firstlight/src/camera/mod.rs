@@ -33,8 +33,9 @@ table! {
     /// A camera: `[camera]`, or several as `[camera.NAME]`, of which `render.camera` or `--camera` names one. A scene
     /// without a camera is given one that sees all of its shapes.
     ///
-    /// What a perspective camera sees is `fov_y_deg`, or `focal_length_mm` with `sensor_height_mm`; with neither it is
-    /// 45 degrees. What an orthographic camera sees is `height` metres.
+    /// What a perspective camera sees is `fov_y_deg`, or `focal_length_mm` with `sensor_height_mm`, or
+    /// `focal_length_px` with `principal_point_px`; with none of them it is 45 degrees. What an orthographic camera
+    /// sees is `height` metres.
     ///
     /// ```toml
     /// [camera]
@@ -58,6 +59,13 @@ table! {
         pub focal_length_mm: Option<f64> = None,
         /// The height of the sensor in millimetres, 0.01 to 10000, for `focal_length_mm`; 24 unless said.
         pub sensor_height_mm: Option<f64> = None,
+        /// Instead of `fov_y_deg`: fx and fy of a camera matrix, the focal lengths in widths and in heights of a pixel,
+        /// each 0.01 to 1e10.
+        pub focal_length_px: Option<[f64; 2]> = None,
+        /// With `focal_length_px`: cx and cy of a camera matrix, where the line of sight meets the picture, in pixels
+        /// from its upper left corner, so that the middle of the first pixel is (0.5, 0.5); at most 100 pictures away.
+        /// Without it, the middle of the picture.
+        pub principal_point_px: Option<[f64; 2]> = None,
         /// From the lower edge of an orthographic picture to the upper, in metres, 1e-9 to 2.5e8. An orthographic
         /// camera needs it, and no other takes it.
         pub height: Option<f64> = None,
@@ -160,6 +168,15 @@ impl Camera {
         self.film().half.to_array()
     }
 
+    /// fx, fy, cx and cy of the camera matrix K of a perspective camera, in pixels: with x to the right, y down and the
+    /// middle of the first pixel at (0.5, 0.5). `None` for an orthographic camera, which has none.
+    pub fn intrinsics(&self) -> Option<[f64; 4]> {
+        match self {
+            Camera::Pinhole(pinhole) => Some(pinhole.film.intrinsics()),
+            Camera::Orthographic(_) => None,
+        }
+    }
+
     /// How far the film's middle is to the right of the line of sight and above it, in widths and heights of the film.
     pub fn film_shift(&self) -> [f32; 2] {
         self.film().shift.to_array()
@@ -251,6 +268,41 @@ mod tests {
         // More of the right and of what is above
         assert!(quarter.local_ray(32.0, 24.0, 1.0).0.d.dot(whole.frame().right) > 0.0);
         assert!(quarter.local_ray(32.0, 24.0, 1.0).0.d.dot(whole.frame().up) > 0.0);
+    }
+
+    #[test]
+    fn intrinsics_in_pixels_are_those_of_a_projection() {
+        // An RGB-D camera turned and moved: points before it, where K finds them, and the ray through there
+        let [fx, fy, cx, cy] = [525.25, 517.5, 300.75, 251.125];
+        let desc = CameraDesc {
+            look_at: [0.5, -1.0, 0.0],
+            up: [0.1, 1.0, 0.2],
+            focal_length_px: Some([fx, fy]),
+            principal_point_px: Some([cx, cy]),
+            ..CameraDesc::new([1.0, 2.0, 10.0])
+        };
+        let camera = compiled(&desc, 640, 480);
+        assert_eq!(camera.intrinsics(), Some([fx, fy, cx, cy]));
+        let Frame { position, right, up, forward, .. } = *camera.frame();
+        for x in [-1.5, 0.0, 0.4, 2.0] {
+            for (y, z) in [(-1.25, 3.0), (0.0, 5.0), (1.75, 9.0)] {
+                let (u, v) = (fx * x / z + cx, fy * y / z + cy);
+                let p = right.as_dvec3() * x - up.as_dvec3() * y + forward.as_dvec3() * z;
+                let (ray, differential) = camera.ray(u as f32, v as f32, 1.0);
+                assert!((ray.d.as_dvec3() - p.normalize()).length() < 2e-7, "{u} {v}");
+                assert_eq!(ray.o, position);
+                // A pixel to the right is 1 / fx at distance 1
+                let step = differential.dx.length() as f64 * p.length() / z * fx;
+                assert!((step - 1.0).abs() < 1e-6, "{step}");
+            }
+        }
+        // Square pixels and the middle are a field of view
+        let fov = 2.0 * pxfm::f_atan(240.0 / 600.0) * 180.0 / std::f64::consts::PI;
+        let square = compiled(&CameraDesc { focal_length_px: Some([600.0; 2]), ..CameraDesc::new([0.0; 3]) }, 640, 480);
+        let usual = compiled(&CameraDesc { fov_y_deg: Some(fov), ..CameraDesc::new([0.0; 3]) }, 640, 480);
+        assert_eq!((square.film_half_size(), square.film_shift()), (usual.film_half_size(), [0.0; 2]));
+        let k = usual.intrinsics().unwrap_or_default();
+        assert!((k[0] - 600.0).abs() < 1e-4 && (k[1] - 600.0).abs() < 1e-4 && k[2..] == [320.0, 240.0], "{k:?}");
     }
 
     #[test]

@@ -3,7 +3,7 @@
 use fearless_simd::{f32x16, prelude::*};
 
 use super::{CameraDesc, FilmPlane, Frame};
-use crate::context::CompileContext;
+use crate::context::{CompileContext, show};
 use crate::math::{Ray, Vec3, Vec3x16};
 use crate::shape::RayDifferential;
 
@@ -24,6 +24,13 @@ impl Orthographic {
             ("focal_length_mm", desc.focal_length_mm),
             ("sensor_height_mm", desc.sensor_height_mm),
         ];
+        let pixels = [("focal_length_px", desc.focal_length_px), ("principal_point_px", desc.principal_point_px)];
+        for (field, value) in pixels {
+            if let Some(value) = value {
+                let message = format!("{} has no effect with projection = \"orthographic\"", show(&value));
+                cx.error(field, message, Some("`height` says how much it sees; take this out"));
+            }
+        }
         for (field, value) in angles {
             if let Some(value) = value {
                 let message = format!("{value} has no effect with projection = \"orthographic\"");

@@ -4,7 +4,7 @@ use fearless_simd::{f32x16, prelude::*};
 use pxfm::{f_atan, f_tan};
 
 use super::{CameraDesc, FilmPlane, Frame};
-use crate::context::CompileContext;
+use crate::context::{CompileContext, show};
 use crate::math::{Ray, Vec3, Vec3x16};
 use crate::shape::RayDifferential;
 
@@ -27,8 +27,21 @@ impl Pinhole {
             let message = format!("{metres} has no effect without projection = \"orthographic\"");
             cx.error("height", message, Some("fov_y_deg says how much a perspective camera sees"));
         }
-        let half_height = f_tan(fov_y(desc, cx) * 0.5);
-        Self { frame, film: FilmPlane::compile(cx, desc.shift, half_height, width, height) }
+        let film = match desc.focal_length_px {
+            Some(focal) => {
+                refuse_beside_pixels(desc, cx);
+                FilmPlane::from_pixels(cx, focal, desc.principal_point_px, width, height)
+            }
+            None => {
+                if let Some(point) = desc.principal_point_px {
+                    let message = format!("{} has no effect without focal_length_px", show(&point));
+                    cx.error("principal_point_px", message, Some("give focal_length_px as well, or write a shift"));
+                }
+                let half_height = f_tan(fov_y(desc, cx) * 0.5);
+                FilmPlane::compile(cx, desc.shift, half_height, width, height)
+            }
+        };
+        Self { frame, film }
     }
 
     /// The ray through the film at `x`, `y` in pixels from its upper left corner, and how it changes over `step` pixels
@@ -58,6 +71,24 @@ impl Pinhole {
         let towards = right * film_x + up * film_y + forward;
         let length = towards.dot(towards).sqrt();
         [eye, Vec3x16 { x: towards.x / length, y: towards.y / length, z: towards.z / length }]
+    }
+}
+
+/// Refuses what says again what a camera matrix says.
+fn refuse_beside_pixels(desc: &CameraDesc, cx: &mut CompileContext) {
+    let others = [
+        ("fov_y_deg", desc.fov_y_deg),
+        ("focal_length_mm", desc.focal_length_mm),
+        ("sensor_height_mm", desc.sensor_height_mm),
+    ];
+    for (field, value) in others {
+        if let Some(value) = value {
+            cx.error(field, format!("{value} and focal_length_px say the same twice"), Some("keep one of them"));
+        }
+    }
+    if desc.shift != [0.0; 2] {
+        let message = format!("{} has no effect with focal_length_px", show(&desc.shift));
+        cx.error("shift", message, Some("principal_point_px says where the line of sight meets the picture"));
     }
 }
 

@@ -74,11 +74,8 @@ impl Scene {
         let mut add = |key: &str, value: String| receipt.entries.push((key.to_owned(), value));
         let list = |names: Vec<Option<String>>| serde_json::Value::from(names).to_string();
         add("buffers", list(buffers.iter().map(|buffer| Some(self.buffer_name(*buffer))).collect()));
-        if self.camera.projection() == Projection::Perspective {
-            let [hx, hy] = self.camera.film_half_size().map(f64::from);
-            let [sx, sy] = self.camera.film_shift().map(f64::from);
-            let (w, h) = (f64::from(self.width), f64::from(self.height));
-            let k = [0.5 * w / hx, 0.0, w * (0.5 - sx), 0.0, 0.5 * h / hy, h * (0.5 + sy), 0.0, 0.0, 1.0];
+        if let Some([fx, fy, cx, cy]) = self.camera.intrinsics() {
+            let k = [fx, 0.0, cx, 0.0, fy, cy, 0.0, 0.0, 1.0];
             add("intrinsics", k.map(|v| v.to_string()).join(" "));
         }
         let Frame { position, right, up, forward, .. } = *self.camera.frame();
