@@ -310,8 +310,14 @@ impl Input {
     /// Every fault of text and meaning.
     pub fn compile(&self, time: f64, quiet: bool) -> Result<Compiled, Failure> {
         let progress = (!quiet).then(loading);
-        let options =
-            CompileOptions { strict: self.strict, time, framing: self.framing, light: self.is_model, progress };
+        let options = CompileOptions {
+            strict: self.strict,
+            time,
+            framing: self.framing,
+            light: self.is_model,
+            progress,
+            cache: None,
+        };
         self.parsed.compile(&self.assets, &options).map_err(|e| Failure::Scene(e.faults))
     }
 }

@@ -83,8 +83,9 @@ pub use describe::{ColorDesc, ColorParam, FilePath, NumberParam, ParamDesc, Samp
 pub use error::{Diagnostic, Place, SceneError, Severity, printable};
 pub use ids::{LightId, MaterialId, SurfaceId, TextureId};
 pub use image::{
-    Buffer, BufferDesc, Format, Image, ImageError, LightChoice, LightPart, PendingFile, Plane, PlaneNumbers, Receipt,
-    Sampling, StagedFile, StoredImage, Window, Written, is_decoding, write_open, write_whole,
+    Buffer, BufferDesc, Format, Image, ImageError, LightChoice, LightPart, NamedPlane, PendingFile, Plane,
+    PlaneNumbers, PlaneVec, Receipt, Sampling, StagedFile, StoredImage, Window, Written, encode_planes, is_decoding,
+    write_open, write_whole,
 };
 pub use import::{ImportError, MeshData, MeshFormat, MeshPart, MeshPlace, MeshReport, is_point_set, read_mesh};
 pub use light::{
@@ -95,14 +96,14 @@ pub use material::{BlinnPhongDesc, MaterialDesc, PhongDesc};
 pub use math::{DVec3, ShadowRay, Vec2, Vec3, WorldRay};
 pub use render::{AaMode, Film, Heat, LightCounts, RenderSettings, RenderStats, VisibilityMode, render, render_image};
 pub use scene::{
-    Added, CameraHit, CompileOptions, Compiled, DisplayEncoding, Framing, Hit, ModelSettings, RenderDesc, Scene,
-    SceneDesc, SceneSummary, SurfacePoint, UpAxis, View,
+    Added, CameraHit, CastHit, CompileOptions, Compiled, DisplayEncoding, Framing, Hit, ModelSettings, RenderDesc,
+    Scene, SceneDesc, SceneSummary, SurfacePoint, UpAxis, View,
 };
 pub use scene::{Builtin, Parsed, builtin_scenes, reference, schema};
 pub use shape::{
-    BoxDesc, ConeDesc, CylinderDesc, DiskDesc, Footprint, GroupDesc, InstanceDesc, MeshDesc, ParallelogramDesc,
-    PlaneDesc, PointSetDesc, RayDifferential, RectangleShapeDesc, ShadowTerminator, ShapeDesc, SphereDesc, SphereUv,
-    TorusDesc, UvEdge,
+    BoxDesc, CompileCache, ConeDesc, CylinderDesc, DiskDesc, Footprint, GroupDesc, InstanceDesc, MeshDesc,
+    ParallelogramDesc, PlaneDesc, PointSetDesc, RayDifferential, RectangleShapeDesc, ShadowTerminator, ShapeDesc,
+    SphereDesc, SphereUv, TorusDesc, UvEdge,
 };
 pub use texture::{CheckerboardDesc, Filter, ImageTextureDesc, TextureDesc, TextureSpace, Wrap};
 pub use transform::{Interpolation, TransformDesc, TransformKeyDesc};

@@ -115,11 +115,13 @@ prop_compose! {
     fn camera()(
         position in vector(), look_at in vector(), up in vector(), projection in select(Projection::ALL),
         sizes in [maybe(number()), maybe(number()), maybe(number()), maybe(number())], shift in [number(), number()],
-        transform in moved(),
+        pixels in [maybe([number(), number()]), maybe([number(), number()])], transform in moved(),
     ) -> CameraDesc {
+        let [focal_length_px, principal_point_px] = pixels;
         let [fov_y_deg, focal_length_mm, sensor_height_mm, height] = sizes;
         CameraDesc {
-            position, look_at, up, projection, fov_y_deg, focal_length_mm, sensor_height_mm, height, shift, transform,
+            position, look_at, up, projection, fov_y_deg, focal_length_mm, sensor_height_mm, focal_length_px,
+            principal_point_px, height, shift, transform,
         }
     }
 }

@@ -11,6 +11,7 @@ mod error;
 mod exr;
 mod file;
 mod format;
+mod given;
 mod hdr;
 mod npz;
 mod patient;
@@ -24,9 +25,10 @@ pub use contain::is_decoding;
 pub use error::ImageError;
 pub use file::{PendingFile, StagedFile, Written, write_whole};
 pub use format::Format;
+pub use given::{PlaneVec, encode_planes};
 pub use patient::write_open;
-pub(crate) use plane::{NamedPlane, PlaneFile};
-pub use plane::{Plane, PlaneNumbers, Sampling};
+pub(crate) use plane::PlaneFile;
+pub use plane::{NamedPlane, Plane, PlaneNumbers, Sampling};
 pub use stored::StoredImage;
 
 use crate::color::Display;
@@ -102,15 +104,21 @@ impl Image {
 
     /// Whether the picture is whole.
     fn check(&self) -> Result<(), ImageError> {
-        let Window { x, y, width, height } = self.window;
-        let [w, h] = self.film;
+        Self::check_window(self.film, self.window)?;
+        let Window { width, height, .. } = self.window;
+        if self.pixels.len() as u64 != u64::from(width) * u64::from(height) {
+            let fault = format!("{} pixels do not fill the window {width} x {height}", self.pixels.len());
+            return Err(ImageError::Picture(fault));
+        }
+        Ok(())
+    }
+
+    /// Whether a window is a part of its film.
+    fn check_window([w, h]: [u32; 2], window: Window) -> Result<(), ImageError> {
+        let Window { x, y, width, height } = window;
         let inside = |first: u32, length: u32, all: u32| first.checked_add(length).is_some_and(|end| end <= all);
         if width == 0 || height == 0 || !inside(x, width, w) || !inside(y, height, h) {
             let fault = format!("the window {width} x {height} at ({x}, {y}) is empty or outside the film {w} x {h}");
-            return Err(ImageError::Picture(fault));
-        }
-        if self.pixels.len() as u64 != u64::from(width) * u64::from(height) {
-            let fault = format!("{} pixels do not fill the window {width} x {height}", self.pixels.len());
             return Err(ImageError::Picture(fault));
         }
         Ok(())

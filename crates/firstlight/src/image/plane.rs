@@ -200,9 +200,13 @@ pub(crate) struct PlaneFile<'a> {
 }
 
 /// A plane with its name in files.
-pub(crate) struct NamedPlane<'a> {
+#[derive(Clone, Copy, Debug)]
+pub struct NamedPlane<'a> {
+    /// The name: of a layer of EXR files, of an array of NPZ files.
     pub name: &'a str,
+    /// What it is, or is like: its channels, its unit and its sampling.
     pub plane: Plane,
+    /// Its numbers.
     pub numbers: PlaneNumbers<'a>,
 }
 

@@ -15,6 +15,7 @@
 
 mod error;
 mod foreign;
+mod given;
 mod obj;
 mod ply;
 mod polygon;
@@ -31,6 +32,7 @@ use crate::math::{DVec3, origin_for};
 use error::ImportFault;
 pub use error::{ImportError, MeshPlace};
 pub(crate) use foreign::{Foreign, WantedFile, foreign};
+pub(crate) use given::from_own_origin;
 pub use report::MeshReport;
 
 /// Vertices and triangles are counted in 32 bits, with one number to spare for "none".

@@ -5,7 +5,9 @@ use std::ops::Range;
 use super::heat::Heat;
 use super::resolve::TermSums;
 use super::tile::Tile;
-use crate::image::{Buffer, Format, Image, ImageError, NamedPlane, Plane, PlaneFile, PlaneNumbers, Receipt, Window};
+use crate::image::{
+    Buffer, Format, Image, ImageError, NamedPlane, Plane, PlaneFile, PlaneNumbers, PlaneVec, Receipt, Window,
+};
 use crate::scene::Scene;
 
 /// The numbers of a plane, pixel by pixel.
@@ -41,6 +43,16 @@ impl Values {
             (Values::Four(to), Values::Four(from)) => copy(to, at, from, first, length),
             (Values::Whole(to), Values::Whole(from)) => copy(to, at, from, first, length),
             _ => unreachable!("a tile has the planes of its film"),
+        }
+    }
+
+    fn into_numbers(self) -> PlaneVec {
+        match self {
+            Values::One(numbers) => PlaneVec::Floats(numbers),
+            Values::Two(numbers) => PlaneVec::Floats(numbers.into_flattened()),
+            Values::Three(numbers) => PlaneVec::Floats(numbers.into_flattened()),
+            Values::Four(numbers) => PlaneVec::Floats(numbers.into_flattened()),
+            Values::Whole(numbers) => PlaneVec::Wholes(numbers),
         }
     }
 
@@ -120,6 +132,13 @@ impl Film {
     pub fn numbers(&self, of: impl Into<Buffer>) -> Option<PlaneNumbers<'_>> {
         let of = of.into();
         self.planes.iter().find(|(buffer, _)| *buffer == of).map(|(_, values)| values.numbers())
+    }
+
+    /// Gives the numbers of all planes away, without a copy, in the order they were asked for.
+    /// Each with its name.
+    pub fn into_planes(self) -> impl Iterator<Item = (String, Buffer, PlaneVec)> {
+        let planes = self.names.into_iter().zip(self.planes);
+        planes.map(|(name, (buffer, values))| (name, buffer, values.into_numbers()))
     }
 
     /// Where the work went; `None` if [`Plane::Rays`] was not asked for.

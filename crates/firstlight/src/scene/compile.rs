@@ -20,11 +20,12 @@ use crate::context::{AssetError, Assets, CompileContext, OnCompile};
 use crate::describe::{ColorParam, Family, NumberParam, SamplesDesc};
 use crate::error::{Diagnostic, SceneError, Severity};
 use crate::ids::TextureId;
+use crate::image::ImageError;
 use crate::image::read::{Limits, TexelData, Texels, decode};
 use crate::light::{Light, LightDesc, check_samples};
 use crate::material::Material;
 use crate::math::DVec3;
-use crate::shape::ShapeDesc;
+use crate::shape::{CompileCache, MeshFiles, ShapeDesc, key_of};
 use crate::texture::{Param, Params, Texture, TextureDesc, TextureSpace};
 use crate::transform::MAX_TIME;
 
@@ -39,6 +40,8 @@ pub struct CompileOptions {
     pub light: bool,
     /// Told what is being done, for scenes that take their time.
     pub progress: Option<OnCompile>,
+    /// What is kept from one compilation to the next, for a description that is compiled again and again.
+    pub cache: Option<CompileCache>,
     /// In seconds, from -1e9 to 1e9: where the scene has keys, it is compiled as it is at this time.
     pub time: f64,
 }
@@ -95,15 +98,18 @@ impl SceneDesc {
         assets: &dyn Assets,
         options: &CompileOptions,
     ) -> Option<(Scene, Added)> {
-        let time = options.time;
+        let (time, cache) = (options.time, options.cache.as_ref());
+        if let Some(cache) = cache {
+            cache.begin();
+        }
         cx.progress = options.progress.clone();
         cx.between("time", time, -MAX_TIME, MAX_TIME, Some("the moment to compile, in seconds"));
         let picture = self.compile_render(cx);
-        let mut textures = Textures::new(self, assets);
+        let mut textures = Textures::new(self, assets, cache);
         textures.check(cx);
         let materials = self.compile_materials(cx, &mut textures);
         textures.check_unused(cx);
-        let mut files = Vec::new();
+        let mut files = MeshFiles { cache, ..MeshFiles::default() };
         let geometry = compile_shapes(self, cx, assets, &mut files);
         let origin = cx.origin;
         let bounds = geometry.as_ref().and_then(Geometry::bounds).map(|bounds| bounds.map(|corner| corner + origin));
@@ -138,7 +144,7 @@ impl SceneDesc {
             occluders,
             level: Level::new(),
             buffers,
-            hash: self.hash(&textures, &files, &added),
+            hash: self.hash(&textures, &files.read, &added),
             moment: time,
             time: cx.keyed.then_some(time),
             placeholders: textures.placeholders,
@@ -167,7 +173,8 @@ impl SceneDesc {
         // What moves is framed as it is at 0 s, so that a camera that was found stands still in all frames
         let still = if self.cameras.is_empty() && cx.keyed && options.time != 0.0 {
             let mut at_zero = CompileContext::at_time(0.0);
-            compile_shapes(self, &mut at_zero, assets, &mut Vec::new()).map(|still| (still, at_zero.origin))
+            let files = &mut MeshFiles { cache: options.cache.as_ref(), ..MeshFiles::default() };
+            compile_shapes(self, &mut at_zero, assets, files).map(|still| (still, at_zero.origin))
         } else {
             None
         };
@@ -414,6 +421,8 @@ fn check_unique<'a>(cx: &mut CompileContext, family: &str, names: impl Iterator<
 struct Textures<'a> {
     desc: &'a SceneDesc,
     assets: &'a dyn Assets,
+    /// Texels of before.
+    cache: Option<&'a CompileCache>,
     /// Which texture a name means.
     names: HashMap<&'a str, usize>,
     /// Each texture as it was asked for: colour and data read the same file differently.
@@ -425,11 +434,12 @@ struct Textures<'a> {
 }
 
 impl<'a> Textures<'a> {
-    fn new(desc: &'a SceneDesc, assets: &'a dyn Assets) -> Self {
+    fn new(desc: &'a SceneDesc, assets: &'a dyn Assets, cache: Option<&'a CompileCache>) -> Self {
         let names = desc.textures.iter().enumerate().rev().map(|(index, (name, _))| (name.as_str(), index)).collect();
         Textures {
             desc,
             assets,
+            cache,
             names,
             placeholders: Vec::new(),
             ids: HashMap::new(),
@@ -503,13 +513,13 @@ impl<'a> Textures<'a> {
         let name = &self.desc.textures[index].0;
         let read = self.assets.read(file, MAX_TEXTURE_FILE);
         let (texels, hash) = match &read {
-            Ok(bytes) => match decode(bytes, &self.limits()) {
-                Ok(texels) => (texels, *blake3::hash(bytes).as_bytes()),
+            Ok(bytes) => match self.texels(bytes) {
+                Ok(decoded) => decoded,
                 Err(error) => {
                     let message = format!("{file:?} cannot be read as a picture: {error}");
                     let hint = "magenta and black stand in for it, unless compiled strictly";
                     cx.outside(|cx| cx.warning(&format!("texture.image.{name}.file"), message, Some(hint)));
-                    (placeholder(), [0; 32])
+                    (Arc::new(placeholder()), [0; 32])
                 }
             },
             Err(error) => {
@@ -527,15 +537,28 @@ impl<'a> Textures<'a> {
                         cx.outside(|cx| cx.warning(&path, message, Some(hint)));
                     }
                 }
-                (placeholder(), [0; 32])
+                (Arc::new(placeholder()), [0; 32])
             }
         };
         if hash == [0; 32] {
             self.placeholders.push(file.to_owned());
         }
-        let texels = Arc::new(texels);
         self.files.insert(file, (texels.clone(), hash));
         texels
+    }
+
+    /// The texels of a picture, and the hash of its bytes.
+    fn texels(&self, bytes: &[u8]) -> Result<(Arc<Texels>, [u8; 32]), ImageError> {
+        let hash = *blake3::hash(bytes).as_bytes();
+        let place = self.cache.map(|cache| (cache, key_of("texels", [&hash[..]])));
+        if let Some(texels) = place.and_then(|(cache, key)| cache.find(&key)) {
+            return Ok((texels, hash));
+        }
+        let texels = Arc::new(decode(bytes, &self.limits())?);
+        if let Some((cache, key)) = place {
+            cache.keep(key, &texels);
+        }
+        Ok((texels, hash))
     }
 
     /// What is left of the texels that one scene may have.

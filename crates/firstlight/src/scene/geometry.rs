@@ -195,8 +195,8 @@ pub(crate) struct Geometry {
     /// The triangles of all meshes of the world, in world space.
     pub world: Option<Joined>,
     pub placed: Vec<Placed>,
-    pub meshes: Vec<Mesh>,
-    pub point_sets: Vec<PointSet>,
+    pub meshes: Vec<Arc<Mesh>>,
+    pub point_sets: Vec<Arc<PointSet>>,
     pub solids: Vec<Solid>,
     /// What has no box: planes.
     pub unbounded: Vec<u32>,
@@ -211,7 +211,7 @@ pub(crate) struct Geometry {
 
 /// The mesh of the world, and which rays meet it.
 pub(crate) struct Joined {
-    pub mesh: Mesh,
+    pub mesh: Arc<Mesh>,
     pub camera: Opacity,
     pub shadow: Opacity,
 }
@@ -224,8 +224,8 @@ pub(crate) struct Parts {
     pub parallelograms: Vec<Owned<Parallelogram>>,
     pub world: Option<Joined>,
     pub placed: Vec<Placed>,
-    pub meshes: Vec<Mesh>,
-    pub point_sets: Vec<PointSet>,
+    pub meshes: Vec<Arc<Mesh>>,
+    pub point_sets: Vec<Arc<PointSet>>,
     pub solids: Vec<Solid>,
     pub links: LinkSets,
 }
@@ -244,7 +244,7 @@ fn drop_copies<T, K: Ord>(list: &mut Vec<T>, key: impl Fn(&T) -> K) {
 
 /// The same for two placed things that no ray can tell apart: of one shape, at one place, with the same to say of rays.
 /// That of the lower surface, which is the one that was placed first, is then the one that rays end at.
-fn same_to_rays(thing: &Placed, surfaces: &[Surface], meshes: &[Mesh], solids: &[Solid]) -> [u8; 32] {
+fn same_to_rays(thing: &Placed, surfaces: &[Surface], meshes: &[Arc<Mesh>], solids: &[Solid]) -> [u8; 32] {
     let rules = |of: u32| surfaces[(thing.surface.0 + of) as usize].ray_rules();
     // Numbers are written so that different ones differ
     let what = match thing.target {
@@ -377,15 +377,15 @@ impl Geometry {
 
     /// Every mesh, that of the world first.
     pub fn all_meshes(&self) -> impl Iterator<Item = &Mesh> {
-        self.world.iter().map(|world| &world.mesh).chain(&self.meshes)
+        self.world.iter().map(|world| &world.mesh).chain(&self.meshes).map(Arc::as_ref)
     }
 
     /// Bytes of meshes and point sets without trees, and of all trees.
     pub fn bytes(&self) -> [u64; 2] {
         let meshes: usize = self.all_meshes().map(Mesh::bytes).sum();
-        let points: usize = self.point_sets.iter().map(PointSet::bytes).sum();
+        let points: usize = self.point_sets.iter().map(|points| points.bytes()).sum();
         let mesh_trees: usize = self.all_meshes().map(|mesh| mesh.tree.bytes()).sum();
-        let point_trees: usize = self.point_sets.iter().map(PointSet::tree_bytes).sum();
+        let point_trees: usize = self.point_sets.iter().map(|points| points.tree_bytes()).sum();
         let placed = size_of_val(self.placed.as_slice()) + size_of_val(self.items.as_slice());
         [(meshes + points) as u64, (mesh_trees + point_trees + self.upper.bytes() + placed) as u64]
     }

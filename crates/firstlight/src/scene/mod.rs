@@ -3,6 +3,7 @@
 mod advice;
 mod buffers;
 mod builtin;
+mod cast;
 mod compile;
 mod course;
 mod description;
@@ -14,12 +15,15 @@ mod occluders;
 mod outline;
 mod place;
 mod seen_lights;
+#[cfg(test)]
+mod tests;
 mod text;
 mod trace;
 mod trees;
 mod world;
 
 pub use builtin::{Builtin, builtin_scenes};
+pub use cast::CastHit;
 pub(crate) use compile::MAX_SIDE;
 pub use compile::{CompileOptions, Compiled};
 pub use description::{DisplayEncoding, RenderDesc, SceneDesc};

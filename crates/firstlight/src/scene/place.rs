@@ -19,7 +19,8 @@ use crate::describe::node::quoted;
 use crate::ids::{MaterialId, SurfaceId};
 use crate::math::{DVec3, origin_for};
 use crate::shape::{
-    Common, Mesh, MeshBuilder, MeshSource, Parallelogram, Placement, PointSet, ShapeDesc, Solid, Sphere,
+    Common, CompileCache, Mesh, MeshBuilder, MeshFiles, MeshSource, Parallelogram, Placement, PointSet, ShapeDesc,
+    Solid, Sphere,
 };
 use crate::transform::TransformDesc;
 
@@ -99,15 +100,15 @@ struct GroupSpace {
     /// All its meshes, to be joined.
     builder: MeshBuilder,
     /// All its meshes, joined, once it is known where they count from.
-    mesh: Option<Mesh>,
+    mesh: Option<Arc<Mesh>>,
     /// Where `mesh` counts from, in the space of the group.
     origin: DVec3,
 }
 
 impl GroupSpace {
     /// Joins the meshes; they count from `origin`.
-    fn join(&mut self, cx: &CompileContext, origin: DVec3) {
-        self.mesh = std::mem::take(&mut self.builder).build(cx, origin);
+    fn join(&mut self, cx: &CompileContext, cache: Option<&CompileCache>, origin: DVec3) {
+        self.mesh = std::mem::take(&mut self.builder).build(cx, cache, origin);
         self.origin = origin;
     }
 }
@@ -116,7 +117,7 @@ impl GroupSpace {
 struct Extents<'a> {
     groups: &'a [GroupSpace],
     solids: &'a [Solid],
-    point_sets: &'a [PointSet],
+    point_sets: &'a [Arc<PointSet>],
     /// Those that are known.
     known: Vec<Option<Option<[DVec3; 2]>>>,
 }
@@ -220,9 +221,10 @@ pub(super) fn compile_shapes(
     desc: &SceneDesc,
     cx: &mut CompileContext,
     assets: &dyn Assets,
-    files: &mut MeshFiles,
+    files: &mut MeshFiles<'_>,
 ) -> Option<Geometry> {
     let before = cx.error_count();
+    let cache = files.cache;
     let materials = MaterialNames::new(desc);
     // The first of a name; a second one is a fault of the text
     let group_ids = desc.groups.iter().enumerate().rev().map(|(id, (name, _))| (name.as_str(), id)).collect();
@@ -258,13 +260,13 @@ pub(super) fn compile_shapes(
     let bounds = Extents { groups: &groups, solids: &solids, point_sets: &point_sets, known }.of(&root);
     cx.origin = bounds.or_else(|| desc.camera_bounds()).map_or(DVec3::ZERO, origin_for);
     for group in &mut groups {
-        group.join(cx, group.builder.bounds().map_or(DVec3::ZERO, origin_for));
+        group.join(cx, cache, group.builder.bounds().map_or(DVec3::ZERO, origin_for));
     }
-    root.join(cx, cx.origin);
+    root.join(cx, cache, cx.origin);
     if cx.error_count() > before {
         return None;
     }
-    let meshes: Vec<&Mesh> = groups.iter().filter_map(|group| group.mesh.as_ref()).collect();
+    let meshes: Vec<&Mesh> = groups.iter().filter_map(|group| group.mesh.as_deref()).collect();
     let mut count = 0;
     let mesh_of = groups.iter().map(|group| {
         group.mesh.as_ref().map(|_| {
@@ -296,24 +298,21 @@ pub(super) fn compile_shapes(
     Some(Geometry::new(parts, desc.render.shadow_terminator))
 }
 
-/// The mesh files that were read, for the hash of the scene and for reports.
-pub(super) type MeshFiles = Vec<(String, [u8; 32])>;
-
-struct Compiler<'a> {
+struct Compiler<'a, 'c> {
     desc: &'a SceneDesc,
     materials: MaterialNames<'a>,
     /// Groups by name.
     group_ids: HashMap<&'a str, usize>,
     links: Links,
     assets: &'a dyn Assets,
-    files: &'a mut MeshFiles,
+    files: &'a mut MeshFiles<'c>,
     solids: Vec<Solid>,
-    point_sets: Vec<PointSet>,
+    point_sets: Vec<Arc<PointSet>>,
     /// Numbers for what surfaces say of rays.
     classes: HashMap<RayRules, u32>,
 }
 
-impl Compiler<'_> {
+impl Compiler<'_, '_> {
     /// Compiles the shapes of a group, or of the scene, whose paths begin with `prefix`.
     fn group(&mut self, cx: &mut CompileContext, prefix: &str, shapes: &[ShapeDesc]) -> GroupSpace {
         let mut leaves: Vec<PlacedShape> = Vec::with_capacity(shapes.len());

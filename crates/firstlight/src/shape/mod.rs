@@ -4,6 +4,7 @@
 //! the way of light.
 
 mod ball;
+mod cache;
 #[cfg(test)]
 pub(crate) mod check;
 mod common;
@@ -26,6 +27,7 @@ mod surface;
 mod torus;
 mod triangles;
 
+pub use cache::CompileCache;
 pub use cone::ConeDesc;
 pub use cuboid::BoxDesc;
 pub use cylinder::CylinderDesc;
@@ -41,6 +43,7 @@ pub use sphere::{Sphere, SphereDesc, SphereUv};
 pub use surface::{Footprint, RayDifferential, ShadowTerminator, SurfaceInteraction, UvEdge};
 pub use torus::TorusDesc;
 
+pub(crate) use cache::{MeshFiles, key_of};
 pub(crate) use common::Common;
 pub(crate) use cover::Cover;
 pub(crate) use disk::{Disk, DiskShadow};
@@ -54,6 +57,7 @@ pub(crate) use surface::ShapePoint;
 pub(crate) use triangles::{Eye, SeenParts, SeenTriangle, TOGETHER, TileHits, TriangleTree, every};
 
 use crate::describe::family;
+use crate::transform::TransformDesc;
 
 family! {
     /// A shape as a scene may say it.
@@ -86,6 +90,16 @@ family! {
 }
 
 impl ShapeDesc {
+    /// What reports call it, if it has a name.
+    pub fn name(&self) -> Option<&str> {
+        self.common().name
+    }
+
+    /// How it is moved, if it is.
+    pub fn transform(&self) -> Option<&TransformDesc> {
+        self.common().transform
+    }
+
     /// What it says that every shape can say.
     pub(crate) fn common(&self) -> Common<'_> {
         match self {

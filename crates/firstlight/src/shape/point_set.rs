@@ -1,10 +1,13 @@
 //! Point sets: millions of spheres with radii and colours.
 
+use std::sync::Arc;
+
 use fearless_simd::Simd;
 
 use super::ball::ball_tangents;
+use super::cache::{MeshFiles, key_of};
 use super::common::shape_table;
-use super::mesh::{from_own_origin, read_mesh_file};
+use super::mesh::{parse_mesh_file, read_mesh_bytes};
 use super::placement::Placement;
 use super::solid::LineLanes;
 use super::sphere::{SphereUv, equirectangular};
@@ -13,7 +16,7 @@ use crate::accel::{Aabb, Bvh, TraceRay};
 use crate::color::Rgb;
 use crate::context::{Assets, CompileContext, show};
 use crate::describe::FilePath;
-use crate::import::MeshData;
+use crate::import::{MeshData, from_own_origin};
 use crate::math::{DRay, DVec3, ErrorBound, Ray, Vec3};
 use crate::parallel;
 
@@ -62,10 +65,12 @@ impl PointSetDesc {
         &self,
         cx: &mut CompileContext,
         assets: &dyn Assets,
-        files: &mut Vec<(String, [u8; 32])>,
-    ) -> Option<PointSet> {
+        files: &mut MeshFiles<'_>,
+    ) -> Option<Arc<PointSet>> {
         let before = cx.error_count();
         let radius = self.radius.map(|radius| cx.positive("radius", radius, "the radius is in metres"));
+        // Where it was kept, with its tree
+        let mut place = None;
         let data = match &self.file {
             Some(file) => {
                 let lists =
@@ -73,7 +78,14 @@ impl PointSetDesc {
                 for (field, _) in lists.iter().filter(|(_, length)| *length > 0) {
                     cx.error(field, "it is said beside a file", Some("give the file, or the lists"));
                 }
-                read_mesh_file(cx, assets, file, files)?
+                let (bytes, hash) = read_mesh_bytes(cx, assets, file, files)?;
+                let own = self.radius.map_or([0; 8], |radius| radius.to_bits().to_le_bytes());
+                place = files.cache.map(|cache| (cache, key_of("points", [file.0.as_bytes(), &hash, &own])));
+                let kept = place.and_then(|(cache, key)| cache.find(&key));
+                if cx.error_count() == before && kept.is_some() {
+                    return kept;
+                }
+                parse_mesh_file(cx, file, &bytes)?
             }
             None => self.written(cx),
         };
@@ -91,7 +103,10 @@ impl PointSetDesc {
             }
         };
         cx.advise_vertex_colors(&data.colors);
-        let points = PointSet::new(data, radius as f32);
+        let points = Arc::new(PointSet::new(data, radius as f32));
+        if let Some((cache, key)) = place {
+            cache.keep(key, &points);
+        }
         if points.bounds().is_none() && points.len() > 0 {
             let message = format!("none of its {} points has a finite place and a radius above 0", points.len());
             cx.advise("", message, Some("nothing of it can be seen"));
@@ -126,7 +141,7 @@ impl PointSetDesc {
                 cx.error(&format!("colors[{i}]"), message, Some("a colour is linear red, green, blue"));
             }
         }
-        let (positions, origin) = from_own_origin(&self.positions);
+        let (positions, origin) = from_own_origin(self.positions.len(), |i| self.positions[i]);
         MeshData {
             positions,
             origin,
@@ -412,7 +427,7 @@ mod tests {
     fn compiled(positions: Vec<[f64; 3]>, radius: Option<f64>) -> (Vec<String>, f32) {
         let desc = PointSetDesc { positions, radius, ..PointSetDesc::default() };
         let cx = &mut CompileContext::default();
-        let points = desc.compile(cx, &NoAssets, &mut Vec::new()).expect("has no faults");
+        let points = desc.compile(cx, &NoAssets, &mut MeshFiles::default()).expect("has no faults");
         (cx.take_advice().iter().map(ToString::to_string).collect(), points.spheres[0][3])
     }
 

@@ -12,6 +12,7 @@ mod rotation;
 
 use crate::context::{CompileContext, show};
 use crate::describe::{ScaleDesc, table, words};
+use crate::error::SceneError;
 use crate::math::{DAffine3, DMat3, DVec3};
 
 use keys::Keyed;
@@ -88,6 +89,22 @@ impl TransformDesc {
             None => self.compile_parts(cx, time),
         };
         if cx.fault_count() == before { affine } else { DAffine3::IDENTITY }
+    }
+
+    /// What it does at `time`, in seconds: three rows of four numbers, `world_from_object`, as in `matrix`.
+    ///
+    /// # Errors
+    /// What is wrong with it, with paths that begin with `transform`.
+    pub fn rows(&self, time: f64) -> Result<[f64; 12], SceneError> {
+        let cx = &mut CompileContext::at_time(time);
+        let affine = cx.within("transform", |cx| self.compile(cx, time));
+        let faults = cx.take_faults();
+        if !faults.is_empty() {
+            return Err(SceneError { faults });
+        }
+        let [x, y, z] = [0, 1, 2].map(|row| affine.matrix3.row(row));
+        let t = affine.translation;
+        Ok([x.x, x.y, x.z, t.x, y.x, y.y, y.z, t.y, z.x, z.y, z.z, t.z])
     }
 
     /// Of the field `transform` that a thing may have, at the context's time: `None` if it has none, or one that was

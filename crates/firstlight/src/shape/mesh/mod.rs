@@ -5,19 +5,21 @@
 mod surface;
 
 use std::ops::ControlFlow;
+use std::sync::Arc;
 
 use glam::DAffine3;
 
 pub(crate) use surface::{JoinedPart, Mesh, TrianglePoint};
 
+use super::cache::{CompileCache, ContentKey, MeshFiles, key_of};
 use super::common::shape_table;
 use super::placement::Placement;
 use super::triangles::{TriangleTree, can_be_hit};
 use crate::context::{AssetError, Assets, CompileContext, CompileStage, show};
 use crate::describe::FilePath;
 use crate::ids::MaterialId;
-use crate::import::{MeshData, read_mesh};
-use crate::math::{DVec3, Vec3, origin_for};
+use crate::import::{MeshData, from_own_origin, read_mesh};
+use crate::math::{DVec3, Vec3};
 
 shape_table! {
     /// Triangles: from a PLY, STL or OBJ file, or written out.
@@ -63,13 +65,13 @@ pub(crate) const MAX_MESH_FILE: u64 = 1 << 36;
 /// Coordinates beyond this, in metres, are refused, as everywhere in a scene.
 const MAX_COORDINATE: f64 = 2.5e8;
 
-/// Reads the file of a mesh or point set. `None` after an error.
-pub(crate) fn read_mesh_file(
+/// The bytes of the file of a mesh or point set, and their hash. `None` after an error.
+pub(crate) fn read_mesh_bytes(
     cx: &mut CompileContext,
     assets: &dyn Assets,
     file: &FilePath,
-    files: &mut Vec<(String, [u8; 32])>,
-) -> Option<MeshData> {
+    files: &mut MeshFiles<'_>,
+) -> Option<(Vec<u8>, ContentKey)> {
     let bytes = match assets.read(&file.0, MAX_MESH_FILE) {
         Ok(bytes) => bytes,
         Err(error) => {
@@ -84,12 +86,18 @@ pub(crate) fn read_mesh_file(
             return None;
         }
     };
-    files.push((file.0.clone(), *blake3::hash(&bytes).as_bytes()));
+    let hash = *blake3::hash(&bytes).as_bytes();
+    files.read.push((file.0.clone(), hash));
+    Some((bytes, hash))
+}
+
+/// The mesh or point set of the bytes of a file. `None` after an error.
+pub(crate) fn parse_mesh_file(cx: &mut CompileContext, file: &FilePath, bytes: &[u8]) -> Option<MeshData> {
     let progress = |done, total| {
         cx.tell(CompileStage::Reading { file: &file.0, done, total });
         ControlFlow::Continue(())
     };
-    match read_mesh(&file.0, &bytes, &progress) {
+    match read_mesh(&file.0, bytes, &progress) {
         Ok(data) => Some(data),
         Err(error) => {
             cx.error("file", error.to_string(), None);
@@ -100,8 +108,10 @@ pub(crate) fn read_mesh_file(
 
 /// A mesh in its own space, checked.
 pub(crate) struct MeshSource {
-    pub data: MeshData,
+    pub data: Arc<MeshData>,
     pub uv_set: usize,
+    /// The key of `data`, where it may be of use.
+    content: Option<ContentKey>,
 }
 
 impl MeshDesc {
@@ -110,20 +120,10 @@ impl MeshDesc {
         &self,
         cx: &mut CompileContext,
         assets: &dyn Assets,
-        files: &mut Vec<(String, [u8; 32])>,
+        files: &mut MeshFiles<'_>,
     ) -> Option<MeshSource> {
         let before = cx.error_count();
-        let mut data = match &self.file {
-            Some(file) => {
-                for (field, said) in self.lists() {
-                    if said {
-                        cx.error(field, "it is said beside a file", Some("give the file, or the lists"));
-                    }
-                }
-                read_mesh_file(cx, assets, file, files)?
-            }
-            None => self.written(cx)?,
-        };
+        let (data, content) = self.load(cx, assets, files)?;
         if data.triangles.is_empty() {
             let message = format!("holds {} points and no faces", data.positions.len());
             cx.error("file", message, Some("points are shown by [[point_set]], as spheres; PLY files can hold them"));
@@ -137,9 +137,6 @@ impl MeshDesc {
                 Some("edges where faces meet at up to this angle are smooth; 0 is flat"),
             );
             cx.advise_radians("smooth_deg", angle);
-            if cx.error_count() == before {
-                data.smooth(angle);
-            }
         }
         let uv_set = self.uv_set as usize;
         if self.uv_set > 0 && uv_set >= data.uvs.len() {
@@ -151,7 +148,68 @@ impl MeshDesc {
             let message = format!("there is no set {}: the mesh has {sets}", self.uv_set);
             cx.error("uv_set", message, Some("sets are counted from 0"));
         }
-        (cx.error_count() == before).then_some(MeshSource { data, uv_set })
+        if cx.error_count() > before {
+            return None;
+        }
+        let (data, content) = self.smoothed(data, content, files.cache);
+        Some(MeshSource { data, uv_set, content })
+    }
+
+    /// The mesh as it is said, and its key where something is kept. `None` after an error.
+    fn load(
+        &self,
+        cx: &mut CompileContext,
+        assets: &dyn Assets,
+        files: &mut MeshFiles<'_>,
+    ) -> Option<(Arc<MeshData>, Option<ContentKey>)> {
+        let Some(file) = &self.file else {
+            let data = self.written(cx)?;
+            let content = files.cache.map(|_| data.content());
+            return Some((Arc::new(data), content));
+        };
+        for (field, said) in self.lists() {
+            if said {
+                cx.error(field, "it is said beside a file", Some("give the file, or the lists"));
+            }
+        }
+        // One that is in no file
+        if let Some((data, content)) = files.cache.and_then(|cache| cache.given(&file.0)) {
+            files.read.push((file.0.clone(), content));
+            return Some((data, Some(content)));
+        }
+        let (bytes, hash) = read_mesh_bytes(cx, assets, file, files)?;
+        let Some(cache) = files.cache else {
+            return Some((Arc::new(parse_mesh_file(cx, file, &bytes)?), None));
+        };
+        // The name may say how the bytes are to be read
+        let key = key_of("mesh file", [file.0.as_bytes(), &hash]);
+        if let Some(data) = cache.find(&key) {
+            return Some((data, Some(key)));
+        }
+        let data = Arc::new(parse_mesh_file(cx, file, &bytes)?);
+        cache.keep(key, &data);
+        Some((data, Some(key)))
+    }
+
+    /// The mesh with the normals that `smooth_deg` asks for.
+    fn smoothed(
+        &self,
+        data: Arc<MeshData>,
+        content: Option<ContentKey>,
+        cache: Option<&CompileCache>,
+    ) -> (Arc<MeshData>, Option<ContentKey>) {
+        let Some(angle) = self.smooth_deg else { return (data, content) };
+        let key = content.map(|content| key_of("smooth mesh", [&content[..], &angle.to_bits().to_le_bytes()]));
+        if let Some(smooth) = cache.zip(key).and_then(|(cache, key)| cache.find(&key)) {
+            return (smooth, key);
+        }
+        let mut smooth = Arc::unwrap_or_clone(data);
+        smooth.smooth(angle);
+        let smooth = Arc::new(smooth);
+        if let Some((cache, key)) = cache.zip(key) {
+            cache.keep(key, &smooth);
+        }
+        (smooth, key)
     }
 
     fn lists(&self) -> [(&'static str, bool); 7] {
@@ -222,7 +280,7 @@ impl MeshDesc {
             return None;
         }
         let single3 = |v: &[f64; 3]| v.map(|c| c as f32);
-        let (positions, origin) = from_own_origin(&self.positions);
+        let (positions, origin) = from_own_origin(self.positions.len(), |i| self.positions[i]);
         Some(MeshData {
             positions,
             origin,
@@ -241,14 +299,6 @@ impl MeshDesc {
     }
 }
 
-/// Positions in 32 bits, and what was taken off them: 0 but where they are far from 0.
-pub(crate) fn from_own_origin(positions: &[[f64; 3]]) -> (Vec<[f32; 3]>, [f64; 3]) {
-    let corners = positions.iter().map(|p| [DVec3::from(*p); 2]);
-    let bounds = corners.reduce(|[low, high], [a, b]| [low.min(a), high.max(b)]);
-    let origin = bounds.map_or(DVec3::ZERO, origin_for);
-    (positions.iter().map(|p| (DVec3::from(*p) - origin).as_vec3().to_array()).collect(), origin.to_array())
-}
-
 /// Joins the meshes of one space.
 #[derive(Default)]
 pub(crate) struct MeshBuilder {
@@ -262,8 +312,9 @@ pub(crate) struct MeshBuilder {
 
 /// A mesh that is to be joined with others, and its part of them.
 struct JoinedSource {
-    data: MeshData,
+    data: Arc<MeshData>,
     uv_set: usize,
+    content: Option<ContentKey>,
     transform: Option<DAffine3>,
     surface: u32,
     class: u32,
@@ -309,7 +360,7 @@ impl MeshBuilder {
         class: u32,
         materials: Vec<MaterialId>,
     ) {
-        let MeshSource { data, uv_set } = source;
+        let MeshSource { data, uv_set, content } = source;
         let counts = [self.counts[0] + data.positions.len(), self.counts[1] + data.triangles.len()];
         if counts.iter().any(|count| *count > u32::MAX as usize) {
             let message = "the meshes of one group have more than 4294967295 vertices or triangles together";
@@ -332,7 +383,7 @@ impl MeshBuilder {
             (Some([low, high]), Some([a, b])) => Some([low.min(a), high.max(b)]),
             (all, own) => all.or(own),
         };
-        self.sources.push(JoinedSource { data, uv_set, transform, surface, class, materials });
+        self.sources.push(JoinedSource { data, uv_set, content, transform, surface, class, materials });
     }
 
     /// The box around all meshes so far, in the space that they are joined in.
@@ -340,8 +391,33 @@ impl MeshBuilder {
         self.bounds
     }
 
+    /// What the joined mesh follows from; `None` where that is not known.
+    fn key(&self, origin: DVec3) -> Option<ContentKey> {
+        let mut parts = vec![numbers(&origin.to_array())];
+        for source in &self.sources {
+            parts.push(source.content?.to_vec());
+            parts.push(source.transform.map_or(Vec::new(), |transform| numbers(&transform.to_cols_array())));
+            let whole = [source.uv_set as u32, source.surface, source.class].into_iter();
+            let whole = whole.chain(source.materials.iter().map(|material| material.0));
+            parts.push(whole.flat_map(u32::to_le_bytes).collect());
+        }
+        Some(key_of("joined mesh", parts.iter().map(Vec::as_slice)))
+    }
+
     /// Joins all meshes, less `origin`, and builds the tree. `None` if there is nothing to be hit.
-    pub fn build(mut self, cx: &CompileContext, origin: DVec3) -> Option<Mesh> {
+    pub fn build(self, cx: &CompileContext, cache: Option<&CompileCache>, origin: DVec3) -> Option<Arc<Mesh>> {
+        let place = cache.zip(self.key(origin)).filter(|_| !self.sources.is_empty());
+        if let Some(mesh) = place.and_then(|(cache, key)| cache.find(&key)) {
+            return Some(mesh);
+        }
+        let mesh = Arc::new(self.build_anew(cx, origin)?);
+        if let Some((cache, key)) = place {
+            cache.keep(key, &mesh);
+        }
+        Some(mesh)
+    }
+
+    fn build_anew(mut self, cx: &CompileContext, origin: DVec3) -> Option<Mesh> {
         for source in std::mem::take(&mut self.sources) {
             self.joined.add(source, origin);
         }
@@ -362,7 +438,8 @@ impl MeshBuilder {
 
 impl Lists {
     fn add(&mut self, source: JoinedSource, origin: DVec3) {
-        let JoinedSource { mut data, uv_set, transform, surface, class, materials } = source;
+        let JoinedSource { data, uv_set, transform, surface, class, materials, .. } = source;
+        let mut data = Arc::unwrap_or_clone(data);
         move_mesh(&mut data, transform, origin);
         let (vertices, first) = (self.positions.len(), self.triangles.len());
         let MeshData { positions, mut triangles, normals, mut uvs, colors, face_materials, .. } = data;
@@ -388,6 +465,11 @@ impl Lists {
             (self.positions, self.triangles) = (positions, triangles);
         }
     }
+}
+
+/// The bytes of numbers, for a key.
+fn numbers(numbers: &[f64]) -> Vec<u8> {
+    numbers.iter().flat_map(|number| number.to_bits().to_le_bytes()).collect()
 }
 
 /// Says why nothing of a mesh can be hit.
