@@ -3,6 +3,7 @@
 //! tests.
 
 use std::ffi::OsString;
+use std::path::Path;
 use std::process::ExitCode;
 
 use xtask::{Outcome, cargo, root, run as run_to_end};
@@ -37,6 +38,43 @@ fn check_walks() -> Outcome {
     Ok(())
 }
 
+/// Tests the Python package: the extension of the build that the other tests use, in a folder under `target` with the
+/// package's own Python, and pytest in an environment there.
+fn test_python() -> Outcome {
+    let mut python = std::process::Command::new("python3");
+    if python.arg("--version").output().is_err() {
+        eprintln!("\nno python3: the Python package is not tested");
+        return Ok(());
+    }
+    let library = if cfg!(target_os = "macos") { "lib_firstlight.dylib" } else { "lib_firstlight.so" };
+    // With the test kit beside it the library has the features that it has in the tests
+    run_command(&["build", "--package", "firstlight-python", "--package", "firstlight-testkit", "--quiet"])?;
+    let target = std::env::var_os("CARGO_TARGET_DIR").map_or_else(|| root().join("target"), Into::into);
+    let (home, crates) = (target.join("python"), root().join("crates/firstlight-python"));
+    let site = home.join("site/firstlight");
+    let copy = |from: &Path, to: &Path| {
+        std::fs::copy(from, to).map(drop).map_err(|fault| format!("{}: {fault}", from.display()))
+    };
+    std::fs::create_dir_all(&site).map_err(|fault| format!("{}: {fault}", site.display()))?;
+    let sources = crates.join("python/firstlight");
+    for entry in std::fs::read_dir(&sources).map_err(|fault| format!("{}: {fault}", sources.display()))?.flatten() {
+        if entry.path().is_file() {
+            copy(&entry.path(), &site.join(entry.file_name()))?;
+        }
+    }
+    copy(&target.join("debug").join(library), &site.join("_firstlight.abi3.so"))?;
+    let (venv, python) = (home.join("venv"), home.join("venv/bin/python"));
+    let packages = ["numpy", "pytest", "OpenEXR"];
+    let has_all = std::process::Command::new(&python).args(["-c", "import numpy, pytest, OpenEXR"]).output();
+    if !has_all.is_ok_and(|output| output.status.success()) {
+        run_to_end(std::process::Command::new("python3").args(["-m", "venv"]).arg(&venv))?;
+        run_to_end(std::process::Command::new(&python).args(["-m", "pip", "install", "--quiet"]).args(packages))?;
+    }
+    let mut pytest = std::process::Command::new(&python);
+    let pytest = pytest.current_dir(&crates).env("PYTHONPATH", home.join("site"));
+    run_to_end(pytest.args(["-m", "pytest", "-q", "-p", "no:cacheprovider"]))
+}
+
 fn test() -> Outcome {
     run_command(&["fmt", "--all", "--check"])?;
     build_book()?;
@@ -45,6 +83,7 @@ fn test() -> Outcome {
     run_to_end(cargo().env("RUSTDOCFLAGS", "-D warnings").args(["doc", "--workspace", "--no-deps", "--quiet"]))?;
     // The library alone, without what can be left out
     run_command(&["check", "--package", "firstlight", "--no-default-features", "--quiet"])?;
+    test_python()?;
     run_command(&["test", "--workspace", "--no-fail-fast"])
 }
 

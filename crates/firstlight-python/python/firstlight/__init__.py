@@ -1,0 +1,49 @@
+"""Direct light, without noise, with the same bits on every machine.
+
+A scene is read (`Scene.from_file`, `Scene.from_text`, `Scene.from_dict`, `builtin`) or built (`Scene()`, `add_mesh`,
+`add_sphere`, `add_rectangle_light`, ...), and rendered to numpy arrays (`Scene.render`, `Scene.render_many`). Without
+a picture it says what rays meet (`Scene.cast`) and what points see of a light (`Scene.visible`).
+
+Lengths are in metres, angles in degrees, colours linear Rec. 709. y is up, axes are right-handed, row 0 of an array is
+the top of the picture.
+"""
+
+from collections.abc import Mapping as _Mapping
+
+from ._camera import Camera
+from ._diagnostics import Diagnostic, Place
+from ._firstlight import (
+    BUFFERS,
+    BUILTIN,
+    LIGHTS,
+    MATERIALS,
+    SHAPES,
+    TEXTURES,
+    Render,
+    SceneError,
+    SceneWarning,
+    __version__,
+)
+from ._scene import Handle, Hits, Scene, builtin
+
+_Mapping.register(Render)
+
+__all__ = [
+    "BUFFERS",
+    "BUILTIN",
+    "LIGHTS",
+    "MATERIALS",
+    "SHAPES",
+    "TEXTURES",
+    "Camera",
+    "Diagnostic",
+    "Handle",
+    "Hits",
+    "Place",
+    "Render",
+    "Scene",
+    "SceneError",
+    "SceneWarning",
+    "__version__",
+    "builtin",
+]

@@ -1,0 +1,484 @@
+"""Direct light, without noise, with the same bits on every machine: see the docstrings of the module itself."""
+
+import os
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Literal, TypedDict
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from typing_extensions import Unpack
+
+__version__: str
+BUFFERS: list[str]
+BUILTIN: list[str]
+SHAPES: list[str]
+LIGHTS: list[str]
+MATERIALS: list[str]
+TEXTURES: list[str]
+
+# Or light:NAME, light:#3, light:*, and their parts, light:NAME:diffuse and light:NAME:specular
+Buffer = str | Literal[
+    "color", "alpha", "background", "emission", "ambient", "diffuse", "specular", "depth", "distance", "position", "position-camera", "normal", "normal-camera", "normal-geometric",
+    "normal-geometric-camera", "tangent", "uv", "barycentric", "object-id", "material-id", "primitive-id",
+    "face-orientation", "rays",
+]
+# Three rows or four of four numbers, or a table of the scene format
+Transform = ArrayLike | Mapping[str, Any] | None
+# Linear [r, g, b], "#rrggbb" in sRGB, or a gray
+Color = Sequence[float] | NDArray[Any] | str | float
+Vector = Sequence[float] | NDArray[Any]
+# A colour or a number, or {"texture": NAME, "factor": ...}
+ColorParam = Color | Mapping[str, Any]
+NumberParam = float | Mapping[str, Any]
+
+class _ShapeFields(TypedDict, total=False):
+    name: str
+    material: str
+    transform: Transform
+    visible: bool
+    casts_shadow: bool
+    receives_shadow: bool
+    single_sided: bool
+    lights_include: Sequence[str]
+    lights_exclude: Sequence[str]
+    shadow_include: Sequence[str]
+    shadow_exclude: Sequence[str]
+
+class _MeshFields(_ShapeFields, total=False):
+    smooth_deg: float
+
+@dataclass(frozen=True)
+class Place:
+    """Where in a text something stands; lines and columns count from 1."""
+
+    file: str
+    line: int
+    column: int
+    excerpt: str
+
+@dataclass(frozen=True)
+class Diagnostic:
+    """One fault; `str()` is all of it in one line."""
+
+    severity: Literal["error", "warning", "advice"]
+    place: Place | None
+    path: str
+    message: str
+    hint: str | None
+    text: str
+
+class SceneError(ValueError):
+    """A scene cannot be rendered: `diagnostics` has all its faults."""
+
+    diagnostics: list[Diagnostic]
+
+class SceneWarning(UserWarning):
+    """A texture that is missing or damaged was put up with."""
+
+class Render(Mapping[str, NDArray[Any]]):
+    """The buffers of a render by name: (height, width) or (height, width, channels), row 0 at the top."""
+
+    @property
+    def receipt(self) -> dict[str, str]: ...
+    @property
+    def film_size(self) -> tuple[int, int]: ...
+    @property
+    def window(self) -> tuple[int, int, int, int]: ...
+    def to_png(self, *, bits: Literal[8, 16] = 8) -> bytes: ...
+    def save(self, path: str | os.PathLike[str]) -> None: ...
+    def __getitem__(self, name: str) -> NDArray[Any]: ...
+    def __iter__(self) -> Iterator[str]: ...
+    def __len__(self) -> int: ...
+
+class Camera:
+    """A camera: the fields of `[camera]`, and the size of its picture."""
+
+    fields: dict[str, Any]
+    width: int | None
+    height: int | None
+    def __init__(
+        self,
+        *,
+        position: Vector,
+        look_at: Vector = ...,
+        up: Vector = ...,
+        fov_y_deg: float | None = ...,
+        focal_length_mm: float | None = ...,
+        sensor_height_mm: float | None = ...,
+        focal_length_px: Vector | None = ...,
+        principal_point_px: Vector | None = ...,
+        projection: Literal["perspective", "orthographic"] = ...,
+        shift: Vector = ...,
+        transform: Mapping[str, Any] | None = ...,
+        width: int | None = None,
+        height: int | None = None,
+        **fields: Any,
+    ) -> None: ...
+    @classmethod
+    def from_pose(
+        cls,
+        pose: ArrayLike,
+        *,
+        convention: Literal["opencv", "opengl"] = "opencv",
+        fov_y_deg: float | None = None,
+        K: ArrayLike | None = None,
+        width: int | None = None,
+        height: int | None = None,
+        pixel_center: float = 0.5,
+    ) -> Camera: ...
+    @classmethod
+    def from_K(
+        cls,
+        K: ArrayLike | None = None,
+        *,
+        fx: float | None = None,
+        fy: float | None = None,
+        cx: float | None = None,
+        cy: float | None = None,
+        width: int,
+        height: int,
+        pixel_center: float = 0.5,
+        pose: ArrayLike | None = None,
+        convention: Literal["opencv", "opengl"] = "opencv",
+    ) -> Camera: ...
+    def resized(self, width: int, height: int) -> Camera: ...
+    def to_dict(self) -> dict[str, Any]: ...
+
+@dataclass(frozen=True)
+class Hits:
+    """What rays meet. Where one meets nothing: distance inf, ids 0, all else 0."""
+
+    hit: NDArray[np.bool_]
+    distance: NDArray[np.float64]
+    """Metres along the ray."""
+    position: NDArray[np.float64]
+    """(..., 3), metres, world space."""
+    normal: NDArray[np.float32]
+    """(..., 3), unit, world space: the shading normal on the side that is met."""
+    normal_geometric: NDArray[np.float32]
+    uv: NDArray[np.float32]
+    """(..., 2)"""
+    barycentric: NDArray[np.float32]
+    """(..., 2): weights of the second and the third corner of a triangle."""
+    object_id: NDArray[np.uint32]
+    material_id: NDArray[np.uint32]
+    primitive_id: NDArray[np.uint32]
+
+class Handle:
+    """A thing of a scene: its fields, and where it is."""
+
+    @property
+    def kind(self) -> str: ...
+    @property
+    def name(self) -> str | None: ...
+    @property
+    def fields(self) -> dict[str, Any]: ...
+    @property
+    def transform(self) -> NDArray[np.float64]: ...
+    @transform.setter
+    def transform(self, value: Transform) -> None: ...
+    def __getitem__(self, field: str) -> Any: ...
+    def __setitem__(self, field: str, value: Any) -> None: ...
+    def update(self, **fields: Any) -> None: ...
+
+class Scene:
+    """A scene, empty at first."""
+
+    def __init__(self) -> None: ...
+    @classmethod
+    def from_file(cls, path: str | os.PathLike[str], *, allow_dirs: Sequence[str | os.PathLike[str]] = ()) -> Scene: ...
+    @classmethod
+    def from_text(
+        cls, text: str, *, name: str = "scene.toml", assets: str | os.PathLike[str] | Mapping[str, bytes] | None = None
+    ) -> Scene: ...
+    @classmethod
+    def from_dict(
+        cls, tree: dict[str, Any], *, assets: str | os.PathLike[str] | Mapping[str, bytes] | None = None
+    ) -> Scene: ...
+    def __getitem__(self, name: str) -> Handle: ...
+    def __contains__(self, name: str) -> bool: ...
+    def __iter__(self) -> Iterator[str]: ...
+    @property
+    def settings(self) -> Handle: ...
+    @property
+    def hash(self) -> str: ...
+    @property
+    def size(self) -> tuple[int, int]: ...
+    @property
+    def bounds(self) -> list[list[float]] | None: ...
+    def check(self, *, time: float = 0.0) -> list[Diagnostic]: ...
+    def to_toml(self) -> str: ...
+    def to_json(self) -> str: ...
+    def render(
+        self,
+        *,
+        camera: str | Camera | dict[str, Any] | None = None,
+        width: int | None = None,
+        height: int | None = None,
+        buffers: Sequence[Buffer] | None = None,
+        aa: int | None = None,
+        samples: Literal["exact"] | int | None = None,
+        tolerance: float | None = None,
+        aa_mode: Literal["adaptive", "full"] = "adaptive",
+        crop: tuple[int, int, int, int] | None = None,
+        time: float = 0.0,
+        threads: int = 0,
+        progress: Callable[[int, int], object] | None = None,
+    ) -> Render: ...
+    def render_many(
+        self,
+        cameras: Iterable[str | Camera | dict[str, Any]],
+        *,
+        buffers: Sequence[Buffer] | None = None,
+        workers: int | None = None,
+        **options: Any,
+    ) -> Iterator[Render]: ...
+    def cast(self, origins: ArrayLike, directions: ArrayLike, *, time: float = 0.0) -> Hits: ...
+    def visible(
+        self, points: ArrayLike, *, light: str | int, normals: ArrayLike | None = None, time: float = 0.0
+    ) -> NDArray[np.float32]: ...
+    def add(self, thing: Any, **fields: Unpack[_MeshFields]) -> Handle | list[Handle]: ...
+    def add_mesh(
+        self,
+        vertices: ArrayLike,
+        faces: ArrayLike,
+        *,
+        normals: ArrayLike | None = None,
+        uv: ArrayLike | None = None,
+        colors: ArrayLike | None = None,
+        static: bool = False,
+        **fields: Unpack[_MeshFields],
+    ) -> Handle: ...
+    def add_camera(self, camera: Camera | None = None, *, name: str = "", **fields: Any) -> Handle: ...
+    def add_checkerboard_texture(
+        self,
+        name: str,
+        *,
+        counts: Sequence[int] = ...,
+        colors: Sequence[Any] = ...,
+    ) -> Handle: ...
+    def add_image_texture(
+        self,
+        name: str,
+        *,
+        file: str,
+        wrap: Sequence[Any] = ...,
+        filter: Literal["nearest", "bilinear"] = ...,
+        space: Literal["srgb", "raw"] = ...,
+        border: Color = ...,
+        scale: Vector = ...,
+        offset: Vector = ...,
+    ) -> Handle: ...
+    def add_phong_material(
+        self,
+        name: str,
+        *,
+        diffuse: ColorParam = ...,
+        specular: ColorParam = ...,
+        ambient: ColorParam = ...,
+        shininess: NumberParam = ...,
+    ) -> Handle: ...
+    def add_blinn_phong_material(
+        self,
+        name: str,
+        *,
+        diffuse: ColorParam = ...,
+        specular: ColorParam = ...,
+        ambient: ColorParam = ...,
+        shininess: NumberParam = ...,
+    ) -> Handle: ...
+    def add_sphere(
+        self,
+        *,
+        center: Vector,
+        radius: float,
+        uv: Literal["equirectangular", "angles"] = ...,
+        **fields: Unpack[_ShapeFields],
+    ) -> Handle: ...
+    def add_parallelogram(
+        self,
+        *,
+        p: Vector,
+        e0: Vector,
+        e1: Vector,
+        flip: bool = ...,
+        **fields: Unpack[_ShapeFields],
+    ) -> Handle: ...
+    def add_plane(
+        self,
+        *,
+        point: Vector = ...,
+        normal: Vector = ...,
+        up: Vector = ...,
+        **fields: Unpack[_ShapeFields],
+    ) -> Handle: ...
+    def add_disk(
+        self,
+        *,
+        center: Vector,
+        normal: Vector = ...,
+        radius: float,
+        inner_radius: float = ...,
+        **fields: Unpack[_ShapeFields],
+    ) -> Handle: ...
+    def add_rectangle(
+        self,
+        *,
+        center: Vector,
+        size: Vector,
+        normal: Vector = ...,
+        up: Vector = ...,
+        **fields: Unpack[_ShapeFields],
+    ) -> Handle: ...
+    def add_box(
+        self,
+        *,
+        center: Vector,
+        size: Vector = ...,
+        **fields: Unpack[_ShapeFields],
+    ) -> Handle: ...
+    def add_cylinder(
+        self,
+        *,
+        p0: Vector,
+        p1: Vector,
+        radius: float,
+        capped: bool = ...,
+        **fields: Unpack[_ShapeFields],
+    ) -> Handle: ...
+    def add_cone(
+        self,
+        *,
+        p0: Vector,
+        p1: Vector,
+        radius0: float,
+        radius1: float = ...,
+        capped: bool = ...,
+        **fields: Unpack[_ShapeFields],
+    ) -> Handle: ...
+    def add_torus(
+        self,
+        *,
+        center: Vector,
+        axis: Vector = ...,
+        major_radius: float,
+        minor_radius: float,
+        **fields: Unpack[_ShapeFields],
+    ) -> Handle: ...
+    def add_point_set(
+        self,
+        *,
+        file: str = ...,
+        positions: Sequence[Any] = ...,
+        radii: Vector = ...,
+        colors: Sequence[Any] = ...,
+        radius: float = ...,
+        **fields: Unpack[_ShapeFields],
+    ) -> Handle: ...
+    def add_instance(
+        self,
+        *,
+        of: str,
+        **fields: Unpack[_ShapeFields],
+    ) -> Handle: ...
+    def add_point_light(
+        self,
+        *,
+        name: str = ...,
+        position: Vector,
+        transform: Transform = ...,
+        color: Color = ...,
+        strength: float = ...,
+        falloff: Literal["physical", "constant"] = ...,
+        shadows: bool = ...,
+    ) -> Handle: ...
+    def add_directional_light(
+        self,
+        *,
+        name: str = ...,
+        direction: Vector,
+        transform: Transform = ...,
+        color: Color = ...,
+        strength: float = ...,
+        falloff: Literal["physical", "constant"] = ...,
+        shadows: bool = ...,
+    ) -> Handle: ...
+    def add_spot_light(
+        self,
+        *,
+        name: str = ...,
+        position: Vector,
+        look_at: Vector = ...,
+        transform: Transform = ...,
+        cone_deg: float = ...,
+        inner_cone_deg: float = ...,
+        color: Color = ...,
+        strength: float = ...,
+        falloff: Literal["physical", "constant"] = ...,
+        shadows: bool = ...,
+    ) -> Handle: ...
+    def add_rectangle_light(
+        self,
+        *,
+        name: str = ...,
+        center: Vector,
+        e0: Vector = ...,
+        e1: Vector = ...,
+        size: Vector = ...,
+        look_at: Vector = ...,
+        normal: Vector = ...,
+        up: Vector = ...,
+        transform: Transform = ...,
+        color: Color = ...,
+        strength: float = ...,
+        falloff: Literal["physical", "constant"] = ...,
+        sides: Literal["front", "both"] = ...,
+        visible: bool = ...,
+        blocks: bool = ...,
+        shadows: bool = ...,
+        samples: Literal["exact"] | int = ...,
+        set: Literal["sobol", "grid", "stratified", "uniform"] = ...,
+        seed: int = ...,
+    ) -> Handle: ...
+    def add_disk_light(
+        self,
+        *,
+        name: str = ...,
+        center: Vector,
+        normal: Vector = ...,
+        look_at: Vector = ...,
+        radius: float = ...,
+        size: float = ...,
+        transform: Transform = ...,
+        color: Color = ...,
+        strength: float = ...,
+        falloff: Literal["physical", "constant"] = ...,
+        sides: Literal["front", "both"] = ...,
+        visible: bool = ...,
+        blocks: bool = ...,
+        shadows: bool = ...,
+        samples: Literal["exact"] | int = ...,
+        set: Literal["sobol", "grid", "stratified", "uniform"] = ...,
+        seed: int = ...,
+    ) -> Handle: ...
+    def add_sphere_light(
+        self,
+        *,
+        name: str = ...,
+        center: Vector,
+        radius: float,
+        transform: Transform = ...,
+        color: Color = ...,
+        strength: float = ...,
+        falloff: Literal["physical", "constant"] = ...,
+        sides: Literal["front", "both"] = ...,
+        visible: bool = ...,
+        blocks: bool = ...,
+        shadows: bool = ...,
+        samples: Literal["exact"] | int = ...,
+        set: Literal["sobol", "grid", "stratified", "uniform"] = ...,
+        seed: int = ...,
+    ) -> Handle: ...
+
+def builtin(name: str) -> Scene: ...

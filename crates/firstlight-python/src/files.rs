@@ -1,0 +1,70 @@
+//! The files of a scene: from a folder or from memory, kept once they were read, so that a scene stays what it was.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+use firstlight::{AssetError, Assets, FolderAssets};
+
+/// Where the files of a scene come from.
+pub enum Source {
+    /// There are none.
+    Nothing,
+    /// A folder, and those that are allowed besides.
+    Folder(FolderAssets),
+}
+
+/// The files of a scene.
+pub struct SceneFiles {
+    source: Source,
+    /// The scene's own file.
+    own: Option<PathBuf>,
+    /// Those that were read, or came with the scene, by their names.
+    known: Mutex<BTreeMap<String, Arc<[u8]>>>,
+}
+
+impl SceneFiles {
+    /// From a source, and with files that are known already.
+    pub fn new(source: Source, own: Option<PathBuf>, known: BTreeMap<String, Arc<[u8]>>) -> Self {
+        SceneFiles { source, own, known: Mutex::new(known) }
+    }
+
+    fn known(&self) -> MutexGuard<'_, BTreeMap<String, Arc<[u8]>>> {
+        self.known.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// All that were read so far.
+    pub fn all(&self) -> BTreeMap<String, Arc<[u8]>> {
+        self.known().clone()
+    }
+
+    /// Whether the scene was read from the file that `path` leads to.
+    pub fn holds(&self, path: &Path) -> bool {
+        let Ok(real) = path.canonicalize() else { return false };
+        let read = match &self.source {
+            Source::Nothing => Vec::new(),
+            Source::Folder(folder) => folder.files(),
+        };
+        read.contains(&real) || self.own.as_ref().is_some_and(|own| *own == real)
+    }
+}
+
+impl Assets for SceneFiles {
+    fn read(&self, path: &str, limit: u64) -> Result<Vec<u8>, AssetError> {
+        let fits = |bytes: &[u8]| {
+            let size = bytes.len() as u64;
+            if size > limit { Err(AssetError::TooLarge { size, limit }) } else { Ok(bytes.to_vec()) }
+        };
+        if let Some(bytes) = self.known().get(path) {
+            return fits(bytes);
+        }
+        match &self.source {
+            Source::Nothing => Err(AssetError::NotFound),
+            Source::Folder(folder) => {
+                let bytes = folder.read(path, limit)?;
+                self.known().insert(path.to_owned(), bytes.as_slice().into());
+                Ok(bytes)
+            }
+        }
+    }
+}

@@ -1,0 +1,305 @@
+//! A render: the library's work on threads of its own while Python waits, and what comes of it as arrays.
+
+use std::ops::ControlFlow;
+use std::path::PathBuf;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::{Arc, Mutex, PoisonError, mpsc};
+use std::time::Duration;
+
+use firstlight::{
+    Display, Film, Format, Image, NamedPlane, Plane, PlaneNumbers, PlaneVec, Receipt, RenderSettings, Scene, Window,
+    encode_planes, render, write_whole,
+};
+use numpy::{PyArray1, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArrayMethods};
+use pyo3::exceptions::{PyKeyError, PyRuntimeError, PyValueError};
+use pyo3::intern;
+use pyo3::prelude::*;
+use pyo3::types::{PyBytes, PyDict};
+
+use crate::error::image_error;
+use crate::files::SceneFiles;
+
+/// How often Python is asked, while a render goes on, whether it is to go on.
+const ASKED_EVERY: Duration = Duration::from_millis(50);
+
+/// Renders on other threads. Python's other threads run meanwhile; this one looks now and then for signals, such as
+/// that of Ctrl-C, and calls `progress(done, all)`. What either raises stops the render.
+pub fn run(
+    py: Python<'_>,
+    scene: &Scene,
+    settings: &RenderSettings,
+    progress: Option<&Bound<'_, PyAny>>,
+) -> PyResult<Film> {
+    let Window { width, height, .. } =
+        settings.crop.unwrap_or(Window { x: 0, y: 0, width: scene.width(), height: scene.height() });
+    let all = u64::from(width) * u64::from(height);
+    let (done, stop) = (AtomicU64::new(0), AtomicBool::new(false));
+    let (send, receive) = mpsc::channel();
+    let receive = Mutex::new(receive);
+    let (done, stop) = (&done, &stop);
+    std::thread::scope(|scope| {
+        let worker = scope.spawn(move || {
+            let told = |so_far: u64, _| {
+                done.fetch_max(so_far, Ordering::Relaxed);
+                if stop.load(Ordering::Relaxed) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+            };
+            // Nobody listens any more only when the render was stopped
+            drop(send.send(render(scene, settings, &told)));
+        });
+        let mut last = None;
+        let mut tell = |now: u64| match progress {
+            Some(progress) if last != Some(now) => {
+                last = Some(now);
+                progress.call1((now, all)).map(drop)
+            }
+            _ => Ok(()),
+        };
+        loop {
+            let answer = py.detach(|| receive.lock().unwrap_or_else(PoisonError::into_inner).recv_timeout(ASKED_EVERY));
+            match answer {
+                Ok(ControlFlow::Continue((film, _))) => {
+                    tell(all)?;
+                    return Ok(film);
+                }
+                Ok(ControlFlow::Break(())) | Err(mpsc::RecvTimeoutError::Disconnected) => {
+                    // The words of a panic, if there was one
+                    let why = py.detach(|| worker.join()).err().and_then(|why| {
+                        why.downcast_ref::<String>()
+                            .cloned()
+                            .or(why.downcast_ref::<&str>().map(|why| (*why).to_owned()))
+                    });
+                    let why = why.unwrap_or_else(|| "the render ended without a picture".into());
+                    return Err(PyRuntimeError::new_err(format!("firstlight failed: {why}")));
+                }
+                Err(mpsc::RecvTimeoutError::Timeout) => {
+                    if let Err(error) = py.check_signals().and_then(|()| tell(done.load(Ordering::Relaxed))) {
+                        stop.store(true, Ordering::Relaxed);
+                        // It ends within some hundredths of a second
+                        drop(py.detach(|| worker.join()));
+                        return Err(error);
+                    }
+                }
+            }
+        }
+    })
+}
+
+/// What was rendered: a mapping from the names of buffers to numpy arrays, row 0 at the top.
+///
+/// Each array has the shape (height, width), or (height, width, channels) where a pixel has several numbers; float32,
+/// or uint32 for ids. They are the memory that was rendered to, not copies of it.
+#[pyclass(frozen, mapping, module = "firstlight", name = "Render")]
+pub struct PyRender {
+    arrays: Py<PyDict>,
+    /// Their names, and what they are.
+    planes: Vec<(String, Plane)>,
+    film: [u32; 2],
+    window: Window,
+    display: Display,
+    /// What a picture says of itself, and what a file of buffers does.
+    receipts: [Receipt; 2],
+    files: Arc<SceneFiles>,
+}
+
+impl PyRender {
+    /// From a film, whose memory it takes over.
+    pub fn new(
+        py: Python<'_>,
+        film: Film,
+        scene: &Scene,
+        settings: &RenderSettings,
+        files: Arc<SceneFiles>,
+    ) -> PyResult<Self> {
+        let (size, window) = (film.size(), film.window());
+        let arrays = PyDict::new(py);
+        let mut planes = Vec::new();
+        for (name, buffer, numbers) in film.into_planes() {
+            let plane = buffer.plane();
+            let (h, w, channels) = (window.height as usize, window.width as usize, plane.channels().len());
+            let shape = if channels == 1 { vec![h, w] } else { vec![h, w, channels] };
+            let array = match numbers {
+                PlaneVec::Floats(numbers) => PyArray1::from_vec(py, numbers).reshape(shape)?.into_any(),
+                PlaneVec::Wholes(numbers) => PyArray1::from_vec(py, numbers).reshape(shape)?.into_any(),
+            };
+            arrays.set_item(&name, array)?;
+            planes.push((name, plane));
+        }
+        let receipts = [scene.receipt(settings), scene.buffers_receipt(settings, &settings.buffers)];
+        Ok(PyRender { arrays: arrays.unbind(), planes, film: size, window, display: scene.display(), receipts, files })
+    }
+
+    /// The numbers of the planes as they are now, lent to `with`.
+    fn with_planes<R>(
+        &self,
+        py: Python<'_>,
+        of: &[(String, Plane)],
+        with: impl FnOnce(&[NamedPlane<'_>]) -> PyResult<R>,
+    ) -> PyResult<R> {
+        let (mut floats, mut wholes) = (Vec::new(), Vec::new());
+        for (name, plane) in of {
+            let array = self.arrays.bind(py).get_item(name)?;
+            let array = array.ok_or_else(|| PyKeyError::new_err(name.clone()))?;
+            if plane.is_whole() {
+                wholes.push(array.extract::<PyReadonlyArrayDyn<'_, u32>>()?);
+            } else {
+                floats.push(array.extract::<PyReadonlyArrayDyn<'_, f32>>()?);
+            }
+        }
+        let (mut next_floats, mut next_wholes) = (floats.iter(), wholes.iter());
+        let mut planes = Vec::new();
+        for (name, plane) in of {
+            let numbers = if plane.is_whole() {
+                next_wholes.next().map(|array| array.as_slice().map(PlaneNumbers::Wholes))
+            } else {
+                next_floats.next().map(|array| array.as_slice().map(PlaneNumbers::Floats))
+            };
+            let numbers = numbers.expect("each plane has its array");
+            let is_moved = |_| PyValueError::new_err(format!("the array {name} is no longer laid out by rows"));
+            planes.push(NamedPlane { name, plane: *plane, numbers: numbers.map_err(is_moved)? });
+        }
+        with(&planes)
+    }
+
+    fn names(&self) -> String {
+        self.planes.iter().map(|(name, _)| name.as_str()).collect::<Vec<_>>().join(", ")
+    }
+
+    fn encode(&self, py: Python<'_>, format: Format) -> PyResult<Vec<u8>> {
+        if matches!(format, Format::Exr | Format::Npz) {
+            return self.with_planes(py, &self.planes, |planes| {
+                encode_planes(self.film, self.window, planes, format, &self.receipts[1]).map_err(|e| image_error(&e))
+            });
+        }
+        let Some(color) = self.planes.iter().position(|(_, plane)| *plane == Plane::Color) else {
+            let message = format!("there is no picture: the render has {}, and not color", self.names());
+            return Err(PyValueError::new_err(message));
+        };
+        self.with_planes(py, &self.planes[color..=color], |planes| {
+            let PlaneNumbers::Floats(numbers) = planes[0].numbers else { unreachable!("colours are floats") };
+            let (pixels, _) = numbers.as_chunks::<4>();
+            let image = Image { film: self.film, window: self.window, pixels: pixels.to_vec() };
+            image.encode(format, &self.display, &self.receipts[0]).map_err(|e| image_error(&e))
+        })
+    }
+}
+
+#[pymethods]
+impl PyRender {
+    /// What decided the pixels: a dict of texts. With more buffers than color it has the camera's matrices and the
+    /// names behind ids.
+    #[getter]
+    fn receipt<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let receipt = PyDict::new(py);
+        for (key, value) in &self.receipts[1].entries {
+            receipt.set_item(key, value)?;
+        }
+        Ok(receipt)
+    }
+
+    /// The columns and rows of the whole film; the arrays are smaller if it was cropped.
+    #[getter]
+    fn film_size(&self) -> (u32, u32) {
+        (self.film[0], self.film[1])
+    }
+
+    /// The part of the film that the arrays hold: x, y, width, height.
+    #[getter]
+    fn window(&self) -> (u32, u32, u32, u32) {
+        let Window { x, y, width, height } = self.window;
+        (x, y, width, height)
+    }
+
+    /// The bytes of a PNG file of the picture, display-encoded, with its receipt.
+    ///
+    /// Parameters
+    /// ----------
+    /// bits : int
+    ///     8 or 16 for each channel.
+    #[pyo3(signature = (*, bits = 8))]
+    fn to_png<'py>(&self, py: Python<'py>, bits: u32) -> PyResult<Bound<'py, PyBytes>> {
+        let format = match bits {
+            8 => Format::Png8,
+            16 => Format::Png16,
+            _ => return Err(PyValueError::new_err(format!("bits is {bits}; a PNG has 8 or 16"))),
+        };
+        Ok(PyBytes::new(py, &self.encode(py, format)?))
+    }
+
+    /// Writes a file, whole or not at all: `.exr` and `.npz` hold all buffers, `.png` and `.hdr` the picture.
+    ///
+    /// The arrays are written as they are now. A file that the scene was read from is never written over.
+    fn save(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
+        let format = Format::from_path(&path).map_err(|e| image_error(&e))?;
+        if self.files.holds(&path) {
+            let message = format!("{}: the scene was read from it; choose another name", path.display());
+            return Err(PyValueError::new_err(message));
+        }
+        let bytes = self.encode(py, format)?;
+        py.detach(|| write_whole(&path, &bytes)).map(drop).map_err(|e| image_error(&e))
+    }
+
+    /// For notebooks.
+    fn _repr_png_<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyBytes>>> {
+        if self.planes.iter().any(|(_, plane)| *plane == Plane::Color) {
+            self.to_png(py, 8).map(Some)
+        } else {
+            Ok(None)
+        }
+    }
+
+    fn __getitem__<'py>(&self, py: Python<'py>, name: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
+        self.arrays
+            .bind(py)
+            .as_any()
+            .get_item(name)
+            .map_err(|_| PyKeyError::new_err(format!("{name}: the render has {}", self.names())))
+    }
+
+    fn __len__(&self) -> usize {
+        self.planes.len()
+    }
+
+    fn __contains__(&self, py: Python<'_>, name: &Bound<'_, PyAny>) -> PyResult<bool> {
+        self.arrays.bind(py).contains(name)
+    }
+
+    fn __iter__<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        self.arrays.bind(py).call_method0(intern!(py, "__iter__"))
+    }
+
+    /// The names of the buffers.
+    fn keys<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        self.arrays.bind(py).call_method0(intern!(py, "keys"))
+    }
+
+    /// The arrays.
+    fn values<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        self.arrays.bind(py).call_method0(intern!(py, "values"))
+    }
+
+    /// Names and arrays.
+    fn items<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        self.arrays.bind(py).call_method0(intern!(py, "items"))
+    }
+
+    /// The array of that name, or `default`.
+    #[pyo3(signature = (name, default = None))]
+    fn get<'py>(
+        &self,
+        py: Python<'py>,
+        name: &Bound<'py, PyAny>,
+        default: Option<Bound<'py, PyAny>>,
+    ) -> PyResult<Option<Bound<'py, PyAny>>> {
+        Ok(self.arrays.bind(py).as_any().get_item(name).ok().or(default))
+    }
+
+    fn __repr__(&self, py: Python<'_>) -> PyResult<String> {
+        let mut words = Vec::new();
+        for (name, array) in self.arrays.bind(py).iter() {
+            let shape = array.cast::<numpy::PyUntypedArray>()?.shape().to_vec();
+            words.push(format!("{name} {shape:?}"));
+        }
+        let Window { width, height, .. } = self.window;
+        Ok(format!("<firstlight.Render {width} x {height}: {}>", words.join(", ")))
+    }
+}
