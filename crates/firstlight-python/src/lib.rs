@@ -23,6 +23,7 @@ use crate::scene::PyScene;
 fn _firstlight(py: Python<'_>, module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<PyScene>()?;
     module.add_class::<PyRender>()?;
+    module.add_function(wrap_pyfunction!(render::restored, module)?)?;
     module.add("SceneError", py.get_type::<SceneError>())?;
     module.add("SceneWarning", py.get_type::<SceneWarning>())?;
     module.add("__version__", env!("CARGO_PKG_VERSION"))?;

@@ -1,5 +1,6 @@
 //! A render: the library's work on threads of its own while Python waits, and what comes of it as arrays.
 
+use std::collections::BTreeMap;
 use std::ops::ControlFlow;
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
@@ -7,8 +8,8 @@ use std::sync::{Arc, Mutex, PoisonError, mpsc};
 use std::time::Duration;
 
 use firstlight::{
-    Display, Film, Format, Image, NamedPlane, Plane, PlaneNumbers, PlaneVec, Receipt, RenderSettings, Scene, Window,
-    encode_planes, render, write_whole,
+    Display, Encoding, Film, Format, Image, NamedPlane, Plane, PlaneNumbers, PlaneVec, Receipt, RenderSettings, Scene,
+    Window, encode_planes, render, write_whole,
 };
 use numpy::{PyArray1, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArrayMethods};
 use pyo3::exceptions::{PyKeyError, PyRuntimeError, PyValueError};
@@ -17,7 +18,7 @@ use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
 
 use crate::error::image_error;
-use crate::files::SceneFiles;
+use crate::files::{SceneFiles, Source};
 
 /// How often Python is asked, while a render goes on, whether it is to go on.
 const ASKED_EVERY: Duration = Duration::from_millis(50);
@@ -81,6 +82,42 @@ pub fn run(
                 }
             }
         }
+    })
+}
+
+/// What makes another render of the same: the arrays; the names of the planes and what they are; the size of the film
+/// and the part that they hold; how it is shown; what files say of it.
+type Pickled<'py> =
+    (Bound<'py, PyDict>, Vec<(String, String)>, [u32; 2], [u32; 4], (String, f64, f64), [Vec<(String, String)>; 2]);
+
+/// The render of such a state.
+#[pyfunction(name = "_restored_render")]
+pub fn restored(
+    arrays: Bound<'_, PyDict>,
+    names: Vec<(String, String)>,
+    film: [u32; 2],
+    window: [u32; 4],
+    display: (String, f64, f64),
+    says: [Vec<(String, String)>; 2],
+) -> PyResult<PyRender> {
+    let ([x, y, width, height], (encoding, gamma, exposure)) = (window, display);
+    let plane = |(name, word): (String, String)| match Plane::from_name(&word) {
+        Some(plane) => Ok((name, plane)),
+        None => Err(PyValueError::new_err(format!("{name}: this version of firstlight has no plane {word}"))),
+    };
+    let encoding = match encoding.as_str() {
+        "gamma" => Encoding::Gamma(gamma),
+        "linear" => Encoding::Linear,
+        _ => Encoding::Srgb,
+    };
+    Ok(PyRender {
+        arrays: arrays.unbind(),
+        planes: names.into_iter().map(plane).collect::<PyResult<_>>()?,
+        film,
+        window: Window { x, y, width, height },
+        display: Display { encoding, exposure },
+        receipts: says.map(|entries| Receipt { entries }),
+        files: Arc::new(SceneFiles::new(Source::Nothing, None, BTreeMap::new())),
     })
 }
 
@@ -291,6 +328,21 @@ impl PyRender {
         default: Option<Bound<'py, PyAny>>,
     ) -> PyResult<Option<Bound<'py, PyAny>>> {
         Ok(self.arrays.bind(py).as_any().get_item(name).ok().or(default))
+    }
+
+    /// For pickle: the arrays and all that files of them say, without the files of the scene.
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, Pickled<'py>)> {
+        let names = self.planes.iter().map(|(name, plane)| (name.clone(), plane.name().to_owned())).collect();
+        let (encoding, gamma) = match self.display.encoding {
+            Encoding::Srgb => ("srgb", 0.0),
+            Encoding::Gamma(gamma) => ("gamma", gamma),
+            Encoding::Linear => ("linear", 0.0),
+        };
+        let Window { x, y, width, height } = self.window;
+        let says = [&self.receipts[0], &self.receipts[1]].map(|receipt| receipt.entries.clone());
+        let display = (encoding.to_owned(), gamma, self.display.exposure);
+        let state = (self.arrays.bind(py).clone(), names, self.film, [x, y, width, height], display, says);
+        Ok((py.import("firstlight._firstlight")?.getattr("_restored_render")?, state))
     }
 
     fn __repr__(&self, py: Python<'_>) -> PyResult<String> {

@@ -6,7 +6,8 @@ import re
 import pytest
 
 ROOT = pathlib.Path(__file__).parents[3]
-PAGES = [ROOT / "docs/src/python.md", ROOT / "README.md", ROOT / "crates/firstlight-python/README.md"]
+PAGES = [ROOT / page for page in ("docs/src/python.md", "docs/src/conventions.md", "README.md")]
+PAGES.append(ROOT / "crates/firstlight-python/README.md")
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)

@@ -142,12 +142,18 @@ def test_what_progress_raises_stops_the_render():
 
 def test_an_interrupt_stops_the_render():
     import _thread
+    import signal
 
+    # Whoever started the tests may have had it ignored
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
     timer = threading.Timer(0.3, _thread.interrupt_main)
     timer.start()
-    with pytest.raises(KeyboardInterrupt):
-        fl.builtin("config23").render(width=1024, height=1024, aa=8, aa_mode="full")
-    timer.join()
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            fl.builtin("config23").render(width=1024, height=1024, aa=8, aa_mode="full")
+    finally:
+        timer.join()
+        signal.signal(signal.SIGINT, before)
 
 
 def test_several_threads_render_at_once():

@@ -77,6 +77,20 @@ def test_things_move_by_their_handles():
         scene.add_phong_material("red")
 
 
+def test_pickled_renders_are_the_same(tmp_path):
+    scene = room()
+    scene.settings.update(display="gamma", gamma=2.4, exposure=0.5)
+    frame = scene.render(buffers=["color", "object-id", "light:lamp"], crop=(2, 3, 16, 12), **SMALL)
+    other = pickle.loads(pickle.dumps(frame))
+    assert list(other) == list(frame) and other.receipt == frame.receipt
+    assert all((other[name] == frame[name]).all() for name in frame)
+    assert (other.window, other.film_size) == (frame.window, frame.film_size)
+    assert other.to_png() == frame.to_png()
+    for which, name in ((frame, "a.npz"), (other, "b.npz")):
+        which.save(tmp_path / name)
+    assert (tmp_path / "a.npz").read_bytes() == (tmp_path / "b.npz").read_bytes()
+
+
 def test_pickled_scenes_are_the_same(tmp_path):
     scene = room()
     other = pickle.loads(pickle.dumps(scene))

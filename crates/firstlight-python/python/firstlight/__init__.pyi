@@ -19,9 +19,10 @@ TEXTURES: list[str]
 
 # Or light:NAME, light:#3, light:*, and their parts, light:NAME:diffuse and light:NAME:specular
 Buffer = str | Literal[
-    "color", "alpha", "background", "emission", "ambient", "diffuse", "specular", "depth", "distance", "position", "position-camera", "normal", "normal-camera", "normal-geometric",
-    "normal-geometric-camera", "tangent", "uv", "barycentric", "object-id", "material-id", "primitive-id",
-    "face-orientation", "rays",
+    "color", "alpha", "background", "emission", "ambient", "diffuse", "specular", "depth", "distance", "position",
+    "position-camera", "position-object", "normal", "normal-camera", "normal-object", "normal-geometric",
+    "normal-geometric-camera", "tangent", "uv", "barycentric", "albedo", "object-id", "instance-id", "material-id",
+    "primitive-id", "face-orientation", "rays",
 ]
 # Three rows or four of four numbers, or a table of the scene format
 Transform = ArrayLike | Mapping[str, Any] | None

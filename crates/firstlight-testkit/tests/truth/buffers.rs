@@ -199,6 +199,50 @@ fn each_is_what_the_centre_ray_meets() {
 }
 
 #[test]
+fn objects_are_told_in_their_own_space() {
+    let scene = scene(SCENE);
+    let film = film(&scene, &of(Plane::ALL));
+    let receipt = scene.buffers_receipt(&RenderSettings::default(), &of(Plane::ALL).buffers);
+    let list = |key: &str| -> Vec<Option<String>> {
+        serde_json::from_str(&receipt.entries.iter().find(|(k, _)| k == key).unwrap().1).unwrap()
+    };
+    let (names, instances) = (list("object_names"), list("instance_names"));
+    assert_eq!(instances, [Some("one".to_owned()), None]);
+    let (sin, cos) = (0.5, 0.75f64.sqrt());
+    let mut placed = [0; 3];
+    for pixel in 0..90 * 70 {
+        let three = |plane| {
+            let numbers = <[f32; 3]>::try_from(&floats(&film, plane)[3 * pixel..][..3]).unwrap();
+            Vec3::from(numbers).as_dvec3()
+        };
+        let id = wholes(&film, Plane::ObjectId)[pixel] as usize;
+        let instance = wholes(&film, Plane::InstanceId)[pixel];
+        let (p, n) = (three(Plane::PositionObject), three(Plane::NormalObject));
+        let shapes = names.len() - 2;
+        if id == 0 || id > shapes {
+            assert_eq!((instance, p, n, three(Plane::Albedo)), (0, DVec3::ZERO, DVec3::ZERO, DVec3::ZERO));
+            continue;
+        }
+        // As the scene says: moved, and around y first
+        let turned = |v: DVec3| DVec3::new(cos * v.x + sin * v.z, v.y, cos * v.z - sin * v.x);
+        let (there, normal) = match instance {
+            0 => (p, n),
+            1 => (p + DVec3::new(-0.5, -1.5, 0.0), n),
+            _ => (turned(p) + DVec3::new(1.5, -1.5, 0.0), turned(n)),
+        };
+        assert!((there - three(Plane::Position)).length() < 2e-6, "{instance}: {there} {}", three(Plane::Position));
+        assert!((normal - three(Plane::Normal)).length() < 2e-6, "{instance}: {normal} {}", three(Plane::Normal));
+        // Those without a material have the one that is white
+        let albedo = [DVec3::X, DVec3::Y].get(wholes(&film, Plane::MaterialId)[pixel] as usize - 1).copied();
+        assert!(albedo.is_none_or(|albedo| albedo == three(Plane::Albedo)), "{}", three(Plane::Albedo));
+        let within = names[id - 1].as_deref().is_some_and(|name| name.starts_with("one/"));
+        assert!(!within || instance == 1);
+        placed[instance as usize] += 1;
+    }
+    assert!(placed.iter().all(|pixels| *pixels > 20), "{placed:?}");
+}
+
+#[test]
 fn pixels_lead_to_the_world_and_back() {
     let turned = SCENE.replace("look_at = [0.1, 0, 0]", "look_at = [-3, 2, 1]\nup = [0.4, 1, 0.2]\nfov_y_deg = 80");
     for text in [SCENE, &turned] {

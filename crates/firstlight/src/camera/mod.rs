@@ -298,8 +298,9 @@ mod tests {
         }
         // Square pixels and the middle are a field of view
         let fov = 2.0 * pxfm::f_atan(240.0 / 600.0) * 180.0 / std::f64::consts::PI;
-        let square = compiled(&CameraDesc { focal_length_px: Some([600.0; 2]), ..CameraDesc::new([0.0; 3]) }, 640, 480);
-        let usual = compiled(&CameraDesc { fov_y_deg: Some(fov), ..CameraDesc::new([0.0; 3]) }, 640, 480);
+        let eye = [0.0, 0.0, 5.0];
+        let square = compiled(&CameraDesc { focal_length_px: Some([600.0; 2]), ..CameraDesc::new(eye) }, 640, 480);
+        let usual = compiled(&CameraDesc { fov_y_deg: Some(fov), ..CameraDesc::new(eye) }, 640, 480);
         assert_eq!((square.film_half_size(), square.film_shift()), (usual.film_half_size(), [0.0; 2]));
         let k = usual.intrinsics().unwrap_or_default();
         assert!((k[0] - 600.0).abs() < 1e-4 && (k[1] - 600.0).abs() < 1e-4 && k[2..] == [320.0, 240.0], "{k:?}");

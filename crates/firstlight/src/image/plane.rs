@@ -34,10 +34,15 @@ words! {
         Position = "position",
         /// Where it is, from the camera: x to the right, y up, z backwards.
         PositionCamera = "position-camera",
+        /// Where it is in the space that the object was described in, before its transform and those of the instances
+        /// around it; 0 on lights.
+        PositionObject = "position-object",
         /// The shading normal, unit, on the side that is seen: what light sees of a smooth mesh.
         Normal = "normal",
         /// The shading normal from the camera: x to the right, y up, z backwards.
         NormalCamera = "normal-camera",
+        /// The shading normal in the space that the object was described in; 0 on lights.
+        NormalObject = "normal-object",
         /// The geometric normal, unit, on the side that is seen: of the facet itself.
         NormalGeometric = "normal-geometric",
         /// The geometric normal from the camera: x to the right, y up, z backwards.
@@ -48,9 +53,14 @@ words! {
         Uv = "uv",
         /// On a triangle, how much its second and its third corner count; 0 on all else.
         Barycentric = "barycentric",
+        /// The diffuse colour of its material there, texture and vertex colour looked up; 0 on lights.
+        Albedo = "albedo",
         /// Which object it is, in scene order: 1 for the first shape, and the lights after all shapes. Each instance of
         /// a shape is an object of its own.
         ObjectId = "object-id",
+        /// Which instance placed it, in scene order, of nested ones the outermost: 1 for the first; 0 on what no instance
+        /// placed.
+        InstanceId = "instance-id",
         /// Which material it has, in the order of the scene: 1 for the first; 0 on lights.
         MaterialId = "material-id",
         /// Which triangle of its mesh, or point of its point set, in the order of its file: 1 for the first; 0 on all
@@ -90,19 +100,22 @@ impl Plane {
         match self {
             Color => &["R", "G", "B", "A"],
             Alpha => &["A"],
-            Background | Emission | Ambient | Diffuse | Specular => &["R", "G", "B"],
+            Background | Emission | Ambient | Diffuse | Specular | Albedo => &["R", "G", "B"],
             Depth | Distance => &["Z"],
-            Position | PositionCamera => &["X", "Y", "Z"],
-            Normal | NormalCamera | NormalGeometric | NormalGeometricCamera | Tangent => &["X", "Y", "Z"],
+            Position | PositionCamera | PositionObject => &["X", "Y", "Z"],
+            Normal | NormalCamera | NormalObject | NormalGeometric | NormalGeometricCamera | Tangent => {
+                &["X", "Y", "Z"]
+            }
             Uv | Barycentric => &["U", "V"],
-            ObjectId | MaterialId | PrimitiveId | FaceOrientation => &["ID"],
+            ObjectId | InstanceId | MaterialId | PrimitiveId | FaceOrientation => &["ID"],
             Rays => &["N"],
         }
     }
 
     /// Whether its numbers are whole.
     pub fn is_whole(self) -> bool {
-        matches!(self, Plane::ObjectId | Plane::MaterialId | Plane::PrimitiveId | Plane::FaceOrientation)
+        use Plane::*;
+        matches!(self, ObjectId | InstanceId | MaterialId | PrimitiveId | FaceOrientation)
     }
 
     /// The type of its numbers, as numpy names it.
@@ -115,7 +128,8 @@ impl Plane {
         use Plane::*;
         match self {
             Color | Background | Emission | Ambient | Diffuse | Specular => "linear Rec. 709, premultiplied",
-            Depth | Distance | Position | PositionCamera => "m",
+            Albedo => "linear Rec. 709",
+            Depth | Distance | Position | PositionCamera | PositionObject => "m",
             Rays => "rays",
             _ => "1",
         }
@@ -127,6 +141,7 @@ impl Plane {
         match self {
             Position | Normal | NormalGeometric | Tangent => "world",
             Depth | PositionCamera | NormalCamera | NormalGeometricCamera => "camera",
+            PositionObject | NormalObject => "object",
             Uv => "texture",
             _ => "-",
         }

@@ -8,9 +8,10 @@ use fearless_simd::Level;
 use super::film::{CenterValue, FilmTile};
 use super::hits::{PixelHits, grid_ray};
 use crate::camera::Frame;
+use crate::color::Rgb;
 use crate::image::Plane;
 use crate::math::{DVec3, Ray, Vec3};
-use crate::scene::{Hit, Scene};
+use crate::scene::{Hit, ObjectSpace, Scene};
 use crate::shape::{RayDifferential, SurfaceInteraction};
 
 /// One thread's way through the centre rays of tiles.
@@ -80,6 +81,12 @@ impl<'a> Center<'a> {
         }
     }
 
+    /// The space that it was described in; `None` on a light.
+    fn space(&self) -> Option<&ObjectSpace> {
+        let geometry = &self.scene.geometry;
+        geometry.surfaces.get(self.hit.surface.index()).map(|surface| &geometry.spaces[surface.space as usize])
+    }
+
     /// The unit normal of the front: of a shape, or of a light.
     fn front(&self) -> Vec3 {
         let Scene { geometry, lights, .. } = self.scene;
@@ -120,6 +127,21 @@ impl<'a> Center<'a> {
                 let along_u = self.surface.map(|_| geometry.tangents(&self.ray, &self.hit)[0]);
                 vector(along_u.map_or(Vec3::ZERO, |along| along.normalize_or_zero().as_vec3()))
             }
+            Plane::PositionObject => {
+                let object = self.space().map(|space| space.scene_from_object.inverse().transform_point3(self.p()));
+                vector(object.map_or(Vec3::ZERO, DVec3::as_vec3))
+            }
+            Plane::NormalObject => {
+                // Normals go back by the transpose
+                let object = self.space().map(|space| space.scene_from_object.matrix3.transpose() * ns().as_dvec3());
+                vector(object.map_or(Vec3::ZERO, |n| n.normalize_or_zero().as_vec3()))
+            }
+            Plane::Albedo => {
+                let Scene { materials, textures, .. } = self.scene;
+                let color = self.surface.map(|si| materials[si.material.index()].bsdf(&si, textures).colors.cosine());
+                vector(color.map_or(Vec3::ZERO, |Rgb { r, g, b }| Vec3::new(r, g, b)))
+            }
+            Plane::InstanceId => CenterValue::Whole(self.space().map_or(0, |space| space.instance)),
             Plane::Uv => vector(self.surface.map_or(Vec3::ZERO, |surface| surface.uv.extend(0.0))),
             Plane::Barycentric => vector(self.hit.barycentric().extend(0.0)),
             Plane::ObjectId => CenterValue::Whole(self.hit.surface.0 + 1),

@@ -94,6 +94,12 @@ impl Scene {
             let shapes = self.geometry.surfaces.iter().map(|surface| surface.name.as_deref().map(str::to_owned));
             add("object_names", list(shapes.chain(self.light_names()).collect()));
         }
+        if asks_for(Plane::InstanceId) {
+            add(
+                "instance_names",
+                list(self.geometry.instances.iter().map(|n| n.as_deref().map(str::to_owned)).collect()),
+            );
+        }
         if asks_for(Plane::MaterialId) {
             add("material_names", list(self.summary.materials.iter().map(|(name, _)| Some(name.clone())).collect()));
         }

@@ -17,7 +17,7 @@ use super::links::{LinkId, LinkSets};
 use super::occluders::Opacity;
 use crate::accel::{Aabb, Bvh};
 use crate::ids::{LightId, MaterialId, SurfaceId};
-use crate::math::{DVec3, Facet, Vec2};
+use crate::math::{DAffine3, DVec3, Facet, Vec2};
 use crate::shape::{Mesh, Parallelogram, Placement, PointSet, ShadowTerminator, Solid, Sphere, TrianglePoint};
 
 /// What a surface id stands for.
@@ -39,6 +39,16 @@ pub(crate) struct Surface {
     pub lights: Option<LinkId>,
     /// The lights it casts shadows for, if it casts any; `None`: all.
     pub shadows: Option<LinkId>,
+    /// Which of [`Geometry::spaces`] it was described in.
+    pub space: u32,
+}
+
+/// A space that shapes were described in: their own, before all transforms.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct ObjectSpace {
+    pub scene_from_object: DAffine3,
+    /// The outermost instance that placed it there, from 1 on in the order of the scene; 0 without.
+    pub instance: u32,
 }
 
 /// What a surface says of rays: which of them it lets pass. Of two shapes at the same place that say the same, no ray
@@ -188,6 +198,9 @@ pub(crate) const LISTED: usize = 48;
 pub(crate) struct Geometry {
     /// What each surface id of a shape stands for.
     pub surfaces: Vec<Surface>,
+    pub spaces: Vec<ObjectSpace>,
+    /// The names of the outermost instances.
+    pub instances: Vec<Option<Arc<str>>>,
     pub spheres: Vec<Owned<Sphere>>,
     pub parallelograms: Vec<Owned<Parallelogram>>,
     /// Whether spheres and parallelograms are few: then they are asked one by one and do not lie in the upper tree.
@@ -220,6 +233,8 @@ pub(crate) struct Joined {
 #[derive(Default)]
 pub(crate) struct Parts {
     pub surfaces: Vec<Surface>,
+    pub spaces: Vec<ObjectSpace>,
+    pub instances: Vec<Option<Arc<str>>>,
     pub spheres: Vec<Owned<Sphere>>,
     pub parallelograms: Vec<Owned<Parallelogram>>,
     pub world: Option<Joined>,
@@ -278,8 +293,19 @@ impl std::fmt::Debug for Geometry {
 impl Geometry {
     /// From shapes that are in the world; the trees of meshes and point sets are there already.
     pub fn new(parts: Parts, terminator: ShadowTerminator) -> Self {
-        let Parts { surfaces, mut spheres, mut parallelograms, world, placed, meshes, point_sets, solids, links } =
-            parts;
+        let Parts {
+            surfaces,
+            spaces,
+            instances,
+            mut spheres,
+            mut parallelograms,
+            world,
+            placed,
+            meshes,
+            point_sets,
+            solids,
+            links,
+        } = parts;
         if spheres.len() + parallelograms.len() > LISTED {
             let rules = |surface: SurfaceId| surfaces[surface.index()].ray_rules();
             drop_copies(&mut spheres, |s| (s.shape.place_bits(), s.shape.single_sided, rules(s.surface)));
@@ -323,6 +349,8 @@ impl Geometry {
         let upper = Bvh::build_distinct(&boxes, key);
         Geometry {
             surfaces,
+            spaces,
+            instances,
             spheres,
             parallelograms,
             listed,

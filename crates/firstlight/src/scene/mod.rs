@@ -46,7 +46,7 @@ use crate::light::Light;
 use crate::material::Material;
 use crate::math::DVec3;
 use crate::texture::Texture;
-pub(crate) use geometry::{At, Geometry, Nearest, Placed, PlacedTarget, UpperItem};
+pub(crate) use geometry::{At, Geometry, Nearest, ObjectSpace, Placed, PlacedTarget, UpperItem};
 pub(crate) use links::LinkId;
 pub(crate) use occluders::{Listed, ListedOccluders, Opacity};
 use seen_lights::SeenLights;

@@ -10,7 +10,7 @@ use std::sync::Arc;
 use glam::DAffine3;
 
 use super::SceneDesc;
-use super::geometry::{Geometry, Joined, Owned, Parts, Placed, PlacedTarget, RayRules, Surface};
+use super::geometry::{Geometry, Joined, ObjectSpace, Owned, Parts, Placed, PlacedTarget, RayRules, Surface};
 use super::links::{LinkId, Links};
 use super::occluders::Opacity;
 use crate::context::{Assets, CompileContext};
@@ -166,6 +166,8 @@ struct Over {
     single_sided: bool,
     lights: Option<LinkId>,
     shadows: Option<LinkId>,
+    /// The number of the outermost of them; 0 without.
+    instance: u32,
 }
 
 impl Over {
@@ -178,6 +180,7 @@ impl Over {
         single_sided: false,
         lights: None,
         shadows: None,
+        instance: 0,
     };
 
     /// The name of something within.
@@ -199,6 +202,7 @@ impl Over {
             single_sided: self.single_sided || leaf.surface.single_sided,
             lights: links.both(self.lights, leaf.surface.lights),
             shadows: links.both(self.shadows, leaf.surface.shadows),
+            instance: self.instance,
         }
     }
 
@@ -212,6 +216,7 @@ impl Over {
             single_sided: self.single_sided || own.single_sided,
             lights: links.both(self.lights, own.lights),
             shadows: links.both(self.shadows, own.shadows),
+            space: 0,
         }
     }
 }
@@ -345,6 +350,7 @@ impl Compiler<'_, '_> {
             single_sided,
             lights: self.links.compile(cx, ["lights_include", "lights_exclude"], lights),
             shadows: self.links.compile(cx, ["shadow_include", "shadow_exclude"], shadows),
+            space: 0,
         };
         let transform = TransformDesc::compile_field(transform, cx);
         let solid = |solids: &mut Vec<Solid>, solid: Solid| {
@@ -522,10 +528,19 @@ impl SceneWalk<'_> {
         let surfaces = group.leaves.iter().filter(|leaf| !matches!(leaf.form, Form::Instance(_)));
         let links = &mut self.links;
         self.parts.surfaces.extend(surfaces.map(|leaf| over.surface(&leaf.surface, links)));
+        let own_space = self.parts.spaces.len() as u32;
+        self.parts.spaces.push(ObjectSpace { scene_from_object: world_from_group, instance: over.instance });
         for (i, leaf) in group.leaves.iter().enumerate() {
             let world = leaf.transform.map_or(world_from_group, |transform| world_from_group * transform);
             let surface = SurfaceId(first + i as u32);
             let seen = over.visible && leaf.surface.visible;
+            if !matches!(leaf.form, Form::Instance(_)) {
+                let space = if leaf.transform.is_some() { self.parts.spaces.len() as u32 } else { own_space };
+                if leaf.transform.is_some() {
+                    self.parts.spaces.push(ObjectSpace { scene_from_object: world, instance: over.instance });
+                }
+                self.parts.surfaces[surface.index()].space = space;
+            }
             match &leaf.form {
                 Form::Nothing | Form::MeshPart => {}
                 Form::Sphere(sphere) => match sphere.moved(&world) {
@@ -551,7 +566,11 @@ impl SceneWalk<'_> {
                 }
                 Form::Instance(of) => {
                     let groups = self.groups;
-                    let over = over.within(leaf, &mut self.links);
+                    let mut over = over.within(leaf, &mut self.links);
+                    if over.instance == 0 {
+                        self.parts.instances.push(leaf.surface.name.clone());
+                        over.instance = self.parts.instances.len() as u32;
+                    }
                     self.group(&groups[*of], Some(*of), world, &over);
                 }
             }
