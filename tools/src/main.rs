@@ -16,7 +16,7 @@ mod shading_rate;
 mod slow;
 mod verify;
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
@@ -80,6 +80,12 @@ enum Verify {
     /// Compares pictures whose camera rays share their light, as by default, with every ray lit by itself, at real
     /// size.
     ShadingRate(shading_rate::Options),
+    /// Tests the Python package beside packages that are too large for every day: Ray, trimesh, OpenImageIO, OpenCV.
+    Python {
+        /// A folder with models, which are compared with the ray caster of trimesh.
+        #[arg(long)]
+        models: Option<PathBuf>,
+    },
 }
 
 fn main() -> ExitCode {
@@ -95,6 +101,7 @@ fn main() -> ExitCode {
         Task::Peers(options) => peers::run(&options),
         Task::Verify { what: Some(Verify::Exact(options)), .. } => exact::run(&options),
         Task::Verify { what: Some(Verify::ShadingRate(options)), .. } => shading_rate::run(&options),
+        Task::Verify { what: Some(Verify::Python { models }), .. } => verify::python(models.as_deref()),
         Task::Verify { scenes, what: None } => verify::run(scenes),
     };
     match outcome {
