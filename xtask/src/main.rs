@@ -47,8 +47,8 @@ fn test_python() -> Outcome {
         return Ok(());
     }
     let library = if cfg!(target_os = "macos") { "lib_firstlight.dylib" } else { "lib_firstlight.so" };
-    // With the test kit beside it the library has the features that it has in the tests
-    run_command(&["build", "--package", "firstlight-python", "--package", "firstlight-testkit", "--quiet"])?;
+    // With the tests beside it, so that nothing is compiled twice
+    run_command(&["build", "--workspace", "--lib", "--bins", "--tests", "--examples", "--quiet"])?;
     let target = std::env::var_os("CARGO_TARGET_DIR").map_or_else(|| root().join("target"), Into::into);
     let (home, crates) = (target.join("python"), root().join("crates/firstlight-python"));
     let site = home.join("site/firstlight");

@@ -35,7 +35,8 @@ pub fn run() -> Result<(), Failure> {
 
 /// Those whose names hold the name of a light.
 const LIGHTS: &str = "
-Of each light, with the channels of diffuse; NAME is its name, or #3 for the third in scene order, or * for all of them, each apart:
+Of each light, with the channels of diffuse; NAME is its name, or #3 for the third in scene order,
+or * for all of them, each apart:
 light:NAME           What of the picture it sends.
 light:NAME:diffuse   What of that surfaces reflect diffusely.
 light:NAME:specular  What of that highlights make.

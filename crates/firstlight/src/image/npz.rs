@@ -17,7 +17,8 @@ pub(super) fn encode(file: &PlaneFile, receipt: &Receipt) -> Result<Vec<u8>, Ima
     archive(file, receipt).map_err(|e| ImageError::Encode { format: "NPZ", reason: e.to_string() })
 }
 
-/// An archive of files `NAME.npy`, with names as they are: `light:` is no drive. Without a clock: the same arrays give the same bytes.
+/// An archive of files `NAME.npy`, with names as they are: `light:` is no drive. Without a clock: the same arrays give
+/// the same bytes.
 fn archive(file: &PlaneFile, receipt: &Receipt) -> Result<Vec<u8>, rawzip::Error> {
     let (rows, columns) = (file.window.height, file.window.width);
     let room: usize = file.planes.iter().map(|named| named.plane.bytes()).sum();

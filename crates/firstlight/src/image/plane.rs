@@ -58,8 +58,8 @@ words! {
         /// Which object it is, in scene order: 1 for the first shape, and the lights after all shapes. Each instance of
         /// a shape is an object of its own.
         ObjectId = "object-id",
-        /// Which instance placed it, in scene order, of nested ones the outermost: 1 for the first; 0 on what no instance
-        /// placed.
+        /// Which instance placed it, in scene order, of nested ones the outermost: 1 for the first; 0 on what no
+        /// instance placed.
         InstanceId = "instance-id",
         /// Which material it has, in the order of the scene: 1 for the first; 0 on lights.
         MaterialId = "material-id",

@@ -144,8 +144,8 @@ impl RenderSettings {
         let by_light = self.buffers.iter().any(|buffer| matches!(buffer, Buffer::Light(..)));
         if by_light && scene.lights.len() > many::FEW && !self.renderer().samples_all() {
             return Err(format!(
-                "buffers: the lights of a scene are kept apart where there are up to {}, and it has {}; ask for diffuse \
-                 and specular, or have every light sampled, with --visibility traced",
+                "buffers: the lights of a scene are kept apart where there are up to {}, and it has {}; ask for \
+                 diffuse and specular, or have every light sampled, with --visibility traced",
                 many::FEW,
                 scene.lights.len()
             ));
