@@ -5,6 +5,8 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 use firstlight::{AssetError, Assets, FolderAssets};
+use pyo3::exceptions::PyOSError;
+use pyo3::prelude::*;
 
 /// Where the files of a scene come from.
 pub enum Source {
@@ -23,7 +25,22 @@ pub struct SceneFiles {
     known: Mutex<BTreeMap<String, Arc<[u8]>>>,
 }
 
+impl Source {
+    /// A folder, and those that are allowed besides.
+    pub fn folder(folder: &Path, allowed: &[PathBuf]) -> PyResult<Source> {
+        let refused = |(folder, error): (PathBuf, _)| PyOSError::new_err(format!("{}: {error}", folder.display()));
+        FolderAssets::new(folder, allowed).map(Source::Folder).map_err(refused)
+    }
+}
+
 impl SceneFiles {
+    /// Those of a folder, if one is given, and some by name.
+    pub fn given(folder: Option<PathBuf>, files: Option<BTreeMap<String, Vec<u8>>>) -> PyResult<Self> {
+        let source = folder.map_or(Ok(Source::Nothing), |folder| Source::folder(&folder, &[]))?;
+        let known = files.unwrap_or_default().into_iter().map(|(name, bytes)| (name, bytes.into())).collect();
+        Ok(SceneFiles::new(source, None, known))
+    }
+
     /// From a source, and with files that are known already.
     pub fn new(source: Source, own: Option<PathBuf>, known: BTreeMap<String, Arc<[u8]>>) -> Self {
         SceneFiles { source, own, known: Mutex::new(known) }

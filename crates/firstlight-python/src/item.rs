@@ -4,7 +4,12 @@ use firstlight::{
     CameraDesc, LightDesc, MaterialDesc, NoAssets, Parsed, RenderDesc, SceneDesc, SceneError, ShapeDesc, TextureDesc,
     TransformDesc,
 };
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
 use serde_json::{Map, Value as Json, json};
+
+use crate::error::fault;
+use crate::value::table;
 
 /// A thing of a scene.
 #[derive(Clone, Debug)]
@@ -187,4 +192,29 @@ pub fn push(desc: &mut SceneDesc, item: Item) {
         Item::Shape(shape) => desc.shapes.push(shape),
         Item::Light(light) => desc.lights.push(light),
     }
+}
+
+/// The table of keyword arguments; a transform may be a matrix.
+pub fn item_table(fields: &Bound<'_, PyDict>, path: &str) -> PyResult<Map<String, Json>> {
+    let mut table = table(fields, path)?;
+    if let Some(Json::Array(rows)) = table.get("transform") {
+        let matrix = matrix_of(rows);
+        let Some(matrix) = matrix else {
+            let message = "is neither a table nor a matrix of 3 or 4 rows of 4 numbers, the fourth of them 0, 0, 0, 1";
+            return Err(fault(fields.py(), &format!("{path}.transform"), message.into(), None));
+        };
+        table.insert("transform".into(), serde_json::json!({ "matrix": matrix }));
+    }
+    Ok(table)
+}
+
+/// The first three rows of a matrix of four, or of three.
+fn matrix_of(rows: &[Json]) -> Option<Vec<Json>> {
+    let rows: Option<Vec<&Vec<Json>>> = rows.iter().map(Json::as_array).collect();
+    let rows = rows.filter(|rows| (3..=4).contains(&rows.len()) && rows.iter().all(|row| row.len() == 4))?;
+    let is_last = |row: &Vec<Json>| row.iter().zip([0.0, 0.0, 0.0, 1.0]).all(|(n, one)| n.as_f64() == Some(one));
+    if rows.get(3).is_some_and(|row| !is_last(row)) {
+        return None;
+    }
+    Some(rows[..3].iter().flat_map(|row| row.iter().cloned()).collect())
 }

@@ -9,6 +9,7 @@ mod files;
 mod item;
 mod render;
 mod scene;
+mod state;
 mod value;
 
 use firstlight::{LightDesc, MaterialDesc, Plane, ShapeDesc, TextureDesc, builtin_scenes};

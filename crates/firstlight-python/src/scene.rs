@@ -6,12 +6,11 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 
 use firstlight::{
-    AaMode, BufferDesc, CameraDesc, CompileCache, CompileOptions, Compiled, DVec3, FolderAssets, GroupDesc,
-    InstanceDesc, MeshDesc, NoAssets, Parsed, RenderSettings, SamplesDesc, SceneDesc, SceneError as Faults, ShapeDesc,
-    Vec3, Window, WorldRay, builtin_scenes,
+    AaMode, BufferDesc, Compiled, DVec3, GroupDesc, InstanceDesc, MeshDesc, NoAssets, Parsed, RenderSettings,
+    SamplesDesc, SceneDesc, SceneError as Faults, ShapeDesc, Vec3, Window, WorldRay, builtin_scenes,
 };
 use numpy::{PyArray1, PyArrayMethods};
-use pyo3::exceptions::{PyKeyError, PyMemoryError, PyOSError, PyTypeError, PyValueError};
+use pyo3::exceptions::{PyKeyError, PyMemoryError, PyTypeError, PyValueError};
 use pyo3::intern;
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict, PyList};
@@ -20,9 +19,10 @@ use serde_json::{Map, Value as Json};
 use crate::arrays;
 use crate::error::{SceneWarning, diagnostics, fault, scene_error};
 use crate::files::{SceneFiles, Source};
-use crate::item::{Item, find, get, push, set, without_places};
+use crate::item::{Item, find, get, item_table, push, set, without_places};
 use crate::render::{PyRender, run};
-use crate::value::{table, tree};
+use crate::state::{CameraChoice, State, Wanted};
+use crate::value::tree;
 
 /// No scene text is longer, in bytes.
 const TEXT_LIMIT: u64 = 64 << 20;
@@ -31,102 +31,6 @@ const TEXT_LIMIT: u64 = 64 << 20;
 #[pyclass(subclass, frozen, module = "firstlight._firstlight", name = "SceneBase")]
 pub struct PyScene {
     state: Mutex<State>,
-}
-
-/// What changes of a scene.
-struct State {
-    parsed: Parsed,
-    files: Arc<SceneFiles>,
-    cache: CompileCache,
-    /// Counts changes.
-    changes: u64,
-    /// What was compiled last, when and how.
-    compiled: Option<(u64, Wanted, Arc<Compiled>)>,
-}
-
-/// What a call wants otherwise than the description says.
-#[derive(Clone, Debug, Default, PartialEq)]
-struct Wanted {
-    camera: Option<CameraChoice>,
-    size: [Option<u32>; 2],
-    antialiasing: Option<u32>,
-    samples: Option<SamplesDesc>,
-    tolerance: Option<f64>,
-    buffers: Option<Vec<BufferDesc>>,
-    time: f64,
-}
-
-#[derive(Clone, Debug, PartialEq)]
-enum CameraChoice {
-    Named(String),
-    Other(Box<CameraDesc>),
-}
-
-impl State {
-    fn of(parsed: Parsed, files: SceneFiles) -> Self {
-        let (files, cache) = (Arc::new(files), CompileCache::default());
-        State { parsed, files, cache, changes: 0, compiled: None }
-    }
-
-    /// The scene as it is wanted.
-    fn compile(&mut self, wanted: &Wanted) -> Result<(Arc<Compiled>, bool), Faults> {
-        if let Some((changes, how, compiled)) = &self.compiled
-            && *changes == self.changes
-            && how == wanted
-        {
-            return Ok((compiled.clone(), false));
-        }
-        // Change the description as wanted, for a while
-        let desc = &mut self.parsed.desc;
-        let before = (desc.render.clone(), desc.cameras.clone(), desc.lights.clone());
-        let render = &mut desc.render;
-        [render.width, render.height] = film_size(wanted.size, [render.width, render.height]);
-        render.antialiasing = wanted.antialiasing.unwrap_or(render.antialiasing);
-        render.tolerance = wanted.tolerance.unwrap_or(render.tolerance);
-        match &wanted.camera {
-            Some(CameraChoice::Named(name)) => render.camera = Some(name.clone()),
-            Some(CameraChoice::Other(camera)) => {
-                render.camera = None;
-                desc.cameras = vec![(String::new(), (**camera).clone())];
-            }
-            None => {}
-        }
-        if let Some(buffers) = &wanted.buffers {
-            desc.render.buffers.clone_from(buffers);
-        }
-        if let Some(samples) = wanted.samples {
-            desc.render.samples = samples;
-            desc.lights.iter_mut().for_each(|light| light.set_samples(samples));
-        }
-        let options =
-            CompileOptions { time: wanted.time, cache: Some(self.cache.clone()), ..CompileOptions::default() };
-        let compiled = self.parsed.compile(&*self.files, &options);
-        let desc = &mut self.parsed.desc;
-        (desc.render, desc.cameras, desc.lights) = before;
-        let compiled = Arc::new(compiled?);
-        self.compiled = Some((self.changes, wanted.clone(), compiled.clone()));
-        Ok((compiled, true))
-    }
-
-    /// Notes that the description is another.
-    fn change(&mut self) {
-        self.changes += 1;
-        self.compiled = None;
-    }
-}
-
-/// Columns and rows: as asked, and one alone keeps the scene's aspect ratio, to the nearest pixel.
-fn film_size(asked: [Option<u32>; 2], own: [u32; 2]) -> [u32; 2] {
-    let scaled = |n: u32, times: u32, over: u32| {
-        let (n, times, over) = (u64::from(n), u64::from(times), u64::from(over.max(1)));
-        u32::try_from(((2 * n * times + over) / (2 * over)).max(1)).unwrap_or(u32::MAX)
-    };
-    match asked {
-        [None, None] => own,
-        [Some(width), Some(height)] => [width, height],
-        [Some(width), None] => [width, scaled(width, own[1], own[0])],
-        [None, Some(height)] => [scaled(height, own[0], own[1]), height],
-    }
 }
 
 impl PyScene {
@@ -163,7 +67,7 @@ impl PyScene {
             state = made.0;
             made.1.map_err(|faults| scene_error(py, &faults))?;
             // So that they become warnings of the first call that needs them
-            state.compiled = None;
+            state.forget();
         }
         self.with(py, |own| *own = state);
         Ok(())
@@ -219,31 +123,6 @@ impl PyScene {
     }
 }
 
-/// The table of keyword arguments; a transform may be a matrix.
-fn item_table(fields: &Bound<'_, PyDict>, path: &str) -> PyResult<Map<String, Json>> {
-    let mut table = table(fields, path)?;
-    if let Some(Json::Array(rows)) = table.get("transform") {
-        let matrix = matrix_of(rows);
-        let Some(matrix) = matrix else {
-            let message = "is neither a table nor a matrix of 3 or 4 rows of 4 numbers, the fourth of them 0, 0, 0, 1";
-            return Err(fault(fields.py(), &format!("{path}.transform"), message.into(), None));
-        };
-        table.insert("transform".into(), serde_json::json!({ "matrix": matrix }));
-    }
-    Ok(table)
-}
-
-/// The first three rows of a matrix of four, or of three.
-fn matrix_of(rows: &[Json]) -> Option<Vec<Json>> {
-    let rows: Option<Vec<&Vec<Json>>> = rows.iter().map(Json::as_array).collect();
-    let rows = rows.filter(|rows| (3..=4).contains(&rows.len()) && rows.iter().all(|row| row.len() == 4))?;
-    let is_last = |row: &Vec<Json>| row.iter().zip([0.0, 0.0, 0.0, 1.0]).all(|(n, one)| n.as_f64() == Some(one));
-    if rows.get(3).is_some_and(|row| !is_last(row)) {
-        return None;
-    }
-    Some(rows[..3].iter().flat_map(|row| row.iter().cloned()).collect())
-}
-
 #[pymethods]
 impl PyScene {
     #[new]
@@ -266,9 +145,7 @@ impl PyScene {
         let text = std::fs::read(&path).map_err(refused)?;
         let folder = path.parent().unwrap_or(Path::new(""));
         let own = path.canonicalize().ok();
-        let files = FolderAssets::new(folder, &allow_dirs)
-            .map_err(|(folder, error)| PyOSError::new_err(format!("{}: {error}", folder.display())))?;
-        let files = SceneFiles::new(Source::Folder(files), own, BTreeMap::new());
+        let files = SceneFiles::new(Source::folder(folder, &allow_dirs)?, own, BTreeMap::new());
         let name = path.display().to_string();
         let parsed = py.detach(|| SceneDesc::parse(&name, &text, &files));
         self.take(py, State::of(parsed, files))
@@ -284,15 +161,7 @@ impl PyScene {
         folder: Option<PathBuf>,
         files: Option<BTreeMap<String, Vec<u8>>>,
     ) -> PyResult<()> {
-        let source = match folder {
-            None => Source::Nothing,
-            Some(folder) => Source::Folder(
-                FolderAssets::new(&folder, &[])
-                    .map_err(|(folder, error)| PyOSError::new_err(format!("{}: {error}", folder.display())))?,
-            ),
-        };
-        let known = files.unwrap_or_default().into_iter().map(|(name, bytes)| (name, bytes.into())).collect();
-        let files = SceneFiles::new(source, None, known);
+        let files = SceneFiles::given(folder, files)?;
         let parsed = py.detach(|| SceneDesc::parse(name, text.as_bytes(), &files));
         self.take(py, State::of(parsed, files))
     }
@@ -307,15 +176,7 @@ impl PyScene {
         files: Option<BTreeMap<String, Vec<u8>>>,
     ) -> PyResult<()> {
         let text = tree(scene, "")?.to_string();
-        let source = match folder {
-            None => Source::Nothing,
-            Some(folder) => Source::Folder(
-                FolderAssets::new(&folder, &[])
-                    .map_err(|(folder, error)| PyOSError::new_err(format!("{}: {error}", folder.display())))?,
-            ),
-        };
-        let known = files.unwrap_or_default().into_iter().map(|(name, bytes)| (name, bytes.into())).collect();
-        let files = SceneFiles::new(source, None, known);
+        let files = SceneFiles::given(folder, files)?;
         let parsed = py.detach(|| SceneDesc::parse("scene.json", text.as_bytes(), &files));
         if !parsed.faults().is_empty() {
             return Err(scene_error(py, &Faults { faults: without_places(parsed.faults(), "") }));

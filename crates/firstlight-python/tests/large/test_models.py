@@ -1,6 +1,6 @@
 """Depth, normals and ids of models against the ray caster of trimesh (Embree), on the same rays.
 
-`FIRSTLIGHT_MODELS` is a folder; every .ply, .obj and .stl file below it is a case.
+Every .ply, .obj and .stl file below a folder is a case: `FIRSTLIGHT_MODELS`, or the project's own test scenes.
 """
 
 import os
@@ -14,12 +14,16 @@ import firstlight as fl
 trimesh = pytest.importorskip("trimesh")
 pytest.importorskip("embreex")
 
-MODELS = os.environ.get("FIRSTLIGHT_MODELS")
-FILES = sorted(p for p in pathlib.Path(MODELS).rglob("*") if p.suffix in (".ply", ".obj", ".stl")) if MODELS else []
+OWN = pathlib.Path(__file__).parents[3] / "firstlight-testkit/tests/truth/cases"
+MODELS = pathlib.Path(os.environ.get("FIRSTLIGHT_MODELS", OWN))
+FILES = sorted(p for p in MODELS.rglob("*") if p.suffix in (".ply", ".obj", ".stl"))
 WIDTH, HEIGHT = 80, 60
 
 
-@pytest.mark.skipif(not FILES, reason="FIRSTLIGHT_MODELS names no folder with models")
+def test_there_are_models():
+    assert FILES, MODELS
+
+
 @pytest.mark.parametrize("file", FILES, ids=lambda file: file.name)
 def test_a_model_is_what_another_ray_caster_meets(file):
     try:

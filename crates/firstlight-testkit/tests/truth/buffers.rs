@@ -75,12 +75,13 @@ const SCENE: &str = r#"
     radius = 0.3
 "#;
 
-fn scene(text: &str) -> Scene {
+pub fn scene(text: &str) -> Scene {
     let parsed = SceneDesc::parse("scene.toml", text.as_bytes(), &NoAssets);
     parsed.compile(&NoAssets, &CompileOptions::default()).unwrap_or_else(|e| panic!("{e}")).scene
 }
 
-fn film(scene: &Scene, settings: &RenderSettings) -> Film {
+pub fn film(scene: &Scene, settings: &RenderSettings) -> Film {
+    settings.check(scene).unwrap_or_else(|fault| panic!("{fault}"));
     match render(scene, settings, &|_, _| ControlFlow::Continue(())) {
         ControlFlow::Continue((film, _)) => film,
         ControlFlow::Break(()) => unreachable!("nothing stops this render"),
@@ -91,10 +92,11 @@ fn of(buffers: &[Plane]) -> RenderSettings {
     RenderSettings { buffers: buffers.iter().map(|plane| (*plane).into()).collect(), ..RenderSettings::default() }
 }
 
-fn floats(film: &Film, plane: Plane) -> &[f32] {
-    match film.numbers(plane) {
+pub fn floats(film: &Film, of: impl Into<Buffer>) -> &[f32] {
+    let of = of.into();
+    match film.numbers(of) {
         Some(PlaneNumbers::Floats(numbers)) => numbers,
-        other => panic!("{plane:?}: {other:?}"),
+        other => panic!("{of:?}: {other:?}"),
     }
 }
 

@@ -1,26 +1,10 @@
 //! The terms of a picture: kept apart, they add up to it, bit for bit.
 
-use std::ops::ControlFlow;
-
 use firstlight::*;
 
+use crate::buffers::{film, floats, scene as compiled};
 use crate::exact_scenes;
 use crate::scenes::times;
-
-fn film(scene: &Scene, settings: &RenderSettings) -> Film {
-    settings.check(scene).unwrap_or_else(|fault| panic!("{fault}"));
-    match render(scene, settings, &|_, _| ControlFlow::Continue(())) {
-        ControlFlow::Continue((film, _)) => film,
-        ControlFlow::Break(()) => unreachable!("nothing stops this render"),
-    }
-}
-
-fn floats(film: &Film, of: impl Into<Buffer>) -> &[f32] {
-    match film.numbers(of) {
-        Some(PlaneNumbers::Floats(numbers)) => numbers,
-        other => panic!("{other:?}"),
-    }
-}
 
 /// By default, each ray by itself, traced, and the plain renderer.
 fn rules() -> [RenderSettings; 4] {
@@ -64,7 +48,7 @@ fn add_up(name: &str, scene: &Scene, rules: &RenderSettings) -> Film {
         }
     }
     // The picture knows nothing of them
-    let alone = self::film(scene, rules);
+    let alone = crate::buffers::film(scene, rules);
     let bits = |film: &Film| floats(film, Plane::Color).iter().map(|v| v.to_bits()).collect::<Vec<_>>();
     assert!(bits(&film) == bits(&alone), "{name}");
     film
@@ -121,11 +105,6 @@ const SCENE: &str = r#"
     radius = 0.3
     strength = 2
 "#;
-
-fn compiled(text: &str) -> Scene {
-    let parsed = SceneDesc::parse("scene.toml", text.as_bytes(), &NoAssets);
-    parsed.compile(&NoAssets, &CompileOptions::default()).unwrap_or_else(|e| panic!("{e}")).scene
-}
 
 #[test]
 fn each_term_is_the_picture_of_a_scene_with_nothing_else() {
