@@ -36,8 +36,12 @@ pub fn run() -> Result<(), Failure> {
 /// Those whose names hold the name of a light.
 const LIGHTS: &str = "
 Of each light, with the channels of diffuse; NAME is its name, or #3 for the third in scene order,
-or * for all of them, each apart:
-light:NAME           What of the picture it sends.
-light:NAME:diffuse   What of that surfaces reflect diffusely.
-light:NAME:specular  What of that highlights make.
+or * for all of them, each apart; group:NAME is the same of a group of lights:
+light:NAME                    What of the picture it sends.
+light:NAME:diffuse            What of that surfaces reflect diffusely.
+light:NAME:specular           What of that highlights make.
+light:NAME:unshadowed         What it would send if nothing cast shadows.
+light:NAME:visibility         The share of that which arrives, 0 to 1, as shadow.
+light:NAME:unscaled-diffuse   What it sends before its own colour and strength; not of groups.
+light:NAME:unscaled-specular  The same of highlights.
 ";

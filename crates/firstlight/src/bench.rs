@@ -392,7 +392,7 @@ pub fn pixel(scene: &Scene, at: [u32; 2], choose: &mut ChoosePoints) -> [f32; 4]
     let hit = |_, _, ray: &Ray| scene.intersect_local(ray);
     let go_on = || ControlFlow::Continue(());
     let _ = sum.sample(scene, at, &mut Given::new(choose), hit, &mut Counts::default(), &go_on);
-    let mut sums = TermSums::new(1, &[]);
+    let mut sums = TermSums::new(scene, 1, &[]);
     sum.resolve(scene, 0, &mut sums);
     sums.colors[0]
 }

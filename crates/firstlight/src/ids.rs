@@ -25,6 +25,10 @@ id!(
     LightId
 );
 id!(
+    /// A group of lights, in the order of their first lights.
+    LightGroupId
+);
+id!(
     /// A material of the scene.
     MaterialId
 );

@@ -81,7 +81,7 @@ pub use color::{Display, Encoding, Rgb};
 pub use context::{AssetError, Assets, CompileStage, FolderAssets, MemoryAssets, NoAssets, OnCompile};
 pub use describe::{ColorDesc, ColorParam, FilePath, NumberParam, ParamDesc, SamplesDesc, ScaleDesc};
 pub use error::{Diagnostic, Place, SceneError, Severity, printable};
-pub use ids::{LightId, MaterialId, SurfaceId, TextureId};
+pub use ids::{LightGroupId, LightId, MaterialId, SurfaceId, TextureId};
 pub use image::{
     Buffer, BufferDesc, Format, Image, ImageError, LightChoice, LightPart, NamedPlane, PendingFile, Plane,
     PlaneNumbers, PlaneVec, Receipt, Sampling, StagedFile, StoredImage, Window, Written, encode_planes, is_decoding,

@@ -93,8 +93,11 @@ fn buffer() -> impl Strategy<Value = BufferDesc> {
         (1..=u32::MAX).prop_map(LightChoice::Number),
         "[a-z ]{1,8}".prop_map(LightChoice::Name)
     ];
-    let of_light = (light, maybe(select(LightPart::ALL))).prop_map(|(light, part)| BufferDesc::Light { light, part });
-    prop_oneof![select(Plane::ALL).prop_map(BufferDesc::Plane), of_light]
+    let of_light =
+        (light.clone(), maybe(select(LightPart::ALL))).prop_map(|(light, part)| BufferDesc::Light { light, part });
+    let of_groups = [LightPart::Diffuse, LightPart::Specular, LightPart::Unshadowed, LightPart::Visibility];
+    let of_group = (light, maybe(select(&of_groups[..]))).prop_map(|(group, part)| BufferDesc::Group { group, part });
+    prop_oneof![select(Plane::ALL).prop_map(BufferDesc::Plane), of_light, of_group]
 }
 
 prop_compose! {

@@ -150,12 +150,179 @@ fn many_lights_are_told_together() {
             assert!((sum - color).abs() <= 8.0 * f32::EPSILON * terms.into_iter().fold(0.0, f32::max), "{sum} {color}");
         }
     }
-    // Each by itself only where every light is sampled
-    let asked = RenderSettings { buffers: vec![Buffer::Light(LightId(3), None)], ..RenderSettings::default() };
-    assert!(asked.check(&scene).unwrap_err().contains("up to 16, and it has 22"));
     add_up("traced", &scene, &RenderSettings { visibility: VisibilityMode::Traced, ..RenderSettings::default() });
-    let unknown = RenderSettings { buffers: vec![Buffer::Light(LightId(22), None)], ..asked };
+    let unknown = RenderSettings { buffers: vec![Buffer::Light(LightId(22), None)], ..RenderSettings::default() };
     assert!(unknown.check(&scene).unwrap_err().contains("there is no light #23: the scene has 22"));
+}
+
+/// The film of a scene with some buffers, by the default settings.
+fn film_of(scene: &Scene, buffers: Vec<Buffer>) -> Film {
+    film(scene, &RenderSettings { buffers, ..RenderSettings::default() })
+}
+
+/// Sees that the background, emission, ambient light, some buffers and the rest are the picture, but for the rounding
+/// of the rest.
+fn is_closed(film: &Film, terms: &[Buffer]) {
+    let first = [Plane::Background, Plane::Emission, Plane::Ambient].map(Buffer::from);
+    let all: Vec<Buffer> = first.into_iter().chain(terms.iter().copied()).chain([Plane::Rest.into()]).collect();
+    for (pixel, color) in floats(film, Plane::Color).chunks(4).enumerate() {
+        for (channel, color) in color[..3].iter().enumerate() {
+            let sum = all.iter().fold(0.0f32, |sum, term| sum + floats(film, *term)[3 * pixel + channel]);
+            let near = [color.next_down(), *color, color.next_up()];
+            assert!(near.contains(&sum), "pixel {pixel}, channel {channel}: {sum} {color}");
+        }
+    }
+}
+
+#[test]
+fn what_is_not_kept_apart_is_the_rest() {
+    let lamps = |count: u32, more: &str| -> String {
+        let at = |i: u32| [f64::from(i % 40) * 0.15 - 3.0, 2.0 + f64::from(i / 40) * 0.1, 3.0];
+        (0..count)
+            .map(|i| {
+                format!("[[light.point]]\nposition = {:?}\nstrength = {}\n{more}\n", at(i), 6.0 / f64::from(count))
+            })
+            .collect()
+    };
+    let base = [Plane::Color, Plane::Background, Plane::Emission, Plane::Ambient, Plane::Rest].map(Buffer::from);
+    for count in [0, 20, 1100] {
+        let scene = compiled(&format!("{SCENE}{}", lamps(count, "group = \"lamps\"")));
+        // Point lights come first
+        let apart: &[u32] = if count == 0 { &[0] } else { &[0, count] };
+        let some: Vec<Buffer> = apart.iter().flat_map(|light| parts_of(*light as usize + 1).pop().unwrap()).collect();
+        let film = film_of(&scene, base.iter().chain(&some).copied().collect());
+        let parts: Vec<Buffer> =
+            some.iter().filter(|buffer| !matches!(buffer, Buffer::Light(_, None))).copied().collect();
+        is_closed(&film, &parts);
+        let alone = film_of(&scene, vec![Plane::Color.into()]);
+        assert!(floats(&film, Plane::Color) == floats(&alone, Plane::Color), "{count}");
+        if count == 0 {
+            continue;
+        }
+        // A lamp kept apart is what it sends by itself
+        let single = scene_with_one_lamp(&scene, &lamps(count, ""));
+        let of_one = film_of(&single, vec![Buffer::Light(LightId(0), None)]);
+        let (one, all) =
+            (floats(&of_one, Buffer::Light(LightId(0), None)), floats(&film, Buffer::Light(LightId(0), None)));
+        let worst = one.iter().zip(all).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
+        assert!(worst < 2e-3 && one.iter().any(|v| *v > 4.0 * worst), "{count}: {worst}");
+        // A group
+        let group = Buffer::Group(LightGroupId(0), None);
+        let film = film_of(&scene, base.iter().copied().chain([group]).collect());
+        is_closed(&film, &[group]);
+        assert_eq!(scene.buffer_name(group), "group:lamps");
+        let (lamps, rest) = (floats(&film, group), floats(&film, Plane::Rest));
+        let [lamps, rest] = [lamps, rest].map(|plane| plane.iter().map(|v| f64::from(*v)).sum::<f64>());
+        assert!(lamps > 1.0 && rest > 1.0, "{lamps} {rest}");
+    }
+}
+
+/// The scene with the first of its lamps alone.
+fn scene_with_one_lamp(scene: &Scene, lamps: &str) -> Scene {
+    let first = lamps.split("[[").nth(1).unwrap();
+    let one = compiled(&format!(
+        "{}\n[[{first}",
+        SCENE.replace("strength = 3", "strength = 0").replace("strength = 2", "strength = 0")
+    ));
+    assert_eq!(one.width(), scene.width());
+    one
+}
+
+#[test]
+fn shadows_are_told_from_what_casts_none() {
+    let light = |part: Option<LightPart>| Buffer::Light(LightId(0), part);
+    let text = |shadows: bool| {
+        format!(
+            r#"
+            [render]
+            width = 40
+            height = 32
+            antialiasing = 2
+            [camera]
+            position = [0, 3, 6]
+            [material.phong.shiny]
+            diffuse = 0.5
+            specular = 0.3
+            shininess = 10
+            [[sphere]]
+            center = [0, 0.5, 0]
+            radius = 0.7
+            material = "shiny"
+            [[rectangle]]
+            center = [0, -0.5, 0]
+            size = [8, 8]
+            normal = [0, 1, 0]
+            material = "shiny"
+            [[light.point]]
+            position = [1, 4, 1]
+            strength = 10
+            shadows = {shadows}
+            [[light.sphere]]
+            center = [-2, 4, 1]
+            radius = 0.5
+            strength = 4
+            shadows = {shadows}
+            "#
+        )
+    };
+    let [scene, open] = [true, false].map(|shadows| compiled(&text(shadows)));
+    for rules in rules() {
+        let buffers = vec![
+            Plane::Shadow.into(),
+            light(Some(LightPart::Visibility)),
+            light(Some(LightPart::Unshadowed)),
+            light(None),
+            Plane::Color.into(),
+            Plane::Diffuse.into(),
+            Plane::Specular.into(),
+        ];
+        let film = film(&scene, &RenderSettings { buffers: buffers.clone(), ..rules.clone() });
+        assert_eq!(film.planes().collect::<Vec<_>>(), buffers);
+        let alone = crate::buffers::film(&scene, &rules);
+        assert!(floats(&film, Plane::Color) == floats(&alone, Plane::Color));
+        let all = vec![light(None), Plane::Diffuse.into(), Plane::Specular.into()];
+        let without = crate::buffers::film(&open, &RenderSettings { buffers: all, ..rules.clone() });
+        assert!(floats(&film, light(Some(LightPart::Unshadowed))) == floats(&without, light(None)));
+        let [shadow, visibility] = [Plane::Shadow.into(), light(Some(LightPart::Visibility))].map(|b| floats(&film, b));
+        // What all lights send, of which that which is seen of them is none
+        let all = |film: &Film, pixel: usize| {
+            let parts = [Plane::Diffuse, Plane::Specular].map(|plane| floats(film, plane));
+            parts.iter().flat_map(|part| &part[3 * pixel..3 * pixel + 3]).sum::<f32>()
+        };
+        let (mut dark, mut bright) = (0, 0);
+        for pixel in 0..shadow.len() {
+            let of = |film: &Film| floats(film, light(None))[3 * pixel..3 * pixel + 3].iter().sum::<f32>();
+            if of(&without) > 0.0 {
+                assert!((visibility[pixel] - (of(&film) / of(&without)).min(1.0)).abs() < 1e-5, "pixel {pixel}");
+                dark += usize::from(visibility[pixel] == 0.0);
+                bright += usize::from(visibility[pixel] == 1.0);
+            } else {
+                assert_eq!(visibility[pixel], 0.0);
+            }
+            let arriving = all(&without, pixel);
+            let share = if arriving > 0.0 { (all(&film, pixel) / arriving).min(1.0) } else { 0.0 };
+            assert!((shadow[pixel] - share).abs() < 1e-5, "pixel {pixel}: {} {share}", shadow[pixel]);
+        }
+        assert!(dark > 10 && bright > 300, "{dark} {bright}");
+    }
+}
+
+#[test]
+fn scales_are_left_out_where_that_is_asked_for() {
+    let parts = |part| Buffer::Light(LightId(0), Some(part));
+    let all = [LightPart::Diffuse, LightPart::Specular, LightPart::UnscaledDiffuse, LightPart::UnscaledSpecular];
+    let [weak, strong] = ["strength = 3", "strength = 6"].map(|strength| {
+        let scene = compiled(&SCENE.replace("strength = 3", &format!("{strength}\nsamples = 9")));
+        let settings =
+            RenderSettings { aa_mode: AaMode::Full, buffers: all.map(parts).to_vec(), ..RenderSettings::default() };
+        film(&scene, &settings)
+    });
+    for [scaled, unscaled] in [[all[0], all[2]], [all[1], all[3]]] {
+        let of = |film| (floats(film, parts(scaled)), floats(film, parts(unscaled)));
+        let ((a, a_unscaled), (b, b_unscaled)) = (of(&weak), of(&strong));
+        assert!(a_unscaled == b_unscaled && a_unscaled.iter().any(|v| *v > 0.0));
+        assert!(a.iter().zip(b).all(|(a, b)| 2.0 * a == *b));
+    }
 }
 
 #[test]
@@ -185,6 +352,8 @@ fn lights_are_asked_for_by_name_by_number_and_all() {
         ("[\"light:*\", \"light:key\"]", "", "render.buffers[1]: \"light:key\" is given twice"),
         ("[\"light:\"]", "", "\"light:\" names no light"),
         ("[\"lihgt:key\"]", "", "is not \"color\""),
+        ("[\"group:key\"]", "", "no group of lights is called \"key\"; the scene has none"),
+        ("[\"group:#2\"]", &format!("{twin}group = \"a\"\n"), "there is no group of lights #2: the scene has 1"),
     ] {
         let said = asked(buffers, more).unwrap_err();
         assert!(said.contains(fault), "{said}");

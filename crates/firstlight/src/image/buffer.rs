@@ -6,15 +6,39 @@ use super::Plane;
 use crate::describe::node::{Data, Node, quoted};
 use crate::describe::read::Reader;
 use crate::describe::{Choice, TextValue, Value, Words, nearest, words};
-use crate::ids::LightId;
+use crate::ids::{LightGroupId, LightId};
 
 words! {
-    /// A part of what a light sends, as the picture shows it.
+    /// A part of what a light sends, as the picture shows it, or what becomes of it.
     pub enum LightPart {
         /// What the diffuse reflection of surfaces makes of it.
         Diffuse = "diffuse",
         /// What highlights make of it.
         Specular = "specular",
+        /// What it would send if nothing cast shadows.
+        Unshadowed = "unshadowed",
+        /// The share of that which arrives, 0 to 1; 0 where nothing would.
+        Visibility = "visibility",
+        /// What the diffuse reflection makes of it before the light's own scale, its colour and strength.
+        UnscaledDiffuse = "unscaled-diffuse",
+        /// What highlights make of it before that.
+        UnscaledSpecular = "unscaled-specular",
+    }
+}
+
+impl LightPart {
+    /// Of parts that are of one moment of the light: which.
+    pub(crate) fn moment(self) -> Option<usize> {
+        match self {
+            LightPart::Diffuse | LightPart::UnscaledDiffuse => Some(0),
+            LightPart::Specular | LightPart::UnscaledSpecular => Some(1),
+            LightPart::Unshadowed | LightPart::Visibility => None,
+        }
+    }
+
+    /// Whether the light's scale is left out.
+    pub(crate) fn is_unscaled(self) -> bool {
+        matches!(self, LightPart::UnscaledDiffuse | LightPart::UnscaledSpecular)
     }
 }
 
@@ -25,11 +49,13 @@ pub enum Buffer {
     Plane(Plane),
     /// What of the picture one light sends, its own sight left out: all of it or a part.
     Light(LightId, Option<LightPart>),
+    /// The same of a group of lights.
+    Group(LightGroupId, Option<LightPart>),
 }
 
 /// A buffer as a scene may ask for it: the name of a [`Plane`]; or `light:NAME`, what one light sends, with `light:#3`
-/// for the third in scene order and `light:*` for all of them, each apart. `light:NAME:diffuse` and
-/// `light:NAME:specular` are its parts, see [`LightPart`].
+/// for the third in scene order and `light:*` for all of them, each apart. `light:NAME:diffuse` is a part of it, see
+/// [`LightPart`]. `group:NAME` is what the lights of a group send together.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum BufferDesc {
     /// One that every scene has.
@@ -41,9 +67,16 @@ pub enum BufferDesc {
         /// Which part of it; `None` for all.
         part: Option<LightPart>,
     },
+    /// What of it a group of lights sends.
+    Group {
+        /// Which group.
+        group: LightChoice,
+        /// Which part of it; `None` for all.
+        part: Option<LightPart>,
+    },
 }
 
-/// Which of a scene's lights.
+/// Which of a scene's lights, or of their groups.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum LightChoice {
     /// Each of them.
@@ -59,8 +92,36 @@ impl Buffer {
     pub fn plane(self) -> Plane {
         match self {
             Buffer::Plane(plane) => plane,
-            Buffer::Light(_, Some(LightPart::Specular)) => Plane::Specular,
-            Buffer::Light(..) => Plane::Diffuse,
+            Buffer::Light(_, part) | Buffer::Group(_, part) => match part {
+                Some(LightPart::Specular | LightPart::UnscaledSpecular) => Plane::Specular,
+                Some(LightPart::Visibility) => Plane::Shadow,
+                _ => Plane::Diffuse,
+            },
+        }
+    }
+
+    /// Which part it is of what lights send.
+    pub(crate) fn part(self) -> Option<LightPart> {
+        match self {
+            Buffer::Plane(_) => None,
+            Buffer::Light(_, part) | Buffer::Group(_, part) => part,
+        }
+    }
+
+    /// Another part of the same; planes have none.
+    pub(crate) fn with_part(self, part: Option<LightPart>) -> Buffer {
+        match self {
+            Buffer::Plane(_) => self,
+            Buffer::Light(light, _) => Buffer::Light(light, part),
+            Buffer::Group(group, _) => Buffer::Group(group, part),
+        }
+    }
+
+    /// Whether it is the sum of some of the terms of `color`.
+    pub(crate) fn is_of_terms(self) -> bool {
+        match self {
+            Buffer::Plane(plane) => plane.is_of_terms(),
+            Buffer::Light(_, part) | Buffer::Group(_, part) => part.is_none_or(|part| part.moment().is_some()),
         }
     }
 }
@@ -77,8 +138,9 @@ impl From<Plane> for BufferDesc {
     }
 }
 
-/// What the names of buffers of lights begin with.
+/// What the names of buffers of lights begin with, and of groups of them.
 const LIGHT: &str = "light:";
+const GROUP: &str = "group:";
 
 impl BufferDesc {
     /// The buffer of that name; `Err` says what is wrong with the name, and a hint.
@@ -89,42 +151,53 @@ impl BufferDesc {
         if let Some(plane) = Plane::from_name(name) {
             return Ok(BufferDesc::Plane(plane));
         }
-        let Some(light) = name.strip_prefix(LIGHT) else {
+        let of_light = name.strip_prefix(LIGHT);
+        let Some(chosen) = of_light.or(name.strip_prefix(GROUP)) else {
             let known: Vec<&str> = Plane::CHOICES.iter().map(|choice| choice.word).collect();
             let hint = nearest(name, &known).map(|near| format!("did you mean \"{near}\"?"));
             return Err((format!("{} is not {}", quoted(name), Self::words()), hint));
         };
-        let of_part = |part: &LightPart| Some((light.strip_suffix(part.name())?.strip_suffix(':')?, Some(*part)));
-        let (light, part) = LightPart::ALL.iter().find_map(of_part).unwrap_or((light, None));
-        let light = match light.strip_prefix('#').map(str::parse) {
-            _ if light.is_empty() => return Err((format!("{} names no light", quoted(name)), None)),
-            _ if light == "*" => LightChoice::All,
+        let of_part = |part: &LightPart| Some((chosen.strip_suffix(part.name())?.strip_suffix(':')?, Some(*part)));
+        let (chosen, part) = LightPart::ALL.iter().find_map(of_part).unwrap_or((chosen, None));
+        let choice = match chosen.strip_prefix('#').map(str::parse) {
+            _ if chosen.is_empty() => {
+                let kind = if of_light.is_some() { "light" } else { "group of lights" };
+                return Err((format!("{} names no {kind}", quoted(name)), None));
+            }
+            _ if chosen == "*" => LightChoice::All,
             Some(Ok(number)) if number > 0 => LightChoice::Number(number),
-            _ => LightChoice::Name(light.to_owned()),
+            _ => LightChoice::Name(chosen.to_owned()),
         };
-        Ok(BufferDesc::Light { light, part })
+        match (of_light, part) {
+            (Some(_), part) => Ok(BufferDesc::Light { light: choice, part }),
+            (None, Some(part)) if part.is_unscaled() => {
+                let hint = "each light has a scale of its own: ask for them one by one, with light:NAME".to_owned();
+                Err((format!("{} is not a part of a group of lights", quoted(part.name())), Some(hint)))
+            }
+            (None, part) => Ok(BufferDesc::Group { group: choice, part }),
+        }
     }
 
     /// Its name, as a scene says it.
     pub fn name(&self) -> String {
-        match self {
-            BufferDesc::Plane(plane) => plane.name().to_owned(),
-            BufferDesc::Light { light, part } => {
-                let light = match light {
-                    LightChoice::All => "*".to_owned(),
-                    LightChoice::Number(number) => format!("#{number}"),
-                    LightChoice::Name(name) => name.clone(),
-                };
-                let part = part.map(|part| format!(":{}", part.name())).unwrap_or_default();
-                format!("{LIGHT}{light}{part}")
-            }
-        }
+        let (prefix, choice, part) = match self {
+            BufferDesc::Plane(plane) => return plane.name().to_owned(),
+            BufferDesc::Light { light, part } => (LIGHT, light, part),
+            BufferDesc::Group { group, part } => (GROUP, group, part),
+        };
+        let choice = match choice {
+            LightChoice::All => "*".to_owned(),
+            LightChoice::Number(number) => format!("#{number}"),
+            LightChoice::Name(name) => name.clone(),
+        };
+        let part = part.map(|part| format!(":{}", part.name())).unwrap_or_default();
+        format!("{prefix}{choice}{part}")
     }
 }
 
 impl Value for BufferDesc {
     fn words() -> String {
-        format!("{}, or \"{LIGHT}NAME\"", Plane::words().replace(" or ", ", "))
+        format!("{}, \"{LIGHT}NAME\" or \"{GROUP}NAME\"", Plane::words().replace(" or ", ", "))
     }
 
     fn plural() -> String {
@@ -132,7 +205,7 @@ impl Value for BufferDesc {
     }
 
     fn schema() -> Json {
-        json!({ "anyOf": [Plane::schema(), { "type": "string", "pattern": format!("^{LIGHT}.+$") }] })
+        json!({ "anyOf": [Plane::schema(), { "type": "string", "pattern": format!("^({LIGHT}|{GROUP}).+$") }] })
     }
 
     fn choices() -> &'static [Choice] {
@@ -173,6 +246,9 @@ mod tests {
             ("depth", BufferDesc::Plane(Plane::Depth)),
             ("light:*", light(LightChoice::All, None)),
             ("light:#12:specular", light(LightChoice::Number(12), Some(LightPart::Specular))),
+            ("light:key:unscaled-diffuse", light(LightChoice::Name("key".into()), Some(LightPart::UnscaledDiffuse))),
+            ("group:*:visibility", BufferDesc::Group { group: LightChoice::All, part: Some(LightPart::Visibility) }),
+            ("group:sky", BufferDesc::Group { group: LightChoice::Name("sky".into()), part: None }),
             ("light:a:b", light(LightChoice::Name("a:b".into()), None)),
             ("light:a:b:diffuse", light(LightChoice::Name("a:b".into()), Some(LightPart::Diffuse))),
             ("light:#x", light(LightChoice::Name("#x".into()), None)),
@@ -184,6 +260,8 @@ mod tests {
         for (name, fault) in [
             ("light:", "names no light"),
             ("light::diffuse", "names no light"),
+            ("group:", "names no group of lights"),
+            ("group:sky:unscaled-specular", "is not a part of a group of lights"),
             ("dept", "is not \"color\""),
             ("", "is not \"color\""),
         ] {

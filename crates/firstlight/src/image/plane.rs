@@ -7,7 +7,8 @@ use crate::parallel;
 words! {
     /// A buffer: what a plane of the film says of each pixel.
     ///
-    /// `color`, `alpha` and the terms that `color` is the sum of, `background` to `specular`, are means over the pixel.
+    /// `color`, `alpha` and the terms that `color` is the sum of, `background` to `rest`, are means over the pixel, and
+    /// so is `shadow`.
     /// All others are of its centre ray, and never averaged: what it meets first, a shape or a visible light, as the
     /// camera sees it. Where it meets nothing, `depth` and `distance` are infinite and all others 0.
     pub enum Plane {
@@ -25,6 +26,12 @@ words! {
         Diffuse = "diffuse",
         /// What of it lights send by highlights, of all lights together.
         Specular = "specular",
+        /// What of it lights send that are not kept apart: `color` without `background`, `emission`, `ambient` and the
+        /// lights, or else groups of lights, that are asked for beside it. Added to those it is `color`, to the last bit but one.
+        Rest = "rest",
+        /// Of what all lights together would send if nothing cast shadows, the share that arrives, 0 to 1; 0 where
+        /// nothing would.
+        Shadow = "shadow",
         /// How far away it is along the line of sight of the camera, as in a depth map: from the eye's plane, or the
         /// film of an orthographic camera.
         Depth = "depth",
@@ -100,7 +107,8 @@ impl Plane {
         match self {
             Color => &["R", "G", "B", "A"],
             Alpha => &["A"],
-            Background | Emission | Ambient | Diffuse | Specular | Albedo => &["R", "G", "B"],
+            Background | Emission | Ambient | Diffuse | Specular | Rest | Albedo => &["R", "G", "B"],
+            Shadow => &["Y"],
             Depth | Distance => &["Z"],
             Position | PositionCamera | PositionObject => &["X", "Y", "Z"],
             Normal | NormalCamera | NormalObject | NormalGeometric | NormalGeometricCamera | Tangent => {
@@ -127,7 +135,7 @@ impl Plane {
     pub fn unit(self) -> &'static str {
         use Plane::*;
         match self {
-            Color | Background | Emission | Ambient | Diffuse | Specular => "linear Rec. 709, premultiplied",
+            Color | Background | Emission | Ambient | Diffuse | Specular | Rest => "linear Rec. 709, premultiplied",
             Albedo => "linear Rec. 709",
             Depth | Distance | Position | PositionCamera | PositionObject => "m",
             Rays => "rays",
@@ -150,7 +158,7 @@ impl Plane {
     /// How a pixel of it comes about.
     pub fn sampling(self) -> Sampling {
         match self {
-            Plane::Color | Plane::Alpha => Sampling::Filtered,
+            Plane::Color | Plane::Alpha | Plane::Rest | Plane::Shadow => Sampling::Filtered,
             plane if plane.is_of_terms() => Sampling::Filtered,
             Plane::Rays => Sampling::Counted,
             _ => Sampling::Center,

@@ -31,6 +31,8 @@ macro_rules! area_table {
             pub struct $name {
                 /// What reports call it.
                 pub name: Option<String> = None,
+                /// The group of lights that it belongs to, for buffers: `group:NAME`.
+                pub group: Option<String> = None,
                 $($own)*
                 /// Linear colour; channels of 0 or more.
                 pub color: $crate::describe::ColorDesc = $crate::describe::ColorDesc::WHITE,

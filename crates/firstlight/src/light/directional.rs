@@ -20,6 +20,8 @@ table! {
     pub struct DirectionalDesc {
         /// What reports call it.
         pub name: Option<String> = None,
+        /// The group of lights that it belongs to, for buffers: `group:NAME`.
+        pub group: Option<String> = None,
         /// The way the light travels, of any length above 1e-9.
         pub direction: [f64; 3],
         /// Where it is moved; it turns `direction`.

@@ -91,6 +91,18 @@ impl LightDesc {
         }
     }
 
+    /// The group of lights that it belongs to, if any.
+    pub fn group(&self) -> Option<&str> {
+        match self {
+            LightDesc::Point(light) => light.group.as_deref(),
+            LightDesc::Directional(light) => light.group.as_deref(),
+            LightDesc::Spot(light) => light.group.as_deref(),
+            LightDesc::Rectangle(light) => light.group.as_deref(),
+            LightDesc::Disk(light) => light.group.as_deref(),
+            LightDesc::Sphere(light) => light.group.as_deref(),
+        }
+    }
+
     /// How an area light is sampled: its own `samples`, if it says any, and how the points are laid out. `None` for a
     /// light without an area.
     pub fn samples(&self) -> Option<(Option<SamplesDesc>, SampleSet)> {

@@ -20,6 +20,8 @@ table! {
     pub struct PointDesc {
         /// What reports call it.
         pub name: Option<String> = None,
+        /// The group of lights that it belongs to, for buffers: `group:NAME`.
+        pub group: Option<String> = None,
         /// In metres, world space.
         pub position: [f64; 3],
         /// Where it is moved; it moves `position`.

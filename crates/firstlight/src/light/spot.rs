@@ -26,6 +26,8 @@ table! {
     pub struct SpotDesc {
         /// What reports call it.
         pub name: Option<String> = None,
+        /// The group of lights that it belongs to, for buffers: `group:NAME`.
+        pub group: Option<String> = None,
         /// In metres, world space.
         pub position: [f64; 3],
         /// The point at the middle of the cone; not `position` itself.

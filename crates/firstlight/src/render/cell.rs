@@ -131,7 +131,7 @@ impl<'a> Cells<'a> {
     pub fn new(scene: &'a Scene, mode: AaMode, lights: LightQueue<'a>, buffers: &[Buffer]) -> Self {
         let pixel_rays = PixelRays::new(lights.arrivals.level(), scene.antialiasing);
         let hits = PixelHits::new(lights.arrivals.level(), scene.antialiasing);
-        let many = lights.arrivals.tree().map(|tree| Many::new(scene, tree));
+        let many = lights.arrivals.tree().map(|tree| Many::new(scene, tree, buffers));
         let few = if many.is_some() { 0 } else { scene.lights.len() };
         Cells {
             scene,
@@ -141,7 +141,7 @@ impl<'a> Cells<'a> {
             near: Default::default(),
             corner: [0; 2],
             states: vec![PixelState::Done; PIXELS],
-            sums: TermSums::new(PIXELS, buffers),
+            sums: TermSums::new(scene, PIXELS, buffers),
             blocks: Vec::new(),
             patchwork: Vec::new(),
             pixels: Vec::new(),
@@ -242,9 +242,10 @@ impl<'a> Cells<'a> {
         }
         let pixel = |fragment: usize| &pixels[fragments.all[fragment].pixel as usize];
         many.begin(fragments, size, |fragment| pixel(fragment).index);
-        many.light(fragments, &mut lights.arrivals, counts, go_on, |fragment, sent, took| {
+        many.light(fragments, &mut lights.arrivals, counts, go_on, |fragment, [sent, apart], took| {
             let Pixel { index, terms } = *pixel(fragment);
             terms.resolve(scene, sent.iter().copied(), index as usize, sums);
+            PixelTerms::keep(scene, apart, index as usize, sums);
             sums.work[index as usize] += took;
         })
     }
@@ -308,14 +309,15 @@ impl<'a> Cells<'a> {
             let first = self.index([x, j]);
             let mut told = [true; CELL as usize];
             self.sums.begin(first..first + columns, Rgb::BLACK, 1.0);
-            self.sums.add(first, Term::Ambient, iter::repeat_n(scene.ambient * block.bsdf.ambient, columns));
+            let ambient = iter::repeat_n(scene.ambient * block.bsdf.ambient, columns);
+            self.sums.add(first, Term::Ambient, Rgb::WHITE, ambient);
             for light in 0..scene.lights.len() {
                 let scale = self.lights.arrivals.scale(light);
                 let row = self.grid.row(light, [x, j], columns);
                 told.iter_mut().zip(row).for_each(|(told, arrived)| *told &= arrived.is_known());
                 for moment in 0..MOMENTS {
-                    let part = |arrived: &Moments| scale * block.bsdf.colors.each(arrived).0[moment];
-                    self.sums.add(first, Term::Light(Some(light as u32), moment), row.iter().map(part));
+                    let part = |arrived: &Moments| block.bsdf.colors.each(arrived).0[moment];
+                    self.sums.add(first, Term::Light(Some(light as u32), moment), scale, row.iter().map(part));
                 }
             }
             for k in (0..columns).filter(|k| told[*k]) {
@@ -333,13 +335,13 @@ impl<'a> Cells<'a> {
         let (bsdf, contrast) = self.patchwork[first + ((at[1] - y) * side + at[0] - x) as usize];
         let Some(bsdf) = bsdf else { return false };
         self.sums.begin(index..index + 1, Rgb::BLACK, 1.0);
-        self.sums.add(index, Term::Ambient, iter::once(scene.ambient * bsdf.ambient));
+        self.sums.add(index, Term::Ambient, Rgb::WHITE, iter::once(scene.ambient * bsdf.ambient));
         let mut slopes = Rgb::BLACK;
         for light in 0..scene.lights.len() {
             let Some(arrived) = self.grid.arrived(light, at) else { return false };
             let scale = self.lights.arrivals.scale(light);
             for (moment, part) in bsdf.colors.each(&arrived).0.into_iter().enumerate() {
-                self.sums.add(index, Term::Light(Some(light as u32), moment), iter::once(scale * part));
+                self.sums.add(index, Term::Light(Some(light as u32), moment), scale, iter::once(part));
             }
             if contrast != Contrast::default() {
                 let Some(slope) = self.grid.slope(light, at, square) else { return false };

@@ -101,6 +101,25 @@ impl Film {
         Film { size: [scene.width, scene.height], window, planes: empty(planes, pixels), names }
     }
 
+    /// Adds a plane, whose numbers are floats.
+    pub(super) fn add(&mut self, scene: &Scene, buffer: Buffer, numbers: &[f32]) {
+        let values = match buffer.plane().channels().len() {
+            1 => Values::One(numbers.to_vec()),
+            _ => Values::Three(numbers.as_chunks().0.to_vec()),
+        };
+        self.planes.push((buffer, values));
+        self.names.push(scene.buffer_name(buffer));
+    }
+
+    /// Leaves those planes alone, in their order.
+    pub(super) fn keep(&mut self, buffers: &[Buffer]) {
+        let place = |of: Buffer| buffers.iter().position(|buffer| *buffer == of);
+        let planes = std::mem::take(&mut self.planes).into_iter().zip(std::mem::take(&mut self.names));
+        let mut kept: Vec<_> = planes.filter_map(|plane| Some((place(plane.0.0)?, plane))).collect();
+        kept.sort_by_key(|(place, _)| *place);
+        (self.planes, self.names) = kept.into_iter().map(|(_, plane)| plane).unzip();
+    }
+
     /// Takes the pixels of a tile.
     pub(crate) fn merge(&mut self, from: &FilmTile) {
         let Tile { x, y, width, height } = from.tile;
@@ -186,6 +205,7 @@ impl FilmTile {
     pub fn set_row(&mut self, x: u32, y: u32, sums: &TermSums, some: Range<usize>) {
         let index = (y * self.tile.width + x) as usize;
         let here = index..index + some.len();
+        let mut kept = sums.kept();
         for (buffer, values) in &mut self.planes {
             match (buffer.plane(), values) {
                 (Plane::Color, Values::Four(pixels)) => {
@@ -196,10 +216,9 @@ impl FilmTile {
                     pixels[here.clone()].iter_mut().zip(colors).for_each(|(to, from)| *to = from[3]);
                 }
                 (Plane::Rays, Values::One(pixels)) => pixels[here.clone()].copy_from_slice(&sums.work[some.clone()]),
-                (_, Values::Three(pixels)) => {
-                    if let Some(kept) = sums.kept(*buffer) {
-                        pixels[here.clone()].copy_from_slice(&kept[some.clone()]);
-                    }
+                (_, Values::Three(pixels)) if buffer.is_of_terms() => {
+                    let kept = kept.next().expect("each of those buffers has its sums");
+                    pixels[here.clone()].copy_from_slice(&kept[some.clone()]);
                 }
                 _ => {}
             }

@@ -31,6 +31,7 @@ mod light_queue;
 mod lights;
 mod many;
 mod packets;
+mod passes;
 pub(crate) mod pixel;
 mod plain;
 mod receipt;
@@ -71,6 +72,7 @@ use hits::PixelHits;
 use lanes::Lanes;
 use light_queue::LightQueue;
 use lights::Lights;
+use passes::Passes;
 use pixel::{Lighting, PixelSum};
 use plain::Plain;
 use resolve::TermSums;
@@ -140,15 +142,6 @@ impl RenderSettings {
         }
         if let Some(fault) = scene.fault_of(&self.buffers) {
             return Err(format!("buffers: {fault}"));
-        }
-        let by_light = self.buffers.iter().any(|buffer| matches!(buffer, Buffer::Light(..)));
-        if by_light && scene.lights.len() > many::FEW && !self.renderer().samples_all() {
-            return Err(format!(
-                "buffers: the lights of a scene are kept apart where there are up to {}, and it has {}; ask for \
-                 diffuse and specular, or have every light sampled, with --visibility traced",
-                many::FEW,
-                scene.lights.len()
-            ));
         }
         if !self.simd.is_available() {
             let names: Vec<_> = SimdLevel::available().iter().map(|level| level.name()).collect();
@@ -278,13 +271,38 @@ pub fn render(
     if let Err(fault) = settings.check(scene) {
         panic!("{fault}");
     }
+    let passes = Passes::of(scene, &settings.buffers);
+    if passes.unshadowed.is_empty() && passes.picture == settings.buffers {
+        return expose(scene, settings, &settings.buffers, progress);
+    }
+    let count = u64::from(!passes.picture.is_empty()) + u64::from(!passes.unshadowed.is_empty());
+    let (film, stats) = expose(scene, settings, &passes.picture, &|done, all| progress(done, count * all))?;
+    let mut unshadowed = None;
+    let mut all_stats = stats;
+    if !passes.unshadowed.is_empty() {
+        let before = count - 1;
+        let progress = |done, all| progress(before * all + done, count * all);
+        let (film, stats) = expose(&scene.without_shadows(), settings, &passes.unshadowed, &progress)?;
+        unshadowed = Some(film);
+        all_stats = all_stats.and(&stats);
+    }
+    let film = Passes::develop(scene, &settings.buffers, film, unshadowed.as_ref());
+    ControlFlow::Continue((film, all_stats))
+}
+
+/// Renders some planes in one pass.
+fn expose(
+    scene: &Scene,
+    settings: &RenderSettings,
+    planes: &[Buffer],
+    progress: &(dyn Fn(u64, u64) -> ControlFlow<()> + Sync),
+) -> ControlFlow<(), (Film, RenderStats)> {
     let window = settings.window(scene);
     let threads = settings.threads.map_or_else(available_threads, NonZeroUsize::get);
     let renderer = settings.renderer();
     let level = settings.simd.resolve();
     let simd = if renderer == Renderer::Reference { SimdLevel::Fallback } else { level };
     let nothing = Counts::default().stats(simd, threads);
-    let planes = &settings.buffers;
     let result = Mutex::new((Film::new(scene, window, planes), nothing));
     let of_centers = planes.iter().any(|buffer| buffer.plane().is_of_center());
     let is_lit = planes.iter().any(|buffer| !buffer.plane().is_of_center());
@@ -392,7 +410,7 @@ fn render_tile(
     let tile = film.tile;
     let mut counts = Counts::default();
     let mut pixel = PixelSum::new(scene);
-    let mut sums = TermSums::new(1, &film.planes());
+    let mut sums = TermSums::new(scene, 1, &film.planes());
     let rays = (scene.antialiasing * scene.antialiasing) as f32;
     let side = hits.as_ref().map_or(1, PixelHits::side);
     for top in (0..tile.height).step_by(side as usize) {

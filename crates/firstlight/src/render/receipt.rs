@@ -65,6 +65,7 @@ impl Scene {
     ///   x to the right and y down as OpenCV has them;
     /// - `opencv_camera_from_world` and `opengl_camera_from_world`: 4 x 4, row by row; OpenCV's camera looks along z
     ///   with y down, OpenGL's along -z with y up;
+    /// - `light_groups`: a JSON list of their names and of the numbers of their lights, from 1;
     /// - `object_names`, `material_names`: JSON lists, the name of id 1 first, `null` for what has none.
     pub fn buffers_receipt(&self, settings: &RenderSettings, buffers: &[Buffer]) -> Receipt {
         let mut receipt = self.receipt(settings);
@@ -103,8 +104,13 @@ impl Scene {
         if asks_for(Plane::MaterialId) {
             add("material_names", list(self.summary.materials.iter().map(|(name, _)| Some(name.clone())).collect()));
         }
-        if buffers.iter().any(|buffer| matches!(buffer, Buffer::Light(..))) {
+        if buffers.iter().any(|buffer| matches!(buffer, Buffer::Light(..) | Buffer::Group(..))) {
             add("light_names", list(self.light_names()));
+        }
+        if buffers.iter().any(|buffer| matches!(buffer, Buffer::Group(..))) {
+            let group = |(name, lights): &(String, Vec<u32>)| serde_json::json!({ "name": name, "lights": lights.iter().map(|light| light + 1).collect::<Vec<_>>() });
+            let groups: Vec<_> = self.light_groups.iter().map(group).collect();
+            add("light_groups", serde_json::Value::from(groups).to_string());
         }
         receipt
     }

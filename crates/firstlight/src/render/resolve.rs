@@ -3,9 +3,8 @@
 use std::ops::Range;
 
 use crate::color::Rgb;
-use crate::ids::LightId;
 use crate::image::{Buffer, LightPart, Plane};
-use crate::material::Colors;
+use crate::material::{Colors, MOMENTS};
 use crate::scene::Scene;
 
 /// A term of a pixel's colour: a mean over its rays.
@@ -24,8 +23,17 @@ pub(crate) struct TermSums {
     pub colors: Vec<[f32; 4]>,
     /// What each took.
     pub work: Vec<f32>,
-    /// The sums of some terms alone.
-    kept: Vec<(Buffer, Vec<[f32; 3]>)>,
+    /// The sums of some terms alone, in the order of their buffers.
+    kept: Vec<KeptSum>,
+    /// Term by term: which of those it is added to.
+    of_term: Vec<Vec<u32>>,
+}
+
+/// The sum of some terms, for a buffer.
+struct KeptSum {
+    /// Whether the scales of lights are left out.
+    unscaled: bool,
+    pixels: Vec<[f32; 3]>,
 }
 
 /// What the rays of a pixel see beside the light of lights, added up.
@@ -58,6 +66,16 @@ impl ScaledTerm {
 }
 
 impl PixelTerms {
+    /// Keeps of pixel `at` what is not added to the colour light by light: of some lights, each by itself.
+    pub fn keep(scene: &Scene, lights: &[ScaledTerm], at: usize, sums: &mut TermSums) {
+        let rays = (scene.antialiasing * scene.antialiasing) as f32;
+        for ScaledTerm { light, scale, term } in lights {
+            for (moment, part) in term.0.into_iter().enumerate() {
+                sums.keep(at, Term::Light(*light, moment), *scale, std::iter::once(part * (1.0 / rays)));
+            }
+        }
+    }
+
     /// Makes pixel `at` of `sums` the mean over the rays. `lights` come in scene order, each with its scale, which is
     /// applied to its means.
     pub fn resolve(&self, scene: &Scene, lights: impl Iterator<Item = ScaledTerm>, at: usize, sums: &mut TermSums) {
@@ -67,41 +85,68 @@ impl PixelTerms {
         let (background, alpha) =
             if scene.transparent { (Rgb::BLACK, 1.0 - uncovered) } else { (scene.background * uncovered, 1.0) };
         sums.begin(at..at + 1, background, alpha);
-        let mut add = |term: Term, value: Rgb| sums.add(at, term, std::iter::once(value));
-        add(Term::Emission, mean(self.emission));
-        add(Term::Ambient, mean(self.ambient));
+        let mut add = |term: Term, scale: Rgb, value: Rgb| sums.add(at, term, scale, std::iter::once(value));
+        add(Term::Emission, Rgb::WHITE, mean(self.emission));
+        add(Term::Ambient, Rgb::WHITE, mean(self.ambient));
         for ScaledTerm { light, scale, term } in lights {
             for (moment, part) in term.0.into_iter().enumerate() {
-                add(Term::Light(light, moment), scale * mean(part));
+                add(Term::Light(light, moment), scale, mean(part));
             }
         }
     }
 }
 
 impl Term {
-    /// Whether a buffer is a sum that this belongs to.
-    fn is_of(self, buffer: Buffer) -> bool {
-        match (self, buffer) {
-            (Term::Background, Buffer::Plane(plane)) => plane == Plane::Background,
-            (Term::Emission, Buffer::Plane(plane)) => plane == Plane::Emission,
-            (Term::Ambient, Buffer::Plane(plane)) => plane == Plane::Ambient,
-            (Term::Light(_, moment), Buffer::Plane(plane)) => plane == [Plane::Diffuse, Plane::Specular][moment],
-            (Term::Light(light, moment), Buffer::Light(LightId(of), part)) => {
-                light == Some(of) && part.is_none_or(|part| part == [LightPart::Diffuse, LightPart::Specular][moment])
+    /// Its number among the terms of a picture.
+    #[inline(always)]
+    fn index(self) -> usize {
+        match self {
+            Term::Background => 0,
+            Term::Emission => 1,
+            Term::Ambient => 2,
+            Term::Light(light, moment) => 3 + light.map_or(0, |light| light as usize + 1) * MOMENTS + moment,
+        }
+    }
+
+    /// Those that a buffer is the sum of.
+    fn of(scene: &Scene, buffer: Buffer) -> Vec<Term> {
+        let all = || std::iter::once(None).chain((0..scene.lights.len() as u32).map(Some));
+        match buffer {
+            Buffer::Plane(Plane::Background) => vec![Term::Background],
+            Buffer::Plane(Plane::Emission) => vec![Term::Emission],
+            Buffer::Plane(Plane::Ambient) => vec![Term::Ambient],
+            Buffer::Plane(Plane::Diffuse) => all().map(|light| Term::Light(light, 0)).collect(),
+            Buffer::Plane(Plane::Specular) => all().map(|light| Term::Light(light, 1)).collect(),
+            Buffer::Plane(_) => Vec::new(),
+            Buffer::Light(_, part) | Buffer::Group(_, part) => {
+                let moments = match part.and_then(LightPart::moment) {
+                    Some(moment) => moment..moment + 1,
+                    None => 0..MOMENTS,
+                };
+                let lights = scene.lights_of(buffer);
+                let terms = |light| moments.clone().map(move |moment| Term::Light(Some(light), moment));
+                lights.into_iter().flat_map(terms).collect()
             }
-            (_, Buffer::Light(..)) => false,
         }
     }
 }
 
 impl TermSums {
-    /// So many, with those buffers that are sums of some terms.
-    pub fn new(pixels: usize, buffers: &[Buffer]) -> TermSums {
-        let kept = buffers.iter().filter(|buffer| buffer.plane().is_of_terms());
+    /// So many of a scene, with those buffers that are sums of some terms.
+    pub fn new(scene: &Scene, pixels: usize, buffers: &[Buffer]) -> TermSums {
+        let kept: Vec<Buffer> = buffers.iter().copied().filter(|buffer| buffer.is_of_terms()).collect();
+        let unscaled = |buffer: &Buffer| buffer.part().is_some_and(LightPart::is_unscaled);
+        let sum = |buffer: &Buffer| KeptSum { unscaled: unscaled(buffer), pixels: vec![[0.0; 3]; pixels] };
+        let terms = if kept.is_empty() { 0 } else { Term::Light(None, 0).index() + (scene.lights.len() + 1) * MOMENTS };
+        let mut of_term = vec![Vec::new(); terms];
+        for (k, buffer) in (0..).zip(&kept) {
+            Term::of(scene, *buffer).into_iter().for_each(|term| of_term[term.index()].push(k));
+        }
         TermSums {
             colors: vec![[0.0; 4]; pixels],
             work: vec![0.0; pixels],
-            kept: kept.map(|buffer| (*buffer, vec![[0.0; 3]; pixels])).collect(),
+            kept: kept.iter().map(sum).collect(),
+            of_term,
         }
     }
 
@@ -110,19 +155,33 @@ impl TermSums {
     pub fn begin(&mut self, pixels: Range<usize>, background: Rgb, alpha: f32) {
         let Rgb { r, g, b } = background;
         self.colors[pixels.clone()].fill([r, g, b, alpha]);
-        for (buffer, sums) in &mut self.kept {
-            sums[pixels.clone()].fill(if Term::Background.is_of(*buffer) { [r, g, b] } else { [0.0; 3] });
+        for sum in &mut self.kept {
+            sum.pixels[pixels.clone()].fill([0.0; 3]);
+        }
+        if !self.kept.is_empty() {
+            let all = std::iter::repeat_n(background, pixels.len());
+            self.keep(pixels.start, Term::Background, Rgb::WHITE, all);
         }
     }
 
-    /// Adds a term to pixels side by side, from number `first` on.
+    /// Adds a term to pixels side by side, from number `first` on: `scale` times the values.
     #[inline(always)]
-    pub fn add(&mut self, first: usize, term: Term, values: impl Iterator<Item = Rgb> + Clone) {
+    pub fn add(&mut self, first: usize, term: Term, scale: Rgb, values: impl Iterator<Item = Rgb> + Clone) {
         for ([r, g, b, _], value) in self.colors[first..].iter_mut().zip(values.clone()) {
+            let value = scale * value;
             (*r, *g, *b) = (*r + value.r, *g + value.g, *b + value.b);
         }
-        for (_, sums) in self.kept.iter_mut().filter(|(buffer, _)| term.is_of(*buffer)) {
-            for ([r, g, b], value) in sums[first..].iter_mut().zip(values.clone()) {
+        if !self.kept.is_empty() {
+            self.keep(first, term, scale, values);
+        }
+    }
+
+    /// Adds a term to those sums that keep it, and not to the colours.
+    pub fn keep(&mut self, first: usize, term: Term, scale: Rgb, values: impl Iterator<Item = Rgb> + Clone) {
+        for k in &self.of_term[term.index()] {
+            let KeptSum { unscaled, pixels } = &mut self.kept[*k as usize];
+            for ([r, g, b], value) in pixels[first..].iter_mut().zip(values.clone()) {
+                let value = if *unscaled { value } else { scale * value };
                 (*r, *g, *b) = (*r + value.r, *g + value.g, *b + value.b);
             }
         }
@@ -134,8 +193,8 @@ impl TermSums {
         Rgb::new(r, g, b)
     }
 
-    /// The sums of some terms; `None` if they are not kept.
-    pub fn kept(&self, of: Buffer) -> Option<&[[f32; 3]]> {
-        self.kept.iter().find(|(buffer, _)| *buffer == of).map(|(_, sums)| &sums[..])
+    /// The sums of some terms, in the order of their buffers.
+    pub fn kept(&self) -> impl Iterator<Item = &[[f32; 3]]> {
+        self.kept.iter().map(|sum| &sum.pixels[..])
     }
 }

@@ -57,7 +57,7 @@ impl<'a> Shafts<'a> {
         let side = self.hits.side();
         let rays = (self.scene.antialiasing * self.scene.antialiasing) as f32;
         let mut pixels: Vec<(PixelSum, usize)> = (0..side * side).map(|_| (PixelSum::new(self.scene), 0)).collect();
-        let mut sums = TermSums::new(1, &film.planes());
+        let mut sums = TermSums::new(self.scene, 1, &film.planes());
         for top in (0..tile.height).step_by(side as usize) {
             for left in (0..tile.width).step_by(side as usize) {
                 let (w, h) = ((tile.width - left).min(side), (tile.height - top).min(side));

@@ -117,7 +117,8 @@ impl SceneDesc {
         let desc = &*self.with(&added);
         let camera = desc.compile_camera(cx, picture.width, picture.height, geometry.is_some());
         let lights = desc.compile_lights(cx);
-        let buffers = desc.compile_buffers(cx);
+        let light_groups = desc.light_groups();
+        let buffers = desc.compile_buffers(cx, &light_groups);
         let (Some(geometry), false) = (geometry, cx.has_errors()) else {
             return None;
         };
@@ -140,6 +141,7 @@ impl SceneDesc {
             geometry: Arc::new(geometry),
             seen_lights: Arc::new(SeenLights::new(&lights)),
             lights,
+            light_groups,
             materials,
             occluders,
             level: Level::new(),

@@ -73,6 +73,8 @@ pub struct Scene {
     pub(crate) display: Display,
     pub(crate) geometry: Arc<Geometry>,
     pub(crate) lights: Vec<Light>,
+    /// Their groups, by name, in the order of their first lights.
+    pub(crate) light_groups: Vec<(String, Vec<u32>)>,
     /// Those of them that a camera can see.
     pub(crate) seen_lights: Arc<SeenLights>,
     pub(crate) materials: Vec<Material>,
@@ -166,6 +168,13 @@ impl Scene {
     /// any, and for lights.
     pub fn surface_name(&self, id: SurfaceId) -> Option<&str> {
         self.geometry.surfaces.get(id.index())?.name.as_deref()
+    }
+
+    /// The same, in which nothing casts shadows.
+    pub(crate) fn without_shadows(&self) -> Scene {
+        let mut scene = self.clone();
+        scene.lights.iter_mut().for_each(|light| light.shadows = false);
+        scene
     }
 
     /// The moment that was compiled, in seconds; `None` if nothing in the scene changes with time.

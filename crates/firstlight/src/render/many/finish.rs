@@ -2,13 +2,14 @@
 
 use std::ops::Range;
 
+use super::apart::Apart;
 use super::dense::sent;
 use super::patch::Patches;
 use super::{ANYTHING, Many, Single, Stored};
 use crate::color::Rgb;
 use crate::integrate::TOLERANCE;
 use crate::light::Sent;
-use crate::material::{Lobe, Moments};
+use crate::material::Moments;
 use crate::render::arrival::{ArrivalPlace, Arrivals};
 use crate::render::counts::Counts;
 use crate::render::fence::Fence;
@@ -27,7 +28,8 @@ pub(super) struct Doubt {
 
 impl<'a> Many<'a> {
     /// What lights send to the patches of a pixel, by their numbers: what each ray sees, added up. `scaled` gets each
-    /// light's diffuse part and highlight with its scale, in scene order, and last what is taken together.
+    /// light's diffuse part and highlight with its scale, in scene order, and last what is taken together. `apart` gets
+    /// what of that is of lights that are kept apart.
     pub(super) fn finish(
         &mut self,
         fragments: &Fragments,
@@ -35,13 +37,15 @@ impl<'a> Many<'a> {
         pixel: Range<usize>,
         arrivals: &mut Arrivals<'a>,
         counts: &mut Counts,
-        scaled: &mut Vec<ScaledTerm>,
+        [scaled, apart]: [&mut Vec<ScaledTerm>; 2],
     ) {
         let scene = self.scene;
         let mut terms = std::mem::take(&mut self.terms);
         let mut fence = std::mem::take(&mut self.fence);
         let mut doubts = std::mem::take(&mut self.doubts);
         terms.clear();
+        let mut kept = std::mem::take(&mut self.kept);
+        kept.clear();
         let (mut rays, mut found) = (Vec::new(), Vec::new());
         let mut together = Sent::BLACK;
         for number in pixel {
@@ -54,6 +58,7 @@ impl<'a> Many<'a> {
             let bsdf = &patch.bsdf;
             if !in_doubt(None) {
                 together += bsdf.colors * stored.sent * count;
+                self.nodes(stored).for_each(|entry| self.apart.add(&mut kept, entry, &patch.si, bsdf, count));
             }
             for i in stored.singles.clone() {
                 if !in_doubt(Some(i)) {
@@ -71,7 +76,12 @@ impl<'a> Many<'a> {
             for doubt in &doubts {
                 let Some(i) = doubt.single else {
                     for (si, bsdf) in &rays {
-                        together += bsdf.colors * self.sent_at(stored, &mut fence, si, &bsdf.lobe);
+                        let mut sum = Sent::BLACK;
+                        self.seen_at(stored, &mut fence, si, |entry| {
+                            sum += sent(scene, self.tree, entry, si, &bsdf.lobe);
+                            self.apart.add(&mut kept, entry, si, bsdf, 1.0);
+                        });
+                        together += bsdf.colors * sum;
                     }
                     continue;
                 };
@@ -92,26 +102,20 @@ impl<'a> Many<'a> {
         }
         // Of many scales
         scaled.push(ScaledTerm { light: None, scale: Rgb::WHITE, term: together });
-        (self.terms, self.fence, self.doubts) = (terms, fence, doubts);
+        Apart::finish(&mut kept, arrivals, apart);
+        (self.terms, self.fence, self.doubts, self.kept) = (terms, fence, doubts, kept);
     }
 
-    /// What nodes send to where one camera ray ends.
-    pub(super) fn sent_at(&self, stored: &Stored, fence: &mut Fence, si: &SurfaceInteraction, lobe: &Lobe) -> Sent {
-        let (scene, tree) = (self.scene, self.tree);
-        let mut sum = Sent::BLACK;
-        let mut add = |entry: u32| {
-            sum += sent(scene, tree, entry, si, lobe);
-        };
+    /// Calls `each` with the nodes that are seen from where one camera ray ends.
+    fn seen_at(&self, stored: &Stored, fence: &mut Fence, si: &SurfaceInteraction, mut each: impl FnMut(u32)) {
         if stored.maybe.is_empty() {
-            self.nodes(stored).for_each(&mut add);
-            return sum;
+            return self.nodes(stored).for_each(each);
         }
         let list = |range: &Range<u32>| &self.lit[range.start as usize..range.end as usize];
-        list(&stored.lit[0]).iter().for_each(|entry| add(*entry));
-        fence.stand(scene, si);
+        list(&stored.lit[0]).iter().for_each(|entry| each(*entry));
+        fence.stand(self.scene, si);
         let dots = &self.dots[stored.maybe.start as usize..stored.maybe.end as usize];
-        dots.iter().filter(|dot| dot.arrives(scene, fence, si)).for_each(|dot| add(dot.entry));
-        sum
+        dots.iter().filter(|dot| dot.arrives(self.scene, fence, si)).for_each(|dot| each(dot.entry));
     }
 
     /// How far the mean over a patch can be from what arrives at its middle because other lights are seen from

@@ -9,6 +9,7 @@
 //! block, and what may be wrong is `TOLERANCE.crowd` as the root of a sum of squares. Cells and blocks lie on a
 //! grid of the film, so nothing depends on tiles, crops or threads.
 
+mod apart;
 mod dense;
 mod finish;
 mod neighbours;
@@ -27,12 +28,14 @@ use super::fragment::Fragments;
 use super::resolve::ScaledTerm;
 use crate::color::Rgb;
 use crate::ids::LightId;
+use crate::image::Buffer;
 use crate::integrate::TOLERANCE;
 use crate::light::{LightTree, Sent};
 use crate::material::Lobe;
 use crate::math::{Vec3, square};
 use crate::scene::Scene;
 use crate::visibility::{Outlook, Seen};
+use apart::{Apart, SentApart};
 use dense::{Dot, sent};
 use finish::Doubt;
 use patch::{Patch, Patches};
@@ -77,6 +80,8 @@ pub(super) struct Many<'a> {
     dots: Vec<Dot>,
     terms: Vec<(u32, Sent)>,
     doubts: Vec<Doubt>,
+    apart: Apart<'a>,
+    kept: SentApart,
 }
 
 /// One light at one patch.
@@ -112,7 +117,8 @@ struct Above {
 }
 
 impl<'a> Many<'a> {
-    pub fn new(scene: &'a Scene, tree: &'a LightTree) -> Self {
+    /// `buffers` say which lights are kept apart.
+    pub fn new(scene: &'a Scene, tree: &'a LightTree, buffers: &[Buffer]) -> Self {
         Many {
             scene,
             tree,
@@ -129,6 +135,8 @@ impl<'a> Many<'a> {
             dots: Vec::new(),
             terms: Vec::new(),
             doubts: Vec::new(),
+            apart: Apart::new(scene, tree, buffers),
+            kept: SentApart::new(),
         }
     }
 
@@ -138,27 +146,29 @@ impl<'a> Many<'a> {
     }
 
     /// Lights the fragments of the cell. `add` hears, pixel by pixel, one of its fragments; of each light in scene
-    /// order what it sends and its scale, and last what is taken together; and the work that this took.
+    /// order what it sends and its scale, and last what is taken together; what of that is of lights that are kept
+    /// apart; and the work that this took.
     pub fn light(
         &mut self,
         fragments: &Fragments,
         arrivals: &mut Arrivals<'a>,
         counts: &mut Counts,
         go_on: &impl Fn() -> ControlFlow<()>,
-        mut add: impl FnMut(usize, &[ScaledTerm], f32),
+        mut add: impl FnMut(usize, [&[ScaledTerm]; 2], f32),
     ) -> ControlFlow<()> {
         let patches = std::mem::take(&mut self.patches);
         let before = counts.work();
         let looked = self.look(&patches, arrivals, counts, go_on);
         if looked.is_continue() {
             let each = (counts.work() - before) / (CELL * CELL) as f32;
-            let mut terms = Vec::new();
+            let (mut terms, mut apart) = (Vec::new(), Vec::new());
             let mut first = 0;
             for same in patches.all.chunk_by(|a, b| a.pixel == b.pixel) {
                 let before = counts.work();
                 terms.clear();
-                self.finish(fragments, &patches, first..first + same.len(), arrivals, counts, &mut terms);
-                add(same[0].fragment as usize, &terms, each + counts.work() - before);
+                let pixel = first..first + same.len();
+                self.finish(fragments, &patches, pixel, arrivals, counts, [&mut terms, &mut apart]);
+                add(same[0].fragment as usize, [&terms, &apart], each + counts.work() - before);
                 first += same.len();
             }
         }
