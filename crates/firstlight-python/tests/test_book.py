@@ -1,4 +1,4 @@
-"""The Python of the book's page and of the README runs."""
+"""The Python of the book's pages and of the README runs."""
 
 import pathlib
 import re
@@ -6,8 +6,8 @@ import re
 import pytest
 
 ROOT = pathlib.Path(__file__).parents[3]
-PAGES = [ROOT / page for page in ("docs/src/python.md", "docs/src/conventions.md", "README.md")]
-PAGES.append(ROOT / "crates/firstlight-python/README.md")
+PAGES = [ROOT / "docs/src" / page for page in ("python.md", "conventions.md", "pyrender.md")]
+PAGES += [ROOT / "README.md", ROOT / "crates/firstlight-python/README.md"]
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.name)
