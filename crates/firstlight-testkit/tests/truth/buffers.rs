@@ -15,6 +15,7 @@ const SCENE: &str = r#"
     height = 70
     antialiasing = 2
     transparent = true
+    motion_to = "next"
     [camera]
     position = [0.3, 0.7, 10]
     look_at = [0.1, 0, 0]

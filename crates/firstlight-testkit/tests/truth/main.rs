@@ -14,6 +14,7 @@ mod geometry;
 mod known;
 mod links;
 mod many_lights;
+mod motion;
 mod near;
 mod robust;
 mod terminator;

@@ -100,6 +100,13 @@ impl FilmPlane {
         [right, above]
     }
 
+    /// The place in pixels from its upper left corner that lies so far to the right of the line of sight, and above it:
+    /// the way back from [`place`](Self::place).
+    pub(super) fn pixel(&self, right: f64, above: f64) -> [f64; 2] {
+        let [half, size, axis] = [self.half, self.size, self.axis].map(|v| v.as_dvec2());
+        [0.5 * (axis.x + right / half.x * size.x), 0.5 * (axis.y - above / half.y * size.y)]
+    }
+
     /// How that changes over `step` pixels to the right, and over as many down.
     #[inline(always)]
     pub(super) fn steps(&self, step: f32) -> [f32; 2] {

@@ -2,7 +2,7 @@
 
 use super::CameraDesc;
 use crate::context::{CompileContext, show};
-use crate::math::{DVec3, Vec3};
+use crate::math::{DMat3, DVec3, Vec3};
 use crate::transform::TransformDesc;
 
 /// Where a camera is, and which way it is turned: three directions at right angles.
@@ -28,6 +28,13 @@ const MIN_SINE: f64 = 1e-6;
 const MIN_DISTANCE: f64 = 1e-9;
 
 impl Frame {
+    /// A direction of the scene by its parts along `right`, `up` and `forward`: exactly those that rays are made of,
+    /// though in 32 bits the three are not quite at right angles.
+    pub(super) fn parts(&self, d: DVec3) -> DVec3 {
+        let [right, up, forward] = [self.right, self.up, self.forward].map(|axis| axis.as_dvec3());
+        DMat3::from_cols(right, up, forward).inverse() * d
+    }
+
     pub(super) fn compile(desc: &CameraDesc, cx: &mut CompileContext) -> Self {
         let (mut eye, mut target) = (DVec3::from(desc.position), DVec3::from(desc.look_at));
         let mut up = DVec3::from(desc.up);

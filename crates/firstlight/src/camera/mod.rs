@@ -14,7 +14,7 @@ use fearless_simd::{f32x16, prelude::*};
 
 use crate::context::CompileContext;
 use crate::describe::{table, words};
-use crate::math::{Ray, Vec3, Vec3x16, WorldRay};
+use crate::math::{DVec3, Ray, Vec3, Vec3x16, WorldRay};
 use crate::shape::RayDifferential;
 use crate::transform::TransformDesc;
 
@@ -111,6 +111,40 @@ impl Camera {
         match self {
             Camera::Pinhole(pinhole) => pinhole.ray(x, y, step),
             Camera::Orthographic(orthographic) => orthographic.ray(x, y, step),
+        }
+    }
+
+    /// Where a point of the world is in the picture: in pixels from its upper left corner, also outside of it. `None`
+    /// for what is behind the camera. The way back from [`ray`](Self::ray).
+    pub fn project(&self, point: DVec3) -> Option<[f64; 2]> {
+        let (pixel, depth) = self.local_project(point - self.frame().origin)?;
+        (depth > 0.0).then_some(pixel)
+    }
+
+    /// The same of a point in the scene's own coordinates, and how far it is along the line of sight: also of what is
+    /// behind the film of an orthographic camera. `None` for what is behind an eye.
+    pub(crate) fn local_project(&self, p: DVec3) -> Option<([f64; 2], f64)> {
+        let parts = self.frame().parts(p - self.frame().eye.as_dvec3());
+        self.on_film(parts).map(|pixel| (pixel, parts.z))
+    }
+
+    /// Where the end of a ray, infinitely far away, is in the picture. `None` behind the camera, and for an
+    /// orthographic one that looks along another way.
+    pub(crate) fn local_project_end(&self, o: DVec3, d: DVec3) -> Option<[f64; 2]> {
+        match self {
+            Camera::Pinhole(pinhole) => self.on_film(pinhole.frame.parts(d)),
+            Camera::Orthographic(orthographic) if d == orthographic.frame.forward.as_dvec3() => {
+                self.local_project(o).map(|(pixel, _)| pixel)
+            }
+            Camera::Orthographic(_) => None,
+        }
+    }
+
+    /// Where in the picture something is that has these parts along the axes of the camera.
+    fn on_film(&self, DVec3 { x, y, z }: DVec3) -> Option<[f64; 2]> {
+        match self {
+            Camera::Pinhole(pinhole) => (z > 0.0).then(|| pinhole.film.pixel(x / z, y / z)),
+            Camera::Orthographic(orthographic) => Some(orthographic.film.pixel(x, y)),
         }
     }
 

@@ -75,6 +75,14 @@ words! {
         PrimitiveId = "primitive-id",
         /// Which side is seen: 1 for the front, 2 for the back.
         FaceOrientation = "face-orientation",
+        /// The way in the picture, in pixels to the right and down, from here to where the same point of the same thing
+        /// is at the moment, or for the camera, that `motion_to` names. `visible` is 1 if it is seen there, 0 if
+        /// something hides it or it is outside of the picture, and -1 if it has no place there, with a way of 0. What
+        /// meets nothing is infinitely far away.
+        Motion = "motion",
+        /// The same the other way: of the picture that `motion_to` names, pixel by pixel of that picture, the way to
+        /// this one.
+        MotionBackward = "motion-backward",
         /// How much work the pixel took, as in `--heat`: rays that were asked, from the camera and to lights.
         Rays = "rays",
     }
@@ -115,6 +123,7 @@ impl Plane {
                 &["X", "Y", "Z"]
             }
             Uv | Barycentric => &["U", "V"],
+            Motion | MotionBackward => &["X", "Y", "visible"],
             ObjectId | InstanceId | MaterialId | PrimitiveId | FaceOrientation => &["ID"],
             Rays => &["N"],
         }
@@ -138,6 +147,7 @@ impl Plane {
             Color | Background | Emission | Ambient | Diffuse | Specular | Rest => "linear Rec. 709, premultiplied",
             Albedo => "linear Rec. 709",
             Depth | Distance | Position | PositionCamera | PositionObject => "m",
+            Motion | MotionBackward => "px",
             Rays => "rays",
             _ => "1",
         }
@@ -151,6 +161,7 @@ impl Plane {
             Depth | PositionCamera | NormalCamera | NormalGeometricCamera => "camera",
             PositionObject | NormalObject => "object",
             Uv => "texture",
+            Motion | MotionBackward => "picture",
             _ => "-",
         }
     }
@@ -180,6 +191,11 @@ impl Plane {
     /// Whether the centre ray of a pixel says it.
     pub(crate) fn is_of_center(self) -> bool {
         self.sampling() == Sampling::Center
+    }
+
+    /// Whether it leads to another moment or camera.
+    pub(crate) fn is_of_motion(self) -> bool {
+        matches!(self, Plane::Motion | Plane::MotionBackward)
     }
 
     /// Bytes of a pixel of it.

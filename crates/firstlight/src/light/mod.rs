@@ -103,6 +103,18 @@ impl LightDesc {
         }
     }
 
+    /// Where it is moved, if it says so.
+    pub(crate) fn transform(&self) -> Option<&TransformDesc> {
+        match self {
+            LightDesc::Point(light) => light.transform.as_deref(),
+            LightDesc::Directional(light) => light.transform.as_deref(),
+            LightDesc::Spot(light) => light.transform.as_deref(),
+            LightDesc::Rectangle(light) => light.transform.as_deref(),
+            LightDesc::Disk(light) => light.transform.as_deref(),
+            LightDesc::Sphere(light) => light.transform.as_deref(),
+        }
+    }
+
     /// How an area light is sampled: its own `samples`, if it says any, and how the points are laid out. `None` for a
     /// light without an area.
     pub fn samples(&self) -> Option<(Option<SamplesDesc>, SampleSet)> {

@@ -7,6 +7,7 @@ use fearless_simd::Level;
 
 use super::film::{CenterValue, FilmTile};
 use super::hits::{PixelHits, grid_ray};
+use super::motion;
 use crate::camera::Frame;
 use crate::color::Rgb;
 use crate::image::Plane;
@@ -15,45 +16,76 @@ use crate::scene::{Hit, ObjectSpace, Scene};
 use crate::shape::{RayDifferential, SurfaceInteraction};
 
 /// One thread's way through the centre rays of tiles.
-pub(super) struct Centers<'a> {
+struct Centers<'a> {
     scene: &'a Scene,
+    /// Whereto motion leads.
+    there: Option<&'a Scene>,
+    level: Level,
     hits: PixelHits,
 }
 
 /// What a centre ray meets.
-struct Center<'a> {
-    scene: &'a Scene,
+pub(super) struct Center<'a> {
+    pub scene: &'a Scene,
     ray: Ray,
     differential: RayDifferential,
-    hit: Hit,
+    pub hit: Hit,
     /// `None` on a light.
     surface: Option<SurfaceInteraction>,
 }
 
+/// Fills the planes of a tile that centre rays say. The answer is how many camera rays it took.
+pub(super) fn fill(scene: &Scene, level: Level, film: &mut FilmTile) -> u64 {
+    let there = scene.motion.as_deref().map(|motion| &motion.there);
+    let has = |film: &FilmTile, backward: bool| {
+        let of_center = |plane: Plane| plane.is_of_center() && (plane == Plane::MotionBackward) == backward;
+        film.planes().iter().any(|buffer| of_center(buffer.plane()))
+    };
+    let mut rays = 0;
+    if has(film, false) {
+        let says = |plane: Plane| (plane != Plane::MotionBackward).then_some(plane);
+        rays += Centers::new(scene, there, level).fill(film, says);
+    }
+    if let (true, Some(there)) = (has(film, true), there) {
+        // Of the other picture, the way to this one
+        let says = |plane: Plane| (plane == Plane::MotionBackward).then_some(Plane::Motion);
+        rays += Centers::new(there, Some(scene), level).fill(film, says);
+    }
+    rays
+}
+
 impl<'a> Centers<'a> {
-    pub fn new(scene: &'a Scene, level: Level) -> Self {
-        Centers { scene, hits: PixelHits::new(level, 1) }
+    fn new(scene: &'a Scene, there: Option<&'a Scene>, level: Level) -> Self {
+        Centers { scene, there, level, hits: PixelHits::new(level, 1) }
     }
 
-    /// Fills the planes of a tile that are theirs.
-    pub fn fill(&mut self, film: &mut FilmTile) {
+    /// Fills planes of a tile; `asks` says what each of them is here, if anything.
+    fn fill(&mut self, film: &mut FilmTile, asks: impl Fn(Plane) -> Option<Plane>) -> u64 {
         let (scene, tile, side) = (self.scene, film.tile, self.hits.side());
         for top in (0..tile.height).step_by(side as usize) {
             for left in (0..tile.width).step_by(side as usize) {
                 let (w, h) = ((tile.width - left).min(side), (tile.height - top).min(side));
                 self.hits.trace(scene, tile.x + left, tile.y + top, w, h);
                 for (y, x) in (0..h).flat_map(|y| (0..w).map(move |x| (y, x))) {
-                    let center = self.hits.get(x, y, 0, 0).map(|hit| {
-                        let (ray, differential) = grid_ray(scene, 1, tile.x + left + x, tile.y + top + y);
-                        Center::new(scene, ray, differential, hit)
-                    });
-                    film.set_center(left + x, top + y, |plane| match &center {
-                        Some(center) => center.says(plane),
-                        None => nothing(plane),
+                    let (ray, differential) = grid_ray(scene, 1, tile.x + left + x, tile.y + top + y);
+                    let hit = self.hits.get(x, y, 0, 0);
+                    let center = hit.map(|hit| Center::new(scene, ray, differential, hit));
+                    film.set_center(left + x, top + y, |plane| {
+                        let plane = asks(plane)?;
+                        Some(match (&center, self.there) {
+                            (_, Some(there)) if plane == Plane::Motion => CenterValue::Floats(match &center {
+                                Some(center) => motion::of_thing(center, there, self.level),
+                                None => motion::of_nothing(scene, there, &ray, self.level),
+                            }),
+                            (Some(center), _) => center.says(plane),
+                            (None, _) => nothing(plane),
+                        })
                     });
                 }
             }
         }
+        let asks_motion = film.planes().iter().any(|buffer| asks(buffer.plane()) == Some(Plane::Motion));
+        u64::from(tile.width) * u64::from(tile.height) * if asks_motion { 2 } else { 1 }
     }
 }
 
@@ -67,18 +99,23 @@ fn nothing(plane: Plane) -> CenterValue {
 }
 
 impl<'a> Center<'a> {
-    fn new(scene: &'a Scene, ray: Ray, differential: RayDifferential, hit: Hit) -> Self {
+    pub fn new(scene: &'a Scene, ray: Ray, differential: RayDifferential, hit: Hit) -> Self {
         let is_light = hit.surface.index() >= scene.geometry.surfaces.len();
         let surface = (!is_light).then(|| scene.local_surface(&ray, &hit, &differential));
         Center { scene, ray, differential, hit, surface }
     }
 
     /// Where it is, in the scene's own coordinates.
-    fn p(&self) -> DVec3 {
+    pub fn p(&self) -> DVec3 {
         match &self.surface {
             Some(surface) => surface.p.as_dvec3(),
             None => self.ray.o.as_dvec3() + self.ray.d.as_dvec3() * self.hit.t,
         }
+    }
+
+    /// How far that may be off the surface.
+    pub fn error(&self) -> f64 {
+        self.surface.as_ref().map_or(0.0, |surface| f64::from(surface.error.0.max_element()))
     }
 
     /// The space that it was described in; `None` on a light.
@@ -88,7 +125,7 @@ impl<'a> Center<'a> {
     }
 
     /// The unit normal of the front: of a shape, or of a light.
-    fn front(&self) -> Vec3 {
+    pub fn front(&self) -> Vec3 {
         let Scene { geometry, lights, .. } = self.scene;
         match self.hit.surface.index().checked_sub(geometry.surfaces.len()) {
             None => geometry.point(&self.ray, &self.hit, &self.differential).normal,
@@ -96,8 +133,13 @@ impl<'a> Center<'a> {
         }
     }
 
+    /// Whether that side is seen.
+    pub fn is_front(&self) -> bool {
+        self.front().dot(self.ray.d) < 0.0
+    }
+
     /// The geometric and the shading normal, on the side that is seen.
-    fn normals(&self) -> [Vec3; 2] {
+    pub fn normals(&self) -> [Vec3; 2] {
         match &self.surface {
             Some(surface) => [surface.ng, surface.ns],
             None if self.front().dot(self.ray.d) > 0.0 => [-self.front(); 2],
@@ -147,7 +189,7 @@ impl<'a> Center<'a> {
             Plane::ObjectId => CenterValue::Whole(self.hit.surface.0 + 1),
             Plane::MaterialId => CenterValue::Whole(self.surface.map_or(0, |surface| surface.material.0 + 1)),
             Plane::PrimitiveId => CenterValue::Whole(geometry.primitive(&self.hit).map_or(0, |number| number + 1)),
-            Plane::FaceOrientation => CenterValue::Whole(if self.front().dot(self.ray.d) < 0.0 { 1 } else { 2 }),
+            Plane::FaceOrientation => CenterValue::Whole(if self.is_front() { 1 } else { 2 }),
             _ => unreachable!("{} is not of the centre", plane.name()),
         }
     }

@@ -230,11 +230,12 @@ impl FilmTile {
         self.planes.iter().map(|(buffer, _)| *buffer).collect()
     }
 
-    /// Notes what the centre ray of a pixel says, plane by plane of those that ask it.
-    pub(super) fn set_center(&mut self, x: u32, y: u32, says: impl Fn(Plane) -> CenterValue) {
+    /// Notes what the centre ray of a pixel says, plane by plane of those that ask it; `None` leaves a plane as it is.
+    pub(super) fn set_center(&mut self, x: u32, y: u32, says: impl Fn(Plane) -> Option<CenterValue>) {
         let index = (y * self.tile.width + x) as usize;
         for (buffer, values) in self.planes.iter_mut().filter(|(buffer, _)| buffer.plane().is_of_center()) {
-            match (says(buffer.plane()), values) {
+            let Some(said) = says(buffer.plane()) else { continue };
+            match (said, values) {
                 (CenterValue::Floats([a, ..]), Values::One(pixels)) => pixels[index] = a,
                 (CenterValue::Floats([a, b, _]), Values::Two(pixels)) => pixels[index] = [a, b],
                 (CenterValue::Floats(all), Values::Three(pixels)) => pixels[index] = all,

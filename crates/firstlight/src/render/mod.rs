@@ -30,6 +30,7 @@ mod leaves;
 mod light_queue;
 mod lights;
 mod many;
+mod motion;
 mod packets;
 mod passes;
 pub(crate) mod pixel;
@@ -65,7 +66,6 @@ use crate::scene::Scene;
 use crate::visibility::Target;
 use arrival::Arrivals;
 use cell::{CELL, Cells};
-use centers::Centers;
 pub(crate) use counts::Counts;
 use film::FilmTile;
 use hits::PixelHits;
@@ -335,9 +335,7 @@ fn expose(
         let mut film_tile = FilmTile::new(tile, planes);
         let film = &mut film_tile;
         let token = level.token();
-        if of_centers {
-            Centers::new(scene, token).fill(film);
-        }
+        let center_rays = if of_centers { centers::fill(scene, token, film) } else { 0 };
         let rendered = match renderer {
             _ if !is_lit => ControlFlow::Continue(Counts::default()),
             Renderer::Reference => render_tile(scene, film, &mut Plain, None, &go_on),
@@ -359,9 +357,7 @@ fn expose(
             }
         };
         let ControlFlow::Continue(mut counts) = rendered else { return };
-        if of_centers {
-            counts.camera_rays += tile.width as u64 * tile.height as u64;
-        }
+        counts.camera_rays += center_rays;
         {
             let (film, stats) = &mut *result.lock().expect("no thread panics while it holds the film");
             film.merge(&film_tile);

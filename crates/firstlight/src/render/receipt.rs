@@ -66,6 +66,8 @@ impl Scene {
     /// - `opencv_camera_from_world` and `opengl_camera_from_world`: 4 x 4, row by row; OpenCV's camera looks along z
     ///   with y down, OpenGL's along -z with y up;
     /// - `light_groups`: a JSON list of their names and of the numbers of their lights, from 1;
+    /// - `motion_to`, where motion is asked for: whereto it leads, a number of seconds, or the name of a camera in quotes;
+    ///   and the three matrices of the camera there, with `motion_` before them;
     /// - `object_names`, `material_names`: JSON lists, the name of id 1 first, `null` for what has none.
     pub fn buffers_receipt(&self, settings: &RenderSettings, buffers: &[Buffer]) -> Receipt {
         let mut receipt = self.receipt(settings);
@@ -75,20 +77,26 @@ impl Scene {
         let mut add = |key: &str, value: String| receipt.entries.push((key.to_owned(), value));
         let list = |names: Vec<Option<String>>| serde_json::Value::from(names).to_string();
         add("buffers", list(buffers.iter().map(|buffer| Some(self.buffer_name(*buffer))).collect()));
-        if let Some([fx, fy, cx, cy]) = self.camera.intrinsics() {
-            let k = [fx, 0.0, cx, 0.0, fy, cy, 0.0, 0.0, 1.0];
-            add("intrinsics", k.map(|v| v.to_string()).join(" "));
+        let of_motion = buffers.iter().any(|buffer| buffer.plane().is_of_motion());
+        let motion = self.motion.as_deref().filter(|_| of_motion);
+        if let Some(motion) = motion {
+            add("motion_to", motion.to.to_string());
         }
-        let Frame { position, right, up, forward, .. } = *self.camera.frame();
-        for (key, axes) in
-            [("opencv_camera_from_world", [right, -up, forward]), ("opengl_camera_from_world", [right, up, -forward])]
-        {
-            let row = |axis: Vec3| {
-                let axis = axis.as_dvec3();
-                // Never -0
-                [axis.x, axis.y, axis.z, -axis.dot(position)].map(|v| (v + 0.0).to_string()).join(" ")
-            };
-            add(key, format!("{} 0 0 0 1", axes.map(row).join(" ")));
+        let there = motion.map(|motion| ("motion_", &motion.there.camera));
+        for (prefix, camera) in std::iter::once(("", &self.camera)).chain(there) {
+            if let Some([fx, fy, cx, cy]) = camera.intrinsics() {
+                let k = [fx, 0.0, cx, 0.0, fy, cy, 0.0, 0.0, 1.0];
+                add(&format!("{prefix}intrinsics"), k.map(|v| v.to_string()).join(" "));
+            }
+            let Frame { position, right, up, forward, .. } = *camera.frame();
+            for (convention, axes) in [("opencv", [right, -up, forward]), ("opengl", [right, up, -forward])] {
+                let row = |axis: Vec3| {
+                    let axis = axis.as_dvec3();
+                    // Never -0
+                    [axis.x, axis.y, axis.z, -axis.dot(position)].map(|v| (v + 0.0).to_string()).join(" ")
+                };
+                add(&format!("{prefix}{convention}_camera_from_world"), format!("{} 0 0 0 1", axes.map(row).join(" ")));
+            }
         }
         let asks_for = |plane: Plane| buffers.contains(&plane.into());
         if asks_for(Plane::ObjectId) {

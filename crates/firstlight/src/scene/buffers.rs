@@ -43,7 +43,14 @@ impl SceneDesc {
         for (i, desc) in self.render.buffers.iter().enumerate() {
             let path = format!("render.buffers[{i}]");
             let found: Vec<Buffer> = match desc {
-                BufferDesc::Plane(plane) => vec![(*plane).into()],
+                BufferDesc::Plane(plane) => {
+                    if plane.is_of_motion() && self.render.motion_to.is_none() {
+                        let hint = "write motion_to = a time in seconds, \"next\", \"previous\" or the name of a \
+                                    camera, as --motion-to does";
+                        cx.error(&path, format!("{} leads nowhere without motion_to", quoted(plane.name())), Some(hint));
+                    }
+                    vec![(*plane).into()]
+                }
                 BufferDesc::Light { light, part } => {
                     if *light == LightChoice::All && names.len() > MAX_APART {
                         let message = format!("all {} lights, each apart, are more than {MAX_APART}", names.len());
@@ -170,7 +177,9 @@ impl Scene {
             Buffer::Group(group, _) => (group.index() >= self.light_groups.len()).then(|| {
                 format!("there is no group of lights #{}: the scene has {}", group.0 + 1, self.light_groups.len())
             }),
-            Buffer::Plane(_) => None,
+            Buffer::Plane(plane) => (plane.is_of_motion() && self.motion.is_none()).then(|| {
+                format!("{} leads nowhere: [render] motion_to of the scene says whereto", quoted(plane.name()))
+            }),
         };
         let twice = || {
             let twice = buffers.iter().enumerate().find(|(i, buffer)| buffers[..*i].contains(buffer));

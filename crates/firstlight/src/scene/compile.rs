@@ -98,7 +98,10 @@ impl SceneDesc {
         assets: &dyn Assets,
         options: &CompileOptions,
     ) -> Option<(Scene, Added)> {
-        let (time, cache) = (options.time, options.cache.as_ref());
+        let time = options.time;
+        // What is compiled for two moments shares what does not move
+        let shared = self.render.motion_to.as_ref().map(|_| CompileCache::default());
+        let cache = options.cache.as_ref().or(shared.as_ref());
         if let Some(cache) = cache {
             cache.begin();
         }
@@ -127,7 +130,7 @@ impl SceneDesc {
             bounds: bounds.map(|bounds| bounds.map(|corner| corner.to_array())),
             ..self.summary(desc, &geometry, &lights, &textures)
         };
-        let scene = Scene {
+        let mut scene = Scene {
             width: picture.width,
             height: picture.height,
             antialiasing: picture.antialiasing,
@@ -142,6 +145,7 @@ impl SceneDesc {
             seen_lights: Arc::new(SeenLights::new(&lights)),
             lights,
             light_groups,
+            light_spaces: desc.light_spaces(time, origin),
             materials,
             occluders,
             level: Level::new(),
@@ -149,10 +153,12 @@ impl SceneDesc {
             hash: self.hash(&textures, &files.read, &added),
             moment: time,
             time: cx.keyed.then_some(time),
+            motion: None,
             placeholders: textures.placeholders,
             textures: textures.compiled,
             summary,
         };
+        scene.motion = self.compile_motion(cx, assets, cache, desc, &scene);
         advise(cx, &scene, desc);
         Some((scene, added))
     }
@@ -233,7 +239,7 @@ impl SceneDesc {
     /// Checks every camera and answers with the chosen one.
     ///
     /// `known`: whether the shapes compiled, so that a camera would have been found if there is anything to see.
-    fn compile_camera(&self, cx: &mut CompileContext, width: u32, height: u32, known: bool) -> Camera {
+    pub(super) fn compile_camera(&self, cx: &mut CompileContext, width: u32, height: u32, known: bool) -> Camera {
         let (mut chosen, wanted) = (None, self.chosen_camera());
         for (i, (name, camera)) in self.cameras.iter().enumerate() {
             let path = if name.is_empty() { "camera".to_owned() } else { format!("camera.{name}") };
@@ -277,7 +283,7 @@ impl SceneDesc {
         materials
     }
 
-    fn compile_lights(&self, cx: &mut CompileContext) -> Vec<Light> {
+    pub(super) fn compile_lights(&self, cx: &mut CompileContext) -> Vec<Light> {
         let samples = self.render.samples;
         let points = self.lights.iter().filter_map(LightDesc::samples).map(|(own, _)| match own.unwrap_or(samples) {
             SamplesDesc::Exact => 0,
@@ -355,7 +361,7 @@ impl SceneDesc {
         said.render.fps = RenderDesc::default().fps;
         said.render.tolerance = RenderDesc::default().tolerance;
         // What else is written of the film changes nothing of it
-        said.render.buffers = RenderDesc::default().buffers;
+        (said.render.buffers, said.render.motion_to) = (RenderDesc::default().buffers, None);
         let mut hasher = blake3::Hasher::new();
         hasher.update(said.to_json().as_bytes());
         for (file, hash) in textures.file_hashes() {
@@ -386,6 +392,7 @@ impl Scene {
         scene.camera = compiled;
         scene.time = self.time.or(cx.keyed.then_some(self.moment));
         scene.summary.camera = String::new();
+        scene.motion = self.motion.as_ref().map(|motion| motion.with_camera(camera)).transpose()?;
         let said = SceneDesc { cameras: vec![(String::new(), camera.clone())], ..SceneDesc::default() };
         let mut hasher = blake3::Hasher::new();
         hasher.update(self.hash.as_bytes()).update(b"camera").update(said.to_json().as_bytes());

@@ -1,5 +1,6 @@
 //! A scene as it may be said, in text or in code: nothing resolved, nothing checked.
 
+use super::motion::MotionTo;
 use crate::camera::CameraDesc;
 use crate::describe::{ColorDesc, FilePath, SamplesDesc, table, words};
 use crate::image::{BufferDesc, Plane};
@@ -65,6 +66,9 @@ table! {
         pub exposure: f64 = 0.0,
         /// What files that hold more than a picture, .exr and .npz, are given of each pixel.
         pub buffers: Vec<BufferDesc> = vec![BufferDesc::Plane(Plane::Color)],
+        /// Whereto the buffer `motion` leads: another moment, in seconds from -1e9 to 1e9; `"next"` or `"previous"`, the
+        /// frame after or before this one; or another camera, by its name, at the same moment.
+        pub motion_to: Option<MotionTo> = None,
         /// Frames in a second, 0.001 to 1000000: frame number n of `--frames` is the moment n / fps. Without keys it is
         /// of no account.
         pub fps: f64 = 24.0,

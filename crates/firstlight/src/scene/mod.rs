@@ -11,6 +11,7 @@ mod geometry;
 mod light_spheres;
 mod links;
 mod model;
+mod motion;
 mod occluders;
 mod outline;
 mod place;
@@ -28,6 +29,7 @@ pub(crate) use compile::MAX_SIDE;
 pub use compile::{CompileOptions, Compiled};
 pub use description::{DisplayEncoding, RenderDesc, SceneDesc};
 pub use model::{Added, Framing, ModelSettings, UpAxis, View};
+pub use motion::MotionTo;
 pub use text::{Parsed, reference, schema};
 pub use trace::Hit;
 pub(crate) use trace::TracedHit;
@@ -44,11 +46,12 @@ use crate::ids::SurfaceId;
 use crate::image::Buffer;
 use crate::light::Light;
 use crate::material::Material;
-use crate::math::DVec3;
+use crate::math::{DAffine3, DVec3};
 use crate::texture::Texture;
 pub(crate) use geometry::{At, Geometry, Nearest, ObjectSpace, Placed, PlacedTarget, UpperItem};
 pub(crate) use links::LinkId;
 pub(crate) use occluders::{Listed, ListedOccluders, Opacity};
+use motion::Motion;
 use seen_lights::SeenLights;
 pub(crate) use trees::ShadowRays;
 
@@ -75,6 +78,8 @@ pub struct Scene {
     pub(crate) lights: Vec<Light>,
     /// Their groups, by name, in the order of their first lights.
     pub(crate) light_groups: Vec<(String, Vec<u32>)>,
+    /// The spaces that they were described in: from there to the scene's own coordinates.
+    pub(crate) light_spaces: Vec<DAffine3>,
     /// Those of them that a camera can see.
     pub(crate) seen_lights: Arc<SeenLights>,
     pub(crate) materials: Vec<Material>,
@@ -90,6 +95,8 @@ pub struct Scene {
     pub(crate) moment: f64,
     /// The moment, in seconds, if anything of the scene changes with time.
     pub(crate) time: Option<f64>,
+    /// Whereto `motion` leads.
+    pub(crate) motion: Option<Arc<Motion>>,
     /// The texture files that something stands in for.
     pub(crate) placeholders: Vec<String>,
     pub(crate) summary: SceneSummary,

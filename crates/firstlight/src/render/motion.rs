@@ -1,0 +1,113 @@
+//! Where what a pixel shows is in another picture of the same scene: at another moment, or from another camera.
+
+use fearless_simd::Level;
+
+use super::centers::Center;
+use crate::camera::Camera;
+use crate::math::{DVec3, Ray, UNIT_ROUNDOFF};
+use crate::scene::{Hit, Scene};
+
+/// Pixels to the right and down, and whether it is seen there.
+pub(super) type Flow = [f32; 3];
+
+const SEEN: f32 = 1.0;
+const HIDDEN: f32 = 0.0;
+/// What has no place in the other picture.
+const NOWHERE: Flow = [0.0, 0.0, -1.0];
+
+/// Rounding in a place that was found on one way and is looked for on another, in units of the last place of 32 bits:
+/// that of the point, of the ray to it, and of the surface there.
+const ROUNDINGS: f64 = 32.0;
+
+/// A point of a surface that was carried from one scene to another.
+struct Carried<'a> {
+    there: &'a Scene,
+    level: Level,
+    of: Hit,
+    /// Where it is, and the normal of its front, of any length.
+    p: DVec3,
+    front: DVec3,
+    /// Whether the front was seen.
+    is_front: bool,
+    /// How far `p` may be off the surface, but for what grows with the way to the camera.
+    error: f64,
+}
+
+/// Of a thing that a centre ray meets.
+pub(super) fn of_thing(center: &Center, there: &Scene, level: Level) -> Flow {
+    let (here, p, front) = (center.scene, center.p(), center.front().as_dvec3());
+    let surface = center.hit.surface;
+    let [from, to] = [here, there].map(|scene| scene.space_of(surface));
+    // What does not move stays, to the bit
+    let (moved, turned) = if from == to {
+        (p, front)
+    } else {
+        let there_from_here = to * from.inverse();
+        (there_from_here.transform_point3(p), there_from_here.matrix3.inverse().transpose() * front)
+    };
+    let (Some((before, _)), Some((after, depth))) =
+        (here.camera.local_project(p), there.camera.local_project(moved))
+    else {
+        return NOWHERE;
+    };
+    let error = center.error() + ROUNDINGS * ulp(p.abs().max(moved.abs()).max_element());
+    let is_front = center.is_front();
+    let carried = Carried { there, level, of: center.hit, p: moved, front: turned, is_front, error };
+    flow(before, after, || depth > 0.0 && is_inside(there, after) && carried.is_seen(after))
+}
+
+/// Of a centre ray that meets nothing: of its end, infinitely far away.
+pub(super) fn of_nothing(here: &Scene, there: &Scene, ray: &Ray, level: Level) -> Flow {
+    let (o, d) = (ray.o.as_dvec3(), ray.d.as_dvec3());
+    let from_there = o + (here.origin - there.origin);
+    let ends = (here.camera.local_project_end(o, d), there.camera.local_project_end(from_there, d));
+    let (Some(before), Some(after)) = ends else { return NOWHERE };
+    flow(before, after, || is_inside(there, after) && there.intersect_at(level, &ray_at(&there.camera, after)).is_none())
+}
+
+fn flow(before: [f64; 2], after: [f64; 2], is_seen: impl FnOnce() -> bool) -> Flow {
+    let [x, y] = [0, 1].map(|axis| (after[axis] - before[axis]) as f32);
+    if !(x.is_finite() && y.is_finite()) {
+        return NOWHERE;
+    }
+    [x, y, if is_seen() { SEEN } else { HIDDEN }]
+}
+
+fn is_inside(scene: &Scene, [x, y]: [f64; 2]) -> bool {
+    (0.0..f64::from(scene.width)).contains(&x) && (0.0..f64::from(scene.height)).contains(&y)
+}
+
+fn ray_at(camera: &Camera, [x, y]: [f64; 2]) -> Ray {
+    camera.local_ray(x as f32, y as f32, 1.0).0
+}
+
+fn ulp(size: f64) -> f64 {
+    size * f64::from(UNIT_ROUNDOFF)
+}
+
+impl Carried<'_> {
+    /// Whether a camera ray through `pixel`, where it is, ends at it.
+    fn is_seen(&self, pixel: [f64; 2]) -> bool {
+        let ray = ray_at(&self.there.camera, pixel);
+        let (o, d) = (ray.o.as_dvec3(), ray.d.as_dvec3());
+        let t = (self.p - o).dot(d) / d.length_squared();
+        let error = self.error + ROUNDINGS * ulp(t.abs());
+        let is_front = self.front.dot(d) < 0.0;
+        let faces = is_front == self.is_front;
+        let Some(hit) = self.there.intersect_at(self.level, &ray) else {
+            // At an edge that the ray just misses; or it is the side that rays pass through
+            return faces;
+        };
+        let gap = t - hit.t;
+        if hit.surface == self.of.surface {
+            let met = Center::new(self.there, ray, Default::default(), hit);
+            // Along a slanting ray a little beside the point is far along the ray: what counts is how far the point is
+            // off the plane that was met. The far side of something round is met from the other side
+            let height = gap * met.normals()[0].as_dvec3().dot(d);
+            if height.abs() <= error + met.error() && met.is_front() == is_front {
+                return true;
+            }
+        }
+        gap <= error && faces
+    }
+}
