@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Args, Parser, Subcommand, ValueEnum, ValueHint};
-use firstlight::{BufferDesc, ColorDesc, Framing, SamplesDesc, SimdLevel, View, VisibilityMode, Window};
+use firstlight::{BufferDesc, ColorDesc, Framing, MotionTo, SamplesDesc, SimdLevel, View, VisibilityMode, Window};
 
 /// The version and, where it is known, the commit: `0.1.0 (0123456789)`.
 const VERSION: &str = concat!(env!("CARGO_PKG_VERSION"), env!("FIRSTLIGHT_COMMIT"));
@@ -72,6 +72,8 @@ Examples:
       the same pixels as in the whole picture, only fewer of them
   firstlight render room.toml --buffers color,depth,object-id -o room.npz
       what is seen, how far away and which object, as arrays for numpy
+  firstlight render room.toml --frames 0..46 --buffers color,motion --motion-to next -o room.exr
+      frames with the optical flow from each to the next
   firstlight render config23 -o - | magick - config23.jpg
       to another program
   generate-scene | firstlight render - -o scene.png
@@ -170,6 +172,11 @@ pub struct RenderArgs {
     #[arg(long, value_name = "NAMES", value_parser = buffer, value_delimiter = ',', help_heading = "Output")]
     #[arg(hide_possible_values = true)]
     pub buffers: Option<Vec<BufferDesc>>,
+    /// Whereto the buffers motion and motion-backward lead: another moment, in seconds; next or previous, the frame after
+    /// or before this one; or another camera of the scene, by its name [default: the scene's]
+    #[arg(long, value_name = "TIME|CAMERA", value_parser = motion_to, help_heading = "Output")]
+    #[arg(allow_hyphen_values = true)]
+    pub motion_to: Option<MotionTo>,
     /// Bits of each channel of PNG files: 8 or 16 [default: 8]
     #[arg(long, value_name = "BITS", help_heading = "Output")]
     pub bits: Option<Bits>,
@@ -368,6 +375,14 @@ fn visibility() -> impl TypedValueParser<Value = VisibilityMode> {
 /// Reads the name of a buffer.
 fn buffer(name: &str) -> Result<BufferDesc, String> {
     BufferDesc::parse(name).map_err(|(fault, hint)| hint.map_or(fault.clone(), |hint| format!("{fault}; {hint}")))
+}
+
+/// Reads whereto motion leads: what reads as a number is a time.
+fn motion_to(text: &str) -> Result<MotionTo, String> {
+    if text.parse::<f64>().is_ok() {
+        return time(text).map(MotionTo::Time);
+    }
+    MotionTo::from_name(text).ok_or("a time in seconds, next, previous, or the name of a camera is needed".into())
 }
 
 /// Reads the number of samples, or the word for none.

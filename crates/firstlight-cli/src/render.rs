@@ -74,7 +74,7 @@ fn render(plan: &Plan, job: &Job, reading: &ReadingArgs) -> Result<(), Failure> 
     let (outputs, settings) = plan.join(job, &mut input)?;
     plan.check_buffers(&outputs, &input.parsed.desc.render.buffers)?;
     let moments = plan.moments(job, &input, &outputs)?;
-    if moments.len() > 1 {
+    if moments.len() > 1 || input.parsed.desc.render.motion_to.is_some() {
         input.remember_files();
     }
 

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 
 use firstlight::{
-    AaMode, BufferDesc, Compiled, DVec3, GroupDesc, InstanceDesc, MeshDesc, NoAssets, Parsed, RenderSettings,
+    AaMode, BufferDesc, Compiled, DVec3, GroupDesc, InstanceDesc, MeshDesc, MotionTo, NoAssets, Parsed, RenderSettings,
     SamplesDesc, SceneDesc, SceneError as Faults, ShapeDesc, Vec3, Window, WorldRay, builtin_scenes,
 };
 use numpy::{PyArray1, PyArrayMethods};
@@ -21,7 +21,7 @@ use crate::error::{SceneWarning, diagnostics, fault, scene_error};
 use crate::files::{SceneFiles, Source};
 use crate::item::{Item, find, get, item_table, push, set, without_places};
 use crate::render::{PyRender, run};
-use crate::state::{CameraChoice, State, Wanted};
+use crate::state::{CameraChoice, MotionChoice, State, Wanted};
 use crate::value::tree;
 
 /// No scene text is longer, in bytes.
@@ -84,29 +84,7 @@ impl PyScene {
         tolerance: Option<f64>,
         time: f64,
     ) -> PyResult<Wanted> {
-        let camera = match camera {
-            None => None,
-            Some(camera) => match camera.extract::<String>() {
-                Ok(name) => Some(CameraChoice::Named(name)),
-                Err(_) => {
-                    let fields = if camera.hasattr(intern!(py, "_resolve"))? {
-                        let resolved = camera.call_method1(intern!(py, "_resolve"), (size[0], size[1]))?;
-                        let (fields, width, height): (Bound<'_, PyDict>, Option<u32>, Option<u32>) =
-                            resolved.extract()?;
-                        size = [width, height];
-                        fields
-                    } else {
-                        let wanted = "a name, a Camera or a dict is wanted";
-                        camera.cast::<PyDict>().map_err(|_| PyTypeError::new_err(format!("camera: {wanted}")))?.clone()
-                    };
-                    let item = Item::read("camera", "camera", "", item_table(&fields, "camera")?);
-                    match item.map_err(|faults| scene_error(py, &faults))? {
-                        Item::Camera(_, camera) => Some(CameraChoice::Other(Box::new(camera))),
-                        _ => None,
-                    }
-                }
-            },
-        };
+        let camera = camera.map(|camera| camera_choice(py, "camera", camera, &mut size)).transpose()?;
         let samples = match samples {
             None => None,
             Some(word) if word.extract::<String>().is_ok_and(|word| word == "exact") => Some(SamplesDesc::Exact),
@@ -114,7 +92,7 @@ impl PyScene {
                 PyValueError::new_err(format!("samples is {count}; \"exact\" or a whole number is wanted"))
             })?)),
         };
-        Ok(Wanted { camera, size, antialiasing, samples, tolerance, buffers: None, time })
+        Ok(Wanted { camera, size, antialiasing, samples, tolerance, time, ..Wanted::default() })
     }
 
     fn item(&self, py: Python<'_>, family: &str, index: usize) -> PyResult<Item> {
@@ -430,6 +408,9 @@ impl PyScene {
     ///     x, y, width and height of the part to render, in pixels from the upper left corner.
     /// time : float
     ///     The moment, in seconds, of a scene with keys.
+    /// motion_to : float or str or Camera or dict, optional
+    ///     Whereto the buffers `motion` and `motion-backward` lead: another moment, in seconds; "next" or "previous", the
+    ///     frame after or before this one; one of the scene's cameras, or another one.
     /// threads : int
     ///     Threads to render with; 0 is one for each processor. It changes no bit.
     /// progress : callable, optional
@@ -441,7 +422,7 @@ impl PyScene {
     ///     A mapping from the names of the buffers to arrays, row 0 at the top.
     #[pyo3(signature = (
         *, camera = None, width = None, height = None, buffers = None, aa = None, samples = None, tolerance = None,
-        aa_mode = "adaptive", crop = None, time = 0.0, threads = 0, progress = None
+        aa_mode = "adaptive", crop = None, time = 0.0, motion_to = None, threads = 0, progress = None
     ))]
     #[allow(clippy::too_many_arguments, reason = "they are the keyword arguments of Python")]
     fn render(
@@ -457,6 +438,7 @@ impl PyScene {
         aa_mode: &str,
         crop: Option<(u32, u32, u32, u32)>,
         time: f64,
+        motion_to: Option<&Bound<'_, PyAny>>,
         threads: usize,
         progress: Option<&Bound<'_, PyAny>>,
     ) -> PyResult<PyRender> {
@@ -468,9 +450,14 @@ impl PyScene {
         let mut wanted = Self::wanted(py, camera, [width, height], aa, samples, tolerance, time)?;
         let asked = buffers.map(|names| names.iter().map(|name| buffer(name)).collect::<PyResult<_>>());
         wanted.buffers = asked.transpose()?;
+        wanted.motion_to = motion_to.map(|to| motion_choice(py, to, &mut wanted.size)).transpose()?;
         let (compiled, files) = self.compiled(py, &wanted)?;
         let scene = &compiled.scene;
         let buffers = scene.buffers().to_vec();
+        if motion_to.is_some() && !buffers.iter().any(|buffer| buffer.plane().is_of_motion()) {
+            let message = "motion_to is for the buffers motion and motion-backward, and neither is asked for";
+            return Err(PyValueError::new_err(message));
+        }
         let settings = RenderSettings { threads, crop, aa_mode, buffers, ..RenderSettings::default() };
         settings.check(scene).map_err(PyValueError::new_err)?;
         settings.check_memory(scene).map_err(PyMemoryError::new_err)?;
@@ -612,6 +599,47 @@ impl PyScene {
         }
         self.with(py, |own| *own = state);
         Ok(())
+    }
+}
+
+/// A camera of the scene, by its name, or another one; `size` is that of the picture, which it may say. `what` is the
+/// argument's name.
+fn camera_choice(
+    py: Python<'_>,
+    what: &str,
+    camera: &Bound<'_, PyAny>,
+    size: &mut [Option<u32>; 2],
+) -> PyResult<CameraChoice> {
+    if let Ok(name) = camera.extract::<String>() {
+        return Ok(CameraChoice::Named(name));
+    }
+    let fields = if camera.hasattr(intern!(py, "_resolve"))? {
+        let resolved = camera.call_method1(intern!(py, "_resolve"), (size[0], size[1]))?;
+        let (fields, width, height): (Bound<'_, PyDict>, Option<u32>, Option<u32>) = resolved.extract()?;
+        *size = [width, height];
+        fields
+    } else {
+        let wanted = || PyTypeError::new_err(format!("{what}: a name, a Camera or a dict is wanted"));
+        camera.cast::<PyDict>().map_err(|_| wanted())?.clone()
+    };
+    match Item::read("camera", "camera", "", item_table(&fields, "camera")?) {
+        Ok(Item::Camera(_, camera)) => Ok(CameraChoice::Other(Box::new(camera))),
+        Ok(_) => unreachable!("it was read as a camera"),
+        Err(faults) => Err(scene_error(py, &faults)),
+    }
+}
+
+/// Whereto motion leads.
+fn motion_choice(py: Python<'_>, to: &Bound<'_, PyAny>, size: &mut [Option<u32>; 2]) -> PyResult<MotionChoice> {
+    if let Ok(time) = to.extract::<f64>() {
+        return Ok(MotionChoice::To(MotionTo::Time(time)));
+    }
+    match camera_choice(py, "motion_to", to, size)? {
+        CameraChoice::Other(camera) => Ok(MotionChoice::Camera(camera)),
+        CameraChoice::Named(name) => match MotionTo::from_name(&name) {
+            Some(to) => Ok(MotionChoice::To(to)),
+            None => Err(PyValueError::new_err("motion_to is empty; it is a time, \"next\", \"previous\" or a camera")),
+        },
     }
 }
 

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use firstlight::{
-    BufferDesc, CameraDesc, CompileCache, CompileOptions, Compiled, Parsed, SamplesDesc, SceneError as Faults,
+    BufferDesc, CameraDesc, CompileCache, CompileOptions, Compiled, MotionTo, Parsed, SamplesDesc, SceneError as Faults,
 };
 
 use crate::files::SceneFiles;
@@ -28,6 +28,7 @@ pub struct Wanted {
     pub samples: Option<SamplesDesc>,
     pub tolerance: Option<f64>,
     pub buffers: Option<Vec<BufferDesc>>,
+    pub motion_to: Option<MotionChoice>,
     pub time: f64,
 }
 
@@ -35,6 +36,12 @@ pub struct Wanted {
 pub enum CameraChoice {
     Named(String),
     Other(Box<CameraDesc>),
+}
+
+#[derive(Clone, Debug, PartialEq)]
+pub enum MotionChoice {
+    To(MotionTo),
+    Camera(Box<CameraDesc>),
 }
 
 impl State {
@@ -59,6 +66,9 @@ impl State {
         [render.width, render.height] = film_size(wanted.size, [render.width, render.height]);
         render.antialiasing = wanted.antialiasing.unwrap_or(render.antialiasing);
         render.tolerance = wanted.tolerance.unwrap_or(render.tolerance);
+        // Also where the call's camera takes the place of the scene's
+        let own = || before.0.motion_to.clone().map(MotionChoice::To);
+        let there = wanted.motion_to.clone().or_else(own).map(|to| to.named(&before.1));
         match &wanted.camera {
             Some(CameraChoice::Named(name)) => render.camera = Some(name.clone()),
             Some(CameraChoice::Other(camera)) => {
@@ -69,6 +79,11 @@ impl State {
         }
         if let Some(buffers) = &wanted.buffers {
             desc.render.buffers.clone_from(buffers);
+        }
+        if let Some((to, camera)) = there {
+            let camera = camera.filter(|(name, _)| desc.cameras.iter().all(|(other, _)| other != name));
+            desc.cameras.extend(camera);
+            desc.render.motion_to = Some(to);
         }
         if let Some(samples) = wanted.samples {
             desc.render.samples = samples;
@@ -93,6 +108,24 @@ impl State {
     pub fn change(&mut self) {
         self.changes += 1;
         self.compiled = None;
+    }
+}
+
+impl MotionChoice {
+    /// As a scene says it, and the camera it leads to, of `cameras` or another one.
+    fn named(&self, cameras: &[(String, CameraDesc)]) -> (MotionTo, Option<(String, CameraDesc)>) {
+        match self {
+            MotionChoice::To(to) => {
+                let camera = cameras.iter().find(|(name, _)| matches!(to, MotionTo::Camera(own) if own == name));
+                (to.clone(), camera.cloned())
+            }
+            MotionChoice::Camera(camera) => {
+                let taken = |name: &String| cameras.iter().any(|(other, _)| other == name);
+                let mut names = std::iter::once("there".to_owned()).chain((2u32..).map(|n| format!("there-{n}")));
+                let name = names.find(|name| !taken(name)).expect("the cameras are not endless");
+                (MotionTo::Camera(name.clone()), Some((name, (**camera).clone())))
+            }
+        }
     }
 }
 

@@ -170,3 +170,55 @@ def test_several_threads_render_at_once():
     for thread in threads:
         thread.join()
     assert all((a == b).all() for a, b in zip(found, expected))
+
+
+def _moving():
+    keys = [{"time": 0, "translate": [0, 0, 0]}, {"time": 1, "translate": [1, 0, 0]}]
+    scene = fl.Scene()
+    scene.add_camera(name="left", position=[0, 0, 10], projection="orthographic", height=4)
+    scene.add_camera(name="right", position=[0.5, 0, 10], look_at=[0.5, 0, 0], projection="orthographic", height=4)
+    scene.add_parallelogram(p=[-0.5, -0.5, 0], e0=[1, 0, 0], e1=[0, 1, 0], transform={"keys": keys})
+    scene.settings.update(width=80, height=40, fps=2)
+    return scene
+
+
+def test_motion_leads_to_a_time_or_a_camera():
+    scene = _moving()
+    buffers = ["motion", "object-id"]
+
+    def steps(**options):
+        frame = scene.render(buffers=buffers, **options)
+        seen = frame["motion"][frame["object-id"] == 1]
+        assert frame["motion"].shape == (40, 80, 3) and len(seen) > 50 and (seen[:, 1] == 0).all()
+        assert np.ptp(seen[:, 0]) < 1e-4
+        return float(seen[0, 0]), float(seen[0, 2]), frame.receipt["motion_to"]
+
+    # Ten pixels are a metre
+    assert steps(motion_to=0.2) == (pytest.approx(2), 1, "0.2")
+    assert steps(motion_to="next") == (pytest.approx(5), 1, "0.5")
+    assert steps(motion_to="previous", time=1.0) == (pytest.approx(-5), 1, "0.5")
+    assert steps(motion_to="right", time=0.5) == (pytest.approx(-5), 1, '"right"')
+    other = {"position": [-0.2, 0, 10], "look_at": [-0.2, 0, 0], "projection": "orthographic", "height": 4}
+    assert steps(motion_to=other)[:2] == (pytest.approx(2), 1)
+    assert steps(camera=fl.Camera(**other), motion_to="right")[0] == pytest.approx(-7)
+    assert steps(camera="right", motion_to=fl.Camera(**other))[0] == pytest.approx(7)
+    # There and back: the other picture's own motion
+    there = scene.render(buffers=["motion"], time=0.7, motion_to=0.0)["motion"]
+    assert (scene.render(buffers=["motion-backward"], motion_to=0.7)["motion-backward"] == there).all()
+    # A scene may say it itself
+    scene.settings.update(motion_to="right")
+    assert steps()[0] == pytest.approx(-5) and steps(camera=other)[0] == pytest.approx(-7)
+
+
+def test_motion_that_leads_nowhere_is_refused():
+    scene = _moving()
+    with pytest.raises(fl.SceneError, match="motion_to"):
+        scene.render(buffers=["motion"])
+    with pytest.raises(ValueError, match="neither is asked for"):
+        scene.render(buffers=["depth"], motion_to=1)
+    with pytest.raises(fl.SceneError, match='did you mean "right"'):
+        scene.render(buffers=["motion"], motion_to="rigt")
+    with pytest.raises(TypeError, match="motion_to: a name, a Camera or a dict"):
+        scene.render(buffers=["motion"], motion_to=[1])
+    with pytest.raises(fl.SceneError, match="in seconds"):
+        scene.render(buffers=["motion"], motion_to=float("nan"))

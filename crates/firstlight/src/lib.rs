@@ -96,8 +96,8 @@ pub use material::{BlinnPhongDesc, MaterialDesc, PhongDesc};
 pub use math::{DVec3, ShadowRay, Vec2, Vec3, WorldRay};
 pub use render::{AaMode, Film, Heat, LightCounts, RenderSettings, RenderStats, VisibilityMode, render, render_image};
 pub use scene::{
-    Added, CameraHit, CastHit, CompileOptions, Compiled, DisplayEncoding, Framing, Hit, ModelSettings, RenderDesc,
-    MotionTo, Scene, SceneDesc, SceneSummary, SurfacePoint, UpAxis, View,
+    Added, CameraHit, CastHit, CompileOptions, Compiled, DisplayEncoding, Framing, Hit, ModelSettings, MotionTo,
+    RenderDesc, Scene, SceneDesc, SceneSummary, SurfacePoint, UpAxis, View,
 };
 pub use scene::{Builtin, Parsed, builtin_scenes, reference, schema};
 pub use shape::{

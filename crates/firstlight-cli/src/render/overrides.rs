@@ -1,6 +1,8 @@
 //! What the command line says in place of the scene.
 
-use firstlight::{BufferDesc, ColorDesc, LightDesc, SampleSet, SamplesDesc, SceneDesc, ShadowTerminator};
+use firstlight::{
+    BufferDesc, ColorDesc, LightDesc, MotionTo, RenderDesc, SampleSet, SamplesDesc, SceneDesc, ShadowTerminator,
+};
 
 use crate::args::Size;
 use crate::report::Failure;
@@ -20,6 +22,7 @@ pub(super) struct Overrides<'a> {
     pub camera: Option<&'a str>,
     pub tolerance: Option<f64>,
     pub buffers: Option<&'a [BufferDesc]>,
+    pub motion_to: Option<&'a MotionTo>,
     pub terminator: Option<ShadowTerminator>,
 }
 
@@ -43,12 +46,19 @@ impl Overrides<'_> {
         if let Some(buffers) = self.buffers {
             render.buffers = buffers.to_vec();
         }
+        if let Some(to) = self.motion_to {
+            render.motion_to = Some(to.clone());
+        }
+        self.check_motion(render)?;
         render.shadow_terminator = self.terminator.unwrap_or(render.shadow_terminator);
         if let Some(name) = self.camera {
-            if !desc.cameras.iter().any(|(known, _)| known == name) {
-                return Err(Failure::Usage(no_such_camera(name, desc)));
-            }
             render.camera = Some(name.to_owned());
+        }
+        let there = self.motion_to.and_then(|to| if let MotionTo::Camera(name) = to { Some(&**name) } else { None });
+        for (option, name) in [("--camera", self.camera), ("--motion-to", there)] {
+            if let Some(name) = name.filter(|name| !desc.cameras.iter().any(|(known, _)| known == name)) {
+                return Err(Failure::Usage(no_such_camera(option, name, desc)));
+            }
         }
         if let Some(samples) = self.samples {
             render.samples = samples;
@@ -57,6 +67,27 @@ impl Overrides<'_> {
             }
         }
         Ok(())
+    }
+
+    /// Sees that motion is asked for together with where it leads.
+    fn check_motion(&self, render: &RenderDesc) -> Result<(), Failure> {
+        let of_motion = |buffer: &&BufferDesc| matches!(buffer, BufferDesc::Plane(plane) if plane.is_of_motion());
+        match render.buffers.iter().find(of_motion) {
+            None if self.motion_to.is_some() => {
+                let message = "--motion-to is for the buffers motion and motion-backward, and neither is asked for; \
+                               name one with --buffers";
+                Err(Failure::Usage(message.into()))
+            }
+            Some(buffer) if self.buffers.is_some() && render.motion_to.is_none() => {
+                let name = buffer.name();
+                let message = format!(
+                    "--buffers {name} leads nowhere; say whereto with --motion-to: a time in seconds, next, previous, \
+                     or the name of a camera"
+                );
+                Err(Failure::Usage(message))
+            }
+            _ => Ok(()),
+        }
     }
 }
 
@@ -77,11 +108,11 @@ fn set_samples(light: &mut LightDesc, samples: SamplesDesc) -> Result<(), Failur
     Ok(())
 }
 
-fn no_such_camera(name: &str, desc: &SceneDesc) -> String {
+fn no_such_camera(option: &str, name: &str, desc: &SceneDesc) -> String {
     let names: Vec<&str> = desc.cameras.iter().map(|(name, _)| name.as_str()).filter(|name| !name.is_empty()).collect();
     match names[..] {
-        [] => format!("--camera {name}: the scene names no cameras; leave the option out"),
-        _ => format!("--camera {name}: the scene has no such camera; it has {}", names.join(", ")),
+        [] => format!("{option} {name}: the scene names no cameras; leave the option out"),
+        _ => format!("{option} {name}: the scene has no such camera; it has {}", names.join(", ")),
     }
 }
 

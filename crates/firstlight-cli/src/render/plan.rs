@@ -124,6 +124,7 @@ impl<'a> Plan<'a> {
             camera: args.camera.as_deref(),
             tolerance: args.tolerance,
             buffers: args.buffers.as_deref(),
+            motion_to: args.motion_to.as_ref(),
             terminator: args.shadow_terminator.map(|word| match word {
                 Terminator::Smooth => ShadowTerminator::Smooth,
                 Terminator::Hard => ShadowTerminator::Hard,

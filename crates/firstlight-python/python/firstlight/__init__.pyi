@@ -22,7 +22,7 @@ Buffer = str | Literal[
     "color", "alpha", "background", "emission", "ambient", "diffuse", "specular", "depth", "distance", "position",
     "position-camera", "position-object", "normal", "normal-camera", "normal-object", "normal-geometric",
     "normal-geometric-camera", "tangent", "uv", "barycentric", "albedo", "object-id", "instance-id", "material-id",
-    "primitive-id", "face-orientation", "rays",
+    "primitive-id", "face-orientation", "motion", "motion-backward", "rays",
 ]
 # Three rows or four of four numbers, or a table of the scene format
 Transform = ArrayLike | Mapping[str, Any] | None
@@ -224,6 +224,7 @@ class Scene:
         aa_mode: Literal["adaptive", "full"] = "adaptive",
         crop: tuple[int, int, int, int] | None = None,
         time: float = 0.0,
+        motion_to: float | str | Camera | dict[str, Any] | None = None,
         threads: int = 0,
         progress: Callable[[int, int], object] | None = None,
     ) -> Render: ...

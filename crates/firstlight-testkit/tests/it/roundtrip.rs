@@ -100,16 +100,26 @@ fn buffer() -> impl Strategy<Value = BufferDesc> {
     prop_oneof![select(Plane::ALL).prop_map(BufferDesc::Plane), of_light, of_group]
 }
 
+fn motion_to() -> impl Strategy<Value = MotionTo> {
+    prop_oneof![
+        number().prop_map(MotionTo::Time),
+        "[a-z ]{1,8}".prop_map(|name| MotionTo::from_name(&name).unwrap()),
+        select(vec![MotionTo::Next, MotionTo::Previous])
+    ]
+}
+
 prop_compose! {
     fn render()(
         size in [any::<u32>(), any::<u32>(), any::<u32>()], camera in maybe(text()),
         samples in samples(), colors in [color(), color()], transparent: bool, display in select(DisplayEncoding::ALL),
         gamma in number(), exposure in number(), fps in number(), tolerance in number(),
         shadow_terminator in select(ShadowTerminator::ALL), buffers in vec(buffer(), 0..4),
+        motion_to in maybe(motion_to()),
     ) -> RenderDesc {
         RenderDesc {
             width: size[0], height: size[1], antialiasing: size[2], samples, camera, background: colors[0],
             transparent, ambient: colors[1], display, gamma, exposure, fps, shadow_terminator, tolerance, buffers,
+            motion_to,
         }
     }
 }

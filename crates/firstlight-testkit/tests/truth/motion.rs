@@ -229,7 +229,8 @@ const CARD: &str = "[render]\nwidth = 60\nheight = 40\nmotion_to = 1\n[camera]\n
 
 #[test]
 fn what_gets_hidden_is_marked_and_nothing_else() {
-    let inside = |pixel: usize, left: usize| (left..left + 10).contains(&(pixel % 60)) && (15..25).contains(&(pixel / 60));
+    let inside =
+        |pixel: usize, left: usize| (left..left + 10).contains(&(pixel % 60)) && (15..25).contains(&(pixel / 60));
     let forward = motion(&at(CARD, 0.0), Plane::Motion);
     for (pixel, [x, y, visible]) in forward.into_iter().enumerate() {
         let is_card = inside(pixel, 25);
@@ -282,7 +283,10 @@ fn what_turns_away_hides_itself() {
             as_said += usize::from((*visible == 1.0) == seen);
         }
         // Of a ball that turns a little one edge goes behind it
-        assert!(on > 300 && as_said >= on - if degrees == 5.0 { 25 } else { 0 }, "{shape} {degrees}: {as_said} of {on}");
+        assert!(
+            on > 300 && as_said >= on - if degrees == 5.0 { 25 } else { 0 },
+            "{shape} {degrees}: {as_said} of {on}"
+        );
     }
 }
 

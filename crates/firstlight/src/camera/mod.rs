@@ -277,6 +277,38 @@ mod tests {
     }
 
     #[test]
+    fn projecting_is_the_way_back_from_a_ray() {
+        let turned = |desc: CameraDesc| CameraDesc { look_at: [0.5, -1.0, 0.2], up: [0.1, 1.0, 0.2], ..desc };
+        let eye = CameraDesc::new([1.0, 2.0, 10.0]);
+        let matrix = CameraDesc {
+            focal_length_px: Some([525.25, 917.5]),
+            principal_point_px: Some([-300.75, 251.125]),
+            ..eye.clone()
+        };
+        for desc in [
+            eye.clone(),
+            turned(eye.clone()),
+            turned(CameraDesc { fov_y_deg: Some(170.0), ..eye.clone() }),
+            turned(CameraDesc { fov_y_deg: Some(0.5), shift: [3.0, -2.0], ..eye }),
+            turned(matrix),
+            orthographic(4.0),
+            turned(CameraDesc { shift: [0.3, -7.0], ..orthographic(0.02) }),
+        ] {
+            let camera = compiled(&desc, 1920, 1080);
+            for (x, y) in [(0.0, 0.0), (960.0, 540.0), (0.5, 1079.5), (1313.25, 77.75), (-20.0, 1100.0)] {
+                for distance in [0.01, 1.0, 12.5, 1e6] {
+                    let (ray, _) = camera.ray(x, y, 1.0);
+                    let ahead = camera.project(ray.o + ray.d.as_dvec3() * distance);
+                    let [u, v] = ahead.unwrap_or_else(|| panic!("{desc:?} {x} {y}"));
+                    let off = (u - f64::from(x)).abs().max((v - f64::from(y)).abs());
+                    assert!(off < 1e-3, "{desc:?}: {u} {v} is not {x} {y}");
+                    assert_eq!(camera.project(ray.o - ray.d.as_dvec3() * distance), None);
+                }
+            }
+        }
+    }
+
+    #[test]
     fn a_shift_is_a_part_of_a_larger_film() {
         // The right upper quarter of a film of twice the size, bit by bit; 12 mm and 24 mm high at the same focal
         // length

@@ -194,7 +194,7 @@ impl Plane {
     }
 
     /// Whether it leads to another moment or camera.
-    pub(crate) fn is_of_motion(self) -> bool {
+    pub fn is_of_motion(self) -> bool {
         matches!(self, Plane::Motion | Plane::MotionBackward)
     }
 

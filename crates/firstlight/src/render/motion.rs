@@ -45,8 +45,7 @@ pub(super) fn of_thing(center: &Center, there: &Scene, level: Level) -> Flow {
         let there_from_here = to * from.inverse();
         (there_from_here.transform_point3(p), there_from_here.matrix3.inverse().transpose() * front)
     };
-    let (Some((before, _)), Some((after, depth))) =
-        (here.camera.local_project(p), there.camera.local_project(moved))
+    let (Some((before, _)), Some((after, depth))) = (here.camera.local_project(p), there.camera.local_project(moved))
     else {
         return NOWHERE;
     };
@@ -62,7 +61,9 @@ pub(super) fn of_nothing(here: &Scene, there: &Scene, ray: &Ray, level: Level) -
     let from_there = o + (here.origin - there.origin);
     let ends = (here.camera.local_project_end(o, d), there.camera.local_project_end(from_there, d));
     let (Some(before), Some(after)) = ends else { return NOWHERE };
-    flow(before, after, || is_inside(there, after) && there.intersect_at(level, &ray_at(&there.camera, after)).is_none())
+    flow(before, after, || {
+        is_inside(there, after) && there.intersect_at(level, &ray_at(&there.camera, after)).is_none()
+    })
 }
 
 fn flow(before: [f64; 2], after: [f64; 2], is_seen: impl FnOnce() -> bool) -> Flow {

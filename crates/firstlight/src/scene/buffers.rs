@@ -47,7 +47,11 @@ impl SceneDesc {
                     if plane.is_of_motion() && self.render.motion_to.is_none() {
                         let hint = "write motion_to = a time in seconds, \"next\", \"previous\" or the name of a \
                                     camera, as --motion-to does";
-                        cx.error(&path, format!("{} leads nowhere without motion_to", quoted(plane.name())), Some(hint));
+                        cx.error(
+                            &path,
+                            format!("{} leads nowhere without motion_to", quoted(plane.name())),
+                            Some(hint),
+                        );
                     }
                     vec![(*plane).into()]
                 }

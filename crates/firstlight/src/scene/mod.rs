@@ -50,8 +50,8 @@ use crate::math::{DAffine3, DVec3};
 use crate::texture::Texture;
 pub(crate) use geometry::{At, Geometry, Nearest, ObjectSpace, Placed, PlacedTarget, UpperItem};
 pub(crate) use links::LinkId;
-pub(crate) use occluders::{Listed, ListedOccluders, Opacity};
 use motion::Motion;
+pub(crate) use occluders::{Listed, ListedOccluders, Opacity};
 use seen_lights::SeenLights;
 pub(crate) use trees::ShadowRays;
 
