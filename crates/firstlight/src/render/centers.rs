@@ -3,6 +3,8 @@
 //! Apart from all that is lit: one ray through the middle of each pixel, whatever the antialiasing, and nothing of it
 //! reaches the picture.
 
+use std::cell::OnceCell;
+
 use fearless_simd::Level;
 
 use super::film::{CenterValue, FilmTile};
@@ -13,7 +15,7 @@ use crate::color::Rgb;
 use crate::image::Plane;
 use crate::math::{DVec3, Ray, Vec3};
 use crate::scene::{Hit, ObjectSpace, Scene};
-use crate::shape::{RayDifferential, SurfaceInteraction};
+use crate::shape::{RayDifferential, ShadowTerminator, SurfaceInteraction};
 
 /// One thread's way through the centre rays of tiles.
 struct Centers<'a> {
@@ -30,8 +32,8 @@ pub(super) struct Center<'a> {
     ray: Ray,
     differential: RayDifferential,
     pub hit: Hit,
-    /// `None` on a light.
-    surface: Option<SurfaceInteraction>,
+    /// Found when it is asked for; `None` on a light.
+    surface: OnceCell<Option<SurfaceInteraction>>,
 }
 
 /// Fills the planes of a tile that centre rays say. The answer is how many camera rays it took.
@@ -61,30 +63,40 @@ impl<'a> Centers<'a> {
 
     /// Fills planes of a tile; `asks` says what each of them is here, if anything.
     fn fill(&mut self, film: &mut FilmTile, asks: impl Fn(Plane) -> Option<Plane>) -> u64 {
-        let (scene, tile, side) = (self.scene, film.tile, self.hits.side());
+        let (scene, there, level) = (self.scene, self.there, self.level);
+        let (tile, side) = (film.tile, self.hits.side());
+        let asked = |of: Plane| film.planes().iter().any(|buffer| asks(buffer.plane()) == Some(of));
+        let (asks_motion, asks_texture) = (asked(Plane::Motion), asked(Plane::Albedo));
+        let mut centers: Vec<(Ray, Option<Center>)> = Vec::with_capacity((side * side) as usize);
         for top in (0..tile.height).step_by(side as usize) {
             for left in (0..tile.width).step_by(side as usize) {
                 let (w, h) = ((tile.width - left).min(side), (tile.height - top).min(side));
-                self.hits.trace(scene, tile.x + left, tile.y + top, w, h);
-                for (y, x) in (0..h).flat_map(|y| (0..w).map(move |x| (y, x))) {
-                    let (ray, differential) = grid_ray(scene, 1, tile.x + left + x, tile.y + top + y);
-                    let hit = self.hits.get(x, y, 0, 0);
-                    let center = hit.map(|hit| Center::new(scene, ray, differential, hit));
-                    film.set_center(left + x, top + y, |plane| {
-                        let plane = asks(plane)?;
-                        Some(match (&center, self.there) {
-                            (_, Some(there)) if plane == Plane::Motion => CenterValue::Floats(match &center {
-                                Some(center) => motion::of_thing(center, there, self.level),
-                                None => motion::of_nothing(scene, there, &ray, self.level),
-                            }),
-                            (Some(center), _) => center.says(plane),
-                            (None, _) => nothing(plane),
-                        })
+                let [x, y] = [tile.x + left, tile.y + top];
+                self.hits.trace(scene, x, y, w, h);
+                centers.clear();
+                centers.extend((0..h).flat_map(|j| (0..w).map(move |i| (i, j))).map(|(i, j)| {
+                    let ray = self.hits.ray(i, j);
+                    let center = self.hits.get(i, j, 0, 0).map(|hit| {
+                        let differential =
+                            if asks_texture { grid_ray(scene, 1, x + i, y + j).1 } else { RayDifferential::default() };
+                        Center::new(scene, ray, differential, hit)
                     });
-                }
+                    (ray, center)
+                }));
+                film.set_centers([left, top], w, &asks, |plane| {
+                    centers.iter().map(move |(ray, center)| match (center, there) {
+                        (Some(center), Some(there)) if plane == Plane::Motion => {
+                            CenterValue::Floats(motion::of_thing(center, there, level))
+                        }
+                        (None, Some(there)) if plane == Plane::Motion => {
+                            CenterValue::Floats(motion::of_nothing(scene, there, ray, level))
+                        }
+                        (Some(center), _) => center.says(plane),
+                        (None, _) => nothing(plane),
+                    })
+                });
             }
         }
-        let asks_motion = film.planes().iter().any(|buffer| asks(buffer.plane()) == Some(Plane::Motion));
         u64::from(tile.width) * u64::from(tile.height) * if asks_motion { 2 } else { 1 }
     }
 }
@@ -100,14 +112,20 @@ fn nothing(plane: Plane) -> CenterValue {
 
 impl<'a> Center<'a> {
     pub fn new(scene: &'a Scene, ray: Ray, differential: RayDifferential, hit: Hit) -> Self {
+        Center { scene, ray, differential, hit, surface: OnceCell::new() }
+    }
+
+    /// The surface; `None` on a light. No light is gathered from it, so it is not lifted.
+    fn surface(&self) -> Option<&SurfaceInteraction> {
+        let Center { scene, ray, differential, hit, .. } = self;
         let is_light = hit.surface.index() >= scene.geometry.surfaces.len();
-        let surface = (!is_light).then(|| scene.local_surface(&ray, &hit, &differential));
-        Center { scene, ray, differential, hit, surface }
+        let find = || (!is_light).then(|| scene.surface_with(ray, hit, differential, ShadowTerminator::Hard));
+        self.surface.get_or_init(find).as_ref()
     }
 
     /// Where it is, in the scene's own coordinates.
     pub fn p(&self) -> DVec3 {
-        match &self.surface {
+        match self.surface() {
             Some(surface) => surface.p.as_dvec3(),
             None => self.ray.o.as_dvec3() + self.ray.d.as_dvec3() * self.hit.t,
         }
@@ -115,7 +133,7 @@ impl<'a> Center<'a> {
 
     /// How far that may be off the surface.
     pub fn error(&self) -> f64 {
-        self.surface.as_ref().map_or(0.0, |surface| f64::from(surface.error.0.max_element()))
+        self.surface().map_or(0.0, |surface| f64::from(surface.error.0.max_element()))
     }
 
     /// The space that it was described in; `None` on a light.
@@ -128,7 +146,7 @@ impl<'a> Center<'a> {
     pub fn front(&self) -> Vec3 {
         let Scene { geometry, lights, .. } = self.scene;
         match self.hit.surface.index().checked_sub(geometry.surfaces.len()) {
-            None => geometry.point(&self.ray, &self.hit, &self.differential).normal,
+            None => geometry.point(&self.ray, &self.hit, &self.differential, ShadowTerminator::Hard).normal,
             Some(light) => lights[light].area().map_or(Vec3::ZERO, |area| area.shape.normal_at(self.p())),
         }
     }
@@ -140,7 +158,7 @@ impl<'a> Center<'a> {
 
     /// The geometric and the shading normal, on the side that is seen.
     pub fn normals(&self) -> [Vec3; 2] {
-        match &self.surface {
+        match self.surface() {
             Some(surface) => [surface.ng, surface.ns],
             None if self.front().dot(self.ray.d) > 0.0 => [-self.front(); 2],
             None => [self.front(); 2],
@@ -166,7 +184,7 @@ impl<'a> Center<'a> {
             Plane::NormalGeometric => vector(ng()),
             Plane::NormalGeometricCamera => from_camera(ng().as_dvec3()),
             Plane::Tangent => {
-                let along_u = self.surface.map(|_| geometry.tangents(&self.ray, &self.hit)[0]);
+                let along_u = self.surface().map(|_| geometry.tangents(&self.ray, &self.hit)[0]);
                 vector(along_u.map_or(Vec3::ZERO, |along| along.normalize_or_zero().as_vec3()))
             }
             Plane::PositionObject => {
@@ -180,14 +198,14 @@ impl<'a> Center<'a> {
             }
             Plane::Albedo => {
                 let Scene { materials, textures, .. } = self.scene;
-                let color = self.surface.map(|si| materials[si.material.index()].bsdf(&si, textures).colors.cosine());
+                let color = self.surface().map(|si| materials[si.material.index()].bsdf(si, textures).colors.cosine());
                 vector(color.map_or(Vec3::ZERO, |Rgb { r, g, b }| Vec3::new(r, g, b)))
             }
             Plane::InstanceId => CenterValue::Whole(self.space().map_or(0, |space| space.instance)),
-            Plane::Uv => vector(self.surface.map_or(Vec3::ZERO, |surface| surface.uv.extend(0.0))),
+            Plane::Uv => vector(self.surface().map_or(Vec3::ZERO, |surface| surface.uv.extend(0.0))),
             Plane::Barycentric => vector(self.hit.barycentric().extend(0.0)),
             Plane::ObjectId => CenterValue::Whole(self.hit.surface.0 + 1),
-            Plane::MaterialId => CenterValue::Whole(self.surface.map_or(0, |surface| surface.material.0 + 1)),
+            Plane::MaterialId => CenterValue::Whole(self.surface().map_or(0, |surface| surface.material.0 + 1)),
             Plane::PrimitiveId => CenterValue::Whole(geometry.primitive(&self.hit).map_or(0, |number| number + 1)),
             Plane::FaceOrientation => CenterValue::Whole(if self.is_front() { 1 } else { 2 }),
             _ => unreachable!("{} is not of the centre", plane.name()),

@@ -65,16 +65,15 @@ impl PixelHits {
     fn block(&mut self, scene: &Scene, x: u32, y: u32, left: u32, top: u32, w: u32, h: u32) {
         let geometry = &scene.geometry;
         let bundle = geometry.world_as_bundle();
+        self.aim(scene, x + left, y + top);
         let mut active = 0u64;
         for row in 0..h {
             for column in 0..w {
-                let (ray, _) = grid_ray(scene, self.n, x + left + column, y + top + row);
+                let place = place(column, row);
+                let ray = Ray { o: self.rays.o(place), d: self.rays.d(place) };
                 let mut nearest = scene.meet_listed(&ray);
                 if bundle {
                     geometry.meet_upper(self.level, &ray, &mut nearest);
-                    // Blocks of 4 x 4 after each other
-                    let place = ((row / 4 * 2 + column / 4) * 16 + row % 4 * 4 + column % 4) as usize;
-                    self.rays.set(place, ray.o, ray.d);
                     self.found.t[place] = nearest.limit();
                     self.found.surface[place] = u32::MAX;
                     self.found.triangle[place] = u32::MAX;
@@ -100,6 +99,37 @@ impl PixelHits {
         }
     }
 
+    /// Finds the rays of the block from ray (`x`, `y`) of the film: the bits of [`grid_ray`].
+    fn aim(&mut self, scene: &Scene, x: u32, y: u32) {
+        let [xs, ys] = [x, y].map(|first| std::array::from_fn::<f32, 8, _>(|k| on_film(self.n, first + k as u32)));
+        for part in 0..4usize {
+            let (columns, rows) = (&xs[part % 2 * 4..][..4], &ys[part / 2 * 4..][..4]);
+            let x: [f32; LANES] = std::array::from_fn(|k| columns[k % 4]);
+            let y: [f32; LANES] = std::array::from_fn(|k| rows[k / 4]);
+            let ways = dispatch_wide!(self.level, simd => simd.vectorize(
+                #[inline(always)]
+                || {
+                    let [x, y] = [x, y].map(|places| f32x16::simd_from(simd, places));
+                    let ways = scene.camera.ray_lanes(simd, x, y);
+                    ways.map(|v| [v.x.to_array(), v.y.to_array(), v.z.to_array()])
+                },
+            ));
+            for (to, from) in [&mut self.rays.o, &mut self.rays.d].into_iter().zip(ways) {
+                for axis in 0..3 {
+                    to[axis][LANES * part..][..LANES].copy_from_slice(&from[axis]);
+                }
+            }
+        }
+    }
+
+    /// The camera ray through a pixel of the last block, where a pixel has one.
+    #[inline(always)]
+    pub fn ray(&self, i: u32, j: u32) -> Ray {
+        debug_assert_eq!(self.n, 1, "of several, each belongs to a block of its own");
+        let place = place(i, j);
+        Ray { o: self.rays.o(place), d: self.rays.d(place) }
+    }
+
     /// What the ray (`column`, `row`) of pixel (`i`, `j`), counted from the first pixel that was traced, hits.
     #[inline(always)]
     pub fn get(&self, i: u32, j: u32, column: u32, row: u32) -> Option<Hit> {
@@ -116,9 +146,19 @@ pub(crate) fn camera_ray(scene: &Scene, x: u32, y: u32) -> (Ray, RayDifferential
 /// The same of a grid of `n` x `n` rays in each pixel.
 #[inline(always)]
 pub(super) fn grid_ray(scene: &Scene, n: u32, x: u32, y: u32) -> (Ray, RayDifferential) {
-    // The middle of the sub-pixel
-    let at = |ray: u32| (ray / n) as f32 + ((ray % n) as f32 + 0.5) / n as f32;
-    scene.camera.local_ray(at(x), at(y), 1.0 / n as f32)
+    scene.camera.local_ray(on_film(n, x), on_film(n, y), 1.0 / n as f32)
+}
+
+/// Where on the film a ray of such a grid is, across or down, in pixels: the middle of its part of the pixel.
+#[inline(always)]
+fn on_film(n: u32, ray: u32) -> f32 {
+    (ray / n) as f32 + ((ray % n) as f32 + 0.5) / n as f32
+}
+
+/// The place of a ray in its block: blocks of 4 x 4 after each other.
+#[inline(always)]
+fn place(column: u32, row: u32) -> usize {
+    ((row / 4 * 2 + column / 4) * 16 + row % 4 * 4 + column % 4) as usize
 }
 
 /// The camera rays of one pixel, row by row.

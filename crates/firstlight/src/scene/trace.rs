@@ -8,7 +8,7 @@ use super::occluders::{Listed, ListedOccluders};
 use crate::color::Rgb;
 use crate::ids::{LightId, SurfaceId};
 use crate::math::{Ray, ShadowRay};
-use crate::shape::{RayDifferential, ShapePoint, Sphere, SurfaceInteraction};
+use crate::shape::{RayDifferential, ShadowTerminator, ShapePoint, Sphere, SurfaceInteraction};
 
 pub use super::geometry::Hit;
 
@@ -146,8 +146,20 @@ impl Scene {
     /// If the hit is a light's: a light has no material.
     #[inline(always)]
     pub(crate) fn local_surface(&self, ray: &Ray, hit: &Hit, differential: &RayDifferential) -> SurfaceInteraction {
+        self.surface_with(ray, hit, differential, self.geometry.terminator)
+    }
+
+    /// The same with another border of light and dark than the scene's.
+    #[inline(always)]
+    pub(crate) fn surface_with(
+        &self,
+        ray: &Ray,
+        hit: &Hit,
+        differential: &RayDifferential,
+        terminator: ShadowTerminator,
+    ) -> SurfaceInteraction {
         let surface = &self.geometry.surfaces[hit.surface.index()];
-        let point = self.geometry.point(ray, hit, differential);
+        let point = self.geometry.point(ray, hit, differential, terminator);
         let ShapePoint { p, error, normal, shading, lifted, uv, footprint, color } = point;
         let wo = -ray.d;
         let (ng, ns) = if normal.dot(wo) < 0.0 { (-normal, -shading) } else { (normal, shading) };

@@ -8,7 +8,8 @@ use crate::accel::{Aabb, Planes, RayPacket16, RayTile, TraceRay, dispatch_all, d
 use crate::ids::{LightId, MaterialId, SurfaceId};
 use crate::math::{DVec3, Ray, ShadowRay, Vec3};
 use crate::shape::{
-    JoinedPart, LineLanes, Mesh, RayDifferential, ShapePoint, SolidHit, TileHits, TrianglePoint, every,
+    JoinedPart, LineLanes, Mesh, RayDifferential, ShadowTerminator, ShapePoint, SolidHit, TileHits, TrianglePoint,
+    every,
 };
 
 impl Geometry {
@@ -321,28 +322,40 @@ impl Geometry {
 
     /// What a camera ray sees at a hit of a shape.
     #[inline(always)]
-    pub fn point(&self, ray: &Ray, hit: &Hit, differential: &RayDifferential) -> ShapePoint {
+    pub fn point(
+        &self,
+        ray: &Ray,
+        hit: &Hit,
+        differential: &RayDifferential,
+        terminator: ShadowTerminator,
+    ) -> ShapePoint {
         match hit.at {
             At::Sphere(i) => self.spheres[i as usize].shape.point(ray, hit.t, differential),
             At::Parallelogram(i) => self.parallelograms[i as usize].shape.point(ray, hit.t, differential),
-            _ => self.far_point(ray, hit, differential),
+            _ => self.far_point(ray, hit, differential, terminator),
         }
     }
 
     /// [`point`](Self::point) for what is in the trees.
     #[inline(never)]
-    fn far_point(&self, ray: &Ray, hit: &Hit, differential: &RayDifferential) -> ShapePoint {
+    fn far_point(
+        &self,
+        ray: &Ray,
+        hit: &Hit,
+        differential: &RayDifferential,
+        terminator: ShadowTerminator,
+    ) -> ShapePoint {
         match hit.at {
             At::World(point) => {
                 let world = self.world.as_ref().expect("the hit is on it");
-                world.mesh.point(None, point, ray, hit.t, differential, self.terminator)
+                world.mesh.point(None, point, ray, hit.t, differential, terminator)
             }
             At::Placed(index, spot) => {
                 let thing = &self.placed[index as usize];
                 match (thing.target, spot) {
                     (PlacedTarget::Mesh(mesh), PlacedSpot::Triangle(point)) => {
                         let mesh = &self.meshes[mesh as usize];
-                        mesh.point(Some(&thing.placement), point, ray, hit.t, differential, self.terminator)
+                        mesh.point(Some(&thing.placement), point, ray, hit.t, differential, terminator)
                     }
                     (PlacedTarget::Points(points), PlacedSpot::Point(point)) => {
                         self.point_sets[points as usize].point(&thing.placement, point, ray, hit.t, differential)

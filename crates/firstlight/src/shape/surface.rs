@@ -119,6 +119,12 @@ pub struct RayDifferential {
 }
 
 impl RayDifferential {
+    /// Whether the ray stands for a point alone.
+    #[inline(always)]
+    pub(crate) fn is_zero(&self) -> bool {
+        [self.dx, self.dy, self.origin_dx, self.origin_dy] == [Vec3::ZERO; 4]
+    }
+
     /// The steps, on the plane through the hit with normal `n`, from the point `t d` to where the neighbours meet it:
     /// dp = dO + t dD - d (n.(dO + t dD)) / (n.d).
     ///

@@ -181,16 +181,21 @@ impl Mesh {
         let corner_uvs = self.corner_uvs(at.triangle);
         let (f1, f2) = (corner_uvs[1] - corner_uvs[0], corner_uvs[2] - corner_uvs[0]);
         let uv = corner_uvs[0] + f1 * u + f2 * v;
-        // The dual basis of the edges turns steps on the surface into steps of the weights, and those of uv
-        let cross = e1.cross(e2);
-        let area2 = cross.length_squared();
-        let (u_axis, v_axis) = (e2.cross(cross) / area2, cross.cross(e1) / area2);
-        let steps = differential.on_plane(ray.d, t as f32, normal.as_vec3(), f32::MAX.sqrt() * 0.5);
-        let [dx, dy] = steps.map(|dp| {
-            let dp = dp.as_dvec3();
-            let step = f1 * dp.dot(u_axis) + f2 * dp.dot(v_axis);
-            if step.is_finite() { step.as_vec2() } else { Vec2::ZERO }
-        });
+        let footprint = match differential.is_zero() {
+            true => [Vec2::ZERO; 2],
+            false => {
+                // The dual basis of the edges turns steps on the surface into steps of the weights, and those of uv
+                let cross = e1.cross(e2);
+                let area2 = cross.length_squared();
+                let (u_axis, v_axis) = (e2.cross(cross) / area2, cross.cross(e1) / area2);
+                let steps = differential.on_plane(ray.d, t as f32, normal.as_vec3(), f32::MAX.sqrt() * 0.5);
+                steps.map(|dp| {
+                    let dp = dp.as_dvec3();
+                    let step = f1 * dp.dot(u_axis) + f2 * dp.dot(v_axis);
+                    if step.is_finite() { step.as_vec2() } else { Vec2::ZERO }
+                })
+            }
+        };
         let color = if self.colors.is_empty() {
             Rgb::WHITE
         } else {
@@ -204,7 +209,7 @@ impl Mesh {
             shading: shading.as_vec3(),
             lifted,
             uv: uv.as_vec2(),
-            footprint: Footprint { dx, dy, edges: [UvEdge::Unbounded; 2] },
+            footprint: Footprint { dx: footprint[0], dy: footprint[1], edges: [UvEdge::Unbounded; 2] },
             color,
         }
     }
