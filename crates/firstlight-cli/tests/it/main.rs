@@ -9,6 +9,7 @@ mod faults;
 mod files;
 mod found;
 mod frames;
+mod motion;
 mod pictures;
 mod several;
 #[cfg(unix)]
