@@ -11,7 +11,11 @@ use crate::report::{Failure, answer};
 pub fn run() -> Result<(), Failure> {
     let head = ["name", "channels", "type", "unit", "space", "sampling"].map(str::to_owned);
     let row = |plane: &Plane| {
-        let channels = plane.channels().join(" ");
+        let channels = match plane.channels() {
+            // Of a layer of Cryptomatte, from where to where
+            [first, .., last] if plane.channels().len() > 4 => format!("{first} to {last}"),
+            all => all.join(" "),
+        };
         let words =
             [plane.name(), &channels, plane.number_type(), plane.unit(), plane.space(), plane.sampling().name()];
         words.map(str::to_owned)
@@ -30,6 +34,7 @@ pub fn run() -> Result<(), Failure> {
         text.push_str(&format!("{:width$}  {}\n", plane.name(), plane.about(), width = widths[0]));
     }
     text.push_str(LIGHTS);
+    text.push_str(OBJECTS);
     answer(&text)
 }
 
@@ -44,4 +49,11 @@ light:NAME:unshadowed         What it would send if nothing cast shadows.
 light:NAME:visibility         The share of that which arrives, 0 to 1, as shadow.
 light:NAME:unscaled-diffuse   What it sends before its own colour and strength; not of groups.
 light:NAME:unscaled-specular  The same of highlights.
+";
+
+/// Those whose names hold the name of an object.
+const OBJECTS: &str = "
+Of each object, as coverage:background is of the background; NAME is its name, or #3 for the one of
+object-id 3, or * for all that a camera can see, each apart:
+coverage:NAME        The share of the pixel's camera rays that meet it first.
 ";

@@ -47,6 +47,33 @@ fn lights_are_kept_apart() {
 }
 
 #[test]
+fn masks_are_what_compositing_programs_read() {
+    let folder = Folder::with_scene();
+    let asked = "coverage:background,coverage:#1,crypto-object,crypto-material,depth:filtered";
+    folder.run(&format!("render scene.toml --buffers {asked} -o a.npz -o a.exr -o b.exr")).done();
+    let (arrays, exr) = (folder.get("a.npz"), folder.get("a.exr"));
+    assert!(exr == folder.get("b.exr"), "the order of attributes is always the same");
+    for name in ["coverage:background", "crypto-object", "crypto-material", "depth:filtered", "receipt"] {
+        assert!(holds(&arrays, name), "{name}");
+    }
+    let says = |word: &str| exr.windows(word.len()).any(|part| part == word.as_bytes());
+    for word in [
+        "coverage:background.A\0",
+        "CryptoObject00.R\0",
+        "CryptoMaterial02.A\0",
+        "depth:filtered.Z\0",
+        "cryptomatte/3ae39a5/name\0string\0",
+        "cryptomatte/3ae39a5/manifest\0string\0",
+        "MurmurHash3_32",
+        "uint32_to_float32",
+        "firstlight:object_manifest",
+    ] {
+        assert!(says(word), "{word}");
+    }
+    assert!(!says("CryptoInstance"));
+}
+
+#[test]
 fn the_scene_may_ask_for_them() {
     let folder = Folder::new();
     folder.put("scene.toml", SCENE.replace("[render]\n", "[render]\nbuffers = [\"color\", \"normal\"]\n"));
@@ -65,6 +92,9 @@ fn what_cannot_be_is_said() {
     folder.run("render scene.toml --buffers dept -o a.npz").exits(2).says(&["dept", "\"depth\""]);
     folder.run("render scene.toml --buffers light:nobody -o a.npz").exits(1).says(&["no light is called \"nobody\""]);
     folder.run("render scene.toml --buffers light: -o a.npz").exits(2).says(&["names no light"]);
+    folder.run("render scene.toml --buffers coverage:it -o a.npz").exits(1).says(&["no object is called \"it\""]);
+    folder.run("render scene.toml --buffers coverage: -o a.npz").exits(2).says(&["names no object"]);
+    folder.run("render scene.toml --buffers object-id:filtered -o a.npz").exits(2).says(&["an id has no mean"]);
     folder.run("render scene.toml --buffers depth").exits(2).says(&["--buffers is for .exr and .npz files"]);
     folder.run("render scene.toml --buffers depth -o a.png -o a.hdr").exits(2).says(&["name one with -o"]);
     folder.run("render scene.toml --buffers depth,depth -o a.npz").exits(1).says(&["\"depth\" is given twice"]);
@@ -80,10 +110,10 @@ fn all_of_them_are_listed() {
         let mut lines = list.lines().filter(|line| line.split_whitespace().next() == Some(plane.name()));
         let row = lines.next().unwrap();
         assert!(
-            row.contains(&plane.channels().join(" "))
-                && row.contains(plane.number_type())
-                && row.contains(plane.unit())
+            plane.channels().len() > 4 && row.contains(&format!("{} to ", plane.channels()[0]))
+                || row.contains(&plane.channels().join(" "))
         );
+        assert!(row.contains(plane.number_type()) && row.contains(plane.unit()));
         assert!(lines.next().is_some_and(|line| line.ends_with('.')), "{}", plane.name());
     }
 }

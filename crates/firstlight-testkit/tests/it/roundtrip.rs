@@ -96,8 +96,10 @@ fn buffer() -> impl Strategy<Value = BufferDesc> {
     let of_light =
         (light.clone(), maybe(select(LightPart::ALL))).prop_map(|(light, part)| BufferDesc::Light { light, part });
     let of_groups = [LightPart::Diffuse, LightPart::Specular, LightPart::Unshadowed, LightPart::Visibility];
-    let of_group = (light, maybe(select(&of_groups[..]))).prop_map(|(group, part)| BufferDesc::Group { group, part });
-    prop_oneof![select(Plane::ALL).prop_map(BufferDesc::Plane), of_light, of_group]
+    let of_group =
+        (light.clone(), maybe(select(&of_groups[..]))).prop_map(|(group, part)| BufferDesc::Group { group, part });
+    let of_object = light.prop_map(BufferDesc::Coverage);
+    prop_oneof![select(Plane::ALL).prop_map(BufferDesc::Plane), of_light, of_group, of_object]
 }
 
 fn motion_to() -> impl Strategy<Value = MotionTo> {

@@ -9,7 +9,7 @@ use crate::scenes::bits;
 
 /// A little of everything: a sphere, a wall seen from behind, two meshes that are joined into one tree, two instances
 /// of a group with a mesh and a torus, a point set, lights that are seen.
-const SCENE: &str = r#"
+pub const SCENE: &str = r#"
     [render]
     width = 90
     height = 70

@@ -1,4 +1,5 @@
-//! What can be asked for of each pixel: a plane that every scene has, or what one of its lights sends.
+//! What can be asked for of each pixel: a plane that every scene has, what one of its lights sends, or how much of it
+//! one of its objects covers.
 
 use serde_json::{Value as Json, json};
 
@@ -6,7 +7,7 @@ use super::Plane;
 use crate::describe::node::{Data, Node, quoted};
 use crate::describe::read::Reader;
 use crate::describe::{Choice, TextValue, Value, Words, nearest, words};
-use crate::ids::{LightGroupId, LightId};
+use crate::ids::{LightGroupId, LightId, SurfaceId};
 
 words! {
     /// A part of what a light sends, as the picture shows it, or what becomes of it.
@@ -51,11 +52,14 @@ pub enum Buffer {
     Light(LightId, Option<LightPart>),
     /// The same of a group of lights.
     Group(LightGroupId, Option<LightPart>),
+    /// The share of the pixel's camera rays that meet one object first: a shape or a light.
+    Coverage(SurfaceId),
 }
 
 /// A buffer as a scene may ask for it: the name of a [`Plane`]; or `light:NAME`, what one light sends, with `light:#3`
 /// for the third in scene order and `light:*` for all of them, each apart. `light:NAME:diffuse` is a part of it, see
-/// [`LightPart`]. `group:NAME` is what the lights of a group send together.
+/// [`LightPart`]. `group:NAME` is what the lights of a group send together. `coverage:NAME` is the share of the pixel that
+/// an object covers: a shape, one that an instance places, or a light.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum BufferDesc {
     /// One that every scene has.
@@ -74,9 +78,11 @@ pub enum BufferDesc {
         /// Which part of it; `None` for all.
         part: Option<LightPart>,
     },
+    /// How much of the pixel an object covers; of all, each that a camera can see.
+    Coverage(LightChoice),
 }
 
-/// Which of a scene's lights, or of their groups.
+/// Which of a scene's lights, of their groups, or of its objects.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum LightChoice {
     /// Each of them.
@@ -88,7 +94,8 @@ pub enum LightChoice {
 }
 
 impl Buffer {
-    /// The plane that has its channels, its unit and its sampling: itself, or that of all lights together.
+    /// The plane that has its channels, its unit and its sampling: itself, or that of all lights together, or of the
+    /// background.
     pub fn plane(self) -> Plane {
         match self {
             Buffer::Plane(plane) => plane,
@@ -97,21 +104,22 @@ impl Buffer {
                 Some(LightPart::Visibility) => Plane::Shadow,
                 _ => Plane::Diffuse,
             },
+            Buffer::Coverage(_) => Plane::BackgroundCoverage,
         }
     }
 
     /// Which part it is of what lights send.
     pub(crate) fn part(self) -> Option<LightPart> {
         match self {
-            Buffer::Plane(_) => None,
+            Buffer::Plane(_) | Buffer::Coverage(_) => None,
             Buffer::Light(_, part) | Buffer::Group(_, part) => part,
         }
     }
 
-    /// Another part of the same; planes have none.
+    /// Another part of the same; only what lights send has parts.
     pub(crate) fn with_part(self, part: Option<LightPart>) -> Buffer {
         match self {
-            Buffer::Plane(_) => self,
+            Buffer::Plane(_) | Buffer::Coverage(_) => self,
             Buffer::Light(light, _) => Buffer::Light(light, part),
             Buffer::Group(group, _) => Buffer::Group(group, part),
         }
@@ -121,6 +129,7 @@ impl Buffer {
     pub(crate) fn is_of_terms(self) -> bool {
         match self {
             Buffer::Plane(plane) => plane.is_of_terms(),
+            Buffer::Coverage(_) => false,
             Buffer::Light(_, part) | Buffer::Group(_, part) => part.is_none_or(|part| part.moment().is_some()),
         }
     }
@@ -141,6 +150,10 @@ impl From<Plane> for BufferDesc {
 /// What the names of buffers of lights begin with, and of groups of them.
 const LIGHT: &str = "light:";
 const GROUP: &str = "group:";
+/// What those of objects' coverage begin with.
+const COVERAGE: &str = "coverage:";
+/// What the names of means over camera rays end with.
+const FILTERED: &str = ":filtered";
 
 impl BufferDesc {
     /// The buffer of that name; `Err` says what is wrong with the name, and a hint.
@@ -151,30 +164,39 @@ impl BufferDesc {
         if let Some(plane) = Plane::from_name(name) {
             return Ok(BufferDesc::Plane(plane));
         }
-        let of_light = name.strip_prefix(LIGHT);
-        let Some(chosen) = of_light.or(name.strip_prefix(GROUP)) else {
+        if let Some(plane) = name.strip_suffix(FILTERED).and_then(Plane::from_name) {
+            return Err((format!("{} is no buffer: {}", quoted(name), plane.why_no_mean()), None));
+        }
+        let prefixed = |prefix: &'static str| Some((prefix, name.strip_prefix(prefix)?));
+        let Some((prefix, chosen)) = [LIGHT, GROUP, COVERAGE].into_iter().find_map(prefixed) else {
             let known: Vec<&str> = Plane::CHOICES.iter().map(|choice| choice.word).collect();
             let hint = nearest(name, &known).map(|near| format!("did you mean \"{near}\"?"));
             return Err((format!("{} is not {}", quoted(name), Self::words()), hint));
         };
         let of_part = |part: &LightPart| Some((chosen.strip_suffix(part.name())?.strip_suffix(':')?, Some(*part)));
-        let (chosen, part) = LightPart::ALL.iter().find_map(of_part).unwrap_or((chosen, None));
+        let part = if prefix == COVERAGE { None } else { LightPart::ALL.iter().find_map(of_part) };
+        let (chosen, part) = part.unwrap_or((chosen, None));
         let choice = match chosen.strip_prefix('#').map(str::parse) {
             _ if chosen.is_empty() => {
-                let kind = if of_light.is_some() { "light" } else { "group of lights" };
+                let kind = match prefix {
+                    LIGHT => "light",
+                    GROUP => "group of lights",
+                    _ => "object",
+                };
                 return Err((format!("{} names no {kind}", quoted(name)), None));
             }
             _ if chosen == "*" => LightChoice::All,
             Some(Ok(number)) if number > 0 => LightChoice::Number(number),
             _ => LightChoice::Name(chosen.to_owned()),
         };
-        match (of_light, part) {
-            (Some(_), part) => Ok(BufferDesc::Light { light: choice, part }),
-            (None, Some(part)) if part.is_unscaled() => {
+        match (prefix, part) {
+            (COVERAGE, _) => Ok(BufferDesc::Coverage(choice)),
+            (LIGHT, part) => Ok(BufferDesc::Light { light: choice, part }),
+            (_, Some(part)) if part.is_unscaled() => {
                 let hint = "each light has a scale of its own: ask for them one by one, with light:NAME".to_owned();
                 Err((format!("{} is not a part of a group of lights", quoted(part.name())), Some(hint)))
             }
-            (None, part) => Ok(BufferDesc::Group { group: choice, part }),
+            (_, part) => Ok(BufferDesc::Group { group: choice, part }),
         }
     }
 
@@ -182,8 +204,9 @@ impl BufferDesc {
     pub fn name(&self) -> String {
         let (prefix, choice, part) = match self {
             BufferDesc::Plane(plane) => return plane.name().to_owned(),
-            BufferDesc::Light { light, part } => (LIGHT, light, part),
-            BufferDesc::Group { group, part } => (GROUP, group, part),
+            BufferDesc::Light { light, part } => (LIGHT, light, *part),
+            BufferDesc::Group { group, part } => (GROUP, group, *part),
+            BufferDesc::Coverage(object) => (COVERAGE, object, None),
         };
         let choice = match choice {
             LightChoice::All => "*".to_owned(),
@@ -197,7 +220,8 @@ impl BufferDesc {
 
 impl Value for BufferDesc {
     fn words() -> String {
-        format!("{}, \"{LIGHT}NAME\" or \"{GROUP}NAME\"", Plane::words().replace(" or ", ", "))
+        let planes = Plane::words().replace(" or ", ", ");
+        format!("{planes}, \"{LIGHT}NAME\", \"{GROUP}NAME\" or \"{COVERAGE}NAME\"")
     }
 
     fn plural() -> String {
@@ -205,7 +229,8 @@ impl Value for BufferDesc {
     }
 
     fn schema() -> Json {
-        json!({ "anyOf": [Plane::schema(), { "type": "string", "pattern": format!("^({LIGHT}|{GROUP}).+$") }] })
+        let named = format!("^({LIGHT}|{GROUP}|{COVERAGE}).+$");
+        json!({ "anyOf": [Plane::schema(), { "type": "string", "pattern": named }] })
     }
 
     fn choices() -> &'static [Choice] {
@@ -253,6 +278,11 @@ mod tests {
             ("light:a:b:diffuse", light(LightChoice::Name("a:b".into()), Some(LightPart::Diffuse))),
             ("light:#x", light(LightChoice::Name("#x".into()), None)),
             ("light:#0", light(LightChoice::Name("#0".into()), None)),
+            ("coverage:background", BufferDesc::Plane(Plane::BackgroundCoverage)),
+            ("coverage:*", BufferDesc::Coverage(LightChoice::All)),
+            ("coverage:#7", BufferDesc::Coverage(LightChoice::Number(7))),
+            ("coverage:one/ring:diffuse", BufferDesc::Coverage(LightChoice::Name("one/ring:diffuse".into()))),
+            ("depth:filtered", BufferDesc::Plane(Plane::FilteredDepth)),
         ] {
             assert_eq!(BufferDesc::parse(name), Ok(buffer.clone()));
             assert_eq!(buffer.name(), name);
@@ -261,6 +291,12 @@ mod tests {
             ("light:", "names no light"),
             ("light::diffuse", "names no light"),
             ("group:", "names no group of lights"),
+            ("coverage:", "names no object"),
+            ("object-id:filtered", "an id has no mean"),
+            ("color:filtered", "is a mean over the pixel as it is"),
+            ("depth:filtered:filtered", "is a mean over the pixel as it is"),
+            ("rays:filtered", "counted"),
+            ("barycentric:filtered", "of each object's own"),
             ("group:sky:unscaled-specular", "is not a part of a group of lights"),
             ("dept", "is not \"color\""),
             ("", "is not \"color\""),

@@ -1,7 +1,7 @@
 //! OpenEXR files: the film as it is, in 32-bit floats, and ids in 32-bit whole numbers.
 //!
 //! Of the picture channels R, G, B, and A unless every alpha is 1; premultiplied, as the format wants. Of another plane
-//! one layer, `depth.Z`. The data window is the
+//! one layer, `depth.Z`; Cryptomatte has channels of its own and texts `cryptomatte/KEY/...`. The data window is the
 //! picture's window, the display window the whole film. Rec. 709 chromaticities. The receipt is in string attributes
 //! `firstlight:KEY`, UTF-8, the program in `software`. Lossless ZIP in blocks of 16 rows.
 
@@ -21,7 +21,7 @@ use codec::meta::header::Header;
 use codec::meta::{BlockDescription, attribute::Text as Name};
 use codec::prelude::{Compression, SmallVec};
 
-use super::{ImageError, NamedPlane, PREFIX, Plane, PlaneFile, PlaneNumbers, Receipt, SOFTWARE};
+use super::{ImageError, NamedPlane, PREFIX, Plane, PlaneFile, PlaneNumbers, Receipt, SOFTWARE, cryptomatte};
 use crate::parallel;
 
 /// One channel of a file.
@@ -37,7 +37,8 @@ struct Channel<'a> {
 pub(super) fn encode(file: &PlaneFile, receipt: &Receipt) -> Result<Vec<u8>, ImageError> {
     let fault = |e: Error| ImageError::Encode { format: "EXR", reason: e.to_string() };
     let channels = channels(file);
-    let header = header(file, &channels, receipt);
+    let texts = texts(file, receipt);
+    let header = header(file, &channels, &texts);
     let width = file.window.width as usize;
     // Compress all blocks of rows at once
     let headers: SmallVec<[Header; 3]> = SmallVec::from_elem(header, 1);
@@ -55,7 +56,7 @@ pub(super) fn encode(file: &PlaneFile, receipt: &Receipt) -> Result<Vec<u8>, Ima
     })
     .map_err(fault)?;
     let mut bytes = bytes.into_inner();
-    order_attributes(&mut bytes, receipt);
+    order_attributes(&mut bytes, &texts);
     Ok(bytes)
 }
 
@@ -68,8 +69,8 @@ fn channels<'a>(file: &PlaneFile<'a>) -> Vec<Channel<'a>> {
             if *plane == Plane::Color && *name == "A" && is_opaque(numbers) {
                 continue;
             }
-            // The picture's are those of the file itself, as readers expect it
-            let name = if *plane == Plane::Color { (*name).to_owned() } else { format!("{of}.{name}") };
+            // The picture's are those of the file itself, and Cryptomatte has its own, as readers expect it
+            let name = if plane.names_channels() { (*name).to_owned() } else { format!("{of}.{name}") };
             all.push(Channel { name, numbers: *numbers, place, of: names.len() });
         }
     }
@@ -82,8 +83,15 @@ fn is_opaque(picture: &PlaneNumbers) -> bool {
     matches!(picture, PlaneNumbers::Floats(numbers) if numbers.iter().skip(3).step_by(4).all(|alpha| *alpha == 1.0))
 }
 
+/// What it says in texts, by their names: what layers of Cryptomatte are, and the receipt.
+fn texts(file: &PlaneFile, receipt: &Receipt) -> Vec<(String, String)> {
+    let mut texts = cryptomatte::metadata(file.planes, receipt);
+    texts.extend(receipt.entries.iter().map(|(key, value)| (format!("{PREFIX}{key}"), value.clone())));
+    texts
+}
+
 /// Everything that the file says before its pixels.
-fn header(file: &PlaneFile, channels: &[Channel], receipt: &Receipt) -> Header {
+fn header(file: &PlaneFile, channels: &[Channel], texts: &[(String, String)]) -> Header {
     let window = file.window;
     let size = Vec2(window.width as usize, window.height as usize);
     let kind = |channel: &Channel| match channel.numbers {
@@ -108,9 +116,9 @@ fn header(file: &PlaneFile, channels: &[Channel], receipt: &Receipt) -> Header {
     own.layer_name = None;
     own.layer_position = Vec2(window.x as i32, window.y as i32);
     own.software_name = Some(Text::from(SOFTWARE));
-    for (key, value) in &receipt.entries {
+    for (name, value) in texts {
         let text = Text::from_bytes_unchecked(value.as_bytes().into());
-        own.other.insert(Text::from(format!("{PREFIX}{key}").as_str()), AttributeValue::Text(text));
+        own.other.insert(Text::from(name.as_str()), AttributeValue::Text(text));
     }
     header
 }
@@ -166,13 +174,10 @@ pub(super) fn attributes(bytes: &[u8]) -> Vec<Attribute<'_>> {
     found
 }
 
-/// Puts the receipt behind all other attributes, in its own order. The library keeps them in a hash map, whose order is
+/// Puts the texts behind all other attributes, in their own order. The library keeps them in a hash map, whose order is
 /// another on every run. The header stays as long as it was.
-fn order_attributes(bytes: &mut [u8], receipt: &Receipt) {
-    let rank = |a: &Attribute| {
-        let key = a.name.strip_prefix(PREFIX.as_bytes())?;
-        receipt.entries.iter().position(|(k, _)| k.as_bytes() == key)
-    };
+fn order_attributes(bytes: &mut [u8], texts: &[(String, String)]) {
+    let rank = |a: &Attribute| texts.iter().position(|(name, _)| name.as_bytes() == a.name);
     let mut list = attributes(bytes);
     let Some(all) = list.first().zip(list.last()).map(|(a, b)| a.all.start..b.all.end) else { return };
     // `None`, all others, comes first, and the sort is stable

@@ -5,6 +5,7 @@
 
 mod buffer;
 mod contain;
+pub(crate) mod cryptomatte;
 mod damage;
 mod error;
 #[cfg(feature = "exr")]

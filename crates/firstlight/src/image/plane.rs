@@ -1,5 +1,6 @@
 //! What a film can hold beside the picture: one plane of numbers for each buffer.
 
+use super::cryptomatte::Named;
 use super::{Format, ImageError, Receipt, Window};
 use crate::describe::{Words, words};
 use crate::parallel;
@@ -8,9 +9,9 @@ words! {
     /// A buffer: what a plane of the film says of each pixel.
     ///
     /// `color`, `alpha` and the terms that `color` is the sum of, `background` to `rest`, are means over the pixel, and
-    /// so is `shadow`.
-    /// All others are of its centre ray, and never averaged: what it meets first, a shape or a visible light, as the
-    /// camera sees it. Where it meets nothing, `depth` and `distance` are infinite and all others 0.
+    /// so are `shadow`, coverage, Cryptomatte and what ends in `:filtered`. All others are of its centre ray, and never
+    /// averaged: what it meets first, a shape or a visible light, as the camera sees it. Where it meets nothing, `depth`
+    /// and `distance` are infinite and all others 0; so are the means where no ray meets anything.
     pub enum Plane {
         /// The picture, with its alpha.
         Color = "color",
@@ -83,6 +84,35 @@ words! {
         /// The same the other way: of the picture that `motion_to` names, pixel by pixel of that picture, the way to
         /// this one.
         MotionBackward = "motion-backward",
+        /// The mean of `depth` over those of the pixel's camera rays that meet something.
+        FilteredDepth = "depth:filtered",
+        /// The same of `distance`.
+        FilteredDistance = "distance:filtered",
+        /// The same of `position`.
+        FilteredPosition = "position:filtered",
+        /// The same of `position-camera`.
+        FilteredPositionCamera = "position-camera:filtered",
+        /// The same of `normal`: shorter than 1 where the surface bends.
+        FilteredNormal = "normal:filtered",
+        /// The same of `normal-camera`.
+        FilteredNormalCamera = "normal-camera:filtered",
+        /// The same of `normal-geometric`.
+        FilteredNormalGeometric = "normal-geometric:filtered",
+        /// The same of `normal-geometric-camera`.
+        FilteredNormalGeometricCamera = "normal-geometric-camera:filtered",
+        /// The same of `uv`.
+        FilteredUv = "uv:filtered",
+        /// The same of `albedo`.
+        FilteredAlbedo = "albedo:filtered",
+        /// The share of the pixel's camera rays that meet nothing. With the coverage of each object it adds up to 1.
+        BackgroundCoverage = "coverage:background",
+        /// Cryptomatte of objects: the six with the greatest shares of the pixel's camera rays, each as the hash of its
+        /// name and its share.
+        CryptoObject = "crypto-object",
+        /// Cryptomatte of the outermost instances; what no instance placed has no share.
+        CryptoInstance = "crypto-instance",
+        /// Cryptomatte of materials; lights have no share.
+        CryptoMaterial = "crypto-material",
         /// How much work the pixel took, as in `--heat`: rays that were asked, from the camera and to lights.
         Rays = "rays",
     }
@@ -109,10 +139,10 @@ pub enum PlaneNumbers<'a> {
 }
 
 impl Plane {
-    /// The names of its channels, as in EXR files after `NAME.`; those of `color` stand there alone.
+    /// The names of its channels, as in EXR files after `NAME.`; those of `color` and of Cryptomatte stand there alone.
     pub fn channels(self) -> &'static [&'static str] {
         use Plane::*;
-        match self {
+        match self.of_each_ray().unwrap_or(self) {
             Color => &["R", "G", "B", "A"],
             Alpha => &["A"],
             Background | Emission | Ambient | Diffuse | Specular | Rest | Albedo => &["R", "G", "B"],
@@ -126,6 +156,11 @@ impl Plane {
             Motion | MotionBackward => &["X", "Y", "visible"],
             ObjectId | InstanceId | MaterialId | PrimitiveId | FaceOrientation => &["ID"],
             Rays => &["N"],
+            BackgroundCoverage => &["A"],
+            CryptoObject => Named::Object.channels(),
+            CryptoInstance => Named::Instance.channels(),
+            CryptoMaterial => Named::Material.channels(),
+            _ => unreachable!("a mean is of a plane that is none"),
         }
     }
 
@@ -143,7 +178,7 @@ impl Plane {
     /// What its numbers count; "1" for none.
     pub fn unit(self) -> &'static str {
         use Plane::*;
-        match self {
+        match self.of_each_ray().unwrap_or(self) {
             Color | Background | Emission | Ambient | Diffuse | Specular | Rest => "linear Rec. 709, premultiplied",
             Albedo => "linear Rec. 709",
             Depth | Distance | Position | PositionCamera | PositionObject => "m",
@@ -156,7 +191,7 @@ impl Plane {
     /// The space of its coordinates; "-" for none.
     pub fn space(self) -> &'static str {
         use Plane::*;
-        match self {
+        match self.of_each_ray().unwrap_or(self) {
             Position | Normal | NormalGeometric | Tangent => "world",
             Depth | PositionCamera | NormalCamera | NormalGeometricCamera => "camera",
             PositionObject | NormalObject => "object",
@@ -170,7 +205,7 @@ impl Plane {
     pub fn sampling(self) -> Sampling {
         match self {
             Plane::Color | Plane::Alpha | Plane::Rest | Plane::Shadow => Sampling::Filtered,
-            plane if plane.is_of_terms() => Sampling::Filtered,
+            plane if plane.is_of_terms() || plane.is_of_all_rays() => Sampling::Filtered,
             Plane::Rays => Sampling::Counted,
             _ => Sampling::Center,
         }
@@ -186,6 +221,51 @@ impl Plane {
     pub(crate) fn is_of_terms(self) -> bool {
         use Plane::*;
         matches!(self, Background | Emission | Ambient | Diffuse | Specular)
+    }
+
+    /// What of each camera ray it is the mean of; `None` if it is no such mean.
+    pub(crate) fn of_each_ray(self) -> Option<Plane> {
+        use Plane::*;
+        match self {
+            FilteredDepth => Some(Depth),
+            FilteredDistance => Some(Distance),
+            FilteredPosition => Some(Position),
+            FilteredPositionCamera => Some(PositionCamera),
+            FilteredNormal => Some(Normal),
+            FilteredNormalCamera => Some(NormalCamera),
+            FilteredNormalGeometric => Some(NormalGeometric),
+            FilteredNormalGeometricCamera => Some(NormalGeometricCamera),
+            FilteredUv => Some(Uv),
+            FilteredAlbedo => Some(Albedo),
+            _ => None,
+        }
+    }
+
+    /// Why there is no [mean](Self::of_each_ray) of it over camera rays.
+    pub(crate) fn why_no_mean(self) -> String {
+        let name = self.name();
+        match self.sampling() {
+            Sampling::Filtered => format!("\"{name}\" is a mean over the pixel as it is"),
+            Sampling::Counted => format!("\"{name}\" is counted over the whole pixel as it is"),
+            Sampling::Center if self.is_whole() => {
+                "an id has no mean; how much of the pixel each thing has is in \"coverage:NAME\" and \"crypto-object\""
+                    .to_owned()
+            }
+            Sampling::Center => format!("\"{name}\" is in a space of each object's own, and has no mean over several"),
+        }
+    }
+
+    /// Whether all camera rays of a pixel together say it, without light.
+    pub(crate) fn is_of_all_rays(self) -> bool {
+        use Plane::*;
+        self.of_each_ray().is_some()
+            || matches!(self, BackgroundCoverage | CryptoObject | CryptoInstance | CryptoMaterial)
+    }
+
+    /// Whether its channels have names of their own in files, without that of a layer before them.
+    #[cfg_attr(not(feature = "exr"), allow(dead_code, reason = "only EXR files have channels"))]
+    pub(crate) fn names_channels(self) -> bool {
+        self == Plane::Color || Named::of_layer(self).is_some()
     }
 
     /// Whether the centre ray of a pixel says it.

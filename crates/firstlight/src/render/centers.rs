@@ -26,7 +26,7 @@ struct Centers<'a> {
     hits: PixelHits,
 }
 
-/// What a centre ray meets.
+/// What a centre ray meets, or another camera ray.
 pub(super) struct Center<'a> {
     pub scene: &'a Scene,
     ray: Ray,
@@ -102,7 +102,7 @@ impl<'a> Centers<'a> {
 }
 
 /// What a ray says that meets nothing.
-fn nothing(plane: Plane) -> CenterValue {
+pub(super) fn nothing(plane: Plane) -> CenterValue {
     match plane {
         Plane::Depth | Plane::Distance => CenterValue::Floats([f32::INFINITY; 3]),
         plane if plane.is_whole() => CenterValue::Whole(0),
@@ -165,7 +165,7 @@ impl<'a> Center<'a> {
         }
     }
 
-    fn says(&self, plane: Plane) -> CenterValue {
+    pub fn says(&self, plane: Plane) -> CenterValue {
         let Scene { camera, geometry, .. } = self.scene;
         let (d, t) = (self.ray.d.as_dvec3(), self.hit.t);
         let float = |number: f64| CenterValue::Floats([number as f32, 0.0, 0.0]);

@@ -5,6 +5,7 @@ use std::ops::Range;
 use super::heat::Heat;
 use super::resolve::TermSums;
 use super::tile::Tile;
+use crate::image::cryptomatte;
 use crate::image::{
     Buffer, Format, Image, ImageError, NamedPlane, Plane, PlaneFile, PlaneNumbers, PlaneVec, Receipt, Window,
 };
@@ -17,6 +18,7 @@ enum Values {
     Two(Vec<[f32; 2]>),
     Three(Vec<[f32; 3]>),
     Four(Vec<[f32; 4]>),
+    Twelve(Vec<[f32; cryptomatte::NUMBERS]>),
     Whole(Vec<u32>),
 }
 
@@ -27,6 +29,7 @@ impl Values {
             1 => Values::One(vec![0.0; pixels]),
             2 => Values::Two(vec![[0.0; 2]; pixels]),
             3 => Values::Three(vec![[0.0; 3]; pixels]),
+            cryptomatte::NUMBERS => Values::Twelve(vec![[0.0; cryptomatte::NUMBERS]; pixels]),
             _ => Values::Four(vec![[0.0; 4]; pixels]),
         }
     }
@@ -41,6 +44,7 @@ impl Values {
             (Values::Two(to), Values::Two(from)) => copy(to, at, from, first, length),
             (Values::Three(to), Values::Three(from)) => copy(to, at, from, first, length),
             (Values::Four(to), Values::Four(from)) => copy(to, at, from, first, length),
+            (Values::Twelve(to), Values::Twelve(from)) => copy(to, at, from, first, length),
             (Values::Whole(to), Values::Whole(from)) => copy(to, at, from, first, length),
             _ => unreachable!("a tile has the planes of its film"),
         }
@@ -52,6 +56,7 @@ impl Values {
             Values::Two(numbers) => PlaneVec::Floats(numbers.into_flattened()),
             Values::Three(numbers) => PlaneVec::Floats(numbers.into_flattened()),
             Values::Four(numbers) => PlaneVec::Floats(numbers.into_flattened()),
+            Values::Twelve(numbers) => PlaneVec::Floats(numbers.into_flattened()),
             Values::Whole(numbers) => PlaneVec::Wholes(numbers),
         }
     }
@@ -62,6 +67,7 @@ impl Values {
             Values::Two(numbers) => PlaneNumbers::Floats(numbers.as_flattened()),
             Values::Three(numbers) => PlaneNumbers::Floats(numbers.as_flattened()),
             Values::Four(numbers) => PlaneNumbers::Floats(numbers.as_flattened()),
+            Values::Twelve(numbers) => PlaneNumbers::Floats(numbers.as_flattened()),
             Values::Whole(numbers) => PlaneNumbers::Wholes(numbers),
         }
     }
@@ -253,5 +259,19 @@ impl FilmTile {
                 }
             }
         }
+    }
+
+    /// Notes what all rays of a pixel say for plane number `plane`, which has as many channels.
+    pub(super) fn set_pixel(&mut self, plane: usize, x: u32, y: u32, numbers: &[f32]) {
+        let index = (y * self.tile.width + x) as usize;
+        let all = match &mut self.planes[plane].1 {
+            Values::One(pixels) => &mut pixels[..],
+            Values::Two(pixels) => pixels.as_flattened_mut(),
+            Values::Three(pixels) => pixels.as_flattened_mut(),
+            Values::Four(pixels) => pixels.as_flattened_mut(),
+            Values::Twelve(pixels) => pixels.as_flattened_mut(),
+            Values::Whole(_) => unreachable!("a mean is no whole number"),
+        };
+        all[index * numbers.len()..][..numbers.len()].copy_from_slice(numbers);
     }
 }

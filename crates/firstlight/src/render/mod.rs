@@ -15,6 +15,7 @@ mod cell;
 mod centers;
 mod change;
 mod counts;
+mod coverage;
 mod cut;
 mod fence;
 mod film;
@@ -67,6 +68,7 @@ use crate::visibility::Target;
 use arrival::Arrivals;
 use cell::{CELL, Cells};
 pub(crate) use counts::Counts;
+use coverage::{Asked, Coverage};
 use film::FilmTile;
 use hits::PixelHits;
 use lanes::Lanes;
@@ -305,7 +307,8 @@ fn expose(
     let nothing = Counts::default().stats(simd, threads);
     let result = Mutex::new((Film::new(scene, window, planes), nothing));
     let of_centers = planes.iter().any(|buffer| buffer.plane().is_of_center());
-    let is_lit = planes.iter().any(|buffer| !buffer.plane().is_of_center());
+    let of_all_rays = Asked::new(scene, planes);
+    let is_lit = planes.iter().map(|buffer| buffer.plane()).any(|of| !of.is_of_center() && !of.is_of_all_rays());
     let lights = Lights::new(scene);
     // Where every light is sampled at every ray, the bits are those of the plain renderer
     let is_sampled = lights.emitters.iter().all(Option::is_none);
@@ -336,6 +339,11 @@ fn expose(
         let film = &mut film_tile;
         let token = level.token();
         let center_rays = if of_centers { centers::fill(scene, token, film) } else { 0 };
+        if let Some(asked) = &of_all_rays
+            && Coverage::new(scene, asked, token).fill(film, &go_on).is_break()
+        {
+            return;
+        }
         let rendered = match renderer {
             _ if !is_lit => ControlFlow::Continue(Counts::default()),
             Renderer::Reference => render_tile(scene, film, &mut Plain, None, &go_on),
@@ -358,12 +366,15 @@ fn expose(
         };
         let ControlFlow::Continue(mut counts) = rendered else { return };
         counts.camera_rays += center_rays;
+        let pixels = tile.width as u64 * tile.height as u64;
+        if of_all_rays.is_some() {
+            counts.camera_rays += pixels * u64::from(scene.antialiasing) * u64::from(scene.antialiasing);
+        }
         {
             let (film, stats) = &mut *result.lock().expect("no thread panics while it holds the film");
             film.merge(&film_tile);
             *stats = stats.and(&counts.stats(simd, threads));
         }
-        let pixels = tile.width as u64 * tile.height as u64;
         let now = done.fetch_add(pixels, Ordering::Relaxed) + pixels;
         if progress(now, all).is_break() {
             stop.store(true, Ordering::Relaxed);

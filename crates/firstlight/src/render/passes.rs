@@ -77,6 +77,7 @@ fn is_rendered(buffer: Buffer) -> bool {
     match buffer {
         Buffer::Plane(plane) => !matches!(plane, Plane::Rest | Plane::Shadow),
         Buffer::Light(_, part) | Buffer::Group(_, part) => part.is_none_or(|part| part.moment().is_some()),
+        Buffer::Coverage(_) => true,
     }
 }
 

@@ -4,6 +4,7 @@ use super::many::SINGLY;
 use super::{RenderSettings, Renderer};
 use crate::camera::{Frame, Projection};
 use crate::describe::SamplesDesc;
+use crate::image::cryptomatte::{self, Named};
 use crate::image::{Buffer, Plane, Receipt};
 use crate::light::Light;
 use crate::math::Vec3;
@@ -68,7 +69,10 @@ impl Scene {
     /// - `light_groups`: a JSON list of their names and of the numbers of their lights, from 1;
     /// - `motion_to`, where motion is asked for: whereto it leads, a number of seconds, or the name of a camera in quotes;
     ///   and the three matrices of the camera there, with `motion_` before them;
-    /// - `object_names`, `material_names`: JSON lists, the name of id 1 first, `null` for what has none.
+    /// - `object_names`, `instance_names`, `material_names`: JSON lists, the name of id 1 first, `null` for what has
+    ///   none;
+    /// - `object_manifest`, `instance_manifest`, `material_manifest`: JSON dictionaries of the same names, `#3` for that
+    ///   of id 3 if it has none, to the ids that Cryptomatte has for them, 8 hexadecimal digits.
     pub fn buffers_receipt(&self, settings: &RenderSettings, buffers: &[Buffer]) -> Receipt {
         let mut receipt = self.receipt(settings);
         if matches!(buffers, [Buffer::Plane(Plane::Color)]) {
@@ -98,19 +102,12 @@ impl Scene {
                 add(&format!("{prefix}{convention}_camera_from_world"), format!("{} 0 0 0 1", axes.map(row).join(" ")));
             }
         }
-        let asks_for = |plane: Plane| buffers.contains(&plane.into());
-        if asks_for(Plane::ObjectId) {
-            let shapes = self.geometry.surfaces.iter().map(|surface| surface.name.as_deref().map(str::to_owned));
-            add("object_names", list(shapes.chain(self.light_names()).collect()));
-        }
-        if asks_for(Plane::InstanceId) {
-            add(
-                "instance_names",
-                list(self.geometry.instances.iter().map(|n| n.as_deref().map(str::to_owned)).collect()),
-            );
-        }
-        if asks_for(Plane::MaterialId) {
-            add("material_names", list(self.summary.materials.iter().map(|(name, _)| Some(name.clone())).collect()));
+        for named in Named::ALL {
+            if buffers.iter().any(|buffer| Named::of(buffer.plane()) == Some(named)) {
+                let names = self.names_of(named);
+                add(&format!("{}_names", named.word()), list(names.iter().map(|n| n.map(str::to_owned)).collect()));
+                add(&named.manifest_key(), cryptomatte::manifest(names.into_iter()));
+            }
         }
         if buffers.iter().any(|buffer| matches!(buffer, Buffer::Light(..) | Buffer::Group(..))) {
             add("light_names", list(self.light_names()));

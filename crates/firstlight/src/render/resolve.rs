@@ -117,7 +117,7 @@ impl Term {
             Buffer::Plane(Plane::Ambient) => vec![Term::Ambient],
             Buffer::Plane(Plane::Diffuse) => all().map(|light| Term::Light(light, 0)).collect(),
             Buffer::Plane(Plane::Specular) => all().map(|light| Term::Light(light, 1)).collect(),
-            Buffer::Plane(_) => Vec::new(),
+            Buffer::Plane(_) | Buffer::Coverage(_) => Vec::new(),
             Buffer::Light(_, part) | Buffer::Group(_, part) => {
                 let moments = match part.and_then(LightPart::moment) {
                     Some(moment) => moment..moment + 1,

@@ -1,22 +1,35 @@
-//! What a scene asks for of each pixel: names of buffers become planes, lights and groups of lights.
+//! What a scene asks for of each pixel: names of buffers become planes, lights, groups of lights and objects.
 
+use super::geometry::Geometry;
 use super::{Scene, SceneDesc};
 use crate::context::CompileContext;
 use crate::describe::node::quoted;
-use crate::ids::{LightGroupId, LightId};
+use crate::ids::{LightGroupId, LightId, SurfaceId};
+use crate::image::cryptomatte::Named;
 use crate::image::{Buffer, BufferDesc, LightChoice};
-use crate::light::LightDesc;
+use crate::light::{Light, LightDesc};
 
-/// Lights, or groups of them, that names of buffers choose from.
+/// The names of what has buffers of its own.
+#[derive(Default)]
+struct Names<'a> {
+    lights: Vec<Option<&'a str>>,
+    groups: Vec<Option<&'a str>>,
+    objects: Vec<Option<&'a str>>,
+}
+
+/// Lights, groups of them, or objects, that names of buffers choose from.
 struct Chosen<'a> {
     /// What one of them is called in messages, and many.
     kinds: [&'a str; 2],
     /// What the names of its buffers begin with.
     prefix: &'a str,
-    names: &'a [Option<String>],
+    names: &'a [Option<&'a str>],
 }
 
-/// So many lights are at most kept apart where all of them are asked for.
+/// Of many things of one name so many are said.
+const SAID: usize = 8;
+
+/// So many lights, or objects, are at most kept apart where all of them are asked for.
 const MAX_APART: usize = 1000;
 
 impl SceneDesc {
@@ -34,11 +47,28 @@ impl SceneDesc {
     }
 
     /// What `[render] buffers` asks for.
-    pub(super) fn compile_buffers(&self, cx: &mut CompileContext, groups: &[(String, Vec<u32>)]) -> Vec<Buffer> {
-        let names: Vec<Option<String>> = LightDesc::in_scene_order(&self.lights).map(LightDesc::name).collect();
-        let groups: Vec<Option<String>> = groups.iter().map(|(name, _)| Some(name.clone())).collect();
-        let of_lights = Chosen { kinds: ["light", "lights"], prefix: "light", names: &names };
-        let of_groups = Chosen { kinds: ["group of lights", "groups of lights"], prefix: "group", names: &groups };
+    pub(super) fn compile_buffers(
+        &self,
+        cx: &mut CompileContext,
+        groups: &[(String, Vec<u32>)],
+        geometry: Option<&Geometry>,
+        lights: &[Light],
+    ) -> Vec<Buffer> {
+        let light_names: Vec<Option<String>> = LightDesc::in_scene_order(&self.lights).map(LightDesc::name).collect();
+        let mut names = Names {
+            lights: light_names.iter().map(Option::as_deref).collect(),
+            groups: groups.iter().map(|(name, _)| Some(name.as_str())).collect(),
+            objects: Vec::new(),
+        };
+        if self.render.buffers.iter().any(|desc| matches!(desc, BufferDesc::Coverage(_))) {
+            // Without a geometry there is a fault already
+            let Some(geometry) = geometry else { return Vec::new() };
+            names.objects = geometry.surface_names().chain(names.lights.iter().copied()).collect();
+        }
+        let of_lights = Chosen { kinds: ["light", "lights"], prefix: "light", names: &names.lights };
+        let of_groups =
+            Chosen { kinds: ["group of lights", "groups of lights"], prefix: "group", names: &names.groups };
+        let of_objects = Chosen { kinds: ["object", "objects"], prefix: "coverage", names: &names.objects };
         let mut all = Vec::new();
         for (i, desc) in self.render.buffers.iter().enumerate() {
             let path = format!("render.buffers[{i}]");
@@ -56,8 +86,8 @@ impl SceneDesc {
                     vec![(*plane).into()]
                 }
                 BufferDesc::Light { light, part } => {
-                    if *light == LightChoice::All && names.len() > MAX_APART {
-                        let message = format!("all {} lights, each apart, are more than {MAX_APART}", names.len());
+                    if *light == LightChoice::All && lights.len() > MAX_APART {
+                        let message = format!("all {} lights, each apart, are more than {MAX_APART}", lights.len());
                         cx.error(&path, message, Some("name those that count, or give lights a group"));
                         continue;
                     }
@@ -68,10 +98,22 @@ impl SceneDesc {
                     let groups = of_groups.choose(cx, &path, group);
                     groups.into_iter().map(|group| Buffer::Group(LightGroupId(group as u32), *part)).collect()
                 }
+                BufferDesc::Coverage(object) => {
+                    let mut objects = of_objects.choose(cx, &path, object);
+                    if *object == LightChoice::All {
+                        objects.retain(|object| geometry.is_some_and(|geometry| is_seen(*object, geometry, lights)));
+                    }
+                    if objects.len() > MAX_APART {
+                        let message = format!("all {} objects, each apart, are more than {MAX_APART}", objects.len());
+                        cx.error(&path, message, Some("name those that count, or ask for crypto-object"));
+                        continue;
+                    }
+                    objects.into_iter().map(|object| Buffer::Coverage(SurfaceId(object as u32))).collect()
+                }
             };
             for buffer in found {
                 if all.contains(&buffer) {
-                    let message = format!("{} is given twice", quoted(&name_of(buffer, &names, &groups)));
+                    let message = format!("{} is given twice", quoted(&names.of(buffer)));
                     cx.error(&path, message, Some("name each once; the picture is \"color\""));
                 } else {
                     all.push(buffer);
@@ -83,6 +125,14 @@ impl SceneDesc {
             cx.error("render.buffers", "an empty list asks for nothing", Some(hint));
         }
         all
+    }
+}
+
+/// Whether a camera can see an object.
+fn is_seen(object: usize, geometry: &Geometry, lights: &[Light]) -> bool {
+    match object.checked_sub(geometry.surfaces.len()) {
+        None => geometry.surfaces[object].visible,
+        Some(light) => lights.get(light).and_then(Light::area).is_some_and(|area| area.visible),
     }
 }
 
@@ -98,18 +148,20 @@ impl Chosen<'_> {
                 Vec::new()
             }
             LightChoice::Name(name) => {
-                let called = |of: &usize| names[*of].as_ref() == Some(name);
+                let called = |of: &usize| names[*of] == Some(name);
                 let same: Vec<usize> = (0..names.len()).filter(called).collect();
                 match same.len() {
                     1 => return same,
                     0 => {
-                        let known: Vec<&str> = names.iter().flatten().map(String::as_str).collect();
+                        let known: Vec<&str> = names.iter().flatten().copied().collect();
                         cx.unknown(path, kind, name, &known);
                     }
                     count => {
                         let message = format!("{count} {kinds} are called {}", quoted(name));
-                        let numbers: Vec<String> = same.iter().map(|of| format!("{prefix}:#{}", of + 1)).collect();
-                        cx.error(path, message, Some(&format!("they are {}; or rename them", numbers.join(", "))));
+                        let numbers = same.iter().take(SAID).map(|of| format!("{prefix}:#{}", of + 1));
+                        let more = if count > SAID { ", ..." } else { "" };
+                        let numbers = numbers.collect::<Vec<_>>().join(", ") + more;
+                        cx.error(path, message, Some(&format!("they are {numbers}; or rename them")));
                     }
                 }
                 Vec::new()
@@ -118,25 +170,31 @@ impl Chosen<'_> {
     }
 }
 
-/// The name of a buffer, which no other has, and which can stand in any file: an archive says letters
-/// beyond ASCII in ways that readers do not agree on. `lights` and `groups` are the names of those.
-fn name_of(buffer: Buffer, lights: &[Option<String>], groups: &[Option<String>]) -> String {
-    let choice = |number: usize, names: &[Option<String>]| {
-        let own = names.get(number).and_then(Option::as_ref).filter(|name| {
-            let is_alone = names.iter().flatten().filter(|other| other == name).count() == 1;
+impl Names<'_> {
+    /// The name of a buffer, which no other has, and which can stand in any file: an archive says letters beyond ASCII
+    /// in ways that readers do not agree on.
+    fn of(&self, buffer: Buffer) -> String {
+        let (names, number) = match buffer {
+            Buffer::Plane(plane) => return plane.name().to_owned(),
+            Buffer::Light(light, _) => (&self.lights, light.index()),
+            Buffer::Group(group, _) => (&self.groups, group.index()),
+            Buffer::Coverage(object) => (&self.objects, object.index()),
+        };
+        let desc = |choice: LightChoice| match buffer {
+            Buffer::Plane(plane) => BufferDesc::Plane(plane),
+            Buffer::Light(_, part) => BufferDesc::Light { light: choice, part },
+            Buffer::Group(_, part) => BufferDesc::Group { group: choice, part },
+            Buffer::Coverage(_) => BufferDesc::Coverage(choice),
+        };
+        let own = names.get(number).copied().flatten().filter(|name| {
+            let is_alone = names.iter().flatten().filter(|other| *other == name).count() == 1;
             is_alone && !name.is_empty() && name.chars().all(|c| matches!(c, ' '..='~') && !matches!(c, '/' | '\\'))
         });
-        match own {
-            Some(name) => LightChoice::Name(name.clone()),
-            None => LightChoice::Number(number as u32 + 1),
-        }
-    };
-    let desc = match buffer {
-        Buffer::Plane(plane) => BufferDesc::Plane(plane),
-        Buffer::Light(light, part) => BufferDesc::Light { light: choice(light.index(), lights), part },
-        Buffer::Group(group, part) => BufferDesc::Group { group: choice(group.index(), groups), part },
-    };
-    desc.name()
+        // Some names mean something else: that of a number, or of the background
+        let by_name = own.map(|name| desc(LightChoice::Name(name.to_owned())));
+        let by_name = by_name.filter(|desc| BufferDesc::parse(&desc.name()).as_ref() == Ok(desc));
+        by_name.unwrap_or_else(|| desc(LightChoice::Number(number as u32 + 1))).name()
+    }
 }
 
 impl Scene {
@@ -146,9 +204,34 @@ impl Scene {
     }
 
     /// The name of a buffer in files: that of the plane; `light:NAME` or, of a light without a name of its own,
-    /// `light:#3`, with the part after it; and so for groups of lights.
+    /// `light:#3`, with the part after it; and so for groups of lights, and for the coverage of objects.
     pub fn buffer_name(&self, buffer: Buffer) -> String {
-        name_of(buffer, &self.light_names(), &self.group_names())
+        let lights = || self.summary.lights.iter().map(|(_, name, _)| name.as_deref()).collect();
+        let names = match buffer {
+            Buffer::Plane(_) => Names::default(),
+            Buffer::Light(..) => Names { lights: lights(), ..Names::default() },
+            Buffer::Group(..) => {
+                let groups = self.light_groups.iter().map(|(name, _)| Some(name.as_str())).collect();
+                Names { groups, ..Names::default() }
+            }
+            Buffer::Coverage(_) => Names { objects: self.names_of(Named::Object), ..Names::default() },
+        };
+        names.of(buffer)
+    }
+
+    /// The names of what has ids, that of id 1 first.
+    pub(crate) fn names_of(&self, named: Named) -> Vec<Option<&str>> {
+        match named {
+            Named::Object => {
+                let lights = self.summary.lights.iter().map(|(_, name, _)| name.as_deref());
+                self.geometry.surface_names().chain(lights).collect()
+            }
+            Named::Instance => self.geometry.instances.iter().map(Option::as_deref).collect(),
+            // The last one is of shapes that name none
+            Named::Material => {
+                self.summary.materials.iter().map(|(name, _)| Some(name.as_str())).chain([None]).collect()
+            }
+        }
     }
 
     /// The names of the lights, in scene order.
@@ -156,15 +239,10 @@ impl Scene {
         self.summary.lights.iter().map(|(_, name, _)| name.clone()).collect()
     }
 
-    /// The names of their groups.
-    pub(crate) fn group_names(&self) -> Vec<Option<String>> {
-        self.light_groups.iter().map(|(name, _)| Some(name.clone())).collect()
-    }
-
-    /// The lights that a buffer is of, in scene order; none of a plane.
+    /// The lights that a buffer is of, in scene order; none of what is not sent by lights.
     pub(crate) fn lights_of(&self, buffer: Buffer) -> Vec<u32> {
         match buffer {
-            Buffer::Plane(_) => Vec::new(),
+            Buffer::Plane(_) | Buffer::Coverage(_) => Vec::new(),
             Buffer::Light(light, _) => vec![light.0],
             Buffer::Group(group, _) => self.light_groups[group.index()].1.clone(),
         }
@@ -184,6 +262,8 @@ impl Scene {
             Buffer::Plane(plane) => (plane.is_of_motion() && self.motion.is_none()).then(|| {
                 format!("{} leads nowhere: [render] motion_to of the scene says whereto", quoted(plane.name()))
             }),
+            Buffer::Coverage(object) => (object.index() >= self.surfaces())
+                .then(|| format!("there is no object #{}: the scene has {}", object.0 + 1, self.surfaces())),
         };
         let twice = || {
             let twice = buffers.iter().enumerate().find(|(i, buffer)| buffers[..*i].contains(buffer));

@@ -121,7 +121,7 @@ impl SceneDesc {
         let camera = desc.compile_camera(cx, picture.width, picture.height, geometry.is_some());
         let lights = desc.compile_lights(cx);
         let light_groups = desc.light_groups();
-        let buffers = desc.compile_buffers(cx, &light_groups);
+        let buffers = desc.compile_buffers(cx, &light_groups, geometry.as_ref(), &lights);
         let (Some(geometry), false) = (geometry, cx.has_errors()) else {
             return None;
         };

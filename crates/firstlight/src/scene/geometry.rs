@@ -367,6 +367,11 @@ impl Geometry {
         }
     }
 
+    /// What the scene calls each surface.
+    pub fn surface_names(&self) -> impl Iterator<Item = Option<&str>> {
+        self.surfaces.iter().map(|surface| surface.name.as_deref())
+    }
+
     /// The lights that shine on a surface; `None`: all.
     #[inline(always)]
     pub fn lights_of(&self, surface: SurfaceId) -> Option<LinkId> {

@@ -1,0 +1,227 @@
+//! What all camera rays of a pixel meet, counted: coverage, Cryptomatte, and means of what a centre ray says.
+//!
+//! Apart from all that is lit, as centre rays are ([`centers`](super::centers)). All n x n rays are traced, whatever the
+//! antialiasing mode: they are those of the picture, and meet what those meet.
+
+use std::ops::ControlFlow;
+
+use fearless_simd::Level;
+
+use super::centers::{Center, nothing};
+use super::film::{CenterValue, FilmTile};
+use super::hits::{PixelHits, grid_ray};
+use crate::ids::SurfaceId;
+use crate::image::cryptomatte::{self, Named, hashed_name, id_bits};
+use crate::image::{Buffer, Plane};
+use crate::scene::{Hit, Scene};
+
+/// Rays between two questions.
+const QUESTION_EVERY: u32 = 1 << 20;
+
+/// What is asked of all camera rays, each with the number of its plane.
+pub(super) struct Asked {
+    /// By their ids.
+    objects: Vec<(SurfaceId, usize)>,
+    background: Option<usize>,
+    mattes: Vec<(Matte, usize)>,
+    /// The mean of what each ray says of a plane.
+    means: Vec<(Plane, usize)>,
+}
+
+/// A layer of Cryptomatte.
+struct Matte {
+    named: Named,
+    /// The bits of each name, that of id 1 first.
+    bits: Vec<u32>,
+}
+
+/// One thread's way through all camera rays of tiles.
+pub(super) struct Coverage<'a> {
+    scene: &'a Scene,
+    asked: &'a Asked,
+    hits: PixelHits,
+    /// The rays of a pixel that meet something: which of the film's rays it is, and what it meets.
+    met: Vec<([u32; 2], Hit)>,
+    shares: Shares,
+    /// One for each of the means.
+    sums: Vec<[f64; 3]>,
+}
+
+/// Counts how many have the same key.
+#[derive(Default)]
+struct Shares {
+    keys: Vec<u32>,
+    /// Each key and how often it is there, by the key.
+    counts: Vec<(u32, u32)>,
+}
+
+impl Asked {
+    /// What is asked by `planes`; `None` if nothing is.
+    pub fn new(scene: &Scene, planes: &[Buffer]) -> Option<Asked> {
+        let mut asked = Asked { objects: Vec::new(), background: None, mattes: Vec::new(), means: Vec::new() };
+        for (number, buffer) in planes.iter().enumerate() {
+            match *buffer {
+                Buffer::Coverage(object) => asked.objects.push((object, number)),
+                Buffer::Plane(Plane::BackgroundCoverage) => asked.background = Some(number),
+                Buffer::Plane(plane) => {
+                    asked.mattes.extend(Named::of_layer(plane).map(|named| (Matte::new(scene, named), number)));
+                    asked.means.extend(plane.of_each_ray().map(|of| (of, number)));
+                }
+                Buffer::Light(..) | Buffer::Group(..) => {}
+            }
+        }
+        asked.objects.sort_unstable();
+        planes.iter().any(|buffer| buffer.plane().is_of_all_rays()).then_some(asked)
+    }
+}
+
+impl Matte {
+    fn new(scene: &Scene, named: Named) -> Matte {
+        let names = (1..).zip(scene.names_of(named));
+        Matte { named, bits: names.map(|(id, name)| id_bits(&hashed_name(id, name))).collect() }
+    }
+
+    /// The bits of the name of what was met; `None` for what has no such name.
+    fn bits_of(&self, scene: &Scene, hit: &Hit) -> Option<u32> {
+        let geometry = &scene.geometry;
+        let surface = geometry.surfaces.get(hit.surface.index());
+        let place = match self.named {
+            Named::Object => hit.surface.index(),
+            Named::Instance => (geometry.spaces[surface?.space as usize].instance as usize).checked_sub(1)?,
+            Named::Material => surface?.material.unwrap_or_else(|| geometry.face_material(hit)).index(),
+        };
+        Some(self.bits[place])
+    }
+}
+
+impl Shares {
+    /// Counts `keys`.
+    fn count(&mut self, keys: impl Iterator<Item = u32>) {
+        self.keys.clear();
+        self.keys.extend(keys);
+        self.keys.sort_unstable();
+        self.counts.clear();
+        self.counts.extend(self.keys.chunk_by(|a, b| a == b).map(|same| (same[0], same.len() as u32)));
+    }
+
+    /// Those with the greatest counts, as a layer of Cryptomatte has them: bits and share of `all`. Of equal counts the
+    /// lower bits are first, so that no order of a scene decides.
+    fn ranks(&mut self, all: f32) -> [f32; cryptomatte::NUMBERS] {
+        self.counts.sort_unstable_by_key(|(bits, count)| (u32::MAX - count, *bits));
+        let mut numbers = [0.0; cryptomatte::NUMBERS];
+        for ([id, share], (bits, count)) in numbers.as_chunks_mut::<2>().0.iter_mut().zip(&self.counts) {
+            (*id, *share) = (f32::from_bits(*bits), *count as f32 / all);
+        }
+        numbers
+    }
+}
+
+impl<'a> Coverage<'a> {
+    pub fn new(scene: &'a Scene, asked: &'a Asked, level: Level) -> Self {
+        let hits = PixelHits::new(level, scene.antialiasing);
+        let sums = vec![[0.0; 3]; asked.means.len()];
+        Coverage { scene, asked, hits, met: Vec::new(), shares: Shares::default(), sums }
+    }
+
+    /// Fills the planes of a tile that are theirs. `go_on` is asked now and then.
+    pub fn fill(&mut self, film: &mut FilmTile, go_on: &impl Fn() -> ControlFlow<()>) -> ControlFlow<()> {
+        let (scene, tile, side, n) = (self.scene, film.tile, self.hits.side(), self.scene.antialiasing);
+        let mut traced = 0;
+        for top in (0..tile.height).step_by(side as usize) {
+            for left in (0..tile.width).step_by(side as usize) {
+                let (w, h) = ((tile.width - left).min(side), (tile.height - top).min(side));
+                self.hits.trace(scene, tile.x + left, tile.y + top, w, h);
+                for (y, x) in (0..h).flat_map(|y| (0..w).map(move |x| (y, x))) {
+                    let [i, j] = [tile.x + left + x, tile.y + top + y];
+                    self.met.clear();
+                    for (row, column) in (0..n).flat_map(|row| (0..n).map(move |column| (row, column))) {
+                        let hit = self.hits.get(x, y, column, row);
+                        self.met.extend(hit.map(|hit| ([i * n + column, j * n + row], hit)));
+                    }
+                    self.pixel(film, left + x, top + y);
+                }
+                traced += w * h * n * n;
+                if traced >= QUESTION_EVERY {
+                    traced = 0;
+                    go_on()?;
+                }
+            }
+        }
+        ControlFlow::Continue(())
+    }
+
+    /// Fills a pixel of a tile with what its rays meet.
+    fn pixel(&mut self, film: &mut FilmTile, x: u32, y: u32) {
+        let Coverage { scene, asked, met, shares, .. } = self;
+        let rays = scene.antialiasing * scene.antialiasing;
+        if let Some(plane) = asked.background {
+            film.set_pixel(plane, x, y, &[(rays - met.len() as u32) as f32 / rays as f32]);
+        }
+        if !asked.objects.is_empty() {
+            shares.count(met.iter().map(|(_, hit)| hit.surface.0));
+            for (object, count) in &shares.counts {
+                if let Ok(at) = asked.objects.binary_search_by_key(object, |(asked, _)| asked.0) {
+                    film.set_pixel(asked.objects[at].1, x, y, &[*count as f32 / rays as f32]);
+                }
+            }
+        }
+        for (matte, plane) in &asked.mattes {
+            shares.count(met.iter().filter_map(|(_, hit)| matte.bits_of(scene, hit)));
+            film.set_pixel(*plane, x, y, &shares.ranks(rays as f32));
+        }
+        if !asked.means.is_empty() {
+            self.means(film, x, y);
+        }
+    }
+
+    /// Fills a pixel of the means: sums in 64 bits, ray by ray.
+    fn means(&mut self, film: &mut FilmTile, x: u32, y: u32) {
+        let Coverage { scene, asked, met, sums, .. } = self;
+        sums.fill([0.0; 3]);
+        for ([i, j], hit) in &*met {
+            let (ray, differential) = grid_ray(scene, scene.antialiasing, *i, *j);
+            let there = Center::new(scene, ray, differential, *hit);
+            for ((of, _), sum) in asked.means.iter().zip(&mut *sums) {
+                let said = floats(there.says(*of));
+                *sum = std::array::from_fn(|channel| sum[channel] + f64::from(said[channel]));
+            }
+        }
+        for ((of, plane), sum) in asked.means.iter().zip(sums) {
+            let mean = match met.len() {
+                0 => floats(nothing(*of)),
+                count => sum.map(|sum| (sum / count as f64) as f32),
+            };
+            film.set_pixel(*plane, x, y, &mean[..of.channels().len()]);
+        }
+    }
+}
+
+fn floats(value: CenterValue) -> [f32; 3] {
+    match value {
+        CenterValue::Floats(numbers) => numbers,
+        CenterValue::Whole(_) => unreachable!("ids have no mean"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_greatest_shares_come_first_and_of_equal_ones_the_lower_bits() {
+        let mut shares = Shares::default();
+        let bits = |name: &str| id_bits(name);
+        let keys = "abcdefghhhaaaaccc".chars().map(|name| bits(&name.to_string()));
+        shares.count(keys);
+        assert_eq!(shares.counts.iter().map(|(_, count)| count).sum::<u32>(), 17);
+        let ranks = shares.ranks(32.0);
+        let mut equal = ["b", "d", "e", "f", "g"].map(bits);
+        equal.sort_unstable();
+        let expected = [(bits("a"), 5), (bits("c"), 4), (bits("h"), 3), (equal[0], 1), (equal[1], 1), (equal[2], 1)];
+        for (rank, (id, count)) in expected.into_iter().enumerate() {
+            assert_eq!((ranks[2 * rank].to_bits(), ranks[2 * rank + 1]), (id, count as f32 / 32.0), "{rank}");
+        }
+        shares.count(std::iter::once(bits("a")));
+        assert_eq!(shares.ranks(1.0)[1..], [1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]);
+    }
+}
