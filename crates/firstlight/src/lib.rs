@@ -83,9 +83,10 @@ pub use describe::{ColorDesc, ColorParam, FilePath, NumberParam, ParamDesc, Samp
 pub use error::{Diagnostic, Place, SceneError, Severity, printable};
 pub use ids::{LightGroupId, LightId, MaterialId, SurfaceId, TextureId};
 pub use image::{
-    Buffer, BufferDesc, Format, Image, ImageError, LightChoice, LightPart, NamedPlane, PendingFile, Plane,
-    PlaneNumbers, PlaneVec, Receipt, Sampling, StagedFile, StoredImage, Window, Written, encode_planes, is_decoding,
-    write_open, write_whole,
+    Buffer, BufferDesc, DifferingSample, Distance, Flip, Format, Image, ImageError, LightChoice, LightPart, NamedPlane,
+    PendingFile, Plane, PlaneDifference, PlaneNumbers, PlaneVec, Receipt, Sampling, StagedFile, StoredImage,
+    StoredPlane, StoredPlanes, Window, Written, display_steps, encode_planes, false_colors, is_decoding,
+    relative_differences, write_open, write_whole,
 };
 pub use import::{ImportError, MeshData, MeshFormat, MeshPart, MeshPlace, MeshReport, is_point_set, read_mesh};
 pub use light::{
@@ -94,7 +95,10 @@ pub use light::{
 };
 pub use material::{BlinnPhongDesc, MaterialDesc, PhongDesc};
 pub use math::{DVec3, ShadowRay, Vec2, Vec3, WorldRay};
-pub use render::{AaMode, Film, Heat, LightCounts, RenderSettings, RenderStats, VisibilityMode, render, render_image};
+pub use render::{
+    AaMode, Film, Heat, LightCounts, ReceiptFault, ReceiptSettings, RenderSettings, RenderStats, VisibilityMode,
+    render, render_image,
+};
 pub use scene::{
     Added, CameraHit, CastHit, CompileOptions, Compiled, DisplayEncoding, Framing, Hit, ModelSettings, MotionTo,
     RenderDesc, Scene, SceneDesc, SceneSummary, SurfacePoint, UpAxis, View,

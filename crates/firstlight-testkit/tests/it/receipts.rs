@@ -4,8 +4,8 @@ use std::num::NonZeroUsize;
 use std::ops::ControlFlow;
 
 use firstlight::{
-    AaMode, CompileOptions, NoAssets, Plane, Receipt, RenderSettings, SamplesDesc, SceneDesc, ShadowTerminator,
-    ShapeDesc, SimdLevel, VisibilityMode, Window, render,
+    AaMode, CompileOptions, NoAssets, Plane, Receipt, ReceiptSettings, RenderSettings, SamplesDesc, SceneDesc,
+    ShadowTerminator, ShapeDesc, SimdLevel, VisibilityMode, Window, render,
 };
 
 /// Everything that a setting can change: area lights with and without a word on samples, a smooth mesh, keys, two
@@ -136,8 +136,8 @@ fn renderers_of_the_same_bits_say_the_same() {
     assert!(shoot(&sampled, &full) == reference);
 }
 
-#[test]
-fn what_changes_the_film_changes_the_receipt() {
+/// Films of all kinds of one scene.
+fn shots() -> Vec<(&'static str, Shot)> {
     let desc = scene();
     let base = RenderSettings::default();
     let full = RenderSettings { aa_mode: AaMode::Full, ..base.clone() };
@@ -153,7 +153,7 @@ fn what_changes_the_film_changes_the_receipt() {
         })
     };
     let crop = |x, y, width, height| RenderSettings { crop: Some(Window { x, y, width, height }), ..base.clone() };
-    let shots: Vec<(&str, Shot)> = vec![
+    vec![
         ("as it is", shoot(&desc, &base)),
         ("full", shoot(&desc, &full)),
         ("reference", shoot(&desc, &RenderSettings { reference: true, ..base.clone() })),
@@ -173,7 +173,26 @@ fn what_changes_the_film_changes_the_receipt() {
         ("another time", shoot_at(&desc, &base, 0.5)),
         ("crop", shoot(&desc, &crop(0, 0, 20, 25))),
         ("another crop", shoot(&desc, &crop(13, 0, 20, 25))),
-    ];
+    ]
+}
+
+#[test]
+fn a_receipt_leads_back_to_the_film() {
+    for (name, (bits, receipt)) in shots() {
+        let said = ReceiptSettings::read(&receipt).unwrap();
+        assert!(said.is_of_this_version());
+        let mut desc = scene();
+        said.apply(&mut desc);
+        let options = CompileOptions { time: said.time, ..CompileOptions::default() };
+        let scene = desc.compile(&NoAssets, &options).expect("it has no faults").scene;
+        assert_eq!(scene.hash(), said.scene_hash, "{name}");
+        assert!(shoot_at(&desc, &said.settings(&scene), said.time) == (bits, receipt), "{name}");
+    }
+}
+
+#[test]
+fn what_changes_the_film_changes_the_receipt() {
+    let shots = shots();
     for (i, (one, (bits, receipt))) in shots.iter().enumerate() {
         for (other, (other_bits, other_receipt)) in &shots[..i] {
             assert!(bits != other_bits, "{one} and {other} have the same film: the scene tests too little");

@@ -109,9 +109,42 @@ impl std::fmt::Display for Display {
     }
 }
 
+impl std::str::FromStr for Display {
+    type Err = String;
+
+    /// As it is written; the error says what is.
+    fn from_str(text: &str) -> Result<Self, String> {
+        let read = || {
+            let (encoding, exposure) = text.split_once(", exposure ")?;
+            let encoding = match (encoding, encoding.strip_prefix("gamma ")) {
+                ("srgb", _) => Encoding::Srgb,
+                ("linear", _) => Encoding::Linear,
+                (_, Some(gamma)) => Encoding::Gamma(gamma.parse().ok()?),
+                _ => return None,
+            };
+            let display = Display { encoding, exposure: exposure.parse().ok()? };
+            display.fault().is_none().then_some(display)
+        };
+        read().ok_or_else(|| format!("{text:?} is no display encoding; one is \"srgb, exposure 0\""))
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn what_is_written_is_read() {
+        for encoding in [Encoding::Srgb, Encoding::Linear, Encoding::Gamma(2.2)] {
+            for exposure in [0.0, -1.5, 0.1] {
+                let display = Display { encoding, exposure };
+                assert_eq!(display.to_string().parse(), Ok(display));
+            }
+        }
+        for bad in ["", "srgb", "srgb, exposure x", "gamma 0, exposure 0", "rec2020, exposure 0", "srgb, exposure 65"] {
+            assert!(bad.parse::<Display>().is_err(), "{bad}");
+        }
+    }
 
     #[test]
     fn srgb_known_values() {

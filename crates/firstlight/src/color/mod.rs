@@ -2,10 +2,12 @@
 
 mod display;
 mod quantize;
+mod ramp;
 mod steps;
 
 pub use display::{Display, Encoding};
 pub(crate) use quantize::Quantizer;
+pub(crate) use ramp::false_color;
 pub(crate) use steps::DisplaySteps;
 
 use std::ops::{Add, AddAssign, Mul};

@@ -264,7 +264,8 @@ mod tests {
             assert_eq!(text.bytes(), value.as_bytes());
         }
         let names: Vec<_> = attributes(&bytes).iter().map(|a| String::from_utf8_lossy(a.name).into_owned()).collect();
-        let last: Vec<_> = receipt().entries.iter().map(|(k, _)| format!("firstlight:{k}")).collect();
+        let keys = receipt().entries.into_iter().map(|(key, _)| key).chain(["buffer.color".into()]);
+        let last: Vec<_> = keys.map(|key| format!("firstlight:{key}")).collect();
         assert_eq!(names[names.len() - last.len()..], last);
         // The walk ends where the header does
         assert_eq!(bytes[attributes(&bytes).last().unwrap().all.end], 0);

@@ -37,10 +37,7 @@ pub fn encode_planes(
 ) -> Result<Vec<u8>, ImageError> {
     let pixels = u64::from(window.width) * u64::from(window.height);
     for NamedPlane { name, plane, numbers } in planes {
-        let (length, is_whole) = match numbers {
-            PlaneNumbers::Floats(numbers) => (numbers.len(), false),
-            PlaneNumbers::Wholes(numbers) => (numbers.len(), true),
-        };
+        let (length, is_whole) = (numbers.count(), matches!(numbers, PlaneNumbers::Wholes(_)));
         if is_whole != plane.is_whole() || length as u64 != pixels * plane.channels().len() as u64 {
             let kind = plane.number_type();
             let fault = format!("{length} numbers do not fill the plane {name}, {kind}, of {pixels} pixels");

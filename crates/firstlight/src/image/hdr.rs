@@ -6,32 +6,43 @@
 //!
 //! Source: G. Ward, "Real Pixels", Graphics Gems II, 1991; the Radiance file formats manual, "picture files".
 
-use super::{Image, PREFIX, Receipt, SOFTWARE};
+use super::plane::BUFFER_KEY;
+use super::{Image, PREFIX, Plane, Receipt, SOFTWARE};
 
 /// The bytes of a Radiance file. The picture and the receipt have been checked.
 pub(super) fn encode(picture: &Image, receipt: &Receipt) -> Vec<u8> {
     let (width, height) = (picture.window.width, picture.window.height);
+    let colors: Vec<[f32; 3]> = picture.pixels.iter().map(|&[r, g, b, _]| [r, g, b]).collect();
+    let pixels = bytes(&colors);
+    let hash = blake3::hash(&pixels).to_hex();
+    let said =
+        format!("channels R G B; rgbe; unit {}; space -; alpha left out; filtered; blake3 {hash}", Plane::Color.unit());
+    let receipt = receipt.with(&format!("{BUFFER_KEY}{}", Plane::Color.name()), said);
     // The header: variables, comments, an empty line, the size
-    let mut bytes = format!("#?RADIANCE\nSOFTWARE={SOFTWARE}\n").into_bytes();
+    let mut file = format!("#?RADIANCE\nSOFTWARE={SOFTWARE}\n").into_bytes();
     for (key, value) in &receipt.entries {
-        bytes.extend(format!("# {PREFIX}{key} {}\n", escape(value)).into_bytes());
+        file.extend(format!("# {PREFIX}{key} {}\n", escape(value)).into_bytes());
     }
-    bytes.extend(b"PRIMARIES=0.640 0.330 0.300 0.600 0.150 0.060 0.3127 0.3290\n");
-    bytes.extend(format!("FORMAT=32-bit_rle_rgbe\n\n-Y {height} +X {width}\n").into_bytes());
+    file.extend(b"PRIMARIES=0.640 0.330 0.300 0.600 0.150 0.060 0.3127 0.3290\n");
+    file.extend(format!("FORMAT=32-bit_rle_rgbe\n\n-Y {height} +X {width}\n").into_bytes());
     // Rows: runs of each channel where the format can count them, otherwise plain
-    for row in picture.pixels.chunks_exact(width as usize) {
-        let pixels: Vec<[u8; 4]> = row.iter().map(|&[r, g, b, _]| shared_exponent([r, g, b])).collect();
+    for pixels in pixels.as_chunks::<4>().0.chunks_exact(width as usize) {
         if (8..=32767).contains(&width) {
-            bytes.extend([2, 2, (width >> 8) as u8, width as u8]);
+            file.extend([2, 2, (width >> 8) as u8, width as u8]);
             for channel in 0..4 {
                 let values: Vec<u8> = pixels.iter().map(|p| p[channel]).collect();
-                run_lengths(&values, &mut bytes);
+                run_lengths(&values, &mut file);
             }
         } else {
-            bytes.extend(pixels.as_flattened());
+            file.extend(pixels.as_flattened());
         }
     }
-    bytes
+    file
+}
+
+/// What a file stores of colours, runs aside: three mantissas and an exponent of each.
+pub(super) fn bytes(colors: &[[f32; 3]]) -> Vec<u8> {
+    colors.iter().map(|color| shared_exponent(*color)).collect::<Vec<_>>().into_flattened()
 }
 
 /// Three mantissas and the exponent: channel = mantissa / 256 x 2^(exponent - 128), to the nearest.

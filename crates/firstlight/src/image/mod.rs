@@ -4,6 +4,7 @@
 //! Before it stands the film; after it, only the disk.
 
 mod buffer;
+mod compare;
 mod contain;
 pub(crate) mod cryptomatte;
 mod damage;
@@ -11,10 +12,12 @@ mod error;
 #[cfg(feature = "exr")]
 mod exr;
 mod file;
+mod flip;
 mod format;
 mod given;
 mod hdr;
 mod npz;
+mod npz_read;
 mod patient;
 mod plane;
 mod png;
@@ -22,15 +25,17 @@ pub(crate) mod read;
 mod stored;
 
 pub use buffer::{Buffer, BufferDesc, LightChoice, LightPart};
+pub use compare::{DifferingSample, Distance, PlaneDifference, display_steps, false_colors, relative_differences};
 pub use contain::is_decoding;
 pub use error::ImageError;
 pub use file::{PendingFile, StagedFile, Written, write_whole};
+pub use flip::Flip;
 pub use format::Format;
 pub use given::{PlaneVec, encode_planes};
 pub use patient::write_open;
 pub(crate) use plane::PlaneFile;
 pub use plane::{NamedPlane, Plane, PlaneNumbers, Sampling};
-pub use stored::StoredImage;
+pub use stored::{StoredImage, StoredPlane, StoredPlanes};
 
 use crate::color::Display;
 
@@ -142,6 +147,17 @@ impl Receipt {
         Receipt { entries: others.chain(own).collect() }
     }
 
+    /// What it says under a key.
+    pub fn get(&self, key: &str) -> Option<&str> {
+        self.entries.iter().find(|(known, _)| known == key).map(|(_, value)| value.as_str())
+    }
+
+    /// The receipt with another entry, in place of the one that has its key.
+    pub(crate) fn with(&self, key: &str, value: String) -> Receipt {
+        let others = self.entries.iter().filter(|(known, _)| known != key).cloned();
+        Receipt { entries: others.chain([(key.to_owned(), value)]).collect() }
+    }
+
     /// Whether a file is a PNG that firstlight wrote, with a receipt in it. Reads no further than to where the pixels
     /// begin.
     pub fn is_in_png(file: &mut dyn std::io::Read) -> bool {
@@ -200,7 +216,7 @@ mod tests {
         }
     }
 
-    const FORMATS: [Format; 4] = [Format::Png8, Format::Png16, Format::Exr, Format::Hdr];
+    const FORMATS: [Format; 5] = [Format::Png8, Format::Png16, Format::Exr, Format::Npz, Format::Hdr];
 
     fn built(format: Format) -> bool {
         format != Format::Exr || cfg!(feature = "exr")
@@ -246,8 +262,11 @@ mod tests {
             for _ in 0..5 {
                 assert!(picture.encode(format, &Display::default(), &receipt()).unwrap() == bytes, "{format:?}");
             }
-            let stored = StoredImage::read(&bytes).unwrap();
+            let mut stored = StoredPlanes::read(&bytes).unwrap();
             assert_eq!(stored.format, format);
+            assert_eq!(stored.is_as_written(&stored.planes[0]), Some(true), "{format:?}");
+            let described = stored.receipt.entries.pop().unwrap();
+            assert!(described.0 == "buffer.color" && described.1.starts_with("channels R G B"), "{format:?}");
             let is_shown = matches!(format, Format::Png8 | Format::Png16);
             assert_eq!(stored.receipt, receipt().shown_by(is_shown.then(Display::default).as_ref()), "{format:?}");
             assert_eq!((stored.film, stored.window), (picture.film, picture.window));
@@ -297,7 +316,7 @@ mod tests {
         for format in FORMATS.into_iter().filter(|&f| built(f)) {
             let bytes = picture.encode(format, &display, &Receipt::default()).unwrap();
             let stored = StoredImage::read(&bytes).unwrap();
-            if format == Format::Exr {
+            if matches!(format, Format::Exr | Format::Npz) {
                 let bits = |p: &[[f32; 4]]| p.iter().flatten().map(|x| x.to_bits()).collect::<Vec<_>>();
                 assert!(bits(&stored.pixels) == bits(&picture.pixels));
             } else {

@@ -133,7 +133,11 @@ mod tests {
         let hash = blake3::hash(&PlaneNumbers::Floats(&depth).to_le_bytes()).to_hex();
         assert_eq!(
             json["buffer.depth"],
-            format!("channels Z; float32; unit m; space camera; center; blake3 {hash}").as_str()
+            format!(
+                "channels Z; float32; unit m; space camera; along the line of sight, infinite for nothing; center; \
+                 blake3 {hash}"
+            )
+            .as_str()
         );
     }
 

@@ -201,6 +201,26 @@ impl Plane {
         }
     }
 
+    /// What its numbers mean beside their unit and space: axes, signs, where they count from.
+    pub fn convention(self) -> &'static str {
+        use Plane::*;
+        match self {
+            Color => "colour times alpha",
+            Alpha => "0 nothing, 1 all of the pixel",
+            Background | Emission | Ambient | Diffuse | Specular => "a term of color",
+            Albedo => "diffuse reflectance",
+            Depth => "along the line of sight, infinite for nothing",
+            Distance => "along the ray, infinite for nothing",
+            Position | PositionObject | Normal | NormalObject | NormalGeometric | Tangent => "right-handed, y up",
+            PositionCamera | NormalCamera | NormalGeometricCamera => "x right, y up, z backwards",
+            Uv => "u right, v up",
+            Barycentric => "weights of the second and third corner",
+            ObjectId | InstanceId | MaterialId | PrimitiveId => "1 for the first, 0 for none",
+            FaceOrientation => "1 front, 2 back, 0 for none",
+            Rays => "counted",
+        }
+    }
+
     /// How a pixel of it comes about.
     pub fn sampling(self) -> Sampling {
         match self {
@@ -296,6 +316,14 @@ impl Sampling {
 }
 
 impl PlaneNumbers<'_> {
+    /// How many there are.
+    pub fn count(self) -> usize {
+        match self {
+            PlaneNumbers::Floats(numbers) => numbers.len(),
+            PlaneNumbers::Wholes(numbers) => numbers.len(),
+        }
+    }
+
     /// Their bytes, the lowest of each first.
     pub fn to_le_bytes(self) -> Vec<u8> {
         fn bytes<T: Copy>(numbers: &[T], of: impl Fn(T) -> [u8; 4]) -> Vec<u8> {
@@ -352,23 +380,26 @@ impl PlaneFile<'_> {
         }
     }
 
-    /// The receipt with what each plane is and the hash of its bits, where there is more than the picture.
+    /// The receipt with what each plane is and the hash of its bits.
     fn described(&self, receipt: &Receipt) -> Receipt {
         let mut receipt = receipt.shown_by(None);
-        if matches!(self.planes, [NamedPlane { plane: Plane::Color, .. }]) {
-            return receipt;
-        }
         let hashes =
             parallel::collect(self.planes.len(), |k| blake3::hash(&self.planes[k].numbers.to_le_bytes()).to_hex());
         for (NamedPlane { name, plane, .. }, hash) in self.planes.iter().zip(hashes) {
-            let channels = plane.channels().join(" ");
-            let (kind, unit, space) = (plane.number_type(), plane.unit(), plane.space());
             let said = format!(
-                "channels {channels}; {kind}; unit {unit}; space {space}; {}; blake3 {hash}",
+                "channels {}; {}; unit {}; space {}; {}; {}; blake3 {hash}",
+                plane.channels().join(" "),
+                plane.number_type(),
+                plane.unit(),
+                plane.space(),
+                plane.convention(),
                 plane.sampling().name()
             );
-            receipt.entries.push((format!("buffer.{name}"), said));
+            receipt = receipt.with(&format!("{BUFFER_KEY}{name}"), said);
         }
         receipt
     }
 }
+
+/// Before the name of a plane, the key of what a receipt says of it.
+pub(super) const BUFFER_KEY: &str = "buffer.";

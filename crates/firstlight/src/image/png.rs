@@ -7,7 +7,8 @@
 use ::png as codec;
 use codec::text_metadata::{ITXtChunk, TEXtChunk};
 
-use super::{Image, ImageError, PREFIX, Receipt, SOFTWARE};
+use super::plane::BUFFER_KEY;
+use super::{Image, ImageError, PREFIX, Plane, Receipt, SOFTWARE};
 use crate::color::{Display, Encoding, Quantizer};
 use crate::parallel;
 
@@ -16,6 +17,16 @@ use crate::parallel;
 pub(super) enum Depth {
     Eight,
     Sixteen,
+}
+
+impl Depth {
+    /// The type of a sample, as numpy names it.
+    fn number_type(self) -> &'static str {
+        match self {
+            Depth::Eight => "uint8",
+            Depth::Sixteen => "uint16",
+        }
+    }
 }
 
 /// The bytes of a PNG file. The picture and the receipt have been checked.
@@ -30,6 +41,13 @@ pub(super) fn encode(
     }
     let alpha = !picture.is_opaque();
     let samples = quantize(picture, depth, display, alpha);
+    let (channels, kind) = (if alpha { "R G B A" } else { "R G B" }, depth.number_type());
+    let hash = blake3::hash(&samples).to_hex();
+    let said = format!(
+        "channels {channels}; {kind}; unit display-encoded; space -; straight alpha, never encoded; filtered; blake3 \
+         {hash}"
+    );
+    let receipt = &receipt.with(&format!("{BUFFER_KEY}{}", Plane::Color.name()), said);
     write(picture, depth, alpha, display.encoding, receipt, &samples)
         .map_err(|e| ImageError::Encode { format: "PNG", reason: e.to_string() })
 }
@@ -229,7 +247,11 @@ mod tests {
         let software = &info.uncompressed_latin1_text[0];
         assert_eq!((software.keyword.as_str(), software.text.as_str()), ("Software", SOFTWARE));
         let found: Vec<_> = info.utf8_text.iter().map(|t| (t.keyword.clone(), t.get_text().unwrap())).collect();
-        let shown = receipt().shown_by(Some(&Display::default()));
+        let mut shown = receipt().shown_by(Some(&Display::default()));
+        // Of the samples of the one pixel, (0.5, 0.5, 0.5) over alpha 0.5
+        let hash = blake3::hash(&[255, 255, 255, 128]).to_hex();
+        let said = "channels R G B A; uint8; unit display-encoded; space -; straight alpha, never encoded; filtered";
+        shown.entries.push(("buffer.color".into(), format!("{said}; blake3 {hash}")));
         let expected: Vec<_> = shown.entries.into_iter().map(|(k, v)| (format!("firstlight:{k}"), v)).collect();
         assert_eq!(found, expected);
     }

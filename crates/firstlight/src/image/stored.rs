@@ -6,8 +6,9 @@ use ::png;
 
 use super::contain::contained;
 use super::damage;
+use super::plane::BUFFER_KEY;
 use super::read::{Limits, check_size};
-use super::{Format, ImageError, PREFIX, Receipt, Window};
+use super::{Format, ImageError, PREFIX, Plane, PlaneNumbers, PlaneVec, Receipt, Window};
 
 /// A picture file as it was stored: nothing decoded, nothing multiplied.
 #[derive(Clone, Debug, PartialEq)]
@@ -26,38 +27,132 @@ pub struct StoredImage {
 }
 
 /// As large as a film can be.
-const LIMITS: Limits = Limits { side: 65536, texels: 1 << 27 };
+pub(super) const LIMITS: Limits = Limits { side: 65536, texels: 1 << 27 };
 
-impl StoredImage {
-    /// Reads a PNG, EXR or HDR file; which of them, its first bytes say. Made for the files that firstlight writes;
-    /// those of other programs are read if they are of the same make (no palettes, no tiles with levels, no other
-    /// channels alone).
+/// All that a picture file holds, as it was stored: nothing decoded, nothing multiplied.
+#[derive(Clone, Debug, PartialEq)]
+pub struct StoredPlanes {
+    /// Which kind of file.
+    pub format: Format,
+    /// The width and height of the whole film. Only EXR knows it; the others say that of the picture.
+    pub film: [u32; 2],
+    /// The part of it that the planes hold. Only EXR knows where; the others begin at (0, 0).
+    pub window: Window,
+    /// The buffers, in the order of the file.
+    pub planes: Vec<StoredPlane>,
+    /// What firstlight wrote into the file; empty in a file of other programs.
+    pub receipt: Receipt,
+}
+
+/// A buffer of a file.
+#[derive(Clone, Debug, PartialEq)]
+pub struct StoredPlane {
+    /// What it is called: `color` is the picture.
+    pub name: String,
+    /// The names of its channels, as [`Plane::channels`](crate::Plane::channels) has them.
+    pub channels: Vec<String>,
+    /// Rows from the top, each from the left, the channels of a pixel side by side. The samples of a PNG file are whole
+    /// numbers.
+    pub numbers: PlaneVec,
+    /// Of a picture of 8 or 16 bits, which is display-encoded, the largest number: 255 or 65535.
+    pub steps: Option<u32>,
+}
+
+impl StoredPlanes {
+    /// Reads a PNG, EXR, NPZ or HDR file; which of them, its first bytes say. Made for the files that firstlight
+    /// writes; those of other programs are read if they are of the same make: no tiles with levels, no compressed
+    /// arrays.
     ///
     /// # Errors
     /// [`ImageError::UnknownKind`]; [`ImageError::TooLarge`] above 65536 a side or 2^27 in all, the largest film;
     /// [`ImageError::Damaged`]; [`ImageError::WithoutExr`].
-    pub fn read(bytes: &[u8]) -> Result<StoredImage, ImageError> {
+    pub fn read(bytes: &[u8]) -> Result<StoredPlanes, ImageError> {
         if bytes.starts_with(b"\x89PNG\r\n\x1a\n") {
             contained("PNG", || read_png(bytes))
         } else if bytes.starts_with(b"#?RADIANCE\n") {
             contained("HDR", || read_hdr(bytes))
+        } else if bytes.starts_with(b"PK\x03\x04") {
+            contained("NPZ", || super::npz_read::read(bytes))
         } else if bytes.starts_with(&[0x76, 0x2f, 0x31, 0x01]) {
             #[cfg(feature = "exr")]
             return contained("EXR", || read_exr(bytes));
             #[cfg(not(feature = "exr"))]
             Err(ImageError::WithoutExr)
         } else {
-            Err(ImageError::UnknownKind { expected: "PNG, EXR or HDR" })
+            Err(ImageError::UnknownKind { expected: "PNG, EXR, NPZ or HDR" })
         }
     }
 
-    /// A picture that is its whole film.
-    fn whole(format: Format, width: u32, height: u32, pixels: Vec<[f32; 4]>, receipt: Receipt) -> Self {
-        Self { format, film: [width, height], window: Window { x: 0, y: 0, width, height }, pixels, receipt }
+    /// The buffer of that name.
+    pub fn plane(&self, name: &str) -> Option<&StoredPlane> {
+        self.planes.iter().find(|plane| plane.name == name)
+    }
+
+    /// Whether the numbers of a buffer are those that the receipt speaks of; `None` if it says nothing of them.
+    pub fn is_as_written(&self, plane: &StoredPlane) -> Option<bool> {
+        let said = self.receipt.get(&format!("{BUFFER_KEY}{}", plane.name))?;
+        let (_, hash) = said.rsplit_once("blake3 ")?;
+        let bytes = match (&plane.numbers, self.format) {
+            (PlaneVec::Wholes(codes), Format::Png8) => codes.iter().map(|code| *code as u8).collect(),
+            (PlaneVec::Wholes(codes), Format::Png16) => codes.iter().flat_map(|c| (*c as u16).to_be_bytes()).collect(),
+            (PlaneVec::Floats(colors), Format::Hdr) => super::hdr::bytes(colors.as_chunks().0),
+            (numbers, _) => numbers.numbers().to_le_bytes(),
+        };
+        Some(blake3::hash(&bytes).to_hex().as_str() == hash)
+    }
+
+    /// The picture of a file that is its whole film.
+    fn picture(format: Format, [width, height]: [u32; 2], plane: StoredPlane, receipt: Receipt) -> Self {
+        let window = Window { x: 0, y: 0, width, height };
+        Self { format, film: [width, height], window, planes: vec![plane], receipt }
     }
 }
 
-fn read_png(bytes: &[u8]) -> Result<StoredImage, ImageError> {
+impl StoredPlane {
+    /// The picture, with the first so many of its channels.
+    fn color(numbers: PlaneVec, channels: usize, steps: Option<u32>) -> Self {
+        let name = Plane::Color.name().to_owned();
+        let channels = Plane::Color.channels()[..channels].iter().map(|name| (*name).to_owned()).collect();
+        StoredPlane { name, channels, numbers, steps }
+    }
+
+    /// Red, green, blue and alpha of each pixel, 0 to 1 where that is a step of 8 or 16 bits; alpha is 1 where there is
+    /// none. `None` if it has no such channels.
+    pub fn rgba(&self) -> Option<Vec<[f32; 4]>> {
+        let place = |name: &str| self.channels.iter().position(|channel| channel == name);
+        let [r, g, b] = [place("R")?, place("G")?, place("B")?];
+        let (a, all) = (place("A"), self.channels.len());
+        fn pixels<T: Copy>(numbers: &[T], all: usize, pixel: impl Fn(&[T]) -> [f32; 4]) -> Vec<[f32; 4]> {
+            numbers.chunks_exact(all).map(pixel).collect()
+        }
+        let steps = self.steps.unwrap_or(1) as f32;
+        Some(match self.numbers.numbers() {
+            PlaneNumbers::Floats(n) => pixels(n, all, |n| [n[r], n[g], n[b], a.map_or(1.0, |a| n[a])]),
+            PlaneNumbers::Wholes(n) => {
+                let part = |n: u32| n as f32 / steps;
+                pixels(n, all, |n| [part(n[r]), part(n[g]), part(n[b]), a.map_or(1.0, |a| part(n[a]))])
+            }
+        })
+    }
+}
+
+impl StoredImage {
+    /// Reads the picture of a PNG, EXR, NPZ or HDR file, as [`StoredPlanes::read`].
+    ///
+    /// # Errors
+    /// Those of [`StoredPlanes::read`]; [`ImageError::Damaged`] for a file without a picture.
+    pub fn read(bytes: &[u8]) -> Result<StoredImage, ImageError> {
+        let StoredPlanes { format, film, window, planes, receipt } = StoredPlanes::read(bytes)?;
+        let color = planes.iter().find(|plane| plane.name == Plane::Color.name());
+        let pixels = color.and_then(StoredPlane::rgba).ok_or_else(|| {
+            let names: Vec<&str> = planes.iter().map(|plane| plane.name.as_str()).collect();
+            ImageError::Picture(format!("holds no picture: it has {}, and not color", names.join(", ")))
+        })?;
+        Ok(StoredImage { format, film, window, pixels, receipt })
+    }
+}
+
+fn read_png(bytes: &[u8]) -> Result<StoredPlanes, ImageError> {
     let damaged = |reason: String| ImageError::Damaged { format: "PNG", reason };
     let fault = |e: png::DecodingError| damaged(e.to_string());
     damage::in_png(bytes).map_err(damaged)?;
@@ -74,30 +169,29 @@ fn read_png(bytes: &[u8]) -> Result<StoredImage, ImageError> {
     let mut samples = vec![0; reader.output_buffer_size().ok_or_else(|| damaged("it is too large".into()))?];
     reader.next_frame(&mut samples).map_err(fault)?;
     let (color, depth) = reader.output_color_type();
-    let (format, values): (_, Vec<f32>) = match depth {
+    let (format, steps, codes): (_, _, Vec<u32>) = match depth {
         png::BitDepth::Sixteen => {
-            let value = |s: &[u8]| f32::from(u16::from_be_bytes([s[0], s[1]])) / 65535.0;
-            (Format::Png16, samples.chunks_exact(2).map(value).collect())
+            let code = |s: &[u8]| u32::from(u16::from_be_bytes([s[0], s[1]]));
+            (Format::Png16, 65535, samples.chunks_exact(2).map(code).collect())
         }
-        _ => (Format::Png8, samples.iter().map(|&s| f32::from(s) / 255.0).collect()),
+        _ => (Format::Png8, 255, samples.iter().map(|&s| u32::from(s)).collect()),
     };
-    let pixels = values.chunks_exact(color.samples()).map(|s| match *s {
-        [v] => [v, v, v, 1.0],
-        [v, a] => [v, v, v, a],
-        [r, g, b] => [r, g, b, 1.0],
-        [r, g, b, a] => [r, g, b, a],
-        _ => [0.0; 4],
-    });
+    let (codes, channels) = match color.samples() {
+        1 => (codes.into_iter().flat_map(|v| [v; 3]).collect(), 3),
+        2 => (codes.as_chunks().0.iter().flat_map(|&[v, a]| [v, v, v, a]).collect(), 4),
+        channels => (codes, channels),
+    };
     let mut receipt = Receipt::default();
     for chunk in &reader.info().utf8_text {
         if let (Some(key), Ok(value)) = (chunk.keyword.strip_prefix(PREFIX), chunk.get_text()) {
             receipt.entries.push((key.into(), value));
         }
     }
-    Ok(StoredImage::whole(format, width, height, pixels.collect(), receipt))
+    let plane = StoredPlane::color(PlaneVec::Wholes(codes), channels, Some(steps));
+    Ok(StoredPlanes::picture(format, [width, height], plane, receipt))
 }
 
-fn read_hdr(bytes: &[u8]) -> Result<StoredImage, ImageError> {
+fn read_hdr(bytes: &[u8]) -> Result<StoredPlanes, ImageError> {
     let damaged = |reason: String| ImageError::Damaged { format: "HDR", reason };
     let (width, height, rows) =
         super::hdr::header(bytes).ok_or_else(|| damaged("its header is of no known make".into()))?;
@@ -117,11 +211,20 @@ fn read_hdr(bytes: &[u8]) -> Result<StoredImage, ImageError> {
             receipt.entries.push((key.into(), super::hdr::unescape(value)));
         }
     }
-    Ok(StoredImage::whole(Format::Hdr, width, height, pixels, receipt))
+    let colors = pixels.into_iter().flat_map(|[r, g, b, _]| [r, g, b]).collect();
+    let plane = StoredPlane::color(PlaneVec::Floats(colors), 3, None);
+    Ok(StoredPlanes::picture(Format::Hdr, [width, height], plane, receipt))
 }
 
+/// The most bytes that the channels of an EXR file may have whatever the file's length: those of the largest picture.
 #[cfg(feature = "exr")]
-fn read_exr(bytes: &[u8]) -> Result<StoredImage, ImageError> {
+const EXR_BYTES: u64 = 1 << 31;
+/// Of larger ones, how many times the length of the file.
+#[cfg(feature = "exr")]
+const EXR_EXPANDS: u64 = 4096;
+
+#[cfg(feature = "exr")]
+fn read_exr(bytes: &[u8]) -> Result<StoredPlanes, ImageError> {
     use ::exr::prelude::*;
     let damaged = |reason: String| ImageError::Damaged { format: "EXR", reason };
     // Check the size
@@ -130,6 +233,13 @@ fn read_exr(bytes: &[u8]) -> Result<StoredImage, ImageError> {
     let side = |n: usize| u32::try_from(n).unwrap_or(u32::MAX);
     let (width, height) = (side(header.layer_size.x()), side(header.layer_size.y()));
     check_size(width, height, &LIMITS)?;
+    let taken = |header: &::exr::meta::header::Header| {
+        4 * header.channels.list.len() as u64 * header.layer_size.x() as u64 * header.layer_size.y() as u64
+    };
+    let taken = meta.headers.iter().map(taken).fold(0, u64::saturating_add);
+    if taken > EXR_BYTES.max(EXR_EXPANDS * bytes.len() as u64) {
+        return Err(damaged("it is too short for its size".into()));
+    }
     let Vec2(x, y) = header.own_attributes.layer_position;
     let display = header.shared_attributes.display_window;
     // The windows in the film's own pixels
@@ -139,19 +249,22 @@ fn read_exr(bytes: &[u8]) -> Result<StoredImage, ImageError> {
         _ => return Err(damaged("its data window begins outside its display window".into())),
     };
     let film = [side(display.size.x()), side(display.size.y())];
-    // Read the pixels
-    let columns = width as usize;
-    let reader = read().no_deep_data().largest_resolution_level().rgba_channels(
-        move |size: Vec2<usize>, _: &RgbaChannels| vec![[0.0_f32; 4]; size.area()],
-        move |pixels: &mut Vec<[f32; 4]>, at: Vec2<usize>, (r, g, b, a): (f32, f32, f32, f32)| {
-            pixels[at.y() * columns + at.x()] = [r, g, b, a];
-        },
-    );
-    let file = reader.first_valid_layer().all_attributes().from_buffered(Cursor::new(bytes));
-    let file = file.map_err(|e| damaged(e.to_string()))?;
-    let pixels = file.layer_data.channel_data.pixels;
-    if pixels.len() as u64 != u64::from(width) * u64::from(height) {
-        return Err(damaged("its first layer has no colours".into()));
+    // Read the channels
+    let reader = read().no_deep_data().largest_resolution_level().all_channels().first_valid_layer().all_attributes();
+    let file = reader.from_buffered(Cursor::new(bytes)).map_err(|e| damaged(e.to_string()))?;
+    let pixels = width as usize * height as usize;
+    let mut channels = Vec::new();
+    for channel in file.layer_data.channel_data.list {
+        let name = channel.name.to_string();
+        let numbers = match channel.sample_data {
+            FlatSamples::F16(halves) => PlaneVec::Floats(halves.into_iter().map(f32::from).collect()),
+            FlatSamples::F32(floats) => PlaneVec::Floats(floats),
+            FlatSamples::U32(wholes) => PlaneVec::Wholes(wholes),
+        };
+        if numbers.numbers().count() != pixels {
+            return Err(damaged(format!("its channel {name} has not a number for each pixel")));
+        }
+        channels.push((name, numbers));
     }
     let mut receipt = Receipt::default();
     for attribute in super::exr::attributes(bytes) {
@@ -160,7 +273,59 @@ fn read_exr(bytes: &[u8]) -> Result<StoredImage, ImageError> {
             receipt.entries.push((text(key), text(&bytes[attribute.value])));
         }
     }
-    Ok(StoredImage { format: Format::Exr, film, window, pixels, receipt })
+    Ok(StoredPlanes { format: Format::Exr, film, window, planes: planes_of(channels), receipt })
+}
+
+/// The channels of an EXR file as planes: `depth.Z` belongs to `depth`, R, G, B and A to the picture.
+#[cfg(feature = "exr")]
+fn planes_of(channels: Vec<(String, PlaneVec)>) -> Vec<StoredPlane> {
+    let is_of_picture = |name: &str| Plane::Color.channels().contains(&name);
+    let mut layers: Vec<(String, Vec<(String, PlaneVec)>)> = Vec::new();
+    for (name, numbers) in channels {
+        let (layer, channel) = match name.rsplit_once('.') {
+            Some((layer, channel)) => (layer.to_owned(), channel.to_owned()),
+            None if is_of_picture(&name) => (Plane::Color.name().to_owned(), name),
+            None => (name.clone(), name),
+        };
+        // What is whole and what is not cannot be one plane
+        let is_whole = |numbers: &PlaneVec| matches!(numbers, PlaneVec::Wholes(_));
+        let same = |(known, all): &&mut (String, Vec<(String, PlaneVec)>)| {
+            *known == layer && is_whole(&all[0].1) == is_whole(&numbers)
+        };
+        match layers.iter_mut().find(same) {
+            Some((_, all)) => all.push((channel, numbers)),
+            None => layers.push((layer, vec![(channel, numbers)])),
+        }
+    }
+    layers.into_iter().map(|(name, channels)| plane_of(name, channels)).collect()
+}
+
+/// One plane of channels that have as many numbers each, side by side in it: red, green, blue, alpha, x, y, z.
+#[cfg(feature = "exr")]
+fn plane_of(name: String, mut channels: Vec<(String, PlaneVec)>) -> StoredPlane {
+    const ORDER: [&str; 9] = ["R", "G", "B", "A", "X", "Y", "Z", "U", "V"];
+    // The picture leaves alpha out where it is 1 everywhere
+    let names: Vec<&str> = channels.iter().map(|(name, _)| name.as_str()).collect();
+    if name == Plane::Color.name() && names == ["B", "G", "R"] {
+        let pixels = channels[0].1.numbers().count();
+        channels.push(("A".into(), PlaneVec::Floats(vec![1.0; pixels])));
+    }
+    channels.sort_by_key(|(name, _)| ORDER.iter().position(|known| known == name).unwrap_or(ORDER.len()));
+    fn join<T: Copy>(all: &[&[T]]) -> Vec<T> {
+        if let [one] = all {
+            return one.to_vec();
+        }
+        (0..all[0].len()).flat_map(|i| all.iter().map(move |channel| channel[i])).collect()
+    }
+    let (mut floats, mut wholes) = (Vec::new(), Vec::new());
+    for (_, numbers) in &channels {
+        match numbers.numbers() {
+            PlaneNumbers::Floats(numbers) => floats.push(numbers),
+            PlaneNumbers::Wholes(numbers) => wholes.push(numbers),
+        }
+    }
+    let numbers = if wholes.is_empty() { PlaneVec::Floats(join(&floats)) } else { PlaneVec::Wholes(join(&wholes)) };
+    StoredPlane { name, channels: channels.into_iter().map(|(name, _)| name).collect(), numbers, steps: None }
 }
 
 #[cfg(test)]
@@ -206,7 +371,7 @@ mod tests {
     #[test]
     fn other_files_are_named_as_such() {
         let words = StoredImage::read(b"BM").unwrap_err().to_string();
-        assert_eq!(words, "is not a PNG, EXR or HDR file; convert it to one");
+        assert_eq!(words, "is not a PNG, EXR, NPZ or HDR file; convert it to one");
     }
 
     #[test]

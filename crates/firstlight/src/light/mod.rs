@@ -79,6 +79,14 @@ impl LightDesc {
         Self::KINDS.iter().flat_map(|kind| lights.iter().filter(move |light| light.kind() == *kind))
     }
 
+    /// The same, to be changed.
+    pub(crate) fn in_scene_order_mut(lights: &mut [LightDesc]) -> impl Iterator<Item = &mut LightDesc> {
+        let mut lights: Vec<&mut LightDesc> = lights.iter_mut().collect();
+        // Stable: in each kind the order of the text
+        lights.sort_by_key(|light| Self::KINDS.iter().position(|kind| *kind == light.kind()));
+        lights.into_iter()
+    }
+
     /// Its name, if it has one.
     pub fn name(&self) -> Option<String> {
         match self {

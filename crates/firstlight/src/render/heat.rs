@@ -1,6 +1,6 @@
 //! Where the work went, pixel by pixel.
 
-use crate::color::{Encoding, Rgb};
+use crate::color::{Rgb, false_color};
 use crate::image::{Image, Window};
 
 /// How much work each pixel of a render took.
@@ -17,10 +17,6 @@ pub struct Heat {
     /// The window's rows from the top, each from the left; 0 or more.
     pub work: Vec<f32>,
 }
-
-/// From nothing to much, as sRGB-encoded red, green, blue.
-const RAMP: [[f32; 3]; 6] =
-    [[0.0, 0.0, 0.02], [0.16, 0.1, 0.4], [0.5, 0.12, 0.5], [0.85, 0.25, 0.3], [0.99, 0.62, 0.15], [1.0, 1.0, 0.8]];
 
 impl Heat {
     /// What a place that asks for an integrated light counts: about what it takes, in rays.
@@ -47,15 +43,7 @@ impl Heat {
 
 fn color(work: f32) -> Rgb {
     let [first, last] = Heat::SCALE.map(|power| power as f32);
-    let at = if work > 0.0 { (pxfm::f_log2f(work) - first) / (last - first) } else { 0.0 };
-    let at = at.clamp(0.0, 1.0) * (RAMP.len() - 1) as f32;
-    let place = (at as usize).min(RAMP.len() - 2);
-    let part = at - place as f32;
-    let channel = |k: usize| {
-        let encoded = RAMP[place][k] * (1.0 - part) + RAMP[place + 1][k] * part;
-        Encoding::Srgb.decode(f64::from(encoded)) as f32
-    };
-    Rgb::new(channel(0), channel(1), channel(2))
+    false_color(if work > 0.0 { (pxfm::f_log2f(work) - first) / (last - first) } else { 0.0 })
 }
 
 #[cfg(test)]

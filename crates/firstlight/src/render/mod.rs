@@ -37,6 +37,7 @@ mod passes;
 pub(crate) mod pixel;
 mod plain;
 mod receipt;
+mod receipt_settings;
 pub(crate) mod resolve;
 mod sampled;
 mod shafts;
@@ -56,6 +57,7 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 pub use counts::{LightCounts, RenderStats};
 pub use film::Film;
 pub use heat::Heat;
+pub use receipt_settings::{ReceiptFault, ReceiptSettings};
 
 use crate::accel::SimdLevel;
 use crate::describe::words;

@@ -2,17 +2,27 @@
 
 use super::many::SINGLY;
 use super::{RenderSettings, Renderer};
-use crate::camera::{Frame, Projection};
+use crate::camera::{Camera, Frame, Projection};
 use crate::describe::SamplesDesc;
 use crate::image::cryptomatte::{self, Named};
 use crate::image::{Buffer, Plane, Receipt};
 use crate::light::Light;
 use crate::math::Vec3;
-use crate::scene::Scene;
+use crate::scene::{Choices, Framing, ModelSettings, Scene};
 
 /// How many entries **Pixels** has in the changelog, over all versions. It is part of the version in a receipt, so that
 /// two builds whose pictures differ never say the same. The test below compares it with the changelog.
 const PIXELS_ENTRIES: u32 = 74;
+
+/// The version, as receipts say it.
+pub(super) fn version() -> String {
+    format!("{}+pixels.{PIXELS_ENTRIES}", env!("CARGO_PKG_VERSION"))
+}
+
+/// What a receipt calls a background that lets through what is behind.
+pub(super) const TRANSPARENT: &str = "transparent";
+/// What it calls the plain renderer, where it says how shadows are found.
+pub(super) const REFERENCE: &str = "reference";
 
 impl Scene {
     /// What a picture of this scene says of itself: all that decides the film, by the rules that are in effect, so that
@@ -20,7 +30,7 @@ impl Scene {
     /// [encoded](crate::Image::encode).
     pub fn receipt(&self, settings: &RenderSettings) -> Receipt {
         let mut entries = vec![
-            ("version", format!("{}+pixels.{PIXELS_ENTRIES}", env!("CARGO_PKG_VERSION"))),
+            ("version", version()),
             ("scene_hash", self.hash.clone()),
             ("width", self.width.to_string()),
             ("height", self.height.to_string()),
@@ -32,6 +42,19 @@ impl Scene {
             ("light_samples", light_samples(&self.lights, settings)),
             ("color_space", "linear Rec. 709, alpha premultiplied, before display encoding".to_owned()),
         ];
+        let Choices { background, shadow_terminator, framing, model } = &self.choices;
+        let background = if self.transparent { TRANSPARENT.to_owned() } else { numbers(background.linear) };
+        entries.push(("background", background));
+        entries.push(("shadow_terminator", shadow_terminator.name().to_owned()));
+        if let Some(Framing { view, margin }) = framing {
+            entries.push(("view", numbers([view.azimuth_deg, view.elevation_deg])));
+            entries.push(("margin", margin.to_string()));
+        }
+        if let Some(ModelSettings { smooth_deg, up, .. }) = model {
+            entries.push(("up", up.name().to_owned()));
+            entries.extend(smooth_deg.map(|angle| ("smooth_deg", angle.to_string())));
+        }
+        entries.extend(Self::matrices(&self.camera));
         // What is neither integrated nor lit once for several rays is not judged
         let is_integrated =
             |light: &Light| light.said_samples() == SamplesDesc::Exact && !settings.renderer().samples_all();
@@ -59,13 +82,33 @@ impl Scene {
 }
 
 impl Scene {
-    /// What a file of buffers says of itself: the [receipt](Self::receipt), and what leads from pixels to the world and
-    /// from ids to names.
+    /// What leads from the world to the pixels of a camera:
     ///
     /// - `intrinsics`: K of a pinhole camera, row by row, in pixels, the middle of the first pixel at (0.5, 0.5), with
     ///   x to the right and y down as OpenCV has them;
     /// - `opencv_camera_from_world` and `opengl_camera_from_world`: 4 x 4, row by row; OpenCV's camera looks along z
-    ///   with y down, OpenGL's along -z with y up;
+    ///   with y down, OpenGL's along -z with y up.
+    fn matrices(camera: &Camera) -> Vec<(&'static str, String)> {
+        let intrinsics = camera
+            .intrinsics()
+            .map(|[fx, fy, cx, cy]| ("intrinsics", numbers([fx, 0.0, cx, 0.0, fy, cy, 0.0, 0.0, 1.0])));
+        let Frame { position, right, up, forward, .. } = *camera.frame();
+        let extrinsics =
+            [("opencv_camera_from_world", [right, -up, forward]), ("opengl_camera_from_world", [right, up, -forward])];
+        let rows = |(key, axes): (&'static str, [Vec3; 3])| {
+            let row = |axis: Vec3| {
+                let axis = axis.as_dvec3();
+                // Never -0
+                numbers([axis.x, axis.y, axis.z, -axis.dot(position)].map(|v| v + 0.0))
+            };
+            (key, format!("{} 0 0 0 1", axes.map(row).join(" ")))
+        };
+        intrinsics.into_iter().chain(extrinsics.map(rows)).collect()
+    }
+
+    /// What a file of buffers says of itself: the [receipt](Self::receipt), and more where there is more than the
+    /// picture.
+    ///
     /// - `light_groups`: a JSON list of their names and of the numbers of their lights, from 1;
     /// - `motion_to`, where motion is asked for: whereto it leads, a number of seconds, or the name of a camera in quotes;
     ///   and the three matrices of the camera there, with `motion_` before them;
@@ -81,25 +124,16 @@ impl Scene {
         let mut add = |key: &str, value: String| receipt.entries.push((key.to_owned(), value));
         let list = |names: Vec<Option<String>>| serde_json::Value::from(names).to_string();
         add("buffers", list(buffers.iter().map(|buffer| Some(self.buffer_name(*buffer))).collect()));
-        let of_motion = buffers.iter().any(|buffer| buffer.plane().is_of_motion());
-        let motion = self.motion.as_deref().filter(|_| of_motion);
-        if let Some(motion) = motion {
-            add("motion_to", motion.to.to_string());
+        if buffers.contains(&Plane::Rays.into()) {
+            // How much work it is, the way decides
+            let way = if settings.reference { REFERENCE } else { settings.visibility.name() };
+            add("visibility", way.to_owned());
         }
-        let there = motion.map(|motion| ("motion_", &motion.there.camera));
-        for (prefix, camera) in std::iter::once(("", &self.camera)).chain(there) {
-            if let Some([fx, fy, cx, cy]) = camera.intrinsics() {
-                let k = [fx, 0.0, cx, 0.0, fy, cy, 0.0, 0.0, 1.0];
-                add(&format!("{prefix}intrinsics"), k.map(|v| v.to_string()).join(" "));
-            }
-            let Frame { position, right, up, forward, .. } = *camera.frame();
-            for (convention, axes) in [("opencv", [right, -up, forward]), ("opengl", [right, up, -forward])] {
-                let row = |axis: Vec3| {
-                    let axis = axis.as_dvec3();
-                    // Never -0
-                    [axis.x, axis.y, axis.z, -axis.dot(position)].map(|v| (v + 0.0).to_string()).join(" ")
-                };
-                add(&format!("{prefix}{convention}_camera_from_world"), format!("{} 0 0 0 1", axes.map(row).join(" ")));
+        let of_motion = buffers.iter().any(|buffer| buffer.plane().is_of_motion());
+        if let Some(motion) = self.motion.as_deref().filter(|_| of_motion) {
+            add("motion_to", motion.to.to_string());
+            for (key, numbers) in Self::matrices(&motion.there.camera) {
+                add(&format!("motion_{key}"), numbers);
             }
         }
         for named in Named::ALL {
@@ -145,7 +179,7 @@ fn matrix(rows: [f64; 16]) -> String {
 }
 
 /// Numbers as text that reads back to the same bits.
-fn numbers(values: impl IntoIterator<Item = f32>) -> String {
+fn numbers(values: impl IntoIterator<Item = impl ToString>) -> String {
     values.into_iter().map(|v| v.to_string()).collect::<Vec<_>>().join(" ")
 }
 

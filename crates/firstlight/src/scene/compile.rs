@@ -13,7 +13,7 @@ use super::occluders::ListedOccluders;
 use super::outline::ShapeOutline;
 use super::place::compile_shapes;
 use super::seen_lights::SeenLights;
-use super::{DisplayEncoding, RenderDesc, Scene, SceneDesc, SceneSummary};
+use super::{Choices, DisplayEncoding, RenderDesc, Scene, SceneDesc, SceneSummary};
 use crate::camera::{Camera, CameraDesc};
 use crate::color::{Display, Encoding, Rgb};
 use crate::context::{AssetError, Assets, CompileContext, OnCompile};
@@ -150,6 +150,12 @@ impl SceneDesc {
             occluders,
             level: Level::new(),
             buffers,
+            choices: Choices {
+                background: self.render.background,
+                shadow_terminator: self.render.shadow_terminator,
+                framing: added.camera.is_some().then_some(options.framing),
+                model: None,
+            },
             hash: self.hash(&textures, &files.read, &added),
             moment: time,
             time: cx.keyed.then_some(time),
@@ -393,6 +399,7 @@ impl Scene {
         scene.time = self.time.or(cx.keyed.then_some(self.moment));
         scene.summary.camera = String::new();
         scene.motion = self.motion.as_ref().map(|motion| motion.with_camera(camera)).transpose()?;
+        scene.choices.framing = None;
         let said = SceneDesc { cameras: vec![(String::new(), camera.clone())], ..SceneDesc::default() };
         let mut hasher = blake3::Hasher::new();
         hasher.update(self.hash.as_bytes()).update(b"camera").update(said.to_json().as_bytes());

@@ -41,12 +41,13 @@ use fearless_simd::Level;
 
 use crate::camera::Camera;
 use crate::color::{Display, Rgb};
-use crate::describe::SamplesDesc;
+use crate::describe::{ColorDesc, SamplesDesc};
 use crate::ids::SurfaceId;
 use crate::image::Buffer;
 use crate::light::Light;
 use crate::material::Material;
 use crate::math::{DAffine3, DVec3};
+use crate::shape::ShadowTerminator;
 use crate::texture::Texture;
 pub(crate) use geometry::{At, Geometry, Nearest, ObjectSpace, Placed, PlacedTarget, UpperItem};
 pub(crate) use links::LinkId;
@@ -91,6 +92,7 @@ pub struct Scene {
     pub(crate) hash: String,
     /// What it asks for of each pixel.
     pub(crate) buffers: Vec<Buffer>,
+    pub(crate) choices: Choices,
     /// The moment that was compiled, in seconds.
     pub(crate) moment: f64,
     /// The moment, in seconds, if anything of the scene changes with time.
@@ -100,6 +102,17 @@ pub struct Scene {
     /// The texture files that something stands in for.
     pub(crate) placeholders: Vec<String>,
     pub(crate) summary: SceneSummary,
+}
+
+/// What whoever renders may say in place of the scene, as it was said; receipts keep it.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Choices {
+    pub background: ColorDesc,
+    pub shadow_terminator: ShadowTerminator,
+    /// Of a camera that was found.
+    pub framing: Option<Framing>,
+    /// Of a model by itself.
+    pub model: Option<ModelSettings>,
 }
 
 /// What a scene holds, for people.

@@ -3,20 +3,26 @@
 use super::SceneDesc;
 use super::outline::ShapeOutline;
 use crate::camera::CameraDesc;
-use crate::describe::{ColorDesc, FilePath};
+use crate::describe::{ColorDesc, FilePath, words};
 use crate::light::{DirectionalDesc, LightDesc};
 use crate::math::DVec3;
 use crate::shape::{MeshDesc, PointSetDesc, ShapeDesc};
 use crate::transform::TransformDesc;
 
-/// The axis of a model that points upwards.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum UpAxis {
-    /// y, as everywhere in firstlight and in glTF.
-    #[default]
-    Y,
-    /// z, as in most scans, CAD programs and Blender.
-    Z,
+words! {
+    /// The axis of a model that points upwards.
+    pub enum UpAxis {
+        /// y, as everywhere in firstlight and in glTF.
+        Y = "y",
+        /// z, as in most scans, CAD programs and Blender.
+        Z = "z",
+    }
+}
+
+impl Default for UpAxis {
+    fn default() -> Self {
+        UpAxis::Y
+    }
 }
 
 /// How a model is shown.

@@ -42,8 +42,17 @@ pub struct Parsed {
     sources: Sources,
     /// A whole text or a group of named things is missing, so that compiling would complain without reason.
     incomplete: bool,
-    /// What messages call the model that the scene is about, and what the description calls it.
-    model: Option<[String; 2]>,
+    model: Option<ModelFile>,
+}
+
+/// The model that a scene is about.
+#[derive(Clone, Debug)]
+struct ModelFile {
+    /// What messages call it.
+    name: String,
+    /// What the description calls it.
+    file: String,
+    settings: ModelSettings,
 }
 
 impl From<SceneDesc> for Parsed {
@@ -70,11 +79,14 @@ impl Parsed {
             return Err(SceneError { faults: self.faults.clone() });
         }
         match self.desc.compile(assets, options) {
-            Ok(compiled) if self.faults.is_empty() => Ok(Compiled {
-                warnings: self.of_file(self.sources.attach(compiled.warnings)),
-                advice: self.of_file(self.sources.attach(compiled.advice)),
-                ..compiled
-            }),
+            Ok(mut compiled) if self.faults.is_empty() => {
+                compiled.scene.choices.model = self.model.as_ref().map(|model| model.settings);
+                Ok(Compiled {
+                    warnings: self.of_file(self.sources.attach(compiled.warnings)),
+                    advice: self.of_file(self.sources.attach(compiled.advice)),
+                    ..compiled
+                })
+            }
             Ok(_) => Err(SceneError { faults: self.faults.clone() }),
             Err(error) => {
                 let text = self.positions.iter().copied().zip(self.faults.iter().cloned());
@@ -92,13 +104,13 @@ impl Parsed {
     /// A scene that shows a model, as [`SceneDesc::of_model`] makes it; what is wrong with it is said of the file,
     /// which is called `name`, and not of a description that nobody wrote.
     pub fn of_model(name: &str, file: &str, settings: &ModelSettings) -> Self {
-        let model = Some([name.to_owned(), file.to_owned()]);
+        let model = Some(ModelFile { name: name.to_owned(), file: file.to_owned(), settings: *settings });
         Self { model, ..SceneDesc::of_model(file, settings).into() }
     }
 
     /// The same diagnostics; of a model by itself, about its file.
     fn of_file(&self, mut list: Vec<Diagnostic>) -> Vec<Diagnostic> {
-        let Some([name, file]) = &self.model else { return list };
+        let Some(ModelFile { name, file, .. }) = &self.model else { return list };
         for diagnostic in &mut list {
             let path = std::mem::take(&mut diagnostic.path);
             let field = path.strip_prefix("mesh[0]").or(path.strip_prefix("point_set[0]"));
