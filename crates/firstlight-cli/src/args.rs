@@ -4,7 +4,9 @@ use std::path::PathBuf;
 
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Args, Parser, Subcommand, ValueEnum, ValueHint};
-use firstlight::{BufferDesc, ColorDesc, Framing, MotionTo, SamplesDesc, SimdLevel, View, VisibilityMode, Window};
+use firstlight::{
+    BufferDesc, ColorDesc, Flip, Framing, MotionTo, SamplesDesc, SimdLevel, View, VisibilityMode, Window,
+};
 
 /// The version and, where it is known, the commit: `0.1.0 (0123456789)`.
 const VERSION: &str = concat!(env!("CARGO_PKG_VERSION"), env!("FIRSTLIGHT_COMMIT"));
@@ -25,6 +27,7 @@ Exit codes:
   0    done
   1    could not be done: the scene, a file or the disk
   2    wrong usage
+  3    differs: diff, verify
   130  interrupted; no output is left, but the frames that were done
 
 Environment:
@@ -44,6 +47,12 @@ pub enum Command {
     Scenes(ScenesArgs),
     /// Lists what .exr and .npz files can hold of each pixel: see `render --buffers`
     Buffers,
+    /// Says how two pictures differ, buffer by buffer: bits, largest difference, FLIP
+    #[command(after_help = DIFF_EXAMPLES)]
+    Diff(DiffArgs),
+    /// Renders a picture again from its receipt, and says whether it has the same bits
+    #[command(after_help = VERIFY_EXAMPLES)]
+    Verify(VerifyArgs),
     /// Prints the JSON Schema of scene files, for completion in editors
     Schema,
     /// Prints a completion script for a shell
@@ -82,6 +91,31 @@ Examples:
       two seconds at 24 frames in each, turn_000.exr to turn_047.exr
   firstlight render room.toml --stats=room.json --quiet
       what it took, for another program to read";
+
+const DIFF_EXAMPLES: &str = "\
+Exit codes: 0 the same, 3 different, 1 cannot be compared
+
+Examples:
+  firstlight diff before.png after.png
+      whether they have the same bits, and if not, where and by how much
+  firstlight diff before.exr after.exr --flip 0.01 -o difference.png
+      as much alike as somebody sees who flips between them, with a picture of where they are not
+  firstlight diff a.npz b.npz --buffers depth --max 1e-4
+      depth to a tenth of a millimetre
+  firstlight diff film.exr picture.png
+      whether the film gives that picture";
+
+const VERIFY_EXAMPLES: &str = "\
+Exit codes: 0 the same bits, or of another version within the tolerance; 3 others; 1 cannot be rendered again, for
+one because the scene is another
+
+Examples:
+  firstlight verify config11.png
+      of a built-in scene
+  firstlight verify out/room.exr --scene room.toml
+      of a scene of one's own
+  firstlight verify out/frame.0007.png --scene scenes
+      of one of the scenes of a folder";
 
 /// Where a scene comes from.
 #[derive(Args, Debug)]
@@ -234,6 +268,12 @@ pub struct RenderArgs {
     #[arg(long, value_name = "A..B", value_parser = frames, conflicts_with = "time", help_heading = "Time")]
     pub frames: Option<Frames>,
 
+    /// Renders every N-th of the pictures only, from the I-th on, for job arrays: of all frames of all scenes, in their
+    /// order. All of 1/N to N/N write what one run without it does, under the same names; where there are fewer than N
+    /// pictures, some have nothing to do, which is no error [default: 1/1]
+    #[arg(long, value_name = "I/N", value_parser = shard, help_heading = "Output")]
+    pub shard: Option<Shard>,
+
     /// Antialiasing by N x N camera rays in each pixel, 1 to 64; 4 is "4X" [default: the scene's]
     #[arg(long, value_name = "N", value_parser = whole::<u32>(1, 64), help_heading = "Quality")]
     pub aa: Option<u32>,
@@ -288,7 +328,7 @@ pub struct RenderArgs {
     #[arg(long, value_name = "FILE.toml", require_equals = true, help_heading = "Output")]
     #[arg(value_hint = ValueHint::FilePath)]
     #[arg(conflicts_with_all = ["output", "bits", "format", "exposure", "crop"])]
-    #[arg(conflicts_with_all = ["time", "frames", "aa_mode", "reference", "visibility"])]
+    #[arg(conflicts_with_all = ["time", "frames", "shard", "aa_mode", "reference", "visibility"])]
     #[arg(conflicts_with_all = ["threads", "tile_size", "simd", "stats", "heat"])]
     pub print_scene: Option<Option<PathBuf>>,
     /// Says nothing but errors, warnings (no notes), and --stats where asked for
@@ -314,6 +354,69 @@ pub struct InfoArgs {
     /// As JSON, for another program to read
     #[arg(long)]
     pub json: bool,
+}
+
+/// `firstlight diff`
+#[derive(Args, Debug)]
+pub struct DiffArgs {
+    /// A picture: .png, .exr, .npz or .hdr; of FLIP the reference
+    #[arg(value_name = "A", value_hint = ValueHint::FilePath)]
+    pub a: PathBuf,
+    /// Another, of the same size. Of a PNG file and one of linear light the picture is compared in the bits of the PNG
+    /// file, with the exposure and the encoding that it was written with
+    #[arg(value_name = "B", value_hint = ValueHint::FilePath)]
+    pub b: PathBuf,
+    /// The buffers to compare, with commas between [default: all that both have; one that only one has is a difference,
+    /// where both files can hold buffers]
+    #[arg(long, value_name = "NAMES", value_delimiter = ',')]
+    pub buffers: Option<Vec<String>>,
+    /// The largest difference that is allowed of a number, in the buffer's unit, of PNG files in steps of theirs; ids
+    /// have to be the same [default: the bits have to be the same]
+    #[arg(long, value_name = "X", value_parser = limit)]
+    pub max: Option<f64>,
+    /// The largest mean of FLIP that is allowed of colours, 0 to 1 [default: the bits have to be the same]
+    #[arg(long, value_name = "X", value_parser = part)]
+    pub flip: Option<f64>,
+    /// Pixels in a degree of what an observer of FLIP sees, 1 to 1000: the distance of the eye times the pixels in a
+    /// metre, over 57.3 [default: 67.02, a screen of 3840 pixels in 0.7 m, seen from 0.7 m]
+    #[arg(long, value_name = "PIXELS", value_parser = pixels_per_degree, hide_default_value = true)]
+    #[arg(default_value_t = Flip::PIXELS_PER_DEGREE)]
+    pub ppd: f64,
+    /// Stops of exposure at which FLIP sees two pictures of linear light, -64 to 64 [default: 0]
+    #[arg(long, value_name = "EV", allow_negative_numbers = true, value_parser = exposure)]
+    pub exposure: Option<f64>,
+    /// A picture of the difference to write: FLIP of the picture, from black, nothing is seen, to pale yellow; without
+    /// a picture to compare the first buffer that differs, over its largest difference [default: none]
+    #[arg(short, long = "output", value_name = "FILE.png", value_hint = ValueHint::FilePath)]
+    pub output: Option<PathBuf>,
+    /// As JSON, for another program to read
+    #[arg(long)]
+    pub json: bool,
+    /// Says nothing but errors: the exit code tells
+    #[arg(short, long)]
+    pub quiet: bool,
+}
+
+/// `firstlight verify`
+#[derive(Args, Debug)]
+pub struct VerifyArgs {
+    /// A picture that firstlight wrote: .png, .exr, .npz or .hdr
+    #[arg(value_name = "FILE", value_hint = ValueHint::FilePath)]
+    pub file: PathBuf,
+    /// Its scene, or a folder that has it among its scenes and models; which one it is, the hash tells [default: a
+    /// built-in scene]
+    #[arg(long, value_name = "FILE_OR_DIR", value_hint = ValueHint::AnyPath)]
+    pub scene: Option<PathBuf>,
+    /// Lets the scene read files of this folder and below, besides its own folder; may be given several times [default:
+    /// none]
+    #[arg(long = "allow-dir", value_name = "DIR", value_hint = ValueHint::DirPath)]
+    pub allow_dir: Vec<PathBuf>,
+    /// As JSON, for another program to read
+    #[arg(long)]
+    pub json: bool,
+    /// Says nothing but errors: the exit code tells
+    #[arg(short, long)]
+    pub quiet: bool,
 }
 
 /// `firstlight scenes`
@@ -450,6 +553,59 @@ fn frames(text: &str) -> Result<Frames, String> {
     }
 }
 
+/// A part of the pictures of a run.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Shard {
+    /// Which, from 1 on.
+    pub index: u64,
+    /// Of how many.
+    pub count: u64,
+}
+
+impl Shard {
+    /// Whether the picture of that number, counted from 0, is one of its.
+    pub fn has(self, picture: u64) -> bool {
+        picture % self.count == self.index - 1
+    }
+}
+
+/// Reads `I/N`.
+fn shard(text: &str) -> Result<Shard, String> {
+    let number = |part: &str| part.trim().parse::<u64>().ok();
+    match text.split_once('/').and_then(|(index, count)| number(index).zip(number(count))) {
+        Some((index, count)) if (1..=count).contains(&index) => Ok(Shard { index, count }),
+        Some((0, 1..)) => Err("shards count from 1: the first of four is 1/4".into()),
+        Some((index, count)) if count > 0 => {
+            Err(format!("there is no shard {index} of {count}: they are 1 to {count}"))
+        }
+        _ => Err("two whole numbers I/N are needed, as 1/4 for the first of four".into()),
+    }
+}
+
+/// Reads the largest difference that is allowed.
+fn limit(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(limit) if limit >= 0.0 && limit.is_finite() => Ok(limit),
+        _ => Err("a number of at least 0 is needed".into()),
+    }
+}
+
+/// Reads a number from 0 to 1.
+fn part(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(part) if (0.0..=1.0).contains(&part) => Ok(part),
+        _ => Err("a number from 0 to 1 is needed".into()),
+    }
+}
+
+/// Reads how many pixels there are in a degree.
+fn pixels_per_degree(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(pixels) if (1.0..=1000.0).contains(&pixels) => Ok(pixels),
+        _ => Err("a number of pixels from 1 to 1000 is needed".into()),
+    }
+}
+
 /// Reads `X,Y,WIDTH,HEIGHT`. Whether the film is that large is seen once the scene is known.
 fn crop(text: &str) -> Result<Window, String> {
     let wanted = "four whole numbers X,Y,WIDTH,HEIGHT are needed, in pixels, WIDTH and HEIGHT at least 1";
@@ -579,6 +735,21 @@ mod tests {
             assert!(frames(bad).is_err(), "{bad}");
         }
         assert!(time("-0.5").is_ok() && time("inf").is_err() && time("nan").is_err() && time("2e9").is_err());
+    }
+
+    #[test]
+    fn shards_are_parts_of_a_whole() {
+        assert_eq!(shard("2/3"), Ok(Shard { index: 2, count: 3 }));
+        for bad in ["", "1", "/", "1/", "/2", "0/2", "3/2", "0/0", "1/0", "-1/2", "1/2/3", "a/b", "1.5/2"] {
+            assert!(shard(bad).is_err(), "{bad}");
+        }
+        // Every picture is in one of them
+        for picture in 0..10 {
+            assert_eq!((1..=4).filter(|index| Shard { index: *index, count: 4 }.has(picture)).count(), 1);
+        }
+        assert!(limit("0").is_ok() && limit("-1").is_err() && limit("nan").is_err() && limit("inf").is_err());
+        assert!(part("1").is_ok() && part("1.1").is_err() && part("nan").is_err());
+        assert!(pixels_per_degree("67").is_ok() && pixels_per_degree("0.5").is_err());
     }
 
     #[test]

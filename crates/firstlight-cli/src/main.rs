@@ -3,6 +3,8 @@
 mod args;
 mod buffers;
 mod check;
+mod diff;
+mod difference;
 mod faster;
 mod hints;
 mod info;
@@ -14,6 +16,7 @@ mod render;
 mod report;
 mod scenes;
 mod stats;
+mod verify;
 
 use std::process::ExitCode;
 
@@ -44,6 +47,8 @@ fn main() -> ExitCode {
         Command::Info(args) => ("info", info::run(args)),
         Command::Scenes(args) => ("scenes", scenes::run(args)),
         Command::Buffers => ("buffers", buffers::run()),
+        Command::Diff(args) => ("diff", diff::run(args)),
+        Command::Verify(args) => ("verify", verify::run(args)),
         Command::Schema => ("schema", answer(&with_newline(firstlight::schema()))),
         Command::Completions(args) => ("completions", completions(args.shell)),
         Command::Man => ("man", man()),

@@ -9,7 +9,7 @@ use std::time::{Duration, Instant};
 
 use firstlight::Window;
 
-use crate::args::{ReadingArgs, RenderArgs};
+use crate::args::{ReadingArgs, RenderArgs, Shard};
 use crate::input;
 use crate::interrupt::Watch;
 use crate::output::Target;
@@ -23,11 +23,18 @@ use plan::{Job, Plan, StatsPlan};
 /// # Errors
 /// Wrong usage; a scene that cannot be had or has faults; an output that cannot be written; an interruption.
 pub fn run(args: &RenderArgs) -> Result<(), Failure> {
-    let plan = Plan::resolve(args)?;
+    let mut plan = Plan::resolve(args)?;
     if let Some(target) = &args.print_scene {
         return print::run(&plan, target.as_deref(), &args.reading);
     }
+    plan.keep_shard();
     match &plan.jobs[..] {
+        [] => {
+            if let (Some(Shard { index, count }), false) = (plan.shard, plan.quiet) {
+                say(format_args!("shard {index} of {count} has nothing to do: there are fewer pictures"));
+            }
+            Ok(())
+        }
         [job] => render(&plan, job, &args.reading),
         jobs => render_all(&plan, jobs, &args.reading),
     }

@@ -40,6 +40,8 @@ pub enum Failure {
         /// How many there are.
         all: usize,
     },
+    /// `diff` and `verify` found a difference, and have said it: exit code 3.
+    Differs,
     /// Stopped while one of several scenes was rendered: exit code 130.
     InterruptedIn {
         /// What it is called.
@@ -57,6 +59,7 @@ impl Failure {
         ExitCode::from(match self {
             Failure::Work(_) | Failure::Scene(_) | Failure::Several { .. } => 1,
             Failure::Usage(_) => 2,
+            Failure::Differs => 3,
             Failure::Interrupted
             | Failure::InterruptedWriting(_)
             | Failure::InterruptedAfter { .. }
@@ -76,6 +79,7 @@ impl Failure {
                 show_diagnostics(faults);
                 say(format_args!("{}", count(faults)));
             }
+            Failure::Differs => {}
             Failure::Interrupted => say(format_args!("interrupted; nothing was written")),
             Failure::InterruptedWriting(to) => {
                 say(format_args!("interrupted while {to} was written; it may have got a part"));

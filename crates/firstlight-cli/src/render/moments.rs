@@ -162,6 +162,7 @@ fn encoded(
 ) -> Result<Vec<Vec<u8>>, ImageError> {
     let heat = film.heat().map(|heat| heat.picture());
     let receipt = scene.receipt(settings);
+    let of_heat = scene.buffers_receipt(settings, &[Plane::Rays.into()]);
     let buffers = scene.buffers();
     let of_buffers = scene.buffers_receipt(settings, buffers);
     // Before the film becomes the picture
@@ -175,7 +176,7 @@ fn encoded(
     let image = settings.buffers.contains(&Plane::Color.into()).then(|| film.develop());
     for (bytes, output) in encoded.iter_mut().zip(outputs).filter(|(_, output)| !output.takes_buffers()) {
         *bytes = match (output.content, &heat, &image) {
-            (Content::Heat, Some(heat), _) => heat.encode(output.format, &Display::default(), &receipt)?,
+            (Content::Heat, Some(heat), _) => heat.encode(output.format, &Display::default(), &of_heat)?,
             (Content::Scene, _, Some(image)) => image.encode(output.format, &display, &receipt)?,
             _ => unreachable!("a film has what its outputs show"),
         };

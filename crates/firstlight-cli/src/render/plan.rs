@@ -11,7 +11,7 @@ use firstlight::{
 
 use super::moments::Moment;
 use super::overrides::Overrides;
-use crate::args::{AntialiasingMode, Bits, Frames, RenderArgs, Terminator};
+use crate::args::{AntialiasingMode, Bits, Frames, RenderArgs, Shard, Terminator};
 use crate::input::{self, Input};
 use crate::output::{self, Content, Names, Output, Target};
 use crate::report::{Failure, say, shown};
@@ -36,12 +36,15 @@ pub(super) struct Plan<'a> {
     pub margin: Option<f64>,
     pub time: f64,
     pub frames: Option<Frames>,
+    pub shard: Option<Shard>,
     pub quiet: bool,
 }
 
 /// One of the scenes to render.
 pub(super) struct Job<'a> {
     pub scene: &'a Path,
+    /// Which of the scenes that were given, from 0 on.
+    pub index: usize,
     /// What the placeholders in the names of its outputs stand for.
     pub names: Names,
 }
@@ -73,7 +76,12 @@ impl<'a> Plan<'a> {
             Some(Some(path)) => StatsPlan::Json(stats_target(path)?),
         };
         let heat = args.heat.as_deref().map(heat_output).transpose()?;
-        let jobs: Vec<Job> = args.scenes.iter().map(|scene| Job { scene, names: input::names_of(scene) }).collect();
+        let jobs: Vec<Job> = args
+            .scenes
+            .iter()
+            .enumerate()
+            .map(|(index, scene)| Job { scene, index, names: input::names_of(scene) })
+            .collect();
         let several = jobs.len() > 1;
         let pictures = outputs.iter().map(|output| ("-o", &output.target));
         let pictures = pictures.chain(heat.iter().map(|heat| ("--heat", &heat.target)));
@@ -97,6 +105,13 @@ impl<'a> Plan<'a> {
             let message =
                 "--frames writes a file for each frame, and -o - is not one; name files, or give --time instead";
             return Err(Failure::Usage(message.into()));
+        }
+
+        if let (Some(_), Some(_), StatsPlan::Json(target)) = (args.shard, args.frames, &stats) {
+            let name = target.name();
+            return Err(Failure::Usage(format!(
+                "--stats={name}: every shard of the frames would write this file; --stats alone is a table of each"
+            )));
         }
 
         let mut settings = RenderSettings::default();
@@ -144,12 +159,27 @@ impl<'a> Plan<'a> {
             margin: args.margin,
             time: args.time.unwrap_or(0.0),
             frames,
+            shard: args.shard,
             quiet,
         };
         if several {
             plan.refuse_shared()?;
         }
         Ok(plan)
+    }
+
+    /// Whether a picture is one to render. They are counted from 0, over all frames of one scene after the other.
+    fn takes(&self, scene: usize, frame: u32) -> bool {
+        let frames = self.frames.map_or(1, |Frames { first, last }| u64::from(last - first) + 1);
+        self.shard.is_none_or(|shard| shard.has(scene as u64 * frames + u64::from(frame)))
+    }
+
+    /// Leaves to the jobs those that have something to render.
+    pub fn keep_shard(&mut self) {
+        let last = self.frames.map_or(0, |Frames { first, last }| last - first);
+        let mut jobs = std::mem::take(&mut self.jobs);
+        jobs.retain(|job| (0..=last).any(|frame| self.takes(job.index, frame)));
+        self.jobs = jobs;
     }
 
     /// Sees that no two of several scenes have an output in common, and that none is the file of another scene.
@@ -224,7 +254,9 @@ impl<'a> Plan<'a> {
                     return Err(Failure::Usage(format!("two frames would be {path}; give the files other names")));
                 }
             }
-            moments.push(Moment { time: f64::from(frame) / fps, outputs });
+            if self.takes(job.index, frame - first) {
+                moments.push(Moment { time: f64::from(frame) / fps, outputs });
+            }
         }
         Ok(moments)
     }

@@ -5,6 +5,7 @@ mod answers;
 mod book;
 mod buffers;
 mod common;
+mod compare;
 mod faults;
 mod files;
 mod found;

@@ -204,10 +204,11 @@ impl Plane {
     /// What its numbers mean beside their unit and space: axes, signs, where they count from.
     pub fn convention(self) -> &'static str {
         use Plane::*;
-        match self {
+        match self.of_each_ray().unwrap_or(self) {
             Color => "colour times alpha",
             Alpha => "0 nothing, 1 all of the pixel",
-            Background | Emission | Ambient | Diffuse | Specular => "a term of color",
+            Background | Emission | Ambient | Diffuse | Specular | Rest => "a term of color",
+            Shadow => "0 nothing arrives, 1 all",
             Albedo => "diffuse reflectance",
             Depth => "along the line of sight, infinite for nothing",
             Distance => "along the ray, infinite for nothing",
@@ -217,7 +218,11 @@ impl Plane {
             Barycentric => "weights of the second and third corner",
             ObjectId | InstanceId | MaterialId | PrimitiveId => "1 for the first, 0 for none",
             FaceOrientation => "1 front, 2 back, 0 for none",
+            Motion | MotionBackward => "x right, y down; visible 1, hidden 0, nowhere -1",
+            BackgroundCoverage => "0 nothing, 1 all of the pixel",
+            CryptoObject | CryptoInstance | CryptoMaterial => "Cryptomatte: hash and share, by share",
             Rays => "counted",
+            _ => unreachable!("a mean is of a plane that is none"),
         }
     }
 

@@ -3,12 +3,12 @@
 use std::str::FromStr;
 
 use super::receipt::{REFERENCE, TRANSPARENT, version};
-use super::{AaMode, RenderSettings, Renderer, VisibilityMode};
+use super::{AaMode, RenderSettings, VisibilityMode};
 use crate::color::Display;
 use crate::describe::{ColorDesc, SamplesDesc};
-use crate::image::{Buffer, BufferDesc, Plane, Receipt, Window};
-use crate::light::{Light, LightDesc};
-use crate::scene::{Framing, ModelSettings, Scene, SceneDesc, UpAxis, View};
+use crate::image::{BufferDesc, Plane, Receipt, Window};
+use crate::light::LightDesc;
+use crate::scene::{Framing, ModelSettings, MotionTo, Scene, SceneDesc, UpAxis, View};
 use crate::shape::ShadowTerminator;
 
 /// What a [`Receipt`] says of how its picture was rendered, so that it can be rendered again: [`apply`](Self::apply) to
@@ -32,6 +32,8 @@ pub struct ReceiptSettings {
     pub display: Option<Display>,
     /// What the file holds of each pixel.
     pub buffers: Vec<BufferDesc>,
+    /// Whereto the motion leads that the file holds.
+    motion_to: Option<MotionTo>,
     size: [u32; 2],
     antialiasing: u32,
     aa_mode: AaMode,
@@ -116,6 +118,15 @@ fn buffers(text: &str) -> Option<Vec<BufferDesc>> {
     names.iter().map(|name| BufferDesc::parse(name).ok()).collect()
 }
 
+/// A number of seconds, or the name of a camera in quotes.
+fn motion_to(text: &str) -> Option<MotionTo> {
+    match serde_json::from_str(text).ok()? {
+        serde_json::Value::Number(time) => time.as_f64().map(MotionTo::Time),
+        serde_json::Value::String(name) => Some(MotionTo::Camera(name)),
+        _ => None,
+    }
+}
+
 impl ReceiptSettings {
     /// Reads a receipt.
     ///
@@ -154,6 +165,7 @@ impl ReceiptSettings {
             tolerance: from.optional("tolerance", number)?,
             display: from.optional("display", number)?,
             buffers: from.optional("buffers", buffers)?.unwrap_or_else(|| vec![Plane::Color.into()]),
+            motion_to: from.optional("motion_to", motion_to)?,
             size: [from.required("width", number)?, from.required("height", number)?],
             antialiasing: from.required("antialiasing", number)?,
             aa_mode: from.required("aa_mode", AaMode::from_name)?,
@@ -189,6 +201,7 @@ impl ReceiptSettings {
         render.background = self.background.unwrap_or(render.background);
         render.shadow_terminator = self.shadow_terminator;
         render.buffers = self.buffers.clone();
+        render.motion_to = self.motion_to.clone();
         let said = self.light_samples.iter();
         let mut said = said.flat_map(|(count, samples)| std::iter::repeat_n(*samples, *count));
         for light in LightDesc::in_scene_order_mut(&mut desc.lights) {
@@ -200,21 +213,14 @@ impl ReceiptSettings {
 
     /// The settings that give the same film of the compiled scene.
     pub fn settings(&self, scene: &Scene) -> RenderSettings {
-        let mut settings = RenderSettings {
+        RenderSettings {
             aa_mode: self.aa_mode,
             crop: self.crop,
             reference: self.reference,
             visibility: self.visibility,
             buffers: scene.buffers().to_vec(),
             ..RenderSettings::default()
-        };
-        // Where every light is sampled at every ray the bits are the same, and each of many lights can be kept
-        let by_light = settings.buffers.iter().any(|buffer| matches!(buffer, Buffer::Light(..)));
-        let is_sampled = |light: &Light| light.said_samples() != SamplesDesc::Exact;
-        if settings.renderer() == Renderer::Full && by_light && scene.lights.iter().all(is_sampled) {
-            settings.visibility = VisibilityMode::Traced;
         }
-        settings
     }
 }
 
@@ -260,6 +266,7 @@ mod tests {
             ("visibility", "x"),
             ("tolerance", "one"),
             ("up", "x"),
+            ("motion_to", "north"),
         ] {
             let with = [&LEAST[..], &[(key, value)]].concat();
             let fault = ReceiptFault::Unknown { key, value: value.into() };
