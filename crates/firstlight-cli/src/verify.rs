@@ -110,6 +110,9 @@ fn open(path: &Path, said: &ReceiptSettings, args: &VerifyArgs) -> Result<(Input
     })?;
     said.apply(&mut input.parsed.desc);
     input.framing = said.framing.unwrap_or(input.framing);
+    if input.parsed.desc.render.motion_to.is_some() {
+        input.remember_files();
+    }
     let compiled = input.compile(said.time, true)?;
     Ok((input, compiled))
 }

@@ -95,9 +95,9 @@ fn buffer() -> impl Strategy<Value = BufferDesc> {
     ];
     let of_light =
         (light.clone(), maybe(select(LightPart::ALL))).prop_map(|(light, part)| BufferDesc::Light { light, part });
-    let of_groups = [LightPart::Diffuse, LightPart::Specular, LightPart::Unshadowed, LightPart::Visibility];
+    let of_groups = vec![LightPart::Diffuse, LightPart::Specular, LightPart::Unshadowed, LightPart::Visibility];
     let of_group =
-        (light.clone(), maybe(select(&of_groups[..]))).prop_map(|(group, part)| BufferDesc::Group { group, part });
+        (light.clone(), maybe(select(of_groups))).prop_map(|(group, part)| BufferDesc::Group { group, part });
     let of_object = light.prop_map(BufferDesc::Coverage);
     prop_oneof![select(Plane::ALL).prop_map(BufferDesc::Plane), of_light, of_group, of_object]
 }
@@ -263,19 +263,36 @@ fn moved() -> BoxedStrategy<Option<Box<TransformDesc>>> {
 }
 
 fn light() -> impl Strategy<Value = LightDesc> {
-    let common = || (maybe(text()), color(), number(), select(Falloff::ALL), any::<bool>());
-    let point =
-        (vector(), moved(), common()).prop_map(|(position, transform, (name, color, strength, falloff, shadows))| {
-            LightDesc::Point(PointDesc { name, position, transform, color, strength, falloff, shadows })
-        });
-    let directional =
-        (vector(), moved(), common()).prop_map(|(direction, transform, (name, color, strength, falloff, shadows))| {
-            LightDesc::Directional(DirectionalDesc { name, direction, transform, color, strength, falloff, shadows })
-        });
+    let common = || ([maybe(text()), maybe(text())], color(), number(), select(Falloff::ALL), any::<bool>());
+    let point = (vector(), moved(), common()).prop_map(
+        |(position, transform, ([name, group], color, strength, falloff, shadows))| {
+            LightDesc::Point(PointDesc { name, group, position, transform, color, strength, falloff, shadows })
+        },
+    );
+    let directional = (vector(), moved(), common()).prop_map(
+        |(direction, transform, ([name, group], color, strength, falloff, shadows))| {
+            LightDesc::Directional(DirectionalDesc {
+                name,
+                group,
+                direction,
+                transform,
+                color,
+                strength,
+                falloff,
+                shadows,
+            })
+        },
+    );
     let spot = ([vector(), vector()], moved(), number(), maybe(number()), common()).prop_map(
-        |([position, look_at], transform, cone_deg, inner_cone_deg, (name, color, strength, falloff, shadows))| {
+        |(
+            [position, look_at],
+            transform,
+            cone_deg,
+            inner_cone_deg,
+            ([name, group], color, strength, falloff, shadows),
+        )| {
             let new = SpotDesc { look_at, transform, cone_deg, inner_cone_deg, ..SpotDesc::new(position) };
-            LightDesc::Spot(SpotDesc { name, color, strength, falloff, shadows, ..new })
+            LightDesc::Spot(SpotDesc { name, group, color, strength, falloff, shadows, ..new })
         },
     );
     /// An area light's own fields with what all of them can say.
@@ -293,7 +310,7 @@ fn light() -> impl Strategy<Value = LightDesc> {
             )
                 .prop_map(|(own, transform, sides, [visible, blocks], samples, set, seed, common)| {
                     let mut light = own;
-                    (light.name, light.color, light.strength, light.falloff, light.shadows) = common;
+                    ([light.name, light.group], light.color, light.strength, light.falloff, light.shadows) = common;
                     (light.transform, light.sides, light.visible, light.blocks) = (transform, sides, visible, blocks);
                     (light.samples, light.set, light.seed) = (samples, set, seed);
                     LightDesc::$variant(light)
