@@ -206,8 +206,8 @@ pub struct RenderArgs {
     #[arg(long, value_name = "NAMES", value_parser = buffer, value_delimiter = ',', help_heading = "Output")]
     #[arg(hide_possible_values = true)]
     pub buffers: Option<Vec<BufferDesc>>,
-    /// Whereto the buffers motion and motion-backward lead: another moment, in seconds; next or previous, the frame after
-    /// or before this one; or another camera of the scene, by its name [default: the scene's]
+    /// Whereto the buffers motion and motion-backward lead: another moment, in seconds; next or previous, the frame
+    /// after or before this one; or another camera of the scene, by its name [default: the scene's]
     #[arg(long, value_name = "TIME|CAMERA", value_parser = motion_to, help_heading = "Output")]
     #[arg(allow_hyphen_values = true)]
     pub motion_to: Option<MotionTo>,

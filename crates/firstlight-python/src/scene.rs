@@ -409,8 +409,8 @@ impl PyScene {
     /// time : float
     ///     The moment, in seconds, of a scene with keys.
     /// motion_to : float or str or Camera or dict, optional
-    ///     Whereto the buffers `motion` and `motion-backward` lead: another moment, in seconds; "next" or "previous", the
-    ///     frame after or before this one; one of the scene's cameras, or another one.
+    ///     Whereto the buffers `motion` and `motion-backward` lead: another moment, in seconds; "next" or "previous",
+    ///     the frame after or before this one; one of the scene's cameras, or another one.
     /// threads : int
     ///     Threads to render with; 0 is one for each processor. It changes no bit.
     /// progress : callable, optional

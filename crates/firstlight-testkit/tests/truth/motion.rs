@@ -84,11 +84,15 @@ const MOVING: &str = r#"
     p = [-4, -3, 0]
     e0 = [8, 0, 0]
     e1 = [0, 6, 0]
-    transform = { translate = [0, 0, -4], keys = [{ time = 0, rotate_deg = [0, 0, 0] }, { time = 1, rotate_deg = [0, 20, 0] }] }
+    transform = { translate = [0, 0, -4], keys = [
+        { time = 0, rotate_deg = [0, 0, 0] }, { time = 1, rotate_deg = [0, 20, 0] },
+    ] }
     [[box]]
     center = [0, 0, 0]
     size = [0.8, 0.8, 0.8]
-    transform = { translate = [2.4, 1.2, 0], keys = [{ time = 0, rotate_deg = [0, 10, 0] }, { time = 1, rotate_deg = [0, 60, 0] }] }
+    transform = { translate = [2.4, 1.2, 0], keys = [
+        { time = 0, rotate_deg = [0, 10, 0] }, { time = 1, rotate_deg = [0, 60, 0] },
+    ] }
     [[mesh]]
     positions = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]
     triangles = [[0, 1, 2], [0, 2, 3]]
@@ -99,7 +103,9 @@ const MOVING: &str = r#"
     transform = { keys = [{ time = 0, translate = [-0.6, 2.2, 0] }, { time = 1, translate = [0, 2.2, 0] }] }
     [[instance]]
     of = "arm"
-    transform = { translate = [0.8, -1.5, 0], keys = [{ time = 0, rotate_deg = [0, 0, 0] }, { time = 1, rotate_deg = [0, 40, 0] }] }
+    transform = { translate = [0.8, -1.5, 0], keys = [
+        { time = 0, rotate_deg = [0, 0, 0] }, { time = 1, rotate_deg = [0, 40, 0] },
+    ] }
     [[group.arm.instance]]
     of = "hand"
     transform = { keys = [{ time = 0, translate = [0.5, 0, 0] }, { time = 1, translate = [0.5, 0.6, 0] }] }
@@ -116,7 +122,9 @@ const MOVING: &str = r#"
     e0 = [0.8, 0, 0]
     e1 = [0, 0.6, 0]
     sides = "both"
-    transform = { translate = [-2.5, -1.6, 0], keys = [{ time = 0, rotate_deg = [0, 0, 0] }, { time = 1, rotate_deg = [0, 35, 0] }] }
+    transform = { translate = [-2.5, -1.6, 0], keys = [
+        { time = 0, rotate_deg = [0, 0, 0] }, { time = 1, rotate_deg = [0, 35, 0] },
+    ] }
 "#;
 
 /// Where a point of an object is at a moment, by its place in its own space, or in the world at 0 s on the light.
@@ -193,7 +201,8 @@ fn there_and_back_again() {
         projection = \"orthographic\"\nheight = 6\n\
         [[parallelogram]]\np = [-9, -9, -3]\ne0 = [18, 0, 0]\ne1 = [0, 18, 0]\n\
         [[parallelogram]]\np = [-2, -1, 0]\ne0 = [3, 0, 0.5]\ne1 = [0, 2, 1]\n\
-        transform = { keys = [{ time = 0, rotate_deg = [0, 0, 0] }, { time = 1, rotate_deg = [12, 25, -8], translate = [0.5, 0.2, 0] }] }\n";
+        transform = { keys = [{ time = 0, rotate_deg = [0, 0, 0] }, \
+        { time = 1, rotate_deg = [12, 25, -8], translate = [0.5, 0.2, 0] }] }\n";
     let here = at(text, 0.0);
     let (forward, backward) = (motion(&here, Plane::Motion), motion(&here, Plane::MotionBackward));
     let objects = [ids(&here), ids(&at(&text.replace("motion_to = 1\n", ""), 1.0))];
@@ -257,8 +266,9 @@ fn what_turns_away_hides_itself() {
     // Half a turn: the left comes from the front to the back, all of it
     let text = |shape: &str, degrees: f64| {
         format!(
-            "[render]\nwidth = 40\nheight = 40\nmotion_to = 1\n[camera]\nposition = [0, 0, 10]\nfov_y_deg = 20\n{shape}\n\
-             transform = {{ keys = [{{ time = 0, rotate_deg = [0, 0, 0] }}, {{ time = 1, rotate_deg = [0, {degrees}, 0] }}] }}\n"
+            "[render]\nwidth = 40\nheight = 40\nmotion_to = 1\n[camera]\nposition = [0, 0, 10]\nfov_y_deg = 20\n\
+             {shape}\ntransform = {{ keys = [{{ time = 0, rotate_deg = [0, 0, 0] }}, \
+             {{ time = 1, rotate_deg = [0, {degrees}, 0] }}] }}\n"
         )
     };
     let ball = "[[sphere]]\ncenter = [0, 0, 0]\nradius = 1";
@@ -321,7 +331,8 @@ fn what_comes_behind_the_eye_has_no_place() {
         format!(
             "[render]\nwidth = 30\nheight = 20\nmotion_to = 1\n[camera]\nposition = [0, 0, 5]\n{projection}\n\
              [[parallelogram]]\np = [-9, -9, 0]\ne0 = [18, 0, 0]\ne1 = [0, 18, 0]\n\
-             transform = {{ keys = [{{ time = 0, translate = [0, 0, 0] }}, {{ time = 1, translate = [0, 0, 5.5] }}] }}\n"
+             transform = {{ keys = [{{ time = 0, translate = [0, 0, 0] }}, \
+             {{ time = 1, translate = [0, 0, 5.5] }}] }}\n"
         )
     };
     assert!(motion(&at(&text(""), 0.0), Plane::Motion).iter().all(|flow| *flow == [0.0, 0.0, -1.0]));
@@ -341,7 +352,8 @@ fn what_stands_still_does_not_move() {
         [[sphere]]\ncenter = [2, 0, 0]\nradius = 1\ntransform = { scale = [1, 1.5, 1] }\n\
         [[box]]\ncenter = [0, 0, -6]\nsize = [12, 4, 12]\n\
         [[cylinder]]\np0 = [0, 1.8, 0]\np1 = [0, 2.6, 0]\nradius = 0.4\n\
-        [[mesh]]\npositions = [[-9, -3, 9], [9, -3, 9], [9, -3, -90], [-9, -3, -90]]\ntriangles = [[0, 1, 2], [0, 2, 3]]\n\
+        [[mesh]]\npositions = [[-9, -3, 9], [9, -3, 9], [9, -3, -90], [-9, -3, -90]]\n\
+        triangles = [[0, 1, 2], [0, 2, 3]]\n\
         [[plane]]\npoint = [0, 9, 0]\n\
         [[point_set]]\npositions = [[0, -2.5, 0], [0.3, -2.5, 0]]\nradius = 0.3\n\
         [[torus]]\ncenter = [0, 0, 1]\nmajor_radius = 1\nminor_radius = 0.3\naxis = [0, 1, 0.3]\n";
@@ -364,7 +376,8 @@ fn what_stands_still_does_not_move() {
 const PAIR: &str = "[render]\nwidth = 64\nheight = 48\ncamera = \"left\"\nmotion_to = \"right\"\n\
     [camera.left]\nposition = [-0.1, 0, 5]\nlook_at = [-0.1, 0, 0]\nfocal_length_px = [60, 60]\n\
     [camera.right]\nposition = [0.1, 0, 5]\nlook_at = [0.1, 0, 0]\nfocal_length_px = [60, 60]\n\
-    [[sphere]]\ncenter = [0, 0, 0]\nradius = 1\n[[parallelogram]]\np = [-9, -9, -3]\ne0 = [18, 0, 0]\ne1 = [0, 18, 0]\n";
+    [[sphere]]\ncenter = [0, 0, 0]\nradius = 1\n\
+    [[parallelogram]]\np = [-9, -9, -3]\ne0 = [18, 0, 0]\ne1 = [0, 18, 0]\n";
 
 #[test]
 fn between_two_cameras_it_is_the_disparity() {

@@ -28,7 +28,8 @@ words! {
         /// What of it lights send by highlights, of all lights together.
         Specular = "specular",
         /// What of it lights send that are not kept apart: `color` without `background`, `emission`, `ambient` and the
-        /// lights, or else groups of lights, that are asked for beside it. Added to those it is `color`, to the last bit but one.
+        /// lights, or else groups of lights, that are asked for beside it. Added to those it is `color`, to the last
+        /// bit but one.
         Rest = "rest",
         /// Of what all lights together would send if nothing cast shadows, the share that arrives, 0 to 1; 0 where
         /// nothing would.

@@ -17,7 +17,7 @@ const NOWHERE: Flow = [0.0, 0.0, -1.0];
 
 /// Rounding in a place that was found on one way and is looked for on another, in units of the last place of 32 bits:
 /// that of the point, of the ray to it, and of the surface there.
-const ROUNDINGS: f64 = 32.0;
+const ROUNDINGS: u32 = 32;
 
 /// A point of a surface that was carried from one scene to another.
 struct Carried<'a> {
@@ -49,7 +49,7 @@ pub(super) fn of_thing(center: &Center, there: &Scene, level: Level) -> Flow {
     else {
         return NOWHERE;
     };
-    let error = center.error() + ROUNDINGS * ulp(p.abs().max(moved.abs()).max_element());
+    let error = center.error() + roundings(p.abs().max(moved.abs()).max_element());
     let is_front = center.is_front();
     let carried = Carried { there, level, of: center.hit, p: moved, front: turned, is_front, error };
     flow(before, after, || depth > 0.0 && is_inside(there, after) && carried.is_seen(after))
@@ -82,8 +82,9 @@ fn ray_at(camera: &Camera, [x, y]: [f64; 2]) -> Ray {
     camera.local_ray(x as f32, y as f32, 1.0).0
 }
 
-fn ulp(size: f64) -> f64 {
-    size * f64::from(UNIT_ROUNDOFF)
+/// The rounding in something of that size.
+fn roundings(size: f64) -> f64 {
+    size * f64::from(UNIT_ROUNDOFF) * f64::from(ROUNDINGS)
 }
 
 impl Carried<'_> {
@@ -92,7 +93,7 @@ impl Carried<'_> {
         let ray = ray_at(&self.there.camera, pixel);
         let (o, d) = (ray.o.as_dvec3(), ray.d.as_dvec3());
         let t = (self.p - o).dot(d) / d.length_squared();
-        let error = self.error + ROUNDINGS * ulp(t.abs());
+        let error = self.error + roundings(t.abs());
         let is_front = self.front.dot(d) < 0.0;
         let faces = is_front == self.is_front;
         let Some(hit) = self.there.intersect_at(self.level, &ray) else {

@@ -66,8 +66,8 @@ table! {
         pub exposure: f64 = 0.0,
         /// What files that hold more than a picture, .exr and .npz, are given of each pixel.
         pub buffers: Vec<BufferDesc> = vec![BufferDesc::Plane(Plane::Color)],
-        /// Whereto the buffer `motion` leads: another moment, in seconds from -1e9 to 1e9; `"next"` or `"previous"`, the
-        /// frame after or before this one; or another camera, by its name, at the same moment.
+        /// Whereto the buffer `motion` leads: another moment, in seconds from -1e9 to 1e9; `"next"` or `"previous"`,
+        /// the frame after or before this one; or another camera, by its name, at the same moment.
         pub motion_to: Option<MotionTo> = None,
         /// Frames in a second, 0.001 to 1000000: frame number n of `--frames` is the moment n / fps. Without keys it is
         /// of no account.
