@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Args, Parser, Subcommand, ValueEnum, ValueHint};
 use firstlight::{
-    BufferDesc, ColorDesc, Flip, Framing, MotionTo, SamplesDesc, SimdLevel, View, VisibilityMode, Window,
+    BufferDesc, ColorDesc, Flip, Framing, LightChange, MotionTo, SamplesDesc, SimdLevel, View, VisibilityMode, Window,
 };
 
 /// The version and, where it is known, the commit: `0.1.0 (0123456789)`.
@@ -53,6 +53,9 @@ pub enum Command {
     /// Renders a picture again from its receipt, and says whether it has the same bits
     #[command(after_help = VERIFY_EXAMPLES)]
     Verify(VerifyArgs),
+    /// Lights a picture again that was rendered with --buffers relight: other strengths and colours, without a render
+    #[command(after_help = RELIGHT_EXAMPLES)]
+    Relight(RelightArgs),
     /// Prints the JSON Schema of scene files, for completion in editors
     Schema,
     /// Prints a completion script for a shell
@@ -116,6 +119,13 @@ Examples:
       of a scene of one's own
   firstlight verify out/frame.0007.png --scene scenes
       of one of the scenes of a folder";
+
+const RELIGHT_EXAMPLES: &str = "\
+Examples:
+  firstlight render room.toml --buffers color,relight -o room.exr
+      keeps what each light sends
+  firstlight relight room.exr --light key=x1.5 --light fill=#ffd0a0 -o warm.png
+      one light half as strong again, another in a warmer colour";
 
 /// Where a scene comes from.
 #[derive(Args, Debug)]
@@ -419,6 +429,31 @@ pub struct VerifyArgs {
     pub quiet: bool,
 }
 
+/// `firstlight relight`
+#[derive(Args, Debug)]
+pub struct RelightArgs {
+    /// A file that was rendered with --buffers relight: .exr or .npz
+    #[arg(value_name = "FILE", value_hint = ValueHint::FilePath)]
+    pub file: PathBuf,
+    /// A light and what becomes of it: NAME=x1.5 multiplies its strength, NAME=1.5 sets it, NAME=#ffd0a0 (sRGB) or
+    /// NAME=R,G,B (linear) sets its colour. NAME may be #3, the third in scene order. May be given several times, in
+    /// effect in that order
+    #[arg(long, value_name = "NAME=CHANGE", value_parser = crate::relight::change, required = true)]
+    pub light: Vec<(String, LightChange)>,
+    /// A picture to write: its ending, .png, .exr, .npz or .hdr, says the format. May be given several times
+    #[arg(short, long = "output", value_name = "FILE", value_hint = ValueHint::FilePath, required = true)]
+    pub output: Vec<PathBuf>,
+    /// Bits in each channel of PNG files [default: 8]
+    #[arg(long, value_name = "8|16")]
+    pub bits: Option<Bits>,
+    /// Stops of exposure of 8- and 16-bit pictures, -64 to 64 [default: the scene's]
+    #[arg(long, value_name = "EV", allow_negative_numbers = true, value_parser = exposure)]
+    pub exposure: Option<f64>,
+    /// Says nothing but errors
+    #[arg(short, long)]
+    pub quiet: bool,
+}
+
 /// `firstlight scenes`
 #[derive(Args, Debug)]
 pub struct ScenesArgs {
@@ -642,7 +677,7 @@ fn numbers<const N: usize>(text: &str) -> Option<[f64; N]> {
 }
 
 /// Reads a colour.
-fn color(text: &str) -> Result<ColorDesc, String> {
+pub fn color(text: &str) -> Result<ColorDesc, String> {
     let linear = || numbers::<3>(text).filter(|rgb| rgb.iter().all(|c| (0.0..=1e6).contains(c))).map(ColorDesc::from);
     let wanted =
         "a colour is '#' and 6 hexadecimal digits (sRGB), as '#336699', or three numbers R,G,B from 0 to 1e6 (linear)";

@@ -49,6 +49,8 @@ light:NAME:unshadowed         What it would send if nothing cast shadows.
 light:NAME:visibility         The share of that which arrives, 0 to 1, as shadow.
 light:NAME:unscaled-diffuse   What it sends before its own colour and strength; not of groups.
 light:NAME:unscaled-specular  The same of highlights.
+relight                       All that `firstlight relight` needs: alpha, background, emission, ambient,
+                              the unscaled parts of all lights, the coverage of lights that are seen.
 ";
 
 /// Those whose names hold the name of an object.

@@ -12,6 +12,7 @@ mod input;
 mod interrupt;
 mod output;
 mod progress;
+mod relight;
 mod render;
 mod report;
 mod scenes;
@@ -48,6 +49,7 @@ fn main() -> ExitCode {
         Command::Scenes(args) => ("scenes", scenes::run(args)),
         Command::Buffers => ("buffers", buffers::run()),
         Command::Diff(args) => ("diff", diff::run(args)),
+        Command::Relight(args) => ("relight", relight::run(args)),
         Command::Verify(args) => ("verify", verify::run(args)),
         Command::Schema => ("schema", answer(&with_newline(firstlight::schema()))),
         Command::Completions(args) => ("completions", completions(args.shell)),

@@ -498,7 +498,7 @@ const MAX_COORDINATE: f64 = 2.5e8;
 /// That holds as well for products of a difference of such coordinates and one of those of a camera.
 const MAX_FAR_COORDINATE: f64 = 2.5e9;
 const MIN_LENGTH: f64 = 1e-9;
-const MAX_STRENGTH: f64 = 1e15;
+pub(crate) const MAX_STRENGTH: f64 = 1e15;
 const MAX_COLOR: f64 = 1e6;
 
 /// A value as the user would write it.

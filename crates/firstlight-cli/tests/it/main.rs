@@ -12,6 +12,7 @@ mod found;
 mod frames;
 mod motion;
 mod pictures;
+mod relight;
 mod several;
 #[cfg(unix)]
 mod signals;

@@ -17,6 +17,7 @@ mod links;
 mod many_lights;
 mod motion;
 mod near;
+mod relight;
 mod robust;
 mod terminator;
 mod terms;

@@ -80,6 +80,9 @@ pub enum BufferDesc {
     },
     /// How much of the pixel an object covers; of all, each that a camera can see.
     Coverage(LightChoice),
+    /// All that [`relight`](crate::relight) needs: alpha, background, emission, ambient, of each light what it sends
+    /// without its scale, and the coverage of those that a camera can see.
+    Relight,
 }
 
 /// Which of a scene's lights, of their groups, or of its objects.
@@ -150,6 +153,8 @@ impl From<Plane> for BufferDesc {
 /// What the names of buffers of lights begin with, and of groups of them.
 const LIGHT: &str = "light:";
 const GROUP: &str = "group:";
+/// What stands for all that a picture is lit again from.
+const RELIGHT: &str = "relight";
 /// What those of objects' coverage begin with.
 const COVERAGE: &str = "coverage:";
 /// What the names of means over camera rays end with.
@@ -163,6 +168,9 @@ impl BufferDesc {
     pub fn parse(name: &str) -> Result<Self, (String, Option<String>)> {
         if let Some(plane) = Plane::from_name(name) {
             return Ok(BufferDesc::Plane(plane));
+        }
+        if name == RELIGHT {
+            return Ok(BufferDesc::Relight);
         }
         if let Some(plane) = name.strip_suffix(FILTERED).and_then(Plane::from_name) {
             return Err((format!("{} is no buffer: {}", quoted(name), plane.why_no_mean()), None));
@@ -204,6 +212,7 @@ impl BufferDesc {
     pub fn name(&self) -> String {
         let (prefix, choice, part) = match self {
             BufferDesc::Plane(plane) => return plane.name().to_owned(),
+            BufferDesc::Relight => return RELIGHT.to_owned(),
             BufferDesc::Light { light, part } => (LIGHT, light, *part),
             BufferDesc::Group { group, part } => (GROUP, group, *part),
             BufferDesc::Coverage(object) => (COVERAGE, object, None),
@@ -221,7 +230,7 @@ impl BufferDesc {
 impl Value for BufferDesc {
     fn words() -> String {
         let planes = Plane::words().replace(" or ", ", ");
-        format!("{planes}, \"{LIGHT}NAME\", \"{GROUP}NAME\" or \"{COVERAGE}NAME\"")
+        format!("{planes}, \"{RELIGHT}\", \"{LIGHT}NAME\", \"{GROUP}NAME\" or \"{COVERAGE}NAME\"")
     }
 
     fn plural() -> String {
@@ -229,7 +238,7 @@ impl Value for BufferDesc {
     }
 
     fn schema() -> Json {
-        let named = format!("^({LIGHT}|{GROUP}|{COVERAGE}).+$");
+        let named = format!("^({RELIGHT}|({LIGHT}|{GROUP}|{COVERAGE}).+)$");
         json!({ "anyOf": [Plane::schema(), { "type": "string", "pattern": named }] })
     }
 
@@ -283,6 +292,7 @@ mod tests {
             ("coverage:#7", BufferDesc::Coverage(LightChoice::Number(7))),
             ("coverage:one/ring:diffuse", BufferDesc::Coverage(LightChoice::Name("one/ring:diffuse".into()))),
             ("depth:filtered", BufferDesc::Plane(Plane::FilteredDepth)),
+            ("relight", BufferDesc::Relight),
         ] {
             assert_eq!(BufferDesc::parse(name), Ok(buffer.clone()));
             assert_eq!(buffer.name(), name);

@@ -6,9 +6,9 @@ use std::sync::{Arc, OnceLock};
 use fearless_simd::{f32x16, prelude::*};
 
 use super::{
-    DiskLight, EmitSides, Falloff, FineCell, Light, LightKind, Rectangle, SampleSet, SphereLight, scaled, way_error,
+    DiskLight, EmitSides, Falloff, FineCell, Light, LightKind, Rectangle, SampleSet, Scale, SphereLight, scaled,
+    way_error,
 };
-use crate::color::Rgb;
 use crate::context::{CompileContext, show};
 use crate::describe::{ColorDesc, SamplesDesc};
 use crate::math::{DVec3, ErrorBound, LANES, Ray, Vec3, Vec3x16};
@@ -163,7 +163,7 @@ impl AreaCommon {
             Falloff::Constant => 1.0,
         };
         let scale = scaled(cx, self.color, self.strength, self.falloff.factor() * area / count.max(1) as f64);
-        let intensity = self.color.linear.map(|c| (c * self.strength * self.falloff.factor()) as f32);
+        let whole = Scale { factor: self.falloff.factor(), ..scale };
         let [low, high] = shape.bounds();
         let area = Area {
             middle: ((low + high) * 0.5).as_vec3(),
@@ -185,9 +185,10 @@ impl AreaCommon {
         }
         Light {
             kind: LightKind::Area(area),
-            scale,
-            intensity: Rgb::new(intensity[0], intensity[1], intensity[2]),
-            radiance: Rgb::from(self.color) * self.strength as f32,
+            scale: scale.rgb(),
+            intensity: whole.rgb(),
+            radiance: whole.radiance(),
+            said: [scale, whole],
             shadows: self.shadows,
             exact,
         }

@@ -55,8 +55,9 @@ impl DirectionalDesc {
         let scale = scaled(cx, self.color, self.strength, self.falloff.factor());
         Light {
             kind: LightKind::Directional(Directional { to_light: to_light.as_vec3() }),
-            scale,
-            intensity: scale,
+            scale: scale.rgb(),
+            intensity: scale.rgb(),
+            said: [scale; 2],
             radiance: Rgb::BLACK,
             shadows: self.shadows,
             exact: false,

@@ -158,10 +158,40 @@ pub struct Light {
     pub intensity: Rgb,
     /// What the camera sees of it: `color` x `strength`.
     pub radiance: Rgb,
+    /// What `scale` and `intensity` come of.
+    pub said: [Scale; 2],
     /// Whether its light can be blocked.
     pub shadows: bool,
     /// Whether it asks to be integrated, not sampled. It has points all the same, for those who sample every light.
     pub exact: bool,
+}
+
+/// How much light it is, before rounding: `color` x `strength` x `factor`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Scale {
+    /// Linear, as the scene says it.
+    pub color: [f64; 3],
+    /// As the scene says it.
+    pub strength: f64,
+    /// What the kind of light, and the number of its samples, make of it.
+    pub factor: f64,
+}
+
+impl Scale {
+    pub(crate) fn exact(&self) -> [f64; 3] {
+        self.color.map(|c| c * self.strength * self.factor)
+    }
+
+    /// As renderers multiply with it.
+    pub(crate) fn rgb(&self) -> Rgb {
+        let [r, g, b] = self.exact().map(|c| c as f32);
+        Rgb::new(r, g, b)
+    }
+
+    /// What a camera sees of the light.
+    pub(crate) fn radiance(&self) -> Rgb {
+        Rgb::from(ColorDesc::from(self.color)) * self.strength as f32
+    }
 }
 
 /// The place and shape of a light.
@@ -302,22 +332,21 @@ fn moved_point(cx: &mut CompileContext, field: &str, p: [f64; 3], transform: Opt
 }
 
 /// `color` x `strength`, checked; `factor` is what the kind of light makes of it.
-fn scaled(cx: &mut CompileContext, color: ColorDesc, strength: f64, factor: f64) -> Rgb {
+fn scaled(cx: &mut CompileContext, color: ColorDesc, strength: f64, factor: f64) -> Scale {
     let fine = cx.fault_count();
     cx.color("color", color);
     cx.strength(strength);
-    let scaled = color.linear.map(|c| c * strength * factor);
+    let scaled = Scale { color: color.linear, strength, factor };
     // What a material makes of it has to be a number still
-    if cx.fault_count() == fine && !scaled.iter().all(|c| *c <= MAX_LIGHT) {
+    if cx.fault_count() == fine && !scaled.exact().iter().all(|c| *c <= MAX_LIGHT) {
         let message = format!("{strength} is too much for a light of this colour and size: together they pass 1e30");
         cx.error("strength", message, Some("use a weaker light and raise the exposure"));
     }
-    let [r, g, b] = scaled.map(|c| c as f32);
-    Rgb::new(r, g, b)
+    scaled
 }
 
 /// The most light that one channel of one light sends, in the unit it is computed with.
-const MAX_LIGHT: f64 = 1e30;
+pub(crate) const MAX_LIGHT: f64 = 1e30;
 
 impl Falloff {
     /// Irradiance over pi where it is physical, the plain number where not.

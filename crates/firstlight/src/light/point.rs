@@ -52,8 +52,9 @@ impl PointDesc {
         let scale = scaled(cx, self.color, self.strength, self.falloff.factor());
         Light {
             kind: LightKind::Point(Point { position, physical: self.falloff == Falloff::Physical }),
-            scale,
-            intensity: scale,
+            scale: scale.rgb(),
+            intensity: scale.rgb(),
+            said: [scale; 2],
             radiance: Rgb::BLACK,
             shadows: self.shadows,
             exact: false,

@@ -38,6 +38,7 @@ pub(crate) mod pixel;
 mod plain;
 mod receipt;
 mod receipt_settings;
+mod relight;
 pub(crate) mod resolve;
 mod sampled;
 mod shafts;
@@ -58,6 +59,7 @@ pub use counts::{LightCounts, RenderStats};
 pub use film::Film;
 pub use heat::Heat;
 pub use receipt_settings::{ReceiptFault, ReceiptSettings};
+pub use relight::{LightChange, RelightError, Relit, relight};
 
 use crate::accel::SimdLevel;
 use crate::describe::words;

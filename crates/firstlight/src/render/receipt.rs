@@ -5,7 +5,7 @@ use super::{RenderSettings, Renderer};
 use crate::camera::{Camera, Frame, Projection};
 use crate::describe::SamplesDesc;
 use crate::image::cryptomatte::{self, Named};
-use crate::image::{Buffer, Plane, Receipt};
+use crate::image::{Buffer, LightPart, Plane, Receipt};
 use crate::light::Light;
 use crate::math::Vec3;
 use crate::scene::{Choices, Framing, ModelSettings, Scene};
@@ -109,6 +109,8 @@ impl Scene {
     /// What a file of buffers says of itself: the [receipt](Self::receipt), and more where there is more than the
     /// picture.
     ///
+    /// - `lights` and `scene_display`, where light is asked for without its scale: what the lights are, and how the
+    ///   scene is displayed, for [`relight`](crate::relight);
     /// - `light_groups`: a JSON list of their names and of the numbers of their lights, from 1;
     /// - `motion_to`, where motion is asked for: whereto it leads, a number of seconds, or the name of a camera in quotes;
     ///   and the three matrices of the camera there, with `motion_` before them;
@@ -145,6 +147,9 @@ impl Scene {
         }
         if buffers.iter().any(|buffer| matches!(buffer, Buffer::Light(..) | Buffer::Group(..))) {
             add("light_names", list(self.light_names()));
+        }
+        if buffers.iter().any(|buffer| buffer.part().is_some_and(LightPart::is_unscaled)) {
+            self.light_entries(settings).into_iter().for_each(|(key, value)| add(key, value));
         }
         if buffers.iter().any(|buffer| matches!(buffer, Buffer::Group(..))) {
             let group = |(name, lights): &(String, Vec<u32>)| serde_json::json!({ "name": name, "lights": lights.iter().map(|light| light + 1).collect::<Vec<_>>() });

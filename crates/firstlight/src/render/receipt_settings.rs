@@ -3,6 +3,7 @@
 use std::str::FromStr;
 
 use super::receipt::{REFERENCE, TRANSPARENT, version};
+use super::relight::RELIT;
 use super::{AaMode, RenderSettings, VisibilityMode};
 use crate::color::Display;
 use crate::describe::{ColorDesc, SamplesDesc};
@@ -54,6 +55,9 @@ pub enum ReceiptFault {
     /// There is none: another program wrote the file, or took it out.
     #[error("holds no receipt: firstlight did not write it, or another program took the receipt out")]
     Missing,
+    /// No scene has the lights of the picture.
+    #[error("was lit again after it was rendered: verify the file that it was made of")]
+    Relit,
     /// It does not say what it has to.
     #[error("its receipt does not say {0}, as those of this version do")]
     Lacks(&'static str),
@@ -135,6 +139,9 @@ impl ReceiptSettings {
     pub fn read(receipt: &Receipt) -> Result<Self, ReceiptFault> {
         if receipt.entries.is_empty() {
             return Err(ReceiptFault::Missing);
+        }
+        if receipt.get(RELIT).is_some() {
+            return Err(ReceiptFault::Relit);
         }
         let from = Entries(receipt);
         let color = |text: &str| numbers(text, ' ').map(|linear: [f64; 3]| ColorDesc::from(linear));

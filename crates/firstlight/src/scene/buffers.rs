@@ -6,7 +6,7 @@ use crate::context::CompileContext;
 use crate::describe::node::quoted;
 use crate::ids::{LightGroupId, LightId, SurfaceId};
 use crate::image::cryptomatte::Named;
-use crate::image::{Buffer, BufferDesc, LightChoice};
+use crate::image::{Buffer, BufferDesc, LightChoice, LightPart, Plane};
 use crate::light::{Light, LightDesc};
 
 /// The names of what has buffers of its own.
@@ -60,7 +60,7 @@ impl SceneDesc {
             groups: groups.iter().map(|(name, _)| Some(name.as_str())).collect(),
             objects: Vec::new(),
         };
-        if self.render.buffers.iter().any(|desc| matches!(desc, BufferDesc::Coverage(_))) {
+        if self.render.buffers.iter().any(|desc| matches!(desc, BufferDesc::Coverage(_) | BufferDesc::Relight)) {
             // Without a geometry there is a fault already
             let Some(geometry) = geometry else { return Vec::new() };
             names.objects = geometry.surface_names().chain(names.lights.iter().copied()).collect();
@@ -70,7 +70,11 @@ impl SceneDesc {
             Chosen { kinds: ["group of lights", "groups of lights"], prefix: "group", names: &names.groups };
         let of_objects = Chosen { kinds: ["object", "objects"], prefix: "coverage", names: &names.objects };
         let mut all = Vec::new();
-        for (i, desc) in self.render.buffers.iter().enumerate() {
+        // What else is asked for may be among what a picture is lit again from
+        let is_relight = |desc: &BufferDesc| *desc == BufferDesc::Relight;
+        let (last, first): (Vec<_>, Vec<_>) =
+            self.render.buffers.iter().enumerate().partition(|(_, desc)| is_relight(desc));
+        for (i, desc) in first.into_iter().chain(last) {
             let path = format!("render.buffers[{i}]");
             let found: Vec<Buffer> = match desc {
                 BufferDesc::Plane(plane) => {
@@ -98,6 +102,15 @@ impl SceneDesc {
                     let groups = of_groups.choose(cx, &path, group);
                     groups.into_iter().map(|group| Buffer::Group(LightGroupId(group as u32), *part)).collect()
                 }
+                BufferDesc::Relight => {
+                    if lights.len() > MAX_APART {
+                        let message = format!("all {} lights, each apart, are more than {MAX_APART}", lights.len());
+                        cx.error(&path, message, Some("ask for groups of lights"));
+                        continue;
+                    }
+                    let shapes = geometry.map_or(0, |geometry| geometry.surfaces.len());
+                    of_relight(lights, shapes)
+                }
                 BufferDesc::Coverage(object) => {
                     let mut objects = of_objects.choose(cx, &path, object);
                     if *object == LightChoice::All {
@@ -112,6 +125,9 @@ impl SceneDesc {
                 }
             };
             for buffer in found {
+                if all.contains(&buffer) && is_relight(desc) {
+                    continue;
+                }
                 if all.contains(&buffer) {
                     let message = format!("{} is given twice", quoted(&names.of(buffer)));
                     cx.error(&path, message, Some("name each once; the picture is \"color\""));
@@ -126,6 +142,18 @@ impl SceneDesc {
         }
         all
     }
+}
+
+/// All that a picture is lit again from; so many shapes are objects before the lights.
+fn of_relight(lights: &[Light], shapes: usize) -> Vec<Buffer> {
+    let planes = [Plane::Alpha, Plane::Background, Plane::Emission, Plane::Ambient].map(Buffer::from);
+    let sent = (0..lights.len() as u32).flat_map(|light| {
+        [LightPart::UnscaledDiffuse, LightPart::UnscaledSpecular].map(|part| Buffer::Light(LightId(light), Some(part)))
+    });
+    let is_visible = |light: &Light| light.area().is_some_and(|area| area.visible);
+    let seen = lights.iter().enumerate().filter(|(_, light)| is_visible(light));
+    let seen = seen.map(|(light, _)| Buffer::Coverage(SurfaceId((shapes + light) as u32)));
+    planes.into_iter().chain(sent).chain(seen).collect()
 }
 
 /// Whether a camera can see an object.

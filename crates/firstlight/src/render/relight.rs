@@ -1,0 +1,249 @@
+//! A picture lit again, from what a file keeps of each light: other strengths and colours, without a render.
+//!
+//! A pixel is the sum of its terms, and the terms of a light are its scale times what the file holds. So the sum is the
+//! one that a render makes, in its order; where every light is sampled at every camera ray, with its bits.
+
+use serde_json::{Value, json};
+
+use crate::color::{Display, Rgb};
+use crate::context::MAX_STRENGTH;
+use crate::describe::{ColorDesc, SamplesDesc};
+use crate::ids::{LightId, SurfaceId};
+use crate::image::{Buffer, Image, LightPart, Plane, PlaneVec, Receipt, StoredPlanes};
+use crate::light::{Light, MAX_LIGHT, Scale};
+use crate::scene::Scene;
+
+use super::RenderSettings;
+
+/// How a light is changed.
+#[derive(Clone, Debug, PartialEq)]
+pub enum LightChange {
+    /// Its strength is multiplied by this.
+    Times(f64),
+    /// Its strength becomes this.
+    Strength(f64),
+    /// Its colour becomes this.
+    Color(ColorDesc),
+}
+
+/// A picture that was lit again.
+#[derive(Clone, Debug)]
+pub struct Relit {
+    /// The picture.
+    pub image: Image,
+    /// How the scene is displayed.
+    pub display: Display,
+    /// That of the file, with the changes.
+    pub receipt: Receipt,
+}
+
+/// Why a picture cannot be lit again, with what to do.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{0}")]
+pub struct RelightError(String);
+
+/// What a receipt says of the lights, so that the picture can be lit again.
+const LIGHTS: &str = "lights";
+/// And of how the scene is displayed.
+const SCENE_DISPLAY: &str = "scene_display";
+/// What was changed of the lights: such a picture is of no scene.
+pub(super) const RELIT: &str = "relit";
+
+/// A light of a file.
+struct FiledLight {
+    name: Option<String>,
+    scale: Scale,
+    /// The buffers of what it sends, and of where it is seen, if that may be.
+    sends: [String; 2],
+    seen: Option<String>,
+}
+
+impl Scene {
+    /// What a receipt says of the lights, by its keys.
+    pub(super) fn light_entries(&self, settings: &RenderSettings) -> [(&'static str, String); 2] {
+        let samples_all = settings.renderer().samples_all();
+        let names = self.light_names();
+        let entry = |(number, light): (u32, &Light)| {
+            let is_whole = light.said_samples() == SamplesDesc::Exact && !samples_all;
+            let Scale { color, strength, factor } = light.said[usize::from(is_whole)];
+            let part = |part| self.buffer_name(Buffer::Light(LightId(number), Some(part)));
+            let sends = [LightPart::UnscaledDiffuse, LightPart::UnscaledSpecular].map(part);
+            let surface = SurfaceId(self.geometry.surfaces.len() as u32 + number);
+            let is_visible = light.area().is_some_and(|area| area.visible);
+            let seen = is_visible.then(|| self.buffer_name(Buffer::Coverage(surface)));
+            json!({
+                "name": names[number as usize], "color": color, "strength": strength, "factor": factor,
+                "sends": sends, "seen": seen,
+            })
+        };
+        let all: Vec<Value> = (0..).zip(&self.lights).map(entry).collect();
+        [(LIGHTS, Value::from(all).to_string()), (SCENE_DISPLAY, self.display.to_string())]
+    }
+}
+
+impl FiledLight {
+    fn read(value: &Value) -> Option<FiledLight> {
+        let number = |key: &str| value.get(key)?.as_f64();
+        let color: Vec<f64> = value.get("color")?.as_array()?.iter().map(Value::as_f64).collect::<Option<_>>()?;
+        let scale = Scale { color: color.try_into().ok()?, strength: number("strength")?, factor: number("factor")? };
+        let text = |value: &Value| value.as_str().map(str::to_owned);
+        let sends: Vec<String> = value.get("sends")?.as_array()?.iter().map(text).collect::<Option<_>>()?;
+        let (name, seen) = (text(value.get("name")?), text(value.get("seen")?));
+        Some(FiledLight { name, scale, sends: sends.try_into().ok()?, seen })
+    }
+}
+
+/// What the file holds, by the names of its buffers.
+struct Planes<'a>(&'a StoredPlanes);
+
+impl<'a> Planes<'a> {
+    fn floats(&self, name: &str, channels: usize) -> Option<&'a [f32]> {
+        let plane = self.0.plane(name).filter(|plane| plane.channels.len() == channels)?;
+        match &plane.numbers {
+            PlaneVec::Floats(numbers) => Some(numbers),
+            PlaneVec::Wholes(_) => None,
+        }
+    }
+
+    fn required(&self, name: &str, channels: usize) -> Result<&'a [f32], RelightError> {
+        self.floats(name, channels).ok_or_else(|| {
+            RelightError(format!("it has no buffer {name}; render it with --buffers color,relight, to .exr or .npz"))
+        })
+    }
+}
+
+/// Lights a picture again. `file` is one that was rendered with the buffers of
+/// [`BufferDesc::Relight`](crate::BufferDesc::Relight); each change names a light, or `#3` for the third in scene order.
+///
+/// The result is what a render of the changed scene gives: with its bits where all lights are sampled and each camera
+/// ray is lit by itself, and within the tolerance otherwise.
+///
+/// # Errors
+/// The file lacks something; there is no such light; a strength or a colour that cannot be; a light that sent nothing
+/// when the file was rendered.
+pub fn relight(file: &StoredPlanes, changes: &[(String, LightChange)]) -> Result<Relit, RelightError> {
+    let planes = Planes(file);
+    let lacking = |what: &str| {
+        RelightError(format!(
+            "its receipt does not say {what}; render it with --buffers color,relight, to .exr or .npz"
+        ))
+    };
+    let said = file.receipt.get(LIGHTS).ok_or_else(|| lacking("what its lights are"))?;
+    let lights: Option<Vec<FiledLight>> =
+        serde_json::from_str::<Vec<Value>>(said).ok().and_then(|all| all.iter().map(FiledLight::read).collect());
+    let before = lights.ok_or_else(|| lacking("what its lights are in words that are known"))?;
+    let scales = changed(&before, changes)?;
+    // Sum the terms in their order
+    let [background, emission, ambient] = [Plane::Background, Plane::Emission, Plane::Ambient].map(Plane::name);
+    let (background, ambient) = (planes.required(background, 3)?, planes.required(ambient, 3)?);
+    let emission = emitted(&planes, &before, &scales, planes.required(emission, 3)?)?;
+    let mut sums: Vec<f32> = background.iter().zip(&emission).zip(ambient).map(|((b, e), a)| b + e + a).collect();
+    for (light, scale) in before.iter().zip(&scales) {
+        let Rgb { r, g, b } = scale.rgb();
+        for part in &light.sends {
+            let values = planes.required(part, 3)?;
+            for (sum, value) in sums.as_chunks_mut::<3>().0.iter_mut().zip(values.as_chunks::<3>().0) {
+                *sum = [sum[0] + r * value[0], sum[1] + g * value[1], sum[2] + b * value[2]];
+            }
+        }
+    }
+    let alpha = planes.required(Plane::Alpha.name(), 1)?;
+    let pixels = sums.as_chunks::<3>().0.iter().zip(alpha).map(|(&[r, g, b], a)| [r, g, b, *a]).collect();
+    let display = file.receipt.get(SCENE_DISPLAY).and_then(|text| text.parse().ok()).unwrap_or_default();
+    let own = |key: &str| !(key == LIGHTS || key == SCENE_DISPLAY || key == "buffers" || key.starts_with("buffer."));
+    let mut receipt = Receipt { entries: file.receipt.entries.iter().filter(|(key, _)| own(key)).cloned().collect() };
+    receipt.entries.push((RELIT.into(), words(changes)));
+    let image = Image { film: file.film, window: file.window, pixels };
+    Ok(Relit { image, display, receipt })
+}
+
+/// What was changed, as a JSON dictionary of lists.
+fn words(changes: &[(String, LightChange)]) -> String {
+    let word = |(name, change): &(String, LightChange)| match change {
+        LightChange::Times(factor) => json!({ "light": name, "times": factor }),
+        LightChange::Strength(strength) => json!({ "light": name, "strength": strength }),
+        LightChange::Color(color) => json!({ "light": name, "color": color.linear }),
+    };
+    Value::from(changes.iter().map(word).collect::<Vec<_>>()).to_string()
+}
+
+/// The scales of the lights after the changes.
+fn changed(lights: &[FiledLight], changes: &[(String, LightChange)]) -> Result<Vec<Scale>, RelightError> {
+    let mut scales: Vec<Scale> = lights.iter().map(|light| light.scale).collect();
+    for (name, change) in changes {
+        let at = find(lights, name)?;
+        let scale = &mut scales[at];
+        match change {
+            LightChange::Times(factor) => scale.strength *= factor,
+            LightChange::Strength(strength) => scale.strength = *strength,
+            LightChange::Color(color) => scale.color = color.linear,
+        }
+        if !(0.0..=MAX_STRENGTH).contains(&scale.strength) {
+            let message = format!("light {name}: its strength would be {}, which is outside [0, 1e15]", scale.strength);
+            return Err(RelightError(message));
+        }
+        if !scale.exact().iter().all(|c| *c <= MAX_LIGHT) {
+            return Err(RelightError(format!("light {name}: its colour times its strength would pass 1e30")));
+        }
+        let sent_nothing = |(before, after): (f64, f64)| before == 0.0 && after > 0.0;
+        if lights[at].scale.exact().into_iter().zip(scale.exact()).any(sent_nothing) {
+            let message = format!(
+                "light {name} sent nothing, in one channel or in all, when the file was rendered; render it with a \
+                 strength and a colour that are not 0"
+            );
+            return Err(RelightError(message));
+        }
+    }
+    Ok(scales)
+}
+
+/// The light that is called so, or `#3` for the third.
+fn find(lights: &[FiledLight], name: &str) -> Result<usize, RelightError> {
+    let called: Vec<usize> = (0..lights.len()).filter(|k| lights[*k].name.as_deref() == Some(name)).collect();
+    let number = name.strip_prefix('#').and_then(|number| number.parse::<usize>().ok());
+    match (called.as_slice(), number) {
+        ([at], _) => Ok(*at),
+        ([], Some(number)) if (1..=lights.len()).contains(&number) => Ok(number - 1),
+        ([], Some(_)) => Err(RelightError(format!("there is no light {name}: the file has {}", lights.len()))),
+        ([], None) => {
+            let known: Vec<&str> = lights.iter().filter_map(|light| light.name.as_deref()).collect();
+            let hint = match crate::describe::nearest(name, &known) {
+                Some(near) => format!("did you mean {near}?"),
+                None if known.is_empty() => format!("none has a name; they are #1 to #{}", lights.len()),
+                None => format!("the file has {}", known.join(", ")),
+            };
+            Err(RelightError(format!("no light is called {name}; {hint}")))
+        }
+        (several, _) => {
+            let numbers: Vec<String> = several.iter().map(|at| format!("#{}", at + 1)).collect();
+            Err(RelightError(format!("{} lights are called {name}; they are {}", several.len(), numbers.join(", "))))
+        }
+    }
+}
+
+/// What the camera sees of the lights themselves: told anew where one that is changed may be seen.
+fn emitted(
+    planes: &Planes,
+    before: &[FiledLight],
+    after: &[Scale],
+    emission: &[f32],
+) -> Result<Vec<f32>, RelightError> {
+    let is_changed = before.iter().zip(after).any(|(light, scale)| light.seen.is_some() && light.scale != *scale);
+    if !is_changed || emission.iter().all(|value| *value == 0.0) {
+        return Ok(emission.to_vec());
+    }
+    let number = |key: &str| planes.0.receipt.get(key)?.parse::<u32>().ok();
+    let rays = number("antialiasing").map_or(1.0, |n| (n * n) as f32);
+    let mut sums = vec![0.0f32; emission.len()];
+    for (light, scale) in before.iter().zip(after) {
+        let Some(seen) = &light.seen else { continue };
+        let shares = planes.required(seen, 1)?;
+        let radiance = scale.radiance();
+        for (sum, share) in sums.as_chunks_mut::<3>().0.iter_mut().zip(shares) {
+            for _ in 0..(share * rays).round() as u32 {
+                *sum = [sum[0] + radiance.r, sum[1] + radiance.g, sum[2] + radiance.b];
+            }
+        }
+    }
+    Ok(sums.into_iter().map(|sum| sum / rays).collect())
+}
