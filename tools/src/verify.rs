@@ -6,8 +6,17 @@ use std::process::Command;
 use crate::{Outcome, cargo, root, run as run_to_end};
 
 /// What the tests of `tests/large` take beside what the package itself does. OpenCV 5 reads no EXR files.
-const LARGE: &[&str] =
-    &["pytest", "OpenEXR", "ray", "trimesh", "embreex", "pillow", "OpenImageIO", "opencv-python-headless<5"];
+const LARGE: &[&str] = &[
+    "pytest",
+    "OpenEXR",
+    "ray",
+    "trimesh",
+    "embreex",
+    "pillow",
+    "OpenImageIO",
+    "opencv-python-headless<5",
+    "cryptomatte-api",
+];
 
 /// The rays that each mesh is asked, by its tree and triangle by triangle.
 const RAYS: &str = "1000000";
