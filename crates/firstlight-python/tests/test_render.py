@@ -200,8 +200,10 @@ def test_motion_leads_to_a_time_or_a_camera():
     assert steps(motion_to="right", time=0.5) == (pytest.approx(-5), 1, '"right"')
     other = {"position": [-0.2, 0, 10], "look_at": [-0.2, 0, 0], "projection": "orthographic", "height": 4}
     assert steps(motion_to=other)[:2] == (pytest.approx(2), 1)
-    assert steps(camera=fl.Camera(**other), motion_to="right")[0] == pytest.approx(-7)
-    assert steps(camera="right", motion_to=fl.Camera(**other))[0] == pytest.approx(7)
+    assert steps(camera=other, motion_to="right")[0] == pytest.approx(-7)
+    assert steps(camera="right", motion_to=other)[0] == pytest.approx(7)
+    frame = scene.render(buffers=buffers, camera="right", motion_to=fl.Camera(position=[0, 0, 10]))
+    assert "intrinsics" not in frame.receipt and "motion_intrinsics" in frame.receipt
     # There and back: the other picture's own motion
     there = scene.render(buffers=["motion"], time=0.7, motion_to=0.0)["motion"]
     assert (scene.render(buffers=["motion-backward"], motion_to=0.7)["motion-backward"] == there).all()
