@@ -1,5 +1,5 @@
-//! Coverage, Cryptomatte and filtered buffers: against rays that are cast one by one, and against buffers of centre rays
-//! where a pixel has no other.
+//! Coverage, Cryptomatte and filtered buffers: against rays that are cast one by one, and against buffers of centre
+//! rays where a pixel has no other.
 
 use std::collections::BTreeMap;
 use std::num::NonZeroUsize;

@@ -58,8 +58,8 @@ pub enum Buffer {
 
 /// A buffer as a scene may ask for it: the name of a [`Plane`]; or `light:NAME`, what one light sends, with `light:#3`
 /// for the third in scene order and `light:*` for all of them, each apart. `light:NAME:diffuse` is a part of it, see
-/// [`LightPart`]. `group:NAME` is what the lights of a group send together. `coverage:NAME` is the share of the pixel that
-/// an object covers: a shape, one that an instance places, or a light.
+/// [`LightPart`]. `group:NAME` is what the lights of a group send together. `coverage:NAME` is the share of the pixel
+/// that an object covers: a shape, one that an instance places, or a light.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum BufferDesc {
     /// One that every scene has.

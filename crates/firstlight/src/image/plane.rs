@@ -10,8 +10,8 @@ words! {
     ///
     /// `color`, `alpha` and the terms that `color` is the sum of, `background` to `rest`, are means over the pixel, and
     /// so are `shadow`, coverage, Cryptomatte and what ends in `:filtered`. All others are of its centre ray, and never
-    /// averaged: what it meets first, a shape or a visible light, as the camera sees it. Where it meets nothing, `depth`
-    /// and `distance` are infinite and all others 0; so are the means where no ray meets anything.
+    /// averaged: what it meets first, a shape or a visible light, as the camera sees it. Where it meets nothing,
+    /// `depth` and `distance` are infinite and all others 0; so are the means where no ray meets anything.
     pub enum Plane {
         /// The picture, with its alpha.
         Color = "color",

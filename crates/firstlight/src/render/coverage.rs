@@ -1,7 +1,7 @@
 //! What all camera rays of a pixel meet, counted: coverage, Cryptomatte, and means of what a centre ray says.
 //!
-//! Apart from all that is lit, as centre rays are ([`centers`](super::centers)). All n x n rays are traced, whatever the
-//! antialiasing mode: they are those of the picture, and meet what those meet.
+//! Apart from all that is lit, as centre rays are ([`centers`](super::centers)). All n x n rays are traced, whatever
+//! the antialiasing mode: they are those of the picture, and meet what those meet.
 
 use std::ops::ControlFlow;
 
@@ -19,7 +19,7 @@ use crate::scene::{Hit, Scene};
 const QUESTION_EVERY: u32 = 1 << 20;
 
 /// What is asked of all camera rays, each with the number of its plane.
-pub(super) struct Asked {
+pub(super) struct CoveragePlanes {
     /// By their ids.
     objects: Vec<(SurfaceId, usize)>,
     background: Option<usize>,
@@ -38,7 +38,7 @@ struct Matte {
 /// One thread's way through all camera rays of tiles.
 pub(super) struct Coverage<'a> {
     scene: &'a Scene,
-    asked: &'a Asked,
+    asked: &'a CoveragePlanes,
     hits: PixelHits,
     /// The rays of a pixel that meet something: which of the film's rays it is, and what it meets.
     met: Vec<([u32; 2], Hit)>,
@@ -55,10 +55,10 @@ struct Shares {
     counts: Vec<(u32, u32)>,
 }
 
-impl Asked {
+impl CoveragePlanes {
     /// What is asked by `planes`; `None` if nothing is.
-    pub fn new(scene: &Scene, planes: &[Buffer]) -> Option<Asked> {
-        let mut asked = Asked { objects: Vec::new(), background: None, mattes: Vec::new(), means: Vec::new() };
+    pub fn new(scene: &Scene, planes: &[Buffer]) -> Option<CoveragePlanes> {
+        let mut asked = CoveragePlanes { objects: Vec::new(), background: None, mattes: Vec::new(), means: Vec::new() };
         for (number, buffer) in planes.iter().enumerate() {
             match *buffer {
                 Buffer::Coverage(object) => asked.objects.push((object, number)),
@@ -117,7 +117,7 @@ impl Shares {
 }
 
 impl<'a> Coverage<'a> {
-    pub fn new(scene: &'a Scene, asked: &'a Asked, level: Level) -> Self {
+    pub fn new(scene: &'a Scene, asked: &'a CoveragePlanes, level: Level) -> Self {
         let hits = PixelHits::new(level, scene.antialiasing);
         let sums = vec![[0.0; 3]; asked.means.len()];
         Coverage { scene, asked, hits, met: Vec::new(), shares: Shares::default(), sums }

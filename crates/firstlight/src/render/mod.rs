@@ -72,7 +72,7 @@ use crate::visibility::Target;
 use arrival::Arrivals;
 use cell::{CELL, Cells};
 pub(crate) use counts::Counts;
-use coverage::{Asked, Coverage};
+use coverage::{Coverage, CoveragePlanes};
 use film::FilmTile;
 use hits::PixelHits;
 use lanes::Lanes;
@@ -311,7 +311,7 @@ fn expose(
     let nothing = Counts::default().stats(simd, threads);
     let result = Mutex::new((Film::new(scene, window, planes), nothing));
     let of_centers = planes.iter().any(|buffer| buffer.plane().is_of_center());
-    let of_all_rays = Asked::new(scene, planes);
+    let of_all_rays = CoveragePlanes::new(scene, planes);
     let is_lit = planes.iter().map(|buffer| buffer.plane()).any(|of| !of.is_of_center() && !of.is_of_all_rays());
     let lights = Lights::new(scene);
     // Where every light is sampled at every ray, the bits are those of the plain renderer

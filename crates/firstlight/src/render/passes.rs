@@ -1,5 +1,5 @@
-//! What a film is rendered for: the picture with what is told of its pixels, and the same scene without shadows. What is
-//! made of both, pixel by pixel, when they are there.
+//! What a film is rendered for: the picture with what is told of its pixels, and the same scene without shadows. What
+//! is made of both, pixel by pixel, when they are there.
 
 use super::film::Film;
 use crate::ids::{LightGroupId, LightId};

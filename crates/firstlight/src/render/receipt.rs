@@ -112,12 +112,12 @@ impl Scene {
     /// - `lights` and `scene_display`, where light is asked for without its scale: what the lights are, and how the
     ///   scene is displayed, for [`relight`](crate::relight);
     /// - `light_groups`: a JSON list of their names and of the numbers of their lights, from 1;
-    /// - `motion_to`, where motion is asked for: whereto it leads, a number of seconds, or the name of a camera in quotes;
-    ///   and the three matrices of the camera there, with `motion_` before them;
+    /// - `motion_to`, where motion is asked for: whereto it leads, a number of seconds, or the name of a camera in
+    ///   quotes; and the three matrices of the camera there, with `motion_` before them;
     /// - `object_names`, `instance_names`, `material_names`: JSON lists, the name of id 1 first, `null` for what has
     ///   none;
-    /// - `object_manifest`, `instance_manifest`, `material_manifest`: JSON dictionaries of the same names, `#3` for that
-    ///   of id 3 if it has none, to the ids that Cryptomatte has for them, 8 hexadecimal digits.
+    /// - `object_manifest`, `instance_manifest`, `material_manifest`: JSON dictionaries of the same names, `#3` for
+    ///   that of id 3 if it has none, to the ids that Cryptomatte has for them, 8 hexadecimal digits.
     pub fn buffers_receipt(&self, settings: &RenderSettings, buffers: &[Buffer]) -> Receipt {
         let mut receipt = self.receipt(settings);
         if matches!(buffers, [Buffer::Plane(Plane::Color)]) {
