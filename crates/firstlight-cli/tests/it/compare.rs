@@ -61,6 +61,8 @@ fn every_file_is_rendered_again_from_its_receipt() {
         ("scene.toml", "--transparent --exposure -1.5 --bits 16 --reference --heat h.png".into(), &["a.png", "h.png"]),
         ("moving.toml", "--time 2.5 --aa-mode full --shadow-terminator hard --width 18".into(), &["a.exr"]),
         ("moving.toml", "--visibility traced --buffers rays,uv --tolerance 4".into(), &["a.npz"]),
+        ("moving.toml", "--buffers motion,shadow --motion-to next".into(), &["a.npz"]),
+        ("moving.toml", "--buffers motion-backward --motion-to side --time 1".into(), &["a.exr"]),
         ("bare.toml", "--view 30,60 --margin 0.2 --width 20".into(), &["a.png"]),
         ("corner.stl", "--smooth 40 --up z --view iso --size 20".into(), &["a.png"]),
     ] {

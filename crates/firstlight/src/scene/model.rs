@@ -19,6 +19,7 @@ words! {
     }
 }
 
+#[expect(clippy::derivable_impls, reason = "the macro has no place for a default")]
 impl Default for UpAxis {
     fn default() -> Self {
         UpAxis::Y
