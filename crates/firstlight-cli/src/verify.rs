@@ -294,7 +294,10 @@ impl<'a> Report<'a> {
     }
 
     fn json(&self) -> Value {
-        let steps = |Steps { name, pixels, beyond, worst, tolerance }: &Steps| json!({ "name": name, "pixels": pixels, "beyond": beyond, "worst": worst, "tolerance": tolerance });
+        let steps = |steps: &Steps| {
+            let Steps { name, pixels, beyond, worst, tolerance } = steps;
+            json!({ "name": name, "pixels": pixels, "beyond": beyond, "worst": worst, "tolerance": tolerance })
+        };
         json!({
             "file": self.file,
             "scene": self.scene,

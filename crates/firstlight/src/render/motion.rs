@@ -7,13 +7,8 @@ use crate::camera::Camera;
 use crate::math::{DVec3, Ray, UNIT_ROUNDOFF};
 use crate::scene::{Hit, Scene};
 
-/// Pixels to the right and down, and whether it is seen there.
+/// Pixels to the right and down, and whether it is seen there: 1, or 0 if not; -1 if it has no place there.
 pub(super) type Flow = [f32; 3];
-
-const SEEN: f32 = 1.0;
-const HIDDEN: f32 = 0.0;
-/// What has no place in the other picture.
-const NOWHERE: Flow = [0.0, 0.0, -1.0];
 
 /// Rounding in a place that was found on one way and is looked for on another, in units of the last place of 32 bits:
 /// that of the point, of the ray to it, and of the surface there.
@@ -47,7 +42,7 @@ pub(super) fn of_thing(center: &Center, there: &Scene, level: Level) -> Flow {
     };
     let (Some((before, _)), Some((after, depth))) = (here.camera.local_project(p), there.camera.local_project(moved))
     else {
-        return NOWHERE;
+        return nowhere();
     };
     let error = center.error() + roundings(p.abs().max(moved.abs()).max_element());
     let is_front = center.is_front();
@@ -60,7 +55,7 @@ pub(super) fn of_nothing(here: &Scene, there: &Scene, ray: &Ray, level: Level) -
     let (o, d) = (ray.o.as_dvec3(), ray.d.as_dvec3());
     let from_there = o + (here.origin - there.origin);
     let ends = (here.camera.local_project_end(o, d), there.camera.local_project_end(from_there, d));
-    let (Some(before), Some(after)) = ends else { return NOWHERE };
+    let (Some(before), Some(after)) = ends else { return nowhere() };
     flow(before, after, || {
         is_inside(there, after) && there.intersect_at(level, &ray_at(&there.camera, after)).is_none()
     })
@@ -69,9 +64,14 @@ pub(super) fn of_nothing(here: &Scene, there: &Scene, ray: &Ray, level: Level) -
 fn flow(before: [f64; 2], after: [f64; 2], is_seen: impl FnOnce() -> bool) -> Flow {
     let [x, y] = [0, 1].map(|axis| (after[axis] - before[axis]) as f32);
     if !(x.is_finite() && y.is_finite()) {
-        return NOWHERE;
+        return nowhere();
     }
-    [x, y, if is_seen() { SEEN } else { HIDDEN }]
+    [x, y, f32::from(u8::from(is_seen()))]
+}
+
+/// That of what has no place in the other picture.
+fn nowhere() -> Flow {
+    [0.0, 0.0, -1.0]
 }
 
 fn is_inside(scene: &Scene, [x, y]: [f64; 2]) -> bool {

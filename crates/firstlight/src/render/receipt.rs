@@ -152,7 +152,10 @@ impl Scene {
             self.light_entries(settings).into_iter().for_each(|(key, value)| add(key, value));
         }
         if buffers.iter().any(|buffer| matches!(buffer, Buffer::Group(..))) {
-            let group = |(name, lights): &(String, Vec<u32>)| serde_json::json!({ "name": name, "lights": lights.iter().map(|light| light + 1).collect::<Vec<_>>() });
+            let group = |(name, lights): &(String, Vec<u32>)| {
+                let numbers: Vec<u32> = lights.iter().map(|light| light + 1).collect();
+                serde_json::json!({ "name": name, "lights": numbers })
+            };
             let groups: Vec<_> = self.light_groups.iter().map(group).collect();
             add("light_groups", serde_json::Value::from(groups).to_string());
         }

@@ -94,9 +94,9 @@ impl FiledLight {
 }
 
 /// What the file holds, by the names of its buffers.
-struct Planes<'a>(&'a StoredPlanes);
+struct FiledTerms<'a>(&'a StoredPlanes);
 
-impl<'a> Planes<'a> {
+impl<'a> FiledTerms<'a> {
     fn floats(&self, name: &str, channels: usize) -> Option<&'a [f32]> {
         let plane = self.0.plane(name).filter(|plane| plane.channels.len() == channels)?;
         match &plane.numbers {
@@ -122,7 +122,7 @@ impl<'a> Planes<'a> {
 /// The file lacks something; there is no such light; a strength or a colour that cannot be; a light that sent nothing
 /// when the file was rendered.
 pub fn relight(file: &StoredPlanes, changes: &[(String, LightChange)]) -> Result<Relit, RelightError> {
-    let planes = Planes(file);
+    let planes = FiledTerms(file);
     let lacking = |what: &str| {
         RelightError(format!(
             "its receipt does not say {what}; render it with --buffers color,relight, to .exr or .npz"
@@ -223,7 +223,7 @@ fn find(lights: &[FiledLight], name: &str) -> Result<usize, RelightError> {
 
 /// What the camera sees of the lights themselves: told anew where one that is changed may be seen.
 fn emitted(
-    planes: &Planes,
+    planes: &FiledTerms,
     before: &[FiledLight],
     after: &[Scale],
     emission: &[f32],
