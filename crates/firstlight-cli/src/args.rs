@@ -86,6 +86,8 @@ Examples:
       what is seen, how far away and which object, as arrays for numpy
   firstlight render room.toml --frames 0..46 --buffers color,motion --motion-to next -o room.exr
       frames with the optical flow from each to the next
+  firstlight render room.toml -o room.png -o depth=depth.png -o object-id=ids.png
+      the same as pictures: depth in millimetres, ids as they are, both of 16 bits
   firstlight render config23 -o - | magick - config23.jpg
       to another program
   generate-scene | firstlight render - -o scene.png
@@ -204,11 +206,13 @@ pub struct RenderArgs {
     #[command(flatten)]
     pub reading: ReadingArgs,
 
-    /// A picture to write: its ending, .png, .exr, .npz or .hdr, says the format; - is standard output. {stem} in it is
-    /// the scene's file name without its ending, {name} the whole of it; with several scenes one of them is needed, in
-    /// --heat and --stats too. May be given several times [default: the scene's name with .png, or with .render.png
+    /// A picture to write: its ending, .png, .exr, .npz, .npy or .hdr, says the format; - is standard output. With
+    /// NAME= before it, one buffer by itself, as in depth=depth.png (`firstlight buffers` lists them all), rendered
+    /// whatever --buffers says; a file whose own name has a = is written as ./a=b.png. {stem} in it is the scene's file
+    /// name without its ending, {name} the whole of it; with several scenes one of them is needed, in --heat and
+    /// --stats too. May be given several times [default: the scene's name with .png, or with .render.png
     /// where that is a file not written by firstlight; a course file's output_file; in the working folder]
-    #[arg(short, long = "output", value_name = "FILE", value_hint = ValueHint::FilePath, help_heading = "Output")]
+    #[arg(short, long = "output", value_name = "[NAME=]FILE", value_hint = ValueHint::FilePath, help_heading = "Output")]
     pub output: Vec<PathBuf>,
     /// What .exr and .npz files hold of each pixel, with commas between: color,depth,normal,object-id; `firstlight
     /// buffers` lists them all. Without color, and no other picture, no light is asked [default: the scene's, which is
@@ -221,12 +225,17 @@ pub struct RenderArgs {
     #[arg(long, value_name = "TIME|CAMERA", value_parser = motion_to, help_heading = "Output")]
     #[arg(allow_hyphen_values = true)]
     pub motion_to: Option<MotionTo>,
-    /// Bits of each channel of PNG files: 8 or 16 [default: 8]
+    /// Bits of each channel of PNG files: 8 or 16; depth, distance and ids always have 16 [default: 8]
     #[arg(long, value_name = "BITS", help_heading = "Output")]
     pub bits: Option<Bits>,
     /// The format of -o - and of names without an ending, such as /dev/null [default: png for -]
     #[arg(long, value_name = "FORMAT", help_heading = "Output")]
     pub format: Option<NamedFormat>,
+    /// Units per metre of depth and distance in PNG files, 0.001 to 1000000: 1000 are millimetres, as in ScanNet and
+    /// BOP; the data sets of TUM have 5000. 0 is where nothing is, and where something is farther than 65535 units:
+    /// that is a warning, and an error under --strict [default: 1000]
+    #[arg(long, value_name = "N", value_parser = depth_scale, help_heading = "Output")]
+    pub depth_scale: Option<f64>,
     /// Stops of exposure of 8- and 16-bit pictures, -64 to 64: they are multiplied by 2^EV; other files are the same
     /// with it [default: the scene's]
     #[arg(long, value_name = "EV", allow_negative_numbers = true, value_parser = exposure, help_heading = "Output")]
@@ -337,7 +346,7 @@ pub struct RenderArgs {
     /// there [default: renders]
     #[arg(long, value_name = "FILE.toml", require_equals = true, help_heading = "Output")]
     #[arg(value_hint = ValueHint::FilePath)]
-    #[arg(conflicts_with_all = ["output", "bits", "format", "exposure", "crop"])]
+    #[arg(conflicts_with_all = ["output", "bits", "format", "depth_scale", "exposure", "crop"])]
     #[arg(conflicts_with_all = ["time", "frames", "shard", "aa_mode", "reference", "visibility"])]
     #[arg(conflicts_with_all = ["threads", "tile_size", "simd", "stats", "heat"])]
     pub print_scene: Option<Option<PathBuf>>,
@@ -489,6 +498,8 @@ pub enum NamedFormat {
     Exr,
     /// The film itself, as arrays for numpy
     Npz,
+    /// One buffer, as an array for numpy
+    Npy,
     /// The film itself, in Radiance's shared exponents
     Hdr,
 }
@@ -541,6 +552,14 @@ fn exposure(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(ev) if (-64.0..=64.0).contains(&ev) => Ok(ev),
         _ => Err("a number of stops from -64 to 64 is needed".into()),
+    }
+}
+
+/// Reads a scale of depth in units per metre.
+fn depth_scale(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(scale) if (1e-3..=1e6).contains(&scale) => Ok(scale),
+        _ => Err("a number of units per metre from 0.001 to 1000000 is needed; 1000 are millimetres".into()),
     }
 }
 

@@ -5,7 +5,7 @@ use std::fs::{self, File};
 use std::io::{self, BufReader, IsTerminal};
 use std::path::{Path, PathBuf};
 
-use firstlight::{Format, ImageError, PendingFile, Receipt, StagedFile, Written, write_open};
+use firstlight::{BufferDesc, Format, ImageError, PendingFile, Receipt, StagedFile, Written, write_open};
 
 use crate::args::{Bits, NamedFormat};
 use crate::report::{Failure, say, shown};
@@ -40,18 +40,35 @@ pub struct Output {
 }
 
 /// What a picture shows.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Content {
     /// The scene.
     Scene,
+    /// One buffer by itself, in any format that can hold it.
+    Buffer(BufferDesc),
     /// The work that each pixel took.
     Heat,
+}
+
+impl Content {
+    /// The buffer that it is by itself.
+    pub fn buffer(&self) -> Option<&BufferDesc> {
+        match self {
+            Content::Buffer(desc) => Some(desc),
+            Content::Scene | Content::Heat => None,
+        }
+    }
 }
 
 impl Output {
     /// Whether it takes all buffers that are asked for, not the picture alone.
     pub fn takes_buffers(&self) -> bool {
         self.content == Content::Scene && matches!(self.format, Format::Exr | Format::Npz)
+    }
+
+    /// Whether it is a PNG file.
+    pub fn is_png(&self) -> bool {
+        matches!(self.format, Format::Png8 | Format::Png16)
     }
 }
 
@@ -320,6 +337,30 @@ fn aside(path: &Path, written: Written) -> String {
     }
 }
 
+/// What `-o` asks for: a file, or a buffer and its file.
+///
+/// # Errors
+/// What stands before the first `=` is no buffer's name. With a folder before it, all of it is a file's.
+fn content_of(path: &Path) -> Result<(Content, PathBuf), Failure> {
+    let Some((name, file)) = path.to_str().and_then(|text| text.split_once('=')) else {
+        return Ok((Content::Scene, path.to_owned()));
+    };
+    match BufferDesc::parse(name) {
+        Ok(_) if file.is_empty() => {
+            Err(Failure::Usage(format!("-o {name}=: a file is needed after it, as {name}=a.png")))
+        }
+        Ok(buffer) => Ok((Content::Buffer(buffer), file.into())),
+        Err(_) if name.contains(['/', std::path::MAIN_SEPARATOR]) => Ok((Content::Scene, path.to_owned())),
+        Err((_, hint)) => {
+            let hint = hint.map(|hint| format!("; {hint}")).unwrap_or_default();
+            Err(Failure::Usage(format!(
+                "-o {name}={file}: {name:?} is no buffer{hint} `firstlight buffers` lists them all; a file of that name \
+                 is ./{name}={file}"
+            )))
+        }
+    }
+}
+
 /// What the options say of outputs.
 ///
 /// # Errors
@@ -328,31 +369,34 @@ pub fn resolve(paths: &[PathBuf], bits: Option<Bits>, format: Option<NamedFormat
     let usage = |message: String| Err(Failure::Usage(message));
     let mut outputs: Vec<Output> = Vec::new();
     for path in paths {
-        let target = Target::of(path);
+        let (content, path) = content_of(path)?;
+        let target = Target::of(&path);
         let kind = match (&target, format) {
             (Target::Stdout, format) => format.map_or(Format::Png8, format_of),
             (Target::File(path), Some(format)) if path.extension().is_none() => format_of(format),
             (Target::File(path), _) => match Format::from_path(path) {
                 Ok(kind) => kind,
                 Err(e) if path.extension().is_none() => {
-                    return usage(format!("{e}, or say the format with --format png, exr, npz or hdr"));
+                    return usage(format!("{e}, or say the format with --format png, exr, npz, npy or hdr"));
                 }
                 Err(e) => return usage(e.to_string()),
             },
         };
-        outputs.push(Output { target, format: with_bits(kind, bits), content: Content::Scene });
+        outputs.push(Output { target, format: with_bits(kind, bits), content });
     }
 
     let to_stdout = outputs.iter().any(|output| output.target == Target::Stdout);
     if to_stdout && io::stdout().is_terminal() {
         return usage("-o - would write a picture to the terminal; send standard output to a file or program".into());
     }
-    let without_ending = paths.iter().any(|path| path.extension().is_none());
+    let without_ending = outputs.iter().any(|output| match &output.target {
+        Target::Stdout => true,
+        Target::File(path) => path.extension().is_none(),
+    });
     if format.is_some() && !without_ending {
         return usage("--format is for -o - and names without an ending; the ending of a file says its format".into());
     }
-    let png = |output: &Output| matches!(output.format, Format::Png8 | Format::Png16);
-    if bits.is_some() && !outputs.is_empty() && !outputs.iter().any(png) {
+    if bits.is_some() && !outputs.is_empty() && !outputs.iter().any(Output::is_png) {
         return usage("--bits is for PNG only, and no output is one".into());
     }
     Ok(outputs)
@@ -462,7 +506,9 @@ pub fn refuse_overwriting<'a>(
         if let Some(file) = overwritten(&output.target) {
             let name = output.target.name();
             return match output.content {
-                Content::Scene => usage(format!("the picture {name}"), file, "name another file with -o"),
+                Content::Scene | Content::Buffer(_) => {
+                    usage(format!("the picture {name}"), file, "name another file with -o")
+                }
                 Content::Heat => usage(format!("--heat {name}"), file, "name another file"),
             };
         }
@@ -501,6 +547,7 @@ fn format_of(format: NamedFormat) -> Format {
         NamedFormat::Png => Format::Png8,
         NamedFormat::Exr => Format::Exr,
         NamedFormat::Npz => Format::Npz,
+        NamedFormat::Npy => Format::Npy,
         NamedFormat::Hdr => Format::Hdr,
     }
 }
@@ -536,6 +583,30 @@ mod tests {
         );
         for (path, several) in [("a.png", true), ("-", true), ("{frame}.png", false), ("{stem}_{x}.png", true)] {
             assert!(check(path, several).is_err(), "{path}");
+        }
+    }
+
+    #[test]
+    fn an_output_is_a_file_or_a_buffer_and_its_file() {
+        let of = |text: &str| content_of(Path::new(text));
+        let buffer = |text: &str| match of(text) {
+            Ok((Content::Buffer(desc), file)) => (desc.name(), file.display().to_string()),
+            other => panic!("{text}: {other:?}"),
+        };
+        assert_eq!(buffer("depth=a=b.png"), ("depth".into(), "a=b.png".into()));
+        assert_eq!(buffer("light:a/b=-"), ("light:a/b".into(), "-".into()));
+        for file in ["a.png", "./a=b.png", "depth/a=b.png", "./depth=d.png"] {
+            assert_eq!(of(file).unwrap(), (Content::Scene, PathBuf::from(file)));
+        }
+        for (bad, said) in [
+            ("dept=d.png", "did you mean \"depth\"?"),
+            ("a=b.png", "./a=b.png"),
+            ("=b.png", "./=b.png"),
+            ("depth=", "a file is needed"),
+            ("light:=d.png", "is no buffer"),
+        ] {
+            let Err(Failure::Usage(words)) = of(bad) else { panic!("{bad}") };
+            assert!(words.contains(said), "{words}");
         }
     }
 

@@ -1,5 +1,6 @@
 //! `firstlight render`: from a scene to picture files.
 
+mod contents;
 mod moments;
 mod overrides;
 mod plan;

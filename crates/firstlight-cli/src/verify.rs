@@ -6,7 +6,7 @@ use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
 use firstlight::{
-    Compiled, Display, Film, Format, ImageError, Plane, PlaneDifference, ReceiptSettings, RenderSettings, Scene,
+    Compiled, FileSettings, Film, Format, ImageError, Plane, PlaneDifference, ReceiptSettings, RenderSettings, Scene,
     StoredPlane, StoredPlanes, UpAxis, builtin_scenes, display_steps,
 };
 use serde_json::{Value, json};
@@ -32,7 +32,7 @@ pub fn run(args: &VerifyArgs) -> Result<(), Failure> {
     if !args.quiet {
         show_diagnostics(&compiled.warnings);
     }
-    let again = render_again(&compiled.scene, &said, stored.format, args.quiet)?;
+    let again = render_again(&compiled.scene, &said, &stored, args.quiet)?;
     let size = |file: &StoredPlanes| [file.window.width, file.window.height];
     if size(&stored) != size(&again) {
         let ([w, h], [v, g]) = (size(&stored), size(&again));
@@ -118,7 +118,12 @@ fn open(path: &Path, said: &ReceiptSettings, args: &VerifyArgs) -> Result<(Input
 }
 
 /// The same file, rendered by this version.
-fn render_again(scene: &Scene, said: &ReceiptSettings, format: Format, quiet: bool) -> Result<StoredPlanes, Failure> {
+fn render_again(
+    scene: &Scene,
+    said: &ReceiptSettings,
+    file: &StoredPlanes,
+    quiet: bool,
+) -> Result<StoredPlanes, Failure> {
     let settings = said.settings(scene);
     settings.check(scene).map_err(Failure::Work)?;
     settings.check_memory(scene).map_err(Failure::Work)?;
@@ -131,27 +136,24 @@ fn render_again(scene: &Scene, said: &ReceiptSettings, format: Format, quiet: bo
     });
     let ControlFlow::Continue((film, _)) = rendered else { return Err(Failure::Interrupted) };
     progress.finish(width, height);
-    let encoded = encode(film, scene, &settings, format, said.display.unwrap_or_default());
+    let files = FileSettings { display: said.display.unwrap_or_default(), ..FileSettings::of(&file.receipt) };
+    let encoded = encode(&film, scene, &settings, file.format, &files);
     let again = encoded.and_then(|bytes| StoredPlanes::read(&bytes));
     again.map_err(|e| Failure::Work(e.to_string()))
 }
 
 /// The bytes of such a file.
 fn encode(
-    film: Film,
+    film: &Film,
     scene: &Scene,
     settings: &RenderSettings,
     format: Format,
-    display: Display,
+    files: &FileSettings,
 ) -> Result<Vec<u8>, ImageError> {
     let receipt = scene.buffers_receipt(settings, scene.buffers());
-    if matches!(format, Format::Exr | Format::Npz) {
-        return film.encode(scene.buffers(), format, &receipt);
-    }
-    match film.heat() {
-        Some(heat) => heat.picture().encode(format, &display, &receipt),
-        None if settings.buffers.contains(&Plane::Color.into()) => film.develop().encode(format, &display, &receipt),
-        None => Err(ImageError::Picture("its receipt speaks of buffers that such a file cannot hold".into())),
+    match film.heat().filter(|_| !matches!(format, Format::Exr | Format::Npz)) {
+        Some(heat) => heat.picture().encode(format, &files.display, &receipt),
+        None => film.encode(scene.buffers(), format, files, &receipt),
     }
 }
 

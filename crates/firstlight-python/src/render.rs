@@ -8,8 +8,8 @@ use std::sync::{Arc, Mutex, PoisonError, mpsc};
 use std::time::Duration;
 
 use firstlight::{
-    Display, Encoding, Film, Format, Image, NamedPlane, Plane, PlaneNumbers, PlaneVec, Receipt, RenderSettings, Scene,
-    Window, encode_planes, render, write_whole,
+    Display, Encoding, FileSettings, Film, Format, NamedPlane, Plane, PlaneNumbers, PlaneVec, Receipt, RenderSettings,
+    Scene, Window, encode_planes, render, write_whole,
 };
 use numpy::{PyArray1, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArrayMethods};
 use pyo3::exceptions::{PyKeyError, PyRuntimeError, PyValueError};
@@ -201,25 +201,33 @@ impl PyRender {
         self.planes.iter().map(|(name, _)| name.as_str()).collect::<Vec<_>>().join(", ")
     }
 
-    fn encode(&self, py: Python<'_>, format: Format) -> PyResult<Vec<u8>> {
-        if matches!(format, Format::Exr | Format::Npz) {
-            return self.with_planes(py, &self.planes, |planes| {
-                encode_planes(self.film, self.window, planes, format, &self.receipts[1]).map_err(|e| image_error(&e))
-            });
-        }
-        let Some(color) = self.planes.iter().position(|(_, plane)| *plane == Plane::Color) else {
-            let message = format!("there is no picture: the render has {}, and not color", self.names());
-            return Err(PyValueError::new_err(message));
+    /// The bytes of a file: of the buffer of that name, else of all in a format that holds them, else of the picture.
+    fn encode(&self, py: Python<'_>, format: Format, buffer: Option<&str>, depth_scale: f64) -> PyResult<Vec<u8>> {
+        let of = match buffer {
+            None if matches!(format, Format::Exr | Format::Npz) => &self.planes[..],
+            named => {
+                let name = named.unwrap_or(Plane::Color.name());
+                let Some(k) = self.planes.iter().position(|(known, _)| known == name) else {
+                    let message = match named {
+                        Some(name) => format!("{name}: the render has {}", self.names()),
+                        None => format!("there is no picture: the render has {}, and not color", self.names()),
+                    };
+                    return Err(PyValueError::new_err(message));
+                };
+                std::slice::from_ref(&self.planes[k])
+            }
         };
-        self.with_planes(py, &self.planes[color..=color], |planes| {
-            let PlaneNumbers::Floats(numbers) = planes[0].numbers else { unreachable!("colours are floats") };
-            let (pixels, _) = numbers.as_chunks::<4>();
-            let image = Image { film: self.film, window: self.window, pixels: pixels.to_vec() };
-            image.encode(format, &self.display, &self.receipts[0]).map_err(|e| image_error(&e))
+        let is_picture = matches!(of, [(_, Plane::Color)]);
+        let mut receipt = self.receipts[usize::from(!is_picture)].clone();
+        if let (Some(name), Some((_, said))) = (buffer, receipt.entries.iter_mut().find(|(key, _)| key == "buffers")) {
+            *said = format!("[{name:?}]");
+        }
+        let settings = FileSettings { display: self.display, depth_scale };
+        self.with_planes(py, of, |planes| {
+            encode_planes(self.film, self.window, planes, format, &settings, &receipt).map_err(|e| image_error(&e))
         })
     }
 }
-
 #[pymethods]
 impl PyRender {
     /// What decided the pixels: a dict of texts. With more buffers than color it has the camera's matrices and the
@@ -259,19 +267,32 @@ impl PyRender {
             16 => Format::Png16,
             _ => return Err(PyValueError::new_err(format!("bits is {bits}; a PNG has 8 or 16"))),
         };
-        Ok(PyBytes::new(py, &self.encode(py, format)?))
+        Ok(PyBytes::new(py, &self.encode(py, format, None, FileSettings::default().depth_scale)?))
     }
 
-    /// Writes a file, whole or not at all: `.exr` and `.npz` hold all buffers, `.png` and `.hdr` the picture.
+    /// Writes a file, whole or not at all: `.exr` and `.npz` hold all buffers, the others one.
     ///
     /// The arrays are written as they are now. A file that the scene was read from is never written over.
-    fn save(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
+    ///
+    /// Parameters
+    /// ----------
+    /// path : path-like
+    ///     The ending says the format: .png (8 bits), .exr, .npz, .npy or .hdr.
+    /// buffer : str, optional
+    ///     The buffer to write by itself; else all that the format holds, or the picture. In a .png file depth,
+    ///     distance and ids have 16 bits, and 0 where nothing is; colours are shown as the picture is; normals are
+    ///     (x, y, z) / 2 + 1/2.
+    /// depth_scale : float
+    ///     Units per metre of depth and distance in a .png file: 1000 are millimetres. What is farther than 65535
+    ///     units is 0.
+    #[pyo3(signature = (path, *, buffer = None, depth_scale = 1000.0))]
+    fn save(&self, py: Python<'_>, path: PathBuf, buffer: Option<&str>, depth_scale: f64) -> PyResult<()> {
         let format = Format::from_path(&path).map_err(|e| image_error(&e))?;
         if self.files.holds(&path) {
             let message = format!("{}: the scene was read from it; choose another name", path.display());
             return Err(PyValueError::new_err(message));
         }
-        let bytes = self.encode(py, format)?;
+        let bytes = self.encode(py, format, buffer, depth_scale)?;
         py.detach(|| write_whole(&path, &bytes)).map(drop).map_err(|e| image_error(&e))
     }
 

@@ -83,9 +83,9 @@ pub use describe::{ColorDesc, ColorParam, FilePath, NumberParam, ParamDesc, Samp
 pub use error::{Diagnostic, Place, SceneError, Severity, printable};
 pub use ids::{LightGroupId, LightId, MaterialId, SurfaceId, TextureId};
 pub use image::{
-    Buffer, BufferDesc, DifferingSample, Distance, Flip, Format, Image, ImageError, LightChoice, LightPart, NamedPlane,
-    PendingFile, Plane, PlaneDifference, PlaneNumbers, PlaneVec, Receipt, Sampling, StagedFile, StoredImage,
-    StoredPlane, StoredPlanes, Window, Written, display_steps, encode_planes, false_colors, is_decoding,
+    Buffer, BufferDesc, DifferingSample, Distance, FileSettings, Flip, Format, Image, ImageError, LightChoice,
+    LightPart, NamedPlane, PendingFile, Plane, PlaneDifference, PlaneNumbers, PlaneVec, Receipt, Sampling, StagedFile,
+    StoredImage, StoredPlane, StoredPlanes, Window, Written, display_steps, encode_planes, false_colors, is_decoding,
     relative_differences, write_open, write_whole,
 };
 pub use import::{ImportError, MeshData, MeshFormat, MeshPart, MeshPlace, MeshReport, is_point_set, read_mesh};

@@ -3,14 +3,15 @@
 use std::ops::ControlFlow;
 use std::time::Duration;
 
-use firstlight::{Diagnostic, Display, Film, ImageError, Plane, RenderSettings, RenderStats, Scene, Severity, Window};
+use firstlight::{Diagnostic, RenderSettings, RenderStats, Scene, Severity, Window};
 
+use super::contents::Contents;
 use super::plan::Plan;
 use super::timed;
 use crate::faster::faster;
 use crate::input::Input;
 use crate::interrupt::Watch;
-use crate::output::{self, Content, Output, Ready, Staged, Target};
+use crate::output::{self, Output, Ready, Staged, Target};
 use crate::progress::Progress;
 use crate::report::{Failure, show_diagnostics};
 
@@ -92,7 +93,8 @@ impl Run<'_> {
             self.input.tell_added(&compiled);
         }
         let scene = &compiled.scene;
-        let settings = &RenderSettings { buffers: Plan::buffers(&moment.outputs, scene.buffers()), ..settings.clone() };
+        let contents = Contents::of(&moment.outputs, scene)?;
+        let settings = &RenderSettings { buffers: contents.buffers(), ..settings.clone() };
         settings.check(scene).map_err(Failure::Usage)?;
         settings.check_memory(scene).map_err(Failure::Work)?;
 
@@ -118,8 +120,7 @@ impl Run<'_> {
 
         // Encode all pictures and bring them to the disk, then let them appear
         let (written, write) = timed(|| {
-            let bytes =
-                encoded(plan, settings, film, scene, &moment.outputs).map_err(|e| Failure::Work(e.to_string()))?;
+            let bytes = progress.aside(|| contents.encode(plan, settings, &film, scene))?;
             watch.check()?;
             let stage = ready.into_iter().zip(&bytes).map(|(ready, bytes)| ready.stage(bytes));
             let staged: Vec<Staged> = stage.collect::<Result<_, _>>()?;
@@ -150,36 +151,4 @@ impl Run<'_> {
             hint: Some(hint.into()),
         })
     }
-}
-
-/// The bytes of each output.
-fn encoded(
-    plan: &Plan,
-    settings: &RenderSettings,
-    film: Film,
-    scene: &Scene,
-    outputs: &[Output],
-) -> Result<Vec<Vec<u8>>, ImageError> {
-    let heat = film.heat().map(|heat| heat.picture());
-    let receipt = scene.receipt(settings);
-    let of_heat = scene.buffers_receipt(settings, &[Plane::Rays.into()]);
-    let buffers = scene.buffers();
-    let of_buffers = scene.buffers_receipt(settings, buffers);
-    // Before the film becomes the picture
-    let mut encoded = Vec::new();
-    for output in outputs {
-        let takes = output.takes_buffers();
-        encoded.push(if takes { film.encode(buffers, output.format, &of_buffers)? } else { Vec::new() });
-    }
-    let own = scene.display();
-    let display = Display { exposure: plan.exposure.unwrap_or(own.exposure), ..own };
-    let image = settings.buffers.contains(&Plane::Color.into()).then(|| film.develop());
-    for (bytes, output) in encoded.iter_mut().zip(outputs).filter(|(_, output)| !output.takes_buffers()) {
-        *bytes = match (output.content, &heat, &image) {
-            (Content::Heat, Some(heat), _) => heat.encode(output.format, &Display::default(), &of_heat)?,
-            (Content::Scene, _, Some(image)) => image.encode(output.format, &display, &receipt)?,
-            _ => unreachable!("a film has what its outputs show"),
-        };
-    }
-    Ok(encoded)
 }

@@ -22,6 +22,8 @@ pub(super) struct Overrides<'a> {
     pub camera: Option<&'a str>,
     pub tolerance: Option<f64>,
     pub buffers: Option<&'a [BufferDesc]>,
+    /// Buffers that have outputs of their own.
+    pub alone: Vec<BufferDesc>,
     pub motion_to: Option<&'a MotionTo>,
     pub terminator: Option<ShadowTerminator>,
 }
@@ -72,16 +74,17 @@ impl Overrides<'_> {
     /// Sees that motion is asked for together with where it leads.
     fn check_motion(&self, render: &RenderDesc) -> Result<(), Failure> {
         let of_motion = |buffer: &&BufferDesc| matches!(buffer, BufferDesc::Plane(plane) if plane.is_of_motion());
-        match render.buffers.iter().find(of_motion) {
+        let own = self.alone.iter().find(of_motion);
+        match own.or(render.buffers.iter().find(of_motion)) {
             None if self.motion_to.is_some() => {
                 let message = "--motion-to is for the buffers motion and motion-backward, and neither is asked for; \
-                               name one with --buffers";
+                               name one with --buffers, or as -o motion=FILE";
                 Err(Failure::Usage(message.into()))
             }
-            Some(buffer) if self.buffers.is_some() && render.motion_to.is_none() => {
+            Some(buffer) if (own.is_some() || self.buffers.is_some()) && render.motion_to.is_none() => {
                 let name = buffer.name();
                 let message = format!(
-                    "--buffers {name} leads nowhere; say whereto with --motion-to: a time in seconds, next, previous, \
+                    "the buffer {name} leads nowhere; say whereto with --motion-to: a time in seconds, next, previous, \
                      or the name of a camera"
                 );
                 Err(Failure::Usage(message))

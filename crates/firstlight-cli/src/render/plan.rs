@@ -6,7 +6,7 @@ use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 
 use firstlight::{
-    AaMode, Buffer, BufferDesc, Format, Framing, Plane, RenderSettings, ShadowTerminator, SimdLevel, View, Window,
+    AaMode, BufferDesc, FileSettings, Format, Framing, Plane, RenderSettings, ShadowTerminator, SimdLevel, View, Window,
 };
 
 use super::moments::Moment;
@@ -31,6 +31,10 @@ pub(super) struct Plan<'a> {
     pub overrides: Overrides<'a>,
     /// Of 8- and 16-bit files, in place of the scene's.
     pub exposure: Option<f64>,
+    /// Units per metre in 16 bits.
+    pub depth_scale: f64,
+    /// Warnings are errors.
+    pub strict: bool,
     /// How a camera frames a scene that has none, as far as it was said.
     pub view: Option<View>,
     pub margin: Option<f64>,
@@ -75,6 +79,15 @@ impl<'a> Plan<'a> {
             Some(None) => StatsPlan::Table,
             Some(Some(path)) => StatsPlan::Json(stats_target(path)?),
         };
+        let is_scaled = |output: &Output| match &output.content {
+            Content::Buffer(BufferDesc::Plane(plane)) => plane.is_distance() && output.is_png(),
+            _ => false,
+        };
+        if args.depth_scale.is_some() && !outputs.iter().any(is_scaled) {
+            let message =
+                "--depth-scale is for depth and distance in PNG files, as -o depth=d.png, and no output is one";
+            return Err(Failure::Usage(message.into()));
+        }
         let heat = args.heat.as_deref().map(heat_output).transpose()?;
         let jobs: Vec<Job> = args
             .scenes
@@ -139,6 +152,7 @@ impl<'a> Plan<'a> {
             camera: args.camera.as_deref(),
             tolerance: args.tolerance,
             buffers: args.buffers.as_deref(),
+            alone: outputs.iter().filter_map(|output| output.content.buffer().cloned()).collect(),
             motion_to: args.motion_to.as_ref(),
             terminator: args.shadow_terminator.map(|word| match word {
                 Terminator::Smooth => ShadowTerminator::Smooth,
@@ -155,6 +169,8 @@ impl<'a> Plan<'a> {
             settings,
             overrides,
             exposure: args.exposure,
+            depth_scale: args.depth_scale.unwrap_or(FileSettings::default().depth_scale),
+            strict: args.reading.strict,
             view: args.view,
             margin: args.margin,
             time: args.time.unwrap_or(0.0),
@@ -323,18 +339,6 @@ impl<'a> Plan<'a> {
             say(format_args!("the scene asks for buffers, and no output takes them: .exr and .npz files do"));
         }
         Ok(())
-    }
-
-    /// The planes that outputs need; `asked` is what those take that hold buffers.
-    pub fn buffers(outputs: &[Output], asked: &[Buffer]) -> Vec<Buffer> {
-        let mut planes = if outputs.iter().any(Output::takes_buffers) { asked.to_vec() } else { Vec::new() };
-        for output in outputs.iter().filter(|output| !output.takes_buffers()) {
-            let shown = if output.content == Content::Heat { Plane::Rays } else { Plane::Color }.into();
-            if !planes.contains(&shown) {
-                planes.push(shown);
-            }
-        }
-        planes
     }
 
     /// Has a camera that is found for the scene frame it as asked.

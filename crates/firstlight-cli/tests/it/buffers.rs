@@ -88,6 +88,48 @@ fn the_scene_may_ask_for_them() {
 }
 
 #[test]
+fn a_file_may_hold_one_by_itself() {
+    let folder = Folder::with_scene();
+    let picture = folder.png("");
+    let files = "-o a.png -o depth=d.png -o object-id=i.png -o depth=d.npy -o c.npy -o light:#1=l.png -o depth=d.exr";
+    folder.run(&format!("render scene.toml {files} -o light:*=l.npz")).done();
+    assert!(folder.get("a.png") == picture);
+    let gray = |name: &str| {
+        let file = folder.get(name);
+        // Bits of a sample, and the kind of colour
+        assert_eq!(file[24..26], [16, 0], "{name}");
+        assert!(file.windows(17).any(|part| part == b"firstlight:stored"), "{name}");
+    };
+    gray("d.png");
+    gray("i.png");
+    assert_eq!(folder.get("l.png")[24..26], [8, 2]);
+    assert!(folder.get("d.npy").starts_with(b"\x93NUMPY") && folder.get("c.npy").starts_with(b"\x93NUMPY"));
+    assert!(holds(&folder.get("l.npz"), "light:#1") && !holds(&folder.get("l.npz"), "color"));
+    let exr = folder.get("d.exr");
+    let says = |word: &str| exr.windows(word.len()).any(|part| part == word.as_bytes());
+    assert!(says("depth.Z") && says("firstlight:buffer.depth"));
+    // What files of all buffers take does not grow by it
+    folder.run("render scene.toml -o b.npz -o depth=- --format npy").done();
+    assert!(!holds(&folder.get("b.npz"), "depth"));
+    folder.run("render scene.toml -o ./a=b.png").done();
+    assert!(folder.get("a=b.png") == picture);
+}
+
+#[test]
+fn a_scale_of_depth_says_what_it_cannot_tell() {
+    let folder = Folder::with_scene();
+    assert!(!folder.run("render scene.toml -o depth=mm.png").done().text().contains("warning"));
+    folder
+        .run("render scene.toml -o depth=d.png --depth-scale 1e6")
+        .done()
+        .says(&["warning", "farther than 0.065535 m"]);
+    folder.run("render scene.toml -o depth=s.png --depth-scale 1e6 --strict").exits(1).says(&["are farther than"]);
+    folder.run("render scene.toml -o depth=d.npy --depth-scale 1e6").exits(2).says(&["--depth-scale is for depth"]);
+    folder.run("render scene.toml -o depth=d.png --depth-scale 0").exits(2).says(&["from 0.001 to 1000000"]);
+    assert_eq!(folder.names(), ["d.png", "mm.png", "scene.toml"]);
+}
+
+#[test]
 fn what_cannot_be_is_said() {
     let folder = Folder::with_scene();
     folder.run("render scene.toml --buffers dept -o a.npz").exits(2).says(&["dept", "\"depth\""]);
@@ -99,6 +141,10 @@ fn what_cannot_be_is_said() {
     folder.run("render scene.toml --buffers depth").exits(2).says(&["--buffers is for .exr and .npz files"]);
     folder.run("render scene.toml --buffers depth -o a.png -o a.hdr").exits(2).says(&["name one with -o"]);
     folder.run("render scene.toml --buffers depth,depth -o a.npz").exits(1).says(&["\"depth\" is given twice"]);
+    folder.run("render scene.toml -o dept=d.png").exits(2).says(&["\"dept\" is no buffer; did you mean \"depth\"?"]);
+    folder.run("render scene.toml -o position=p.png").exits(2).says(&["no range", ".exr, .npz and .npy files can"]);
+    folder.run("render scene.toml -o depth=d.hdr").exits(2).says(&["it is no colour"]);
+    folder.run("render scene.toml -o light:nobody=d.png").exits(2).says(&["no light is called \"nobody\""]);
     folder.put("none.toml", SCENE.replace("[render]\n", "[render]\nbuffers = []\n"));
     folder.run("render none.toml -o a.npz").exits(1).says(&["render.buffers", "asks for nothing"]);
     assert_eq!(folder.names(), ["none.toml", "scene.toml"]);

@@ -1,6 +1,6 @@
 //! `verify` and `diff`: what is the same, what differs and where, and what cannot be compared.
 
-use firstlight::{Format, NamedPlane, Plane, PlaneVec, Receipt, StoredPlanes, encode_planes};
+use firstlight::{FileSettings, Format, NamedPlane, Plane, PlaneVec, Receipt, StoredPlanes, encode_planes};
 
 use crate::common::{Folder, QUICK, SCENE};
 
@@ -22,7 +22,7 @@ fn changed(bytes: &[u8], change: impl Fn(&mut StoredPlanes)) -> Vec<u8> {
             numbers: plane.numbers.numbers(),
         })
         .collect();
-    encode_planes(file.film, file.window, &planes, Format::Npz, &file.receipt).unwrap()
+    encode_planes(file.film, file.window, &planes, Format::Npz, &FileSettings::default(), &file.receipt).unwrap()
 }
 
 /// The floats of a buffer.

@@ -3,27 +3,42 @@
 use std::io;
 use std::path::PathBuf;
 
+use super::Format;
+
 /// Why a picture could not be written or read, with what is allowed and what to do.
 #[derive(Debug, thiserror::Error)]
 pub enum ImageError {
     /// The ending of a file's name is not that of a picture.
-    #[error("{}: {}; use .png, .exr, .npz or .hdr", path.display(), ending(path))]
+    #[error("{}: {}; use .png, .exr, .npz, .npy or .hdr", path.display(), ending(path))]
     UnknownEnding {
         /// The file's name.
         path: PathBuf,
     },
     /// The program was built without EXR.
-    #[error("this build of firstlight has no EXR; use .png, .npz or .hdr, or build it with the feature `exr`")]
+    #[error("this build of firstlight has no EXR; use .png, .npz, .npy or .hdr, or build it with the feature `exr`")]
     WithoutExr,
     /// An [`Image`](super::Image) whose pixels do not fill its window, or whose window is not in its film.
     #[error("{0}")]
     Picture(String),
-    /// A format that holds no more than the picture.
-    #[error("a {format} file holds one picture; buffers go to .exr and .npz files")]
-    OnePicture {
-        /// `PNG` or `HDR`.
-        format: &'static str,
+    /// A format that holds one buffer, where several are to go.
+    #[error("{} file holds one buffer; several go to .exr and .npz files", a(*format))]
+    OneBuffer {
+        /// PNG, HDR or NPY.
+        format: Format,
     },
+    /// A buffer whose numbers a format cannot hold.
+    #[error("{} file cannot hold {buffer}: {reason}; .exr, .npz and .npy files can", a(*format))]
+    NotHeld {
+        /// PNG or HDR.
+        format: Format,
+        /// The buffer's name.
+        buffer: String,
+        /// What of it does not fit.
+        reason: String,
+    },
+    /// A [`FileSettings::depth_scale`](super::FileSettings::depth_scale) outside what it may be.
+    #[error("the depth scale is {0}; units per metre are needed, from 0.001 to 1000000")]
+    DepthScale(f64),
     /// A [`Display`](crate::Display) outside what it may be.
     #[error("{0}")]
     Display(String),
@@ -106,6 +121,17 @@ pub enum ImageError {
         /// What is wrong with it.
         reason: String,
     },
+}
+
+/// The format with its article.
+fn a(format: Format) -> &'static str {
+    match format {
+        Format::Png8 | Format::Png16 => "a PNG",
+        Format::Exr => "an EXR",
+        Format::Npz => "an NPZ",
+        Format::Npy => "an NPY",
+        Format::Hdr => "an HDR",
+    }
 }
 
 /// The fault of a file's ending, with its value.

@@ -190,7 +190,7 @@ fn order_attributes(bytes: &mut [u8], texts: &[(String, String)]) {
 mod tests {
     use super::super::Image;
     use super::super::tests::{receipt, whole};
-    use super::super::{Format, Window};
+    use super::super::{FileSettings, Format, Window};
     use super::*;
     use crate::color::Display;
     use codec::prelude::{FlatImage, FlatSamples, ReadChannels, ReadLayers, read};
@@ -243,7 +243,7 @@ mod tests {
         ];
         let window = Window { x: 0, y: 0, width: 2, height: 1 };
         let file = PlaneFile { film: [2, 1], window, planes: &planes };
-        let file = read_back(&file.encode(Format::Exr, &Receipt::default()).unwrap());
+        let file = read_back(&file.encode(Format::Exr, &FileSettings::default(), &Receipt::default()).unwrap());
         let channels = &file.layer_data[0].channel_data.list;
         let names: Vec<_> = channels.iter().map(|c| c.name.to_string()).collect();
         assert_eq!(names, ["B", "G", "R", "depth.Z", "normal.X", "normal.Y", "normal.Z", "object-id.ID"]);

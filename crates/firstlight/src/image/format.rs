@@ -15,12 +15,14 @@ pub enum Format {
     Exr,
     /// Arrays for numpy, 32-bit floats: as EXR.
     Npz,
+    /// One array for numpy, 32-bit floats or whole numbers. It has no place for a receipt.
+    Npy,
     /// Radiance RGBE: linear Rec. 709 with a shared exponent; alpha is left out.
     Hdr,
 }
 
 impl Format {
-    /// By the ending of a file's name, in capitals or not: `.png` (8 bits), `.exr`, `.npz`, `.hdr`.
+    /// By the ending of a file's name, in capitals or not: `.png` (8 bits), `.exr`, `.npz`, `.npy`, `.hdr`.
     ///
     /// # Errors
     /// [`ImageError::UnknownEnding`] for any other; [`ImageError::WithoutExr`] for `.exr` in a build without it.
@@ -31,6 +33,7 @@ impl Format {
             "exr" if cfg!(feature = "exr") => Ok(Format::Exr),
             "exr" => Err(ImageError::WithoutExr),
             "npz" => Ok(Format::Npz),
+            "npy" => Ok(Format::Npy),
             "hdr" => Ok(Format::Hdr),
             _ => Err(ImageError::UnknownEnding { path: path.to_path_buf() }),
         }
@@ -53,11 +56,11 @@ mod tests {
         let words = |p: &str| of(p).unwrap_err().to_string();
         assert_eq!(
             words("out/b.jpg"),
-            "out/b.jpg: \".jpg\" is not the ending of a picture; use .png, .exr, .npz or .hdr"
+            "out/b.jpg: \".jpg\" is not the ending of a picture; use .png, .exr, .npz, .npy or .hdr"
         );
         assert_eq!(
             words(".png"),
-            ".png: has no ending that says which kind of picture to write; use .png, .exr, .npz or .hdr"
+            ".png: has no ending that says which kind of picture to write; use .png, .exr, .npz, .npy or .hdr"
         );
     }
 }

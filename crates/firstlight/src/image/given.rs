@@ -1,6 +1,6 @@
 //! Planes of numbers by themselves, apart from a film: given away by one, or brought by somebody else.
 
-use super::{Format, Image, ImageError, NamedPlane, PlaneFile, PlaneNumbers, Receipt, Window};
+use super::{FileSettings, Format, Image, ImageError, NamedPlane, PlaneFile, PlaneNumbers, Receipt, Window};
 
 /// The numbers of a plane as [`Film::into_planes`](crate::Film::into_planes) gives them away: the window's rows from
 /// the top, each from the left, the channels of a pixel side by side.
@@ -22,17 +22,18 @@ impl PlaneVec {
     }
 }
 
-/// The bytes of a file that holds planes of `window`, a part of a film of `film` pixels: EXR or NPZ. As
+/// The bytes of a file that holds planes of `window`, a part of a film of `film` pixels. As
 /// [`Film::encode`](crate::Film::encode), for numbers that are no film's any more.
 ///
 /// # Errors
 /// A plane that does not fill the window or has numbers of another kind; a window outside the film; a format that holds
-/// one picture alone; a receipt outside what it may be.
+/// one buffer alone, or not such numbers; a receipt outside what it may be.
 pub fn encode_planes(
     film: [u32; 2],
     window: Window,
     planes: &[NamedPlane<'_>],
     format: Format,
+    settings: &FileSettings,
     receipt: &Receipt,
 ) -> Result<Vec<u8>, ImageError> {
     let pixels = u64::from(window.width) * u64::from(window.height);
@@ -53,7 +54,7 @@ pub fn encode_planes(
         return Err(ImageError::Picture("there are no planes".into()));
     }
     Image::check_window(film, window)?;
-    PlaneFile { film, window, planes }.encode(format, receipt)
+    PlaneFile { film, window, planes }.encode(format, settings, receipt)
 }
 
 #[cfg(test)]
@@ -66,7 +67,7 @@ mod tests {
         let window = Window { x: 1, y: 0, width: 2, height: 3 };
         let (depth, ids) = (vec![1.0; 6], vec![7; 6]);
         let encode = |planes: &[NamedPlane<'_>], window: Window| {
-            encode_planes([4, 4], window, planes, Format::Npz, &Receipt::default())
+            encode_planes([4, 4], window, planes, Format::Npz, &FileSettings::default(), &Receipt::default())
         };
         let (floats, wholes) = (PlaneNumbers::Floats(&depth), PlaneNumbers::Wholes(&ids));
         assert!(

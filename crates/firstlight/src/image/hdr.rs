@@ -7,17 +7,17 @@
 //! Source: G. Ward, "Real Pixels", Graphics Gems II, 1991; the Radiance file formats manual, "picture files".
 
 use super::plane::BUFFER_KEY;
-use super::{Image, PREFIX, Plane, Receipt, SOFTWARE};
+use super::{NamedPlane, PREFIX, Receipt, SOFTWARE, Window};
 
-/// The bytes of a Radiance file. The picture and the receipt have been checked.
-pub(super) fn encode(picture: &Image, receipt: &Receipt) -> Vec<u8> {
-    let (width, height) = (picture.window.width, picture.window.height);
-    let colors: Vec<[f32; 3]> = picture.pixels.iter().map(|&[r, g, b, _]| [r, g, b]).collect();
+/// The bytes of a Radiance file of a colour. The pixels, which are those of `of`, and the receipt have been checked.
+pub(super) fn encode(window: Window, of: &NamedPlane, pixels: &[[f32; 4]], receipt: &Receipt) -> Vec<u8> {
+    let Window { width, height, .. } = window;
+    let colors: Vec<[f32; 3]> = pixels.iter().map(|&[r, g, b, _]| [r, g, b]).collect();
     let pixels = bytes(&colors);
     let hash = blake3::hash(&pixels).to_hex();
-    let said =
-        format!("channels R G B; rgbe; unit {}; space -; alpha left out; filtered; blake3 {hash}", Plane::Color.unit());
-    let receipt = receipt.with(&format!("{BUFFER_KEY}{}", Plane::Color.name()), said);
+    let (unit, sampling) = (of.plane.unit(), of.plane.sampling().name());
+    let said = format!("channels R G B; rgbe; unit {unit}; space -; alpha left out; {sampling}; blake3 {hash}");
+    let receipt = receipt.with(&format!("{BUFFER_KEY}{}", of.name), said);
     // The header: variables, comments, an empty line, the size
     let mut file = format!("#?RADIANCE\nSOFTWARE={SOFTWARE}\n").into_bytes();
     for (key, value) in &receipt.entries {
@@ -181,7 +181,13 @@ pub(super) fn unescape(line: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::super::tests::{receipt, whole};
+    use super::super::{Format, Image};
     use super::*;
+    use crate::color::Display;
+
+    fn encode(picture: &Image, receipt: &Receipt) -> Vec<u8> {
+        picture.encode(Format::Hdr, &Display::default(), receipt).unwrap()
+    }
     use image::ImageDecoder;
 
     fn decoded(bytes: &[u8]) -> (u32, u32, Vec<f32>) {

@@ -21,6 +21,7 @@ mod npz_read;
 mod patient;
 mod plane;
 mod png;
+mod quantized;
 pub(crate) mod read;
 mod stored;
 
@@ -35,6 +36,7 @@ pub use given::{PlaneVec, encode_planes};
 pub use patient::write_open;
 pub(crate) use plane::PlaneFile;
 pub use plane::{NamedPlane, Plane, PlaneNumbers, Sampling};
+pub use quantized::FileSettings;
 pub use stored::{StoredImage, StoredPlane, StoredPlanes};
 
 use crate::color::Display;
@@ -95,17 +97,9 @@ impl Image {
     /// display or receipt outside what it may be; a format that this build does not have.
     pub fn encode(&self, format: Format, display: &Display, receipt: &Receipt) -> Result<Vec<u8>, ImageError> {
         self.check()?;
-        receipt.check()?;
-        let shown = || receipt.shown_by(Some(display));
-        match format {
-            Format::Png8 => png::encode(self, png::Depth::Eight, display, &shown()),
-            Format::Png16 => png::encode(self, png::Depth::Sixteen, display, &shown()),
-            Format::Exr | Format::Npz => {
-                let planes = [NamedPlane::new(Plane::Color, PlaneNumbers::Floats(self.pixels.as_flattened()))];
-                PlaneFile { film: self.film, window: self.window, planes: &planes }.encode(format, receipt)
-            }
-            Format::Hdr => Ok(hdr::encode(self, &receipt.shown_by(None))),
-        }
+        let planes = [NamedPlane::new(Plane::Color, PlaneNumbers::Floats(self.pixels.as_flattened()))];
+        let settings = FileSettings { display: *display, ..FileSettings::default() };
+        PlaneFile { film: self.film, window: self.window, planes: &planes }.encode(format, &settings, receipt)
     }
 
     /// Whether the picture is whole.
@@ -128,11 +122,6 @@ impl Image {
             return Err(ImageError::Picture(fault));
         }
         Ok(())
-    }
-
-    /// Whether every pixel has alpha 1, so that a file needs none.
-    fn is_opaque(&self) -> bool {
-        self.pixels.iter().all(|p| p[3] == 1.0)
     }
 }
 

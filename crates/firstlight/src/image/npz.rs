@@ -10,7 +10,21 @@ use std::io::Write;
 use rawzip::path::EntryPath;
 use rawzip::{CompressionMethod, ZipArchiveWriter};
 
-use super::{ImageError, NamedPlane, PlaneFile, PlaneNumbers, Receipt};
+use super::{ImageError, NamedPlane, PlaneFile, PlaneNumbers, Receipt, Window};
+
+/// The bytes of an NPY file: one plane by itself.
+pub(super) fn encode_one(window: Window, plane: &NamedPlane) -> Vec<u8> {
+    let kind = match plane.numbers {
+        PlaneNumbers::Floats(_) => "<f4",
+        PlaneNumbers::Wholes(_) => "<u4",
+    };
+    let Window { width, height, .. } = window;
+    let shape = match plane.plane.channels().len() {
+        1 => format!("({height}, {width})"),
+        channels => format!("({height}, {width}, {channels})"),
+    };
+    array(kind, &shape, &plane.numbers.to_le_bytes())
+}
 
 /// The bytes of an NPZ file. The planes and the receipt have been checked.
 pub(super) fn encode(file: &PlaneFile, receipt: &Receipt) -> Result<Vec<u8>, ImageError> {
@@ -20,9 +34,9 @@ pub(super) fn encode(file: &PlaneFile, receipt: &Receipt) -> Result<Vec<u8>, Ima
 /// An archive of files `NAME.npy`, with names as they are: `light:` is no drive. Without a clock: the same arrays give
 /// the same bytes.
 fn archive(file: &PlaneFile, receipt: &Receipt) -> Result<Vec<u8>, rawzip::Error> {
-    let (rows, columns) = (file.window.height, file.window.width);
+    let Window { width, height, .. } = file.window;
     let room: usize = file.planes.iter().map(|named| named.plane.bytes()).sum();
-    let mut bytes = Vec::with_capacity(room * rows as usize * columns as usize);
+    let mut bytes = Vec::with_capacity(room * width as usize * height as usize);
     let mut archive = ZipArchiveWriter::new(&mut bytes);
     let mut add = |name: &str, array: Vec<u8>| -> Result<(), rawzip::Error> {
         let name = format!("{name}.npy");
@@ -37,16 +51,8 @@ fn archive(file: &PlaneFile, receipt: &Receipt) -> Result<Vec<u8>, rawzip::Error
         Ok(())
     };
     // One after the other: beside the archive there is a copy of one plane at a time
-    for NamedPlane { name, plane, numbers } in file.planes {
-        let kind = match numbers {
-            PlaneNumbers::Floats(_) => "<f4",
-            PlaneNumbers::Wholes(_) => "<u4",
-        };
-        let shape = match plane.channels().len() {
-            1 => format!("({rows}, {columns})"),
-            channels => format!("({rows}, {columns}, {channels})"),
-        };
-        add(name, array(kind, &shape, &numbers.to_le_bytes()))?;
+    for plane in file.planes {
+        add(plane.name, encode_one(file.window, plane))?;
     }
     let said: serde_json::Map<_, _> =
         receipt.entries.iter().map(|(key, value)| (key.clone(), value.clone().into())).collect();
@@ -74,7 +80,7 @@ fn array(kind: &str, shape: &str, numbers: &[u8]) -> Vec<u8> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{Format, Plane, Window};
+    use super::super::{FileSettings, Format, Plane};
     use super::*;
 
     /// The kind, shape and numbers of an array.
@@ -113,8 +119,8 @@ mod tests {
         ];
         let file = PlaneFile { film: [9, 9], window, planes: &planes };
         let receipt = Receipt { entries: vec![("name".into(), "Würfel \"1\"".into())] };
-        let bytes = file.encode(Format::Npz, &receipt).unwrap();
-        assert_eq!(bytes, file.encode(Format::Npz, &receipt).unwrap());
+        let bytes = file.encode(Format::Npz, &FileSettings::default(), &receipt).unwrap();
+        assert_eq!(bytes, file.encode(Format::Npz, &FileSettings::default(), &receipt).unwrap());
         let files = files(&bytes);
         let names: Vec<_> = files.iter().map(|(name, _)| name.as_str()).collect();
         assert_eq!(names, ["depth.npy", "uv.npy", "object-id.npy", "receipt.npy"]);
@@ -139,16 +145,5 @@ mod tests {
             )
             .as_str()
         );
-    }
-
-    #[test]
-    fn formats_of_one_picture_hold_no_buffers() {
-        let window = Window { x: 0, y: 0, width: 1, height: 1 };
-        let planes = [NamedPlane::new(Plane::Depth, PlaneNumbers::Floats(&[1.0]))];
-        let file = PlaneFile { film: [1, 1], window, planes: &planes };
-        for format in [Format::Png8, Format::Png16, Format::Hdr] {
-            let error = file.encode(format, &Receipt::default()).unwrap_err();
-            assert!(matches!(error, ImageError::OnePicture { .. }), "{error}");
-        }
     }
 }

@@ -137,7 +137,7 @@ fn channel_names(name: &str, count: usize, receipt: &Receipt) -> Vec<String> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{NamedPlane, PlaneFile, PlaneNumbers};
+    use super::super::{FileSettings, NamedPlane, PlaneFile, PlaneNumbers};
     use super::*;
 
     fn archive() -> Vec<u8> {
@@ -148,7 +148,9 @@ mod tests {
             NamedPlane::new(Plane::ObjectId, PlaneNumbers::Wholes(&ids)),
         ];
         let receipt = Receipt { entries: vec![("name".into(), "Würfel \"1\"".into())] };
-        PlaneFile { film: [3, 2], window, planes: &planes }.encode(Format::Npz, &receipt).unwrap()
+        PlaneFile { film: [3, 2], window, planes: &planes }
+            .encode(Format::Npz, &FileSettings::default(), &receipt)
+            .unwrap()
     }
 
     #[test]

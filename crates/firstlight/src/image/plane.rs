@@ -1,7 +1,8 @@
 //! What a film can hold beside the picture: one plane of numbers for each buffer.
 
 use super::cryptomatte::Named;
-use super::{Format, ImageError, Receipt, Window};
+use super::png::Depth;
+use super::{FileSettings, Format, ImageError, Receipt, Window};
 use crate::describe::{Words, words};
 use crate::parallel;
 
@@ -372,17 +373,25 @@ impl<'a> NamedPlane<'a> {
 
 impl PlaneFile<'_> {
     /// The bytes of a file. The planes fill the window.
-    pub fn encode(&self, format: Format, receipt: &Receipt) -> Result<Vec<u8>, ImageError> {
+    pub fn encode(&self, format: Format, settings: &FileSettings, receipt: &Receipt) -> Result<Vec<u8>, ImageError> {
         receipt.check()?;
-        let receipt = self.described(receipt);
-        match format {
+        settings.check()?;
+        if let [NamedPlane { name, plane, .. }] = self.planes
+            && let Some(reason) = format.refuses(*plane)
+        {
+            return Err(ImageError::NotHeld { format, buffer: (*name).to_owned(), reason });
+        }
+        match (format, self.planes) {
             #[cfg(feature = "exr")]
-            Format::Exr => super::exr::encode(self, &receipt),
+            (Format::Exr, _) => super::exr::encode(self, &self.described(receipt)),
             #[cfg(not(feature = "exr"))]
-            Format::Exr => Err(ImageError::WithoutExr),
-            Format::Npz => super::npz::encode(self, &receipt),
-            Format::Png8 | Format::Png16 => Err(ImageError::OnePicture { format: "PNG" }),
-            Format::Hdr => Err(ImageError::OnePicture { format: "HDR" }),
+            (Format::Exr, _) => Err(ImageError::WithoutExr),
+            (Format::Npz, _) => super::npz::encode(self, &self.described(receipt)),
+            (Format::Npy, [plane]) => Ok(super::npz::encode_one(self.window, plane)),
+            (Format::Png8, [plane]) => super::quantized::png(self.window, plane, Depth::Eight, settings, receipt),
+            (Format::Png16, [plane]) => super::quantized::png(self.window, plane, Depth::Sixteen, settings, receipt),
+            (Format::Hdr, [plane]) => Ok(super::quantized::hdr(self.window, plane, &receipt.shown_by(None))),
+            (Format::Npy | Format::Png8 | Format::Png16 | Format::Hdr, _) => Err(ImageError::OneBuffer { format }),
         }
     }
 

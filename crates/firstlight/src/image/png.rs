@@ -5,10 +5,11 @@
 //! chunks `firstlight:KEY`, the program in a tEXt chunk `Software`.
 
 use ::png as codec;
+pub(super) use codec::ColorType;
 use codec::text_metadata::{ITXtChunk, TEXtChunk};
 
 use super::plane::BUFFER_KEY;
-use super::{Image, ImageError, PREFIX, Plane, Receipt, SOFTWARE};
+use super::{ImageError, NamedPlane, PREFIX, Receipt, SOFTWARE, Window};
 use crate::color::{Display, Encoding, Quantizer};
 use crate::parallel;
 
@@ -19,7 +20,34 @@ pub(super) enum Depth {
     Sixteen,
 }
 
+/// What a PNG file holds.
+pub(super) struct Samples {
+    pub window: Window,
+    pub depth: Depth,
+    pub color: ColorType,
+    /// How colours are encoded; `None` for numbers that are no colours.
+    pub encoding: Option<Encoding>,
+    /// Rows from the top, 16 bits with the high byte first.
+    pub bytes: Vec<u8>,
+}
+
 impl Depth {
+    /// The code of 1.
+    pub fn largest(self) -> u32 {
+        match self {
+            Depth::Eight => 255,
+            Depth::Sixteen => 65535,
+        }
+    }
+
+    /// Bits a sample.
+    pub fn bits(self) -> u32 {
+        match self {
+            Depth::Eight => 8,
+            Depth::Sixteen => 16,
+        }
+    }
+
     /// The type of a sample, as numpy names it.
     fn number_type(self) -> &'static str {
         match self {
@@ -29,9 +57,11 @@ impl Depth {
     }
 }
 
-/// The bytes of a PNG file. The picture and the receipt have been checked.
+/// The bytes of a PNG file of a colour. The pixels, which are those of `of`, and the receipt have been checked.
 pub(super) fn encode(
-    picture: &Image,
+    window: Window,
+    of: &NamedPlane,
+    pixels: &[[f32; 4]],
     depth: Depth,
     display: &Display,
     receipt: &Receipt,
@@ -39,48 +69,43 @@ pub(super) fn encode(
     if let Some(fault) = display.fault() {
         return Err(ImageError::Display(fault));
     }
-    let alpha = !picture.is_opaque();
-    let samples = quantize(picture, depth, display, alpha);
-    let (channels, kind) = (if alpha { "R G B A" } else { "R G B" }, depth.number_type());
-    let hash = blake3::hash(&samples).to_hex();
-    let said = format!(
-        "channels {channels}; {kind}; unit display-encoded; space -; straight alpha, never encoded; filtered; blake3 \
-         {hash}"
-    );
-    let receipt = &receipt.with(&format!("{BUFFER_KEY}{}", Plane::Color.name()), said);
-    write(picture, depth, alpha, display.encoding, receipt, &samples)
-        .map_err(|e| ImageError::Encode { format: "PNG", reason: e.to_string() })
+    // No alpha where every pixel has 1
+    let alpha = pixels.iter().any(|pixel| pixel[3] != 1.0);
+    let color = if alpha { ColorType::Rgba } else { ColorType::Rgb };
+    let bytes = quantize(window, pixels, depth, display, alpha);
+    let samples = Samples { window, depth, color, encoding: Some(display.encoding), bytes };
+    let channels = if alpha { "R G B A" } else { "R G B" };
+    let meaning = "unit display-encoded; space -; straight alpha, never encoded";
+    samples.encode(&samples.described(of, channels, meaning, &receipt.shown_by(Some(display))))
 }
 
-/// The samples, rows from the top, 16 bits with the high byte first.
-fn quantize(picture: &Image, depth: Depth, display: &Display, alpha: bool) -> Vec<u8> {
-    let largest = match depth {
-        Depth::Eight => 255,
-        Depth::Sixteen => 65535,
-    };
-    let color = Quantizer::for_count(display, largest, picture.pixels.len().saturating_mul(3));
+/// The samples of a picture.
+fn quantize(window: Window, pixels: &[[f32; 4]], depth: Depth, display: &Display, alpha: bool) -> Vec<u8> {
+    let largest = depth.largest();
+    let color = Quantizer::for_count(display, largest, pixels.len().saturating_mul(3));
     let rgb = |[r, g, b, _]: [f32; 4]| [color.code(r), color.code(g), color.code(b)];
     let rgba = |pixel| {
         let [r, g, b, a] = straight(pixel);
         [color.code(r), color.code(g), color.code(b), Quantizer::linear(a, largest)]
     };
     match (depth, alpha) {
-        (Depth::Eight, false) => each(picture, |p| rgb(p).map(|code| code as u8)),
-        (Depth::Eight, true) => each(picture, |p| rgba(p).map(|code| code as u8)),
-        (Depth::Sixteen, false) => each(picture, |p| rgb(p).map(u16::to_be_bytes)).into_flattened(),
-        (Depth::Sixteen, true) => each(picture, |p| rgba(p).map(u16::to_be_bytes)).into_flattened(),
+        (Depth::Eight, false) => each(window, pixels, |p| rgb(p).map(|code| code as u8)),
+        (Depth::Eight, true) => each(window, pixels, |p| rgba(p).map(|code| code as u8)),
+        (Depth::Sixteen, false) => each(window, pixels, |p| rgb(p).map(u16::to_be_bytes)).into_flattened(),
+        (Depth::Sixteen, true) => each(window, pixels, |p| rgba(p).map(u16::to_be_bytes)).into_flattened(),
     }
 }
 
 /// What `samples` makes of each pixel, one after another; rows in parallel.
 fn each<T: Copy + Default + Send, const N: usize>(
-    picture: &Image,
+    window: Window,
+    pixels: &[[f32; 4]],
     samples: impl Fn([f32; 4]) -> [T; N] + Sync,
 ) -> Vec<T> {
-    let width = picture.window.width as usize;
-    let mut all = vec![[T::default(); N]; picture.pixels.len()];
+    let width = window.width as usize;
+    let mut all = vec![[T::default(); N]; pixels.len()];
     parallel::for_each_chunk(&mut all, width, |y, row| {
-        for (out, pixel) in row.iter_mut().zip(&picture.pixels[y * width..]) {
+        for (out, pixel) in row.iter_mut().zip(&pixels[y * width..]) {
             *out = samples(*pixel);
         }
     });
@@ -98,38 +123,54 @@ fn straight([r, g, b, a]: [f32; 4]) -> [f32; 4] {
     }
 }
 
-fn write(
-    picture: &Image,
-    depth: Depth,
-    alpha: bool,
-    encoding: Encoding,
-    receipt: &Receipt,
-    samples: &[u8],
-) -> Result<Vec<u8>, codec::EncodingError> {
-    let mut bytes = Vec::new();
-    let mut encoder = codec::Encoder::new(&mut bytes, picture.window.width, picture.window.height);
-    encoder.set_color(if alpha { codec::ColorType::Rgba } else { codec::ColorType::Rgb });
-    encoder.set_depth(match depth {
-        Depth::Eight => codec::BitDepth::Eight,
-        Depth::Sixteen => codec::BitDepth::Sixteen,
-    });
-    // Thirteen times as fast as the default
-    encoder.set_compression(codec::Compression::Fast);
-    // Say what the numbers mean
-    match encoding {
-        Encoding::Srgb => encoder.set_source_srgb(codec::SrgbRenderingIntent::RelativeColorimetric),
-        Encoding::Gamma(gamma) => set_gamma(&mut encoder, gamma),
-        Encoding::Linear => set_gamma(&mut encoder, 1.0),
+impl Samples {
+    /// A receipt that says of a plane what its samples are, and their hash.
+    pub fn described(&self, of: &NamedPlane, channels: &str, meaning: &str, receipt: &Receipt) -> Receipt {
+        let (kind, sampling) = (self.depth.number_type(), of.plane.sampling().name());
+        let hash = blake3::hash(&self.bytes).to_hex();
+        let said = format!("channels {channels}; {kind}; {meaning}; {sampling}; blake3 {hash}");
+        receipt.with(&format!("{BUFFER_KEY}{}", of.name), said)
     }
-    let mut writer = encoder.write_header()?;
-    writer.write_text_chunk(&TEXtChunk::new("Software", SOFTWARE))?;
-    for (key, value) in &receipt.entries {
-        writer.write_text_chunk(&ITXtChunk::new(format!("{PREFIX}{key}"), value.as_str()))?;
+
+    /// The bytes of a file.
+    pub fn encode(&self, receipt: &Receipt) -> Result<Vec<u8>, ImageError> {
+        self.write(receipt).map_err(|e| ImageError::Encode { format: "PNG", reason: e.to_string() })
     }
-    writer.write_image_data(samples)?;
-    writer.finish()?;
-    Ok(bytes)
+
+    fn write(&self, receipt: &Receipt) -> Result<Vec<u8>, codec::EncodingError> {
+        let mut bytes = Vec::new();
+        let mut encoder = codec::Encoder::new(&mut bytes, self.window.width, self.window.height);
+        encoder.set_color(self.color);
+        encoder.set_depth(match self.depth {
+            Depth::Eight => codec::BitDepth::Eight,
+            Depth::Sixteen => codec::BitDepth::Sixteen,
+        });
+        // Thirteen times as fast as the default
+        encoder.set_compression(codec::Compression::Fast);
+        // Say what the numbers mean
+        match self.encoding {
+            None => {}
+            Some(Encoding::Srgb) => encoder.set_source_srgb(codec::SrgbRenderingIntent::RelativeColorimetric),
+            Some(Encoding::Gamma(gamma)) => set_gamma(&mut encoder, gamma),
+            Some(Encoding::Linear) => set_gamma(&mut encoder, 1.0),
+        }
+        let mut writer = encoder.write_header()?;
+        writer.write_text_chunk(&TEXtChunk::new("Software", SOFTWARE))?;
+        for (key, value) in &receipt.entries {
+            let keyword = format!("{PREFIX}{key}");
+            // The format has no room for what is said of a light with a very long name
+            if keyword.len() <= MAX_KEYWORD {
+                writer.write_text_chunk(&ITXtChunk::new(keyword, value.as_str()))?;
+            }
+        }
+        writer.write_image_data(&self.bytes)?;
+        writer.finish()?;
+        Ok(bytes)
+    }
 }
+
+/// No keyword of a text chunk is longer.
+const MAX_KEYWORD: usize = 79;
 
 /// Whether a chunk of a receipt comes before the pixels of a PNG file.
 ///
@@ -183,7 +224,7 @@ fn set_gamma(encoder: &mut codec::Encoder<'_, &mut Vec<u8>>, gamma: f64) {
 #[cfg(test)]
 mod tests {
     use super::super::tests::{receipt, whole};
-    use super::super::{Format, Window};
+    use super::super::{Format, Image, Window};
     use super::*;
 
     fn decode(bytes: &[u8]) -> (codec::Info<'static>, Vec<u8>) {

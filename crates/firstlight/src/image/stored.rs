@@ -176,19 +176,32 @@ fn read_png(bytes: &[u8]) -> Result<StoredPlanes, ImageError> {
         }
         _ => (Format::Png8, 255, samples.iter().map(|&s| u32::from(s)).collect()),
     };
-    let (codes, channels) = match color.samples() {
-        1 => (codes.into_iter().flat_map(|v| [v; 3]).collect(), 3),
-        2 => (codes.as_chunks().0.iter().flat_map(|&[v, a]| [v, v, v, a]).collect(), 4),
-        channels => (codes, channels),
-    };
     let mut receipt = Receipt::default();
     for chunk in &reader.info().utf8_text {
         if let (Some(key), Ok(value)) = (chunk.keyword.strip_prefix(PREFIX), chunk.get_text()) {
             receipt.entries.push((key.into(), value));
         }
     }
+    if let Some((name, channels)) = one_buffer(&receipt, color.samples()) {
+        let plane = StoredPlane { name, channels, numbers: PlaneVec::Wholes(codes), steps: Some(steps) };
+        return Ok(StoredPlanes::picture(format, [width, height], plane, receipt));
+    }
+    let (codes, channels) = match color.samples() {
+        1 => (codes.into_iter().flat_map(|v| [v; 3]).collect(), 3),
+        2 => (codes.as_chunks().0.iter().flat_map(|&[v, a]| [v, v, v, a]).collect(), 4),
+        channels => (codes, channels),
+    };
     let plane = StoredPlane::color(PlaneVec::Wholes(codes), channels, Some(steps));
     Ok(StoredPlanes::picture(format, [width, height], plane, receipt))
+}
+
+/// The buffer that a receipt speaks of, if it is one, and the names of its channels, if they are so many.
+fn one_buffer(receipt: &Receipt, count: usize) -> Option<(String, Vec<String>)> {
+    let mut said = receipt.entries.iter().filter_map(|(key, said)| Some((key.strip_prefix(BUFFER_KEY)?, said)));
+    let (name, said) = said.next().filter(|_| said.next().is_none())?;
+    let channels = said.strip_prefix("channels ")?.split(';').next()?;
+    let channels: Vec<String> = channels.split(' ').map(str::to_owned).collect();
+    (channels.len() == count).then(|| (name.to_owned(), channels))
 }
 
 fn read_hdr(bytes: &[u8]) -> Result<StoredPlanes, ImageError> {
@@ -212,7 +225,10 @@ fn read_hdr(bytes: &[u8]) -> Result<StoredPlanes, ImageError> {
         }
     }
     let colors = pixels.into_iter().flat_map(|[r, g, b, _]| [r, g, b]).collect();
-    let plane = StoredPlane::color(PlaneVec::Floats(colors), 3, None);
+    let mut plane = StoredPlane::color(PlaneVec::Floats(colors), 3, None);
+    if let Some((name, _)) = one_buffer(&receipt, 3) {
+        plane.name = name;
+    }
     Ok(StoredPlanes::picture(Format::Hdr, [width, height], plane, receipt))
 }
 

@@ -7,7 +7,8 @@ use super::resolve::TermSums;
 use super::tile::Tile;
 use crate::image::cryptomatte;
 use crate::image::{
-    Buffer, Format, Image, ImageError, NamedPlane, Plane, PlaneFile, PlaneNumbers, PlaneVec, Receipt, Window,
+    Buffer, FileSettings, Format, Image, ImageError, NamedPlane, Plane, PlaneFile, PlaneNumbers, PlaneVec, Receipt,
+    Window,
 };
 use crate::scene::Scene;
 
@@ -172,18 +173,25 @@ impl Film {
         Some(Heat { film: self.size, window: self.window, work: work.to_vec() })
     }
 
-    /// The bytes of a file that holds some of its planes, EXR or NPZ. The same film and receipt give the same bytes,
-    /// always. The receipt says of each plane what it is, and the hash of its bits.
+    /// The bytes of a file that holds some of its planes: EXR and NPZ any, the others one. The same film, settings and
+    /// receipt give the same bytes, always. The receipt says of each plane what it is, and the hash of its bits.
     ///
     /// # Errors
-    /// A format that holds one picture alone; a plane that was not asked for; a receipt outside what it may be.
-    pub fn encode(&self, planes: &[Buffer], format: Format, receipt: &Receipt) -> Result<Vec<u8>, ImageError> {
+    /// A format that holds one buffer alone, or not the numbers of this one; a plane that was not asked for; settings
+    /// or a receipt outside what they may be.
+    pub fn encode(
+        &self,
+        planes: &[Buffer],
+        format: Format,
+        settings: &FileSettings,
+        receipt: &Receipt,
+    ) -> Result<Vec<u8>, ImageError> {
         let named = |of: &Buffer| match self.planes.iter().position(|(buffer, _)| buffer == of) {
             Some(k) => Ok(NamedPlane { name: &self.names[k], plane: of.plane(), numbers: self.planes[k].1.numbers() }),
             None => Err(ImageError::Picture(format!("the film has no plane for {of:?}: it was not asked for"))),
         };
         let planes = planes.iter().map(named).collect::<Result<Vec<_>, _>>()?;
-        PlaneFile { film: self.size, window: self.window, planes: &planes }.encode(format, receipt)
+        PlaneFile { film: self.size, window: self.window, planes: &planes }.encode(format, settings, receipt)
     }
 
     /// The picture.

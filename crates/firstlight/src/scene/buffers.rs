@@ -4,6 +4,7 @@ use super::geometry::Geometry;
 use super::{Scene, SceneDesc};
 use crate::context::CompileContext;
 use crate::describe::node::quoted;
+use crate::error::Diagnostic;
 use crate::ids::{LightGroupId, LightId, SurfaceId};
 use crate::image::cryptomatte::Named;
 use crate::image::{Buffer, BufferDesc, LightChoice, LightPart, Plane};
@@ -65,10 +66,6 @@ impl SceneDesc {
             let Some(geometry) = geometry else { return Vec::new() };
             names.objects = geometry.surface_names().chain(names.lights.iter().copied()).collect();
         }
-        let of_lights = Chosen { kinds: ["light", "lights"], prefix: "light", names: &names.lights };
-        let of_groups =
-            Chosen { kinds: ["group of lights", "groups of lights"], prefix: "group", names: &names.groups };
-        let of_objects = Chosen { kinds: ["object", "objects"], prefix: "coverage", names: &names.objects };
         let mut all = Vec::new();
         // What else is asked for may be among what a picture is lit again from
         let is_relight = |desc: &BufferDesc| *desc == BufferDesc::Relight;
@@ -76,55 +73,17 @@ impl SceneDesc {
             self.render.buffers.iter().enumerate().partition(|(_, desc)| is_relight(desc));
         for (i, desc) in first.into_iter().chain(last) {
             let path = format!("render.buffers[{i}]");
-            let found: Vec<Buffer> = match desc {
-                BufferDesc::Plane(plane) => {
-                    if plane.is_of_motion() && self.render.motion_to.is_none() {
-                        let hint = "write motion_to = a time in seconds, \"next\", \"previous\" or the name of a \
-                                    camera, as --motion-to does";
-                        cx.error(
-                            &path,
-                            format!("{} leads nowhere without motion_to", quoted(plane.name())),
-                            Some(hint),
-                        );
-                    }
-                    vec![(*plane).into()]
-                }
-                BufferDesc::Light { light, part } => {
-                    if *light == LightChoice::All && lights.len() > MAX_APART {
-                        let message = format!("all {} lights, each apart, are more than {MAX_APART}", lights.len());
-                        cx.error(&path, message, Some("name those that count, or give lights a group"));
-                        continue;
-                    }
-                    let lights = of_lights.choose(cx, &path, light);
-                    lights.into_iter().map(|light| Buffer::Light(LightId(light as u32), *part)).collect()
-                }
-                BufferDesc::Group { group, part } => {
-                    let groups = of_groups.choose(cx, &path, group);
-                    groups.into_iter().map(|group| Buffer::Group(LightGroupId(group as u32), *part)).collect()
-                }
-                BufferDesc::Relight => {
-                    if lights.len() > MAX_APART {
-                        let message = format!("all {} lights, each apart, are more than {MAX_APART}", lights.len());
-                        cx.error(&path, message, Some("ask for groups of lights"));
-                        continue;
-                    }
-                    let shapes = geometry.map_or(0, |geometry| geometry.surfaces.len());
-                    of_relight(lights, shapes)
-                }
-                BufferDesc::Coverage(object) => {
-                    let mut objects = of_objects.choose(cx, &path, object);
-                    if *object == LightChoice::All {
-                        objects.retain(|object| geometry.is_some_and(|geometry| is_seen(*object, geometry, lights)));
-                    }
-                    if objects.len() > MAX_APART {
-                        let message = format!("all {} objects, each apart, are more than {MAX_APART}", objects.len());
-                        cx.error(&path, message, Some("name those that count, or ask for crypto-object"));
-                        continue;
-                    }
-                    objects.into_iter().map(|object| Buffer::Coverage(SurfaceId(object as u32))).collect()
-                }
-            };
-            for buffer in found {
+            if let BufferDesc::Plane(plane) = desc
+                && plane.is_of_motion()
+                && self.render.motion_to.is_none()
+            {
+                let hint = "write motion_to = a time in seconds, \"next\", \"previous\" or the name of a camera, as \
+                            --motion-to does";
+                cx.error(&path, format!("{} leads nowhere without motion_to", quoted(plane.name())), Some(hint));
+            }
+            for buffer in names
+                .meant(cx, &path, desc, |object| geometry.is_some_and(|geometry| is_seen(object, geometry, lights)))
+            {
                 if all.contains(&buffer) && is_relight(desc) {
                     continue;
                 }
@@ -142,18 +101,6 @@ impl SceneDesc {
         }
         all
     }
-}
-
-/// All that a picture is lit again from; so many shapes are objects before the lights.
-fn of_relight(lights: &[Light], shapes: usize) -> Vec<Buffer> {
-    let planes = [Plane::Alpha, Plane::Background, Plane::Emission, Plane::Ambient].map(Buffer::from);
-    let sent = (0..lights.len() as u32).flat_map(|light| {
-        [LightPart::UnscaledDiffuse, LightPart::UnscaledSpecular].map(|part| Buffer::Light(LightId(light), Some(part)))
-    });
-    let is_visible = |light: &Light| light.area().is_some_and(|area| area.visible);
-    let seen = lights.iter().enumerate().filter(|(_, light)| is_visible(light));
-    let seen = seen.map(|(light, _)| Buffer::Coverage(SurfaceId((shapes + light) as u32)));
-    planes.into_iter().chain(sent).chain(seen).collect()
 }
 
 /// Whether a camera can see an object.
@@ -199,6 +146,61 @@ impl Chosen<'_> {
 }
 
 impl Names<'_> {
+    /// The buffers that a description means; none after a fault. `is_seen` says which objects a camera can see.
+    fn meant(
+        &self,
+        cx: &mut CompileContext,
+        path: &str,
+        desc: &BufferDesc,
+        is_seen: impl Fn(usize) -> bool,
+    ) -> Vec<Buffer> {
+        let of_lights = Chosen { kinds: ["light", "lights"], prefix: "light", names: &self.lights };
+        let of_groups = Chosen { kinds: ["group of lights", "groups of lights"], prefix: "group", names: &self.groups };
+        let of_objects = Chosen { kinds: ["object", "objects"], prefix: "coverage", names: &self.objects };
+        match desc {
+            BufferDesc::Plane(plane) => vec![(*plane).into()],
+            BufferDesc::Light { light: LightChoice::All, .. } | BufferDesc::Relight
+                if self.lights.len() > MAX_APART =>
+            {
+                let message = format!("all {} lights, each apart, are more than {MAX_APART}", self.lights.len());
+                cx.error(path, message, Some("name those that count, or give lights a group"));
+                Vec::new()
+            }
+            BufferDesc::Light { light, part } => {
+                let lights = of_lights.choose(cx, path, light);
+                lights.into_iter().map(|light| Buffer::Light(LightId(light as u32), *part)).collect()
+            }
+            BufferDesc::Group { group, part } => {
+                let groups = of_groups.choose(cx, path, group);
+                groups.into_iter().map(|group| Buffer::Group(LightGroupId(group as u32), *part)).collect()
+            }
+            BufferDesc::Relight => self.of_relight(is_seen),
+            BufferDesc::Coverage(object) => {
+                let mut objects = of_objects.choose(cx, path, object);
+                if *object == LightChoice::All {
+                    objects.retain(|object| is_seen(*object));
+                }
+                if objects.len() > MAX_APART {
+                    let message = format!("all {} objects, each apart, are more than {MAX_APART}", objects.len());
+                    cx.error(path, message, Some("name those that count, or ask for crypto-object"));
+                    return Vec::new();
+                }
+                objects.into_iter().map(|object| Buffer::Coverage(SurfaceId(object as u32))).collect()
+            }
+        }
+    }
+
+    /// All that a picture is lit again from. The objects are shapes, then the lights.
+    fn of_relight(&self, is_seen: impl Fn(usize) -> bool) -> Vec<Buffer> {
+        let planes = [Plane::Alpha, Plane::Background, Plane::Emission, Plane::Ambient].map(Buffer::from);
+        let parts = [LightPart::UnscaledDiffuse, LightPart::UnscaledSpecular];
+        let sent =
+            (0..self.lights.len() as u32).flat_map(|light| parts.map(|part| Buffer::Light(LightId(light), Some(part))));
+        let seen = (self.objects.len() - self.lights.len()..self.objects.len()).filter(|object| is_seen(*object));
+        let seen = seen.map(|object| Buffer::Coverage(SurfaceId(object as u32)));
+        planes.into_iter().chain(sent).chain(seen).collect()
+    }
+
     /// The name of a buffer, which no other has, and which can stand in any file: an archive says letters beyond ASCII
     /// in ways that readers do not agree on.
     fn of(&self, buffer: Buffer) -> String {
@@ -234,17 +236,45 @@ impl Scene {
     /// The name of a buffer in files: that of the plane; `light:NAME` or, of a light without a name of its own,
     /// `light:#3`, with the part after it; and so for groups of lights, and for the coverage of objects.
     pub fn buffer_name(&self, buffer: Buffer) -> String {
-        let lights = || self.summary.lights.iter().map(|(_, name, _)| name.as_deref()).collect();
         let names = match buffer {
             Buffer::Plane(_) => Names::default(),
-            Buffer::Light(..) => Names { lights: lights(), ..Names::default() },
-            Buffer::Group(..) => {
-                let groups = self.light_groups.iter().map(|(name, _)| Some(name.as_str())).collect();
-                Names { groups, ..Names::default() }
-            }
+            Buffer::Light(..) => Names { lights: self.said_lights(), ..Names::default() },
+            Buffer::Group(..) => Names { groups: self.said_groups(), ..Names::default() },
             Buffer::Coverage(_) => Names { objects: self.names_of(Named::Object), ..Names::default() },
         };
         names.of(buffer)
+    }
+
+    /// The buffers that a description means in this scene: one, or one for each light, group of lights or object.
+    ///
+    /// # Errors
+    /// None is called so, in words that say which there are.
+    pub fn buffers_of(&self, desc: &BufferDesc) -> Result<Vec<Buffer>, String> {
+        let (mut cx, mut names) = (CompileContext::default(), Names::default());
+        match desc {
+            BufferDesc::Plane(_) => {}
+            BufferDesc::Light { .. } => names.lights = self.said_lights(),
+            BufferDesc::Group { .. } => names.groups = self.said_groups(),
+            BufferDesc::Coverage(_) => names.objects = self.names_of(Named::Object),
+            BufferDesc::Relight => {
+                (names.lights, names.objects) = (self.said_lights(), self.names_of(Named::Object));
+            }
+        }
+        let found = names.meant(&mut cx, "", desc, |object| is_seen(object, &self.geometry, &self.lights));
+        match cx.take_faults().into_iter().next() {
+            None => Ok(found),
+            Some(Diagnostic { message, hint, .. }) => {
+                Err(hint.map_or(message.clone(), |hint| format!("{message}; {hint}")))
+            }
+        }
+    }
+
+    fn said_lights(&self) -> Vec<Option<&str>> {
+        self.summary.lights.iter().map(|(_, name, _)| name.as_deref()).collect()
+    }
+
+    fn said_groups(&self) -> Vec<Option<&str>> {
+        self.light_groups.iter().map(|(name, _)| Some(name.as_str())).collect()
     }
 
     /// The names of what has ids, that of id 1 first.

@@ -1,0 +1,122 @@
+//! What each output holds: the buffers of a scene, and their bytes.
+
+use firstlight::{Buffer, Display, FileSettings, Film, Format, Plane, PlaneNumbers, RenderSettings, Scene};
+
+use super::plan::Plan;
+use crate::output::{Content, Output};
+use crate::report::{Failure, say};
+
+/// The outputs of one moment, each with what it holds.
+pub(super) struct Contents<'a>(Vec<(&'a Output, Vec<Buffer>)>);
+
+impl<'a> Contents<'a> {
+    /// Finds out what outputs hold of a scene.
+    ///
+    /// # Errors
+    /// A buffer that the scene has not; several in a file that holds one.
+    pub fn of(outputs: &'a [Output], scene: &Scene) -> Result<Self, Failure> {
+        let of = |output: &'a Output| {
+            let buffers = match &output.content {
+                Content::Scene if output.takes_buffers() => scene.buffers().to_vec(),
+                Content::Scene => vec![Plane::Color.into()],
+                Content::Heat => vec![Plane::Rays.into()],
+                Content::Buffer(desc) => {
+                    let (name, file) = (desc.name(), output.target.name());
+                    let fault = |why: String| Failure::Usage(format!("-o {name}={file}: {why}"));
+                    let found = scene.buffers_of(desc).map_err(fault)?;
+                    if found.len() != 1 && !matches!(output.format, Format::Exr | Format::Npz) {
+                        let count = found.len();
+                        return Err(fault(format!(
+                            "the scene has {count} of them, and such a file holds one; .exr and .npz hold any number"
+                        )));
+                    }
+                    if found.is_empty() {
+                        return Err(fault("the scene has none".into()));
+                    }
+                    if let Some(why) = found.iter().find_map(|buffer| output.format.refuses(buffer.plane())) {
+                        return Err(fault(format!("{why}; .exr, .npz and .npy files can hold it")));
+                    }
+                    found
+                }
+            };
+            Ok((output, buffers))
+        };
+        outputs.iter().map(of).collect::<Result<_, _>>().map(Contents)
+    }
+
+    /// All that is to be rendered for them, each once.
+    pub fn buffers(&self) -> Vec<Buffer> {
+        let mut all = Vec::new();
+        for buffer in self.0.iter().flat_map(|(_, buffers)| buffers) {
+            if !all.contains(buffer) {
+                all.push(*buffer);
+            }
+        }
+        all
+    }
+
+    /// The bytes of each output.
+    ///
+    /// # Errors
+    /// Numbers that a format cannot hold.
+    pub fn encode(
+        &self,
+        plan: &Plan,
+        settings: &RenderSettings,
+        film: &Film,
+        scene: &Scene,
+    ) -> Result<Vec<Vec<u8>>, Failure> {
+        let own = scene.display();
+        let display = Display { exposure: plan.exposure.unwrap_or(own.exposure), ..own };
+        let files = FileSettings { display, depth_scale: plan.depth_scale };
+        let bytes = |(output, buffers): &(&Output, Vec<Buffer>)| {
+            let heat = (output.content == Content::Heat).then(|| film.heat()).flatten();
+            let encoded = match heat {
+                Some(heat) => {
+                    heat.picture().encode(output.format, &Display::default(), &scene.buffers_receipt(settings, buffers))
+                }
+                None => {
+                    warn_of_far(output, buffers, film, &files, plan)?;
+                    film.encode(buffers, output.format, &files, &scene.buffers_receipt(settings, buffers))
+                }
+            };
+            encoded.map_err(|e| Failure::Work(format!("{}: {e}", output.target.name())))
+        };
+        self.0.iter().map(bytes).collect()
+    }
+}
+
+/// Says how many pixels are farther away than a file can tell.
+///
+/// # Errors
+/// There are some, and warnings are errors.
+fn warn_of_far(
+    output: &Output,
+    buffers: &[Buffer],
+    film: &Film,
+    files: &FileSettings,
+    plan: &Plan,
+) -> Result<(), Failure> {
+    let [buffer] = buffers else { return Ok(()) };
+    if !output.is_png() || !buffer.plane().is_distance() {
+        return Ok(());
+    }
+    let Some(PlaneNumbers::Floats(distances)) = film.numbers(*buffer) else { return Ok(()) };
+    let far = files.beyond(distances);
+    if far == 0 {
+        return Ok(());
+    }
+    let words = format!(
+        "{}: {far} of {} pixels are farther than {} m, the most at {} units per metre, and are 0; a smaller \
+         --depth-scale reaches farther, .exr, .npz and .npy files hold any distance",
+        output.target.name(),
+        distances.len(),
+        files.farthest(),
+        files.depth_scale
+    );
+    if plan.strict {
+        return Err(Failure::Work(words));
+    }
+    say(format_args!("warning: {words}"));
+    Ok(())
+}
