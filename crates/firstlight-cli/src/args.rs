@@ -88,6 +88,8 @@ Examples:
       frames with the optical flow from each to the next
   firstlight render room.toml -o room.png -o depth=depth.png -o object-id=ids.png
       the same as pictures: depth in millimetres, ids as they are, both of 16 bits
+  firstlight render room.toml --frames 0..47 -o train/turn_###.png --coco train.json
+      pictures with masks and boxes of all objects, for training
   firstlight render config23 -o - | magick - config23.jpg
       to another program
   generate-scene | firstlight render - -o scene.png
@@ -337,6 +339,11 @@ pub struct RenderArgs {
     #[arg(long, value_name = "FILE.json", require_equals = true, value_hint = ValueHint::FilePath)]
     #[arg(help_heading = "Messages")]
     pub stats: Option<Option<PathBuf>>,
+    /// Writes an annotation of each object that is seen, as JSON in COCO's format: its mask and its box, where it is seen
+    /// and where it would be if it were alone (amodal), its category, which is its name, and its object-id. All frames
+    /// are in one file [default: none]
+    #[arg(long, value_name = "FILE.json", value_hint = ValueHint::FilePath, help_heading = "Output")]
+    pub coco: Option<PathBuf>,
     /// Writes a second picture that shows where the work went: from black over violet, red and orange to pale yellow,
     /// each doubling of what a pixel took a step of the same length [default: none]
     #[arg(long, value_name = "FILE.png", value_hint = ValueHint::FilePath, help_heading = "Messages")]
@@ -348,7 +355,7 @@ pub struct RenderArgs {
     #[arg(value_hint = ValueHint::FilePath)]
     #[arg(conflicts_with_all = ["output", "bits", "format", "depth_scale", "exposure", "crop"])]
     #[arg(conflicts_with_all = ["time", "frames", "shard", "aa_mode", "reference", "visibility"])]
-    #[arg(conflicts_with_all = ["threads", "tile_size", "simd", "stats", "heat"])]
+    #[arg(conflicts_with_all = ["threads", "tile_size", "simd", "stats", "coco", "heat"])]
     pub print_scene: Option<Option<PathBuf>>,
     /// Says nothing but errors, warnings (no notes), and --stats where asked for
     #[arg(short, long, help_heading = "Messages")]

@@ -39,6 +39,48 @@ pub struct Output {
     pub content: Content,
 }
 
+/// A file of JSON beside the pictures: the numbers of `--stats`, the annotations of `--coco`.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct JsonFile {
+    /// The option, as it stands before the file's name.
+    option: &'static str,
+    /// Where to.
+    pub target: Target,
+}
+
+impl JsonFile {
+    /// The file of an option, which is given as it stands before the name. It is a `.json`, so that no slip of the hand
+    /// writes it over a scene or a picture.
+    ///
+    /// # Errors
+    /// It is none.
+    pub fn of(option: &'static str, path: &Path) -> Result<Self, Failure> {
+        let target = Target::of(path);
+        let is_json = path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("json"));
+        if target != Target::Stdout && !is_json {
+            let name = shown(path);
+            let message = format!("{option}{name}: the file's name must end in .json; - is standard output");
+            return Err(Failure::Usage(message));
+        }
+        Ok(JsonFile { option, target })
+    }
+
+    /// What messages call it: `--coco a.json`.
+    pub fn name(&self) -> String {
+        format!("{}{}", self.option, self.target.name())
+    }
+
+    /// The option alone.
+    pub fn option(&self) -> &'static str {
+        self.option.trim_end_matches([' ', '='])
+    }
+
+    /// With the names of a scene in place of the placeholders.
+    pub fn of_scene(&self, names: &Names) -> Self {
+        JsonFile { target: self.target.of_scene(names), ..self.clone() }
+    }
+}
+
 /// What a picture shows.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Content {
@@ -419,7 +461,7 @@ pub fn format_of_course(course: &str, path: &Path) -> Result<Format, Failure> {
 ///
 /// # Errors
 /// Two of them are one file, under whatever names.
-pub fn refuse_clashes(scene: Option<&Path>, outputs: &[Output], stats: Option<&Target>) -> Result<(), Failure> {
+pub fn refuse_clashes(scene: Option<&Path>, outputs: &[Output], beside: &[JsonFile]) -> Result<(), Failure> {
     let usage = |message: String| Err(Failure::Usage(message));
     let scene = scene.map(real);
     let mut seen: Vec<Target> = Vec::new();
@@ -436,13 +478,15 @@ pub fn refuse_clashes(scene: Option<&Path>, outputs: &[Output], stats: Option<&T
         }
         seen.push(place);
     }
-    let Some(stats) = stats else { return Ok(()) };
-    let (name, place) = (stats.name(), stats.real());
-    if scene.is_some_and(|scene| place == Target::File(scene)) {
-        return usage(format!("--stats={name} would replace the scene's own file; name another"));
-    }
-    if seen.contains(&place) {
-        return usage(format!("--stats={name} and -o name the same output; give each its own"));
+    for file in beside {
+        let (name, place) = (file.name(), file.target.real());
+        if scene.as_ref().is_some_and(|scene| place == Target::File(scene.clone())) {
+            return usage(format!("{name} would replace the scene's own file; name another"));
+        }
+        if seen.contains(&place) {
+            return usage(format!("{name} and another option, or -o, name the same output; give each its own"));
+        }
+        seen.push(place);
     }
     Ok(())
 }
@@ -492,7 +536,7 @@ impl Identity {
 pub fn refuse_overwriting<'a>(
     read: &[PathBuf],
     outputs: impl IntoIterator<Item = &'a Output>,
-    stats: Option<&Target>,
+    beside: &[JsonFile],
 ) -> Result<(), Failure> {
     let files: Vec<(Identity, &PathBuf)> = read.iter().filter_map(|name| Some((Identity::of(name)?, name))).collect();
     let overwritten = |target: &Target| {
@@ -513,8 +557,8 @@ pub fn refuse_overwriting<'a>(
             };
         }
     }
-    match stats.and_then(|stats| Some((stats, overwritten(stats)?))) {
-        Some((stats, file)) => usage(format!("--stats={}", stats.name()), file, "name another file"),
+    match beside.iter().find_map(|beside| Some((beside.name(), overwritten(&beside.target)?))) {
+        Some((name, file)) => usage(name, file, "name another file"),
         None => Ok(()),
     }
 }

@@ -8,12 +8,12 @@ mod print;
 
 use std::time::{Duration, Instant};
 
-use firstlight::Window;
+use firstlight::{Coco, Window};
 
 use crate::args::{ReadingArgs, RenderArgs, Shard};
 use crate::input;
 use crate::interrupt::Watch;
-use crate::output::Target;
+use crate::output::{Ready, Target};
 use crate::report::{Failure, say, shown};
 use crate::stats::Stats;
 use moments::{Run, Took};
@@ -90,8 +90,10 @@ fn render(plan: &Plan, job: &Job, reading: &ReadingArgs) -> Result<(), Failure> 
     // this may make a file for a moment
     let watch = Watch::begin();
     let mut ready = Some(moments[0].ready()?);
-    let stats_target = plan.stats.target().map(|target| target.of_scene(&job.names));
-    let stats_file = stats_target.as_ref().map(Target::ready).transpose()?;
+    let beside = plan.beside(&job.names);
+    let stats_file = plan.stats.file().map(|file| file.of_scene(&job.names).target.ready()).transpose()?;
+    let coco = plan.coco.as_ref().map(|file| file.of_scene(&job.names).target);
+    let coco_file = coco.as_ref().map(Target::ready).transpose()?;
     watch.check()?;
     drop(watch);
 
@@ -103,7 +105,8 @@ fn render(plan: &Plan, job: &Job, reading: &ReadingArgs) -> Result<(), Failure> 
         plan,
         input: &input,
         settings: &settings,
-        stats: stats_target.as_ref(),
+        beside: &beside,
+        coco: coco.map(|target| (Coco::new(), target)),
         progress: None,
         warned: Vec::new(),
     };
@@ -123,6 +126,10 @@ fn render(plan: &Plan, job: &Job, reading: &ReadingArgs) -> Result<(), Failure> 
         });
     }
 
+    if let (Some(ready), Some((coco, _))) = (coco_file, &run.coco) {
+        write_json(plan, ready, &coco.to_json())?;
+    }
+
     // Say what it took
     let Some(Took { compile, render, write, rays }) = took else { return Ok(()) };
     let (width, height, frames) = (window.width, window.height, moments.len());
@@ -131,11 +138,14 @@ fn render(plan: &Plan, job: &Job, reading: &ReadingArgs) -> Result<(), Failure> 
         say(format_args!("{}", stats.to_table()));
     }
     if let Some(ready) = stats_file {
-        let watch = Watch::begin();
-        let json = stats.to_json();
-        ready.stage(json.as_bytes())?.commit(plan.quiet, &|| watch.check().is_err())?;
+        write_json(plan, ready, &stats.to_json())?;
     }
     Ok(())
+}
+
+fn write_json(plan: &Plan, ready: Ready, json: &str) -> Result<(), Failure> {
+    let watch = Watch::begin();
+    ready.stage(json.as_bytes())?.commit(plan.quiet, &|| watch.check().is_err())
 }
 
 fn timed<T>(f: impl FnOnce() -> T) -> (T, Duration) {

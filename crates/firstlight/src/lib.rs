@@ -96,8 +96,8 @@ pub use light::{
 pub use material::{BlinnPhongDesc, MaterialDesc, PhongDesc};
 pub use math::{DVec3, ShadowRay, Vec2, Vec3, WorldRay};
 pub use render::{
-    AaMode, Film, Heat, LightChange, LightCounts, ReceiptFault, ReceiptSettings, RelightError, Relit, RenderSettings,
-    RenderStats, VisibilityMode, relight, render, render_image,
+    AaMode, Coco, Film, Heat, LightChange, LightCounts, Mask, ObjectMasks, ReceiptFault, ReceiptSettings, RelightError,
+    Relit, RenderSettings, RenderStats, VisibilityMode, relight, render, render_image,
 };
 pub use scene::{
     Added, CameraHit, CastHit, CompileOptions, Compiled, DisplayEncoding, Framing, Hit, ModelSettings, MotionTo,

@@ -1,9 +1,10 @@
 //! One moment after the other: compiled, rendered, written.
 
 use std::ops::ControlFlow;
+use std::path::Path;
 use std::time::Duration;
 
-use firstlight::{Diagnostic, RenderSettings, RenderStats, Scene, Severity, Window};
+use firstlight::{Coco, Diagnostic, Plane, RenderSettings, RenderStats, Scene, Severity, Window};
 
 use super::contents::Contents;
 use super::plan::Plan;
@@ -11,7 +12,7 @@ use super::timed;
 use crate::faster::faster;
 use crate::input::Input;
 use crate::interrupt::Watch;
-use crate::output::{self, Output, Ready, Staged, Target};
+use crate::output::{self, Content, JsonFile, Output, Ready, Staged, Target};
 use crate::progress::Progress;
 use crate::report::{Failure, show_diagnostics};
 
@@ -48,13 +49,29 @@ impl Took {
     }
 }
 
+/// What annotations call the picture that they are of: the first of the outputs that shows the scene, else the first,
+/// as seen from their own file.
+fn picture_name(outputs: &[Output], json: &Target) -> String {
+    let shown = outputs.iter().find(|output| output.content == Content::Scene).or(outputs.first());
+    let Some(Target::File(picture)) = shown.map(|output| &output.target) else { return String::new() };
+    let folder = match json {
+        Target::File(json) => json.parent().unwrap_or(Path::new("")),
+        Target::Stdout => Path::new(""),
+    };
+    let picture = picture.strip_prefix(folder).unwrap_or(picture);
+    // With `/` between folders on every system
+    picture.to_string_lossy().replace(std::path::MAIN_SEPARATOR, "/")
+}
+
 /// The rendering of one moment after the other.
 pub(super) struct Run<'a> {
     pub plan: &'a Plan<'a>,
     pub input: &'a Input,
     pub settings: &'a RenderSettings,
-    /// Where the numbers go, if that is a file.
-    pub stats: Option<&'a Target>,
+    /// The files beside the pictures.
+    pub beside: &'a [JsonFile],
+    /// The annotations so far, if they are asked for, and where they go.
+    pub coco: Option<(Coco, Target)>,
     /// Once there is something to render.
     pub progress: Option<Progress>,
     /// What has been said already.
@@ -78,7 +95,7 @@ impl Run<'_> {
         // Now it is known which files the scene is made of: none of them may be lost, by none of the frames to come
         let ahead = if index == 0 { moments } else { &moments[index..=index] };
         let outputs = ahead.iter().flat_map(|moment| &moment.outputs);
-        output::refuse_overwriting(&self.input.files(), outputs, self.stats)?;
+        output::refuse_overwriting(&self.input.files(), outputs, self.beside)?;
         if !plan.quiet {
             compiled.advice.extend(self.advice_on_time(&compiled.scene, moments.len()));
             compiled.warnings.append(&mut compiled.advice);
@@ -94,7 +111,12 @@ impl Run<'_> {
         }
         let scene = &compiled.scene;
         let contents = Contents::of(&moment.outputs, scene)?;
-        let settings = &RenderSettings { buffers: contents.buffers(), ..settings.clone() };
+        let mut buffers = contents.buffers();
+        let ids = Plane::ObjectId.into();
+        if self.coco.is_some() && !buffers.contains(&ids) {
+            buffers.push(ids);
+        }
+        let settings = &RenderSettings { buffers, ..settings.clone() };
         settings.check(scene).map_err(Failure::Usage)?;
         settings.check_memory(scene).map_err(Failure::Work)?;
 
@@ -125,7 +147,12 @@ impl Run<'_> {
             let stage = ready.into_iter().zip(&bytes).map(|(ready, bytes)| ready.stage(bytes));
             let staged: Vec<Staged> = stage.collect::<Result<_, _>>()?;
             watch.check()?;
-            progress.aside(|| output::commit(staged, plan.quiet, &|| watch.check().is_err()))
+            progress.aside(|| output::commit(staged, plan.quiet, &|| watch.check().is_err()))?;
+            if let Some((coco, json)) = &mut self.coco {
+                let is_added = coco.add(scene, &film, &picture_name(&moment.outputs, json));
+                debug_assert!(is_added, "ids were asked for");
+            }
+            Ok(())
         });
         written?;
         Ok(Took { compile, render, write, rays })

@@ -13,7 +13,7 @@ use super::moments::Moment;
 use super::overrides::Overrides;
 use crate::args::{AntialiasingMode, Bits, Frames, RenderArgs, Shard, Terminator};
 use crate::input::{self, Input};
-use crate::output::{self, Content, Names, Output, Target};
+use crate::output::{self, Content, JsonFile, Names, Output, Target};
 use crate::report::{Failure, say, shown};
 
 /// No more pixels are rendered at once.
@@ -27,6 +27,8 @@ pub(super) struct Plan<'a> {
     pub heat: Option<Output>,
     pub bits: Option<Bits>,
     pub stats: StatsPlan,
+    /// Where annotations go.
+    pub coco: Option<JsonFile>,
     pub settings: RenderSettings,
     pub overrides: Overrides<'a>,
     /// Of 8- and 16-bit files, in place of the scene's.
@@ -57,14 +59,14 @@ pub(super) struct Job<'a> {
 pub(super) enum StatsPlan {
     Nowhere,
     Table,
-    Json(Target),
+    Json(JsonFile),
 }
 
 impl StatsPlan {
     /// Where JSON goes.
-    pub fn target(&self) -> Option<&Target> {
+    pub fn file(&self) -> Option<&JsonFile> {
         match self {
-            StatsPlan::Json(target) => Some(target),
+            StatsPlan::Json(file) => Some(file),
             StatsPlan::Nowhere | StatsPlan::Table => None,
         }
     }
@@ -77,8 +79,10 @@ impl<'a> Plan<'a> {
         let stats = match &args.stats {
             None => StatsPlan::Nowhere,
             Some(None) => StatsPlan::Table,
-            Some(Some(path)) => StatsPlan::Json(stats_target(path)?),
+            Some(Some(path)) => StatsPlan::Json(JsonFile::of("--stats=", path)?),
         };
+        let coco = args.coco.as_deref().map(|path| JsonFile::of("--coco ", path)).transpose()?;
+        let beside: Vec<&JsonFile> = stats.file().into_iter().chain(&coco).collect();
         let is_scaled = |output: &Output| match &output.content {
             Content::Buffer(BufferDesc::Plane(plane)) => plane.is_distance() && output.is_png(),
             _ => false,
@@ -98,13 +102,13 @@ impl<'a> Plan<'a> {
         let several = jobs.len() > 1;
         let pictures = outputs.iter().map(|output| ("-o", &output.target));
         let pictures = pictures.chain(heat.iter().map(|heat| ("--heat", &heat.target)));
-        for (option, target) in pictures.chain(stats.target().map(|target| ("--stats", target))) {
+        for (option, target) in pictures.chain(beside.iter().map(|file| (file.option(), &file.target))) {
             output::check_placeholders(option, target, several)?;
         }
         for job in &jobs {
             let all: Vec<Output> = outputs.iter().chain(&heat).map(|output| output.of_scene(&job.names)).collect();
-            let stats = stats.target().map(|target| target.of_scene(&job.names));
-            output::refuse_clashes(input::file_of(job.scene), &all, stats.as_ref())?;
+            let beside: Vec<JsonFile> = beside.iter().map(|file| file.of_scene(&job.names)).collect();
+            output::refuse_clashes(input::file_of(job.scene), &all, &beside)?;
         }
 
         let simd = args.simd.unwrap_or(SimdLevel::Auto);
@@ -166,6 +170,7 @@ impl<'a> Plan<'a> {
             heat,
             bits,
             stats,
+            coco,
             settings,
             overrides,
             exposure: args.exposure,
@@ -217,7 +222,7 @@ impl<'a> Plan<'a> {
                 let of_frame = move |frame| if self.frames.is_some() { output.of_frame(frame) } else { output.clone() };
                 frames.clone().map(of_frame).map(|output| output.target)
             });
-            for target in pictures.chain(self.stats.target().cloned()) {
+            for target in pictures.chain(self.beside(&job.names).into_iter().map(|file| file.target)) {
                 let target = target.of_scene(&job.names);
                 let (name, real) = (target.name(), target.real());
                 if scenes.contains(&real) {
@@ -239,13 +244,18 @@ impl<'a> Plan<'a> {
         Ok(())
     }
 
+    /// The files beside the pictures of a scene.
+    pub fn beside(&self, names: &Names) -> Vec<JsonFile> {
+        self.stats.file().into_iter().chain(&self.coco).map(|file| file.of_scene(names)).collect()
+    }
+
     /// The moments to render, each with its own files.
     pub fn moments(&self, job: &Job, input: &Input, outputs: &[Output]) -> Result<Vec<Moment>, Failure> {
         let Some(Frames { first, last }) = self.frames else {
             let outputs = outputs.iter().map(|output| output.of_scene(&job.names)).collect();
             return Ok(vec![Moment { time: self.time, outputs }]);
         };
-        let stats = self.stats.target().map(|target| target.of_scene(&job.names));
+        let beside = self.beside(&job.names);
         for output in outputs {
             if let Target::File(path) = &output.target
                 && path.metadata().is_ok_and(|meta| !meta.is_file() && !meta.is_dir())
@@ -261,7 +271,7 @@ impl<'a> Plan<'a> {
         for frame in first..=last {
             let outputs = outputs.iter().map(|output| output.of_frame(frame).of_scene(&job.names));
             let outputs: Vec<Output> = outputs.collect();
-            output::refuse_clashes(input::file_of(job.scene), &outputs, stats.as_ref())?;
+            output::refuse_clashes(input::file_of(job.scene), &outputs, &beside)?;
             for output in &outputs {
                 if let Target::File(path) = &output.target
                     && !seen.insert(path.clone())
@@ -323,8 +333,7 @@ impl<'a> Plan<'a> {
                 .chain(self.heat.clone())
                 .collect();
         let own: Vec<Output> = outputs.iter().map(|output| output.of_scene(&job.names)).collect();
-        let stats = self.stats.target().map(|target| target.of_scene(&job.names));
-        output::refuse_clashes(input::file_of(job.scene), &own, stats.as_ref())?;
+        output::refuse_clashes(input::file_of(job.scene), &own, &self.beside(&job.names))?;
         Ok((outputs, settings))
     }
 
@@ -400,17 +409,6 @@ fn heat_output(path: &Path) -> Result<Output, Failure> {
         return Err(Failure::Usage(format!("--heat {name}: the file's name must end in .png")));
     }
     Ok(Output { target, format: Format::Png8, content: Content::Heat })
-}
-
-/// A file for the numbers is a `.json`, so that no slip of the hand writes them over a scene or a picture.
-fn stats_target(path: &Path) -> Result<Target, Failure> {
-    let target = Target::of(path);
-    let is_json = path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("json"));
-    if target != Target::Stdout && !is_json {
-        let name = shown(path);
-        return Err(Failure::Usage(format!("--stats={name}: the file's name must end in .json; - is standard output")));
-    }
-    Ok(target)
 }
 
 fn inside(crop: Window, width: u32, height: u32) -> bool {

@@ -4,6 +4,7 @@ mod answers;
 #[cfg(unix)]
 mod book;
 mod buffers;
+mod coco;
 mod common;
 mod compare;
 mod faults;

@@ -15,6 +15,7 @@ mod geometry;
 mod known;
 mod links;
 mod many_lights;
+mod masks;
 mod motion;
 mod near;
 mod relight;

@@ -77,7 +77,7 @@ pub struct Receipt {
 }
 
 /// What made a file, as it says of itself.
-const SOFTWARE: &str = concat!("firstlight ", env!("CARGO_PKG_VERSION"));
+pub(crate) const SOFTWARE: &str = concat!("firstlight ", env!("CARGO_PKG_VERSION"));
 
 /// Before a receipt's key, where it stands among the names of others.
 const PREFIX: &str = "firstlight:";

@@ -14,6 +14,7 @@ mod beams;
 mod cell;
 mod centers;
 mod change;
+mod coco;
 mod counts;
 mod coverage;
 mod cut;
@@ -31,6 +32,7 @@ mod leaves;
 mod light_queue;
 mod lights;
 mod many;
+mod masks;
 mod motion;
 mod packets;
 mod passes;
@@ -55,9 +57,11 @@ use std::ops::ControlFlow;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
+pub use coco::Coco;
 pub use counts::{LightCounts, RenderStats};
 pub use film::Film;
 pub use heat::Heat;
+pub use masks::{Mask, ObjectMasks};
 pub use receipt_settings::{ReceiptFault, ReceiptSettings};
 pub use relight::{LightChange, RelightError, Relit, relight};
 

@@ -292,6 +292,11 @@ impl Scene {
         }
     }
 
+    /// The names of all objects, that of id 1 first: shapes, then lights.
+    pub fn object_names(&self) -> Vec<Option<&str>> {
+        self.names_of(Named::Object)
+    }
+
     /// The names of the lights, in scene order.
     pub(crate) fn light_names(&self) -> Vec<Option<String>> {
         self.summary.lights.iter().map(|(_, name, _)| name.clone()).collect()

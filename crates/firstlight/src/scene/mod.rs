@@ -19,6 +19,7 @@ mod seen_lights;
 #[cfg(test)]
 mod tests;
 mod text;
+mod through;
 mod trace;
 mod trees;
 mod world;

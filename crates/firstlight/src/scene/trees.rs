@@ -164,7 +164,7 @@ impl Geometry {
     }
 
     /// Whether a camera ray ends at a triangle, or passes through.
-    fn seen(&self, mesh: &Mesh, first: u32, triangle: u32, d: Vec3) -> bool {
+    pub(super) fn seen(&self, mesh: &Mesh, first: u32, triangle: u32, d: Vec3) -> bool {
         let surface = &self.surfaces[(first + mesh.part(triangle).surface) as usize];
         surface.visible && !(surface.single_sided && mesh.is_behind(triangle, d))
     }
