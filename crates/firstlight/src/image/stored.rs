@@ -295,13 +295,16 @@ fn read_exr(bytes: &[u8]) -> Result<StoredPlanes, ImageError> {
 /// The channels of an EXR file as planes: `depth.Z` belongs to `depth`, R, G, B and A to the picture.
 #[cfg(feature = "exr")]
 fn planes_of(channels: Vec<(String, PlaneVec)>) -> Vec<StoredPlane> {
-    let is_of_picture = |name: &str| Plane::Color.channels().contains(&name);
+    let owner = |name: &str| {
+        let mut owners = Plane::ALL.iter().filter(|plane| plane.names_channels());
+        owners.find(|plane| plane.channels().contains(&name)).map(|plane| plane.name())
+    };
     let mut layers: Vec<(String, Vec<(String, PlaneVec)>)> = Vec::new();
     for (name, numbers) in channels {
-        let (layer, channel) = match name.rsplit_once('.') {
-            Some((layer, channel)) => (layer.to_owned(), channel.to_owned()),
-            None if is_of_picture(&name) => (Plane::Color.name().to_owned(), name),
-            None => (name.clone(), name),
+        let (layer, channel) = match (owner(&name), name.rsplit_once('.')) {
+            (Some(owner), _) => (owner.to_owned(), name),
+            (None, Some((layer, channel))) => (layer.to_owned(), channel.to_owned()),
+            (None, None) => (name.clone(), name),
         };
         // What is whole and what is not cannot be one plane
         let is_whole = |numbers: &PlaneVec| matches!(numbers, PlaneVec::Wholes(_));
@@ -326,7 +329,8 @@ fn plane_of(name: String, mut channels: Vec<(String, PlaneVec)>) -> StoredPlane 
         let pixels = channels[0].1.numbers().count();
         channels.push(("A".into(), PlaneVec::Floats(vec![1.0; pixels])));
     }
-    channels.sort_by_key(|(name, _)| ORDER.iter().position(|known| known == name).unwrap_or(ORDER.len()));
+    let order = Plane::from_name(&name).map_or(&ORDER[..], Plane::channels);
+    channels.sort_by_key(|(name, _)| order.iter().position(|known| known == name).unwrap_or(order.len()));
     fn join<T: Copy>(all: &[&[T]]) -> Vec<T> {
         if let [one] = all {
             return one.to_vec();
