@@ -69,7 +69,7 @@ fn rendered(scene: &Scene, settings: &RenderSettings) -> StoredPlanes {
     let settings = RenderSettings { buffers: scene.buffers().to_vec(), ..settings.clone() };
     let film = film(scene, &settings);
     let receipt = scene.buffers_receipt(&settings, scene.buffers());
-    StoredPlanes::read(&film.encode(scene.buffers(), Format::Npz, &receipt).unwrap()).unwrap()
+    StoredPlanes::read(&film.encode(scene.buffers(), Format::Npz, &FileSettings::default(), &receipt).unwrap()).unwrap()
 }
 
 fn pixels(image: &Image) -> &[f32] {
