@@ -4,6 +4,7 @@
 //! `python/firstlight` beside it is the package that imports this module: its helpers, its stubs, its words.
 
 mod arrays;
+mod coco;
 mod error;
 mod files;
 mod item;
@@ -15,6 +16,7 @@ mod value;
 use firstlight::{LightDesc, MaterialDesc, Plane, ShapeDesc, TextureDesc, builtin_scenes};
 use pyo3::prelude::*;
 
+use crate::coco::PyCoco;
 use crate::error::{SceneError, SceneWarning};
 use crate::render::PyRender;
 use crate::scene::PyScene;
@@ -24,6 +26,7 @@ use crate::scene::PyScene;
 fn _firstlight(py: Python<'_>, module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<PyScene>()?;
     module.add_class::<PyRender>()?;
+    module.add_class::<PyCoco>()?;
     module.add_function(wrap_pyfunction!(render::restored, module)?)?;
     module.add("SceneError", py.get_type::<SceneError>())?;
     module.add("SceneWarning", py.get_type::<SceneWarning>())?;

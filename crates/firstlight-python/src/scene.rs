@@ -6,8 +6,8 @@ use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
 
 use firstlight::{
-    AaMode, BufferDesc, Compiled, DVec3, GroupDesc, InstanceDesc, MeshDesc, MotionTo, NoAssets, Parsed, RenderSettings,
-    SamplesDesc, SceneDesc, SceneError as Faults, ShapeDesc, Vec3, Window, WorldRay, builtin_scenes,
+    AaMode, BufferDesc, Compiled, DVec3, Film, GroupDesc, InstanceDesc, MeshDesc, MotionTo, NoAssets, Parsed, Plane,
+    RenderSettings, SamplesDesc, SceneDesc, SceneError as Faults, ShapeDesc, Vec3, Window, WorldRay, builtin_scenes,
 };
 use numpy::{PyArray1, PyArrayMethods};
 use pyo3::exceptions::{PyKeyError, PyMemoryError, PyTypeError, PyValueError};
@@ -93,6 +93,24 @@ impl PyScene {
             })?)),
         };
         Ok(Wanted { camera, size, antialiasing, samples, tolerance, time, ..Wanted::default() })
+    }
+
+    /// The scene as a camera sees it, and the objects that the middles of the pixels meet.
+    pub fn film_of_objects(
+        &self,
+        py: Python<'_>,
+        camera: Option<&Bound<'_, PyAny>>,
+        size: [Option<u32>; 2],
+        time: f64,
+    ) -> PyResult<(Arc<Compiled>, Film)> {
+        let mut wanted = Self::wanted(py, camera, size, None, None, None, time)?;
+        let buffers = vec![Plane::ObjectId.into()];
+        wanted.buffers = Some(vec![Plane::ObjectId.into()]);
+        let (compiled, _) = self.compiled(py, &wanted)?;
+        let settings = RenderSettings { buffers, ..RenderSettings::default() };
+        settings.check_memory(&compiled.scene).map_err(PyMemoryError::new_err)?;
+        let film = run(py, &compiled.scene, &settings, None)?;
+        Ok((compiled, film))
     }
 
     fn item(&self, py: Python<'_>, family: &str, index: usize) -> PyResult<Item> {

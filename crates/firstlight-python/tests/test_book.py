@@ -6,7 +6,7 @@ import re
 import pytest
 
 ROOT = pathlib.Path(__file__).parents[3]
-PAGES = [ROOT / "docs/src" / page for page in ("python.md", "conventions.md", "pyrender.md")]
+PAGES = [ROOT / "docs/src" / page for page in ("python.md", "conventions.md", "data-set.md", "pyrender.md")]
 PAGES += [ROOT / "README.md", ROOT / "crates/firstlight-python/README.md"]
 
 

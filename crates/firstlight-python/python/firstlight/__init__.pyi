@@ -98,6 +98,23 @@ class Render(Mapping[str, NDArray[Any]]):
     def __iter__(self) -> Iterator[str]: ...
     def __len__(self) -> int: ...
 
+class Coco:
+    """A data set in COCO's format, which grows picture by picture: boxes and masks of all objects that are seen."""
+
+    def __init__(self) -> None: ...
+    def add(
+        self,
+        scene: Scene,
+        file_name: str,
+        *,
+        camera: Camera | str | Mapping[str, Any] | None = None,
+        width: int | None = None,
+        height: int | None = None,
+        time: float = 0.0,
+    ) -> None: ...
+    def to_json(self) -> str: ...
+    def save(self, path: str | os.PathLike[str]) -> None: ...
+
 class Camera:
     """A camera: the fields of `[camera]`, and the size of its picture."""
 
