@@ -5,8 +5,9 @@ use std::path::{Path, PathBuf};
 
 use firstlight::bench::{ShareSeen, sights};
 use firstlight::{
-    Assets, BufferDesc, CompileOptions, Display, Encoding, Film, FolderAssets, Format, Image, LightChoice, NoAssets,
-    Parsed, Plane, PlaneNumbers, RenderSettings, SamplesDesc, Scene, SceneDesc, Window, builtin_scenes, render,
+    Assets, BufferDesc, BufferView, CompileOptions, Display, Encoding, Film, FolderAssets, Format, Image, LightChoice,
+    NoAssets, Parsed, Plane, PlaneNumbers, RenderSettings, SamplesDesc, Scene, SceneDesc, Window, builtin_scenes,
+    render,
 };
 
 use crate::bench::config11;
@@ -51,6 +52,9 @@ pub fn run(filter: Option<&str>) -> Outcome {
     }
     if wanted("buffers") {
         buffers()?;
+    }
+    if wanted("view-depth") {
+        view_depth()?;
     }
     if wanted("terms") {
         terms()?;
@@ -178,6 +182,21 @@ fn buffers() -> Outcome {
     let mut pictures = vec![film.develop().pixels];
     pictures.extend((0..3).map(|which| others.iter().map(|views| views[which]).collect()));
     save("buffers", &beside(&pictures), &scene.display(), &scene, &settings)
+}
+
+/// What `firstlight view-buffer` makes of a depth: `view-depth.png`.
+fn view_depth() -> Outcome {
+    let (scene, settings, film) = film_of("clockwork.toml", &[Plane::Depth.into()])?;
+    let Some(numbers) = film.numbers(Plane::Depth) else { unreachable!("it was asked for") };
+    let channels = ["Z".to_owned()];
+    let size = [BUFFER; 2];
+    let view =
+        BufferView { name: "depth", channels: &channels, numbers, size, range: None, display: Display::default() };
+    let bytes = view.encode(&scene.receipt(&settings)).map_err(|e| e.to_string())?;
+    let path = Path::new("docs/src/pictures/view-depth.png");
+    write(&root().join(path), &bytes)?;
+    eprintln!("wrote {}", path.display());
+    Ok(())
 }
 
 /// Renders one scene into `docs/src/pictures/NAME.png`.

@@ -56,6 +56,10 @@ pub enum Command {
     /// Lights a picture again that was rendered with --buffers relight: other strengths and colours, without a render
     #[command(after_help = RELIGHT_EXAMPLES)]
     Relight(RelightArgs),
+    /// Makes a picture to look at of a buffer of a file: depth in false colours with a legend, ids in colours, motion as
+    /// a colour wheel
+    #[command(after_help = VIEW_EXAMPLES)]
+    ViewBuffer(ViewBufferArgs),
     /// Prints the JSON Schema of scene files, for completion in editors
     Schema,
     /// Prints a completion script for a shell
@@ -423,6 +427,40 @@ pub struct DiffArgs {
     pub quiet: bool,
 }
 
+const VIEW_EXAMPLES: &str = "\
+Examples:
+  firstlight view-buffer room.exr depth
+      room.depth.png, with a legend in metres
+  firstlight view-buffer room.npz object-id -o ids.png
+      each object in a colour of its own
+  firstlight view-buffer depth.npy depth --range 0,10
+      an array by itself; what it is, the name says";
+
+/// `firstlight view-buffer`
+#[derive(Args, Debug)]
+pub struct ViewBufferArgs {
+    /// A file with buffers: .exr, .npz, .npy, .png or .hdr
+    #[arg(value_name = "FILE", value_hint = ValueHint::FilePath)]
+    pub file: PathBuf,
+    /// The buffer to look at, as `firstlight buffers` lists them; of an .npy file what its array is
+    #[arg(value_name = "NAME")]
+    pub name: String,
+    /// The picture to write; - is standard output [default: FILE.NAME.png, without the ending of FILE, in the working
+    /// folder]
+    #[arg(short, long = "output", value_name = "FILE.png", value_hint = ValueHint::FilePath)]
+    pub output: Option<PathBuf>,
+    /// The numbers at the ends of the legend, in the buffer's unit; of motion B is the radius of the wheel [default: the
+    /// least and the greatest finite number]
+    #[arg(long, value_name = "A,B", value_parser = range, allow_hyphen_values = true)]
+    pub range: Option<[f64; 2]>,
+    /// Stops of exposure of colours, -64 to 64 [default: 0]
+    #[arg(long, value_name = "EV", allow_negative_numbers = true, value_parser = exposure)]
+    pub exposure: Option<f64>,
+    /// Says nothing but errors
+    #[arg(short, long)]
+    pub quiet: bool,
+}
+
 /// `firstlight verify`
 #[derive(Args, Debug)]
 pub struct VerifyArgs {
@@ -560,6 +598,12 @@ fn exposure(text: &str) -> Result<f64, String> {
         Ok(ev) if (-64.0..=64.0).contains(&ev) => Ok(ev),
         _ => Err("a number of stops from -64 to 64 is needed".into()),
     }
+}
+
+/// Reads the ends of a legend.
+fn range(text: &str) -> Result<[f64; 2], String> {
+    let range = numbers::<2>(text).filter(|[low, high]| low < high);
+    range.ok_or_else(|| "two numbers A,B are needed, the lower one first, as 0,10".into())
 }
 
 /// Reads a scale of depth in units per metre.

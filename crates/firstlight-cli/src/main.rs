@@ -18,6 +18,7 @@ mod report;
 mod scenes;
 mod stats;
 mod verify;
+mod view_buffer;
 
 use std::process::ExitCode;
 
@@ -51,6 +52,7 @@ fn main() -> ExitCode {
         Command::Diff(args) => ("diff", diff::run(args)),
         Command::Relight(args) => ("relight", relight::run(args)),
         Command::Verify(args) => ("verify", verify::run(args)),
+        Command::ViewBuffer(args) => ("view-buffer", view_buffer::run(args)),
         Command::Schema => ("schema", answer(&with_newline(firstlight::schema()))),
         Command::Completions(args) => ("completions", completions(args.shell)),
         Command::Man => ("man", man()),

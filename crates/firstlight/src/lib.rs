@@ -79,14 +79,15 @@ pub use accel::SimdLevel;
 pub use camera::{Camera, CameraDesc, FilmPlane, Frame, Orthographic, Pinhole, Projection};
 pub use color::{Display, Encoding, Rgb};
 pub use context::{AssetError, Assets, CompileStage, FolderAssets, MemoryAssets, NoAssets, OnCompile};
+pub use describe::nearest_name;
 pub use describe::{ColorDesc, ColorParam, FilePath, NumberParam, ParamDesc, SamplesDesc, ScaleDesc};
 pub use error::{Diagnostic, Place, SceneError, Severity, printable};
 pub use ids::{LightGroupId, LightId, MaterialId, SurfaceId, TextureId};
 pub use image::{
-    Buffer, BufferDesc, DifferingSample, Distance, FileSettings, Flip, Format, Image, ImageError, LightChoice,
-    LightPart, NamedPlane, PendingFile, Plane, PlaneDifference, PlaneNumbers, PlaneVec, Receipt, Sampling, StagedFile,
-    StoredImage, StoredPlane, StoredPlanes, Window, Written, display_steps, encode_planes, false_colors, is_decoding,
-    relative_differences, write_open, write_whole,
+    Buffer, BufferDesc, BufferView, DifferingSample, Distance, FileSettings, Flip, Format, Image, ImageError,
+    LightChoice, LightPart, NamedPlane, PendingFile, Plane, PlaneDifference, PlaneNumbers, PlaneVec, Receipt, Sampling,
+    StagedFile, StoredImage, StoredPlane, StoredPlanes, Window, Written, display_steps, encode_planes, false_colors,
+    is_decoding, relative_differences, write_open, write_whole,
 };
 pub use import::{ImportError, MeshData, MeshFormat, MeshPart, MeshPlace, MeshReport, is_point_set, read_mesh};
 pub use light::{

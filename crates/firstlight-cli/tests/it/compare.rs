@@ -157,7 +157,7 @@ fn what_cannot_be_verified_is_said() {
     folder.run("verify a.png --scene none.toml").exits(1).says(&["none.toml: no such file"]);
     folder.run("verify none.png").exits(1).says(&["none.png: no such file"]);
     folder.run("verify .").exits(1).says(&["is a folder"]);
-    folder.run("verify scene.toml").exits(1).says(&["scene.toml: is not a PNG, EXR, NPZ or HDR file"]);
+    folder.run("verify scene.toml").exits(1).says(&["scene.toml: is not a PNG, EXR, NPZ, NPY or HDR file"]);
     for name in ["a.png", "a.exr"] {
         let whole = folder.get(name);
         folder.put("cut", &whole[..whole.len() / 2]);
@@ -226,7 +226,7 @@ fn what_cannot_be_compared_is_said() {
         ("diff a.png small.png", 1, "a.png is 24 x 16 pixels and small.png is 12 x 8"),
         ("diff a.npz n.exr", 1, "a.npz has color, depth and n.exr has normal: no buffer is in both"),
         ("diff a.npz n.exr --buffers normal", 1, "a.npz has no buffer normal; it has color, depth"),
-        ("diff a.png scene.toml", 1, "scene.toml: is not a PNG, EXR, NPZ or HDR file"),
+        ("diff a.png scene.toml", 1, "scene.toml: is not a PNG, EXR, NPZ, NPY or HDR file"),
         ("diff a.png none.png", 1, "none.png: no such file"),
         ("diff a.png a.png -o a.png", 2, "would replace one of the two pictures"),
         ("diff a.png a.png -o d.exr", 2, "must end in .png"),

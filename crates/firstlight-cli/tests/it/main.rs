@@ -19,3 +19,4 @@ mod several;
 mod signals;
 mod streams;
 mod usage;
+mod view_buffer;

@@ -288,6 +288,11 @@ impl Fields<'_, '_, '_> {
     }
 }
 
+/// The known name nearest to `name`, if one is near enough to have been meant.
+pub fn nearest_name<'k>(name: &str, known: &[&'k str]) -> Option<&'k str> {
+    nearest(name, known)
+}
+
 /// The known word nearest to `word`, if one is near enough to have been meant.
 pub(crate) fn nearest<'k>(word: &str, known: &[&'k str]) -> Option<&'k str> {
     // Nobody misspells so long a word, and the comparison takes time by the product of the lengths

@@ -96,17 +96,22 @@ pub enum LightChoice {
     Name(String),
 }
 
+/// The plane that is like a part of what lights send.
+fn of_lights(part: Option<LightPart>) -> Plane {
+    match part {
+        Some(LightPart::Specular | LightPart::UnscaledSpecular) => Plane::Specular,
+        Some(LightPart::Visibility) => Plane::Shadow,
+        _ => Plane::Diffuse,
+    }
+}
+
 impl Buffer {
     /// The plane that has its channels, its unit and its sampling: itself, or that of all lights together, or of the
     /// background.
     pub fn plane(self) -> Plane {
         match self {
             Buffer::Plane(plane) => plane,
-            Buffer::Light(_, part) | Buffer::Group(_, part) => match part {
-                Some(LightPart::Specular | LightPart::UnscaledSpecular) => Plane::Specular,
-                Some(LightPart::Visibility) => Plane::Shadow,
-                _ => Plane::Diffuse,
-            },
+            Buffer::Light(_, part) | Buffer::Group(_, part) => of_lights(part),
             Buffer::Coverage(_) => Plane::BackgroundCoverage,
         }
     }
@@ -205,6 +210,15 @@ impl BufferDesc {
                 Err((format!("{} is not a part of a group of lights", quoted(part.name())), Some(hint)))
             }
             (_, part) => Ok(BufferDesc::Group { group: choice, part }),
+        }
+    }
+
+    /// The plane that has its channels, as [`Buffer::plane`].
+    pub fn plane(&self) -> Plane {
+        match self {
+            BufferDesc::Plane(plane) => *plane,
+            BufferDesc::Light { part, .. } | BufferDesc::Group { part, .. } => of_lights(*part),
+            BufferDesc::Coverage(_) => Plane::BackgroundCoverage,
         }
     }
 

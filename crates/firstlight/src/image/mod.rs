@@ -24,6 +24,7 @@ mod png;
 mod quantized;
 pub(crate) mod read;
 mod stored;
+mod view;
 
 pub use buffer::{Buffer, BufferDesc, LightChoice, LightPart};
 pub use compare::{DifferingSample, Distance, PlaneDifference, display_steps, false_colors, relative_differences};
@@ -38,6 +39,7 @@ pub(crate) use plane::PlaneFile;
 pub use plane::{NamedPlane, Plane, PlaneNumbers, Sampling};
 pub use quantized::FileSettings;
 pub use stored::{StoredImage, StoredPlane, StoredPlanes};
+pub use view::BufferView;
 
 use crate::color::Display;
 

@@ -56,6 +56,34 @@ pub(super) fn read(bytes: &[u8]) -> Result<StoredPlanes, ImageError> {
     Ok(StoredPlanes { format: Format::Npz, film: [width, height], window, planes, receipt })
 }
 
+/// The array of an NPY file, which does not say what it is called.
+pub(super) fn read_one(bytes: &[u8]) -> Result<StoredPlanes, ImageError> {
+    let name = "array";
+    let (header, numbers) = parted(bytes).ok_or_else(|| damaged("it has no header".into()))?;
+    let shape = shape(header).unwrap_or_default();
+    let [rows, columns, ref channels @ ..] = shape[..] else {
+        return Err(damaged(format!("its shape is {shape:?}; rows and columns are needed")));
+    };
+    if channels.len() > 1 {
+        return Err(damaged(format!("its shape is {shape:?}; rows, columns and channels are read")));
+    }
+    let count = channels.first().copied().unwrap_or(1);
+    let numbers = numbers_of(name, header, numbers, [rows, columns, count])?;
+    let side = |n: u64| u32::try_from(n).unwrap_or(u32::MAX);
+    let (width, height) = (side(columns), side(rows));
+    check_size(width, height, &LIMITS)?;
+    let channels = channel_names(name, count as usize, &Receipt::default());
+    let plane = StoredPlane { name: name.to_owned(), channels, numbers, steps: None };
+    let window = Window { x: 0, y: 0, width, height };
+    Ok(StoredPlanes {
+        format: Format::Npy,
+        film: [width, height],
+        window,
+        planes: vec![plane],
+        receipt: Receipt::default(),
+    })
+}
+
 fn damaged(reason: String) -> ImageError {
     ImageError::Damaged { format: "NPZ", reason }
 }

@@ -11,7 +11,9 @@
 //! - alpha: gray.
 
 use super::png::{self, ColorType, Depth, Samples};
-use super::{Format, ImageError, NamedPlane, Plane, PlaneNumbers, Receipt, Window, hdr};
+use super::{
+    BufferDesc, Format, ImageError, NamedPlane, Plane, PlaneNumbers, PlaneVec, Receipt, StoredPlane, Window, hdr,
+};
 use crate::color::{Display, Quantizer};
 
 /// How files hold numbers, where there is a choice.
@@ -100,6 +102,40 @@ impl Plane {
     /// Whether its numbers are distances from the camera, which 16-bit files hold at a scale.
     pub fn is_distance(self) -> bool {
         Kind::of(self) == Kind::Distance
+    }
+}
+
+impl StoredPlane {
+    /// The numbers that a buffer of that name has where these are stored: of 8- and 16-bit files, back from the codes
+    /// to metres, unit vectors, shares; the ids as they are, and colours from 0 to 1, encoded as they are.
+    pub fn meant(&self, name: &str, receipt: &Receipt) -> PlaneVec {
+        let (Some(steps), PlaneVec::Wholes(codes)) = (self.steps, &self.numbers) else { return self.numbers.clone() };
+        let kind = BufferDesc::parse(name).map_or(Kind::Color, |desc| Kind::of(desc.plane()));
+        let settings = FileSettings::of(receipt);
+        let part = |code: u32| f64::from(code) / f64::from(steps);
+        let number = |code: u32| match kind {
+            Kind::Distance if code == 0 => f64::INFINITY,
+            Kind::Distance => f64::from(code) / settings.depth_scale,
+            Kind::Direction => part(code) * 2.0 - 1.0,
+            _ => part(code),
+        };
+        if kind == Kind::Id {
+            return self.numbers.clone();
+        }
+        let mut numbers: Vec<f32> = codes.iter().map(|code| number(*code) as f32).collect();
+        if kind == Kind::Direction {
+            // Black is none
+            for (v, _) in numbers
+                .as_chunks_mut::<3>()
+                .0
+                .iter_mut()
+                .zip(codes.as_chunks::<3>().0)
+                .filter(|(_, code)| **code == [0; 3])
+            {
+                *v = [0.0; 3];
+            }
+        }
+        PlaneVec::Floats(numbers)
     }
 }
 
@@ -271,7 +307,7 @@ mod tests {
         let floats = |numbers| PlaneNumbers::Floats(numbers);
         let rgb = [0.0, 0.5, 1.0].repeat(4);
         let rgba = [0.0, 0.5, 1.0, 1.0].repeat(4);
-        let pixels = |bytes: Vec<u8>| super::super::StoredImage::read(&bytes).unwrap().pixels;
+        let pixels = |bytes: Vec<u8>| super::super::StoredPlanes::read(&bytes).unwrap().planes[0].rgba().unwrap();
         for format in [Format::Png8, Format::Png16, Format::Hdr] {
             let [term, picture] = [(Plane::Diffuse, &rgb), (Plane::Color, &rgba)]
                 .map(|(plane, numbers)| pixels(encoded(plane, floats(numbers), format).unwrap()));

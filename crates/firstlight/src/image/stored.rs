@@ -59,7 +59,7 @@ pub struct StoredPlane {
 }
 
 impl StoredPlanes {
-    /// Reads a PNG, EXR, NPZ or HDR file; which of them, its first bytes say. Made for the files that firstlight
+    /// Reads a PNG, EXR, NPZ, NPY or HDR file; which of them, its first bytes say. Made for the files that firstlight
     /// writes; those of other programs are read if they are of the same make: no tiles with levels, no compressed
     /// arrays.
     ///
@@ -71,6 +71,8 @@ impl StoredPlanes {
             contained("PNG", || read_png(bytes))
         } else if bytes.starts_with(b"#?RADIANCE\n") {
             contained("HDR", || read_hdr(bytes))
+        } else if bytes.starts_with(b"\x93NUMPY") {
+            contained("NPY", || super::npz_read::read_one(bytes))
         } else if bytes.starts_with(b"PK\x03\x04") {
             contained("NPZ", || super::npz_read::read(bytes))
         } else if bytes.starts_with(&[0x76, 0x2f, 0x31, 0x01]) {
@@ -79,7 +81,7 @@ impl StoredPlanes {
             #[cfg(not(feature = "exr"))]
             Err(ImageError::WithoutExr)
         } else {
-            Err(ImageError::UnknownKind { expected: "PNG, EXR, NPZ or HDR" })
+            Err(ImageError::UnknownKind { expected: "PNG, EXR, NPZ, NPY or HDR" })
         }
     }
 
@@ -137,7 +139,7 @@ impl StoredPlane {
 }
 
 impl StoredImage {
-    /// Reads the picture of a PNG, EXR, NPZ or HDR file, as [`StoredPlanes::read`].
+    /// Reads the picture of a PNG, EXR, NPZ, NPY or HDR file, as [`StoredPlanes::read`].
     ///
     /// # Errors
     /// Those of [`StoredPlanes::read`]; [`ImageError::Damaged`] for a file without a picture.
@@ -391,7 +393,7 @@ mod tests {
     #[test]
     fn other_files_are_named_as_such() {
         let words = StoredImage::read(b"BM").unwrap_err().to_string();
-        assert_eq!(words, "is not a PNG, EXR, NPZ or HDR file; convert it to one");
+        assert_eq!(words, "is not a PNG, EXR, NPZ, NPY or HDR file; convert it to one");
     }
 
     #[test]
