@@ -69,6 +69,7 @@ impl Named {
     }
 
     /// The name of its layer, as other renderers have it.
+    #[cfg_attr(not(feature = "exr"), allow(dead_code, reason = "only EXR files say it"))]
     fn layer(self) -> &'static str {
         match self {
             Named::Object => "CryptoObject",
@@ -130,6 +131,7 @@ pub(crate) fn manifest<'a>(names: impl Iterator<Item = Option<&'a str>>) -> Stri
 }
 
 /// What a file of such layers says before its pixels: keys and values.
+#[cfg_attr(not(feature = "exr"), allow(dead_code, reason = "only EXR files say it"))]
 pub(crate) fn metadata(planes: &[NamedPlane<'_>], receipt: &Receipt) -> Vec<(String, String)> {
     let mut all = Vec::new();
     for named in planes.iter().filter_map(|plane| Named::of_layer(plane.plane)) {
