@@ -213,12 +213,13 @@ impl BufferDesc {
         }
     }
 
-    /// The plane that has its channels, as [`Buffer::plane`].
-    pub fn plane(&self) -> Plane {
+    /// The plane that has its channels, as [`Buffer::plane`]; `None` of what is many planes.
+    pub fn plane(&self) -> Option<Plane> {
         match self {
-            BufferDesc::Plane(plane) => *plane,
-            BufferDesc::Light { part, .. } | BufferDesc::Group { part, .. } => of_lights(*part),
-            BufferDesc::Coverage(_) => Plane::BackgroundCoverage,
+            BufferDesc::Plane(plane) => Some(*plane),
+            BufferDesc::Light { part, .. } | BufferDesc::Group { part, .. } => Some(of_lights(*part)),
+            BufferDesc::Coverage(_) => Some(Plane::BackgroundCoverage),
+            BufferDesc::Relight => None,
         }
     }
 

@@ -110,7 +110,8 @@ impl StoredPlane {
     /// to metres, unit vectors, shares; the ids as they are, and colours from 0 to 1, encoded as they are.
     pub fn meant(&self, name: &str, receipt: &Receipt) -> PlaneVec {
         let (Some(steps), PlaneVec::Wholes(codes)) = (self.steps, &self.numbers) else { return self.numbers.clone() };
-        let kind = BufferDesc::parse(name).map_or(Kind::Color, |desc| Kind::of(desc.plane()));
+        let plane = BufferDesc::parse(name).ok().and_then(|desc| desc.plane());
+        let kind = plane.map_or(Kind::Color, Kind::of);
         let settings = FileSettings::of(receipt);
         let part = |code: u32| f64::from(code) / f64::from(steps);
         let number = |code: u32| match kind {

@@ -114,7 +114,7 @@ impl BufferView<'_> {
 
     /// How it is looked at: by its name, else by its channels.
     fn look(&self) -> Look {
-        let plane = BufferDesc::parse(self.name).ok().map(|desc| desc.plane());
+        let plane = BufferDesc::parse(self.name).ok().and_then(|desc| desc.plane());
         let plane = plane.filter(|plane| plane.channels().len() <= self.channels.len());
         let of_plane = plane.and_then(|plane| match Kind::of(plane) {
             _ if plane.is_of_motion() => Some(Look::Flow),
