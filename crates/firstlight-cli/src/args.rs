@@ -56,8 +56,8 @@ pub enum Command {
     /// Lights a picture again that was rendered with --buffers relight: other strengths and colours, without a render
     #[command(after_help = RELIGHT_EXAMPLES)]
     Relight(RelightArgs),
-    /// Makes a picture to look at of a buffer of a file: depth in false colours with a legend, ids in colours, motion as
-    /// a colour wheel
+    /// Makes a picture to look at of a buffer of a file: depth in false colours with a legend, ids in colours, motion
+    /// as a colour wheel
     #[command(after_help = VIEW_EXAMPLES)]
     ViewBuffer(ViewBufferArgs),
     /// Prints the JSON Schema of scene files, for completion in editors
@@ -343,9 +343,9 @@ pub struct RenderArgs {
     #[arg(long, value_name = "FILE.json", require_equals = true, value_hint = ValueHint::FilePath)]
     #[arg(help_heading = "Messages")]
     pub stats: Option<Option<PathBuf>>,
-    /// Writes an annotation of each object that is seen, as JSON in COCO's format: its mask and its box, where it is seen
-    /// and where it would be if it were alone (amodal), its category, which is its name, and its object-id. All frames
-    /// are in one file [default: none]
+    /// Writes an annotation of each object that is seen, as JSON in COCO's format: its mask and its box, where it is
+    /// seen and where it would be if it were alone (amodal), its category, which is its name, and its object-id. All
+    /// frames are in one file [default: none]
     #[arg(long, value_name = "FILE.json", value_hint = ValueHint::FilePath, help_heading = "Output")]
     pub coco: Option<PathBuf>,
     /// Writes a second picture that shows where the work went: from black over violet, red and orange to pale yellow,
@@ -449,8 +449,8 @@ pub struct ViewBufferArgs {
     /// folder]
     #[arg(short, long = "output", value_name = "FILE.png", value_hint = ValueHint::FilePath)]
     pub output: Option<PathBuf>,
-    /// The numbers at the ends of the legend, in the buffer's unit; of motion B is the radius of the wheel [default: the
-    /// least and the greatest finite number]
+    /// The numbers at the ends of the legend, in the buffer's unit; of motion B is the radius of the wheel [default:
+    /// the least and the greatest finite number]
     #[arg(long, value_name = "A,B", value_parser = range, allow_hyphen_values = true)]
     pub range: Option<[f64; 2]>,
     /// Stops of exposure of colours, -64 to 64 [default: 0]

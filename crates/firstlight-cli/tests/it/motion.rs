@@ -73,7 +73,10 @@ fn motion_changes_no_pixel_of_the_picture() {
 #[test]
 fn what_leads_nowhere_is_said() {
     let folder = moving();
-    folder.run("render scene.toml --buffers motion -o a.npz").exits(2).says(&["--buffers motion", "--motion-to"]);
+    folder
+        .run("render scene.toml --buffers motion -o a.npz")
+        .exits(2)
+        .says(&["the buffer motion leads nowhere", "--motion-to"]);
     folder.run("render scene.toml --motion-to 1 -o a.npz").exits(2).says(&["--motion-to", "name one with --buffers"]);
     folder.run("render scene.toml --buffers motion --motion-to 2e9 -o a.npz").exits(2).says(&["-1e9 to 1e9"]);
     folder.run("render scene.toml --buffers motion --motion-to sid -o a.npz").exits(2).says(&["sid", "front, side"]);

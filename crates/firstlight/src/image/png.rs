@@ -21,7 +21,7 @@ pub(super) enum Depth {
 }
 
 /// What a PNG file holds.
-pub(super) struct Samples {
+pub(super) struct PngSamples {
     pub window: Window,
     pub depth: Depth,
     pub color: ColorType,
@@ -73,7 +73,7 @@ pub(super) fn encode(
     let alpha = pixels.iter().any(|pixel| pixel[3] != 1.0);
     let color = if alpha { ColorType::Rgba } else { ColorType::Rgb };
     let bytes = quantize(window, pixels, depth, display, alpha);
-    let samples = Samples { window, depth, color, encoding: Some(display.encoding), bytes };
+    let samples = PngSamples { window, depth, color, encoding: Some(display.encoding), bytes };
     let channels = if alpha { "R G B A" } else { "R G B" };
     let meaning = "unit display-encoded; space -; straight alpha, never encoded";
     samples.encode(&samples.described(of, channels, meaning, &receipt.shown_by(Some(display))))
@@ -123,7 +123,7 @@ fn straight([r, g, b, a]: [f32; 4]) -> [f32; 4] {
     }
 }
 
-impl Samples {
+impl PngSamples {
     /// A receipt that says of a plane what its samples are, and their hash.
     pub fn described(&self, of: &NamedPlane, channels: &str, meaning: &str, receipt: &Receipt) -> Receipt {
         let (kind, sampling) = (self.depth.number_type(), of.plane.sampling().name());

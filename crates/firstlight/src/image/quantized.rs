@@ -7,10 +7,11 @@
 //!   where nothing is, and where something is farther than 65535 units. As data sets of depth cameras have it: 1000 per
 //!   metre in ScanNet and BOP, 5000 in that of TUM.
 //! - ids: 16 bits of gray, the id; 0 where nothing is.
-//! - normals and tangents: red, green and blue are (x, y, z) / 2 + 1/2; black where nothing is, which no unit vector is.
+//! - normals and tangents: red, green and blue are (x, y, z) / 2 + 1/2; black where nothing is, which no unit vector
+//!   is.
 //! - alpha: gray.
 
-use super::png::{self, ColorType, Depth, Samples};
+use super::png::{self, ColorType, Depth, PngSamples};
 use super::{
     BufferDesc, Format, ImageError, NamedPlane, Plane, PlaneNumbers, PlaneVec, Receipt, StoredPlane, Window, hdr,
 };
@@ -68,7 +69,7 @@ impl FileSettings {
 
 /// What the numbers of a plane are.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Kind {
+pub(super) enum NumberKind {
     Color,
     /// Of 1.
     Share,
@@ -79,16 +80,18 @@ pub(super) enum Kind {
     Other,
 }
 
-impl Kind {
-    pub fn of(plane: Plane) -> Kind {
+impl NumberKind {
+    pub fn of(plane: Plane) -> NumberKind {
         use Plane::*;
         match plane.of_each_ray().unwrap_or(plane) {
-            Color | Background | Emission | Ambient | Diffuse | Specular | Rest | Albedo => Kind::Color,
-            Alpha | Shadow | BackgroundCoverage => Kind::Share,
-            Depth | Distance => Kind::Distance,
-            Normal | NormalCamera | NormalObject | NormalGeometric | NormalGeometricCamera | Tangent => Kind::Direction,
-            plane if plane.is_whole() => Kind::Id,
-            _ => Kind::Other,
+            Color | Background | Emission | Ambient | Diffuse | Specular | Rest | Albedo => NumberKind::Color,
+            Alpha | Shadow | BackgroundCoverage => NumberKind::Share,
+            Depth | Distance => NumberKind::Distance,
+            Normal | NormalCamera | NormalObject | NormalGeometric | NormalGeometricCamera | Tangent => {
+                NumberKind::Direction
+            }
+            plane if plane.is_whole() => NumberKind::Id,
+            _ => NumberKind::Other,
         }
     }
 }
@@ -96,12 +99,12 @@ impl Kind {
 impl Plane {
     /// Whether it is a colour, which 8- and 16-bit files show as they show the picture.
     pub fn is_color(self) -> bool {
-        Kind::of(self) == Kind::Color
+        NumberKind::of(self) == NumberKind::Color
     }
 
     /// Whether its numbers are distances from the camera, which 16-bit files hold at a scale.
     pub fn is_distance(self) -> bool {
-        Kind::of(self) == Kind::Distance
+        NumberKind::of(self) == NumberKind::Distance
     }
 }
 
@@ -111,20 +114,20 @@ impl StoredPlane {
     pub fn meant(&self, name: &str, receipt: &Receipt) -> PlaneVec {
         let (Some(steps), PlaneVec::Wholes(codes)) = (self.steps, &self.numbers) else { return self.numbers.clone() };
         let plane = BufferDesc::parse(name).ok().and_then(|desc| desc.plane());
-        let kind = plane.map_or(Kind::Color, Kind::of);
+        let kind = plane.map_or(NumberKind::Color, NumberKind::of);
         let settings = FileSettings::of(receipt);
         let part = |code: u32| f64::from(code) / f64::from(steps);
         let number = |code: u32| match kind {
-            Kind::Distance if code == 0 => f64::INFINITY,
-            Kind::Distance => f64::from(code) / settings.depth_scale,
-            Kind::Direction => part(code) * 2.0 - 1.0,
+            NumberKind::Distance if code == 0 => f64::INFINITY,
+            NumberKind::Distance => f64::from(code) / settings.depth_scale,
+            NumberKind::Direction => part(code) * 2.0 - 1.0,
             _ => part(code),
         };
-        if kind == Kind::Id {
+        if kind == NumberKind::Id {
             return self.numbers.clone();
         }
         let mut numbers: Vec<f32> = codes.iter().map(|code| number(*code) as f32).collect();
-        if kind == Kind::Direction {
+        if kind == NumberKind::Direction {
             // Black is none
             for (v, _) in numbers
                 .as_chunks_mut::<3>()
@@ -160,11 +163,11 @@ fn with_pixels<R>(of: &NamedPlane, with: impl FnOnce(&[[f32; 4]]) -> R) -> R {
 impl Format {
     /// Why files of this format hold no buffer like `plane`, whatever its numbers; `None` if they can.
     pub fn refuses(self, plane: Plane) -> Option<String> {
-        match (self, Kind::of(plane)) {
-            (Format::Png8 | Format::Png16, Kind::Other) => {
+        match (self, NumberKind::of(plane)) {
+            (Format::Png8 | Format::Png16, NumberKind::Other) => {
                 Some("its numbers have no range that 16 bits could be made of".into())
             }
-            (Format::Hdr, kind) if kind != Kind::Color => Some("it is no colour".into()),
+            (Format::Hdr, kind) if kind != NumberKind::Color => Some("it is no colour".into()),
             _ => None,
         }
     }
@@ -185,25 +188,25 @@ pub(super) fn png(
     receipt: &Receipt,
 ) -> Result<Vec<u8>, ImageError> {
     let (largest, bits) = (depth.largest(), depth.bits());
-    let (color, depth, unit, stored, codes): (_, _, _, _, Vec<u16>) = match Kind::of(of.plane) {
-        Kind::Color => {
+    let (color, depth, unit, stored, codes): (_, _, _, _, Vec<u16>) = match NumberKind::of(of.plane) {
+        NumberKind::Color => {
             let display = &settings.display;
             return with_pixels(of, |pixels| png::encode(window, of, pixels, depth, display, receipt));
         }
-        Kind::Other => unreachable!("such a plane has been refused"),
-        Kind::Share => {
+        NumberKind::Other => unreachable!("such a plane has been refused"),
+        NumberKind::Share => {
             let codes = floats(of).iter().map(|share| Quantizer::linear(*share, largest));
             let stored = format!("{bits}-bit gray: {largest} is 1");
             (ColorType::Grayscale, depth, format!("1/{largest}"), stored, codes.collect())
         }
-        Kind::Distance => {
+        NumberKind::Distance => {
             let (scale, farthest) = (settings.depth_scale, settings.farthest());
             let stored =
                 format!("16-bit gray: {scale} units per metre; 0 where nothing is, or farther than {farthest} m");
             let codes = floats(of).iter().map(|metres| settings.code(*metres));
             (ColorType::Grayscale, Depth::Sixteen, format!("1/{scale} m"), stored, codes.collect())
         }
-        Kind::Id => {
+        NumberKind::Id => {
             let PlaneNumbers::Wholes(ids) = of.numbers else { unreachable!("ids are whole") };
             let codes = ids.iter().map(|id| u16::try_from(*id)).collect::<Result<_, _>>();
             let too_large = |_| ImageError::NotHeld {
@@ -214,7 +217,7 @@ pub(super) fn png(
             let codes = codes.map_err(too_large);
             (ColorType::Grayscale, Depth::Sixteen, "1".into(), "16-bit gray: ids; 0 where nothing is".into(), codes?)
         }
-        Kind::Direction => {
+        NumberKind::Direction => {
             let stored = format!("{bits}-bit RGB: (x, y, z) x {largest}/2 + {largest}/2; black where nothing is");
             let code = |axis: f32| Quantizer::linear(axis * 0.5 + 0.5, largest);
             let codes = floats(of).as_chunks::<3>().0.iter();
@@ -227,10 +230,10 @@ pub(super) fn png(
         Depth::Sixteen => codes.into_iter().flat_map(u16::to_be_bytes).collect(),
     };
     let mut receipt = receipt.shown_by(None).with("stored", stored);
-    if Kind::of(of.plane) == Kind::Distance {
+    if NumberKind::of(of.plane) == NumberKind::Distance {
         receipt = receipt.with(SCALE_KEY, settings.depth_scale.to_string());
     }
-    let samples = Samples { window, depth, color, encoding: None, bytes };
+    let samples = PngSamples { window, depth, color, encoding: None, bytes };
     let (channels, space, convention) = (of.plane.channels().join(" "), of.plane.space(), of.plane.convention());
     let meaning = format!("unit {unit}; space {space}; {convention}");
     samples.encode(&samples.described(of, &channels, &meaning, &receipt))

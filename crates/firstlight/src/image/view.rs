@@ -15,8 +15,8 @@ mod colors;
 mod legend;
 mod scale;
 
-use super::png::{ColorType, Depth, Samples};
-use super::quantized::Kind;
+use super::png::{ColorType, Depth, PngSamples};
+use super::quantized::NumberKind;
 use super::{BufferDesc, ImageError, Plane, PlaneNumbers, Receipt, SOFTWARE, Window};
 use crate::color::{Display, Encoding};
 use colors::{flow, map, of_id};
@@ -86,7 +86,7 @@ impl BufferView<'_> {
         said.entries.extend(["version", "scene_hash"].iter().filter_map(kept));
         said.entries.push(("view".to_owned(), format!("{} of {SOFTWARE}", self.name)));
         let bytes = canvas.pixels.into_flattened();
-        Samples { window, depth: Depth::Eight, color: ColorType::Rgb, encoding: Some(Encoding::Srgb), bytes }
+        PngSamples { window, depth: Depth::Eight, color: ColorType::Rgb, encoding: Some(Encoding::Srgb), bytes }
             .encode(&said)
     }
 
@@ -116,18 +116,18 @@ impl BufferView<'_> {
     fn look(&self) -> Look {
         let plane = BufferDesc::parse(self.name).ok().and_then(|desc| desc.plane());
         let plane = plane.filter(|plane| plane.channels().len() <= self.channels.len());
-        let of_plane = plane.and_then(|plane| match Kind::of(plane) {
+        let of_plane = plane.and_then(|plane| match NumberKind::of(plane) {
             _ if plane.is_of_motion() => Some(Look::Flow),
-            Kind::Color => Some(Look::Color),
-            Kind::Share => Some(Look::Number("")),
-            Kind::Distance => Some(Look::Number("m")),
-            Kind::Id => Some(Look::Id),
-            Kind::Direction => Some(Look::Direction),
-            Kind::Other if plane.channels().len() >= 3 => Some(Look::Position),
-            Kind::Other if plane.channels().len() == 1 => {
+            NumberKind::Color => Some(Look::Color),
+            NumberKind::Share => Some(Look::Number("")),
+            NumberKind::Distance => Some(Look::Number("m")),
+            NumberKind::Id => Some(Look::Id),
+            NumberKind::Direction => Some(Look::Direction),
+            NumberKind::Other if plane.channels().len() >= 3 => Some(Look::Position),
+            NumberKind::Other if plane.channels().len() == 1 => {
                 Some(Look::Number(if plane == Plane::Rays { "rays" } else { "" }))
             }
-            Kind::Other => None,
+            NumberKind::Other => None,
         });
         of_plane.unwrap_or_else(|| {
             let has = |wanted: &[&str]| wanted.iter().all(|name| self.channels.iter().any(|channel| channel == name));

@@ -6,7 +6,7 @@ use std::sync::{Arc, OnceLock};
 use fearless_simd::{f32x16, prelude::*};
 
 use super::{
-    DiskLight, EmitSides, Falloff, FineCell, Light, LightKind, Rectangle, SampleSet, Scale, SphereLight, scaled,
+    DiskLight, EmitSides, Falloff, FineCell, Light, LightKind, LightScale, Rectangle, SampleSet, SphereLight, scaled,
     way_error,
 };
 use crate::context::{CompileContext, show};
@@ -163,7 +163,7 @@ impl AreaCommon {
             Falloff::Constant => 1.0,
         };
         let scale = scaled(cx, self.color, self.strength, self.falloff.factor() * area / count.max(1) as f64);
-        let whole = Scale { factor: self.falloff.factor(), ..scale };
+        let whole = LightScale { factor: self.falloff.factor(), ..scale };
         let [low, high] = shape.bounds();
         let area = Area {
             middle: ((low + high) * 0.5).as_vec3(),

@@ -159,7 +159,7 @@ pub struct Light {
     /// What the camera sees of it: `color` x `strength`.
     pub radiance: Rgb,
     /// What `scale` and `intensity` come of.
-    pub said: [Scale; 2],
+    pub said: [LightScale; 2],
     /// Whether its light can be blocked.
     pub shadows: bool,
     /// Whether it asks to be integrated, not sampled. It has points all the same, for those who sample every light.
@@ -168,7 +168,7 @@ pub struct Light {
 
 /// How much light it is, before rounding: `color` x `strength` x `factor`.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Scale {
+pub struct LightScale {
     /// Linear, as the scene says it.
     pub color: [f64; 3],
     /// As the scene says it.
@@ -177,7 +177,7 @@ pub struct Scale {
     pub factor: f64,
 }
 
-impl Scale {
+impl LightScale {
     pub(crate) fn exact(&self) -> [f64; 3] {
         self.color.map(|c| c * self.strength * self.factor)
     }
@@ -332,11 +332,11 @@ fn moved_point(cx: &mut CompileContext, field: &str, p: [f64; 3], transform: Opt
 }
 
 /// `color` x `strength`, checked; `factor` is what the kind of light makes of it.
-fn scaled(cx: &mut CompileContext, color: ColorDesc, strength: f64, factor: f64) -> Scale {
+fn scaled(cx: &mut CompileContext, color: ColorDesc, strength: f64, factor: f64) -> LightScale {
     let fine = cx.fault_count();
     cx.color("color", color);
     cx.strength(strength);
-    let scaled = Scale { color: color.linear, strength, factor };
+    let scaled = LightScale { color: color.linear, strength, factor };
     // What a material makes of it has to be a number still
     if cx.fault_count() == fine && !scaled.exact().iter().all(|c| *c <= MAX_LIGHT) {
         let message = format!("{strength} is too much for a light of this colour and size: together they pass 1e30");

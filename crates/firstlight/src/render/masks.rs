@@ -1,7 +1,7 @@
 //! Which pixels each object covers: those where it is seen, and those where it would be seen if it were alone.
 //!
-//! Both are of the centre rays of pixels. The second, *amodal* masks, come from one walk along each ray through all that
-//! lies on it, not from a render of each object.
+//! Both are of the centre rays of pixels. The second, *amodal* masks, come from one walk along each ray through all
+//! that lies on it, not from a render of each object.
 
 use super::film::Film;
 use super::hits::grid_ray;

@@ -10,7 +10,7 @@ use crate::context::MAX_STRENGTH;
 use crate::describe::{ColorDesc, SamplesDesc};
 use crate::ids::{LightId, SurfaceId};
 use crate::image::{Buffer, Image, LightPart, Plane, PlaneVec, Receipt, StoredPlanes};
-use crate::light::{Light, MAX_LIGHT, Scale};
+use crate::light::{Light, LightScale, MAX_LIGHT};
 use crate::scene::Scene;
 
 use super::RenderSettings;
@@ -52,7 +52,7 @@ pub(super) const RELIT: &str = "relit";
 /// A light of a file.
 struct FiledLight {
     name: Option<String>,
-    scale: Scale,
+    scale: LightScale,
     /// The buffers of what it sends, and of where it is seen, if that may be.
     sends: [String; 2],
     seen: Option<String>,
@@ -65,7 +65,7 @@ impl Scene {
         let names = self.light_names();
         let entry = |(number, light): (u32, &Light)| {
             let is_whole = light.said_samples() == SamplesDesc::Exact && !samples_all;
-            let Scale { color, strength, factor } = light.said[usize::from(is_whole)];
+            let LightScale { color, strength, factor } = light.said[usize::from(is_whole)];
             let part = |part| self.buffer_name(Buffer::Light(LightId(number), Some(part)));
             let sends = [LightPart::UnscaledDiffuse, LightPart::UnscaledSpecular].map(part);
             let surface = SurfaceId(self.geometry.surfaces.len() as u32 + number);
@@ -85,7 +85,8 @@ impl FiledLight {
     fn read(value: &Value) -> Option<FiledLight> {
         let number = |key: &str| value.get(key)?.as_f64();
         let color: Vec<f64> = value.get("color")?.as_array()?.iter().map(Value::as_f64).collect::<Option<_>>()?;
-        let scale = Scale { color: color.try_into().ok()?, strength: number("strength")?, factor: number("factor")? };
+        let scale =
+            LightScale { color: color.try_into().ok()?, strength: number("strength")?, factor: number("factor")? };
         let text = |value: &Value| value.as_str().map(str::to_owned);
         let sends: Vec<String> = value.get("sends")?.as_array()?.iter().map(text).collect::<Option<_>>()?;
         let (name, seen) = (text(value.get("name")?), text(value.get("seen")?));
@@ -113,7 +114,8 @@ impl<'a> FiledTerms<'a> {
 }
 
 /// Lights a picture again. `file` is one that was rendered with the buffers of
-/// [`BufferDesc::Relight`](crate::BufferDesc::Relight); each change names a light, or `#3` for the third in scene order.
+/// [`BufferDesc::Relight`](crate::BufferDesc::Relight); each change names a light, or `#3` for the third in scene
+/// order.
 ///
 /// The result is what a render of the changed scene gives: with its bits where all lights are sampled and each camera
 /// ray is lit by itself, and within the tolerance otherwise.
@@ -168,8 +170,8 @@ fn words(changes: &[(String, LightChange)]) -> String {
 }
 
 /// The scales of the lights after the changes.
-fn changed(lights: &[FiledLight], changes: &[(String, LightChange)]) -> Result<Vec<Scale>, RelightError> {
-    let mut scales: Vec<Scale> = lights.iter().map(|light| light.scale).collect();
+fn changed(lights: &[FiledLight], changes: &[(String, LightChange)]) -> Result<Vec<LightScale>, RelightError> {
+    let mut scales: Vec<LightScale> = lights.iter().map(|light| light.scale).collect();
     for (name, change) in changes {
         let at = find(lights, name)?;
         let scale = &mut scales[at];
@@ -225,7 +227,7 @@ fn find(lights: &[FiledLight], name: &str) -> Result<usize, RelightError> {
 fn emitted(
     planes: &FiledTerms,
     before: &[FiledLight],
-    after: &[Scale],
+    after: &[LightScale],
     emission: &[f32],
 ) -> Result<Vec<f32>, RelightError> {
     let is_changed = before.iter().zip(after).any(|(light, scale)| light.seen.is_some() && light.scale != *scale);
