@@ -218,7 +218,8 @@ pub struct RenderArgs {
     /// name without its ending, {name} the whole of it; with several scenes one of them is needed, in --heat and
     /// --stats too. May be given several times [default: the scene's name with .png, or with .render.png
     /// where that is a file not written by firstlight; a course file's output_file; in the working folder]
-    #[arg(short, long = "output", value_name = "[NAME=]FILE", value_hint = ValueHint::FilePath, help_heading = "Output")]
+    #[arg(short, long = "output", value_name = "[NAME=]FILE", value_hint = ValueHint::FilePath)]
+    #[arg(help_heading = "Output")]
     pub output: Vec<PathBuf>,
     /// What .exr and .npz files hold of each pixel, with commas between: color,depth,normal,object-id; `firstlight
     /// buffers` lists them all. Without color, and no other picture, no light is asked [default: the scene's, which is

@@ -396,8 +396,8 @@ fn content_of(path: &Path) -> Result<(Content, PathBuf), Failure> {
         Err((_, hint)) => {
             let hint = hint.map(|hint| format!("; {hint}")).unwrap_or_default();
             Err(Failure::Usage(format!(
-                "-o {name}={file}: {name:?} is no buffer{hint} `firstlight buffers` lists them all; a file of that name \
-                 is ./{name}={file}"
+                "-o {name}={file}: {name:?} is no buffer{hint} `firstlight buffers` lists them all; a file of that \
+                 name is ./{name}={file}"
             )))
         }
     }

@@ -295,13 +295,15 @@ mod tests {
             turned(CameraDesc { shift: [0.3, -7.0], ..orthographic(0.02) }),
         ] {
             let camera = compiled(&desc, 1920, 1080);
+            // A ray's direction has 32 bits
+            let rounding = camera.intrinsics().map_or(0.0, |[fx, ..]| fx * 1e-7);
             for (x, y) in [(0.0, 0.0), (960.0, 540.0), (0.5, 1079.5), (1313.25, 77.75), (-20.0, 1100.0)] {
                 for distance in [0.01, 1.0, 12.5, 1e6] {
                     let (ray, _) = camera.ray(x, y, 1.0);
                     let ahead = camera.project(ray.o + ray.d.as_dvec3() * distance);
                     let [u, v] = ahead.unwrap_or_else(|| panic!("{desc:?} {x} {y}"));
                     let off = (u - f64::from(x)).abs().max((v - f64::from(y)).abs());
-                    assert!(off < 1e-3, "{desc:?}: {u} {v} is not {x} {y}");
+                    assert!(off < 1e-3 + rounding, "{desc:?}: {u} {v} is not {x} {y}");
                     assert_eq!(camera.project(ray.o - ray.d.as_dvec3() * distance), None);
                 }
             }
