@@ -295,8 +295,9 @@ mod tests {
             turned(CameraDesc { shift: [0.3, -7.0], ..orthographic(0.02) }),
         ] {
             let camera = compiled(&desc, 1920, 1080);
-            // A ray's direction has 32 bits
-            let rounding = camera.intrinsics().map_or(0.0, |[fx, ..]| fx * 1e-7);
+            // A ray has 32 bits: of its direction, or of where it begins, some 10 m from the origin
+            let in_a_metre = 540.0 / f64::from(camera.film_half_size()[1]);
+            let rounding = camera.intrinsics().map_or(in_a_metre * 1e-6, |[fx, ..]| fx * 1e-7);
             for (x, y) in [(0.0, 0.0), (960.0, 540.0), (0.5, 1079.5), (1313.25, 77.75), (-20.0, 1100.0)] {
                 for distance in [0.01, 1.0, 12.5, 1e6] {
                     let (ray, _) = camera.ray(x, y, 1.0);
