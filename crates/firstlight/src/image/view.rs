@@ -19,7 +19,7 @@ use super::png::{ColorType, Depth, PngSamples};
 use super::quantized::NumberKind;
 use super::{BufferDesc, ImageError, Plane, PlaneNumbers, Receipt, SOFTWARE, Window};
 use crate::color::{Display, Encoding};
-use colors::{flow, map, of_id};
+use colors::{flow, of_id};
 use legend::Canvas;
 use scale::Scale;
 
@@ -202,7 +202,7 @@ impl BufferView<'_> {
                 let numbers = (0..pixels).map(|pixel| at(pixel, 0));
                 let scale =
                     if unit == "m" { Scale::of(self.range, numbers) } else { Scale::linear(self.range, numbers) };
-                let color = |pixel: usize| scale.place(at(pixel, 0)).map_or(NOTHING, map);
+                let color = |pixel: usize| scale.place(at(pixel, 0)).map_or(NOTHING, |place| scale.color(place));
                 (each(&color), Some(legend::Legend::Bar { scale, unit }))
             }
         }
@@ -264,7 +264,7 @@ mod tests {
         // The nearest and the farthest at the ends of the map, nothing gray
         assert_eq!(
             [pixel(0, 0), pixel(239, 0), pixel(0, 239), pixel(239, 239)],
-            [map(0.0), map(1.0), NOTHING, NOTHING]
+            [colors::map(1.0), colors::map(0.0), NOTHING, NOTHING]
         );
     }
 

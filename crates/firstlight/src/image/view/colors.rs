@@ -17,9 +17,9 @@ const VIRIDIS: [Rgb8; 9] = [
     [0xfd, 0xe7, 0x25],
 ];
 
-/// The colour of a place in a colour map, 0 for the lowest number, which is the brightest: what is near is in front.
+/// The colour of a place in a colour map, from 0, dark, to 1, bright.
 pub(super) fn map(place: f64) -> Rgb8 {
-    let at = (1.0 - place.clamp(0.0, 1.0)) * 8.0;
+    let at = place.clamp(0.0, 1.0) * 8.0;
     let below = (at as usize).min(7);
     let part = at - below as f64;
     let mix = |c: usize| f64::from(VIRIDIS[below][c]) * (1.0 - part) + f64::from(VIRIDIS[below + 1][c]) * part;
@@ -91,7 +91,7 @@ mod tests {
 
     #[test]
     fn the_map_goes_from_end_to_end() {
-        assert_eq!([map(0.0), map(1.0), map(0.5)], [VIRIDIS[8], VIRIDIS[0], VIRIDIS[4]]);
+        assert_eq!([map(0.0), map(1.0), map(0.5)], [VIRIDIS[0], VIRIDIS[8], VIRIDIS[4]]);
         assert_eq!([map(-1.0), map(2.0)], [map(0.0), map(1.0)]);
     }
 

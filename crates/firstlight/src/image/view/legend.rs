@@ -1,7 +1,7 @@
 //! The picture with its legend beside it, and the letters for that.
 
 use super::Rgb8;
-use super::colors::{flow, map};
+use super::colors::flow;
 use super::scale::Scale;
 
 /// What the colours of a picture stand for.
@@ -114,7 +114,7 @@ impl Canvas {
         let length = self.height - top - 10 * unit;
         for row in 0..length {
             let place = 1.0 - (f64::from(row) + 0.5) / f64::from(length);
-            self.fill([bar, top + row, 12 * unit, 1], map(place));
+            self.fill([bar, top + row, 12 * unit, 1], scale.color(place));
         }
         self.write(bar, 6 * unit, unit, word);
         let count = (length / (26 * unit)).clamp(2, 10) as usize;

@@ -1,11 +1,16 @@
 //! From numbers to places in a colour map, and the numbers that a legend has.
 
+use super::Rgb8;
+use super::colors::map;
+
 /// What lies between the lowest and the highest number.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Scale {
     low: f64,
     high: f64,
     is_logarithmic: bool,
+    /// Whether low numbers are bright: what is near is in front.
+    is_distance: bool,
 }
 
 /// From this ratio on, distances are on a logarithmic scale.
@@ -22,24 +27,29 @@ impl Scale {
         });
         // What is the same everywhere has a range around it
         let room = if high > low { 0.0 } else { (low.abs() * 0.5).max(0.5) };
-        Scale { low: low - room, high: high + room, is_logarithmic: false }
+        Scale { low: low - room, high: high + room, is_logarithmic: false, is_distance: false }
     }
 
-    /// The same, logarithmic where that shows more.
+    /// The same of distances, logarithmic where that shows more.
     pub fn of(range: Option<[f64; 2]>, numbers: impl Iterator<Item = f64>) -> Scale {
         let scale = Scale::linear(range, numbers);
-        Scale { is_logarithmic: scale.low > 0.0 && scale.high / scale.low > WIDE, ..scale }
+        Scale { is_logarithmic: scale.low > 0.0 && scale.high / scale.low > WIDE, is_distance: true, ..scale }
     }
 
     /// The place of a number from 0 to 1; `None` of one that is not finite.
     pub fn place(&self, number: f64) -> Option<f64> {
-        let Scale { low, high, is_logarithmic } = *self;
+        let Scale { low, high, is_logarithmic, .. } = *self;
         let place = if is_logarithmic {
             pxfm::f_log2(number.max(low) / low) / pxfm::f_log2(high / low)
         } else {
             (number - low) / (high - low)
         };
         number.is_finite().then_some(place.clamp(0.0, 1.0))
+    }
+
+    /// The colour of a place.
+    pub fn color(&self, place: f64) -> Rgb8 {
+        map(if self.is_distance { 1.0 - place } else { place })
     }
 
     /// Numbers for a legend, about `count` of them, round, and written so.
