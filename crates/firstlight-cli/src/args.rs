@@ -247,6 +247,10 @@ pub struct RenderArgs {
     /// that is a warning, and an error under --strict [default: 1000]
     #[arg(long, value_name = "N", value_parser = depth_scale, help_heading = "Output")]
     pub depth_scale: Option<f64>,
+    /// Store colours and shares of the pixel in EXR files in 16-bit floats, which are half as long and end at 65504.
+    /// Depth, positions, normals and all else keep their 32 bits
+    #[arg(long, help_heading = "Output")]
+    pub half: bool,
     /// Stops of exposure of 8- and 16-bit pictures, -64 to 64: they are multiplied by 2^EV; other files are the same
     /// with it [default: the scene's]
     #[arg(long, value_name = "EV", allow_negative_numbers = true, value_parser = exposure, help_heading = "Output")]
@@ -362,7 +366,7 @@ pub struct RenderArgs {
     /// there [default: renders]
     #[arg(long, value_name = "FILE.toml", require_equals = true, help_heading = "Output")]
     #[arg(value_hint = ValueHint::FilePath)]
-    #[arg(conflicts_with_all = ["output", "bits", "format", "depth_scale", "exposure", "crop"])]
+    #[arg(conflicts_with_all = ["output", "bits", "format", "depth_scale", "half", "exposure", "crop"])]
     #[arg(conflicts_with_all = ["time", "frames", "shard", "aa_mode", "reference", "visibility"])]
     #[arg(conflicts_with_all = ["threads", "tile_size", "simd", "stats", "coco", "heat"])]
     pub print_scene: Option<Option<PathBuf>>,
@@ -447,7 +451,7 @@ pub struct ViewBufferArgs {
     /// A file with buffers: .exr, .npz, .npy, .png or .hdr
     #[arg(value_name = "FILE", value_hint = ValueHint::FilePath)]
     pub file: PathBuf,
-    /// The buffer to look at, as `firstlight buffers` lists them; of an .npy file what its array is
+    /// The buffer to look at, as `firstlight buffers` lists them; of another program's .npy file what its array is
     #[arg(value_name = "NAME")]
     pub name: String,
     /// The picture to write; - is standard output [default: FILE.NAME.png, without the ending of FILE, in the working

@@ -197,12 +197,22 @@ impl PyRender {
         with(&planes)
     }
 
+    fn is_distance(&self, name: &str) -> bool {
+        self.planes.iter().any(|(known, plane)| known == name && plane.is_distance())
+    }
+
     fn names(&self) -> String {
         self.planes.iter().map(|(name, _)| name.as_str()).collect::<Vec<_>>().join(", ")
     }
 
     /// The bytes of a file: of the buffer of that name, else of all in a format that holds them, else of the picture.
-    fn encode(&self, py: Python<'_>, format: Format, buffer: Option<&str>, depth_scale: f64) -> PyResult<Vec<u8>> {
+    fn encode(
+        &self,
+        py: Python<'_>,
+        format: Format,
+        buffer: Option<&str>,
+        settings: FileSettings,
+    ) -> PyResult<Vec<u8>> {
         let of = match buffer {
             None if matches!(format, Format::Exr | Format::Npz) => &self.planes[..],
             named => {
@@ -222,7 +232,7 @@ impl PyRender {
         if let (Some(name), Some((_, said))) = (buffer, receipt.entries.iter_mut().find(|(key, _)| key == "buffers")) {
             *said = format!("[{name:?}]");
         }
-        let settings = FileSettings { display: self.display, depth_scale };
+        let settings = FileSettings { display: self.display, ..settings };
         self.with_planes(py, of, |planes| {
             encode_planes(self.film, self.window, planes, format, &settings, &receipt).map_err(|e| image_error(&e))
         })
@@ -267,7 +277,7 @@ impl PyRender {
             16 => Format::Png16,
             _ => return Err(PyValueError::new_err(format!("bits is {bits}; a PNG has 8 or 16"))),
         };
-        Ok(PyBytes::new(py, &self.encode(py, format, None, FileSettings::default().depth_scale)?))
+        Ok(PyBytes::new(py, &self.encode(py, format, None, FileSettings::default())?))
     }
 
     /// Writes a file, whole or not at all: `.exr` and `.npz` hold all buffers, the others one.
@@ -283,16 +293,36 @@ impl PyRender {
     ///     distance and ids have 16 bits, and 0 where nothing is; colours are shown as the picture is; normals are
     ///     (x, y, z) / 2 + 1/2.
     /// depth_scale : float
-    ///     Units per metre of depth and distance in a .png file: 1000 are millimetres. What is farther than 65535
+    ///     Units per metre of depth and distance in a .png file: 1000, if not given, are millimetres. What is farther than 65535
     ///     units is 0.
-    #[pyo3(signature = (path, *, buffer = None, depth_scale = 1000.0))]
-    fn save(&self, py: Python<'_>, path: PathBuf, buffer: Option<&str>, depth_scale: f64) -> PyResult<()> {
+    /// half : bool
+    ///     Whether an .exr file holds colours and shares of the pixel in 16-bit floats, which end at 65504. Depth,
+    ///     positions, normals and all else keep their 32 bits.
+    #[pyo3(signature = (path, *, buffer = None, depth_scale = None, half = false))]
+    fn save(
+        &self,
+        py: Python<'_>,
+        path: PathBuf,
+        buffer: Option<&str>,
+        depth_scale: Option<f64>,
+        half: bool,
+    ) -> PyResult<()> {
         let format = Format::from_path(&path).map_err(|e| image_error(&e))?;
+        if half && format != Format::Exr {
+            return Err(PyValueError::new_err(format!("half is for .exr files, and {} is none", path.display())));
+        }
+        let is_scaled = format == Format::Png8 && buffer.is_some_and(|name| self.is_distance(name));
+        if depth_scale.is_some() && !is_scaled {
+            return Err(PyValueError::new_err("depth_scale is for depth and distance in a .png file"));
+        }
         if self.files.holds(&path) {
             let message = format!("{}: the scene was read from it; choose another name", path.display());
             return Err(PyValueError::new_err(message));
         }
-        let bytes = self.encode(py, format, buffer, depth_scale)?;
+        let default = FileSettings::default();
+        let depth_scale = depth_scale.unwrap_or(default.depth_scale);
+        let settings = FileSettings { depth_scale, half, ..default };
+        let bytes = self.encode(py, format, buffer, settings)?;
         py.detach(|| write_whole(&path, &bytes)).map(drop).map_err(|e| image_error(&e))
     }
 

@@ -35,6 +35,8 @@ pub(super) struct Plan<'a> {
     pub exposure: Option<f64>,
     /// Units per metre in 16 bits.
     pub depth_scale: f64,
+    /// Whether EXR files hold colours in 16-bit floats.
+    pub half: bool,
     /// Warnings are errors.
     pub strict: bool,
     /// How a camera frames a scene that has none, as far as it was said.
@@ -92,6 +94,9 @@ impl<'a> Plan<'a> {
                 "--depth-scale is for depth and distance in PNG files, as -o depth=d.png, and no output is one";
             return Err(Failure::Usage(message.into()));
         }
+        if args.half && !outputs.iter().any(|output| output.format == Format::Exr) {
+            return Err(Failure::Usage("--half is for EXR files, as -o a.exr, and no output is one".into()));
+        }
         let heat = args.heat.as_deref().map(heat_output).transpose()?;
         let jobs: Vec<Job> = args
             .scenes
@@ -124,11 +129,14 @@ impl<'a> Plan<'a> {
             return Err(Failure::Usage(message.into()));
         }
 
-        if let (Some(_), Some(_), StatsPlan::Json(target)) = (args.shard, args.frames, &stats) {
-            let name = target.name();
-            return Err(Failure::Usage(format!(
-                "--stats={name}: every shard of the frames would write this file; --stats alone is a table of each"
-            )));
+        // A file beside the pictures is one of all frames; several scenes have one each
+        if let (Some(_), Some(_), [file, ..]) = (args.shard, args.frames, &beside[..]) {
+            let instead = match file.option() {
+                "--stats" => "--stats alone is a table of each",
+                _ => "it takes all frames in one run, without --shard",
+            };
+            let message = format!("{}: every shard of the frames would write this file; {instead}", file.name());
+            return Err(Failure::Usage(message));
         }
 
         let mut settings = RenderSettings::default();
@@ -175,6 +183,7 @@ impl<'a> Plan<'a> {
             overrides,
             exposure: args.exposure,
             depth_scale: args.depth_scale.unwrap_or(FileSettings::default().depth_scale),
+            half: args.half,
             strict: args.reading.strict,
             view: args.view,
             margin: args.margin,

@@ -116,6 +116,22 @@ fn a_file_may_hold_one_by_itself() {
 }
 
 #[test]
+fn colors_of_exr_files_can_have_16_bits() {
+    let folder = Folder::with_scene();
+    folder.run("render scene.toml --buffers color,depth,alpha -o a.exr").done();
+    folder.run("render scene.toml --buffers color,depth,alpha -o h.exr --half -o depth=d.npy").done();
+    assert!(folder.get("h.exr").len() < folder.get("a.exr").len());
+    folder.run("diff a.exr h.exr --buffers depth,alpha").done();
+    // 11 bits of numbers below 1
+    folder.run("diff a.exr h.exr --buffers color").exits(3);
+    folder.run("diff a.exr h.exr --buffers color --max 0.0005").done();
+    for file in ["h.exr", "d.npy"] {
+        folder.run(&format!("verify {file} --scene scene.toml")).done();
+    }
+    folder.run("render scene.toml -o a.png --half").exits(2).says(&["--half is for EXR files"]);
+}
+
+#[test]
 fn a_scale_of_depth_says_what_it_cannot_tell() {
     let folder = Folder::with_scene();
     assert!(!folder.run("render scene.toml -o depth=mm.png").done().text().contains("warning"));

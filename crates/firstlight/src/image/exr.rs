@@ -1,4 +1,5 @@
-//! OpenEXR files: the film as it is, in 32-bit floats, and ids in 32-bit whole numbers.
+//! OpenEXR files: the film as it is, in 32-bit floats, and ids in 32-bit whole numbers; if asked for, colours and shares
+//! in 16-bit floats.
 //!
 //! Of the picture channels R, G, B, and A unless every alpha is 1; premultiplied, as the format wants. Of another plane
 //! one layer, `depth.Z`; Cryptomatte has channels of its own and texts `cryptomatte/KEY/...`. The data window is the
@@ -19,24 +20,27 @@ use codec::meta::attribute::{
 };
 use codec::meta::header::Header;
 use codec::meta::{BlockDescription, attribute::Text as Name};
-use codec::prelude::{Compression, SmallVec};
+use codec::prelude::{Compression, SmallVec, f16};
 
-use super::{ImageError, NamedPlane, PREFIX, Plane, PlaneFile, PlaneNumbers, Receipt, SOFTWARE, cryptomatte};
+use super::{
+    FileSettings, ImageError, NamedPlane, PREFIX, Plane, PlaneFile, PlaneNumbers, Receipt, SOFTWARE, cryptomatte,
+};
 use crate::parallel;
 
 /// One channel of a file.
 struct Channel<'a> {
     name: String,
     numbers: PlaneNumbers<'a>,
+    kind: SampleType,
     /// Which of so many numbers of a pixel it is.
     place: usize,
     of: usize,
 }
 
 /// The bytes of an EXR file. The planes and the receipt have been checked.
-pub(super) fn encode(file: &PlaneFile, receipt: &Receipt) -> Result<Vec<u8>, ImageError> {
+pub(super) fn encode(file: &PlaneFile, settings: &FileSettings, receipt: &Receipt) -> Result<Vec<u8>, ImageError> {
     let fault = |e: Error| ImageError::Encode { format: "EXR", reason: e.to_string() };
-    let channels = channels(file);
+    let channels = channels(file, settings);
     let texts = texts(file, receipt);
     let header = header(file, &channels, &texts);
     let width = file.window.width as usize;
@@ -61,17 +65,22 @@ pub(super) fn encode(file: &PlaneFile, receipt: &Receipt) -> Result<Vec<u8>, Ima
 }
 
 /// The channels of all planes, by name, as the format wants them.
-fn channels<'a>(file: &PlaneFile<'a>) -> Vec<Channel<'a>> {
+fn channels<'a>(file: &PlaneFile<'a>, settings: &FileSettings) -> Vec<Channel<'a>> {
     let mut all = Vec::new();
     for NamedPlane { name: of, plane, numbers } in file.planes {
         let names = plane.channels();
+        let kind = match numbers {
+            PlaneNumbers::Floats(_) if settings.is_half(*plane) => SampleType::F16,
+            PlaneNumbers::Floats(_) => SampleType::F32,
+            PlaneNumbers::Wholes(_) => SampleType::U32,
+        };
         for (place, name) in names.iter().enumerate() {
             if *plane == Plane::Color && *name == "A" && is_opaque(numbers) {
                 continue;
             }
             // The picture's are those of the file itself, and Cryptomatte has its own, as readers expect it
             let name = if plane.names_channels() { (*name).to_owned() } else { format!("{of}.{name}") };
-            all.push(Channel { name, numbers: *numbers, place, of: names.len() });
+            all.push(Channel { name, numbers: *numbers, kind, place, of: names.len() });
         }
     }
     all.sort_by(|a, b| a.name.cmp(&b.name));
@@ -94,11 +103,7 @@ fn texts(file: &PlaneFile, receipt: &Receipt) -> Vec<(String, String)> {
 fn header(file: &PlaneFile, channels: &[Channel], texts: &[(String, String)]) -> Header {
     let window = file.window;
     let size = Vec2(window.width as usize, window.height as usize);
-    let kind = |channel: &Channel| match channel.numbers {
-        PlaneNumbers::Floats(_) => SampleType::F32,
-        PlaneNumbers::Wholes(_) => SampleType::U32,
-    };
-    let channels = channels.iter().map(|c| ChannelDescription::named(c.name.as_str(), kind(c))).collect();
+    let channels = channels.iter().map(|c| ChannelDescription::named(c.name.as_str(), c.kind)).collect();
     let mut header = Header::new(Name::from(""), size, channels).with_encoding(
         Compression::ZIP16,
         BlockDescription::ScanLines,
@@ -127,9 +132,13 @@ fn header(file: &PlaneFile, channels: &[Channel], texts: &[(String, String)]) ->
 fn rows_of(channels: &[Channel], rows: Range<usize>, width: usize) -> Vec<u8> {
     let mut data = Vec::with_capacity(rows.len() * width * channels.len() * 4);
     for row in rows {
-        for Channel { numbers, place, of, .. } in channels {
+        for Channel { numbers, kind, place, of, .. } in channels {
             let all = row * width * of..(row + 1) * width * of;
             match numbers {
+                PlaneNumbers::Floats(numbers) if *kind == SampleType::F16 => {
+                    let row = numbers[all].iter().skip(*place).step_by(*of);
+                    data.extend(row.flat_map(|n| half(*n).to_ne_bytes()));
+                }
                 PlaneNumbers::Floats(numbers) => {
                     data.extend(numbers[all].iter().skip(*place).step_by(*of).flat_map(|n| n.to_ne_bytes()));
                 }
@@ -140,6 +149,17 @@ fn rows_of(channels: &[Channel], rows: Range<usize>, width: usize) -> Vec<u8> {
         }
     }
     data
+}
+
+/// The nearest 16-bit float; the largest, 65504, of what is beyond it.
+fn half(number: f32) -> f16 {
+    let largest = f16::MAX.to_f32();
+    f16::from_f32(number.clamp(-largest, largest))
+}
+
+/// The bytes of numbers as 16-bit floats, the lowest of each first.
+pub(super) fn half_bytes(numbers: &[f32]) -> Vec<u8> {
+    numbers.iter().flat_map(|number| half(*number).to_le_bytes()).collect()
 }
 
 /// One attribute of a header: its name, its type, where its value stands, and where all of it stands.
@@ -190,7 +210,7 @@ fn order_attributes(bytes: &mut [u8], texts: &[(String, String)]) {
 mod tests {
     use super::super::Image;
     use super::super::tests::{receipt, whole};
-    use super::super::{FileSettings, Format, Window};
+    use super::super::{Format, StoredPlanes, Window};
     use super::*;
     use crate::color::Display;
     use codec::prelude::{FlatImage, FlatSamples, ReadChannels, ReadLayers, read};
@@ -252,6 +272,31 @@ mod tests {
         assert_eq!(numbers[3], FlatSamples::F32(depth.to_vec()));
         assert_eq!(numbers[5], FlatSamples::F32(vec![2.0, 5.0]));
         assert_eq!(numbers[7], FlatSamples::U32(ids.to_vec()));
+    }
+
+    #[test]
+    fn colors_and_shares_can_have_16_bits() {
+        let (color, depth) = ([0.1f32, -2.0, 1e6, 0.5, f32::NAN, 0.0, 65504.0, 1.0], [0.1f32, f32::INFINITY]);
+        let planes = [
+            NamedPlane::new(Plane::Color, PlaneNumbers::Floats(&color)),
+            NamedPlane::new(Plane::Depth, PlaneNumbers::Floats(&depth)),
+        ];
+        let window = Window { x: 0, y: 0, width: 2, height: 1 };
+        let settings = FileSettings { half: true, ..FileSettings::default() };
+        let file = PlaneFile { film: [2, 1], window, planes: &planes };
+        let bytes = file.encode(Format::Exr, &settings, &Receipt::default()).unwrap();
+        let channels = read_back(&bytes).layer_data.remove(0).channel_data.list;
+        let kinds: Vec<_> = channels.iter().map(|c| c.sample_data.clone()).collect();
+        assert_eq!(kinds[0], FlatSamples::F16([0.5, 1.0].map(f16::from_f32).to_vec()));
+        assert_eq!(kinds[1], FlatSamples::F16([65504.0; 2].map(f16::from_f32).to_vec()));
+        assert_eq!(kinds[4], FlatSamples::F32(depth.to_vec()));
+        let FlatSamples::F16(red) = &kinds[3] else { panic!("not f16") };
+        // A half has 11 bits: 0.1 is 1638.4 / 2^14
+        assert!(red[0].to_f32() == 1638.0 / 16384.0 && red[1].is_nan());
+        let stored = StoredPlanes::read(&bytes).unwrap();
+        assert!(stored.receipt.get("buffer.color").unwrap().starts_with("channels R G B A; float16; "));
+        assert_eq!(FileSettings::of(&stored.receipt), settings);
+        assert!(stored.planes.iter().all(|plane| stored.is_as_written(plane) == Some(true)));
     }
 
     #[test]

@@ -1,4 +1,4 @@
-//! NPZ files: an archive of arrays as numpy reads them, `numpy.load("a.npz")["depth"]`.
+//! NPZ files: an archive of arrays as numpy reads them, `numpy.load("a.npz")["depth"]`. NPY files: one of them.
 //!
 //! One array for each plane, of shape (rows, columns) or (rows, columns, channels), little-endian, and `receipt`, the
 //! receipt as JSON text. Not compressed, as `numpy.savez` leaves them: they are read as fast as the disk is.
@@ -12,8 +12,13 @@ use rawzip::{CompressionMethod, ZipArchiveWriter};
 
 use super::{ImageError, NamedPlane, PlaneFile, PlaneNumbers, Receipt, Window};
 
-/// The bytes of an NPY file: one plane by itself.
-pub(super) fn encode_one(window: Window, plane: &NamedPlane) -> Vec<u8> {
+/// The bytes of an NPY file: one plane, and behind it the receipt, a second array. `numpy.load` of the file's name reads
+/// the first; of the open file, one after the other.
+pub(super) fn encode_one(window: Window, plane: &NamedPlane, receipt: &Receipt) -> Vec<u8> {
+    [plane_array(window, plane), receipt_array(receipt)].concat()
+}
+
+fn plane_array(window: Window, plane: &NamedPlane) -> Vec<u8> {
     let kind = match plane.numbers {
         PlaneNumbers::Floats(_) => "<f4",
         PlaneNumbers::Wholes(_) => "<u4",
@@ -52,16 +57,21 @@ fn archive(file: &PlaneFile, receipt: &Receipt) -> Result<Vec<u8>, rawzip::Error
     };
     // One after the other: beside the archive there is a copy of one plane at a time
     for plane in file.planes {
-        add(plane.name, encode_one(file.window, plane))?;
+        add(plane.name, plane_array(file.window, plane))?;
     }
+    add("receipt", receipt_array(receipt))?;
+    archive.finish()?;
+    Ok(bytes)
+}
+
+/// A receipt as JSON text.
+fn receipt_array(receipt: &Receipt) -> Vec<u8> {
     let said: serde_json::Map<_, _> =
         receipt.entries.iter().map(|(key, value)| (key.clone(), value.clone().into())).collect();
     let text = serde_json::Value::Object(said).to_string();
     // numpy's text is UTF-32
     let characters: Vec<u8> = text.chars().flat_map(|c| u32::from(c).to_le_bytes()).collect();
-    add("receipt", array(&format!("<U{}", characters.len() / 4), "()", &characters))?;
-    archive.finish()?;
-    Ok(bytes)
+    array(&format!("<U{}", characters.len() / 4), "()", &characters)
 }
 
 /// An array with its header: where the numbers begin is a multiple of 64.

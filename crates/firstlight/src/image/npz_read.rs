@@ -7,7 +7,7 @@ use std::io::Read;
 use rawzip::{CompressionMethod, ZipArchive};
 
 use super::read::check_size;
-use super::stored::{LIMITS, StoredPlane, StoredPlanes};
+use super::stored::{LIMITS, StoredPlane, StoredPlanes, one_buffer};
 use super::{Format, ImageError, Plane, PlaneVec, Receipt, Window};
 
 /// The planes of an archive: all its arrays of rows and columns.
@@ -56,10 +56,9 @@ pub(super) fn read(bytes: &[u8]) -> Result<StoredPlanes, ImageError> {
     Ok(StoredPlanes { format: Format::Npz, film: [width, height], window, planes, receipt })
 }
 
-/// The array of an NPY file, which does not say what it is called.
+/// The array of an NPY file, which does not say what it is called unless a receipt stands behind it.
 pub(super) fn read_one(bytes: &[u8]) -> Result<StoredPlanes, ImageError> {
-    let name = "array";
-    let (header, numbers) = parted(bytes).ok_or_else(|| damaged("it has no header".into()))?;
+    let (header, rest) = parted(bytes).ok_or_else(|| damaged("it has no header".into()))?;
     let shape = shape(header).unwrap_or_default();
     let [rows, columns, ref channels @ ..] = shape[..] else {
         return Err(damaged(format!("its shape is {shape:?}; rows and columns are needed")));
@@ -68,20 +67,20 @@ pub(super) fn read_one(bytes: &[u8]) -> Result<StoredPlanes, ImageError> {
         return Err(damaged(format!("its shape is {shape:?}; rows, columns and channels are read")));
     }
     let count = channels.first().copied().unwrap_or(1);
-    let numbers = numbers_of(name, header, numbers, [rows, columns, count])?;
+    let end = size_of_numbers(header, [rows, columns, count]).map_or(rest.len(), |size| rest.len().min(size));
+    let (numbers, behind) = rest.split_at(end);
+    let receipt = parted(behind).and_then(|(header, text)| receipt_of(header, text)).unwrap_or_default();
+    let known = one_buffer(&receipt, count as usize);
+    let (name, channels) =
+        known.unwrap_or_else(|| ("array".into(), channel_names("array", count as usize, &Receipt::default())));
+    // Other arrays behind it are somebody else's
+    let numbers = if receipt.entries.is_empty() { rest } else { numbers };
+    let numbers = numbers_of(&name, header, numbers, [rows, columns, count])?;
     let side = |n: u64| u32::try_from(n).unwrap_or(u32::MAX);
     let (width, height) = (side(columns), side(rows));
     check_size(width, height, &LIMITS)?;
-    let channels = channel_names(name, count as usize, &Receipt::default());
-    let plane = StoredPlane { name: name.to_owned(), channels, numbers, steps: None };
-    let window = Window { x: 0, y: 0, width, height };
-    Ok(StoredPlanes {
-        format: Format::Npy,
-        film: [width, height],
-        window,
-        planes: vec![plane],
-        receipt: Receipt::default(),
-    })
+    let plane = StoredPlane { name, channels, numbers, steps: None };
+    Ok(StoredPlanes::picture(Format::Npy, [width, height], plane, receipt))
 }
 
 fn damaged(reason: String) -> ImageError {
@@ -117,22 +116,32 @@ fn shape(header: &str) -> Option<Vec<u64>> {
     sides.map(|side| side.parse().ok()).collect()
 }
 
+/// Bytes of a number of such a type, if it is read.
+fn width_of(kind: &str) -> Option<u64> {
+    match kind {
+        "<f4" | "<u4" => Some(4),
+        "<u2" => Some(2),
+        "|u1" => Some(1),
+        _ => None,
+    }
+}
+
+/// Bytes of an array of that shape.
+fn size_of_numbers(header: &str, shape: [u64; 3]) -> Option<usize> {
+    let count = shape.iter().try_fold(1, |product: u64, side| product.checked_mul(*side))?;
+    usize::try_from(count.checked_mul(width_of(kind(header)?)?)?).ok()
+}
+
 fn numbers_of(name: &str, header: &str, bytes: &[u8], shape: [u64; 3]) -> Result<PlaneVec, ImageError> {
     let kind = kind(header).unwrap_or_default();
-    let width = match kind {
-        "<f4" | "<u4" => 4,
-        "<u2" => 2,
-        "|u1" => 1,
-        _ => {
-            let allowed = "float32, uint32, uint16 and uint8 are read, the lowest byte first";
-            return Err(damaged(format!("its array {name} has numbers of the type {kind:?}; {allowed}")));
-        }
-    };
+    if width_of(kind).is_none() {
+        let allowed = "float32, uint32, uint16 and uint8 are read, the lowest byte first";
+        return Err(damaged(format!("its array {name} has numbers of the type {kind:?}; {allowed}")));
+    }
     if !after(header, "fortran_order").is_some_and(|rest| rest.starts_with("False")) {
         return Err(damaged(format!("its array {name} goes column by column; rows are read")));
     }
-    let count = shape.iter().try_fold(1, |product: u64, side| product.checked_mul(*side));
-    if count.and_then(|count| count.checked_mul(width)) != Some(bytes.len() as u64) {
+    if size_of_numbers(header, shape) != Some(bytes.len()) {
         return Err(damaged(format!("its array {name} has not as many numbers as it says")));
     }
     Ok(match kind {

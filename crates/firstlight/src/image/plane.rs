@@ -29,8 +29,7 @@ words! {
         /// What of it lights send by highlights, of all lights together.
         Specular = "specular",
         /// What of it lights send that are not kept apart: `color` without `background`, `emission`, `ambient` and the
-        /// lights, or else groups of lights, that are asked for beside it. Added to those it is `color`, to the last
-        /// bit but one.
+        /// lights, or else groups of lights, that are asked for beside it. Added to those it is `color`.
         Rest = "rest",
         /// Of what all lights together would send if nothing cast shadows, the share that arrives, 0 to 1; 0 where
         /// nothing would.
@@ -341,6 +340,16 @@ impl PlaneNumbers<'_> {
             PlaneNumbers::Wholes(numbers) => bytes(numbers, u32::to_le_bytes),
         }
     }
+
+    /// The same as a file holds them that may have floats of 16 bits.
+    #[cfg_attr(not(feature = "exr"), allow(unused_variables, reason = "only EXR files hold such floats"))]
+    pub(super) fn stored_bytes(self, half: bool) -> Vec<u8> {
+        match self {
+            #[cfg(feature = "exr")]
+            PlaneNumbers::Floats(numbers) if half => super::exr::half_bytes(numbers),
+            PlaneNumbers::Floats(_) | PlaneNumbers::Wholes(_) => self.to_le_bytes(),
+        }
+    }
 }
 
 /// Planes that go to a file together.
@@ -381,13 +390,14 @@ impl PlaneFile<'_> {
         {
             return Err(ImageError::NotHeld { format, buffer: (*name).to_owned(), reason });
         }
+        let whole = |receipt| self.described(receipt, &FileSettings { half: false, ..*settings });
         match (format, self.planes) {
             #[cfg(feature = "exr")]
-            (Format::Exr, _) => super::exr::encode(self, &self.described(receipt)),
+            (Format::Exr, _) => super::exr::encode(self, settings, &self.described(receipt, settings)),
             #[cfg(not(feature = "exr"))]
             (Format::Exr, _) => Err(ImageError::WithoutExr),
-            (Format::Npz, _) => super::npz::encode(self, &self.described(receipt)),
-            (Format::Npy, [plane]) => Ok(super::npz::encode_one(self.window, plane)),
+            (Format::Npz, _) => super::npz::encode(self, &whole(receipt)),
+            (Format::Npy, [plane]) => Ok(super::npz::encode_one(self.window, plane, &whole(receipt))),
             (Format::Png8, [plane]) => super::quantized::png(self.window, plane, Depth::Eight, settings, receipt),
             (Format::Png16, [plane]) => super::quantized::png(self.window, plane, Depth::Sixteen, settings, receipt),
             (Format::Hdr, [plane]) => Ok(super::quantized::hdr(self.window, plane, &receipt.shown_by(None))),
@@ -396,15 +406,18 @@ impl PlaneFile<'_> {
     }
 
     /// The receipt with what each plane is and the hash of its bits.
-    fn described(&self, receipt: &Receipt) -> Receipt {
+    fn described(&self, receipt: &Receipt, settings: &FileSettings) -> Receipt {
         let mut receipt = receipt.shown_by(None);
-        let hashes =
-            parallel::collect(self.planes.len(), |k| blake3::hash(&self.planes[k].numbers.to_le_bytes()).to_hex());
+        let hash = |k: usize| {
+            let NamedPlane { plane, numbers, .. } = self.planes[k];
+            blake3::hash(&numbers.stored_bytes(settings.is_half(plane))).to_hex()
+        };
+        let hashes = parallel::collect(self.planes.len(), hash);
         for (NamedPlane { name, plane, .. }, hash) in self.planes.iter().zip(hashes) {
             let said = format!(
                 "channels {}; {}; unit {}; space {}; {}; {}; blake3 {hash}",
                 plane.channels().join(" "),
-                plane.number_type(),
+                if settings.is_half(*plane) { HALF } else { plane.number_type() },
                 plane.unit(),
                 plane.space(),
                 plane.convention(),
@@ -418,3 +431,11 @@ impl PlaneFile<'_> {
 
 /// Before the name of a plane, the key of what a receipt says of it.
 pub(super) const BUFFER_KEY: &str = "buffer.";
+
+/// The type of 16-bit floats, in what a receipt says of a plane.
+const HALF: &str = "float16";
+
+/// Whether a plane was stored in 16-bit floats, by what a receipt says of it.
+pub(super) fn is_half(said: &str) -> bool {
+    said.split("; ").nth(1) == Some(HALF)
+}

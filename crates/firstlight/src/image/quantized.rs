@@ -11,6 +11,7 @@
 //!   is.
 //! - alpha: gray.
 
+use super::plane::{BUFFER_KEY, is_half};
 use super::png::{self, ColorType, Depth, PngSamples};
 use super::{
     BufferDesc, Format, ImageError, NamedPlane, Plane, PlaneNumbers, PlaneVec, Receipt, StoredPlane, Window, hdr,
@@ -24,12 +25,15 @@ pub struct FileSettings {
     pub display: Display,
     /// Units per metre of depth and distance in 16 bits, 0.001 to 1,000,000: 1000 are millimetres.
     pub depth_scale: f64,
+    /// Whether EXR files hold colours and shares in 16-bit floats, which have 11 bits and end at 65504; larger numbers
+    /// become that. All others stay as they are.
+    pub half: bool,
 }
 
 impl Default for FileSettings {
-    /// sRGB; millimetres.
+    /// sRGB; millimetres; 32-bit floats.
     fn default() -> Self {
-        FileSettings { display: Display::default(), depth_scale: 1000.0 }
+        FileSettings { display: Display::default(), depth_scale: 1000.0, half: false }
     }
 }
 
@@ -41,12 +45,18 @@ impl FileSettings {
     pub fn of(receipt: &Receipt) -> Self {
         let said = receipt.get(SCALE_KEY).and_then(|scale| scale.parse().ok());
         let default = FileSettings::default();
-        FileSettings { depth_scale: said.unwrap_or(default.depth_scale), ..default }
+        let half = receipt.entries.iter().any(|(key, said)| key.starts_with(BUFFER_KEY) && is_half(said));
+        FileSettings { depth_scale: said.unwrap_or(default.depth_scale), half, ..default }
     }
 
     pub(super) fn check(&self) -> Result<(), ImageError> {
         let is_scale = (1e-3..=1e6).contains(&self.depth_scale);
         if is_scale { Ok(()) } else { Err(ImageError::DepthScale(self.depth_scale)) }
+    }
+
+    /// Whether files that can hold a plane in 16-bit floats do.
+    pub(super) fn is_half(&self, plane: Plane) -> bool {
+        self.half && matches!(NumberKind::of(plane), NumberKind::Color | NumberKind::Share)
     }
 
     /// What is farther away than this, in metres, is 0 in 16 bits.
@@ -241,7 +251,7 @@ pub(super) fn png(
 
 #[cfg(test)]
 mod tests {
-    use super::super::encode_planes;
+    use super::super::{StoredPlanes, encode_planes};
     use super::*;
 
     const WINDOW: Window = Window { x: 0, y: 0, width: 2, height: 2 };
@@ -342,8 +352,15 @@ mod tests {
     #[test]
     fn an_array_by_itself_is_the_one_of_the_archive() {
         let numbers = [1.0, 2.0, f32::INFINITY, 4.0];
+        let [array, archive] = [Format::Npy, Format::Npz].map(|format| {
+            StoredPlanes::read(&encoded(Plane::Depth, PlaneNumbers::Floats(&numbers), format).unwrap()).unwrap()
+        });
+        assert_eq!((&array.planes, &array.receipt), (&archive.planes, &archive.receipt));
+        assert_eq!((array.format, array.is_as_written(&array.planes[0])), (Format::Npy, Some(true)));
+        // The array of an archive, which is one by itself, has no name
         let bytes = encoded(Plane::Depth, PlaneNumbers::Floats(&numbers), Format::Npy).unwrap();
-        let archive = encoded(Plane::Depth, PlaneNumbers::Floats(&numbers), Format::Npz).unwrap();
-        assert!(bytes.starts_with(b"\x93NUMPY") && archive.windows(bytes.len()).any(|part| part == bytes));
+        let bare = StoredPlanes::read(&bytes[..128 + 4 * numbers.len()]).unwrap();
+        assert_eq!((bare.planes[0].name.as_str(), bare.receipt), ("array", Receipt::default()));
+        assert!(StoredPlanes::read(&bytes[..bytes.len() - 1]).is_err());
     }
 }

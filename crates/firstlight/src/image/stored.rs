@@ -6,7 +6,7 @@ use ::png;
 
 use super::contain::contained;
 use super::damage;
-use super::plane::BUFFER_KEY;
+use super::plane::{BUFFER_KEY, is_half};
 use super::read::{Limits, check_size};
 use super::{Format, ImageError, PREFIX, Plane, PlaneNumbers, PlaneVec, Receipt, Window};
 
@@ -98,13 +98,13 @@ impl StoredPlanes {
             (PlaneVec::Wholes(codes), Format::Png8) => codes.iter().map(|code| *code as u8).collect(),
             (PlaneVec::Wholes(codes), Format::Png16) => codes.iter().flat_map(|c| (*c as u16).to_be_bytes()).collect(),
             (PlaneVec::Floats(colors), Format::Hdr) => super::hdr::bytes(colors.as_chunks().0),
-            (numbers, _) => numbers.numbers().to_le_bytes(),
+            (numbers, _) => numbers.numbers().stored_bytes(is_half(said)),
         };
         Some(blake3::hash(&bytes).to_hex().as_str() == hash)
     }
 
     /// The picture of a file that is its whole film.
-    fn picture(format: Format, [width, height]: [u32; 2], plane: StoredPlane, receipt: Receipt) -> Self {
+    pub(super) fn picture(format: Format, [width, height]: [u32; 2], plane: StoredPlane, receipt: Receipt) -> Self {
         let window = Window { x: 0, y: 0, width, height };
         Self { format, film: [width, height], window, planes: vec![plane], receipt }
     }
@@ -198,7 +198,7 @@ fn read_png(bytes: &[u8]) -> Result<StoredPlanes, ImageError> {
 }
 
 /// The buffer that a receipt speaks of, if it is one, and the names of its channels, if they are so many.
-fn one_buffer(receipt: &Receipt, count: usize) -> Option<(String, Vec<String>)> {
+pub(super) fn one_buffer(receipt: &Receipt, count: usize) -> Option<(String, Vec<String>)> {
     let mut said = receipt.entries.iter().filter_map(|(key, said)| Some((key.strip_prefix(BUFFER_KEY)?, said)));
     let (name, said) = said.next().filter(|_| said.next().is_none())?;
     let channels = said.strip_prefix("channels ")?.split(';').next()?;
