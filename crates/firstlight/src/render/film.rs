@@ -109,13 +109,18 @@ impl Film {
     }
 
     /// Adds a plane, whose numbers are floats.
-    pub(super) fn add(&mut self, scene: &Scene, buffer: Buffer, numbers: &[f32]) {
+    pub(super) fn put(&mut self, scene: &Scene, buffer: Buffer, numbers: &[f32]) {
         let values = match buffer.plane().channels().len() {
             1 => Values::One(numbers.to_vec()),
             _ => Values::Three(numbers.as_chunks().0.to_vec()),
         };
-        self.planes.push((buffer, values));
-        self.names.push(scene.buffer_name(buffer));
+        match self.planes.iter_mut().find(|(known, _)| *known == buffer) {
+            Some((_, known)) => *known = values,
+            None => {
+                self.planes.push((buffer, values));
+                self.names.push(scene.buffer_name(buffer));
+            }
+        }
     }
 
     /// Leaves those planes alone, in their order.

@@ -51,13 +51,16 @@ impl Passes {
                     shares(&with, &without(&of))
                 }
                 None if buffer == Plane::Rest.into() => {
-                    let terms: Vec<Buffer> = beside_rest(scene, asked);
-                    let terms: Vec<&[f32]> = terms.iter().filter_map(|term| picture.floats(*term)).collect();
-                    rest(picture.floats(Plane::Color.into()).unwrap_or_default(), &terms)
+                    let terms = beside_rest(scene, asked).into_iter();
+                    let (terms, mut numbers): (Vec<Buffer>, Vec<Vec<f32>>) =
+                        terms.filter_map(|term| Some((term, picture.floats(term)?.to_vec()))).unzip();
+                    let rest = rest(picture.floats(Plane::Color.into()).unwrap_or_default(), &mut numbers);
+                    terms.iter().zip(&numbers).for_each(|(term, numbers)| picture.put(scene, *term, numbers));
+                    rest
                 }
                 None => without(&[buffer.with_part(None)]).concat(),
             };
-            picture.add(scene, buffer, &numbers);
+            picture.put(scene, buffer, &numbers);
         }
         picture.keep(asked);
         picture
@@ -128,11 +131,45 @@ fn shares(with: &[&[f32]], without: &[&[f32]]) -> Vec<f32> {
     (0..without.first().map_or(0, |plane| plane.len() / 3)).map(share).collect()
 }
 
-/// What of the colour is left without some terms: the difference from their sum, rounded once.
-fn rest(color: &[f32], terms: &[&[f32]]) -> Vec<f32> {
-    let of = |at: usize, color: f32| color - terms.iter().fold(0.0, |sum, term| sum + term[at]);
+/// What of the colour is left without some terms: added to their sum, it is the colour.
+fn rest(color: &[f32], terms: &mut [Vec<f32>]) -> Vec<f32> {
+    let mut of = |at: usize, color: f32| {
+        let mut here: Vec<f32> = terms.iter().map(|term| term[at]).collect();
+        let rest = closing(color, &mut here);
+        terms.iter_mut().zip(here).for_each(|(term, here)| term[at] = here);
+        rest
+    };
     let pixels = color.chunks_exact(4).enumerate();
     pixels.flat_map(|(pixel, color)| [0, 1, 2].map(|channel| of(3 * pixel + channel, color[channel]))).collect()
+}
+
+/// The number that closes a sum: terms, added up one after the other, and it are the whole, in 32-bit floats. For some
+/// sums no float does, such as 1/2 of the whole's last place: then a term, the largest that helps, is taken down by its
+/// last place, which is within what it was rounded by.
+fn closing(whole: f32, terms: &mut [f32]) -> f32 {
+    let rest = |terms: &[f32]| {
+        let sum = terms.iter().fold(0.0, |sum, term| sum + term);
+        let rest = whole - sum;
+        (rest, sum + rest == whole)
+    };
+    let (nearest, closes) = rest(terms);
+    if closes || !nearest.is_finite() {
+        return nearest;
+    }
+    let mut by_size: Vec<usize> = (0..terms.len()).filter(|term| terms[*term] > 0.0).collect();
+    by_size.sort_by(|a, b| terms[*b].total_cmp(&terms[*a]));
+    for term in by_size {
+        let given = terms[term];
+        // The last place of the sum may be several of the term's
+        for _ in 0..64 {
+            terms[term] = terms[term].next_down();
+            if let (rest, true) = rest(terms) {
+                return rest;
+            }
+        }
+        terms[term] = given;
+    }
+    nearest
 }
 
 impl Film {
@@ -142,5 +179,35 @@ impl Film {
             PlaneNumbers::Floats(numbers) => Some(numbers),
             PlaneNumbers::Wholes(_) => None,
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_rest_closes_every_sum() {
+        let mut state = 1u64;
+        let mut random = || {
+            state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+            ((state >> 11) as f64 / (1u64 << 53) as f64) as f32
+        };
+        let mut moved = 0;
+        for _ in 0..100_000 {
+            let scale = (random() * 20.0 - 19.0).exp2();
+            let given = [random() * scale, 0.25 * random() * scale, if random() < 0.3 { 0.0 } else { random() * 0.1 }];
+            let whole = given.iter().sum::<f32>() * (1.0 + 8.0 * random());
+            let mut terms = given;
+            let rest = closing(whole, &mut terms);
+            assert_eq!(terms.iter().fold(0.0, |sum, term| sum + term) + rest, whole, "{given:?} {whole}");
+            for (term, given) in terms.into_iter().zip(given) {
+                assert!(term <= given && given - term <= 2.0 * f32::EPSILON * whole, "{term:e} {given:e} {whole:e}");
+            }
+            moved += usize::from(terms != given);
+        }
+        assert!((100..10_000).contains(&moved), "{moved}");
+        assert_eq!(closing(0.25, &mut []), 0.25);
+        assert!(closing(f32::NAN, &mut [1.0]).is_nan() && closing(f32::INFINITY, &mut [1.0]) == f32::INFINITY);
     }
 }
