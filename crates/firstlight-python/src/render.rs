@@ -293,8 +293,8 @@ impl PyRender {
     ///     distance and ids have 16 bits, and 0 where nothing is; colours are shown as the picture is; normals are
     ///     (x, y, z) / 2 + 1/2.
     /// depth_scale : float
-    ///     Units per metre of depth and distance in a .png file: 1000, if not given, are millimetres. What is farther than 65535
-    ///     units is 0.
+    ///     Units per metre of depth and distance in a .png file: 1000, if not given, are millimetres. What is farther
+    ///     than 65535 units is 0.
     /// half : bool
     ///     Whether an .exr file holds colours and shares of the pixel in 16-bit floats, which end at 65504. Depth,
     ///     positions, normals and all else keep their 32 bits.

@@ -113,6 +113,28 @@ fn a_picture_lit_again_is_that_of_the_changed_scene() {
 }
 
 #[test]
+fn lights_that_share_a_pixel_are_lit_again() {
+    let more = |strength: &str| {
+        let [key, fill, lamp] = BEFORE;
+        let wing = "[[light.rectangle]]\nname = \"wing\"\ncenter = [2.3, 1.5, 1]\ne0 = [0.8, 0, 0]\n\
+                    e1 = [0, 0.6, 0.2]\nsides = \"both\"\n";
+        let text = text(key, fill, lamp, "samples = 9\nbuffers = [\"relight\"]");
+        compiled(&format!("{text}{wing}{strength}\n"))
+    };
+    let sampled = RenderSettings { aa_mode: AaMode::Full, ..RenderSettings::default() };
+    let file = rendered(&more("color = [0.9, 0.7, 0.3]\nstrength = 1.3"), &sampled);
+    let of = |name: &str| match &file.plane(name).unwrap().numbers {
+        PlaneVec::Floats(shares) => shares.clone(),
+        PlaneVec::Wholes(_) => panic!("{name} is whole"),
+    };
+    let both = of("coverage:key").into_iter().zip(of("coverage:wing")).filter(|(a, b)| *a > 0.0 && *b > 0.0).count();
+    assert!(both >= 4, "{both}");
+    let relit = relight(&file, &[("wing".into(), LightChange::Strength(0.7))]).unwrap();
+    let truth = film(&more("color = [0.9, 0.7, 0.3]\nstrength = 0.7"), &sampled).develop();
+    assert!(pixels(&relit.image) == pixels(&truth));
+}
+
+#[test]
 fn many_lights_are_lit_again() {
     let lamps = |strength: f64| -> String {
         let lamp = |i: u32| {
@@ -166,6 +188,22 @@ fn what_cannot_be_lit_again_is_told() {
     let mut less = file.clone();
     less.receipt.entries.retain(|(entry, _)| entry != "lights");
     assert!(relight(&less, &[]).unwrap_err().to_string().contains("does not say what its lights are"));
+    // What no render writes
+    for said in ["0", "65", "65536", "x"] {
+        let mut odd = file.clone();
+        odd.receipt.entries.iter_mut().find(|(key, _)| key == "antialiasing").unwrap().1 = said.into();
+        let fault = relight(&odd, &[("key".into(), LightChange::Times(2.0))]).unwrap_err().to_string();
+        assert!(fault.contains("antialiasing, 1 to 64"), "{fault}");
+    }
+    for share in [f32::INFINITY, f32::NAN, -0.5, 1e9] {
+        let mut odd = file.clone();
+        let seen = odd.planes.iter_mut().find(|plane| plane.name == "coverage:key").unwrap();
+        seen.numbers = PlaneVec::Floats(vec![share; seen.numbers.numbers().count()]);
+        let fault = relight(&odd, &[("key".into(), LightChange::Times(2.0))]).unwrap_err().to_string();
+        assert!(fault.contains("coverage:key") && fault.contains("0 to 1"), "{fault}");
+    }
+    let bad = LightChange::Color(ColorDesc::linear(-1.0, f64::NAN, 1.0));
+    assert!(fault("key", bad).contains("its colour would be -1"));
     // Nothing to multiply
     let dark = compiled(&text("strength = 0", fill, lamp, "samples = 4\nbuffers = [\"relight\"]"));
     let dark = rendered(&dark, &RenderSettings::default());

@@ -204,7 +204,21 @@ fn what_is_not_kept_apart_is_the_rest() {
             (floats(&of_one, Buffer::Light(LightId(0), None)), floats(&film, Buffer::Light(LightId(0), None)));
         let worst = one.iter().zip(all).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
         assert!(worst < 2e-3 && one.iter().any(|v| *v > 4.0 * worst), "{count}: {worst}");
-        // A group
+        // What is asked for beside them changes no other buffer
+        let totals = [Plane::Diffuse, Plane::Specular, Plane::Shadow].map(Buffer::from);
+        let film = film_of(
+            &scene,
+            totals.iter().chain(&some).chain(&[Buffer::Group(LightGroupId(0), None)]).copied().collect(),
+        );
+        let alone = film_of(&scene, totals.to_vec());
+        for total in totals {
+            assert!(floats(&film, total) == floats(&alone, total), "{count}: {total:?}");
+        }
+        // A group, whatever else is told of its lights
+        let beside = Buffer::Light(LightId(0), Some(LightPart::Visibility));
+        let film =
+            film_of(&scene, base.iter().copied().chain([Buffer::Group(LightGroupId(0), None), beside]).collect());
+        is_closed(&film, &[Buffer::Group(LightGroupId(0), None)]);
         let group = Buffer::Group(LightGroupId(0), None);
         let film = film_of(&scene, base.iter().copied().chain([group]).collect());
         is_closed(&film, &[group]);

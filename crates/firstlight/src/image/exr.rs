@@ -1,5 +1,5 @@
-//! OpenEXR files: the film as it is, in 32-bit floats, and ids in 32-bit whole numbers; if asked for, colours and shares
-//! in 16-bit floats.
+//! OpenEXR files: the film as it is, in 32-bit floats, and ids in 32-bit whole numbers; if asked for, colours and
+//! shares in 16-bit floats.
 //!
 //! Of the picture channels R, G, B, and A unless every alpha is 1; premultiplied, as the format wants. Of another plane
 //! one layer, `depth.Z`; Cryptomatte has channels of its own and texts `cryptomatte/KEY/...`. The data window is the

@@ -12,8 +12,8 @@ use rawzip::{CompressionMethod, ZipArchiveWriter};
 
 use super::{ImageError, NamedPlane, PlaneFile, PlaneNumbers, Receipt, Window};
 
-/// The bytes of an NPY file: one plane, and behind it the receipt, a second array. `numpy.load` of the file's name reads
-/// the first; of the open file, one after the other.
+/// The bytes of an NPY file: one plane, and behind it the receipt, a second array. `numpy.load` of the file's name
+/// reads the first; of the open file, one after the other.
 pub(super) fn encode_one(window: Window, plane: &NamedPlane, receipt: &Receipt) -> Vec<u8> {
     [plane_array(window, plane), receipt_array(receipt)].concat()
 }

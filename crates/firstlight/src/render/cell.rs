@@ -245,7 +245,7 @@ impl<'a> Cells<'a> {
         many.light(fragments, &mut lights.arrivals, counts, go_on, |fragment, [sent, apart], took| {
             let Pixel { index, terms } = *pixel(fragment);
             terms.resolve(scene, sent.iter().copied(), index as usize, sums);
-            PixelTerms::keep(scene, apart, index as usize, sums);
+            PixelTerms::keep_apart(scene, apart, index as usize, sums);
             sums.work[index as usize] += took;
         })
     }

@@ -194,7 +194,10 @@ impl RenderSettings {
             }
         }
         let window = self.window(scene);
-        let pixel: usize = self.buffers.iter().map(|buffer| buffer.plane().bytes()).sum();
+        let bytes = |buffers: &[Buffer]| buffers.iter().map(|buffer| buffer.plane().bytes()).sum::<usize>();
+        let Passes { picture, unshadowed } = Passes::of(scene, &self.buffers);
+        // What is rendered is there when what is made of it is
+        let pixel = bytes(&self.buffers).max((bytes(&picture) + bytes(&unshadowed) + bytes(&self.buffers)).div_ceil(2));
         let both = 2 * window.width as usize * window.height as usize * pixel;
         Vec::<u8>::new().try_reserve_exact(both).map_err(|_| {
             let Window { width, height, .. } = window;
@@ -285,19 +288,24 @@ pub fn render(
     if passes.unshadowed.is_empty() && passes.picture == settings.buffers {
         return expose(scene, settings, &settings.buffers, progress);
     }
+    // A pixel is done when it is in every pass
     let count = u64::from(!passes.picture.is_empty()) + u64::from(!passes.unshadowed.is_empty());
-    let (film, stats) = expose(scene, settings, &passes.picture, &|done, all| progress(done, count * all))?;
-    let mut unshadowed = None;
-    let mut all_stats = stats;
-    if !passes.unshadowed.is_empty() {
-        let before = count - 1;
-        let progress = |done, all| progress(before * all + done, count * all);
-        let (film, stats) = expose(&scene.without_shadows(), settings, &passes.unshadowed, &progress)?;
-        unshadowed = Some(film);
-        all_stats = all_stats.and(&stats);
-    }
-    let film = Passes::develop(scene, &settings.buffers, film, unshadowed.as_ref());
-    ControlFlow::Continue((film, all_stats))
+    let mut before = 0;
+    let mut pass = |scene: &Scene, planes: &[Buffer]| {
+        if planes.is_empty() {
+            return ControlFlow::Continue(None);
+        }
+        let progress = |done, all| progress((before * all + done) / count, all);
+        let exposed = expose(scene, settings, planes, &progress)?;
+        before += 1;
+        ControlFlow::Continue(Some(exposed))
+    };
+    let (picture, unshadowed) = (pass(scene, &passes.picture)?, pass(&scene.without_shadows(), &passes.unshadowed)?);
+    let stats = [&picture, &unshadowed].into_iter().flatten().map(|(_, stats)| *stats);
+    let stats = stats.reduce(|all, stats| all.and(&stats)).expect("there is a pass for every buffer");
+    let film = picture.map_or_else(|| Film::new(scene, settings.window(scene), &[]), |(film, _)| film);
+    let unshadowed = unshadowed.as_ref().map(|(film, _)| film);
+    ControlFlow::Continue((Passes::develop(scene, &settings.buffers, film, unshadowed), stats))
 }
 
 /// Renders some planes in one pass.

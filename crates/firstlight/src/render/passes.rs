@@ -103,13 +103,11 @@ fn beside_rest(scene: &Scene, asked: &[Buffer]) -> Vec<Buffer> {
     };
     let mut terms: Vec<Buffer> = [Plane::Background, Plane::Emission, Plane::Ambient].map(Buffer::from).to_vec();
     let mut is_apart = vec![false; scene.lights.len()];
-    for buffer in asked {
-        if let Buffer::Light(LightId(light), _) = buffer {
-            is_apart[*light as usize] = true;
-        }
+    for (light, is_apart) in (0..).zip(&mut is_apart) {
+        let parts = parts(Buffer::Light(LightId(light), None));
+        *is_apart = !parts.is_empty();
+        terms.extend(parts);
     }
-    let lights = (0..scene.lights.len()).filter(|light| is_apart[*light]);
-    terms.extend(lights.flat_map(|light| parts(Buffer::Light(LightId(light as u32), None))));
     for (group, (_, lights)) in (0..).zip(&scene.light_groups) {
         if !lights.iter().any(|light| is_apart[*light as usize]) {
             terms.extend(parts(Buffer::Group(LightGroupId(group), None)));

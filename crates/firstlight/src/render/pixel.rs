@@ -88,7 +88,7 @@ impl PixelSum {
     pub fn see(&mut self, scene: &Scene, seen: TracedHit) -> Option<(SurfaceInteraction, Bsdf)> {
         match seen {
             TracedHit::Background => self.terms.background += 1,
-            TracedHit::Emission(color) => self.terms.emission += color,
+            TracedHit::Emission(radiance) => self.terms.emission.add(radiance, 1),
             TracedHit::Surface(si) => {
                 // Look the material's textures up
                 let bsdf = scene.materials[si.material.index()].bsdf(&si, &scene.textures);

@@ -124,8 +124,9 @@ impl Scene {
             return receipt;
         }
         let mut add = |key: &str, value: String| receipt.entries.push((key.to_owned(), value));
-        let list = |names: Vec<Option<String>>| serde_json::Value::from(names).to_string();
-        add("buffers", list(buffers.iter().map(|buffer| Some(self.buffer_name(*buffer))).collect()));
+        let list = |names: &[Option<&str>]| serde_json::json!(names).to_string();
+        let asked: Vec<String> = buffers.iter().map(|buffer| self.buffer_name(*buffer)).collect();
+        add("buffers", serde_json::json!(asked).to_string());
         if buffers.contains(&Plane::Rays.into()) {
             // How much work it is, the way decides
             let way = if settings.reference { REFERENCE } else { settings.visibility.name() };
@@ -141,12 +142,12 @@ impl Scene {
         for named in Named::ALL {
             if buffers.iter().any(|buffer| Named::of(buffer.plane()) == Some(named)) {
                 let names = self.names_of(named);
-                add(&format!("{}_names", named.word()), list(names.iter().map(|n| n.map(str::to_owned)).collect()));
+                add(&format!("{}_names", named.word()), list(&names));
                 add(&named.manifest_key(), cryptomatte::manifest(names.into_iter()));
             }
         }
         if buffers.iter().any(|buffer| matches!(buffer, Buffer::Light(..) | Buffer::Group(..))) {
-            add("light_names", list(self.light_names()));
+            add("light_names", list(&self.light_names()));
         }
         if buffers.iter().any(|buffer| buffer.part().is_some_and(LightPart::is_unscaled)) {
             self.light_entries(settings).into_iter().for_each(|(key, value)| add(key, value));

@@ -11,9 +11,10 @@ use crate::describe::{ColorDesc, SamplesDesc};
 use crate::ids::{LightId, SurfaceId};
 use crate::image::{Buffer, Image, LightPart, Plane, PlaneVec, Receipt, StoredPlanes};
 use crate::light::{Light, LightScale, MAX_LIGHT};
-use crate::scene::Scene;
+use crate::scene::{MAX_ANTIALIASING, Scene};
 
 use super::RenderSettings;
+use super::resolve::Emission;
 
 /// How a light is changed.
 #[derive(Clone, Debug, PartialEq)]
@@ -184,6 +185,9 @@ fn changed(lights: &[FiledLight], changes: &[(String, LightChange)]) -> Result<V
             let message = format!("light {name}: its strength would be {}, which is outside [0, 1e15]", scale.strength);
             return Err(RelightError(message));
         }
+        if let Some(channel) = scale.color.into_iter().find(|channel| !(0.0..).contains(channel)) {
+            return Err(RelightError(format!("light {name}: its colour would be {channel}, which is below 0 or none")));
+        }
         if !scale.exact().iter().all(|c| *c <= MAX_LIGHT) {
             return Err(RelightError(format!("light {name}: its colour times its strength would pass 1e30")));
         }
@@ -234,18 +238,27 @@ fn emitted(
     if !is_changed || emission.iter().all(|value| *value == 0.0) {
         return Ok(emission.to_vec());
     }
-    let number = |key: &str| planes.0.receipt.get(key)?.parse::<u32>().ok();
-    let rays = number("antialiasing").map_or(1.0, |n| (n * n) as f32);
-    let mut sums = vec![0.0f32; emission.len()];
+    let said = planes.0.receipt.get("antialiasing").and_then(|number| number.parse::<u32>().ok());
+    let rays = said.filter(|n| (1..=MAX_ANTIALIASING).contains(n)).map(|n| n * n).ok_or_else(|| {
+        RelightError(format!(
+            "its receipt does not say how many camera rays it has: antialiasing, 1 to {MAX_ANTIALIASING}"
+        ))
+    })?;
+    let mut sums = vec![Emission::default(); emission.len() / 3];
     for (light, scale) in before.iter().zip(after) {
         let Some(seen) = &light.seen else { continue };
         let shares = planes.required(seen, 1)?;
+        if let Some(share) = shares.iter().find(|share| !(0.0..=1.0).contains(*share)) {
+            return Err(RelightError(format!("a pixel of its buffer {seen} is {share}, which is no share: 0 to 1")));
+        }
         let radiance = scale.radiance();
-        for (sum, share) in sums.as_chunks_mut::<3>().0.iter_mut().zip(shares) {
-            for _ in 0..(share * rays).round() as u32 {
-                *sum = [sum[0] + radiance.r, sum[1] + radiance.g, sum[2] + radiance.b];
-            }
+        for (sum, share) in sums.iter_mut().zip(shares) {
+            sum.add(radiance, (share * rays as f32).round() as u32);
         }
     }
-    Ok(sums.into_iter().map(|sum| sum / rays).collect())
+    let mean = |sum: Emission| {
+        let Rgb { r, g, b } = sum.mean(rays);
+        [r, g, b]
+    };
+    Ok(sums.into_iter().flat_map(mean).collect())
 }

@@ -15,6 +15,8 @@ pub(crate) enum Term {
     Ambient,
     /// A moment of what a light sends; of no light, of what is taken together where there are many.
     Light(Option<u32>, usize),
+    /// The same of a light that is told by itself beside what is taken together: no term of the colour.
+    Apart(u32, usize),
 }
 
 /// Pixels as the sums of their terms; of those that are to be kept, with all that were added to them.
@@ -27,6 +29,8 @@ pub(crate) struct TermSums {
     kept: Vec<KeptSum>,
     /// Term by term: which of those it is added to.
     of_term: Vec<Vec<u32>>,
+    /// How many the scene has.
+    lights: usize,
 }
 
 /// The sum of some terms, for a buffer.
@@ -41,9 +45,29 @@ struct KeptSum {
 pub(crate) struct PixelTerms {
     /// How many of them meet nothing.
     pub background: u32,
-    /// Of lights that are seen.
-    pub emission: Rgb,
+    /// Of lights that are seen. In 64 bits, where what several of them emit is the same in whatever order it is added.
+    pub emission: Emission,
     pub ambient: Rgb,
+}
+
+/// What lights that are seen emit, added up.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Emission([f64; 3]);
+
+impl Emission {
+    /// Adds that of so many rays.
+    pub fn add(&mut self, radiance: Rgb, rays: u32) {
+        let Rgb { r, g, b } = radiance;
+        for (sum, radiance) in self.0.iter_mut().zip([r, g, b]) {
+            *sum += f64::from(radiance) * f64::from(rays);
+        }
+    }
+
+    /// The mean over so many rays.
+    pub fn mean(&self, rays: u32) -> Rgb {
+        let [r, g, b] = self.0.map(|sum| (sum / f64::from(rays)) as f32);
+        Rgb::new(r, g, b)
+    }
 }
 
 /// What one light sends to the surfaces that they see, added up, with the surfaces' colours and without the light's
@@ -66,12 +90,13 @@ impl ScaledTerm {
 }
 
 impl PixelTerms {
-    /// Keeps of pixel `at` what is not added to the colour light by light: of some lights, each by itself.
-    pub fn keep(scene: &Scene, lights: &[ScaledTerm], at: usize, sums: &mut TermSums) {
+    /// Keeps of pixel `at` what lights send that are told apart.
+    pub fn keep_apart(scene: &Scene, lights: &[ScaledTerm], at: usize, sums: &mut TermSums) {
         let rays = (scene.antialiasing * scene.antialiasing) as f32;
         for ScaledTerm { light, scale, term } in lights {
+            let Some(light) = *light else { continue };
             for (moment, part) in term.0.into_iter().enumerate() {
-                sums.keep(at, Term::Light(*light, moment), *scale, std::iter::once(part * (1.0 / rays)));
+                sums.keep(at, Term::Apart(light, moment), *scale, std::iter::once(part * (1.0 / rays)));
             }
         }
     }
@@ -86,7 +111,7 @@ impl PixelTerms {
             if scene.transparent { (Rgb::BLACK, 1.0 - uncovered) } else { (scene.background * uncovered, 1.0) };
         sums.begin(at..at + 1, background, alpha);
         let mut add = |term: Term, scale: Rgb, value: Rgb| sums.add(at, term, scale, std::iter::once(value));
-        add(Term::Emission, Rgb::WHITE, mean(self.emission));
+        add(Term::Emission, Rgb::WHITE, self.emission.mean(scene.antialiasing * scene.antialiasing));
         add(Term::Ambient, Rgb::WHITE, mean(self.ambient));
         for ScaledTerm { light, scale, term } in lights {
             for (moment, part) in term.0.into_iter().enumerate() {
@@ -99,12 +124,13 @@ impl PixelTerms {
 impl Term {
     /// Its number among the terms of a picture.
     #[inline(always)]
-    fn index(self) -> usize {
+    fn index(self, lights: usize) -> usize {
         match self {
             Term::Background => 0,
             Term::Emission => 1,
             Term::Ambient => 2,
             Term::Light(light, moment) => 3 + light.map_or(0, |light| light as usize + 1) * MOMENTS + moment,
+            Term::Apart(light, moment) => 3 + (1 + lights + light as usize) * MOMENTS + moment,
         }
     }
 
@@ -124,7 +150,10 @@ impl Term {
                     None => 0..MOMENTS,
                 };
                 let lights = scene.lights_of(buffer);
-                let terms = |light| moments.clone().map(move |moment| Term::Light(Some(light), moment));
+                let terms = |light| {
+                    let of = move |moment| [Term::Light(Some(light), moment), Term::Apart(light, moment)];
+                    moments.clone().flat_map(of)
+                };
                 lights.into_iter().flat_map(terms).collect()
             }
         }
@@ -137,16 +166,18 @@ impl TermSums {
         let kept: Vec<Buffer> = buffers.iter().copied().filter(|buffer| buffer.is_of_terms()).collect();
         let unscaled = |buffer: &Buffer| buffer.part().is_some_and(LightPart::is_unscaled);
         let sum = |buffer: &Buffer| KeptSum { unscaled: unscaled(buffer), pixels: vec![[0.0; 3]; pixels] };
-        let terms = if kept.is_empty() { 0 } else { Term::Light(None, 0).index() + (scene.lights.len() + 1) * MOMENTS };
+        let lights = scene.lights.len();
+        let terms = if kept.is_empty() { 0 } else { Term::Apart(lights as u32, 0).index(lights) };
         let mut of_term = vec![Vec::new(); terms];
         for (k, buffer) in (0..).zip(&kept) {
-            Term::of(scene, *buffer).into_iter().for_each(|term| of_term[term.index()].push(k));
+            Term::of(scene, *buffer).into_iter().for_each(|term| of_term[term.index(lights)].push(k));
         }
         TermSums {
             colors: vec![[0.0; 4]; pixels],
             work: vec![0.0; pixels],
             kept: kept.iter().map(sum).collect(),
             of_term,
+            lights,
         }
     }
 
@@ -178,7 +209,7 @@ impl TermSums {
 
     /// Adds a term to those sums that keep it, and not to the colours.
     pub fn keep(&mut self, first: usize, term: Term, scale: Rgb, values: impl Iterator<Item = Rgb> + Clone) {
-        for k in &self.of_term[term.index()] {
+        for k in &self.of_term[term.index(self.lights)] {
             let KeptSum { unscaled, pixels } = &mut self.kept[*k as usize];
             for ([r, g, b], value) in pixels[first..].iter_mut().zip(values.clone()) {
                 let value = if *unscaled { value } else { scale * value };

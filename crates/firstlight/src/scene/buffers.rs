@@ -117,7 +117,9 @@ impl Chosen<'_> {
         let Chosen { kinds: [kind, kinds], prefix, names } = self;
         match choice {
             LightChoice::All => (0..names.len()).collect(),
-            LightChoice::Number(number) if (*number as usize) <= names.len() => vec![*number as usize - 1],
+            LightChoice::Number(number) if (1..=names.len()).contains(&(*number as usize)) => {
+                vec![*number as usize - 1]
+            }
             LightChoice::Number(number) => {
                 cx.error(path, format!("there is no {kind} #{number}: the scene has {}", names.len()), None);
                 Vec::new()
@@ -238,7 +240,7 @@ impl Scene {
     pub fn buffer_name(&self, buffer: Buffer) -> String {
         let names = match buffer {
             Buffer::Plane(_) => Names::default(),
-            Buffer::Light(..) => Names { lights: self.said_lights(), ..Names::default() },
+            Buffer::Light(..) => Names { lights: self.light_names(), ..Names::default() },
             Buffer::Group(..) => Names { groups: self.said_groups(), ..Names::default() },
             Buffer::Coverage(_) => Names { objects: self.names_of(Named::Object), ..Names::default() },
         };
@@ -253,11 +255,11 @@ impl Scene {
         let (mut cx, mut names) = (CompileContext::default(), Names::default());
         match desc {
             BufferDesc::Plane(_) => {}
-            BufferDesc::Light { .. } => names.lights = self.said_lights(),
+            BufferDesc::Light { .. } => names.lights = self.light_names(),
             BufferDesc::Group { .. } => names.groups = self.said_groups(),
             BufferDesc::Coverage(_) => names.objects = self.names_of(Named::Object),
             BufferDesc::Relight => {
-                (names.lights, names.objects) = (self.said_lights(), self.names_of(Named::Object));
+                (names.lights, names.objects) = (self.light_names(), self.names_of(Named::Object));
             }
         }
         let found = names.meant(&mut cx, "", desc, |object| is_seen(object, &self.geometry, &self.lights));
@@ -269,10 +271,6 @@ impl Scene {
         }
     }
 
-    fn said_lights(&self) -> Vec<Option<&str>> {
-        self.summary.lights.iter().map(|(_, name, _)| name.as_deref()).collect()
-    }
-
     fn said_groups(&self) -> Vec<Option<&str>> {
         self.light_groups.iter().map(|(name, _)| Some(name.as_str())).collect()
     }
@@ -280,10 +278,7 @@ impl Scene {
     /// The names of what has ids, that of id 1 first.
     pub(crate) fn names_of(&self, named: Named) -> Vec<Option<&str>> {
         match named {
-            Named::Object => {
-                let lights = self.summary.lights.iter().map(|(_, name, _)| name.as_deref());
-                self.geometry.surface_names().chain(lights).collect()
-            }
+            Named::Object => self.geometry.surface_names().chain(self.light_names()).collect(),
             Named::Instance => self.geometry.instances.iter().map(Option::as_deref).collect(),
             // The last one is of shapes that name none
             Named::Material => {
@@ -298,8 +293,8 @@ impl Scene {
     }
 
     /// The names of the lights, in scene order.
-    pub(crate) fn light_names(&self) -> Vec<Option<String>> {
-        self.summary.lights.iter().map(|(_, name, _)| name.clone()).collect()
+    pub(crate) fn light_names(&self) -> Vec<Option<&str>> {
+        self.summary.lights.iter().map(|(_, name, _)| name.as_deref()).collect()
     }
 
     /// The lights that a buffer is of, in scene order; none of what is not sent by lights.

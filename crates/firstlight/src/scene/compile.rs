@@ -62,7 +62,7 @@ pub struct Compiled {
 
 /// The largest side of a picture, in pixels.
 pub(crate) const MAX_SIDE: u32 = 65536;
-const MAX_ANTIALIASING: u32 = 64;
+pub(crate) const MAX_ANTIALIASING: u32 = 64;
 /// Of the tolerance: below it the converged pictures that it was tested with are not good enough themselves.
 const MIN_TOLERANCE: f64 = 0.25;
 const MAX_TOLERANCE: f64 = 16.0;

@@ -26,8 +26,8 @@ mod world;
 
 pub use builtin::{Builtin, builtin_scenes};
 pub use cast::CastHit;
-pub(crate) use compile::MAX_SIDE;
 pub use compile::{CompileOptions, Compiled};
+pub(crate) use compile::{MAX_ANTIALIASING, MAX_SIDE};
 pub use description::{DisplayEncoding, RenderDesc, SceneDesc};
 pub use model::{Added, Framing, ModelSettings, UpAxis, View};
 pub use motion::MotionTo;

@@ -106,7 +106,7 @@ impl Cells<'_> {
                 continue;
             };
             if let Some(light) = hit.surface.index().checked_sub(scene.geometry.surfaces.len()) {
-                pixel.terms.emission += scene.lights[light].radiance;
+                pixel.terms.emission.add(scene.lights[light].radiance, 1);
                 continue;
             }
             let (ray, differential) = camera_ray(scene, i * n + at[0], j * n + at[1]);
@@ -166,7 +166,7 @@ impl Cells<'_> {
             match first {
                 None => pixel.terms.background += 1,
                 Some((place, t)) => match near[place] {
-                    Candidate::Light(light) => pixel.terms.emission += scene.lights[light as usize].radiance,
+                    Candidate::Light(light) => pixel.terms.emission.add(scene.lights[light as usize].radiance, 1),
                     _ => self.rays.push((place as u32, RayHit { ray, t, at })),
                 },
             }
