@@ -473,7 +473,7 @@ pub struct ViewBufferArgs {
 /// `firstlight verify`
 #[derive(Args, Debug)]
 pub struct VerifyArgs {
-    /// A picture that firstlight wrote: .png, .exr, .npz or .hdr
+    /// A picture that firstlight wrote: .png, .exr, .npz, .npy or .hdr
     #[arg(value_name = "FILE", value_hint = ValueHint::FilePath)]
     pub file: PathBuf,
     /// Its scene, or a folder that has it among its scenes and models; which one it is, the hash tells [default: a
@@ -503,7 +503,7 @@ pub struct RelightArgs {
     /// effect in that order
     #[arg(long, value_name = "NAME=CHANGE", value_parser = crate::relight::change, required = true)]
     pub light: Vec<(String, LightChange)>,
-    /// A picture to write: its ending, .png, .exr, .npz or .hdr, says the format. May be given several times
+    /// A picture to write: its ending, .png, .exr, .npz, .npy or .hdr, says the format. May be given several times
     #[arg(short, long = "output", value_name = "FILE", value_hint = ValueHint::FilePath, required = true)]
     pub output: Vec<PathBuf>,
     /// Bits in each channel of PNG files [default: 8]

@@ -1,12 +1,12 @@
 //! `firstlight relight`: a picture with other lights, without a render.
 
-use firstlight::{Display, Format, LightChange, Relit, relight};
+use firstlight::{Display, FileSettings, Format, LightChange, Relit, relight};
 
 use crate::args::RelightArgs;
 use crate::difference;
 use crate::interrupt::Watch;
 use crate::output::{Target, commit, with_bits};
-use crate::report::{Failure, shown};
+use crate::report::{Failure, say, shown};
 
 /// Lights the picture of a file again and writes it.
 ///
@@ -18,6 +18,10 @@ pub fn run(args: &RelightArgs) -> Result<(), Failure> {
     let stored = difference::read(&args.file)?;
     let work = |why: String| Failure::Work(format!("{}: {why}", shown(&args.file)));
     let Relit { image, display, receipt } = relight(&stored, &args.light).map_err(|e| work(e.to_string()))?;
+    if FileSettings::of(&stored.receipt).half && !args.quiet {
+        let name = shown(&args.file);
+        say(format_args!("note: {name} holds its lights in 16-bit floats; the picture is as exact as those"));
+    }
     let display = Display { exposure: args.exposure.unwrap_or(display.exposure), ..display };
     let watch = Watch::begin();
     let encode = |(_, format): &(Target, Format)| image.encode(*format, &display, &receipt);
@@ -43,6 +47,13 @@ fn outputs(args: &RelightArgs) -> Result<Vec<(Target, Format)>, Failure> {
             return Err(Failure::Usage(format!("-o {name} is named twice")));
         }
         outputs.push((target, with_bits(format, args.bits)));
+    }
+    let is_png = |(_, format): &(Target, Format)| matches!(format, Format::Png8 | Format::Png16);
+    if !outputs.iter().any(is_png) {
+        let unused = [("--bits", args.bits.is_some()), ("--exposure", args.exposure.is_some())];
+        if let Some((option, _)) = unused.into_iter().find(|(_, given)| *given) {
+            return Err(Failure::Usage(format!("{option} is for PNG only, and no output is one")));
+        }
     }
     Ok(outputs)
 }

@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use firstlight::{BufferView, Display, Encoding, Format, StoredPlane, StoredPlanes, nearest_name};
+use firstlight::{BufferView, Display, Encoding, Format, PlaneVec, StoredPlane, StoredPlanes, nearest_name};
 
 use crate::args::ViewBufferArgs;
 use crate::difference;
@@ -18,16 +18,19 @@ pub fn run(args: &ViewBufferArgs) -> Result<(), Failure> {
     let target = target(args)?;
     let file = difference::read(&args.file)?;
     let plane = find(args, &file)?;
-    let numbers = plane.meant(&args.name, &file.receipt);
-    // The samples of a PNG file are encoded already
-    let encoding = if plane.steps.is_some() { Encoding::Linear } else { Encoding::Srgb };
+    let mut numbers = plane.meant(&args.name, &file.receipt);
+    // The colours of a PNG file are encoded already
+    if let (Some(_), true, PlaneVec::Floats(colors)) = (plane.steps, plane.is_color(), &mut numbers) {
+        let encoding = file.display().encoding;
+        colors.iter_mut().for_each(|color| *color = encoding.decode(f64::from(*color)) as f32);
+    }
     let view = BufferView {
         name: &args.name,
         channels: &plane.channels,
         numbers: numbers.numbers(),
         size: [file.window.width, file.window.height],
         range: args.range,
-        display: Display { encoding, exposure: args.exposure.unwrap_or(0.0) },
+        display: Display { encoding: Encoding::Srgb, exposure: args.exposure.unwrap_or(0.0) },
     };
     let bytes = view.encode(&file.receipt).map_err(|e| Failure::Work(format!("{}: {e}", shown(&args.file))))?;
     let watch = Watch::begin();

@@ -468,9 +468,21 @@ impl PyScene {
         let mut wanted = Self::wanted(py, camera, [width, height], aa, samples, tolerance, time)?;
         let asked = buffers.map(|names| names.iter().map(|name| buffer(name)).collect::<PyResult<_>>());
         wanted.buffers = asked.transpose()?;
-        wanted.motion_to = motion_to.map(|to| motion_choice(py, to, &mut wanted.size)).transpose()?;
+        let (choice, there) = match motion_to.map(|to| motion_choice(py, to, wanted.size)).transpose()? {
+            Some((choice, size)) => (Some(choice), size),
+            None => (None, [None; 2]),
+        };
+        wanted.motion_to = choice;
         let (compiled, files) = self.compiled(py, &wanted)?;
         let scene = &compiled.scene;
+        if let ([Some(width), Some(height)], [w, h]) = (there, [scene.width(), scene.height()])
+            && [width, height] != [w, h]
+        {
+            return Err(PyValueError::new_err(format!(
+                "motion_to is a camera of {width} x {height} pixels, and the render has {w} x {h}; motion is in pixels \
+                 of one size"
+            )));
+        }
         let buffers = scene.buffers().to_vec();
         if motion_to.is_some() && !buffers.iter().any(|buffer| buffer.plane().is_of_motion()) {
             let message = "motion_to is for the buffers motion and motion-backward, and neither is asked for";
@@ -647,18 +659,27 @@ fn camera_choice(
     }
 }
 
-/// Whereto motion leads.
-fn motion_choice(py: Python<'_>, to: &Bound<'_, PyAny>, size: &mut [Option<u32>; 2]) -> PyResult<MotionChoice> {
+/// Whereto motion leads, and the size of the picture there: that of a render of `size`, else what the camera says.
+fn motion_choice(
+    py: Python<'_>,
+    to: &Bound<'_, PyAny>,
+    size: [Option<u32>; 2],
+) -> PyResult<(MotionChoice, [Option<u32>; 2])> {
     if let Ok(time) = to.extract::<f64>() {
-        return Ok(MotionChoice::To(MotionTo::Time(time)));
+        return Ok((MotionChoice::To(MotionTo::Time(time)), size));
     }
-    match camera_choice(py, "motion_to", to, size)? {
-        CameraChoice::Other(camera) => Ok(MotionChoice::Camera(camera)),
+    let mut own = size;
+    let choice = match camera_choice(py, "motion_to", to, &mut own)? {
+        CameraChoice::Other(camera) => MotionChoice::Camera(camera),
         CameraChoice::Named(name) => match MotionTo::from_name(&name) {
-            Some(to) => Ok(MotionChoice::To(to)),
-            None => Err(PyValueError::new_err("motion_to is empty; it is a time, \"next\", \"previous\" or a camera")),
+            Some(to) => MotionChoice::To(to),
+            None => {
+                let message = "motion_to is empty; it is a time, \"next\", \"previous\" or a camera";
+                return Err(PyValueError::new_err(message));
+            }
         },
-    }
+    };
+    Ok((choice, own))
 }
 
 /// The buffer of that name.

@@ -2,7 +2,9 @@
 
 import collections.abc
 import json
+import re
 import threading
+from pathlib import Path
 
 import numpy as np
 import OpenEXR
@@ -204,6 +206,11 @@ def test_motion_leads_to_a_time_or_a_camera():
     assert steps(camera="right", motion_to=other)[0] == pytest.approx(7)
     frame = scene.render(buffers=buffers, camera="right", motion_to=fl.Camera(position=[0, 0, 10]))
     assert "intrinsics" not in frame.receipt and "motion_intrinsics" in frame.receipt
+    # Its picture is as large as the render's
+    sized = fl.Camera(position=[0, 0, 10], width=80, height=40)
+    assert scene.render(buffers=buffers, motion_to=sized)["motion"].shape == (40, 80, 3)
+    with pytest.raises(ValueError, match="640 x 100 pixels, and the render has 80 x 40"):
+        scene.render(buffers=buffers, motion_to=fl.Camera(position=[0, 0, 10], width=640, height=100))
     # There and back: the other picture's own motion
     there = scene.render(buffers=["motion"], time=0.7, motion_to=0.0)["motion"]
     assert (scene.render(buffers=["motion-backward"], motion_to=0.7)["motion-backward"] == there).all()
@@ -224,3 +231,25 @@ def test_motion_that_leads_nowhere_is_refused():
         scene.render(buffers=["motion"], motion_to=[1])
     with pytest.raises(fl.SceneError, match="in seconds"):
         scene.render(buffers=["motion"], motion_to=float("nan"))
+
+
+def test_stubs_know_every_buffer():
+    stubs = (Path(fl.__file__).parent / "__init__.pyi").read_text()
+    names = re.search(r"Buffer = str \| Literal\[(.*?)\]", stubs, re.S).group(1)
+    assert set(re.findall(r'"([^"]+)"', names)) == {*fl.BUFFERS, "relight"}
+
+
+def test_files_take_what_is_for_them(tmp_path):
+    frame = _moving().render(buffers=["color", "depth", "alpha"])
+    frame.save(tmp_path / "a.exr")
+    frame.save(tmp_path / "h.exr", half=True)
+    assert (tmp_path / "h.exr").stat().st_size < (tmp_path / "a.exr").stat().st_size
+    frame.save(tmp_path / "d.png", buffer="depth", depth_scale=100)
+    with pytest.raises(ValueError, match="half is for .exr files"):
+        frame.save(tmp_path / "a.npz", half=True)
+    with pytest.raises(ValueError, match="depth_scale is for depth and distance"):
+        frame.save(tmp_path / "a.exr", depth_scale=100)
+    frame.save(tmp_path / "depth.npy", buffer="depth")
+    with open(tmp_path / "depth.npy", "rb") as file:
+        assert (np.load(file) == frame["depth"]).all()
+        assert json.loads(str(np.load(file)))["buffers"] == '["depth"]'

@@ -24,14 +24,14 @@ impl<'a> Contents<'a> {
                     let (name, file) = (desc.name(), output.target.name());
                     let fault = |why: String| Failure::Usage(format!("-o {name}={file}: {why}"));
                     let found = scene.buffers_of(desc).map_err(fault)?;
+                    if found.is_empty() {
+                        return Err(fault("the scene has none".into()));
+                    }
                     if found.len() != 1 && !matches!(output.format, Format::Exr | Format::Npz) {
                         let count = found.len();
                         return Err(fault(format!(
                             "the scene has {count} of them, and such a file holds one; .exr and .npz hold any number"
                         )));
-                    }
-                    if found.is_empty() {
-                        return Err(fault("the scene has none".into()));
                     }
                     if let Some(why) = found.iter().find_map(|buffer| output.format.refuses(buffer.plane())) {
                         return Err(fault(format!("{why}; .exr, .npz and .npy files can hold it")));

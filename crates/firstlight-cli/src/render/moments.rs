@@ -52,15 +52,23 @@ impl Took {
 /// What annotations call the picture that they are of: the first of the outputs that shows the scene, else the first,
 /// as seen from their own file.
 fn picture_name(outputs: &[Output], json: &Target) -> String {
-    let shown = outputs.iter().find(|output| output.content == Content::Scene).or(outputs.first());
-    let Some(Target::File(picture)) = shown.map(|output| &output.target) else { return String::new() };
+    let file = |output: &Output| match &output.target {
+        Target::File(path) => Some(path.clone()),
+        Target::Stdout => None,
+    };
+    let of_scene = outputs.iter().filter(|output| output.content == Content::Scene).find_map(file);
+    let Some(picture) = of_scene.or_else(|| outputs.iter().find_map(file)) else { return String::new() };
+    let whole = |path: &Path| std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
     let folder = match json {
         Target::File(json) => json.parent().unwrap_or(Path::new("")),
         Target::Stdout => Path::new(""),
     };
-    let picture = picture.strip_prefix(folder).unwrap_or(picture);
+    let (picture, folder) = (whole(&picture), whole(&folder.join(".")));
+    let common = picture.components().zip(folder.components()).take_while(|(a, b)| a == b).count();
+    let up = folder.components().skip(common).map(|_| "..".into());
+    let down = picture.components().skip(common).map(|part| part.as_os_str().to_string_lossy().into_owned());
     // With `/` between folders on every system
-    picture.to_string_lossy().replace(std::path::MAIN_SEPARATOR, "/")
+    up.chain(down).collect::<Vec<String>>().join("/")
 }
 
 /// The rendering of one moment after the other.

@@ -21,6 +21,17 @@ fn all_frames_are_in_one_file() {
         json["annotations"].as_array().unwrap().iter().filter(move |annotation| annotation["image_id"] == image)
     };
     assert!(of(1).count() >= 2 && of(2).count() >= 2);
+    folder.run("render scene.toml -o out/p.png --coco a.json").done();
+    std::fs::create_dir(folder.path("notes")).unwrap();
+    let whole = folder.path("out/q.png");
+    let shard = "--frames 0..3 --shard 1/2 -o f_#.png";
+    folder.run(&format!("render scene.toml {shard} --coco s.json")).exits(2).says(&["--coco s.json: every shard"]);
+    folder.run(&format!("render scene.toml -o {} --coco notes/b.json", whole.display())).done();
+    folder.run("render scene.toml -o - -o object-id=i.png --coco c.json").done();
+    for (file, expected) in [("a.json", "out/p.png"), ("notes/b.json", "../out/q.png"), ("c.json", "i.png")] {
+        let json: Json = serde_json::from_slice(&folder.get(file)).unwrap();
+        assert_eq!(json["images"][0]["file_name"], expected);
+    }
     // The part of the film that is rendered is the picture
     folder.run("render scene.toml --crop 10,8,16,12 -o c.png --coco c.json").done();
     let json: Json = serde_json::from_slice(&folder.get("c.json")).unwrap();

@@ -2,7 +2,7 @@
 
 use firstlight::{FileSettings, Format, NamedPlane, Plane, PlaneVec, Receipt, StoredPlanes, encode_planes};
 
-use crate::common::{Folder, QUICK, SCENE};
+use crate::common::{Folder, QUICK, SCENE, ran};
 
 /// The options of [`QUICK`] as one text, but for the samples.
 fn quick() -> String {
@@ -214,6 +214,43 @@ fn differences_are_counted_and_measured() {
     assert!(run.text().contains("samples differ") && !run.text().contains("largest"), "{}", run.text());
     let run = folder.run("diff a.npz c.npz").exits(3);
     assert!(run.text().contains("only in a.npz: color, depth"), "{}", run.text());
+}
+
+#[test]
+fn what_a_png_file_holds_is_compared_as_it_holds_it() {
+    let folder = Folder::with_scene();
+    let lights = "-o light:#1=l.png -o depth=d.png -o object-id=i.png";
+    folder
+        .run(&format!("render scene.toml --buffers color,depth,object-id,light:#1 -o a.exr {lights} -o a.png"))
+        .done();
+    for png in ["a.png", "l.png", "d.png", "i.png"] {
+        folder.run(&format!("diff {png} a.exr")).done();
+        folder.run(&format!("diff a.exr {png}")).done();
+    }
+    folder.run("render scene.toml --camera side --buffers color,depth,object-id -o b.exr -o object-id=j.png").done();
+    assert!(folder.run("diff d.png b.exr").exits(3).text().contains("depth"));
+    folder.run("diff l.png b.exr").exits(1).says(&["l.png has light:#1 and b.exr has color, depth, object-id"]);
+    // Ids are the same or not, in any file
+    folder.run("diff i.png j.png --max 9").exits(3);
+    // The name of a light that is long, or has spaces
+    for name in ["my light", &"k".repeat(60)] {
+        let scene = String::from_utf8(folder.get("scene.toml")).unwrap();
+        folder.put(
+            "named.toml",
+            scene.replacen(
+                "[[light.",
+                &format!("[[light.point]]\nname = \"{name}\"\nposition = [1, 2, 3]\n[[light."),
+                1,
+            ),
+        );
+        for file in ["n.png", "n.hdr"] {
+            ran(folder.command(["render", "named.toml", "-o", &format!("light:{name}={file}")]).output().unwrap())
+                .done();
+            ran(folder.command(["view-buffer", file, &format!("light:{name}"), "-o", "x.png"]).output().unwrap())
+                .done();
+            folder.run(&format!("verify {file} --scene named.toml")).done();
+        }
+    }
 }
 
 #[test]

@@ -17,16 +17,16 @@ LIGHTS: list[str]
 MATERIALS: list[str]
 TEXTURES: list[str]
 
-# Or light:NAME, light:#3, light:*, and their parts, light:NAME:diffuse and light:NAME:specular;
-# coverage:NAME, coverage:#3, coverage:*
+# Or light:NAME, light:#3, light:*, group:NAME, group:*, and their parts: diffuse, specular, unshadowed, visibility,
+# unscaled-diffuse, unscaled-specular, as in light:NAME:diffuse; coverage:NAME, coverage:#3, coverage:*
 Buffer = str | Literal[
-    "color", "alpha", "background", "emission", "ambient", "diffuse", "specular", "depth", "distance", "position",
+    "color", "alpha", "background", "emission", "ambient", "diffuse", "specular", "rest", "shadow", "depth", "distance", "position",
     "position-camera", "position-object", "normal", "normal-camera", "normal-object", "normal-geometric",
     "normal-geometric-camera", "tangent", "uv", "barycentric", "albedo", "object-id", "instance-id", "material-id",
     "primitive-id", "face-orientation", "motion", "motion-backward", "depth:filtered", "distance:filtered",
     "position:filtered", "position-camera:filtered", "normal:filtered", "normal-camera:filtered",
     "normal-geometric:filtered", "normal-geometric-camera:filtered", "uv:filtered", "albedo:filtered",
-    "coverage:background", "crypto-object", "crypto-instance", "crypto-material", "rays",
+    "coverage:background", "crypto-object", "crypto-instance", "crypto-material", "rays", "relight",
 ]
 # Three rows or four of four numbers, or a table of the scene format
 Transform = ArrayLike | Mapping[str, Any] | None

@@ -1,6 +1,9 @@
 //! Comparing picture files, number by number.
 
-use super::{Image, ImageError, Plane, PlaneNumbers, Receipt, StoredPlane, StoredPlanes, Window};
+use super::{
+    BufferDesc, FileSettings, Image, ImageError, NamedPlane, Plane, PlaneNumbers, Receipt, StoredPlane, StoredPlanes,
+    Window, encode_planes,
+};
 use crate::color::{Display, Encoding, Rgb, false_color};
 
 /// How the numbers of one buffer differ between two files.
@@ -97,9 +100,10 @@ fn pair<'a>(a: &'a StoredPlane, b: &'a StoredPlane) -> Result<Pair<'a>, String> 
     let both = |channel: &&String| b.channels.contains(channel);
     let opaque = |plane: &StoredPlane| is_color && plane.steps.is_some() && plane.channels.len() == 3;
     let mut channels: Vec<String> = a.channels.iter().filter(both).cloned().collect();
+    let lacks_color = is_color && !(a.is_color() && b.is_color());
     if (opaque(a) && b.channels.len() == 4) || (opaque(b) && a.channels.len() == 4) {
         channels.push("A".into());
-    } else if !is_color && (channels.len() != a.channels.len() || channels.len() != b.channels.len()) {
+    } else if lacks_color || !is_color && (channels.len() != a.channels.len() || channels.len() != b.channels.len()) {
         let [a, b] = [a, b].map(|plane| plane.channels.join(" "));
         return Err(format!("{name} has the channels {a} in one file and {b} in the other"));
     }
@@ -113,6 +117,13 @@ fn pair<'a>(a: &'a StoredPlane, b: &'a StoredPlane) -> Result<Pair<'a>, String> 
     };
     let numbers = [samples(a), samples(b)];
     Ok(Pair { name, channels, numbers, steps })
+}
+
+/// Whether numbers are ids, which are the same or not: of a buffer of ids, or else whole numbers that are no codes of 8
+/// or 16 bits.
+fn is_id(name: &str, steps: Option<u32>, numbers: PlaneNumbers) -> bool {
+    let plane = BufferDesc::parse(name).ok().and_then(|desc| desc.plane());
+    plane.map_or(steps.is_none(), Plane::is_whole) && matches!(numbers, PlaneNumbers::Wholes(_))
 }
 
 /// How far two numbers are apart.
@@ -133,7 +144,7 @@ impl PlaneDifference {
     /// They are not of one kind.
     pub fn compare(a: &StoredPlane, b: &StoredPlane, columns: u32) -> Result<PlaneDifference, String> {
         let Pair { name, channels, numbers: [a, b], steps } = pair(a, b)?;
-        let is_id = steps.is_none() && matches!(a.numbers, PlaneNumbers::Wholes(_));
+        let is_id = is_id(name, steps, a.numbers);
         let pixels = a.numbers.count() / a.all.max(1);
         let sample = |pixel: usize, channel: usize, values: [f64; 2]| {
             let columns = columns as usize;
@@ -204,18 +215,28 @@ impl StoredPlanes {
         self.receipt.get(super::DISPLAY_KEY).and_then(|said| said.parse().ok()).unwrap_or_default()
     }
 
-    /// The picture as it would be stored in the 8 or 16 bits of another file; itself if it is in such bits already, and
-    /// all other buffers left out.
+    /// The buffer of a file of 8 or 16 bits as it would be stored there, all others left out; itself if it has none of
+    /// that name, or has it in such bits already.
     ///
     /// # Errors
-    /// It has no picture.
+    /// A number that such a file cannot hold.
     pub fn shown_as(&self, other: &StoredPlanes) -> Result<StoredPlanes, ImageError> {
-        let color = self.plane(Plane::Color.name()).filter(|plane| plane.steps.is_none());
-        let Some(pixels) = color.and_then(StoredPlane::rgba) else { return Ok(self.clone()) };
+        let [StoredPlane { name, .. }] = &other.planes[..] else { return Ok(self.clone()) };
+        let Some(own) = self.plane(name).filter(|plane| plane.steps.is_none()) else { return Ok(self.clone()) };
         let Window { width, height, .. } = self.window;
         let window = Window { x: 0, y: 0, width, height };
-        let image = Image { film: [width, height], window, pixels };
-        StoredPlanes::read(&image.encode(other.format, &other.display(), &Receipt::default())?)
+        let settings = FileSettings { display: other.display(), ..FileSettings::of(&other.receipt) };
+        let bytes = if name == Plane::Color.name() {
+            let Some(pixels) = own.rgba() else { return Ok(self.clone()) };
+            Image { film: [width, height], window, pixels }.encode(other.format, &settings.display, &Receipt::default())
+        } else {
+            let Some(plane) = BufferDesc::parse(name).ok().and_then(|desc| desc.plane()) else {
+                return Ok(self.clone());
+            };
+            let plane = NamedPlane { name, plane, numbers: own.numbers.numbers() };
+            encode_planes([width, height], window, &[plane], other.format, &settings, &Receipt::default())
+        };
+        StoredPlanes::read(&bytes?)
     }
 }
 
@@ -239,8 +260,8 @@ pub fn false_colors(numbers: &[f32], columns: u32) -> Image {
 /// # Errors
 /// They are not of one kind.
 pub fn relative_differences(a: &StoredPlane, b: &StoredPlane) -> Result<Vec<f32>, String> {
-    let Pair { channels, numbers: [a, b], steps, .. } = pair(a, b)?;
-    let is_id = steps.is_none() && matches!(a.numbers, PlaneNumbers::Wholes(_));
+    let Pair { name, channels, numbers: [a, b], steps } = pair(a, b)?;
+    let is_id = is_id(name, steps, a.numbers);
     let of = |pixel: usize, channel: usize| {
         let [(bits, x), (other, y)] = [&a, &b].map(|samples| samples.at(pixel, channel, steps));
         if is_id { f64::from(u8::from(bits != other)) } else { distance(x, y) }

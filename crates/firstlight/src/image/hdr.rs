@@ -21,7 +21,7 @@ pub(super) fn encode(window: Window, of: &NamedPlane, pixels: &[[f32; 4]], recei
     // The header: variables, comments, an empty line, the size
     let mut file = format!("#?RADIANCE\nSOFTWARE={SOFTWARE}\n").into_bytes();
     for (key, value) in &receipt.entries {
-        file.extend(format!("# {PREFIX}{key} {}\n", escape(value)).into_bytes());
+        file.extend(format!("# {PREFIX}{} {}\n", escape(key).replace(' ', "\\u{20}"), escape(value)).into_bytes());
     }
     file.extend(b"PRIMARIES=0.640 0.330 0.300 0.600 0.150 0.060 0.3127 0.3290\n");
     file.extend(format!("FORMAT=32-bit_rle_rgbe\n\n-Y {height} +X {width}\n").into_bytes());

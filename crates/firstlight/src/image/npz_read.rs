@@ -19,7 +19,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<StoredPlanes, ImageError> {
         let path = String::from_utf8_lossy(entry.file_path().as_bytes()).into_owned();
         let Some(name) = path.strip_suffix(".npy") else { continue };
         if entry.compression_method() != CompressionMethod::STORE {
-            return Err(damaged(format!("its array {name} is compressed; numpy.savez writes it as it is read here")));
+            return Err(unread(name, "is compressed; numpy.savez writes it as it is read here"));
         }
         let entry = archive.get_entry(entry.wayfinder()).map_err(fault)?;
         let mut data = Vec::with_capacity(entry.data().len());
@@ -42,9 +42,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<StoredPlanes, ImageError> {
     if let Some((other, [r, c], ..)) = arrays.iter().find(|(_, other, ..)| *other != size) {
         return Err(damaged(format!("its array {first} has {rows} x {columns} pixels, and {other} has {r} x {c}")));
     }
-    let side = |n: u64| u32::try_from(n).unwrap_or(u32::MAX);
-    let (width, height) = (side(columns), side(rows));
-    check_size(width, height, &LIMITS)?;
+    let [width, height] = size_of([columns, rows])?;
     let plane = |(name, _, channels, numbers): (String, [u64; 2], u64, PlaneVec)| StoredPlane {
         channels: channel_names(&name, channels as usize, &receipt),
         name,
@@ -58,6 +56,13 @@ pub(super) fn read(bytes: &[u8]) -> Result<StoredPlanes, ImageError> {
 
 /// The array of an NPY file, which does not say what it is called unless a receipt stands behind it.
 pub(super) fn read_one(bytes: &[u8]) -> Result<StoredPlanes, ImageError> {
+    read_array(bytes).map_err(|fault| match fault {
+        ImageError::Damaged { reason, .. } => ImageError::Damaged { format: "NPY", reason },
+        fault => fault,
+    })
+}
+
+fn read_array(bytes: &[u8]) -> Result<StoredPlanes, ImageError> {
     let (header, rest) = parted(bytes).ok_or_else(|| damaged("it has no header".into()))?;
     let shape = shape(header).unwrap_or_default();
     let [rows, columns, ref channels @ ..] = shape[..] else {
@@ -76,15 +81,28 @@ pub(super) fn read_one(bytes: &[u8]) -> Result<StoredPlanes, ImageError> {
     // Other arrays behind it are somebody else's
     let numbers = if receipt.entries.is_empty() { rest } else { numbers };
     let numbers = numbers_of(&name, header, numbers, [rows, columns, count])?;
-    let side = |n: u64| u32::try_from(n).unwrap_or(u32::MAX);
-    let (width, height) = (side(columns), side(rows));
-    check_size(width, height, &LIMITS)?;
+    let [width, height] = size_of([columns, rows])?;
     let plane = StoredPlane { name, channels, numbers, steps: None };
     Ok(StoredPlanes::picture(Format::Npy, [width, height], plane, receipt))
 }
 
+/// The width and height of a picture.
+fn size_of(sides: [u64; 2]) -> Result<[u32; 2], ImageError> {
+    let [width, height] = sides.map(|side| u32::try_from(side).unwrap_or(u32::MAX));
+    if width == 0 || height == 0 {
+        return Err(ImageError::Picture(format!("its arrays are of {width} x {height} pixels, which is no picture")));
+    }
+    check_size(width, height, &LIMITS)?;
+    Ok([width, height])
+}
+
 fn damaged(reason: String) -> ImageError {
     ImageError::Damaged { format: "NPZ", reason }
+}
+
+/// What is well made, and is not read here.
+fn unread(name: &str, why: &str) -> ImageError {
+    ImageError::Picture(format!("its array {name} {why}"))
 }
 
 /// The header of an array, a literal of Python, and its numbers.
@@ -136,10 +154,10 @@ fn numbers_of(name: &str, header: &str, bytes: &[u8], shape: [u64; 3]) -> Result
     let kind = kind(header).unwrap_or_default();
     if width_of(kind).is_none() {
         let allowed = "float32, uint32, uint16 and uint8 are read, the lowest byte first";
-        return Err(damaged(format!("its array {name} has numbers of the type {kind:?}; {allowed}")));
+        return Err(unread(name, &format!("has numbers of the type {kind:?}; {allowed}")));
     }
     if !after(header, "fortran_order").is_some_and(|rest| rest.starts_with("False")) {
-        return Err(damaged(format!("its array {name} goes column by column; rows are read")));
+        return Err(unread(name, "goes column by column; rows are read"));
     }
     if size_of_numbers(header, shape) != Some(bytes.len()) {
         return Err(damaged(format!("its array {name} has not as many numbers as it says")));
@@ -167,7 +185,12 @@ fn channel_names(name: &str, count: usize, receipt: &Receipt) -> Vec<String> {
     let said = receipt.get(&format!("{}{name}", super::plane::BUFFER_KEY));
     let said = said.and_then(|said| said.strip_prefix("channels ")?.split_once(';')).map(|(names, _)| names);
     let said = said.map(|names| names.split(' ').map(str::to_owned).collect());
-    let known = || Plane::from_name(name).map(|plane| plane.channels().iter().map(|name| (*name).to_owned()).collect());
+    // A picture may have no alpha
+    let known = || {
+        let channels = Plane::from_name(name)?.channels();
+        let channels = if name == Plane::Color.name() { &channels[..count.clamp(3, 4)] } else { channels };
+        Some(channels.iter().map(|name| (*name).to_owned()).collect())
+    };
     let fits = |names: &Vec<String>| names.len() == count;
     said.filter(fits).or_else(|| known().filter(fits)).unwrap_or_else(|| (1..=count).map(|k| k.to_string()).collect())
 }

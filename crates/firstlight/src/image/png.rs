@@ -157,17 +157,21 @@ impl PngSamples {
         let mut writer = encoder.write_header()?;
         writer.write_text_chunk(&TEXtChunk::new("Software", SOFTWARE))?;
         for (key, value) in &receipt.entries {
-            let keyword = format!("{PREFIX}{key}");
-            // The format has no room for what is said of a light with a very long name
-            if keyword.len() <= MAX_KEYWORD {
-                writer.write_text_chunk(&ITXtChunk::new(keyword, value.as_str()))?;
+            let mut keyword = format!("{PREFIX}{key}");
+            // Only the key of the one buffer grows, with the name of a light, which stands in `buffers` too
+            if keyword.len() > MAX_KEYWORD {
+                keyword = format!("{PREFIX}{LONG_KEY}");
             }
+            writer.write_text_chunk(&ITXtChunk::new(keyword, value.as_str()))?;
         }
         writer.write_image_data(&self.bytes)?;
         writer.finish()?;
         Ok(bytes)
     }
 }
+
+/// In place of the key of a buffer whose name is too long for a keyword.
+pub(super) const LONG_KEY: &str = "buffer";
 
 /// No keyword of a text chunk is longer.
 const MAX_KEYWORD: usize = 79;

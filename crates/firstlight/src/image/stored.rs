@@ -184,6 +184,13 @@ fn read_png(bytes: &[u8]) -> Result<StoredPlanes, ImageError> {
             receipt.entries.push((key.into(), value));
         }
     }
+    // The name of the buffer may have been too long for the key
+    let asked = receipt.get("buffers").and_then(|said| serde_json::from_str::<Vec<String>>(said).ok());
+    if let Some([name]) = asked.as_deref()
+        && let Some((key, _)) = receipt.entries.iter_mut().find(|(key, _)| key == super::png::LONG_KEY)
+    {
+        *key = format!("{BUFFER_KEY}{name}");
+    }
     if let Some((name, channels)) = one_buffer(&receipt, color.samples()) {
         let plane = StoredPlane { name, channels, numbers: PlaneVec::Wholes(codes), steps: Some(steps) };
         return Ok(StoredPlanes::picture(format, [width, height], plane, receipt));
@@ -223,7 +230,7 @@ fn read_hdr(bytes: &[u8]) -> Result<StoredPlanes, ImageError> {
         let entry =
             std::str::from_utf8(line).ok().and_then(|l| l.strip_prefix("# ")?.strip_prefix(PREFIX)?.split_once(' '));
         if let Some((key, value)) = entry {
-            receipt.entries.push((key.into(), super::hdr::unescape(value)));
+            receipt.entries.push((super::hdr::unescape(key), super::hdr::unescape(value)));
         }
     }
     let colors = pixels.into_iter().flat_map(|[r, g, b, _]| [r, g, b]).collect();

@@ -37,9 +37,10 @@ pub struct BufferView<'a> {
     pub numbers: PlaneNumbers<'a>,
     /// Pixels across and down.
     pub size: [u32; 2],
-    /// The numbers at the ends of the colour map, the radius of the wheel last; found from the numbers if `None`.
+    /// The numbers at the ends of the colour map, of motion 0 and the radius of the wheel; found from the numbers if
+    /// `None`. Colours, ids and directions have none.
     pub range: Option<[f64; 2]>,
-    /// How colours are shown.
+    /// How colours are shown; of what is none, with an exposure of 0.
     pub display: Display,
 }
 
@@ -105,6 +106,21 @@ impl BufferView<'_> {
             && !(low.is_finite() && high.is_finite() && low < high)
         {
             return fault(format!("the range is {low} to {high}; two numbers are needed, the lower one first"));
+        }
+        let what = match self.look() {
+            Look::Color if self.range.is_some() => Some("is a colour, and has no range; an exposure shows it brighter"),
+            Look::Id | Look::Direction if self.range.is_some() => {
+                Some("has no range: each colour is a number of its own")
+            }
+            Look::Flow if self.range.is_some_and(|[low, _]| low != 0.0) => {
+                Some("is motion, whose range is 0 to the length at the rim of the wheel")
+            }
+            Look::Color => None,
+            _ if self.display.exposure != 0.0 => Some("is no colour, and has no exposure; a range sets the ends"),
+            _ => None,
+        };
+        if let Some(what) = what {
+            return Err(ImageError::Picture(format!("{} {what}", self.name)));
         }
         match self.display.fault() {
             Some(words) => Err(ImageError::Display(words)),

@@ -65,7 +65,7 @@ impl Canvas {
     pub fn with_legend(self, legend: Option<&Legend>) -> Canvas {
         let Some(legend) = legend else { return self };
         // Letters grow with the picture
-        let unit = (self.height / 360).max(1);
+        let unit = (self.height.min(4 * self.width) / 360).max(1);
         let extra = match legend {
             Legend::Bar { .. } => (16 + 12 + 9 * ADVANCE + 6) * unit,
             Legend::Wheel { .. } => 92 * unit,

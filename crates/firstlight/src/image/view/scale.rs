@@ -90,8 +90,10 @@ fn power_of_ten(exponent: i32) -> f64 {
 /// A number with as many decimals as steps of that size need; of very large and small ones with an exponent.
 fn written(number: f64, step: f64) -> String {
     let size = number.abs().max(step);
-    if !(1e-4..1e6).contains(&size) {
-        return format!("{number:.1e}");
+    if !(1e-4..1e8).contains(&size) {
+        // As many digits as tell one step from the next, and as fit
+        let digits = pxfm::f_log10(size / step).floor().clamp(1.0, 4.0) as usize;
+        return format!("{number:.digits$e}");
     }
     if number.abs() >= 1.0 && number == number.round() {
         return format!("{number}");
@@ -114,6 +116,8 @@ mod tests {
         let linear = |low, high| Scale::linear(Some([low, high]), [].into_iter());
         assert_eq!(texts(linear(3.1, 11.9), 5), ["4", "6", "8", "10"]);
         assert_eq!(texts(linear(0.0, 1.0), 5), ["0.0", "0.2", "0.4", "0.6", "0.8", "1"]);
+        assert_eq!(texts(linear(2e6, 2e6 + 4.0), 4), ["2000000", "2000001", "2000002", "2000003", "2000004"]);
+        assert_eq!(texts(linear(3e9, 3.4e9), 2), ["3.0e9", "3.2e9", "3.4e9"]);
         assert_eq!(texts(linear(-0.03, 0.02), 5), ["-0.03", "-0.02", "-0.01", "0.00", "0.01", "0.02"]);
         let wide = Scale::of(Some([0.5, 2000.0]), [].into_iter());
         assert_eq!(texts(wide, 6), ["1", "10", "100", "1000"]);
