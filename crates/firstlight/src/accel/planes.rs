@@ -23,6 +23,20 @@ pub(crate) struct TreePlanes([(Vec3, f32); 5]);
 const SLACK: f64 = 1e-5;
 
 impl Planes {
+    /// Around neighbouring rays, of which these are the corners, one after the other: origins and directions.
+    pub fn around(corners: [[DVec3; 2]; 4]) -> Planes {
+        let sum = |of: usize| corners.iter().map(|ray| ray[of]).sum::<DVec3>();
+        let (o, d) = (sum(0) * 0.25, sum(1));
+        let side = |k: usize| {
+            let [[o0, d0], [o1, d1]] = [corners[k], corners[(k + 1) % 4]];
+            // Along both rays and from one to the other, whether they begin at one place or go one way
+            let n = (d0 + d1).cross(o1 + d1 - o0 - d0).normalize_or_zero();
+            HalfSpace { n: if n.dot(o + d - o0) > 0.0 { -n } else { n }, p: o0 }
+        };
+        let behind = HalfSpace { n: -d.normalize_or_zero(), p: o };
+        Planes([side(0), side(1), side(2), side(3), behind])
+    }
+
     /// In a tree around `center` that reaches `half` from it.
     pub fn within(&self, center: Vec3, half: f32) -> TreePlanes {
         TreePlanes(self.0.map(|HalfSpace { n, p }| {
@@ -44,6 +58,13 @@ impl Planes {
 }
 
 impl TreePlanes {
+    /// [`meet`](Self::meet) for who visits a tree.
+    #[inline(always)]
+    pub fn test<S: Simd>(self) -> impl Fn(S, &BoxNode) -> (u32, f32x8<S>) {
+        #[inline(always)]
+        move |simd, node| self.meet(simd, node)
+    }
+
     /// The children of a node that may reach inside: a bit for each, and no order.
     #[inline(always)]
     pub fn meet<S: Simd>(&self, simd: S, node: &BoxNode) -> (u32, f32x8<S>) {

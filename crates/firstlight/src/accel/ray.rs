@@ -130,6 +130,17 @@ pub(crate) type RayTile = Rays<64>;
 impl<const N: usize> Rays<N> {
     pub const ZERO: Self = Rays { o: [[0.0; N]; 3], d: [[0.0; N]; 3] };
 
+    /// The rays that `change` makes of these.
+    #[inline(always)]
+    pub fn map(&self, change: impl Fn(Vec3, Vec3) -> [Vec3; 2]) -> Self {
+        let mut all = Self::ZERO;
+        for place in 0..N {
+            let [o, d] = change(self.o(place), self.d(place));
+            all.set(place, o, d);
+        }
+        all
+    }
+
     /// Puts a ray into a place.
     #[inline(always)]
     pub fn set(&mut self, place: usize, o: Vec3, d: Vec3) {

@@ -1,14 +1,14 @@
 //! What the camera rays of neighbouring pixels hit, together.
 //!
-//! Rays of one block of 8 x 8 go through the mesh of the world as a bundle; everything else is asked ray by ray. The
-//! answers are those of [`Scene::intersect`], to the bit.
+//! Rays of one block of 8 x 8 go through the mesh of the world as a bundle, and through meshes that are placed where few
+//! things are; everything else is asked ray by ray. The answers are those of [`Scene::intersect`], to the bit.
 
 use fearless_simd::{Level, f32x16, prelude::*};
 
-use crate::accel::RayTile;
+use crate::accel::{Planes, RayTile};
 use crate::math::{LANES, Ray, Vec3, dispatch_wide};
 use crate::scene::{Hit, Nearest, Scene};
-use crate::shape::{RayDifferential, TileHits};
+use crate::shape::{RayDifferential, TileHits, bits};
 
 /// Rays across a block.
 const BLOCK: u32 = 8;
@@ -25,6 +25,8 @@ pub(crate) struct PixelHits {
     hits: Vec<Option<Hit>>,
     rays: Box<RayTile>,
     found: Box<TileHits>,
+    /// The meshes that are placed where the rays of a block go.
+    meshes: Vec<u32>,
 }
 
 impl PixelHits {
@@ -40,6 +42,7 @@ impl PixelHits {
             hits: vec![None; (across * across) as usize],
             rays: Box::new(RayTile::ZERO),
             found: Box::new(TileHits::new(0.0)),
+            meshes: Vec::new(),
         }
     }
 
@@ -64,38 +67,57 @@ impl PixelHits {
     #[allow(clippy::too_many_arguments, reason = "a rectangle in a square on a film")]
     fn block(&mut self, scene: &Scene, x: u32, y: u32, left: u32, top: u32, w: u32, h: u32) {
         let geometry = &scene.geometry;
-        let bundle = geometry.world_as_bundle();
         self.aim(scene, x + left, y + top);
+        let bundle = geometry.world_as_bundle();
+        // Which things each ray is asked of by itself
+        let upper_bundle = (bundle || !geometry.has_world()) && {
+            let corners = [[0, 0], [w - 1, 0], [w - 1, h - 1], [0, h - 1]].map(|[column, row]| {
+                let place = place(column, row);
+                [self.rays.o(place), self.rays.d(place)].map(Vec3::as_dvec3)
+            });
+            geometry.few_meshes(self.level, &Planes::around(corners), &mut self.meshes)
+        };
+        let at = |place: usize| {
+            let (row, column) = (place / 32 * 4 + place % 16 / 4, place / 16 % 2 * 4 + place % 4);
+            (top as usize + row) * self.across as usize + left as usize + column
+        };
         let mut active = 0u64;
         for row in 0..h {
             for column in 0..w {
                 let place = place(column, row);
                 let ray = Ray { o: self.rays.o(place), d: self.rays.d(place) };
                 let mut nearest = scene.meet_listed(&ray);
-                if bundle {
+                if upper_bundle {
+                    geometry.meet_unbounded(self.level, &ray, &mut nearest);
+                } else if bundle {
                     geometry.meet_upper(self.level, &ray, &mut nearest);
-                    self.found.t[place] = nearest.limit();
-                    self.found.surface[place] = u32::MAX;
-                    self.found.triangle[place] = u32::MAX;
-                    active |= 1 << place;
                 } else if geometry.has_trees() {
                     geometry.meet_trees(self.level, &ray, &mut nearest);
                 }
-                self.hits[((top + row) * self.across + left + column) as usize] = nearest.0;
+                active |= 1 << place;
+                self.hits[at(place)] = nearest.0;
             }
         }
-        if !bundle {
-            return;
+        if bundle {
+            ask_from_here(&mut self.found, active, |place| Nearest(self.hits[at(place)]));
+            let met = geometry.meet_world(self.level, &self.rays, active, &mut self.found);
+            for place in bits(met) {
+                let mut nearest = Nearest(self.hits[at(place)]);
+                geometry.offer_world(&self.found, place, &mut nearest);
+                self.hits[at(place)] = nearest.0;
+            }
         }
-        let mut met = geometry.meet_world(self.level, &self.rays, active, &mut self.found);
-        while met != 0 {
-            let place = met.trailing_zeros();
-            met &= met - 1;
-            let (row, column) = (place / 32 * 4 + place % 16 / 4, place / 16 % 2 * 4 + place % 4);
-            let hit = &mut self.hits[((top + row) * self.across + left + column) as usize];
-            let mut nearest = Nearest(*hit);
-            geometry.offer_world(&self.found, place as usize, &mut nearest);
-            *hit = nearest.0;
+        if upper_bundle && !self.meshes.is_empty() {
+            ask_from_here(&mut self.found, active, |place| Nearest(self.hits[at(place)]));
+            let mut met = 0;
+            for mesh in &self.meshes {
+                met |= geometry.meet_placed_tile(self.level, *mesh, &self.rays, active, &mut self.found);
+            }
+            for place in bits(met) {
+                let mut nearest = Nearest(self.hits[at(place)]);
+                geometry.offer_placed(&self.meshes, &self.found, place, &mut nearest);
+                self.hits[at(place)] = nearest.0;
+            }
         }
     }
 
@@ -134,6 +156,15 @@ impl PixelHits {
     #[inline(always)]
     pub fn get(&self, i: u32, j: u32, column: u32, row: u32) -> Option<Hit> {
         self.hits[((j * self.n + row) * self.across + i * self.n + column) as usize]
+    }
+}
+
+/// Lets hits count up to the nearest that is known of each ray.
+fn ask_from_here(found: &mut TileHits, active: u64, nearest: impl Fn(usize) -> Nearest) {
+    for place in bits(active) {
+        found.t[place] = nearest(place).limit();
+        found.surface[place] = u32::MAX;
+        found.triangle[place] = u32::MAX;
     }
 }
 
@@ -226,6 +257,61 @@ mod tests {
                         assert_eq!((ray.o, ray.d), (one.o, one.d), "{n} {i} {j} {k}");
                     }
                 }
+            }
+        }
+    }
+
+    #[test]
+    fn placed_meshes_are_met_as_ray_by_ray() {
+        let level = SimdLevel::Auto.resolve().token();
+        let part = |more: &str| {
+            format!(
+                "[[group.star.mesh]]\npositions = [[0, 1, 0], [1, -1, 0.5], [-1, -1, -0.5], [0, 0, 1], [0.3, 0.2, -1]]\n\
+                 triangles = [[0, 1, 2], [0, 2, 3], [1, 3, 4], [4, 0, 1], [2, 4, 3]]\n{more}\n"
+            )
+        };
+        let place = |x: f64, more: &str| {
+            format!("[[instance]]\nof = \"star\"\ntransform = {{ translate = [{x}, 0, 0] }}\n{more}\n")
+        };
+        let ball = "[[group.ball.sphere]]\ncenter = [0, 1.2, 0]\nradius = 0.5\n[[instance]]\nof = \"ball\"\n";
+        let tilted =
+            "[[instance]]\nof = \"star\"\ntransform = { rotate_deg = [20, 30, 5], scale = [0.7, -1.1, 0.8] }\n";
+        let own = "[[mesh]]\npositions = [[-3, -1, -1], [3, -1, -1], [0, 2, 0.4]]\ntriangles = [[0, 1, 2]]\n";
+        let both = place(0.4, "") + &place(0.4, "") + tilted;
+        for (number, (text, projection)) in [
+            (both.clone(), ""),
+            (both.clone() + own, ""),
+            (both.clone() + own + ball, "projection = \"orthographic\"\nheight = 3"),
+            (place(-1.0, "visible = false") + &both, ""),
+            ((0..9).map(|k| place(f64::from(k) * 0.4 - 1.6, "")).collect::<String>() + ball, ""),
+        ]
+        .into_iter()
+        .enumerate()
+        {
+            for single in ["", "single_sided = true"] {
+                let text = format!(
+                    "[render]\nwidth = 45\nheight = 37\n[camera]\nposition = [1, 0.5, 4]\nlook_at = [0, 0, 0]\n\
+                     {projection}\n{}{text}",
+                    part(single)
+                );
+                let parsed = SceneDesc::parse("s.toml", text.as_bytes(), &NoAssets);
+                let scene = parsed.compile(&NoAssets, &CompileOptions::default()).expect("is a scene").scene;
+                let mut hits = PixelHits::new(level, 1);
+                let mut met = 0;
+                for (y, x) in (0..37).step_by(8).flat_map(|y| (0..45).step_by(8).map(move |x| (y, x))) {
+                    let (w, h) = (8.min(45 - x), 8.min(37 - y));
+                    hits.trace(&scene, x, y, w, h);
+                    for (j, i) in (0..h).flat_map(|j| (0..w).map(move |i| (j, i))) {
+                        let one = scene.intersect_at(level, &hits.ray(i, j));
+                        assert_eq!(
+                            format!("{:?}", hits.get(i, j, 0, 0)),
+                            format!("{one:?}"),
+                            "{number} {x} {y} {i} {j}"
+                        );
+                        met += u32::from(one.is_some());
+                    }
+                }
+                assert!(met > 100, "{number}: {met}");
             }
         }
     }

@@ -12,6 +12,9 @@ use crate::shape::{
     every,
 };
 
+/// So many meshes at the same place are asked for many rays at once, each for all of them.
+const FEW_MESHES: usize = 4;
+
 impl Geometry {
     /// Whether there is anything beside the lists.
     #[inline(always)]
@@ -35,14 +38,10 @@ impl Geometry {
 
     #[inline(always)]
     fn reaches<S: Simd>(&self, simd: S, planes: &Planes) -> bool {
-        let meet = |center: Vec3, half: f32| {
-            let planes = planes.within(center, half);
-            #[inline(always)]
-            move |simd, node: &_| planes.meet(simd, node)
-        };
         let of_world = self.world.as_ref().filter(|world| world.camera != Opacity::Clear);
-        of_world.is_some_and(|world| !world.mesh.tree.gather(simd, meet, |_| false))
-            || !self.upper.gather(simd, meet, |_| false)
+        of_world.is_some_and(|world| {
+            !world.mesh.tree.gather(simd, |center, half| planes.within(center, half).test(), |_| false)
+        }) || !self.upper.gather(simd, |center, half| planes.within(center, half).test(), |_| false)
     }
 
     /// Offers what a camera ray meets in the trees.
@@ -74,6 +73,68 @@ impl Geometry {
     #[inline(never)]
     fn meet_upper_now(&self, level: Level, ray: &Ray, nearest: &mut Nearest) {
         dispatch_eight!(level, simd => self.meet_upper_with(simd, ray, nearest))
+    }
+
+    /// Finds the meshes that are placed where camera rays inside of `planes` may meet them, if all that is placed there
+    /// is a few meshes that let no ray pass: then each can be asked for many rays at once, see
+    /// [`meet_placed_tile`](Self::meet_placed_tile). What has no end is not among them.
+    pub fn few_meshes(&self, level: Level, planes: &Planes, found: &mut Vec<u32>) -> bool {
+        found.clear();
+        if self.items.is_empty() {
+            return true;
+        }
+        let take = |item: u32| {
+            let UpperItem::Placed(index) = self.items[item as usize] else { return false };
+            let thing = &self.placed[index as usize];
+            let is_mesh = thing.camera == Opacity::Opaque && matches!(thing.target, PlacedTarget::Mesh(_));
+            if is_mesh {
+                found.push(index);
+            }
+            (is_mesh && found.len() <= FEW_MESHES) || thing.camera == Opacity::Clear
+        };
+        dispatch_eight!(level, simd => self.upper.gather(simd, |center, half| planes.within(center, half).test(), take))
+    }
+
+    /// What rays meet of a mesh that is placed, at most as far as `hits` says: which rays meet something nearer.
+    #[inline(never)]
+    pub fn meet_placed_tile(&self, level: Level, index: u32, rays: &RayTile, active: u64, hits: &mut TileHits) -> u64 {
+        let thing = &self.placed[index as usize];
+        let PlacedTarget::Mesh(mesh) = thing.target else { unreachable!("only meshes are asked so") };
+        let own = dispatch_eight!(level, simd => simd.vectorize(
+            #[inline(always)]
+            || rays.map(#[inline(always)] |o, d| {
+                let own = thing.placement.line(o, d);
+                [own.o.as_vec3(), own.d.as_vec3()]
+            }),
+        ));
+        self.meshes[mesh as usize].tree.tile_at(level, &own, active, thing.surface.0, hits, &every)
+    }
+
+    /// Offers what [`meet_placed_tile`](Self::meet_placed_tile) found for the ray at `place` of one of those meshes.
+    pub fn offer_placed(&self, meshes: &[u32], hits: &TileHits, place: usize, nearest: &mut Nearest) {
+        let Some(hit) = hits.get(place) else { return };
+        for index in meshes {
+            let thing = &self.placed[*index as usize];
+            if let (PlacedTarget::Mesh(mesh), true) = (thing.target, thing.surface.0 == hits.surface[place]) {
+                let part = self.meshes[mesh as usize].part(hit.triangle).surface;
+                let point = TrianglePoint { triangle: hit.triangle, u: hit.u, v: hit.v };
+                let at = At::Placed(*index, PlacedSpot::Triangle(point));
+                nearest.offer(hit.t as f64, SurfaceId(thing.surface.0 + part), at);
+            }
+        }
+    }
+
+    /// Offers what a camera ray meets of what has no end.
+    #[inline(always)]
+    pub fn meet_unbounded(&self, level: Level, ray: &Ray, nearest: &mut Nearest) {
+        for &thing in &self.unbounded {
+            dispatch_eight!(level, simd => self.meet_placed(simd, thing, ray, nearest));
+        }
+    }
+
+    /// Whether there is a mesh of the world.
+    pub fn has_world(&self) -> bool {
+        self.world.is_some()
     }
 
     /// Whether the mesh of the world can be asked for many rays at once: where no triangle lets some rays pass.

@@ -637,7 +637,7 @@ fn along(pack: &Pack, place: usize, [kx, ky, kz]: [usize; 3]) -> [[f32; 3]; 3] {
 
 /// The places of the bits that are set.
 #[inline(always)]
-fn bits(mut mask: u64) -> impl Iterator<Item = usize> {
+pub(crate) fn bits(mut mask: u64) -> impl Iterator<Item = usize> {
     std::iter::from_fn(move || {
         let place = mask.trailing_zeros() as usize;
         (mask != 0).then(|| {
