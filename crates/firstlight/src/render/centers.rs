@@ -65,36 +65,40 @@ impl<'a> Centers<'a> {
     fn fill(&mut self, film: &mut FilmTile, asks: impl Fn(Plane) -> Option<Plane>) -> u64 {
         let (scene, there, level) = (self.scene, self.there, self.level);
         let (tile, side) = (film.tile, self.hits.side());
-        let asked = |of: Plane| film.planes().iter().any(|buffer| asks(buffer.plane()) == Some(of));
+        // Which planes of the film are asked for, and what each is here
+        let planes: Vec<(usize, Plane)> = (0..)
+            .zip(film.planes())
+            .filter(|(_, buffer)| buffer.plane().is_of_center())
+            .filter_map(|(number, buffer)| Some((number, asks(buffer.plane())?)))
+            .collect();
+        let asked = |of: Plane| planes.iter().any(|(_, plane)| *plane == of);
         let (asks_motion, asks_texture) = (asked(Plane::Motion), asked(Plane::Albedo));
-        let mut centers: Vec<(Ray, Option<Center>)> = Vec::with_capacity((side * side) as usize);
         for top in (0..tile.height).step_by(side as usize) {
             for left in (0..tile.width).step_by(side as usize) {
                 let (w, h) = ((tile.width - left).min(side), (tile.height - top).min(side));
                 let [x, y] = [tile.x + left, tile.y + top];
                 self.hits.trace(scene, x, y, w, h);
-                centers.clear();
-                centers.extend((0..h).flat_map(|j| (0..w).map(move |i| (i, j))).map(|(i, j)| {
+                for (j, i) in (0..h).flat_map(|j| (0..w).map(move |i| (j, i))) {
                     let ray = self.hits.ray(i, j);
                     let center = self.hits.get(i, j, 0, 0).map(|hit| {
                         let differential =
                             if asks_texture { grid_ray(scene, 1, x + i, y + j).1 } else { RayDifferential::default() };
                         Center::new(scene, ray, differential, hit)
                     });
-                    (ray, center)
-                }));
-                film.set_centers([left, top], w, &asks, |plane| {
-                    centers.iter().map(move |(ray, center)| match (center, there) {
-                        (Some(center), Some(there)) if plane == Plane::Motion => {
-                            CenterValue::Floats(motion::of_thing(center, there, level))
-                        }
-                        (None, Some(there)) if plane == Plane::Motion => {
-                            CenterValue::Floats(motion::of_nothing(scene, there, ray, level))
-                        }
-                        (Some(center), _) => center.says(plane),
-                        (None, _) => nothing(plane),
-                    })
-                });
+                    for (number, plane) in &planes {
+                        let said = match (&center, there) {
+                            (Some(center), Some(there)) if *plane == Plane::Motion => {
+                                CenterValue::Floats(motion::of_thing(center, there, level))
+                            }
+                            (None, Some(there)) if *plane == Plane::Motion => {
+                                CenterValue::Floats(motion::of_nothing(scene, there, &ray, level))
+                            }
+                            (Some(center), _) => center.says(*plane),
+                            (None, _) => nothing(*plane),
+                        };
+                        film.set_center(*number, [left + i, top + j], said);
+                    }
+                }
             }
         }
         u64::from(tile.width) * u64::from(tile.height) * if asks_motion { 2 } else { 1 }

@@ -249,28 +249,16 @@ impl FilmTile {
         self.planes.iter().map(|(buffer, _)| *buffer).collect()
     }
 
-    /// Notes what the centre rays of some pixels say, plane by plane: of those from `corner` of the tile on, in rows of
-    /// `width`. `asks` says what a plane asks for, if anything; `None` leaves it as it is.
-    pub(super) fn set_centers<I: Iterator<Item = CenterValue>>(
-        &mut self,
-        [left, top]: [u32; 2],
-        width: u32,
-        asks: impl Fn(Plane) -> Option<Plane>,
-        say: impl Fn(Plane) -> I,
-    ) {
-        let across = self.tile.width;
-        for (buffer, values) in self.planes.iter_mut().filter(|(buffer, _)| buffer.plane().is_of_center()) {
-            let Some(plane) = asks(buffer.plane()) else { continue };
-            for (k, said) in (0..).zip(say(plane)) {
-                let index = ((top + k / width) * across + left + k % width) as usize;
-                match (said, &mut *values) {
-                    (CenterValue::Floats([a, ..]), Values::One(pixels)) => pixels[index] = a,
-                    (CenterValue::Floats([a, b, _]), Values::Two(pixels)) => pixels[index] = [a, b],
-                    (CenterValue::Floats(all), Values::Three(pixels)) => pixels[index] = all,
-                    (CenterValue::Whole(number), Values::Whole(pixels)) => pixels[index] = number,
-                    _ => unreachable!("each plane has its numbers"),
-                }
-            }
+    /// Notes what the centre ray of a pixel of the tile says for a plane, by its number.
+    #[inline(always)]
+    pub(super) fn set_center(&mut self, plane: usize, [x, y]: [u32; 2], said: CenterValue) {
+        let index = (y * self.tile.width + x) as usize;
+        match (said, &mut self.planes[plane].1) {
+            (CenterValue::Floats([a, ..]), Values::One(pixels)) => pixels[index] = a,
+            (CenterValue::Floats([a, b, _]), Values::Two(pixels)) => pixels[index] = [a, b],
+            (CenterValue::Floats(all), Values::Three(pixels)) => pixels[index] = all,
+            (CenterValue::Whole(number), Values::Whole(pixels)) => pixels[index] = number,
+            _ => unreachable!("each plane has its numbers"),
         }
     }
 
