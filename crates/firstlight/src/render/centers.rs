@@ -150,7 +150,7 @@ impl<'a> Center<'a> {
     pub fn front(&self) -> Vec3 {
         let Scene { geometry, lights, .. } = self.scene;
         match self.hit.surface.index().checked_sub(geometry.surfaces.len()) {
-            None => geometry.point(&self.ray, &self.hit, &self.differential, ShadowTerminator::Hard).normal,
+            None => geometry.normals(&self.ray, &self.hit)[0],
             Some(light) => lights[light].area().map_or(Vec3::ZERO, |area| area.shape.normal_at(self.p())),
         }
     }
@@ -162,11 +162,11 @@ impl<'a> Center<'a> {
 
     /// The geometric and the shading normal, on the side that is seen.
     pub fn normals(&self) -> [Vec3; 2] {
-        match self.surface() {
-            Some(surface) => [surface.ng, surface.ns],
-            None if self.front().dot(self.ray.d) > 0.0 => [-self.front(); 2],
-            None => [self.front(); 2],
-        }
+        let Scene { geometry, .. } = self.scene;
+        let is_light = self.hit.surface.index() >= geometry.surfaces.len();
+        // Without what else there is to know of the surface
+        let [normal, shading] = if is_light { [self.front(); 2] } else { geometry.normals(&self.ray, &self.hit) };
+        if normal.dot(-self.ray.d) < 0.0 { [-normal, -shading] } else { [normal, shading] }
     }
 
     pub fn says(&self, plane: Plane) -> CenterValue {

@@ -397,6 +397,33 @@ impl Geometry {
         }
     }
 
+    /// The normals of [`point`](Self::point): the facet's and the shading one.
+    #[inline(always)]
+    pub fn normals(&self, ray: &Ray, hit: &Hit) -> [Vec3; 2] {
+        let mesh = match hit.at {
+            At::World(point) => self.world.as_ref().map(|world| (&world.mesh, None, point)),
+            At::Placed(index, PlacedSpot::Triangle(point)) => {
+                let thing = &self.placed[index as usize];
+                match thing.target {
+                    PlacedTarget::Mesh(mesh) => Some((&self.meshes[mesh as usize], Some(&thing.placement), point)),
+                    PlacedTarget::Points(_) | PlacedTarget::Solid(_) => None,
+                }
+            }
+            _ => None,
+        };
+        match mesh {
+            Some((mesh, placement, point)) => {
+                let (normal, blended) = mesh.normals(placement, point);
+                [normal, blended.unwrap_or(normal)].map(DVec3::as_vec3)
+            }
+            None => {
+                let ShapePoint { normal, shading, .. } =
+                    self.point(ray, hit, &RayDifferential::default(), ShadowTerminator::Hard);
+                [normal, shading]
+            }
+        }
+    }
+
     /// [`point`](Self::point) for what is in the trees.
     #[inline(never)]
     fn far_point(

@@ -56,6 +56,20 @@ pub(crate) struct TrianglePoint {
     pub v: f32,
 }
 
+/// How much each corner of a triangle counts.
+#[inline(always)]
+fn weights(at: TrianglePoint) -> [f64; 3] {
+    let (u, v) = (at.u as f64, at.v as f64);
+    [1.0 - u - v, u, v]
+}
+
+/// What lies between what the corners have.
+#[inline(always)]
+fn blended(corners: [DVec3; 3], at: TrianglePoint) -> DVec3 {
+    let weights = weights(at);
+    corners[0] * weights[0] + corners[1] * weights[1] + corners[2] * weights[2]
+}
+
 impl Mesh {
     /// Bytes in memory, without the tree.
     pub fn bytes(&self) -> usize {
@@ -114,6 +128,24 @@ impl Mesh {
         (b - a).cross(c - a)
     }
 
+    /// The unit normals of the front: of the facet, and the blended one of the corners, if there is one. Those of the
+    /// corners decide which side is the front.
+    #[inline(always)]
+    pub fn normals(&self, placement: Option<&Placement>, at: TrianglePoint) -> (DVec3, Option<DVec3>) {
+        let to_world = |n: DVec3| placement.map_or(n, |at| at.normal(n)).normalize_or_zero();
+        let corners = self.corners(at.triangle);
+        let normal = to_world((corners[1] - corners[0]).cross(corners[2] - corners[0]));
+        if self.normals.is_empty() {
+            return (normal, None);
+        }
+        let of_corner = |i: u32| Vec3::from(self.normals[i as usize]).as_dvec3();
+        let shading = to_world(blended(self.triangles[at.triangle as usize].map(of_corner), at));
+        if shading == DVec3::ZERO {
+            return (normal, None);
+        }
+        (if shading.dot(normal) < 0.0 { -normal } else { normal }, Some(shading))
+    }
+
     /// What `ray`, which met the mesh at `t`, sees there.
     ///
     /// The point is found from the weights of the corners, so that it lies on the triangle however far the ray came.
@@ -128,9 +160,8 @@ impl Mesh {
     ) -> ShapePoint {
         let corners = self.corners(at.triangle);
         let (u, v) = (at.u as f64, at.v as f64);
-        let weights = [1.0 - u - v, u, v];
-        let blend = |q: [DVec3; 3]| q[0] * weights[0] + q[1] * weights[1] + q[2] * weights[2];
-        let own = blend(corners);
+        let weights = weights(at);
+        let own = blended(corners, at);
         let (e1, e2) = (corners[1] - corners[0], corners[2] - corners[0]);
         // The tree's rays start and end in single precision, in the mesh's own space: a point there is wrong by this
         let largest = corners[0].abs().max(corners[1].abs()).max(corners[2].abs());
@@ -138,45 +169,32 @@ impl Mesh {
         // height 0 is as wrong as it is wide
         let rounding = DVec3::splat((largest + e1.abs() + e2.abs()).max_element() * (4.0 * UNIT_ROUNDOFF as f64));
         // To the world
-        let (p, terms, rounding, e1, e2, mut normal) = match placement {
-            None => (own, largest, rounding, e1, e2, e1.cross(e2)),
+        let (p, terms, rounding, w1, w2) = match placement {
+            None => (own, largest, rounding, e1, e2),
             Some(at) => {
                 let m = &at.world_from_object;
                 let (w1, w2) = (m.transform_vector3(e1), m.transform_vector3(e2));
-                (m.transform_point3(own), at.terms(largest), at.reach(rounding), w1, w2, at.normal(e1.cross(e2)))
+                (m.transform_point3(own), at.terms(largest), at.reach(rounding), w1, w2)
             }
         };
-        normal = normal.normalize_or_zero();
+        let (normal, of_corners) = self.normals(placement, at);
         let rounded = p.as_vec3();
         let ErrorBound(base) = ErrorBound::of_rounded(rounded, terms);
         let error = ErrorBound(base + rounding.as_vec3());
-        // The normals of the corners decide which side is the front, and the shading
-        let indices = self.triangles[at.triangle as usize].map(|i| i as usize);
-        let (mut shading, has_normals) = (DVec3::ZERO, !self.normals.is_empty());
-        if has_normals {
-            let blended = blend(indices.map(|i| Vec3::from(self.normals[i]).as_dvec3()));
-            shading = placement.map_or(blended, |at| at.normal(blended)).normalize_or_zero();
-        }
+        let shading = of_corners.unwrap_or(normal);
         let mut lifted = None;
-        if shading == DVec3::ZERO {
-            shading = normal;
-        } else {
-            if shading.dot(normal) < 0.0 {
-                normal = -normal;
-            }
-            if terminator == ShadowTerminator::Smooth {
-                // From the viewer's side, which is decided as the viewer decides it
-                let side = if normal.as_vec3().dot(-ray.d) < 0.0 { -1.0 } else { 1.0 };
-                let round = RoundCorners {
-                    corners: corners.map(|q| placement.map_or(q, |at| at.world_from_object.transform_point3(q))),
-                    normals: indices.map(|i| {
-                        let n = Vec3::from(self.normals[i]).as_dvec3();
-                        placement.map_or(n, |at| at.normal(n)).normalize_or_zero() * side
-                    }),
-                    weights,
-                };
-                lifted = round.lift(p, normal * side).map(|p| p.as_vec3());
-            }
+        if of_corners.is_some() && terminator == ShadowTerminator::Smooth {
+            // From the viewer's side, which is decided as the viewer decides it
+            let side = if normal.as_vec3().dot(-ray.d) < 0.0 { -1.0 } else { 1.0 };
+            let round = RoundCorners {
+                corners: corners.map(|q| placement.map_or(q, |at| at.world_from_object.transform_point3(q))),
+                normals: self.triangles[at.triangle as usize].map(|i| {
+                    let n = Vec3::from(self.normals[i as usize]).as_dvec3();
+                    placement.map_or(n, |at| at.normal(n)).normalize_or_zero() * side
+                }),
+                weights,
+            };
+            lifted = round.lift(p, normal * side).map(|p| p.as_vec3());
         }
         let corner_uvs = self.corner_uvs(at.triangle);
         let (f1, f2) = (corner_uvs[1] - corner_uvs[0], corner_uvs[2] - corner_uvs[0]);
@@ -185,9 +203,9 @@ impl Mesh {
             true => [Vec2::ZERO; 2],
             false => {
                 // The dual basis of the edges turns steps on the surface into steps of the weights, and those of uv
-                let cross = e1.cross(e2);
+                let cross = w1.cross(w2);
                 let area2 = cross.length_squared();
-                let (u_axis, v_axis) = (e2.cross(cross) / area2, cross.cross(e1) / area2);
+                let (u_axis, v_axis) = (w2.cross(cross) / area2, cross.cross(w1) / area2);
                 let steps = differential.on_plane(ray.d, t as f32, normal.as_vec3(), f32::MAX.sqrt() * 0.5);
                 steps.map(|dp| {
                     let dp = dp.as_dvec3();
@@ -199,7 +217,8 @@ impl Mesh {
         let color = if self.colors.is_empty() {
             Rgb::WHITE
         } else {
-            let c = blend(indices.map(|i| Vec3::from(self.colors[i]).as_dvec3()));
+            let of_corner = |i: u32| Vec3::from(self.colors[i as usize]).as_dvec3();
+            let c = blended(self.triangles[at.triangle as usize].map(of_corner), at);
             Rgb::new(c.x as f32, c.y as f32, c.z as f32)
         };
         ShapePoint {
