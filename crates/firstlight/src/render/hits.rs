@@ -1,7 +1,7 @@
 //! What the camera rays of neighbouring pixels hit, together.
 //!
-//! Rays of one block of 8 x 8 go through the mesh of the world as a bundle, and through meshes that are placed where few
-//! things are; everything else is asked ray by ray. The answers are those of [`Scene::intersect`], to the bit.
+//! Rays of one block of 8 x 8 go through the mesh of the world as a bundle, and through meshes that are placed where
+//! few things are; everything else is asked ray by ray. The answers are those of [`Scene::intersect`], to the bit.
 
 use fearless_simd::{Level, f32x16, prelude::*};
 
@@ -266,7 +266,8 @@ mod tests {
         let level = SimdLevel::Auto.resolve().token();
         let part = |more: &str| {
             format!(
-                "[[group.star.mesh]]\npositions = [[0, 1, 0], [1, -1, 0.5], [-1, -1, -0.5], [0, 0, 1], [0.3, 0.2, -1]]\n\
+                "[[group.star.mesh]]\n\
+                 positions = [[0, 1, 0], [1, -1, 0.5], [-1, -1, -0.5], [0, 0, 1], [0.3, 0.2, -1]]\n\
                  triangles = [[0, 1, 2], [0, 2, 3], [1, 3, 4], [4, 0, 1], [2, 4, 3]]\n{more}\n"
             )
         };
