@@ -80,11 +80,15 @@ enum Verify {
     /// Compares pictures whose camera rays share their light, as by default, with every ray lit by itself, at real
     /// size.
     ShadingRate(shading_rate::Options),
-    /// Tests the Python package beside packages that are too large for every day: Ray, trimesh, OpenImageIO, OpenCV.
+    /// Tests the Python package beside packages that are too large for every day: Ray, trimesh, OpenImageIO, OpenCV,
+    /// Open3D, pycocotools, mypy; and times it beside Open3D and pyrender.
     Python {
         /// A folder with models, which are compared with the ray caster of trimesh.
         #[arg(long)]
         models: Option<PathBuf>,
+        /// Writes what it found to `docs/benchmarks/NAME-python/`.
+        #[arg(long, value_name = "DATE-MACHINE")]
+        name: Option<String>,
     },
 }
 
@@ -101,7 +105,9 @@ fn main() -> ExitCode {
         Task::Peers(options) => peers::run(&options),
         Task::Verify { what: Some(Verify::Exact(options)), .. } => exact::run(&options),
         Task::Verify { what: Some(Verify::ShadingRate(options)), .. } => shading_rate::run(&options),
-        Task::Verify { what: Some(Verify::Python { models }), .. } => verify::python(models.as_deref()),
+        Task::Verify { what: Some(Verify::Python { models, name }), .. } => {
+            verify::python(models.as_deref(), name.as_deref())
+        }
         Task::Verify { scenes, what: None } => verify::run(scenes),
     };
     match outcome {

@@ -1,9 +1,10 @@
 //! `cargo xtask verify`: the tests that take long.
 
-use std::path::Path;
-use std::process::Command;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
 
-use crate::{Outcome, cargo, root, run as run_to_end};
+use crate::bench::commit;
+use crate::{Outcome, cargo, root, run as run_to_end, write};
 
 /// What the tests of `tests/large` take beside what the package itself does. OpenCV 5 reads no EXR files.
 const LARGE: &[&str] = &[
@@ -16,7 +17,13 @@ const LARGE: &[&str] = &[
     "OpenImageIO",
     "opencv-python-headless<5",
     "cryptomatte-api",
+    "pycocotools",
+    "open3d-cpu",
+    "mypy",
 ];
+
+/// What pyrender takes, in an environment of its own: the OpenGL that it names is older than what renders off screen.
+const PYRENDER: [&[&str]; 2] = [&["pyrender"], &["--no-deps", "PyOpenGL>=3.1.7"]];
 
 /// The rays that each mesh is asked, by its tree and triangle by triangle.
 const RAYS: &str = "1000000";
@@ -34,23 +41,52 @@ pub fn run(scenes: u32) -> Outcome {
     run_to_end(command.args(["test", "--release", "--package", "firstlight", "--lib", "shape::triangles"]))
 }
 
-/// All tests of the Python package, as it is installed, in an environment of their own.
-pub fn python(models: Option<&Path>) -> Outcome {
-    let (venv, package) = (root().join("target/python/large"), root().join("crates/firstlight-python"));
-    let python = venv.join("bin/python");
-    if !python.exists() {
-        run_to_end(Command::new("python3").args(["-m", "venv"]).arg(&venv))?;
-    }
-    let pip = |what: &[&std::ffi::OsStr]| {
-        run_to_end(Command::new(&python).args(["-m", "pip", "install", "--quiet"]).args(what))
-    };
-    pip(&LARGE.iter().map(std::ffi::OsStr::new).collect::<Vec<_>>())?;
-    pip(&["--force-reinstall".as_ref(), "--no-deps".as_ref(), package.as_os_str()])?;
+/// All tests of the Python package, as it is installed, in an environment of their own; then its times beside those of
+/// other programs. With a name, what was found is kept.
+pub fn python(models: Option<&Path>, name: Option<&str>) -> Outcome {
+    let (home, package) = (root().join("target/python"), root().join("crates/firstlight-python"));
+    let python = environment(&home.join("large"), &[LARGE])?;
+    let package_path = [package.as_os_str()];
+    run_to_end(
+        Command::new(&python)
+            .args(["-m", "pip", "install", "--quiet", "--force-reinstall", "--no-deps"])
+            .args(package_path),
+    )?;
     let mut pytest = Command::new(&python);
-    pytest.current_dir(&package).args(["-m", "pytest", "-q", "-p", "no:cacheprovider"]);
+    pytest.current_dir(&package).args(["-m", "pytest", "-q", "-p", "no:cacheprovider"]).stderr(Stdio::inherit());
     if let Some(models) = models {
         let models = models.canonicalize().map_err(|fault| format!("{}: {fault}", models.display()))?;
         pytest.env("FIRSTLIGHT_MODELS", models);
     }
-    run_to_end(&mut pytest)
+    let tested = pytest.output().map_err(|fault| format!("{}: {fault}", python.display()))?;
+    let said = String::from_utf8_lossy(&tested.stdout);
+    eprintln!("{said}");
+    if !tested.status.success() {
+        return Err("tests of the Python package fail".into());
+    }
+    let pyrender = environment(&home.join("pyrender"), &PYRENDER)?;
+    let times = home.join("times.md");
+    let mut speed = Command::new(&python);
+    speed.arg(package.join("tests/large/speed.py")).arg("--memory").arg("--pyrender").arg(pyrender);
+    run_to_end(speed.arg("--out").arg(&times))?;
+    let Some(name) = name else { return Ok(()) };
+    let times = std::fs::read_to_string(&times).map_err(|fault| format!("{}: {fault}", times.display()))?;
+    let page = format!(
+        "# The Python package\n\n`cargo xtask verify python --models FOLDER --name {name}`, at commit {}: {}.\n\n{times}",
+        commit(),
+        said.lines().last().unwrap_or_default()
+    );
+    write(&root().join("docs/benchmarks").join(format!("{name}-python")).join("README.md"), page.as_bytes())
+}
+
+/// The interpreter of an environment that has some packages, which `pip` is given in their order.
+fn environment(venv: &Path, packages: &[&[&str]]) -> Result<PathBuf, String> {
+    let python = venv.join("bin/python");
+    if !python.exists() {
+        run_to_end(Command::new("python3").args(["-m", "venv"]).arg(venv))?;
+    }
+    for packages in packages {
+        run_to_end(Command::new(&python).args(["-m", "pip", "install", "--quiet"]).args(*packages))?;
+    }
+    Ok(python)
 }

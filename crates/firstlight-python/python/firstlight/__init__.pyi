@@ -3,7 +3,7 @@
 import os
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Literal, TypedDict
+from typing import Any, Literal, TypedDict, final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -81,6 +81,7 @@ class SceneError(ValueError):
 class SceneWarning(UserWarning):
     """A texture that is missing or damaged was put up with."""
 
+@final
 class Render(Mapping[str, NDArray[Any]]):
     """The buffers of a render by name: (height, width) or (height, width, channels), row 0 at the top."""
 
@@ -92,12 +93,18 @@ class Render(Mapping[str, NDArray[Any]]):
     def window(self) -> tuple[int, int, int, int]: ...
     def to_png(self, *, bits: Literal[8, 16] = 8) -> bytes: ...
     def save(
-        self, path: str | os.PathLike[str], *, buffer: str | None = None, depth_scale: float | None = None, half: bool = False
+        self,
+        path: str | os.PathLike[str],
+        *,
+        buffer: str | None = None,
+        depth_scale: float | None = None,
+        half: bool = False,
     ) -> None: ...
-    def __getitem__(self, name: str) -> NDArray[Any]: ...
+    def __getitem__(self, name: str, /) -> NDArray[Any]: ...
     def __iter__(self) -> Iterator[str]: ...
     def __len__(self) -> int: ...
 
+@final
 class Coco:
     """A data set in COCO's format, which grows picture by picture: boxes and masks of all objects that are seen."""
 
