@@ -71,10 +71,10 @@ pub fn python(models: Option<&Path>, name: Option<&str>) -> Outcome {
     run_to_end(speed.arg("--out").arg(&times))?;
     let Some(name) = name else { return Ok(()) };
     let times = std::fs::read_to_string(&times).map_err(|fault| format!("{}: {fault}", times.display()))?;
+    let (commit, summary) = (commit(), said.lines().last().unwrap_or_default());
     let page = format!(
-        "# The Python package\n\n`cargo xtask verify python --models FOLDER --name {name}`, at commit {}: {}.\n\n{times}",
-        commit(),
-        said.lines().last().unwrap_or_default()
+        "# The Python package\n\n`cargo xtask verify python --models FOLDER --name {name}`, at commit {commit}: \
+         {summary}.\n\n{times}"
     );
     write(&root().join("docs/benchmarks").join(format!("{name}-python")).join("README.md"), page.as_bytes())
 }

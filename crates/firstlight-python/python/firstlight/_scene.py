@@ -171,8 +171,12 @@ class Scene(SceneBase):
             return [self._add_node(thing, node, fields) for node in graph.nodes_geometry]
         if hasattr(thing, "faces") and hasattr(thing, "vertices"):
             return self.add_mesh(thing.vertices, thing.faces, **{**_of_trimesh(thing), **fields})
+        # A mesh of tensors
+        if hasattr(thing, "to_legacy"):
+            thing = thing.to_legacy()
         if hasattr(thing, "triangles") and hasattr(thing, "vertices"):
-            return self.add_mesh(np.asarray(thing.vertices), np.asarray(thing.triangles), **_of_open3d(thing), **fields)
+            arrays = np.asarray(thing.vertices), np.asarray(thing.triangles)
+            return self.add_mesh(*arrays, **{**_of_open3d(thing), **fields})
         raise TypeError(f"a {type(thing).__name__} has neither vertices and faces nor vertices and triangles")
 
     def _add_node(self, scene, node, fields):

@@ -87,16 +87,17 @@ def test_a_mesh_is_what_its_arrays_are(given):
     same_pictures(picture(own), picture(arrays))
 
 
-def test_arrays_of_a_tensor_mesh():
+def test_a_tensor_mesh():
     mesh = MADE["torus"]()
     mesh.compute_vertex_normals()
     tensors = o3d.t.geometry.TriangleMesh.from_legacy(mesh, o3d.core.float64)
-    own, arrays = fl.Scene(), fl.Scene()
+    own, arrays, whole = fl.Scene(), fl.Scene(), fl.Scene()
     own.add(mesh)
-    arrays.add_mesh(
-        tensors.vertex.positions.numpy(), tensors.triangle.indices.numpy(), normals=tensors.vertex.normals.numpy()
-    )
+    positions, normals = tensors.vertex.positions.numpy(), tensors.vertex.normals.numpy()
+    arrays.add_mesh(positions, tensors.triangle.indices.numpy(), normals=normals)
+    whole.add(tensors)
     same_pictures(picture(own), picture(arrays))
+    same_pictures(picture(own), picture(whole))
 
 
 @pytest.mark.parametrize("make", MADE.values(), ids=list(MADE))

@@ -193,7 +193,7 @@ mod tests {
         };
         let mut moved = 0;
         for _ in 0..100_000 {
-            let scale = (random() * 20.0 - 19.0).exp2();
+            let scale = 1.0 / (1u32 << (random() * 19.0) as u32) as f32;
             let given = [random() * scale, 0.25 * random() * scale, if random() < 0.3 { 0.0 } else { random() * 0.1 }];
             let whole = given.iter().sum::<f32>() * (1.0 + 8.0 * random());
             let mut terms = given;
