@@ -96,8 +96,9 @@ def test_a_tensor_mesh():
     positions, normals = tensors.vertex.positions.numpy(), tensors.vertex.normals.numpy()
     arrays.add_mesh(positions, tensors.triangle.indices.numpy(), normals=normals)
     whole.add(tensors)
-    same_pictures(picture(own), picture(arrays))
-    same_pictures(picture(own), picture(whole))
+    expected = picture(own)
+    same_pictures(expected, picture(arrays))
+    same_pictures(expected, picture(whole))
 
 
 @pytest.mark.parametrize("make", MADE.values(), ids=list(MADE))

@@ -4,6 +4,7 @@ import os
 import pathlib
 import subprocess
 import sys
+import sysconfig
 
 import pytest
 
@@ -28,6 +29,7 @@ import firstlight as fl
 
 scene = fl.Scene()
 chair = scene.add_mesh(np.zeros((3, 3)), np.array([[0, 1, 2]]), name="chair")
+scene.add_sphere(center=[0, 0, 0], radius=1)
 camera = fl.Camera(position=[0, 0, 1], look_at=[0, 0, 0], fov_y_deg=45, width=3, height=4)
 frame = scene.render(camera=camera, buffers=["color", "depth", "light:*"], aa=1)
 depth: NDArray[Any] = frame["depth"]
@@ -40,8 +42,10 @@ scene["chair"].transform = np.eye(4)
 
 
 def mypy(folder, module, *arguments):
-    package = pathlib.Path(fl.__file__).parents[1]
-    environment = os.environ | {"MYPYPATH": str(package)}
+    package, environment = str(pathlib.Path(fl.__file__).parents[1]), dict(os.environ)
+    # Where packages are installed, mypy looks by itself
+    if package != sysconfig.get_paths()["platlib"]:
+        environment["MYPYPATH"] = package
     command = [sys.executable, "-m", module, *arguments]
     return subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True)
 
@@ -60,7 +64,7 @@ def test_a_program_is_well_typed(tmp_path):
     (tmp_path / "program.py").write_text(PROGRAM)
     ran = mypy(tmp_path, "mypy", "--strict", "program.py")
     assert ran.returncode == 0, ran.stdout
-    wrong = PROGRAM.replace('half=True', 'half="yes"').replace("fov_y_deg=45", "fov=45")
+    wrong = PROGRAM.replace('half=True', 'half="yes"').replace("radius=1", "radios=1")
     (tmp_path / "program.py").write_text(wrong)
     ran = mypy(tmp_path, "mypy", "--strict", "program.py")
-    assert '"half"' in ran.stdout and '"fov"' in ran.stdout, ran.stdout
+    assert '"half"' in ran.stdout and '"radios"' in ran.stdout, ran.stdout
