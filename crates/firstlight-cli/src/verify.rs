@@ -6,8 +6,8 @@ use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
 use firstlight::{
-    Compiled, FileSettings, Film, Format, ImageError, Plane, PlaneDifference, ReceiptSettings, RenderSettings, Scene,
-    StoredPlane, StoredPlanes, UpAxis, builtin_scenes, display_steps,
+    Compiled, FileSettings, Film, Format, ImageError, Plane, PlaneDifference, ReceiptFault, ReceiptSettings,
+    RenderSettings, Scene, StoredPlane, StoredPlanes, UpAxis, builtin_scenes, display_steps,
 };
 use serde_json::{Value, json};
 
@@ -27,7 +27,11 @@ pub fn run(args: &VerifyArgs) -> Result<(), Failure> {
     let name = shown(&args.file);
     let work = |why: String| Failure::Work(format!("{name}: {why}"));
     let stored = difference::read(&args.file)?;
-    let said = ReceiptSettings::read(&stored.receipt).map_err(|fault| work(fault.to_string()))?;
+    let said = ReceiptSettings::read(&stored.receipt).map_err(|fault| {
+        let version = stored.receipt.get("version").filter(|_| matches!(fault, ReceiptFault::Lacks(_)));
+        let of = version.map(|version| format!("; the picture was made by version {version}")).unwrap_or_default();
+        work(format!("{fault}{of}"))
+    })?;
     let (input, compiled) = find_scene(&name, &said, args)?;
     if !args.quiet {
         show_diagnostics(&compiled.warnings);
