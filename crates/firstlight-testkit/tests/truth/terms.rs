@@ -229,6 +229,35 @@ fn what_is_not_kept_apart_is_the_rest() {
     }
 }
 
+#[test]
+fn a_light_that_is_left_out_is_seen_all_the_same() {
+    let lamp = |i: u32| {
+        let (name, strength) = if i == 7 { ("weak", 0.002) } else { ("lamp", 0.4) };
+        let x = f64::from(i) * 0.2 - 3.0;
+        format!("[[light.point]]\nname = \"{name} {i}\"\nposition = [{x}, 2, 3]\nstrength = {strength}\n")
+    };
+    let scene = compiled(&format!("{SCENE}{}", (0..30).map(lamp).collect::<String>()));
+    let weak = Buffer::Light(LightId(7), None);
+    let share = Buffer::Light(LightId(7), Some(LightPart::Visibility));
+    let all = film_of(&scene, vec![weak, share]);
+    let traced =
+        RenderSettings { buffers: vec![weak, share], visibility: VisibilityMode::Traced, ..RenderSettings::default() };
+    let traced = film(&scene, &traced);
+    let (mut left_out, mut wrong, mut umbra) = (0, 0, 0);
+    for (pixel, share_of_it) in floats(&all, share).iter().enumerate() {
+        let truth = floats(&traced, share)[pixel];
+        let [told, sent] = [&all, &traced].map(|film| floats(film, weak)[3 * pixel..][..3].iter().sum::<f32>());
+        left_out += u32::from(told == 0.0 && sent > 0.0);
+        // Edges lie within pixels
+        let is_whole = truth == 0.0 || truth == 1.0;
+        wrong += u32::from(is_whole && (share_of_it - truth).abs() > 0.3);
+        umbra += u32::from(truth == 0.0 && sent == 0.0);
+    }
+    // At silhouettes the middle may meet nothing
+    assert!(wrong < 20 && umbra > 50, "{wrong} {umbra}");
+    assert!(left_out > 100, "{left_out}");
+}
+
 /// The scene with the first of its lamps alone.
 fn scene_with_one_lamp(scene: &Scene, lamps: &str) -> Scene {
     let first = lamps.split("[[").nth(1).unwrap();

@@ -2,8 +2,10 @@
 //! is made of both, pixel by pixel, when they are there.
 
 use super::film::Film;
+use super::many::FEW;
 use crate::ids::{LightGroupId, LightId};
 use crate::image::{Buffer, LightPart, Plane, PlaneNumbers};
+use crate::math::Vec3;
 use crate::scene::Scene;
 
 /// The buffers that are rendered, each once.
@@ -36,6 +38,9 @@ impl Passes {
             if let Some(of) = arriving(*buffer) {
                 add(&mut passes.picture, of.iter().copied());
                 add(&mut passes.unshadowed, of);
+                if may_be_left_out(scene, *buffer).is_some() {
+                    add(&mut passes.picture, PLACE);
+                }
             }
         }
         passes
@@ -48,7 +53,11 @@ impl Passes {
             let numbers = match arriving(buffer) {
                 Some(of) => {
                     let with: Vec<&[f32]> = of.iter().filter_map(|of| picture.floats(*of)).collect();
-                    shares(&with, &without(&of))
+                    let mut shares = shares(&with, &without(&of));
+                    if let Some(light) = may_be_left_out(scene, buffer) {
+                        see_what_was_left_out(scene, light, &picture, &with, &mut shares);
+                    }
+                    shares
                 }
                 None if buffer == Plane::Rest.into() => {
                     let terms = beside_rest(scene, asked).into_iter();
@@ -90,6 +99,33 @@ fn arriving(buffer: Buffer) -> Option<Vec<Buffer>> {
         (Buffer::Plane(Plane::Shadow), _) => Some(ALL_LIGHT.to_vec()),
         (_, Some(LightPart::Visibility)) => Some(vec![buffer.with_part(None)]),
         _ => None,
+    }
+}
+
+/// Where a centre ray ends, the normal there, and whether that is on a surface, not on a light.
+const PLACE: [Buffer; 3] =
+    [Buffer::Plane(Plane::Position), Buffer::Plane(Plane::NormalGeometric), Buffer::Plane(Plane::MaterialId)];
+
+/// Of a buffer that says how much of one light arrives: the light, if it may be left out of pixels where it does not
+/// show.
+fn may_be_left_out(scene: &Scene, buffer: Buffer) -> Option<LightId> {
+    match buffer {
+        Buffer::Light(light, Some(LightPart::Visibility)) if scene.lights.len() > FEW => Some(light),
+        _ => None,
+    }
+}
+
+/// Asks by shadow rays how much of a light the middles of those pixels see that were told nothing of it: it may have
+/// been left out there, and its share would be 0 as in an umbra. `with` is what it sends.
+fn see_what_was_left_out(scene: &Scene, light: LightId, picture: &Film, with: &[&[f32]], shares: &mut [f32]) {
+    let [places, normals] = [PLACE[0], PLACE[1]].map(|plane| picture.floats(plane).unwrap_or_default());
+    let Some(PlaneNumbers::Wholes(materials)) = picture.numbers(PLACE[2]) else { return };
+    let at = |of: &[f32], pixel: usize| Vec3::from_slice(&of[3 * pixel..][..3]);
+    let is_asked = |pixel: &usize| materials[*pixel] != 0 && with.iter().all(|of| at(of, *pixel) == Vec3::ZERO);
+    let pixels: Vec<usize> = (0..shares.len()).filter(is_asked).collect();
+    let point = |i: usize| (at(places, pixels[i]).as_dvec3(), Some(at(normals, pixels[i])));
+    for (pixel, seen) in pixels.iter().zip(scene.visible_fractions(light, pixels.len(), point)) {
+        shares[*pixel] = seen;
     }
 }
 
