@@ -1,5 +1,7 @@
 //! What stands behind an option, read: numbers in their ranges, pairs, names; or what is allowed instead.
 
+use std::ops::RangeInclusive;
+
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use firstlight::{BufferDesc, ColorDesc, Framing, MotionTo, SamplesDesc, SimdLevel, View, VisibilityMode, Window};
 
@@ -48,10 +50,7 @@ pub(super) fn camera(name: &str) -> Result<String, String> {
 
 /// Reads an exposure in stops.
 pub(super) fn exposure(text: &str) -> Result<f64, String> {
-    match text.parse::<f64>() {
-        Ok(ev) if (-64.0..=64.0).contains(&ev) => Ok(ev),
-        _ => Err("a number of stops from -64 to 64 is needed".into()),
-    }
+    number(text, -64.0..=64.0, "a number of stops from -64 to 64 is needed")
 }
 
 /// Reads the ends of a legend.
@@ -60,28 +59,24 @@ pub(super) fn range(text: &str) -> Result<[f64; 2], String> {
     range.ok_or_else(|| "two numbers A,B are needed, the lower one first, as 0,10".into())
 }
 
+/// Reads a number of a range; `wanted` says which are.
+fn number(text: &str, range: RangeInclusive<f64>, wanted: &str) -> Result<f64, String> {
+    text.parse().ok().filter(|number| range.contains(number)).ok_or_else(|| wanted.to_owned())
+}
+
 /// Reads a scale of depth in units per metre.
 pub(super) fn depth_scale(text: &str) -> Result<f64, String> {
-    match text.parse::<f64>() {
-        Ok(scale) if (1e-3..=1e6).contains(&scale) => Ok(scale),
-        _ => Err("a number of units per metre from 0.001 to 1000000 is needed; 1000 are millimetres".into()),
-    }
+    number(text, 1e-3..=1e6, "a number of units per metre from 0.001 to 1000000 is needed; 1000 are millimetres")
 }
 
 /// Reads a tolerance in display steps.
 pub(super) fn tolerance(text: &str) -> Result<f64, String> {
-    match text.parse::<f64>() {
-        Ok(steps) if (0.25..=16.0).contains(&steps) => Ok(steps),
-        _ => Err("a number of display steps from 0.25 to 16 is needed".into()),
-    }
+    number(text, 0.25..=16.0, "a number of display steps from 0.25 to 16 is needed")
 }
 
 /// Reads a moment in seconds.
 pub(super) fn time(text: &str) -> Result<f64, String> {
-    match text.parse::<f64>() {
-        Ok(time) if (-1e9..=1e9).contains(&time) => Ok(time),
-        _ => Err("a number of seconds from -1e9 to 1e9 is needed".into()),
-    }
+    number(text, -1e9..=1e9, "a number of seconds from -1e9 to 1e9 is needed")
 }
 
 /// The numbers of frames, both ends included.
@@ -151,18 +146,12 @@ pub(super) fn limit(text: &str) -> Result<f64, String> {
 
 /// Reads a number from 0 to 1.
 pub(super) fn part(text: &str) -> Result<f64, String> {
-    match text.parse::<f64>() {
-        Ok(part) if (0.0..=1.0).contains(&part) => Ok(part),
-        _ => Err("a number from 0 to 1 is needed".into()),
-    }
+    number(text, 0.0..=1.0, "a number from 0 to 1 is needed")
 }
 
 /// Reads how many pixels there are in a degree.
 pub(super) fn pixels_per_degree(text: &str) -> Result<f64, String> {
-    match text.parse::<f64>() {
-        Ok(pixels) if (1.0..=1000.0).contains(&pixels) => Ok(pixels),
-        _ => Err("a number of pixels from 1 to 1000 is needed".into()),
-    }
+    number(text, 1.0..=1000.0, "a number of pixels from 1 to 1000 is needed")
 }
 
 /// Reads `X,Y,WIDTH,HEIGHT`. Whether the film is that large is seen once the scene is known.
@@ -224,10 +213,7 @@ pub(super) fn view(text: &str) -> Result<View, String> {
 
 /// Reads a part of the picture's shorter side.
 pub(super) fn margin(text: &str) -> Result<f64, String> {
-    match text.parse::<f64>() {
-        Ok(margin) if (0.0..=Framing::MAX_MARGIN).contains(&margin) => Ok(margin),
-        _ => Err("a part of the picture's shorter side is needed, from 0 to 0.45".into()),
-    }
+    number(text, 0.0..=Framing::MAX_MARGIN, "a part of the picture's shorter side is needed, from 0 to 0.45")
 }
 
 /// Reads the name of a SIMD level; completions and help list them all, whatever this machine has.

@@ -108,7 +108,7 @@ impl Film {
         Film { size: [scene.width, scene.height], window, planes: empty(planes, pixels), names }
     }
 
-    /// Adds a plane, whose numbers are floats.
+    /// Adds a plane, whose numbers are floats, or takes its place.
     pub(super) fn put(&mut self, scene: &Scene, buffer: Buffer, numbers: &[f32]) {
         let values = match buffer.plane().channels().len() {
             1 => Values::One(numbers.to_vec()),

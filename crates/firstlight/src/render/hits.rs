@@ -69,7 +69,7 @@ impl PixelHits {
         let geometry = &scene.geometry;
         self.aim(scene, x + left, y + top);
         let bundle = geometry.world_as_bundle();
-        // Which things each ray is asked of by itself
+        // Whether all that is placed is told by bundles too
         let upper_bundle = (bundle || !geometry.has_world()) && {
             let corners = [[0, 0], [w - 1, 0], [w - 1, h - 1], [0, h - 1]].map(|[column, row]| {
                 let place = place(column, row);
@@ -102,9 +102,7 @@ impl PixelHits {
             ask_from_here(&mut self.found, active, |place| Nearest(self.hits[at(place)]));
             let met = geometry.meet_world(self.level, &self.rays, active, &mut self.found);
             for place in bits(met) {
-                let mut nearest = Nearest(self.hits[at(place)]);
-                geometry.offer_world(&self.found, place, &mut nearest);
-                self.hits[at(place)] = nearest.0;
+                improve(&mut self.hits[at(place)], |nearest| geometry.offer_world(&self.found, place, nearest));
             }
         }
         if upper_bundle && !self.meshes.is_empty() {
@@ -114,9 +112,8 @@ impl PixelHits {
                 met |= geometry.meet_placed_tile(self.level, *mesh, &self.rays, active, &mut self.found);
             }
             for place in bits(met) {
-                let mut nearest = Nearest(self.hits[at(place)]);
-                geometry.offer_placed(&self.meshes, &self.found, place, &mut nearest);
-                self.hits[at(place)] = nearest.0;
+                let offer = |nearest: &mut Nearest| geometry.offer_placed(&self.meshes, &self.found, place, nearest);
+                improve(&mut self.hits[at(place)], offer);
             }
         }
     }
@@ -157,6 +154,13 @@ impl PixelHits {
     pub fn get(&self, i: u32, j: u32, column: u32, row: u32) -> Option<Hit> {
         self.hits[((j * self.n + row) * self.across + i * self.n + column) as usize]
     }
+}
+
+/// Offers a ray's nearest hit what was found.
+fn improve(hit: &mut Option<Hit>, offer: impl FnOnce(&mut Nearest)) {
+    let mut nearest = Nearest(*hit);
+    offer(&mut nearest);
+    *hit = nearest.0;
 }
 
 /// Lets hits count up to the nearest that is known of each ray.
