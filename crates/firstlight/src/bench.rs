@@ -279,13 +279,13 @@ impl Soft {
         hidden.clear();
         for point in &self.points {
             for first in (0..self.count()).step_by(LANES) {
-                let from = [point.ray(self.target.light, Vec3::ZERO, true)];
+                let from = [point.ray(self.target.end(), Vec3::ZERO, true)];
                 let mut shadows = ShadowRays { from: &from, rays: RayPacket16::ZERO, t_end: [0.0; LANES] };
                 let mut active = 0;
                 for k in first..(first + LANES).min(self.count()) {
                     let l = light.towards(k, point.p).l;
                     shadows.rays.set(k - first, point.start, l);
-                    shadows.t_end[k - first] = point.ray(self.target.light, l, true).end();
+                    shadows.t_end[k - first] = point.ray(self.target.end(), l, true).end();
                     active |= u16::from(point.horizon.dot(l) > 0.0) << (k - first);
                 }
                 hidden.push(self.scene.geometry.are_blocked(Level::new(), &shadows, active));

@@ -33,6 +33,8 @@ pub(crate) struct Obstacles<'a> {
     touches: Vec<Touch>,
     pub ball: Option<(Exact, f32)>,
     pub cuts: u64,
+    /// On which sides of the plane of a flat light each has a part of itself.
+    sides: Vec<LightSides>,
     /// Which placed things are among them.
     placed: Vec<u32>,
     /// Whether there is more than that.
@@ -111,11 +113,13 @@ impl<'a> Obstacles<'a> {
             occluders: std::mem::take(&mut self.occluders),
             exact: std::mem::take(&mut self.exact),
             touches: std::mem::take(&mut self.touches),
+            sides: std::mem::take(&mut self.sides),
             ..Obstacles::default()
         };
         self.occluders.clear();
         self.exact.clear();
         self.touches.clear();
+        self.sides.clear();
         for which in &trees.spheres {
             self.sphere(scene.sphere(*which));
         }
@@ -151,7 +155,7 @@ impl<'a> Obstacles<'a> {
         self.exact.push(ExactShape::Flat { flat, side, seen_side });
     }
 
-    /// Finds out what reaches into a light that is a ball.
+    /// Finds out how each lies to the light: what reaches into a ball, and what is behind the plane of a flat light.
     fn touch(&mut self, emitter: &Emitter) {
         if let Emitter::Ball { center, radius, .. } = emitter {
             self.ball = Some((Exact::new(*center), *radius as f32));
@@ -159,6 +163,7 @@ impl<'a> Obstacles<'a> {
         for (i, (exact, occluder)) in self.exact.iter().zip(&self.occluders).enumerate() {
             let touch = Touch::of(emitter, exact);
             self.touches.push(touch);
+            self.sides.push(LightSides::of(emitter, exact));
             self.cuts |= u64::from(touch == Touch::Cuts && cut::knows(occluder)) << i;
         }
     }
@@ -171,11 +176,13 @@ impl<'a> Obstacles<'a> {
         true
     }
 
-    /// Each, and whether it reaches into a ball as rows tell.
+    /// Each, its sides of the light, and whether it reaches into a ball as rows tell.
     #[inline(always)]
-    fn each(&self) -> impl Iterator<Item = (&Occluder, &ExactShape<'a>, Touch, bool)> {
-        let all = self.occluders.iter().zip(&self.exact).zip(&self.touches).enumerate();
-        all.map(|(i, ((occluder, exact), touch))| (occluder, exact, *touch, self.cuts >> i & 1 == 1))
+    fn each(&self) -> impl Iterator<Item = (&Occluder, &ExactShape<'a>, LightSides, Touch, bool)> {
+        let all = self.occluders.iter().zip(&self.exact).zip(self.sides.iter().zip(&self.touches)).enumerate();
+        all.map(|(i, ((occluder, exact), (sides, touch)))| {
+            (occluder, exact, *sides, *touch, self.cuts >> i & 1 == 1)
+        })
     }
 
     /// Whether any reaches into a ball.
@@ -436,12 +443,17 @@ pub(crate) fn classify<S: Simd>(
     }
     let mut sight = LanesSight::new(simd, views, points);
     let own = near.is_some().then(|| Own::new(simd, &sight, points));
+    let places = LightSides::of_points(emitter, points);
     let mut asked = asked;
-    for (i, (occluder, exact, touch, cuts)) in
+    for (i, (occluder, exact, sides, touch, cuts)) in
         obstacles.each().chain(near.into_iter().flat_map(Obstacles::each)).enumerate()
     {
         if asked == 0 {
             break;
+        }
+        let before = asked & sides.of_these(places);
+        if before == 0 {
+            continue;
         }
         // What reaches into a ball may hide some of its far half
         sight.depth = match emitter {
@@ -452,18 +464,18 @@ pub(crate) fn classify<S: Simd>(
         };
         let mut told = match (occluder, exact) {
             (Occluder::Sphere { center, radius }, ExactShape::Sphere(sphere)) => {
-                sphere_between(simd, &sight, center.seen_from(simd, sight.p), *radius, sphere, points, asked)
+                sphere_between(simd, &sight, center.seen_from(simd, sight.p), *radius, sphere, points, before)
             }
             (Occluder::Flat { corners }, ExactShape::Flat { flat, side, seen_side }) => {
                 let corners = corners_from(simd, corners, sight.p);
-                flat_between(simd, &sight, corners, (flat, *side, *seen_side), points, asked)
+                flat_between(simd, &sight, corners, (flat, *side, *seen_side), points, before)
             }
             (Occluder::Solid(_), ExactShape::Solid(shape)) => {
-                solid_between(simd, &sight, shape, occluder, points, asked)
+                solid_between(simd, &sight, shape, occluder, points, before)
             }
             (Occluder::Flat { corners }, ExactShape::Facet(shape)) => match &own {
                 Some(own) => {
-                    facet_between(simd, &sight, corners_from(simd, corners, sight.p), shape, own, points, asked)
+                    facet_between(simd, &sight, corners_from(simd, corners, sight.p), shape, own, points, before)
                 }
                 None => unreachable!("no triangle is in lists"),
             },
@@ -518,6 +530,54 @@ pub(crate) fn classify<S: Simd>(
         class.other |= many + more > MAX_INTERVALS || obstacles.has_more;
     }
     classes
+}
+
+/// On which sides of the plane of a flat light something is, as bits: whether a thing reaches into the front and into
+/// the back by more than rounding, or which points are there. What lies in the plane, or behind it as seen from a point,
+/// hides nothing of the light from that point. Of other lights both sides are all of space.
+#[derive(Clone, Copy, Debug)]
+struct LightSides {
+    front: u64,
+    back: u64,
+}
+
+impl LightSides {
+    const BOTH: LightSides = LightSides { front: u64::MAX, back: u64::MAX };
+
+    /// Where an obstacle is.
+    fn of(emitter: &Emitter, exact: &ExactShape) -> LightSides {
+        let Emitter::Flat(light) = emitter else { return Self::BOTH };
+        let n = light.normal();
+        let sides = [n, -n].map(|n| {
+            let reach = match exact {
+                ExactShape::Sphere(sphere) => n.dot(sphere.c) + sphere.r,
+                ExactShape::Flat { flat, .. } => flat.support(n),
+                ExactShape::Solid(solid) => solid.reach(n),
+                ExactShape::Facet(facet) => facet.reach(n),
+            };
+            if reach - n.dot(light.c) > light.rounding() { u64::MAX } else { 0 }
+        });
+        LightSides { front: sides[0], back: sides[1] }
+    }
+
+    /// On which sides sixteen points are; on both, where some of the places around are on the other.
+    fn of_points(emitter: &Emitter, points: &[ShadingPoint]) -> LightSides {
+        let Emitter::Flat(light) = emitter else { return Self::BOTH };
+        let n = light.normal();
+        let mut sides = LightSides { front: 0, back: 0 };
+        for (k, point) in points.iter().enumerate() {
+            let height = n.dot(point.p.as_dvec3() - light.c);
+            let reach = f64::from(point.reach);
+            sides.front |= u64::from(height >= -reach) << k;
+            sides.back |= u64::from(height <= reach) << k;
+        }
+        sides
+    }
+
+    /// The points on those sides that this is on.
+    fn of_these(self, points: LightSides) -> u64 {
+        self.front & points.front | self.back & points.back
+    }
 }
 
 /// How something lies to a light that is a ball.

@@ -350,7 +350,7 @@ impl BallCase {
                 start: p,
                 l: l.as_vec3(),
                 t_max: 1.0,
-                light: LightId(0),
+                to: scene.light_end(LightId(0)),
                 but: facet,
             });
         }

@@ -78,6 +78,18 @@ impl FlatLight {
         }
     }
 
+    /// Unit normal of the front, in f64.
+    pub fn normal(&self) -> DVec3 {
+        self.deep[2]
+    }
+
+    /// How far from its plane, in metres, things are told to be in front of it or behind it: the rounding of its points
+    /// in f32, as [`ShadowRay::end`](crate::math::ShadowRay) allows for it.
+    pub fn rounding(&self) -> f64 {
+        let reach = self.c.abs() + self.deep[0].abs() + self.deep[1].abs();
+        reach.element_sum() * f64::from(32.0 * UNIT_ROUNDOFF)
+    }
+
     /// What dx dy is multiplied with: an area (physical), or a share of the whole.
     pub(super) fn measure(&self) -> f32 {
         let area = match self.outline {

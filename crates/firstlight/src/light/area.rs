@@ -259,7 +259,7 @@ impl AreaShape {
     }
 
     /// Unit normal of the front, where all of it faces one way.
-    fn flat_normal(&self) -> Option<Vec3> {
+    pub(crate) fn flat_normal(&self) -> Option<Vec3> {
         match self {
             AreaShape::Rectangle(rectangle) => Some(rectangle.n.as_vec3()),
             AreaShape::Disk(disk) => Some(disk.n.as_vec3()),

@@ -257,6 +257,11 @@ impl Light {
         }
     }
 
+    /// Unit normal of the plane that all of it lies in; 0 of one that is not flat.
+    pub(crate) fn plane(&self) -> Vec3 {
+        self.area().and_then(|area| area.shape.flat_normal()).unwrap_or(Vec3::ZERO)
+    }
+
     /// How many points of it are sampled, 1 or more; of a light that is `exact`, where it is sampled all the same.
     #[inline(always)]
     pub fn samples(&self) -> usize {

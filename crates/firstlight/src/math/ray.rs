@@ -77,6 +77,13 @@ impl ErrorBound {
         ErrorBound(p.abs() * (4.0 * UNIT_ROUNDOFF) + (terms * (8.0 * f64::EPSILON)).as_vec3())
     }
 
+    /// The same, larger by `rounding` along each axis: what lies in one plane with the point's surface may be off by
+    /// the rounding of its own shape, however well the point is known.
+    #[inline(always)]
+    pub fn widened(self, rounding: f32) -> Self {
+        ErrorBound(self.0 + Vec3::splat(rounding))
+    }
+
     /// Where a ray that leaves `p` on the side of the unit normal `ng` starts: `p`, lifted until the whole box of the
     /// bound is below the plane through the new point. What the surface curves away from cannot be hit again from
     /// there.
@@ -88,6 +95,14 @@ impl ErrorBound {
         let n = ng.as_dvec3();
         p.as_dvec3() + n * n.abs().dot(self.0.as_dvec3())
     }
+}
+
+/// The light that a shadow ray leads to.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct LightEnd {
+    pub light: LightId,
+    /// Unit normal of the plane that all of the light lies in, on either side; 0 of a light that is not flat.
+    pub plane: Vec3,
 }
 
 /// A ray from a surface towards a light: the points `p + t l`, 0 < t < t_max.
@@ -106,7 +121,7 @@ pub struct ShadowRay {
     /// 1 where `l` reaches the light, infinite where the light is infinitely far away.
     pub(crate) t_max: f32,
     /// The light: not everything casts shadows for every one.
-    pub(crate) light: LightId,
+    pub(crate) to: LightEnd,
     /// What does not stand in the way: the facet that the ray starts on.
     pub(crate) but: Facet,
 }
@@ -137,7 +152,7 @@ impl ShadowRay {
 
     /// The light it leads to.
     pub fn light(&self) -> LightId {
-        self.light
+        self.to.light
     }
 
     /// Whether the light is at the end of [`direction`](Self::direction), and not infinitely far away.
@@ -146,8 +161,9 @@ impl ShadowRay {
         self.t_max == 1.0
     }
 
-    /// Where the way ends for what has no bound of its own at the light: short of a light that lies on a surface, by
-    /// the rounding of both ends.
+    /// Where the way ends for what has no bound of its own at the light: short of what the light lies on, by the
+    /// rounding of both ends. What lies in the plane of a flat light hides none of it, so there that is a distance from
+    /// the plane, however flat the ray meets it.
     #[inline(always)]
     pub(crate) fn end(&self) -> f32 {
         if !self.is_finite() {
@@ -155,6 +171,7 @@ impl ShadowRay {
         }
         let (o, l) = (self.start.abs(), self.l.abs());
         let length = l.x + l.y + l.z;
-        1.0 - (o.x + o.y + o.z + length) / length * (32.0 * UNIT_ROUNDOFF)
+        let approach = if self.to.plane == Vec3::ZERO { length } else { self.to.plane.dot(self.l).abs() };
+        1.0 - (o.x + o.y + o.z + length) / approach * (32.0 * UNIT_ROUNDOFF)
     }
 }

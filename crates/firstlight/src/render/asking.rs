@@ -210,7 +210,7 @@ impl<'a> AskedLeaves<'a> {
         for (one, rung) in asking.iter_mut().zip(rungs).filter(|(one, _)| one.view.trees) {
             beams.push(RungRays { point: Viewpoint::of(&one.si), rung, hidden: &mut one.view.hidden });
         }
-        counts.settled.traced += beams::trace(asker.scene, asker.target.light, asked, &mut beams);
+        counts.settled.traced += beams::trace(asker.scene, asker.target.end(), asked, &mut beams);
         for (one, rung) in asking.iter_mut().zip(rungs).filter(|(one, _)| !one.view.trees) {
             counts.settled.traced += asker.mask(rung, asked, &mut one.view, &Viewpoint::of(&one.si));
         }

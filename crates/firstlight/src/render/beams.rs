@@ -9,8 +9,7 @@
 
 use super::ladder::{Rung, cells_in};
 use crate::accel::RayPacket16;
-use crate::ids::LightId;
-use crate::math::{LANES, ShadowRay, Vec3};
+use crate::math::{LANES, LightEnd, ShadowRay, Vec3};
 use crate::scene::{Scene, ShadowRays};
 use crate::visibility::Viewpoint;
 
@@ -24,7 +23,7 @@ pub(super) struct RungRays<'a> {
 
 /// Up to sixteen shadow rays towards one light, each with what the caller knows it by.
 pub(super) struct Packet {
-    light: LightId,
+    to: LightEnd,
     from: [ShadowRay; LANES],
     /// The numbers of the places that `from` holds: those of the last packet are often those of the next.
     places: [u32; LANES],
@@ -35,10 +34,10 @@ pub(super) struct Packet {
 
 impl Packet {
     /// `point` is any place, for want of a ray.
-    pub fn new(light: LightId, point: &Viewpoint) -> Packet {
-        let from = [point.ray(light, Vec3::ZERO, true); LANES];
+    pub fn new(to: LightEnd, point: &Viewpoint) -> Packet {
+        let from = [point.ray(to, Vec3::ZERO, true); LANES];
         let (places, points) = ([u32::MAX; LANES], [0; LANES]);
-        Packet { light, from, places, rays: RayPacket16::ZERO, points, count: 0 }
+        Packet { to, from, places, rays: RayPacket16::ZERO, points, count: 0 }
     }
 
     /// Adds a ray from place `number` along `l` to a point, by its number; whether the packet is full now.
@@ -47,7 +46,7 @@ impl Packet {
         let lane = self.count % LANES;
         if self.places[lane] != number {
             self.places[lane] = number;
-            self.from[lane] = place.ray(self.light, l, true);
+            self.from[lane] = place.ray(self.to, l, true);
             for axis in 0..3 {
                 self.rays.o[axis][lane] = place.start[axis];
             }
@@ -85,10 +84,10 @@ impl Packet {
 
 /// Finds which of the points that are `asked` things in trees hide from some places. What is below a place's horizon is
 /// not asked. Says how many rays were traced.
-pub(super) fn trace(scene: &Scene, light: LightId, asked: &[u16], beams: &mut [RungRays]) -> u64 {
+pub(super) fn trace(scene: &Scene, to: LightEnd, asked: &[u16], beams: &mut [RungRays]) -> u64 {
     let mut traced = 0;
     let Some(first) = beams.first() else { return traced };
-    let mut packet = Packet::new(light, &first.point);
+    let mut packet = Packet::new(to, &first.point);
     for beam in beams.iter_mut() {
         beam.hidden.clear();
         beam.hidden.resize(asked.len(), 0);

@@ -34,6 +34,6 @@ impl Fence {
         let stops = |opacity: Opacity| scene.geometry.stops(opacity, light);
         self.spheres.iter().any(|sphere| sphere.shape.blocks(l, finite) && stops(sphere.opacity))
             || self.flats.iter().any(|flat| flat.shape.blocks(l, finite) && stops(flat.opacity))
-            || scene.occluded_but_by_lists(&from.ray(light, l, finite))
+            || scene.occluded_but_by_lists(&from.ray(scene.light_end(light), l, finite))
     }
 }

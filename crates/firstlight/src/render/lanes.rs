@@ -14,7 +14,7 @@ use crate::accel::dispatch_all;
 use crate::ids::LightId;
 use crate::light::{Area, Extent, MIN_DISTANCE2, Points};
 use crate::material::{Lobe, MOMENTS};
-use crate::math::{LANES, LaneSum, ShadowRay, Vec3, Vec3x16};
+use crate::math::{LANES, LaneSum, LightEnd, ShadowRay, Vec3, Vec3x16};
 use crate::scene::{Geometry, Listed, Opacity, Scene, ShadowRays};
 use crate::shape::{DiskShadow, ParallelogramShadow, PlaneSide, SphereShadow, SurfaceInteraction};
 use crate::visibility::ShadowView;
@@ -60,7 +60,7 @@ pub(super) struct PointObstacles<'a> {
     pub flats: &'a [ParallelogramShadow],
     pub disks: &'a [DiskShadow],
     /// All that lies in trees, and the light that it stands in the way of.
-    pub trees: Option<(&'a Geometry, LightId)>,
+    pub trees: Option<(&'a Geometry, LightEnd)>,
     /// For each block of samples, those that are known to be hidden; empty if none are.
     pub hidden: &'a [u16],
 }
@@ -139,12 +139,12 @@ fn gather_area<S: Simd>(
         if lit.all_false() {
             continue;
         }
-        if let Some((geometry, light)) = obstacles.trees {
+        if let Some((geometry, to)) = obstacles.trees {
             let mut ways = [[0.0; LANES]; 3];
             for (way, l) in ways.iter_mut().zip([l.x, l.y, l.z]) {
                 l.store_slice(way);
             }
-            let hidden = hidden_by_trees(simd.level(), geometry, si, light, ways, lit.to_bitmask() as u16);
+            let hidden = hidden_by_trees(simd.level(), geometry, si, to, ways, lit.to_bitmask() as u16);
             lit &= !mask32x16::from_bitmask(simd, hidden as u64);
             if lit.all_false() {
                 continue;
@@ -169,11 +169,11 @@ fn hidden_by_trees(
     level: Level,
     geometry: &Geometry,
     si: &SurfaceInteraction,
-    light: LightId,
+    to: LightEnd,
     l: [[f32; LANES]; 3],
     active: u16,
 ) -> u16 {
-    let from = si.shadow_ray(light, Vec3::ZERO, 1.0);
+    let from = si.shadow_ray(to, Vec3::ZERO, 1.0);
     let o = from.start.to_array().map(|o| [o; LANES]);
     let mut shadows = ShadowRays { from: &[from], rays: RayPacket16 { o, d: l }, t_end: [0.0; LANES] };
     for (lane, end) in shadows.t_end.iter_mut().enumerate() {
@@ -241,7 +241,7 @@ impl Lighting for Lanes {
         flats.extend(scene.that_stop(&self.flats, id).filter(is_between).map(|(_, flat)| flat.shape));
         disks.clear();
         disks.extend(scene.that_stop(&self.disks, id).map(|(_, disk)| disk.shape));
-        let trees = scene.geometry.has_trees().then_some((&*scene.geometry, id));
+        let trees = scene.geometry.has_trees().then(|| (&*scene.geometry, scene.light_end(id)));
         let obstacles = if light.shadows && si.receives_shadow {
             PointObstacles { spheres, flats, disks, trees, hidden: &[] }
         } else {

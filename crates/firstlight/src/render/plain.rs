@@ -5,7 +5,7 @@ use super::pixel::{Lighting, LobeSums};
 use crate::ids::LightId;
 use crate::light::{Light, LightSample, Towards};
 use crate::material::{Lobe, MOMENTS, Moments};
-use crate::math::LaneSum;
+use crate::math::{LaneSum, LightEnd};
 use crate::scene::Scene;
 use crate::shape::SurfaceInteraction;
 
@@ -39,7 +39,7 @@ impl Lighting for Plain {
 pub(super) struct Facing<'a> {
     scene: &'a Scene,
     pub light: &'a Light,
-    index: usize,
+    end: LightEnd,
     si: &'a SurfaceInteraction,
     lobe: &'a Lobe,
     cos_o: f32,
@@ -51,7 +51,8 @@ impl<'a> Facing<'a> {
         let light = &scene.lights[index];
         let cos_o = si.ns.dot(si.wo);
         let floor = light.floor(si.lit_from, si.error, si.horizon);
-        Facing { scene, light, index, si, lobe, cos_o, floor }
+        let end = scene.light_end(LightId(index as u32));
+        Facing { scene, light, end, si, lobe, cos_o, floor }
     }
 
     /// What one point of the light, to which `to` leads, adds to the diffuse sum and to that of the highlight. `sample`
@@ -75,7 +76,7 @@ impl<'a> Facing<'a> {
         // Nor does what something else hides
         if self.light.shadows && si.receives_shadow {
             let t_max = if to.finite { 1.0 } else { f32::INFINITY };
-            if self.scene.occluded(&si.shadow_ray(LightId(self.index as u32), to.l, t_max)) {
+            if self.scene.occluded(&si.shadow_ray(self.end, to.l, t_max)) {
                 return None;
             }
         } else {

@@ -71,12 +71,12 @@ impl Scene {
         count: usize,
         point: impl Fn(usize) -> (DVec3, Option<Vec3>) + Sync,
     ) -> Vec<f32> {
-        let from = &self.lights[light.index()];
+        let (from, end) = (&self.lights[light.index()], self.light_end(light));
         parallel::map(count, TOGETHER, |i| {
             let (place, normal) = point(i);
             let place = place - self.origin;
             let p = place.as_vec3();
-            let error = ErrorBound::of_rounded(p, place.abs());
+            let error = ErrorBound::of_rounded(p, place.abs()).widened(self.geometry.rounding);
             let floor = normal.map_or(f32::NEG_INFINITY, |n| from.floor(p, error, n));
             let sees = |k: usize| {
                 let to = from.towards(k, p);
@@ -87,7 +87,7 @@ impl Scene {
                 let away = normal.unwrap_or_else(|| to.l.normalize_or_zero());
                 let start = error.offset(p, away).as_vec3();
                 let t_max = if to.finite { 1.0 } else { f32::INFINITY };
-                !self.occluded(&ShadowRay { p, error, start, l: to.l, t_max, light, but: Facet::NONE })
+                !self.occluded(&ShadowRay { p, error, start, l: to.l, t_max, to: end, but: Facet::NONE })
             };
             let all = from.samples();
             (0..all).filter(|k| sees(*k)).count() as f32 / all as f32

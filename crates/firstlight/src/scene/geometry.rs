@@ -220,6 +220,9 @@ pub(crate) struct Geometry {
     pub terminator: ShadowTerminator,
     /// The sets of lights that surfaces choose.
     pub links: LinkSets,
+    /// How far what is computed of a shape in f64 may be off its place, in metres: two shapes with faces in one plane
+    /// have them in one plane to within this.
+    pub rounding: f32,
 }
 
 /// The mesh of the world, and which rays meet it.
@@ -347,7 +350,7 @@ impl Geometry {
             _ => Ok(item),
         };
         let upper = Bvh::build_distinct(&boxes, key);
-        Geometry {
+        let mut geometry = Geometry {
             surfaces,
             spaces,
             instances,
@@ -364,7 +367,23 @@ impl Geometry {
             upper,
             terminator,
             links,
-        }
+            rounding: 0.0,
+        };
+        geometry.rounding = geometry.largest_coordinate() as f32 * (64.0 * f64::EPSILON) as f32;
+        geometry
+    }
+
+    /// The largest coordinate of what any shape is described by.
+    fn largest_coordinate(&self) -> f64 {
+        let planes = self.unbounded.iter().filter_map(|thing| {
+            let Placed { placement, target: PlacedTarget::Solid(solid), .. } = &self.placed[*thing as usize] else {
+                return None;
+            };
+            let (point, _) = self.solids[*solid as usize].plane()?;
+            Some(placement.world_from_object.transform_point3(point).abs())
+        });
+        let corners = self.bounds().map(|[low, high]| low.abs().max(high.abs()));
+        planes.chain(corners).map(DVec3::max_element).fold(0.0, f64::max)
     }
 
     /// What the scene calls each surface.

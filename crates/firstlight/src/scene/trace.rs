@@ -7,7 +7,7 @@ use super::geometry::{At, Nearest};
 use super::occluders::{Listed, ListedOccluders};
 use crate::color::Rgb;
 use crate::ids::{LightId, SurfaceId};
-use crate::math::{Ray, ShadowRay};
+use crate::math::{LightEnd, Ray, ShadowRay};
 use crate::shape::{RayDifferential, ShadowTerminator, ShapePoint, Sphere, SurfaceInteraction};
 
 pub use super::geometry::Hit;
@@ -88,6 +88,12 @@ impl Scene {
         (0..self.lights.len() as u32).map(LightId)
     }
 
+    /// The end of shadow rays to a light.
+    #[inline(always)]
+    pub(crate) fn light_end(&self, light: LightId) -> LightEnd {
+        LightEnd { light, plane: self.lights[light.index()].plane() }
+    }
+
     /// How many points of a light are sampled; 1 for one without an area. For a light that is integrated, as many as
     /// [`RenderSettings::reference`](crate::RenderSettings::reference) would sample it at.
     ///
@@ -109,10 +115,10 @@ impl Scene {
     pub(crate) fn occluded_by_lists(&self, ray: &ShadowRay) -> bool {
         let finite = ray.is_finite();
         let ListedOccluders { flats, .. } = &self.occluders;
-        let mut spheres = self.that_stop(self.occluders.surface_spheres(), ray.light);
+        let mut spheres = self.that_stop(self.occluders.surface_spheres(), ray.to.light);
         spheres.any(|(_, sphere)| sphere.shape.shadow(ray.p, ray.error).blocks(ray.l, finite))
             || self
-                .that_stop(flats, ray.light)
+                .that_stop(flats, ray.to.light)
                 .any(|(_, flat)| flat.shape.shadow(ray.p, ray.error).blocks(ray.l, finite))
             || self.occluded_by_lights(ray)
     }
@@ -129,14 +135,14 @@ impl Scene {
         let finite = ray.is_finite();
         let (spheres, disks) = (self.occluders.light_spheres(), &self.occluders.disks);
         let by_sphere = |sphere: &Listed<Sphere>| {
-            self.geometry.stops(sphere.opacity, ray.light)
+            self.geometry.stops(sphere.opacity, ray.to.light)
                 && sphere.shape.shadow(ray.p, ray.error).blocks(ray.l, finite)
         };
         let tree = self.occluders.light_tree();
         tree.and_then(|tree| tree.any(self.level, ray, |i| by_sphere(&spheres[i as usize])))
             .unwrap_or_else(|| spheres.iter().any(by_sphere))
             || self
-                .that_stop(disks, ray.light)
+                .that_stop(disks, ray.to.light)
                 .any(|(_, disk)| disk.shape.shadow(ray.p, ray.error).blocks(ray.l, finite))
     }
 
@@ -161,6 +167,7 @@ impl Scene {
         let surface = &self.geometry.surfaces[hit.surface.index()];
         let point = self.geometry.point(ray, hit, differential, terminator);
         let ShapePoint { p, error, normal, shading, lifted, uv, footprint, color } = point;
+        let error = error.widened(self.geometry.rounding);
         let wo = -ray.d;
         let (ng, ns) = if normal.dot(wo) < 0.0 { (-normal, -shading) } else { (normal, shading) };
         let (lit_from, horizon) = match lifted {

@@ -8,8 +8,8 @@ use crate::accel::{Aabb, Planes, RayPacket16, RayTile, TraceRay, dispatch_all, d
 use crate::ids::{LightId, MaterialId, SurfaceId};
 use crate::math::{DVec3, Ray, ShadowRay, Vec3};
 use crate::shape::{
-    JoinedPart, LineLanes, Mesh, RayDifferential, ShadowTerminator, ShapePoint, SolidHit, TileHits, TrianglePoint,
-    every,
+    JoinedPart, LineLanes, Mesh, Placement, RayDifferential, ShadowTerminator, ShapePoint, SolidHit, TileHits,
+    TrianglePoint, bits, every,
 };
 
 /// So many meshes at the same place are asked for many rays at once, each for all of them.
@@ -240,17 +240,7 @@ impl Geometry {
     fn blocked<S: Simd>(&self, simd: S, ray: &ShadowRay) -> bool {
         let (o, t_end) = (ray.start, ray.end());
         if let Some(world) = &self.world
-            && self.blocked_by_mesh(
-                simd,
-                &world.mesh,
-                SurfaceId(0),
-                world.shadow,
-                ray.light,
-                ray.but.of(0),
-                o,
-                ray.l,
-                t_end,
-            )
+            && self.blocked_by_mesh(simd, &world.mesh, SurfaceId(0), world.shadow, 0, None, ray, t_end)
         {
             return true;
         }
@@ -263,12 +253,12 @@ impl Geometry {
         self.upper.any(simd, &TraceRay::new(o, ray.l), t_end, |item| match self.items[item as usize] {
             UpperItem::Sphere(i) => {
                 let sphere = &self.spheres[i as usize];
-                self.casts(sphere.surface, ray.light)
+                self.casts(sphere.surface, ray.to.light)
                     && sphere.shape.shadow(ray.p, ray.error).blocks(ray.l, ray.is_finite())
             }
             UpperItem::Parallelogram(i) => {
                 let flat = &self.parallelograms[i as usize];
-                self.casts(flat.surface, ray.light)
+                self.casts(flat.surface, ray.to.light)
                     && flat.shape.shadow(ray.p, ray.error).blocks(ray.l, ray.is_finite())
             }
             UpperItem::Placed(i) => self.blocked_by_placed(simd, i, ray, t_end),
@@ -278,25 +268,14 @@ impl Geometry {
     #[inline(always)]
     fn blocked_by_placed<S: Simd>(&self, simd: S, index: u32, ray: &ShadowRay, t_end: f32) -> bool {
         let thing = &self.placed[index as usize];
-        if !self.stops(thing.shadow, ray.light) {
+        if !self.stops(thing.shadow, ray.to.light) {
             return false;
         }
         let own = thing.placement.line(ray.start, ray.l);
         match thing.target {
             PlacedTarget::Mesh(mesh) => {
-                let mesh = &self.meshes[mesh as usize];
-                let (o, l) = (own.o.as_vec3(), own.d.as_vec3());
-                self.blocked_by_mesh(
-                    simd,
-                    mesh,
-                    thing.surface,
-                    thing.shadow,
-                    ray.light,
-                    ray.but.of(index + 1),
-                    o,
-                    l,
-                    t_end,
-                )
+                let (mesh, placement) = (&self.meshes[mesh as usize], Some(&thing.placement));
+                self.blocked_by_mesh(simd, mesh, thing.surface, thing.shadow, index + 1, placement, ray, t_end)
             }
             PlacedTarget::Points(points) => self.point_sets[points as usize].blocks(simd, &own, t_end),
             PlacedTarget::Solid(solid) => self.solids[solid as usize].blocks(&own, 0.0, t_end as f64),
@@ -327,7 +306,7 @@ impl Geometry {
         Some((hit.t, TrianglePoint { triangle: hit.triangle, u: hit.u, v: hit.v }))
     }
 
-    /// Whether any triangle `but` one stands on the way, in the mesh's space.
+    /// Whether any triangle of a mesh, in its place, which is number `source`, blocks a ray.
     #[inline(never)]
     #[allow(clippy::too_many_arguments, reason = "a mesh with its place, a ray with its reach")]
     fn blocked_by_mesh<S: Simd>(
@@ -336,24 +315,33 @@ impl Geometry {
         mesh: &Mesh,
         first: SurfaceId,
         opacity: Opacity,
-        light: LightId,
-        but: u32,
-        o: Vec3,
-        l: Vec3,
+        source: u32,
+        placement: Option<&Placement>,
+        ray: &ShadowRay,
         t_end: f32,
     ) -> bool {
         if opacity == Opacity::Clear {
             return false;
         }
-        let asks = |triangle| triangle != but && self.triangle_casts(mesh, first, opacity, triangle, light);
+        let (o, l) = match placement {
+            None => (ray.start, ray.l),
+            Some(placement) => {
+                let own = placement.line(ray.start, ray.l);
+                (own.o.as_vec3(), own.d.as_vec3())
+            }
+        };
+        let asks = |triangle| {
+            self.triangle_casts(mesh, first, opacity, triangle, ray.to.light)
+                && !starts_on(mesh, source, placement, ray, o, triangle)
+        };
         simd.vectorize(
             #[inline(always)]
             || mesh.tree.any(simd, &TraceRay::new(o, l), t_end, &asks),
         )
     }
 
-    /// Which of sixteen rays a mesh blocks, but for the triangles that they leave. `rays` are those of `shadows` in the
-    /// mesh's space; its place is number `source`.
+    /// Which of sixteen rays a mesh blocks. `rays` are those of `shadows` in the mesh's space; its place is number
+    /// `source`.
     #[inline(never)]
     #[allow(clippy::too_many_arguments, reason = "a mesh with its place, rays with their reach")]
     fn lanes_blocked_by_mesh<S: Simd>(
@@ -363,6 +351,7 @@ impl Geometry {
         first: SurfaceId,
         opacity: Opacity,
         source: u32,
+        placement: Option<&Placement>,
         shadows: &ShadowRays,
         rays: &RayPacket16,
         active: u16,
@@ -371,9 +360,16 @@ impl Geometry {
             return 0;
         }
         let light = shadows.light();
-        let asks = |triangle, lanes: u64| {
-            let casts = self.triangle_casts(mesh, first, opacity, triangle, light);
-            if casts { lanes & !shadows.leaving(source, triangle) } else { 0 }
+        let asks = |triangle, hit: u64| {
+            if !self.triangle_casts(mesh, first, opacity, triangle, light) {
+                return 0;
+            }
+            let starts_on = |lane| starts_on(mesh, source, placement, shadows.origin(lane), rays.o(lane), triangle);
+            if shadows.from.len() == 1 {
+                // All start at one point
+                return if starts_on(hit.trailing_zeros() as usize) { 0 } else { hit };
+            }
+            bits(hit).filter(|lane| !starts_on(*lane)).fold(0, |hit, lane| hit | 1 << lane)
         };
         simd.vectorize(
             #[inline(always)]
@@ -539,7 +535,7 @@ impl ShadowRays<'_> {
 
     /// The light they lead to.
     fn light(&self) -> LightId {
-        self.from[0].light
+        self.from[0].to.light
     }
 
     /// Those that pass through a box, but for rounding.
@@ -554,15 +550,22 @@ impl ShadowRays<'_> {
         }
         !(near.simd_gt(far).to_bitmask() as u16)
     }
+}
 
-    /// The rays that leave a triangle of a mesh, which does not stand in their way.
-    fn leaving(&self, source: u32, triangle: u32) -> u64 {
-        let mut lanes = 0;
-        for (lane, from) in self.from.iter().enumerate() {
-            lanes |= u64::from(from.but.of(source) == triangle) << lane;
-        }
-        if self.from.len() == 1 { lanes * 0xffff } else { lanes }
-    }
+/// Whether a ray starts on a triangle of a mesh, which does not block it then: on its own facet, or in the plane of
+/// another, as far as rounding allows to tell. `o` is the start in the space of the mesh, whose place is number
+/// `source`.
+#[inline(never)]
+fn starts_on(
+    mesh: &Mesh,
+    source: u32,
+    placement: Option<&Placement>,
+    ray: &ShadowRay,
+    o: Vec3,
+    triangle: u32,
+) -> bool {
+    let error = || placement.map_or(ray.error.0.as_dvec3(), |placement| placement.error_in_object(ray.error));
+    ray.but.of(source) == triangle || mesh.is_in_plane(triangle, o, error())
 }
 
 /// The lanes that are set in `active`.
@@ -608,7 +611,7 @@ impl Geometry {
         let mut done = 0;
         if let Some(world) = &self.world {
             let (mesh, rays) = (&world.mesh, &shadows.rays);
-            done |= self.lanes_blocked_by_mesh(simd, mesh, SurfaceId(0), world.shadow, 0, shadows, rays, active);
+            done |= self.lanes_blocked_by_mesh(simd, mesh, SurfaceId(0), world.shadow, 0, None, shadows, rays, active);
         }
         for &thing in &self.unbounded {
             done |= self.placed_blocks_lanes(simd, thing, shadows, active & !done);
@@ -671,6 +674,7 @@ impl Geometry {
             let line = thing.placement.line(shadows.rays.o(lane), shadows.rays.d(lane));
             own.set(lane, line.o.as_vec3(), line.d.as_vec3());
         }
-        self.lanes_blocked_by_mesh(simd, mesh, thing.surface, thing.shadow, index + 1, shadows, &own, active)
+        let placement = Some(&thing.placement);
+        self.lanes_blocked_by_mesh(simd, mesh, thing.surface, thing.shadow, index + 1, placement, shadows, &own, active)
     }
 }

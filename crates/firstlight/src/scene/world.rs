@@ -108,18 +108,18 @@ impl Scene {
     pub fn shadow_rays(&self, surface: &SurfacePoint, light: LightId) -> impl Iterator<Item = ShadowRay> + use<'_> {
         let si = surface.local;
         let from = &self.lights[light.index()];
-        let floor = from.floor(si.lit_from, si.error, si.horizon);
+        let (end, floor) = (self.light_end(light), from.floor(si.lit_from, si.error, si.horizon));
         (0..from.samples()).filter_map(move |k| {
             let to = from.towards(k, si.lit_from);
             let is_above = si.horizon.dot(to.l) > floor && si.ns.dot(to.l) > 0.0;
-            is_above.then(|| si.shadow_ray(light, to.l, if to.finite { 1.0 } else { f32::INFINITY }))
+            is_above.then(|| si.shadow_ray(end, to.l, if to.finite { 1.0 } else { f32::INFINITY }))
         })
     }
 
     /// A ray from `surface` to a point, world space, for [`occluded`](Self::occluded): whether the two see each other,
     /// as far as the shadows of `light` go. Whether the point is above the horizon is not looked at.
     pub fn shadow_ray_to(&self, surface: &SurfacePoint, light: LightId, point: DVec3) -> ShadowRay {
-        surface.local.shadow_ray(light, (point - surface.lit_from).as_vec3(), 1.0)
+        surface.local.shadow_ray(self.light_end(light), (point - surface.lit_from).as_vec3(), 1.0)
     }
 
     fn in_world(&self, local: SurfaceInteraction) -> SurfacePoint {

@@ -50,6 +50,12 @@ impl Placement {
         self.reach(p) + self.world_from_object.translation.abs()
     }
 
+    /// A bound on the error of a point of the world, along each axis of the object.
+    #[inline(always)]
+    pub fn error_in_object(&self, error: ErrorBound) -> DVec3 {
+        abs(self.object_from_world.matrix3) * error.0.as_dvec3()
+    }
+
     /// How far a displacement of at most `p` along each axis of the object can lead in the world.
     #[inline(always)]
     pub fn reach(&self, p: DVec3) -> DVec3 {

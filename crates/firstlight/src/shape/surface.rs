@@ -2,8 +2,8 @@
 
 use crate::color::Rgb;
 use crate::describe::words;
-use crate::ids::{LightId, MaterialId, SurfaceId};
-use crate::math::{ErrorBound, Facet, ShadowRay, Vec2, Vec3};
+use crate::ids::{MaterialId, SurfaceId};
+use crate::math::{ErrorBound, Facet, LightEnd, ShadowRay, Vec2, Vec3};
 
 words! {
     /// What is made of the border of light and dark on facets with smooth normals.
@@ -96,11 +96,17 @@ pub struct SurfaceInteraction {
 }
 
 impl SurfaceInteraction {
+    /// Where rays to lights start.
+    #[inline(always)]
+    pub(crate) fn shadow_start(&self) -> Vec3 {
+        self.error.offset(self.lit_from, self.ng).as_vec3()
+    }
+
     /// A ray from here towards a light along `l`, up to `t_max` times its length.
     #[inline(always)]
-    pub(crate) fn shadow_ray(&self, light: LightId, l: Vec3, t_max: f32) -> ShadowRay {
-        let start = self.error.offset(self.lit_from, self.ng).as_vec3();
-        ShadowRay { p: self.lit_from, error: self.error, start, l, t_max, light, but: self.facet }
+    pub(crate) fn shadow_ray(&self, to: LightEnd, l: Vec3, t_max: f32) -> ShadowRay {
+        let start = self.shadow_start();
+        ShadowRay { p: self.lit_from, error: self.error, start, l, t_max, to, but: self.facet }
     }
 }
 

@@ -7,7 +7,6 @@ use super::occluders::ShadowMesh;
 use super::target::{LightSeen, SampleBlock, Target};
 use super::view::ShadowView;
 use crate::accel::{RayPacket16, dispatch_all};
-use crate::ids::LightId;
 use crate::math::{LANES, ShadowRay, UNIT_ROUNDOFF, Vec3, least_and_most};
 use crate::scene::{Scene, ShadowRays};
 use crate::shape::{SeenParts, SeenTriangle};
@@ -131,7 +130,7 @@ impl ShadowView {
                         let unsure = told.unsure & !*hidden & !told.hidden;
                         *hidden |= told.hidden;
                         if unsure != 0 {
-                            *hidden |= by_kernel(simd, scene, target.light, triangle, block, point, unsure);
+                            *hidden |= by_kernel(simd, scene, target, triangle, block, point, unsure);
                         }
                     }
                     open &= !(u16::from(*hidden == u16::MAX) << i);
@@ -143,7 +142,7 @@ impl ShadowView {
     /// Asks the trees, or only what is no mesh, ray by ray.
     fn trace(&mut self, level: Level, scene: &Scene, target: &Target, point: &Viewpoint) -> u64 {
         let mut traced = 0;
-        let from = [point.ray(target.light, Vec3::ZERO, true)];
+        let from = [point.ray(target.end(), Vec3::ZERO, true)];
         for (block, hidden) in target.blocks.iter().zip(&mut self.in_space) {
             let asking = !*hidden;
             if asking == 0 {
@@ -182,7 +181,13 @@ fn shadow_rays<'a, S: Simd>(
     // `ShadowRay::end`, operation by operation
     let o = point.start.abs();
     let length = l[0].abs() + l[1].abs() + l[2].abs();
-    let end = -((length + (o.x + o.y + o.z)) / length * (32.0 * UNIT_ROUNDOFF)) + 1.0;
+    let plane = from[0].to.plane;
+    let approach = if plane == Vec3::ZERO {
+        length
+    } else {
+        (l[0] * plane.x + l[1] * plane.y + l[2] * plane.z).abs()
+    };
+    let end = -((length + (o.x + o.y + o.z)) / approach * (32.0 * UNIT_ROUNDOFF)) + 1.0;
     end.store_slice(&mut shadows.t_end);
     shadows
 }
@@ -192,7 +197,7 @@ fn shadow_rays<'a, S: Simd>(
 fn by_kernel<S: Simd>(
     simd: S,
     scene: &Scene,
-    light: LightId,
+    target: &Target,
     triangle: &SeenTriangle,
     block: &SampleBlock,
     point: &Viewpoint,
@@ -201,8 +206,8 @@ fn by_kernel<S: Simd>(
     simd.vectorize(
         #[inline(always)]
         || {
-            let Some(mesh) = ShadowMesh::of(&scene.geometry, triangle.source, light) else { return 0 };
-            let from = [point.ray(light, Vec3::ZERO, true)];
+            let Some(mesh) = ShadowMesh::of(&scene.geometry, triangle.source, target.light) else { return 0 };
+            let from = [point.ray(target.end(), Vec3::ZERO, true)];
             let mut shadows = shadow_rays(simd, &from, point, block);
             if let Some(placement) = mesh.placement {
                 for lane in (0..LANES).filter(|lane| unsure >> lane & 1 == 1) {

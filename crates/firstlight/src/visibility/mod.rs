@@ -27,8 +27,7 @@ pub(crate) use shaft::Shaft;
 pub(crate) use target::Target;
 pub(crate) use view::{ShadowView, Visibility};
 
-use crate::ids::LightId;
-use crate::math::{ErrorBound, Facet, ShadowRay, Vec3};
+use crate::math::{ErrorBound, Facet, LightEnd, ShadowRay, Vec3};
 use crate::shape::SurfaceInteraction;
 
 /// A point that light is gathered from.
@@ -48,14 +47,14 @@ pub(crate) struct Viewpoint {
 impl Viewpoint {
     #[inline(always)]
     pub fn of(si: &SurfaceInteraction) -> Self {
-        let start = si.shadow_ray(LightId(0), Vec3::ZERO, 1.0).start;
+        let start = si.shadow_start();
         Viewpoint { p: si.lit_from, error: si.error, start, horizon: si.horizon, ns: si.ns, but: si.facet }
     }
 
     /// A ray along `l` towards a light.
     #[inline(always)]
-    pub fn ray(&self, light: LightId, l: Vec3, finite: bool) -> ShadowRay {
+    pub fn ray(&self, to: LightEnd, l: Vec3, finite: bool) -> ShadowRay {
         let t_max = if finite { 1.0 } else { f32::INFINITY };
-        ShadowRay { p: self.p, error: self.error, start: self.start, l, t_max, light, but: self.but }
+        ShadowRay { p: self.p, error: self.error, start: self.start, l, t_max, to, but: self.but }
     }
 }

@@ -139,6 +139,7 @@ impl Shaft {
                 axes: hull.axes.map(|a| m.transform_vector3(a.as_dvec3()).as_vec3()),
                 finite: true,
                 is_ball: false,
+                plane: Vec3::ZERO,
             }
         } else {
             LightHull { center: m.transform_vector3(hull.center.as_dvec3()).as_vec3(), ..*hull }

@@ -126,6 +126,7 @@ impl Outlook {
             axes: [Vec3::new(half.x, 0.0, 0.0), Vec3::new(0.0, half.y, 0.0), Vec3::new(0.0, 0.0, half.z)],
             finite: true,
             is_ball: false,
+            plane: Vec3::ZERO,
         };
         let shaft = Shaft::between(self.places, &hull, self.apart);
         let size = self.places.min.abs().max(self.places.max.abs()).max(low.abs()).max(high.abs()).max_element();

@@ -6,7 +6,7 @@ use fearless_simd::{Level, f32x16, prelude::*};
 use crate::accel::{Aabb, dispatch_all};
 use crate::ids::LightId;
 use crate::light::{AreaShape, Extent, Light, LightKind, PointBlock, Points};
-use crate::math::{Axes, DMat3, DVec3, LANES, Vec3, least_and_most};
+use crate::math::{Axes, DMat3, DVec3, LANES, LightEnd, Vec3, least_and_most};
 use crate::scene::Scene;
 
 /// What encloses a light: the points `center` + u `axes[0]` + v `axes[1]` + w `axes[2]`, each of u, v, w from -1 to 1;
@@ -19,6 +19,8 @@ pub(crate) struct LightHull {
     pub finite: bool,
     /// Whether it is a ball, as wide as each axis.
     pub is_ball: bool,
+    /// Unit normal of the plane that all of it lies in; 0 of a light that is not flat.
+    pub plane: Vec3,
 }
 
 /// A light as it is seen from one point: the ways `l` + u `axes[0]` + v `axes[1]` + w `axes[2]` lead to it.
@@ -31,6 +33,8 @@ pub(crate) struct LightSeen {
     /// The largest coordinate of every way, at most.
     pub shortest: f32,
     pub finite: bool,
+    /// See [`LightHull::plane`].
+    pub plane: Vec3,
     /// Along which what is in the way is bounded: two axes across, and a third. Those of a ball face the point.
     pub frame: [Vec3; 3],
     /// How far away a ball is, in radii.
@@ -78,7 +82,7 @@ const ROOM: f64 = 1e-5;
 
 impl LightHull {
     fn at(center: Vec3, finite: bool) -> Self {
-        LightHull { center, axes: [Vec3::ZERO; 3], finite, is_ball: false }
+        LightHull { center, axes: [Vec3::ZERO; 3], finite, is_ball: false, plane: Vec3::ZERO }
     }
 
     /// The smallest hull with axes along `e0`, `e1` and across them, around `points`.
@@ -89,7 +93,7 @@ impl LightHull {
         let across = e0.cross(e1).normalize_or(DVec3::Y);
         let thin = across * (e0.length() + e1.length());
         let axes = [e0, e1, thin].map(|axis| axis.as_vec3());
-        let mut hull = LightHull { center, axes, finite: true, is_ball: false };
+        let mut hull = LightHull { center, axes, finite: true, is_ball: false, plane: Vec3::ZERO };
         // Fit the axes to the points, then look whether rounding lets any point out
         let mut needed = [0.0f64; 3];
         for q in points {
@@ -134,7 +138,7 @@ impl LightHull {
                     points.extend((0..area.samples()).map(|k| area.point(k).as_dvec3()));
                 }
                 let is_ball = matches!(area.shape, AreaShape::Sphere(_));
-                LightHull { is_ball, ..Self::around(e0, e1, &points) }
+                LightHull { is_ball, plane: light.plane(), ..Self::around(e0, e1, &points) }
             }
         }
     }
@@ -167,7 +171,7 @@ impl LightHull {
     #[inline(always)]
     pub fn from(&self, p: Vec3) -> LightSeen {
         let l = if self.finite { self.center - p } else { self.center };
-        let seen = LightSeen::new(l, self.axes, self.finite);
+        let seen = LightSeen { plane: self.plane, ..LightSeen::new(l, self.axes, self.finite) };
         if !self.is_ball {
             return seen;
         }
@@ -242,7 +246,7 @@ impl LightSeen {
         let reach = axes[0].abs() + axes[1].abs() + axes[2].abs();
         let longest = (l.abs() + reach).max_element() * (1.0 + 4.0 * f32::EPSILON);
         let shortest = ((l.abs() - reach).max_element() - longest * (4.0 * f32::EPSILON)).max(0.0);
-        LightSeen { l, axes, longest, shortest, finite, frame: axes, radii: None }
+        LightSeen { l, axes, longest, shortest, finite, plane: Vec3::ZERO, frame: axes, radii: None }
     }
 
     /// Between what values f.w lies for the ways w, but for rounding: its middle and how far it goes from there.
@@ -267,6 +271,11 @@ impl Target {
             Extent::Area(area) if !light.exact => target.with(scene.level, area.points()),
             Extent::Area(_) | Extent::Point => target,
         }
+    }
+
+    /// The end of shadow rays to it.
+    pub fn end(&self) -> LightEnd {
+        LightEnd { light: self.light, plane: self.hull.plane }
     }
 
     /// The same light with these points of it.

@@ -314,7 +314,7 @@ fn every_sample_is_answered_as_by_its_own_ray() {
                     if !(point.horizon.dot(to.l) > 0.0 && point.ns.dot(to.l) > 0.0) {
                         continue;
                     }
-                    let hidden = scene.occluded(&point.ray(target.light, to.l, to.finite));
+                    let hidden = scene.occluded(&point.ray(target.end(), to.l, to.finite));
                     let answer = match visibility {
                         Visibility::Lit => false,
                         Visibility::Hidden | Visibility::BelowHorizon => true,

@@ -236,10 +236,19 @@ fn look_at<S: Simd>(
 fn eye(mesh: &ShadowMesh, light: &LightSeen, point: &Viewpoint) -> Eye {
     // Rays end short of the light by the rounding of both ends: `ShadowRay::end`
     let o = point.start.abs();
-    let short = 32.0 * UNIT_ROUNDOFF * (1.01 + 1.01 * (o.x + o.y + o.z) / light.shortest) + 8.0 * UNIT_ROUNDOFF;
+    let o = o.x + o.y + o.z;
+    let part = if light.plane == Vec3::ZERO {
+        1.0 + o / light.shortest
+    } else {
+        // All ways come as near to the plane, but for rounding
+        let (length, (middle, reach)) = (3.0 * light.longest, light.range(light.plane));
+        (length + o) / (middle.abs() - reach - length * (8.0 * UNIT_ROUNDOFF)).max(0.0)
+    };
+    let short = 32.0 * UNIT_ROUNDOFF * 1.01 * part + 8.0 * UNIT_ROUNDOFF;
     let short = if short < 0.5 { 1.0 / (1.0 - short) * (1.0 + 8.0 * UNIT_ROUNDOFF) } else { f32::INFINITY };
     let own = Eye {
         o: point.start,
+        error: point.error.0.as_dvec3(),
         l: light.l,
         axes: light.axes,
         frame: light.frame,
@@ -262,6 +271,7 @@ fn eye(mesh: &ShadowMesh, light: &LightSeen, point: &Viewpoint) -> Eye {
     let upright = placement.world_from_object.matrix3.transpose();
     Eye {
         o: placement.line(point.start, light.l).o.as_vec3(),
+        error: placement.error_in_object(point.error),
         l: seen.l,
         axes: seen.axes,
         frame: light.frame.map(way),

@@ -50,15 +50,9 @@ pub(super) fn flat_between<S: Simd>(
     if near == 0 {
         return told;
     }
-    // In the light's own plane nothing is before it
     let lines = edges(q, &sight.ways);
     let n = (q[1] - q[0]).cross(q[3] - q[0]);
     let length = n.dot(n).sqrt();
-    let mut in_plane = near;
-    for [x, y] in sight.square() {
-        in_plane &= lines[0].at(x, y).abs().simd_le(length * sight.far * SLACK).to_bitmask();
-    }
-    near &= if sight.depth > 0.0 { near } else { !in_plane };
     // How far away it is decides how far its shadow moves
     let mut motion = [0.0f32; LANES];
     let mut left = near & sight.reach.simd_gt(zero).to_bitmask();
@@ -132,6 +126,11 @@ impl FacetShape {
     pub fn corners(&self) -> [Exact; 4] {
         let [a, b, c] = self.corners.map(Exact::new);
         [a, b, c, c]
+    }
+
+    /// How far it reaches in a direction.
+    pub fn reach(&self, n: DVec3) -> f64 {
+        self.corners.iter().map(|q| n.dot(*q)).fold(f64::NEG_INFINITY, f64::max)
     }
 
     /// How far it is from a point.

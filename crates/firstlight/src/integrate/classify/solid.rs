@@ -86,7 +86,7 @@ impl PlacedSolid {
     }
 
     /// How far it reaches in a direction.
-    fn reach(&self, n: DVec3) -> f64 {
+    pub fn reach(&self, n: DVec3) -> f64 {
         let to_world = &self.placement.world_from_object;
         self.solid.support(to_world.matrix3.transpose() * n) + n.dot(to_world.translation)
     }

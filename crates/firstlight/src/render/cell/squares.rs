@@ -320,10 +320,10 @@ impl Cells<'_> {
                 let l = asker.point(inner, LOOKING, cell) - point.p;
                 if point.horizon.dot(l) > 0.0 && point.ns.dot(l) > 0.0 {
                     asked[inner][0] += 1;
-                    if scene.occluded_by_lists(&point.ray(asker.target.light, l, true)) {
+                    if scene.occluded_by_lists(&point.ray(asker.target.end(), l, true)) {
                         asked[inner][1] += 1;
                     } else {
-                        let packet = packet.get_or_insert_with(|| Packet::new(asker.target.light, &point));
+                        let packet = packet.get_or_insert_with(|| Packet::new(asker.target.end(), &point));
                         packet.add((inner * LOOKING + cell) as u32, &point, l, inner as u32);
                     }
                 }

@@ -8,7 +8,7 @@ use crate::math::{DVec3, ErrorBound, Ray, UNIT_ROUNDOFF, Vec2, Vec3};
 use crate::shape::TriangleTree;
 use crate::shape::placement::Placement;
 use crate::shape::surface::{Footprint, RayDifferential, ShadowTerminator, ShapePoint, UvEdge};
-use crate::shape::triangles::can_be_hit;
+use crate::shape::triangles::{can_be_hit, is_in_plane};
 
 /// The meshes of one space, the world or that of a group, joined: one tree for all their triangles.
 pub(crate) struct Mesh {
@@ -119,6 +119,11 @@ impl Mesh {
     #[inline(always)]
     fn corners(&self, triangle: u32) -> [DVec3; 3] {
         self.triangles[triangle as usize].map(|i| Vec3::from(self.positions[i as usize]).as_dvec3())
+    }
+
+    /// Whether a shadow ray that starts at `o` starts in the plane of a triangle; see [`is_in_plane`].
+    pub fn is_in_plane(&self, triangle: u32, o: Vec3, error: DVec3) -> bool {
+        is_in_plane(self.corners(triangle), o.as_dvec3(), error)
     }
 
     /// The normal of a triangle's front, by the order of its corners; of any length.

@@ -16,7 +16,7 @@ use crate::accel::{
     Aabb, Beam, Built, LEAF, LaneSlabs, RayPacket16, RayTile, Slabs, TraceRay, Tree, build, dispatch_eight,
     dispatch_sixteen, groups,
 };
-use crate::math::{DVec3, Vec3};
+use crate::math::{DVec3, UNIT_ROUNDOFF, Vec3};
 use kernel::{Crossings, intersect, intersect_lanes};
 pub(crate) use seen::{Eye, SeenParts, SeenTriangle, TOGETHER};
 
@@ -128,6 +128,24 @@ fn corners(positions: &[[f32; 3]], triangle: &[u32; 3]) -> Option<[Vec3; 3]> {
 pub(crate) fn can_be_hit(positions: &[[f32; 3]], triangle: &[u32; 3]) -> bool {
     corners(positions, triangle).is_some_and(|corners| corners.iter().all(|corner| corner.is_finite()))
 }
+
+/// Whether a shadow ray that starts at `o`, lifted off a surface point that may be wrong by `error`, starts in the plane
+/// of a triangle, as far as rounding allows to tell. All in the space of the mesh.
+///
+/// Seen from o, the corners a, b, c span a volume V = n.a, n = (b - a) x (c - a), that is 0 in the plane. A corner that
+/// moves by r changes it by no more than r times the area that the other two span with o. So a small triangle, whose
+/// plane its corners hardly decide, is in one plane with more points than a large one.
+pub(crate) fn is_in_plane(corners: [DVec3; 3], o: DVec3, error: DVec3) -> bool {
+    let largest = corners.iter().fold(o.abs(), |largest, q| largest.max(q.abs())).max_element();
+    let [a, b, c] = corners.map(|q| q - o);
+    let n = (b - a).cross(c - a);
+    let areas = b.cross(c).length() + c.cross(a).length() + a.cross(b).length();
+    // The start is off the point by the lift, and the point off the surface by its error
+    n.dot(a).abs() <= areas * largest * CORNER_ROUNDING + 2.0 * n.abs().dot(error)
+}
+
+/// How far a corner may be off where it was meant to be, in its largest coordinate: two ulps in f32.
+const CORNER_ROUNDING: f64 = 4.0 * UNIT_ROUNDOFF as f64;
 
 impl TriangleTree {
     /// Builds the tree over a mesh. A triangle without area, or with a vertex that is not finite or not there, is left

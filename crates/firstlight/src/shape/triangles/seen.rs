@@ -47,9 +47,9 @@
 use fearless_simd::{f32x4, f32x8, f32x16, mask32x16, prelude::*};
 
 use super::kernel::{intersect, intersect_lanes};
-use super::{NONE, PACK, Pack, TriangleTree, along, bits};
+use super::{CORNER_ROUNDING, NONE, PACK, Pack, TriangleTree, along, bits, is_in_plane};
 use crate::accel::{RayPacket16, Slabs, groups};
-use crate::math::{UNIT_ROUNDOFF as H, Vec3};
+use crate::math::{DVec3, UNIT_ROUNDOFF as H, Vec3};
 
 /// By how much U, V and W can be wrong, in D s L.
 const EDGE: f32 = 192.0 * H;
@@ -82,6 +82,8 @@ pub(crate) const TOGETHER: usize = 4;
 pub(crate) struct Eye {
     /// The origin of the rays.
     pub o: Vec3,
+    /// How far the point that they leave may be wrong.
+    pub error: DVec3,
     /// To the light's middle.
     pub l: Vec3,
     /// Half the light, along its axes.
@@ -385,6 +387,18 @@ impl TriangleTree {
         }
         if keep == 0 {
             return false;
+        }
+        // Nor do those that the rays start in the plane of. A bound on what is allowed there leaves few to look at
+        let largest = far_off + eye.o.abs().max_element();
+        let allowed = largest * far_off * side * (10.0 * CORNER_ROUNDING as f32)
+            + area * (2.1 * eye.error.max_element() as f32)
+            + wrong;
+        let mut level = height.simd_le(allowed).to_bitmask() as u32 & keep;
+        while level != 0 {
+            let lane = level.trailing_zeros() as usize & 15;
+            level &= level - 1;
+            let corners = packs[lane / PACK].triangle(lane % PACK).map(|q| q.as_dvec3());
+            keep &= !(u32::from(is_in_plane(corners, eye.o.as_dvec3(), eye.error)) << lane);
         }
         // Those that hide something: for sure where det is above `near`, for sure not where it is below `far`
         let middling = height.simd_gt(wrong + sliver * (1.0 / GRAZE)) & sound;
