@@ -20,6 +20,12 @@ pub struct Frame {
     pub(crate) origin: DVec3,
     /// `position` in the scene's own coordinates.
     pub(crate) eye: Vec3,
+    /// The line of sight, in f64.
+    pub(crate) sight: DVec3,
+    /// How far along it rays begin, in metres, and the place there, in the scene's own coordinates: 0 and `eye`, but
+    /// where the scene is far away.
+    pub(crate) near: f64,
+    pub(crate) start: Vec3,
 }
 
 /// `up` nearer to the line of sight than this sine is parallel to it.
@@ -33,6 +39,11 @@ impl Frame {
     pub(super) fn parts(&self, d: DVec3) -> DVec3 {
         let [right, up, forward] = [self.right, self.up, self.forward].map(|axis| axis.as_dvec3());
         DMat3::from_cols(right, up, forward).inverse() * d
+    }
+
+    /// The same with rays that begin so far along the line of sight.
+    pub(super) fn starting_at(self, near: f64) -> Self {
+        Frame { near, start: (self.position - self.origin + self.sight * near).as_vec3(), ..self }
     }
 
     pub(super) fn compile(desc: &CameraDesc, cx: &mut CompileContext) -> Self {
@@ -73,6 +84,9 @@ impl Frame {
             forward: forward.as_vec3(),
             origin: cx.origin,
             eye: cx.local(eye).as_vec3(),
+            sight: forward,
+            near: 0.0,
+            start: cx.local(eye).as_vec3(),
         }
     }
 }

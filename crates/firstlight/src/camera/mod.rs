@@ -99,7 +99,7 @@ impl CameraDesc {
 
 impl Camera {
     /// The ray through the film at `x`, `y` in pixels from its upper left corner, and how it changes over `step` pixels
-    /// to the right and down.
+    /// to the right and down. It begins at the camera or, where the scene is far from there, on its way to it.
     pub fn ray(&self, x: f32, y: f32, step: f32) -> (WorldRay, RayDifferential) {
         let (ray, differential) = self.local_ray(x, y, step);
         (ray.in_world(self.frame().origin), differential)
@@ -114,6 +114,17 @@ impl Camera {
         }
     }
 
+    /// The same with rays that begin so far along its line of sight, in metres.
+    pub(crate) fn starting_at(self, near: f64) -> Self {
+        match self {
+            Camera::Pinhole(pinhole) => Camera::Pinhole(Pinhole { frame: pinhole.frame.starting_at(near), ..pinhole }),
+            Camera::Orthographic(orthographic) => {
+                let frame = orthographic.frame.starting_at(near);
+                Camera::Orthographic(Orthographic { frame, ..orthographic })
+            }
+        }
+    }
+
     /// Where a point of the world is in the picture: in pixels from its upper left corner, also outside of it. `None`
     /// for what is behind the camera. The way back from [`ray`](Self::ray).
     pub fn project(&self, point: DVec3) -> Option<[f64; 2]> {
@@ -124,7 +135,8 @@ impl Camera {
     /// The same of a point in the scene's own coordinates, and how far it is along the line of sight: also of what is
     /// behind the film of an orthographic camera. `None` for what is behind an eye.
     pub(crate) fn local_project(&self, p: DVec3) -> Option<([f64; 2], f64)> {
-        let parts = self.frame().parts(p - self.frame().eye.as_dvec3());
+        let Frame { near, start, .. } = self.frame();
+        let parts = self.frame().parts(p - start.as_dvec3()) + DVec3::Z * *near;
         self.on_film(parts).map(|pixel| (pixel, parts.z))
     }
 

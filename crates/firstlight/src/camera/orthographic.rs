@@ -50,20 +50,20 @@ impl Orthographic {
     /// the right and down: it starts elsewhere, and its direction stays.
     #[inline(always)]
     pub(super) fn ray(&self, x: f32, y: f32, step: f32) -> (Ray, RayDifferential) {
-        let Frame { eye, right, up, forward, .. } = self.frame;
+        let Frame { start, right, up, forward, .. } = self.frame;
         let [film_x, film_y] = self.film.place(x, y);
         let [step_x, step_y] = self.film.steps(step);
         let differential =
             RayDifferential { dx: Vec3::ZERO, dy: Vec3::ZERO, origin_dx: right * step_x, origin_dy: up * step_y };
-        (Ray { o: eye + right * film_x + up * film_y, d: forward }, differential)
+        (Ray { o: start + right * film_x + up * film_y, d: forward }, differential)
     }
 
     /// The rays through sixteen places, from where and in which directions: the same bits.
     #[inline(always)]
     pub(super) fn ray_lanes<S: Simd>(&self, simd: S, x: f32x16<S>, y: f32x16<S>) -> [Vec3x16<S>; 2] {
-        let [eye, right, up, forward] =
-            [self.frame.eye, self.frame.right, self.frame.up, self.frame.forward].map(|v| Vec3x16::splat(simd, v));
+        let [start, right, up, forward] =
+            [self.frame.start, self.frame.right, self.frame.up, self.frame.forward].map(|v| Vec3x16::splat(simd, v));
         let [film_x, film_y] = self.film.place_lanes(x, y);
-        [eye + right * film_x + up * film_y, forward]
+        [start + right * film_x + up * film_y, forward]
     }
 }

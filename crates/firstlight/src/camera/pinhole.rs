@@ -5,7 +5,7 @@ use pxfm::{f_atan, f_tan};
 
 use super::{CameraDesc, FilmPlane, Frame};
 use crate::context::{CompileContext, show};
-use crate::math::{Ray, Vec3, Vec3x16};
+use crate::math::{Ray, Vec3x16};
 use crate::shape::RayDifferential;
 
 /// A pinhole camera in front of a film, ready to look.
@@ -48,7 +48,8 @@ impl Pinhole {
     /// to the right and down.
     #[inline(always)]
     pub(super) fn ray(&self, x: f32, y: f32, step: f32) -> (Ray, RayDifferential) {
-        let Frame { eye, right, up, forward, .. } = self.frame;
+        let Frame { start, right, up, forward, .. } = self.frame;
+        let near = self.frame.near as f32;
         let [film_x, film_y] = self.film.place(x, y);
         let towards = right * film_x + up * film_y + forward;
         let length = towards.length();
@@ -56,21 +57,24 @@ impl Pinhole {
         let differential = RayDifferential {
             dx: right * (step_x / length),
             dy: up * (step_y / length),
-            origin_dx: Vec3::ZERO,
-            origin_dy: Vec3::ZERO,
+            origin_dx: right * (step_x * near),
+            origin_dy: up * (step_y * near),
         };
-        (Ray { o: eye, d: towards / length }, differential)
+        let o = start + (right * (film_x * near) + up * (film_y * near));
+        (Ray { o, d: towards / length }, differential)
     }
 
     /// The rays through sixteen places, from where and in which directions: the same bits.
     #[inline(always)]
     pub(super) fn ray_lanes<S: Simd>(&self, simd: S, x: f32x16<S>, y: f32x16<S>) -> [Vec3x16<S>; 2] {
-        let [eye, right, up, forward] =
-            [self.frame.eye, self.frame.right, self.frame.up, self.frame.forward].map(|v| Vec3x16::splat(simd, v));
+        let near = self.frame.near as f32;
+        let [start, right, up, forward] =
+            [self.frame.start, self.frame.right, self.frame.up, self.frame.forward].map(|v| Vec3x16::splat(simd, v));
         let [film_x, film_y] = self.film.place_lanes(x, y);
         let towards = right * film_x + up * film_y + forward;
         let length = towards.dot(towards).sqrt();
-        [eye, Vec3x16 { x: towards.x / length, y: towards.y / length, z: towards.z / length }]
+        let o = start + (right * (film_x * near) + up * (film_y * near));
+        [o, Vec3x16 { x: towards.x / length, y: towards.y / length, z: towards.z / length }]
     }
 }
 

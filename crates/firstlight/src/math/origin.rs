@@ -19,10 +19,28 @@ pub(crate) fn origin_for([low, high]: [DVec3; 2]) -> DVec3 {
     if !(is_far && far.is_finite()) {
         return DVec3::ZERO;
     }
-    // The power of two below the size, not finer than f64 has digits
-    let step = size.max(far * f64::EPSILON * 16.0).max(f64::MIN_POSITIVE);
+    rounded(center, size)
+}
+
+/// A camera that is nearer to what it looks at than this part of that place's distance from the origin looks at
+/// something far: 32 bits would tell apart less than a thousandth of a pixel there.
+const FAR_VIEW: f64 = 8.0;
+
+/// What to take off every coordinate of a scene whose shapes are best counted from `of_shapes`, and whose camera, at
+/// `eye`, looks at `target`: the same, unless `target` is far from there, beside how far the camera sees. A floor of
+/// 100 km, or something at the origin of a map, takes no digits from what the camera is near to then; what is far from
+/// the camera is known to as small a part of a pixel.
+pub(crate) fn origin_of_view(of_shapes: DVec3, eye: DVec3, target: DVec3) -> DVec3 {
+    let distance = (target - eye).length();
+    let is_far = (target - of_shapes).abs().max_element() > distance * FAR_VIEW;
+    if is_far && target.is_finite() && distance > 0.0 { rounded(target, distance) } else { of_shapes }
+}
+
+/// A place in whole steps of the power of two below a size, not finer than f64 has digits.
+fn rounded(place: DVec3, size: f64) -> DVec3 {
+    let step = size.max(place.abs().max_element() * f64::EPSILON * 16.0).max(f64::MIN_POSITIVE);
     let step = f64::from_bits(step.to_bits() & (0x7ff << 52));
-    (center / step).round() * step
+    (place / step).round() * step
 }
 
 #[cfg(test)]
@@ -42,6 +60,20 @@ mod tests {
         assert_eq!(of(DVec3::splat(f64::INFINITY), 1.0), DVec3::ZERO);
         // A planet under a camera, a floor that is large
         assert_eq!(of(DVec3::new(0.0, -6.4e6, 0.0), 12.8e6), DVec3::ZERO);
+    }
+
+    #[test]
+    fn what_a_camera_is_near_to_keeps_its_digits() {
+        let (town, here) = (DVec3::new(450_000.0, 120.0, -5_400_000.0), DVec3::new(0.0, 3.0, 12.0));
+        // Shapes of all sizes and places around leave the origin at 0; the view moves it
+        let origin = origin_of_view(DVec3::ZERO, town + here, town);
+        assert!((origin - town).abs().max_element() <= 8.0, "{origin}");
+        assert_eq!(origin_of_view(DVec3::ZERO, here, DVec3::ZERO), DVec3::ZERO);
+        assert_eq!(origin_of_view(DVec3::ZERO, here + 60.0, DVec3::splat(60.0)), DVec3::ZERO);
+        // Shapes that are near to it, and what cannot be told
+        assert_eq!(origin_of_view(town - 9.0, town + here, town), town - 9.0);
+        assert_eq!(origin_of_view(here, town, town), here);
+        assert_eq!(origin_of_view(here, town, DVec3::splat(f64::NAN)), here);
     }
 
     #[test]

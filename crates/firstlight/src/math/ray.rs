@@ -12,14 +12,6 @@ pub struct WorldRay {
     pub d: Vec3,
 }
 
-impl WorldRay {
-    /// The same ray in a scene whose coordinates count from `origin`.
-    #[inline(always)]
-    pub(crate) fn within(&self, origin: DVec3) -> Ray {
-        Ray { o: (self.o - origin).as_vec3(), d: self.d }
-    }
-}
-
 /// A camera ray: the points `o + t d`, 0 < t.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Ray {

@@ -174,13 +174,13 @@ impl<'a> Center<'a> {
         let (d, t) = (self.ray.d.as_dvec3(), self.hit.t);
         let float = |number: f64| CenterValue::Floats([number as f32, 0.0, 0.0]);
         let vector = |v: Vec3| CenterValue::Floats(v.to_array());
-        let Frame { right, up, forward, origin, position, .. } = camera.frame();
+        let Frame { right, up, forward, origin, position, near, .. } = camera.frame();
         let from_camera =
             |v: DVec3| CenterValue::Floats([*right, *up, -*forward].map(|axis| axis.as_dvec3().dot(v) as f32));
         let (ng, ns) = (|| self.normals()[0], || self.normals()[1]);
         match plane {
-            Plane::Depth => float(forward.as_dvec3().dot(d) * t),
-            Plane::Distance => float(d.length() * t),
+            Plane::Depth => float(near + forward.as_dvec3().dot(d) * t),
+            Plane::Distance => float(near / forward.as_dvec3().dot(d) + d.length() * t),
             Plane::Position => vector((self.p() + *origin).as_vec3()),
             Plane::PositionCamera => from_camera(self.p() + *origin - *position),
             Plane::Normal => vector(ns()),

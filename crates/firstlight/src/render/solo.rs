@@ -32,7 +32,8 @@ pub(crate) struct Pyramid {
     /// Outward unit normals.
     sides: [DVec3; 4],
     forward: Vec3,
-    eye: Vec3,
+    /// Where its middle begins.
+    start: Vec3,
     /// The cone around it: where it begins and how wide it is there, which way it leads, and the sine and cosine of
     /// half its angle.
     middle: Ray,
@@ -64,7 +65,7 @@ impl Pyramid {
         let width = corners.iter().fold(0.0f64, |width, ray| width.max(f64::from((ray.o - middle.o).length())));
         let (sin, width) = (sin * (1.0 + SLACK) + SLACK * SLACK, width * (1.0 + SLACK));
         let cos = (1.0 - sin * sin).max(0.0).sqrt();
-        Pyramid { corners, sides, forward: frame.forward, eye: frame.eye, middle, width, sin, cos }
+        Pyramid { corners, sides, forward: frame.forward, start: middle.o, middle, width, sin, cos }
     }
 
     /// Whether the cone around it misses a ball.
@@ -79,7 +80,7 @@ impl Pyramid {
 
     /// How far in front of the camera, along its line of sight.
     fn depth(&self, q: DVec3) -> f64 {
-        self.forward.as_dvec3().dot(q - self.eye.as_dvec3())
+        self.forward.as_dvec3().dot(q - self.start.as_dvec3())
     }
 
     fn misses_sphere(&self, sphere: &Sphere) -> bool {
@@ -120,7 +121,7 @@ impl Pyramid {
 
     /// What it lies between.
     fn planes(&self) -> Planes {
-        let eye = HalfSpace { n: -self.forward.as_dvec3(), p: self.eye.as_dvec3() };
+        let eye = HalfSpace { n: -self.forward.as_dvec3(), p: self.start.as_dvec3() };
         let side = |i: usize| HalfSpace { n: self.sides[i], p: self.corners[i].o.as_dvec3() };
         Planes([side(0), side(1), side(2), side(3), eye])
     }
@@ -197,7 +198,7 @@ impl Pyramid {
                 let (forward, planes) = (self.forward.as_dvec3(), self.planes());
                 let boxes = scene.geometry.tree_bounds().filter(|bounds| planes.may_meet(*bounds));
                 boxes.fold(f64::INFINITY, |nearest, bounds| {
-                    let [min, max] = [bounds.min, bounds.max].map(|q| q.as_dvec3() - self.eye.as_dvec3());
+                    let [min, max] = [bounds.min, bounds.max].map(|q| q.as_dvec3() - self.start.as_dvec3());
                     nearest.min(forward.max(DVec3::ZERO).dot(min) + forward.min(DVec3::ZERO).dot(max))
                 })
             }

@@ -40,11 +40,11 @@ impl Scene {
     }
 
     fn cast_one(&self, ray: &WorldRay) -> Option<CastHit> {
-        let local = ray.within(self.origin);
+        let (local, way) = self.enter(ray);
         let hit = self.intersect_local(&local)?;
-        let (t, surface, barycentric) = (hit.t, hit.surface, hit.barycentric());
+        let (t, surface, barycentric) = (hit.t + way, hit.surface, hit.barycentric());
         if let At::Light = hit.at {
-            let there = local.o.as_dvec3() + local.d.as_dvec3() * t;
+            let there = local.o.as_dvec3() + local.d.as_dvec3() * hit.t;
             let area = self.lights[surface.index() - self.geometry.surfaces.len()].area();
             let front = area.map_or(Vec3::ZERO, |area| area.shape.normal_at(there));
             let ng = if front.dot(local.d) > 0.0 { -front } else { front };

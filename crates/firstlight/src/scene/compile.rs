@@ -7,6 +7,7 @@ use std::sync::Arc;
 use fearless_simd::Level;
 
 use super::advice::{advise, advise_reflectance};
+use super::far::{Extent, approach};
 use super::geometry::Geometry;
 use super::model::{Added, Framing};
 use super::occluders::ListedOccluders;
@@ -126,6 +127,8 @@ impl SceneDesc {
             return None;
         };
         let occluders = ListedOccluders::new(&geometry, &lights);
+        let extent = Extent::new(&geometry, &lights);
+        let camera = approach(camera, [picture.width, picture.height], &geometry, extent.as_ref());
         let summary = SceneSummary {
             bounds: bounds.map(|bounds| bounds.map(|corner| corner.to_array())),
             ..self.summary(desc, &geometry, &lights, &textures)
@@ -148,6 +151,7 @@ impl SceneDesc {
             light_spaces: desc.light_spaces(time, origin),
             materials,
             occluders,
+            extent,
             level: Level::new(),
             buffers,
             choices: Choices {
@@ -318,11 +322,14 @@ impl SceneDesc {
         lights
     }
 
-    /// The box around the chosen camera and what it looks at, as they are said.
-    pub(super) fn camera_bounds(&self) -> Option<[DVec3; 2]> {
+    /// Where the chosen camera is and what it looks at, as it is at 0 s: so all frames count from one origin.
+    pub(super) fn line_of_sight(&self) -> Option<[DVec3; 2]> {
         let (_, camera) = &self.cameras[self.chosen_camera()?];
-        let (eye, target) = (DVec3::from(camera.position), DVec3::from(camera.look_at));
-        camera.transform.is_none().then_some([eye.min(target), eye.max(target)])
+        let ends = [camera.position, camera.look_at].map(DVec3::from);
+        let Some(transform) = &camera.transform else { return Some(ends) };
+        // Its faults are told where the camera is compiled
+        let [x, y, z] = *transform.rows(0.0).ok()?.as_chunks::<4>().0 else { return None };
+        Some(ends.map(|q| DVec3::from([x, y, z].map(|[a, b, c, d]| DVec3::new(a, b, c).dot(q) + d))))
     }
 
     fn summary(
@@ -395,7 +402,7 @@ impl Scene {
             return Err(SceneError { faults: cx.take_faults() });
         }
         let mut scene = self.clone();
-        scene.camera = compiled;
+        scene.camera = approach(compiled, [self.width, self.height], &self.geometry, self.extent.as_ref());
         scene.time = self.time.or(cx.keyed.then_some(self.moment));
         scene.summary.camera = String::new();
         scene.motion = self.motion.as_ref().map(|motion| motion.with_camera(camera)).transpose()?;

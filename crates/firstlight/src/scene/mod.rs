@@ -7,6 +7,7 @@ mod cast;
 mod compile;
 mod course;
 mod description;
+mod far;
 mod geometry;
 mod light_spheres;
 mod links;
@@ -52,6 +53,7 @@ use crate::shape::ShadowTerminator;
 use crate::texture::Texture;
 pub(crate) use geometry::{At, Geometry, Nearest, ObjectSpace, Placed, PlacedTarget, UpperItem};
 pub(crate) use links::LinkId;
+use far::Extent;
 use motion::Motion;
 pub(crate) use occluders::{Listed, ListedOccluders, Opacity};
 use seen_lights::SeenLights;
@@ -88,6 +90,8 @@ pub struct Scene {
     pub(crate) textures: Vec<Texture>,
     /// What is listed and stands in the way of light.
     pub(crate) occluders: ListedOccluders,
+    /// Around all that rays can meet but for planes.
+    pub(crate) extent: Option<Extent>,
     /// The best instruction set of this processor: for rays that are asked for one at a time.
     pub(crate) level: Level,
     pub(crate) hash: String,

@@ -17,7 +17,7 @@ use crate::context::{Assets, CompileContext};
 use crate::describe::Family;
 use crate::describe::node::quoted;
 use crate::ids::{MaterialId, SurfaceId};
-use crate::math::{DVec3, origin_for};
+use crate::math::{DVec3, origin_for, origin_of_view};
 use crate::shape::{
     Common, CompileCache, Mesh, MeshBuilder, MeshFiles, MeshSource, Parallelogram, Placement, PointSet, ShapeDesc,
     Solid, Sphere,
@@ -263,7 +263,8 @@ pub(super) fn compile_shapes(
     // Say where coordinates count from: those of each group's mesh, and those of the scene
     let known = vec![None; groups.len()];
     let bounds = Extents { groups: &groups, solids: &solids, point_sets: &point_sets, known }.of(&root);
-    cx.origin = bounds.or_else(|| desc.camera_bounds()).map_or(DVec3::ZERO, origin_for);
+    let of_shapes = bounds.map_or(DVec3::ZERO, origin_for);
+    cx.origin = desc.line_of_sight().map_or(of_shapes, |[eye, target]| origin_of_view(of_shapes, eye, target));
     for group in &mut groups {
         group.join(cx, cache, group.builder.bounds().map_or(DVec3::ZERO, origin_for));
     }

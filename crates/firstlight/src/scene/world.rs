@@ -64,7 +64,8 @@ impl Scene {
 
     /// The first surface on a ray that a camera can see; of several at the same distance, the one with the lowest id.
     pub fn intersect(&self, ray: &WorldRay) -> Option<Hit> {
-        self.intersect_local(&ray.within(self.origin))
+        let (local, way) = self.enter(ray);
+        self.intersect_local(&local).map(|hit| Hit { t: hit.t + way, ..hit })
     }
 
     /// The surface at a hit, turned to the viewer. `differential` is that of the camera ray.
@@ -72,7 +73,8 @@ impl Scene {
     /// # Panics
     /// If the hit is a light's: a light has no material.
     pub fn surface(&self, ray: &WorldRay, hit: &Hit, differential: &RayDifferential) -> SurfacePoint {
-        self.in_world(self.local_surface(&ray.within(self.origin), hit, differential))
+        let (ray, way) = self.enter(ray);
+        self.in_world(self.local_surface(&ray, &Hit { t: hit.t - way, ..*hit }, differential))
     }
 
     /// The triangle of a mesh or the point of a point set that was hit, in the order of its file; `None` on all else.
@@ -86,12 +88,13 @@ impl Scene {
     /// # Panics
     /// If the hit is a light's.
     pub fn tangents(&self, ray: &WorldRay, hit: &Hit) -> [Vec3; 2] {
-        self.geometry.tangents(&ray.within(self.origin), hit).map(|d| d.as_vec3())
+        let (ray, way) = self.enter(ray);
+        self.geometry.tangents(&ray, &Hit { t: hit.t - way, ..*hit }).map(|d| d.as_vec3())
     }
 
     /// What a camera ray ends at.
     pub fn look(&self, ray: &WorldRay, differential: &RayDifferential) -> CameraHit {
-        let ray = ray.within(self.origin);
+        let (ray, _) = self.enter(ray);
         match self.see(&ray, self.intersect_local(&ray), differential) {
             TracedHit::Surface(si) => CameraHit::Surface(self.in_world(si)),
             TracedHit::Emission(color) => CameraHit::Emission(color),

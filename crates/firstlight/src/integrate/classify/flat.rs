@@ -6,7 +6,7 @@ use super::{LanesSight, SLACK, Told};
 use crate::integrate::batch::{Exact, ShadingPoint};
 use crate::integrate::row::edges;
 use crate::math::{DVec3, Facet, LANES, Vec3, Vec3x16};
-use crate::shape::{Parallelogram, PlaneSide};
+use crate::shape::{Parallelogram, PlaneSide, is_in_plane};
 
 #[inline(always)]
 pub(super) fn flat_between<S: Simd>(
@@ -133,6 +133,11 @@ impl FacetShape {
         self.corners.iter().map(|q| n.dot(*q)).fold(f64::NEG_INFINITY, f64::max)
     }
 
+    /// Whether a point is in its plane, as far as rounding allows to tell.
+    fn is_under(&self, point: &ShadingPoint) -> bool {
+        is_in_plane(self.corners, point.p.as_dvec3(), point.error.0.as_dvec3())
+    }
+
     /// How far it is from a point.
     pub fn distance(&self, p: DVec3) -> f32 {
         triangle_distance(&self.corners.map(|q| (q - p).as_vec3()))
@@ -213,7 +218,7 @@ pub(super) fn facet_between<S: Simd>(
         if near & bit == 0 {
             continue;
         }
-        if point.facet == shape.facet {
+        if point.facet == shape.facet || shape.is_under(point) {
             near &= !bit;
         } else if point.reach > 0.0 {
             distances[k] = (shape.distance(point.p.as_dvec3()) - point.reach).max(0.0);

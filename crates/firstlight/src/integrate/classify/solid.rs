@@ -162,12 +162,22 @@ impl PlacedSolid {
             let near = if let Canonical::Torus { tube } = self.kind { 0.125 * f64::from(tube) } else { 0.0 };
             if !self.kind.holds(at, room.max(near)) {
                 Lies::Between
+            } else if self.is_left(at, n, room) {
+                Lies::Aside
             } else if self.surrounds(point, room + largest(size(DVec3::splat(f64::from(point.turn * point.reach))))) {
                 Lies::Inside
             } else {
                 Lies::NearlyInside
             }
         }
+    }
+
+    /// Whether a point that is on its surface or inside, at `at` in its own space, leaves it along the normal `n` of the
+    /// point's horizon: then it is on one face with the solid's, however that normal is rounded.
+    fn is_left(&self, at: DVec3, n: DVec3, room: f64) -> bool {
+        let way = self.canonical_from_world.transform_vector3(n);
+        let step = way * (8.0 * room / way.abs().max_element());
+        !self.kind.has_hole() && !self.kind.holds(at, -room) && !self.kind.holds(at + step, room)
     }
 
     /// Whether all that lies around a point on its surface is inside, but for so much.
