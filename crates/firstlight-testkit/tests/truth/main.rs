@@ -7,6 +7,7 @@ mod buffers;
 mod cameras;
 mod cases;
 mod checker;
+mod coplanar;
 mod coverage;
 mod determinism;
 mod deviations;
