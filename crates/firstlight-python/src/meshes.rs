@@ -60,7 +60,7 @@ impl NewMesh {
     /// Adds it; the answer is its number, or the name that is taken.
     pub fn add(self, state: &mut State) -> Result<usize, String> {
         let name = self.placed.as_ref().map_or(&self.own.name, |placed| &placed.name).clone();
-        if let Some(name) = name.filter(|name| state.is_taken("shape", name, None)) {
+        if let Some(name) = name.filter(|name| state.numbers.named("shape", name).is_some()) {
             return Err(name);
         }
         let file = Some(state.cache.give_mesh(self.data).into());

@@ -232,18 +232,12 @@ impl PyScene {
         }
         let families = || FAMILIES.into_iter().filter(|own| family.is_none_or(|family| family == *own));
         let found = self.with(py, |state| {
-            let desc = &state.parsed.desc;
-            let first = families().find_map(|family| {
-                names(desc, family).find(|(_, other)| other == name).map(|(index, _)| (family, index))
-            });
-            match first {
-                Some((family, index)) => Ok((family.to_owned(), state.numbers.at(family, index))),
-                None => {
-                    let all: Vec<Cow<'_, str>> =
-                        families().flat_map(|family| names(desc, family)).map(|n| n.1).collect();
-                    Err(did_you_mean(name, &all.iter().map(AsRef::as_ref).collect::<Vec<_>>()))
-                }
-            }
+            let named = |family: &'static str| Some((family.to_owned(), state.numbers.named(family, name)?));
+            families().find_map(named).ok_or_else(|| {
+                let desc = &state.parsed.desc;
+                let all: Vec<Cow<'_, str>> = families().flat_map(|family| names(desc, family)).map(|n| n.1).collect();
+                did_you_mean(name, &all.iter().map(AsRef::as_ref).collect::<Vec<_>>())
+            })
         });
         found.map_err(|hint| PyKeyError::new_err(format!("nothing in the scene is called {name:?}{hint}")))
     }
@@ -280,7 +274,7 @@ impl PyScene {
 
     /// Whether a thing of a family has that name.
     fn _is_taken(&self, py: Python<'_>, family: &str, name: &str) -> bool {
-        self.with(py, |state| state.is_taken(family, name, None))
+        self.with(py, |state| state.numbers.named(family, name).is_some())
     }
 
     /// How many things each family has.

@@ -9,7 +9,7 @@ use firstlight::{
 };
 
 use crate::files::{IN_MEMORY, SceneFiles};
-use crate::item::{Item, names, push, remove, set};
+use crate::item::{Item, get, push, remove, set};
 use crate::numbers::Numbers;
 use crate::pool::in_pool;
 
@@ -121,31 +121,31 @@ impl State {
         self.compiled = None;
     }
 
-    /// Whether another thing of the family than that of `number` is called so.
-    pub fn is_taken(&mut self, family: &str, name: &str, number: Option<usize>) -> bool {
-        let own = number.and_then(|number| self.numbers.index(family, number));
-        names(&self.parsed.desc, family).any(|(i, other)| Some(i) != own && other == name)
-    }
-
     /// Adds a thing, and answers with its number; `None` where its name is taken.
     pub fn add(&mut self, item: Item) -> Option<usize> {
-        let family = item.words().0;
-        if item.name().is_some_and(|name| self.is_taken(family, &name, None)) {
+        let (family, name) = (item.words().0, item.name());
+        if name.as_ref().is_some_and(|name| self.numbers.named(family, name).is_some()) {
             return None;
         }
         push(&mut self.parsed.desc, item);
         self.change();
-        Some(self.numbers.push(family))
+        Some(self.numbers.push(family, name))
     }
 
     /// Puts a thing in the place of another; says whether that is there, and the name not taken.
     pub fn replace(&mut self, number: usize, item: Item) -> Result<(), Refused> {
-        let family = item.words().0;
+        let (family, name) = (item.words().0, item.name());
         let index = self.numbers.index(family, number).ok_or(Refused::Removed)?;
-        if item.name().is_some_and(|name| self.is_taken(family, &name, Some(number))) {
-            return Err(Refused::Taken);
+        let before = get(&self.parsed.desc, family, index).and_then(|item| item.name());
+        if name == before {
+            set(&mut self.parsed, index, item);
+        } else {
+            if name.as_ref().is_some_and(|name| self.numbers.named(family, name).is_some()) {
+                return Err(Refused::Taken);
+            }
+            set(&mut self.parsed, index, item);
+            self.numbers.rename(family, number, before.as_deref(), name, &self.parsed.desc);
         }
-        set(&mut self.parsed, index, item);
         self.change();
         Ok(())
     }
@@ -153,8 +153,9 @@ impl State {
     /// Removes a thing, with the mesh that it alone showed; says whether it was there.
     pub fn remove(&mut self, family: &str, number: usize) -> bool {
         let Some(index) = self.numbers.index(family, number) else { return false };
+        let name = get(&self.parsed.desc, family, index).and_then(|item| item.name());
         remove(&mut self.parsed.desc, family, index);
-        self.numbers.remove(family, index);
+        self.numbers.remove(family, index, name.as_deref(), &self.parsed.desc);
         self.removed();
         true
     }

@@ -210,6 +210,28 @@ def test_things_are_removed():
     assert (scene.render(**SMALL)["color"] == before["color"]).all()
 
 
+def test_shapes_of_a_text_may_be_called_alike():
+    text = "[camera]\nposition = [0, 0, 9]\n"
+    text += "".join(f'[[sphere]]\nname = "twin"\ncenter = [{x}, 0, 0]\nradius = 1\n' for x in (0, 1, 2))
+    scene = fl.Scene.from_text(text)
+    first = scene["twin"]
+    first["radius"] = 0.5
+    first["name"] = "first"
+    assert (scene["first"]["radius"], scene["twin"]["center"]) == (0.5, [1, 0, 0])
+    # What leads to one that was removed leads to the next
+    del scene["twin"]
+    second = scene["twin"]
+    assert second["center"] == [2, 0, 0]
+    second["radius"] = 2
+    del scene["twin"]
+    assert list(scene) == ["first"] and "twin" not in scene
+    scene.add_sphere(center=[0, 0, 0], radius=1, name="twin")
+    with pytest.raises(fl.SceneError, match="taken"):
+        first["name"] = "twin"
+    first.update(name=None)
+    scene.add_sphere(center=[0, 0, 0], radius=1, name="first")
+
+
 def test_places_of_a_text_end_with_a_removal():
     text = "[camera]\nposition = [0, 0, 5]\n"
     text += "".join(f'[[sphere]]\nname = "{name}"\ncenter = [0, 0, 0]\nradius = 1\n' for name in "abc")
