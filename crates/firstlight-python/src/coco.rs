@@ -69,8 +69,8 @@ impl PyCoco {
 
     /// Writes the data set as a file of JSON, whole or not at all.
     fn save(&self, py: Python<'_>, path: PathBuf) -> PyResult<()> {
-        let written = pool::at_work(py, || write_whole(&path, self.coco().to_json().as_bytes()));
-        written.map(drop).map_err(|e| image_error(&e))
+        let text = self.to_json(py);
+        py.detach(|| write_whole(&path, text.as_bytes())).map(drop).map_err(|e| image_error(&e))
     }
 
     /// How many pictures, annotations and categories it has.

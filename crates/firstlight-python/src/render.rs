@@ -446,7 +446,8 @@ impl PyRender {
         let depth_scale = depth_scale.unwrap_or(default.depth_scale);
         let settings = FileSettings { depth_scale, half, ..default };
         let bytes = self.encode(py, format, buffer, settings)?;
-        pool::at_work(py, || write_whole(&path, &bytes)).map(drop).map_err(|e| image_error(&e))
+        // Not at work: it takes no locks, and may wait for a reader that is yet to be forked
+        py.detach(|| write_whole(&path, &bytes)).map(drop).map_err(|e| image_error(&e))
     }
 
     /// For notebooks.

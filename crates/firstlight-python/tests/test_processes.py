@@ -294,6 +294,20 @@ for k, frame in found.items():
     expected = scene.render(camera={"position": [k, 3, 8]}, buffers=["color", "object-id"], **SIZE)
     assert all((frame[name] == expected[name]).all() for name in expected)
 """,
+    "a child that reads what a thread saves": """
+frame = room().render(width=400, height=300, aa=1)
+frame.save("whole.exr")
+os.mkfifo("pipe.exr")
+writer = threading.Thread(target=lambda: frame.save("pipe.exr"))
+writer.start()
+time.sleep(0.5)
+def read():
+    with open("pipe.exr", "rb") as pipe, open("whole.exr", "rb") as whole:
+        assert pipe.read() == whole.read()
+wait(child(read))
+writer.join(60)
+assert not writer.is_alive()
+""",
     "a child with a terminal": """
 scene = room()
 expected = everything(scene)
@@ -346,5 +360,6 @@ def test_this_way_works(way, tmp_path):
     body = "".join(f"    {line}\n" for line in way.strip().splitlines())
     # What several processes run has to be found by its name
     program.write_text(f'{PRELUDE}\n\nif __name__ == "__main__":\n{body}    print("the end")\n')
-    ran = subprocess.run([sys.executable, program], capture_output=True, text=True, timeout=SECONDS)
+    how = {"cwd": tmp_path, "capture_output": True, "text": True, "timeout": SECONDS}
+    ran = subprocess.run([sys.executable, program], **how)
     assert (ran.returncode, ran.stdout.strip().endswith("the end")) == (0, True), ran.stdout + ran.stderr

@@ -377,6 +377,15 @@ def test_help_and_words_have_the_real_fields():
     scene = room()
     assert repr(scene["ball"]) == "<firstlight.Handle sphere 'ball': center=[0, 1, 0], radius=1, material='red'>"
     assert repr(scene) == "<firstlight.Scene 1024 x 1024: 2 shapes, 1 light, 1 camera, 1 material>"
+    # What is not said has its default
+    assert (scene["ball"]["visible"], scene["ball"]["transform"], scene["lamp"]["falloff"]) == (True, None, "physical")
+    assert (scene.settings["antialiasing"], scene["red"]["shininess"], scene["floor"]["of"]) == (4, 16, "mesh-0")
+    for thing, field, near in ((scene["ball"], "raduis", "radius"), (scene.settings, "widht", "width")):
+        with pytest.raises(KeyError, match=f"did you mean '{near}'"):
+            thing[field]
+    scene.add_camera(name="side", position=[5, 0, 0])
+    assert scene["side"]["fov_y_deg"] is None and scene["side"]["position"] == [5, 0, 0]
+    scene.remove("side")
     camera = fl.Camera(position=[0, 0, 1], width=3, height=4)
     assert repr(camera) == "Camera(position=[0, 0, 1], width=3, height=4)"
     for known, wrong in (("floor", "flor"), ("lamp", "lapm")):

@@ -1,22 +1,32 @@
 """The methods of a scene that add things: their signatures and docstrings, from the tables of the scene format."""
 
 import json
+from functools import cache
 from inspect import Parameter, Signature
 
-from ._firstlight import _schema
+from ._firstlight import _nearest, _schema
 
 # The families whose things are called by a key, which is the first argument
 _NAMED = ("material", "texture")
 
 
+@cache
 def tables():
     """The table of each kind of thing, as JSON Schema, by family and kind."""
-    schema = json.loads(_schema())
     found = {}
-    for name, table in schema["$defs"].items():
+    for name, table in json.loads(_schema())["$defs"].items():
         family, _, kind = name.rpartition(".")
-        found[family or "shape", kind] = table
+        found[family or (kind if kind in ("render", "camera") else "shape"), kind] = table
     return found
+
+
+def default(family, kind, field):
+    """What a field is that a thing does not say; None where it has none."""
+    known = tables()[family, kind]["properties"]
+    if field in known:
+        return known[field].get("default")
+    near = _nearest(str(field), list(known))
+    raise KeyError(f"{kind} has no field {field!r}" + (f"; did you mean {near!r}?" if near else ""))
 
 
 def method(name, family, kind, table, handle):

@@ -35,8 +35,8 @@ class Hits:
 class Handle:
     """A thing of a scene: a shape, a light, a camera, a material or a texture.
 
-    `handle["field"]` reads a field as the scene's text says it, `handle["field"] = value` and `handle.update(...)`
-    change it. `handle.transform` is the matrix that places it.
+    `handle["field"]` reads a field as the scene's text says it, or its default; `handle["field"] = value` and
+    `handle.update(...)` change it. `handle.transform` is the matrix that places it.
     """
 
     __slots__ = ("_family", "_number", "_scene")
@@ -62,7 +62,8 @@ class Handle:
         return json.loads(self._scene._item(self._family, self._number)[3])
 
     def __getitem__(self, field):
-        return self.fields[field]
+        fields = self.fields
+        return fields[field] if field in fields else _fields.default(self._family, self.kind, field)
 
     def __setitem__(self, field, value):
         self.update(**{field: value})
