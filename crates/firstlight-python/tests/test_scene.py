@@ -304,6 +304,9 @@ def test_colours_are_bytes_or_floats():
             room(colors=half.astype(kind))
     with pytest.raises(ValueError, match=r"shape \(4, 3\) and int64"):
         room(colors=[[1, 0, 0]] * 4)
+    with pytest.warns(fl.SceneWarning, match="colors: up to 188, where 1 reflects all light") as caught:
+        room(colors=half.astype(float))
+    assert len(caught) == 1 and caught[0].filename == __file__
 
 
 def test_normals_are_of_any_length():
@@ -373,6 +376,9 @@ def test_help_and_words_have_the_real_fields():
     text = pydoc.render_doc(fl.Scene, renderer=pydoc.plaintext)
     for words in ("radius : float", "add_spot_light(self, *, position", "cone_deg : float, default 60", "Parameters"):
         assert words in text, words
+    for words in ("casts_shadow : bool, default True", "smooth_deg : float, optional"):
+        assert words in fl.Scene.add_mesh.__doc__, words
+    assert "positions" not in fl.Scene.add_mesh.__doc__ and "fov_y_deg : float" in fl.Scene.add_camera.__doc__
     assert 'uv : {"equirectangular", "angles"}' in fl.Scene.add_sphere.__doc__
     scene = room()
     assert repr(scene["ball"]) == "<firstlight.Handle sphere 'ball': center=[0, 1, 0], radius=1, material='red'>"

@@ -1,8 +1,7 @@
 """The methods of a scene that add things: their signatures and docstrings, from the tables of the scene format."""
 
 import json
-from functools import cache
-from inspect import Parameter, Signature
+from inspect import Parameter, Signature, cleandoc
 
 from ._firstlight import _nearest, _schema
 
@@ -10,8 +9,7 @@ from ._firstlight import _nearest, _schema
 _NAMED = ("material", "texture")
 
 
-@cache
-def tables():
+def _tables():
     """The table of each kind of thing, as JSON Schema, by family and kind."""
     found = {}
     for name, table in json.loads(_schema())["$defs"].items():
@@ -20,9 +18,12 @@ def tables():
     return found
 
 
+TABLES = _tables()
+
+
 def default(family, kind, field):
     """What a field is that a thing does not say; None where it has none."""
-    known = tables()[family, kind]["properties"]
+    known = TABLES[family, kind]["properties"]
     if field in known:
         return known[field].get("default")
     near = _nearest(str(field), list(known))
@@ -68,10 +69,22 @@ def _doc(family, kind, table):
     lines = [f"Adds a {family}, `{text}` of a scene's text. {table['description']}", "", "Parameters", "----------"]
     if family in _NAMED:
         lines += ["name : str", f"    What the scene calls it; no other {family} may be called so."]
-    for key, field, needed in sorted(_fields(table), key=lambda field: not field[2]):
+    return "\n".join([*lines, *_lines(_fields(table)), "", "Returns", "-------", "Handle", ""])
+
+
+def add_to_doc(method, *places):
+    """Lists fields in the docstring of a method: those of some tables, each without those that are left out."""
+    fields = [one for table, left_out in places for one in _fields(table) if one[0] not in left_out]
+    method.__doc__ = "\n".join([cleandoc(method.__doc__), "", "Fields", "------", *_lines(fields), ""])
+
+
+def _lines(fields):
+    """What a docstring says of fields, those first that are needed."""
+    lines = []
+    for key, field, needed in sorted(fields, key=lambda one: not one[2]):
         default = "" if needed else f", default {field['default']!r}" if "default" in field else ", optional"
         lines += [f"{key} : {_type(field)}{default}", f"    {field['description']}"]
-    return "\n".join([*lines, "", "Returns", "-------", "Handle", ""])
+    return lines
 
 
 def _type(field):

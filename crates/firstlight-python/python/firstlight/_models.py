@@ -72,7 +72,7 @@ class Model:
             remove_all(scene, added)
             raise
         if self.lost:
-            _warn(f"{called}: not taken: {', '.join(self.lost)}")
+            warn(f"{called}: not taken: {', '.join(self.lost)}")
         return added
 
     def _material(self, scene, base):
@@ -93,7 +93,7 @@ def remove_all(scene, things):
         scene.remove(thing)
 
 
-def _warn(text):
+def warn(text):
     """A warning of the code that called the package, however many calls that is away."""
     level, frame = 1, sys._getframe()
     while frame is not None and frame.f_globals.get("__name__", "").startswith("firstlight."):
@@ -345,7 +345,7 @@ def add_graph(scene, graph, fields):
             model = of(thing)
             if model is None or len(model.faces) == 0:
                 what = "it has no faces" if model is not None else f"it is a {type(thing).__name__}, and no mesh"
-                _warn(f"{name!r} is not taken: {what}")
+                warn(f"{name!r} is not taken: {what}")
                 continue
             matrix = matrix if outer is None else outer @ matrix
             added = model.add(scene, name, {**fields, "transform": matrix})
@@ -357,11 +357,11 @@ def add_graph(scene, graph, fields):
     rest = [word for word, is_there in _beside(graph) if is_there]
     if rest:
         called = f"the scene {base!r}" if base else "a scene of trimesh"
-        _warn(f"{called}: not taken: {', '.join(rest)}; add_camera and the methods for lights add them")
+        warn(f"{called}: not taken: {', '.join(rest)}; add_camera and the methods for lights add them")
     return handles
 
 
 def _beside(graph):
-    """What a scene of trimesh has beside its meshes, without making it: trimesh makes cameras when they are asked for."""
+    """What a scene of trimesh has beside its meshes, without making it: trimesh makes what it is asked for."""
     yield "its camera", getattr(graph, "has_camera", False)
     yield "its lights", bool(getattr(graph, "_lights", None))

@@ -158,9 +158,16 @@ class Scene(SceneBase):
         static : bool
             Whether it is joined with other static meshes in one tree, which is built again when one of them moves.
         **fields
-            `transform` (a matrix of 4 x 4, or a table), `material`, `name`, `smooth_deg`, `visible`, `casts_shadow`,
-            and all else that a shape takes.
+            `transform` (a matrix of 4 x 4, or a table), `material`, `name`, and all else of the list below.
+
+        Returns
+        -------
+        Handle
         """
+        if colors is not None:
+            colors = np.asarray(colors)
+            if colors.dtype.kind == "f" and colors.ndim == 2 and colors.size and (most := colors[:, :3].max()) > 1:
+                _models.warn(f"colors: up to {most:g}, where 1 reflects all light; are they 0 to 255? then give uint8")
         own = {key: fields.pop(key) for key in _OF_TRIANGLES if key in fields}
         place = self._add_mesh(
             vertices, faces, normals=normals, uv=uv, colors=colors, own=own, fields=fields, static=static
@@ -168,7 +175,21 @@ class Scene(SceneBase):
         return Handle(self, *place)
 
     def add_camera(self, camera=None, *, name="", **fields):
-        """Adds a camera: a `Camera`, or the fields of one. The first of a scene is the one that is used."""
+        """Adds a camera: a `Camera`, or the fields of one. The first of a scene is the one that is used.
+
+        Parameters
+        ----------
+        camera : Camera, optional
+            One that is there; its size becomes that of the scene's picture.
+        name : str
+            What the scene calls it.
+        **fields
+            Those of the list below.
+
+        Returns
+        -------
+        Handle
+        """
         if camera is not None:
             width, height = camera.width, camera.height
             fields = {**camera.to_dict(), **fields}
@@ -348,12 +369,15 @@ def _add_methods():
     """One method for each kind of thing that a scene may hold; what it takes are the fields of that kind's table."""
     families = [("shape", SHAPES, ""), ("light", LIGHTS, "_light")]
     families += [("material", MATERIALS, "_material"), ("texture", TEXTURES, "_texture")]
-    tables = _fields.tables()
+    tables = _fields.TABLES
     for family, kinds, ending in families:
         for kind in kinds:
             name = f"add_{kind.replace('-', '_')}{ending}"
             if name != "add_mesh":
                 setattr(Scene, name, _fields.method(name, family, kind, tables[family, kind], Handle))
+    own = set(tables["shape", "mesh"]["properties"]) - set(_OF_TRIANGLES)
+    _fields.add_to_doc(Scene.add_mesh, (tables["shape", "instance"], {"of"}), (tables["shape", "mesh"], own))
+    _fields.add_to_doc(Scene.add_camera, (tables["camera", "camera"], ()))
 
 
 _add_methods()
