@@ -113,7 +113,6 @@ pub fn mesh(
     uv: Option<&Bound<'_, PyAny>>,
     colors: Option<&Bound<'_, PyAny>>,
 ) -> PyResult<MeshData> {
-    let py = vertices.py();
     let mut mesh = MeshData::default();
     with_floats(vertices, "vertices", &[3], |[rows, _], at| {
         mesh.set_positions(rows, |i| [at(i, 0), at(i, 1), at(i, 2)]);
@@ -131,6 +130,7 @@ pub fn mesh(
     }
     if let Some(colors) = colors {
         let colors = &as_array(colors)?;
+        let py = colors.py();
         // Bytes are sRGB, as in files; what other whole numbers stand for cannot be known
         let is_bytes = colors.cast::<PyUntypedArray>().is_ok_and(|array| array.dtype().is_equiv_to(&dtype::<u8>(py)));
         if !is_bytes && kind_of(colors)? != "f" {
