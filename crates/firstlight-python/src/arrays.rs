@@ -2,7 +2,10 @@
 
 use firstlight::{Encoding, MeshData};
 use numpy::ndarray::ArrayView2;
-use numpy::{Element, PyArray2, PyArrayMethods, PyReadonlyArray2};
+use numpy::{
+    Element, PyArray2, PyArrayDescrMethods, PyArrayMethods, PyReadonlyArray2, PyUntypedArray, PyUntypedArrayMethods,
+    dtype,
+};
 use pyo3::exceptions::PyValueError;
 use pyo3::intern;
 use pyo3::prelude::*;
@@ -126,8 +129,15 @@ pub fn mesh(
         })?];
     }
     if let Some(colors) = colors {
-        // Bytes are sRGB, as in files
-        let is_bytes = as_array(colors)?.getattr("dtype")?.getattr("itemsize")?.extract::<usize>()? == 1;
+        let colors = &as_array(colors)?;
+        let py = colors.py();
+        // Bytes are sRGB, as in files; what other whole numbers stand for cannot be known
+        let is_bytes = colors.cast::<PyUntypedArray>().is_ok_and(|array| array.dtype().is_equiv_to(&dtype::<u8>(py)));
+        if !is_bytes && kind_of(colors)? != "f" {
+            let wanted = "colours are uint8, 0 to 255 in sRGB, or floats, linear: for 0 to 255 write \
+                          colors.astype(numpy.uint8), for 0 to 1 colors.astype(float)";
+            return Err(refused(colors, "colors", wanted));
+        }
         let linear = |c: f64| if is_bytes { Encoding::Srgb.decode(c / 255.0) as f32 } else { c as f32 };
         mesh.colors = with_floats(colors, "colors", &[3, 4], |[rows, _], at| {
             (0..rows).map(|i| [linear(at(i, 0)), linear(at(i, 1)), linear(at(i, 2)), 1.0]).collect()

@@ -1,6 +1,6 @@
 //! Faults of the library as exceptions of Python.
 
-use firstlight::{Diagnostic, ImageError, SceneError as Faults, Severity};
+use firstlight::{Diagnostic, ImageError, SceneError as Faults, Severity, nearest_name};
 use pyo3::exceptions::{PyOSError, PyUserWarning, PyValueError};
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
@@ -17,7 +17,7 @@ create_exception!(
     firstlight,
     SceneWarning,
     PyUserWarning,
-    "Something of a scene was put up with: a texture that is missing or damaged."
+    "Something of a scene was put up with, as a texture that is missing, or may surprise, as a light that faces away."
 );
 
 /// The Python class of one fault.
@@ -78,4 +78,9 @@ pub fn image_error(error: &ImageError) -> PyErr {
         | ImageError::Stopped { .. } => PyOSError::new_err(error.to_string()),
         _ => PyValueError::new_err(error.to_string()),
     }
+}
+
+/// The end of a message about a name that is none of those that are known: the nearest of them, if one is near.
+pub fn did_you_mean(name: &str, known: &[&str]) -> String {
+    nearest_name(name, known).map(|near| format!("; did you mean {near:?}?")).unwrap_or_default()
 }

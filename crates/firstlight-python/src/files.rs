@@ -8,6 +8,9 @@ use firstlight::{AssetError, Assets, FolderAssets};
 use pyo3::exceptions::PyOSError;
 use pyo3::prelude::*;
 
+/// What the names of files begin with that are in no folder, as those of meshes of arrays.
+pub const IN_MEMORY: &str = "memory:";
+
 /// Where the files of a scene come from.
 pub enum Source {
     /// There are none.
@@ -53,6 +56,16 @@ impl SceneFiles {
     /// All that were read so far.
     pub fn all(&self) -> BTreeMap<String, Arc<[u8]>> {
         self.known().clone()
+    }
+
+    /// Keeps a file that is in no folder.
+    pub fn give(&self, name: String, bytes: Vec<u8>) {
+        self.known().insert(name, bytes.into());
+    }
+
+    /// Drops those that are in no folder, but for those of these names.
+    pub fn retain_in_memory(&self, names: &dyn Fn(&str) -> bool) {
+        self.known().retain(|name, _| !name.starts_with(IN_MEMORY) || names(name));
     }
 
     /// Whether the scene was read from the file that `path` leads to.

@@ -1,5 +1,7 @@
 //! One thing of a scene as a table: read from keyword arguments, written, replaced.
 
+use std::borrow::Cow;
+
 use firstlight::{
     CameraDesc, LightDesc, MaterialDesc, NoAssets, Parsed, RenderDesc, SceneDesc, SceneError, ShapeDesc, TextureDesc,
     TransformDesc,
@@ -74,6 +76,16 @@ impl Item {
         }
     }
 
+    /// Its name, if it has one.
+    pub fn name(&self) -> Option<String> {
+        match self {
+            Item::Render(_) => None,
+            Item::Shape(shape) => shape.name().map(str::to_owned),
+            Item::Light(light) => light.name(),
+            Item::Camera(name, _) | Item::Texture(name, _) | Item::Material(name, _) => Some(name.clone()),
+        }
+    }
+
     /// Its table: the fields that differ from their defaults.
     pub fn table(&self) -> Map<String, Json> {
         let mut desc = SceneDesc::default();
@@ -142,19 +154,19 @@ pub fn without_places(faults: &[firstlight::Diagnostic], path: &str) -> Vec<firs
     faults.collect()
 }
 
-/// The things of a description that have a name: the first of that name, as its family and its index there.
-pub fn find(desc: &SceneDesc, name: &str) -> Option<(&'static str, usize)> {
-    let shape = desc.shapes.iter().position(|shape| shape.name() == Some(name));
-    let light = || desc.lights.iter().position(|light| light.name().as_deref() == Some(name));
-    let camera = || desc.cameras.iter().position(|(own, _)| own == name);
-    let material = || desc.materials.iter().position(|(own, _)| own == name);
-    let texture = || desc.textures.iter().position(|(own, _)| own == name);
-    shape
-        .map(|i| ("shape", i))
-        .or_else(|| light().map(|i| ("light", i)))
-        .or_else(|| camera().map(|i| ("camera", i)))
-        .or_else(|| material().map(|i| ("material", i)))
-        .or_else(|| texture().map(|i| ("texture", i)))
+/// The names of those of a family that have one, and where they are in its list.
+pub fn names<'d>(desc: &'d SceneDesc, family: &str) -> Box<dyn Iterator<Item = (usize, Cow<'d, str>)> + 'd> {
+    fn keys<T>(list: &[(String, T)]) -> Box<dyn Iterator<Item = (usize, Cow<'_, str>)> + '_> {
+        Box::new(list.iter().map(|(name, _)| Cow::from(name)).enumerate())
+    }
+    let named = |(i, name): (usize, Option<Cow<'d, str>>)| name.map(|name| (i, name));
+    match family {
+        "shape" => Box::new(desc.shapes.iter().map(|s| s.name().map(Cow::from)).enumerate().filter_map(named)),
+        "light" => Box::new(desc.lights.iter().map(|l| l.name().map(Cow::from)).enumerate().filter_map(named)),
+        "camera" => keys(&desc.cameras),
+        "material" => keys(&desc.materials),
+        _ => keys(&desc.textures),
+    }
 }
 
 /// The thing at that place.
@@ -191,6 +203,17 @@ pub fn push(desc: &mut SceneDesc, item: Item) {
         Item::Material(name, material) => desc.materials.push((name, material)),
         Item::Shape(shape) => desc.shapes.push(shape),
         Item::Light(light) => desc.lights.push(light),
+    }
+}
+
+/// Removes the thing at that place.
+pub fn remove(desc: &mut SceneDesc, family: &str, index: usize) {
+    match family {
+        "camera" => drop(desc.cameras.remove(index)),
+        "texture" => drop(desc.textures.remove(index)),
+        "material" => drop(desc.materials.remove(index)),
+        "light" => drop(desc.lights.remove(index)),
+        _ => drop(desc.shapes.remove(index)),
     }
 }
 

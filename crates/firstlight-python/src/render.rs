@@ -8,17 +8,19 @@ use std::sync::{Arc, Mutex, PoisonError, mpsc};
 use std::time::Duration;
 
 use firstlight::{
-    Display, Encoding, FileSettings, Film, Format, NamedPlane, Plane, PlaneNumbers, PlaneVec, Receipt, RenderSettings,
-    Scene, Window, encode_planes, render, write_whole,
+    Compiled, Display, Encoding, FileSettings, Film, Format, NamedPlane, Plane, PlaneNumbers, PlaneVec, Receipt,
+    RenderSettings, Window, display_bytes, encode_planes, render, write_whole,
 };
-use numpy::{PyArray1, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArrayMethods};
+use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArrayMethods};
 use pyo3::exceptions::{PyKeyError, PyRuntimeError, PyValueError};
 use pyo3::intern;
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
 
-use crate::error::image_error;
+use crate::camera::CameraMatrices;
+use crate::error::{did_you_mean, image_error};
 use crate::files::{SceneFiles, Source};
+use crate::pool;
 
 /// How often Python is asked, while a render goes on, whether it is to go on.
 const ASKED_EVERY: Duration = Duration::from_millis(50);
@@ -27,68 +29,84 @@ const ASKED_EVERY: Duration = Duration::from_millis(50);
 /// that of Ctrl-C, and calls `progress(done, all)`. What either raises stops the render.
 pub fn run(
     py: Python<'_>,
-    scene: &Scene,
+    compiled: &Arc<Compiled>,
     settings: &RenderSettings,
     progress: Option<&Bound<'_, PyAny>>,
 ) -> PyResult<Film> {
+    let scene = &compiled.scene;
     let Window { width, height, .. } =
         settings.crop.unwrap_or(Window { x: 0, y: 0, width: scene.width(), height: scene.height() });
     let all = u64::from(width) * u64::from(height);
-    let (done, stop) = (AtomicU64::new(0), AtomicBool::new(false));
+    let process = std::process::id();
+    let shared = Arc::new((AtomicU64::new(0), AtomicBool::new(false)));
+    let (done, stop) = &*shared;
     let (send, receive) = mpsc::channel();
     let receive = Mutex::new(receive);
-    let (done, stop) = (&done, &stop);
-    std::thread::scope(|scope| {
-        let worker = scope.spawn(move || {
+    // Not in a scope, which a child that is forked meanwhile could never leave
+    let worker = std::thread::spawn({
+        let (compiled, settings, shared) = (compiled.clone(), settings.clone(), shared.clone());
+        move || {
+            let (done, stop) = &*shared;
             let told = |so_far: u64, _| {
                 done.fetch_max(so_far, Ordering::Relaxed);
                 if stop.load(Ordering::Relaxed) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
             };
             // Nobody listens any more only when the render was stopped
-            drop(send.send(render(scene, settings, &told)));
-        });
-        let mut last = None;
-        let mut tell = |now: u64| match progress {
-            Some(progress) if last != Some(now) => {
-                last = Some(now);
-                progress.call1((now, all)).map(drop)
+            drop(send.send(render(&compiled.scene, &settings, &told)));
+        }
+    });
+    let mut last = None;
+    let mut tell = |now: u64| match progress {
+        Some(progress) if last != Some(now) => {
+            last = Some(now);
+            progress.call1((now, all)).map(drop)
+        }
+        _ => Ok(()),
+    };
+    loop {
+        let answer = py.detach(|| receive.lock().unwrap_or_else(PoisonError::into_inner).recv_timeout(ASKED_EVERY));
+        match answer {
+            Ok(ControlFlow::Continue((film, _))) => {
+                tell(all)?;
+                return Ok(film);
             }
-            _ => Ok(()),
-        };
-        loop {
-            let answer = py.detach(|| receive.lock().unwrap_or_else(PoisonError::into_inner).recv_timeout(ASKED_EVERY));
-            match answer {
-                Ok(ControlFlow::Continue((film, _))) => {
-                    tell(all)?;
-                    return Ok(film);
-                }
-                Ok(ControlFlow::Break(())) | Err(mpsc::RecvTimeoutError::Disconnected) => {
-                    // The words of a panic, if there was one
-                    let why = py.detach(|| worker.join()).err().and_then(|why| {
-                        why.downcast_ref::<String>()
-                            .cloned()
-                            .or(why.downcast_ref::<&str>().map(|why| (*why).to_owned()))
-                    });
-                    let why = why.unwrap_or_else(|| "the render ended without a picture".into());
-                    return Err(PyRuntimeError::new_err(format!("firstlight failed: {why}")));
-                }
-                Err(mpsc::RecvTimeoutError::Timeout) => {
-                    if let Err(error) = py.check_signals().and_then(|()| tell(done.load(Ordering::Relaxed))) {
-                        stop.store(true, Ordering::Relaxed);
-                        // It ends within some hundredths of a second
+            Ok(ControlFlow::Break(())) | Err(mpsc::RecvTimeoutError::Disconnected) => {
+                // The words of a panic, if there was one
+                let why = py.detach(|| worker.join()).err().and_then(|why| {
+                    why.downcast_ref::<String>().cloned().or(why.downcast_ref::<&str>().map(|why| (*why).to_owned()))
+                });
+                let why = why.unwrap_or_else(|| "the render ended without a picture".into());
+                return Err(PyRuntimeError::new_err(format!("firstlight failed: {why}")));
+            }
+            Err(mpsc::RecvTimeoutError::Timeout) if std::process::id() != process => {
+                let message = "progress forked the process: the picture is rendered in the parent alone";
+                return Err(PyRuntimeError::new_err(message));
+            }
+            Err(mpsc::RecvTimeoutError::Timeout) => {
+                if let Err(error) = py.check_signals().and_then(|()| tell(done.load(Ordering::Relaxed))) {
+                    stop.store(true, Ordering::Relaxed);
+                    // It ends within some hundredths of a second; in a child that progress forked there is none
+                    if std::process::id() == process {
                         drop(py.detach(|| worker.join()));
-                        return Err(error);
                     }
+                    return Err(error);
                 }
             }
         }
-    })
+    }
 }
 
 /// What makes another render of the same: the arrays; the names of the planes and what they are; the size of the film
-/// and the part that they hold; how it is shown; what files say of it.
-type Pickled<'py> =
-    (Bound<'py, PyDict>, Vec<(String, String)>, [u32; 2], [u32; 4], (String, f64, f64), [Vec<(String, String)>; 2]);
+/// and the part that they hold; how it is shown; what files say of it; K and the pose of the camera.
+type Pickled<'py> = (
+    Bound<'py, PyDict>,
+    Vec<(String, String)>,
+    [u32; 2],
+    [u32; 4],
+    (String, f64, f64),
+    [Vec<(String, String)>; 2],
+    (Option<[f64; 4]>, [f64; 16]),
+);
 
 /// The render of such a state.
 #[pyfunction(name = "_restored_render")]
@@ -99,6 +117,7 @@ pub fn restored(
     window: [u32; 4],
     display: (String, f64, f64),
     says: [Vec<(String, String)>; 2],
+    camera: (Option<[f64; 4]>, [f64; 16]),
 ) -> PyResult<PyRender> {
     let ([x, y, width, height], (encoding, gamma, exposure)) = (window, display);
     let plane = |(name, word): (String, String)| match Plane::from_name(&word) {
@@ -117,6 +136,8 @@ pub fn restored(
         window: Window { x, y, width, height },
         display: Display { encoding, exposure },
         receipts: says.map(|entries| Receipt { entries }),
+        camera: CameraMatrices { intrinsics: camera.0, world_from_camera: camera.1 },
+        compiled: None,
         files: Arc::new(SceneFiles::new(Source::Nothing, None, BTreeMap::new())),
     })
 }
@@ -135,6 +156,9 @@ pub struct PyRender {
     display: Display,
     /// What a picture says of itself, and what a file of buffers does.
     receipts: [Receipt; 2],
+    camera: CameraMatrices,
+    /// The scene, where there are ids to be annotated.
+    compiled: Option<Arc<Compiled>>,
     files: Arc<SceneFiles>,
 }
 
@@ -143,11 +167,11 @@ impl PyRender {
     pub fn new(
         py: Python<'_>,
         film: Film,
-        scene: &Scene,
+        compiled: Arc<Compiled>,
         settings: &RenderSettings,
         files: Arc<SceneFiles>,
     ) -> PyResult<Self> {
-        let (size, window) = (film.size(), film.window());
+        let (scene, size, window) = (&compiled.scene, film.size(), film.window());
         let arrays = PyDict::new(py);
         let mut planes = Vec::new();
         for (name, buffer, numbers) in film.into_planes() {
@@ -162,7 +186,31 @@ impl PyRender {
             planes.push((name, plane));
         }
         let receipts = [scene.receipt(settings), scene.buffers_receipt(settings, &settings.buffers)];
-        Ok(PyRender { arrays: arrays.unbind(), planes, film: size, window, display: scene.display(), receipts, files })
+        let (camera, display) = (CameraMatrices::of(scene.camera()), scene.display());
+        let has_ids = planes.iter().any(|(_, plane)| *plane == Plane::ObjectId);
+        let compiled = has_ids.then_some(compiled);
+        Ok(PyRender { arrays: arrays.unbind(), planes, film: size, window, display, receipts, camera, compiled, files })
+    }
+
+    /// The scene, and the ids of the objects that the middles of the pixels meet, lent to `with` with the window.
+    pub fn with_ids<R>(
+        &self,
+        py: Python<'_>,
+        with: impl FnOnce(&Compiled, Window, &[u32]) -> PyResult<R>,
+    ) -> PyResult<R> {
+        let of = self.planes.iter().find(|(_, plane)| *plane == Plane::ObjectId);
+        let Some(of) = of else {
+            let message = format!("the render has {}, and not object-id, which annotations are made of", self.names());
+            return Err(PyValueError::new_err(message));
+        };
+        let Some(compiled) = &self.compiled else {
+            let message = "a render that was pickled has lost its scene; add(scene, ...) renders it again";
+            return Err(PyValueError::new_err(message));
+        };
+        self.with_planes(py, std::slice::from_ref(of), |planes| match planes {
+            [NamedPlane { numbers: PlaneNumbers::Wholes(ids), .. }] => with(compiled, self.window, ids),
+            _ => unreachable!("ids are whole numbers"),
+        })
     }
 
     /// The numbers of the planes as they are now, lent to `with`.
@@ -205,6 +253,19 @@ impl PyRender {
         self.planes.iter().map(|(name, _)| name.as_str()).collect::<Vec<_>>().join(", ")
     }
 
+    /// What is said of a buffer that is not there.
+    fn no_buffer(&self, name: &str) -> String {
+        let names: Vec<&str> = self.planes.iter().map(|(name, _)| name.as_str()).collect();
+        format!("{name}: the render has {}{}", names.join(", "), did_you_mean(name, &names))
+    }
+
+    /// The plane of the picture.
+    fn picture(&self) -> PyResult<&(String, Plane)> {
+        let missing = || format!("there is no picture: the render has {}, and not color", self.names());
+        let picture = self.planes.iter().find(|(_, plane)| *plane == Plane::Color);
+        picture.ok_or_else(|| PyValueError::new_err(missing()))
+    }
+
     /// The bytes of a file: of the buffer of that name, else of all in a format that holds them, else of the picture.
     fn encode(
         &self,
@@ -216,15 +277,14 @@ impl PyRender {
         let of = match buffer {
             None if matches!(format, Format::Exr | Format::Npz) => &self.planes[..],
             named => {
-                let name = named.unwrap_or(Plane::Color.name());
-                let Some(k) = self.planes.iter().position(|(known, _)| known == name) else {
-                    let message = match named {
-                        Some(name) => format!("{name}: the render has {}", self.names()),
-                        None => format!("there is no picture: the render has {}, and not color", self.names()),
-                    };
-                    return Err(PyValueError::new_err(message));
+                let plane = match named {
+                    None => self.picture()?,
+                    Some(name) => {
+                        let known = self.planes.iter().find(|(known, _)| known == name);
+                        known.ok_or_else(|| PyValueError::new_err(self.no_buffer(name)))?
+                    }
                 };
-                std::slice::from_ref(&self.planes[k])
+                std::slice::from_ref(plane)
             }
         };
         let is_picture = matches!(of, [(_, Plane::Color)]);
@@ -234,12 +294,75 @@ impl PyRender {
         }
         let settings = FileSettings { display: self.display, ..settings };
         self.with_planes(py, of, |planes| {
-            encode_planes(self.film, self.window, planes, format, &settings, &receipt).map_err(|e| image_error(&e))
+            let encode = || encode_planes(self.film, self.window, planes, format, &settings, &receipt);
+            pool::run(py, encode).map_err(|e| image_error(&e))
         })
     }
 }
+
 #[pymethods]
 impl PyRender {
+    /// The camera matrix [[fx, 0, cx], [0, fy, cy], [0, 0, 1]] of the arrays, (3, 3), float64.
+    ///
+    /// In pixels, x to the right and y down, the middle of the first pixel of the arrays at (0.5, 0.5), also where they
+    /// are a part of the film.
+    ///
+    /// Raises
+    /// ------
+    /// ValueError
+    ///     The camera is orthographic, and has none.
+    #[getter(K)]
+    fn intrinsics<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        self.camera.k(py, [self.window.x, self.window.y])
+    }
+
+    /// The matrix from camera to world, (4, 4), float64, metres: what `Camera.from_pose` takes.
+    ///
+    /// Parameters
+    /// ----------
+    /// convention : {"opencv", "opengl"}
+    ///     Whether the camera looks along z with y down, or along -z with y up.
+    #[pyo3(signature = (convention = "opencv"))]
+    fn pose<'py>(&self, py: Python<'py>, convention: &str) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        self.camera.pose(py, convention)
+    }
+
+    /// The names of the objects that ids count, that of id 1 first; None for what has none. Lights come last.
+    ///
+    /// Raises
+    /// ------
+    /// ValueError
+    ///     The render has no buffer that tells objects apart.
+    #[getter]
+    fn object_names(&self) -> PyResult<Vec<Option<String>>> {
+        let said = self.receipts[1].entries.iter().find(|(key, _)| key == "object_names");
+        let names = said.and_then(|(_, names)| serde_json::from_str(names).ok());
+        names.ok_or_else(|| {
+            let message =
+                format!("the render has {}, and nothing that tells objects apart: object-id does", self.names());
+            PyValueError::new_err(message)
+        })
+    }
+
+    /// The picture in 8 bits, display-encoded as in a .png file: uint8, (height, width, 3) or (height, width, 4).
+    ///
+    /// Parameters
+    /// ----------
+    /// alpha : bool
+    ///     Whether there is a fourth channel: alpha, with the colours not multiplied by it. Without it, what is
+    ///     transparent lies on black.
+    #[pyo3(signature = (*, alpha = false))]
+    fn rgb8<'py>(&self, py: Python<'py>, alpha: bool) -> PyResult<Bound<'py, PyArray3<u8>>> {
+        let of = self.picture()?;
+        let bytes = self.with_planes(py, std::slice::from_ref(of), |planes| {
+            let PlaneNumbers::Floats(numbers) = planes[0].numbers else { unreachable!("colours are floats") };
+            let encode = || display_bytes(numbers.as_chunks::<4>().0, &self.display, alpha);
+            pool::run(py, encode).map_err(|e| image_error(&e))
+        })?;
+        let (h, w) = (self.window.height as usize, self.window.width as usize);
+        PyArray1::from_vec(py, bytes).reshape([h, w, if alpha { 4 } else { 3 }])
+    }
+
     /// What decided the pixels: a dict of texts. With more buffers than color it has the camera's matrices and the
     /// names behind ids.
     #[getter]
@@ -315,7 +438,7 @@ impl PyRender {
         if depth_scale.is_some() && !is_scaled {
             return Err(PyValueError::new_err("depth_scale is for depth and distance in a .png file"));
         }
-        if self.files.holds(&path) {
+        if pool::at_work(py, || self.files.holds(&path)) {
             let message = format!("{}: the scene was read from it; choose another name", path.display());
             return Err(PyValueError::new_err(message));
         }
@@ -323,6 +446,7 @@ impl PyRender {
         let depth_scale = depth_scale.unwrap_or(default.depth_scale);
         let settings = FileSettings { depth_scale, half, ..default };
         let bytes = self.encode(py, format, buffer, settings)?;
+        // Not at work: it takes no locks, and may wait for a reader that is yet to be forked
         py.detach(|| write_whole(&path, &bytes)).map(drop).map_err(|e| image_error(&e))
     }
 
@@ -336,11 +460,7 @@ impl PyRender {
     }
 
     fn __getitem__<'py>(&self, py: Python<'py>, name: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
-        self.arrays
-            .bind(py)
-            .as_any()
-            .get_item(name)
-            .map_err(|_| PyKeyError::new_err(format!("{name}: the render has {}", self.names())))
+        self.arrays.bind(py).as_any().get_item(name).map_err(|_| PyKeyError::new_err(self.no_buffer(&name.to_string())))
     }
 
     fn __len__(&self) -> usize {
@@ -392,7 +512,8 @@ impl PyRender {
         let Window { x, y, width, height } = self.window;
         let says = [&self.receipts[0], &self.receipts[1]].map(|receipt| receipt.entries.clone());
         let display = (encoding.to_owned(), gamma, self.display.exposure);
-        let state = (self.arrays.bind(py).clone(), names, self.film, [x, y, width, height], display, says);
+        let camera = (self.camera.intrinsics, self.camera.world_from_camera);
+        let state = (self.arrays.bind(py).clone(), names, self.film, [x, y, width, height], display, says, camera);
         Ok((py.import("firstlight._firstlight")?.getattr("_restored_render")?, state))
     }
 

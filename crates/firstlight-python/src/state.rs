@@ -1,18 +1,28 @@
 //! What changes of a scene: its description, compiled again only where a call wants it otherwise than the last.
 
+use std::collections::BTreeSet;
 use std::sync::Arc;
 
 use firstlight::{
-    BufferDesc, CameraDesc, CompileCache, CompileOptions, Compiled, MotionTo, Parsed, SamplesDesc, SceneError as Faults,
+    BufferDesc, CameraDesc, CompileCache, CompileOptions, Compiled, GroupDesc, MotionTo, Parsed, RenderDesc,
+    SamplesDesc, SceneDesc, SceneError as Faults, ShapeDesc,
 };
 
-use crate::files::SceneFiles;
+use crate::files::{IN_MEMORY, SceneFiles};
+use crate::item::{Item, get, push, remove, set};
+use crate::numbers::Numbers;
+use crate::pool::in_pool;
 
 /// What changes of a scene.
 pub struct State {
     pub parsed: Parsed,
     pub files: Arc<SceneFiles>,
     pub cache: CompileCache,
+    pub numbers: Numbers,
+    /// The advice that renders have given already.
+    pub told: BTreeSet<String>,
+    /// Whether something was removed since [`tidy`](Self::tidy).
+    is_untidy: bool,
     /// Counts changes.
     changes: u64,
     /// What was compiled last, when and how.
@@ -47,8 +57,8 @@ pub enum MotionChoice {
 impl State {
     /// Of a description, and its files.
     pub fn of(parsed: Parsed, files: SceneFiles) -> Self {
-        let (files, cache) = (Arc::new(files), CompileCache::default());
-        State { parsed, files, cache, changes: 0, compiled: None }
+        let (files, cache, numbers) = (Arc::new(files), CompileCache::default(), Numbers::of(&parsed.desc));
+        State { parsed, files, cache, numbers, told: BTreeSet::new(), is_untidy: false, changes: 0, compiled: None }
     }
 
     /// The scene as it is wanted.
@@ -59,6 +69,7 @@ impl State {
         {
             return Ok((compiled.clone(), false));
         }
+        self.tidy();
         // Change the description as wanted, for a while
         let desc = &mut self.parsed.desc;
         let before = (desc.render.clone(), desc.cameras.clone(), desc.lights.clone());
@@ -91,7 +102,7 @@ impl State {
         }
         let options =
             CompileOptions { time: wanted.time, cache: Some(self.cache.clone()), ..CompileOptions::default() };
-        let compiled = self.parsed.compile(&*self.files, &options);
+        let compiled = in_pool(|| self.parsed.compile(&*self.files, &options));
         let desc = &mut self.parsed.desc;
         (desc.render, desc.cameras, desc.lights) = before;
         let compiled = Arc::new(compiled?);
@@ -109,6 +120,92 @@ impl State {
         self.changes += 1;
         self.compiled = None;
     }
+
+    /// Adds a thing, and answers with its number; `None` where its name is taken.
+    pub fn add(&mut self, item: Item) -> Option<usize> {
+        let (family, name) = (item.words().0, item.name());
+        if name.as_ref().is_some_and(|name| self.numbers.named(family, name).is_some()) {
+            return None;
+        }
+        push(&mut self.parsed.desc, item);
+        self.change();
+        Some(self.numbers.push(family, name))
+    }
+
+    /// Puts a thing in the place of another; says whether that is there, and the name not taken.
+    pub fn replace(&mut self, number: usize, item: Item) -> Result<(), Refused> {
+        let (family, name) = (item.words().0, item.name());
+        let index = self.numbers.index(family, number).ok_or(Refused::Removed)?;
+        let before = get(&self.parsed.desc, family, index).and_then(|item| item.name());
+        if name == before {
+            set(&mut self.parsed, index, item);
+        } else {
+            if name.as_ref().is_some_and(|name| self.numbers.named(family, name).is_some()) {
+                return Err(Refused::Taken);
+            }
+            set(&mut self.parsed, index, item);
+            self.numbers.rename(family, number, before.as_deref(), name, &self.parsed.desc);
+        }
+        self.change();
+        Ok(())
+    }
+
+    /// Removes a thing, with the mesh that it alone showed; says whether it was there.
+    pub fn remove(&mut self, family: &str, number: usize) -> bool {
+        let Some(index) = self.numbers.index(family, number) else { return false };
+        let name = get(&self.parsed.desc, family, index).and_then(|item| item.name());
+        remove(&mut self.parsed.desc, family, index);
+        self.numbers.remove(family, index, name.as_deref(), &self.parsed.desc);
+        self.removed();
+        true
+    }
+
+    /// Removes all but the picture's settings, in which no camera is named any more.
+    pub fn clear(&mut self) {
+        let named = |to: &MotionTo| !matches!(to, MotionTo::Camera(_));
+        let render = self.parsed.desc.render.clone();
+        let render = RenderDesc { camera: None, motion_to: render.motion_to.clone().filter(named), ..render };
+        self.parsed.desc = SceneDesc { render, ..SceneDesc::default() };
+        self.numbers.clear();
+        self.removed();
+    }
+
+    /// Notes that something was removed: what stands behind it is no longer where the text had it.
+    fn removed(&mut self) {
+        self.parsed = Parsed::from(std::mem::take(&mut self.parsed.desc));
+        self.is_untidy = true;
+        self.change();
+    }
+
+    /// After something was removed, drops the groups of meshes of arrays that no instance shows, and what is in memory
+    /// for nothing.
+    pub fn tidy(&mut self) {
+        if !std::mem::take(&mut self.is_untidy) {
+            return;
+        }
+        let desc = &mut self.parsed.desc;
+        let shapes = || desc.shapes.iter().chain(desc.groups.iter().flat_map(|(_, group)| &group.shapes));
+        let of = |shape: &ShapeDesc| match shape {
+            ShapeDesc::Instance(instance) => Some(instance.of.clone()),
+            _ => None,
+        };
+        let shown: BTreeSet<String> = shapes().filter_map(of).collect();
+        let in_memory = |shape: &ShapeDesc| match shape {
+            ShapeDesc::Mesh(mesh) => mesh.file.as_ref().is_some_and(|file| file.0.starts_with(IN_MEMORY)),
+            _ => false,
+        };
+        let is_of_arrays = |group: &GroupDesc| !group.shapes.is_empty() && group.shapes.iter().all(in_memory);
+        desc.groups.retain(|(name, group)| shown.contains(name) || !is_of_arrays(group));
+        let used: BTreeSet<String> = desc.files_mut().map(|file| file.0.clone()).collect();
+        self.cache.retain_given(&|name| used.contains(name));
+        self.files.retain_in_memory(&|name| used.contains(name));
+    }
+}
+
+/// Why a thing was not put in the place of another.
+pub enum Refused {
+    Removed,
+    Taken,
 }
 
 impl MotionChoice {

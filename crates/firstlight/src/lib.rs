@@ -86,8 +86,8 @@ pub use ids::{LightGroupId, LightId, MaterialId, SurfaceId, TextureId};
 pub use image::{
     Buffer, BufferDesc, BufferView, DifferingSample, Distance, FileSettings, Flip, Format, Image, ImageError,
     LightChoice, LightPart, NamedPlane, PendingFile, Plane, PlaneDifference, PlaneNumbers, PlaneVec, Receipt, Sampling,
-    StagedFile, StoredImage, StoredPlane, StoredPlanes, Window, Written, display_steps, encode_planes, false_colors,
-    is_decoding, relative_differences, write_open, write_whole,
+    StagedFile, StoredImage, StoredPlane, StoredPlanes, Window, Written, display_bytes, display_steps, encode_planes,
+    false_colors, is_decoding, relative_differences, write_open, write_whole,
 };
 pub use import::{ImportError, MeshData, MeshFormat, MeshPart, MeshPlace, MeshReport, is_point_set, read_mesh};
 pub use light::{

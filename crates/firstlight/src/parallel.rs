@@ -21,6 +21,18 @@ pub(crate) fn for_each(count: usize, each: &(dyn Fn(usize) + Sync)) {
     }
 }
 
+/// What a cell holds that outlives a render, made now if it is empty. Threads that find it empty at once each make it,
+/// to the same bits, and one is kept: none waits for another, which a process that was forked meanwhile may not have.
+#[inline]
+pub(crate) fn kept<T>(cell: &OnceLock<T>, make: impl FnOnce() -> T) -> &T {
+    if let Some(kept) = cell.get() {
+        return kept;
+    }
+    // Somebody else may have been first
+    drop(cell.set(make()));
+    cell.get().expect("it was set")
+}
+
 /// What `make` makes of each number below `count`: few, and much to do for each.
 pub(crate) fn collect<T: Send + Sync>(count: usize, make: impl Fn(usize) -> T + Sync) -> Vec<T> {
     let made: Vec<OnceLock<T>> = std::iter::repeat_with(OnceLock::new).take(count).collect();
@@ -75,6 +87,19 @@ pub(crate) fn count(count: usize, size: usize, is: impl Fn(usize) -> bool + Sync
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn what_is_kept_is_what_was_first() {
+        let cell = OnceLock::new();
+        assert_eq!((kept(&cell, || 1), kept(&cell, || unreachable!("it is kept"))), (&1, &1));
+        // Somebody else comes first while it is made
+        let cell = OnceLock::new();
+        let made = kept(&cell, || {
+            assert_eq!(cell.set(2), Ok(()));
+            3
+        });
+        assert_eq!(made, &2);
+    }
 
     #[test]
     fn every_number_comes_once_and_in_its_place() {

@@ -8,9 +8,12 @@ Lengths are in metres, angles in degrees, colours linear Rec. 709. y is up, axes
 the top of the picture.
 """
 
+import os as _os
 from collections.abc import Mapping as _Mapping
 
+from . import _firstlight
 from ._camera import Camera
+from ._coco import Coco
 from ._diagnostics import Diagnostic, Place
 from ._firstlight import (
     BUFFERS,
@@ -19,7 +22,6 @@ from ._firstlight import (
     MATERIALS,
     SHAPES,
     TEXTURES,
-    Coco,
     Render,
     SceneError,
     SceneWarning,
@@ -28,6 +30,13 @@ from ._firstlight import (
 from ._scene import Handle, Hits, Scene, builtin
 
 _Mapping.register(Render)
+# So that a child that is forked while other threads are at work finds nothing locked
+if hasattr(_os, "register_at_fork"):
+    _os.register_at_fork(
+        before=_firstlight._before_fork,
+        after_in_parent=_firstlight._after_fork_in_parent,
+        after_in_child=_firstlight._after_fork_in_child,
+    )
 
 __all__ = [
     "BUFFERS",

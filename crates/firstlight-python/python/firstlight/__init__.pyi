@@ -3,7 +3,7 @@
 import os
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Literal, TypedDict, final
+from typing import Any, Literal, TypedDict, final, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -38,20 +38,20 @@ ColorParam = Color | Mapping[str, Any]
 NumberParam = float | Mapping[str, Any]
 
 class _ShapeFields(TypedDict, total=False):
-    name: str
-    material: str
+    name: str | None
+    material: str | None
     transform: Transform
     visible: bool
     casts_shadow: bool
     receives_shadow: bool
     single_sided: bool
-    lights_include: Sequence[str]
-    lights_exclude: Sequence[str]
-    shadow_include: Sequence[str]
-    shadow_exclude: Sequence[str]
+    lights_include: Sequence[str] | None
+    lights_exclude: Sequence[str] | None
+    shadow_include: Sequence[str] | None
+    shadow_exclude: Sequence[str] | None
 
 class _MeshFields(_ShapeFields, total=False):
-    smooth_deg: float
+    smooth_deg: float | None
 
 @dataclass(frozen=True)
 class Place:
@@ -79,7 +79,7 @@ class SceneError(ValueError):
     diagnostics: list[Diagnostic]
 
 class SceneWarning(UserWarning):
-    """A texture that is missing or damaged was put up with."""
+    """Something of a scene was put up with, as a texture that is missing, or may surprise, as a light that faces away."""
 
 @final
 class Render(Mapping[str, NDArray[Any]]):
@@ -91,6 +91,18 @@ class Render(Mapping[str, NDArray[Any]]):
     def film_size(self) -> tuple[int, int]: ...
     @property
     def window(self) -> tuple[int, int, int, int]: ...
+    @property
+    def K(self) -> NDArray[np.float64]:
+        """(3, 3), in pixels of the arrays, the middle of the first one at (0.5, 0.5)."""
+
+    def pose(self, convention: Literal["opencv", "opengl"] = "opencv") -> NDArray[np.float64]:
+        """(4, 4), camera to world."""
+
+    @property
+    def object_names(self) -> list[str | None]: ...
+    def rgb8(self, *, alpha: bool = False) -> NDArray[np.uint8]:
+        """(height, width, 3) or, with alpha, (height, width, 4), display-encoded."""
+
     def to_png(self, *, bits: Literal[8, 16] = 8) -> bytes: ...
     def save(
         self,
@@ -104,21 +116,23 @@ class Render(Mapping[str, NDArray[Any]]):
     def __iter__(self) -> Iterator[str]: ...
     def __len__(self) -> int: ...
 
-@final
 class Coco:
-    """A data set in COCO's format, which grows picture by picture: boxes and masks of all objects that are seen."""
+    """A data set in COCO's format, which grows picture by picture: boxes and masks of the objects that are seen."""
 
     def __init__(self) -> None: ...
+    @overload
+    def add(
+        self, picture: Render, file_name: str | os.PathLike[str], *, only: str | Sequence[str] | None = None
+    ) -> Render: ...
+    @overload
     def add(
         self,
-        scene: Scene,
-        file_name: str,
+        picture: Scene,
+        file_name: str | os.PathLike[str],
         *,
-        camera: Camera | str | Mapping[str, Any] | None = None,
-        width: int | None = None,
-        height: int | None = None,
-        time: float = 0.0,
-    ) -> None: ...
+        only: str | Sequence[str] | None = None,
+        **options: Any,
+    ) -> Render: ...
     def to_json(self) -> str: ...
     def save(self, path: str | os.PathLike[str]) -> None: ...
 
@@ -174,6 +188,16 @@ class Camera:
         convention: Literal["opencv", "opengl"] = "opencv",
     ) -> Camera: ...
     def resized(self, width: int, height: int) -> Camera: ...
+    @property
+    def K(self) -> NDArray[np.float64]:
+        """(3, 3), in pixels of its picture, the middle of the first one at (0.5, 0.5)."""
+
+    def pose(self, convention: Literal["opencv", "opengl"] = "opencv") -> NDArray[np.float64]:
+        """(4, 4), camera to world."""
+
+    def project(self, points: ArrayLike) -> NDArray[np.float64]:
+        """(..., 2), pixels from the upper left corner; NaN for what is behind the camera."""
+
     def to_dict(self) -> dict[str, Any]: ...
 
 @dataclass(frozen=True)
@@ -228,6 +252,7 @@ class Scene:
         cls, tree: dict[str, Any], *, assets: str | os.PathLike[str] | Mapping[str, bytes] | None = None
     ) -> Scene: ...
     def __getitem__(self, name: str) -> Handle: ...
+    def __delitem__(self, name: str) -> None: ...
     def __contains__(self, name: str) -> bool: ...
     def __iter__(self) -> Iterator[str]: ...
     @property
@@ -247,7 +272,7 @@ class Scene:
         camera: str | Camera | dict[str, Any] | None = None,
         width: int | None = None,
         height: int | None = None,
-        buffers: Sequence[Buffer] | None = None,
+        buffers: Buffer | Sequence[Buffer] | None = None,
         aa: int | None = None,
         samples: Literal["exact"] | int | None = None,
         tolerance: float | None = None,
@@ -262,7 +287,7 @@ class Scene:
         self,
         cameras: Iterable[str | Camera | dict[str, Any]],
         *,
-        buffers: Sequence[Buffer] | None = None,
+        buffers: Buffer | Sequence[Buffer] | None = None,
         workers: int | None = None,
         **options: Any,
     ) -> Iterator[Render]: ...
@@ -271,6 +296,13 @@ class Scene:
         self, points: ArrayLike, *, light: str | int, normals: ArrayLike | None = None, time: float = 0.0
     ) -> NDArray[np.float32]: ...
     def add(self, thing: Any, **fields: Unpack[_MeshFields]) -> Handle | list[Handle]: ...
+    def remove(
+        self,
+        thing: str | Handle,
+        *,
+        family: Literal["shape", "light", "camera", "material", "texture"] | None = None,
+    ) -> None: ...
+    def clear(self) -> None: ...
     def add_mesh(
         self,
         vertices: ArrayLike,
@@ -297,7 +329,7 @@ class Scene:
         file: str,
         wrap: Sequence[Any] = ...,
         filter: Literal["nearest", "bilinear"] = ...,
-        space: Literal["srgb", "raw"] = ...,
+        space: Literal["srgb", "raw"] | None = ...,
         border: Color = ...,
         scale: Vector = ...,
         offset: Vector = ...,
@@ -308,7 +340,7 @@ class Scene:
         *,
         diffuse: ColorParam = ...,
         specular: ColorParam = ...,
-        ambient: ColorParam = ...,
+        ambient: ColorParam | None = ...,
         shininess: NumberParam = ...,
     ) -> Handle: ...
     def add_blinn_phong_material(
@@ -317,7 +349,7 @@ class Scene:
         *,
         diffuse: ColorParam = ...,
         specular: ColorParam = ...,
-        ambient: ColorParam = ...,
+        ambient: ColorParam | None = ...,
         shininess: NumberParam = ...,
     ) -> Handle: ...
     def add_sphere(
@@ -342,7 +374,7 @@ class Scene:
         *,
         point: Vector = ...,
         normal: Vector = ...,
-        up: Vector = ...,
+        up: Vector | None = ...,
         **fields: Unpack[_ShapeFields],
     ) -> Handle: ...
     def add_disk(
@@ -360,7 +392,7 @@ class Scene:
         center: Vector,
         size: Vector,
         normal: Vector = ...,
-        up: Vector = ...,
+        up: Vector | None = ...,
         **fields: Unpack[_ShapeFields],
     ) -> Handle: ...
     def add_box(
@@ -401,11 +433,11 @@ class Scene:
     def add_point_set(
         self,
         *,
-        file: str = ...,
+        file: str | None = ...,
         positions: Sequence[Any] = ...,
         radii: Vector = ...,
         colors: Sequence[Any] = ...,
-        radius: float = ...,
+        radius: float | None = ...,
         **fields: Unpack[_ShapeFields],
     ) -> Handle: ...
     def add_instance(
@@ -417,7 +449,8 @@ class Scene:
     def add_point_light(
         self,
         *,
-        name: str = ...,
+        name: str | None = ...,
+        group: str | None = ...,
         position: Vector,
         transform: Transform = ...,
         color: Color = ...,
@@ -428,7 +461,8 @@ class Scene:
     def add_directional_light(
         self,
         *,
-        name: str = ...,
+        name: str | None = ...,
+        group: str | None = ...,
         direction: Vector,
         transform: Transform = ...,
         color: Color = ...,
@@ -439,12 +473,13 @@ class Scene:
     def add_spot_light(
         self,
         *,
-        name: str = ...,
+        name: str | None = ...,
+        group: str | None = ...,
         position: Vector,
         look_at: Vector = ...,
         transform: Transform = ...,
         cone_deg: float = ...,
-        inner_cone_deg: float = ...,
+        inner_cone_deg: float | None = ...,
         color: Color = ...,
         strength: float = ...,
         falloff: Literal["physical", "constant"] = ...,
@@ -453,62 +488,65 @@ class Scene:
     def add_rectangle_light(
         self,
         *,
-        name: str = ...,
+        name: str | None = ...,
+        group: str | None = ...,
         center: Vector,
-        e0: Vector = ...,
-        e1: Vector = ...,
-        size: Vector = ...,
-        look_at: Vector = ...,
-        normal: Vector = ...,
-        up: Vector = ...,
+        e0: Vector | None = ...,
+        e1: Vector | None = ...,
+        size: Vector | None = ...,
+        look_at: Vector | None = ...,
+        normal: Vector | None = ...,
+        up: Vector | None = ...,
         transform: Transform = ...,
         color: Color = ...,
         strength: float = ...,
         falloff: Literal["physical", "constant"] = ...,
-        sides: Literal["front", "both"] = ...,
+        sides: Literal["front", "both"] | None = ...,
         visible: bool = ...,
         blocks: bool = ...,
         shadows: bool = ...,
-        samples: Literal["exact"] | int = ...,
+        samples: Literal["exact"] | int | None = ...,
         set: Literal["sobol", "grid", "stratified", "uniform"] = ...,
         seed: int = ...,
     ) -> Handle: ...
     def add_disk_light(
         self,
         *,
-        name: str = ...,
+        name: str | None = ...,
+        group: str | None = ...,
         center: Vector,
-        normal: Vector = ...,
-        look_at: Vector = ...,
-        radius: float = ...,
-        size: float = ...,
+        normal: Vector | None = ...,
+        look_at: Vector | None = ...,
+        radius: float | None = ...,
+        size: float | None = ...,
         transform: Transform = ...,
         color: Color = ...,
         strength: float = ...,
         falloff: Literal["physical", "constant"] = ...,
-        sides: Literal["front", "both"] = ...,
+        sides: Literal["front", "both"] | None = ...,
         visible: bool = ...,
         blocks: bool = ...,
         shadows: bool = ...,
-        samples: Literal["exact"] | int = ...,
+        samples: Literal["exact"] | int | None = ...,
         set: Literal["sobol", "grid", "stratified", "uniform"] = ...,
         seed: int = ...,
     ) -> Handle: ...
     def add_sphere_light(
         self,
         *,
-        name: str = ...,
+        name: str | None = ...,
+        group: str | None = ...,
         center: Vector,
         radius: float,
         transform: Transform = ...,
         color: Color = ...,
         strength: float = ...,
         falloff: Literal["physical", "constant"] = ...,
-        sides: Literal["front", "both"] = ...,
+        sides: Literal["front", "both"] | None = ...,
         visible: bool = ...,
         blocks: bool = ...,
         shadows: bool = ...,
-        samples: Literal["exact"] | int = ...,
+        samples: Literal["exact"] | int | None = ...,
         set: Literal["sobol", "grid", "stratified", "uniform"] = ...,
         seed: int = ...,
     ) -> Handle: ...

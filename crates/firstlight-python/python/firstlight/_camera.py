@@ -2,6 +2,8 @@
 
 import numpy as np
 
+from . import _firstlight
+
 # What turns the axes of OpenCV's camera, which looks along z with y down, to those of OpenGL's
 _OPENGL_FROM_OPENCV = np.diag([1.0, -1.0, -1.0])
 # How far a rotation may be from one
@@ -23,7 +25,10 @@ def _frame(pose, convention):
     if convention == "opencv":
         rotation = rotation @ _OPENGL_FROM_OPENCV
     elif convention != "opengl":
-        raise ValueError(f"convention is {convention!r}; it is 'opencv' (y down, z forward) or 'opengl' (y up, z back)")
+        near = _firstlight._nearest(str(convention), ["opencv", "opengl"])
+        hint = f"; did you mean {near!r}?" if near else ""
+        wanted = "'opencv' (y down, z forward) or 'opengl' (y up, z back)"
+        raise ValueError(f"convention is {convention!r}; it is {wanted}{hint}")
     return position, rotation[:, 0], rotation[:, 1], -rotation[:, 2]
 
 
@@ -145,6 +150,59 @@ class Camera:
                     fields[key] = [number * by for number, by in zip(fields[key], scale)]
         return Camera(width=width, height=height, **fields)
 
+    def _sized(self):
+        """The table and the size of its picture, which has to be known."""
+        if self.width is None or self.height is None:
+            raise ValueError("the size of its picture is not known: give the camera a width and a height")
+        return self.to_dict(), self.width, self.height
+
+    @property
+    def K(self):
+        """The camera matrix [[fx, 0, cx], [0, fy, cy], [0, 0, 1]]: (3, 3), float64, in pixels of its picture.
+
+        x is to the right, y down, and the middle of the first pixel at (0.5, 0.5).
+
+        Raises
+        ------
+        ValueError
+            The camera has no width and height, or is orthographic.
+        """
+        return _firstlight._camera_k(*self._sized())
+
+    def pose(self, convention="opencv"):
+        """The matrix from camera to world: (4, 4), float64, metres. What `from_pose` takes.
+
+        Parameters
+        ----------
+        convention : {"opencv", "opengl"}
+            Whether the camera looks along z with y down, or along -z with y up.
+        """
+        return _firstlight._camera_pose(self.to_dict(), self.width or 1024, self.height or 1024, convention)
+
+    def project(self, points):
+        """Where points are in the picture, also outside of it and behind other things.
+
+        Parameters
+        ----------
+        points : array of shape (..., 3)
+            In metres, world space.
+
+        Returns
+        -------
+        array of shape (..., 2), float64
+            x and y in pixels from the upper left corner, so that (0.5, 0.5) is the middle of the first pixel; NaN for
+            what is behind the camera.
+
+        Raises
+        ------
+        ValueError
+            The camera has no width and height.
+        """
+        points = np.asarray(points, dtype=np.float64)
+        if points.shape[-1:] != (3,):
+            raise ValueError(f"points: an array of shape {points.shape}; (..., 3) is wanted")
+        return _firstlight._camera_project(*self._sized(), points.reshape(-1, 3)).reshape(*points.shape[:-1], 2)
+
     def to_dict(self):
         """The table of the scene format that says the same."""
         return {key: value for key, value in self.fields.items() if value is not None}
@@ -163,4 +221,5 @@ class Camera:
         return self.to_dict(), *size
 
     def __repr__(self):
-        return f"Camera({', '.join(f'{key}={value!r}' for key, value in self.to_dict().items())})"
+        fields = {**self.to_dict(), "width": self.width, "height": self.height}
+        return f"Camera({', '.join(f'{key}={value!r}' for key, value in fields.items() if value is not None)})"

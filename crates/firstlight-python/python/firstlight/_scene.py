@@ -9,7 +9,7 @@ from threading import Event
 
 import numpy as np
 
-from . import _firstlight
+from . import _fields, _models
 from ._firstlight import LIGHTS, MATERIALS, SHAPES, TEXTURES, SceneBase
 
 # Fields of a mesh that belong to its triangles; all others belong to the thing that is placed
@@ -35,46 +35,47 @@ class Hits:
 class Handle:
     """A thing of a scene: a shape, a light, a camera, a material or a texture.
 
-    `handle["field"]` reads a field as the scene's text says it, `handle["field"] = value` and `handle.update(...)`
-    change it. `handle.transform` is the matrix that places it.
+    `handle["field"]` reads a field as the scene's text says it, or its default; `handle["field"] = value` and
+    `handle.update(...)` change it. `handle.transform` is the matrix that places it.
     """
 
-    __slots__ = ("_family", "_index", "_scene")
+    __slots__ = ("_family", "_number", "_scene")
 
-    def __init__(self, scene, family, index):
+    def __init__(self, scene, family, number):
         self._scene = scene
         self._family = family
-        self._index = index
+        self._number = number
 
     @property
     def kind(self):
         """What it is: "sphere", "point", "phong", ..."""
-        return self._scene._item(self._family, self._index)[1]
+        return self._scene._item(self._family, self._number)[1]
 
     @property
     def name(self):
         """What the scene calls it, if it has a name."""
-        return self._scene._item(self._family, self._index)[2]
+        return self._scene._item(self._family, self._number)[2]
 
     @property
     def fields(self):
         """The fields that differ from their defaults, as a dict."""
-        return json.loads(self._scene._item(self._family, self._index)[3])
+        return json.loads(self._scene._item(self._family, self._number)[3])
 
     def __getitem__(self, field):
-        return self.fields[field]
+        fields = self.fields
+        return fields[field] if field in fields else _fields.default(self._family, self.kind, field)
 
     def __setitem__(self, field, value):
         self.update(**{field: value})
 
     def update(self, **fields):
         """Changes fields. One that is None goes back to its default."""
-        self._scene._update(self._family, self._index, fields)
+        self._scene._update(self._family, self._number, fields)
 
     @property
     def transform(self):
         """The matrix from its own space to the world: (4, 4), float64, metres. At 0 s where it has keys."""
-        rows = np.array(self._scene._transform(self._family, self._index, 0.0)).reshape(3, 4)
+        rows = np.array(self._scene._transform(self._family, self._number, 0.0)).reshape(3, 4)
         return np.vstack([rows, [0.0, 0.0, 0.0, 1.0]])
 
     @transform.setter
@@ -82,11 +83,24 @@ class Handle:
         self.update(transform=value)
 
     def __repr__(self):
-        return f"<firstlight.Handle {self.kind} {self.name!r}>"
+        if not self._scene._has(self._family, self._number):
+            return f"<firstlight.Handle of a {self._family} that was removed>"
+        fields = {key: value for key, value in self.fields.items() if key != "name"}
+        words = [f"{key}={_short(value)}" for key, value in fields.items()]
+        return f"<firstlight.Handle {self.kind} {self.name!r}: {', '.join(words) or 'all fields at their defaults'}>"
+
+
+def _short(value):
+    """A value as text, without what is in the middle of a long one."""
+    text = repr(value)
+    return text if len(text) <= 60 else f"{text[:40]} ... {text[-15:]}"
 
 
 class Scene(SceneBase):
-    """A scene, empty at first."""
+    """A scene, empty at first.
+
+    `scene[name]` is a `Handle` of what has that name, `del scene[name]` removes it, `scene.clear()` removes all.
+    """
 
     @classmethod
     def from_file(cls, path, *, allow_dirs=()):
@@ -111,6 +125,9 @@ class Scene(SceneBase):
 
     def __getitem__(self, name):
         return Handle(self, *self._find(name))
+
+    def __delitem__(self, name):
+        self.remove(name)
 
     def __contains__(self, name):
         return name in self._names()
@@ -137,13 +154,20 @@ class Scene(SceneBase):
         uv : array of shape (n, 2), optional
             A texture coordinate for each vertex.
         colors : array of shape (n, 3) or (n, 4), optional
-            A colour for each vertex: linear floats, or bytes, which are sRGB. Alpha is not looked at.
+            A colour for each vertex: linear floats, or uint8, 0 to 255 in sRGB. Alpha is not looked at.
         static : bool
             Whether it is joined with other static meshes in one tree, which is built again when one of them moves.
         **fields
-            `transform` (a matrix of 4 x 4, or a table), `material`, `name`, `smooth_deg`, `visible`, `casts_shadow`,
-            and all else that a shape takes.
+            `transform` (a matrix of 4 x 4, or a table), `material`, `name`, and all else of the list below.
+
+        Returns
+        -------
+        Handle
         """
+        if colors is not None:
+            colors = np.asarray(colors)
+            if colors.dtype.kind == "f" and colors.ndim == 2 and colors.size and (most := colors[:, :3].max()) > 1:
+                _models.warn(f"colors: up to {most:g}, where 1 reflects all light; are they 0 to 255? then give uint8")
         own = {key: fields.pop(key) for key in _OF_TRIANGLES if key in fields}
         place = self._add_mesh(
             vertices, faces, normals=normals, uv=uv, colors=colors, own=own, fields=fields, static=static
@@ -151,7 +175,21 @@ class Scene(SceneBase):
         return Handle(self, *place)
 
     def add_camera(self, camera=None, *, name="", **fields):
-        """Adds a camera: a `Camera`, or the fields of one. The first of a scene is the one that is used."""
+        """Adds a camera: a `Camera`, or the fields of one. The first of a scene is the one that is used.
+
+        Parameters
+        ----------
+        camera : Camera, optional
+            One that is there; its size becomes that of the scene's picture.
+        name : str
+            What the scene calls it.
+        **fields
+            Those of the list below.
+
+        Returns
+        -------
+        Handle
+        """
         if camera is not None:
             width, height = camera.width, camera.height
             fields = {**camera.to_dict(), **fields}
@@ -162,29 +200,50 @@ class Scene(SceneBase):
     def add(self, thing, **fields):
         """Adds a mesh or a scene of trimesh, or a mesh of Open3D, with the fields that `add_mesh` takes.
 
+        Taken are triangles, texture coordinates, colours of vertices and of faces, and of materials the base colour and
+        its texture. What is not taken is told in one `SceneWarning` for each mesh, with its name.
+
+        `normals` and `smooth_deg` decide how smooth a mesh is. Where neither is given, a mesh of Open3D has its own
+        normals, and is flat without. A mesh of trimesh is flat where all faces around each vertex lie in one plane, as
+        where each has vertices of its own, and else smooth across edges of up to 30 degrees: its `vertex_normals`,
+        which trimesh computes when they are looked at, are taken only if they are given as `normals`.
+
+        Parameters
+        ----------
+        thing : trimesh.Trimesh or trimesh.Scene or open3d.geometry.TriangleMesh or open3d.t.geometry.TriangleMesh
+        **fields
+            What `add_mesh` takes. `name` and `transform` of a scene go before those of its nodes: `room/chair`.
+
         Returns
         -------
         Handle, or a list of them for a scene
         """
         graph = getattr(thing, "graph", None)
         if graph is not None and hasattr(graph, "nodes_geometry"):
-            return [self._add_node(thing, node, fields) for node in graph.nodes_geometry]
-        if hasattr(thing, "faces") and hasattr(thing, "vertices"):
-            return self.add_mesh(thing.vertices, thing.faces, **{**_of_trimesh(thing), **fields})
-        # A mesh of tensors
-        if hasattr(thing, "to_legacy"):
-            thing = thing.to_legacy()
-        if hasattr(thing, "triangles") and hasattr(thing, "vertices"):
-            arrays = np.asarray(thing.vertices), np.asarray(thing.triangles)
-            return self.add_mesh(*arrays, **{**_of_open3d(thing), **fields})
-        raise TypeError(f"a {type(thing).__name__} has neither vertices and faces nor vertices and triangles")
+            return _models.add_graph(self, thing, fields)
+        model = _models.of(thing)
+        if model is None:
+            raise TypeError(f"a {type(thing).__name__} has neither vertices and faces nor vertices and triangles")
+        return model.add(self, fields.get("name"), fields)[0]
 
-    def _add_node(self, scene, node, fields):
-        matrix, geometry = scene.graph[node]
-        outer = fields.get("transform")
-        if outer is not None:
-            matrix = np.asarray(outer, dtype=np.float64) @ matrix
-        return self.add(scene.geometry[geometry], **{"name": str(node), **fields, "transform": matrix})
+    def remove(self, thing, *, family=None):
+        """Removes a thing: a shape, a light, a camera, a material or a texture.
+
+        Handles of other things stay theirs. What names a material or a texture that was removed is told by the next
+        render, unless another one of that name was added.
+
+        Parameters
+        ----------
+        thing : str or Handle
+            Its name, or what `scene[name]` and the methods that add give.
+        family : {"shape", "light", "camera", "material", "texture"}, optional
+            Of which family it is. Without it, it is the first of that name, in this order, as in `scene[name]`.
+        """
+        if isinstance(thing, Handle):
+            place = thing._family, thing._number
+        else:
+            place = self._find(thing, family)
+        self._remove(*place)
 
     def render_many(self, cameras, *, buffers=None, workers=None, **options):
         """Renders the scene from many cameras, on all processors, and yields each `Render` in order.
@@ -194,7 +253,7 @@ class Scene(SceneBase):
         Parameters
         ----------
         cameras : iterable of Camera, str or dict
-        buffers : list of str, optional
+        buffers : str or list of str, optional
         workers : int, optional
             Pictures that are rendered at once, each on one thread; as many as there are processors unless said.
         **options
@@ -211,18 +270,28 @@ class Scene(SceneBase):
             still_wanted(0, 0)
             return self.render(camera=camera, buffers=buffers, threads=1, progress=still_wanted, **options)
 
-        pool = ThreadPoolExecutor(workers, thread_name_prefix="firstlight")
-        pending = deque()
+        process, pool, pending = None, None, deque()
+
+        def threads():
+            """Those of this process: others after a fork, which copies none of them into the child."""
+            nonlocal process, pool
+            if process != os.getpid():
+                process, pool = os.getpid(), ThreadPoolExecutor(workers, thread_name_prefix="firstlight")
+                for k, (camera, _) in enumerate(pending):
+                    pending[k] = camera, pool.submit(one, camera)
+            return pool
+
         try:
             for camera in cameras:
-                pending.append(pool.submit(one, camera))
+                pending.append((camera, threads().submit(one, camera)))
                 if len(pending) > workers:
-                    yield pending.popleft().result()
-            while pending:
-                yield pending.popleft().result()
+                    yield pending.popleft()[1].result()
+            while threads() and pending:
+                yield pending.popleft()[1].result()
         finally:
             stop.set()
-            pool.shutdown(wait=True, cancel_futures=True)
+            if process == os.getpid():
+                pool.shutdown(wait=True, cancel_futures=True)
 
     def cast(self, origins, directions, *, time=0.0):
         """What each of many rays meets first, on all processors.
@@ -252,7 +321,7 @@ class Scene(SceneBase):
         points : array of shape (..., 3)
             In metres, world space.
         light : str or int
-            The light's name, or which it is in the scene's order.
+            The light's name, or which it is in the scene's order, from 1 on: 1 is that of the buffer `light:#1`.
         normals : array of shape (..., 3), optional
             The unit normal at points on surfaces: what is below their horizon is not seen.
 
@@ -270,7 +339,8 @@ class Scene(SceneBase):
 
     def __repr__(self):
         width, height = self.size
-        return f"<firstlight.Scene {width} x {height}>"
+        counts = [f"{count} {family}{'s' * (count != 1)}" for family, count in self._counts() if count > 0]
+        return f"<firstlight.Scene {width} x {height}: {', '.join(counts) or 'empty'}>"
 
 
 def _restored(cls, text, files, meshes):
@@ -288,32 +358,6 @@ def _assets(assets):
     return None, {name: bytes(content) for name, content in assets.items()}
 
 
-def _of_trimesh(mesh):
-    """What a mesh of trimesh has beside its triangles."""
-    found = {}
-    visual = getattr(mesh, "visual", None)
-    kind = getattr(visual, "kind", None)
-    if kind == "vertex":
-        found["colors"] = np.asarray(visual.vertex_colors)
-    elif kind == "texture" and getattr(visual, "uv", None) is not None:
-        found["uv"] = np.asarray(visual.uv)
-    # Those that were given: trimesh would compute some where there are none
-    cache = getattr(mesh, "_cache", None)
-    if cache is not None and "vertex_normals" in cache:
-        found["normals"] = np.asarray(mesh.vertex_normals)
-    return found
-
-
-def _of_open3d(mesh):
-    """What a mesh of Open3D has beside its triangles."""
-    found = {}
-    if len(getattr(mesh, "vertex_normals", ())):
-        found["normals"] = np.asarray(mesh.vertex_normals)
-    if len(getattr(mesh, "vertex_colors", ())):
-        found["colors"] = np.asarray(mesh.vertex_colors)
-    return found
-
-
 def builtin(name):
     """The scene of that name that is built in, one of `firstlight.BUILTIN`."""
     scene = Scene()
@@ -321,38 +365,19 @@ def builtin(name):
     return scene
 
 
-def _named(family, kind):
-    """A method that adds things that are called by a key."""
-
-    def add(self, name, **fields):
-        return Handle(self, *self._add(family, kind, name, fields))
-
-    return add
-
-
-def _unnamed(family, kind):
-    """A method that adds things whose name is a field."""
-
-    def add(self, **fields):
-        return Handle(self, *self._add(family, kind, "", fields))
-
-    return add
-
-
 def _add_methods():
     """One method for each kind of thing that a scene may hold; what it takes are the fields of that kind's table."""
-    families = [("shape", SHAPES, "", _unnamed), ("light", LIGHTS, "_light", _unnamed)]
-    families += [("material", MATERIALS, "_material", _named), ("texture", TEXTURES, "_texture", _named)]
-    for family, kinds, ending, make in families:
+    families = [("shape", SHAPES, ""), ("light", LIGHTS, "_light")]
+    families += [("material", MATERIALS, "_material"), ("texture", TEXTURES, "_texture")]
+    tables = _fields.TABLES
+    for family, kinds, ending in families:
         for kind in kinds:
             name = f"add_{kind.replace('-', '_')}{ending}"
-            if name == "add_mesh":
-                continue
-            method = make(family, kind)
-            method.__name__, method.__qualname__ = name, f"Scene.{name}"
-            table = {"shape": f"[[{kind}]]", "light": f"[[light.{kind}]]"}.get(family, f"[{family}.{kind}.NAME]")
-            method.__doc__ = f"Adds a {family}: the keyword arguments are the fields of `{table}` in a scene's text."
-            setattr(Scene, name, method)
+            if name != "add_mesh":
+                setattr(Scene, name, _fields.method(name, family, kind, tables[family, kind], Handle))
+    own = set(tables["shape", "mesh"]["properties"]) - set(_OF_TRIANGLES)
+    _fields.add_to_doc(Scene.add_mesh, (tables["shape", "instance"], {"of"}), (tables["shape", "mesh"], own))
+    _fields.add_to_doc(Scene.add_camera, (tables["camera", "camera"], ()))
 
 
 _add_methods()

@@ -16,7 +16,7 @@ def render_many(scene, cameras, *, buffers=None, in_flight=None, retries=3, **op
         As it is now: later changes of it are not seen.
     cameras : iterable of Camera, str or dict
         May be endless.
-    buffers : list of str, optional
+    buffers : str or list of str, optional
         As `Scene.render` takes them.
     in_flight : int, optional
         Pictures that are under way or wait to be yielded; twice the processors of the cluster unless said.

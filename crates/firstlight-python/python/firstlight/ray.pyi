@@ -9,7 +9,7 @@ def render_many(
     scene: Scene,
     cameras: Iterable[Camera | str | Mapping[str, Any]],
     *,
-    buffers: Sequence[Buffer] | None = None,
+    buffers: Buffer | Sequence[Buffer] | None = None,
     in_flight: int | None = None,
     retries: int = 3,
     **options: Any,

@@ -37,6 +37,7 @@ pub use given::{PlaneVec, encode_planes};
 pub use patient::write_open;
 pub(crate) use plane::PlaneFile;
 pub use plane::{NamedPlane, Plane, PlaneNumbers, Sampling};
+pub use png::display_bytes;
 pub use quantized::FileSettings;
 pub use stored::{StoredImage, StoredPlane, StoredPlanes};
 pub use view::BufferView;

@@ -299,6 +299,11 @@ impl Plane {
         self.sampling() == Sampling::Center
     }
 
+    /// Whether it takes light: neither the centre ray of a pixel alone says it, nor all its camera rays together.
+    pub fn is_lit(self) -> bool {
+        !self.is_of_center() && !self.is_of_all_rays()
+    }
+
     /// Whether it leads to another moment or camera.
     pub fn is_of_motion(self) -> bool {
         matches!(self, Plane::Motion | Plane::MotionBackward)

@@ -11,7 +11,7 @@ use codec::text_metadata::{ITXtChunk, TEXtChunk};
 use super::plane::BUFFER_KEY;
 use super::{ImageError, NamedPlane, PREFIX, Receipt, SOFTWARE, Window};
 use crate::color::{Display, Encoding, Quantizer};
-use crate::parallel;
+use crate::parallel::{self, CHUNK};
 
 /// Bits a channel.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -77,6 +77,20 @@ pub(super) fn encode(
     let channels = if alpha { "R G B A" } else { "R G B" };
     let meaning = "unit display-encoded; space -; straight alpha, never encoded";
     samples.encode(&samples.described(of, channels, meaning, &receipt.shown_by(Some(display))))
+}
+
+/// The samples of an 8-bit PNG file of a picture, by rows as `pixels` are: display-encoded red, green and blue; with
+/// `alpha` of the straight colour, and alpha after it; without, of the colour as it is, which lies on black.
+///
+/// # Errors
+/// A display outside what it may be.
+pub fn display_bytes(pixels: &[[f32; 4]], display: &Display, alpha: bool) -> Result<Vec<u8>, ImageError> {
+    if let Some(fault) = display.fault() {
+        return Err(ImageError::Display(fault));
+    }
+    let row = u32::try_from(pixels.len().clamp(1, CHUNK)).expect("a chunk is small");
+    let rows = Window { x: 0, y: 0, width: row, height: 1 };
+    Ok(quantize(rows, pixels, Depth::Eight, display, alpha))
 }
 
 /// The samples of a picture.
@@ -266,6 +280,11 @@ mod tests {
         let picture = whole(4, 1, |x, _| pixels[x as usize]);
         let (info, samples) = encoded(&picture, Format::Png8, Encoding::Srgb, 0.0);
         assert_eq!(info.color_type, codec::ColorType::Rgba);
+        let display = Display { encoding: Encoding::Srgb, exposure: 0.0 };
+        assert_eq!(display_bytes(&pixels, &display, true).unwrap(), samples);
+        // On black, 0.25 is 137, whatever covers it
+        let on_black = display_bytes(&pixels, &display, false).unwrap();
+        assert_eq!(on_black, [137, 137, 0, 188, 188, 188, 0, 0, 0, 255, 255, 255]);
         // Alpha is never encoded: 255 / 2 = 127.5, rounded up
         assert_eq!(samples, [188, 188, 0, 128, 188, 188, 188, 255, 0, 0, 0, 0, 0, 0, 0, 0]);
         let (_, samples) = encoded(&picture, Format::Png16, Encoding::Linear, 0.0);

@@ -12,6 +12,7 @@ use super::{
 use crate::context::{CompileContext, show};
 use crate::describe::{ColorDesc, SamplesDesc};
 use crate::math::{DVec3, ErrorBound, LANES, Ray, Vec3, Vec3x16};
+use crate::parallel;
 use crate::shape::{Parallelogram, PlaneSide};
 
 /// The largest number of points on one light.
@@ -356,8 +357,8 @@ impl Area {
     /// The sampled points.
     #[inline(always)]
     pub(crate) fn points(&self) -> &Points {
-        self.points
-            .get_or_init(|| Points::new(&self.shape, (0..self.count).map(|k| self.set.point(k, self.count, self.seed))))
+        let make = || Points::new(&self.shape, (0..self.count).map(|k| self.set.point(k, self.count, self.seed)));
+        parallel::kept(&self.points, make)
     }
 
     /// The points that stand for some places of the unit square, sixteen by sixteen. In lanes where it is called within

@@ -11,7 +11,7 @@ use serde_json::{Value as Json, json};
 
 use super::film::Film;
 use super::masks::{Mask, ObjectMasks};
-use crate::image::Window;
+use crate::image::{Plane, PlaneNumbers, Window};
 use crate::scene::Scene;
 
 /// A data set that grows picture by picture.
@@ -33,13 +33,35 @@ impl Coco {
     }
 
     /// Adds a picture with all objects that are seen in it, and says whether it could: not where the film has no
-    /// [`Plane::ObjectId`](crate::Plane::ObjectId). `file_name` is what the data set calls the picture's file. All
+    /// [`Plane::ObjectId`]. `file_name` is what the data set calls the picture's file. All
     /// names in the scene become categories, seen or not, so that they are the same in all of its pictures.
     pub fn add(&mut self, scene: &Scene, film: &Film, file_name: &str) -> bool {
-        let Some(masks) = scene.object_masks(film) else { return false };
+        let Some(PlaneNumbers::Wholes(ids)) = film.numbers(Plane::ObjectId) else { return false };
+        self.add_some(scene, film.window(), ids, &|_| true, file_name);
+        true
+    }
+
+    /// Adds a picture with those objects that are `wanted`, by their places in
+    /// [`object_names`](Scene::object_names); the names of no others become categories. `ids` are those of
+    /// [`Plane::ObjectId`] in a window of the scene's film, by rows.
+    ///
+    /// # Panics
+    /// If there are fewer ids than pixels, or one that is no object's.
+    pub fn add_some(
+        &mut self,
+        scene: &Scene,
+        window: Window,
+        ids: &[u32],
+        wanted: &(dyn Fn(usize) -> bool + Sync),
+        file_name: &str,
+    ) {
+        let wanted_id = |id: u32| if id > 0 && wanted(id as usize - 1) { id } else { 0 };
+        let ids: Vec<u32> = ids.iter().map(|id| wanted_id(*id)).collect();
+        let masks = scene.masks_of_ids(window, &ids);
         let names = scene.object_names();
-        let categories: Vec<usize> = names.iter().map(|name| self.category(*name)).collect();
-        let (image, Window { width, height, .. }) = (self.images.len() + 1, film.window());
+        let category = |(object, name): (usize, &Option<&str>)| wanted(object).then(|| self.category(*name));
+        let categories: Vec<Option<usize>> = names.iter().enumerate().map(category).collect();
+        let (image, Window { width, height, .. }) = (self.images.len() + 1, window);
         self.images.push(json!({ "id": image, "file_name": file_name, "width": width, "height": height }));
         for ObjectMasks { id, visible, amodal } in masks {
             let object = id as usize - 1;
@@ -60,12 +82,21 @@ impl Coco {
                 "visible_fraction": visible_fraction,
             }));
         }
-        true
+    }
+
+    /// The category of an object of that name: the last part of it, `unnamed` if it has none.
+    pub fn category_of(name: Option<&str>) -> &str {
+        name.and_then(|name| name.rsplit('/').next()).filter(|own| !own.is_empty()).unwrap_or(UNNAMED)
+    }
+
+    /// How many pictures, annotations and categories it has.
+    pub fn counts(&self) -> [usize; 3] {
+        [self.images.len(), self.annotations.len(), self.categories.len()]
     }
 
     /// The id of the category of a name.
     fn category(&mut self, name: Option<&str>) -> usize {
-        let own = name.and_then(|name| name.rsplit('/').next()).filter(|own| !own.is_empty()).unwrap_or(UNNAMED);
+        let own = Self::category_of(name);
         if let Some(id) = self.categories.get(own) {
             return *id;
         }

@@ -13,6 +13,7 @@ use super::leaves::{Halved, HalvedBlock};
 use crate::accel::dispatch_all;
 use crate::light::{Area, FineCell, Points, SERIES, SeriesPart, with_gaps};
 use crate::math::{LANES, Vec3};
+use crate::parallel;
 use crate::scene::Scene;
 use crate::visibility::{ShadowView, Target, Viewpoint};
 
@@ -150,7 +151,7 @@ impl<'a> Asker<'a> {
         let kept = &self.ladder.series[series][(count / FIRST).ilog2() as usize][usize::from(first > 0)];
         AskedRung::Kept(kept.get_or_init(|| {
             let part = &PARTS[series][(count / FIRST).ilog2() as usize][usize::from(first > 0)];
-            let part = part.get_or_init(|| SeriesPart::new(series, first as u32, count as u32));
+            let part = parallel::kept(part, || SeriesPart::new(series, first as u32, count as u32));
             Rung::new(part.cells.clone(), count.ilog2(), self.area.points_at(part.places.iter().copied()))
         }))
     }

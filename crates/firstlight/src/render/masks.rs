@@ -109,7 +109,15 @@ impl Scene {
     /// [`Plane::ObjectId`] was not asked for.
     pub fn object_masks(&self, film: &Film) -> Option<Vec<ObjectMasks>> {
         let Some(PlaneNumbers::Wholes(ids)) = film.numbers(Plane::ObjectId) else { return None };
-        let window = film.window();
+        Some(self.masks_of_ids(film.window(), ids))
+    }
+
+    /// The masks of the objects whose ids are given, for each pixel of a window of this scene's film by rows, in the
+    /// order of their ids. Those that are given as 0 have none.
+    ///
+    /// # Panics
+    /// If there are fewer ids than pixels.
+    pub fn masks_of_ids(&self, window: Window, ids: &[u32]) -> Vec<ObjectMasks> {
         let Window { x: left, y: top, width, height } = window;
         // Of each id, from 0 on; an object that is not seen keeps none
         let most = ids.iter().copied().max().unwrap_or(0) as usize;
@@ -149,7 +157,7 @@ impl Scene {
                 }
             }
         }
-        Some(masks.into_iter().flatten().collect())
+        masks.into_iter().flatten().collect()
     }
 }
 

@@ -324,7 +324,7 @@ fn expose(
     let result = Mutex::new((Film::new(scene, window, planes), nothing));
     let of_centers = planes.iter().any(|buffer| buffer.plane().is_of_center());
     let of_all_rays = CoveragePlanes::new(scene, planes);
-    let is_lit = planes.iter().map(|buffer| buffer.plane()).any(|of| !of.is_of_center() && !of.is_of_all_rays());
+    let is_lit = planes.iter().any(|buffer| buffer.plane().is_lit());
     let lights = Lights::new(scene);
     // Where every light is sampled at every ray, the bits are those of the plain renderer
     let is_sampled = lights.emitters.iter().all(Option::is_none);
