@@ -24,6 +24,7 @@ mod smooth;
 mod stl;
 mod text;
 mod tidy;
+mod turned;
 mod weld;
 
 use std::ops::{ControlFlow, Range};
