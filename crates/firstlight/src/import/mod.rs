@@ -165,6 +165,9 @@ pub fn read_mesh(
     bytes: &[u8],
     progress: &(dyn Fn(u64, u64) -> ControlFlow<()> + Sync),
 ) -> Result<MeshData, ImportError> {
+    if bytes.is_empty() {
+        return Err(ImportError::Empty { file: name.to_owned() });
+    }
     // Whatever its ending says
     if let Some(foreign) = foreign(bytes, WantedFile::Mesh) {
         let (message, hint) = (foreign.message(WantedFile::Mesh), foreign.hint(WantedFile::Mesh).to_owned());

@@ -82,7 +82,8 @@ pub(crate) fn read_mesh_bytes(
                 AssetError::TooLarge { .. } => "split it",
                 AssetError::Io(_) => "a mesh is a plain file that can be read",
             };
-            cx.error("file", format!("{:?}{colon} {error}", file.0), Some(hint));
+            let slashes = error.slashes(&file.0);
+            cx.error("file", format!("{:?}{colon} {error}", file.0), Some(slashes.as_deref().unwrap_or(hint)));
             return None;
         }
     };
