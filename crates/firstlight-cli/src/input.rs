@@ -153,6 +153,10 @@ fn read_text(
     own: Option<PathBuf>,
     reading: &ReadingArgs,
 ) -> Result<Input, Failure> {
+    if text.trim_ascii().is_empty() {
+        let hint = "a scene is TOML or JSON text, a model a PLY, STL or OBJ file";
+        return Err(Failure::Work(format!("{}: is empty; {hint}", shown(Path::new(&name)))));
+    }
     // A scene reads its own folder
     let assets = Remembered::new(folder.map(|folder| folder_assets(folder, reading)).transpose()?);
     let parsed = SceneDesc::parse(&name, text, &assets);
@@ -325,11 +329,16 @@ impl Input {
 fn open(path: &Path) -> Result<File, String> {
     match File::open(path) {
         Err(e) if e.kind() == io::ErrorKind::NotFound => {
+            let name = path.to_string_lossy();
+            if cfg!(not(windows)) && name.contains('\\') {
+                let parted = PathBuf::from(name.replace('\\', "/"));
+                return Err(format!("no such file; `/` parts folders and files: {}", shown(&parted)));
+            }
             // A name with an ending or a folder is a file's; any other may be a built-in scene's, mistyped
             if path.extension().is_some() || path.components().count() != 1 {
                 return Err("no such file".into());
             }
-            let (near, names) = scenes::near_and_all(&path.to_string_lossy());
+            let (near, names) = scenes::near_and_all(&name);
             Err(format!("no such file, and no built-in scene; {near}built in are {names}"))
         }
         Err(e) => Err(e.to_string()),

@@ -113,11 +113,11 @@ pub fn mesh(
     uv: Option<&Bound<'_, PyAny>>,
     colors: Option<&Bound<'_, PyAny>>,
 ) -> PyResult<MeshData> {
-    let mut mesh = MeshData::default();
+    // What no face has does not decide where the vertices count from
+    let mut mesh = MeshData { triangles: triangles(faces)?, ..MeshData::default() };
     with_floats(vertices, "vertices", &[3], |[rows, _], at| {
         mesh.set_positions(rows, |i| [at(i, 0), at(i, 1), at(i, 2)]);
     })?;
-    mesh.triangles = triangles(faces)?;
     if let Some(normals) = normals {
         mesh.normals = with_floats(normals, "normals", &[3], |[rows, _], at| {
             (0..rows).map(|i| [at(i, 0) as f32, at(i, 1) as f32, at(i, 2) as f32]).collect()

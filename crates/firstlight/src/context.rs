@@ -41,6 +41,14 @@ pub enum AssetError {
     Io(String),
 }
 
+impl AssetError {
+    /// What to do where `path`, of which there is no such file, has folders as Windows writes them.
+    pub(crate) fn slashes(&self, path: &str) -> Option<String> {
+        (*self == AssetError::NotFound && path.contains('\\'))
+            .then(|| format!("`/` parts folders and files: write \"{}\"", path.replace('\\', "/")))
+    }
+}
+
 /// No files at all: for scenes that name none.
 pub struct NoAssets;
 
@@ -265,7 +273,13 @@ impl CompileContext {
         if most > 1.0 {
             let message =
                 format!("the colours of its vertices go up to {most}: that reflects more light than there is");
-            self.advise("", message, Some("they are 0 to 1; a file may have bytes, as whole numbers of one byte each"));
+            let hint = match most {
+                2.0..=255.0 => {
+                    "are they 0 to 255? divide them by 255, or write whole numbers of one byte each (PLY `uchar`)"
+                }
+                _ => "they are fractions from 0 to 1, linear; a file may also have whole numbers of one byte each",
+            };
+            self.advise("", message, Some(hint));
         }
     }
 

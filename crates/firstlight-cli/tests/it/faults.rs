@@ -36,7 +36,6 @@ fn faults_of_standard_input_have_a_place_too() {
 #[test]
 fn what_is_no_scene_is_a_fault_and_no_panic() {
     let folder = Folder::new();
-    folder.put("empty.toml", "");
     folder.put("bytes.toml", (0..=255).collect::<Vec<u8>>());
     folder.put("text.json", "{\"render\": ");
     folder.put("course.txt", "camera_id 1 2\nlight 3\n");
@@ -45,9 +44,6 @@ fn what_is_no_scene_is_a_fault_and_no_panic() {
             folder.run(&format!("{command} {name}")).exits(1).says(&[name]);
         }
     }
-    // Whether nothing is a scene is the library's to say; the program ends well either way
-    let ran = folder.run("check empty.toml");
-    assert!(matches!(ran.code, Some(0 | 1)), "{}", ran.stderr);
 }
 
 #[test]
@@ -173,14 +169,61 @@ fn a_model_is_spoken_of_by_its_name() {
     let folder = Folder::new();
     std::fs::create_dir(folder.path("models")).unwrap();
     folder.put("models/a.obj", MODEL.replace("f 1", "usemtl clay\nf 1"));
-    let named = "warning: models/a.obj: names a material that is not described: \"clay\"; ";
-    let ran = folder.run("check models/a.obj").done().says(&[named]);
-    assert_eq!(ran.stderr.lines().count(), 1, "{}", ran.stderr);
+    // Nothing can be done about it but to write a scene: no fault of the model
+    let named = "note: models/a.obj: names a material that is not described: \"clay\"; ";
+    let own = "their faces have the mesh's own material; a scene describes one as [material.phong.NAME]\n";
+    for command in ["check models/a.obj", "check models/a.obj --strict"] {
+        let ran = folder.run(command).done().says(&[&format!("{named}{own}")]);
+        assert_eq!(ran.stderr.lines().count(), 1, "{}", ran.stderr);
+    }
+    folder.put("models/a.obj", format!("mtllib a.mtl\n{}", MODEL.replace("f 1", "usemtl clay\nf 1")));
+    folder.put("models/a.mtl", "newmtl clay\nKd 1 0 0\n");
+    for command in ["check models/a.obj", "check models/a.obj --strict"] {
+        let ran = folder.run(command).done().says(&[&format!("{named}.mtl files are not read: {own}")]);
+        assert_eq!(ran.stderr.lines().count(), 1, "{}", ran.stderr);
+    }
     folder.put("models/a.obj", "v 0 0 0\nv 1 1 1\nv 2 2 z\n");
     folder.run("check models/a.obj").exits(1).says(&["error: models/a.obj:3: v: `z`"]);
     folder.put("models/a.obj", "v 0 0 0\n".repeat(3) + "f 1 2 3\n");
     folder.run("check models/a.obj").done().says(&["note: models/a.obj: it has no size"]);
-    folder.run("check models/b.obj").exits(1).says(&["error: models/b.obj: no such file"]);
+    folder.run("check models/b.obj").exits(1).says(&["error: models/b.obj: no such file\n"]);
+    folder.run("check models\\a.obj").exits(1).says(&["`/` parts folders and files: models/a.obj\n"]);
+    folder.run("check models\\a.toml").exits(1).says(&["`/` parts folders and files: models/a.toml\n"]);
+    // Colours that look like bytes
+    folder.put("models/a.obj", "v 0 0 0 255 0 0\nv 1 0 0 0 128 0\nv 0 1 0 0 0 64\nf 1 2 3\n");
+    let ran = folder.run("check models/a.obj --strict").done();
+    let note = "note: models/a.obj: the colours of its vertices go up to 255: that reflects more light than there is; \
+                are they 0 to 255? divide them by 255, or write whole numbers of one byte each (PLY `uchar`)\n";
+    assert_eq!(ran.stderr, note);
+    // Those of what no face has are none
+    folder.put("models/a.obj", "v 0 0 0 1 0 0\nv 1 0 0 0 1 0\nv 0 1 0 0 0 1\nf 1 2 3\nv nan 0 0 255 0 0\n");
+    assert_eq!(folder.run("check models/a.obj --strict").done().stderr, "");
+}
+
+#[test]
+fn an_empty_file_is_said_to_be_empty() {
+    let folder = Folder::new();
+    for name in ["a.obj", "a.ply", "a.stl"] {
+        folder.put(name, "");
+        for command in ["check", "info", "render"] {
+            let words = format!("error: {name}: is empty; give a PLY, STL or OBJ file\n");
+            folder.run(&format!("{command} {name}")).exits(1).says(&[&words]);
+        }
+    }
+    for name in ["a", "a.toml", "a.json", "-"] {
+        let words = "is empty; a scene is TOML or JSON text, a model a PLY, STL or OBJ file\n";
+        for text in ["", " \n\n"] {
+            let ran = match name {
+                "-" => folder.run_with_input("check -", text.as_bytes()),
+                name => {
+                    folder.put(name, text);
+                    folder.run(&format!("check {name}"))
+                }
+            };
+            let ran = ran.exits(1).says(&[words]);
+            assert_eq!(ran.stderr.lines().count(), 1, "{}", ran.stderr);
+        }
+    }
 }
 
 #[test]

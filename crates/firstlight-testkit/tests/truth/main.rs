@@ -17,6 +17,7 @@ mod known;
 mod links;
 mod many_lights;
 mod masks;
+mod meshes;
 mod motion;
 mod near;
 mod relight;

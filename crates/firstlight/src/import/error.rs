@@ -24,6 +24,12 @@ impl fmt::Display for MeshPlace {
 /// Why a mesh could not be read, with what is allowed and what to do.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum ImportError {
+    /// A file without a byte.
+    #[error("{file}: is empty; give a PLY, STL or OBJ file")]
+    Empty {
+        /// The file, as it was named.
+        file: String,
+    },
     /// Bytes that are no mesh of a known kind.
     #[error("{file}: is not a mesh of a known kind; give a PLY, STL or OBJ file")]
     UnknownKind {
@@ -135,12 +141,41 @@ fn line_of(bytes: &[u8], offset: usize) -> u64 {
     line
 }
 
-/// A piece of a file as it can be shown in a message: at most 40 characters, nothing that cannot be printed.
+/// A piece of a file as it can be shown in a message: at most 40 characters. What is no text is not shown.
 pub(super) fn shown(word: &[u8]) -> String {
-    let start = String::from_utf8_lossy(&word[..word.len().min(160)]);
+    let start = match std::str::from_utf8(&word[..word.len().min(160)]) {
+        Ok(start) => start,
+        // Cut within a character
+        Err(error) if word.len() > 160 && error.error_len().is_none() => {
+            std::str::from_utf8(&word[..error.valid_up_to()]).unwrap_or_default()
+        }
+        Err(_) => return NO_TEXT.into(),
+    };
+    if start.chars().any(|c| c.is_control() && !c.is_whitespace()) {
+        return NO_TEXT.into();
+    }
     let mut text: String = start.chars().take(40).flat_map(char::escape_debug).collect();
     if start.chars().count() > 40 || word.len() > 160 {
         text.push_str("...");
     }
     format!("`{text}`")
+}
+
+/// In place of what cannot be shown.
+const NO_TEXT: &str = "a word that is no text";
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn text_is_quoted_and_bytes_are_not() {
+        assert_eq!(shown(b"facet"), "`facet`");
+        assert_eq!(shown("d\u{e9}j\u{e0}\tvu".as_bytes()), "`d\u{e9}j\u{e0}\\tvu`");
+        assert_eq!(shown(b""), "``");
+        assert_eq!(shown("\u{20ac}".repeat(100).as_bytes()), format!("`{}...`", "\u{20ac}".repeat(40)));
+        for bytes in [&b"\xff\xfe1"[..], b"a\x01b", b"\0", "a\u{7f}".as_bytes(), b"caf\xe9"] {
+            assert_eq!(shown(bytes), "a word that is no text", "{bytes:?}");
+        }
+    }
 }

@@ -1,6 +1,7 @@
 //! Meshes that somebody makes in memory: from numbers of 64 bits, checked, and known by their content.
 
 use super::MeshData;
+use super::tidy::used_vertices;
 use crate::error::{Diagnostic, Severity};
 use crate::math::{DVec3, origin_for};
 
@@ -11,22 +12,29 @@ const MAX_COLOR: f32 = 1e6;
 /// Faults that are told.
 const TOLD: usize = 64;
 
-/// Positions in 32 bits, and what was taken off them: 0 but where they are far from 0.
-pub(crate) fn from_own_origin(count: usize, at: impl Fn(usize) -> [f64; 3]) -> (Vec<[f32; 3]>, [f64; 3]) {
-    let corners = (0..count).map(|i| [DVec3::from(at(i)); 2]);
+/// Positions in 32 bits, and what was taken off them: 0 but where all that are `used` are far from 0.
+pub(crate) fn from_own_origin(
+    count: usize,
+    used: impl Fn(usize) -> bool,
+    at: impl Fn(usize) -> [f64; 3],
+) -> (Vec<[f32; 3]>, [f64; 3]) {
+    let corners = (0..count).filter(|i| used(*i)).map(|i| [DVec3::from(at(i)); 2]);
     let bounds = corners.reduce(|[low, high], [a, b]| [low.min(a), high.max(b)]);
     let origin = bounds.map_or(DVec3::ZERO, origin_for);
     ((0..count).map(|i| (DVec3::from(at(i)) - origin).as_vec3().to_array()).collect(), origin.to_array())
 }
 
 impl MeshData {
-    /// Sets `positions` and `origin` from `count` places in 64 bits, each of them asked for twice.
+    /// Sets `positions` and `origin` from `count` places in 64 bits, each of them asked for twice. Where `triangles`
+    /// are set, the places that they have decide the origin.
     pub fn set_positions(&mut self, count: usize, at: impl Fn(usize) -> [f64; 3]) {
-        (self.positions, self.origin) = from_own_origin(count, at);
+        let used = used_vertices(count, &self.triangles);
+        let is_used = |i: usize| used[i] || self.triangles.is_empty();
+        (self.positions, self.origin) = from_own_origin(count, is_used, at);
     }
 
-    /// What keeps it from being a mesh of a scene: lists of other lengths, indices and numbers out of range. At most
-    /// 64 faults are told.
+    /// What keeps it from being a mesh of a scene: lists of other lengths, indices out of range, and numbers out of
+    /// range of vertices that triangles have. At most 64 faults are told.
     pub fn faults(&self) -> Vec<Diagnostic> {
         let mut faults = Vec::new();
         let mut tell = |path: String, message: String, hint: &str| {
@@ -47,8 +55,9 @@ impl MeshData {
             let message = format!("{length} of them for {vertices} positions");
             tell(field.into(), message, "give one for each vertex, or none");
         }
-        let origin = DVec3::from(self.origin);
-        for (i, position) in self.positions.iter().enumerate() {
+        let (origin, used) = (DVec3::from(self.origin), self.used_vertices());
+        let is_used = |i: usize| used.get(i).is_none_or(|used| *used);
+        for (i, position) in self.positions.iter().enumerate().filter(|(i, _)| is_used(*i)) {
             let place = DVec3::from(position.map(f64::from)) + origin;
             if !(place.abs().max_element() <= MAX_COORDINATE && place.is_finite()) {
                 let message = format!("{} is outside [-2.5e8, 2.5e8]", crate::context::show(&place.to_array()));
@@ -61,18 +70,19 @@ impl MeshData {
                 tell(format!("triangles[{i}]"), message, "");
             }
         }
-        for (i, [r, g, b, _]) in self.colors.iter().enumerate() {
+        for (i, [r, g, b, _]) in self.colors.iter().enumerate().filter(|(i, _)| is_used(*i)) {
             if ![r, g, b].into_iter().all(|c| (0.0..=MAX_COLOR).contains(c)) {
                 let message = format!("[{r}, {g}, {b}] is outside [0, 1e6]");
                 tell(format!("colors[{i}]"), message, "a colour is linear red, green, blue");
             }
         }
-        for (i, normal) in self.normals.iter().enumerate() {
+        for (i, normal) in self.normals.iter().enumerate().filter(|(i, _)| is_used(*i)) {
             if !normal.iter().all(|c| c.abs() <= 1e30) {
                 tell(format!("normals[{i}]"), format!("{normal:?} is outside [-1e30, 1e30]"), "");
             }
         }
-        for (i, uv) in self.uvs.iter().flatten().enumerate() {
+        let uvs = self.uvs.iter().flat_map(|set| set.iter().enumerate());
+        for (i, uv) in uvs.filter(|(i, _)| is_used(*i)) {
             if !uv.iter().all(|c| c.abs() <= 1e30) {
                 tell(format!("uvs[{i}]"), format!("{uv:?} is outside [-1e30, 1e30]"), "");
             }
@@ -151,6 +161,12 @@ mod tests {
         assert_eq!(paths[..6], expected);
         assert_eq!(paths[6..], ["uvs[0]", "uvs[1]", "uvs[2]"]);
         assert_eq!(MeshData::default().faults().len(), 2);
+        // What no triangle has may hold anything
+        let mut unused = triangle();
+        unused.positions.extend([[f32::NAN; 3], [1e30; 3]]);
+        unused.colors = vec![[0.5; 4]; 3];
+        unused.colors.extend([[-1.0; 4], [f32::INFINITY; 4]]);
+        assert_eq!(unused.faults(), []);
         mesh.triangles = vec![[9; 3]; 1000];
         assert_eq!(mesh.faults().len(), TOLD);
     }
@@ -161,6 +177,15 @@ mod tests {
         mesh.set_positions(2, |i| [4e6 + 0.001 * i as f64, 1.0, 2.0]);
         let places: Vec<f64> = mesh.positions.iter().map(|p| f64::from(p[0]) + mesh.origin[0]).collect();
         assert!((places[1] - places[0] - 0.001).abs() < 1e-6, "{places:?}");
+    }
+
+    #[test]
+    fn what_no_triangle_has_does_not_move_the_origin() {
+        let at = |i: usize| [[4e6, 0.0, 0.0], [4e6 + 1.0, 0.0, 0.0], [4e6, 1.0, 0.0], [0.0; 3], [f64::NAN; 3]][i];
+        let mut mesh = MeshData { triangles: vec![[0, 1, 2]], ..MeshData::default() };
+        mesh.set_positions(5, at);
+        assert!((mesh.origin[0] - 4e6).abs() <= 1.0, "{:?}", mesh.origin);
+        assert_eq!(mesh.faults(), []);
     }
 
     #[test]

@@ -23,6 +23,8 @@ mod report;
 mod smooth;
 mod stl;
 mod text;
+mod tidy;
+mod turned;
 mod weld;
 
 use std::ops::{ControlFlow, Range};
@@ -34,6 +36,7 @@ pub use error::{ImportError, MeshPlace};
 pub(crate) use foreign::{Foreign, WantedFile, foreign};
 pub(crate) use given::from_own_origin;
 pub use report::MeshReport;
+pub(crate) use tidy::used_vertices;
 
 /// Vertices and triangles are counted in 32 bits, with one number to spare for "none".
 const MAX_COUNT: u64 = (1 << 32) - 2;
@@ -42,7 +45,8 @@ const MAX_COUNT: u64 = (1 << 32) - 2;
 ///
 /// Every list "per vertex" has the length of `positions` or is empty; every list "per triangle" that of `triangles`, or
 /// is empty. Indices are in range. Numbers may be anything a file can say, NaN and infinities too: whoever uses them
-/// leaves out the triangles whose positions are not finite.
+/// leaves out the triangles whose positions are not finite. Scenes also leave out the vertices of no triangle, whatever
+/// their numbers, and make normals of length 1; where one has no direction they take that of the facet.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct MeshData {
     /// Where the vertices are, in the file's units and axes, less `origin`.
@@ -137,7 +141,7 @@ impl MeshFormat {
         let mut mesh = read([0.0; 3])?;
         // What is far from 0 has lost its small digits: once more, without what all of it has in common. STL has no
         // more digits
-        let origin = mesh.bounds().map_or(DVec3::ZERO, origin_for).to_array();
+        let origin = mesh.used_bounds().map_or(DVec3::ZERO, origin_for).to_array();
         if self != Self::Stl && origin != [0.0; 3] {
             mesh = read(origin)?;
             mesh.origin = origin;
@@ -161,6 +165,9 @@ pub fn read_mesh(
     bytes: &[u8],
     progress: &(dyn Fn(u64, u64) -> ControlFlow<()> + Sync),
 ) -> Result<MeshData, ImportError> {
+    if bytes.is_empty() {
+        return Err(ImportError::Empty { file: name.to_owned() });
+    }
     // Whatever its ending says
     if let Some(foreign) = foreign(bytes, WantedFile::Mesh) {
         let (message, hint) = (foreign.message(WantedFile::Mesh), foreign.hint(WantedFile::Mesh).to_owned());

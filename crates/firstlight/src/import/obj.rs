@@ -26,7 +26,7 @@ use super::text::{Cursor, pieces};
 use super::weld::weld;
 use super::{ImportFault, MAX_COUNT, MeshData, MeshPart, Progress, all};
 use crate::parallel::{self, CHUNK};
-use piece::{Event, MAX_INDEX, NONE, Piece, RELATIVE, corner, skip_blanks, skip_line};
+use piece::{Event, MAX_INDEX, NONE, Piece, RELATIVE, corner, skip_blanks, skip_line, word};
 
 /// Bytes of text that one thread reads at a time.
 const PIECE: usize = 1 << 20;
@@ -152,7 +152,7 @@ fn place_of(bytes: &[u8], start: usize, wanted: usize) -> usize {
     let mut seen = 0;
     while !text.at_end() {
         skip_blanks(&mut text);
-        let word = text.word();
+        let word = word(&mut text);
         if word.starts_with(b"#") {
             text.rest_of_line();
             text.pass_line_end();
@@ -398,6 +398,15 @@ mod tests {
         let mesh = read("v 0 0 0 1 0.5 0\nv 1 0 0 2\nv 1 \\\n 1 \\\r\n 0\nf 1 2 \\\n3 # 4 5\n# a path\\\nf 3 2 1\n");
         assert_eq!(mesh.colors, [[1.0, 0.5, 0.0, 1.0], [1.0; 4], [1.0; 4]]);
         assert_eq!(mesh.triangles, [[0, 1, 2], [2, 1, 0]]);
+        // Directly after a word or a number, within names, and where the file ends
+        let text = "v\\\n0 0 0\nv 1\\\r\n0 0\nvt 1\\\n2\nv 1 1 0\\\n0.5\\\n0.25 1\ng one\\\ntwo\nf\\\n1 2\\\n3\ns\\\n";
+        for end in ["off\nf 3 2 1", "off\nf\\\r3 2 1\\", "off\nf 3 2 1 \\", "\\\noff\nf 3 2 1\n\\"] {
+            let mesh = read(&format!("{text}{end}"));
+            assert_eq!(mesh.triangles, [[0, 1, 2], [2, 1, 0]], "{end:?}");
+            assert_eq!(mesh.positions, [[0.0; 3], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0]], "{end:?}");
+            assert_eq!((mesh.colors[2], mesh.parts[0].group.as_str()), ([0.5, 0.25, 1.0, 1.0], "one"));
+            assert_eq!((&mesh.smoothing[..], mesh.notes.len()), (&[0, 0][..], 0));
+        }
     }
 
     #[test]

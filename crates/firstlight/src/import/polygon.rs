@@ -1,14 +1,23 @@
 //! Polygons to triangles.
 //!
 //! A polygon is laid onto the axis plane that its own plane (Newell's method) is nearest to. Where all triangles of the
-//! fan from its first corner turn the same way, the fan is taken; that is so for every convex polygon. Otherwise ears
-//! are cut off, always the first in order (G. H. Meisters 1975, "Polygons have ears"). Which corners are ears is
-//! remembered, so that cutting takes quadratic time, not cubic. Polygons of more than [`SMALL`] corners are cut in
-//! [`rounds`] instead.
+//! fan from its first corner turn the same way, the fan is taken; that is so for every convex polygon without corners
+//! on straight edges. Otherwise ears are cut off, always the first in order (G. H. Meisters 1975, "Polygons have
+//! ears"). Which corners are ears is remembered, so that cutting takes quadratic time, not cubic. Polygons of more than
+//! [`SMALL`] corners are cut in [`rounds`] instead.
+//!
+//! **Corners on straight edges stay corners.** A triangle without area has no place in the surface: one that is cut off
+//! at a corner on a straight edge leaves that edge whole, and a neighbour that has the corner too meets it in a
+//! T-junction, through which rays pass. So neither a fan nor an ear has a triangle that is flat within the rounding of
+//! its coordinates ([`Flatness`]), and an ear has no other corner on its edges. Every polygon that does not cross
+//! itself has such ears until all of it is cut, unless all corners are in one line: in G. H. Meisters' proof, a corner
+//! on a diagonal parts the polygon as a corner inside of it does.
 
+mod flatness;
 mod rounds;
 
 use crate::parallel;
+use flatness::Flatness;
 use rounds::Rounds;
 
 /// The largest polygon that is a fan, or whose ears are cut in order.
@@ -95,6 +104,7 @@ fn area(a: FlatPoint, b: FlatPoint, c: FlatPoint) -> f64 {
 #[derive(Default)]
 struct Ears {
     points: Vec<FlatPoint>,
+    flatness: Flatness,
     next: Vec<u32>,
     previous: Vec<u32>,
     ear: Vec<bool>,
@@ -114,7 +124,8 @@ impl Ears {
         counts.small += u64::from(size < 3);
         if size > 3 && self.lay(start, size, position) {
             if size > SMALL {
-                counts.tangled += u64::from(self.rounds.cut(&self.points, start as u32, triangles).tangled);
+                counts.tangled +=
+                    u64::from(self.rounds.cut(&self.points, self.flatness, start as u32, triangles).tangled);
                 return;
             }
             if !self.is_fan() {
@@ -155,6 +166,7 @@ impl Ears {
         if !(largest > 0.0 && largest.is_finite()) || sizes.iter().any(|s| s.is_nan()) {
             return false;
         }
+        self.flatness = Flatness::of_coordinates((0..size).flat_map(at));
         let axis = if sizes[2] == largest {
             2
         } else if sizes[1] == largest {
@@ -175,7 +187,11 @@ impl Ears {
     /// Whether the fan from the first corner is right.
     fn is_fan(&self) -> bool {
         let points = &self.points;
-        (2..points.len()).all(|i| area(points[0], points[i - 1], points[i]) >= 0.0)
+        (2..points.len()).all(|i| {
+            let triangle @ [a, b, c] = [points[0], points[i - 1], points[i]];
+            // A triangle with two corners at one place leaves no edge whole that has a corner on it
+            self.flatness.is_forward(triangle) || a == b || b == c || c == a
+        })
     }
 
     /// Cuts ears off the polygon in `points`.
@@ -187,17 +203,18 @@ impl Ears {
         self.previous.extend((0..size).map(|i| (i + size - 1) % size));
         self.ear.clear();
         self.ear.resize(size as usize, false);
-        for i in 0..size {
-            self.ear[i as usize] = self.is_ear(i);
-        }
+        self.find_ears(0);
         let mut at = 0;
         for _ in 0..size - 2 {
-            // The next ear from here; where there is none, the polygon crosses itself: any corner that turns forwards,
-            // or any
+            // The next ear from here; where there is none, the exact signs decide. If none is left then, the polygon
+            // crosses itself: any corner that turns forwards, or any
             let begin = at;
             while !self.ear[at as usize] {
                 at = self.next[at as usize];
-                if at == begin {
+                if at == begin && self.flatness != Flatness::EXACT {
+                    self.flatness = Flatness::EXACT;
+                    self.find_ears(begin);
+                } else if at == begin {
                     at = self.forward(begin);
                     break;
                 }
@@ -216,18 +233,28 @@ impl Ears {
         [self.previous[i as usize], i, self.next[i as usize]].map(|i| self.points[i as usize])
     }
 
+    /// Finds out of every corner that is left whether it is an ear, `begin` being one of them.
+    fn find_ears(&mut self, begin: u32) {
+        let mut i = begin;
+        loop {
+            self.ear[i as usize] = self.is_ear(i);
+            i = self.next[i as usize];
+            if i == begin {
+                return;
+            }
+        }
+    }
+
     /// Whether the triangle at a corner is forward and no other corner is in it.
     fn is_ear(&self, i: u32) -> bool {
-        let [a, b, c] = self.corner(i);
-        if !(area(a, b, c) > 0.0) {
+        let corner = self.corner(i);
+        if !self.flatness.is_forward(corner) {
             return false;
         }
+        let reach = self.flatness.reach(corner);
         let mut other = self.next[self.next[i as usize] as usize];
         while other != self.previous[i as usize] {
-            let p = self.points[other as usize];
-            // Corners at the same place as one of the three do not count: polygons with holes have such seams
-            let within = area(a, b, p) >= 0.0 && area(b, c, p) >= 0.0 && area(c, a, p) >= 0.0;
-            if within && p != a && p != b && p != c {
+            if reach.holds(self.points[other as usize]) {
                 return false;
             }
             other = self.next[other as usize];
@@ -270,6 +297,18 @@ mod tests {
     }
 
     #[test]
+    fn corners_at_one_place_leave_a_fan() {
+        let square = [[0.0, 0.0], [2.0, 0.0], [2.0, 2.0], [0.0, 2.0]];
+        for twice in 0..4 {
+            let mut points = square.to_vec();
+            points.insert(twice, square[twice]);
+            let (triangles, areas) = split(&points, |p| [p[1], 3.0, p[0]]);
+            assert_eq!(triangles, [[0, 1, 2], [0, 2, 3], [0, 3, 4]]);
+            assert_eq!(areas.iter().filter(|area| **area == 2.0).count(), 2, "{areas:?}");
+        }
+    }
+
+    #[test]
     fn a_dart_is_split_at_its_notch() {
         let dart = [[0.0, 0.0], [2.0, 1.0], [0.0, 2.0], [1.0, 1.0]];
         for turn in 0..4 {
@@ -305,6 +344,111 @@ mod tests {
             assert_eq!(triangles.len(), polygon.len() - 2);
             assert!(areas.iter().all(|&a| a * whole.signum() >= 0.0));
             assert!((areas.iter().sum::<f64>() - whole).abs() < 1e-6);
+        }
+    }
+
+    /// What must hold of the triangles of a polygon that does not cross itself: each edge of it is in one of them, each
+    /// other edge in two that lie on both sides of it, and none is flat: all are higher than `least`.
+    fn check_edges(triangles: &[[u32; 3]], positions: &[[f32; 3]], least: f64) {
+        let size = positions.len() as u32;
+        assert_eq!(triangles.len(), triangles_of(size));
+        let edges: Vec<[u32; 2]> = triangles.iter().flat_map(|[a, b, c]| [[*a, *b], [*b, *c], [*c, *a]]).collect();
+        for (i, edge @ [a, b]) in edges.iter().enumerate() {
+            assert!(!edges[..i].contains(edge), "{edge:?} twice: {triangles:?}");
+            let is_boundary = *b == (a + 1) % size;
+            assert_eq!(edges.contains(&[*b, *a]), !is_boundary, "{edge:?}: {triangles:?}");
+        }
+        for triangle in triangles {
+            let [a, b, c] = triangle.map(|i| crate::math::DVec3::from(positions[i as usize].map(f64::from)));
+            let longest = (b - a).length().max((c - b).length()).max((a - c).length());
+            let height = (b - a).cross(c - a).length() / longest;
+            assert!(height > least, "{triangle:?} is {height:e} high: {triangles:?} {positions:?}");
+        }
+    }
+
+    /// Each edge of a polygon, cut into parts of equal length.
+    fn subdivided(polygon: &[[f32; 2]], parts: usize) -> Vec<[f32; 2]> {
+        let next = |i: usize| polygon[(i + 1) % polygon.len()];
+        let along = |i: usize, k: usize| {
+            let t = k as f32 / parts as f32;
+            [0, 1].map(|axis| polygon[i][axis] * (1.0 - t) + next(i)[axis] * t)
+        };
+        (0..polygon.len()).flat_map(|i| (0..parts).map(move |k| (i, k))).map(|(i, k)| along(i, k)).collect()
+    }
+
+    #[test]
+    fn corners_on_straight_edges_stay_corners() {
+        let square = vec![[1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0], [1.0, -1.0]];
+        // One corner, two and three on one edge, some on each edge of a triangle, the most that are possible
+        let half = vec![[1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0], [0.0, 0.0]];
+        let three = vec![[0.0, 0.0], [1.0, 0.0], [2.0, 0.0], [3.0, 0.0], [4.0, 0.0], [4.0, 3.0]];
+        let triangle = vec![[0.0, 0.0], [2.0, 0.0], [1.0, 3.0]];
+        // Concave ones: corners beside the notch, on the line of two others, and on a line that passes by
+        let corner = vec![[0.0, 0.0], [2.0, 0.0], [2.0, 1.0], [1.0, 1.0], [1.0, 2.0], [0.0, 2.0]];
+        let cross: Vec<[f32; 2]> =
+            [[1, 0], [2, 0], [2, 1], [3, 1], [3, 2], [2, 2], [2, 3], [1, 3], [1, 2], [0, 2], [0, 1], [1, 1]]
+                .map(|p: [u8; 2]| p.map(f32::from))
+                .to_vec();
+        let comb = vec![
+            [0.0, 0.0],
+            [8.0, 0.0],
+            [8.0, 2.0],
+            [7.0, 1.0],
+            [6.0, 2.0],
+            [5.0, 1.0],
+            [4.0, 2.0],
+            [3.0, 1.0],
+            [2.0, 2.0],
+            [1.0, 1.0],
+            [0.0, 2.0],
+        ];
+        let mut polygons = vec![square.clone(), half, three];
+        for polygon in [square, triangle, corner, cross, comb] {
+            polygons.extend([2, 3, 7, 40].map(|parts| subdivided(&polygon, parts)));
+        }
+        let mut random = firstlight_testkit::Random::new(11);
+        for polygon in polygons {
+            let turns = polygon.len().min(12);
+            for tilt in 0..100 {
+                let mut points = polygon.clone();
+                points.rotate_left(tilt % turns);
+                // In the axis plane, then anywhere: corners are off their edges by the rounding of coordinates
+                let z = crate::math::DVec3::from(random.direction());
+                let [x, y] = [z.any_orthonormal_vector(), z.cross(z.any_orthonormal_vector())];
+                let shift = crate::math::DVec3::from(random.vector(2.0));
+                let place = |[u, v]: [f32; 2]| match tilt < turns {
+                    true => [u, v, 0.5],
+                    false => (shift + x * f64::from(u) + y * f64::from(v)).as_vec3().to_array(),
+                };
+                let positions: Vec<[f32; 3]> = points.iter().map(|p| place(*p)).collect();
+                let (triangles, counts) = triangulate(&[points.len() as u32], |i| positions[i]);
+                assert_eq!((counts.small, counts.tangled), (0, 0));
+                check_edges(&triangles, &positions, 1e-4);
+            }
+        }
+    }
+
+    #[test]
+    fn corners_that_all_lie_in_one_line_are_triangles_without_an_area() {
+        for size in [4, 5, 30, 64, 65, 300] {
+            for direction in [[1.0, 0.0, 0.0], [0.3, 0.7, -0.2]] {
+                // To and fro, so that some corners are at one place
+                let along = |i: usize| i.min(size - i) as f64;
+                let position = |i: usize| direction.map(|d: f64| (d * along(i)) as f32);
+                let (triangles, counts) = triangulate(&[size as u32], position);
+                assert_eq!((triangles.len(), counts.tangled), (size - 2, 0));
+                assert!(triangles.iter().flatten().all(|&i| (i as usize) < size));
+            }
+        }
+    }
+
+    #[test]
+    fn what_is_fine_is_a_fan_however_coarse_its_coordinates() {
+        // Quads of a tenth of a millimetre, 2 m from the origin, and one a thousand times as long as high
+        let small = [[2.0, 1.0], [2.0001, 1.0], [2.0001, 1.0001], [2.0, 1.0001]];
+        let thin = [[0.0, 0.0], [1.0, 0.0], [1.0, 0.001], [0.0, 0.001]];
+        for points in [small, thin] {
+            assert_eq!(split(&points, |p| [0.0, p[0], p[1]]).0, [[0, 1, 2], [0, 2, 3]]);
         }
     }
 

@@ -19,7 +19,8 @@ pub struct MeshReport {
     pub positions: u64,
     /// How many triangles there are.
     pub triangles: u64,
-    /// The lowest and highest coordinates of all finite vertices; `None` if there are none.
+    /// The lowest and highest coordinates of all finite vertices that triangles have, or of all where there are no
+    /// triangles; `None` if there are none.
     pub bounds: Option<[[f64; 3]; 2]>,
     /// Vertices with a coordinate that is NaN or infinite.
     pub non_finite_vertices: u64,
@@ -70,13 +71,12 @@ impl MeshData {
     pub fn report(&self) -> MeshReport {
         let finite = |p: &[f32; 3]| p.iter().all(|x| x.is_finite());
         let count = |n: usize| n as u64;
-        let mut used = vec![false; self.positions.len()];
-        self.triangles.iter().flatten().for_each(|&v| used[v as usize] = true);
+        let used = self.used_vertices();
         let bad = |n: &[f32; 3]| !finite(n) || n.iter().all(|&x| x == 0.0);
         let mut report = MeshReport {
             vertices: count(self.positions.len()),
             triangles: count(self.triangles.len()),
-            bounds: self.bounds().map(|corners| corners.map(|corner| corner.to_array())),
+            bounds: self.used_bounds().map(|corners| corners.map(|corner| corner.to_array())),
             non_finite_vertices: count(parallel::count(self.positions.len(), CHUNK, |i| !finite(&self.positions[i]))),
             unused_vertices: count(used.iter().filter(|used| !**used).count()),
             has_normals: !self.normals.is_empty(),
@@ -90,18 +90,22 @@ impl MeshData {
         report
     }
 
-    /// The lowest and highest coordinates of finite vertices, as the file has them.
-    pub(crate) fn bounds(&self) -> Option<[DVec3; 2]> {
+    /// The lowest and highest coordinates of finite vertices, as the file has them: of those that triangles have, where
+    /// there are triangles.
+    pub(crate) fn used_bounds(&self) -> Option<[DVec3; 2]> {
         let join = |a: [[f32; 3]; 2], b: [[f32; 3]; 2]| {
             [[0, 1, 2].map(|i| a[0][i].min(b[0][i])), [0, 1, 2].map(|i| a[1][i].max(b[1][i]))]
         };
-        let chunks: Vec<&[[f32; 3]]> = self.positions.chunks(CHUNK).collect();
-        let of_chunk = |i: usize| {
-            let finite = chunks[i].iter().filter(|p| p.iter().all(|x| x.is_finite()));
+        let corners = self.triangles.as_flattened();
+        let count = if corners.is_empty() { self.positions.len() } else { corners.len() };
+        let of_chunk = |chunk: usize| {
+            let each =
+                (chunk * CHUNK..((chunk + 1) * CHUNK).min(count)).map(|i| corners.get(i).map_or(i, |v| *v as usize));
+            let finite = each.map(|i| self.positions[i]).filter(|p| p.iter().all(|x| x.is_finite()));
             // Adding 0 makes 0 of -0, of which the least would not be the same every time
             finite.map(|p| [p.map(|x| x + 0.0); 2]).reduce(join)
         };
-        let corners = parallel::collect(chunks.len(), of_chunk).into_iter().flatten().reduce(join)?;
+        let corners = parallel::collect(count.div_ceil(CHUNK), of_chunk).into_iter().flatten().reduce(join)?;
         Some(corners.map(|corner| DVec3::from(corner.map(f64::from)) + DVec3::from(self.origin)))
     }
 
@@ -216,7 +220,9 @@ mod tests {
         assert_eq!((report.degenerate_triangles, report.non_finite_triangles, report.duplicate_triangles), (3, 1, 0));
         assert_eq!((report.non_finite_vertices, report.unused_vertices, report.bad_normals), (1, 1, 7));
         assert_eq!((report.boundary_edges, report.non_manifold_edges), (3, 0));
-        assert_eq!(report.bounds, Some([[0.0; 3], [9.0, 9.0, 9.0]]));
+        assert_eq!(report.bounds, Some([[0.0; 3], [2.0, 1.0, 0.0]]));
+        let points = MeshData { triangles: Vec::new(), ..mesh };
+        assert_eq!(points.report().bounds, Some([[0.0; 3], [9.0, 9.0, 9.0]]));
         assert_eq!(MeshData::default().report(), MeshReport::default());
     }
 }

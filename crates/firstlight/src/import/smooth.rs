@@ -6,9 +6,14 @@
 //! corner, so that it does not matter how polygons were cut into triangles. Sums are of f64, in the order of the
 //! triangles.
 //!
+//! Triangles that are turned against their neighbours count with the side that most of their patch has ([`turned`]):
+//! two halves of a smooth surface would be a crease otherwise, or cancel out. Few meshes have such triangles, and only
+//! the places can tell; so all is done as if there were none, and once more where a place has met one.
+//!
 //! Source: G. Thürmer, C. A. Wüthrich 1998, "Computing Vertex Normals from Polygonal Facets".
 
 use super::MeshData;
+use super::turned::turned;
 use super::weld::weld;
 use crate::math::DVec3;
 use crate::parallel;
@@ -27,6 +32,9 @@ impl MeshData {
     /// vertex without a triangle that has an area gets the normal `[0, 0, 0]`, all others are of length 1. New vertices
     /// follow the old ones. The result does not depend on the number of threads.
     ///
+    /// Triangles that are turned against their neighbours get normals on the side of most of those that they are joined
+    /// with, by edges of two; the order of their corners stays.
+    ///
     /// The mesh is left as it is, but without normals, if it would need more than 2^32 - 2 vertices.
     pub fn smooth(&mut self, crease_deg: f64) {
         self.normals = Vec::new();
@@ -38,23 +46,35 @@ impl MeshData {
             if crease_deg >= 180.0 { f64::NEG_INFINITY } else { pxfm::f_cos(crease_deg.max(0.0).to_radians()) - 1e-12 };
         // Faces, places, and the corners at each place in the order of the triangles
         let (triangles, positions) = (&self.triangles, &self.positions);
-        let faces: Vec<DVec3> = parallel::map(triangles.len(), BLOCK, |i| unit_normal(positions, &triangles[i]));
+        let mut faces: Vec<DVec3> = parallel::map(triangles.len(), BLOCK, |i| unit_normal(positions, &triangles[i]));
         let places = weld(positions.len(), |i| {
             let [x, y, z] = positions[i].map(|x| (x + 0.0).to_bits());
             [x, y, z, 0]
         });
-        let around = Around { mesh: self, faces: &faces, place: &places.vertex, least_cosine };
         let (starts, at_place) = gather(triangles, &places.vertex, places.first.len());
         // The normals at each place, and the vertices that are needed for them
-        let blocks: Vec<Normals> = parallel::collect(places.first.len().div_ceil(BLOCK), |block| {
-            let mut room = Room::default();
-            let mut normals = Normals::default();
-            for place in block * BLOCK..((block + 1) * BLOCK).min(places.first.len()) {
-                let corners = &at_place[starts[place] as usize..starts[place + 1] as usize];
-                around.normals(corners, &mut room, &mut normals);
+        let look = |faces: &[DVec3]| {
+            let around = Around { mesh: self, faces, place: &places.vertex, least_cosine };
+            parallel::collect(places.first.len().div_ceil(BLOCK), |block| {
+                let mut room = Room::default();
+                let mut normals = Normals::default();
+                for place in block * BLOCK..((block + 1) * BLOCK).min(places.first.len()) {
+                    let corners = &at_place[starts[place] as usize..starts[place + 1] as usize];
+                    around.normals(corners, &mut room, &mut normals);
+                }
+                normals
+            })
+        };
+        let mut blocks: Vec<Normals> = look(&faces);
+        // Once more, with neighbours turned alike
+        if blocks.iter().any(|block| block.turned) {
+            let corners = |i: usize| triangles[i].map(|v| places.vertex[v as usize]);
+            let turned = turned(triangles.len(), corners, |i| faces[i] != DVec3::ZERO);
+            if let Some(turned) = turned {
+                parallel::for_each_mut(&mut faces, BLOCK, |i, face| *face = if turned[i] { -*face } else { *face });
+                blocks = look(&faces);
             }
-            normals
-        });
+        }
         let old = self.positions.len();
         let count = old + blocks.iter().map(|b| b.new.len()).sum::<usize>();
         if count as u64 > super::MAX_COUNT {
@@ -77,23 +97,8 @@ impl MeshData {
                 normals.push(normal);
             }
         }
-        copy(&mut self.positions, &sources);
-        copy(&mut self.colors, &sources);
-        copy(&mut self.radii, &sources);
-        for set in &mut self.uvs {
-            copy(set, &sources);
-        }
+        self.copy_vertices(&sources);
         self.normals = normals;
-    }
-}
-
-/// Adds copies of some entries to a list per vertex that is there.
-fn copy<T: Copy>(list: &mut Vec<T>, sources: &[u32]) {
-    if !list.is_empty() {
-        list.reserve_exact(sources.len());
-        for &vertex in sources {
-            list.push(list[vertex as usize]);
-        }
     }
 }
 
@@ -134,6 +139,8 @@ struct Normals {
     new: Vec<(u32, [f32; 3])>,
     /// Corners, each with the number of the new vertex that it gets.
     moved: Vec<(u32, u32)>,
+    /// Whether there are triangles at an edge that run along it the same way.
+    turned: bool,
 }
 
 /// Room for one place at a time.
@@ -178,7 +185,8 @@ impl Around<'_> {
         room.leader.extend(0..corners.len() as u32);
         for edge in room.edges.chunk_by(|a, b| a.0 == b.0).filter(|e| e.len() <= MAX_AROUND_EDGE) {
             for (n, &(_, i)) in edge.iter().enumerate() {
-                for &(_, j) in &edge[n + 1..] {
+                for &(end, j) in &edge[n + 1..] {
+                    normals.turned |= self.leaves(corners[i as usize], end) == self.leaves(corners[j as usize], end);
                     if self.is_smooth(corners[i as usize] / 3, corners[j as usize] / 3) {
                         unite(&mut room.leader, i, j);
                     }
@@ -215,6 +223,12 @@ impl Around<'_> {
                 normals.moved.extend(group.iter().map(|&(_, _, corner)| (corner, new)));
             }
         }
+    }
+
+    /// Whether a triangle runs from its corner to the place `end`, not from there.
+    fn leaves(&self, corner: u32, end: u32) -> bool {
+        let next = if corner % 3 == 2 { corner - 2 } else { corner + 1 };
+        self.place[self.vertex(next) as usize] == end
     }
 
     /// Whether the edge between two triangles is no crease.
@@ -288,6 +302,68 @@ mod tests {
             }
         }
         assert!(flat.fault().is_none() && round.fault().is_none());
+    }
+
+    #[test]
+    fn triangles_turned_at_random_have_the_normals_of_those_that_are_not() {
+        // A ball of squares, cut from a cube's surface
+        let side = |axis: usize, sign: f32, i: usize, j: usize, n: usize| {
+            let mut p = [0.0; 3];
+            let at = |k: usize| (k as f32 / n as f32 - 0.5) * 2.0;
+            (p[axis], p[(axis + 1) % 3], p[(axis + 2) % 3]) = (sign, at(i) * sign, at(j));
+            p
+        };
+        let mut ball = MeshData::default();
+        for (axis, sign) in (0..6).map(|k| (k / 2, if k % 2 == 0 { 1.0 } else { -1.0 })) {
+            for (i, j) in (0..64).map(|k| (k / 8, k % 8)) {
+                let first = ball.positions.len() as u32;
+                ball.positions.extend([[0, 0], [1, 0], [1, 1], [0, 1]].map(|[a, b]| side(axis, sign, i + a, j + b, 8)));
+                ball.triangles.extend([[0, 1, 2], [0, 2, 3]].map(|t: [u32; 3]| t.map(|v| first + v)));
+            }
+        }
+        for p in &mut ball.positions {
+            let length = p.iter().map(|x| x * x).sum::<f32>().sqrt();
+            *p = p.map(|x| x / length);
+        }
+        assert_eq!((ball.report().turned_edges, ball.report().boundary_edges), (0, 0));
+        let mut random = firstlight_testkit::Random::new(9);
+        for share in [0.01, 0.3, 0.45] {
+            let mut turned = ball.clone();
+            turned.triangles.iter_mut().filter(|_| random.chance(share)).for_each(|t| t.swap(1, 2));
+            assert!(turned.report().turned_edges > 0);
+            let mut right = ball.clone();
+            for mesh in [&mut turned, &mut right] {
+                mesh.smooth(60.0);
+            }
+            // In another order of sums
+            for (t, r) in turned.triangles.iter().zip(&right.triangles) {
+                for vertex in t {
+                    let normal = DVec3::from(turned.normals[*vertex as usize].map(f64::from));
+                    let same = r.iter().find(|v| right.positions[**v as usize] == turned.positions[*vertex as usize]);
+                    let wanted = DVec3::from(right.normals[*same.unwrap() as usize].map(f64::from));
+                    assert!((normal - wanted).length() < 1e-6, "{share}: {normal} {wanted}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn two_sheets_at_one_place_keep_their_sides() {
+        // Each triangle twice, once from each side, or twice from one
+        let mut mesh = MeshData { positions: cube().positions, triangles: cube().triangles, ..MeshData::default() };
+        let (once, mut twice) = (mesh.triangles.clone(), mesh.clone());
+        mesh.triangles.extend(once.iter().map(|[a, b, c]| [*a, *c, *b]));
+        twice.triangles.extend(&once);
+        let mut alone = MeshData { triangles: once, ..cube() };
+        for mesh in [&mut mesh, &mut twice, &mut alone] {
+            mesh.smooth(10.0);
+        }
+        for (i, triangle) in alone.triangles.iter().enumerate() {
+            let normal = alone.normals[triangle[0] as usize];
+            let of = |mesh: &MeshData, i: usize| mesh.normals[mesh.triangles[i][0] as usize];
+            assert_eq!((of(&twice, i), of(&twice, i + 12)), (normal, normal));
+            assert_eq!((of(&mesh, i), of(&mesh, i + 12)), (normal, normal.map(|x| 0.0 - x)));
+        }
     }
 
     #[test]

@@ -86,7 +86,7 @@ fn is_text(file: &[u8]) -> bool {
     let near = &file[text.at..file.len().min(text.at + 1024)];
     let has = |word: &[u8]| near.windows(word.len()).any(|w| w.eq_ignore_ascii_case(word));
     // A name and all facets on one line, too
-    has(b"facet") || has(b"endsolid")
+    has(b"facet") || has(b"endsolid") || has(b"end solid")
 }
 
 /// The first word of a text, after a mark of byte order.
@@ -192,7 +192,7 @@ fn read_piece(bytes: &[u8], start: usize) -> Result<StlPiece<'_>, ImportFault> {
         let word = text.word();
         if word.eq_ignore_ascii_case(b"facet") {
             facet(&mut text, &mut piece.corners)?;
-        } else if word.eq_ignore_ascii_case(b"endsolid") {
+        } else if word.eq_ignore_ascii_case(b"endsolid") || is_parted(&mut text, word, b"endsolid") {
             text.rest_of_line();
             piece.ended = true;
         } else if word.eq_ignore_ascii_case(b"solid") {
@@ -246,10 +246,24 @@ fn expect(text: &mut Cursor, needed: &'static [u8]) -> Result<(), ImportFault> {
     text.skip_space();
     let at = text.at;
     let word = text.word();
-    if word == needed || word.eq_ignore_ascii_case(needed) {
+    if word == needed || word.eq_ignore_ascii_case(needed) || is_parted(text, word, needed) {
         return Ok(());
     }
     Err(missing(text, at, &format!("`{}`", String::from_utf8_lossy(needed))))
+}
+
+/// Whether `word`, which was read last, is the first half of `needed` in two words, as `end solid`; reads the second.
+#[cold]
+fn is_parted(text: &mut Cursor, word: &[u8], needed: &[u8]) -> bool {
+    let mut after = text.clone();
+    after.skip_blanks();
+    let second = after.word();
+    let parted = needed.len() > 3 && word.eq_ignore_ascii_case(b"end") && needed[..3] == *b"end";
+    let is_needed = parted && second.eq_ignore_ascii_case(&needed[3..]);
+    if is_needed {
+        *text = after;
+    }
+    is_needed
 }
 
 #[inline(always)]
@@ -329,12 +343,16 @@ mod tests {
             format!("solid {FACET_TEXT}endsolid"),
             format!("SOLID\r{}\rENDSOLID", FACET_TEXT.to_uppercase().replace(' ', "\r\r")),
             format!("\u{feff} \tSolid\n{}\nendsolid name of it", FACET_TEXT.replace(' ', " \t\r\n ")),
+            format!("solid\n{}\nEnd  Solid name of it\n", FACET_TEXT.replace("end", "end ")),
         ] {
             let mesh = read(text.as_bytes()).unwrap();
             assert_eq!((mesh.triangles.as_slice(), mesh.parts.len()), (&[[0, 1, 2]][..], 0), "{text}");
             assert!(mesh.notes.is_empty());
         }
-        assert_eq!(read(b"solid nothing\nendsolid nothing\n").unwrap().triangles.len(), 0);
+        for text in ["solid nothing\nendsolid nothing\n", "solid nothing\nend solid\n"] {
+            assert_eq!(read(text.as_bytes()).unwrap().triangles.len(), 0);
+        }
+        assert!(read(format!("solid\n{FACET_TEXT}end facet").as_bytes()).is_err());
     }
 
     #[test]

@@ -284,6 +284,9 @@ mod tests {
         assert!(
             points("[[0, 0, 0], [0, 200, 0]]")[0].contains("point_set[0]: the colours of its vertices go up to 200: ")
         );
+        let are_bytes =
+            |most: &str| points(&format!("[[0, 0, 0], [{most}, 0, 0]]"))[0].contains("; are they 0 to 255?");
+        assert_eq!(["1.5", "2", "255", "256"].map(are_bytes), [false, true, true, false]);
         assert_eq!(points("[[0, 0, 0], [0, 1, 0]]"), [""; 0]);
     }
 

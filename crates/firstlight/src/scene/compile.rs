@@ -539,7 +539,10 @@ impl<'a> Textures<'a> {
             Ok(bytes) => match self.texels(bytes) {
                 Ok(decoded) => decoded,
                 Err(error) => {
-                    let message = format!("{file:?} cannot be read as a picture: {error}");
+                    let message = match bytes.len() {
+                        0 => format!("{file:?} is empty"),
+                        _ => format!("{file:?} cannot be read as a picture: {error}"),
+                    };
                     let hint = "magenta and black stand in for it, unless compiled strictly";
                     cx.outside(|cx| cx.warning(&format!("texture.image.{name}.file"), message, Some(hint)));
                     (Arc::new(placeholder()), [0; 32])
@@ -555,9 +558,10 @@ impl<'a> Textures<'a> {
                         cx.outside(|cx| cx.error(&path, message, Some(hint)));
                     }
                     _ => {
-                        let hint = "it is looked for beside the text that names it; magenta and black stand in for it, \
-                                    unless compiled strictly";
-                        cx.outside(|cx| cx.warning(&path, message, Some(hint)));
+                        let place = error.slashes(file);
+                        let place = place.as_deref().unwrap_or("it is looked for beside the text that names it");
+                        let hint = format!("{place}; magenta and black stand in for it, unless compiled strictly");
+                        cx.outside(|cx| cx.warning(&path, message, Some(&hint)));
                     }
                 }
                 (Arc::new(placeholder()), [0; 32])

@@ -431,8 +431,15 @@ impl Compiler<'_, '_> {
             let count = unknown.len();
             let (noun, pronoun) = if count == 1 { ("a material", "is") } else { ("materials", "are") };
             let message = format!("names {noun} that {pronoun} not described: {}", first_names(&unknown));
+            let read = if source.data.material_files.is_empty() { "" } else { ".mtl files are not read: " };
             let hint = "their faces have the mesh's own material; a scene describes one as [material.phong.NAME]";
-            cx.warning("file", message, Some(hint));
+            let hint = format!("{read}{hint}");
+            // A scene that describes no material, as that of a bare model, has misspelt none
+            if self.desc.materials.is_empty() {
+                cx.advise("file", message, Some(&hint));
+            } else {
+                cx.warning("file", message, Some(&hint));
+            }
         }
         chosen
     }

@@ -47,8 +47,10 @@ impl CompileCache {
     /// `memory:` and the BLAKE3 of the mesh: the same mesh has the same name everywhere, and a description that holds
     /// it the same hash.
     ///
-    /// The mesh has to be [without faults](MeshData::faults).
-    pub fn give_mesh(&self, mesh: MeshData) -> String {
+    /// The mesh has to be [without faults](MeshData::faults). As of a file, its normals become of length 1, and
+    /// vertices of no triangle are left out.
+    pub fn give_mesh(&self, mut mesh: MeshData) -> String {
+        mesh.tidy();
         let key = mesh.content();
         let name = format!("{GIVEN}{}", blake3::Hash::from_bytes(key).to_hex());
         self.kept().given.entry(name.clone()).or_insert_with(|| (Arc::new(mesh), key));

@@ -141,7 +141,7 @@ impl PointSetDesc {
                 cx.error(&format!("colors[{i}]"), message, Some("a colour is linear red, green, blue"));
             }
         }
-        let (positions, origin) = from_own_origin(self.positions.len(), |i| self.positions[i]);
+        let (positions, origin) = from_own_origin(self.positions.len(), |_| true, |i| self.positions[i]);
         MeshData {
             positions,
             origin,

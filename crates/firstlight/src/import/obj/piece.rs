@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use crate::import::ImportFault;
 use crate::import::error::shown;
-use crate::import::text::{Cursor, is_blank};
+use crate::import::text::{Cursor, is_blank, is_line_end};
 
 /// Indices are kept in 31 bits, and relative ones around this.
 pub(super) const RELATIVE: i64 = -(1 << 30);
@@ -45,16 +45,35 @@ pub(super) struct Piece<'a> {
     pub more_unknown: u64,
 }
 
-/// Passes blanks, and the ends of lines that go on.
+/// Whether the line, or the file, ends after this byte.
+#[inline(always)]
+fn is_last_of_line(text: &Cursor, at: usize) -> bool {
+    text.bytes.get(at + 1).is_none_or(|b| is_line_end(*b))
+}
+
+/// Passes blanks, and the ends of lines that go on; the last line of a file has nothing to go on with.
 #[inline(always)]
 pub(super) fn skip_blanks(text: &mut Cursor) {
     loop {
         text.skip_blanks();
-        if text.peek() != Some(b'\\') || !matches!(text.bytes.get(text.at + 1), Some(b'\n' | b'\r')) {
+        if text.peek() != Some(b'\\') || !is_last_of_line(text, text.at) {
             return;
         }
         text.at += 1;
         text.pass_line_end();
+    }
+}
+
+/// The word that begins here, without the `\` that joins its line with the next.
+#[inline(always)]
+pub(super) fn word<'a>(text: &mut Cursor<'a>) -> &'a [u8] {
+    let word = text.word();
+    match word {
+        [word @ .., b'\\'] if text.at_line_end() => {
+            text.at -= 1;
+            word
+        }
+        word => word,
     }
 }
 
@@ -76,12 +95,12 @@ impl<'a> Piece<'a> {
         while !text.at_end() {
             skip_blanks(&mut text);
             let at = text.at;
-            match text.word() {
+            match word(&mut text) {
                 b"v" => self.position(&mut text)?,
                 b"vt" => {
                     let u = number(&mut text, at, "vt", 1)?;
                     skip_blanks(&mut text);
-                    self.uvs.push([u, text.f32().unwrap_or(0.0)]);
+                    self.uvs.push([u, read(&mut text, Cursor::f32).unwrap_or(0.0)]);
                 }
                 b"vn" => {
                     let mut of = |n| number(&mut text, at, "vn", n);
@@ -90,7 +109,7 @@ impl<'a> Piece<'a> {
                 b"f" | b"fo" => self.face(&mut text)?,
                 b"" => {}
                 // A comment ends with its line, also where a Windows path is the last word of it
-                word if word[0] == b'#' => {
+                [b'#', ..] => {
                     text.rest_of_line();
                     text.pass_line_end();
                     continue;
@@ -128,7 +147,7 @@ impl<'a> Piece<'a> {
             let mut position = [0.0; 3];
             for (i, value) in position.iter_mut().enumerate() {
                 skip_blanks(text);
-                let Some(number) = text.f64() else { return Err(no_number(text, at, "v", i + 1)) };
+                let Some(number) = read(text, Cursor::f64) else { return Err(no_number(text, at, "v", i + 1)) };
                 *value = (number - self.origin[i]) as f32;
             }
             self.positions.push(position);
@@ -139,7 +158,7 @@ impl<'a> Piece<'a> {
             let mut more = [0.0; 3];
             for value in &mut more {
                 skip_blanks(text);
-                match text.f32() {
+                match read(text, Cursor::f32) {
                     Some(number) => *value = number,
                     None => return Ok(()),
                 }
@@ -176,7 +195,7 @@ impl<'a> Piece<'a> {
     pub fn smoothing(&mut self, text: &mut Cursor) -> Result<(), ImportFault> {
         skip_blanks(text);
         let at = text.at;
-        let group = match text.word() {
+        let group = match word(text) {
             b"off" | b"" => 0,
             b"on" => 1,
             word => match std::str::from_utf8(word).ok().and_then(|w| w.parse().ok()) {
@@ -197,10 +216,11 @@ impl<'a> Piece<'a> {
     }
 }
 
-/// The rest of a line as a name.
+/// The rest of a line as a name; what follows on a line that is joined with it is left out.
 fn rest<'a>(text: &mut Cursor<'a>) -> &'a [u8] {
-    text.skip_blanks();
+    skip_blanks(text);
     let line = text.clone().rest_of_line();
+    let line = line.strip_suffix(b"\\").unwrap_or(line);
     text.at += line.len();
     line.trim_ascii()
 }
@@ -209,15 +229,27 @@ fn rest<'a>(text: &mut Cursor<'a>) -> &'a [u8] {
 #[inline(always)]
 fn number(text: &mut Cursor, at: usize, statement: &str, n: usize) -> Result<f32, ImportFault> {
     skip_blanks(text);
-    match text.f32() {
+    match read(text, Cursor::f32) {
         Some(number) => Ok(number),
         None => Err(no_number(text, at, statement, n)),
     }
 }
 
+/// The number that begins here, also directly before the `\` that joins its line with the next.
+#[inline(always)]
+fn read<'a, T>(text: &mut Cursor<'a>, number: impl Fn(&mut Cursor<'a>) -> Option<T>) -> Option<T> {
+    number(text).or_else(|| {
+        let length = word(&mut text.clone()).len();
+        let mut alone = Cursor { bytes: &text.bytes[..text.at + length], at: text.at };
+        let value = number(&mut alone)?;
+        text.at = alone.at;
+        Some(value)
+    })
+}
+
 #[cold]
 fn no_number(text: &Cursor, at: usize, statement: &str, n: usize) -> ImportFault {
-    let word = text.next_word();
+    let word = word(&mut text.clone());
     let hint = "a position has 3 numbers, texture coordinates have 1 to 3, a normal has 3";
     let message = if word.is_empty() {
         format!("{statement} has {} numbers", n - 1)

@@ -5,10 +5,11 @@
 //! that are neighbours are cut in one round, so that each round makes of a convex polygon one of half the corners, and
 //! the triangles of all rounds but the last few are small. A corner is looked at again only when one of its neighbours
 //! was cut: of a polygon that does not cross itself no other can have become an ear. Whether one is asks a tree of the
-//! corners that turn backwards, which alone can lie in its triangle. So n corners take n log n steps, where they are
-//! not made to take more.
+//! corners that do not turn forwards, which alone can lie in its triangle or on its edges. So n corners take n log n
+//! steps, where they are not made to take more.
 
-use super::{FlatPoint, area};
+use super::FlatPoint;
+use super::flatness::{Flatness, Reach};
 
 /// Steps for each corner, on average, before the rest is cut without looking: a few hundred are usual.
 const STEPS: u64 = 2048;
@@ -22,6 +23,7 @@ pub(super) struct Rounds {
     previous: Vec<u32>,
     /// The round in which each corner is to be looked at.
     due: Vec<u32>,
+    flatness: Flatness,
     backward: Backward,
 }
 
@@ -31,16 +33,22 @@ const GONE: u32 = u32::MAX;
 impl Rounds {
     /// Adds the triangles of a polygon that lies in a plane, counter-clockwise, as numbers of corners counted from
     /// `start`.
-    pub(super) fn cut(&mut self, points: &[FlatPoint], start: u32, triangles: &mut Vec<[u32; 3]>) -> Looked {
+    pub(super) fn cut(
+        &mut self,
+        points: &[FlatPoint],
+        flatness: Flatness,
+        start: u32,
+        triangles: &mut Vec<[u32; 3]>,
+    ) -> Looked {
         let size = points.len() as u32;
+        self.flatness = flatness;
         self.next.clear();
         self.next.extend((0..size).map(|i| (i + 1) % size));
         self.previous.clear();
         self.previous.extend((0..size).map(|i| (i + size - 1) % size));
         self.due.clear();
         self.due.resize(points.len(), 0);
-        let backward: Vec<u32> = (0..size).filter(|&i| !self.is_forward(points, i)).collect();
-        self.backward.build(points, backward);
+        self.plant(points);
         let mut left = points.len();
         let mut looked = Looked { steps: 0, most: STEPS * u64::from(size), tangled: false };
         let mut current: Vec<u32> = (0..size).collect();
@@ -52,8 +60,15 @@ impl Rounds {
                     left -= 1;
                 }
             }
-            // No ear is left: it crosses itself, or what remains has no area
-            if coming.is_empty() {
+            if coming.is_empty() && self.flatness != Flatness::EXACT {
+                // No ear is left within the rounding of coordinates: the exact signs decide
+                self.flatness = Flatness::EXACT;
+                self.plant(points);
+                coming.extend((0..size).filter(|&i| self.due[i as usize] != GONE));
+                coming.iter().for_each(|&i| self.due[i as usize] = round + 1);
+                looked.steps += u64::from(size);
+            } else if coming.is_empty() {
+                // It crosses itself, or what remains has no area
                 left -= self.force(points, start, left, round, triangles, &mut coming, &mut looked);
             }
             std::mem::swap(&mut current, &mut coming);
@@ -70,18 +85,23 @@ impl Rounds {
         [self.previous[i as usize], i, self.next[i as usize]]
     }
 
+    /// Builds the tree of the corners that are left and do not turn forwards.
+    fn plant(&mut self, points: &[FlatPoint]) {
+        let corners = (0..points.len() as u32).filter(|&i| self.due[i as usize] != GONE && !self.is_forward(points, i));
+        let corners = corners.collect();
+        self.backward.build(points, corners);
+    }
+
     fn is_forward(&self, points: &[FlatPoint], i: u32) -> bool {
-        let [a, b, c] = self.corner(i).map(|i| points[i as usize]);
-        area(a, b, c) > 0.0
+        self.flatness.is_forward(self.corner(i).map(|i| points[i as usize]))
     }
 
     /// Whether the triangle at a corner is forward and no other corner is in it.
     fn is_ear(&self, points: &[FlatPoint], i: u32, looked: &mut Looked) -> bool {
         let corner = self.corner(i).map(|i| points[i as usize]);
-        let [a, b, c] = corner;
-        area(a, b, c) > 0.0
+        self.flatness.is_forward(corner)
             && looked.steps <= looked.most
-            && !self.backward.is_any_in(points, corner, &mut looked.steps)
+            && !self.backward.is_any_in(points, &self.flatness.reach(corner), &mut looked.steps)
     }
 
     /// Cuts a corner off; its neighbours are to be looked at in the coming round.
@@ -160,7 +180,7 @@ pub(super) struct Looked {
     pub(super) tangled: bool,
 }
 
-/// The corners that turn backwards, in a tree of boxes.
+/// The corners that do not turn forwards, in a tree of boxes.
 #[derive(Default)]
 struct Backward {
     corners: Vec<u32>,
@@ -229,21 +249,20 @@ impl Backward {
         }
     }
 
-    /// Whether any is in a triangle, on its edges too, but not at the place of one of its corners: polygons with holes
-    /// have such seams.
-    fn is_any_in(&self, points: &[FlatPoint], triangle: [FlatPoint; 3], steps: &mut u64) -> bool {
+    /// Whether any is in a triangle or on its edges.
+    fn is_any_in(&self, points: &[FlatPoint], reach: &Reach, steps: &mut u64) -> bool {
         if self.nodes.is_empty() {
             return false;
         }
-        let [a, b, c] = triangle;
-        let low = [a[0].min(b[0]).min(c[0]), a[1].min(b[1]).min(c[1])];
-        let high = [a[0].max(b[0]).max(c[0]), a[1].max(b[1]).max(c[1])];
+        let &Reach { triangle: [a, b, c], margin, .. } = reach;
+        let low = [0, 1].map(|axis: usize| a[axis].min(b[axis]).min(c[axis]) - margin);
+        let high = [0, 1].map(|axis: usize| a[axis].max(b[axis]).max(c[axis]) + margin);
         let mut open = vec![0];
         while let Some(at) = open.pop() {
             let node = &self.nodes[at as usize];
             *steps += 1;
             let is_apart = (0..2).any(|axis| node.low[axis] > high[axis] || node.high[axis] < low[axis]);
-            let is_beyond = [(a, b), (b, c), (c, a)].iter().any(|(p, q)| node.is_right_of(*p, *q));
+            let is_beyond = [(a, b), (b, c), (c, a)].iter().any(|(p, q)| node.is_right_of(*p, *q, margin));
             if node.left == 0 || is_apart || is_beyond {
                 continue;
             }
@@ -252,9 +271,7 @@ impl Backward {
                 continue;
             }
             for &i in &self.corners[node.range[0] as usize..node.range[1] as usize] {
-                let p = points[i as usize];
-                let within = area(a, b, p) >= 0.0 && area(b, c, p) >= 0.0 && area(c, a, p) >= 0.0;
-                if within && self.leaf[i as usize].is_some() && p != a && p != b && p != c {
+                if self.leaf[i as usize].is_some() && reach.holds(points[i as usize]) {
                     return true;
                 }
             }
@@ -264,26 +281,28 @@ impl Backward {
 }
 
 impl LeafNode {
-    /// Whether all of the box is clearly on the right of a line.
-    fn is_right_of(&self, p: FlatPoint, q: FlatPoint) -> bool {
+    /// Whether all of the box is clearly on the right of a line, by more than `margin`.
+    fn is_right_of(&self, p: FlatPoint, q: FlatPoint, margin: f64) -> bool {
         let d = [q[0] - p[0], q[1] - p[1]];
         // The corner of the box that is farthest to the left
         let x = if d[1] > 0.0 { self.low[0] } else { self.high[0] } - p[0];
         let y = if d[0] > 0.0 { self.high[1] } else { self.low[1] } - p[1];
         let (s, t) = (d[0] * y, d[1] * x);
-        s - t < -1e-9 * (s.abs() + t.abs())
+        s - t < -1e-9 * (s.abs() + t.abs()) - margin * (d[0].abs() + d[1].abs())
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::area;
     use super::*;
     use std::f64::consts::TAU;
 
     /// Cuts a polygon that does not cross itself, and checks what must hold of any: its area is covered once.
     fn check(points: &[FlatPoint]) -> (Vec<[u32; 3]>, u64) {
         let mut triangles = Vec::new();
-        let looked = Rounds::default().cut(points, 0, &mut triangles);
+        let flatness = Flatness::of_coordinates(points.iter().flatten().copied());
+        let looked = Rounds::default().cut(points, flatness, 0, &mut triangles);
         assert!(!looked.tangled);
         assert_eq!(triangles.len(), points.len() - 2);
         let areas = triangles.iter().map(|t| {
@@ -349,14 +368,14 @@ mod tests {
             .map(|i| [i.wrapping_mul(48_271) % 1009, i.wrapping_mul(69_621) % 997].map(|x| x as f64))
             .collect();
         let mut triangles = Vec::new();
-        let looked = Rounds::default().cut(&wild, 7, &mut triangles);
+        let looked = Rounds::default().cut(&wild, Flatness::EXACT, 7, &mut triangles);
         assert!(looked.tangled);
         assert_eq!(triangles.len(), wild.len() - 2);
         assert!(triangles.iter().flatten().all(|&i| (7..7 + 5000).contains(&i)));
         // All in a line: nothing overlaps, for nothing has an area
         let line: Vec<FlatPoint> = (0..1000).map(|i| [f64::from(i), 0.0]).collect();
         triangles.clear();
-        assert!(!Rounds::default().cut(&line, 0, &mut triangles).tangled);
+        assert!(!Rounds::default().cut(&line, Flatness::EXACT, 0, &mut triangles).tangled);
         assert_eq!(triangles.len(), 998);
     }
 

@@ -198,6 +198,7 @@ impl Loader<'_> {
                         AssetError::Io(_) => "a scene includes plain files that can be read".to_owned(),
                     };
                     let colon = if matches!(error, AssetError::NotFound | AssetError::Io(_)) { ":" } else { "" };
+                    let hint = error.slashes(&path).unwrap_or(hint);
                     fault(format!("{shown}{colon} {error}"), Some(hint), None);
                     continue;
                 }

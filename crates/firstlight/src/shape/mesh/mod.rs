@@ -18,7 +18,7 @@ use super::triangles::{TriangleTree, can_be_hit};
 use crate::context::{AssetError, Assets, CompileContext, CompileStage, show};
 use crate::describe::FilePath;
 use crate::ids::MaterialId;
-use crate::import::{MeshData, from_own_origin, read_mesh};
+use crate::import::{MeshData, from_own_origin, read_mesh, used_vertices};
 use crate::math::{DVec3, Vec3};
 
 shape_table! {
@@ -82,7 +82,8 @@ pub(crate) fn read_mesh_bytes(
                 AssetError::TooLarge { .. } => "split it",
                 AssetError::Io(_) => "a mesh is a plain file that can be read",
             };
-            cx.error("file", format!("{:?}{colon} {error}", file.0), Some(hint));
+            let slashes = error.slashes(&file.0);
+            cx.error("file", format!("{:?}{colon} {error}", file.0), Some(slashes.as_deref().unwrap_or(hint)));
             return None;
         }
     };
@@ -163,7 +164,8 @@ impl MeshDesc {
         files: &mut MeshFiles<'_>,
     ) -> Option<(Arc<MeshData>, Option<ContentKey>)> {
         let Some(file) = &self.file else {
-            let data = self.written(cx)?;
+            let mut data = self.written(cx)?;
+            data.tidy();
             let content = files.cache.map(|_| data.content());
             return Some((Arc::new(data), content));
         };
@@ -178,15 +180,18 @@ impl MeshDesc {
             return Some((data, Some(content)));
         }
         let (bytes, hash) = read_mesh_bytes(cx, assets, file, files)?;
-        let Some(cache) = files.cache else {
-            return Some((Arc::new(parse_mesh_file(cx, file, &bytes)?), None));
+        let parse = |cx: &mut CompileContext| {
+            let mut data = parse_mesh_file(cx, file, &bytes)?;
+            data.tidy();
+            Some(Arc::new(data))
         };
+        let Some(cache) = files.cache else { return Some((parse(cx)?, None)) };
         // The name may say how the bytes are to be read
         let key = key_of("mesh file", [file.0.as_bytes(), &hash]);
         if let Some(data) = cache.find(&key) {
             return Some((data, Some(key)));
         }
-        let data = Arc::new(parse_mesh_file(cx, file, &bytes)?);
+        let data = parse(cx)?;
         cache.keep(key, &data);
         Some((data, Some(key)))
     }
@@ -240,7 +245,10 @@ impl MeshDesc {
                 cx.error(field, message, Some("give one for each vertex, or none"));
             }
         }
-        for (i, position) in self.positions.iter().enumerate() {
+        // What no triangle has may hold anything
+        let used = used_vertices(vertices, &self.triangles);
+        let is_used = |i: usize| used.get(i).is_none_or(|used| *used);
+        for (i, position) in self.positions.iter().enumerate().filter(|(i, _)| is_used(*i)) {
             if !position.iter().all(|c| c.abs() <= MAX_COORDINATE) {
                 let message = format!("{} is outside [-2.5e8, 2.5e8]", show(position));
                 cx.error(&format!("positions[{i}]"), message, Some("coordinates are in metres"));
@@ -252,17 +260,17 @@ impl MeshDesc {
                 cx.error(&format!("triangles[{i}]"), message, None);
             }
         }
-        for (i, color) in self.colors.iter().enumerate() {
+        for (i, color) in self.colors.iter().enumerate().filter(|(i, _)| is_used(*i)) {
             if !color.iter().all(|c| (0.0..=1e6).contains(c)) {
                 let message = format!("{} is outside [0, 1e6]", show(color));
                 cx.error(&format!("colors[{i}]"), message, Some("a colour is linear red, green, blue"));
             }
         }
-        for (i, number) in self.normals.iter().flatten().chain(self.uvs.iter().flatten()).enumerate() {
-            if !(number.abs() <= 1e30) {
-                let three = self.normals.len() * 3;
-                let (field, at) = if i < three { ("normals", i / 3) } else { ("uvs", (i - three) / 2) };
-                cx.error(&format!("{field}[{at}]"), format!("{number} is outside [-1e30, 1e30]"), None);
+        let normals = self.normals.iter().enumerate().map(|(i, normal)| ("normals", i, &normal[..]));
+        let uvs = self.uvs.iter().enumerate().map(|(i, uv)| ("uvs", i, &uv[..]));
+        for (field, i, numbers) in normals.chain(uvs).filter(|(_, i, _)| is_used(*i)) {
+            for number in numbers.iter().filter(|number| !(number.abs() <= 1e30)) {
+                cx.error(&format!("{field}[{i}]"), format!("{number} is outside [-1e30, 1e30]"), None);
             }
         }
         let faces = self.face_materials.len();
@@ -280,7 +288,7 @@ impl MeshDesc {
             return None;
         }
         let single3 = |v: &[f64; 3]| v.map(|c| c as f32);
-        let (positions, origin) = from_own_origin(self.positions.len(), |i| self.positions[i]);
+        let (positions, origin) = from_own_origin(vertices, is_used, |i| self.positions[i]);
         Some(MeshData {
             positions,
             origin,
