@@ -192,9 +192,15 @@ pub(super) fn numbers<const N: usize>(text: &str) -> Option<[f64; N]> {
 /// Reads a colour.
 pub fn color(text: &str) -> Result<ColorDesc, String> {
     let linear = || numbers::<3>(text).filter(|rgb| rgb.iter().all(|c| (0.0..=1e6).contains(c))).map(ColorDesc::from);
-    let wanted =
-        "a colour is '#' and 6 hexadecimal digits (sRGB), as '#336699', or three numbers R,G,B from 0 to 1e6 (linear)";
-    ColorDesc::from_hex(text).or_else(linear).ok_or_else(|| wanted.into())
+    ColorDesc::from_css(text).or_else(linear).ok_or_else(|| {
+        let is_word = text.chars().all(|c| c.is_ascii_alphabetic());
+        let near = ColorDesc::nearest_css_name(text).filter(|_| is_word);
+        let near = near.map(|near| format!("did you mean {near}? ")).unwrap_or_default();
+        format!(
+            "{near}a colour is '#336699' or '#369' (hexadecimal digits, sRGB), a name of CSS such as orange, or three \
+             numbers R,G,B from 0 to 1e6 (linear)"
+        )
+    })
 }
 
 /// Reads where an automatic camera looks from.
