@@ -181,7 +181,7 @@ impl Style {
 /// `error: scene.toml:14:9: path: message; hint`, and the line of text with a caret under the fault.
 fn plain(diagnostic: &Diagnostic) -> String {
     let mut text = format!("{}: {}", word(diagnostic.severity), clean(&diagnostic.to_string()));
-    if let Some(place) = &diagnostic.place {
+    if let Some(place) = diagnostic.place.as_ref().filter(|place| !place.excerpt.is_empty()) {
         let number = place.line.to_string();
         let excerpt = clean_line(&place.excerpt);
         // Tabs stay tabs, so that the caret stands under its character whatever their width

@@ -45,9 +45,9 @@ fn what_is_no_scene_is_a_fault_and_no_panic() {
             folder.run(&format!("{command} {name}")).exits(1).says(&[name]);
         }
     }
-    // Whether nothing is a scene is the library's to say; the program ends well either way
-    let ran = folder.run("check empty.toml");
-    assert!(matches!(ran.code, Some(0 | 1)), "{}", ran.stderr);
+    let said = "empty.toml is empty; a scene is TOML or JSON text; an empty one is `{}`";
+    folder.run("check empty.toml").exits(1).says(&[said]);
+    folder.run_with_input("check -", b" \n").exits(1).says(&["<stdin> is empty"]);
 }
 
 #[test]
