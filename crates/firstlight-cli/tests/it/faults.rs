@@ -90,6 +90,11 @@ fn a_missing_texture_warns_and_is_an_error_under_strict() {
     // A warning is said even when little is
     folder.run("render scene.toml --quiet").done().says(&["warning: scene.toml:", "tiles.png"]);
     assert_eq!(folder.names(), ["scene.png", "scene.toml"]);
+    // What stands in for it has edges as sharp as those of a checkerboard
+    folder.put("crisp.toml", SCENE.replace("[8, 8]", "[8, 8]\ncolors = [\"magenta\", \"black\"]"));
+    folder.run("render crisp.toml").done();
+    let [placeholder, crisp] = ["scene.png", "crisp.png"].map(|name| Picture::decode(&folder.get(name)).data);
+    assert!(placeholder == crisp);
 }
 
 #[test]
