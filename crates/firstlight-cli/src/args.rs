@@ -19,7 +19,7 @@ const VERSION: &str = concat!(env!("CARGO_PKG_VERSION"), env!("FIRSTLIGHT_COMMIT
 #[derive(Debug, Parser)]
 #[command(name = "firstlight", version = VERSION, arg_required_else_help = true, max_term_width = 100)]
 #[command(after_help = EXIT_CODES)]
-#[command(disable_help_subcommand = true, args_override_self = false)]
+#[command(args_override_self = false)]
 pub struct Cli {
     /// What to do
     #[command(subcommand)]

@@ -111,8 +111,6 @@ const MEANT: &[(&str, &str)] = &[
     ("scene.toml", "to render it: firstlight render scene.toml"),
     ("nowhere.ply", "to render it: firstlight render nowhere.ply"),
     ("config23", "to render it: firstlight render config23"),
-    ("help", "firstlight --help"),
-    ("help render", "firstlight COMMAND --help"),
     ("version", "firstlight --version"),
     ("show scene.toml", "nothing opens a window"),
     ("validate scene.toml", "firstlight check SCENE"),
