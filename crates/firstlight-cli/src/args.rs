@@ -45,7 +45,8 @@ pub enum Command {
     Render(Box<RenderArgs>),
     /// Reads and compiles a scene and says `ok`, or every fault in it
     Check(CheckArgs),
-    /// Says what a scene holds
+    /// Says what a scene or a model holds; of a picture its receipt
+    #[command(after_help = INFO_EXAMPLES)]
     Info(InfoArgs),
     /// Lists the scenes that are built in, or prints the text of one
     Scenes(ScenesArgs),
@@ -381,6 +382,15 @@ pub struct CheckArgs {
     #[command(flatten)]
     pub scene: SceneArgs,
 }
+
+const INFO_EXAMPLES: &str = "\
+Examples:
+  firstlight info room.toml
+      its camera, shapes, lights, materials, textures
+  firstlight info bunny.ply
+      its triangles, and whether its surface is closed
+  firstlight info room.exr --json
+      the receipt of a picture (.png, .exr, .npz, .npy, .hdr): what made it, and its buffers";
 
 /// `firstlight info`
 #[derive(Args, Debug)]
