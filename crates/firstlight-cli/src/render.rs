@@ -1,6 +1,7 @@
 //! `firstlight render`: from a scene to picture files.
 
 mod contents;
+mod dark;
 mod moments;
 mod overrides;
 mod plan;

@@ -226,6 +226,82 @@ fn control_characters_and_long_names_of_a_scene_are_not_shown_as_they_are() {
 }
 
 #[test]
+fn a_picture_that_is_nearly_black_says_what_strength_means() {
+    let folder = Folder::new();
+    let lit = |light: &str| {
+        let scene = SCENE.split("[[light.point]]").next().unwrap().replace("ambient = 0.05\n", "");
+        folder.put("dark.toml", format!("{scene}{light}"));
+    };
+    let point = "[[light.point]]\nposition = [4, 6, 4]\n";
+    lit(point);
+    let ran = folder.run("render dark.toml -o a.png").done();
+    let [start, meaning] = [
+        "note: dark.toml: the picture is nearly black, its brightest pixel is ",
+        " of 255: light.point[0] was left at strength 1, one candela, of which a white surface shows 1 / (pi d^2)",
+    ];
+    let ran = ran.says(&[start, meaning, "; try strength = "]);
+    // What is proposed makes its brightest pixel bright: 0.8 of white is 231 of 255
+    let proposed = |text: &str, after: &str| -> f64 {
+        let number = text.split(after).nth(1).unwrap().trim_start_matches(['=', ' ']);
+        number.split([',', ' ', ';', '\n']).next().unwrap().parse().unwrap()
+    };
+    let brightest = |line: &str| {
+        folder.run(&format!("render dark.toml -q -o b.png {line}")).done();
+        Picture::decode(&folder.get("b.png")).data.into_iter().max().unwrap()
+    };
+    let stops = proposed(&ran.stderr, "--exposure ");
+    assert!((225..=237).contains(&brightest(&format!("--exposure {stops}"))));
+    lit(&format!("{point}strength = {}\n", proposed(&ran.stderr, "try strength")));
+    assert!((225..=237).contains(&brightest("")));
+    // Which is not said again, nor of a part of it, nor where little is to be said
+    for line in ["", "-q"] {
+        assert!(!folder.run(&format!("render dark.toml {line} -o a.png")).done().stderr.contains("note"));
+    }
+    lit(point);
+    for line in ["-q", "--crop 0,0,4,4", "--exposure 9", "--buffers depth -o a.npz"] {
+        let ran = folder.run(&format!("render dark.toml {line} -o a.npz")).done();
+        assert!(!ran.stderr.contains("nearly black"), "{line}: {}", ran.stderr);
+    }
+    for (light, meaning) in [
+        ("[[light.rectangle]]\ncenter = [0, 60, 0]\nsize = [1, 1]\nlook_at = [0, 0, 0]\n", "a radiance of 1"),
+        ("[[light.directional]]\ndirection = [-1, -0.02, 0]\ncolor = 0.01\n", "one lux, of which a white surface"),
+        (&format!("{point}{point}"), "light.point[0] was left at strength 1 (as one more is), one candela"),
+    ] {
+        lit(light);
+        folder.run("render dark.toml -o a.png").done().says(&["nearly black", meaning]);
+    }
+    // Neither without light at all, nor in a model where units are the user's
+    for light in [&format!("{point}strength = 0.9\n"), &format!("{point}falloff = \"constant\"\ncolor = 0.001\n")] {
+        lit(light);
+        assert!(!folder.run("render dark.toml -o a.png").done().stderr.contains("nearly black"), "{light}");
+    }
+}
+
+#[test]
+fn a_tolerance_of_sampled_lights_is_a_note() {
+    let folder = Folder::with_scene();
+    let note = "note: scene.toml: --tolerance 4 changes next to nothing: the scene says (samples) at how many points \
+                each light is sampled, and the tolerance is for lights that are integrated; --samples exact integrates \
+                them";
+    let run = |line: &str| folder.run(&format!("render scene.toml --tolerance 4 --size 12 {line}")).done();
+    run("").says(&[note]);
+    run("--aa-mode full").says(&["--tolerance 4 changes nothing: the scene says (samples)"]);
+    run("--samples 9").says(&["changes next to nothing: --samples says at how many"]);
+    for line in ["--samples exact", "-q"] {
+        assert!(!run(line).stderr.contains("--tolerance"), "{line}");
+    }
+    assert!(!folder.run("render scene.toml --size 12").done().stderr.contains("--tolerance"));
+    // And it is so: sampled lights under full antialiasing know no tolerance
+    let bytes = |tolerance: &str| {
+        folder.run(&format!("render scene.toml --aa-mode full --tolerance {tolerance} -o a.png --bits 16 -q")).done();
+        Picture::decode(&folder.get("a.png"))
+    };
+    assert!(bytes("0.25") == bytes("16"));
+    folder.put("scene.toml", SCENE.replace("samples = 16\n", ""));
+    assert!(!run("").stderr.contains("note"));
+}
+
+#[test]
 fn advice_is_a_note_and_no_error() {
     let folder = Folder::new();
     let dark = SCENE.split("[[light.point]]").next().unwrap().replace("ambient = 0.05\n", "");
