@@ -307,7 +307,23 @@ mod tests {
     #[test]
     fn a_colour_is_srgb_or_linear() {
         assert_eq!((color("#ffffff"), color("0, 0.5,2")), (Ok(ColorDesc::WHITE), Ok(ColorDesc::linear(0.0, 0.5, 2.0))));
-        for bad in ["", "white", "#fff", "ffffff", "#gggggg", "1,2", "1,2,3,4", "-1,0,0", "nan,0,0", "1e7,0,0", "0.5"] {
+        for white in ["#fff", "white", "White"] {
+            assert_eq!(color(white), Ok(ColorDesc::WHITE), "{white}");
+        }
+        for bad in [
+            "",
+            "whites",
+            "transparent",
+            "#ff",
+            "ffffff",
+            "#gggggg",
+            "1,2",
+            "1,2,3,4",
+            "-1,0,0",
+            "nan,0,0",
+            "1e7,0,0",
+            "0.5",
+        ] {
             assert!(color(bad).is_err(), "{bad}");
         }
     }

@@ -136,6 +136,11 @@ fn a_file_of_another_kind_is_one_line_that_says_what_it_is() {
     for (name, bytes, said) in files {
         folder.put(name, bytes);
         for command in ["check", "render", "info"] {
+            // Of a picture its receipt is looked for
+            if (command, *name) == ("info", "a.png") {
+                folder.run("info a.png").exits(1).says(&["error: a.png: is a damaged PNG file: "]);
+                continue;
+            }
             let ran = folder.run(&format!("{command} {name}")).exits(1).says(&[&format!("error: {name} "), said]);
             assert_eq!(ran.stderr.lines().count(), 2, "{}", ran.stderr);
         }
@@ -259,13 +264,16 @@ fn a_picture_that_is_nearly_black_says_what_strength_means() {
     }
     lit(point);
     for line in ["-q", "--crop 0,0,4,4", "--exposure 9", "--buffers depth -o a.npz"] {
-        let ran = folder.run(&format!("render dark.toml {line} -o a.npz")).done();
+        let ran = folder.run(&format!("render dark.toml {line}")).done();
         assert!(!ran.stderr.contains("nearly black"), "{line}: {}", ran.stderr);
     }
     for (light, meaning) in [
         ("[[light.rectangle]]\ncenter = [0, 60, 0]\nsize = [1, 1]\nlook_at = [0, 0, 0]\n", "a radiance of 1"),
         ("[[light.directional]]\ndirection = [-1, -0.02, 0]\ncolor = 0.01\n", "one lux, of which a white surface"),
-        (&format!("{point}{point}"), "light.point[0] was left at strength 1 (as one more is), one candela"),
+        (
+            &format!("{point}{point}").replace("6, 4", "16, 4"),
+            "light.point[0] was left at strength 1 (as one more is), one candela",
+        ),
     ] {
         lit(light);
         folder.run("render dark.toml -o a.png").done().says(&["nearly black", meaning]);
