@@ -34,14 +34,17 @@ pub(super) fn advice(name: &str, desc: &SceneDesc, film: &Film, display: &Displa
         }
     };
     let factor = two_digits(BRIGHT / (f64::from(most) * display.factor()));
-    let stops = (factor.log2() * 10.0).round() / 10.0 + display.exposure;
+    // In tenths of a stop
+    let stops = (0..=640).map(|tenths| f64::from(tenths) / 10.0);
+    let stops = stops.map(|stops| Display { exposure: stops, ..*display }).find(|more| more.factor() >= factor);
+    let exposure = stops.map(|more| more.exposure + display.exposure).filter(|stops| *stops <= 64.0);
     let message = format!(
         "{name}: the picture is nearly black, its brightest pixel is {brightest:.0} of 255: {path} was left at \
          strength 1{others}, {meaning}"
     );
-    let hint = match stops <= 64.0 {
-        true => format!("try strength = {factor}, or --exposure {stops} for the same in this picture"),
-        false => format!("try strength = {factor}"),
+    let hint = match exposure {
+        Some(stops) => format!("try strength = {factor}, or --exposure {stops:.1} for the same in this picture"),
+        None => format!("try strength = {factor}"),
     };
     Some(Diagnostic { severity: Severity::Advice, place: None, path: String::new(), message, hint: Some(hint) })
 }
@@ -69,7 +72,13 @@ fn is_left(light: &LightDesc) -> bool {
 
 /// A number of 1 or more, to two digits.
 fn two_digits(number: f64) -> f64 {
-    let unit = 10f64.powf(number.log10().floor() - 1.0).max(0.1);
+    if number < 9.95 {
+        return (number * 10.0).round() / 10.0;
+    }
+    let mut unit = 1.0;
+    while number / unit >= 99.5 {
+        unit *= 10.0;
+    }
     (number / unit).round() * unit
 }
 
@@ -79,8 +88,8 @@ mod tests {
 
     #[test]
     fn strengths_are_proposed_to_two_digits() {
-        for (number, expected) in [(12.34, 12.0), (99.9, 100.0), (1234.0, 1200.0), (8.76, 8.8), (56789.0, 57000.0)] {
-            assert!((two_digits(number) - expected).abs() < 1e-9 * expected, "{number}: {}", two_digits(number));
+        for (number, expected) in [(12.34, 12.0), (99.9, 100.0), (1234.0, 1200.0), (8.69, 8.7), (56789.0, 57000.0)] {
+            assert_eq!(two_digits(number), expected, "{number}");
         }
     }
 }

@@ -321,7 +321,8 @@ mod tests {
         let small = BALL.replace("radius = 1", "radius = 0.02") + LIGHT;
         assert_eq!(said(&small), [""; 0]);
         // Smaller than a pixel: all 16 camera rays of each are asked, and meet it, or fall beside it
-        let pixel = |i: f64, sub: f64| ((2.0 * (i + sub) / 1024.0 - 1.0) * (std::f64::consts::PI / 8.0).tan()) * 5.0;
+        // At 5 m, where half the film is tan(45 / 2 degrees) = sqrt(2) - 1 high
+        let pixel = |i: f64, sub: f64| ((2.0 * (i + sub) / 1024.0 - 1.0) * (2f64.sqrt() - 1.0)) * 5.0;
         let tiny = |x: f64, radius: f64| {
             let center = format!("center = [{x}, {}, 0]", -pixel(300.0, 0.125));
             said(
