@@ -19,7 +19,7 @@ const VERSION: &str = concat!(env!("CARGO_PKG_VERSION"), env!("FIRSTLIGHT_COMMIT
 #[derive(Debug, Parser)]
 #[command(name = "firstlight", version = VERSION, arg_required_else_help = true, max_term_width = 100)]
 #[command(after_help = EXIT_CODES)]
-#[command(disable_help_subcommand = true, args_override_self = false)]
+#[command(args_override_self = false)]
 pub struct Cli {
     /// What to do
     #[command(subcommand)]
@@ -45,7 +45,8 @@ pub enum Command {
     Render(Box<RenderArgs>),
     /// Reads and compiles a scene and says `ok`, or every fault in it
     Check(CheckArgs),
-    /// Says what a scene holds
+    /// Says what a scene or a model holds; of a picture its receipt
+    #[command(after_help = INFO_EXAMPLES)]
     Info(InfoArgs),
     /// Lists the scenes that are built in, or prints the text of one
     Scenes(ScenesArgs),
@@ -271,8 +272,8 @@ pub struct RenderArgs {
     /// Leaves what no surface covers transparent [default: as the scene has it]
     #[arg(long, conflicts_with = "background", help_heading = "Picture")]
     pub transparent: bool,
-    /// The colour of what no surface covers: '#rrggbb' (sRGB), or R,G,B (linear, 0 to 1e6, as in scene text) [default:
-    /// the scene's]
+    /// The colour of what no surface covers: '#rrggbb', '#rgb' or a name of CSS such as orange (sRGB), or R,G,B
+    /// (linear, 0 to 1e6, as in scene text) [default: the scene's]
     #[arg(long, value_name = "COLOR", value_parser = color, allow_hyphen_values = true, help_heading = "Picture")]
     pub background: Option<ColorDesc>,
     /// Where the camera of a model, or of a scene without a camera, looks from: front, back, left, right, top, bottom,
@@ -381,6 +382,15 @@ pub struct CheckArgs {
     #[command(flatten)]
     pub scene: SceneArgs,
 }
+
+const INFO_EXAMPLES: &str = "\
+Examples:
+  firstlight info room.toml
+      its camera, shapes, lights, materials, textures
+  firstlight info bunny.ply
+      its triangles, and whether its surface is closed
+  firstlight info room.exr --json
+      the receipt of a picture (.png, .exr, .npz, .npy, .hdr): what made it, and its buffers";
 
 /// `firstlight info`
 #[derive(Args, Debug)]
@@ -498,9 +508,9 @@ pub struct RelightArgs {
     /// A file that was rendered with --buffers relight: .exr or .npz
     #[arg(value_name = "FILE", value_hint = ValueHint::FilePath)]
     pub file: PathBuf,
-    /// A light and what becomes of it: NAME=x1.5 multiplies its strength, NAME=1.5 sets it, NAME=#ffd0a0 (sRGB) or
-    /// NAME=R,G,B (linear) sets its colour. NAME may be #3, the third in scene order. May be given several times, in
-    /// effect in that order
+    /// A light and what becomes of it: NAME=x1.5 multiplies its strength, NAME=1.5 sets it, NAME=#ffd0a0 or
+    /// NAME=orange (a name of CSS; sRGB) or NAME=R,G,B (linear) sets its colour. NAME may be #3, the third in scene
+    /// order. May be given several times, in effect in that order
     #[arg(long, value_name = "NAME=CHANGE", value_parser = crate::relight::change, required = true)]
     pub light: Vec<(String, LightChange)>,
     /// A picture to write: its ending, .png, .exr, .npz, .npy or .hdr, says the format. May be given several times

@@ -91,7 +91,6 @@ const OPTIONS: &[(&[&str], &str)] = &[
 
 /// Words in the place of a command, and what does it here.
 const COMMANDS: &[(&[&str], &str)] = &[
-    (&["help"], "firstlight --help lists the commands, firstlight COMMAND --help what one of them takes"),
     (&["version"], "firstlight --version"),
     (
         &["draw", "make", "run", "trace", "raytrace", "bake", "image", "picture", "thumbnail"],

@@ -1,4 +1,6 @@
-//! `firstlight info`: what a scene holds.
+//! `firstlight info`: what a scene, a model or a picture holds.
+
+mod picture;
 
 use std::fmt::Write;
 use std::ops::ControlFlow;
@@ -9,15 +11,20 @@ use firstlight::{
 };
 use serde_json::{Map, Value, json};
 
-use crate::args::InfoArgs;
+use crate::args::{InfoArgs, ReadingArgs};
 use crate::input::{self, Input};
-use crate::report::{Failure, answer, show_diagnostics};
+use crate::report::{Failure, answer, show_diagnostics, shown};
 
-/// Says what a scene holds.
+/// Says what a scene, a model or a picture holds.
 ///
 /// # Errors
-/// The scene cannot be had, or has faults.
+/// It cannot be had, or has faults.
 pub fn run(args: &InfoArgs) -> Result<(), Failure> {
+    let file = &args.scene.scene;
+    if picture::is_picture(file) {
+        refuse_options_of_scenes(args)?;
+        return picture::answer_picture(file, args.json);
+    }
     let input = input::read(&args.scene.scene, &args.scene.reading)?;
     if input.is_model {
         return answer_model(&input, args);
@@ -28,6 +35,28 @@ pub fn run(args: &InfoArgs) -> Result<(), Failure> {
     input.tell_added(&compiled);
     let info = gather(&input.name, &input.parsed.desc, &compiled);
     answer(&if args.json { format!("{info:#}\n") } else { text(&info) })
+}
+
+/// Sees that options of scenes and models are not said of a picture.
+///
+/// # Errors
+/// One is.
+fn refuse_options_of_scenes(args: &InfoArgs) -> Result<(), Failure> {
+    let ReadingArgs { strict, allow_dir, smooth, up } = &args.scene.reading;
+    let said = [
+        ("--strict", *strict),
+        ("--allow-dir", !allow_dir.is_empty()),
+        ("--smooth", smooth.is_some()),
+        ("--up", up.is_some()),
+        ("--time", args.time.is_some()),
+    ];
+    match said.into_iter().find(|(_, said)| *said) {
+        Some((option, _)) => {
+            let name = shown(&args.scene.scene);
+            Err(Failure::Usage(format!("{option} has no meaning for a picture, and {name} is one")))
+        }
+        None => Ok(()),
+    }
 }
 
 /// Says what a model holds.

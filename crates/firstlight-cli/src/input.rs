@@ -153,10 +153,6 @@ fn read_text(
     own: Option<PathBuf>,
     reading: &ReadingArgs,
 ) -> Result<Input, Failure> {
-    if text.trim_ascii().is_empty() {
-        let hint = "a scene is TOML or JSON text, a model a PLY, STL or OBJ file";
-        return Err(Failure::Work(format!("{}: is empty; {hint}", shown(Path::new(&name)))));
-    }
     // A scene reads its own folder
     let assets = Remembered::new(folder.map(|folder| folder_assets(folder, reading)).transpose()?);
     let parsed = SceneDesc::parse(&name, text, &assets);

@@ -95,7 +95,8 @@ fn man() -> Result<(), Failure> {
     let mut program = Cli::command();
     program.build();
     let mut roff = Vec::new();
-    let pages = std::iter::once(&program).chain(program.get_subcommands());
+    let commands = program.get_subcommands().filter(|command| command.get_name() != "help");
+    let pages = std::iter::once(&program).chain(commands);
     for page in pages {
         // The page of a command is called firstlight-render(1), and its synopsis begins `firstlight render`
         let title = page.get_display_name().unwrap_or(page.get_name()).to_owned();

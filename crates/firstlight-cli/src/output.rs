@@ -145,6 +145,11 @@ impl Target {
         matches!(self, Target::File(path) if path.to_str().is_some_and(|text| placeholder(text).is_some()))
     }
 
+    /// Whether the whole name of the scene's file is in it.
+    pub fn has_name(&self) -> bool {
+        matches!(self, Target::File(path) if path.to_str().is_some_and(|text| text.contains(NAME)))
+    }
+
     /// What messages call it.
     pub fn name(&self) -> String {
         match self {
@@ -396,7 +401,7 @@ fn content_of(path: &Path) -> Result<(Content, PathBuf), Failure> {
         Err((_, hint)) => {
             let hint = hint.map(|hint| format!("; {hint}")).unwrap_or_default();
             Err(Failure::Usage(format!(
-                "-o {name}={file}: {name:?} is no buffer{hint} `firstlight buffers` lists them all; a file of that \
+                "-o {name}={file}: {name:?} is no buffer{hint}; `firstlight buffers` lists them all; a file of that \
                  name is ./{name}={file}"
             )))
         }

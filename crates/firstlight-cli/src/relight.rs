@@ -61,7 +61,7 @@ fn outputs(args: &RelightArgs) -> Result<Vec<(Target, Format)>, Failure> {
 /// Reads `NAME=x1.5`, `NAME=1.5` or `NAME=#ffd0a0`: the name may hold `=`, what follows the last one is the change.
 pub fn change(text: &str) -> Result<(String, LightChange), String> {
     let wanted = "NAME=x1.5 multiplies the strength of the light NAME, or of #3, the third; NAME=1.5 sets it; \
-                  NAME=#ffd0a0 or NAME=R,G,B sets its colour";
+                  NAME=#ffd0a0, NAME=orange or NAME=R,G,B sets its colour";
     let (name, value) = text.rsplit_once('=').filter(|(name, _)| !name.is_empty()).ok_or(wanted)?;
     let number = |text: &str| text.parse::<f64>().ok().filter(|number| (0.0..=1e15).contains(number));
     let change = match value.strip_prefix('x') {
@@ -87,7 +87,8 @@ mod tests {
             ("key=x1.5", "key", LightChange::Times(1.5)),
             ("key=0", "key", LightChange::Strength(0.0)),
             ("a=b=#ffffff", "a=b", white.clone()),
-            ("#3=1,1,1", "#3", white),
+            ("#3=1,1,1", "#3", white.clone()),
+            ("#3=White", "#3", white),
         ] {
             assert_eq!(change(text), Ok((name.to_owned(), expected)), "{text}");
         }

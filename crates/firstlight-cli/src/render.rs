@@ -1,6 +1,7 @@
 //! `firstlight render`: from a scene to picture files.
 
 mod contents;
+mod dark;
 mod moments;
 mod overrides;
 mod plan;
@@ -14,7 +15,7 @@ use crate::args::{ReadingArgs, RenderArgs, Shard};
 use crate::input;
 use crate::interrupt::Watch;
 use crate::output::{Ready, Target};
-use crate::report::{Failure, say, shown};
+use crate::report::{Failure, say, shown, whole};
 use crate::stats::Stats;
 use moments::{Run, Took};
 use plan::{Job, Plan, StatsPlan};
@@ -61,7 +62,7 @@ fn render_all(plan: &Plan, jobs: &[Job], reading: &ReadingArgs) -> Result<(), Fa
             }
             Err(failure) => {
                 failure.show("render");
-                failed.push(scene);
+                failed.push(whole(job.scene));
             }
         }
     }

@@ -35,7 +35,7 @@ pub enum Failure {
     },
     /// Some of several scenes could not be rendered, and what was wrong with each has been said: exit code 1.
     Several {
-        /// What messages call those that failed.
+        /// The names of those that failed, without control characters.
         failed: Vec<String>,
         /// How many there are.
         all: usize,
@@ -88,8 +88,10 @@ impl Failure {
                 say(format_args!("interrupted; {done} of {all} frames were written, each of them whole"));
             }
             Failure::Several { failed, all } => {
-                let (count, names) = (failed.len(), clean(&failed.join(", ")));
-                say(format_args!("{} of {all} scenes were rendered; {count} could not be: {names}", all - count));
+                let count = failed.len();
+                say(format_args!("{} of {all} scenes were rendered; {count} could not be:", all - count));
+                // Each by its whole name, to be copied
+                failed.iter().for_each(|name| say(format_args!("  {name}")));
             }
             Failure::InterruptedIn { scene, done, all } => {
                 say(format_args!("interrupted in {}; {done} of {all} scenes were rendered before it", clean(scene)));
@@ -181,7 +183,7 @@ impl Style {
 /// `error: scene.toml:14:9: path: message; hint`, and the line of text with a caret under the fault.
 fn plain(diagnostic: &Diagnostic) -> String {
     let mut text = format!("{}: {}", word(diagnostic.severity), clean(&diagnostic.to_string()));
-    if let Some(place) = &diagnostic.place {
+    if let Some(place) = diagnostic.place.as_ref().filter(|place| !place.excerpt.is_empty()) {
         let number = place.line.to_string();
         let excerpt = clean_line(&place.excerpt);
         // Tabs stay tabs, so that the caret stands under its character whatever their width
@@ -217,6 +219,11 @@ fn clean_line(text: &str) -> String {
 /// A path as messages show it: on one line, without control characters, and not longer than a line or two.
 pub fn shown(path: &Path) -> String {
     printable(&cut(&path.display().to_string(), MAX_NAME)).into_owned()
+}
+
+/// The whole of a path, on one line and without control characters.
+pub fn whole(path: &Path) -> String {
+    printable(&path.display().to_string()).into_owned()
 }
 
 /// Characters of a name, and of a message, that are shown; of more, the beginning and the end.

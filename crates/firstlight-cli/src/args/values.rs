@@ -192,9 +192,15 @@ pub(super) fn numbers<const N: usize>(text: &str) -> Option<[f64; N]> {
 /// Reads a colour.
 pub fn color(text: &str) -> Result<ColorDesc, String> {
     let linear = || numbers::<3>(text).filter(|rgb| rgb.iter().all(|c| (0.0..=1e6).contains(c))).map(ColorDesc::from);
-    let wanted =
-        "a colour is '#' and 6 hexadecimal digits (sRGB), as '#336699', or three numbers R,G,B from 0 to 1e6 (linear)";
-    ColorDesc::from_hex(text).or_else(linear).ok_or_else(|| wanted.into())
+    ColorDesc::from_css(text).or_else(linear).ok_or_else(|| {
+        let is_word = text.chars().all(|c| c.is_ascii_alphabetic());
+        let near = ColorDesc::nearest_css_name(text).filter(|_| is_word);
+        let near = near.map(|near| format!("did you mean {near}? ")).unwrap_or_default();
+        format!(
+            "{near}a colour is '#336699' or '#369' (hexadecimal digits, sRGB), a name of CSS such as orange, or three \
+             numbers R,G,B from 0 to 1e6 (linear)"
+        )
+    })
 }
 
 /// Reads where an automatic camera looks from.
@@ -301,7 +307,23 @@ mod tests {
     #[test]
     fn a_colour_is_srgb_or_linear() {
         assert_eq!((color("#ffffff"), color("0, 0.5,2")), (Ok(ColorDesc::WHITE), Ok(ColorDesc::linear(0.0, 0.5, 2.0))));
-        for bad in ["", "white", "#fff", "ffffff", "#gggggg", "1,2", "1,2,3,4", "-1,0,0", "nan,0,0", "1e7,0,0", "0.5"] {
+        for white in ["#fff", "white", "White"] {
+            assert_eq!(color(white), Ok(ColorDesc::WHITE), "{white}");
+        }
+        for bad in [
+            "",
+            "whites",
+            "transparent",
+            "#ff",
+            "ffffff",
+            "#gggggg",
+            "1,2",
+            "1,2,3,4",
+            "-1,0,0",
+            "nan,0,0",
+            "1e7,0,0",
+            "0.5",
+        ] {
             assert!(color(bad).is_err(), "{bad}");
         }
     }

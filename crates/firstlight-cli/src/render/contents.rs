@@ -39,6 +39,10 @@ impl<'a> Contents<'a> {
                     found
                 }
             };
+            if let Some(why) = buffers.iter().find_map(|buffer| output.format.refuses_name(&scene.buffer_name(*buffer)))
+            {
+                return Err(Failure::Work(format!("{}: {why}", output.target.name())));
+            }
             Ok((output, buffers))
         };
         outputs.iter().map(of).collect::<Result<_, _>>().map(Contents)

@@ -4,9 +4,12 @@ use std::ops::ControlFlow;
 use std::path::Path;
 use std::time::Duration;
 
-use firstlight::{Coco, Diagnostic, Plane, RenderSettings, RenderStats, Scene, Severity, Window};
+use firstlight::{
+    AaMode, Coco, Diagnostic, Display, Plane, RenderSettings, RenderStats, SamplesDesc, Scene, Severity, Window,
+};
 
 use super::contents::Contents;
+use super::dark;
 use super::plan::Plan;
 use super::timed;
 use crate::faster::faster;
@@ -106,6 +109,7 @@ impl Run<'_> {
         output::refuse_overwriting(&self.input.files(), outputs, self.beside)?;
         if !plan.quiet {
             compiled.advice.extend(self.advice_on_time(&compiled.scene, moments.len()));
+            compiled.advice.extend(self.advice_on_tolerance());
             compiled.warnings.append(&mut compiled.advice);
         }
         compiled.warnings.retain(|warning| !self.warned.contains(warning));
@@ -163,6 +167,12 @@ impl Run<'_> {
             Ok(())
         });
         written?;
+        // Last, where it is seen: what there is to say of the picture itself
+        if index == 0 && !plan.quiet && settings.crop.is_none() {
+            let display = Display { exposure: plan.exposure.unwrap_or(scene.display().exposure), ..scene.display() };
+            let advice = dark::advice(&self.input.name, &self.input.parsed.desc, &film, &display);
+            progress.aside(|| show_diagnostics(advice.as_slice()));
+        }
         Ok(Took { compile, render, write, rays })
     }
 }
@@ -178,12 +188,37 @@ impl Run<'_> {
             _ => return None,
         };
         let hint = "keys = [{ time = 0, ... }, ...] in a transform move a shape, a light or the camera";
-        Some(Diagnostic {
+        Some(self.note(&message, hint))
+    }
+
+    /// What there is to say where `--tolerance` was given and no light is integrated to it.
+    fn advice_on_tolerance(&self) -> Option<Diagnostic> {
+        let tolerance = self.plan.overrides.tolerance?;
+        let desc = &self.input.parsed.desc;
+        // Those of each light, or of the scene
+        let samples = desc.lights.iter().filter_map(|light| light.samples());
+        let samples: Vec<_> = samples.map(|(own, _)| own.unwrap_or(desc.render.samples)).collect();
+        if samples.is_empty() || samples.contains(&SamplesDesc::Exact) {
+            return None;
+        }
+        // Edges alone are judged by it
+        let little = if self.settings.aa_mode == AaMode::Adaptive { "next to nothing" } else { "nothing" };
+        let said_by = if self.plan.overrides.samples.is_some() { "--samples says" } else { "the scene says (samples)" };
+        let message = format!(
+            "--tolerance {tolerance} changes {little}: {said_by} at how many points each light is sampled, and the \
+             tolerance is for lights that are integrated"
+        );
+        Some(self.note(&message, "--samples exact integrates them"))
+    }
+
+    /// A note about the scene.
+    fn note(&self, message: &str, hint: &str) -> Diagnostic {
+        Diagnostic {
             severity: Severity::Advice,
             place: None,
             path: String::new(),
             message: format!("{}: {message}", self.input.name),
-            hint: Some(hint.into()),
-        })
+            hint: Some(hint.to_owned()),
+        }
     }
 }

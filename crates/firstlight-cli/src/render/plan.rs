@@ -231,8 +231,9 @@ impl<'a> Plan<'a> {
                 let of_frame = move |frame| if self.frames.is_some() { output.of_frame(frame) } else { output.clone() };
                 frames.clone().map(of_frame).map(|output| output.target)
             });
-            for target in pictures.chain(self.beside(&job.names).into_iter().map(|file| file.target)) {
-                let target = target.of_scene(&job.names);
+            let beside = self.stats.file().into_iter().chain(&self.coco).map(|file| file.target.clone());
+            for written in pictures.chain(beside) {
+                let target = written.of_scene(&job.names);
                 let (name, real) = (target.name(), target.real());
                 if scenes.contains(&real) {
                     return Err(Failure::Usage(format!(
@@ -242,11 +243,19 @@ impl<'a> Plan<'a> {
                 if let Some(before) = seen.insert(real, index)
                     && before != index
                 {
-                    let (one, other) = (shown(self.jobs[before].scene), shown(job.scene));
-                    return Err(Failure::Usage(format!(
-                        "{one} and {other} would both be written to {name}; {{name}} in the output's name keeps their \
-                         endings apart, else render them in two calls"
-                    )));
+                    let [one, other] = [self.jobs[before].scene, job.scene];
+                    let way = match (input::file_of(one), input::file_of(other)) {
+                        _ if one == other => "name it once",
+                        (Some(a), Some(b)) if Target::of(a).real() == Target::of(b).real() => {
+                            "they are one file, name it once"
+                        }
+                        _ if self.jobs[before].names.name == job.names.name || written.has_name() => {
+                            "render them in two calls, to folders of their own"
+                        }
+                        _ => "{name} in the output's name keeps their endings apart",
+                    };
+                    let (one, other) = (shown(one), shown(other));
+                    return Err(Failure::Usage(format!("{one} and {other} would both be written to {name}; {way}")));
                 }
             }
         }

@@ -110,6 +110,80 @@ fn help_and_version_are_answers() {
     }
 }
 
+#[test]
+fn help_of_a_command_is_that_of_its_option() {
+    let folder = Folder::new();
+    assert_eq!(folder.run("help").done().text(), folder.run("--help").done().text());
+    for command in ["render", "check", "info", "relight", "view-buffer", "man"] {
+        let [asked, option] = [format!("help {command}"), format!("{command} --help")].map(|line| folder.run(&line));
+        assert_eq!(asked.done().text(), option.done().text(), "{command}");
+    }
+}
+
+#[test]
+fn the_page_of_the_program_names_every_command_and_option() {
+    let page = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/src/program.md");
+    let page = std::fs::read_to_string(page).unwrap();
+    let folder = Folder::new();
+    let help = folder.run("--help").done().text();
+    let commands = help.split("Commands:\n").nth(1).unwrap().split("\n\n").next().unwrap();
+    let names = commands.lines().filter_map(|line| line.strip_prefix("  ").filter(|line| !line.starts_with(' ')));
+    let names = names.filter_map(|line| line.split_whitespace().next());
+    let names: Vec<&str> = names.filter(|name| *name != "help").collect();
+    assert!(names.len() >= 12 && names.contains(&"relight"), "{names:?}");
+    for name in names {
+        assert!(page.contains(&format!("firstlight {name} ")), "{name}");
+        // What it makes of buffers has its own page
+        if name == "view-buffer" {
+            continue;
+        }
+        let help = folder.run(&format!("{name} --help")).done().text();
+        let lines = help.lines().filter(|line| line.starts_with("  ") && line.trim_start().starts_with('-'));
+        for option in lines.flat_map(|line| line.split([' ', ',', '<', '[', '='])).filter(|word| word.starts_with("--"))
+        {
+            assert!(option == "--help" || page.contains(option), "{name} {option}");
+        }
+    }
+}
+
+#[test]
+fn info_of_a_picture_is_its_receipt() {
+    let folder = Folder::with_scene();
+    folder.run("render scene.toml -o a.png -o a.exr -o a.npz -o a.hdr -o depth=a.npy --buffers color,depth -q").done();
+    let hash = folder.run("info scene.toml --json").done().text();
+    let hash = serde_json::from_str::<serde_json::Value>(&hash).unwrap()["hash"].as_str().unwrap().to_owned();
+    for (name, format, buffers) in [
+        ("a.png", "PNG, 8 bits", "buffers    color: R G B, as it was written\n"),
+        ("a.exr", "OpenEXR", "buffers    color: R G B A, as it was written\n           depth: Z, as it was written\n"),
+        ("a.npz", "NPZ", "buffers    color: R G B A, as it was written\n           depth: Z, as it was written\n"),
+        ("a.npy", "NPY", "buffers    depth: Z, as it was written\n"),
+        ("a.hdr", "Radiance HDR", "buffers    color: R G B, as it was written\n"),
+    ] {
+        let text = folder.run(&format!("info {name}")).done().text();
+        for part in [&*format!(" bytes, {format}\n"), "size       36 x 24 pixels\n", buffers, &hash, " tolerance "] {
+            assert!(text.contains(part), "{name}: {part:?} is not in\n{text}");
+        }
+        let json: serde_json::Value =
+            serde_json::from_slice(&folder.run(&format!("info {name} --json")).done().stdout).unwrap();
+        assert_eq!(json["receipt"]["scene_hash"], hash.as_str(), "{name}");
+        assert_eq!((&json["format"], &json["width"]), (&format.into(), &36.into()));
+    }
+    // A part says of what
+    folder.run("render scene.toml --crop 4,3,20,10 -o part.exr -q").done();
+    assert!(folder.run("info part.exr").done().text().contains("size       20 x 10 pixels, at (4, 3) of 36 x 24\n"));
+    // What another program wrote, what is damaged, and what is for scenes
+    let bytes = folder.get("a.png");
+    folder.put("cut.png", &bytes[..bytes.len() / 2]);
+    folder.run("info cut.png").exits(1).says(&["cut.png: is a damaged PNG file"]);
+    folder.run("info a.png --time 1").exits(2).says(&["--time has no meaning for a picture, and a.png is one"]);
+    let mut other = Vec::new();
+    let mut encoder = png::Encoder::new(&mut other, 3, 2);
+    encoder.set_color(png::ColorType::Grayscale);
+    encoder.write_header().unwrap().write_image_data(&[7; 6]).unwrap();
+    folder.put("other.png", other);
+    assert!(folder.run("info other.png").done().text().contains("receipt    none: "));
+}
+
 /// What the completions know, help says: with its default, and at the end by examples.
 #[test]
 fn help_says_every_option_and_its_default() {

@@ -88,7 +88,17 @@ fn pages() -> Vec<(String, String)> {
     files.push(root.join("README.md"));
     files.sort();
     let name = |file: &Path| file.file_name().unwrap().to_string_lossy().into_owned();
-    files.iter().map(|file| (name(file), fs::read_to_string(file).unwrap())).collect()
+    files.iter().map(|file| (name(file), without_runs(&fs::read_to_string(file).unwrap()))).collect()
+}
+
+/// A page without the stored runs that it shows, whose commands were run when they were stored; with as many lines.
+fn without_runs(text: &str) -> String {
+    let mut is_run = false;
+    let line = |line: &str| {
+        is_run = (is_run || line.starts_with("<!-- run ")) && line != "<!-- end of run -->";
+        if is_run { "\n".to_owned() } else { format!("{line}\n") }
+    };
+    text.lines().map(line).collect()
 }
 
 fn root() -> PathBuf {

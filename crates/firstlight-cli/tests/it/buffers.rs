@@ -33,6 +33,28 @@ fn files_hold_what_is_asked_for() {
 }
 
 #[test]
+fn names_too_long_for_a_file_are_told_before_anything_is_rendered() {
+    let folder = Folder::new();
+    let scene = |length: usize| {
+        let name = format!("[[light.rectangle]]\nname = \"{}\"", "l".repeat(length));
+        SCENE.replace("[[light.rectangle]]", &name)
+    };
+    // `light:` and the name, with room for `firstlight:buffer.` before them in 255 bytes
+    folder.put("long.toml", scene(232));
+    let line = "render long.toml --buffers color,light:* --size 2000 --aa 64 --samples 1000000";
+    folder.run(&format!("{line} -o a.exr")).exits(1).says(&[
+        "a.exr: the buffer \"light:lllll",
+        "has a name of 238 bytes, and at most 237 are possible; give the light",
+    ]);
+    assert_eq!(folder.names(), ["long.toml"]);
+    folder.put("scene.toml", scene(231));
+    folder.run("render scene.toml --buffers color,light:* -o a.exr -q").done();
+    folder.run("verify a.exr --scene scene.toml").done();
+    // Arrays have room for it
+    folder.run("render long.toml --buffers color,light:* -o a.npz -q").done();
+}
+
+#[test]
 fn lights_are_kept_apart() {
     let folder = Folder::with_scene();
     folder.run("render scene.toml --buffers color,ambient,light:*,light:#1:specular -o a.npz -o a.exr").done();

@@ -36,6 +36,7 @@ fn faults_of_standard_input_have_a_place_too() {
 #[test]
 fn what_is_no_scene_is_a_fault_and_no_panic() {
     let folder = Folder::new();
+    folder.put("empty.toml", "");
     folder.put("bytes.toml", (0..=255).collect::<Vec<u8>>());
     folder.put("text.json", "{\"render\": ");
     folder.put("course.txt", "camera_id 1 2\nlight 3\n");
@@ -44,6 +45,9 @@ fn what_is_no_scene_is_a_fault_and_no_panic() {
             folder.run(&format!("{command} {name}")).exits(1).says(&[name]);
         }
     }
+    let said = "empty.toml is empty; a scene is TOML or JSON text; an empty one is `{}`";
+    folder.run("check empty.toml").exits(1).says(&[said]);
+    folder.run_with_input("check -", b" \n").exits(1).says(&["<stdin> is empty"]);
 }
 
 #[test]
@@ -86,6 +90,11 @@ fn a_missing_texture_warns_and_is_an_error_under_strict() {
     // A warning is said even when little is
     folder.run("render scene.toml --quiet").done().says(&["warning: scene.toml:", "tiles.png"]);
     assert_eq!(folder.names(), ["scene.png", "scene.toml"]);
+    // What stands in for it has edges as sharp as those of a checkerboard
+    folder.put("crisp.toml", SCENE.replace("[8, 8]", "[8, 8]\ncolors = [\"magenta\", \"black\"]"));
+    folder.run("render crisp.toml").done();
+    let [placeholder, crisp] = ["scene.png", "crisp.png"].map(|name| Picture::decode(&folder.get(name)).data);
+    assert!(placeholder == crisp);
 }
 
 #[test]
@@ -127,6 +136,11 @@ fn a_file_of_another_kind_is_one_line_that_says_what_it_is() {
     for (name, bytes, said) in files {
         folder.put(name, bytes);
         for command in ["check", "render", "info"] {
+            // Of a picture its receipt is looked for
+            if (command, *name) == ("info", "a.png") {
+                folder.run("info a.png").exits(1).says(&["error: a.png: is a damaged PNG file: "]);
+                continue;
+            }
             let ran = folder.run(&format!("{command} {name}")).exits(1).says(&[&format!("error: {name} "), said]);
             assert_eq!(ran.stderr.lines().count(), 2, "{}", ran.stderr);
         }
@@ -174,13 +188,13 @@ fn a_model_is_spoken_of_by_its_name() {
     let own = "their faces have the mesh's own material; a scene describes one as [material.phong.NAME]\n";
     for command in ["check models/a.obj", "check models/a.obj --strict"] {
         let ran = folder.run(command).done().says(&[&format!("{named}{own}")]);
-        assert_eq!(ran.stderr.lines().count(), 1, "{}", ran.stderr);
+        assert_eq!(ran.stderr.matches("is empty").count(), 1, "{}", ran.stderr);
     }
     folder.put("models/a.obj", format!("mtllib a.mtl\n{}", MODEL.replace("f 1", "usemtl clay\nf 1")));
     folder.put("models/a.mtl", "newmtl clay\nKd 1 0 0\n");
     for command in ["check models/a.obj", "check models/a.obj --strict"] {
         let ran = folder.run(command).done().says(&[&format!("{named}.mtl files are not read: {own}")]);
-        assert_eq!(ran.stderr.lines().count(), 1, "{}", ran.stderr);
+        assert_eq!(ran.stderr.matches("is empty").count(), 1, "{}", ran.stderr);
     }
     folder.put("models/a.obj", "v 0 0 0\nv 1 1 1\nv 2 2 z\n");
     folder.run("check models/a.obj").exits(1).says(&["error: models/a.obj:3: v: `z`"]);
@@ -211,7 +225,7 @@ fn an_empty_file_is_said_to_be_empty() {
         }
     }
     for name in ["a", "a.toml", "a.json", "-"] {
-        let words = "is empty; a scene is TOML or JSON text, a model a PLY, STL or OBJ file\n";
+        let words = "is empty; a scene is TOML or JSON text; an empty one is `{}`\n";
         for text in ["", " \n\n"] {
             let ran = match name {
                 "-" => folder.run_with_input("check -", text.as_bytes()),
@@ -221,7 +235,7 @@ fn an_empty_file_is_said_to_be_empty() {
                 }
             };
             let ran = ran.exits(1).says(&[words]);
-            assert_eq!(ran.stderr.lines().count(), 1, "{}", ran.stderr);
+            assert_eq!(ran.stderr.matches("is empty").count(), 1, "{}", ran.stderr);
         }
     }
 }
@@ -261,6 +275,85 @@ fn control_characters_and_long_names_of_a_scene_are_not_shown_as_they_are() {
     let ran = folder.run("check scene.toml").exits(1).says(&["\\u{1b}", "fov_y_deg"]);
     assert!(!ran.stderr.chars().any(|c| c.is_control() && c != '\n' || c == '\u{202e}'), "{}", ran.stderr);
     assert!(ran.stderr.lines().all(|line| line.chars().count() < 1200), "{}", ran.stderr);
+}
+
+#[test]
+fn a_picture_that_is_nearly_black_says_what_strength_means() {
+    let folder = Folder::new();
+    let lit = |light: &str| {
+        let scene = SCENE.split("[[light.point]]").next().unwrap().replace("ambient = 0.05\n", "");
+        folder.put("dark.toml", format!("{scene}{light}"));
+    };
+    let point = "[[light.point]]\nposition = [4, 6, 4]\n";
+    lit(point);
+    let ran = folder.run("render dark.toml -o a.png").done();
+    let [start, meaning] = [
+        "note: dark.toml: the picture is nearly black, its brightest pixel is ",
+        " of 255: light.point[0] was left at strength 1, one candela, of which a white surface shows 1 / (pi d^2)",
+    ];
+    let ran = ran.says(&[start, meaning, "; try strength = "]);
+    // What is proposed makes its brightest pixel bright: 0.8 of white is 231 of 255
+    let proposed = |text: &str, after: &str| -> f64 {
+        let number = text.split(after).nth(1).unwrap().trim_start_matches(['=', ' ']);
+        number.split([',', ' ', ';', '\n']).next().unwrap().parse().unwrap()
+    };
+    let brightest = |line: &str| {
+        folder.run(&format!("render dark.toml -q -o b.png {line}")).done();
+        Picture::decode(&folder.get("b.png")).data.into_iter().max().unwrap()
+    };
+    let stops = proposed(&ran.stderr, "--exposure ");
+    assert!((225..=237).contains(&brightest(&format!("--exposure {stops}"))));
+    lit(&format!("{point}strength = {}\n", proposed(&ran.stderr, "try strength")));
+    assert!((225..=237).contains(&brightest("")));
+    // Which is not said again, nor of a part of it, nor where little is to be said
+    for line in ["", "-q"] {
+        assert!(!folder.run(&format!("render dark.toml {line} -o a.png")).done().stderr.contains("note"));
+    }
+    lit(point);
+    for line in ["-q", "--crop 0,0,4,4", "--exposure 9", "--buffers depth -o a.npz"] {
+        let ran = folder.run(&format!("render dark.toml {line}")).done();
+        assert!(!ran.stderr.contains("nearly black"), "{line}: {}", ran.stderr);
+    }
+    for (light, meaning) in [
+        ("[[light.rectangle]]\ncenter = [0, 60, 0]\nsize = [1, 1]\nlook_at = [0, 0, 0]\n", "a radiance of 1"),
+        ("[[light.directional]]\ndirection = [-1, -0.02, 0]\ncolor = 0.01\n", "one lux, of which a white surface"),
+        (
+            &format!("{point}{point}").replace("6, 4", "16, 4"),
+            "light.point[0] was left at strength 1 (as one more is), one candela",
+        ),
+    ] {
+        lit(light);
+        folder.run("render dark.toml -o a.png").done().says(&["nearly black", meaning]);
+    }
+    // Neither without light at all, nor in a model where units are the user's
+    for light in [&format!("{point}strength = 0.9\n"), &format!("{point}falloff = \"constant\"\ncolor = 0.001\n")] {
+        lit(light);
+        assert!(!folder.run("render dark.toml -o a.png").done().stderr.contains("nearly black"), "{light}");
+    }
+}
+
+#[test]
+fn a_tolerance_of_sampled_lights_is_a_note() {
+    let folder = Folder::with_scene();
+    let note = "note: scene.toml: --tolerance 4 changes next to nothing: the scene says (samples) at how many points \
+                each light is sampled, and the tolerance is for lights that are integrated; --samples exact integrates \
+                them";
+    let run = |line: &str| folder.run(&format!("render scene.toml --tolerance 4 --size 12 {line}")).done();
+    run("").says(&[note]);
+    run("--aa-mode full").says(&["--tolerance 4 changes nothing: the scene says (samples)"]);
+    run("--samples 9").says(&["changes next to nothing: --samples says at how many"]);
+    for line in ["--samples exact", "-q"] {
+        assert!(!run(line).stderr.contains("--tolerance"), "{line}");
+    }
+    assert!(!folder.run("render scene.toml --size 12").done().stderr.contains("--tolerance"));
+    // And it is so: sampled lights under full antialiasing know no tolerance
+    let bytes = |tolerance: &str| {
+        folder.run(&format!("render scene.toml --aa-mode full --tolerance {tolerance} -o a.png --bits 16 -q")).done();
+        Picture::decode(&folder.get("a.png"))
+    };
+    assert!(bytes("0.25") == bytes("16"));
+    folder.put("scene.toml", SCENE.replace("samples = 16\n", ""));
+    assert!(!run("").stderr.contains("note"));
 }
 
 #[test]

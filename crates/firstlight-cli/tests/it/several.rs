@@ -31,7 +31,7 @@ fn one_that_fails_does_not_keep_the_others_from_being_rendered() {
         .says(&[
             "wrote out/a.png",
             "wrote out/c.png",
-            "2 of 4 scenes were rendered; 2 could not be: b.toml, none.toml",
+            "2 of 4 scenes were rendered; 2 could not be:\n  b.toml\n  none.toml\n",
         ]);
     assert_eq!(files(&folder, "out"), ["a.png", "c.png"]);
     // The bytes of a call for itself
@@ -42,7 +42,16 @@ fn one_that_fails_does_not_keep_the_others_from_being_rendered() {
     assert_eq!(run.stderr, "");
     assert_eq!(folder.names(), ["a.png", "a.toml", "b.toml", "c.png", "c.toml", "config11.png", "out"]);
     let run = folder.run(&format!("render b.toml a.toml --quiet {quick}")).exits(1);
-    assert!(run.stderr.ends_with("1 of 2 scenes were rendered; 1 could not be: b.toml\n"), "{}", run.stderr);
+    assert!(run.stderr.ends_with("1 of 2 scenes were rendered; 1 could not be:\n  b.toml\n"), "{}", run.stderr);
+}
+
+#[test]
+fn names_of_those_that_failed_are_whole() {
+    let folder = three();
+    let long = format!("{}.toml", "x".repeat(200));
+    let run = folder.run(&format!("render {long} a.toml none.toml --quiet {}", QUICK.join(" "))).exits(1);
+    let list = format!("1 of 3 scenes were rendered; 2 could not be:\n  {long}\n  none.toml\n");
+    assert!(run.stderr.ends_with(&list), "{}", run.stderr);
 }
 
 #[test]
@@ -50,12 +59,25 @@ fn what_would_be_one_file_is_refused_before_anything_is_rendered() {
     let folder = three();
     folder.put("a.json", "{}");
     folder.put("a.toml.json", "{}");
+    std::fs::create_dir(folder.path("sub")).unwrap();
+    folder.put("sub/a.toml", SCENE);
     folder.put("one.txt", COURSE);
     folder.put("two.txt", COURSE);
     let before = folder.names();
     for (options, words) in [
-        ("a.toml a.json -o out/{stem}.png", "a.toml and a.json would both be written to out/a.png"),
-        ("c.toml a.toml ./a.toml -o out/{name}.png", "would both be written to out/a.toml.png"),
+        (
+            "a.toml a.json -o out/{stem}.png",
+            "a.toml and a.json would both be written to out/a.png; {name} in the output's name keeps their endings \
+             apart",
+        ),
+        (
+            "c.toml a.toml ./a.toml -o out/{name}.png",
+            "would both be written to out/a.toml.png; they are one file, name it once",
+        ),
+        ("a.toml a.toml -o out/{stem}.png", "would both be written to out/a.png; name it once"),
+        // What is used already is not proposed, nor what would not help
+        ("a.toml sub/a.toml -o out/{name}.png", "to out/a.toml.png; render them in two calls, to folders of their own"),
+        ("a.toml sub/a.toml -o out/{stem}.png", "to out/a.png; render them in two calls, to folders of their own"),
         // A course file says its own output
         ("one.txt two.txt", "one.txt and two.txt would both be written to course.png"),
         ("a.toml a.json --frames 0..1 -o out/{stem}_##.png", "out/a_00.png"),

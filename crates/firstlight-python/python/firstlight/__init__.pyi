@@ -30,7 +30,7 @@ Buffer = str | Literal[
 ]
 # Three rows or four of four numbers, or a table of the scene format
 Transform = ArrayLike | Mapping[str, Any] | None
-# Linear [r, g, b], "#rrggbb" in sRGB, or a gray
+# Linear [r, g, b], "#rrggbb", "#rgb" or a name of CSS in sRGB, or a gray
 Color = Sequence[float] | NDArray[Any] | str | float
 Vector = Sequence[float] | NDArray[Any]
 # A colour or a number, or {"texture": NAME, "factor": ...}

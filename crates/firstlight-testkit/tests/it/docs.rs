@@ -1,4 +1,5 @@
-//! The book and the other pages: every link, include and picture leads somewhere, and every page is in the summary.
+//! The book and the other pages: every link and picture leads somewhere, every page is in the summary, and no page
+//! needs mdBook to be read.
 
 use std::collections::{BTreeSet, HashMap};
 use std::path::{Path, PathBuf};
@@ -18,14 +19,9 @@ fn pages() -> Vec<PathBuf> {
     pages
 }
 
-/// A page's text with what it includes; whatever it includes is there.
+/// A page's text.
 fn read(page: &Path) -> String {
-    let text = std::fs::read_to_string(page).unwrap_or_else(|e| panic!("{}: {e}", page.display()));
-    let include = |line: &str| {
-        let path = line.trim().strip_prefix("{{#include ")?.strip_suffix("}}")?;
-        Some(std::fs::read_to_string(page.with_file_name(path)).unwrap_or_else(|e| panic!("{line}: {e}")))
-    };
-    text.lines().map(|line| include(line).unwrap_or_else(|| line.to_owned()) + "\n").collect()
+    std::fs::read_to_string(page).unwrap_or_else(|e| panic!("{}: {e}", page.display()))
 }
 
 /// The lines of a page that are not code, `code spans` taken out.
@@ -94,6 +90,20 @@ fn every_link_leads_somewhere() {
     }
     assert!(count >= 100, "only {count} links");
     assert!(wrong.is_empty(), "\n{}", wrong.join("\n"));
+}
+
+#[test]
+fn no_page_has_a_directive_that_mdbook_alone_knows() {
+    for page in pages() {
+        let text = read(&page);
+        let directive = prose(&text).find(|line| line.contains("{{#"));
+        assert_eq!(
+            directive,
+            None,
+            "{}: write the text itself, as `cargo xtask generate` does of runs",
+            page.display()
+        );
+    }
 }
 
 #[test]

@@ -66,9 +66,9 @@ fn misfit(root: &Json, schema: &Json, value: &Json, path: &str) -> Option<String
                 if fits { None } else { at("too few properties".into()) }
             }
             "pattern" => {
-                assert_eq!(rule, "^#[0-9a-fA-F]{6}$");
-                let fits = value.as_str().is_none_or(|s| s.len() == 7 && s.starts_with('#'));
-                if fits { None } else { at(format!("{value} is not #rrggbb")) }
+                assert_eq!(rule, "^#([0-9a-fA-F]{3}|[0-9a-fA-F]{6})$");
+                let fits = value.as_str().is_none_or(|s| matches!(s.len(), 4 | 7) && s.starts_with('#'));
+                if fits { None } else { at(format!("{value} is not #rrggbb or #rgb")) }
             }
             "$schema" | "$defs" | "title" | "description" | "default" => None,
             other => panic!("the schema uses {other}"),
@@ -120,6 +120,7 @@ fn the_schema_refuses_what_the_reader_refuses() {
             "a": { "position": [0, 0, 1] }, "b": { "position": [0, 0, 1] } } }"##,
         r##"{ "material": { "phong": { "red": {
             "diffuse": { "texture": "t", "factor": "#ff0000" }, "shininess": 3 } } } }"##,
+        r##"{ "material": { "phong": { "red": { "diffuse": "#f00", "specular": "darkred" } } } }"##,
     ] {
         assert_eq!(check(text), None, "{text}");
     }

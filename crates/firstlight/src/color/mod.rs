@@ -1,11 +1,13 @@
 //! Colour: linear Rec. 709 everywhere inside; sRGB and gamma only at the edges.
 
 mod display;
+mod names;
 mod quantize;
 mod ramp;
 mod steps;
 
 pub use display::{Display, Encoding};
+pub(crate) use names::{CSS_COLORS, css_color};
 pub(crate) use quantize::Quantizer;
 pub(crate) use ramp::false_color;
 pub(crate) use steps::DisplaySteps;

@@ -225,6 +225,7 @@ pub(crate) mod info;
 pub(crate) mod node;
 pub(crate) mod read;
 mod scan;
+pub(crate) mod synonyms;
 mod toml;
 pub(crate) mod value;
 pub(crate) mod write;

@@ -123,9 +123,29 @@ impl Node {
 #[derive(Debug)]
 pub(crate) struct SyntaxFault {
     pub span: Span,
+    /// Of what, where that is known.
+    pub path: String,
     pub message: String,
     pub hint: Option<String>,
 }
+
+impl SyntaxFault {
+    pub(super) fn new(span: Span, message: String, hint: Option<&str>) -> Self {
+        Self { span, path: String::new(), message, hint: hint.map(str::to_owned) }
+    }
+}
+
+/// A text that was read.
+#[derive(Debug)]
+pub(crate) struct ReadText {
+    /// `None` where the syntax does not allow one.
+    pub root: Option<Node>,
+    /// All faults of the syntax; for JSON the first.
+    pub faults: Vec<SyntaxFault>,
+}
+
+/// Whether the tables of that path are an array of tables, by their names from the outermost on.
+pub(crate) type IsArray<'a> = &'a dyn Fn(&[Arc<str>]) -> bool;
 
 /// The two languages of scene text.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -134,14 +154,15 @@ pub(crate) enum Syntax {
     Json,
 }
 
-/// Reads a text into a tree.
-///
-/// # Errors
-/// All faults of the syntax; for JSON the first.
-pub(crate) fn parse(text: &str, syntax: Syntax) -> Result<Node, Vec<SyntaxFault>> {
+/// Reads a text into a tree. In TOML a table of `is_array` that is written with single brackets is a fault, and read
+/// as one more of them.
+pub(crate) fn parse(text: &str, syntax: Syntax, is_array: IsArray<'_>) -> ReadText {
     match syntax {
-        Syntax::Toml => super::toml::parse(text),
-        Syntax::Json => parse_json(text).map_err(|fault| vec![fault]),
+        Syntax::Toml => super::toml::parse(text, is_array),
+        Syntax::Json => match parse_json(text) {
+            Ok(root) => ReadText { root: Some(root), faults: Vec::new() },
+            Err(fault) => ReadText { root: None, faults: vec![fault] },
+        },
     }
 }
 
@@ -169,19 +190,13 @@ fn parse_json(text: &str) -> Result<Node, SyntaxFault> {
         allow_extended_string_escapes: false,
     };
     let parsed = jsonc_parser::parse_to_ast(&piece.text, &jsonc_parser::CollectOptions::default(), &strict);
-    let value = parsed.map_err(|e| SyntaxFault {
-        span: piece.span(e.range().start..e.range().end),
-        message: format!("not JSON: {}", lower_first(&e.kind().to_string())),
-        hint: None,
+    let value = parsed.map_err(|e| {
+        let span = piece.span(e.range().start..e.range().end);
+        SyntaxFault::new(span, format!("not JSON: {}", lower_first(&e.kind().to_string())), None)
     })?;
-    match value.value {
-        Some(value) => json_node(value, &piece),
-        None => Err(SyntaxFault {
-            span: Span::default(),
-            message: "not JSON: the text is empty".into(),
-            hint: Some("an empty scene is `{}`".into()),
-        }),
-    }
+    let empty =
+        || SyntaxFault::new(Span::default(), "not JSON: the text is empty".into(), Some("an empty scene is `{}`"));
+    json_node(value.value.ok_or_else(empty)?, &piece)
 }
 
 fn json_node(value: ast::Value<'_>, piece: &TextPiece<'_>) -> Result<Node, SyntaxFault> {
@@ -241,8 +256,7 @@ fn ast_range(value: &ast::Value<'_>) -> std::ops::Range<usize> {
 }
 
 pub(super) fn twice(span: Span, key: &str) -> SyntaxFault {
-    let message = format!("{} is said twice", quoted(key));
-    SyntaxFault { span, message, hint: Some("keep one of them".into()) }
+    SyntaxFault::new(span, format!("{} is said twice", quoted(key)), Some("keep one of them"))
 }
 
 fn lower_first(text: &str) -> String {
@@ -271,7 +285,7 @@ mod tests {
     #[test]
     fn tables_stand_at_their_headers() {
         let text = "# first\n[[sphere]]\nradius = 1\n[material.phong.\"a b\"]\n[[sphere]]\n";
-        let root = parse(text, Syntax::Toml).expect("is TOML");
+        let root = parse(text, Syntax::Toml, &|_| false).root.expect("is TOML");
         let at = |span: Span| &text[span.start..span.end];
         let spheres = root.get("sphere").expect("is there");
         let sphere = |i: usize| spheres.element(text, i).expect("two spheres");
@@ -293,7 +307,8 @@ mod tests {
             (format!("a = {}1", "{ a.b.c = ".repeat(1_000_000)), Syntax::Toml),
             ("{\"a\":".repeat(1_000_000), Syntax::Json),
         ] {
-            let faults = parse(&text, syntax).expect_err("is too deep");
+            let ReadText { root, faults } = parse(&text, syntax, &|_| false);
+            assert!(root.is_none());
             assert!(faults[0].message.contains("64"), "{}", faults[0].message);
         }
     }
@@ -308,9 +323,9 @@ mod tests {
             format!("a = '''{many}\n''''' # {many}"),
             format!("# {many}\na = [1.5, 2.5, 3.5]"),
         ] {
-            assert!(parse(&text, Syntax::Toml).is_ok(), "{text}");
+            assert!(parse(&text, Syntax::Toml, &|_| false).root.is_some(), "{text}");
         }
-        assert!(parse(&format!("{{\"a\\\"{many}\": 1}}"), Syntax::Json).is_ok());
+        assert!(parse(&format!("{{\"a\\\"{many}\": 1}}"), Syntax::Json, &|_| false).root.is_some());
     }
 
     #[test]
@@ -337,7 +352,7 @@ mod tests {
             "{\"a\"}",
             "[tru]",
         ] {
-            assert!(parse(text, Syntax::Json).is_err(), "{text}");
+            assert!(parse(text, Syntax::Json, &|_| false).root.is_none(), "{text}");
         }
     }
 }

@@ -11,6 +11,7 @@ use serde_json::{Value as Json, json};
 use super::TableInfo;
 use super::info::{Choice, FieldInfo, inner_name};
 use super::node::{Data, Entry, Node, Span, quoted, shortened};
+use super::synonyms;
 use super::write::{TextValue, key};
 
 /// What a field of the scene text can be.
@@ -224,12 +225,10 @@ impl<'a> Reader<'a> {
         let mut meant = Vec::new();
         for entry in entries {
             if !known.contains(&&*entry.key) {
-                let near = nearest(&entry.key, known);
-                meant.extend(near);
-                let hint = match near {
-                    Some(near) => format!("did you mean \"{near}\"? {what} takes {}", known.join(", ")),
-                    None => format!("{what} takes {}", known.join(", ")),
-                };
+                let near = synonyms::meant(&entry.key, known);
+                meant.extend(near.map(|near| near.word));
+                let question = near.map(|near| near.question()).unwrap_or_default();
+                let hint = format!("{question}{what} takes {}", known.join(", "));
                 self.within(&shortened(&entry.key), |r| r.error(entry.key_span, "unknown key", Some(hint)));
             }
         }

@@ -163,7 +163,7 @@ impl<'t> Scan<'t> {
                 b'\r' if is_toml && bytes.get(i) != Some(&b'\n') => {
                     let message = "not TOML: a carriage return without a newline".to_owned();
                     let hint = "save the text with lines that end in a newline (LF, or CR LF)";
-                    return Err(SyntaxFault { span: Span { start: at, end: i }, message, hint: Some(hint.into()) });
+                    return Err(SyntaxFault::new(Span { start: at, end: i }, message, Some(hint)));
                 }
                 _ => {}
             }
@@ -175,18 +175,13 @@ impl<'t> Scan<'t> {
                 };
                 let hint = "spread the scene over several files with `include`; a mesh or point set of many parts is \
                             best a file of its own";
-                return Err(SyntaxFault {
-                    span: Span { start: at, end: at + 1 },
-                    message: format!("more than {most} {what} in one text"),
-                    hint: Some(hint.into()),
-                });
+                let message = format!("more than {most} {what} in one text");
+                return Err(SyntaxFault::new(Span { start: at, end: at + 1 }, message, Some(hint)));
             }
             if is_toml && self.tables - tables_before > MAX_INLINE_TABLES {
-                return Err(SyntaxFault {
-                    span: Span { start: at, end: at + 1 },
-                    message: format!("more than {MAX_INLINE_TABLES} tables in one value"),
-                    hint: Some("write each under a header of its own, as [[sphere]]".into()),
-                });
+                let message = format!("more than {MAX_INLINE_TABLES} tables in one value");
+                let hint = "write each under a header of its own, as [[sphere]]";
+                return Err(SyntaxFault::new(Span { start: at, end: at + 1 }, message, Some(hint)));
             }
         }
         self.at = i;
@@ -196,11 +191,8 @@ impl<'t> Scan<'t> {
 }
 
 fn too_deep(at: usize) -> SyntaxFault {
-    SyntaxFault {
-        span: Span { start: at, end: at + 1 },
-        message: format!("more than {MAX_DEPTH} tables or arrays within each other"),
-        hint: Some("a scene needs no more than 5".into()),
-    }
+    let message = format!("more than {MAX_DEPTH} tables or arrays within each other");
+    SyntaxFault::new(Span { start: at, end: at + 1 }, message, Some("a scene needs no more than 5"))
 }
 
 /// Where the line ends.

@@ -9,8 +9,9 @@ use std::sync::Arc;
 
 use toml::de::{DeTable, DeValue};
 
-use super::node::{Data, Entry, Node, Span, Syntax, SyntaxFault, quoted, twice};
+use super::node::{Data, Entry, IsArray, Node, ReadText, Span, Syntax, SyntaxFault, quoted, twice};
 use super::scan::{Expression, Scan, TextPiece};
+use super::write::key;
 
 /// Expressions under one header are parsed together up to so many bytes.
 const BATCH: usize = 1 << 14;
@@ -19,13 +20,19 @@ const MAX_FAULTS: usize = 10_000;
 /// Of longer expressions only the first error is told: each costs memory.
 const ALL_FAULTS: usize = 1 << 16;
 
-/// Reads a text.
-pub(super) fn parse(text: &str) -> Result<Node, Vec<SyntaxFault>> {
+/// Reads a text; a table of `is_array` with single brackets is a fault that leaves a tree.
+pub(super) fn parse(text: &str, is_array: IsArray<'_>) -> ReadText {
     // What goes beyond the limits is told alone
     let mut scan = Scan::new(text, Syntax::Toml);
-    while scan.next().map_err(|fault| vec![fault])?.is_some() {}
+    loop {
+        match scan.next() {
+            Ok(Some(_)) => {}
+            Ok(None) => break,
+            Err(fault) => return ReadText { root: None, faults: vec![fault] },
+        }
+    }
     let mut scan = Scan::new(text, Syntax::Toml);
-    let mut builder = Builder::new();
+    let mut builder = Builder::new(is_array);
     let mut faults = Vec::new();
     let mut batch = Expression::default();
     while faults.len() <= MAX_FAULTS {
@@ -45,9 +52,11 @@ pub(super) fn parse(text: &str) -> Result<Node, Vec<SyntaxFault>> {
             }
         }
     }
-    if faults.is_empty() {
-        return Ok(builder.finish());
+    if faults.is_empty() && builder.singles.len() <= MAX_FAULTS {
+        let faults = std::mem::take(&mut builder.singles);
+        return ReadText { root: Some(builder.finish()), faults };
     }
+    faults.append(&mut builder.singles);
     // One slip makes the parser stumble over every word that follows it on the line: tell the first
     faults.sort_by_key(|fault| fault.span.start);
     let (mut line, mut to) = (0usize, 0);
@@ -58,7 +67,7 @@ pub(super) fn parse(text: &str) -> Result<Node, Vec<SyntaxFault>> {
         to = start;
         told.replace(line) != Some(line)
     });
-    Err(faults)
+    ReadText { root: None, faults }
 }
 
 /// Reads an expression, or several without a header, into the tree.
@@ -79,7 +88,7 @@ fn read(text: &str, expression: &Expression, builder: &mut Builder, faults: &mut
                     let key = text.get(span.start..span.end).unwrap_or_default();
                     return twice(span, key.trim_matches(['"', '\'']));
                 }
-                SyntaxFault { span, message: format!("not TOML: {}", error.message()), hint: None }
+                SyntaxFault::new(span, format!("not TOML: {}", error.message()), None)
             }));
         }
     }
@@ -135,7 +144,10 @@ impl Keys {
 }
 
 /// The tree while it grows.
-struct Builder {
+struct Builder<'a> {
+    is_array: IsArray<'a>,
+    /// Headers of single brackets where double ones are meant.
+    singles: Vec<SyntaxFault>,
     /// The root, and every table that more can be said of.
     tables: Vec<TomlTable>,
     /// The table of the last header.
@@ -200,10 +212,18 @@ impl TomlTable {
     }
 }
 
-impl Builder {
-    fn new() -> Self {
+/// What to say of `[sphere]` in place of `[[sphere]]`.
+fn single(span: Span, path: &[Arc<str>]) -> SyntaxFault {
+    let path = path.iter().map(|name| key(name)).collect::<Vec<_>>().join(".");
+    let kind = path.rsplit('.').next().unwrap_or_default();
+    let hint = format!("write [[{path}]] for each {kind}");
+    SyntaxFault { span, message: "a table is not an array of tables".into(), hint: Some(hint), path }
+}
+
+impl<'a> Builder<'a> {
+    fn new(is_array: IsArray<'a>) -> Self {
         let root = TomlTable { items: Vec::new(), made: Made::Said, places: None };
-        Builder { tables: vec![root], section: 0, keys: Keys::default() }
+        Builder { is_array, singles: Vec::new(), tables: vec![root], section: 0, keys: Keys::default() }
     }
 
     fn add_table(&mut self, made: Made) -> usize {
@@ -216,11 +236,20 @@ impl Builder {
         // What follows a header that cannot be is read all the same, for its errors
         let mut at = 0;
         let mut rest = header;
+        let mut path = Vec::new();
         loop {
             let Some((key, value)) = rest.into_iter().next() else { return };
             let (key_span, span) = (piece.span(key.span()), piece.span(value.span()));
             let name = self.keys.get(key.get_ref());
+            path.push(name.clone());
             match value.into_inner() {
+                DeValue::Table(inner) if inner.is_empty() && (self.is_array)(&path) => {
+                    if self.singles.len() <= MAX_FAULTS {
+                        self.singles.push(single(span, &path));
+                    }
+                    self.section = self.say_one_more(at, name, key_span, span, faults);
+                    return;
+                }
                 DeValue::Table(inner) if inner.is_empty() => {
                     self.section = self.say(at, name, key_span, span, faults);
                     return;
@@ -323,7 +352,7 @@ impl Builder {
             TomlValue::Leaf(node) => {
                 let kind = node.kind();
                 let message = format!("not TOML: {} is {kind} already, and takes no keys here", quoted(&key));
-                faults.push(SyntaxFault { span: key_span, message, hint: None });
+                faults.push(SyntaxFault::new(key_span, message, None));
                 None
             }
         }

@@ -1,13 +1,14 @@
 //! The values a field of the scene text can have, beyond plain numbers, words and arrays.
 
-use crate::color::{Encoding, Rgb};
+use crate::color::{CSS_COLORS, Encoding, Rgb, css_color};
 use serde_json::{Value as Json, json};
 
 use super::node::{Data, Node, quoted};
 use super::read::{Reader, Value, nearest};
 use super::write::TextValue;
 
-/// A colour: linear Rec. 709. In text `[r, g, b]` is linear, `"#rrggbb"` sRGB, and a number is that much gray (linear).
+/// A colour: linear Rec. 709. In text `[r, g, b]` is linear; `"#rrggbb"`, `"#rgb"` and the names of CSS, such as
+/// `"orange"`, are sRGB; and a number is that much gray (linear).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ColorDesc {
     /// Red, green, blue; linear, 0 or more.
@@ -25,18 +26,35 @@ impl ColorDesc {
         Self { linear: [r, g, b] }
     }
 
-    /// The colour of `#rrggbb`, which is sRGB.
-    pub fn from_hex(text: &str) -> Option<Self> {
-        let digits = text.strip_prefix('#').filter(|d| d.len() == 6 && d.bytes().all(|b| b.is_ascii_hexdigit()))?;
-        let channel = |i: usize| {
-            u8::from_str_radix(&digits[i..i + 2], 16).ok().map(|byte| Encoding::Srgb.decode(f64::from(byte) / 255.0))
+    /// The colour that CSS has for `#rrggbb`, `#rgb` or one of its 148 names, in any case: all of them are sRGB. `None`
+    /// for all else, `transparent` among it.
+    pub fn from_css(text: &str) -> Option<Self> {
+        let rgb = match text.strip_prefix('#') {
+            Some(digits) => hex_bytes(digits.as_bytes())?,
+            None => css_color(text)?,
         };
-        Some(ColorDesc::linear(channel(0)?, channel(2)?, channel(4)?))
+        Some(rgb.map(|byte| Encoding::Srgb.decode(f64::from(byte) / 255.0)).into())
+    }
+
+    /// The name of CSS nearest to `text`, if one is near enough to have been meant.
+    pub fn nearest_css_name(text: &str) -> Option<&'static str> {
+        nearest(text, &CSS_COLORS.map(|(name, _)| name))
     }
 
     /// The same linear value in all channels.
     pub const fn gray(v: f64) -> Self {
         Self::linear(v, v, v)
+    }
+}
+
+/// The bytes of `rrggbb`, or of `rgb`, in which each digit stands for two.
+fn hex_bytes(digits: &[u8]) -> Option<[u8; 3]> {
+    let digit = |at: usize| char::from(digits[at]).to_digit(16).map(|digit| digit as u8);
+    let byte = |high: usize, low: usize| Some(16 * digit(high)? + digit(low)?);
+    match digits.len() {
+        3 => Some([byte(0, 0)?, byte(1, 1)?, byte(2, 2)?]),
+        6 => Some([byte(0, 1)?, byte(2, 3)?, byte(4, 5)?]),
+        _ => None,
     }
 }
 
@@ -61,21 +79,33 @@ impl From<f64> for ColorDesc {
     }
 }
 
+/// The forms of a colour, as messages list them.
+pub(crate) const COLOR_FORMS: &str = " ([r, g, b], \"#rrggbb\", \"#rgb\", a name of CSS or a gray)";
+
+/// The JSON Schema of a colour, which that of every field refers to as `color`.
+pub(crate) fn color_schema() -> Json {
+    json!({
+        "description": "Linear [r, g, b], \"#rrggbb\", \"#rgb\" or a name of CSS in sRGB, or a linear gray.",
+        "anyOf": [
+            { "type": "array", "items": { "type": "number", "minimum": 0 }, "minItems": 3, "maxItems": 3 },
+            { "type": "string", "pattern": "^#([0-9a-fA-F]{3}|[0-9a-fA-F]{6})$" },
+            { "enum": CSS_COLORS.map(|(name, _)| name).as_slice() },
+            { "type": "number", "minimum": 0 },
+        ],
+    })
+}
+
 impl Value for ColorDesc {
     fn words() -> String {
-        "a colour ([r, g, b], \"#rrggbb\" or a gray)".into()
+        format!("a colour{COLOR_FORMS}")
     }
 
     fn plural() -> String {
-        "colours ([r, g, b], \"#rrggbb\" or a gray)".into()
+        format!("colours{COLOR_FORMS}")
     }
 
     fn schema() -> Json {
-        json!({ "anyOf": [
-            { "type": "array", "items": { "type": "number", "minimum": 0 }, "minItems": 3, "maxItems": 3 },
-            { "type": "string", "pattern": "^#[0-9a-fA-F]{6}$" },
-            { "type": "number", "minimum": 0 },
-        ] })
+        json!({ "$ref": "#/$defs/color" })
     }
 
     fn placeholder() -> Self {
@@ -87,12 +117,19 @@ impl Value for ColorDesc {
             _ if node.len() == Some(3) => <[f64; 3]>::read(node, reader).map(Self::from),
             Data::Number(_) => f64::read(node, reader).map(Self::gray),
             Data::String(text) => {
-                let color = Self::from_hex(text);
+                let color = Self::from_css(text);
                 if color.is_none() {
                     let message = format!("{} is not a colour", quoted(text));
-                    let hint = "a string colour is \"#\" and 6 hexadecimal digits, as \"#ff8000\"; \
-                                a linear one is [r, g, b]";
-                    reader.error(node.span, message, Some(hint.into()));
+                    let near = match text.strip_prefix('#') {
+                        None => Self::nearest_css_name(text).map(|near| format!("did you mean \"{near}\"? ")),
+                        Some(_) => None,
+                    };
+                    let hint = format!(
+                        "{}a string colour is \"#rrggbb\" or \"#rgb\" with hexadecimal digits, as \"#ff8000\", or a \
+                         name of CSS, as \"orange\"; a linear one is [r, g, b]",
+                        near.unwrap_or_default()
+                    );
+                    reader.error(node.span, message, Some(hint));
                 }
                 color
             }
@@ -444,16 +481,23 @@ mod tests {
     use super::*;
 
     #[test]
-    fn hex_colours_are_srgb() {
-        assert_eq!(ColorDesc::from_hex("#ffffff"), Some(ColorDesc::WHITE));
-        assert_eq!(ColorDesc::from_hex("#000000"), Some(ColorDesc::BLACK));
+    fn colours_of_css_are_srgb() {
+        let of = ColorDesc::from_css;
+        assert_eq!(["#ffffff", "#fff", "white"].map(of), [Some(ColorDesc::WHITE); 3]);
+        assert_eq!(["#000000", "#000", "Black"].map(of), [Some(ColorDesc::BLACK); 3]);
+        // Each digit of three stands for two
+        assert_eq!(of("#18f"), of("#1188ff"));
+        assert_eq!(of("RebeccaPurple"), of("#639"));
         // 188 of 255 is half of the light, the well-known middle of black and white
-        let half = ColorDesc::from_hex("#bcbcbc").expect("is a colour").linear[0];
+        let half = of("#bcbcbc").expect("is a colour").linear[0];
         assert!((half - 0.502886).abs() < 1e-6, "{half}");
-        assert_eq!(ColorDesc::from_hex("#0a0A0a").expect("is a colour").linear[0], 10.0 / 255.0 / 12.92);
-        for bad in ["", "#", "ffffff", "#fff", "#ggffff", "#fffffff", "#\u{e4}\u{e4}\u{e4}", "red"] {
-            assert_eq!(ColorDesc::from_hex(bad), None, "{bad}");
+        assert_eq!(of("#0a0A0a").expect("is a colour").linear[0], 10.0 / 255.0 / 12.92);
+        for bad in
+            ["", "#", "ffffff", "#ggg", "#ggffff", "#ffff", "#fffffff", "#\u{e4}\u{e4}\u{e4}", "#red", "transparent"]
+        {
+            assert_eq!(of(bad), None, "{bad}");
         }
+        assert_eq!(ColorDesc::nearest_css_name("grene"), Some("green"));
     }
 
     #[test]

@@ -36,6 +36,14 @@ pub enum ImageError {
         /// What of it does not fit.
         reason: String,
     },
+    /// A buffer whose name a format cannot hold.
+    #[error("{} file cannot hold it: {reason}", a(*format))]
+    Name {
+        /// EXR or NPZ.
+        format: Format,
+        /// Which, and what to do.
+        reason: String,
+    },
     /// A [`FileSettings::depth_scale`](super::FileSettings::depth_scale) outside what it may be.
     #[error("the depth scale is {0}; units per metre are needed, from 0.001 to 1000000")]
     DepthScale(f64),

@@ -15,7 +15,7 @@ pub enum Format {
     Exr,
     /// Arrays for numpy, 32-bit floats: as EXR.
     Npz,
-    /// One array for numpy, 32-bit floats or whole numbers. It has no place for a receipt.
+    /// One array for numpy, 32-bit floats or whole numbers; behind it a second, the receipt.
     Npy,
     /// Radiance RGBE: linear Rec. 709 with a shared exponent; alpha is left out.
     Hdr,

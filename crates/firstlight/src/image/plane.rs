@@ -395,6 +395,9 @@ impl PlaneFile<'_> {
         {
             return Err(ImageError::NotHeld { format, buffer: (*name).to_owned(), reason });
         }
+        if let Some(reason) = self.planes.iter().find_map(|plane| format.refuses_name(plane.name)) {
+            return Err(ImageError::Name { format, reason });
+        }
         let whole = |receipt| self.described(receipt, &FileSettings { half: false, ..*settings });
         match (format, self.planes) {
             #[cfg(feature = "exr")]

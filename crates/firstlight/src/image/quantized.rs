@@ -14,7 +14,8 @@
 use super::plane::{BUFFER_KEY, is_half};
 use super::png::{self, ColorType, Depth, PngSamples};
 use super::{
-    BufferDesc, Format, ImageError, NamedPlane, Plane, PlaneNumbers, PlaneVec, Receipt, StoredPlane, Window, hdr,
+    BufferDesc, Format, ImageError, NamedPlane, PREFIX, Plane, PlaneNumbers, PlaneVec, Receipt, StoredPlane, Window,
+    hdr,
 };
 use crate::color::{Display, Quantizer};
 
@@ -181,7 +182,30 @@ impl Format {
             _ => None,
         }
     }
+
+    /// Why files of this format cannot hold a buffer of that name; `None` if they can. Names hold those of lights,
+    /// groups of lights and objects.
+    pub fn refuses_name(self, name: &str) -> Option<String> {
+        let most = match self {
+            Format::Exr => MAX_EXR_NAME,
+            Format::Npz => MAX_NPZ_NAME,
+            Format::Png8 | Format::Png16 | Format::Npy | Format::Hdr => return None,
+        };
+        let length = name.len();
+        (length > most).then(|| {
+            let start: String = name.chars().take(40).collect();
+            format!(
+                "the buffer {start:?}... has a name of {length} bytes, and at most {most} are possible; give the \
+                 light, group or object in it a shorter name"
+            )
+        })
+    }
 }
+
+/// No name in an EXR file has more than 255 bytes, that of a receipt's entry about a buffer among them.
+const MAX_EXR_NAME: usize = 255 - PREFIX.len() - BUFFER_KEY.len();
+/// Nor one in a zip archive more than 65535, its ending among them.
+const MAX_NPZ_NAME: usize = 65535 - ".npy".len();
 
 /// The bytes of a Radiance file of one colour. The plane and the receipt have been checked.
 pub(super) fn hdr(window: Window, of: &NamedPlane, receipt: &Receipt) -> Vec<u8> {

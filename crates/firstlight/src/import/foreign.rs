@@ -175,8 +175,8 @@ pub(crate) fn foreign(bytes: &[u8], wanted: WantedFile) -> Option<Foreign> {
         return is("a tar archive", FileFamily::Archive);
     }
     let head = &bytes[..bytes.len().min(HEAD)];
-    // No text has a zero byte. A mesh may well, and its reader says what is wrong with it
-    if head.contains(&0) {
+    // No text has such bytes. A mesh may well, and its reader says what is wrong with it
+    if head.contains(&0) || !is_utf8(head) && head.iter().any(is_odd) {
         return if wanted == WantedFile::Scene {
             is("binary data of an unknown kind", FileFamily::Other)
         } else {
@@ -184,6 +184,16 @@ pub(crate) fn foreign(bytes: &[u8], wanted: WantedFile) -> Option<Foreign> {
         };
     }
     text(bytes, head, wanted)
+}
+
+/// Whether the bytes are UTF-8, as far as they go: the last character may be cut.
+fn is_utf8(bytes: &[u8]) -> bool {
+    std::str::from_utf8(bytes).map_or_else(|error| error.error_len().is_none(), |_| true)
+}
+
+/// Whether a byte is a control character that no encoding of text has: not a blank, an end of a line or an escape.
+fn is_odd(byte: &u8) -> bool {
+    *byte < 0x20 && !matches!(byte, b'\t' | b'\n' | b'\x0b' | b'\x0c' | b'\r' | 0x1b) || *byte == 0x7f
 }
 
 /// A zip archive, by the names of its first files.
@@ -319,6 +329,7 @@ mod tests {
             (b"<scene version=\"3.0.0\">", "a Mitsuba scene"),
             (b"\xff\xfea\0", "text in UTF-16"),
             (b"a\0b", "binary data of an unknown kind"),
+            (b"\x8b\x1c\xd0 \x05\xe9 = 3\n", "binary data of an unknown kind"),
             (b"// a\n#include \"colors.inc\"\n", "a POV-Ray scene"),
             (b"# x\ncamera {\n location <0, 0, 1>\n}\n", "a POV-Ray scene"),
             (b"LookAt 0 0 5  0 0 0  0 1 0\n", "a pbrt scene"),
@@ -350,6 +361,8 @@ mod tests {
             b"output_resolution 30\noutput_file course.png\n",
             b"[[sphere]]\nname = \"camera { }\"\n",
             b"\xe4\xf6",
+            b"# gr\xfc\xdfe\n[camera]\n",
+            b"\x01 = 3\n",
         ];
         for text in texts {
             assert_eq!(foreign(text, WantedFile::Scene), None, "{:?}", String::from_utf8_lossy(text));

@@ -33,7 +33,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use crate::math::{DVec3, origin_for};
 use error::ImportFault;
 pub use error::{ImportError, MeshPlace};
-pub(crate) use foreign::{Foreign, WantedFile, foreign};
+pub(crate) use foreign::{WantedFile, foreign};
 pub(crate) use given::from_own_origin;
 pub use report::MeshReport;
 pub(crate) use tidy::used_vertices;

@@ -131,7 +131,9 @@ pub struct RenderSettings {
     pub reference: bool,
     /// How shadows are found.
     pub visibility: VisibilityMode,
-    /// The planes of the film. Without those that are lit, no light is asked.
+    /// The planes of the film: [`Plane::Color`] alone unless said. What the scene's text asks for is
+    /// [`Scene::buffers`], and is rendered where it is given here: `buffers: scene.buffers().to_vec()`. Without planes
+    /// that are lit, no light is asked.
     pub buffers: Vec<Buffer>,
 }
 

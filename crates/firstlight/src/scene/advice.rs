@@ -9,23 +9,28 @@ use crate::camera::Projection;
 use crate::context::{CompileContext, show};
 use crate::light::{Area, LightDesc, LightKind, Spot};
 use crate::math::DVec3;
+use crate::parallel;
 use crate::shape::Solid;
 
-/// Camera rays along each side of the picture that look for something: first few, then many.
-const RAYS: [u32; 2] = [24, 256];
+/// Camera rays along each side of the picture that look for something first: most often they find it.
+const FEW_RAYS: u64 = 24;
+/// Of more camera rays than this a regular part is asked whether anything is there.
+const MOST_RAYS: u64 = 1 << 25;
+/// Pixels around what is projected, for the rounding of rays.
+const AROUND: f64 = 1.0;
 
 /// Says what the scene as a whole may surprise with. `desc` is what it was made from, completed.
 pub(super) fn advise(cx: &mut CompileContext, scene: &Scene, desc: &SceneDesc) {
-    let seen = sees_something(scene);
+    let search = Search::of(scene);
     if scene.geometry.surfaces.is_empty() {
-        if !seen {
+        if !search.met {
             cx.advise("", "the scene has no shapes: its picture is the background", None);
         }
         return;
     }
     advise_light(cx, scene);
-    if !seen && (scene.geometry.bounds().is_some() || !scene.geometry.unbounded.is_empty()) {
-        advise_view(cx, scene, desc);
+    if !search.met && (scene.geometry.bounds().is_some() || !scene.geometry.unbounded.is_empty()) {
+        advise_view(cx, scene, desc, &search);
     }
     advise_directions(cx, scene);
 }
@@ -42,18 +47,84 @@ pub(super) fn advise_reflectance(cx: &mut CompileContext, field: &str, color: [f
     }
 }
 
-/// Whether any of a grid of camera rays meets a shape or a light.
-fn sees_something(scene: &Scene) -> bool {
-    RAYS.into_iter().any(|rays| {
-        let [columns, rows] = [scene.width, scene.height].map(|side| side.min(rays));
-        // Through the middles of cells
-        let at = |i: u32, cells: u32, side: u32| (i as f32 + 0.5) * (side as f32 / cells as f32);
-        let mut places = (0..rows).flat_map(|row| (0..columns).map(move |column| (column, row)));
-        places.any(|(column, row)| {
-            let (x, y) = (at(column, columns, scene.width), at(row, rows, scene.height));
-            scene.intersect(&scene.camera.ray(x, y, 1.0).0).is_some()
-        })
-    })
+/// Whether any camera ray meets a shape or a light.
+struct Search {
+    met: bool,
+    /// How many were asked, where those of the few that go first met nothing.
+    rays: u64,
+    /// Whether these were all that could meet anything.
+    is_all: bool,
+    /// Whether any of what a camera can see may lie within the picture.
+    is_framed: bool,
+}
+
+impl Search {
+    /// Asks few camera rays, then all that can meet anything.
+    fn of(scene: &Scene) -> Search {
+        let sides = [scene.width, scene.height].map(|side| [0, side]);
+        let [few_wide, few_high] = [scene.width, scene.height].map(|side| FEW_RAYS.min(side.into()));
+        if meets(scene, sides, [few_wide, few_high]) {
+            return Search { met: true, rays: few_wide * few_high, is_all: false, is_framed: true };
+        }
+        let Some(sides) = framed(scene) else {
+            return Search { met: false, rays: 0, is_all: true, is_framed: false };
+        };
+        let all = sides.map(|[start, end]| u64::from(end - start) * u64::from(scene.antialiasing));
+        // A square grid of as many as may be asked, where that is not enough for all
+        let most = MOST_RAYS.isqrt();
+        let is_all = all[0] * all[1] <= MOST_RAYS;
+        let cells = if is_all { all } else { all.map(|side| side.min(most)) };
+        Search { met: meets(scene, sides, cells), rays: cells[0] * cells[1], is_all, is_framed: true }
+    }
+}
+
+/// Whether a ray through the middle of any of so many cells, across and down, of a part of the picture meets something.
+fn meets(scene: &Scene, sides: [[u32; 2]; 2], cells: [u64; 2]) -> bool {
+    let at = |i: u64, axis: usize| {
+        let [start, end] = sides[axis].map(f64::from);
+        (start + (i as f64 + 0.5) * (end - start) / cells[axis] as f64) as f32
+    };
+    let misses = |row: usize| {
+        let y = at(row as u64, 1);
+        (0..cells[0]).all(|column| scene.intersect_local(&scene.camera.local_ray(at(column, 0), y, 1.0).0).is_none())
+    };
+    !parallel::all(cells[1] as usize, 4, misses)
+}
+
+/// The columns and the rows of pixels that what can be seen lies in, or all where that is not known; `None` if nothing
+/// lies in the picture.
+fn framed(scene: &Scene) -> Option<[[u32; 2]; 2]> {
+    let geometry = &scene.geometry;
+    let all = [scene.width, scene.height].map(|side| [0, side]);
+    let is_lamp_seen = |area: &&Area| area.visible;
+    let lamps = scene.lights.iter().filter_map(|light| light.area()).filter(is_lamp_seen);
+    let lamps = lamps.map(|area| area.shape.bounds()).reduce(|[low, high], [a, b]| [low.min(a), high.max(b)]);
+    let is_shape_seen = geometry.surfaces.iter().any(|surface| surface.visible);
+    if is_shape_seen && !geometry.unbounded.is_empty() {
+        return Some(all);
+    }
+    let boxes: Vec<_> = geometry.bounds().filter(|_| is_shape_seen).into_iter().chain(lamps).collect();
+    let ahead = |p: DVec3| scene.camera.local_project(p).filter(|(_, depth)| *depth > 0.0);
+    let seen = |corners: [DVec3; 2]| -> Option<[[u32; 2]; 2]> {
+        let places: Vec<_> = self::corners(corners).filter_map(ahead).map(|(pixel, _)| pixel).collect();
+        match places.len() {
+            0 => return None,
+            8 => {}
+            // Partly behind the camera
+            _ => return Some(all),
+        }
+        let side = |axis: usize, length: u32| {
+            let [low, high] = places.iter().fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], place| {
+                [low.min(place[axis]), high.max(place[axis])]
+            });
+            let within = |pixel: f64| pixel.clamp(0.0, f64::from(length)) as u32;
+            let [start, end] = [within((low - AROUND).floor()), within((high + AROUND).ceil())];
+            (start < end).then_some([start, end])
+        };
+        Some([side(0, scene.width)?, side(1, scene.height)?])
+    };
+    let joined = |a: [[u32; 2]; 2], b: [[u32; 2]; 2]| [0, 1].map(|i| [a[i][0].min(b[i][0]), a[i][1].max(b[i][1])]);
+    boxes.into_iter().filter_map(seen).reduce(joined)
 }
 
 /// Advises if every surface is black.
@@ -71,7 +142,7 @@ fn advise_light(cx: &mut CompileContext, scene: &Scene) {
 }
 
 /// Advises that nothing is in the picture.
-fn advise_view(cx: &mut CompileContext, scene: &Scene, desc: &SceneDesc) {
+fn advise_view(cx: &mut CompileContext, scene: &Scene, desc: &SceneDesc, search: &Search) {
     let name = scene.summary.camera.as_str();
     let path = if name.is_empty() { "camera".to_owned() } else { format!("camera.{name}") };
     if scene.geometry.surfaces.iter().all(|surface| !surface.visible) {
@@ -90,11 +161,26 @@ fn advise_view(cx: &mut CompileContext, scene: &Scene, desc: &SceneDesc) {
     let eye = show(&eye.to_array());
     let message = match behind && scene.geometry.unbounded.is_empty() {
         true => format!("nothing is in the picture: the camera at {eye} has everything behind it{lies}"),
-        false => format!("no camera ray of {0} x {0} meets anything: the camera is at {eye}{lies}", RAYS[1]),
+        false => {
+            let of = if search.is_all { String::new() } else { format!(" of {} that were asked", search.rays) };
+            let thin = match search.is_framed {
+                true => "; what is thinner than the distance between camera rays can fall between them",
+                false => "",
+            };
+            format!("no camera ray{of} meets anything: the camera is at {eye}{lies}{thin}")
+        }
     };
     let hint = match desc.cameras.iter().find(|(known, _)| known == name) {
+        // The camera was found for it, and looks at it
+        _ if scene.choices.framing.is_some() => {
+            "more pixels (--size), more camera rays in each (--aa) or another side (--view) may show it"
+        }
         Some((_, camera)) if camera.projection == Projection::Orthographic => {
             "position, look_at and height say what it sees; what is behind position is not seen"
+        }
+        _ if search.is_framed => {
+            "position and look_at say where it is and what it looks at; more pixels or more camera rays in each \
+             (antialiasing) may show what is thin"
         }
         _ => "position and look_at say where it is and what it looks at",
     };
@@ -173,7 +259,7 @@ fn corners([low, high]: [DVec3; 2]) -> impl Iterator<Item = DVec3> {
 mod tests {
     use crate::context::MemoryAssets;
     use crate::scene::text::Parsed;
-    use crate::scene::{CompileOptions, ModelSettings, SceneDesc};
+    use crate::scene::{CompileOptions, Framing, ModelSettings, SceneDesc, View};
 
     /// What is said of a scene, strictly compiled.
     fn said(text: &str) -> Vec<String> {
@@ -228,14 +314,54 @@ mod tests {
         let past = BALL.replace("[0, 0, 5]", "[0, 0, 5]\nlook_at = [0, 5, 0]") + LIGHT;
         assert_eq!(
             said(&past),
-            ["s.toml:1:1: camera: no camera ray of 256 x 256 meets anything: the camera is at [0, 0, 5], shapes \
+            ["s.toml:1:1: camera: no camera ray meets anything: the camera is at [0, 0, 5], shapes \
               lie from [-1, -1, -1] to [1, 1, 1]; position and look_at say where it is and what it looks at"]
         );
         // As small as a pixel, but there
         let small = BALL.replace("radius = 1", "radius = 0.02") + LIGHT;
         assert_eq!(said(&small), [""; 0]);
+        // Smaller than a pixel: all 16 camera rays of each are asked, and meet it, or fall beside it
+        // At 5 m, where half the film is tan(45 / 2 degrees) = sqrt(2) - 1 high
+        let pixel = |i: f64, sub: f64| ((2.0 * (i + sub) / 1024.0 - 1.0) * (2f64.sqrt() - 1.0)) * 5.0;
+        let tiny = |x: f64, radius: f64| {
+            let center = format!("center = [{x}, {}, 0]", -pixel(300.0, 0.125));
+            said(
+                &(BALL.replace("center = [0, 0, 0]", &center).replace("radius = 1", &format!("radius = {radius}"))
+                    + LIGHT),
+            )
+        };
+        assert_eq!(tiny(pixel(700.0, 0.125), 1e-4), [""; 0]);
+        let [told] = &tiny(pixel(700.0, 0.25), 1e-4)[..] else { panic!() };
+        for words in [
+            "camera: no camera ray meets anything: the camera is at [0, 0, 5]",
+            "; what is thinner than the distance between camera rays can fall between them; position and look_at say",
+            "more pixels or more camera rays in each (antialiasing) may show what is thin",
+        ] {
+            assert!(told.contains(words), "{told}");
+        }
         let unseen = BALL.replace("radius = 1", "radius = 1\nvisible = false") + LIGHT;
         assert_eq!(said(&unseen), ["s.toml:1:1: camera: nothing is in the picture: every shape has visible = false"]);
+    }
+
+    #[test]
+    fn a_model_that_falls_between_camera_rays() {
+        // A needle along the line of sight of the camera that is found for it
+        let mut assets = MemoryAssets::default();
+        assets.files.insert("a.obj".into(), "v 0 0 0\nv 0 0 1\nv 1e-5 0 0\nf 1 2 3\n".into());
+        let told = |antialiasing: u32| {
+            let mut parsed = Parsed::of_model("a.obj", "a.obj", &ModelSettings::default());
+            parsed.desc.render.antialiasing = antialiasing;
+            (parsed.desc.render.width, parsed.desc.render.height) = (32, 32);
+            let framing = Framing { view: View::from_name("right").expect("is one"), margin: 0.1 };
+            let options = CompileOptions { light: true, framing, ..CompileOptions::default() };
+            let compiled = parsed.compile(&assets, &options).unwrap_or_else(|error| panic!("{error}"));
+            compiled.advice.iter().map(ToString::to_string).collect::<Vec<_>>()
+        };
+        let [words] = &told(2)[..] else { panic!("{:?}", told(2)) };
+        assert!(words.starts_with("a.obj: camera: no camera ray meets anything: the camera is at ["), "{words}");
+        let end = "can fall between them; more pixels (--size), more camera rays in each (--aa) or another side \
+                   (--view) may show it";
+        assert!(words.ends_with(end), "{words}");
     }
 
     #[test]

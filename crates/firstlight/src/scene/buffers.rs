@@ -230,7 +230,8 @@ impl Names<'_> {
 }
 
 impl Scene {
-    /// What `[render] buffers` asks for, each light by itself.
+    /// What `[render] buffers` asks for, each light by itself. A render makes what its settings say, so give it to
+    /// [`RenderSettings::buffers`](crate::RenderSettings::buffers).
     pub fn buffers(&self) -> &[Buffer] {
         &self.buffers
     }

@@ -18,7 +18,7 @@ use super::{Choices, DisplayEncoding, RenderDesc, Scene, SceneDesc, SceneSummary
 use crate::camera::{Camera, CameraDesc};
 use crate::color::{Display, Encoding, Rgb};
 use crate::context::{AssetError, Assets, CompileContext, OnCompile};
-use crate::describe::{ColorParam, Family, NumberParam, SamplesDesc};
+use crate::describe::{ColorDesc, ColorParam, Family, NumberParam, SamplesDesc};
 use crate::error::{Diagnostic, SceneError, Severity};
 use crate::ids::TextureId;
 use crate::image::ImageError;
@@ -27,7 +27,7 @@ use crate::light::{Light, LightDesc, check_samples};
 use crate::material::Material;
 use crate::math::DVec3;
 use crate::shape::{CompileCache, MeshFiles, ShapeDesc, key_of};
-use crate::texture::{Param, Params, Texture, TextureDesc, TextureSpace};
+use crate::texture::{CheckerboardDesc, Param, Params, Texture, TextureDesc, TextureSpace};
 use crate::transform::MAX_TIME;
 
 /// How strict compiling is, and which moment is compiled.
@@ -450,7 +450,8 @@ struct Textures<'a> {
     names: HashMap<&'a str, usize>,
     /// Each texture as it was asked for: colour and data read the same file differently.
     ids: HashMap<(usize, TextureSpace), TextureId>,
-    files: HashMap<&'a str, (Arc<Texels>, [u8; 32])>,
+    /// The texels of each file and the hash of its bytes; without texels where something stands in for it.
+    files: HashMap<&'a str, (Option<Arc<Texels>>, [u8; 32])>,
     compiled: Vec<Texture>,
     /// The files that something stands in for.
     placeholders: Vec<String>,
@@ -477,7 +478,7 @@ impl<'a> Textures<'a> {
         for (name, desc) in &self.desc.textures {
             cx.within(&format!("texture.{}.{name}", desc.kind()), |cx| match desc {
                 TextureDesc::Checkerboard(board) => drop(board.compile(cx)),
-                TextureDesc::Image(image) => drop(image.compile(cx, Arc::new(placeholder()), TextureSpace::Raw)),
+                TextureDesc::Image(image) => drop(image.compile(cx, Arc::new(unread()), TextureSpace::Raw)),
             });
         }
     }
@@ -517,10 +518,10 @@ impl<'a> Textures<'a> {
         let silent = &mut CompileContext::default();
         let texture = match &textures[index].1 {
             TextureDesc::Checkerboard(board) => Texture::Checkerboard(board.compile(silent)),
-            TextureDesc::Image(image) => {
-                let texels = self.load(cx, index, &image.file.0);
-                Texture::Image(image.compile(silent, texels, space))
-            }
+            TextureDesc::Image(image) => match self.load(cx, index, &image.file.0) {
+                Some(texels) => Texture::Image(image.compile(silent, texels, space)),
+                None => Texture::Checkerboard(placeholder().compile(silent)),
+            },
         };
         let id = TextureId(self.compiled.len() as u32);
         self.compiled.push(texture);
@@ -528,8 +529,8 @@ impl<'a> Textures<'a> {
         Some(id)
     }
 
-    /// The texels of `file`; a loud placeholder where they cannot be had.
-    fn load(&mut self, cx: &mut CompileContext, index: usize, file: &'a str) -> Arc<Texels> {
+    /// The texels of `file`; `None`, and a warning, where they cannot be had.
+    fn load(&mut self, cx: &mut CompileContext, index: usize, file: &'a str) -> Option<Arc<Texels>> {
         if let Some((texels, _)) = self.files.get(file) {
             return texels.clone();
         }
@@ -537,7 +538,7 @@ impl<'a> Textures<'a> {
         let read = self.assets.read(file, MAX_TEXTURE_FILE);
         let (texels, hash) = match &read {
             Ok(bytes) => match self.texels(bytes) {
-                Ok(decoded) => decoded,
+                Ok((texels, hash)) => (Some(texels), hash),
                 Err(error) => {
                     let message = match bytes.len() {
                         0 => format!("{file:?} is empty"),
@@ -545,7 +546,7 @@ impl<'a> Textures<'a> {
                     };
                     let hint = "magenta and black stand in for it, unless compiled strictly";
                     cx.outside(|cx| cx.warning(&format!("texture.image.{name}.file"), message, Some(hint)));
-                    (Arc::new(placeholder()), [0; 32])
+                    (None, [0; 32])
                 }
             },
             Err(error) => {
@@ -564,10 +565,10 @@ impl<'a> Textures<'a> {
                         cx.outside(|cx| cx.warning(&path, message, Some(&hint)));
                     }
                 }
-                (Arc::new(placeholder()), [0; 32])
+                (None, [0; 32])
             }
         };
-        if hash == [0; 32] {
+        if texels.is_none() {
             self.placeholders.push(file.to_owned());
         }
         self.files.insert(file, (texels.clone(), hash));
@@ -590,7 +591,8 @@ impl<'a> Textures<'a> {
 
     /// What is left of the texels that one scene may have.
     fn limits(&self) -> Limits {
-        let used: u64 = self.files.values().map(|(t, _)| t.width as u64 * t.height as u64).sum();
+        let used: u64 =
+            self.files.values().filter_map(|(t, _)| t.as_ref()).map(|t| t.width as u64 * t.height as u64).sum();
         let whole = Limits::default();
         Limits { texels: whole.texels.saturating_sub(used), ..whole }
     }
@@ -598,7 +600,10 @@ impl<'a> Textures<'a> {
     fn sizes(&self) -> Vec<(String, &'static str, Option<[u32; 2]>)> {
         let size = |desc: &TextureDesc| match desc {
             TextureDesc::Checkerboard(board) => Some(board.counts),
-            TextureDesc::Image(image) => self.files.get(image.file.0.as_str()).map(|(t, _)| [t.width, t.height]),
+            TextureDesc::Image(image) => {
+                let (texels, _) = self.files.get(image.file.0.as_str())?;
+                texels.as_ref().map(|t| [t.width, t.height])
+            }
         };
         self.desc.textures.iter().map(|(name, desc)| (name.clone(), desc.kind(), size(desc))).collect()
     }
@@ -608,7 +613,7 @@ impl<'a> Textures<'a> {
             TexelData::Rgb8(data) => size_of_val(data.as_slice()),
             TexelData::Rgb16(data) => size_of_val(data.as_slice()),
         };
-        self.files.values().map(|(texels, _)| size(texels) as u64).sum()
+        self.files.values().filter_map(|(texels, _)| texels.as_deref()).map(|texels| size(texels) as u64).sum()
     }
 
     /// Each file that was read with the hash of its bytes, in the order of names.
@@ -638,8 +643,12 @@ fn factor_path(field: &str, texture: &Option<String>) -> String {
     if texture.is_some() { format!("{field}.factor") } else { field.to_owned() }
 }
 
-/// What stands in for a picture that cannot be had: magenta and black, not to be overlooked.
-fn placeholder() -> Texels {
-    let (magenta, black) = ([255, 0, 255], [0, 0, 0]);
-    Texels { width: 2, height: 2, data: TexelData::Rgb8(vec![magenta, black, black, magenta]) }
+/// What stands in for a picture that cannot be had: magenta and black squares, not to be overlooked.
+fn placeholder() -> CheckerboardDesc {
+    CheckerboardDesc { counts: [8, 8], colors: [ColorDesc::linear(1.0, 0.0, 1.0), ColorDesc::BLACK] }
+}
+
+/// What stands for the texels of a picture while only its other settings are checked.
+fn unread() -> Texels {
+    Texels { width: 1, height: 1, data: TexelData::Rgb8(vec![[0; 3]]) }
 }

@@ -24,7 +24,8 @@ use super::text::sources::{SourceFile, Sources};
 use super::text::{Parsed, decode, too_long};
 use crate::context::NoAssets;
 use crate::describe::node::{Data, Entry, Node, Span, quoted, shortened};
-use crate::describe::read::{Fault, Faults, nearest};
+use crate::describe::read::{Fault, Faults};
+use crate::describe::synonyms::did_you_mean;
 use crate::light::{LightDesc, SampleSet};
 
 const KEYS: &[&str] = &[
@@ -74,7 +75,7 @@ pub(super) fn parse(name: &str, bytes: &[u8]) -> Parsed {
             let words: Vec<(&str, Span)> = words(&text, line).take(3).collect();
             let Some(&(word, span)) = words.first() else { continue };
             let Some(key) = KEYS.iter().find(|k| **k == word) else {
-                let near = nearest(word, KEYS).map(|near| format!("did you mean \"{near}\"? ")).unwrap_or_default();
+                let near = did_you_mean(word, KEYS);
                 let hint = format!("{near}a course file takes {}", KEYS.join(", "));
                 fault(span, &shortened(word), "unknown key".into(), Some(hint), None);
                 continue;

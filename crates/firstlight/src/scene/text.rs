@@ -21,12 +21,15 @@ use crate::describe::Family;
 use crate::describe::node::Span;
 use crate::describe::read::Faults;
 use crate::error::{Diagnostic, SceneError, Severity};
-use crate::import::{Foreign, WantedFile, foreign};
+use crate::import::{WantedFile, foreign};
 use crate::scene::compile::{CompileOptions, Compiled};
 use crate::scene::model::ModelSettings;
 
 /// Most bytes of all texts of a scene together: 64 MiB.
 const MAX_BYTES: u64 = 64 << 20;
+
+/// What some editors begin a text with; it is no part of it.
+const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";
 
 /// A description as it was read, with the faults of its text and the places of its values.
 #[derive(Debug)]
@@ -137,8 +140,11 @@ impl SceneDesc {
     /// includes them. The lists of the description come in scene order: kinds in the order of their enums, then the
     /// order of the text, included files first.
     pub fn parse(name: &str, text: &[u8], assets: &dyn Assets) -> Parsed {
+        if text.strip_prefix(BYTE_ORDER_MARK).unwrap_or(text).trim_ascii().is_empty() {
+            return Parsed::no_scene(name, "is empty", "a scene is TOML or JSON text; an empty one is `{}`");
+        }
         if let Some(foreign) = foreign(text, WantedFile::Scene) {
-            return Parsed::foreign(name, foreign);
+            return Parsed::no_scene(name, &foreign.message(WantedFile::Scene), foreign.hint(WantedFile::Scene));
         }
         if course::is_course(name, text) {
             return course::parse(name, text);
@@ -161,13 +167,13 @@ impl SceneDesc {
 
 impl Parsed {
     /// Of a file that is no text of a scene: one fault, and no place in it.
-    fn foreign(name: &str, foreign: Foreign) -> Self {
+    fn no_scene(name: &str, message: &str, hint: &str) -> Self {
         let fault = Diagnostic {
             severity: Severity::Error,
             place: None,
             path: String::new(),
-            message: format!("{name} {}", foreign.message(WantedFile::Scene)),
-            hint: Some(foreign.hint(WantedFile::Scene).to_owned()),
+            message: format!("{name} {message}"),
+            hint: Some(hint.to_owned()),
         };
         let nothing = Self::from(SceneDesc::default());
         Self { faults: vec![fault], positions: vec![(0, 0)], incomplete: true, ..nothing }
@@ -201,7 +207,7 @@ pub(super) fn too_long(bytes: &[u8]) -> Option<String> {
 
 /// The text of UTF-8 bytes; of others as much as can be shown, and what is wrong.
 pub(super) fn decode(bytes: &[u8]) -> (String, Option<(Span, String)>) {
-    let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
+    let bytes = bytes.strip_prefix(BYTE_ORDER_MARK).unwrap_or(bytes);
     // Too long is said without looking further
     if bytes.len() as u64 > MAX_BYTES {
         return (String::new(), None);
@@ -220,9 +226,16 @@ pub(super) fn decode(bytes: &[u8]) -> (String, Option<(Span, String)>) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::camera::CameraDesc;
     use crate::context::{MemoryAssets, NoAssets};
+    use crate::describe::Table;
+    use crate::describe::synonyms::{SYNONYMS, did_you_mean};
+    use crate::light::LightDesc;
+    use crate::material::MaterialDesc;
+    use crate::scene::RenderDesc;
     use crate::shape::ShapeDesc;
     use crate::texture::TextureDesc;
+    use crate::transform::TransformDesc;
 
     fn faultless(name: &str, text: &str, assets: &MemoryAssets) -> SceneDesc {
         let parsed = SceneDesc::parse(name, text.as_bytes(), assets);
@@ -272,6 +285,22 @@ mod tests {
         );
         let json = SceneDesc::parse("scene", b" { \"camera\": { \"position\": [0, 0, 5] } }", &NoAssets);
         assert_eq!(json.faults(), []);
+    }
+
+    #[test]
+    fn synonyms_stand_for_words_that_exist() {
+        let tables = [ShapeDesc::tables(), LightDesc::tables(), MaterialDesc::tables(), TextureDesc::tables()].concat();
+        let mut known = vec!["render", "material", "light"];
+        known.extend([ShapeDesc::KINDS, LightDesc::KINDS, MaterialDesc::KINDS, TextureDesc::KINDS].concat());
+        known.extend([CameraDesc::FIELDS, RenderDesc::FIELDS, TransformDesc::FIELDS].concat());
+        known.extend(tables.iter().flat_map(|table| table.fields.iter().map(|field| field.name)));
+        for (words, target, _) in SYNONYMS {
+            assert!(known.contains(target), "{target} is no word of scene text");
+            for word in *words {
+                let question = did_you_mean(word, &[target]);
+                assert!(question.starts_with(&format!("did you mean \"{target}\"? ")), "{word}: {question}");
+            }
+        }
     }
 
     #[test]
@@ -363,7 +392,16 @@ mod tests {
         assert_eq!(told("[material.phong.a]\n[material]\nphong.b = {}\n"), Vec::<String>::new());
         assert_eq!(told("[material.phong]\n[material]\nphong.b = {}\n"), twice("3:1", "phong"));
         assert_eq!(told("sphere = []\n[[sphere]]\n"), twice("2:3", "sphere"));
-        assert_eq!(told("[[sphere]]\n[sphere]\n"), twice("2:2", "sphere"));
+        // One more of an array of tables, with single brackets, does not hide what else there is
+        let sphere = "center = [0, 0, 0]\nradius = 1\n";
+        let single = |line: u32| {
+            format!("s.toml:{line}:1: sphere: a table is not an array of tables; write [[sphere]] for each sphere")
+        };
+        assert_eq!(told(&format!("[[sphere]]\n{sphere}[sphere]\n{sphere}")), [single(4)]);
+        let more = format!("[sphere]\n{sphere}[sphere]\n{sphere}[[sphere]]\n{sphere}colour = 1\n");
+        let all = told(&more);
+        assert_eq!(all[..2], [single(1), single(4)]);
+        assert!(all.len() == 3 && all[2].starts_with("s.toml:10:1: sphere[2].colour: unknown key; "), "{all:?}");
         // Many keys are found by another way than few
         let many: String = (0..40).map(|i| format!("a{i} = 1\n")).collect();
         assert_eq!(told(&format!("{many}a3 = 2\n")), twice("41:1", "a3"));

@@ -1,14 +1,16 @@
 //! From a text and those it includes to one description.
 
 use std::collections::HashMap;
+use std::sync::Arc;
 
 use super::sources::{SourceFile, Sources};
 use super::tables::{Arrays, cameras, kinds, named, read_groups};
 use super::{MAX_BYTES, Parsed, decode, too_long};
 use crate::context::{AssetError, Assets};
 use crate::describe::Family;
-use crate::describe::node::{self, Data, Node, Span, Syntax, quoted};
-use crate::describe::read::{Fault, Faults, Reader, nearest};
+use crate::describe::node::{self, Data, Node, ReadText, Span, Syntax, SyntaxFault, quoted};
+use crate::describe::read::{Fault, Faults, Reader};
+use crate::describe::synonyms::did_you_mean;
 use crate::describe::value::{join_path, normalized};
 use crate::import::{WantedFile, foreign};
 use crate::light::LightDesc;
@@ -34,6 +36,16 @@ fn is_first_line(text: &str, span: Span) -> bool {
 /// The keys of a scene's top level.
 const BEFORE_SHAPES: &[&str] = &["include", "render", "camera", "texture", "material"];
 const AFTER_SHAPES: &[&str] = &["group", "light"];
+
+/// Whether the scene format has an array of tables at `path`.
+fn is_array(path: &[Arc<str>]) -> bool {
+    match path {
+        [shape] => ShapeDesc::KINDS.contains(&&**shape),
+        [light, kind] => &**light == LightDesc::WORD && LightDesc::KINDS.contains(&&**kind),
+        [group, _, shape] => &**group == "group" && ShapeDesc::KINDS.contains(&&**shape),
+        _ => false,
+    }
+}
 
 fn top() -> Vec<&'static str> {
     [BEFORE_SHAPES, ShapeDesc::KINDS, AFTER_SHAPES].concat()
@@ -110,22 +122,19 @@ impl Loader<'_> {
             self.file_fault(file, span, message, Some("save the text as UTF-8".into()));
             None
         } else {
-            match node::parse(&text, syntax) {
-                Ok(root) => Some(root),
-                // Another language, most likely
-                Err(faults) if faults.len() > MAX_SYNTAX_FAULTS && is_first_line(&text, faults[0].span) => {
-                    let lines = faults.len();
-                    let message = format!("not TOML: {lines} lines are not understood, this is the first");
-                    self.file_fault(file, faults[0].span, message, Some("a scene is TOML or JSON text".into()));
-                    None
-                }
-                Err(faults) => {
-                    for fault in faults {
-                        self.file_fault(file, fault.span, fault.message, fault.hint);
-                    }
-                    None
+            let ReadText { root, faults } = node::parse(&text, syntax, &is_array);
+            self.incomplete |= root.is_none();
+            // Another language, most likely
+            if root.is_none() && faults.len() > MAX_SYNTAX_FAULTS && is_first_line(&text, faults[0].span) {
+                let lines = faults.len();
+                let message = format!("not TOML: {lines} lines are not understood, this is the first");
+                self.file_fault(file, faults[0].span, message, Some("a scene is TOML or JSON text".into()));
+            } else {
+                for SyntaxFault { span, path, message, hint } in faults {
+                    self.faults.push(Fault { file, span, path, message, hint, other: None });
                 }
             }
+            root
         };
         if let Some(mut root) = root {
             if let Some(include) = root.get("include") {
@@ -285,8 +294,7 @@ impl Loader<'_> {
                         format!("textures are written [texture.{key}.NAME]")
                     } else {
                         let top = top();
-                        let near =
-                            nearest(key, &top).map(|near| format!("did you mean \"{near}\"? ")).unwrap_or_default();
+                        let near = did_you_mean(key, &top);
                         format!("{near}a scene takes {}", top.join(", "))
                     };
                     reader.within(&node::shortened(key), |r| r.error(span, "unknown key", Some(hint)));

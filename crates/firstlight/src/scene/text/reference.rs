@@ -2,6 +2,7 @@
 
 use crate::camera::CameraDesc;
 use crate::describe::info::sentence;
+use crate::describe::value::COLOR_FORMS;
 use crate::describe::{Family, TableInfo};
 use crate::describe::{FieldInfo, TextValue};
 use crate::light::LightDesc;
@@ -16,7 +17,8 @@ A scene is a text in TOML, or the same in JSON (a file whose name ends in `.json
 every field; it is made from the program's own definitions.
 
 - Units: metres and degrees. Right-handed, y up.
-- A **colour** is `[r, g, b]` (linear Rec. 709), `"#rrggbb"` (sRGB) or one number (linear gray).
+- A **colour** is `[r, g, b]` (linear Rec. 709); `"#rrggbb"`, `"#rgb"` or one of the 148 names of
+  [CSS](https://www.w3.org/TR/css-color-4/#named-colors) such as `"orange"` (sRGB); or one number (linear gray).
 - Where a value can be **textured**, it is a constant, or `{ texture = "NAME", factor = ... }`: the texture, times the
   factor, which is 1 unless said.
 - **Whole numbers** are welcome wherever a number is.
@@ -135,7 +137,7 @@ fn takes(field: &FieldInfo) -> String {
         let anchor = format!("#table-{}", table.kind.replace('_', "-"));
         return format!("[{}]({anchor})", field.words);
     }
-    let words = field.words.replace(" ([r, g, b], \"#rrggbb\" or a gray)", "");
+    let words = field.words.replace(COLOR_FORMS, "");
     match words.split_once(" or { texture") {
         Some((value, _)) => format!("{value}, textured"),
         None => words,

@@ -3,6 +3,7 @@
 use serde_json::{Map, Value as Json, json};
 
 use crate::camera::CameraDesc;
+use crate::describe::value::color_schema;
 use crate::describe::{Family, TableInfo};
 use crate::light::LightDesc;
 use crate::material::MaterialDesc;
@@ -12,7 +13,7 @@ use crate::texture::TextureDesc;
 
 /// The JSON Schema (draft 2020-12) of a scene in JSON or TOML, pretty printed.
 pub fn schema() -> String {
-    let mut defs = Map::new();
+    let mut defs = Map::from_iter([("color".to_owned(), color_schema())]);
     let mut reference = |prefix: &str, table: TableInfo| -> (String, Json) {
         let name = if prefix.is_empty() { table.kind.clone() } else { format!("{prefix}.{}", table.kind) };
         let to = json!({ "$ref": format!("#/$defs/{name}") });

@@ -179,6 +179,10 @@ impl Sources {
             excerpt = whole.chars().skip(skipped).take(EXCERPT).collect();
             offset = before - skipped;
         }
+        // What is no text is not quoted
+        if 2 * excerpt.chars().filter(|c| *c == char::REPLACEMENT_CHARACTER).count() > excerpt.chars().count() {
+            (excerpt, offset) = (String::new(), 0);
+        }
         let longest = excerpt.chars().count().saturating_sub(offset).max(1);
         let width = text[start..end].chars().take(longest).count().max(1);
         let number = |n: usize| u32::try_from(n).unwrap_or(u32::MAX);
@@ -315,6 +319,16 @@ mod tests {
         let text = "output_resolution 64\narea_light_resolution 3\n";
         let told = attached("c.txt", text, &MemoryAssets::default(), &["light.rectangle[0].samples", "render.height"]);
         assert_eq!(told, ["c.txt:1:19: render.height: wrong", "c.txt:2:23: light.rectangle[0].samples: wrong"]);
+    }
+
+    #[test]
+    fn what_is_no_text_is_not_quoted() {
+        for (text, excerpt) in [(&b"a = \"caf\xe9\""[..], "a = \"caf\u{fffd}\""), (b"\x80\x81\x82= 1", "")] {
+            let parsed = SceneDesc::parse("s.toml", text, &NoAssets);
+            let [fault] = parsed.faults() else { panic!("{:?}", parsed.faults()) };
+            assert!(fault.message.contains("is not UTF-8"), "{fault}");
+            assert_eq!(fault.place.as_ref().map(|place| place.excerpt.as_str()), Some(excerpt));
+        }
     }
 
     #[test]

@@ -4,7 +4,8 @@ use std::collections::HashMap;
 
 use crate::camera::CameraDesc;
 use crate::describe::node::{self, Data, Node, Span, Syntax, quoted};
-use crate::describe::read::{Reader, nearest};
+use crate::describe::read::Reader;
+use crate::describe::synonyms::did_you_mean;
 use crate::describe::write::key;
 use crate::describe::{Family, Table};
 use crate::light::LightDesc;
@@ -38,6 +39,10 @@ impl Arrays<'_> {
             };
             reader.wrong_type(node, "an array of tables", Some(hint));
             reader.poison();
+            // One by itself is read for its faults
+            if node.entries().is_some() {
+                reader.at(*count, |r| read(r, node));
+            }
             return;
         }
         node.each(reader.text(), |_, element| {
@@ -92,9 +97,7 @@ pub(super) fn read_groups(
                                 });
                             }
                             None => {
-                                let near = nearest(&of_kind.key, ShapeDesc::KINDS)
-                                    .map(|near| format!("did you mean \"{near}\"? "))
-                                    .unwrap_or_default();
+                                let near = did_you_mean(&of_kind.key, ShapeDesc::KINDS);
                                 let hint = format!("{near}a group takes {}", ShapeDesc::KINDS.join(", "));
                                 r.error(of_kind.key_span, "unknown key", Some(hint));
                             }
@@ -123,8 +126,7 @@ pub(super) fn kinds<'n, F: Family>(
     for entry in entries {
         let kind = F::KINDS.iter().position(|k| *k == &*entry.key);
         if kind.is_none() {
-            let near =
-                nearest(&entry.key, F::KINDS).map(|near| format!("did you mean \"{near}\"? ")).unwrap_or_default();
+            let near = did_you_mean(&entry.key, F::KINDS);
             let hint = format!("{near}kinds of {} are {}", F::WORD, F::KINDS.join(", "));
             let message = format!("unknown kind of {}", F::WORD);
             reader.within(&node::shortened(&entry.key), |r| r.error(entry.key_span, message, Some(hint)));
