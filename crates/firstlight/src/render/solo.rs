@@ -12,7 +12,7 @@ use crate::ids::SurfaceId;
 use crate::light::AreaShape;
 use crate::material::Bsdf;
 use crate::math::{DVec3, Ray, Vec3};
-use crate::scene::{At, Hit, Scene};
+use crate::scene::{At, Hit, Opacity, PlacedSpot, Scene};
 use crate::shape::{Footprint, Parallelogram, RayDifferential, Sphere, SurfaceInteraction};
 
 /// Something that a block's rays may meet.
@@ -20,9 +20,11 @@ use crate::shape::{Footprint, Parallelogram, RayDifferential, Sphere, SurfaceInt
 pub(crate) enum Candidate {
     Sphere(u32),
     Parallelogram(u32),
+    /// A plane, as it is placed.
+    Plane(u32),
     /// A light's shape.
     Light(u32),
-    /// All that lies in trees.
+    /// All that lies in trees, which has an end.
     Trees,
 }
 
@@ -102,6 +104,24 @@ impl Pyramid {
         self.sides.iter().zip(&self.corners).any(outside) || corners.iter().all(|q| self.depth(*q) < -slack)
     }
 
+    /// At each corner: how high over a plane the ray begins, and how much higher it is a metre on.
+    fn heights(&self, scene: &Scene, plane: u32) -> [[f64; 2]; 4] {
+        let (thing, plane) = scene.geometry.plane(plane);
+        let (_, normal) = plane.place();
+        let scale = 1.0 / thing.placement.normal(normal).length();
+        self.corners.each_ref().map(|ray| plane.approach(&thing.placement.ray(ray)).map(|height| height * scale))
+    }
+
+    /// Whether all rays lead away from a plane, from one side of it, or all begin in it.
+    fn misses_plane(&self, scene: &Scene, plane: u32) -> bool {
+        let heights = self.heights(scene, plane);
+        let side = heights[0][0].signum();
+        let leads_away = |(ray, [height, gain]): (&Ray, &[f64; 2])| {
+            height * side > f64::from(ray.o.abs().max_element()) * SLACK && gain * side > SLACK
+        };
+        heights.iter().all(|[height, _]| *height == 0.0) || self.corners.iter().zip(&heights).all(leads_away)
+    }
+
     /// Those of the listed shapes and lights that the rays may meet.
     pub fn candidates(&self, scene: &Scene, from: &[Candidate], into: &mut Vec<Candidate>) {
         into.clear();
@@ -109,6 +129,7 @@ impl Pyramid {
         into.extend(from.iter().filter(|candidate| match candidate {
             Candidate::Sphere(i) => !self.misses_sphere(&geometry.spheres[*i as usize].shape),
             Candidate::Parallelogram(i) => !self.misses_flat(&geometry.parallelograms[*i as usize].shape),
+            Candidate::Plane(i) => !self.misses_plane(scene, *i),
             Candidate::Light(i) => scene.lights[*i as usize].area().is_some_and(|area| match &area.shape {
                 AreaShape::Rectangle(rectangle) => !self.misses_flat(&rectangle.shape),
                 AreaShape::Sphere(sphere) => !self.misses_sphere(&sphere.shape),
@@ -141,6 +162,7 @@ impl Pyramid {
                 let flat = &scene.geometry.parallelograms[i as usize].shape;
                 depths(&|ray| flat.intersect(ray))
             }
+            Candidate::Plane(_) => depths(&|ray| candidate.intersect(scene, ray)),
             Candidate::Sphere(i) => {
                 let sphere = &scene.geometry.spheres[i as usize].shape;
                 let inside = |ray: &Ray| (ray.o.as_dvec3() - sphere.c).length() <= sphere.r * (1.0 + SLACK);
@@ -188,12 +210,13 @@ impl Pyramid {
                 }
             }
             Candidate::Parallelogram(i) => self.nearest_flat(&scene.geometry.parallelograms[i as usize].shape),
+            Candidate::Plane(i) => self.nearest_plane(scene, i),
             Candidate::Light(i) => match scene.lights[i as usize].area().map(|area| &area.shape) {
                 Some(AreaShape::Rectangle(rectangle)) => self.nearest_flat(&rectangle.shape),
                 Some(AreaShape::Disk(_) | AreaShape::Sphere(_)) => f64::NEG_INFINITY,
                 None => f64::INFINITY,
             },
-            Candidate::Trees if scene.geometry.unbounded.is_empty() => {
+            Candidate::Trees => {
                 let (forward, planes) = (self.forward.as_dvec3(), self.planes());
                 let boxes = scene.geometry.tree_bounds().filter(|bounds| planes.may_meet(*bounds));
                 boxes.fold(f64::INFINITY, |nearest, bounds| {
@@ -201,7 +224,6 @@ impl Pyramid {
                     nearest.min(forward.max(DVec3::ZERO).dot(min) + forward.min(DVec3::ZERO).dot(max))
                 })
             }
-            Candidate::Trees => f64::NEG_INFINITY,
         }
     }
 
@@ -223,6 +245,22 @@ impl Pyramid {
             nearest = nearest.min(self.depth(o + d * t));
         }
         Some(nearest - nearest.abs() * SLACK)
+    }
+
+    /// The same of a placed plane, also if only some of the rays meet it: those that begin on one side of it and do not
+    /// come nearer are as if they met it very far off.
+    fn nearest_plane(&self, scene: &Scene, plane: u32) -> f64 {
+        let heights = self.heights(scene, plane);
+        let side = heights[0][0].signum();
+        if !heights.iter().all(|[height, _]| height * side > 0.0) {
+            return f64::NEG_INFINITY;
+        }
+        let depths = self.corners.iter().zip(heights).map(|(ray, [height, gain])| {
+            let t = height * side / (-gain * side).max(SLACK * SLACK);
+            self.depth(ray.o.as_dvec3() + ray.d.as_dvec3() * t)
+        });
+        let nearest = depths.fold(f64::INFINITY, f64::min);
+        nearest - nearest.abs() * SLACK
     }
 
     /// The one shape that all the rays see, if that is proved. `candidates` is all that they may meet.
@@ -249,7 +287,9 @@ pub(crate) fn all(scene: &Scene) -> Vec<Candidate> {
         let flats = &geometry.parallelograms;
         all.extend((0..flats.len()).filter(|i| flats[*i].seen).map(|i| Candidate::Parallelogram(i as u32)));
     }
-    all.extend(geometry.has_trees().then_some(Candidate::Trees));
+    let is_seen = |thing: &u32| geometry.placed[*thing as usize].camera != Opacity::Clear;
+    all.extend(geometry.unbounded.iter().copied().filter(is_seen).map(Candidate::Plane));
+    all.extend(geometry.has_boxes().then_some(Candidate::Trees));
     let visible = |i: &usize| scene.lights[*i].area().is_some_and(|area| area.visible);
     all.extend((0..scene.lights.len()).filter(visible).map(|i| Candidate::Light(i as u32)));
     all
@@ -271,6 +311,7 @@ impl Candidate {
         match self {
             Candidate::Sphere(i) => scene.geometry.spheres[i as usize].shape.intersect(ray),
             Candidate::Parallelogram(i) => scene.geometry.parallelograms[i as usize].shape.intersect(ray),
+            Candidate::Plane(i) => scene.geometry.meet_plane(i, ray),
             Candidate::Light(i) => scene.lights[i as usize].area()?.shape.intersect(ray),
             Candidate::Trees => unreachable!("what lies in trees is not one shape"),
         }
@@ -278,10 +319,11 @@ impl Candidate {
 
     /// The shape that a ray ends at, if it is one by itself.
     #[inline(always)]
-    pub fn of(hit: &Hit) -> Option<Candidate> {
+    pub fn of(scene: &Scene, hit: &Hit) -> Option<Candidate> {
         match hit.at {
             At::Sphere(i) => Some(Candidate::Sphere(i)),
             At::Parallelogram(i) => Some(Candidate::Parallelogram(i)),
+            At::Placed(i, PlacedSpot::Part(_)) if scene.geometry.is_plane(i) => Some(Candidate::Plane(i)),
             _ => None,
         }
     }
@@ -292,6 +334,7 @@ impl Candidate {
         match self {
             Candidate::Sphere(i) => scene.geometry.spheres[i as usize].surface,
             Candidate::Parallelogram(i) => scene.geometry.parallelograms[i as usize].surface,
+            Candidate::Plane(i) => scene.geometry.placed[i as usize].surface,
             Candidate::Light(i) => SurfaceId(scene.geometry.surfaces.len() as u32 + i),
             Candidate::Trees => unreachable!("what lies in trees is not one shape"),
         }
@@ -303,6 +346,7 @@ impl Candidate {
         let at = match self {
             Candidate::Sphere(i) => At::Sphere(i),
             Candidate::Parallelogram(i) => At::Parallelogram(i),
+            Candidate::Plane(i) => At::Placed(i, PlacedSpot::Part(0)),
             Candidate::Light(_) => At::Light,
             Candidate::Trees => unreachable!("what lies in trees is not one shape"),
         };
@@ -382,7 +426,7 @@ impl Candidate {
     pub fn curvature(self, scene: &Scene) -> f32 {
         match self {
             Candidate::Sphere(i) => (1.0 / scene.geometry.spheres[i as usize].shape.r) as f32,
-            Candidate::Parallelogram(_) | Candidate::Light(_) | Candidate::Trees => 0.0,
+            Candidate::Parallelogram(_) | Candidate::Plane(_) | Candidate::Light(_) | Candidate::Trees => 0.0,
         }
     }
 }

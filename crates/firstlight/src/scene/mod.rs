@@ -50,7 +50,7 @@ use crate::material::Material;
 use crate::math::{DAffine3, DVec3};
 use crate::shape::ShadowTerminator;
 use crate::texture::Texture;
-pub(crate) use geometry::{At, Geometry, Nearest, ObjectSpace, Placed, PlacedTarget, UpperItem};
+pub(crate) use geometry::{At, Geometry, Nearest, ObjectSpace, Placed, PlacedSpot, PlacedTarget, UpperItem};
 pub(crate) use links::LinkId;
 use motion::Motion;
 pub(crate) use occluders::{Listed, ListedOccluders, Opacity};

@@ -19,7 +19,13 @@ impl Geometry {
     /// Whether there is anything beside the lists.
     #[inline(always)]
     pub fn has_trees(&self) -> bool {
-        self.world.is_some() || !self.items.is_empty() || !self.unbounded.is_empty()
+        self.has_boxes() || !self.unbounded.is_empty()
+    }
+
+    /// The same, but for planes.
+    #[inline(always)]
+    pub fn has_boxes(&self) -> bool {
+        self.world.is_some() || !self.items.is_empty()
     }
 
     /// The boxes around all that lies in trees and has an end.
@@ -28,12 +34,10 @@ impl Geometry {
         self.world.iter().map(|world| world.mesh.tree.bounds()).chain(upper)
     }
 
-    /// Whether camera rays inside of `planes` may meet anything that lies in trees.
+    /// Whether camera rays inside of `planes` may meet anything that lies in trees and has an end.
     pub fn may_meet(&self, level: Level, planes: &Planes) -> bool {
-        let is_seen = |thing: &u32| self.placed[*thing as usize].camera != Opacity::Clear;
-        self.unbounded.iter().any(is_seen)
-            || self.tree_bounds().any(|bounds| planes.may_meet(bounds))
-                && dispatch_eight!(level, simd => self.reaches(simd, planes))
+        self.tree_bounds().any(|bounds| planes.may_meet(bounds))
+            && dispatch_eight!(level, simd => self.reaches(simd, planes))
     }
 
     #[inline(always)]
