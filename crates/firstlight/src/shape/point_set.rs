@@ -362,13 +362,20 @@ impl PointSet {
     /// Which of sixteen lines of the set's own space meet any sphere before they end.
     #[inline(always)]
     pub fn blocks_lanes<S: Simd>(&self, simd: S, lines: &LineLanes, t_end: &[f32; 16], active: u16) -> u16 {
-        self.tree.any16(simd, &lines.rays(active), t_end, active, |index, _| {
-            let ball = self.ball(index);
-            lines.each(
-                #[inline(always)]
-                |line, end| [ball.blocks(line, end), false],
-            )[0]
-        })
+        self.tree.any16(
+            simd,
+            &lines.rays(active),
+            t_end,
+            active,
+            #[inline(always)]
+            |index, _| {
+                let ball = self.ball(index);
+                lines.each(
+                    #[inline(always)]
+                    |line, end| [ball.blocks(line, end), false],
+                )[0]
+            },
+        )
     }
 
     /// What `ray`, which met sphere `index` at `t`, sees there.
