@@ -87,6 +87,11 @@ impl PlainMaterials {
 
     /// That of a shape, if it has no textures.
     pub fn get(&self, scene: &Scene, of: Candidate) -> Option<Bsdf> {
+        if let Candidate::Facet(facet) = of
+            && scene.geometry.has_colors(facet)
+        {
+            return None;
+        }
         let surface = scene.geometry.surfaces.get(of.surface(scene).index())?;
         self.0[surface.material?.index()]
     }
@@ -331,7 +336,7 @@ impl Fragments {
         let (ray, whole) = scene.camera.local_ray(i as f32 + 0.5, j as f32 + 0.5, 1.0);
         let is_seen = of.intersect(scene, &ray);
         let middle = is_seen.map_or(rays[0], |t| RayHit { ray, t, at: [0; 2] });
-        let si = scene.local_surface(&middle.ray, &of.hit_at(scene, middle.t), &whole);
+        let si = scene.local_surface(&middle.ray, &of.hit_at(scene, &middle.ray, middle.t), &whole);
         let material = &scene.materials[si.material.index()];
         let ends = rays.iter().map(|ray| ray.end().as_vec3());
         let even = is_seen.is_some() && of.is_even_over(scene, &si, &middle.ray, middle.t, &whole, ends);
@@ -511,7 +516,7 @@ impl Candidate {
             match self {
                 Candidate::Sphere(i) => scene.geometry.spheres[i as usize].shape.place(ray, t),
                 Candidate::Parallelogram(i) => scene.geometry.parallelograms[i as usize].shape.place(ray, t),
-                Candidate::Plane(_) => return self.surface_point(scene, ray, t),
+                Candidate::Plane(_) | Candidate::Facet(_) => return self.surface_point(scene, ray, t),
                 Candidate::Light(_) | Candidate::Trees => unreachable!("it has no material of its own"),
             },
             -ray.d,
@@ -524,7 +529,9 @@ impl Candidate {
             match self {
                 Candidate::Sphere(i) => scene.geometry.spheres[i as usize].shape.nearest_place(q),
                 Candidate::Parallelogram(i) => scene.geometry.parallelograms[i as usize].shape.nearest_place(q),
-                Candidate::Plane(_) => return self.surface_point(scene, &Ray { o: q.as_vec3(), d: -wo }, 0.0),
+                Candidate::Plane(_) | Candidate::Facet(_) => {
+                    return self.surface_point(scene, &Ray { o: q.as_vec3(), d: -wo }, 0.0);
+                }
                 Candidate::Light(_) | Candidate::Trees => unreachable!("it has no material of its own"),
             },
             wo,
@@ -533,13 +540,13 @@ impl Candidate {
 
     /// The same of what is placed.
     fn surface_point(self, scene: &Scene, ray: &Ray, t: f64) -> ShadingPoint {
-        let si = scene.local_surface(ray, &self.hit_at(scene, t), &RayDifferential::default());
+        let si = scene.local_surface(ray, &self.hit_at(scene, ray, t), &RayDifferential::default());
         ShadingPoint::of(&si)
     }
 
     /// The material that a ray sees which meets it.
     fn bsdf(self, scene: &Scene, ray: &RayHit, differential: &RayDifferential) -> Bsdf {
-        let si = scene.local_surface(&ray.ray, &self.hit_at(scene, ray.t), differential);
+        let si = scene.local_surface(&ray.ray, &self.hit_at(scene, &ray.ray, ray.t), differential);
         scene.materials[si.material.index()].bsdf(&si, &scene.textures)
     }
 

@@ -11,8 +11,8 @@ use crate::accel::{HalfSpace, Planes};
 use crate::ids::SurfaceId;
 use crate::light::AreaShape;
 use crate::material::Bsdf;
-use crate::math::{DVec3, Ray, Vec3};
-use crate::scene::{At, Hit, Opacity, PlacedSpot, Scene};
+use crate::math::{DVec3, Facet, Ray, Vec3};
+use crate::scene::{At, FewFacets, Hit, Opacity, PlacedSpot, Scene};
 use crate::shape::{Footprint, Parallelogram, RayDifferential, Sphere, SurfaceInteraction};
 
 /// Something that a block's rays may meet.
@@ -22,6 +22,8 @@ pub(crate) enum Candidate {
     Parallelogram(u32),
     /// A plane, as it is placed.
     Plane(u32),
+    /// A flat facet of a mesh that all rays of a square are proved to see.
+    Facet(Facet),
     /// A light's shape.
     Light(u32),
     /// All that lies in trees, which has an end.
@@ -130,6 +132,7 @@ impl Pyramid {
             Candidate::Sphere(i) => !self.misses_sphere(&geometry.spheres[*i as usize].shape),
             Candidate::Parallelogram(i) => !self.misses_flat(&geometry.parallelograms[*i as usize].shape),
             Candidate::Plane(i) => !self.misses_plane(scene, *i),
+            Candidate::Facet(_) => unreachable!("facets are found where they are"),
             Candidate::Light(i) => scene.lights[*i as usize].area().is_some_and(|area| match &area.shape {
                 AreaShape::Rectangle(rectangle) => !self.misses_flat(&rectangle.shape),
                 AreaShape::Sphere(sphere) => !self.misses_sphere(&sphere.shape),
@@ -163,6 +166,18 @@ impl Pyramid {
                 depths(&|ray| flat.intersect(ray))
             }
             Candidate::Plane(_) => depths(&|ray| candidate.intersect(scene, ray)),
+            Candidate::Facet(facet) => {
+                let flat = scene.geometry.facet(facet);
+                depths(&|ray| {
+                    let t = flat.intersect(ray)?;
+                    // As sure as the tree's own test, in single precision
+                    let way = ray.d.as_dvec3() * t;
+                    let from = ray.o.as_dvec3() - flat.p + way;
+                    let [u, v] = [flat.u_axis, flat.v_axis].map(|axis| from.dot(axis));
+                    let [du, dv] = [flat.u_axis, flat.v_axis].map(|axis| axis.length() * way.length() * SLACK);
+                    (u >= du && v >= dv && u + v <= 1.0 - du - dv).then_some(t)
+                })
+            }
             Candidate::Sphere(i) => {
                 let sphere = &scene.geometry.spheres[i as usize].shape;
                 let inside = |ray: &Ray| (ray.o.as_dvec3() - sphere.c).length() <= sphere.r * (1.0 + SLACK);
@@ -211,6 +226,7 @@ impl Pyramid {
             }
             Candidate::Parallelogram(i) => self.nearest_flat(&scene.geometry.parallelograms[i as usize].shape),
             Candidate::Plane(i) => self.nearest_plane(scene, i),
+            Candidate::Facet(facet) => self.nearest_flat(&scene.geometry.facet(facet)),
             Candidate::Light(i) => match scene.lights[i as usize].area().map(|area| &area.shape) {
                 Some(AreaShape::Rectangle(rectangle)) => self.nearest_flat(&rectangle.shape),
                 Some(AreaShape::Disk(_) | AreaShape::Sphere(_)) => f64::NEG_INFINITY,
@@ -265,15 +281,20 @@ impl Pyramid {
 
     /// The one shape that all the rays see, if that is proved. `candidates` is all that they may meet.
     pub fn only(&self, scene: &Scene, candidates: &[Candidate]) -> Option<Candidate> {
-        candidates.iter().copied().enumerate().find_map(|(i, one)| {
-            let [_, far] = self.cover(scene, one)?;
-            let others = candidates.iter().enumerate().filter(|(j, _)| *j != i);
-            let mut behind = others.map(|(_, other)| match self.cover(scene, *other) {
-                Some([near, _]) => near,
-                None => self.nearest(scene, *other),
-            });
-            behind.all(|near| near > far + (far.abs() + near.abs()) * SLACK).then_some(one)
-        })
+        // Of what lies in trees few facets are candidates as others are
+        let mut facets = FewFacets::new();
+        let is_few = candidates.contains(&Candidate::Trees)
+            && scene.geometry.few_facets(scene.level, &self.planes(), &mut facets);
+        let others = candidates.iter().copied().filter(|other| !(is_few && *other == Candidate::Trees));
+        let facets = facets.iter().filter(|_| is_few).map(|facet| Candidate::Facet(*facet));
+        let all = others.chain(facets);
+        let covers = all.clone().filter_map(|one| Some((one, self.cover(scene, one)?[1])));
+        let (one, far) = covers.min_by(|(_, one), (_, other)| one.total_cmp(other))?;
+        let mut behind = all.filter(|other| *other != one).map(|other| match self.cover(scene, other) {
+            Some([near, _]) => near,
+            None => self.nearest(scene, other),
+        });
+        behind.all(|near| near > far + (far.abs() + near.abs()) * SLACK).then_some(one)
     }
 }
 
@@ -312,6 +333,7 @@ impl Candidate {
             Candidate::Sphere(i) => scene.geometry.spheres[i as usize].shape.intersect(ray),
             Candidate::Parallelogram(i) => scene.geometry.parallelograms[i as usize].shape.intersect(ray),
             Candidate::Plane(i) => scene.geometry.meet_plane(i, ray),
+            Candidate::Facet(facet) => scene.geometry.facet(facet).intersect(ray),
             Candidate::Light(i) => scene.lights[i as usize].area()?.shape.intersect(ray),
             Candidate::Trees => unreachable!("what lies in trees is not one shape"),
         }
@@ -335,18 +357,20 @@ impl Candidate {
             Candidate::Sphere(i) => scene.geometry.spheres[i as usize].surface,
             Candidate::Parallelogram(i) => scene.geometry.parallelograms[i as usize].surface,
             Candidate::Plane(i) => scene.geometry.placed[i as usize].surface,
+            Candidate::Facet(facet) => scene.geometry.facet_surface(facet),
             Candidate::Light(i) => SurfaceId(scene.geometry.surfaces.len() as u32 + i),
             Candidate::Trees => unreachable!("what lies in trees is not one shape"),
         }
     }
 
-    /// What a ray ends at that meets it at `t`.
+    /// What `ray` ends at, which meets it at `t`.
     #[inline(always)]
-    pub fn hit_at(self, scene: &Scene, t: f64) -> Hit {
+    pub fn hit_at(self, scene: &Scene, ray: &Ray, t: f64) -> Hit {
         let at = match self {
             Candidate::Sphere(i) => At::Sphere(i),
             Candidate::Parallelogram(i) => At::Parallelogram(i),
             Candidate::Plane(i) => At::Placed(i, PlacedSpot::Part(0)),
+            Candidate::Facet(facet) => scene.geometry.on_facet(facet, ray.o.as_dvec3() + ray.d.as_dvec3() * t),
             Candidate::Light(_) => At::Light,
             Candidate::Trees => unreachable!("what lies in trees is not one shape"),
         };
@@ -355,7 +379,7 @@ impl Candidate {
 
     /// What a ray that meets only this ends at.
     pub fn hit(self, scene: &Scene, ray: &Ray) -> Option<Hit> {
-        self.intersect(scene, ray).map(|t| self.hit_at(scene, t))
+        self.intersect(scene, ray).map(|t| self.hit_at(scene, ray, t))
     }
 
     /// The material of a square of pixels that see only this, in its middle.
@@ -426,7 +450,7 @@ impl Candidate {
     pub fn curvature(self, scene: &Scene) -> f32 {
         match self {
             Candidate::Sphere(i) => (1.0 / scene.geometry.spheres[i as usize].shape.r) as f32,
-            Candidate::Parallelogram(_) | Candidate::Plane(_) | Candidate::Light(_) | Candidate::Trees => 0.0,
+            _ => 0.0,
         }
     }
 }

@@ -18,7 +18,9 @@ use super::occluders::Opacity;
 use crate::accel::{Aabb, Bvh};
 use crate::ids::{LightId, MaterialId, SurfaceId};
 use crate::math::{DAffine3, DVec3, Facet, Ray, Vec2};
-use crate::shape::{Mesh, Parallelogram, Placement, PointSet, ShadowTerminator, Solid, Sphere, TrianglePoint, UnboundedPlane};
+use crate::shape::{
+    Mesh, Parallelogram, Placement, PointSet, ShadowTerminator, Solid, Sphere, TrianglePoint, UnboundedPlane,
+};
 
 /// What a surface id stands for.
 #[derive(Clone, Debug)]

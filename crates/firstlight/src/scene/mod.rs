@@ -55,7 +55,7 @@ pub(crate) use links::LinkId;
 use motion::Motion;
 pub(crate) use occluders::{Listed, ListedOccluders, Opacity};
 use seen_lights::SeenLights;
-pub(crate) use trees::ShadowRays;
+pub(crate) use trees::{FewFacets, ShadowRays};
 
 /// A scene, ready to be rendered: flat lists and ids. Between here and the image nothing can fail.
 ///
