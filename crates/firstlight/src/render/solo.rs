@@ -168,15 +168,8 @@ impl Pyramid {
             Candidate::Plane(_) => depths(&|ray| candidate.intersect(scene, ray)),
             Candidate::Facet(facet) => {
                 let flat = scene.geometry.facet(facet);
-                depths(&|ray| {
-                    let t = flat.intersect(ray)?;
-                    // As sure as the tree's own test, in single precision
-                    let way = ray.d.as_dvec3() * t;
-                    let from = ray.o.as_dvec3() - flat.p + way;
-                    let [u, v] = [flat.u_axis, flat.v_axis].map(|axis| from.dot(axis));
-                    let [du, dv] = [flat.u_axis, flat.v_axis].map(|axis| axis.length() * way.length() * SLACK);
-                    (u >= du && v >= dv && u + v <= 1.0 - du - dv).then_some(t)
-                })
+                self.insides(&flat)?.as_flattened().iter().all(|inside| *inside > 0.0).then_some(())?;
+                depths(&|ray| flat.intersect(ray))
             }
             Candidate::Sphere(i) => {
                 let sphere = &scene.geometry.spheres[i as usize].shape;
@@ -189,6 +182,29 @@ impl Pyramid {
             }
             Candidate::Light(_) | Candidate::Trees => None,
         }
+    }
+
+    /// How far inside of each of its three sides the rays through the corners meet a facet's plane, in sizes of the
+    /// facet: below 0 if outside, and 0 where single precision leaves it open. `None` if not all meet the plane.
+    fn insides(&self, flat: &Parallelogram) -> Option<[[f64; 3]; 4]> {
+        let mut insides = [[0.0; 3]; 4];
+        for (inside, ray) in insides.iter_mut().zip(&self.corners) {
+            let (from, d) = (ray.o.as_dvec3() - flat.p, ray.d.as_dvec3());
+            let t = -flat.n.dot(from) / flat.n.dot(d);
+            if !(t > 0.0 && t < f64::INFINITY) {
+                return None;
+            }
+            let [u, v] = [flat.u_axis, flat.v_axis].map(|axis| (from + d * t).dot(axis));
+            let slack = (flat.u_axis.length() + flat.v_axis.length()) * t * SLACK;
+            *inside = [u, v, 1.0 - u - v].map(|w| if w.abs() > slack { w } else { 0.0 });
+        }
+        Some(insides)
+    }
+
+    /// Whether all rays pass a facet on one side of it.
+    fn misses_facet(&self, scene: &Scene, facet: Facet) -> bool {
+        let insides = self.insides(&scene.geometry.facet(facet));
+        insides.is_some_and(|insides| (0..3).any(|side| insides.iter().all(|inside| inside[side] < 0.0)))
     }
 
     /// The greatest depth at which a ray comes nearest to a point: where it meets a sphere around that from outside, it
@@ -286,7 +302,8 @@ impl Pyramid {
         let is_few = candidates.contains(&Candidate::Trees)
             && scene.geometry.few_facets(scene.level, &self.planes(), &mut facets);
         let others = candidates.iter().copied().filter(|other| !(is_few && *other == Candidate::Trees));
-        let facets = facets.iter().filter(|_| is_few).map(|facet| Candidate::Facet(*facet));
+        facets.retain(|facet| is_few && !self.misses_facet(scene, *facet));
+        let facets = facets.iter().map(|facet| Candidate::Facet(*facet));
         let all = others.chain(facets);
         let covers = all.clone().filter_map(|one| Some((one, self.cover(scene, one)?[1])));
         let (one, far) = covers.min_by(|(_, one), (_, other)| one.total_cmp(other))?;

@@ -17,7 +17,8 @@ use crate::shape::{
 const FEW_MESHES: usize = 4;
 
 /// The most facets, and the most leaves of a mesh, that a square of pixels is asked for.
-const FEW_FACETS: usize = 4;
+const FEW_FACETS: usize = 8;
+const FEW_LEAVES: usize = 4;
 
 /// Facets of meshes.
 pub(crate) type FewFacets = ArrayVec<Facet, FEW_FACETS>;
@@ -27,7 +28,7 @@ fn facets_within(level: Level, mesh: &Mesh, source: u32, planes: &Planes, found:
     let mut leaves = 0;
     let take = |leaf: u32| {
         leaves += 1;
-        leaves <= FEW_FACETS
+        leaves <= FEW_LEAVES
             && mesh.tree.leaf(leaf).all(|(triangle, corners)| {
                 planes.misses(&corners) || mesh.is_flat(triangle) && found.try_push(Facet { source, triangle }).is_ok()
             })
