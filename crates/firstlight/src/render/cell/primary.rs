@@ -11,6 +11,7 @@ use crate::render::solo::{Candidate, Pyramid};
 use crate::render::square::Square;
 use crate::render::{AaMode, Counts};
 use crate::scene::Scene;
+use crate::shape::RayDifferential;
 
 /// Pixels across the smallest squares that are asked whether they hold one surface.
 const SMALLEST: u32 = 2;
@@ -110,6 +111,8 @@ impl Cells<'_> {
                 continue;
             }
             let (ray, differential) = camera_ray(scene, i * n + at[0], j * n + at[1]);
+            // Footprints are for textures
+            let differential = if scene.textures.is_empty() { RayDifferential::default() } else { differential };
             let at = at.map(|at| at as u16);
             match Candidate::of(scene, &hit) {
                 Some(shape) => {
