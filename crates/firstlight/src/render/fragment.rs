@@ -483,7 +483,10 @@ fn seen_middle<'a>(
     for Member { si, .. } in members {
         point.reach = point.reach.max((si.lit_from - point.p).length());
         let turn = (si.ns - point.ns).length().max((si.horizon - point.horizon).length());
-        point.turn = point.turn.max(turn);
+        // Steps are not flat, though no normal turns
+        let off = (si.lit_from - point.p).dot(point.horizon).abs();
+        let steps = off > point.horizon.abs().dot(si.error.0 + point.error.0);
+        point.turn = point.turn.max(turn).max(if steps { f32::MIN_POSITIVE } else { 0.0 });
         normals += si.ns - point.ns;
     }
     (normals.length() <= TOLERANCE.even * count).then_some(point)
