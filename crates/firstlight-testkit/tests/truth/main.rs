@@ -18,6 +18,7 @@ mod many_lights;
 mod masks;
 mod motion;
 mod near;
+mod proved;
 mod relight;
 mod robust;
 mod terminator;
