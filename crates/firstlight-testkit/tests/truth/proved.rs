@@ -114,7 +114,9 @@ fn planes_are_lit_as_parallelograms_are_and_take_no_longer() {
         let Deviation { worst, at, .. } =
             Deviation::between(&plane, 1.0, &picture(&flat, &integrated()), &picture(&plane, &integrated()));
         assert!(worst < WORST, "{planes}{rest}: {worst} steps at {at:?}");
-        let (is, may) = (work(&plane), 1.1 * work(&flat));
+        // At the edge of a hard shadow, what may be in the way of a ball's shadow is known a little later
+        let times = if rest.contains("directional") { 1.25 } else { 1.1 };
+        let (is, may) = (work(&plane), times * work(&flat));
         assert!(is <= may, "{planes}{rest}: {is} rays for a pixel in place of {may}");
     }
 }
@@ -201,7 +203,10 @@ fn flat_facets_are_lit_as_every_ray_sees_them() {
         ("blended normals", wall(normals)),
         ("one colour", wall(one_color)),
         ("blended colours", wall(colors)),
-        ("beside a solid", [&wall(""), "[[torus]]\ncenter = [0, 0, -1]\nradius = 0.4\ntube_radius = 0.1\n"].concat()),
+        (
+            "beside a solid",
+            [&wall(""), "[[torus]]\ncenter = [0, 0, -1]\nmajor_radius = 0.4\nminor_radius = 0.1\n"].concat(),
+        ),
     ] {
         for lights in [LIGHTS, SUN] {
             as_every_ray(name, &scene(CORNER, &[&text, lights].concat()));
