@@ -20,6 +20,7 @@ mod masks;
 mod meshes;
 mod motion;
 mod near;
+mod proved;
 mod relight;
 mod robust;
 mod terminator;

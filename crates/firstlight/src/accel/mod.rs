@@ -196,14 +196,19 @@ impl Bvh {
             }
             let beam = Beam::new(simd, rays, t_max, group, which, self.tree.center, self.tree.half);
             let mut asking = group as u16;
-            self.tree.beam(simd, &beam, |id, z_max| {
-                let now = leaf(id, asking) & asking;
-                asking &= !now;
-                done |= now;
-                if asking == 0 {
-                    *z_max = f32::NEG_INFINITY;
-                }
-            });
+            self.tree.beam(
+                simd,
+                &beam,
+                #[inline(always)]
+                |id, z_max| {
+                    let now = leaf(id, asking) & asking;
+                    asking &= !now;
+                    done |= now;
+                    if asking == 0 {
+                        *z_max = f32::NEG_INFINITY;
+                    }
+                },
+            );
         }
         done
     }

@@ -4,7 +4,7 @@ use fearless_simd::{f32x8, prelude::*};
 
 use super::Aabb;
 use super::node::BoxNode;
-use crate::math::{DVec3, Vec3};
+use crate::math::{DAffine3, DVec3, Vec3};
 
 /// A part of space that planes bound: a pyramid and the plane it begins at.
 pub(crate) struct Planes(pub [HalfSpace; 5]);
@@ -37,6 +37,14 @@ impl Planes {
         Planes([side(0), side(1), side(2), side(3), behind])
     }
 
+    /// The same in the space of something placed.
+    pub fn placed(&self, world_from_object: &DAffine3, object_from_world: &DAffine3) -> Planes {
+        Planes(self.0.map(|HalfSpace { n, p }| HalfSpace {
+            n: (world_from_object.matrix3.transpose() * n).normalize_or_zero(),
+            p: object_from_world.transform_point3(p),
+        }))
+    }
+
     /// In a tree around `center` that reaches `half` from it.
     pub fn within(&self, center: Vec3, half: f32) -> TreePlanes {
         TreePlanes(self.0.map(|HalfSpace { n, p }| {
@@ -44,6 +52,16 @@ impl Planes {
             let slack = (way.abs().max_element() + f64::from(half) + p.abs().max_element()) * SLACK;
             (n.as_vec3(), (n.dot(way) + slack) as f32)
         }))
+    }
+
+    /// Whether all of a triangle is outside of one of them.
+    pub fn misses(&self, corners: &[Vec3; 3]) -> bool {
+        self.0.iter().any(|HalfSpace { n, p }| {
+            corners.iter().all(|q| {
+                let way = q.as_dvec3() - p;
+                n.dot(way) > (way.abs().max_element() + p.abs().max_element()) * SLACK
+            })
+        })
     }
 
     /// Whether a box may reach inside.

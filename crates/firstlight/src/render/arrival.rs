@@ -12,6 +12,7 @@ use super::lights::Lights;
 use super::tally::Tally;
 use super::together::Together;
 use super::worth::Worth;
+use crate::accel::Aabb;
 use crate::color::{DisplaySteps, Rgb};
 use crate::ids::LightId;
 use crate::integrate::{
@@ -19,10 +20,10 @@ use crate::integrate::{
 };
 use crate::light::{Area, Extent, LightTree};
 use crate::material::{Bsdf, Lobe, Moments};
-use crate::math::LANES;
+use crate::math::{DVec3, Facet, LANES};
 use crate::scene::Scene;
 use crate::shape::SurfaceInteraction;
-use crate::visibility::{OccluderList, Settler, ShadowView, Shaft, Viewpoint, Visibility};
+use crate::visibility::{OccluderList, Settler, ShadowMesh, ShadowView, Shaft, Target, Viewpoint, Visibility};
 
 pub(crate) use place::ArrivalPlace;
 
@@ -232,6 +233,7 @@ impl<'a> Arrivals<'a> {
         found.resize(places.len(), (Change::NONE, Sighting::Known(Moments::default())));
         // Those that are asked: past what nothing in trees is added to, and without shadows
         let mut asked: [Vec<u32>; 2] = Default::default();
+        let has_trees = lights.has_trees(scene, index);
         let mut next = 0;
         while next < places.len() {
             let (from, place) = (next, &places[next]);
@@ -240,7 +242,7 @@ impl<'a> Arrivals<'a> {
                 continue;
             }
             let shadows = |place: &ArrivalPlace| scene.lights[index].shadows && place.si.receives_shadow && !place.lit;
-            if !shadows(place) || place.clear || !scene.geometry.has_trees() {
+            if !shadows(place) || place.clear || !has_trees {
                 asked[usize::from(!shadows(place))].push(from as u32);
                 continue;
             }
@@ -553,12 +555,19 @@ impl<'a> Arrivals<'a> {
     /// which normals turn by `turn`; or from several points.
     pub(super) fn gather(&mut self, index: usize, points: &[Viewpoint], reach: f32, turn: f32) -> Trees {
         let (scene, lights) = (self.scene, self.lights);
-        if !scene.geometry.has_trees() {
+        if !lights.has_trees(scene, index) {
             return Trees::Nothing;
         }
         let (target, trees) = (&lights.targets[index], &mut self.occluders);
         match points {
-            [point] => trees.gather_around(self.level, scene, target, point, reach, turn > 0.0, LEAVES),
+            [point] => {
+                trees.gather_around(self.level, scene, target, point, reach, turn > 0.0, LEAVES);
+                trees.others.retain(|thing| !is_beside(scene, target, point, reach, turn, *thing));
+                // All of a flat patch has one horizon, and what does not rise over it is in nobody's way
+                if reach > 0.0 && turn == 0.0 && point.but != Facet::NONE {
+                    trees.leaves.retain(|(source, leaf)| rises(scene, point, *source, *leaf));
+                }
+            }
             points => {
                 self.indices.clear();
                 self.indices.extend(0..points.len() as u32);
@@ -584,4 +593,40 @@ impl<'a> Arrivals<'a> {
         let points: ArrayVec<Viewpoint, LANES> = places.iter().map(|place| Viewpoint::of(place.si)).collect();
         self.gather(index, &points, places[0].reach, places[0].turn)
     }
+}
+
+/// Whether something placed is a plane that has a light and all within `reach` of a place on one side, or that the
+/// place lies on, if its normal does not turn.
+fn is_beside(scene: &Scene, target: &Target, place: &Viewpoint, reach: f32, turn: f32, thing: u32) -> bool {
+    if !scene.geometry.is_plane(thing) {
+        return false;
+    }
+    let (thing, plane) = scene.geometry.plane(thing);
+    let (p, n) = plane.place();
+    let (p, n) = (thing.placement.world_from_object.transform_point3(p), thing.placement.normal(n).normalize_or_zero());
+    let height = n.dot(place.p.as_dvec3() - p);
+    let (room, n) = (n.abs().dot(place.error.0.as_dvec3()), n * height.signum());
+    if height.abs() <= room {
+        return turn == 0.0 && n.cross(place.horizon.as_dvec3()).length() < 1e-6;
+    }
+    let beside = if target.hull.finite {
+        let Aabb { min, max } = target.hull.bounds();
+        n.max(DVec3::ZERO).dot(min.as_dvec3() - p) + n.min(DVec3::ZERO).dot(max.as_dvec3() - p)
+    } else {
+        n.dot(target.hull.center.as_dvec3())
+    };
+    height.abs() > f64::from(reach) + room && beside >= 0.0
+}
+
+/// Whether anything in a leaf of a mesh rises over the horizon of a flat place.
+fn rises(scene: &Scene, place: &Viewpoint, source: u32, leaf: u32) -> bool {
+    let Some(mesh) = ShadowMesh::of(&scene.geometry, source, LightId(0)) else { return true };
+    mesh.mesh.tree.leaf(leaf).any(|(_, corners)| {
+        corners.iter().any(|q| {
+            let q = mesh.placement.map_or(q.as_dvec3(), |at| at.world_from_object.transform_point3(q.as_dvec3()));
+            let way = q - place.p.as_dvec3();
+            let room = way.abs().max_element() * 1e-6 + f64::from(place.error.0.max_element());
+            place.horizon.as_dvec3().dot(way) > room
+        })
+    })
 }

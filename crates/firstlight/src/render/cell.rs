@@ -511,7 +511,7 @@ impl<'a> Cells<'a> {
         for Wanted { fragment, light, .. } in &refused {
             self.asked[*fragment as usize] += usize::from(self.lights.arrivals.is_integrated(*light as usize));
         }
-        if self.scene.geometry.has_trees() {
+        if self.scene.geometry.has_boxes() {
             for fragment in 0..self.fragments.all.len() {
                 self.asked[fragment] += self.count_settled(fragment);
             }

@@ -11,10 +11,10 @@ use super::square::Square;
 use crate::color::Rgb;
 use crate::ids::SurfaceId;
 use crate::integrate::{ShadingPoint, TOLERANCE};
-use crate::material::{Bsdf, Colors, Lobe};
+use crate::material::{Bsdf, Colors, Lobe, Material};
 use crate::math::{DVec3, ErrorBound, Ray, Vec3};
 use crate::scene::Scene;
-use crate::shape::SurfaceInteraction;
+use crate::shape::{RayDifferential, SurfaceInteraction};
 
 /// How far colours of some rays differ, channel by channel.
 pub(crate) type Contrast = Colors;
@@ -73,34 +73,27 @@ pub(crate) struct Quadrant {
     pub contrast: Contrast,
 }
 
-/// The materials of listed shapes that have no textures.
-pub(crate) struct PlainMaterials {
-    spheres: Vec<Option<Bsdf>>,
-    parallelograms: Vec<Option<Bsdf>>,
-}
+/// The materials that have no textures, in numbers.
+pub(crate) struct PlainMaterials(Vec<Option<Bsdf>>);
 
 impl PlainMaterials {
     pub fn new(scene: &Scene) -> Self {
-        let of = |surface: SurfaceId| {
-            let material = &scene.materials[scene.geometry.surfaces[surface.index()].material?.index()];
-            let point = ShadingPoint::new(Vec3::ZERO, ErrorBound(Vec3::ZERO), Vec3::Z, Vec3::Z);
-            let bsdf = Bsdf { colors: Colors::BLACK, ambient: Rgb::BLACK, lobe: Lobe::None };
-            let si = LitPlace::new(scene, point, surface, &bsdf).surface();
-            material.is_plain().then(|| material.bsdf(&si, &scene.textures))
-        };
-        PlainMaterials {
-            spheres: scene.geometry.spheres.iter().map(|sphere| of(sphere.surface)).collect(),
-            parallelograms: scene.geometry.parallelograms.iter().map(|flat| of(flat.surface)).collect(),
-        }
+        let point = ShadingPoint::new(Vec3::ZERO, ErrorBound(Vec3::ZERO), Vec3::Z, Vec3::Z);
+        let bsdf = Bsdf { colors: Colors::BLACK, ambient: Rgb::BLACK, lobe: Lobe::None };
+        let si = LitPlace { point, surface: SurfaceId(0), receives_shadow: true, bsdf }.surface();
+        let of = |material: &Material| material.is_plain().then(|| material.bsdf(&si, &scene.textures));
+        PlainMaterials(scene.materials.iter().map(of).collect())
     }
 
     /// That of a shape, if it has no textures.
-    pub fn get(&self, of: Candidate) -> Option<Bsdf> {
-        match of {
-            Candidate::Sphere(i) => self.spheres[i as usize],
-            Candidate::Parallelogram(i) => self.parallelograms[i as usize],
-            Candidate::Light(_) | Candidate::Trees => None,
+    pub fn get(&self, scene: &Scene, of: Candidate) -> Option<Bsdf> {
+        if let Candidate::Facet(facet) = of
+            && scene.geometry.has_colors(facet)
+        {
+            return None;
         }
+        let surface = scene.geometry.surfaces.get(of.surface(scene).index())?;
+        self.0[surface.material?.index()]
     }
 }
 
@@ -332,7 +325,7 @@ impl Fragments {
 
     /// The material in the middle of a pixel, and whether it is that of all its rays.
     fn material(&self, scene: &Scene, [i, j]: [u32; 2], of: Candidate, rays: &[RayHit]) -> (Bsdf, bool) {
-        if let Some(plain) = self.plain.get(of) {
+        if let Some(plain) = self.plain.get(scene, of) {
             return (plain, true);
         }
         if let [ray] = rays {
@@ -343,7 +336,7 @@ impl Fragments {
         let (ray, whole) = scene.camera.local_ray(i as f32 + 0.5, j as f32 + 0.5, 1.0);
         let is_seen = of.intersect(scene, &ray);
         let middle = is_seen.map_or(rays[0], |t| RayHit { ray, t, at: [0; 2] });
-        let si = scene.local_surface(&middle.ray, &of.hit_at(scene, middle.t), &whole);
+        let si = scene.local_surface(&middle.ray, &of.hit_at(scene, &middle.ray, middle.t), &whole);
         let material = &scene.materials[si.material.index()];
         let ends = rays.iter().map(|ray| ray.end().as_vec3());
         let even = is_seen.is_some() && of.is_even_over(scene, &si, &middle.ray, middle.t, &whole, ends);
@@ -490,7 +483,10 @@ fn seen_middle<'a>(
     for Member { si, .. } in members {
         point.reach = point.reach.max((si.lit_from - point.p).length());
         let turn = (si.ns - point.ns).length().max((si.horizon - point.horizon).length());
-        point.turn = point.turn.max(turn);
+        // Steps are not flat, though no normal turns
+        let off = (si.lit_from - point.p).dot(point.horizon).abs();
+        let steps = off > point.horizon.abs().dot(si.error.0 + point.error.0);
+        point.turn = point.turn.max(turn).max(if steps { f32::MIN_POSITIVE } else { 0.0 });
         normals += si.ns - point.ns;
     }
     (normals.length() <= TOLERANCE.even * count).then_some(point)
@@ -523,27 +519,37 @@ impl Candidate {
             match self {
                 Candidate::Sphere(i) => scene.geometry.spheres[i as usize].shape.place(ray, t),
                 Candidate::Parallelogram(i) => scene.geometry.parallelograms[i as usize].shape.place(ray, t),
+                Candidate::Plane(_) | Candidate::Facet(_) => return self.surface_point(scene, ray, t),
                 Candidate::Light(_) | Candidate::Trees => unreachable!("it has no material of its own"),
             },
             -ray.d,
         )
     }
 
-    /// The same for the point of it that is nearest to `q`, seen along `wo`.
+    /// The same for the point of it that is nearest to `q`, seen along `wo`; `q` is next to it on what is flat.
     fn point_near(self, scene: &Scene, q: DVec3, wo: Vec3) -> ShadingPoint {
         turned(
             match self {
                 Candidate::Sphere(i) => scene.geometry.spheres[i as usize].shape.nearest_place(q),
                 Candidate::Parallelogram(i) => scene.geometry.parallelograms[i as usize].shape.nearest_place(q),
+                Candidate::Plane(_) | Candidate::Facet(_) => {
+                    return self.surface_point(scene, &Ray { o: q.as_vec3(), d: -wo }, 0.0);
+                }
                 Candidate::Light(_) | Candidate::Trees => unreachable!("it has no material of its own"),
             },
             wo,
         )
     }
 
+    /// The same of what is placed.
+    fn surface_point(self, scene: &Scene, ray: &Ray, t: f64) -> ShadingPoint {
+        let si = scene.local_surface(ray, &self.hit_at(scene, ray, t), &RayDifferential::default());
+        ShadingPoint::of(&si)
+    }
+
     /// The material that a ray sees which meets it.
-    fn bsdf(self, scene: &Scene, ray: &RayHit, differential: &crate::shape::RayDifferential) -> Bsdf {
-        let si = scene.local_surface(&ray.ray, &self.hit_at(scene, ray.t), differential);
+    fn bsdf(self, scene: &Scene, ray: &RayHit, differential: &RayDifferential) -> Bsdf {
+        let si = scene.local_surface(&ray.ray, &self.hit_at(scene, &ray.ray, ray.t), differential);
         scene.materials[si.material.index()].bsdf(&si, &scene.textures)
     }
 

@@ -217,7 +217,7 @@ impl<'a> LightQueue<'a> {
                     go_on()?;
                     self.sampled(&of, some, answers, counts);
                 }
-            } else if shadows && scene.geometry.has_trees() {
+            } else if shadows && self.arrivals.lights.has_trees(scene, light) {
                 self.past_trees(&of, &members, answers, counts, go_on)?;
             } else {
                 self.batch(&of, [shadows, false], &members, answers, counts);

@@ -3,6 +3,7 @@
 use super::ladder::Ladder;
 use super::many::FEW;
 use crate::color::{DisplaySteps, Rgb};
+use crate::ids::LightId;
 use crate::integrate::{Asked, Emitter, Obstacles, TOLERANCE};
 use crate::light::{Light, LightTree};
 use crate::material::Lobe;
@@ -53,6 +54,13 @@ impl<'a> Lights<'a> {
         let allowed = TOLERANCE.point / (integrated.max(1) as f32).sqrt();
         let least = steps.value_of(allowed);
         Lights { emitters, integrated, scales, steps, tree, targets, ladders, obstacles, allowed, least }
+    }
+
+    /// Whether anything in trees may be in the way of light `index`, but for planes that are told row by row.
+    pub fn has_trees(&self, scene: &Scene, index: usize) -> bool {
+        let geometry = &scene.geometry;
+        let stops = |thing: &u32| geometry.stops(geometry.placed[*thing as usize].shadow, LightId(index as u32));
+        geometry.has_boxes() || !self.know(index, geometry.unbounded.iter().copied().filter(stops))
     }
 
     /// Whether all of these placed things are told row by row where they are in the way of light `index`.

@@ -11,8 +11,8 @@ use crate::accel::{HalfSpace, Planes};
 use crate::ids::SurfaceId;
 use crate::light::AreaShape;
 use crate::material::Bsdf;
-use crate::math::{DVec3, Ray, Vec3};
-use crate::scene::{At, Hit, Scene};
+use crate::math::{DVec3, Facet, Ray, Vec3};
+use crate::scene::{At, FewFacets, Hit, Opacity, PlacedSpot, Scene};
 use crate::shape::{Footprint, Parallelogram, RayDifferential, Sphere, SurfaceInteraction};
 
 /// Something that a block's rays may meet.
@@ -20,9 +20,13 @@ use crate::shape::{Footprint, Parallelogram, RayDifferential, Sphere, SurfaceInt
 pub(crate) enum Candidate {
     Sphere(u32),
     Parallelogram(u32),
+    /// A plane, as it is placed.
+    Plane(u32),
+    /// A flat facet of a mesh that all rays of a square are proved to see.
+    Facet(Facet),
     /// A light's shape.
     Light(u32),
-    /// All that lies in trees.
+    /// All that lies in trees, which has an end.
     Trees,
 }
 
@@ -103,6 +107,24 @@ impl Pyramid {
         self.sides.iter().zip(&self.corners).any(outside) || corners.iter().all(|q| self.depth(*q) < -slack)
     }
 
+    /// At each corner: how high over a plane the ray begins, and how much higher it is a metre on.
+    fn heights(&self, scene: &Scene, plane: u32) -> [[f64; 2]; 4] {
+        let (thing, plane) = scene.geometry.plane(plane);
+        let (_, normal) = plane.place();
+        let scale = 1.0 / thing.placement.normal(normal).length();
+        self.corners.each_ref().map(|ray| plane.approach(&thing.placement.ray(ray)).map(|height| height * scale))
+    }
+
+    /// Whether all rays lead away from a plane, from one side of it, or all begin in it.
+    fn misses_plane(&self, scene: &Scene, plane: u32) -> bool {
+        let heights = self.heights(scene, plane);
+        let side = heights[0][0].signum();
+        let leads_away = |(ray, [height, gain]): (&Ray, &[f64; 2])| {
+            height * side > f64::from(ray.o.abs().max_element()) * SLACK && gain * side > SLACK
+        };
+        heights.iter().all(|[height, _]| *height == 0.0) || self.corners.iter().zip(&heights).all(leads_away)
+    }
+
     /// Those of the listed shapes and lights that the rays may meet.
     pub fn candidates(&self, scene: &Scene, from: &[Candidate], into: &mut Vec<Candidate>) {
         into.clear();
@@ -110,6 +132,8 @@ impl Pyramid {
         into.extend(from.iter().filter(|candidate| match candidate {
             Candidate::Sphere(i) => !self.misses_sphere(&geometry.spheres[*i as usize].shape),
             Candidate::Parallelogram(i) => !self.misses_flat(&geometry.parallelograms[*i as usize].shape),
+            Candidate::Plane(i) => !self.misses_plane(scene, *i),
+            Candidate::Facet(_) => unreachable!("facets are found where they are"),
             Candidate::Light(i) => scene.lights[*i as usize].area().is_some_and(|area| match &area.shape {
                 AreaShape::Rectangle(rectangle) => !self.misses_flat(&rectangle.shape),
                 AreaShape::Sphere(sphere) => !self.misses_sphere(&sphere.shape),
@@ -142,6 +166,12 @@ impl Pyramid {
                 let flat = &scene.geometry.parallelograms[i as usize].shape;
                 depths(&|ray| flat.intersect(ray))
             }
+            Candidate::Plane(_) => depths(&|ray| candidate.intersect(scene, ray)),
+            Candidate::Facet(facet) => {
+                let flat = scene.geometry.facet(facet);
+                self.insides(&flat)?.as_flattened().iter().all(|inside| *inside > 0.0).then_some(())?;
+                depths(&|ray| flat.intersect(ray))
+            }
             Candidate::Sphere(i) => {
                 let sphere = &scene.geometry.spheres[i as usize].shape;
                 let inside = |ray: &Ray| (ray.o.as_dvec3() - sphere.c).length() <= sphere.r * (1.0 + SLACK);
@@ -153,6 +183,29 @@ impl Pyramid {
             }
             Candidate::Light(_) | Candidate::Trees => None,
         }
+    }
+
+    /// How far inside of each of its three sides the rays through the corners meet a facet's plane, in sizes of the
+    /// facet: below 0 if outside, and 0 where single precision leaves it open. `None` if not all meet the plane.
+    fn insides(&self, flat: &Parallelogram) -> Option<[[f64; 3]; 4]> {
+        let mut insides = [[0.0; 3]; 4];
+        for (inside, ray) in insides.iter_mut().zip(&self.corners) {
+            let (from, d) = (ray.o.as_dvec3() - flat.p, ray.d.as_dvec3());
+            let t = -flat.n.dot(from) / flat.n.dot(d);
+            if !(t > 0.0 && t < f64::INFINITY) {
+                return None;
+            }
+            let [u, v] = [flat.u_axis, flat.v_axis].map(|axis| (from + d * t).dot(axis));
+            let slack = (flat.u_axis.length() + flat.v_axis.length()) * t * SLACK;
+            *inside = [u, v, 1.0 - u - v].map(|w| if w.abs() > slack { w } else { 0.0 });
+        }
+        Some(insides)
+    }
+
+    /// Whether all rays pass a facet on one side of it.
+    fn misses_facet(&self, scene: &Scene, facet: Facet) -> bool {
+        let insides = self.insides(&scene.geometry.facet(facet));
+        insides.is_some_and(|insides| (0..3).any(|side| insides.iter().all(|inside| inside[side] < 0.0)))
     }
 
     /// The greatest depth at which a ray comes nearest to a point: where it meets a sphere around that from outside, it
@@ -189,12 +242,14 @@ impl Pyramid {
                 }
             }
             Candidate::Parallelogram(i) => self.nearest_flat(&scene.geometry.parallelograms[i as usize].shape),
+            Candidate::Plane(i) => self.nearest_plane(scene, i),
+            Candidate::Facet(facet) => self.nearest_flat(&scene.geometry.facet(facet)),
             Candidate::Light(i) => match scene.lights[i as usize].area().map(|area| &area.shape) {
                 Some(AreaShape::Rectangle(rectangle)) => self.nearest_flat(&rectangle.shape),
                 Some(AreaShape::Disk(_) | AreaShape::Sphere(_)) => f64::NEG_INFINITY,
                 None => f64::INFINITY,
             },
-            Candidate::Trees if scene.geometry.unbounded.is_empty() => {
+            Candidate::Trees => {
                 let (forward, planes) = (self.forward.as_dvec3(), self.planes());
                 let boxes = scene.geometry.tree_bounds().filter(|bounds| planes.may_meet(*bounds));
                 boxes.fold(f64::INFINITY, |nearest, bounds| {
@@ -202,7 +257,6 @@ impl Pyramid {
                     nearest.min(forward.max(DVec3::ZERO).dot(min) + forward.min(DVec3::ZERO).dot(max))
                 })
             }
-            Candidate::Trees => f64::NEG_INFINITY,
         }
     }
 
@@ -226,17 +280,39 @@ impl Pyramid {
         Some(nearest - nearest.abs() * SLACK)
     }
 
+    /// The same of a placed plane, also if only some of the rays meet it: those that begin on one side of it and do not
+    /// come nearer are as if they met it very far off.
+    fn nearest_plane(&self, scene: &Scene, plane: u32) -> f64 {
+        let heights = self.heights(scene, plane);
+        let side = heights[0][0].signum();
+        if !heights.iter().all(|[height, _]| height * side > 0.0) {
+            return f64::NEG_INFINITY;
+        }
+        let depths = self.corners.iter().zip(heights).map(|(ray, [height, gain])| {
+            let t = height * side / (-gain * side).max(SLACK * SLACK);
+            self.depth(ray.o.as_dvec3() + ray.d.as_dvec3() * t)
+        });
+        let nearest = depths.fold(f64::INFINITY, f64::min);
+        nearest - nearest.abs() * SLACK
+    }
+
     /// The one shape that all the rays see, if that is proved. `candidates` is all that they may meet.
     pub fn only(&self, scene: &Scene, candidates: &[Candidate]) -> Option<Candidate> {
-        candidates.iter().copied().enumerate().find_map(|(i, one)| {
-            let [_, far] = self.cover(scene, one)?;
-            let others = candidates.iter().enumerate().filter(|(j, _)| *j != i);
-            let mut behind = others.map(|(_, other)| match self.cover(scene, *other) {
-                Some([near, _]) => near,
-                None => self.nearest(scene, *other),
-            });
-            behind.all(|near| near > far + (far.abs() + near.abs()) * SLACK).then_some(one)
-        })
+        // Of what lies in trees few facets are candidates as others are
+        let mut facets = FewFacets::new();
+        let is_few = candidates.contains(&Candidate::Trees)
+            && scene.geometry.few_facets(scene.level, &self.planes(), &mut facets);
+        let others = candidates.iter().copied().filter(|other| !(is_few && *other == Candidate::Trees));
+        facets.retain(|facet| is_few && !self.misses_facet(scene, *facet));
+        let facets = facets.iter().map(|facet| Candidate::Facet(*facet));
+        let all = others.chain(facets);
+        let covers = all.clone().filter_map(|one| Some((one, self.cover(scene, one)?[1])));
+        let (one, far) = covers.min_by(|(_, one), (_, other)| one.total_cmp(other))?;
+        let mut behind = all.filter(|other| *other != one).map(|other| match self.cover(scene, other) {
+            Some([near, _]) => near,
+            None => self.nearest(scene, other),
+        });
+        behind.all(|near| near > far + (far.abs() + near.abs()) * SLACK).then_some(one)
     }
 }
 
@@ -250,7 +326,9 @@ pub(crate) fn all(scene: &Scene) -> Vec<Candidate> {
         let flats = &geometry.parallelograms;
         all.extend((0..flats.len()).filter(|i| flats[*i].seen).map(|i| Candidate::Parallelogram(i as u32)));
     }
-    all.extend(geometry.has_trees().then_some(Candidate::Trees));
+    let is_seen = |thing: &u32| geometry.placed[*thing as usize].camera != Opacity::Clear;
+    all.extend(geometry.unbounded.iter().copied().filter(is_seen).map(Candidate::Plane));
+    all.extend(geometry.has_boxes().then_some(Candidate::Trees));
     let visible = |i: &usize| scene.lights[*i].area().is_some_and(|area| area.visible);
     all.extend((0..scene.lights.len()).filter(visible).map(|i| Candidate::Light(i as u32)));
     all
@@ -272,6 +350,8 @@ impl Candidate {
         match self {
             Candidate::Sphere(i) => scene.geometry.spheres[i as usize].shape.intersect(ray),
             Candidate::Parallelogram(i) => scene.geometry.parallelograms[i as usize].shape.intersect(ray),
+            Candidate::Plane(i) => scene.geometry.meet_plane(i, ray),
+            Candidate::Facet(facet) => scene.geometry.facet(facet).intersect(ray),
             Candidate::Light(i) => scene.lights[i as usize].area()?.shape.intersect(ray),
             Candidate::Trees => unreachable!("what lies in trees is not one shape"),
         }
@@ -279,10 +359,11 @@ impl Candidate {
 
     /// The shape that a ray ends at, if it is one by itself.
     #[inline(always)]
-    pub fn of(hit: &Hit) -> Option<Candidate> {
+    pub fn of(scene: &Scene, hit: &Hit) -> Option<Candidate> {
         match hit.at {
             At::Sphere(i) => Some(Candidate::Sphere(i)),
             At::Parallelogram(i) => Some(Candidate::Parallelogram(i)),
+            At::Placed(i, PlacedSpot::Part(_)) if scene.geometry.is_plane(i) => Some(Candidate::Plane(i)),
             _ => None,
         }
     }
@@ -293,17 +374,21 @@ impl Candidate {
         match self {
             Candidate::Sphere(i) => scene.geometry.spheres[i as usize].surface,
             Candidate::Parallelogram(i) => scene.geometry.parallelograms[i as usize].surface,
+            Candidate::Plane(i) => scene.geometry.placed[i as usize].surface,
+            Candidate::Facet(facet) => scene.geometry.facet_surface(facet),
             Candidate::Light(i) => SurfaceId(scene.geometry.surfaces.len() as u32 + i),
             Candidate::Trees => unreachable!("what lies in trees is not one shape"),
         }
     }
 
-    /// What a ray ends at that meets it at `t`.
+    /// What `ray` ends at, which meets it at `t`.
     #[inline(always)]
-    pub fn hit_at(self, scene: &Scene, t: f64) -> Hit {
+    pub fn hit_at(self, scene: &Scene, ray: &Ray, t: f64) -> Hit {
         let at = match self {
             Candidate::Sphere(i) => At::Sphere(i),
             Candidate::Parallelogram(i) => At::Parallelogram(i),
+            Candidate::Plane(i) => At::Placed(i, PlacedSpot::Part(0)),
+            Candidate::Facet(facet) => scene.geometry.on_facet(facet, ray.o.as_dvec3() + ray.d.as_dvec3() * t),
             Candidate::Light(_) => At::Light,
             Candidate::Trees => unreachable!("what lies in trees is not one shape"),
         };
@@ -312,7 +397,7 @@ impl Candidate {
 
     /// What a ray that meets only this ends at.
     pub fn hit(self, scene: &Scene, ray: &Ray) -> Option<Hit> {
-        self.intersect(scene, ray).map(|t| self.hit_at(scene, t))
+        self.intersect(scene, ray).map(|t| self.hit_at(scene, ray, t))
     }
 
     /// The material of a square of pixels that see only this, in its middle.
@@ -383,7 +468,7 @@ impl Candidate {
     pub fn curvature(self, scene: &Scene) -> f32 {
         match self {
             Candidate::Sphere(i) => (1.0 / scene.geometry.spheres[i as usize].shape.r) as f32,
-            Candidate::Parallelogram(_) | Candidate::Light(_) | Candidate::Trees => 0.0,
+            _ => 0.0,
         }
     }
 }

@@ -17,8 +17,10 @@ use super::links::{LinkId, LinkSets};
 use super::occluders::Opacity;
 use crate::accel::{Aabb, Bvh};
 use crate::ids::{LightId, MaterialId, SurfaceId};
-use crate::math::{DAffine3, DVec3, Facet, Vec2};
-use crate::shape::{Mesh, Parallelogram, Placement, PointSet, ShadowTerminator, Solid, Sphere, TrianglePoint};
+use crate::math::{DAffine3, DVec3, Facet, Ray, Vec2};
+use crate::shape::{
+    Mesh, Parallelogram, Placement, PointSet, ShadowTerminator, Solid, Sphere, TrianglePoint, UnboundedPlane,
+};
 
 /// What a surface id stands for.
 #[derive(Clone, Debug)]
@@ -425,6 +427,33 @@ impl Geometry {
         light: LightId,
     ) -> bool {
         opacity == Opacity::Opaque || self.casts(SurfaceId(first.0 + mesh.part(triangle).surface), light)
+    }
+
+    /// One of the things that have no end: a plane, where it is placed.
+    #[inline(always)]
+    pub fn plane(&self, index: u32) -> (&Placed, &UnboundedPlane) {
+        let thing = &self.placed[index as usize];
+        if let PlacedTarget::Solid(solid) = thing.target
+            && let Solid::Plane(plane) = &self.solids[solid as usize]
+        {
+            return (thing, plane);
+        }
+        unreachable!("only planes have no end")
+    }
+
+    /// Whether something placed has no end.
+    #[inline(always)]
+    pub fn is_plane(&self, index: u32) -> bool {
+        let PlacedTarget::Solid(solid) = self.placed[index as usize].target else { return false };
+        matches!(self.solids[solid as usize], Solid::Plane(_))
+    }
+
+    /// How far along a camera ray it meets a plane.
+    #[inline(always)]
+    pub fn meet_plane(&self, index: u32, ray: &Ray) -> Option<f64> {
+        let (thing, plane) = self.plane(index);
+        let single_sided = self.surfaces[thing.surface.index()].single_sided;
+        plane.intersect(&thing.placement.ray(ray), 0.0, f64::INFINITY, single_sided).map(|hit| hit.t)
     }
 
     /// Every mesh, that of the world first.

@@ -51,13 +51,13 @@ use crate::material::Material;
 use crate::math::{DAffine3, DVec3};
 use crate::shape::ShadowTerminator;
 use crate::texture::Texture;
-pub(crate) use geometry::{At, Geometry, Nearest, ObjectSpace, Placed, PlacedTarget, UpperItem};
+pub(crate) use geometry::{At, Geometry, Nearest, ObjectSpace, Placed, PlacedSpot, PlacedTarget, UpperItem};
 pub(crate) use links::LinkId;
 use far::Extent;
 use motion::Motion;
 pub(crate) use occluders::{Listed, ListedOccluders, Opacity};
 use seen_lights::SeenLights;
-pub(crate) use trees::ShadowRays;
+pub(crate) use trees::{FewFacets, ShadowRays};
 
 /// A scene, ready to be rendered: flat lists and ids. Between here and the image nothing can fail.
 ///

@@ -1,25 +1,52 @@
 //! Rays through the trees of a scene: the mesh of the world, and all that is placed.
 
+use arrayvec::ArrayVec;
 use fearless_simd::{Level, f32x16, prelude::*};
 
 use super::geometry::{At, Geometry, Hit, Nearest, Placed, PlacedSpot, PlacedTarget, UpperItem};
 use super::occluders::Opacity;
 use crate::accel::{Aabb, Planes, RayPacket16, RayTile, TraceRay, dispatch_all, dispatch_eight, dispatch_sixteen};
 use crate::ids::{LightId, MaterialId, SurfaceId};
-use crate::math::{DVec3, Ray, ShadowRay, Vec3};
+use crate::math::{DVec3, Facet, Ray, ShadowRay, Vec3};
 use crate::shape::{
-    JoinedPart, LineLanes, Mesh, Placement, RayDifferential, ShadowTerminator, ShapePoint, SolidHit, TileHits,
-    TrianglePoint, bits, every,
+    JoinedPart, LineLanes, Mesh, Parallelogram, Placement, RayDifferential, ShadowTerminator, ShapePoint, SolidHit,
+    TileHits, TrianglePoint, bits, every,
 };
 
 /// So many meshes at the same place are asked for many rays at once, each for all of them.
 const FEW_MESHES: usize = 4;
 
+/// The most facets, and the most leaves of a mesh, that a square of pixels is asked for.
+const FEW_FACETS: usize = 8;
+const FEW_LEAVES: usize = 4;
+
+/// Facets of meshes.
+pub(crate) type FewFacets = ArrayVec<Facet, FEW_FACETS>;
+
+/// Finds the facets of a mesh that lie within `planes`, which are of its space, if they are few and flat.
+fn facets_within(level: Level, mesh: &Mesh, source: u32, planes: &Planes, found: &mut FewFacets) -> bool {
+    let mut leaves = 0;
+    let take = |leaf: u32| {
+        leaves += 1;
+        leaves <= FEW_LEAVES
+            && mesh.tree.leaf(leaf).all(|(triangle, corners)| {
+                planes.misses(&corners) || mesh.is_flat(triangle) && found.try_push(Facet { source, triangle }).is_ok()
+            })
+    };
+    dispatch_eight!(level, simd => mesh.tree.gather(simd, |center, half| planes.within(center, half).test(), take))
+}
+
 impl Geometry {
     /// Whether there is anything beside the lists.
     #[inline(always)]
     pub fn has_trees(&self) -> bool {
-        self.world.is_some() || !self.items.is_empty() || !self.unbounded.is_empty()
+        self.has_boxes() || !self.unbounded.is_empty()
+    }
+
+    /// The same, but for planes.
+    #[inline(always)]
+    pub fn has_boxes(&self) -> bool {
+        self.world.is_some() || !self.items.is_empty()
     }
 
     /// The boxes around all that lies in trees and has an end.
@@ -28,12 +55,10 @@ impl Geometry {
         self.world.iter().map(|world| world.mesh.tree.bounds()).chain(upper)
     }
 
-    /// Whether camera rays inside of `planes` may meet anything that lies in trees.
+    /// Whether camera rays inside of `planes` may meet anything that lies in trees and has an end.
     pub fn may_meet(&self, level: Level, planes: &Planes) -> bool {
-        let is_seen = |thing: &u32| self.placed[*thing as usize].camera != Opacity::Clear;
-        self.unbounded.iter().any(is_seen)
-            || self.tree_bounds().any(|bounds| planes.may_meet(bounds))
-                && dispatch_eight!(level, simd => self.reaches(simd, planes))
+        self.tree_bounds().any(|bounds| planes.may_meet(bounds))
+            && dispatch_eight!(level, simd => self.reaches(simd, planes))
     }
 
     #[inline(always)]
@@ -93,6 +118,69 @@ impl Geometry {
             (is_mesh && found.len() <= FEW_MESHES) || thing.camera == Opacity::Clear
         };
         dispatch_eight!(level, simd => self.upper.gather(simd, |center, half| planes.within(center, half).test(), take))
+    }
+
+    /// Finds the facets of meshes that camera rays inside of `planes` may meet, if they are few and flat, and all that
+    /// is there in trees.
+    pub fn few_facets(&self, level: Level, planes: &Planes, found: &mut FewFacets) -> bool {
+        let mut placed = Vec::new();
+        if !self.few_meshes(level, planes, &mut placed) {
+            return false;
+        }
+        let world = self.world.iter().filter(|world| world.camera != Opacity::Clear);
+        world
+            .into_iter()
+            .all(|world| world.camera == Opacity::Opaque && facets_within(level, &world.mesh, 0, planes, found))
+            && placed.into_iter().all(|index| {
+                let thing = &self.placed[index as usize];
+                let PlacedTarget::Mesh(mesh) = thing.target else { unreachable!("only meshes are asked so") };
+                let Placement { world_from_object, object_from_world } = &thing.placement;
+                let planes = planes.placed(world_from_object, object_from_world);
+                facets_within(level, &self.meshes[mesh as usize], index + 1, &planes, found)
+            })
+    }
+
+    /// The mesh of a facet, where it is placed, and the first of its surfaces.
+    fn mesh_of(&self, facet: Facet) -> (&Mesh, Option<&Placement>, SurfaceId) {
+        match facet.source.checked_sub(1) {
+            None => (&self.world.as_ref().expect("it has the facet").mesh, None, SurfaceId(0)),
+            Some(index) => {
+                let thing = &self.placed[index as usize];
+                let PlacedTarget::Mesh(mesh) = thing.target else { unreachable!("only meshes have facets") };
+                (&self.meshes[mesh as usize], Some(&thing.placement), thing.surface)
+            }
+        }
+    }
+
+    /// A facet as one half of a parallelogram: where u + v is at most 1.
+    pub fn facet(&self, facet: Facet) -> Parallelogram {
+        let (mesh, placement, _) = self.mesh_of(facet);
+        let [a, b, c] = mesh
+            .corners(facet.triangle)
+            .map(|q| placement.map_or(q, |placement| placement.world_from_object.transform_point3(q)));
+        Parallelogram::new(a, b - a, c - a, 1.0, false)
+    }
+
+    /// Where on a facet a point of it is.
+    pub fn on_facet(&self, facet: Facet, q: DVec3) -> At {
+        let Parallelogram { p, u_axis, v_axis, .. } = self.facet(facet);
+        let [u, v] = [u_axis, v_axis].map(|axis| (q - p).dot(axis) as f32);
+        let point = TrianglePoint { triangle: facet.triangle, u, v };
+        match facet.source.checked_sub(1) {
+            None => At::World(point),
+            Some(index) => At::Placed(index, PlacedSpot::Triangle(point)),
+        }
+    }
+
+    /// The surface of a facet.
+    pub fn facet_surface(&self, facet: Facet) -> SurfaceId {
+        let (mesh, _, first) = self.mesh_of(facet);
+        SurfaceId(first.0 + mesh.part(facet.triangle).surface)
+    }
+
+    /// Whether the corners of a facet have colours of their own.
+    pub fn has_colors(&self, facet: Facet) -> bool {
+        !self.mesh_of(facet).0.colors.is_empty()
     }
 
     /// What rays meet of a mesh that is placed, at most as far as `hits` says: which rays meet something nearer.

@@ -50,6 +50,7 @@ pub(crate) use disk::{Disk, DiskShadow};
 pub(crate) use mesh::{JoinedPart, Mesh, MeshBuilder, MeshSource, TrianglePoint};
 pub(crate) use parallelogram::{ParallelogramShadow, PlaneSide};
 pub(crate) use placement::Placement;
+pub(crate) use plane::UnboundedPlane;
 pub(crate) use point_set::PointSet;
 pub(crate) use solid::{Canonical, LineLanes, Solid, SolidHit};
 pub(crate) use sphere::SphereShadow;

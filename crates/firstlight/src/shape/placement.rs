@@ -5,7 +5,7 @@ use glam::{DAffine3, DMat3};
 use super::solid::{Solid, SolidHit, SolidPoint};
 use super::surface::{Footprint, RayDifferential, ShapePoint};
 use crate::color::Rgb;
-use crate::math::{DRay, DVec3, ErrorBound, Ray, UNIT_ROUNDOFF, Vec3};
+use crate::math::{DRay, DVec3, ErrorBound, Ray, UNIT_ROUNDOFF, Vec2, Vec3};
 
 /// From a thing's own space to the world, and back. In f64: what is far from the origin keeps its place.
 #[derive(Clone, Copy, Debug)]
@@ -81,8 +81,13 @@ impl Placement {
         let error = ErrorBound::of_rounded(p, self.terms(terms));
         let normal = self.normal(normal).normalize_or(DVec3::Y).as_vec3();
         // Steps on the surface as steps of uv
-        let steps = differential.on_plane(ray.d, hit.t as f32, normal, f32::MAX.sqrt() * 0.5);
-        let [dx, dy] = steps.map(|dp| at.uv_step(self.object_from_world.transform_vector3(dp.as_dvec3())).as_vec2());
+        let [dx, dy] = match differential.is_zero() {
+            true => [Vec2::ZERO; 2],
+            false => {
+                let steps = differential.on_plane(ray.d, hit.t as f32, normal, f32::MAX.sqrt() * 0.5);
+                steps.map(|dp| at.uv_step(self.object_from_world.transform_vector3(dp.as_dvec3())).as_vec2())
+            }
+        };
         ShapePoint {
             p,
             error,

@@ -50,14 +50,20 @@ impl PlaneDesc {
 const REACH: f64 = 1e9;
 
 impl UnboundedPlane {
+    /// How far in front of it a ray begins, and by how much it gains height with t.
+    #[inline(always)]
+    pub fn approach(&self, ray: &DRay) -> [f64; 2] {
+        [self.frame.z.dot(ray.o - self.point), self.frame.z.dot(ray.d)]
+    }
+
     #[inline(always)]
     pub fn intersect(&self, ray: &DRay, t_min: f64, t_max: f64, single_sided: bool) -> Option<SolidHit> {
-        let cos = self.frame.z.dot(ray.d);
+        let [height, cos] = self.approach(ray);
         if single_sided && cos >= 0.0 {
             return None;
         }
         let from = ray.o - self.point;
-        let t = -self.frame.z.dot(from) / cos;
+        let t = -height / cos;
         if !(t > t_min && t < t_max) {
             return None;
         }

@@ -62,7 +62,7 @@ const TOGETHER: usize = 64;
 
 impl Behind {
     pub fn new(scene: &Scene, lights: usize) -> Self {
-        let across = if scene.geometry.has_trees() { PIXELS * lights } else { 0 };
+        let across = if scene.geometry.has_boxes() { PIXELS * lights } else { 0 };
         Behind {
             known: Vec::new(),
             only: vec![NONE; PIXELS],
@@ -122,7 +122,7 @@ impl Cells<'_> {
     /// Finds out what rays see of the lights that are wanted, past what lies in trees. What is told by that is wanted
     /// no more.
     pub(super) fn behind(&mut self, counts: &mut Counts, go_on: &impl Fn() -> ControlFlow<()>) -> ControlFlow<()> {
-        if !self.scene.geometry.has_trees() {
+        if !self.scene.geometry.has_boxes() {
             return ControlFlow::Continue(());
         }
         self.begin_looking(counts);

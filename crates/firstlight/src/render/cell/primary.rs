@@ -11,6 +11,7 @@ use crate::render::solo::{Candidate, Pyramid};
 use crate::render::square::Square;
 use crate::render::{AaMode, Counts};
 use crate::scene::Scene;
+use crate::shape::RayDifferential;
 
 /// Pixels across the smallest squares that are asked whether they hold one surface.
 const SMALLEST: u32 = 2;
@@ -110,8 +111,10 @@ impl Cells<'_> {
                 continue;
             }
             let (ray, differential) = camera_ray(scene, i * n + at[0], j * n + at[1]);
+            // Footprints are for textures
+            let differential = if scene.textures.is_empty() { RayDifferential::default() } else { differential };
             let at = at.map(|at| at as u16);
-            match Candidate::of(&hit) {
+            match Candidate::of(scene, &hit) {
                 Some(shape) => {
                     let place = shapes.iter().position(|other| *other == shape).unwrap_or_else(|| {
                         shapes.push(shape);
@@ -195,7 +198,7 @@ impl Cells<'_> {
     /// Notes a square that is proved to see one shape.
     fn block(&mut self, square: Square, only: Candidate) {
         let scene = self.scene;
-        let even = self.fragments.plain.get(only).or_else(|| only.even(scene, square));
+        let even = self.fragments.plain.get(scene, only).or_else(|| only.even(scene, square));
         if even.is_none() && square.side > PATCHWORK {
             for quarter in square.quarters_on([scene.width, scene.height]) {
                 self.block(quarter, only);

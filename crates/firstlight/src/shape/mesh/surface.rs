@@ -104,6 +104,18 @@ impl Mesh {
         own.dot(self.face_normal(triangle)) < 0.0
     }
 
+    /// Whether all of a triangle has one normal, which is its own, and one colour.
+    pub fn is_flat(&self, triangle: u32) -> bool {
+        let [a, b, c] = self.triangles[triangle as usize].map(|i| i as usize);
+        let is_one = |list: &[[f32; 3]]| list.is_empty() || list[a] == list[b] && list[b] == list[c];
+        let is_own = || {
+            let n = Vec3::from(self.normals[a]).as_dvec3().normalize_or_zero();
+            let own = self.face_normal(triangle).normalize_or_zero();
+            n == DVec3::ZERO || (n * n.dot(own).signum() - own).abs().max_element() <= SAME_NORMAL
+        };
+        is_one(&self.normals) && is_one(&self.colors) && (self.normals.is_empty() || is_own())
+    }
+
     /// The part that a triangle belongs to.
     #[inline]
     pub fn part(&self, triangle: u32) -> &JoinedPart {
@@ -117,7 +129,7 @@ impl Mesh {
     }
 
     #[inline(always)]
-    fn corners(&self, triangle: u32) -> [DVec3; 3] {
+    pub fn corners(&self, triangle: u32) -> [DVec3; 3] {
         self.triangles[triangle as usize].map(|i| Vec3::from(self.positions[i as usize]).as_dvec3())
     }
 
