@@ -3,9 +3,9 @@
 //! Each scene is rendered twice, with and without the shadows of what lies in a plane: the pictures are the same. As
 //! described, and moved, turned and scaled by a matrix, so that nothing stays where digits end.
 
-use firstlight::{DVec3, Image, LightId, NoAssets, RenderSettings, Scene, SceneDesc, Vec3};
+use firstlight::{DVec3, Image, LightId, NoAssets, RenderSettings, SampleSet, Scene, SceneDesc, Vec3};
 
-use crate::converged::{displayed, integrated, traced};
+use crate::converged::{displayed, exact, traced, with_samples};
 use crate::scenes::*;
 
 /// Where a scene is put: how large it is, where to, and three axes.
@@ -174,10 +174,17 @@ fn compiled(text: &str) -> Scene {
     compile(&parsed.desc)
 }
 
-/// Three ways to render: lights integrated, sampled by the fast renderer, and by the plain one.
-fn ways() -> [(&'static str, RenderSettings); 3] {
-    let points = |settings: RenderSettings| RenderSettings { samples: Some(64.into()), ..settings };
-    [("integrated", integrated()), ("sampled", points(traced())), ("reference", points(RenderSettings::reference()))]
+/// The pictures of a scene by three renderers: lights integrated, sampled by the fast one, and by the plain one.
+fn pictures(text: &str) -> [(&'static str, Image); 3] {
+    let parsed = SceneDesc::parse("s.toml", text.as_bytes(), &NoAssets);
+    assert!(parsed.faults().is_empty(), "{:?}\n{text}", parsed.faults());
+    let sampled = compile(&with_samples(&parsed.desc, 64, SampleSet::Sobol, 1));
+    let plain = RenderSettings { reference: true, ..traced() };
+    [
+        ("integrated", exact(&parsed.desc)),
+        ("sampled", picture(&sampled, &traced())),
+        ("plain", picture(&sampled, &plain)),
+    ]
 }
 
 /// By how many display steps two pictures differ at most, and how bright the second is in the mean.
@@ -191,13 +198,15 @@ fn apart(scene: &Scene, one: &Image, other: &Image) -> (f64, f64) {
 
 /// That a scene is the same without the shadows of what is said with `shadows`.
 fn is_the_same_without(what: &str, text: &str) {
-    let [with, without] = ["true", "false"].map(|casts| compiled(&text.replace("SHADOWS", casts)));
-    for (how, settings) in ways() {
-        let (worst, mean) = apart(&with, &picture(&with, &settings), &picture(&without, &settings));
+    let [with, without] = ["true", "false"].map(|casts| pictures(&text.replace("SHADOWS", casts)));
+    let scene = compiled(&text.replace("SHADOWS", "true"));
+    for ((how, with), (_, without)) in with.iter().zip(&without) {
+        let (worst, mean) = apart(&scene, with, without);
         assert!(mean > 4.0, "{what}, {how}: it is dark anyway\n{text}");
-        let allowed = if how == "integrated" { 1.0 } else { 1e-4 };
+        let allowed = if *how == "integrated" { 1.0 } else { 1e-4 };
         assert!(worst <= allowed, "{what}, {how}: {worst} steps\n{text}");
     }
+    assert_eq!(bits(&with[1].1), bits(&with[2].1), "{what}: the two renderers differ\n{text}");
 }
 
 fn poses(random: &mut Random) -> [Pose; 3] {
@@ -258,8 +267,7 @@ fn what_stands_in_a_lights_way_still_does() {
                 flat(kind, pose, [0.0; 2], height, -1.0, 2.0, "", 1),
                 light("rectangle", pose, [0.0; 2], 2.0, 0.5, sides),
             ];
-            let scene = compiled(&text.concat());
-            ways().map(|(_, settings)| picture(&scene, &settings).pixels.iter().fold(0.0f32, |most, p| most.max(p[0])))
+            pictures(&text.concat()).map(|(_, image)| image.pixels.iter().fold(0.0f32, |most, p| most.max(p[0])))
         };
         let (below, above) = ([0.0, 1.0, 0.3], [0.0, 3.0, 0.3]);
         assert!(lit(2.0, below, "").iter().all(|most| *most > 0.05), "{kind}");

@@ -180,9 +180,7 @@ impl<'a> Obstacles<'a> {
     #[inline(always)]
     fn each(&self) -> impl Iterator<Item = (&Occluder, &ExactShape<'a>, LightSides, Touch, bool)> {
         let all = self.occluders.iter().zip(&self.exact).zip(self.sides.iter().zip(&self.touches)).enumerate();
-        all.map(|(i, ((occluder, exact), (sides, touch)))| {
-            (occluder, exact, *sides, *touch, self.cuts >> i & 1 == 1)
-        })
+        all.map(|(i, ((occluder, exact), (sides, touch)))| (occluder, exact, *sides, *touch, self.cuts >> i & 1 == 1))
     }
 
     /// Whether any reaches into a ball.

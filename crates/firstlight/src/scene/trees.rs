@@ -644,14 +644,7 @@ impl ShadowRays<'_> {
 /// another, as far as rounding allows to tell. `o` is the start in the space of the mesh, whose place is number
 /// `source`.
 #[inline(never)]
-fn starts_on(
-    mesh: &Mesh,
-    source: u32,
-    placement: Option<&Placement>,
-    ray: &ShadowRay,
-    o: Vec3,
-    triangle: u32,
-) -> bool {
+fn starts_on(mesh: &Mesh, source: u32, placement: Option<&Placement>, ray: &ShadowRay, o: Vec3, triangle: u32) -> bool {
     let error = || placement.map_or(ray.error.0.as_dvec3(), |placement| placement.error_in_object(ray.error));
     ray.but.of(source) == triangle || mesh.is_in_plane(triangle, o, error())
 }

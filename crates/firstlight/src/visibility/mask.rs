@@ -182,11 +182,7 @@ fn shadow_rays<'a, S: Simd>(
     let o = point.start.abs();
     let length = l[0].abs() + l[1].abs() + l[2].abs();
     let plane = from[0].to.plane;
-    let approach = if plane == Vec3::ZERO {
-        length
-    } else {
-        (l[0] * plane.x + l[1] * plane.y + l[2] * plane.z).abs()
-    };
+    let approach = if plane == Vec3::ZERO { length } else { (l[0] * plane.x + l[1] * plane.y + l[2] * plane.z).abs() };
     let end = -((length + (o.x + o.y + o.z)) / approach * (32.0 * UNIT_ROUNDOFF)) + 1.0;
     end.store_slice(&mut shadows.t_end);
     shadows
