@@ -222,12 +222,6 @@ pub struct Area {
 }
 
 impl Area {
-    /// The box around it: its least and its greatest corner, to within rounding.
-    pub(crate) fn bounds(&self) -> [DVec3; 2] {
-        let (middle, half) = (self.middle.as_dvec3(), self.half.as_dvec3());
-        [middle - half, middle + half]
-    }
-
     /// A point of it and the unit normal of its front, if all of it shines to that side alone.
     pub(crate) fn front(&self) -> Option<(DVec3, DVec3)> {
         match &self.shape {

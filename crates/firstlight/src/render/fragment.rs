@@ -516,6 +516,7 @@ impl Candidate {
     #[inline(always)]
     pub fn point(self, scene: &Scene, ray: &Ray, t: f64) -> ShadingPoint {
         turned(
+            scene,
             match self {
                 Candidate::Sphere(i) => scene.geometry.spheres[i as usize].shape.place(ray, t),
                 Candidate::Parallelogram(i) => scene.geometry.parallelograms[i as usize].shape.place(ray, t),
@@ -529,6 +530,7 @@ impl Candidate {
     /// The same for the point of it that is nearest to `q`, seen along `wo`; `q` is next to it on what is flat.
     fn point_near(self, scene: &Scene, q: DVec3, wo: Vec3) -> ShadingPoint {
         turned(
+            scene,
             match self {
                 Candidate::Sphere(i) => scene.geometry.spheres[i as usize].shape.nearest_place(q),
                 Candidate::Parallelogram(i) => scene.geometry.parallelograms[i as usize].shape.nearest_place(q),
@@ -622,7 +624,8 @@ const MAX_MEAN: usize = 64;
 
 /// A place with its normal on the viewer's side.
 #[inline(always)]
-fn turned((p, error, normal): (Vec3, ErrorBound, Vec3), wo: Vec3) -> ShadingPoint {
+fn turned(scene: &Scene, (p, error, normal): (Vec3, ErrorBound, Vec3), wo: Vec3) -> ShadingPoint {
+    let error = error.widened(scene.geometry.rounding);
     ShadingPoint::new(p, error, if normal.dot(wo) < 0.0 { -normal } else { normal }, wo)
 }
 

@@ -8,7 +8,7 @@ use super::{Scene, SceneDesc};
 use crate::camera::Projection;
 use crate::context::{CompileContext, show};
 use crate::light::{Area, LightDesc, LightKind, Spot};
-use crate::math::DVec3;
+use crate::math::{DVec3, UNIT_ROUNDOFF};
 use crate::parallel;
 use crate::shape::Solid;
 
@@ -33,6 +33,44 @@ pub(super) fn advise(cx: &mut CompileContext, scene: &Scene, desc: &SceneDesc) {
         advise_view(cx, scene, desc, &search);
     }
     advise_directions(cx, scene);
+    advise_digits(cx, scene);
+}
+
+/// Places are known well enough if they are known to this part of a pixel: no picture shows that, and no depth is worth
+/// more.
+const PART_OF_A_PIXEL: f64 = 1e-2;
+
+/// Advises if 32 bits are too few for much of what the camera sees.
+fn advise_digits(cx: &mut CompileContext, scene: &Scene) {
+    let (frame, [_, half]) = (scene.camera.frame(), scene.camera.film_half_size().map(f64::from));
+    let [across, down] = [scene.width, scene.height].map(|side| FEW_RAYS.min(side.into()));
+    let at = |i: u64, cells: u64, side: u32| ((i as f64 + 0.5) * f64::from(side) / cells as f64) as f32;
+    let place = |cell: u64| {
+        let (x, y) = (at(cell % across, across, scene.width), at(cell / across, down, scene.height));
+        let ray = scene.camera.local_ray(x, y, 1.0).0;
+        let hit = scene.intersect_local(&ray)?;
+        let p = ray.o.as_dvec3() + ray.d.as_dvec3() * hit.t;
+        // How wide a pixel is there
+        let depth = match scene.camera.projection() {
+            Projection::Perspective => frame.near + frame.forward.as_dvec3().dot(p - frame.start.as_dvec3()),
+            Projection::Orthographic => 1.0,
+        };
+        let rounding = p.abs().max_element() * f64::from(UNIT_ROUNDOFF);
+        Some([rounding, depth * 2.0 * half / f64::from(scene.height)])
+    };
+    let places: Vec<[f64; 2]> = (0..across * down).filter_map(place).collect();
+    let coarse = || places.iter().filter(|[rounding, pixel]| *rounding > PART_OF_A_PIXEL * pixel);
+    let Some([rounding, pixel]) = coarse().max_by(|a, b| (a[0] / a[1]).total_cmp(&(b[0] / b[1]))) else { return };
+    // Something that is in the way of the lens is not what the picture is about
+    if coarse().count() * 10 > places.len() {
+        let message = format!(
+            "it sees what is known to {rounding:.1e} m, where a pixel is {pixel:.1e} m wide: 32 bits have no more digits \
+             so far from where coordinates are counted"
+        );
+        let hint = "coordinates are counted from what the camera of the scene looks at: let its look_at be near to what \
+                    is seen, or move the scene to the origin";
+        cx.advise("camera", message, Some(hint));
+    }
 }
 
 /// Advises if a reflectance is more than all.
@@ -459,6 +497,34 @@ mod tests {
         let told = mesh("[[1, 2, 3], [2, 3, 4], [3, 4, 5]]");
         assert!(told[0].contains("none of its 1 triangles has an area"), "{told:?}");
         assert_eq!(mesh("[[1, 2, 3], [2, 3, 4], [3, 4, 6]]"), [""; 0]);
+    }
+
+    #[test]
+    fn too_few_digits_for_what_is_seen() {
+        // A ball at map coordinates, its camera, and what else there is
+        let map = |camera: &str, rest: &str| {
+            said(&format!(
+                "{LIGHT}[camera]\n{camera}\n[[sphere]]\ncenter = [450000, 120, -5400000]\nradius = 2\n{rest}"
+            ))
+        };
+        let near = "position = [450000, 123, -5399988]\nlook_at = [450000, 120, -5400000]";
+        let (marker, floor) = (
+            "[[sphere]]\ncenter = [0, 0, 0]\nradius = 1\n",
+            "[[disk]]\ncenter = [450000, 100, -5400000]\nradius = 1e5\n",
+        );
+        for rest in ["", marker, floor, "[[plane]]\n", &format!("{marker}{floor}[[plane]]\n")] {
+            assert_eq!(map(near, rest), [""; 0], "{rest}");
+        }
+        // It looks at a place far beyond, and sees the ball before it
+        let beyond = "position = [450000, 123, -5399988]\nlook_at = [450000, -4499877, -23399988]\nfov_y_deg = 20";
+        assert_eq!(map(beyond, ""), [""; 0]);
+        let told = map(beyond, marker);
+        assert!(told.len() == 1 && told[0].contains("32 bits have no more digits so far from"), "{told:?}");
+        // From far away a pixel is large
+        assert_eq!(
+            map("position = [0, 5e6, 0]\nlook_at = [0, 0, -1e6]\nup = [0, 0, -1]\nfov_y_deg = 120", marker),
+            [""; 0]
+        );
     }
 
     #[test]

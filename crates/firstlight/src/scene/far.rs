@@ -23,7 +23,7 @@ pub(crate) struct Extent {
 impl Extent {
     /// Around shapes and the lights that cameras see. `None` where nothing has an end.
     pub fn new(geometry: &Geometry, lights: &[Light]) -> Option<Extent> {
-        let lights = lights.iter().filter_map(Light::area).filter(|area| area.visible).map(|area| area.bounds());
+        let lights = lights.iter().filter_map(Light::area).filter(|area| area.visible).map(|area| area.shape.bounds());
         let [low, high] =
             geometry.bounds().into_iter().chain(lights).reduce(|a, b| [a[0].min(b[0]), a[1].max(b[1])])?;
         Some(Extent { middle: (low + high) * 0.5, radius: (high - low).length() * 0.5 })

@@ -83,9 +83,15 @@ fn a_shaft_leaves_out_no_box_that_a_way_to_the_light_meets() {
             *axis = (random.place(1.0) * unit * size).as_vec3();
         }
         let hull = if finite {
-            LightHull { center: at(random, reach), axes, finite, is_ball: false }
+            LightHull { center: at(random, reach), axes, finite, is_ball: false, plane: Vec3::ZERO }
         } else {
-            LightHull { center: random.direction().as_vec3(), axes: [Vec3::ZERO; 3], finite, is_ball: false }
+            LightHull {
+                center: random.direction().as_vec3(),
+                axes: [Vec3::ZERO; 3],
+                finite,
+                is_ball: false,
+                plane: Vec3::ZERO,
+            }
         };
         let bounds = points.iter().fold(Aabb::EMPTY, |bounds, p| bounds.with(*p));
         let mut shaft = Shaft::between(bounds, &hull, Vec3::ZERO);
