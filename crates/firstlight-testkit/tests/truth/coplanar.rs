@@ -163,7 +163,8 @@ fn light(kind: &str, pose: &Pose, [x, z]: [f64; 2], y: f64, size: f64, rest: &st
 
 fn camera_at(pose: &Pose, eye: V, at: V, size: u32) -> String {
     format!(
-        "[render]\nwidth = {size}\nheight = {size}\nantialiasing = 2\n[camera]\nposition = {eye:?}\nlook_at = {at:?}\nup = [0, 0.1, 1]\nfov_y_deg = 50\n{}",
+        "[render]\nwidth = {size}\nheight = {size}\nantialiasing = 2\n[camera]\nposition = {eye:?}\nlook_at = {at:?}\n\
+         up = [0, 0.1, 1]\nfov_y_deg = 50\n{}",
         pose.field()
     )
 }

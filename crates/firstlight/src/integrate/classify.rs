@@ -531,8 +531,8 @@ pub(crate) fn classify<S: Simd>(
 }
 
 /// On which sides of the plane of a flat light something is, as bits: whether a thing reaches into the front and into
-/// the back by more than rounding, or which points are there. What lies in the plane, or behind it as seen from a point,
-/// hides nothing of the light from that point. Of other lights both sides are all of space.
+/// the back by more than rounding, or which points are there. What lies in the plane, or behind it as seen from a
+/// point, hides nothing of the light from that point. Of other lights both sides are all of space.
 #[derive(Clone, Copy, Debug)]
 struct LightSides {
     front: u64,

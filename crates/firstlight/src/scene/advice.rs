@@ -64,11 +64,11 @@ fn advise_digits(cx: &mut CompileContext, scene: &Scene) {
     // Something that is in the way of the lens is not what the picture is about
     if coarse().count() * 10 > places.len() {
         let message = format!(
-            "it sees what is known to {rounding:.1e} m, where a pixel is {pixel:.1e} m wide: 32 bits have no more digits \
-             so far from where coordinates are counted"
+            "it sees what is known to {rounding:.1e} m, where a pixel is {pixel:.1e} m wide: 32 bits have no more \
+             digits so far from where coordinates are counted"
         );
-        let hint = "coordinates are counted from what the camera of the scene looks at: let its look_at be near to what \
-                    is seen, or move the scene to the origin";
+        let hint = "coordinates are counted from what the camera of the scene looks at: let its look_at be near to \
+                    what is seen, or move the scene to the origin";
         cx.advise("camera", message, Some(hint));
     }
 }
@@ -521,10 +521,8 @@ mod tests {
         let told = map(beyond, marker);
         assert!(told.len() == 1 && told[0].contains("32 bits have no more digits so far from"), "{told:?}");
         // From far away a pixel is large
-        assert_eq!(
-            map("position = [0, 5e6, 0]\nlook_at = [0, 0, -1e6]\nup = [0, 0, -1]\nfov_y_deg = 120", marker),
-            [""; 0]
-        );
+        let above = "position = [0, 5e6, 0]\nlook_at = [0, 0, -1e6]\nup = [0, 0, -1]\nfov_y_deg = 120";
+        assert_eq!(map(above, "[[disk]]\ncenter = [0, 0, 0]\nradius = 1e7\n"), [""; 0]);
     }
 
     #[test]

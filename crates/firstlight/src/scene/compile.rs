@@ -7,7 +7,7 @@ use std::sync::Arc;
 use fearless_simd::Level;
 
 use super::advice::{advise, advise_reflectance};
-use super::far::{Extent, approach};
+use super::far::{SceneBall, approach};
 use super::geometry::Geometry;
 use super::model::{Added, Framing};
 use super::occluders::ListedOccluders;
@@ -127,7 +127,7 @@ impl SceneDesc {
             return None;
         };
         let occluders = ListedOccluders::new(&geometry, &lights);
-        let extent = Extent::new(&geometry, &lights);
+        let extent = SceneBall::new(&geometry, &lights);
         let camera = approach(camera, [picture.width, picture.height], &geometry, extent.as_ref());
         let summary = SceneSummary {
             bounds: bounds.map(|bounds| bounds.map(|corner| corner.to_array())),

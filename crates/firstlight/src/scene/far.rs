@@ -15,18 +15,18 @@ const FAR: f64 = 64.0;
 
 /// A ball around all that rays can meet but for planes, in the scene's own coordinates: its middle and its radius.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Extent {
+pub(crate) struct SceneBall {
     middle: DVec3,
     radius: f64,
 }
 
-impl Extent {
+impl SceneBall {
     /// Around shapes and the lights that cameras see. `None` where nothing has an end.
-    pub fn new(geometry: &Geometry, lights: &[Light]) -> Option<Extent> {
+    pub fn new(geometry: &Geometry, lights: &[Light]) -> Option<SceneBall> {
         let lights = lights.iter().filter_map(Light::area).filter(|area| area.visible).map(|area| area.shape.bounds());
         let [low, high] =
             geometry.bounds().into_iter().chain(lights).reduce(|a, b| [a[0].min(b[0]), a[1].max(b[1])])?;
-        Some(Extent { middle: (low + high) * 0.5, radius: (high - low).length() * 0.5 })
+        Some(SceneBall { middle: (low + high) * 0.5, radius: (high - low).length() * 0.5 })
     }
 
     /// How far from `o` along `d`, a unit vector, all of it begins; `None` unless that is far.
@@ -54,7 +54,7 @@ pub(super) fn approach(
     camera: Camera,
     [width, height]: [u32; 2],
     geometry: &Geometry,
-    extent: Option<&Extent>,
+    extent: Option<&SceneBall>,
 ) -> Camera {
     let frame = camera.frame();
     let Some((extent, near)) = extent.and_then(|extent| {

@@ -51,7 +51,7 @@ use crate::material::Material;
 use crate::math::{DAffine3, DVec3};
 use crate::shape::ShadowTerminator;
 use crate::texture::Texture;
-use far::Extent;
+use far::SceneBall;
 pub(crate) use geometry::{At, Geometry, Nearest, ObjectSpace, Placed, PlacedSpot, PlacedTarget, UpperItem};
 pub(crate) use links::LinkId;
 use motion::Motion;
@@ -91,7 +91,7 @@ pub struct Scene {
     /// What is listed and stands in the way of light.
     pub(crate) occluders: ListedOccluders,
     /// Around all that rays can meet but for planes.
-    pub(crate) extent: Option<Extent>,
+    pub(crate) extent: Option<SceneBall>,
     /// The best instruction set of this processor: for rays that are asked for one at a time.
     pub(crate) level: Level,
     pub(crate) hash: String,

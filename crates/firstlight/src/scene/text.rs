@@ -140,14 +140,14 @@ impl SceneDesc {
     /// includes them. The lists of the description come in scene order: kinds in the order of their enums, then the
     /// order of the text, included files first.
     pub fn parse(name: &str, text: &[u8], assets: &dyn Assets) -> Parsed {
-        if text.strip_prefix(BYTE_ORDER_MARK).unwrap_or(text).trim_ascii().is_empty() {
-            return Parsed::no_scene(name, "is empty", "a scene is TOML or JSON text; an empty one is `{}`");
-        }
         if let Some(foreign) = foreign(text, WantedFile::Scene) {
             return Parsed::no_scene(name, &foreign.message(WantedFile::Scene), foreign.hint(WantedFile::Scene));
         }
         if course::is_course(name, text) {
             return course::parse(name, text);
+        }
+        if text.strip_prefix(BYTE_ORDER_MARK).unwrap_or(text).trim_ascii().is_empty() {
+            return Parsed::no_scene(name, "is empty", "a scene is TOML or JSON text; an empty one is `{}`");
         }
         load::load(name, text, assets)
     }
@@ -332,11 +332,11 @@ mod tests {
         let row = |i: usize| if i == 99 { odd.to_owned() } else { format!("[{i}, {}.5, -1e-3]", i % 7) };
         let rows: Vec<String> = (0..10_000).map(row).collect();
         let toml = format!(
-            "[[mesh]]\ntriangles = [[0, 1, 2]]\npositions = [ # many\n{},\n]\nname = \"m\"\n",
+            "[[mesh]]\ntriangles = [[0, 1, 99]]\npositions = [ # many\n{},\n]\nname = \"m\"\n",
             rows.join(",\n")
         );
         let json = format!(
-            "{{ \"mesh\": [{{\"triangles\": [[0, 1, 2]],\n\"positions\": [{}],\n\"name\": \"m\" }}] }}",
+            "{{ \"mesh\": [{{\"triangles\": [[0, 1, 99]],\n\"positions\": [{}],\n\"name\": \"m\" }}] }}",
             rows.join(",\n")
         );
         [("s.toml", toml), ("s.json", json)]

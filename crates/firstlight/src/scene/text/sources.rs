@@ -323,7 +323,7 @@ mod tests {
 
     #[test]
     fn what_is_no_text_is_not_quoted() {
-        for (text, excerpt) in [(&b"a = \"caf\xe9\""[..], "a = \"caf\u{fffd}\""), (b"\x80\x81\x82= 1", "")] {
+        for (text, excerpt) in [(&b"a = \"caf\xe9\""[..], "a = \"caf\u{fffd}\""), (b"\x80\x81\x82\x83= 1", "")] {
             let parsed = SceneDesc::parse("s.toml", text, &NoAssets);
             let [fault] = parsed.faults() else { panic!("{:?}", parsed.faults()) };
             assert!(fault.message.contains("is not UTF-8"), "{fault}");

@@ -51,6 +51,10 @@ impl SceneDesc {
         for light in in_order(&self.lights, Family::kind_index) {
             table(format!("[[light.{}]]", kind_name(light)), light.write());
         }
+        if out.is_empty() {
+            // A file without anything in it is no scene
+            out.push_str("# A scene without anything in it\n");
+        }
         out
     }
 

@@ -129,8 +129,8 @@ pub(crate) fn can_be_hit(positions: &[[f32; 3]], triangle: &[u32; 3]) -> bool {
     corners(positions, triangle).is_some_and(|corners| corners.iter().all(|corner| corner.is_finite()))
 }
 
-/// Whether a shadow ray that starts at `o`, lifted off a surface point that may be wrong by `error`, starts in the plane
-/// of a triangle, as far as rounding allows to tell. All in the space of the mesh.
+/// Whether a shadow ray that starts at `o`, lifted off a surface point that may be wrong by `error`, starts in the
+/// plane of a triangle, as far as rounding allows to tell. All in the space of the mesh.
 ///
 /// Seen from o, the corners a, b, c span a volume V = n.a, n = (b - a) x (c - a), that is 0 in the plane. A corner that
 /// moves by r changes it by no more than r times the area that the other two span with o. So a small triangle, whose
