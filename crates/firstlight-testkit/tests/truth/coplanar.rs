@@ -63,6 +63,7 @@ const KINDS: [&str; 12] = [
 
 /// A shape whose face at height `y` faces up or down, and reaches `size` from (x, z); `rest` is said of it too. Meshes
 /// are described where they are, as files have them; `number` keeps names of groups apart.
+#[allow(clippy::too_many_arguments, reason = "a face, where it is, and what is said of it")]
 fn flat(kind: &str, pose: &Pose, [x, z]: [f64; 2], y: f64, up: f64, size: f64, rest: &str, number: u32) -> String {
     let (below, depth) = (y - up * 0.3, 0.3);
     let at = |p: V| {
