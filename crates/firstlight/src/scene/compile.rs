@@ -127,8 +127,8 @@ impl SceneDesc {
             return None;
         };
         let occluders = ListedOccluders::new(&geometry, &lights);
-        let extent = SceneBall::new(&geometry, &lights);
-        let camera = approach(camera, [picture.width, picture.height], &geometry, extent.as_ref());
+        let ball = SceneBall::new(&geometry, &lights);
+        let camera = approach(camera, [picture.width, picture.height], &geometry, ball.as_ref());
         let summary = SceneSummary {
             bounds: bounds.map(|bounds| bounds.map(|corner| corner.to_array())),
             ..self.summary(desc, &geometry, &lights, &textures)
@@ -151,7 +151,7 @@ impl SceneDesc {
             light_spaces: desc.light_spaces(time, origin),
             materials,
             occluders,
-            extent,
+            ball,
             level: Level::new(),
             buffers,
             choices: Choices {
@@ -402,7 +402,7 @@ impl Scene {
             return Err(SceneError { faults: cx.take_faults() });
         }
         let mut scene = self.clone();
-        scene.camera = approach(compiled, [self.width, self.height], &self.geometry, self.extent.as_ref());
+        scene.camera = approach(compiled, [self.width, self.height], &self.geometry, self.ball.as_ref());
         scene.time = self.time.or(cx.keyed.then_some(self.moment));
         scene.summary.camera = String::new();
         scene.motion = self.motion.as_ref().map(|motion| motion.with_camera(camera)).transpose()?;

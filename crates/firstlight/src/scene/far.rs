@@ -5,7 +5,7 @@
 //! scene does: the way up to there is computed in 64 bits.
 
 use super::Scene;
-use super::geometry::{Geometry, PlacedTarget};
+use super::geometry::Geometry;
 use crate::camera::Camera;
 use crate::light::Light;
 use crate::math::{DVec3, Ray, WorldRay};
@@ -40,9 +40,8 @@ impl Geometry {
     /// Whether no plane lies between some places: all are on the same side of each.
     fn is_open_between(&self, places: &[DVec3]) -> bool {
         self.unbounded.iter().all(|thing| {
-            let thing = &self.placed[*thing as usize];
-            let PlacedTarget::Solid(solid) = thing.target else { return false };
-            let Some((point, normal)) = self.solids[solid as usize].plane() else { return false };
+            let (thing, plane) = self.plane(*thing);
+            let (point, normal) = plane.place();
             let height = |q: &DVec3| normal.dot(thing.placement.object_from_world.transform_point3(*q) - point);
             places.iter().all(|q| height(q) > 0.0) || places.iter().all(|q| height(q) < 0.0)
         })
@@ -54,12 +53,12 @@ pub(super) fn approach(
     camera: Camera,
     [width, height]: [u32; 2],
     geometry: &Geometry,
-    extent: Option<&SceneBall>,
+    ball: Option<&SceneBall>,
 ) -> Camera {
     let frame = camera.frame();
-    let Some((extent, near)) = extent.and_then(|extent| {
+    let Some((ball, near)) = ball.and_then(|ball| {
         let eye = frame.position - frame.origin;
-        Some((extent, extent.begins(eye, frame.sight)?))
+        Some((ball, ball.begins(eye, frame.sight)?))
     }) else {
         return camera;
     };
@@ -68,7 +67,7 @@ pub(super) fn approach(
         [(0.0, 0.0), (w, 0.0), (w, h), (0.0, h)].map(|(x, y)| camera.local_ray(x, y, 1.0).0.o.as_dvec3())
     };
     // Before all planes, which may cut the film where it is nearest
-    let nearer = [0.0, 4.0, 16.0, 64.0].map(|radii| camera.starting_at(near - radii * extent.radius));
+    let nearer = [0.0, 4.0, 16.0, 64.0].map(|radii| camera.starting_at(near - radii * ball.radius));
     let is_open = |nearer: &Camera| geometry.is_open_between(&[corners(&camera), corners(nearer)].concat());
     nearer.into_iter().find(is_open).unwrap_or(camera)
 }
@@ -78,7 +77,7 @@ impl Scene {
     #[inline]
     pub(crate) fn enter(&self, ray: &WorldRay) -> (Ray, f64) {
         let (o, d) = (ray.o - self.origin, ray.d.as_dvec3());
-        let way = self.extent.as_ref().and_then(|extent| extent.begins(o, d));
+        let way = self.ball.as_ref().and_then(|ball| ball.begins(o, d));
         let way = way.filter(|way| self.geometry.is_open_between(&[o, o + d * *way])).unwrap_or(0.0);
         (Ray { o: (o + d * way).as_vec3(), d: ray.d }, way)
     }

@@ -91,7 +91,7 @@ pub struct Scene {
     /// What is listed and stands in the way of light.
     pub(crate) occluders: ListedOccluders,
     /// Around all that rays can meet but for planes.
-    pub(crate) extent: Option<SceneBall>,
+    pub(crate) ball: Option<SceneBall>,
     /// The best instruction set of this processor: for rays that are asked for one at a time.
     pub(crate) level: Level,
     pub(crate) hash: String,
