@@ -343,3 +343,25 @@ fn visible_fractions_and_many_lights_know_lights_in_walls() {
         }
     }
 }
+
+#[test]
+fn renderers_agree_right_below_the_plane_of_a_light() {
+    // Balls in a tree and in a list, plates and a mesh stand between; rays to the light are all but parallel to it
+    let random = &mut Random::new(5);
+    for (count, depth) in [(8, 1e-4), (60, 1e-4), (60, 1e-5), (60, 1e-2)] {
+        let pose = &Pose::HERE;
+        let mut text = camera_at(pose, [0.0, 4.0, 0.01], [0.0, 2.0, 0.0], 24);
+        text += &flat("parallelogram", pose, [0.0; 2], 2.0 - depth, 1.0, 3.0, "", 0);
+        for _ in 0..count {
+            let [x, y, z] = random.vector(1.0);
+            text +=
+                &format!("[[sphere]]\ncenter = [{:?}, {:?}, {:?}]\nradius = 0.1\n", 2.0 * x, 2.0 + 0.1 * y, 2.0 * z);
+        }
+        text += &flat("box", pose, [1.2, 0.3], 2.1, 1.0, 0.1, "", 1);
+        text += &flat("mesh box", pose, [-1.1, 0.6], 2.1, 1.0, 0.1, "", 2);
+        text += &light("rectangle", pose, [0.0; 2], 2.0, 0.5, "sides = \"both\"\nvisible = false\n");
+        let [_, (_, fast), (_, plain)] = pictures(&text);
+        assert_eq!(bits(&fast), bits(&plain), "{count} balls, {depth} m");
+        assert!(fast.pixels.iter().any(|pixel| pixel[0] > 0.0), "{count} balls, {depth} m: all is dark");
+    }
+}

@@ -11,6 +11,7 @@ mod coplanar;
 mod coverage;
 mod determinism;
 mod deviations;
+mod distances;
 mod exact;
 mod geometry;
 mod known;

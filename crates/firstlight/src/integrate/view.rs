@@ -84,7 +84,7 @@ impl FlatLight {
     }
 
     /// How far from its plane, in metres, things are told to be in front of it or behind it: the rounding of its points
-    /// in f32, as [`ShadowRay::end`](crate::math::ShadowRay) allows for it.
+    /// in f32.
     pub fn rounding(&self) -> f64 {
         let reach = self.c.abs() + self.deep[0].abs() + self.deep[1].abs();
         reach.element_sum() * f64::from(32.0 * UNIT_ROUNDOFF)

@@ -22,8 +22,8 @@ pub(crate) fn origin_for([low, high]: [DVec3; 2]) -> DVec3 {
     rounded(center, size)
 }
 
-/// A camera that is nearer to what it looks at than this part of that place's distance from the origin looks at
-/// something far: 32 bits would tell apart less than a thousandth of a pixel there.
+/// What a camera looks at is far from the origin if it is farther from there than this many times the distance of the
+/// camera: 32 bits do not resolve a thousandth of a pixel there.
 const FAR_VIEW: f64 = 8.0;
 
 /// What to take off every coordinate of a scene whose shapes are best counted from `of_shapes`, and whose camera, at

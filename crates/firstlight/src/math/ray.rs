@@ -93,7 +93,7 @@ impl ErrorBound {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct LightEnd {
     pub light: LightId,
-    /// Unit normal of the plane that all of the light lies in, on either side; 0 of a light that is not flat.
+    /// Unit normal of the plane that all of the light lies in, of either sign; 0 of a light that is not flat.
     pub plane: Vec3,
 }
 
@@ -153,8 +153,8 @@ impl ShadowRay {
         self.t_max == 1.0
     }
 
-    /// Where the way ends for what has no bound of its own at the light: short of what the light lies on, by the
-    /// rounding of both ends. What lies in the plane of a flat light hides none of it, so there that is a distance from
+    /// The ray's `t_max` for tests that have no margin of their own at the light: short of what the light lies on, by
+    /// the rounding of both ends. What lies in the plane of a flat light hides none of it, so there that is a distance from
     /// the plane, however flat the ray meets it.
     #[inline(always)]
     pub(crate) fn end(&self) -> f32 {

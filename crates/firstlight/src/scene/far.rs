@@ -10,7 +10,7 @@ use crate::camera::Camera;
 use crate::light::Light;
 use crate::math::{DVec3, Ray, WorldRay};
 
-/// What is farther away than so many times the size of the scene is far.
+/// A scene is far away if it begins more than this many of its radii away.
 const FAR: f64 = 64.0;
 
 /// A ball around all that rays can meet but for planes, in the scene's own coordinates: its middle and its radius.
@@ -29,9 +29,10 @@ impl SceneBall {
         Some(SceneBall { middle: (low + high) * 0.5, radius: (high - low).length() * 0.5 })
     }
 
-    /// How far from `o` along `d`, a unit vector, all of it begins; `None` unless that is far.
+    /// How far along a line from `o`, in lengths of `d`, which is a unit vector as far as 32 bits tell, the plane is that
+    /// is perpendicular to `d` and touches the near side of the ball; `None` unless that is far.
     fn begins(&self, o: DVec3, d: DVec3) -> Option<f64> {
-        let ahead = d.dot(self.middle - o) - self.radius;
+        let ahead = (d.dot(self.middle - o) - self.radius * d.length()) / d.length_squared();
         (ahead > FAR * self.radius).then_some(ahead)
     }
 }
@@ -66,7 +67,7 @@ pub(super) fn approach(
         let (w, h) = (width as f32, height as f32);
         [(0.0, 0.0), (w, 0.0), (w, h), (0.0, h)].map(|(x, y)| camera.local_ray(x, y, 1.0).0.o.as_dvec3())
     };
-    // Before all planes, which may cut the film where it is nearest
+    // A step back, until no infinite plane cuts the near film
     let nearer = [0.0, 4.0, 16.0, 64.0].map(|radii| camera.starting_at(near - radii * ball.radius));
     let is_open = |nearer: &Camera| geometry.is_open_between(&[corners(&camera), corners(nearer)].concat());
     nearer.into_iter().find(is_open).unwrap_or(camera)

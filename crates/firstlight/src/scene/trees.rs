@@ -338,7 +338,8 @@ impl Geometry {
         if self.items.is_empty() {
             return false;
         }
-        self.upper.any(simd, &TraceRay::new(o, ray.l), t_end, |item| match self.items[item as usize] {
+        // Spheres and parallelograms have margins of their own at the light: only what is in placed things ends before
+        self.upper.any(simd, &TraceRay::new(o, ray.l), ray.t_max, |item| match self.items[item as usize] {
             UpperItem::Sphere(i) => {
                 let sphere = &self.spheres[i as usize];
                 self.casts(sphere.surface, ray.to.light)
@@ -603,7 +604,7 @@ impl Geometry {
 
 /// Sixteen rays from one surface, or from sixteen places, towards a light, each ending at a point of it.
 pub(crate) struct ShadowRays<'a> {
-    /// The surface they leave, one for all of them or one for each: `l` and `t_max` are of no account.
+    /// The surface they leave, one for all of them or one for each; `l` is ignored.
     pub from: &'a [ShadowRay],
     /// Origins and ways, as the trees want them.
     pub rays: RayPacket16,
@@ -700,7 +701,8 @@ impl Geometry {
         if self.items.is_empty() || active & !done == 0 {
             return done;
         }
-        done | self.upper.any16(simd, &shadows.rays, &shadows.t_end, active & !done, |item, asking| {
+        let whole = [shadows.from[0].t_max; 16];
+        done | self.upper.any16(simd, &shadows.rays, &whole, active & !done, |item, asking| {
             let one_by_one = |blocks: &dyn Fn(&ShadowRay) -> bool| {
                 lanes(asking).filter(|lane| blocks(&shadows.ray(*lane))).fold(0, |mask, lane| mask | 1 << lane)
             };

@@ -133,15 +133,16 @@ pub(crate) fn can_be_hit(positions: &[[f32; 3]], triangle: &[u32; 3]) -> bool {
 /// plane of a triangle, as far as rounding allows to tell. All in the space of the mesh.
 ///
 /// Seen from o, the corners a, b, c span a volume V = n.a, n = (b - a) x (c - a), that is 0 in the plane. A corner that
-/// moves by r changes it by no more than r times the area that the other two span with o. So a small triangle, whose
-/// plane its corners hardly decide, is in one plane with more points than a large one.
+/// moves by r changes it by no more than r times the area that the other two span with o, and o by |n| r. So the
+/// tolerance grows as triangles get smaller or farther away: their corners hardly decide their plane.
 pub(crate) fn is_in_plane(corners: [DVec3; 3], o: DVec3, error: DVec3) -> bool {
-    let largest = corners.iter().fold(o.abs(), |largest, q| largest.max(q.abs())).max_element();
+    let largest = corners.iter().fold(DVec3::ZERO, |largest, q| largest.max(q.abs())).max_element();
     let [a, b, c] = corners.map(|q| q - o);
     let n = (b - a).cross(c - a);
     let areas = b.cross(c).length() + c.cross(a).length() + a.cross(b).length();
+    let rounding = (areas * largest + n.length() * o.abs().max_element()) * CORNER_ROUNDING;
     // The start is off the point by the lift, and the point off the surface by its error
-    n.dot(a).abs() <= areas * largest * CORNER_ROUNDING + 2.0 * n.abs().dot(error)
+    n.dot(a).abs() <= rounding + 2.0 * n.abs().dot(error)
 }
 
 /// How far a corner may be off where it was meant to be, in its largest coordinate: two ulps in f32.

@@ -388,8 +388,9 @@ impl TriangleTree {
         if keep == 0 {
             return false;
         }
-        // Nor do those that the rays start in the plane of. A bound on what is allowed there leaves few to look at
-        let largest = far_off + eye.o.abs().max_element();
+        // Nor do those that the rays start in the plane of: an upper bound on the tolerance of that test leaves few to
+        // ask. Each area is at most 3 far_off side, |n| 6 far_off side
+        let largest = far_off + 1.6 * eye.o.abs().max_element();
         let allowed = largest * far_off * side * (10.0 * CORNER_ROUNDING as f32)
             + area * (2.1 * eye.error.max_element() as f32)
             + wrong;
