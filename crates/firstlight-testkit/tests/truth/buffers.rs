@@ -101,7 +101,7 @@ pub fn floats(film: &Film, of: impl Into<Buffer>) -> &[f32] {
     }
 }
 
-fn wholes(film: &Film, plane: Plane) -> &[u32] {
+pub fn wholes(film: &Film, plane: Plane) -> &[u32] {
     match film.numbers(plane) {
         Some(PlaneNumbers::Wholes(numbers)) => numbers,
         other => panic!("{plane:?}: {other:?}"),

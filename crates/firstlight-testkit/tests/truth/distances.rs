@@ -53,7 +53,7 @@ fn cameras_see_the_same_from_all_distances() {
                     let text = format!(
                         "[render]\nwidth = {SIDE}\nheight = {SIDE}\n[camera]\nposition = {position:?}\n{lens}\
                          [[sphere]]\ncenter = [0, 0, 0]\nradius = 1\n\
-                         [[mesh]]\npositions = [[-1, 1, 0], [1, 1, 0], [0, 1.4, 0]]\ntriangles = [[0, 1, 2]]\n{more}"
+                         [[mesh]]\npositions = [[-1.4, 1.1, 0], [-1.1, 1.1, 0], [-1.3, 1.4, 0]]\ntriangles = [[0, 1, 2]]\n{more}"
                     );
                     if !parallel && SIDE as f64 * distance / 3.0 > 1e10 {
                         continue;
