@@ -53,7 +53,8 @@ fn cameras_see_the_same_from_all_distances() {
                     let text = format!(
                         "[render]\nwidth = {SIDE}\nheight = {SIDE}\n[camera]\nposition = {position:?}\n{lens}\
                          [[sphere]]\ncenter = [0, 0, 0]\nradius = 1\n\
-                         [[mesh]]\npositions = [[-1.4, 1.1, 0], [-1.1, 1.1, 0], [-1.3, 1.4, 0]]\ntriangles = [[0, 1, 2]]\n{more}"
+                         [[mesh]]\npositions = [[-1.4, 1.1, 0], [-1.1, 1.1, 0], [-1.3, 1.4, 0]]\n\
+                         triangles = [[0, 1, 2]]\n{more}"
                     );
                     if !parallel && SIDE as f64 * distance / 3.0 > 1e10 {
                         continue;
@@ -104,7 +105,8 @@ fn what_a_camera_is_near_to_is_exact_whatever_else_there_is() {
         format!(
             "[render]\nwidth = 48\nheight = 48\nantialiasing = 2\n[camera]\nposition = [{x:?}, {:?}, {:?}]\n\
              look_at = {at:?}\n[[light.directional]]\ndirection = [-1, -2, -1]\n\
-             [[sphere]]\ncenter = {at:?}\nradius = 2\n[[cylinder]]\np0 = [{x:?}, {:?}, {z:?}]\np1 = {at:?}\nradius = 1\n\
+             [[sphere]]\ncenter = {at:?}\nradius = 2\n\
+             [[cylinder]]\np0 = [{x:?}, {:?}, {z:?}]\np1 = {at:?}\nradius = 1\n\
              [[mesh]]\npositions = [[{:?}, {:?}, {z:?}], [{:?}, {:?}, {z:?}], [{x:?}, {:?}, {z:?}]]\n\
              triangles = [[0, 1, 2]]\n{more}",
             y + 3.0,
