@@ -331,7 +331,8 @@ impl BallCase {
         };
         let BallCase { center, radius, .. } = case;
         let light = format!("[[light.sphere]]\ncenter = {}\nradius = {radius}", list(center));
-        let camera = "[camera]\nposition = [0, 0, 0]\nlook_at = [0, 0, 1]";
+        // One ray: compiling asks all of a picture's rays whether they meet anything
+        let camera = "[render]\nwidth = 1\nheight = 1\n[camera]\nposition = [0, 0, 0]\nlook_at = [0, 0, 1]";
         let parsed = SceneDesc::parse("s.toml", format!("{camera}\n{text}\n{light}").as_bytes(), &NoAssets);
         let scene = parsed.compile(&NoAssets, &CompileOptions::default()).expect("is a scene").scene;
         let here = (-scene.origin).as_vec3();
