@@ -154,8 +154,8 @@ impl ShadowRay {
     }
 
     /// The ray's `t_max` for tests that have no margin of their own at the light: short of what the light lies on, by
-    /// the rounding of both ends. What lies in the plane of a flat light hides none of it, so there that is a distance from
-    /// the plane, however flat the ray meets it.
+    /// the rounding of both ends. What lies in the plane of a flat light hides none of it, so there that is a distance
+    /// from the plane, however flat the ray meets it.
     #[inline(always)]
     pub(crate) fn end(&self) -> f32 {
         if !self.is_finite() {

@@ -29,8 +29,8 @@ impl SceneBall {
         Some(SceneBall { middle: (low + high) * 0.5, radius: (high - low).length() * 0.5 })
     }
 
-    /// How far along a line from `o`, in lengths of `d`, which is a unit vector as far as 32 bits tell, the plane is that
-    /// is perpendicular to `d` and touches the near side of the ball; `None` unless that is far.
+    /// How far along a line from `o`, in lengths of `d`, which is a unit vector as far as 32 bits tell, the plane is
+    /// that is perpendicular to `d` and touches the near side of the ball; `None` unless that is far.
     fn begins(&self, o: DVec3, d: DVec3) -> Option<f64> {
         let ahead = (d.dot(self.middle - o) - self.radius * d.length()) / d.length_squared();
         (ahead > FAR * self.radius).then_some(ahead)

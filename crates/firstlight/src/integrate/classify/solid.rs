@@ -172,8 +172,8 @@ impl PlacedSolid {
         }
     }
 
-    /// Whether a point that is on its surface or inside, at `at` in its own space, leaves it along the normal `n` of the
-    /// point's horizon: then its surface is taken to lie in a face of the solid, however that normal is rounded.
+    /// Whether a point that is on its surface or inside, at `at` in its own space, leaves it along the normal `n` of
+    /// the point's horizon: then its surface is taken to lie in a face of the solid, however that normal is rounded.
     fn is_left(&self, at: DVec3, n: DVec3, room: f64) -> bool {
         let way = self.canonical_from_world.transform_vector3(n);
         let step = way * (8.0 * room / way.abs().max_element());
