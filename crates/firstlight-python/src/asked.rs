@@ -1,4 +1,4 @@
-//! What is asked of a scene without a picture: what rays meet, and what points see of a light.
+//! Queries of a scene without a render: `cast` traces rays, `visible` finds the visible fraction of a light.
 
 use firstlight::{CastHit, DVec3, Scene, Vec3, WorldRay};
 use numpy::{PyArray1, PyArrayMethods};

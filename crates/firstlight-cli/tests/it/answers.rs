@@ -171,7 +171,7 @@ fn info_of_a_picture_is_its_receipt() {
     // A part says of what
     folder.run("render scene.toml --crop 4,3,20,10 -o part.exr -q").done();
     assert!(folder.run("info part.exr").done().text().contains("size       20 x 10 pixels, at (4, 3) of 36 x 24\n"));
-    // What another program wrote, what is damaged, and what is for scenes
+    // A picture of another program, a damaged one, and options that are for scenes only
     let bytes = folder.get("a.png");
     folder.put("cut.png", &bytes[..bytes.len() / 2]);
     folder.run("info cut.png").exits(1).says(&["cut.png: is a damaged PNG file"]);

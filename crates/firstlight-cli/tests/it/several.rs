@@ -75,7 +75,7 @@ fn what_would_be_one_file_is_refused_before_anything_is_rendered() {
             "would both be written to out/a.toml.png; they are one file, name it once",
         ),
         ("a.toml a.toml -o out/{stem}.png", "would both be written to out/a.png; name it once"),
-        // What is used already is not proposed, nor what would not help
+        // The hint proposes no placeholder that the name has already, nor one that would not help
         ("a.toml sub/a.toml -o out/{name}.png", "to out/a.toml.png; render them in two calls, to folders of their own"),
         ("a.toml sub/a.toml -o out/{stem}.png", "to out/a.png; render them in two calls, to folders of their own"),
         // A course file says its own output
