@@ -36,9 +36,11 @@ pub(super) fn advise(cx: &mut CompileContext, scene: &Scene, desc: &SceneDesc) {
     advise_digits(cx, scene);
 }
 
-/// Places are known well enough if they are known to this part of a pixel: no picture shows that, and no depth is worth
-/// more.
-const PART_OF_A_PIXEL: f64 = 1e-2;
+/// Places are known well enough if they are known to this part of a pixel.
+const PART_OF_A_PIXEL: f64 = 1e-4;
+/// And they are if they are known as well as those that are no farther from where coordinates are counted than this
+/// many times their distance from the camera: 32 bits hold no more of a picture of many rows.
+const FAR_VIEWS: f64 = 16.0;
 
 /// Advises if 32 bits are too few for much of what the camera sees.
 fn advise_digits(cx: &mut CompileContext, scene: &Scene) {
@@ -56,10 +58,13 @@ fn advise_digits(cx: &mut CompileContext, scene: &Scene) {
             Projection::Orthographic => 1.0,
         };
         let rounding = p.abs().max_element() * f64::from(UNIT_ROUNDOFF);
-        Some([rounding, depth * 2.0 * half / f64::from(scene.height)])
+        let pixel = depth * 2.0 * half / f64::from(scene.height);
+        let distance = (p - frame.position + frame.origin).length();
+        let enough = (PART_OF_A_PIXEL * pixel).max(FAR_VIEWS * distance * f64::from(UNIT_ROUNDOFF));
+        Some((rounding > enough, [rounding, pixel]))
     };
-    let places: Vec<[f64; 2]> = (0..across * down).filter_map(place).collect();
-    let coarse = || places.iter().filter(|[rounding, pixel]| *rounding > PART_OF_A_PIXEL * pixel);
+    let places: Vec<(bool, [f64; 2])> = (0..across * down).filter_map(place).collect();
+    let coarse = || places.iter().filter_map(|(is_coarse, sizes)| is_coarse.then_some(sizes));
     let Some([rounding, pixel]) = coarse().max_by(|a, b| (a[0] / a[1]).total_cmp(&(b[0] / b[1]))) else { return };
     // Something that is in the way of the lens is not what the picture is about
     if coarse().count() * 10 > places.len() {
@@ -138,7 +143,11 @@ fn framed(scene: &Scene) -> Option<[[u32; 2]; 2]> {
     let lamps = scene.lights.iter().filter_map(|light| light.area()).filter(is_lamp_seen);
     let lamps = lamps.map(|area| area.shape.bounds()).reduce(|[low, high], [a, b]| [low.min(a), high.max(b)]);
     let is_shape_seen = geometry.surfaces.iter().any(|surface| surface.visible);
-    if is_shape_seen && !geometry.unbounded.is_empty() {
+    // A plane that any ray of the picture meets is met by one through a corner of it: what decides that is linear
+    let [width, height] = all.map(|[_, end]| end as f32);
+    let of_film = [(0.0, 0.0), (width, 0.0), (width, height), (0.0, height)];
+    let is_met = |(x, y): (f32, f32)| scene.intersect_local(&scene.camera.local_ray(x, y, 1.0).0).is_some();
+    if is_shape_seen && !geometry.unbounded.is_empty() && of_film.into_iter().any(is_met) {
         return Some(all);
     }
     let boxes: Vec<_> = geometry.bounds().filter(|_| is_shape_seen).into_iter().chain(lamps).collect();
