@@ -195,10 +195,12 @@ impl Scene {
         self.geometry.surfaces.get(id.index())?.name.as_deref()
     }
 
-    /// The same, in which nothing casts shadows.
+    /// The same, in which nothing casts shadows, at a quarter of the tolerance: light without shadows takes little
+    /// time, and what is divided by it is to be as exact as the picture is.
     pub(crate) fn without_shadows(&self) -> Scene {
         let mut scene = self.clone();
         scene.lights.iter_mut().for_each(|light| light.shadows = false);
+        scene.tolerance *= 0.25;
         scene
     }
 
