@@ -47,11 +47,13 @@ impl CheckerboardDesc {
 
 const MAX_COUNT: u32 = 65536;
 
-/// An edge of the footprint that crosses more lines than this is not followed: the board is gray there, to within the
-/// inverse of this number.
-const MAX_CROSSINGS: f64 = 1024.0;
+/// A footprint that reaches over more squares than this from its middle, on both axes, is not cut into strips: the board
+/// is gray there. Over a floor up to the horizon that is off by 0.17 of a display step at most (squares of 0.2 to 100 m,
+/// 1.5 m below the camera, 400 rows).
+const MAX_STRIPS: f64 = 128.0;
 
-/// A footprint that reaches farther beyond the rim of its surface, in squares, is not cut there: the board is gray.
+/// Where a footprint goes farther than this from the first square, in squares, the board is gray: 32 bits of u and v do
+/// not tell squares apart there.
 const MAX_REACH: f64 = 1e9;
 
 /// A footprint whose area is smaller than this fraction of its sides' squares is a line.
@@ -100,16 +102,19 @@ impl Checkerboard {
         if Self::square(center - reach) == Self::square(center + reach) {
             return waves[0].sign(center.x) * waves[1].sign(center.y);
         }
+        if !((center.abs() + reach).max_element() < MAX_REACH) {
+            return 0.0;
+        }
         let leaves = |i: usize| center[i] - reach[i] < 0.0 || center[i] + reach[i] > scale[i];
         if (0..2).any(|i| footprint.edges[i] == UvEdge::Bounded && leaves(i)) {
             return mean_within(&waves, center, a, b);
         }
-        if !(reach.max_element() < MAX_CROSSINGS) {
+        if !(reach.min_element() < MAX_STRIPS) {
             return 0.0;
         }
         let area = a.perp_dot(b);
         if area.abs() > MIN_AREA * (a.length_squared() + b.length_squared()) {
-            mean_over_parallelogram(&waves, center, a, b, area)
+            mean_over(&waves, &corners(center, a, b), area, 2.0 * reach)
         } else {
             let along = if a.length_squared() > b.length_squared() { a } else { b };
             mean_over_line(&waves, center - along * 0.5, center + along * 0.5)
@@ -132,9 +137,6 @@ fn mean_within(waves: &[Wave; 2], c: DVec2, a: DVec2, b: DVec2) -> f64 {
     let (mut outline, mut line) = (Polygon::new(), Polygon::new());
     outline.extend(corners(c, a, b));
     line.extend([c - along * 0.5, c + along * 0.5]);
-    if !outline.iter().all(|p| p.abs().max_element() < MAX_REACH) {
-        return 0.0;
-    }
     for (axis, wave) in waves.iter().enumerate().filter(|(_, wave)| wave.edge == UvEdge::Bounded) {
         for (end, sign) in [(0.0, 1.0), (wave.count, -1.0)] {
             (outline, line) = (cut(&outline, axis, end, sign, true), cut(&line, axis, end, sign, false));
@@ -144,12 +146,12 @@ fn mean_within(waves: &[Wave; 2], c: DVec2, a: DVec2, b: DVec2) -> f64 {
     let (low, high) = outline.iter().fold(none, |(low, high), p| (low.min(*p), high.max(*p)));
     let size = high - low;
     // Also where nothing is left
-    if (size * 0.5).max_element() >= MAX_CROSSINGS {
+    if !(size.min_element() * 0.5 < MAX_STRIPS) {
         return 0.0;
     }
     let area = (0..outline.len()).map(|i| outline[i].perp_dot(outline[(i + 1) % outline.len()])).sum::<f64>() * 0.5;
     if area.abs() > MIN_AREA * size.length_squared() {
-        return mean_over(waves, &outline, area);
+        return mean_over(waves, &outline, area, size);
     }
     match line[..] {
         [from, to] if from != to => mean_over_line(waves, from, to),
@@ -180,66 +182,57 @@ fn cut(outline: &[DVec2], axis: usize, end: f64, sign: f64, closed: bool) -> Pol
     left
 }
 
-/// The mean over the parallelogram around `c` with sides `a` and `b` of w0(x) w1(y), by Green's theorem: the integral
-/// over an area of w0(x) w1(y) is that along its outline of W0(x) w1(y) dy, where W0 is the integral of w0. Between two
-/// lines of the board w1 is constant and W0 straight, so each piece of the outline is exact.
-fn mean_over_parallelogram(waves: &[Wave; 2], c: DVec2, a: DVec2, b: DVec2, area: f64) -> f64 {
-    mean_over(waves, &corners(c, a, b), area)
-}
-
-/// The same over a convex outline with that area.
-fn mean_over(waves: &[Wave; 2], outline: &[DVec2], area: f64) -> f64 {
+/// The mean of w0(x) w1(y) over a convex outline with that area and size, by Green's theorem: the integral over an area
+/// of w0(x) w1(y) is that along its outline of W0(x) w1(y) dy, where W0 is an integral of w0. In a strip of the board,
+/// between two of its lines, w1 is constant, and an edge of the outline runs through it at an even pace. Strips are cut
+/// along the axis that has fewer of them, x and y exchanged if need be: toward a horizon a footprint is narrow and long.
+fn mean_over(waves: &[Wave; 2], outline: &[DVec2], area: f64, size: DVec2) -> f64 {
+    let across = usize::from(size.y <= size.x);
+    let along = 1 - across;
     let mut integral = 0.0;
     for (i, &from) in outline.iter().enumerate() {
         let to = outline[(i + 1) % outline.len()];
-        for_each_piece(from, to, |p, q| {
-            let middle = waves[1].sign((p.y + q.y) * 0.5);
-            integral += (waves[0].integral(p.x) + waves[0].integral(q.x)) * 0.5 * middle * (q.y - p.y);
+        let mut begin = waves[along].second_integral(from[along]);
+        for_each_strip(from, to, across, |p, q| {
+            let end = waves[along].second_integral(q[along]);
+            let sign = waves[across].sign((p[across] + q[across]) * 0.5);
+            let mean = mean_between(p[along], q[along], |x| waves[along].integral(x), end - begin);
+            integral += mean * sign * (q[across] - p[across]);
+            begin = end;
         });
     }
-    (integral / area).clamp(-1.0, 1.0)
+    let turn = if across == 1 { 1.0 } else { -1.0 };
+    (turn * integral / area).clamp(-1.0, 1.0)
 }
 
 /// The mean along a line.
 fn mean_over_line(waves: &[Wave; 2], from: DVec2, to: DVec2) -> f64 {
-    let length = (to - from).length();
+    let line = to - from;
+    let across = usize::from(line.y.abs() <= line.x.abs());
+    let along = 1 - across;
     let mut integral = 0.0;
-    for_each_piece(from, to, |p, q| {
-        let middle = (p + q) * 0.5;
-        integral += waves[0].sign(middle.x) * waves[1].sign(middle.y) * (q - p).length();
+    for_each_strip(from, to, across, |p, q| {
+        let sign = waves[across].sign((p[across] + q[across]) * 0.5);
+        // Of a line the longer axis has a length
+        let of_piece = waves[along].integral(q[along]) - waves[along].integral(p[along]);
+        let mean = mean_between(p[along], q[along], |x| waves[along].sign(x), of_piece);
+        integral += mean * sign * (q[along] - p[along]);
     });
-    (integral / length).clamp(-1.0, 1.0)
+    (integral / line[along]).clamp(-1.0, 1.0)
 }
 
-/// Cuts the line from `from` to `to` where it crosses a line of the board.
-fn for_each_piece(from: DVec2, to: DVec2, mut piece: impl FnMut(DVec2, DVec2)) {
-    let along = to - from;
-    // The k-th whole number ahead on an axis, as a parameter of the line
-    let parameter = |axis: usize, k: f64| {
-        if along[axis] == 0.0 {
-            return f64::INFINITY;
-        }
-        let first = if along[axis] > 0.0 { floor(from[axis]) + 1.0 } else { -floor(-from[axis]) - 1.0 };
-        (first + k * along[axis].signum() - from[axis]) / along[axis]
-    };
-    let (mut kx, mut ky, mut start) = (0.0, 0.0, from);
-    loop {
-        let (tx, ty) = (parameter(0, kx), parameter(1, ky));
-        let t = tx.min(ty);
-        if !(t < 1.0) {
-            piece(start, to);
-            return;
-        }
-        let end = from + along * t;
+/// Cuts the line from `from` to `to` where it crosses a line of the board, of those that are whole numbers of an axis.
+fn for_each_strip(from: DVec2, to: DVec2, axis: usize, mut piece: impl FnMut(DVec2, DVec2)) {
+    let (way, rise) = (to - from, to[axis] - from[axis]);
+    let first = if rise > 0.0 { floor(from[axis]) + 1.0 } else { -floor(-from[axis]) - 1.0 };
+    let (mut line, mut start) = (first, from);
+    while (to[axis] - line) * rise > 0.0 {
+        let mut end = from + way * ((line - from[axis]) / rise);
+        end[axis] = line;
         piece(start, end);
-        start = end;
-        if tx <= ty {
-            kx += 1.0;
-        }
-        if ty <= tx {
-            ky += 1.0;
-        }
+        (start, line) = (end, line + rise.signum());
     }
+    piece(start, to);
 }
 
 /// The wave that is +1 on even squares and -1 on odd ones, and what it does beyond the shape.
@@ -255,6 +248,7 @@ impl Wave {
     }
 
     /// +1 or -1: the square that holds `x`.
+    #[inline(always)]
     fn sign(&self, x: f64) -> f64 {
         let square = match self.edge {
             UvEdge::Bounded | UvEdge::Folded => floor(x).clamp(0.0, self.count - 1.0),
@@ -267,28 +261,74 @@ impl Wave {
         if half == floor(half) { 1.0 } else { -1.0 }
     }
 
-    /// The integral of the wave from 0 to `x`.
+    /// An integral of the wave.
+    #[inline(always)]
     fn integral(&self, x: f64) -> f64 {
+        let (from, rounds) = self.begin(x);
+        let (one_round, beyond) = (triangle(self.count) - triangle(0.0), self.beyond(x));
+        rounds * one_round + triangle(x - from - beyond) + beyond * self.sign(x)
+    }
+
+    /// An integral of that.
+    #[inline(always)]
+    fn second_integral(&self, x: f64) -> f64 {
+        let (from, rounds) = self.begin(x);
+        let (one_round, beyond) = (triangle(self.count) - triangle(0.0), self.beyond(x));
+        let within = x - from - beyond;
+        let before = rounds * (parabola(self.count) + one_round * (0.5 * (rounds - 1.0) * self.count + within));
+        before + parabola(within) + beyond * (triangle(within) + 0.5 * beyond * self.sign(x))
+    }
+
+    /// Where the round that holds `x` begins, and how many are before it.
+    #[inline(always)]
+    fn begin(&self, x: f64) -> (f64, f64) {
         match self.edge {
-            // The outermost squares go on for ever: of what ends there nothing asks
-            UvEdge::Bounded | UvEdge::Folded if x < 0.0 => x,
-            UvEdge::Bounded | UvEdge::Folded if x > self.count => {
-                triangle(self.count) + (x - self.count) * self.sign(self.count)
-            }
-            UvEdge::Bounded | UvEdge::Folded | UvEdge::Unbounded => triangle(x),
-            // An odd count leaves one square over in each round
             UvEdge::Periodic => {
-                let round = floor(x / self.count);
-                round * triangle(self.count) + triangle(x - round * self.count)
+                let rounds = floor(x / self.count);
+                (rounds * self.count, rounds)
             }
+            UvEdge::Bounded | UvEdge::Folded | UvEdge::Unbounded => (0.0, 0.0),
+        }
+    }
+
+    /// How far `x` is beyond the outermost squares, which go on for ever: of what ends there nothing asks.
+    #[inline(always)]
+    fn beyond(&self, x: f64) -> f64 {
+        match self.edge {
+            UvEdge::Bounded | UvEdge::Folded => x - x.clamp(0.0, self.count),
+            UvEdge::Periodic | UvEdge::Unbounded => 0.0,
         }
     }
 }
 
-/// The integral from 0 to `x` of the wave without edges: 0 at even numbers, 1 at odd ones, straight between.
+/// The mean between two places of a function that is straight between whole numbers, from its integral between them.
+/// Over less than a unit from two straight pieces: differences of integrals have no digits there.
+#[inline(always)]
+fn mean_between(a: f64, b: f64, function: impl Fn(f64) -> f64, integral: f64) -> f64 {
+    let width = b - a;
+    if width.abs() > 1.0 {
+        return integral / width;
+    }
+    let line = floor(a.max(b));
+    if a.min(b) >= line {
+        return function((a + b) * 0.5);
+    }
+    let share = (b - line) / width;
+    function((a + line) * 0.5) * (1.0 - share) + function((line + b) * 0.5) * share
+}
+
+/// An integral of the wave without edges, with the mean 0: -1/2 at even numbers, 1/2 at odd ones, straight between.
+#[inline(always)]
 fn triangle(x: f64) -> f64 {
     let phase = x - 2.0 * floor(x * 0.5);
-    if phase <= 1.0 { phase } else { 2.0 - phase }
+    if phase <= 1.0 { phase - 0.5 } else { 1.5 - phase }
+}
+
+/// The integral of that from 0 to `x`: 0 at whole numbers, parabolas between.
+#[inline(always)]
+fn parabola(x: f64) -> f64 {
+    let phase = x - 2.0 * floor(x * 0.5);
+    if phase <= 1.0 { 0.5 * phase * (phase - 1.0) } else { 0.5 * (phase - 1.0) * (2.0 - phase) }
 }
 
 #[cfg(test)]
@@ -335,6 +375,30 @@ mod tests {
                     for uv in [Vec2::new(0.01, 0.99), Vec2::new(0.5, 0.333), Vec2::new(0.9 + 0.01 * k as f32, 0.2)] {
                         let (exact, counted) = (board(n).mean(uv, &f), by_counting(n, uv, &f));
                         assert!((exact - counted).abs() < 0.01, "{n} {edge:?} {uv} {size}: {exact} {counted}");
+                    }
+                }
+            }
+        }
+    }
+
+    /// Halves of a footprint make its mean, and turned or exchanged axes the same: also where it is long and narrow, as
+    /// toward a horizon.
+    #[test]
+    fn halves_make_the_whole() {
+        for edge in [UvEdge::Folded, UvEdge::Periodic, UvEdge::Unbounded] {
+            for n in 1..=4 {
+                for (dx, dy) in [([0.5, 0.2], [7.0, 300.3]), ([90.0, 0.0], [0.3, 4.0]), ([20.0, 21.0], [-1.0, 1.5])] {
+                    let (dx, dy) = (Vec2::from(dx), Vec2::from(dy));
+                    for at in [Vec2::new(0.3, 0.6), Vec2::new(-7.1, 31.2)] {
+                        let mean = |at: Vec2, dx: Vec2, dy: Vec2| board(n).mean(at, &footprint(dx, dy, edge));
+                        let whole = mean(at, dx, dy);
+                        let halves = [0.25, -0.25].map(|k| mean(at + dy * k, dx, dy * 0.5));
+                        let thirds = [-1.0, 0.0, 1.0].map(|k| mean(at + dx * (k / 3.0), dx / 3.0, dy));
+                        let exchanged = mean(Vec2::new(at.y, at.x), Vec2::new(dy.y, dy.x), Vec2::new(dx.y, dx.x));
+                        let means = [halves.iter().sum::<f64>() / 2.0, thirds.iter().sum::<f64>() / 3.0, exchanged];
+                        for mean in means {
+                            assert!((mean - whole).abs() < 1e-5, "{edge:?} {n} {at} {dx} {dy}: {whole} {means:?}");
+                        }
                     }
                 }
             }
