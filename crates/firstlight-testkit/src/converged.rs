@@ -30,9 +30,6 @@ const LAST: u32 = 20;
 const LONG: u32 = 13;
 /// The logarithm to base 2 of how many times the points the sets have where a root mean square is out of bounds.
 const AGAIN: u32 = 4;
-/// How many times the root mean square that is allowed makes the converged picture be looked at again, whatever few
-/// points make of the scene.
-const LOOKED_AT: f64 = 2.0;
 /// Steps off at which a pixel of the converged picture is looked at again, at a tolerance of 1.
 const DISPUTED: f64 = 0.75;
 
@@ -412,19 +409,47 @@ impl Deviation {
     }
 }
 
-/// How far an integrated picture may be off.
+/// How far integrated pictures of many scenes may be off, in steps of 255.
 #[derive(Clone, Copy, Debug)]
 pub struct Bounds {
-    /// Steps, at any pixel.
+    /// The root mean square of a scene: the first in 95 % of them, the second in 99 %.
+    pub rms: [f64; 2],
+    /// The worst pixel of a scene, in 99 % of them.
     pub worst: f64,
-    /// The share of pixels that may be off by more than the tolerance, over all scenes together.
+    /// The share of all pixels that may be off by more than the tolerance.
     pub over: f64,
-    /// The root mean square that a scene may always have; beyond it, that of 400 samples.
-    pub rms: f64,
 }
 
 /// What is promised of integrated light at the default tolerance.
-pub const PROMISED: Bounds = Bounds { worst: 2.0, over: 1e-4, rms: 0.1 };
+pub const PROMISED: Bounds = Bounds { rms: [0.2, 0.5], worst: 2.0, over: 1e-3 };
+
+/// The shares of scenes that may be beyond the first root mean square, and beyond the second or the worst pixel.
+const BEYOND: [f64; 2] = [0.05, 0.01];
+
+/// How far one scene is off.
+#[derive(Clone, Copy, Debug)]
+pub struct SceneError {
+    pub seed: u64,
+    pub deviation: Deviation,
+    /// [`Converged::own_error`]: what the converged picture does not know itself cannot be held against another.
+    pub doubt: f64,
+}
+
+impl SceneError {
+    fn is_beyond(&self, rms: f64) -> bool {
+        let Deviation { rms: is, .. } = self.deviation;
+        !(is * is <= rms * rms + self.doubt * self.doubt)
+    }
+
+    /// What is beyond the bounds that most scenes are within.
+    pub fn outside(&self, bounds: &Bounds) -> Option<String> {
+        let Deviation { worst, at: [x, y], rms, .. } = self.deviation;
+        if !(worst <= bounds.worst) {
+            return Some(format!("pixel {x}, {y} is off by {worst:.2} steps of 255"));
+        }
+        self.is_beyond(bounds.rms[0]).then(|| format!("rms {rms:.3}"))
+    }
+}
 
 impl Bounds {
     /// What is promised of a scene: it scales with its tolerance.
@@ -434,7 +459,32 @@ impl Bounds {
 
     /// So many times as far off.
     pub fn times(&self, tolerance: f64) -> Bounds {
-        Bounds { worst: tolerance * self.worst, over: self.over, rms: tolerance * self.rms }
+        Bounds { rms: self.rms.map(|rms| tolerance * rms), worst: tolerance * self.worst, over: self.over }
+    }
+
+    /// What of all scenes together is out of bounds.
+    pub fn faults(&self, scenes: &[SceneError]) -> Vec<String> {
+        let mut faults = Vec::new();
+        let mut hold = |what: String, share: f64, is_beyond: &dyn Fn(&SceneError) -> bool| {
+            let beyond: Vec<u64> = scenes.iter().filter(|scene| is_beyond(scene)).map(|scene| scene.seed).collect();
+            let allowed = (share * scenes.len() as f64) as usize;
+            if beyond.len() > allowed {
+                let count = beyond.len();
+                faults.push(format!("{count} scenes have {what}, {allowed} of {} may: {beyond:?}", scenes.len()));
+            }
+        };
+        for (rms, share) in self.rms.into_iter().zip(BEYOND) {
+            hold(format!("an rms above {rms}"), share, &|scene| scene.is_beyond(rms));
+        }
+        let worst = format!("a pixel that is off by more than {}", self.worst);
+        hold(worst, BEYOND[1], &|scene| !(scene.deviation.worst <= self.worst));
+        let sum = |of: fn(&Deviation) -> u64| scenes.iter().map(|scene| of(&scene.deviation)).sum::<u64>();
+        let (pixels, over) = (sum(|d| d.pixels), sum(|d| d.over));
+        let allowed = (self.over * pixels as f64).ceil();
+        if over as f64 > allowed {
+            faults.push(format!("{over} of {pixels} pixels are off by more than the tolerance, {allowed} may be"));
+        }
+        faults
     }
 }
 
@@ -452,54 +502,36 @@ pub struct Report {
 }
 
 impl Report {
-    /// Renders the scene in all ways.
-    #[track_caller]
-    pub fn new(desc: &SceneDesc, cap: u32) -> Self {
-        Self::beside(&mut Converged::new(desc, cap), desc)
-    }
-
-    /// Renders the scene, and looks at the converged picture again where there is reason to doubt it.
+    /// Renders the scene in all ways, and looks at the converged picture again where there is reason to doubt it.
     #[track_caller]
     pub fn beside(truth: &mut Converged, desc: &SceneDesc) -> Self {
         let exact = exact(desc);
         truth.doubt(&exact);
-        let (sobol, uniform) = (sampled(desc, SampleSet::Sobol, 400), sampled(desc, SampleSet::Uniform, 400));
-        let report = |truth: &Converged| Report {
-            exact: truth.deviation(&exact),
-            sobol: truth.deviation(&sobol),
-            uniform: truth.deviation(&uniform),
-            open: truth.open(),
-            doubt: truth.own_error(),
-        };
-        let first = report(truth);
+        let first = Self::of(truth, desc, &exact);
         let bounds = Bounds::promised(desc);
+        let error = SceneError { seed: 0, deviation: first.exact, doubt: first.doubt };
         // All pixels off by a little is what a converged picture is as well whose points are too few
-        let is_even = first.exact.rms <= LOOKED_AT * bounds.rms;
-        if first.fault(&bounds).is_none() && is_even || !(first.exact.worst <= bounds.worst) {
+        if !error.is_beyond(bounds.rms[0]) || !(first.exact.worst <= bounds.worst) {
             return first;
         }
         truth.again(AGAIN);
-        report(truth)
+        Self::of(truth, desc, &exact)
     }
 
-    /// See [`fault`].
-    pub fn fault(&self, bounds: &Bounds) -> Option<String> {
-        fault(&self.exact, self.doubt, bounds, || self.sobol.rms)
+    /// Renders the scene in all ways, beside a converged picture that is taken as it is.
+    #[track_caller]
+    pub fn as_kept(truth: &Converged, desc: &SceneDesc) -> Self {
+        Self::of(truth, desc, &exact(desc))
     }
-}
 
-/// What is outside the bounds of a single scene. `doubt` is what the converged picture may be off itself, `sampled` the
-/// root mean square of 400 points of `sobol`. The share of pixels off by more than a step is one of many scenes.
-pub fn fault(exact: &Deviation, doubt: f64, bounds: &Bounds, sampled: impl FnOnce() -> f64) -> Option<String> {
-    if !(exact.worst <= bounds.worst) {
-        let [x, y] = exact.at;
-        return Some(format!("pixel {x}, {y} is off by {:.2} steps of 255", exact.worst));
+    #[track_caller]
+    fn of(truth: &Converged, desc: &SceneDesc, exact: &Image) -> Self {
+        Report {
+            exact: truth.deviation(exact),
+            sobol: truth.deviation(&sampled(desc, SampleSet::Sobol, 400)),
+            uniform: truth.deviation(&sampled(desc, SampleSet::Uniform, 400)),
+            open: truth.open(),
+            doubt: truth.own_error(),
+        }
     }
-    // What the converged picture does not know itself cannot be held against another
-    let is_within = |rms: f64| exact.rms * exact.rms <= rms * rms + doubt * doubt;
-    if is_within(bounds.rms) {
-        return None;
-    }
-    let sampled = sampled();
-    (!is_within(sampled)).then(|| format!("rms {:.3}; of 400 points {sampled:.3}", exact.rms))
 }

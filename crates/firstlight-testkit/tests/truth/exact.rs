@@ -11,7 +11,7 @@ use firstlight::{
 
 use crate::analytic::{corners, lambert, white};
 use crate::converged::{
-    Bounds, Converged, Deviation, PROMISED, Report, displayed, exact, fault, integrated, sampled, with_samples,
+    Bounds, Converged, Deviation, PROMISED, SceneError, displayed, exact, integrated, sampled, with_samples,
 };
 use crate::scenes::*;
 use crate::{exact_scenes, kept};
@@ -60,7 +60,7 @@ fn hold(seeds: impl Iterator<Item = u64>, size: u32) {
 /// The same with a larger tolerance.
 fn hold_to(tolerance: f64, seeds: impl Iterator<Item = u64>, size: u32) {
     let bounds = BOUNDS.times(tolerance);
-    let (mut pixels, mut over) = (0, 0);
+    let mut errors = Vec::new();
     for seed in seeds {
         let mut desc = exact_scenes::scene(seed, size);
         desc.render.tolerance = tolerance;
@@ -74,15 +74,10 @@ fn hold_to(tolerance: f64, seeds: impl Iterator<Item = u64>, size: u32) {
                 path.display()
             );
         };
-        let exact = truth.deviation(&exact(&desc));
-        let sobol = || truth.deviation(&sampled(&desc, SampleSet::Sobol, 400)).rms;
-        if let Some(fault) = fault(&exact, truth.own_error(), &bounds, sobol) {
-            panic!("scene {seed}: {fault}; `{command}`");
-        }
-        (pixels, over) = (pixels + exact.pixels, over + exact.over);
+        errors.push(SceneError { seed, deviation: truth.deviation(&exact(&desc)), doubt: truth.own_error() });
     }
-    let allowed = (BOUNDS.over * pixels as f64).ceil();
-    assert!(over as f64 <= allowed, "{over} of {pixels} pixels are off by more than the tolerance, {allowed} may be");
+    let faults = bounds.faults(&errors);
+    assert!(faults.is_empty(), "{}; `cargo xtask verify exact --size {size}` shows more", faults.join("; "));
 }
 
 #[test]
@@ -206,14 +201,16 @@ fn scenes_of_one_kind_are_within_the_bounds() {
 #[test]
 #[ignore = "takes long: cargo xtask verify runs it"]
 fn built_in_scenes_are_within_half_the_bounds() {
-    let half = Bounds { worst: 0.5 * BOUNDS.worst, over: 0.5 * BOUNDS.over, rms: 0.5 * BOUNDS.rms };
+    let half = BOUNDS.times(0.5);
     for builtin in builtin_scenes() {
         let mut desc = SceneDesc::parse(builtin.name, builtin.text.as_bytes(), &NoAssets).desc;
         (desc.render.width, desc.render.height, desc.render.antialiasing) = (32, 32, 2);
-        let report = Report::new(&desc, 14);
-        assert!(report.open * 100 < 32 * 32, "{}: {} pixels are open", builtin.name, report.open);
-        assert_eq!(report.fault(&half), None, "{}", builtin.name);
-        assert!(report.exact.over as f64 <= (half.over * report.exact.pixels as f64).ceil(), "{}", builtin.name);
+        let mut truth = Converged::new(&desc, 14);
+        let exact = exact(&desc);
+        truth.doubt(&exact);
+        assert!(truth.open() * 100 < 32 * 32, "{}: {} pixels are open", builtin.name, truth.open());
+        let error = SceneError { seed: 0, deviation: truth.deviation(&exact), doubt: truth.own_error() };
+        assert_eq!(half.faults(&[error]), [""; 0], "{}", builtin.name);
     }
 }
 
