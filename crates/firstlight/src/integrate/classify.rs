@@ -10,7 +10,6 @@ mod solid;
 use fearless_simd::{f32x16, prelude::*};
 
 use super::batch::{Exact, Linear16, ShadingPoint, ViewBlock, ViewNumber, Views, ways};
-use super::cut::{self, Half};
 use super::emitter::Emitter;
 use super::hull::SolidOccluder;
 use super::occluder::{Occluder, Shadow, corners_from};
@@ -29,10 +28,8 @@ pub(crate) struct Obstacles<'a> {
     /// As they are met row by row, and as they are; number by number the same.
     pub occluders: Vec<Occluder>,
     exact: Vec<ExactShape<'a>>,
-    /// How each lies to the light, if that is a ball; that ball, and which of them reach into it, bit by bit.
+    /// How each lies to the light, if that is a ball.
     touches: Vec<Touch>,
-    pub ball: Option<(Exact, f32)>,
-    pub cuts: u64,
     /// On which sides of the plane of a flat light each has a part of itself.
     sides: Vec<LightSides>,
     /// Which placed things are among them.
@@ -157,15 +154,8 @@ impl<'a> Obstacles<'a> {
 
     /// Finds out how each lies to the light: what reaches into a ball, and what is behind the plane of a flat light.
     fn touch(&mut self, emitter: &Emitter) {
-        if let Emitter::Ball { center, radius, .. } = emitter {
-            self.ball = Some((Exact::new(*center), *radius as f32));
-        }
-        for (i, (exact, occluder)) in self.exact.iter().zip(&self.occluders).enumerate() {
-            let touch = Touch::of(emitter, exact);
-            self.touches.push(touch);
-            self.sides.push(LightSides::of(emitter, exact));
-            self.cuts |= u64::from(touch == Touch::Cuts && cut::knows(occluder)) << i;
-        }
+        self.touches.extend(self.exact.iter().map(|exact| Touch::of(emitter, exact)));
+        self.sides.extend(self.exact.iter().map(|exact| LightSides::of(emitter, exact)));
     }
 
     /// Adds a solid, if rows tell it.
@@ -176,16 +166,11 @@ impl<'a> Obstacles<'a> {
         true
     }
 
-    /// Each, its sides of the light, and whether it reaches into a ball as rows tell.
+    /// Each, with its sides of the light, and how it lies to a ball.
     #[inline(always)]
-    fn each(&self) -> impl Iterator<Item = (&Occluder, &ExactShape<'a>, LightSides, Touch, bool)> {
-        let all = self.occluders.iter().zip(&self.exact).zip(self.sides.iter().zip(&self.touches)).enumerate();
-        all.map(|(i, ((occluder, exact), (sides, touch)))| (occluder, exact, *sides, *touch, self.cuts >> i & 1 == 1))
-    }
-
-    /// Whether any reaches into a ball.
-    pub fn touch_ball(&self) -> bool {
-        self.touches.contains(&Touch::Cuts)
+    fn each(&self) -> impl Iterator<Item = (&Occluder, &ExactShape<'a>, LightSides, Touch)> {
+        let all = self.occluders.iter().zip(&self.exact).zip(self.sides.iter().zip(&self.touches));
+        all.map(|((occluder, exact), (sides, touch))| (occluder, exact, *sides, *touch))
     }
 
     /// Whether a placed thing is among them.
@@ -443,7 +428,7 @@ pub(crate) fn classify<S: Simd>(
     let own = near.is_some().then(|| Own::new(simd, &sight, points));
     let places = LightSides::of_points(emitter, points);
     let mut asked = asked;
-    for (i, (occluder, exact, sides, touch, cuts)) in
+    for (i, (occluder, exact, sides, touch)) in
         obstacles.each().chain(near.into_iter().flat_map(Obstacles::each)).enumerate()
     {
         if asked == 0 {
@@ -455,7 +440,7 @@ pub(crate) fn classify<S: Simd>(
         }
         // What reaches into a ball may hide some of its far half
         sight.depth = match emitter {
-            Emitter::Ball { radius, .. } if touch == Touch::Cuts && emitter.half() == Half::Far => 2.0 * *radius as f32,
+            Emitter::Ball { radius, both_sides: true, .. } if touch == Touch::Cuts => 2.0 * *radius as f32,
             // From inside nothing else is between
             Emitter::Face { .. } if touch != Touch::Cuts => continue,
             Emitter::Ball { .. } | Emitter::Flat(_) | Emitter::Face { .. } => 0.0,
@@ -480,17 +465,9 @@ pub(crate) fn classify<S: Simd>(
             _ => unreachable!("both lists hold the same things"),
         };
         if touch == Touch::Cuts {
-            // Of the ball more may be seen than of its disk, and of the far half less
-            told.within =
-                if emitter.half() == Half::Near { told.within | told.hidden & told.around } else { told.around };
-            told.outside |= told.hidden & !told.around;
-            (told.hidden, told.firm) = (0, 0);
-            if emitter.halves().is_some() {
-                // They are asked one by one
-                told.other |= asked;
-            } else if !cuts {
-                told.other |= told.outside | told.within;
-            }
+            // Of the ball more may be seen than of its disk, and of its far half less
+            told.other |= told.outside | told.within | told.around | told.hidden;
+            (told.outside, told.within, told.hidden, told.firm) = (0, 0, 0, 0);
         }
         if (told.outside | told.within | told.hidden | told.moving | told.other) & asked == 0 {
             continue;
@@ -520,12 +497,10 @@ pub(crate) fn classify<S: Simd>(
             class.between.within |= (told.within >> k & 1) << i;
         }
     }
-    let cuts = obstacles.cuts | near.map_or(0, |near| near.cuts << obstacles.occluders.len());
     for class in &mut classes {
         let Between { outside, within } = class.between;
         let many = 2 * (outside.count_ones() + within.count_ones()) as usize;
-        let more = (cut::MOST - 2) * (outside & cuts).count_ones() as usize;
-        class.other |= many + more > MAX_INTERVALS || obstacles.has_more;
+        class.other |= many > MAX_INTERVALS || obstacles.has_more;
     }
     classes
 }

@@ -5,7 +5,6 @@ use std::f64::consts::PI;
 use arrayvec::ArrayVec;
 
 use super::batch::Exact;
-use super::cut::Half;
 use super::fit::AreaWeight;
 use super::view::{FlatLight, Outline};
 use crate::light::{Area, AreaShape};
@@ -21,18 +20,10 @@ pub(crate) enum Emitter {
     Flat(FlatLight),
     /// A sphere. From any point outside it looks like the disk in which the cone around it touches it: the same
     /// directions, and, where light weakens on its way, the same radiance in each.
-    Ball { center: DVec3, radius: f64, physical: bool, sides: BallSides },
+    Ball { center: DVec3, radius: f64, physical: bool, both_sides: bool },
     /// What of a sphere a point inside of it sees through one face of a cube around itself, which stands beyond all of
     /// the sphere: the same directions and radiance.
     Face { center: DVec3, radius: f64, physical: bool, face: usize },
-}
-
-/// Which sides of a ball shine: from outside, its near half shows the outer one, its far half the inner one.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum BallSides {
-    Outer,
-    Inner,
-    Both,
 }
 
 impl Emitter {
@@ -46,7 +37,7 @@ impl Emitter {
                 center: sphere.center,
                 radius: sphere.radius,
                 physical: area.physical,
-                sides: if area.both_sides { BallSides::Both } else { BallSides::Outer },
+                both_sides: area.both_sides,
             },
         }
     }
@@ -62,7 +53,6 @@ impl Emitter {
     /// What its places count for.
     pub fn falloff(&self) -> AreaWeight {
         match (self.outline(), self.is_physical()) {
-            (Outline::Sphere, _) if self.half() == Half::Far => AreaWeight::SphereInside,
             (Outline::Sphere, _) => AreaWeight::Sphere,
             (_, true) => AreaWeight::Physical,
             (_, false) => match self {
@@ -98,42 +88,18 @@ impl Emitter {
     pub fn depth(&self, p: Vec3) -> Option<f32> {
         match self {
             Emitter::Flat(_) | Emitter::Face { .. } => None,
-            Emitter::Ball { center, radius, sides, .. } => {
+            Emitter::Ball { center, radius, both_sides, .. } => {
                 let depth = radius - (*center - p.as_dvec3()).length();
-                (*sides != BallSides::Outer && !(depth < 0.0)).then_some(depth as f32)
+                (*both_sides && !(depth < 0.0)).then_some(depth as f32)
             }
-        }
-    }
-
-    /// Which half of a ball shines, as a point sees it.
-    pub fn half(&self) -> Half {
-        match self {
-            Emitter::Ball { sides: BallSides::Inner, .. } => Half::Far,
-            Emitter::Face { .. } => Half::Around,
-            Emitter::Flat(_) | Emitter::Ball { .. } => Half::Near,
         }
     }
 
     /// What of a ball that shines inwards points inside of it see, by the faces of a cube.
     pub fn faces(&self) -> Option<[Emitter; FACES]> {
         match *self {
-            Emitter::Ball { center, radius, physical, sides: BallSides::Both | BallSides::Inner } => {
+            Emitter::Ball { center, radius, physical, both_sides: true } => {
                 Some(std::array::from_fn(|face| Emitter::Face { center, radius, physical, face }))
-            }
-            Emitter::Flat(_) | Emitter::Ball { .. } | Emitter::Face { .. } => None,
-        }
-    }
-
-    /// Both sides of a ball that shines on both.
-    pub fn halves(&self) -> Option<[Emitter; 2]> {
-        match *self {
-            Emitter::Ball { center, radius, physical, sides: BallSides::Both } => {
-                Some([BallSides::Outer, BallSides::Inner].map(|sides| Emitter::Ball {
-                    center,
-                    radius,
-                    physical,
-                    sides,
-                }))
             }
             Emitter::Flat(_) | Emitter::Ball { .. } | Emitter::Face { .. } => None,
         }
@@ -187,7 +153,7 @@ impl Emitter {
                 // Of the sphere's area, 4 pi r^2, in place of the square's
                 Some(if *physical { square } else { FlatLight { times: (4.0 / PI) as f32, ..square } })
             }
-            Emitter::Ball { center, radius, physical, sides } => {
+            Emitter::Ball { center, radius, physical, both_sides } => {
                 let to = *center - p.as_dvec3();
                 let distance2 = to.length_squared();
                 let share = radius * radius / distance2;
@@ -199,14 +165,14 @@ impl Emitter {
                 let r = radius * (1.0 - share).sqrt();
                 let c = p.as_dvec3() + to * (1.0 - share);
                 let disk = FlatLight::new(c, a * r, a.cross(n) * r, -n, self.outline(), *physical, false);
-                Some(match (physical, sides) {
+                Some(match (physical, both_sides) {
                     // Both where a ray enters the ball and where it leaves it
-                    (true, BallSides::Both) => FlatLight { times: 2.0, ..disk },
-                    (true, BallSides::Outer | BallSides::Inner) => disk,
+                    (true, true) => FlatLight { times: 2.0, ..disk },
+                    (true, false) => disk,
                     (false, _) => FlatLight {
                         times: (1.0 - share) as f32,
                         ratio: share.sqrt() as f32,
-                        behind2: if *sides == BallSides::Outer { 0.0 } else { (distance2 - radius * radius) as f32 },
+                        behind2: if *both_sides { (distance2 - radius * radius) as f32 } else { 0.0 },
                         ..disk
                     },
                 })

@@ -15,8 +15,6 @@
 //! Two certificates stand apart: whether the light is known on a cell (the end of its series), and whether what is seen
 //! of the cell is (two rules for the rows of each panel). What is asked again is asked with everything else that is.
 
-use std::f32::consts::FRAC_1_SQRT_2;
-
 use arrayvec::ArrayVec;
 use fearless_simd::{Level, Simd};
 
@@ -114,12 +112,6 @@ pub(crate) struct Asked<'a> {
 }
 
 impl Asked<'_> {
-    /// Which of all that may be in the way reach into the light, if that is a ball: in lists, and then of trees.
-    fn cuts(&self) -> u64 {
-        let Obstacles { occluders, cuts, .. } = self.obstacles;
-        cuts | self.near.map_or(0, |near| near.cuts << occluders.len())
-    }
-
     /// How many cells and panels a pixel may be asked in place of points of a light that makes so many display steps:
     /// about half of what takes as long, as they are asked in vain where there are more of them.
     fn most_asked(steps: f32) -> f32 {
@@ -128,10 +120,8 @@ impl Asked<'_> {
 
     /// The light with what is between it and points.
     fn blocked<'b>(&'b self, between: &'b [Between]) -> Blocked<'b> {
-        let Obstacles { occluders, ball, .. } = self.obstacles;
         let near = self.near.map_or(&[][..], |near| &near.occluders);
-        let ball = ball.map(|(center, radius)| (center, radius, self.emitter.half()));
-        Blocked { occluders: [occluders, near], ball, cuts: self.cuts(), outline: self.emitter.outline(), between }
+        Blocked { occluders: [&self.obstacles.occluders, near], outline: self.emitter.outline(), between }
     }
 }
 
@@ -196,7 +186,7 @@ impl Evaluator {
     /// Adds to `arrived` what of a light arrives at each point.
     pub fn evaluate(&mut self, level: Level, light: &Asked, points: &[ShadingPoint], arrived: &mut Vec<Arrived>) {
         let first = arrived.len();
-        self.evaluate_outside(level, light, points, arrived);
+        self.evaluate_one(level, light, points, arrived);
         let Some(faces) = light.emitter.faces() else { return };
         let is_inside = |point: &ShadingPoint| light.emitter.surrounds(point.p);
         let inside: Vec<ShadingPoint> = points.iter().filter(|point| is_inside(point)).copied().collect();
@@ -224,24 +214,6 @@ impl Evaluator {
     }
 
     /// The same, but for points inside of a ball: those have answers that say so.
-    fn evaluate_outside(&mut self, level: Level, light: &Asked, points: &[ShadingPoint], arrived: &mut Vec<Arrived>) {
-        let is_cut = || light.obstacles.touch_ball() || light.near.is_some_and(Obstacles::touch_ball);
-        let Some([near, far]) = light.emitter.halves().filter(|_| light.shadows && is_cut()) else {
-            return self.evaluate_one(level, light, points, arrived);
-        };
-        // Both halves of a ball: what reaches into it hides more of the far one
-        let half = |emitter| Asked { emitter, allowed: light.allowed * FRAC_1_SQRT_2, ..*light };
-        let first = arrived.len();
-        self.evaluate_one(level, &half(&near), points, arrived);
-        let mut behind = std::mem::take(&mut self.part);
-        behind.clear();
-        self.evaluate_one(level, &half(&far), points, &mut behind);
-        for (one, other) in arrived[first..].iter_mut().zip(&behind) {
-            *one = one.and(other);
-        }
-        self.part = behind;
-    }
-
     fn evaluate_one(&mut self, level: Level, light: &Asked, points: &[ShadingPoint], arrived: &mut Vec<Arrived>) {
         let first = arrived.len();
         self.look(level, light, points, arrived);

@@ -121,8 +121,6 @@ pub(crate) enum AreaWeight {
     Physical,
     /// All places of a sphere alike: [`Outline::Sphere`](super::view::Outline::Sphere).
     Sphere,
-    /// The same of its far half alone.
-    SphereInside,
     /// The same of a sphere that points are inside of, seen through the faces of a cube.
     Around { center: Exact, radius: f32 },
 }
@@ -212,7 +210,7 @@ fn values<S: Simd, const N: usize>(
     let zero = splat(0.0);
     let height2 = height * height;
     let mut values = [[[zero; N]; N]; MOMENTS];
-    let is_sphere = matches!(falloff, AreaWeight::Sphere | AreaWeight::SphereInside);
+    let is_sphere = falloff == AreaWeight::Sphere;
     let (ratio, behind2) = (members.lanes(simd, Ratio), members.lanes(simd, Behind2));
     // The way to the middle of a sphere, and the square of the way to where it is touched, as if there were one
     let around = match falloff {
@@ -257,14 +255,13 @@ fn values<S: Simd, const N: usize>(
                     let t = to.simd_lt(zero).select(-touch2 / (root - to), (to + root) / length2);
                     weights[i] = t * t * size / root;
                 }
-                AreaWeight::Sphere | AreaWeight::SphereInside => {
+                AreaWeight::Sphere => {
                     // With q = sqrt(1 - x^2 - y^2), the areas of the sphere before and behind a place of the disk are
                     // as 1 / (1 + ratio q)^2 and 1 / (1 - ratio q)^2, over q; and 1 - (ratio q)^2 is |l|^2 over the
                     // square of the way to where the sphere is touched
                     let near = deep[i] * wide * ratio + 1.0;
                     let far = near * (behind2 * inverse * inverse);
-                    let front = if falloff == AreaWeight::Sphere { 1.0 / (near * near) } else { zero };
-                    weights[i] = wide * (front + far * far);
+                    weights[i] = wide * (1.0 / (near * near) + far * far);
                 }
             }
             cos_i[i] = (x * cos.x + cos_row) * inverse;

@@ -8,7 +8,6 @@
 mod batch;
 mod breaks;
 mod classify;
-mod cut;
 mod emitter;
 mod evaluate;
 mod fit;
@@ -23,7 +22,7 @@ mod view;
 
 pub(crate) use batch::ShadingPoint;
 pub(crate) use classify::Obstacles;
-pub(crate) use emitter::{BallSides, Emitter};
+pub(crate) use emitter::Emitter;
 pub(crate) use evaluate::{Arrived, Asked, Evaluator, Illumination};
 pub(crate) use tolerance::{COSTS, TOLERANCE};
 pub(crate) use view::{FlatView, Receiver};

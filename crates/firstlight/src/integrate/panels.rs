@@ -13,9 +13,8 @@
 use arrayvec::ArrayVec;
 use fearless_simd::{f32x16, mask32x16, prelude::*};
 
-use super::batch::{Exact, LaneNumbers, Members, ViewBlock, ViewNumber, Views, ways};
+use super::batch::{LaneNumbers, Members, ViewBlock, ViewNumber, Views, ways};
 use super::breaks::{Breaks, RoundSides};
-use super::cut::{self, BallCut, Half};
 use super::fit::{Cell, CutBlock, MOMENTS, sides};
 use super::occluder::{Occluder, Shadow};
 use super::row::{FAR, Interval16};
@@ -84,9 +83,6 @@ impl Between {
 pub(crate) struct Blocked<'a> {
     /// In lists, and of trees: counted together.
     pub occluders: [&'a [Occluder]; 2],
-    /// The light, if it is a ball, with the half that is asked, and which of them reach into it, bit by bit.
-    pub ball: Option<(Exact, f32, Half)>,
-    pub cuts: u64,
     pub outline: Outline,
     /// Point by point.
     pub between: &'a [Between],
@@ -102,7 +98,6 @@ impl<'a> Blocked<'a> {
     /// How many cells a panel behind such things takes as long as.
     pub fn cost(&self, between: Between) -> f32 {
         let cost = |number: usize| match self.occluder(number) {
-            Occluder::Flat { .. } if self.cuts >> number & 1 == 1 => COSTS.cut,
             Occluder::Solid(solid) if matches!(solid.kind, Canonical::Torus { .. }) => COSTS.torus,
             _ => 0.0,
         };
@@ -119,8 +114,7 @@ pub(crate) struct PanelSums {
     pub seen: LaneNumbers,
 }
 
-/// The most intervals of a row that may be hidden from one point: one for each thing, two if it has a hole, more if it
-/// reaches into a ball.
+/// The most intervals of a row that may be hidden from one point: one for each thing, two if it has a hole.
 pub(crate) const MAX_INTERVALS: usize = 48;
 
 /// What may be in the way of a batch: the occluders that any of its points sees, and for which of them.
@@ -151,13 +145,6 @@ impl<'a, S: Simd> Batch<'a, S> {
             any.within |= between.within;
         }
         any.occluders()
-    }
-
-    /// The same of one that reaches into a light that is a ball.
-    #[inline(always)]
-    fn cut(&self, simd: S, occluder: usize) -> Option<BallCut<S>> {
-        let ball = self.blocked.ball.filter(|_| self.blocked.cuts >> occluder & 1 == 1)?;
-        BallCut::new(simd, self.blocked.occluder(occluder), ball, self.p, &self.l)
     }
 
     /// One of them as they see it, and who sees it from outside and from within.
@@ -238,10 +225,7 @@ fn breaks<S: Simd>(
     for occluder in batch.occluders() {
         let (shadow, outside, within) = batch.shadow(simd, occluder);
         let mut breaks = Breaks { x, is_straight, y, round, of: outside | within, rows };
-        match batch.cut(simd, occluder) {
-            Some(cut) => cut.breaks(&mut breaks),
-            None => shadow.breaks(&mut breaks),
-        }
+        shadow.breaks(&mut breaks);
     }
     let all = x[0].simd_eq(x[0]);
     let mut breaks = Breaks { x, is_straight, y, round, of: all, rows };
@@ -334,35 +318,18 @@ pub(crate) fn rows<S: Simd>(
     for occluder in batch.occluders() {
         let (shadow, outside, within) = batch.shadow(simd, occluder);
         let (some_outside, some_within) = (outside.any_true(), within.any_true());
-        let cut = batch.cut(simd, occluder);
-        let asked = if cut.is_some() { outside | within } else { outside };
         for row in 0..ROWS {
             let y = y_of[row];
-            if some_within && cut.is_none() {
+            if some_within {
                 let (all, inside) = (&mut open[row], shadow.within(simd, y));
                 all.from = within.select(all.from.max(inside.from), all.from);
                 all.to = within.select(all.to.min(inside.to), all.to);
             }
-            if some_outside || cut.is_some() {
-                let mut intervals = [Interval16::none(simd); cut::MOST];
-                let parts = match &cut {
-                    Some(cut) => {
-                        let reach = match blocked.outline {
-                            Outline::Parallelogram => one,
-                            Outline::Disk => (1.0 - y * y).max(zero).sqrt(),
-                            Outline::Sphere => wide[row],
-                        };
-                        intervals = cut.hidden(simd, y, &Interval16 { from: -reach, to: reach }, within);
-                        cut::parts(blocked.occluder(occluder))
-                    }
-                    None => {
-                        [intervals[0], intervals[1]] = shadow.hidden(simd, y);
-                        if shadow.has_hole() { 2 } else { 1 }
-                    }
-                };
-                for interval in &intervals[..parts] {
+            if some_outside {
+                let parts = if shadow.has_hole() { 2 } else { 1 };
+                for interval in &shadow.hidden(simd, y)[..parts] {
                     let mut interval = *interval;
-                    let is_there = asked & interval.from.simd_lt(interval.to);
+                    let is_there = outside & interval.from.simd_lt(interval.to);
                     interval.from = is_there.select(interval.from, far);
                     interval.to = is_there.select(interval.to, far);
                     for before in hidden[row].iter_mut() {

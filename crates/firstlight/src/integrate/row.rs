@@ -103,19 +103,6 @@ impl<S: Simd> Quadratic16<S> {
         }
     }
 
-    /// The product of two things that are linear over the light.
-    #[inline(always)]
-    pub fn product(p: &Linear16<S>, q: &Linear16<S>) -> Self {
-        Quadratic16 {
-            c: p.c * q.c,
-            x: (p.c * q.x + p.x * q.c) * 0.5,
-            y: (p.c * q.y + p.y * q.c) * 0.5,
-            xx: p.x * q.x,
-            xy: (p.x * q.y + p.y * q.x) * 0.5,
-            yy: p.y * q.y,
-        }
-    }
-
     /// The square of what is linear over the light.
     #[inline(always)]
     pub fn square(line: &Linear16<S>) -> Self {

@@ -5,11 +5,8 @@ use fearless_simd::Level;
 use super::view::{FlatLight, Outline};
 use super::*;
 use crate::color::{Display, DisplaySteps, Rgb};
-use crate::context::NoAssets;
-use crate::ids::LightId;
 use crate::material::{BlinnPhongLobe, Colors, Lobe, Moments, PhongLobe};
-use crate::math::{DVec3, ErrorBound, ShadowRay, Vec3};
-use crate::scene::{CompileOptions, Scene, SceneDesc};
+use crate::math::{DVec3, ErrorBound, Vec3};
 use crate::shape::{Parallelogram, Sphere, SphereUv};
 
 struct Random(firstlight_testkit::Random);
@@ -239,8 +236,6 @@ struct BallCase {
     lobe: Lobe,
     spheres: Vec<Sphere>,
     flats: Vec<Parallelogram>,
-    /// What else there is, in place of all of these.
-    scene: Option<Scene>,
 }
 
 impl BallCase {
@@ -277,7 +272,7 @@ impl BallCase {
         let scale = [1e-3, 1.0, 3e3][seed as usize / 3 % 3];
         let (center, radius) = (center * scale, radius * scale);
         spheres.iter_mut().for_each(|sphere: &mut Sphere| (sphere.c, sphere.r) = (sphere.c * scale, sphere.r * scale));
-        BallCase { center, radius, physical, both_sides, point, lobe, spheres, flats: Vec::new(), scene: None }
+        BallCase { center, radius, physical, both_sides, point, lobe, spheres, flats: Vec::new() }
     }
 
     /// With the point inside of the ball.
@@ -301,61 +296,14 @@ impl BallCase {
         case
     }
 
-    /// With one solid that may reach into the light, and a sphere around the point.
-    fn with_solid(seed: u64) -> BallCase {
-        let mut case = if seed.is_multiple_of(2) { BallCase::new(seed) } else { BallCase::inside(seed) };
-        let mut random = Random::new(seed ^ 0x9d7);
-        let list = |v: DVec3| format!("[{}, {}, {}]", v.x, v.y, v.z);
-        let size = case.radius * random.scale(0.2, 1.0);
-        let at = case.center + random.direction() * case.radius * random.between(0.2, 1.3);
-        let to = at + random.direction() * size * random.scale(0.2, 2.0);
-        let normal = random.direction();
-        let kind = (seed / 2) % 5;
-        let text = match kind {
-            0 => format!("[[cylinder]]\np0 = {}\np1 = {}\nradius = {}", list(at), list(to), size * 0.5),
-            1 => format!("[[cone]]\np0 = {}\np1 = {}\nradius0 = {size}", list(at), list(to)),
-            2 => {
-                let hole = size * random.between(0.1, 0.9);
-                format!(
-                    "[[disk]]\ncenter = {}\nnormal = {}\nradius = {size}\ninner_radius = {hole}",
-                    list(at),
-                    list(normal)
-                )
-            }
-            3 => {
-                let place = format!("translate = {}, rotate_deg = [20, 30, 40], scale = [1, 0.4, 0.7]", list(at));
-                format!("[[sphere]]\ncenter = [0, 0, 0]\nradius = {size}\ntransform = {{ {place} }}")
-            }
-            // Around the point
-            _ => format!("[[sphere]]\ncenter = {}\nradius = {}", list(normal * size), size * random.scale(1.02, 3.0)),
-        };
-        let BallCase { center, radius, .. } = case;
-        let light = format!("[[light.sphere]]\ncenter = {}\nradius = {radius}", list(center));
-        // One ray: compiling asks all of a picture's rays whether they meet anything
-        let camera = "[render]\nwidth = 1\nheight = 1\n[camera]\nposition = [0, 0, 0]\nlook_at = [0, 0, 1]";
-        let parsed = SceneDesc::parse("s.toml", format!("{camera}\n{text}\n{light}").as_bytes(), &NoAssets);
-        let scene = parsed.compile(&NoAssets, &CompileOptions::default()).expect("is a scene").scene;
-        let here = (-scene.origin).as_vec3();
-        (case.point.p, case.center) = (here, case.center - scene.origin);
-        (case.spheres, case.flats) = (Vec::new(), Vec::new());
-        case.scene = Some(scene);
-        case
+    fn is_hidden(&self, l: DVec3) -> bool {
+        self.spheres.iter().any(|s| is_hidden(s, l)) || self.flats.iter().any(|flat| is_behind(flat, l))
     }
 
-    fn is_hidden(&self, l: DVec3) -> bool {
-        if let Some(scene) = &self.scene {
-            let ShadingPoint { p, error, facet, .. } = self.point;
-            return scene.occluded(&ShadowRay {
-                p,
-                error,
-                start: p,
-                l: l.as_vec3(),
-                t_max: 1.0,
-                to: scene.light_end(LightId(0)),
-                but: facet,
-            });
-        }
-        self.spheres.iter().any(|s| is_hidden(s, l)) || self.flats.iter().any(|flat| is_behind(flat, l))
+    /// Whether anything has a part of itself within the light.
+    fn is_reached_into(&self) -> bool {
+        self.spheres.iter().any(|sphere| (sphere.c - self.center).length() < sphere.r + self.radius)
+            || self.flats.iter().any(|flat| flat.distance(self.center) < self.radius)
     }
 
     /// The mean over `n` x 2 `n` points of the sphere, in f64.
@@ -386,12 +334,8 @@ impl BallCase {
 
     fn batched(&self, steps: &DisplaySteps) -> Moments {
         let BallCase { center, radius, physical, both_sides, .. } = *self;
-        let sides = if both_sides { BallSides::Both } else { BallSides::Outer };
-        let emitter = Emitter::Ball { center, radius, physical, sides };
-        let obstacles = match &self.scene {
-            Some(scene) => Obstacles::new(scene, 0, &emitter),
-            None => Obstacles::of(&self.spheres, &self.flats, &emitter),
-        };
+        let emitter = Emitter::Ball { center, radius, physical, both_sides };
+        let obstacles = Obstacles::of(&self.spheres, &self.flats, &emitter);
         let asked = Asked {
             emitter: &emitter,
             obstacles: &obstacles,
@@ -418,14 +362,21 @@ fn is_hidden(sphere: &Sphere, l: DVec3) -> bool {
 #[test]
 fn batches_know_spheres_of_any_kind() {
     let steps = DisplaySteps::new(&Display::default(), 1.0);
+    let mut unknown = 0;
     for seed in 7000..7300 {
         let case = BallCase::new(seed);
-        let (found, truth) = (case.batched(&steps), case.brute(300));
-        assert!(found.is_known(), "seed {seed}");
+        let found = case.batched(&steps);
+        assert!(found.is_known() || case.is_reached_into(), "seed {seed}");
+        if !found.is_known() {
+            unknown += 1;
+            continue;
+        }
+        let truth = case.brute(300);
         let off = off(&steps, &found, &truth);
         let what = (case.physical, case.both_sides, case.radius / case.center.length(), case.spheres.len());
         assert!(off < 0.4, "seed {seed}, {what:?}: {found:?} is not {truth:?}: {off} steps");
     }
+    assert!((10..60).contains(&unknown), "{unknown}");
 }
 
 /// To one in a hundred, and `room`.
@@ -438,32 +389,21 @@ fn assert_close(found: &Moments, truth: &Moments, room: f32, what: &str) {
 #[test]
 fn batches_know_spheres_from_inside() {
     let steps = DisplaySteps::new(&Display::default(), 1.0);
+    let mut unknown = 0;
     for seed in 8000..8300 {
         let case = BallCase::inside(seed);
-        let (found, truth) = (case.batched(&steps), case.brute(400));
+        let found = case.batched(&steps);
+        assert!(found.is_known() || case.is_reached_into(), "seed {seed}");
+        if !found.is_known() {
+            unknown += 1;
+            continue;
+        }
+        let truth = case.brute(400);
         let off = off(&steps, &found, &truth);
         let what = (case.physical, case.radius / case.center.length(), case.spheres.len(), case.flats.len());
         assert!(off < 0.4, "seed {seed}, {what:?}: {found:?} is not {truth:?}: {off} steps");
         // A half space of such light is more than white
         assert_close(&found, &truth, 0.004, &format!("seed {seed}, {what:?}"));
     }
-}
-
-#[test]
-fn batches_know_what_reaches_into_spheres() {
-    let steps = DisplaySteps::new(&Display::default(), 1.0);
-    let mut unknown = 0;
-    for seed in 9000..9400 {
-        let case = BallCase::with_solid(seed);
-        let found = case.batched(&steps);
-        if !found.is_known() {
-            // From inside of what is cut
-            unknown += 1;
-            continue;
-        }
-        let truth = case.brute(300);
-        let what = (case.physical, case.both_sides, case.radius / case.center.length(), seed / 2 % 5);
-        assert_close(&found, &truth, 0.006, &format!("seed {seed}, {what:?}"));
-    }
-    assert!(unknown < 20, "{unknown}");
+    assert!((50..200).contains(&unknown), "{unknown}");
 }

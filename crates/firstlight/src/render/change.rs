@@ -1,7 +1,7 @@
 //! What of one light arrives at a place, and how much that bends over the patch around it.
 
 use super::arrival::ArrivalPlace;
-use crate::integrate::{Arrived, BallSides, Emitter, FlatView, Illumination, TOLERANCE};
+use crate::integrate::{Arrived, Emitter, FlatView, Illumination, TOLERANCE};
 use crate::material::{Lobe, Moments};
 use crate::math::{Vec3, square};
 
@@ -52,7 +52,7 @@ impl Arrival {
 pub(super) fn unseen(emitter: &Emitter, place: &ArrivalPlace) -> Change {
     let is_known = match emitter {
         Emitter::Flat(_) => true,
-        Emitter::Ball { sides: BallSides::Both | BallSides::Inner, .. } | Emitter::Face { .. } => false,
+        Emitter::Ball { both_sides: true, .. } | Emitter::Face { .. } => false,
         Emitter::Ball { center, radius, .. } => {
             (*center - place.si.lit_from.as_dvec3()).length() + f64::from(place.reach) < radius * (1.0 - 1e-6)
         }

@@ -14,7 +14,7 @@ use super::behind::{FragmentSight, NONE};
 use super::{CELL, Cells};
 use crate::color::Rgb;
 use crate::ids::LightId;
-use crate::integrate::{BallSides, Emitter, TOLERANCE};
+use crate::integrate::{Emitter, TOLERANCE};
 use crate::material::Moments;
 use crate::math::{LANES, Vec3};
 use crate::render::Counts;
@@ -415,7 +415,7 @@ impl Cells<'_> {
         let mut misses = Misses::new(side);
         // Of a ball that shines on one side, rays see points that do not shine to them
         let emitter = &self.lights.arrivals.lights.emitters[light];
-        let is_telling = !matches!(emitter, Some(Emitter::Ball { sides: BallSides::Outer | BallSides::Inner, .. }));
+        let is_telling = !matches!(emitter, Some(Emitter::Ball { both_sides: false, .. }));
         for (number, told) in told.iter_mut().enumerate().take((side * side) as usize) {
             let [i, j] = [number as u32 % side, number as u32 / side];
             let [across, down] = [columns.weights(i), rows.weights(j)];
