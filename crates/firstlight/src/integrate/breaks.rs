@@ -22,8 +22,6 @@ pub(crate) struct Breaks<'a, S: Simd> {
     /// The sides of the cells, if they are straight, or of boxes around them.
     pub x: [f32x16<S>; 2],
     pub is_straight: bool,
-    /// Their first and last rows.
-    pub y: [f32x16<S>; 2],
     pub round: Option<RoundSides<S>>,
     /// Whose rows are looked for.
     pub of: mask32x16<S>,

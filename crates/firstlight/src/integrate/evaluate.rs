@@ -176,10 +176,9 @@ struct PointSum {
     /// The round that the last two are of.
     round: u32,
     cells: u32,
-    /// What was asked, and may be, in cells; and what a panel counts for.
+    /// What was asked, and may be, in cells and panels.
     asked: f32,
     most_asked: f32,
-    panel: f32,
 }
 
 impl Evaluator {
@@ -260,7 +259,7 @@ impl Evaluator {
         self.panels.clear();
         self.kept.clear();
         self.seen.clear();
-        let (outline, blocked) = (light.emitter.outline(), light.blocked(&[]));
+        let outline = light.emitter.outline();
         for (block, points) in points.chunks(LANES).enumerate() {
             let start = block * LANES;
             let there = self.see(level, light, block, points);
@@ -319,7 +318,7 @@ impl Evaluator {
                     self.grading.push(whole(outline, number, self.views[block].square(k)));
                 }
                 let state = &mut self.state[start + k];
-                (state.most_asked, state.panel) = (most_asked, blocked.cost(class.between));
+                state.most_asked = most_asked;
                 self.between.push(class.between);
                 arrived.push(one);
             }
@@ -429,7 +428,7 @@ impl Evaluator {
     fn count_panels(&mut self, arrived: &mut [Arrived]) {
         for panel in &self.panels {
             let state = &mut self.state[panel.point as usize];
-            state.asked += state.panel;
+            state.asked += 1.0;
         }
         if self.give_up(arrived) {
             self.leave_panels();

@@ -155,11 +155,7 @@ impl<S: Simd> Inside<S> {
                 );
                 Some(Inside { lines, mantle: Some((mantle, wide)) })
             }
-            Canonical::Frustum { .. }
-            | Canonical::Plane
-            | Canonical::Disk { .. }
-            | Canonical::Ball
-            | Canonical::Torus { .. } => None,
+            Canonical::Frustum { .. } | Canonical::Plane | Canonical::Disk { .. } | Canonical::Ball => None,
         }
     }
 
@@ -200,7 +196,7 @@ enum Hole {
 }
 
 impl<S: Simd> Hull<S> {
-    /// `to` is the way to the middle of its own space, `l` are the light's in it. Not of a ball or a torus. Not
+    /// `to` is the way to the middle of its own space, `l` are the light's in it. Not of a ball. Not
     /// inlined, as what it is asked is not: one copy of each for each instruction set is enough.
     #[inline(never)]
     pub fn new(solid: &SolidOccluder, to: Vec3x16<S>, l: &[Vec3x16<S>; 3]) -> Hull<S> {
@@ -275,7 +271,7 @@ impl<S: Simd> Hull<S> {
                 // No such planes: only an end is seen
                 hull.faces[0][0].c = touches.select(hull.faces[0][0].c, simd.splat_f32x16(-FAR));
             }
-            Canonical::Ball | Canonical::Torus { .. } => unreachable!("these have shadows of their own"),
+            Canonical::Ball => unreachable!("it has a shadow of its own"),
         }
         hull
     }

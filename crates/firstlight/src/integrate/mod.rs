@@ -17,7 +17,6 @@ mod occluder;
 mod panels;
 mod row;
 mod tolerance;
-mod torus;
 mod view;
 
 pub(crate) use batch::ShadingPoint;

@@ -12,7 +12,6 @@ use super::batch::{Exact, Linear16};
 use super::breaks::Breaks;
 use super::hull::{Hull, SolidOccluder};
 use super::row::{FAR, Interval16, Quadratic16, edges};
-use super::torus::TorusShadow;
 use crate::math::Vec3x16;
 use crate::shape::Canonical;
 
@@ -53,7 +52,6 @@ pub(crate) enum Shadow<S: Simd> {
         lines: [Linear16<S>; 5],
     },
     Hull(Hull<S>),
-    Torus(TorusShadow<S>),
 }
 
 impl<S: Simd> Shadow<S> {
@@ -67,7 +65,6 @@ impl<S: Simd> Shadow<S> {
                 let (to, l) = solid.seen_from(simd, p, l);
                 match solid.kind {
                     Canonical::Ball => Shadow::cone(simd, to, 1.0, &l),
-                    Canonical::Torus { tube } => Shadow::Torus(TorusShadow::new(to, &l, tube)),
                     _ => Shadow::Hull(Hull::new(solid, to, &l)),
                 }
             }
@@ -129,7 +126,6 @@ impl<S: Simd> Shadow<S> {
     pub fn hidden(&self, simd: S, y: f32x16<S>) -> [Interval16<S>; 2] {
         match self {
             Shadow::Hull(hull) => hull.hidden(simd, y),
-            Shadow::Torus(torus) => torus.hidden(simd, y),
             Shadow::Edges { .. } | Shadow::Cone { .. } => [self.interval(simd, y), Interval16::none(simd)],
         }
     }
@@ -138,7 +134,6 @@ impl<S: Simd> Shadow<S> {
     pub fn has_hole(&self) -> bool {
         match self {
             Shadow::Hull(hull) => hull.has_hole(),
-            Shadow::Torus(_) => true,
             Shadow::Cone { .. } | Shadow::Edges { .. } => false,
         }
     }
@@ -148,7 +143,6 @@ impl<S: Simd> Shadow<S> {
     fn interval(&self, simd: S, y: f32x16<S>) -> Interval16<S> {
         match self {
             Shadow::Hull(hull) => hull.hidden(simd, y)[0],
-            Shadow::Torus(torus) => torus.hidden(simd, y)[0],
             Shadow::Edges { lines } => {
                 let mut interval = Interval16::all(simd);
                 for line in lines {
@@ -180,7 +174,7 @@ impl<S: Simd> Shadow<S> {
     pub fn within(&self, simd: S, y: f32x16<S>) -> Interval16<S> {
         let far = simd.splat_f32x16(FAR);
         match self {
-            Shadow::Edges { .. } | Shadow::Hull(_) | Shadow::Torus(_) => Interval16::all(simd),
+            Shadow::Edges { .. } | Shadow::Hull(_) => Interval16::all(simd),
             Shadow::Cone { inside, .. } => {
                 let i = inside.on_row(y);
                 Interval16 { from: i.any.select(i.low, far), to: i.any.select(i.high, -far) }
@@ -201,7 +195,6 @@ impl<S: Simd> Shadow<S> {
                 all
             }
             Shadow::Hull(hull) => hull.hides(x, y),
-            Shadow::Torus(torus) => torus.hides(x, y),
             Shadow::Cone { quadratic, ahead, cut, .. } => {
                 let on_line = quadratic.at(x, y).simd_ge(zero) & ahead.at(x, y).simd_gt(zero);
                 match cut {
@@ -228,7 +221,7 @@ impl<S: Simd> Shadow<S> {
     pub fn holds(&self, x: f32x16<S>, y: f32x16<S>) -> mask32x16<S> {
         let zero = x.token().splat_f32x16(0.0);
         match self {
-            Shadow::Edges { .. } | Shadow::Hull(_) | Shadow::Torus(_) => x.simd_lt(x),
+            Shadow::Edges { .. } | Shadow::Hull(_) => x.simd_lt(x),
             Shadow::Cone { inside, .. } => inside.at(x, y).simd_gt(zero),
         }
     }
@@ -246,7 +239,6 @@ impl<S: Simd> Shadow<S> {
             }
             Shadow::Edges { lines } => breaks.polygon(lines),
             Shadow::Hull(hull) => hull.breaks(breaks),
-            Shadow::Torus(torus) => torus.breaks(breaks),
         }
     }
 }

@@ -18,10 +18,8 @@ use super::breaks::{Breaks, RoundSides};
 use super::fit::{Cell, CutBlock, MOMENTS, sides};
 use super::occluder::{Occluder, Shadow};
 use super::row::{FAR, Interval16};
-use super::tolerance::COSTS;
 use super::view::Outline;
 use crate::math::{LANES, Vec3x16, asin, sin_cos};
-use crate::shape::Canonical;
 
 /// Rows of a panel: the Kronrod rule of seven on [0, 1], spread.
 const ROWS: usize = 7;
@@ -93,15 +91,6 @@ impl<'a> Blocked<'a> {
     fn occluder(&self, number: usize) -> &'a Occluder {
         let [listed, near] = self.occluders;
         listed.get(number).unwrap_or_else(|| &near[number - listed.len()])
-    }
-
-    /// How many cells a panel behind such things takes as long as.
-    pub fn cost(&self, between: Between) -> f32 {
-        let cost = |number: usize| match self.occluder(number) {
-            Occluder::Solid(solid) if matches!(solid.kind, Canonical::Torus { .. }) => COSTS.torus,
-            _ => 0.0,
-        };
-        between.occluders().map(cost).fold(1.0, |sum, cost| sum + cost)
     }
 }
 
@@ -205,8 +194,8 @@ fn breaks<S: Simd>(
     rows: &mut Vec<LaneNumbers>,
 ) {
     use ViewNumber::*;
-    let [x0, x1, y0, y1] = sides(cells).map(|side| f32x16::simd_from(simd, side));
-    let (x, mut y) = ([x0, x1], [y0, y1]);
+    let [x0, x1, ..] = sides(cells).map(|side| f32x16::simd_from(simd, side));
+    let x = [x0, x1];
     let zero = simd.splat_f32x16(0.0);
     let (x, round) = match blocked.outline {
         Outline::Parallelogram => (x, None),
@@ -215,7 +204,6 @@ fn breaks<S: Simd>(
             (x, Some(RoundSides { width: [simd.splat_f32x16(-1.0), simd.splat_f32x16(1.0)], origin }))
         }
         Outline::Sphere => {
-            y = [sin_cos(y[0]).0, sin_cos(y[1]).0];
             let width = [sin_cos(x[0]).0, sin_cos(x[1]).0];
             ([width[0].min(zero), width[1].max(zero)], Some(RoundSides { width, origin: [zero; 2] }))
         }
@@ -224,11 +212,11 @@ fn breaks<S: Simd>(
     let batch = Batch::new(simd, blocked, members, |k| cells[k.min(cells.len() - 1)].point);
     for occluder in batch.occluders() {
         let (shadow, outside, within) = batch.shadow(simd, occluder);
-        let mut breaks = Breaks { x, is_straight, y, round, of: outside | within, rows };
+        let mut breaks = Breaks { x, is_straight, round, of: outside | within, rows };
         shadow.breaks(&mut breaks);
     }
     let all = x[0].simd_eq(x[0]);
-    let mut breaks = Breaks { x, is_straight, y, round, of: all, rows };
+    let mut breaks = Breaks { x, is_straight, round, of: all, rows };
     breaks.line(&members.linear(simd, [CosC, CosX, CosY]));
     breaks.line(&members.linear(simd, [HorizonC, HorizonX, HorizonY]));
     if blocked.outline == Outline::Disk {

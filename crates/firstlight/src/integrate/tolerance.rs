@@ -152,8 +152,6 @@ pub(crate) struct Costs {
     pub asked_per_step: f32,
     /// A cell of a light, or a panel, takes as long as so many points.
     pub cell: f32,
-    /// So much longer a panel takes for each torus in the way, in cells.
-    pub torus: f32,
     /// So many rays tell whether closed forms pay.
     pub heard: f32,
     /// The part of places that closed forms have to tell, or none are asked.
@@ -180,7 +178,6 @@ pub(crate) const COSTS: Costs = Costs {
     asked: 32.0,
     asked_per_step: 2.0,
     cell: 15.0,
-    torus: 3.0,
     heard: 8.0,
     answered: 0.3,
     remembered: 0.9,

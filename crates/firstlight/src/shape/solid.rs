@@ -38,8 +38,6 @@ pub(crate) enum Canonical {
     Ball,
     /// z from 0 to 1, with these radii at both ends, which may be open.
     Frustum { radii: [f32; 2], open: bool },
-    /// No farther than `tube`, below 1, from the circle x^2 + y^2 = 1, z = 0.
-    Torus { tube: f32 },
 }
 
 impl Canonical {
@@ -53,14 +51,7 @@ impl Canonical {
                 let [first, last] = radii.map(f64::from);
                 p.z > -room && p.z < 1.0 + room && p.truncate().length() < first + (last - first) * p.z + room
             }
-            Canonical::Torus { .. } => self.outside(p).is_some_and(|outside| outside < room),
         }
-    }
-
-    /// How far a point is outside of a torus, below 0 inside; of others a box around them says enough.
-    pub fn outside(&self, p: DVec3) -> Option<f64> {
-        let Canonical::Torus { tube } = self else { return None };
-        Some(DVec2::new(p.truncate().length() - 1.0, p.z).length() - f64::from(*tube))
     }
 
     /// Whether light can pass through it.
@@ -69,7 +60,6 @@ impl Canonical {
             Canonical::Disk { hole } => *hole > 0.0,
             Canonical::Frustum { open, .. } => *open,
             Canonical::Plane | Canonical::Box | Canonical::Ball => false,
-            Canonical::Torus { .. } => true,
         }
     }
 
@@ -209,7 +199,7 @@ impl Solid {
             }
             Solid::Frustum(frustum) => Some(frustum.canonical()),
             Solid::Ball(_) => Some((DAffine3::IDENTITY, Canonical::Ball)),
-            Solid::Torus(torus) => torus.canonical(),
+            Solid::Torus(_) => None,
         }
     }
 

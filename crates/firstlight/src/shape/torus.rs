@@ -6,10 +6,10 @@ use arrayvec::ArrayVec;
 use glam::DVec2;
 
 use super::common::shape_table;
-use super::solid::{Canonical, Solid, SolidHit, SolidPoint, turn};
+use super::solid::{Solid, SolidHit, SolidPoint, turn};
 use super::surface::UvEdge;
 use crate::context::CompileContext;
-use crate::math::{Axes, DAffine3, DMat3, DRay, DVec3, bracketed, depressed_cubic};
+use crate::math::{Axes, DRay, DVec3, bracketed, depressed_cubic};
 
 shape_table! {
     /// A ring: a tube bent round into a circle. Where the tube is thicker than the circle the ring has no hole, and
@@ -111,9 +111,6 @@ impl Signs {
 const CLOSE: f64 = 1e-9;
 /// How often a way is halved to find out whether it meets the tube.
 const HALVINGS: usize = 10;
-
-/// Tubes thicker than this part of the circle's radius leave next to no hole.
-const THICK: f64 = 0.95;
 
 impl TorusDesc {
     pub(crate) fn compile(&self, cx: &mut CompileContext) -> Solid {
@@ -334,15 +331,6 @@ impl Torus {
             edges: [UvEdge::Periodic; 2],
             terms: self.center.abs() + DVec3::splat(self.major + self.minor),
         }
-    }
-
-    /// What it is an image of, and by which map; `None` if the tube fills the hole, or nearly so.
-    pub fn canonical(&self) -> Option<(DAffine3, Canonical)> {
-        let tube = self.minor / self.major;
-        let Axes { x, y, z } = self.frame;
-        let axes = DMat3::from_cols(x, y, z) * self.major;
-        (tube < THICK)
-            .then(|| (DAffine3::from_mat3_translation(axes, self.center), Canonical::Torus { tube: tube as f32 }))
     }
 
     pub fn bounds(&self) -> Option<[DVec3; 2]> {

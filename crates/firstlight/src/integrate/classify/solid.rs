@@ -10,7 +10,7 @@ use crate::integrate::occluder::{Occluder, Shadow};
 use crate::math::{DAffine3, DMat3, DVec3, LANES, Vec3x16};
 use crate::shape::{Canonical, Placement, Solid, Sphere, SphereUv};
 
-/// A solid as it is placed: a convex one, one with a straight hole, or a torus.
+/// A solid as it is placed: a convex one, or one with a straight hole.
 pub(super) struct PlacedSolid {
     placement: Placement,
     solid: Solid,
@@ -99,12 +99,7 @@ impl PlacedSolid {
 
     /// How far a point is from it, at least, in metres.
     fn apart(&self, p: DVec3) -> f64 {
-        let apart = self.bounds.as_ref().map_or_else(|| self.height(p).abs(), |bounds| distance(bounds, p));
-        let Some(outside) = self.kind.outside(self.canonical_from_world.transform_point3(p)) else { return apart };
-        // A metre is no longer in its own space than the columns together
-        let [x, y, z] = self.canonical_from_world.matrix3.to_cols_array_2d().map(DVec3::from);
-        let longest = (x.length_squared() + y.length_squared() + z.length_squared()).sqrt();
-        apart.max(outside / longest)
+        self.bounds.as_ref().map_or_else(|| self.height(p).abs(), |bounds| distance(bounds, p))
     }
 
     /// Whether a point is on the plane of a flat one, as far as it can be told, and its surface lies in it.
@@ -127,7 +122,7 @@ enum Lies {
     Aside,
     /// It hides nothing from the point, but may from near it.
     Near,
-    /// The point is inside, and what surrounds it, or it is where the surface is; or nearly at a torus.
+    /// The point is inside, and what surrounds it, or it is where the surface is.
     Inside,
     /// The point is inside, and what surrounds it may be outside.
     NearlyInside,
@@ -158,9 +153,7 @@ impl PlacedSolid {
             let size = |v: DVec3| [rows.x_axis, rows.y_axis, rows.z_axis].map(|row| row.abs().dot(v));
             let largest = |sizes: [f64; 3]| sizes.into_iter().fold(0.0, f64::max);
             let room = ROUNDING + 2.0 * largest(size(error));
-            // Where a tube is as good as around a point, the ends of its chords are not told apart
-            let near = if let Canonical::Torus { tube } = self.kind { 0.125 * f64::from(tube) } else { 0.0 };
-            if !self.kind.holds(at, room.max(near)) {
+            if !self.kind.holds(at, room) {
                 Lies::Between
             } else if self.is_left(at, n, room) {
                 Lies::Aside
