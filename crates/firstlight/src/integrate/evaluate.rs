@@ -21,7 +21,7 @@ use fearless_simd::{Level, Simd};
 use super::batch::{LaneNumbers, Members, ShadingPoint, ViewBlock};
 use super::classify::{Class, Obstacles, classify};
 use super::emitter::Emitter;
-use super::fit::{Cell, CutBlock, Fits, MOMENTS, coarse, fit};
+use super::fit::{Cell, CutBlock, Fits, MOMENTS, fit};
 use super::grade::{Grades, grade, halves, survey, whole};
 use super::panels::{Between, Blocked, Panel, PanelSums, cut, rows};
 use super::tolerance::{COSTS, TOLERANCE, Weight};
@@ -58,8 +58,6 @@ pub(crate) struct Arrived {
     /// How far the light is away, and the point from its plane.
     pub distance: f32,
     pub height: f32,
-    /// What was asked, in cells, if that is bounded and something is in the way.
-    pub asked: f32,
 }
 
 impl Arrived {
@@ -71,7 +69,6 @@ impl Arrived {
         motion: f32::INFINITY,
         distance: 0.0,
         height: 0.0,
-        asked: 0.0,
     };
 
     /// What arrives of two parts of a light.
@@ -86,7 +83,6 @@ impl Arrived {
             illumination,
             proved: self.proved && other.proved && illumination != Illumination::Partial,
             motion: self.motion.max(other.motion),
-            asked: self.asked + other.asked,
             ..*self
         }
     }
@@ -143,9 +139,7 @@ pub(crate) struct Evaluator {
     grading: Vec<Cell>,
     grades: Vec<Grades>,
     next_grading: Vec<Cell>,
-    /// Cells that are seen whole, to be asked: those on which light is smooth enough that few nodes may tell it, and
-    /// others.
-    smooth: Vec<Cell>,
+    /// Cells that are seen whole, to be asked.
     whole: Vec<Cell>,
     /// All cells that are seen in part, what is kept of those that were asked, and how much is seen of each. Those of
     /// one round begin with a block.
@@ -155,7 +149,6 @@ pub(crate) struct Evaluator {
     /// Panels to be asked.
     panels: Vec<Panel>,
     /// What was asked in one round.
-    smooth_fits: Vec<Fits>,
     fits: Vec<Fits>,
     cut_fits: Vec<Fits>,
     panel_sums: Vec<PanelSums>,
@@ -219,11 +212,7 @@ impl Evaluator {
         let arrived = &mut arrived[first..];
         let is_bounded = points.iter().any(ShadingPoint::is_bounded);
         let mut round = 0;
-        while !(self.smooth.is_empty()
-            && self.whole.is_empty()
-            && self.kept.len() * LANES == self.cut.len()
-            && self.panels.is_empty())
-        {
+        while !(self.whole.is_empty() && self.kept.len() * LANES == self.cut.len() && self.panels.is_empty()) {
             round += 1;
             let new = self.kept.len() * LANES;
             if is_bounded {
@@ -253,7 +242,6 @@ impl Evaluator {
         self.between.clear();
         self.state.clear();
         self.state.resize(points.len(), PointSum::default());
-        self.smooth.clear();
         self.whole.clear();
         self.cut.clear();
         self.panels.clear();
@@ -285,7 +273,6 @@ impl Evaluator {
                     motion: 0.0,
                     distance: if is(there) { survey.nearest[k] } else { 0.0 },
                     height: if is(there) { survey.height[k] } else { 0.0 },
-                    asked: 0.0,
                 };
                 let is_open = class.between == Between::default();
                 if is(survey.arrives) {
@@ -307,10 +294,6 @@ impl Evaluator {
                     Illumination::Partial | Illumination::Unknown => false,
                 };
                 let most_asked = Asked::most_asked(LARGEST_CODE) * point.part_of_points;
-                // Nothing is begun that may not be asked
-                if most_asked == 0.0 && !is_open && one.illumination == Illumination::Partial {
-                    one.illumination = Illumination::Unknown;
-                }
                 let is_wanted = light.sums && (one.proved || one.motion <= point.most_motion);
                 if is_wanted && matches!(one.illumination, Illumination::Full | Illumination::Partial) {
                     let number = (start + k) as u32;
@@ -378,12 +361,7 @@ impl Evaluator {
                     continue;
                 }
                 let is_open = self.between[cell.point as usize] == Between::default();
-                let queue = match is_open && is(grades.all) {
-                    true if is(grades.smooth) => &mut self.smooth,
-                    true => &mut self.whole,
-                    false => &mut self.cut,
-                };
-                queue.push(*cell);
+                if is_open && is(grades.all) { &mut self.whole } else { &mut self.cut }.push(*cell);
             }
             self.grading.clear();
             std::mem::swap(&mut self.grading, &mut self.next_grading);
@@ -392,9 +370,9 @@ impl Evaluator {
 
     /// Bounds what points are asked by what the light could make of them: it was asked for all cells once.
     fn bound(&mut self, light: &Asked, points: &[ShadingPoint]) {
-        let Evaluator { state, smooth, smooth_fits, whole, fits, cut, cut_fits, .. } = self;
+        let Evaluator { state, whole, fits, cut, cut_fits, .. } = self;
         let mut sent = vec![Moments::default(); points.len()];
-        for (cells, fits) in [(smooth, smooth_fits), (whole, fits), (cut, cut_fits)] {
+        for (cells, fits) in [(whole, fits), (cut, cut_fits)] {
             for (k, cell) in cells.iter().enumerate() {
                 sent[cell.point as usize] += Moments(lane(&fits[k / LANES].sums, k).map(f32::abs));
             }
@@ -409,13 +387,12 @@ impl Evaluator {
     /// Counts the cells of this round, and leaves out those of points that are asked too much.
     fn count_cells(&mut self, arrived: &mut [Arrived]) {
         let new = self.kept.len() * LANES;
-        for cell in self.smooth.iter().chain(&self.whole).chain(&self.cut[new..]) {
+        for cell in self.whole.iter().chain(&self.cut[new..]) {
             self.state[cell.point as usize].asked += 1.0;
         }
         if self.give_up(arrived) {
             let state = &self.state;
             let is_asked = |cell: &Cell| state[cell.point as usize].cells != PointSum::GIVEN_UP;
-            self.smooth.retain(is_asked);
             self.whole.retain(is_asked);
             let mut kept = self.cut.split_off(new);
             kept.retain(is_asked);
@@ -440,9 +417,6 @@ impl Evaluator {
         let mut is_any = false;
         for ((state, between), arrived) in self.state.iter_mut().zip(&self.between).zip(arrived) {
             let is_behind = *between != Between::default() && arrived.illumination == Illumination::Partial;
-            if is_behind {
-                arrived.asked = state.asked;
-            }
             if is_behind && state.asked > state.most_asked {
                 state.cells = PointSum::GIVEN_UP;
                 arrived.illumination = Illumination::Unknown;
@@ -459,25 +433,17 @@ impl Evaluator {
 
     /// Asks all cells of this round, and makes panels of those that are new and seen in part.
     fn ask_cells(&mut self, level: Level, light: &Asked) {
-        let Evaluator { views, between, smooth, whole, cut: cut_cells, kept, panels, spare, .. } = self;
+        let Evaluator { views, between, whole, cut: cut_cells, kept, panels, spare, .. } = self;
         let falloff = light.emitter.falloff();
         let blocked = light.blocked(between);
-        self.smooth_fits.clear();
         self.fits.clear();
         self.cut_fits.clear();
-        let (smooth_fits, fits, cut_fits) = (&mut self.smooth_fits, &mut self.fits, &mut self.cut_fits);
+        let (fits, cut_fits) = (&mut self.fits, &mut self.cut_fits);
         // Those of the cut cells that are new
         let new = cut_cells[kept.len() * LANES..].chunks(LANES).map(|cells| (cells, true));
         let asked = whole.chunks(LANES).map(|cells| (cells, false)).chain(new);
         // Each kernel is called at one place: so there is one copy of it for each instruction set
         dispatch_wide!(level, simd => {
-            for cells in smooth.chunks(LANES) {
-                let members = Members::new(views, cells.len(), |k| cells[k].point);
-                smooth_fits.push(simd.vectorize(
-                    #[inline(always)]
-                    || coarse(simd, light.lobe, falloff, &members, cells),
-                ));
-            }
             for (cells, is_cut) in asked {
                 let members = Members::new(views, cells.len(), |k| cells[k].point);
                 let first = (kept.len() * LANES) as u32;
@@ -518,9 +484,6 @@ impl Evaluator {
     /// first time.
     fn judge(&mut self, light: &Asked, points: &[ShadingPoint], new: usize, round: u32) {
         // What arrives as far as is known now, and how much of each new cell is seen
-        for (k, cell) in self.smooth.iter().enumerate() {
-            self.state[cell.point as usize].expect(lane(&self.smooth_fits[k / LANES].sums, k), round);
-        }
         for (k, cell) in self.whole.iter().enumerate() {
             self.state[cell.point as usize].expect(lane(&self.fits[k / LANES].sums, k), round);
         }
@@ -535,7 +498,7 @@ impl Evaluator {
         }
         // How much errors weigh at such a brightness
         let states = &mut self.state;
-        let asked = self.smooth.iter().chain(&self.whole).map(|cell| cell.point);
+        let asked = self.whole.iter().map(|cell| cell.point);
         let asked = asked.chain(self.panels.iter().map(|panel| panel.point));
         for point in asked {
             let state = &mut states[point as usize];
@@ -549,17 +512,6 @@ impl Evaluator {
         }
         // Cells that are seen whole
         self.next_whole.clear();
-        for (k, cell) in self.smooth.iter().enumerate() {
-            let fits = &self.smooth_fits[k / LANES];
-            let state = &mut self.state[cell.point as usize];
-            let [x, y] = fit_error(state.weight, fits, k);
-            if x + y > TOLERANCE.part {
-                self.next_whole.push(*cell);
-            } else {
-                state.accept(lane(&fits.sums, k));
-            }
-        }
-        self.smooth.clear();
         for (k, cell) in self.whole.iter().enumerate() {
             let fits = &self.fits[k / LANES];
             let state = &mut self.state[cell.point as usize];

@@ -30,40 +30,33 @@ const WEIGHTS: [f64; NODES] = [
     0.236_926_885_056_189_08,
 ];
 
-/// A Gauss-Legendre rule of `N` nodes on [-1, 1], with what each node counts in the coefficients of the last two
-/// Legendre polynomials that it knows.
-struct Rule<const N: usize> {
-    nodes: [f32; N],
-    weights: [f32; N],
-    tails: [[f32; N]; 2],
+/// The rule as floats, with what each node counts in the coefficients of the last two Legendre polynomials that it
+/// knows.
+struct Rule {
+    nodes: [f32; NODES],
+    weights: [f32; NODES],
+    tails: [[f32; NODES]; 2],
 }
 
-impl<const N: usize> Rule<N> {
-    const fn new(nodes: [f64; N], weights: [f64; N]) -> Rule<N> {
-        let mut rule = Rule { nodes: [0.0; N], weights: [0.0; N], tails: [[0.0; N]; 2] };
-        let mut i = 0;
-        while i < N {
-            let x = nodes[i];
-            // Bonnet's recursion
-            let (mut before, mut p, mut k) = (1.0, x, 1);
-            while k + 1 < N {
-                (before, p) = (p, ((2 * k + 1) as f64 * x * p - k as f64 * before) / (k + 1) as f64);
-                k += 1;
-            }
-            rule.nodes[i] = x as f32;
-            rule.weights[i] = weights[i] as f32;
-            rule.tails[0][i] = ((k as f64 - 0.5) * weights[i] * before) as f32;
-            rule.tails[1][i] = ((k as f64 + 0.5) * weights[i] * p) as f32;
-            i += 1;
+const RULE: Rule = {
+    let mut rule = Rule { nodes: [0.0; NODES], weights: [0.0; NODES], tails: [[0.0; NODES]; 2] };
+    let mut i = 0;
+    while i < NODES {
+        let x = GAUSS[i];
+        // Bonnet's recursion
+        let (mut before, mut p, mut k) = (1.0, x, 1);
+        while k + 1 < NODES {
+            (before, p) = (p, ((2 * k + 1) as f64 * x * p - k as f64 * before) / (k + 1) as f64);
+            k += 1;
         }
-        rule
+        rule.nodes[i] = x as f32;
+        rule.weights[i] = WEIGHTS[i] as f32;
+        rule.tails[0][i] = ((k as f64 - 0.5) * WEIGHTS[i] * before) as f32;
+        rule.tails[1][i] = ((k as f64 + 0.5) * WEIGHTS[i] * p) as f32;
+        i += 1;
     }
-}
-
-const FINE: Rule<NODES> = Rule::new(GAUSS, WEIGHTS);
-/// Three nodes, which tell the mean of what is smooth on a cell.
-const COARSE: Rule<3> =
-    Rule::new([-0.774_596_669_241_483_4, 0.0, 0.774_596_669_241_483_4], [5.0 / 9.0, 8.0 / 9.0, 5.0 / 9.0]);
+    rule
+};
 
 /// Coefficients of x^0 to x^4 of the polynomial that is 1 at a node and 0 at the others.
 const LAGRANGE: [[f64; NODES]; NODES] = {
@@ -180,19 +173,18 @@ pub(super) fn sides(cells: &[Cell]) -> [LaneNumbers; 4] {
     sides
 }
 
-/// What sixteen cells send at the nodes of a rule: [moment][row][column].
-type NodeValues<S, const N: usize> = [[[f32x16<S>; N]; N]; MOMENTS];
+/// What sixteen cells send at the nodes: [moment][row][column].
+type NodeValues<S> = [[[f32x16<S>; NODES]; NODES]; MOMENTS];
 
-/// What up to sixteen cells send at the nodes of a rule, and what they count for. To be called within `vectorize`.
+/// What up to sixteen cells send at the nodes, and what they count for. To be called within `vectorize`.
 #[inline(always)]
-fn values<S: Simd, const N: usize>(
+fn values<S: Simd>(
     simd: S,
-    rule: &Rule<N>,
     lobe: &Lobe,
     falloff: AreaWeight,
     members: &Members<ViewBlock>,
     cells: &[Cell],
-) -> (NodeValues<S, N>, f32x16<S>) {
+) -> (NodeValues<S>, f32x16<S>) {
     use ViewNumber::*;
     let splat = |v: f32| simd.splat_f32x16(v);
     let [x0, x1, y0, y1] = sides(cells).map(|side| f32x16::simd_from(simd, side));
@@ -209,7 +201,7 @@ fn values<S: Simd, const N: usize>(
     let out = members.linear(simd, [OutC, OutX, OutY]);
     let zero = splat(0.0);
     let height2 = height * height;
-    let mut values = [[[zero; N]; N]; MOMENTS];
+    let mut values = [[[zero; NODES]; NODES]; MOMENTS];
     let is_sphere = falloff == AreaWeight::Sphere;
     let (ratio, behind2) = (members.lanes(simd, Ratio), members.lanes(simd, Behind2));
     // The way to the middle of a sphere, and the square of the way to where it is touched, as if there were one
@@ -222,14 +214,14 @@ fn values<S: Simd, const N: usize>(
         }
         _ => (Linear16 { c: zero, x: zero, y: zero }, zero, zero),
     };
-    let (mut places, mut deep) = ([zero; N], [splat(1.0); N]);
-    for (i, node) in rule.nodes.iter().enumerate() {
+    let (mut places, mut deep) = ([zero; NODES], [splat(1.0); NODES]);
+    for (i, node) in RULE.nodes.iter().enumerate() {
         places[i] = xh * *node + xm;
         if is_sphere {
             (places[i], deep[i]) = sin_cos(places[i]);
         }
     }
-    for (j, node) in rule.nodes.iter().enumerate() {
+    for (j, node) in RULE.nodes.iter().enumerate() {
         let (mut y, mut wide) = (yh * *node + ym, splat(1.0));
         if is_sphere {
             (y, wide) = sin_cos(y);
@@ -238,8 +230,8 @@ fn values<S: Simd, const N: usize>(
         let across = y * lb + fb;
         let rest = across * across + height2;
         let (cos_row, out_row) = (y * cos.y + cos.c, y * out.y + out.c);
-        let (mut cos_i, mut cos_io, mut weights) = ([zero; N], [zero; N], [splat(1.0); N]);
-        for i in 0..N {
+        let (mut cos_i, mut cos_io, mut weights) = ([zero; NODES], [zero; NODES], [splat(1.0); NODES]);
+        for i in 0..NODES {
             let x = if is_sphere { places[i] * wide } else { places[i] };
             let along = x * la + along_row;
             let inverse = 1.0 / (along * along + rest).sqrt();
@@ -277,56 +269,25 @@ fn values<S: Simd, const N: usize>(
 /// The sum of a moment over a cell, and the last two coefficients of its series along x and along y, as much as they
 /// make of that.
 #[inline(always)]
-fn sum<S: Simd, const N: usize>(
-    simd: S,
-    rule: &Rule<N>,
-    values: &[[f32x16<S>; N]; N],
-) -> (f32x16<S>, [[f32x16<S>; 2]; 2]) {
+fn sum<S: Simd>(simd: S, values: &[[f32x16<S>; NODES]; NODES]) -> (f32x16<S>, [[f32x16<S>; 2]; 2]) {
     let zero = simd.splat_f32x16(0.0);
     let (mut sum, mut tails) = (zero, [[zero; 2]; 2]);
     for (j, row) in values.iter().enumerate() {
         let (mut total, mut c, mut d) = (zero, [zero; 2], [zero; 2]);
-        for i in 0..N {
-            total += row[i] * rule.weights[i];
+        for i in 0..NODES {
+            total += row[i] * RULE.weights[i];
             for k in 0..2 {
-                c[k] += row[i] * rule.tails[k][i];
-                d[k] += values[i][j] * rule.tails[k][i];
+                c[k] += row[i] * RULE.tails[k][i];
+                d[k] += values[i][j] * RULE.tails[k][i];
             }
         }
-        sum += total * rule.weights[j];
+        sum += total * RULE.weights[j];
         for k in 0..2 {
-            tails[0][k] += c[k].abs() * (2.0 * rule.weights[j]);
-            tails[1][k] += d[k].abs() * (2.0 * rule.weights[j]);
+            tails[0][k] += c[k].abs() * (2.0 * RULE.weights[j]);
+            tails[1][k] += d[k].abs() * (2.0 * RULE.weights[j]);
         }
     }
     (sum, tails)
-}
-
-/// The sums of up to sixteen cells by three nodes along each axis. What comes next in their series is as large as their
-/// last coefficient, or, where that is 0 by chance, as the square of the one before; what nodes miss is the third power
-/// of that, where it is small beside the sum. To be called within `vectorize`.
-#[inline(always)]
-pub(crate) fn coarse<S: Simd>(
-    simd: S,
-    lobe: &Lobe,
-    falloff: AreaWeight,
-    members: &Members<ViewBlock>,
-    cells: &[Cell],
-) -> Fits {
-    let (values, area) = values(simd, &COARSE, lobe, falloff, members, cells);
-    let mut fits = Fits::default();
-    let moments = lobe.moment_count();
-    for (moment, values) in values.iter().enumerate().take(moments) {
-        let (sum, tails) = sum(simd, &COARSE, values);
-        fits.sums[moment] = (sum * area).to_array();
-        let (least, one) = (simd.splat_f32x16(f32::MIN_POSITIVE), simd.splat_f32x16(1.0));
-        for (axis, [before, last]) in tails.into_iter().enumerate() {
-            let tail = last + before * (before / sum.abs().max(least)).min(one);
-            let part = (tail / sum.abs().max(least)).min(one);
-            fits.errors[axis][moment] = (tail * (part * part) * area).to_array();
-        }
-    }
-    fits
 }
 
 /// The fit of up to sixteen cells. Where all of a cell is seen it can be wrong by the end of its series, times the part
@@ -341,12 +302,12 @@ pub(crate) fn fit<S: Simd>(
     cells: &[Cell],
     kept: Option<&mut Vec<CutBlock>>,
 ) -> Fits {
-    let (values, area) = values(simd, &FINE, lobe, falloff, members, cells);
+    let (values, area) = values(simd, lobe, falloff, members, cells);
     let (zero, one, least) = (simd.splat_f32x16(0.0), simd.splat_f32x16(1.0), simd.splat_f32x16(f32::MIN_POSITIVE));
     let mut fits = Fits::default();
     let moments = lobe.moment_count();
     for (moment, values) in values.iter().enumerate().take(moments) {
-        let (sum, tails) = sum(simd, &FINE, values);
+        let (sum, tails) = sum(simd, values);
         fits.sums[moment] = (sum * area).to_array();
         for (axis, [before, last]) in tails.into_iter().enumerate() {
             let tail = last + before * 0.25;

@@ -94,10 +94,9 @@ pub(super) struct Grades {
     /// Nothing of it is in the light and above the horizons; all of it is.
     pub nothing: u64,
     pub all: u64,
-    /// It is too wide, and longer along y than along x; it is so narrow that few nodes may tell it.
+    /// It is too wide, and longer along y than along x.
     pub wide: u64,
     pub along_y: u64,
-    pub smooth: u64,
 }
 
 /// Grades up to sixteen cells. To be called within `vectorize`.
@@ -128,7 +127,6 @@ pub(super) fn grade<S: Simd>(
     let (half_x2, half_y2) = ((half_x + lean) * (half_x + lean), half_y * half_y);
     let size2 = half_x2 + half_y2;
     let mut wide = size2.simd_gt(distance2);
-    let mut smooth = !wide;
     let sharpness = lobe.sharpness_lanes(members.lanes(simd, CosO));
     let is_sharp = (sharpness * size2).simd_gt(distance2);
     if is_sharp.any_true() {
@@ -143,7 +141,6 @@ pub(super) fn grade<S: Simd>(
         let is_far = has_mirror & (sharpness * apart * apart).simd_ge(TOLERANCE.highlight);
         let is_across = (sharpness * size2).simd_gt(distance2 * TOLERANCE.highlight);
         wide |= is_sharp & has_mirror & !is_far & is_across;
-        smooth &= !is_sharp | is_far;
     }
     let [nothing, all] = seen(simd, outline, members, [x0, x1], [y0, y1]);
     let along_y = match outline {
@@ -156,7 +153,6 @@ pub(super) fn grade<S: Simd>(
         all: all.to_bitmask(),
         wide: wide.to_bitmask(),
         along_y: along_y.to_bitmask(),
-        smooth: smooth.to_bitmask(),
     }
 }
 

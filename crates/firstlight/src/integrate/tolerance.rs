@@ -150,19 +150,6 @@ pub(crate) struct Costs {
     /// takes as long as about 8 of them.
     pub asked: f32,
     pub asked_per_step: f32,
-    /// A cell of a light, or a panel, takes as long as so many points.
-    pub cell: f32,
-    /// So many rays tell whether closed forms pay.
-    pub heard: f32,
-    /// The part of places that closed forms have to tell, or none are asked.
-    pub answered: f32,
-    /// The part of what was heard that counts when more is heard.
-    pub remembered: f32,
-    /// The part of what was heard of closed forms that counts after places were asked none: one day they are asked
-    /// again.
-    pub passed: f32,
-    /// How much more than is usual is asked where that pays.
-    pub more: f32,
     /// Nodes of lights whose error, taken for one, is no more than this part of all they send are looked at whether
     /// they are seen whole; those wider than this sine are not.
     pub looked_at: f32,
@@ -174,20 +161,8 @@ pub(crate) struct Costs {
 }
 
 /// All numbers that decide how long a picture takes.
-pub(crate) const COSTS: Costs = Costs {
-    asked: 32.0,
-    asked_per_step: 2.0,
-    cell: 15.0,
-    heard: 8.0,
-    answered: 0.3,
-    remembered: 0.9,
-    passed: 0.97,
-    more: 4.0,
-    looked_at: 0.25,
-    wide: 0.7,
-    maybe: 0.3,
-    pilot: 4.0,
-};
+pub(crate) const COSTS: Costs =
+    Costs { asked: 32.0, asked_per_step: 2.0, looked_at: 0.25, wide: 0.7, maybe: 0.3, pilot: 4.0 };
 
 /// What a unit of each moment's error uses up of what is allowed, at one point.
 #[derive(Clone, Copy, Debug, Default)]

@@ -11,7 +11,6 @@ use super::ladder::Asker as LadderAsker;
 use super::lights::Lights;
 use super::tally::Tally;
 use super::together::Together;
-use super::worth::Worth;
 use crate::accel::Aabb;
 use crate::color::{DisplaySteps, Rgb};
 use crate::ids::LightId;
@@ -78,8 +77,6 @@ pub(crate) struct Arrivals<'a> {
     indices: Vec<u32>,
     /// In display steps: how far one light may be wrong at a place.
     allowed: f32,
-    /// Whether closed forms pay in this cell, light by light.
-    worth: Vec<Worth>,
 }
 
 /// The most triangles in the way of a ray that batches are asked past.
@@ -101,7 +98,6 @@ impl<'a> Arrivals<'a> {
             near: Obstacles::default(),
             settler: Settler::default(),
             occluders: OccluderList::default(),
-            worth: vec![Worth::default(); scene.lights.len()],
             views: Vec::new(),
             tallies: Vec::new(),
             indices: Vec::new(),
@@ -199,16 +195,6 @@ impl<'a> Arrivals<'a> {
             &flat,
             &Receiver { p: si.lit_from, error: si.error, horizon: si.horizon, ns: si.ns, wo: si.wo, lobe: *place.lobe },
         ))
-    }
-
-    /// Forgets whether closed forms pay, for another cell of pixels.
-    pub fn begin(&mut self) {
-        self.worth.fill(Worth::default());
-    }
-
-    /// Hears how many points of a light some rays took.
-    pub fn took(&mut self, index: usize, rays: usize, points: usize) {
-        self.worth[index].hear_points(rays, points);
     }
 
     /// Whether what light `index` sends to a place varies over no less than `apart`, on the light.
@@ -319,10 +305,7 @@ impl<'a> Arrivals<'a> {
             while let Some(place) = places.next_if(|place| place.lobe == lobe) {
                 self.points.push(place.point_of_surface());
             }
-            let (level, evaluator) = (self.level, &mut self.evaluator);
-            self.worth[index].ask(&mut self.points, arrived, |points, arrived| {
-                evaluator.evaluate(level, &asked, points, arrived);
-            });
+            self.evaluator.evaluate(self.level, &asked, &self.points, arrived);
         }
     }
 
@@ -375,15 +358,14 @@ impl<'a> Arrivals<'a> {
         index: usize,
         lobe: &Lobe,
         [shadows, near]: [bool; 2],
-        points: &mut [ShadingPoint],
+        points: &[ShadingPoint],
         arrived: &mut Vec<Arrived>,
     ) {
         let Some(asked) = self.lights.asked(index, lobe, shadows) else {
             unreachable!("lights that are sampled have no cells")
         };
         let asked = Asked { near: near.then_some(&self.near), allowed: self.allowed, ..asked };
-        let (level, evaluator) = (self.level, &mut self.evaluator);
-        self.worth[index].ask(points, arrived, |points, arrived| evaluator.evaluate(level, &asked, points, arrived));
+        self.evaluator.evaluate(self.level, &asked, points, arrived);
     }
 
     /// In display steps: how far one light may be wrong at a place that stands for such a share of a pixel, where the

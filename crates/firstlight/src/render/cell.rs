@@ -201,7 +201,6 @@ impl<'a> Cells<'a> {
 
     fn begin(&mut self, corner: [u32; 2]) {
         self.corner = corner;
-        self.lights.arrivals.begin();
         self.states.fill(PixelState::Done);
         self.sums.work.fill(0.0);
         self.blocks.clear();

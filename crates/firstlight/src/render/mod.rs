@@ -50,7 +50,6 @@ mod square;
 mod tally;
 mod tile;
 mod together;
-mod worth;
 
 use std::num::NonZeroUsize;
 use std::ops::ControlFlow;

@@ -291,7 +291,6 @@ impl Together {
                 continue;
             }
             if is_enough {
-                arrivals.took(self.light, asking.len(), points);
                 return;
             }
             // Errors shrink as they do where an edge is
