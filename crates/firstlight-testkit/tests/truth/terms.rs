@@ -230,7 +230,7 @@ fn what_is_not_kept_apart_is_the_rest() {
 }
 
 #[test]
-fn a_light_that_is_left_out_is_seen_all_the_same() {
+fn a_weak_light_among_many_has_its_own_visibility() {
     let lamp = |i: u32| {
         let (name, strength) = if i == 7 { ("weak", 0.002) } else { ("lamp", 0.4) };
         let x = f64::from(i) * 0.2 - 3.0;
@@ -243,11 +243,10 @@ fn a_light_that_is_left_out_is_seen_all_the_same() {
     let traced =
         RenderSettings { buffers: vec![weak, share], visibility: VisibilityMode::Traced, ..RenderSettings::default() };
     let traced = film(&scene, &traced);
-    let (mut left_out, mut wrong, mut umbra) = (0, 0, 0);
+    let (mut wrong, mut umbra) = (0, 0);
     for (pixel, share_of_it) in floats(&all, share).iter().enumerate() {
         let truth = floats(&traced, share)[pixel];
-        let [told, sent] = [&all, &traced].map(|film| floats(film, weak)[3 * pixel..][..3].iter().sum::<f32>());
-        left_out += u32::from(told == 0.0 && sent > 0.0);
+        let sent = floats(&traced, weak)[3 * pixel..][..3].iter().sum::<f32>();
         // Edges lie within pixels
         let is_whole = truth == 0.0 || truth == 1.0;
         wrong += u32::from(is_whole && (share_of_it - truth).abs() > 0.3);
@@ -255,7 +254,6 @@ fn a_light_that_is_left_out_is_seen_all_the_same() {
     }
     // At silhouettes the middle may meet nothing
     assert!(wrong < 20 && umbra > 50, "{wrong} {umbra}");
-    assert!(left_out > 100, "{left_out}");
 }
 
 /// The scene with the first of its lamps alone.

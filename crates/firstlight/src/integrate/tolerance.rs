@@ -85,11 +85,6 @@ pub(crate) struct Tolerance {
     pub node_pixels: f32,
 
     // Many lights
-    /// How far what is settled for a block may be wrong, and what is settled for a patch.
-    pub many: f32,
-    /// The part of that which blocks of each size may have, those of the largest twice. Together less than all: a patch
-    /// may be darker than its block was guessed to be.
-    pub block: f32,
     /// The root of the sum of squares of all that may be wrong where many are taken for one.
     pub crowd: f32,
     /// A patch that is darker than was guessed is looked at again beyond this factor of that.
@@ -133,8 +128,6 @@ pub(crate) const TOLERANCE: Tolerance = Tolerance {
     stratified: 0.5,
     heavy: 2.0,
     node_pixels: 0.64,
-    many: 0.425,
-    block: 0.15,
     crowd: 1.5,
     lenient: 1.25,
     sure: 0.8,

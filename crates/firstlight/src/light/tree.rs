@@ -77,18 +77,21 @@ struct Seed {
     light: u32,
     shine: Shine,
     center: Vec3,
-    order: u8,
+    order: (u32, u8),
 }
 
 impl LightTree {
-    pub fn new(lights: &[Light]) -> LightTree {
+    /// `classes` has a number for each light. Nodes hold lights of one: of a surface that some lights shine on, a node's
+    /// lights all do or none.
+    pub fn new(lights: &[Light], classes: &[u32]) -> LightTree {
         let mut seeds: Vec<Seed> = lights
             .iter()
             .enumerate()
             .map(|(index, light)| {
                 let (shine, _) = Shine::of(light);
                 let kind = shine.sends as u8 * 2 + u8::from(light.shadows);
-                Seed { light: index as u32, center: shine.ball().0, order: kind * 2 + u8::from(shine.constant), shine }
+                let order = (classes[index], kind * 2 + u8::from(shine.constant));
+                Seed { light: index as u32, center: shine.ball().0, order, shine }
             })
             .collect();
         seeds.sort_by_key(|seed| seed.order);
@@ -517,7 +520,7 @@ mod tests {
             let size = random.between(0.01, 1.0);
             let some = 1 + (random.next() * 8.0) as u32;
             let lights = lights(&mut random, kind, some, size);
-            let tree = LightTree::new(&lights);
+            let tree = LightTree::new(&lights, &vec![0; lights.len()]);
             // A zone somewhere around
             let distance = random.between(0.3, 8.0) as f32;
             let center = random.direction() * distance;
@@ -602,7 +605,7 @@ mod tests {
         for kind in 0..8 {
             all.extend(lights(&mut random, kind, 50, 1.0));
         }
-        let tree = LightTree::new(&all);
+        let tree = LightTree::new(&all, &vec![0; all.len()]);
         let mut seen = vec![0; all.len()];
         let mut open = tree.roots.clone();
         while let Some(node) = open.pop() {

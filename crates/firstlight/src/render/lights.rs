@@ -43,7 +43,8 @@ impl<'a> Lights<'a> {
         let scales = scene.lights.iter().zip(&emitters).map(scale).collect();
         let targets = Target::of_all(scene);
         let ladders = emitters.iter().map(|_| Ladder::default()).collect();
-        let tree = (scene.lights.len() > FEW).then(|| LightTree::new(&scene.lights));
+        let tree = (scene.lights.len() > FEW)
+            .then(|| LightTree::new(&scene.lights, &scene.geometry.links.classes(scene.lights.len())));
         let obstacles = scene.lights.iter().enumerate().map(|(index, light)| {
             light.area().map_or_else(Obstacles::default, |area| Obstacles::new(scene, index, &Emitter::new(area)))
         });

@@ -1,6 +1,5 @@
 //! What a picture says of itself: all that decides its pixels, and nothing else.
 
-use super::many::SINGLY;
 use super::{RenderSettings, Renderer};
 use crate::camera::{Camera, Frame, Projection};
 use crate::describe::SamplesDesc;
@@ -10,9 +9,12 @@ use crate::light::Light;
 use crate::math::Vec3;
 use crate::scene::{Choices, Framing, ModelSettings, Scene};
 
+/// Samples of so many lights are listed one by one.
+const MOST_LISTED: usize = 1000;
+
 /// How many entries **Pixels** has in the changelog, over all versions. It is part of the version in a receipt, so that
 /// two builds whose pictures differ never say the same. The test below compares it with the changelog.
-const PIXELS_ENTRIES: u32 = 86;
+const PIXELS_ENTRIES: u32 = 88;
 
 /// The version, as receipts say it.
 pub(super) fn version() -> String {
@@ -174,7 +176,7 @@ fn light_samples(lights: &[Light], settings: &RenderSettings) -> String {
     let counts: Vec<String> = lights.iter().map(said).collect();
     // Of many lights, how many in a row say the same
     let run = |same: &[String]| format!("{} x {}", same.len(), same[0]);
-    if counts.len() > SINGLY {
+    if counts.len() > MOST_LISTED {
         counts.chunk_by(|a, b| a == b).map(run).collect::<Vec<_>>().join(", ")
     } else {
         counts.join(" ")

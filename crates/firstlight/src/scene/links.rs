@@ -34,6 +34,20 @@ impl LinkSets {
         set.is_none_or(|set| self.bits_of(set)[light.index() / 64] >> (light.index() % 64) & 1 == 1)
     }
 
+    /// A number for each light, the same for those that are in the same sets.
+    pub fn classes(&self, lights: usize) -> Vec<u32> {
+        let mut classes = vec![0; lights];
+        for set in self.bits.chunks_exact(self.words.max(1)) {
+            let mut numbers: HashMap<(u32, bool), u32> = HashMap::new();
+            for (light, class) in classes.iter_mut().enumerate() {
+                let is_in = set[light / 64] >> (light % 64) & 1 == 1;
+                let next = numbers.len() as u32;
+                *class = *numbers.entry((*class, is_in)).or_insert(next);
+            }
+        }
+        classes
+    }
+
     #[inline]
     fn bits_of(&self, LinkId(set): LinkId) -> &[u64] {
         &self.bits[set as usize * self.words..][..self.words]

@@ -1,7 +1,7 @@
 //! Lights that are kept apart of what is taken together: what each sends by itself, beside the sum.
 
 use super::ONE;
-use super::dense::sent;
+use super::block::sent;
 use crate::color::Rgb;
 use crate::image::Buffer;
 use crate::light::{Held, LightTree, Sent};

@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use super::apart::Apart;
-use super::dense::sent;
+use super::block::sent;
 use super::patch::Patches;
 use super::{ANYTHING, Many, Single, Stored};
 use crate::color::Rgb;

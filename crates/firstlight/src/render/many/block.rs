@@ -1,4 +1,4 @@
-//! More lights than are taken one by one: cuts in which one light may stand for others.
+//! Cuts in which one light may stand for others: which nodes count at the places of a block.
 
 use std::ops::Range;
 
@@ -31,10 +31,9 @@ pub(super) struct Dot {
 }
 
 impl<'a> Many<'a> {
-    /// The places of a block that lie on one surface, where lights are so many that one may stand for others. `guess`
-    /// is what is known to be sent there.
+    /// The places of a block that lie on one surface, `guess` is what is known to be sent there.
     #[allow(clippy::too_many_arguments, reason = "a block of a cell, and what it asks with")]
-    pub(super) fn crowd(
+    pub(super) fn block(
         &mut self,
         patches: &[Patch],
         group: &[usize],
@@ -50,16 +49,8 @@ impl<'a> Many<'a> {
         let receives = group.iter().any(|at| patch(at).si.receives_shadow);
         self.outlook.stand(scene, group.iter().map(|at| standing(patch(at))));
         let steps = arrivals.display_steps();
-        let rules = CutRules {
-            tree,
-            steps,
-            zone: &zone,
-            tones: &tones,
-            shines: &|_| true,
-            budget: TOLERANCE.crowd,
-            leaves_open: false,
-        };
-        let mut crowd = std::mem::take(&mut self.crowd);
+        let rules = CutRules { tree, steps, zone: &zone, tones: &tones, budget: TOLERANCE.crowd };
+        let mut cut = std::mem::take(&mut self.cut);
         let (simd, outlook, fence) = (arrivals.level(), &mut self.outlook, &mut self.fence);
         let mut look = |node: &LightNode, light: u32| {
             if !(receives && node.shadows) {
@@ -67,14 +58,19 @@ impl<'a> Many<'a> {
             }
             outlook.look(simd, scene, node.shine.low, node.shine.high, LightId(light))
         };
-        crowd.begin(&rules, &tree.roots, [0.0; 3]);
+        let links = scene.geometry.lights_of(patch(&group[0]).si.surface);
+        let shines = |root: &&u32| {
+            let light = tree.nodes[**root as usize].first(tree);
+            scene.geometry.links.contains(links, LightId(light))
+        };
+        cut.begin(&rules, tree.roots.iter().filter(shines));
         let guess = guess.unwrap_or_else(|| {
-            crowd.refine(&CutRules { budget: TOLERANCE.crowd * COSTS.pilot, ..rules }, None, &mut look);
-            crowd.peek();
+            cut.refine(&CutRules { budget: TOLERANCE.crowd * COSTS.pilot, ..rules }, None, &mut look);
+            cut.peek();
             let some = [0, group.len() / 2, group.len() - 1].map(|i| patch(&group[i]));
             let all = some.map(|patch| {
                 fence.stand(scene, &patch.si);
-                crowd.nodes.iter().fold(Rgb::BLACK, |sum, (node, by)| match entry(*node, *by) {
+                cut.nodes.iter().fold(Rgb::BLACK, |sum, (node, by)| match entry(*node, *by) {
                     entry if by.is_everywhere() || Dot::new(tree, entry).arrives(scene, fence, &patch.si) => {
                         sum + sent(scene, tree, entry, &patch.si, &patch.bsdf.lobe).cosine()
                     }
@@ -83,19 +79,19 @@ impl<'a> Many<'a> {
             });
             all.into_iter().reduce(Rgb::min).unwrap_or(Rgb::BLACK) * TOLERANCE.sure
         });
-        crowd.refine(&rules, Some(guess), &mut look);
-        let is_close = crowd.open.len() > CLOSE && level < LEVELS && group.len() > 1;
+        cut.refine(&rules, Some(guess), &mut look);
+        let is_close = cut.open.len() > CLOSE && level < LEVELS && group.len() > 1;
         let (mut again, mut darkest) = (Vec::new(), guess);
         if is_close {
             again.extend_from_slice(group);
         } else {
-            crowd.settle(&rules, group.len(), &mut look);
+            cut.settle(&rules, group.len(), &mut look);
             let start = self.lit.len() as u32;
-            let everywhere = crowd.nodes.iter().filter(|(_, by)| by.is_everywhere());
+            let everywhere = cut.nodes.iter().filter(|(_, by)| by.is_everywhere());
             self.lit.extend(everywhere.map(|(node, by)| entry(*node, *by)));
             let lit = start..self.lit.len() as u32;
             let start = self.dots.len() as u32;
-            let sometimes = crowd.nodes.iter().filter(|(_, by)| !by.is_everywhere());
+            let sometimes = cut.nodes.iter().filter(|(_, by)| !by.is_everywhere());
             self.dots.extend(sometimes.map(|(node, by)| Dot::new(tree, entry(*node, *by))));
             let maybe = start..self.dots.len() as u32;
             let mut found: Option<Rgb> = None;
@@ -103,8 +99,8 @@ impl<'a> Many<'a> {
                 let patch = patch(at);
                 let singles = self.singles.len();
                 let lists = [lit.clone(), maybe.clone()];
-                let (stored, light) = self.in_crowd(patch, &crowd.open, lists, arrivals, counts);
-                let error = crowd.error(&patch.bsdf.colors);
+                let (stored, light) = self.patch(patch, &cut.open, lists, arrivals, counts);
+                let error = cut.error(&patch.bsdf.colors);
                 if arrivals.steps(stored.value, error) > TOLERANCE.crowd * TOLERANCE.lenient && guess != Rgb::BLACK {
                     // Darker than was guessed
                     self.singles.truncate(singles);
@@ -123,7 +119,7 @@ impl<'a> Many<'a> {
                 Rgb::BLACK
             };
         }
-        self.crowd = crowd;
+        self.cut = cut;
         if again.is_empty() {
             return;
         }
@@ -131,13 +127,13 @@ impl<'a> Many<'a> {
         for quarter in 0..4 {
             let part: Vec<usize> = again.iter().filter(|at| patch(at).quarter(half) == quarter).copied().collect();
             if !part.is_empty() {
-                self.crowd(patches, &part, level + 1, Some(darkest), arrivals, counts);
+                self.block(patches, &part, level + 1, Some(darkest), arrivals, counts);
             }
         }
     }
 
     /// What arrives at one patch of a block, as its block says; and what of it is diffuse light.
-    pub(super) fn in_crowd(
+    pub(super) fn patch(
         &mut self,
         patch: &Patch,
         singles: &[u32],
@@ -157,9 +153,9 @@ impl<'a> Many<'a> {
         let seen = dots.iter().filter(|dot| dot.arrives(scene, &self.fence, si));
         self.lit.extend(seen.map(|dot| dot.entry));
         (stored.lit[0], stored.maybe) = (everywhere, maybe);
-        stored.lit[LEVELS] = start..self.lit.len() as u32;
+        stored.lit[1] = start..self.lit.len() as u32;
         self.add(patch, 0, &mut stored);
-        self.add(patch, LEVELS, &mut stored);
+        self.add(patch, 1, &mut stored);
         stored.value =
             (bsdf.colors * stored.sent).0.into_iter().fold(scene.ambient * bsdf.ambient, |sum, part| sum + part);
         let from = self.singles.len() as u32;
