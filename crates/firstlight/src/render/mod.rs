@@ -92,7 +92,8 @@ words! {
     /// How the edges of what a pixel holds are smoothed.
     pub enum AaMode {
         /// All n x n camera rays say what is seen; light is taken once for each surface in a pixel where it is shown to
-        /// bend little over it.
+        /// bend little over it. Where all area lights are sampled, and there are meshes, point sets or instances, that
+        /// takes longer than [`Full`](Self::Full), whose picture it is then.
         Adaptive = "adaptive",
         /// Each of the n x n camera rays is lit by itself.
         Full = "full",
@@ -318,7 +319,14 @@ fn expose(
 ) -> ControlFlow<(), (Film, RenderStats)> {
     let window = settings.window(scene);
     let threads = settings.threads.map_or_else(available_threads, NonZeroUsize::get);
-    let renderer = settings.renderer();
+    let lights = Lights::new(scene);
+    let is_sampled = lights.emitters.iter().all(Option::is_none);
+    // Behind trees rays that share their light take longer to find that out than to be lit
+    let is_soft = || scene.lights.iter().any(|light| light.area().is_some());
+    let renderer = match settings.renderer() {
+        Renderer::Adaptive if is_sampled && scene.geometry.has_trees() && is_soft() => Renderer::Full,
+        renderer => renderer,
+    };
     let level = settings.simd.resolve();
     let simd = if renderer == Renderer::Reference { SimdLevel::Fallback } else { level };
     let nothing = Counts::default().stats(simd, threads);
@@ -326,9 +334,7 @@ fn expose(
     let of_centers = planes.iter().any(|buffer| buffer.plane().is_of_center());
     let of_all_rays = CoveragePlanes::new(scene, planes);
     let is_lit = planes.iter().any(|buffer| buffer.plane().is_lit());
-    let lights = Lights::new(scene);
     // Where every light is sampled at every ray, the bits are those of the plain renderer
-    let is_sampled = lights.emitters.iter().all(Option::is_none);
     let every_ray = renderer.samples_all() || renderer == Renderer::Full && is_sampled;
     let tiles = if every_ray {
         Tile::cover(window, settings.tile_size)
