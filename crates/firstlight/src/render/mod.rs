@@ -207,7 +207,21 @@ impl RenderSettings {
         })
     }
 
-    /// What renders by these settings.
+    /// What renders a scene by these settings.
+    fn renderer_of(&self, scene: &Scene) -> Renderer {
+        let areas = || scene.lights.iter().filter(|light| light.area().is_some());
+        match self.renderer() {
+            // Behind trees rays that share the light of sampled areas take longer to find that out than to be lit
+            Renderer::Adaptive
+                if scene.geometry.has_trees() && areas().next().is_some() && areas().all(|light| !light.exact) =>
+            {
+                Renderer::Full
+            }
+            renderer => renderer,
+        }
+    }
+
+    /// What renders by these settings, whatever the scene.
     fn renderer(&self) -> Renderer {
         match (self.reference, self.visibility, self.aa_mode) {
             (true, ..) => Renderer::Reference,
@@ -319,14 +333,7 @@ fn expose(
 ) -> ControlFlow<(), (Film, RenderStats)> {
     let window = settings.window(scene);
     let threads = settings.threads.map_or_else(available_threads, NonZeroUsize::get);
-    let lights = Lights::new(scene);
-    let is_sampled = lights.emitters.iter().all(Option::is_none);
-    // Behind trees rays that share their light take longer to find that out than to be lit
-    let is_soft = || scene.lights.iter().any(|light| light.area().is_some());
-    let renderer = match settings.renderer() {
-        Renderer::Adaptive if is_sampled && scene.geometry.has_trees() && is_soft() => Renderer::Full,
-        renderer => renderer,
-    };
+    let renderer = settings.renderer_of(scene);
     let level = settings.simd.resolve();
     let simd = if renderer == Renderer::Reference { SimdLevel::Fallback } else { level };
     let nothing = Counts::default().stats(simd, threads);
@@ -334,7 +341,9 @@ fn expose(
     let of_centers = planes.iter().any(|buffer| buffer.plane().is_of_center());
     let of_all_rays = CoveragePlanes::new(scene, planes);
     let is_lit = planes.iter().any(|buffer| buffer.plane().is_lit());
+    let lights = Lights::new(scene);
     // Where every light is sampled at every ray, the bits are those of the plain renderer
+    let is_sampled = lights.emitters.iter().all(Option::is_none);
     let every_ray = renderer.samples_all() || renderer == Renderer::Full && is_sampled;
     let tiles = if every_ray {
         Tile::cover(window, settings.tile_size)

@@ -14,7 +14,7 @@ const MOST_LISTED: usize = 1000;
 
 /// How many entries **Pixels** has in the changelog, over all versions. It is part of the version in a receipt, so that
 /// two builds whose pictures differ never say the same. The test below compares it with the changelog.
-const PIXELS_ENTRIES: u32 = 89;
+const PIXELS_ENTRIES: u32 = 90;
 
 /// The version, as receipts say it.
 pub(super) fn version() -> String {
@@ -37,7 +37,7 @@ impl Scene {
             ("width", self.width.to_string()),
             ("height", self.height.to_string()),
             ("antialiasing", self.antialiasing.to_string()),
-            ("aa_mode", settings.renderer().aa_mode().name().to_owned()),
+            ("aa_mode", settings.renderer_of(self).aa_mode().name().to_owned()),
             ("camera", self.summary.camera.clone()),
             ("world_from_camera", matrix(self.camera.world_from_camera())),
             ("film_half_size", numbers(self.camera.film_half_size())),
@@ -60,7 +60,7 @@ impl Scene {
         // What is neither integrated nor lit once for several rays is not judged
         let is_integrated =
             |light: &Light| light.said_samples() == SamplesDesc::Exact && !settings.renderer().samples_all();
-        if settings.renderer() == Renderer::Adaptive || self.lights.iter().any(is_integrated) {
+        if settings.renderer_of(self) == Renderer::Adaptive || self.lights.iter().any(is_integrated) {
             entries.push(("tolerance", self.tolerance.to_string()));
         }
         if let Some(time) = self.time {
