@@ -139,10 +139,17 @@ pub(crate) fn is_in_plane(corners: [DVec3; 3], o: DVec3, error: DVec3) -> bool {
     let largest = corners.iter().fold(DVec3::ZERO, |largest, q| largest.max(q.abs())).max_element();
     let [a, b, c] = corners.map(|q| q - o);
     let n = (b - a).cross(c - a);
+    let (volume, of_error) = (n.dot(a).abs(), 2.0 * n.abs().dot(error));
+    // Bounds of these areas, without roots: nearly always they say enough
+    let squares = a.length_squared() + b.length_squared() + c.length_squared();
+    let o = o.abs().max_element();
+    if volume > (squares * largest + n.abs().element_sum() * o) * CORNER_ROUNDING + of_error {
+        return false;
+    }
     let areas = b.cross(c).length() + c.cross(a).length() + a.cross(b).length();
-    let rounding = (areas * largest + n.length() * o.abs().max_element()) * CORNER_ROUNDING;
+    let rounding = (areas * largest + n.length() * o) * CORNER_ROUNDING;
     // The start is off the point by the lift, and the point off the surface by its error
-    n.dot(a).abs() <= rounding + 2.0 * n.abs().dot(error)
+    volume <= rounding + of_error
 }
 
 /// How far a corner may be off where it was meant to be, in its largest coordinate: two ulps in f32.
