@@ -467,7 +467,7 @@ impl Bounds {
         let mut faults = Vec::new();
         let mut hold = |what: String, share: f64, is_beyond: &dyn Fn(&SceneError) -> bool| {
             let beyond: Vec<u64> = scenes.iter().filter(|scene| is_beyond(scene)).map(|scene| scene.seed).collect();
-            let allowed = (share * scenes.len() as f64) as usize;
+            let allowed = (share * scenes.len() as f64).round() as usize;
             if beyond.len() > allowed {
                 let count = beyond.len();
                 faults.push(format!("{count} scenes have {what}, {allowed} of {} may: {beyond:?}", scenes.len()));

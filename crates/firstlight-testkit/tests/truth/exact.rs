@@ -124,7 +124,7 @@ fn compare_part(name: &str, desc: &SceneDesc, [x, y]: [u32; 2], size: u32) {
     let found = picture(&scene, &RenderSettings { crop, ..integrated() });
     let truth = picture(&scene, &RenderSettings { crop, ..every_ray() });
     let Deviation { worst, .. } = Deviation::between(&scene, 1.0, &truth, &found);
-    assert!(worst < 1.0, "{name}, from ({x}, {y}) on: {worst} steps");
+    assert!(worst < 2.0, "{name}, from ({x}, {y}) on: {worst} steps");
 }
 
 #[test]

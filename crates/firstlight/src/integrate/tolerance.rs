@@ -60,10 +60,8 @@ pub(crate) struct Tolerance {
     // Points of a light
     /// In points, with a tolerance of 1: those of a pixel that are asked first; with others a root of it fewer.
     pub first_points: f32,
-    /// After more than so many times those, more may be wrong, by the fourth root of their number, up to the square of
-    /// that times as many again. A picture of so much error in all takes least where pixels that take long are off by
-    /// more.
-    pub long: f32,
+    /// So many times as many, where the light is nearer than those are apart.
+    pub nearer: f32,
     /// In effective points: so many that find nothing in the way of a pixel find that nothing is, and so many of all
     /// rays together tell something.
     pub clear: f32,
@@ -101,7 +99,7 @@ pub(crate) struct Tolerance {
 /// All numbers that decide an error.
 pub(crate) const TOLERANCE: Tolerance = Tolerance {
     point: 0.15,
-    by_chance: 5.0 / 3.0,
+    by_chance: 3.3,
     least_share: 1.0 / 16.0,
     part: 0.5,
     fit_cut: 0.1,
@@ -117,10 +115,10 @@ pub(crate) const TOLERANCE: Tolerance = Tolerance {
     even: 0.01,
     same_mean: 0.004,
     resolved: 0.2,
-    first_points: 1024.0,
-    long: 2.0,
-    clear: 384.0,
-    told: 32.0,
+    first_points: 256.0,
+    nearer: 4.0,
+    clear: 96.0,
+    told: 16.0,
     untold: 0.2,
     mixed: 0.041,
     alike: 2.3,

@@ -36,8 +36,6 @@ pub(crate) struct Together {
     /// The share of the pixel that a ray has, and that of the patch.
     each: f32,
     share: f32,
-    /// Whether they tell what other pixels see.
-    is_node: bool,
     /// How many times more this light may be wrong, as points of some others are not asked: their errors are none, or
     /// small.
     room: f32,
@@ -89,7 +87,6 @@ impl Together {
             light,
             each,
             share,
-            is_node: false,
             room: 1.0,
             series,
             rays: 0,
@@ -108,7 +105,6 @@ impl Together {
     pub fn of_node(mut self) -> Self {
         self.share *= TOLERANCE.node_pixels;
         self.each *= TOLERANCE.node_pixels;
-        self.is_node = true;
         self
     }
 
@@ -261,10 +257,14 @@ impl Together {
     /// asked in closed form.
     fn points(&self, arrivals: &mut Arrivals, asking: &mut [Asking], counts: &mut Counts) {
         let asker = arrivals.asker(self.light);
-        let begin = TOLERANCE.first_points / (arrivals.scene.tolerance() as f32).sqrt();
+        let mut begin = TOLERANCE.first_points / (arrivals.scene.tolerance() as f32).sqrt();
+        let place = asking[0].place(self.each);
+        if !arrivals.varies_over(self.light, &place, asker.area.diagonal() / begin.sqrt()) {
+            begin *= TOLERANCE.nearer;
+        }
         let first = (begin * self.share.sqrt() / asking.len() as f32) as usize;
         let first = first.next_power_of_two().clamp(FIRST, LAST);
-        let tolerance = arrivals.tolerance_by_chance(self.share) * self.room;
+        let allowed = arrivals.tolerance_by_chance(self.share) * self.room;
         let mut is_tried = false;
         let mut asked = AskedLeaves::new(asker, first, asking, counts);
         let mut packets = None;
@@ -275,8 +275,7 @@ impl Together {
             let packets = packets.get_or_insert_with(|| Packets::new(said.sent));
             let wrong = self.wrong(&said, packets, &mut asked, asking, arrivals);
             let points = asked.leaves.count() * asking.len();
-            let allowed = tolerance * self.deviation(points as f32 / begin);
-            let is_told = said.shows(arrivals, &|k| said.untold(k)) <= tolerance * TOLERANCE.untold;
+            let is_told = said.shows(arrivals, &|k| said.untold(k)) <= allowed * TOLERANCE.untold;
             let is_lit = !said.is_hidden && self.is_clear(&said);
             let is_dark = said.is_dark && points >= ALL_HIDDEN;
             let is_last = points >= MOST || !is_halved;
@@ -391,16 +390,6 @@ impl Together {
             |k: usize| said.effective[k] < f64::from(TOLERANCE.told) && asking.iter().any(|one| one.reflects(k));
         (0..MOMENTS).any(is_unseen)
             || asking.iter().any(|one| !arrivals.varies_over(self.light, &one.place(self.each), apart))
-    }
-
-    /// How many times what is allowed by chance these rays may deviate by, after so many times the first points.
-    fn deviation(&self, times: f32) -> f32 {
-        // What is off at a node is off at all pixels that it tells
-        if self.is_node {
-            1.0
-        } else {
-            (times / TOLERANCE.long).clamp(1.0, TOLERANCE.long * TOLERANCE.long).sqrt().sqrt()
-        }
     }
 
     /// Asks what would arrive at all rays if nothing were in the way.

@@ -45,8 +45,8 @@ table! {
         /// points that it is sampled at, 1 to 1048576.
         pub samples: SamplesDesc = DEFAULT_SAMPLES,
         /// How far a pixel may be off the converged picture, 0.25 to 16, in display steps: 1/255 of what is displayed.
-        /// 99.9 % of pixels are within it, and of 99 scenes in 100 all within twice as much. More is faster, as 4 for a preview.
-        /// Sampled lights under `--aa-mode full` know no tolerance.
+        /// 99.9 % of pixels are within it, and of 99 scenes in 100 all within twice as much. More is faster, as 4 for a
+        /// preview. Sampled lights under `--aa-mode full` know no tolerance.
         pub tolerance: f64 = 1.0,
         /// What is made of the border of light and dark on meshes with smooth normals.
         pub shadow_terminator: ShadowTerminator = ShadowTerminator::Smooth,

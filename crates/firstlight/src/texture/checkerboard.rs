@@ -47,9 +47,9 @@ impl CheckerboardDesc {
 
 const MAX_COUNT: u32 = 65536;
 
-/// A footprint that reaches over more squares than this from its middle, on both axes, is not cut into strips: the board
-/// is gray there. Over a floor up to the horizon that is off by 0.17 of a display step at most (squares of 0.2 to 100 m,
-/// 1.5 m below the camera, 400 rows).
+/// A footprint that reaches over more squares than this from its middle, on both axes, is not cut into strips: the
+/// board is gray there. Over a floor up to the horizon that is off by 0.17 of a display step at most (squares of 0.2 to
+/// 100 m, 1.5 m below the camera, 400 rows).
 const MAX_STRIPS: f64 = 128.0;
 
 /// Where a footprint goes farther than this from the first square, in squares, the board is gray: 32 bits of u and v do
@@ -185,7 +185,8 @@ fn cut(outline: &[DVec2], axis: usize, end: f64, sign: f64, closed: bool) -> Pol
 /// The mean of w0(x) w1(y) over a convex outline with that area and size, by Green's theorem: the integral over an area
 /// of w0(x) w1(y) is that along its outline of W0(x) w1(y) dy, where W0 is an integral of w0. In a strip of the board,
 /// between two of its lines, w1 is constant, and an edge of the outline runs through it at an even pace. Strips are cut
-/// along the axis that has fewer of them, x and y exchanged if need be: toward a horizon a footprint is narrow and long.
+/// along the axis that has fewer of them, x and y exchanged if need be: toward a horizon a footprint is narrow and
+/// long.
 fn mean_over(waves: &[Wave; 2], outline: &[DVec2], area: f64, size: DVec2) -> f64 {
     let across = usize::from(size.y <= size.x);
     let along = 1 - across;
