@@ -246,7 +246,7 @@ impl<'a> LightQueue<'a> {
             ShadingPoint { worth, base, ..place.point }
         }));
         self.arrived.clear();
-        self.arrivals.evaluate(light, &of.lobe, [shadows, near], &mut self.points, &mut self.arrived);
+        self.arrivals.evaluate(light, &of.lobe, [shadows, near], &self.points, &mut self.arrived);
         let measure = self.arrivals.measure(light);
         let is_physical = scene.lights[light].area().is_some_and(|area| area.physical);
         let is_one_sided = self.arrivals.lights.emitters[light].as_ref().is_some_and(Emitter::is_one_sided);
