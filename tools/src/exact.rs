@@ -42,7 +42,7 @@ pub struct Options {
     kept: PathBuf,
     /// Takes converged pictures as they are kept, without a second look at what is off: seconds in place of minutes, to
     /// compare two versions of the engine.
-    #[arg(long, conflicts_with_all = ["write", "converge"])]
+    #[arg(long, conflicts_with = "converge")]
     as_kept: bool,
     /// Only makes the converged pictures that are not kept yet.
     #[arg(long)]

@@ -168,6 +168,38 @@ fn area_lights_taken_for_one_do_not_show() {
     hold(30..32, 1200, Kinds::Areas);
 }
 
+/// Of lights that a surface leaves out, none stands for others there.
+#[test]
+fn lights_that_surfaces_choose_are_taken_for_one_among_themselves() {
+    let mut unlike = 0;
+    for seed in 50..53 {
+        let mut desc = lit(stage(seed), seed, 120, Kinds::Points);
+        for (i, light) in desc.lights.iter_mut().enumerate() {
+            let name = Some(if i % 3 == 0 { "few" } else { "most" }.to_owned());
+            match light {
+                LightDesc::Point(light) => light.name = name,
+                LightDesc::Spot(light) => light.name = name,
+                _ => unreachable!("there are no others"),
+            }
+        }
+        let plain = picture(&compile(&desc), &adaptive());
+        let [few, most] = ["few", "most"].map(|name| Some(vec![name.to_owned()]));
+        for (i, shape) in desc.shapes.iter_mut().enumerate() {
+            let [include, exclude, _, shadows] = common(shape).links;
+            match i {
+                0 => *include = few.clone(),
+                1 => *exclude = few.clone(),
+                2..5 => *shadows = most.clone(),
+                _ => {}
+            }
+        }
+        let is = picture(&compile(&desc), &adaptive());
+        assert_same(&desc, &is, &picture(&compile(&desc), &every_ray()), &format!("scene {seed}"));
+        unlike += plain.pixels.iter().zip(&is.pixels).filter(|(a, b)| (a[0] - b[0]).abs() > 0.02).count();
+    }
+    assert!(unlike > 200, "{unlike}");
+}
+
 /// An orthographic camera that moves by whole pixels sees the same places: each may differ by the bound, and no more.
 #[test]
 fn nothing_swims_with_the_camera() {
