@@ -5,6 +5,7 @@
 //! moves on the light from one of them to another.
 
 mod flat;
+mod light_contact;
 mod solid;
 
 use fearless_simd::{f32x16, prelude::*};
@@ -20,6 +21,7 @@ use crate::scene::{PlacedTarget, Scene};
 use crate::shape::{Parallelogram, Placement, PlaneSide, Solid, Sphere};
 use crate::visibility::{OccluderList, ShadowMesh};
 use flat::{FacetShape, Own, facet_between, flat_between};
+use light_contact::{LightSides, Touch};
 use solid::{PlacedSolid, solid_between};
 
 /// All things that may stand in the way of one light.
@@ -503,87 +505,6 @@ pub(crate) fn classify<S: Simd>(
         class.other |= many > MAX_INTERVALS || obstacles.has_more;
     }
     classes
-}
-
-/// On which sides of the plane of a flat light something is, as bits: whether a thing reaches into the front and into
-/// the back by more than rounding, or which points are there. What lies in the plane, or behind it as seen from a
-/// point, hides nothing of the light from that point. Of other lights both sides are all of space.
-#[derive(Clone, Copy, Debug)]
-struct LightSides {
-    front: u64,
-    back: u64,
-}
-
-impl LightSides {
-    const BOTH: LightSides = LightSides { front: u64::MAX, back: u64::MAX };
-
-    /// Where an obstacle is.
-    fn of(emitter: &Emitter, exact: &ExactShape) -> LightSides {
-        let Emitter::Flat(light) = emitter else { return Self::BOTH };
-        let n = light.normal();
-        let sides = [n, -n].map(|n| {
-            let reach = match exact {
-                ExactShape::Sphere(sphere) => n.dot(sphere.c) + sphere.r,
-                ExactShape::Flat { flat, .. } => flat.support(n),
-                ExactShape::Solid(solid) => solid.reach(n),
-                ExactShape::Facet(facet) => facet.reach(n),
-            };
-            if reach - n.dot(light.c) > light.rounding() { u64::MAX } else { 0 }
-        });
-        LightSides { front: sides[0], back: sides[1] }
-    }
-
-    /// On which sides sixteen points are; on both, where some of the places around are on the other.
-    fn of_points(emitter: &Emitter, points: &[ShadingPoint]) -> LightSides {
-        let Emitter::Flat(light) = emitter else { return Self::BOTH };
-        let n = light.normal();
-        let mut sides = LightSides { front: 0, back: 0 };
-        for (k, point) in points.iter().enumerate() {
-            let height = n.dot(point.p.as_dvec3() - light.c);
-            let reach = f64::from(point.reach);
-            sides.front |= u64::from(height >= -reach) << k;
-            sides.back |= u64::from(height <= reach) << k;
-        }
-        sides
-    }
-
-    /// The points on those sides that this is on.
-    fn of_these(self, points: LightSides) -> u64 {
-        self.front & points.front | self.back & points.back
-    }
-}
-
-/// How something lies to a light that is a ball.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Touch {
-    Apart,
-    /// It reaches into it: what of it is behind the light's surface does not show on the disk that stands for the
-    /// light.
-    Cuts,
-    /// The light is inside of it.
-    Holds,
-}
-
-impl Touch {
-    fn of(emitter: &Emitter, exact: &ExactShape) -> Touch {
-        let Emitter::Ball { center, radius, .. } = emitter else { return Touch::Apart };
-        match exact {
-            ExactShape::Sphere(sphere) => {
-                let distance = (*center - sphere.c).length();
-                if distance >= radius + sphere.r {
-                    Touch::Apart
-                } else if distance + radius <= sphere.r * (1.0 - 1e-9) {
-                    Touch::Holds
-                } else {
-                    Touch::Cuts
-                }
-            }
-            ExactShape::Flat { flat, .. } if flat.distance(*center) < *radius => Touch::Cuts,
-            ExactShape::Solid(solid) if solid.may_touch => Touch::Cuts,
-            ExactShape::Facet(shape) if f64::from(shape.distance(*center)) < *radius => Touch::Cuts,
-            ExactShape::Flat { .. } | ExactShape::Solid(_) | ExactShape::Facet(_) => Touch::Apart,
-        }
-    }
 }
 
 /// What one thing does to sixteen points, in bits.

@@ -17,6 +17,7 @@ mod occluders;
 mod outline;
 mod place;
 mod seen_lights;
+mod shadow_rays;
 #[cfg(test)]
 mod tests;
 mod text;
@@ -57,7 +58,8 @@ pub(crate) use links::LinkId;
 use motion::Motion;
 pub(crate) use occluders::{Listed, ListedOccluders, Opacity};
 use seen_lights::SeenLights;
-pub(crate) use trees::{FewFacets, ShadowRays};
+pub(crate) use shadow_rays::ShadowRays;
+pub(crate) use trees::FewFacets;
 
 /// A scene, ready to be rendered: flat lists and ids. Between here and the image nothing can fail.
 ///

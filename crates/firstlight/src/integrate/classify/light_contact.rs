@@ -1,0 +1,87 @@
+//! How an occluder lies to a light: on which sides of a flat light's plane it is, and whether it intersects a sphere
+//! light.
+
+use super::ExactShape;
+use crate::integrate::batch::ShadingPoint;
+use crate::integrate::emitter::Emitter;
+
+/// On which sides of the plane of a flat light something is, as bits: whether a thing reaches into the front and into
+/// the back by more than rounding, or which points are there. What lies in the plane, or behind it as seen from a
+/// point, hides nothing of the light from that point. Of other lights both sides are all of space.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct LightSides {
+    front: u64,
+    back: u64,
+}
+
+impl LightSides {
+    const BOTH: LightSides = LightSides { front: u64::MAX, back: u64::MAX };
+
+    /// Where an obstacle is.
+    pub fn of(emitter: &Emitter, exact: &ExactShape) -> LightSides {
+        let Emitter::Flat(light) = emitter else { return Self::BOTH };
+        let n = light.normal();
+        let sides = [n, -n].map(|n| {
+            let reach = match exact {
+                ExactShape::Sphere(sphere) => n.dot(sphere.c) + sphere.r,
+                ExactShape::Flat { flat, .. } => flat.support(n),
+                ExactShape::Solid(solid) => solid.reach(n),
+                ExactShape::Facet(facet) => facet.reach(n),
+            };
+            if reach - n.dot(light.c) > light.rounding() { u64::MAX } else { 0 }
+        });
+        LightSides { front: sides[0], back: sides[1] }
+    }
+
+    /// On which sides sixteen points are; on both, where some of the places around are on the other.
+    pub fn of_points(emitter: &Emitter, points: &[ShadingPoint]) -> LightSides {
+        let Emitter::Flat(light) = emitter else { return Self::BOTH };
+        let n = light.normal();
+        let mut sides = LightSides { front: 0, back: 0 };
+        for (k, point) in points.iter().enumerate() {
+            let height = n.dot(point.p.as_dvec3() - light.c);
+            let reach = f64::from(point.reach);
+            sides.front |= u64::from(height >= -reach) << k;
+            sides.back |= u64::from(height <= reach) << k;
+        }
+        sides
+    }
+
+    /// The points on those sides that this is on.
+    pub fn of_these(self, points: LightSides) -> u64 {
+        self.front & points.front | self.back & points.back
+    }
+}
+
+/// How something lies to a light that is a ball.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Touch {
+    Apart,
+    /// It reaches into it: what of it is behind the light's surface does not show on the disk that stands for the
+    /// light.
+    Cuts,
+    /// The light is inside of it.
+    Holds,
+}
+
+impl Touch {
+    pub fn of(emitter: &Emitter, exact: &ExactShape) -> Touch {
+        let Emitter::Ball { center, radius, .. } = emitter else { return Touch::Apart };
+        match exact {
+            ExactShape::Sphere(sphere) => {
+                let distance = (*center - sphere.c).length();
+                if distance >= radius + sphere.r {
+                    Touch::Apart
+                } else if distance + radius <= sphere.r * (1.0 - 1e-9) {
+                    Touch::Holds
+                } else {
+                    Touch::Cuts
+                }
+            }
+            ExactShape::Flat { flat, .. } if flat.distance(*center) < *radius => Touch::Cuts,
+            ExactShape::Solid(solid) if solid.may_touch => Touch::Cuts,
+            ExactShape::Facet(shape) if f64::from(shape.distance(*center)) < *radius => Touch::Cuts,
+            ExactShape::Flat { .. } | ExactShape::Solid(_) | ExactShape::Facet(_) => Touch::Apart,
+        }
+    }
+}
