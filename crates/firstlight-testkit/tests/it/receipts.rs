@@ -200,7 +200,8 @@ fn what_changes_the_film_changes_the_receipt() {
     }
 }
 
-/// Where all area lights are sampled behind trees, every camera ray is lit, whatever is asked for.
+/// In a scene with BVHs whose area lights are all sampled, the adaptive mode shades every camera ray: film and receipt
+/// are those of the full mode.
 #[test]
 fn what_is_sampled_behind_trees_is_full() {
     let mut desc = scene();

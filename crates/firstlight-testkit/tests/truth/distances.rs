@@ -81,7 +81,7 @@ fn cameras_see_the_same_from_all_distances() {
                         let depth = forward.dot(ray[1]) * t;
                         assert!((at(Plane::Depth, k) - depth).abs() < 1e-6 * distance, "{what}: depth of {k}");
                         assert!((at(Plane::Distance, k) - t).abs() < 1e-6 * distance, "{what}: distance of {k}");
-                        // The same of a ray that is asked for by itself, as far as 32 bits of its direction lead
+                        // `Scene::intersect` finds the same point, for the ray whose direction is rounded to f32
                         let own = WorldRay { o: ray[0], d: ray[1].as_vec3() };
                         let ([o, d], hit) = ([own.o, own.d.as_dvec3().normalize()], scene.intersect(&own));
                         let (t, near) = on_ball([o, d]);

@@ -169,7 +169,7 @@ struct PointSum {
     /// The round that the last two are of.
     round: u32,
     cells: u32,
-    /// What was asked, and may be, in cells and panels.
+    /// The number of cells and panels that were evaluated, and the largest number that may be.
     asked: f32,
     most_asked: f32,
 }

@@ -353,6 +353,15 @@ impl BallCase {
     }
 }
 
+impl BallCase {
+    /// What batches find, or nothing where a shape intersects the light: there it is sampled.
+    fn known(&self, seed: u64, steps: &DisplaySteps) -> Option<Moments> {
+        let found = self.batched(steps);
+        assert!(found.is_known() || self.is_reached_into(), "seed {seed}");
+        found.is_known().then_some(found)
+    }
+}
+
 /// Whether a sphere is in the way from the origin to `l`.
 fn is_hidden(sphere: &Sphere, l: DVec3) -> bool {
     let t = (sphere.c.dot(l) / l.length_squared()).clamp(0.0, 1.0);
@@ -365,12 +374,10 @@ fn batches_know_spheres_of_any_kind() {
     let mut unknown = 0;
     for seed in 7000..7300 {
         let case = BallCase::new(seed);
-        let found = case.batched(&steps);
-        assert!(found.is_known() || case.is_reached_into(), "seed {seed}");
-        if !found.is_known() {
+        let Some(found) = case.known(seed, &steps) else {
             unknown += 1;
             continue;
-        }
+        };
         let truth = case.brute(300);
         let off = off(&steps, &found, &truth);
         let what = (case.physical, case.both_sides, case.radius / case.center.length(), case.spheres.len());
@@ -392,12 +399,10 @@ fn batches_know_spheres_from_inside() {
     let mut unknown = 0;
     for seed in 8000..8300 {
         let case = BallCase::inside(seed);
-        let found = case.batched(&steps);
-        assert!(found.is_known() || case.is_reached_into(), "seed {seed}");
-        if !found.is_known() {
+        let Some(found) = case.known(seed, &steps) else {
             unknown += 1;
             continue;
-        }
+        };
         let truth = case.brute(400);
         let off = off(&steps, &found, &truth);
         let what = (case.physical, case.radius / case.center.length(), case.spheres.len(), case.flats.len());

@@ -271,8 +271,9 @@ impl Cut {
         worst == 0.0 || self.shown(rules) <= rules.budget
     }
 
-    /// Splits nodes until what is wrong shows by no more than is allowed. `guess` is what is known to be sent; else it
-    /// is guessed. `look` says how much of a node is seen, of which one light is named.
+    /// Splits the node with the largest error bound, again and again, until the error of the cut is at most
+    /// `rules.budget` display steps. The display steps depend on the incident light: `guess`, or else the sum over the
+    /// nodes of the cut. `look` classifies the visibility of a node; its second argument is one of the node's lights.
     pub fn refine(&mut self, rules: &CutRules, guess: Option<Rgb>, look: &mut dyn FnMut(&LightNode, u32) -> Seen) {
         self.guess = guess;
         let mut counted = f32::INFINITY;
