@@ -81,8 +81,8 @@ struct Seed {
 }
 
 impl LightTree {
-    /// `classes` has a number for each light. Nodes hold lights of one: of a surface that some lights shine on, a
-    /// node's lights all do or none.
+    /// `classes` has the link class of each light. All lights of a node have the same class, so that a surface receives
+    /// light from all of them or from none.
     pub fn new(lights: &[Light], classes: &[u32]) -> LightTree {
         let mut seeds: Vec<Seed> = lights
             .iter()

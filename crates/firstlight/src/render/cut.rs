@@ -1,12 +1,11 @@
 //! Light cuts: from all lights of a scene to those that count at the places of a block of pixels.
 //!
-//! A walk begins with the roots of the [`LightTree`] and splits the worst node, again and again, until the error of all
-//! nodes that are taken for one light shows by no more than is allowed. Each error is bounded: where a node counts as
-//! its middle, by Taylor's series; where it is not known how much of a node is seen, by half of what it can send.
-//! Errors of nodes are independent of each other, so their squares add up.
+//! The traversal begins at the roots of the [`LightTree`] and splits the node with the largest error bound, until the
+//! error of the cut is at most the budget. The error of a node that is fully visible and evaluated at its centroid is
+//! bounded by the remainder of a Taylor series; that of a node whose visibility is unknown, by half of its largest
+//! contribution. The errors of nodes are taken to be independent, so their squares add up.
 //!
-//! Source: Walter et al., "Lightcuts", SIGGRAPH 2005; the independent errors as in Yuksel, "Stochastic Lightcuts", HPG
-//! 2019.
+//! Source: Walter et al., "Lightcuts", SIGGRAPH 2005; the bounds and their sum are ours.
 
 use std::collections::BinaryHeap;
 
@@ -85,9 +84,9 @@ const PAIRS: [[usize; 2]; MOMENTS * (MOMENTS + 1) / 2] = {
     pairs
 };
 
-/// So many nodes are split between two looks at the sum of their errors.
+/// The number of nodes that are split between two evaluations of the error of the cut.
 const STRIDE: u32 = 8;
-/// Sums are made anew where the worst error has become so much less: what was taken away has left its rounding behind.
+/// The sums are recomputed once the largest error has fallen by this factor: subtraction leaves rounding errors behind.
 const AGAIN: f32 = 1e-4;
 
 /// A walk through the tree. Keeps its memory.

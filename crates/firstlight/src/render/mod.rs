@@ -211,7 +211,7 @@ impl RenderSettings {
     fn renderer_of(&self, scene: &Scene) -> Renderer {
         let areas = || scene.lights.iter().filter(|light| light.area().is_some());
         match self.renderer() {
-            // Behind trees rays that share the light of sampled areas take longer to find that out than to be lit
+            // With BVHs in the scene, testing whether rays may share sampled light takes longer than shading each ray
             Renderer::Adaptive
                 if scene.geometry.has_trees() && areas().next().is_some() && areas().all(|light| !light.exact) =>
             {

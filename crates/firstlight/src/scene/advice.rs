@@ -143,7 +143,8 @@ fn framed(scene: &Scene) -> Option<[[u32; 2]; 2]> {
     let lamps = scene.lights.iter().filter_map(|light| light.area()).filter(is_lamp_seen);
     let lamps = lamps.map(|area| area.shape.bounds()).reduce(|[low, high], [a, b]| [low.min(a), high.max(b)]);
     let is_shape_seen = geometry.surfaces.iter().any(|surface| surface.visible);
-    // A plane that any ray of the picture meets is met by one through a corner of it: what decides that is linear
+    // If any camera ray meets an infinite plane, so does a ray through a corner of the film: the condition is linear
+    // over the film
     let [width, height] = all.map(|[_, end]| end as f32);
     let of_film = [(0.0, 0.0), (width, 0.0), (width, height), (0.0, height)];
     let is_met = |(x, y): (f32, f32)| scene.intersect_local(&scene.camera.local_ray(x, y, 1.0).0).is_some();

@@ -34,7 +34,7 @@ impl LinkSets {
         set.is_none_or(|set| self.bits_of(set)[light.index() / 64] >> (light.index() % 64) & 1 == 1)
     }
 
-    /// A number for each light, the same for those that are in the same sets.
+    /// The link class of each light: two lights have the same class if every set holds both or neither.
     pub fn classes(&self, lights: usize) -> Vec<u32> {
         let mut classes = vec![0; lights];
         for set in self.bits.chunks_exact(self.words.max(1)) {

@@ -31,7 +31,7 @@ pub(super) struct Dot {
 }
 
 impl<'a> Many<'a> {
-    /// The places of a block that lie on one surface, `guess` is what is known to be sent there.
+    /// Lights the shading points of a block that lie on one surface. `guess` is a cautious estimate of their incident light.
     #[allow(clippy::too_many_arguments, reason = "a block of a cell, and what it asks with")]
     pub(super) fn block(
         &mut self,
