@@ -31,7 +31,8 @@ pub(super) struct Dot {
 }
 
 impl<'a> Many<'a> {
-    /// Lights the shading points of a block that lie on one surface. `guess` is a cautious estimate of their incident light.
+    /// Lights the shading points of a block that lie on one surface. `guess` is a cautious estimate of their incident
+    /// light.
     #[allow(clippy::too_many_arguments, reason = "a block of a cell, and what it asks with")]
     pub(super) fn block(
         &mut self,
