@@ -7,6 +7,7 @@ use fearless_simd::{Level, Simd};
 
 use crate::accel::{Aabb, Bvh, RayPacket16, RayTile, TraceRay, dispatch_eight};
 use crate::ids::LightId;
+use crate::material::ShadingPoint;
 use crate::math::{LANES, Ray, Vec3};
 use crate::render::Counts;
 use crate::render::given::Given;
@@ -14,7 +15,7 @@ pub use crate::render::given::{ChoosePoints, LightPoint};
 use crate::render::pixel::PixelSum;
 use crate::render::resolve::TermSums;
 use crate::scene::{CompileOptions, Scene, SceneDesc, ShadowRays, TracedHit};
-use crate::shape::{RayDifferential, TileHits, TriangleTree, every};
+use crate::shape::{RayDifferential, SurfaceInteraction, TileHits, TriangleTree, every};
 use crate::visibility::{OccluderList, Settled, Settler, ShadowView, Target, Viewpoint, Visibility};
 
 /// Origin and direction of a ray.
@@ -219,7 +220,7 @@ impl Soft {
                 let si = scene.local_surface(&ray, &hit, &differential);
                 let counts = |k: usize| si.horizon.dot(scene.lights[0].towards(k, si.lit_from).l) > 0.0;
                 if (0..scene.lights[0].samples()).any(counts) {
-                    points.push(Viewpoint::of(&si));
+                    points.push(viewpoint(&scene, &si));
                 }
             }
             if points.len() as u32 > first {
@@ -359,7 +360,7 @@ pub fn sights(scene: &Scene, light: u32, block: u32) -> Vec<Option<ShareSeen>> {
                 for x in left..(left + block).min(scene.width) {
                     let (ray, differential) = scene.camera.local_ray(x as f32 + 0.5, y as f32 + 0.5, 1.0);
                     if let TracedHit::Surface(si) = scene.see(&ray, scene.intersect_local(&ray), &differential) {
-                        points.push(Viewpoint::of(&si));
+                        points.push(viewpoint(scene, &si));
                         pixels.push((y * scene.width + x) as usize);
                     }
                 }
@@ -395,4 +396,10 @@ pub fn pixel(scene: &Scene, at: [u32; 2], choose: &mut ChoosePoints) -> [f32; 4]
     let mut sums = TermSums::new(scene, 1, &[]);
     sum.resolve(scene, 0, &mut sums);
     sums.colors[0]
+}
+
+/// Where light is gathered on a surface.
+fn viewpoint(scene: &Scene, si: &SurfaceInteraction) -> Viewpoint {
+    let bsdf = scene.materials[si.material.index()].bsdf(si, &scene.textures);
+    Viewpoint::of(&ShadingPoint::of(si, &bsdf, scene.ambient))
 }

@@ -7,82 +7,11 @@ use arrayvec::ArrayVec;
 use fearless_simd::{f32x16, mask32x16, prelude::*};
 
 use super::view::{FlatLight, FlatView, NEAR};
-use crate::color::Rgb;
-use crate::material::Colors;
-use crate::math::{DVec3, ErrorBound, Facet, LANES, UNIT_ROUNDOFF, Vec3, Vec3x16};
-use crate::shape::SurfaceInteraction;
+use crate::material::ShadingPoint;
+use crate::math::{DVec3, LANES, UNIT_ROUNDOFF, Vec3, Vec3x16};
 
 /// Sixteen numbers, one of each member of a batch.
 pub(crate) type LaneNumbers = [f32; LANES];
-
-/// What lighting needs to know of a surface at one point.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct ShadingPoint {
-    /// World space, and how sure we are of it.
-    pub p: Vec3,
-    pub error: ErrorBound,
-    /// Light from below the plane with this normal does not count.
-    pub horizon: Vec3,
-    /// Geometric normal, to the viewer's side, and the facet that the point was lifted off.
-    pub ng: Vec3,
-    pub facet: Facet,
-    /// Shading normal.
-    pub ns: Vec3,
-    /// To the viewer.
-    pub wo: Vec3,
-    /// How far what it stands for reaches from it, in metres, and how far normals turn on the way, in radians; 0 for a
-    /// point alone.
-    pub reach: f32,
-    pub turn: f32,
-    /// How far outlines of shadows may move on the light within its reach, see [`Arrived::motion`]: where they move
-    /// farther, and nothing is proved, what arrives is not wanted.
-    ///
-    /// [`Arrived::motion`]: super::Arrived::motion
-    pub most_motion: f32,
-    /// The part of the points of a light that it asks in place of all this, where that would take too long: 1/n of a
-    /// ray that asks together with n - 1 others. Without bound where it must be known.
-    pub part_of_points: f32,
-    /// What one unit of each moment is worth: linear colours, the light's scale included.
-    pub worth: Colors,
-    /// What is there beside this light, at least.
-    pub base: Rgb,
-    /// The share of a pixel that it stands for.
-    pub share: f32,
-}
-
-impl ShadingPoint {
-    /// Whether points of the light would tell as well.
-    pub fn is_bounded(&self) -> bool {
-        self.part_of_points < f32::INFINITY
-    }
-
-    /// A point by itself that stands for a pixel, of a surface with this unit normal on the viewer's side; colours are
-    /// still to come.
-    pub fn new(p: Vec3, error: ErrorBound, n: Vec3, wo: Vec3) -> ShadingPoint {
-        ShadingPoint {
-            p,
-            error,
-            horizon: n,
-            ng: n,
-            facet: Facet::NONE,
-            ns: n,
-            wo,
-            reach: 0.0,
-            turn: 0.0,
-            most_motion: f32::INFINITY,
-            part_of_points: f32::INFINITY,
-            worth: Colors::BLACK,
-            base: Rgb::BLACK,
-            share: 1.0,
-        }
-    }
-
-    /// The same where a ray meets a surface.
-    pub fn of(si: &SurfaceInteraction) -> ShadingPoint {
-        let SurfaceInteraction { lit_from, error, horizon, ng, facet, ns, wo, .. } = *si;
-        ShadingPoint { horizon, ng, facet, ..ShadingPoint::new(lit_from, error, ns, wo) }
-    }
-}
 
 /// One number of what a point sees of a flat light; see [`FlatView`].
 #[derive(Clone, Copy, Debug)]

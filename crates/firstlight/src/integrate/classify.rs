@@ -10,12 +10,13 @@ mod solid;
 
 use fearless_simd::{f32x16, prelude::*};
 
-use super::batch::{Exact, Linear16, ShadingPoint, ViewBlock, ViewNumber, Views, ways};
+use super::batch::{Exact, Linear16, ViewBlock, ViewNumber, Views, ways};
 use super::emitter::Emitter;
 use super::hull::SolidOccluder;
 use super::occluder::{Occluder, Shadow, corners_from};
 use super::panels::{Between, MAX_INTERVALS};
 use crate::ids::LightId;
+use crate::material::ShadingPoint;
 use crate::math::{DAffine3, Facet, LANES, Vec3, Vec3x16};
 use crate::scene::{PlacedTarget, Scene};
 use crate::shape::{Parallelogram, Placement, PlaneSide, Solid, Sphere};

@@ -6,8 +6,9 @@ use arrayvec::ArrayVec;
 
 use super::batch::Exact;
 use super::fit::AreaWeight;
-use super::view::{FlatLight, Outline};
+use super::view::{FlatLight, FlatView, Outline};
 use crate::light::{Area, AreaShape};
+use crate::material::ShadingPoint;
 use crate::math::{DVec3, Vec3};
 
 /// Of a cube.
@@ -93,6 +94,12 @@ impl Emitter {
                 (*both_sides && !(depth < 0.0)).then_some(depth as f32)
             }
         }
+    }
+
+    /// The distance of a point to it, or a little less; 0 where nothing emits towards the point.
+    pub fn nearest(&self, point: &ShadingPoint) -> f32 {
+        let flat = || self.flat(point.p).map(|flat| FlatView::new(&flat, point).nearest());
+        self.depth(point.p).or_else(flat).unwrap_or(0.0)
     }
 
     /// What of a ball that shines inwards points inside of it see, by the faces of a cube.

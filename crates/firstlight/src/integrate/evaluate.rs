@@ -18,16 +18,16 @@
 use arrayvec::ArrayVec;
 use fearless_simd::{Level, Simd};
 
-use super::batch::{LaneNumbers, Members, ShadingPoint, ViewBlock};
+use super::batch::{LaneNumbers, Members, ViewBlock};
 use super::classify::{Class, Obstacles, classify};
 use super::emitter::Emitter;
 use super::fit::{Cell, CutBlock, Fits, MOMENTS, fit};
 use super::grade::{Grades, grade, halves, survey, whole};
 use super::panels::{Between, Blocked, Panel, PanelSums, cut, rows};
 use super::tolerance::{COSTS, TOLERANCE, Weight};
-use super::view::{FlatView, Receiver};
-use crate::color::DisplaySteps;
-use crate::material::{Lobe, Moments};
+use super::view::FlatView;
+use crate::color::{DisplaySteps, Rgb};
+use crate::material::{Lobe, Moments, ShadingPoint};
 use crate::math::{LANES, dispatch_wide};
 
 /// How much of a light shines on a point.
@@ -61,16 +61,6 @@ pub(crate) struct Arrived {
 }
 
 impl Arrived {
-    /// Nothing is known of what is seen.
-    pub const UNKNOWN: Arrived = Arrived {
-        sums: Moments::UNKNOWN,
-        illumination: Illumination::Unknown,
-        proved: false,
-        motion: f32::INFINITY,
-        distance: 0.0,
-        height: 0.0,
-    };
-
     /// What arrives of two parts of a light.
     fn and(&self, other: &Arrived) -> Arrived {
         let illumination = match (self.illumination, other.illumination) {
@@ -96,6 +86,8 @@ pub(crate) struct Asked<'a> {
     /// What of trees may be in the way, if anything is.
     pub near: Option<&'a Obstacles<'a>>,
     pub lobe: &'a Lobe,
+    /// What its moments are multiplied with before the colours of a surface.
+    pub scale: Rgb,
     pub steps: &'a DisplaySteps,
     /// In display steps: how far this light may be wrong at a point that stands for a pixel.
     pub allowed: f32,
@@ -323,8 +315,7 @@ impl Evaluator {
         for (k, point) in points.iter().enumerate().filter(|(k, _)| one_by_one >> k & 1 == 1) {
             if let Some(flat) = light.emitter.flat(point.p) {
                 there |= 1 << k;
-                let ShadingPoint { p, error, horizon, ns, wo, .. } = *point;
-                views.set(k, p, &FlatView::new(&flat, &Receiver { p, error, horizon, ns, wo, lobe: *light.lobe }));
+                views.set(k, point.p, &FlatView::new(&flat, point));
             }
         }
         there
@@ -378,7 +369,7 @@ impl Evaluator {
             }
         }
         for ((state, point), sent) in state.iter_mut().zip(points).zip(&sent) {
-            let error = point.worth.of(sent);
+            let error = (light.scale * point.bsdf.colors).of(sent);
             let steps = light.steps.of_color(point.base + error * 0.5, error);
             state.most_asked = Asked::most_asked(steps) * point.part_of_points;
         }
@@ -504,10 +495,11 @@ impl Evaluator {
             let state = &mut states[point as usize];
             if state.round == round {
                 state.round += WEIGHED;
-                let ShadingPoint { worth, base, share, .. } = &points[point as usize];
+                let ShadingPoint { bsdf, base, share, .. } = &points[point as usize];
+                let worth = light.scale * bsdf.colors;
                 let value = worth.onto(*base, &state.estimate);
                 let allowed = light.allowed / share.max(TOLERANCE.least_share).sqrt();
-                state.weight = Weight::new(light.steps, value, worth, allowed, light.least);
+                state.weight = Weight::new(light.steps, value, &worth, allowed, light.least);
             }
         }
         // Cells that are seen whole

@@ -5,11 +5,11 @@ use std::f32::consts::FRAC_PI_2;
 
 use fearless_simd::{f32x16, mask32x16, prelude::*};
 
-use super::batch::{LaneNumbers, Linear16, Members, ShadingPoint, ViewBlock, ViewNumber, Views, ways};
+use super::batch::{LaneNumbers, Linear16, Members, ViewBlock, ViewNumber, Views, ways};
 use super::fit::{Cell, sides};
 use super::tolerance::TOLERANCE;
 use super::view::Outline;
-use crate::material::Lobe;
+use crate::material::{Lobe, ShadingPoint};
 use crate::math::{LANES, Vec3x16, sin_cos};
 
 /// What sixteen points see of a light with nothing in the way, each a bit.

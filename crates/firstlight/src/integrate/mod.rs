@@ -19,12 +19,10 @@ mod row;
 mod tolerance;
 mod view;
 
-pub(crate) use batch::ShadingPoint;
 pub(crate) use classify::Obstacles;
 pub(crate) use emitter::Emitter;
 pub(crate) use evaluate::{Arrived, Asked, Evaluator, Illumination};
 pub(crate) use tolerance::{COSTS, TOLERANCE};
-pub(crate) use view::{FlatView, Receiver};
 
 #[cfg(test)]
 mod tests;

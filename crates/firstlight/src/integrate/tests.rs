@@ -2,10 +2,10 @@
 
 use fearless_simd::Level;
 
-use super::view::{FlatLight, Outline};
+use super::view::{FlatLight, FlatView, Linear, Outline};
 use super::*;
 use crate::color::{Display, DisplaySteps, Rgb};
-use crate::material::{BlinnPhongLobe, Colors, Lobe, Moments, PhongLobe};
+use crate::material::{BlinnPhongLobe, Bsdf, Colors, Lobe, Moments, PhongLobe, ShadingPoint};
 use crate::math::{DVec3, ErrorBound, Vec3};
 use crate::shape::{Parallelogram, Sphere, SphereUv};
 
@@ -38,13 +38,26 @@ impl Random {
     }
 }
 
+/// A grey material with a lobe.
+fn gray(lobe: Lobe) -> Bsdf {
+    Bsdf { colors: Colors::default().map(|_| Rgb::gray(0.5)), ambient: Rgb::BLACK, lobe }
+}
+
 /// A light and a point near the origin, and things between them.
 struct Case {
     light: FlatLight,
-    receiver: Receiver,
+    point: ShadingPoint,
     view: FlatView,
     spheres: Vec<Sphere>,
     flats: Vec<Parallelogram>,
+}
+
+/// Whether any light can arrive: a side that emits faces the point, and some of the light is above the horizon.
+fn arrives(light: &FlatLight, view: &FlatView) -> bool {
+    let largest =
+        |of: &Linear| of.c + (of.x * view.x[0]).max(of.x * view.x[1]) + (of.y * view.y[0]).max(of.y * view.y[1]);
+    let is_in_plane = light.physical && view.height == 0.0;
+    view.facing > 0.0 && !is_in_plane && largest(&view.cos) > 0.0 && largest(&view.horizon) > 0.0
 }
 
 fn case(seed: u64, things: usize, sharpest: f64) -> Option<Case> {
@@ -81,11 +94,10 @@ fn case(seed: u64, things: usize, sharpest: f64) -> Option<Case> {
     } else {
         ns
     };
-    let p = Vec3::ZERO;
     let (ns, wo) = (ns.as_vec3(), wo.as_vec3());
-    let receiver = Receiver { p, error: ErrorBound(Vec3::ZERO), horizon: ns, ns, wo, lobe };
-    let view = FlatView::new(&light, &receiver);
-    if !view.arrives() {
+    let point = ShadingPoint::new(Vec3::ZERO, ErrorBound(Vec3::ZERO), ns, wo, &gray(lobe));
+    let view = FlatView::new(&light, &point);
+    if !arrives(&light, &view) {
         return None;
     }
     let (mut spheres, mut flats) = (Vec::new(), Vec::new());
@@ -102,7 +114,7 @@ fn case(seed: u64, things: usize, sharpest: f64) -> Option<Case> {
             flats.push(Parallelogram::new(at - (e0 + e1) * 0.5, e0, e1, 1.0, false));
         }
     }
-    Some(Case { light, receiver, view, spheres, flats })
+    Some(Case { light, point, view, spheres, flats })
 }
 
 /// Whether a parallelogram is in the way from the origin to `l`.
@@ -118,7 +130,7 @@ fn is_behind(flat: &Parallelogram, l: DVec3) -> bool {
 
 /// The mean of `n` x `n` points, in f64.
 fn brute(case: &Case, n: usize) -> Moments {
-    let (light, at) = (&case.light, &case.receiver);
+    let (light, at) = (&case.light, &case.point);
     let (mut diffuse, mut specular) = (0.0, 0.0);
     for i in 0..n {
         for j in 0..n {
@@ -129,7 +141,7 @@ fn brute(case: &Case, n: usize) -> Moments {
             }
             // Places are counted from the view's origin
             let [x, y] = [x - case.view.origin[0], y - case.view.origin[1]];
-            let l = case.view.l(x, y);
+            let l = case.view.l0 + case.view.a * x + case.view.b * y;
             let (height, distance) = (at.ns.dot(l), l.length());
             let to = l.as_dvec3();
             let hides = case.spheres.iter().any(|sphere| is_hidden(sphere, to))
@@ -143,7 +155,7 @@ fn brute(case: &Case, n: usize) -> Moments {
             }
             let cos_i = height / distance;
             diffuse += weight * f64::from(cos_i);
-            specular += weight * f64::from(at.lobe.eval(cos_i, at.ns.dot(at.wo), at.wo.dot(l) / distance));
+            specular += weight * f64::from(at.bsdf.lobe.eval(cos_i, at.ns.dot(at.wo), at.wo.dot(l) / distance));
         }
     }
     Moments::bounds(diffuse as f32, specular as f32)
@@ -151,15 +163,13 @@ fn brute(case: &Case, n: usize) -> Moments {
 
 /// What batches say: the same for whoever shares one, and with every instruction set.
 fn batched(case: &Case, steps: &DisplaySteps) -> Moments {
-    let Receiver { p, error, ns, wo, .. } = case.receiver;
-    let worth = Colors::default().map(|_| Rgb::gray(0.5));
-    let point = ShadingPoint { worth, ..ShadingPoint::new(p, error, ns, wo) };
     let emitter = Emitter::Flat(case.light);
     let asked = Asked {
         emitter: &emitter,
         obstacles: &Obstacles::of(&case.spheres, &case.flats, &emitter),
         near: None,
-        lobe: &case.receiver.lobe,
+        lobe: &case.point.bsdf.lobe,
+        scale: Rgb::WHITE,
         steps,
         allowed: TOLERANCE.point,
         least: steps.value_of(TOLERANCE.point),
@@ -168,7 +178,7 @@ fn batched(case: &Case, steps: &DisplaySteps) -> Moments {
     };
     let all = |level: Level, count: usize| {
         let mut arrived = Vec::new();
-        Evaluator::default().evaluate(level, &asked, &vec![point; count], &mut arrived);
+        Evaluator::default().evaluate(level, &asked, &vec![case.point; count], &mut arrived);
         arrived
     };
     let found = all(Level::new(), 1)[0];
@@ -233,7 +243,6 @@ struct BallCase {
     physical: bool,
     both_sides: bool,
     point: ShadingPoint,
-    lobe: Lobe,
     spheres: Vec<Sphere>,
     flats: Vec<Parallelogram>,
 }
@@ -266,13 +275,12 @@ impl BallCase {
                 spheres.push(Sphere { c, r, uv: SphereUv::Angles, single_sided: false });
             }
         }
-        let worth = Colors::default().map(|_| Rgb::gray(0.5));
-        let point = ShadingPoint { worth, ..ShadingPoint::new(Vec3::ZERO, ErrorBound(Vec3::ZERO), ns, wo) };
+        let point = ShadingPoint::new(Vec3::ZERO, ErrorBound(Vec3::ZERO), ns, wo, &gray(lobe));
         // Millimetres, metres, kilometres
         let scale = [1e-3, 1.0, 3e3][seed as usize / 3 % 3];
         let (center, radius) = (center * scale, radius * scale);
         spheres.iter_mut().for_each(|sphere: &mut Sphere| (sphere.c, sphere.r) = (sphere.c * scale, sphere.r * scale));
-        BallCase { center, radius, physical, both_sides, point, lobe, spheres, flats: Vec::new() }
+        BallCase { center, radius, physical, both_sides, point, spheres, flats: Vec::new() }
     }
 
     /// With the point inside of the ball.
@@ -327,7 +335,7 @@ impl BallCase {
             }
             let [cos_i, cos_o, cos_io] = [height / distance, ns.dot(wo), wo.dot(l) / distance].map(|v| v as f32);
             diffuse += weight * f64::from(cos_i);
-            specular += weight * f64::from(self.lobe.eval(cos_i, cos_o, cos_io));
+            specular += weight * f64::from(self.point.bsdf.lobe.eval(cos_i, cos_o, cos_io));
         }
         Moments::bounds(diffuse as f32, specular as f32)
     }
@@ -340,7 +348,8 @@ impl BallCase {
             emitter: &emitter,
             obstacles: &obstacles,
             near: None,
-            lobe: &self.lobe,
+            lobe: &self.point.bsdf.lobe,
+            scale: Rgb::WHITE,
             steps,
             allowed: TOLERANCE.point,
             least: steps.value_of(TOLERANCE.point),

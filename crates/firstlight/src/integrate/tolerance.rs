@@ -53,9 +53,6 @@ pub(crate) struct Tolerance {
     pub even: f32,
     /// As a part of it: how far colours may be from their mean that are taken for one.
     pub same_mean: f32,
-    /// Outlines that move over a larger part of the light than this, in squares of widths highlights that move by more,
-    /// and in radians light that turns by more, are not wide beside a place's reach.
-    pub resolved: f32,
 
     // Points of a light
     /// In points, with a tolerance of 1: those of a pixel that are asked first; with others a root of it fewer.
@@ -114,7 +111,6 @@ pub(crate) const TOLERANCE: Tolerance = Tolerance {
     mingled: 0.4,
     even: 0.01,
     same_mean: 0.004,
-    resolved: 0.2,
     first_points: 256.0,
     nearer: 4.0,
     clear: 96.0,

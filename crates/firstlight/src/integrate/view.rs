@@ -3,8 +3,8 @@
 use std::f32::consts::PI;
 
 use crate::light::way_error;
-use crate::material::Lobe;
-use crate::math::{DVec3, ErrorBound, UNIT_ROUNDOFF, Vec3};
+use crate::material::ShadingPoint;
+use crate::math::{DVec3, UNIT_ROUNDOFF, Vec3};
 
 /// What a flat light fills of the square [-1, 1]^2 of its own coordinates.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -101,20 +101,6 @@ impl FlatLight {
     }
 }
 
-/// A point that asks for light.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Receiver {
-    pub p: Vec3,
-    pub error: ErrorBound,
-    /// Light from below this plane does not count.
-    pub horizon: Vec3,
-    /// Shading normal.
-    pub ns: Vec3,
-    /// To the viewer.
-    pub wo: Vec3,
-    pub lobe: Lobe,
-}
-
 /// c + x X + y Y: a quantity that changes linearly over a light.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Linear {
@@ -162,8 +148,6 @@ pub(crate) struct FlatView {
     pub cos_o: f32,
     pub ns: Vec3,
     pub wo: Vec3,
-    pub lobe: Lobe,
-    pub physical: bool,
     /// See [`FlatLight::measure`].
     pub measure: f32,
     /// See [`FlatLight::ratio`].
@@ -172,7 +156,7 @@ pub(crate) struct FlatView {
 }
 
 impl FlatView {
-    pub fn new(light: &FlatLight, at: &Receiver) -> FlatView {
+    pub fn new(light: &FlatLight, at: &ShadingPoint) -> FlatView {
         let l0 = (light.c - at.p.as_dvec3()).as_vec3();
         let side = -light.n.dot(l0);
         let linear = |v: Vec3| Linear { c: v.dot(l0), x: v.dot(light.a), y: v.dot(light.b) };
@@ -198,8 +182,6 @@ impl FlatView {
             cos_o: at.ns.dot(at.wo),
             ns: at.ns,
             wo: at.wo,
-            lobe: at.lobe,
-            physical: light.physical,
             measure: light.measure(),
             ratio: light.ratio,
             behind2: light.behind2,
@@ -208,7 +190,7 @@ impl FlatView {
     }
 
     /// The same with places counted from the nearest.
-    fn near(self, light: &FlatLight, at: &Receiver) -> FlatView {
+    fn near(self, light: &FlatLight, at: &ShadingPoint) -> FlatView {
         let [a, b, n] = light.deep;
         let middle = light.c - at.p.as_dvec3();
         let (ua, ub) = (a.normalize(), (b - a * (a.dot(b) / a.length_squared())).normalize());
@@ -248,85 +230,14 @@ impl FlatView {
         }
     }
 
-    /// The corners of the light's square, around.
-    pub fn square(&self) -> [[f32; 2]; 4] {
-        let ([x0, x1], [y0, y1]) = (self.x, self.y);
-        [[x0, y0], [x1, y0], [x1, y1], [x0, y1]]
-    }
-
-    /// The least of a quantity over the square.
-    #[inline(always)]
-    pub fn min(&self, of: &Linear) -> f32 {
-        of.c + (of.x * self.x[0]).min(of.x * self.x[1]) + (of.y * self.y[0]).min(of.y * self.y[1])
-    }
-
-    /// The greatest.
-    #[inline(always)]
-    pub fn max(&self, of: &Linear) -> f32 {
-        of.c + (of.x * self.x[0]).max(of.x * self.x[1]) + (of.y * self.y[0]).max(of.y * self.y[1])
-    }
-
-    /// The way to the light's middle.
-    #[inline(always)]
-    pub fn middle(&self) -> Vec3 {
-        self.l(0.5 * (self.x[0] + self.x[1]), 0.5 * (self.y[0] + self.y[1]))
-    }
-
-    /// Whether any light can arrive: a side that emits faces the point, and some of the light is above the horizon.
-    #[inline(always)]
-    pub fn arrives(&self) -> bool {
-        self.facing > 0.0
-            && (self.height > 0.0 || !self.physical)
-            && self.max(&self.cos) > 0.0
-            && self.max(&self.horizon) > 0.0
-    }
-
     /// The distance to the nearest place of the light's square, or a little less.
     pub fn nearest(&self) -> f32 {
-        let [x, y] = self.gaps();
-        (x * x + y * y + self.height * self.height).sqrt()
-    }
-
-    /// How far beside the light's square the foot of the point is, along its edges, or a little less.
-    pub fn gaps(&self) -> [f32; 2] {
         let gap = |foot: f32, [low, high]: [f32; 2]| (foot - low).max(-foot - high).max(0.0);
         let ([x0, x1], [y0, y1]) = (self.x, self.y);
         let lean = self.skew.abs() * y1.max(-y0);
-        [gap(self.fa, [self.la * -x0 + lean, self.la * x1 + lean]), gap(self.fb, [self.lb * -y0, self.lb * y1])]
-    }
-
-    /// The most that can arrive within `reach` of the point, or thereabouts: the cosine at the surface is 1, and
-    /// nothing is in the way.
-    pub fn most(&self, reach: f32) -> f32 {
-        if !self.physical {
-            return 1.0;
-        }
-        let size = self.la.max(self.lb);
-        let distance = self.nearest().max(0.3 * size);
-        // No more than a whole half space of light
-        (4.0 * self.measure * (self.height + reach).min(distance) / (distance * distance * distance))
-            .min(std::f32::consts::PI)
-    }
-
-    /// What share of [`most`](Self::most) the mean within `reach` can be off where the light's plane runs through: from
-    /// there one side of a light shines and the other does not, or both grow.
-    pub fn crossing(&self, reach: f32) -> f32 {
-        match (self.height <= reach, self.physical) {
-            (false, _) => 0.0,
-            (true, true) => 0.5,
-            (true, false) => f32::from(self.facing.is_finite()),
-        }
-    }
-
-    /// The way to the point (x, y) of the light.
-    #[inline(always)]
-    pub fn l(&self, x: f32, y: f32) -> Vec3 {
-        self.l0 + self.a * x + self.b * y
-    }
-
-    /// The ways to the corners of the square, around.
-    pub fn corners(&self) -> [Vec3; 4] {
-        self.square().map(|[x, y]| self.l(x, y))
+        let across = gap(self.fa, [self.la * -x0 + lean, self.la * x1 + lean]);
+        let along = gap(self.fb, [self.lb * -y0, self.lb * y1]);
+        (across * across + along * along + self.height * self.height).sqrt()
     }
 
     /// The direction of a highlight's middle: the viewer's, mirrored at the shading normal.
@@ -334,16 +245,5 @@ impl FlatView {
         let m = self.ns * (2.0 * self.cos_o) - self.wo;
         let length = m.length();
         (length > 0.5).then(|| m / length)
-    }
-
-    /// [`Lobe::sharpness`] as the point sees it.
-    pub fn sharpness(&self) -> f32 {
-        self.lobe.sharpness(self.cos_o)
-    }
-
-    /// Whether all of the light is above the horizon.
-    #[inline(always)]
-    pub fn is_above_horizon(&self) -> bool {
-        self.min(&self.cos) > 0.0 && self.min(&self.horizon) > 0.0
     }
 }

@@ -262,6 +262,11 @@ impl Light {
         self.area().and_then(|area| area.shape.flat_normal()).unwrap_or(Vec3::ZERO)
     }
 
+    /// Whether it is an area light that is integrated, not sampled.
+    pub(crate) fn is_integrated(&self) -> bool {
+        self.exact && self.area().is_some()
+    }
+
     /// How many points of it are sampled, 1 or more; of a light that is `exact`, where it is sampled all the same.
     #[inline(always)]
     pub fn samples(&self) -> usize {

@@ -4,6 +4,7 @@ mod blinn_phong;
 mod highlight;
 mod moments;
 mod phong;
+mod shading_point;
 
 use fearless_simd::{f32x16, prelude::*};
 
@@ -11,6 +12,7 @@ pub use blinn_phong::{BlinnPhongDesc, BlinnPhongLobe};
 pub(crate) use highlight::Highlight;
 pub(crate) use moments::{Colors, MOMENTS, Moments};
 pub use phong::{PhongDesc, PhongLobe};
+pub(crate) use shading_point::ShadingPoint;
 
 use crate::color::Rgb;
 use crate::context::CompileContext;
@@ -99,29 +101,39 @@ impl Material {
     /// The material in numbers at one surface.
     #[inline]
     pub fn bsdf(&self, si: &SurfaceInteraction, textures: &[Texture]) -> Bsdf {
-        let diffuse = self.diffuse.color(si, textures) * si.color;
+        self.evaluate(|param| param.color(si, textures) * si.color, |param| param.number(si, textures))
+    }
+
+    /// The same on any surface, if it has no texture.
+    pub(crate) fn plain_bsdf(&self) -> Option<Bsdf> {
+        self.is_plain().then(|| self.evaluate(|param| param.factor, |param| param.factor))
+    }
+
+    #[inline(always)]
+    fn evaluate(&self, color: impl Fn(&Param<Rgb>) -> Rgb, number: impl Fn(&Param<f32>) -> f32) -> Bsdf {
+        let diffuse = color(&self.diffuse);
         // The same texture in both is looked up once: config 11 has it so everywhere
         let specular = match (self.specular.texture, self.diffuse.texture) {
             (Some(s), Some(d)) if s == d && self.specular.factor == self.diffuse.factor => diffuse,
-            _ => self.specular.color(si, textures) * si.color,
+            _ => color(&self.specular),
         };
         let lobe = if specular.is_black() {
             Lobe::None
         } else {
-            let shininess = self.shininess.number(si, textures).clamp(0.0, MAX_SHININESS);
+            let shininess = number(&self.shininess).clamp(0.0, MAX_SHININESS);
             match self.lobe {
                 LobeKind::Phong => Lobe::Phong(PhongLobe::new(shininess)),
                 LobeKind::BlinnPhong => Lobe::BlinnPhong(BlinnPhongLobe::new(shininess)),
             }
         };
-        let ambient = self.ambient.map_or(diffuse, |a| a.color(si, textures) * si.color);
+        let ambient = self.ambient.as_ref().map_or(diffuse, color);
         Bsdf { colors: Colors([diffuse, specular]), ambient, lobe }
     }
 }
 
 impl Material {
     /// Whether it has no texture.
-    pub(crate) fn is_plain(&self) -> bool {
+    fn is_plain(&self) -> bool {
         let ambient = self.ambient.and_then(|ambient| ambient.texture);
         [self.diffuse.texture, self.specular.texture, self.shininess.texture, ambient] == [None; 4]
     }

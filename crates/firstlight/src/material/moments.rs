@@ -17,7 +17,6 @@ pub(crate) struct Colors(pub [Rgb; MOMENTS]);
 
 impl Moments {
     pub const ZERO: Moments = Moments([0.0; MOMENTS]);
-    pub const MOST: Moments = Moments([f32::MAX; MOMENTS]);
     pub const UNKNOWN: Moments = Moments([f32::NAN; MOMENTS]);
 
     /// Bounds: of what is as wide as the cosine, and of highlights.

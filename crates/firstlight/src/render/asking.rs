@@ -1,7 +1,6 @@
 //! Rays that ask points of a light, each in the same leaves of it.
 
 use super::Counts;
-use super::arrival::ArrivalPlace;
 use super::beams::{self, RungRays};
 use super::ladder::{AskedRung, Asker};
 use super::leaves::{LeafBlock, Leaves};
@@ -10,9 +9,8 @@ use super::tally::{Tally, would_send};
 use crate::color::Rgb;
 use crate::integrate::TOLERANCE;
 use crate::light::FineCell;
-use crate::material::{Lobe, MOMENTS, Moments};
+use crate::material::{MOMENTS, Moments, ShadingPoint};
 use crate::math::LANES;
-use crate::shape::SurfaceInteraction;
 use crate::visibility::{ShadowView, Viewpoint};
 
 /// The points of all rays up to which all leaves are of one size.
@@ -24,11 +22,8 @@ const DEEPEST: u32 = 44;
 
 /// A ray whose light is behind things.
 pub(super) struct Asking {
-    pub si: SurfaceInteraction,
-    pub lobe: Lobe,
-    pub base: Rgb,
+    pub point: ShadingPoint,
     pub scale: Rgb,
-    pub reflected: LightTerm,
     pub series: usize,
     pub view: ShadowView,
     /// What would arrive if nothing were in the way, if that was asked in closed form.
@@ -39,14 +34,13 @@ pub(super) struct Asking {
 }
 
 impl Asking {
-    pub fn place(&self, share: f32) -> ArrivalPlace<'_> {
-        let place = ArrivalPlace::point(&self.si, &self.lobe, self.base, self.scale, self.reflected);
-        ArrivalPlace { share, ..place }
+    pub fn place(&self, share: f32) -> ShadingPoint {
+        ShadingPoint { share, ..self.point }
     }
 
     /// The diffuse part and the highlight, with their colours.
     pub fn each(&self, sums: &Moments) -> LightTerm {
-        (self.scale * self.reflected).each(sums)
+        (self.scale * self.point.bsdf.colors).each(sums)
     }
 
     pub fn color(&self, sums: &Moments) -> Rgb {
@@ -86,7 +80,7 @@ impl<'a> AskedLeaves<'a> {
         let first: Vec<AskedRung> = asking.iter().map(|one| asker.first(one.series, count)).collect();
         asked.look(&first, &vec![u16::MAX; count / LANES], asking, counts);
         for (one, rung) in asking.iter_mut().zip(&first) {
-            one.tally.fill(&asker, rung, &one.view, &one.si, &one.lobe);
+            one.tally.fill(&asker, rung, &one.view, &one.point);
         }
         asked
     }
@@ -146,7 +140,7 @@ impl<'a> AskedLeaves<'a> {
             let next: Vec<AskedRung> = asking.iter().map(next).collect();
             self.look(&next, &next[0].asked(halved), asking, counts);
             for (one, rung) in asking.iter_mut().zip(&next) {
-                one.tally.halve(&self.asker, (rung, halved), &one.view, &one.si, &one.lobe);
+                one.tally.halve(&self.asker, (rung, halved), &one.view, &one.point);
             }
         }
         let halves: Vec<u32> = halved.iter().flat_map(|halved| &halved.blocks).flat_map(|block| block.halves).collect();
@@ -195,7 +189,7 @@ impl<'a> AskedLeaves<'a> {
                 }
                 [x, y]
             });
-            let sent = would_send(&self.asker, places, &one.si, &one.lobe);
+            let sent = would_send(&self.asker, places, &one.point);
             for ((worth, number), sent) in worth.iter_mut().zip(blocks).zip(&sent) {
                 *worth += peak.weigh(sent) * self.leaves.blocks[*number as usize].part();
             }
@@ -208,11 +202,11 @@ impl<'a> AskedLeaves<'a> {
         let asker = &self.asker;
         let mut beams: Vec<RungRays> = Vec::new();
         for (one, rung) in asking.iter_mut().zip(rungs).filter(|(one, _)| one.view.trees) {
-            beams.push(RungRays { point: Viewpoint::of(&one.si), rung, hidden: &mut one.view.hidden });
+            beams.push(RungRays { point: Viewpoint::of(&one.point), rung, hidden: &mut one.view.hidden });
         }
         counts.settled.traced += beams::trace(asker.scene, asker.target.end(), asked, &mut beams);
         for (one, rung) in asking.iter_mut().zip(rungs).filter(|(one, _)| !one.view.trees) {
-            counts.settled.traced += asker.mask(rung, asked, &mut one.view, &Viewpoint::of(&one.si));
+            counts.settled.traced += asker.mask(rung, asked, &mut one.view, &Viewpoint::of(&one.point));
         }
         let points = asked.iter().map(|bits| u64::from(bits.count_ones())).sum::<u64>() * asking.len() as u64;
         counts.shadow_rays += points;
@@ -232,7 +226,7 @@ struct Peak {
 
 impl Peak {
     fn of(ray: usize, one: &Asking, asker: &Asker) -> Peak {
-        let weights = (one.scale * one.reflected).0.map(largest);
+        let weights = (one.scale * one.point.bsdf.colors).0.map(largest);
         let measure = asker.area.stands_for();
         let mut peak = Peak { ray, at: one.tally.most(asker.level, &weights), weights, sends: 0.0 };
         peak.sends = peak.weigh(&one.sent(measure)) / measure;
@@ -246,9 +240,9 @@ impl Peak {
     /// may be below the horizon. So it is looked for nearest to places above, each a quarter as high as the one before.
     fn look(&mut self, one: &Asking, asker: &Asker) {
         let height = |k: usize| f64::from(asker.area.diagonal()) / (1u64 << (2 * k)) as f64;
-        let above = |k: usize| one.si.lit_from.as_dvec3() + one.si.horizon.as_dvec3() * height(k);
+        let above = |k: usize| one.point.p.as_dvec3() + one.point.horizon.as_dvec3() * height(k);
         let at: [FineCell; LANES] = std::array::from_fn(|k| FineCell::of(asker.area.nearest(above(k))));
-        let sent = would_send(asker, std::iter::once(FineCell::middles(&at)), &one.si, &one.lobe);
+        let sent = would_send(asker, std::iter::once(FineCell::middles(&at)), &one.point);
         let mut most = 0.0;
         for (at, sent) in at.into_iter().zip(&sent) {
             let sent = self.weigh(sent);

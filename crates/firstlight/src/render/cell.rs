@@ -10,9 +10,9 @@
 //! resolve    the pixel's sum, once
 //! ```
 //!
-//! Each station asks [`LightQueue`] for all of its places together; what its judge refuses is asked by the next. Where
-//! lights are many, [`Many`] stands for all stations after the first. Cells lie on a grid of the film and are always
-//! rendered whole, so no decision depends on tiles, crops or threads.
+//! Each station asks [`DirectLighting`] for all of its places together; what its judge refuses is asked by the next.
+//! Where lights are many, [`Many`] stands for all stations after the first. Cells lie on a grid of the film and are
+//! always rendered whole, so no decision depends on tiles, crops or threads.
 
 mod behind;
 mod primary;
@@ -21,11 +21,11 @@ mod squares;
 use std::iter;
 use std::ops::{ControlFlow, Range};
 
+use super::direct::{DirectLighting, LightEstimate, LightQuery, Occlusion};
 use super::film::FilmTile;
 use super::fragment::{Contrast, Fragment, Fragments, Member, Quadrant, RayHit};
 use super::grid::{Block, Grid};
 use super::hits::{PixelHits, PixelRays};
-use super::light_queue::{Answer, LightQueue, LitPlace, Request, Sight};
 use super::many::Many;
 use super::resolve::{LightTerm, PixelTerms, ScaledTerm, Term, TermSums};
 use super::solo::{self, Candidate};
@@ -36,7 +36,7 @@ use super::{AaMode, Counts, Heat};
 use crate::color::Rgb;
 use crate::image::Buffer;
 use crate::integrate::TOLERANCE;
-use crate::material::{Bsdf, MOMENTS, Moments};
+use crate::material::{Bsdf, MOMENTS, Moments, ShadingPoint};
 use crate::scene::Scene;
 use behind::Behind;
 
@@ -74,14 +74,14 @@ struct Pixel {
 struct Wanted {
     fragment: u32,
     light: u32,
-    sight: Sight,
+    occlusion: Occlusion,
     /// Whether each ray asks for itself: no place of the fragment stands for others.
     is_parted: bool,
 }
 
 impl Wanted {
     fn new(fragment: u32, light: u32) -> Wanted {
-        Wanted { fragment, light, sight: Sight::Unknown, is_parted: false }
+        Wanted { fragment, light, occlusion: Occlusion::Unknown, is_parted: false }
     }
 }
 
@@ -89,7 +89,7 @@ impl Wanted {
 pub(crate) struct Cells<'a> {
     scene: &'a Scene,
     mode: AaMode,
-    lights: LightQueue<'a>,
+    lights: DirectLighting<'a>,
     /// All that can be seen, and what squares may see of it.
     listed: Vec<Candidate>,
     near: [Vec<Candidate>; DEPTHS],
@@ -106,15 +106,15 @@ pub(crate) struct Cells<'a> {
     terms: Vec<LightTerm>,
     few: usize,
     grid: Grid,
-    places: Vec<LitPlace>,
-    requests: Vec<Request>,
-    answers: Vec<Answer>,
+    places: Vec<ShadingPoint>,
+    requests: Vec<LightQuery>,
+    answers: Vec<LightEstimate>,
     fragments: Fragments,
     pixel_rays: PixelRays,
     hits: PixelHits,
     /// The rays of one pixel, each with what it meets: a candidate by its number, or something in trees.
     rays: Vec<(u32, RayHit)>,
-    seen: Vec<(Member, Bsdf)>,
+    seen: Vec<Member>,
     shapes: Vec<Candidate>,
     /// What is to be asked by middles, by quadrants and by rays.
     wanted: Vec<Wanted>,
@@ -128,10 +128,10 @@ pub(crate) struct Cells<'a> {
 }
 
 impl<'a> Cells<'a> {
-    pub fn new(scene: &'a Scene, mode: AaMode, lights: LightQueue<'a>, buffers: &[Buffer]) -> Self {
-        let pixel_rays = PixelRays::new(lights.arrivals.level(), scene.antialiasing);
-        let hits = PixelHits::new(lights.arrivals.level(), scene.antialiasing);
-        let many = lights.arrivals.tree().map(|tree| Many::new(scene, tree, buffers));
+    pub fn new(scene: &'a Scene, mode: AaMode, lights: DirectLighting<'a>, buffers: &[Buffer]) -> Self {
+        let pixel_rays = PixelRays::new(lights.level(), scene.antialiasing);
+        let hits = PixelHits::new(lights.level(), scene.antialiasing);
+        let many = lights.tree().map(|tree| Many::new(scene, tree, buffers));
         let few = if many.is_some() { 0 } else { scene.lights.len() };
         Cells {
             scene,
@@ -241,7 +241,7 @@ impl<'a> Cells<'a> {
         }
         let pixel = |fragment: usize| &pixels[fragments.all[fragment].pixel as usize];
         many.begin(fragments, size, |fragment| pixel(fragment).index);
-        many.light(fragments, &mut lights.arrivals, counts, go_on, |fragment, [sent, apart], took| {
+        many.light(fragments, lights, counts, go_on, |fragment, [sent, apart], took| {
             let Pixel { index, terms } = *pixel(fragment);
             terms.resolve(scene, sent.iter().copied(), index as usize, sums);
             PixelTerms::keep_apart(scene, apart, index as usize, sums);
@@ -289,7 +289,7 @@ impl<'a> Cells<'a> {
             if fragment == self.fragments.all.len() {
                 continue;
             }
-            let is_even = self.fragments.all[fragment].bsdfs.is_none();
+            let is_even = !self.fragments.all[fragment].is_textured;
             for light in lights.clone() {
                 match self.grid.arrived(light as usize, at).filter(|_| is_even) {
                     Some(sums) => self.add(fragment, light as usize, sums),
@@ -311,7 +311,7 @@ impl<'a> Cells<'a> {
             let ambient = iter::repeat_n(scene.ambient * block.bsdf.ambient, columns);
             self.sums.add(first, Term::Ambient, Rgb::WHITE, ambient);
             for light in 0..scene.lights.len() {
-                let scale = self.lights.arrivals.scale(light);
+                let scale = self.lights.scale(light);
                 let row = self.grid.row(light, [x, j], columns);
                 told.iter_mut().zip(row).for_each(|(told, arrived)| *told &= arrived.is_known());
                 for moment in 0..MOMENTS {
@@ -338,7 +338,7 @@ impl<'a> Cells<'a> {
         let mut slopes = Rgb::BLACK;
         for light in 0..scene.lights.len() {
             let Some(arrived) = self.grid.arrived(light, at) else { return false };
-            let scale = self.lights.arrivals.scale(light);
+            let scale = self.lights.scale(light);
             for (moment, part) in bsdf.colors.each(&arrived).0.into_iter().enumerate() {
                 self.sums.add(index, Term::Light(Some(light as u32), moment), scale, iter::once(part));
             }
@@ -347,9 +347,7 @@ impl<'a> Cells<'a> {
                 slopes += scale * contrast.of(&slope) * 0.125;
             }
         }
-        if contrast != Contrast::default()
-            && self.lights.arrivals.steps(self.sums.color(index), slopes) > TOLERANCE.mingled
-        {
+        if contrast != Contrast::default() && self.lights.steps(self.sums.color(index), slopes) > TOLERANCE.mingled {
             return false;
         }
         self.states[index] = PixelState::Done;
@@ -375,10 +373,10 @@ impl<'a> Cells<'a> {
         let middle = |wanted: &Wanted, fragments: &Fragments| fragments.all[wanted.fragment as usize].middle;
         self.requests.clear();
         for wanted in &wanted {
-            let Wanted { light, sight, .. } = *wanted;
-            self.requests.extend(middle(wanted, &self.fragments).map(|place| Request { place, light, sight }));
+            let Wanted { light, occlusion, .. } = *wanted;
+            self.requests.extend(middle(wanted, &self.fragments).map(|point| LightQuery { point, light, occlusion }));
         }
-        self.lights.ask(&self.fragments.places, &self.requests, &mut self.answers, counts, go_on)?;
+        self.lights.estimate(&self.fragments.places, &self.requests, &mut self.answers, counts, go_on)?;
         let mut next = 0;
         for wanted in &wanted {
             let Wanted { fragment, light, .. } = *wanted;
@@ -390,13 +388,15 @@ impl<'a> Cells<'a> {
             next += 1;
             let Fragment { pixel, count, .. } = self.fragments.all[fragment as usize];
             self.sums.work[self.pixels[pixel as usize].index as usize] += Heat::PLACE;
-            let is_dark = answer.sums == Moments::default();
-            let is_known = answer.sums.is_known();
-            if is_known && (count == 1 || answer.smooth && (is_dark || self.is_nearly_even(fragment, light, &answer))) {
-                self.add(fragment as usize, light as usize, answer.sums);
+            let is_dark = answer.moments == Moments::default();
+            let is_known = answer.moments.is_known();
+            if is_known
+                && (count == 1 || answer.is_uniform && (is_dark || self.is_nearly_even(fragment, light, &answer)))
+            {
+                self.add(fragment as usize, light as usize, answer.moments);
             } else {
-                let is_parted = !is_known && !self.lights.arrivals.is_integrated(light as usize);
-                self.parted.push(Wanted { sight: answer.sight, is_parted, ..*wanted });
+                let is_parted = !is_known && !self.lights.is_integrated(light as usize);
+                self.parted.push(Wanted { occlusion: answer.occlusion, is_parted, ..*wanted });
             }
         }
         self.wanted = wanted;
@@ -408,15 +408,15 @@ impl<'a> Cells<'a> {
         let scene = self.scene;
         let wanted = std::mem::take(&mut self.parted);
         self.requests.clear();
-        for Wanted { fragment, light, sight, .. } in wanted.iter().copied().filter(|wanted| !wanted.is_parted) {
+        for Wanted { fragment, light, occlusion, .. } in wanted.iter().copied().filter(|wanted| !wanted.is_parted) {
             let pixel = self.fragments.all[fragment as usize].pixel;
             let at = self.at(self.pixels[pixel as usize].index as usize);
             self.fragments.find_quadrants(scene, fragment as usize, at);
             let quadrants = self.fragments.quadrants(&self.fragments.all[fragment as usize]);
-            self.requests.extend(quadrants.iter().map(|q| Request { place: q.place, light, sight }));
+            self.requests.extend(quadrants.iter().map(|q| LightQuery { point: q.place, light, occlusion }));
         }
         let fragments = &self.fragments;
-        self.lights.ask(&fragments.places, &self.requests, &mut self.answers, counts, go_on)?;
+        self.lights.estimate(&fragments.places, &self.requests, &mut self.answers, counts, go_on)?;
         let mut next = 0;
         for wanted in &wanted {
             if wanted.is_parted {
@@ -435,7 +435,7 @@ impl<'a> Cells<'a> {
             let term = &mut self.terms[fragment.pixel as usize * scene.lights.len() + wanted.light as usize];
             for (quadrant, answer) in quadrants.iter().zip(answers) {
                 let (sums, bsdf) =
-                    (answer.sums * quadrant.rays as f32, &fragments.places[quadrant.place as usize].bsdf);
+                    (answer.moments * quadrant.rays as f32, &fragments.places[quadrant.place as usize].bsdf);
                 *term += bsdf.colors.each(&sums);
             }
         }
@@ -444,7 +444,7 @@ impl<'a> Cells<'a> {
     }
 
     /// Whether the middle of a fragment stands for all of it: what it sees of a light changes but by what that turns.
-    fn is_nearly_even(&self, fragment: u32, light: u32, answer: &Answer) -> bool {
+    fn is_nearly_even(&self, fragment: u32, light: u32, answer: &LightEstimate) -> bool {
         let fragment = &self.fragments.all[fragment as usize];
         answer.turn <= TOLERANCE.middle_turn
             && self.bend(fragment, light as usize, answer, answer.turned()) <= TOLERANCE.middle_bend
@@ -452,42 +452,43 @@ impl<'a> Cells<'a> {
 
     /// In display steps: by how much such a part of all that a light could send may bend it within the reach of a place
     /// of a fragment.
-    fn bend(&self, fragment: &Fragment, light: usize, answer: &Answer, part: f32) -> f32 {
+    fn bend(&self, fragment: &Fragment, light: usize, answer: &LightEstimate, part: f32) -> f32 {
         let bend = part * answer.most;
         let bsdf = &fragment.bsdf;
-        let colors = self.lights.arrivals.scale(light) * bsdf.colors;
-        let value = colors.onto(self.scene.ambient * bsdf.ambient, &answer.sums);
-        self.lights.arrivals.steps(value, colors.of(&Moments::bounds(bend, bend)))
+        let colors = self.lights.scale(light) * bsdf.colors;
+        let value = colors.onto(self.scene.ambient * bsdf.ambient, &answer.moments);
+        self.lights.steps(value, colors.of(&Moments::bounds(bend, bend)))
     }
 
     /// Whether a light is even enough over the quadrants of a fragment.
-    fn is_even(&self, fragment: &Fragment, light: usize, answers: &[Answer]) -> bool {
+    fn is_even(&self, fragment: &Fragment, light: usize, answers: &[LightEstimate]) -> bool {
         let scene = self.scene;
         if answers.iter().any(|answer| answer.motion > TOLERANCE.motion || answer.turn == f32::INFINITY) {
             return false;
         }
-        let bends = |answer: &Answer| {
-            let part = if answer.sums == Moments::default() { answer.kink() } else { answer.turned() + answer.kink() };
+        let bends = |answer: &LightEstimate| {
+            let part =
+                if answer.moments == Moments::default() { answer.kink() } else { answer.turned() + answer.kink() };
             self.bend(fragment, light, answer, part) * fragment.share > TOLERANCE.quadrant_bend
         };
         if answers.iter().any(bends) {
             return false;
         }
-        let scale = self.lights.arrivals.scale(light);
-        let (mut least, mut most) = (answers[0].sums, answers[0].sums);
+        let scale = self.lights.scale(light);
+        let (mut least, mut most) = (answers[0].moments, answers[0].moments);
         for answer in answers {
-            (least, most) = (least.min(answer.sums), most.max(answer.sums));
+            (least, most) = (least.min(answer.moments), most.max(answer.moments));
         }
         // Between places that see nothing a light can come in
-        if most.cosine() == 0.0 && !answers.iter().all(|answer| answer.smooth) {
+        if most.cosine() == 0.0 && !answers.iter().all(|answer| answer.is_uniform) {
             return false;
         }
         let apart = most + least * -1.0;
         let bsdf = &fragment.bsdf;
         let colors = scale * bsdf.colors;
         let value = colors.onto(scene.ambient * bsdf.ambient, &most);
-        let spread = self.lights.arrivals.steps(value, colors.of(&apart));
-        let sets_in = answers.iter().any(|answer| answer.sums == Moments::default());
+        let spread = self.lights.steps(value, colors.of(&apart));
+        let sets_in = answers.iter().any(|answer| answer.moments == Moments::default());
         let allowed = if sets_in { TOLERANCE.spread * TOLERANCE.bends_at_once } else { TOLERANCE.spread };
         let weight = fragment.share * (scene.lights.len() as f32).sqrt();
         if spread * weight > allowed {
@@ -497,8 +498,7 @@ impl<'a> Cells<'a> {
         self.fragments.quadrants(fragment).iter().all(|Quadrant { contrast, .. }| {
             let mingled = contrast.of(&apart);
             *contrast == Contrast::default()
-                || answers.len() == 4
-                    && self.lights.arrivals.steps(value, scale * mingled * 0.125) * weight <= TOLERANCE.mingled
+                || answers.len() == 4 && self.lights.steps(value, scale * mingled * 0.125) * weight <= TOLERANCE.mingled
         })
     }
 
@@ -508,7 +508,7 @@ impl<'a> Cells<'a> {
         self.asked.clear();
         self.asked.resize(self.fragments.all.len(), 0);
         for Wanted { fragment, light, .. } in &refused {
-            self.asked[*fragment as usize] += usize::from(self.lights.arrivals.is_integrated(*light as usize));
+            self.asked[*fragment as usize] += usize::from(self.lights.is_integrated(*light as usize));
         }
         if self.scene.geometry.has_boxes() {
             for fragment in 0..self.fragments.all.len() {
@@ -534,7 +534,7 @@ impl<'a> Cells<'a> {
         self.requests.clear();
         // Places of a fragment serve all lights
         let mut last: Option<(u32, Range<usize>)> = None;
-        for Wanted { fragment: number, light, sight, .. } in refused {
+        for Wanted { fragment: number, light, occlusion, .. } in refused {
             self.trace_rays(*number as usize, counts);
             let fragment = &self.fragments.all[*number as usize];
             if last.as_ref().is_none_or(|(before, _)| before != number) {
@@ -543,9 +543,13 @@ impl<'a> Cells<'a> {
                 last = Some((*number, first..self.places.len()));
             }
             let places = last.as_ref().map_or(0..0, |(_, places)| places.clone());
-            self.requests.extend(places.map(|place| Request { place: place as u32, light: *light, sight: *sight }));
+            self.requests.extend(places.map(|place| LightQuery {
+                point: place as u32,
+                light: *light,
+                occlusion: *occlusion,
+            }));
         }
-        self.lights.ask(&self.places, &self.requests, &mut self.answers, counts, go_on)?;
+        self.lights.estimate(&self.places, &self.requests, &mut self.answers, counts, go_on)?;
         // Requests of a fragment lie together
         let mut answers = self.requests.iter().zip(&self.answers);
         for Wanted { fragment, light, .. } in refused {
@@ -558,22 +562,22 @@ impl<'a> Cells<'a> {
             // Rays of which no batch knows what they see ask points of the light together
             let mut unknown = None;
             for (request, answer) in answers.by_ref().take(fragment.count()) {
-                let place = &self.places[request.place as usize];
-                if answer.sums.is_known() {
-                    *term += place.bsdf.colors.each(&answer.sums);
+                let place = &self.places[request.point as usize];
+                if answer.moments.is_known() {
+                    *term += place.bsdf.colors.each(&answer.moments);
                     continue;
                 }
                 let salt = salt(at, place.surface);
                 let (light, rays, share) = (*light as usize, fragment.count(), fragment.share);
-                let arrivals = &mut self.lights.arrivals;
-                let new = || Together::new(light, rays, share, salt, Rgb::BLACK).of_lights(asked, arrivals);
+                let lights = &mut self.lights;
+                let new = || Together::new(lights, light, rays, share, salt, Rgb::BLACK).of_lights(asked, lights);
                 let together = unknown.get_or_insert_with(new);
-                together.ask_points(arrivals, &place.surface(), &place.bsdf, counts);
+                together.ask_points(lights, place, counts);
             }
             if let Some(together) = unknown {
                 go_on()?;
                 let before = counts.work();
-                *term += together.finish(&mut self.lights.arrivals, counts).terms;
+                *term += together.finish(&mut self.lights, counts).terms;
                 self.sums.work[index] += counts.work() - before;
             }
         }
@@ -605,7 +609,7 @@ impl<'a> Cells<'a> {
         let scene = self.scene;
         let lights = scene.lights.len();
         for (number, pixel) in self.pixels.iter().enumerate() {
-            let scales = self.lights.arrivals.scales().iter().copied();
+            let scales = self.lights.scales().iter().copied();
             let lit = ScaledTerm::of_all(scales, &self.terms[number * lights..][..lights]);
             pixel.terms.resolve(scene, lit, pixel.index as usize, &mut self.sums);
         }

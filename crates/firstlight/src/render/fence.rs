@@ -1,9 +1,10 @@
 //! What stands around one place, made ready for many rays to lights.
 
 use crate::ids::LightId;
+use crate::material::ShadingPoint;
 use crate::math::Vec3;
 use crate::scene::{Listed, Opacity, Scene};
-use crate::shape::{ParallelogramShadow, SphereShadow, SurfaceInteraction};
+use crate::shape::{ParallelogramShadow, SphereShadow};
 use crate::visibility::Viewpoint;
 
 /// The listed things that may be in the way of light to a place. Keeps its memory.
@@ -16,15 +17,15 @@ pub(super) struct Fence {
 
 impl Fence {
     /// Takes its stand at a place.
-    pub fn stand(&mut self, scene: &Scene, si: &SurfaceInteraction) {
+    pub fn stand(&mut self, scene: &Scene, point: &ShadingPoint) {
         self.spheres.clear();
         let spheres = scene.occluders.surface_spheres().iter();
-        let spheres = spheres.map(|sphere| sphere.map(|shape| shape.shadow(si.lit_from, si.error)));
-        self.spheres.extend(spheres.filter(|sphere| !sphere.shape.is_below(si.horizon)));
-        self.from = Some(Viewpoint::of(si));
+        let spheres = spheres.map(|sphere| sphere.map(|shape| shape.shadow(point.p, point.error)));
+        self.spheres.extend(spheres.filter(|sphere| !sphere.shape.is_below(point.horizon)));
+        self.from = Some(Viewpoint::of(point));
         let flats = scene.occluders.flats.iter();
         self.flats.clear();
-        self.flats.extend(flats.map(|flat| flat.map(|shape| shape.shadow(si.lit_from, si.error))));
+        self.flats.extend(flats.map(|flat| flat.map(|shape| shape.shadow(point.p, point.error))));
     }
 
     /// Whether anything stands on a ray along `l` from there to a light: what [`Scene::occluded`] says.

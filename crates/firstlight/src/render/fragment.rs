@@ -5,16 +5,15 @@ use std::ops::Range;
 use arrayvec::ArrayVec;
 
 use super::hits::camera_ray;
-use super::light_queue::LitPlace;
 use super::solo::{Candidate, SquareBsdf};
 use super::square::Square;
 use crate::color::Rgb;
 use crate::ids::SurfaceId;
-use crate::integrate::{ShadingPoint, TOLERANCE};
-use crate::material::{Bsdf, Colors, Lobe, Material};
+use crate::integrate::TOLERANCE;
+use crate::material::{Bsdf, Colors, Lobe, Material, ShadingPoint};
 use crate::math::{DVec3, ErrorBound, Ray, Vec3};
 use crate::scene::Scene;
-use crate::shape::{RayDifferential, SurfaceInteraction};
+use crate::shape::RayDifferential;
 
 /// How far colours of some rays differ, channel by channel.
 pub(crate) type Contrast = Colors;
@@ -34,7 +33,7 @@ pub(crate) struct RayHit {
 /// What a camera ray sees of what lies in trees.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Member {
-    pub si: SurfaceInteraction,
+    pub point: ShadingPoint,
     /// Column and row in its pixel.
     at: [u16; 2],
 }
@@ -50,11 +49,12 @@ pub(crate) struct Fragment {
     pub bsdf: Bsdf,
     /// How many of the pixel's rays see it.
     pub count: u32,
-    /// They among all of the cell, or what they see among all that is in trees, none while nobody needs them; and their
-    /// materials, if they are not all the same.
+    /// They among all of the cell, or what they see among all that is in trees, none while nobody needs them.
     pub rays: Range<usize>,
-    pub bsdfs: Option<Range<usize>>,
-    /// Whether those differ in more than colours, and how far those differ.
+    /// The materials of rays that meet a shape, if they are not all the same.
+    bsdfs: Option<Range<usize>>,
+    /// Whether the materials of rays differ, whether they differ in more than colours, and how far those differ.
+    pub is_textured: bool,
     pub uneven: bool,
     pub contrast: Contrast,
     /// The share of a pixel by which its errors are judged.
@@ -78,11 +78,7 @@ pub(crate) struct PlainMaterials(Vec<Option<Bsdf>>);
 
 impl PlainMaterials {
     pub fn new(scene: &Scene) -> Self {
-        let point = ShadingPoint::new(Vec3::ZERO, ErrorBound(Vec3::ZERO), Vec3::Z, Vec3::Z);
-        let bsdf = Bsdf { colors: Colors::BLACK, ambient: Rgb::BLACK, lobe: Lobe::None };
-        let si = LitPlace { point, surface: SurfaceId(0), receives_shadow: true, bsdf }.surface();
-        let of = |material: &Material| material.is_plain().then(|| material.bsdf(&si, &scene.textures));
-        PlainMaterials(scene.materials.iter().map(of).collect())
+        PlainMaterials(scene.materials.iter().map(Material::plain_bsdf).collect())
     }
 
     /// That of a shape, if it has no textures.
@@ -108,7 +104,7 @@ pub(crate) struct Fragments {
     bsdfs: Vec<Bsdf>,
     quadrants: Vec<Quadrant>,
     /// The middles of fragments and of quadrants.
-    pub places: Vec<LitPlace>,
+    pub places: Vec<ShadingPoint>,
 }
 
 impl Fragment {
@@ -173,19 +169,19 @@ impl Fragments {
             Some(range) => MeanBsdf::of(self.bsdfs[range.clone()].iter()),
         };
         let middle = match rays {
-            [ray] => Some(of.point(scene, &ray.ray, ray.t)),
+            [ray] => Some(of.point(scene, &ray.ray, ray.t, &mean.bsdf)),
             _ if self.has_no_middle(&mean) => None,
-            _ => Some(middle(scene, of, rays.iter())),
+            _ => Some(middle(scene, of, &mean.bsdf, rays.iter())),
         };
-        let surface = of.surface(scene);
-        let middle = middle.map(|point| self.add_middle(scene, surface, &mean.bsdf, point, share));
+        let middle = middle.map(|point| self.add_middle(point, share));
         self.all.push(Fragment {
             pixel,
             of: Some(of),
-            surface,
+            surface: of.surface(scene),
             bsdf: mean.bsdf,
             count: (all.len() - first) as u32,
             rays: first..all.len(),
+            is_textured: bsdfs.is_some(),
             bsdfs,
             uneven: mean.uneven,
             contrast: mean.contrast,
@@ -202,10 +198,9 @@ impl Fragments {
     }
 
     /// Adds the middle of a fragment that fills a share of its pixel: which of all places it is.
-    fn add_middle(&mut self, scene: &Scene, surface: SurfaceId, bsdf: &Bsdf, point: ShadingPoint, share: f32) -> u32 {
+    fn add_middle(&mut self, point: ShadingPoint, share: f32) -> u32 {
         // It tells nothing beside what is proved
-        let point = ShadingPoint { share, most_motion: -1.0, ..point };
-        self.places.push(LitPlace::new(scene, point, surface, bsdf));
+        self.places.push(ShadingPoint { share, most_motion: -1.0, ..point });
         self.places.len() as u32 - 1
     }
 
@@ -216,41 +211,39 @@ impl Fragments {
         scene: &Scene,
         pixel: u32,
         at: [u32; 2],
-        seen: &mut Vec<(Member, Bsdf)>,
+        seen: &mut Vec<Member>,
         once: bool,
         share: impl Fn(usize) -> f32,
     ) {
-        while let Some((Member { si, .. }, bsdf)) = seen.first().copied() {
-            let (members, bsdfs) = (self.members.len(), self.bsdfs.len());
+        while let Some(Member { point, .. }) = seen.first().copied() {
+            let first = self.members.len();
             let mut is_first = true;
-            for (member, bsdf) in seen
-                .extract_if(.., |(member, _)| std::mem::take(&mut is_first) || once && is_one_surface(&si, &member.si))
-            {
-                self.members.push(member);
-                self.bsdfs.push(bsdf);
-            }
-            let count = self.members.len() - members;
-            let even = self.bsdfs[bsdfs..].iter().all(|other| *other == bsdf);
-            let mean = if even {
-                self.bsdfs.truncate(bsdfs);
-                MeanBsdf { bsdf, contrast: Contrast::default(), uneven: false }
-            } else {
-                MeanBsdf::of(self.bsdfs[bsdfs..].iter())
+            let is_alike =
+                |member: &mut Member| std::mem::take(&mut is_first) || once && is_one_surface(&point, &member.point);
+            self.members.extend(seen.extract_if(.., is_alike));
+            let members = &self.members[first..];
+            let count = members.len();
+            let bsdfs = members.iter().map(|member| &member.point.bsdf);
+            let is_textured = bsdfs.clone().any(|other| *other != point.bsdf);
+            let mean = match is_textured {
+                false => MeanBsdf { bsdf: point.bsdf, contrast: Contrast::default(), uneven: false },
+                true => MeanBsdf::of(bsdfs),
             };
             let share = share(count);
             let middle = match self.has_no_middle(&mean) {
                 true => None,
-                false => seen_middle(scene, at, self.members[members..].iter()),
+                false => seen_middle(scene, at, &mean.bsdf, members.iter()),
             };
-            let middle = middle.map(|point| self.add_middle(scene, si.surface, &mean.bsdf, point, share));
+            let middle = middle.map(|point| self.add_middle(point, share));
             self.all.push(Fragment {
                 pixel,
                 of: None,
-                surface: si.surface,
+                surface: point.surface,
                 bsdf: mean.bsdf,
                 count: count as u32,
-                rays: members..self.members.len(),
-                bsdfs: (!even).then_some(bsdfs..self.bsdfs.len()),
+                rays: first..self.members.len(),
+                is_textured,
+                bsdfs: None,
                 uneven: mean.uneven,
                 contrast: mean.contrast,
                 share,
@@ -271,7 +264,7 @@ impl Fragments {
         for [x, y] in [[0.25, 0.25], [0.75, 0.25], [0.25, 0.75], [0.75, 0.75]] {
             let (ray, _) = scene.camera.local_ray(i as f32 + x, j as f32 + y, 1.0);
             match of.intersect(scene, &ray) {
-                Some(t) => points.push(of.point(scene, &ray, t)),
+                Some(t) => points.push(of.point(scene, &ray, t, &bsdf)),
                 None => return false,
             }
         }
@@ -284,8 +277,8 @@ impl Fragments {
         for point in points {
             let (place, rays) = (self.places.len() as u32, n * n / 4);
             self.quadrants.push(Quadrant { place, rays, contrast: Contrast::default() });
-            let point = ShadingPoint { reach, turn, most_motion: TOLERANCE.motion, part_of_points: 0.25, ..point };
-            self.places.push(LitPlace::new(scene, point, of.surface(scene), &bsdf));
+            let most_motion = TOLERANCE.motion;
+            self.places.push(ShadingPoint { reach, turn, most_motion, part_of_points: 0.25, ..point });
         }
         let quadrants = Some(first..self.quadrants.len());
         let (count, rays) = (n * n, 0..0);
@@ -296,6 +289,7 @@ impl Fragments {
             bsdf,
             count,
             rays,
+            is_textured: false,
             bsdfs: None,
             uneven: false,
             contrast: Contrast::default(),
@@ -360,40 +354,37 @@ impl Fragments {
     }
 
     fn add_quadrants(&mut self, scene: &Scene, fragment: usize, pixel: [u32; 2]) -> bool {
-        let Fragment { of, surface, bsdf, bsdfs, rays, uneven, share, count, .. } = self.all[fragment].clone();
+        let Fragment { of, bsdf, is_textured, rays, uneven, share, count, .. } = self.all[fragment].clone();
         if uneven || count as usize <= FEW_RAYS {
             return false;
         }
         let half = scene.antialiasing.div_ceil(2) as u16;
         for number in [[0, 0], [1, 0], [0, 1], [1, 1]] {
             let is_in = |at: [u16; 2]| at.map(|at| at / half) == number;
-            let (count, point) = match of {
-                Some(of) => {
-                    let rays = self.rays[rays.clone()].iter().filter(|ray| is_in(ray.at));
-                    (rays.clone().count(), Some(middle(scene, of, rays)))
-                }
-                None => {
-                    let members = self.members[rays.clone()].iter().filter(|member| is_in(member.at));
-                    (members.clone().count(), seen_middle(scene, pixel, members))
-                }
-            };
+            let those = (0..rays.len()).filter(|k| is_in(self.ray_at(of, rays.start + k)));
+            let count = those.clone().count();
             if count == 0 {
                 continue;
             }
-            let Some(point) = point else { return false };
-            let mean = match &bsdfs {
-                None => MeanBsdf { bsdf, contrast: Contrast::default(), uneven: false },
-                Some(range) => {
-                    let bsdfs = self.bsdfs[range.clone()].iter().enumerate();
-                    let is_in = |k: usize| is_in(self.ray_at(of, rays.start + k));
-                    MeanBsdf::of(bsdfs.filter(|(k, _)| is_in(*k)).map(|(_, bsdf)| bsdf))
+            let mean = match is_textured {
+                false => MeanBsdf { bsdf, contrast: Contrast::default(), uneven: false },
+                true => MeanBsdf::of(those.map(|k| self.bsdf(&self.all[fragment], k))),
+            };
+            let point = match of {
+                Some(of) => {
+                    let rays = self.rays[rays.clone()].iter().filter(|ray| is_in(ray.at));
+                    Some(middle(scene, of, &mean.bsdf, rays))
+                }
+                None => {
+                    let members = self.members[rays.clone()].iter().filter(|member| is_in(member.at));
+                    seen_middle(scene, pixel, &mean.bsdf, members)
                 }
             };
+            let Some(point) = point else { return false };
             let (place, contrast) = (self.places.len() as u32, mean.contrast);
             self.quadrants.push(Quadrant { place, rays: count as u32, contrast });
             let part_of_points = count as f32 / rays.len() as f32;
-            let point = ShadingPoint { share, most_motion: TOLERANCE.motion, part_of_points, ..point };
-            self.places.push(LitPlace::new(scene, point, surface, &mean.bsdf));
+            self.places.push(ShadingPoint { share, most_motion: TOLERANCE.motion, part_of_points, ..point });
         }
         true
     }
@@ -407,34 +398,38 @@ impl Fragments {
     }
 
     /// Where a ray of a fragment, its `k`-th, wants light.
-    pub fn place(&self, scene: &Scene, fragment: &Fragment, k: usize) -> LitPlace {
+    pub fn place(&self, scene: &Scene, fragment: &Fragment, k: usize) -> ShadingPoint {
         let ray = fragment.rays.start + k;
-        let bsdf = self.bsdf(fragment, k);
         let point = match fragment.of {
-            Some(of) => of.point(scene, &self.rays[ray].ray, self.rays[ray].t),
-            None => ShadingPoint::of(&self.members[ray].si),
+            Some(of) => of.point(scene, &self.rays[ray].ray, self.rays[ray].t, self.bsdf(fragment, k)),
+            None => self.members[ray].point,
         };
-        let (share, part_of_points) = (fragment.share, 1.0 / fragment.count() as f32);
-        LitPlace::new(scene, ShadingPoint { share, part_of_points, ..point }, fragment.surface, bsdf)
+        ShadingPoint { share: fragment.share, part_of_points: 1.0 / fragment.count() as f32, ..point }
     }
 
     /// The material that a ray of a fragment sees.
     fn bsdf<'b>(&'b self, fragment: &'b Fragment, ray: usize) -> &'b Bsdf {
-        match &fragment.bsdfs {
-            Some(range) => &self.bsdfs[range.start + ray],
-            None => &fragment.bsdf,
+        match (&fragment.bsdfs, fragment.of) {
+            (Some(range), _) => &self.bsdfs[range.start + ray],
+            (None, Some(_)) => &fragment.bsdf,
+            (None, None) => &self.members[fragment.rays.start + ray].point.bsdf,
         }
     }
 }
 
 /// The middle of what some rays see of a shape, with its reach to their ends.
-fn middle<'a>(scene: &Scene, of: Candidate, rays: impl Iterator<Item = &'a RayHit> + Clone) -> ShadingPoint {
+fn middle<'a>(
+    scene: &Scene,
+    of: Candidate,
+    bsdf: &Bsdf,
+    rays: impl Iterator<Item = &'a RayHit> + Clone,
+) -> ShadingPoint {
     let (mut count, mut q, mut d) = (0.0, DVec3::ZERO, Vec3::ZERO);
     for ray in rays.clone() {
         (count, q, d) = (count + 1.0, q + ray.end(), d + ray.ray.d);
     }
     // In the middle of what they see, not of the rays: on a rim the surface runs away
-    let mut point = of.point_near(scene, q / count, -d.normalize());
+    let mut point = of.point_near(scene, q / count, -d.normalize(), bsdf);
     let mut reach2 = 0.0f32;
     for ray in rays {
         reach2 = reach2.max((ray.end().as_vec3() - point.p).length_squared());
@@ -445,8 +440,8 @@ fn middle<'a>(scene: &Scene, of: Candidate, rays: impl Iterator<Item = &'a RayHi
 }
 
 /// Whether two places that camera rays see are of one surface, which may be lit as one.
-pub(crate) fn is_one_surface(one: &SurfaceInteraction, other: &SurfaceInteraction) -> bool {
-    if one.surface != other.surface || one.material != other.material || !(one.ns.dot(other.ns) > 0.0) {
+pub(crate) fn is_one_surface(one: &ShadingPoint, other: &ShadingPoint) -> bool {
+    if one.surface != other.surface || !(one.ns.dot(other.ns) > 0.0) {
         return false;
     }
     let apart = other.p - one.p;
@@ -460,6 +455,7 @@ pub(crate) fn is_one_surface(one: &SurfaceInteraction, other: &SurfaceInteractio
 fn seen_middle<'a>(
     scene: &Scene,
     [i, j]: [u32; 2],
+    bsdf: &Bsdf,
     members: impl Iterator<Item = &'a Member> + Clone,
 ) -> Option<ShadingPoint> {
     let n = scene.antialiasing;
@@ -467,35 +463,35 @@ fn seen_middle<'a>(
     for member in members.clone() {
         (count, x, y) = (count + 1.0, x + f32::from(member.at[0]), y + f32::from(member.at[1]));
     }
-    let first = &members.clone().next()?.si;
+    let first = members.clone().next()?.point;
     if count == 1.0 {
-        return Some(ShadingPoint::of(first));
+        return Some(first);
     }
     let at = |from: u32, sum: f32| from as f32 + (sum / count + 0.5) / n as f32;
     let (ray, differential) = scene.camera.local_ray(at(i, x), at(j, y), 1.0 / n as f32);
     let hit = scene.intersect_local(&ray).filter(|hit| hit.surface == first.surface)?;
     let si = scene.local_surface(&ray, &hit, &differential);
-    if !is_one_surface(&si, first) {
+    let mut point = ShadingPoint::of(&si, bsdf, scene.ambient);
+    if !is_one_surface(&point, &first) {
         return None;
     }
-    let mut point = ShadingPoint::of(&si);
     let mut normals = Vec3::ZERO;
-    for Member { si, .. } in members {
-        point.reach = point.reach.max((si.lit_from - point.p).length());
-        let turn = (si.ns - point.ns).length().max((si.horizon - point.horizon).length());
+    for Member { point: other, .. } in members {
+        point.reach = point.reach.max((other.p - point.p).length());
+        let turn = (other.ns - point.ns).length().max((other.horizon - point.horizon).length());
         // Steps are not flat, though no normal turns
-        let off = (si.lit_from - point.p).dot(point.horizon).abs();
-        let steps = off > point.horizon.abs().dot(si.error.0 + point.error.0);
+        let off = (other.p - point.p).dot(point.horizon).abs();
+        let steps = off > point.horizon.abs().dot(other.error.0 + point.error.0);
         point.turn = point.turn.max(turn).max(if steps { f32::MIN_POSITIVE } else { 0.0 });
-        normals += si.ns - point.ns;
+        normals += other.ns - point.ns;
     }
     (normals.length() <= TOLERANCE.even * count).then_some(point)
 }
 
 impl Member {
     /// What the ray at `at` of its pixel sees.
-    pub fn new(si: SurfaceInteraction, at: [u16; 2]) -> Member {
-        Member { si, at }
+    pub fn new(point: ShadingPoint, at: [u16; 2]) -> Member {
+        Member { point, at }
     }
 }
 
@@ -514,39 +510,57 @@ impl RayHit {
 impl Candidate {
     /// Where a ray that meets it at `t` wants light.
     #[inline(always)]
-    pub fn point(self, scene: &Scene, ray: &Ray, t: f64) -> ShadingPoint {
-        turned(
+    pub fn point(self, scene: &Scene, ray: &Ray, t: f64, bsdf: &Bsdf) -> ShadingPoint {
+        self.turned(
             scene,
             match self {
                 Candidate::Sphere(i) => scene.geometry.spheres[i as usize].shape.place(ray, t),
                 Candidate::Parallelogram(i) => scene.geometry.parallelograms[i as usize].shape.place(ray, t),
-                Candidate::Plane(_) | Candidate::Facet(_) => return self.surface_point(scene, ray, t),
+                Candidate::Plane(_) | Candidate::Facet(_) => return self.surface_point(scene, ray, t, bsdf),
                 Candidate::Light(_) | Candidate::Trees => unreachable!("it has no material of its own"),
             },
             -ray.d,
+            bsdf,
         )
     }
 
     /// The same for the point of it that is nearest to `q`, seen along `wo`; `q` is next to it on what is flat.
-    fn point_near(self, scene: &Scene, q: DVec3, wo: Vec3) -> ShadingPoint {
-        turned(
+    fn point_near(self, scene: &Scene, q: DVec3, wo: Vec3, bsdf: &Bsdf) -> ShadingPoint {
+        self.turned(
             scene,
             match self {
                 Candidate::Sphere(i) => scene.geometry.spheres[i as usize].shape.nearest_place(q),
                 Candidate::Parallelogram(i) => scene.geometry.parallelograms[i as usize].shape.nearest_place(q),
                 Candidate::Plane(_) | Candidate::Facet(_) => {
-                    return self.surface_point(scene, &Ray { o: q.as_vec3(), d: -wo }, 0.0);
+                    return self.surface_point(scene, &Ray { o: q.as_vec3(), d: -wo }, 0.0, bsdf);
                 }
                 Candidate::Light(_) | Candidate::Trees => unreachable!("it has no material of its own"),
             },
             wo,
+            bsdf,
         )
     }
 
+    /// A place with its normal on the viewer's side.
+    #[inline(always)]
+    fn turned(
+        self,
+        scene: &Scene,
+        (p, error, normal): (Vec3, ErrorBound, Vec3),
+        wo: Vec3,
+        bsdf: &Bsdf,
+    ) -> ShadingPoint {
+        let error = error.widened(scene.geometry.rounding);
+        let (n, surface) = (if normal.dot(wo) < 0.0 { -normal } else { normal }, self.surface(scene));
+        let receives_shadow = scene.geometry.surfaces[surface.index()].receives_shadow;
+        let base = scene.ambient * bsdf.ambient;
+        ShadingPoint { surface, receives_shadow, base, ..ShadingPoint::new(p, error, n, wo, bsdf) }
+    }
+
     /// The same of what is placed.
-    fn surface_point(self, scene: &Scene, ray: &Ray, t: f64) -> ShadingPoint {
+    fn surface_point(self, scene: &Scene, ray: &Ray, t: f64, bsdf: &Bsdf) -> ShadingPoint {
         let si = scene.local_surface(ray, &self.hit_at(scene, ray, t), &RayDifferential::default());
-        ShadingPoint::of(&si)
+        ShadingPoint::of(&si, bsdf, scene.ambient)
     }
 
     /// The material that a ray sees which meets it.
@@ -621,13 +635,6 @@ impl Candidate {
 
 /// The most rays whose mean is taken at once.
 const MAX_MEAN: usize = 64;
-
-/// A place with its normal on the viewer's side.
-#[inline(always)]
-fn turned(scene: &Scene, (p, error, normal): (Vec3, ErrorBound, Vec3), wo: Vec3) -> ShadingPoint {
-    let error = error.widened(scene.geometry.rounding);
-    ShadingPoint::new(p, error, if normal.dot(wo) < 0.0 { -normal } else { normal }, wo)
-}
 
 /// The mean of some materials in numbers.
 struct MeanBsdf {

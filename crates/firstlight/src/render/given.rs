@@ -5,10 +5,9 @@ use super::Counts;
 use super::pixel::{Lighting, LobeSums};
 use super::plain::{Facing, Plain};
 use crate::light::{Extent, LightSample, Towards};
-use crate::material::{Lobe, MOMENTS};
+use crate::material::{MOMENTS, ShadingPoint};
 use crate::math::LaneSum;
 use crate::scene::Scene;
-use crate::shape::SurfaceInteraction;
 
 /// A point of an area light: of the unit square that stands for it, equal areas for equal areas; and its share of the
 /// light, all of which is 1.
@@ -31,29 +30,22 @@ impl<'a, 'b> Given<'a, 'b> {
 }
 
 impl Lighting for Given<'_, '_> {
-    fn look_around(&mut self, _: &Scene, _: &SurfaceInteraction) {}
+    fn look_around(&mut self, _: &Scene, _: &ShadingPoint) {}
 
-    fn gather(
-        &mut self,
-        scene: &Scene,
-        index: usize,
-        si: &SurfaceInteraction,
-        lobe: &Lobe,
-        counts: &mut Counts,
-    ) -> LobeSums {
-        let facing = Facing::new(scene, index, si, lobe);
+    fn gather(&mut self, scene: &Scene, index: usize, point: &ShadingPoint, counts: &mut Counts) -> LobeSums {
+        let facing = Facing::new(scene, index, point);
         let area = match facing.light.extent() {
             Extent::Area(area) => area,
-            Extent::Point => return Plain.gather(scene, index, si, lobe, counts),
+            Extent::Point => return Plain.gather(scene, index, point, counts),
         };
         self.points.clear();
-        let from = si.lit_from.as_dvec3().to_array();
+        let from = point.p.as_dvec3().to_array();
         (self.choose)(index, from, &|uv| area.position(uv), &mut self.points);
         // A light's scale has its number of samples in it
         let count = facing.light.samples() as f64;
         let mut sums = [0.0f64; MOMENTS];
         for (uv, share) in &self.points {
-            let (l, inverse_distance, weight) = area.at(*uv, si.lit_from);
+            let (l, inverse_distance, weight) = area.at(*uv, point.p);
             let sample = || inverse_distance.is_finite().then_some(LightSample { inverse_distance, weight });
             if let Some(arriving) = facing.arriving(Towards { l, finite: true }, sample, counts) {
                 sums = std::array::from_fn(|k| sums[k] + f64::from(arriving.0[k]) * share);

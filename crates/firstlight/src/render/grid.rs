@@ -11,12 +11,12 @@
 use std::ops::ControlFlow;
 
 use super::cell::CELL;
-use super::light_queue::{Answer, LightQueue, LitPlace, Request, Sight};
+use super::direct::{DirectLighting, LightEstimate, LightQuery, Occlusion};
 use super::solo::Candidate;
 use super::square::Square;
 use super::{Counts, Heat};
-use crate::integrate::{ShadingPoint, TOLERANCE};
-use crate::material::{Bsdf, Lobe, Moments};
+use crate::integrate::TOLERANCE;
+use crate::material::{Bsdf, Lobe, Moments, ShadingPoint};
 use crate::scene::Scene;
 
 /// Pixels across the largest and the smallest square that is lit from nine places.
@@ -107,12 +107,12 @@ pub(crate) struct Grid {
     wanted: Vec<bool>,
     /// Which of them the requests are for.
     asked_of: Vec<usize>,
-    places: Vec<LitPlace>,
+    places: Vec<ShadingPoint>,
     /// Pixel by pixel: see [`Heat`].
     work: Vec<f32>,
-    asked: Vec<LitPlace>,
-    requests: Vec<Request>,
-    answers: Vec<Answer>,
+    asked: Vec<ShadingPoint>,
+    requests: Vec<LightQuery>,
+    answers: Vec<LightEstimate>,
 }
 
 impl Grid {
@@ -200,7 +200,7 @@ impl Grid {
     pub fn light(
         &mut self,
         scene: &Scene,
-        lights: &mut LightQueue,
+        lights: &mut DirectLighting,
         blocks: &[Block],
         counts: &mut Counts,
         go_on: &dyn Fn() -> ControlFlow<()>,
@@ -241,7 +241,7 @@ impl Grid {
     fn round(
         &mut self,
         scene: &Scene,
-        lights: &mut LightQueue,
+        lights: &mut DirectLighting,
         blocks: &[Block],
         items: &mut Vec<GridItem>,
         counts: &mut Counts,
@@ -250,14 +250,14 @@ impl Grid {
         // How each square sees its light from its middle
         self.asked.clear();
         self.requests.clear();
-        let mut last: Option<(Square, u32, [u32; 9], Option<LitPlace>)> = None;
+        let mut last: Option<(Square, u32, [u32; 9], Option<ShadingPoint>)> = None;
         let mut kept: Vec<GridItem> = Vec::new();
         let mut failed: Vec<GridItem> = Vec::new();
         for mut item in items.drain(..) {
             let block = &blocks[item.block as usize];
             if last.as_ref().is_none_or(|(square, of, ..)| (*square, *of) != (item.square, item.block)) {
                 let nodes = self.nine(scene, block, item.square);
-                let place = self.middle(block, &nodes);
+                let place = self.middle(scene, block, &nodes);
                 last = Some((item.square, item.block, nodes, place));
             }
             let Some((_, _, nodes, Some(place))) = last else {
@@ -265,19 +265,23 @@ impl Grid {
                 continue;
             };
             (item.nodes, item.center) = (nodes, self.requests.len() as u32);
-            self.requests.push(Request { place: self.asked.len() as u32, light: item.light, sight: Sight::Unknown });
+            self.requests.push(LightQuery {
+                point: self.asked.len() as u32,
+                light: item.light,
+                occlusion: Occlusion::Unknown,
+            });
             self.asked.push(place);
             self.spend(item.square, 1);
             kept.push(item);
         }
-        lights.ask(&self.asked, &self.requests, &mut self.answers, counts, go_on)?;
+        lights.estimate(&self.asked, &self.requests, &mut self.answers, counts, go_on)?;
         let centers = std::mem::take(&mut self.answers);
         // Those that do not fail at once ask their nodes
         self.requests.clear();
         let mut open: Vec<GridItem> = Vec::new();
         for item in kept {
             let answer = &centers[item.center as usize];
-            if answer.smooth && answer.sums == Moments::default() {
+            if answer.is_uniform && answer.moments == Moments::default() {
                 self.fill(scene, &item, &[Moments::default(); 9]);
                 continue;
             }
@@ -286,24 +290,25 @@ impl Grid {
                 failed.push(item);
                 continue;
             }
-            self.sums[item.nodes[4] as usize * self.lights + item.light as usize] = answer.sums;
+            self.sums[item.nodes[4] as usize * self.lights + item.light as usize] = answer.moments;
             open.push(item);
         }
         for item in &open {
-            let (before, sight) = (self.requests.len(), centers[item.center as usize].sight);
+            let (before, occlusion) = (self.requests.len(), centers[item.center as usize].occlusion);
             for node in item.nodes {
                 let known = node as usize * self.lights + item.light as usize;
                 if !self.sums[known].is_known() && !self.wanted[known] {
                     self.wanted[known] = true;
-                    self.requests.push(Request { place: self.nodes[node as usize].place, light: item.light, sight });
+                    let (point, light) = (self.nodes[node as usize].place, item.light);
+                    self.requests.push(LightQuery { point, light, occlusion });
                     self.asked_of.push(known);
                 }
             }
             self.spend(item.square, self.requests.len() - before);
         }
-        lights.ask(&self.places, &self.requests, &mut self.answers, counts, go_on)?;
+        lights.estimate(&self.places, &self.requests, &mut self.answers, counts, go_on)?;
         for (known, answer) in self.asked_of.drain(..).zip(&self.answers) {
-            self.sums[known] = answer.sums;
+            self.sums[known] = answer.moments;
         }
         for item in open {
             let nodes = item.nodes.map(|node| self.sums[node as usize * self.lights + item.light as usize]);
@@ -344,8 +349,7 @@ impl Grid {
         let node = self.nodes.len() as u32;
         let place = match block.of.hit(scene, &ray) {
             Some(hit) => {
-                let point = block.of.point(scene, &ray, hit.t);
-                self.places.push(LitPlace::new(scene, point, hit.surface, &block.bsdf));
+                self.places.push(block.of.point(scene, &ray, hit.t, &block.bsdf));
                 self.places.len() as u32 - 1
             }
             None => NONE,
@@ -358,11 +362,11 @@ impl Grid {
     }
 
     /// The middle of a square, which stands for all of it.
-    fn middle(&self, block: &Block, nodes: &[u32; 9]) -> Option<LitPlace> {
+    fn middle(&self, scene: &Scene, block: &Block, nodes: &[u32; 9]) -> Option<ShadingPoint> {
         if nodes.contains(&NONE) {
             return None;
         }
-        let point = |k: usize| &self.places[self.nodes[nodes[k] as usize].place as usize].point;
+        let point = |k: usize| &self.places[self.nodes[nodes[k] as usize].place as usize];
         let middle = point(4);
         let (mut reach, mut turn) = (0.0f32, 0.0f32);
         for k in [0, 2, 6, 8] {
@@ -371,26 +375,25 @@ impl Grid {
         }
         // The arc, not the chord
         let (reach, turn) = (reach * 1.0625, turn * 1.0625);
-        let middle = ShadingPoint { reach, turn, most_motion: 1.0, ..*middle };
-        let node = &self.places[self.nodes[nodes[4] as usize].place as usize];
-        Some(LitPlace { point: middle, bsdf: block.bsdf, ..*node })
+        let (bsdf, base) = (block.bsdf, scene.ambient * block.bsdf.ambient);
+        Some(ShadingPoint { reach, turn, bsdf, base, most_motion: 1.0, ..*middle })
     }
 
     /// Whether the corners foretell the other five.
     fn is_foretold(
         &self,
         scene: &Scene,
-        lights: &LightQueue,
+        lights: &DirectLighting,
         block: &Block,
         item: &GridItem,
         nodes: &[Moments; 9],
-        center: &Answer,
+        center: &LightEstimate,
     ) -> bool {
-        let scale = lights.arrivals.scale(item.light as usize);
+        let scale = lights.scale(item.light as usize);
         let colors = scale * block.bsdf.colors;
         let base = scene.ambient * block.bsdf.ambient;
         let sets_in = nodes.iter().any(|node| *node == Moments::default());
-        let is_behind = scene.geometry.has_trees() && center.sight == Sight::Unknown;
+        let is_behind = scene.geometry.has_trees() && center.occlusion == Occlusion::Unknown;
         // Over a square that outlines move far over, the edge of a penumbra may run between the nine
         let is_crossed = item.square.side > SMALLEST && center.motion > TOLERANCE.motion;
         let bends = if sets_in || is_behind || is_crossed { TOLERANCE.bends_at_once } else { 1.0 };
@@ -402,7 +405,7 @@ impl Grid {
         foretold.iter().all(|(is, said)| {
             let value = colors.onto(base, is);
             let error = colors.of(&is.apart(*said));
-            lights.arrivals.steps(value, error) <= allowed
+            lights.steps(value, error) <= allowed
         })
     }
 

@@ -13,11 +13,11 @@ use crate::accel::RayPacket16;
 use crate::accel::dispatch_all;
 use crate::ids::LightId;
 use crate::light::{Area, Extent, MIN_DISTANCE2, Points};
-use crate::material::{Lobe, MOMENTS};
+use crate::material::{MOMENTS, ShadingPoint};
 use crate::math::{LANES, LaneSum, LightEnd, ShadowRay, Vec3, Vec3x16};
 use crate::scene::{Geometry, Listed, Opacity, Scene, ShadowRays};
-use crate::shape::{DiskShadow, ParallelogramShadow, PlaneSide, SphereShadow, SurfaceInteraction};
-use crate::visibility::ShadowView;
+use crate::shape::{DiskShadow, ParallelogramShadow, PlaneSide, SphereShadow};
+use crate::visibility::{ShadowView, Viewpoint};
 
 /// Light, sixteen samples at a time.
 pub(crate) struct Lanes {
@@ -80,14 +80,8 @@ impl<'a> PointObstacles<'a> {
 /// The sums over the points of an area light that none of the `obstacles` hides. One dispatch for all samples of a
 /// light: what is below is compiled for each instruction set, the rest once.
 #[inline(never)]
-pub(super) fn sum_area(
-    level: Level,
-    area: &Area,
-    si: &SurfaceInteraction,
-    lobe: &Lobe,
-    obstacles: &PointObstacles,
-) -> LobeSums {
-    dispatch_all!(level, simd => gather_area(simd, area, area.points(), si, lobe, obstacles))
+pub(super) fn sum_area(level: Level, area: &Area, point: &ShadingPoint, obstacles: &PointObstacles) -> LobeSums {
+    dispatch_all!(level, simd => gather_area(simd, area, area.points(), point, obstacles))
 }
 
 /// The sums over the `points` of an area light.
@@ -96,19 +90,18 @@ fn gather_area<S: Simd>(
     simd: S,
     area: &Area,
     points: &Points,
-    si: &SurfaceInteraction,
-    lobe: &Lobe,
+    point: &ShadingPoint,
     obstacles: &PointObstacles,
 ) -> LobeSums {
     let splat = |v: f32| simd.splat_f32x16(v);
     let zero = splat(0.0);
-    let p = Vec3x16::splat(simd, si.lit_from);
-    let (ns, wo) = (Vec3x16::splat(simd, si.ns), Vec3x16::splat(simd, si.wo));
-    let horizon = Vec3x16::splat(simd, si.horizon);
-    let one_horizon = si.horizon == si.ns;
-    let floor = area.floor(si.lit_from, si.error, si.horizon);
+    let p = Vec3x16::splat(simd, point.p);
+    let (ns, wo) = (Vec3x16::splat(simd, point.ns), Vec3x16::splat(simd, point.wo));
+    let horizon = Vec3x16::splat(simd, point.horizon);
+    let one_horizon = point.horizon == point.ns;
+    let floor = area.floor(point.p, point.error, point.horizon);
     let least = if one_horizon { floor } else { 0.0 };
-    let cos_o = si.ns.dot(si.wo);
+    let cos_o = point.ns.dot(point.wo);
     let mut sums = [zero; MOMENTS];
     for (index, block) in points.blocks.iter().enumerate() {
         let q = block.lanes(simd);
@@ -144,7 +137,7 @@ fn gather_area<S: Simd>(
             for (way, l) in ways.iter_mut().zip([l.x, l.y, l.z]) {
                 l.store_slice(way);
             }
-            let hidden = hidden_by_trees(simd.level(), geometry, si, to, ways, lit.to_bitmask() as u16);
+            let hidden = hidden_by_trees(simd.level(), geometry, point, to, ways, lit.to_bitmask() as u16);
             lit &= !mask32x16::from_bitmask(simd, hidden as u64);
             if lit.all_false() {
                 continue;
@@ -155,7 +148,9 @@ fn gather_area<S: Simd>(
         let weight = area.weight_lanes(points, index, l, inverse_distance);
         let cos_i = height * inverse_distance;
         let cos_io = wo.dot(l) * inverse_distance;
-        for (sum, [moment]) in sums.iter_mut().zip(lobe.moments_lanes([cos_i], splat(cos_o), [cos_io], [weight])) {
+        for (sum, [moment]) in
+            sums.iter_mut().zip(point.bsdf.lobe.moments_lanes([cos_i], splat(cos_o), [cos_io], [weight]))
+        {
             *sum += lit.select(moment, zero);
         }
     }
@@ -168,12 +163,12 @@ fn gather_area<S: Simd>(
 fn hidden_by_trees(
     level: Level,
     geometry: &Geometry,
-    si: &SurfaceInteraction,
+    point: &ShadingPoint,
     to: LightEnd,
     l: [[f32; LANES]; 3],
     active: u16,
 ) -> u16 {
-    let from = si.shadow_ray(to, Vec3::ZERO, 1.0);
+    let from = Viewpoint::of(point).ray(to, Vec3::ZERO, true);
     let o = from.start.to_array().map(|o| [o; LANES]);
     let mut shadows = ShadowRays { from: &[from], rays: RayPacket16 { o, d: l }, t_end: [0.0; LANES] };
     for (lane, end) in shadows.t_end.iter_mut().enumerate() {
@@ -190,38 +185,31 @@ fn partials<S: Simd>(v: f32x16<S>) -> LaneSum {
 }
 
 impl Lighting for Lanes {
-    fn look_around(&mut self, scene: &Scene, si: &SurfaceInteraction) {
+    fn look_around(&mut self, scene: &Scene, point: &ShadingPoint) {
         let listed = &scene.occluders;
         self.spheres.clear();
         self.sphere_opacities.clear();
         for Listed { shape, opacity } in &listed.spheres {
-            let shadow = shape.shadow(si.lit_from, si.error);
-            if !shadow.is_below(si.horizon) {
+            let shadow = shape.shadow(point.p, point.error);
+            if !shadow.is_below(point.horizon) {
                 self.spheres.push(shadow);
                 self.sphere_opacities.push(*opacity);
             }
         }
         let flats = listed.flats.iter();
         self.flats.clear();
-        self.flats.extend(flats.map(|flat| flat.map(|shape| shape.shadow(si.lit_from, si.error))));
+        self.flats.extend(flats.map(|flat| flat.map(|shape| shape.shadow(point.p, point.error))));
         let disks = listed.disks.iter();
         self.disks.clear();
-        self.disks.extend(disks.map(|disk| disk.map(|shape| shape.shadow(si.lit_from, si.error))));
+        self.disks.extend(disks.map(|disk| disk.map(|shape| shape.shadow(point.p, point.error))));
     }
 
-    fn gather(
-        &mut self,
-        scene: &Scene,
-        index: usize,
-        si: &SurfaceInteraction,
-        lobe: &Lobe,
-        counts: &mut Counts,
-    ) -> LobeSums {
+    fn gather(&mut self, scene: &Scene, index: usize, point: &ShadingPoint, counts: &mut Counts) -> LobeSums {
         let light = &scene.lights[index];
         let area = match light.extent() {
             Extent::Area(area) => area,
             // A single sample fills no lanes
-            Extent::Point => return Plain.gather(scene, index, si, lobe, counts),
+            Extent::Point => return Plain.gather(scene, index, point, counts),
         };
         let id = LightId(index as u32);
         let BetweenShapes { spheres, flats, disks } = &mut self.between;
@@ -242,7 +230,7 @@ impl Lighting for Lanes {
         disks.clear();
         disks.extend(scene.that_stop(&self.disks, id).map(|(_, disk)| disk.shape));
         let trees = scene.geometry.has_trees().then(|| (&*scene.geometry, scene.light_end(id)));
-        let obstacles = if light.shadows && si.receives_shadow {
+        let obstacles = if light.shadows && point.receives_shadow {
             PointObstacles { spheres, flats, disks, trees, hidden: &[] }
         } else {
             PointObstacles::default()
@@ -252,6 +240,6 @@ impl Lighting for Lanes {
         if obstacles.are_none() {
             counts.shadow_rays_skipped += samples;
         }
-        sum_area(self.level, area, si, lobe, &obstacles)
+        sum_area(self.level, area, point, &obstacles)
     }
 }

@@ -12,7 +12,7 @@ use crate::visibility::Target;
 
 /// What all tiles share: the lights as they are integrated, and how errors show.
 pub(crate) struct Lights<'a> {
-    /// For each light, if it is integrated; and how many are.
+    /// Those that have an area; and how many of them are integrated.
     pub emitters: Vec<Option<Emitter>>,
     pub integrated: usize,
     /// What the sums of each are multiplied with, before the colours of the surface.
@@ -34,24 +34,20 @@ pub(crate) struct Lights<'a> {
 
 impl<'a> Lights<'a> {
     pub fn new(scene: &'a Scene) -> Lights<'a> {
-        let emitter = |light: &Light| light.area().filter(|_| light.exact).map(Emitter::new);
-        let emitters: Vec<_> = scene.lights.iter().map(emitter).collect();
-        let scale = |(light, emitter): (&Light, &Option<Emitter>)| match emitter {
-            Some(_) => light.intensity,
-            None => light.scale,
-        };
-        let scales = scene.lights.iter().zip(&emitters).map(scale).collect();
+        let emitters: Vec<_> = scene.lights.iter().map(|light| light.area().map(Emitter::new)).collect();
+        let scale = |light: &Light| if light.is_integrated() { light.intensity } else { light.scale };
+        let scales = scene.lights.iter().map(scale).collect();
         let targets = Target::of_all(scene);
         let ladders = emitters.iter().map(|_| Ladder::default()).collect();
         let tree = (scene.lights.len() > FEW)
             .then(|| LightTree::new(&scene.lights, &scene.geometry.links.classes(scene.lights.len())));
-        let obstacles = scene.lights.iter().enumerate().map(|(index, light)| {
-            light.area().map_or_else(Obstacles::default, |area| Obstacles::new(scene, index, &Emitter::new(area)))
+        let obstacles = emitters.iter().enumerate().map(|(index, emitter)| {
+            emitter.as_ref().map_or_else(Obstacles::default, |emitter| Obstacles::new(scene, index, emitter))
         });
         let obstacles = obstacles.collect();
         let steps = DisplaySteps::new(&scene.display, scene.tolerance);
         // Errors of lights that are not integrated are none, or asked for
-        let integrated = emitters.iter().flatten().count();
+        let integrated = scene.lights.iter().filter(|light| light.is_integrated()).count();
         let allowed = TOLERANCE.point / (integrated.max(1) as f32).sqrt();
         let least = steps.value_of(allowed);
         Lights { emitters, integrated, scales, steps, tree, targets, ladders, obstacles, allowed, least }
@@ -69,23 +65,20 @@ impl<'a> Lights<'a> {
         placed.into_iter().all(|thing| self.obstacles[index].has_placed(thing))
     }
 
-    /// Light `index` as batches ask for it, with one highlight, with or without what stands in its way; `None` if it is
-    /// not integrated.
+    /// Light `index` as points of one lobe are evaluated for it, with or without what occludes it; `None` if it has no
+    /// area.
     pub fn asked<'b>(&'b self, index: usize, lobe: &'b Lobe, shadows: bool) -> Option<Asked<'b>> {
-        self.emitters[index].as_ref().map(|emitter| self.asked_of(index, emitter, lobe, shadows))
-    }
-
-    pub fn asked_of<'b>(&'b self, index: usize, emitter: &'b Emitter, lobe: &'b Lobe, shadows: bool) -> Asked<'b> {
-        Asked {
+        self.emitters[index].as_ref().map(|emitter| Asked {
             emitter,
             obstacles: &self.obstacles[index],
             near: None,
             lobe,
+            scale: self.scales[index],
             steps: &self.steps,
             allowed: self.allowed,
             least: self.least,
             shadows,
             sums: true,
-        }
+        })
     }
 }

@@ -8,16 +8,15 @@
 //!
 //! [`cell`](cell/index.html) integrates lights and lights a surface once where that is enough; all else is as above.
 
-mod arrival;
 mod asking;
 mod beams;
 mod cell;
 mod centers;
-mod change;
 mod coco;
 mod counts;
 mod coverage;
 mod cut;
+mod direct;
 mod fence;
 mod film;
 mod fragment;
@@ -29,7 +28,6 @@ mod hits;
 mod ladder;
 mod lanes;
 mod leaves;
-mod light_queue;
 mod lights;
 mod many;
 mod masks;
@@ -42,9 +40,7 @@ mod receipt;
 mod receipt_settings;
 mod relight;
 pub(crate) mod resolve;
-mod sampled;
 mod shafts;
-mod single;
 mod solo;
 mod square;
 mod tally;
@@ -72,14 +68,13 @@ use crate::math::Ray;
 use crate::parallel;
 use crate::scene::Scene;
 use crate::visibility::Target;
-use arrival::Arrivals;
 use cell::{CELL, Cells};
 pub(crate) use counts::Counts;
 use coverage::{Coverage, CoveragePlanes};
+use direct::DirectLighting;
 use film::FilmTile;
 use hits::PixelHits;
 use lanes::Lanes;
-use light_queue::LightQueue;
 use lights::Lights;
 use passes::Passes;
 use pixel::{Lighting, PixelSum};
@@ -343,7 +338,7 @@ fn expose(
     let is_lit = planes.iter().any(|buffer| buffer.plane().is_lit());
     let lights = Lights::new(scene);
     // Where every light is sampled at every ray, the bits are those of the plain renderer
-    let is_sampled = lights.emitters.iter().all(Option::is_none);
+    let is_sampled = lights.integrated == 0;
     let every_ray = renderer.samples_all() || renderer == Renderer::Full && is_sampled;
     let tiles = if every_ray {
         Tile::cover(window, settings.tile_size)
@@ -388,8 +383,8 @@ fn expose(
                 // Their memory goes from tile to tile
                 let used = spare.lock().expect("no thread panics while it holds a renderer").pop();
                 let mut cells = used.unwrap_or_else(|| {
-                    let queue = LightQueue::new(scene, Arrivals::new(scene, &lights, token));
-                    Cells::new(scene, renderer.aa_mode(), queue, planes)
+                    let direct = DirectLighting::new(scene, &lights, token);
+                    Cells::new(scene, renderer.aa_mode(), direct, planes)
                 });
                 let rendered = cells.render(film, &go_on);
                 spare.lock().expect("no thread panics while it holds a renderer").push(cells);

@@ -6,26 +6,18 @@ use super::hits::camera_ray;
 use super::resolve::{LightTerm, PixelTerms, ScaledTerm, TermSums};
 use super::{Counts, QUESTION_EVERY};
 use crate::ids::LightId;
-use crate::material::{Bsdf, Lobe, MOMENTS, Moments};
+use crate::material::{Bsdf, MOMENTS, Moments, ShadingPoint};
 use crate::math::{LaneSum, Ray};
 use crate::scene::{Hit, Scene, TracedHit};
-use crate::shape::SurfaceInteraction;
 
 /// How the light of one source is summed at one surface: the only thing in which the renderers differ.
 pub(crate) trait Lighting {
     /// Looks around from a surface, once for all lights.
-    fn look_around(&mut self, scene: &Scene, si: &SurfaceInteraction);
+    fn look_around(&mut self, scene: &Scene, point: &ShadingPoint);
 
     /// The sums over the points of light `index`, in the contract's order, of the weight times the cosine and of the
-    /// weight times the highlight, hidden points being 0. `si` is the surface last looked around from.
-    fn gather(
-        &mut self,
-        scene: &Scene,
-        index: usize,
-        si: &SurfaceInteraction,
-        lobe: &Lobe,
-        counts: &mut Counts,
-    ) -> LobeSums;
+    /// weight times the highlight, hidden points being 0. `point` is the one last looked around from.
+    fn gather(&mut self, scene: &Scene, index: usize, point: &ShadingPoint, counts: &mut Counts) -> LobeSums;
 }
 
 /// What arrives from one light, before all colours.
@@ -75,8 +67,8 @@ impl PixelSum {
                     go_on()?;
                 }
                 let seen = scene.see(&ray, hit(column, row, &ray), &differential);
-                if let Some((si, bsdf)) = self.see(scene, seen) {
-                    self.add_lights(scene, &si, &bsdf, lighting, counts);
+                if let Some(point) = self.see(scene, seen) {
+                    self.add_lights(scene, &point, lighting, counts);
                 }
             }
         }
@@ -85,15 +77,16 @@ impl PixelSum {
 
     /// Adds what a camera ray ends at, but for the light of lights: that of a surface is added by
     /// [`light`](Self::light).
-    pub fn see(&mut self, scene: &Scene, seen: TracedHit) -> Option<(SurfaceInteraction, Bsdf)> {
+    pub fn see(&mut self, scene: &Scene, seen: TracedHit) -> Option<ShadingPoint> {
         match seen {
             TracedHit::Background => self.terms.background += 1,
             TracedHit::Emission(radiance) => self.terms.emission.add(radiance, 1),
             TracedHit::Surface(si) => {
                 // Look the material's textures up
                 let bsdf = scene.materials[si.material.index()].bsdf(&si, &scene.textures);
-                self.terms.ambient += scene.ambient * bsdf.ambient;
-                return Some((si, bsdf));
+                let point = ShadingPoint::of(&si, &bsdf, scene.ambient);
+                self.terms.ambient += point.base;
+                return Some(point);
             }
         }
         None
@@ -106,22 +99,15 @@ impl PixelSum {
     }
 
     /// Adds what each light sends.
-    fn add_lights(
-        &mut self,
-        scene: &Scene,
-        si: &SurfaceInteraction,
-        bsdf: &Bsdf,
-        lighting: &mut impl Lighting,
-        counts: &mut Counts,
-    ) {
-        lighting.look_around(scene, si);
-        let links = scene.geometry.lights_of(si.surface);
+    fn add_lights(&mut self, scene: &Scene, point: &ShadingPoint, lighting: &mut impl Lighting, counts: &mut Counts) {
+        lighting.look_around(scene, point);
+        let links = scene.geometry.lights_of(point.surface);
         for index in 0..scene.lights.len() {
             if !scene.geometry.links.contains(links, LightId(index as u32)) {
                 continue;
             }
-            let sums = lighting.gather(scene, index, si, &bsdf.lobe, counts);
-            self.light(index, bsdf, &sums.total());
+            let sums = lighting.gather(scene, index, point, counts);
+            self.light(index, &point.bsdf, &sums.total());
         }
     }
 

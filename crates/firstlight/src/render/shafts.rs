@@ -8,16 +8,15 @@ use std::ops::ControlFlow;
 
 use fearless_simd::Level;
 
+use super::direct::Sampled;
 use super::film::FilmTile;
 use super::hits::{PixelHits, camera_ray};
 use super::pixel::PixelSum;
 use super::resolve::TermSums;
-use super::sampled::Sampled;
 use super::{Counts, QUESTION_EVERY};
 use crate::ids::LightId;
-use crate::material::{Bsdf, Moments};
+use crate::material::{Moments, ShadingPoint};
 use crate::scene::Scene;
-use crate::shape::SurfaceInteraction;
 use crate::visibility::{Settler, Target, Viewpoint};
 
 /// The points of a block of pixels, and what is needed to light them.
@@ -27,7 +26,7 @@ pub(crate) struct Shafts<'a> {
     level: Level,
     hits: PixelHits,
     points: Vec<Viewpoint>,
-    surfaces: Vec<(SurfaceInteraction, Bsdf)>,
+    surfaces: Vec<ShadingPoint>,
     /// What one light sends to each point.
     sums: Vec<Moments>,
     /// The points that are being lit, part by part.
@@ -100,9 +99,9 @@ impl<'a> Shafts<'a> {
                     // Found anew: to keep a ray costs more than to find it
                     let (ray, differential) = camera_ray(scene, (i + x) * n + column, (j + y) * n + row);
                     let hit = self.hits.get(x, y, column, row);
-                    if let Some((si, bsdf)) = pixel.see(scene, scene.see(&ray, hit, &differential)) {
-                        self.points.push(Viewpoint::of(&si));
-                        self.surfaces.push((si, bsdf));
+                    if let Some(point) = pixel.see(scene, scene.see(&ray, hit, &differential)) {
+                        self.points.push(Viewpoint::of(&point));
+                        self.surfaces.push(point);
                     }
                 }
             }
@@ -113,9 +112,9 @@ impl<'a> Shafts<'a> {
             let mut start = 0;
             for (pixel, end) in pixels.iter_mut() {
                 for k in start..*end {
-                    let (si, bsdf) = &self.surfaces[k];
-                    if shines_on(scene, index, si) {
-                        pixel.light(index, bsdf, &self.sums[k]);
+                    let point = &self.surfaces[k];
+                    if shines_on(scene, index, point) {
+                        pixel.light(index, &point.bsdf, &self.sums[k]);
                     }
                 }
                 start = *end;
@@ -133,14 +132,14 @@ impl<'a> Shafts<'a> {
         sums.resize(surfaces.len(), Moments::ZERO);
         // Those that nothing can shadow
         self.order.clear();
-        for (k, (si, bsdf)) in surfaces.iter().enumerate() {
-            if !shines_on(scene, index, si) {
+        for (k, point) in surfaces.iter().enumerate() {
+            if !shines_on(scene, index, point) {
                 continue;
             }
-            if light.is_shadowed(si) {
+            if light.is_shadowed(point) {
                 self.order.push(k as u32);
             } else {
-                sums[k] = light.unshadowed(si, &bsdf.lobe, counts);
+                sums[k] = light.unshadowed(point, counts);
             }
         }
         // The others in parts that are not too long for someone who waits
@@ -151,8 +150,7 @@ impl<'a> Shafts<'a> {
                 go_on()?;
             }
             light.settle(&mut self.settler, &self.points, part, counts, |k, visibility, view| {
-                let (si, bsdf) = &surfaces[k];
-                sums[k] = light.sent(si, &bsdf.lobe, visibility, view);
+                sums[k] = light.sent(&surfaces[k], visibility, view);
             });
         }
         ControlFlow::Continue(())
@@ -161,7 +159,7 @@ impl<'a> Shafts<'a> {
 
 /// Whether a surface lets light `index` shine on it.
 #[inline(always)]
-fn shines_on(scene: &Scene, index: usize, si: &SurfaceInteraction) -> bool {
-    let links = scene.geometry.lights_of(si.surface);
+fn shines_on(scene: &Scene, index: usize, point: &ShadingPoint) -> bool {
+    let links = scene.geometry.lights_of(point.surface);
     scene.geometry.links.contains(links, LightId(index as u32))
 }

@@ -15,9 +15,8 @@ use super::lanes::PointObstacles;
 use super::leaves::{Halved, Leaves};
 use crate::accel::dispatch_all;
 use crate::light::{Area, FineCell, MIN_DISTANCE2, Points};
-use crate::material::{Lobe, MOMENTS, Moments};
+use crate::material::{Lobe, MOMENTS, Moments, ShadingPoint};
 use crate::math::{LANES, Vec3x16, only, total};
-use crate::shape::SurfaceInteraction;
 use crate::visibility::ShadowView;
 
 /// Blocks whose sums are added up in single precision.
@@ -94,14 +93,14 @@ impl Tally {
 
     /// Hears what all points of a rung say, one in each of as many leaves, and forgets what was known. `view` says what
     /// is hidden in trees, point by point.
-    pub fn fill(&mut self, asker: &Asker, rung: &Rung, view: &ShadowView, si: &SurfaceInteraction, lobe: &Lobe) {
+    pub fn fill(&mut self, asker: &Asker, rung: &Rung, view: &ShadowView, point: &ShadingPoint) {
         let obstacles = PointObstacles::of(view);
         self.blocks.clear();
         self.surprises = Default::default();
         dispatch_all!(asker.level, simd => {
-            let place = PlaceLanes::new(simd, asker.area, si);
+            let place = PlaceLanes::new(simd, asker.area, point);
             for (block, at) in rung.cells.iter().enumerate() {
-                let answers = place.ask(simd, asker.area, &rung.points, block, lobe, &obstacles);
+                let answers = place.ask(simd, asker.area, &rung.points, block, &point.bsdf.lobe, &obstacles);
                 self.blocks.push(BlockAnswers { at: *at, ..answers });
             }
         });
@@ -114,19 +113,18 @@ impl Tally {
         asker: &Asker,
         (rung, halved): (&AskedRung, &Halved),
         view: &ShadowView,
-        si: &SurfaceInteraction,
-        lobe: &Lobe,
+        point: &ShadingPoint,
     ) {
         let obstacles = PointObstacles::of(view);
         let most = halved.blocks.last().map_or(0, |block| block.halves[1] as usize + 1);
         self.blocks.resize(self.blocks.len().max(most), BlockAnswers::NONE);
         let part = 0.5 / (1u64 << halved.level) as f32;
         dispatch_all!(asker.level, simd => {
-            let place = PlaceLanes::new(simd, asker.area, si);
+            let place = PlaceLanes::new(simd, asker.area, point);
             let mut surprises = [simd.splat_f32x16(0.0); MOMENTS];
             for (k, block) in halved.blocks.iter().enumerate() {
                 let from = rung.block_of(k, block);
-                let answers = place.ask(simd, asker.area, &rung.points, from, lobe, &obstacles);
+                let answers = place.ask(simd, asker.area, &rung.points, from, &point.bsdf.lobe, &obstacles);
                 let new = BlockAnswers { at: rung.cells[from], ..answers };
                 let old = self.blocks[block.halves[0] as usize];
                 if block.is_away {
@@ -231,15 +229,14 @@ impl BlockAnswers {
 pub(super) fn would_send(
     asker: &Asker,
     places: impl Iterator<Item = [[f64; LANES]; 2]>,
-    si: &SurfaceInteraction,
-    lobe: &Lobe,
+    point: &ShadingPoint,
 ) -> Vec<Moments> {
     let mut sent = Vec::new();
     dispatch_all!(asker.level, simd => {
-        let place = PlaceLanes::new(simd, asker.area, si);
+        let place = PlaceLanes::new(simd, asker.area, point);
         let points = asker.area.points_at(places);
         for block in 0..points.blocks.len() {
-            let answers = place.ask(simd, asker.area, &points, block, lobe, &PointObstacles::default());
+            let answers = place.ask(simd, asker.area, &points, block, &point.bsdf.lobe, &PointObstacles::default());
             for lane in 0..LANES {
                 sent.push(answers.moments(lane));
             }
@@ -260,14 +257,14 @@ struct PlaceLanes<S: Simd> {
 
 impl<S: Simd> PlaceLanes<S> {
     #[inline(always)]
-    fn new(simd: S, area: &Area, si: &SurfaceInteraction) -> Self {
+    fn new(simd: S, area: &Area, point: &ShadingPoint) -> Self {
         PlaceLanes {
-            p: Vec3x16::splat(simd, si.lit_from),
-            ns: Vec3x16::splat(simd, si.ns),
-            wo: Vec3x16::splat(simd, si.wo),
-            horizon: Vec3x16::splat(simd, si.horizon),
-            floor: simd.splat_f32x16(area.floor(si.lit_from, si.error, si.horizon)),
-            cos_o: simd.splat_f32x16(si.ns.dot(si.wo)),
+            p: Vec3x16::splat(simd, point.p),
+            ns: Vec3x16::splat(simd, point.ns),
+            wo: Vec3x16::splat(simd, point.wo),
+            horizon: Vec3x16::splat(simd, point.horizon),
+            floor: simd.splat_f32x16(area.floor(point.p, point.error, point.horizon)),
+            cos_o: simd.splat_f32x16(point.ns.dot(point.wo)),
         }
     }
 

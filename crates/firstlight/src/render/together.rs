@@ -5,8 +5,8 @@
 //! by, those of others meet. Their number grows until what they say together will do.
 
 use super::Counts;
-use super::arrival::{ArrivalPlace, Arrivals, Sighting};
 use super::asking::{AskedLeaves, Asking, EVENLY, MOST, parts};
+use super::direct::{DirectLighting, Occlusion};
 use super::ladder::{FIRST, LAST};
 use super::packets::{Packets, of_edge};
 use super::resolve::LightTerm;
@@ -15,8 +15,7 @@ use crate::color::Rgb;
 use crate::ids::SurfaceId;
 use crate::integrate::TOLERANCE;
 use crate::light::SERIES;
-use crate::material::{Bsdf, MOMENTS, Moments};
-use crate::shape::SurfaceInteraction;
+use crate::material::{MOMENTS, Moments, ShadingPoint};
 use crate::visibility::{ShadowView, Visibility};
 
 /// So many points of all rays tell that all of the light is hidden: near black, anything shows.
@@ -24,15 +23,15 @@ const ALL_HIDDEN: usize = 1 << 14;
 
 /// A ray of which nothing is known yet but that nothing is in the way, if that is, or nothing in trees.
 struct Looking {
-    si: SurfaceInteraction,
-    bsdf: Bsdf,
-    lit: bool,
-    clear: bool,
+    point: ShadingPoint,
+    occlusion: Occlusion,
 }
 
 /// What the rays of one patch ask of one light.
 pub(crate) struct Together {
     light: usize,
+    /// What its moments are multiplied with.
+    scale: Rgb,
     /// The share of the pixel that a ray has, and that of the patch.
     each: f32,
     share: f32,
@@ -78,13 +77,14 @@ pub(crate) fn salt([i, j]: [u32; 2], surface: SurfaceId) -> u32 {
 impl Together {
     /// Of a patch with so many rays, `share` of its pixel. By its [`salt`] it asks other points than others; `others`
     /// is what other lights send to a ray, at least.
-    pub fn new(light: usize, rays: usize, share: f32, salt: u32, others: Rgb) -> Self {
+    pub fn new(lights: &DirectLighting, light: usize, rays: usize, share: f32, salt: u32, others: Rgb) -> Self {
         // Which of the series is first: any, but not by a pattern
         let series = (salt.wrapping_mul(0x9e37_79b9) >> 16) as usize % SERIES;
         let each = share / rays as f32;
         let (sums, terms) = (Moments::default(), LightTerm::BLACK);
         Together {
             light,
+            scale: lights.scale(light),
             each,
             share,
             room: 1.0,
@@ -109,65 +109,61 @@ impl Together {
     }
 
     /// The same where so many of all lights that are integrated are asked for points.
-    pub fn of_lights(mut self, asked: usize, arrivals: &Arrivals) -> Self {
-        let all = arrivals.lights.integrated.max(1);
+    pub fn of_lights(mut self, asked: usize, lights: &DirectLighting) -> Self {
+        let all = lights.lights.integrated.max(1);
         self.room = (all as f32 / asked.clamp(1, all) as f32).sqrt();
         self
     }
 
-    /// Asks for what one ray sees. It may be known that nothing is in the way, or nothing in trees: `lit`, `clear`.
+    /// Asks for what one ray sees, past what may occlude the light.
     pub fn ask(
         &mut self,
-        arrivals: &mut Arrivals,
-        si: &SurfaceInteraction,
-        bsdf: &Bsdf,
-        lit: bool,
-        clear: bool,
+        lights: &mut DirectLighting,
+        point: &ShadingPoint,
+        occlusion: Occlusion,
         counts: &mut Counts,
     ) {
-        if arrivals.is_integrated(self.light) {
-            self.looking.push(Looking { si: *si, bsdf: *bsdf, lit, clear });
+        let point = ShadingPoint { share: self.share, part_of_points: f32::INFINITY, ..*point };
+        if lights.is_integrated(self.light) {
+            self.looking.push(Looking { point, occlusion });
         } else {
-            let place = ArrivalPlace { share: self.share, lit, clear, ..arrivals.place(self.light, si, bsdf) };
-            let sums = arrivals.arrival(self.light, &place, counts).sums;
-            self.know(&place, &sums);
-            self.shares += if lit { 1.0 } else { f32::NAN };
+            let moments = lights.estimate_one(self.light, &point, occlusion, counts).moments;
+            self.know(&point, &moments);
+            self.shares += if occlusion == Occlusion::None { 1.0 } else { f32::NAN };
             self.sharing += 1;
         }
     }
 
     /// Asks points of the light for one ray, as nobody knows what it sees.
-    pub fn ask_points(&mut self, arrivals: &mut Arrivals, si: &SurfaceInteraction, bsdf: &Bsdf, counts: &mut Counts) {
-        let place = ArrivalPlace { share: self.share, ..arrivals.place(self.light, si, bsdf) };
+    pub fn ask_points(&mut self, lights: &mut DirectLighting, point: &ShadingPoint, counts: &mut Counts) {
         counts.settled.visibility[Visibility::Mask as usize] += 1;
-        self.hear(&place, Sighting::Behind, arrivals, counts);
+        match lights.classify_one(self.light, point, counts) {
+            Some(view) => self.behind(point, view),
+            None => self.dark(point),
+        }
     }
 
     /// Hears what one ray sees.
-    pub fn know(&mut self, place: &ArrivalPlace, sums: &Moments) {
+    pub fn know(&mut self, point: &ShadingPoint, sums: &Moments) {
         self.rays += 1;
-        self.value += place.base;
-        self.add(place, sums);
+        self.value += point.base;
+        self.add(point, sums);
     }
 
     /// Hears that something hides all of the light from a ray.
-    pub fn dark(&mut self, place: &ArrivalPlace) {
-        self.know(place, &Moments::default());
+    pub fn dark(&mut self, point: &ShadingPoint) {
+        self.know(point, &Moments::default());
         self.sharing += 1;
     }
 
     /// Asks for what one ray sees past what is in `view`.
-    pub fn behind(&mut self, place: &ArrivalPlace, view: ShadowView) {
+    pub fn behind(&mut self, point: &ShadingPoint, view: ShadowView) {
         let series = self.series ^ (self.rays % SERIES);
         self.rays += 1;
-        self.value += place.base;
-        let ArrivalPlace { si, lobe, base, scale, reflected, .. } = *place;
+        self.value += point.base;
         self.asking.push(Asking {
-            si: *si,
-            lobe: *lobe,
-            base,
-            scale,
-            reflected,
+            point: ShadingPoint { part_of_points: f32::INFINITY, ..*point },
+            scale: self.scale,
             series,
             view,
             whole: None,
@@ -176,66 +172,70 @@ impl Together {
         });
     }
 
-    fn add(&mut self, place: &ArrivalPlace, sums: &Moments) {
-        self.terms += place.reflected.each(sums);
-        self.value += place.color(sums);
+    fn add(&mut self, point: &ShadingPoint, sums: &Moments) {
+        self.terms += point.bsdf.colors.each(sums);
+        self.value += (self.scale * point.bsdf.colors).of(sums);
         self.sums += *sums;
     }
 
+    /// What some points of one pixel see of a light, of which nothing is known.
+    pub fn of_points(
+        light: usize,
+        points: &[ShadingPoint],
+        salt: u32,
+        lights: &mut DirectLighting,
+        counts: &mut Counts,
+    ) -> Outcome {
+        let share = points.iter().map(|point| point.share).fold(0.0, f32::max);
+        let mut together = Together::new(lights, light, points.len(), share, salt, Rgb::BLACK);
+        points.iter().for_each(|point| together.ask(lights, point, Occlusion::Unknown, counts));
+        together.finish(lights, counts)
+    }
+
     /// What all rays see of the light.
-    pub fn finish(self, arrivals: &mut Arrivals, counts: &mut Counts) -> Outcome {
+    pub fn finish(self, lights: &mut DirectLighting, counts: &mut Counts) -> Outcome {
         let mut one = [self];
-        Together::tell(&mut one, arrivals, counts);
+        Together::tell(&mut one, lights, counts);
         let [one] = one;
-        one.settle(arrivals, counts)
+        one.settle(lights, counts)
     }
 
     /// Has the rays of some patches, which ask the same light, told all that batches know of it.
-    pub fn tell(all: &mut [Together], arrivals: &mut Arrivals, counts: &mut Counts) {
+    pub fn tell(all: &mut [Together], lights: &mut DirectLighting, counts: &mut Counts) {
         let Some(light) = all.first().map(|one| one.light) else { return };
         let looking: Vec<Vec<Looking>> = all.iter_mut().map(|one| std::mem::take(&mut one.looking)).collect();
-        let mut places = Vec::new();
+        let mut points = Vec::new();
         for (one, looking) in all.iter().zip(&looking) {
-            let part_of_points = 1.0 / (one.asking.len() + looking.len()) as f32;
-            places.extend(looking.iter().map(|Looking { si, bsdf, lit, clear }| {
-                // What is integrated is wrong alike at all rays: that much by no more than if one stood for all
-                let (share, lit, clear) = (one.share, *lit, *clear);
-                ArrivalPlace { share, lit, clear, part_of_points, ..arrivals.place(light, si, bsdf) }
-            }));
+            // What is integrated is wrong alike at all rays: by no more than if one represented all
+            let (share, part_of_points) = (one.share, 1.0 / (one.asking.len() + looking.len()) as f32);
+            points.extend(looking.iter().map(|one| ShadingPoint { share, part_of_points, ..one.point }));
         }
-        if !places.is_empty() {
-            let mut seen = Vec::new();
-            arrivals.look(light, &places, &mut seen, counts);
-            let mut seen = places.iter().zip(seen);
-            for (one, looking) in all.iter_mut().zip(&looking) {
-                for (place, (_, seen)) in seen.by_ref().take(looking.len()) {
-                    one.hear(place, seen, arrivals, counts);
+        if points.is_empty() {
+            return;
+        }
+        let occlusions: Vec<Occlusion> = looking.iter().flatten().map(|one| one.occlusion).collect();
+        let estimates = lights.estimate_each(light, &points, |k| occlusions[k], counts);
+        let mut seen = points.iter().zip(&estimates).zip(&occlusions);
+        for (one, looking) in all.iter_mut().zip(&looking) {
+            for ((point, estimate), occlusion) in seen.by_ref().take(looking.len()) {
+                if !estimate.moments.is_known() {
+                    one.ask_points(lights, point, counts);
+                    continue;
                 }
+                one.know(point, &estimate.moments);
+                one.shares += if *occlusion == Occlusion::None { 1.0 } else { f32::NAN };
+                one.sharing += 1;
             }
-        }
-    }
-
-    fn hear(&mut self, place: &ArrivalPlace, seen: Sighting, arrivals: &mut Arrivals, counts: &mut Counts) {
-        match seen {
-            Sighting::Known(sums) => {
-                self.know(place, &sums);
-                self.shares += if place.lit { 1.0 } else { f32::NAN };
-                self.sharing += 1;
-            }
-            Sighting::Behind => match arrivals.settle(self.light, place.si, counts) {
-                Some(view) => self.behind(place, view),
-                None => self.dark(place),
-            },
         }
     }
 
     /// Asks points of the light, as it is known by now what batches know.
-    pub fn settle(mut self, arrivals: &mut Arrivals, counts: &mut Counts) -> Outcome {
+    pub fn settle(mut self, lights: &mut DirectLighting, counts: &mut Counts) -> Outcome {
         if !self.asking.is_empty() {
             let mut asking = std::mem::take(&mut self.asking);
-            asking.iter_mut().for_each(|one| one.tally = arrivals.tally());
-            let measure = arrivals.measure(self.light);
-            self.points(arrivals, &mut asking, counts);
+            asking.iter_mut().for_each(|one| one.tally = lights.tally());
+            let measure = lights.measure(self.light);
+            self.points(lights, &mut asking, counts);
             let shares = parts(&asking, |tally| &tally.lit);
             for one in asking {
                 let place = one.place(self.each);
@@ -245,8 +245,8 @@ impl Together {
                     self.sharing += 1;
                 }
                 self.add(&place, &sums);
-                arrivals.keep(one.view);
-                arrivals.keep_tally(one.tally);
+                lights.keep(one.view);
+                lights.keep_tally(one.tally);
             }
         }
         let share = self.shares / self.sharing.max(1) as f32;
@@ -255,16 +255,16 @@ impl Together {
 
     /// Asks points of the light, more and more, until what they say together will do. What the most will not settle is
     /// asked in closed form.
-    fn points(&self, arrivals: &mut Arrivals, asking: &mut [Asking], counts: &mut Counts) {
-        let asker = arrivals.asker(self.light);
-        let mut begin = TOLERANCE.first_points / (arrivals.scene.tolerance() as f32).sqrt();
+    fn points(&self, lights: &mut DirectLighting, asking: &mut [Asking], counts: &mut Counts) {
+        let asker = lights.asker(self.light);
+        let mut begin = TOLERANCE.first_points / (lights.scene.tolerance() as f32).sqrt();
         let place = asking[0].place(self.each);
-        if !arrivals.varies_over(self.light, &place, asker.area.diagonal() / begin.sqrt()) {
+        if !lights.varies_over(self.light, &place, asker.area.diagonal() / begin.sqrt()) {
             begin *= TOLERANCE.nearer;
         }
         let first = (begin * self.share.sqrt() / asking.len() as f32) as usize;
         let first = first.next_power_of_two().clamp(FIRST, LAST);
-        let allowed = arrivals.tolerance_by_chance(self.share) * self.room;
+        let allowed = lights.tolerance_by_chance(self.share) * self.room;
         let mut is_tried = false;
         let mut asked = AskedLeaves::new(asker, first, asking, counts);
         let mut packets = None;
@@ -273,9 +273,9 @@ impl Together {
             asking.iter_mut().for_each(|one| one.tally.sum(asker.level, &asked.leaves));
             let said = self.said(asking, is_plain, asker.area.stands_for());
             let packets = packets.get_or_insert_with(|| Packets::new(said.sent));
-            let wrong = self.wrong(&said, packets, &mut asked, asking, arrivals);
+            let wrong = self.wrong(&said, packets, &mut asked, asking, lights);
             let points = asked.leaves.count() * asking.len();
-            let is_told = said.shows(arrivals, &|k| said.untold(k)) <= allowed * TOLERANCE.untold;
+            let is_told = said.shows(lights, &|k| said.untold(k)) <= allowed * TOLERANCE.untold;
             let is_lit = !said.is_hidden && self.is_clear(&said);
             let is_dark = said.is_dark && points >= ALL_HIDDEN;
             let is_last = points >= MOST || !is_halved;
@@ -284,8 +284,8 @@ impl Together {
             // of it
             let is_wanted =
                 is_enough || (!is_told || wrong.smooth > allowed) && (wrong.edges <= allowed || points >= EVENLY);
-            if is_plain && is_wanted && (wrong.smooth > allowed || self.may_miss(&said, points, asking, arrivals)) {
-                self.ask_wholes(asking, arrivals);
+            if is_plain && is_wanted && (wrong.smooth > allowed || self.may_miss(&said, points, asking, lights)) {
+                self.ask_wholes(asking, lights, counts);
                 is_plain = false;
                 continue;
             }
@@ -296,7 +296,8 @@ impl Together {
             if !is_tried && wrong.error() * of_edge(MOST as f64) > allowed * of_edge(points as f64) {
                 is_tried = true;
                 let places: Vec<_> = asking.iter().map(|one| one.place(self.each)).collect();
-                let known = arrivals.in_closed_form(self.light, &places, counts);
+                let estimates = lights.estimate_each(self.light, &places, |_| Occlusion::Unknown, counts);
+                let known = estimates.iter().map(|one| one.moments.is_known().then_some(one.moments));
                 asking.iter_mut().zip(known).for_each(|(one, known)| one.known = known);
                 if asking.iter().all(|one| one.known.is_some()) {
                     return;
@@ -353,15 +354,15 @@ impl Together {
         packets: &mut Packets,
         asked: &mut AskedLeaves,
         asking: &[Asking],
-        arrivals: &Arrivals,
+        lights: &DirectLighting,
     ) -> Wrong {
         let tallies: Vec<&Tally> = asking.iter().map(|one| &one.tally).collect();
         let new = asked.take_new();
-        packets.hear(arrivals.level(), &tallies, &asked.leaves, &new);
+        packets.hear(lights.level(), &tallies, &asked.leaves, &new);
         let packets = packets.errors(&tallies, &asked.leaves, said.found);
         let effective = said.effective.map(|points| points.max(1.0) as f32);
         let met: [f32; MOMENTS] = std::array::from_fn(|k| said.surprises[k] + 1.0 / effective[k]);
-        let shows = |part: &dyn Fn(usize) -> f32| said.shows(arrivals, &|k| said.all[k] * part(k));
+        let shows = |part: &dyn Fn(usize) -> f32| said.shows(lights, &|k| said.all[k] * part(k));
         // As much as packets are wrong by, and what nobody met: about what points found away from edges that nobody
         // expected, and one more (Good, "The population frequencies of species and the estimation of population
         // parameters", 1953). Of small things that are in the way each point says what it sends; where leaves near
@@ -384,19 +385,19 @@ impl Together {
     }
 
     /// Whether so many points may miss some of what would arrive if nothing were in the way.
-    fn may_miss(&self, said: &PointsSaid, points: usize, asking: &[Asking], arrivals: &Arrivals) -> bool {
-        let apart = arrivals.asker(self.light).area.diagonal() / (points as f32).sqrt();
+    fn may_miss(&self, said: &PointsSaid, points: usize, asking: &[Asking], lights: &DirectLighting) -> bool {
+        let apart = lights.asker(self.light).area.diagonal() / (points as f32).sqrt();
         let is_unseen =
             |k: usize| said.effective[k] < f64::from(TOLERANCE.told) && asking.iter().any(|one| one.reflects(k));
         (0..MOMENTS).any(is_unseen)
-            || asking.iter().any(|one| !arrivals.varies_over(self.light, &one.place(self.each), apart))
+            || asking.iter().any(|one| !lights.varies_over(self.light, &one.place(self.each), apart))
     }
 
     /// Asks what would arrive at all rays if nothing were in the way.
-    fn ask_wholes(&self, asking: &mut [Asking], arrivals: &mut Arrivals) {
+    fn ask_wholes(&self, asking: &mut [Asking], lights: &mut DirectLighting, counts: &mut Counts) {
         let places: Vec<_> = asking.iter().map(|one| one.place(self.each)).collect();
-        let wholes = arrivals.wholes(self.light, &places);
-        asking.iter_mut().zip(wholes).for_each(|(one, whole)| one.whole = Some(whole));
+        let wholes = lights.estimate_each(self.light, &places, |_| Occlusion::None, counts);
+        asking.iter_mut().zip(wholes).for_each(|(one, whole)| one.whole = Some(whole.moments));
     }
 }
 
@@ -423,9 +424,9 @@ struct PointsSaid {
 
 impl PointsSaid {
     /// How many display steps an error makes, which is so much of each kind.
-    fn shows(&self, arrivals: &Arrivals, error: &dyn Fn(usize) -> Rgb) -> f32 {
+    fn shows(&self, lights: &DirectLighting, error: &dyn Fn(usize) -> Rgb) -> f32 {
         let sum = (1..MOMENTS).fold(error(0), |sum, k| sum + error(k));
-        arrivals.steps(self.value * self.part, sum * self.part)
+        lights.steps(self.value * self.part, sum * self.part)
     }
 
     /// What one of the points sends.

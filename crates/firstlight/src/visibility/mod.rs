@@ -27,8 +27,8 @@ pub(crate) use shaft::Shaft;
 pub(crate) use target::Target;
 pub(crate) use view::{ShadowView, Visibility};
 
+use crate::material::ShadingPoint;
 use crate::math::{ErrorBound, Facet, LightEnd, ShadowRay, Vec3};
-use crate::shape::SurfaceInteraction;
 
 /// A point that light is gathered from.
 #[derive(Clone, Copy, Debug)]
@@ -46,9 +46,9 @@ pub(crate) struct Viewpoint {
 
 impl Viewpoint {
     #[inline(always)]
-    pub fn of(si: &SurfaceInteraction) -> Self {
-        let start = si.shadow_start();
-        Viewpoint { p: si.lit_from, error: si.error, start, horizon: si.horizon, ns: si.ns, but: si.facet }
+    pub fn of(point: &ShadingPoint) -> Self {
+        let ShadingPoint { p, error, horizon, ns, facet, .. } = *point;
+        Viewpoint { p, error, start: point.shadow_start(), horizon, ns, but: facet }
     }
 
     /// A ray along `l` towards a light.

@@ -290,7 +290,9 @@ fn seen_points(random: &mut Random, scene: &Scene) -> Vec<Viewpoint> {
         if let Some(hit) = scene.intersect_local(&ray)
             && hit.surface.index() < scene.geometry.surfaces.len()
         {
-            points.push(Viewpoint::of(&scene.local_surface(&ray, &hit, &differential)));
+            let si = scene.local_surface(&ray, &hit, &differential);
+            let bsdf = scene.materials[si.material.index()].bsdf(&si, &scene.textures);
+            points.push(Viewpoint::of(&ShadingPoint::of(&si, &bsdf, scene.ambient)));
         }
     }
     points

@@ -3,8 +3,9 @@
 use fearless_simd::{f32x16, prelude::*};
 
 use super::{LanesSight, SLACK, Told};
-use crate::integrate::batch::{Exact, ShadingPoint};
+use crate::integrate::batch::Exact;
 use crate::integrate::row::edges;
+use crate::material::ShadingPoint;
 use crate::math::{DVec3, Facet, LANES, Vec3, Vec3x16};
 use crate::shape::{Parallelogram, PlaneSide, is_in_plane};
 

@@ -2,8 +2,8 @@
 //! light.
 
 use super::ExactShape;
-use crate::integrate::batch::ShadingPoint;
 use crate::integrate::emitter::Emitter;
+use crate::material::ShadingPoint;
 
 /// On which sides of the plane of a flat light something is, as bits: whether a thing reaches into the front and into
 /// the back by more than rounding, or which points are there. What lies in the plane, or behind it as seen from a

@@ -3,10 +3,11 @@
 use fearless_simd::{f32x16, prelude::*};
 
 use super::{LanesSight, SLACK, Told};
-use crate::integrate::batch::{Exact, ShadingPoint};
+use crate::integrate::batch::Exact;
 use crate::integrate::emitter::Emitter;
 use crate::integrate::hull::SolidOccluder;
 use crate::integrate::occluder::{Occluder, Shadow};
+use crate::material::ShadingPoint;
 use crate::math::{DAffine3, DMat3, DVec3, LANES, Vec3x16};
 use crate::shape::{Canonical, Placement, Solid, Sphere, SphereUv};
 

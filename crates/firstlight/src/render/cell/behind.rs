@@ -7,10 +7,9 @@ use std::ops::{ControlFlow, Range};
 use super::{Cells, PIXELS, Pixel, Wanted};
 use crate::color::Rgb;
 use crate::ids::LightId;
-use crate::material::Moments;
-use crate::render::arrival::{ArrivalPlace, Arrivals, Past};
+use crate::material::{Moments, ShadingPoint};
+use crate::render::direct::{DirectLighting, Occlusion};
 use crate::render::fragment::{Fragment, Fragments};
-use crate::render::light_queue::{LitPlace, Sight};
 use crate::render::resolve::LightTerm;
 use crate::render::together::{Outcome, Together, salt};
 use crate::render::{AaMode, Counts};
@@ -92,7 +91,7 @@ enum RaySight {
 /// The rays of some fragments, as they look for lights. Keeps its memory.
 #[derive(Default)]
 struct RayBlock {
-    places: Vec<LitPlace>,
+    places: Vec<ShadingPoint>,
     points: Vec<Viewpoint>,
     fragments: Vec<FragmentRays>,
 }
@@ -145,15 +144,15 @@ impl Cells<'_> {
 
     /// Leaves of what is wanted that of which too little is known by now, and tells the rest.
     fn tell_wanted(&mut self, wanted: &mut Vec<Wanted>) {
-        wanted.retain_mut(|Wanted { fragment, light, sight, .. }| {
-            *sight = match self.fragment_sight(*fragment as usize, *light as usize) {
-                FragmentSight::Unknown | FragmentSight::Told => Sight::Unknown,
+        wanted.retain_mut(|Wanted { fragment, light, occlusion, .. }| {
+            *occlusion = match self.fragment_sight(*fragment as usize, *light as usize) {
+                FragmentSight::Unknown | FragmentSight::Told => Occlusion::Unknown,
                 FragmentSight::Parted => {
                     self.refused.push(Wanted::new(*fragment, *light));
                     return false;
                 }
-                FragmentSight::Clear => Sight::Clear,
-                FragmentSight::Lit => Sight::Lit,
+                FragmentSight::Clear => Occlusion::Listed,
+                FragmentSight::Lit => Occlusion::None,
                 FragmentSight::Dark => return false,
                 FragmentSight::Settled(terms) => {
                     let pixel = self.fragments.all[*fragment as usize].pixel as usize;
@@ -225,7 +224,7 @@ impl Cells<'_> {
             sights.open.clear();
             let is_open = |of: &FragmentRays| {
                 let sight = self.fragment_sight(of.fragment as usize, light);
-                self.lights.arrivals.looks_for(light) && matches!(sight, FragmentSight::Unknown)
+                self.lights.is_classified_by_blocks(light) && matches!(sight, FragmentSight::Unknown)
             };
             sights.open.extend(block.fragments.iter().map(is_open));
             if !sights.open.contains(&true) {
@@ -250,17 +249,17 @@ impl Cells<'_> {
             let before = counts.work();
             let ask = |k: &usize| self.together(&block, *k, light, false, sights, counts);
             let mut all: Vec<Together> = wanted.iter().map(ask).collect();
-            Together::tell(&mut all, &mut self.lights.arrivals, counts);
+            Together::tell(&mut all, &mut self.lights, counts);
             let each = (counts.work() - before) / wanted.len().max(1) as f32;
             for (k, together) in wanted.into_iter().zip(all) {
                 let fragment = block.fragments[k].fragment as usize;
                 let index = self.pixel_of(fragment);
                 let before = counts.work();
-                let terms = together.settle(&mut self.lights.arrivals, counts).terms;
+                let terms = together.settle(&mut self.lights, counts).terms;
                 self.sums.work[index] += each + counts.work() - before;
                 self.behind.known[fragment * lights + light] = FragmentSight::Settled(terms);
             }
-            sights.views.iter_mut().filter_map(Option::take).for_each(|view| self.lights.arrivals.keep(view));
+            sights.views.iter_mut().filter_map(Option::take).for_each(|view| self.lights.keep(view));
         }
         self.behind.sights = sights;
         self.behind.block = block;
@@ -274,8 +273,7 @@ impl Cells<'_> {
 
     /// How many lights that are integrated a fragment sees in such a way.
     fn count_lights(&self, fragment: usize, is: impl Fn(FragmentSight) -> bool) -> usize {
-        let is =
-            |light: &usize| self.lights.arrivals.is_integrated(*light) && is(self.fragment_sight(fragment, *light));
+        let is = |light: &usize| self.lights.is_integrated(*light) && is(self.fragment_sight(fragment, *light));
         (0..self.scene.lights.len()).filter(is).count()
     }
 
@@ -298,13 +296,13 @@ impl Cells<'_> {
     }
 
     /// What lights other than one send to each ray of a fragment, at least, as far as that is known by now.
-    pub(super) fn others(&mut self, fragment: usize, light: usize) -> Rgb {
+    pub(super) fn others(&mut self, fragment: usize, light: usize, counts: &mut Counts) -> Rgb {
         let lights = self.scene.lights.len();
         let Fragment { pixel, count, .. } = self.fragments.all[fragment];
         let rays = count as f32;
         let mut others = Rgb::BLACK;
         for other in (0..lights).filter(|other| *other != light) {
-            let scale = self.lights.arrivals.scale(other);
+            let scale = self.lights.scale(other);
             let share = match self.fragment_sight(fragment, other) {
                 FragmentSight::Settled(terms) => {
                     others += scale * terms.sum() * (1.0 / rays);
@@ -319,7 +317,7 @@ impl Cells<'_> {
                 FragmentSight::Clear | FragmentSight::Dark | FragmentSight::Parted => 0.0,
             };
             if share > 0.0 {
-                others += self.unshadowed(fragment, other) * share;
+                others += self.unshadowed(fragment, other, counts) * share;
             }
         }
         others
@@ -327,22 +325,23 @@ impl Cells<'_> {
 
     /// What a light would send to a fragment if nothing were in the way, with all colours; black where that is not
     /// known. All fragments of the cell are asked together.
-    fn unshadowed(&mut self, fragment: usize, light: usize) -> Rgb {
-        let (scene, arrivals) = (self.scene, &mut self.lights.arrivals);
-        if !arrivals.is_integrated(light) {
+    fn unshadowed(&mut self, fragment: usize, light: usize, counts: &mut Counts) -> Rgb {
+        let (scene, lights) = (self.scene, &mut self.lights);
+        if !lights.is_integrated(light) {
             return Rgb::BLACK;
         }
         let (fragments, wholes) = (&self.fragments, &mut self.behind.wholes[light]);
         if wholes.is_empty() {
-            let surfaces = fragments.all.iter().map(|fragment| match fragment.rays.is_empty() {
+            let points = fragments.all.iter().map(|fragment| match fragment.rays.is_empty() {
                 true => fragments.places[fragments.quadrants(fragment)[0].place as usize],
                 false => fragments.place(scene, fragment, 0),
             });
-            let surfaces: Vec<_> = surfaces.map(|place| (place.surface(), place.bsdf)).collect();
-            let places: Vec<_> = surfaces.iter().map(|(si, bsdf)| arrivals.place(light, si, bsdf)).collect();
-            *wholes = arrivals.wholes(light, &places);
+            let alone = |point| ShadingPoint { reach: 0.0, turn: 0.0, share: 1.0, ..point };
+            let points: Vec<ShadingPoint> = points.map(alone).collect();
+            let estimates = lights.estimate_each(light, &points, |_| Occlusion::None, counts);
+            wholes.extend(estimates.iter().map(|estimate| estimate.moments));
         }
-        arrivals.scale(light) * fragments.all[fragment].bsdf.colors.of(&wholes[fragment])
+        lights.scale(light) * fragments.all[fragment].bsdf.colors.of(&wholes[fragment])
     }
 
     /// What all rays of a fragment see of a light, ray by ray.
@@ -356,12 +355,12 @@ impl Cells<'_> {
         self.look_for(&block, light, &mut sights, counts);
         let before = counts.work();
         let mut together = [self.together(&block, 0, light, true, &mut sights, counts)];
-        Together::tell(&mut together, &mut self.lights.arrivals, counts);
+        Together::tell(&mut together, &mut self.lights, counts);
         let [together] = together;
-        let outcome = together.settle(&mut self.lights.arrivals, counts);
+        let outcome = together.settle(&mut self.lights, counts);
         let index = self.pixel_of(fragment);
         self.sums.work[index] += counts.work() - before;
-        sights.views.iter_mut().filter_map(Option::take).for_each(|view| self.lights.arrivals.keep(view));
+        sights.views.iter_mut().filter_map(Option::take).for_each(|view| self.lights.keep(view));
         self.behind.sights.push(sights);
         self.behind.block = block;
         outcome
@@ -378,20 +377,20 @@ impl Cells<'_> {
         counts: &mut Counts,
     ) -> Together {
         let of = block.fragments[k];
-        let others = self.others(of.fragment as usize, light);
+        let others = self.others(of.fragment as usize, light, counts);
         let Fragment { surface, share, .. } = self.fragments.all[of.fragment as usize];
         let salt = salt(self.at(self.pixel_of(of.fragment as usize)), surface);
         // Of how many lights points may be asked, as far as is known by now
         let asked = self.count_lights(of.fragment as usize, |sight| {
             !matches!(sight, FragmentSight::Told | FragmentSight::Lit | FragmentSight::Dark)
         });
-        let together = Together::new(light, of.count as usize, share, salt, others);
-        let mut together = together.of_lights(asked, &self.lights.arrivals);
+        let together = Together::new(&self.lights, light, of.count as usize, share, salt, others);
+        let mut together = together.of_lights(asked, &self.lights);
         if is_node {
             together = together.of_node();
         }
         for (place, k) in block.places[of.rays()].iter().zip(of.rays()) {
-            sights.settle(k, place, &mut self.lights.arrivals, light, share, &mut together, counts);
+            sights.settle(k, place, &mut self.lights, light, &mut together, counts);
         }
         together
     }
@@ -406,7 +405,7 @@ impl Cells<'_> {
         views.clear();
         views.resize_with(block.points.len(), || None);
         for (of, is_open) in block.fragments.iter().zip(open) {
-            let LitPlace { surface, receives_shadow, .. } = block.places[of.first as usize];
+            let ShadingPoint { surface, receives_shadow, .. } = block.places[of.first as usize];
             let shines = scene.geometry.links.contains(scene.geometry.lights_of(surface), LightId(light as u32));
             for k in of.first..of.first + of.count {
                 sights.push(if shines { RaySight::Lit } else { RaySight::BelowHorizon });
@@ -415,19 +414,20 @@ impl Cells<'_> {
                 }
             }
         }
-        self.lights.arrivals.sights(light, &block.points, order, counts, |k, visibility, take| {
+        self.lights.classify(light, &block.points, order, counts, |k, visibility, occlusion| {
             sights[k] = match visibility {
                 Visibility::Lit => RaySight::Lit,
                 Visibility::Hidden => RaySight::Dark,
                 Visibility::BelowHorizon => RaySight::BelowHorizon,
-                Visibility::Mask => match take() {
-                    Past::Unknown(view) => {
-                        views[k] = Some(view);
-                        RaySight::Behind
+                Visibility::Mask => {
+                    let (occlusion, view) = occlusion();
+                    views[k] = view;
+                    match occlusion {
+                        Occlusion::Unknown => RaySight::Behind,
+                        Occlusion::Gathered => RaySight::Near,
+                        Occlusion::Listed | Occlusion::None => RaySight::Clear,
                     }
-                    Past::Known => RaySight::Near,
-                    Past::Nothing => RaySight::Clear,
-                },
+                }
             };
         });
     }
@@ -453,7 +453,7 @@ impl RayBlock {
         let (first, count) = (self.points.len() as u32, fragment.count);
         self.fragments.push(FragmentRays { fragment: number as u32, first, count });
         self.places.extend((0..fragment.rays.len()).map(|k| fragments.place(scene, fragment, k)));
-        self.points.extend(self.places[first as usize..].iter().map(LitPlace::viewpoint));
+        self.points.extend(self.places[first as usize..].iter().map(Viewpoint::of));
     }
 }
 
@@ -481,29 +481,26 @@ impl RaySights {
     }
 
     /// Adds what ray `k` of the block sees of a light to that of the others of its fragment.
-    #[allow(clippy::too_many_arguments, reason = "a ray of a fragment, a light, and where it goes")]
     fn settle(
         &mut self,
         k: usize,
-        place: &LitPlace,
-        arrivals: &mut Arrivals,
+        point: &ShadingPoint,
+        lights: &mut DirectLighting,
         light: usize,
-        share: f32,
         together: &mut Together,
         counts: &mut Counts,
     ) {
-        let (si, bsdf) = (&place.surface(), &place.bsdf);
         match self.sights[k] {
-            RaySight::Dark => together.dark(&arrivals.place(light, si, bsdf)),
-            RaySight::BelowHorizon => together.know(&arrivals.place(light, si, bsdf), &Moments::default()),
-            sight @ (RaySight::Lit | RaySight::Clear | RaySight::Near) => {
-                together.ask(arrivals, si, bsdf, sight == RaySight::Lit, sight != RaySight::Near, counts);
-            }
-            RaySight::Behind => {
+            RaySight::Dark => together.dark(point),
+            RaySight::BelowHorizon => together.know(point, &Moments::default()),
+            RaySight::Lit => together.ask(lights, point, Occlusion::None, counts),
+            RaySight::Clear => together.ask(lights, point, Occlusion::Listed, counts),
+            RaySight::Near => together.ask(lights, point, Occlusion::Unknown, counts),
+            RaySight::Behind if lights.is_integrated(light) => {
                 let view = self.views[k].take().expect("what is behind things has a view");
-                let place = ArrivalPlace { share, lit: true, clear: true, ..arrivals.place(light, si, bsdf) };
-                arrivals.ask_behind(together, light, &place, view, counts);
+                together.behind(point, view);
             }
+            RaySight::Behind => together.ask(lights, point, Occlusion::Unknown, counts),
         }
     }
 }

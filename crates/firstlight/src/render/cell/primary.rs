@@ -2,7 +2,7 @@
 //! of all others are traced, those that may meet something in trees as bundles.
 
 use super::{CELL, Cells, Pixel, PixelState};
-use crate::material::Bsdf;
+use crate::material::{Bsdf, ShadingPoint};
 use crate::render::fragment::{Contrast, Member, RayHit};
 use crate::render::grid::Block;
 use crate::render::hits::camera_ray;
@@ -125,7 +125,7 @@ impl Cells<'_> {
                 None => {
                     let si = scene.local_surface(&ray, &hit, &differential);
                     let bsdf = scene.materials[si.material.index()].bsdf(&si, &scene.textures);
-                    self.seen.push((Member::new(si, at), bsdf));
+                    self.seen.push(Member::new(ShadingPoint::of(&si, &bsdf, scene.ambient), at));
                 }
             }
         }

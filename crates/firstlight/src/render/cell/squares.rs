@@ -15,12 +15,12 @@ use super::{CELL, Cells};
 use crate::color::Rgb;
 use crate::ids::LightId;
 use crate::integrate::{Emitter, TOLERANCE};
-use crate::material::Moments;
+use crate::material::{Moments, ShadingPoint};
 use crate::math::{LANES, Vec3};
 use crate::render::Counts;
 use crate::render::beams::Packet;
+use crate::render::direct::Occlusion;
 use crate::render::fragment::{Contrast, Fragment};
-use crate::render::light_queue::LitPlace;
 use crate::render::many::FEW;
 use crate::render::square::Square;
 use crate::render::tile::Tile;
@@ -122,7 +122,7 @@ impl Cells<'_> {
                 continue;
             }
             let lights: ArrayVec<usize, FEW> =
-                (0..scene.lights.len()).filter(|light| self.lights.arrivals.is_behind(*light)).collect();
+                (0..scene.lights.len()).filter(|light| self.lights.is_behind(*light)).collect();
             self.square(square, &lights, counts);
             go_on()?;
         }
@@ -176,14 +176,14 @@ impl Cells<'_> {
     }
 
     /// The middle between two opposite rays of a pixel that is filled.
-    fn standing(&self, at: [u32; 2]) -> Option<LitPlace> {
+    fn standing(&self, at: [u32; 2]) -> Option<ShadingPoint> {
         let (_, fragment) = self.whole(at)?;
         let [one, other] = [0, fragment.rays.len() - 1].map(|k| self.fragments.place(self.scene, fragment, k));
         let mean = |a: Vec3, b: Vec3| (a + b) * 0.5;
         let mut place = one;
-        place.point.p = mean(one.point.p, other.point.p);
-        place.point.ns = mean(one.point.ns, other.point.ns).normalize_or_zero();
-        place.point.ng = mean(one.point.ng, other.point.ng).normalize_or_zero();
+        place.p = mean(one.p, other.p);
+        place.ns = mean(one.ns, other.ns).normalize_or_zero();
+        place.ng = mean(one.ng, other.ng).normalize_or_zero();
         Some(place)
     }
 
@@ -195,7 +195,7 @@ impl Cells<'_> {
         }
         let at = |i: u32, j: u32| self.standing([x + i, y + j]);
         let Some(middle) = at(side / 2, side / 2) else { return false };
-        let is_like = |place: &LitPlace| middle.surface == place.surface && middle.bsdf.lobe == place.bsdf.lobe;
+        let is_like = |place: &ShadingPoint| middle.surface == place.surface && middle.bsdf.lobe == place.bsdf.lobe;
         // With the first of what lies beside it
         let across = side + 1;
         let mut normals = Vec::with_capacity((across * across) as usize);
@@ -207,7 +207,7 @@ impl Cells<'_> {
                 continue;
             }
             match at(i, j) {
-                Some(place) if is_like(&place) => normals.push(place.point.ns),
+                Some(place) if is_like(&place) => normals.push(place.ns),
                 _ => return false,
             }
         }
@@ -244,14 +244,17 @@ impl Cells<'_> {
         }
         let mut points = std::mem::take(&mut self.behind.points);
         self.viewpoints(square, &mut points);
-        let (is_behind, is_lit) = self.lights.arrivals.gather_for(light, &points, counts);
+        let occlusion = self.lights.gather_for(light, &points, counts);
         self.behind.points = points;
-        if !is_behind {
-            for at in square.pixels() {
-                self.note_at(at, light, if is_lit { FragmentSight::Lit } else { FragmentSight::Clear });
-            }
+        let sight = match occlusion {
+            Occlusion::None => FragmentSight::Lit,
+            Occlusion::Listed => FragmentSight::Clear,
+            Occlusion::Gathered | Occlusion::Unknown => return false,
+        };
+        for at in square.pixels() {
+            self.note_at(at, light, sight);
         }
-        !is_behind
+        true
     }
 
     /// Whether a light runs through a square or what is asked for it, so that the nine may lie evenly by chance.
@@ -260,9 +263,9 @@ impl Cells<'_> {
         let nodes = rows.0.iter().flat_map(|j| columns.0.map(|i| [square.x + i, square.y + j]));
         let fragments = nodes.chain(square.pixels()).filter_map(|at| self.whole(at));
         let places = fragments.flat_map(|(_, fragment)| {
-            (0..fragment.rays.len()).map(|k| self.fragments.place(self.scene, fragment, k).point.p)
+            (0..fragment.rays.len()).map(|k| self.fragments.place(self.scene, fragment, k).p)
         });
-        self.lights.arrivals.lights.emitters[light].is_some_and(|emitter| emitter.parts(places))
+        self.lights.lights.emitters[light].is_some_and(|emitter| emitter.parts(places))
     }
 
     /// Where the rays of a square end, pixel by pixel.
@@ -271,7 +274,7 @@ impl Cells<'_> {
         for at in square.pixels() {
             if let Some((_, fragment)) = self.whole(at) {
                 let rays = 0..fragment.rays.len();
-                points.extend(rays.map(|k| self.fragments.place(self.scene, fragment, k).viewpoint()));
+                points.extend(rays.map(|k| Viewpoint::of(&self.fragments.place(self.scene, fragment, k))));
             }
         }
     }
@@ -305,7 +308,7 @@ impl Cells<'_> {
     /// other.
     fn vote(&mut self, [x, y]: [u32; 2], light: usize, counts: &mut Counts) {
         let scene = self.scene;
-        let asker = self.lights.arrivals.asker(light);
+        let asker = self.lights.asker(light);
         let at = |inner: usize| [x + inner as u32 % BLOCK, y + inner as u32 / BLOCK];
         let pixels: [Option<(usize, &Fragment)>; LANES] = std::array::from_fn(|inner| self.whole(at(inner)));
         let mut packet: Option<Packet> = None;
@@ -316,7 +319,7 @@ impl Cells<'_> {
                 // Each ray once, if there are as many
                 let turn = (at(inner)[0] * 7 + at(inner)[1] * 3) as usize % LOOKING;
                 let ray = (cell ^ turn) % fragment.rays.len();
-                let point = self.fragments.place(scene, fragment, ray).viewpoint();
+                let point = Viewpoint::of(&self.fragments.place(scene, fragment, ray));
                 let l = asker.point(inner, LOOKING, cell) - point.p;
                 if point.horizon.dot(l) > 0.0 && point.ns.dot(l) > 0.0 {
                     asked[inner][0] += 1;
@@ -405,7 +408,7 @@ impl Cells<'_> {
                     }
                 }
                 let off = foretold.apart(node.sums);
-                if self.steps_of([x + i, y + j], light, &node.sums, &off) > foretold_to {
+                if self.steps_of([x + i, y + j], light, &node.sums, &off, counts) > foretold_to {
                     return false;
                 }
             }
@@ -414,7 +417,7 @@ impl Cells<'_> {
         let mut told = [Moments::default(); (LARGEST * LARGEST) as usize];
         let mut misses = Misses::new(side);
         // Of a ball that shines on one side, rays see points that do not shine to them
-        let emitter = &self.lights.arrivals.lights.emitters[light];
+        let emitter = &self.lights.lights.emitters[light];
         let is_telling = !matches!(emitter, Some(Emitter::Ball { both_sides: false, .. }));
         for (number, told) in told.iter_mut().enumerate().take((side * side) as usize) {
             let [i, j] = [number as u32 % side, number as u32 / side];
@@ -450,9 +453,9 @@ impl Cells<'_> {
                     slope += other.apart(sums);
                 }
                 let mingled = of.contrast.of(&slope) * 0.125;
-                let scale = self.lights.arrivals.scale(light);
+                let scale = self.lights.scale(light);
                 let value = scale * of.bsdf.colors.of(&sums);
-                if self.lights.arrivals.steps(value, scale * mingled) > TOLERANCE.mingled {
+                if self.lights.steps(value, scale * mingled) > TOLERANCE.mingled {
                     continue;
                 }
             }
@@ -480,12 +483,12 @@ impl Cells<'_> {
     }
 
     /// How many display steps an error makes of what a light sends to a pixel.
-    fn steps_of(&mut self, at: [u32; 2], light: usize, sums: &Moments, error: &Moments) -> f32 {
+    fn steps_of(&mut self, at: [u32; 2], light: usize, sums: &Moments, error: &Moments, counts: &mut Counts) -> f32 {
         let Some((fragment, bsdf)) = self.whole(at).map(|(number, of)| (number, of.bsdf)) else { return f32::INFINITY };
-        let scale = self.lights.arrivals.scale(light);
+        let scale = self.lights.scale(light);
         let color = |sums: &Moments| scale * bsdf.colors.of(sums);
-        let others = self.others(fragment, light);
+        let others = self.others(fragment, light, counts);
         let value: Rgb = self.scene.ambient * bsdf.ambient + others + color(sums);
-        self.lights.arrivals.steps(value, color(error))
+        self.lights.steps(value, color(error))
     }
 }

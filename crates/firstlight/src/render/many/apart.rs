@@ -5,11 +5,10 @@ use super::block::sent;
 use crate::color::Rgb;
 use crate::image::Buffer;
 use crate::light::{Held, LightTree, Sent};
-use crate::material::Bsdf;
-use crate::render::arrival::Arrivals;
+use crate::material::ShadingPoint;
+use crate::render::direct::DirectLighting;
 use crate::render::resolve::ScaledTerm;
 use crate::scene::Scene;
-use crate::shape::SurfaceInteraction;
 
 /// Which lights are kept apart.
 pub(super) struct Apart<'a> {
@@ -49,25 +48,25 @@ impl<'a> Apart<'a> {
     }
 
     /// Adds to `to` what those of an entry of a list of nodes send to a place, so many times.
-    pub fn add(&self, to: &mut SentApart, entry: u32, si: &SurfaceInteraction, bsdf: &Bsdf, times: f32) {
+    pub fn add(&self, to: &mut SentApart, entry: u32, point: &ShadingPoint, times: f32) {
         let (node, one) = (entry & !ONE, entry & ONE);
         if !self.nodes.get(node as usize).is_some_and(|holds| *holds) {
             return;
         }
         match self.tree.nodes[node as usize].held {
             Held::Light(light) => {
-                to.push((light, bsdf.colors * sent(self.scene, self.tree, entry, si, &bsdf.lobe) * times));
+                to.push((light, point.bsdf.colors * sent(self.scene, self.tree, entry, point) * times));
             }
-            Held::Two(two) => two.into_iter().for_each(|node| self.add(to, node | one, si, bsdf, times)),
+            Held::Two(two) => two.into_iter().for_each(|node| self.add(to, node | one, point, times)),
         }
     }
 
     /// What each of them sends, added up, with its scale, in scene order.
-    pub fn finish(sent: &mut SentApart, arrivals: &Arrivals, scaled: &mut Vec<ScaledTerm>) {
+    pub fn finish(sent: &mut SentApart, lights: &DirectLighting, scaled: &mut Vec<ScaledTerm>) {
         sent.sort_by_key(|(light, _)| *light);
         scaled.clear();
         for same in sent.chunk_by(|a, b| a.0 == b.0) {
-            let scale = arrivals.scale(same[0].0 as usize);
+            let scale = lights.scale(same[0].0 as usize);
             let of = |sent: f32, scale: f32| if scale > 0.0 { sent / scale } else { 0.0 };
             let unscaled = |sent: Rgb| Rgb::new(of(sent.r, scale.r), of(sent.g, scale.g), of(sent.b, scale.b));
             let term = same.iter().fold(Sent::BLACK, |sum, (_, sent)| sum + *sent).map(unscaled);

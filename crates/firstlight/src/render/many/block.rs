@@ -9,14 +9,14 @@ use crate::color::Rgb;
 use crate::ids::LightId;
 use crate::integrate::{COSTS, TOLERANCE};
 use crate::light::{Extent, Held, LightNode, LightTree, Sends, Sent};
-use crate::material::{Lobe, Moments};
+use crate::material::{Moments, ShadingPoint};
 use crate::math::Vec3;
-use crate::render::arrival::{ArrivalPlace, Arrivals};
 use crate::render::counts::Counts;
 use crate::render::cut::{By, CutRules};
+use crate::render::direct::{DirectLighting, LightQuery, Occlusion};
 use crate::render::fence::Fence;
+use crate::render::together::Together;
 use crate::scene::Scene;
-use crate::shape::SurfaceInteraction;
 use crate::visibility::Seen;
 
 /// A node that counts where the light that stands for it is seen.
@@ -40,26 +40,26 @@ impl<'a> Many<'a> {
         group: &[usize],
         level: usize,
         guess: Option<Rgb>,
-        arrivals: &mut Arrivals<'a>,
+        lights: &mut DirectLighting<'a>,
         counts: &mut Counts,
     ) {
         let (scene, tree) = (self.scene, self.tree);
         let patch = |number: &usize| &patches[*number];
         let zone = zone(group.iter().map(patch), self.eye);
         let tones = tones(scene, group.iter().map(patch));
-        let receives = group.iter().any(|at| patch(at).si.receives_shadow);
+        let receives = group.iter().any(|at| patch(at).point.receives_shadow);
         self.outlook.stand(scene, group.iter().map(|at| standing(patch(at))));
-        let steps = arrivals.display_steps();
+        let steps = lights.display_steps();
         let rules = CutRules { tree, steps, zone: &zone, tones: &tones, budget: TOLERANCE.crowd };
         let mut cut = std::mem::take(&mut self.cut);
-        let (simd, outlook, fence) = (arrivals.level(), &mut self.outlook, &mut self.fence);
+        let (simd, outlook, fence) = (lights.level(), &mut self.outlook, &mut self.fence);
         let mut look = |node: &LightNode, light: u32| {
             if !(receives && node.shadows) {
                 return Seen::Whole;
             }
             outlook.look(simd, scene, node.shine.low, node.shine.high, LightId(light))
         };
-        let links = scene.geometry.lights_of(patch(&group[0]).si.surface);
+        let links = scene.geometry.lights_of(patch(&group[0]).point.surface);
         let shines = |root: &&u32| {
             let light = tree.nodes[**root as usize].first(tree);
             scene.geometry.links.contains(links, LightId(light))
@@ -70,10 +70,10 @@ impl<'a> Many<'a> {
             cut.peek();
             let some = [0, group.len() / 2, group.len() - 1].map(|i| patch(&group[i]));
             let all = some.map(|patch| {
-                fence.stand(scene, &patch.si);
+                fence.stand(scene, &patch.point);
                 cut.nodes.iter().fold(Rgb::BLACK, |sum, (node, by)| match entry(*node, *by) {
-                    entry if by.is_everywhere() || Dot::new(tree, entry).arrives(scene, fence, &patch.si) => {
-                        sum + sent(scene, tree, entry, &patch.si, &patch.bsdf.lobe).cosine()
+                    entry if by.is_everywhere() || Dot::new(tree, entry).arrives(scene, fence, &patch.point) => {
+                        sum + sent(scene, tree, entry, &patch.point).cosine()
                     }
                     _ => sum,
                 })
@@ -100,9 +100,9 @@ impl<'a> Many<'a> {
                 let patch = patch(at);
                 let singles = self.singles.len();
                 let lists = [lit.clone(), maybe.clone()];
-                let (stored, light) = self.patch(patch, &cut.open, lists, arrivals, counts);
-                let error = cut.error(&patch.bsdf.colors);
-                if arrivals.steps(stored.value, error) > TOLERANCE.crowd * TOLERANCE.lenient && guess != Rgb::BLACK {
+                let (stored, light) = self.patch(patch, &cut.open, lists, lights, counts);
+                let error = cut.error(&patch.point.bsdf.colors);
+                if lights.steps(stored.value, error) > TOLERANCE.crowd * TOLERANCE.lenient && guess != Rgb::BLACK {
                     // Darker than was guessed
                     self.singles.truncate(singles);
                     found = Some(found.map_or(light, |found| found.min(light)));
@@ -128,7 +128,7 @@ impl<'a> Many<'a> {
         for quarter in 0..4 {
             let part: Vec<usize> = again.iter().filter(|at| patch(at).quarter(half) == quarter).copied().collect();
             if !part.is_empty() {
-                self.block(patches, &part, level + 1, Some(darkest), arrivals, counts);
+                self.block(patches, &part, level + 1, Some(darkest), lights, counts);
             }
         }
     }
@@ -139,19 +139,19 @@ impl<'a> Many<'a> {
         patch: &Patch,
         singles: &[u32],
         [everywhere, maybe]: [Range<u32>; 2],
-        arrivals: &mut Arrivals<'a>,
+        lights: &mut DirectLighting<'a>,
         counts: &mut Counts,
     ) -> (Stored, Rgb) {
         let scene = self.scene;
-        let (si, bsdf) = (&patch.si, &patch.bsdf);
+        let (point, bsdf) = (&patch.point, &patch.point.bsdf);
         let mut stored = Stored::default();
         let start = self.lit.len() as u32;
         counts.points += maybe.len() as u64;
         if !maybe.is_empty() {
-            self.fence.stand(scene, si);
+            self.fence.stand(scene, point);
         }
         let dots = &self.dots[maybe.start as usize..maybe.end as usize];
-        let seen = dots.iter().filter(|dot| dot.arrives(scene, &self.fence, si));
+        let seen = dots.iter().filter(|dot| dot.arrives(scene, &self.fence, point));
         self.lit.extend(seen.map(|dot| dot.entry));
         (stored.lit[0], stored.maybe) = (everywhere, maybe);
         stored.lit[1] = start..self.lit.len() as u32;
@@ -162,19 +162,25 @@ impl<'a> Many<'a> {
         let from = self.singles.len() as u32;
         let mut light = stored.sent.cosine();
         if !singles.is_empty() {
-            arrivals.tolerate(TOLERANCE.integrals / (singles.len() as f32).sqrt());
+            lights.tolerate(TOLERANCE.integrals / (singles.len() as f32).sqrt());
         }
-        for index in singles {
-            let place = ArrivalPlace {
-                base: stored.value,
-                reach: patch.reach,
-                turn: patch.turn,
-                ..arrivals.place(*index as usize, si, bsdf)
+        let point = ShadingPoint { base: stored.value, ..*point };
+        let query = |light: &u32| LightQuery { point: 0, light: *light, occlusion: Occlusion::Unknown };
+        let queries: Vec<LightQuery> = singles.iter().map(query).collect();
+        let mut estimates = Vec::with_capacity(queries.len());
+        lights.estimate_all(&[point], &queries, &mut estimates, counts);
+        for (index, estimate) in singles.iter().zip(&estimates) {
+            let moments = match estimate.moments.is_known() {
+                true => estimate.moments,
+                false => {
+                    Together::of_points(*index as usize, std::slice::from_ref(&point), patch.salt(), lights, counts)
+                        .sums
+                }
             };
-            let arrival = arrivals.arrival(*index as usize, &place, counts);
-            light += arrivals.scale(*index as usize) * arrival.sums.cosine();
-            stored.value += place.color(&arrival.sums);
-            self.singles.push(Single { light: *index, arrival });
+            let scale = lights.scale(*index as usize);
+            light += scale * moments.cosine();
+            stored.value += (scale * bsdf.colors).of(&moments);
+            self.singles.push(Single { light: *index, moments, bend: estimate.bend() });
         }
         stored.singles = from..self.singles.len() as u32;
         (stored, light)
@@ -196,12 +202,12 @@ impl Dot {
 
     /// Whether its light is seen from where `fence` stands.
     #[inline]
-    pub(super) fn arrives(&self, scene: &Scene, fence: &Fence, si: &SurfaceInteraction) -> bool {
-        if !(si.receives_shadow && self.shadows) {
+    pub(super) fn arrives(&self, scene: &Scene, fence: &Fence, point: &ShadingPoint) -> bool {
+        if !(point.receives_shadow && self.shadows) {
             return true;
         }
-        let l = if self.finite { self.at - si.lit_from } else { self.at };
-        si.horizon.dot(l) > 0.0 && si.ns.dot(l) > 0.0 && !fence.blocks(scene, LightId(self.light), l, self.finite)
+        let l = if self.finite { self.at - point.p } else { self.at };
+        point.horizon.dot(l) > 0.0 && point.ns.dot(l) > 0.0 && !fence.blocks(scene, LightId(self.light), l, self.finite)
     }
 }
 
@@ -212,29 +218,29 @@ pub(super) fn entry(node: u32, by: By) -> u32 {
 
 /// What an entry of a list of nodes sends: diffuse and specular, before the colours of the surface.
 #[inline(always)]
-pub(super) fn sent(scene: &Scene, tree: &LightTree, entry: u32, si: &SurfaceInteraction, lobe: &Lobe) -> Sent {
+pub(super) fn sent(scene: &Scene, tree: &LightTree, entry: u32, point: &ShadingPoint) -> Sent {
     let node = &tree.nodes[(entry & !ONE) as usize];
     if entry & ONE == 0 {
-        return node.send(si.lit_from, si.ns, si.wo, lobe);
+        return node.send(point.p, point.ns, point.wo, &point.bsdf.lobe);
     }
-    sent_by_one(scene, &tree.nodes[node.one as usize], si, lobe).colors(|sent| node.power * sent)
+    sent_by_one(scene, &tree.nodes[node.one as usize], point).colors(|sent| node.power * sent)
 }
 
 /// What one light would send if its power were 1.
-pub(super) fn sent_by_one(scene: &Scene, one: &LightNode, si: &SurfaceInteraction, lobe: &Lobe) -> Moments {
+pub(super) fn sent_by_one(scene: &Scene, one: &LightNode, point: &ShadingPoint) -> Moments {
     let Held::Light(light) = one.held else { return Moments::ZERO };
     let light = &scene.lights[light as usize];
     let k = light.samples() / 2;
-    let l = light.towards(k, si.lit_from).l;
-    let height = si.ns.dot(l);
-    if !(si.horizon.dot(l) > 0.0 && height > 0.0) {
+    let l = light.towards(k, point.p).l;
+    let height = point.ns.dot(l);
+    if !(point.horizon.dot(l) > 0.0 && height > 0.0) {
         return Moments::ZERO;
     }
     match light.extent() {
-        Extent::Area(_) if one.is_smooth() => return one.send_one(si.lit_from, si.ns, si.wo, lobe),
+        Extent::Area(_) if one.is_smooth() => return one.send_one(point.p, point.ns, point.wo, &point.bsdf.lobe),
         Extent::Area(_) | Extent::Point => {}
     }
     let Some(sample) = light.sample(k, l) else { return Moments::ZERO };
-    let (cos_i, cos_io) = (height * sample.inverse_distance, si.wo.dot(l) * sample.inverse_distance);
-    lobe.moments(cos_i, si.ns.dot(si.wo), cos_io, sample.weight)
+    let (cos_i, cos_io) = (height * sample.inverse_distance, point.wo.dot(l) * sample.inverse_distance);
+    point.bsdf.lobe.moments(cos_i, point.ns.dot(point.wo), cos_io, sample.weight)
 }

@@ -14,18 +14,17 @@ mod places;
 
 use std::ops::{ControlFlow, Range};
 
-use super::arrival::Arrivals;
 use super::cell::CELL;
-use super::change::Arrival;
 use super::counts::Counts;
 use super::cut::Cut;
+use super::direct::DirectLighting;
 use super::fence::Fence;
 use super::fragment::Fragments;
 use super::resolve::ScaledTerm;
 use crate::color::Rgb;
 use crate::image::Buffer;
 use crate::light::{LightTree, Sent};
-use crate::material::Lobe;
+use crate::material::{Lobe, Moments};
 use crate::math::{Vec3, square};
 use crate::scene::Scene;
 use crate::visibility::Outlook;
@@ -78,7 +77,9 @@ pub(super) struct Many<'a> {
 #[derive(Clone, Copy)]
 struct Single {
     light: u32,
-    arrival: Arrival,
+    moments: Moments,
+    /// How far the mean of its moments over the patch may be from those at the point.
+    bend: f32,
 }
 
 /// What arrives at one patch.
@@ -128,14 +129,14 @@ impl<'a> Many<'a> {
     pub fn light(
         &mut self,
         fragments: &Fragments,
-        arrivals: &mut Arrivals<'a>,
+        lights: &mut DirectLighting<'a>,
         counts: &mut Counts,
         go_on: &impl Fn() -> ControlFlow<()>,
         mut add: impl FnMut(usize, [&[ScaledTerm]; 2], f32),
     ) -> ControlFlow<()> {
         let patches = std::mem::take(&mut self.patches);
         let before = counts.work();
-        let looked = self.look(&patches, arrivals, counts, go_on);
+        let looked = self.look(&patches, lights, counts, go_on);
         if looked.is_continue() {
             let each = (counts.work() - before) / (CELL * CELL) as f32;
             let (mut terms, mut apart) = (Vec::new(), Vec::new());
@@ -144,7 +145,7 @@ impl<'a> Many<'a> {
                 let before = counts.work();
                 terms.clear();
                 let pixel = first..first + same.len();
-                self.finish(fragments, &patches, pixel, arrivals, counts, [&mut terms, &mut apart]);
+                self.finish(fragments, &patches, pixel, lights, counts, [&mut terms, &mut apart]);
                 add(same[0].fragment as usize, [&terms, &apart], each + counts.work() - before);
                 first += same.len();
             }
@@ -157,7 +158,7 @@ impl<'a> Many<'a> {
     fn look(
         &mut self,
         patches: &Patches,
-        arrivals: &mut Arrivals<'a>,
+        lights: &mut DirectLighting<'a>,
         counts: &mut Counts,
         go_on: &impl Fn() -> ControlFlow<()>,
     ) -> ControlFlow<()> {
@@ -183,7 +184,7 @@ impl<'a> Many<'a> {
                 }
             }
             for group in &groups {
-                self.block(&patches.all, group, 0, None, arrivals, counts);
+                self.block(&patches.all, group, 0, None, lights, counts);
             }
         }
         ControlFlow::Continue(())
@@ -204,20 +205,20 @@ impl<'a> Many<'a> {
 
     /// Adds what the nodes of one list send.
     fn add(&self, patch: &Patch, list: usize, stored: &mut Stored) {
-        let (si, lobe) = (&patch.si, &patch.bsdf.lobe);
+        let (point, lobe) = (&patch.point, &patch.point.bsdf.lobe);
         let range = &stored.lit[list];
         for entry in &self.lit[range.start as usize..range.end as usize] {
-            let sent = sent(self.scene, self.tree, *entry, si, lobe);
+            let sent = sent(self.scene, self.tree, *entry, point);
             let node = &self.tree.nodes[(entry & !ONE) as usize];
             stored.sent += sent;
-            if patch.reach > 0.0 {
-                let swing = patch.turn + patch.reach / node.distance(si.lit_from).max(patch.reach);
+            if point.reach > 0.0 {
+                let swing = point.turn + point.reach / node.distance(point.p).max(point.reach);
                 // No second derivative of what a far light sends is more, over the square of its distance and what it
                 // sends
                 let smooth = (swing * swing).min(1.0) * 3.0;
-                let weight = node.weight(si.lit_from);
-                let moved = swing + patch.turn;
-                let narrow = (lobe.sharpness(si.ns.dot(si.wo)) * square(moved)).min(1.0);
+                let weight = node.weight(point.p);
+                let moved = swing + point.turn;
+                let narrow = (lobe.sharpness(point.ns.dot(point.wo)) * square(moved)).min(1.0);
                 let specular = if matches!(lobe, Lobe::None) { 0.0 } else { (narrow + smooth).min(1.0) };
                 stored.bend += Sent::bounds(node.power * (weight * smooth), node.power * (weight * specular));
             }

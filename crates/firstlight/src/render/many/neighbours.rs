@@ -17,7 +17,7 @@ impl Patches {
             let mut normals = [Vec3::ZERO; 3];
             for ((sums, normal), place) in rows.iter_mut().zip(&mut normals).zip(self.three(patch, axis)?) {
                 let beside = self.whole[place as usize].filter(|beside| self.is_same(patch, *beside))?;
-                (*sums, *normal) = (arrived(beside)?, self.all[beside].si.ns);
+                (*sums, *normal) = (arrived(beside)?, self.all[beside].point.ns);
             }
             // Nor do they tell where an edge of the surface runs between
             let [before, here, after] = normals;
@@ -43,6 +43,6 @@ impl Patches {
     /// Whether another patch is of the same surface, so that one tells something of the other.
     fn is_same(&self, patch: &Patch, beside: usize) -> bool {
         let beside = &self.all[beside];
-        beside.bsdf.lobe == patch.bsdf.lobe && patch.holds(beside)
+        beside.point.bsdf.lobe == patch.point.bsdf.lobe && patch.holds(beside)
     }
 }

@@ -1,22 +1,16 @@
 //! What is lit together: a fragment, or one of its rays.
 
-use crate::material::Bsdf;
+use crate::material::ShadingPoint;
 use crate::render::cell::CELL;
 use crate::render::fragment::{Fragments, is_one_surface};
-use crate::render::light_queue::LitPlace;
+use crate::render::together::salt;
 use crate::scene::Scene;
-use crate::shape::SurfaceInteraction;
 
 /// A fragment of which one place may stand for all, or a ray of one that has no such place.
 #[derive(Clone, Copy)]
 pub(super) struct Patch {
-    /// Where it is lit.
-    pub si: SurfaceInteraction,
-    /// Its material; the colours are the mean over its rays.
-    pub bsdf: Bsdf,
-    /// How far it reaches from there, in metres, and how far its normal turns on the way, in radians.
-    pub reach: f32,
-    pub turn: f32,
+    /// Where it is lit, and its footprint; the colours of its material are the mean over its rays.
+    pub point: ShadingPoint,
     /// How many rays of its pixel see it, and whether all of them do.
     pub count: u32,
     pub is_whole: bool,
@@ -55,12 +49,9 @@ impl Patches {
 }
 
 impl Patch {
-    fn new(place: &LitPlace) -> Patch {
+    fn new(point: ShadingPoint) -> Patch {
         Patch {
-            si: place.surface(),
-            bsdf: place.bsdf,
-            reach: place.point.reach,
-            turn: place.point.turn,
+            point: ShadingPoint { share: 1.0, most_motion: f32::INFINITY, part_of_points: f32::INFINITY, ..point },
             count: 1,
             is_whole: false,
             pixel: 0,
@@ -80,16 +71,21 @@ impl Patch {
         let middle = of.middle.map(|place| Patch {
             count: of.count,
             is_whole: of.count == rays,
-            ..Patch::new(&fragments.places[place as usize])
+            ..Patch::new(fragments.places[place as usize])
         });
         let alone = if middle.is_some() { 0 } else { of.rays.len() };
-        let each = (0..alone).map(move |k| Patch::new(&fragments.place(scene, of, k)));
+        let each = (0..alone).map(move |k| Patch::new(fragments.place(scene, of, k)));
         middle.into_iter().chain(each).map(move |patch| Patch { pixel, fragment: fragment as u32, ..patch })
     }
 
     /// Where it is in the cell: column and row.
     pub fn at(&self) -> [u32; 2] {
         [self.pixel % CELL, self.pixel / CELL]
+    }
+
+    /// By what its samples differ from those of others.
+    pub fn salt(&self) -> u32 {
+        salt(self.at(), self.point.surface)
     }
 
     /// Which quarter of a block twice as wide as `half` it is in.
@@ -100,18 +96,17 @@ impl Patch {
 
     /// Whether another patch is of the same surface.
     pub fn holds(&self, other: &Patch) -> bool {
-        is_one_surface(&self.si, &other.si)
+        is_one_surface(&self.point, &other.point)
     }
 
     /// Calls `each` with what every ray of it sees.
-    pub fn for_each(&self, scene: &Scene, fragments: &Fragments, mut each: impl FnMut(&SurfaceInteraction, &Bsdf)) {
-        if self.reach == 0.0 && self.count == 1 {
-            return each(&self.si, &self.bsdf);
+    pub fn for_each(&self, scene: &Scene, fragments: &Fragments, mut each: impl FnMut(ShadingPoint)) {
+        if self.point.reach == 0.0 && self.count == 1 {
+            return each(self.point);
         }
         let of = &fragments.all[self.fragment as usize];
         for k in 0..of.rays.len() {
-            let place = fragments.place(scene, of, k);
-            each(&place.surface(), &place.bsdf);
+            each(fragments.place(scene, of, k));
         }
     }
 }

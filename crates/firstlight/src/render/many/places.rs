@@ -3,25 +3,24 @@
 use super::TONES;
 use super::patch::Patch;
 use crate::light::Zone;
-use crate::material::{Bsdf, Lobe};
+use crate::material::{Bsdf, Lobe, ShadingPoint};
 use crate::math::{Arc, Vec3};
 use crate::render::cut::Tone;
 use crate::scene::Scene;
-use crate::shape::SurfaceInteraction;
 use crate::visibility::Viewpoint;
 
 /// Whether two patches can be looked at together.
 pub(super) fn is_alike(a: &Patch, b: &Patch) -> bool {
-    a.si.surface == b.si.surface && a.bsdf.lobe == b.bsdf.lobe && a.si.ns.dot(b.si.ns) > 0.0
+    a.point.surface == b.point.surface && a.point.bsdf.lobe == b.point.bsdf.lobe && a.point.ns.dot(b.point.ns) > 0.0
 }
 
-pub(super) fn standing(patch: &Patch) -> (Viewpoint, f32, bool) {
-    (Viewpoint::of(&patch.si), patch.reach, patch.turn > 0.0)
+pub(super) fn standing(Patch { point, .. }: &Patch) -> (Viewpoint, f32, bool) {
+    (Viewpoint::of(point), point.reach, point.turn > 0.0)
 }
 
 /// The direction that the middle of a highlight comes from.
-pub(super) fn mirror(si: &SurfaceInteraction) -> Vec3 {
-    si.ns * (2.0 * si.ns.dot(si.wo)) - si.wo
+pub(super) fn mirror(ShadingPoint { ns, wo, .. }: &ShadingPoint) -> Vec3 {
+    *ns * (2.0 * ns.dot(*wo)) - *wo
 }
 
 /// The zone of some patches, of one surface and one highlight.
@@ -29,20 +28,21 @@ pub(super) fn zone<'p>(patches: impl Iterator<Item = &'p Patch> + Clone, eye: Ve
     let (mut low, mut high) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
     let (mut n, mut m, mut w) = (Vec3::ZERO, Vec3::ZERO, Vec3::ZERO);
     let mut lobe = Lobe::None;
-    for Patch { si, bsdf, .. } in patches.clone() {
-        (low, high) = (low.min(si.lit_from), high.max(si.lit_from));
-        (n, m, w) = (n + si.ns, m + mirror(si), w + si.wo);
-        lobe = bsdf.lobe;
+    for Patch { point, .. } in patches.clone() {
+        (low, high) = (low.min(point.p), high.max(point.p));
+        (n, m, w) = (n + point.ns, m + mirror(point), w + point.wo);
+        lobe = point.bsdf.lobe;
     }
     let center = low + (high - low) * 0.5;
     let (n, m, w) = (n.normalize_or(Vec3::Y), m.normalize_or(Vec3::Y), w.normalize_or(Vec3::Y));
     let (mut reach, mut turn, mut blur, mut wo_turn) = (0.0f32, 0.0f32, 0.0f32, 0.0f32);
-    for Patch { si, reach: around, turn: turns, .. } in patches {
-        let swing = around / (si.lit_from - eye).length().max(*around).max(f32::MIN_POSITIVE);
-        reach = reach.max((si.lit_from - center).length() + around);
-        turn = turn.max((si.ns - n).length().max((si.horizon - n).length()) + turns);
-        blur = blur.max((mirror(si) - m).length() + 2.0 * turns + swing);
-        wo_turn = wo_turn.max((si.wo - w).length() + swing);
+    for Patch { point, .. } in patches {
+        let ShadingPoint { reach: around, turn: turns, .. } = *point;
+        let swing = around / (point.p - eye).length().max(around).max(f32::MIN_POSITIVE);
+        reach = reach.max((point.p - center).length() + around);
+        turn = turn.max((point.ns - n).length().max((point.horizon - n).length()) + turns);
+        blur = blur.max((mirror(point) - m).length() + 2.0 * turns + swing);
+        wo_turn = wo_turn.max((point.wo - w).length() + swing);
     }
     Zone {
         center,
@@ -65,7 +65,7 @@ pub(super) fn tone(scene: &Scene, bsdf: &Bsdf) -> Tone {
 pub(super) fn tones<'p>(scene: &Scene, patches: impl Iterator<Item = &'p Patch>) -> Vec<Tone> {
     let mut tones: Vec<Tone> = Vec::with_capacity(TONES);
     for patch in patches {
-        let new = tone(scene, &patch.bsdf);
+        let new = tone(scene, &patch.point.bsdf);
         let same = |tone: &Tone| tone.known == new.known && tone.error == new.error && tone.base == new.base;
         if tones.iter().any(same) {
             continue;

@@ -1,0 +1,88 @@
+//! A point of a surface, as lights need it.
+
+use super::Bsdf;
+use crate::color::Rgb;
+use crate::ids::SurfaceId;
+use crate::math::{ErrorBound, Facet, Vec3};
+use crate::shape::SurfaceInteraction;
+
+/// A point of a surface to be lit: where it is, what it reflects, and the footprint that it represents. World space,
+/// metres; all directions are unit vectors.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct ShadingPoint {
+    /// Where light is gathered, and its error bound.
+    pub p: Vec3,
+    pub error: ErrorBound,
+    /// Light from below the plane with this normal does not count.
+    pub horizon: Vec3,
+    /// Geometric normal, on the viewer's side.
+    pub ng: Vec3,
+    /// The facet that the point lies on, or was lifted from: it casts no shadow on the point.
+    pub facet: Facet,
+    /// Shading normal.
+    pub ns: Vec3,
+    /// To the viewer.
+    pub wo: Vec3,
+    pub surface: SurfaceId,
+    /// Whether occluders take light away.
+    pub receives_shadow: bool,
+    /// The material; of a footprint over which colours vary, the brightest reflectances and the darkest ambient one.
+    pub bsdf: Bsdf,
+    /// A lower bound of the linear radiance towards the viewer beside the light at hand.
+    pub base: Rgb,
+    /// Radius of the footprint in metres, and by how many radians normals vary over it; 0 for a point alone.
+    pub reach: f32,
+    pub turn: f32,
+    /// The share of a pixel that the point represents.
+    pub share: f32,
+    /// How far silhouettes may move on the light over the footprint, as a part of the light's size: where they move
+    /// farther, and visibility is not proved, the integral is not computed.
+    pub most_motion: f32,
+    /// The part of the pixel's budget of light samples that the point has: the closed form is given up where it would
+    /// cost more. Infinite: it is never given up.
+    pub part_of_points: f32,
+}
+
+impl ShadingPoint {
+    /// A point alone that represents a pixel, with one normal `n` for all purposes, beside no other light.
+    pub fn new(p: Vec3, error: ErrorBound, n: Vec3, wo: Vec3, bsdf: &Bsdf) -> ShadingPoint {
+        ShadingPoint {
+            p,
+            error,
+            horizon: n,
+            ng: n,
+            facet: Facet::NONE,
+            ns: n,
+            wo,
+            surface: SurfaceId(0),
+            receives_shadow: true,
+            bsdf: *bsdf,
+            base: Rgb::BLACK,
+            reach: 0.0,
+            turn: 0.0,
+            share: 1.0,
+            most_motion: f32::INFINITY,
+            part_of_points: f32::INFINITY,
+        }
+    }
+
+    /// Where a ray meets a surface, under `ambient` light.
+    #[inline(always)]
+    pub fn of(si: &SurfaceInteraction, bsdf: &Bsdf, ambient: Rgb) -> ShadingPoint {
+        let SurfaceInteraction { lit_from, error, horizon, ng, facet, ns, wo, surface, receives_shadow, .. } = *si;
+        let base = ambient * bsdf.ambient;
+        let point = ShadingPoint::new(lit_from, error, ns, wo, bsdf);
+        ShadingPoint { horizon, ng, facet, surface, receives_shadow, base, ..point }
+    }
+
+    /// Whether the closed form is given up where it costs too much.
+    pub fn is_bounded(&self) -> bool {
+        self.part_of_points < f32::INFINITY
+    }
+
+    /// Where rays to lights start.
+    #[inline(always)]
+    pub fn shadow_start(&self) -> Vec3 {
+        self.error.offset(self.p, self.ng).as_vec3()
+    }
+}

@@ -1,0 +1,495 @@
+//! Direct light at shading points: each light is estimated for all points that need it together.
+//!
+//! Lights that are integrated are evaluated in batches of sixteen points ([`Evaluator`]), past the listed occluders and
+//! the few triangles that are gathered from the BVHs. Where more than that may occlude a light, the estimate is
+//! unknown, and callers sample the light ([`together`](super::together)).
+
+mod gather;
+mod sampled;
+mod single;
+
+use std::ops::ControlFlow;
+
+use fearless_simd::Level;
+
+use super::ladder::Asker;
+use super::lights::Lights;
+use super::tally::Tally;
+use super::{Counts, QUESTION_EVERY};
+use crate::color::{DisplaySteps, Rgb};
+use crate::ids::LightId;
+use crate::integrate::{Arrived, Asked, Emitter, Evaluator, Illumination, Obstacles, TOLERANCE};
+use crate::light::{Area, Extent, LightTree};
+use crate::material::{Lobe, Moments, ShadingPoint};
+use crate::scene::Scene;
+use crate::visibility::{OccluderList, Settler, ShadowView};
+pub(super) use sampled::Sampled;
+
+/// The most points that a sampled light is summed for between two calls of `go_on`.
+const AT_ONCE: u64 = 256;
+
+/// What may occlude a light, seen from a point and from all of its footprint.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) enum Occlusion {
+    /// Nothing is known.
+    #[default]
+    Unknown,
+    /// Listed shapes, and few triangles that were gathered from BVHs.
+    Gathered,
+    /// Listed shapes alone.
+    Listed,
+    /// Nothing.
+    None,
+}
+
+/// One light at one shading point.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct LightQuery {
+    /// The number of the point among those of the call.
+    pub point: u32,
+    pub light: u32,
+    pub occlusion: Occlusion,
+}
+
+/// What one light sends to a shading point, and how much that varies over the point's footprint.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct LightEstimate {
+    /// At the point; not a number where the light has to be sampled, or where it varies too much.
+    pub moments: Moments,
+    /// Whether all of the light, or nothing, is seen from all of the footprint.
+    pub is_uniform: bool,
+    /// How far silhouettes move on the light over the footprint, as a part of its size.
+    pub motion: f32,
+    /// By how many radians the light's direction, and the normal under it, turn over the footprint, times the square
+    /// root of the lobe's exponent; infinite near the light or its plane.
+    pub turn: f32,
+    /// About the largest moment the light can have here: its measure over the squared distance.
+    pub most: f32,
+    /// What is known by now of what may occlude it.
+    pub occlusion: Occlusion,
+}
+
+impl LightEstimate {
+    /// A light of which nothing arrives, anywhere on the footprint.
+    pub const NOTHING: LightEstimate = LightEstimate {
+        moments: Moments::ZERO,
+        is_uniform: true,
+        motion: 0.0,
+        turn: 0.0,
+        most: 0.0,
+        occlusion: Occlusion::Unknown,
+    };
+    /// A light that has to be sampled.
+    pub const UNKNOWN: LightEstimate = LightEstimate {
+        moments: Moments::UNKNOWN,
+        is_uniform: false,
+        motion: f32::INFINITY,
+        turn: f32::INFINITY,
+        most: 0.0,
+        occlusion: Occlusion::Unknown,
+    };
+
+    /// How far the mean over the footprint may be from the value at the point because the light turns, as a part of
+    /// [`most`](Self::most).
+    pub fn turned(&self) -> f32 {
+        0.5 * self.turn * self.turn
+    }
+
+    /// The same because the light comes out from behind a silhouette, or above the horizon: the visible fraction begins
+    /// to grow at once, over an eighth of the way that the silhouette or the light moves.
+    pub fn kink(&self) -> f32 {
+        let moved = if self.is_uniform { self.motion } else { self.motion.max(self.turn) };
+        if self.moments.cosine() > moved * self.most { 0.0 } else { 0.125 * moved }
+    }
+
+    /// How far the mean of a moment over the footprint may be from its value at the point.
+    pub fn bend(&self) -> f32 {
+        if self.turn == f32::INFINITY { f32::MAX } else { (self.turned() + self.kink()).min(1.0) * self.most }
+    }
+}
+
+/// Queries for one light at points of one lobe.
+struct Group<'p> {
+    light: usize,
+    lobe: Lobe,
+    points: &'p [ShadingPoint],
+    queries: &'p [LightQuery],
+}
+
+impl<'p> Group<'p> {
+    fn query(&self, k: u32) -> &'p LightQuery {
+        &self.queries[k as usize]
+    }
+
+    fn point(&self, k: u32) -> &'p ShadingPoint {
+        &self.points[self.query(k).point as usize]
+    }
+}
+
+/// Direct lighting by one thread. Keeps its memory.
+pub(crate) struct DirectLighting<'a> {
+    pub(super) scene: &'a Scene,
+    pub(super) lights: &'a Lights<'a>,
+    pub(super) level: Level,
+    pub(super) evaluator: Evaluator,
+    /// In display steps: how far one light may be wrong at a point.
+    allowed: f32,
+    lobes: Vec<Lobe>,
+    /// The numbers of queries, by lobe, light, and whether occluders count.
+    order: Vec<((usize, u32, bool), u32)>,
+    points: Vec<ShadingPoint>,
+    arrived: Vec<Arrived>,
+    /// Of a group: those whose light listed shapes alone may occlude.
+    listed: Vec<u32>,
+    /// What was gathered from BVHs for up to sixteen points.
+    near: Obstacles<'a>,
+    pub(super) occluders: OccluderList,
+    pub(super) settler: Settler,
+    indices: Vec<u32>,
+    /// Views and tallies that are not used any more.
+    views: Vec<ShadowView>,
+    tallies: Vec<Tally>,
+}
+
+impl<'a> DirectLighting<'a> {
+    pub fn new(scene: &'a Scene, lights: &'a Lights<'a>, level: Level) -> Self {
+        DirectLighting {
+            scene,
+            lights,
+            level,
+            evaluator: Evaluator::default(),
+            allowed: lights.allowed,
+            lobes: Vec::new(),
+            order: Vec::new(),
+            points: Vec::new(),
+            arrived: Vec::new(),
+            listed: Vec::new(),
+            near: Obstacles::default(),
+            occluders: OccluderList::default(),
+            settler: Settler::default(),
+            indices: Vec::new(),
+            views: Vec::new(),
+            tallies: Vec::new(),
+        }
+    }
+
+    /// The tree of all lights, where there are many.
+    pub fn tree(&self) -> Option<&'a LightTree> {
+        self.lights.tree.as_ref()
+    }
+
+    /// The instruction set.
+    pub fn level(&self) -> Level {
+        self.level
+    }
+
+    /// How errors show.
+    pub fn display_steps(&self) -> &'a DisplaySteps {
+        &self.lights.steps
+    }
+
+    /// Sets how many display steps each light may be wrong by from now on.
+    pub fn tolerate(&mut self, allowed: f32) {
+        self.allowed = allowed;
+    }
+
+    /// How many display steps a value can be off by an error.
+    pub fn steps(&self, value: Rgb, error: Rgb) -> f32 {
+        self.lights.steps.of_color(value, error)
+    }
+
+    /// What the moments of light `index` are multiplied with, before the colours of the surface.
+    pub fn scale(&self, index: usize) -> Rgb {
+        self.lights.scales[index]
+    }
+
+    /// The same of all lights.
+    pub fn scales(&self) -> &'a [Rgb] {
+        &self.lights.scales
+    }
+
+    /// What all points of light `index` together stand for.
+    pub fn measure(&self, index: usize) -> f32 {
+        self.scene.lights[index].area().map_or(1.0, Area::stands_for)
+    }
+
+    /// Whether a light is integrated.
+    pub fn is_integrated(&self, index: usize) -> bool {
+        self.scene.lights[index].is_integrated()
+    }
+
+    /// Whether a light is integrated and can be occluded: then it is sampled behind what is in BVHs.
+    pub fn is_behind(&self, index: usize) -> bool {
+        self.is_integrated(index) && self.scene.lights[index].shadows
+    }
+
+    /// Whether the occlusion of light `index` is to be found for all rays of a block of pixels together: not of area
+    /// lights that are sampled at fixed points.
+    pub fn is_classified_by_blocks(&self, index: usize) -> bool {
+        match self.scene.lights[index].extent() {
+            Extent::Area(_) => self.is_integrated(index),
+            Extent::Point => true,
+        }
+    }
+
+    /// In display steps: how far one light may be wrong at a point that represents such a share of a pixel, where the
+    /// errors of neighbours are as good as independent.
+    pub fn tolerance_by_chance(&self, share: f32) -> f32 {
+        self.allowed * TOLERANCE.by_chance / share.max(TOLERANCE.least_share).sqrt()
+    }
+
+    /// Whether a light illuminates the surface of a point.
+    pub(super) fn is_linked(&self, index: usize, point: &ShadingPoint) -> bool {
+        let geometry = &self.scene.geometry;
+        geometry.links.contains(geometry.lights_of(point.surface), LightId(index as u32))
+    }
+
+    /// Whether what light `index` sends to a point varies over no less than `apart` metres, on the light.
+    pub fn varies_over(&self, index: usize, point: &ShadingPoint, apart: f32) -> bool {
+        self.lights.emitters[index].as_ref().is_some_and(|emitter| emitter.nearest(point) >= apart)
+    }
+
+    /// Estimates one light at one point.
+    pub fn estimate_one(
+        &mut self,
+        light: usize,
+        point: &ShadingPoint,
+        occlusion: Occlusion,
+        counts: &mut Counts,
+    ) -> LightEstimate {
+        self.estimate_each(light, std::slice::from_ref(point), |_| occlusion, counts)[0]
+    }
+
+    /// Estimates one light at each point.
+    pub fn estimate_each(
+        &mut self,
+        light: usize,
+        points: &[ShadingPoint],
+        occlusion: impl Fn(usize) -> Occlusion,
+        counts: &mut Counts,
+    ) -> Vec<LightEstimate> {
+        let query = |k| LightQuery { point: k as u32, light: light as u32, occlusion: occlusion(k) };
+        let queries: Vec<LightQuery> = (0..points.len()).map(query).collect();
+        let mut estimates = Vec::with_capacity(points.len());
+        self.estimate_all(points, &queries, &mut estimates, counts);
+        estimates
+    }
+
+    /// Estimates each query, without a break.
+    pub fn estimate_all(
+        &mut self,
+        points: &[ShadingPoint],
+        queries: &[LightQuery],
+        estimates: &mut Vec<LightEstimate>,
+        counts: &mut Counts,
+    ) {
+        let go_on = || ControlFlow::Continue(());
+        let ControlFlow::Continue(()) = self.estimate(points, queries, estimates, counts, &go_on) else {
+            unreachable!("it always goes on")
+        };
+    }
+
+    /// Estimates each query, in place of what was in `estimates`. `go_on` is called now and then.
+    pub fn estimate(
+        &mut self,
+        points: &[ShadingPoint],
+        queries: &[LightQuery],
+        estimates: &mut Vec<LightEstimate>,
+        counts: &mut Counts,
+        go_on: &dyn Fn() -> ControlFlow<()>,
+    ) -> ControlFlow<()> {
+        let scene = self.scene;
+        estimates.clear();
+        estimates.resize(queries.len(), LightEstimate::NOTHING);
+        // Sort them by lobe, light and shadows
+        let mut order = std::mem::take(&mut self.order);
+        self.lobes.clear();
+        order.clear();
+        for (k, query) in queries.iter().enumerate() {
+            let point = &points[query.point as usize];
+            if !self.is_linked(query.light as usize, point) {
+                continue;
+            }
+            let lobe = self.lobes.iter().position(|lobe| *lobe == point.bsdf.lobe).unwrap_or_else(|| {
+                self.lobes.push(point.bsdf.lobe);
+                self.lobes.len() - 1
+            });
+            let shadows = scene.lights[query.light as usize].shadows
+                && point.receives_shadow
+                && query.occlusion != Occlusion::None;
+            order.push(((lobe, query.light, shadows), k as u32));
+        }
+        order.sort_unstable();
+        let mut members = Vec::new();
+        for group in order.chunk_by(|(one, _), (other, _)| one == other) {
+            let ((lobe, light, shadows), _) = group[0];
+            let light = light as usize;
+            members.clear();
+            members.extend(group.iter().map(|(_, k)| *k));
+            let of = Group { light, lobe: self.lobes[lobe], points, queries };
+            match scene.lights[light].extent() {
+                Extent::Point => {
+                    for k in &members {
+                        estimates[*k as usize] = self.single(&of, *k, counts);
+                    }
+                    go_on()?;
+                }
+                Extent::Area(_) if self.is_integrated(light) => {
+                    self.evaluate(&of, shadows, &members, estimates, counts, go_on)?;
+                }
+                Extent::Area(area) => {
+                    let varying: Vec<u32> = members.iter().copied().filter(|k| of.point(*k).reach > 0.0).collect();
+                    self.evaluate(&of, shadows, &varying, estimates, counts, go_on)?;
+                    let at_once = (QUESTION_EVERY / area.samples() as u64).clamp(1, AT_ONCE) as usize;
+                    for some in members.chunks(at_once) {
+                        go_on()?;
+                        self.add_samples(&of, area, some, estimates, counts);
+                    }
+                }
+            }
+        }
+        self.order = order;
+        ControlFlow::Continue(())
+    }
+
+    /// Evaluates an area light at some points of a group, past what may occlude it: what it sends if it is integrated,
+    /// and how it varies over the footprints.
+    fn evaluate(
+        &mut self,
+        of: &Group,
+        shadows: bool,
+        members: &[u32],
+        estimates: &mut [LightEstimate],
+        counts: &mut Counts,
+        go_on: &dyn Fn() -> ControlFlow<()>,
+    ) -> ControlFlow<()> {
+        if shadows && self.lights.has_trees(self.scene, of.light) {
+            return self.past_trees(of, members, estimates, counts, go_on);
+        }
+        let occlusion = if shadows { Occlusion::Listed } else { Occlusion::None };
+        self.batch(of, occlusion, members, estimates, counts);
+        ControlFlow::Continue(())
+    }
+
+    /// The same past what is in BVHs, which is gathered for each point, and for consecutive points of one surface
+    /// together. Where that is too much, the estimate is unknown.
+    fn past_trees(
+        &mut self,
+        of: &Group,
+        members: &[u32],
+        estimates: &mut [LightEstimate],
+        counts: &mut Counts,
+        go_on: &dyn Fn() -> ControlFlow<()>,
+    ) -> ControlFlow<()> {
+        let mut listed = std::mem::take(&mut self.listed);
+        listed.clear();
+        let mut rest = members;
+        while let Some(first) = rest.first().copied() {
+            if of.query(first).occlusion == Occlusion::Listed {
+                listed.push(first);
+                rest = &rest[1..];
+                continue;
+            }
+            go_on()?;
+            let (occlusion, run) = self.gather_run(of, rest);
+            let (now, later) = rest.split_at(run);
+            match occlusion {
+                Occlusion::Listed | Occlusion::None => listed.extend(now),
+                Occlusion::Gathered => self.batch(of, Occlusion::Gathered, now, estimates, counts),
+                Occlusion::Unknown => self.unknown(of, first, estimates),
+            }
+            rest = later;
+        }
+        self.batch(of, Occlusion::Listed, &listed, estimates, counts);
+        self.listed = listed;
+        ControlFlow::Continue(())
+    }
+
+    /// The same for up to any number of points, past what is known to occlude the light.
+    fn batch(
+        &mut self,
+        of: &Group,
+        occlusion: Occlusion,
+        members: &[u32],
+        estimates: &mut [LightEstimate],
+        counts: &mut Counts,
+    ) {
+        let sums = self.is_integrated(of.light);
+        self.arrive(of, occlusion, sums, members);
+        let known = if occlusion == Occlusion::Gathered { Occlusion::Unknown } else { occlusion };
+        for (arrived, k) in self.arrived.iter().zip(members) {
+            if sums {
+                counts.note(arrived.illumination);
+            }
+            estimates[*k as usize] = LightEstimate { occlusion: known, ..self.variation(of, *k, arrived) };
+        }
+    }
+
+    /// Notes that a light has to be sampled at a point. If its value is wanted whatever silhouettes do over the
+    /// footprint, so is a bound of what it can send.
+    fn unknown(&mut self, of: &Group, k: u32, estimates: &mut [LightEstimate]) {
+        let point = of.point(k);
+        estimates[k as usize] = LightEstimate::UNKNOWN;
+        if point.reach > 0.0 && point.most_motion == f32::INFINITY {
+            self.arrive(of, Occlusion::None, false, &[k]);
+            let LightEstimate { turn, most, .. } = self.variation(of, k, &self.arrived[0]);
+            estimates[k as usize] = LightEstimate { turn, most, ..LightEstimate::UNKNOWN };
+        }
+    }
+
+    /// Evaluates an area light at some points of a group: its sums only if they are wanted.
+    fn arrive(&mut self, of: &Group, occlusion: Occlusion, sums: bool, members: &[u32]) {
+        self.points.clear();
+        self.points.extend(members.iter().map(|k| *of.point(*k)));
+        self.arrived.clear();
+        let near = (occlusion == Occlusion::Gathered).then_some(&self.near);
+        let shadows = occlusion != Occlusion::None;
+        let Some(asked) = self.lights.asked(of.light, &of.lobe, shadows) else { unreachable!("it has an area") };
+        let asked = Asked { near, sums, allowed: self.allowed, ..asked };
+        self.evaluator.evaluate(self.level, &asked, &self.points, &mut self.arrived);
+    }
+
+    /// What a light sends to a point, and how it varies over the footprint.
+    fn variation(&self, of: &Group, k: u32, arrived: &Arrived) -> LightEstimate {
+        let Arrived { sums, illumination, proved, motion, distance, height } = *arrived;
+        let (light, point) = (&self.scene.lights[of.light], of.point(k));
+        let is_physical = light.area().is_some_and(|area| area.physical);
+        let most = if is_physical { self.measure(of.light) / (distance * distance) } else { 1.0 };
+        if illumination == Illumination::Unknown {
+            return LightEstimate { most, ..LightEstimate::UNKNOWN };
+        }
+        let is_one_sided = self.lights.emitters[of.light].as_ref().is_some_and(Emitter::is_one_sided);
+        let is_near = is_one_sided && height <= point.reach;
+        let turn = if is_near && !proved { f32::INFINITY } else { self.turn(point, distance) };
+        LightEstimate { moments: sums, is_uniform: proved, motion, turn, most, occlusion: Occlusion::Unknown }
+    }
+
+    /// Area light `index`, as its points are asked for.
+    pub fn asker(&self, index: usize) -> Asker<'a> {
+        let (scene, level) = (self.scene, self.level);
+        let area = scene.lights[index].area().expect("lights that are integrated have an area");
+        let (target, ladder) = (&self.lights.targets[index], &self.lights.ladders[index]);
+        Asker { scene, level, area, target, ladder }
+    }
+
+    /// An empty tally.
+    pub fn tally(&mut self) -> Tally {
+        self.tallies.pop().unwrap_or_default()
+    }
+
+    /// Takes a tally back, for its memory.
+    pub fn keep_tally(&mut self, tally: Tally) {
+        self.tallies.push(tally);
+    }
+
+    /// By how many radians directions turn over the footprint of a point, times how narrow its lobe is.
+    pub(super) fn turn(&self, point: &ShadingPoint, distance: f32) -> f32 {
+        if point.reach == 0.0 {
+            return 0.0;
+        }
+        let sway = self.scene.camera.sway(point.p, point.reach);
+        let angle = point.turn + 0.5 * (point.reach / distance + sway);
+        // As the exponent of Blinn's model
+        angle * (8.0 * point.bsdf.lobe.sharpness(1.0)).max(1.0).sqrt()
+    }
+}

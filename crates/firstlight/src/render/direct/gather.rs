@@ -1,0 +1,200 @@
+//! What of the BVHs may occlude a light, seen from points: gathered in the shaft between them.
+
+use arrayvec::ArrayVec;
+
+use super::{DirectLighting, Group, Occlusion};
+use crate::accel::Aabb;
+use crate::ids::LightId;
+use crate::material::ShadingPoint;
+use crate::math::{DVec3, Facet, LANES};
+use crate::render::Counts;
+use crate::scene::Scene;
+use crate::visibility::{ShadowMesh, ShadowView, Shaft, Target, Viewpoint, Visibility};
+
+/// The most triangles that a light is evaluated past, seen from one ray.
+const FEW_TRIANGLES: usize = 6;
+/// The most leaves of triangles whose triangles are tested one by one.
+const LEAVES: usize = 12;
+
+impl DirectLighting<'_> {
+    /// Gathers what of the BVHs may occlude a light for the first of some queries, and for those after it that are for
+    /// points of one surface; and says for how many that was done.
+    pub(super) fn gather_run(&mut self, of: &Group, members: &[u32]) -> (Occlusion, usize) {
+        let first = of.point(members[0]);
+        let is_like = |k: &&u32| {
+            let point = of.point(**k);
+            first.reach + point.reach == 0.0
+                && point.surface == first.surface
+                && of.query(**k).occlusion == Occlusion::Unknown
+        };
+        let mut run = 1 + members[1..].iter().take(LANES - 1).take_while(is_like).count();
+        loop {
+            let points: ArrayVec<Viewpoint, LANES> =
+                members[..run].iter().map(|k| Viewpoint::of(of.point(*k))).collect();
+            let occlusion = self.gather(of.light, &points, first);
+            if run == 1 || occlusion != Occlusion::Unknown {
+                return (occlusion, run);
+            }
+            run /= 2;
+        }
+    }
+
+    /// Gathers what of the BVHs may occlude a light: from one point and its footprint; or from several points.
+    fn gather(
+        &mut self,
+        index: usize,
+        points: &[Viewpoint],
+        ShadingPoint { reach, turn, .. }: &ShadingPoint,
+    ) -> Occlusion {
+        let (scene, lights, reach, turn) = (self.scene, self.lights, *reach, *turn);
+        if !lights.has_trees(scene, index) {
+            return Occlusion::Listed;
+        }
+        let (target, trees) = (&lights.targets[index], &mut self.occluders);
+        match points {
+            [point] => {
+                trees.gather_around(self.level, scene, target, point, reach, turn > 0.0, LEAVES);
+                trees.others.retain(|thing| !is_beside(scene, target, point, reach, turn, *thing));
+                // What does not rise over the one horizon of a flat footprint occludes nothing
+                if reach > 0.0 && turn == 0.0 && point.but != Facet::NONE {
+                    trees.leaves.retain(|(source, leaf)| rises(scene, point, *source, *leaf));
+                }
+            }
+            points => {
+                self.indices.clear();
+                self.indices.extend(0..points.len() as u32);
+                let shaft = Shaft::of(points, &self.indices, &target.hull);
+                trees.gather_in(self.level, scene, target, &shaft, points, &self.indices, LEAVES);
+            }
+        }
+        let is_known = lights.know(index, trees.others.iter().copied());
+        if is_known && !trees.has_meshes() {
+            Occlusion::Listed
+        } else if is_known
+            && !trees.too_many
+            && let Some(emitter) = &lights.emitters[index]
+            && self.near.gather(scene, target.light, emitter, trees, lights.obstacles[index].occluders.len())
+        {
+            Occlusion::Gathered
+        } else {
+            Occlusion::Unknown
+        }
+    }
+
+    /// Whether a light of one point is occluded by nothing in the BVHs, from all of a footprint.
+    pub(super) fn is_unoccluded_by_trees(&mut self, index: usize, point: &ShadingPoint) -> bool {
+        self.gather(index, &[Viewpoint::of(point)], point) == Occlusion::Listed
+    }
+
+    /// What may occlude light `index` from all of some points together, by one shaft.
+    pub fn gather_for(&mut self, index: usize, points: &[Viewpoint], counts: &mut Counts) -> Occlusion {
+        self.indices.clear();
+        self.indices.extend(0..points.len() as u32);
+        let occluders = &mut self.occluders;
+        occluders.gather(self.level, self.scene, &self.lights.targets[index], points, &self.indices, 0);
+        counts.settled.shafts += 1;
+        let is_known = || self.lights.know(index, occluders.others.iter().copied()) && !occluders.has_meshes();
+        if occluders.has_trees() && !is_known() {
+            Occlusion::Unknown
+        } else if occluders.count() > 0 {
+            Occlusion::Listed
+        } else {
+            Occlusion::None
+        }
+    }
+
+    /// Classifies the visibility of light `index` from each of those `points` whose numbers are in `order`. `each` gets
+    /// the point's number, its visibility, and a function that says what occludes a light that is seen in part, with
+    /// the view that it is sampled by where that is unknown.
+    pub fn classify(
+        &mut self,
+        index: usize,
+        points: &[Viewpoint],
+        order: &mut [u32],
+        counts: &mut Counts,
+        mut each: impl FnMut(usize, Visibility, &mut dyn FnMut() -> (Occlusion, Option<ShadowView>)),
+    ) {
+        let (lights, views) = (self.lights, &mut self.views);
+        let (target, listed) = (&lights.targets[index], self.scene.geometry.listed);
+        let settled = &mut counts.settled;
+        self.settler.settle(self.level, self.scene, target, points, order, settled, |k, visibility, view| {
+            each(k, visibility, &mut || {
+                let is_listed = listed || view.spheres.is_empty() && view.flats.is_empty();
+                if view.trees
+                    || !lights.know(index, view.others.iter().map(|(thing, _)| *thing))
+                    || view.triangles.len() > FEW_TRIANGLES
+                {
+                    (Occlusion::Unknown, Some(std::mem::replace(view, views.pop().unwrap_or_default())))
+                } else if is_listed && view.triangles.is_empty() {
+                    (Occlusion::Listed, None)
+                } else {
+                    (Occlusion::Gathered, None)
+                }
+            });
+        });
+    }
+
+    /// What may occlude light `index`, seen from one point; `None` if it is not visible.
+    pub fn classify_one(&mut self, index: usize, point: &ShadingPoint, counts: &mut Counts) -> Option<ShadowView> {
+        let mut kept = self.views.pop().unwrap_or_default();
+        if !(self.scene.lights[index].shadows && point.receives_shadow) {
+            kept.clear();
+            return Some(kept);
+        }
+        let mut found = None;
+        let (target, points) = (&self.lights.targets[index], [Viewpoint::of(point)]);
+        let settled = &mut counts.settled;
+        self.settler.settle(self.level, self.scene, target, &points, &mut [0], settled, |_, visibility, view| {
+            found = Some(visibility);
+            std::mem::swap(&mut kept, view);
+        });
+        match found {
+            Some(Visibility::Hidden | Visibility::BelowHorizon) | None => {
+                self.views.push(kept);
+                None
+            }
+            Some(Visibility::Lit | Visibility::Mask) => Some(kept),
+        }
+    }
+
+    /// Takes a view back, for its memory.
+    pub fn keep(&mut self, view: ShadowView) {
+        self.views.push(view);
+    }
+}
+
+/// Whether something placed is a plane that has a light and all within `reach` of a place on one side, or that the
+/// place lies on, if its normal does not turn.
+fn is_beside(scene: &Scene, target: &Target, place: &Viewpoint, reach: f32, turn: f32, thing: u32) -> bool {
+    if !scene.geometry.is_plane(thing) {
+        return false;
+    }
+    let (thing, plane) = scene.geometry.plane(thing);
+    let (p, n) = plane.place();
+    let (p, n) = (thing.placement.world_from_object.transform_point3(p), thing.placement.normal(n).normalize_or_zero());
+    let height = n.dot(place.p.as_dvec3() - p);
+    let (room, n) = (n.abs().dot(place.error.0.as_dvec3()), n * height.signum());
+    if height.abs() <= room {
+        return turn == 0.0 && n.cross(place.horizon.as_dvec3()).length() < 1e-6;
+    }
+    let beside = if target.hull.finite {
+        let Aabb { min, max } = target.hull.bounds();
+        n.max(DVec3::ZERO).dot(min.as_dvec3() - p) + n.min(DVec3::ZERO).dot(max.as_dvec3() - p)
+    } else {
+        n.dot(target.hull.center.as_dvec3())
+    };
+    height.abs() > f64::from(reach) + room && beside >= 0.0
+}
+
+/// Whether anything in a leaf of a mesh rises over the horizon of a flat place.
+fn rises(scene: &Scene, place: &Viewpoint, source: u32, leaf: u32) -> bool {
+    let Some(mesh) = ShadowMesh::of(&scene.geometry, source, LightId(0)) else { return true };
+    mesh.mesh.tree.leaf(leaf).any(|(_, corners)| {
+        corners.iter().any(|q| {
+            let q = mesh.placement.map_or(q.as_dvec3(), |at| at.world_from_object.transform_point3(q.as_dvec3()));
+            let way = q - place.p.as_dvec3();
+            let room = way.abs().max_element() * 1e-6 + f64::from(place.error.0.max_element());
+            place.horizon.as_dvec3().dot(way) > room
+        })
+    })
+}

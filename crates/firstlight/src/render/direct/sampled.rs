@@ -1,0 +1,145 @@
+//! Lights that are sampled at fixed points: their visibility by shafts, and the sums over their samples, which are
+//! those of [`Lanes`](crate::render::lanes::Lanes), in the same order.
+
+use fearless_simd::Level;
+
+use super::{DirectLighting, Group, LightEstimate};
+use crate::light::{Area, Extent, Light};
+use crate::material::{Moments, ShadingPoint};
+use crate::render::Counts;
+use crate::render::lanes::{PointObstacles, sum_area};
+use crate::render::pixel::{Lighting, LobeSums};
+use crate::render::plain::Plain;
+use crate::scene::Scene;
+use crate::visibility::{Settler, ShadowView, Target, Viewpoint, Visibility};
+
+/// The shadows of a light of fewer samples than this show by themselves.
+const FEW_SAMPLES: usize = 256;
+
+/// A light, and how shafts lead to it.
+pub(crate) struct Sampled<'a> {
+    scene: &'a Scene,
+    level: Level,
+    index: usize,
+    target: &'a Target,
+}
+
+impl<'a> Sampled<'a> {
+    /// Light `index`; `targets` has one for each light.
+    pub fn new(scene: &'a Scene, level: Level, index: usize, targets: &'a [Target]) -> Self {
+        Sampled { scene, level, index, target: &targets[index] }
+    }
+
+    fn light(&self) -> &'a Light {
+        &self.scene.lights[self.index]
+    }
+
+    /// How many points it has.
+    pub fn samples(&self) -> u64 {
+        self.light().samples() as u64
+    }
+
+    /// Whether something may shadow a surface from it.
+    pub fn is_shadowed(&self, point: &ShadingPoint) -> bool {
+        self.light().shadows && point.receives_shadow
+    }
+
+    /// What it sends to a point that nothing shadows.
+    pub fn unshadowed(&self, point: &ShadingPoint, counts: &mut Counts) -> Moments {
+        counts.shadow_rays += self.samples();
+        counts.shadow_rays_skipped += self.samples();
+        self.lit(point)
+    }
+
+    /// Hears what of it is seen from those `points` whose numbers are in `part`; see [`Settler::settle`].
+    pub fn settle(
+        &self,
+        settler: &mut Settler,
+        points: &[Viewpoint],
+        part: &mut [u32],
+        counts: &mut Counts,
+        each: impl FnMut(usize, Visibility, &mut ShadowView),
+    ) {
+        let all = self.samples() * part.len() as u64;
+        let settled = &mut counts.settled;
+        let before = *settled;
+        settler.settle(self.level, self.scene, self.target, points, part, settled, each);
+        // Cut by shapes of the lists, which are asked for every sample, or by what is in the trees
+        let cut = settled.visibility[Visibility::Mask as usize] - before.visibility[Visibility::Mask as usize];
+        let traced = settled.traced - before.traced;
+        let asked = if self.scene.geometry.has_trees() { traced } else { self.samples() * cut };
+        counts.shadow_rays += all;
+        counts.shadow_rays_skipped += all - asked;
+    }
+
+    /// What it sends to a point that sees so much of it.
+    #[inline(always)]
+    pub fn sent(&self, point: &ShadingPoint, visibility: Visibility, view: &ShadowView) -> Moments {
+        match visibility {
+            Visibility::Hidden | Visibility::BelowHorizon => Moments::ZERO,
+            Visibility::Lit => self.lit(point),
+            Visibility::Mask => self.masked(point, view),
+        }
+    }
+
+    /// Where nothing hides any of it.
+    #[inline(always)]
+    fn lit(&self, point: &ShadingPoint) -> Moments {
+        totals(match self.light().extent() {
+            Extent::Area(area) => sum_area(self.level, area, point, &PointObstacles::default()),
+            Extent::Point => {
+                let unshadowed = ShadingPoint { receives_shadow: false, ..*point };
+                Plain.gather(self.scene, self.index, &unshadowed, &mut Counts::default())
+            }
+        })
+    }
+
+    /// Past what is in `view`.
+    #[inline(always)]
+    fn masked(&self, point: &ShadingPoint, view: &ShadowView) -> Moments {
+        totals(match self.light().extent() {
+            Extent::Area(area) => sum_area(self.level, area, point, &PointObstacles::of(view)),
+            Extent::Point => Plain.gather(self.scene, self.index, point, &mut Counts::default()),
+        })
+    }
+}
+
+impl DirectLighting<'_> {
+    /// Sums the samples of an area light at some points of a group, for which its variation over their footprints is
+    /// estimated; where that is unknown, only if the value is wanted all the same.
+    pub(super) fn add_samples(
+        &mut self,
+        of: &Group,
+        area: &Area,
+        members: &[u32],
+        estimates: &mut [LightEstimate],
+        counts: &mut Counts,
+    ) {
+        let light = Sampled::new(self.scene, self.level, of.light, &self.lights.targets);
+        let points: Vec<Viewpoint> = members.iter().map(|k| Viewpoint::of(of.point(*k))).collect();
+        let mut order = Vec::with_capacity(members.len());
+        for (number, k) in members.iter().enumerate() {
+            let (point, estimate) = (of.point(*k), &mut estimates[*k as usize]);
+            // Each of a fixed set of samples casts a hard shadow, which shows where they are few
+            if area.samples() < FEW_SAMPLES && estimate.motion > 0.0 {
+                *estimate = LightEstimate { occlusion: estimate.occlusion, ..LightEstimate::UNKNOWN };
+            }
+            estimate.most *= area.samples() as f32 / area.stands_for();
+            if estimate.turn == f32::INFINITY && point.most_motion < f32::INFINITY {
+                estimate.moments = Moments::UNKNOWN;
+            } else if light.is_shadowed(point) {
+                order.push(number as u32);
+            } else {
+                estimate.moments = light.unshadowed(point, counts);
+            }
+        }
+        light.settle(&mut self.settler, &points, &mut order, counts, |number, visibility, view| {
+            let k = members[number];
+            estimates[k as usize].moments = light.sent(of.point(k), visibility, view);
+        });
+    }
+}
+
+fn totals(sums: LobeSums) -> Moments {
+    sums.total()
+}

@@ -1,0 +1,142 @@
+//! Lights of one point.
+
+use super::{DirectLighting, Group, LightEstimate, Occlusion};
+use crate::ids::LightId;
+use crate::light::{Light, LightKind};
+use crate::material::{Moments, ShadingPoint};
+use crate::math::Vec3;
+use crate::render::Counts;
+use crate::render::pixel::Lighting;
+use crate::render::plain::Plain;
+use crate::scene::Listed;
+use crate::shape::PlaneSide;
+
+impl DirectLighting<'_> {
+    /// Estimates a light of one point.
+    pub(super) fn single(&mut self, of: &Group, k: u32, counts: &mut Counts) -> LightEstimate {
+        let (light, point, occlusion) = (&self.scene.lights[of.light], of.point(k), of.query(k).occlusion);
+        let moments = self.of_single(of.light, point, occlusion);
+        counts.points += u64::from(occlusion != Occlusion::None);
+        let alone = LightEstimate { moments, occlusion, ..LightEstimate::NOTHING };
+        if point.reach == 0.0 {
+            return alone;
+        }
+        let to = light.towards(0, point.p);
+        let height = point.ns.dot(to.l).min(point.horizon.dot(to.l));
+        // How far the horizon and the light may move against each other over the footprint
+        let room = point.reach + point.turn * to.l.length();
+        if height < -room {
+            return alone;
+        }
+        let Some(sample) = light.sample(0, to.l) else {
+            return LightEstimate { moments, occlusion, ..LightEstimate::UNKNOWN };
+        };
+        let distance = if to.finite { to.l.length() } else { f32::INFINITY };
+        let casts = light.shadows && point.receives_shadow && occlusion != Occlusion::None;
+        let is_crossed = casts && self.may_cross_shadow(of.light, to.l, to.finite, point, occlusion);
+        // The light sets at once, and a spot's cone ends at once
+        let rim = if height < room { f32::INFINITY } else { self.rim_turn(light, point, to.l) };
+        let turn = self.turn(point, distance).max(rim);
+        LightEstimate {
+            moments,
+            is_uniform: !is_crossed && turn < f32::INFINITY,
+            motion: if is_crossed { f32::INFINITY } else { 0.0 },
+            turn,
+            most: sample.weight.max(moments.cosine()),
+            occlusion,
+        }
+    }
+
+    /// What a light of one point sends.
+    pub(super) fn of_single(&self, index: usize, point: &ShadingPoint, occlusion: Occlusion) -> Moments {
+        let receives_shadow = point.receives_shadow && occlusion != Occlusion::None;
+        let point = ShadingPoint { receives_shadow, ..*point };
+        Plain.gather(self.scene, index, &point, &mut Counts::default()).total()
+    }
+
+    /// The turn of the light over the footprint that makes as much as the fading of a spot's cone; infinite where its
+    /// rim may cross.
+    fn rim_turn(&self, light: &Light, point: &ShadingPoint, l: Vec3) -> f32 {
+        let LightKind::Spot(spot) = &light.kind else { return 0.0 };
+        let near = (l.length() - point.reach).max(0.0);
+        let swing = 2.0 * point.reach / near.max(f32::MIN_POSITIVE);
+        let cos = 1.0 - (-l).normalize_or_zero().dot(spot.axis);
+        if (cos - spot.outer).abs() < 2.0 * swing {
+            return f32::INFINITY;
+        }
+        swing * (2.0 * spot.inverse_fade.min(1e6)).sqrt()
+    }
+
+    /// Whether the edge of a shadow, of a light of one point, may cross the footprint.
+    fn may_cross_shadow(
+        &mut self,
+        light: usize,
+        l: Vec3,
+        finite: bool,
+        point: &ShadingPoint,
+        occlusion: Occlusion,
+    ) -> bool {
+        let scene = self.scene;
+        let listed = &scene.occluders;
+        if !listed.disks.is_empty() || occlusion != Occlusion::Listed && !self.is_unoccluded_by_trees(light, point) {
+            return true;
+        }
+        let length = l.length();
+        let d = l / length;
+        let end = if finite { length } else { f32::INFINITY };
+        let id = LightId(light as u32);
+        for (_, Listed { shape: sphere, .. }) in scene.that_stop(&listed.spheres, id) {
+            let s = (sphere.c - point.p.as_dvec3()).as_vec3();
+            let (r, distance) = (sphere.r as f32, s.length());
+            // The surface's own sphere, from outside; not one that another surface runs into
+            let is_along = s.dot(point.horizon) < -0.9375 * distance;
+            if is_along && sphere.shadow(point.p, point.error).is_on() {
+                continue;
+            }
+            let t = s.dot(d).clamp(0.0, end);
+            let miss = (s - d * t).length();
+            let through = distance > r + point.reach && end - s.dot(d) > r + point.reach && s.dot(d) > 0.0;
+            let slack = point.reach + (distance + length.min(1e30)) * 1e-5;
+            if miss > r + slack {
+                continue;
+            }
+            if through && miss < r - slack {
+                return false;
+            }
+            return true;
+        }
+        let mut may_cross = false;
+        for (_, Listed { shape: flat, .. }) in scene.that_stop(&listed.flats, id) {
+            let n = flat.n.as_vec3();
+            let height = flat.n.dot(point.p.as_dvec3() - flat.p) as f32;
+            let tip = if finite {
+                height + n.dot(l)
+            } else if n.dot(l) * height < 0.0 {
+                -height
+            } else {
+                height
+            };
+            let slack = point.reach + (height.abs() + length.min(1e30)) * 1e-5;
+            if height.abs() <= slack && flat.shadow(point.p, point.error).is_one_sided(PlaneSide::Both) {
+                // The surface's own
+                continue;
+            }
+            if height > slack && tip > slack || height < -slack && tip < -slack {
+                continue;
+            }
+            let t = -f64::from(height) / f64::from(n.dot(l));
+            let hit = point.p.as_dvec3() + l.as_dvec3() * t;
+            let aside = flat.outside(hit) as f32;
+            // Where the way meets the plane at a small angle, it moves there by more than the point
+            let wide = slack * (length / n.dot(l).abs()).max(1.0) * 1.25;
+            if aside > wide {
+                continue;
+            }
+            if aside < -wide && height.abs() > slack && (!finite || tip.abs() > slack) {
+                return false;
+            }
+            may_cross = true;
+        }
+        may_cross
+    }
+}
