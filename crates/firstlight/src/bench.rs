@@ -6,13 +6,13 @@ use std::ops::ControlFlow;
 use fearless_simd::{Level, Simd};
 
 use crate::accel::{Aabb, Bvh, RayPacket16, RayTile, TraceRay, dispatch_eight};
+use crate::film::resolve::TermSums;
 use crate::ids::LightId;
 use crate::math::{LANES, Ray, Vec3};
 use crate::render::Counts;
 use crate::render::given::Given;
 pub use crate::render::given::{ChoosePoints, LightPoint};
 use crate::render::pixel::PixelSum;
-use crate::render::resolve::TermSums;
 use crate::scene::{CompileOptions, Scene, SceneDesc, ShadowRays, TracedHit};
 use crate::shape::{RayDifferential, TileHits, TriangleTree, every};
 use crate::visibility::{OccluderList, Settled, Settler, ShadowView, Target, Viewpoint, Visibility};

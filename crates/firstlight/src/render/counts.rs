@@ -1,7 +1,7 @@
 //! What a render did, in numbers.
 
 use super::SimdLevel;
-use super::heat::Heat;
+use crate::film::Heat;
 use crate::integrate::Illumination;
 use crate::visibility::{Settled, Visibility};
 

@@ -4,11 +4,11 @@ use std::ops::Range;
 
 use arrayvec::ArrayVec;
 
-use super::hits::camera_ray;
 use super::light_queue::LitPlace;
 use super::solo::{Candidate, SquareBsdf};
 use super::square::Square;
 use crate::color::Rgb;
+use crate::film::hits::camera_ray;
 use crate::ids::SurfaceId;
 use crate::integrate::{ShadingPoint, TOLERANCE};
 use crate::material::{Bsdf, Colors, Lobe, Material};

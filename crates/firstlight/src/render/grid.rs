@@ -10,11 +10,12 @@
 
 use std::ops::ControlFlow;
 
+use super::Counts;
 use super::cell::CELL;
 use super::light_queue::{Answer, LightQueue, LitPlace, Request, Sight};
 use super::solo::Candidate;
 use super::square::Square;
-use super::{Counts, Heat};
+use crate::film::Heat;
 use crate::integrate::{ShadingPoint, TOLERANCE};
 use crate::material::{Bsdf, Lobe, Moments};
 use crate::scene::Scene;

@@ -1,8 +1,8 @@
 //! What a film is rendered for: the picture with what is told of its pixels, and the same scene without shadows. What
 //! is made of both, pixel by pixel, when they are there.
 
-use super::film::Film;
 use super::many::FEW;
+use crate::film::Film;
 use crate::ids::{LightGroupId, LightId};
 use crate::image::{Buffer, LightPart, Plane, PlaneNumbers};
 use crate::math::Vec3;

@@ -14,7 +14,7 @@ use crate::light::{Light, LightScale, MAX_LIGHT};
 use crate::scene::{MAX_ANTIALIASING, Scene};
 
 use super::RenderSettings;
-use super::resolve::Emission;
+use crate::film::resolve::Emission;
 
 /// How a light is changed.
 #[derive(Clone, Debug, PartialEq)]

@@ -8,12 +8,12 @@ use std::ops::ControlFlow;
 
 use fearless_simd::Level;
 
-use super::film::FilmTile;
-use super::hits::{PixelHits, camera_ray};
 use super::pixel::PixelSum;
-use super::resolve::TermSums;
 use super::sampled::Sampled;
 use super::{Counts, QUESTION_EVERY};
+use crate::film::FilmTile;
+use crate::film::hits::{PixelHits, camera_ray};
+use crate::film::resolve::TermSums;
 use crate::ids::LightId;
 use crate::material::{Bsdf, Moments};
 use crate::scene::Scene;

@@ -6,12 +6,12 @@ use std::ops::{ControlFlow, Range};
 
 use super::{Cells, PIXELS, Pixel, Wanted};
 use crate::color::Rgb;
+use crate::film::resolve::LightTerm;
 use crate::ids::LightId;
 use crate::material::Moments;
 use crate::render::arrival::{ArrivalPlace, Arrivals, Past};
 use crate::render::fragment::{Fragment, Fragments};
 use crate::render::light_queue::{LitPlace, Sight};
-use crate::render::resolve::LightTerm;
 use crate::render::together::{Outcome, Together, salt};
 use crate::render::{AaMode, Counts};
 use crate::scene::Scene;

@@ -13,6 +13,7 @@ use arrayvec::ArrayVec;
 use super::behind::{FragmentSight, NONE};
 use super::{CELL, Cells};
 use crate::color::Rgb;
+use crate::film::tile::Tile;
 use crate::ids::LightId;
 use crate::integrate::{Emitter, TOLERANCE};
 use crate::material::Moments;
@@ -23,7 +24,6 @@ use crate::render::fragment::{Contrast, Fragment};
 use crate::render::light_queue::LitPlace;
 use crate::render::many::FEW;
 use crate::render::square::Square;
-use crate::render::tile::Tile;
 use crate::visibility::Viewpoint;
 
 /// Pixels across the largest and the smallest squares.

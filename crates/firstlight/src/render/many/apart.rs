@@ -3,11 +3,11 @@
 use super::ONE;
 use super::block::sent;
 use crate::color::Rgb;
+use crate::film::resolve::ScaledTerm;
 use crate::image::Buffer;
 use crate::light::{Held, LightTree, Sent};
 use crate::material::Bsdf;
 use crate::render::arrival::Arrivals;
-use crate::render::resolve::ScaledTerm;
 use crate::scene::Scene;
 use crate::shape::SurfaceInteraction;
 

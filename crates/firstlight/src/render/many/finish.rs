@@ -7,6 +7,7 @@ use super::block::sent;
 use super::patch::Patches;
 use super::{ANYTHING, Many, Single, Stored};
 use crate::color::Rgb;
+use crate::film::resolve::ScaledTerm;
 use crate::integrate::TOLERANCE;
 use crate::light::Sent;
 use crate::material::Moments;
@@ -14,7 +15,6 @@ use crate::render::arrival::{ArrivalPlace, Arrivals};
 use crate::render::counts::Counts;
 use crate::render::fence::Fence;
 use crate::render::fragment::Fragments;
-use crate::render::resolve::ScaledTerm;
 use crate::shape::SurfaceInteraction;
 
 /// A light, or all that are taken together, whose mean over a patch is in doubt.

@@ -3,7 +3,7 @@
 //! Both are of the centre rays of pixels. The second, *amodal* masks, come from one walk along each ray through all
 //! that lies on it, not from a render of each object.
 
-use super::film::Film;
+use super::Film;
 use super::hits::grid_ray;
 use crate::image::{Plane, PlaneNumbers, Window};
 use crate::parallel;

@@ -1,16 +1,29 @@
 //! Where pixels are collected: planes of one size, each of one thing, those that were asked for.
 
+pub(crate) mod centers;
+mod coco;
+pub(crate) mod coverage;
+mod heat;
+pub(crate) mod hits;
+mod masks;
+mod motion;
+pub(crate) mod resolve;
+pub(crate) mod tile;
+
 use std::ops::Range;
 
-use super::heat::Heat;
-use super::resolve::TermSums;
-use super::tile::Tile;
+pub use coco::Coco;
+pub use heat::Heat;
+pub use masks::{Mask, ObjectMasks};
+
 use crate::image::cryptomatte;
 use crate::image::{
     Buffer, FileSettings, Format, Image, ImageError, NamedPlane, Plane, PlaneFile, PlaneNumbers, PlaneVec, Receipt,
     Window,
 };
 use crate::scene::Scene;
+use resolve::TermSums;
+use tile::Tile;
 
 /// The numbers of a plane, pixel by pixel.
 #[derive(Clone, Debug)]
@@ -109,7 +122,7 @@ impl Film {
     }
 
     /// Adds a plane, whose numbers are floats, or takes its place.
-    pub(super) fn put(&mut self, scene: &Scene, buffer: Buffer, numbers: &[f32]) {
+    pub(crate) fn put(&mut self, scene: &Scene, buffer: Buffer, numbers: &[f32]) {
         let values = match buffer.plane().channels().len() {
             1 => Values::One(numbers.to_vec()),
             _ => Values::Three(numbers.as_chunks().0.to_vec()),
@@ -124,7 +137,7 @@ impl Film {
     }
 
     /// Leaves those planes alone, in their order.
-    pub(super) fn keep(&mut self, buffers: &[Buffer]) {
+    pub(crate) fn keep(&mut self, buffers: &[Buffer]) {
         let place = |of: Buffer| buffers.iter().position(|buffer| *buffer == of);
         let planes = std::mem::take(&mut self.planes).into_iter().zip(std::mem::take(&mut self.names));
         let mut kept: Vec<_> = planes.filter_map(|plane| Some((place(plane.0.0)?, plane))).collect();

@@ -8,8 +8,8 @@ use std::ops::ControlFlow;
 use fearless_simd::Level;
 
 use super::centers::{Center, nothing};
-use super::film::{CenterValue, FilmTile};
 use super::hits::{PixelHits, grid_ray};
+use super::{CenterValue, FilmTile};
 use crate::ids::SurfaceId;
 use crate::image::cryptomatte::{self, Named, hashed_name, id_bits};
 use crate::image::{Buffer, Plane};
@@ -19,7 +19,7 @@ use crate::scene::{Hit, Scene};
 const QUESTION_EVERY: u32 = 1 << 20;
 
 /// What is asked of all camera rays, each with the number of its plane.
-pub(super) struct CoveragePlanes {
+pub(crate) struct CoveragePlanes {
     /// By their ids.
     objects: Vec<(SurfaceId, usize)>,
     background: Option<usize>,
@@ -36,7 +36,7 @@ struct Matte {
 }
 
 /// One thread's way through all camera rays of tiles.
-pub(super) struct Coverage<'a> {
+pub(crate) struct Coverage<'a> {
     scene: &'a Scene,
     asked: &'a CoveragePlanes,
     hits: PixelHits,

@@ -7,9 +7,9 @@ use std::cell::OnceCell;
 
 use fearless_simd::Level;
 
-use super::film::{CenterValue, FilmTile};
 use super::hits::{PixelHits, grid_ray};
 use super::motion;
+use super::{CenterValue, FilmTile};
 use crate::camera::Frame;
 use crate::color::Rgb;
 use crate::image::Plane;
@@ -37,7 +37,7 @@ pub(super) struct Center<'a> {
 }
 
 /// Fills the planes of a tile that centre rays say. The answer is how many camera rays it took.
-pub(super) fn fill(scene: &Scene, level: Level, film: &mut FilmTile) -> u64 {
+pub(crate) fn fill(scene: &Scene, level: Level, film: &mut FilmTile) -> u64 {
     let there = scene.motion.as_deref().map(|motion| &motion.there);
     let has = |film: &FilmTile, backward: bool| {
         let of_center = |plane: Plane| plane.is_of_center() && (plane == Plane::MotionBackward) == backward;
