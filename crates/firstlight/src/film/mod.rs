@@ -7,7 +7,12 @@ mod heat;
 pub(crate) mod hits;
 mod masks;
 mod motion;
+pub(crate) mod passes;
+mod receipt;
+mod receipt_settings;
+mod relight;
 pub(crate) mod resolve;
+pub(crate) mod settings;
 pub(crate) mod tile;
 
 use std::ops::Range;
@@ -15,6 +20,9 @@ use std::ops::Range;
 pub use coco::Coco;
 pub use heat::Heat;
 pub use masks::{Mask, ObjectMasks};
+pub use receipt_settings::{ReceiptFault, ReceiptSettings};
+pub use relight::{LightChange, RelightError, Relit, relight};
+pub use settings::{AaMode, RenderSettings, VisibilityMode};
 
 use crate::image::cryptomatte;
 use crate::image::{

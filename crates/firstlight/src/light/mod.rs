@@ -30,7 +30,7 @@ pub use spot::{Spot, SpotDesc};
 
 pub(crate) use area::{PointBlock, Points, check_samples};
 pub(crate) use bound::{Sends, ZoneSight};
-pub(crate) use tree::{Held, LightNode, LightTree, Sent};
+pub(crate) use tree::{FEW_LIGHTS, Held, LightNode, LightTree, Sent};
 pub(crate) use zone::Zone;
 
 words! {

@@ -16,6 +16,9 @@ use crate::color::Rgb;
 use crate::material::{Colors, Lobe, Moments};
 use crate::math::{DVec3, Vec3};
 
+/// Up to so many lights are all evaluated at every point; a scene with more has a light tree.
+pub(crate) const FEW_LIGHTS: usize = 16;
+
 /// All lights of a scene, in a tree for each way of sending light.
 #[derive(Debug)]
 pub(crate) struct LightTree {

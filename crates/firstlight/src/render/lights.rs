@@ -1,11 +1,10 @@
 //! The lights of a scene as they are asked: what all threads share.
 
 use super::ladder::Ladder;
-use super::many::FEW;
 use crate::color::{DisplaySteps, Rgb};
 use crate::ids::LightId;
 use crate::integrate::{Asked, Emitter, Obstacles, TOLERANCE};
-use crate::light::{Light, LightTree};
+use crate::light::{FEW_LIGHTS, Light, LightTree};
 use crate::material::Lobe;
 use crate::scene::Scene;
 use crate::visibility::Target;
@@ -43,7 +42,7 @@ impl<'a> Lights<'a> {
         let scales = scene.lights.iter().zip(&emitters).map(scale).collect();
         let targets = Target::of_all(scene);
         let ladders = emitters.iter().map(|_| Ladder::default()).collect();
-        let tree = (scene.lights.len() > FEW)
+        let tree = (scene.lights.len() > FEW_LIGHTS)
             .then(|| LightTree::new(&scene.lights, &scene.geometry.links.classes(scene.lights.len())));
         let obstacles = scene.lights.iter().enumerate().map(|(index, light)| {
             light.area().map_or_else(Obstacles::default, |area| Obstacles::new(scene, index, &Emitter::new(area)))

@@ -16,13 +16,13 @@ use crate::color::Rgb;
 use crate::film::tile::Tile;
 use crate::ids::LightId;
 use crate::integrate::{Emitter, TOLERANCE};
+use crate::light::FEW_LIGHTS;
 use crate::material::Moments;
 use crate::math::{LANES, Vec3};
 use crate::render::Counts;
 use crate::render::beams::Packet;
 use crate::render::fragment::{Contrast, Fragment};
 use crate::render::light_queue::LitPlace;
-use crate::render::many::FEW;
 use crate::render::square::Square;
 use crate::visibility::Viewpoint;
 
@@ -121,7 +121,7 @@ impl Cells<'_> {
                 squares.extend(square.quarters_on([scene.width, scene.height]));
                 continue;
             }
-            let lights: ArrayVec<usize, FEW> =
+            let lights: ArrayVec<usize, FEW_LIGHTS> =
                 (0..scene.lights.len()).filter(|light| self.lights.arrivals.is_behind(*light)).collect();
             self.square(square, &lights, counts);
             go_on()?;
@@ -131,14 +131,14 @@ impl Cells<'_> {
 
     /// Asks for some lights over a square, or over those of its quarters that tell.
     fn square(&mut self, square: Square, lights: &[usize], counts: &mut Counts) {
-        let mut left = ArrayVec::<usize, FEW>::new();
+        let mut left = ArrayVec::<usize, FEW_LIGHTS>::new();
         let is_open = |light: &usize| square.pixels().any(|at| self.is_unknown(at, *light));
-        let lights: ArrayVec<usize, FEW> = lights.iter().copied().filter(is_open).collect();
+        let lights: ArrayVec<usize, FEW_LIGHTS> = lights.iter().copied().filter(is_open).collect();
         if lights.is_empty() {
             return;
         }
         if self.is_smooth(square) {
-            let behind: ArrayVec<usize, FEW> =
+            let behind: ArrayVec<usize, FEW_LIGHTS> =
                 lights.iter().copied().filter(|light| !self.is_clear(square, *light, counts)).collect();
             behind.iter().for_each(|light| self.look_around(square, *light, counts));
             let mut is_told = |light: &usize| {

@@ -1,4 +1,5 @@
-//! More than [`FEW`] lights: what arrives at the fragments of a cell where not every light is asked for at every one.
+//! More than [`FEW_LIGHTS`](crate::light::FEW_LIGHTS) lights: what arrives at the fragments of a cell, where not every
+//! light is evaluated at every one.
 //!
 //! For each block of pixels, and for its quarters where many lights are near, a [`Cut`] says which lights count: nodes
 //! of the [`LightTree`](crate::light::LightTree), each of which one light stands for or their middle, and lights that
@@ -35,8 +36,6 @@ use finish::Doubt;
 use patch::{Patch, Patches};
 use places::is_alike;
 
-/// So few lights are all asked for everywhere, and none is left out.
-pub(crate) const FEW: usize = 16;
 /// Blocks that ask for more lights by themselves are quartered.
 const CLOSE: usize = 24;
 /// An error that shows whatever is there.

@@ -4,7 +4,7 @@ use std::str::FromStr;
 
 use super::receipt::{REFERENCE, TRANSPARENT, version};
 use super::relight::RELIT;
-use super::{AaMode, RenderSettings, VisibilityMode};
+use super::settings::{AaMode, RenderSettings, VisibilityMode};
 use crate::color::Display;
 use crate::describe::{ColorDesc, SamplesDesc};
 use crate::image::{BufferDesc, Plane, Receipt, Window};

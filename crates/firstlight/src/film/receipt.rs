@@ -1,6 +1,6 @@
 //! What a picture says of itself: all that decides its pixels, and nothing else.
 
-use super::{RenderSettings, Renderer};
+use super::settings::{RenderSettings, Renderer};
 use crate::camera::{Camera, Frame, Projection};
 use crate::describe::SamplesDesc;
 use crate::image::cryptomatte::{self, Named};

@@ -1,16 +1,16 @@
 //! What a film is rendered for: the picture with what is told of its pixels, and the same scene without shadows. What
 //! is made of both, pixel by pixel, when they are there.
 
-use super::many::FEW;
-use crate::film::Film;
+use super::Film;
 use crate::ids::{LightGroupId, LightId};
 use crate::image::{Buffer, LightPart, Plane, PlaneNumbers};
+use crate::light::FEW_LIGHTS;
 use crate::math::Vec3;
 use crate::scene::Scene;
 
 /// The buffers that are rendered, each once.
 #[derive(Debug, Default, PartialEq)]
-pub(super) struct Passes {
+pub(crate) struct Passes {
     /// Of the scene as it is.
     pub picture: Vec<Buffer>,
     /// Of the scene when nothing casts shadows.
@@ -110,7 +110,7 @@ const PLACE: [Buffer; 3] =
 /// show.
 fn may_be_left_out(scene: &Scene, buffer: Buffer) -> Option<LightId> {
     match buffer {
-        Buffer::Light(light, Some(LightPart::Visibility)) if scene.lights.len() > FEW => Some(light),
+        Buffer::Light(light, Some(LightPart::Visibility)) if scene.lights.len() > FEW_LIGHTS => Some(light),
         _ => None,
     }
 }

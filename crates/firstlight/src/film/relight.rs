@@ -13,8 +13,8 @@ use crate::image::{Buffer, Image, LightPart, Plane, PlaneVec, Receipt, StoredPla
 use crate::light::{Light, LightScale, MAX_LIGHT};
 use crate::scene::{MAX_ANTIALIASING, Scene};
 
-use super::RenderSettings;
-use crate::film::resolve::Emission;
+use super::resolve::Emission;
+use super::settings::RenderSettings;
 
 /// How a light is changed.
 #[derive(Clone, Debug, PartialEq)]
