@@ -15,7 +15,7 @@ pub use crate::render::given::{ChoosePoints, LightPoint};
 use crate::render::pixel::PixelSum;
 use crate::scene::{CompileOptions, Scene, SceneDesc, ShadowRays, TracedHit};
 use crate::shape::{RayDifferential, TileHits, TriangleTree, every};
-use crate::visibility::{OccluderList, Settled, Settler, ShadowView, Target, Viewpoint, Visibility};
+use crate::visibility::{OccluderList, ShadowView, Target, Viewpoint, Visibility, VisibilityResolver, VisibilityStats};
 
 /// Origin and direction of a ray.
 pub type RayBits = [f32; 6];
@@ -175,11 +175,11 @@ impl<'a> Instances<'a> {
 pub struct Soft {
     scene: Scene,
     target: Target,
-    settler: Settler,
+    resolver: VisibilityResolver,
     points: Vec<Viewpoint>,
     /// The points of each tile of pixels.
     tiles: Vec<std::ops::Range<u32>>,
-    settled: Settled,
+    visibility: VisibilityStats,
 }
 
 impl Soft {
@@ -226,7 +226,14 @@ impl Soft {
                 tiles.push(first..points.len() as u32);
             }
         }
-        Some(Soft { scene, target, settler: Settler::default(), points, tiles, settled: Settled::default() })
+        Some(Soft {
+            scene,
+            target,
+            resolver: VisibilityResolver::default(),
+            points,
+            tiles,
+            visibility: VisibilityStats::default(),
+        })
     }
 
     /// For each point: where its rays start, the point, its normal.
@@ -256,20 +263,20 @@ impl Soft {
         hidden.clear();
         hidden.resize(self.points.len() * blocks, 0);
         let mut order = Vec::new();
-        self.settled = Settled::default();
+        self.visibility = VisibilityStats::default();
         for tile in &self.tiles {
             order.clear();
             order.extend(tile.clone());
-            let (scene, settled) = (&self.scene, &mut self.settled);
+            let (scene, stats) = (&self.scene, &mut self.visibility);
             let each = |k: usize, visibility, view: &mut crate::visibility::ShadowView| {
                 let hidden = &mut hidden[k * blocks..(k + 1) * blocks];
                 match visibility {
-                    Visibility::Lit => {}
-                    Visibility::Hidden | Visibility::BelowHorizon => hidden.fill(0xffff),
-                    Visibility::Mask => hidden.copy_from_slice(&view.hidden),
+                    Visibility::Full => {}
+                    Visibility::None | Visibility::BelowHorizon => hidden.fill(0xffff),
+                    Visibility::Partial => hidden.copy_from_slice(&view.hidden),
                 }
             };
-            self.settler.settle(Level::new(), scene, &self.target, &self.points, &mut order, settled, each);
+            self.resolver.resolve(Level::new(), scene, &self.target, &self.points, &mut order, stats, each);
         }
     }
 
@@ -323,7 +330,7 @@ impl Soft {
 
     /// How many points are lit, hidden, below the horizon, cut; shafts; what they held; samples traced.
     pub fn settled(&self) -> [u64; 7] {
-        let Settled { visibility: [lit, hidden, below, mask], shafts, occluders, traced } = self.settled;
+        let VisibilityStats { classes: [lit, hidden, below, mask], shafts, occluders, traced } = self.visibility;
         [lit, hidden, below, mask, shafts, occluders, traced]
     }
 }
@@ -373,11 +380,11 @@ pub fn sights(scene: &Scene, light: u32, block: u32) -> Vec<Option<ShareSeen>> {
             occluders.gather(level, scene, &target, &points, &order, usize::MAX);
             for (point, pixel) in points.iter().zip(&pixels) {
                 sights[*pixel] = Some(match view.classify(level, scene, &target, &occluders, point) {
-                    Visibility::Lit if occluders.count() == 0 => ShareSeen::Empty,
-                    Visibility::Lit => ShareSeen::Lit,
-                    Visibility::Hidden => ShareSeen::Hidden,
+                    Visibility::Full if occluders.count() == 0 => ShareSeen::Empty,
+                    Visibility::Full => ShareSeen::Lit,
+                    Visibility::None => ShareSeen::Hidden,
                     Visibility::BelowHorizon => ShareSeen::BelowHorizon,
-                    Visibility::Mask => ShareSeen::Cut,
+                    Visibility::Partial => ShareSeen::Cut,
                 });
             }
         }

@@ -22,7 +22,9 @@ use crate::material::{Bsdf, Lobe, Moments};
 use crate::math::{DVec3, Facet, LANES};
 use crate::scene::Scene;
 use crate::shape::SurfaceInteraction;
-use crate::visibility::{OccluderList, Settler, ShadowMesh, ShadowView, Shaft, Target, Viewpoint, Visibility};
+use crate::visibility::{
+    OccluderList, ShadowMesh, ShadowView, Shaft, Target, Viewpoint, Visibility, VisibilityResolver,
+};
 
 pub(crate) use place::ArrivalPlace;
 
@@ -68,7 +70,7 @@ pub(crate) struct Arrivals<'a> {
     /// What of trees is in the way of one place.
     pub(super) near: Obstacles<'a>,
     /// Of lights that are sampled.
-    pub(super) settler: Settler,
+    pub(super) resolver: VisibilityResolver,
     pub(super) occluders: OccluderList,
     /// Views that are not used any more.
     views: Vec<ShadowView>,
@@ -96,7 +98,7 @@ impl<'a> Arrivals<'a> {
             seen: Vec::new(),
             found: Vec::new(),
             near: Obstacles::default(),
-            settler: Settler::default(),
+            resolver: VisibilityResolver::default(),
             occluders: OccluderList::default(),
             views: Vec::new(),
             tallies: Vec::new(),
@@ -263,7 +265,7 @@ impl<'a> Arrivals<'a> {
                     if place.reach > 0.0 {
                         asked[1].push(from as u32);
                     } else {
-                        counts.settled.visibility[Visibility::Mask as usize] += 1;
+                        counts.visibility.classes[Visibility::Partial as usize] += 1;
                     }
                     found[from].1 = Sighting::Behind;
                 }
@@ -277,7 +279,7 @@ impl<'a> Arrivals<'a> {
                 let (k, mut arrived) = (*k as usize, *arrived);
                 if matches!(found[k].1, Sighting::Behind) && arrived.illumination != Illumination::Below {
                     arrived.motion = f32::INFINITY;
-                    counts.settled.visibility[Visibility::Mask as usize] += 1;
+                    counts.visibility.classes[Visibility::Partial as usize] += 1;
                     found[k] = (self.change(index, &places[k], &arrived), Sighting::Behind);
                 } else {
                     found[k] = self.found(index, &places[k], arrived, counts);
@@ -319,7 +321,7 @@ impl<'a> Arrivals<'a> {
     ) -> (Change, Sighting) {
         counts.note(arrived.illumination);
         if arrived.illumination == Illumination::Unknown {
-            counts.settled.visibility[Visibility::Mask as usize] += 1;
+            counts.visibility.classes[Visibility::Partial as usize] += 1;
             arrived.motion = f32::INFINITY;
             return (self.change(index, place, &arrived), Sighting::Behind);
         }
@@ -400,7 +402,7 @@ impl<'a> Arrivals<'a> {
         self.indices.extend(0..points.len() as u32);
         let occluders = &mut self.occluders;
         occluders.gather(self.level, self.scene, &self.lights.targets[index], points, &self.indices, 0);
-        counts.settled.shafts += 1;
+        counts.visibility.shafts += 1;
         let is_known = self.lights.know(index, occluders.others.iter().copied()) && !occluders.has_meshes();
         (occluders.has_trees() && !is_known, occluders.count() == 0)
     }
@@ -417,8 +419,8 @@ impl<'a> Arrivals<'a> {
     ) {
         let (lights, views) = (self.lights, &mut self.views);
         let (target, listed) = (&lights.targets[index], self.scene.geometry.listed);
-        let settled = &mut counts.settled;
-        self.settler.settle(self.level, self.scene, target, points, order, settled, |k, visibility, view| {
+        let stats = &mut counts.visibility;
+        self.resolver.resolve(self.level, self.scene, target, points, order, stats, |k, visibility, view| {
             each(k, visibility, &mut || {
                 let is_listed = listed || view.spheres.is_empty() && view.flats.is_empty();
                 if view.trees
@@ -486,17 +488,17 @@ impl<'a> Arrivals<'a> {
         }
         let mut found = None;
         let (target, points) = (&self.lights.targets[index], [Viewpoint::of(si)]);
-        let settled = &mut counts.settled;
-        self.settler.settle(self.level, self.scene, target, &points, &mut [0], settled, |_, visibility, view| {
+        let stats = &mut counts.visibility;
+        self.resolver.resolve(self.level, self.scene, target, &points, &mut [0], stats, |_, visibility, view| {
             found = Some(visibility);
             std::mem::swap(&mut kept, view);
         });
         match found {
-            Some(Visibility::Hidden | Visibility::BelowHorizon) | None => {
+            Some(Visibility::None | Visibility::BelowHorizon) | None => {
                 self.views.push(kept);
                 None
             }
-            Some(Visibility::Lit | Visibility::Mask) => Some(kept),
+            Some(Visibility::Full | Visibility::Partial) => Some(kept),
         }
     }
 

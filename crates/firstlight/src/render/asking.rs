@@ -210,9 +210,9 @@ impl<'a> AskedLeaves<'a> {
         for (one, rung) in asking.iter_mut().zip(rungs).filter(|(one, _)| one.view.trees) {
             beams.push(RungRays { point: Viewpoint::of(&one.si), rung, hidden: &mut one.view.hidden });
         }
-        counts.settled.traced += beams::trace(asker.scene, asker.target.end(), asked, &mut beams);
+        counts.visibility.traced += beams::trace(asker.scene, asker.target.end(), asked, &mut beams);
         for (one, rung) in asking.iter_mut().zip(rungs).filter(|(one, _)| !one.view.trees) {
-            counts.settled.traced += asker.mask(rung, asked, &mut one.view, &Viewpoint::of(&one.si));
+            counts.visibility.traced += asker.mask(rung, asked, &mut one.view, &Viewpoint::of(&one.si));
         }
         let points = asked.iter().map(|bits| u64::from(bits.count_ones())).sum::<u64>() * asking.len() as u64;
         counts.shadow_rays += points;

@@ -16,7 +16,7 @@ use crate::light::{Area, Extent, Light};
 use crate::material::{Lobe, Moments};
 use crate::scene::Scene;
 use crate::shape::SurfaceInteraction;
-use crate::visibility::{Settler, ShadowView, Target, Viewpoint, Visibility};
+use crate::visibility::{ShadowView, Target, Viewpoint, Visibility, VisibilityResolver};
 
 /// The shadows of a light of fewer samples than this show by themselves.
 const FEW_SAMPLES: usize = 256;
@@ -56,22 +56,22 @@ impl<'a> Sampled<'a> {
         self.lit(si, lobe)
     }
 
-    /// Hears what of it is seen from those `points` whose numbers are in `part`; see [`Settler::settle`].
+    /// Hears what of it is seen from those `points` whose numbers are in `part`; see [`VisibilityResolver::resolve`].
     pub fn settle(
         &self,
-        settler: &mut Settler,
+        resolver: &mut VisibilityResolver,
         points: &[Viewpoint],
         part: &mut [u32],
         counts: &mut Counts,
         each: impl FnMut(usize, Visibility, &mut ShadowView),
     ) {
         let all = self.samples() * part.len() as u64;
-        let settled = &mut counts.settled;
-        let before = *settled;
-        settler.settle(self.level, self.scene, self.target, points, part, settled, each);
+        let stats = &mut counts.visibility;
+        let before = *stats;
+        resolver.resolve(self.level, self.scene, self.target, points, part, stats, each);
         // Cut by shapes of the lists, which are asked for every sample, or by what is in the trees
-        let cut = settled.visibility[Visibility::Mask as usize] - before.visibility[Visibility::Mask as usize];
-        let traced = settled.traced - before.traced;
+        let cut = stats.classes[Visibility::Partial as usize] - before.classes[Visibility::Partial as usize];
+        let traced = stats.traced - before.traced;
         let asked = if self.scene.geometry.has_trees() { traced } else { self.samples() * cut };
         counts.shadow_rays += all;
         counts.shadow_rays_skipped += all - asked;
@@ -81,9 +81,9 @@ impl<'a> Sampled<'a> {
     #[inline(always)]
     pub fn sent(&self, si: &SurfaceInteraction, lobe: &Lobe, visibility: Visibility, view: &ShadowView) -> Moments {
         match visibility {
-            Visibility::Hidden | Visibility::BelowHorizon => Moments::ZERO,
-            Visibility::Lit => self.lit(si, lobe),
-            Visibility::Mask => self.masked(si, lobe, view),
+            Visibility::None | Visibility::BelowHorizon => Moments::ZERO,
+            Visibility::Full => self.lit(si, lobe),
+            Visibility::Partial => self.masked(si, lobe, view),
         }
     }
 
@@ -200,7 +200,7 @@ impl Arrivals<'_> {
                 sums[k] = light.unshadowed(place.si, place.lobe, counts);
             }
         }
-        light.settle(&mut self.settler, &points, &mut order, counts, |k, visibility, view| {
+        light.settle(&mut self.resolver, &points, &mut order, counts, |k, visibility, view| {
             sums[k] = light.sent(places[k].si, places[k].lobe, visibility, view);
         });
         sums

@@ -1,7 +1,7 @@
 //! The fast renderer's way through a tile: what may stand before a light is gathered once for neighbouring points.
 //!
 //! The camera rays of a block of pixels first, then light by light: the points of the block that need it are taken
-//! together, and a [`Settler`] finds from which of them the light is lit, hidden, below the horizon, or cut
+//! together, and a [`VisibilityResolver`] finds from which of them the light is lit, hidden, below the horizon, or cut
 //! ([`Sampled`]).
 
 use std::ops::ControlFlow;
@@ -18,7 +18,7 @@ use crate::ids::LightId;
 use crate::material::{Bsdf, Moments};
 use crate::scene::Scene;
 use crate::shape::SurfaceInteraction;
-use crate::visibility::{Settler, Target, Viewpoint};
+use crate::visibility::{Target, Viewpoint, VisibilityResolver};
 
 /// The points of a block of pixels, and what is needed to light them.
 pub(crate) struct Shafts<'a> {
@@ -32,7 +32,7 @@ pub(crate) struct Shafts<'a> {
     sums: Vec<Moments>,
     /// The points that are being lit, part by part.
     order: Vec<u32>,
-    settler: Settler,
+    resolver: VisibilityResolver,
 }
 
 impl<'a> Shafts<'a> {
@@ -46,7 +46,7 @@ impl<'a> Shafts<'a> {
             surfaces: Vec::new(),
             sums: Vec::new(),
             order: Vec::new(),
-            settler: Settler::default(),
+            resolver: VisibilityResolver::default(),
         }
     }
 
@@ -150,7 +150,7 @@ impl<'a> Shafts<'a> {
                 counts.next_question = counts.shadow_rays + QUESTION_EVERY;
                 go_on()?;
             }
-            light.settle(&mut self.settler, &self.points, part, counts, |k, visibility, view| {
+            light.settle(&mut self.resolver, &self.points, part, counts, |k, visibility, view| {
                 let (si, bsdf) = &surfaces[k];
                 sums[k] = light.sent(si, &bsdf.lobe, visibility, view);
             });

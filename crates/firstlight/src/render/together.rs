@@ -139,7 +139,7 @@ impl Together {
     /// Asks points of the light for one ray, as nobody knows what it sees.
     pub fn ask_points(&mut self, arrivals: &mut Arrivals, si: &SurfaceInteraction, bsdf: &Bsdf, counts: &mut Counts) {
         let place = ArrivalPlace { share: self.share, ..arrivals.place(self.light, si, bsdf) };
-        counts.settled.visibility[Visibility::Mask as usize] += 1;
+        counts.visibility.classes[Visibility::Partial as usize] += 1;
         self.hear(&place, Sighting::Behind, arrivals, counts);
     }
 

@@ -13,7 +13,7 @@
 mod mask;
 mod occluders;
 mod outlook;
-mod settle;
+mod resolver;
 mod shaft;
 mod target;
 #[cfg(test)]
@@ -22,7 +22,7 @@ mod view;
 
 pub(crate) use occluders::{OccluderList, ShadowMesh};
 pub(crate) use outlook::{Outlook, Seen};
-pub(crate) use settle::{Settled, Settler};
+pub(crate) use resolver::{VisibilityResolver, VisibilityStats};
 pub(crate) use shaft::Shaft;
 pub(crate) use target::Target;
 pub(crate) use view::{ShadowView, Visibility};

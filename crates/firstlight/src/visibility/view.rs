@@ -15,13 +15,13 @@ use crate::shape::{Cover, DiskShadow, Eye, ParallelogramShadow, Placement, SeenT
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Visibility {
     /// All of it that is above the horizon.
-    Lit,
+    Full,
     /// Nothing: one thing stands before all of it.
-    Hidden,
+    None,
     /// Nothing: it is behind the surface.
     BelowHorizon,
     /// Each sample for itself.
-    Mask,
+    Partial,
 }
 
 /// What may hide some of a light from one point.
@@ -84,7 +84,7 @@ impl ShadowView {
             }
             match shadow.covers(light.l, &light.axes, light.longest, light.finite) {
                 Cover::Nothing => {}
-                Cover::All => return Visibility::Hidden,
+                Cover::All => return Visibility::None,
                 Cover::Some => self.spheres.push(shadow),
             }
         }
@@ -95,7 +95,7 @@ impl ShadowView {
             }
             match shadow.covers(light.l, &light.axes, light.longest, light.finite) {
                 Cover::Nothing => {}
-                Cover::All => return Visibility::Hidden,
+                Cover::All => return Visibility::None,
                 Cover::Some => self.flats.push(shadow),
             }
         }
@@ -103,7 +103,7 @@ impl ShadowView {
             let shadow = scene.occluders.disks[*disk as usize].shape.shadow(point.p, point.error);
             match shadow.covers(light.l, &light.axes, light.longest, light.finite) {
                 Cover::Nothing => {}
-                Cover::All => return Visibility::Hidden,
+                Cover::All => return Visibility::None,
                 Cover::Some => self.disks.push(shadow),
             }
         }
@@ -114,11 +114,11 @@ impl ShadowView {
                 simd => self.look(simd, scene, target, &light, occluders, point)
             );
             if hidden {
-                return Visibility::Hidden;
+                return Visibility::None;
             }
         }
         if self.trees {
-            return Visibility::Mask;
+            return Visibility::Partial;
         }
         self.gather_others(scene, target, &light, occluders, point);
         let nothing = self.spheres.is_empty()
@@ -126,7 +126,7 @@ impl ShadowView {
             && self.disks.is_empty()
             && self.triangles.is_empty()
             && self.others.is_empty();
-        if nothing { Visibility::Lit } else { Visibility::Mask }
+        if nothing { Visibility::Full } else { Visibility::Partial }
     }
 
     /// Keeps those solids and point sets that may be in the way.

@@ -417,10 +417,10 @@ impl Cells<'_> {
         }
         self.lights.arrivals.sights(light, &block.points, order, counts, |k, visibility, take| {
             sights[k] = match visibility {
-                Visibility::Lit => RaySight::Lit,
-                Visibility::Hidden => RaySight::Dark,
+                Visibility::Full => RaySight::Lit,
+                Visibility::None => RaySight::Dark,
                 Visibility::BelowHorizon => RaySight::BelowHorizon,
-                Visibility::Mask => match take() {
+                Visibility::Partial => match take() {
                     Past::Unknown(view) => {
                         views[k] = Some(view);
                         RaySight::Behind

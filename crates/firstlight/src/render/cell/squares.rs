@@ -329,7 +329,7 @@ impl Cells<'_> {
                 }
             }
             if let Some(packet) = &mut packet {
-                counts.settled.traced += packet.trace(scene, |_, inner| asked[inner as usize][1] += 1);
+                counts.visibility.traced += packet.trace(scene, |_, inner| asked[inner as usize][1] += 1);
             }
         }
         for (inner, [asked, hidden]) in asked.into_iter().enumerate() {

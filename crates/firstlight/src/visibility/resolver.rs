@@ -26,7 +26,7 @@ const TRACED: usize = 32;
 
 /// Settles what is seen of lights, points together as long as little stands in the way. Keeps its memory.
 #[derive(Debug, Default)]
-pub(crate) struct Settler {
+pub(crate) struct VisibilityResolver {
     pub occluders: OccluderList,
     pub view: ShadowView,
     alone: OccluderList,
@@ -35,9 +35,9 @@ pub(crate) struct Settler {
 
 /// What was done, for statistics.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(crate) struct Settled {
+pub(crate) struct VisibilityStats {
     /// By [`Visibility`].
-    pub visibility: [u64; 4],
+    pub classes: [u64; 4],
     /// Shafts that something was gathered in.
     pub shafts: u64,
     /// What they held.
@@ -46,18 +46,18 @@ pub(crate) struct Settled {
     pub traced: u64,
 }
 
-impl Settler {
+impl VisibilityResolver {
     /// Hears what of a light is seen from each of the `points` whose numbers are in `order`, in any order: `each` is
     /// told which point, how much is seen, and by which view, which it may keep. The order of `order` is lost.
     #[allow(clippy::too_many_arguments, reason = "a light of a scene and points, as lists")]
-    pub fn settle(
+    pub fn resolve(
         &mut self,
         level: Level,
         scene: &Scene,
         target: &Target,
         points: &[Viewpoint],
         order: &mut [u32],
-        counts: &mut Settled,
+        counts: &mut VisibilityStats,
         mut each: impl FnMut(usize, Visibility, &mut ShadowView),
     ) {
         let mut parts = std::mem::take(&mut self.parts);
@@ -110,8 +110,8 @@ impl Settler {
             counts.occluders += self.occluders.count() as u64;
             for k in part.iter().map(|k| *k as usize) {
                 let visibility = self.view.classify(level, scene, target, &self.occluders, &points[k]);
-                counts.visibility[visibility as usize] += 1;
-                if visibility == Visibility::Mask && !target.blocks.is_empty() {
+                counts.classes[visibility as usize] += 1;
+                if visibility == Visibility::Partial && !target.blocks.is_empty() {
                     counts.traced += self.view.mask(level, scene, target, None, &points[k]);
                 }
                 each(k, visibility, &mut self.view);
