@@ -1,7 +1,7 @@
 //! Lights: where light comes from, and how much. A light never traces rays.
 
 mod area;
-mod bound;
+mod bounds;
 mod directional;
 mod disk;
 mod point;
@@ -10,7 +10,6 @@ mod samples;
 mod sphere;
 mod spot;
 mod tree;
-mod zone;
 
 use crate::color::Rgb;
 use crate::context::CompileContext;
@@ -29,9 +28,8 @@ pub use sphere::{SphereLight, SphereLightDesc};
 pub use spot::{Spot, SpotDesc};
 
 pub(crate) use area::{PointBlock, Points, check_samples};
-pub(crate) use bound::{Sends, ZoneSight};
-pub(crate) use tree::{FEW_LIGHTS, Held, LightNode, LightTree, Sent};
-pub(crate) use zone::Zone;
+pub(crate) use bounds::{ContributionBounds, EmissionProfile, ReceiverBounds};
+pub(crate) use tree::{FEW_LIGHTS, LightNode, LightTree, NodeContents};
 
 words! {
     /// How light weakens on its way.

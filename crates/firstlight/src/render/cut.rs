@@ -11,8 +11,8 @@ use std::collections::BinaryHeap;
 
 use crate::color::{DisplaySteps, Rgb};
 use crate::integrate::COSTS;
-use crate::light::{Held, LightNode, LightTree, Sent, Zone, ZoneSight};
-use crate::material::MOMENTS;
+use crate::light::{ContributionBounds, LightNode, LightTree, NodeContents, ReceiverBounds};
+use crate::material::{Colors, MOMENTS};
 use crate::visibility::Seen;
 
 /// The colours that a zone's places make of light.
@@ -23,7 +23,7 @@ pub(super) struct Tone {
     /// What diffuse light is multiplied with, at least.
     pub known: Rgb,
     /// What an error of diffuse light and of highlights is multiplied with, at most.
-    pub error: Sent,
+    pub error: Colors,
 }
 
 /// What the walk goes through, and by which rules.
@@ -31,7 +31,7 @@ pub(super) struct Tone {
 pub(super) struct CutRules<'a> {
     pub tree: &'a LightTree,
     pub steps: &'a DisplaySteps,
-    pub zone: &'a Zone,
+    pub receivers: &'a ReceiverBounds,
     pub tones: &'a [Tone],
     /// In display steps.
     pub budget: f32,
@@ -56,13 +56,13 @@ pub(super) struct CutItem {
     node: u32,
     by: By,
     /// How far it can be wrong to take it as it is, and how much of that shows at most.
-    error: Sent,
+    error: Colors,
     key: f32,
     /// What it sends to the zone, thereabouts, if its power were 1.
     typical: f32,
     /// Whether it was asked what is seen of it.
     looked: bool,
-    sight: ZoneSight,
+    bounds: ContributionBounds,
 }
 
 /// Sums of products of errors, channel by channel: diffuse with itself, with highlights, highlights with themselves.
@@ -125,7 +125,7 @@ impl By {
 }
 
 impl CutRules<'_> {
-    fn key(&self, error: &Sent) -> f32 {
+    fn key(&self, error: &Colors) -> f32 {
         self.tones.iter().fold(0.0, |key, tone| {
             let shown = (tone.error * *error).sum();
             shown.r.max(shown.g).max(shown.b).max(key)
@@ -139,7 +139,7 @@ impl CutRules<'_> {
 
 impl Squares {
     /// Adds an error, or takes it away, `sign` being 1 or -1.
-    fn add(&mut self, error: &Sent, sign: f64) {
+    fn add(&mut self, error: &Colors, sign: f64) {
         let errors = error.0.map(of);
         for (sum, [a, b]) in self.0.iter_mut().zip(PAIRS) {
             (0..3).for_each(|i| sum[i] += errors[a][i] * errors[b][i] * sign);
@@ -147,7 +147,7 @@ impl Squares {
     }
 
     /// How far all can be wrong together where diffuse light and highlights are multiplied with `colors`.
-    fn of(&self, colors: &Sent) -> Rgb {
+    fn of(&self, colors: &Colors) -> Rgb {
         let colors = colors.0.map(of);
         let [r, g, b] = std::array::from_fn(|i| {
             let parts = self.0.iter().zip(PAIRS).map(|(sum, [a, b])| {
@@ -162,35 +162,35 @@ impl Squares {
 
 impl CutItem {
     /// A node as it counts, `lit` if it is known to be seen whole.
-    fn new(rules: &CutRules, index: u32, sight: ZoneSight, lit: bool) -> CutItem {
+    fn new(rules: &CutRules, index: u32, bounds: ContributionBounds, lit: bool) -> CutItem {
         let node = &rules.tree.nodes[index as usize];
-        let by = match (lit, sight.whole && node.is_smooth()) {
+        let by = match (lit, bounds.is_smooth) {
             (true, true) => By::Middle,
             (true, false) => By::One,
             (false, true) => By::MiddleIfSeen,
             (false, false) => By::OneIfSeen,
         };
-        let error = match (by, node.held) {
-            (By::Middle, _) => node.error(&sight),
+        let error = match (by, node.contents) {
+            (By::Middle, _) => node.error(&bounds),
             // Asked at each place, it is what it is
-            (_, Held::Light(_)) if node.is_point() => Sent::default(),
+            (_, NodeContents::Light(_)) if node.is_point() => Colors::default(),
             // Between nothing and the most nothing is farther off its mean, in the mean, than half of that
-            _ => node.most(&sight) * 0.5,
+            _ => node.max_contribution(&bounds) * 0.5,
         };
         let part = if by.is_everywhere() { 1.0 } else { COSTS.maybe };
-        let typical = part * 0.5 * (sight.least + sight.diffuse.min(1e3 * sight.least));
-        CutItem { node: index, by, error, key: rules.key(&error), typical, looked: lit, sight }
+        let typical = part * 0.5 * (bounds.min_diffuse + bounds.max_diffuse.min(1e3 * bounds.min_diffuse));
+        CutItem { node: index, by, error, key: rules.key(&error), typical, looked: lit, bounds }
     }
 
     /// The item as one that is seen whole, if it counts as its middle then.
     fn as_middle(&self, rules: &CutRules) -> Option<CutItem> {
-        (self.by == By::MiddleIfSeen).then(|| CutItem::new(rules, self.node, self.sight, true))
+        (self.by == By::MiddleIfSeen).then(|| CutItem::new(rules, self.node, self.bounds, true))
     }
 
     /// Whether it is worth a look how much of it is seen.
     fn is_worth_a_look(&self, rules: &CutRules, node: &LightNode) -> bool {
-        self.sight.width < COSTS.wide
-            || self.by == By::MiddleIfSeen && rules.key(&node.error(&self.sight)) <= COSTS.looked_at * self.key
+        self.bounds.sin_half_angle < COSTS.wide
+            || self.by == By::MiddleIfSeen && rules.key(&node.error(&self.bounds)) <= COSTS.looked_at * self.key
     }
 }
 
@@ -207,9 +207,9 @@ impl Cut {
 
     /// Adds a node, but for one that sends nothing.
     fn push(&mut self, rules: &CutRules, index: u32, lit: bool) {
-        let sight = rules.tree.nodes[index as usize].shine.sight(rules.zone);
-        if sight.weight != 0.0 {
-            self.add(rules, CutItem::new(rules, index, sight, lit));
+        let bounds = rules.tree.nodes[index as usize].bounds.contribution(rules.receivers);
+        if bounds.max_weight != 0.0 {
+            self.add(rules, CutItem::new(rules, index, bounds, lit));
         }
     }
 
@@ -244,7 +244,7 @@ impl Cut {
     }
 
     /// How far all that is in question can be wrong where diffuse light and highlights are multiplied with `colors`.
-    pub fn error(&self, colors: &Sent) -> Rgb {
+    pub fn error(&self, colors: &Colors) -> Rgb {
         self.errors.of(colors)
     }
 
@@ -296,9 +296,9 @@ impl Cut {
                     Seen::Unknown => {}
                 }
             }
-            match node.held {
-                Held::Light(light) => self.open.push(light),
-                Held::Two(children) => children.into_iter().for_each(|child| self.push(rules, child, lit)),
+            match node.contents {
+                NodeContents::Light(light) => self.open.push(light),
+                NodeContents::Children(children) => children.into_iter().for_each(|child| self.push(rules, child, lit)),
             }
         }
     }

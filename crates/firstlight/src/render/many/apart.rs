@@ -5,8 +5,8 @@ use super::block::sent;
 use crate::color::Rgb;
 use crate::film::resolve::ScaledTerm;
 use crate::image::Buffer;
-use crate::light::{Held, LightTree, Sent};
-use crate::material::Bsdf;
+use crate::light::{LightTree, NodeContents};
+use crate::material::{Bsdf, Colors};
 use crate::render::arrival::Arrivals;
 use crate::scene::Scene;
 use crate::shape::SurfaceInteraction;
@@ -22,7 +22,7 @@ pub(super) struct Apart<'a> {
 }
 
 /// What some lights send to one pixel, each by its number, as often as it was added.
-pub(super) type SentApart = Vec<(u32, Sent)>;
+pub(super) type SentApart = Vec<(u32, Colors)>;
 
 impl<'a> Apart<'a> {
     pub fn new(scene: &'a Scene, tree: &'a LightTree, buffers: &[Buffer]) -> Self {
@@ -40,9 +40,9 @@ impl<'a> Apart<'a> {
 
     /// Whether a node holds one of them; it and its nodes are marked.
     fn mark(&mut self, node: u32) -> bool {
-        let holds = match self.tree.nodes[node as usize].held {
-            Held::Light(light) => self.lights[light as usize],
-            Held::Two(two) => two.map(|node| self.mark(node)).contains(&true),
+        let holds = match self.tree.nodes[node as usize].contents {
+            NodeContents::Light(light) => self.lights[light as usize],
+            NodeContents::Children(children) => children.map(|node| self.mark(node)).contains(&true),
         };
         self.nodes[node as usize] = holds;
         holds
@@ -54,11 +54,13 @@ impl<'a> Apart<'a> {
         if !self.nodes.get(node as usize).is_some_and(|holds| *holds) {
             return;
         }
-        match self.tree.nodes[node as usize].held {
-            Held::Light(light) => {
+        match self.tree.nodes[node as usize].contents {
+            NodeContents::Light(light) => {
                 to.push((light, bsdf.colors * sent(self.scene, self.tree, entry, si, &bsdf.lobe) * times));
             }
-            Held::Two(two) => two.into_iter().for_each(|node| self.add(to, node | one, si, bsdf, times)),
+            NodeContents::Children(children) => {
+                children.into_iter().for_each(|node| self.add(to, node | one, si, bsdf, times))
+            }
         }
     }
 
@@ -70,7 +72,7 @@ impl<'a> Apart<'a> {
             let scale = arrivals.scale(same[0].0 as usize);
             let of = |sent: f32, scale: f32| if scale > 0.0 { sent / scale } else { 0.0 };
             let unscaled = |sent: Rgb| Rgb::new(of(sent.r, scale.r), of(sent.g, scale.g), of(sent.b, scale.b));
-            let term = same.iter().fold(Sent::BLACK, |sum, (_, sent)| sum + *sent).map(unscaled);
+            let term = same.iter().fold(Colors::BLACK, |sum, (_, sent)| sum + *sent).map(unscaled);
             scaled.push(ScaledTerm { light: Some(same[0].0), scale, term });
         }
     }

@@ -3,13 +3,13 @@
 use std::ops::Range;
 
 use super::patch::Patch;
-use super::places::{standing, tones, zone};
+use super::places::{receiver_bounds, standing, tones};
 use super::{BLOCK, CLOSE, LEVELS, Many, ONE, Single, Stored};
 use crate::color::Rgb;
 use crate::ids::LightId;
 use crate::integrate::{COSTS, TOLERANCE};
-use crate::light::{Extent, Held, LightNode, LightTree, Sends, Sent};
-use crate::material::{Lobe, Moments};
+use crate::light::{EmissionProfile, Extent, LightNode, LightTree, NodeContents};
+use crate::material::{Colors, Lobe, Moments};
 use crate::math::Vec3;
 use crate::render::arrival::{ArrivalPlace, Arrivals};
 use crate::render::counts::Counts;
@@ -45,19 +45,19 @@ impl<'a> Many<'a> {
     ) {
         let (scene, tree) = (self.scene, self.tree);
         let patch = |number: &usize| &patches[*number];
-        let zone = zone(group.iter().map(patch), self.eye);
+        let receivers = receiver_bounds(group.iter().map(patch), self.eye);
         let tones = tones(scene, group.iter().map(patch));
         let receives = group.iter().any(|at| patch(at).si.receives_shadow);
         self.outlook.stand(scene, group.iter().map(|at| standing(patch(at))));
         let steps = arrivals.display_steps();
-        let rules = CutRules { tree, steps, zone: &zone, tones: &tones, budget: TOLERANCE.crowd };
+        let rules = CutRules { tree, steps, receivers: &receivers, tones: &tones, budget: TOLERANCE.crowd };
         let mut cut = std::mem::take(&mut self.cut);
         let (simd, outlook, fence) = (arrivals.level(), &mut self.outlook, &mut self.fence);
         let mut look = |node: &LightNode, light: u32| {
             if !(receives && node.shadows) {
                 return Seen::Whole;
             }
-            outlook.look(simd, scene, node.shine.low, node.shine.high, LightId(light))
+            outlook.look(simd, scene, node.bounds.low, node.bounds.high, LightId(light))
         };
         let links = scene.geometry.lights_of(patch(&group[0]).si.surface);
         let shines = |root: &&u32| {
@@ -184,13 +184,13 @@ impl<'a> Many<'a> {
 impl Dot {
     pub(super) fn new(tree: &LightTree, entry: u32) -> Dot {
         let node = &tree.nodes[(entry & !ONE) as usize];
-        let one = &tree.nodes[node.one as usize];
-        let light = match one.held {
-            Held::Light(light) => light,
-            Held::Two(_) => one.first(tree),
+        let one = &tree.nodes[node.representative as usize];
+        let light = match one.contents {
+            NodeContents::Light(light) => light,
+            NodeContents::Children(_) => one.first(tree),
         };
-        let finite = one.shine.sends != Sends::Parallel;
-        let at = if finite { one.shine.ball().0 } else { one.shine.low };
+        let finite = one.bounds.profile != EmissionProfile::Directional;
+        let at = if finite { one.bounds.ball().0 } else { one.bounds.low };
         Dot { entry, light, at, finite, shadows: node.shadows }
     }
 
@@ -212,17 +212,17 @@ pub(super) fn entry(node: u32, by: By) -> u32 {
 
 /// What an entry of a list of nodes sends: diffuse and specular, before the colours of the surface.
 #[inline(always)]
-pub(super) fn sent(scene: &Scene, tree: &LightTree, entry: u32, si: &SurfaceInteraction, lobe: &Lobe) -> Sent {
+pub(super) fn sent(scene: &Scene, tree: &LightTree, entry: u32, si: &SurfaceInteraction, lobe: &Lobe) -> Colors {
     let node = &tree.nodes[(entry & !ONE) as usize];
     if entry & ONE == 0 {
-        return node.send(si.lit_from, si.ns, si.wo, lobe);
+        return node.estimate(si.lit_from, si.ns, si.wo, lobe);
     }
-    sent_by_one(scene, &tree.nodes[node.one as usize], si, lobe).colors(|sent| node.power * sent)
+    sent_by_one(scene, &tree.nodes[node.representative as usize], si, lobe).colors(|sent| node.power * sent)
 }
 
 /// What one light would send if its power were 1.
 pub(super) fn sent_by_one(scene: &Scene, one: &LightNode, si: &SurfaceInteraction, lobe: &Lobe) -> Moments {
-    let Held::Light(light) = one.held else { return Moments::ZERO };
+    let NodeContents::Light(light) = one.contents else { return Moments::ZERO };
     let light = &scene.lights[light as usize];
     let k = light.samples() / 2;
     let l = light.towards(k, si.lit_from).l;
@@ -231,7 +231,7 @@ pub(super) fn sent_by_one(scene: &Scene, one: &LightNode, si: &SurfaceInteractio
         return Moments::ZERO;
     }
     match light.extent() {
-        Extent::Area(_) if one.is_smooth() => return one.send_one(si.lit_from, si.ns, si.wo, lobe),
+        Extent::Area(_) if one.has_estimate() => return one.unit_estimate(si.lit_from, si.ns, si.wo, lobe),
         Extent::Area(_) | Extent::Point => {}
     }
     let Some(sample) = light.sample(k, l) else { return Moments::ZERO };

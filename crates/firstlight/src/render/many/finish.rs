@@ -9,8 +9,7 @@ use super::{ANYTHING, Many, Single, Stored};
 use crate::color::Rgb;
 use crate::film::resolve::ScaledTerm;
 use crate::integrate::TOLERANCE;
-use crate::light::Sent;
-use crate::material::Moments;
+use crate::material::{Colors, Moments};
 use crate::render::arrival::{ArrivalPlace, Arrivals};
 use crate::render::counts::Counts;
 use crate::render::fence::Fence;
@@ -47,7 +46,7 @@ impl<'a> Many<'a> {
         let mut kept = std::mem::take(&mut self.kept);
         kept.clear();
         let (mut rays, mut found) = (Vec::new(), Vec::new());
-        let mut together = Sent::BLACK;
+        let mut together = Colors::BLACK;
         for number in pixel {
             let patch = &patches.all[number];
             let count = patch.count as f32;
@@ -76,7 +75,7 @@ impl<'a> Many<'a> {
             for doubt in &doubts {
                 let Some(i) = doubt.single else {
                     for (si, bsdf) in &rays {
-                        let mut sum = Sent::BLACK;
+                        let mut sum = Colors::BLACK;
                         self.seen_at(stored, &mut fence, si, |entry| {
                             sum += sent(scene, self.tree, entry, si, &bsdf.lobe);
                             self.apart.add(&mut kept, entry, si, bsdf, 1.0);
@@ -96,7 +95,7 @@ impl<'a> Many<'a> {
         // In scene order
         terms.sort_by_key(|(light, _)| *light);
         for same in terms.chunk_by(|a, b| a.0 == b.0) {
-            let term = same.iter().fold(Sent::BLACK, |sum, (_, term)| sum + *term);
+            let term = same.iter().fold(Colors::BLACK, |sum, (_, term)| sum + *term);
             let light = same[0].0;
             scaled.push(ScaledTerm { light: Some(light), scale: arrivals.scale(light as usize), term });
         }

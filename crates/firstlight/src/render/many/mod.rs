@@ -25,8 +25,8 @@ use super::fragment::Fragments;
 use crate::color::Rgb;
 use crate::film::resolve::ScaledTerm;
 use crate::image::Buffer;
-use crate::light::{LightTree, Sent};
-use crate::material::Lobe;
+use crate::light::LightTree;
+use crate::material::{Colors, Lobe};
 use crate::math::{Vec3, square};
 use crate::scene::Scene;
 use crate::visibility::Outlook;
@@ -67,7 +67,7 @@ pub(super) struct Many<'a> {
     lit: Vec<u32>,
     /// Nodes that count where they are seen, block by block.
     dots: Vec<Dot>,
-    terms: Vec<(u32, Sent)>,
+    terms: Vec<(u32, Colors)>,
     doubts: Vec<Doubt>,
     apart: Apart<'a>,
     kept: SentApart,
@@ -89,8 +89,8 @@ struct Stored {
     /// The dots of its block; those that are seen are among its own nodes.
     maybe: Range<u32>,
     /// What those send, and how far the mean over the patch can be from it.
-    sent: Sent,
-    bend: Sent,
+    sent: Colors,
+    bend: Colors,
     value: Rgb,
 }
 
@@ -210,15 +210,15 @@ impl<'a> Many<'a> {
             let node = &self.tree.nodes[(entry & !ONE) as usize];
             stored.sent += sent;
             if patch.reach > 0.0 {
-                let swing = patch.turn + patch.reach / node.distance(si.lit_from).max(patch.reach);
+                let swing = patch.turn + patch.reach / node.distance_from(si.lit_from).max(patch.reach);
                 // No second derivative of what a far light sends is more, over the square of its distance and what it
                 // sends
                 let smooth = (swing * swing).min(1.0) * 3.0;
-                let weight = node.weight(si.lit_from);
+                let weight = node.weight_at(si.lit_from);
                 let moved = swing + patch.turn;
                 let narrow = (lobe.sharpness(si.ns.dot(si.wo)) * square(moved)).min(1.0);
                 let specular = if matches!(lobe, Lobe::None) { 0.0 } else { (narrow + smooth).min(1.0) };
-                stored.bend += Sent::bounds(node.power * (weight * smooth), node.power * (weight * specular));
+                stored.bend += Colors::bounds(node.power * (weight * smooth), node.power * (weight * specular));
             }
         }
     }

@@ -2,9 +2,9 @@
 
 use super::TONES;
 use super::patch::Patch;
-use crate::light::Zone;
+use crate::light::ReceiverBounds;
 use crate::material::{Bsdf, Lobe};
-use crate::math::{Arc, Vec3};
+use crate::math::{Arc, DirectionCone, Vec3};
 use crate::render::cut::Tone;
 use crate::scene::Scene;
 use crate::shape::SurfaceInteraction;
@@ -24,8 +24,8 @@ pub(super) fn mirror(si: &SurfaceInteraction) -> Vec3 {
     si.ns * (2.0 * si.ns.dot(si.wo)) - si.wo
 }
 
-/// The zone of some patches, of one surface and one highlight.
-pub(super) fn zone<'p>(patches: impl Iterator<Item = &'p Patch> + Clone, eye: Vec3) -> Zone {
+/// The bounds of some patches of one surface and one lobe.
+pub(super) fn receiver_bounds<'p>(patches: impl Iterator<Item = &'p Patch> + Clone, eye: Vec3) -> ReceiverBounds {
     let (mut low, mut high) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
     let (mut n, mut m, mut w) = (Vec3::ZERO, Vec3::ZERO, Vec3::ZERO);
     let mut lobe = Lobe::None;
@@ -36,25 +36,16 @@ pub(super) fn zone<'p>(patches: impl Iterator<Item = &'p Patch> + Clone, eye: Ve
     }
     let center = low + (high - low) * 0.5;
     let (n, m, w) = (n.normalize_or(Vec3::Y), m.normalize_or(Vec3::Y), w.normalize_or(Vec3::Y));
-    let (mut reach, mut turn, mut blur, mut wo_turn) = (0.0f32, 0.0f32, 0.0f32, 0.0f32);
+    let (mut radius, mut turn, mut blur, mut wo_turn) = (0.0f32, 0.0f32, 0.0f32, 0.0f32);
     for Patch { si, reach: around, turn: turns, .. } in patches {
         let swing = around / (si.lit_from - eye).length().max(*around).max(f32::MIN_POSITIVE);
-        reach = reach.max((si.lit_from - center).length() + around);
+        radius = radius.max((si.lit_from - center).length() + around);
         turn = turn.max((si.ns - n).length().max((si.horizon - n).length()) + turns);
         blur = blur.max((mirror(si) - m).length() + 2.0 * turns + swing);
         wo_turn = wo_turn.max((si.wo - w).length() + swing);
     }
-    Zone {
-        center,
-        reach,
-        n,
-        turn: Arc::of_chord(turn),
-        mirror: m,
-        blur: Arc::of_chord(blur),
-        wo: w,
-        wo_turn: Arc::of_chord(wo_turn),
-        lobe,
-    }
+    let cone = |axis: Vec3, chord: f32| DirectionCone { axis, angle: Arc::of_chord(chord) };
+    ReceiverBounds { center, radius, normals: cone(n, turn), mirrors: cone(m, blur), wo: cone(w, wo_turn), lobe }
 }
 
 pub(super) fn tone(scene: &Scene, bsdf: &Bsdf) -> Tone {
