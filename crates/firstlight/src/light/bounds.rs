@@ -189,7 +189,7 @@ impl LightBounds {
         // The directions from the receivers to the lights: within `spread` of `d`
         let to = center - receivers.center;
         let (distance, reach) = (to.length(), radius + receivers.radius);
-        let inside = !is_directional && !(distance * ROOM > reach && reach < distance);
+        let inside = !(is_directional || reach < distance);
         let (d, sin_half_angle) = match (is_directional, inside) {
             (true, _) => (self.low, 0.0),
             (false, true) => (normals.axis, 1.0),

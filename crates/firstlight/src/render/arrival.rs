@@ -556,7 +556,7 @@ impl<'a> Arrivals<'a> {
                 self.indices.clear();
                 self.indices.extend(0..points.len() as u32);
                 let shaft = Shaft::of(points, &self.indices, &target.hull);
-                trees.gather_in(self.level, scene, target, &shaft, points, &self.indices, LEAVES);
+                trees.gather_in(self.level, scene, target, &shaft, LEAVES);
             }
         }
         if !trees.has_meshes() && lights.know(index, trees.others.iter().copied()) {

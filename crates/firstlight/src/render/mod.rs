@@ -15,7 +15,6 @@ mod cell;
 mod change;
 mod counts;
 mod cut;
-mod fence;
 mod fragment;
 #[cfg(feature = "bench")]
 pub(crate) mod given;
@@ -25,6 +24,7 @@ mod lanes;
 mod leaves;
 mod light_queue;
 mod lights;
+mod listed_occluder_cache;
 mod many;
 mod packets;
 pub(crate) mod pixel;

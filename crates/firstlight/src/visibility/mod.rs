@@ -10,9 +10,9 @@
 //!
 //! Before it stand the scene and its shapes; after it, the renderer.
 
+mod cluster_visibility;
 mod mask;
 mod occluders;
-mod outlook;
 mod resolver;
 mod shaft;
 mod target;
@@ -20,8 +20,8 @@ mod target;
 mod tests;
 mod view;
 
+pub(crate) use cluster_visibility::ClusterVisibility;
 pub(crate) use occluders::{OccluderList, ShadowMesh};
-pub(crate) use outlook::{Outlook, Seen};
 pub(crate) use resolver::{VisibilityResolver, VisibilityStats};
 pub(crate) use shaft::Shaft;
 pub(crate) use target::Target;
@@ -49,6 +49,11 @@ impl Viewpoint {
     pub fn of(si: &SurfaceInteraction) -> Self {
         let start = si.shadow_start();
         Viewpoint { p: si.lit_from, error: si.error, start, horizon: si.horizon, ns: si.ns, but: si.facet }
+    }
+
+    /// The distance of `start` from `p` along each axis, rounded up.
+    pub fn apart(&self) -> Vec3 {
+        (self.start - self.p).abs() * 1.0001
     }
 
     /// A ray along `l` towards a light.

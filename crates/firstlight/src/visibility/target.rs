@@ -81,7 +81,7 @@ pub(crate) struct Target {
 const ROOM: f64 = 1e-5;
 
 impl LightHull {
-    fn at(center: Vec3, finite: bool) -> Self {
+    pub fn at(center: Vec3, finite: bool) -> Self {
         LightHull { center, axes: [Vec3::ZERO; 3], finite, is_ball: false, plane: Vec3::ZERO }
     }
 

@@ -1,6 +1,6 @@
 //! Lights that are kept apart of what is taken together: what each sends by itself, beside the sum.
 
-use super::ONE;
+use super::BY_REPRESENTATIVE;
 use super::block::sent;
 use crate::color::Rgb;
 use crate::film::resolve::ScaledTerm;
@@ -50,7 +50,7 @@ impl<'a> Apart<'a> {
 
     /// Adds to `to` what those of an entry of a list of nodes send to a place, so many times.
     pub fn add(&self, to: &mut SentApart, entry: u32, si: &SurfaceInteraction, bsdf: &Bsdf, times: f32) {
-        let (node, one) = (entry & !ONE, entry & ONE);
+        let (node, one) = (entry & !BY_REPRESENTATIVE, entry & BY_REPRESENTATIVE);
         if !self.nodes.get(node as usize).is_some_and(|holds| *holds) {
             return;
         }

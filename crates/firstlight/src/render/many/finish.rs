@@ -1,26 +1,27 @@
-//! From what arrives at patches to the colour of a pixel: what is in doubt is asked at each ray.
+//! From what arrives at patches to the colour of a pixel: terms with too large an error are evaluated at each camera
+//! ray.
 
 use std::ops::Range;
 
 use super::apart::Apart;
 use super::block::sent;
 use super::patch::Patches;
-use super::{ANYTHING, Many, Single, Stored};
+use super::{ANYTHING, Many, PatchLight, SingleLight};
 use crate::color::Rgb;
 use crate::film::resolve::ScaledTerm;
 use crate::integrate::TOLERANCE;
 use crate::material::{Colors, Moments};
 use crate::render::arrival::{ArrivalPlace, Arrivals};
 use crate::render::counts::Counts;
-use crate::render::fence::Fence;
 use crate::render::fragment::Fragments;
+use crate::render::listed_occluder_cache::ListedOccluderCache;
 use crate::shape::SurfaceInteraction;
 
-/// A light, or all that are taken together, whose mean over a patch is in doubt.
+/// A single light, or all nodes together, whose value at the middle of a patch may differ too much from the mean.
 #[derive(Clone, Copy)]
-pub(super) struct Doubt {
+pub(super) struct UncertainTerm {
     shown: f32,
-    /// Among the singles; `None` for the rest.
+    /// The index among single lights; `None` for the nodes.
     single: Option<u32>,
     error: Rgb,
 }
@@ -40,8 +41,8 @@ impl<'a> Many<'a> {
     ) {
         let scene = self.scene;
         let mut terms = std::mem::take(&mut self.terms);
-        let mut fence = std::mem::take(&mut self.fence);
-        let mut doubts = std::mem::take(&mut self.doubts);
+        let mut cache = std::mem::take(&mut self.cache);
+        let mut uncertain = std::mem::take(&mut self.uncertain);
         terms.clear();
         let mut kept = std::mem::take(&mut self.kept);
         kept.clear();
@@ -51,32 +52,33 @@ impl<'a> Many<'a> {
             let patch = &patches.all[number];
             let count = patch.count as f32;
             let stored = &self.stored[number];
-            self.doubts_of(patches, number, arrivals, &mut doubts);
-            doubts.sort_unstable_by_key(|doubt| doubt.single);
-            let in_doubt = |single: Option<u32>| doubts.binary_search_by_key(&single, |doubt| doubt.single).is_ok();
+            self.uncertain_terms(patches, number, arrivals, &mut uncertain);
+            uncertain.sort_unstable_by_key(|term| term.single);
+            let is_uncertain =
+                |single: Option<u32>| uncertain.binary_search_by_key(&single, |term| term.single).is_ok();
             let bsdf = &patch.bsdf;
-            if !in_doubt(None) {
+            if !is_uncertain(None) {
                 together += bsdf.colors * stored.sent * count;
                 self.nodes(stored).for_each(|entry| self.apart.add(&mut kept, entry, &patch.si, bsdf, count));
             }
             for i in stored.singles.clone() {
-                if !in_doubt(Some(i)) {
-                    let Single { light, arrival } = self.singles[i as usize];
+                if !is_uncertain(Some(i)) {
+                    let SingleLight { light, arrival } = self.singles[i as usize];
                     let sums = arrival.sums * count;
                     terms.push((light, bsdf.colors.each(&sums)));
                 }
             }
-            if doubts.is_empty() {
+            if uncertain.is_empty() {
                 continue;
             }
-            arrivals.tolerate(TOLERANCE.integrals / (doubts.len() as f32).sqrt());
+            arrivals.tolerate(TOLERANCE.integrals / (uncertain.len() as f32).sqrt());
             rays.clear();
             patch.for_each(scene, fragments, |si, bsdf| rays.push((*si, *bsdf)));
-            for doubt in &doubts {
-                let Some(i) = doubt.single else {
+            for term in &uncertain {
+                let Some(i) = term.single else {
                     for (si, bsdf) in &rays {
                         let mut sum = Colors::BLACK;
-                        self.seen_at(stored, &mut fence, si, |entry| {
+                        self.visible_nodes(stored, &mut cache, si, |entry| {
                             sum += sent(scene, self.tree, entry, si, &bsdf.lobe);
                             self.apart.add(&mut kept, entry, si, bsdf, 1.0);
                         });
@@ -102,24 +104,33 @@ impl<'a> Many<'a> {
         // Of many scales
         scaled.push(ScaledTerm { light: None, scale: Rgb::WHITE, term: together });
         Apart::finish(&mut kept, arrivals, apart);
-        (self.terms, self.fence, self.doubts, self.kept) = (terms, fence, doubts, kept);
+        (self.terms, self.cache, self.uncertain, self.kept) = (terms, cache, uncertain, kept);
     }
 
-    /// Calls `each` with the nodes that are seen from where one camera ray ends.
-    fn seen_at(&self, stored: &Stored, fence: &mut Fence, si: &SurfaceInteraction, mut each: impl FnMut(u32)) {
+    /// Calls `each` with the nodes that are visible from the end of one camera ray.
+    fn visible_nodes(
+        &self,
+        stored: &PatchLight,
+        cache: &mut ListedOccluderCache,
+        si: &SurfaceInteraction,
+        mut each: impl FnMut(u32),
+    ) {
         if stored.maybe.is_empty() {
             return self.nodes(stored).for_each(each);
         }
         let list = |range: &Range<u32>| &self.lit[range.start as usize..range.end as usize];
         list(&stored.lit[0]).iter().for_each(|entry| each(*entry));
-        fence.stand(self.scene, si);
-        let dots = &self.dots[stored.maybe.start as usize..stored.maybe.end as usize];
-        dots.iter().filter(|dot| dot.arrives(self.scene, fence, si)).for_each(|dot| each(dot.entry));
+        cache.set_receiver(self.scene, si);
+        let representatives = &self.representatives[stored.maybe.start as usize..stored.maybe.end as usize];
+        representatives
+            .iter()
+            .filter(|light| light.is_visible(self.scene, cache, si))
+            .for_each(|light| each(light.entry));
     }
 
     /// How far the mean over a patch can be from what arrives at its middle because other lights are seen from
     /// elsewhere on it: as its neighbours tell, and anything where they do not.
-    fn flicker(&self, patches: &Patches, number: usize) -> Rgb {
+    fn visibility_error(&self, patches: &Patches, number: usize) -> Rgb {
         let (patch, stored) = (&patches.all[number], &self.stored[number]);
         if patch.reach == 0.0 || stored.maybe.is_empty() {
             return Rgb::BLACK;
@@ -140,42 +151,48 @@ impl<'a> Many<'a> {
         all
     }
 
-    /// What of the light at a patch has to be asked for at each ray. All the rest may together bend by as much as one
-    /// may.
-    fn doubts_of(&self, patches: &Patches, number: usize, arrivals: &Arrivals, doubts: &mut Vec<Doubt>) {
-        doubts.clear();
+    /// The terms of a patch that have to be evaluated at each ray. The errors of all others together are within the
+    /// tolerance for one point.
+    fn uncertain_terms(
+        &self,
+        patches: &Patches,
+        number: usize,
+        arrivals: &Arrivals,
+        uncertain: &mut Vec<UncertainTerm>,
+    ) {
+        uncertain.clear();
         let (patch, stored) = (&patches.all[number], &self.stored[number]);
         let (bsdf, value) = (&patch.bsdf, stored.value);
         let mut all = Rgb::BLACK;
-        let mut doubt = |single: Option<u32>, error: Rgb| {
+        let mut push = |single: Option<u32>, error: Rgb| {
             all += error;
-            doubts.push(Doubt { shown: 0.0, single, error });
+            uncertain.push(UncertainTerm { shown: 0.0, single, error });
         };
         if stored.lit.iter().any(|range| !range.is_empty()) {
             let smooth = (bsdf.colors * stored.bend).sum();
-            doubt(None, smooth + self.flicker(patches, number));
+            push(None, smooth + self.visibility_error(patches, number));
         }
         let shown = |light: u32, bend: &Moments| {
             let scale = arrivals.scale(light as usize);
             (scale * bsdf.colors).of(bend)
         };
         for i in stored.singles.clone() {
-            let Single { light, arrival } = &self.singles[i as usize];
-            doubt(Some(i), shown(*light, &arrival.bend));
+            let SingleLight { light, arrival } = &self.singles[i as usize];
+            push(Some(i), shown(*light, &arrival.bend));
         }
         if arrivals.steps(value, all) <= TOLERANCE.point {
-            doubts.clear();
+            uncertain.clear();
             return;
         }
-        for doubt in &mut *doubts {
-            doubt.shown = arrivals.steps(value, doubt.error);
+        for term in &mut *uncertain {
+            term.shown = arrivals.steps(value, term.error);
         }
-        // The least first: as many as will do together
-        doubts.sort_unstable_by(|a, b| a.shown.total_cmp(&b.shown).then(a.single.cmp(&b.single)));
+        // Leave out the smallest errors, as long as their sum is within the tolerance
+        uncertain.sort_unstable_by(|a, b| a.shown.total_cmp(&b.shown).then(a.single.cmp(&b.single)));
         let mut sum = Rgb::BLACK;
-        doubts.retain(|doubt| {
-            if arrivals.steps(value, sum + doubt.error) <= TOLERANCE.point {
-                sum += doubt.error;
+        uncertain.retain(|term| {
+            if arrivals.steps(value, sum + term.error) <= TOLERANCE.point {
+                sum += term.error;
                 return false;
             }
             true

@@ -1,21 +1,21 @@
-//! Patches that are looked at together: their zone and their colours.
+//! Bounds of the patches of a block, and of their colours.
 
-use super::TONES;
+use super::MAX_COLORS;
 use super::patch::Patch;
 use crate::light::ReceiverBounds;
 use crate::material::{Bsdf, Lobe};
 use crate::math::{Arc, DirectionCone, Vec3};
-use crate::render::cut::Tone;
+use crate::render::cut::ReceiverColors;
 use crate::scene::Scene;
 use crate::shape::SurfaceInteraction;
 use crate::visibility::Viewpoint;
 
-/// Whether two patches can be looked at together.
+/// Whether two patches can have one cut.
 pub(super) fn is_alike(a: &Patch, b: &Patch) -> bool {
     a.si.surface == b.si.surface && a.bsdf.lobe == b.bsdf.lobe && a.si.ns.dot(b.si.ns) > 0.0
 }
 
-pub(super) fn standing(patch: &Patch) -> (Viewpoint, f32, bool) {
+pub(super) fn receiver(patch: &Patch) -> (Viewpoint, f32, bool) {
     (Viewpoint::of(&patch.si), patch.reach, patch.turn > 0.0)
 }
 
@@ -48,26 +48,30 @@ pub(super) fn receiver_bounds<'p>(patches: impl Iterator<Item = &'p Patch> + Clo
     ReceiverBounds { center, radius, normals: cone(n, turn), mirrors: cone(m, blur), wo: cone(w, wo_turn), lobe }
 }
 
-pub(super) fn tone(scene: &Scene, bsdf: &Bsdf) -> Tone {
-    Tone { base: scene.ambient * bsdf.ambient, known: bsdf.colors.cosine(), error: bsdf.colors }
+pub(super) fn receiver_colors(scene: &Scene, bsdf: &Bsdf) -> ReceiverColors {
+    ReceiverColors { base: scene.ambient * bsdf.ambient, known: bsdf.colors.cosine(), error: bsdf.colors }
 }
 
 /// The colours of some patches: each once, or where they are too many the rest as one.
-pub(super) fn tones<'p>(scene: &Scene, patches: impl Iterator<Item = &'p Patch>) -> Vec<Tone> {
-    let mut tones: Vec<Tone> = Vec::with_capacity(TONES);
+pub(super) fn colors<'p>(scene: &Scene, patches: impl Iterator<Item = &'p Patch>) -> Vec<ReceiverColors> {
+    let mut colors: Vec<ReceiverColors> = Vec::with_capacity(MAX_COLORS);
     for patch in patches {
-        let new = tone(scene, &patch.bsdf);
-        let same = |tone: &Tone| tone.known == new.known && tone.error == new.error && tone.base == new.base;
-        if tones.iter().any(same) {
+        let new = receiver_colors(scene, &patch.bsdf);
+        let same =
+            |known: &ReceiverColors| known.known == new.known && known.error == new.error && known.base == new.base;
+        if colors.iter().any(same) {
             continue;
         }
-        if tones.len() < TONES {
-            tones.push(new);
+        if colors.len() < MAX_COLORS {
+            colors.push(new);
             continue;
         }
-        let last = &mut tones[TONES - 1];
-        *last =
-            Tone { base: last.base.min(new.base), known: last.known.min(new.known), error: last.error.max(new.error) };
+        let last = &mut colors[MAX_COLORS - 1];
+        *last = ReceiverColors {
+            base: last.base.min(new.base),
+            known: last.known.min(new.known),
+            error: last.error.max(new.error),
+        };
     }
-    tones
+    colors
 }
