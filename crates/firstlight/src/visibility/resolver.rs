@@ -1,4 +1,4 @@
-//! From many points and a light to what is seen from each.
+//! The visibility of one light from many points: the points are split until few occluders are in each shaft.
 
 use fearless_simd::Level;
 
@@ -9,46 +9,47 @@ use super::view::{ShadowView, Visibility};
 use crate::accel::Aabb;
 use crate::scene::Scene;
 
-/// Leaves of triangles gathered for many points; more, and the points are parted. With twice as many a ball of 7
-/// thousand triangles took a third longer, as did a terrain of a million.
-const MANY: usize = 8;
-/// Points that are taken one by one if they are not settled together.
-const FEW: usize = 16;
-/// Leaves looked at from one point, the nearest first, and how many more for each block of samples. What is hidden by
-/// none of them is traced. Ten times as many leave half as much to trace, and take twice the time on triangles of a
-/// pixel's size.
-const ONE: usize = 16;
-const ONE_MORE: usize = 1;
-/// Blocks of samples of a light that is integrated, for that.
-const UNKNOWN: usize = 64;
-/// Leaves in the way of a light that is integrated, of few points together: where there are more, rays are traced.
-const TRACED: usize = 32;
+/// The most leaves of triangles in the shaft of several points; with more the points are split. With twice as many a
+/// ball of 7 thousand triangles took a third longer, as did a terrain of a million.
+const MAX_LEAVES: usize = 8;
+/// Up to so many points are not split into quarters but into single points.
+const FEW_POINTS: usize = 16;
+/// The most leaves in the shaft of one point, nearest first, and how many more for each block of samples. Samples that
+/// none of them hides are traced. Ten times as many leave half as many samples to trace, and take twice the time on
+/// triangles of a pixel's size.
+const MAX_LEAVES_OF_POINT: usize = 16;
+const LEAVES_PER_BLOCK: usize = 1;
+/// The number of blocks to assume for that where the light has no samples, since it is integrated.
+const BLOCKS_OF_INTEGRATED: usize = 64;
+/// The most leaves in the shaft of few points to a light that is integrated; with more, rays are traced.
+const MAX_LEAVES_OF_FEW: usize = 32;
 
-/// Settles what is seen of lights, points together as long as little stands in the way. Keeps its memory.
+/// Computes the visibility of lights from points. Keeps its memory.
 #[derive(Debug, Default)]
 pub(crate) struct VisibilityResolver {
     pub occluders: OccluderList,
     pub view: ShadowView,
-    alone: OccluderList,
+    occluders_of_one: OccluderList,
     parts: Vec<(usize, usize)>,
 }
 
-/// What was done, for statistics.
+/// Counts of the work, for statistics.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct VisibilityStats {
-    /// By [`Visibility`].
+    /// Pairs of a point and a light, by [`Visibility`].
     pub classes: [u64; 4],
-    /// Shafts that something was gathered in.
+    /// Shafts that occluders were gathered in.
     pub shafts: u64,
-    /// What they held.
+    /// Occluders that they held, all together.
     pub occluders: u64,
-    /// Samples whose rays the trees were asked for.
+    /// Samples whose rays were traced through the trees.
     pub traced: u64,
 }
 
 impl VisibilityResolver {
-    /// Hears what of a light is seen from each of the `points` whose numbers are in `order`, in any order: `each` is
-    /// told which point, how much is seen, and by which view, which it may keep. The order of `order` is lost.
+    /// Computes the visibility of a light from those `points` whose indices are in `order`, which is permuted. Calls
+    /// `each`, in any order of the points, with the index, the visibility, and the occluders as that point sees them,
+    /// which it may take.
     #[allow(clippy::too_many_arguments, reason = "a light of a scene and points, as lists")]
     pub fn resolve(
         &mut self,
@@ -67,37 +68,37 @@ impl VisibilityResolver {
         }
         while let Some((start, end)) = parts.pop() {
             let part = &mut order[start..end];
-            let blocks = if target.blocks.is_empty() { UNKNOWN } else { target.blocks.len() };
-            let cap = if part.len() > 1 { MANY } else { ONE + ONE_MORE * blocks };
+            let blocks = if target.blocks.is_empty() { BLOCKS_OF_INTEGRATED } else { target.blocks.len() };
+            let cap = if part.len() > 1 { MAX_LEAVES } else { MAX_LEAVES_OF_POINT + LEAVES_PER_BLOCK * blocks };
             self.occluders.gather(level, scene, target, points, part, cap);
             counts.shafts += 1;
-            // What too much is in the way of is left to whoever traces rays, past what is in lists
+            // With too many leaves in the shaft of few points the caller traces rays through the trees
             let mut is_traced = false;
-            if self.occluders.too_many && part.len() <= FEW && target.blocks.is_empty() {
+            if self.occluders.too_many && part.len() <= FEW_POINTS && target.blocks.is_empty() {
                 if part.len() > 1 {
-                    self.occluders.gather(level, scene, target, points, part, TRACED);
+                    self.occluders.gather(level, scene, target, points, part, MAX_LEAVES_OF_FEW);
                     counts.shafts += 1;
                 }
                 is_traced = self.occluders.too_many;
-                // It may be in the ways of all together that so much is, not in those of each
+                // The shaft of all may hold so many leaves where those of single points hold few
                 if is_traced && part.len() > 1 {
-                    let cap = ONE + ONE_MORE * UNKNOWN;
-                    self.alone.gather(level, scene, target, points, &part[part.len() / 2..][..1], cap);
+                    let cap = MAX_LEAVES_OF_POINT + LEAVES_PER_BLOCK * BLOCKS_OF_INTEGRATED;
+                    self.occluders_of_one.gather(level, scene, target, points, &part[part.len() / 2..][..1], cap);
                     counts.shafts += 1;
-                    is_traced = self.alone.too_many;
+                    is_traced = self.occluders_of_one.too_many;
                 }
             }
             if is_traced {
                 self.occluders.leaves.clear();
             } else if self.occluders.too_many && part.len() > 1 {
-                if part.len() <= FEW {
+                if part.len() <= FEW_POINTS {
                     parts.extend((start..end).map(|i| (i, i + 1)));
                     continue;
                 }
-                // In four
-                let middle = halve(points, part);
+                // Split into quarters
+                let middle = split(points, part);
                 let (left, right) = part.split_at_mut(middle);
-                let quarters = [halve(points, left), middle, middle + halve(points, right), end - start];
+                let quarters = [split(points, left), middle, middle + split(points, right), end - start];
                 let mut first = 0;
                 for last in quarters {
                     if last > first {
@@ -121,8 +122,9 @@ impl VisibilityResolver {
     }
 }
 
-/// Parts points where their box is longest, and says how many are in the first part: at least one in each.
-fn halve(points: &[Viewpoint], part: &mut [u32]) -> usize {
+/// Splits points at the middle of their box along its longest axis, and returns the number of points in the first part:
+/// neither part is empty.
+fn split(points: &[Viewpoint], part: &mut [u32]) -> usize {
     let bounds = part.iter().fold(Aabb::EMPTY, |bounds, k| bounds.with(points[*k as usize].start));
     let size = bounds.max - bounds.min;
     let axis = if size.x >= size.y && size.x >= size.z { 0 } else { 1 + usize::from(size.z > size.y) };
