@@ -119,7 +119,7 @@ impl RenderSettings {
         let window = self.window(scene);
         let bytes = |buffers: &[Buffer]| buffers.iter().map(|buffer| buffer.plane().bytes()).sum::<usize>();
         let Passes { picture, unshadowed } = Passes::of(scene, &self.buffers);
-        // What is rendered is there when what is made of it is
+        // The films of the passes are in memory while the buffers are computed from them
         let pixel = bytes(&self.buffers).max((bytes(&picture) + bytes(&unshadowed) + bytes(&self.buffers)).div_ceil(2));
         let both = 2 * window.width as usize * window.height as usize * pixel;
         Vec::<u8>::new().try_reserve_exact(both).map_err(|_| {
@@ -128,7 +128,7 @@ impl RenderSettings {
         })
     }
 
-    /// What renders a scene by these settings.
+    /// The rules by which these settings render a scene.
     pub(crate) fn renderer_of(&self, scene: &Scene) -> Renderer {
         let areas = || scene.lights.iter().filter(|light| light.area().is_some());
         match self.renderer() {
@@ -142,7 +142,7 @@ impl RenderSettings {
         }
     }
 
-    /// What renders by these settings, whatever the scene.
+    /// The rules by which these settings render, independent of the scene.
     pub(crate) fn renderer(&self) -> Renderer {
         match (self.reference, self.visibility, self.aa_mode) {
             (true, ..) => Renderer::Reference,
@@ -172,7 +172,7 @@ pub(crate) enum Renderer {
 }
 
 impl Renderer {
-    /// Whether all lights are sampled, and that at every camera ray, whatever they say.
+    /// Whether all lights are sampled at every camera ray, also those that are to be integrated.
     pub fn samples_all(self) -> bool {
         matches!(self, Renderer::Reference | Renderer::Traced)
     }
