@@ -9,7 +9,7 @@
 //! the points and the farthest part of the tree, twice the padding for single rays, which in turn is twice what the
 //! triangle test needs (`accel/ray.rs`). The roundings of the six bounds and of the sides are below a tenth of it.
 //!
-//! Source: Haines, Wallace, "Shaft Culling for Efficient Ray-Traced Radiosity", 1991.
+//! Source: Haines, Wallace, "Shaft Culling for Efficient Ray-Cast Radiosity", 1991.
 
 use fearless_simd::{f32x8, prelude::*};
 

@@ -2,7 +2,7 @@
 //! light is evaluated at every one.
 //!
 //! Each block of pixels, or each of its quarters where many lights are near, has a [`Cut`]: nodes of the
-//! [`LightTree`](crate::light::LightTree), estimated by their centroid or by a representative light, and single lights
+//! [`LightTree`], estimated by their centroid or by a representative light, and single lights
 //! that are integrated. Its error is at most `TOLERANCE.crowd` display steps, as the root of a sum of squares. Cells
 //! and blocks lie on a grid of the film, so nothing depends on tiles, crops or threads.
 
