@@ -142,7 +142,7 @@ impl ClusterVisibility {
         if !scene.geometry.has_trees() {
             return Some(Visibility::Full);
         }
-        let target = Target { light, hull, blocks: Vec::new(), cells: Vec::new(), is_in_order: true };
+        let target = Target::without_samples(light, hull);
         let shaft = Shaft { horizon: self.horizon, ..shaft };
         self.occluders.gather_in(level, scene, &target, &shaft, MAX_LEAVES);
         self.classify_behind_trees(scene, &target, &shaft, room)

@@ -182,16 +182,16 @@ impl LightHull {
 }
 
 impl SampleBlock {
-    /// Some samples, at most sixteen.
-    fn of(count: usize, sample: impl Fn(usize) -> Sample) -> SampleBlock {
+    /// The block of at most sixteen samples.
+    fn of(samples: &[Sample]) -> SampleBlock {
         let mut block = SampleBlock {
             at: [[0.0; LANES]; 3],
             point: [[0.0; LANES]; 3],
             sample: [0; LANES],
-            present: ((1u32 << count) - 1) as u16,
+            present: ((1u32 << samples.len()) - 1) as u16,
         };
         for lane in 0..LANES {
-            let (k, q, at) = sample(lane.min(count - 1));
+            let (k, q, at) = samples[lane.min(samples.len() - 1)];
             for axis in 0..3 {
                 block.at[axis][lane] = at[axis] as f32;
                 block.point[axis][lane] = q[axis];
@@ -265,8 +265,7 @@ impl Target {
 
     pub fn new(scene: &Scene, id: LightId) -> Self {
         let light = &scene.lights[id.index()];
-        let hull = LightHull::of(light);
-        let target = Target { light: id, hull, blocks: Vec::new(), cells: Vec::new(), is_in_order: true };
+        let target = Target::without_samples(id, LightHull::of(light));
         match light.extent() {
             Extent::Area(area) if !light.exact => target.with(scene.level, area.points()),
             Extent::Area(_) | Extent::Point => target,
@@ -284,8 +283,8 @@ impl Target {
         let sample = |k: usize| (k as u32, points.get(k), inverse * (points.get(k).as_dvec3() - center));
         let mut samples: Vec<Sample> = (0..points.count()).map(sample).collect();
         gather_neighbours(&mut samples);
-        let blocks = samples.chunks(LANES).map(|chunk| SampleBlock::of(chunk.len(), |lane| chunk[lane])).collect();
-        Target { blocks, is_in_order: false, ..self.without() }.bounded(level)
+        let blocks = samples.chunks(LANES).map(SampleBlock::of).collect();
+        Target { blocks, is_in_order: false, ..Target::without_samples(self.light, self.hull) }.bounded(level)
     }
 
     /// The same light with these samples, each sixteen of which are neighbours.
@@ -297,7 +296,7 @@ impl Target {
                 blocks.push(SampleBlock::of_points(number * LANES, block, &inverse, center));
             }
         });
-        Target { blocks, ..self.without() }.bounded(level)
+        Target { blocks, ..Target::without_samples(self.light, self.hull) }.bounded(level)
     }
 
     /// The boxes of sixteen blocks, by their indices.
@@ -313,9 +312,9 @@ impl Target {
         bounds
     }
 
-    /// The same light without samples.
-    fn without(&self) -> Self {
-        Target { light: self.light, hull: self.hull, blocks: Vec::new(), cells: Vec::new(), is_in_order: true }
+    /// A light, or a box around some of which `light` is one, without samples.
+    pub fn without_samples(light: LightId, hull: LightHull) -> Self {
+        Target { light, hull, blocks: Vec::new(), cells: Vec::new(), is_in_order: true }
     }
 
     /// Computes the boxes of its blocks.

@@ -141,8 +141,7 @@ impl ShadowView {
         if occluders.others.is_empty() {
             return;
         }
-        let own = [*point];
-        let shaft = Shaft::of(&own, &[0], &target.hull);
+        let shaft = Shaft::of(std::slice::from_ref(point), &[0], &target.hull);
         for &index in &occluders.others {
             let thing = &scene.geometry.placed[index as usize];
             let bounds = match thing.target {

@@ -1,4 +1,4 @@
-//! Lights that are kept apart of what is taken together: what each sends by itself, beside the sum.
+//! Contributions of single lights within the nodes of a cut, for lights that have buffers of their own.
 
 use super::BY_REPRESENTATIVE;
 use super::block::sent;
@@ -11,17 +11,17 @@ use crate::render::arrival::Arrivals;
 use crate::scene::Scene;
 use crate::shape::SurfaceInteraction;
 
-/// Which lights are kept apart.
+/// The lights that have buffers of their own.
 pub(super) struct Apart<'a> {
     scene: &'a Scene,
     tree: &'a LightTree,
-    /// Light by light; empty if none is.
+    /// For each light of the scene whether it is one; empty if there is none.
     lights: Vec<bool>,
-    /// Node by node of the tree: whether it holds one.
+    /// For each node of the tree whether it holds one.
     nodes: Vec<bool>,
 }
 
-/// What some lights send to one pixel, each by its number, as often as it was added.
+/// Contributions to one pixel, each with the index of its light; a light may occur several times.
 pub(super) type SentApart = Vec<(u32, Colors)>;
 
 impl<'a> Apart<'a> {
@@ -38,7 +38,7 @@ impl<'a> Apart<'a> {
         apart
     }
 
-    /// Whether a node holds one of them; it and its nodes are marked.
+    /// Sets `nodes` for a node and those below it. Returns whether it holds one of the lights.
     fn mark(&mut self, node: u32) -> bool {
         let holds = match self.tree.nodes[node as usize].contents {
             NodeContents::Light(light) => self.lights[light as usize],
@@ -48,7 +48,7 @@ impl<'a> Apart<'a> {
         holds
     }
 
-    /// Adds to `to` what those of an entry of a list of nodes send to a place, so many times.
+    /// Adds to `to` the contributions of the lights within the node of an entry, with the factor `times`.
     pub fn add(&self, to: &mut SentApart, entry: u32, si: &SurfaceInteraction, bsdf: &Bsdf, times: f32) {
         let (node, one) = (entry & !BY_REPRESENTATIVE, entry & BY_REPRESENTATIVE);
         if !self.nodes.get(node as usize).is_some_and(|holds| *holds) {
@@ -64,7 +64,7 @@ impl<'a> Apart<'a> {
         }
     }
 
-    /// What each of them sends, added up, with its scale, in scene order.
+    /// Sums the contributions of each light, divided by its scale, in scene order.
     pub fn finish(sent: &mut SentApart, arrivals: &Arrivals, scaled: &mut Vec<ScaledTerm>) {
         sent.sort_by_key(|(light, _)| *light);
         scaled.clear();

@@ -27,9 +27,9 @@ pub(super) struct UncertainTerm {
 }
 
 impl<'a> Many<'a> {
-    /// What lights send to the patches of a pixel, by their numbers: what each ray sees, added up. `scaled` gets each
-    /// light's diffuse part and highlight with its scale, in scene order, and last what is taken together. `apart` gets
-    /// what of that is of lights that are kept apart.
+    /// Computes the terms of a pixel from its patches, as sums over camera rays. `scaled` receives those of each single
+    /// light in scene order, and last that of all nodes; `apart` those of the lights that have buffers of their own,
+    /// which are parts of the last.
     pub(super) fn finish(
         &mut self,
         fragments: &Fragments,
@@ -128,8 +128,8 @@ impl<'a> Many<'a> {
             .for_each(|light| each(light.entry));
     }
 
-    /// How far the mean over a patch can be from what arrives at its middle because other lights are seen from
-    /// elsewhere on it: as its neighbours tell, and anything where they do not.
+    /// The error of a patch where representatives are visible from parts of it: estimated from neighbouring pixels, or
+    /// [`ANYTHING`] where they cannot be compared.
     fn visibility_error(&self, patches: &Patches, number: usize) -> Rgb {
         let (patch, stored) = (&patches.all[number], &self.stored[number]);
         if patch.reach == 0.0 || stored.maybe.is_empty() {

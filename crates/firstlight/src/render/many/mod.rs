@@ -80,7 +80,7 @@ struct SingleLight {
     arrival: Arrival,
 }
 
-/// What arrives at one patch.
+/// The light that arrives at one patch.
 #[derive(Clone, Default)]
 struct PatchLight {
     singles: Range<u32>,
@@ -88,7 +88,8 @@ struct PatchLight {
     lit: [Range<u32>; 2],
     /// The representatives of its block; the visible ones are among its own nodes.
     maybe: Range<u32>,
-    /// What those send, and how far the mean over the patch can be from it.
+    /// The contribution of those nodes at the middle, and the error bound of its difference from the mean over the
+    /// patch.
     sent: Colors,
     bend: Colors,
     value: Rgb,
@@ -121,9 +122,9 @@ impl<'a> Many<'a> {
         self.patches.begin(self.scene, fragments, size, pixel);
     }
 
-    /// Lights the fragments of the cell. `add` hears, pixel by pixel, one of its fragments; of each light in scene
-    /// order what it sends and its scale, and last what is taken together; what of that is of lights that are kept
-    /// apart; and the work that this took.
+    /// Lights the fragments of the cell. Calls `add` for each pixel with one of its fragments, the terms of single
+    /// lights in scene order and last that of all nodes, the terms of lights that have buffers of their own, and the
+    /// work.
     pub fn light(
         &mut self,
         fragments: &Fragments,
@@ -212,8 +213,8 @@ impl<'a> Many<'a> {
             stored.sent += sent;
             if patch.reach > 0.0 {
                 let swing = patch.turn + patch.reach / node.distance_from(si.lit_from).max(patch.reach);
-                // No second derivative of what a far light sends is more, over the square of its distance and what it
-                // sends
+                // Bound of the second derivatives of a far light's contribution, relative to the contribution over the
+                // squared distance
                 let smooth = (swing * swing).min(1.0) * 3.0;
                 let weight = node.weight_at(si.lit_from);
                 let moved = swing + patch.turn;

@@ -1,4 +1,4 @@
-//! What is lit together: a fragment, or one of its rays.
+//! Patches: the parts of fragments that have one shading point, a whole fragment or one of its rays.
 
 use crate::material::Bsdf;
 use crate::render::cell::CELL;
@@ -7,17 +7,17 @@ use crate::render::light_queue::LitPlace;
 use crate::scene::Scene;
 use crate::shape::SurfaceInteraction;
 
-/// A fragment of which one place may stand for all, or a ray of one that has no such place.
+/// A fragment that its middle may represent, or one ray of a fragment without a middle.
 #[derive(Clone, Copy)]
 pub(super) struct Patch {
-    /// Where it is lit.
+    /// Its shading point.
     pub si: SurfaceInteraction,
     /// Its material; the colours are the mean over its rays.
     pub bsdf: Bsdf,
-    /// How far it reaches from there, in metres, and how far its normal turns on the way, in radians.
+    /// Its radius around that point, in metres, and the largest angle between normals within, in radians.
     pub reach: f32,
     pub turn: f32,
-    /// How many rays of its pixel see it, and whether all of them do.
+    /// The number of camera rays of its pixel that meet it, and whether all of them do.
     pub count: u32,
     pub is_whole: bool,
     /// Its pixel in the cell, row by row, and which of the cell's fragments it is of.
@@ -103,7 +103,7 @@ impl Patch {
         is_one_surface(&self.si, &other.si)
     }
 
-    /// Calls `each` with what every ray of it sees.
+    /// Calls `each` with the surface and the material at every ray of it.
     pub fn for_each(&self, scene: &Scene, fragments: &Fragments, mut each: impl FnMut(&SurfaceInteraction, &Bsdf)) {
         if self.reach == 0.0 && self.count == 1 {
             return each(&self.si, &self.bsdf);
