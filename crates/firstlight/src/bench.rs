@@ -6,6 +6,7 @@ use std::ops::ControlFlow;
 use fearless_simd::{Level, Simd};
 
 use crate::accel::{Aabb, Bvh, RayPacket16, RayTile, TraceRay, dispatch_eight};
+use crate::film::resolve::TermSums;
 use crate::ids::LightId;
 use crate::material::ShadingPoint;
 use crate::math::{LANES, Ray, Vec3};
@@ -13,10 +14,9 @@ use crate::render::Counts;
 use crate::render::given::Given;
 pub use crate::render::given::{ChoosePoints, LightPoint};
 use crate::render::pixel::PixelSum;
-use crate::render::resolve::TermSums;
 use crate::scene::{CompileOptions, Scene, SceneDesc, ShadowRays, TracedHit};
 use crate::shape::{RayDifferential, SurfaceInteraction, TileHits, TriangleTree, every};
-use crate::visibility::{OccluderList, Settled, Settler, ShadowView, Target, Viewpoint, Visibility};
+use crate::visibility::{OccluderList, ShadowView, Target, Viewpoint, Visibility, VisibilityResolver, VisibilityStats};
 
 /// Origin and direction of a ray.
 pub type RayBits = [f32; 6];
@@ -176,11 +176,11 @@ impl<'a> Instances<'a> {
 pub struct Soft {
     scene: Scene,
     target: Target,
-    settler: Settler,
+    resolver: VisibilityResolver,
     points: Vec<Viewpoint>,
     /// The points of each tile of pixels.
     tiles: Vec<std::ops::Range<u32>>,
-    settled: Settled,
+    settled: VisibilityStats,
 }
 
 impl Soft {
@@ -227,7 +227,14 @@ impl Soft {
                 tiles.push(first..points.len() as u32);
             }
         }
-        Some(Soft { scene, target, settler: Settler::default(), points, tiles, settled: Settled::default() })
+        Some(Soft {
+            scene,
+            target,
+            resolver: VisibilityResolver::default(),
+            points,
+            tiles,
+            settled: VisibilityStats::default(),
+        })
     }
 
     /// For each point: where its rays start, the point, its normal.
@@ -257,7 +264,7 @@ impl Soft {
         hidden.clear();
         hidden.resize(self.points.len() * blocks, 0);
         let mut order = Vec::new();
-        self.settled = Settled::default();
+        self.settled = VisibilityStats::default();
         for tile in &self.tiles {
             order.clear();
             order.extend(tile.clone());
@@ -265,12 +272,12 @@ impl Soft {
             let each = |k: usize, visibility, view: &mut crate::visibility::ShadowView| {
                 let hidden = &mut hidden[k * blocks..(k + 1) * blocks];
                 match visibility {
-                    Visibility::Lit => {}
-                    Visibility::Hidden | Visibility::BelowHorizon => hidden.fill(0xffff),
-                    Visibility::Mask => hidden.copy_from_slice(&view.hidden),
+                    Visibility::Full => {}
+                    Visibility::None | Visibility::BelowHorizon => hidden.fill(0xffff),
+                    Visibility::Partial => hidden.copy_from_slice(&view.hidden),
                 }
             };
-            self.settler.settle(Level::new(), scene, &self.target, &self.points, &mut order, settled, each);
+            self.resolver.resolve(Level::new(), scene, &self.target, &self.points, &mut order, settled, each);
         }
     }
 
@@ -324,7 +331,7 @@ impl Soft {
 
     /// How many points are lit, hidden, below the horizon, cut; shafts; what they held; samples traced.
     pub fn settled(&self) -> [u64; 7] {
-        let Settled { visibility: [lit, hidden, below, mask], shafts, occluders, traced } = self.settled;
+        let VisibilityStats { classes: [lit, hidden, below, mask], shafts, occluders, traced } = self.settled;
         [lit, hidden, below, mask, shafts, occluders, traced]
     }
 }
@@ -374,11 +381,11 @@ pub fn sights(scene: &Scene, light: u32, block: u32) -> Vec<Option<ShareSeen>> {
             occluders.gather(level, scene, &target, &points, &order, usize::MAX);
             for (point, pixel) in points.iter().zip(&pixels) {
                 sights[*pixel] = Some(match view.classify(level, scene, &target, &occluders, point) {
-                    Visibility::Lit if occluders.count() == 0 => ShareSeen::Empty,
-                    Visibility::Lit => ShareSeen::Lit,
-                    Visibility::Hidden => ShareSeen::Hidden,
+                    Visibility::Full if occluders.count() == 0 => ShareSeen::Empty,
+                    Visibility::Full => ShareSeen::Lit,
+                    Visibility::None => ShareSeen::Hidden,
                     Visibility::BelowHorizon => ShareSeen::BelowHorizon,
-                    Visibility::Mask => ShareSeen::Cut,
+                    Visibility::Partial => ShareSeen::Cut,
                 });
             }
         }

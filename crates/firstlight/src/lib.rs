@@ -60,6 +60,7 @@ mod color;
 mod context;
 mod describe;
 mod error;
+mod film;
 mod ids;
 mod image;
 mod import;
@@ -82,6 +83,10 @@ pub use context::{AssetError, Assets, CompileStage, FolderAssets, MemoryAssets, 
 pub use describe::nearest_name;
 pub use describe::{ColorDesc, ColorParam, FilePath, NumberParam, ParamDesc, SamplesDesc, ScaleDesc};
 pub use error::{Diagnostic, Place, SceneError, Severity, printable};
+pub use film::{
+    AaMode, Coco, Film, Heat, LightChange, Mask, ObjectMasks, ReceiptFault, ReceiptSettings, RelightError, Relit,
+    RenderSettings, VisibilityMode, relight,
+};
 pub use ids::{LightGroupId, LightId, MaterialId, SurfaceId, TextureId};
 pub use image::{
     Buffer, BufferDesc, BufferView, DifferingSample, Distance, FileSettings, Flip, Format, Image, ImageError,
@@ -96,10 +101,7 @@ pub use light::{
 };
 pub use material::{BlinnPhongDesc, MaterialDesc, PhongDesc};
 pub use math::{DVec3, ShadowRay, Vec2, Vec3, WorldRay};
-pub use render::{
-    AaMode, Coco, Film, Heat, LightChange, LightCounts, Mask, ObjectMasks, ReceiptFault, ReceiptSettings, RelightError,
-    Relit, RenderSettings, RenderStats, VisibilityMode, relight, render, render_image,
-};
+pub use render::{LightCounts, RenderStats, render, render_image};
 pub use scene::{
     Added, CameraHit, CastHit, CompileOptions, Compiled, DisplayEncoding, Framing, Hit, ModelSettings, MotionTo,
     RenderDesc, Scene, SceneDesc, SceneSummary, SurfacePoint, UpAxis, View,

@@ -126,7 +126,7 @@ pub(super) struct AreaCommon {
     pub seed: u32,
 }
 
-/// Checks how many points are asked for.
+/// Checks the number of samples.
 pub(crate) fn check_samples(cx: &mut CompileContext, samples: SamplesDesc, hint: &str) -> SamplesDesc {
     if let SamplesDesc::Count(count) = samples {
         cx.count("samples", count, 1, MAX_SAMPLES, Some(hint));
@@ -180,7 +180,7 @@ impl AreaCommon {
             visible: self.visible,
             blocks: self.blocks,
         };
-        // A light that is integrated may never ask for its points; a description with faults makes no scene
+        // A light that is integrated may never need its samples; a description with faults makes no scene
         if !exact && !cx.has_errors() {
             area.points();
         }
@@ -196,7 +196,7 @@ impl AreaCommon {
     }
 }
 
-/// An area light, ready to shine.
+/// A compiled area light.
 #[derive(Clone, Debug)]
 pub struct Area {
     /// Its shape, in world space.
@@ -217,12 +217,12 @@ pub struct Area {
     set: SampleSet,
     count: u32,
     seed: u32,
-    /// The sampled points, made when first asked for.
+    /// The samples, computed at their first use.
     points: Arc<OnceLock<Points>>,
 }
 
 impl Area {
-    /// A point of it and the unit normal of its front, if all of it shines to that side alone.
+    /// A point of it and the unit normal of its front, if it is flat and emits to that side alone.
     pub(crate) fn front(&self) -> Option<(DVec3, DVec3)> {
         match &self.shape {
             _ if self.both_sides => None,

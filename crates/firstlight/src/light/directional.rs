@@ -37,7 +37,7 @@ table! {
     }
 }
 
-/// A directional light, ready to shine.
+/// A directional light, compiled.
 #[derive(Clone, Copy, Debug)]
 pub struct Directional {
     /// Unit, from any surface to the light.

@@ -1,7 +1,7 @@
 //! Lights: where light comes from, and how much. A light never traces rays.
 
 mod area;
-mod bound;
+mod bounds;
 mod directional;
 mod disk;
 mod point;
@@ -10,7 +10,6 @@ mod samples;
 mod sphere;
 mod spot;
 mod tree;
-mod zone;
 
 use crate::color::Rgb;
 use crate::context::CompileContext;
@@ -29,9 +28,8 @@ pub use sphere::{SphereLight, SphereLightDesc};
 pub use spot::{Spot, SpotDesc};
 
 pub(crate) use area::{PointBlock, Points, check_samples};
-pub(crate) use bound::{Sends, ZoneSight};
-pub(crate) use tree::{Held, LightNode, LightTree, Sent};
-pub(crate) use zone::Zone;
+pub(crate) use bounds::{ContributionBounds, EmissionProfile, ReceiverBounds};
+pub(crate) use tree::{FEW_LIGHTS, LightNode, LightTree, NodeContents};
 
 words! {
     /// How light weakens on its way.
@@ -145,15 +143,15 @@ impl LightDesc {
     }
 }
 
-/// A light, ready to shine.
+/// A compiled light.
 #[derive(Clone, Debug)]
 pub struct Light {
     /// Its place and shape.
     pub kind: LightKind,
-    /// What each sample's weight is multiplied with: `color` x `strength`, over the number of samples, and over pi
+    /// The factor of each sample's weight: `color` x `strength`, over the number of samples, and over pi
     /// where the light is physical, so that it meets materials that give pi x BRDF x cosine.
     pub scale: Rgb,
-    /// What the whole light sends, whatever its samples: `color` x `strength`, over pi where the light is physical. The
+    /// The factor of the integral over the whole light: `color` x `strength`, over pi where the light is physical. The
     /// integral over its area takes this in place of `scale`, which has the area and the number of samples in it.
     pub intensity: Rgb,
     /// What the camera sees of it: `color` x `strength`.
@@ -162,7 +160,7 @@ pub struct Light {
     pub said: [LightScale; 2],
     /// Whether its light can be blocked.
     pub shadows: bool,
-    /// Whether it asks to be integrated, not sampled. It has points all the same, for those who sample every light.
+    /// Whether it is integrated, not sampled. It has samples all the same, for renderers that sample every light.
     pub exact: bool,
 }
 
@@ -273,7 +271,7 @@ impl Light {
         self.area().map_or(1, Area::samples)
     }
 
-    /// What it says of its samples: of a light without an area, that it has one.
+    /// Its number of samples, or that it is integrated; one sample of a light without an area.
     pub fn said_samples(&self) -> SamplesDesc {
         if self.exact { SamplesDesc::Exact } else { SamplesDesc::Count(self.samples() as u32) }
     }

@@ -37,7 +37,7 @@ table! {
     }
 }
 
-/// A point light, ready to shine.
+/// A point light, compiled.
 #[derive(Clone, Copy, Debug)]
 pub struct Point {
     /// Where it is.

@@ -1,4 +1,5 @@
-//! The points of an area light.
+//! Sample points of area lights: the sets that a scene may choose, and the low-discrepancy series of the sampled
+//! renderers.
 
 use crate::describe::words;
 use crate::math::LANES;
@@ -18,7 +19,7 @@ words! {
 }
 
 impl SampleSet {
-    /// Whether `count` points can be laid out so; if not, which numbers can.
+    /// Whether the set exists for `count` points; if not, the error says for which counts it does.
     pub(crate) fn allows(self, count: u32) -> Result<(), String> {
         let side = count.isqrt();
         match self {
@@ -43,59 +44,60 @@ impl SampleSet {
     }
 }
 
-/// Series of points that go well together.
+/// The number of series of points that are stratified together.
 pub(crate) const SERIES: usize = 16;
 
 /// Point `k` of one of the [`SERIES`] of a Sobol' (0, 2)-sequence, both coordinates scrambled in Owen's way under fixed
 /// seeds: the first 2^m points of each are stratified in every way that the square can be cut into 2^m equal boxes of
 /// binary sides.
 ///
-/// Series 0 is the sequence itself. In each of the others some digits of all points are turned, so that the first 2^m
-/// points of all together are stratified nearly as well: m from 3 to 10, they are a (t, m + 4, 2)-net in base 2 with t
-/// up to 2.
+/// Series 0 is the sequence itself. In each of the others some binary digits of all points are inverted, so that the
+/// first 2^m points of all series together are stratified nearly as well: for m from 3 to 10 they are a
+/// (t, m + 4, 2)-net in base 2 with t at most 2.
 ///
 /// Sources: Burley, "Practical hash-based Owen scrambling", JCGT 9(4), 2020, section 3; of nets: Niederreiter, "Random
 /// Number Generation and Quasi-Monte Carlo Methods", 1992, section 4.1.
 pub(crate) fn point_of_series(k: u32, series: usize) -> [f64; 2] {
-    let turned = |digits: [u32; 4]| {
+    let inverted = |digits: [u32; 4]| {
         let chosen = (0..4).filter(|bit| series >> bit & 1 == 1);
-        chosen.fold(0, |turned, bit| turned ^ digits[bit] << 16)
+        chosen.fold(0, |inverted, bit| inverted ^ digits[bit] << 16)
     };
     // The radical inverse is the first dimension; Sobol's second direction numbers make the other
-    let (x, y) = (k.reverse_bits() ^ turned(TURNED[0]), sobol_second(k) ^ turned(TURNED[1]));
+    let (x, y) = (k.reverse_bits() ^ inverted(INVERTED[0]), sobol_second(k) ^ inverted(INVERTED[1]));
     [unit(owen(x, SCRAMBLE[0])), unit(owen(y, SCRAMBLE[1]))]
 }
 
-/// A cell of the unit square, by which points are told apart: halves of halves of the square, along x and along y in
-/// turn, follow each other, so that cells next to each other are near each other, and the first digits of a cell are
-/// the larger cell that it is a part of.
+/// A cell of the unit square, as a Morton code: the square is halved along x and y in turn, and each binary digit
+/// chooses a half. Cells of successive codes are near each other, and the leading digits of a code are a larger cell
+/// that holds the cell.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) struct FineCell(u64);
 
 impl FineCell {
+    /// Binary digits of a code.
     pub const DIGITS: u32 = 48;
     pub const FIRST: FineCell = FineCell(0);
-    /// Of each of its sides.
+    /// The length of its sides.
     pub const SIDE: f64 = 1.0 / (1u64 << (Self::DIGITS / 2)) as f64;
 
-    /// The one that a point lies in.
+    /// The cell that a point lies in.
     pub fn of(point: [f64; 2]) -> FineCell {
         let [x, y] = point.map(|v| with_gaps((v * (1u64 << (Self::DIGITS / 2)) as f64) as u64));
         FineCell(x << 1 | y)
     }
 
-    /// Which of `count` larger cells, a power of two, it is a part of.
+    /// The index of the larger cell that holds it, of `count`, a power of two.
     pub fn part_of(self, count: usize) -> usize {
         (self.0 >> (Self::DIGITS - count.ilog2())) as usize
     }
 
-    /// Its middle.
+    /// Its center.
     #[inline(always)]
     pub fn middle(self) -> [f64; 2] {
         [self.0 >> 1, self.0].map(|of| (every_second(of) as f64 + 0.5) / (1u64 << (Self::DIGITS / 2)) as f64)
     }
 
-    /// The cell of one of 2^`level` larger ones, whose first is `first`, that is nearest to this one.
+    /// The cell nearest to this one among those of a larger cell, one of 2^`level`, whose first cell is `first`.
     pub fn nearest_in(self, first: FineCell, level: u32) -> FineCell {
         let axis = |axis: u32, halvings: u32| {
             let [to, least] = [self.0 >> axis, first.0 >> axis].map(every_second);
@@ -104,13 +106,12 @@ impl FineCell {
         FineCell(with_gaps(axis(1, level.div_ceil(2))) << 1 | with_gaps(axis(0, level / 2)))
     }
 
-    /// The first of those that are part of one of 2^`level` larger cells.
+    /// The first cell of a larger one, one of 2^`level`.
     pub fn first_of(cell: u64, level: u32) -> FineCell {
         FineCell(cell << (Self::DIGITS - level))
     }
 
-    /// Where one more point of a series goes into the one of 2^`level` cells that this one is part of: anywhere into
-    /// the other half of it.
+    /// A second sample in the larger cell, one of 2^`level`, that holds this one: a random cell of the other half.
     #[inline(always)]
     pub fn second(self, series: usize, level: u32) -> FineCell {
         let rest = Self::DIGITS - level - 1;
@@ -119,7 +120,7 @@ impl FineCell {
         FineCell(other << rest | any & ((1 << rest) - 1))
     }
 
-    /// The middles of sixteen, along x and along y. In lanes where it is called within `vectorize`.
+    /// The centers of sixteen cells, along x and along y. In lanes where it is called within `vectorize`.
     #[inline(always)]
     pub fn middles(cells: &[FineCell; LANES]) -> [[f64; LANES]; 2] {
         let [mut x, mut y] = [[0.0; LANES]; 2];
@@ -129,7 +130,7 @@ impl FineCell {
         [x, y]
     }
 
-    /// [`second`](Self::second) of sixteen, in the same way.
+    /// [`second`](Self::second) of sixteen cells, in the same way.
     #[inline(always)]
     pub fn seconds(cells: &[FineCell; LANES], series: usize, level: u32) -> [FineCell; LANES] {
         let mut seconds = [FineCell::FIRST; LANES];
@@ -139,13 +140,13 @@ impl FineCell {
         seconds
     }
 
-    /// Which half of the one of 2^`level` larger cells that it is part of it lies in.
+    /// Which half of the larger cell, one of 2^`level`, holds it.
     pub fn half(self, level: u32) -> usize {
         (self.0 >> (Self::DIGITS - level - 1)) as usize & 1
     }
 }
 
-/// A number whose every second digit, from the last on, are those of another.
+/// The binary digits of a number, each preceded by a 0.
 pub(crate) fn with_gaps(digits: u64) -> u64 {
     let mut digits = (digits | digits << 16) & 0x0000_ffff_0000_ffff;
     digits = (digits | digits << 8) & 0x00ff_00ff_00ff_00ff;
@@ -154,7 +155,7 @@ pub(crate) fn with_gaps(digits: u64) -> u64 {
     (digits | digits << 1) & 0x5555_5555_5555_5555
 }
 
-/// Every second of the digits of a number, from the last on.
+/// Every second binary digit of a number, from the last on: the inverse.
 #[inline(always)]
 fn every_second(digits: u64) -> u64 {
     let mut digits = digits & 0x5555_5555_5555_5555;
@@ -165,15 +166,15 @@ fn every_second(digits: u64) -> u64 {
     (digits | digits >> 16) & 0xffff_ffff
 }
 
-/// Some points of a series: one in each of 2^m cells of the square, in their order, sixteen in a block.
+/// 2^m points of a series, one in each of 2^m cells of the square, in the order of the cells, in blocks of sixteen.
 pub(crate) struct SeriesPart {
-    /// x and y.
+    /// x and y of the points.
     pub places: Vec<[[f64; LANES]; 2]>,
     pub cells: Vec<[FineCell; LANES]>,
 }
 
 impl SeriesPart {
-    /// Those that are counted from `first` on, as many as there are cells, where that is a multiple of them.
+    /// The `count` points from number `first` on, which is a multiple of `count`.
     pub fn new(series: usize, first: u32, count: u32) -> SeriesPart {
         let points = series_by_cell(series, first, count);
         let (blocks, _) = points.as_chunks::<LANES>();
@@ -184,8 +185,8 @@ impl SeriesPart {
     }
 }
 
-/// The points of a series that are counted from `first` on, 2^m of them where `first` is a multiple of 2^m, in the
-/// order of the cells of the square that each holds one of.
+/// The 2^m points of a series from number `first` on, a multiple of 2^m, in the order of the 2^m cells of the square,
+/// each of which holds one.
 fn series_by_cell(series: usize, first: u32, count: u32) -> Vec<[f64; 2]> {
     let mut points = vec![[f64::NAN; 2]; count as usize];
     for point in (first..first + count).map(|k| point_of_series(k, series)) {
@@ -194,9 +195,9 @@ fn series_by_cell(series: usize, first: u32, count: u32) -> Vec<[f64; 2]> {
     points
 }
 
-/// The digits that each bit of a series' number turns: the first 16 of each coordinate. Found by search: of all that
-/// was tried, the sum of t squared over all numbers of points and 2, 4, 8 and 16 series is the least.
-const TURNED: [[u32; 4]; 2] = [[0x7a7f, 0x7f4b, 0x9526, 0x8cf9], [0xdfca, 0x22a7, 0x1251, 0x29d3]];
+/// The digits that each bit of a series' number inverts, of the first 16 of each coordinate. Found by a search for the
+/// least sum of t squared over all numbers of points and 2, 4, 8 and 16 series.
+const INVERTED: [[u32; 4]; 2] = [[0x7a7f, 0x7f4b, 0x9526, 0x8cf9], [0xdfca, 0x22a7, 0x1251, 0x29d3]];
 
 /// The scramble of the sequence: part of the definition of every picture with an area light.
 const SCRAMBLE: [u32; 2] = [0x5be0_cd19, 0x1f83_d9ab];
@@ -214,7 +215,7 @@ fn sobol_second(index: u32) -> u32 {
     result
 }
 
-/// Owen's scramble of a binary fraction: each bit is turned or not by a hash of the bits above it.
+/// Owen's scramble of a binary fraction: each bit is inverted, or not, by a hash of the bits above it.
 fn owen(fraction: u32, seed: u32) -> u32 {
     // The hash of Laine and Karras carries from low bits to high ones, so it runs on the mirrored number
     let mut v = fraction.reverse_bits();
@@ -235,7 +236,7 @@ fn random(k: u32, seed: u32) -> [f64; 2] {
 /// A bijection of 64-bit numbers without visible pattern: the finalizer of SplitMix64 (Steele, Lea, Flood, "Fast
 /// splittable pseudorandom number generators", OOPSLA 2014).
 #[inline(always)]
-fn mix(k: u64) -> u64 {
+pub(super) fn mix(k: u64) -> u64 {
     let mut z = k.wrapping_add(1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
     z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
     z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);

@@ -50,7 +50,7 @@ table! {
     }
 }
 
-/// A spot light, ready to shine.
+/// A spot light, compiled.
 #[derive(Clone, Copy, Debug)]
 pub struct Spot {
     /// Where it is.

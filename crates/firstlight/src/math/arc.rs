@@ -1,4 +1,5 @@
-//! Angles from 0 to half a turn, by their sine and cosine: they add up without any function of the system's.
+//! Angles from 0 to pi, as their sine and cosine: sums and differences need no trigonometric function. Cones of
+//! directions.
 
 use super::Vec3;
 
@@ -54,6 +55,38 @@ impl Arc {
         }
         let sin = self.sin * other.cos - self.cos * other.sin;
         Arc { cos: self.cos * other.cos + self.sin * other.sin, sin: sin.max(0.0) }
+    }
+}
+
+/// A set of directions: all within an angle of an axis.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct DirectionCone {
+    /// Unit.
+    pub axis: Vec3,
+    pub angle: Arc,
+}
+
+impl DirectionCone {
+    /// All directions.
+    pub const SPHERE: DirectionCone = DirectionCone { axis: Vec3::Y, angle: Arc::HALF_TURN };
+
+    /// One direction, a unit vector.
+    pub fn of(axis: Vec3) -> DirectionCone {
+        DirectionCone { axis, angle: Arc::ZERO }
+    }
+
+    /// A cone that holds both.
+    pub fn union(&self, other: &DirectionCone) -> DirectionCone {
+        let axis = (self.axis + other.axis).normalize_or(self.axis);
+        let [a, b] = [self, other].map(|cone| Arc::between(axis, cone.axis).plus(cone.angle));
+        DirectionCone { axis, angle: if a.cos < b.cos { a } else { b } }
+    }
+
+    /// The smallest and the largest angle between a direction of the cone and one within `spread` of `d`, a unit
+    /// vector.
+    pub fn angles_to(&self, d: Vec3, spread: Arc) -> [Arc; 2] {
+        let off = Arc::between(d, self.axis);
+        [off.minus(spread).minus(self.angle), off.plus(spread).plus(self.angle)]
     }
 }
 

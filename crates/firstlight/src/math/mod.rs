@@ -12,7 +12,7 @@ mod roots;
 mod sum;
 mod trig;
 
-pub(crate) use arc::Arc;
+pub(crate) use arc::{Arc, DirectionCone};
 pub(crate) use frame::Axes;
 pub(crate) use lanes::{Vec3x16, dispatch_wide, least_and_most, only, sum_of_runs, total};
 pub(crate) use origin::{origin_for, origin_of_view};

@@ -4,9 +4,9 @@ use super::Counts;
 use super::beams::{self, RungRays};
 use super::ladder::{AskedRung, Asker};
 use super::leaves::{LeafBlock, Leaves};
-use super::resolve::LightTerm;
 use super::tally::{Tally, would_send};
 use crate::color::Rgb;
+use crate::film::resolve::LightTerm;
 use crate::integrate::TOLERANCE;
 use crate::light::FineCell;
 use crate::material::{MOMENTS, Moments, ShadingPoint};
@@ -204,9 +204,9 @@ impl<'a> AskedLeaves<'a> {
         for (one, rung) in asking.iter_mut().zip(rungs).filter(|(one, _)| one.view.trees) {
             beams.push(RungRays { point: Viewpoint::of(&one.point), rung, hidden: &mut one.view.hidden });
         }
-        counts.settled.traced += beams::trace(asker.scene, asker.target.end(), asked, &mut beams);
+        counts.visibility.traced += beams::trace(asker.scene, asker.target.end(), asked, &mut beams);
         for (one, rung) in asking.iter_mut().zip(rungs).filter(|(one, _)| !one.view.trees) {
-            counts.settled.traced += asker.mask(rung, asked, &mut one.view, &Viewpoint::of(&one.point));
+            counts.visibility.traced += asker.mask(rung, asked, &mut one.view, &Viewpoint::of(&one.point));
         }
         let points = asked.iter().map(|bits| u64::from(bits.count_ones())).sum::<u64>() * asking.len() as u64;
         counts.shadow_rays += points;

@@ -1,9 +1,9 @@
 //! What a render did, in numbers.
 
 use super::SimdLevel;
-use super::heat::Heat;
+use crate::film::Heat;
 use crate::integrate::Illumination;
-use crate::visibility::{Settled, Visibility};
+use crate::visibility::{Visibility, VisibilityStats};
 
 /// What a render did.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -75,7 +75,7 @@ pub(crate) struct Counts {
     pub camera_rays: u64,
     pub shadow_rays: u64,
     pub shadow_rays_skipped: u64,
-    pub settled: Settled,
+    pub visibility: VisibilityStats,
     pub closed_form: u64,
     /// Camera rays that were asked: not those of places where it is proved what they would meet.
     pub looks: u64,
@@ -89,13 +89,13 @@ pub(crate) struct Counts {
 impl Counts {
     /// What is told of it.
     pub fn stats(&self, simd: SimdLevel, threads: usize) -> RenderStats {
-        let Counts { camera_rays, shadow_rays, shadow_rays_skipped, settled, closed_form, lights, .. } = *self;
-        let Settled { visibility, shafts, occluders, traced } = settled;
+        let Counts { camera_rays, shadow_rays, shadow_rays_skipped, visibility, closed_form, lights, .. } = *self;
+        let VisibilityStats { classes, shafts, occluders, traced } = visibility;
         RenderStats {
             camera_rays,
             shadow_rays,
             shadow_rays_skipped,
-            visibility,
+            visibility: classes,
             closed_form,
             shafts,
             occluders,
@@ -108,11 +108,11 @@ impl Counts {
 
     /// Notes what a batch says of a place.
     pub fn note(&mut self, illumination: Illumination) {
-        let settled = &mut self.settled.visibility;
+        let classes = &mut self.visibility.classes;
         match illumination {
-            Illumination::Below => settled[Visibility::BelowHorizon as usize] += 1,
-            Illumination::Hidden => settled[Visibility::Hidden as usize] += 1,
-            Illumination::Full => settled[Visibility::Lit as usize] += 1,
+            Illumination::Below => classes[Visibility::BelowHorizon as usize] += 1,
+            Illumination::Hidden => classes[Visibility::None as usize] += 1,
+            Illumination::Full => classes[Visibility::Full as usize] += 1,
             Illumination::Partial => self.closed_form += 1,
             Illumination::Unknown => {}
         }
@@ -120,8 +120,8 @@ impl Counts {
 
     /// In the unit of [`Heat`].
     pub fn work(&self) -> f32 {
-        let rays = self.looks + (self.shadow_rays - self.shadow_rays_skipped) + self.settled.traced + self.points;
-        let places = self.settled.visibility.iter().sum::<u64>() + self.closed_form;
+        let rays = self.looks + (self.shadow_rays - self.shadow_rays_skipped) + self.visibility.traced + self.points;
+        let places = self.visibility.classes.iter().sum::<u64>() + self.closed_form;
         rays as f32 + Heat::PLACE * places as f32 + self.lights.nodes as f32
     }
 }

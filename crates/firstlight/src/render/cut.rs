@@ -1,4 +1,4 @@
-//! Light cuts: from all lights of a scene to those that count at the places of a block of pixels.
+//! Light cuts: the nodes of the light tree, and the single lights, that light a set of receivers.
 //!
 //! The traversal begins at the roots of the [`LightTree`] and splits the node with the largest error bound, until the
 //! error of the cut is at most the budget. The error of a node that is fully visible and evaluated at its centroid is
@@ -11,65 +11,66 @@ use std::collections::BinaryHeap;
 
 use crate::color::{DisplaySteps, Rgb};
 use crate::integrate::COSTS;
-use crate::light::{Held, LightNode, LightTree, Sent, Zone, ZoneSight};
-use crate::material::MOMENTS;
-use crate::visibility::Seen;
+use crate::light::{ContributionBounds, LightNode, LightTree, NodeContents, ReceiverBounds};
+use crate::material::{Colors, MOMENTS};
+use crate::visibility::Visibility;
 
-/// The colours that a zone's places make of light.
+/// Bounds of the colours of the receivers.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Tone {
-    /// What is there whatever the lights do, at least.
+pub(super) struct ReceiverColors {
+    /// A lower bound of the radiance without the lights.
     pub base: Rgb,
-    /// What diffuse light is multiplied with, at least.
+    /// A lower bound of the factor of diffuse light.
     pub known: Rgb,
-    /// What an error of diffuse light and of highlights is multiplied with, at most.
-    pub error: Sent,
+    /// Upper bounds of the factors of an error of diffuse light and of highlights.
+    pub error: Colors,
 }
 
-/// What the walk goes through, and by which rules.
+/// The input of a light cut.
 #[derive(Clone, Copy)]
 pub(super) struct CutRules<'a> {
     pub tree: &'a LightTree,
     pub steps: &'a DisplaySteps,
-    pub zone: &'a Zone,
-    pub tones: &'a [Tone],
-    /// In display steps.
+    pub receivers: &'a ReceiverBounds,
+    pub colors: &'a [ReceiverColors],
+    /// The error that the cut may have, in display steps.
     pub budget: f32,
 }
 
-/// How a node counts at all places of a zone.
+/// How the contribution of a node is estimated at all receivers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum By {
-    /// As its middle, seen from everywhere.
-    Middle,
-    /// As its middle, where the light that stands for it is seen.
-    MiddleIfSeen,
-    /// As the light that stands for it, seen from everywhere.
-    One,
-    /// As the light that stands for it, where that is seen.
-    OneIfSeen,
+pub(super) enum NodeEstimator {
+    /// By its centroid; nothing occludes it.
+    Centroid,
+    /// By its centroid, where its representative light is visible.
+    CentroidIfVisible,
+    /// By its representative light; nothing occludes it.
+    Representative,
+    /// By its representative light, where that is visible.
+    RepresentativeIfVisible,
 }
 
-/// A node in question.
+/// A node of the cut.
 #[derive(Clone, Copy)]
 pub(super) struct CutItem {
     node: u32,
-    by: By,
-    /// How far it can be wrong to take it as it is, and how much of that shows at most.
-    error: Sent,
+    estimator: NodeEstimator,
+    /// The error bound of the estimator, and its largest channel for any of the receivers' colours.
+    error: Colors,
     key: f32,
-    /// What it sends to the zone, thereabouts, if its power were 1.
+    /// The diffuse contribution to the receivers to expect for a power of 1.
     typical: f32,
-    /// Whether it was asked what is seen of it.
-    looked: bool,
-    sight: ZoneSight,
+    /// Whether its visibility was classified.
+    is_classified: bool,
+    bounds: ContributionBounds,
 }
 
-/// Sums of products of errors, channel by channel: diffuse with itself, with highlights, highlights with themselves.
+/// For each channel, the sums over nodes of the products of their errors: diffuse with diffuse, diffuse with highlight,
+/// highlight with highlight.
 #[derive(Default)]
 struct Squares([[f64; 3]; PAIRS.len()]);
 
-/// Each moment with each, once.
+/// All pairs of moments.
 const PAIRS: [[usize; 2]; MOMENTS * (MOMENTS + 1) / 2] = {
     let mut pairs = [[0; 2]; MOMENTS * (MOMENTS + 1) / 2];
     let (mut k, mut a) = (0, 0);
@@ -89,25 +90,25 @@ const STRIDE: u32 = 8;
 /// The sums are recomputed once the largest error has fallen by this factor: subtraction leaves rounding errors behind.
 const AGAIN: f32 = 1e-4;
 
-/// A walk through the tree. Keeps its memory.
+/// A cut through the light tree. Keeps its memory.
 #[derive(Default)]
 pub(super) struct Cut {
     items: Vec<CutItem>,
-    /// The worst first: the bits of its key, and which item, the one first that was made first.
+    /// The bits of an item's key and the complement of its index: the largest key first, then the smallest index.
     heap: BinaryHeap<u64>,
     errors: Squares,
-    /// What the nodes in question send, thereabouts.
+    /// The diffuse contribution of the nodes to expect, by channel.
     known: [f64; 3],
-    /// What is sent to the places, where that is known better.
+    /// The incident light, where the caller knows it better.
     guess: Option<Rgb>,
-    /// Nodes that count, and how.
-    pub nodes: Vec<(u32, By)>,
-    /// Lights that have to be integrated for themselves.
-    pub open: Vec<u32>,
+    /// The nodes of the finished cut, and their estimators.
+    pub nodes: Vec<(u32, NodeEstimator)>,
+    /// Lights that are to be integrated one by one.
+    pub single_lights: Vec<u32>,
 }
 
-/// From fewer places than this each asks for itself.
-const WORTH_A_LOOK: usize = 6;
+/// For fewer receivers than this a shadow ray from each takes less time than the classification of a node.
+const FEW_RECEIVERS: usize = 6;
 
 fn of(color: Rgb) -> [f64; 3] {
     [color.r, color.g, color.b].map(f64::from)
@@ -117,17 +118,17 @@ fn color([r, g, b]: [f64; 3]) -> Rgb {
     Rgb::new(r.max(0.0) as f32, g.max(0.0) as f32, b.max(0.0) as f32)
 }
 
-impl By {
-    /// Whether it counts wherever the places are.
-    pub fn is_everywhere(self) -> bool {
-        matches!(self, By::Middle | By::One)
+impl NodeEstimator {
+    /// Whether the node is known to be fully visible from all receivers.
+    pub fn is_unoccluded(self) -> bool {
+        matches!(self, NodeEstimator::Centroid | NodeEstimator::Representative)
     }
 }
 
 impl CutRules<'_> {
-    fn key(&self, error: &Sent) -> f32 {
-        self.tones.iter().fold(0.0, |key, tone| {
-            let shown = (tone.error * *error).sum();
+    fn key(&self, error: &Colors) -> f32 {
+        self.colors.iter().fold(0.0, |key, colors| {
+            let shown = (colors.error * *error).sum();
             shown.r.max(shown.g).max(shown.b).max(key)
         })
     }
@@ -138,16 +139,16 @@ impl CutRules<'_> {
 }
 
 impl Squares {
-    /// Adds an error, or takes it away, `sign` being 1 or -1.
-    fn add(&mut self, error: &Sent, sign: f64) {
+    /// Adds the products of an error times `sign`, which is 1 or -1.
+    fn add(&mut self, error: &Colors, sign: f64) {
         let errors = error.0.map(of);
         for (sum, [a, b]) in self.0.iter_mut().zip(PAIRS) {
             (0..3).for_each(|i| sum[i] += errors[a][i] * errors[b][i] * sign);
         }
     }
 
-    /// How far all can be wrong together where diffuse light and highlights are multiplied with `colors`.
-    fn of(&self, colors: &Sent) -> Rgb {
+    /// The root of the sum of squares of all errors, where diffuse light and highlights have the factors `colors`.
+    fn of(&self, colors: &Colors) -> Rgb {
         let colors = colors.0.map(of);
         let [r, g, b] = std::array::from_fn(|i| {
             let parts = self.0.iter().zip(PAIRS).map(|(sum, [a, b])| {
@@ -161,55 +162,56 @@ impl Squares {
 }
 
 impl CutItem {
-    /// A node as it counts, `lit` if it is known to be seen whole.
-    fn new(rules: &CutRules, index: u32, sight: ZoneSight, lit: bool) -> CutItem {
+    /// A node with its estimator; `lit` if it is known to be fully visible.
+    fn new(rules: &CutRules, index: u32, bounds: ContributionBounds, lit: bool) -> CutItem {
         let node = &rules.tree.nodes[index as usize];
-        let by = match (lit, sight.whole && node.is_smooth()) {
-            (true, true) => By::Middle,
-            (true, false) => By::One,
-            (false, true) => By::MiddleIfSeen,
-            (false, false) => By::OneIfSeen,
+        let estimator = match (lit, bounds.is_smooth) {
+            (true, true) => NodeEstimator::Centroid,
+            (true, false) => NodeEstimator::Representative,
+            (false, true) => NodeEstimator::CentroidIfVisible,
+            (false, false) => NodeEstimator::RepresentativeIfVisible,
         };
-        let error = match (by, node.held) {
-            (By::Middle, _) => node.error(&sight),
-            // Asked at each place, it is what it is
-            (_, Held::Light(_)) if node.is_point() => Sent::default(),
-            // Between nothing and the most nothing is farther off its mean, in the mean, than half of that
-            _ => node.most(&sight) * 0.5,
+        let error = match (estimator, node.contents) {
+            (NodeEstimator::Centroid, _) => node.error(&bounds),
+            // Evaluated at each receiver, it has no error
+            (_, NodeContents::Light(_)) if node.is_point() => Colors::default(),
+            // The standard deviation of a number between 0 and the maximum is at most half of the maximum
+            _ => node.max_contribution(&bounds) * 0.5,
         };
-        let part = if by.is_everywhere() { 1.0 } else { COSTS.maybe };
-        let typical = part * 0.5 * (sight.least + sight.diffuse.min(1e3 * sight.least));
-        CutItem { node: index, by, error, key: rules.key(&error), typical, looked: lit, sight }
+        let part = if estimator.is_unoccluded() { 1.0 } else { COSTS.maybe };
+        let typical = part * 0.5 * (bounds.min_diffuse + bounds.max_diffuse.min(1e3 * bounds.min_diffuse));
+        CutItem { node: index, estimator, error, key: rules.key(&error), typical, is_classified: lit, bounds }
     }
 
-    /// The item as one that is seen whole, if it counts as its middle then.
-    fn as_middle(&self, rules: &CutRules) -> Option<CutItem> {
-        (self.by == By::MiddleIfSeen).then(|| CutItem::new(rules, self.node, self.sight, true))
+    /// The item as a fully visible one, if its centroid estimates it then.
+    fn as_centroid(&self, rules: &CutRules) -> Option<CutItem> {
+        (self.estimator == NodeEstimator::CentroidIfVisible).then(|| CutItem::new(rules, self.node, self.bounds, true))
     }
 
-    /// Whether it is worth a look how much of it is seen.
-    fn is_worth_a_look(&self, rules: &CutRules, node: &LightNode) -> bool {
-        self.sight.width < COSTS.wide
-            || self.by == By::MiddleIfSeen && rules.key(&node.error(&self.sight)) <= COSTS.looked_at * self.key
+    /// Whether a classification of its visibility is likely to save more time than it takes.
+    fn is_worth_classifying(&self, rules: &CutRules, node: &LightNode) -> bool {
+        self.bounds.sin_half_angle < COSTS.wide
+            || self.estimator == NodeEstimator::CentroidIfVisible
+                && rules.key(&node.error(&self.bounds)) <= COSTS.looked_at * self.key
     }
 }
 
 impl Cut {
-    /// Begins with some nodes.
+    /// Begins a cut with some nodes.
     pub fn begin<'n>(&mut self, rules: &CutRules, nodes: impl Iterator<Item = &'n u32>) {
         self.items.clear();
         self.heap.clear();
         self.nodes.clear();
-        self.open.clear();
+        self.single_lights.clear();
         (self.errors, self.known, self.guess) = (Squares::default(), [0.0; 3], None);
         nodes.for_each(|node| self.push(rules, *node, false));
     }
 
-    /// Adds a node, but for one that sends nothing.
+    /// Adds a node, unless it contributes nothing.
     fn push(&mut self, rules: &CutRules, index: u32, lit: bool) {
-        let sight = rules.tree.nodes[index as usize].shine.sight(rules.zone);
-        if sight.weight != 0.0 {
-            self.add(rules, CutItem::new(rules, index, sight, lit));
+        let bounds = rules.tree.nodes[index as usize].bounds.contribution(rules.receivers);
+        if bounds.max_weight != 0.0 {
+            self.add(rules, CutItem::new(rules, index, bounds, lit));
         }
     }
 
@@ -232,7 +234,7 @@ impl Cut {
         self.known.iter_mut().zip(sent).for_each(|(sum, sent)| *sum += sent * f64::from(item.typical) * sign);
     }
 
-    /// Sums up anew: what was taken away leaves rounding behind.
+    /// Recomputes the sums: subtraction leaves rounding errors behind.
     fn recount(&mut self, rules: &CutRules) {
         (self.errors, self.known) = (Squares::default(), [0.0; 3]);
         let heap = std::mem::take(&mut self.heap);
@@ -243,19 +245,20 @@ impl Cut {
         self.heap = heap;
     }
 
-    /// How far all that is in question can be wrong where diffuse light and highlights are multiplied with `colors`.
-    pub fn error(&self, colors: &Sent) -> Rgb {
+    /// The error of the cut, where diffuse light and highlights have the factors `colors`.
+    pub fn error(&self, colors: &Colors) -> Rgb {
         self.errors.of(colors)
     }
 
     fn shown(&self, rules: &CutRules) -> f32 {
         let known = self.guess.unwrap_or_else(|| color(self.known));
-        rules.tones.iter().fold(0.0, |worst, tone| {
-            rules.steps.of_color(tone.base + tone.known * known, self.error(&tone.error)).max(worst)
+        rules.colors.iter().fold(0.0, |worst, colors| {
+            rules.steps.of_color(colors.base + colors.known * known, self.error(&colors.error)).max(worst)
         })
     }
 
-    /// Whether what is in question shows by no more than is allowed. `counted` was the worst when sums were made anew.
+    /// Whether the error of the cut is within the budget. `counted` is the largest key at the last recomputation of the
+    /// sums.
     fn is_enough(&mut self, rules: &CutRules, turn: u32, counted: &mut f32) -> bool {
         let worst = self.heap.peek().map_or(0.0, |place| f32::from_bits((place >> 32) as u32));
         let due = worst < *counted * AGAIN;
@@ -272,8 +275,14 @@ impl Cut {
 
     /// Splits the node with the largest error bound, again and again, until the error of the cut is at most
     /// `rules.budget` display steps. The display steps depend on the incident light: `guess`, or else the sum over the
-    /// nodes of the cut. `look` classifies the visibility of a node; its second argument is one of the node's lights.
-    pub fn refine(&mut self, rules: &CutRules, guess: Option<Rgb>, look: &mut dyn FnMut(&LightNode, u32) -> Seen) {
+    /// nodes of the cut. `classify` returns the visibility of a node, if it can be proved; its second argument is one
+    /// of the node's lights.
+    pub fn refine(
+        &mut self,
+        rules: &CutRules,
+        guess: Option<Rgb>,
+        classify: &mut dyn FnMut(&LightNode, u32) -> Option<Visibility>,
+    ) {
         self.guess = guess;
         let mut counted = f32::INFINITY;
         for turn in 0.. {
@@ -282,62 +291,67 @@ impl Cut {
             }
             let Some(item) = self.pop(rules) else { break };
             let node = rules.node(&item);
-            let mut lit = item.by.is_everywhere();
-            if !lit && !item.looked && item.is_worth_a_look(rules, node) {
-                match look(node, node.first(rules.tree)) {
-                    Seen::Nothing => continue,
-                    Seen::Whole => {
+            let mut lit = item.estimator.is_unoccluded();
+            if !lit && !item.is_classified && item.is_worth_classifying(rules, node) {
+                match classify(node, node.first(rules.tree)) {
+                    Some(Visibility::None) => continue,
+                    Some(Visibility::Full) => {
                         lit = true;
-                        if let Some(item) = item.as_middle(rules) {
+                        if let Some(item) = item.as_centroid(rules) {
                             self.add(rules, item);
                             continue;
                         }
                     }
-                    Seen::Unknown => {}
+                    _ => {}
                 }
             }
-            match node.held {
-                Held::Light(light) => self.open.push(light),
-                Held::Two(children) => children.into_iter().for_each(|child| self.push(rules, child, lit)),
+            match node.contents {
+                NodeContents::Light(light) => self.single_lights.push(light),
+                NodeContents::Children(children) => children.into_iter().for_each(|child| self.push(rules, child, lit)),
             }
         }
     }
 
-    /// How all nodes in question would count as they are.
-    pub fn peek(&mut self) {
+    /// Lists the nodes of the cut as it is.
+    pub fn list_nodes(&mut self) {
         self.nodes.clear();
-        self.nodes.extend(self.heap.iter().map(|place| &self.items[at(*place)]).map(|item| (item.node, item.by)));
+        self.nodes
+            .extend(self.heap.iter().map(|place| &self.items[at(*place)]).map(|item| (item.node, item.estimator)));
         self.nodes.sort_unstable_by_key(|(node, _)| *node);
     }
 
-    /// Looks at what was not looked at yet, and says how all nodes count.
-    ///
-    /// Where `places` are few, asking from each is less work than looking.
-    pub fn settle(&mut self, rules: &CutRules, places: usize, look: &mut dyn FnMut(&LightNode, u32) -> Seen) {
+    /// Classifies the nodes that were not classified yet, unless the receivers are few, and lists the nodes of the cut.
+    pub fn finish(
+        &mut self,
+        rules: &CutRules,
+        receivers: usize,
+        classify: &mut dyn FnMut(&LightNode, u32) -> Option<Visibility>,
+    ) {
         self.nodes.clear();
         for place in std::mem::take(&mut self.heap) {
             let mut item = self.items[at(place)];
             let node = rules.node(&item);
-            if !item.by.is_everywhere() && !item.looked && places >= WORTH_A_LOOK {
-                let seen = look(node, node.first(rules.tree));
-                if seen == Seen::Nothing {
+            if !item.estimator.is_unoccluded() && !item.is_classified && receivers >= FEW_RECEIVERS {
+                let visibility = classify(node, node.first(rules.tree));
+                if visibility == Some(Visibility::None) {
                     self.count(rules, &item, -1.0);
                     continue;
                 }
-                if seen == Seen::Whole {
+                if visibility == Some(Visibility::Full) {
                     self.count(rules, &item, -1.0);
-                    item = item.as_middle(rules).unwrap_or(CutItem { by: By::One, ..item });
+                    item =
+                        item.as_centroid(rules).unwrap_or(CutItem { estimator: NodeEstimator::Representative, ..item });
                     self.count(rules, &item, 1.0);
                 }
             }
-            self.nodes.push((item.node, item.by));
+            self.nodes.push((item.node, item.estimator));
         }
         self.nodes.sort_unstable_by_key(|(node, _)| *node);
-        self.open.sort_unstable();
+        self.single_lights.sort_unstable();
     }
 }
 
-/// Which item a place of the heap means.
+/// The index of the item that an entry of the heap stands for.
 fn at(place: u64) -> usize {
     !(place as u32) as usize
 }

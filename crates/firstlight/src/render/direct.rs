@@ -22,7 +22,7 @@ use crate::integrate::{Arrived, Asked, Emitter, Evaluator, Illumination, Obstacl
 use crate::light::{Area, Extent, LightTree};
 use crate::material::{Lobe, Moments, ShadingPoint};
 use crate::scene::Scene;
-use crate::visibility::{OccluderList, Settler, ShadowView};
+use crate::visibility::{OccluderList, ShadowView, VisibilityResolver};
 pub(super) use sampled::Sampled;
 
 /// The most points that a sampled light is summed for between two calls of `go_on`.
@@ -144,7 +144,7 @@ pub(crate) struct DirectLighting<'a> {
     /// What was gathered from BVHs for up to sixteen points.
     near: Obstacles<'a>,
     pub(super) occluders: OccluderList,
-    pub(super) settler: Settler,
+    pub(super) resolver: VisibilityResolver,
     indices: Vec<u32>,
     /// Views and tallies that are not used any more.
     views: Vec<ShadowView>,
@@ -166,7 +166,7 @@ impl<'a> DirectLighting<'a> {
             listed: Vec::new(),
             near: Obstacles::default(),
             occluders: OccluderList::default(),
-            settler: Settler::default(),
+            resolver: VisibilityResolver::default(),
             indices: Vec::new(),
             views: Vec::new(),
             tallies: Vec::new(),

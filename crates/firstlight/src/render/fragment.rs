@@ -4,10 +4,10 @@ use std::ops::Range;
 
 use arrayvec::ArrayVec;
 
-use super::hits::camera_ray;
 use super::solo::{Candidate, SquareBsdf};
 use super::square::Square;
 use crate::color::Rgb;
+use crate::film::hits::camera_ray;
 use crate::ids::SurfaceId;
 use crate::integrate::TOLERANCE;
 use crate::material::{Bsdf, Colors, Lobe, Material, ShadingPoint};

@@ -10,11 +10,12 @@
 
 use std::ops::ControlFlow;
 
+use super::Counts;
 use super::cell::CELL;
 use super::direct::{DirectLighting, LightEstimate, LightQuery, Occlusion};
 use super::solo::Candidate;
 use super::square::Square;
-use super::{Counts, Heat};
+use crate::film::Heat;
 use crate::integrate::TOLERANCE;
 use crate::material::{Bsdf, Lobe, Moments, ShadingPoint};
 use crate::scene::Scene;

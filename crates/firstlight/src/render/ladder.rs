@@ -159,7 +159,7 @@ impl<'a> Asker<'a> {
     /// Which of a rung's points that are `asked` are hidden from a point, by what is in its view; says how many rays
     /// were traced.
     pub fn mask(&self, rung: &Rung, asked: &[u16], view: &mut ShadowView, point: &Viewpoint) -> u64 {
-        if !view.asks_points() {
+        if !view.needs_mask() {
             view.hidden.clear();
             return 0;
         }

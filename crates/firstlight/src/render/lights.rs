@@ -1,11 +1,10 @@
 //! The lights of a scene as they are asked: what all threads share.
 
 use super::ladder::Ladder;
-use super::many::FEW;
 use crate::color::{DisplaySteps, Rgb};
 use crate::ids::LightId;
 use crate::integrate::{Asked, Emitter, Obstacles, TOLERANCE};
-use crate::light::{Light, LightTree};
+use crate::light::{FEW_LIGHTS, Light, LightTree};
 use crate::material::Lobe;
 use crate::scene::Scene;
 use crate::visibility::Target;
@@ -39,7 +38,7 @@ impl<'a> Lights<'a> {
         let scales = scene.lights.iter().map(scale).collect();
         let targets = Target::of_all(scene);
         let ladders = emitters.iter().map(|_| Ladder::default()).collect();
-        let tree = (scene.lights.len() > FEW)
+        let tree = (scene.lights.len() > FEW_LIGHTS)
             .then(|| LightTree::new(&scene.lights, &scene.geometry.links.classes(scene.lights.len())));
         let obstacles = emitters.iter().enumerate().map(|(index, emitter)| {
             emitter.as_ref().map_or_else(Obstacles::default, |emitter| Obstacles::new(scene, index, emitter))

@@ -2,9 +2,9 @@
 
 use std::ops::ControlFlow;
 
-use super::hits::camera_ray;
-use super::resolve::{LightTerm, PixelTerms, ScaledTerm, TermSums};
 use super::{Counts, QUESTION_EVERY};
+use crate::film::hits::camera_ray;
+use crate::film::resolve::{LightTerm, PixelTerms, ScaledTerm, TermSums};
 use crate::ids::LightId;
 use crate::material::{Bsdf, MOMENTS, Moments, ShadingPoint};
 use crate::math::{LaneSum, Ray};

@@ -1,7 +1,7 @@
 //! The fast renderer's way through a tile: what may stand before a light is gathered once for neighbouring points.
 //!
 //! The camera rays of a block of pixels first, then light by light: the points of the block that need it are taken
-//! together, and a [`Settler`] finds from which of them the light is lit, hidden, below the horizon, or cut
+//! together, and a [`VisibilityResolver`] finds from which of them the light is lit, hidden, below the horizon, or cut
 //! ([`Sampled`]).
 
 use std::ops::ControlFlow;
@@ -9,15 +9,15 @@ use std::ops::ControlFlow;
 use fearless_simd::Level;
 
 use super::direct::Sampled;
-use super::film::FilmTile;
-use super::hits::{PixelHits, camera_ray};
 use super::pixel::PixelSum;
-use super::resolve::TermSums;
 use super::{Counts, QUESTION_EVERY};
+use crate::film::FilmTile;
+use crate::film::hits::{PixelHits, camera_ray};
+use crate::film::resolve::TermSums;
 use crate::ids::LightId;
 use crate::material::{Moments, ShadingPoint};
 use crate::scene::Scene;
-use crate::visibility::{Settler, Target, Viewpoint};
+use crate::visibility::{Target, Viewpoint, VisibilityResolver};
 
 /// The points of a block of pixels, and what is needed to light them.
 pub(crate) struct Shafts<'a> {
@@ -31,7 +31,7 @@ pub(crate) struct Shafts<'a> {
     sums: Vec<Moments>,
     /// The points that are being lit, part by part.
     order: Vec<u32>,
-    settler: Settler,
+    resolver: VisibilityResolver,
 }
 
 impl<'a> Shafts<'a> {
@@ -45,7 +45,7 @@ impl<'a> Shafts<'a> {
             surfaces: Vec::new(),
             sums: Vec::new(),
             order: Vec::new(),
-            settler: Settler::default(),
+            resolver: VisibilityResolver::default(),
         }
     }
 
@@ -149,7 +149,7 @@ impl<'a> Shafts<'a> {
                 counts.next_question = counts.shadow_rays + QUESTION_EVERY;
                 go_on()?;
             }
-            light.settle(&mut self.settler, &self.points, part, counts, |k, visibility, view| {
+            light.settle(&mut self.resolver, &self.points, part, counts, |k, visibility, view| {
                 sums[k] = light.sent(&surfaces[k], visibility, view);
             });
         }

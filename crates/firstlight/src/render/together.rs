@@ -9,9 +9,9 @@ use super::asking::{AskedLeaves, Asking, EVENLY, MOST, parts};
 use super::direct::{DirectLighting, Occlusion};
 use super::ladder::{FIRST, LAST};
 use super::packets::{Packets, of_edge};
-use super::resolve::LightTerm;
 use super::tally::Tally;
 use crate::color::Rgb;
+use crate::film::resolve::LightTerm;
 use crate::ids::SurfaceId;
 use crate::integrate::TOLERANCE;
 use crate::light::SERIES;
@@ -136,7 +136,7 @@ impl Together {
 
     /// Asks points of the light for one ray, as nobody knows what it sees.
     pub fn ask_points(&mut self, lights: &mut DirectLighting, point: &ShadingPoint, counts: &mut Counts) {
-        counts.settled.visibility[Visibility::Mask as usize] += 1;
+        counts.visibility.classes[Visibility::Partial as usize] += 1;
         match lights.classify_one(self.light, point, counts) {
             Some(view) => self.behind(point, view),
             None => self.dark(point),

@@ -1,4 +1,4 @@
-//! Which samples of a light are hidden, a bit for each.
+//! Masks of the hidden samples of a light, as one point sees it.
 
 use fearless_simd::{Level, f32x16, prelude::*};
 
@@ -12,11 +12,10 @@ use crate::scene::{Scene, ShadowRays};
 use crate::shape::{SeenParts, SeenTriangle};
 
 impl ShadowView {
-    /// Fills [`hidden`](Self::hidden): what triangles, solids and point sets hide, and what is below the horizon for
-    /// sure. Spheres and parallelograms are left to their own tests.
+    /// Fills [`hidden`](Self::hidden) with the samples that triangles, solids and point sets hide, and those that are
+    /// certainly below the horizon. Spheres and parallelograms are not tested here.
     ///
-    /// Only those samples are asked for that `asked` names, a bit for each, if it is there. Answers with the number of
-    /// samples that were asked for one by one.
+    /// `asked` is a mask of the samples to test; `None` for all. Returns the number of samples whose rays were traced.
     pub fn mask(
         &mut self,
         level: Level,
@@ -28,11 +27,11 @@ impl ShadowView {
         let count = target.blocks.len();
         let mut traced = 0;
         self.hidden.clear();
-        if count == 0 || !self.asks_points() {
+        if count == 0 || !self.needs_mask() {
             return 0;
         }
         self.in_space.clear();
-        // What is not asked is as good as hidden
+        // Samples that are not to be tested count as hidden
         self.in_space.extend(target.blocks.iter().map(|block| {
             let Some(asked) = asked else { return !block.present };
             if target.is_in_order {
@@ -50,7 +49,7 @@ impl ShadowView {
             self.hidden.extend_from_slice(&self.in_space);
             return traced;
         }
-        // From the order of space to that of the light
+        // From the order of the blocks to that of the light's samples
         self.hidden.resize(count, 0);
         for (block, hidden) in target.blocks.iter().zip(&self.in_space) {
             let mut rest = hidden & block.present;
@@ -66,7 +65,7 @@ impl ShadowView {
 
     #[inline(always)]
     fn mask_triangles<S: Simd>(&mut self, simd: S, scene: &Scene, target: &Target, point: &Viewpoint) {
-        // What is below the horizon needs no answer
+        // Samples below the horizon count as hidden
         let seen = target.hull.from(point.p);
         let size = point.horizon.abs();
         let wrong = (size.x + size.y + size.z) * seen.longest * (64.0 * UNIT_ROUNDOFF);
@@ -84,7 +83,7 @@ impl ShadowView {
         }
         let ball = BallSeen::of(&seen);
         let are_bounded = self.triangles.iter().any(SeenTriangle::is_bounded);
-        // Blocks of which something is asked, sixteen at a time
+        // Blocks with samples that are not hidden yet, sixteen at a time
         let mut next = if self.triangles.is_empty() { target.blocks.len() } else { 0 };
         while next < target.blocks.len() {
             let (mut places, mut count) = ([0u32; LANES], 0);
@@ -111,7 +110,7 @@ impl ShadowView {
                 Some(ball) => ball.parts(simd, places[..count].iter().map(|place| &target.blocks[*place as usize])),
                 None => SeenParts::flat(simd, &cells.middle, &cells.half, count),
             };
-            // Bit by bit
+            // A bit for each block that is not all hidden yet
             let mut open = ((1u32 << count) - 1) as u16;
             for triangle in &self.triangles {
                 if open == 0 {
@@ -139,7 +138,7 @@ impl ShadowView {
         }
     }
 
-    /// Asks the trees, or only what is no mesh, ray by ray.
+    /// Traces rays through the trees, or only to solids and point sets.
     fn trace(&mut self, level: Level, scene: &Scene, target: &Target, point: &Viewpoint) -> u64 {
         let mut traced = 0;
         let from = [point.ray(target.end(), Vec3::ZERO, true)];
@@ -188,7 +187,7 @@ fn shadow_rays<'a, S: Simd>(
     shadows
 }
 
-/// Lets the kernel decide for the samples in `unsure`.
+/// Tests the samples in `unsure` by the kernel that traces rays. Returns a mask of the hidden ones.
 #[inline(never)]
 fn by_kernel<S: Simd>(
     simd: S,
@@ -216,12 +215,12 @@ fn by_kernel<S: Simd>(
     )
 }
 
-/// A ball as its points are seen, by where ways to them meet the plane through its middle that faces the point.
+/// The projection of a spherical light from the point to the plane through the center that faces the point.
 struct BallSeen {
-    /// From coordinates along the light's axes to those along the frame's.
+    /// From coordinates along the light's axes to those along its frame.
     turn: [[f32; 3]; 3],
     radii: f32,
-    /// By how much that may be wrong.
+    /// Error bound of projected coordinates.
     room: f32,
 }
 
@@ -229,12 +228,12 @@ impl BallSeen {
     fn of(light: &LightSeen) -> Option<BallSeen> {
         let radii = light.radii?;
         let turn = light.frame.map(|to| light.axes.map(|axis| axis.dot(to) / to.length_squared()));
-        // Ways are wrong by their rounding, and those that end nearest are longest in the plane
+        // Rounding of directions; the projection magnifies it most for the nearest points
         let nearest = radii / (radii - 1.0).max(UNIT_ROUNDOFF);
         Some(BallSeen { turn, radii, room: 64.0 * UNIT_ROUNDOFF * (radii + 2.0) * nearest * nearest })
     }
 
-    /// Where at most sixteen blocks are seen.
+    /// Bounds of the projections of at most sixteen blocks.
     #[inline(always)]
     fn parts<'a, S: Simd>(&self, simd: S, blocks: impl Iterator<Item = &'a SampleBlock>) -> SeenParts {
         let mut parts = SeenParts::NONE;

@@ -1,28 +1,27 @@
-//! How much of a light reaches a point, settled from proof to work.
+//! Visibility of lights from points: full, none, or a mask of the light's samples.
 //!
-//! A [`Shaft`] is the space between some points and a light. [`OccluderList::gather`] finds what lies in it, once for
-//! all the points: mostly nothing, and then all of the light arrives. What is left is looked at from each point by
-//! [`ShadowView::classify`]: below the horizon, lit by all of the light, hidden from all of it, or cut by some edge. In
-//! the last case [`ShadowView::mask`] says which of the light's sampled points are hidden, a bit for each.
+//! A [`Shaft`] is the convex hull of some points and a light. [`OccluderList::gather`] finds the occluders in it, once
+//! for all the points; if there are none, the light is fully visible. [`ShadowView::classify`] tests the occluders of
+//! one point against the whole light: the point is below the light's horizon, sees all of it, nothing of it, or is in
+//! the penumbra. In the penumbra [`ShadowView::mask`] computes which of the light's samples are hidden, a bit for each.
 //!
-//! Every answer is a proof that the plain renderer's own tests would all have answered the same, rounding included;
-//! where a proof fails by a hair's breadth, that test itself is asked. So pictures have the same bits with and without.
-//!
-//! Before it stand the scene and its shapes; after it, the renderer.
+//! All results are conservative: each is a proof that the shadow-ray tests of the plain renderer give the same,
+//! rounding included. Where the margin is too small for a proof, that test itself decides. So pictures have the same
+//! bits with and without this module.
 
+mod cluster_visibility;
 mod mask;
 mod occluders;
-mod outlook;
-mod settle;
+mod resolver;
 mod shaft;
 mod target;
 #[cfg(test)]
 mod tests;
 mod view;
 
+pub(crate) use cluster_visibility::ClusterVisibility;
 pub(crate) use occluders::{OccluderList, ShadowMesh};
-pub(crate) use outlook::{Outlook, Seen};
-pub(crate) use settle::{Settled, Settler};
+pub(crate) use resolver::{VisibilityResolver, VisibilityStats};
 pub(crate) use shaft::Shaft;
 pub(crate) use target::Target;
 pub(crate) use view::{ShadowView, Visibility};
@@ -30,17 +29,17 @@ pub(crate) use view::{ShadowView, Visibility};
 use crate::material::ShadingPoint;
 use crate::math::{ErrorBound, Facet, LightEnd, ShadowRay, Vec3};
 
-/// A point that light is gathered from.
+/// A point to be lit, as far as its visibility depends on it.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Viewpoint {
     pub p: Vec3,
     pub error: ErrorBound,
-    /// Where rays start.
+    /// The origin of shadow rays.
     pub start: Vec3,
-    /// Light with horizon.l <= 0 or ns.l <= 0 does not count.
+    /// Light from `l` with horizon.l <= 0 or ns.l <= 0 does not reach the point.
     pub horizon: Vec3,
     pub ns: Vec3,
-    /// What does not stand in the way.
+    /// The triangle that the point lies on, which does not occlude it.
     pub but: Facet,
 }
 
@@ -51,7 +50,12 @@ impl Viewpoint {
         Viewpoint { p, error, start: point.shadow_start(), horizon, ns, but: facet }
     }
 
-    /// A ray along `l` towards a light.
+    /// The distance of `start` from `p` along each axis, rounded up.
+    pub fn apart(&self) -> Vec3 {
+        (self.start - self.p).abs() * 1.0001
+    }
+
+    /// A shadow ray along `l` to a light; `finite` if it ends there, at t = 1.
     #[inline(always)]
     pub fn ray(&self, to: LightEnd, l: Vec3, finite: bool) -> ShadowRay {
         let t_max = if finite { 1.0 } else { f32::INFINITY };

@@ -1,44 +1,44 @@
-//! What may stand between some points and a light, gathered once for all of them.
+//! The occluders between some points and a light, gathered once for all of the points.
 
 use fearless_simd::{Level, Simd};
 
 use super::Viewpoint;
 use super::shaft::{Horizon, Shaft};
-use super::target::{LightHull, Target};
-use crate::accel::{Aabb, dispatch_all};
+use super::target::Target;
+use crate::accel::dispatch_all;
 use crate::ids::{LightId, SurfaceId};
 use crate::math::Vec3;
 use crate::scene::{Geometry, Opacity, PlacedTarget, Scene, UpperItem};
 use crate::shape::{Mesh, Parallelogram, Placement, PlaneSide, Sphere};
 
-/// A sphere or parallelogram: of the lists of occluders, or of the upper tree.
+/// A sphere or parallelogram, by its index in the list of occluders or in the upper tree.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Which {
+pub(crate) enum ShapeRef {
     Listed(u32),
     InTree(u32),
 }
 
-/// A mesh in its place: 0 is that of the world, others are what is placed, counted from 1.
+/// An instance of a mesh: 0 is the mesh in world coordinates, n the placed thing of index n - 1.
 pub(crate) type MeshNumber = u32;
 
-/// All that may stand between the points of a group and one light. What is not here does not, whatever rounding says.
+/// A superset of what occludes one light from a group of points, rounding included. Keeps its memory.
 #[derive(Debug, Default)]
 pub(crate) struct OccluderList {
-    pub spheres: Vec<Which>,
-    pub flats: Vec<(Which, PlaneSide)>,
-    /// Disk lights, as the scene lists them.
+    pub spheres: Vec<ShapeRef>,
+    pub flats: Vec<(ShapeRef, PlaneSide)>,
+    /// Disk lights that block, by their index in the list of occluders.
     pub disks: Vec<u32>,
     /// Leaves of the trees of meshes.
     pub leaves: Vec<(MeshNumber, u32)>,
-    /// Solids and point sets, as they are placed.
+    /// Solids and point sets, by their index among placed things.
     pub others: Vec<u32>,
-    /// Whether the trees held more than was asked for: then they have to be asked ray by ray.
+    /// Whether the trees held more than the cap: the lists from trees are incomplete then, and rays have to be traced.
     pub too_many: bool,
-    /// Meshes that the shaft leads through.
+    /// Placed meshes whose boxes intersect the shaft.
     meshes: Vec<MeshNumber>,
 }
 
-/// A mesh that casts shadows, in its place.
+/// An instance of a mesh, and which of its triangles occlude a light.
 pub(crate) struct ShadowMesh<'a> {
     pub mesh: &'a Mesh,
     pub placement: Option<&'a Placement>,
@@ -49,7 +49,7 @@ pub(crate) struct ShadowMesh<'a> {
 }
 
 impl<'a> ShadowMesh<'a> {
-    /// With what of it stands in the way of a light.
+    /// The instance `source`, as an occluder of `light`; `None` if it is no mesh.
     pub fn of(geometry: &'a Geometry, source: MeshNumber, light: LightId) -> Option<Self> {
         if source == 0 {
             let world = geometry.world.as_ref()?;
@@ -70,93 +70,29 @@ impl<'a> ShadowMesh<'a> {
         Some(ShadowMesh { mesh, placement, first, opacity: thing.shadow, geometry, light })
     }
 
-    /// Whether a triangle stands in the way of the light.
+    /// Whether a triangle casts shadows of the light.
     #[inline(always)]
     pub fn casts(&self, triangle: u32) -> bool {
         self.geometry.triangle_casts(self.mesh, self.first, self.opacity, triangle, self.light)
     }
 }
 
-/// The sphere's own test is wrong by less than this part of the radius, and of the distance.
+/// Relative errors of the test of a sphere: in its radius, and in the distance.
 pub(crate) const SPHERE_ROOM: [f64; 2] = [4e-4, 1e-5];
 
 impl Scene {
-    pub(crate) fn sphere(&self, which: Which) -> &Sphere {
+    pub(crate) fn sphere(&self, which: ShapeRef) -> &Sphere {
         match which {
-            Which::Listed(i) => &self.occluders.spheres[i as usize].shape,
-            Which::InTree(i) => &self.geometry.spheres[i as usize].shape,
+            ShapeRef::Listed(i) => &self.occluders.spheres[i as usize].shape,
+            ShapeRef::InTree(i) => &self.geometry.spheres[i as usize].shape,
         }
     }
 
-    pub(crate) fn flat(&self, which: Which) -> &Parallelogram {
+    pub(crate) fn flat(&self, which: ShapeRef) -> &Parallelogram {
         match which {
-            Which::Listed(i) => &self.occluders.flats[i as usize].shape,
-            Which::InTree(i) => &self.geometry.parallelograms[i as usize].shape,
+            ShapeRef::Listed(i) => &self.occluders.flats[i as usize].shape,
+            ShapeRef::InTree(i) => &self.geometry.parallelograms[i as usize].shape,
         }
-    }
-}
-
-impl Shaft {
-    /// From points to a light.
-    pub fn of(points: &[Viewpoint], indices: &[u32], hull: &LightHull) -> Shaft {
-        let mut starts = Aabb::EMPTY;
-        let mut apart = Vec3::ZERO;
-        let first = &points[indices[0] as usize];
-        let mut horizon = Some(Horizon { n: first.horizon, least: f64::INFINITY });
-        for point in indices.iter().map(|i| &points[*i as usize]) {
-            // Some shapes are asked from the point itself
-            starts = starts.with(point.start).with(point.p);
-            apart = apart.max((point.start - point.p).abs() * 1.0001);
-            match &mut horizon {
-                Some(horizon) if horizon.n == point.horizon => {
-                    let height = |v: Vec3| point.horizon.as_dvec3().dot(v.as_dvec3());
-                    horizon.least = horizon.least.min(height(point.p)).min(height(point.start));
-                }
-                _ => horizon = None,
-            }
-        }
-        let mut shaft = Shaft::between(starts, hull, apart);
-        shaft.horizon = horizon;
-        shaft
-    }
-
-    /// The same in the space of something placed.
-    fn placed(&self, placement: &Placement, hull: &LightHull, apart: Vec3) -> Shaft {
-        let m = &placement.object_from_world;
-        let size = |v: Vec3| {
-            let (a, v) = (&m.matrix3, v.as_dvec3());
-            a.x_axis.abs() * v.x + a.y_axis.abs() * v.y + a.z_axis.abs() * v.z
-        };
-        let Aabb { min, max } = self.points;
-        let middle = (min.as_dvec3() + max.as_dvec3()) * 0.5;
-        let (center, half) = (m.transform_point3(middle), size((max - min) * 0.5) * (1.0 + 1e-6));
-        // Rays start where single precision puts them
-        let room = (center.abs() + half) * f64::from(f32::EPSILON);
-        let points = Aabb { min: (center - half - room).as_vec3(), max: (center + half + room).as_vec3() };
-        let hull = if hull.finite {
-            LightHull {
-                center: m.transform_point3(hull.center.as_dvec3()).as_vec3(),
-                axes: hull.axes.map(|a| m.transform_vector3(a.as_dvec3()).as_vec3()),
-                finite: true,
-                is_ball: false,
-                plane: Vec3::ZERO,
-            }
-        } else {
-            LightHull { center: m.transform_vector3(hull.center.as_dvec3()).as_vec3(), ..*hull }
-        };
-        let apart = size(apart).as_vec3() + room.as_vec3() * 2.0;
-        let mut shaft = Shaft::between(points, &hull, apart);
-        if !hull.finite {
-            // The rounding of the direction
-            let room = shaft.low.abs() * f32::EPSILON;
-            (shaft.low, shaft.high) = (shaft.low - room, shaft.high + room);
-        }
-        shaft.horizon = self.horizon.map(|horizon| {
-            let n = (placement.world_from_object.matrix3.transpose() * horizon.n.as_dvec3()).as_vec3();
-            let above = horizon.least - horizon.n.as_dvec3().dot(middle);
-            Horizon { n, least: n.as_dvec3().dot(center) + above }
-        });
-        shaft
     }
 }
 
@@ -171,27 +107,27 @@ impl OccluderList {
         self.too_many = false;
     }
 
-    /// Whether something in trees may be in the way.
+    /// Whether it holds anything from trees.
     pub fn has_trees(&self) -> bool {
         self.has_meshes() || !self.others.is_empty()
     }
 
-    /// Whether something in trees may be that is neither a solid nor a point set.
+    /// Whether it holds anything from trees that is neither a solid nor a point set.
     pub fn has_meshes(&self) -> bool {
-        let is_in_tree = |which: &Which| matches!(which, Which::InTree(_));
+        let is_in_tree = |which: &ShapeRef| matches!(which, ShapeRef::InTree(_));
         self.too_many
             || !self.leaves.is_empty()
             || self.spheres.iter().any(is_in_tree)
             || self.flats.iter().any(|(which, _)| is_in_tree(which))
     }
 
-    /// How many things it holds: shapes and leaves.
+    /// The number of shapes and leaves.
     pub fn count(&self) -> usize {
         self.spheres.len() + self.flats.len() + self.disks.len() + self.leaves.len() + self.others.len()
     }
 
-    /// Gathers what may stand between those of `points` in `indices` and a light: all listed shapes that cast shadows
-    /// for it and are not proved to be out of the way, and of the trees at most `cap` leaves of triangles.
+    /// Gathers the occluders between those of `points` in `indices` and a light: the listed shapes that cast shadows of
+    /// it and may intersect the shaft, and at most `cap` leaves of triangles from the trees.
     pub fn gather(
         &mut self,
         level: Level,
@@ -217,7 +153,7 @@ impl OccluderList {
         };
         let listed = &scene.occluders;
         let spheres = scene.that_stop(&listed.spheres, light).filter(|(_, sphere)| meets(&sphere.shape));
-        self.spheres.extend(spheres.map(|(i, _)| Which::Listed(i as u32)));
+        self.spheres.extend(spheres.map(|(i, _)| ShapeRef::Listed(i as u32)));
         self.disks.extend(scene.that_stop(&listed.disks, light).map(|(i, _)| i as u32));
         let sides = listed.sides(light);
         for (i, flat) in scene.that_stop(&listed.flats, light) {
@@ -227,28 +163,17 @@ impl OccluderList {
                 flat.shape.is_one_sided(point.p, point.error, side)
             };
             if !indices.iter().all(one_sided) {
-                self.flats.push((Which::Listed(i as u32), side));
+                self.flats.push((ShapeRef::Listed(i as u32), side));
             }
         }
         if scene.geometry.has_trees() {
-            let gathered =
-                dispatch_all!(level, simd => self.gather_trees(simd, scene, target, &shaft, points, indices, cap));
-            self.too_many = !gathered;
+            self.too_many = !dispatch_all!(level, simd => self.gather_trees(simd, scene, target, &shaft, cap));
         }
     }
 
+    /// Gathers from the trees. Returns whether that is all.
     #[inline(always)]
-    #[allow(clippy::too_many_arguments, reason = "the rest of `gather`")]
-    fn gather_trees<S: Simd>(
-        &mut self,
-        simd: S,
-        scene: &Scene,
-        target: &Target,
-        shaft: &Shaft,
-        points: &[Viewpoint],
-        indices: &[u32],
-        cap: usize,
-    ) -> bool {
+    fn gather_trees<S: Simd>(&mut self, simd: S, scene: &Scene, target: &Target, shaft: &Shaft, cap: usize) -> bool {
         let geometry = &*scene.geometry;
         if geometry.world.as_ref().is_some_and(|world| geometry.stops(world.shadow, target.light))
             && !self.gather_mesh(simd, geometry, 0, target.light, shaft, cap)
@@ -256,9 +181,9 @@ impl OccluderList {
             return false;
         }
         let casts = |surface| geometry.casts(surface, target.light);
-        let stands = |thing: u32| geometry.stops(geometry.placed[thing as usize].shadow, target.light);
+        let stops = |thing: u32| geometry.stops(geometry.placed[thing as usize].shadow, target.light);
         for &thing in &geometry.unbounded {
-            if stands(thing) {
+            if stops(thing) {
                 self.others.push(thing);
             }
         }
@@ -279,12 +204,12 @@ impl OccluderList {
                 found += 1;
                 match geometry.items[item as usize] {
                     UpperItem::Sphere(i) if casts(geometry.spheres[i as usize].surface) => {
-                        self.spheres.push(Which::InTree(i));
+                        self.spheres.push(ShapeRef::InTree(i));
                     }
                     UpperItem::Parallelogram(i) if casts(geometry.parallelograms[i as usize].surface) => {
-                        self.flats.push((Which::InTree(i), PlaneSide::Both));
+                        self.flats.push((ShapeRef::InTree(i), PlaneSide::Both));
                     }
-                    UpperItem::Placed(i) if stands(i) => match geometry.placed[i as usize].target {
+                    UpperItem::Placed(i) if stops(i) => match geometry.placed[i as usize].target {
                         PlacedTarget::Mesh(_) => self.meshes.push(i + 1),
                         PlacedTarget::Points(_) | PlacedTarget::Solid(_) => self.others.push(i),
                     },
@@ -296,14 +221,10 @@ impl OccluderList {
         if !all {
             return false;
         }
-        let apart = indices
-            .iter()
-            .map(|i| &points[*i as usize])
-            .fold(Vec3::ZERO, |apart, point| apart.max((point.start - point.p).abs() * 1.0001));
         for i in 0..self.meshes.len() {
             let source = self.meshes[i];
             let placement = &geometry.placed[source as usize - 1].placement;
-            let own = shaft.placed(placement, &target.hull, apart);
+            let own = shaft.in_object(placement, &target.hull);
             if !self.gather_mesh(simd, geometry, source, target.light, &own, cap) {
                 return false;
             }
@@ -311,8 +232,8 @@ impl OccluderList {
         true
     }
 
-    /// Gathers what of the trees may stand between a light and the patch, `curved` or flat, that reaches `reach` around
-    /// `point`: at most `cap` leaves.
+    /// Gathers from the trees the occluders between a light and a patch of surface, `curved` or flat, of radius `reach`
+    /// around `point`: at most `cap` leaves.
     #[allow(clippy::too_many_arguments, reason = "a light of a scene, and a patch")]
     pub fn gather_around(
         &mut self,
@@ -324,7 +245,6 @@ impl OccluderList {
         curved: bool,
         cap: usize,
     ) {
-        self.clear();
         let mut points = [*point; 2];
         if reach > 0.0 {
             for (point, side) in points.iter_mut().zip([-1.0, 1.0]) {
@@ -332,36 +252,24 @@ impl OccluderList {
                 point.start += Vec3::splat(reach * side);
             }
             if curved {
-                // It sees over what its middle does not
+                // The horizon differs over the patch: the shaft has none
                 points[1].horizon = -point.horizon;
             }
         }
         let indices = &[0, 1][..if reach > 0.0 { 2 } else { 1 }];
         let shaft = Shaft::of(&points, indices, &target.hull);
-        self.gather_in(level, scene, target, &shaft, &points, indices, cap);
+        self.gather_in(level, scene, target, &shaft, cap);
     }
 
-    /// Gathers what of the trees lies in a shaft from those of `points` in `indices`: at most `cap` leaves. The same
-    /// with every instruction set.
+    /// Gathers from the trees what intersects a shaft to a light: at most `cap` leaves. The same with every instruction
+    /// set.
     #[inline(never)]
-    #[allow(clippy::too_many_arguments, reason = "a light of a scene, and points")]
-    pub fn gather_in(
-        &mut self,
-        level: Level,
-        scene: &Scene,
-        target: &Target,
-        shaft: &Shaft,
-        points: &[Viewpoint],
-        indices: &[u32],
-        cap: usize,
-    ) {
+    pub fn gather_in(&mut self, level: Level, scene: &Scene, target: &Target, shaft: &Shaft, cap: usize) {
         self.clear();
-        let gathered =
-            dispatch_all!(level, simd => self.gather_trees(simd, scene, target, shaft, points, indices, cap));
-        self.too_many = !gathered;
+        self.too_many = !dispatch_all!(level, simd => self.gather_trees(simd, scene, target, shaft, cap));
     }
 
-    /// The leaves of one mesh. Not inlined: one copy for each instruction set is enough.
+    /// Gathers the leaves of one mesh. Not inlined: one copy for each instruction set is enough.
     #[inline(never)]
     fn gather_mesh<S: Simd>(
         &mut self,

@@ -1,25 +1,28 @@
-//! The space that a light's ways to some points can cross, and which boxes lie in it.
+//! The convex hull of some points and a light, and which boxes intersect it.
 //!
-//! The hull of a box of points and a box of ends is the union, over s from 0 to 1, of the boxes between the two: their
-//! low side along an axis is low + s (end's low - low), their high side likewise. Whether a box meets one of them is
-//! six linear inequalities in s: each says from where or up to where, so a slab test, at the price of a ray's. Light
-//! from infinitely far away is the same with directions for ends, and s without end.
+//! The hull of the box of the points and that of the light is the union, over s from 0 to 1, of the boxes between the
+//! two: their low side along an axis is low + s (low of the light - low), and so is their high side. Whether a box
+//! intersects one of them is a system of six linear inequalities in s, so a slab test, at the cost of that of one ray.
+//! For light from infinitely far away the ends are directions, and s is unbounded.
 //!
-//! A shaft never leaves out what a ray within it could be told to meet: boxes are padded by [`BEAM_PAD`] of the
-//! distance between the points and the farthest part of the tree, twice what single rays pad them with, which in turn
-//! is twice what the test of a triangle needs (`accel/ray.rs`). The roundings of the six bounds and of the sides are
-//! below a tenth of it.
+//! A shaft holds every box that a ray within it can intersect: boxes are padded by [`BEAM_PAD`] of the distance between
+//! the points and the farthest part of the tree, twice the padding for single rays, which in turn is twice what the
+//! triangle test needs (`accel/ray.rs`). The roundings of the six bounds and of the sides are below a tenth of it.
+//!
+//! Source: Haines, Wallace, "Shaft Culling for Efficient Ray-Cast Radiosity", 1991.
 
 use fearless_simd::{f32x8, prelude::*};
 
+use super::Viewpoint;
 use super::target::LightHull;
 use crate::accel::{Aabb, BEAM_PAD, BoxNode};
 use crate::math::{DVec3, Vec3};
+use crate::shape::Placement;
 
-/// What lies below is not lit from above: no way to a light that counts leads through n.x < `least`.
+/// The half-space n.x >= `least`, which holds all rays that carry light to the points.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Horizon {
-    /// A normal of the surface that all points share, of length about 1.
+    /// The horizon that all points share, of length about 1.
     pub n: Vec3,
     /// The least n.x of the points.
     pub least: f64,
@@ -30,18 +33,21 @@ pub(crate) struct Horizon {
 pub(crate) struct Shaft {
     /// Where rays start.
     pub points: Aabb,
-    /// How the low and the high sides change from the points to the light, rounded outwards.
+    /// The largest distance of a ray's origin from its point, along each axis.
+    pub apart: Vec3,
+    /// The differences of the low and of the high sides between the light and the points, rounded outwards.
     pub low: Vec3,
     pub high: Vec3,
-    /// How far they change: 1, or without end.
+    /// The largest s: 1, or infinite.
     pub s_max: f32,
     pub horizon: Option<Horizon>,
 }
 
-/// A shaft as one tree sees it.
+/// A shaft in the coordinates of one tree, with the padding for it.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct TreeShaft {
-    /// By axis: what the low line and what the high line says of a box's high and low plane.
+    /// For each axis, the bounds on s from the low side against a box's high plane, and from the high side against its
+    /// low plane.
     lines: [[Line; 2]; 3],
     s_max: f32,
     n: Vec3,
@@ -49,36 +55,88 @@ pub(crate) struct TreeShaft {
     has_horizon: bool,
 }
 
-/// A bound on s: plane x `r` + `c`.
+/// A linear bound on s: plane x `r` + `c`.
 #[derive(Clone, Copy, Debug)]
 struct Line {
     r: f32,
     c: f32,
-    /// Whether s is at least that; at most, if not.
+    /// Whether it is a lower bound.
     enters: bool,
 }
 
-/// Changes along an axis smaller than this, against the largest, are taken to be this, outwards.
+/// The smallest difference along an axis, relative to the largest and absolute; smaller ones are rounded outwards to
+/// it.
 const SMALLEST: f32 = 1.0 / (1u64 << 32) as f32;
 const TINY: f32 = 1.0 / (1u128 << 72) as f32;
 
 impl Shaft {
-    /// From rays that start in `points` towards `light`. `apart` is how far, along each axis, a ray's start can be from
-    /// the point its direction is measured from.
+    /// The shaft of rays from origins in `points` towards `light`. `apart` is the largest distance, along each axis, of
+    /// such an origin from the point that the ray's direction is computed from.
     pub fn between(points: Aabb, light: &LightHull, apart: Vec3) -> Self {
         if !light.finite {
             let d = light.center;
-            return Shaft { points, low: d, high: d, s_max: f32::INFINITY, horizon: None };
+            return Shaft { points, low: d, high: d, s_max: f32::INFINITY, apart, horizon: None };
         }
         let ends = light.bounds();
         let size = (ends.max - points.min).abs().max((points.max - ends.min).abs());
-        // The end of a ray is its start and the rounded difference of light and point
+        // A ray ends at its origin plus the rounded difference of light and point
         let room = apart + size * (4.0 * f32::EPSILON);
         let (low, high) = (ends.min - points.min - room, ends.max - points.max + room);
-        Shaft { points, low, high, s_max: 1.0, horizon: None }
+        Shaft { points, apart, low, high, s_max: 1.0, horizon: None }
     }
 
-    /// Through a tree around `center` that reaches `half` from it.
+    /// The shaft from some of the points to a light.
+    pub fn of(points: &[Viewpoint], indices: &[u32], hull: &LightHull) -> Shaft {
+        let (mut starts, mut apart) = (Aabb::EMPTY, Vec3::ZERO);
+        let first = &points[indices[0] as usize];
+        let mut horizon = Some(Horizon { n: first.horizon, least: f64::INFINITY });
+        for point in indices.iter().map(|i| &points[*i as usize]) {
+            // The tests of some shapes start at the point itself
+            starts = starts.with(point.start).with(point.p);
+            apart = apart.max(point.apart());
+            match &mut horizon {
+                Some(horizon) if horizon.n == point.horizon => {
+                    let height = |v: Vec3| point.horizon.as_dvec3().dot(v.as_dvec3());
+                    horizon.least = horizon.least.min(height(point.p)).min(height(point.start));
+                }
+                _ => horizon = None,
+            }
+        }
+        Shaft { horizon, ..Shaft::between(starts, hull, apart) }
+    }
+
+    /// The same shaft in the object space of `placement`.
+    pub fn in_object(&self, placement: &Placement, hull: &LightHull) -> Shaft {
+        let m = &placement.object_from_world;
+        let size = |v: Vec3| {
+            let (a, v) = (&m.matrix3, v.as_dvec3());
+            a.x_axis.abs() * v.x + a.y_axis.abs() * v.y + a.z_axis.abs() * v.z
+        };
+        let Aabb { min, max } = self.points;
+        let middle = (min.as_dvec3() + max.as_dvec3()) * 0.5;
+        let (center, half) = (m.transform_point3(middle), size((max - min) * 0.5) * (1.0 + 1e-6));
+        // Origins of rays are rounded to single precision
+        let room = (center.abs() + half) * f64::from(f32::EPSILON);
+        let points = Aabb { min: (center - half - room).as_vec3(), max: (center + half + room).as_vec3() };
+        let vector = |v: Vec3| m.transform_vector3(v.as_dvec3()).as_vec3();
+        let at = if hull.finite { m.transform_point3(hull.center.as_dvec3()).as_vec3() } else { vector(hull.center) };
+        let hull = LightHull { axes: hull.axes.map(vector), ..LightHull::at(at, hull.finite) };
+        let apart = size(self.apart).as_vec3() + room.as_vec3() * 2.0;
+        let mut shaft = Shaft::between(points, &hull, apart);
+        if !hull.finite {
+            // The rounding of the direction
+            let room = shaft.low.abs() * f32::EPSILON;
+            (shaft.low, shaft.high) = (shaft.low - room, shaft.high + room);
+        }
+        shaft.horizon = self.horizon.map(|horizon| {
+            let n = (placement.world_from_object.matrix3.transpose() * horizon.n.as_dvec3()).as_vec3();
+            let above = horizon.least - horizon.n.as_dvec3().dot(middle);
+            Horizon { n, least: n.as_dvec3().dot(center) + above }
+        });
+        shaft
+    }
+
+    /// The shaft in a tree that reaches `half` from `center`.
     #[inline(always)]
     pub fn within(&self, center: Vec3, half: f32) -> TreeShaft {
         let (min, max) = (self.points.min - center, self.points.max - center);
@@ -114,7 +172,7 @@ impl Shaft {
         }
     }
 
-    /// Whether a box meets the shaft, in f64 and without any padding but `room`.
+    /// Whether a box intersects the shaft, in f64 and with `room` as the only padding.
     pub fn meets(&self, low: DVec3, high: DVec3, room: f64) -> bool {
         let (mut enter, mut leave) = (0.0f64, f64::from(self.s_max));
         let mut bound = |r: f64, value: f64, at_most: bool| {
@@ -146,8 +204,8 @@ impl Shaft {
 }
 
 impl TreeShaft {
-    /// The children of a node that the shaft meets: a bit for each, and where they begin. Padding makes up for every
-    /// rounding; no instruction set multiplies and adds at once, so that all find the same.
+    /// The children of a node that the shaft intersects, a bit for each, and the least s of each. The padding covers
+    /// the rounding; no instruction set fuses multiplication and addition, so all compute the same.
     #[inline(always)]
     pub fn meet<S: Simd>(&self, simd: S, node: &BoxNode) -> (u32, f32x8<S>) {
         let planes = &node.planes;
@@ -160,7 +218,7 @@ impl TreeShaft {
         for ([low, high], [low_planes, high_planes]) in self.lines.iter().zip(planes) {
             let a = line(high_planes, low.r, simd.splat_f32x8(low.c));
             let b = line(low_planes, high.r, simd.splat_f32x8(high.c));
-            // A pattern that seldom changes from node to node
+            // The same branch for all nodes of a tree
             match (low.enters, high.enters) {
                 (false, true) => (enter, leave) = (enter.max(b), leave.min(a)),
                 (true, false) => (enter, leave) = (enter.max(a), leave.min(b)),

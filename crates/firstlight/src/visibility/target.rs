@@ -1,5 +1,4 @@
-//! A light as something to be seen from a surface: a box along its own axes around all that shines, and its sampled
-//! points in the order of space.
+//! A light as the target of shadow rays: an oriented box around it, and its samples in blocks of neighbours.
 
 use fearless_simd::{Level, f32x16, prelude::*};
 
@@ -9,52 +8,52 @@ use crate::light::{AreaShape, Extent, Light, LightKind, PointBlock, Points};
 use crate::math::{Axes, DMat3, DVec3, LANES, LightEnd, Vec3, least_and_most};
 use crate::scene::Scene;
 
-/// What encloses a light: the points `center` + u `axes[0]` + v `axes[1]` + w `axes[2]`, each of u, v, w from -1 to 1;
-/// or, of a light that is infinitely far away, the direction `center` alone.
+/// An oriented box around a light: the points `center` + u `axes[0]` + v `axes[1]` + w `axes[2]`, each of u, v, w from
+/// -1 to 1. For a light that is infinitely far away, its direction `center`.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct LightHull {
     pub center: Vec3,
     pub axes: [Vec3; 3],
-    /// Whether it is somewhere.
+    /// Whether it has a position.
     pub finite: bool,
-    /// Whether it is a ball, as wide as each axis.
+    /// Whether it is a sphere, whose radius is the length of each axis.
     pub is_ball: bool,
-    /// Unit normal of the plane that all of it lies in; 0 of a light that is not flat.
+    /// The unit normal of a flat light; 0 for all others.
     pub plane: Vec3,
 }
 
-/// A light as it is seen from one point: the ways `l` + u `axes[0]` + v `axes[1]` + w `axes[2]` lead to it.
+/// A light relative to one point: the vectors `l` + u `axes[0]` + v `axes[1]` + w `axes[2]` from the point to its box.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct LightSeen {
     pub l: Vec3,
     pub axes: [Vec3; 3],
-    /// The largest coordinate of any way, at least.
+    /// An upper bound of the largest coordinate of any of the vectors.
     pub longest: f32,
-    /// The largest coordinate of every way, at most.
+    /// A lower bound of the largest coordinate of each of the vectors.
     pub shortest: f32,
     pub finite: bool,
     /// See [`LightHull::plane`].
     pub plane: Vec3,
-    /// Along which what is in the way is bounded: two axes across, and a third. Those of a ball face the point.
+    /// The axes along which projections of occluders are bounded; those of a sphere face the point.
     pub frame: [Vec3; 3],
-    /// How far away a ball is, in radii.
+    /// The distance of the center of a sphere, in radii.
     pub radii: Option<f32>,
 }
 
-/// Sixteen sampled points, by their coordinates along the hull's axes. Where there is none, those of another one.
+/// Sixteen samples of a light, by their coordinates along the axes of its box. Lanes without a sample repeat one.
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(64))]
 pub(crate) struct SampleBlock {
     pub at: [[f32; LANES]; 3],
-    /// The points themselves, world space.
+    /// The same points in world space, in metres.
     pub point: [[f32; LANES]; 3],
-    /// Which of the light's samples they are.
+    /// Their indices among the light's samples.
     pub sample: [u32; LANES],
-    /// The lanes that hold a sample.
+    /// A mask of the lanes that hold a sample.
     pub present: u16,
 }
 
-/// Where the points of sixteen blocks lie: the middle and half the size of each along the hull's axes.
+/// The boxes of sixteen blocks: the center and half the size of each along the axes of the light's box.
 #[derive(Clone, Copy, Debug)]
 #[repr(C, align(64))]
 pub(crate) struct BlockBounds {
@@ -62,30 +61,30 @@ pub(crate) struct BlockBounds {
     pub half: [[f32; LANES]; 3],
 }
 
-/// A light, ready to be aimed at.
+/// A light as the target of shadow rays.
 #[derive(Clone, Debug)]
 pub(crate) struct Target {
-    /// The light itself.
+    /// Which light.
     pub light: LightId,
     pub hull: LightHull,
-    /// The sampled points, neighbours together; none of a light that is integrated.
+    /// The samples, neighbours together; empty for a light that is integrated.
     pub blocks: Vec<SampleBlock>,
-    /// Where the blocks lie, sixteen at a time.
+    /// The boxes of the blocks, sixteen at a time.
     pub cells: Vec<BlockBounds>,
-    /// Whether the light's own order is that of the blocks, each of which is full.
+    /// Whether the blocks have the order of the light's samples, and each is full.
     pub is_in_order: bool,
 }
 
-/// Axes are this much longer than they need to be, and no shorter than this against the others: more than single
-/// precision loses.
+/// Relative enlargement of the axes, and their least length relative to the longest: more than the rounding to single
+/// precision.
 const ROOM: f64 = 1e-5;
 
 impl LightHull {
-    fn at(center: Vec3, finite: bool) -> Self {
+    pub fn at(center: Vec3, finite: bool) -> Self {
         LightHull { center, axes: [Vec3::ZERO; 3], finite, is_ball: false, plane: Vec3::ZERO }
     }
 
-    /// The smallest hull with axes along `e0`, `e1` and across them, around `points`.
+    /// The smallest box around `points` with axes along `e0`, `e1` and their cross product.
     fn around(e0: DVec3, e1: DVec3, points: &[DVec3]) -> Self {
         let none = (DVec3::INFINITY, DVec3::NEG_INFINITY);
         let (low, high) = points.iter().fold(none, |(a, b), q| (a.min(*q), b.max(*q)));
@@ -94,7 +93,7 @@ impl LightHull {
         let thin = across * (e0.length() + e1.length());
         let axes = [e0, e1, thin].map(|axis| axis.as_vec3());
         let mut hull = LightHull { center, axes, finite: true, is_ball: false, plane: Vec3::ZERO };
-        // Fit the axes to the points, then look whether rounding lets any point out
+        // Fit the axes to the points, then enlarge the box while rounding leaves a point outside
         let mut needed = [0.0f64; 3];
         for q in points {
             let at = hull.coordinates(*q);
@@ -117,7 +116,7 @@ impl LightHull {
             LightKind::Spot(spot) => Self::at(spot.position, true),
             LightKind::Directional(directional) => Self::at(directional.to_light, false),
             LightKind::Area(area) => {
-                // The shape as it is described, and its points as they are rounded
+                // The exact shape, and its samples as they are rounded
                 let (e0, e1, mut points) = match &area.shape {
                     AreaShape::Rectangle(rectangle) => {
                         let corners = rectangle.shape.corners.map(|corner| corner.as_dvec3());
@@ -148,26 +147,26 @@ impl LightHull {
         self.inverse() * (q - self.center.as_dvec3())
     }
 
-    /// What makes coordinates along the axes of a way from the middle.
+    /// The matrix from vectors from the center to coordinates along the axes.
     fn inverse(&self) -> DMat3 {
         let [a, b, c] = self.axes.map(|v| v.as_dvec3());
         DMat3::from_cols(a, b, c).inverse()
     }
 
-    /// How far the light reaches from its centre, along the axes of the world.
+    /// Half the size of its bounding box along the axes of the world.
     pub fn reach(&self) -> Vec3 {
         let [a, b, c] = self.axes.map(|v| v.abs());
         a + b + c
     }
 
-    /// The box around it. For a light infinitely far away the box of its direction.
+    /// The axis-aligned bounding box; of a light infinitely far away that of its direction.
     pub fn bounds(&self) -> Aabb {
         let reach = self.reach() * (1.0 + 4.0 * f32::EPSILON);
         let room = (self.center.abs() + reach) * f32::EPSILON;
         Aabb { min: self.center - reach - room, max: self.center + reach + room }
     }
 
-    /// The light from `p`.
+    /// The light relative to `p`.
     #[inline(always)]
     pub fn from(&self, p: Vec3) -> LightSeen {
         let l = if self.finite { self.center - p } else { self.center };
@@ -183,16 +182,16 @@ impl LightHull {
 }
 
 impl SampleBlock {
-    /// Some samples, at most sixteen.
-    fn of(count: usize, sample: impl Fn(usize) -> Sample) -> SampleBlock {
+    /// The block of at most sixteen samples.
+    fn of(samples: &[Sample]) -> SampleBlock {
         let mut block = SampleBlock {
             at: [[0.0; LANES]; 3],
             point: [[0.0; LANES]; 3],
             sample: [0; LANES],
-            present: ((1u32 << count) - 1) as u16,
+            present: ((1u32 << samples.len()) - 1) as u16,
         };
         for lane in 0..LANES {
-            let (k, q, at) = sample(lane.min(count - 1));
+            let (k, q, at) = samples[lane.min(samples.len() - 1)];
             for axis in 0..3 {
                 block.at[axis][lane] = at[axis] as f32;
                 block.point[axis][lane] = q[axis];
@@ -202,7 +201,8 @@ impl SampleBlock {
         block
     }
 
-    /// The samples of a block of points, by the number of the first. In lanes where it is called within `vectorize`.
+    /// The samples of a block of points, the first of which has index `first`. In lanes where it is called within
+    /// `vectorize`.
     #[inline(always)]
     fn of_points(first: usize, points: &PointBlock, inverse: &DMat3, center: DVec3) -> SampleBlock {
         let point = points.coordinates();
@@ -249,7 +249,7 @@ impl LightSeen {
         LightSeen { l, axes, longest, shortest, finite, plane: Vec3::ZERO, frame: axes, radii: None }
     }
 
-    /// Between what values f.w lies for the ways w, but for rounding: its middle and how far it goes from there.
+    /// The range of f.w over the vectors w to the light, without rounding: its center and half its length.
     #[inline(always)]
     pub fn range(&self, f: Vec3) -> (f32, f32) {
         let [a, b, c] = self.axes;
@@ -265,8 +265,7 @@ impl Target {
 
     pub fn new(scene: &Scene, id: LightId) -> Self {
         let light = &scene.lights[id.index()];
-        let hull = LightHull::of(light);
-        let target = Target { light: id, hull, blocks: Vec::new(), cells: Vec::new(), is_in_order: true };
+        let target = Target::without_samples(id, LightHull::of(light));
         match light.extent() {
             Extent::Area(area) if !light.exact => target.with(scene.level, area.points()),
             Extent::Area(_) | Extent::Point => target,
@@ -278,17 +277,17 @@ impl Target {
         LightEnd { light: self.light, plane: self.hull.plane }
     }
 
-    /// The same light with these points of it.
+    /// The same light with these samples.
     fn with(&self, level: Level, points: &Points) -> Self {
         let (inverse, center) = (self.hull.inverse(), self.hull.center.as_dvec3());
         let sample = |k: usize| (k as u32, points.get(k), inverse * (points.get(k).as_dvec3() - center));
         let mut samples: Vec<Sample> = (0..points.count()).map(sample).collect();
         gather_neighbours(&mut samples);
-        let blocks = samples.chunks(LANES).map(|chunk| SampleBlock::of(chunk.len(), |lane| chunk[lane])).collect();
-        Target { blocks, is_in_order: false, ..self.without() }.bounded(level)
+        let blocks = samples.chunks(LANES).map(SampleBlock::of).collect();
+        Target { blocks, is_in_order: false, ..Target::without_samples(self.light, self.hull) }.bounded(level)
     }
 
-    /// The same light with these points of it, of which each sixteen that follow each other are neighbours.
+    /// The same light with these samples, each sixteen of which are neighbours.
     pub fn with_neighbours(&self, level: Level, points: &Points) -> Self {
         let (inverse, center) = (self.hull.inverse(), self.hull.center.as_dvec3());
         let mut blocks = Vec::with_capacity(points.blocks.len());
@@ -297,10 +296,10 @@ impl Target {
                 blocks.push(SampleBlock::of_points(number * LANES, block, &inverse, center));
             }
         });
-        Target { blocks, ..self.without() }.bounded(level)
+        Target { blocks, ..Target::without_samples(self.light, self.hull) }.bounded(level)
     }
 
-    /// Where sixteen of its blocks lie, by their numbers.
+    /// The boxes of sixteen blocks, by their indices.
     pub fn bounds_of(&self, blocks: &[u32; LANES]) -> BlockBounds {
         let mut bounds = BlockBounds { middle: [[0.0; LANES]; 3], half: [[0.0; LANES]; 3] };
         for (lane, block) in blocks.iter().enumerate() {
@@ -313,12 +312,12 @@ impl Target {
         bounds
     }
 
-    /// The same light without points.
-    fn without(&self) -> Self {
-        Target { light: self.light, hull: self.hull, blocks: Vec::new(), cells: Vec::new(), is_in_order: true }
+    /// A light, or a box around some of which `light` is one, without samples.
+    pub fn without_samples(light: LightId, hull: LightHull) -> Self {
+        Target { light, hull, blocks: Vec::new(), cells: Vec::new(), is_in_order: true }
     }
 
-    /// Finds where its blocks lie.
+    /// Computes the boxes of its blocks.
     fn bounded(mut self, level: Level) -> Self {
         let Target { blocks, cells, .. } = &mut self;
         dispatch_all!(level, simd => {
@@ -330,10 +329,10 @@ impl Target {
     }
 }
 
-/// A sampled point: its number, where it is, and its coordinates along the hull's axes.
+/// A sample: its index, its position, and its coordinates along the axes of the light's box.
 type Sample = (u32, Vec3, DVec3);
 
-/// Orders samples so that each sixteen are neighbours: halves them along their longest side again and again.
+/// Orders samples so that each sixteen are neighbours: recursive median splits along the longest axis.
 fn gather_neighbours(samples: &mut [Sample]) {
     if samples.len() <= LANES {
         return;

@@ -303,7 +303,7 @@ fn every_sample_is_answered_as_by_its_own_ray() {
     let random = &mut Random::new(7);
     let mut seen = [0u64; 4];
     let mut traced = 0;
-    let mut settler = Settler::default();
+    let mut resolver = VisibilityResolver::default();
     let levels: Vec<Level> = SimdLevel::available().into_iter().rev().map(SimdLevel::token).collect();
     for round in 0..600 {
         let scene = random_scene(random);
@@ -311,10 +311,10 @@ fn every_sample_is_answered_as_by_its_own_ray() {
         for (light, target) in scene.lights.iter().zip(Target::of_all(&scene)) {
             let index = target.light.index();
             let level = levels[if round % 4 == 0 { random.below(levels.len()) } else { 0 }];
-            let mut counts = Settled::default();
+            let mut counts = VisibilityStats::default();
             let mut order: Vec<u32> = (0..points.len() as u32).collect();
             let mut asked = 0;
-            settler.settle(level, &scene, &target, &points, &mut order, &mut counts, |k, visibility, view| {
+            resolver.resolve(level, &scene, &target, &points, &mut order, &mut counts, |k, visibility, view| {
                 asked += 1;
                 let point = &points[k];
                 for s in 0..light.samples() {
@@ -324,11 +324,11 @@ fn every_sample_is_answered_as_by_its_own_ray() {
                     }
                     let hidden = scene.occluded(&point.ray(target.end(), to.l, to.finite));
                     let answer = match visibility {
-                        Visibility::Lit => false,
-                        Visibility::Hidden | Visibility::BelowHorizon => true,
+                        Visibility::Full => false,
+                        Visibility::None | Visibility::BelowHorizon => true,
                         // One sample is traced as it is
-                        Visibility::Mask if target.blocks.is_empty() => hidden,
-                        Visibility::Mask => {
+                        Visibility::Partial if target.blocks.is_empty() => hidden,
+                        Visibility::Partial => {
                             view.hidden.get(s / 16).is_some_and(|bits| bits >> (s % 16) & 1 == 1)
                                 || view.spheres.iter().any(|sphere| sphere.blocks(to.l, true))
                                 || view.flats.iter().any(|flat| flat.blocks(to.l, true))
@@ -343,7 +343,7 @@ fn every_sample_is_answered_as_by_its_own_ray() {
                 }
             });
             assert_eq!(asked, points.len());
-            (0..4).for_each(|i| seen[i] += counts.visibility[i]);
+            (0..4).for_each(|i| seen[i] += counts.classes[i]);
             traced += counts.traced;
         }
     }

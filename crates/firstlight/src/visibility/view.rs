@@ -1,4 +1,4 @@
-//! A light, seen from one point past what may stand in the way.
+//! The occluders of a light as one point sees them, and the class of its visibility.
 
 use fearless_simd::{Level, Simd};
 
@@ -11,42 +11,42 @@ use crate::math::{DVec3, UNIT_ROUNDOFF, Vec3};
 use crate::scene::{PlacedTarget, Scene};
 use crate::shape::{Cover, DiskShadow, Eye, ParallelogramShadow, Placement, SeenTriangle, SphereShadow, TOGETHER};
 
-/// How much of a light reaches a point.
+/// How much of a light is visible from a point.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Visibility {
-    /// All of it that is above the horizon.
-    Lit,
-    /// Nothing: one thing stands before all of it.
-    Hidden,
-    /// Nothing: it is behind the surface.
+    /// All that is above the horizon.
+    Full,
+    /// Nothing: one occluder hides all of it.
+    None,
+    /// Nothing: it is below the horizon of the surface.
     BelowHorizon,
-    /// Each sample for itself.
-    Mask,
+    /// Some of it may be hidden: each sample is tested.
+    Partial,
 }
 
-/// What may hide some of a light from one point.
+/// The occluders that may hide a part of a light from one point. Keeps its memory.
 #[derive(Debug, Default)]
 pub(crate) struct ShadowView {
     pub spheres: Vec<SphereShadow>,
     pub flats: Vec<ParallelogramShadow>,
     pub disks: Vec<DiskShadow>,
     pub triangles: Vec<SeenTriangle>,
-    /// Solids and point sets, as they are placed, each with a box around it in the world.
+    /// Solids and point sets, by their index among placed things, each with its box in world space.
     pub others: Vec<(u32, Aabb)>,
-    /// Whether all trees have to be asked, ray by ray.
+    /// Whether rays have to be traced through all trees.
     pub trees: bool,
-    /// For each block of sixteen samples, those that are known to be hidden: in the light's order.
+    /// For each block of sixteen samples, a mask of the hidden ones, in the light's order.
     pub hidden: Vec<u16>,
     leaves: Vec<u32>,
-    /// The same in the order of space, while it is made.
+    /// The same in the order of the blocks of the target, while it is computed.
     pub(super) in_space: Vec<u16>,
 }
 
-/// Products of three numbers with sum are wrong by less than this, in the sum of their sizes.
+/// Error bound of a dot product, relative to the sum of the sizes of its terms.
 const DOT: f32 = 16.0 * UNIT_ROUNDOFF;
 
 impl ShadowView {
-    /// Nothing is in the way.
+    /// Removes all occluders.
     pub fn clear(&mut self) {
         self.spheres.clear();
         self.flats.clear();
@@ -57,13 +57,13 @@ impl ShadowView {
         self.trees = false;
     }
 
-    /// Whether anything in it is asked point by point, but for what is in lists.
-    pub fn asks_points(&self) -> bool {
+    /// Whether any occluder is tested sample by sample: triangles, and what is in trees.
+    pub fn needs_mask(&self) -> bool {
         self.trees || !self.triangles.is_empty() || !self.others.is_empty()
     }
 
-    /// What of a light is seen from `point`, past `occluders`, which were gathered for it. What is left to ask for the
-    /// samples is in this view then.
+    /// The visibility of a light from `point`, past `occluders`, which were gathered for it and maybe other points. The
+    /// occluders that hide some of the light, or may, are in this view afterwards.
     pub fn classify(
         &mut self,
         level: Level,
@@ -84,7 +84,7 @@ impl ShadowView {
             }
             match shadow.covers(light.l, &light.axes, light.longest, light.finite) {
                 Cover::Nothing => {}
-                Cover::All => return Visibility::Hidden,
+                Cover::All => return Visibility::None,
                 Cover::Some => self.spheres.push(shadow),
             }
         }
@@ -95,7 +95,7 @@ impl ShadowView {
             }
             match shadow.covers(light.l, &light.axes, light.longest, light.finite) {
                 Cover::Nothing => {}
-                Cover::All => return Visibility::Hidden,
+                Cover::All => return Visibility::None,
                 Cover::Some => self.flats.push(shadow),
             }
         }
@@ -103,7 +103,7 @@ impl ShadowView {
             let shadow = scene.occluders.disks[*disk as usize].shape.shadow(point.p, point.error);
             match shadow.covers(light.l, &light.axes, light.longest, light.finite) {
                 Cover::Nothing => {}
-                Cover::All => return Visibility::Hidden,
+                Cover::All => return Visibility::None,
                 Cover::Some => self.disks.push(shadow),
             }
         }
@@ -111,14 +111,14 @@ impl ShadowView {
         if !occluders.leaves.is_empty() {
             let hidden = dispatch_all!(
                 level,
-                simd => self.look(simd, scene, target, &light, occluders, point)
+                simd => self.classify_triangles(simd, scene, target, &light, occluders, point)
             );
             if hidden {
-                return Visibility::Hidden;
+                return Visibility::None;
             }
         }
         if self.trees {
-            return Visibility::Mask;
+            return Visibility::Partial;
         }
         self.gather_others(scene, target, &light, occluders, point);
         let nothing = self.spheres.is_empty()
@@ -126,10 +126,10 @@ impl ShadowView {
             && self.disks.is_empty()
             && self.triangles.is_empty()
             && self.others.is_empty();
-        if nothing { Visibility::Lit } else { Visibility::Mask }
+        if nothing { Visibility::Full } else { Visibility::Partial }
     }
 
-    /// Keeps those solids and point sets that may be in the way.
+    /// Adds the solids and point sets whose boxes intersect the shaft of this point.
     fn gather_others(
         &mut self,
         scene: &Scene,
@@ -141,8 +141,7 @@ impl ShadowView {
         if occluders.others.is_empty() {
             return;
         }
-        let own = [*point];
-        let shaft = Shaft::of(&own, &[0], &target.hull);
+        let shaft = Shaft::of(std::slice::from_ref(point), &[0], &target.hull);
         for &index in &occluders.others {
             let thing = &scene.geometry.placed[index as usize];
             let bounds = match thing.target {
@@ -166,7 +165,7 @@ impl ShadowView {
                 if !shaft.meets(low, high, far * 1e-5) {
                     continue;
                 }
-                // More than what rays in single precision lose
+                // Covers the rounding of rays in single precision
                 let room = (far + start.abs().max_element()) * 1e-5;
                 around = Aabb { min: (low - room).as_vec3(), max: (high + room).as_vec3() };
             }
@@ -174,9 +173,9 @@ impl ShadowView {
         }
     }
 
-    /// Looks at all triangles that were gathered. Says whether one hides all of the light.
+    /// Adds the triangles that may hide some of the light. Returns whether one hides all of it.
     #[inline(always)]
-    fn look<S: Simd>(
+    fn classify_triangles<S: Simd>(
         &mut self,
         simd: S,
         scene: &Scene,
@@ -195,7 +194,7 @@ impl ShadowView {
             rest = &rest[count..];
             if let Some(mesh) = ShadowMesh::of(&scene.geometry, source, target.light) {
                 let eye = eye(&mesh, light, point);
-                if look_at(simd, &mesh, &eye, &leaves, source, point.but.of(source), &mut self.triangles) {
+                if classify_leaves(simd, &mesh, &eye, &leaves, source, point.but.of(source), &mut self.triangles) {
                     hidden = true;
                     break;
                 }
@@ -206,10 +205,10 @@ impl ShadowView {
     }
 }
 
-/// Looks at leaves of one mesh, `but` for one of its triangles. Not inlined: one copy for each instruction set is
+/// The same for leaves of one mesh, without its triangle `but`. Not inlined: one copy for each instruction set is
 /// enough.
 #[inline(never)]
-fn look_at<S: Simd>(
+fn classify_leaves<S: Simd>(
     simd: S,
     mesh: &ShadowMesh,
     eye: &Eye,
@@ -232,7 +231,7 @@ fn look_at<S: Simd>(
     )
 }
 
-/// The point and the light in the space of a mesh.
+/// The point and the light in the object space of a mesh.
 fn eye(mesh: &ShadowMesh, light: &LightSeen, point: &Viewpoint) -> Eye {
     // Rays end short of the light by the rounding of both ends: `ShadowRay::end`
     let o = point.start.abs();
@@ -240,7 +239,7 @@ fn eye(mesh: &ShadowMesh, light: &LightSeen, point: &Viewpoint) -> Eye {
     let part = if light.plane == Vec3::ZERO {
         1.0 + o / light.shortest
     } else {
-        // All ways come as near to the plane, but for rounding
+        // The distance to the plane of the light is the same along all rays, but for rounding
         let (length, (middle, reach)) = (3.0 * light.longest, light.range(light.plane));
         (length + o) / (middle.abs() - reach - length * (8.0 * UNIT_ROUNDOFF)).max(0.0)
     };
@@ -282,15 +281,15 @@ fn eye(mesh: &ShadowMesh, light: &LightSeen, point: &Viewpoint) -> Eye {
     }
 }
 
-/// Whether point and light are on one side of a plane through `on` with normal `n` in the space of `placement`: by the
-/// numbers with which the plane itself is met.
+/// Whether point and light are on one side of a plane through `on` with normal `n` in the object space of `placement`,
+/// computed from the numbers that the intersection with the plane uses.
 fn stays_before(placement: &Placement, on: DVec3, n: DVec3, light: &LightSeen, point: &Viewpoint) -> bool {
     let height = n.dot(placement.line(point.start, light.l).o - on);
     let across = placement.object_from_world.matrix3.transpose() * n;
     let reach: f64 = light.axes.iter().map(|a| across.dot(a.as_dvec3()).abs()).sum();
     let room = across.abs().element_sum() * f64::from(light.longest) * 1e-6;
     let middle = across.dot(light.l.as_dvec3()) * height.signum();
-    // The lowest that the light gets, over the plane, turned to the point's side
+    // The least height of the light over the plane, positive on the point's side
     let least = middle - reach - room;
     height == 0.0 || if light.finite { height.abs() * (1.0 - 1e-9) + least > 0.0 } else { least > 0.0 }
 }

@@ -6,11 +6,11 @@ use std::ops::{ControlFlow, Range};
 
 use super::{Cells, PIXELS, Pixel, Wanted};
 use crate::color::Rgb;
+use crate::film::resolve::LightTerm;
 use crate::ids::LightId;
 use crate::material::{Moments, ShadingPoint};
 use crate::render::direct::{DirectLighting, Occlusion};
 use crate::render::fragment::{Fragment, Fragments};
-use crate::render::resolve::LightTerm;
 use crate::render::together::{Outcome, Together, salt};
 use crate::render::{AaMode, Counts};
 use crate::scene::Scene;
@@ -33,7 +33,7 @@ pub(super) enum FragmentSight {
     /// Rays differ: each asks for itself.
     Parted,
     /// Rays differ, and were asked: what all of them see, added up, diffuse and specular.
-    Settled(LightTerm),
+    VisibilityStats(LightTerm),
 }
 
 /// What is known of the ways past trees. Keeps its memory.
@@ -154,7 +154,7 @@ impl Cells<'_> {
                 FragmentSight::Clear => Occlusion::Listed,
                 FragmentSight::Lit => Occlusion::None,
                 FragmentSight::Dark => return false,
-                FragmentSight::Settled(terms) => {
+                FragmentSight::VisibilityStats(terms) => {
                     let pixel = self.fragments.all[*fragment as usize].pixel as usize;
                     self.terms[pixel * self.scene.lights.len() + *light as usize] += terms;
                     return false;
@@ -257,7 +257,7 @@ impl Cells<'_> {
                 let before = counts.work();
                 let terms = together.settle(&mut self.lights, counts).terms;
                 self.sums.work[index] += each + counts.work() - before;
-                self.behind.known[fragment * lights + light] = FragmentSight::Settled(terms);
+                self.behind.known[fragment * lights + light] = FragmentSight::VisibilityStats(terms);
             }
             sights.views.iter_mut().filter_map(Option::take).for_each(|view| self.lights.keep(view));
         }
@@ -279,7 +279,7 @@ impl Cells<'_> {
 
     /// Of how many lights the rays of a fragment were asked for points.
     pub(super) fn count_settled(&self, fragment: usize) -> usize {
-        self.count_lights(fragment, |sight| matches!(sight, FragmentSight::Settled(_)))
+        self.count_lights(fragment, |sight| matches!(sight, FragmentSight::VisibilityStats(_)))
     }
 
     /// Notes that, if nothing is known of it yet.
@@ -304,7 +304,7 @@ impl Cells<'_> {
         for other in (0..lights).filter(|other| *other != light) {
             let scale = self.lights.scale(other);
             let share = match self.fragment_sight(fragment, other) {
-                FragmentSight::Settled(terms) => {
+                FragmentSight::VisibilityStats(terms) => {
                     others += scale * terms.sum() * (1.0 / rays);
                     continue;
                 }
@@ -416,10 +416,10 @@ impl Cells<'_> {
         }
         self.lights.classify(light, &block.points, order, counts, |k, visibility, occlusion| {
             sights[k] = match visibility {
-                Visibility::Lit => RaySight::Lit,
-                Visibility::Hidden => RaySight::Dark,
+                Visibility::Full => RaySight::Lit,
+                Visibility::None => RaySight::Dark,
                 Visibility::BelowHorizon => RaySight::BelowHorizon,
-                Visibility::Mask => {
+                Visibility::Partial => {
                     let (occlusion, view) = occlusion();
                     views[k] = view;
                     match occlusion {

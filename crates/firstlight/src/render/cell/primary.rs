@@ -2,11 +2,11 @@
 //! of all others are traced, those that may meet something in trees as bundles.
 
 use super::{CELL, Cells, Pixel, PixelState};
+use crate::film::hits::camera_ray;
+use crate::film::resolve::{LightTerm, PixelTerms};
 use crate::material::{Bsdf, ShadingPoint};
 use crate::render::fragment::{Contrast, Member, RayHit};
 use crate::render::grid::Block;
-use crate::render::hits::camera_ray;
-use crate::render::resolve::{LightTerm, PixelTerms};
 use crate::render::solo::{Candidate, Pyramid};
 use crate::render::square::Square;
 use crate::render::{AaMode, Counts};

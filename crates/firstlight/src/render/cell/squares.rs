@@ -13,17 +13,17 @@ use arrayvec::ArrayVec;
 use super::behind::{FragmentSight, NONE};
 use super::{CELL, Cells};
 use crate::color::Rgb;
+use crate::film::tile::Tile;
 use crate::ids::LightId;
 use crate::integrate::{Emitter, TOLERANCE};
+use crate::light::FEW_LIGHTS;
 use crate::material::{Moments, ShadingPoint};
 use crate::math::{LANES, Vec3};
 use crate::render::Counts;
 use crate::render::beams::Packet;
 use crate::render::direct::Occlusion;
 use crate::render::fragment::{Contrast, Fragment};
-use crate::render::many::FEW;
 use crate::render::square::Square;
-use crate::render::tile::Tile;
 use crate::visibility::Viewpoint;
 
 /// Pixels across the largest and the smallest squares.
@@ -121,7 +121,7 @@ impl Cells<'_> {
                 squares.extend(square.quarters_on([scene.width, scene.height]));
                 continue;
             }
-            let lights: ArrayVec<usize, FEW> =
+            let lights: ArrayVec<usize, FEW_LIGHTS> =
                 (0..scene.lights.len()).filter(|light| self.lights.is_behind(*light)).collect();
             self.square(square, &lights, counts);
             go_on()?;
@@ -131,14 +131,14 @@ impl Cells<'_> {
 
     /// Asks for some lights over a square, or over those of its quarters that tell.
     fn square(&mut self, square: Square, lights: &[usize], counts: &mut Counts) {
-        let mut left = ArrayVec::<usize, FEW>::new();
+        let mut left = ArrayVec::<usize, FEW_LIGHTS>::new();
         let is_open = |light: &usize| square.pixels().any(|at| self.is_unknown(at, *light));
-        let lights: ArrayVec<usize, FEW> = lights.iter().copied().filter(is_open).collect();
+        let lights: ArrayVec<usize, FEW_LIGHTS> = lights.iter().copied().filter(is_open).collect();
         if lights.is_empty() {
             return;
         }
         if self.is_smooth(square) {
-            let behind: ArrayVec<usize, FEW> =
+            let behind: ArrayVec<usize, FEW_LIGHTS> =
                 lights.iter().copied().filter(|light| !self.is_clear(square, *light, counts)).collect();
             behind.iter().for_each(|light| self.look_around(square, *light, counts));
             let mut is_told = |light: &usize| {
@@ -332,7 +332,7 @@ impl Cells<'_> {
                 }
             }
             if let Some(packet) = &mut packet {
-                counts.settled.traced += packet.trace(scene, |_, inner| asked[inner as usize][1] += 1);
+                counts.visibility.traced += packet.trace(scene, |_, inner| asked[inner as usize][1] += 1);
             }
         }
         for (inner, [asked, hidden]) in asked.into_iter().enumerate() {
@@ -440,7 +440,7 @@ impl Cells<'_> {
         }
         for (at, sums) in square.pixels().zip(told) {
             let Some((fragment, of)) = self.whole(at) else { continue };
-            if matches!(self.fragment_sight(fragment, light), FragmentSight::Settled(_) | FragmentSight::Told) {
+            if matches!(self.fragment_sight(fragment, light), FragmentSight::VisibilityStats(_) | FragmentSight::Told) {
                 continue;
             }
             // Of two colours that meet different light the mean is no product of means
@@ -461,7 +461,7 @@ impl Cells<'_> {
             }
             let all = sums * rays;
             let terms = of.bsdf.colors.each(&all);
-            self.note(fragment, light, FragmentSight::Settled(terms));
+            self.note(fragment, light, FragmentSight::VisibilityStats(terms));
         }
         true
     }
@@ -476,7 +476,7 @@ impl Cells<'_> {
         }
         let Some((fragment, _)) = self.whole(at) else { unreachable!("smooth squares are filled") };
         let outcome = self.settled(fragment, light, counts);
-        self.note(fragment, light, FragmentSight::Settled(outcome.terms));
+        self.note(fragment, light, FragmentSight::VisibilityStats(outcome.terms));
         let node = SquareNode { sums: outcome.sums * (1.0 / rays), share: outcome.share };
         self.behind.nodes.push((index, light, node));
         node

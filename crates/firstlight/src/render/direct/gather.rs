@@ -64,7 +64,7 @@ impl DirectLighting<'_> {
                 self.indices.clear();
                 self.indices.extend(0..points.len() as u32);
                 let shaft = Shaft::of(points, &self.indices, &target.hull);
-                trees.gather_in(self.level, scene, target, &shaft, points, &self.indices, LEAVES);
+                trees.gather_in(self.level, scene, target, &shaft, LEAVES);
             }
         }
         let is_known = lights.know(index, trees.others.iter().copied());
@@ -92,7 +92,7 @@ impl DirectLighting<'_> {
         self.indices.extend(0..points.len() as u32);
         let occluders = &mut self.occluders;
         occluders.gather(self.level, self.scene, &self.lights.targets[index], points, &self.indices, 0);
-        counts.settled.shafts += 1;
+        counts.visibility.shafts += 1;
         let is_known = || self.lights.know(index, occluders.others.iter().copied()) && !occluders.has_meshes();
         if occluders.has_trees() && !is_known() {
             Occlusion::Unknown
@@ -116,8 +116,8 @@ impl DirectLighting<'_> {
     ) {
         let (lights, views) = (self.lights, &mut self.views);
         let (target, listed) = (&lights.targets[index], self.scene.geometry.listed);
-        let settled = &mut counts.settled;
-        self.settler.settle(self.level, self.scene, target, points, order, settled, |k, visibility, view| {
+        let settled = &mut counts.visibility;
+        self.resolver.resolve(self.level, self.scene, target, points, order, settled, |k, visibility, view| {
             each(k, visibility, &mut || {
                 let is_listed = listed || view.spheres.is_empty() && view.flats.is_empty();
                 if view.trees
@@ -143,17 +143,17 @@ impl DirectLighting<'_> {
         }
         let mut found = None;
         let (target, points) = (&self.lights.targets[index], [Viewpoint::of(point)]);
-        let settled = &mut counts.settled;
-        self.settler.settle(self.level, self.scene, target, &points, &mut [0], settled, |_, visibility, view| {
+        let settled = &mut counts.visibility;
+        self.resolver.resolve(self.level, self.scene, target, &points, &mut [0], settled, |_, visibility, view| {
             found = Some(visibility);
             std::mem::swap(&mut kept, view);
         });
         match found {
-            Some(Visibility::Hidden | Visibility::BelowHorizon) | None => {
+            Some(Visibility::None | Visibility::BelowHorizon) | None => {
                 self.views.push(kept);
                 None
             }
-            Some(Visibility::Lit | Visibility::Mask) => Some(kept),
+            Some(Visibility::Full | Visibility::Partial) => Some(kept),
         }
     }
 

@@ -11,7 +11,7 @@ use crate::render::lanes::{PointObstacles, sum_area};
 use crate::render::pixel::{Lighting, LobeSums};
 use crate::render::plain::Plain;
 use crate::scene::Scene;
-use crate::visibility::{Settler, ShadowView, Target, Viewpoint, Visibility};
+use crate::visibility::{ShadowView, Target, Viewpoint, Visibility, VisibilityResolver};
 
 /// The shadows of a light of fewer samples than this show by themselves.
 const FEW_SAMPLES: usize = 256;
@@ -51,21 +51,21 @@ impl<'a> Sampled<'a> {
         self.lit(point)
     }
 
-    /// Hears what of it is seen from those `points` whose numbers are in `part`; see [`Settler::settle`].
+    /// Hears what of it is seen from those `points` whose numbers are in `part`; see [`VisibilityResolver::resolve`].
     pub fn settle(
         &self,
-        settler: &mut Settler,
+        resolver: &mut VisibilityResolver,
         points: &[Viewpoint],
         part: &mut [u32],
         counts: &mut Counts,
         each: impl FnMut(usize, Visibility, &mut ShadowView),
     ) {
         let all = self.samples() * part.len() as u64;
-        let settled = &mut counts.settled;
+        let settled = &mut counts.visibility;
         let before = *settled;
-        settler.settle(self.level, self.scene, self.target, points, part, settled, each);
+        resolver.resolve(self.level, self.scene, self.target, points, part, settled, each);
         // Cut by shapes of the lists, which are asked for every sample, or by what is in the trees
-        let cut = settled.visibility[Visibility::Mask as usize] - before.visibility[Visibility::Mask as usize];
+        let cut = settled.classes[Visibility::Partial as usize] - before.classes[Visibility::Partial as usize];
         let traced = settled.traced - before.traced;
         let asked = if self.scene.geometry.has_trees() { traced } else { self.samples() * cut };
         counts.shadow_rays += all;
@@ -76,9 +76,9 @@ impl<'a> Sampled<'a> {
     #[inline(always)]
     pub fn sent(&self, point: &ShadingPoint, visibility: Visibility, view: &ShadowView) -> Moments {
         match visibility {
-            Visibility::Hidden | Visibility::BelowHorizon => Moments::ZERO,
-            Visibility::Lit => self.lit(point),
-            Visibility::Mask => self.masked(point, view),
+            Visibility::None | Visibility::BelowHorizon => Moments::ZERO,
+            Visibility::Full => self.lit(point),
+            Visibility::Partial => self.masked(point, view),
         }
     }
 
@@ -133,7 +133,7 @@ impl DirectLighting<'_> {
                 estimate.moments = light.unshadowed(point, counts);
             }
         }
-        light.settle(&mut self.settler, &points, &mut order, counts, |number, visibility, view| {
+        light.settle(&mut self.resolver, &points, &mut order, counts, |number, visibility, view| {
             let k = members[number];
             estimates[k as usize].moments = light.sent(of.point(k), visibility, view);
         });

@@ -1,38 +1,37 @@
-//! Cuts in which one light may stand for others: which nodes count at the places of a block.
+//! The light cut of a block of patches, and what its nodes contribute to each of them.
 
 use std::ops::Range;
 
 use super::patch::Patch;
-use super::places::{standing, tones, zone};
-use super::{BLOCK, CLOSE, LEVELS, Many, ONE, Single, Stored};
+use super::receivers::{colors, receiver, receiver_bounds};
+use super::{BLOCK, BY_REPRESENTATIVE, LEVELS, MAX_SINGLE_LIGHTS, Many, PatchLight, SingleLight};
 use crate::color::Rgb;
 use crate::ids::LightId;
 use crate::integrate::{COSTS, TOLERANCE};
-use crate::light::{Extent, Held, LightNode, LightTree, Sends, Sent};
-use crate::material::{Moments, ShadingPoint};
+use crate::light::{EmissionProfile, Extent, LightNode, LightTree, NodeContents};
+use crate::material::{Colors, Moments, ShadingPoint};
 use crate::math::Vec3;
 use crate::render::counts::Counts;
-use crate::render::cut::{By, CutRules};
+use crate::render::cut::{CutRules, NodeEstimator};
 use crate::render::direct::{DirectLighting, LightQuery, Occlusion};
-use crate::render::fence::Fence;
+use crate::render::listed_occluder_cache::ListedOccluderCache;
 use crate::render::together::Together;
 use crate::scene::Scene;
-use crate::visibility::Seen;
+use crate::visibility::Visibility;
 
-/// A node that counts where the light that stands for it is seen.
+/// The representative light of a node, which contributes where that light is visible.
 #[derive(Clone, Copy)]
-pub(super) struct Dot {
+pub(super) struct RepresentativeLight {
     pub(super) entry: u32,
     light: u32,
-    /// Where the light is; of one that is infinitely far away, its direction.
+    /// The position of the light; of a directional one, its direction.
     at: Vec3,
     finite: bool,
     shadows: bool,
 }
 
 impl<'a> Many<'a> {
-    /// Lights the shading points of a block that lie on one surface. `guess` is a cautious estimate of their incident
-    /// light.
+    /// Lights the patches of a block that lie on one surface. `guess` is a lower estimate of their incident light.
     #[allow(clippy::too_many_arguments, reason = "a block of a cell, and what it asks with")]
     pub(super) fn block(
         &mut self,
@@ -45,19 +44,19 @@ impl<'a> Many<'a> {
     ) {
         let (scene, tree) = (self.scene, self.tree);
         let patch = |number: &usize| &patches[*number];
-        let zone = zone(group.iter().map(patch), self.eye);
-        let tones = tones(scene, group.iter().map(patch));
+        let receivers = receiver_bounds(group.iter().map(patch), self.eye);
+        let colors = colors(scene, group.iter().map(patch));
         let receives = group.iter().any(|at| patch(at).point.receives_shadow);
-        self.outlook.stand(scene, group.iter().map(|at| standing(patch(at))));
+        self.cluster_visibility.set_receivers(scene, group.iter().map(|at| receiver(patch(at))));
         let steps = lights.display_steps();
-        let rules = CutRules { tree, steps, zone: &zone, tones: &tones, budget: TOLERANCE.crowd };
+        let rules = CutRules { tree, steps, receivers: &receivers, colors: &colors, budget: TOLERANCE.crowd };
         let mut cut = std::mem::take(&mut self.cut);
-        let (simd, outlook, fence) = (lights.level(), &mut self.outlook, &mut self.fence);
-        let mut look = |node: &LightNode, light: u32| {
+        let (simd, cluster_visibility, cache) = (lights.level(), &mut self.cluster_visibility, &mut self.cache);
+        let mut classify = |node: &LightNode, light: u32| {
             if !(receives && node.shadows) {
-                return Seen::Whole;
+                return Some(Visibility::Full);
             }
-            outlook.look(simd, scene, node.shine.low, node.shine.high, LightId(light))
+            cluster_visibility.classify(simd, scene, node.bounds.low, node.bounds.high, LightId(light))
         };
         let links = scene.geometry.lights_of(patch(&group[0]).point.surface);
         let shines = |root: &&u32| {
@@ -66,13 +65,16 @@ impl<'a> Many<'a> {
         };
         cut.begin(&rules, tree.roots.iter().filter(shines));
         let guess = guess.unwrap_or_else(|| {
-            cut.refine(&CutRules { budget: TOLERANCE.crowd * COSTS.pilot, ..rules }, None, &mut look);
-            cut.peek();
+            cut.refine(&CutRules { budget: TOLERANCE.crowd * COSTS.pilot, ..rules }, None, &mut classify);
+            cut.list_nodes();
             let some = [0, group.len() / 2, group.len() - 1].map(|i| patch(&group[i]));
             let all = some.map(|patch| {
-                fence.stand(scene, &patch.point);
-                cut.nodes.iter().fold(Rgb::BLACK, |sum, (node, by)| match entry(*node, *by) {
-                    entry if by.is_everywhere() || Dot::new(tree, entry).arrives(scene, fence, &patch.point) => {
+                cache.set_receiver(scene, &patch.point);
+                cut.nodes.iter().fold(Rgb::BLACK, |sum, (node, estimator)| match entry(*node, *estimator) {
+                    entry
+                        if estimator.is_unoccluded()
+                            || RepresentativeLight::new(tree, entry).is_visible(scene, cache, &patch.point) =>
+                    {
                         sum + sent(scene, tree, entry, &patch.point).cosine()
                     }
                     _ => sum,
@@ -80,30 +82,31 @@ impl<'a> Many<'a> {
             });
             all.into_iter().reduce(Rgb::min).unwrap_or(Rgb::BLACK) * TOLERANCE.sure
         });
-        cut.refine(&rules, Some(guess), &mut look);
-        let is_close = cut.open.len() > CLOSE && level < LEVELS && group.len() > 1;
+        cut.refine(&rules, Some(guess), &mut classify);
+        let is_close = cut.single_lights.len() > MAX_SINGLE_LIGHTS && level < LEVELS && group.len() > 1;
         let (mut again, mut darkest) = (Vec::new(), guess);
         if is_close {
             again.extend_from_slice(group);
         } else {
-            cut.settle(&rules, group.len(), &mut look);
+            cut.finish(&rules, group.len(), &mut classify);
             let start = self.lit.len() as u32;
-            let everywhere = cut.nodes.iter().filter(|(_, by)| by.is_everywhere());
-            self.lit.extend(everywhere.map(|(node, by)| entry(*node, *by)));
+            let everywhere = cut.nodes.iter().filter(|(_, estimator)| estimator.is_unoccluded());
+            self.lit.extend(everywhere.map(|(node, estimator)| entry(*node, *estimator)));
             let lit = start..self.lit.len() as u32;
-            let start = self.dots.len() as u32;
-            let sometimes = cut.nodes.iter().filter(|(_, by)| !by.is_everywhere());
-            self.dots.extend(sometimes.map(|(node, by)| Dot::new(tree, entry(*node, *by))));
-            let maybe = start..self.dots.len() as u32;
+            let start = self.representatives.len() as u32;
+            let sometimes = cut.nodes.iter().filter(|(_, estimator)| !estimator.is_unoccluded());
+            self.representatives
+                .extend(sometimes.map(|(node, estimator)| RepresentativeLight::new(tree, entry(*node, *estimator))));
+            let maybe = start..self.representatives.len() as u32;
             let mut found: Option<Rgb> = None;
             for at in group {
                 let patch = patch(at);
                 let singles = self.singles.len();
                 let lists = [lit.clone(), maybe.clone()];
-                let (stored, light) = self.patch(patch, &cut.open, lists, lights, counts);
+                let (stored, light) = self.patch(patch, &cut.single_lights, lists, lights, counts);
                 let error = cut.error(&patch.point.bsdf.colors);
                 if lights.steps(stored.value, error) > TOLERANCE.crowd * TOLERANCE.lenient && guess != Rgb::BLACK {
-                    // Darker than was guessed
+                    // Darker than the guess
                     self.singles.truncate(singles);
                     found = Some(found.map_or(light, |found| found.min(light)));
                     again.push(*at);
@@ -133,7 +136,7 @@ impl<'a> Many<'a> {
         }
     }
 
-    /// What arrives at one patch of a block, as its block says; and what of it is diffuse light.
+    /// What arrives at one patch of a block from the nodes and single lights of its cut; and the diffuse part of it.
     pub(super) fn patch(
         &mut self,
         patch: &Patch,
@@ -141,18 +144,18 @@ impl<'a> Many<'a> {
         [everywhere, maybe]: [Range<u32>; 2],
         lights: &mut DirectLighting<'a>,
         counts: &mut Counts,
-    ) -> (Stored, Rgb) {
+    ) -> (PatchLight, Rgb) {
         let scene = self.scene;
         let (point, bsdf) = (&patch.point, &patch.point.bsdf);
-        let mut stored = Stored::default();
+        let mut stored = PatchLight::default();
         let start = self.lit.len() as u32;
         counts.points += maybe.len() as u64;
         if !maybe.is_empty() {
-            self.fence.stand(scene, point);
+            self.cache.set_receiver(scene, point);
         }
-        let dots = &self.dots[maybe.start as usize..maybe.end as usize];
-        let seen = dots.iter().filter(|dot| dot.arrives(scene, &self.fence, point));
-        self.lit.extend(seen.map(|dot| dot.entry));
+        let representatives = &self.representatives[maybe.start as usize..maybe.end as usize];
+        let seen = representatives.iter().filter(|light| light.is_visible(scene, &self.cache, point));
+        self.lit.extend(seen.map(|light| light.entry));
         (stored.lit[0], stored.maybe) = (everywhere, maybe);
         stored.lit[1] = start..self.lit.len() as u32;
         self.add(patch, 0, &mut stored);
@@ -173,62 +176,62 @@ impl<'a> Many<'a> {
             let moments = match estimate.moments.is_known() {
                 true => estimate.moments,
                 false => {
-                    Together::of_points(*index as usize, std::slice::from_ref(&point), patch.salt(), lights, counts)
-                        .sums
+                    let (index, points) = (*index as usize, std::slice::from_ref(&point));
+                    Together::of_points(index, points, patch.salt(), lights, counts).sums
                 }
             };
             let scale = lights.scale(*index as usize);
             light += scale * moments.cosine();
             stored.value += (scale * bsdf.colors).of(&moments);
-            self.singles.push(Single { light: *index, moments, bend: estimate.bend() });
+            self.singles.push(SingleLight { light: *index, moments, bend: estimate.bend() });
         }
         stored.singles = from..self.singles.len() as u32;
         (stored, light)
     }
 }
 
-impl Dot {
-    pub(super) fn new(tree: &LightTree, entry: u32) -> Dot {
-        let node = &tree.nodes[(entry & !ONE) as usize];
-        let one = &tree.nodes[node.one as usize];
-        let light = match one.held {
-            Held::Light(light) => light,
-            Held::Two(_) => one.first(tree),
-        };
-        let finite = one.shine.sends != Sends::Parallel;
-        let at = if finite { one.shine.ball().0 } else { one.shine.low };
-        Dot { entry, light, at, finite, shadows: node.shadows }
+impl RepresentativeLight {
+    pub(super) fn new(tree: &LightTree, entry: u32) -> RepresentativeLight {
+        let node = &tree.nodes[(entry & !BY_REPRESENTATIVE) as usize];
+        let one = &tree.nodes[node.representative as usize];
+        let finite = one.bounds.profile != EmissionProfile::Directional;
+        let at = if finite { one.bounds.ball().0 } else { one.bounds.low };
+        RepresentativeLight { entry, light: one.first(tree), at, finite, shadows: node.shadows }
     }
 
-    /// Whether its light is seen from where `fence` stands.
+    /// Whether the light is visible from `point`, the receiver of `cache`.
     #[inline]
-    pub(super) fn arrives(&self, scene: &Scene, fence: &Fence, point: &ShadingPoint) -> bool {
+    pub(super) fn is_visible(&self, scene: &Scene, cache: &ListedOccluderCache, point: &ShadingPoint) -> bool {
         if !(point.receives_shadow && self.shadows) {
             return true;
         }
         let l = if self.finite { self.at - point.p } else { self.at };
-        point.horizon.dot(l) > 0.0 && point.ns.dot(l) > 0.0 && !fence.blocks(scene, LightId(self.light), l, self.finite)
+        point.horizon.dot(l) > 0.0 && point.ns.dot(l) > 0.0 && !cache.blocks(scene, LightId(self.light), l, self.finite)
     }
 }
 
-/// A node as lists of nodes name it.
-pub(super) fn entry(node: u32, by: By) -> u32 {
-    if matches!(by, By::One | By::OneIfSeen) { node | ONE } else { node }
+/// An entry of a list of nodes.
+pub(super) fn entry(node: u32, estimator: NodeEstimator) -> u32 {
+    if matches!(estimator, NodeEstimator::Representative | NodeEstimator::RepresentativeIfVisible) {
+        node | BY_REPRESENTATIVE
+    } else {
+        node
+    }
 }
 
-/// What an entry of a list of nodes sends: diffuse and specular, before the colours of the surface.
+/// What the node of an entry contributes: diffuse and specular, before the colours of the surface.
 #[inline(always)]
-pub(super) fn sent(scene: &Scene, tree: &LightTree, entry: u32, point: &ShadingPoint) -> Sent {
-    let node = &tree.nodes[(entry & !ONE) as usize];
-    if entry & ONE == 0 {
-        return node.send(point.p, point.ns, point.wo, &point.bsdf.lobe);
+pub(super) fn sent(scene: &Scene, tree: &LightTree, entry: u32, point: &ShadingPoint) -> Colors {
+    let node = &tree.nodes[(entry & !BY_REPRESENTATIVE) as usize];
+    if entry & BY_REPRESENTATIVE == 0 {
+        return node.estimate(point.p, point.ns, point.wo, &point.bsdf.lobe);
     }
-    sent_by_one(scene, &tree.nodes[node.one as usize], point).colors(|sent| node.power * sent)
+    sent_by_one(scene, &tree.nodes[node.representative as usize], point).colors(|sent| node.power * sent)
 }
 
-/// What one light would send if its power were 1.
+/// What one light contributes for a power of 1.
 pub(super) fn sent_by_one(scene: &Scene, one: &LightNode, point: &ShadingPoint) -> Moments {
-    let Held::Light(light) = one.held else { return Moments::ZERO };
+    let NodeContents::Light(light) = one.contents else { return Moments::ZERO };
     let light = &scene.lights[light as usize];
     let k = light.samples() / 2;
     let l = light.towards(k, point.p).l;
@@ -237,7 +240,9 @@ pub(super) fn sent_by_one(scene: &Scene, one: &LightNode, point: &ShadingPoint) 
         return Moments::ZERO;
     }
     match light.extent() {
-        Extent::Area(_) if one.is_smooth() => return one.send_one(point.p, point.ns, point.wo, &point.bsdf.lobe),
+        Extent::Area(_) if one.has_estimate() => {
+            return one.unit_estimate(point.p, point.ns, point.wo, &point.bsdf.lobe);
+        }
         Extent::Area(_) | Extent::Point => {}
     }
     let Some(sample) = light.sample(k, l) else { return Moments::ZERO };

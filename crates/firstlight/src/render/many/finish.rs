@@ -1,35 +1,35 @@
-//! From what arrives at patches to the colour of a pixel: what is in doubt is asked at each ray.
+//! From what arrives at patches to the colour of a pixel: terms with too large an error are evaluated at each camera
+//! ray.
 
 use std::ops::Range;
 
 use super::apart::Apart;
 use super::block::sent;
 use super::patch::Patches;
-use super::{ANYTHING, Many, Single, Stored};
+use super::{ANYTHING, Many, PatchLight, SingleLight};
 use crate::color::Rgb;
+use crate::film::resolve::ScaledTerm;
 use crate::integrate::TOLERANCE;
-use crate::light::Sent;
-use crate::material::{Moments, ShadingPoint};
+use crate::material::{Colors, Moments, ShadingPoint};
 use crate::render::counts::Counts;
 use crate::render::direct::DirectLighting;
-use crate::render::fence::Fence;
 use crate::render::fragment::Fragments;
-use crate::render::resolve::ScaledTerm;
+use crate::render::listed_occluder_cache::ListedOccluderCache;
 use crate::render::together::Together;
 
-/// A light, or all that are taken together, whose mean over a patch is in doubt.
+/// A single light, or all nodes together, whose value at the middle of a patch may differ too much from the mean.
 #[derive(Clone, Copy)]
-pub(super) struct Doubt {
+pub(super) struct UncertainTerm {
     shown: f32,
-    /// Among the singles; `None` for the rest.
+    /// The index among single lights; `None` for the nodes.
     single: Option<u32>,
     error: Rgb,
 }
 
 impl<'a> Many<'a> {
-    /// What lights send to the patches of a pixel, by their numbers: what each ray sees, added up. `scaled` gets each
-    /// light's diffuse part and highlight with its scale, in scene order, and last what is taken together. `apart` gets
-    /// what of that is of lights that are kept apart.
+    /// Computes the terms of a pixel from its patches, as sums over camera rays. `scaled` receives those of each single
+    /// light in scene order, and last that of all nodes; `apart` those of the lights that have buffers of their own,
+    /// which are parts of the last.
     pub(super) fn finish(
         &mut self,
         fragments: &Fragments,
@@ -41,43 +41,44 @@ impl<'a> Many<'a> {
     ) {
         let scene = self.scene;
         let mut terms = std::mem::take(&mut self.terms);
-        let mut fence = std::mem::take(&mut self.fence);
-        let mut doubts = std::mem::take(&mut self.doubts);
+        let mut cache = std::mem::take(&mut self.cache);
+        let mut uncertain = std::mem::take(&mut self.uncertain);
         terms.clear();
         let mut kept = std::mem::take(&mut self.kept);
         kept.clear();
         let mut rays = Vec::new();
-        let mut together = Sent::BLACK;
+        let mut together = Colors::BLACK;
         for number in pixel {
             let patch = &patches.all[number];
             let count = patch.count as f32;
             let stored = &self.stored[number];
-            self.doubts_of(patches, number, lights, &mut doubts);
-            doubts.sort_unstable_by_key(|doubt| doubt.single);
-            let in_doubt = |single: Option<u32>| doubts.binary_search_by_key(&single, |doubt| doubt.single).is_ok();
+            self.uncertain_terms(patches, number, lights, &mut uncertain);
+            uncertain.sort_unstable_by_key(|term| term.single);
+            let is_uncertain =
+                |single: Option<u32>| uncertain.binary_search_by_key(&single, |term| term.single).is_ok();
             let bsdf = &patch.point.bsdf;
-            if !in_doubt(None) {
+            if !is_uncertain(None) {
                 together += bsdf.colors * stored.sent * count;
                 self.nodes(stored).for_each(|entry| self.apart.add(&mut kept, entry, &patch.point, count));
             }
             for i in stored.singles.clone() {
-                if !in_doubt(Some(i)) {
-                    let Single { light, moments, .. } = self.singles[i as usize];
+                if !is_uncertain(Some(i)) {
+                    let SingleLight { light, moments, .. } = self.singles[i as usize];
                     let sums = moments * count;
                     terms.push((light, bsdf.colors.each(&sums)));
                 }
             }
-            if doubts.is_empty() {
+            if uncertain.is_empty() {
                 continue;
             }
-            lights.tolerate(TOLERANCE.integrals / (doubts.len() as f32).sqrt());
+            lights.tolerate(TOLERANCE.integrals / (uncertain.len() as f32).sqrt());
             rays.clear();
             patch.for_each(scene, fragments, |point| rays.push(point));
-            for doubt in &doubts {
-                let Some(i) = doubt.single else {
+            for term in &uncertain {
+                let Some(i) = term.single else {
                     for point in &rays {
-                        let mut sum = Sent::BLACK;
-                        self.seen_at(stored, &mut fence, point, |entry| {
+                        let mut sum = Colors::BLACK;
+                        self.visible_nodes(stored, &mut cache, point, |entry| {
                             sum += sent(scene, self.tree, entry, point);
                             self.apart.add(&mut kept, entry, point, 1.0);
                         });
@@ -92,31 +93,40 @@ impl<'a> Many<'a> {
         // In scene order
         terms.sort_by_key(|(light, _)| *light);
         for same in terms.chunk_by(|a, b| a.0 == b.0) {
-            let term = same.iter().fold(Sent::BLACK, |sum, (_, term)| sum + *term);
+            let term = same.iter().fold(Colors::BLACK, |sum, (_, term)| sum + *term);
             let light = same[0].0;
             scaled.push(ScaledTerm { light: Some(light), scale: lights.scale(light as usize), term });
         }
         // Of many scales
         scaled.push(ScaledTerm { light: None, scale: Rgb::WHITE, term: together });
         Apart::finish(&mut kept, lights, apart);
-        (self.terms, self.fence, self.doubts, self.kept) = (terms, fence, doubts, kept);
+        (self.terms, self.cache, self.uncertain, self.kept) = (terms, cache, uncertain, kept);
     }
 
-    /// Calls `each` with the nodes that are seen from where one camera ray ends.
-    fn seen_at(&self, stored: &Stored, fence: &mut Fence, point: &ShadingPoint, mut each: impl FnMut(u32)) {
+    /// Calls `each` with the nodes that are visible from the end of one camera ray.
+    fn visible_nodes(
+        &self,
+        stored: &PatchLight,
+        cache: &mut ListedOccluderCache,
+        point: &ShadingPoint,
+        mut each: impl FnMut(u32),
+    ) {
         if stored.maybe.is_empty() {
             return self.nodes(stored).for_each(each);
         }
         let list = |range: &Range<u32>| &self.lit[range.start as usize..range.end as usize];
         list(&stored.lit[0]).iter().for_each(|entry| each(*entry));
-        fence.stand(self.scene, point);
-        let dots = &self.dots[stored.maybe.start as usize..stored.maybe.end as usize];
-        dots.iter().filter(|dot| dot.arrives(self.scene, fence, point)).for_each(|dot| each(dot.entry));
+        cache.set_receiver(self.scene, point);
+        let representatives = &self.representatives[stored.maybe.start as usize..stored.maybe.end as usize];
+        representatives
+            .iter()
+            .filter(|light| light.is_visible(self.scene, cache, point))
+            .for_each(|light| each(light.entry));
     }
 
-    /// How far the mean over a patch can be from what arrives at its middle because other lights are seen from
-    /// elsewhere on it: as its neighbours tell, and anything where they do not.
-    fn flicker(&self, patches: &Patches, number: usize) -> Rgb {
+    /// The error of a patch where representatives are visible from parts of it: estimated from neighbouring pixels, or
+    /// [`ANYTHING`] where they cannot be compared.
+    fn visibility_error(&self, patches: &Patches, number: usize) -> Rgb {
         let (patch, stored) = (&patches.all[number], &self.stored[number]);
         if patch.point.reach == 0.0 || stored.maybe.is_empty() {
             return Rgb::BLACK;
@@ -137,38 +147,44 @@ impl<'a> Many<'a> {
         all
     }
 
-    /// What of the light at a patch has to be asked for at each ray. All the rest may together bend by as much as one
-    /// may.
-    fn doubts_of(&self, patches: &Patches, number: usize, lights: &DirectLighting, doubts: &mut Vec<Doubt>) {
-        doubts.clear();
+    /// The terms of a patch that have to be evaluated at each ray. The errors of all others together are within the
+    /// tolerance for one point.
+    fn uncertain_terms(
+        &self,
+        patches: &Patches,
+        number: usize,
+        lights: &DirectLighting,
+        uncertain: &mut Vec<UncertainTerm>,
+    ) {
+        uncertain.clear();
         let (patch, stored) = (&patches.all[number], &self.stored[number]);
         let (bsdf, value) = (&patch.point.bsdf, stored.value);
         let mut all = Rgb::BLACK;
-        let mut doubt = |single: Option<u32>, error: Rgb| {
+        let mut push = |single: Option<u32>, error: Rgb| {
             all += error;
-            doubts.push(Doubt { shown: 0.0, single, error });
+            uncertain.push(UncertainTerm { shown: 0.0, single, error });
         };
         if stored.lit.iter().any(|range| !range.is_empty()) {
             let smooth = (bsdf.colors * stored.bend).sum();
-            doubt(None, smooth + self.flicker(patches, number));
+            push(None, smooth + self.visibility_error(patches, number));
         }
         for i in stored.singles.clone() {
-            let Single { light, bend, .. } = self.singles[i as usize];
-            doubt(Some(i), (lights.scale(light as usize) * bsdf.colors).of(&Moments::bounds(bend, bend)));
+            let SingleLight { light, bend, .. } = self.singles[i as usize];
+            push(Some(i), (lights.scale(light as usize) * bsdf.colors).of(&Moments::bounds(bend, bend)));
         }
         if lights.steps(value, all) <= TOLERANCE.point {
-            doubts.clear();
+            uncertain.clear();
             return;
         }
-        for doubt in &mut *doubts {
-            doubt.shown = lights.steps(value, doubt.error);
+        for term in &mut *uncertain {
+            term.shown = lights.steps(value, term.error);
         }
-        // The least first: as many as will do together
-        doubts.sort_unstable_by(|a, b| a.shown.total_cmp(&b.shown).then(a.single.cmp(&b.single)));
+        // Leave out the smallest errors, as long as their sum is within the tolerance
+        uncertain.sort_unstable_by(|a, b| a.shown.total_cmp(&b.shown).then(a.single.cmp(&b.single)));
         let mut sum = Rgb::BLACK;
-        doubts.retain(|doubt| {
-            if lights.steps(value, sum + doubt.error) <= TOLERANCE.point {
-                sum += doubt.error;
+        uncertain.retain(|term| {
+            if lights.steps(value, sum + term.error) <= TOLERANCE.point {
+                sum += term.error;
                 return false;
             }
             true

@@ -1,16 +1,17 @@
-//! More than [`FEW`] lights: what arrives at the fragments of a cell where not every light is asked for at every one.
+//! More than [`FEW_LIGHTS`](crate::light::FEW_LIGHTS) lights: what arrives at the fragments of a cell, where not every
+//! light is evaluated at every one.
 //!
-//! For each block of pixels, and for its quarters where many lights are near, a [`Cut`] says which lights count: nodes
-//! of the [`LightTree`](crate::light::LightTree), each of which one light stands for or their middle, and lights that
-//! are integrated one by one. What may be wrong is `TOLERANCE.crowd` display steps, as the root of a sum of squares.
-//! Cells and blocks lie on a grid of the film, so nothing depends on tiles, crops or threads.
+//! Each block of pixels, or each of its quarters where many lights are near, has a [`Cut`]: nodes of the
+//! [`LightTree`], estimated by their centroid or by a representative light, and single lights
+//! that are integrated. Its error is at most `TOLERANCE.crowd` display steps, as the root of a sum of squares. Cells
+//! and blocks lie on a grid of the film, so nothing depends on tiles, crops or threads.
 
 mod apart;
 mod block;
 mod finish;
 mod neighbours;
 mod patch;
-mod places;
+mod receivers;
 
 use std::ops::{ControlFlow, Range};
 
@@ -18,37 +19,35 @@ use super::cell::CELL;
 use super::counts::Counts;
 use super::cut::Cut;
 use super::direct::DirectLighting;
-use super::fence::Fence;
 use super::fragment::Fragments;
-use super::resolve::ScaledTerm;
+use super::listed_occluder_cache::ListedOccluderCache;
 use crate::color::Rgb;
+use crate::film::resolve::ScaledTerm;
 use crate::image::Buffer;
-use crate::light::{LightTree, Sent};
-use crate::material::{Lobe, Moments};
+use crate::light::LightTree;
+use crate::material::{Colors, Lobe, Moments};
 use crate::math::{Vec3, square};
 use crate::scene::Scene;
-use crate::visibility::Outlook;
+use crate::visibility::ClusterVisibility;
 use apart::{Apart, SentApart};
-use block::{Dot, sent};
-use finish::Doubt;
+use block::{RepresentativeLight, sent};
+use finish::UncertainTerm;
 use patch::{Patch, Patches};
-use places::is_alike;
+use receivers::is_alike;
 
-/// So few lights are all asked for everywhere, and none is left out.
-pub(crate) const FEW: usize = 16;
-/// Blocks that ask for more lights by themselves are quartered.
-const CLOSE: usize = 24;
-/// An error that shows whatever is there.
+/// Blocks whose cuts have more single lights are quartered.
+const MAX_SINGLE_LIGHTS: usize = 24;
+/// An error that exceeds every tolerance.
 const ANYTHING: f32 = 1e30;
-/// In a list of nodes: one light stands for this one.
-const ONE: u32 = 1 << 31;
+/// In an entry of a list of nodes: the estimator is the representative light.
+const BY_REPRESENTATIVE: u32 = 1 << 31;
 /// Pixels across a block.
 const BLOCK: usize = 8;
 const BLOCKS: usize = CELL as usize / BLOCK;
 /// Sizes of blocks: each has four of the next.
 const LEVELS: usize = 3;
-/// Colours of a block that are told apart.
-const TONES: usize = 8;
+/// Different colours of a block that are kept; all others are joined with the last.
+const MAX_COLORS: usize = 8;
 
 /// What arrives at the fragments of one cell. Keeps its memory.
 pub(super) struct Many<'a> {
@@ -56,43 +55,44 @@ pub(super) struct Many<'a> {
     patches: Patches,
     tree: &'a LightTree,
     eye: Vec3,
-    outlook: Outlook,
+    cluster_visibility: ClusterVisibility,
     cut: Cut,
-    fence: Fence,
+    cache: ListedOccluderCache,
     /// What arrives at each patch.
-    stored: Vec<Stored>,
-    /// The lights that were asked for one by one, patch by patch, in scene order.
-    singles: Vec<Single>,
-    /// Nodes that are taken for one, list by list.
+    stored: Vec<PatchLight>,
+    /// The single lights, patch by patch, in scene order.
+    singles: Vec<SingleLight>,
+    /// Entries of the nodes that contribute, list by list.
     lit: Vec<u32>,
-    /// Nodes that count where they are seen, block by block.
-    dots: Vec<Dot>,
-    terms: Vec<(u32, Sent)>,
-    doubts: Vec<Doubt>,
+    /// The representatives whose visibility is unknown, block by block.
+    representatives: Vec<RepresentativeLight>,
+    terms: Vec<(u32, Colors)>,
+    uncertain: Vec<UncertainTerm>,
     apart: Apart<'a>,
     kept: SentApart,
 }
 
 /// One light at one patch.
 #[derive(Clone, Copy)]
-struct Single {
+struct SingleLight {
     light: u32,
     moments: Moments,
     /// How far the mean of its moments over the patch may be from those at the point.
     bend: f32,
 }
 
-/// What arrives at one patch.
+/// The light that arrives at one patch.
 #[derive(Clone, Default)]
-struct Stored {
+struct PatchLight {
     singles: Range<u32>,
     /// The nodes of its block, and its own.
     lit: [Range<u32>; 2],
-    /// The dots of its block; those that are seen are among its own nodes.
+    /// The representatives of its block; the visible ones are among its own nodes.
     maybe: Range<u32>,
-    /// What those send, and how far the mean over the patch can be from it.
-    sent: Sent,
-    bend: Sent,
+    /// The contribution of those nodes at the middle, and the error bound of its difference from the mean over the
+    /// patch.
+    sent: Colors,
+    bend: Colors,
     value: Rgb,
 }
 
@@ -103,16 +103,16 @@ impl<'a> Many<'a> {
             scene,
             tree,
             eye: scene.camera.frame().eye,
-            outlook: Outlook::default(),
+            cluster_visibility: ClusterVisibility::default(),
             cut: Cut::default(),
-            fence: Fence::default(),
+            cache: ListedOccluderCache::default(),
             patches: Patches::default(),
             stored: Vec::new(),
             singles: Vec::new(),
             lit: Vec::new(),
-            dots: Vec::new(),
+            representatives: Vec::new(),
             terms: Vec::new(),
-            doubts: Vec::new(),
+            uncertain: Vec::new(),
             apart: Apart::new(scene, tree, buffers),
             kept: SentApart::new(),
         }
@@ -123,9 +123,9 @@ impl<'a> Many<'a> {
         self.patches.begin(self.scene, fragments, size, pixel);
     }
 
-    /// Lights the fragments of the cell. `add` hears, pixel by pixel, one of its fragments; of each light in scene
-    /// order what it sends and its scale, and last what is taken together; what of that is of lights that are kept
-    /// apart; and the work that this took.
+    /// Lights the fragments of the cell. Calls `add` for each pixel with one of its fragments, the terms of single
+    /// lights in scene order and last that of all nodes, the terms of lights that have buffers of their own, and the
+    /// work.
     pub fn light(
         &mut self,
         fragments: &Fragments,
@@ -136,8 +136,8 @@ impl<'a> Many<'a> {
     ) -> ControlFlow<()> {
         let patches = std::mem::take(&mut self.patches);
         let before = counts.work();
-        let looked = self.look(&patches, lights, counts, go_on);
-        if looked.is_continue() {
+        let lit = self.light_patches(&patches, lights, counts, go_on);
+        if lit.is_continue() {
             let each = (counts.work() - before) / (CELL * CELL) as f32;
             let (mut terms, mut apart) = (Vec::new(), Vec::new());
             let mut first = 0;
@@ -151,11 +151,11 @@ impl<'a> Many<'a> {
             }
         }
         self.patches = patches;
-        looked
+        lit
     }
 
-    /// Finds out what arrives at each patch of a cell.
-    fn look(
+    /// Evaluates what arrives at each patch of a cell.
+    fn light_patches(
         &mut self,
         patches: &Patches,
         lights: &mut DirectLighting<'a>,
@@ -163,10 +163,10 @@ impl<'a> Many<'a> {
         go_on: &impl Fn() -> ControlFlow<()>,
     ) -> ControlFlow<()> {
         self.stored.clear();
-        self.stored.resize(patches.all.len(), Stored::default());
+        self.stored.resize(patches.all.len(), PatchLight::default());
         self.singles.clear();
         self.lit.clear();
-        self.dots.clear();
+        self.representatives.clear();
         let mut blocks: [Vec<usize>; BLOCKS * BLOCKS] = Default::default();
         for (number, patch) in patches.all.iter().enumerate() {
             let [x, y] = patch.at().map(|at| at as usize / BLOCK);
@@ -190,37 +190,38 @@ impl<'a> Many<'a> {
         ControlFlow::Continue(())
     }
 
-    fn count(&self, stored: &Stored, counts: &mut Counts) {
-        let together: u32 = self.nodes(stored).map(|node| self.tree.nodes[(node & !ONE) as usize].count).sum();
+    fn count(&self, stored: &PatchLight, counts: &mut Counts) {
+        let together: u32 =
+            self.nodes(stored).map(|node| self.tree.nodes[(node & !BY_REPRESENTATIVE) as usize].count).sum();
         counts.lights.pairs += self.scene.lights.len() as u64;
         counts.lights.singly += stored.singles.len() as u64;
         counts.lights.nodes += stored.lit.iter().map(Range::len).sum::<usize>() as u64;
         counts.lights.together += u64::from(together);
     }
 
-    /// The nodes that are taken for one.
-    fn nodes(&self, stored: &Stored) -> impl Iterator<Item = u32> + '_ {
+    /// The entries of the nodes that contribute.
+    fn nodes(&self, stored: &PatchLight) -> impl Iterator<Item = u32> + '_ {
         stored.lit.clone().into_iter().flat_map(|range| &self.lit[range.start as usize..range.end as usize]).copied()
     }
 
-    /// Adds what the nodes of one list send.
-    fn add(&self, patch: &Patch, list: usize, stored: &mut Stored) {
+    /// Adds what the nodes of one list contribute.
+    fn add(&self, patch: &Patch, list: usize, stored: &mut PatchLight) {
         let (point, lobe) = (&patch.point, &patch.point.bsdf.lobe);
         let range = &stored.lit[list];
         for entry in &self.lit[range.start as usize..range.end as usize] {
             let sent = sent(self.scene, self.tree, *entry, point);
-            let node = &self.tree.nodes[(entry & !ONE) as usize];
+            let node = &self.tree.nodes[(entry & !BY_REPRESENTATIVE) as usize];
             stored.sent += sent;
             if point.reach > 0.0 {
-                let swing = point.turn + point.reach / node.distance(point.p).max(point.reach);
-                // No second derivative of what a far light sends is more, over the square of its distance and what it
-                // sends
+                let swing = point.turn + point.reach / node.distance_from(point.p).max(point.reach);
+                // Bound of the second derivatives of a far light's contribution, relative to the contribution over the
+                // squared distance
                 let smooth = (swing * swing).min(1.0) * 3.0;
-                let weight = node.weight(point.p);
+                let weight = node.weight_at(point.p);
                 let moved = swing + point.turn;
                 let narrow = (lobe.sharpness(point.ns.dot(point.wo)) * square(moved)).min(1.0);
                 let specular = if matches!(lobe, Lobe::None) { 0.0 } else { (narrow + smooth).min(1.0) };
-                stored.bend += Sent::bounds(node.power * (weight * smooth), node.power * (weight * specular));
+                stored.bend += Colors::bounds(node.power * (weight * smooth), node.power * (weight * specular));
             }
         }
     }

@@ -1,4 +1,4 @@
-//! What the neighbours of a pixel in its cell tell of what light does within it.
+//! The curvature of irradiance across a pixel, from differences between neighbouring pixels of its cell.
 
 use super::patch::{Patch, Patches};
 use crate::integrate::TOLERANCE;
@@ -7,9 +7,9 @@ use crate::math::Vec3;
 use crate::render::cell::CELL;
 
 impl Patches {
-    /// How far the mean of what light does over a patch that fills its pixel can be from what it does in the middle: by
-    /// how far three pixels in a row are from a line, along each axis, as `arrived` says of their patches. `None` where
-    /// they tell nothing. At an edge of the cell those next to it tell.
+    /// An estimate of the difference between the mean over a patch that fills its pixel and the value at its middle,
+    /// from the second differences of three pixels along each axis. `arrived` returns the values of patches. `None`
+    /// where neighbours cannot be compared. At an edge of the cell the second difference next to it is taken.
     pub(super) fn within(&self, patch: &Patch, arrived: impl Fn(usize) -> Option<Moments>) -> Option<Moments> {
         let mut bend = Moments::default();
         for axis in 0..2 {
@@ -19,7 +19,7 @@ impl Patches {
                 let beside = self.whole[place as usize].filter(|beside| self.is_same(patch, *beside))?;
                 (*sums, *normal) = (arrived(beside)?, self.all[beside].point.ns);
             }
-            // Nor do they tell where an edge of the surface runs between
+            // Pixels on both sides of an edge of the surface cannot be compared
             let [before, here, after] = normals;
             if !((before + after - here * 2.0).length() <= TOLERANCE.even) {
                 return None;
@@ -40,7 +40,7 @@ impl Patches {
         Some([middle - step, middle, middle + step])
     }
 
-    /// Whether another patch is of the same surface, so that one tells something of the other.
+    /// Whether another patch is of the same surface and lobe, so that both can be compared.
     fn is_same(&self, patch: &Patch, beside: usize) -> bool {
         let beside = &self.all[beside];
         beside.point.bsdf.lobe == patch.point.bsdf.lobe && patch.holds(beside)

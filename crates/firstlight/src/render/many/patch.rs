@@ -1,4 +1,4 @@
-//! What is lit together: a fragment, or one of its rays.
+//! Patches: the parts of fragments that have one shading point, a whole fragment or one of its rays.
 
 use crate::material::ShadingPoint;
 use crate::render::cell::CELL;
@@ -6,12 +6,12 @@ use crate::render::fragment::{Fragments, is_one_surface};
 use crate::render::together::salt;
 use crate::scene::Scene;
 
-/// A fragment of which one place may stand for all, or a ray of one that has no such place.
+/// A fragment that its middle may represent, or one ray of a fragment without a middle.
 #[derive(Clone, Copy)]
 pub(super) struct Patch {
-    /// Where it is lit, and its footprint; the colours of its material are the mean over its rays.
+    /// Its shading point and footprint; the colours of the material are the mean over its rays.
     pub point: ShadingPoint,
-    /// How many rays of its pixel see it, and whether all of them do.
+    /// The number of camera rays of its pixel that meet it, and whether all of them do.
     pub count: u32,
     pub is_whole: bool,
     /// Its pixel in the cell, row by row, and which of the cell's fragments it is of.
@@ -50,13 +50,8 @@ impl Patches {
 
 impl Patch {
     fn new(point: ShadingPoint) -> Patch {
-        Patch {
-            point: ShadingPoint { share: 1.0, most_motion: f32::INFINITY, part_of_points: f32::INFINITY, ..point },
-            count: 1,
-            is_whole: false,
-            pixel: 0,
-            fragment: 0,
-        }
+        let point = ShadingPoint { share: 1.0, most_motion: f32::INFINITY, part_of_points: f32::INFINITY, ..point };
+        Patch { point, count: 1, is_whole: false, pixel: 0, fragment: 0 }
     }
 
     /// Those of a fragment, which is in such a pixel of the cell.
@@ -99,7 +94,7 @@ impl Patch {
         is_one_surface(&self.point, &other.point)
     }
 
-    /// Calls `each` with what every ray of it sees.
+    /// Calls `each` with the shading point of every ray of it.
     pub fn for_each(&self, scene: &Scene, fragments: &Fragments, mut each: impl FnMut(ShadingPoint)) {
         if self.point.reach == 0.0 && self.count == 1 {
             return each(self.point);

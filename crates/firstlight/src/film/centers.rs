@@ -1,15 +1,14 @@
-//! What the centre rays of pixels meet: depth, normals, ids and their like, which are never averaged.
+//! Planes from the centre rays of pixels: depth, normals, ids and others that are never averaged.
 //!
-//! Apart from all that is lit: one ray through the middle of each pixel, whatever the antialiasing, and nothing of it
-//! reaches the picture.
+//! One ray through the middle of each pixel, independent of antialiasing and of all lighting.
 
 use std::cell::OnceCell;
 
 use fearless_simd::Level;
 
-use super::film::{CenterValue, FilmTile};
 use super::hits::{PixelHits, grid_ray};
 use super::motion;
+use super::{CenterValue, FilmTile};
 use crate::camera::Frame;
 use crate::color::Rgb;
 use crate::image::Plane;
@@ -17,27 +16,27 @@ use crate::math::{DVec3, Ray, Vec3};
 use crate::scene::{Hit, ObjectSpace, Scene};
 use crate::shape::{RayDifferential, ShadowTerminator, SurfaceInteraction};
 
-/// One thread's way through the centre rays of tiles.
+/// Fills the planes of tiles from centre rays, for one thread.
 struct Centers<'a> {
     scene: &'a Scene,
-    /// Whereto motion leads.
+    /// The scene that motion leads to.
     there: Option<&'a Scene>,
     level: Level,
     hits: PixelHits,
 }
 
-/// What a centre ray meets, or another camera ray.
+/// The hit of a centre ray, or of another camera ray.
 pub(super) struct Center<'a> {
     pub scene: &'a Scene,
     ray: Ray,
     differential: RayDifferential,
     pub hit: Hit,
-    /// Found when it is asked for; `None` on a light.
+    /// The surface, computed at its first use; `None` on a light.
     surface: OnceCell<Option<SurfaceInteraction>>,
 }
 
-/// Fills the planes of a tile that centre rays say. The answer is how many camera rays it took.
-pub(super) fn fill(scene: &Scene, level: Level, film: &mut FilmTile) -> u64 {
+/// Fills the planes of a tile that come from centre rays. Returns the number of rays that were traced.
+pub(crate) fn fill(scene: &Scene, level: Level, film: &mut FilmTile) -> u64 {
     let there = scene.motion.as_deref().map(|motion| &motion.there);
     let has = |film: &FilmTile, backward: bool| {
         let of_center = |plane: Plane| plane.is_of_center() && (plane == Plane::MotionBackward) == backward;
@@ -61,11 +60,11 @@ impl<'a> Centers<'a> {
         Centers { scene, there, level, hits: PixelHits::new(level, 1) }
     }
 
-    /// Fills planes of a tile; `asks` says what each of them is here, if anything.
+    /// Fills planes of a tile; `asks` maps a buffer to the plane of centre rays that it is, if it is one.
     fn fill(&mut self, film: &mut FilmTile, asks: impl Fn(Plane) -> Option<Plane>) -> u64 {
         let (scene, there, level) = (self.scene, self.there, self.level);
         let (tile, side) = (film.tile, self.hits.side());
-        // Which planes of the film are asked for, and what each is here
+        // The planes of the film that come from centre rays
         let planes: Vec<(usize, Plane)> = (0..)
             .zip(film.planes())
             .filter(|(_, buffer)| buffer.plane().is_of_center())
@@ -105,7 +104,7 @@ impl<'a> Centers<'a> {
     }
 }
 
-/// What a ray says that meets nothing.
+/// The value of a plane at a ray without a hit.
 pub(super) fn nothing(plane: Plane) -> CenterValue {
     match plane {
         Plane::Depth | Plane::Distance => CenterValue::Floats([f32::INFINITY; 3]),
@@ -119,7 +118,7 @@ impl<'a> Center<'a> {
         Center { scene, ray, differential, hit, surface: OnceCell::new() }
     }
 
-    /// The surface; `None` on a light. No light is gathered from it, so it is not lifted.
+    /// The surface; `None` on a light. It is not lit, so it is not lifted off its facet.
     fn surface(&self) -> Option<&SurfaceInteraction> {
         let Center { scene, ray, differential, hit, .. } = self;
         let is_light = hit.surface.index() >= scene.geometry.surfaces.len();
@@ -127,7 +126,7 @@ impl<'a> Center<'a> {
         self.surface.get_or_init(find).as_ref()
     }
 
-    /// Where it is, in the scene's own coordinates.
+    /// Its position, in the scene's own coordinates.
     pub fn p(&self) -> DVec3 {
         match self.surface() {
             Some(surface) => surface.p.as_dvec3(),
@@ -135,12 +134,12 @@ impl<'a> Center<'a> {
         }
     }
 
-    /// How far that may be off the surface.
+    /// The error bound of that position, in metres.
     pub fn error(&self) -> f64 {
         self.surface().map_or(0.0, |surface| f64::from(surface.error.0.max_element()))
     }
 
-    /// The space that it was described in; `None` on a light.
+    /// The object space of its shape; `None` on a light.
     fn space(&self) -> Option<&ObjectSpace> {
         let geometry = &self.scene.geometry;
         geometry.surfaces.get(self.hit.surface.index()).map(|surface| &geometry.spaces[surface.space as usize])
@@ -155,12 +154,12 @@ impl<'a> Center<'a> {
         }
     }
 
-    /// Whether that side is seen.
+    /// Whether the ray meets the front.
     pub fn is_front(&self) -> bool {
         self.front().dot(self.ray.d) < 0.0
     }
 
-    /// The geometric and the shading normal, on the side that is seen.
+    /// The geometric and the shading normal, towards the viewer.
     pub fn normals(&self) -> [Vec3; 2] {
         let Scene { geometry, .. } = self.scene;
         let is_light = self.hit.surface.index() >= geometry.surfaces.len();

@@ -1,30 +1,30 @@
-//! What all camera rays of a pixel meet, counted: coverage, Cryptomatte, and means of what a centre ray says.
+//! Planes from all n x n camera rays of a pixel: coverage, Cryptomatte, and means of planes of centre rays.
 //!
-//! Apart from all that is lit, as centre rays are ([`centers`](super::centers)). All n x n rays are traced, whatever
-//! the antialiasing mode: they are those of the picture, and meet what those meet.
+//! Independent of all lighting, as [`centers`](super::centers) is. All rays are traced, in every antialiasing mode;
+//! they are the camera rays of the picture.
 
 use std::ops::ControlFlow;
 
 use fearless_simd::Level;
 
 use super::centers::{Center, nothing};
-use super::film::{CenterValue, FilmTile};
 use super::hits::{PixelHits, grid_ray};
+use super::{CenterValue, FilmTile};
 use crate::ids::SurfaceId;
 use crate::image::cryptomatte::{self, Named, hashed_name, id_bits};
 use crate::image::{Buffer, Plane};
 use crate::scene::{Hit, Scene};
 
-/// Rays between two questions.
+/// Rays between two calls of `go_on`.
 const QUESTION_EVERY: u32 = 1 << 20;
 
-/// What is asked of all camera rays, each with the number of its plane.
-pub(super) struct CoveragePlanes {
-    /// By their ids.
+/// The planes of a film that come from all camera rays, each with its number.
+pub(crate) struct CoveragePlanes {
+    /// The surfaces of coverage planes, by their ids.
     objects: Vec<(SurfaceId, usize)>,
     background: Option<usize>,
     mattes: Vec<(Matte, usize)>,
-    /// The mean of what each ray says of a plane.
+    /// Means over the rays of a plane of centre rays.
     means: Vec<(Plane, usize)>,
 }
 
@@ -35,12 +35,12 @@ struct Matte {
     bits: Vec<u32>,
 }
 
-/// One thread's way through all camera rays of tiles.
-pub(super) struct Coverage<'a> {
+/// Fills the planes of tiles from all camera rays, for one thread.
+pub(crate) struct Coverage<'a> {
     scene: &'a Scene,
     asked: &'a CoveragePlanes,
     hits: PixelHits,
-    /// The rays of a pixel that meet something: which of the film's rays it is, and what it meets.
+    /// The rays of a pixel that have a hit: the number of the ray on the film, and the hit.
     met: Vec<([u32; 2], Hit)>,
     shares: Shares,
     /// One for each of the means.
@@ -56,7 +56,7 @@ struct Shares {
 }
 
 impl CoveragePlanes {
-    /// What is asked by `planes`; `None` if nothing is.
+    /// Those of some planes; `None` if there are none.
     pub fn new(scene: &Scene, planes: &[Buffer]) -> Option<CoveragePlanes> {
         let mut asked = CoveragePlanes { objects: Vec::new(), background: None, mattes: Vec::new(), means: Vec::new() };
         for (number, buffer) in planes.iter().enumerate() {
@@ -123,7 +123,7 @@ impl<'a> Coverage<'a> {
         Coverage { scene, asked, hits, met: Vec::new(), shares: Shares::default(), sums }
     }
 
-    /// Fills the planes of a tile that are theirs. `go_on` is asked now and then.
+    /// Fills the planes of a tile. `go_on` is called now and then, and stops it with a break.
     pub fn fill(&mut self, film: &mut FilmTile, go_on: &impl Fn() -> ControlFlow<()>) -> ControlFlow<()> {
         let (scene, tile, side, n) = (self.scene, film.tile, self.hits.side(), self.scene.antialiasing);
         let mut traced = 0;
@@ -150,7 +150,7 @@ impl<'a> Coverage<'a> {
         ControlFlow::Continue(())
     }
 
-    /// Fills a pixel of a tile with what its rays meet.
+    /// Fills a pixel of a tile from the hits of its rays.
     fn pixel(&mut self, film: &mut FilmTile, x: u32, y: u32) {
         let Coverage { scene, asked, met, shares, .. } = self;
         let rays = scene.antialiasing * scene.antialiasing;

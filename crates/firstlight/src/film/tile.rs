@@ -1,4 +1,4 @@
-//! The unit of work.
+//! Tiles: the unit of work of a thread.
 
 use crate::image::Window;
 
@@ -60,8 +60,8 @@ impl Tile {
 /// Runs of neighbouring tiles stay together; of a large picture there are about so many runs.
 const RUNS: usize = 256;
 
-/// The same tiles in an order in which any stretch of them is spread over the whole picture, so that the time the first
-/// of them took tells how long all will take. Neighbours still follow each other in runs: they look at the same things.
+/// The same tiles in an order in which any stretch of them is spread over the whole picture, so that the time of the
+/// first ones predicts that of all. Neighbours still follow each other in runs: their rays meet the same surfaces.
 pub(crate) fn spread(tiles: &[Tile]) -> Vec<Tile> {
     let runs: Vec<&[Tile]> = tiles.chunks((tiles.len() / RUNS).max(1)).collect();
     let count = runs.len();

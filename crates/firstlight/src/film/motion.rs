@@ -1,4 +1,5 @@
-//! Where what a pixel shows is in another picture of the same scene: at another moment, or from another camera.
+//! Optical flow: where the point that a pixel shows lies in another picture of the scene, at another time or from
+//! another camera.
 
 use fearless_simd::Level;
 
@@ -7,28 +8,28 @@ use crate::camera::Camera;
 use crate::math::{DVec3, Ray, UNIT_ROUNDOFF};
 use crate::scene::{Hit, Scene};
 
-/// Pixels to the right and down, and whether it is seen there: 1, or 0 if not; -1 if it has no place there.
+/// Pixels to the right and down, and the visibility there: 1 visible, 0 occluded, -1 outside of what the camera images.
 pub(super) type Flow = [f32; 3];
 
-/// Rounding in a place that was found on one way and is looked for on another, in units of the last place of 32 bits:
-/// that of the point, of the ray to it, and of the surface there.
+/// Error bound of the position of a point that is computed in one scene and found again in another, in units of the
+/// last place of 32 bits: the rounding of the point, of the ray to it, and of the surface there.
 const ROUNDINGS: u32 = 32;
 
-/// A point of a surface that was carried from one scene to another.
+/// A point of a surface, moved to where it is in another scene.
 struct Carried<'a> {
     there: &'a Scene,
     level: Level,
     of: Hit,
-    /// Where it is, and the normal of its front, of any length.
+    /// Its position there, and the normal of its front, of any length.
     p: DVec3,
     front: DVec3,
-    /// Whether the front was seen.
+    /// Whether the front was visible.
     is_front: bool,
-    /// How far `p` may be off the surface, but for what grows with the way to the camera.
+    /// The error bound of `p`, without the part that grows with the distance to the camera.
     error: f64,
 }
 
-/// Of a thing that a centre ray meets.
+/// The flow of the hit of a centre ray.
 pub(super) fn of_thing(center: &Center, there: &Scene, level: Level) -> Flow {
     let (here, p, front) = (center.scene, center.p(), center.front().as_dvec3());
     let surface = center.hit.surface;
@@ -50,7 +51,7 @@ pub(super) fn of_thing(center: &Center, there: &Scene, level: Level) -> Flow {
     flow(before, after, || depth > 0.0 && is_inside(there, after) && carried.is_seen(after))
 }
 
-/// Of a centre ray that meets nothing: of its end, infinitely far away.
+/// The flow of a centre ray without a hit: of its end, infinitely far away.
 pub(super) fn of_nothing(here: &Scene, there: &Scene, ray: &Ray, level: Level) -> Flow {
     let (o, d) = (ray.o.as_dvec3(), ray.d.as_dvec3());
     let from_there = o + (here.origin - there.origin);
@@ -69,7 +70,7 @@ fn flow(before: [f64; 2], after: [f64; 2], is_seen: impl FnOnce() -> bool) -> Fl
     [x, y, f32::from(u8::from(is_seen()))]
 }
 
-/// That of what has no place in the other picture.
+/// The flow of a point that has no image in the other picture.
 fn nowhere() -> Flow {
     [0.0, 0.0, -1.0]
 }
@@ -82,7 +83,7 @@ fn ray_at(camera: &Camera, [x, y]: [f64; 2]) -> Ray {
     camera.local_ray(x as f32, y as f32, 1.0).0
 }
 
-/// The rounding in something of that size.
+/// The error bound of a coordinate of that size.
 fn roundings(size: f64) -> f64 {
     size * f64::from(UNIT_ROUNDOFF) * f64::from(ROUNDINGS)
 }

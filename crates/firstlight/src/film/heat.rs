@@ -1,13 +1,13 @@
-//! Where the work went, pixel by pixel.
+//! The work of a render, pixel by pixel.
 
 use crate::color::{Rgb, false_color};
 use crate::image::{Image, Window};
 
 /// How much work each pixel of a render took.
 ///
-/// The unit is one ray that was asked, from the camera or to a light. A place that asks for a light that is integrated
-/// counts as [`PLACE`](Self::PLACE); where many pixels share such places, each has its share. The same for every thread
-/// count, tile size and machine: it is counted, not timed.
+/// The unit is one ray, from the camera or to a light. A point at which a light is integrated counts as
+/// [`PLACE`](Self::PLACE); where many pixels share such points, each has its share. The same for every thread count,
+/// tile size and machine: it is counted, not timed.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Heat {
     /// The width and height of the whole film.
@@ -19,7 +19,7 @@ pub struct Heat {
 }
 
 impl Heat {
-    /// What a place that asks for an integrated light counts: about what it takes, in rays.
+    /// The work of integrating a light at one point, in rays.
     pub const PLACE: f32 = 16.0;
     /// Where the ramp of colours begins and ends, as powers of two.
     pub const SCALE: [i32; 2] = [-2, 16];

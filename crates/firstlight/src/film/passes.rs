@@ -1,16 +1,16 @@
-//! What a film is rendered for: the picture with what is told of its pixels, and the same scene without shadows. What
-//! is made of both, pixel by pixel, when they are there.
+//! Render passes: the scene as it is, and the same scene without shadows; and the buffers that are computed from both,
+//! pixel by pixel.
 
-use super::film::Film;
-use super::many::FEW;
+use super::Film;
 use crate::ids::{LightGroupId, LightId};
 use crate::image::{Buffer, LightPart, Plane, PlaneNumbers};
+use crate::light::FEW_LIGHTS;
 use crate::math::Vec3;
 use crate::scene::Scene;
 
 /// The buffers that are rendered, each once.
 #[derive(Debug, Default, PartialEq)]
-pub(super) struct Passes {
+pub(crate) struct Passes {
     /// Of the scene as it is.
     pub picture: Vec<Buffer>,
     /// Of the scene when nothing casts shadows.
@@ -46,7 +46,7 @@ impl Passes {
         passes
     }
 
-    /// The film of what was asked for, from the films of the passes.
+    /// The film of the buffers `asked`, from the films of the passes.
     pub fn develop(scene: &Scene, asked: &[Buffer], mut picture: Film, unshadowed: Option<&Film>) -> Film {
         let without = |of: &[Buffer]| of.iter().filter_map(|of| unshadowed?.floats(*of)).collect::<Vec<_>>();
         for buffer in asked.iter().copied().filter(|buffer| !is_rendered(*buffer)) {
@@ -55,7 +55,7 @@ impl Passes {
                     let with: Vec<&[f32]> = of.iter().filter_map(|of| picture.floats(*of)).collect();
                     let mut shares = shares(&with, &without(&of));
                     if let Some(light) = may_be_left_out(scene, buffer) {
-                        see_what_was_left_out(scene, light, &picture, &with, &mut shares);
+                        trace_left_out_light(scene, light, &picture, &with, &mut shares);
                     }
                     shares
                 }
@@ -106,18 +106,17 @@ fn arriving(buffer: Buffer) -> Option<Vec<Buffer>> {
 const PLACE: [Buffer; 3] =
     [Buffer::Plane(Plane::Position), Buffer::Plane(Plane::NormalGeometric), Buffer::Plane(Plane::MaterialId)];
 
-/// Of a buffer that says how much of one light arrives: the light, if it may be left out of pixels where it does not
-/// show.
+/// The light of a buffer of visibility, if a light cut may leave that light out of pixels where it contributes little.
 fn may_be_left_out(scene: &Scene, buffer: Buffer) -> Option<LightId> {
     match buffer {
-        Buffer::Light(light, Some(LightPart::Visibility)) if scene.lights.len() > FEW => Some(light),
+        Buffer::Light(light, Some(LightPart::Visibility)) if scene.lights.len() > FEW_LIGHTS => Some(light),
         _ => None,
     }
 }
 
-/// Asks by shadow rays how much of a light the middles of those pixels see that were told nothing of it: it may have
-/// been left out there, and its share would be 0 as in an umbra. `with` is what it sends.
-fn see_what_was_left_out(scene: &Scene, light: LightId, picture: &Film, with: &[&[f32]], shares: &mut [f32]) {
+/// Computes by shadow rays the visible fraction of a light in the middles of those pixels where its contribution,
+/// `with`, is 0: the light may have been left out there, and its share would be 0 as in an umbra.
+fn trace_left_out_light(scene: &Scene, light: LightId, picture: &Film, with: &[&[f32]], shares: &mut [f32]) {
     let [places, normals] = [PLACE[0], PLACE[1]].map(|plane| picture.floats(plane).unwrap_or_default());
     let Some(PlaneNumbers::Wholes(materials)) = picture.numbers(PLACE[2]) else { return };
     let at = |of: &[f32], pixel: usize| Vec3::from_slice(&of[3 * pixel..][..3]);

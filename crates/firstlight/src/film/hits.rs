@@ -1,7 +1,8 @@
-//! What the camera rays of neighbouring pixels hit, together.
+//! The hits of the camera rays of neighbouring pixels.
 //!
-//! Rays of one block of 8 x 8 go through the mesh of the world as a bundle, and through meshes that are placed where
-//! few things are; everything else is asked ray by ray. The answers are those of [`Scene::intersect`], to the bit.
+//! The rays of a block of 8 x 8 traverse the tree of the mesh in world coordinates as a packet, and those of placed
+//! meshes where few things are placed; all else is intersected ray by ray. The hits have the bits of
+//! [`Scene::intersect`].
 
 use fearless_simd::{Level, f32x16, prelude::*};
 
@@ -13,7 +14,7 @@ use crate::shape::{RayDifferential, TileHits, bits};
 /// Rays across a block.
 const BLOCK: u32 = 8;
 
-/// The camera rays of a square of pixels, and what they hit.
+/// The camera rays of a square of pixels, and their hits.
 pub(crate) struct PixelHits {
     level: Level,
     /// Rays across a pixel.
@@ -69,7 +70,7 @@ impl PixelHits {
         let geometry = &scene.geometry;
         self.aim(scene, x + left, y + top);
         let bundle = geometry.world_as_bundle();
-        // Whether all that is placed is told by bundles too
+        // Whether packets find all hits with placed things too
         let upper_bundle = (bundle || !geometry.has_world()) && {
             let corners = [[0, 0], [w - 1, 0], [w - 1, h - 1], [0, h - 1]].map(|[column, row]| {
                 let place = place(column, row);
@@ -149,21 +150,21 @@ impl PixelHits {
         Ray { o: self.rays.o(place), d: self.rays.d(place) }
     }
 
-    /// What the ray (`column`, `row`) of pixel (`i`, `j`), counted from the first pixel that was traced, hits.
+    /// The hit of ray (`column`, `row`) of pixel (`i`, `j`), counted from the first pixel that was traced.
     #[inline(always)]
     pub fn get(&self, i: u32, j: u32, column: u32, row: u32) -> Option<Hit> {
         self.hits[((j * self.n + row) * self.across + i * self.n + column) as usize]
     }
 }
 
-/// Offers a ray's nearest hit what was found.
+/// Replaces a ray's nearest hit by a nearer one.
 fn improve(hit: &mut Option<Hit>, offer: impl FnOnce(&mut Nearest)) {
     let mut nearest = Nearest(*hit);
     offer(&mut nearest);
     *hit = nearest.0;
 }
 
-/// Lets hits count up to the nearest that is known of each ray.
+/// Limits hits to the nearest known hit of each ray.
 fn ask_from_here(found: &mut TileHits, active: u64, nearest: impl Fn(usize) -> Nearest) {
     for place in bits(active) {
         found.t[place] = nearest(place).limit();
@@ -172,7 +173,7 @@ fn ask_from_here(found: &mut TileHits, active: u64, nearest: impl Fn(usize) -> N
     }
 }
 
-/// The camera ray (`x`, `y`) of the film, counted in rays, and how it changes to the next.
+/// Camera ray (`x`, `y`) of the film, counted in rays, and its differentials.
 #[inline(always)]
 pub(crate) fn camera_ray(scene: &Scene, x: u32, y: u32) -> (Ray, RayDifferential) {
     grid_ray(scene, scene.antialiasing, x, y)
@@ -184,13 +185,13 @@ pub(super) fn grid_ray(scene: &Scene, n: u32, x: u32, y: u32) -> (Ray, RayDiffer
     scene.camera.local_ray(on_film(n, x), on_film(n, y), 1.0 / n as f32)
 }
 
-/// Where on the film a ray of such a grid is, across or down, in pixels: the middle of its part of the pixel.
+/// The position of a ray of such a grid on the film along one axis, in pixels: the middle of its part of the pixel.
 #[inline(always)]
 fn on_film(n: u32, ray: u32) -> f32 {
     (ray / n) as f32 + ((ray % n) as f32 + 0.5) / n as f32
 }
 
-/// The place of a ray in its block: blocks of 4 x 4 after each other.
+/// The index of a ray in its block, which consists of blocks of 4 x 4.
 #[inline(always)]
 fn place(column: u32, row: u32) -> usize {
     ((row / 4 * 2 + column / 4) * 16 + row % 4 * 4 + column % 4) as usize

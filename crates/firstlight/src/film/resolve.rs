@@ -1,4 +1,5 @@
-//! From what the camera rays of a pixel see to its colour: a picture is the sum of these terms in one fixed order.
+//! The colour of a pixel: the sum of its terms (background, emission, ambient light, moments of each light) in one
+//! fixed order.
 
 use std::ops::Range;
 
@@ -13,23 +14,23 @@ pub(crate) enum Term {
     Background,
     Emission,
     Ambient,
-    /// A moment of what a light sends; of no light, of what is taken together where there are many.
+    /// A moment of the light of one light; `None` is all lights that a cut takes together.
     Light(Option<u32>, usize),
-    /// The same of a light that is told by itself beside what is taken together: no term of the colour.
+    /// The same of one light among those that are taken together: a part of that term, not one of the colour.
     Apart(u32, usize),
 }
 
-/// Pixels as the sums of their terms; of those that are to be kept, with all that were added to them.
+/// The sums of the terms of some pixels, and of subsets of the terms for the buffers that need them.
 pub(crate) struct TermSums {
     /// Red, green, blue premultiplied, alpha.
     pub colors: Vec<[f32; 4]>,
-    /// What each took.
+    /// The work for each, in the unit of [`Heat`](super::Heat).
     pub work: Vec<f32>,
     /// The sums of some terms alone, in the order of their buffers.
     kept: Vec<KeptSum>,
-    /// Term by term: which of those it is added to.
+    /// For each term, the indices of the sums in `kept` that contain it.
     of_term: Vec<Vec<u32>>,
-    /// How many the scene has.
+    /// The number of lights of the scene.
     lights: usize,
 }
 
@@ -40,22 +41,22 @@ struct KeptSum {
     pixels: Vec<[f32; 3]>,
 }
 
-/// What the rays of a pixel see beside the light of lights, added up.
+/// Sums over the rays of a pixel of all terms but the light of lights.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct PixelTerms {
-    /// How many of them meet nothing.
+    /// The number of rays without a hit.
     pub background: u32,
-    /// Of lights that are seen. In 64 bits, where what several of them emit is the same in whatever order it is added.
+    /// The emission of visible lights.
     pub emission: Emission,
     pub ambient: Rgb,
 }
 
-/// What lights that are seen emit, added up.
+/// The sum of the emission of visible lights over rays. In 64 bits, so that it does not depend on the order.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Emission([f64; 3]);
 
 impl Emission {
-    /// Adds that of so many rays.
+    /// Adds the radiance of a light that `rays` rays meet.
     pub fn add(&mut self, radiance: Rgb, rays: u32) {
         let Rgb { r, g, b } = radiance;
         for (sum, radiance) in self.0.iter_mut().zip([r, g, b]) {
@@ -63,18 +64,17 @@ impl Emission {
         }
     }
 
-    /// The mean over so many rays.
+    /// The mean over `rays` rays.
     pub fn mean(&self, rays: u32) -> Rgb {
         let [r, g, b] = self.0.map(|sum| (sum / f64::from(rays)) as f32);
         Rgb::new(r, g, b)
     }
 }
 
-/// What one light sends to the surfaces that they see, added up, with the surfaces' colours and without the light's
-/// scale: diffuse and specular.
+/// The reflected light of one light, summed over the rays of a pixel, without the light's scale: diffuse and specular.
 pub(crate) type LightTerm = Colors;
 
-/// The same with the light it is of and its scale; of no light, what is taken together.
+/// The same with the light and its scale; `None` is all lights that a cut takes together.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ScaledTerm {
     pub light: Option<u32>,
@@ -83,14 +83,14 @@ pub(crate) struct ScaledTerm {
 }
 
 impl ScaledTerm {
-    /// Of all lights, in scene order.
+    /// The terms of all lights, in scene order.
     pub fn of_all(scales: impl Iterator<Item = Rgb>, terms: &[LightTerm]) -> impl Iterator<Item = ScaledTerm> {
         (0..).zip(scales).zip(terms).map(|((light, scale), term)| ScaledTerm { light: Some(light), scale, term: *term })
     }
 }
 
 impl PixelTerms {
-    /// Keeps of pixel `at` what lights send that are told apart.
+    /// Adds the terms of single lights, which are no terms of the colour, to the sums of pixel `at` for buffers.
     pub fn keep_apart(scene: &Scene, lights: &[ScaledTerm], at: usize, sums: &mut TermSums) {
         let rays = (scene.antialiasing * scene.antialiasing) as f32;
         for ScaledTerm { light, scale, term } in lights {
@@ -122,7 +122,7 @@ impl PixelTerms {
 }
 
 impl Term {
-    /// Its number among the terms of a picture.
+    /// Its index among the terms of a picture.
     #[inline(always)]
     fn index(self, lights: usize) -> usize {
         match self {
@@ -134,7 +134,7 @@ impl Term {
         }
     }
 
-    /// Those that a buffer is the sum of.
+    /// The terms that a buffer is the sum of.
     fn of(scene: &Scene, buffer: Buffer) -> Vec<Term> {
         let all = || std::iter::once(None).chain((0..scene.lights.len() as u32).map(Some));
         match buffer {
@@ -161,7 +161,7 @@ impl Term {
 }
 
 impl TermSums {
-    /// So many of a scene, with those buffers that are sums of some terms.
+    /// Sums for `pixels` pixels of a scene, and for those of `buffers` that are sums of terms.
     pub fn new(scene: &Scene, pixels: usize, buffers: &[Buffer]) -> TermSums {
         let kept: Vec<Buffer> = buffers.iter().copied().filter(|buffer| buffer.is_of_terms()).collect();
         let unscaled = |buffer: &Buffer| buffer.part().is_some_and(LightPart::is_unscaled);
@@ -181,7 +181,7 @@ impl TermSums {
         }
     }
 
-    /// Begins the sums of some pixels.
+    /// Resets the sums of some pixels to the background.
     #[inline(always)]
     pub fn begin(&mut self, pixels: Range<usize>, background: Rgb, alpha: f32) {
         let Rgb { r, g, b } = background;
@@ -195,7 +195,7 @@ impl TermSums {
         }
     }
 
-    /// Adds a term to pixels side by side, from number `first` on: `scale` times the values.
+    /// Adds a term, `scale` times the values, to successive pixels from `first` on.
     #[inline(always)]
     pub fn add(&mut self, first: usize, term: Term, scale: Rgb, values: impl Iterator<Item = Rgb> + Clone) {
         for ([r, g, b, _], value) in self.colors[first..].iter_mut().zip(values.clone()) {
@@ -207,7 +207,7 @@ impl TermSums {
         }
     }
 
-    /// Adds a term to those sums that keep it, and not to the colours.
+    /// Adds a term to the sums for buffers, not to the colours.
     pub fn keep(&mut self, first: usize, term: Term, scale: Rgb, values: impl Iterator<Item = Rgb> + Clone) {
         for k in &self.of_term[term.index(self.lights)] {
             let KeptSum { unscaled, pixels } = &mut self.kept[*k as usize];
@@ -218,13 +218,13 @@ impl TermSums {
         }
     }
 
-    /// The colour of a pixel by now.
+    /// The sum of a pixel's terms so far.
     pub fn color(&self, at: usize) -> Rgb {
         let [r, g, b, _] = self.colors[at];
         Rgb::new(r, g, b)
     }
 
-    /// The sums of some terms, in the order of their buffers.
+    /// The sums for buffers, in their order.
     pub fn kept(&self) -> impl Iterator<Item = &[[f32; 3]]> {
         self.kept.iter().map(|sum| &sum.pixels[..])
     }

@@ -1,9 +1,9 @@
 //! Which pixels each object covers: those where it is seen, and those where it would be seen if it were alone.
 //!
-//! Both are of the centre rays of pixels. The second, *amodal* masks, come from one walk along each ray through all
-//! that lies on it, not from a render of each object.
+//! Both are of the centre rays of pixels. The second, *amodal* masks, come from one traversal of all hits along each
+//! ray, not from a render of each object.
 
-use super::film::Film;
+use super::Film;
 use super::hits::grid_ray;
 use crate::image::{Plane, PlaneNumbers, Window};
 use crate::parallel;
@@ -106,7 +106,7 @@ impl Mask {
 
 impl Scene {
     /// The masks of all objects that are seen in a film of this scene, in the order of their ids; `None` if
-    /// [`Plane::ObjectId`] was not asked for.
+    /// [`Plane::ObjectId`] was not rendered.
     pub fn object_masks(&self, film: &Film) -> Option<Vec<ObjectMasks>> {
         let Some(PlaneNumbers::Wholes(ids)) = film.numbers(Plane::ObjectId) else { return None };
         Some(self.masks_of_ids(film.window(), ids))

@@ -1,4 +1,4 @@
-//! What stands around one place, made ready for many rays to lights.
+//! The listed occluders as one receiver sees them, for shadow rays to many lights.
 
 use crate::ids::LightId;
 use crate::material::ShadingPoint;
@@ -7,17 +7,17 @@ use crate::scene::{Listed, Opacity, Scene};
 use crate::shape::{ParallelogramShadow, SphereShadow};
 use crate::visibility::Viewpoint;
 
-/// The listed things that may be in the way of light to a place. Keeps its memory.
+/// The listed shapes that may occlude lights from one receiver. Keeps its memory.
 #[derive(Default)]
-pub(super) struct Fence {
+pub(super) struct ListedOccluderCache {
     spheres: Vec<Listed<SphereShadow>>,
     flats: Vec<Listed<ParallelogramShadow>>,
     from: Option<Viewpoint>,
 }
 
-impl Fence {
-    /// Takes its stand at a place.
-    pub fn stand(&mut self, scene: &Scene, point: &ShadingPoint) {
+impl ListedOccluderCache {
+    /// Replaces the receiver.
+    pub fn set_receiver(&mut self, scene: &Scene, point: &ShadingPoint) {
         self.spheres.clear();
         let spheres = scene.occluders.surface_spheres().iter();
         let spheres = spheres.map(|sphere| sphere.map(|shape| shape.shadow(point.p, point.error)));
@@ -28,7 +28,7 @@ impl Fence {
         self.flats.extend(flats.map(|flat| flat.map(|shape| shape.shadow(point.p, point.error))));
     }
 
-    /// Whether anything stands on a ray along `l` from there to a light: what [`Scene::occluded`] says.
+    /// Whether a shadow ray from the receiver along `l` to a light is blocked: the result of [`Scene::occluded`].
     #[inline]
     pub fn blocks(&self, scene: &Scene, light: LightId, l: Vec3, finite: bool) -> bool {
         let Some(from) = &self.from else { return false };

@@ -9,7 +9,7 @@ use std::collections::BTreeMap;
 
 use serde_json::{Value as Json, json};
 
-use super::film::Film;
+use super::Film;
 use super::masks::{Mask, ObjectMasks};
 use crate::image::{Plane, PlaneNumbers, Window};
 use crate::scene::Scene;

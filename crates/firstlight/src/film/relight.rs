@@ -1,4 +1,4 @@
-//! A picture lit again, from what a file keeps of each light: other strengths and colours, without a render.
+//! Relighting: a picture with other strengths and colours of its lights, from the buffers of a file, without a render.
 //!
 //! A pixel is the sum of its terms, and the terms of a light are its scale times what the file holds. So the sum is the
 //! one that a render makes, in its order; where every light is sampled at every camera ray, with its bits.
@@ -13,8 +13,8 @@ use crate::image::{Buffer, Image, LightPart, Plane, PlaneVec, Receipt, StoredPla
 use crate::light::{Light, LightScale, MAX_LIGHT};
 use crate::scene::{MAX_ANTIALIASING, Scene};
 
-use super::RenderSettings;
 use super::resolve::Emission;
+use super::settings::RenderSettings;
 
 /// How a light is changed.
 #[derive(Clone, Debug, PartialEq)]
@@ -43,24 +43,24 @@ pub struct Relit {
 #[error("{0}")]
 pub struct RelightError(String);
 
-/// What a receipt says of the lights, so that the picture can be lit again.
+/// The entry of a receipt with the lights.
 const LIGHTS: &str = "lights";
-/// And of how the scene is displayed.
+/// The entry with the display of the scene.
 const SCENE_DISPLAY: &str = "scene_display";
-/// What was changed of the lights: such a picture is of no scene.
+/// The entry with the changes of the lights: a picture that has it is of no scene.
 pub(super) const RELIT: &str = "relit";
 
 /// A light of a file.
 struct FiledLight {
     name: Option<String>,
     scale: LightScale,
-    /// The buffers of what it sends, and of where it is seen, if that may be.
+    /// The names of the buffers of its light, and of its coverage if it may be visible.
     sends: [String; 2],
     seen: Option<String>,
 }
 
 impl Scene {
-    /// What a receipt says of the lights, by its keys.
+    /// The entries of a receipt with the lights and the display.
     pub(super) fn light_entries(&self, settings: &RenderSettings) -> [(&'static str, String); 2] {
         let samples_all = settings.renderer().samples_all();
         let names = self.light_names();
@@ -227,7 +227,7 @@ fn find(lights: &[FiledLight], name: &str) -> Result<usize, RelightError> {
     }
 }
 
-/// What the camera sees of the lights themselves: told anew where one that is changed may be seen.
+/// The emission of visible lights, recomputed if one that may be visible is changed.
 fn emitted(
     planes: &FiledTerms,
     before: &[FiledLight],

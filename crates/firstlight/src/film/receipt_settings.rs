@@ -1,10 +1,10 @@
-//! From a receipt back to what rendered the picture: the settings, and what was said in place of the scene.
+//! From a receipt back to the settings that rendered the picture, and the values that replaced those of the scene.
 
 use std::str::FromStr;
 
 use super::receipt::{REFERENCE, TRANSPARENT, version};
 use super::relight::RELIT;
-use super::{AaMode, RenderSettings, VisibilityMode};
+use super::settings::{AaMode, RenderSettings, VisibilityMode};
 use crate::color::Display;
 use crate::describe::{ColorDesc, SamplesDesc};
 use crate::image::{BufferDesc, Plane, Receipt, Window};
@@ -42,7 +42,7 @@ pub struct ReceiptSettings {
     /// `None` for transparent.
     background: Option<ColorDesc>,
     shadow_terminator: ShadowTerminator,
-    /// In scene order, how many lights say the same.
+    /// Runs of lights in scene order with the same number of samples.
     light_samples: Vec<(usize, SamplesDesc)>,
     crop: Option<Window>,
     reference: bool,
@@ -196,7 +196,7 @@ impl ReceiptSettings {
         self.version == version()
     }
 
-    /// Has a description say what was said in its place, or what it said itself.
+    /// Sets the values of a description to those that the picture was rendered with.
     pub fn apply(&self, desc: &mut SceneDesc) {
         let render = &mut desc.render;
         [render.width, render.height] = self.size;

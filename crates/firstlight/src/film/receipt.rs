@@ -1,6 +1,6 @@
-//! What a picture says of itself: all that decides its pixels, and nothing else.
+//! Receipts: the settings and inputs that decide the pixels of a file, kept in the file.
 
-use super::{RenderSettings, Renderer};
+use super::settings::{RenderSettings, Renderer};
 use crate::camera::{Camera, Frame, Projection};
 use crate::describe::SamplesDesc;
 use crate::image::cryptomatte::{self, Named};
@@ -13,23 +13,23 @@ use crate::scene::{Choices, Framing, ModelSettings, Scene};
 const MOST_LISTED: usize = 1000;
 
 /// How many entries **Pixels** has in the changelog, over all versions. It is part of the version in a receipt, so that
-/// two builds whose pictures differ never say the same. The test below compares it with the changelog.
+/// two builds whose pictures differ never have the same version. The test below compares it with the changelog.
 const PIXELS_ENTRIES: u32 = 91;
 
-/// The version, as receipts say it.
+/// The version in receipts.
 pub(super) fn version() -> String {
     format!("{}+pixels.{PIXELS_ENTRIES}", env!("CARGO_PKG_VERSION"))
 }
 
-/// What a receipt calls a background that lets through what is behind.
+/// The background entry of a transparent background.
 pub(super) const TRANSPARENT: &str = "transparent";
-/// What it calls the plain renderer, where it says how shadows are found.
+/// The visibility entry of the plain renderer.
 pub(super) const REFERENCE: &str = "reference";
 
 impl Scene {
-    /// What a picture of this scene says of itself: all that decides the film, by the rules that are in effect, so that
-    /// settings that give the same film say the same. How 8- and 16-bit files show it is added where they are
-    /// [encoded](crate::Image::encode).
+    /// The receipt of a picture of this scene: all that decides the film, by the rules that are in effect, so that
+    /// settings that give the same film have the same receipt. The display of 8- and 16-bit files is added where they
+    /// are [encoded](crate::Image::encode).
     pub fn receipt(&self, settings: &RenderSettings) -> Receipt {
         let mut entries = vec![
             ("version", version()),
@@ -57,7 +57,7 @@ impl Scene {
             entries.extend(smooth_deg.map(|angle| ("smooth_deg", angle.to_string())));
         }
         entries.extend(Self::matrices(&self.camera));
-        // What is neither integrated nor lit once for several rays is not judged
+        // Only integration, and light shared by several rays, depend on the tolerance
         let is_integrated =
             |light: &Light| light.said_samples() == SamplesDesc::Exact && !settings.renderer().samples_all();
         if settings.renderer_of(self) == Renderer::Adaptive || self.lights.iter().any(is_integrated) {
@@ -84,7 +84,7 @@ impl Scene {
 }
 
 impl Scene {
-    /// What leads from the world to the pixels of a camera:
+    /// The matrices from the world to the pixels of a camera:
     ///
     /// - `intrinsics`: K of a pinhole camera, row by row, in pixels, the middle of the first pixel at (0.5, 0.5), with
     ///   x to the right and y down as OpenCV has them;
@@ -108,8 +108,8 @@ impl Scene {
         intrinsics.into_iter().chain(extrinsics.map(rows)).collect()
     }
 
-    /// What a file of buffers says of itself: the [receipt](Self::receipt), and more where there is more than the
-    /// picture.
+    /// The receipt of a file of buffers: the [receipt](Self::receipt) of the picture, and more where there is more than
+    /// the picture.
     ///
     /// - `lights` and `scene_display`, where light is asked for without its scale: what the lights are, and how the
     ///   scene is displayed, for [`relight`](crate::relight);
@@ -166,7 +166,7 @@ impl Scene {
     }
 }
 
-/// The points that each light is sampled at, or that it is integrated: in effect, whoever said so.
+/// The number of samples of each light in effect, or that it is integrated.
 fn light_samples(lights: &[Light], settings: &RenderSettings) -> String {
     // Where every sample is traced, every light is sampled
     let said = |light: &Light| match light.said_samples() {
@@ -174,7 +174,7 @@ fn light_samples(lights: &[Light], settings: &RenderSettings) -> String {
         said => said.to_string(),
     };
     let counts: Vec<String> = lights.iter().map(said).collect();
-    // Of many lights, how many in a row say the same
+    // Many lights are listed as runs of equal counts
     let run = |same: &[String]| format!("{} x {}", same.len(), same[0]);
     if counts.len() > MOST_LISTED {
         counts.chunk_by(|a, b| a == b).map(run).collect::<Vec<_>>().join(", ")

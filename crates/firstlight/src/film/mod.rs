@@ -1,18 +1,42 @@
-//! Where pixels are collected: planes of one size, each of one thing, those that were asked for.
+//! The film: pixels in planes of one size, one for each buffer that a render is to fill; and what is made of films.
+//!
+//! Before it stands the scene; after it, the renderer, which adds light. Planes that no light is needed for are filled
+//! here: by [`centers`] from centre rays, by [`coverage`] from all camera rays.
+
+pub(crate) mod centers;
+mod coco;
+pub(crate) mod coverage;
+mod heat;
+pub(crate) mod hits;
+mod masks;
+mod motion;
+pub(crate) mod passes;
+mod receipt;
+mod receipt_settings;
+mod relight;
+pub(crate) mod resolve;
+pub(crate) mod settings;
+pub(crate) mod tile;
 
 use std::ops::Range;
 
-use super::heat::Heat;
-use super::resolve::TermSums;
-use super::tile::Tile;
+pub use coco::Coco;
+pub use heat::Heat;
+pub use masks::{Mask, ObjectMasks};
+pub use receipt_settings::{ReceiptFault, ReceiptSettings};
+pub use relight::{LightChange, RelightError, Relit, relight};
+pub use settings::{AaMode, RenderSettings, VisibilityMode};
+
 use crate::image::cryptomatte;
 use crate::image::{
     Buffer, FileSettings, Format, Image, ImageError, NamedPlane, Plane, PlaneFile, PlaneNumbers, PlaneVec, Receipt,
     Window,
 };
 use crate::scene::Scene;
+use resolve::TermSums;
+use tile::Tile;
 
-/// The numbers of a plane, pixel by pixel.
+/// The values of a plane, pixel by pixel.
 #[derive(Clone, Debug)]
 enum Values {
     One(Vec<f32>),
@@ -35,7 +59,7 @@ impl Values {
         }
     }
 
-    /// Takes a row of `from`, from its number `first` on, and puts it at number `at`.
+    /// Copies `length` pixels of `from`, from index `first` on, to index `at`.
     fn take(&mut self, at: usize, from: &Values, first: usize, length: usize) {
         fn copy<T: Copy>(to: &mut [T], at: usize, from: &[T], first: usize, length: usize) {
             to[at..at + length].copy_from_slice(&from[first..first + length]);
@@ -74,13 +98,13 @@ impl Values {
     }
 }
 
-/// The film.
+/// The pixels of a picture, in the planes that were rendered.
 #[derive(Clone, Debug)]
 pub struct Film {
     size: [u32; 2],
     window: Window,
     planes: Vec<(Buffer, Values)>,
-    /// The name of each in files.
+    /// The name of each plane in files.
     names: Vec<String>,
 }
 
@@ -90,7 +114,7 @@ pub(crate) struct FilmTile {
     planes: Vec<(Buffer, Values)>,
 }
 
-/// What a pixel's centre ray says for a plane.
+/// The value of a plane at a pixel's centre ray.
 pub(super) enum CenterValue {
     Floats([f32; 3]),
     Whole(u32),
@@ -108,8 +132,8 @@ impl Film {
         Film { size: [scene.width, scene.height], window, planes: empty(planes, pixels), names }
     }
 
-    /// Adds a plane, whose numbers are floats, or takes its place.
-    pub(super) fn put(&mut self, scene: &Scene, buffer: Buffer, numbers: &[f32]) {
+    /// Adds a plane of floats, or replaces it.
+    pub(crate) fn put(&mut self, scene: &Scene, buffer: Buffer, numbers: &[f32]) {
         let values = match buffer.plane().channels().len() {
             1 => Values::One(numbers.to_vec()),
             _ => Values::Three(numbers.as_chunks().0.to_vec()),
@@ -123,8 +147,8 @@ impl Film {
         }
     }
 
-    /// Leaves those planes alone, in their order.
-    pub(super) fn keep(&mut self, buffers: &[Buffer]) {
+    /// Removes all planes but these, and puts them into this order.
+    pub(crate) fn keep(&mut self, buffers: &[Buffer]) {
         let place = |of: Buffer| buffers.iter().position(|buffer| *buffer == of);
         let planes = std::mem::take(&mut self.planes).into_iter().zip(std::mem::take(&mut self.names));
         let mut kept: Vec<_> = planes.filter_map(|plane| Some((place(plane.0.0)?, plane))).collect();
@@ -132,7 +156,7 @@ impl Film {
         (self.planes, self.names) = kept.into_iter().map(|(_, plane)| plane).unzip();
     }
 
-    /// Takes the pixels of a tile.
+    /// Copies the pixels of a tile.
     pub(crate) fn merge(&mut self, from: &FilmTile) {
         let Tile { x, y, width, height } = from.tile;
         let (left, top) = ((x - self.window.x) as usize, (y - self.window.y) as usize);
@@ -149,41 +173,41 @@ impl Film {
         self.size
     }
 
-    /// The part of it that was exposed, which its planes hold.
+    /// The part of it that was rendered, which its planes hold.
     pub fn window(&self) -> Window {
         self.window
     }
 
-    /// What it holds: [`RenderSettings::buffers`](super::RenderSettings::buffers), in their order.
+    /// The buffers that it holds: [`RenderSettings::buffers`](super::RenderSettings::buffers), in their order.
     pub fn planes(&self) -> impl Iterator<Item = Buffer> {
         self.planes.iter().map(|(buffer, _)| *buffer)
     }
 
-    /// The numbers of a plane; `None` if it was not asked for.
+    /// The values of a plane; `None` if it was not rendered.
     pub fn numbers(&self, of: impl Into<Buffer>) -> Option<PlaneNumbers<'_>> {
         let of = of.into();
         self.planes.iter().find(|(buffer, _)| *buffer == of).map(|(_, values)| values.numbers())
     }
 
-    /// Gives the numbers of all planes away, without a copy, in the order they were asked for.
-    /// Each with its name.
+    /// Moves out the values of all planes, each with its name, in their order.
     pub fn into_planes(self) -> impl Iterator<Item = (String, Buffer, PlaneVec)> {
         let planes = self.names.into_iter().zip(self.planes);
         planes.map(|(name, (buffer, values))| (name, buffer, values.into_numbers()))
     }
 
-    /// Where the work went; `None` if [`Plane::Rays`] was not asked for.
+    /// The work for each pixel; `None` if [`Plane::Rays`] was not rendered.
     pub fn heat(&self) -> Option<Heat> {
         let PlaneNumbers::Floats(work) = self.numbers(Plane::Rays)? else { return None };
         Some(Heat { film: self.size, window: self.window, work: work.to_vec() })
     }
 
     /// The bytes of a file that holds some of its planes: EXR and NPZ any, the others one. The same film, settings and
-    /// receipt give the same bytes, always. The receipt says of each plane what it is, and the hash of its bits.
+    /// receipt always give the same bytes. The receipt in it has the description of each plane and the hash of its
+    /// bits.
     ///
     /// # Errors
-    /// A format that holds one buffer alone, or not the numbers of this one; a plane that was not asked for; settings
-    /// or a receipt outside what they may be.
+    /// A format that cannot hold several buffers, or not the values of this one; a plane that was not rendered;
+    /// settings or a receipt outside their ranges.
     pub fn encode(
         &self,
         planes: &[Buffer],
@@ -202,7 +226,7 @@ impl Film {
     /// The picture.
     ///
     /// # Panics
-    /// If [`Plane::Color`] was not asked for.
+    /// If [`Plane::Color`] was not rendered.
     pub fn develop(self) -> Image {
         let pixels = self.planes.into_iter().find_map(|(plane, values)| match (plane, values) {
             (Buffer::Plane(Plane::Color), Values::Four(pixels)) => Some(pixels),
@@ -213,13 +237,13 @@ impl Film {
 }
 
 impl FilmTile {
-    /// One with the same planes.
+    /// An empty tile with the same planes.
     pub fn new(tile: &Tile, planes: &[Buffer]) -> Self {
         let pixels = tile.width as usize * tile.height as usize;
         FilmTile { tile: *tile, planes: empty(planes, pixels) }
     }
 
-    /// Notes what pixels side by side show, from column `x`, row `y` of the tile on: `some` of `sums`.
+    /// Stores a row of pixels, from column `x`, row `y` of the tile on: those in `some` of `sums`.
     #[inline(always)]
     pub fn set_row(&mut self, x: u32, y: u32, sums: &TermSums, some: Range<usize>) {
         let index = (y * self.tile.width + x) as usize;
@@ -244,12 +268,12 @@ impl FilmTile {
         }
     }
 
-    /// The planes it has.
+    /// The planes of the tile.
     pub fn planes(&self) -> Vec<Buffer> {
         self.planes.iter().map(|(buffer, _)| *buffer).collect()
     }
 
-    /// Notes what the centre ray of a pixel of the tile says for a plane, by its number.
+    /// Stores the value of plane number `plane` at the centre ray of a pixel of the tile.
     #[inline(always)]
     pub(super) fn set_center(&mut self, plane: usize, [x, y]: [u32; 2], said: CenterValue) {
         let index = (y * self.tile.width + x) as usize;
@@ -262,7 +286,7 @@ impl FilmTile {
         }
     }
 
-    /// Notes what all rays of a pixel say for plane number `plane`, which has as many channels.
+    /// Stores the channels of plane number `plane` at a pixel.
     pub(super) fn set_pixel(&mut self, plane: usize, x: u32, y: u32, numbers: &[f32]) {
         let index = (y * self.tile.width + x) as usize;
         let all = match &mut self.planes[plane].1 {
