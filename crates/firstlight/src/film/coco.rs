@@ -32,9 +32,9 @@ impl Coco {
         Self::default()
     }
 
-    /// Adds a picture with all objects that are seen in it, and says whether it could: not where the film has no
-    /// [`Plane::ObjectId`]. `file_name` is what the data set calls the picture's file. All
-    /// names in the scene become categories, seen or not, so that they are the same in all of its pictures.
+    /// Adds a picture with all objects that are visible in it. Returns false, and adds nothing, if the film has no
+    /// [`Plane::ObjectId`]. `file_name` is the name of the picture's file in the data set. All names in the scene
+    /// become categories, visible or not, so that they are the same in all of its pictures.
     pub fn add(&mut self, scene: &Scene, film: &Film, file_name: &str) -> bool {
         let Some(PlaneNumbers::Wholes(ids)) = film.numbers(Plane::ObjectId) else { return false };
         self.add_some(scene, film.window(), ids, &|_| true, file_name);

@@ -128,8 +128,8 @@ fn trace_left_out_light(scene: &Scene, light: LightId, picture: &Film, with: &[&
     }
 }
 
-/// The terms that `rest` is added to, in their order: of each light, or group of none of those, that is asked for, its
-/// two parts or else what is asked of it.
+/// The terms that `rest` complements, in their order: for each light that has a buffer, and for each group with one
+/// that holds none of those lights, the buffers of its two parts, or else the one of both.
 fn beside_rest(scene: &Scene, asked: &[Buffer]) -> Vec<Buffer> {
     let parts = |of: Buffer| {
         let both = [LightPart::Diffuse, LightPart::Specular].map(|part| of.with_part(Some(part)));

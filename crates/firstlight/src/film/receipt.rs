@@ -111,11 +111,11 @@ impl Scene {
     /// The receipt of a file of buffers: the [receipt](Self::receipt) of the picture, and more where there is more than
     /// the picture.
     ///
-    /// - `lights` and `scene_display`, where light is asked for without its scale: what the lights are, and how the
-    ///   scene is displayed, for [`relight`](crate::relight);
+    /// - `lights` and `scene_display`, with buffers of light without its scale: the lights, and the display of the
+    ///   scene, for [`relight`](crate::relight);
     /// - `light_groups`: a JSON list of their names and of the numbers of their lights, from 1;
-    /// - `motion_to`, where motion is asked for: whereto it leads, a number of seconds, or the name of a camera in
-    ///   quotes; and the three matrices of the camera there, with `motion_` before them;
+    /// - `motion_to`, with buffers of motion: its other end, a number of seconds, or the name of a camera in quotes;
+    ///   and the three matrices of the camera there, with `motion_` before them;
     /// - `object_names`, `instance_names`, `material_names`: JSON lists, the name of id 1 first, `null` for what has
     ///   none;
     /// - `object_manifest`, `instance_manifest`, `material_manifest`: JSON dictionaries of the same names, `#3` for

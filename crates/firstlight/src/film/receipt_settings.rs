@@ -12,7 +12,7 @@ use crate::light::LightDesc;
 use crate::scene::{Framing, ModelSettings, MotionTo, Scene, SceneDesc, UpAxis, View};
 use crate::shape::ShadowTerminator;
 
-/// What a [`Receipt`] says of how its picture was rendered, so that it can be rendered again: [`apply`](Self::apply) to
+/// The settings in a [`Receipt`], by which its picture can be rendered again: [`apply`](Self::apply) to
 /// the description of its scene, compile at [`time`](Self::time), see that the hash is
 /// [`scene_hash`](Self::scene_hash), and render with [`settings`](Self::settings).
 #[derive(Clone, Debug, PartialEq)]
@@ -58,15 +58,15 @@ pub enum ReceiptFault {
     /// No scene has the lights of the picture.
     #[error("was lit again after it was rendered: verify the file that it was made of")]
     Relit,
-    /// It does not say what it has to.
+    /// It lacks an entry.
     #[error("its receipt does not say {0}, as those of this version do")]
     Lacks(&'static str),
     /// An entry that no receipt has.
     #[error("its receipt says {key} {value:?}, which no receipt of this version does")]
     Unknown {
-        /// Which.
+        /// The key of the entry.
         key: &'static str,
-        /// What it says.
+        /// Its value.
         value: String,
     },
 }

@@ -32,8 +32,8 @@ words! {
     }
 }
 
-/// A caller's wishes. None of them changes a bit of the picture, but `crop`, which chooses its part, and those that say
-/// by which rules it is made: `aa_mode`, `visibility`, `reference`.
+/// The settings of a render. Pixels depend only on `crop`, which chooses a part of the picture, and on the rules
+/// `aa_mode`, `visibility` and `reference`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RenderSettings {
     /// Threads to render with; all processors if `None`.
@@ -52,9 +52,9 @@ pub struct RenderSettings {
     pub reference: bool,
     /// How shadows are found.
     pub visibility: VisibilityMode,
-    /// The planes of the film: [`Plane::Color`] alone unless said. What the scene's text asks for is
-    /// [`Scene::buffers`], and is rendered where it is given here: `buffers: scene.buffers().to_vec()`. Without planes
-    /// that are lit, no light is asked.
+    /// The planes of the film; [`Plane::Color`] alone by default. Those that the scene's text lists are
+    /// [`Scene::buffers`], and are rendered where they are given here: `buffers: scene.buffers().to_vec()`. Without
+    /// planes that need light, no light is evaluated.
     pub buffers: Vec<Buffer>,
 }
 

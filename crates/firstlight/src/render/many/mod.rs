@@ -97,7 +97,7 @@ struct PatchLight {
 }
 
 impl<'a> Many<'a> {
-    /// `buffers` say which lights are kept apart.
+    /// `buffers` are those of the render: some lights may have buffers of their own.
     pub fn new(scene: &'a Scene, tree: &'a LightTree, buffers: &[Buffer]) -> Self {
         Many {
             scene,
@@ -118,7 +118,7 @@ impl<'a> Many<'a> {
         }
     }
 
-    /// Begins a cell of which the film has so much; `pixel` says where in it a fragment is.
+    /// Begins a cell, of which `size` columns and rows are on the film; `pixel` returns the pixel of a fragment.
     pub fn begin(&mut self, fragments: &Fragments, size: [u32; 2], pixel: impl Fn(usize) -> u32) {
         self.patches.begin(self.scene, fragments, size, pixel);
     }

@@ -31,7 +31,8 @@ pub(super) struct Patches {
 }
 
 impl Patches {
-    /// Those of all fragments of a cell, of which the film has so much. `pixel` says where in the cell a fragment is.
+    /// Those of all fragments of a cell, of which `size` columns and rows are on the film. `pixel` returns the pixel of
+    /// a fragment in the cell.
     pub fn begin(&mut self, scene: &Scene, fragments: &Fragments, size: [u32; 2], pixel: impl Fn(usize) -> u32) {
         self.all.clear();
         self.whole.clear();
