@@ -7,7 +7,7 @@ use arrayvec::ArrayVec;
 use fearless_simd::{f32x16, mask32x16, prelude::*};
 
 use super::view::{FlatLight, FlatView, NEAR};
-use crate::material::ShadingPoint;
+use crate::material::{LobeKind, LobeLanes, ShadingPoint};
 use crate::math::{DVec3, LANES, UNIT_ROUNDOFF, Vec3, Vec3x16};
 
 /// Sixteen numbers, one of each member of a batch.
@@ -53,6 +53,8 @@ pub(crate) enum ViewNumber {
     OutX,
     OutY,
     CosO,
+    /// The exponent of the lobe.
+    Shininess,
     /// The light's square.
     X0,
     X1,
@@ -81,14 +83,15 @@ impl Default for ViewBlock {
 impl ViewBlock {
     /// Puts what one point sees into a lane.
     #[inline(always)]
-    pub fn set(&mut self, lane: usize, p: Vec3, v: &FlatView) {
-        let (l0, a, b) = (v.l0, v.a, v.b);
+    pub fn set(&mut self, lane: usize, point: &ShadingPoint, v: &FlatView) {
+        let (p, l0, a, b) = (point.p, v.l0, v.a, v.b);
         let mirror = v.mirror().unwrap_or_default();
         #[rustfmt::skip]
         let numbers: [f32; NUMBERS] = [
             p.x, p.y, p.z, l0.x, l0.y, l0.z, a.x, a.y, a.z, b.x, b.y, b.z,
             v.fa, v.la, v.skew, v.fb, v.lb, v.height, v.facing, mirror.x, mirror.y, mirror.z,
             v.cos.c, v.cos.x, v.cos.y, v.horizon.c, v.horizon.x, v.horizon.y, v.out.c, v.out.x, v.out.y, v.cos_o,
+            point.bsdf.lobe.shininess(),
             v.x[0], v.x[1], v.y[0], v.y[1], v.origin[0], v.origin[1],
             v.ratio, v.behind2, v.measure,
         ];
@@ -121,6 +124,10 @@ impl ViewBlock {
         let [error, horizon] =
             [vectors!(|point: &ShadingPoint| point.error.0), vectors!(|point: &ShadingPoint| point.horizon)];
         let [ns, wo] = [vectors!(|point: &ShadingPoint| point.ns), vectors!(|point: &ShadingPoint| point.wo)];
+        // Lanes without a point have the lobe of the last: of one exponent for all, powers are faster
+        for (lane, shininess) in self.0[Shininess as usize].iter_mut().enumerate() {
+            *shininess = points[lane.min(points.len() - 1)].bsdf.lobe.shininess();
+        }
         let [a, b, n] = [light.a, light.b, light.n].map(|v| Vec3x16::splat(simd, v));
         let l0 = Exact::new(light.c).seen_from(simd, p);
         let side = -n.dot(l0);
@@ -266,6 +273,14 @@ pub(crate) trait Views {
     #[inline(always)]
     fn linear<S: Simd>(&self, simd: S, [c, x, y]: [ViewNumber; 3]) -> Linear16<S> {
         Linear16 { c: self.lanes(simd, c), x: self.lanes(simd, x), y: self.lanes(simd, y) }
+    }
+}
+
+impl Members<'_, ViewBlock> {
+    /// The lobes of each, which are of one kind.
+    #[inline(always)]
+    pub fn lobes<S: Simd>(&self, simd: S, kind: Option<LobeKind>) -> LobeLanes {
+        LobeLanes::new(kind, self.lanes(simd, ViewNumber::Shininess).to_array())
     }
 }
 

@@ -27,7 +27,7 @@ use super::panels::{Between, Blocked, Panel, PanelSums, cut, rows};
 use super::tolerance::{COSTS, TOLERANCE, Weight};
 use super::view::FlatView;
 use crate::color::{DisplaySteps, Rgb};
-use crate::material::{Lobe, Moments, ShadingPoint};
+use crate::material::{LobeKind, Moments, ShadingPoint};
 use crate::math::{LANES, dispatch_wide};
 
 /// How much of a light shines on a point.
@@ -85,7 +85,8 @@ pub(crate) struct Asked<'a> {
     pub obstacles: &'a Obstacles<'a>,
     /// What of trees may be in the way, if anything is.
     pub near: Option<&'a Obstacles<'a>>,
-    pub lobe: &'a Lobe,
+    /// The kind of the points' lobes.
+    pub lobe: Option<LobeKind>,
     /// What its moments are multiplied with before the colours of a surface.
     pub scale: Rgb,
     pub steps: &'a DisplaySteps,
@@ -315,7 +316,7 @@ impl Evaluator {
         for (k, point) in points.iter().enumerate().filter(|(k, _)| one_by_one >> k & 1 == 1) {
             if let Some(flat) = light.emitter.flat(point.p) {
                 there |= 1 << k;
-                views.set(k, point.p, &FlatView::new(&flat, point));
+                views.set(k, point, &FlatView::new(&flat, point));
             }
         }
         there
@@ -457,7 +458,7 @@ impl Evaluator {
     fn ask_panels(&mut self, level: Level, light: &Asked) {
         let Evaluator { views, between, kept, panels, panel_sums, .. } = self;
         let blocked = light.blocked(between);
-        let moments = light.lobe.moment_count();
+        let moments = if light.lobe.is_none() { 1 } else { MOMENTS };
         panel_sums.clear();
         dispatch_wide!(level, simd => {
             for some in panels.chunks(LANES) {

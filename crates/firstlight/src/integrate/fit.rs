@@ -11,7 +11,7 @@ use fearless_simd::{f32x16, prelude::*};
 
 use super::batch::{Exact, LaneBlock, LaneNumbers, Linear16, Members, ViewBlock, ViewNumber, Views, ways};
 use super::tolerance::TOLERANCE;
-use crate::material::Lobe;
+use crate::material::{LobeKind, LobeLanes};
 use crate::math::{LANES, sin_cos};
 
 /// Moments of a light: the cosine, and the highlight.
@@ -180,7 +180,7 @@ type NodeValues<S> = [[[f32x16<S>; NODES]; NODES]; MOMENTS];
 #[inline(always)]
 fn values<S: Simd>(
     simd: S,
-    lobe: &Lobe,
+    lobes: &LobeLanes,
     falloff: AreaWeight,
     members: &Members<ViewBlock>,
     cells: &[Cell],
@@ -259,7 +259,7 @@ fn values<S: Simd>(
             cos_i[i] = (x * cos.x + cos_row) * inverse;
             cos_io[i] = (x * out.x + out_row) * inverse;
         }
-        for (values, moment) in values.iter_mut().zip(lobe.moments_lanes(cos_i, cos_o, cos_io, weights)) {
+        for (values, moment) in values.iter_mut().zip(lobes.moments(cos_i, cos_o, cos_io, weights)) {
             values[j] = moment;
         }
     }
@@ -296,16 +296,17 @@ fn sum<S: Simd>(simd: S, values: &[[f32x16<S>; NODES]; NODES]) -> (f32x16<S>, [[
 #[inline(always)]
 pub(crate) fn fit<S: Simd>(
     simd: S,
-    lobe: &Lobe,
+    lobe: Option<LobeKind>,
     falloff: AreaWeight,
     members: &Members<ViewBlock>,
     cells: &[Cell],
     kept: Option<&mut Vec<CutBlock>>,
 ) -> Fits {
-    let (values, area) = values(simd, lobe, falloff, members, cells);
+    let lobes = members.lobes(simd, lobe);
+    let (values, area) = values(simd, &lobes, falloff, members, cells);
     let (zero, one, least) = (simd.splat_f32x16(0.0), simd.splat_f32x16(1.0), simd.splat_f32x16(f32::MIN_POSITIVE));
     let mut fits = Fits::default();
-    let moments = lobe.moment_count();
+    let moments = lobes.moment_count();
     for (moment, values) in values.iter().enumerate().take(moments) {
         let (sum, tails) = sum(simd, values);
         fits.sums[moment] = (sum * area).to_array();

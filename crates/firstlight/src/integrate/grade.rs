@@ -9,7 +9,7 @@ use super::batch::{LaneNumbers, Linear16, Members, ViewBlock, ViewNumber, Views,
 use super::fit::{Cell, sides};
 use super::tolerance::TOLERANCE;
 use super::view::Outline;
-use crate::material::{Lobe, ShadingPoint};
+use crate::material::{LobeKind, ShadingPoint};
 use crate::math::{LANES, Vec3x16, sin_cos};
 
 /// What sixteen points see of a light with nothing in the way, each a bit.
@@ -103,7 +103,7 @@ pub(super) struct Grades {
 #[inline(always)]
 pub(super) fn grade<S: Simd>(
     simd: S,
-    lobe: &Lobe,
+    lobe: Option<LobeKind>,
     outline: Outline,
     members: &Members<ViewBlock>,
     cells: &[Cell],
@@ -127,7 +127,7 @@ pub(super) fn grade<S: Simd>(
     let (half_x2, half_y2) = ((half_x + lean) * (half_x + lean), half_y * half_y);
     let size2 = half_x2 + half_y2;
     let mut wide = size2.simd_gt(distance2);
-    let sharpness = lobe.sharpness_lanes(members.lanes(simd, CosO));
+    let sharpness = members.lobes(simd, lobe).sharpness(members.lanes(simd, CosO));
     let is_sharp = (sharpness * size2).simd_gt(distance2);
     if is_sharp.any_true() {
         // How far off the highlight's middle the cell begins

@@ -5,7 +5,7 @@ use fearless_simd::{f32x16, prelude::*};
 use super::{LobeKind, Material};
 use crate::context::CompileContext;
 use crate::describe::{ColorParam, NumberParam, table};
-use crate::math::Exponent;
+use crate::math::{Exponent, ExponentLanes};
 use crate::texture::Params;
 
 table! {
@@ -79,10 +79,10 @@ impl BlinnPhongLobe {
         2.0 * self.half_exponent.value()
     }
 
-    /// [`eval`](Self::eval) in so many times sixteen lanes: the same bits.
+    /// [`eval`](Self::eval) in so many times sixteen lanes, each with half its exponent: the same bits.
     #[inline(always)]
     pub(crate) fn eval_lanes<S: Simd, const N: usize>(
-        &self,
+        half_exponents: &ExponentLanes,
         mut cos_i: [f32x16<S>; N],
         cos_o: f32x16<S>,
         cos_io: [f32x16<S>; N],
@@ -94,7 +94,7 @@ impl BlinnPhongLobe {
             *base = (sum * sum) / length2;
             *base = base.simd_lt(one).select(*base, one);
         }
-        let mut powers = self.half_exponent.pow_lanes(cos_i);
+        let mut powers = half_exponents.pow_lanes(cos_i);
         for (power, cos_io) in powers.iter_mut().zip(cos_io) {
             *power = (cos_io * 2.0 + 2.0).simd_gt(zero).select(*power, zero);
         }

@@ -2,14 +2,14 @@
 
 mod blinn_phong;
 mod highlight;
+mod lobe_lanes;
 mod moments;
 mod phong;
 mod shading_point;
 
-use fearless_simd::{f32x16, prelude::*};
-
 pub use blinn_phong::{BlinnPhongDesc, BlinnPhongLobe};
 pub(crate) use highlight::Highlight;
+pub(crate) use lobe_lanes::LobeLanes;
 pub(crate) use moments::{Colors, MOMENTS, Moments};
 pub use phong::{PhongDesc, PhongLobe};
 pub(crate) use shading_point::ShadingPoint;
@@ -42,7 +42,7 @@ impl MaterialDesc {
 }
 
 /// The shape of a highlight.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum LobeKind {
     /// Around the mirror direction.
     Phong,
@@ -217,26 +217,24 @@ impl Lobe {
         Moments([cosine, if matches!(self, Lobe::None) { 0.0 } else { weight * self.eval(cos_i, cos_o, cos_io) }])
     }
 
-    /// How many moments are not always 0.
+    /// Its kind, if there is one.
     #[inline(always)]
-    pub(crate) fn moment_count(&self) -> usize {
-        if matches!(self, Lobe::None) { 1 } else { MOMENTS }
+    pub(crate) fn kind(&self) -> Option<LobeKind> {
+        match self {
+            Lobe::None => None,
+            Lobe::Phong(_) => Some(LobeKind::Phong),
+            Lobe::BlinnPhong(_) => Some(LobeKind::BlinnPhong),
+        }
     }
 
-    /// [`moments`](Self::moments) in lanes: the same bits.
+    /// Its exponent; 0 if there is none.
     #[inline(always)]
-    pub(crate) fn moments_lanes<S: Simd, const N: usize>(
-        &self,
-        cos_i: [f32x16<S>; N],
-        cos_o: f32x16<S>,
-        cos_io: [f32x16<S>; N],
-        weight: [f32x16<S>; N],
-    ) -> [[f32x16<S>; N]; MOMENTS] {
-        let times = |v: [f32x16<S>; N]| std::array::from_fn(|i| v[i] * weight[i]);
-        if matches!(self, Lobe::None) {
-            return [times(cos_i), [cos_o.token().splat_f32x16(0.0); N]];
+    pub(crate) fn shininess(&self) -> f32 {
+        match self {
+            Lobe::None => 0.0,
+            Lobe::Phong(lobe) => lobe.exponent(),
+            Lobe::BlinnPhong(lobe) => lobe.exponent(),
         }
-        [times(cos_i), times(self.eval_lanes(cos_i, cos_o, cos_io))]
     }
 
     /// What it is, at most, where the light is off the mirror's direction by these angles at least and at most, and
@@ -261,32 +259,6 @@ impl Lobe {
                 let k = 1.0 / (2.0 * half(apart())).max(1e-3);
                 Highlight::of_power(lobe.exponent(), at, half(nearest), sin, [k, 2.0 * k + 3.0 * k * k])
             }
-        }
-    }
-
-    /// [`sharpness`](Self::sharpness) in lanes.
-    #[inline(always)]
-    pub(crate) fn sharpness_lanes<S: Simd>(&self, cos_o: f32x16<S>) -> f32x16<S> {
-        let simd = cos_o.token();
-        match self {
-            Lobe::None => simd.splat_f32x16(0.0),
-            Lobe::Phong(lobe) => simd.splat_f32x16(0.5 * lobe.exponent()),
-            Lobe::BlinnPhong(lobe) => 0.125 * lobe.exponent() / (cos_o * cos_o).max(simd.splat_f32x16(0.01)),
-        }
-    }
-
-    /// [`eval`](Self::eval) in so many times sixteen lanes: the same bits.
-    #[inline(always)]
-    pub(crate) fn eval_lanes<S: Simd, const N: usize>(
-        &self,
-        cos_i: [f32x16<S>; N],
-        cos_o: f32x16<S>,
-        cos_io: [f32x16<S>; N],
-    ) -> [f32x16<S>; N] {
-        match self {
-            Lobe::None => [cos_o.token().splat_f32x16(0.0); N],
-            Lobe::Phong(lobe) => lobe.eval_lanes(cos_i, cos_o, cos_io),
-            Lobe::BlinnPhong(lobe) => lobe.eval_lanes(cos_i, cos_o, cos_io),
         }
     }
 }

@@ -5,7 +5,7 @@ use fearless_simd::{f32x16, prelude::*};
 use super::{LobeKind, Material};
 use crate::context::CompileContext;
 use crate::describe::{ColorParam, NumberParam, table};
-use crate::math::Exponent;
+use crate::math::{Exponent, ExponentLanes};
 use crate::texture::Params;
 
 table! {
@@ -65,10 +65,10 @@ impl PhongLobe {
         self.exponent.value()
     }
 
-    /// [`eval`](Self::eval) in so many times sixteen lanes: the same bits.
+    /// [`eval`](Self::eval) in so many times sixteen lanes, each with its exponent: the same bits.
     #[inline(always)]
     pub(crate) fn eval_lanes<S: Simd, const N: usize>(
-        &self,
+        exponents: &ExponentLanes,
         mut cos_i: [f32x16<S>; N],
         cos_o: f32x16<S>,
         cos_io: [f32x16<S>; N],
@@ -79,6 +79,6 @@ impl PhongLobe {
             *base = base.simd_lt(one).select(*base, one);
             *base = base.simd_gt(zero).select(*base, zero);
         }
-        self.exponent.pow_lanes(cos_i)
+        exponents.pow_lanes(cos_i)
     }
 }

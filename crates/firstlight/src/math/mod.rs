@@ -16,7 +16,7 @@ pub(crate) use arc::{Arc, DirectionCone};
 pub(crate) use frame::Axes;
 pub(crate) use lanes::{Vec3x16, dispatch_wide, least_and_most, only, sum_of_runs, total};
 pub(crate) use origin::{origin_for, origin_of_view};
-pub(crate) use pow::Exponent;
+pub(crate) use pow::{Exponent, ExponentLanes};
 pub(crate) use ray::{DRay, ErrorBound, Facet, LightEnd, Ray};
 pub use ray::{ShadowRay, WorldRay};
 pub(crate) use roots::{bracketed, depressed_cubic};

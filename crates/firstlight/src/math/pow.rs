@@ -3,7 +3,8 @@
 //! A whole exponent is a chain of multiplications. Any other is 2^(y log2 x) by two short polynomials: only + - x / and
 //! moves of bits, so that every processor agrees. `pxfm` is as exact, but scalar: 11 ns a sample is too slow here.
 
-use fearless_simd::{f32x16, prelude::*};
+use arrayvec::ArrayVec;
+use fearless_simd::{f32x16, mask32x16, prelude::*};
 
 use super::LANES;
 
@@ -88,6 +89,83 @@ impl Exponent {
                 x
             }
         }
+    }
+}
+
+/// An exponent for each of sixteen lanes, made ready once for a batch.
+#[derive(Clone, Debug)]
+pub struct ExponentLanes {
+    values: [f32; LANES],
+    /// The exponent of all lanes, if they have the same.
+    same: Option<Exponent>,
+    /// Of whole exponents, and of those that are a half more: which lanes have each bit, from the lowest up.
+    bits: ArrayVec<u16, 17>,
+    /// Which lanes have an exponent that is a half more than a whole one, and which any other.
+    halves: u16,
+    reals: u16,
+}
+
+impl ExponentLanes {
+    /// `values`: finite, 0 or more.
+    #[inline]
+    pub fn new(values: [f32; LANES]) -> Self {
+        let mut lanes = ExponentLanes { values, same: None, bits: ArrayVec::new(), halves: 0, reals: 0 };
+        if values == [values[0]; LANES] {
+            lanes.same = Some(Exponent::new(values[0]));
+            return lanes;
+        }
+        let mut wholes = [0; LANES];
+        for (lane, (whole, y)) in wholes.iter_mut().zip(values).enumerate() {
+            match Exponent::new(y).kind {
+                Kind::Whole(n) => *whole = n,
+                Kind::Half(n) => (*whole, lanes.halves) = (n, lanes.halves | 1 << lane),
+                Kind::Real(_) => lanes.reals |= 1 << lane,
+            }
+        }
+        while wholes != [0; LANES] {
+            let mut bits = 0;
+            for (lane, whole) in wholes.iter_mut().enumerate() {
+                bits |= ((*whole & 1) as u16) << lane;
+                *whole >>= 1;
+            }
+            lanes.bits.push(bits);
+        }
+        lanes
+    }
+
+    /// y, lane by lane.
+    #[inline(always)]
+    pub fn values(&self) -> &[f32; LANES] {
+        &self.values
+    }
+
+    /// [`Exponent::pow`] in so many times sixteen lanes, each lane with its exponent: the same bits.
+    #[inline(always)]
+    pub fn pow_lanes<S: Simd, const N: usize>(&self, x: [f32x16<S>; N]) -> [f32x16<S>; N] {
+        if let Some(same) = self.same {
+            return same.pow_lanes(x);
+        }
+        let simd = x[0].token();
+        let mask = |bits: u16| mask32x16::from_bitmask(simd, bits.into());
+        let (mut results, mut squares) = ([simd.splat_f32x16(1.0); N], x);
+        for bits in &self.bits {
+            for (result, square) in results.iter_mut().zip(&mut squares) {
+                *result = mask(*bits).select(*result * *square, *result);
+                *square *= *square;
+            }
+        }
+        for (result, x) in results.iter_mut().zip(x) {
+            *result = mask(self.halves).select(*result * x.sqrt(), *result);
+            if self.reals != 0 {
+                let (mut lanes, mut bases) = (self.values, [0.0; LANES]);
+                x.store_slice(&mut bases);
+                for (lane, base) in lanes.iter_mut().zip(bases) {
+                    *lane = exp2(*lane * log2(base));
+                }
+                *result = mask(self.reals).select(f32x16::simd_from(simd, lanes), *result);
+            }
+        }
+        results
     }
 }
 
@@ -183,6 +261,23 @@ mod tests {
         xs.extend((0..2_000).map(|i| 1.0 - (i as f32) * 1e-7));
         xs.resize(xs.len().next_multiple_of(16), 0.25);
         xs
+    }
+
+    #[test]
+    fn lanes_with_exponents_of_their_own_have_the_bits_of_one() {
+        let mixed = [0.0, 0.5, 1.0, 1.5, 2.0, 8.0, 11.0, 22.5, 100.25, 2000.0, 2000.5, 65536.0, 1e6, 3.0, 7.75, 64.0];
+        for values in [mixed, [3.0; LANES], std::array::from_fn(|lane| lane as f32)] {
+            let exponents = ExponentLanes::new(values);
+            for bases in bases().chunks_exact(LANES) {
+                let of_lanes: [f32; LANES] = dispatch!(Level::new(), simd => {
+                    let [power] = exponents.pow_lanes([f32x16::from_slice(simd, bases)]);
+                    power.to_array()
+                });
+                for ((x, y), power) in bases.iter().zip(values).zip(of_lanes) {
+                    assert_eq!(power.to_bits(), Exponent::new(y).pow(*x).to_bits(), "{x}^{y}");
+                }
+            }
+        }
     }
 
     #[test]

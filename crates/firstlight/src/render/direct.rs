@@ -20,7 +20,7 @@ use crate::color::{DisplaySteps, Rgb};
 use crate::ids::LightId;
 use crate::integrate::{Arrived, Asked, Emitter, Evaluator, Illumination, Obstacles, TOLERANCE};
 use crate::light::{Area, Extent, LightTree};
-use crate::material::{Lobe, Moments, ShadingPoint};
+use crate::material::{LobeKind, Moments, ShadingPoint};
 use crate::scene::Scene;
 use crate::visibility::{OccluderList, ShadowView, VisibilityResolver};
 pub(super) use sampled::Sampled;
@@ -108,10 +108,10 @@ impl LightEstimate {
     }
 }
 
-/// Queries for one light at points of one lobe.
+/// Queries for one light at points whose lobes are of one kind.
 struct Group<'p> {
     light: usize,
-    lobe: Lobe,
+    lobe: Option<LobeKind>,
     points: &'p [ShadingPoint],
     queries: &'p [LightQuery],
 }
@@ -134,9 +134,8 @@ pub(crate) struct DirectLighting<'a> {
     pub(super) evaluator: Evaluator,
     /// In display steps: how far one light may be wrong at a point.
     allowed: f32,
-    lobes: Vec<Lobe>,
-    /// The numbers of queries, by lobe, light, and whether occluders count.
-    order: Vec<((usize, u32, bool), u32)>,
+    /// The numbers of queries, by kind of lobe, light, and whether occluders count.
+    order: Vec<((Option<LobeKind>, u32, bool), u32)>,
     points: Vec<ShadingPoint>,
     arrived: Vec<Arrived>,
     /// Of a group: those whose light listed shapes alone may occlude.
@@ -159,7 +158,6 @@ impl<'a> DirectLighting<'a> {
             level,
             evaluator: Evaluator::default(),
             allowed: lights.allowed,
-            lobes: Vec::new(),
             order: Vec::new(),
             points: Vec::new(),
             arrived: Vec::new(),
@@ -301,23 +299,18 @@ impl<'a> DirectLighting<'a> {
         let scene = self.scene;
         estimates.clear();
         estimates.resize(queries.len(), LightEstimate::NOTHING);
-        // Sort them by lobe, light and shadows
+        // Sort them by kind of lobe, light and shadows
         let mut order = std::mem::take(&mut self.order);
-        self.lobes.clear();
         order.clear();
         for (k, query) in queries.iter().enumerate() {
             let point = &points[query.point as usize];
             if !self.is_linked(query.light as usize, point) {
                 continue;
             }
-            let lobe = self.lobes.iter().position(|lobe| *lobe == point.bsdf.lobe).unwrap_or_else(|| {
-                self.lobes.push(point.bsdf.lobe);
-                self.lobes.len() - 1
-            });
             let shadows = scene.lights[query.light as usize].shadows
                 && point.receives_shadow
                 && query.occlusion != Occlusion::None;
-            order.push(((lobe, query.light, shadows), k as u32));
+            order.push(((point.bsdf.lobe.kind(), query.light, shadows), k as u32));
         }
         order.sort_unstable();
         let mut members = Vec::new();
@@ -326,7 +319,7 @@ impl<'a> DirectLighting<'a> {
             let light = light as usize;
             members.clear();
             members.extend(group.iter().map(|(_, k)| *k));
-            let of = Group { light, lobe: self.lobes[lobe], points, queries };
+            let of = Group { light, lobe, points, queries };
             match scene.lights[light].extent() {
                 Extent::Point => {
                     for k in &members {
@@ -444,7 +437,7 @@ impl<'a> DirectLighting<'a> {
         self.arrived.clear();
         let near = (occlusion == Occlusion::Gathered).then_some(&self.near);
         let shadows = occlusion != Occlusion::None;
-        let Some(asked) = self.lights.asked(of.light, &of.lobe, shadows) else { unreachable!("it has an area") };
+        let Some(asked) = self.lights.asked(of.light, of.lobe, shadows) else { unreachable!("it has an area") };
         let asked = Asked { near, sums, allowed: self.allowed, ..asked };
         self.evaluator.evaluate(self.level, &asked, &self.points, &mut self.arrived);
     }

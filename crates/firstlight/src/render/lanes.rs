@@ -13,7 +13,7 @@ use crate::accel::RayPacket16;
 use crate::accel::dispatch_all;
 use crate::ids::LightId;
 use crate::light::{Area, Extent, MIN_DISTANCE2, Points};
-use crate::material::{MOMENTS, ShadingPoint};
+use crate::material::{LobeLanes, MOMENTS, ShadingPoint};
 use crate::math::{LANES, LaneSum, LightEnd, ShadowRay, Vec3, Vec3x16};
 use crate::scene::{Geometry, Listed, Opacity, Scene, ShadowRays};
 use crate::shape::{DiskShadow, ParallelogramShadow, PlaneSide, SphereShadow};
@@ -102,6 +102,7 @@ fn gather_area<S: Simd>(
     let floor = area.floor(point.p, point.error, point.horizon);
     let least = if one_horizon { floor } else { 0.0 };
     let cos_o = point.ns.dot(point.wo);
+    let lobe = LobeLanes::of(&point.bsdf.lobe);
     let mut sums = [zero; MOMENTS];
     for (index, block) in points.blocks.iter().enumerate() {
         let q = block.lanes(simd);
@@ -148,9 +149,7 @@ fn gather_area<S: Simd>(
         let weight = area.weight_lanes(points, index, l, inverse_distance);
         let cos_i = height * inverse_distance;
         let cos_io = wo.dot(l) * inverse_distance;
-        for (sum, [moment]) in
-            sums.iter_mut().zip(point.bsdf.lobe.moments_lanes([cos_i], splat(cos_o), [cos_io], [weight]))
-        {
+        for (sum, [moment]) in sums.iter_mut().zip(lobe.moments([cos_i], splat(cos_o), [cos_io], [weight])) {
             *sum += lit.select(moment, zero);
         }
     }

@@ -5,7 +5,7 @@ use crate::color::{DisplaySteps, Rgb};
 use crate::ids::LightId;
 use crate::integrate::{Asked, Emitter, Obstacles, TOLERANCE};
 use crate::light::{FEW_LIGHTS, Light, LightTree};
-use crate::material::Lobe;
+use crate::material::LobeKind;
 use crate::scene::Scene;
 use crate::visibility::Target;
 
@@ -66,7 +66,7 @@ impl<'a> Lights<'a> {
 
     /// Light `index` as points of one lobe are evaluated for it, with or without what occludes it; `None` if it has no
     /// area.
-    pub fn asked<'b>(&'b self, index: usize, lobe: &'b Lobe, shadows: bool) -> Option<Asked<'b>> {
+    pub fn asked<'b>(&'b self, index: usize, lobe: Option<LobeKind>, shadows: bool) -> Option<Asked<'b>> {
         self.emitters[index].as_ref().map(|emitter| Asked {
             emitter,
             obstacles: &self.obstacles[index],

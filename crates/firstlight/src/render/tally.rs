@@ -15,7 +15,7 @@ use super::lanes::PointObstacles;
 use super::leaves::{Halved, Leaves};
 use crate::accel::dispatch_all;
 use crate::light::{Area, FineCell, MIN_DISTANCE2, Points};
-use crate::material::{Lobe, MOMENTS, Moments, ShadingPoint};
+use crate::material::{LobeLanes, MOMENTS, Moments, ShadingPoint};
 use crate::math::{LANES, Vec3x16, only, total};
 use crate::visibility::ShadowView;
 
@@ -100,7 +100,7 @@ impl Tally {
         dispatch_all!(asker.level, simd => {
             let place = PlaceLanes::new(simd, asker.area, point);
             for (block, at) in rung.cells.iter().enumerate() {
-                let answers = place.ask(simd, asker.area, &rung.points, block, &point.bsdf.lobe, &obstacles);
+                let answers = place.ask(simd, asker.area, &rung.points, block, &obstacles);
                 self.blocks.push(BlockAnswers { at: *at, ..answers });
             }
         });
@@ -124,7 +124,7 @@ impl Tally {
             let mut surprises = [simd.splat_f32x16(0.0); MOMENTS];
             for (k, block) in halved.blocks.iter().enumerate() {
                 let from = rung.block_of(k, block);
-                let answers = place.ask(simd, asker.area, &rung.points, from, &point.bsdf.lobe, &obstacles);
+                let answers = place.ask(simd, asker.area, &rung.points, from, &obstacles);
                 let new = BlockAnswers { at: rung.cells[from], ..answers };
                 let old = self.blocks[block.halves[0] as usize];
                 if block.is_away {
@@ -236,7 +236,7 @@ pub(super) fn would_send(
         let place = PlaceLanes::new(simd, asker.area, point);
         let points = asker.area.points_at(places);
         for block in 0..points.blocks.len() {
-            let answers = place.ask(simd, asker.area, &points, block, &point.bsdf.lobe, &PointObstacles::default());
+            let answers = place.ask(simd, asker.area, &points, block, &PointObstacles::default());
             for lane in 0..LANES {
                 sent.push(answers.moments(lane));
             }
@@ -253,6 +253,7 @@ struct PlaceLanes<S: Simd> {
     horizon: Vec3x16<S>,
     floor: f32x16<S>,
     cos_o: f32x16<S>,
+    lobe: LobeLanes,
 }
 
 impl<S: Simd> PlaceLanes<S> {
@@ -265,20 +266,13 @@ impl<S: Simd> PlaceLanes<S> {
             horizon: Vec3x16::splat(simd, point.horizon),
             floor: simd.splat_f32x16(area.floor(point.p, point.error, point.horizon)),
             cos_o: simd.splat_f32x16(point.ns.dot(point.wo)),
+            lobe: LobeLanes::of(&point.bsdf.lobe),
         }
     }
 
     /// What sixteen points of an area light send, wherever they are.
     #[inline(always)]
-    fn ask(
-        &self,
-        simd: S,
-        area: &Area,
-        points: &Points,
-        block: usize,
-        lobe: &Lobe,
-        obstacles: &PointObstacles,
-    ) -> BlockAnswers {
+    fn ask(&self, simd: S, area: &Area, points: &Points, block: usize, obstacles: &PointObstacles) -> BlockAnswers {
         let zero = simd.splat_f32x16(0.0);
         let q = points.blocks[block].lanes(simd);
         let Vec3x16 { x, y, z } = self.p;
@@ -310,7 +304,7 @@ impl<S: Simd> PlaceLanes<S> {
         }
         answers.hides = answers.sends & !(lit.to_bitmask() as u16);
         let (cos_i, cos_io) = (height * inverse_distance, self.wo.dot(l) * inverse_distance);
-        let moments = lobe.moments_lanes([cos_i], self.cos_o, [cos_io], [weight]);
+        let moments = self.lobe.moments([cos_i], self.cos_o, [cos_io], [weight]);
         for (sent, [moment]) in answers.sent.iter_mut().zip(moments) {
             is_above.select(moment, zero).store_slice(sent);
         }
