@@ -108,6 +108,9 @@ impl LightEstimate {
     }
 }
 
+/// The kind of lobe and the light of a query, and whether occluders count.
+type GroupKey = (Option<LobeKind>, u32, bool);
+
 /// Queries for one light at points whose lobes are of one kind.
 struct Group<'p> {
     light: usize,
@@ -135,7 +138,7 @@ pub(crate) struct DirectLighting<'a> {
     /// In display steps: how far one light may be wrong at a point.
     allowed: f32,
     /// The numbers of queries, by kind of lobe, light, and whether occluders count.
-    order: Vec<((Option<LobeKind>, u32, bool), u32)>,
+    order: Vec<(GroupKey, u32)>,
     points: Vec<ShadingPoint>,
     arrived: Vec<Arrived>,
     /// Of a group: those whose light listed shapes alone may occlude.
