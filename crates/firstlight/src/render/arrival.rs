@@ -7,10 +7,8 @@ use fearless_simd::Level;
 
 use super::Counts;
 use super::change::{Arrival, Change, change, horizon_change, unseen};
-use super::ladder::Asker as LadderAsker;
 use super::lights::Lights;
-use super::tally::Tally;
-use super::together::Together;
+use super::pooled::{LightSampler, PooledVisibility};
 use crate::accel::Aabb;
 use crate::color::{DisplaySteps, Rgb};
 use crate::ids::LightId;
@@ -72,8 +70,6 @@ pub(crate) struct Arrivals<'a> {
     pub(super) occluders: OccluderList,
     /// Views that are not used any more.
     views: Vec<ShadowView>,
-    /// Tallies as well.
-    tallies: Vec<Tally>,
     indices: Vec<u32>,
     /// In display steps: how far one light may be wrong at a place.
     allowed: f32,
@@ -99,7 +95,6 @@ impl<'a> Arrivals<'a> {
             settler: Settler::default(),
             occluders: OccluderList::default(),
             views: Vec::new(),
-            tallies: Vec::new(),
             indices: Vec::new(),
             allowed: lights.allowed,
         }
@@ -435,41 +430,19 @@ impl<'a> Arrivals<'a> {
         });
     }
 
-    /// Has rays that are asked together ask past what is in `view`.
-    pub fn ask_behind(
-        &mut self,
-        together: &mut Together,
-        index: usize,
-        place: &ArrivalPlace,
-        view: ShadowView,
-        counts: &mut Counts,
-    ) {
-        match &self.lights.emitters[index] {
-            Some(_) => together.behind(place, view),
-            // One ray tells
-            None => {
-                let sums = self.of_single(index, &ArrivalPlace { lit: false, ..*place });
-                counts.points += 1;
-                together.know(place, &sums);
-                self.keep(view);
-            }
-        }
-    }
-
     /// What arrives at one point, past what is in the way.
     fn one(&mut self, index: usize, place: &ArrivalPlace, counts: &mut Counts) -> Moments {
-        let Some(view) = self.settle(index, place.si, counts) else { return Moments::default() };
-        let mut together = Together::new(index, 1, place.share, 0, Rgb::BLACK);
-        together.behind(place, view);
-        together.settle(self, counts).sums
+        let mut pooled = PooledVisibility::new(index, 1, place.share, 0, Rgb::BLACK, usize::MAX);
+        pooled.add_sampled(place, self, counts);
+        pooled.estimate(self, counts).moments
     }
 
-    /// Area light `index`, as its points are asked for.
-    pub fn asker(&self, index: usize) -> LadderAsker<'a> {
+    /// Area light `index`, as it is sampled.
+    pub fn sampler(&self, index: usize) -> LightSampler<'a> {
         let (scene, level) = (self.scene, self.level);
         let area = scene.lights[index].area().expect("lights that are integrated have an area");
-        let (target, ladder) = (&self.lights.targets[index], &self.lights.ladders[index]);
-        LadderAsker { scene, level, area, target, ladder }
+        let (target, sets) = (&self.lights.targets[index], &self.lights.point_sets[index]);
+        LightSampler { scene, level, area, target, sets }
     }
 
     /// What all points of area light `index` together stand for.
@@ -503,16 +476,6 @@ impl<'a> Arrivals<'a> {
     /// Takes a view back, for its memory.
     pub fn keep(&mut self, view: ShadowView) {
         self.views.push(view);
-    }
-
-    /// An empty tally.
-    pub fn tally(&mut self) -> Tally {
-        self.tallies.pop().unwrap_or_default()
-    }
-
-    /// Takes a tally back, for its memory.
-    pub fn keep_tally(&mut self, tally: Tally) {
-        self.tallies.push(tally);
     }
 
     /// What arrives at each place, past anything, if that has a closed form.

@@ -27,17 +27,18 @@ use super::grid::{Block, Grid};
 use super::hits::{PixelHits, PixelRays};
 use super::light_queue::{Answer, LightQueue, LitPlace, Request, Sight};
 use super::many::Many;
+use super::pooled::{PooledVisibility, salt};
 use super::resolve::{LightTerm, PixelTerms, ScaledTerm, Term, TermSums};
 use super::solo::{self, Candidate};
 use super::square::Square;
 use super::tile::Tile;
-use super::together::{Together, salt};
 use super::{AaMode, Counts, Heat};
 use crate::color::Rgb;
 use crate::image::Buffer;
 use crate::integrate::TOLERANCE;
 use crate::material::{Bsdf, MOMENTS, Moments};
 use crate::scene::Scene;
+use crate::visibility::Visibility;
 use behind::Behind;
 
 /// So many fragments, of one light each, ask at all of their rays at once.
@@ -555,7 +556,7 @@ impl<'a> Cells<'a> {
             self.sums.work[index] += Heat::PLACE * fragment.count() as f32;
             let at = self.at(index);
             let term = &mut self.terms[fragment.pixel as usize * scene.lights.len() + *light as usize];
-            // Rays of which no batch knows what they see ask points of the light together
+            // Rays of which no batch knows what they see sample the light together
             let mut unknown = None;
             for (request, answer) in answers.by_ref().take(fragment.count()) {
                 let place = &self.places[request.place as usize];
@@ -566,14 +567,16 @@ impl<'a> Cells<'a> {
                 let salt = salt(at, place.surface);
                 let (light, rays, share) = (*light as usize, fragment.count(), fragment.share);
                 let arrivals = &mut self.lights.arrivals;
-                let new = || Together::new(light, rays, share, salt, Rgb::BLACK).of_lights(asked, arrivals);
-                let together = unknown.get_or_insert_with(new);
-                together.ask_points(arrivals, &place.surface(), &place.bsdf, counts);
+                let pooled =
+                    unknown.get_or_insert_with(|| PooledVisibility::new(light, rays, share, salt, Rgb::BLACK, asked));
+                let si = place.surface();
+                counts.settled.visibility[Visibility::Mask as usize] += 1;
+                pooled.add_sampled(&arrivals.place(light, &si, &place.bsdf), arrivals, counts);
             }
-            if let Some(together) = unknown {
+            if let Some(pooled) = unknown {
                 go_on()?;
                 let before = counts.work();
-                *term += together.finish(&mut self.lights.arrivals, counts).terms;
+                *term += pooled.estimate(&mut self.lights.arrivals, counts).terms;
                 self.sums.work[index] += counts.work() - before;
             }
         }

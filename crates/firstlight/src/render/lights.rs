@@ -1,7 +1,7 @@
 //! The lights of a scene as they are asked: what all threads share.
 
-use super::ladder::Ladder;
 use super::many::FEW;
+use super::pooled::LightPointSets;
 use crate::color::{DisplaySteps, Rgb};
 use crate::ids::LightId;
 use crate::integrate::{Asked, Emitter, Obstacles, TOLERANCE};
@@ -23,7 +23,7 @@ pub(crate) struct Lights<'a> {
     /// The lights as shafts lead to them.
     pub targets: Vec<Target>,
     /// The points of those that are integrated.
-    pub ladders: Vec<Ladder>,
+    pub point_sets: Vec<LightPointSets>,
     /// What may stand in the way of those that have an area.
     pub obstacles: Vec<Obstacles<'a>>,
     /// In display steps: how far one light may be wrong at a point that stands for a pixel; and the value that many
@@ -42,7 +42,7 @@ impl<'a> Lights<'a> {
         };
         let scales = scene.lights.iter().zip(&emitters).map(scale).collect();
         let targets = Target::of_all(scene);
-        let ladders = emitters.iter().map(|_| Ladder::default()).collect();
+        let point_sets = emitters.iter().map(|_| LightPointSets::default()).collect();
         let tree = (scene.lights.len() > FEW)
             .then(|| LightTree::new(&scene.lights, &scene.geometry.links.classes(scene.lights.len())));
         let obstacles = scene.lights.iter().enumerate().map(|(index, light)| {
@@ -54,7 +54,7 @@ impl<'a> Lights<'a> {
         let integrated = emitters.iter().flatten().count();
         let allowed = TOLERANCE.point / (integrated.max(1) as f32).sqrt();
         let least = steps.value_of(allowed);
-        Lights { emitters, integrated, scales, steps, tree, targets, ladders, obstacles, allowed, least }
+        Lights { emitters, integrated, scales, steps, tree, targets, point_sets, obstacles, allowed, least }
     }
 
     /// Whether anything in trees may be in the way of light `index`, but for planes that are told row by row.

@@ -9,8 +9,6 @@
 //! [`cell`](cell/index.html) integrates lights and lights a surface once where that is enough; all else is as above.
 
 mod arrival;
-mod asking;
-mod beams;
 mod cell;
 mod centers;
 mod change;
@@ -26,18 +24,16 @@ pub(crate) mod given;
 mod grid;
 mod heat;
 mod hits;
-mod ladder;
 mod lanes;
-mod leaves;
 mod light_queue;
 mod lights;
 mod many;
 mod masks;
 mod motion;
-mod packets;
 mod passes;
 pub(crate) mod pixel;
 mod plain;
+mod pooled;
 mod receipt;
 mod receipt_settings;
 mod relight;
@@ -47,9 +43,7 @@ mod shafts;
 mod single;
 mod solo;
 mod square;
-mod tally;
 mod tile;
-mod together;
 
 use std::num::NonZeroUsize;
 use std::ops::ControlFlow;

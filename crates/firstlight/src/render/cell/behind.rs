@@ -7,12 +7,13 @@ use std::ops::{ControlFlow, Range};
 use super::{Cells, PIXELS, Pixel, Wanted};
 use crate::color::Rgb;
 use crate::ids::LightId;
+use crate::integrate::TOLERANCE;
 use crate::material::Moments;
-use crate::render::arrival::{ArrivalPlace, Arrivals, Past};
+use crate::render::arrival::{Arrivals, Past};
 use crate::render::fragment::{Fragment, Fragments};
 use crate::render::light_queue::{LitPlace, Sight};
+use crate::render::pooled::{PooledLight, PooledVisibility, salt};
 use crate::render::resolve::LightTerm;
-use crate::render::together::{Outcome, Together, salt};
 use crate::render::{AaMode, Counts};
 use crate::scene::Scene;
 use crate::visibility::{ShadowView, Viewpoint, Visibility};
@@ -248,15 +249,15 @@ impl Cells<'_> {
             };
             let wanted: Vec<usize> = (0..block.fragments.len()).filter(is_wanted).collect();
             let before = counts.work();
-            let ask = |k: &usize| self.together(&block, *k, light, false, sights, counts);
-            let mut all: Vec<Together> = wanted.iter().map(ask).collect();
-            Together::tell(&mut all, &mut self.lights.arrivals, counts);
+            let pool = |k: &usize| self.pool(&block, *k, light, false, sights, counts);
+            let mut all: Vec<PooledVisibility> = wanted.iter().map(pool).collect();
+            PooledVisibility::resolve(&mut all, &mut self.lights.arrivals, counts);
             let each = (counts.work() - before) / wanted.len().max(1) as f32;
-            for (k, together) in wanted.into_iter().zip(all) {
+            for (k, pooled) in wanted.into_iter().zip(all) {
                 let fragment = block.fragments[k].fragment as usize;
                 let index = self.pixel_of(fragment);
                 let before = counts.work();
-                let terms = together.settle(&mut self.lights.arrivals, counts).terms;
+                let terms = pooled.estimate(&mut self.lights.arrivals, counts).terms;
                 self.sums.work[index] += each + counts.work() - before;
                 self.behind.known[fragment * lights + light] = FragmentSight::Settled(terms);
             }
@@ -346,7 +347,7 @@ impl Cells<'_> {
     }
 
     /// What all rays of a fragment see of a light, ray by ray.
-    pub(super) fn settled(&mut self, fragment: usize, light: usize, counts: &mut Counts) -> Outcome {
+    pub(super) fn settled(&mut self, fragment: usize, light: usize, counts: &mut Counts) -> PooledLight {
         let mut block = std::mem::take(&mut self.behind.block);
         block.clear();
         block.add(self.scene, &self.fragments, fragment);
@@ -355,20 +356,18 @@ impl Cells<'_> {
         sights.open.push(true);
         self.look_for(&block, light, &mut sights, counts);
         let before = counts.work();
-        let mut together = [self.together(&block, 0, light, true, &mut sights, counts)];
-        Together::tell(&mut together, &mut self.lights.arrivals, counts);
-        let [together] = together;
-        let outcome = together.settle(&mut self.lights.arrivals, counts);
+        let pooled = self.pool(&block, 0, light, true, &mut sights, counts);
+        let pooled = pooled.estimate(&mut self.lights.arrivals, counts);
         let index = self.pixel_of(fragment);
         self.sums.work[index] += counts.work() - before;
         sights.views.iter_mut().filter_map(Option::take).for_each(|view| self.lights.arrivals.keep(view));
         self.behind.sights.push(sights);
         self.behind.block = block;
-        outcome
+        pooled
     }
 
-    /// Asks for a light at all rays of a fragment of the block, which may tell what other pixels see.
-    fn together(
+    /// A light at all rays of a fragment of the block, whose pixel may be interpolated for others.
+    fn pool(
         &mut self,
         block: &RayBlock,
         k: usize,
@@ -376,7 +375,7 @@ impl Cells<'_> {
         is_node: bool,
         sights: &mut RaySights,
         counts: &mut Counts,
-    ) -> Together {
+    ) -> PooledVisibility {
         let of = block.fragments[k];
         let others = self.others(of.fragment as usize, light);
         let Fragment { surface, share, .. } = self.fragments.all[of.fragment as usize];
@@ -385,15 +384,12 @@ impl Cells<'_> {
         let asked = self.count_lights(of.fragment as usize, |sight| {
             !matches!(sight, FragmentSight::Told | FragmentSight::Lit | FragmentSight::Dark)
         });
-        let together = Together::new(light, of.count as usize, share, salt, others);
-        let mut together = together.of_lights(asked, &self.lights.arrivals);
-        if is_node {
-            together = together.of_node();
-        }
+        let share = if is_node { share * TOLERANCE.node_pixels } else { share };
+        let mut pooled = PooledVisibility::new(light, of.count as usize, share, salt, others, asked);
         for (place, k) in block.places[of.rays()].iter().zip(of.rays()) {
-            sights.settle(k, place, &mut self.lights.arrivals, light, share, &mut together, counts);
+            sights.settle(k, place, &mut self.lights.arrivals, light, &mut pooled, counts);
         }
-        together
+        pooled
     }
 
     /// Finds out what each ray of the block sees of a light.
@@ -481,28 +477,26 @@ impl RaySights {
     }
 
     /// Adds what ray `k` of the block sees of a light to that of the others of its fragment.
-    #[allow(clippy::too_many_arguments, reason = "a ray of a fragment, a light, and where it goes")]
     fn settle(
         &mut self,
         k: usize,
         place: &LitPlace,
         arrivals: &mut Arrivals,
         light: usize,
-        share: f32,
-        together: &mut Together,
+        pooled: &mut PooledVisibility,
         counts: &mut Counts,
     ) {
         let (si, bsdf) = (&place.surface(), &place.bsdf);
         match self.sights[k] {
-            RaySight::Dark => together.dark(&arrivals.place(light, si, bsdf)),
-            RaySight::BelowHorizon => together.know(&arrivals.place(light, si, bsdf), &Moments::default()),
-            sight @ (RaySight::Lit | RaySight::Clear | RaySight::Near) => {
-                together.ask(arrivals, si, bsdf, sight == RaySight::Lit, sight != RaySight::Near, counts);
-            }
-            RaySight::Behind => {
+            RaySight::Dark => pooled.add_known(&arrivals.place(light, si, bsdf), &Moments::default(), Some(0.0)),
+            RaySight::BelowHorizon => pooled.add_known(&arrivals.place(light, si, bsdf), &Moments::default(), None),
+            RaySight::Behind if arrivals.is_integrated(light) => {
                 let view = self.views[k].take().expect("what is behind things has a view");
-                let place = ArrivalPlace { share, lit: true, clear: true, ..arrivals.place(light, si, bsdf) };
-                arrivals.ask_behind(together, light, &place, view, counts);
+                pooled.add_behind(&arrivals.place(light, si, bsdf), view);
+            }
+            sight => {
+                let is_clear = sight == RaySight::Lit || sight == RaySight::Clear;
+                pooled.add(arrivals, si, bsdf, [sight == RaySight::Lit, is_clear], counts);
             }
         }
     }
