@@ -241,7 +241,7 @@ impl Cells<'_> {
         for (light, sights) in sights.iter_mut().enumerate() {
             let is_wanted = |k: &usize| {
                 sights.open[*k]
-                    && sights.is_crowded(&block.fragments[*k])
+                    && sights.is_sampled(&block.fragments[*k])
                     && matches!(
                         self.fragment_sight(block.fragments[*k].fragment as usize, light),
                         FragmentSight::Parted
@@ -471,9 +471,9 @@ impl RaySights {
         }
     }
 
-    /// Whether so much is in the way of some ray of a fragment that points of the light have to be asked.
-    fn is_crowded(&self, fragment: &FragmentRays) -> bool {
-        self.views[fragment.rays()].iter().flatten().any(|view| view.trees)
+    /// Whether some ray of a fragment has to sample the light.
+    fn is_sampled(&self, fragment: &FragmentRays) -> bool {
+        self.views[fragment.rays()].iter().any(Option::is_some)
     }
 
     /// Adds what ray `k` of the block sees of a light to that of the others of its fragment.
