@@ -478,24 +478,6 @@ impl<'a> Arrivals<'a> {
         self.views.push(view);
     }
 
-    /// What arrives at each place, past anything, if that has a closed form.
-    pub fn in_closed_form(
-        &mut self,
-        index: usize,
-        places: &[ArrivalPlace],
-        counts: &mut Counts,
-    ) -> Vec<Option<Moments>> {
-        let mut seen = std::mem::take(&mut self.seen);
-        self.look(index, places, &mut seen, counts);
-        let known = |(_, sighting): &(Change, Sighting)| match sighting {
-            Sighting::Known(sums) => Some(*sums),
-            Sighting::Behind => None,
-        };
-        let found = seen.iter().map(known).collect();
-        self.seen = seen;
-        found
-    }
-
     /// Gathers what of the trees may be in the way of a light: from one point and what lies within `reach` of it, over
     /// which normals turn by `turn`; or from several points.
     pub(super) fn gather(&mut self, index: usize, points: &[Viewpoint], reach: f32, turn: f32) -> Trees {

@@ -13,7 +13,7 @@ mod variance;
 use light_sampler::{FEWEST, MOST_KEPT, SampledReceiver};
 pub(super) use light_sampler::{LightPointSets, LightSampler, Packet};
 use strata::{MOST, MOST_UNIFORM, Strata, StratumSums};
-use variance::{VarianceEstimate, of_edge};
+use variance::VarianceEstimate;
 
 use super::Counts;
 use super::arrival::{ArrivalPlace, Arrivals, Sighting};
@@ -187,7 +187,7 @@ impl PooledVisibility {
             let measure = arrivals.measure(self.light);
             for receiver in receivers {
                 let unoccluded = receiver.unoccluded(measure);
-                let moments = receiver.arriving.unwrap_or_else(|| receiver.sums.arriving(&unoccluded, &fractions));
+                let moments = receiver.sums.arriving(&unoccluded, &fractions);
                 let visible = 1.0 - (receiver.sums.hidden / receiver.sums.sending) as f32;
                 self.receive(&receiver.place(self.each), &moments, (receiver.sums.sending > 0.0).then_some(visible));
                 arrivals.keep(receiver.view);
@@ -197,8 +197,8 @@ impl PooledVisibility {
         self.sum
     }
 
-    /// Samples the light in more and more strata until the error of all rays together is small enough. What the most
-    /// samples do not settle is looked for in closed form. Returns the visible fractions of the moments.
+    /// Samples the light in more and more strata until the error of all rays together is small enough. Returns the
+    /// visible fractions of the moments.
     fn sample(
         &self,
         arrivals: &mut Arrivals,
@@ -217,7 +217,7 @@ impl PooledVisibility {
         let room = (lights as f32 / self.sampled_lights.clamp(1, lights) as f32).sqrt();
         let allowed = arrivals.tolerance_by_chance(self.share) * room;
         let mut strata = Strata::new(sampler, first, receivers, counts);
-        let (mut is_tried, mut is_split) = (false, true);
+        let mut is_split = true;
         loop {
             receivers.iter_mut().enumerate().for_each(|(k, receiver)| receiver.sums = strata.sums(k));
             let pooled = self.pool(receivers, &strata, sampler.measure());
@@ -242,16 +242,6 @@ impl PooledVisibility {
             }
             if is_enough {
                 return pooled.fractions;
-            }
-            // Errors fall as they do at an edge
-            if !is_tried && error.all() * of_edge(MOST as f64) > allowed * of_edge(samples as f64) {
-                is_tried = true;
-                let places: Vec<_> = receivers.iter().map(|one| one.place(self.each)).collect();
-                let known = arrivals.in_closed_form(self.light, &places, counts);
-                receivers.iter_mut().zip(known).for_each(|(one, known)| one.arriving = known);
-                if receivers.iter().all(|one| one.arriving.is_some()) {
-                    return pooled.fractions;
-                }
             }
             // More strata everywhere as long as there is room for more near silhouettes
             let is_raised = !is_sure || error.unmet.max(error.overlooked) > allowed || !strata.is_halved;

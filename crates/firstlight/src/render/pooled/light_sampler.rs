@@ -60,9 +60,8 @@ pub(crate) struct SampledReceiver {
     pub series: usize,
     /// What may occlude the light.
     pub view: ShadowView,
-    /// The unoccluded integral, and what arrives, where they are known in closed form.
+    /// The unoccluded integral, where it is known in closed form.
     pub unoccluded: Option<Moments>,
-    pub arriving: Option<Moments>,
     /// Of its samples.
     pub sums: StratumSums,
 }
@@ -70,8 +69,8 @@ pub(crate) struct SampledReceiver {
 impl SampledReceiver {
     pub fn new(place: &ArrivalPlace, series: usize, view: ShadowView) -> Self {
         let ArrivalPlace { si, lobe, base, scale, reflected, .. } = *place;
-        let (unoccluded, arriving, sums) = (None, None, StratumSums::default());
-        SampledReceiver { si: *si, lobe: *lobe, base, scale, reflected, series, view, unoccluded, arriving, sums }
+        let (unoccluded, sums) = (None, StratumSums::default());
+        SampledReceiver { si: *si, lobe: *lobe, base, scale, reflected, series, view, unoccluded, sums }
     }
 
     /// The receiver as a part of a pixel.

@@ -198,7 +198,7 @@ fn around(seen: &[[u16; 2]], run: usize) -> Vec<bool> {
 
 /// How the error of n stratified points at an edge falls with their number: the edge runs through a root of as many
 /// strata.
-pub(super) fn of_edge(points: f64) -> f32 {
+fn of_edge(points: f64) -> f32 {
     let root = points.max(1e-9).sqrt();
     (1.0 / (root * root.sqrt())) as f32
 }
