@@ -57,6 +57,11 @@ pub(crate) struct Tolerance {
     /// and in radians light that turns by more, are not wide beside a place's reach.
     pub resolved: f32,
 
+    // Rays of a pixel
+    /// In display steps, the tolerance from which every second ray of a pixel samples an area light for all of them.
+    /// Not less: shadows that are narrower than a pixel are off by up to twenty.
+    pub half_of_rays: f32,
+
     // Points of a light
     /// In points, with a tolerance of 1: those of a pixel that are asked first; with others a root of it fewer.
     pub first_points: f32,
@@ -115,6 +120,7 @@ pub(crate) const TOLERANCE: Tolerance = Tolerance {
     even: 0.01,
     same_mean: 0.004,
     resolved: 0.2,
+    half_of_rays: 16.0,
     first_points: 256.0,
     nearer: 4.0,
     clear: 96.0,

@@ -88,6 +88,13 @@ enum RaySight {
     Dark,
     BelowHorizon,
     Behind,
+    /// Not looked at: others stand for it.
+    Skipped,
+}
+
+/// Whether ray `k` of a pixel of n x n is one of those that sample area lights for all.
+fn is_kept(k: u32, n: u32, tolerance: f32) -> bool {
+    tolerance < TOLERANCE.half_of_rays || (k % n + k / n).is_multiple_of(2)
 }
 
 /// The rays of some fragments, as they look for lights. Keeps its memory.
@@ -254,12 +261,13 @@ impl Cells<'_> {
             PooledVisibility::resolve(&mut all, &mut self.lights.arrivals, counts);
             let each = (counts.work() - before) / wanted.len().max(1) as f32;
             for (k, pooled) in wanted.into_iter().zip(all) {
-                let fragment = block.fragments[k].fragment as usize;
+                let of = &block.fragments[k];
+                let (fragment, per_kept) = (of.fragment as usize, of.count as f32 / sights.kept(of) as f32);
                 let index = self.pixel_of(fragment);
                 let before = counts.work();
                 let terms = pooled.estimate(&mut self.lights.arrivals, counts).terms;
                 self.sums.work[index] += each + counts.work() - before;
-                self.behind.known[fragment * lights + light] = FragmentSight::Settled(terms);
+                self.behind.known[fragment * lights + light] = FragmentSight::Settled(terms * per_kept);
             }
             sights.views.iter_mut().filter_map(Option::take).for_each(|view| self.lights.arrivals.keep(view));
         }
@@ -357,7 +365,9 @@ impl Cells<'_> {
         self.look_for(&block, light, &mut sights, counts);
         let before = counts.work();
         let pooled = self.pool(&block, 0, light, true, &mut sights, counts);
-        let pooled = pooled.estimate(&mut self.lights.arrivals, counts);
+        let mut pooled = pooled.estimate(&mut self.lights.arrivals, counts);
+        let per_kept = block.fragments[0].count as f32 / sights.kept(&block.fragments[0]) as f32;
+        (pooled.terms, pooled.moments) = (pooled.terms * per_kept, pooled.moments * per_kept);
         let index = self.pixel_of(fragment);
         self.sums.work[index] += counts.work() - before;
         sights.views.iter_mut().filter_map(Option::take).for_each(|view| self.lights.arrivals.keep(view));
@@ -385,7 +395,7 @@ impl Cells<'_> {
             !matches!(sight, FragmentSight::Told | FragmentSight::Lit | FragmentSight::Dark)
         });
         let share = if is_node { share * TOLERANCE.node_pixels } else { share };
-        let mut pooled = PooledVisibility::new(light, of.count as usize, share, salt, others, asked);
+        let mut pooled = PooledVisibility::new(light, sights.kept(&of), share, salt, others, asked);
         for (place, k) in block.places[of.rays()].iter().zip(of.rays()) {
             sights.settle(k, place, &mut self.lights.arrivals, light, &mut pooled, counts);
         }
@@ -404,7 +414,14 @@ impl Cells<'_> {
         for (of, is_open) in block.fragments.iter().zip(open) {
             let LitPlace { surface, receives_shadow, .. } = block.places[of.first as usize];
             let shines = scene.geometry.links.contains(scene.geometry.lights_of(surface), LightId(light as u32));
+            // Where a pixel is one surface, and shadows are as wide as the light
+            let n = scene.antialiasing;
+            let may_skip = of.count == n * n && self.lights.arrivals.is_integrated(light);
             for k in of.first..of.first + of.count {
+                if may_skip && !is_kept(k - of.first, n, scene.tolerance() as f32) {
+                    sights.push(RaySight::Skipped);
+                    continue;
+                }
                 sights.push(if shines { RaySight::Lit } else { RaySight::BelowHorizon });
                 if *is_open && shines && shadows && receives_shadow {
                     order.push(k);
@@ -458,7 +475,7 @@ impl RaySights {
     fn all(&self, fragment: &FragmentRays) -> FragmentSight {
         let of = |sight: RaySight| self.sights[fragment.rays()].iter().filter(|s| **s == sight).count();
         let dark = of(RaySight::Dark);
-        if dark + of(RaySight::BelowHorizon) == fragment.count as usize {
+        if dark + of(RaySight::BelowHorizon) == self.kept(fragment) {
             FragmentSight::Dark
         } else if dark > 0 || of(RaySight::Behind) > 0 {
             FragmentSight::Parted
@@ -469,6 +486,11 @@ impl RaySights {
         } else {
             FragmentSight::Lit
         }
+    }
+
+    /// How many rays of a fragment stand for all.
+    fn kept(&self, fragment: &FragmentRays) -> usize {
+        self.sights[fragment.rays()].iter().filter(|sight| **sight != RaySight::Skipped).count()
     }
 
     /// Whether some ray of a fragment has to sample the light.
@@ -490,6 +512,7 @@ impl RaySights {
         match self.sights[k] {
             RaySight::Dark => pooled.add_known(&arrivals.place(light, si, bsdf), &Moments::default(), Some(0.0)),
             RaySight::BelowHorizon => pooled.add_known(&arrivals.place(light, si, bsdf), &Moments::default(), None),
+            RaySight::Skipped => {}
             RaySight::Behind if arrivals.is_integrated(light) => {
                 let view = self.views[k].take().expect("what is behind things has a view");
                 pooled.add_behind(&arrivals.place(light, si, bsdf), view);
