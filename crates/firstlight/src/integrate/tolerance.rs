@@ -54,6 +54,11 @@ pub(crate) struct Tolerance {
     /// As a part of it: how far colours may be from their mean that are taken for one.
     pub same_mean: f32,
 
+    // Rays of a pixel
+    /// In display steps, the tolerance from which every second ray of a pixel samples an area light for all of them.
+    /// Not less: shadows that are narrower than a pixel are off by up to twenty.
+    pub half_of_rays: f32,
+
     // Points of a light
     /// In points, with a tolerance of 1: those of a pixel that are asked first; with others a root of it fewer.
     pub first_points: f32,
@@ -111,6 +116,7 @@ pub(crate) const TOLERANCE: Tolerance = Tolerance {
     mingled: 0.4,
     even: 0.01,
     same_mean: 0.004,
+    half_of_rays: 16.0,
     first_points: 256.0,
     nearer: 4.0,
     clear: 96.0,

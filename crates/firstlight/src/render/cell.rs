@@ -26,9 +26,9 @@ use super::direct::{DirectLighting, LightEstimate, LightQuery, Occlusion};
 use super::fragment::{Contrast, Fragment, Fragments, Member, Quadrant, RayHit};
 use super::grid::{Block, Grid};
 use super::many::Many;
+use super::pooled::{PooledVisibility, salt};
 use super::solo::{self, Candidate};
 use super::square::Square;
-use super::together::{Together, salt};
 use crate::color::Rgb;
 use crate::film::FilmTile;
 use crate::film::hits::{PixelHits, PixelRays};
@@ -39,6 +39,7 @@ use crate::image::Buffer;
 use crate::integrate::TOLERANCE;
 use crate::material::{Bsdf, MOMENTS, Moments, ShadingPoint};
 use crate::scene::Scene;
+use crate::visibility::Visibility;
 use behind::Behind;
 
 /// So many fragments, of one light each, ask at all of their rays at once.
@@ -560,7 +561,7 @@ impl<'a> Cells<'a> {
             self.sums.work[index] += Heat::PLACE * fragment.count() as f32;
             let at = self.at(index);
             let term = &mut self.terms[fragment.pixel as usize * scene.lights.len() + *light as usize];
-            // Rays of which no batch knows what they see ask points of the light together
+            // Rays of which no batch knows what they see sample the light together
             let mut unknown = None;
             for (request, answer) in answers.by_ref().take(fragment.count()) {
                 let place = &self.places[request.point as usize];
@@ -570,15 +571,15 @@ impl<'a> Cells<'a> {
                 }
                 let salt = salt(at, place.surface);
                 let (light, rays, share) = (*light as usize, fragment.count(), fragment.share);
-                let lights = &mut self.lights;
-                let new = || Together::new(lights, light, rays, share, salt, Rgb::BLACK).of_lights(asked, lights);
-                let together = unknown.get_or_insert_with(new);
-                together.ask_points(lights, place, counts);
+                let scale = self.lights.scale(light);
+                let new = || PooledVisibility::new(light, scale, rays, share, salt, Rgb::BLACK, asked);
+                counts.visibility.classes[Visibility::Partial as usize] += 1;
+                unknown.get_or_insert_with(new).add_sampled(place, &mut self.lights, counts);
             }
-            if let Some(together) = unknown {
+            if let Some(pooled) = unknown {
                 go_on()?;
                 let before = counts.work();
-                *term += together.finish(&mut self.lights, counts).terms;
+                *term += pooled.estimate(&mut self.lights, counts).terms;
                 self.sums.work[index] += counts.work() - before;
             }
         }

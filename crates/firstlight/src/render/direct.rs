@@ -2,7 +2,7 @@
 //!
 //! Lights that are integrated are evaluated in batches of sixteen points ([`Evaluator`]), past the listed occluders and
 //! the few triangles that are gathered from the BVHs. Where more than that may occlude a light, the estimate is
-//! unknown, and callers sample the light ([`together`](super::together)).
+//! unknown, and callers sample the light ([`pooled`](super::pooled)).
 
 mod gather;
 mod sampled;
@@ -12,9 +12,8 @@ use std::ops::ControlFlow;
 
 use fearless_simd::Level;
 
-use super::ladder::Asker;
 use super::lights::Lights;
-use super::tally::Tally;
+use super::pooled::LightSampler;
 use super::{Counts, QUESTION_EVERY};
 use crate::color::{DisplaySteps, Rgb};
 use crate::ids::LightId;
@@ -148,9 +147,8 @@ pub(crate) struct DirectLighting<'a> {
     pub(super) occluders: OccluderList,
     pub(super) resolver: VisibilityResolver,
     indices: Vec<u32>,
-    /// Views and tallies that are not used any more.
+    /// Views that are not used any more.
     views: Vec<ShadowView>,
-    tallies: Vec<Tally>,
 }
 
 impl<'a> DirectLighting<'a> {
@@ -170,7 +168,6 @@ impl<'a> DirectLighting<'a> {
             resolver: VisibilityResolver::default(),
             indices: Vec::new(),
             views: Vec::new(),
-            tallies: Vec::new(),
         }
     }
 
@@ -460,22 +457,12 @@ impl<'a> DirectLighting<'a> {
         LightEstimate { moments: sums, is_uniform: proved, motion, turn, most, occlusion: Occlusion::Unknown }
     }
 
-    /// Area light `index`, as its points are asked for.
-    pub fn asker(&self, index: usize) -> Asker<'a> {
+    /// Area light `index`, as it is sampled.
+    pub fn sampler(&self, index: usize) -> LightSampler<'a> {
         let (scene, level) = (self.scene, self.level);
         let area = scene.lights[index].area().expect("lights that are integrated have an area");
-        let (target, ladder) = (&self.lights.targets[index], &self.lights.ladders[index]);
-        Asker { scene, level, area, target, ladder }
-    }
-
-    /// An empty tally.
-    pub fn tally(&mut self) -> Tally {
-        self.tallies.pop().unwrap_or_default()
-    }
-
-    /// Takes a tally back, for its memory.
-    pub fn keep_tally(&mut self, tally: Tally) {
-        self.tallies.push(tally);
+        let (target, sets) = (&self.lights.targets[index], &self.lights.point_sets[index]);
+        LightSampler { scene, level, area, target, sets }
     }
 
     /// By how many radians directions turn over the footprint of a point, times how narrow its lobe is.

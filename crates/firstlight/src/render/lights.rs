@@ -1,6 +1,6 @@
 //! The lights of a scene as they are asked: what all threads share.
 
-use super::ladder::Ladder;
+use super::pooled::LightPointSets;
 use crate::color::{DisplaySteps, Rgb};
 use crate::ids::LightId;
 use crate::integrate::{Asked, Emitter, Obstacles, TOLERANCE};
@@ -22,7 +22,7 @@ pub(crate) struct Lights<'a> {
     /// The lights as shafts lead to them.
     pub targets: Vec<Target>,
     /// The points of those that are integrated.
-    pub ladders: Vec<Ladder>,
+    pub point_sets: Vec<LightPointSets>,
     /// What may stand in the way of those that have an area.
     pub obstacles: Vec<Obstacles<'a>>,
     /// In display steps: how far one light may be wrong at a point that stands for a pixel; and the value that many
@@ -37,7 +37,7 @@ impl<'a> Lights<'a> {
         let scale = |light: &Light| if light.is_integrated() { light.intensity } else { light.scale };
         let scales = scene.lights.iter().map(scale).collect();
         let targets = Target::of_all(scene);
-        let ladders = emitters.iter().map(|_| Ladder::default()).collect();
+        let point_sets = emitters.iter().map(|_| LightPointSets::default()).collect();
         let tree = (scene.lights.len() > FEW_LIGHTS)
             .then(|| LightTree::new(&scene.lights, &scene.geometry.links.classes(scene.lights.len())));
         let obstacles = emitters.iter().enumerate().map(|(index, emitter)| {
@@ -49,7 +49,7 @@ impl<'a> Lights<'a> {
         let integrated = scene.lights.iter().filter(|light| light.is_integrated()).count();
         let allowed = TOLERANCE.point / (integrated.max(1) as f32).sqrt();
         let least = steps.value_of(allowed);
-        Lights { emitters, integrated, scales, steps, tree, targets, ladders, obstacles, allowed, least }
+        Lights { emitters, integrated, scales, steps, tree, targets, point_sets, obstacles, allowed, least }
     }
 
     /// Whether anything in trees may be in the way of light `index`, but for planes that are told row by row.

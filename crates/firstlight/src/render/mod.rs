@@ -8,8 +8,6 @@
 //!
 //! [`cell`](cell/index.html) integrates lights and lights a surface once where that is enough; all else is as above.
 
-mod asking;
-mod beams;
 mod cell;
 mod counts;
 mod cut;
@@ -18,20 +16,16 @@ mod fragment;
 #[cfg(feature = "bench")]
 pub(crate) mod given;
 mod grid;
-mod ladder;
 mod lanes;
-mod leaves;
 mod lights;
 mod listed_occluder_cache;
 mod many;
-mod packets;
 pub(crate) mod pixel;
 mod plain;
+mod pooled;
 mod shafts;
 mod solo;
 mod square;
-mod tally;
-mod together;
 
 use std::num::NonZeroUsize;
 use std::ops::ControlFlow;

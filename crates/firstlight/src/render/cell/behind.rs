@@ -8,10 +8,11 @@ use super::{Cells, PIXELS, Pixel, Wanted};
 use crate::color::Rgb;
 use crate::film::resolve::LightTerm;
 use crate::ids::LightId;
+use crate::integrate::TOLERANCE;
 use crate::material::{Moments, ShadingPoint};
 use crate::render::direct::{DirectLighting, Occlusion};
 use crate::render::fragment::{Fragment, Fragments};
-use crate::render::together::{Outcome, Together, salt};
+use crate::render::pooled::{PooledLight, PooledVisibility, salt};
 use crate::render::{AaMode, Counts};
 use crate::scene::Scene;
 use crate::visibility::{ShadowView, Viewpoint, Visibility};
@@ -33,7 +34,7 @@ pub(super) enum FragmentSight {
     /// Rays differ: each asks for itself.
     Parted,
     /// Rays differ, and were asked: what all of them see, added up, diffuse and specular.
-    VisibilityStats(LightTerm),
+    Settled(LightTerm),
 }
 
 /// What is known of the ways past trees. Keeps its memory.
@@ -86,6 +87,13 @@ enum RaySight {
     Dark,
     BelowHorizon,
     Behind,
+    /// Not looked at: others stand for it.
+    Skipped,
+}
+
+/// Whether ray `k` of a pixel of n x n is one of those that sample area lights for all.
+fn is_kept(k: u32, n: u32, tolerance: f32) -> bool {
+    tolerance < TOLERANCE.half_of_rays || (k % n + k / n).is_multiple_of(2)
 }
 
 /// The rays of some fragments, as they look for lights. Keeps its memory.
@@ -154,7 +162,7 @@ impl Cells<'_> {
                 FragmentSight::Clear => Occlusion::Listed,
                 FragmentSight::Lit => Occlusion::None,
                 FragmentSight::Dark => return false,
-                FragmentSight::VisibilityStats(terms) => {
+                FragmentSight::Settled(terms) => {
                     let pixel = self.fragments.all[*fragment as usize].pixel as usize;
                     self.terms[pixel * self.scene.lights.len() + *light as usize] += terms;
                     return false;
@@ -239,7 +247,7 @@ impl Cells<'_> {
         for (light, sights) in sights.iter_mut().enumerate() {
             let is_wanted = |k: &usize| {
                 sights.open[*k]
-                    && sights.is_crowded(&block.fragments[*k])
+                    && sights.is_sampled(&block.fragments[*k])
                     && matches!(
                         self.fragment_sight(block.fragments[*k].fragment as usize, light),
                         FragmentSight::Parted
@@ -247,17 +255,18 @@ impl Cells<'_> {
             };
             let wanted: Vec<usize> = (0..block.fragments.len()).filter(is_wanted).collect();
             let before = counts.work();
-            let ask = |k: &usize| self.together(&block, *k, light, false, sights, counts);
-            let mut all: Vec<Together> = wanted.iter().map(ask).collect();
-            Together::tell(&mut all, &mut self.lights, counts);
+            let pool = |k: &usize| self.pool(&block, *k, light, false, sights, counts);
+            let mut all: Vec<PooledVisibility> = wanted.iter().map(pool).collect();
+            PooledVisibility::resolve(&mut all, &mut self.lights, counts);
             let each = (counts.work() - before) / wanted.len().max(1) as f32;
-            for (k, together) in wanted.into_iter().zip(all) {
-                let fragment = block.fragments[k].fragment as usize;
+            for (k, pooled) in wanted.into_iter().zip(all) {
+                let of = &block.fragments[k];
+                let (fragment, per_kept) = (of.fragment as usize, of.count as f32 / sights.kept(of) as f32);
                 let index = self.pixel_of(fragment);
                 let before = counts.work();
-                let terms = together.settle(&mut self.lights, counts).terms;
+                let terms = pooled.estimate(&mut self.lights, counts).terms;
                 self.sums.work[index] += each + counts.work() - before;
-                self.behind.known[fragment * lights + light] = FragmentSight::VisibilityStats(terms);
+                self.behind.known[fragment * lights + light] = FragmentSight::Settled(terms * per_kept);
             }
             sights.views.iter_mut().filter_map(Option::take).for_each(|view| self.lights.keep(view));
         }
@@ -279,7 +288,7 @@ impl Cells<'_> {
 
     /// Of how many lights the rays of a fragment were asked for points.
     pub(super) fn count_settled(&self, fragment: usize) -> usize {
-        self.count_lights(fragment, |sight| matches!(sight, FragmentSight::VisibilityStats(_)))
+        self.count_lights(fragment, |sight| matches!(sight, FragmentSight::Settled(_)))
     }
 
     /// Notes that, if nothing is known of it yet.
@@ -304,7 +313,7 @@ impl Cells<'_> {
         for other in (0..lights).filter(|other| *other != light) {
             let scale = self.lights.scale(other);
             let share = match self.fragment_sight(fragment, other) {
-                FragmentSight::VisibilityStats(terms) => {
+                FragmentSight::Settled(terms) => {
                     others += scale * terms.sum() * (1.0 / rays);
                     continue;
                 }
@@ -345,7 +354,7 @@ impl Cells<'_> {
     }
 
     /// What all rays of a fragment see of a light, ray by ray.
-    pub(super) fn settled(&mut self, fragment: usize, light: usize, counts: &mut Counts) -> Outcome {
+    pub(super) fn settled(&mut self, fragment: usize, light: usize, counts: &mut Counts) -> PooledLight {
         let mut block = std::mem::take(&mut self.behind.block);
         block.clear();
         block.add(self.scene, &self.fragments, fragment);
@@ -354,20 +363,20 @@ impl Cells<'_> {
         sights.open.push(true);
         self.look_for(&block, light, &mut sights, counts);
         let before = counts.work();
-        let mut together = [self.together(&block, 0, light, true, &mut sights, counts)];
-        Together::tell(&mut together, &mut self.lights, counts);
-        let [together] = together;
-        let outcome = together.settle(&mut self.lights, counts);
+        let pooled = self.pool(&block, 0, light, true, &mut sights, counts);
+        let mut pooled = pooled.estimate(&mut self.lights, counts);
+        let per_kept = block.fragments[0].count as f32 / sights.kept(&block.fragments[0]) as f32;
+        (pooled.terms, pooled.moments) = (pooled.terms * per_kept, pooled.moments * per_kept);
         let index = self.pixel_of(fragment);
         self.sums.work[index] += counts.work() - before;
         sights.views.iter_mut().filter_map(Option::take).for_each(|view| self.lights.keep(view));
         self.behind.sights.push(sights);
         self.behind.block = block;
-        outcome
+        pooled
     }
 
-    /// Asks for a light at all rays of a fragment of the block, which may tell what other pixels see.
-    fn together(
+    /// A light at all rays of a fragment of the block, whose pixel may be interpolated for others.
+    fn pool(
         &mut self,
         block: &RayBlock,
         k: usize,
@@ -375,7 +384,7 @@ impl Cells<'_> {
         is_node: bool,
         sights: &mut RaySights,
         counts: &mut Counts,
-    ) -> Together {
+    ) -> PooledVisibility {
         let of = block.fragments[k];
         let others = self.others(of.fragment as usize, light, counts);
         let Fragment { surface, share, .. } = self.fragments.all[of.fragment as usize];
@@ -384,15 +393,13 @@ impl Cells<'_> {
         let asked = self.count_lights(of.fragment as usize, |sight| {
             !matches!(sight, FragmentSight::Told | FragmentSight::Lit | FragmentSight::Dark)
         });
-        let together = Together::new(&self.lights, light, of.count as usize, share, salt, others);
-        let mut together = together.of_lights(asked, &self.lights);
-        if is_node {
-            together = together.of_node();
-        }
+        let share = if is_node { share * TOLERANCE.node_pixels } else { share };
+        let mut pooled =
+            PooledVisibility::new(light, self.lights.scale(light), sights.kept(&of), share, salt, others, asked);
         for (place, k) in block.places[of.rays()].iter().zip(of.rays()) {
-            sights.settle(k, place, &mut self.lights, light, &mut together, counts);
+            sights.settle(k, place, &mut self.lights, light, &mut pooled, counts);
         }
-        together
+        pooled
     }
 
     /// Finds out what each ray of the block sees of a light.
@@ -407,7 +414,14 @@ impl Cells<'_> {
         for (of, is_open) in block.fragments.iter().zip(open) {
             let ShadingPoint { surface, receives_shadow, .. } = block.places[of.first as usize];
             let shines = scene.geometry.links.contains(scene.geometry.lights_of(surface), LightId(light as u32));
+            // Where a pixel is one surface, and shadows are as wide as the light
+            let n = scene.antialiasing;
+            let may_skip = of.count == n * n && self.lights.is_integrated(light);
             for k in of.first..of.first + of.count {
+                if may_skip && !is_kept(k - of.first, n, scene.tolerance() as f32) {
+                    sights.push(RaySight::Skipped);
+                    continue;
+                }
                 sights.push(if shines { RaySight::Lit } else { RaySight::BelowHorizon });
                 if *is_open && shines && shadows && receives_shadow {
                     order.push(k);
@@ -462,7 +476,7 @@ impl RaySights {
     fn all(&self, fragment: &FragmentRays) -> FragmentSight {
         let of = |sight: RaySight| self.sights[fragment.rays()].iter().filter(|s| **s == sight).count();
         let dark = of(RaySight::Dark);
-        if dark + of(RaySight::BelowHorizon) == fragment.count as usize {
+        if dark + of(RaySight::BelowHorizon) == self.kept(fragment) {
             FragmentSight::Dark
         } else if dark > 0 || of(RaySight::Behind) > 0 {
             FragmentSight::Parted
@@ -475,9 +489,14 @@ impl RaySights {
         }
     }
 
-    /// Whether so much is in the way of some ray of a fragment that points of the light have to be asked.
-    fn is_crowded(&self, fragment: &FragmentRays) -> bool {
-        self.views[fragment.rays()].iter().flatten().any(|view| view.trees)
+    /// How many rays of a fragment stand for all.
+    fn kept(&self, fragment: &FragmentRays) -> usize {
+        self.sights[fragment.rays()].iter().filter(|sight| **sight != RaySight::Skipped).count()
+    }
+
+    /// Whether some ray of a fragment has to sample the light.
+    fn is_sampled(&self, fragment: &FragmentRays) -> bool {
+        self.views[fragment.rays()].iter().any(Option::is_some)
     }
 
     /// Adds what ray `k` of the block sees of a light to that of the others of its fragment.
@@ -487,20 +506,20 @@ impl RaySights {
         point: &ShadingPoint,
         lights: &mut DirectLighting,
         light: usize,
-        together: &mut Together,
+        pooled: &mut PooledVisibility,
         counts: &mut Counts,
     ) {
         match self.sights[k] {
-            RaySight::Dark => together.dark(point),
-            RaySight::BelowHorizon => together.know(point, &Moments::default()),
-            RaySight::Lit => together.ask(lights, point, Occlusion::None, counts),
-            RaySight::Clear => together.ask(lights, point, Occlusion::Listed, counts),
-            RaySight::Near => together.ask(lights, point, Occlusion::Unknown, counts),
+            RaySight::Dark => pooled.add_known(point, &Moments::default(), Some(0.0)),
+            RaySight::BelowHorizon => pooled.add_known(point, &Moments::default(), None),
+            RaySight::Skipped => {}
+            RaySight::Lit => pooled.add(lights, point, Occlusion::None, counts),
+            RaySight::Clear => pooled.add(lights, point, Occlusion::Listed, counts),
             RaySight::Behind if lights.is_integrated(light) => {
                 let view = self.views[k].take().expect("what is behind things has a view");
-                together.behind(point, view);
+                pooled.add_behind(point, view);
             }
-            RaySight::Behind => together.ask(lights, point, Occlusion::Unknown, counts),
+            RaySight::Near | RaySight::Behind => pooled.add(lights, point, Occlusion::Unknown, counts),
         }
     }
 }

@@ -20,9 +20,9 @@ use crate::light::FEW_LIGHTS;
 use crate::material::{Moments, ShadingPoint};
 use crate::math::{LANES, Vec3};
 use crate::render::Counts;
-use crate::render::beams::Packet;
 use crate::render::direct::Occlusion;
 use crate::render::fragment::{Contrast, Fragment};
+use crate::render::pooled::Packet;
 use crate::render::square::Square;
 use crate::visibility::Viewpoint;
 
@@ -308,7 +308,7 @@ impl Cells<'_> {
     /// other.
     fn vote(&mut self, [x, y]: [u32; 2], light: usize, counts: &mut Counts) {
         let scene = self.scene;
-        let asker = self.lights.asker(light);
+        let sampler = self.lights.sampler(light);
         let at = |inner: usize| [x + inner as u32 % BLOCK, y + inner as u32 / BLOCK];
         let pixels: [Option<(usize, &Fragment)>; LANES] = std::array::from_fn(|inner| self.whole(at(inner)));
         let mut packet: Option<Packet> = None;
@@ -320,13 +320,13 @@ impl Cells<'_> {
                 let turn = (at(inner)[0] * 7 + at(inner)[1] * 3) as usize % LOOKING;
                 let ray = (cell ^ turn) % fragment.rays.len();
                 let point = Viewpoint::of(&self.fragments.place(scene, fragment, ray));
-                let l = asker.point(inner, LOOKING, cell) - point.p;
+                let l = sampler.point(inner, LOOKING, cell) - point.p;
                 if point.horizon.dot(l) > 0.0 && point.ns.dot(l) > 0.0 {
                     asked[inner][0] += 1;
-                    if scene.occluded_by_lists(&point.ray(asker.target.end(), l, true)) {
+                    if scene.occluded_by_lists(&point.ray(sampler.end(), l, true)) {
                         asked[inner][1] += 1;
                     } else {
-                        let packet = packet.get_or_insert_with(|| Packet::new(asker.target.end(), &point));
+                        let packet = packet.get_or_insert_with(|| Packet::new(sampler.end(), &point));
                         packet.add((inner * LOOKING + cell) as u32, &point, l, inner as u32);
                     }
                 }
@@ -440,7 +440,7 @@ impl Cells<'_> {
         }
         for (at, sums) in square.pixels().zip(told) {
             let Some((fragment, of)) = self.whole(at) else { continue };
-            if matches!(self.fragment_sight(fragment, light), FragmentSight::VisibilityStats(_) | FragmentSight::Told) {
+            if matches!(self.fragment_sight(fragment, light), FragmentSight::Settled(_) | FragmentSight::Told) {
                 continue;
             }
             // Of two colours that meet different light the mean is no product of means
@@ -461,7 +461,7 @@ impl Cells<'_> {
             }
             let all = sums * rays;
             let terms = of.bsdf.colors.each(&all);
-            self.note(fragment, light, FragmentSight::VisibilityStats(terms));
+            self.note(fragment, light, FragmentSight::Settled(terms));
         }
         true
     }
@@ -475,9 +475,9 @@ impl Cells<'_> {
             return node;
         }
         let Some((fragment, _)) = self.whole(at) else { unreachable!("smooth squares are filled") };
-        let outcome = self.settled(fragment, light, counts);
-        self.note(fragment, light, FragmentSight::VisibilityStats(outcome.terms));
-        let node = SquareNode { sums: outcome.sums * (1.0 / rays), share: outcome.share };
+        let pooled = self.settled(fragment, light, counts);
+        self.note(fragment, light, FragmentSight::Settled(pooled.terms));
+        let node = SquareNode { sums: pooled.moments * (1.0 / rays), share: pooled.visible_fraction };
         self.behind.nodes.push((index, light, node));
         node
     }

@@ -15,7 +15,7 @@ use crate::render::counts::Counts;
 use crate::render::cut::{CutRules, NodeEstimator};
 use crate::render::direct::{DirectLighting, LightQuery, Occlusion};
 use crate::render::listed_occluder_cache::ListedOccluderCache;
-use crate::render::together::Together;
+use crate::render::pooled::PooledVisibility;
 use crate::scene::Scene;
 use crate::visibility::Visibility;
 
@@ -177,7 +177,7 @@ impl<'a> Many<'a> {
                 true => estimate.moments,
                 false => {
                     let (index, points) = (*index as usize, std::slice::from_ref(&point));
-                    Together::of_points(index, points, patch.salt(), lights, counts).sums
+                    PooledVisibility::of_points(index, points, patch.salt(), lights, counts).moments
                 }
             };
             let scale = lights.scale(*index as usize);

@@ -15,7 +15,7 @@ use crate::render::counts::Counts;
 use crate::render::direct::DirectLighting;
 use crate::render::fragment::Fragments;
 use crate::render::listed_occluder_cache::ListedOccluderCache;
-use crate::render::together::Together;
+use crate::render::pooled::PooledVisibility;
 
 /// A single light, or all nodes together, whose value at the middle of a patch may differ too much from the mean.
 #[derive(Clone, Copy)]
@@ -87,7 +87,10 @@ impl<'a> Many<'a> {
                     continue;
                 };
                 let light = self.singles[i as usize].light;
-                terms.push((light, Together::of_points(light as usize, &rays, patch.salt(), lights, counts).terms));
+                terms.push((
+                    light,
+                    PooledVisibility::of_points(light as usize, &rays, patch.salt(), lights, counts).terms,
+                ));
             }
         }
         // In scene order

@@ -3,7 +3,7 @@
 use crate::material::ShadingPoint;
 use crate::render::cell::CELL;
 use crate::render::fragment::{Fragments, is_one_surface};
-use crate::render::together::salt;
+use crate::render::pooled::salt;
 use crate::scene::Scene;
 
 /// A fragment that its middle may represent, or one ray of a fragment without a middle.
