@@ -56,6 +56,8 @@ impl Stats {
             "lights_below_horizon": self.rays.visibility[2],
             "lights_by_mask": self.rays.visibility[3],
             "lights_in_closed_form": self.rays.closed_form,
+            "batches": self.rays.batches,
+            "batched_points": self.rays.batched_points,
             "shafts": self.rays.shafts,
             "occluders": self.rays.occluders,
             "shadow_rays_traced": self.rays.traced,
@@ -129,6 +131,14 @@ impl Stats {
             ("shafts", self.rays.shafts.to_string(), format!("{each:.1} things in each that may be in the way")),
             ("rays a second", format!("{:.1} million", self.mrays_per_s()), String::new()),
         ];
+        if self.rays.batches > 0 {
+            let filled = 100.0 * self.rays.batched_points as f64 / (16 * self.rays.batches) as f64;
+            rows.push((
+                "batches of 16 points",
+                self.rays.batches.to_string(),
+                format!("{filled:.0} % of lanes filled"),
+            ));
+        }
         if self.rays.lights.pairs > 0 {
             rows.push(("places and many lights", self.rays.lights.pairs.to_string(), self.many()));
         }

@@ -20,6 +20,10 @@ pub struct RenderStats {
     /// Pairs of a lit point and a light that is integrated, of which some is hidden by things so few that what is left
     /// is known in closed form. Not among those of `visibility`.
     pub closed_form: u64,
+    /// Batches of sixteen lanes in which area lights were evaluated.
+    pub batches: u64,
+    /// The points in them.
+    pub batched_points: u64,
     /// Shafts from points to lights.
     pub shafts: u64,
     /// What they held that could stand in the way, all together.
@@ -45,6 +49,8 @@ impl RenderStats {
             *sum += count;
         }
         sum.closed_form += self.closed_form;
+        sum.batches += self.batches;
+        sum.batched_points += self.batched_points;
         sum.shafts += self.shafts;
         sum.occluders += self.occluders;
         sum.traced += self.traced;
@@ -77,6 +83,8 @@ pub(crate) struct Counts {
     pub shadow_rays_skipped: u64,
     pub visibility: VisibilityStats,
     pub closed_form: u64,
+    pub batches: u64,
+    pub batched_points: u64,
     /// Camera rays that were asked: not those of places where it is proved what they would meet.
     pub looks: u64,
     /// Points of lights that were asked one by one, of lights that are integrated.
@@ -90,6 +98,7 @@ impl Counts {
     /// What is told of it.
     pub fn stats(&self, simd: SimdLevel, threads: usize) -> RenderStats {
         let Counts { camera_rays, shadow_rays, shadow_rays_skipped, visibility, closed_form, lights, .. } = *self;
+        let Counts { batches, batched_points, .. } = *self;
         let VisibilityStats { classes, shafts, occluders, traced } = visibility;
         RenderStats {
             camera_rays,
@@ -97,6 +106,8 @@ impl Counts {
             shadow_rays_skipped,
             visibility: classes,
             closed_form,
+            batches,
+            batched_points,
             shafts,
             occluders,
             traced,

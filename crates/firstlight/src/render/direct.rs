@@ -20,6 +20,7 @@ use crate::ids::LightId;
 use crate::integrate::{Arrived, Asked, Emitter, Evaluator, Illumination, Obstacles, TOLERANCE};
 use crate::light::{Area, Extent, LightTree};
 use crate::material::{LobeKind, Moments, ShadingPoint};
+use crate::math::LANES;
 use crate::scene::Scene;
 use crate::visibility::{OccluderList, ShadowView, VisibilityResolver};
 pub(super) use sampled::Sampled;
@@ -389,7 +390,7 @@ impl<'a> DirectLighting<'a> {
             match occlusion {
                 Occlusion::Listed | Occlusion::None => listed.extend(now),
                 Occlusion::Gathered => self.batch(of, Occlusion::Gathered, now, estimates, counts),
-                Occlusion::Unknown => self.unknown(of, first, estimates),
+                Occlusion::Unknown => self.unknown(of, first, estimates, counts),
             }
             rest = later;
         }
@@ -408,7 +409,7 @@ impl<'a> DirectLighting<'a> {
         counts: &mut Counts,
     ) {
         let sums = self.is_integrated(of.light);
-        self.arrive(of, occlusion, sums, members);
+        self.arrive(of, occlusion, sums, members, counts);
         let known = if occlusion == Occlusion::Gathered { Occlusion::Unknown } else { occlusion };
         for (arrived, k) in self.arrived.iter().zip(members) {
             if sums {
@@ -420,18 +421,20 @@ impl<'a> DirectLighting<'a> {
 
     /// Notes that a light has to be sampled at a point. If its value is wanted whatever silhouettes do over the
     /// footprint, so is a bound of what it can send.
-    fn unknown(&mut self, of: &Group, k: u32, estimates: &mut [LightEstimate]) {
+    fn unknown(&mut self, of: &Group, k: u32, estimates: &mut [LightEstimate], counts: &mut Counts) {
         let point = of.point(k);
         estimates[k as usize] = LightEstimate::UNKNOWN;
         if point.reach > 0.0 && point.most_motion == f32::INFINITY {
-            self.arrive(of, Occlusion::None, false, &[k]);
+            self.arrive(of, Occlusion::None, false, &[k], counts);
             let LightEstimate { turn, most, .. } = self.variation(of, k, &self.arrived[0]);
             estimates[k as usize] = LightEstimate { turn, most, ..LightEstimate::UNKNOWN };
         }
     }
 
     /// Evaluates an area light at some points of a group: its sums only if they are wanted.
-    fn arrive(&mut self, of: &Group, occlusion: Occlusion, sums: bool, members: &[u32]) {
+    fn arrive(&mut self, of: &Group, occlusion: Occlusion, sums: bool, members: &[u32], counts: &mut Counts) {
+        counts.batches += members.len().div_ceil(LANES) as u64;
+        counts.batched_points += members.len() as u64;
         self.points.clear();
         self.points.extend(members.iter().map(|k| *of.point(*k)));
         self.arrived.clear();
