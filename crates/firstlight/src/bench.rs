@@ -274,7 +274,7 @@ impl Soft {
                 match visibility {
                     Visibility::Full => {}
                     Visibility::None | Visibility::BelowHorizon => hidden.fill(0xffff),
-                    Visibility::Partial => hidden.copy_from_slice(&view.hidden),
+                    _ => hidden.copy_from_slice(&view.hidden),
                 }
             };
             self.resolver.resolve(Level::new(), scene, &self.target, &self.points, &mut order, settled, each);
@@ -385,7 +385,7 @@ pub fn sights(scene: &Scene, light: u32, block: u32) -> Vec<Option<ShareSeen>> {
                     Visibility::Full => ShareSeen::Lit,
                     Visibility::None => ShareSeen::Hidden,
                     Visibility::BelowHorizon => ShareSeen::BelowHorizon,
-                    Visibility::Partial => ShareSeen::Cut,
+                    _ => ShareSeen::Cut,
                 });
             }
         }

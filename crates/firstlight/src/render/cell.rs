@@ -22,7 +22,7 @@ use std::iter;
 use std::ops::{ControlFlow, Range};
 
 use super::Counts;
-use super::direct::{DirectLighting, LightEstimate, LightQuery, Occlusion};
+use super::direct::{DirectLighting, LightEstimate, LightQuery};
 use super::fragment::{Contrast, Fragment, Fragments, Member, Quadrant, RayHit};
 use super::grid::{Block, Grid};
 use super::many::Many;
@@ -76,14 +76,14 @@ struct Pixel {
 struct Wanted {
     fragment: u32,
     light: u32,
-    occlusion: Occlusion,
+    visibility: Visibility,
     /// Whether each ray asks for itself: no place of the fragment stands for others.
     is_parted: bool,
 }
 
 impl Wanted {
     fn new(fragment: u32, light: u32) -> Wanted {
-        Wanted { fragment, light, occlusion: Occlusion::Unknown, is_parted: false }
+        Wanted { fragment, light, visibility: Visibility::Partial, is_parted: false }
     }
 }
 
@@ -375,8 +375,8 @@ impl<'a> Cells<'a> {
         let middle = |wanted: &Wanted, fragments: &Fragments| fragments.all[wanted.fragment as usize].middle;
         self.requests.clear();
         for wanted in &wanted {
-            let Wanted { light, occlusion, .. } = *wanted;
-            self.requests.extend(middle(wanted, &self.fragments).map(|point| LightQuery { point, light, occlusion }));
+            let Wanted { light, visibility, .. } = *wanted;
+            self.requests.extend(middle(wanted, &self.fragments).map(|point| LightQuery { point, light, visibility }));
         }
         self.lights.estimate(&self.fragments.places, &self.requests, &mut self.answers, counts, go_on)?;
         let mut next = 0;
@@ -398,7 +398,7 @@ impl<'a> Cells<'a> {
                 self.add(fragment as usize, light as usize, answer.moments);
             } else {
                 let is_parted = !is_known && !self.lights.is_integrated(light as usize);
-                self.parted.push(Wanted { occlusion: answer.occlusion, is_parted, ..*wanted });
+                self.parted.push(Wanted { visibility: answer.visibility, is_parted, ..*wanted });
             }
         }
         self.wanted = wanted;
@@ -410,12 +410,12 @@ impl<'a> Cells<'a> {
         let scene = self.scene;
         let wanted = std::mem::take(&mut self.parted);
         self.requests.clear();
-        for Wanted { fragment, light, occlusion, .. } in wanted.iter().copied().filter(|wanted| !wanted.is_parted) {
+        for Wanted { fragment, light, visibility, .. } in wanted.iter().copied().filter(|wanted| !wanted.is_parted) {
             let pixel = self.fragments.all[fragment as usize].pixel;
             let at = self.at(self.pixels[pixel as usize].index as usize);
             self.fragments.find_quadrants(scene, fragment as usize, at);
             let quadrants = self.fragments.quadrants(&self.fragments.all[fragment as usize]);
-            self.requests.extend(quadrants.iter().map(|q| LightQuery { point: q.place, light, occlusion }));
+            self.requests.extend(quadrants.iter().map(|q| LightQuery { point: q.place, light, visibility }));
         }
         let fragments = &self.fragments;
         self.lights.estimate(&fragments.places, &self.requests, &mut self.answers, counts, go_on)?;
@@ -536,7 +536,7 @@ impl<'a> Cells<'a> {
         self.requests.clear();
         // Places of a fragment serve all lights
         let mut last: Option<(u32, Range<usize>)> = None;
-        for Wanted { fragment: number, light, occlusion, .. } in refused {
+        for Wanted { fragment: number, light, visibility, .. } in refused {
             self.trace_rays(*number as usize, counts);
             let fragment = &self.fragments.all[*number as usize];
             if last.as_ref().is_none_or(|(before, _)| before != number) {
@@ -548,7 +548,7 @@ impl<'a> Cells<'a> {
             self.requests.extend(places.map(|place| LightQuery {
                 point: place as u32,
                 light: *light,
-                occlusion: *occlusion,
+                visibility: *visibility,
             }));
         }
         self.lights.estimate(&self.places, &self.requests, &mut self.answers, counts, go_on)?;

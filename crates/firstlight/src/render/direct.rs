@@ -22,25 +22,11 @@ use crate::light::{Area, Extent, LightTree};
 use crate::material::{LobeKind, Moments, ShadingPoint};
 use crate::math::LANES;
 use crate::scene::Scene;
-use crate::visibility::{OccluderList, ShadowView, VisibilityResolver};
+use crate::visibility::{OccluderList, ShadowView, Visibility, VisibilityResolver};
 pub(super) use sampled::Sampled;
 
 /// The most points that a sampled light is summed for between two calls of `go_on`.
 const AT_ONCE: u64 = 256;
-
-/// What may occlude a light, seen from a point and from all of its footprint.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(crate) enum Occlusion {
-    /// Nothing is known.
-    #[default]
-    Unknown,
-    /// Listed shapes, and few triangles that were gathered from BVHs.
-    Gathered,
-    /// Listed shapes alone.
-    Listed,
-    /// Nothing.
-    None,
-}
 
 /// One light at one shading point.
 #[derive(Clone, Copy, Debug)]
@@ -48,11 +34,12 @@ pub(crate) struct LightQuery {
     /// The number of the point among those of the call.
     pub point: u32,
     pub light: u32,
-    pub occlusion: Occlusion,
+    /// What is known of how much of it is seen from all of the footprint.
+    pub visibility: Visibility,
 }
 
 /// What one light sends to a shading point, and how much that varies over the point's footprint.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug)]
 pub(crate) struct LightEstimate {
     /// At the point; not a number where the light has to be sampled, or where it varies too much.
     pub moments: Moments,
@@ -65,8 +52,8 @@ pub(crate) struct LightEstimate {
     pub turn: f32,
     /// About the largest moment the light can have here: its measure over the squared distance.
     pub most: f32,
-    /// What is known by now of what may occlude it.
-    pub occlusion: Occlusion,
+    /// What is known by now of how much of it is seen from all of the footprint.
+    pub visibility: Visibility,
 }
 
 impl LightEstimate {
@@ -77,7 +64,7 @@ impl LightEstimate {
         motion: 0.0,
         turn: 0.0,
         most: 0.0,
-        occlusion: Occlusion::Unknown,
+        visibility: Visibility::Partial,
     };
     /// A light that has to be sampled.
     pub const UNKNOWN: LightEstimate = LightEstimate {
@@ -86,7 +73,7 @@ impl LightEstimate {
         motion: f32::INFINITY,
         turn: f32::INFINITY,
         most: 0.0,
-        occlusion: Occlusion::Unknown,
+        visibility: Visibility::Partial,
     };
 
     /// How far the mean over the footprint may be from the value at the point because the light turns, as a part of
@@ -222,7 +209,7 @@ impl<'a> DirectLighting<'a> {
         self.is_integrated(index) && self.scene.lights[index].shadows
     }
 
-    /// Whether the occlusion of light `index` is to be found for all rays of a block of pixels together: not of area
+    /// Whether the visibility of light `index` is to be found for all rays of a block of pixels together: not of area
     /// lights that are sampled at fixed points.
     pub fn is_classified_by_blocks(&self, index: usize) -> bool {
         match self.scene.lights[index].extent() {
@@ -253,10 +240,10 @@ impl<'a> DirectLighting<'a> {
         &mut self,
         light: usize,
         point: &ShadingPoint,
-        occlusion: Occlusion,
+        visibility: Visibility,
         counts: &mut Counts,
     ) -> LightEstimate {
-        self.estimate_each(light, std::slice::from_ref(point), |_| occlusion, counts)[0]
+        self.estimate_each(light, std::slice::from_ref(point), |_| visibility, counts)[0]
     }
 
     /// Estimates one light at each point.
@@ -264,10 +251,10 @@ impl<'a> DirectLighting<'a> {
         &mut self,
         light: usize,
         points: &[ShadingPoint],
-        occlusion: impl Fn(usize) -> Occlusion,
+        visibility: impl Fn(usize) -> Visibility,
         counts: &mut Counts,
     ) -> Vec<LightEstimate> {
-        let query = |k| LightQuery { point: k as u32, light: light as u32, occlusion: occlusion(k) };
+        let query = |k| LightQuery { point: k as u32, light: light as u32, visibility: visibility(k) };
         let queries: Vec<LightQuery> = (0..points.len()).map(query).collect();
         let mut estimates = Vec::with_capacity(points.len());
         self.estimate_all(points, &queries, &mut estimates, counts);
@@ -310,7 +297,7 @@ impl<'a> DirectLighting<'a> {
             }
             let shadows = scene.lights[query.light as usize].shadows
                 && point.receives_shadow
-                && query.occlusion != Occlusion::None;
+                && query.visibility != Visibility::Full;
             order.push(((point.bsdf.lobe.kind(), query.light, shadows), k as u32));
         }
         order.sort_unstable();
@@ -360,8 +347,8 @@ impl<'a> DirectLighting<'a> {
         if shadows && self.lights.has_trees(self.scene, of.light) {
             return self.past_trees(of, members, estimates, counts, go_on);
         }
-        let occlusion = if shadows { Occlusion::Listed } else { Occlusion::None };
-        self.batch(of, occlusion, members, estimates, counts);
+        let visibility = if shadows { Visibility::Listed } else { Visibility::Full };
+        self.batch(of, visibility, members, estimates, counts);
         ControlFlow::Continue(())
     }
 
@@ -379,22 +366,22 @@ impl<'a> DirectLighting<'a> {
         listed.clear();
         let mut rest = members;
         while let Some(first) = rest.first().copied() {
-            if of.query(first).occlusion == Occlusion::Listed {
+            if of.query(first).visibility == Visibility::Listed {
                 listed.push(first);
                 rest = &rest[1..];
                 continue;
             }
             go_on()?;
-            let (occlusion, run) = self.gather_run(of, rest);
+            let (visibility, run) = self.gather_run(of, rest);
             let (now, later) = rest.split_at(run);
-            match occlusion {
-                Occlusion::Listed | Occlusion::None => listed.extend(now),
-                Occlusion::Gathered => self.batch(of, Occlusion::Gathered, now, estimates, counts),
-                Occlusion::Unknown => self.unknown(of, first, estimates, counts),
+            match visibility {
+                Visibility::Gathered => self.batch(of, Visibility::Gathered, now, estimates, counts),
+                Visibility::Partial => self.unknown(of, first, estimates, counts),
+                _ => listed.extend(now),
             }
             rest = later;
         }
-        self.batch(of, Occlusion::Listed, &listed, estimates, counts);
+        self.batch(of, Visibility::Listed, &listed, estimates, counts);
         self.listed = listed;
         ControlFlow::Continue(())
     }
@@ -403,19 +390,19 @@ impl<'a> DirectLighting<'a> {
     fn batch(
         &mut self,
         of: &Group,
-        occlusion: Occlusion,
+        visibility: Visibility,
         members: &[u32],
         estimates: &mut [LightEstimate],
         counts: &mut Counts,
     ) {
         let sums = self.is_integrated(of.light);
-        self.arrive(of, occlusion, sums, members, counts);
-        let known = if occlusion == Occlusion::Gathered { Occlusion::Unknown } else { occlusion };
+        self.arrive(of, visibility, sums, members, counts);
+        let known = if visibility == Visibility::Gathered { Visibility::Partial } else { visibility };
         for (arrived, k) in self.arrived.iter().zip(members) {
             if sums {
                 counts.note(arrived.illumination);
             }
-            estimates[*k as usize] = LightEstimate { occlusion: known, ..self.variation(of, *k, arrived) };
+            estimates[*k as usize] = LightEstimate { visibility: known, ..self.variation(of, *k, arrived) };
         }
     }
 
@@ -425,21 +412,21 @@ impl<'a> DirectLighting<'a> {
         let point = of.point(k);
         estimates[k as usize] = LightEstimate::UNKNOWN;
         if point.reach > 0.0 && point.most_motion == f32::INFINITY {
-            self.arrive(of, Occlusion::None, false, &[k], counts);
+            self.arrive(of, Visibility::Full, false, &[k], counts);
             let LightEstimate { turn, most, .. } = self.variation(of, k, &self.arrived[0]);
             estimates[k as usize] = LightEstimate { turn, most, ..LightEstimate::UNKNOWN };
         }
     }
 
     /// Evaluates an area light at some points of a group: its sums only if they are wanted.
-    fn arrive(&mut self, of: &Group, occlusion: Occlusion, sums: bool, members: &[u32], counts: &mut Counts) {
+    fn arrive(&mut self, of: &Group, visibility: Visibility, sums: bool, members: &[u32], counts: &mut Counts) {
         counts.batches += members.len().div_ceil(LANES) as u64;
         counts.batched_points += members.len() as u64;
         self.points.clear();
         self.points.extend(members.iter().map(|k| *of.point(*k)));
         self.arrived.clear();
-        let near = (occlusion == Occlusion::Gathered).then_some(&self.near);
-        let shadows = occlusion != Occlusion::None;
+        let near = (visibility == Visibility::Gathered).then_some(&self.near);
+        let shadows = visibility != Visibility::Full;
         let Some(asked) = self.lights.asked(of.light, of.lobe, shadows) else { unreachable!("it has an area") };
         let asked = Asked { near, sums, allowed: self.allowed, ..asked };
         self.evaluator.evaluate(self.level, &asked, &self.points, &mut self.arrived);
@@ -457,7 +444,7 @@ impl<'a> DirectLighting<'a> {
         let is_one_sided = self.lights.emitters[of.light].as_ref().is_some_and(Emitter::is_one_sided);
         let is_near = is_one_sided && height <= point.reach;
         let turn = if is_near && !proved { f32::INFINITY } else { self.turn(point, distance) };
-        LightEstimate { moments: sums, is_uniform: proved, motion, turn, most, occlusion: Occlusion::Unknown }
+        LightEstimate { moments: sums, is_uniform: proved, motion, turn, most, visibility: Visibility::Partial }
     }
 
     /// Area light `index`, as it is sampled.

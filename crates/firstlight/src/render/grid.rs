@@ -12,13 +12,14 @@ use std::ops::ControlFlow;
 
 use super::Counts;
 use super::cell::CELL;
-use super::direct::{DirectLighting, LightEstimate, LightQuery, Occlusion};
+use super::direct::{DirectLighting, LightEstimate, LightQuery};
 use super::solo::Candidate;
 use super::square::Square;
 use crate::film::Heat;
 use crate::integrate::TOLERANCE;
 use crate::material::{Bsdf, Lobe, Moments, ShadingPoint};
 use crate::scene::Scene;
+use crate::visibility::Visibility;
 
 /// Pixels across the largest and the smallest square that is lit from nine places.
 const LARGEST: u32 = 16;
@@ -269,7 +270,7 @@ impl Grid {
             self.requests.push(LightQuery {
                 point: self.asked.len() as u32,
                 light: item.light,
-                occlusion: Occlusion::Unknown,
+                visibility: Visibility::Partial,
             });
             self.asked.push(place);
             self.spend(item.square, 1);
@@ -295,13 +296,13 @@ impl Grid {
             open.push(item);
         }
         for item in &open {
-            let (before, occlusion) = (self.requests.len(), centers[item.center as usize].occlusion);
+            let (before, visibility) = (self.requests.len(), centers[item.center as usize].visibility);
             for node in item.nodes {
                 let known = node as usize * self.lights + item.light as usize;
                 if !self.sums[known].is_known() && !self.wanted[known] {
                     self.wanted[known] = true;
                     let (point, light) = (self.nodes[node as usize].place, item.light);
-                    self.requests.push(LightQuery { point, light, occlusion });
+                    self.requests.push(LightQuery { point, light, visibility });
                     self.asked_of.push(known);
                 }
             }
@@ -394,7 +395,7 @@ impl Grid {
         let colors = scale * block.bsdf.colors;
         let base = scene.ambient * block.bsdf.ambient;
         let sets_in = nodes.iter().any(|node| *node == Moments::default());
-        let is_behind = scene.geometry.has_trees() && center.occlusion == Occlusion::Unknown;
+        let is_behind = scene.geometry.has_trees() && center.visibility == Visibility::Partial;
         // Over a square that outlines move far over, the edge of a penumbra may run between the nine
         let is_crossed = item.square.side > SMALLEST && center.motion > TOLERANCE.motion;
         let bends = if sets_in || is_behind || is_crossed { TOLERANCE.bends_at_once } else { 1.0 };

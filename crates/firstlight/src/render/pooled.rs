@@ -16,7 +16,7 @@ use strata::{MOST, MOST_UNIFORM, Strata, StratumSums};
 use variance::VarianceEstimate;
 
 use super::Counts;
-use super::direct::{DirectLighting, Occlusion};
+use super::direct::DirectLighting;
 use crate::color::Rgb;
 use crate::film::resolve::LightTerm;
 use crate::ids::SurfaceId;
@@ -41,7 +41,7 @@ pub(super) struct PooledLight {
 /// A ray whose light may have a closed form.
 struct Pending {
     point: ShadingPoint,
-    occlusion: Occlusion,
+    visibility: Visibility,
 }
 
 /// One light at the rays of one patch.
@@ -116,21 +116,21 @@ impl PooledVisibility {
         &mut self,
         lights: &mut DirectLighting,
         point: &ShadingPoint,
-        occlusion: Occlusion,
+        visibility: Visibility,
         counts: &mut Counts,
     ) {
         let point = ShadingPoint { share: self.share, part_of_points: f32::INFINITY, ..*point };
         if lights.is_integrated(self.light) {
-            self.pending.push(Pending { point, occlusion });
+            self.pending.push(Pending { point, visibility });
         } else {
-            let moments = lights.estimate_one(self.light, &point, occlusion, counts).moments;
-            self.add_known(&point, &moments, Self::fraction(occlusion));
+            let moments = lights.estimate_one(self.light, &point, visibility, counts).moments;
+            self.add_known(&point, &moments, Self::fraction(visibility));
         }
     }
 
     /// The visible fraction that a closed form comes with.
-    fn fraction(occlusion: Occlusion) -> Option<f32> {
-        Some(if occlusion == Occlusion::None { 1.0 } else { f32::NAN })
+    fn fraction(visibility: Visibility) -> Option<f32> {
+        Some(if visibility == Visibility::Full { 1.0 } else { f32::NAN })
     }
 
     /// Adds a ray that samples the light, unless one thing hides all of it.
@@ -172,13 +172,13 @@ impl PooledVisibility {
         if points.is_empty() {
             return;
         }
-        let occlusions: Vec<Occlusion> = pending.iter().flatten().map(|ray| ray.occlusion).collect();
-        let estimates = lights.estimate_each(light, &points, |k| occlusions[k], counts);
-        let mut rays = points.iter().zip(&estimates).zip(&occlusions);
+        let visibilities: Vec<Visibility> = pending.iter().flatten().map(|ray| ray.visibility).collect();
+        let estimates = lights.estimate_each(light, &points, |k| visibilities[k], counts);
+        let mut rays = points.iter().zip(&estimates).zip(&visibilities);
         for (one, pending) in all.iter_mut().zip(&pending) {
-            for ((point, estimate), occlusion) in rays.by_ref().take(pending.len()) {
+            for ((point, estimate), visibility) in rays.by_ref().take(pending.len()) {
                 if estimate.moments.is_known() {
-                    one.add_known(point, &estimate.moments, Self::fraction(*occlusion));
+                    one.add_known(point, &estimate.moments, Self::fraction(*visibility));
                 } else {
                     counts.visibility.classes[Visibility::Partial as usize] += 1;
                     one.add_sampled(point, lights, counts);
@@ -198,7 +198,7 @@ impl PooledVisibility {
         let share = points.iter().map(|point| point.share).fold(0.0, f32::max);
         let scale = lights.scale(light);
         let mut pooled = PooledVisibility::new(light, scale, points.len(), share, salt, Rgb::BLACK, usize::MAX);
-        points.iter().for_each(|point| pooled.add(lights, point, Occlusion::Unknown, counts));
+        points.iter().for_each(|point| pooled.add(lights, point, Visibility::Partial, counts));
         pooled.estimate(lights, counts)
     }
 
@@ -260,7 +260,7 @@ impl PooledVisibility {
                 && (error.smooth > allowed || self.may_miss(&pooled, &strata, receivers, lights))
             {
                 let places: Vec<_> = receivers.iter().map(|one| one.place(self.each)).collect();
-                let unoccluded = lights.estimate_each(self.light, &places, |_| Occlusion::None, counts);
+                let unoccluded = lights.estimate_each(self.light, &places, |_| Visibility::Full, counts);
                 receivers.iter_mut().zip(unoccluded).for_each(|(one, known)| one.unoccluded = Some(known.moments));
                 continue;
             }

@@ -328,7 +328,7 @@ fn every_sample_is_answered_as_by_its_own_ray() {
                         Visibility::None | Visibility::BelowHorizon => true,
                         // One sample is traced as it is
                         Visibility::Partial if target.blocks.is_empty() => hidden,
-                        Visibility::Partial => {
+                        _ => {
                             view.hidden.get(s / 16).is_some_and(|bits| bits >> (s % 16) & 1 == 1)
                                 || view.spheres.iter().any(|sphere| sphere.blocks(to.l, true))
                                 || view.flats.iter().any(|flat| flat.blocks(to.l, true))

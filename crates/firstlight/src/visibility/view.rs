@@ -20,8 +20,12 @@ pub(crate) enum Visibility {
     None,
     /// Nothing: it is below the horizon of the surface.
     BelowHorizon,
-    /// Some of it may be hidden: each sample is tested.
+    /// Some of it may be hidden, or nothing is known: each sample is tested.
     Partial,
+    /// Some of it may be hidden, by listed shapes alone: the light has a closed form.
+    Listed,
+    /// Some of it may be hidden, by listed shapes and a few triangles of trees: the same.
+    Gathered,
 }
 
 /// The occluders that may hide a part of a light from one point. Keeps its memory.

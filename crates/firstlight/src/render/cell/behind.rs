@@ -10,37 +10,31 @@ use crate::film::resolve::LightTerm;
 use crate::ids::LightId;
 use crate::integrate::TOLERANCE;
 use crate::material::{Moments, ShadingPoint};
-use crate::render::direct::{DirectLighting, Occlusion};
+use crate::render::direct::DirectLighting;
 use crate::render::fragment::{Fragment, Fragments};
 use crate::render::pooled::{PooledLight, PooledVisibility, salt};
 use crate::render::{AaMode, Counts};
 use crate::scene::Scene;
 use crate::visibility::{ShadowView, Viewpoint, Visibility};
 
-/// What the rays of one fragment see of one light.
+/// What is known of one light at the camera rays of one fragment.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) enum FragmentSight {
-    /// Nobody asks: what arrives is told already.
+pub(super) enum FragmentLight {
+    /// It is interpolated, and nothing is to be done.
     #[default]
-    Told,
-    /// Nobody looked: nothing is known.
-    Unknown,
-    /// All of it, but for what is below the horizon.
-    Lit,
-    /// Nothing in trees is in the way; what is in lists may be.
-    Clear,
-    /// Nothing of it.
-    Dark,
-    /// Rays differ: each asks for itself.
-    Parted,
-    /// Rays differ, and were asked: what all of them see, added up, diffuse and specular.
-    Settled(LightTerm),
+    Done,
+    /// The visibility of the light from all rays.
+    Seen(Visibility),
+    /// Rays differ: each is lit by itself.
+    PerRay,
+    /// The sum over the rays, with the colours of their surfaces.
+    Summed(LightTerm),
 }
 
 /// What is known of the ways past trees. Keeps its memory.
 pub(super) struct Behind {
     /// Fragment by fragment, light by light.
-    known: Vec<FragmentSight>,
+    known: Vec<FragmentLight>,
     /// The fragment that fills a pixel of the cell, or [`NONE`].
     pub(super) only: Vec<u32>,
     block: RayBlock,
@@ -77,20 +71,6 @@ impl Behind {
     }
 }
 
-/// What one ray sees of one light.
-#[derive(Clone, Copy, Debug, PartialEq)]
-enum RaySight {
-    Lit,
-    Clear,
-    /// Something in trees is in the way that batches know.
-    Near,
-    Dark,
-    BelowHorizon,
-    Behind,
-    /// Not looked at: others stand for it.
-    Skipped,
-}
-
 /// Whether ray `k` of a pixel of n x n is one of those that sample area lights for all.
 fn is_kept(k: u32, n: u32, tolerance: f32) -> bool {
     tolerance < TOLERANCE.half_of_rays || (k % n + k / n).is_multiple_of(2)
@@ -110,7 +90,7 @@ struct RaySights {
     /// Which fragments are asked.
     open: Vec<bool>,
     order: Vec<u32>,
-    sights: Vec<RaySight>,
+    sights: Vec<Option<Visibility>>,
     /// Of those that are behind things, what is in the way.
     views: Vec<Option<ShadowView>>,
 }
@@ -152,17 +132,16 @@ impl Cells<'_> {
 
     /// Leaves of what is wanted that of which too little is known by now, and tells the rest.
     fn tell_wanted(&mut self, wanted: &mut Vec<Wanted>) {
-        wanted.retain_mut(|Wanted { fragment, light, occlusion, .. }| {
-            *occlusion = match self.fragment_sight(*fragment as usize, *light as usize) {
-                FragmentSight::Unknown | FragmentSight::Told => Occlusion::Unknown,
-                FragmentSight::Parted => {
+        wanted.retain_mut(|Wanted { fragment, light, visibility, .. }| {
+            *visibility = match self.fragment_light(*fragment as usize, *light as usize) {
+                FragmentLight::Done => Visibility::Partial,
+                FragmentLight::Seen(Visibility::None) => return false,
+                FragmentLight::Seen(visibility) => visibility,
+                FragmentLight::PerRay => {
                     self.refused.push(Wanted::new(*fragment, *light));
                     return false;
                 }
-                FragmentSight::Clear => Occlusion::Listed,
-                FragmentSight::Lit => Occlusion::None,
-                FragmentSight::Dark => return false,
-                FragmentSight::Settled(terms) => {
+                FragmentLight::Summed(terms) => {
                     let pixel = self.fragments.all[*fragment as usize].pixel as usize;
                     self.terms[pixel * self.scene.lights.len() + *light as usize] += terms;
                     return false;
@@ -182,9 +161,9 @@ impl Cells<'_> {
         self.behind.votes.fill(f32::NAN);
         self.behind.only.fill(NONE);
         self.behind.known.clear();
-        self.behind.known.resize(self.fragments.all.len() * lights, FragmentSight::Told);
+        self.behind.known.resize(self.fragments.all.len() * lights, FragmentLight::Done);
         for Wanted { fragment, light, .. } in self.wanted.iter().chain(&self.parted) {
-            self.behind.known[*fragment as usize * lights + *light as usize] = FragmentSight::Unknown;
+            self.behind.known[*fragment as usize * lights + *light as usize] = FragmentLight::Seen(Visibility::Partial);
         }
         for number in 0..self.fragments.all.len() {
             let Fragment { pixel, .. } = self.fragments.all[number];
@@ -206,7 +185,7 @@ impl Cells<'_> {
     fn is_open(&self, fragment: usize) -> bool {
         let lights = self.scene.lights.len();
         let known = &self.behind.known[fragment * lights..][..lights];
-        known.iter().any(|sight| matches!(sight, FragmentSight::Unknown))
+        known.iter().any(|sight| matches!(sight, FragmentLight::Seen(Visibility::Partial)))
     }
 
     /// Looks from all rays of some fragments, from number `from` on, for all lights that nothing is known of yet; the
@@ -231,8 +210,8 @@ impl Cells<'_> {
         for (light, sights) in sights.iter_mut().enumerate() {
             sights.open.clear();
             let is_open = |of: &FragmentRays| {
-                let sight = self.fragment_sight(of.fragment as usize, light);
-                self.lights.is_classified_by_blocks(light) && matches!(sight, FragmentSight::Unknown)
+                let sight = self.fragment_light(of.fragment as usize, light);
+                self.lights.is_classified_by_blocks(light) && matches!(sight, FragmentLight::Seen(Visibility::Partial))
             };
             sights.open.extend(block.fragments.iter().map(is_open));
             if !sights.open.contains(&true) {
@@ -249,8 +228,8 @@ impl Cells<'_> {
                 sights.open[*k]
                     && sights.is_sampled(&block.fragments[*k])
                     && matches!(
-                        self.fragment_sight(block.fragments[*k].fragment as usize, light),
-                        FragmentSight::Parted
+                        self.fragment_light(block.fragments[*k].fragment as usize, light),
+                        FragmentLight::PerRay
                     )
             };
             let wanted: Vec<usize> = (0..block.fragments.len()).filter(is_wanted).collect();
@@ -266,7 +245,7 @@ impl Cells<'_> {
                 let before = counts.work();
                 let terms = pooled.estimate(&mut self.lights, counts).terms;
                 self.sums.work[index] += each + counts.work() - before;
-                self.behind.known[fragment * lights + light] = FragmentSight::Settled(terms * per_kept);
+                self.behind.known[fragment * lights + light] = FragmentLight::Summed(terms * per_kept);
             }
             sights.views.iter_mut().filter_map(Option::take).for_each(|view| self.lights.keep(view));
         }
@@ -276,25 +255,25 @@ impl Cells<'_> {
     }
 
     /// What the rays of a fragment see of a light past what is in trees.
-    pub(super) fn fragment_sight(&self, fragment: usize, light: usize) -> FragmentSight {
+    pub(super) fn fragment_light(&self, fragment: usize, light: usize) -> FragmentLight {
         self.behind.known[fragment * self.scene.lights.len() + light]
     }
 
     /// How many lights that are integrated a fragment sees in such a way.
-    fn count_lights(&self, fragment: usize, is: impl Fn(FragmentSight) -> bool) -> usize {
-        let is = |light: &usize| self.lights.is_integrated(*light) && is(self.fragment_sight(fragment, *light));
+    fn count_lights(&self, fragment: usize, is: impl Fn(FragmentLight) -> bool) -> usize {
+        let is = |light: &usize| self.lights.is_integrated(*light) && is(self.fragment_light(fragment, *light));
         (0..self.scene.lights.len()).filter(is).count()
     }
 
     /// Of how many lights the rays of a fragment were asked for points.
     pub(super) fn count_settled(&self, fragment: usize) -> usize {
-        self.count_lights(fragment, |sight| matches!(sight, FragmentSight::Settled(_)))
+        self.count_lights(fragment, |sight| matches!(sight, FragmentLight::Summed(_)))
     }
 
     /// Notes that, if nothing is known of it yet.
-    pub(super) fn note(&mut self, fragment: usize, light: usize, sight: FragmentSight) {
+    pub(super) fn note(&mut self, fragment: usize, light: usize, sight: FragmentLight) {
         let known = &mut self.behind.known[fragment * self.scene.lights.len() + light];
-        if matches!(known, FragmentSight::Unknown | FragmentSight::Clear) {
+        if matches!(known, FragmentLight::Seen(Visibility::Partial) | FragmentLight::Seen(Visibility::Listed)) {
             *known = sight;
         }
     }
@@ -312,18 +291,18 @@ impl Cells<'_> {
         let mut others = Rgb::BLACK;
         for other in (0..lights).filter(|other| *other != light) {
             let scale = self.lights.scale(other);
-            let share = match self.fragment_sight(fragment, other) {
-                FragmentSight::Settled(terms) => {
+            let share = match self.fragment_light(fragment, other) {
+                FragmentLight::Summed(terms) => {
                     others += scale * terms.sum() * (1.0 / rays);
                     continue;
                 }
-                FragmentSight::Told => {
+                FragmentLight::Done => {
                     others += scale * self.terms[pixel as usize * lights + other].sum() * (1.0 / rays);
                     continue;
                 }
-                FragmentSight::Lit => 1.0,
-                FragmentSight::Unknown => self.share_seen(fragment, other),
-                FragmentSight::Clear | FragmentSight::Dark | FragmentSight::Parted => 0.0,
+                FragmentLight::Seen(Visibility::Full) => 1.0,
+                FragmentLight::Seen(Visibility::Partial) => self.share_seen(fragment, other),
+                FragmentLight::Seen(_) | FragmentLight::PerRay => 0.0,
             };
             if share > 0.0 {
                 others += self.unshadowed(fragment, other, counts) * share;
@@ -347,7 +326,7 @@ impl Cells<'_> {
             });
             let alone = |point| ShadingPoint { reach: 0.0, turn: 0.0, share: 1.0, ..point };
             let points: Vec<ShadingPoint> = points.map(alone).collect();
-            let estimates = lights.estimate_each(light, &points, |_| Occlusion::None, counts);
+            let estimates = lights.estimate_each(light, &points, |_| Visibility::Full, counts);
             wholes.extend(estimates.iter().map(|estimate| estimate.moments));
         }
         lights.scale(light) * fragments.all[fragment].bsdf.colors.of(&wholes[fragment])
@@ -391,7 +370,7 @@ impl Cells<'_> {
         let salt = salt(self.at(self.pixel_of(of.fragment as usize)), surface);
         // Of how many lights points may be asked, as far as is known by now
         let asked = self.count_lights(of.fragment as usize, |sight| {
-            !matches!(sight, FragmentSight::Told | FragmentSight::Lit | FragmentSight::Dark)
+            !matches!(sight, FragmentLight::Done | FragmentLight::Seen(Visibility::Full | Visibility::None))
         });
         let share = if is_node { share * TOLERANCE.node_pixels } else { share };
         let mut pooled =
@@ -419,30 +398,18 @@ impl Cells<'_> {
             let may_skip = of.count == n * n && self.lights.is_integrated(light);
             for k in of.first..of.first + of.count {
                 if may_skip && !is_kept(k - of.first, n, scene.tolerance() as f32) {
-                    sights.push(RaySight::Skipped);
+                    sights.push(None);
                     continue;
                 }
-                sights.push(if shines { RaySight::Lit } else { RaySight::BelowHorizon });
+                sights.push(Some(if shines { Visibility::Full } else { Visibility::BelowHorizon }));
                 if *is_open && shines && shadows && receives_shadow {
                     order.push(k);
                 }
             }
         }
-        self.lights.classify(light, &block.points, order, counts, |k, visibility, occlusion| {
-            sights[k] = match visibility {
-                Visibility::Full => RaySight::Lit,
-                Visibility::None => RaySight::Dark,
-                Visibility::BelowHorizon => RaySight::BelowHorizon,
-                Visibility::Partial => {
-                    let (occlusion, view) = occlusion();
-                    views[k] = view;
-                    match occlusion {
-                        Occlusion::Unknown => RaySight::Behind,
-                        Occlusion::Gathered => RaySight::Near,
-                        Occlusion::Listed | Occlusion::None => RaySight::Clear,
-                    }
-                }
-            };
+        self.lights.classify(light, &block.points, order, counts, |k, visibility, view| {
+            sights[k] = Some(visibility);
+            views[k] = view;
         });
     }
 }
@@ -473,25 +440,25 @@ impl RayBlock {
 
 impl RaySights {
     /// What the rays of a fragment see together.
-    fn all(&self, fragment: &FragmentRays) -> FragmentSight {
-        let of = |sight: RaySight| self.sights[fragment.rays()].iter().filter(|s| **s == sight).count();
-        let dark = of(RaySight::Dark);
-        if dark + of(RaySight::BelowHorizon) == self.kept(fragment) {
-            FragmentSight::Dark
-        } else if dark > 0 || of(RaySight::Behind) > 0 {
-            FragmentSight::Parted
-        } else if of(RaySight::Near) > 0 {
-            FragmentSight::Unknown
-        } else if of(RaySight::Clear) > 0 {
-            FragmentSight::Clear
+    fn all(&self, fragment: &FragmentRays) -> FragmentLight {
+        let of = |visibility| self.sights[fragment.rays()].iter().filter(|seen| **seen == Some(visibility)).count();
+        let hidden = of(Visibility::None);
+        if hidden + of(Visibility::BelowHorizon) == self.kept(fragment) {
+            FragmentLight::Seen(Visibility::None)
+        } else if hidden > 0 || of(Visibility::Partial) > 0 {
+            FragmentLight::PerRay
+        } else if of(Visibility::Gathered) > 0 {
+            FragmentLight::Seen(Visibility::Partial)
+        } else if of(Visibility::Listed) > 0 {
+            FragmentLight::Seen(Visibility::Listed)
         } else {
-            FragmentSight::Lit
+            FragmentLight::Seen(Visibility::Full)
         }
     }
 
     /// How many rays of a fragment stand for all.
     fn kept(&self, fragment: &FragmentRays) -> usize {
-        self.sights[fragment.rays()].iter().filter(|sight| **sight != RaySight::Skipped).count()
+        self.sights[fragment.rays()].iter().flatten().count()
     }
 
     /// Whether some ray of a fragment has to sample the light.
@@ -510,16 +477,16 @@ impl RaySights {
         counts: &mut Counts,
     ) {
         match self.sights[k] {
-            RaySight::Dark => pooled.add_known(point, &Moments::default(), Some(0.0)),
-            RaySight::BelowHorizon => pooled.add_known(point, &Moments::default(), None),
-            RaySight::Skipped => {}
-            RaySight::Lit => pooled.add(lights, point, Occlusion::None, counts),
-            RaySight::Clear => pooled.add(lights, point, Occlusion::Listed, counts),
-            RaySight::Behind if lights.is_integrated(light) => {
-                let view = self.views[k].take().expect("what is behind things has a view");
+            None => {}
+            Some(Visibility::None) => pooled.add_known(point, &Moments::default(), Some(0.0)),
+            Some(Visibility::BelowHorizon) => pooled.add_known(point, &Moments::default(), None),
+            Some(Visibility::Partial) if lights.is_integrated(light) => {
+                let view = self.views[k].take().expect("what is sampled has a view");
                 pooled.add_behind(point, view);
             }
-            RaySight::Near | RaySight::Behind => pooled.add(lights, point, Occlusion::Unknown, counts),
+            // What few triangles hide is gathered anew
+            Some(Visibility::Gathered) => pooled.add(lights, point, Visibility::Partial, counts),
+            Some(visibility) => pooled.add(lights, point, visibility, counts),
         }
     }
 }

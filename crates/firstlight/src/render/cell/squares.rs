@@ -10,7 +10,7 @@ use std::ops::ControlFlow;
 
 use arrayvec::ArrayVec;
 
-use super::behind::{FragmentSight, NONE};
+use super::behind::{FragmentLight, NONE};
 use super::{CELL, Cells};
 use crate::color::Rgb;
 use crate::film::tile::Tile;
@@ -20,11 +20,10 @@ use crate::light::FEW_LIGHTS;
 use crate::material::{Moments, ShadingPoint};
 use crate::math::{LANES, Vec3};
 use crate::render::Counts;
-use crate::render::direct::Occlusion;
 use crate::render::fragment::{Contrast, Fragment};
 use crate::render::pooled::Packet;
 use crate::render::square::Square;
-use crate::visibility::Viewpoint;
+use crate::visibility::{Viewpoint, Visibility};
 
 /// Pixels across the largest and the smallest squares.
 const LARGEST: u32 = 16;
@@ -172,7 +171,9 @@ impl Cells<'_> {
 
     /// Whether nothing is known of what a pixel's only fragment sees of a light.
     fn is_unknown(&self, at: [u32; 2], light: usize) -> bool {
-        self.whole(at).is_some_and(|(number, _)| matches!(self.fragment_sight(number, light), FragmentSight::Unknown))
+        self.whole(at).is_some_and(|(number, _)| {
+            matches!(self.fragment_light(number, light), FragmentLight::Seen(Visibility::Partial))
+        })
     }
 
     /// The middle between two opposite rays of a pixel that is filled.
@@ -244,15 +245,13 @@ impl Cells<'_> {
         }
         let mut points = std::mem::take(&mut self.behind.points);
         self.viewpoints(square, &mut points);
-        let occlusion = self.lights.gather_for(light, &points, counts);
+        let visibility = self.lights.gather_for(light, &points, counts);
         self.behind.points = points;
-        let sight = match occlusion {
-            Occlusion::None => FragmentSight::Lit,
-            Occlusion::Listed => FragmentSight::Clear,
-            Occlusion::Gathered | Occlusion::Unknown => return false,
-        };
+        if visibility == Visibility::Partial {
+            return false;
+        }
         for at in square.pixels() {
-            self.note_at(at, light, sight);
+            self.note_at(at, light, FragmentLight::Seen(visibility));
         }
         true
     }
@@ -280,9 +279,9 @@ impl Cells<'_> {
     }
 
     /// Notes what a pixel's only fragment sees of a light, if that is not known.
-    fn note_at(&mut self, at: [u32; 2], light: usize, sight: FragmentSight) {
+    fn note_at(&mut self, at: [u32; 2], light: usize, known: FragmentLight) {
         if let Some((number, _)) = self.whole(at) {
-            self.note(number, light, sight);
+            self.note(number, light, known);
         }
     }
 
@@ -386,7 +385,7 @@ impl Cells<'_> {
         let vote = |at: [u32; 2]| self.behind.votes[self.index(at) * self.scene.lights.len() + light];
         if nodes.as_flattened().iter().all(|node| node.share == 1.0) && square.pixels().all(|at| vote(at) == 1.0) {
             for at in square.pixels() {
-                self.note_at(at, light, FragmentSight::Clear);
+                self.note_at(at, light, FragmentLight::Seen(Visibility::Listed));
             }
             return true;
         }
@@ -440,7 +439,7 @@ impl Cells<'_> {
         }
         for (at, sums) in square.pixels().zip(told) {
             let Some((fragment, of)) = self.whole(at) else { continue };
-            if matches!(self.fragment_sight(fragment, light), FragmentSight::Settled(_) | FragmentSight::Told) {
+            if matches!(self.fragment_light(fragment, light), FragmentLight::Summed(_) | FragmentLight::Done) {
                 continue;
             }
             // Of two colours that meet different light the mean is no product of means
@@ -461,7 +460,7 @@ impl Cells<'_> {
             }
             let all = sums * rays;
             let terms = of.bsdf.colors.each(&all);
-            self.note(fragment, light, FragmentSight::Settled(terms));
+            self.note(fragment, light, FragmentLight::Summed(terms));
         }
         true
     }
@@ -476,7 +475,7 @@ impl Cells<'_> {
         }
         let Some((fragment, _)) = self.whole(at) else { unreachable!("smooth squares are filled") };
         let pooled = self.settled(fragment, light, counts);
-        self.note(fragment, light, FragmentSight::Settled(pooled.terms));
+        self.note(fragment, light, FragmentLight::Summed(pooled.terms));
         let node = SquareNode { sums: pooled.moments * (1.0 / rays), share: pooled.visible_fraction };
         self.behind.nodes.push((index, light, node));
         node

@@ -2,7 +2,7 @@
 
 use arrayvec::ArrayVec;
 
-use super::{DirectLighting, Group, Occlusion};
+use super::{DirectLighting, Group};
 use crate::accel::Aabb;
 use crate::ids::LightId;
 use crate::material::ShadingPoint;
@@ -19,21 +19,21 @@ const LEAVES: usize = 12;
 impl DirectLighting<'_> {
     /// Gathers what of the BVHs may occlude a light for the first of some queries, and for those after it that are for
     /// points of one surface; and says for how many that was done.
-    pub(super) fn gather_run(&mut self, of: &Group, members: &[u32]) -> (Occlusion, usize) {
+    pub(super) fn gather_run(&mut self, of: &Group, members: &[u32]) -> (Visibility, usize) {
         let first = of.point(members[0]);
         let is_like = |k: &&u32| {
             let point = of.point(**k);
             first.reach + point.reach == 0.0
                 && point.surface == first.surface
-                && of.query(**k).occlusion == Occlusion::Unknown
+                && of.query(**k).visibility == Visibility::Partial
         };
         let mut run = 1 + members[1..].iter().take(LANES - 1).take_while(is_like).count();
         loop {
             let points: ArrayVec<Viewpoint, LANES> =
                 members[..run].iter().map(|k| Viewpoint::of(of.point(*k))).collect();
-            let occlusion = self.gather(of.light, &points, first);
-            if run == 1 || occlusion != Occlusion::Unknown {
-                return (occlusion, run);
+            let visibility = self.gather(of.light, &points, first);
+            if run == 1 || visibility != Visibility::Partial {
+                return (visibility, run);
             }
             run /= 2;
         }
@@ -45,10 +45,10 @@ impl DirectLighting<'_> {
         index: usize,
         points: &[Viewpoint],
         ShadingPoint { reach, turn, .. }: &ShadingPoint,
-    ) -> Occlusion {
+    ) -> Visibility {
         let (scene, lights, reach, turn) = (self.scene, self.lights, *reach, *turn);
         if !lights.has_trees(scene, index) {
-            return Occlusion::Listed;
+            return Visibility::Listed;
         }
         let (target, trees) = (&lights.targets[index], &mut self.occluders);
         match points {
@@ -69,25 +69,25 @@ impl DirectLighting<'_> {
         }
         let is_known = lights.know(index, trees.others.iter().copied());
         if is_known && !trees.has_meshes() {
-            Occlusion::Listed
+            Visibility::Listed
         } else if is_known
             && !trees.too_many
             && let Some(emitter) = &lights.emitters[index]
             && self.near.gather(scene, target.light, emitter, trees, lights.obstacles[index].occluders.len())
         {
-            Occlusion::Gathered
+            Visibility::Gathered
         } else {
-            Occlusion::Unknown
+            Visibility::Partial
         }
     }
 
     /// Whether a light of one point is occluded by nothing in the BVHs, from all of a footprint.
     pub(super) fn is_unoccluded_by_trees(&mut self, index: usize, point: &ShadingPoint) -> bool {
-        self.gather(index, &[Viewpoint::of(point)], point) == Occlusion::Listed
+        self.gather(index, &[Viewpoint::of(point)], point) == Visibility::Listed
     }
 
     /// What may occlude light `index` from all of some points together, by one shaft.
-    pub fn gather_for(&mut self, index: usize, points: &[Viewpoint], counts: &mut Counts) -> Occlusion {
+    pub fn gather_for(&mut self, index: usize, points: &[Viewpoint], counts: &mut Counts) -> Visibility {
         self.indices.clear();
         self.indices.extend(0..points.len() as u32);
         let occluders = &mut self.occluders;
@@ -95,42 +95,42 @@ impl DirectLighting<'_> {
         counts.visibility.shafts += 1;
         let is_known = || self.lights.know(index, occluders.others.iter().copied()) && !occluders.has_meshes();
         if occluders.has_trees() && !is_known() {
-            Occlusion::Unknown
+            Visibility::Partial
         } else if occluders.count() > 0 {
-            Occlusion::Listed
+            Visibility::Listed
         } else {
-            Occlusion::None
+            Visibility::Full
         }
     }
 
     /// Classifies the visibility of light `index` from each of those `points` whose numbers are in `order`. `each` gets
-    /// the point's number, its visibility, and a function that says what occludes a light that is seen in part, with
-    /// the view that it is sampled by where that is unknown.
+    /// the point's number, its visibility, and, where the light has no closed form, the view that it is sampled by.
     pub fn classify(
         &mut self,
         index: usize,
         points: &[Viewpoint],
         order: &mut [u32],
         counts: &mut Counts,
-        mut each: impl FnMut(usize, Visibility, &mut dyn FnMut() -> (Occlusion, Option<ShadowView>)),
+        mut each: impl FnMut(usize, Visibility, Option<ShadowView>),
     ) {
         let (lights, views) = (self.lights, &mut self.views);
         let (target, listed) = (&lights.targets[index], self.scene.geometry.listed);
-        let settled = &mut counts.visibility;
-        self.resolver.resolve(self.level, self.scene, target, points, order, settled, |k, visibility, view| {
-            each(k, visibility, &mut || {
-                let is_listed = listed || view.spheres.is_empty() && view.flats.is_empty();
-                if view.trees
-                    || !lights.know(index, view.others.iter().map(|(thing, _)| *thing))
-                    || view.triangles.len() > FEW_TRIANGLES
-                {
-                    (Occlusion::Unknown, Some(std::mem::replace(view, views.pop().unwrap_or_default())))
-                } else if is_listed && view.triangles.is_empty() {
-                    (Occlusion::Listed, None)
-                } else {
-                    (Occlusion::Gathered, None)
-                }
-            });
+        let stats = &mut counts.visibility;
+        self.resolver.resolve(self.level, self.scene, target, points, order, stats, |k, visibility, view| {
+            if visibility != Visibility::Partial {
+                return each(k, visibility, None);
+            }
+            let is_listed = listed || view.spheres.is_empty() && view.flats.is_empty();
+            if view.trees
+                || !lights.know(index, view.others.iter().map(|(thing, _)| *thing))
+                || view.triangles.len() > FEW_TRIANGLES
+            {
+                each(k, visibility, Some(std::mem::replace(view, views.pop().unwrap_or_default())));
+            } else if is_listed && view.triangles.is_empty() {
+                each(k, Visibility::Listed, None);
+            } else {
+                each(k, Visibility::Gathered, None);
+            }
         });
     }
 
@@ -153,7 +153,7 @@ impl DirectLighting<'_> {
                 self.views.push(kept);
                 None
             }
-            Some(Visibility::Full | Visibility::Partial) => Some(kept),
+            Some(_) => Some(kept),
         }
     }
 

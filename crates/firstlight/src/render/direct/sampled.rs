@@ -78,7 +78,7 @@ impl<'a> Sampled<'a> {
         match visibility {
             Visibility::None | Visibility::BelowHorizon => Moments::ZERO,
             Visibility::Full => self.lit(point),
-            Visibility::Partial => self.masked(point, view),
+            Visibility::Partial | Visibility::Listed | Visibility::Gathered => self.masked(point, view),
         }
     }
 
@@ -122,7 +122,7 @@ impl DirectLighting<'_> {
             let (point, estimate) = (of.point(*k), &mut estimates[*k as usize]);
             // Each of a fixed set of samples casts a hard shadow, which shows where they are few
             if area.samples() < FEW_SAMPLES && estimate.motion > 0.0 {
-                *estimate = LightEstimate { occlusion: estimate.occlusion, ..LightEstimate::UNKNOWN };
+                *estimate = LightEstimate { visibility: estimate.visibility, ..LightEstimate::UNKNOWN };
             }
             estimate.most *= area.samples() as f32 / area.stands_for();
             if estimate.turn == f32::INFINITY && point.most_motion < f32::INFINITY {

@@ -1,6 +1,6 @@
 //! Lights of one point.
 
-use super::{DirectLighting, Group, LightEstimate, Occlusion};
+use super::{DirectLighting, Group, LightEstimate};
 use crate::ids::LightId;
 use crate::light::{Light, LightKind};
 use crate::material::{Moments, ShadingPoint};
@@ -10,14 +10,15 @@ use crate::render::pixel::Lighting;
 use crate::render::plain::Plain;
 use crate::scene::Listed;
 use crate::shape::PlaneSide;
+use crate::visibility::Visibility;
 
 impl DirectLighting<'_> {
     /// Estimates a light of one point.
     pub(super) fn single(&mut self, of: &Group, k: u32, counts: &mut Counts) -> LightEstimate {
-        let (light, point, occlusion) = (&self.scene.lights[of.light], of.point(k), of.query(k).occlusion);
-        let moments = self.of_single(of.light, point, occlusion);
-        counts.points += u64::from(occlusion != Occlusion::None);
-        let alone = LightEstimate { moments, occlusion, ..LightEstimate::NOTHING };
+        let (light, point, visibility) = (&self.scene.lights[of.light], of.point(k), of.query(k).visibility);
+        let moments = self.of_single(of.light, point, visibility);
+        counts.points += u64::from(visibility != Visibility::Full);
+        let alone = LightEstimate { moments, visibility, ..LightEstimate::NOTHING };
         if point.reach == 0.0 {
             return alone;
         }
@@ -29,11 +30,11 @@ impl DirectLighting<'_> {
             return alone;
         }
         let Some(sample) = light.sample(0, to.l) else {
-            return LightEstimate { moments, occlusion, ..LightEstimate::UNKNOWN };
+            return LightEstimate { moments, visibility, ..LightEstimate::UNKNOWN };
         };
         let distance = if to.finite { to.l.length() } else { f32::INFINITY };
-        let casts = light.shadows && point.receives_shadow && occlusion != Occlusion::None;
-        let is_crossed = casts && self.may_cross_shadow(of.light, to.l, to.finite, point, occlusion);
+        let casts = light.shadows && point.receives_shadow && visibility != Visibility::Full;
+        let is_crossed = casts && self.may_cross_shadow(of.light, to.l, to.finite, point, visibility);
         // The light sets at once, and a spot's cone ends at once
         let rim = if height < room { f32::INFINITY } else { self.rim_turn(light, point, to.l) };
         let turn = self.turn(point, distance).max(rim);
@@ -43,13 +44,13 @@ impl DirectLighting<'_> {
             motion: if is_crossed { f32::INFINITY } else { 0.0 },
             turn,
             most: sample.weight.max(moments.cosine()),
-            occlusion,
+            visibility,
         }
     }
 
     /// What a light of one point sends.
-    pub(super) fn of_single(&self, index: usize, point: &ShadingPoint, occlusion: Occlusion) -> Moments {
-        let receives_shadow = point.receives_shadow && occlusion != Occlusion::None;
+    pub(super) fn of_single(&self, index: usize, point: &ShadingPoint, visibility: Visibility) -> Moments {
+        let receives_shadow = point.receives_shadow && visibility != Visibility::Full;
         let point = ShadingPoint { receives_shadow, ..*point };
         Plain.gather(self.scene, index, &point, &mut Counts::default()).total()
     }
@@ -74,11 +75,11 @@ impl DirectLighting<'_> {
         l: Vec3,
         finite: bool,
         point: &ShadingPoint,
-        occlusion: Occlusion,
+        visibility: Visibility,
     ) -> bool {
         let scene = self.scene;
         let listed = &scene.occluders;
-        if !listed.disks.is_empty() || occlusion != Occlusion::Listed && !self.is_unoccluded_by_trees(light, point) {
+        if !listed.disks.is_empty() || visibility != Visibility::Listed && !self.is_unoccluded_by_trees(light, point) {
             return true;
         }
         let length = l.length();

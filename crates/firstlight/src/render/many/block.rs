@@ -13,7 +13,7 @@ use crate::material::{Colors, Moments, ShadingPoint};
 use crate::math::Vec3;
 use crate::render::counts::Counts;
 use crate::render::cut::{CutRules, NodeEstimator};
-use crate::render::direct::{DirectLighting, LightQuery, Occlusion};
+use crate::render::direct::{DirectLighting, LightQuery};
 use crate::render::listed_occluder_cache::ListedOccluderCache;
 use crate::render::pooled::PooledVisibility;
 use crate::scene::Scene;
@@ -168,7 +168,7 @@ impl<'a> Many<'a> {
             lights.tolerate(TOLERANCE.integrals / (singles.len() as f32).sqrt());
         }
         let point = ShadingPoint { base: stored.value, ..*point };
-        let query = |light: &u32| LightQuery { point: 0, light: *light, occlusion: Occlusion::Unknown };
+        let query = |light: &u32| LightQuery { point: 0, light: *light, visibility: Visibility::Partial };
         let queries: Vec<LightQuery> = singles.iter().map(query).collect();
         let mut estimates = Vec::with_capacity(queries.len());
         lights.estimate_all(&[point], &queries, &mut estimates, counts);
