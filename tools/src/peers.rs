@@ -411,7 +411,8 @@ mod tests {
             program: Some("firstlight".into()),
             name: None,
         };
-        let ways = curve(&options, Path::new("folder")).unwrap();
+        let mut ways = curve(&options, Path::new("folder")).unwrap();
+        ways.iter_mut().for_each(|way| way.seconds.push(1.0));
         assert!(ways.iter().all(|way| way.program == "firstlight"));
         assert_eq!(ways.iter().filter(|way| way.converged).count(), 1);
         assert!(page(&options, &ways).contains("Mitsuba: not measured"));
