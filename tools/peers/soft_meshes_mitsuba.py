@@ -1,8 +1,8 @@
 """Two smooth meshes under two area lights in Mitsuba 3. Usage: soft_meshes_mitsuba.py SIZE SAMPLES PASSES OUT.png
 
-SIZE x 9/16 SIZE pixels, the mean of PASSES pictures of SAMPLES samples in each pixel, one point of one light for each of them; direct light
-only, 2 threads, variant llvm_ad_rgb. The scene is that of soft_meshes.toml. Prints the processor seconds of the render alone: start, loading and
-compilation are left out."""
+SIZE x 9/16 SIZE pixels, the mean of PASSES pictures of SAMPLES samples in each pixel, one point of one light for each of them;
+direct light only, 2 threads, variant llvm_ad_rgb. The scene is that of soft_meshes.toml. Prints the processor
+seconds of the render alone: start, loading and compilation are left out."""
 
 import pathlib
 import sys
@@ -85,7 +85,8 @@ scene = mitsuba.load_dict(
 numpy.array(mitsuba.render(scene, spp=samples, seed=0))
 start = time.process_time()
 # Seeds by the number of samples: pictures that are compared share none
-total = sum(numpy.array(mitsuba.render(scene, spp=samples, seed=samples * (passes + i))) for i in range(passes)) / passes
+seeds = [samples * (passes + i) for i in range(passes)]
+total = sum(numpy.array(mitsuba.render(scene, spp=samples, seed=seed)) for seed in seeds) / passes
 print(time.process_time() - start)
 picture = mitsuba.Bitmap(total.astype(numpy.float32))
 picture.convert(mitsuba.Bitmap.PixelFormat.RGB, mitsuba.Struct.Type.UInt16, srgb_gamma=True).write(out)
