@@ -1,7 +1,7 @@
 """Two smooth meshes under two area lights in Mitsuba 3. Usage: soft_meshes_mitsuba.py SIZE SAMPLES PASSES OUT.png
 
-SIZE x 9/16 SIZE pixels, the mean of PASSES pictures of SAMPLES samples in each pixel, one point of one light for each of them;
-direct light only, 2 threads, variant llvm_ad_rgb. The scene is that of soft_meshes.toml. Prints the processor
+SIZE x 9/16 SIZE pixels, the mean of PASSES pictures of SAMPLES samples in each pixel, one point of one light for each
+of them; direct light only, 2 threads, variant llvm_ad_rgb. The scene is that of soft_meshes.toml. Prints the processor
 seconds of the render alone: start, loading and compilation are left out."""
 
 import pathlib

@@ -90,7 +90,8 @@ pub fn run(options: &Options) -> Outcome {
         let rows: Vec<_> = ways.iter().map(row).collect();
         let versions = versions(options);
         let data = json!({
-            "scene": if options.curve { "soft meshes" } else { "config11" }, "size": options.size, "rows": rows, "versions": versions, "commit": commit(), "processor": processor(),
+            "scene": if options.curve { "soft meshes" } else { "config11" },
+            "size": options.size, "rows": rows, "versions": versions, "commit": commit(), "processor": processor(),
         });
         let text = serde_json::to_string_pretty(&data).map_err(|e| e.to_string())?;
         write(&folder.join("peers.json"), format!("{text}\n").as_bytes())?;
@@ -356,8 +357,8 @@ fn about_curve(Options { size, rounds, .. }: &Options, ways: &[Way]) -> String {
          Two smooth models of 5,856 triangles on a floor under two area lights, {size} x {height} pixels, 2 threads; 4 \
          x 4 camera rays in each pixel of firstlight where nothing else is said, in Mitsuba as many as samples, with \
          one point of one light for each. Seconds are of the processor, both threads together, medians of {rounds} \
-         rounds, the programs in turns: the whole process of firstlight, the render alone of Mitsuba, without its start \
-         and compilation. Ratios count more than seconds, as the machine may do other work. The error is that against \
+         rounds, the programs in turns: the whole process of firstlight, the render alone of Mitsuba, without its \
+         start and compilation. Ratios count more than seconds, as the machine may do other work. The error is that against \
          a converged picture of the same program, which was made once, in steps of an 8-bit picture as it is \
          displayed, where that picture is smooth: where 3 x 3 pixels span less than 6 steps."
     );
