@@ -60,7 +60,8 @@ enum Task {
     /// Measures whole processes from a mesh file to a picture, against F3D and Mitsuba where a Python has them, and
     /// writes a page under docs/benchmarks.
     Models(models::Options),
-    /// Measures config 11 against Mitsuba and POV-Ray, where they are named, and writes a page under docs/benchmarks.
+    /// Measures config 11, or the curve of soft shadows on meshes, against Mitsuba and POV-Ray, where they are named,
+    /// and writes a page under docs/benchmarks.
     Peers(peers::Options),
     /// Runs the tests that take long: more scenes, more rays.
     #[command(args_conflicts_with_subcommands = true)]
