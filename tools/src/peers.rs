@@ -358,8 +358,8 @@ fn about_curve(Options { size, rounds, .. }: &Options, ways: &[Way]) -> String {
          x 4 camera rays in each pixel of firstlight where nothing else is said, in Mitsuba as many as samples, with \
          one point of one light for each. Seconds are of the processor, both threads together, medians of {rounds} \
          rounds, the programs in turns: the whole process of firstlight, the render alone of Mitsuba, without its \
-         start and compilation. Ratios count more than seconds, as the machine may do other work. The error is that against \
-         a converged picture of the same program, which was made once, in steps of an 8-bit picture as it is \
+         start and compilation. Ratios count more than seconds, as the machine may do other work. The error is that \
+         against a converged picture of the same program, which was made once, in steps of an 8-bit picture as it is \
          displayed, where that picture is smooth: where 3 x 3 pixels span less than 6 steps."
     );
     if let Some([rms, _]) = ways.iter().find(|way| way.converged && way.program == "Mitsuba").and_then(|way| way.error)
