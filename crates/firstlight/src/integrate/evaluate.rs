@@ -47,7 +47,7 @@ pub(crate) enum Illumination {
 
 /// What arrives at a point.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Arrived {
+pub(crate) struct LightIntegral {
     /// Nothing where it is not wanted: see [`ShadingPoint::most_motion`].
     pub sums: Moments,
     pub illumination: Illumination,
@@ -60,15 +60,15 @@ pub(crate) struct Arrived {
     pub height: f32,
 }
 
-impl Arrived {
+impl LightIntegral {
     /// What arrives of two parts of a light.
-    fn and(&self, other: &Arrived) -> Arrived {
+    fn and(&self, other: &LightIntegral) -> LightIntegral {
         let illumination = match (self.illumination, other.illumination) {
             (one, other) if one == other => one,
             (Illumination::Unknown, _) | (_, Illumination::Unknown) => Illumination::Unknown,
             _ => Illumination::Partial,
         };
-        Arrived {
+        LightIntegral {
             sums: self.sums + other.sums,
             illumination,
             proved: self.proved && other.proved && illumination != Illumination::Partial,
@@ -80,7 +80,7 @@ impl Arrived {
 
 /// A light as it is asked.
 #[derive(Clone, Copy)]
-pub(crate) struct Asked<'a> {
+pub(crate) struct LightTask<'a> {
     pub emitter: &'a Emitter,
     pub obstacles: &'a Obstacles<'a>,
     /// What of trees may be in the way, if anything is.
@@ -100,7 +100,7 @@ pub(crate) struct Asked<'a> {
     pub sums: bool,
 }
 
-impl Asked<'_> {
+impl LightTask<'_> {
     /// How many cells and panels a pixel may be asked in place of points of a light that makes so many display steps:
     /// about half of what takes as long, as they are asked in vain where there are more of them.
     fn most_asked(steps: f32) -> f32 {
@@ -121,9 +121,9 @@ const MOST_CELLS: u32 = 2048;
 /// In display steps: what a light makes at most.
 const LARGEST_CODE: f32 = u8::MAX as f32;
 
-/// The memory of [`evaluate`](Evaluator::evaluate), used again and again.
+/// The memory of [`evaluate`](AreaLightIntegrator::evaluate), used again and again.
 #[derive(Default)]
-pub(crate) struct Evaluator {
+pub(crate) struct AreaLightIntegrator {
     /// Point by point.
     views: Vec<ViewBlock>,
     between: Vec<Between>,
@@ -149,7 +149,7 @@ pub(crate) struct Evaluator {
     next_panels: Vec<Panel>,
     spare: Vec<LaneNumbers>,
     /// Of a part of a ball.
-    part: Vec<Arrived>,
+    part: Vec<LightIntegral>,
 }
 
 /// What is known of one point.
@@ -167,22 +167,28 @@ struct PointSum {
     most_asked: f32,
 }
 
-impl Evaluator {
-    /// Adds to `arrived` what of a light arrives at each point.
-    pub fn evaluate(&mut self, level: Level, light: &Asked, points: &[ShadingPoint], arrived: &mut Vec<Arrived>) {
-        let first = arrived.len();
-        self.evaluate_one(level, light, points, arrived);
-        let Some(faces) = light.emitter.faces() else { return };
-        let is_inside = |point: &ShadingPoint| light.emitter.surrounds(point.p);
+impl AreaLightIntegrator {
+    /// Adds to `integrals` what of a light arrives at each point.
+    pub fn evaluate(
+        &mut self,
+        level: Level,
+        task: &LightTask,
+        points: &[ShadingPoint],
+        integrals: &mut Vec<LightIntegral>,
+    ) {
+        let first = integrals.len();
+        self.evaluate_one(level, task, points, integrals);
+        let Some(faces) = task.emitter.faces() else { return };
+        let is_inside = |point: &ShadingPoint| task.emitter.surrounds(point.p);
         let inside: Vec<ShadingPoint> = points.iter().filter(|point| is_inside(point)).copied().collect();
         if inside.is_empty() {
             return;
         }
-        let mut seen: Vec<Arrived> = Vec::new();
+        let mut seen: Vec<LightIntegral> = Vec::new();
         for emitter in &faces {
             let mut through = std::mem::take(&mut self.part);
             through.clear();
-            let face = Asked { emitter, allowed: light.allowed / 6f32.sqrt(), ..*light };
+            let face = LightTask { emitter, allowed: task.allowed / 6f32.sqrt(), ..*task };
             self.evaluate_one(level, &face, &inside, &mut through);
             if seen.is_empty() {
                 seen.extend_from_slice(&through);
@@ -191,43 +197,49 @@ impl Evaluator {
             }
             self.part = through;
         }
-        let places = arrived[first..].iter_mut().zip(points);
-        let places = places.filter_map(|(place, point)| Some((place, light.emitter.depth(point.p)?)));
+        let places = integrals[first..].iter_mut().zip(points);
+        let places = places.filter_map(|(place, point)| Some((place, task.emitter.depth(point.p)?)));
         for ((place, distance), seen) in places.zip(seen) {
-            *place = Arrived { distance, height: distance, ..seen };
+            *place = LightIntegral { distance, height: distance, ..seen };
         }
     }
 
     /// The same, but for points inside of a ball: those have answers that say so.
-    fn evaluate_one(&mut self, level: Level, light: &Asked, points: &[ShadingPoint], arrived: &mut Vec<Arrived>) {
-        let first = arrived.len();
-        self.look(level, light, points, arrived);
-        let arrived = &mut arrived[first..];
+    fn evaluate_one(
+        &mut self,
+        level: Level,
+        task: &LightTask,
+        points: &[ShadingPoint],
+        integrals: &mut Vec<LightIntegral>,
+    ) {
+        let first = integrals.len();
+        self.look(level, task, points, integrals);
+        let integrals = &mut integrals[first..];
         let is_bounded = points.iter().any(ShadingPoint::is_bounded);
         let mut round = 0;
         while !(self.whole.is_empty() && self.kept.len() * LANES == self.cut.len() && self.panels.is_empty()) {
             round += 1;
             let new = self.kept.len() * LANES;
             if is_bounded {
-                self.count_cells(arrived);
+                self.count_cells(integrals);
             }
-            self.ask_cells(level, light);
+            self.ask_cells(level, task);
             if is_bounded {
                 if round == 1 {
-                    self.bound(light, points);
+                    self.bound(task, points);
                 }
-                self.count_panels(arrived);
+                self.count_panels(integrals);
             }
-            self.ask_panels(level, light);
-            self.judge(light, points, new, round);
+            self.ask_panels(level, task);
+            self.judge(task, points, new, round);
         }
-        for (arrived, state) in arrived.iter_mut().zip(&self.state) {
-            arrived.sums = state.accepted.at_least_0();
+        for (integrals, state) in integrals.iter_mut().zip(&self.state) {
+            integrals.sums = state.accepted.at_least_0();
         }
     }
 
     /// Finds out how each point sees the light, and queues the cells it is asked by.
-    fn look(&mut self, level: Level, light: &Asked, points: &[ShadingPoint], arrived: &mut Vec<Arrived>) {
+    fn look(&mut self, level: Level, task: &LightTask, points: &[ShadingPoint], integrals: &mut Vec<LightIntegral>) {
         // Blocks are written where they are read: nothing of what is left in them counts
         if self.views.len() < points.len().div_ceil(LANES) {
             self.views.resize(points.len().div_ceil(LANES), ViewBlock::default());
@@ -240,26 +252,26 @@ impl Evaluator {
         self.panels.clear();
         self.kept.clear();
         self.seen.clear();
-        let outline = light.emitter.outline();
+        let outline = task.emitter.outline();
         for (block, points) in points.chunks(LANES).enumerate() {
             let start = block * LANES;
-            let there = self.see(level, light, block, points);
+            let there = self.see(level, task, block, points);
             let views = &self.views[block];
             let (survey, classes) = dispatch_wide!(level, simd => {
                 simd.vectorize(
                     #[inline(always)]
                     || {
-                        let mut survey = survey(simd, views, light.emitter.is_physical(), points);
+                        let mut survey = survey(simd, views, task.emitter.is_physical(), points);
                         survey.arrives &= there;
-                        let asked = if light.shadows { survey.arrives } else { 0 };
-                        let classes = classify(simd, light.obstacles, light.near, light.emitter, views, points, asked);
+                        let asked = if task.shadows { survey.arrives } else { 0 };
+                        let classes = classify(simd, task.obstacles, task.near, task.emitter, views, points, asked);
                         (survey, classes)
                     },
                 )
             });
             for (k, (point, class)) in points.iter().zip(&classes).enumerate() {
                 let is = |bits: u64| bits >> k & 1 == 1;
-                let mut one = Arrived {
+                let mut one = LightIntegral {
                     sums: Moments::default(),
                     illumination: Illumination::Below,
                     proved: point.reach == 0.0,
@@ -276,7 +288,7 @@ impl Evaluator {
                         _ if is_open && is(survey.above) => Illumination::Full,
                         _ => Illumination::Partial,
                     };
-                } else if light.emitter.surrounds(point.p) {
+                } else if task.emitter.surrounds(point.p) {
                     one.illumination = Illumination::Unknown;
                 }
                 // The same for all places within the point's reach
@@ -286,8 +298,8 @@ impl Evaluator {
                     Illumination::Full => is(survey.above_around) && one.motion == 0.0,
                     Illumination::Partial | Illumination::Unknown => false,
                 };
-                let most_asked = Asked::most_asked(LARGEST_CODE) * point.part_of_points;
-                let is_wanted = light.sums && (one.proved || one.motion <= point.most_motion);
+                let most_asked = LightTask::most_asked(LARGEST_CODE) * point.part_of_points;
+                let is_wanted = task.sums && (one.proved || one.motion <= point.most_motion);
                 if is_wanted && matches!(one.illumination, Illumination::Full | Illumination::Partial) {
                     let number = (start + k) as u32;
                     self.state[start + k].cells = 1;
@@ -296,17 +308,17 @@ impl Evaluator {
                 let state = &mut self.state[start + k];
                 state.most_asked = most_asked;
                 self.between.push(class.between);
-                arrived.push(one);
+                integrals.push(one);
             }
         }
-        self.grade(level, light);
+        self.grade(level, task);
     }
 
     /// Puts what a block of points sees of the light into its lanes. Returns those that see anything of it, bit by bit.
-    fn see(&mut self, level: Level, light: &Asked, block: usize, points: &[ShadingPoint]) -> u64 {
+    fn see(&mut self, level: Level, task: &LightTask, block: usize, points: &[ShadingPoint]) -> u64 {
         let views = &mut self.views[block];
         let (mut there, mut one_by_one) = (0, u64::MAX);
-        if let Emitter::Flat(flat) = light.emitter {
+        if let Emitter::Flat(flat) = task.emitter {
             there = u64::MAX;
             one_by_one = dispatch_wide!(level, simd => simd.vectorize(
                 #[inline(always)]
@@ -314,7 +326,7 @@ impl Evaluator {
             ));
         }
         for (k, point) in points.iter().enumerate().filter(|(k, _)| one_by_one >> k & 1 == 1) {
-            if let Some(flat) = light.emitter.flat(point.p) {
+            if let Some(flat) = task.emitter.flat(point.p) {
                 there |= 1 << k;
                 views.set(k, point, &FlatView::new(&flat, point));
             }
@@ -324,8 +336,8 @@ impl Evaluator {
 
     /// Queues the cells that the light is asked by at first. Where nothing is in the way, those of which all is seen
     /// are told apart.
-    fn grade(&mut self, level: Level, light: &Asked) {
-        let outline = light.emitter.outline();
+    fn grade(&mut self, level: Level, task: &LightTask) {
+        let outline = task.emitter.outline();
         while !self.grading.is_empty() {
             self.grades.clear();
             let (grades, views) = (&mut self.grades, &self.views);
@@ -334,7 +346,7 @@ impl Evaluator {
                     let members = Members::new(views, cells.len(), |k| cells[k].point);
                     grades.push(simd.vectorize(
                         #[inline(always)]
-                        || grade(simd, light.lobe, outline, &members, cells),
+                        || grade(simd, task.lobe, outline, &members, cells),
                     ));
                 }
             });
@@ -361,8 +373,8 @@ impl Evaluator {
     }
 
     /// Bounds what points are asked by what the light could make of them: it was asked for all cells once.
-    fn bound(&mut self, light: &Asked, points: &[ShadingPoint]) {
-        let Evaluator { state, whole, fits, cut, cut_fits, .. } = self;
+    fn bound(&mut self, task: &LightTask, points: &[ShadingPoint]) {
+        let AreaLightIntegrator { state, whole, fits, cut, cut_fits, .. } = self;
         let mut sent = vec![Moments::default(); points.len()];
         for (cells, fits) in [(whole, fits), (cut, cut_fits)] {
             for (k, cell) in cells.iter().enumerate() {
@@ -370,19 +382,19 @@ impl Evaluator {
             }
         }
         for ((state, point), sent) in state.iter_mut().zip(points).zip(&sent) {
-            let error = (light.scale * point.bsdf.colors).of(sent);
-            let steps = light.steps.of_color(point.base + error * 0.5, error);
-            state.most_asked = Asked::most_asked(steps) * point.part_of_points;
+            let error = (task.scale * point.bsdf.colors).of(sent);
+            let steps = task.steps.of_color(point.base + error * 0.5, error);
+            state.most_asked = LightTask::most_asked(steps) * point.part_of_points;
         }
     }
 
     /// Counts the cells of this round, and leaves out those of points that are asked too much.
-    fn count_cells(&mut self, arrived: &mut [Arrived]) {
+    fn count_cells(&mut self, integrals: &mut [LightIntegral]) {
         let new = self.kept.len() * LANES;
         for cell in self.whole.iter().chain(&self.cut[new..]) {
             self.state[cell.point as usize].asked += 1.0;
         }
-        if self.give_up(arrived) {
+        if self.give_up(integrals) {
             let state = &self.state;
             let is_asked = |cell: &Cell| state[cell.point as usize].cells != PointSum::GIVEN_UP;
             self.whole.retain(is_asked);
@@ -394,24 +406,24 @@ impl Evaluator {
     }
 
     /// The same with panels.
-    fn count_panels(&mut self, arrived: &mut [Arrived]) {
+    fn count_panels(&mut self, integrals: &mut [LightIntegral]) {
         for panel in &self.panels {
             let state = &mut self.state[panel.point as usize];
             state.asked += 1.0;
         }
-        if self.give_up(arrived) {
+        if self.give_up(integrals) {
             self.leave_panels();
         }
     }
 
     /// Gives up what is asked too much of what something is in the way of; whether there was any.
-    fn give_up(&mut self, arrived: &mut [Arrived]) -> bool {
+    fn give_up(&mut self, integrals: &mut [LightIntegral]) -> bool {
         let mut is_any = false;
-        for ((state, between), arrived) in self.state.iter_mut().zip(&self.between).zip(arrived) {
-            let is_behind = *between != Between::default() && arrived.illumination == Illumination::Partial;
+        for ((state, between), integrals) in self.state.iter_mut().zip(&self.between).zip(integrals) {
+            let is_behind = *between != Between::default() && integrals.illumination == Illumination::Partial;
             if is_behind && state.asked > state.most_asked {
                 state.cells = PointSum::GIVEN_UP;
-                arrived.illumination = Illumination::Unknown;
+                integrals.illumination = Illumination::Unknown;
                 is_any = true;
             }
         }
@@ -419,15 +431,15 @@ impl Evaluator {
     }
 
     fn leave_panels(&mut self) {
-        let Evaluator { state, panels, .. } = self;
+        let AreaLightIntegrator { state, panels, .. } = self;
         panels.retain(|panel| state[panel.point as usize].cells != PointSum::GIVEN_UP);
     }
 
     /// Asks all cells of this round, and makes panels of those that are new and seen in part.
-    fn ask_cells(&mut self, level: Level, light: &Asked) {
-        let Evaluator { views, between, whole, cut: cut_cells, kept, panels, spare, .. } = self;
-        let falloff = light.emitter.falloff();
-        let blocked = light.blocked(between);
+    fn ask_cells(&mut self, level: Level, task: &LightTask) {
+        let AreaLightIntegrator { views, between, whole, cut: cut_cells, kept, panels, spare, .. } = self;
+        let falloff = task.emitter.falloff();
+        let blocked = task.blocked(between);
         self.fits.clear();
         self.cut_fits.clear();
         let (fits, cut_fits) = (&mut self.fits, &mut self.cut_fits);
@@ -442,7 +454,7 @@ impl Evaluator {
                 let wanted = is_cut.then_some(&mut *kept);
                 let fitted = simd.vectorize(
                     #[inline(always)]
-                    || fit(simd, light.lobe, falloff, &members, cells, wanted),
+                    || fit(simd, task.lobe, falloff, &members, cells, wanted),
                 );
                 if is_cut {
                     cut_fits.push(fitted);
@@ -455,10 +467,10 @@ impl Evaluator {
     }
 
     /// Asks all panels of this round.
-    fn ask_panels(&mut self, level: Level, light: &Asked) {
-        let Evaluator { views, between, kept, panels, panel_sums, .. } = self;
-        let blocked = light.blocked(between);
-        let moments = if light.lobe.is_none() { 1 } else { MOMENTS };
+    fn ask_panels(&mut self, level: Level, task: &LightTask) {
+        let AreaLightIntegrator { views, between, kept, panels, panel_sums, .. } = self;
+        let blocked = task.blocked(between);
+        let moments = if task.lobe.is_none() { 1 } else { MOMENTS };
         panel_sums.clear();
         dispatch_wide!(level, simd => {
             for some in panels.chunks(LANES) {
@@ -474,7 +486,7 @@ impl Evaluator {
 
     /// Accepts what is good enough, and queues the halves of what is not. Cut cells from `new` on were asked for the
     /// first time.
-    fn judge(&mut self, light: &Asked, points: &[ShadingPoint], new: usize, round: u32) {
+    fn judge(&mut self, task: &LightTask, points: &[ShadingPoint], new: usize, round: u32) {
         // What arrives as far as is known now, and how much of each new cell is seen
         for (k, cell) in self.whole.iter().enumerate() {
             self.state[cell.point as usize].expect(lane(&self.fits[k / LANES].sums, k), round);
@@ -497,10 +509,10 @@ impl Evaluator {
             if state.round == round {
                 state.round += WEIGHED;
                 let ShadingPoint { bsdf, base, share, .. } = &points[point as usize];
-                let worth = light.scale * bsdf.colors;
+                let worth = task.scale * bsdf.colors;
                 let value = worth.onto(*base, &state.estimate);
-                let allowed = light.allowed / share.max(TOLERANCE.least_share).sqrt();
-                state.weight = Weight::new(light.steps, value, &worth, allowed, light.least);
+                let allowed = task.allowed / share.max(TOLERANCE.least_share).sqrt();
+                state.weight = Weight::new(task.steps, value, &worth, allowed, task.least);
             }
         }
         // Cells that are seen whole

@@ -21,7 +21,7 @@ mod view;
 
 pub(crate) use classify::Obstacles;
 pub(crate) use emitter::Emitter;
-pub(crate) use evaluate::{Arrived, Asked, Evaluator, Illumination};
+pub(crate) use evaluate::{AreaLightIntegrator, Illumination, LightIntegral, LightTask};
 pub(crate) use tolerance::{COSTS, TOLERANCE};
 
 #[cfg(test)]

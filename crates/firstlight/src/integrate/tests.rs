@@ -164,7 +164,7 @@ fn brute(case: &Case, n: usize) -> Moments {
 /// What batches say: the same for whoever shares one, and with every instruction set.
 fn batched(case: &Case, steps: &DisplaySteps) -> Moments {
     let emitter = Emitter::Flat(case.light);
-    let asked = Asked {
+    let task = LightTask {
         emitter: &emitter,
         obstacles: &Obstacles::of(&case.spheres, &case.flats, &emitter),
         near: None,
@@ -177,9 +177,9 @@ fn batched(case: &Case, steps: &DisplaySteps) -> Moments {
         sums: true,
     };
     let all = |level: Level, count: usize| {
-        let mut arrived = Vec::new();
-        Evaluator::default().evaluate(level, &asked, &vec![case.point; count], &mut arrived);
-        arrived
+        let mut integrals = Vec::new();
+        AreaLightIntegrator::default().evaluate(level, &task, &vec![case.point; count], &mut integrals);
+        integrals
     };
     let found = all(Level::new(), 1)[0];
     assert_ne!(found.illumination, Illumination::Unknown);
@@ -344,7 +344,7 @@ impl BallCase {
         let BallCase { center, radius, physical, both_sides, .. } = *self;
         let emitter = Emitter::Ball { center, radius, physical, both_sides };
         let obstacles = Obstacles::of(&self.spheres, &self.flats, &emitter);
-        let asked = Asked {
+        let task = LightTask {
             emitter: &emitter,
             obstacles: &obstacles,
             near: None,
@@ -356,9 +356,9 @@ impl BallCase {
             shadows: true,
             sums: true,
         };
-        let mut arrived = Vec::new();
-        Evaluator::default().evaluate(Level::new(), &asked, &[self.point], &mut arrived);
-        if arrived[0].illumination == Illumination::Unknown { Moments::UNKNOWN } else { arrived[0].sums }
+        let mut integrals = Vec::new();
+        AreaLightIntegrator::default().evaluate(Level::new(), &task, &[self.point], &mut integrals);
+        if integrals[0].illumination == Illumination::Unknown { Moments::UNKNOWN } else { integrals[0].sums }
     }
 }
 

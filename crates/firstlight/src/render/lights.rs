@@ -3,7 +3,7 @@
 use super::pooled::LightPointSets;
 use crate::color::{DisplaySteps, Rgb};
 use crate::ids::LightId;
-use crate::integrate::{Asked, Emitter, Obstacles, TOLERANCE};
+use crate::integrate::{Emitter, LightTask, Obstacles, TOLERANCE};
 use crate::light::{FEW_LIGHTS, Light, LightTree};
 use crate::material::LobeKind;
 use crate::scene::Scene;
@@ -66,8 +66,8 @@ impl<'a> Lights<'a> {
 
     /// Light `index` as points of one lobe are evaluated for it, with or without what occludes it; `None` if it has no
     /// area.
-    pub fn asked<'b>(&'b self, index: usize, lobe: Option<LobeKind>, shadows: bool) -> Option<Asked<'b>> {
-        self.emitters[index].as_ref().map(|emitter| Asked {
+    pub fn task<'b>(&'b self, index: usize, lobe: Option<LobeKind>, shadows: bool) -> Option<LightTask<'b>> {
+        self.emitters[index].as_ref().map(|emitter| LightTask {
             emitter,
             obstacles: &self.obstacles[index],
             near: None,
