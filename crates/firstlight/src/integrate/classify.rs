@@ -21,9 +21,9 @@ use crate::math::{DAffine3, Facet, LANES, Vec3, Vec3x16};
 use crate::scene::{PlacedTarget, Scene};
 use crate::shape::{Parallelogram, Placement, PlaneSide, Solid, Sphere};
 use crate::visibility::{OccluderList, ShadowMesh};
-use flat::{FacetShape, Own, facet_between, flat_between};
-use light_contact::{LightSides, Touch};
-use solid::{PlacedSolid, solid_between};
+use flat::{FacetShape, Own, test_parallelogram, test_triangle};
+use light_contact::{LightContact, LightSides};
+use solid::{PlacedSolid, test_solid};
 
 /// All things that may stand in the way of one light.
 #[derive(Default)]
@@ -32,7 +32,7 @@ pub(crate) struct Obstacles<'a> {
     pub occluders: Vec<Occluder>,
     exact: Vec<ExactShape<'a>>,
     /// How each lies to the light, if that is a ball.
-    touches: Vec<Touch>,
+    contacts: Vec<LightContact>,
     /// On which sides of the plane of a flat light each has a part of itself.
     sides: Vec<LightSides>,
     /// Which placed things are among them.
@@ -95,7 +95,7 @@ impl<'a> Obstacles<'a> {
             }
             obstacles.placed.push(k as u32);
         }
-        obstacles.touch(emitter);
+        obstacles.add_contacts(emitter);
         obstacles
     }
 
@@ -112,13 +112,13 @@ impl<'a> Obstacles<'a> {
         *self = Obstacles {
             occluders: std::mem::take(&mut self.occluders),
             exact: std::mem::take(&mut self.exact),
-            touches: std::mem::take(&mut self.touches),
+            contacts: std::mem::take(&mut self.contacts),
             sides: std::mem::take(&mut self.sides),
             ..Obstacles::default()
         };
         self.occluders.clear();
         self.exact.clear();
-        self.touches.clear();
+        self.contacts.clear();
         self.sides.clear();
         for which in &trees.spheres {
             self.sphere(scene.sphere(*which));
@@ -141,7 +141,7 @@ impl<'a> Obstacles<'a> {
                 self.exact.push(ExactShape::Facet(shape));
             }
         }
-        self.touch(emitter);
+        self.add_contacts(emitter);
         self.occluders.len() + others <= MAX_OBSTACLES
     }
 
@@ -156,8 +156,8 @@ impl<'a> Obstacles<'a> {
     }
 
     /// Finds out how each lies to the light: what reaches into a ball, and what is behind the plane of a flat light.
-    fn touch(&mut self, emitter: &Emitter) {
-        self.touches.extend(self.exact.iter().map(|exact| Touch::of(emitter, exact)));
+    fn add_contacts(&mut self, emitter: &Emitter) {
+        self.contacts.extend(self.exact.iter().map(|exact| LightContact::of(emitter, exact)));
         self.sides.extend(self.exact.iter().map(|exact| LightSides::of(emitter, exact)));
     }
 
@@ -171,9 +171,9 @@ impl<'a> Obstacles<'a> {
 
     /// Each, with its sides of the light, and how it lies to a ball.
     #[inline(always)]
-    fn each(&self) -> impl Iterator<Item = (&Occluder, &ExactShape<'a>, LightSides, Touch)> {
-        let all = self.occluders.iter().zip(&self.exact).zip(self.sides.iter().zip(&self.touches));
-        all.map(|((occluder, exact), (sides, touch))| (occluder, exact, *sides, *touch))
+    fn each(&self) -> impl Iterator<Item = (&Occluder, &ExactShape<'a>, LightSides, LightContact)> {
+        let all = self.occluders.iter().zip(&self.exact).zip(self.sides.iter().zip(&self.contacts));
+        all.map(|((occluder, exact), (sides, contact))| (occluder, exact, *sides, *contact))
     }
 
     /// Whether a placed thing is among them.
@@ -189,14 +189,14 @@ impl<'a> Obstacles<'a> {
         let mut obstacles = Obstacles::default();
         spheres.iter().for_each(|sphere| obstacles.sphere(sphere));
         flats.iter().for_each(|flat| obstacles.flat(flat, PlaneSide::Both, PlaneSide::Both));
-        obstacles.touch(emitter);
+        obstacles.add_contacts(emitter);
         obstacles
     }
 }
 
 /// What is between a point, with what lies around it, and a light.
 #[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct Class {
+pub(crate) struct OcclusionClass {
     /// What may hide a part of it from the point.
     pub between: Between,
     /// Whether all of it is hidden from the point.
@@ -231,7 +231,7 @@ struct LanesSight<S: Simd> {
     error: Vec3x16<S>,
     reach: f32x16<S>,
     turn: f32x16<S>,
-    /// How far behind its plane the light may be, as far as what is asked for may be in the way of that.
+    /// How far behind its plane the light may be, as far as what is lanes for may be in the way of that.
     depth: f32,
 }
 
@@ -411,7 +411,7 @@ impl<S: Simd> LanesSight<S> {
     }
 }
 
-/// The classes of up to sixteen points, whose `views` are in a block; of those whose bits are in `asked`. What is in
+/// The classes of up to sixteen points, whose `views` are in a block; of those whose bits are in `lanes`. What is in
 /// trees is `near` and counted after what is in lists. To be called within `vectorize`.
 #[inline(always)]
 pub(crate) fn classify<S: Simd>(
@@ -421,83 +421,82 @@ pub(crate) fn classify<S: Simd>(
     emitter: &Emitter,
     views: &ViewBlock,
     points: &[ShadingPoint],
-    asked: u64,
-) -> [Class; LANES] {
-    let mut classes = [Class::default(); LANES];
-    if asked == 0 {
+    mut lanes: u64,
+) -> [OcclusionClass; LANES] {
+    let mut classes = [OcclusionClass::default(); LANES];
+    if lanes == 0 {
         return classes;
     }
     let mut sight = LanesSight::new(simd, views, points);
     let own = near.is_some().then(|| Own::new(simd, &sight, points));
     let places = LightSides::of_points(emitter, points);
-    let mut asked = asked;
-    for (i, (occluder, exact, sides, touch)) in
+    for (i, (occluder, exact, sides, contact)) in
         obstacles.each().chain(near.into_iter().flat_map(Obstacles::each)).enumerate()
     {
-        if asked == 0 {
+        if lanes == 0 {
             break;
         }
-        let before = asked & sides.of_these(places);
+        let before = lanes & sides.of_these(places);
         if before == 0 {
             continue;
         }
         // What reaches into a ball may hide some of its far half
         sight.depth = match emitter {
-            Emitter::Ball { radius, both_sides: true, .. } if touch == Touch::Cuts => 2.0 * *radius as f32,
+            Emitter::Ball { radius, both_sides: true, .. } if contact == LightContact::Intersects => {
+                2.0 * *radius as f32
+            }
             // From inside nothing else is between
-            Emitter::Face { .. } if touch != Touch::Cuts => continue,
+            Emitter::Face { .. } if contact != LightContact::Intersects => continue,
             Emitter::Ball { .. } | Emitter::Flat(_) | Emitter::Face { .. } => 0.0,
         };
-        let mut told = match (occluder, exact) {
+        let mut test = match (occluder, exact) {
             (Occluder::Sphere { center, radius }, ExactShape::Sphere(sphere)) => {
-                sphere_between(simd, &sight, center.seen_from(simd, sight.p), *radius, sphere, points, before)
+                test_sphere(simd, &sight, center.seen_from(simd, sight.p), *radius, sphere, points, before)
             }
             (Occluder::Flat { corners }, ExactShape::Flat { flat, side, seen_side }) => {
                 let corners = corners_from(simd, corners, sight.p);
-                flat_between(simd, &sight, corners, (flat, *side, *seen_side), points, before)
+                test_parallelogram(simd, &sight, corners, (flat, *side, *seen_side), points, before)
             }
-            (Occluder::Solid(_), ExactShape::Solid(shape)) => {
-                solid_between(simd, &sight, shape, occluder, points, before)
-            }
+            (Occluder::Solid(_), ExactShape::Solid(shape)) => test_solid(simd, &sight, shape, occluder, points, before),
             (Occluder::Flat { corners }, ExactShape::Facet(shape)) => match &own {
                 Some(own) => {
-                    facet_between(simd, &sight, corners_from(simd, corners, sight.p), shape, own, points, before)
+                    test_triangle(simd, &sight, corners_from(simd, corners, sight.p), shape, own, points, before)
                 }
                 None => unreachable!("no triangle is in lists"),
             },
             _ => unreachable!("both lists hold the same things"),
         };
-        if touch == Touch::Cuts {
+        if contact == LightContact::Intersects {
             // Of the ball more may be seen than of its disk, and of its far half less
-            told.other |= told.outside | told.within | told.around | told.hidden;
-            (told.outside, told.within, told.hidden, told.firm) = (0, 0, 0, 0);
+            test.other |= test.outside | test.within | test.around | test.hidden;
+            (test.outside, test.within, test.hidden, test.firm) = (0, 0, 0, 0);
         }
-        if (told.outside | told.within | told.hidden | told.moving | told.other) & asked == 0 {
+        if (test.outside | test.within | test.hidden | test.moving | test.other) & lanes == 0 {
             continue;
         }
-        if touch == Touch::Holds {
-            told.hidden |= told.outside;
-            (told.outside, told.within) = (0, 0);
+        if contact == LightContact::Contains {
+            test.hidden |= test.outside;
+            (test.outside, test.within) = (0, 0);
         }
-        let motion = told.motion.to_array();
+        let motion = test.motion.to_array();
         for (k, class) in classes.iter_mut().enumerate().take(points.len()) {
-            if asked >> k & 1 == 0 {
+            if lanes >> k & 1 == 0 {
                 continue;
             }
-            if told.moving >> k & 1 == 1 {
+            if test.moving >> k & 1 == 1 {
                 class.motion = class.motion.max(motion[k]);
             }
-            if told.hidden >> k & 1 == 1 {
+            if test.hidden >> k & 1 == 1 {
                 class.hidden = true;
-                if told.firm >> k & 1 == 1 {
+                if test.firm >> k & 1 == 1 {
                     class.motion = 0.0;
                 }
-                asked &= !(1 << k);
+                lanes &= !(1 << k);
                 continue;
             }
-            class.other |= told.other >> k & 1 == 1;
-            class.between.outside |= (told.outside >> k & 1) << i;
-            class.between.within |= (told.within >> k & 1) << i;
+            class.other |= test.other >> k & 1 == 1;
+            class.between.outside |= (test.outside >> k & 1) << i;
+            class.between.within |= (test.within >> k & 1) << i;
         }
     }
     for class in &mut classes {
@@ -509,7 +508,7 @@ pub(crate) fn classify<S: Simd>(
 }
 
 /// What one thing does to sixteen points, in bits.
-struct Told<S: Simd> {
+struct OccluderTest<S: Simd> {
     /// It may hide a part of the light, from outside of it or from within.
     outside: u64,
     within: u64,
@@ -525,33 +524,33 @@ struct Told<S: Simd> {
     motion: f32x16<S>,
 }
 
-impl<S: Simd> Told<S> {
+impl<S: Simd> OccluderTest<S> {
     #[inline(always)]
     fn nothing(zero: f32x16<S>) -> Self {
-        Told { outside: 0, within: 0, around: 0, hidden: 0, other: 0, firm: 0, moving: 0, motion: zero }
+        OccluderTest { outside: 0, within: 0, around: 0, hidden: 0, other: 0, firm: 0, moving: 0, motion: zero }
     }
 }
 
 #[inline(always)]
-fn sphere_between<S: Simd>(
+fn test_sphere<S: Simd>(
     simd: S,
     sight: &LanesSight<S>,
     s: Vec3x16<S>,
     r: f32,
     sphere: &Sphere,
     points: &[ShadingPoint],
-    asked: u64,
-) -> Told<S> {
+    lanes: u64,
+) -> OccluderTest<S> {
     let zero = simd.splat_f32x16(0.0);
-    let mut told = Told::nothing(zero);
+    let mut test = OccluderTest::nothing(zero);
     let distance2 = s.dot(s);
     let distance = distance2.sqrt();
     // On which side of the sphere the points are: where that is close, to the last bit
     let power = distance2 - r * r;
     let margin = s.abs().dot(sight.error) * 2.0;
     let room = margin + (distance2 + r * r) * 1e-6;
-    let mut close = power.abs().simd_le(room).to_bitmask() & asked;
-    let mut inside = power.simd_lt(zero).to_bitmask() & asked & !close;
+    let mut close = power.abs().simd_le(room).to_bitmask() & lanes;
+    let mut inside = power.simd_lt(zero).to_bitmask() & lanes & !close;
     let mut on = 0;
     while close != 0 {
         let k = close.trailing_zeros() as usize;
@@ -571,8 +570,8 @@ fn sphere_between<S: Simd>(
     let below_all = (-height).simd_gt(slack + r + around).to_bitmask();
     // From its outside nothing of it is above the horizon, but by rounding
     let outer = on & height.simd_lt(zero).to_bitmask();
-    let within = (inside | on & !outer) & asked;
-    let outside = asked & !on & !inside;
+    let within = (inside | on & !outer) & lanes;
+    let outside = lanes & !on & !inside;
     if within != 0 {
         let mut all_in = within;
         let mut none_in = within;
@@ -589,42 +588,42 @@ fn sphere_between<S: Simd>(
         let deep = (r - distance).simd_gt(sight.reach * 2.0).to_bitmask();
         let touches = on & (sight.turn * r).simd_lt(sight.reach * 0.5).to_bitmask();
         let moving = within & (inside | touches) & !deep & sight.reach.simd_gt(zero).to_bitmask();
-        told.around = within;
-        told.hidden |= none_in;
-        told.firm |= none_in & !moving;
-        told.within = within & !all_in & !none_in;
+        test.around = within;
+        test.hidden |= none_in;
+        test.firm |= none_in & !moving;
+        test.within = within & !all_in & !none_in;
         // From outside it hides a light that is inside of it as well
         let all_around = (r - distance).simd_gt(sight.reach).to_bitmask();
-        told.moving |= moving & !(all_in & all_around);
-        told.motion = simd.splat_f32x16(f32::INFINITY);
+        test.moving |= moving & !(all_in & all_around);
+        test.motion = simd.splat_f32x16(f32::INFINITY);
     }
     let [around, mut near] = sight.meets(s, distance, r, outside & !below_all);
     if around == 0 {
-        return told;
+        return test;
     }
     let toward = (distance - sight.reach).max(simd.splat_f32x16(r));
     let tangent = (toward * toward - r * r).max(zero).sqrt();
     let motion = sight.motion(tangent);
-    told.motion = if told.moving != 0 {
-        let moving = fearless_simd::mask32x16::from_bitmask(simd, told.moving);
-        moving.select(told.motion, motion)
+    test.motion = if test.moving != 0 {
+        let moving = fearless_simd::mask32x16::from_bitmask(simd, test.moving);
+        moving.select(test.motion, motion)
     } else {
         motion
     };
-    told.moving |= around & sight.reach.simd_gt(zero).to_bitmask();
+    test.moving |= around & sight.reach.simd_gt(zero).to_bitmask();
     near &= !below;
     if near == 0 {
-        return told;
+        return test;
     }
     // One convex thing hides all of the light if it hides its corners
     let shadow = Shadow::cone(simd, s, r, &sight.ways);
     let hidden = sight.hidden(&shadow, near);
-    told.hidden |= hidden;
-    told.outside = near & !hidden;
+    test.hidden |= hidden;
+    test.outside = near & !hidden;
     // From everywhere around: ways to the corners pass its middle nearly as closely. From inside of it, more may be
     // seen
     let patches = hidden & sight.reach.simd_gt(zero).to_bitmask();
-    told.firm |= hidden & !patches;
+    test.firm |= hidden & !patches;
     let mut patches = patches & (distance - r).simd_gt(sight.reach).to_bitmask();
     while patches != 0 {
         let k = patches.trailing_zeros() as usize;
@@ -632,8 +631,8 @@ fn sphere_between<S: Simd>(
         let smaller = r - points[k].reach;
         if smaller > 0.0 {
             let shadow = Shadow::cone(simd, s, smaller, &sight.ways);
-            told.firm |= sight.hidden(&shadow, 1 << k);
+            test.firm |= sight.hidden(&shadow, 1 << k);
         }
     }
-    told
+    test
 }

@@ -19,7 +19,7 @@ use arrayvec::ArrayVec;
 use fearless_simd::{Level, Simd};
 
 use super::batch::{LaneNumbers, Members, ViewBlock};
-use super::classify::{Class, Obstacles, classify};
+use super::classify::{Obstacles, OcclusionClass, classify};
 use super::emitter::Emitter;
 use super::fit::{Cell, CutBlock, Fits, MOMENTS, fit};
 use super::grade::{Grades, grade, halves, survey, whole};
@@ -53,7 +53,7 @@ pub(crate) struct LightIntegral {
     pub illumination: Illumination,
     /// Whether the same is proved for all places within the point's reach.
     pub proved: bool,
-    /// See [`Class::motion`].
+    /// See [`OcclusionClass::motion`].
     pub motion: f32,
     /// How far the light is away, and the point from its plane.
     pub distance: f32,
@@ -283,8 +283,8 @@ impl AreaLightIntegrator {
                 if is(survey.arrives) {
                     one.motion = class.motion;
                     one.illumination = match class {
-                        Class { hidden: true, .. } => Illumination::Hidden,
-                        Class { other: true, .. } => Illumination::Unknown,
+                        OcclusionClass { hidden: true, .. } => Illumination::Hidden,
+                        OcclusionClass { other: true, .. } => Illumination::Unknown,
                         _ if is_open && is(survey.above) => Illumination::Full,
                         _ => Illumination::Partial,
                     };

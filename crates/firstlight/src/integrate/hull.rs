@@ -21,14 +21,14 @@ pub(crate) struct SolidOccluder {
     rows: [Vec3; 3],
     pub kind: Canonical,
     /// Whether a part of the light may be inside.
-    touches: bool,
+    may_contain_light: bool,
 }
 
 impl SolidOccluder {
-    pub fn new(world_from_canonical: &DAffine3, kind: Canonical, touches: bool) -> SolidOccluder {
+    pub fn new(world_from_canonical: &DAffine3, kind: Canonical, may_contain_light: bool) -> SolidOccluder {
         let inverse = world_from_canonical.matrix3.inverse().transpose();
         let rows = [inverse.x_axis, inverse.y_axis, inverse.z_axis].map(|row: DVec3| row.as_vec3());
-        SolidOccluder { center: Exact::new(world_from_canonical.translation), rows, kind, touches }
+        SolidOccluder { center: Exact::new(world_from_canonical.translation), rows, kind, may_contain_light }
     }
 
     #[inline(always)]
@@ -214,7 +214,7 @@ impl<S: Simd> Hull<S> {
         let empty = Rim { quadratic: Quadratic16::square(&nothing), ahead: nothing, plane: nothing };
         let mut hull =
             Hull { faces: [[nothing; 5]; FACES], rims: [empty; RIMS], count: [0; 2], hole: Hole::None, inside: None };
-        if solid.touches {
+        if solid.may_contain_light {
             hull.inside = Inside::new(solid.kind, to, l);
         }
         match solid.kind {

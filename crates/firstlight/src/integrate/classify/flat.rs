@@ -2,7 +2,7 @@
 
 use fearless_simd::{f32x16, prelude::*};
 
-use super::{LanesSight, SLACK, Told};
+use super::{LanesSight, OccluderTest, SLACK};
 use crate::integrate::batch::Exact;
 use crate::integrate::row::edges;
 use crate::material::ShadingPoint;
@@ -10,16 +10,16 @@ use crate::math::{DVec3, Facet, LANES, Vec3, Vec3x16};
 use crate::shape::{Parallelogram, PlaneSide, is_in_plane};
 
 #[inline(always)]
-pub(super) fn flat_between<S: Simd>(
+pub(super) fn test_parallelogram<S: Simd>(
     simd: S,
     sight: &LanesSight<S>,
     q: [Vec3x16<S>; 4],
     (flat, side, seen_side): (&Parallelogram, PlaneSide, PlaneSide),
     points: &[ShadingPoint],
-    asked: u64,
-) -> Told<S> {
+    lanes: u64,
+) -> OccluderTest<S> {
     let zero = simd.splat_f32x16(0.0);
-    let mut told = Told::nothing(zero);
+    let mut test = OccluderTest::nothing(zero);
     let mut size2 = zero;
     let mut rises = simd.splat_f32x16(f32::NEG_INFINITY);
     for q in &q {
@@ -29,9 +29,9 @@ pub(super) fn flat_between<S: Simd>(
     let rounding = size2.sqrt() * SLACK;
     // Above whose horizon it rises
     let around = sight.reach + sight.turn * (size2.sqrt() + sight.reach);
-    let mut near = asked & rises.simd_ge(-rounding - around).to_bitmask();
+    let mut near = lanes & rises.simd_ge(-rounding - around).to_bitmask();
     if near == 0 {
-        return told;
+        return test;
     }
     let gap = sight.gap(&q);
     near &= gap.simd_le(rounding + sight.reach).to_bitmask();
@@ -49,7 +49,7 @@ pub(super) fn flat_between<S: Simd>(
     }
     near = through | beside;
     if near == 0 {
-        return told;
+        return test;
     }
     let lines = edges(q, &sight.ways);
     let n = (q[1] - q[0]).cross(q[3] - q[0]);
@@ -66,17 +66,17 @@ pub(super) fn flat_between<S: Simd>(
             beside >> k & 1 == 1 && distance <= point.reach && flat.screens(point.p, point.wo, point.reach, seen_side);
         if !is_screen {
             motion[k] = (distance - point.reach).max(0.0);
-            told.moving |= 1 << k;
+            test.moving |= 1 << k;
         }
     }
-    told.motion = sight.motion(f32x16::simd_from(simd, motion));
+    test.motion = sight.motion(f32x16::simd_from(simd, motion));
     near &= through & gap.simd_le(rounding).to_bitmask() & rises.simd_ge(-rounding).to_bitmask();
     if near == 0 {
-        return told;
+        return test;
     }
     let [near, hidden] = sight.covered(&lines, near);
-    told.hidden = hidden;
-    told.outside = near & !hidden;
+    test.hidden = hidden;
+    test.outside = near & !hidden;
     // From everywhere around: all ways to the corners pass far inside of the edges
     let mut patches = hidden;
     while patches != 0 {
@@ -84,7 +84,7 @@ pub(super) fn flat_between<S: Simd>(
         patches &= patches - 1;
         let point = &points[k];
         if point.reach == 0.0 {
-            told.firm |= 1 << k;
+            test.firm |= 1 << k;
             continue;
         }
         let share = (motion[k] + point.reach) / sight.far.to_array()[k];
@@ -98,10 +98,10 @@ pub(super) fn flat_between<S: Simd>(
             }
         }
         if depth * share.min(1.0) > point.reach {
-            told.firm |= 1 << k;
+            test.firm |= 1 << k;
         }
     }
-    told
+    test
 }
 
 /// A triangle of a mesh as it is placed.
@@ -178,17 +178,17 @@ impl<S: Simd> Own<S> {
 
 #[allow(clippy::too_many_arguments, reason = "a triangle, sixteen points and what they are on")]
 #[inline(always)]
-pub(super) fn facet_between<S: Simd>(
+pub(super) fn test_triangle<S: Simd>(
     simd: S,
     sight: &LanesSight<S>,
     q: [Vec3x16<S>; 4],
     shape: &FacetShape,
     own: &Own<S>,
     points: &[ShadingPoint],
-    asked: u64,
-) -> Told<S> {
+    lanes: u64,
+) -> OccluderTest<S> {
     let zero = simd.splat_f32x16(0.0);
-    let mut told = Told::nothing(zero);
+    let mut test = OccluderTest::nothing(zero);
     let mut size2 = zero;
     let mut rises = simd.splat_f32x16(f32::NEG_INFINITY);
     let mut over_own = rises;
@@ -199,7 +199,7 @@ pub(super) fn facet_between<S: Simd>(
     }
     let rounding = size2.sqrt() * SLACK;
     let room = sight.error.dot(sight.error).sqrt() * 4.0 + shape.edge * LEVEL;
-    let mut near = asked & rises.simd_gt(room).to_bitmask();
+    let mut near = lanes & rises.simd_gt(room).to_bitmask();
     // One that goes on as a lifted point's own facet does, or falls off from it, hides nothing that is above that; and
     // one in the same plane nothing at all: what comes from below has passed that plane before it gets there
     let level = near & own.lifted & over_own.simd_le(room).to_bitmask();
@@ -211,7 +211,7 @@ pub(super) fn facet_between<S: Simd>(
     let gap = sight.gap(&q[..3]);
     near &= gap.simd_le(rounding + sight.reach).to_bitmask();
     if near == 0 {
-        return told;
+        return test;
     }
     let mut distances = [0.0f32; LANES];
     for (k, point) in points.iter().enumerate() {
@@ -223,19 +223,19 @@ pub(super) fn facet_between<S: Simd>(
             near &= !bit;
         } else if point.reach > 0.0 {
             distances[k] = (shape.distance(point.p.as_dvec3()) - point.reach).max(0.0);
-            told.moving |= bit;
+            test.moving |= bit;
         }
     }
-    told.motion = sight.motion(f32x16::simd_from(simd, distances));
+    test.motion = sight.motion(f32x16::simd_from(simd, distances));
     near &= gap.simd_le(rounding).to_bitmask();
     if near == 0 {
-        return told;
+        return test;
     }
     let [near, hidden] = sight.covered(&edges(q, &sight.ways), near);
-    told.hidden = hidden;
-    told.firm = hidden & !told.moving;
-    told.outside = near & !hidden;
-    told
+    test.hidden = hidden;
+    test.firm = hidden & !test.moving;
+    test.outside = near & !hidden;
+    test
 }
 
 /// How far a triangle is from the origin.

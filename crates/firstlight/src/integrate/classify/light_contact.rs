@@ -55,33 +55,33 @@ impl LightSides {
 
 /// How something lies to a light that is a ball.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Touch {
-    Apart,
+pub(super) enum LightContact {
+    Disjoint,
     /// It reaches into it: what of it is behind the light's surface does not show on the disk that stands for the
     /// light.
-    Cuts,
+    Intersects,
     /// The light is inside of it.
-    Holds,
+    Contains,
 }
 
-impl Touch {
-    pub fn of(emitter: &Emitter, exact: &ExactShape) -> Touch {
-        let Emitter::Ball { center, radius, .. } = emitter else { return Touch::Apart };
+impl LightContact {
+    pub fn of(emitter: &Emitter, exact: &ExactShape) -> LightContact {
+        let Emitter::Ball { center, radius, .. } = emitter else { return LightContact::Disjoint };
         match exact {
             ExactShape::Sphere(sphere) => {
                 let distance = (*center - sphere.c).length();
                 if distance >= radius + sphere.r {
-                    Touch::Apart
+                    LightContact::Disjoint
                 } else if distance + radius <= sphere.r * (1.0 - 1e-9) {
-                    Touch::Holds
+                    LightContact::Contains
                 } else {
-                    Touch::Cuts
+                    LightContact::Intersects
                 }
             }
-            ExactShape::Flat { flat, .. } if flat.distance(*center) < *radius => Touch::Cuts,
-            ExactShape::Solid(solid) if solid.may_touch => Touch::Cuts,
-            ExactShape::Facet(shape) if f64::from(shape.distance(*center)) < *radius => Touch::Cuts,
-            ExactShape::Flat { .. } | ExactShape::Solid(_) | ExactShape::Facet(_) => Touch::Apart,
+            ExactShape::Flat { flat, .. } if flat.distance(*center) < *radius => LightContact::Intersects,
+            ExactShape::Solid(solid) if solid.may_contain_light => LightContact::Intersects,
+            ExactShape::Facet(shape) if f64::from(shape.distance(*center)) < *radius => LightContact::Intersects,
+            ExactShape::Flat { .. } | ExactShape::Solid(_) | ExactShape::Facet(_) => LightContact::Disjoint,
         }
     }
 }

@@ -2,7 +2,7 @@
 
 use fearless_simd::{f32x16, prelude::*};
 
-use super::{LanesSight, SLACK, Told};
+use super::{LanesSight, OccluderTest, SLACK};
 use crate::integrate::batch::Exact;
 use crate::integrate::emitter::Emitter;
 use crate::integrate::hull::SolidOccluder;
@@ -20,7 +20,7 @@ pub(super) struct PlacedSolid {
     /// The box around it, if it has an end.
     bounds: Option<[DVec3; 2]>,
     /// Whether a part of the light may be in it, and whether all is.
-    pub may_touch: bool,
+    pub may_contain_light: bool,
     contains: bool,
 }
 
@@ -57,11 +57,11 @@ impl PlacedSolid {
             kind,
             canonical_from_world,
             bounds,
-            may_touch: false,
+            may_contain_light: false,
             contains: emitter.corners().iter().all(|q| kind.holds(canonical_from_world.transform_point3(*q), ROUNDING)),
         };
-        made.may_touch = made.touches(emitter);
-        let occluder = SolidOccluder::new(&world_from_canonical, kind, made.may_touch);
+        made.may_contain_light = made.touches(emitter);
+        let occluder = SolidOccluder::new(&world_from_canonical, kind, made.may_contain_light);
         Some((made, occluder))
     }
 
@@ -189,25 +189,25 @@ impl PlacedSolid {
     }
 }
 
-/// Which of the points asked see some of the light past the solid, or nothing of it.
+/// Which of the points lanes see some of the light past the solid, or nothing of it.
 #[inline(always)]
-pub(super) fn solid_between<S: Simd>(
+pub(super) fn test_solid<S: Simd>(
     simd: S,
     sight: &LanesSight<S>,
     shape: &PlacedSolid,
     occluder: &Occluder,
     points: &[ShadingPoint],
-    asked: u64,
-) -> Told<S> {
+    lanes: u64,
+) -> OccluderTest<S> {
     let zero = simd.splat_f32x16(0.0);
-    let mut told = Told::nothing(zero);
-    let (mut around, mut near) = (asked, asked);
+    let mut test = OccluderTest::nothing(zero);
+    let (mut around, mut near) = (lanes, lanes);
     if let Some([low, high]) = shape.bounds {
         let s: Vec3x16<S> = Exact::new((low + high) * 0.5).seen_from(simd, sight.p);
-        [around, near] = sight.meets(s, s.dot(s).sqrt(), ((high - low).length() * 0.5) as f32, asked);
+        [around, near] = sight.meets(s, s.dot(s).sqrt(), ((high - low).length() * 0.5) as f32, lanes);
     }
     if around == 0 {
-        return told;
+        return test;
     }
     let mut distances = [0.0f32; LANES];
     let (mut hidden, mut firm) = (0, 0);
@@ -224,8 +224,8 @@ pub(super) fn solid_between<S: Simd>(
             Lies::Near => near &= !bit,
             lies @ (Lies::Inside | Lies::NearlyInside) => {
                 near &= !bit;
-                if shape.kind.has_hole() || shape.may_touch && !shape.contains {
-                    told.other |= bit;
+                if shape.kind.has_hole() || shape.may_contain_light && !shape.contains {
+                    test.other |= bit;
                     continue;
                 }
                 // All of the light is inside, or none of it
@@ -241,9 +241,9 @@ pub(super) fn solid_between<S: Simd>(
         }
     }
     near &= around;
-    (told.hidden, told.firm) = (hidden, hidden & firm);
+    (test.hidden, test.firm) = (hidden, hidden & firm);
     if around == 0 {
-        return told;
+        return test;
     }
     let shadow = Shadow::new(simd, occluder, sight.p, &sight.ways);
     if shape.kind == Canonical::Plane && sight.depth == 0.0 {
@@ -256,14 +256,14 @@ pub(super) fn solid_between<S: Simd>(
         near &= some;
         around &= some | close;
     }
-    told.moving = around & sight.reach.simd_gt(zero).to_bitmask();
-    told.motion = sight.motion(f32x16::simd_from(simd, distances));
+    test.moving = around & sight.reach.simd_gt(zero).to_bitmask();
+    test.motion = sight.motion(f32x16::simd_from(simd, distances));
     if !shape.kind.has_hole() {
         // It is convex: what hides all corners hides all
-        told.hidden |= sight.hidden(&shadow, near);
-        told.firm |= told.hidden & !told.moving;
+        test.hidden |= sight.hidden(&shadow, near);
+        test.firm |= test.hidden & !test.moving;
     }
-    told.other |= if shape.may_touch && shape.kind.has_hole() && !shape.kind.is_flat() { near } else { 0 };
-    told.outside = near & !told.hidden;
-    told
+    test.other |= if shape.may_contain_light && shape.kind.has_hole() && !shape.kind.is_flat() { near } else { 0 };
+    test.outside = near & !test.hidden;
+    test
 }
