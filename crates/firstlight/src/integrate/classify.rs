@@ -14,7 +14,7 @@ use super::batch::{Exact, Linear16, ViewBlock, ViewNumber, Views, ways};
 use super::emitter::Emitter;
 use super::hull::SolidOccluder;
 use super::occluder::{Occluder, Shadow, corners_from};
-use super::panels::{Between, MAX_INTERVALS};
+use super::panels::{MAX_INTERVALS, OccluderMask};
 use crate::ids::LightId;
 use crate::material::ShadingPoint;
 use crate::math::{DAffine3, Facet, LANES, Vec3, Vec3x16};
@@ -27,7 +27,7 @@ use solid::{PlacedSolid, test_solid};
 
 /// All things that may stand in the way of one light.
 #[derive(Default)]
-pub(crate) struct Obstacles<'a> {
+pub(crate) struct LightOccluders<'a> {
     /// As they are met row by row, and as they are; number by number the same.
     pub occluders: Vec<Occluder>,
     exact: Vec<ExactShape<'a>>,
@@ -56,47 +56,47 @@ enum ExactShape<'a> {
 }
 
 /// The most obstacles of a light, those in lists and those in trees.
-pub(crate) const MAX_OBSTACLES: usize = 64;
+pub(crate) const MAX_OCCLUDERS: usize = 64;
 
-impl<'a> Obstacles<'a> {
+impl<'a> LightOccluders<'a> {
     /// Those of light `index` that are in lists, and solids.
-    pub fn new(scene: &'a Scene, index: usize, emitter: &Emitter) -> Obstacles<'a> {
+    pub fn new(scene: &'a Scene, index: usize, emitter: &Emitter) -> LightOccluders<'a> {
         let id = LightId(index as u32);
-        let mut obstacles = Obstacles::default();
+        let mut all = LightOccluders::default();
         if !scene.lights[index].shadows {
-            return obstacles;
+            return all;
         }
         let listed = &scene.occluders;
         for (_, sphere) in scene.that_stop(&listed.spheres, id) {
-            obstacles.sphere(&sphere.shape);
+            all.sphere(&sphere.shape);
         }
         let sides = listed.sides(id);
         for (i, flat) in scene.that_stop(&listed.flats, id) {
             let side = sides.get(i).copied().unwrap_or(PlaneSide::Both);
             let seen_side = if listed.flats_seen.get(i) == Some(&true) { side } else { PlaneSide::Both };
-            obstacles.flat(&flat.shape, side, seen_side);
+            all.flat(&flat.shape, side, seen_side);
         }
         for (_, disk) in scene.that_stop(&listed.disks, id) {
-            obstacles.solid(PlacedSolid::new(Solid::Disk(disk.shape), Placement::new(DAffine3::IDENTITY), emitter));
+            all.solid(PlacedSolid::new(Solid::Disk(disk.shape), Placement::new(DAffine3::IDENTITY), emitter));
         }
-        obstacles.has_more = obstacles.occluders.len() > MAX_OBSTACLES;
-        obstacles.occluders.truncate(MAX_OBSTACLES);
-        obstacles.exact.truncate(MAX_OBSTACLES);
+        all.has_more = all.occluders.len() > MAX_OCCLUDERS;
+        all.occluders.truncate(MAX_OCCLUDERS);
+        all.exact.truncate(MAX_OCCLUDERS);
         for (k, thing) in scene.geometry.placed.iter().enumerate() {
             let PlacedTarget::Solid(solid) = thing.target else { continue };
-            if !scene.geometry.stops(thing.shadow, id) || obstacles.occluders.len() == MAX_OBSTACLES {
+            if !scene.geometry.stops(thing.shadow, id) || all.occluders.len() == MAX_OCCLUDERS {
                 continue;
             }
             let solid = scene.geometry.solids[solid as usize];
             match solid::sphere(&solid, &thing.placement) {
-                Some(sphere) => obstacles.sphere(&sphere),
-                None if obstacles.solid(PlacedSolid::new(solid, thing.placement, emitter)) => {}
+                Some(sphere) => all.sphere(&sphere),
+                None if all.solid(PlacedSolid::new(solid, thing.placement, emitter)) => {}
                 None => continue,
             }
-            obstacles.placed.push(k as u32);
+            all.placed.push(k as u32);
         }
-        obstacles.add_contacts(emitter);
-        obstacles
+        all.add_contacts(emitter);
+        all
     }
 
     /// Takes what was gathered in trees in the way of light `id`, but for placed things, in place of what it was;
@@ -109,13 +109,8 @@ impl<'a> Obstacles<'a> {
         trees: &OccluderList,
         others: usize,
     ) -> bool {
-        *self = Obstacles {
-            occluders: std::mem::take(&mut self.occluders),
-            exact: std::mem::take(&mut self.exact),
-            contacts: std::mem::take(&mut self.contacts),
-            sides: std::mem::take(&mut self.sides),
-            ..Obstacles::default()
-        };
+        self.has_more = false;
+        self.placed.clear();
         self.occluders.clear();
         self.exact.clear();
         self.contacts.clear();
@@ -142,7 +137,7 @@ impl<'a> Obstacles<'a> {
             }
         }
         self.add_contacts(emitter);
-        self.occluders.len() + others <= MAX_OBSTACLES
+        self.occluders.len() + others <= MAX_OCCLUDERS
     }
 
     fn sphere(&mut self, sphere: &Sphere) {
@@ -183,14 +178,14 @@ impl<'a> Obstacles<'a> {
 }
 
 #[cfg(test)]
-impl<'a> Obstacles<'a> {
+impl<'a> LightOccluders<'a> {
     /// Spheres alone, and parallelograms.
-    pub fn of(spheres: &'a [Sphere], flats: &'a [Parallelogram], emitter: &Emitter) -> Obstacles<'a> {
-        let mut obstacles = Obstacles::default();
-        spheres.iter().for_each(|sphere| obstacles.sphere(sphere));
-        flats.iter().for_each(|flat| obstacles.flat(flat, PlaneSide::Both, PlaneSide::Both));
-        obstacles.add_contacts(emitter);
-        obstacles
+    pub fn of(spheres: &'a [Sphere], flats: &'a [Parallelogram], emitter: &Emitter) -> LightOccluders<'a> {
+        let mut listed = LightOccluders::default();
+        spheres.iter().for_each(|sphere| listed.sphere(sphere));
+        flats.iter().for_each(|flat| listed.flat(flat, PlaneSide::Both, PlaneSide::Both));
+        listed.add_contacts(emitter);
+        listed
     }
 }
 
@@ -198,7 +193,7 @@ impl<'a> Obstacles<'a> {
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct OcclusionClass {
     /// What may hide a part of it from the point.
-    pub between: Between,
+    pub mask: OccluderMask,
     /// Whether all of it is hidden from the point.
     pub hidden: bool,
     /// Whether something is in the way that is not told row by row.
@@ -416,8 +411,8 @@ impl<S: Simd> LanesSight<S> {
 #[inline(always)]
 pub(crate) fn classify<S: Simd>(
     simd: S,
-    obstacles: &Obstacles,
-    near: Option<&Obstacles>,
+    listed: &LightOccluders,
+    near: Option<&LightOccluders>,
     emitter: &Emitter,
     views: &ViewBlock,
     points: &[ShadingPoint],
@@ -431,7 +426,7 @@ pub(crate) fn classify<S: Simd>(
     let own = near.is_some().then(|| Own::new(simd, &sight, points));
     let places = LightSides::of_points(emitter, points);
     for (i, (occluder, exact, sides, contact)) in
-        obstacles.each().chain(near.into_iter().flat_map(Obstacles::each)).enumerate()
+        listed.each().chain(near.into_iter().flat_map(LightOccluders::each)).enumerate()
     {
         if lanes == 0 {
             break;
@@ -495,14 +490,14 @@ pub(crate) fn classify<S: Simd>(
                 continue;
             }
             class.other |= test.other >> k & 1 == 1;
-            class.between.outside |= (test.outside >> k & 1) << i;
-            class.between.within |= (test.within >> k & 1) << i;
+            class.mask.outside |= (test.outside >> k & 1) << i;
+            class.mask.within |= (test.within >> k & 1) << i;
         }
     }
     for class in &mut classes {
-        let Between { outside, within } = class.between;
+        let OccluderMask { outside, within } = class.mask;
         let many = 2 * (outside.count_ones() + within.count_ones()) as usize;
-        class.other |= many > MAX_INTERVALS || obstacles.has_more;
+        class.other |= many > MAX_INTERVALS || listed.has_more;
     }
     classes
 }

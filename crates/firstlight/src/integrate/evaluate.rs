@@ -19,11 +19,11 @@ use arrayvec::ArrayVec;
 use fearless_simd::{Level, Simd};
 
 use super::batch::{LaneNumbers, Members, ViewBlock};
-use super::classify::{Obstacles, OcclusionClass, classify};
+use super::classify::{LightOccluders, OcclusionClass, classify};
 use super::emitter::Emitter;
 use super::fit::{Cell, CutBlock, Fits, MOMENTS, fit};
 use super::grade::{Grades, grade, halves, survey, whole};
-use super::panels::{Between, Blocked, Panel, PanelSums, cut, rows};
+use super::panels::{OccludedLight, OccluderMask, Panel, PanelSums, cut, rows};
 use super::tolerance::{COSTS, TOLERANCE, Weight};
 use super::view::FlatView;
 use crate::color::{DisplaySteps, Rgb};
@@ -82,9 +82,9 @@ impl LightIntegral {
 #[derive(Clone, Copy)]
 pub(crate) struct LightTask<'a> {
     pub emitter: &'a Emitter,
-    pub obstacles: &'a Obstacles<'a>,
+    pub listed: &'a LightOccluders<'a>,
     /// What of trees may be in the way, if anything is.
-    pub near: Option<&'a Obstacles<'a>>,
+    pub near: Option<&'a LightOccluders<'a>>,
     /// The kind of the points' lobes.
     pub lobe: Option<LobeKind>,
     /// What its moments are multiplied with before the colours of a surface.
@@ -108,9 +108,9 @@ impl LightTask<'_> {
     }
 
     /// The light with what is between it and points.
-    fn blocked<'b>(&'b self, between: &'b [Between]) -> Blocked<'b> {
+    fn occluded_light<'b>(&'b self, masks: &'b [OccluderMask]) -> OccludedLight<'b> {
         let near = self.near.map_or(&[][..], |near| &near.occluders);
-        Blocked { occluders: [&self.obstacles.occluders, near], outline: self.emitter.outline(), between }
+        OccludedLight { occluders: [&self.listed.occluders, near], outline: self.emitter.outline(), masks }
     }
 }
 
@@ -126,7 +126,7 @@ const LARGEST_CODE: f32 = u8::MAX as f32;
 pub(crate) struct AreaLightIntegrator {
     /// Point by point.
     views: Vec<ViewBlock>,
-    between: Vec<Between>,
+    masks: Vec<OccluderMask>,
     state: Vec<PointSum>,
     /// Cells to be graded, their grades, and the halves of those that are too wide.
     grading: Vec<Cell>,
@@ -244,7 +244,7 @@ impl AreaLightIntegrator {
         if self.views.len() < points.len().div_ceil(LANES) {
             self.views.resize(points.len().div_ceil(LANES), ViewBlock::default());
         }
-        self.between.clear();
+        self.masks.clear();
         self.state.clear();
         self.state.resize(points.len(), PointSum::default());
         self.whole.clear();
@@ -264,7 +264,7 @@ impl AreaLightIntegrator {
                         let mut survey = survey(simd, views, task.emitter.is_physical(), points);
                         survey.arrives &= there;
                         let asked = if task.shadows { survey.arrives } else { 0 };
-                        let classes = classify(simd, task.obstacles, task.near, task.emitter, views, points, asked);
+                        let classes = classify(simd, task.listed, task.near, task.emitter, views, points, asked);
                         (survey, classes)
                     },
                 )
@@ -279,7 +279,7 @@ impl AreaLightIntegrator {
                     distance: if is(there) { survey.nearest[k] } else { 0.0 },
                     height: if is(there) { survey.height[k] } else { 0.0 },
                 };
-                let is_open = class.between == Between::default();
+                let is_open = class.mask == OccluderMask::default();
                 if is(survey.arrives) {
                     one.motion = class.motion;
                     one.illumination = match class {
@@ -307,7 +307,7 @@ impl AreaLightIntegrator {
                 }
                 let state = &mut self.state[start + k];
                 state.most_asked = most_asked;
-                self.between.push(class.between);
+                self.masks.push(class.mask);
                 integrals.push(one);
             }
         }
@@ -364,7 +364,7 @@ impl AreaLightIntegrator {
                     self.next_grading.extend(halves);
                     continue;
                 }
-                let is_open = self.between[cell.point as usize] == Between::default();
+                let is_open = self.masks[cell.point as usize] == OccluderMask::default();
                 if is_open && is(grades.all) { &mut self.whole } else { &mut self.cut }.push(*cell);
             }
             self.grading.clear();
@@ -419,8 +419,8 @@ impl AreaLightIntegrator {
     /// Gives up what is asked too much of what something is in the way of; whether there was any.
     fn give_up(&mut self, integrals: &mut [LightIntegral]) -> bool {
         let mut is_any = false;
-        for ((state, between), integrals) in self.state.iter_mut().zip(&self.between).zip(integrals) {
-            let is_behind = *between != Between::default() && integrals.illumination == Illumination::Partial;
+        for ((state, mask), integrals) in self.state.iter_mut().zip(&self.masks).zip(integrals) {
+            let is_behind = *mask != OccluderMask::default() && integrals.illumination == Illumination::Partial;
             if is_behind && state.asked > state.most_asked {
                 state.cells = PointSum::GIVEN_UP;
                 integrals.illumination = Illumination::Unknown;
@@ -437,9 +437,9 @@ impl AreaLightIntegrator {
 
     /// Asks all cells of this round, and makes panels of those that are new and seen in part.
     fn ask_cells(&mut self, level: Level, task: &LightTask) {
-        let AreaLightIntegrator { views, between, whole, cut: cut_cells, kept, panels, spare, .. } = self;
+        let AreaLightIntegrator { views, masks, whole, cut: cut_cells, kept, panels, spare, .. } = self;
         let falloff = task.emitter.falloff();
-        let blocked = task.blocked(between);
+        let light = task.occluded_light(masks);
         self.fits.clear();
         self.cut_fits.clear();
         let (fits, cut_fits) = (&mut self.fits, &mut self.cut_fits);
@@ -458,7 +458,7 @@ impl AreaLightIntegrator {
                 );
                 if is_cut {
                     cut_fits.push(fitted);
-                    cut(simd, &blocked, &members, cells, first, spare, panels);
+                    cut(simd, &light, &members, cells, first, spare, panels);
                 } else {
                     fits.push(fitted);
                 }
@@ -468,8 +468,8 @@ impl AreaLightIntegrator {
 
     /// Asks all panels of this round.
     fn ask_panels(&mut self, level: Level, task: &LightTask) {
-        let AreaLightIntegrator { views, between, kept, panels, panel_sums, .. } = self;
-        let blocked = task.blocked(between);
+        let AreaLightIntegrator { views, masks, kept, panels, panel_sums, .. } = self;
+        let light = task.occluded_light(masks);
         let moments = if task.lobe.is_none() { 1 } else { MOMENTS };
         panel_sums.clear();
         dispatch_wide!(level, simd => {
@@ -478,7 +478,7 @@ impl AreaLightIntegrator {
                 let cells = Members::new(kept, some.len(), |k| some[k].cell);
                 panel_sums.push(simd.vectorize(
                     #[inline(always)]
-                    || rows(simd, &blocked, &members, &cells, some, moments),
+                    || rows(simd, &light, &members, &cells, some, moments),
                 ));
             }
         });

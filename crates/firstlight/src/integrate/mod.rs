@@ -19,7 +19,7 @@ mod row;
 mod tolerance;
 mod view;
 
-pub(crate) use classify::Obstacles;
+pub(crate) use classify::LightOccluders;
 pub(crate) use emitter::Emitter;
 pub(crate) use evaluate::{AreaLightIntegrator, Illumination, LightIntegral, LightTask};
 pub(crate) use tolerance::{COSTS, TOLERANCE};

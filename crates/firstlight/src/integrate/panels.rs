@@ -58,12 +58,12 @@ pub(crate) struct Panel {
 
 /// What of a light's occluders matters to one point: bits of those it sees from outside, and of spheres it is in.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(crate) struct Between {
+pub(crate) struct OccluderMask {
     pub outside: u64,
     pub within: u64,
 }
 
-impl Between {
+impl OccluderMask {
     /// Their numbers.
     #[inline(always)]
     fn occluders(self) -> impl Iterator<Item = usize> {
@@ -78,15 +78,15 @@ impl Between {
 
 /// A light and what is in the way, for all that asks.
 #[derive(Clone, Copy)]
-pub(crate) struct Blocked<'a> {
+pub(crate) struct OccludedLight<'a> {
     /// In lists, and of trees: counted together.
     pub occluders: [&'a [Occluder]; 2],
     pub outline: Outline,
     /// Point by point.
-    pub between: &'a [Between],
+    pub masks: &'a [OccluderMask],
 }
 
-impl<'a> Blocked<'a> {
+impl<'a> OccludedLight<'a> {
     #[inline(always)]
     fn occluder(&self, number: usize) -> &'a Occluder {
         let [listed, near] = self.occluders;
@@ -108,30 +108,30 @@ pub(crate) const MAX_INTERVALS: usize = 48;
 
 /// What may be in the way of a batch: the occluders that any of its points sees, and for which of them.
 struct Batch<'a, S: Simd> {
-    blocked: &'a Blocked<'a>,
-    between: [Between; LANES],
+    light: &'a OccludedLight<'a>,
+    masks: [OccluderMask; LANES],
     p: Vec3x16<S>,
     l: [Vec3x16<S>; 3],
 }
 
 impl<'a, S: Simd> Batch<'a, S> {
     #[inline(always)]
-    fn new(simd: S, blocked: &'a Blocked<'a>, members: &Members<ViewBlock>, point: impl Fn(usize) -> u32) -> Self {
+    fn new(simd: S, light: &'a OccludedLight<'a>, members: &Members<ViewBlock>, point: impl Fn(usize) -> u32) -> Self {
         use ViewNumber::*;
-        let mut between = [Between::default(); LANES];
-        for (k, between) in between.iter_mut().enumerate() {
-            *between = blocked.between[point(k) as usize];
+        let mut masks = [OccluderMask::default(); LANES];
+        for (k, mask) in masks.iter_mut().enumerate() {
+            *mask = light.masks[point(k) as usize];
         }
-        Batch { blocked, between, p: members.vectors(simd, [Px, Py, Pz]), l: ways(simd, members) }
+        Batch { light, masks, p: members.vectors(simd, [Px, Py, Pz]), l: ways(simd, members) }
     }
 
     /// Which of the occluders any point sees.
     #[inline(always)]
     fn occluders(&self) -> impl Iterator<Item = usize> + use<S> {
-        let mut any = Between::default();
-        for between in &self.between {
-            any.outside |= between.outside;
-            any.within |= between.within;
+        let mut any = OccluderMask::default();
+        for mask in &self.masks {
+            any.outside |= mask.outside;
+            any.within |= mask.within;
         }
         any.occluders()
     }
@@ -140,12 +140,12 @@ impl<'a, S: Simd> Batch<'a, S> {
     #[inline(always)]
     fn shadow(&self, simd: S, occluder: usize) -> (Shadow<S>, mask32x16<S>, mask32x16<S>) {
         let (mut outside, mut within) = (0, 0);
-        for (k, between) in self.between.iter().enumerate() {
-            outside |= (between.outside >> occluder & 1) << k;
-            within |= (between.within >> occluder & 1) << k;
+        for (k, mask) in self.masks.iter().enumerate() {
+            outside |= (mask.outside >> occluder & 1) << k;
+            within |= (mask.within >> occluder & 1) << k;
         }
         (
-            Shadow::new(simd, self.blocked.occluder(occluder), self.p, &self.l),
+            Shadow::new(simd, self.light.occluder(occluder), self.p, &self.l),
             mask32x16::from_bitmask(simd, outside),
             mask32x16::from_bitmask(simd, within),
         )
@@ -156,7 +156,7 @@ impl<'a, S: Simd> Batch<'a, S> {
 #[inline(never)]
 pub(crate) fn cut<S: Simd>(
     simd: S,
-    blocked: &Blocked,
+    light: &OccludedLight,
     members: &Members<ViewBlock>,
     cells: &[Cell],
     first: u32,
@@ -166,7 +166,7 @@ pub(crate) fn cut<S: Simd>(
     spare.clear();
     simd.vectorize(
         #[inline(always)]
-        || breaks(simd, blocked, members, cells, spare),
+        || breaks(simd, light, members, cells, spare),
     );
     for (k, cell) in cells.iter().enumerate() {
         let least = (cell.y[1] - cell.y[0]) * LEAST;
@@ -188,7 +188,7 @@ pub(crate) fn cut<S: Simd>(
 #[inline(always)]
 fn breaks<S: Simd>(
     simd: S,
-    blocked: &Blocked,
+    light: &OccludedLight,
     members: &Members<ViewBlock>,
     cells: &[Cell],
     rows: &mut Vec<LaneNumbers>,
@@ -197,7 +197,7 @@ fn breaks<S: Simd>(
     let [x0, x1, ..] = sides(cells).map(|side| f32x16::simd_from(simd, side));
     let x = [x0, x1];
     let zero = simd.splat_f32x16(0.0);
-    let (x, round) = match blocked.outline {
+    let (x, round) = match light.outline {
         Outline::Parallelogram => (x, None),
         Outline::Disk => {
             let origin = [members.lanes(simd, OriginX), members.lanes(simd, OriginY)];
@@ -208,8 +208,8 @@ fn breaks<S: Simd>(
             ([width[0].min(zero), width[1].max(zero)], Some(RoundSides { width, origin: [zero; 2] }))
         }
     };
-    let is_straight = blocked.outline != Outline::Sphere;
-    let batch = Batch::new(simd, blocked, members, |k| cells[k.min(cells.len() - 1)].point);
+    let is_straight = light.outline != Outline::Sphere;
+    let batch = Batch::new(simd, light, members, |k| cells[k.min(cells.len() - 1)].point);
     for occluder in batch.occluders() {
         let (shadow, outside, within) = batch.shadow(simd, occluder);
         let mut breaks = Breaks { x, is_straight, round, of: outside | within, rows };
@@ -219,12 +219,12 @@ fn breaks<S: Simd>(
     let mut breaks = Breaks { x, is_straight, round, of: all, rows };
     breaks.line(&members.linear(simd, [CosC, CosX, CosY]));
     breaks.line(&members.linear(simd, [HorizonC, HorizonX, HorizonY]));
-    if blocked.outline == Outline::Disk {
+    if light.outline == Outline::Disk {
         let origin = [members.lanes(simd, OriginX), members.lanes(simd, OriginY)];
         breaks.round = None;
         breaks.quadratic(&Shadow::rim(origin), all);
     }
-    if blocked.outline == Outline::Sphere {
+    if light.outline == Outline::Sphere {
         for row in rows.iter_mut() {
             *row = asin(f32x16::simd_from(simd, *row)).to_array();
         }
@@ -245,7 +245,7 @@ fn antiderivative<S: Simd>([a, b, c, d, e]: &[f32x16<S>; 5], u: f32x16<S>) -> f3
 #[inline(always)]
 pub(crate) fn rows<S: Simd>(
     simd: S,
-    blocked: &Blocked,
+    light: &OccludedLight,
     members: &Members<ViewBlock>,
     cells: &Members<CutBlock>,
     panels: &[Panel],
@@ -262,7 +262,7 @@ pub(crate) fn rows<S: Simd>(
     );
     let (xm, xh) = ((x0 + x1) * 0.5, (x1 - x0) * 0.5);
     let (ym, yh) = ((y0 + y1) * 0.5, (y1 - y0) * 0.5);
-    let batch = Batch::new(simd, blocked, members, |k| panels[k.min(panels.len() - 1)].point);
+    let batch = Batch::new(simd, light, members, |k| panels[k.min(panels.len() - 1)].point);
     let cos = members.linear(simd, [CosC, CosX, CosY]);
     let horizon = members.linear(simd, [HorizonC, HorizonX, HorizonY]);
     let origin = [members.lanes(simd, OriginX), members.lanes(simd, OriginY)];
@@ -275,7 +275,7 @@ pub(crate) fn rows<S: Simd>(
             }
         }
     }
-    let is_sphere = blocked.outline == Outline::Sphere;
+    let is_sphere = light.outline == Outline::Sphere;
     // Where each row lies on the light's plane, and half of how long it is, if that differs
     let (mut y_of, mut wide) = ([zero; ROWS], [one; ROWS]);
     for (row, [place, ..]) in SPREAD.into_iter().enumerate() {
@@ -294,7 +294,7 @@ pub(crate) fn rows<S: Simd>(
         }
         all.clip(y * cos.y + cos.c, cos.x);
         all.clip(y * horizon.y + horizon.c, horizon.x);
-        if blocked.outline == Outline::Disk {
+        if light.outline == Outline::Disk {
             let across = y + origin[1];
             let reach = (1.0 - across * across).max(zero).sqrt();
             all.from = all.from.max(-reach - origin[0]);

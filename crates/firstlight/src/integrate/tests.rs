@@ -166,7 +166,7 @@ fn batched(case: &Case, steps: &DisplaySteps) -> Moments {
     let emitter = Emitter::Flat(case.light);
     let task = LightTask {
         emitter: &emitter,
-        obstacles: &Obstacles::of(&case.spheres, &case.flats, &emitter),
+        listed: &LightOccluders::of(&case.spheres, &case.flats, &emitter),
         near: None,
         lobe: case.point.bsdf.lobe.kind(),
         scale: Rgb::WHITE,
@@ -343,10 +343,10 @@ impl BallCase {
     fn batched(&self, steps: &DisplaySteps) -> Moments {
         let BallCase { center, radius, physical, both_sides, .. } = *self;
         let emitter = Emitter::Ball { center, radius, physical, both_sides };
-        let obstacles = Obstacles::of(&self.spheres, &self.flats, &emitter);
+        let listed = LightOccluders::of(&self.spheres, &self.flats, &emitter);
         let task = LightTask {
             emitter: &emitter,
-            obstacles: &obstacles,
+            listed: &listed,
             near: None,
             lobe: self.point.bsdf.lobe.kind(),
             scale: Rgb::WHITE,

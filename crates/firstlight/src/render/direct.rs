@@ -17,7 +17,9 @@ use super::pooled::LightSampler;
 use super::{Counts, QUESTION_EVERY};
 use crate::color::{DisplaySteps, Rgb};
 use crate::ids::LightId;
-use crate::integrate::{AreaLightIntegrator, Emitter, Illumination, LightIntegral, LightTask, Obstacles, TOLERANCE};
+use crate::integrate::{
+    AreaLightIntegrator, Emitter, Illumination, LightIntegral, LightOccluders, LightTask, TOLERANCE,
+};
 use crate::light::{Area, Extent, LightTree};
 use crate::material::{LobeKind, Moments, ShadingPoint};
 use crate::scene::Scene;
@@ -143,7 +145,7 @@ pub(crate) struct DirectLighting<'a> {
     /// Of a group: those whose light listed shapes alone may occlude.
     listed: Vec<u32>,
     /// What was gathered from BVHs for up to sixteen points.
-    near: Obstacles<'a>,
+    near: LightOccluders<'a>,
     pub(super) occluders: OccluderList,
     pub(super) resolver: VisibilityResolver,
     indices: Vec<u32>,
@@ -163,7 +165,7 @@ impl<'a> DirectLighting<'a> {
             points: Vec::new(),
             integrals: Vec::new(),
             listed: Vec::new(),
-            near: Obstacles::default(),
+            near: LightOccluders::default(),
             occluders: OccluderList::default(),
             resolver: VisibilityResolver::default(),
             indices: Vec::new(),
