@@ -6,16 +6,16 @@
 use arrayvec::ArrayVec;
 use fearless_simd::{f32x16, mask32x16, prelude::*};
 
-use super::view::{FlatLight, FlatView, NEAR};
+use super::light_frame::{FlatLight, LightFrame, NEAR};
 use crate::material::{LobeKind, LobeLanes, ShadingPoint};
 use crate::math::{DVec3, LANES, UNIT_ROUNDOFF, Vec3, Vec3x16};
 
 /// Sixteen numbers, one of each member of a batch.
 pub(crate) type LaneNumbers = [f32; LANES];
 
-/// One number of what a point sees of a flat light; see [`FlatView`].
+/// One number of what a point sees of a flat light; see [`LightFrame`].
 #[derive(Clone, Copy, Debug)]
-pub(crate) enum ViewNumber {
+pub(crate) enum FrameNumber {
     /// The point.
     Px,
     Py,
@@ -68,22 +68,22 @@ pub(crate) enum ViewNumber {
     Measure,
 }
 
-const NUMBERS: usize = ViewNumber::Measure as usize + 1;
+const NUMBERS: usize = FrameNumber::Measure as usize + 1;
 
 /// What sixteen points see of a flat light.
 #[derive(Clone, Debug)]
-pub(crate) struct ViewBlock([LaneNumbers; NUMBERS]);
+pub(crate) struct LightFrame16([LaneNumbers; NUMBERS]);
 
-impl Default for ViewBlock {
+impl Default for LightFrame16 {
     fn default() -> Self {
-        ViewBlock([[0.0; LANES]; NUMBERS])
+        LightFrame16([[0.0; LANES]; NUMBERS])
     }
 }
 
-impl ViewBlock {
+impl LightFrame16 {
     /// Puts what one point sees into a lane.
     #[inline(always)]
-    pub fn set(&mut self, lane: usize, point: &ShadingPoint, v: &FlatView) {
+    pub fn set(&mut self, lane: usize, point: &ShadingPoint, v: &LightFrame) {
         let (p, l0, a, b) = (point.p, v.l0, v.a, v.b);
         let mirror = v.mirror().unwrap_or_default();
         #[rustfmt::skip]
@@ -101,13 +101,13 @@ impl ViewBlock {
     }
 }
 
-impl ViewBlock {
-    /// Puts what up to sixteen points see of one flat light into the lanes, as [`FlatView::new`] does; but for those
+impl LightFrame16 {
+    /// Puts what up to sixteen points see of one flat light into the lanes, as [`LightFrame::new`] does; but for those
     /// whose bits are returned: they are so near that they count its places from the nearest. To be called within
     /// `vectorize`.
     #[inline(always)]
-    pub fn see<S: Simd>(&mut self, simd: S, light: &FlatLight, points: &[ShadingPoint]) -> u64 {
-        use ViewNumber::*;
+    pub fn project<S: Simd>(&mut self, simd: S, light: &FlatLight, points: &[ShadingPoint]) -> u64 {
+        use FrameNumber::*;
         macro_rules! vectors {
             ($of:expr) => {{
                 let mut numbers = [[0.0f32; LANES]; 3];
@@ -179,7 +179,7 @@ impl ViewBlock {
     /// The distance to the nearest place of the light's square, or a little less.
     #[inline(always)]
     pub fn nearest<S: Simd>(&self, simd: S) -> f32x16<S> {
-        use ViewNumber::*;
+        use FrameNumber::*;
         let [x0, x1] = [self.lanes(simd, X0), self.lanes(simd, X1)];
         let [y0, y1] = [self.lanes(simd, Y0), self.lanes(simd, Y1)];
         let (fa, la, fb, lb) = (self.lanes(simd, Fa), self.lanes(simd, La), self.lanes(simd, Fb), self.lanes(simd, Lb));
@@ -192,7 +192,7 @@ impl ViewBlock {
 
     /// From where to where a lane's light goes.
     pub fn square(&self, lane: usize) -> [[f32; 2]; 2] {
-        use ViewNumber::*;
+        use FrameNumber::*;
         [[X0, X1], [Y0, Y1]].map(|sides| sides.map(|of| self.0[of as usize][lane]))
     }
 }
@@ -202,7 +202,7 @@ pub(crate) trait LaneBlock {
     fn numbers(&self) -> &[LaneNumbers];
 }
 
-impl LaneBlock for ViewBlock {
+impl LaneBlock for LightFrame16 {
     #[inline(always)]
     fn numbers(&self) -> &[LaneNumbers] {
         &self.0
@@ -259,41 +259,41 @@ impl<'a, B: LaneBlock> Members<'a, B> {
 
 /// What sixteen points see of a flat light, number by number: the points of one block, or those that a batch takes from
 /// many.
-pub(crate) trait Views {
+pub(crate) trait FrameLanes {
     /// One number of each.
-    fn lanes<S: Simd>(&self, simd: S, of: ViewNumber) -> f32x16<S>;
+    fn lanes<S: Simd>(&self, simd: S, of: FrameNumber) -> f32x16<S>;
 
     /// Three numbers of each, as vectors.
     #[inline(always)]
-    fn vectors<S: Simd>(&self, simd: S, [x, y, z]: [ViewNumber; 3]) -> Vec3x16<S> {
+    fn vectors<S: Simd>(&self, simd: S, [x, y, z]: [FrameNumber; 3]) -> Vec3x16<S> {
         Vec3x16 { x: self.lanes(simd, x), y: self.lanes(simd, y), z: self.lanes(simd, z) }
     }
 
     /// A quantity that changes linearly over the light, of each.
     #[inline(always)]
-    fn linear<S: Simd>(&self, simd: S, [c, x, y]: [ViewNumber; 3]) -> Linear16<S> {
+    fn linear<S: Simd>(&self, simd: S, [c, x, y]: [FrameNumber; 3]) -> Linear16<S> {
         Linear16 { c: self.lanes(simd, c), x: self.lanes(simd, x), y: self.lanes(simd, y) }
     }
 }
 
-impl Members<'_, ViewBlock> {
+impl Members<'_, LightFrame16> {
     /// The lobes of each, which are of one kind.
     #[inline(always)]
     pub fn lobes<S: Simd>(&self, simd: S, kind: Option<LobeKind>) -> LobeLanes {
-        LobeLanes::new(kind, self.lanes(simd, ViewNumber::Shininess).to_array())
+        LobeLanes::new(kind, self.lanes(simd, FrameNumber::Shininess).to_array())
     }
 }
 
-impl Views for Members<'_, ViewBlock> {
+impl FrameLanes for Members<'_, LightFrame16> {
     #[inline(always)]
-    fn lanes<S: Simd>(&self, simd: S, of: ViewNumber) -> f32x16<S> {
+    fn lanes<S: Simd>(&self, simd: S, of: FrameNumber) -> f32x16<S> {
         self.number(simd, of as usize)
     }
 }
 
-impl Views for ViewBlock {
+impl FrameLanes for LightFrame16 {
     #[inline(always)]
-    fn lanes<S: Simd>(&self, simd: S, of: ViewNumber) -> f32x16<S> {
+    fn lanes<S: Simd>(&self, simd: S, of: FrameNumber) -> f32x16<S> {
         f32x16::simd_from(simd, self.0[of as usize])
     }
 }
@@ -348,8 +348,8 @@ impl Exact {
 
 /// The three vectors of a view.
 #[inline(always)]
-pub(crate) fn ways<S: Simd>(simd: S, views: &impl Views) -> [Vec3x16<S>; 3] {
-    use ViewNumber::*;
+pub(crate) fn light_vectors<S: Simd>(simd: S, frames: &impl FrameLanes) -> [Vec3x16<S>; 3] {
+    use FrameNumber::*;
     // Written out, here and below: a map of an array is not inlined, and each operation becomes a call
-    [views.vectors(simd, [L0x, L0y, L0z]), views.vectors(simd, [Ax, Ay, Az]), views.vectors(simd, [Bx, By, Bz])]
+    [frames.vectors(simd, [L0x, L0y, L0z]), frames.vectors(simd, [Ax, Ay, Az]), frames.vectors(simd, [Bx, By, Bz])]
 }

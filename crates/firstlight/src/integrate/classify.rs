@@ -10,7 +10,7 @@ mod solid;
 
 use fearless_simd::{f32x16, prelude::*};
 
-use super::batch::{Exact, Linear16, ViewBlock, ViewNumber, Views, ways};
+use super::batch::{Exact, FrameLanes, FrameNumber, LightFrame16, Linear16, light_vectors};
 use super::emitter::Emitter;
 use super::hull::SolidOccluder;
 use super::occluder::{Occluder, Shadow, corners_from};
@@ -207,9 +207,9 @@ pub(crate) struct OcclusionClass {
 const SLACK: f32 = 1e-5;
 
 /// The light as sixteen points see it: the pyramid over it, and the cone around it.
-struct LanesSight<S: Simd> {
+struct LightPyramid16<S: Simd> {
     p: Vec3x16<S>,
-    ways: [Vec3x16<S>; 3],
+    light_vectors: [Vec3x16<S>; 3],
     x: [f32x16<S>; 2],
     y: [f32x16<S>; 2],
     /// Outward unit normals.
@@ -218,7 +218,7 @@ struct LanesSight<S: Simd> {
     sin: f32x16<S>,
     cos: f32x16<S>,
     far: f32x16<S>,
-    /// Across the line of sight, at least.
+    /// Across the line of pyramid, at least.
     size: f32x16<S>,
     normal: Vec3x16<S>,
     horizon: Vec3x16<S>,
@@ -246,10 +246,10 @@ fn way<S: Simd>(l: &[Vec3x16<S>; 3], x: f32x16<S>, y: f32x16<S>) -> Vec3x16<S> {
     l[0] + (l[1] * x + l[2] * y)
 }
 
-impl<S: Simd> LanesSight<S> {
+impl<S: Simd> LightPyramid16<S> {
     #[inline(always)]
-    fn new(simd: S, views: &ViewBlock, points: &[ShadingPoint]) -> LanesSight<S> {
-        use ViewNumber::*;
+    fn new(simd: S, frames: &LightFrame16, points: &[ShadingPoint]) -> LightPyramid16<S> {
+        use FrameNumber::*;
         let point = |f: fn(&ShadingPoint) -> f32| {
             let mut numbers = [0.0; LANES];
             for (number, point) in numbers.iter_mut().zip(points) {
@@ -257,8 +257,9 @@ impl<S: Simd> LanesSight<S> {
             }
             numbers
         };
-        let l = ways(simd, views);
-        let (x, y) = ([views.lanes(simd, X0), views.lanes(simd, X1)], [views.lanes(simd, Y0), views.lanes(simd, Y1)]);
+        let l = light_vectors(simd, frames);
+        let (x, y) =
+            ([frames.lanes(simd, X0), frames.lanes(simd, X1)], [frames.lanes(simd, Y0), frames.lanes(simd, Y1)]);
         let corners = [way(&l, x[0], y[0]), way(&l, x[1], y[0]), way(&l, x[1], y[1]), way(&l, x[0], y[1])];
         let middle = way(&l, (x[0] + x[1]) * 0.5, (y[0] + y[1]) * 0.5);
         let zero = simd.splat_f32x16(0.0);
@@ -277,11 +278,11 @@ impl<S: Simd> LanesSight<S> {
             far = far.max(l.dot(*l));
         }
         let far = far.sqrt();
-        let slant = views.lanes(simd, Height) / distance;
-        let size = views.lanes(simd, La).min(views.lanes(simd, Lb)) * slant.max(simd.splat_f32x16(0.02)) * 2.0;
-        LanesSight {
-            p: views.vectors(simd, [Px, Py, Pz]),
-            ways: l,
+        let slant = frames.lanes(simd, Height) / distance;
+        let size = frames.lanes(simd, La).min(frames.lanes(simd, Lb)) * slant.max(simd.splat_f32x16(0.02)) * 2.0;
+        LightPyramid16 {
+            p: frames.vectors(simd, [Px, Py, Pz]),
+            light_vectors: l,
             x,
             y,
             sides,
@@ -310,7 +311,7 @@ impl<S: Simd> LanesSight<S> {
     /// The way to a place of the light.
     #[inline(always)]
     fn way(&self, x: f32x16<S>, y: f32x16<S>) -> Vec3x16<S> {
-        way(&self.ways, x, y)
+        way(&self.light_vectors, x, y)
     }
 
     /// How far the hull of some points lies outside of one side of the pyramid over the light, at most.
@@ -389,7 +390,7 @@ impl<S: Simd> LanesSight<S> {
         let gap = gap - r;
         let rounding = distance * SLACK;
         // Behind the light's plane
-        let to_plane = self.normal.dot(self.ways[0]);
+        let to_plane = self.normal.dot(self.light_vectors[0]);
         let beyond = (self.normal.dot(s) - to_plane)
             * to_plane.simd_lt(zero).select(simd.splat_f32x16(-1.0), simd.splat_f32x16(1.0));
         let far = r + self.depth;
@@ -406,7 +407,7 @@ impl<S: Simd> LanesSight<S> {
     }
 }
 
-/// The classes of up to sixteen points, whose `views` are in a block; of those whose bits are in `lanes`. What is in
+/// The classes of up to sixteen points, whose `frames` are in a block; of those whose bits are in `lanes`. What is in
 /// trees is `near` and counted after what is in lists. To be called within `vectorize`.
 #[inline(always)]
 pub(crate) fn classify<S: Simd>(
@@ -414,7 +415,7 @@ pub(crate) fn classify<S: Simd>(
     listed: &LightOccluders,
     near: Option<&LightOccluders>,
     emitter: &Emitter,
-    views: &ViewBlock,
+    frames: &LightFrame16,
     points: &[ShadingPoint],
     mut lanes: u64,
 ) -> [OcclusionClass; LANES] {
@@ -422,8 +423,8 @@ pub(crate) fn classify<S: Simd>(
     if lanes == 0 {
         return classes;
     }
-    let mut sight = LanesSight::new(simd, views, points);
-    let own = near.is_some().then(|| Own::new(simd, &sight, points));
+    let mut pyramid = LightPyramid16::new(simd, frames, points);
+    let own = near.is_some().then(|| Own::new(simd, &pyramid, points));
     let places = LightSides::of_points(emitter, points);
     for (i, (occluder, exact, sides, contact)) in
         listed.each().chain(near.into_iter().flat_map(LightOccluders::each)).enumerate()
@@ -436,7 +437,7 @@ pub(crate) fn classify<S: Simd>(
             continue;
         }
         // What reaches into a ball may hide some of its far half
-        sight.depth = match emitter {
+        pyramid.depth = match emitter {
             Emitter::Ball { radius, both_sides: true, .. } if contact == LightContact::Intersects => {
                 2.0 * *radius as f32
             }
@@ -446,16 +447,18 @@ pub(crate) fn classify<S: Simd>(
         };
         let mut test = match (occluder, exact) {
             (Occluder::Sphere { center, radius }, ExactShape::Sphere(sphere)) => {
-                test_sphere(simd, &sight, center.seen_from(simd, sight.p), *radius, sphere, points, before)
+                test_sphere(simd, &pyramid, center.seen_from(simd, pyramid.p), *radius, sphere, points, before)
             }
             (Occluder::Flat { corners }, ExactShape::Flat { flat, side, seen_side }) => {
-                let corners = corners_from(simd, corners, sight.p);
-                test_parallelogram(simd, &sight, corners, (flat, *side, *seen_side), points, before)
+                let corners = corners_from(simd, corners, pyramid.p);
+                test_parallelogram(simd, &pyramid, corners, (flat, *side, *seen_side), points, before)
             }
-            (Occluder::Solid(_), ExactShape::Solid(shape)) => test_solid(simd, &sight, shape, occluder, points, before),
+            (Occluder::Solid(_), ExactShape::Solid(shape)) => {
+                test_solid(simd, &pyramid, shape, occluder, points, before)
+            }
             (Occluder::Flat { corners }, ExactShape::Facet(shape)) => match &own {
                 Some(own) => {
-                    test_triangle(simd, &sight, corners_from(simd, corners, sight.p), shape, own, points, before)
+                    test_triangle(simd, &pyramid, corners_from(simd, corners, pyramid.p), shape, own, points, before)
                 }
                 None => unreachable!("no triangle is in lists"),
             },
@@ -529,7 +532,7 @@ impl<S: Simd> OccluderTest<S> {
 #[inline(always)]
 fn test_sphere<S: Simd>(
     simd: S,
-    sight: &LanesSight<S>,
+    pyramid: &LightPyramid16<S>,
     s: Vec3x16<S>,
     r: f32,
     sphere: &Sphere,
@@ -542,7 +545,7 @@ fn test_sphere<S: Simd>(
     let distance = distance2.sqrt();
     // On which side of the sphere the points are: where that is close, to the last bit
     let power = distance2 - r * r;
-    let margin = s.abs().dot(sight.error) * 2.0;
+    let margin = s.abs().dot(pyramid.error) * 2.0;
     let room = margin + (distance2 + r * r) * 1e-6;
     let mut close = power.abs().simd_le(room).to_bitmask() & lanes;
     let mut inside = power.simd_lt(zero).to_bitmask() & lanes & !close;
@@ -558,9 +561,9 @@ fn test_sphere<S: Simd>(
         }
     }
     // Above whose horizon it rises, for any of the places around
-    let height = sight.horizon.dot(s);
+    let height = pyramid.horizon.dot(s);
     let slack = distance * SLACK + 4e-4 * r;
-    let around = sight.reach + sight.turn * (distance + sight.reach);
+    let around = pyramid.reach + pyramid.turn * (distance + pyramid.reach);
     let below = (-height).simd_gt(slack + r).to_bitmask();
     let below_all = (-height).simd_gt(slack + r + around).to_bitmask();
     // From its outside nothing of it is above the horizon, but by rounding
@@ -570,63 +573,63 @@ fn test_sphere<S: Simd>(
     if within != 0 {
         let mut all_in = within;
         let mut none_in = within;
-        let smaller = Shadow::cone(simd, s, r * (1.0 - 1e-6), &sight.ways);
-        let larger = Shadow::cone(simd, s, r * (1.0 + 1e-6), &sight.ways);
-        for [x, y] in sight.square() {
+        let smaller = Shadow::cone(simd, s, r * (1.0 - 1e-6), &pyramid.light_vectors);
+        let larger = Shadow::cone(simd, s, r * (1.0 + 1e-6), &pyramid.light_vectors);
+        for [x, y] in pyramid.square() {
             all_in &= smaller.holds(x, y).to_bitmask();
             none_in &= !larger.holds(x, y).to_bitmask();
         }
         // All of the light is outside only if the sphere does not reach through it
-        let from_center = sight.ways[0] - s;
-        none_in &= sight.normal.dot(from_center).abs().simd_gt(r * (1.0 + 1e-6)).to_bitmask();
+        let from_center = pyramid.light_vectors[0] - s;
+        none_in &= pyramid.normal.dot(from_center).abs().simd_gt(r * (1.0 + 1e-6)).to_bitmask();
         // What is hidden is the same from everywhere inside, and on a surface that bends as the sphere does
-        let deep = (r - distance).simd_gt(sight.reach * 2.0).to_bitmask();
-        let touches = on & (sight.turn * r).simd_lt(sight.reach * 0.5).to_bitmask();
-        let moving = within & (inside | touches) & !deep & sight.reach.simd_gt(zero).to_bitmask();
+        let deep = (r - distance).simd_gt(pyramid.reach * 2.0).to_bitmask();
+        let touches = on & (pyramid.turn * r).simd_lt(pyramid.reach * 0.5).to_bitmask();
+        let moving = within & (inside | touches) & !deep & pyramid.reach.simd_gt(zero).to_bitmask();
         test.around = within;
         test.hidden |= none_in;
         test.firm |= none_in & !moving;
         test.within = within & !all_in & !none_in;
         // From outside it hides a light that is inside of it as well
-        let all_around = (r - distance).simd_gt(sight.reach).to_bitmask();
+        let all_around = (r - distance).simd_gt(pyramid.reach).to_bitmask();
         test.moving |= moving & !(all_in & all_around);
         test.motion = simd.splat_f32x16(f32::INFINITY);
     }
-    let [around, mut near] = sight.meets(s, distance, r, outside & !below_all);
+    let [around, mut near] = pyramid.meets(s, distance, r, outside & !below_all);
     if around == 0 {
         return test;
     }
-    let toward = (distance - sight.reach).max(simd.splat_f32x16(r));
+    let toward = (distance - pyramid.reach).max(simd.splat_f32x16(r));
     let tangent = (toward * toward - r * r).max(zero).sqrt();
-    let motion = sight.motion(tangent);
+    let motion = pyramid.motion(tangent);
     test.motion = if test.moving != 0 {
         let moving = fearless_simd::mask32x16::from_bitmask(simd, test.moving);
         moving.select(test.motion, motion)
     } else {
         motion
     };
-    test.moving |= around & sight.reach.simd_gt(zero).to_bitmask();
+    test.moving |= around & pyramid.reach.simd_gt(zero).to_bitmask();
     near &= !below;
     if near == 0 {
         return test;
     }
     // One convex thing hides all of the light if it hides its corners
-    let shadow = Shadow::cone(simd, s, r, &sight.ways);
-    let hidden = sight.hidden(&shadow, near);
+    let shadow = Shadow::cone(simd, s, r, &pyramid.light_vectors);
+    let hidden = pyramid.hidden(&shadow, near);
     test.hidden |= hidden;
     test.outside = near & !hidden;
     // From everywhere around: ways to the corners pass its middle nearly as closely. From inside of it, more may be
     // seen
-    let patches = hidden & sight.reach.simd_gt(zero).to_bitmask();
+    let patches = hidden & pyramid.reach.simd_gt(zero).to_bitmask();
     test.firm |= hidden & !patches;
-    let mut patches = patches & (distance - r).simd_gt(sight.reach).to_bitmask();
+    let mut patches = patches & (distance - r).simd_gt(pyramid.reach).to_bitmask();
     while patches != 0 {
         let k = patches.trailing_zeros() as usize;
         patches &= patches - 1;
         let smaller = r - points[k].reach;
         if smaller > 0.0 {
-            let shadow = Shadow::cone(simd, s, smaller, &sight.ways);
-            test.firm |= sight.hidden(&shadow, 1 << k);
+            let shadow = Shadow::cone(simd, s, smaller, &pyramid.light_vectors);
+            test.firm |= pyramid.hidden(&shadow, 1 << k);
         }
     }
     test

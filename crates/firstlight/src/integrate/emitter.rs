@@ -6,7 +6,7 @@ use arrayvec::ArrayVec;
 
 use super::batch::Exact;
 use super::fit::AreaWeight;
-use super::view::{FlatLight, FlatView, Outline};
+use super::light_frame::{FlatLight, LightFrame, Outline};
 use crate::light::{Area, AreaShape};
 use crate::material::ShadingPoint;
 use crate::math::{DVec3, Vec3};
@@ -98,7 +98,7 @@ impl Emitter {
 
     /// The distance of a point to it, or a little less; 0 where nothing emits towards the point.
     pub fn nearest(&self, point: &ShadingPoint) -> f32 {
-        let flat = || self.flat(point.p).map(|flat| FlatView::new(&flat, point).nearest());
+        let flat = || self.flat(point.p).map(|flat| LightFrame::new(&flat, point).nearest());
         self.depth(point.p).or_else(flat).unwrap_or(0.0)
     }
 

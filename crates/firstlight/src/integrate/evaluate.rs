@@ -18,14 +18,14 @@
 use arrayvec::ArrayVec;
 use fearless_simd::{Level, Simd};
 
-use super::batch::{LaneNumbers, Members, ViewBlock};
+use super::batch::{LaneNumbers, LightFrame16, Members};
 use super::classify::{LightOccluders, OcclusionClass, classify};
 use super::emitter::Emitter;
 use super::fit::{Cell, CutBlock, Fits, MOMENTS, fit};
 use super::grade::{Grades, grade, halves, survey, whole};
+use super::light_frame::LightFrame;
 use super::panels::{OccludedLight, OccluderMask, Panel, PanelSums, cut, rows};
 use super::tolerance::{COSTS, TOLERANCE, Weight};
-use super::view::FlatView;
 use crate::color::{DisplaySteps, Rgb};
 use crate::material::{LobeKind, Moments, ShadingPoint};
 use crate::math::{LANES, dispatch_wide};
@@ -125,7 +125,7 @@ const LARGEST_CODE: f32 = u8::MAX as f32;
 #[derive(Default)]
 pub(crate) struct AreaLightIntegrator {
     /// Point by point.
-    views: Vec<ViewBlock>,
+    frames: Vec<LightFrame16>,
     masks: Vec<OccluderMask>,
     state: Vec<PointSum>,
     /// Cells to be graded, their grades, and the halves of those that are too wide.
@@ -213,7 +213,7 @@ impl AreaLightIntegrator {
         integrals: &mut Vec<LightIntegral>,
     ) {
         let first = integrals.len();
-        self.look(level, task, points, integrals);
+        self.project_light(level, task, points, integrals);
         let integrals = &mut integrals[first..];
         let is_bounded = points.iter().any(ShadingPoint::is_bounded);
         let mut round = 0;
@@ -239,10 +239,16 @@ impl AreaLightIntegrator {
     }
 
     /// Finds out how each point sees the light, and queues the cells it is asked by.
-    fn look(&mut self, level: Level, task: &LightTask, points: &[ShadingPoint], integrals: &mut Vec<LightIntegral>) {
+    fn project_light(
+        &mut self,
+        level: Level,
+        task: &LightTask,
+        points: &[ShadingPoint],
+        integrals: &mut Vec<LightIntegral>,
+    ) {
         // Blocks are written where they are read: nothing of what is left in them counts
-        if self.views.len() < points.len().div_ceil(LANES) {
-            self.views.resize(points.len().div_ceil(LANES), ViewBlock::default());
+        if self.frames.len() < points.len().div_ceil(LANES) {
+            self.frames.resize(points.len().div_ceil(LANES), LightFrame16::default());
         }
         self.masks.clear();
         self.state.clear();
@@ -255,16 +261,16 @@ impl AreaLightIntegrator {
         let outline = task.emitter.outline();
         for (block, points) in points.chunks(LANES).enumerate() {
             let start = block * LANES;
-            let there = self.see(level, task, block, points);
-            let views = &self.views[block];
+            let there = self.project(level, task, block, points);
+            let frames = &self.frames[block];
             let (survey, classes) = dispatch_wide!(level, simd => {
                 simd.vectorize(
                     #[inline(always)]
                     || {
-                        let mut survey = survey(simd, views, task.emitter.is_physical(), points);
+                        let mut survey = survey(simd, frames, task.emitter.is_physical(), points);
                         survey.arrives &= there;
                         let asked = if task.shadows { survey.arrives } else { 0 };
-                        let classes = classify(simd, task.listed, task.near, task.emitter, views, points, asked);
+                        let classes = classify(simd, task.listed, task.near, task.emitter, frames, points, asked);
                         (survey, classes)
                     },
                 )
@@ -303,7 +309,7 @@ impl AreaLightIntegrator {
                 if is_wanted && matches!(one.illumination, Illumination::Full | Illumination::Partial) {
                     let number = (start + k) as u32;
                     self.state[start + k].cells = 1;
-                    self.grading.push(whole(outline, number, self.views[block].square(k)));
+                    self.grading.push(whole(outline, number, self.frames[block].square(k)));
                 }
                 let state = &mut self.state[start + k];
                 state.most_asked = most_asked;
@@ -315,20 +321,20 @@ impl AreaLightIntegrator {
     }
 
     /// Puts what a block of points sees of the light into its lanes. Returns those that see anything of it, bit by bit.
-    fn see(&mut self, level: Level, task: &LightTask, block: usize, points: &[ShadingPoint]) -> u64 {
-        let views = &mut self.views[block];
+    fn project(&mut self, level: Level, task: &LightTask, block: usize, points: &[ShadingPoint]) -> u64 {
+        let frames = &mut self.frames[block];
         let (mut there, mut one_by_one) = (0, u64::MAX);
         if let Emitter::Flat(flat) = task.emitter {
             there = u64::MAX;
             one_by_one = dispatch_wide!(level, simd => simd.vectorize(
                 #[inline(always)]
-                || views.see(simd, flat, points),
+                || frames.project(simd, flat, points),
             ));
         }
         for (k, point) in points.iter().enumerate().filter(|(k, _)| one_by_one >> k & 1 == 1) {
             if let Some(flat) = task.emitter.flat(point.p) {
                 there |= 1 << k;
-                views.set(k, point, &FlatView::new(&flat, point));
+                frames.set(k, point, &LightFrame::new(&flat, point));
             }
         }
         there
@@ -340,10 +346,10 @@ impl AreaLightIntegrator {
         let outline = task.emitter.outline();
         while !self.grading.is_empty() {
             self.grades.clear();
-            let (grades, views) = (&mut self.grades, &self.views);
+            let (grades, frames) = (&mut self.grades, &self.frames);
             dispatch_wide!(level, simd => {
                 for cells in self.grading.chunks(LANES) {
-                    let members = Members::new(views, cells.len(), |k| cells[k].point);
+                    let members = Members::new(frames, cells.len(), |k| cells[k].point);
                     grades.push(simd.vectorize(
                         #[inline(always)]
                         || grade(simd, task.lobe, outline, &members, cells),
@@ -437,7 +443,7 @@ impl AreaLightIntegrator {
 
     /// Asks all cells of this round, and makes panels of those that are new and seen in part.
     fn ask_cells(&mut self, level: Level, task: &LightTask) {
-        let AreaLightIntegrator { views, masks, whole, cut: cut_cells, kept, panels, spare, .. } = self;
+        let AreaLightIntegrator { frames, masks, whole, cut: cut_cells, kept, panels, spare, .. } = self;
         let falloff = task.emitter.falloff();
         let light = task.occluded_light(masks);
         self.fits.clear();
@@ -449,7 +455,7 @@ impl AreaLightIntegrator {
         // Each kernel is called at one place: so there is one copy of it for each instruction set
         dispatch_wide!(level, simd => {
             for (cells, is_cut) in asked {
-                let members = Members::new(views, cells.len(), |k| cells[k].point);
+                let members = Members::new(frames, cells.len(), |k| cells[k].point);
                 let first = (kept.len() * LANES) as u32;
                 let wanted = is_cut.then_some(&mut *kept);
                 let fitted = simd.vectorize(
@@ -468,13 +474,13 @@ impl AreaLightIntegrator {
 
     /// Asks all panels of this round.
     fn ask_panels(&mut self, level: Level, task: &LightTask) {
-        let AreaLightIntegrator { views, masks, kept, panels, panel_sums, .. } = self;
+        let AreaLightIntegrator { frames, masks, kept, panels, panel_sums, .. } = self;
         let light = task.occluded_light(masks);
         let moments = if task.lobe.is_none() { 1 } else { MOMENTS };
         panel_sums.clear();
         dispatch_wide!(level, simd => {
             for some in panels.chunks(LANES) {
-                let members = Members::new(views, some.len(), |k| some[k].point);
+                let members = Members::new(frames, some.len(), |k| some[k].point);
                 let cells = Members::new(kept, some.len(), |k| some[k].cell);
                 panel_sums.push(simd.vectorize(
                     #[inline(always)]

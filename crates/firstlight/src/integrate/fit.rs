@@ -9,7 +9,9 @@
 
 use fearless_simd::{f32x16, prelude::*};
 
-use super::batch::{Exact, LaneBlock, LaneNumbers, Linear16, Members, ViewBlock, ViewNumber, Views, ways};
+use super::batch::{
+    Exact, FrameLanes, FrameNumber, LaneBlock, LaneNumbers, LightFrame16, Linear16, Members, light_vectors,
+};
 use super::tolerance::TOLERANCE;
 use crate::material::{LobeKind, LobeLanes};
 use crate::math::{LANES, sin_cos};
@@ -112,7 +114,7 @@ pub(crate) enum AreaWeight {
     Constant,
     /// By the square of the distance and the cosine at the light.
     Physical,
-    /// All places of a sphere alike: [`Outline::Sphere`](super::view::Outline::Sphere).
+    /// All places of a sphere alike: [`Outline::Sphere`](super::light_frame::Outline::Sphere).
     Sphere,
     /// The same of a sphere that points are inside of, seen through the faces of a cube.
     Around { center: Exact, radius: f32 },
@@ -182,10 +184,10 @@ fn values<S: Simd>(
     simd: S,
     lobes: &LobeLanes,
     falloff: AreaWeight,
-    members: &Members<ViewBlock>,
+    members: &Members<LightFrame16>,
     cells: &[Cell],
 ) -> (NodeValues<S>, f32x16<S>) {
-    use ViewNumber::*;
+    use FrameNumber::*;
     let splat = |v: f32| simd.splat_f32x16(v);
     let [x0, x1, y0, y1] = sides(cells).map(|side| f32x16::simd_from(simd, side));
     let (xm, xh, ym, yh) = ((x0 + x1) * 0.5, (x1 - x0) * 0.5, (y0 + y1) * 0.5, (y1 - y0) * 0.5);
@@ -210,7 +212,7 @@ fn values<S: Simd>(
             let to = center.seen_from(simd, members.vectors(simd, [Px, Py, Pz]));
             let distance = to.dot(to).sqrt();
             let touch2 = ((distance - radius) * (distance + radius)).min(zero);
-            (Linear16::along(to, &ways(simd, members)), touch2, height * radius)
+            (Linear16::along(to, &light_vectors(simd, members)), touch2, height * radius)
         }
         _ => (Linear16 { c: zero, x: zero, y: zero }, zero, zero),
     };
@@ -298,7 +300,7 @@ pub(crate) fn fit<S: Simd>(
     simd: S,
     lobe: Option<LobeKind>,
     falloff: AreaWeight,
-    members: &Members<ViewBlock>,
+    members: &Members<LightFrame16>,
     cells: &[Cell],
     kept: Option<&mut Vec<CutBlock>>,
 ) -> Fits {

@@ -5,10 +5,10 @@ use std::f32::consts::FRAC_PI_2;
 
 use fearless_simd::{f32x16, mask32x16, prelude::*};
 
-use super::batch::{LaneNumbers, Linear16, Members, ViewBlock, ViewNumber, Views, ways};
+use super::batch::{FrameLanes, FrameNumber, LaneNumbers, LightFrame16, Linear16, Members, light_vectors};
 use super::fit::{Cell, sides};
+use super::light_frame::Outline;
 use super::tolerance::TOLERANCE;
-use super::view::Outline;
 use crate::material::{LobeKind, ShadingPoint};
 use crate::math::{LANES, Vec3x16, sin_cos};
 
@@ -31,18 +31,18 @@ pub(super) struct Survey {
 
 /// Looks at a light from up to sixteen points. To be called within `vectorize`.
 #[inline(always)]
-pub(super) fn survey<S: Simd>(simd: S, views: &ViewBlock, is_physical: bool, points: &[ShadingPoint]) -> Survey {
-    use ViewNumber::*;
+pub(super) fn survey<S: Simd>(simd: S, frames: &LightFrame16, is_physical: bool, points: &[ShadingPoint]) -> Survey {
+    use FrameNumber::*;
     let zero = simd.splat_f32x16(0.0);
     let (mut reach, mut turn) = ([0.0; LANES], [0.0; LANES]);
     for (k, point) in points.iter().enumerate() {
         (reach[k], turn[k]) = (point.reach, point.turn);
     }
     let (reach, turn) = (f32x16::simd_from(simd, reach), f32x16::simd_from(simd, turn));
-    let [x0, x1] = [views.lanes(simd, X0), views.lanes(simd, X1)];
-    let [y0, y1] = [views.lanes(simd, Y0), views.lanes(simd, Y1)];
-    let (height, facing) = (views.lanes(simd, Height), views.lanes(simd, Facing));
-    let l = ways(simd, views);
+    let [x0, x1] = [frames.lanes(simd, X0), frames.lanes(simd, X1)];
+    let [y0, y1] = [frames.lanes(simd, Y0), frames.lanes(simd, Y1)];
+    let (height, facing) = (frames.lanes(simd, Height), frames.lanes(simd, Facing));
+    let l = light_vectors(simd, frames);
     let mut far2 = zero;
     for [x, y] in [[x0, y0], [x1, y0], [x1, y1], [x0, y1]] {
         let corner = l[0] + (l[1] * x + l[2] * y);
@@ -58,7 +58,7 @@ pub(super) fn survey<S: Simd>(simd: S, views: &ViewBlock, is_physical: bool, poi
     let mut above = arrives;
     let mut below_around = facing.simd_lt(-reach);
     let mut above_around = is_beside;
-    for line in [views.linear(simd, [CosC, CosX, CosY]), views.linear(simd, [HorizonC, HorizonX, HorizonY])] {
+    for line in [frames.linear(simd, [CosC, CosX, CosY]), frames.linear(simd, [HorizonC, HorizonX, HorizonY])] {
         let most = line.c + (line.x * x0).max(line.x * x1) + (line.y * y0).max(line.y * y1);
         let least = line.c + (line.x * x0).min(line.x * x1) + (line.y * y0).min(line.y * y1);
         arrives &= most.simd_gt(zero);
@@ -72,7 +72,7 @@ pub(super) fn survey<S: Simd>(simd: S, views: &ViewBlock, is_physical: bool, poi
         below_around: below_around.to_bitmask(),
         above_around: above_around.to_bitmask(),
         beside_around: is_beside.to_bitmask(),
-        nearest: views.nearest(simd).to_array(),
+        nearest: frames.nearest(simd).to_array(),
         height: height.to_array(),
     }
 }
@@ -105,10 +105,10 @@ pub(super) fn grade<S: Simd>(
     simd: S,
     lobe: Option<LobeKind>,
     outline: Outline,
-    members: &Members<ViewBlock>,
+    members: &Members<LightFrame16>,
     cells: &[Cell],
 ) -> Grades {
-    use ViewNumber::*;
+    use FrameNumber::*;
     let zero = simd.splat_f32x16(0.0);
     let [u0, u1, v0, v1] = sides(cells).map(|side| f32x16::simd_from(simd, side));
     let ([x0, x1], [y0, y1]) = match outline {
@@ -133,7 +133,7 @@ pub(super) fn grade<S: Simd>(
         // How far off the highlight's middle the cell begins
         let mirror = members.vectors(simd, [MirrorX, MirrorY, MirrorZ]);
         let has_mirror = mirror.dot(mirror).simd_gt(zero);
-        let [l0, a, b] = ways(simd, members);
+        let [l0, a, b] = light_vectors(simd, members);
         let l: Vec3x16<S> = l0 + (a * x + b * y);
         let length2 = l.dot(l);
         let cos = (l.dot(mirror) / length2.sqrt()).max(simd.splat_f32x16(-1.0)).min(simd.splat_f32x16(1.0));
@@ -174,11 +174,11 @@ fn around<S: Simd>(simd: S, [u0, u1]: [f32x16<S>; 2], [v0, v1]: [f32x16<S>; 2]) 
 fn seen<S: Simd>(
     simd: S,
     outline: Outline,
-    members: &Members<ViewBlock>,
+    members: &Members<LightFrame16>,
     [x0, x1]: [f32x16<S>; 2],
     [y0, y1]: [f32x16<S>; 2],
 ) -> [mask32x16<S>; 2] {
-    use ViewNumber::*;
+    use FrameNumber::*;
     let (zero, one) = (simd.splat_f32x16(0.0), simd.splat_f32x16(1.0));
     let lines: [Linear16<S>; 2] =
         [members.linear(simd, [CosC, CosX, CosY]), members.linear(simd, [HorizonC, HorizonX, HorizonY])];

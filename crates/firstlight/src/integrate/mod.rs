@@ -13,11 +13,11 @@ mod evaluate;
 mod fit;
 mod grade;
 mod hull;
+mod light_frame;
 mod occluder;
 mod panels;
 mod row;
 mod tolerance;
-mod view;
 
 pub(crate) use classify::LightOccluders;
 pub(crate) use emitter::Emitter;

@@ -55,7 +55,7 @@ pub(crate) enum Shadow<S: Simd> {
 }
 
 impl<S: Simd> Shadow<S> {
-    /// What `occluder` does to lights with these ways, from `p`.
+    /// What `occluder` does to lights with these light_vectors, from `p`.
     #[inline(always)]
     pub fn new(simd: S, occluder: &Occluder, p: Vec3x16<S>, l: &[Vec3x16<S>; 3]) -> Shadow<S> {
         match occluder {

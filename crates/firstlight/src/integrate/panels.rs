@@ -13,12 +13,12 @@
 use arrayvec::ArrayVec;
 use fearless_simd::{f32x16, mask32x16, prelude::*};
 
-use super::batch::{LaneNumbers, Members, ViewBlock, ViewNumber, Views, ways};
+use super::batch::{FrameLanes, FrameNumber, LaneNumbers, LightFrame16, Members, light_vectors};
 use super::breaks::{Breaks, RoundSides};
 use super::fit::{Cell, CutBlock, MOMENTS, sides};
+use super::light_frame::Outline;
 use super::occluder::{Occluder, Shadow};
 use super::row::{FAR, Interval16};
-use super::view::Outline;
 use crate::math::{LANES, Vec3x16, asin, sin_cos};
 
 /// Rows of a panel: the Kronrod rule of seven on [0, 1], spread.
@@ -116,13 +116,18 @@ struct Batch<'a, S: Simd> {
 
 impl<'a, S: Simd> Batch<'a, S> {
     #[inline(always)]
-    fn new(simd: S, light: &'a OccludedLight<'a>, members: &Members<ViewBlock>, point: impl Fn(usize) -> u32) -> Self {
-        use ViewNumber::*;
+    fn new(
+        simd: S,
+        light: &'a OccludedLight<'a>,
+        members: &Members<LightFrame16>,
+        point: impl Fn(usize) -> u32,
+    ) -> Self {
+        use FrameNumber::*;
         let mut masks = [OccluderMask::default(); LANES];
         for (k, mask) in masks.iter_mut().enumerate() {
             *mask = light.masks[point(k) as usize];
         }
-        Batch { light, masks, p: members.vectors(simd, [Px, Py, Pz]), l: ways(simd, members) }
+        Batch { light, masks, p: members.vectors(simd, [Px, Py, Pz]), l: light_vectors(simd, members) }
     }
 
     /// Which of the occluders any point sees.
@@ -157,7 +162,7 @@ impl<'a, S: Simd> Batch<'a, S> {
 pub(crate) fn cut<S: Simd>(
     simd: S,
     light: &OccludedLight,
-    members: &Members<ViewBlock>,
+    members: &Members<LightFrame16>,
     cells: &[Cell],
     first: u32,
     spare: &mut Vec<LaneNumbers>,
@@ -189,11 +194,11 @@ pub(crate) fn cut<S: Simd>(
 fn breaks<S: Simd>(
     simd: S,
     light: &OccludedLight,
-    members: &Members<ViewBlock>,
+    members: &Members<LightFrame16>,
     cells: &[Cell],
     rows: &mut Vec<LaneNumbers>,
 ) {
-    use ViewNumber::*;
+    use FrameNumber::*;
     let [x0, x1, ..] = sides(cells).map(|side| f32x16::simd_from(simd, side));
     let x = [x0, x1];
     let zero = simd.splat_f32x16(0.0);
@@ -246,12 +251,12 @@ fn antiderivative<S: Simd>([a, b, c, d, e]: &[f32x16<S>; 5], u: f32x16<S>) -> f3
 pub(crate) fn rows<S: Simd>(
     simd: S,
     light: &OccludedLight,
-    members: &Members<ViewBlock>,
+    members: &Members<LightFrame16>,
     cells: &Members<CutBlock>,
     panels: &[Panel],
     moments: usize,
 ) -> PanelSums {
-    use ViewNumber::*;
+    use FrameNumber::*;
     let splat = |v: f32| simd.splat_f32x16(v);
     let end = |end: usize| std::array::from_fn::<f32, LANES, _>(|k| panels[k.min(panels.len() - 1)].y[end]);
     let [from, to] = [f32x16::simd_from(simd, end(0)), f32x16::simd_from(simd, end(1))];

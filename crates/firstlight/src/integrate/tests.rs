@@ -2,7 +2,7 @@
 
 use fearless_simd::Level;
 
-use super::view::{FlatLight, FlatView, Linear, Outline};
+use super::light_frame::{FlatLight, LightFrame, Linear, Outline};
 use super::*;
 use crate::color::{Display, DisplaySteps, Rgb};
 use crate::material::{BlinnPhongLobe, Bsdf, Colors, Lobe, Moments, PhongLobe, ShadingPoint};
@@ -47,13 +47,13 @@ fn gray(lobe: Lobe) -> Bsdf {
 struct Case {
     light: FlatLight,
     point: ShadingPoint,
-    view: FlatView,
+    view: LightFrame,
     spheres: Vec<Sphere>,
     flats: Vec<Parallelogram>,
 }
 
 /// Whether any light can arrive: a side that emits faces the point, and some of the light is above the horizon.
-fn arrives(light: &FlatLight, view: &FlatView) -> bool {
+fn arrives(light: &FlatLight, view: &LightFrame) -> bool {
     let largest =
         |of: &Linear| of.c + (of.x * view.x[0]).max(of.x * view.x[1]) + (of.y * view.y[0]).max(of.y * view.y[1]);
     let is_in_plane = light.physical && view.height == 0.0;
@@ -96,7 +96,7 @@ fn case(seed: u64, things: usize, sharpest: f64) -> Option<Case> {
     };
     let (ns, wo) = (ns.as_vec3(), wo.as_vec3());
     let point = ShadingPoint::new(Vec3::ZERO, ErrorBound(Vec3::ZERO), ns, wo, &gray(lobe));
-    let view = FlatView::new(&light, &point);
+    let view = LightFrame::new(&light, &point);
     if !arrives(&light, &view) {
         return None;
     }

@@ -2,7 +2,7 @@
 
 use fearless_simd::{f32x16, prelude::*};
 
-use super::{LanesSight, OccluderTest, SLACK};
+use super::{LightPyramid16, OccluderTest, SLACK};
 use crate::integrate::batch::Exact;
 use crate::integrate::row::edges;
 use crate::material::ShadingPoint;
@@ -12,7 +12,7 @@ use crate::shape::{Parallelogram, PlaneSide, is_in_plane};
 #[inline(always)]
 pub(super) fn test_parallelogram<S: Simd>(
     simd: S,
-    sight: &LanesSight<S>,
+    pyramid: &LightPyramid16<S>,
     q: [Vec3x16<S>; 4],
     (flat, side, seen_side): (&Parallelogram, PlaneSide, PlaneSide),
     points: &[ShadingPoint],
@@ -24,17 +24,17 @@ pub(super) fn test_parallelogram<S: Simd>(
     let mut rises = simd.splat_f32x16(f32::NEG_INFINITY);
     for q in &q {
         size2 = size2.max(q.dot(*q));
-        rises = rises.max(sight.horizon.dot(*q));
+        rises = rises.max(pyramid.horizon.dot(*q));
     }
     let rounding = size2.sqrt() * SLACK;
     // Above whose horizon it rises
-    let around = sight.reach + sight.turn * (size2.sqrt() + sight.reach);
+    let around = pyramid.reach + pyramid.turn * (size2.sqrt() + pyramid.reach);
     let mut near = lanes & rises.simd_ge(-rounding - around).to_bitmask();
     if near == 0 {
         return test;
     }
-    let gap = sight.gap(&q);
-    near &= gap.simd_le(rounding + sight.reach).to_bitmask();
+    let gap = pyramid.gap(&q);
+    near &= gap.simd_le(rounding + pyramid.reach).to_bitmask();
     // On which side of it the points are, to the last bit; and a part of what is around them may be on the other side
     let (mut left, mut through, mut beside) = (near, 0u64, 0u64);
     while left != 0 {
@@ -51,12 +51,12 @@ pub(super) fn test_parallelogram<S: Simd>(
     if near == 0 {
         return test;
     }
-    let lines = edges(q, &sight.ways);
+    let lines = edges(q, &pyramid.light_vectors);
     let n = (q[1] - q[0]).cross(q[3] - q[0]);
     let length = n.dot(n).sqrt();
     // How far away it is decides how far its shadow moves
     let mut motion = [0.0f32; LANES];
-    let mut left = near & sight.reach.simd_gt(zero).to_bitmask();
+    let mut left = near & pyramid.reach.simd_gt(zero).to_bitmask();
     while left != 0 {
         let k = left.trailing_zeros() as usize;
         left &= left - 1;
@@ -69,12 +69,12 @@ pub(super) fn test_parallelogram<S: Simd>(
             test.moving |= 1 << k;
         }
     }
-    test.motion = sight.motion(f32x16::simd_from(simd, motion));
+    test.motion = pyramid.motion(f32x16::simd_from(simd, motion));
     near &= through & gap.simd_le(rounding).to_bitmask() & rises.simd_ge(-rounding).to_bitmask();
     if near == 0 {
         return test;
     }
-    let [near, hidden] = sight.covered(&lines, near);
+    let [near, hidden] = pyramid.covered(&lines, near);
     test.hidden = hidden;
     test.outside = near & !hidden;
     // From everywhere around: all ways to the corners pass far inside of the edges
@@ -87,13 +87,13 @@ pub(super) fn test_parallelogram<S: Simd>(
             test.firm |= 1 << k;
             continue;
         }
-        let share = (motion[k] + point.reach) / sight.far.to_array()[k];
+        let share = (motion[k] + point.reach) / pyramid.far.to_array()[k];
         let corners = flat.deep_corners().map(|q| (q - point.p.as_dvec3()).as_vec3());
         let edge = |i: usize| corners[i].cross(corners[(i + 1) % 4]).length();
         let lengths = [length.to_array()[k], edge(0), edge(1), edge(2), edge(3)];
         let mut depth = f32::INFINITY;
         for (line, length) in lines.iter().zip(lengths) {
-            for [x, y] in sight.square() {
+            for [x, y] in pyramid.square() {
                 depth = depth.min(line.at(x, y).to_array()[k] / length);
             }
         }
@@ -157,7 +157,7 @@ pub(super) struct Own<S: Simd> {
 
 impl<S: Simd> Own<S> {
     #[inline(always)]
-    pub fn new(simd: S, sight: &LanesSight<S>, points: &[ShadingPoint]) -> Own<S> {
+    pub fn new(simd: S, pyramid: &LightPyramid16<S>, points: &[ShadingPoint]) -> Own<S> {
         let mut numbers = [[0.0; LANES]; 3];
         let mut lifted = 0;
         for (k, point) in points.iter().enumerate() {
@@ -169,8 +169,8 @@ impl<S: Simd> Own<S> {
         let ng =
             Vec3x16 { x: f32x16::simd_from(simd, x), y: f32x16::simd_from(simd, y), z: f32x16::simd_from(simd, z) };
         let mut least = simd.splat_f32x16(f32::INFINITY);
-        for [x, y] in sight.square() {
-            least = least.min(ng.dot(sight.way(x, y)));
+        for [x, y] in pyramid.square() {
+            least = least.min(ng.dot(pyramid.way(x, y)));
         }
         Own { ng, lifted, sees_below: lifted & !least.simd_gt(simd.splat_f32x16(0.0)).to_bitmask() }
     }
@@ -180,7 +180,7 @@ impl<S: Simd> Own<S> {
 #[inline(always)]
 pub(super) fn test_triangle<S: Simd>(
     simd: S,
-    sight: &LanesSight<S>,
+    pyramid: &LightPyramid16<S>,
     q: [Vec3x16<S>; 4],
     shape: &FacetShape,
     own: &Own<S>,
@@ -194,11 +194,11 @@ pub(super) fn test_triangle<S: Simd>(
     let mut over_own = rises;
     for q in &q[..3] {
         size2 = size2.max(q.dot(*q));
-        rises = rises.max(sight.horizon.dot(*q));
+        rises = rises.max(pyramid.horizon.dot(*q));
         over_own = over_own.max(own.ng.dot(*q));
     }
     let rounding = size2.sqrt() * SLACK;
-    let room = sight.error.dot(sight.error).sqrt() * 4.0 + shape.edge * LEVEL;
+    let room = pyramid.error.dot(pyramid.error).sqrt() * 4.0 + shape.edge * LEVEL;
     let mut near = lanes & rises.simd_gt(room).to_bitmask();
     // One that goes on as a lifted point's own facet does, or falls off from it, hides nothing that is above that; and
     // one in the same plane nothing at all: what comes from below has passed that plane before it gets there
@@ -208,8 +208,8 @@ pub(super) fn test_triangle<S: Simd>(
         let in_plane = n.dot(q[0]).abs().simd_le(n.dot(n).sqrt() * (shape.edge * IN_PLANE)).to_bitmask();
         near &= !level | own.sees_below & !in_plane;
     }
-    let gap = sight.gap(&q[..3]);
-    near &= gap.simd_le(rounding + sight.reach).to_bitmask();
+    let gap = pyramid.gap(&q[..3]);
+    near &= gap.simd_le(rounding + pyramid.reach).to_bitmask();
     if near == 0 {
         return test;
     }
@@ -226,12 +226,12 @@ pub(super) fn test_triangle<S: Simd>(
             test.moving |= bit;
         }
     }
-    test.motion = sight.motion(f32x16::simd_from(simd, distances));
+    test.motion = pyramid.motion(f32x16::simd_from(simd, distances));
     near &= gap.simd_le(rounding).to_bitmask();
     if near == 0 {
         return test;
     }
-    let [near, hidden] = sight.covered(&edges(q, &sight.ways), near);
+    let [near, hidden] = pyramid.covered(&edges(q, &pyramid.light_vectors), near);
     test.hidden = hidden;
     test.firm = hidden & !test.moving;
     test.outside = near & !hidden;

@@ -2,7 +2,7 @@
 
 use fearless_simd::{f32x16, prelude::*};
 
-use super::{LanesSight, OccluderTest, SLACK};
+use super::{LightPyramid16, OccluderTest, SLACK};
 use crate::integrate::batch::Exact;
 use crate::integrate::emitter::Emitter;
 use crate::integrate::hull::SolidOccluder;
@@ -193,7 +193,7 @@ impl PlacedSolid {
 #[inline(always)]
 pub(super) fn test_solid<S: Simd>(
     simd: S,
-    sight: &LanesSight<S>,
+    pyramid: &LightPyramid16<S>,
     shape: &PlacedSolid,
     occluder: &Occluder,
     points: &[ShadingPoint],
@@ -203,8 +203,8 @@ pub(super) fn test_solid<S: Simd>(
     let mut test = OccluderTest::nothing(zero);
     let (mut around, mut near) = (lanes, lanes);
     if let Some([low, high]) = shape.bounds {
-        let s: Vec3x16<S> = Exact::new((low + high) * 0.5).seen_from(simd, sight.p);
-        [around, near] = sight.meets(s, s.dot(s).sqrt(), ((high - low).length() * 0.5) as f32, lanes);
+        let s: Vec3x16<S> = Exact::new((low + high) * 0.5).seen_from(simd, pyramid.p);
+        [around, near] = pyramid.meets(s, s.dot(s).sqrt(), ((high - low).length() * 0.5) as f32, lanes);
     }
     if around == 0 {
         return test;
@@ -245,22 +245,22 @@ pub(super) fn test_solid<S: Simd>(
     if around == 0 {
         return test;
     }
-    let shadow = Shadow::new(simd, occluder, sight.p, &sight.ways);
-    if shape.kind == Canonical::Plane && sight.depth == 0.0 {
+    let shadow = Shadow::new(simd, occluder, pyramid.p, &pyramid.light_vectors);
+    if shape.kind == Canonical::Plane && pyramid.depth == 0.0 {
         // From within reach no more of the light is beyond a plane than from the point, if that is farther off
         let mut some = 0;
-        for [x, y] in sight.square() {
+        for [x, y] in pyramid.square() {
             some |= shadow.hides(x, y).to_bitmask();
         }
         let close = f32x16::simd_from(simd, distances).simd_le(zero).to_bitmask();
         near &= some;
         around &= some | close;
     }
-    test.moving = around & sight.reach.simd_gt(zero).to_bitmask();
-    test.motion = sight.motion(f32x16::simd_from(simd, distances));
+    test.moving = around & pyramid.reach.simd_gt(zero).to_bitmask();
+    test.motion = pyramid.motion(f32x16::simd_from(simd, distances));
     if !shape.kind.has_hole() {
         // It is convex: what hides all corners hides all
-        test.hidden |= sight.hidden(&shadow, near);
+        test.hidden |= pyramid.hidden(&shadow, near);
         test.firm |= test.hidden & !test.moving;
     }
     test.other |= if shape.may_contain_light && shape.kind.has_hole() && !shape.kind.is_flat() { near } else { 0 };

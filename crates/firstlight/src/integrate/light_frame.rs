@@ -121,7 +121,7 @@ pub(super) const NEAR: f32 = 0.03;
 /// Distances are computed in a frame of the light's plane, where nothing cancels near it:
 /// |l|^2 = (fa + la x + skew y)^2 + (fb + lb y)^2 + height^2.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct FlatView {
+pub(crate) struct LightFrame {
     /// Where they are counted from, from the middle.
     pub origin: [f32; 2],
     /// From where to where the light's square goes: -1 to 1 if they are counted from the middle.
@@ -155,14 +155,14 @@ pub(crate) struct FlatView {
     pub behind2: f32,
 }
 
-impl FlatView {
-    pub fn new(light: &FlatLight, at: &ShadingPoint) -> FlatView {
+impl LightFrame {
+    pub fn new(light: &FlatLight, at: &ShadingPoint) -> LightFrame {
         let l0 = (light.c - at.p.as_dvec3()).as_vec3();
         let side = -light.n.dot(l0);
         let linear = |v: Vec3| Linear { c: v.dot(l0), x: v.dot(light.a), y: v.dot(light.b) };
         let (cos, mut horizon) = (linear(at.ns), linear(at.horizon));
         horizon.c -= at.horizon.abs().dot(way_error(light.c.as_vec3(), light.a.abs() + light.b.abs(), at.p, at.error));
-        let view = FlatView {
+        let view = LightFrame {
             origin: [0.0; 2],
             x: [-1.0, 1.0],
             y: [-1.0, 1.0],
@@ -190,7 +190,7 @@ impl FlatView {
     }
 
     /// The same with places counted from the nearest.
-    fn near(self, light: &FlatLight, at: &ShadingPoint) -> FlatView {
+    fn near(self, light: &FlatLight, at: &ShadingPoint) -> LightFrame {
         let [a, b, n] = light.deep;
         let middle = light.c - at.p.as_dvec3();
         let (ua, ub) = (a.normalize(), (b - a * (a.dot(b) / a.length_squared())).normalize());
@@ -214,7 +214,7 @@ impl FlatView {
         };
         let mut horizon = linear(at.horizon);
         horizon.c -= at.horizon.abs().dot(at.error.0 + l0.abs().as_vec3() * UNIT_ROUNDOFF);
-        FlatView {
+        LightFrame {
             origin: [x as f32, y as f32],
             x: [(-1.0 - x) as f32, (1.0 - x) as f32],
             y: [(-1.0 - y) as f32, (1.0 - y) as f32],
