@@ -22,9 +22,9 @@ use super::batch::{LaneNumbers, LightFrame16, Members};
 use super::classify::{LightOccluders, OcclusionClass, classify};
 use super::emitter::Emitter;
 use super::fit::{Cell, CutBlock, Fits, MOMENTS, fit};
-use super::grade::{Grades, grade, halves, survey, whole};
 use super::light_frame::LightFrame;
 use super::panels::{OccludedLight, OccluderMask, Panel, PanelSums, cut, rows};
+use super::subdivide::{CellMetrics, cell_metrics, halves, test_horizons, whole_light};
 use super::tolerance::{COSTS, TOLERANCE, Weight};
 use crate::color::{DisplaySteps, Rgb};
 use crate::material::{LobeKind, Moments, ShadingPoint};
@@ -128,10 +128,10 @@ pub(crate) struct AreaLightIntegrator {
     frames: Vec<LightFrame16>,
     masks: Vec<OccluderMask>,
     state: Vec<PointSum>,
-    /// Cells to be graded, their grades, and the halves of those that are too wide.
-    grading: Vec<Cell>,
-    grades: Vec<Grades>,
-    next_grading: Vec<Cell>,
+    /// Cells to be graded, their metrics, and the halves of those that are too wide.
+    uncut: Vec<Cell>,
+    metrics: Vec<CellMetrics>,
+    next_uncut: Vec<Cell>,
     /// Cells that are seen whole, to be asked.
     whole: Vec<Cell>,
     /// All cells that are seen in part, what is kept of those that were asked, and how much is seen of each. Those of
@@ -263,15 +263,15 @@ impl AreaLightIntegrator {
             let start = block * LANES;
             let there = self.project(level, task, block, points);
             let frames = &self.frames[block];
-            let (survey, classes) = dispatch_wide!(level, simd => {
+            let (horizons, classes) = dispatch_wide!(level, simd => {
                 simd.vectorize(
                     #[inline(always)]
                     || {
-                        let mut survey = survey(simd, frames, task.emitter.is_physical(), points);
-                        survey.arrives &= there;
-                        let asked = if task.shadows { survey.arrives } else { 0 };
+                        let mut horizons = test_horizons(simd, frames, task.emitter.is_physical(), points);
+                        horizons.arrives &= there;
+                        let asked = if task.shadows { horizons.arrives } else { 0 };
                         let classes = classify(simd, task.listed, task.near, task.emitter, frames, points, asked);
-                        (survey, classes)
+                        (horizons, classes)
                     },
                 )
             });
@@ -282,16 +282,16 @@ impl AreaLightIntegrator {
                     illumination: Illumination::Below,
                     proved: point.reach == 0.0,
                     motion: 0.0,
-                    distance: if is(there) { survey.nearest[k] } else { 0.0 },
-                    height: if is(there) { survey.height[k] } else { 0.0 },
+                    distance: if is(there) { horizons.nearest[k] } else { 0.0 },
+                    height: if is(there) { horizons.height[k] } else { 0.0 },
                 };
                 let is_open = class.mask == OccluderMask::default();
-                if is(survey.arrives) {
+                if is(horizons.arrives) {
                     one.motion = class.motion;
                     one.illumination = match class {
                         OcclusionClass { hidden: true, .. } => Illumination::Hidden,
                         OcclusionClass { other: true, .. } => Illumination::Unknown,
-                        _ if is_open && is(survey.above) => Illumination::Full,
+                        _ if is_open && is(horizons.above) => Illumination::Full,
                         _ => Illumination::Partial,
                     };
                 } else if task.emitter.surrounds(point.p) {
@@ -299,9 +299,9 @@ impl AreaLightIntegrator {
                 }
                 // The same for all places within the point's reach
                 one.proved |= match one.illumination {
-                    Illumination::Below => is(there & survey.below_around),
-                    Illumination::Hidden => is(survey.beside_around) && one.motion == 0.0,
-                    Illumination::Full => is(survey.above_around) && one.motion == 0.0,
+                    Illumination::Below => is(there & horizons.below_around),
+                    Illumination::Hidden => is(horizons.beside_around) && one.motion == 0.0,
+                    Illumination::Full => is(horizons.above_around) && one.motion == 0.0,
                     Illumination::Partial | Illumination::Unknown => false,
                 };
                 let most_asked = LightTask::most_asked(LARGEST_CODE) * point.part_of_points;
@@ -309,7 +309,7 @@ impl AreaLightIntegrator {
                 if is_wanted && matches!(one.illumination, Illumination::Full | Illumination::Partial) {
                     let number = (start + k) as u32;
                     self.state[start + k].cells = 1;
-                    self.grading.push(whole(outline, number, self.frames[block].square(k)));
+                    self.uncut.push(whole_light(outline, number, self.frames[block].square(k)));
                 }
                 let state = &mut self.state[start + k];
                 state.most_asked = most_asked;
@@ -317,7 +317,7 @@ impl AreaLightIntegrator {
                 integrals.push(one);
             }
         }
-        self.grade(level, task);
+        self.subdivide(level, task);
     }
 
     /// Puts what a block of points sees of the light into its lanes. Returns those that see anything of it, bit by bit.
@@ -342,39 +342,39 @@ impl AreaLightIntegrator {
 
     /// Queues the cells that the light is asked by at first. Where nothing is in the way, those of which all is seen
     /// are told apart.
-    fn grade(&mut self, level: Level, task: &LightTask) {
+    fn subdivide(&mut self, level: Level, task: &LightTask) {
         let outline = task.emitter.outline();
-        while !self.grading.is_empty() {
-            self.grades.clear();
-            let (grades, frames) = (&mut self.grades, &self.frames);
+        while !self.uncut.is_empty() {
+            self.metrics.clear();
+            let (metrics, frames) = (&mut self.metrics, &self.frames);
             dispatch_wide!(level, simd => {
-                for cells in self.grading.chunks(LANES) {
+                for cells in self.uncut.chunks(LANES) {
                     let members = Members::new(frames, cells.len(), |k| cells[k].point);
-                    grades.push(simd.vectorize(
+                    metrics.push(simd.vectorize(
                         #[inline(always)]
-                        || grade(simd, task.lobe, outline, &members, cells),
+                        || cell_metrics(simd, task.lobe, outline, &members, cells),
                     ));
                 }
             });
-            for (k, cell) in self.grading.iter().enumerate() {
-                let grades = &self.grades[k / LANES];
+            for (k, cell) in self.uncut.iter().enumerate() {
+                let metrics = &self.metrics[k / LANES];
                 let is = |bits: u64| bits >> (k % LANES) & 1 == 1;
                 let state = &mut self.state[cell.point as usize];
-                if is(grades.nothing) {
+                if is(metrics.nothing) {
                     state.cells -= 1;
                     continue;
                 }
-                let is_wide = is(grades.wide) && state.may_halve(cell);
-                if let Some(halves) = halves(cell, is(grades.along_y)).filter(|_| is_wide) {
+                let is_wide = is(metrics.wide) && state.may_halve(cell);
+                if let Some(halves) = halves(cell, is(metrics.along_y)).filter(|_| is_wide) {
                     state.cells += 1;
-                    self.next_grading.extend(halves);
+                    self.next_uncut.extend(halves);
                     continue;
                 }
                 let is_open = self.masks[cell.point as usize] == OccluderMask::default();
-                if is_open && is(grades.all) { &mut self.whole } else { &mut self.cut }.push(*cell);
+                if is_open && is(metrics.all) { &mut self.whole } else { &mut self.cut }.push(*cell);
             }
-            self.grading.clear();
-            std::mem::swap(&mut self.grading, &mut self.next_grading);
+            self.uncut.clear();
+            std::mem::swap(&mut self.uncut, &mut self.next_uncut);
         }
     }
 

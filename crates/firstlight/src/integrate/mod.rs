@@ -11,12 +11,12 @@ mod classify;
 mod emitter;
 mod evaluate;
 mod fit;
-mod grade;
 mod hull;
 mod light_frame;
 mod occluder;
 mod panels;
 mod row;
+mod subdivide;
 mod tolerance;
 
 pub(crate) use classify::LightOccluders;

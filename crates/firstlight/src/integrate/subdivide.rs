@@ -14,7 +14,7 @@ use crate::math::{LANES, Vec3x16, sin_cos};
 
 /// What sixteen points see of a light with nothing in the way, each a bit.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Survey {
+pub(super) struct HorizonTest {
     /// Some of it can arrive: a side that emits faces the point, and some of the light is above its horizons.
     pub arrives: u64,
     /// All of it is above them.
@@ -31,7 +31,12 @@ pub(super) struct Survey {
 
 /// Looks at a light from up to sixteen points. To be called within `vectorize`.
 #[inline(always)]
-pub(super) fn survey<S: Simd>(simd: S, frames: &LightFrame16, is_physical: bool, points: &[ShadingPoint]) -> Survey {
+pub(super) fn test_horizons<S: Simd>(
+    simd: S,
+    frames: &LightFrame16,
+    is_physical: bool,
+    points: &[ShadingPoint],
+) -> HorizonTest {
     use FrameNumber::*;
     let zero = simd.splat_f32x16(0.0);
     let (mut reach, mut turn) = ([0.0; LANES], [0.0; LANES]);
@@ -66,7 +71,7 @@ pub(super) fn survey<S: Simd>(simd: S, frames: &LightFrame16, is_physical: bool,
         below_around |= most.simd_lt(-room);
         above_around &= least.simd_gt(room);
     }
-    Survey {
+    HorizonTest {
         arrives: arrives.to_bitmask(),
         above: (arrives & above).to_bitmask(),
         below_around: below_around.to_bitmask(),
@@ -78,7 +83,7 @@ pub(super) fn survey<S: Simd>(simd: S, frames: &LightFrame16, is_physical: bool,
 }
 
 /// A light as one cell, as `point` asks it: in the coordinates by which it is cut.
-pub(super) fn whole(outline: Outline, point: u32, [x, y]: [[f32; 2]; 2]) -> Cell {
+pub(super) fn whole_light(outline: Outline, point: u32, [x, y]: [[f32; 2]; 2]) -> Cell {
     match outline {
         Outline::Parallelogram | Outline::Disk => Cell { point, x, y, depth: 0 },
         Outline::Sphere => {
@@ -90,7 +95,7 @@ pub(super) fn whole(outline: Outline, point: u32, [x, y]: [[f32; 2]; 2]) -> Cell
 
 /// What becomes of sixteen cells, each a bit.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Grades {
+pub(super) struct CellMetrics {
     /// Nothing of it is in the light and above the horizons; all of it is.
     pub nothing: u64,
     pub all: u64,
@@ -99,15 +104,15 @@ pub(super) struct Grades {
     pub along_y: u64,
 }
 
-/// Grades up to sixteen cells. To be called within `vectorize`.
+/// CellMetrics up to sixteen cells. To be called within `vectorize`.
 #[inline(always)]
-pub(super) fn grade<S: Simd>(
+pub(super) fn cell_metrics<S: Simd>(
     simd: S,
     lobe: Option<LobeKind>,
     outline: Outline,
     members: &Members<LightFrame16>,
     cells: &[Cell],
-) -> Grades {
+) -> CellMetrics {
     use FrameNumber::*;
     let zero = simd.splat_f32x16(0.0);
     let [u0, u1, v0, v1] = sides(cells).map(|side| f32x16::simd_from(simd, side));
@@ -148,7 +153,7 @@ pub(super) fn grade<S: Simd>(
         Outline::Sphere => (v1 - v0).simd_gt(u1 - u0),
         Outline::Parallelogram | Outline::Disk => (half_y2 + lean * lean).simd_gt(half_x * half_x),
     };
-    Grades {
+    CellMetrics {
         nothing: nothing.to_bitmask(),
         all: all.to_bitmask(),
         wide: wide.to_bitmask(),
