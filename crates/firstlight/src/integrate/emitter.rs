@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 use arrayvec::ArrayVec;
 
 use super::batch::Exact;
-use super::fit::AreaWeight;
+use super::cell::AreaWeight;
 use super::light_frame::{FlatLight, LightFrame, Outline};
 use crate::light::{Area, AreaShape};
 use crate::material::ShadingPoint;

@@ -7,11 +7,11 @@
 
 mod batch;
 mod breaks;
+mod cell;
 mod classify;
 mod emitter;
-mod evaluate;
-mod fit;
 mod hull;
+mod integrator;
 mod light_frame;
 mod occluder;
 mod panels;
@@ -21,7 +21,7 @@ mod tolerance;
 
 pub(crate) use classify::LightOccluders;
 pub(crate) use emitter::Emitter;
-pub(crate) use evaluate::{AreaLightIntegrator, Illumination, LightIntegral, LightTask};
+pub(crate) use integrator::{AreaLightIntegrator, Illumination, LightIntegral, LightTask};
 pub(crate) use tolerance::{COSTS, TOLERANCE};
 
 #[cfg(test)]

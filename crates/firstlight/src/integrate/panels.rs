@@ -15,7 +15,7 @@ use fearless_simd::{f32x16, mask32x16, prelude::*};
 
 use super::batch::{FrameLanes, FrameNumber, LaneNumbers, LightFrame16, Members, light_vectors};
 use super::breaks::{Breaks, RoundSides};
-use super::fit::{Cell, CutBlock, MOMENTS, sides};
+use super::cell::{Cell, MOMENTS, PartialCells, sides};
 use super::light_frame::Outline;
 use super::occluder::{Occluder, Shadow};
 use super::row::{FAR, Interval16};
@@ -159,7 +159,7 @@ impl<'a, S: Simd> Batch<'a, S> {
 
 /// The panels of up to sixteen cells: they end where something begins, ends or has a corner. `spare` is memory.
 #[inline(never)]
-pub(crate) fn cut<S: Simd>(
+pub(crate) fn split_panels<S: Simd>(
     simd: S,
     light: &OccludedLight,
     members: &Members<LightFrame16>,
@@ -248,11 +248,11 @@ fn antiderivative<S: Simd>([a, b, c, d, e]: &[f32x16<S>; 5], u: f32x16<S>) -> f3
 
 /// What up to sixteen panels send. To be called within `vectorize`.
 #[inline(always)]
-pub(crate) fn rows<S: Simd>(
+pub(crate) fn integrate_rows<S: Simd>(
     simd: S,
     light: &OccludedLight,
     members: &Members<LightFrame16>,
-    cells: &Members<CutBlock>,
+    cells: &Members<PartialCells>,
     panels: &[Panel],
     moments: usize,
 ) -> PanelSums {
@@ -263,7 +263,7 @@ pub(crate) fn rows<S: Simd>(
     let (zero, one, far) = (splat(0.0), splat(1.0), splat(FAR));
     let [x0, x1, y0, y1] = [0, 1, 2, 3].map(
         #[inline(always)]
-        |side| cells.number(simd, CutBlock::SIDES[side]),
+        |side| cells.number(simd, PartialCells::SIDES[side]),
     );
     let (xm, xh) = ((x0 + x1) * 0.5, (x1 - x0) * 0.5);
     let (ym, yh) = ((y0 + y1) * 0.5, (y1 - y0) * 0.5);
@@ -276,7 +276,7 @@ pub(crate) fn rows<S: Simd>(
     for (moment, powers) in powers.iter_mut().enumerate().take(moments) {
         for (x, powers) in powers.iter_mut().enumerate() {
             for (y, power) in powers.iter_mut().enumerate() {
-                *power = cells.number(simd, CutBlock::power(moment, x, y));
+                *power = cells.number(simd, PartialCells::power(moment, x, y));
             }
         }
     }

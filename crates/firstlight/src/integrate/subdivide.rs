@@ -6,7 +6,7 @@ use std::f32::consts::FRAC_PI_2;
 use fearless_simd::{f32x16, mask32x16, prelude::*};
 
 use super::batch::{FrameLanes, FrameNumber, LaneNumbers, LightFrame16, Linear16, Members, light_vectors};
-use super::fit::{Cell, sides};
+use super::cell::{Cell, sides};
 use super::light_frame::Outline;
 use super::tolerance::TOLERANCE;
 use crate::material::{LobeKind, ShadingPoint};

@@ -134,7 +134,7 @@ pub(crate) struct Cell {
 
 /// What sixteen cells send, and how far that can be wrong along x and along y; each for both moments.
 #[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct Fits {
+pub(crate) struct CellQuadrature {
     pub sums: [LaneNumbers; MOMENTS],
     pub errors: [[LaneNumbers; MOMENTS]; 2],
 }
@@ -145,9 +145,9 @@ const POWERS: usize = NODES * NODES;
 /// What is kept of sixteen cells that are seen in part: the antiderivatives along x of what they send, moment by
 /// moment, and from where to where they go.
 #[derive(Clone, Debug)]
-pub(crate) struct CutBlock([LaneNumbers; MOMENTS * POWERS + 4]);
+pub(crate) struct PartialCells([LaneNumbers; MOMENTS * POWERS + 4]);
 
-impl CutBlock {
+impl PartialCells {
     /// The number of a coefficient, of x^(`x` + 1) y^`y`.
     pub const fn power(moment: usize, x: usize, y: usize) -> usize {
         moment * POWERS + x * NODES + y
@@ -157,7 +157,7 @@ impl CutBlock {
     pub const SIDES: [usize; 4] = [MOMENTS * POWERS, MOMENTS * POWERS + 1, MOMENTS * POWERS + 2, MOMENTS * POWERS + 3];
 }
 
-impl LaneBlock for CutBlock {
+impl LaneBlock for PartialCells {
     #[inline(always)]
     fn numbers(&self) -> &[LaneNumbers] {
         &self.0
@@ -296,32 +296,32 @@ fn sum<S: Simd>(simd: S, values: &[[f32x16<S>; NODES]; NODES]) -> (f32x16<S>, [[
 /// of all that this is, as errors cancel at Gauss nodes. With `kept`, that is what is kept of cells that are seen in
 /// part, where they do not. To be called within `vectorize`.
 #[inline(always)]
-pub(crate) fn fit<S: Simd>(
+pub(crate) fn integrate<S: Simd>(
     simd: S,
     lobe: Option<LobeKind>,
     falloff: AreaWeight,
     members: &Members<LightFrame16>,
     cells: &[Cell],
-    kept: Option<&mut Vec<CutBlock>>,
-) -> Fits {
+    kept: Option<&mut Vec<PartialCells>>,
+) -> CellQuadrature {
     let lobes = members.lobes(simd, lobe);
     let (values, area) = values(simd, &lobes, falloff, members, cells);
     let (zero, one, least) = (simd.splat_f32x16(0.0), simd.splat_f32x16(1.0), simd.splat_f32x16(f32::MIN_POSITIVE));
-    let mut fits = Fits::default();
+    let mut whole_sums = CellQuadrature::default();
     let moments = lobes.moment_count();
     for (moment, values) in values.iter().enumerate().take(moments) {
         let (sum, tails) = sum(simd, values);
-        fits.sums[moment] = (sum * area).to_array();
+        whole_sums.sums[moment] = (sum * area).to_array();
         for (axis, [before, last]) in tails.into_iter().enumerate() {
             let tail = last + before * 0.25;
             let part = (tail / sum.abs().max(least)).min(one);
             let part = if kept.is_some() { simd.splat_f32x16(TOLERANCE.fit_cut) } else { part };
-            fits.errors[axis][moment] = (tail * part * area).to_array();
+            whole_sums.errors[axis][moment] = (tail * part * area).to_array();
         }
     }
-    let Some(kept) = kept else { return fits };
-    let mut block = CutBlock([[0.0; LANES]; _]);
-    for (number, side) in CutBlock::SIDES.into_iter().zip(sides(cells)) {
+    let Some(kept) = kept else { return whole_sums };
+    let mut block = PartialCells([[0.0; LANES]; _]);
+    for (number, side) in PartialCells::SIDES.into_iter().zip(sides(cells)) {
         block.0[number] = side;
     }
     for moment in 0..moments {
@@ -341,10 +341,10 @@ pub(crate) fn fit<S: Simd>(
                 for (row, factor) in rows.iter().zip(matrix) {
                     sum += row[k] * *factor;
                 }
-                block.0[CutBlock::power(moment, k, m)] = (sum * area).to_array();
+                block.0[PartialCells::power(moment, k, m)] = (sum * area).to_array();
             }
         }
     }
     kept.push(block);
-    fits
+    whole_sums
 }

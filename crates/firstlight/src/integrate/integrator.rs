@@ -19,11 +19,11 @@ use arrayvec::ArrayVec;
 use fearless_simd::{Level, Simd};
 
 use super::batch::{LaneNumbers, LightFrame16, Members};
+use super::cell::{Cell, CellQuadrature, MOMENTS, PartialCells, integrate};
 use super::classify::{LightOccluders, OcclusionClass, classify};
 use super::emitter::Emitter;
-use super::fit::{Cell, CutBlock, Fits, MOMENTS, fit};
 use super::light_frame::LightFrame;
-use super::panels::{OccludedLight, OccluderMask, Panel, PanelSums, cut, rows};
+use super::panels::{OccludedLight, OccluderMask, Panel, PanelSums, integrate_rows, split_panels};
 use super::subdivide::{CellMetrics, cell_metrics, halves, test_horizons, whole_light};
 use super::tolerance::{COSTS, TOLERANCE, Weight};
 use crate::color::{DisplaySteps, Rgb};
@@ -103,7 +103,7 @@ pub(crate) struct LightTask<'a> {
 impl LightTask<'_> {
     /// How many cells and panels a pixel may be asked in place of points of a light that makes so many display steps:
     /// about half of what takes as long, as they are asked in vain where there are more of them.
-    fn most_asked(steps: f32) -> f32 {
+    fn max_evaluations(steps: f32) -> f32 {
         COSTS.asked + COSTS.asked_per_step * steps
     }
 
@@ -136,14 +136,14 @@ pub(crate) struct AreaLightIntegrator {
     whole: Vec<Cell>,
     /// All cells that are seen in part, what is kept of those that were asked, and how much is seen of each. Those of
     /// one round begin with a block.
-    cut: Vec<Cell>,
-    kept: Vec<CutBlock>,
+    partial: Vec<Cell>,
+    kept: Vec<PartialCells>,
     seen: Vec<f32>,
     /// Panels to be asked.
     panels: Vec<Panel>,
     /// What was asked in one round.
-    fits: Vec<Fits>,
-    cut_fits: Vec<Fits>,
+    whole_sums: Vec<CellQuadrature>,
+    partial_sums: Vec<CellQuadrature>,
     panel_sums: Vec<PanelSums>,
     next_whole: Vec<Cell>,
     next_panels: Vec<Panel>,
@@ -163,8 +163,8 @@ struct PointSum {
     round: u32,
     cells: u32,
     /// The number of cells and panels that were evaluated, and the largest number that may be.
-    asked: f32,
-    most_asked: f32,
+    evaluations: f32,
+    max_evaluations: f32,
 }
 
 impl AreaLightIntegrator {
@@ -217,20 +217,20 @@ impl AreaLightIntegrator {
         let integrals = &mut integrals[first..];
         let is_bounded = points.iter().any(ShadingPoint::is_bounded);
         let mut round = 0;
-        while !(self.whole.is_empty() && self.kept.len() * LANES == self.cut.len() && self.panels.is_empty()) {
+        while !(self.whole.is_empty() && self.kept.len() * LANES == self.partial.len() && self.panels.is_empty()) {
             round += 1;
             let new = self.kept.len() * LANES;
             if is_bounded {
                 self.count_cells(integrals);
             }
-            self.ask_cells(level, task);
+            self.integrate_cells(level, task);
             if is_bounded {
                 if round == 1 {
-                    self.bound(task, points);
+                    self.bound_evaluations(task, points);
                 }
                 self.count_panels(integrals);
             }
-            self.ask_panels(level, task);
+            self.integrate_panels(level, task);
             self.judge(task, points, new, round);
         }
         for (integrals, state) in integrals.iter_mut().zip(&self.state) {
@@ -254,7 +254,7 @@ impl AreaLightIntegrator {
         self.state.clear();
         self.state.resize(points.len(), PointSum::default());
         self.whole.clear();
-        self.cut.clear();
+        self.partial.clear();
         self.panels.clear();
         self.kept.clear();
         self.seen.clear();
@@ -304,7 +304,7 @@ impl AreaLightIntegrator {
                     Illumination::Full => is(horizons.above_around) && one.motion == 0.0,
                     Illumination::Partial | Illumination::Unknown => false,
                 };
-                let most_asked = LightTask::most_asked(LARGEST_CODE) * point.part_of_points;
+                let max_evaluations = LightTask::max_evaluations(LARGEST_CODE) * point.part_of_points;
                 let is_wanted = task.sums && (one.proved || one.motion <= point.most_motion);
                 if is_wanted && matches!(one.illumination, Illumination::Full | Illumination::Partial) {
                     let number = (start + k) as u32;
@@ -312,7 +312,7 @@ impl AreaLightIntegrator {
                     self.uncut.push(whole_light(outline, number, self.frames[block].square(k)));
                 }
                 let state = &mut self.state[start + k];
-                state.most_asked = most_asked;
+                state.max_evaluations = max_evaluations;
                 self.masks.push(class.mask);
                 integrals.push(one);
             }
@@ -371,7 +371,7 @@ impl AreaLightIntegrator {
                     continue;
                 }
                 let is_open = self.masks[cell.point as usize] == OccluderMask::default();
-                if is_open && is(metrics.all) { &mut self.whole } else { &mut self.cut }.push(*cell);
+                if is_open && is(metrics.all) { &mut self.whole } else { &mut self.partial }.push(*cell);
             }
             self.uncut.clear();
             std::mem::swap(&mut self.uncut, &mut self.next_uncut);
@@ -379,35 +379,35 @@ impl AreaLightIntegrator {
     }
 
     /// Bounds what points are asked by what the light could make of them: it was asked for all cells once.
-    fn bound(&mut self, task: &LightTask, points: &[ShadingPoint]) {
-        let AreaLightIntegrator { state, whole, fits, cut, cut_fits, .. } = self;
+    fn bound_evaluations(&mut self, task: &LightTask, points: &[ShadingPoint]) {
+        let AreaLightIntegrator { state, whole, whole_sums, partial, partial_sums, .. } = self;
         let mut sent = vec![Moments::default(); points.len()];
-        for (cells, fits) in [(whole, fits), (cut, cut_fits)] {
+        for (cells, whole_sums) in [(whole, whole_sums), (partial, partial_sums)] {
             for (k, cell) in cells.iter().enumerate() {
-                sent[cell.point as usize] += Moments(lane(&fits[k / LANES].sums, k).map(f32::abs));
+                sent[cell.point as usize] += Moments(lane(&whole_sums[k / LANES].sums, k).map(f32::abs));
             }
         }
         for ((state, point), sent) in state.iter_mut().zip(points).zip(&sent) {
             let error = (task.scale * point.bsdf.colors).of(sent);
             let steps = task.steps.of_color(point.base + error * 0.5, error);
-            state.most_asked = LightTask::most_asked(steps) * point.part_of_points;
+            state.max_evaluations = LightTask::max_evaluations(steps) * point.part_of_points;
         }
     }
 
     /// Counts the cells of this round, and leaves out those of points that are asked too much.
     fn count_cells(&mut self, integrals: &mut [LightIntegral]) {
         let new = self.kept.len() * LANES;
-        for cell in self.whole.iter().chain(&self.cut[new..]) {
-            self.state[cell.point as usize].asked += 1.0;
+        for cell in self.whole.iter().chain(&self.partial[new..]) {
+            self.state[cell.point as usize].evaluations += 1.0;
         }
         if self.give_up(integrals) {
             let state = &self.state;
             let is_asked = |cell: &Cell| state[cell.point as usize].cells != PointSum::GIVEN_UP;
             self.whole.retain(is_asked);
-            let mut kept = self.cut.split_off(new);
+            let mut kept = self.partial.split_off(new);
             kept.retain(is_asked);
-            self.cut.append(&mut kept);
-            self.leave_panels();
+            self.partial.append(&mut kept);
+            self.drop_panels();
         }
     }
 
@@ -415,10 +415,10 @@ impl AreaLightIntegrator {
     fn count_panels(&mut self, integrals: &mut [LightIntegral]) {
         for panel in &self.panels {
             let state = &mut self.state[panel.point as usize];
-            state.asked += 1.0;
+            state.evaluations += 1.0;
         }
         if self.give_up(integrals) {
-            self.leave_panels();
+            self.drop_panels();
         }
     }
 
@@ -427,7 +427,7 @@ impl AreaLightIntegrator {
         let mut is_any = false;
         for ((state, mask), integrals) in self.state.iter_mut().zip(&self.masks).zip(integrals) {
             let is_behind = *mask != OccluderMask::default() && integrals.illumination == Illumination::Partial;
-            if is_behind && state.asked > state.most_asked {
+            if is_behind && state.evaluations > state.max_evaluations {
                 state.cells = PointSum::GIVEN_UP;
                 integrals.illumination = Illumination::Unknown;
                 is_any = true;
@@ -436,44 +436,44 @@ impl AreaLightIntegrator {
         is_any
     }
 
-    fn leave_panels(&mut self) {
+    fn drop_panels(&mut self) {
         let AreaLightIntegrator { state, panels, .. } = self;
         panels.retain(|panel| state[panel.point as usize].cells != PointSum::GIVEN_UP);
     }
 
     /// Asks all cells of this round, and makes panels of those that are new and seen in part.
-    fn ask_cells(&mut self, level: Level, task: &LightTask) {
-        let AreaLightIntegrator { frames, masks, whole, cut: cut_cells, kept, panels, spare, .. } = self;
+    fn integrate_cells(&mut self, level: Level, task: &LightTask) {
+        let AreaLightIntegrator { frames, masks, whole, partial, kept, panels, spare, .. } = self;
         let falloff = task.emitter.falloff();
         let light = task.occluded_light(masks);
-        self.fits.clear();
-        self.cut_fits.clear();
-        let (fits, cut_fits) = (&mut self.fits, &mut self.cut_fits);
+        self.whole_sums.clear();
+        self.partial_sums.clear();
+        let (whole_sums, partial_sums) = (&mut self.whole_sums, &mut self.partial_sums);
         // Those of the cut cells that are new
-        let new = cut_cells[kept.len() * LANES..].chunks(LANES).map(|cells| (cells, true));
+        let new = partial[kept.len() * LANES..].chunks(LANES).map(|cells| (cells, true));
         let asked = whole.chunks(LANES).map(|cells| (cells, false)).chain(new);
         // Each kernel is called at one place: so there is one copy of it for each instruction set
         dispatch_wide!(level, simd => {
-            for (cells, is_cut) in asked {
+            for (cells, is_partial) in asked {
                 let members = Members::new(frames, cells.len(), |k| cells[k].point);
                 let first = (kept.len() * LANES) as u32;
-                let wanted = is_cut.then_some(&mut *kept);
+                let wanted = is_partial.then_some(&mut *kept);
                 let fitted = simd.vectorize(
                     #[inline(always)]
-                    || fit(simd, task.lobe, falloff, &members, cells, wanted),
+                    || integrate(simd, task.lobe, falloff, &members, cells, wanted),
                 );
-                if is_cut {
-                    cut_fits.push(fitted);
-                    cut(simd, &light, &members, cells, first, spare, panels);
+                if is_partial {
+                    partial_sums.push(fitted);
+                    split_panels(simd, &light, &members, cells, first, spare, panels);
                 } else {
-                    fits.push(fitted);
+                    whole_sums.push(fitted);
                 }
             }
         });
     }
 
     /// Asks all panels of this round.
-    fn ask_panels(&mut self, level: Level, task: &LightTask) {
+    fn integrate_panels(&mut self, level: Level, task: &LightTask) {
         let AreaLightIntegrator { frames, masks, kept, panels, panel_sums, .. } = self;
         let light = task.occluded_light(masks);
         let moments = if task.lobe.is_none() { 1 } else { MOMENTS };
@@ -484,7 +484,7 @@ impl AreaLightIntegrator {
                 let cells = Members::new(kept, some.len(), |k| some[k].cell);
                 panel_sums.push(simd.vectorize(
                     #[inline(always)]
-                    || rows(simd, &light, &members, &cells, some, moments),
+                    || integrate_rows(simd, &light, &members, &cells, some, moments),
                 ));
             }
         });
@@ -495,13 +495,13 @@ impl AreaLightIntegrator {
     fn judge(&mut self, task: &LightTask, points: &[ShadingPoint], new: usize, round: u32) {
         // What arrives as far as is known now, and how much of each new cell is seen
         for (k, cell) in self.whole.iter().enumerate() {
-            self.state[cell.point as usize].expect(lane(&self.fits[k / LANES].sums, k), round);
+            self.state[cell.point as usize].add_estimate(lane(&self.whole_sums[k / LANES].sums, k), round);
         }
-        self.seen.resize(self.cut.len(), 0.0);
+        self.seen.resize(self.partial.len(), 0.0);
         for (k, panel) in self.panels.iter().enumerate() {
             let sums = &self.panel_sums[k / LANES];
             let cell = panel.cell as usize;
-            self.state[panel.point as usize].expect(lane(&sums.sums, k), round);
+            self.state[panel.point as usize].add_estimate(lane(&sums.sums, k), round);
             if cell >= new {
                 self.seen[cell] += sums.seen[k % LANES];
             }
@@ -524,27 +524,27 @@ impl AreaLightIntegrator {
         // Cells that are seen whole
         self.next_whole.clear();
         for (k, cell) in self.whole.iter().enumerate() {
-            let fits = &self.fits[k / LANES];
+            let whole_sums = &self.whole_sums[k / LANES];
             let state = &mut self.state[cell.point as usize];
-            let parts = state.refused(cell, fit_error(state.weight, fits, k));
+            let parts = state.split(cell, fit_error(state.weight, whole_sums, k));
             if parts.is_empty() {
-                state.accept(lane(&fits.sums, k));
+                state.accept(lane(&whole_sums.sums, k));
             }
             self.next_whole.extend(parts);
         }
         // Cells that are seen in part: those whose light is not known well enough are asked anew
-        let asked = self.cut.len();
-        self.cut.resize(self.kept.len() * LANES, Cell::default());
+        let asked = self.partial.len();
+        self.partial.resize(self.kept.len() * LANES, Cell::default());
         for k in new..asked {
-            let cell = self.cut[k];
-            let fits = &self.cut_fits[(k - new) / LANES];
+            let cell = self.partial[k];
+            let whole_sums = &self.partial_sums[(k - new) / LANES];
             let state = &mut self.state[cell.point as usize];
-            let error = fit_error(state.weight, fits, k - new).map(|error| error * self.seen[k]);
-            let parts = state.refused(&cell, error);
+            let error = fit_error(state.weight, whole_sums, k - new).map(|error| error * self.seen[k]);
+            let parts = state.split(&cell, error);
             if !parts.is_empty() {
                 self.seen[k] = f32::NAN;
             }
-            self.cut.extend(parts);
+            self.partial.extend(parts);
         }
         self.next_panels.clear();
         for (k, panel) in self.panels.iter().enumerate() {
@@ -587,8 +587,8 @@ fn lane(block: &[LaneNumbers; MOMENTS], k: usize) -> [f32; MOMENTS] {
 }
 
 /// How far the fit of the `k`-th cell can be wrong along x and along y, as parts of what is allowed.
-fn fit_error(weight: Weight, fits: &Fits, k: usize) -> [f32; 2] {
-    fits.errors.map(|errors| weight.of(lane(&errors, k)))
+fn fit_error(weight: Weight, whole_sums: &CellQuadrature, k: usize) -> [f32; 2] {
+    whole_sums.errors.map(|errors| weight.of(lane(&errors, k)))
 }
 
 /// Added to the number of a round once the weight is known.
@@ -599,7 +599,7 @@ impl PointSum {
     const GIVEN_UP: u32 = u32::MAX;
 
     /// Counts on what was asked in a round.
-    fn expect(&mut self, sums: [f32; MOMENTS], round: u32) {
+    fn add_estimate(&mut self, sums: [f32; MOMENTS], round: u32) {
         if self.round != round {
             (self.round, self.estimate) = (round, self.accepted);
         }
@@ -612,7 +612,7 @@ impl PointSum {
 
     /// The halves of a cell whose fit may be wrong by so much along x and along y, along the worse axis; none where
     /// that will do.
-    fn refused(&mut self, cell: &Cell, [x, y]: [f32; 2]) -> ArrayVec<Cell, 2> {
+    fn split(&mut self, cell: &Cell, [x, y]: [f32; 2]) -> ArrayVec<Cell, 2> {
         let is_refused = x + y > TOLERANCE.part && self.may_halve(cell);
         let halves = is_refused.then(|| halves(cell, y > x)).flatten();
         self.cells += u32::from(halves.is_some());
