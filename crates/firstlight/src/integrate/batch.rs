@@ -108,22 +108,12 @@ impl LightFrame16 {
     #[inline(always)]
     pub fn project<S: Simd>(&mut self, simd: S, light: &FlatLight, points: &[ShadingPoint]) -> u64 {
         use FrameNumber::*;
-        macro_rules! vectors {
-            ($of:expr) => {{
-                let mut numbers = [[0.0f32; LANES]; 3];
-                for (k, point) in points.iter().enumerate() {
-                    let v: Vec3 = $of(point);
-                    (numbers[0][k], numbers[1][k], numbers[2][k]) = (v.x, v.y, v.z);
-                }
-                let [x, y, z] = numbers.map(|numbers| f32x16::simd_from(simd, numbers));
-                Vec3x16 { x, y, z }
-            }};
-        }
         let splat = |v: f32| simd.splat_f32x16(v);
-        let p = vectors!(|point: &ShadingPoint| point.p);
-        let [error, horizon] =
-            [vectors!(|point: &ShadingPoint| point.error.0), vectors!(|point: &ShadingPoint| point.horizon)];
-        let [ns, wo] = [vectors!(|point: &ShadingPoint| point.ns), vectors!(|point: &ShadingPoint| point.wo)];
+        let p = point_vectors(simd, points, |point| point.p);
+        let error = point_vectors(simd, points, |point| point.error.0);
+        let horizon = point_vectors(simd, points, |point| point.horizon);
+        let ns = point_vectors(simd, points, |point| point.ns);
+        let wo = point_vectors(simd, points, |point| point.wo);
         // Lanes without a point have the lobe of the last: of one exponent for all, powers are faster
         for (lane, shininess) in self.0[Shininess as usize].iter_mut().enumerate() {
             *shininess = points[lane.min(points.len() - 1)].bsdf.lobe.shininess();
@@ -352,4 +342,32 @@ pub(crate) fn light_vectors<S: Simd>(simd: S, frames: &impl FrameLanes) -> [Vec3
     use FrameNumber::*;
     // Written out, here and below: a map of an array is not inlined, and each operation becomes a call
     [frames.vectors(simd, [L0x, L0y, L0z]), frames.vectors(simd, [Ax, Ay, Az]), frames.vectors(simd, [Bx, By, Bz])]
+}
+
+/// One number of each of up to sixteen points, in lanes; 0 in lanes without a point.
+#[inline(always)]
+pub(crate) fn point_numbers<S: Simd>(
+    simd: S,
+    points: &[ShadingPoint],
+    number: impl Fn(&ShadingPoint) -> f32,
+) -> f32x16<S> {
+    let mut numbers = [0.0; LANES];
+    for (lane, point) in numbers.iter_mut().zip(points) {
+        *lane = number(point);
+    }
+    f32x16::simd_from(simd, numbers)
+}
+
+/// One vector of each of up to sixteen points, in lanes; 0 in lanes without a point.
+#[inline(always)]
+pub(crate) fn point_vectors<S: Simd>(
+    simd: S,
+    points: &[ShadingPoint],
+    vector: impl Fn(&ShadingPoint) -> Vec3,
+) -> Vec3x16<S> {
+    Vec3x16 {
+        x: point_numbers(simd, points, |point| vector(point).x),
+        y: point_numbers(simd, points, |point| vector(point).y),
+        z: point_numbers(simd, points, |point| vector(point).z),
+    }
 }

@@ -10,7 +10,9 @@ mod solid;
 
 use fearless_simd::{f32x16, prelude::*};
 
-use super::batch::{Exact, FrameLanes, FrameNumber, LightFrame16, Linear16, light_vectors};
+use super::batch::{
+    Exact, FrameLanes, FrameNumber, LightFrame16, Linear16, light_vectors, point_numbers, point_vectors,
+};
 use super::emitter::Emitter;
 use super::hull::SolidOccluder;
 use super::occluder::{Occluder, Shadow, corners_from};
@@ -250,13 +252,6 @@ impl<S: Simd> LightPyramid16<S> {
     #[inline(always)]
     fn new(simd: S, frames: &LightFrame16, points: &[ShadingPoint]) -> LightPyramid16<S> {
         use FrameNumber::*;
-        let point = |f: fn(&ShadingPoint) -> f32| {
-            let mut numbers = [0.0; LANES];
-            for (number, point) in numbers.iter_mut().zip(points) {
-                *number = f(point);
-            }
-            numbers
-        };
         let l = light_vectors(simd, frames);
         let (x, y) =
             ([frames.lanes(simd, X0), frames.lanes(simd, X1)], [frames.lanes(simd, Y0), frames.lanes(simd, Y1)]);
@@ -292,26 +287,12 @@ impl<S: Simd> LightPyramid16<S> {
             far,
             size,
             normal: unit(l[1].cross(l[2])),
-            horizon: Vec3x16 {
-                x: f32x16::simd_from(simd, point(|p| p.horizon.x)),
-                y: f32x16::simd_from(simd, point(|p| p.horizon.y)),
-                z: f32x16::simd_from(simd, point(|p| p.horizon.z)),
-            },
-            error: Vec3x16 {
-                x: f32x16::simd_from(simd, point(|p| p.error.0.x)),
-                y: f32x16::simd_from(simd, point(|p| p.error.0.y)),
-                z: f32x16::simd_from(simd, point(|p| p.error.0.z)),
-            },
-            reach: f32x16::simd_from(simd, point(|p| p.reach)),
-            turn: f32x16::simd_from(simd, point(|p| p.turn)),
+            horizon: point_vectors(simd, points, |point| point.horizon),
+            error: point_vectors(simd, points, |point| point.error.0),
+            reach: point_numbers(simd, points, |point| point.reach),
+            turn: point_numbers(simd, points, |point| point.turn),
             depth: 0.0,
         }
-    }
-
-    /// The way to a place of the light.
-    #[inline(always)]
-    fn way(&self, x: f32x16<S>, y: f32x16<S>) -> Vec3x16<S> {
-        way(&self.light_vectors, x, y)
     }
 
     /// How far the hull of some points lies outside of one side of the pyramid over the light, at most.

@@ -5,12 +5,14 @@ use std::f32::consts::FRAC_PI_2;
 
 use fearless_simd::{f32x16, mask32x16, prelude::*};
 
-use super::batch::{FrameLanes, FrameNumber, LaneNumbers, LightFrame16, Linear16, Members, light_vectors};
+use super::batch::{
+    FrameLanes, FrameNumber, LaneNumbers, LightFrame16, Linear16, Members, light_vectors, point_numbers,
+};
 use super::cell::{Cell, sides};
 use super::light_frame::Outline;
 use super::tolerance::TOLERANCE;
 use crate::material::{LobeKind, ShadingPoint};
-use crate::math::{LANES, Vec3x16, sin_cos};
+use crate::math::{Vec3x16, sin_cos};
 
 /// What sixteen points see of a light with nothing in the way, each a bit.
 #[derive(Clone, Copy, Debug, Default)]
@@ -39,11 +41,8 @@ pub(super) fn test_horizons<S: Simd>(
 ) -> HorizonTest {
     use FrameNumber::*;
     let zero = simd.splat_f32x16(0.0);
-    let (mut reach, mut turn) = ([0.0; LANES], [0.0; LANES]);
-    for (k, point) in points.iter().enumerate() {
-        (reach[k], turn[k]) = (point.reach, point.turn);
-    }
-    let (reach, turn) = (f32x16::simd_from(simd, reach), f32x16::simd_from(simd, turn));
+    let reach = point_numbers(simd, points, |point| point.reach);
+    let turn = point_numbers(simd, points, |point| point.turn);
     let [x0, x1] = [frames.lanes(simd, X0), frames.lanes(simd, X1)];
     let [y0, y1] = [frames.lanes(simd, Y0), frames.lanes(simd, Y1)];
     let (height, facing) = (frames.lanes(simd, Height), frames.lanes(simd, Facing));

@@ -360,9 +360,7 @@ impl BallCase {
         AreaLightIntegrator::default().evaluate(Level::new(), &task, &[self.point], &mut integrals);
         if integrals[0].illumination == Illumination::Unknown { Moments::UNKNOWN } else { integrals[0].sums }
     }
-}
 
-impl BallCase {
     /// What batches find, or nothing where a shape intersects the light: there it is sampled.
     fn known(&self, seed: u64, steps: &DisplaySteps) -> Option<Moments> {
         let found = self.batched(steps);

@@ -2,8 +2,8 @@
 
 use fearless_simd::{f32x16, prelude::*};
 
-use super::{LightPyramid16, OccluderTest, SLACK};
-use crate::integrate::batch::Exact;
+use super::{LightPyramid16, OccluderTest, SLACK, way};
+use crate::integrate::batch::{Exact, point_vectors};
 use crate::integrate::row::edges;
 use crate::material::ShadingPoint;
 use crate::math::{DVec3, Facet, LANES, Vec3, Vec3x16};
@@ -158,19 +158,14 @@ pub(super) struct Own<S: Simd> {
 impl<S: Simd> Own<S> {
     #[inline(always)]
     pub fn new(simd: S, pyramid: &LightPyramid16<S>, points: &[ShadingPoint]) -> Own<S> {
-        let mut numbers = [[0.0; LANES]; 3];
         let mut lifted = 0;
         for (k, point) in points.iter().enumerate() {
-            let Vec3 { x, y, z } = point.ng;
-            (numbers[0][k], numbers[1][k], numbers[2][k]) = (x, y, z);
             lifted |= u64::from(point.facet != Facet::NONE) << k;
         }
-        let [x, y, z] = numbers;
-        let ng =
-            Vec3x16 { x: f32x16::simd_from(simd, x), y: f32x16::simd_from(simd, y), z: f32x16::simd_from(simd, z) };
+        let ng = point_vectors(simd, points, |point| point.ng);
         let mut least = simd.splat_f32x16(f32::INFINITY);
         for [x, y] in pyramid.square() {
-            least = least.min(ng.dot(pyramid.way(x, y)));
+            least = least.min(ng.dot(way(&pyramid.light_vectors, x, y)));
         }
         Own { ng, lifted, sees_below: lifted & !least.simd_gt(simd.splat_f32x16(0.0)).to_bitmask() }
     }
