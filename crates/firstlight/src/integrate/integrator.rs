@@ -1,19 +1,20 @@
-//! What arrives from one flat light at many points: batches of sixteen, and a queue of what is not good enough yet.
+//! Irradiance moments from one area light at many points: adaptive quadrature in batches of sixteen, with a queue
+//! of cells and panels whose error estimate is too large.
 //!
 //! ```text
-//! points ── classify ──▶ nothing arrives
+//! points ── classify ──▶ below the horizon, or in the umbra: 0
 //!              │ cells of the light
 //!              ▼
-//!             fit ──▶ seen whole: mean and error estimate ─────────────────┐
-//!              │ polynomials, panels                                       ▼
-//!              ▼                                                         judge ──▶ accepted
-//!             rows ──▶ seen in part: sums and error estimate ──────────────┘ │ halved cells, halved panels
-//!              ▲                                                             │
-//!              └────────────────────────── next round ◀──────────────────────┘
+//!          integrate ──▶ fully visible: sum and error estimate ─────────────┐
+//!              │ polynomials, panels                                        ▼
+//!              ▼                                                          judge ──▶ accepted
+//!        integrate_rows ──▶ partially visible: sum and error estimate ──────┘ │ halved cells, halved panels
+//!              ▲                                                              │
+//!              └────────────────────────── next round ◀───────────────────────┘
 //! ```
 //!
-//! Two certificates stand apart: whether the light is known on a cell (the end of its series), and whether what is seen
-//! of the cell is (two rules for the rows of each panel). What is asked again is asked with everything else that is.
+//! There are two error estimates: of the radiance on a cell (the last coefficients of its Legendre series), and of
+//! the visible part of a cell (an embedded pair of rules on the rows of each panel).
 
 use arrayvec::ArrayVec;
 use fearless_simd::{Level, Simd};
@@ -30,38 +31,38 @@ use crate::color::{DisplaySteps, Rgb};
 use crate::material::{LobeKind, Moments, ShadingPoint};
 use crate::math::{LANES, dispatch_wide};
 
-/// How much of a light shines on a point.
+/// How much of a light illuminates a point.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Illumination {
-    /// Nothing: all is below a horizon, or the point is behind the light.
+    /// None: all of the light is below a horizon, or the point is behind the light.
     Below,
-    /// Nothing: something hides all of it.
+    /// None: the point is in the umbra of an occluder.
     Hidden,
-    /// All of it is seen.
+    /// All of the light is visible.
     Full,
-    /// A part of it, known in closed form.
+    /// A part of the light is visible, known in closed form.
     Partial,
-    /// Something is in the way that has no closed form here.
+    /// An occluder has no closed form here.
     Unknown,
 }
 
-/// What arrives at a point.
+/// What one light sends to one point.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct LightIntegral {
-    /// Nothing where it is not wanted: see [`ShadingPoint::most_motion`].
+    /// The irradiance moments; 0 where they were not computed: see [`ShadingPoint::most_motion`].
     pub sums: Moments,
     pub illumination: Illumination,
-    /// Whether the same is proved for all places within the point's reach.
+    /// Whether `illumination` is proved for all places within the point's reach.
     pub proved: bool,
     /// See [`OcclusionClass::motion`].
     pub motion: f32,
-    /// How far the light is away, and the point from its plane.
+    /// The distance to the light, and of the point from the light's plane, in metres.
     pub distance: f32,
     pub height: f32,
 }
 
 impl LightIntegral {
-    /// What arrives of two parts of a light.
+    /// The sum over two parts of a light.
     fn and(&self, other: &LightIntegral) -> LightIntegral {
         let illumination = match (self.illumination, other.illumination) {
             (one, other) if one == other => one,
@@ -78,97 +79,98 @@ impl LightIntegral {
     }
 }
 
-/// A light as it is asked.
+/// A light to be integrated, with its occluders and the allowed error.
 #[derive(Clone, Copy)]
 pub(crate) struct LightTask<'a> {
     pub emitter: &'a Emitter,
     pub listed: &'a LightOccluders<'a>,
-    /// What of trees may be in the way, if anything is.
+    /// The occluders gathered in trees, if there are any.
     pub near: Option<&'a LightOccluders<'a>>,
     /// The kind of the points' lobes.
     pub lobe: Option<LobeKind>,
-    /// What its moments are multiplied with before the colours of a surface.
+    /// Factor of the moments, before the colours of a surface.
     pub scale: Rgb,
     pub steps: &'a DisplaySteps,
-    /// In display steps: how far this light may be wrong at a point that stands for a pixel.
+    /// In display steps: the largest error of this light at a point that stands for a pixel.
     pub allowed: f32,
-    /// The value that many steps above black.
+    /// The value `allowed` steps above black.
     pub least: f32,
-    /// Whether others can take the light away.
+    /// Whether occluders are tested.
     pub shadows: bool,
-    /// Whether it is asked what arrives, and not only what is seen of the light.
+    /// Whether moments are computed, or the illumination alone.
     pub sums: bool,
 }
 
 impl LightTask<'_> {
-    /// How many cells and panels a pixel may be asked in place of points of a light that makes so many display steps:
-    /// about half of what takes as long, as they are asked in vain where there are more of them.
+    /// The most cells and panels of one point at which a light that contributes `steps` display steps is integrated;
+    /// beyond that, sampling is cheaper. Half of the number at which both cost the same, since the evaluations are
+    /// wasted where the limit is exceeded.
     fn max_evaluations(steps: f32) -> f32 {
         COSTS.asked + COSTS.asked_per_step * steps
     }
 
-    /// The light with what is between it and points.
+    /// The light with its occluders and their masks, point by point.
     fn occluded_light<'b>(&'b self, masks: &'b [OccluderMask]) -> OccludedLight<'b> {
         let near = self.near.map_or(&[][..], |near| &near.occluders);
         OccludedLight { occluders: [&self.listed.occluders, near], outline: self.emitter.outline(), masks }
     }
 }
 
-/// How often cells and panels are halved at most, and the most cells that one light is cut into for one point.
+/// The most halvings of a cell and of a panel, and the most cells of a light for one point.
 const CELL_DEPTH: u32 = 64;
 const PANEL_DEPTH: u32 = 12;
 const MOST_CELLS: u32 = 2048;
-/// In display steps: what a light makes at most.
+/// In display steps: the largest contribution of a light.
 const LARGEST_CODE: f32 = u8::MAX as f32;
 
-/// The memory of [`evaluate`](AreaLightIntegrator::evaluate), used again and again.
+/// The buffers of [`evaluate`](AreaLightIntegrator::evaluate), which are kept from call to call.
 #[derive(Default)]
 pub(crate) struct AreaLightIntegrator {
     /// Point by point.
     frames: Vec<LightFrame16>,
     masks: Vec<OccluderMask>,
     state: Vec<PointSum>,
-    /// Cells to be graded, their metrics, and the halves of those that are too wide.
+    /// Cells to be subdivided, their metrics, and the halves of those that are too wide.
     uncut: Vec<Cell>,
     metrics: Vec<CellMetrics>,
     next_uncut: Vec<Cell>,
-    /// Cells that are seen whole, to be asked.
+    /// Fully visible cells to be integrated.
     whole: Vec<Cell>,
-    /// All cells that are seen in part, what is kept of those that were asked, and how much is seen of each. Those of
-    /// one round begin with a block.
+    /// All partially visible cells, the polynomials of those that were integrated, and the visible area of each. The
+    /// cells of a round begin at a multiple of sixteen.
     partial: Vec<Cell>,
     kept: Vec<PartialCells>,
     seen: Vec<f32>,
-    /// Panels to be asked.
+    /// Panels to be integrated.
     panels: Vec<Panel>,
-    /// What was asked in one round.
+    /// Results of one round.
     whole_sums: Vec<CellQuadrature>,
     partial_sums: Vec<CellQuadrature>,
     panel_sums: Vec<PanelSums>,
     next_whole: Vec<Cell>,
     next_panels: Vec<Panel>,
     spare: Vec<LaneNumbers>,
-    /// Of a part of a ball.
+    /// The integrals of one face of a cube around points inside of a sphere light.
     part: Vec<LightIntegral>,
 }
 
-/// What is known of one point.
+/// The state of the integration at one point.
 #[derive(Clone, Copy, Debug, Default)]
 struct PointSum {
     accepted: Moments,
-    /// With all that is not accepted yet.
+    /// `accepted`, with the sums of the current round.
     estimate: Moments,
     weight: Weight,
-    /// The round that the last two are of.
+    /// The round in which `estimate` and `weight` were computed.
     round: u32,
     cells: u32,
-    /// The number of cells and panels that were evaluated, and the largest number that may be.
+    /// The number of cells and panels that were evaluated, and the largest allowed.
     evaluations: f32,
     max_evaluations: f32,
 }
 
 impl AreaLightIntegrator {
-    /// Adds to `integrals` what of a light arrives at each point.
+    /// Appends the integral of a light at each point to `integrals`.
     pub fn evaluate(
         &mut self,
         level: Level,
@@ -204,7 +206,7 @@ impl AreaLightIntegrator {
         }
     }
 
-    /// The same, but for points inside of a ball: those have answers that say so.
+    /// The same with points inside of a sphere light left [`Illumination::Unknown`].
     fn evaluate_one(
         &mut self,
         level: Level,
@@ -238,7 +240,7 @@ impl AreaLightIntegrator {
         }
     }
 
-    /// Finds out how each point sees the light, and queues the cells it is asked by.
+    /// Computes the light's coordinates from each point, classifies the occluders, and queues the first cells.
     fn project_light(
         &mut self,
         level: Level,
@@ -320,7 +322,8 @@ impl AreaLightIntegrator {
         self.subdivide(level, task);
     }
 
-    /// Puts what a block of points sees of the light into its lanes. Returns those that see anything of it, bit by bit.
+    /// Computes the light's coordinates from a block of points. Returns the points from which the light has any, as
+    /// bits.
     fn project(&mut self, level: Level, task: &LightTask, block: usize, points: &[ShadingPoint]) -> u64 {
         let frames = &mut self.frames[block];
         let (mut there, mut one_by_one) = (0, u64::MAX);
@@ -340,8 +343,8 @@ impl AreaLightIntegrator {
         there
     }
 
-    /// Queues the cells that the light is asked by at first. Where nothing is in the way, those of which all is seen
-    /// are told apart.
+    /// Halves cells until none is too wide, and queues them: cells of which all is above the horizon and nothing
+    /// occludes are fully visible.
     fn subdivide(&mut self, level: Level, task: &LightTask) {
         let outline = task.emitter.outline();
         while !self.uncut.is_empty() {
@@ -378,7 +381,7 @@ impl AreaLightIntegrator {
         }
     }
 
-    /// Bounds what points are asked by what the light could make of them: it was asked for all cells once.
+    /// Limits the evaluations of each point by the unoccluded light there, after all first cells were integrated.
     fn bound_evaluations(&mut self, task: &LightTask, points: &[ShadingPoint]) {
         let AreaLightIntegrator { state, whole, whole_sums, partial, partial_sums, .. } = self;
         let mut sent = vec![Moments::default(); points.len()];
@@ -394,7 +397,7 @@ impl AreaLightIntegrator {
         }
     }
 
-    /// Counts the cells of this round, and leaves out those of points that are asked too much.
+    /// Counts the cells of this round, and drops those of points beyond their limit.
     fn count_cells(&mut self, integrals: &mut [LightIntegral]) {
         let new = self.kept.len() * LANES;
         for cell in self.whole.iter().chain(&self.partial[new..]) {
@@ -411,7 +414,7 @@ impl AreaLightIntegrator {
         }
     }
 
-    /// The same with panels.
+    /// The same for panels.
     fn count_panels(&mut self, integrals: &mut [LightIntegral]) {
         for panel in &self.panels {
             let state = &mut self.state[panel.point as usize];
@@ -422,7 +425,7 @@ impl AreaLightIntegrator {
         }
     }
 
-    /// Gives up what is asked too much of what something is in the way of; whether there was any.
+    /// Marks partially visible points beyond their limit as [`Illumination::Unknown`]. Returns whether there was any.
     fn give_up(&mut self, integrals: &mut [LightIntegral]) -> bool {
         let mut is_any = false;
         for ((state, mask), integrals) in self.state.iter_mut().zip(&self.masks).zip(integrals) {
@@ -441,7 +444,7 @@ impl AreaLightIntegrator {
         panels.retain(|panel| state[panel.point as usize].cells != PointSum::GIVEN_UP);
     }
 
-    /// Asks all cells of this round, and makes panels of those that are new and seen in part.
+    /// Integrates all cells of this round, and splits the new partially visible ones into panels.
     fn integrate_cells(&mut self, level: Level, task: &LightTask) {
         let AreaLightIntegrator { frames, masks, whole, partial, kept, panels, spare, .. } = self;
         let falloff = task.emitter.falloff();
@@ -472,7 +475,7 @@ impl AreaLightIntegrator {
         });
     }
 
-    /// Asks all panels of this round.
+    /// Integrates all panels of this round.
     fn integrate_panels(&mut self, level: Level, task: &LightTask) {
         let AreaLightIntegrator { frames, masks, kept, panels, panel_sums, .. } = self;
         let light = task.occluded_light(masks);
@@ -490,8 +493,8 @@ impl AreaLightIntegrator {
         });
     }
 
-    /// Accepts what is good enough, and queues the halves of what is not. Cut cells from `new` on were asked for the
-    /// first time.
+    /// Accepts results whose error estimate is small enough, and queues the halves of the others. Partially visible
+    /// cells from `new` on were integrated in this round.
     fn judge(&mut self, task: &LightTask, points: &[ShadingPoint], new: usize, round: u32) {
         // What arrives as far as is known now, and how much of each new cell is seen
         for (k, cell) in self.whole.iter().enumerate() {
@@ -581,24 +584,24 @@ impl AreaLightIntegrator {
     }
 }
 
-/// The numbers of the `k`-th of all that was asked in a round, from the block it is in.
+/// The numbers of the `k`-th member of a round, from its block.
 fn lane(block: &[LaneNumbers; MOMENTS], k: usize) -> [f32; MOMENTS] {
     block.map(|numbers| numbers[k % LANES])
 }
 
-/// How far the fit of the `k`-th cell can be wrong along x and along y, as parts of what is allowed.
+/// The error estimate of the `k`-th cell along x and along y, as parts of the allowed error.
 fn fit_error(weight: Weight, whole_sums: &CellQuadrature, k: usize) -> [f32; 2] {
     whole_sums.errors.map(|errors| weight.of(lane(&errors, k)))
 }
 
-/// Added to the number of a round once the weight is known.
+/// Added to the number of a round once the weight is computed.
 const WEIGHED: u32 = 1 << 31;
 
 impl PointSum {
-    /// A number of cells that no point has: it is not asked any more.
+    /// In place of the number of cells: the point is not integrated any more.
     const GIVEN_UP: u32 = u32::MAX;
 
-    /// Counts on what was asked in a round.
+    /// Adds a sum of this round to the estimate.
     fn add_estimate(&mut self, sums: [f32; MOMENTS], round: u32) {
         if self.round != round {
             (self.round, self.estimate) = (round, self.accepted);
@@ -610,8 +613,8 @@ impl PointSum {
         self.accepted += Moments(sums);
     }
 
-    /// The halves of a cell whose fit may be wrong by so much along x and along y, along the worse axis; none where
-    /// that will do.
+    /// The halves of a cell with error estimates along x and y, across the axis of the larger one; none if the cell is
+    /// accepted.
     fn split(&mut self, cell: &Cell, [x, y]: [f32; 2]) -> ArrayVec<Cell, 2> {
         let is_refused = x + y > TOLERANCE.part && self.may_halve(cell);
         let halves = is_refused.then(|| halves(cell, y > x)).flatten();

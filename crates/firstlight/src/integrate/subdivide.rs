@@ -1,5 +1,5 @@
-//! How sixteen points see a light before anything is in the way, and the cells that it is asked by at first: none is
-//! wide beside its distance, or beside a highlight on it.
+//! The horizon test of a light from sixteen points, and the first subdivision of a light into cells: until none is
+//! wide beside its distance or beside a highlight.
 
 use std::f32::consts::FRAC_PI_2;
 
@@ -14,24 +14,24 @@ use super::tolerance::TOLERANCE;
 use crate::material::{LobeKind, ShadingPoint};
 use crate::math::{Vec3x16, sin_cos};
 
-/// What sixteen points see of a light with nothing in the way, each a bit.
+/// The horizon test of sixteen points, without occluders, as bits.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct HorizonTest {
-    /// Some of it can arrive: a side that emits faces the point, and some of the light is above its horizons.
+    /// A side that emits faces the point, and some of the light is above its horizons.
     pub arrives: u64,
-    /// All of it is above them.
+    /// All of the light is above them.
     pub above: u64,
-    /// The same for all places within a point's reach: nothing arrives, all is above; and none of them passes the
-    /// light's plane.
+    /// For all places within the point's reach: no light arrives; all of the light is above the horizons; and the
+    /// light's plane is not crossed.
     pub below_around: u64,
     pub above_around: u64,
     pub beside_around: u64,
-    /// The distance to the nearest place of the light's square, or a little less; and to its plane.
+    /// Lower bound of the distance to the light's square, and the distance to its plane, in metres.
     pub nearest: LaneNumbers,
     pub height: LaneNumbers,
 }
 
-/// Looks at a light from up to sixteen points. To be called within `vectorize`.
+/// Tests a light against the horizons of up to sixteen points. To be called within `vectorize`.
 #[inline(always)]
 pub(super) fn test_horizons<S: Simd>(
     simd: S,
@@ -81,7 +81,7 @@ pub(super) fn test_horizons<S: Simd>(
     }
 }
 
-/// A light as one cell, as `point` asks it: in the coordinates by which it is cut.
+/// The light as one cell of `point`, in the coordinates in which it is subdivided.
 pub(super) fn whole_light(outline: Outline, point: u32, [x, y]: [[f32; 2]; 2]) -> Cell {
     match outline {
         Outline::Parallelogram | Outline::Disk => Cell { point, x, y, depth: 0 },
@@ -92,18 +92,18 @@ pub(super) fn whole_light(outline: Outline, point: u32, [x, y]: [[f32; 2]; 2]) -
     }
 }
 
-/// What becomes of sixteen cells, each a bit.
+/// Sizes and horizon tests of sixteen cells, as bits.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct CellMetrics {
-    /// Nothing of it is in the light and above the horizons; all of it is.
+    /// None of the cell is in the light's outline and above the horizons; all of it is.
     pub nothing: u64,
     pub all: u64,
-    /// It is too wide, and longer along y than along x.
+    /// The cell is too wide, and longer along y than along x.
     pub wide: u64,
     pub along_y: u64,
 }
 
-/// CellMetrics up to sixteen cells. To be called within `vectorize`.
+/// Metrics of up to sixteen cells. To be called within `vectorize`.
 #[inline(always)]
 pub(super) fn cell_metrics<S: Simd>(
     simd: S,
@@ -160,7 +160,7 @@ pub(super) fn cell_metrics<S: Simd>(
     }
 }
 
-/// Boxes of the light's square around cells of a sphere.
+/// Bounding rectangles, on the disk, of cells of a sphere in longitude and latitude.
 #[inline(always)]
 fn around<S: Simd>(simd: S, [u0, u1]: [f32x16<S>; 2], [v0, v1]: [f32x16<S>; 2]) -> ([f32x16<S>; 2], [f32x16<S>; 2]) {
     let (zero, one) = (simd.splat_f32x16(0.0), simd.splat_f32x16(1.0));
@@ -173,7 +173,7 @@ fn around<S: Simd>(simd: S, [u0, u1]: [f32x16<S>; 2], [v0, v1]: [f32x16<S>; 2]) 
     ([from, to], [south, north])
 }
 
-/// Of which rectangles of a light's square nothing is in the light and above the horizons, and of which all.
+/// Rectangles of a light's square of which nothing, and of which all, is in the outline and above the horizons.
 #[inline(always)]
 fn seen<S: Simd>(
     simd: S,
@@ -206,7 +206,7 @@ fn seen<S: Simd>(
     [nothing, all]
 }
 
-/// Both halves of a cell, along x or along y: at 0, from where places are counted, or in the middle. `None` where no
+/// The halves of a cell along x or along y: at 0, the origin of the coordinates, or in the middle. `None` where no
 /// number is left between.
 pub(super) fn halves(cell: &Cell, along_y: bool) -> Option<[Cell; 2]> {
     let [from, to] = if along_y { cell.y } else { cell.x };
