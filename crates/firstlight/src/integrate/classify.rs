@@ -1,8 +1,8 @@
-//! What may stand between points and a light: for sixteen points at once, and for all within a radius of each.
+//! Occluders of an area light, tested against the whole light for sixteen points at once.
 //!
-//! With radius 0 it is the class of a point: it sees all of the light, none of it, or what these things leave of
-//! it. With a radius it is a proof of the same for all places within it, and a bound on how far the outline of a shadow
-//! moves on the light from one of them to another.
+//! With reach 0 the result is the visibility of the light from a point: full, none, or the occluders that may hide
+//! a part. With a reach it is a proof for all places within it, and a bound on how far a silhouette moves on the
+//! light between the point and any of them.
 
 mod flat;
 mod light_contact;
@@ -27,41 +27,41 @@ use flat::{FacetShape, Own, test_parallelogram, test_triangle};
 use light_contact::{LightContact, LightSides};
 use solid::{PlacedSolid, test_solid};
 
-/// All things that may stand in the way of one light.
+/// All occluders of one light.
 #[derive(Default)]
 pub(crate) struct LightOccluders<'a> {
-    /// As they are met row by row, and as they are; number by number the same.
+    /// For projection onto the light, and for exact tests; with equal indices.
     pub occluders: Vec<Occluder>,
     exact: Vec<ExactShape<'a>>,
-    /// How each lies to the light, if that is a ball.
+    /// Whether each intersects or contains a sphere light.
     contacts: Vec<LightContact>,
-    /// On which sides of the plane of a flat light each has a part of itself.
+    /// The sides of a flat light's plane that each reaches into.
     sides: Vec<LightSides>,
-    /// Which placed things are among them.
+    /// The indices of the placed solids among them.
     placed: Vec<u32>,
-    /// Whether there is more than that.
+    /// Whether some did not fit.
     has_more: bool,
 }
 
-/// What decides on which side a point is.
+/// The shape of an occluder in f64.
 enum ExactShape<'a> {
     Sphere(Sphere),
     Flat {
         flat: &'a Parallelogram,
-        /// On which side all of the light is.
+        /// The side of the plane on which all of the light is.
         side: PlaneSide,
-        /// The same if the camera sees it: then nobody sees what is behind it.
+        /// The same if the camera is there too: then no point behind the plane is visible.
         seen_side: PlaneSide,
     },
     Solid(Box<PlacedSolid>),
     Facet(FacetShape),
 }
 
-/// The most obstacles of a light, those in lists and those in trees.
+/// The most occluders of a light, listed ones and those in trees together: the bits of a mask.
 pub(crate) const MAX_OCCLUDERS: usize = 64;
 
 impl<'a> LightOccluders<'a> {
-    /// Those of light `index` that are in lists, and solids.
+    /// Those of light `index` that are listed, and solids.
     pub fn new(scene: &'a Scene, index: usize, emitter: &Emitter) -> LightOccluders<'a> {
         let id = LightId(index as u32);
         let mut all = LightOccluders::default();
@@ -101,8 +101,8 @@ impl<'a> LightOccluders<'a> {
         all
     }
 
-    /// Takes what was gathered in trees in the way of light `id`, but for placed things, in place of what it was;
-    /// `false` if it is more than can be told beside so many others.
+    /// Replaces all by the occluders of light `id` that were gathered in trees, except placed solids. Returns `false`
+    /// if there are too many beside `others`.
     pub fn gather(
         &mut self,
         scene: &'a Scene,
@@ -152,13 +152,13 @@ impl<'a> LightOccluders<'a> {
         self.exact.push(ExactShape::Flat { flat, side, seen_side });
     }
 
-    /// Finds out how each lies to the light: what reaches into a ball, and what is behind the plane of a flat light.
+    /// Computes the contacts and sides of all.
     fn add_contacts(&mut self, emitter: &Emitter) {
         self.contacts.extend(self.exact.iter().map(|exact| LightContact::of(emitter, exact)));
         self.sides.extend(self.exact.iter().map(|exact| LightSides::of(emitter, exact)));
     }
 
-    /// Adds a solid, if rows tell it.
+    /// Adds a solid if its projection has a closed form.
     fn solid(&mut self, solid: Option<(PlacedSolid, SolidOccluder)>) -> bool {
         let Some((shape, occluder)) = solid else { return false };
         self.occluders.push(Occluder::Solid(occluder));
@@ -166,14 +166,14 @@ impl<'a> LightOccluders<'a> {
         true
     }
 
-    /// Each, with its sides of the light, and how it lies to a ball.
+    /// Each occluder, with its sides of the light and its contact with it.
     #[inline(always)]
     fn each(&self) -> impl Iterator<Item = (&Occluder, &ExactShape<'a>, LightSides, LightContact)> {
         let all = self.occluders.iter().zip(&self.exact).zip(self.sides.iter().zip(&self.contacts));
         all.map(|((occluder, exact), (sides, contact))| (occluder, exact, *sides, *contact))
     }
 
-    /// Whether a placed thing is among them.
+    /// Whether placed object `thing` is among them.
     pub fn has_placed(&self, thing: u32) -> bool {
         self.placed.binary_search(&thing).is_ok()
     }
@@ -191,48 +191,48 @@ impl<'a> LightOccluders<'a> {
     }
 }
 
-/// What is between a point, with what lies around it, and a light.
+/// The occlusion of a light from a point and its surroundings.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct OcclusionClass {
-    /// What may hide a part of it from the point.
+    /// The occluders that may hide a part of the light from the point.
     pub mask: OccluderMask,
-    /// Whether all of it is hidden from the point.
+    /// Whether the point is in the umbra.
     pub hidden: bool,
-    /// Whether something is in the way that is not told row by row.
+    /// Whether an occluder has no closed form here.
     pub other: bool,
-    /// How far the outline of a shadow moves on the light from the point to a place within its reach, as a part of the
-    /// light's size; 0 where all those places are proved to be lit or hidden as one.
+    /// The largest motion of a silhouette on the light between the point and a place within its reach, as a part of the
+    /// light's size; 0 if all those places are proved to be in full light or in the umbra.
     pub motion: f32,
 }
 
-/// Room for the rounding of a distance.
+/// As a part of a distance: a bound of its rounding.
 const SLACK: f32 = 1e-5;
 
-/// The light as sixteen points see it: the pyramid over it, and the cone around it.
+/// The pyramid with its apex at a point that is bounded by a light's edges, and the cone around it, for sixteen points.
 struct LightPyramid16<S: Simd> {
     p: Vec3x16<S>,
     light_vectors: [Vec3x16<S>; 3],
     x: [f32x16<S>; 2],
     y: [f32x16<S>; 2],
-    /// Outward unit normals.
+    /// Outward unit normals of the pyramid's sides.
     sides: [Vec3x16<S>; 4],
     axis: Vec3x16<S>,
     sin: f32x16<S>,
     cos: f32x16<S>,
     far: f32x16<S>,
-    /// Across the line of pyramid, at least.
+    /// The least size of the light across the line of sight, in metres.
     size: f32x16<S>,
     normal: Vec3x16<S>,
     horizon: Vec3x16<S>,
-    /// How sure we are of each point.
+    /// The error bound of each point.
     error: Vec3x16<S>,
     reach: f32x16<S>,
     turn: f32x16<S>,
-    /// How far behind its plane the light may be, as far as what is lanes for may be in the way of that.
+    /// In metres: occluders so far behind the light's plane count.
     depth: f32,
 }
 
-/// Unit, or 0 where `v` is.
+/// The unit vector, or 0 where `v` is 0.
 #[inline(always)]
 fn unit<S: Simd>(v: Vec3x16<S>) -> Vec3x16<S> {
     let length2 = v.dot(v);
@@ -242,7 +242,7 @@ fn unit<S: Simd>(v: Vec3x16<S>) -> Vec3x16<S> {
     v * is_long.select(inverse, simd.splat_f32x16(0.0))
 }
 
-/// The way to a place of the light.
+/// The vector from the point to a place of the light.
 #[inline(always)]
 fn way<S: Simd>(l: &[Vec3x16<S>; 3], x: f32x16<S>, y: f32x16<S>) -> Vec3x16<S> {
     l[0] + (l[1] * x + l[2] * y)
@@ -295,7 +295,7 @@ impl<S: Simd> LightPyramid16<S> {
         }
     }
 
-    /// How far the hull of some points lies outside of one side of the pyramid over the light, at most.
+    /// The largest distance of the convex hull of `hull` outside of a side of the pyramid.
     #[inline(always)]
     fn gap(&self, hull: &[Vec3x16<S>]) -> f32x16<S> {
         let mut gap = self.far.token().splat_f32x16(f32::NEG_INFINITY);
@@ -309,8 +309,8 @@ impl<S: Simd> LightPyramid16<S> {
         gap
     }
 
-    /// Those of some points from which something of the light's square is on the inner side of each line, the first of
-    /// which is the plane of what is in the way, and those from which all of it is on that of all.
+    /// Of the points in `of`: those from which some of the light's square is on the inner side of each line, the first
+    /// of which is the occluder's plane, and those from which all of it is on the inner side of all.
     #[inline(always)]
     fn covered(&self, lines: &[Linear16<S>; 5], of: u64) -> [u64; 2] {
         let zero = self.far.token().splat_f32x16(0.0);
@@ -333,7 +333,7 @@ impl<S: Simd> LightPyramid16<S> {
         [[x0, y0], [x1, y0], [x1, y1], [x0, y1]]
     }
 
-    /// Those of some points from which all of the light's corners are hidden.
+    /// Of the points in `of`: those from which all corners of the light are hidden.
     #[inline(always)]
     fn hidden(&self, shadow: &Shadow<S>, of: u64) -> u64 {
         let mut hidden = of;
@@ -345,8 +345,8 @@ impl<S: Simd> LightPyramid16<S> {
         hidden
     }
 
-    /// Which of some points may see the ball of radius `r` around `s` between themselves and the light: from anywhere
-    /// within their reach, and from themselves.
+    /// Of the points in `of`: those for which the ball of radius `r` around `s` may be between the light and some place
+    /// within reach, and those for which it may be between the light and the point itself.
     #[inline(always)]
     fn meets(&self, s: Vec3x16<S>, distance: f32x16<S>, r: f32, of: u64) -> [u64; 2] {
         if of == 0 {
@@ -357,6 +357,7 @@ impl<S: Simd> LightPyramid16<S> {
         // The cone around the light, and its pyramid
         let along = s.dot(self.axis);
         let aside = (distance * distance - along * along).max(zero).sqrt();
+        // The cone around the light, and its pyramid
         let misses = (aside * self.cos - along * self.sin)
             .simd_gt((self.reach + r) * 1.001 + (along.abs() + aside) * SLACK)
             & self.sin.simd_lt(1.0);
@@ -379,7 +380,7 @@ impl<S: Simd> LightPyramid16<S> {
         [around, around & gap.simd_le(rounding).to_bitmask() & !beyond.simd_gt(far).to_bitmask()]
     }
 
-    /// How far the outline of a shadow moves on the light that something casts which is `near` to the point.
+    /// The motion of the silhouette on the light of an occluder at distance `near`, as a part of the light's size.
     #[inline(always)]
     fn motion(&self, near: f32x16<S>) -> f32x16<S> {
         let simd = near.token();
@@ -388,8 +389,8 @@ impl<S: Simd> LightPyramid16<S> {
     }
 }
 
-/// The classes of up to sixteen points, whose `frames` are in a block; of those whose bits are in `lanes`. What is in
-/// trees is `near` and counted after what is in lists. To be called within `vectorize`.
+/// The occlusion of a light from the points in `lanes`, of up to sixteen whose coordinates are in `frames`. Occluders
+/// in trees, `near`, are indexed after listed ones. To be called within `vectorize`.
 #[inline(always)]
 pub(crate) fn classify<S: Simd>(
     simd: S,
@@ -417,7 +418,7 @@ pub(crate) fn classify<S: Simd>(
         if before == 0 {
             continue;
         }
-        // What reaches into a ball may hide some of its far half
+        // An occluder that intersects a sphere light may hide some of its far half
         pyramid.depth = match emitter {
             Emitter::Ball { radius, both_sides: true, .. } if contact == LightContact::Intersects => {
                 2.0 * *radius as f32
@@ -445,6 +446,7 @@ pub(crate) fn classify<S: Simd>(
             },
             _ => unreachable!("both lists hold the same things"),
         };
+        // The visible part of the sphere is not that of its disk
         if contact == LightContact::Intersects {
             // Of the ball more may be seen than of its disk, and of its far half less
             test.other |= test.outside | test.within | test.around | test.hidden;
@@ -486,19 +488,20 @@ pub(crate) fn classify<S: Simd>(
     classes
 }
 
-/// What one thing does to sixteen points, in bits.
+/// The test of one occluder against the light, as bits of sixteen points.
 struct OccluderTest<S: Simd> {
-    /// It may hide a part of the light, from outside of it or from within.
+    /// It may hide a part of the light from a point outside of it, or within it.
     outside: u64,
     within: u64,
-    /// It is around the point.
+    /// It contains the point.
     around: u64,
+    /// It hides all of the light.
     hidden: u64,
-    /// It does what is not told row by row.
+    /// Its projection has no closed form.
     other: u64,
-    /// It hides all from everywhere around the point.
+    /// It hides all of the light from all places within reach.
     firm: u64,
-    /// The outline of its shadow moves so far.
+    /// Its silhouette moves on the light, by `motion`.
     moving: u64,
     motion: f32x16<S>,
 }

@@ -1,14 +1,15 @@
-//! What is seen of a light's cells, row by row, for sixteen panels at once.
+//! The visible part of a light's cells, integrated row by row, for sixteen panels at once.
 //!
-//! A panel is a range of rows of one cell on which the outline of each occluder changes smoothly; where the outlines of
-//! two cross, two rules differ, and the panel is halved. On each of seven rows, the nodes of a Kronrod rule, the
-//! intervals that occluders hide are united, and the antiderivative of the cell's polynomial is summed over the ends of
-//! what is left: nothing is shaded again. The Gauss rule of three inside says how far the panel can be wrong; and where
-//! all rows are hidden, but overlap less and less towards one of them, what a gap between it and the next may send.
-//! Where a panel ends, outlines begin as roots do, so rows are spread by y^2 (3 - 2 y).
+//! A panel is a range of rows of one cell between two break points; where the outlines of two occluders cross
+//! within it, the rules of an embedded pair differ, and the panel is halved. On each of seven rows, the nodes of a
+//! Kronrod rule, the hidden intervals are united, and the antiderivative of the cell's polynomial is summed over
+//! the ends of the remaining ones. The embedded Gauss rule of three nodes gives the error estimate. Where all rows
+//! are hidden, but their intervals overlap less towards one row, the radiance through a possible gap between two
+//! rows is added to it. Outlines begin and end at break points as square roots do, so the rows are transformed by
+//! y^2 (3 - 2 y).
 //!
-//! Source of the rule: Kronrod, "Nodes and Weights of Quadrature Formulas", 1965; of the spread: Davis, Rabinowitz,
-//! "Methods of Numerical Integration", 1984, section 2.12.
+//! Source of the rule: Kronrod, "Nodes and Weights of Quadrature Formulas", 1965; of the transformation: Davis,
+//! Rabinowitz, "Methods of Numerical Integration", 1984, section 2.12.
 
 use arrayvec::ArrayVec;
 use fearless_simd::{f32x16, mask32x16, prelude::*};
@@ -21,7 +22,7 @@ use super::occluder::{Occluder, Shadow};
 use super::row::{FAR, Interval16};
 use crate::math::{LANES, Vec3x16, asin, sin_cos};
 
-/// Rows of a panel: the Kronrod rule of seven on [0, 1], spread.
+/// Rows of a panel: the Kronrod rule of seven nodes.
 const ROWS: usize = 7;
 const KRONROD: [(f64, f64, f64); 4] = [
     // Node, weight, weight in the Gauss rule of three
@@ -31,7 +32,7 @@ const KRONROD: [(f64, f64, f64); 4] = [
     (0.0, 0.450_916_538_658_474_1, 0.888_888_888_888_889),
 ];
 
-/// Where on a panel a row lies, 0 to 1, and what it counts in both rules.
+/// The transformed place of each row in a panel, 0 to 1, and its weights in both rules.
 const SPREAD: [[f32; 3]; ROWS] = {
     let mut rows = [[0.0; 3]; ROWS];
     let mut i = 0;
@@ -45,18 +46,19 @@ const SPREAD: [[f32; 3]; ROWS] = {
     rows
 };
 
-/// Rows of one cell.
+/// A range of rows of one partially visible cell.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Panel {
-    /// Of the cells that are cut, and the point that this is seen from.
+    /// Indices of the cell and of the point.
     pub cell: u32,
     pub point: u32,
     pub y: [f32; 2],
-    /// How often it was halved.
+    /// The number of halvings.
     pub depth: u32,
 }
 
-/// What of a light's occluders matters to one point: bits of those it sees from outside, and of spheres it is in.
+/// The occluders that may hide a part of a light from one point, as bits: those the point is outside of, and spheres
+/// that it is in.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct OccluderMask {
     pub outside: u64,
@@ -64,7 +66,7 @@ pub(crate) struct OccluderMask {
 }
 
 impl OccluderMask {
-    /// Their numbers.
+    /// The indices of the occluders.
     #[inline(always)]
     fn occluders(self) -> impl Iterator<Item = usize> {
         let mut any = self.outside | self.within;
@@ -76,10 +78,10 @@ impl OccluderMask {
     }
 }
 
-/// A light and what is in the way, for all that asks.
+/// A light's outline and its occluders, for all points.
 #[derive(Clone, Copy)]
 pub(crate) struct OccludedLight<'a> {
-    /// In lists, and of trees: counted together.
+    /// Listed occluders and those in trees, indexed consecutively.
     pub occluders: [&'a [Occluder]; 2],
     pub outline: Outline,
     /// Point by point.
@@ -94,8 +96,7 @@ impl<'a> OccludedLight<'a> {
     }
 }
 
-/// What sixteen panels send, how far both rules differ and gaps may be missed, and how much of the light's square is
-/// seen.
+/// Integrals over sixteen panels, their error estimates, and the visible part of the light's square in each.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct PanelSums {
     pub sums: [LaneNumbers; MOMENTS],
@@ -103,10 +104,10 @@ pub(crate) struct PanelSums {
     pub seen: LaneNumbers,
 }
 
-/// The most intervals of a row that may be hidden from one point: one for each thing, two if it has a hole.
+/// The most hidden intervals of a row: one for each occluder, two if it has a hole.
 pub(crate) const MAX_INTERVALS: usize = 48;
 
-/// What may be in the way of a batch: the occluders that any of its points sees, and for which of them.
+/// The occluders of sixteen panels or cells, with the masks of their points.
 struct Batch<'a, S: Simd> {
     light: &'a OccludedLight<'a>,
     masks: [OccluderMask; LANES],
@@ -130,7 +131,7 @@ impl<'a, S: Simd> Batch<'a, S> {
         Batch { light, masks, p: members.vectors(simd, [Px, Py, Pz]), l: light_vectors(simd, members) }
     }
 
-    /// Which of the occluders any point sees.
+    /// The indices of the occluders of any of the points.
     #[inline(always)]
     fn occluders(&self) -> impl Iterator<Item = usize> + use<S> {
         let mut any = OccluderMask::default();
@@ -141,7 +142,7 @@ impl<'a, S: Simd> Batch<'a, S> {
         any.occluders()
     }
 
-    /// One of them as they see it, and who sees it from outside and from within.
+    /// One occluder projected onto the light, and the lanes of points outside of it and within.
     #[inline(always)]
     fn shadow(&self, simd: S, occluder: usize) -> (Shadow<S>, mask32x16<S>, mask32x16<S>) {
         let (mut outside, mut within) = (0, 0);
@@ -157,7 +158,7 @@ impl<'a, S: Simd> Batch<'a, S> {
     }
 }
 
-/// The panels of up to sixteen cells: they end where something begins, ends or has a corner. `spare` is memory.
+/// Splits up to sixteen cells into panels at their break points. `spare` is a buffer.
 #[inline(never)]
 pub(crate) fn split_panels<S: Simd>(
     simd: S,
@@ -238,7 +239,7 @@ fn breaks<S: Simd>(
 
 /// The most panels of a new cell.
 const MAX_PANELS: usize = 48;
-/// Panels shorter than this part of their cell are not worth their rows.
+/// As a part of the cell: panels that are shorter are joined to the next.
 const LEAST: f32 = 1e-4;
 
 #[inline(always)]
@@ -246,7 +247,7 @@ fn antiderivative<S: Simd>([a, b, c, d, e]: &[f32x16<S>; 5], u: f32x16<S>) -> f3
     u * (*a + u * (*b + u * (*c + u * (*d + u * *e))))
 }
 
-/// What up to sixteen panels send. To be called within `vectorize`.
+/// Integrates up to sixteen panels. To be called within `vectorize`.
 #[inline(always)]
 pub(crate) fn integrate_rows<S: Simd>(
     simd: S,
@@ -281,7 +282,7 @@ pub(crate) fn integrate_rows<S: Simd>(
         }
     }
     let is_sphere = light.outline == Outline::Sphere;
-    // Where each row lies on the light's plane, and half of how long it is, if that differs
+    // The y of each row, and on a sphere the half length of its parallel
     let (mut y_of, mut wide) = ([zero; ROWS], [one; ROWS]);
     for (row, [place, ..]) in SPREAD.into_iter().enumerate() {
         y_of[row] = (to - from) * place + from;
@@ -290,7 +291,7 @@ pub(crate) fn integrate_rows<S: Simd>(
         }
     }
     let [west, east] = if is_sphere { [sin_cos(x0).0, sin_cos(x1).0] } else { [x0, x1] };
-    // What of each row is above the horizon, and in the light
+    // Clip each row to the horizons and to the light's outline
     let mut open = [Interval16 { from: west, to: east }; ROWS];
     for (row, all) in open.iter_mut().enumerate() {
         let y = y_of[row];
@@ -306,7 +307,7 @@ pub(crate) fn integrate_rows<S: Simd>(
             all.to = all.to.min(reach - origin[0]);
         }
     }
-    // What is hidden of them, sorted by where it begins
+    // The hidden intervals of each row, sorted by where they begin
     let mut hidden: [ArrayVec<Interval16<S>, MAX_INTERVALS>; ROWS] = std::array::from_fn(|_| ArrayVec::new());
     for occluder in batch.occluders() {
         let (shadow, outside, within) = batch.shadow(simd, occluder);
@@ -333,7 +334,7 @@ pub(crate) fn integrate_rows<S: Simd>(
                         interval.from = swap.select(f, interval.from);
                         interval.to = swap.select(t, interval.to);
                     }
-                    // What is last begins last: so none has more than there may be between the light and one point
+                    // Empty intervals come last, so that no lane has more than its point has occluders
                     if interval.from.simd_lt(far).any_true() && !hidden[row].is_full() {
                         hidden[row].push(interval);
                     }
@@ -345,7 +346,7 @@ pub(crate) fn integrate_rows<S: Simd>(
     let mut coarse = [zero; MOMENTS];
     let mut seen = zero;
     let inverse = 1.0 / xh;
-    // How wide the widest gap of each row is, below 0 where what hides the row overlaps; and what a unit of it sends
+    // The widest gap of each row, negative where hidden intervals overlap; and the radiance of a unit of it
     let mut gap = [-far; ROWS];
     let mut radiant = [[zero; MOMENTS]; ROWS];
     for (row_of, ((all, hidden), [place, weight, inner])) in open.iter().zip(&hidden).zip(SPREAD).enumerate() {
@@ -363,7 +364,7 @@ pub(crate) fn integrate_rows<S: Simd>(
         let mut length = zero;
         let mut begin = all.from;
         for k in 0..=hidden.len() {
-            // Up to the next thing that hides, or to the end
+            // Up to the next hidden interval, or to the end
             let (end, next) = match hidden.get(k) {
                 Some(interval) => (interval.from.min(all.to), begin.max(interval.to)),
                 None => (all.to, begin),
@@ -374,7 +375,7 @@ pub(crate) fn integrate_rows<S: Simd>(
             if is_sphere {
                 (first, last) = (asin(begin / wide[row_of]), asin(end / wide[row_of]));
             }
-            // On nothing, both ends are the same
+            // Both ends are equal where nothing is left
             let from = ((first - xm) * inverse).max(-one).min(one);
             let to = is_there.select(((last - xm) * inverse).max(-one).min(one), from);
             for moment in 0..moments {
@@ -390,7 +391,7 @@ pub(crate) fn integrate_rows<S: Simd>(
         }
         seen += length * weight;
     }
-    // Gaps that open and close between rows, neither of which sees them
+    // Gaps that open and close between two rows
     let mut missed = [zero; MOMENTS];
     for row in 1..ROWS - 1 {
         let rises = [gap[row] - gap[row - 1], gap[row] - gap[row + 1]];
@@ -400,7 +401,7 @@ pub(crate) fn integrate_rows<S: Simd>(
             missed[moment] += radiant[row][moment] * peak;
         }
     }
-    // Rows count as much as the panel is a part of the cell, which is 2 wide in its own coordinates
+    // A cell is 2 high in its own coordinates
     let share = (to - from) / yh;
     let mut result = PanelSums::default();
     for moment in 0..moments {

@@ -1,4 +1,4 @@
-//! What flat things do to a light, for sixteen points: parallelograms, and triangles of meshes.
+//! The tests of parallelograms, and of triangles of meshes, against a light, for sixteen points.
 
 use fearless_simd::{f32x16, prelude::*};
 
@@ -104,7 +104,7 @@ pub(super) fn test_parallelogram<S: Simd>(
     test
 }
 
-/// A triangle of a mesh as it is placed.
+/// A triangle of a mesh, in world space.
 pub(super) struct FacetShape {
     pub facet: Facet,
     corners: [DVec3; 3],
@@ -112,9 +112,9 @@ pub(super) struct FacetShape {
     edge: f32,
 }
 
-/// Points no farther off the plane of a facet than this part of its edges are in it.
+/// As a part of the longer edge: points no farther off a triangle's plane are in it.
 const IN_PLANE: f32 = 1e-5;
-/// Triangles that rise no higher than this part of their edges do not rise.
+/// As a part of the longer edge: triangles that rise no higher above a horizon are below it.
 const LEVEL: f32 = 1e-4;
 
 impl FacetShape {
@@ -123,34 +123,34 @@ impl FacetShape {
         FacetShape { facet, corners, edge: (b - a).length().max((c - a).length()) as f32 }
     }
 
-    /// Around, as a parallelogram whose last two are one.
+    /// The corners as those of a parallelogram whose last two are equal.
     pub fn corners(&self) -> [Exact; 4] {
         let [a, b, c] = self.corners.map(Exact::new);
         [a, b, c, c]
     }
 
-    /// How far it reaches in a direction.
+    /// The support function: the largest n.q of its points q.
     pub fn reach(&self, n: DVec3) -> f64 {
         self.corners.iter().map(|q| n.dot(*q)).fold(f64::NEG_INFINITY, f64::max)
     }
 
-    /// Whether a point is in its plane, as far as rounding allows to tell.
+    /// Whether a point is in its plane within rounding.
     fn is_under(&self, point: &ShadingPoint) -> bool {
         is_in_plane(self.corners, point.p.as_dvec3(), point.error.0.as_dvec3())
     }
 
-    /// How far it is from a point.
+    /// The distance to a point, in metres.
     pub fn distance(&self, p: DVec3) -> f32 {
         triangle_distance(&self.corners.map(|q| (q - p).as_vec3()))
     }
 }
 
-/// The facets that points are on.
+/// The facets of the points themselves.
 pub(super) struct Own<S: Simd> {
-    /// Unit, to the viewer's side.
+    /// Geometric normals, unit, on the viewer's side.
     ng: Vec3x16<S>,
-    /// Which points are lifted off facets that stand for something round, and which of those see some of the light from
-    /// below their facet.
+    /// Points that are lifted off facets of smooth surfaces, and those of them from which some of the light is below
+    /// the facet.
     lifted: u64,
     sees_below: u64,
 }
@@ -233,7 +233,7 @@ pub(super) fn test_triangle<S: Simd>(
     test
 }
 
-/// How far a triangle is from the origin.
+/// The distance of a triangle from the origin, in its unit.
 ///
 /// Source: Ericson, "Real-Time Collision Detection", 2005, section 5.1.5.
 fn triangle_distance([a, b, c]: &[Vec3; 3]) -> f32 {

@@ -1,4 +1,4 @@
-//! What a solid does to a light, for sixteen points.
+//! The test of a solid against a light, for sixteen points.
 
 use fearless_simd::{f32x16, prelude::*};
 
@@ -11,20 +11,20 @@ use crate::material::ShadingPoint;
 use crate::math::{DAffine3, DMat3, DVec3, LANES, Vec3x16};
 use crate::shape::{Canonical, Placement, Solid, Sphere, SphereUv};
 
-/// A solid as it is placed: a convex one, or one with a straight hole.
+/// A solid in the world: convex, or with a straight hole.
 pub(super) struct PlacedSolid {
     placement: Placement,
     solid: Solid,
     kind: Canonical,
     canonical_from_world: DAffine3,
-    /// The box around it, if it has an end.
+    /// Its bounding box, if it is bounded.
     bounds: Option<[DVec3; 2]>,
-    /// Whether a part of the light may be in it, and whether all is.
+    /// Whether a part of the light may be inside, and whether all is.
     pub may_contain_light: bool,
     contains: bool,
 }
 
-/// What a placed solid is if it is a sphere in the world as well.
+/// The sphere that a placed solid is, if it is one in the world as well.
 pub(super) fn sphere(solid: &Solid, placement: &Placement) -> Option<Sphere> {
     let (object_from_canonical, Canonical::Ball) = solid.canonical()? else { return None };
     let DAffine3 { matrix3, translation } = placement.world_from_object * object_from_canonical;
@@ -36,16 +36,16 @@ pub(super) fn sphere(solid: &Solid, placement: &Placement) -> Option<Sphere> {
     (off <= r2 * ROUND).then(|| Sphere { c: translation, r: r2.sqrt(), uv, single_sided: false })
 }
 
-/// By which part of itself the square of a sphere's radius may differ with the direction.
+/// As a part: the largest variation of a sphere's squared radius with the direction.
 const ROUND: f64 = 1e-12;
 
-/// How far a point is from a box.
+/// The distance of a point to a box, in metres.
 fn distance([low, high]: &[DVec3; 2], p: DVec3) -> f64 {
     (*low - p).max(p - *high).max(DVec3::ZERO).length()
 }
 
 impl PlacedSolid {
-    /// `None` of what no row tells.
+    /// `None` if the projection has no closed form.
     pub fn new(solid: Solid, placement: Placement, emitter: &Emitter) -> Option<(PlacedSolid, SolidOccluder)> {
         let (object_from_canonical, kind) = solid.canonical()?;
         let world_from_canonical = placement.world_from_object * object_from_canonical;
@@ -86,24 +86,24 @@ impl PlacedSolid {
         }
     }
 
-    /// How far it reaches in a direction.
+    /// The support function: the largest n.q of its points q.
     pub fn reach(&self, n: DVec3) -> f64 {
         let to_world = &self.placement.world_from_object;
         self.solid.support(to_world.matrix3.transpose() * n) + n.dot(to_world.translation)
     }
 
-    /// How far a point is off the plane of a flat one, in metres.
+    /// The distance of a point from the plane of a flat solid, in metres.
     fn height(&self, p: DVec3) -> f64 {
         let row = self.canonical_from_world.matrix3.transpose().z_axis;
         self.canonical_from_world.transform_point3(p).z / row.length()
     }
 
-    /// How far a point is from it, at least, in metres.
+    /// Lower bound of the distance to a point, in metres.
     fn apart(&self, p: DVec3) -> f64 {
         self.bounds.as_ref().map_or_else(|| self.height(p).abs(), |bounds| distance(bounds, p))
     }
 
-    /// Whether a point is on the plane of a flat one, as far as it can be told, and its surface lies in it.
+    /// Whether a point is in the plane of a flat solid within rounding, and its surface is parallel to it.
     fn is_under(&self, point: &ShadingPoint) -> bool {
         let row = self.canonical_from_world.matrix3.transpose().z_axis;
         let at = self.canonical_from_world.transform_point3(point.p.as_dvec3());
@@ -114,18 +114,18 @@ impl PlacedSolid {
     }
 }
 
-/// Points no farther out than this part of a solid's size are on its surface, as far as single precision tells.
+/// In the solid's own units: points no farther outside are on its surface, within the rounding of f32.
 const ROUNDING: f64 = 1e-6;
 
-/// How a solid lies to a point that may see it in the way.
+/// Where a solid is, as seen from a point and the places within its reach.
 enum Lies {
     /// It hides nothing.
     Aside,
-    /// It hides nothing from the point, but may from near it.
+    /// It hides nothing from the point, but may from a place within reach.
     Near,
-    /// The point is inside, and what surrounds it, or it is where the surface is.
+    /// The point and all places within reach are inside.
     Inside,
-    /// The point is inside, and what surrounds it may be outside.
+    /// The point is inside, and a place within reach may be outside.
     NearlyInside,
     Between,
 }
@@ -166,15 +166,15 @@ impl PlacedSolid {
         }
     }
 
-    /// Whether a point that is on its surface or inside, at `at` in its own space, leaves it along the normal `n` of
-    /// the point's horizon: then its surface is taken to lie in a face of the solid, however that normal is rounded.
+    /// Whether a point on the surface or inside, at `at` in the solid's own space, is left along the normal `n` of its
+    /// horizon: then the point is on a face of the solid, however the normal is rounded.
     fn is_left(&self, at: DVec3, n: DVec3, room: f64) -> bool {
         let way = self.canonical_from_world.transform_vector3(n);
         let step = way * (8.0 * room / way.abs().max_element());
         !self.kind.has_hole() && !self.kind.holds(at, -room) && !self.kind.holds(at + step, room)
     }
 
-    /// Whether all that lies around a point on its surface is inside, but for so much.
+    /// Whether all places within reach of a point are inside, within `room`.
     fn surrounds(&self, point: &ShadingPoint, room: f64) -> bool {
         let reach = f64::from(point.reach);
         if reach == 0.0 {
@@ -189,7 +189,7 @@ impl PlacedSolid {
     }
 }
 
-/// Which of the points lanes see some of the light past the solid, or nothing of it.
+/// Tests a solid for the points in `lanes`.
 #[inline(always)]
 pub(super) fn test_solid<S: Simd>(
     simd: S,
