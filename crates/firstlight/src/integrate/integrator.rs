@@ -383,7 +383,7 @@ impl AreaLightIntegrator {
 
     /// Limits the evaluations of each point by the unoccluded light there, after all first cells were integrated.
     fn bound_evaluations(&mut self, task: &LightTask, points: &[ShadingPoint]) {
-        let AreaLightIntegrator { state, whole, whole_sums, partial, partial_sums, .. } = self;
+        let Self { state, whole, whole_sums, partial, partial_sums, .. } = self;
         let mut sent = vec![Moments::default(); points.len()];
         for (cells, whole_sums) in [(whole, whole_sums), (partial, partial_sums)] {
             for (k, cell) in cells.iter().enumerate() {
@@ -429,8 +429,8 @@ impl AreaLightIntegrator {
     fn give_up(&mut self, integrals: &mut [LightIntegral]) -> bool {
         let mut is_any = false;
         for ((state, mask), integrals) in self.state.iter_mut().zip(&self.masks).zip(integrals) {
-            let is_behind = *mask != OccluderMask::default() && integrals.illumination == Illumination::Partial;
-            if is_behind && state.evaluations > state.max_evaluations {
+            let is_occluded = *mask != OccluderMask::default() && integrals.illumination == Illumination::Partial;
+            if is_occluded && state.evaluations > state.max_evaluations {
                 state.cells = PointSum::GIVEN_UP;
                 integrals.illumination = Illumination::Unknown;
                 is_any = true;
@@ -440,13 +440,13 @@ impl AreaLightIntegrator {
     }
 
     fn drop_panels(&mut self) {
-        let AreaLightIntegrator { state, panels, .. } = self;
+        let Self { state, panels, .. } = self;
         panels.retain(|panel| state[panel.point as usize].cells != PointSum::GIVEN_UP);
     }
 
     /// Integrates all cells of this round, and splits the new partially visible ones into panels.
     fn integrate_cells(&mut self, level: Level, task: &LightTask) {
-        let AreaLightIntegrator { frames, masks, whole, partial, kept, panels, spare, .. } = self;
+        let Self { frames, masks, whole, partial, kept, panels, spare, .. } = self;
         let falloff = task.emitter.falloff();
         let light = task.occluded_light(masks);
         self.whole_sums.clear();
@@ -477,7 +477,7 @@ impl AreaLightIntegrator {
 
     /// Integrates all panels of this round.
     fn integrate_panels(&mut self, level: Level, task: &LightTask) {
-        let AreaLightIntegrator { frames, masks, kept, panels, panel_sums, .. } = self;
+        let Self { frames, masks, kept, panels, panel_sums, .. } = self;
         let light = task.occluded_light(masks);
         let moments = if task.lobe.is_none() { 1 } else { MOMENTS };
         panel_sums.clear();
@@ -496,7 +496,7 @@ impl AreaLightIntegrator {
     /// Accepts results whose error estimate is small enough, and queues the halves of the others. Partially visible
     /// cells from `new` on were integrated in this round.
     fn judge(&mut self, task: &LightTask, points: &[ShadingPoint], new: usize, round: u32) {
-        // What arrives as far as is known now, and how much of each new cell is seen
+        // The estimate at each point, and the visible part of each new cell
         for (k, cell) in self.whole.iter().enumerate() {
             self.state[cell.point as usize].add_estimate(lane(&self.whole_sums[k / LANES].sums, k), round);
         }
@@ -509,7 +509,7 @@ impl AreaLightIntegrator {
                 self.seen[cell] += sums.seen[k % LANES];
             }
         }
-        // How much errors weigh at such a brightness
+        // The weight of errors at this brightness
         let states = &mut self.state;
         let asked = self.whole.iter().map(|cell| cell.point);
         let asked = asked.chain(self.panels.iter().map(|panel| panel.point));
@@ -524,7 +524,7 @@ impl AreaLightIntegrator {
                 state.weight = Weight::new(task.steps, value, &worth, allowed, task.least);
             }
         }
-        // Cells that are seen whole
+        // Fully visible cells
         self.next_whole.clear();
         for (k, cell) in self.whole.iter().enumerate() {
             let whole_sums = &self.whole_sums[k / LANES];
@@ -535,7 +535,7 @@ impl AreaLightIntegrator {
             }
             self.next_whole.extend(parts);
         }
-        // Cells that are seen in part: those whose light is not known well enough are asked anew
+        // Partially visible cells: halve those whose fit is refused
         let asked = self.partial.len();
         self.partial.resize(self.kept.len() * LANES, Cell::default());
         for k in new..asked {
@@ -558,7 +558,7 @@ impl AreaLightIntegrator {
             let state = &mut self.state[panel.point as usize];
             let value = lane(&sums.sums, k);
             let differences = lane(&sums.differences, k);
-            // The finer rule is better than the difference says, the more the closer both are; but where outlines
+            // The finer rule has a smaller error than the difference, the more so the closer both are; but where outlines
             // cross, both may agree by chance
             let error = || {
                 std::array::from_fn(|moment| {
