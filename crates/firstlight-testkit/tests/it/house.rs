@@ -287,7 +287,7 @@ fn the_tolerance_holds_all_numbers_that_decide_an_error() {
     assert!(fields.iter().all(|field| field.ends_with(": f32,")), "{fields:?}");
     let mut all = Vec::new();
     sources(&folder.join("render"), &mut all);
-    for file in ["evaluate", "grade", "fit"] {
+    for file in ["integrator", "subdivide", "cell"] {
         let path = folder.join("integrate").join(file).with_extension("rs");
         let text = std::fs::read_to_string(&path).unwrap();
         all.push((path, text));

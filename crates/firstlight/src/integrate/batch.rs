@@ -1,21 +1,21 @@
-//! Batches of sixteen: how points, and what they see of a light, lie in lanes.
+//! Batches of sixteen points: the layout of points and of a light's coordinates in SIMD lanes.
 //!
-//! Points are kept one after the other, what they see of a flat light in blocks of sixteen; a batch takes its lanes
-//! from wherever its members lie. Lanes work element by element, so no number depends on who shares a batch.
+//! Points are stored one after the other, their coordinates of a flat light in blocks of sixteen; a batch gathers
+//! its lanes from any blocks. All operations are per lane, so no result depends on the other members of a batch.
 
 use arrayvec::ArrayVec;
 use fearless_simd::{f32x16, mask32x16, prelude::*};
 
-use super::view::{FlatLight, FlatView, NEAR};
+use super::light_frame::{FlatLight, LightFrame, NEAR};
 use crate::material::{LobeKind, LobeLanes, ShadingPoint};
 use crate::math::{DVec3, LANES, UNIT_ROUNDOFF, Vec3, Vec3x16};
 
-/// Sixteen numbers, one of each member of a batch.
+/// One number of each of sixteen members.
 pub(crate) type LaneNumbers = [f32; LANES];
 
-/// One number of what a point sees of a flat light; see [`FlatView`].
+/// A number of a flat light's coordinates; see [`LightFrame`].
 #[derive(Clone, Copy, Debug)]
-pub(crate) enum ViewNumber {
+pub(crate) enum FrameNumber {
     /// The point.
     Px,
     Py,
@@ -36,13 +36,13 @@ pub(crate) enum ViewNumber {
     Fb,
     Lb,
     Height,
-    /// How far the point is in front of a side that emits; infinite where both do.
+    /// Distance of the point in front of an emitting side, in metres; infinite if both sides emit.
     Facing,
-    /// The direction of a highlight's middle, or 0.
+    /// The viewer's direction reflected at the shading normal, or 0.
     MirrorX,
     MirrorY,
     MirrorZ,
-    /// Heights over the surface's two horizons, and the cosine to the viewer, times |l|: linear over the light.
+    /// Cosines to the shading normal, the horizon's normal and the viewer, times |l|: linear over the light.
     CosC,
     CosX,
     CosY,
@@ -55,12 +55,12 @@ pub(crate) enum ViewNumber {
     CosO,
     /// The exponent of the lobe.
     Shininess,
-    /// The light's square.
+    /// The first and last x and y of the light's square.
     X0,
     X1,
     Y0,
     Y1,
-    /// Where places are counted from, from the light's middle.
+    /// The origin of x and y, from the light's middle.
     OriginX,
     OriginY,
     Ratio,
@@ -68,22 +68,22 @@ pub(crate) enum ViewNumber {
     Measure,
 }
 
-const NUMBERS: usize = ViewNumber::Measure as usize + 1;
+const NUMBERS: usize = FrameNumber::Measure as usize + 1;
 
-/// What sixteen points see of a flat light.
+/// Coordinates of a flat light from sixteen points.
 #[derive(Clone, Debug)]
-pub(crate) struct ViewBlock([LaneNumbers; NUMBERS]);
+pub(crate) struct LightFrame16([LaneNumbers; NUMBERS]);
 
-impl Default for ViewBlock {
+impl Default for LightFrame16 {
     fn default() -> Self {
-        ViewBlock([[0.0; LANES]; NUMBERS])
+        LightFrame16([[0.0; LANES]; NUMBERS])
     }
 }
 
-impl ViewBlock {
-    /// Puts what one point sees into a lane.
+impl LightFrame16 {
+    /// Stores the coordinates from one point in a lane.
     #[inline(always)]
-    pub fn set(&mut self, lane: usize, point: &ShadingPoint, v: &FlatView) {
+    pub fn set(&mut self, lane: usize, point: &ShadingPoint, v: &LightFrame) {
         let (p, l0, a, b) = (point.p, v.l0, v.a, v.b);
         let mirror = v.mirror().unwrap_or_default();
         #[rustfmt::skip]
@@ -101,29 +101,19 @@ impl ViewBlock {
     }
 }
 
-impl ViewBlock {
-    /// Puts what up to sixteen points see of one flat light into the lanes, as [`FlatView::new`] does; but for those
-    /// whose bits are returned: they are so near that they count its places from the nearest. To be called within
+impl LightFrame16 {
+    /// Computes the coordinates from up to sixteen points, as [`LightFrame::new`] does. Returns, as bits, the points
+    /// that are so close that their origin must be the nearest place: those lanes are not valid. To be called within
     /// `vectorize`.
     #[inline(always)]
-    pub fn see<S: Simd>(&mut self, simd: S, light: &FlatLight, points: &[ShadingPoint]) -> u64 {
-        use ViewNumber::*;
-        macro_rules! vectors {
-            ($of:expr) => {{
-                let mut numbers = [[0.0f32; LANES]; 3];
-                for (k, point) in points.iter().enumerate() {
-                    let v: Vec3 = $of(point);
-                    (numbers[0][k], numbers[1][k], numbers[2][k]) = (v.x, v.y, v.z);
-                }
-                let [x, y, z] = numbers.map(|numbers| f32x16::simd_from(simd, numbers));
-                Vec3x16 { x, y, z }
-            }};
-        }
+    pub fn project<S: Simd>(&mut self, simd: S, light: &FlatLight, points: &[ShadingPoint]) -> u64 {
+        use FrameNumber::*;
         let splat = |v: f32| simd.splat_f32x16(v);
-        let p = vectors!(|point: &ShadingPoint| point.p);
-        let [error, horizon] =
-            [vectors!(|point: &ShadingPoint| point.error.0), vectors!(|point: &ShadingPoint| point.horizon)];
-        let [ns, wo] = [vectors!(|point: &ShadingPoint| point.ns), vectors!(|point: &ShadingPoint| point.wo)];
+        let p = point_vectors(simd, points, |point| point.p);
+        let error = point_vectors(simd, points, |point| point.error.0);
+        let horizon = point_vectors(simd, points, |point| point.horizon);
+        let ns = point_vectors(simd, points, |point| point.ns);
+        let wo = point_vectors(simd, points, |point| point.wo);
         // Lanes without a point have the lobe of the last: of one exponent for all, powers are faster
         for (lane, shininess) in self.0[Shininess as usize].iter_mut().enumerate() {
             *shininess = points[lane.min(points.len() - 1)].bsdf.lobe.shininess();
@@ -176,10 +166,10 @@ impl ViewBlock {
         self.nearest(simd).simd_lt(NEAR * light.la.max(light.lb)).to_bitmask()
     }
 
-    /// The distance to the nearest place of the light's square, or a little less.
+    /// Lower bound of the distance to the light's square, in metres.
     #[inline(always)]
     pub fn nearest<S: Simd>(&self, simd: S) -> f32x16<S> {
-        use ViewNumber::*;
+        use FrameNumber::*;
         let [x0, x1] = [self.lanes(simd, X0), self.lanes(simd, X1)];
         let [y0, y1] = [self.lanes(simd, Y0), self.lanes(simd, Y1)];
         let (fa, la, fb, lb) = (self.lanes(simd, Fa), self.lanes(simd, La), self.lanes(simd, Fb), self.lanes(simd, Lb));
@@ -190,37 +180,37 @@ impl ViewBlock {
         (gap_x * gap_x + gap_y * gap_y + height * height).sqrt()
     }
 
-    /// From where to where a lane's light goes.
+    /// The first and last x and y of the square in one lane.
     pub fn square(&self, lane: usize) -> [[f32; 2]; 2] {
-        use ViewNumber::*;
+        use FrameNumber::*;
         [[X0, X1], [Y0, Y1]].map(|sides| sides.map(|of| self.0[of as usize][lane]))
     }
 }
 
-/// Numbers of sixteen things, which lie in its lanes.
+/// Numbers of sixteen members, each member in a lane.
 pub(crate) trait LaneBlock {
     fn numbers(&self) -> &[LaneNumbers];
 }
 
-impl LaneBlock for ViewBlock {
+impl LaneBlock for LightFrame16 {
     #[inline(always)]
     fn numbers(&self) -> &[LaneNumbers] {
         &self.0
     }
 }
 
-/// Where the members of a batch lie: their blocks, and their lanes in them.
+/// Where the members of a batch are stored: their blocks, and their lanes in them.
 pub(crate) struct Members<'a, B> {
-    /// Those that follow one another and lie in one block, as bits.
+    /// The blocks, each with the members whose lanes are in it as bits, in order.
     runs: ArrayVec<(&'a B, u64), LANES>,
-    /// The bytes of each member's number among those of its block.
+    /// The byte indices of each member's number in its block.
     bytes: [u8; LANES * size_of::<f32>()],
-    /// Whether they lie as in one block: then nothing has to be gathered.
+    /// Whether the members are the first lanes of one block, so that nothing has to be gathered.
     in_line: bool,
 }
 
 impl<'a, B: LaneBlock> Members<'a, B> {
-    /// As many as are asked, of these numbers, counted through all blocks; the last stands for what is missing.
+    /// `count` members with these indices, counted through all blocks; lanes beyond them repeat the last.
     #[inline(always)]
     pub fn new(blocks: &'a [B], count: usize, number: impl Fn(usize) -> u32) -> Self {
         let numbers: [usize; LANES] = std::array::from_fn(|k| number(k.min(count - 1)) as usize);
@@ -241,7 +231,7 @@ impl<'a, B: LaneBlock> Members<'a, B> {
         Members { runs, bytes: *bytes.as_flattened().as_array().expect("four bytes for each"), in_line }
     }
 
-    /// One number of each.
+    /// One number of each member.
     #[inline(always)]
     pub fn number<S: Simd>(&self, simd: S, of: usize) -> f32x16<S> {
         let of_block = |block: &B| f32x16::simd_from(simd, block.numbers()[of]);
@@ -257,48 +247,47 @@ impl<'a, B: LaneBlock> Members<'a, B> {
     }
 }
 
-/// What sixteen points see of a flat light, number by number: the points of one block, or those that a batch takes from
-/// many.
-pub(crate) trait Views {
-    /// One number of each.
-    fn lanes<S: Simd>(&self, simd: S, of: ViewNumber) -> f32x16<S>;
+/// Coordinates of a flat light from sixteen points, number by number: of one block, or gathered by a batch.
+pub(crate) trait FrameLanes {
+    /// One number of each point.
+    fn lanes<S: Simd>(&self, simd: S, of: FrameNumber) -> f32x16<S>;
 
-    /// Three numbers of each, as vectors.
+    /// Three numbers of each point, as vectors.
     #[inline(always)]
-    fn vectors<S: Simd>(&self, simd: S, [x, y, z]: [ViewNumber; 3]) -> Vec3x16<S> {
+    fn vectors<S: Simd>(&self, simd: S, [x, y, z]: [FrameNumber; 3]) -> Vec3x16<S> {
         Vec3x16 { x: self.lanes(simd, x), y: self.lanes(simd, y), z: self.lanes(simd, z) }
     }
 
-    /// A quantity that changes linearly over the light, of each.
+    /// A quantity that is linear over the light, of each point.
     #[inline(always)]
-    fn linear<S: Simd>(&self, simd: S, [c, x, y]: [ViewNumber; 3]) -> Linear16<S> {
+    fn linear<S: Simd>(&self, simd: S, [c, x, y]: [FrameNumber; 3]) -> Linear16<S> {
         Linear16 { c: self.lanes(simd, c), x: self.lanes(simd, x), y: self.lanes(simd, y) }
     }
 }
 
-impl Members<'_, ViewBlock> {
-    /// The lobes of each, which are of one kind.
+impl Members<'_, LightFrame16> {
+    /// The lobes of the members, which are of one kind.
     #[inline(always)]
     pub fn lobes<S: Simd>(&self, simd: S, kind: Option<LobeKind>) -> LobeLanes {
-        LobeLanes::new(kind, self.lanes(simd, ViewNumber::Shininess).to_array())
+        LobeLanes::new(kind, self.lanes(simd, FrameNumber::Shininess).to_array())
     }
 }
 
-impl Views for Members<'_, ViewBlock> {
+impl FrameLanes for Members<'_, LightFrame16> {
     #[inline(always)]
-    fn lanes<S: Simd>(&self, simd: S, of: ViewNumber) -> f32x16<S> {
+    fn lanes<S: Simd>(&self, simd: S, of: FrameNumber) -> f32x16<S> {
         self.number(simd, of as usize)
     }
 }
 
-impl Views for ViewBlock {
+impl FrameLanes for LightFrame16 {
     #[inline(always)]
-    fn lanes<S: Simd>(&self, simd: S, of: ViewNumber) -> f32x16<S> {
+    fn lanes<S: Simd>(&self, simd: S, of: FrameNumber) -> f32x16<S> {
         f32x16::simd_from(simd, self.0[of as usize])
     }
 }
 
-/// c + x X + y Y in lanes: quantities that change linearly over a light.
+/// c + x X + y Y in lanes: a quantity that is linear over a light.
 #[derive(Clone, Copy)]
 pub(crate) struct Linear16<S: Simd> {
     pub c: f32x16<S>,
@@ -307,13 +296,13 @@ pub(crate) struct Linear16<S: Simd> {
 }
 
 impl<S: Simd> Linear16<S> {
-    /// The product of the way to a place of the light with `v`.
+    /// The dot product of `v` with the vector to a place of the light.
     #[inline(always)]
     pub fn along(v: Vec3x16<S>, l: &[Vec3x16<S>; 3]) -> Self {
         Linear16 { c: v.dot(l[0]), x: v.dot(l[1]), y: v.dot(l[2]) }
     }
 
-    /// `factor` times it, and `more`.
+    /// `factor` times the quantity, plus `more`.
     #[inline(always)]
     pub fn times(&self, factor: f32, more: f32) -> Self {
         Linear16 { c: self.c * factor + more, x: self.x * factor, y: self.y * factor }
@@ -325,7 +314,7 @@ impl<S: Simd> Linear16<S> {
     }
 }
 
-/// A vector of doubles as two of floats: the difference to a point loses nothing where the two are close.
+/// A vector of doubles as the sum of two of floats, so that the difference to a close point has no cancellation error.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Exact {
     high: Vec3,
@@ -338,7 +327,7 @@ impl Exact {
         Exact { high, low: (v - high.as_dvec3()).as_vec3() }
     }
 
-    /// The way there from sixteen points.
+    /// The vectors from sixteen points to it.
     #[inline(always)]
     pub fn seen_from<S: Simd>(self, simd: S, p: Vec3x16<S>) -> Vec3x16<S> {
         let (h, l) = (Vec3x16::splat(simd, self.high), Vec3x16::splat(simd, self.low));
@@ -346,10 +335,38 @@ impl Exact {
     }
 }
 
-/// The three vectors of a view.
+/// The vectors l0, a, b of l = l0 + x a + y b.
 #[inline(always)]
-pub(crate) fn ways<S: Simd>(simd: S, views: &impl Views) -> [Vec3x16<S>; 3] {
-    use ViewNumber::*;
+pub(crate) fn light_vectors<S: Simd>(simd: S, frames: &impl FrameLanes) -> [Vec3x16<S>; 3] {
+    use FrameNumber::*;
     // Written out, here and below: a map of an array is not inlined, and each operation becomes a call
-    [views.vectors(simd, [L0x, L0y, L0z]), views.vectors(simd, [Ax, Ay, Az]), views.vectors(simd, [Bx, By, Bz])]
+    [frames.vectors(simd, [L0x, L0y, L0z]), frames.vectors(simd, [Ax, Ay, Az]), frames.vectors(simd, [Bx, By, Bz])]
+}
+
+/// One number of each of up to sixteen points, in lanes; 0 in lanes without a point.
+#[inline(always)]
+pub(crate) fn point_numbers<S: Simd>(
+    simd: S,
+    points: &[ShadingPoint],
+    number: impl Fn(&ShadingPoint) -> f32,
+) -> f32x16<S> {
+    let mut numbers = [0.0; LANES];
+    for (lane, point) in numbers.iter_mut().zip(points) {
+        *lane = number(point);
+    }
+    f32x16::simd_from(simd, numbers)
+}
+
+/// One vector of each of up to sixteen points, in lanes; 0 in lanes without a point.
+#[inline(always)]
+pub(crate) fn point_vectors<S: Simd>(
+    simd: S,
+    points: &[ShadingPoint],
+    vector: impl Fn(&ShadingPoint) -> Vec3,
+) -> Vec3x16<S> {
+    Vec3x16 {
+        x: point_numbers(simd, points, |point| vector(point).x),
+        y: point_numbers(simd, points, |point| vector(point).y),
+        z: point_numbers(simd, points, |point| vector(point).z),
+    }
 }

@@ -1,4 +1,5 @@
-//! Where the panels of a cell end: rows at which outlines begin, end, have a corner or leave the cell.
+//! Break points of a cell: rows at which the outline of an occluder begins, ends, has a corner or leaves the cell.
+//! Panels end there, so that the integrand is smooth within each.
 
 use std::f32::consts::PI;
 
@@ -9,26 +10,26 @@ use super::batch::{LaneNumbers, Linear16};
 use super::row::{Quadratic16, root_between};
 use crate::math::sin_cos;
 
-/// Sides of cells that are halves of ellipses: x + `origin[0]` = `width` sqrt(1 - (y + `origin[1]`)^2), one on each
-/// side.
+/// Sides of cells that are half ellipses: x + `origin[0]` = `width` sqrt(1 - (y + `origin[1]`)^2), one for each
+/// `width`.
 #[derive(Clone, Copy)]
 pub(crate) struct RoundSides<S: Simd> {
     pub width: [f32x16<S>; 2],
     pub origin: [f32x16<S>; 2],
 }
 
-/// Rows at which something begins, ends, has a corner, or meets the sides of cells; not a number where there is none.
+/// Break points of sixteen cells; not a number where a lane has none.
 pub(crate) struct Breaks<'a, S: Simd> {
-    /// The sides of the cells, if they are straight, or of boxes around them.
+    /// The sides of the cells if they are straight, else of their bounding boxes.
     pub x: [f32x16<S>; 2],
     pub is_straight: bool,
     pub round: Option<RoundSides<S>>,
-    /// Whose rows are looked for.
+    /// The lanes whose break points are added.
     pub of: mask32x16<S>,
     pub rows: &'a mut Vec<LaneNumbers>,
 }
 
-/// Round sides are looked at in so many places, evenly in their angle.
+/// Round sides are sampled at so many angles, evenly spaced, to bracket roots.
 const PLACES: usize = 13;
 
 /// Sine and cosine of those angles, from -pi/2 to pi/2: steps of 15 degrees.
@@ -44,10 +45,10 @@ const ANGLES: [[f32; 2]; PLACES] = {
     angles
 };
 
-/// In radians: from one of those angles to the next.
+/// In radians: between two of those angles.
 const STEP: f32 = PI / (PLACES - 1) as f32;
 
-/// The place of a round side that lies so far on, in radians, from an angle with that sine and cosine.
+/// The place of a round side `t` radians beyond the angle with that sine and cosine.
 #[inline(always)]
 fn on_arc<S: Simd>(
     t: f32x16<S>,
@@ -71,7 +72,7 @@ impl<S: Simd> Breaks<'_, S> {
     }
 
     #[inline(always)]
-    pub fn tell_if(&mut self, row: f32x16<S>, is: mask32x16<S>) {
+    pub fn add_if(&mut self, row: f32x16<S>, is: mask32x16<S>) {
         self.rows.push((is & self.of).select(row, row.token().splat_f32x16(f32::NAN)).to_array());
     }
 
@@ -82,17 +83,17 @@ impl<S: Simd> Breaks<'_, S> {
             // Where the row touches
             let x = -(y * quadratic.xy + quadratic.x) / quadratic.xx;
             let room = (self.x[1] - self.x[0]) * 1e-3;
-            self.tell_if(y, of & tangents.any & x.simd_gt(self.x[0] - room) & x.simd_lt(self.x[1] + room));
+            self.add_if(y, of & tangents.any & x.simd_gt(self.x[0] - room) & x.simd_lt(self.x[1] + room));
         }
         for x in self.straight() {
             let crossings = quadratic.crossings(x);
-            self.tell_if(crossings.low, of & crossings.any);
-            self.tell_if(crossings.high, of & crossings.any);
+            self.add_if(crossings.low, of & crossings.any);
+            self.add_if(crossings.high, of & crossings.any);
         }
         self.on_round_sides(quadratic, of);
     }
 
-    /// Where a quadratic is 0 on round sides. Not inlined: one copy for each instruction set is enough.
+    /// Zeros of a quadratic on round sides. Not inlined: one copy for each instruction set is enough.
     #[inline(never)]
     fn on_round_sides(&mut self, quadratic: &Quadratic16<S>, of: mask32x16<S>) {
         let Some(sides) = self.round else { return };
@@ -106,7 +107,8 @@ impl<S: Simd> Breaks<'_, S> {
         );
     }
 
-    /// Where a line crosses round sides, of those places that matter. On a side it is a cos t + b sin t + c.
+    /// Intersections of a line with round sides, of those that `matters` selects. On a side the line is a cos t + b sin
+    /// t + c.
     #[inline(always)]
     fn line_on_round_sides(&mut self, line: &Linear16<S>, matters: impl Fn(f32x16<S>, f32x16<S>) -> mask32x16<S>) {
         let Some(RoundSides { width, origin }) = self.round else { return };
@@ -122,7 +124,7 @@ impl<S: Simd> Breaks<'_, S> {
                 let (x, y) = (width * cos - origin[0], sin - origin[1]);
                 let is = square.simd_gt(zero) & cos.simd_ge(zero) & matters(x, y);
                 if is.any_true() {
-                    self.tell_if(y, is);
+                    self.add_if(y, is);
                 }
             }
         }
@@ -148,20 +150,20 @@ impl<S: Simd> Breaks<'_, S> {
                     },
                 );
                 let [_, y] = on_arc(root, from, width, origin);
-                self.tell_if(y, changes);
+                self.add_if(y, changes);
             }
             before = here;
         }
     }
 
-    /// The corners of a flat thing, and where its sides cross those of a cell.
+    /// The corners of a polygon, and the intersections of its edges with the sides of a cell.
     #[inline(always)]
     pub fn polygon(&mut self, lines: &[Linear16<S>; 5]) {
         let zero = lines[0].c.token().splat_f32x16(0.0);
         for (i, p) in lines.iter().enumerate() {
             for x in self.straight() {
                 let y = -(p.c + x * p.x) / p.y;
-                self.tell_if(y, is_inside(lines, x, y, [i, i]));
+                self.add_if(y, is_inside(lines, x, y, [i, i]));
             }
             self.line_on_round_sides(
                 p,
@@ -174,16 +176,16 @@ impl<S: Simd> Breaks<'_, S> {
             let area = p.x * q.y - p.y * q.x;
             let (x, y) = ((p.y * q.c - p.c * q.y) / area, (p.c * q.x - q.c * p.x) / area);
             let is_beside = x.simd_ge(self.x[0]) & x.simd_le(self.x[1]);
-            self.tell_if(y, !area.simd_eq(zero) & is_beside & is_inside(lines, x, y, [i, j]));
+            self.add_if(y, !area.simd_eq(zero) & is_beside & is_inside(lines, x, y, [i, j]));
         }
     }
 
-    /// Where a line crosses the sides of a cell.
+    /// The intersections of a line with the sides of a cell.
     #[inline(always)]
     pub fn line(&mut self, line: &Linear16<S>) {
         let all = self.of;
         for x in self.straight() {
-            self.tell_if(-(line.c + x * line.x) / line.y, all);
+            self.add_if(-(line.c + x * line.x) / line.y, all);
         }
         self.line_on_round_sides(
             line,
@@ -193,7 +195,7 @@ impl<S: Simd> Breaks<'_, S> {
     }
 }
 
-/// Whether a place is inside of all lines but two, or nearly so.
+/// Whether a place is on the inner side of all lines but two, within rounding.
 #[inline(always)]
 fn is_inside<S: Simd>(lines: &[Linear16<S>; 5], x: f32x16<S>, y: f32x16<S>, but: [usize; 2]) -> mask32x16<S> {
     let mut is = x.simd_eq(x);

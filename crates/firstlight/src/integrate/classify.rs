@@ -1,8 +1,8 @@
-//! What may stand between points and a light: for sixteen points at once, and for all within a radius of each.
+//! Occluders of an area light, tested against the whole light for sixteen points at once.
 //!
-//! With radius 0 it is the class of a point: it sees all of the light, none of it, or what these things leave of
-//! it. With a radius it is a proof of the same for all places within it, and a bound on how far the outline of a shadow
-//! moves on the light from one of them to another.
+//! With reach 0 the result is the visibility of the light from a point: full, none, or the occluders that may hide
+//! a part. With a reach it is a proof for all places within it, and a bound on how far a silhouette moves on the
+//! light between the point and any of them.
 
 mod flat;
 mod light_contact;
@@ -10,97 +10,99 @@ mod solid;
 
 use fearless_simd::{f32x16, prelude::*};
 
-use super::batch::{Exact, Linear16, ViewBlock, ViewNumber, Views, ways};
+use super::batch::{
+    Exact, FrameLanes, FrameNumber, LightFrame16, Linear16, light_vectors, point_numbers, point_vectors,
+};
 use super::emitter::Emitter;
 use super::hull::SolidOccluder;
 use super::occluder::{Occluder, Shadow, corners_from};
-use super::panels::{Between, MAX_INTERVALS};
+use super::panels::{MAX_INTERVALS, OccluderMask};
 use crate::ids::LightId;
 use crate::material::ShadingPoint;
 use crate::math::{DAffine3, Facet, LANES, Vec3, Vec3x16};
 use crate::scene::{PlacedTarget, Scene};
 use crate::shape::{Parallelogram, Placement, PlaneSide, Solid, Sphere};
 use crate::visibility::{OccluderList, ShadowMesh};
-use flat::{FacetShape, Own, facet_between, flat_between};
-use light_contact::{LightSides, Touch};
-use solid::{PlacedSolid, solid_between};
+use flat::{FacetShape, Own, test_parallelogram, test_triangle};
+use light_contact::{LightContact, LightSides};
+use solid::{PlacedSolid, test_solid};
 
-/// All things that may stand in the way of one light.
+/// All occluders of one light.
 #[derive(Default)]
-pub(crate) struct Obstacles<'a> {
-    /// As they are met row by row, and as they are; number by number the same.
+pub(crate) struct LightOccluders<'a> {
+    /// For projection onto the light, and for exact tests; with equal indices.
     pub occluders: Vec<Occluder>,
     exact: Vec<ExactShape<'a>>,
-    /// How each lies to the light, if that is a ball.
-    touches: Vec<Touch>,
-    /// On which sides of the plane of a flat light each has a part of itself.
+    /// Whether each intersects or contains a sphere light.
+    contacts: Vec<LightContact>,
+    /// The sides of a flat light's plane that each reaches into.
     sides: Vec<LightSides>,
-    /// Which placed things are among them.
+    /// The indices of the placed solids among them.
     placed: Vec<u32>,
-    /// Whether there is more than that.
+    /// Whether some did not fit.
     has_more: bool,
 }
 
-/// What decides on which side a point is.
+/// The shape of an occluder in f64.
 enum ExactShape<'a> {
     Sphere(Sphere),
     Flat {
         flat: &'a Parallelogram,
-        /// On which side all of the light is.
+        /// The side of the plane on which all of the light is.
         side: PlaneSide,
-        /// The same if the camera sees it: then nobody sees what is behind it.
+        /// The same if the camera is there too: then no point behind the plane is visible.
         seen_side: PlaneSide,
     },
     Solid(Box<PlacedSolid>),
     Facet(FacetShape),
 }
 
-/// The most obstacles of a light, those in lists and those in trees.
-pub(crate) const MAX_OBSTACLES: usize = 64;
+/// The most occluders of a light, listed ones and those in trees together: the bits of a mask.
+pub(crate) const MAX_OCCLUDERS: usize = 64;
 
-impl<'a> Obstacles<'a> {
-    /// Those of light `index` that are in lists, and solids.
-    pub fn new(scene: &'a Scene, index: usize, emitter: &Emitter) -> Obstacles<'a> {
+impl<'a> LightOccluders<'a> {
+    /// Those of light `index` that are listed, and solids.
+    pub fn new(scene: &'a Scene, index: usize, emitter: &Emitter) -> LightOccluders<'a> {
         let id = LightId(index as u32);
-        let mut obstacles = Obstacles::default();
+        let mut all = LightOccluders::default();
         if !scene.lights[index].shadows {
-            return obstacles;
+            return all;
         }
         let listed = &scene.occluders;
         for (_, sphere) in scene.that_stop(&listed.spheres, id) {
-            obstacles.sphere(&sphere.shape);
+            all.sphere(&sphere.shape);
         }
         let sides = listed.sides(id);
         for (i, flat) in scene.that_stop(&listed.flats, id) {
             let side = sides.get(i).copied().unwrap_or(PlaneSide::Both);
             let seen_side = if listed.flats_seen.get(i) == Some(&true) { side } else { PlaneSide::Both };
-            obstacles.flat(&flat.shape, side, seen_side);
+            all.flat(&flat.shape, side, seen_side);
         }
         for (_, disk) in scene.that_stop(&listed.disks, id) {
-            obstacles.solid(PlacedSolid::new(Solid::Disk(disk.shape), Placement::new(DAffine3::IDENTITY), emitter));
+            all.solid(PlacedSolid::new(Solid::Disk(disk.shape), Placement::new(DAffine3::IDENTITY), emitter));
         }
-        obstacles.has_more = obstacles.occluders.len() > MAX_OBSTACLES;
-        obstacles.occluders.truncate(MAX_OBSTACLES);
-        obstacles.exact.truncate(MAX_OBSTACLES);
+        all.has_more = all.occluders.len() > MAX_OCCLUDERS;
+        all.occluders.truncate(MAX_OCCLUDERS);
+        all.exact.truncate(MAX_OCCLUDERS);
         for (k, thing) in scene.geometry.placed.iter().enumerate() {
             let PlacedTarget::Solid(solid) = thing.target else { continue };
-            if !scene.geometry.stops(thing.shadow, id) || obstacles.occluders.len() == MAX_OBSTACLES {
+            if !scene.geometry.stops(thing.shadow, id) || all.occluders.len() == MAX_OCCLUDERS {
                 continue;
             }
             let solid = scene.geometry.solids[solid as usize];
             match solid::sphere(&solid, &thing.placement) {
-                Some(sphere) => obstacles.sphere(&sphere),
-                None if obstacles.solid(PlacedSolid::new(solid, thing.placement, emitter)) => {}
+                Some(sphere) => all.sphere(&sphere),
+                None if all.solid(PlacedSolid::new(solid, thing.placement, emitter)) => {}
                 None => continue,
             }
-            obstacles.placed.push(k as u32);
+            all.placed.push(k as u32);
         }
-        obstacles.touch(emitter);
-        obstacles
+        all.add_contacts(emitter);
+        all
     }
 
-    /// Takes what was gathered in trees in the way of light `id`, but for placed things, in place of what it was;
-    /// `false` if it is more than can be told beside so many others.
+    /// Replaces all by the occluders of light `id` that were gathered in trees, except placed solids. Returns `false`
+    /// if there are too many beside `others`.
     pub fn gather(
         &mut self,
         scene: &'a Scene,
@@ -109,16 +111,11 @@ impl<'a> Obstacles<'a> {
         trees: &OccluderList,
         others: usize,
     ) -> bool {
-        *self = Obstacles {
-            occluders: std::mem::take(&mut self.occluders),
-            exact: std::mem::take(&mut self.exact),
-            touches: std::mem::take(&mut self.touches),
-            sides: std::mem::take(&mut self.sides),
-            ..Obstacles::default()
-        };
+        self.has_more = false;
+        self.placed.clear();
         self.occluders.clear();
         self.exact.clear();
-        self.touches.clear();
+        self.contacts.clear();
         self.sides.clear();
         for which in &trees.spheres {
             self.sphere(scene.sphere(*which));
@@ -141,8 +138,8 @@ impl<'a> Obstacles<'a> {
                 self.exact.push(ExactShape::Facet(shape));
             }
         }
-        self.touch(emitter);
-        self.occluders.len() + others <= MAX_OBSTACLES
+        self.add_contacts(emitter);
+        self.occluders.len() + others <= MAX_OCCLUDERS
     }
 
     fn sphere(&mut self, sphere: &Sphere) {
@@ -155,13 +152,13 @@ impl<'a> Obstacles<'a> {
         self.exact.push(ExactShape::Flat { flat, side, seen_side });
     }
 
-    /// Finds out how each lies to the light: what reaches into a ball, and what is behind the plane of a flat light.
-    fn touch(&mut self, emitter: &Emitter) {
-        self.touches.extend(self.exact.iter().map(|exact| Touch::of(emitter, exact)));
+    /// Computes the contacts and sides of all.
+    fn add_contacts(&mut self, emitter: &Emitter) {
+        self.contacts.extend(self.exact.iter().map(|exact| LightContact::of(emitter, exact)));
         self.sides.extend(self.exact.iter().map(|exact| LightSides::of(emitter, exact)));
     }
 
-    /// Adds a solid, if rows tell it.
+    /// Adds a solid if its projection has a closed form.
     fn solid(&mut self, solid: Option<(PlacedSolid, SolidOccluder)>) -> bool {
         let Some((shape, occluder)) = solid else { return false };
         self.occluders.push(Occluder::Solid(occluder));
@@ -169,73 +166,73 @@ impl<'a> Obstacles<'a> {
         true
     }
 
-    /// Each, with its sides of the light, and how it lies to a ball.
+    /// Each occluder, with its sides of the light and its contact with it.
     #[inline(always)]
-    fn each(&self) -> impl Iterator<Item = (&Occluder, &ExactShape<'a>, LightSides, Touch)> {
-        let all = self.occluders.iter().zip(&self.exact).zip(self.sides.iter().zip(&self.touches));
-        all.map(|((occluder, exact), (sides, touch))| (occluder, exact, *sides, *touch))
+    fn each(&self) -> impl Iterator<Item = (&Occluder, &ExactShape<'a>, LightSides, LightContact)> {
+        let all = self.occluders.iter().zip(&self.exact).zip(self.sides.iter().zip(&self.contacts));
+        all.map(|((occluder, exact), (sides, contact))| (occluder, exact, *sides, *contact))
     }
 
-    /// Whether a placed thing is among them.
+    /// Whether placed object `thing` is among them.
     pub fn has_placed(&self, thing: u32) -> bool {
         self.placed.binary_search(&thing).is_ok()
     }
 }
 
 #[cfg(test)]
-impl<'a> Obstacles<'a> {
+impl<'a> LightOccluders<'a> {
     /// Spheres alone, and parallelograms.
-    pub fn of(spheres: &'a [Sphere], flats: &'a [Parallelogram], emitter: &Emitter) -> Obstacles<'a> {
-        let mut obstacles = Obstacles::default();
-        spheres.iter().for_each(|sphere| obstacles.sphere(sphere));
-        flats.iter().for_each(|flat| obstacles.flat(flat, PlaneSide::Both, PlaneSide::Both));
-        obstacles.touch(emitter);
-        obstacles
+    pub fn of(spheres: &'a [Sphere], flats: &'a [Parallelogram], emitter: &Emitter) -> LightOccluders<'a> {
+        let mut listed = LightOccluders::default();
+        spheres.iter().for_each(|sphere| listed.sphere(sphere));
+        flats.iter().for_each(|flat| listed.flat(flat, PlaneSide::Both, PlaneSide::Both));
+        listed.add_contacts(emitter);
+        listed
     }
 }
 
-/// What is between a point, with what lies around it, and a light.
+/// The occlusion of a light from a point and its surroundings.
 #[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct Class {
-    /// What may hide a part of it from the point.
-    pub between: Between,
-    /// Whether all of it is hidden from the point.
+pub(crate) struct OcclusionClass {
+    /// The occluders that may hide a part of the light from the point.
+    pub mask: OccluderMask,
+    /// Whether the point is in the umbra.
     pub hidden: bool,
-    /// Whether something is in the way that is not told row by row.
+    /// Whether an occluder has no closed form here.
     pub other: bool,
-    /// How far the outline of a shadow moves on the light from the point to a place within its reach, as a part of the
-    /// light's size; 0 where all those places are proved to be lit or hidden as one.
+    /// The largest motion of a silhouette on the light between the point and a place within its reach, as a part of the
+    /// light's size; 0 if all those places are proved to be in full light or in the umbra.
     pub motion: f32,
 }
 
-/// Room for the rounding of a distance.
+/// As a part of a distance: a bound of its rounding.
 const SLACK: f32 = 1e-5;
 
-/// The light as sixteen points see it: the pyramid over it, and the cone around it.
-struct LanesSight<S: Simd> {
+/// The pyramid with its apex at a point that is bounded by a light's edges, and the cone around it, for sixteen points.
+struct LightPyramid16<S: Simd> {
     p: Vec3x16<S>,
-    ways: [Vec3x16<S>; 3],
+    light_vectors: [Vec3x16<S>; 3],
     x: [f32x16<S>; 2],
     y: [f32x16<S>; 2],
-    /// Outward unit normals.
+    /// Outward unit normals of the pyramid's sides.
     sides: [Vec3x16<S>; 4],
     axis: Vec3x16<S>,
     sin: f32x16<S>,
     cos: f32x16<S>,
     far: f32x16<S>,
-    /// Across the line of sight, at least.
+    /// The least size of the light across the line of sight, in metres.
     size: f32x16<S>,
     normal: Vec3x16<S>,
     horizon: Vec3x16<S>,
-    /// How sure we are of each point.
+    /// The error bound of each point.
     error: Vec3x16<S>,
     reach: f32x16<S>,
     turn: f32x16<S>,
-    /// How far behind its plane the light may be, as far as what is asked for may be in the way of that.
+    /// In metres: occluders so far behind the light's plane count.
     depth: f32,
 }
 
-/// Unit, or 0 where `v` is.
+/// The unit vector, or 0 where `v` is 0.
 #[inline(always)]
 fn unit<S: Simd>(v: Vec3x16<S>) -> Vec3x16<S> {
     let length2 = v.dot(v);
@@ -245,25 +242,19 @@ fn unit<S: Simd>(v: Vec3x16<S>) -> Vec3x16<S> {
     v * is_long.select(inverse, simd.splat_f32x16(0.0))
 }
 
-/// The way to a place of the light.
+/// The vector from the point to a place of the light.
 #[inline(always)]
 fn way<S: Simd>(l: &[Vec3x16<S>; 3], x: f32x16<S>, y: f32x16<S>) -> Vec3x16<S> {
     l[0] + (l[1] * x + l[2] * y)
 }
 
-impl<S: Simd> LanesSight<S> {
+impl<S: Simd> LightPyramid16<S> {
     #[inline(always)]
-    fn new(simd: S, views: &ViewBlock, points: &[ShadingPoint]) -> LanesSight<S> {
-        use ViewNumber::*;
-        let point = |f: fn(&ShadingPoint) -> f32| {
-            let mut numbers = [0.0; LANES];
-            for (number, point) in numbers.iter_mut().zip(points) {
-                *number = f(point);
-            }
-            numbers
-        };
-        let l = ways(simd, views);
-        let (x, y) = ([views.lanes(simd, X0), views.lanes(simd, X1)], [views.lanes(simd, Y0), views.lanes(simd, Y1)]);
+    fn new(simd: S, frames: &LightFrame16, points: &[ShadingPoint]) -> LightPyramid16<S> {
+        use FrameNumber::*;
+        let l = light_vectors(simd, frames);
+        let (x, y) =
+            ([frames.lanes(simd, X0), frames.lanes(simd, X1)], [frames.lanes(simd, Y0), frames.lanes(simd, Y1)]);
         let corners = [way(&l, x[0], y[0]), way(&l, x[1], y[0]), way(&l, x[1], y[1]), way(&l, x[0], y[1])];
         let middle = way(&l, (x[0] + x[1]) * 0.5, (y[0] + y[1]) * 0.5);
         let zero = simd.splat_f32x16(0.0);
@@ -282,11 +273,11 @@ impl<S: Simd> LanesSight<S> {
             far = far.max(l.dot(*l));
         }
         let far = far.sqrt();
-        let slant = views.lanes(simd, Height) / distance;
-        let size = views.lanes(simd, La).min(views.lanes(simd, Lb)) * slant.max(simd.splat_f32x16(0.02)) * 2.0;
-        LanesSight {
-            p: views.vectors(simd, [Px, Py, Pz]),
-            ways: l,
+        let slant = frames.lanes(simd, Height) / distance;
+        let size = frames.lanes(simd, La).min(frames.lanes(simd, Lb)) * slant.max(simd.splat_f32x16(0.02)) * 2.0;
+        LightPyramid16 {
+            p: frames.vectors(simd, [Px, Py, Pz]),
+            light_vectors: l,
             x,
             y,
             sides,
@@ -296,29 +287,15 @@ impl<S: Simd> LanesSight<S> {
             far,
             size,
             normal: unit(l[1].cross(l[2])),
-            horizon: Vec3x16 {
-                x: f32x16::simd_from(simd, point(|p| p.horizon.x)),
-                y: f32x16::simd_from(simd, point(|p| p.horizon.y)),
-                z: f32x16::simd_from(simd, point(|p| p.horizon.z)),
-            },
-            error: Vec3x16 {
-                x: f32x16::simd_from(simd, point(|p| p.error.0.x)),
-                y: f32x16::simd_from(simd, point(|p| p.error.0.y)),
-                z: f32x16::simd_from(simd, point(|p| p.error.0.z)),
-            },
-            reach: f32x16::simd_from(simd, point(|p| p.reach)),
-            turn: f32x16::simd_from(simd, point(|p| p.turn)),
+            horizon: point_vectors(simd, points, |point| point.horizon),
+            error: point_vectors(simd, points, |point| point.error.0),
+            reach: point_numbers(simd, points, |point| point.reach),
+            turn: point_numbers(simd, points, |point| point.turn),
             depth: 0.0,
         }
     }
 
-    /// The way to a place of the light.
-    #[inline(always)]
-    fn way(&self, x: f32x16<S>, y: f32x16<S>) -> Vec3x16<S> {
-        way(&self.ways, x, y)
-    }
-
-    /// How far the hull of some points lies outside of one side of the pyramid over the light, at most.
+    /// The largest distance of the convex hull of `hull` outside of a side of the pyramid.
     #[inline(always)]
     fn gap(&self, hull: &[Vec3x16<S>]) -> f32x16<S> {
         let mut gap = self.far.token().splat_f32x16(f32::NEG_INFINITY);
@@ -332,8 +309,8 @@ impl<S: Simd> LanesSight<S> {
         gap
     }
 
-    /// Those of some points from which something of the light's square is on the inner side of each line, the first of
-    /// which is the plane of what is in the way, and those from which all of it is on that of all.
+    /// Of the points in `of`: those from which some of the light's square is on the inner side of each line, the first
+    /// of which is the occluder's plane, and those from which all of it is on the inner side of all.
     #[inline(always)]
     fn covered(&self, lines: &[Linear16<S>; 5], of: u64) -> [u64; 2] {
         let zero = self.far.token().splat_f32x16(0.0);
@@ -356,7 +333,7 @@ impl<S: Simd> LanesSight<S> {
         [[x0, y0], [x1, y0], [x1, y1], [x0, y1]]
     }
 
-    /// Those of some points from which all of the light's corners are hidden.
+    /// Of the points in `of`: those from which all corners of the light are hidden.
     #[inline(always)]
     fn hidden(&self, shadow: &Shadow<S>, of: u64) -> u64 {
         let mut hidden = of;
@@ -368,8 +345,8 @@ impl<S: Simd> LanesSight<S> {
         hidden
     }
 
-    /// Which of some points may see the ball of radius `r` around `s` between themselves and the light: from anywhere
-    /// within their reach, and from themselves.
+    /// Of the points in `of`: those for which the ball of radius `r` around `s` may be between the light and some place
+    /// within reach, and those for which it may be between the light and the point itself.
     #[inline(always)]
     fn meets(&self, s: Vec3x16<S>, distance: f32x16<S>, r: f32, of: u64) -> [u64; 2] {
         if of == 0 {
@@ -380,6 +357,7 @@ impl<S: Simd> LanesSight<S> {
         // The cone around the light, and its pyramid
         let along = s.dot(self.axis);
         let aside = (distance * distance - along * along).max(zero).sqrt();
+        // The cone around the light, and its pyramid
         let misses = (aside * self.cos - along * self.sin)
             .simd_gt((self.reach + r) * 1.001 + (along.abs() + aside) * SLACK)
             & self.sin.simd_lt(1.0);
@@ -394,7 +372,7 @@ impl<S: Simd> LanesSight<S> {
         let gap = gap - r;
         let rounding = distance * SLACK;
         // Behind the light's plane
-        let to_plane = self.normal.dot(self.ways[0]);
+        let to_plane = self.normal.dot(self.light_vectors[0]);
         let beyond = (self.normal.dot(s) - to_plane)
             * to_plane.simd_lt(zero).select(simd.splat_f32x16(-1.0), simd.splat_f32x16(1.0));
         let far = r + self.depth;
@@ -402,7 +380,7 @@ impl<S: Simd> LanesSight<S> {
         [around, around & gap.simd_le(rounding).to_bitmask() & !beyond.simd_gt(far).to_bitmask()]
     }
 
-    /// How far the outline of a shadow moves on the light that something casts which is `near` to the point.
+    /// The motion of the silhouette on the light of an occluder at distance `near`, as a part of the light's size.
     #[inline(always)]
     fn motion(&self, near: f32x16<S>) -> f32x16<S> {
         let simd = near.token();
@@ -411,147 +389,150 @@ impl<S: Simd> LanesSight<S> {
     }
 }
 
-/// The classes of up to sixteen points, whose `views` are in a block; of those whose bits are in `asked`. What is in
-/// trees is `near` and counted after what is in lists. To be called within `vectorize`.
+/// The occlusion of a light from the points in `lanes`, of up to sixteen whose coordinates are in `frames`. Occluders
+/// in trees, `near`, are indexed after listed ones. To be called within `vectorize`.
 #[inline(always)]
 pub(crate) fn classify<S: Simd>(
     simd: S,
-    obstacles: &Obstacles,
-    near: Option<&Obstacles>,
+    listed: &LightOccluders,
+    near: Option<&LightOccluders>,
     emitter: &Emitter,
-    views: &ViewBlock,
+    frames: &LightFrame16,
     points: &[ShadingPoint],
-    asked: u64,
-) -> [Class; LANES] {
-    let mut classes = [Class::default(); LANES];
-    if asked == 0 {
+    mut lanes: u64,
+) -> [OcclusionClass; LANES] {
+    let mut classes = [OcclusionClass::default(); LANES];
+    if lanes == 0 {
         return classes;
     }
-    let mut sight = LanesSight::new(simd, views, points);
-    let own = near.is_some().then(|| Own::new(simd, &sight, points));
+    let mut pyramid = LightPyramid16::new(simd, frames, points);
+    let own = near.is_some().then(|| Own::new(simd, &pyramid, points));
     let places = LightSides::of_points(emitter, points);
-    let mut asked = asked;
-    for (i, (occluder, exact, sides, touch)) in
-        obstacles.each().chain(near.into_iter().flat_map(Obstacles::each)).enumerate()
+    for (i, (occluder, exact, sides, contact)) in
+        listed.each().chain(near.into_iter().flat_map(LightOccluders::each)).enumerate()
     {
-        if asked == 0 {
+        if lanes == 0 {
             break;
         }
-        let before = asked & sides.of_these(places);
+        let before = lanes & sides.of_these(places);
         if before == 0 {
             continue;
         }
-        // What reaches into a ball may hide some of its far half
-        sight.depth = match emitter {
-            Emitter::Ball { radius, both_sides: true, .. } if touch == Touch::Cuts => 2.0 * *radius as f32,
+        // An occluder that intersects a sphere light may hide some of its far half
+        pyramid.depth = match emitter {
+            Emitter::Ball { radius, both_sides: true, .. } if contact == LightContact::Intersects => {
+                2.0 * *radius as f32
+            }
             // From inside nothing else is between
-            Emitter::Face { .. } if touch != Touch::Cuts => continue,
+            Emitter::Face { .. } if contact != LightContact::Intersects => continue,
             Emitter::Ball { .. } | Emitter::Flat(_) | Emitter::Face { .. } => 0.0,
         };
-        let mut told = match (occluder, exact) {
+        let mut test = match (occluder, exact) {
             (Occluder::Sphere { center, radius }, ExactShape::Sphere(sphere)) => {
-                sphere_between(simd, &sight, center.seen_from(simd, sight.p), *radius, sphere, points, before)
+                test_sphere(simd, &pyramid, center.seen_from(simd, pyramid.p), *radius, sphere, points, before)
             }
             (Occluder::Flat { corners }, ExactShape::Flat { flat, side, seen_side }) => {
-                let corners = corners_from(simd, corners, sight.p);
-                flat_between(simd, &sight, corners, (flat, *side, *seen_side), points, before)
+                let corners = corners_from(simd, corners, pyramid.p);
+                test_parallelogram(simd, &pyramid, corners, (flat, *side, *seen_side), points, before)
             }
             (Occluder::Solid(_), ExactShape::Solid(shape)) => {
-                solid_between(simd, &sight, shape, occluder, points, before)
+                test_solid(simd, &pyramid, shape, occluder, points, before)
             }
             (Occluder::Flat { corners }, ExactShape::Facet(shape)) => match &own {
                 Some(own) => {
-                    facet_between(simd, &sight, corners_from(simd, corners, sight.p), shape, own, points, before)
+                    test_triangle(simd, &pyramid, corners_from(simd, corners, pyramid.p), shape, own, points, before)
                 }
                 None => unreachable!("no triangle is in lists"),
             },
             _ => unreachable!("both lists hold the same things"),
         };
-        if touch == Touch::Cuts {
+        // The visible part of the sphere is not that of its disk
+        if contact == LightContact::Intersects {
             // Of the ball more may be seen than of its disk, and of its far half less
-            told.other |= told.outside | told.within | told.around | told.hidden;
-            (told.outside, told.within, told.hidden, told.firm) = (0, 0, 0, 0);
+            test.other |= test.outside | test.within | test.around | test.hidden;
+            (test.outside, test.within, test.hidden, test.firm) = (0, 0, 0, 0);
         }
-        if (told.outside | told.within | told.hidden | told.moving | told.other) & asked == 0 {
+        if (test.outside | test.within | test.hidden | test.moving | test.other) & lanes == 0 {
             continue;
         }
-        if touch == Touch::Holds {
-            told.hidden |= told.outside;
-            (told.outside, told.within) = (0, 0);
+        if contact == LightContact::Contains {
+            test.hidden |= test.outside;
+            (test.outside, test.within) = (0, 0);
         }
-        let motion = told.motion.to_array();
+        let motion = test.motion.to_array();
         for (k, class) in classes.iter_mut().enumerate().take(points.len()) {
-            if asked >> k & 1 == 0 {
+            if lanes >> k & 1 == 0 {
                 continue;
             }
-            if told.moving >> k & 1 == 1 {
+            if test.moving >> k & 1 == 1 {
                 class.motion = class.motion.max(motion[k]);
             }
-            if told.hidden >> k & 1 == 1 {
+            if test.hidden >> k & 1 == 1 {
                 class.hidden = true;
-                if told.firm >> k & 1 == 1 {
+                if test.firm >> k & 1 == 1 {
                     class.motion = 0.0;
                 }
-                asked &= !(1 << k);
+                lanes &= !(1 << k);
                 continue;
             }
-            class.other |= told.other >> k & 1 == 1;
-            class.between.outside |= (told.outside >> k & 1) << i;
-            class.between.within |= (told.within >> k & 1) << i;
+            class.other |= test.other >> k & 1 == 1;
+            class.mask.outside |= (test.outside >> k & 1) << i;
+            class.mask.within |= (test.within >> k & 1) << i;
         }
     }
     for class in &mut classes {
-        let Between { outside, within } = class.between;
+        let OccluderMask { outside, within } = class.mask;
         let many = 2 * (outside.count_ones() + within.count_ones()) as usize;
-        class.other |= many > MAX_INTERVALS || obstacles.has_more;
+        class.other |= many > MAX_INTERVALS || listed.has_more;
     }
     classes
 }
 
-/// What one thing does to sixteen points, in bits.
-struct Told<S: Simd> {
-    /// It may hide a part of the light, from outside of it or from within.
+/// The test of one occluder against the light, as bits of sixteen points.
+struct OccluderTest<S: Simd> {
+    /// It may hide a part of the light from a point outside of it, or within it.
     outside: u64,
     within: u64,
-    /// It is around the point.
+    /// It contains the point.
     around: u64,
+    /// It hides all of the light.
     hidden: u64,
-    /// It does what is not told row by row.
+    /// Its projection has no closed form.
     other: u64,
-    /// It hides all from everywhere around the point.
+    /// It hides all of the light from all places within reach.
     firm: u64,
-    /// The outline of its shadow moves so far.
+    /// Its silhouette moves on the light, by `motion`.
     moving: u64,
     motion: f32x16<S>,
 }
 
-impl<S: Simd> Told<S> {
+impl<S: Simd> OccluderTest<S> {
     #[inline(always)]
     fn nothing(zero: f32x16<S>) -> Self {
-        Told { outside: 0, within: 0, around: 0, hidden: 0, other: 0, firm: 0, moving: 0, motion: zero }
+        OccluderTest { outside: 0, within: 0, around: 0, hidden: 0, other: 0, firm: 0, moving: 0, motion: zero }
     }
 }
 
 #[inline(always)]
-fn sphere_between<S: Simd>(
+fn test_sphere<S: Simd>(
     simd: S,
-    sight: &LanesSight<S>,
+    pyramid: &LightPyramid16<S>,
     s: Vec3x16<S>,
     r: f32,
     sphere: &Sphere,
     points: &[ShadingPoint],
-    asked: u64,
-) -> Told<S> {
+    lanes: u64,
+) -> OccluderTest<S> {
     let zero = simd.splat_f32x16(0.0);
-    let mut told = Told::nothing(zero);
+    let mut test = OccluderTest::nothing(zero);
     let distance2 = s.dot(s);
     let distance = distance2.sqrt();
     // On which side of the sphere the points are: where that is close, to the last bit
     let power = distance2 - r * r;
-    let margin = s.abs().dot(sight.error) * 2.0;
+    let margin = s.abs().dot(pyramid.error) * 2.0;
     let room = margin + (distance2 + r * r) * 1e-6;
-    let mut close = power.abs().simd_le(room).to_bitmask() & asked;
-    let mut inside = power.simd_lt(zero).to_bitmask() & asked & !close;
+    let mut close = power.abs().simd_le(room).to_bitmask() & lanes;
+    let mut inside = power.simd_lt(zero).to_bitmask() & lanes & !close;
     let mut on = 0;
     while close != 0 {
         let k = close.trailing_zeros() as usize;
@@ -564,76 +545,76 @@ fn sphere_between<S: Simd>(
         }
     }
     // Above whose horizon it rises, for any of the places around
-    let height = sight.horizon.dot(s);
+    let height = pyramid.horizon.dot(s);
     let slack = distance * SLACK + 4e-4 * r;
-    let around = sight.reach + sight.turn * (distance + sight.reach);
+    let around = pyramid.reach + pyramid.turn * (distance + pyramid.reach);
     let below = (-height).simd_gt(slack + r).to_bitmask();
     let below_all = (-height).simd_gt(slack + r + around).to_bitmask();
     // From its outside nothing of it is above the horizon, but by rounding
     let outer = on & height.simd_lt(zero).to_bitmask();
-    let within = (inside | on & !outer) & asked;
-    let outside = asked & !on & !inside;
+    let within = (inside | on & !outer) & lanes;
+    let outside = lanes & !on & !inside;
     if within != 0 {
         let mut all_in = within;
         let mut none_in = within;
-        let smaller = Shadow::cone(simd, s, r * (1.0 - 1e-6), &sight.ways);
-        let larger = Shadow::cone(simd, s, r * (1.0 + 1e-6), &sight.ways);
-        for [x, y] in sight.square() {
+        let smaller = Shadow::cone(simd, s, r * (1.0 - 1e-6), &pyramid.light_vectors);
+        let larger = Shadow::cone(simd, s, r * (1.0 + 1e-6), &pyramid.light_vectors);
+        for [x, y] in pyramid.square() {
             all_in &= smaller.holds(x, y).to_bitmask();
             none_in &= !larger.holds(x, y).to_bitmask();
         }
         // All of the light is outside only if the sphere does not reach through it
-        let from_center = sight.ways[0] - s;
-        none_in &= sight.normal.dot(from_center).abs().simd_gt(r * (1.0 + 1e-6)).to_bitmask();
+        let from_center = pyramid.light_vectors[0] - s;
+        none_in &= pyramid.normal.dot(from_center).abs().simd_gt(r * (1.0 + 1e-6)).to_bitmask();
         // What is hidden is the same from everywhere inside, and on a surface that bends as the sphere does
-        let deep = (r - distance).simd_gt(sight.reach * 2.0).to_bitmask();
-        let touches = on & (sight.turn * r).simd_lt(sight.reach * 0.5).to_bitmask();
-        let moving = within & (inside | touches) & !deep & sight.reach.simd_gt(zero).to_bitmask();
-        told.around = within;
-        told.hidden |= none_in;
-        told.firm |= none_in & !moving;
-        told.within = within & !all_in & !none_in;
+        let deep = (r - distance).simd_gt(pyramid.reach * 2.0).to_bitmask();
+        let touches = on & (pyramid.turn * r).simd_lt(pyramid.reach * 0.5).to_bitmask();
+        let moving = within & (inside | touches) & !deep & pyramid.reach.simd_gt(zero).to_bitmask();
+        test.around = within;
+        test.hidden |= none_in;
+        test.firm |= none_in & !moving;
+        test.within = within & !all_in & !none_in;
         // From outside it hides a light that is inside of it as well
-        let all_around = (r - distance).simd_gt(sight.reach).to_bitmask();
-        told.moving |= moving & !(all_in & all_around);
-        told.motion = simd.splat_f32x16(f32::INFINITY);
+        let all_around = (r - distance).simd_gt(pyramid.reach).to_bitmask();
+        test.moving |= moving & !(all_in & all_around);
+        test.motion = simd.splat_f32x16(f32::INFINITY);
     }
-    let [around, mut near] = sight.meets(s, distance, r, outside & !below_all);
+    let [around, mut near] = pyramid.meets(s, distance, r, outside & !below_all);
     if around == 0 {
-        return told;
+        return test;
     }
-    let toward = (distance - sight.reach).max(simd.splat_f32x16(r));
+    let toward = (distance - pyramid.reach).max(simd.splat_f32x16(r));
     let tangent = (toward * toward - r * r).max(zero).sqrt();
-    let motion = sight.motion(tangent);
-    told.motion = if told.moving != 0 {
-        let moving = fearless_simd::mask32x16::from_bitmask(simd, told.moving);
-        moving.select(told.motion, motion)
+    let motion = pyramid.motion(tangent);
+    test.motion = if test.moving != 0 {
+        let moving = fearless_simd::mask32x16::from_bitmask(simd, test.moving);
+        moving.select(test.motion, motion)
     } else {
         motion
     };
-    told.moving |= around & sight.reach.simd_gt(zero).to_bitmask();
+    test.moving |= around & pyramid.reach.simd_gt(zero).to_bitmask();
     near &= !below;
     if near == 0 {
-        return told;
+        return test;
     }
     // One convex thing hides all of the light if it hides its corners
-    let shadow = Shadow::cone(simd, s, r, &sight.ways);
-    let hidden = sight.hidden(&shadow, near);
-    told.hidden |= hidden;
-    told.outside = near & !hidden;
+    let shadow = Shadow::cone(simd, s, r, &pyramid.light_vectors);
+    let hidden = pyramid.hidden(&shadow, near);
+    test.hidden |= hidden;
+    test.outside = near & !hidden;
     // From everywhere around: ways to the corners pass its middle nearly as closely. From inside of it, more may be
     // seen
-    let patches = hidden & sight.reach.simd_gt(zero).to_bitmask();
-    told.firm |= hidden & !patches;
-    let mut patches = patches & (distance - r).simd_gt(sight.reach).to_bitmask();
+    let patches = hidden & pyramid.reach.simd_gt(zero).to_bitmask();
+    test.firm |= hidden & !patches;
+    let mut patches = patches & (distance - r).simd_gt(pyramid.reach).to_bitmask();
     while patches != 0 {
         let k = patches.trailing_zeros() as usize;
         patches &= patches - 1;
         let smaller = r - points[k].reach;
         if smaller > 0.0 {
-            let shadow = Shadow::cone(simd, s, smaller, &sight.ways);
-            told.firm |= sight.hidden(&shadow, 1 << k);
+            let shadow = Shadow::cone(simd, s, smaller, &pyramid.light_vectors);
+            test.firm |= pyramid.hidden(&shadow, 1 << k);
         }
     }
-    told
+    test
 }

@@ -1,28 +1,28 @@
-//! Area lights as they are integrated.
+//! Area lights in the form in which they are integrated.
 
 use std::f64::consts::PI;
 
 use arrayvec::ArrayVec;
 
 use super::batch::Exact;
-use super::fit::AreaWeight;
-use super::view::{FlatLight, FlatView, Outline};
+use super::cell::AreaWeight;
+use super::light_frame::{FlatLight, LightFrame, Outline};
 use crate::light::{Area, AreaShape};
 use crate::material::ShadingPoint;
 use crate::math::{DVec3, Vec3};
 
-/// Of a cube.
+/// Faces of a cube.
 const FACES: usize = 6;
 
-/// An area light, ready to be integrated.
+/// An area light.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Emitter {
     /// A rectangle or a disk.
     Flat(FlatLight),
-    /// A sphere. From any point outside it looks like the disk in which the cone around it touches it: the same
-    /// directions, and, where light weakens on its way, the same radiance in each.
+    /// A sphere. From a point outside it is replaced by the disk bounded by the circle in which its tangent cone
+    /// touches it: the same directions and, if the light is physical, the same radiance in each.
     Ball { center: DVec3, radius: f64, physical: bool, both_sides: bool },
-    /// What of a sphere a point inside of it sees through one face of a cube around itself, which stands beyond all of
+    /// The part of a sphere that a point inside sees through one face of a cube around the point, which is outside of
     /// the sphere: the same directions and radiance.
     Face { center: DVec3, radius: f64, physical: bool, face: usize },
 }
@@ -43,7 +43,7 @@ impl Emitter {
         }
     }
 
-    /// Whether light weakens with the square of the distance and the cosine at the light.
+    /// Whether irradiance falls with the square of the distance and the cosine at the light.
     pub fn is_physical(&self) -> bool {
         match self {
             Emitter::Flat(flat) => flat.physical,
@@ -51,7 +51,7 @@ impl Emitter {
         }
     }
 
-    /// What its places count for.
+    /// The weight of its places in the integral.
     pub fn falloff(&self) -> AreaWeight {
         match (self.outline(), self.is_physical()) {
             (Outline::Sphere, _) => AreaWeight::Sphere,
@@ -65,7 +65,7 @@ impl Emitter {
         }
     }
 
-    /// Corners of a box or a parallelogram around it.
+    /// Corners of its parallelogram, or of a bounding box.
     pub fn corners(&self) -> ArrayVec<DVec3, 8> {
         match self {
             Emitter::Flat(flat) => {
@@ -80,12 +80,12 @@ impl Emitter {
         }
     }
 
-    /// Whether `p` is inside of a ball that shines inwards: no flat light stands for it there.
+    /// Whether `p` is inside of a sphere that emits inwards: no flat light replaces it there.
     pub fn surrounds(&self, p: Vec3) -> bool {
         self.depth(p).is_some()
     }
 
-    /// How far `p` is from a ball that shines inwards, if it is inside of it.
+    /// The distance of `p` to the surface of a sphere that emits inwards, if `p` is inside.
     pub fn depth(&self, p: Vec3) -> Option<f32> {
         match self {
             Emitter::Flat(_) | Emitter::Face { .. } => None,
@@ -96,13 +96,13 @@ impl Emitter {
         }
     }
 
-    /// The distance of a point to it, or a little less; 0 where nothing emits towards the point.
+    /// Lower bound of the distance to a point, in metres; 0 where nothing emits towards the point.
     pub fn nearest(&self, point: &ShadingPoint) -> f32 {
-        let flat = || self.flat(point.p).map(|flat| FlatView::new(&flat, point).nearest());
+        let flat = || self.flat(point.p).map(|flat| LightFrame::new(&flat, point).nearest());
         self.depth(point.p).or_else(flat).unwrap_or(0.0)
     }
 
-    /// What of a ball that shines inwards points inside of it see, by the faces of a cube.
+    /// The six parts of a sphere that emits inwards, by the faces of a cube.
     pub fn faces(&self) -> Option<[Emitter; FACES]> {
         match *self {
             Emitter::Ball { center, radius, physical, both_sides: true } => {
@@ -112,7 +112,7 @@ impl Emitter {
         }
     }
 
-    /// Whether what it sends changes at once where a point passes its plane.
+    /// Whether its light is discontinuous across its plane.
     pub fn is_one_sided(&self) -> bool {
         match self {
             Emitter::Flat(flat) => flat.physical || !flat.both_sides,
@@ -120,7 +120,7 @@ impl Emitter {
         }
     }
 
-    /// Whether what it sends changes at once between some of these places: they lie on both sides of it.
+    /// Whether its light is discontinuous between some of these places: they lie on both sides of it.
     pub fn parts(&self, mut places: impl Iterator<Item = Vec3>) -> bool {
         let is_within = |p: Vec3| match self {
             Emitter::Flat(flat) => (p.as_dvec3() - flat.c).dot(flat.n.as_dvec3()) > 0.0,
@@ -133,7 +133,7 @@ impl Emitter {
         !is_even && places.any(|p| Some(is_within(p)) != first)
     }
 
-    /// What it fills of its square.
+    /// Its outline in its square.
     pub fn outline(&self) -> Outline {
         match self {
             Emitter::Flat(flat) => flat.outline,
@@ -143,7 +143,7 @@ impl Emitter {
         }
     }
 
-    /// The flat light that stands for it, seen from `p`; `None` if nothing emits towards `p`.
+    /// The flat light that replaces it for `p`; `None` if nothing emits towards `p`.
     pub fn flat(&self, p: Vec3) -> Option<FlatLight> {
         match self {
             Emitter::Flat(flat) => Some(*flat),

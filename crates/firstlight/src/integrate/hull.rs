@@ -1,9 +1,9 @@
-//! Convex solids in the way of a light, for sixteen points at once.
+//! Solids projected onto a light, for sixteen points at once.
 //!
-//! A solid is seen in a space of its own, in which it is a unit box, ball, disk or a frustum about z: lines stay lines
-//! there, so that nothing else changes. What a point sees of it is the hull of a few flat things: of a box, three
-//! faces; of a frustum, its ends and the band between the two lines in which planes through the point touch its mantle.
-//! A ring hides what is inside of its rim but not of its hole; a tube, what is in its hull but not in both of its ends.
+//! Each solid is projected in its own space, in which it is a unit box, ball, disk or a frustum about z: an affine
+//! map keeps lines. The silhouette of a solid is the hull of a few flat parts: three faces of a box; both ends of a
+//! frustum and the quadrilateral between the lines in which tangent planes through the point touch its mantle. A
+//! ring hides the inside of its rim less its hole; a tube hides its hull less the intersection of both ends.
 
 use fearless_simd::{f32x16, mask32x16, prelude::*};
 
@@ -13,22 +13,22 @@ use super::row::{FAR, Interval16, Quadratic16, edges};
 use crate::math::{DAffine3, DVec3, Vec3, Vec3x16};
 use crate::shape::Canonical;
 
-/// A solid that may stand in the way.
+/// A solid occluder.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct SolidOccluder {
-    /// Where its own space begins in the world, and the rows of the matrix that leads there.
+    /// The origin of its own space in the world, and the rows of the matrix from the world to it.
     center: Exact,
     rows: [Vec3; 3],
     pub kind: Canonical,
     /// Whether a part of the light may be inside.
-    touches: bool,
+    may_contain_light: bool,
 }
 
 impl SolidOccluder {
-    pub fn new(world_from_canonical: &DAffine3, kind: Canonical, touches: bool) -> SolidOccluder {
+    pub fn new(world_from_canonical: &DAffine3, kind: Canonical, may_contain_light: bool) -> SolidOccluder {
         let inverse = world_from_canonical.matrix3.inverse().transpose();
         let rows = [inverse.x_axis, inverse.y_axis, inverse.z_axis].map(|row: DVec3| row.as_vec3());
-        SolidOccluder { center: Exact::new(world_from_canonical.translation), rows, kind, touches }
+        SolidOccluder { center: Exact::new(world_from_canonical.translation), rows, kind, may_contain_light }
     }
 
     #[inline(always)]
@@ -41,7 +41,7 @@ impl SolidOccluder {
         }
     }
 
-    /// The ways to its middle and those of the light in its own space, from `p`.
+    /// The vectors from `p` to the solid's middle and to the light, in the solid's own space.
     #[inline(always)]
     pub fn seen_from<S: Simd>(&self, simd: S, p: Vec3x16<S>, l: &[Vec3x16<S>; 3]) -> (Vec3x16<S>, [Vec3x16<S>; 3]) {
         let to = self.local(simd, self.center.seen_from(simd, p));
@@ -49,7 +49,7 @@ impl SolidOccluder {
     }
 }
 
-/// A disk as sixteen points see it: inside of its cone, and behind its plane.
+/// A disk projected from sixteen points: inside of its cone, and behind its plane.
 #[derive(Clone, Copy)]
 pub(crate) struct Rim<S: Simd> {
     pub quadratic: Quadratic16<S>,
@@ -58,7 +58,7 @@ pub(crate) struct Rim<S: Simd> {
 }
 
 impl<S: Simd> Rim<S> {
-    /// Of a disk across z of radius `r`, `to` its middle.
+    /// Of a disk across z of radius `r` with its middle at `to`.
     #[inline(always)]
     fn new(to: Vec3x16<S>, r: f32, l: &[Vec3x16<S>; 3]) -> Rim<S> {
         let simd = to.x.token();
@@ -102,11 +102,11 @@ impl<S: Simd> Rim<S> {
     }
 }
 
-/// The most faces and rims.
+/// The most faces and rims of a silhouette.
 const FACES: usize = 3;
 const RIMS: usize = 2;
 
-/// A convex solid as sixteen points see it from outside.
+/// The silhouette of a solid, from sixteen points outside.
 #[derive(Clone, Copy)]
 pub(crate) struct Hull<S: Simd> {
     pub faces: [[Linear16<S>; 5]; FACES],
@@ -116,12 +116,12 @@ pub(crate) struct Hull<S: Simd> {
     inside: Option<Inside<S>>,
 }
 
-/// The part of a light's plane that is inside of a solid.
+/// The intersection of a light's plane with a solid.
 #[derive(Clone, Copy)]
 struct Inside<S: Simd> {
-    /// All of them have to be 0 or more.
+    /// 0 or more inside.
     lines: [Linear16<S>; 6],
-    /// The same of what is inside of the mantle, and in front of the apex.
+    /// The quadratic of the mantle, and the linear function that is positive before the apex.
     mantle: Option<(Quadratic16<S>, Linear16<S>)>,
 }
 
@@ -185,19 +185,19 @@ impl<S: Simd> Inside<S> {
     }
 }
 
-/// What of a hull light passes.
+/// The part of a hull that does not hide.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Hole {
     None,
     /// Inside of the second rim, which is not part of the hull.
     Ring,
-    /// Inside of both.
+    /// Inside of both rims.
     Tube,
 }
 
 impl<S: Simd> Hull<S> {
-    /// `to` is the way to the middle of its own space, `l` are the light's in it. Not of a ball. Not
-    /// inlined, as what it is asked is not: one copy of each for each instruction set is enough.
+    /// `to`: the vector to the middle in the solid's space, `l`: those of the light. Not of a ball. Not inlined: one
+    /// copy for each instruction set is enough.
     #[inline(never)]
     pub fn new(solid: &SolidOccluder, to: Vec3x16<S>, l: &[Vec3x16<S>; 3]) -> Hull<S> {
         to.x.token().vectorize(
@@ -214,7 +214,7 @@ impl<S: Simd> Hull<S> {
         let empty = Rim { quadratic: Quadratic16::square(&nothing), ahead: nothing, plane: nothing };
         let mut hull =
             Hull { faces: [[nothing; 5]; FACES], rims: [empty; RIMS], count: [0; 2], hole: Hole::None, inside: None };
-        if solid.touches {
+        if solid.may_contain_light {
             hull.inside = Inside::new(solid.kind, to, l);
         }
         match solid.kind {
@@ -276,7 +276,7 @@ impl<S: Simd> Hull<S> {
         hull
     }
 
-    /// What is hidden of sixteen rows: before a hole, and after it.
+    /// The hidden intervals of sixteen rows: before a hole, and after it.
     #[inline(never)]
     pub fn hidden(&self, simd: S, y: f32x16<S>) -> [Interval16<S>; 2] {
         simd.vectorize(

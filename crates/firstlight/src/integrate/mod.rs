@@ -1,27 +1,27 @@
-//! Light, integrated: what arrives from an area light at a point, to a stated error, without a fixed set of samples.
+//! Integration of area lights: irradiance moments from one light at many points, to an error estimate, without a
+//! fixed set of samples.
 //!
-//! Before it stands visibility, which says what may be in the way; after it the film. Points are asked in batches of
-//! sixteen ([`evaluate`]), whatever spheres, flat things, solids and tori stand between. For anything else the renderer
-//! asks points of the light for all rays of a pixel together; where those do not tell, cells that are cut where shadows
-//! have their edges ([`cells`], [`mask`]).
+//! [`visibility`](crate::visibility) gathers the occluders in trees before it; [`render`](crate::render) adds the
+//! result to pixels. Occluders here are spheres, parallelograms, solids and triangles. Lights behind anything else
+//! have the result [`Illumination::Unknown`], and the renderer samples them.
 
 mod batch;
 mod breaks;
+mod cell;
 mod classify;
 mod emitter;
-mod evaluate;
-mod fit;
-mod grade;
 mod hull;
+mod integrator;
+mod light_frame;
 mod occluder;
 mod panels;
 mod row;
+mod subdivide;
 mod tolerance;
-mod view;
 
-pub(crate) use classify::Obstacles;
+pub(crate) use classify::LightOccluders;
 pub(crate) use emitter::Emitter;
-pub(crate) use evaluate::{Arrived, Asked, Evaluator, Illumination};
+pub(crate) use integrator::{AreaLightIntegrator, Illumination, LightIntegral, LightTask};
 pub(crate) use tolerance::{COSTS, TOLERANCE};
 
 #[cfg(test)]

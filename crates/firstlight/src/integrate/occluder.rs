@@ -1,9 +1,9 @@
-//! Things in the way of a light: what they hide of it, row by row, for sixteen points at once.
+//! Occluders projected onto a light, row by row, for sixteen points at once.
 //!
-//! What a point sees of a convex thing on a light's plane is convex, so a row of the light has one hidden interval at
-//! most, and its ends are roots of a linear function or of a quadratic. What has a hole hides two.
+//! The projection of a convex occluder is convex, so it hides at most one interval of a row, whose ends are roots
+//! of a linear function or of a quadratic. An occluder with a hole hides two.
 //!
-//! Source of the quadratic of a sphere: the cone that touches it, r^2 |l|^2 - |l x s|^2 >= 0, as in Heidrich, Brabec,
+//! Source of the quadratic of a sphere: the tangent cone, r^2 |l|^2 - |l x s|^2 >= 0, as in Heidrich, Brabec,
 //! Seidel, "Soft Shadow Maps for Linear Lights", 2000, for one row; the rest is ours.
 
 use fearless_simd::{f32x16, mask32x16, prelude::*};
@@ -15,39 +15,39 @@ use super::row::{FAR, Interval16, Quadratic16, edges};
 use crate::math::Vec3x16;
 use crate::shape::Canonical;
 
-/// A thing that may stand in the way.
+/// An occluder in world space, as it is projected.
 #[derive(Clone, Copy, Debug)]
 pub(crate) enum Occluder {
     Sphere {
         center: Exact,
         radius: f32,
     },
-    /// A parallelogram by its corners, around.
+    /// A parallelogram, by its corners in order.
     Flat {
         corners: [Exact; 4],
     },
     Solid(SolidOccluder),
 }
 
-/// The ways to four corners from sixteen points.
+/// The vectors from sixteen points to four corners.
 #[inline(always)]
 pub(crate) fn corners_from<S: Simd>(simd: S, [a, b, c, d]: &[Exact; 4], p: Vec3x16<S>) -> [Vec3x16<S>; 4] {
     [a.seen_from(simd, p), b.seen_from(simd, p), c.seen_from(simd, p), d.seen_from(simd, p)]
 }
 
-/// A thing as sixteen points see it on a light.
+/// An occluder projected onto a light from sixteen points.
 pub(crate) enum Shadow<S: Simd> {
     /// Of a sphere.
     Cone {
         quadratic: Quadratic16<S>,
         ahead: Linear16<S>,
-        /// Where the light's plane cuts the sphere of any of the points: what is behind the light's places, and what is
-        /// inside of the sphere; and whose it is.
+        /// Where the light's plane intersects the sphere of any of the points: the places of the light before the
+        /// sphere's polar plane, those inside of the sphere; and the lanes concerned.
         cut: Option<([Quadratic16<S>; 2], mask32x16<S>)>,
-        /// Inside of the sphere, for points within it.
+        /// Positive inside of the sphere, for points within it.
         inside: Quadratic16<S>,
     },
-    /// Of a flat thing: above 0 on all of these lines. The first is that of its plane.
+    /// Of a polygon: positive on all of these lines, the first of which is that of its plane.
     Edges {
         lines: [Linear16<S>; 5],
     },
@@ -55,7 +55,7 @@ pub(crate) enum Shadow<S: Simd> {
 }
 
 impl<S: Simd> Shadow<S> {
-    /// What `occluder` does to lights with these ways, from `p`.
+    /// The projection of `occluder` from `p` onto lights with the vectors `l`.
     #[inline(always)]
     pub fn new(simd: S, occluder: &Occluder, p: Vec3x16<S>, l: &[Vec3x16<S>; 3]) -> Shadow<S> {
         match occluder {
@@ -71,7 +71,7 @@ impl<S: Simd> Shadow<S> {
         }
     }
 
-    /// Of a sphere, `s` the way to its middle. Not inlined: one copy for each instruction set is enough.
+    /// Of a sphere, `s` the vector to its middle. Not inlined: one copy for each instruction set is enough.
     #[inline(never)]
     pub fn cone(simd: S, s: Vec3x16<S>, r: f32, l: &[Vec3x16<S>; 3]) -> Shadow<S> {
         simd.vectorize(
@@ -121,7 +121,7 @@ impl<S: Simd> Shadow<S> {
         Shadow::Cone { quadratic, ahead, cut, inside }
     }
 
-    /// What is hidden of sixteen rows, seen from outside: one interval, or two around a hole.
+    /// The hidden intervals of sixteen rows, for points outside: one, or two around a hole.
     #[inline(always)]
     pub fn hidden(&self, simd: S, y: f32x16<S>) -> [Interval16<S>; 2] {
         match self {
@@ -130,7 +130,7 @@ impl<S: Simd> Shadow<S> {
         }
     }
 
-    /// Whether what is hidden may have a hole.
+    /// Whether rows may have two hidden intervals.
     pub fn has_hole(&self) -> bool {
         match self {
             Shadow::Hull(hull) => hull.has_hole(),
@@ -138,7 +138,7 @@ impl<S: Simd> Shadow<S> {
         }
     }
 
-    /// What a convex thing hides of sixteen rows.
+    /// The interval of sixteen rows that a convex occluder hides.
     #[inline(always)]
     fn interval(&self, simd: S, y: f32x16<S>) -> Interval16<S> {
         match self {
@@ -169,7 +169,7 @@ impl<S: Simd> Shadow<S> {
         }
     }
 
-    /// What is seen of sixteen rows from within a sphere.
+    /// The visible interval of sixteen rows, for points within a sphere.
     #[inline(always)]
     pub fn within(&self, simd: S, y: f32x16<S>) -> Interval16<S> {
         let far = simd.splat_f32x16(FAR);
@@ -182,7 +182,7 @@ impl<S: Simd> Shadow<S> {
         }
     }
 
-    /// Whether a place of the light is hidden, seen from outside.
+    /// Whether a place of the light is hidden, for points outside.
     #[inline(always)]
     pub fn hides(&self, x: f32x16<S>, y: f32x16<S>) -> mask32x16<S> {
         let zero = x.token().splat_f32x16(0.0);
@@ -207,7 +207,7 @@ impl<S: Simd> Shadow<S> {
         }
     }
 
-    /// Of a disk light, counted from (`x`, `y`): x^2 + y^2 <= 1.
+    /// The quadratic of a disk light, with coordinates counted from `origin`: x^2 + y^2 <= 1.
     #[inline(always)]
     pub fn rim(origin: [f32x16<S>; 2]) -> Quadratic16<S> {
         let [x, y] = origin;
@@ -216,7 +216,7 @@ impl<S: Simd> Shadow<S> {
         Quadratic16 { c: simd.splat_f32x16(1.0) - (x * x + y * y), x: -x, y: -y, xx: minus, xy: zero, yy: minus }
     }
 
-    /// Whether a place of the light is inside of a sphere; of flat things nothing is.
+    /// Whether a place of the light is inside of a sphere; false for other occluders.
     #[inline(always)]
     pub fn holds(&self, x: f32x16<S>, y: f32x16<S>) -> mask32x16<S> {
         let zero = x.token().splat_f32x16(0.0);
@@ -226,7 +226,8 @@ impl<S: Simd> Shadow<S> {
         }
     }
 
-    /// Tells the rows at which the hidden part begins, ends, has a corner or meets the sides of a cell; some in vain.
+    /// Adds the rows at which the projection begins, ends, has a corner or meets the sides of a cell, and possibly
+    /// others.
     #[inline(always)]
     pub fn breaks(&self, breaks: &mut Breaks<S>) {
         match self {

@@ -1,27 +1,28 @@
-//! What is seen of a light's cells, row by row, for sixteen panels at once.
+//! The visible part of a light's cells, integrated row by row, for sixteen panels at once.
 //!
-//! A panel is a range of rows of one cell on which the outline of each occluder changes smoothly; where the outlines of
-//! two cross, two rules differ, and the panel is halved. On each of seven rows, the nodes of a Kronrod rule, the
-//! intervals that occluders hide are united, and the antiderivative of the cell's polynomial is summed over the ends of
-//! what is left: nothing is shaded again. The Gauss rule of three inside says how far the panel can be wrong; and where
-//! all rows are hidden, but overlap less and less towards one of them, what a gap between it and the next may send.
-//! Where a panel ends, outlines begin as roots do, so rows are spread by y^2 (3 - 2 y).
+//! A panel is a range of rows of one cell between two break points; where the outlines of two occluders cross
+//! within it, the rules of an embedded pair differ, and the panel is halved. On each of seven rows, the nodes of a
+//! Kronrod rule, the hidden intervals are united, and the antiderivative of the cell's polynomial is summed over
+//! the ends of the remaining ones. The embedded Gauss rule of three nodes gives the error estimate. Where all rows
+//! are hidden, but their intervals overlap less towards one row, the radiance through a possible gap between two
+//! rows is added to it. Outlines begin and end at break points as square roots do, so the rows are transformed by
+//! y^2 (3 - 2 y).
 //!
-//! Source of the rule: Kronrod, "Nodes and Weights of Quadrature Formulas", 1965; of the spread: Davis, Rabinowitz,
-//! "Methods of Numerical Integration", 1984, section 2.12.
+//! Source of the rule: Kronrod, "Nodes and Weights of Quadrature Formulas", 1965; of the transformation: Davis,
+//! Rabinowitz, "Methods of Numerical Integration", 1984, section 2.12.
 
 use arrayvec::ArrayVec;
 use fearless_simd::{f32x16, mask32x16, prelude::*};
 
-use super::batch::{LaneNumbers, Members, ViewBlock, ViewNumber, Views, ways};
+use super::batch::{FrameLanes, FrameNumber, LaneNumbers, LightFrame16, Members, light_vectors};
 use super::breaks::{Breaks, RoundSides};
-use super::fit::{Cell, CutBlock, MOMENTS, sides};
+use super::cell::{Cell, MOMENTS, PartialCells, sides};
+use super::light_frame::Outline;
 use super::occluder::{Occluder, Shadow};
 use super::row::{FAR, Interval16};
-use super::view::Outline;
 use crate::math::{LANES, Vec3x16, asin, sin_cos};
 
-/// Rows of a panel: the Kronrod rule of seven on [0, 1], spread.
+/// Rows of a panel: the Kronrod rule of seven nodes.
 const ROWS: usize = 7;
 const KRONROD: [(f64, f64, f64); 4] = [
     // Node, weight, weight in the Gauss rule of three
@@ -31,7 +32,7 @@ const KRONROD: [(f64, f64, f64); 4] = [
     (0.0, 0.450_916_538_658_474_1, 0.888_888_888_888_889),
 ];
 
-/// Where on a panel a row lies, 0 to 1, and what it counts in both rules.
+/// The transformed place of each row in a panel, 0 to 1, and its weights in both rules.
 const SPREAD: [[f32; 3]; ROWS] = {
     let mut rows = [[0.0; 3]; ROWS];
     let mut i = 0;
@@ -45,26 +46,27 @@ const SPREAD: [[f32; 3]; ROWS] = {
     rows
 };
 
-/// Rows of one cell.
+/// A range of rows of one partially visible cell.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Panel {
-    /// Of the cells that are cut, and the point that this is seen from.
+    /// Indices of the cell and of the point.
     pub cell: u32,
     pub point: u32,
     pub y: [f32; 2],
-    /// How often it was halved.
+    /// The number of halvings.
     pub depth: u32,
 }
 
-/// What of a light's occluders matters to one point: bits of those it sees from outside, and of spheres it is in.
+/// The occluders that may hide a part of a light from one point, as bits: those the point is outside of, and spheres
+/// that it is in.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(crate) struct Between {
+pub(crate) struct OccluderMask {
     pub outside: u64,
     pub within: u64,
 }
 
-impl Between {
-    /// Their numbers.
+impl OccluderMask {
+    /// The indices of the occluders.
     #[inline(always)]
     fn occluders(self) -> impl Iterator<Item = usize> {
         let mut any = self.outside | self.within;
@@ -76,17 +78,17 @@ impl Between {
     }
 }
 
-/// A light and what is in the way, for all that asks.
+/// A light's outline and its occluders, for all points.
 #[derive(Clone, Copy)]
-pub(crate) struct Blocked<'a> {
-    /// In lists, and of trees: counted together.
+pub(crate) struct OccludedLight<'a> {
+    /// Listed occluders and those in trees, indexed consecutively.
     pub occluders: [&'a [Occluder]; 2],
     pub outline: Outline,
     /// Point by point.
-    pub between: &'a [Between],
+    pub masks: &'a [OccluderMask],
 }
 
-impl<'a> Blocked<'a> {
+impl<'a> OccludedLight<'a> {
     #[inline(always)]
     fn occluder(&self, number: usize) -> &'a Occluder {
         let [listed, near] = self.occluders;
@@ -94,8 +96,7 @@ impl<'a> Blocked<'a> {
     }
 }
 
-/// What sixteen panels send, how far both rules differ and gaps may be missed, and how much of the light's square is
-/// seen.
+/// Integrals over sixteen panels, their error estimates, and the visible part of the light's square in each.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct PanelSums {
     pub sums: [LaneNumbers; MOMENTS],
@@ -103,61 +104,66 @@ pub(crate) struct PanelSums {
     pub seen: LaneNumbers,
 }
 
-/// The most intervals of a row that may be hidden from one point: one for each thing, two if it has a hole.
+/// The most hidden intervals of a row: one for each occluder, two if it has a hole.
 pub(crate) const MAX_INTERVALS: usize = 48;
 
-/// What may be in the way of a batch: the occluders that any of its points sees, and for which of them.
+/// The occluders of sixteen panels or cells, with the masks of their points.
 struct Batch<'a, S: Simd> {
-    blocked: &'a Blocked<'a>,
-    between: [Between; LANES],
+    light: &'a OccludedLight<'a>,
+    masks: [OccluderMask; LANES],
     p: Vec3x16<S>,
     l: [Vec3x16<S>; 3],
 }
 
 impl<'a, S: Simd> Batch<'a, S> {
     #[inline(always)]
-    fn new(simd: S, blocked: &'a Blocked<'a>, members: &Members<ViewBlock>, point: impl Fn(usize) -> u32) -> Self {
-        use ViewNumber::*;
-        let mut between = [Between::default(); LANES];
-        for (k, between) in between.iter_mut().enumerate() {
-            *between = blocked.between[point(k) as usize];
+    fn new(
+        simd: S,
+        light: &'a OccludedLight<'a>,
+        members: &Members<LightFrame16>,
+        point: impl Fn(usize) -> u32,
+    ) -> Self {
+        use FrameNumber::*;
+        let mut masks = [OccluderMask::default(); LANES];
+        for (k, mask) in masks.iter_mut().enumerate() {
+            *mask = light.masks[point(k) as usize];
         }
-        Batch { blocked, between, p: members.vectors(simd, [Px, Py, Pz]), l: ways(simd, members) }
+        Batch { light, masks, p: members.vectors(simd, [Px, Py, Pz]), l: light_vectors(simd, members) }
     }
 
-    /// Which of the occluders any point sees.
+    /// The indices of the occluders of any of the points.
     #[inline(always)]
     fn occluders(&self) -> impl Iterator<Item = usize> + use<S> {
-        let mut any = Between::default();
-        for between in &self.between {
-            any.outside |= between.outside;
-            any.within |= between.within;
+        let mut any = OccluderMask::default();
+        for mask in &self.masks {
+            any.outside |= mask.outside;
+            any.within |= mask.within;
         }
         any.occluders()
     }
 
-    /// One of them as they see it, and who sees it from outside and from within.
+    /// One occluder projected onto the light, and the lanes of points outside of it and within.
     #[inline(always)]
     fn shadow(&self, simd: S, occluder: usize) -> (Shadow<S>, mask32x16<S>, mask32x16<S>) {
         let (mut outside, mut within) = (0, 0);
-        for (k, between) in self.between.iter().enumerate() {
-            outside |= (between.outside >> occluder & 1) << k;
-            within |= (between.within >> occluder & 1) << k;
+        for (k, mask) in self.masks.iter().enumerate() {
+            outside |= (mask.outside >> occluder & 1) << k;
+            within |= (mask.within >> occluder & 1) << k;
         }
         (
-            Shadow::new(simd, self.blocked.occluder(occluder), self.p, &self.l),
+            Shadow::new(simd, self.light.occluder(occluder), self.p, &self.l),
             mask32x16::from_bitmask(simd, outside),
             mask32x16::from_bitmask(simd, within),
         )
     }
 }
 
-/// The panels of up to sixteen cells: they end where something begins, ends or has a corner. `spare` is memory.
+/// Splits up to sixteen cells into panels at their break points. `spare` is a buffer.
 #[inline(never)]
-pub(crate) fn cut<S: Simd>(
+pub(crate) fn split_panels<S: Simd>(
     simd: S,
-    blocked: &Blocked,
-    members: &Members<ViewBlock>,
+    light: &OccludedLight,
+    members: &Members<LightFrame16>,
     cells: &[Cell],
     first: u32,
     spare: &mut Vec<LaneNumbers>,
@@ -166,7 +172,7 @@ pub(crate) fn cut<S: Simd>(
     spare.clear();
     simd.vectorize(
         #[inline(always)]
-        || breaks(simd, blocked, members, cells, spare),
+        || breaks(simd, light, members, cells, spare),
     );
     for (k, cell) in cells.iter().enumerate() {
         let least = (cell.y[1] - cell.y[0]) * LEAST;
@@ -188,16 +194,16 @@ pub(crate) fn cut<S: Simd>(
 #[inline(always)]
 fn breaks<S: Simd>(
     simd: S,
-    blocked: &Blocked,
-    members: &Members<ViewBlock>,
+    light: &OccludedLight,
+    members: &Members<LightFrame16>,
     cells: &[Cell],
     rows: &mut Vec<LaneNumbers>,
 ) {
-    use ViewNumber::*;
+    use FrameNumber::*;
     let [x0, x1, ..] = sides(cells).map(|side| f32x16::simd_from(simd, side));
     let x = [x0, x1];
     let zero = simd.splat_f32x16(0.0);
-    let (x, round) = match blocked.outline {
+    let (x, round) = match light.outline {
         Outline::Parallelogram => (x, None),
         Outline::Disk => {
             let origin = [members.lanes(simd, OriginX), members.lanes(simd, OriginY)];
@@ -208,8 +214,8 @@ fn breaks<S: Simd>(
             ([width[0].min(zero), width[1].max(zero)], Some(RoundSides { width, origin: [zero; 2] }))
         }
     };
-    let is_straight = blocked.outline != Outline::Sphere;
-    let batch = Batch::new(simd, blocked, members, |k| cells[k.min(cells.len() - 1)].point);
+    let is_straight = light.outline != Outline::Sphere;
+    let batch = Batch::new(simd, light, members, |k| cells[k.min(cells.len() - 1)].point);
     for occluder in batch.occluders() {
         let (shadow, outside, within) = batch.shadow(simd, occluder);
         let mut breaks = Breaks { x, is_straight, round, of: outside | within, rows };
@@ -219,12 +225,12 @@ fn breaks<S: Simd>(
     let mut breaks = Breaks { x, is_straight, round, of: all, rows };
     breaks.line(&members.linear(simd, [CosC, CosX, CosY]));
     breaks.line(&members.linear(simd, [HorizonC, HorizonX, HorizonY]));
-    if blocked.outline == Outline::Disk {
+    if light.outline == Outline::Disk {
         let origin = [members.lanes(simd, OriginX), members.lanes(simd, OriginY)];
         breaks.round = None;
         breaks.quadratic(&Shadow::rim(origin), all);
     }
-    if blocked.outline == Outline::Sphere {
+    if light.outline == Outline::Sphere {
         for row in rows.iter_mut() {
             *row = asin(f32x16::simd_from(simd, *row)).to_array();
         }
@@ -233,7 +239,7 @@ fn breaks<S: Simd>(
 
 /// The most panels of a new cell.
 const MAX_PANELS: usize = 48;
-/// Panels shorter than this part of their cell are not worth their rows.
+/// As a part of the cell: panels that are shorter are joined to the next.
 const LEAST: f32 = 1e-4;
 
 #[inline(always)]
@@ -241,28 +247,28 @@ fn antiderivative<S: Simd>([a, b, c, d, e]: &[f32x16<S>; 5], u: f32x16<S>) -> f3
     u * (*a + u * (*b + u * (*c + u * (*d + u * *e))))
 }
 
-/// What up to sixteen panels send. To be called within `vectorize`.
+/// Integrates up to sixteen panels. To be called within `vectorize`.
 #[inline(always)]
-pub(crate) fn rows<S: Simd>(
+pub(crate) fn integrate_rows<S: Simd>(
     simd: S,
-    blocked: &Blocked,
-    members: &Members<ViewBlock>,
-    cells: &Members<CutBlock>,
+    light: &OccludedLight,
+    members: &Members<LightFrame16>,
+    cells: &Members<PartialCells>,
     panels: &[Panel],
     moments: usize,
 ) -> PanelSums {
-    use ViewNumber::*;
+    use FrameNumber::*;
     let splat = |v: f32| simd.splat_f32x16(v);
     let end = |end: usize| std::array::from_fn::<f32, LANES, _>(|k| panels[k.min(panels.len() - 1)].y[end]);
     let [from, to] = [f32x16::simd_from(simd, end(0)), f32x16::simd_from(simd, end(1))];
     let (zero, one, far) = (splat(0.0), splat(1.0), splat(FAR));
     let [x0, x1, y0, y1] = [0, 1, 2, 3].map(
         #[inline(always)]
-        |side| cells.number(simd, CutBlock::SIDES[side]),
+        |side| cells.number(simd, PartialCells::SIDES[side]),
     );
     let (xm, xh) = ((x0 + x1) * 0.5, (x1 - x0) * 0.5);
     let (ym, yh) = ((y0 + y1) * 0.5, (y1 - y0) * 0.5);
-    let batch = Batch::new(simd, blocked, members, |k| panels[k.min(panels.len() - 1)].point);
+    let batch = Batch::new(simd, light, members, |k| panels[k.min(panels.len() - 1)].point);
     let cos = members.linear(simd, [CosC, CosX, CosY]);
     let horizon = members.linear(simd, [HorizonC, HorizonX, HorizonY]);
     let origin = [members.lanes(simd, OriginX), members.lanes(simd, OriginY)];
@@ -271,12 +277,12 @@ pub(crate) fn rows<S: Simd>(
     for (moment, powers) in powers.iter_mut().enumerate().take(moments) {
         for (x, powers) in powers.iter_mut().enumerate() {
             for (y, power) in powers.iter_mut().enumerate() {
-                *power = cells.number(simd, CutBlock::power(moment, x, y));
+                *power = cells.number(simd, PartialCells::power(moment, x, y));
             }
         }
     }
-    let is_sphere = blocked.outline == Outline::Sphere;
-    // Where each row lies on the light's plane, and half of how long it is, if that differs
+    let is_sphere = light.outline == Outline::Sphere;
+    // The y of each row, and on a sphere the half length of its parallel
     let (mut y_of, mut wide) = ([zero; ROWS], [one; ROWS]);
     for (row, [place, ..]) in SPREAD.into_iter().enumerate() {
         y_of[row] = (to - from) * place + from;
@@ -285,7 +291,7 @@ pub(crate) fn rows<S: Simd>(
         }
     }
     let [west, east] = if is_sphere { [sin_cos(x0).0, sin_cos(x1).0] } else { [x0, x1] };
-    // What of each row is above the horizon, and in the light
+    // Clip each row to the horizons and to the light's outline
     let mut open = [Interval16 { from: west, to: east }; ROWS];
     for (row, all) in open.iter_mut().enumerate() {
         let y = y_of[row];
@@ -294,14 +300,14 @@ pub(crate) fn rows<S: Simd>(
         }
         all.clip(y * cos.y + cos.c, cos.x);
         all.clip(y * horizon.y + horizon.c, horizon.x);
-        if blocked.outline == Outline::Disk {
+        if light.outline == Outline::Disk {
             let across = y + origin[1];
             let reach = (1.0 - across * across).max(zero).sqrt();
             all.from = all.from.max(-reach - origin[0]);
             all.to = all.to.min(reach - origin[0]);
         }
     }
-    // What is hidden of them, sorted by where it begins
+    // The hidden intervals of each row, sorted by where they begin
     let mut hidden: [ArrayVec<Interval16<S>, MAX_INTERVALS>; ROWS] = std::array::from_fn(|_| ArrayVec::new());
     for occluder in batch.occluders() {
         let (shadow, outside, within) = batch.shadow(simd, occluder);
@@ -328,7 +334,7 @@ pub(crate) fn rows<S: Simd>(
                         interval.from = swap.select(f, interval.from);
                         interval.to = swap.select(t, interval.to);
                     }
-                    // What is last begins last: so none has more than there may be between the light and one point
+                    // Empty intervals come last, so that no lane has more than its point has occluders
                     if interval.from.simd_lt(far).any_true() && !hidden[row].is_full() {
                         hidden[row].push(interval);
                     }
@@ -340,7 +346,7 @@ pub(crate) fn rows<S: Simd>(
     let mut coarse = [zero; MOMENTS];
     let mut seen = zero;
     let inverse = 1.0 / xh;
-    // How wide the widest gap of each row is, below 0 where what hides the row overlaps; and what a unit of it sends
+    // The widest gap of each row, negative where hidden intervals overlap; and the radiance of a unit of it
     let mut gap = [-far; ROWS];
     let mut radiant = [[zero; MOMENTS]; ROWS];
     for (row_of, ((all, hidden), [place, weight, inner])) in open.iter().zip(&hidden).zip(SPREAD).enumerate() {
@@ -358,7 +364,7 @@ pub(crate) fn rows<S: Simd>(
         let mut length = zero;
         let mut begin = all.from;
         for k in 0..=hidden.len() {
-            // Up to the next thing that hides, or to the end
+            // Up to the next hidden interval, or to the end
             let (end, next) = match hidden.get(k) {
                 Some(interval) => (interval.from.min(all.to), begin.max(interval.to)),
                 None => (all.to, begin),
@@ -369,7 +375,7 @@ pub(crate) fn rows<S: Simd>(
             if is_sphere {
                 (first, last) = (asin(begin / wide[row_of]), asin(end / wide[row_of]));
             }
-            // On nothing, both ends are the same
+            // Both ends are equal where nothing is left
             let from = ((first - xm) * inverse).max(-one).min(one);
             let to = is_there.select(((last - xm) * inverse).max(-one).min(one), from);
             for moment in 0..moments {
@@ -385,7 +391,7 @@ pub(crate) fn rows<S: Simd>(
         }
         seen += length * weight;
     }
-    // Gaps that open and close between rows, neither of which sees them
+    // Gaps that open and close between two rows
     let mut missed = [zero; MOMENTS];
     for row in 1..ROWS - 1 {
         let rises = [gap[row] - gap[row - 1], gap[row] - gap[row + 1]];
@@ -395,7 +401,7 @@ pub(crate) fn rows<S: Simd>(
             missed[moment] += radiant[row][moment] * peak;
         }
     }
-    // Rows count as much as the panel is a part of the cell, which is 2 wide in its own coordinates
+    // A cell is 2 high in its own coordinates
     let share = (to - from) / yh;
     let mut result = PanelSums::default();
     for moment in 0..moments {

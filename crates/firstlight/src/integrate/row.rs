@@ -1,21 +1,21 @@
-//! Quantities along the rows of a light, for sixteen points at once: intervals, quadratics and where they are 0.
+//! Intervals, quadratic forms and their roots along the rows of a light, for sixteen points at once.
 
 use fearless_simd::{f32x16, mask32x16, prelude::*};
 
 use super::batch::Linear16;
 use crate::math::Vec3x16;
 
-/// An interval of x on each of sixteen rows; empty where it ends before it begins.
+/// An interval of x on each of sixteen rows; empty where `to` is less than `from`.
 #[derive(Clone, Copy)]
 pub(crate) struct Interval16<S: Simd> {
     pub from: f32x16<S>,
     pub to: f32x16<S>,
 }
 
-/// Farther than any x that is asked about.
+/// Beyond any x of a light.
 pub(crate) const FAR: f32 = 1e30;
 
-/// Slopes below this are none: their reciprocals have no bound.
+/// Slopes below this count as 0: their reciprocals overflow.
 const FLAT: f32 = 1e-30;
 
 impl<S: Simd> Interval16<S> {
@@ -24,8 +24,8 @@ impl<S: Simd> Interval16<S> {
         Interval16 { from: simd.splat_f32x16(FAR), to: simd.splat_f32x16(-FAR) }
     }
 
-    /// The hull of two intervals, those aside that are as good as empty: rounding makes such where a rim is seen edge
-    /// on, far from all else.
+    /// The hull of two intervals. Nearly empty intervals of `other` are left out: rounding makes such where a rim is
+    /// seen edge on.
     #[inline(always)]
     pub fn join(&mut self, other: &Self) {
         let is_there = (other.to - other.from).simd_gt((other.from.abs() + other.to.abs()) * 1e-3);
@@ -38,7 +38,7 @@ impl<S: Simd> Interval16<S> {
         Interval16 { from: simd.splat_f32x16(-FAR), to: simd.splat_f32x16(FAR) }
     }
 
-    /// What is left where `slope` x + `c` >= 0.
+    /// Clips the interval to where `slope` x + `c` >= 0.
     #[inline(always)]
     pub fn clip(&mut self, c: f32x16<S>, slope: f32x16<S>) {
         let simd = c.token();
@@ -52,7 +52,7 @@ impl<S: Simd> Interval16<S> {
     }
 }
 
-/// c + 2 (x X + y Y) + x^2 XX + 2 x y XY + y^2 YY, in lanes.
+/// The quadratic form c + 2 (x X + y Y) + x^2 XX + 2 x y XY + y^2 YY, in lanes.
 #[derive(Clone, Copy)]
 pub(crate) struct Quadratic16<S: Simd> {
     pub(super) c: f32x16<S>,
@@ -63,7 +63,7 @@ pub(crate) struct Quadratic16<S: Simd> {
     pub(super) yy: f32x16<S>,
 }
 
-/// Real roots: the smaller and the larger, and where there are any.
+/// Real roots: the smaller, the larger, and the lanes that have them.
 #[derive(Clone, Copy)]
 pub(crate) struct Roots<S: Simd> {
     pub low: f32x16<S>,
@@ -71,8 +71,7 @@ pub(crate) struct Roots<S: Simd> {
     pub any: mask32x16<S>,
 }
 
-/// Where a y^2 + 2 b y + c is 0. Not quite 0 stands for a = 0, so that one root may be far away and nothing is divided
-/// by 0.
+/// Roots of a y^2 + 2 b y + c. A tiny number replaces a = 0, so that one root is far away and nothing is divided by 0.
 #[inline(always)]
 pub(super) fn roots<S: Simd>(a: f32x16<S>, b: f32x16<S>, c: f32x16<S>) -> Roots<S> {
     let simd = a.token();
@@ -103,7 +102,7 @@ impl<S: Simd> Quadratic16<S> {
         }
     }
 
-    /// The square of what is linear over the light.
+    /// The square of a linear quantity.
     #[inline(always)]
     pub fn square(line: &Linear16<S>) -> Self {
         Quadratic16 {
@@ -116,6 +115,7 @@ impl<S: Simd> Quadratic16<S> {
         }
     }
 
+    /// `k` times the form plus `m` times `o`.
     #[inline(always)]
     pub fn combined(self, k: f32x16<S>, o: Self, m: f32x16<S>) -> Self {
         Quadratic16 {
@@ -128,7 +128,7 @@ impl<S: Simd> Quadratic16<S> {
         }
     }
 
-    /// One that is below 0 everywhere.
+    /// A form that is negative everywhere.
     #[inline(always)]
     pub(super) fn below_0(simd: S) -> Self {
         let (zero, minus) = (simd.splat_f32x16(0.0), simd.splat_f32x16(-1.0));
@@ -152,7 +152,7 @@ impl<S: Simd> Quadratic16<S> {
         self.c + (x * self.x + y * self.y) * 2.0 + x * x * self.xx + x * y * self.xy * 2.0 + y * y * self.yy
     }
 
-    /// What is inside of a cone on sixteen rows: where the quadratic is above 0 and `ahead` as well.
+    /// The interval inside of a cone on sixteen rows: where the form and `ahead` are positive.
     #[inline(always)]
     pub fn cone_on_row(&self, simd: S, ahead: &Linear16<S>, y: f32x16<S>) -> Interval16<S> {
         let (zero, far) = (simd.splat_f32x16(0.0), simd.splat_f32x16(FAR));
@@ -169,18 +169,19 @@ impl<S: Simd> Quadratic16<S> {
         interval
     }
 
+    /// The roots on the rows `y`.
     #[inline(always)]
     pub fn on_row(&self, y: f32x16<S>) -> Roots<S> {
         roots(self.xx, y * self.xy + self.x, y * (y * self.yy + self.y * 2.0) + self.c)
     }
 
-    /// The rows on which the line x = `x` crosses 0.
+    /// The y at which the form is 0 on the line x = `x`.
     #[inline(always)]
     pub(super) fn crossings(&self, x: f32x16<S>) -> Roots<S> {
         roots(self.yy, x * self.xy + self.y, x * (x * self.xx + self.x * 2.0) + self.c)
     }
 
-    /// The rows that only touch 0.
+    /// The rows that touch the curve on which the form is 0.
     #[inline(always)]
     pub(super) fn tangents(&self) -> Roots<S> {
         roots(
@@ -191,10 +192,10 @@ impl<S: Simd> Quadratic16<S> {
     }
 }
 
-/// How often a root between two places is looked for.
+/// Steps of the root finder.
 const REFINED: usize = 4;
 
-/// Where `f` is 0 between two places at which it has different signs, and these values.
+/// The root of `f` between `a` and `b`, at which it has the values `fa` and `fb` of different signs.
 ///
 /// Source: the Illinois method, Dowell, Jarratt, "A modified regula falsi method for computing the root of an
 /// equation", 1971.
@@ -216,8 +217,8 @@ pub(super) fn root_between<S: Simd>(
     t
 }
 
-/// What has to be 0 or more on a light for a flat thing with these corners, around, to be in the way: behind its plane,
-/// inside of all its sides.
+/// The projection of a polygon with these corners onto a light: the place (x, y) is hidden where all five linear
+/// functions, of the plane and of the four edges, are 0 or more.
 #[inline(always)]
 pub(crate) fn edges<S: Simd>(q: [Vec3x16<S>; 4], l: &[Vec3x16<S>; 3]) -> [Linear16<S>; 5] {
     let simd = q[0].x.token();

@@ -2,7 +2,7 @@
 
 use fearless_simd::Level;
 
-use super::view::{FlatLight, FlatView, Linear, Outline};
+use super::light_frame::{FlatLight, LightFrame, Linear, Outline};
 use super::*;
 use crate::color::{Display, DisplaySteps, Rgb};
 use crate::material::{BlinnPhongLobe, Bsdf, Colors, Lobe, Moments, PhongLobe, ShadingPoint};
@@ -47,13 +47,13 @@ fn gray(lobe: Lobe) -> Bsdf {
 struct Case {
     light: FlatLight,
     point: ShadingPoint,
-    view: FlatView,
+    view: LightFrame,
     spheres: Vec<Sphere>,
     flats: Vec<Parallelogram>,
 }
 
 /// Whether any light can arrive: a side that emits faces the point, and some of the light is above the horizon.
-fn arrives(light: &FlatLight, view: &FlatView) -> bool {
+fn arrives(light: &FlatLight, view: &LightFrame) -> bool {
     let largest =
         |of: &Linear| of.c + (of.x * view.x[0]).max(of.x * view.x[1]) + (of.y * view.y[0]).max(of.y * view.y[1]);
     let is_in_plane = light.physical && view.height == 0.0;
@@ -96,7 +96,7 @@ fn case(seed: u64, things: usize, sharpest: f64) -> Option<Case> {
     };
     let (ns, wo) = (ns.as_vec3(), wo.as_vec3());
     let point = ShadingPoint::new(Vec3::ZERO, ErrorBound(Vec3::ZERO), ns, wo, &gray(lobe));
-    let view = FlatView::new(&light, &point);
+    let view = LightFrame::new(&light, &point);
     if !arrives(&light, &view) {
         return None;
     }
@@ -164,9 +164,9 @@ fn brute(case: &Case, n: usize) -> Moments {
 /// What batches say: the same for whoever shares one, and with every instruction set.
 fn batched(case: &Case, steps: &DisplaySteps) -> Moments {
     let emitter = Emitter::Flat(case.light);
-    let asked = Asked {
+    let task = LightTask {
         emitter: &emitter,
-        obstacles: &Obstacles::of(&case.spheres, &case.flats, &emitter),
+        listed: &LightOccluders::of(&case.spheres, &case.flats, &emitter),
         near: None,
         lobe: case.point.bsdf.lobe.kind(),
         scale: Rgb::WHITE,
@@ -177,9 +177,9 @@ fn batched(case: &Case, steps: &DisplaySteps) -> Moments {
         sums: true,
     };
     let all = |level: Level, count: usize| {
-        let mut arrived = Vec::new();
-        Evaluator::default().evaluate(level, &asked, &vec![case.point; count], &mut arrived);
-        arrived
+        let mut integrals = Vec::new();
+        AreaLightIntegrator::default().evaluate(level, &task, &vec![case.point; count], &mut integrals);
+        integrals
     };
     let found = all(Level::new(), 1)[0];
     assert_ne!(found.illumination, Illumination::Unknown);
@@ -343,10 +343,10 @@ impl BallCase {
     fn batched(&self, steps: &DisplaySteps) -> Moments {
         let BallCase { center, radius, physical, both_sides, .. } = *self;
         let emitter = Emitter::Ball { center, radius, physical, both_sides };
-        let obstacles = Obstacles::of(&self.spheres, &self.flats, &emitter);
-        let asked = Asked {
+        let listed = LightOccluders::of(&self.spheres, &self.flats, &emitter);
+        let task = LightTask {
             emitter: &emitter,
-            obstacles: &obstacles,
+            listed: &listed,
             near: None,
             lobe: self.point.bsdf.lobe.kind(),
             scale: Rgb::WHITE,
@@ -356,13 +356,11 @@ impl BallCase {
             shadows: true,
             sums: true,
         };
-        let mut arrived = Vec::new();
-        Evaluator::default().evaluate(Level::new(), &asked, &[self.point], &mut arrived);
-        if arrived[0].illumination == Illumination::Unknown { Moments::UNKNOWN } else { arrived[0].sums }
+        let mut integrals = Vec::new();
+        AreaLightIntegrator::default().evaluate(Level::new(), &task, &[self.point], &mut integrals);
+        if integrals[0].illumination == Illumination::Unknown { Moments::UNKNOWN } else { integrals[0].sums }
     }
-}
 
-impl BallCase {
     /// What batches find, or nothing where a shape intersects the light: there it is sampled.
     fn known(&self, seed: u64, steps: &DisplaySteps) -> Option<Moments> {
         let found = self.batched(steps);

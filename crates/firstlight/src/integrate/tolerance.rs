@@ -1,57 +1,57 @@
-//! How wrong a picture may be, and every number that decides it.
+//! The error a picture may have, and every constant that decides it.
 
 use crate::color::{DisplaySteps, Rgb};
 use crate::material::{Colors, MOMENTS};
 
-/// What decides whether an estimate is good enough, and whether one place tells what others see. Errors are in display
-/// steps unless a comment says otherwise; those of the default tolerance of 1 are listed, others scale with it.
+/// Constants that decide whether an estimate is accepted, and whether one point stands for others. Errors are in
+/// display steps unless a comment gives another unit, for the default tolerance of 1; for others they are scaled by it.
+/// Larger values trade error for time.
 ///
-/// The figures come from the runs of random scenes that the page *Exactness, verified* describes.
+/// The values were set by the runs of random scenes on the page *Exactness, verified*.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Tolerance {
-    /// How far all lights together may be wrong at a point that stands for a pixel.
+    /// In display steps: the error of all lights together at a point that stands for a pixel.
     pub point: f32,
-    /// How many times that may be wrong where each place is wrong by itself, as by chance: nothing of that shows as a
-    /// step or an edge.
+    /// A factor of that for errors that are independent from place to place: they show no step or edge.
     pub by_chance: f32,
-    /// Parts of a pixel smaller than this are judged as if they were as large.
+    /// A part of a pixel: smaller parts are judged as if they were as large.
     pub least_share: f32,
 
     // Closed forms
-    /// The part of what is allowed that one cell of a light, or one panel of its rows, may use up: their estimates are
-    /// larger than their errors, mostly many times.
+    /// A part of the allowed error: that of one cell of a light or one panel. Error estimates are mostly many times the
+    /// errors.
     pub part: f32,
-    /// What a fit can be wrong where a part of a cell is seen, as a part of the last coefficients of its series. Where
-    /// all of it is, errors cancel at Gauss nodes.
+    /// A part of the last coefficients of a cell's series: the error estimate of partially visible cells. On fully
+    /// visible ones errors cancel at Gauss nodes.
     pub fit_cut: f32,
-    /// In exponents of the highlight's fall: how far a cell may reach across a highlight, and how far from one it does
-    /// not matter.
+    /// In exponents of a lobe's decay: the largest width of a cell across a highlight, and the distance from the
+    /// highlight beyond which its width does not matter.
     pub highlight: f32,
 
     // One place for others
-    /// What the corners of a square may be wrong about its other places, where there is one light.
+    /// In display steps: the interpolation error from the corners of a square at its other places, for one light.
     pub foretold: f32,
-    /// The part of that, and of [`spread`](Self::spread), where what arrives bends at once, and a quadratic is farther
-    /// off than the corners are: behind what is in trees, whose shadows have corners, where a light sets in, and where
-    /// the edge of a penumbra may run.
+    /// A factor of that and of [`spread`](Self::spread) where irradiance may have a discontinuous derivative: behind
+    /// occluders in trees, where a light sets in, and at the edge of a penumbra. A quadratic interpolates worse there
+    /// than the corners show.
     pub bends_at_once: f32,
-    /// How far the places of a surface in a pixel may differ.
+    /// In display steps: the difference between places of a surface in one pixel.
     pub spread: f32,
-    /// As a part of the light: how far outlines may move on it over a quadrant, and over a square of more than four
-    /// pixels that is not judged as bending at once.
+    /// A part of the light's size: the motion of silhouettes over a quadrant, and over a square of more than four
+    /// pixels that is not judged by `bends_at_once`.
     pub motion: f32,
-    /// How far light may turn where the middle of a fragment stands for all of it, in radians or widths of a highlight.
+    /// In radians or widths of a highlight: the change of direction over a fragment whose middle stands for all of it.
     pub middle_turn: f32,
-    /// By how much that may bend it at most, from a middle to the farthest ray, and from that of a quadrant. The mean
-    /// over the rays is off by far less of what bends over a quadrant: some of it lies below.
+    /// In display steps: the second-order change from a middle to its farthest ray, and from that of a quadrant. The
+    /// mean over the rays of a quadrant is off by far less: signs differ.
     pub middle_bend: f32,
     pub quadrant_bend: f32,
-    /// What colours that differ may make together with light that does.
+    /// In display steps: the effect of colours that vary together with irradiance.
     pub mingled: f32,
-    /// As lengths of differences: how far normals may be from turning evenly, or from their mean. Farther off there is
-    /// a crease.
+    /// The length of a difference of unit normals: their deviation from linear variation or from their mean. Beyond it
+    /// there is a crease.
     pub even: f32,
-    /// As a part of it: how far colours may be from their mean that are taken for one.
+    /// A part of the colour: the deviation from their mean of colours that are replaced by it.
     pub same_mean: f32,
 
     // Rays of a pixel
@@ -60,45 +60,46 @@ pub(crate) struct Tolerance {
     pub half_of_rays: f32,
 
     // Points of a light
-    /// In points, with a tolerance of 1: those of a pixel that are asked first; with others a root of it fewer.
+    /// In points, for a tolerance of 1: the first samples of a pixel; for others it is divided by the root of the
+    /// tolerance.
     pub first_points: f32,
-    /// So many times as many, where the light is nearer than those are apart.
+    /// A factor of that where the light is nearer than its samples are apart.
     pub nearer: f32,
-    /// In effective points: so many that find nothing in the way of a pixel find that nothing is, and so many of all
-    /// rays together tell something.
+    /// In effective samples: as many unoccluded ones of a pixel count as full visibility; and as many of all rays
+    /// together give an estimate.
     pub clear: f32,
     pub told: f32,
-    /// The part of what may be wrong that points may tell nothing about.
+    /// A part of the allowed error: that of strata without samples.
     pub untold: f32,
-    /// The part that a packet of points through which an edge runs is wrong by.
+    /// A part of what it contributes: the error of a group of samples that a silhouette crosses.
     pub mixed: f32,
-    /// How many times what their points send varies other packets are wrong by.
+    /// A factor of the variation within other groups: their error.
     pub alike: f32,
-    /// Over a root of the number of packets: the part that the square of what they say is off by.
+    /// Over the root of the number of groups, a part: the error of the variance.
     pub few_packets: f32,
-    /// The part of the deviation of as many random points that those of all rays have, which are stratified.
+    /// A part of the deviation of independent samples: that of all rays together, which are stratified.
     pub stratified: f32,
-    /// Cells that send more than so many times the mean of as many equal ones are heavy.
+    /// A factor of the mean contribution: strata beyond it are split.
     pub heavy: f32,
-    /// A pixel that tells what others in its square see counts for so many: the mean sum of squares of what the nine
-    /// are worth for a pixel, so that chance puts that one off by as much as if it had been asked.
+    /// In pixels: the weight of a pixel at which others are interpolated. It is the mean sum of squares of the nine
+    /// interpolation weights, so that noise makes the same error as in a pixel of its own.
     pub node_pixels: f32,
 
     // Many lights
-    /// The root of the sum of squares of all that may be wrong where many are taken for one.
+    /// In display steps: the root of the sum of squared errors of lights that one representative stands for.
     pub crowd: f32,
-    /// A patch that is darker than was guessed is looked at again beyond this factor of that.
+    /// A factor of the estimated brightness: darker patches are refined again beyond it.
     pub lenient: f32,
-    /// The part of what a first look finds that is taken for sure.
+    /// A part of the first estimate: its lower bound.
     pub sure: f32,
-    /// How far all lights that are integrated one by one may be wrong together, if their errors are independent.
+    /// In display steps: the error of all lights that are integrated one by one, with independent errors.
     pub integrals: f32,
-    /// What light does within a pixel, at most, as a part of its second difference over three: a corner in the middle
-    /// of the pixel makes an eighth, the onset of a root nearly a fourth.
+    /// A part of the second difference over three: the change of irradiance within a pixel. A corner in the middle of a
+    /// pixel makes an eighth, the onset of a square root nearly a fourth.
     pub within: f32,
 }
 
-/// All numbers that decide an error.
+/// The constants that decide an error.
 pub(crate) const TOLERANCE: Tolerance = Tolerance {
     point: 0.15,
     by_chance: 3.3,
@@ -135,34 +136,34 @@ pub(crate) const TOLERANCE: Tolerance = Tolerance {
     within: 0.2,
 };
 
-/// What decides how long a picture takes, and which of two ways to a light is taken that are both exact enough.
+/// Constants that decide how long a picture takes, and which of two methods is used that are both exact enough.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Costs {
-    /// In points: what a pixel asks of a light where closed forms do not tell, and so many more for each display step
-    /// that the light makes. A pixel asks some 300, and 35 for each step (60,000 pixels of 200 random scenes); a panel
-    /// takes as long as about 8 of them.
+    /// In evaluations of cells and panels: those of a light at a pixel after which it is sampled, and so many more for
+    /// each display step that the light contributes. Sampling takes some 300 samples, and 35 for each step (60,000
+    /// pixels of 200 random scenes); a panel takes as long as about 8 samples.
     pub asked: f32,
     pub asked_per_step: f32,
-    /// Nodes of lights whose error, taken for one, is no more than this part of all they send are looked at whether
-    /// they are seen whole; those wider than this sine are not.
+    /// A part of the power: nodes of lights whose clustering error is no larger are tested for full visibility; and the
+    /// sine of the half angle beyond which they are not.
     pub looked_at: f32,
     pub wide: f32,
-    /// The part of what nothing is known of that is guessed to arrive.
+    /// A part of the unoccluded light: the estimate where visibility is not known.
     pub maybe: f32,
-    /// How much wider the first look at a block is, that says how bright it is.
+    /// A factor of the block's width: that of the first estimate of its brightness.
     pub pilot: f32,
 }
 
-/// All numbers that decide how long a picture takes.
+/// The constants that decide how long a picture takes.
 pub(crate) const COSTS: Costs =
     Costs { asked: 32.0, asked_per_step: 2.0, looked_at: 0.25, wide: 0.7, maybe: 0.3, pilot: 4.0 };
 
-/// What a unit of each moment's error uses up of what is allowed, at one point.
+/// The part of the allowed error that a unit of error of each moment uses up, at one point.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Weight(pub [f32; MOMENTS]);
 
 impl Weight {
-    /// Where light of `worth` times moments is added to what makes `value` together, and may be off by `allowed` steps.
+    /// For light of colours `worth` times the moments, as a part of the total `value`, with `allowed` steps of error.
     /// `least`: see [`DisplaySteps::slope`].
     pub fn new(steps: &DisplaySteps, value: Rgb, worth: &Colors, allowed: f32, least: f32) -> Weight {
         let used = if value.r == value.g && value.g == value.b {
@@ -173,7 +174,7 @@ impl Weight {
         Weight(worth.0.map(|worth| (worth.r * used[0]).max(worth.g * used[1]).max(worth.b * used[2])))
     }
 
-    /// The share of what is allowed that errors use up.
+    /// The part of the allowed error that `errors` use up.
     #[inline(always)]
     pub fn of(self, errors: [f32; MOMENTS]) -> f32 {
         let used: [f32; MOMENTS] = std::array::from_fn(|k| self.0[k] * errors[k]);

@@ -1,6 +1,6 @@
 //! Direct light at shading points: each light is estimated for all points that need it together.
 //!
-//! Lights that are integrated are evaluated in batches of sixteen points ([`Evaluator`]), past the listed occluders and
+//! Lights that are integrated are evaluated in batches of sixteen points ([`AreaLightIntegrator`]), past the listed occluders and
 //! the few triangles that are gathered from the BVHs. Where more than that may occlude a light, the estimate is
 //! unknown, and callers sample the light ([`pooled`](super::pooled)).
 
@@ -17,7 +17,9 @@ use super::pooled::LightSampler;
 use super::{Counts, QUESTION_EVERY};
 use crate::color::{DisplaySteps, Rgb};
 use crate::ids::LightId;
-use crate::integrate::{Arrived, Asked, Emitter, Evaluator, Illumination, Obstacles, TOLERANCE};
+use crate::integrate::{
+    AreaLightIntegrator, Emitter, Illumination, LightIntegral, LightOccluders, LightTask, TOLERANCE,
+};
 use crate::light::{Area, Extent, LightTree};
 use crate::material::{LobeKind, Moments, ShadingPoint};
 use crate::math::LANES;
@@ -121,17 +123,17 @@ pub(crate) struct DirectLighting<'a> {
     pub(super) scene: &'a Scene,
     pub(super) lights: &'a Lights<'a>,
     pub(super) level: Level,
-    pub(super) evaluator: Evaluator,
+    pub(super) evaluator: AreaLightIntegrator,
     /// In display steps: how far one light may be wrong at a point.
     allowed: f32,
     /// The numbers of queries, by kind of lobe, light, and whether occluders count.
     order: Vec<(GroupKey, u32)>,
     points: Vec<ShadingPoint>,
-    arrived: Vec<Arrived>,
+    integrals: Vec<LightIntegral>,
     /// Of a group: those whose light listed shapes alone may occlude.
     listed: Vec<u32>,
     /// What was gathered from BVHs for up to sixteen points.
-    near: Obstacles<'a>,
+    near: LightOccluders<'a>,
     pub(super) occluders: OccluderList,
     pub(super) resolver: VisibilityResolver,
     indices: Vec<u32>,
@@ -145,13 +147,13 @@ impl<'a> DirectLighting<'a> {
             scene,
             lights,
             level,
-            evaluator: Evaluator::default(),
+            evaluator: AreaLightIntegrator::default(),
             allowed: lights.allowed,
             order: Vec::new(),
             points: Vec::new(),
-            arrived: Vec::new(),
+            integrals: Vec::new(),
             listed: Vec::new(),
-            near: Obstacles::default(),
+            near: LightOccluders::default(),
             occluders: OccluderList::default(),
             resolver: VisibilityResolver::default(),
             indices: Vec::new(),
@@ -398,11 +400,11 @@ impl<'a> DirectLighting<'a> {
         let sums = self.is_integrated(of.light);
         self.arrive(of, visibility, sums, members, counts);
         let known = if visibility == Visibility::Gathered { Visibility::Partial } else { visibility };
-        for (arrived, k) in self.arrived.iter().zip(members) {
+        for (integral, k) in self.integrals.iter().zip(members) {
             if sums {
-                counts.note(arrived.illumination);
+                counts.note(integral.illumination);
             }
-            estimates[*k as usize] = LightEstimate { visibility: known, ..self.variation(of, *k, arrived) };
+            estimates[*k as usize] = LightEstimate { visibility: known, ..self.variation(of, *k, integral) };
         }
     }
 
@@ -413,7 +415,7 @@ impl<'a> DirectLighting<'a> {
         estimates[k as usize] = LightEstimate::UNKNOWN;
         if point.reach > 0.0 && point.most_motion == f32::INFINITY {
             self.arrive(of, Visibility::Full, false, &[k], counts);
-            let LightEstimate { turn, most, .. } = self.variation(of, k, &self.arrived[0]);
+            let LightEstimate { turn, most, .. } = self.variation(of, k, &self.integrals[0]);
             estimates[k as usize] = LightEstimate { turn, most, ..LightEstimate::UNKNOWN };
         }
     }
@@ -424,17 +426,17 @@ impl<'a> DirectLighting<'a> {
         counts.batched_points += members.len() as u64;
         self.points.clear();
         self.points.extend(members.iter().map(|k| *of.point(*k)));
-        self.arrived.clear();
+        self.integrals.clear();
         let near = (visibility == Visibility::Gathered).then_some(&self.near);
         let shadows = visibility != Visibility::Full;
-        let Some(asked) = self.lights.asked(of.light, of.lobe, shadows) else { unreachable!("it has an area") };
-        let asked = Asked { near, sums, allowed: self.allowed, ..asked };
-        self.evaluator.evaluate(self.level, &asked, &self.points, &mut self.arrived);
+        let Some(task) = self.lights.task(of.light, of.lobe, shadows) else { unreachable!("it has an area") };
+        let task = LightTask { near, sums, allowed: self.allowed, ..task };
+        self.evaluator.evaluate(self.level, &task, &self.points, &mut self.integrals);
     }
 
     /// What a light sends to a point, and how it varies over the footprint.
-    fn variation(&self, of: &Group, k: u32, arrived: &Arrived) -> LightEstimate {
-        let Arrived { sums, illumination, proved, motion, distance, height } = *arrived;
+    fn variation(&self, of: &Group, k: u32, integral: &LightIntegral) -> LightEstimate {
+        let LightIntegral { sums, illumination, proved, motion, distance, height } = *integral;
         let (light, point) = (&self.scene.lights[of.light], of.point(k));
         let is_physical = light.area().is_some_and(|area| area.physical);
         let most = if is_physical { self.measure(of.light) / (distance * distance) } else { 1.0 };

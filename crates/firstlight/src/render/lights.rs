@@ -3,7 +3,7 @@
 use super::pooled::LightPointSets;
 use crate::color::{DisplaySteps, Rgb};
 use crate::ids::LightId;
-use crate::integrate::{Asked, Emitter, Obstacles, TOLERANCE};
+use crate::integrate::{Emitter, LightOccluders, LightTask, TOLERANCE};
 use crate::light::{FEW_LIGHTS, Light, LightTree};
 use crate::material::LobeKind;
 use crate::scene::Scene;
@@ -24,7 +24,7 @@ pub(crate) struct Lights<'a> {
     /// The points of those that are integrated.
     pub point_sets: Vec<LightPointSets>,
     /// What may stand in the way of those that have an area.
-    pub obstacles: Vec<Obstacles<'a>>,
+    pub obstacles: Vec<LightOccluders<'a>>,
     /// In display steps: how far one light may be wrong at a point that stands for a pixel; and the value that many
     /// steps above black.
     pub allowed: f32,
@@ -41,7 +41,7 @@ impl<'a> Lights<'a> {
         let tree = (scene.lights.len() > FEW_LIGHTS)
             .then(|| LightTree::new(&scene.lights, &scene.geometry.links.classes(scene.lights.len())));
         let obstacles = emitters.iter().enumerate().map(|(index, emitter)| {
-            emitter.as_ref().map_or_else(Obstacles::default, |emitter| Obstacles::new(scene, index, emitter))
+            emitter.as_ref().map_or_else(LightOccluders::default, |emitter| LightOccluders::new(scene, index, emitter))
         });
         let obstacles = obstacles.collect();
         let steps = DisplaySteps::new(&scene.display, scene.tolerance);
@@ -66,10 +66,10 @@ impl<'a> Lights<'a> {
 
     /// Light `index` as points of one lobe are evaluated for it, with or without what occludes it; `None` if it has no
     /// area.
-    pub fn asked<'b>(&'b self, index: usize, lobe: Option<LobeKind>, shadows: bool) -> Option<Asked<'b>> {
-        self.emitters[index].as_ref().map(|emitter| Asked {
+    pub fn task<'b>(&'b self, index: usize, lobe: Option<LobeKind>, shadows: bool) -> Option<LightTask<'b>> {
+        self.emitters[index].as_ref().map(|emitter| LightTask {
             emitter,
-            obstacles: &self.obstacles[index],
+            listed: &self.obstacles[index],
             near: None,
             lobe,
             scale: self.scales[index],

@@ -1,40 +1,40 @@
-//! What flat things do to a light, for sixteen points: parallelograms, and triangles of meshes.
+//! The tests of parallelograms, and of triangles of meshes, against a light, for sixteen points.
 
 use fearless_simd::{f32x16, prelude::*};
 
-use super::{LanesSight, SLACK, Told};
-use crate::integrate::batch::Exact;
+use super::{LightPyramid16, OccluderTest, SLACK, way};
+use crate::integrate::batch::{Exact, point_vectors};
 use crate::integrate::row::edges;
 use crate::material::ShadingPoint;
 use crate::math::{DVec3, Facet, LANES, Vec3, Vec3x16};
 use crate::shape::{Parallelogram, PlaneSide, is_in_plane};
 
 #[inline(always)]
-pub(super) fn flat_between<S: Simd>(
+pub(super) fn test_parallelogram<S: Simd>(
     simd: S,
-    sight: &LanesSight<S>,
+    pyramid: &LightPyramid16<S>,
     q: [Vec3x16<S>; 4],
     (flat, side, seen_side): (&Parallelogram, PlaneSide, PlaneSide),
     points: &[ShadingPoint],
-    asked: u64,
-) -> Told<S> {
+    lanes: u64,
+) -> OccluderTest<S> {
     let zero = simd.splat_f32x16(0.0);
-    let mut told = Told::nothing(zero);
+    let mut test = OccluderTest::nothing(zero);
     let mut size2 = zero;
     let mut rises = simd.splat_f32x16(f32::NEG_INFINITY);
     for q in &q {
         size2 = size2.max(q.dot(*q));
-        rises = rises.max(sight.horizon.dot(*q));
+        rises = rises.max(pyramid.horizon.dot(*q));
     }
     let rounding = size2.sqrt() * SLACK;
     // Above whose horizon it rises
-    let around = sight.reach + sight.turn * (size2.sqrt() + sight.reach);
-    let mut near = asked & rises.simd_ge(-rounding - around).to_bitmask();
+    let around = pyramid.reach + pyramid.turn * (size2.sqrt() + pyramid.reach);
+    let mut near = lanes & rises.simd_ge(-rounding - around).to_bitmask();
     if near == 0 {
-        return told;
+        return test;
     }
-    let gap = sight.gap(&q);
-    near &= gap.simd_le(rounding + sight.reach).to_bitmask();
+    let gap = pyramid.gap(&q);
+    near &= gap.simd_le(rounding + pyramid.reach).to_bitmask();
     // On which side of it the points are, to the last bit; and a part of what is around them may be on the other side
     let (mut left, mut through, mut beside) = (near, 0u64, 0u64);
     while left != 0 {
@@ -49,14 +49,14 @@ pub(super) fn flat_between<S: Simd>(
     }
     near = through | beside;
     if near == 0 {
-        return told;
+        return test;
     }
-    let lines = edges(q, &sight.ways);
+    let lines = edges(q, &pyramid.light_vectors);
     let n = (q[1] - q[0]).cross(q[3] - q[0]);
     let length = n.dot(n).sqrt();
     // How far away it is decides how far its shadow moves
     let mut motion = [0.0f32; LANES];
-    let mut left = near & sight.reach.simd_gt(zero).to_bitmask();
+    let mut left = near & pyramid.reach.simd_gt(zero).to_bitmask();
     while left != 0 {
         let k = left.trailing_zeros() as usize;
         left &= left - 1;
@@ -66,17 +66,17 @@ pub(super) fn flat_between<S: Simd>(
             beside >> k & 1 == 1 && distance <= point.reach && flat.screens(point.p, point.wo, point.reach, seen_side);
         if !is_screen {
             motion[k] = (distance - point.reach).max(0.0);
-            told.moving |= 1 << k;
+            test.moving |= 1 << k;
         }
     }
-    told.motion = sight.motion(f32x16::simd_from(simd, motion));
+    test.motion = pyramid.motion(f32x16::simd_from(simd, motion));
     near &= through & gap.simd_le(rounding).to_bitmask() & rises.simd_ge(-rounding).to_bitmask();
     if near == 0 {
-        return told;
+        return test;
     }
-    let [near, hidden] = sight.covered(&lines, near);
-    told.hidden = hidden;
-    told.outside = near & !hidden;
+    let [near, hidden] = pyramid.covered(&lines, near);
+    test.hidden = hidden;
+    test.outside = near & !hidden;
     // From everywhere around: all ways to the corners pass far inside of the edges
     let mut patches = hidden;
     while patches != 0 {
@@ -84,27 +84,27 @@ pub(super) fn flat_between<S: Simd>(
         patches &= patches - 1;
         let point = &points[k];
         if point.reach == 0.0 {
-            told.firm |= 1 << k;
+            test.firm |= 1 << k;
             continue;
         }
-        let share = (motion[k] + point.reach) / sight.far.to_array()[k];
+        let share = (motion[k] + point.reach) / pyramid.far.to_array()[k];
         let corners = flat.deep_corners().map(|q| (q - point.p.as_dvec3()).as_vec3());
         let edge = |i: usize| corners[i].cross(corners[(i + 1) % 4]).length();
         let lengths = [length.to_array()[k], edge(0), edge(1), edge(2), edge(3)];
         let mut depth = f32::INFINITY;
         for (line, length) in lines.iter().zip(lengths) {
-            for [x, y] in sight.square() {
+            for [x, y] in pyramid.square() {
                 depth = depth.min(line.at(x, y).to_array()[k] / length);
             }
         }
         if depth * share.min(1.0) > point.reach {
-            told.firm |= 1 << k;
+            test.firm |= 1 << k;
         }
     }
-    told
+    test
 }
 
-/// A triangle of a mesh as it is placed.
+/// A triangle of a mesh, in world space.
 pub(super) struct FacetShape {
     pub facet: Facet,
     corners: [DVec3; 3],
@@ -112,9 +112,9 @@ pub(super) struct FacetShape {
     edge: f32,
 }
 
-/// Points no farther off the plane of a facet than this part of its edges are in it.
+/// As a part of the longer edge: points no farther off a triangle's plane are in it.
 const IN_PLANE: f32 = 1e-5;
-/// Triangles that rise no higher than this part of their edges do not rise.
+/// As a part of the longer edge: triangles that rise no higher above a horizon are below it.
 const LEVEL: f32 = 1e-4;
 
 impl FacetShape {
@@ -123,54 +123,49 @@ impl FacetShape {
         FacetShape { facet, corners, edge: (b - a).length().max((c - a).length()) as f32 }
     }
 
-    /// Around, as a parallelogram whose last two are one.
+    /// The corners as those of a parallelogram whose last two are equal.
     pub fn corners(&self) -> [Exact; 4] {
         let [a, b, c] = self.corners.map(Exact::new);
         [a, b, c, c]
     }
 
-    /// How far it reaches in a direction.
+    /// The support function: the largest n.q of its points q.
     pub fn reach(&self, n: DVec3) -> f64 {
         self.corners.iter().map(|q| n.dot(*q)).fold(f64::NEG_INFINITY, f64::max)
     }
 
-    /// Whether a point is in its plane, as far as rounding allows to tell.
+    /// Whether a point is in its plane within rounding.
     fn is_under(&self, point: &ShadingPoint) -> bool {
         is_in_plane(self.corners, point.p.as_dvec3(), point.error.0.as_dvec3())
     }
 
-    /// How far it is from a point.
+    /// The distance to a point, in metres.
     pub fn distance(&self, p: DVec3) -> f32 {
         triangle_distance(&self.corners.map(|q| (q - p).as_vec3()))
     }
 }
 
-/// The facets that points are on.
+/// The facets of the points themselves.
 pub(super) struct Own<S: Simd> {
-    /// Unit, to the viewer's side.
+    /// Geometric normals, unit, on the viewer's side.
     ng: Vec3x16<S>,
-    /// Which points are lifted off facets that stand for something round, and which of those see some of the light from
-    /// below their facet.
+    /// Points that are lifted off facets of smooth surfaces, and those of them from which some of the light is below
+    /// the facet.
     lifted: u64,
     sees_below: u64,
 }
 
 impl<S: Simd> Own<S> {
     #[inline(always)]
-    pub fn new(simd: S, sight: &LanesSight<S>, points: &[ShadingPoint]) -> Own<S> {
-        let mut numbers = [[0.0; LANES]; 3];
+    pub fn new(simd: S, pyramid: &LightPyramid16<S>, points: &[ShadingPoint]) -> Own<S> {
         let mut lifted = 0;
         for (k, point) in points.iter().enumerate() {
-            let Vec3 { x, y, z } = point.ng;
-            (numbers[0][k], numbers[1][k], numbers[2][k]) = (x, y, z);
             lifted |= u64::from(point.facet != Facet::NONE) << k;
         }
-        let [x, y, z] = numbers;
-        let ng =
-            Vec3x16 { x: f32x16::simd_from(simd, x), y: f32x16::simd_from(simd, y), z: f32x16::simd_from(simd, z) };
+        let ng = point_vectors(simd, points, |point| point.ng);
         let mut least = simd.splat_f32x16(f32::INFINITY);
-        for [x, y] in sight.square() {
-            least = least.min(ng.dot(sight.way(x, y)));
+        for [x, y] in pyramid.square() {
+            least = least.min(ng.dot(way(&pyramid.light_vectors, x, y)));
         }
         Own { ng, lifted, sees_below: lifted & !least.simd_gt(simd.splat_f32x16(0.0)).to_bitmask() }
     }
@@ -178,28 +173,28 @@ impl<S: Simd> Own<S> {
 
 #[allow(clippy::too_many_arguments, reason = "a triangle, sixteen points and what they are on")]
 #[inline(always)]
-pub(super) fn facet_between<S: Simd>(
+pub(super) fn test_triangle<S: Simd>(
     simd: S,
-    sight: &LanesSight<S>,
+    pyramid: &LightPyramid16<S>,
     q: [Vec3x16<S>; 4],
     shape: &FacetShape,
     own: &Own<S>,
     points: &[ShadingPoint],
-    asked: u64,
-) -> Told<S> {
+    lanes: u64,
+) -> OccluderTest<S> {
     let zero = simd.splat_f32x16(0.0);
-    let mut told = Told::nothing(zero);
+    let mut test = OccluderTest::nothing(zero);
     let mut size2 = zero;
     let mut rises = simd.splat_f32x16(f32::NEG_INFINITY);
     let mut over_own = rises;
     for q in &q[..3] {
         size2 = size2.max(q.dot(*q));
-        rises = rises.max(sight.horizon.dot(*q));
+        rises = rises.max(pyramid.horizon.dot(*q));
         over_own = over_own.max(own.ng.dot(*q));
     }
     let rounding = size2.sqrt() * SLACK;
-    let room = sight.error.dot(sight.error).sqrt() * 4.0 + shape.edge * LEVEL;
-    let mut near = asked & rises.simd_gt(room).to_bitmask();
+    let room = pyramid.error.dot(pyramid.error).sqrt() * 4.0 + shape.edge * LEVEL;
+    let mut near = lanes & rises.simd_gt(room).to_bitmask();
     // One that goes on as a lifted point's own facet does, or falls off from it, hides nothing that is above that; and
     // one in the same plane nothing at all: what comes from below has passed that plane before it gets there
     let level = near & own.lifted & over_own.simd_le(room).to_bitmask();
@@ -208,10 +203,10 @@ pub(super) fn facet_between<S: Simd>(
         let in_plane = n.dot(q[0]).abs().simd_le(n.dot(n).sqrt() * (shape.edge * IN_PLANE)).to_bitmask();
         near &= !level | own.sees_below & !in_plane;
     }
-    let gap = sight.gap(&q[..3]);
-    near &= gap.simd_le(rounding + sight.reach).to_bitmask();
+    let gap = pyramid.gap(&q[..3]);
+    near &= gap.simd_le(rounding + pyramid.reach).to_bitmask();
     if near == 0 {
-        return told;
+        return test;
     }
     let mut distances = [0.0f32; LANES];
     for (k, point) in points.iter().enumerate() {
@@ -223,22 +218,22 @@ pub(super) fn facet_between<S: Simd>(
             near &= !bit;
         } else if point.reach > 0.0 {
             distances[k] = (shape.distance(point.p.as_dvec3()) - point.reach).max(0.0);
-            told.moving |= bit;
+            test.moving |= bit;
         }
     }
-    told.motion = sight.motion(f32x16::simd_from(simd, distances));
+    test.motion = pyramid.motion(f32x16::simd_from(simd, distances));
     near &= gap.simd_le(rounding).to_bitmask();
     if near == 0 {
-        return told;
+        return test;
     }
-    let [near, hidden] = sight.covered(&edges(q, &sight.ways), near);
-    told.hidden = hidden;
-    told.firm = hidden & !told.moving;
-    told.outside = near & !hidden;
-    told
+    let [near, hidden] = pyramid.covered(&edges(q, &pyramid.light_vectors), near);
+    test.hidden = hidden;
+    test.firm = hidden & !test.moving;
+    test.outside = near & !hidden;
+    test
 }
 
-/// How far a triangle is from the origin.
+/// The distance of a triangle from the origin, in its unit.
 ///
 /// Source: Ericson, "Real-Time Collision Detection", 2005, section 5.1.5.
 fn triangle_distance([a, b, c]: &[Vec3; 3]) -> f32 {

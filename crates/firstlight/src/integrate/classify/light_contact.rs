@@ -5,9 +5,9 @@ use super::ExactShape;
 use crate::integrate::emitter::Emitter;
 use crate::material::ShadingPoint;
 
-/// On which sides of the plane of a flat light something is, as bits: whether a thing reaches into the front and into
-/// the back by more than rounding, or which points are there. What lies in the plane, or behind it as seen from a
-/// point, hides nothing of the light from that point. Of other lights both sides are all of space.
+/// The sides of a flat light's plane that an occluder reaches into by more than rounding, or on which points are, as
+/// bits. What is in the plane, or behind it as seen from a point, hides nothing of the light from that point. For other
+/// lights all bits are set.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct LightSides {
     front: u64,
@@ -17,7 +17,7 @@ pub(super) struct LightSides {
 impl LightSides {
     const BOTH: LightSides = LightSides { front: u64::MAX, back: u64::MAX };
 
-    /// Where an obstacle is.
+    /// The sides of an occluder.
     pub fn of(emitter: &Emitter, exact: &ExactShape) -> LightSides {
         let Emitter::Flat(light) = emitter else { return Self::BOTH };
         let n = light.normal();
@@ -33,7 +33,7 @@ impl LightSides {
         LightSides { front: sides[0], back: sides[1] }
     }
 
-    /// On which sides sixteen points are; on both, where some of the places around are on the other.
+    /// The sides of sixteen points; both, where places within reach are on both.
     pub fn of_points(emitter: &Emitter, points: &[ShadingPoint]) -> LightSides {
         let Emitter::Flat(light) = emitter else { return Self::BOTH };
         let n = light.normal();
@@ -47,41 +47,41 @@ impl LightSides {
         sides
     }
 
-    /// The points on those sides that this is on.
+    /// The points that are on a side of this occluder.
     pub fn of_these(self, points: LightSides) -> u64 {
         self.front & points.front | self.back & points.back
     }
 }
 
-/// How something lies to a light that is a ball.
+/// How an occluder lies to a sphere light.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Touch {
-    Apart,
-    /// It reaches into it: what of it is behind the light's surface does not show on the disk that stands for the
-    /// light.
-    Cuts,
-    /// The light is inside of it.
-    Holds,
+pub(super) enum LightContact {
+    Disjoint,
+    /// The surfaces may intersect: the part of the occluder behind the light's surface is not visible on the disk that
+    /// replaces the light.
+    Intersects,
+    /// The light is inside of the occluder.
+    Contains,
 }
 
-impl Touch {
-    pub fn of(emitter: &Emitter, exact: &ExactShape) -> Touch {
-        let Emitter::Ball { center, radius, .. } = emitter else { return Touch::Apart };
+impl LightContact {
+    pub fn of(emitter: &Emitter, exact: &ExactShape) -> LightContact {
+        let Emitter::Ball { center, radius, .. } = emitter else { return LightContact::Disjoint };
         match exact {
             ExactShape::Sphere(sphere) => {
                 let distance = (*center - sphere.c).length();
                 if distance >= radius + sphere.r {
-                    Touch::Apart
+                    LightContact::Disjoint
                 } else if distance + radius <= sphere.r * (1.0 - 1e-9) {
-                    Touch::Holds
+                    LightContact::Contains
                 } else {
-                    Touch::Cuts
+                    LightContact::Intersects
                 }
             }
-            ExactShape::Flat { flat, .. } if flat.distance(*center) < *radius => Touch::Cuts,
-            ExactShape::Solid(solid) if solid.may_touch => Touch::Cuts,
-            ExactShape::Facet(shape) if f64::from(shape.distance(*center)) < *radius => Touch::Cuts,
-            ExactShape::Flat { .. } | ExactShape::Solid(_) | ExactShape::Facet(_) => Touch::Apart,
+            ExactShape::Flat { flat, .. } if flat.distance(*center) < *radius => LightContact::Intersects,
+            ExactShape::Solid(solid) if solid.may_contain_light => LightContact::Intersects,
+            ExactShape::Facet(shape) if f64::from(shape.distance(*center)) < *radius => LightContact::Intersects,
+            ExactShape::Flat { .. } | ExactShape::Solid(_) | ExactShape::Facet(_) => LightContact::Disjoint,
         }
     }
 }

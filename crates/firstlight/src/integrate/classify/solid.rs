@@ -1,8 +1,8 @@
-//! What a solid does to a light, for sixteen points.
+//! The test of a solid against a light, for sixteen points.
 
 use fearless_simd::{f32x16, prelude::*};
 
-use super::{LanesSight, SLACK, Told};
+use super::{LightPyramid16, OccluderTest, SLACK};
 use crate::integrate::batch::Exact;
 use crate::integrate::emitter::Emitter;
 use crate::integrate::hull::SolidOccluder;
@@ -11,20 +11,20 @@ use crate::material::ShadingPoint;
 use crate::math::{DAffine3, DMat3, DVec3, LANES, Vec3x16};
 use crate::shape::{Canonical, Placement, Solid, Sphere, SphereUv};
 
-/// A solid as it is placed: a convex one, or one with a straight hole.
+/// A solid in the world: convex, or with a straight hole.
 pub(super) struct PlacedSolid {
     placement: Placement,
     solid: Solid,
     kind: Canonical,
     canonical_from_world: DAffine3,
-    /// The box around it, if it has an end.
+    /// Its bounding box, if it is bounded.
     bounds: Option<[DVec3; 2]>,
-    /// Whether a part of the light may be in it, and whether all is.
-    pub may_touch: bool,
+    /// Whether a part of the light may be inside, and whether all is.
+    pub may_contain_light: bool,
     contains: bool,
 }
 
-/// What a placed solid is if it is a sphere in the world as well.
+/// The sphere that a placed solid is, if it is one in the world as well.
 pub(super) fn sphere(solid: &Solid, placement: &Placement) -> Option<Sphere> {
     let (object_from_canonical, Canonical::Ball) = solid.canonical()? else { return None };
     let DAffine3 { matrix3, translation } = placement.world_from_object * object_from_canonical;
@@ -36,16 +36,16 @@ pub(super) fn sphere(solid: &Solid, placement: &Placement) -> Option<Sphere> {
     (off <= r2 * ROUND).then(|| Sphere { c: translation, r: r2.sqrt(), uv, single_sided: false })
 }
 
-/// By which part of itself the square of a sphere's radius may differ with the direction.
+/// As a part: the largest variation of a sphere's squared radius with the direction.
 const ROUND: f64 = 1e-12;
 
-/// How far a point is from a box.
+/// The distance of a point to a box, in metres.
 fn distance([low, high]: &[DVec3; 2], p: DVec3) -> f64 {
     (*low - p).max(p - *high).max(DVec3::ZERO).length()
 }
 
 impl PlacedSolid {
-    /// `None` of what no row tells.
+    /// `None` if the projection has no closed form.
     pub fn new(solid: Solid, placement: Placement, emitter: &Emitter) -> Option<(PlacedSolid, SolidOccluder)> {
         let (object_from_canonical, kind) = solid.canonical()?;
         let world_from_canonical = placement.world_from_object * object_from_canonical;
@@ -57,11 +57,11 @@ impl PlacedSolid {
             kind,
             canonical_from_world,
             bounds,
-            may_touch: false,
+            may_contain_light: false,
             contains: emitter.corners().iter().all(|q| kind.holds(canonical_from_world.transform_point3(*q), ROUNDING)),
         };
-        made.may_touch = made.touches(emitter);
-        let occluder = SolidOccluder::new(&world_from_canonical, kind, made.may_touch);
+        made.may_contain_light = made.touches(emitter);
+        let occluder = SolidOccluder::new(&world_from_canonical, kind, made.may_contain_light);
         Some((made, occluder))
     }
 
@@ -86,24 +86,24 @@ impl PlacedSolid {
         }
     }
 
-    /// How far it reaches in a direction.
+    /// The support function: the largest n.q of its points q.
     pub fn reach(&self, n: DVec3) -> f64 {
         let to_world = &self.placement.world_from_object;
         self.solid.support(to_world.matrix3.transpose() * n) + n.dot(to_world.translation)
     }
 
-    /// How far a point is off the plane of a flat one, in metres.
+    /// The distance of a point from the plane of a flat solid, in metres.
     fn height(&self, p: DVec3) -> f64 {
         let row = self.canonical_from_world.matrix3.transpose().z_axis;
         self.canonical_from_world.transform_point3(p).z / row.length()
     }
 
-    /// How far a point is from it, at least, in metres.
+    /// Lower bound of the distance to a point, in metres.
     fn apart(&self, p: DVec3) -> f64 {
         self.bounds.as_ref().map_or_else(|| self.height(p).abs(), |bounds| distance(bounds, p))
     }
 
-    /// Whether a point is on the plane of a flat one, as far as it can be told, and its surface lies in it.
+    /// Whether a point is in the plane of a flat solid within rounding, and its surface is parallel to it.
     fn is_under(&self, point: &ShadingPoint) -> bool {
         let row = self.canonical_from_world.matrix3.transpose().z_axis;
         let at = self.canonical_from_world.transform_point3(point.p.as_dvec3());
@@ -114,18 +114,18 @@ impl PlacedSolid {
     }
 }
 
-/// Points no farther out than this part of a solid's size are on its surface, as far as single precision tells.
+/// In the solid's own units: points no farther outside are on its surface, within the rounding of f32.
 const ROUNDING: f64 = 1e-6;
 
-/// How a solid lies to a point that may see it in the way.
+/// Where a solid is, as seen from a point and the places within its reach.
 enum Lies {
     /// It hides nothing.
     Aside,
-    /// It hides nothing from the point, but may from near it.
+    /// It hides nothing from the point, but may from a place within reach.
     Near,
-    /// The point is inside, and what surrounds it, or it is where the surface is.
+    /// The point and all places within reach are inside.
     Inside,
-    /// The point is inside, and what surrounds it may be outside.
+    /// The point is inside, and a place within reach may be outside.
     NearlyInside,
     Between,
 }
@@ -166,15 +166,15 @@ impl PlacedSolid {
         }
     }
 
-    /// Whether a point that is on its surface or inside, at `at` in its own space, leaves it along the normal `n` of
-    /// the point's horizon: then its surface is taken to lie in a face of the solid, however that normal is rounded.
+    /// Whether a point on the surface or inside, at `at` in the solid's own space, is left along the normal `n` of its
+    /// horizon: then the point is on a face of the solid, however the normal is rounded.
     fn is_left(&self, at: DVec3, n: DVec3, room: f64) -> bool {
         let way = self.canonical_from_world.transform_vector3(n);
         let step = way * (8.0 * room / way.abs().max_element());
         !self.kind.has_hole() && !self.kind.holds(at, -room) && !self.kind.holds(at + step, room)
     }
 
-    /// Whether all that lies around a point on its surface is inside, but for so much.
+    /// Whether all places within reach of a point are inside, within `room`.
     fn surrounds(&self, point: &ShadingPoint, room: f64) -> bool {
         let reach = f64::from(point.reach);
         if reach == 0.0 {
@@ -189,25 +189,25 @@ impl PlacedSolid {
     }
 }
 
-/// Which of the points asked see some of the light past the solid, or nothing of it.
+/// Tests a solid for the points in `lanes`.
 #[inline(always)]
-pub(super) fn solid_between<S: Simd>(
+pub(super) fn test_solid<S: Simd>(
     simd: S,
-    sight: &LanesSight<S>,
+    pyramid: &LightPyramid16<S>,
     shape: &PlacedSolid,
     occluder: &Occluder,
     points: &[ShadingPoint],
-    asked: u64,
-) -> Told<S> {
+    lanes: u64,
+) -> OccluderTest<S> {
     let zero = simd.splat_f32x16(0.0);
-    let mut told = Told::nothing(zero);
-    let (mut around, mut near) = (asked, asked);
+    let mut test = OccluderTest::nothing(zero);
+    let (mut around, mut near) = (lanes, lanes);
     if let Some([low, high]) = shape.bounds {
-        let s: Vec3x16<S> = Exact::new((low + high) * 0.5).seen_from(simd, sight.p);
-        [around, near] = sight.meets(s, s.dot(s).sqrt(), ((high - low).length() * 0.5) as f32, asked);
+        let s: Vec3x16<S> = Exact::new((low + high) * 0.5).seen_from(simd, pyramid.p);
+        [around, near] = pyramid.meets(s, s.dot(s).sqrt(), ((high - low).length() * 0.5) as f32, lanes);
     }
     if around == 0 {
-        return told;
+        return test;
     }
     let mut distances = [0.0f32; LANES];
     let (mut hidden, mut firm) = (0, 0);
@@ -224,8 +224,8 @@ pub(super) fn solid_between<S: Simd>(
             Lies::Near => near &= !bit,
             lies @ (Lies::Inside | Lies::NearlyInside) => {
                 near &= !bit;
-                if shape.kind.has_hole() || shape.may_touch && !shape.contains {
-                    told.other |= bit;
+                if shape.kind.has_hole() || shape.may_contain_light && !shape.contains {
+                    test.other |= bit;
                     continue;
                 }
                 // All of the light is inside, or none of it
@@ -241,29 +241,29 @@ pub(super) fn solid_between<S: Simd>(
         }
     }
     near &= around;
-    (told.hidden, told.firm) = (hidden, hidden & firm);
+    (test.hidden, test.firm) = (hidden, hidden & firm);
     if around == 0 {
-        return told;
+        return test;
     }
-    let shadow = Shadow::new(simd, occluder, sight.p, &sight.ways);
-    if shape.kind == Canonical::Plane && sight.depth == 0.0 {
+    let shadow = Shadow::new(simd, occluder, pyramid.p, &pyramid.light_vectors);
+    if shape.kind == Canonical::Plane && pyramid.depth == 0.0 {
         // From within reach no more of the light is beyond a plane than from the point, if that is farther off
         let mut some = 0;
-        for [x, y] in sight.square() {
+        for [x, y] in pyramid.square() {
             some |= shadow.hides(x, y).to_bitmask();
         }
         let close = f32x16::simd_from(simd, distances).simd_le(zero).to_bitmask();
         near &= some;
         around &= some | close;
     }
-    told.moving = around & sight.reach.simd_gt(zero).to_bitmask();
-    told.motion = sight.motion(f32x16::simd_from(simd, distances));
+    test.moving = around & pyramid.reach.simd_gt(zero).to_bitmask();
+    test.motion = pyramid.motion(f32x16::simd_from(simd, distances));
     if !shape.kind.has_hole() {
         // It is convex: what hides all corners hides all
-        told.hidden |= sight.hidden(&shadow, near);
-        told.firm |= told.hidden & !told.moving;
+        test.hidden |= pyramid.hidden(&shadow, near);
+        test.firm |= test.hidden & !test.moving;
     }
-    told.other |= if shape.may_touch && shape.kind.has_hole() && !shape.kind.is_flat() { near } else { 0 };
-    told.outside = near & !told.hidden;
-    told
+    test.other |= if shape.may_contain_light && shape.kind.has_hole() && !shape.kind.is_flat() { near } else { 0 };
+    test.outside = near & !test.hidden;
+    test
 }

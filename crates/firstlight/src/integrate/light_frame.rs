@@ -1,4 +1,4 @@
-//! A flat light, and how one point sees it.
+//! Flat lights, and their coordinates from a point.
 
 use std::f32::consts::PI;
 
@@ -6,16 +6,15 @@ use crate::light::way_error;
 use crate::material::ShadingPoint;
 use crate::math::{DVec3, UNIT_ROUNDOFF, Vec3};
 
-/// What a flat light fills of the square [-1, 1]^2 of its own coordinates.
+/// The part of the square [-1, 1]^2 of its own coordinates that a flat light fills.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Outline {
-    /// All of it: a rectangle, or what a transform made of one.
+    /// All of it.
     Parallelogram,
     /// x^2 + y^2 <= 1.
     Disk,
-    /// The same, as the part of a sphere that a point sees: not the places of its disk count alike, but those of the
-    /// sphere. It is integrated over longitude and latitude, with the poles in the plane of the disk: x = cos y' sin
-    /// x', y = sin y'.
+    /// The same, standing for the visible part of a sphere: weights are those of the sphere's area. Integrated over
+    /// longitude x' and latitude y', with the poles in the plane of the disk: x = cos y' sin x', y = sin y'.
     Sphere,
 }
 
@@ -24,30 +23,29 @@ pub(crate) enum Outline {
 pub(crate) struct FlatLight {
     /// The middle, in metres, world space.
     pub c: DVec3,
-    /// From the middle to where x is 1.
+    /// The vectors from the middle to x = 1 and to y = 1.
     pub a: Vec3,
-    /// From the middle to where y is 1.
     pub b: Vec3,
     /// Unit normal of the front.
     pub n: Vec3,
-    /// `a`, `b` and `n` as they were given.
+    /// `a`, `b` and `n` in f64.
     pub(super) deep: [DVec3; 3],
     /// The length of `a`, and `a` as a unit vector.
     pub la: f32,
     pub ua: Vec3,
-    /// The part of `b` along `a`; the length of what is left of it, and that as a unit vector.
+    /// The part of `b` along `a`; the length of the rest, and its unit vector.
     pub skew: f32,
     pub lb: f32,
     pub ub: Vec3,
     pub outline: Outline,
-    /// Whether light weakens with the square of the distance and the cosine at the light.
+    /// Whether irradiance falls with the square of the distance and the cosine at the light.
     pub physical: bool,
-    /// Whether the side behind emits as well.
+    /// Whether the back emits as well.
     pub both_sides: bool,
-    /// How many times it is there.
+    /// Factor of the radiance.
     pub times: f32,
-    /// Of a [`Outline::Sphere`]: its radius over the distance of its middle; and, if the part of it that is turned away
-    /// counts as well, the square of the way to where it is touched, else 0.
+    /// Of [`Outline::Sphere`]: radius over distance of the middle; and the power of the point (the squared length of a
+    /// tangent) if the far half counts as well, else 0.
     pub ratio: f32,
     pub behind2: f32,
 }
@@ -83,14 +81,13 @@ impl FlatLight {
         self.deep[2]
     }
 
-    /// How far from its plane, in metres, things are told to be in front of it or behind it: the rounding of its points
-    /// in f32.
+    /// In metres: the rounding of its points in f32, within which the side of its plane is not known.
     pub fn rounding(&self) -> f64 {
         let reach = self.c.abs() + self.deep[0].abs() + self.deep[1].abs();
         reach.element_sum() * f64::from(32.0 * UNIT_ROUNDOFF)
     }
 
-    /// What dx dy is multiplied with: an area (physical), or a share of the whole.
+    /// The factor of dx dy: an area (physical), or a part of the whole.
     pub(super) fn measure(&self) -> f32 {
         let area = match self.outline {
             Outline::Parallelogram => 4.0,
@@ -101,7 +98,7 @@ impl FlatLight {
     }
 }
 
-/// c + x X + y Y: a quantity that changes linearly over a light.
+/// c + x X + y Y: a quantity that is linear over a light.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Linear {
     pub c: f32,
@@ -109,22 +106,22 @@ pub(crate) struct Linear {
     pub y: f32,
 }
 
-/// Points nearer to a light than this, in its half size, count its places from the nearest: from the middle, numbers
-/// would cancel.
+/// As a part of the light's half size: for closer points the coordinates' origin is the nearest place, since from the
+/// middle, numbers would cancel.
 pub(super) const NEAR: f32 = 0.03;
 
-/// A flat light as one point sees it: l = l0 + x a + y b leads from the point to the light.
+/// Coordinates of a flat light from one point: l = l0 + x a + y b is the vector from the point to a place.
 ///
-/// Places (x, y) are counted from the light's middle, or, where the point is near the light, from the place that is
-/// nearest to it: all numbers around there are small then, and wrong by a small part of themselves.
+/// The origin of (x, y) is the light's middle or, if the point is close, the nearest place: numbers around it are
+/// small, and so is their rounding.
 ///
-/// Distances are computed in a frame of the light's plane, where nothing cancels near it:
-/// |l|^2 = (fa + la x + skew y)^2 + (fb + lb y)^2 + height^2.
+/// Distances are computed in a frame of the light's plane, where nothing cancels near it: |l|^2 = (fa + la x + skew
+/// y)^2 + (fb + lb y)^2 + height^2.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct FlatView {
-    /// Where they are counted from, from the middle.
+pub(crate) struct LightFrame {
+    /// The origin, from the middle.
     pub origin: [f32; 2],
-    /// From where to where the light's square goes: -1 to 1 if they are counted from the middle.
+    /// First and last x and y of the light's square: -1 and 1 from the middle.
     pub x: [f32; 2],
     pub y: [f32; 2],
     pub l0: Vec3,
@@ -135,13 +132,13 @@ pub(crate) struct FlatView {
     pub skew: f32,
     pub fb: f32,
     pub lb: f32,
-    /// Of the point above the light's plane.
+    /// Distance of the point from the light's plane.
     pub height: f32,
-    /// How far the point is in front of a side that emits; infinite where both do.
+    /// Distance of the point in front of an emitting side; infinite if both sides emit.
     pub facing: f32,
     /// ns.l
     pub cos: Linear,
-    /// The height of l above the horizon, less what rounding can add to it: [`crate::light::Light::floor`].
+    /// The height of l above the horizon, less its rounding: [`crate::light::Light::floor`].
     pub horizon: Linear,
     /// wo.l
     pub out: Linear,
@@ -155,14 +152,14 @@ pub(crate) struct FlatView {
     pub behind2: f32,
 }
 
-impl FlatView {
-    pub fn new(light: &FlatLight, at: &ShadingPoint) -> FlatView {
+impl LightFrame {
+    pub fn new(light: &FlatLight, at: &ShadingPoint) -> LightFrame {
         let l0 = (light.c - at.p.as_dvec3()).as_vec3();
         let side = -light.n.dot(l0);
         let linear = |v: Vec3| Linear { c: v.dot(l0), x: v.dot(light.a), y: v.dot(light.b) };
         let (cos, mut horizon) = (linear(at.ns), linear(at.horizon));
         horizon.c -= at.horizon.abs().dot(way_error(light.c.as_vec3(), light.a.abs() + light.b.abs(), at.p, at.error));
-        let view = FlatView {
+        let view = LightFrame {
             origin: [0.0; 2],
             x: [-1.0, 1.0],
             y: [-1.0, 1.0],
@@ -189,8 +186,8 @@ impl FlatView {
         if view.nearest() < NEAR * view.la.max(view.lb) { view.near(light, at) } else { view }
     }
 
-    /// The same with places counted from the nearest.
-    fn near(self, light: &FlatLight, at: &ShadingPoint) -> FlatView {
+    /// The same with the nearest place as origin.
+    fn near(self, light: &FlatLight, at: &ShadingPoint) -> LightFrame {
         let [a, b, n] = light.deep;
         let middle = light.c - at.p.as_dvec3();
         let (ua, ub) = (a.normalize(), (b - a * (a.dot(b) / a.length_squared())).normalize());
@@ -214,7 +211,7 @@ impl FlatView {
         };
         let mut horizon = linear(at.horizon);
         horizon.c -= at.horizon.abs().dot(at.error.0 + l0.abs().as_vec3() * UNIT_ROUNDOFF);
-        FlatView {
+        LightFrame {
             origin: [x as f32, y as f32],
             x: [(-1.0 - x) as f32, (1.0 - x) as f32],
             y: [(-1.0 - y) as f32, (1.0 - y) as f32],
@@ -230,7 +227,7 @@ impl FlatView {
         }
     }
 
-    /// The distance to the nearest place of the light's square, or a little less.
+    /// Lower bound of the distance to the light's square, in metres.
     pub fn nearest(&self) -> f32 {
         let gap = |foot: f32, [low, high]: [f32; 2]| (foot - low).max(-foot - high).max(0.0);
         let ([x0, x1], [y0, y1]) = (self.x, self.y);
@@ -240,7 +237,7 @@ impl FlatView {
         (across * across + along * along + self.height * self.height).sqrt()
     }
 
-    /// The direction of a highlight's middle: the viewer's, mirrored at the shading normal.
+    /// The viewer's direction reflected at the shading normal.
     pub fn mirror(&self) -> Option<Vec3> {
         let m = self.ns * (2.0 * self.cos_o) - self.wo;
         let length = m.length();

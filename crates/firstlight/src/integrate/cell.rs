@@ -1,20 +1,21 @@
-//! A light's moments on a cell of it, for sixteen cells at once: from 5 x 5 Gauss nodes, their mean, how far the fit
-//! can be wrong, and, where things stand in the way, the antiderivative along rows.
+//! Quadrature of one cell of a light, for sixteen cells at once: 5 x 5 Gauss-Legendre nodes give the integral of
+//! each moment, an error estimate and, on partially visible cells, the antiderivative along rows as a polynomial.
 //!
-//! On a cell the light is a polynomial of degree 4 along each axis, or nearly so. How nearly, the last coefficients of
-//! its Legendre series say: they fall by the same factor from one to the next, as those of any function that is smooth
-//! beyond the cell.
+//! The error estimate comes from the last two coefficients of the Legendre series along each axis: for functions
+//! that are analytic beyond the cell, coefficients fall geometrically.
 //!
 //! Source: Trefethen, "Approximation Theory and Approximation Practice", 2013, chapters 8 and 19.
 
 use fearless_simd::{f32x16, prelude::*};
 
-use super::batch::{Exact, LaneBlock, LaneNumbers, Linear16, Members, ViewBlock, ViewNumber, Views, ways};
+use super::batch::{
+    Exact, FrameLanes, FrameNumber, LaneBlock, LaneNumbers, LightFrame16, Linear16, Members, light_vectors,
+};
 use super::tolerance::TOLERANCE;
 use crate::material::{LobeKind, LobeLanes};
 use crate::math::{LANES, sin_cos};
 
-/// Moments of a light: the cosine, and the highlight.
+/// Moments of a light: of the cosine, and of the lobe.
 pub(crate) use crate::material::MOMENTS;
 /// Nodes along an axis.
 const NODES: usize = 5;
@@ -30,8 +31,7 @@ const WEIGHTS: [f64; NODES] = [
     0.236_926_885_056_189_08,
 ];
 
-/// The rule as floats, with what each node counts in the coefficients of the last two Legendre polynomials that it
-/// knows.
+/// The rule in f32, with the factors of each node in the coefficients of the Legendre polynomials of degree 3 and 4.
 struct Rule {
     nodes: [f32; NODES],
     weights: [f32; NODES],
@@ -58,7 +58,7 @@ const RULE: Rule = {
     rule
 };
 
-/// Coefficients of x^0 to x^4 of the polynomial that is 1 at a node and 0 at the others.
+/// Coefficients of x^0 to x^4 of the Lagrange polynomials of the nodes.
 const LAGRANGE: [[f64; NODES]; NODES] = {
     let mut all = [[0.0; NODES]; NODES];
     let mut i = 0;
@@ -87,7 +87,8 @@ const LAGRANGE: [[f64; NODES]; NODES] = {
     all
 };
 
-/// The same as floats, and of the antiderivative: what each node counts in x^1 to x^5.
+/// Factors of each node in the coefficients of x^0 to x^4 of the interpolating polynomial, or of x^1 to x^5 of its
+/// antiderivative.
 const fn matrix(antiderivative: bool) -> [[f32; NODES]; NODES] {
     let mut matrix = [[0.0; NODES]; NODES];
     let mut i = 0;
@@ -105,64 +106,63 @@ const fn matrix(antiderivative: bool) -> [[f32; NODES]; NODES] {
 const ANTIDERIVATIVE: [[f32; NODES]; NODES] = matrix(true);
 const MONOMIALS: [[f32; NODES]; NODES] = matrix(false);
 
-/// What a place of a light counts for, beside the cosine at the surface.
+/// The weight of a place of a light in the integral, beside the cosine at the surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum AreaWeight {
-    /// All places alike.
+    /// The same everywhere.
     Constant,
-    /// By the square of the distance and the cosine at the light.
+    /// The cosine at the light over the square of the distance.
     Physical,
-    /// All places of a sphere alike: [`Outline::Sphere`](super::view::Outline::Sphere).
+    /// The same everywhere on a sphere: [`Outline::Sphere`](super::light_frame::Outline::Sphere).
     Sphere,
-    /// The same of a sphere that points are inside of, seen through the faces of a cube.
+    /// The same on a sphere around the points, seen through the faces of a cube.
     Around { center: Exact, radius: f32 },
 }
 
-/// A rectangle of a light's square, of one point.
+/// A rectangle of a light's square, for one point.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Cell {
     /// The point it is seen from.
     pub point: u32,
-    /// From where to where.
+    /// First and last x and y, in the light's coordinates; longitude and latitude of a sphere.
     pub x: [f32; 2],
     pub y: [f32; 2],
-    /// How often it was halved.
+    /// The number of halvings.
     pub depth: u32,
 }
 
-/// What sixteen cells send, and how far that can be wrong along x and along y; each for both moments.
+/// Integrals over sixteen cells, and their error estimates along x and along y; of each moment.
 #[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct Fits {
+pub(crate) struct CellQuadrature {
     pub sums: [LaneNumbers; MOMENTS],
     pub errors: [[LaneNumbers; MOMENTS]; 2],
 }
 
-/// How many numbers of a polynomial along both axes.
+/// Coefficients of a polynomial of degree 4 along both axes.
 const POWERS: usize = NODES * NODES;
 
-/// What is kept of sixteen cells that are seen in part: the antiderivatives along x of what they send, moment by
-/// moment, and from where to where they go.
+/// Sixteen partially visible cells: the antiderivatives along x of each moment, and the sides of the cells.
 #[derive(Clone, Debug)]
-pub(crate) struct CutBlock([LaneNumbers; MOMENTS * POWERS + 4]);
+pub(crate) struct PartialCells([LaneNumbers; MOMENTS * POWERS + 4]);
 
-impl CutBlock {
-    /// The number of a coefficient, of x^(`x` + 1) y^`y`.
+impl PartialCells {
+    /// The index of the coefficient of x^(`x` + 1) y^`y`.
     pub const fn power(moment: usize, x: usize, y: usize) -> usize {
         moment * POWERS + x * NODES + y
     }
 
-    /// The numbers of the first column, the last, the first row, and the last.
+    /// The indices of the first x, the last x, the first y and the last y.
     pub const SIDES: [usize; 4] = [MOMENTS * POWERS, MOMENTS * POWERS + 1, MOMENTS * POWERS + 2, MOMENTS * POWERS + 3];
 }
 
-impl LaneBlock for CutBlock {
+impl LaneBlock for PartialCells {
     #[inline(always)]
     fn numbers(&self) -> &[LaneNumbers] {
         &self.0
     }
 }
 
-/// The sides of up to sixteen cells: the first column, the last, the first row, and the last.
+/// The sides of up to sixteen cells: first x, last x, first y, last y.
 #[inline(always)]
 pub(super) fn sides(cells: &[Cell]) -> [LaneNumbers; 4] {
     let mut sides = [[0.0; LANES]; 4];
@@ -173,19 +173,20 @@ pub(super) fn sides(cells: &[Cell]) -> [LaneNumbers; 4] {
     sides
 }
 
-/// What sixteen cells send at the nodes: [moment][row][column].
+/// Values at the nodes: [moment][row][column].
 type NodeValues<S> = [[[f32x16<S>; NODES]; NODES]; MOMENTS];
 
-/// What up to sixteen cells send at the nodes, and what they count for. To be called within `vectorize`.
+/// The moments' integrands at the nodes of up to sixteen cells, and the areas of the cells. To be called within
+/// `vectorize`.
 #[inline(always)]
 fn values<S: Simd>(
     simd: S,
     lobes: &LobeLanes,
     falloff: AreaWeight,
-    members: &Members<ViewBlock>,
+    members: &Members<LightFrame16>,
     cells: &[Cell],
 ) -> (NodeValues<S>, f32x16<S>) {
-    use ViewNumber::*;
+    use FrameNumber::*;
     let splat = |v: f32| simd.splat_f32x16(v);
     let [x0, x1, y0, y1] = sides(cells).map(|side| f32x16::simd_from(simd, side));
     let (xm, xh, ym, yh) = ((x0 + x1) * 0.5, (x1 - x0) * 0.5, (y0 + y1) * 0.5, (y1 - y0) * 0.5);
@@ -204,13 +205,13 @@ fn values<S: Simd>(
     let mut values = [[[zero; NODES]; NODES]; MOMENTS];
     let is_sphere = falloff == AreaWeight::Sphere;
     let (ratio, behind2) = (members.lanes(simd, Ratio), members.lanes(simd, Behind2));
-    // The way to the middle of a sphere, and the square of the way to where it is touched, as if there were one
+    // Distance along the way to the middle of a sphere, and the power of the point with respect to it
     let around = match falloff {
         AreaWeight::Around { center, radius } => {
             let to = center.seen_from(simd, members.vectors(simd, [Px, Py, Pz]));
             let distance = to.dot(to).sqrt();
             let touch2 = ((distance - radius) * (distance + radius)).min(zero);
-            (Linear16::along(to, &ways(simd, members)), touch2, height * radius)
+            (Linear16::along(to, &light_vectors(simd, members)), touch2, height * radius)
         }
         _ => (Linear16 { c: zero, x: zero, y: zero }, zero, zero),
     };
@@ -266,8 +267,8 @@ fn values<S: Simd>(
     (values, xh * yh * members.lanes(simd, Measure))
 }
 
-/// The sum of a moment over a cell, and the last two coefficients of its series along x and along y, as much as they
-/// make of that.
+/// The integral of a moment over a cell, and the absolute last two Legendre coefficients along x and along y, times
+/// their number of terms.
 #[inline(always)]
 fn sum<S: Simd>(simd: S, values: &[[f32x16<S>; NODES]; NODES]) -> (f32x16<S>, [[f32x16<S>; 2]; 2]) {
     let zero = simd.splat_f32x16(0.0);
@@ -290,36 +291,36 @@ fn sum<S: Simd>(simd: S, values: &[[f32x16<S>; NODES]; NODES]) -> (f32x16<S>, [[
     (sum, tails)
 }
 
-/// The fit of up to sixteen cells. Where all of a cell is seen it can be wrong by the end of its series, times the part
-/// of all that this is, as errors cancel at Gauss nodes. With `kept`, that is what is kept of cells that are seen in
-/// part, where they do not. To be called within `vectorize`.
+/// Integrates up to sixteen cells. On fully visible cells the error estimate is the tail of the series times its ratio
+/// to the integral, since errors cancel at Gauss nodes; on partially visible cells they do not. With `kept`, cells are
+/// partially visible, and their antiderivatives are appended to it. To be called within `vectorize`.
 #[inline(always)]
-pub(crate) fn fit<S: Simd>(
+pub(crate) fn integrate<S: Simd>(
     simd: S,
     lobe: Option<LobeKind>,
     falloff: AreaWeight,
-    members: &Members<ViewBlock>,
+    members: &Members<LightFrame16>,
     cells: &[Cell],
-    kept: Option<&mut Vec<CutBlock>>,
-) -> Fits {
+    kept: Option<&mut Vec<PartialCells>>,
+) -> CellQuadrature {
     let lobes = members.lobes(simd, lobe);
     let (values, area) = values(simd, &lobes, falloff, members, cells);
     let (zero, one, least) = (simd.splat_f32x16(0.0), simd.splat_f32x16(1.0), simd.splat_f32x16(f32::MIN_POSITIVE));
-    let mut fits = Fits::default();
+    let mut whole_sums = CellQuadrature::default();
     let moments = lobes.moment_count();
     for (moment, values) in values.iter().enumerate().take(moments) {
         let (sum, tails) = sum(simd, values);
-        fits.sums[moment] = (sum * area).to_array();
+        whole_sums.sums[moment] = (sum * area).to_array();
         for (axis, [before, last]) in tails.into_iter().enumerate() {
             let tail = last + before * 0.25;
             let part = (tail / sum.abs().max(least)).min(one);
             let part = if kept.is_some() { simd.splat_f32x16(TOLERANCE.fit_cut) } else { part };
-            fits.errors[axis][moment] = (tail * part * area).to_array();
+            whole_sums.errors[axis][moment] = (tail * part * area).to_array();
         }
     }
-    let Some(kept) = kept else { return fits };
-    let mut block = CutBlock([[0.0; LANES]; _]);
-    for (number, side) in CutBlock::SIDES.into_iter().zip(sides(cells)) {
+    let Some(kept) = kept else { return whole_sums };
+    let mut block = PartialCells([[0.0; LANES]; _]);
+    for (number, side) in PartialCells::SIDES.into_iter().zip(sides(cells)) {
         block.0[number] = side;
     }
     for moment in 0..moments {
@@ -339,10 +340,10 @@ pub(crate) fn fit<S: Simd>(
                 for (row, factor) in rows.iter().zip(matrix) {
                     sum += row[k] * *factor;
                 }
-                block.0[CutBlock::power(moment, k, m)] = (sum * area).to_array();
+                block.0[PartialCells::power(moment, k, m)] = (sum * area).to_array();
             }
         }
     }
     kept.push(block);
-    fits
+    whole_sums
 }

@@ -1,48 +1,52 @@
-//! How sixteen points see a light before anything is in the way, and the cells that it is asked by at first: none is
-//! wide beside its distance, or beside a highlight on it.
+//! The horizon test of a light from sixteen points, and the first subdivision of a light into cells: until none is
+//! wide beside its distance or beside a highlight.
 
 use std::f32::consts::FRAC_PI_2;
 
 use fearless_simd::{f32x16, mask32x16, prelude::*};
 
-use super::batch::{LaneNumbers, Linear16, Members, ViewBlock, ViewNumber, Views, ways};
-use super::fit::{Cell, sides};
+use super::batch::{
+    FrameLanes, FrameNumber, LaneNumbers, LightFrame16, Linear16, Members, light_vectors, point_numbers,
+};
+use super::cell::{Cell, sides};
+use super::light_frame::Outline;
 use super::tolerance::TOLERANCE;
-use super::view::Outline;
 use crate::material::{LobeKind, ShadingPoint};
-use crate::math::{LANES, Vec3x16, sin_cos};
+use crate::math::{Vec3x16, sin_cos};
 
-/// What sixteen points see of a light with nothing in the way, each a bit.
+/// The horizon test of sixteen points, without occluders, as bits.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Survey {
-    /// Some of it can arrive: a side that emits faces the point, and some of the light is above its horizons.
+pub(super) struct HorizonTest {
+    /// A side that emits faces the point, and some of the light is above its horizons.
     pub arrives: u64,
-    /// All of it is above them.
+    /// All of the light is above them.
     pub above: u64,
-    /// The same for all places within a point's reach: nothing arrives, all is above; and none of them passes the
-    /// light's plane.
+    /// For all places within the point's reach: no light arrives; all of the light is above the horizons; and the
+    /// light's plane is not crossed.
     pub below_around: u64,
     pub above_around: u64,
     pub beside_around: u64,
-    /// The distance to the nearest place of the light's square, or a little less; and to its plane.
+    /// Lower bound of the distance to the light's square, and the distance to its plane, in metres.
     pub nearest: LaneNumbers,
     pub height: LaneNumbers,
 }
 
-/// Looks at a light from up to sixteen points. To be called within `vectorize`.
+/// Tests a light against the horizons of up to sixteen points. To be called within `vectorize`.
 #[inline(always)]
-pub(super) fn survey<S: Simd>(simd: S, views: &ViewBlock, is_physical: bool, points: &[ShadingPoint]) -> Survey {
-    use ViewNumber::*;
+pub(super) fn test_horizons<S: Simd>(
+    simd: S,
+    frames: &LightFrame16,
+    is_physical: bool,
+    points: &[ShadingPoint],
+) -> HorizonTest {
+    use FrameNumber::*;
     let zero = simd.splat_f32x16(0.0);
-    let (mut reach, mut turn) = ([0.0; LANES], [0.0; LANES]);
-    for (k, point) in points.iter().enumerate() {
-        (reach[k], turn[k]) = (point.reach, point.turn);
-    }
-    let (reach, turn) = (f32x16::simd_from(simd, reach), f32x16::simd_from(simd, turn));
-    let [x0, x1] = [views.lanes(simd, X0), views.lanes(simd, X1)];
-    let [y0, y1] = [views.lanes(simd, Y0), views.lanes(simd, Y1)];
-    let (height, facing) = (views.lanes(simd, Height), views.lanes(simd, Facing));
-    let l = ways(simd, views);
+    let reach = point_numbers(simd, points, |point| point.reach);
+    let turn = point_numbers(simd, points, |point| point.turn);
+    let [x0, x1] = [frames.lanes(simd, X0), frames.lanes(simd, X1)];
+    let [y0, y1] = [frames.lanes(simd, Y0), frames.lanes(simd, Y1)];
+    let (height, facing) = (frames.lanes(simd, Height), frames.lanes(simd, Facing));
+    let l = light_vectors(simd, frames);
     let mut far2 = zero;
     for [x, y] in [[x0, y0], [x1, y0], [x1, y1], [x0, y1]] {
         let corner = l[0] + (l[1] * x + l[2] * y);
@@ -58,7 +62,7 @@ pub(super) fn survey<S: Simd>(simd: S, views: &ViewBlock, is_physical: bool, poi
     let mut above = arrives;
     let mut below_around = facing.simd_lt(-reach);
     let mut above_around = is_beside;
-    for line in [views.linear(simd, [CosC, CosX, CosY]), views.linear(simd, [HorizonC, HorizonX, HorizonY])] {
+    for line in [frames.linear(simd, [CosC, CosX, CosY]), frames.linear(simd, [HorizonC, HorizonX, HorizonY])] {
         let most = line.c + (line.x * x0).max(line.x * x1) + (line.y * y0).max(line.y * y1);
         let least = line.c + (line.x * x0).min(line.x * x1) + (line.y * y0).min(line.y * y1);
         arrives &= most.simd_gt(zero);
@@ -66,19 +70,19 @@ pub(super) fn survey<S: Simd>(simd: S, views: &ViewBlock, is_physical: bool, poi
         below_around |= most.simd_lt(-room);
         above_around &= least.simd_gt(room);
     }
-    Survey {
+    HorizonTest {
         arrives: arrives.to_bitmask(),
         above: (arrives & above).to_bitmask(),
         below_around: below_around.to_bitmask(),
         above_around: above_around.to_bitmask(),
         beside_around: is_beside.to_bitmask(),
-        nearest: views.nearest(simd).to_array(),
+        nearest: frames.nearest(simd).to_array(),
         height: height.to_array(),
     }
 }
 
-/// A light as one cell, as `point` asks it: in the coordinates by which it is cut.
-pub(super) fn whole(outline: Outline, point: u32, [x, y]: [[f32; 2]; 2]) -> Cell {
+/// The light as one cell of `point`, in the coordinates in which it is subdivided.
+pub(super) fn whole_light(outline: Outline, point: u32, [x, y]: [[f32; 2]; 2]) -> Cell {
     match outline {
         Outline::Parallelogram | Outline::Disk => Cell { point, x, y, depth: 0 },
         Outline::Sphere => {
@@ -88,27 +92,27 @@ pub(super) fn whole(outline: Outline, point: u32, [x, y]: [[f32; 2]; 2]) -> Cell
     }
 }
 
-/// What becomes of sixteen cells, each a bit.
+/// Sizes and horizon tests of sixteen cells, as bits.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Grades {
-    /// Nothing of it is in the light and above the horizons; all of it is.
+pub(super) struct CellMetrics {
+    /// None of the cell is in the light's outline and above the horizons; all of it is.
     pub nothing: u64,
     pub all: u64,
-    /// It is too wide, and longer along y than along x.
+    /// The cell is too wide, and longer along y than along x.
     pub wide: u64,
     pub along_y: u64,
 }
 
-/// Grades up to sixteen cells. To be called within `vectorize`.
+/// Metrics of up to sixteen cells. To be called within `vectorize`.
 #[inline(always)]
-pub(super) fn grade<S: Simd>(
+pub(super) fn cell_metrics<S: Simd>(
     simd: S,
     lobe: Option<LobeKind>,
     outline: Outline,
-    members: &Members<ViewBlock>,
+    members: &Members<LightFrame16>,
     cells: &[Cell],
-) -> Grades {
-    use ViewNumber::*;
+) -> CellMetrics {
+    use FrameNumber::*;
     let zero = simd.splat_f32x16(0.0);
     let [u0, u1, v0, v1] = sides(cells).map(|side| f32x16::simd_from(simd, side));
     let ([x0, x1], [y0, y1]) = match outline {
@@ -133,7 +137,7 @@ pub(super) fn grade<S: Simd>(
         // How far off the highlight's middle the cell begins
         let mirror = members.vectors(simd, [MirrorX, MirrorY, MirrorZ]);
         let has_mirror = mirror.dot(mirror).simd_gt(zero);
-        let [l0, a, b] = ways(simd, members);
+        let [l0, a, b] = light_vectors(simd, members);
         let l: Vec3x16<S> = l0 + (a * x + b * y);
         let length2 = l.dot(l);
         let cos = (l.dot(mirror) / length2.sqrt()).max(simd.splat_f32x16(-1.0)).min(simd.splat_f32x16(1.0));
@@ -148,7 +152,7 @@ pub(super) fn grade<S: Simd>(
         Outline::Sphere => (v1 - v0).simd_gt(u1 - u0),
         Outline::Parallelogram | Outline::Disk => (half_y2 + lean * lean).simd_gt(half_x * half_x),
     };
-    Grades {
+    CellMetrics {
         nothing: nothing.to_bitmask(),
         all: all.to_bitmask(),
         wide: wide.to_bitmask(),
@@ -156,7 +160,7 @@ pub(super) fn grade<S: Simd>(
     }
 }
 
-/// Boxes of the light's square around cells of a sphere.
+/// Bounding rectangles, on the disk, of cells of a sphere in longitude and latitude.
 #[inline(always)]
 fn around<S: Simd>(simd: S, [u0, u1]: [f32x16<S>; 2], [v0, v1]: [f32x16<S>; 2]) -> ([f32x16<S>; 2], [f32x16<S>; 2]) {
     let (zero, one) = (simd.splat_f32x16(0.0), simd.splat_f32x16(1.0));
@@ -169,16 +173,16 @@ fn around<S: Simd>(simd: S, [u0, u1]: [f32x16<S>; 2], [v0, v1]: [f32x16<S>; 2]) 
     ([from, to], [south, north])
 }
 
-/// Of which rectangles of a light's square nothing is in the light and above the horizons, and of which all.
+/// Rectangles of a light's square of which nothing, and of which all, is in the outline and above the horizons.
 #[inline(always)]
 fn seen<S: Simd>(
     simd: S,
     outline: Outline,
-    members: &Members<ViewBlock>,
+    members: &Members<LightFrame16>,
     [x0, x1]: [f32x16<S>; 2],
     [y0, y1]: [f32x16<S>; 2],
 ) -> [mask32x16<S>; 2] {
-    use ViewNumber::*;
+    use FrameNumber::*;
     let (zero, one) = (simd.splat_f32x16(0.0), simd.splat_f32x16(1.0));
     let lines: [Linear16<S>; 2] =
         [members.linear(simd, [CosC, CosX, CosY]), members.linear(simd, [HorizonC, HorizonX, HorizonY])];
@@ -202,7 +206,7 @@ fn seen<S: Simd>(
     [nothing, all]
 }
 
-/// Both halves of a cell, along x or along y: at 0, from where places are counted, or in the middle. `None` where no
+/// The halves of a cell along x or along y: at 0, the origin of the coordinates, or in the middle. `None` where no
 /// number is left between.
 pub(super) fn halves(cell: &Cell, along_y: bool) -> Option<[Cell; 2]> {
     let [from, to] = if along_y { cell.y } else { cell.x };
