@@ -558,8 +558,8 @@ impl AreaLightIntegrator {
             let state = &mut self.state[panel.point as usize];
             let value = lane(&sums.sums, k);
             let differences = lane(&sums.differences, k);
-            // The finer rule has a smaller error than the difference, the more so the closer both are; but where outlines
-            // cross, both may agree by chance
+            // The finer rule has a smaller error than the difference, the more so the closer both are; but where
+            // outlines cross, both may agree by chance
             let error = || {
                 std::array::from_fn(|moment| {
                     let (difference, value) = (differences[moment], value[moment].abs());

@@ -1,8 +1,8 @@
 //! Direct light at shading points: each light is estimated for all points that need it together.
 //!
-//! Lights that are integrated are evaluated in batches of sixteen points ([`AreaLightIntegrator`]), past the listed occluders and
-//! the few triangles that are gathered from the BVHs. Where more than that may occlude a light, the estimate is
-//! unknown, and callers sample the light ([`pooled`](super::pooled)).
+//! Lights that are integrated are evaluated in batches of sixteen points ([`AreaLightIntegrator`]), past the listed
+//! occluders and the few triangles that are gathered from the BVHs. Where more than that may occlude a light, the
+//! estimate is unknown, and callers sample the light ([`pooled`](super::pooled)).
 
 mod gather;
 mod sampled;
