@@ -27,7 +27,7 @@ words! {
         /// What may stand before a light is gathered once for many points; where nothing does, nothing is traced.
         Shafts = "shafts",
         /// Every sample of every light for itself, at every camera ray: the bits of the plain renderer. Lights that are
-        /// integrated are sampled, and [`AaMode`] is of no account.
+        /// integrated are sampled, and [`AaMode`] has no effect.
         Traced = "traced",
     }
 }

@@ -6,11 +6,12 @@
 //! behind     what rays see of the lights past what lies in trees, and light over squares of pixels behind that
 //! middles    what a surface in a pixel gets of a light, from its middle
 //! quadrants  the same, from four places of it
-//! rays       the same, from all of its camera rays; where no batch knows it, they ask points of the light together
+//! rays       the same, from all of its camera rays; lights without a closed form there are sampled for all of them
 //! resolve    the pixel's sum, once
 //! ```
 //!
-//! Each station asks [`DirectLighting`] for all of its places together; what its judge refuses is asked by the next.
+//! Each station has [`DirectLighting`] estimate all of its shading points in one call. Pixels whose error estimate is
+//! too large go on to the next station.
 //! Where lights are many, [`Many`] stands for all stations after the first. Cells lie on a grid of the film and are
 //! always rendered whole, so no decision depends on tiles, crops or threads.
 
@@ -42,7 +43,7 @@ use crate::scene::Scene;
 use crate::visibility::Visibility;
 use behind::Behind;
 
-/// So many fragments, of one light each, ask at all of their rays at once.
+/// The number of pairs of a fragment and a light whose camera rays are estimated in one call.
 const AT_ONCE: usize = 8;
 /// Pixels across a cell.
 pub(crate) const CELL: u32 = 32;
@@ -53,7 +54,7 @@ const DEPTHS: usize = CELL.ilog2() as usize + 2;
 /// What is known of a pixel.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum PixelState {
-    /// Its colour, or that nobody asks for it.
+    /// Its colour is summed, or the film does not have it.
     Done,
     /// It is in this of the blocks.
     Block(u32),
@@ -71,13 +72,13 @@ struct Pixel {
     terms: PixelTerms,
 }
 
-/// A fragment that wants a light.
+/// A fragment and a light whose contribution is not known yet.
 #[derive(Clone, Copy, Debug)]
 struct Wanted {
     fragment: u32,
     light: u32,
     visibility: Visibility,
-    /// Whether each ray asks for itself: no place of the fragment stands for others.
+    /// Whether each camera ray needs its own estimate: no shading point represents several of them.
     is_parted: bool,
 }
 
@@ -118,11 +119,11 @@ pub(crate) struct Cells<'a> {
     rays: Vec<(u32, RayHit)>,
     seen: Vec<Member>,
     shapes: Vec<Candidate>,
-    /// What is to be asked by middles, by quadrants and by rays.
+    /// The pairs of a fragment and a light to be estimated by middles, by quadrants and by rays.
     wanted: Vec<Wanted>,
     parted: Vec<Wanted>,
     refused: Vec<Wanted>,
-    /// How many lights each fragment asks for at its rays.
+    /// The number of lights that are estimated at the camera rays of each fragment.
     asked: Vec<usize>,
     behind: Behind,
     /// What arrives where lights are many, in place of the stations after the first.
@@ -168,7 +169,7 @@ impl<'a> Cells<'a> {
         }
     }
 
-    /// Renders one tile. `go_on` is asked now and then.
+    /// Renders one tile. It calls `go_on` between the stations of a cell, and stops where that breaks.
     pub fn render(&mut self, film: &mut FilmTile, go_on: &impl Fn() -> ControlFlow<()>) -> ControlFlow<(), Counts> {
         let tile = &{ film.tile };
         let mut counts = Counts::default();
@@ -251,12 +252,12 @@ impl<'a> Cells<'a> {
         })
     }
 
-    /// Queues what light the grid does not tell.
+    /// Makes fragments of the pixels that the grid does not light, and queues their lights.
     fn fragments(&mut self, counts: &mut Counts) {
         let scene = self.scene;
         let [x, y] = self.corner;
         let lights = 0..scene.lights.len() as u32;
-        // Those whose rays were traced want all lights
+        // Fragments of traced pixels have no light from the grid
         for fragment in 0..self.fragments.all.len() as u32 {
             self.wanted.extend(lights.clone().map(|light| Wanted::new(fragment, light)));
         }
@@ -496,7 +497,7 @@ impl<'a> Cells<'a> {
         if spread * weight > allowed {
             return false;
         }
-        // Fewer than four quadrants do not tell how light changes along both axes
+        // Fewer than four quadrants do not show how light varies along both axes
         self.fragments.quadrants(fragment).iter().all(|Quadrant { contrast, .. }| {
             let mingled = contrast.of(&apart);
             *contrast == Contrast::default()
@@ -517,7 +518,7 @@ impl<'a> Cells<'a> {
                 self.asked[fragment] += self.count_settled(fragment);
             }
         }
-        // What some are asked tells how others are asked best
+        // A few at a time: each call holds the shading points of all their camera rays
         for some in refused.chunks(AT_ONCE) {
             self.rays_of(some, counts, go_on)?;
         }
@@ -630,5 +631,5 @@ impl<'a> Cells<'a> {
     }
 }
 
-/// Rays of a pixel that is asked for its quadrants alone.
+/// Camera rays of a pixel that is lit at its quadrants alone.
 const QUADRANTS: u32 = 4;

@@ -1,6 +1,6 @@
-//! What of each light the rays of some fragments see past what lies in trees: gathered for all of them together, so
-//! that a fragment is asked once where nothing is in the way from any of its rays, and its rays are asked together
-//! where something is.
+//! The visibility of each light from all camera rays of a group of fragments, past the meshes and instances in trees.
+//! A fragment whose rays all see the light unoccluded is lit once; where occluders hide some of it from some rays, the
+//! light is sampled for all rays of the fragment together ([`PooledVisibility`]).
 
 use std::ops::{ControlFlow, Range};
 
@@ -41,17 +41,17 @@ pub(super) struct Behind {
     sights: Vec<RaySights>,
     /// What each light would send to each fragment of the cell if nothing were in the way, once that is known.
     wholes: Vec<Vec<Moments>>,
-    /// Which share of each light pixels see, as a few of their rays say, light by light; and which were asked.
+    /// The visible fraction of each light from each pixel, by pilot rays, and which blocks of pixels have shot theirs.
     pub(super) votes: Vec<f32>,
     pub(super) voted: Vec<bool>,
-    /// The rays of a square, and the pixels of the cell that were asked for squares, light by light.
+    /// The shading points of a square; the interpolation nodes of the cell: pixel, light, and what it receives.
     pub(super) points: Vec<Viewpoint>,
     pub(super) nodes: Vec<(usize, usize, super::squares::SquareNode)>,
 }
 
 /// No fragment.
 pub(super) const NONE: u32 = u32::MAX;
-/// Rays that look for lights together, if none of their fragments has more.
+/// The most camera rays that are classified together, unless one fragment has more.
 const TOGETHER: usize = 64;
 
 impl Behind {
@@ -76,7 +76,7 @@ fn is_kept(k: u32, n: u32, tolerance: f32) -> bool {
     tolerance < TOLERANCE.half_of_rays || (k % n + k / n).is_multiple_of(2)
 }
 
-/// The rays of some fragments, as they look for lights. Keeps its memory.
+/// The shading points of the camera rays of some fragments. Keeps its memory.
 #[derive(Default)]
 struct RayBlock {
     places: Vec<ShadingPoint>,
@@ -87,7 +87,7 @@ struct RayBlock {
 /// What the rays of a block see of one light. Keeps its memory.
 #[derive(Default)]
 struct RaySights {
-    /// Which fragments are asked.
+    /// Which fragments have rays to be classified.
     open: Vec<bool>,
     order: Vec<u32>,
     sights: Vec<Option<Visibility>>,
@@ -106,8 +106,8 @@ struct FragmentRays {
 }
 
 impl Cells<'_> {
-    /// Finds out what rays see of the lights that are wanted, past what lies in trees. What is told by that is wanted
-    /// no more.
+    /// Classifies the visibility of the queued lights past what lies in trees, and takes those off the queue whose
+    /// contribution is known by that.
     pub(super) fn behind(&mut self, counts: &mut Counts, go_on: &impl Fn() -> ControlFlow<()>) -> ControlFlow<()> {
         if !self.scene.geometry.has_boxes() {
             return ControlFlow::Continue(());
@@ -130,7 +130,7 @@ impl Cells<'_> {
         ControlFlow::Continue(())
     }
 
-    /// Leaves of what is wanted that of which too little is known by now, and tells the rest.
+    /// Keeps the queued lights whose contribution is not known, with their visibility, and adds the others.
     fn tell_wanted(&mut self, wanted: &mut Vec<Wanted>) {
         wanted.retain_mut(|Wanted { fragment, light, visibility, .. }| {
             *visibility = match self.fragment_light(*fragment as usize, *light as usize) {
@@ -181,7 +181,7 @@ impl Cells<'_> {
         }
     }
 
-    /// Whether a fragment wants any light.
+    /// Whether the visibility of any light from a fragment is unknown.
     fn is_open(&self, fragment: usize) -> bool {
         let lights = self.scene.lights.len();
         let known = &self.behind.known[fragment * lights..][..lights];
@@ -265,7 +265,7 @@ impl Cells<'_> {
         (0..self.scene.lights.len()).filter(is).count()
     }
 
-    /// Of how many lights the rays of a fragment were asked for points.
+    /// The number of lights that were sampled for the rays of a fragment.
     pub(super) fn count_settled(&self, fragment: usize) -> usize {
         self.count_lights(fragment, |sight| matches!(sight, FragmentLight::Summed(_)))
     }
@@ -312,7 +312,7 @@ impl Cells<'_> {
     }
 
     /// What a light would send to a fragment if nothing were in the way, with all colours; black where that is not
-    /// known. All fragments of the cell are asked together.
+    /// known. The integrals of all fragments of the cell are evaluated in one call.
     fn unshadowed(&mut self, fragment: usize, light: usize, counts: &mut Counts) -> Rgb {
         let (scene, lights) = (self.scene, &mut self.lights);
         if !lights.is_integrated(light) {
@@ -368,7 +368,7 @@ impl Cells<'_> {
         let others = self.others(of.fragment as usize, light, counts);
         let Fragment { surface, share, .. } = self.fragments.all[of.fragment as usize];
         let salt = salt(self.at(self.pixel_of(of.fragment as usize)), surface);
-        // Of how many lights points may be asked, as far as is known by now
+        // The most lights that may be sampled for the fragment, by what is known so far
         let asked = self.count_lights(of.fragment as usize, |sight| {
             !matches!(sight, FragmentLight::Done | FragmentLight::Seen(Visibility::Full | Visibility::None))
         });

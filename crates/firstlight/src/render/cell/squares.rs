@@ -1,10 +1,10 @@
-//! Light behind what is in trees over squares of pixels: where shadows are wider than pixels, nine pixels of a square
-//! tell what the others see.
+//! Interpolation of light behind trees over squares of pixels, where penumbrae are wider than pixels.
 //!
-//! A square of one smooth surface is asked in nine pixels, each at all of its rays: its corner, those of the squares
-//! beside it, and those half way. If the four in the corners foretell the other five, and a few rays from each pixel
-//! agree with what the nine make of it, the rest lie on the parabola through the nine. Else its quarters are asked,
-//! down to four pixels across.
+//! A square that sees one smooth surface is lit in nine pixels, its nodes, at all camera rays of each: its first
+//! corner, the three corners that it shares with its neighbours, and the pixels half way. Where bilinear interpolation
+//! of the four corners reproduces the other five nodes, and the visible fractions by pilot rays from every pixel agree
+//! with it, the other pixels get the biquadratic through the nodes. Elsewhere the square is quartered, down to four
+//! pixels.
 
 use std::ops::ControlFlow;
 
@@ -28,18 +28,18 @@ use crate::visibility::{Viewpoint, Visibility};
 /// Pixels across the largest and the smallest squares.
 const LARGEST: u32 = 16;
 const SMALLEST: u32 = 4;
-/// Rays of a pixel that look for what the nine do not see.
+/// Pilot rays of a pixel: they detect what the nodes miss.
 const LOOKING: usize = 16;
 /// Pixels across a block, of which those rays go together.
 const BLOCK: u32 = 4;
-/// What a pixel that was asked sees of a light: the mean over its rays.
+/// A node: the mean of a light over the camera rays of its pixel.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct SquareNode {
     sums: Moments,
     share: f32,
 }
 
-/// The three pixels of a row of a square that are asked, counted from its first.
+/// The positions of the nodes along one axis, in pixels from the first of the square.
 #[derive(Clone, Copy)]
 struct Places([u32; 3]);
 
@@ -109,7 +109,7 @@ impl Misses {
 }
 
 impl Cells<'_> {
-    /// Lights what squares of the cell tell.
+    /// Interpolates lights over the squares of the cell.
     pub(super) fn squares(&mut self, counts: &mut Counts, go_on: &impl Fn() -> ControlFlow<()>) -> ControlFlow<()> {
         let scene = self.scene;
         let [x, y] = self.corner;
@@ -128,7 +128,7 @@ impl Cells<'_> {
         ControlFlow::Continue(())
     }
 
-    /// Asks for some lights over a square, or over those of its quarters that tell.
+    /// Interpolates some lights over a square, or over its quarters where the test of the square fails.
     fn square(&mut self, square: Square, lights: &[usize], counts: &mut Counts) {
         let mut left = ArrayVec::<usize, FEW_LIGHTS>::new();
         let is_open = |light: &usize| square.pixels().any(|at| self.is_unknown(at, *light));
@@ -188,7 +188,7 @@ impl Cells<'_> {
         Some(place)
     }
 
-    /// Whether one smooth surface fills all pixels of a square, and those that are asked for it.
+    /// Whether one smooth surface fills all pixels of a square, and its nodes beside it.
     fn is_smooth(&self, square: Square) -> bool {
         let Square { x, y, side } = square;
         if x + side > self.scene.width || y + side > self.scene.height {
@@ -228,7 +228,7 @@ impl Cells<'_> {
         })
     }
 
-    /// Which columns and rows of a square are asked.
+    /// The columns and rows of a square that have nodes.
     fn places(&self, Square { x, y, side }: Square) -> [Places; 2] {
         let end = |axis: usize| (self.corner[axis] + CELL).min([self.scene.width, self.scene.height][axis]);
         [Places::new(x, side, end(0)), Places::new(y, side, end(1))]
@@ -256,7 +256,8 @@ impl Cells<'_> {
         true
     }
 
-    /// Whether a light runs through a square or what is asked for it, so that the nine may lie evenly by chance.
+    /// Whether the plane or the surface of a light passes through a square and its nodes, so that they may pass the
+    /// bilinear test by chance.
     fn is_parted(&self, square: Square, light: usize) -> bool {
         let [columns, rows] = self.places(square);
         let nodes = rows.0.iter().flat_map(|j| columns.0.map(|i| [square.x + i, square.y + j]));
@@ -359,8 +360,7 @@ impl Cells<'_> {
         kinds.into_iter().filter(|kind| *kind).count() > 1
     }
 
-    /// The share of a light that a fragment sees, by a few rays of its pixel; not a number where none were
-    /// asked.
+    /// The visible fraction of a light from a fragment, by the pilot rays of its pixel; not a number without those.
     pub(super) fn share_seen(&self, fragment: usize, light: usize) -> f32 {
         let index = self.pixels[self.fragments.all[fragment].pixel as usize].index as usize;
         if self.behind.only[index] != fragment as u32 {
@@ -369,8 +369,8 @@ impl Cells<'_> {
         self.behind.votes[index * self.scene.lights.len() + light]
     }
 
-    /// Whether nine pixels of a square tell what the others see of a light, which agrees with what a few rays of those
-    /// say; then all is noted.
+    /// Whether the nodes of a square pass the bilinear test, and the pilot rays of its pixels agree with them; then the
+    /// interpolated light of all its pixels is stored.
     fn is_foretold(&mut self, square: Square, light: usize, counts: &mut Counts) -> bool {
         let Square { x, y, side } = square;
         let rays = (self.scene.antialiasing * self.scene.antialiasing) as f32;

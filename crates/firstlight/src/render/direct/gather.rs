@@ -18,7 +18,7 @@ const LEAVES: usize = 12;
 
 impl DirectLighting<'_> {
     /// Gathers what of the BVHs may occlude a light for the first of some queries, and for those after it that are for
-    /// points of one surface; and says for how many that was done.
+    /// points of one surface. Returns the visibility and the number of queries that share it.
     pub(super) fn gather_run(&mut self, of: &Group, members: &[u32]) -> (Visibility, usize) {
         let first = of.point(members[0]);
         let is_like = |k: &&u32| {

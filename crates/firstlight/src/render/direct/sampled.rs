@@ -8,7 +8,7 @@ use crate::light::{Area, Extent, Light};
 use crate::material::{Moments, ShadingPoint};
 use crate::render::Counts;
 use crate::render::lanes::{PointObstacles, sum_area};
-use crate::render::pixel::{Lighting, LobeSums};
+use crate::render::pixel::Lighting;
 use crate::render::plain::Plain;
 use crate::scene::Scene;
 use crate::visibility::{ShadowView, Target, Viewpoint, Visibility, VisibilityResolver};
@@ -51,7 +51,8 @@ impl<'a> Sampled<'a> {
         self.lit(point)
     }
 
-    /// Hears what of it is seen from those `points` whose numbers are in `part`; see [`VisibilityResolver::resolve`].
+    /// Classifies the visibility of the light from those `points` whose indices are in `part`, and calls `each` with
+    /// the index, the class and the view of each; see [`VisibilityResolver::resolve`].
     pub fn settle(
         &self,
         resolver: &mut VisibilityResolver,
@@ -64,7 +65,7 @@ impl<'a> Sampled<'a> {
         let settled = &mut counts.visibility;
         let before = *settled;
         resolver.resolve(self.level, self.scene, self.target, points, part, settled, each);
-        // Cut by shapes of the lists, which are asked for every sample, or by what is in the trees
+        // Shadow rays: one for each sample of a partly visible light past listed shapes, or those traced through trees
         let cut = settled.classes[Visibility::Partial as usize] - before.classes[Visibility::Partial as usize];
         let traced = settled.traced - before.traced;
         let asked = if self.scene.geometry.has_trees() { traced } else { self.samples() * cut };
@@ -78,29 +79,26 @@ impl<'a> Sampled<'a> {
         match visibility {
             Visibility::None | Visibility::BelowHorizon => Moments::ZERO,
             Visibility::Full => self.lit(point),
-            Visibility::Partial | Visibility::Listed | Visibility::Gathered => self.masked(point, view),
+            Visibility::Partial | Visibility::Listed | Visibility::Gathered => {
+                self.sum(point, &PointObstacles::of(view))
+            }
         }
     }
 
-    /// Where nothing hides any of it.
+    /// The sum of its samples at a point that nothing shadows.
     #[inline(always)]
     fn lit(&self, point: &ShadingPoint) -> Moments {
-        totals(match self.light().extent() {
-            Extent::Area(area) => sum_area(self.level, area, point, &PointObstacles::default()),
-            Extent::Point => {
-                let unshadowed = ShadingPoint { receives_shadow: false, ..*point };
-                Plain.gather(self.scene, self.index, &unshadowed, &mut Counts::default())
-            }
-        })
+        self.sum(&ShadingPoint { receives_shadow: false, ..*point }, &PointObstacles::default())
     }
 
-    /// Past what is in `view`.
+    /// The sum of its samples at a point, past occluders.
     #[inline(always)]
-    fn masked(&self, point: &ShadingPoint, view: &ShadowView) -> Moments {
-        totals(match self.light().extent() {
-            Extent::Area(area) => sum_area(self.level, area, point, &PointObstacles::of(view)),
+    fn sum(&self, point: &ShadingPoint, occluders: &PointObstacles) -> Moments {
+        let sums = match self.light().extent() {
+            Extent::Area(area) => sum_area(self.level, area, point, occluders),
             Extent::Point => Plain.gather(self.scene, self.index, point, &mut Counts::default()),
-        })
+        };
+        sums.total()
     }
 }
 
@@ -138,8 +136,4 @@ impl DirectLighting<'_> {
             estimates[k as usize].moments = light.sent(of.point(k), visibility, view);
         });
     }
-}
-
-fn totals(sums: LobeSums) -> Moments {
-    sums.total()
 }

@@ -80,7 +80,8 @@ pub(super) struct BlockSamples {
 /// Sums over the samples of one receiver, each weighed with the part of the light that its stratum is.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct StratumSums {
-    /// What would be sent, what of it arrives, and squares of what would be sent.
+    /// Sums over the samples, moment by moment: of the unoccluded contributions, of the visible ones, and of the
+    /// squares of the unoccluded ones.
     pub sent: [f64; MOMENTS],
     lit: [f64; MOMENTS],
     squares: [f64; MOMENTS],
