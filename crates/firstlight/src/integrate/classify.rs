@@ -19,11 +19,10 @@ use super::occluder::{Occluder, Shadow, corners_from};
 use super::panels::{MAX_INTERVALS, OccluderMask};
 use crate::ids::LightId;
 use crate::material::ShadingPoint;
-use crate::math::{DAffine3, Facet, LANES, Vec3, Vec3x16};
+use crate::math::{DAffine3, LANES, Vec3x16};
 use crate::scene::{PlacedTarget, Scene};
 use crate::shape::{Parallelogram, Placement, PlaneSide, Solid, Sphere};
-use crate::visibility::{OccluderList, ShadowMesh};
-use flat::{FacetShape, Own, test_parallelogram, test_triangle};
+use flat::test_parallelogram;
 use light_contact::{LightContact, LightSides};
 use solid::{PlacedSolid, test_solid};
 
@@ -54,7 +53,6 @@ enum ExactShape<'a> {
         seen_side: PlaneSide,
     },
     Solid(Box<PlacedSolid>),
-    Facet(FacetShape),
 }
 
 /// The most occluders of a light, listed ones and those in trees together: the bits of a mask.
@@ -99,47 +97,6 @@ impl<'a> LightOccluders<'a> {
         }
         all.add_contacts(emitter);
         all
-    }
-
-    /// Replaces all by the occluders of light `id` that were gathered in trees, except placed solids. Returns `false`
-    /// if there are too many beside `others`.
-    pub fn gather(
-        &mut self,
-        scene: &'a Scene,
-        id: LightId,
-        emitter: &Emitter,
-        trees: &OccluderList,
-        others: usize,
-    ) -> bool {
-        self.has_more = false;
-        self.placed.clear();
-        self.occluders.clear();
-        self.exact.clear();
-        self.contacts.clear();
-        self.sides.clear();
-        for which in &trees.spheres {
-            self.sphere(scene.sphere(*which));
-        }
-        for (which, _) in &trees.flats {
-            self.flat(scene.flat(*which), PlaneSide::Both, PlaneSide::Both);
-        }
-        for (source, leaf) in &trees.leaves {
-            let Some(mesh) = ShadowMesh::of(&scene.geometry, *source, id) else { continue };
-            for (triangle, corners) in mesh.mesh.tree.leaf(*leaf) {
-                if !mesh.casts(triangle) {
-                    continue;
-                }
-                let corners = corners.map(|q: Vec3| match mesh.placement {
-                    Some(placement) => placement.world_from_object.transform_point3(q.as_dvec3()),
-                    None => q.as_dvec3(),
-                });
-                let shape = FacetShape::new(Facet { source: *source, triangle }, corners);
-                self.occluders.push(Occluder::Flat { corners: shape.corners() });
-                self.exact.push(ExactShape::Facet(shape));
-            }
-        }
-        self.add_contacts(emitter);
-        self.occluders.len() + others <= MAX_OCCLUDERS
     }
 
     fn sphere(&mut self, sphere: &Sphere) {
@@ -389,13 +346,11 @@ impl<S: Simd> LightPyramid16<S> {
     }
 }
 
-/// The occlusion of a light from the points in `lanes`, of up to sixteen whose coordinates are in `frames`. Occluders
-/// in trees, `near`, are indexed after listed ones. To be called within `vectorize`.
+/// The occlusion of a light from the points in `lanes`, of up to sixteen whose coordinates are in `frames`. To be called within `vectorize`.
 #[inline(always)]
 pub(crate) fn classify<S: Simd>(
     simd: S,
     listed: &LightOccluders,
-    near: Option<&LightOccluders>,
     emitter: &Emitter,
     frames: &LightFrame16,
     points: &[ShadingPoint],
@@ -406,11 +361,8 @@ pub(crate) fn classify<S: Simd>(
         return classes;
     }
     let mut pyramid = LightPyramid16::new(simd, frames, points);
-    let own = near.is_some().then(|| Own::new(simd, &pyramid, points));
     let places = LightSides::of_points(emitter, points);
-    for (i, (occluder, exact, sides, contact)) in
-        listed.each().chain(near.into_iter().flat_map(LightOccluders::each)).enumerate()
-    {
+    for (i, (occluder, exact, sides, contact)) in listed.each().enumerate() {
         if lanes == 0 {
             break;
         }
@@ -438,12 +390,6 @@ pub(crate) fn classify<S: Simd>(
             (Occluder::Solid(_), ExactShape::Solid(shape)) => {
                 test_solid(simd, &pyramid, shape, occluder, points, before)
             }
-            (Occluder::Flat { corners }, ExactShape::Facet(shape)) => match &own {
-                Some(own) => {
-                    test_triangle(simd, &pyramid, corners_from(simd, corners, pyramid.p), shape, own, points, before)
-                }
-                None => unreachable!("no triangle is in lists"),
-            },
             _ => unreachable!("both lists hold the same things"),
         };
         // The visible part of the sphere is not that of its disk

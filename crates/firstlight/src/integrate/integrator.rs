@@ -84,8 +84,6 @@ impl LightIntegral {
 pub(crate) struct LightTask<'a> {
     pub emitter: &'a Emitter,
     pub listed: &'a LightOccluders<'a>,
-    /// The occluders gathered in trees, if there are any.
-    pub near: Option<&'a LightOccluders<'a>>,
     /// The kind of the points' lobes.
     pub lobe: Option<LobeKind>,
     /// Factor of the moments, before the colours of a surface.
@@ -111,8 +109,7 @@ impl LightTask<'_> {
 
     /// The light with its occluders and their masks, point by point.
     fn occluded_light<'b>(&'b self, masks: &'b [OccluderMask]) -> OccludedLight<'b> {
-        let near = self.near.map_or(&[][..], |near| &near.occluders);
-        OccludedLight { occluders: [&self.listed.occluders, near], outline: self.emitter.outline(), masks }
+        OccludedLight { occluders: &self.listed.occluders, outline: self.emitter.outline(), masks }
     }
 }
 
@@ -272,7 +269,7 @@ impl AreaLightIntegrator {
                         let mut horizons = test_horizons(simd, frames, task.emitter.is_physical(), points);
                         horizons.arrives &= there;
                         let asked = if task.shadows { horizons.arrives } else { 0 };
-                        let classes = classify(simd, task.listed, task.near, task.emitter, frames, points, asked);
+                        let classes = classify(simd, task.listed, task.emitter, frames, points, asked);
                         (horizons, classes)
                     },
                 )

@@ -81,19 +81,10 @@ impl OccluderMask {
 /// A light's outline and its occluders, for all points.
 #[derive(Clone, Copy)]
 pub(crate) struct OccludedLight<'a> {
-    /// Listed occluders and those in trees, indexed consecutively.
-    pub occluders: [&'a [Occluder]; 2],
+    pub occluders: &'a [Occluder],
     pub outline: Outline,
     /// Point by point.
     pub masks: &'a [OccluderMask],
-}
-
-impl<'a> OccludedLight<'a> {
-    #[inline(always)]
-    fn occluder(&self, number: usize) -> &'a Occluder {
-        let [listed, near] = self.occluders;
-        listed.get(number).unwrap_or_else(|| &near[number - listed.len()])
-    }
 }
 
 /// Integrals over sixteen panels, their error estimates, and the visible part of the light's square in each.
@@ -151,7 +142,7 @@ impl<'a, S: Simd> Batch<'a, S> {
             within |= (mask.within >> occluder & 1) << k;
         }
         (
-            Shadow::new(simd, self.light.occluder(occluder), self.p, &self.l),
+            Shadow::new(simd, &self.light.occluders[occluder], self.p, &self.l),
             mask32x16::from_bitmask(simd, outside),
             mask32x16::from_bitmask(simd, within),
         )

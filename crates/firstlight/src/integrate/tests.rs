@@ -167,7 +167,6 @@ fn batched(case: &Case, steps: &DisplaySteps) -> Moments {
     let task = LightTask {
         emitter: &emitter,
         listed: &LightOccluders::of(&case.spheres, &case.flats, &emitter),
-        near: None,
         lobe: case.point.bsdf.lobe.kind(),
         scale: Rgb::WHITE,
         steps,
@@ -347,7 +346,6 @@ impl BallCase {
         let task = LightTask {
             emitter: &emitter,
             listed: &listed,
-            near: None,
             lobe: self.point.bsdf.lobe.kind(),
             scale: Rgb::WHITE,
             steps,

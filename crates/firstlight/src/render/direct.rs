@@ -17,9 +17,7 @@ use super::pooled::LightSampler;
 use super::{Counts, QUESTION_EVERY};
 use crate::color::{DisplaySteps, Rgb};
 use crate::ids::LightId;
-use crate::integrate::{
-    AreaLightIntegrator, Emitter, Illumination, LightIntegral, LightOccluders, LightTask, TOLERANCE,
-};
+use crate::integrate::{AreaLightIntegrator, Emitter, Illumination, LightIntegral, LightTask, TOLERANCE};
 use crate::light::{Area, Extent, LightTree};
 use crate::material::{LobeKind, Moments, ShadingPoint};
 use crate::math::LANES;
@@ -132,8 +130,6 @@ pub(crate) struct DirectLighting<'a> {
     integrals: Vec<LightIntegral>,
     /// Of a group: those whose light listed shapes alone may occlude.
     listed: Vec<u32>,
-    /// What was gathered from BVHs for up to sixteen points.
-    near: LightOccluders<'a>,
     pub(super) occluders: OccluderList,
     pub(super) resolver: VisibilityResolver,
     indices: Vec<u32>,
@@ -153,7 +149,6 @@ impl<'a> DirectLighting<'a> {
             points: Vec::new(),
             integrals: Vec::new(),
             listed: Vec::new(),
-            near: LightOccluders::default(),
             occluders: OccluderList::default(),
             resolver: VisibilityResolver::default(),
             indices: Vec::new(),
@@ -366,22 +361,17 @@ impl<'a> DirectLighting<'a> {
     ) -> ControlFlow<()> {
         let mut listed = std::mem::take(&mut self.listed);
         listed.clear();
-        let mut rest = members;
-        while let Some(first) = rest.first().copied() {
-            if of.query(first).visibility == Visibility::Listed {
-                listed.push(first);
-                rest = &rest[1..];
+        for k in members {
+            if of.query(*k).visibility == Visibility::Listed {
+                listed.push(*k);
                 continue;
             }
             go_on()?;
-            let (visibility, run) = self.gather_run(of, rest);
-            let (now, later) = rest.split_at(run);
-            match visibility {
-                Visibility::Gathered => self.batch(of, Visibility::Gathered, now, estimates, counts),
-                Visibility::Partial => self.unknown(of, first, estimates, counts),
-                _ => listed.extend(now),
+            if self.is_clear_of_trees(of.light, of.point(*k)) {
+                listed.push(*k);
+            } else {
+                self.unknown(of, *k, estimates, counts);
             }
-            rest = later;
         }
         self.batch(of, Visibility::Listed, &listed, estimates, counts);
         self.listed = listed;
@@ -399,12 +389,11 @@ impl<'a> DirectLighting<'a> {
     ) {
         let sums = self.is_integrated(of.light);
         self.arrive(of, visibility, sums, members, counts);
-        let known = if visibility == Visibility::Gathered { Visibility::Partial } else { visibility };
         for (integral, k) in self.integrals.iter().zip(members) {
             if sums {
                 counts.note(integral.illumination);
             }
-            estimates[*k as usize] = LightEstimate { visibility: known, ..self.variation(of, *k, integral) };
+            estimates[*k as usize] = LightEstimate { visibility, ..self.variation(of, *k, integral) };
         }
     }
 
@@ -427,10 +416,9 @@ impl<'a> DirectLighting<'a> {
         self.points.clear();
         self.points.extend(members.iter().map(|k| *of.point(*k)));
         self.integrals.clear();
-        let near = (visibility == Visibility::Gathered).then_some(&self.near);
         let shadows = visibility != Visibility::Full;
         let Some(task) = self.lights.task(of.light, of.lobe, shadows) else { unreachable!("it has an area") };
-        let task = LightTask { near, sums, allowed: self.allowed, ..task };
+        let task = LightTask { sums, allowed: self.allowed, ..task };
         self.evaluator.evaluate(self.level, &task, &self.points, &mut self.integrals);
     }
 

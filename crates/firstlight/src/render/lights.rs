@@ -70,7 +70,6 @@ impl<'a> Lights<'a> {
         self.emitters[index].as_ref().map(|emitter| LightTask {
             emitter,
             listed: &self.obstacles[index],
-            near: None,
             lobe,
             scale: self.scales[index],
             steps: &self.steps,

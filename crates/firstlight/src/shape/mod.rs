@@ -55,7 +55,7 @@ pub(crate) use point_set::PointSet;
 pub(crate) use solid::{Canonical, LineLanes, Solid, SolidHit};
 pub(crate) use sphere::SphereShadow;
 pub(crate) use surface::ShapePoint;
-pub(crate) use triangles::{Eye, SeenParts, SeenTriangle, TOGETHER, TileHits, TriangleTree, bits, every, is_in_plane};
+pub(crate) use triangles::{Eye, SeenParts, SeenTriangle, TOGETHER, TileHits, TriangleTree, bits, every};
 
 use crate::describe::family;
 use crate::transform::TransformDesc;

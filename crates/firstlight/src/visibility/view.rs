@@ -24,8 +24,6 @@ pub(crate) enum Visibility {
     Partial,
     /// Some of it may be hidden, by listed shapes alone: the light has a closed form.
     Listed,
-    /// Some of it may be hidden, by listed shapes and a few triangles of trees: the same.
-    Gathered,
 }
 
 /// The occluders that may hide a part of a light from one point. Keeps its memory.

@@ -26,7 +26,6 @@ impl LightSides {
                 ExactShape::Sphere(sphere) => n.dot(sphere.c) + sphere.r,
                 ExactShape::Flat { flat, .. } => flat.support(n),
                 ExactShape::Solid(solid) => solid.reach(n),
-                ExactShape::Facet(facet) => facet.reach(n),
             };
             if reach - n.dot(light.c) > light.rounding() { u64::MAX } else { 0 }
         });
@@ -80,8 +79,7 @@ impl LightContact {
             }
             ExactShape::Flat { flat, .. } if flat.distance(*center) < *radius => LightContact::Intersects,
             ExactShape::Solid(solid) if solid.may_contain_light => LightContact::Intersects,
-            ExactShape::Facet(shape) if f64::from(shape.distance(*center)) < *radius => LightContact::Intersects,
-            ExactShape::Flat { .. } | ExactShape::Solid(_) | ExactShape::Facet(_) => LightContact::Disjoint,
+            ExactShape::Flat { .. } | ExactShape::Solid(_) => LightContact::Disjoint,
         }
     }
 }

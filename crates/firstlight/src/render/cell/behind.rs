@@ -447,8 +447,6 @@ impl RaySights {
             FragmentLight::Seen(Visibility::None)
         } else if hidden > 0 || of(Visibility::Partial) > 0 {
             FragmentLight::PerRay
-        } else if of(Visibility::Gathered) > 0 {
-            FragmentLight::Seen(Visibility::Partial)
         } else if of(Visibility::Listed) > 0 {
             FragmentLight::Seen(Visibility::Listed)
         } else {
@@ -484,8 +482,6 @@ impl RaySights {
                 let view = self.views[k].take().expect("what is sampled has a view");
                 pooled.add_behind(point, view);
             }
-            // What few triangles hide is gathered anew
-            Some(Visibility::Gathered) => pooled.add(lights, point, Visibility::Partial, counts),
             Some(visibility) => pooled.add(lights, point, visibility, counts),
         }
     }

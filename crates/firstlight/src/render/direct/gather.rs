@@ -1,89 +1,33 @@
 //! What of the BVHs may occlude a light, seen from points: gathered in the shaft between them.
 
-use arrayvec::ArrayVec;
-
-use super::{DirectLighting, Group};
+use super::DirectLighting;
 use crate::accel::Aabb;
 use crate::ids::LightId;
 use crate::material::ShadingPoint;
-use crate::math::{DVec3, Facet, LANES};
+use crate::math::{DVec3, Facet};
 use crate::render::Counts;
 use crate::scene::Scene;
-use crate::visibility::{ShadowMesh, ShadowView, Shaft, Target, Viewpoint, Visibility};
+use crate::visibility::{ShadowMesh, ShadowView, Target, Viewpoint, Visibility};
 
-/// The most triangles that a light is evaluated past, seen from one ray.
-const FEW_TRIANGLES: usize = 6;
 /// The most leaves of triangles whose triangles are tested one by one.
 const LEAVES: usize = 12;
 
 impl DirectLighting<'_> {
-    /// Gathers what of the BVHs may occlude a light for the first of some queries, and for those after it that are for
-    /// points of one surface. Returns the visibility and the number of queries that share it.
-    pub(super) fn gather_run(&mut self, of: &Group, members: &[u32]) -> (Visibility, usize) {
-        let first = of.point(members[0]);
-        let is_like = |k: &&u32| {
-            let point = of.point(**k);
-            first.reach + point.reach == 0.0
-                && point.surface == first.surface
-                && of.query(**k).visibility == Visibility::Partial
-        };
-        let mut run = 1 + members[1..].iter().take(LANES - 1).take_while(is_like).count();
-        loop {
-            let points: ArrayVec<Viewpoint, LANES> =
-                members[..run].iter().map(|k| Viewpoint::of(of.point(*k))).collect();
-            let visibility = self.gather(of.light, &points, first);
-            if run == 1 || visibility != Visibility::Partial {
-                return (visibility, run);
-            }
-            run /= 2;
-        }
-    }
-
-    /// Gathers what of the BVHs may occlude a light: from one point and its footprint; or from several points.
-    fn gather(
-        &mut self,
-        index: usize,
-        points: &[Viewpoint],
-        ShadingPoint { reach, turn, .. }: &ShadingPoint,
-    ) -> Visibility {
-        let (scene, lights, reach, turn) = (self.scene, self.lights, *reach, *turn);
+    /// Whether no light from `index` is occluded by what is in the BVHs, but for shapes that are integrated as listed ones
+    /// are, from a point and all of its footprint.
+    pub(super) fn is_clear_of_trees(&mut self, index: usize, point: &ShadingPoint) -> bool {
+        let (scene, lights, ShadingPoint { reach, turn, .. }) = (self.scene, self.lights, *point);
         if !lights.has_trees(scene, index) {
-            return Visibility::Listed;
+            return true;
         }
-        let (target, trees) = (&lights.targets[index], &mut self.occluders);
-        match points {
-            [point] => {
-                trees.gather_around(self.level, scene, target, point, reach, turn > 0.0, LEAVES);
-                trees.others.retain(|thing| !is_beside(scene, target, point, reach, turn, *thing));
-                // What does not rise over the one horizon of a flat footprint occludes nothing
-                if reach > 0.0 && turn == 0.0 && point.but != Facet::NONE {
-                    trees.leaves.retain(|(source, leaf)| rises(scene, point, *source, *leaf));
-                }
-            }
-            points => {
-                self.indices.clear();
-                self.indices.extend(0..points.len() as u32);
-                let shaft = Shaft::of(points, &self.indices, &target.hull);
-                trees.gather_in(self.level, scene, target, &shaft, LEAVES);
-            }
+        let (target, trees, place) = (&lights.targets[index], &mut self.occluders, Viewpoint::of(point));
+        trees.gather_around(self.level, scene, target, &place, reach, turn > 0.0, LEAVES);
+        trees.others.retain(|thing| !is_beside(scene, target, &place, reach, turn, *thing));
+        // What does not rise over the one horizon of a flat footprint occludes nothing
+        if reach > 0.0 && turn == 0.0 && place.but != Facet::NONE {
+            trees.leaves.retain(|(source, leaf)| rises(scene, &place, *source, *leaf));
         }
-        let is_known = lights.know(index, trees.others.iter().copied());
-        if is_known && !trees.has_meshes() {
-            Visibility::Listed
-        } else if is_known
-            && !trees.too_many
-            && let Some(emitter) = &lights.emitters[index]
-            && self.near.gather(scene, target.light, emitter, trees, lights.obstacles[index].occluders.len())
-        {
-            Visibility::Gathered
-        } else {
-            Visibility::Partial
-        }
-    }
-
-    /// Whether a light of one point is occluded by nothing in the BVHs, from all of a footprint.
-    pub(super) fn is_unoccluded_by_trees(&mut self, index: usize, point: &ShadingPoint) -> bool {
-        self.gather(index, &[Viewpoint::of(point)], point) == Visibility::Listed
+        !trees.has_meshes() && lights.know(index, trees.others.iter().copied())
     }
 
     /// What may occlude light `index` from all of some points together, by one shaft.
@@ -121,15 +65,11 @@ impl DirectLighting<'_> {
                 return each(k, visibility, None);
             }
             let is_listed = listed || view.spheres.is_empty() && view.flats.is_empty();
-            if view.trees
-                || !lights.know(index, view.others.iter().map(|(thing, _)| *thing))
-                || view.triangles.len() > FEW_TRIANGLES
-            {
-                each(k, visibility, Some(std::mem::replace(view, views.pop().unwrap_or_default())));
-            } else if is_listed && view.triangles.is_empty() {
+            let is_known = || lights.know(index, view.others.iter().map(|(thing, _)| *thing));
+            if !view.trees && is_listed && view.triangles.is_empty() && is_known() {
                 each(k, Visibility::Listed, None);
             } else {
-                each(k, Visibility::Gathered, None);
+                each(k, visibility, Some(std::mem::replace(view, views.pop().unwrap_or_default())));
             }
         });
     }

@@ -79,9 +79,7 @@ impl<'a> Sampled<'a> {
         match visibility {
             Visibility::None | Visibility::BelowHorizon => Moments::ZERO,
             Visibility::Full => self.lit(point),
-            Visibility::Partial | Visibility::Listed | Visibility::Gathered => {
-                self.sum(point, &PointObstacles::of(view))
-            }
+            Visibility::Partial | Visibility::Listed => self.sum(point, &PointObstacles::of(view)),
         }
     }
 

@@ -79,7 +79,7 @@ impl DirectLighting<'_> {
     ) -> bool {
         let scene = self.scene;
         let listed = &scene.occluders;
-        if !listed.disks.is_empty() || visibility != Visibility::Listed && !self.is_unoccluded_by_trees(light, point) {
+        if !listed.disks.is_empty() || visibility != Visibility::Listed && !self.is_clear_of_trees(light, point) {
             return true;
         }
         let length = l.length();
