@@ -30,29 +30,15 @@ use super::tolerance::{COSTS, TOLERANCE, Weight};
 use crate::color::{DisplaySteps, Rgb};
 use crate::material::{LobeKind, Moments, ShadingPoint};
 use crate::math::{LANES, dispatch_wide};
-
-/// How much of a light illuminates a point.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Illumination {
-    /// None: all of the light is below a horizon, or the point is behind the light.
-    Below,
-    /// None: the point is in the umbra of an occluder.
-    Hidden,
-    /// All of the light is visible.
-    Full,
-    /// A part of the light is visible, known in closed form.
-    Partial,
-    /// An occluder has no closed form here.
-    Unknown,
-}
+use crate::visibility::Visibility;
 
 /// What one light sends to one point.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct LightIntegral {
     /// The irradiance moments; 0 where they were not computed: see [`ShadingPoint::most_motion`].
     pub sums: Moments,
-    pub illumination: Illumination,
-    /// Whether `illumination` is proved for all places within the point's reach.
+    pub visibility: Visibility,
+    /// Whether `visibility` is proved for all places within the point's reach.
     pub proved: bool,
     /// See [`OcclusionClass::motion`].
     pub motion: f32,
@@ -64,15 +50,15 @@ pub(crate) struct LightIntegral {
 impl LightIntegral {
     /// The sum over two parts of a light.
     fn and(&self, other: &LightIntegral) -> LightIntegral {
-        let illumination = match (self.illumination, other.illumination) {
+        let visibility = match (self.visibility, other.visibility) {
             (one, other) if one == other => one,
-            (Illumination::Unknown, _) | (_, Illumination::Unknown) => Illumination::Unknown,
-            _ => Illumination::Partial,
+            (Visibility::Partial, _) | (_, Visibility::Partial) => Visibility::Partial,
+            _ => Visibility::Listed,
         };
         LightIntegral {
             sums: self.sums + other.sums,
-            illumination,
-            proved: self.proved && other.proved && illumination != Illumination::Partial,
+            visibility,
+            proved: self.proved && other.proved && visibility != Visibility::Listed,
             motion: self.motion.max(other.motion),
             ..*self
         }
@@ -95,7 +81,7 @@ pub(crate) struct LightTask<'a> {
     pub least: f32,
     /// Whether occluders are tested.
     pub shadows: bool,
-    /// Whether moments are computed, or the illumination alone.
+    /// Whether moments are computed, or the visibility alone.
     pub sums: bool,
 }
 
@@ -203,7 +189,7 @@ impl AreaLightIntegrator {
         }
     }
 
-    /// The same with points inside of a sphere light left [`Illumination::Unknown`].
+    /// The same with points inside of a sphere light left [`Visibility::Partial`].
     fn evaluate_one(
         &mut self,
         level: Level,
@@ -278,7 +264,7 @@ impl AreaLightIntegrator {
                 let is = |bits: u64| bits >> k & 1 == 1;
                 let mut one = LightIntegral {
                     sums: Moments::default(),
-                    illumination: Illumination::Below,
+                    visibility: Visibility::BelowHorizon,
                     proved: point.reach == 0.0,
                     motion: 0.0,
                     distance: if is(there) { horizons.nearest[k] } else { 0.0 },
@@ -287,25 +273,25 @@ impl AreaLightIntegrator {
                 let is_open = class.mask == OccluderMask::default();
                 if is(horizons.arrives) {
                     one.motion = class.motion;
-                    one.illumination = match class {
-                        OcclusionClass { hidden: true, .. } => Illumination::Hidden,
-                        OcclusionClass { other: true, .. } => Illumination::Unknown,
-                        _ if is_open && is(horizons.above) => Illumination::Full,
-                        _ => Illumination::Partial,
+                    one.visibility = match class {
+                        OcclusionClass { hidden: true, .. } => Visibility::None,
+                        OcclusionClass { other: true, .. } => Visibility::Partial,
+                        _ if is_open && is(horizons.above) => Visibility::Full,
+                        _ => Visibility::Listed,
                     };
                 } else if task.emitter.surrounds(point.p) {
-                    one.illumination = Illumination::Unknown;
+                    one.visibility = Visibility::Partial;
                 }
                 // The same for all places within the point's reach
-                one.proved |= match one.illumination {
-                    Illumination::Below => is(there & horizons.below_around),
-                    Illumination::Hidden => is(horizons.beside_around) && one.motion == 0.0,
-                    Illumination::Full => is(horizons.above_around) && one.motion == 0.0,
-                    Illumination::Partial | Illumination::Unknown => false,
+                one.proved |= match one.visibility {
+                    Visibility::BelowHorizon => is(there & horizons.below_around),
+                    Visibility::None => is(horizons.beside_around) && one.motion == 0.0,
+                    Visibility::Full => is(horizons.above_around) && one.motion == 0.0,
+                    Visibility::Listed | Visibility::Partial => false,
                 };
                 let max_evaluations = LightTask::max_evaluations(LARGEST_CODE) * point.part_of_points;
                 let is_wanted = task.sums && (one.proved || one.motion <= point.most_motion);
-                if is_wanted && matches!(one.illumination, Illumination::Full | Illumination::Partial) {
+                if is_wanted && matches!(one.visibility, Visibility::Full | Visibility::Listed) {
                     let number = (start + k) as u32;
                     self.state[start + k].cells = 1;
                     self.uncut.push(whole_light(outline, number, self.frames[block].square(k)));
@@ -422,14 +408,14 @@ impl AreaLightIntegrator {
         }
     }
 
-    /// Marks partially visible points beyond their limit as [`Illumination::Unknown`]. Returns whether there was any.
+    /// Marks partially visible points beyond their limit as [`Visibility::Partial`]. Returns whether there was any.
     fn give_up(&mut self, integrals: &mut [LightIntegral]) -> bool {
         let mut is_any = false;
         for ((state, mask), integrals) in self.state.iter_mut().zip(&self.masks).zip(integrals) {
-            let is_occluded = *mask != OccluderMask::default() && integrals.illumination == Illumination::Partial;
+            let is_occluded = *mask != OccluderMask::default() && integrals.visibility == Visibility::Listed;
             if is_occluded && state.evaluations > state.max_evaluations {
                 state.cells = PointSum::GIVEN_UP;
-                integrals.illumination = Illumination::Unknown;
+                integrals.visibility = Visibility::Partial;
                 is_any = true;
             }
         }

@@ -3,7 +3,7 @@
 //!
 //! [`visibility`](crate::visibility) gathers the occluders in trees before it; [`render`](crate::render) adds the
 //! result to pixels. Occluders here are spheres, parallelograms, solids and triangles. Lights behind anything else
-//! have the result [`Illumination::Unknown`], and the renderer samples them.
+//! have the result [`Visibility::Partial`], and the renderer samples them.
 
 mod batch;
 mod breaks;
@@ -21,7 +21,7 @@ mod tolerance;
 
 pub(crate) use classify::LightOccluders;
 pub(crate) use emitter::Emitter;
-pub(crate) use integrator::{AreaLightIntegrator, Illumination, LightIntegral, LightTask};
+pub(crate) use integrator::{AreaLightIntegrator, LightIntegral, LightTask};
 pub(crate) use tolerance::{COSTS, TOLERANCE};
 
 #[cfg(test)]

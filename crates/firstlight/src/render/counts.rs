@@ -2,7 +2,6 @@
 
 use super::SimdLevel;
 use crate::film::Heat;
-use crate::integrate::Illumination;
 use crate::visibility::{Visibility, VisibilityStats};
 
 /// What a render did.
@@ -117,15 +116,12 @@ impl Counts {
         }
     }
 
-    /// Notes what a batch says of a place.
-    pub fn note(&mut self, illumination: Illumination) {
-        let classes = &mut self.visibility.classes;
-        match illumination {
-            Illumination::Below => classes[Visibility::BelowHorizon as usize] += 1,
-            Illumination::Hidden => classes[Visibility::None as usize] += 1,
-            Illumination::Full => classes[Visibility::Full as usize] += 1,
-            Illumination::Partial => self.closed_form += 1,
-            Illumination::Unknown => {}
+    /// Counts a point whose visibility a batch classified.
+    pub fn note(&mut self, visibility: Visibility) {
+        match visibility {
+            Visibility::Partial => {}
+            Visibility::Listed => self.closed_form += 1,
+            known => self.visibility.classes[known as usize] += 1,
         }
     }
 

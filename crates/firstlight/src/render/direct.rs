@@ -1,8 +1,8 @@
 //! Direct light at shading points: each light is estimated for all points that need it together.
 //!
 //! Lights that are integrated are evaluated in batches of sixteen points ([`AreaLightIntegrator`]), past the listed
-//! occluders and the few triangles that are gathered from the BVHs. Where more than that may occlude a light, the
-//! estimate is unknown, and callers sample the light ([`pooled`](super::pooled)).
+//! occluders. Where anything in the BVHs may occlude a light, the estimate is unknown, and callers sample the light
+//! ([`pooled`](super::pooled)).
 
 mod gather;
 mod sampled;
@@ -17,7 +17,7 @@ use super::pooled::LightSampler;
 use super::{Counts, QUESTION_EVERY};
 use crate::color::{DisplaySteps, Rgb};
 use crate::ids::LightId;
-use crate::integrate::{AreaLightIntegrator, Emitter, Illumination, LightIntegral, LightTask, TOLERANCE};
+use crate::integrate::{AreaLightIntegrator, Emitter, LightIntegral, LightTask, TOLERANCE};
 use crate::light::{Area, Extent, LightTree};
 use crate::material::{LobeKind, Moments, ShadingPoint};
 use crate::math::LANES;
@@ -341,24 +341,12 @@ impl<'a> DirectLighting<'a> {
         counts: &mut Counts,
         go_on: &dyn Fn() -> ControlFlow<()>,
     ) -> ControlFlow<()> {
-        if shadows && self.lights.has_trees(self.scene, of.light) {
-            return self.past_trees(of, members, estimates, counts, go_on);
-        }
         let visibility = if shadows { Visibility::Listed } else { Visibility::Full };
-        self.batch(of, visibility, members, estimates, counts);
-        ControlFlow::Continue(())
-    }
-
-    /// The same past what is in BVHs, which is gathered for each point, and for consecutive points of one surface
-    /// together. Where that is too much, the estimate is unknown.
-    fn past_trees(
-        &mut self,
-        of: &Group,
-        members: &[u32],
-        estimates: &mut [LightEstimate],
-        counts: &mut Counts,
-        go_on: &dyn Fn() -> ControlFlow<()>,
-    ) -> ControlFlow<()> {
+        if !(shadows && self.lights.has_trees(self.scene, of.light)) {
+            self.batch(of, visibility, members, estimates, counts);
+            return ControlFlow::Continue(());
+        }
+        // Where something in the BVHs may occlude the light, the estimate is unknown
         let mut listed = std::mem::take(&mut self.listed);
         listed.clear();
         for k in members {
@@ -373,7 +361,7 @@ impl<'a> DirectLighting<'a> {
                 self.unknown(of, *k, estimates, counts);
             }
         }
-        self.batch(of, Visibility::Listed, &listed, estimates, counts);
+        self.batch(of, visibility, &listed, estimates, counts);
         self.listed = listed;
         ControlFlow::Continue(())
     }
@@ -391,7 +379,7 @@ impl<'a> DirectLighting<'a> {
         self.arrive(of, visibility, sums, members, counts);
         for (integral, k) in self.integrals.iter().zip(members) {
             if sums {
-                counts.note(integral.illumination);
+                counts.note(integral.visibility);
             }
             estimates[*k as usize] = LightEstimate { visibility, ..self.variation(of, *k, integral) };
         }
@@ -424,11 +412,11 @@ impl<'a> DirectLighting<'a> {
 
     /// What a light sends to a point, and how it varies over the footprint.
     fn variation(&self, of: &Group, k: u32, integral: &LightIntegral) -> LightEstimate {
-        let LightIntegral { sums, illumination, proved, motion, distance, height } = *integral;
+        let LightIntegral { sums, visibility, proved, motion, distance, height } = *integral;
         let (light, point) = (&self.scene.lights[of.light], of.point(k));
         let is_physical = light.area().is_some_and(|area| area.physical);
         let most = if is_physical { self.measure(of.light) / (distance * distance) } else { 1.0 };
-        if illumination == Illumination::Unknown {
+        if visibility == Visibility::Partial {
             return LightEstimate { most, ..LightEstimate::UNKNOWN };
         }
         let is_one_sided = self.lights.emitters[of.light].as_ref().is_some_and(Emitter::is_one_sided);

@@ -20,9 +20,9 @@ pub(crate) enum Visibility {
     None,
     /// Nothing: it is below the horizon of the surface.
     BelowHorizon,
-    /// Some of it may be hidden, or nothing is known: each sample is tested.
+    /// A part that has no closed form, or may be anything: each sample is tested.
     Partial,
-    /// Some of it may be hidden, by listed shapes alone: the light has a closed form.
+    /// A part: what listed shapes leave of it, in closed form.
     Listed,
 }
 

@@ -1,4 +1,4 @@
-//! What of the BVHs may occlude a light, seen from points: gathered in the shaft between them.
+//! The occluders of a light in the BVHs, gathered in the shaft between points and the light.
 
 use super::DirectLighting;
 use crate::accel::Aabb;
