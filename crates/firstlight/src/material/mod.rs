@@ -172,6 +172,14 @@ pub struct Bsdf {
     pub lobe: Lobe,
 }
 
+impl Bsdf {
+    /// What leaves under such ambient light, beside the light of lights.
+    #[inline(always)]
+    pub(crate) fn base(&self, ambient: Rgb) -> Rgb {
+        ambient * self.ambient
+    }
+}
+
 /// A highlight in numbers.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Lobe {
@@ -184,6 +192,14 @@ pub enum Lobe {
 }
 
 impl Lobe {
+    /// The lobe of surfaces of which some have the one and some the other, or none; `None` if they have different ones.
+    pub(crate) fn with(self, other: Lobe) -> Option<Lobe> {
+        match (self, other) {
+            (lobe, Lobe::None) | (Lobe::None, lobe) => Some(lobe),
+            (one, other) => (one == other).then_some(one),
+        }
+    }
+
     /// The highlight, before its colour, from the cosines n.wi > 0, n.wo >= 0 and wi.wo. Never negative, never NaN.
     #[inline(always)]
     pub fn eval(&self, cos_i: f32, cos_o: f32, cos_io: f32) -> f32 {
