@@ -9,9 +9,10 @@
 //!
 //! Nothing here depends on the camera: the estimates and the representative lights are fixed when the tree is built.
 
+use super::area::products;
 use super::bounds::{ContributionBounds, EmissionProfile, LightBounds, MAX_CONTRIBUTION};
 use super::samples::mix;
-use super::{AreaShape, Light, LightKind};
+use super::{Area, Light};
 use crate::color::Rgb;
 use crate::material::{Colors, Lobe, Moments};
 use crate::math::{DVec3, Vec3};
@@ -148,23 +149,7 @@ struct TreeLight {
 impl TreeLight {
     fn new(index: u32, light: &Light, class: u32) -> TreeLight {
         let (bounds, strength) = LightBounds::of(light);
-        let sum = |a: DVec3, b: DVec3, factor: f64| {
-            let (a, b) = (products(a), products(b));
-            std::array::from_fn(|i| (a[i] + b[i]) * factor)
-        };
-        let (covariance, radius) = match &light.kind {
-            LightKind::Area(area) => match &area.shape {
-                AreaShape::Rectangle(r) => (sum(r.e0, r.e1, 1.0 / 12.0), 0.5 * (r.e0.length() + r.e1.length())),
-                AreaShape::Disk(disk) => (sum(disk.a, disk.b, 0.25), disk.radius),
-                // From outside its light is that of a point
-                AreaShape::Sphere(sphere) if area.physical => ([0.0; 6], sphere.radius),
-                AreaShape::Sphere(sphere) => {
-                    let third = sphere.radius * sphere.radius / 3.0;
-                    ([third, third, third, 0.0, 0.0, 0.0], sphere.radius)
-                }
-            },
-            LightKind::Point(_) | LightKind::Directional(_) | LightKind::Spot(_) => ([0.0; 6], 0.0),
-        };
+        let (covariance, radius) = light.area().map_or(([0.0; 6], 0.0), Area::spread);
         let kind = bounds.profile as u8 * 2 + u8::from(light.shadows);
         TreeLight {
             index,
@@ -177,11 +162,6 @@ impl TreeLight {
             shadows: light.shadows,
         }
     }
-}
-
-/// The products of the coordinates of a vector: xx, yy, zz, xy, yz, zx.
-fn products(v: DVec3) -> [f64; 6] {
-    [v.x * v.x, v.y * v.y, v.z * v.z, v.x * v.y, v.y * v.z, v.z * v.x]
 }
 
 /// The channels of a colour.

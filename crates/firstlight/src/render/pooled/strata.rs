@@ -112,7 +112,7 @@ impl StratumSums {
 
 /// The strata of a light, and the samples of some receivers.
 pub(super) struct Strata<'a> {
-    sampler: LightSampler<'a>,
+    pub sampler: LightSampler<'a>,
     receivers: usize,
     /// The first half of a block takes its place, and the second one goes to the end.
     pub blocks: Vec<StratumBlock>,
