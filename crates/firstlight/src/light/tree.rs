@@ -14,7 +14,7 @@ use super::bounds::{ContributionBounds, EmissionProfile, LightBounds, MAX_CONTRI
 use super::samples::mix;
 use super::{Area, Light};
 use crate::color::Rgb;
-use crate::material::{Colors, Lobe, Moments};
+use crate::material::{Colors, Lobe, Moments, PerMoment};
 use crate::math::{DVec3, Vec3};
 
 /// Up to so many lights are all evaluated at every point; a scene with more has a light tree.
@@ -258,7 +258,7 @@ impl LightNode {
     pub fn max_contribution(&self, bounds: &ContributionBounds) -> Colors {
         let capped = |color: Rgb| color.min(Rgb::WHITE * MAX_CONTRIBUTION);
         Moments::bounds(bounds.max_diffuse, bounds.max_weight * bounds.highlight.most)
-            .colors(|most| capped(self.power * most))
+            .map(|most| capped(self.power * most))
     }
 
     /// An upper bound of the difference between [`estimate`](Self::estimate) and what its lights contribute, where
@@ -291,10 +291,12 @@ impl LightNode {
     pub fn estimate(&self, p: Vec3, ns: Vec3, wo: Vec3, lobe: &Lobe) -> Colors {
         let one = |channel: usize| self.channel_estimate(channel, p, ns, wo, lobe);
         if self.is_gray {
-            return one(0).colors(|moment| self.power * moment);
+            return one(0).map(|moment| self.power * moment);
         }
         let [r, g, b] = [one(0), one(1), one(2)];
-        Colors(std::array::from_fn(|i| Rgb::new(self.power.r * r.0[i], self.power.g * g.0[i], self.power.b * b.0[i])))
+        PerMoment(std::array::from_fn(|i| {
+            Rgb::new(self.power.r * r.0[i], self.power.g * g.0[i], self.power.b * b.0[i])
+        }))
     }
 
     #[inline(always)]

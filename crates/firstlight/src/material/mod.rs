@@ -10,7 +10,7 @@ mod shading_point;
 pub use blinn_phong::{BlinnPhongDesc, BlinnPhongLobe};
 pub(crate) use highlight::Highlight;
 pub(crate) use lobe_lanes::LobeLanes;
-pub(crate) use moments::{Colors, MOMENTS, Moments};
+pub(crate) use moments::{Colors, MOMENTS, Moments, PerMoment};
 pub use phong::{PhongDesc, PhongLobe};
 pub(crate) use shading_point::ShadingPoint;
 
@@ -127,7 +127,7 @@ impl Material {
             }
         };
         let ambient = self.ambient.as_ref().map_or(diffuse, color);
-        Bsdf { colors: Colors([diffuse, specular]), ambient, lobe }
+        Bsdf { colors: PerMoment([diffuse, specular]), ambient, lobe }
     }
 }
 
@@ -147,7 +147,7 @@ impl Material {
         };
         let [diffuse, specular] = [contrast(&self.diffuse)?, contrast(&self.specular)?];
         let ambient = self.ambient.as_ref().map_or(Some(diffuse), contrast)?;
-        self.shininess.texture.is_none().then_some((Colors([diffuse, specular]), ambient))
+        self.shininess.texture.is_none().then_some((PerMoment([diffuse, specular]), ambient))
     }
 
     /// Whether it is the same all within a step of the footprint of a surface.
@@ -224,13 +224,13 @@ impl Lobe {
     /// The moments of light of such a weight.
     #[inline(always)]
     pub(crate) fn moments(&self, cos_i: f32, cos_o: f32, cos_io: f32, weight: f32) -> Moments {
-        Moments([cos_i * weight, self.eval(cos_i, cos_o, cos_io) * weight])
+        PerMoment([cos_i * weight, self.eval(cos_i, cos_o, cos_io) * weight])
     }
 
     /// The same where it is known what the cosine makes of many lights together.
     #[inline(always)]
     pub(crate) fn moments_around(&self, cosine: f32, cos_i: f32, cos_o: f32, cos_io: f32, weight: f32) -> Moments {
-        Moments([cosine, if matches!(self, Lobe::None) { 0.0 } else { weight * self.eval(cos_i, cos_o, cos_io) }])
+        PerMoment([cosine, if matches!(self, Lobe::None) { 0.0 } else { weight * self.eval(cos_i, cos_o, cos_io) }])
     }
 
     /// Its kind, if there is one.

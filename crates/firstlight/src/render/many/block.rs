@@ -225,7 +225,7 @@ pub(super) fn sent(scene: &Scene, tree: &LightTree, entry: u32, point: &ShadingP
     if entry & BY_REPRESENTATIVE == 0 {
         return node.estimate(point.p, point.ns, point.wo, &point.bsdf.lobe);
     }
-    sent_by_one(scene, &tree.nodes[node.representative as usize], point).colors(|sent| node.power * sent)
+    sent_by_one(scene, &tree.nodes[node.representative as usize], point).map(|sent| node.power * sent)
 }
 
 /// What one light contributes for a power of 1.

@@ -20,7 +20,7 @@ use crate::color::Rgb;
 use crate::film::resolve::LightTerm;
 use crate::integrate::Emitter;
 use crate::light::{Area, FineCell, MIN_DISTANCE2, Points, SERIES, SeriesPart};
-use crate::material::{Colors, LobeLanes, Moments, ShadingPoint};
+use crate::material::{Colors, LobeLanes, Moments, PerMoment, ShadingPoint};
 use crate::math::{DVec3, LANES, LightEnd, ShadowRay, Vec3, Vec3x16};
 use crate::render::Counts;
 use crate::render::lanes::PointObstacles;
@@ -90,7 +90,7 @@ impl SampledReceiver {
 
     /// The unoccluded integral: in closed form, or as points of a light of such a measure estimate it.
     pub fn unoccluded(&self, measure: f32) -> Moments {
-        self.unoccluded.unwrap_or_else(|| Moments(self.sums.sent.map(|sent| sent as f32 * measure)))
+        self.unoccluded.unwrap_or_else(|| PerMoment(self.sums.sent.map(|sent| sent as f32 * measure)))
     }
 }
 
