@@ -127,18 +127,10 @@ impl Item {
 
     /// Its transform, if it can have one and has.
     pub fn transform(&self) -> Option<TransformDesc> {
-        let of_light = |light: &LightDesc| match light {
-            LightDesc::Point(light) => light.transform.clone(),
-            LightDesc::Directional(light) => light.transform.clone(),
-            LightDesc::Spot(light) => light.transform.clone(),
-            LightDesc::Rectangle(light) => light.transform.clone(),
-            LightDesc::Disk(light) => light.transform.clone(),
-            LightDesc::Sphere(light) => light.transform.clone(),
-        };
         match self {
             Item::Shape(shape) => shape.transform().cloned(),
             Item::Camera(_, camera) => camera.transform.as_deref().cloned(),
-            Item::Light(light) => of_light(light).map(|transform| *transform),
+            Item::Light(light) => light.transform().cloned(),
             Item::Render(_) | Item::Texture(..) | Item::Material(..) => None,
         }
     }

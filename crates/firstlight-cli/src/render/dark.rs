@@ -59,15 +59,7 @@ fn named(desc: &SceneDesc) -> impl Iterator<Item = (String, &LightDesc)> {
 
 /// Whether a light has the strength that it has where none is said, in a unit in which that is little.
 fn is_left(light: &LightDesc) -> bool {
-    let (strength, falloff) = match light {
-        LightDesc::Point(light) => (light.strength, light.falloff),
-        LightDesc::Directional(light) => (light.strength, light.falloff),
-        LightDesc::Spot(light) => (light.strength, light.falloff),
-        LightDesc::Rectangle(light) => (light.strength, light.falloff),
-        LightDesc::Disk(light) => (light.strength, light.falloff),
-        LightDesc::Sphere(light) => (light.strength, light.falloff),
-    };
-    strength == 1.0 && falloff == Falloff::Physical
+    light.strength() == (1.0, Falloff::Physical)
 }
 
 /// A number of 1 or more, to two digits.

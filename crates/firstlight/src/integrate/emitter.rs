@@ -7,7 +7,7 @@ use arrayvec::ArrayVec;
 use super::batch::Exact;
 use super::cell::AreaWeight;
 use super::light_frame::{FlatLight, LightFrame, Outline};
-use crate::light::{Area, AreaShape};
+use crate::light::{AreaShape, Light};
 use crate::material::ShadingPoint;
 use crate::math::{DVec3, Vec3};
 
@@ -28,10 +28,12 @@ pub(crate) enum Emitter {
 }
 
 impl Emitter {
-    pub fn new(area: &Area) -> Emitter {
+    /// `None` of a light without an area.
+    pub fn of(light: &Light) -> Option<Emitter> {
+        let area = light.area()?;
         let flat =
             |c, a, b, n, outline| Emitter::Flat(FlatLight::new(c, a, b, n, outline, area.physical, area.both_sides));
-        match &area.shape {
+        Some(match &area.shape {
             AreaShape::Rectangle(r) => flat(r.center, r.e0 * 0.5, r.e1 * 0.5, r.n, Outline::Parallelogram),
             AreaShape::Disk(disk) => flat(disk.center, disk.a, disk.b, disk.n, Outline::Disk),
             AreaShape::Sphere(sphere) => Emitter::Ball {
@@ -40,7 +42,7 @@ impl Emitter {
                 physical: area.physical,
                 both_sides: area.both_sides,
             },
-        }
+        })
     }
 
     /// Whether irradiance falls with the square of the distance and the cosine at the light.

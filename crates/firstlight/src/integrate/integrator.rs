@@ -28,7 +28,7 @@ use super::panels::{OccludedLight, OccluderMask, Panel, PanelSums, integrate_row
 use super::subdivide::{CellMetrics, cell_metrics, halves, test_horizons, whole_light};
 use super::tolerance::{COSTS, TOLERANCE, Weight};
 use crate::color::{DisplaySteps, Rgb};
-use crate::material::{LobeKind, Moments, ShadingPoint};
+use crate::material::{LobeKind, Moments, PerMoment, ShadingPoint};
 use crate::math::{LANES, dispatch_wide};
 use crate::visibility::Visibility;
 
@@ -370,7 +370,7 @@ impl AreaLightIntegrator {
         let mut sent = vec![Moments::default(); points.len()];
         for (cells, whole_sums) in [(whole, whole_sums), (partial, partial_sums)] {
             for (k, cell) in cells.iter().enumerate() {
-                sent[cell.point as usize] += Moments(lane(&whole_sums[k / LANES].sums, k).map(f32::abs));
+                sent[cell.point as usize] += PerMoment(lane(&whole_sums[k / LANES].sums, k).map(f32::abs));
             }
         }
         for ((state, point), sent) in state.iter_mut().zip(points).zip(&sent) {
@@ -589,11 +589,11 @@ impl PointSum {
         if self.round != round {
             (self.round, self.estimate) = (round, self.accepted);
         }
-        self.estimate += Moments(sums);
+        self.estimate += PerMoment(sums);
     }
 
     fn accept(&mut self, sums: [f32; MOMENTS]) {
-        self.accepted += Moments(sums);
+        self.accepted += PerMoment(sums);
     }
 
     /// The halves of a cell with error estimates along x and y, across the axis of the larger one; none if the cell is

@@ -6,8 +6,8 @@ use std::sync::{Arc, OnceLock};
 use fearless_simd::{f32x16, prelude::*};
 
 use super::{
-    DiskLight, EmitSides, Falloff, FineCell, Light, LightKind, LightScale, Rectangle, SampleSet, SphereLight, scaled,
-    way_error,
+    DiskLight, EmitSides, Falloff, FineCell, Light, LightKind, LightScale, PointBlock, Points, Rectangle, SampleSet,
+    SphereLight, scaled, way_error,
 };
 use crate::context::{CompileContext, show};
 use crate::describe::{ColorDesc, SamplesDesc};
@@ -124,6 +124,11 @@ pub(super) struct AreaCommon {
     pub samples: Option<SamplesDesc>,
     pub set: SampleSet,
     pub seed: u32,
+}
+
+/// The products of the coordinates of a vector: xx, yy, zz, xy, yz, zx.
+pub(super) fn products(v: DVec3) -> [f64; 6] {
+    [v.x * v.x, v.y * v.y, v.z * v.z, v.x * v.y, v.y * v.z, v.z * v.x]
 }
 
 /// Checks the number of samples.
@@ -298,6 +303,30 @@ impl AreaShape {
         }
     }
 
+    /// Two edges of a box around it, and points: the smallest box along the edges that holds the points holds it.
+    pub(crate) fn edges_and_corners(&self) -> ([DVec3; 2], Vec<DVec3>) {
+        match self {
+            AreaShape::Rectangle(rectangle) => {
+                let corners = rectangle.shape.corners.map(|corner| corner.as_dvec3());
+                let deep = rectangle.shape.deep_corners();
+                ([rectangle.e0, rectangle.e1], corners.into_iter().chain(deep).collect())
+            }
+            AreaShape::Disk(disk) => {
+                let (a, b) = (disk.a, disk.b);
+                ([a, b], [a + b, a - b, b - a, -a - b].map(|v| disk.center + v).into())
+            }
+            AreaShape::Sphere(sphere) => {
+                let r = DVec3::splat(sphere.radius);
+                ([DVec3::X, DVec3::Y].map(|axis| axis * sphere.radius), vec![sphere.center - r, sphere.center + r])
+            }
+        }
+    }
+
+    /// Whether it is a ball.
+    pub(crate) fn is_ball(&self) -> bool {
+        matches!(self, AreaShape::Sphere(_))
+    }
+
     /// The smallest t > 0 at which a camera ray meets a side that emits.
     #[inline(always)]
     pub(crate) fn intersect(&self, ray: &Ray) -> Option<f64> {
@@ -328,11 +357,6 @@ impl Area {
         self.count as usize
     }
 
-    /// Its area: [`AreaShape::measure`].
-    pub fn measure(&self) -> f64 {
-        self.shape.measure()
-    }
-
     /// The diagonal of the box around it.
     pub(crate) fn diagonal(&self) -> f32 {
         2.0 * self.half.length()
@@ -340,7 +364,31 @@ impl Area {
 
     /// What all of its points together stand for.
     pub(crate) fn stands_for(&self) -> f32 {
-        if self.physical { self.measure() as f32 } else { 1.0 }
+        if self.physical { self.shape.measure() as f32 } else { 1.0 }
+    }
+
+    /// The mean of the products of coordinates of its points about its center, as its light shows them, in square
+    /// metres; and the largest distance of its points from its center, in metres.
+    pub(super) fn spread(&self) -> ([f64; 6], f64) {
+        let sum = |a: DVec3, b: DVec3, factor: f64| {
+            let (a, b) = (products(a), products(b));
+            std::array::from_fn(|i| (a[i] + b[i]) * factor)
+        };
+        match &self.shape {
+            AreaShape::Rectangle(r) => (sum(r.e0, r.e1, 1.0 / 12.0), 0.5 * (r.e0.length() + r.e1.length())),
+            AreaShape::Disk(disk) => (sum(disk.a, disk.b, 0.25), disk.radius),
+            // From outside its light is that of a point
+            AreaShape::Sphere(sphere) if self.physical => ([0.0; 6], sphere.radius),
+            AreaShape::Sphere(sphere) => {
+                let third = sphere.radius * sphere.radius / 3.0;
+                ([third, third, third, 0.0, 0.0, 0.0], sphere.radius)
+            }
+        }
+    }
+
+    /// About the largest weight of all of it from such a distance.
+    pub(crate) fn most(&self, distance: f32) -> f32 {
+        if self.physical { self.stands_for() / (distance * distance) } else { 1.0 }
     }
 
     /// Unit normal of the front, where all of it faces one way.
@@ -471,68 +519,6 @@ impl Area {
         }
         let cos = side * inverse_distance;
         cos.simd_gt(zero).select(cos * (inverse_distance * inverse_distance), zero)
-    }
-}
-
-/// The sampled points of an area light in blocks of sixteen, coordinate by coordinate, as lanes want them.
-#[derive(Clone, Debug)]
-pub(crate) struct Points {
-    pub blocks: Vec<PointBlock>,
-    /// The unit normal at each point, where each has its own. They are kept, not found from the points: those are
-    /// rounded, and of a small sphere far from the origin nothing would be left.
-    normals: Vec<PointBlock>,
-}
-
-/// Sixteen points, or normals. Where there is none, every coordinate is NaN: it is above no horizon and sends no light.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct PointBlock {
-    x: [f32; LANES],
-    y: [f32; LANES],
-    z: [f32; LANES],
-}
-
-impl Points {
-    /// How many there are.
-    pub fn count(&self) -> usize {
-        let last = self.blocks.last().map_or(0, |block| block.x.iter().filter(|x| !x.is_nan()).count());
-        self.blocks.len().saturating_sub(1) * LANES + last
-    }
-
-    /// Point `k`, world space.
-    pub fn get(&self, k: usize) -> Vec3 {
-        self.blocks[k / LANES].get(k % LANES)
-    }
-}
-
-impl PointBlock {
-    #[inline(always)]
-    fn of(point: impl Fn(usize) -> DVec3) -> PointBlock {
-        let mut block = PointBlock { x: [0.0; LANES], y: [0.0; LANES], z: [0.0; LANES] };
-        for k in 0..LANES {
-            let v = point(k).as_vec3();
-            (block.x[k], block.y[k], block.z[k]) = (v.x, v.y, v.z);
-        }
-        block
-    }
-
-    /// The coordinates of all of them, axis by axis.
-    #[inline(always)]
-    pub fn coordinates(&self) -> [[f32; LANES]; 3] {
-        [self.x, self.y, self.z]
-    }
-
-    #[inline(always)]
-    pub fn get(&self, lane: usize) -> Vec3 {
-        Vec3::new(self.x[lane], self.y[lane], self.z[lane])
-    }
-
-    #[inline(always)]
-    pub fn lanes<S: Simd>(&self, simd: S) -> Vec3x16<S> {
-        Vec3x16 {
-            x: f32x16::simd_from(simd, self.x),
-            y: f32x16::simd_from(simd, self.y),
-            z: f32x16::simd_from(simd, self.z),
-        }
     }
 }
 

@@ -137,7 +137,7 @@ impl LightBounds {
                 let [low, high] = area.shape.bounds();
                 let room = |v: DVec3| v.abs() * 1e-7;
                 let (low, high) = ((low - room(low)).as_vec3(), (high + room(high)).as_vec3());
-                let round = matches!(area.shape, AreaShape::Sphere(_));
+                let round = area.shape.is_ball();
                 let strength = match (&area.shape, area.physical) {
                     (_, false) => 1.0,
                     // The area of its silhouette

@@ -5,6 +5,7 @@ mod bounds;
 mod directional;
 mod disk;
 mod point;
+mod points;
 mod rectangle;
 mod samples;
 mod sphere;
@@ -27,8 +28,9 @@ pub(crate) use samples::{FineCell, SERIES, SeriesPart, with_gaps};
 pub use sphere::{SphereLight, SphereLightDesc};
 pub use spot::{Spot, SpotDesc};
 
-pub(crate) use area::{PointBlock, Points, check_samples};
+pub(crate) use area::check_samples;
 pub(crate) use bounds::{ContributionBounds, EmissionProfile, ReceiverBounds};
+pub(crate) use points::{PointBlock, Points};
 pub(crate) use tree::{FEW_LIGHTS, LightNode, LightTree, NodeContents};
 
 words! {
@@ -71,7 +73,33 @@ family! {
     }
 }
 
+/// Does the same with the table of any light.
+macro_rules! of_any {
+    ($light:expr, $table:ident => $do:expr) => {
+        match $light {
+            LightDesc::Point($table) => $do,
+            LightDesc::Directional($table) => $do,
+            LightDesc::Spot($table) => $do,
+            LightDesc::Rectangle($table) => $do,
+            LightDesc::Disk($table) => $do,
+            LightDesc::Sphere($table) => $do,
+        }
+    };
+}
+
 impl LightDesc {
+    /// The light that it describes; `samples` is the scene's default.
+    pub(crate) fn compile(&self, cx: &mut CompileContext, samples: SamplesDesc) -> Light {
+        match self {
+            LightDesc::Point(light) => light.compile(cx),
+            LightDesc::Directional(light) => light.compile(cx),
+            LightDesc::Spot(light) => light.compile(cx),
+            LightDesc::Rectangle(light) => light.compile(cx, samples),
+            LightDesc::Disk(light) => light.compile(cx, samples),
+            LightDesc::Sphere(light) => light.compile(cx, samples),
+        }
+    }
+
     /// Lights in scene order: kind by kind, in each the order of the text.
     pub(crate) fn in_scene_order(lights: &[LightDesc]) -> impl Iterator<Item = &LightDesc> {
         Self::KINDS.iter().flat_map(|kind| lights.iter().filter(move |light| light.kind() == *kind))
@@ -87,38 +115,22 @@ impl LightDesc {
 
     /// Its name, if it has one.
     pub fn name(&self) -> Option<String> {
-        match self {
-            LightDesc::Point(light) => light.name.clone(),
-            LightDesc::Directional(light) => light.name.clone(),
-            LightDesc::Spot(light) => light.name.clone(),
-            LightDesc::Rectangle(light) => light.name.clone(),
-            LightDesc::Disk(light) => light.name.clone(),
-            LightDesc::Sphere(light) => light.name.clone(),
-        }
+        of_any!(self, light => light.name.clone())
     }
 
     /// The group of lights that it belongs to, if any.
     pub fn group(&self) -> Option<&str> {
-        match self {
-            LightDesc::Point(light) => light.group.as_deref(),
-            LightDesc::Directional(light) => light.group.as_deref(),
-            LightDesc::Spot(light) => light.group.as_deref(),
-            LightDesc::Rectangle(light) => light.group.as_deref(),
-            LightDesc::Disk(light) => light.group.as_deref(),
-            LightDesc::Sphere(light) => light.group.as_deref(),
-        }
+        of_any!(self, light => light.group.as_deref())
+    }
+
+    /// Its strength, and how it weakens on its way.
+    pub fn strength(&self) -> (f64, Falloff) {
+        of_any!(self, light => (light.strength, light.falloff))
     }
 
     /// Where it is moved, if it says so.
-    pub(crate) fn transform(&self) -> Option<&TransformDesc> {
-        match self {
-            LightDesc::Point(light) => light.transform.as_deref(),
-            LightDesc::Directional(light) => light.transform.as_deref(),
-            LightDesc::Spot(light) => light.transform.as_deref(),
-            LightDesc::Rectangle(light) => light.transform.as_deref(),
-            LightDesc::Disk(light) => light.transform.as_deref(),
-            LightDesc::Sphere(light) => light.transform.as_deref(),
-        }
+    pub fn transform(&self) -> Option<&TransformDesc> {
+        of_any!(self, light => light.transform.as_deref())
     }
 
     /// How an area light is sampled: its own `samples`, if it says any, and how the points are laid out. `None` for a
@@ -206,15 +218,6 @@ pub enum LightKind {
     Area(Area),
 }
 
-/// From how much of a place's surroundings a light comes: what decides how it is summed up.
-#[derive(Clone, Copy, Debug)]
-pub enum Extent<'a> {
-    /// From one point, or from one direction: one sample is all of it.
-    Point,
-    /// From an area, which is sampled or integrated.
-    Area(&'a Area),
-}
-
 /// The way from a surface to one point of a light.
 #[derive(Clone, Copy, Debug)]
 pub struct Towards {
@@ -237,21 +240,13 @@ pub struct LightSample {
 pub(crate) const MIN_DISTANCE2: f32 = 1e-30;
 
 impl Light {
-    /// From how much around a place it comes.
-    #[inline(always)]
-    pub fn extent(&self) -> Extent<'_> {
-        match &self.kind {
-            LightKind::Area(area) => Extent::Area(area),
-            LightKind::Point(_) | LightKind::Directional(_) | LightKind::Spot(_) => Extent::Point,
-        }
-    }
-
-    /// Its shape in space, if it has one: what the camera can see of it, and what can stand in the way of others.
+    /// Its area, if it has one, which is sampled or integrated: what the camera can see of it, and what can stand in
+    /// the way of others. Without one it comes from one point, or from one direction: one sample is all of it.
     #[inline(always)]
     pub fn area(&self) -> Option<&Area> {
-        match self.extent() {
-            Extent::Area(area) => Some(area),
-            Extent::Point => None,
+        match &self.kind {
+            LightKind::Area(area) => Some(area),
+            LightKind::Point(_) | LightKind::Directional(_) | LightKind::Spot(_) => None,
         }
     }
 
@@ -302,6 +297,12 @@ impl Light {
             LightKind::Spot(spot) => n.abs().dot(way_error(spot.position, Vec3::ZERO, p, error)),
             LightKind::Area(area) => area.floor(p, error, n),
         }
+    }
+
+    /// The turn of the light over a footprint of radius `reach` that makes as much as the fading of a spot's cone;
+    /// infinite where its rim may cross. `l` leads from the footprint's middle to the light.
+    pub(crate) fn rim_turn(&self, l: Vec3, reach: f32) -> f32 {
+        if let LightKind::Spot(spot) = &self.kind { spot.rim_turn(l, reach) } else { 0.0 }
     }
 
     /// How much arrives from sample `k`, to which `l` leads from a surface. `None` where the two are the same point.

@@ -138,4 +138,15 @@ impl Spot {
         let cone = fade * fade;
         if self.physical { cone * (inverse_distance * inverse_distance) } else { cone }
     }
+
+    /// [`Light::rim_turn`].
+    pub(crate) fn rim_turn(&self, l: Vec3, reach: f32) -> f32 {
+        let near = (l.length() - reach).max(0.0);
+        let swing = 2.0 * reach / near.max(f32::MIN_POSITIVE);
+        let cos = 1.0 - (-l).normalize_or_zero().dot(self.axis);
+        if (cos - self.outer).abs() < 2.0 * swing {
+            return f32::INFINITY;
+        }
+        swing * (2.0 * self.inverse_fade.min(1e6)).sqrt()
+    }
 }

@@ -9,11 +9,12 @@
 //!
 //! Nothing here depends on the camera: the estimates and the representative lights are fixed when the tree is built.
 
+use super::area::products;
 use super::bounds::{ContributionBounds, EmissionProfile, LightBounds, MAX_CONTRIBUTION};
 use super::samples::mix;
-use super::{AreaShape, Light, LightKind};
+use super::{Area, Light};
 use crate::color::Rgb;
-use crate::material::{Colors, Lobe, Moments};
+use crate::material::{Colors, Lobe, Moments, PerMoment};
 use crate::math::{DVec3, Vec3};
 
 /// Up to so many lights are all evaluated at every point; a scene with more has a light tree.
@@ -148,23 +149,7 @@ struct TreeLight {
 impl TreeLight {
     fn new(index: u32, light: &Light, class: u32) -> TreeLight {
         let (bounds, strength) = LightBounds::of(light);
-        let sum = |a: DVec3, b: DVec3, factor: f64| {
-            let (a, b) = (products(a), products(b));
-            std::array::from_fn(|i| (a[i] + b[i]) * factor)
-        };
-        let (covariance, radius) = match &light.kind {
-            LightKind::Area(area) => match &area.shape {
-                AreaShape::Rectangle(r) => (sum(r.e0, r.e1, 1.0 / 12.0), 0.5 * (r.e0.length() + r.e1.length())),
-                AreaShape::Disk(disk) => (sum(disk.a, disk.b, 0.25), disk.radius),
-                // From outside its light is that of a point
-                AreaShape::Sphere(sphere) if area.physical => ([0.0; 6], sphere.radius),
-                AreaShape::Sphere(sphere) => {
-                    let third = sphere.radius * sphere.radius / 3.0;
-                    ([third, third, third, 0.0, 0.0, 0.0], sphere.radius)
-                }
-            },
-            LightKind::Point(_) | LightKind::Directional(_) | LightKind::Spot(_) => ([0.0; 6], 0.0),
-        };
+        let (covariance, radius) = light.area().map_or(([0.0; 6], 0.0), Area::spread);
         let kind = bounds.profile as u8 * 2 + u8::from(light.shadows);
         TreeLight {
             index,
@@ -177,11 +162,6 @@ impl TreeLight {
             shadows: light.shadows,
         }
     }
-}
-
-/// The products of the coordinates of a vector: xx, yy, zz, xy, yz, zx.
-fn products(v: DVec3) -> [f64; 6] {
-    [v.x * v.x, v.y * v.y, v.z * v.z, v.x * v.y, v.y * v.z, v.z * v.x]
 }
 
 /// The channels of a colour.
@@ -278,7 +258,7 @@ impl LightNode {
     pub fn max_contribution(&self, bounds: &ContributionBounds) -> Colors {
         let capped = |color: Rgb| color.min(Rgb::WHITE * MAX_CONTRIBUTION);
         Moments::bounds(bounds.max_diffuse, bounds.max_weight * bounds.highlight.most)
-            .colors(|most| capped(self.power * most))
+            .map(|most| capped(self.power * most))
     }
 
     /// An upper bound of the difference between [`estimate`](Self::estimate) and what its lights contribute, where
@@ -311,10 +291,12 @@ impl LightNode {
     pub fn estimate(&self, p: Vec3, ns: Vec3, wo: Vec3, lobe: &Lobe) -> Colors {
         let one = |channel: usize| self.channel_estimate(channel, p, ns, wo, lobe);
         if self.is_gray {
-            return one(0).colors(|moment| self.power * moment);
+            return one(0).map(|moment| self.power * moment);
         }
         let [r, g, b] = [one(0), one(1), one(2)];
-        Colors(std::array::from_fn(|i| Rgb::new(self.power.r * r.0[i], self.power.g * g.0[i], self.power.b * b.0[i])))
+        PerMoment(std::array::from_fn(|i| {
+            Rgb::new(self.power.r * r.0[i], self.power.g * g.0[i], self.power.b * b.0[i])
+        }))
     }
 
     #[inline(always)]

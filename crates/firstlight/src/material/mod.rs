@@ -10,7 +10,7 @@ mod shading_point;
 pub use blinn_phong::{BlinnPhongDesc, BlinnPhongLobe};
 pub(crate) use highlight::Highlight;
 pub(crate) use lobe_lanes::LobeLanes;
-pub(crate) use moments::{Colors, MOMENTS, Moments};
+pub(crate) use moments::{Colors, MOMENTS, Moments, PerMoment};
 pub use phong::{PhongDesc, PhongLobe};
 pub(crate) use shading_point::ShadingPoint;
 
@@ -127,7 +127,7 @@ impl Material {
             }
         };
         let ambient = self.ambient.as_ref().map_or(diffuse, color);
-        Bsdf { colors: Colors([diffuse, specular]), ambient, lobe }
+        Bsdf { colors: PerMoment([diffuse, specular]), ambient, lobe }
     }
 }
 
@@ -147,7 +147,7 @@ impl Material {
         };
         let [diffuse, specular] = [contrast(&self.diffuse)?, contrast(&self.specular)?];
         let ambient = self.ambient.as_ref().map_or(Some(diffuse), contrast)?;
-        self.shininess.texture.is_none().then_some((Colors([diffuse, specular]), ambient))
+        self.shininess.texture.is_none().then_some((PerMoment([diffuse, specular]), ambient))
     }
 
     /// Whether it is the same all within a step of the footprint of a surface.
@@ -172,6 +172,14 @@ pub struct Bsdf {
     pub lobe: Lobe,
 }
 
+impl Bsdf {
+    /// What leaves under such ambient light, beside the light of lights.
+    #[inline(always)]
+    pub(crate) fn base(&self, ambient: Rgb) -> Rgb {
+        ambient * self.ambient
+    }
+}
+
 /// A highlight in numbers.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Lobe {
@@ -184,6 +192,14 @@ pub enum Lobe {
 }
 
 impl Lobe {
+    /// The lobe of surfaces of which some have the one and some the other, or none; `None` if they have different ones.
+    pub(crate) fn with(self, other: Lobe) -> Option<Lobe> {
+        match (self, other) {
+            (lobe, Lobe::None) | (Lobe::None, lobe) => Some(lobe),
+            (one, other) => (one == other).then_some(one),
+        }
+    }
+
     /// The highlight, before its colour, from the cosines n.wi > 0, n.wo >= 0 and wi.wo. Never negative, never NaN.
     #[inline(always)]
     pub fn eval(&self, cos_i: f32, cos_o: f32, cos_io: f32) -> f32 {
@@ -208,13 +224,13 @@ impl Lobe {
     /// The moments of light of such a weight.
     #[inline(always)]
     pub(crate) fn moments(&self, cos_i: f32, cos_o: f32, cos_io: f32, weight: f32) -> Moments {
-        Moments([cos_i * weight, self.eval(cos_i, cos_o, cos_io) * weight])
+        PerMoment([cos_i * weight, self.eval(cos_i, cos_o, cos_io) * weight])
     }
 
     /// The same where it is known what the cosine makes of many lights together.
     #[inline(always)]
     pub(crate) fn moments_around(&self, cosine: f32, cos_i: f32, cos_o: f32, cos_io: f32, weight: f32) -> Moments {
-        Moments([cosine, if matches!(self, Lobe::None) { 0.0 } else { weight * self.eval(cos_i, cos_o, cos_io) }])
+        PerMoment([cosine, if matches!(self, Lobe::None) { 0.0 } else { weight * self.eval(cos_i, cos_o, cos_io) }])
     }
 
     /// Its kind, if there is one.

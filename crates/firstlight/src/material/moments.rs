@@ -7,49 +7,47 @@ use crate::color::Rgb;
 /// How many there are: the cosine, and the highlight.
 pub(crate) const MOMENTS: usize = 2;
 
-/// What arrives, before all colours: the weight times the cosine, and the weight times the highlight.
+/// Something of each moment.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(crate) struct Moments(pub [f32; MOMENTS]);
+pub(crate) struct PerMoment<T>(pub [T; MOMENTS]);
+
+/// What arrives, before all colours: the weight times the cosine, and the weight times the highlight.
+pub(crate) type Moments = PerMoment<f32>;
 
 /// What each moment is worth.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(crate) struct Colors(pub [Rgb; MOMENTS]);
+pub(crate) type Colors = PerMoment<Rgb>;
 
-impl Moments {
-    pub const ZERO: Moments = Moments([0.0; MOMENTS]);
-    pub const UNKNOWN: Moments = Moments([f32::NAN; MOMENTS]);
-
+impl<T: Copy> PerMoment<T> {
     /// Bounds: of what is as wide as the cosine, and of highlights.
     #[inline(always)]
-    pub fn bounds(wide: f32, narrow: f32) -> Moments {
-        Moments([wide, narrow])
-    }
-
-    /// What each makes.
-    #[inline(always)]
-    pub fn colors(self, f: impl Fn(f32) -> Rgb) -> Colors {
-        Colors(self.0.map(f))
+    pub fn bounds(wide: T, narrow: T) -> Self {
+        PerMoment([wide, narrow])
     }
 
     /// The cosine's.
     #[inline(always)]
-    pub fn cosine(&self) -> f32 {
+    pub fn cosine(&self) -> T {
         self.0[0]
     }
 
     #[inline(always)]
+    pub fn map<U>(self, f: impl Fn(T) -> U) -> PerMoment<U> {
+        PerMoment(self.0.map(f))
+    }
+
+    #[inline(always)]
+    pub fn zip<U: Copy, V>(self, other: PerMoment<U>, f: impl Fn(T, U) -> V) -> PerMoment<V> {
+        PerMoment(std::array::from_fn(|k| f(self.0[k], other.0[k])))
+    }
+}
+
+impl Moments {
+    pub const ZERO: Moments = PerMoment([0.0; MOMENTS]);
+    pub const UNKNOWN: Moments = PerMoment([f32::NAN; MOMENTS]);
+
+    #[inline(always)]
     pub fn is_known(&self) -> bool {
         !self.0[0].is_nan()
-    }
-
-    #[inline(always)]
-    pub fn map(self, f: impl Fn(f32) -> f32) -> Moments {
-        Moments(self.0.map(f))
-    }
-
-    #[inline(always)]
-    pub fn zip(self, other: Moments, f: impl Fn(f32, f32) -> f32) -> Moments {
-        Moments(std::array::from_fn(|k| f(self.0[k], other.0[k])))
     }
 
     #[inline(always)]
@@ -73,60 +71,13 @@ impl Moments {
     }
 }
 
-impl Add for Moments {
-    type Output = Moments;
-
-    #[inline(always)]
-    fn add(self, other: Moments) -> Moments {
-        self.zip(other, |a, b| a + b)
-    }
-}
-
-impl AddAssign for Moments {
-    #[inline(always)]
-    fn add_assign(&mut self, other: Moments) {
-        *self = *self + other;
-    }
-}
-
-impl Mul<f32> for Moments {
-    type Output = Moments;
-
-    #[inline(always)]
-    fn mul(self, times: f32) -> Moments {
-        self.map(|v| v * times)
-    }
-}
-
 impl Colors {
-    /// As [`Moments::bounds`].
-    #[inline(always)]
-    pub fn bounds(wide: Rgb, narrow: Rgb) -> Colors {
-        Colors([wide, narrow])
-    }
-
-    /// That of the cosine.
-    #[inline(always)]
-    pub fn cosine(&self) -> Rgb {
-        self.0[0]
-    }
-
-    pub const BLACK: Colors = Colors([Rgb::BLACK; MOMENTS]);
-
-    #[inline(always)]
-    pub fn map(self, f: impl Fn(Rgb) -> Rgb) -> Colors {
-        Colors(self.0.map(f))
-    }
-
-    #[inline(always)]
-    pub fn zip(self, other: Colors, f: impl Fn(Rgb, Rgb) -> Rgb) -> Colors {
-        Colors(std::array::from_fn(|k| f(self.0[k], other.0[k])))
-    }
+    pub const BLACK: Colors = PerMoment([Rgb::BLACK; MOMENTS]);
 
     /// Each moment with its colour.
     #[inline(always)]
     pub fn each(self, moments: &Moments) -> Colors {
-        Colors(std::array::from_fn(|k| self.0[k] * moments.0[k]))
+        self.zip(*moments, |color, moment| color * moment)
     }
 
     /// Adds what moments make.
@@ -158,28 +109,28 @@ impl Colors {
     }
 }
 
-impl AddAssign for Colors {
-    #[inline(always)]
-    fn add_assign(&mut self, other: Colors) {
-        *self = self.zip(other, |a, b| a + b);
-    }
-}
-
-impl Add for Colors {
-    type Output = Colors;
+impl<T: Copy + Add<Output = T>> Add for PerMoment<T> {
+    type Output = Self;
 
     #[inline(always)]
-    fn add(self, other: Colors) -> Colors {
+    fn add(self, other: Self) -> Self {
         self.zip(other, |a, b| a + b)
     }
 }
 
-impl Mul<f32> for Colors {
-    type Output = Colors;
+impl<T: Copy + Add<Output = T>> AddAssign for PerMoment<T> {
+    #[inline(always)]
+    fn add_assign(&mut self, other: Self) {
+        *self = *self + other;
+    }
+}
+
+impl<T: Copy + Mul<f32, Output = T>> Mul<f32> for PerMoment<T> {
+    type Output = Self;
 
     #[inline(always)]
-    fn mul(self, times: f32) -> Colors {
-        self.map(|color| color * times)
+    fn mul(self, times: f32) -> Self {
+        self.map(|of| of * times)
     }
 }
 

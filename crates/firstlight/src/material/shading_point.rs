@@ -70,7 +70,7 @@ impl ShadingPoint {
     #[inline(always)]
     pub fn of(si: &SurfaceInteraction, bsdf: &Bsdf, ambient: Rgb) -> ShadingPoint {
         let SurfaceInteraction { lit_from, error, horizon, ng, facet, ns, wo, surface, receives_shadow, .. } = *si;
-        let base = ambient * bsdf.ambient;
+        let base = bsdf.base(ambient);
         let point = ShadingPoint::new(lit_from, error, ns, wo, bsdf);
         ShadingPoint { horizon, ng, facet, surface, receives_shadow, base, ..point }
     }

@@ -311,7 +311,7 @@ impl<'a> Cells<'a> {
             let first = self.index([x, j]);
             let mut told = [true; CELL as usize];
             self.sums.begin(first..first + columns, Rgb::BLACK, 1.0);
-            let ambient = iter::repeat_n(scene.ambient * block.bsdf.ambient, columns);
+            let ambient = iter::repeat_n(block.bsdf.base(scene.ambient), columns);
             self.sums.add(first, Term::Ambient, Rgb::WHITE, ambient);
             for light in 0..scene.lights.len() {
                 let scale = self.lights.scale(light);
@@ -337,7 +337,7 @@ impl<'a> Cells<'a> {
         let (bsdf, contrast) = self.patchwork[first + ((at[1] - y) * side + at[0] - x) as usize];
         let Some(bsdf) = bsdf else { return false };
         self.sums.begin(index..index + 1, Rgb::BLACK, 1.0);
-        self.sums.add(index, Term::Ambient, Rgb::WHITE, iter::once(scene.ambient * bsdf.ambient));
+        self.sums.add(index, Term::Ambient, Rgb::WHITE, iter::once(bsdf.base(scene.ambient)));
         let mut slopes = Rgb::BLACK;
         for light in 0..scene.lights.len() {
             let Some(arrived) = self.grid.arrived(light, at) else { return false };
@@ -459,7 +459,7 @@ impl<'a> Cells<'a> {
         let bend = part * answer.most;
         let bsdf = &fragment.bsdf;
         let colors = self.lights.scale(light) * bsdf.colors;
-        let value = colors.onto(self.scene.ambient * bsdf.ambient, &answer.moments);
+        let value = colors.onto(bsdf.base(self.scene.ambient), &answer.moments);
         self.lights.steps(value, colors.of(&Moments::bounds(bend, bend)))
     }
 
@@ -489,7 +489,7 @@ impl<'a> Cells<'a> {
         let apart = most + least * -1.0;
         let bsdf = &fragment.bsdf;
         let colors = scale * bsdf.colors;
-        let value = colors.onto(scene.ambient * bsdf.ambient, &most);
+        let value = colors.onto(bsdf.base(scene.ambient), &most);
         let spread = self.lights.steps(value, colors.of(&apart));
         let sets_in = answers.iter().any(|answer| answer.moments == Moments::default());
         let allowed = if sets_in { TOLERANCE.spread * TOLERANCE.bends_at_once } else { TOLERANCE.spread };
@@ -602,7 +602,7 @@ impl<'a> Cells<'a> {
     fn add_ambient(&mut self) {
         for fragment in &self.fragments.all {
             let pixel = &mut self.pixels[fragment.pixel as usize];
-            pixel.terms.ambient += self.scene.ambient * fragment.bsdf.ambient * fragment.count() as f32;
+            pixel.terms.ambient += fragment.bsdf.base(self.scene.ambient) * fragment.count() as f32;
         }
     }
 

@@ -18,7 +18,7 @@ use super::{Counts, QUESTION_EVERY};
 use crate::color::{DisplaySteps, Rgb};
 use crate::ids::LightId;
 use crate::integrate::{AreaLightIntegrator, Emitter, LightIntegral, LightTask, TOLERANCE};
-use crate::light::{Area, Extent, LightTree};
+use crate::light::LightTree;
 use crate::material::{LobeKind, Moments, ShadingPoint};
 use crate::math::LANES;
 use crate::scene::Scene;
@@ -191,14 +191,14 @@ impl<'a> DirectLighting<'a> {
         &self.lights.scales
     }
 
-    /// What all points of light `index` together stand for.
-    pub fn measure(&self, index: usize) -> f32 {
-        self.scene.lights[index].area().map_or(1.0, Area::stands_for)
-    }
-
     /// Whether a light is integrated.
     pub fn is_integrated(&self, index: usize) -> bool {
         self.scene.lights[index].is_integrated()
+    }
+
+    /// Whether what an area light sends past no occluders is integrated without samples.
+    pub fn has_closed_form(&self, index: usize) -> bool {
+        self.lights.emitters[index].is_some()
     }
 
     /// Whether a light is integrated and can be occluded: then it is sampled behind what is in BVHs.
@@ -209,10 +209,7 @@ impl<'a> DirectLighting<'a> {
     /// Whether the visibility of light `index` is to be found for all rays of a block of pixels together: not of area
     /// lights that are sampled at fixed points.
     pub fn is_classified_by_blocks(&self, index: usize) -> bool {
-        match self.scene.lights[index].extent() {
-            Extent::Area(_) => self.is_integrated(index),
-            Extent::Point => true,
-        }
+        self.is_integrated(index) || self.scene.lights[index].area().is_none()
     }
 
     /// In display steps: how far one light may be wrong at a point that represents such a share of a pixel, where the
@@ -225,11 +222,6 @@ impl<'a> DirectLighting<'a> {
     pub(super) fn is_linked(&self, index: usize, point: &ShadingPoint) -> bool {
         let geometry = &self.scene.geometry;
         geometry.links.contains(geometry.lights_of(point.surface), LightId(index as u32))
-    }
-
-    /// Whether what light `index` sends to a point varies over no less than `apart` metres, on the light.
-    pub fn varies_over(&self, index: usize, point: &ShadingPoint, apart: f32) -> bool {
-        self.lights.emitters[index].as_ref().is_some_and(|emitter| emitter.nearest(point) >= apart)
     }
 
     /// Estimates one light at one point.
@@ -305,17 +297,17 @@ impl<'a> DirectLighting<'a> {
             members.clear();
             members.extend(group.iter().map(|(_, k)| *k));
             let of = Group { light, lobe, points, queries };
-            match scene.lights[light].extent() {
-                Extent::Point => {
+            match scene.lights[light].area() {
+                None => {
                     for k in &members {
                         estimates[*k as usize] = self.single(&of, *k, counts);
                     }
                     go_on()?;
                 }
-                Extent::Area(_) if self.is_integrated(light) => {
+                Some(_) if self.is_integrated(light) => {
                     self.evaluate(&of, shadows, &members, estimates, counts, go_on)?;
                 }
-                Extent::Area(area) => {
+                Some(area) => {
                     let varying: Vec<u32> = members.iter().copied().filter(|k| of.point(*k).reach > 0.0).collect();
                     self.evaluate(&of, shadows, &varying, estimates, counts, go_on)?;
                     let at_once = (QUESTION_EVERY / area.samples() as u64).clamp(1, AT_ONCE) as usize;
@@ -341,6 +333,10 @@ impl<'a> DirectLighting<'a> {
         counts: &mut Counts,
         go_on: &dyn Fn() -> ControlFlow<()>,
     ) -> ControlFlow<()> {
+        if !self.has_closed_form(of.light) {
+            members.iter().for_each(|k| estimates[*k as usize] = LightEstimate::UNKNOWN);
+            return ControlFlow::Continue(());
+        }
         let visibility = if shadows { Visibility::Listed } else { Visibility::Full };
         if !(shadows && self.lights.has_trees(self.scene, of.light)) {
             self.batch(of, visibility, members, estimates, counts);
@@ -414,8 +410,7 @@ impl<'a> DirectLighting<'a> {
     fn variation(&self, of: &Group, k: u32, integral: &LightIntegral) -> LightEstimate {
         let LightIntegral { sums, visibility, proved, motion, distance, height } = *integral;
         let (light, point) = (&self.scene.lights[of.light], of.point(k));
-        let is_physical = light.area().is_some_and(|area| area.physical);
-        let most = if is_physical { self.measure(of.light) / (distance * distance) } else { 1.0 };
+        let most = light.area().map_or(1.0, |area| area.most(distance));
         if visibility == Visibility::Partial {
             return LightEstimate { most, ..LightEstimate::UNKNOWN };
         }
@@ -429,8 +424,9 @@ impl<'a> DirectLighting<'a> {
     pub fn sampler(&self, index: usize) -> LightSampler<'a> {
         let (scene, level) = (self.scene, self.level);
         let area = scene.lights[index].area().expect("lights that are integrated have an area");
-        let (target, sets) = (&self.lights.targets[index], &self.lights.point_sets[index]);
-        LightSampler { scene, level, area, target, sets }
+        let Lights { emitters, targets, point_sets, .. } = self.lights;
+        let (emitter, target, sets) = (emitters[index].as_ref(), &targets[index], &point_sets[index]);
+        LightSampler { scene, level, area, emitter, target, sets }
     }
 
     /// By how many radians directions turn over the footprint of a point, times how narrow its lobe is.

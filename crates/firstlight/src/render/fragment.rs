@@ -553,7 +553,7 @@ impl Candidate {
         let error = error.widened(scene.geometry.rounding);
         let (n, surface) = (if normal.dot(wo) < 0.0 { -normal } else { normal }, self.surface(scene));
         let receives_shadow = scene.geometry.surfaces[surface.index()].receives_shadow;
-        let base = scene.ambient * bsdf.ambient;
+        let base = bsdf.base(scene.ambient);
         ShadingPoint { surface, receives_shadow, base, ..ShadingPoint::new(p, error, n, wo, bsdf) }
     }
 
@@ -656,10 +656,9 @@ impl MeanBsdf {
             count += 1.0;
             (least, most) = (least.min(bsdf.colors), most.max(bsdf.colors));
             // Any ray that sees a highlight says what it is like
-            match (sum.lobe, bsdf.lobe) {
-                (_, Lobe::None) => {}
-                (Lobe::None, lobe) => sum.lobe = lobe,
-                (one, other) => uneven |= one != other,
+            match sum.lobe.with(bsdf.lobe) {
+                Some(lobe) => sum.lobe = lobe,
+                None => uneven = true,
             }
         }
         let inverse = 1.0 / count;

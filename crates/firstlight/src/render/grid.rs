@@ -56,12 +56,7 @@ impl Block {
         let mut all = bsdfs.next()??;
         for bsdf in bsdfs {
             let bsdf = bsdf?;
-            match (all.lobe, bsdf.lobe) {
-                (_, Lobe::None) => {}
-                (Lobe::None, lobe) => all.lobe = lobe,
-                (one, other) if one == other => {}
-                _ => return None,
-            }
+            all.lobe = all.lobe.with(bsdf.lobe)?;
             all.colors = all.colors.max(bsdf.colors);
             all.ambient = all.ambient.min(bsdf.ambient);
         }
@@ -377,7 +372,7 @@ impl Grid {
         }
         // The arc, not the chord
         let (reach, turn) = (reach * 1.0625, turn * 1.0625);
-        let (bsdf, base) = (block.bsdf, scene.ambient * block.bsdf.ambient);
+        let (bsdf, base) = (block.bsdf, block.bsdf.base(scene.ambient));
         Some(ShadingPoint { reach, turn, bsdf, base, most_motion: 1.0, ..*middle })
     }
 
@@ -393,7 +388,7 @@ impl Grid {
     ) -> bool {
         let scale = lights.scale(item.light as usize);
         let colors = scale * block.bsdf.colors;
-        let base = scene.ambient * block.bsdf.ambient;
+        let base = block.bsdf.base(scene.ambient);
         let sets_in = nodes.iter().any(|node| *node == Moments::default());
         let is_behind = scene.geometry.has_trees() && center.visibility == Visibility::Partial;
         // Over a square that outlines move far over, the edge of a penumbra may run between the nine

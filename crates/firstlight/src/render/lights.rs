@@ -11,7 +11,7 @@ use crate::visibility::Target;
 
 /// What all tiles share: the lights as they are integrated, and how errors show.
 pub(crate) struct Lights<'a> {
-    /// Those that have an area; and how many of them are integrated.
+    /// Those whose unoccluded light is integrated without samples; and how many of them are integrated.
     pub emitters: Vec<Option<Emitter>>,
     pub integrated: usize,
     /// What the sums of each are multiplied with, before the colours of the surface.
@@ -33,7 +33,7 @@ pub(crate) struct Lights<'a> {
 
 impl<'a> Lights<'a> {
     pub fn new(scene: &'a Scene) -> Lights<'a> {
-        let emitters: Vec<_> = scene.lights.iter().map(|light| light.area().map(Emitter::new)).collect();
+        let emitters: Vec<_> = scene.lights.iter().map(Emitter::of).collect();
         let scale = |light: &Light| if light.is_integrated() { light.intensity } else { light.scale };
         let scales = scene.lights.iter().map(scale).collect();
         let targets = Target::of_all(scene);

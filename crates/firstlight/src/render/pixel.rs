@@ -6,7 +6,7 @@ use super::{Counts, QUESTION_EVERY};
 use crate::film::hits::camera_ray;
 use crate::film::resolve::{LightTerm, PixelTerms, ScaledTerm, TermSums};
 use crate::ids::LightId;
-use crate::material::{Bsdf, MOMENTS, Moments, ShadingPoint};
+use crate::material::{Bsdf, MOMENTS, Moments, PerMoment, ShadingPoint};
 use crate::math::{LaneSum, Ray};
 use crate::scene::{Hit, Scene, TracedHit};
 
@@ -25,7 +25,7 @@ pub(crate) struct LobeSums(pub [LaneSum; MOMENTS]);
 
 impl LobeSums {
     pub fn total(&self) -> Moments {
-        Moments(std::array::from_fn(|k| self.0[k].total()))
+        PerMoment(std::array::from_fn(|k| self.0[k].total()))
     }
 }
 

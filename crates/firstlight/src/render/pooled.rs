@@ -208,7 +208,7 @@ impl PooledVisibility {
         if !self.receivers.is_empty() {
             let mut receivers = std::mem::take(&mut self.receivers);
             let fractions = self.sample(lights, &mut receivers, counts);
-            let measure = lights.measure(self.light);
+            let measure = lights.sampler(self.light).measure();
             for receiver in receivers {
                 let unoccluded = receiver.unoccluded(measure);
                 let moments = receiver.sums.arriving(&unoccluded, &fractions);
@@ -231,7 +231,7 @@ impl PooledVisibility {
     ) -> [f32; MOMENTS] {
         let sampler = lights.sampler(self.light);
         let mut first = TOLERANCE.first_points / (lights.scene.tolerance() as f32).sqrt();
-        if !lights.varies_over(self.light, &receivers[0].place(self.each), sampler.spacing(first)) {
+        if !sampler.varies_over(&receivers[0].place(self.each), sampler.spacing(first)) {
             first *= TOLERANCE.nearer;
         }
         let first = (first * self.share.sqrt() / receivers.len() as f32) as usize;
@@ -256,8 +256,9 @@ impl PooledVisibility {
             let is_wanted = is_enough
                 || (!is_sure || error.smooth > allowed) && (error.edges <= allowed || samples >= MOST_UNIFORM);
             if pooled.found.is_none()
+                && sampler.emitter.is_some()
                 && is_wanted
-                && (error.smooth > allowed || self.may_miss(&pooled, &strata, receivers, lights))
+                && (error.smooth > allowed || self.may_miss(&pooled, &strata, receivers))
             {
                 let places: Vec<_> = receivers.iter().map(|one| one.place(self.each)).collect();
                 let unoccluded = lights.estimate_each(self.light, &places, |_| Visibility::Full, counts);
@@ -316,18 +317,12 @@ impl PooledVisibility {
     }
 
     /// Whether samples may miss some of the unoccluded integral.
-    fn may_miss(
-        &self,
-        pooled: &PooledEstimate,
-        strata: &Strata,
-        receivers: &[SampledReceiver],
-        lights: &DirectLighting,
-    ) -> bool {
-        let spacing = lights.sampler(self.light).spacing(strata.count() as f32);
+    fn may_miss(&self, pooled: &PooledEstimate, strata: &Strata, receivers: &[SampledReceiver]) -> bool {
+        let spacing = strata.sampler.spacing(strata.count() as f32);
         let is_unseen =
             |k: usize| pooled.effective[k] < f64::from(TOLERANCE.told) && receivers.iter().any(|one| one.reflects(k));
         (0..MOMENTS).any(is_unseen)
-            || receivers.iter().any(|one| !lights.varies_over(self.light, &one.place(self.each), spacing))
+            || receivers.iter().any(|one| !strata.sampler.varies_over(&one.place(self.each), spacing))
     }
 }
 

@@ -137,7 +137,7 @@ impl Pyramid {
             Candidate::Light(i) => scene.lights[*i as usize].area().is_some_and(|area| match &area.shape {
                 AreaShape::Rectangle(rectangle) => !self.misses_flat(&rectangle.shape),
                 AreaShape::Sphere(sphere) => !self.misses_sphere(&sphere.shape),
-                AreaShape::Disk(_) => true,
+                _ => true,
             }),
             Candidate::Trees => geometry.may_meet(scene.level, &self.planes()),
         }));
@@ -246,7 +246,7 @@ impl Pyramid {
             Candidate::Facet(facet) => self.nearest_flat(&scene.geometry.facet(facet)),
             Candidate::Light(i) => match scene.lights[i as usize].area().map(|area| &area.shape) {
                 Some(AreaShape::Rectangle(rectangle)) => self.nearest_flat(&rectangle.shape),
-                Some(AreaShape::Disk(_) | AreaShape::Sphere(_)) => f64::NEG_INFINITY,
+                Some(_) => f64::NEG_INFINITY,
                 None => f64::INFINITY,
             },
             Candidate::Trees => {

@@ -4,7 +4,7 @@ use fearless_simd::{Level, f32x16, prelude::*};
 
 use crate::accel::{Aabb, dispatch_all};
 use crate::ids::LightId;
-use crate::light::{AreaShape, Extent, Light, LightKind, PointBlock, Points};
+use crate::light::{Light, PointBlock, Points, Towards};
 use crate::math::{Axes, DMat3, DVec3, LANES, LightEnd, Vec3, least_and_most};
 use crate::scene::Scene;
 
@@ -111,35 +111,16 @@ impl LightHull {
     }
 
     pub fn of(light: &Light) -> Self {
-        match &light.kind {
-            LightKind::Point(point) => Self::at(point.position, true),
-            LightKind::Spot(spot) => Self::at(spot.position, true),
-            LightKind::Directional(directional) => Self::at(directional.to_light, false),
-            LightKind::Area(area) => {
-                // The exact shape, and its samples as they are rounded
-                let (e0, e1, mut points) = match &area.shape {
-                    AreaShape::Rectangle(rectangle) => {
-                        let corners = rectangle.shape.corners.map(|corner| corner.as_dvec3());
-                        let deep = rectangle.shape.deep_corners();
-                        (rectangle.e0, rectangle.e1, corners.into_iter().chain(deep).collect::<Vec<_>>())
-                    }
-                    AreaShape::Disk(disk) => {
-                        let (a, b) = (disk.a, disk.b);
-                        (a, b, [a + b, a - b, b - a, -a - b].map(|v| disk.center + v).into())
-                    }
-                    AreaShape::Sphere(sphere) => {
-                        let r = DVec3::splat(sphere.radius);
-                        let (x, y) = (DVec3::X * sphere.radius, DVec3::Y * sphere.radius);
-                        (x, y, vec![sphere.center - r, sphere.center + r])
-                    }
-                };
-                if !light.exact {
-                    points.extend((0..area.samples()).map(|k| area.point(k).as_dvec3()));
-                }
-                let is_ball = matches!(area.shape, AreaShape::Sphere(_));
-                LightHull { is_ball, plane: light.plane(), ..Self::around(e0, e1, &points) }
-            }
+        let Some(area) = light.area() else {
+            let Towards { l, finite } = light.towards(0, Vec3::ZERO);
+            return Self::at(l, finite);
+        };
+        // The exact shape, and its samples as they are rounded
+        let ([e0, e1], mut points) = area.shape.edges_and_corners();
+        if !light.exact {
+            points.extend((0..area.samples()).map(|k| area.point(k).as_dvec3()));
         }
+        LightHull { is_ball: area.shape.is_ball(), plane: light.plane(), ..Self::around(e0, e1, &points) }
     }
 
     /// The coordinates of a point along the axes.
@@ -266,9 +247,9 @@ impl Target {
     pub fn new(scene: &Scene, id: LightId) -> Self {
         let light = &scene.lights[id.index()];
         let target = Target::without_samples(id, LightHull::of(light));
-        match light.extent() {
-            Extent::Area(area) if !light.exact => target.with(scene.level, area.points()),
-            Extent::Area(_) | Extent::Point => target,
+        match light.area() {
+            Some(area) if !light.exact => target.with(scene.level, area.points()),
+            _ => target,
         }
     }
 

@@ -1,7 +1,6 @@
 use super::super::bounds::{EmissionProfile, ReceiverBounds};
 use super::super::{
-    Area, AreaShape, Falloff, Light, LightDesc, LightSample, PointDesc, RectangleDesc, SampleSet, SphereLightDesc,
-    SpotDesc,
+    Falloff, Light, LightDesc, LightSample, PointDesc, RectangleDesc, SampleSet, SphereLightDesc, SpotDesc,
 };
 use super::*;
 use crate::context::CompileContext;
@@ -37,14 +36,7 @@ impl Random {
 
 fn compiled(desc: &LightDesc) -> Light {
     let cx = &mut CompileContext::default();
-    let light = match desc {
-        LightDesc::Point(light) => light.compile(cx),
-        LightDesc::Directional(light) => light.compile(cx),
-        LightDesc::Spot(light) => light.compile(cx),
-        LightDesc::Rectangle(light) => light.compile(cx, SamplesDesc::Exact),
-        LightDesc::Disk(light) => light.compile(cx, SamplesDesc::Exact),
-        LightDesc::Sphere(light) => light.compile(cx, SamplesDesc::Exact),
-    };
+    let light = desc.compile(cx, SamplesDesc::Exact);
     assert!(!cx.has_errors());
     light
 }
@@ -96,7 +88,7 @@ fn lobe(random: &mut Random) -> Lobe {
 
 /// What one light sends, point by point of it: the definition.
 fn truth(light: &Light, p: Vec3, ns: Vec3, wo: Vec3, lobe: &Lobe) -> [[f64; 3]; 2] {
-    let area = if let LightKind::Area(area) = &light.kind { Some(area) } else { None };
+    let area = light.area();
     let count = if area.is_some() { 1024 } else { 1 };
     let mut sums = [0.0f64; 2];
     for k in 0..count {
@@ -118,10 +110,7 @@ fn truth(light: &Light, p: Vec3, ns: Vec3, wo: Vec3, lobe: &Lobe) -> [[f64; 3]; 
         let specular = lobe.eval(cos_i, ns.dot(wo), wo.dot(l) * sample.inverse_distance);
         sums[1] += f64::from(specular * sample.weight);
     }
-    let measure = match &light.kind {
-        LightKind::Area(Area { shape, physical: true, .. }) => shape.measure(),
-        _ => 1.0,
-    };
+    let measure = area.filter(|area| area.physical).map_or(1.0, |area| area.shape.measure());
     let own = sums.map(|sum| sum * measure / f64::from(count));
     own.map(|sum| channels(light.intensity).map(|c| f64::from(c) * sum))
 }
@@ -262,8 +251,7 @@ fn third_derivatives_are_bounded() {
 #[test]
 fn a_sphere_is_its_shape() {
     let light = compiled(&LightDesc::Sphere(SphereLightDesc::new([0.0; 3], 0.5)));
-    let LightKind::Area(area) = &light.kind else { panic!("a sphere has an area") };
-    assert!(matches!(area.shape, AreaShape::Sphere(_)));
+    assert!(light.area().is_some_and(|area| area.shape.is_ball()));
     let (bounds, strength) = LightBounds::of(&light);
     assert_eq!(bounds.profile, EmissionProfile::Isotropic);
     assert!((strength - std::f32::consts::PI * 0.25).abs() < 1e-6);

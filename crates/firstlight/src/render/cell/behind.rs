@@ -315,7 +315,7 @@ impl Cells<'_> {
     /// known. The integrals of all fragments of the cell are evaluated in one call.
     fn unshadowed(&mut self, fragment: usize, light: usize, counts: &mut Counts) -> Rgb {
         let (scene, lights) = (self.scene, &mut self.lights);
-        if !lights.is_integrated(light) {
+        if !(lights.is_integrated(light) && lights.has_closed_form(light)) {
             return Rgb::BLACK;
         }
         let (fragments, wholes) = (&self.fragments, &mut self.behind.wholes[light]);

@@ -487,7 +487,7 @@ impl Cells<'_> {
         let scale = self.lights.scale(light);
         let color = |sums: &Moments| scale * bsdf.colors.of(sums);
         let others = self.others(fragment, light, counts);
-        let value: Rgb = self.scene.ambient * bsdf.ambient + others + color(sums);
+        let value: Rgb = bsdf.base(self.scene.ambient) + others + color(sums);
         self.lights.steps(value, color(error))
     }
 }

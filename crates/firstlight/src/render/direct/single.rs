@@ -2,7 +2,6 @@
 
 use super::{DirectLighting, Group, LightEstimate};
 use crate::ids::LightId;
-use crate::light::{Light, LightKind};
 use crate::material::{Moments, ShadingPoint};
 use crate::math::Vec3;
 use crate::render::Counts;
@@ -36,7 +35,7 @@ impl DirectLighting<'_> {
         let casts = light.shadows && point.receives_shadow && visibility != Visibility::Full;
         let is_crossed = casts && self.may_cross_shadow(of.light, to.l, to.finite, point, visibility);
         // The light sets at once, and a spot's cone ends at once
-        let rim = if height < room { f32::INFINITY } else { self.rim_turn(light, point, to.l) };
+        let rim = if height < room { f32::INFINITY } else { light.rim_turn(to.l, point.reach) };
         let turn = self.turn(point, distance).max(rim);
         LightEstimate {
             moments,
@@ -53,19 +52,6 @@ impl DirectLighting<'_> {
         let receives_shadow = point.receives_shadow && visibility != Visibility::Full;
         let point = ShadingPoint { receives_shadow, ..*point };
         Plain.gather(self.scene, index, &point, &mut Counts::default()).total()
-    }
-
-    /// The turn of the light over the footprint that makes as much as the fading of a spot's cone; infinite where its
-    /// rim may cross.
-    fn rim_turn(&self, light: &Light, point: &ShadingPoint, l: Vec3) -> f32 {
-        let LightKind::Spot(spot) = &light.kind else { return 0.0 };
-        let near = (l.length() - point.reach).max(0.0);
-        let swing = 2.0 * point.reach / near.max(f32::MIN_POSITIVE);
-        let cos = 1.0 - (-l).normalize_or_zero().dot(spot.axis);
-        if (cos - spot.outer).abs() < 2.0 * swing {
-            return f32::INFINITY;
-        }
-        swing * (2.0 * spot.inverse_fade.min(1e6)).sqrt()
     }
 
     /// Whether the edge of a shadow, of a light of one point, may cross the footprint.

@@ -8,7 +8,7 @@ use super::{BLOCK, BY_REPRESENTATIVE, LEVELS, MAX_SINGLE_LIGHTS, Many, PatchLigh
 use crate::color::Rgb;
 use crate::ids::LightId;
 use crate::integrate::{COSTS, TOLERANCE};
-use crate::light::{EmissionProfile, Extent, LightNode, LightTree, NodeContents};
+use crate::light::{EmissionProfile, LightNode, LightTree, NodeContents};
 use crate::material::{Colors, Moments, ShadingPoint};
 use crate::math::Vec3;
 use crate::render::counts::Counts;
@@ -160,8 +160,7 @@ impl<'a> Many<'a> {
         stored.lit[1] = start..self.lit.len() as u32;
         self.add(patch, 0, &mut stored);
         self.add(patch, 1, &mut stored);
-        stored.value =
-            (bsdf.colors * stored.sent).0.into_iter().fold(scene.ambient * bsdf.ambient, |sum, part| sum + part);
+        stored.value = (bsdf.colors * stored.sent).0.into_iter().fold(bsdf.base(scene.ambient), |sum, part| sum + part);
         let from = self.singles.len() as u32;
         let mut light = stored.sent.cosine();
         if !singles.is_empty() {
@@ -226,7 +225,7 @@ pub(super) fn sent(scene: &Scene, tree: &LightTree, entry: u32, point: &ShadingP
     if entry & BY_REPRESENTATIVE == 0 {
         return node.estimate(point.p, point.ns, point.wo, &point.bsdf.lobe);
     }
-    sent_by_one(scene, &tree.nodes[node.representative as usize], point).colors(|sent| node.power * sent)
+    sent_by_one(scene, &tree.nodes[node.representative as usize], point).map(|sent| node.power * sent)
 }
 
 /// What one light contributes for a power of 1.
@@ -239,11 +238,8 @@ pub(super) fn sent_by_one(scene: &Scene, one: &LightNode, point: &ShadingPoint) 
     if !(point.horizon.dot(l) > 0.0 && height > 0.0) {
         return Moments::ZERO;
     }
-    match light.extent() {
-        Extent::Area(_) if one.has_estimate() => {
-            return one.unit_estimate(point.p, point.ns, point.wo, &point.bsdf.lobe);
-        }
-        Extent::Area(_) | Extent::Point => {}
+    if light.area().is_some() && one.has_estimate() {
+        return one.unit_estimate(point.p, point.ns, point.wo, &point.bsdf.lobe);
     }
     let Some(sample) = light.sample(k, l) else { return Moments::ZERO };
     let (cos_i, cos_io) = (height * sample.inverse_distance, point.wo.dot(l) * sample.inverse_distance);

@@ -10,7 +10,7 @@ use super::{ANYTHING, Many, PatchLight, SingleLight};
 use crate::color::Rgb;
 use crate::film::resolve::ScaledTerm;
 use crate::integrate::TOLERANCE;
-use crate::material::{Colors, Moments, ShadingPoint};
+use crate::material::{Colors, Moments, PerMoment, ShadingPoint};
 use crate::render::counts::Counts;
 use crate::render::direct::DirectLighting;
 use crate::render::fragment::Fragments;
@@ -141,7 +141,7 @@ impl<'a> Many<'a> {
         let mut all = Rgb::BLACK;
         for channel in 0..3 {
             let of = |color: Rgb| [color.r, color.g, color.b][channel];
-            let arrived = |number: usize| Some(Moments(self.stored[number].sent.0.map(of)));
+            let arrived = |number: usize| Some(PerMoment(self.stored[number].sent.0.map(of)));
             let Some(bend) = patches.within(patch, arrived) else { return anything };
             let one = |channel_of: usize| if channel_of == channel { 1.0 } else { 0.0 };
             let mask = Rgb::new(one(0), one(1), one(2));

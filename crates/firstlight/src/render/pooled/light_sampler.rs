@@ -18,8 +18,9 @@ use super::strata::{BlockSamples, StratumSums};
 use crate::accel::{RayPacket16, dispatch_all};
 use crate::color::Rgb;
 use crate::film::resolve::LightTerm;
+use crate::integrate::Emitter;
 use crate::light::{Area, FineCell, MIN_DISTANCE2, Points, SERIES, SeriesPart};
-use crate::material::{Colors, LobeLanes, MOMENTS, Moments, ShadingPoint};
+use crate::material::{Colors, LobeLanes, Moments, PerMoment, ShadingPoint};
 use crate::math::{DVec3, LANES, LightEnd, ShadowRay, Vec3, Vec3x16};
 use crate::render::Counts;
 use crate::render::lanes::PointObstacles;
@@ -84,12 +85,12 @@ impl SampledReceiver {
 
     /// Whether the surface reflects light of a moment.
     pub fn reflects(&self, moment: usize) -> bool {
-        self.each(&Moments([1.0; MOMENTS])).0[moment] != Rgb::BLACK
+        self.colors().0[moment] != Rgb::BLACK
     }
 
     /// The unoccluded integral: in closed form, or as points of a light of such a measure estimate it.
     pub fn unoccluded(&self, measure: f32) -> Moments {
-        self.unoccluded.unwrap_or_else(|| Moments(self.sums.sent.map(|sent| sent as f32 * measure)))
+        self.unoccluded.unwrap_or_else(|| PerMoment(self.sums.sent.map(|sent| sent as f32 * measure)))
     }
 }
 
@@ -99,6 +100,8 @@ pub(crate) struct LightSampler<'a> {
     pub scene: &'a Scene,
     pub level: Level,
     pub area: &'a Area,
+    /// Its closed form, if it has one.
+    pub emitter: Option<&'a Emitter>,
     pub target: &'a Target,
     pub sets: &'a LightPointSets,
 }
@@ -112,6 +115,11 @@ impl<'a> LightSampler<'a> {
     /// How far so many points of the light are apart.
     pub fn spacing(&self, points: f32) -> f32 {
         self.area.diagonal() / points.sqrt()
+    }
+
+    /// Whether what the light sends to a point varies over no less than `apart` metres, on the light.
+    pub fn varies_over(&self, point: &ShadingPoint, apart: f32) -> bool {
+        self.emitter.is_some_and(|emitter| emitter.nearest(point) >= apart)
     }
 
     /// Where shadow rays to the light end.

@@ -18,7 +18,7 @@ use crate::accel::dispatch_all;
 use crate::color::Rgb;
 use crate::integrate::TOLERANCE;
 use crate::light::{FineCell, with_gaps};
-use crate::material::{MOMENTS, Moments};
+use crate::material::{MOMENTS, Moments, PerMoment};
 use crate::math::{LANES, only, total};
 use crate::render::Counts;
 
@@ -94,7 +94,7 @@ impl StratumSums {
     /// What arrives of the unoccluded integral; `fractions` are visible where no sample sends anything.
     pub fn arriving(&self, unoccluded: &Moments, fractions: &[f32; MOMENTS]) -> Moments {
         let visible = |k: usize| if self.sent[k] > 0.0 { (self.lit[k] / self.sent[k]) as f32 } else { fractions[k] };
-        Moments(std::array::from_fn(|k| unoccluded.0[k] * visible(k)))
+        PerMoment(std::array::from_fn(|k| unoccluded.0[k] * visible(k)))
     }
 
     /// The effective sample size, moment by moment.
@@ -112,7 +112,7 @@ impl StratumSums {
 
 /// The strata of a light, and the samples of some receivers.
 pub(super) struct Strata<'a> {
-    sampler: LightSampler<'a>,
+    pub sampler: LightSampler<'a>,
     receivers: usize,
     /// The first half of a block takes its place, and the second one goes to the end.
     pub blocks: Vec<StratumBlock>,
@@ -423,7 +423,7 @@ impl BlockSamples {
 
     /// The same of one of them.
     pub fn moments(&self, lane: usize) -> Moments {
-        Moments(std::array::from_fn(|k| self.sent[k][lane]))
+        PerMoment(std::array::from_fn(|k| self.sent[k][lane]))
     }
 
     /// The samples in both halves of each stratum, one old and one new, of strata of such a level.
