@@ -138,7 +138,7 @@ impl<'a> Coverage<'a> {
                         let hit = self.hits.get(x, y, column, row);
                         self.met.extend(hit.map(|hit| ([i * n + column, j * n + row], hit)));
                     }
-                    self.pixel(film, left + x, top + y);
+                    self.pixel(film, [left + x, top + y]);
                 }
                 traced += w * h * n * n;
                 if traced >= QUESTION_EVERY {
@@ -151,31 +151,31 @@ impl<'a> Coverage<'a> {
     }
 
     /// Fills a pixel of a tile from the hits of its rays.
-    fn pixel(&mut self, film: &mut FilmTile, x: u32, y: u32) {
+    fn pixel(&mut self, film: &mut FilmTile, at: [u32; 2]) {
         let Coverage { scene, asked, met, shares, .. } = self;
         let rays = scene.antialiasing * scene.antialiasing;
         if let Some(plane) = asked.background {
-            film.set_pixel(plane, x, y, &[(rays - met.len() as u32) as f32 / rays as f32]);
+            film.set_pixel(plane, at, &[(rays - met.len() as u32) as f32 / rays as f32]);
         }
         if !asked.objects.is_empty() {
             shares.count(met.iter().map(|(_, hit)| hit.surface.0));
             for (object, count) in &shares.counts {
-                if let Ok(at) = asked.objects.binary_search_by_key(object, |(asked, _)| asked.0) {
-                    film.set_pixel(asked.objects[at].1, x, y, &[*count as f32 / rays as f32]);
+                if let Ok(object) = asked.objects.binary_search_by_key(object, |(asked, _)| asked.0) {
+                    film.set_pixel(asked.objects[object].1, at, &[*count as f32 / rays as f32]);
                 }
             }
         }
         for (matte, plane) in &asked.mattes {
             shares.count(met.iter().filter_map(|(_, hit)| matte.bits_of(scene, hit)));
-            film.set_pixel(*plane, x, y, &shares.ranks(rays as f32));
+            film.set_pixel(*plane, at, &shares.ranks(rays as f32));
         }
         if !asked.means.is_empty() {
-            self.means(film, x, y);
+            self.means(film, at);
         }
     }
 
     /// Fills a pixel of the means: sums in 64 bits, ray by ray.
-    fn means(&mut self, film: &mut FilmTile, x: u32, y: u32) {
+    fn means(&mut self, film: &mut FilmTile, at: [u32; 2]) {
         let Coverage { scene, asked, met, sums, .. } = self;
         sums.fill([0.0; 3]);
         for ([i, j], hit) in &*met {
@@ -191,7 +191,7 @@ impl<'a> Coverage<'a> {
                 0 => floats(nothing(*of)),
                 count => sum.map(|sum| (sum / count as f64) as f32),
             };
-            film.set_pixel(*plane, x, y, &mean[..of.channels().len()]);
+            film.set_pixel(*plane, at, &mean);
         }
     }
 }
