@@ -125,26 +125,22 @@ impl<'a> Coverage<'a> {
 
     /// Fills the planes of a tile. `go_on` is called now and then, and stops it with a break.
     pub fn fill(&mut self, film: &mut FilmTile, go_on: &impl Fn() -> ControlFlow<()>) -> ControlFlow<()> {
-        let (scene, tile, side, n) = (self.scene, film.tile, self.hits.side(), self.scene.antialiasing);
+        let (scene, n) = (self.scene, self.scene.antialiasing);
         let mut traced = 0;
-        for top in (0..tile.height).step_by(side as usize) {
-            for left in (0..tile.width).step_by(side as usize) {
-                let (w, h) = ((tile.width - left).min(side), (tile.height - top).min(side));
-                self.hits.trace(scene, tile.x + left, tile.y + top, w, h);
-                for (y, x) in (0..h).flat_map(|y| (0..w).map(move |x| (y, x))) {
-                    let [i, j] = [tile.x + left + x, tile.y + top + y];
-                    self.met.clear();
-                    for (row, column) in (0..n).flat_map(|row| (0..n).map(move |column| (row, column))) {
-                        let hit = self.hits.get(x, y, column, row);
-                        self.met.extend(hit.map(|hit| ([i * n + column, j * n + row], hit)));
-                    }
-                    self.pixel(film, [left + x, top + y]);
+        for block in film.tile.parts(self.hits.side(), 1) {
+            self.hits.trace(scene, block);
+            for [i, j] in block.pixels() {
+                self.met.clear();
+                for (row, column) in (0..n).flat_map(|row| (0..n).map(move |column| (row, column))) {
+                    let hit = self.hits.get([i, j], column, row);
+                    self.met.extend(hit.map(|hit| ([i * n + column, j * n + row], hit)));
                 }
-                traced += w * h * n * n;
-                if traced >= QUESTION_EVERY {
-                    traced = 0;
-                    go_on()?;
-                }
+                self.pixel(film, [i, j]);
+            }
+            traced += block.width * block.height * n * n;
+            if traced >= QUESTION_EVERY {
+                traced = 0;
+                go_on()?;
             }
         }
         ControlFlow::Continue(())

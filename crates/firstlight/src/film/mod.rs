@@ -57,7 +57,8 @@ pub(super) enum CenterValue {
     Whole(u32),
 }
 
-fn empty(planes: &[Buffer], pixels: usize) -> Vec<(Buffer, PlaneVec)> {
+fn empty(planes: &[Buffer], window: Window) -> Vec<(Buffer, PlaneVec)> {
+    let pixels = window.width as usize * window.height as usize;
     let numbers = |plane: Plane| match plane.is_whole() {
         true => PlaneVec::Wholes(vec![0; pixels]),
         false => PlaneVec::Floats(vec![0.0; pixels * plane.channels().len()]),
@@ -75,9 +76,8 @@ fn copy_rows<T: Copy>(to: &mut [T], starts: impl Iterator<Item = usize>, from: &
 impl Film {
     /// The film of a scene, of which `window` is exposed.
     pub(crate) fn new(scene: &Scene, window: Window, planes: &[Buffer]) -> Self {
-        let pixels = window.width as usize * window.height as usize;
         let names = planes.iter().map(|buffer| scene.buffer_name(*buffer)).collect();
-        Film { size: [scene.width, scene.height], window, planes: empty(planes, pixels), names }
+        Film { size: [scene.width, scene.height], window, planes: empty(planes, window), names }
     }
 
     /// Adds a plane of floats, or replaces it.
@@ -191,15 +191,20 @@ impl Film {
 
 impl FilmTile {
     /// An empty tile with the same planes.
-    pub fn new(tile: &Tile, planes: &[Buffer]) -> Self {
-        let pixels = tile.width as usize * tile.height as usize;
-        FilmTile { tile: *tile, planes: empty(planes, pixels) }
+    pub fn new(tile: Tile, planes: &[Buffer]) -> Self {
+        FilmTile { tile, planes: empty(planes, tile) }
     }
 
-    /// Stores a row of pixels, from column `x`, row `y` of the tile on: those in `some` of `sums`.
+    /// The index of a pixel of the film in the planes of the tile.
     #[inline(always)]
-    pub fn set_row(&mut self, x: u32, y: u32, sums: &TermSums, some: Range<usize>) {
-        let here = (y * self.tile.width + x) as usize;
+    fn index(&self, [x, y]: [u32; 2]) -> usize {
+        ((y - self.tile.y) * self.tile.width + (x - self.tile.x)) as usize
+    }
+
+    /// Stores a row of pixels of the film, from pixel `first` on: those in `some` of `sums`.
+    #[inline(always)]
+    pub fn set_row(&mut self, first: [u32; 2], sums: &TermSums, some: Range<usize>) {
+        let here = self.index(first);
         let mut kept = sums.kept();
         for (buffer, numbers) in &mut self.planes {
             let PlaneVec::Floats(numbers) = numbers else { continue };
@@ -227,21 +232,20 @@ impl FilmTile {
         self.planes.iter().map(|(buffer, _)| *buffer).collect()
     }
 
-    /// Stores the value of plane number `plane` at a pixel of the tile.
+    /// Stores the value of plane number `plane` at a pixel of the film.
     #[inline(always)]
-    pub(super) fn set_center(&mut self, plane: usize, at: [u32; 2], said: CenterValue) {
+    pub(super) fn set_center(&mut self, plane: usize, pixel: [u32; 2], said: CenterValue) {
+        let index = self.index(pixel);
         match (said, &mut self.planes[plane].1) {
-            (CenterValue::Floats(numbers), _) => self.set_pixel(plane, at, &numbers),
-            (CenterValue::Whole(number), PlaneVec::Wholes(numbers)) => {
-                numbers[(at[1] * self.tile.width + at[0]) as usize] = number;
-            }
+            (CenterValue::Floats(numbers), _) => self.set_pixel(plane, pixel, &numbers),
+            (CenterValue::Whole(number), PlaneVec::Wholes(numbers)) => numbers[index] = number,
             _ => unreachable!("each plane has its numbers"),
         }
     }
 
-    /// Stores the channels of plane number `plane` at a pixel of the tile: the first of `numbers`.
-    pub(super) fn set_pixel(&mut self, plane: usize, [x, y]: [u32; 2], numbers: &[f32]) {
-        let index = (y * self.tile.width + x) as usize;
+    /// Stores the channels of plane number `plane` at a pixel of the film: the first of `numbers`.
+    pub(super) fn set_pixel(&mut self, plane: usize, pixel: [u32; 2], numbers: &[f32]) {
+        let index = self.index(pixel);
         let (buffer, PlaneVec::Floats(all)) = &mut self.planes[plane] else { unreachable!("it has floats") };
         let channels = buffer.plane().channels().len();
         all[index * channels..][..channels].copy_from_slice(&numbers[..channels]);

@@ -626,7 +626,7 @@ impl<'a> Cells<'a> {
         for j in top.max(tile.y)..(top + CELL).min(tile.y + tile.height) {
             let row = self.index([columns.start, j])..self.index([columns.start, j]) + columns.len();
             counts.camera_rays += rays * columns.len() as u64;
-            film.set_row(columns.start - tile.x, j - tile.y, &self.sums, row);
+            film.set_row([columns.start, j], &self.sums, row);
         }
     }
 }
