@@ -21,34 +21,24 @@ pub(crate) const MAX_SAMPLES: u32 = 1 << 20;
 /// How many points stand for a light that is `exact`, where it has to be sampled all the same.
 pub(crate) const REFERENCE_SAMPLES: u32 = 400;
 
-/// Declares the table of an area light: its name, its own fields, then those that all area lights have.
+/// Declares the table of an area light: its own fields, and those that all area lights have.
 macro_rules! area_table {
     (
         $(#[doc = $doc:literal])*
         pub struct $name:ident { $($own:tt)* }
     ) => {
-        $crate::describe::table! {
+        $crate::light::light_table! {
             $(#[doc = $doc])*
-            pub struct $name {
-                /// What reports call it.
-                pub name: Option<String> = None,
-                /// The group of lights that it belongs to, for buffers: `group:NAME`.
-                pub group: Option<String> = None,
-                $($own)*
-                /// Linear colour; channels of 0 or more.
-                pub color: $crate::describe::ColorDesc = $crate::describe::ColorDesc::WHITE,
-                /// Radiance (physical), or a plain factor (constant); 0 to 1e15.
-                pub strength: f64 = 1.0,
-                /// How light weakens on its way.
-                pub falloff: $crate::light::Falloff = $crate::light::Falloff::Physical,
+            pub struct $name { $($own)* }
+            /// Radiance (physical), or a plain factor (constant); 0 to 1e15.
+            strength {
                 /// The sides that emit; without it, `front` under `physical` and `both` under `constant`.
                 pub sides: Option<$crate::light::EmitSides> = None,
                 /// Whether the camera sees it, as its colour.
                 pub visible: bool = true,
                 /// Whether it stops the light of others.
                 pub blocks: bool = false,
-                /// Whether its light can be blocked.
-                pub shadows: bool = true,
+            } {
                 /// How many points of it are sampled, 1 to 1048576, or `"exact"`: it is integrated, not sampled.
                 /// Without it, `render.samples`.
                 pub samples: Option<$crate::describe::SamplesDesc> = None,
@@ -62,17 +52,9 @@ macro_rules! area_table {
         impl $name {
             /// What it says that every area light can say.
             pub(super) fn emitter(&self) -> $crate::light::area::AreaCommon {
+                let Self { color, strength, falloff, sides, visible, blocks, shadows, samples, set, seed, .. } = *self;
                 $crate::light::area::AreaCommon {
-                    color: self.color,
-                    strength: self.strength,
-                    falloff: self.falloff,
-                    sides: self.sides,
-                    visible: self.visible,
-                    blocks: self.blocks,
-                    shadows: self.shadows,
-                    samples: self.samples,
-                    set: self.set,
-                    seed: self.seed,
+                    color, strength, falloff, sides, visible, blocks, shadows, samples, set, seed,
                 }
             }
         }
@@ -184,15 +166,7 @@ impl AreaCommon {
         if !exact && !cx.has_errors() {
             area.points();
         }
-        Light {
-            kind: LightKind::Area(area),
-            scale: scale.rgb(),
-            intensity: whole.rgb(),
-            radiance: whole.radiance(),
-            said: [scale, whole],
-            shadows: self.shadows,
-            exact,
-        }
+        Light::new(LightKind::Area(area), [scale, whole], self.shadows, exact)
     }
 }
 
@@ -221,18 +195,6 @@ pub struct Area {
     points: Arc<OnceLock<Points>>,
 }
 
-impl Area {
-    /// A point of it and the unit normal of its front, if it is flat and emits to that side alone.
-    pub(crate) fn front(&self) -> Option<(DVec3, DVec3)> {
-        match &self.shape {
-            _ if self.both_sides => None,
-            AreaShape::Rectangle(rectangle) => Some((rectangle.center, rectangle.n)),
-            AreaShape::Disk(disk) => Some((disk.center, disk.n)),
-            AreaShape::Sphere(_) => None,
-        }
-    }
-}
-
 /// The shape of an area light. In f64, as it was described.
 #[derive(Clone, Copy, Debug)]
 #[allow(clippy::large_enum_variant, reason = "lights are few, and asked for often")]
@@ -259,21 +221,25 @@ impl AreaShape {
         }
     }
 
-    /// Unit normal of the front, where all of it faces one way.
-    pub(crate) fn flat_normal(&self) -> Option<Vec3> {
+    /// Its middle and the unit normal of the front, where all of it faces one way.
+    fn front(&self) -> Option<(DVec3, DVec3)> {
         match self {
-            AreaShape::Rectangle(rectangle) => Some(rectangle.n.as_vec3()),
-            AreaShape::Disk(disk) => Some(disk.n.as_vec3()),
+            AreaShape::Rectangle(rectangle) => Some((rectangle.center, rectangle.n)),
+            AreaShape::Disk(disk) => Some((disk.center, disk.n)),
             AreaShape::Sphere(_) => None,
         }
+    }
+
+    /// Unit normal of the front, where all of it faces one way.
+    pub(crate) fn flat_normal(&self) -> Option<Vec3> {
+        self.front().map(|(_, n)| n.as_vec3())
     }
 
     /// Unit normal of the front at a point of it.
     pub(crate) fn normal_at(&self, p: DVec3) -> Vec3 {
         match self {
-            AreaShape::Rectangle(rectangle) => rectangle.n.as_vec3(),
-            AreaShape::Disk(disk) => disk.n.as_vec3(),
             AreaShape::Sphere(sphere) => (p - sphere.center).normalize_or_zero().as_vec3(),
+            AreaShape::Rectangle(Rectangle { n, .. }) | AreaShape::Disk(DiskLight { n, .. }) => n.as_vec3(),
         }
     }
 
@@ -331,6 +297,11 @@ impl Area {
     /// Its area: [`AreaShape::measure`].
     pub fn measure(&self) -> f64 {
         self.shape.measure()
+    }
+
+    /// A point of it and the unit normal of its front, if it is flat and emits to that side alone.
+    pub(crate) fn front(&self) -> Option<(DVec3, DVec3)> {
+        self.shape.front().filter(|_| !self.both_sides)
     }
 
     /// The diagonal of the box around it.
@@ -483,58 +454,10 @@ pub(crate) struct Points {
     normals: Vec<PointBlock>,
 }
 
-/// Sixteen points, or normals. Where there is none, every coordinate is NaN: it is above no horizon and sends no light.
+/// Sixteen points, or normals, axis by axis. Where there is none, every coordinate is NaN: it is above no horizon and
+/// sends no light.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct PointBlock {
-    x: [f32; LANES],
-    y: [f32; LANES],
-    z: [f32; LANES],
-}
-
-impl Points {
-    /// How many there are.
-    pub fn count(&self) -> usize {
-        let last = self.blocks.last().map_or(0, |block| block.x.iter().filter(|x| !x.is_nan()).count());
-        self.blocks.len().saturating_sub(1) * LANES + last
-    }
-
-    /// Point `k`, world space.
-    pub fn get(&self, k: usize) -> Vec3 {
-        self.blocks[k / LANES].get(k % LANES)
-    }
-}
-
-impl PointBlock {
-    #[inline(always)]
-    fn of(point: impl Fn(usize) -> DVec3) -> PointBlock {
-        let mut block = PointBlock { x: [0.0; LANES], y: [0.0; LANES], z: [0.0; LANES] };
-        for k in 0..LANES {
-            let v = point(k).as_vec3();
-            (block.x[k], block.y[k], block.z[k]) = (v.x, v.y, v.z);
-        }
-        block
-    }
-
-    /// The coordinates of all of them, axis by axis.
-    #[inline(always)]
-    pub fn coordinates(&self) -> [[f32; LANES]; 3] {
-        [self.x, self.y, self.z]
-    }
-
-    #[inline(always)]
-    pub fn get(&self, lane: usize) -> Vec3 {
-        Vec3::new(self.x[lane], self.y[lane], self.z[lane])
-    }
-
-    #[inline(always)]
-    pub fn lanes<S: Simd>(&self, simd: S) -> Vec3x16<S> {
-        Vec3x16 {
-            x: f32x16::simd_from(simd, self.x),
-            y: f32x16::simd_from(simd, self.y),
-            z: f32x16::simd_from(simd, self.z),
-        }
-    }
-}
+pub(crate) struct PointBlock(pub [[f32; LANES]; 3]);
 
 impl Points {
     /// The points that stand for some of the unit square.
@@ -577,6 +500,41 @@ impl Points {
                 ));
             }
         }
+    }
+
+    /// How many there are.
+    pub fn count(&self) -> usize {
+        let last = self.blocks.last().map_or(0, |block| block.0[0].iter().filter(|x| !x.is_nan()).count());
+        self.blocks.len().saturating_sub(1) * LANES + last
+    }
+
+    /// Point `k`, world space.
+    pub fn get(&self, k: usize) -> Vec3 {
+        self.blocks[k / LANES].get(k % LANES)
+    }
+}
+
+impl PointBlock {
+    #[inline(always)]
+    fn of(point: impl Fn(usize) -> DVec3) -> PointBlock {
+        let mut block = PointBlock([[0.0; LANES]; 3]);
+        for k in 0..LANES {
+            let v = point(k).as_vec3();
+            (block.0[0][k], block.0[1][k], block.0[2][k]) = (v.x, v.y, v.z);
+        }
+        block
+    }
+
+    #[inline(always)]
+    pub fn get(&self, lane: usize) -> Vec3 {
+        let [x, y, z] = &self.0;
+        Vec3::new(x[lane], y[lane], z[lane])
+    }
+
+    #[inline(always)]
+    pub fn lanes<S: Simd>(&self, simd: S) -> Vec3x16<S> {
+        let [x, y, z] = self.0.map(|axis| f32x16::simd_from(simd, axis));
+        Vec3x16 { x, y, z }
     }
 }
 

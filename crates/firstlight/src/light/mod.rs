@@ -71,6 +71,54 @@ family! {
     }
 }
 
+/// Declares the table of a light: its own fields between those that all lights have, the unit of its strength, and
+/// what only area lights say.
+macro_rules! light_table {
+    (
+        $(#[doc = $doc:literal])*
+        pub struct $name:ident { $($own:tt)* }
+        $(#[doc = $unit:literal])*
+        strength $({ $($emission:tt)* } { $($sampling:tt)* })?
+    ) => {
+        $crate::describe::table! {
+            $(#[doc = $doc])*
+            pub struct $name {
+                /// What reports call it.
+                pub name: Option<String> = None,
+                /// The group of lights that it belongs to, for buffers: `group:NAME`.
+                pub group: Option<String> = None,
+                $($own)*
+                /// Linear colour; channels of 0 or more.
+                pub color: $crate::describe::ColorDesc = $crate::describe::ColorDesc::WHITE,
+                $(#[doc = $unit])*
+                pub strength: f64 = 1.0,
+                /// How light weakens on its way.
+                pub falloff: $crate::light::Falloff = $crate::light::Falloff::Physical,
+                $($($emission)*)?
+                /// Whether its light can be blocked.
+                pub shadows: bool = true,
+                $($($sampling)*)?
+            }
+        }
+    };
+}
+
+use light_table;
+
+/// An expression of the table of a light, whatever its kind.
+macro_rules! of_table {
+    ($light:expr, $table:ident => $value:expr) => {
+        match $light {
+            LightDesc::Point($table) => $value,
+            LightDesc::Directional($table) => $value,
+            LightDesc::Spot($table) => $value,
+            LightDesc::Rectangle($table) => $value,
+            LightDesc::Disk($table) => $value,
+            LightDesc::Sphere($table) => $value,
+        }
+    };
+}
+
 impl LightDesc {
     /// Lights in scene order: kind by kind, in each the order of the text.
     pub(crate) fn in_scene_order(lights: &[LightDesc]) -> impl Iterator<Item = &LightDesc> {
@@ -85,40 +133,31 @@ impl LightDesc {
         lights.into_iter()
     }
 
+    /// The light; `samples` is the scene's default for area lights.
+    pub(crate) fn compile(&self, cx: &mut CompileContext, samples: SamplesDesc) -> Light {
+        match self {
+            LightDesc::Point(point) => point.compile(cx),
+            LightDesc::Directional(directional) => directional.compile(cx),
+            LightDesc::Spot(spot) => spot.compile(cx),
+            LightDesc::Rectangle(rectangle) => rectangle.compile(cx, samples),
+            LightDesc::Disk(disk) => disk.compile(cx, samples),
+            LightDesc::Sphere(sphere) => sphere.compile(cx, samples),
+        }
+    }
+
     /// Its name, if it has one.
     pub fn name(&self) -> Option<String> {
-        match self {
-            LightDesc::Point(light) => light.name.clone(),
-            LightDesc::Directional(light) => light.name.clone(),
-            LightDesc::Spot(light) => light.name.clone(),
-            LightDesc::Rectangle(light) => light.name.clone(),
-            LightDesc::Disk(light) => light.name.clone(),
-            LightDesc::Sphere(light) => light.name.clone(),
-        }
+        of_table!(self, light => light.name.clone())
     }
 
     /// The group of lights that it belongs to, if any.
     pub fn group(&self) -> Option<&str> {
-        match self {
-            LightDesc::Point(light) => light.group.as_deref(),
-            LightDesc::Directional(light) => light.group.as_deref(),
-            LightDesc::Spot(light) => light.group.as_deref(),
-            LightDesc::Rectangle(light) => light.group.as_deref(),
-            LightDesc::Disk(light) => light.group.as_deref(),
-            LightDesc::Sphere(light) => light.group.as_deref(),
-        }
+        of_table!(self, light => light.group.as_deref())
     }
 
     /// Where it is moved, if it says so.
     pub(crate) fn transform(&self) -> Option<&TransformDesc> {
-        match self {
-            LightDesc::Point(light) => light.transform.as_deref(),
-            LightDesc::Directional(light) => light.transform.as_deref(),
-            LightDesc::Spot(light) => light.transform.as_deref(),
-            LightDesc::Rectangle(light) => light.transform.as_deref(),
-            LightDesc::Disk(light) => light.transform.as_deref(),
-            LightDesc::Sphere(light) => light.transform.as_deref(),
-        }
+        of_table!(self, light => light.transform.as_deref())
     }
 
     /// How an area light is sampled: its own `samples`, if it says any, and how the points are laid out. `None` for a
@@ -206,15 +245,6 @@ pub enum LightKind {
     Area(Area),
 }
 
-/// From how much of a place's surroundings a light comes: what decides how it is summed up.
-#[derive(Clone, Copy, Debug)]
-pub enum Extent<'a> {
-    /// From one point, or from one direction: one sample is all of it.
-    Point,
-    /// From an area, which is sampled or integrated.
-    Area(&'a Area),
-}
-
 /// The way from a surface to one point of a light.
 #[derive(Clone, Copy, Debug)]
 pub struct Towards {
@@ -237,21 +267,19 @@ pub struct LightSample {
 pub(crate) const MIN_DISTANCE2: f32 = 1e-30;
 
 impl Light {
-    /// From how much around a place it comes.
-    #[inline(always)]
-    pub fn extent(&self) -> Extent<'_> {
-        match &self.kind {
-            LightKind::Area(area) => Extent::Area(area),
-            LightKind::Point(_) | LightKind::Directional(_) | LightKind::Spot(_) => Extent::Point,
-        }
+    /// A light of that place and shape, of which `said` is how much light one sample is, and all of it.
+    fn new(kind: LightKind, said: [LightScale; 2], shadows: bool, exact: bool) -> Light {
+        let [scale, intensity] = said.map(|scale| scale.rgb());
+        Light { kind, scale, intensity, radiance: said[1].radiance(), said, shadows, exact }
     }
 
-    /// Its shape in space, if it has one: what the camera can see of it, and what can stand in the way of others.
+    /// Its shape in space, if it has one: what the camera can see of it, and what can stand in the way of others. It is
+    /// sampled or integrated; of a light from one point, or from one direction, one sample is all of it.
     #[inline(always)]
     pub fn area(&self) -> Option<&Area> {
-        match self.extent() {
-            Extent::Area(area) => Some(area),
-            Extent::Point => None,
+        match &self.kind {
+            LightKind::Area(area) => Some(area),
+            LightKind::Point(_) | LightKind::Directional(_) | LightKind::Spot(_) => None,
         }
     }
 
@@ -281,8 +309,7 @@ impl Light {
     pub fn towards(&self, k: usize, p: Vec3) -> Towards {
         let to = |q: Vec3| Towards { l: q - p, finite: true };
         match &self.kind {
-            LightKind::Point(point) => to(point.position),
-            LightKind::Spot(spot) => to(spot.position),
+            LightKind::Point(Point { position, .. }) | LightKind::Spot(Spot { position, .. }) => to(*position),
             LightKind::Area(area) => to(area.point(k)),
             LightKind::Directional(directional) => Towards { l: directional.to_light, finite: false },
         }
@@ -298,8 +325,9 @@ impl Light {
     pub fn floor(&self, p: Vec3, error: ErrorBound, n: Vec3) -> f32 {
         match &self.kind {
             LightKind::Directional(directional) => n.abs().dot(directional.to_light.abs()) * (4.0 * UNIT_ROUNDOFF),
-            LightKind::Point(point) => n.abs().dot(way_error(point.position, Vec3::ZERO, p, error)),
-            LightKind::Spot(spot) => n.abs().dot(way_error(spot.position, Vec3::ZERO, p, error)),
+            LightKind::Point(Point { position, .. }) | LightKind::Spot(Spot { position, .. }) => {
+                n.abs().dot(way_error(*position, Vec3::ZERO, p, error))
+            }
             LightKind::Area(area) => area.floor(p, error, n),
         }
     }

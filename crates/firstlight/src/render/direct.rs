@@ -20,7 +20,7 @@ use crate::ids::LightId;
 use crate::integrate::{
     AreaLightIntegrator, Emitter, Illumination, LightIntegral, LightOccluders, LightTask, TOLERANCE,
 };
-use crate::light::{Area, Extent, LightTree};
+use crate::light::{Area, LightTree};
 use crate::material::{LobeKind, Moments, ShadingPoint};
 use crate::math::LANES;
 use crate::scene::Scene;
@@ -214,10 +214,8 @@ impl<'a> DirectLighting<'a> {
     /// Whether the visibility of light `index` is to be found for all rays of a block of pixels together: not of area
     /// lights that are sampled at fixed points.
     pub fn is_classified_by_blocks(&self, index: usize) -> bool {
-        match self.scene.lights[index].extent() {
-            Extent::Area(_) => self.is_integrated(index),
-            Extent::Point => true,
-        }
+        let light = &self.scene.lights[index];
+        light.area().is_none() || light.is_integrated()
     }
 
     /// In display steps: how far one light may be wrong at a point that represents such a share of a pixel, where the
@@ -310,17 +308,17 @@ impl<'a> DirectLighting<'a> {
             members.clear();
             members.extend(group.iter().map(|(_, k)| *k));
             let of = Group { light, lobe, points, queries };
-            match scene.lights[light].extent() {
-                Extent::Point => {
+            match scene.lights[light].area() {
+                None => {
                     for k in &members {
                         estimates[*k as usize] = self.single(&of, *k, counts);
                     }
                     go_on()?;
                 }
-                Extent::Area(_) if self.is_integrated(light) => {
+                Some(_) if self.is_integrated(light) => {
                     self.evaluate(&of, shadows, &members, estimates, counts, go_on)?;
                 }
-                Extent::Area(area) => {
+                Some(area) => {
                     let varying: Vec<u32> = members.iter().copied().filter(|k| of.point(*k).reach > 0.0).collect();
                     self.evaluate(&of, shadows, &varying, estimates, counts, go_on)?;
                     let at_once = (QUESTION_EVERY / area.samples() as u64).clamp(1, AT_ONCE) as usize;

@@ -4,7 +4,7 @@
 use super::Counts;
 use super::pixel::{Lighting, LobeSums};
 use super::plain::{Facing, Plain};
-use crate::light::{Extent, LightSample, Towards};
+use crate::light::{LightSample, Towards};
 use crate::material::{MOMENTS, ShadingPoint};
 use crate::math::LaneSum;
 use crate::scene::Scene;
@@ -34,10 +34,7 @@ impl Lighting for Given<'_, '_> {
 
     fn gather(&mut self, scene: &Scene, index: usize, point: &ShadingPoint, counts: &mut Counts) -> LobeSums {
         let facing = Facing::new(scene, index, point);
-        let area = match facing.light.extent() {
-            Extent::Area(area) => area,
-            Extent::Point => return Plain.gather(scene, index, point, counts),
-        };
+        let Some(area) = facing.light.area() else { return Plain.gather(scene, index, point, counts) };
         self.points.clear();
         let from = point.p.as_dvec3().to_array();
         (self.choose)(index, from, &|uv| area.position(uv), &mut self.points);

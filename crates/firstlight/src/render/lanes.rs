@@ -12,7 +12,7 @@ use super::plain::Plain;
 use crate::accel::RayPacket16;
 use crate::accel::dispatch_all;
 use crate::ids::LightId;
-use crate::light::{Area, Extent, MIN_DISTANCE2, Points};
+use crate::light::{Area, MIN_DISTANCE2, Points};
 use crate::material::{LobeLanes, MOMENTS, ShadingPoint};
 use crate::math::{LANES, LaneSum, LightEnd, ShadowRay, Vec3, Vec3x16};
 use crate::scene::{Geometry, Listed, Opacity, Scene, ShadowRays};
@@ -205,11 +205,8 @@ impl Lighting for Lanes {
 
     fn gather(&mut self, scene: &Scene, index: usize, point: &ShadingPoint, counts: &mut Counts) -> LobeSums {
         let light = &scene.lights[index];
-        let area = match light.extent() {
-            Extent::Area(area) => area,
-            // A single sample fills no lanes
-            Extent::Point => return Plain.gather(scene, index, point, counts),
-        };
+        // A single sample fills no lanes
+        let Some(area) = light.area() else { return Plain.gather(scene, index, point, counts) };
         let id = LightId(index as u32);
         let BetweenShapes { spheres, flats, disks } = &mut self.between;
         let spheres = if self.sphere_opacities.iter().all(|opacity| *opacity == Opacity::Opaque) {

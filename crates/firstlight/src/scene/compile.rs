@@ -308,14 +308,7 @@ impl SceneDesc {
         // Scene order: kind by kind, in each the order of the text
         for kind in LightDesc::KINDS {
             for (i, desc) in self.lights.iter().filter(|light| light.kind() == *kind).enumerate() {
-                let light = cx.within(&format!("light.{kind}[{i}]"), |cx| match desc {
-                    LightDesc::Point(point) => point.compile(cx),
-                    LightDesc::Directional(directional) => directional.compile(cx),
-                    LightDesc::Spot(spot) => spot.compile(cx),
-                    LightDesc::Rectangle(rectangle) => rectangle.compile(cx, samples),
-                    LightDesc::Disk(disk) => disk.compile(cx, samples),
-                    LightDesc::Sphere(sphere) => sphere.compile(cx, samples),
-                });
+                let light = cx.within(&format!("light.{kind}[{i}]"), |cx| desc.compile(cx, samples));
                 lights.push(light);
             }
         }

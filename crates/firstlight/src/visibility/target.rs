@@ -4,7 +4,7 @@ use fearless_simd::{Level, f32x16, prelude::*};
 
 use crate::accel::{Aabb, dispatch_all};
 use crate::ids::LightId;
-use crate::light::{AreaShape, Extent, Light, LightKind, PointBlock, Points};
+use crate::light::{AreaShape, Light, LightKind, PointBlock, Points};
 use crate::math::{Axes, DMat3, DVec3, LANES, LightEnd, Vec3, least_and_most};
 use crate::scene::Scene;
 
@@ -205,7 +205,7 @@ impl SampleBlock {
     /// `vectorize`.
     #[inline(always)]
     fn of_points(first: usize, points: &PointBlock, inverse: &DMat3, center: DVec3) -> SampleBlock {
-        let point = points.coordinates();
+        let point = points.0;
         let [x, y, z] = inverse.to_cols_array_2d();
         let mut at = [[0.0; LANES]; 3];
         let mut sample = [0; LANES];
@@ -266,9 +266,9 @@ impl Target {
     pub fn new(scene: &Scene, id: LightId) -> Self {
         let light = &scene.lights[id.index()];
         let target = Target::without_samples(id, LightHull::of(light));
-        match light.extent() {
-            Extent::Area(area) if !light.exact => target.with(scene.level, area.points()),
-            Extent::Area(_) | Extent::Point => target,
+        match light.area() {
+            Some(area) if !light.exact => target.with(scene.level, area.points()),
+            _ => target,
         }
     }
 

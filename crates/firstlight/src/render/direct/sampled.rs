@@ -4,7 +4,7 @@
 use fearless_simd::Level;
 
 use super::{DirectLighting, Group, LightEstimate};
-use crate::light::{Area, Extent, Light};
+use crate::light::{Area, Light};
 use crate::material::{Moments, ShadingPoint};
 use crate::render::Counts;
 use crate::render::lanes::{PointObstacles, sum_area};
@@ -94,9 +94,9 @@ impl<'a> Sampled<'a> {
     /// The sum of its samples at a point, past occluders.
     #[inline(always)]
     fn sum(&self, point: &ShadingPoint, occluders: &PointObstacles) -> Moments {
-        let sums = match self.light().extent() {
-            Extent::Area(area) => sum_area(self.level, area, point, occluders),
-            Extent::Point => Plain.gather(self.scene, self.index, point, &mut Counts::default()),
+        let sums = match self.light().area() {
+            Some(area) => sum_area(self.level, area, point, occluders),
+            None => Plain.gather(self.scene, self.index, point, &mut Counts::default()),
         };
         sums.total()
     }

@@ -8,7 +8,7 @@ use super::{BLOCK, BY_REPRESENTATIVE, LEVELS, MAX_SINGLE_LIGHTS, Many, PatchLigh
 use crate::color::Rgb;
 use crate::ids::LightId;
 use crate::integrate::{COSTS, TOLERANCE};
-use crate::light::{EmissionProfile, Extent, LightNode, LightTree, NodeContents};
+use crate::light::{EmissionProfile, LightNode, LightTree, NodeContents};
 use crate::material::{Colors, Moments, ShadingPoint};
 use crate::math::Vec3;
 use crate::render::counts::Counts;
@@ -239,11 +239,8 @@ pub(super) fn sent_by_one(scene: &Scene, one: &LightNode, point: &ShadingPoint) 
     if !(point.horizon.dot(l) > 0.0 && height > 0.0) {
         return Moments::ZERO;
     }
-    match light.extent() {
-        Extent::Area(_) if one.has_estimate() => {
-            return one.unit_estimate(point.p, point.ns, point.wo, &point.bsdf.lobe);
-        }
-        Extent::Area(_) | Extent::Point => {}
+    if light.area().is_some() && one.has_estimate() {
+        return one.unit_estimate(point.p, point.ns, point.wo, &point.bsdf.lobe);
     }
     let Some(sample) = light.sample(k, l) else { return Moments::ZERO };
     let (cos_i, cos_io) = (height * sample.inverse_distance, point.wo.dot(l) * sample.inverse_distance);
