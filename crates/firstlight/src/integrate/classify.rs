@@ -20,9 +20,9 @@ use super::panels::{MAX_INTERVALS, OccluderMask};
 use crate::ids::LightId;
 use crate::material::ShadingPoint;
 use crate::math::{DAffine3, Facet, LANES, Vec3, Vec3x16};
-use crate::scene::{PlacedTarget, Scene};
+use crate::scene::{PlacedTarget, Scene, ShadowMesh};
 use crate::shape::{Parallelogram, Placement, PlaneSide, Solid, Sphere};
-use crate::visibility::{OccluderList, ShadowMesh};
+use crate::visibility::OccluderList;
 use flat::{FacetShape, Own, test_parallelogram, test_triangle};
 use light_contact::{LightContact, LightSides};
 use solid::{PlacedSolid, test_solid};
@@ -129,10 +129,7 @@ impl<'a> LightOccluders<'a> {
                 if !mesh.casts(triangle) {
                     continue;
                 }
-                let corners = corners.map(|q: Vec3| match mesh.placement {
-                    Some(placement) => placement.world_from_object.transform_point3(q.as_dvec3()),
-                    None => q.as_dvec3(),
-                });
+                let corners = corners.map(|q: Vec3| mesh.in_world(q));
                 let shape = FacetShape::new(Facet { source: *source, triangle }, corners);
                 self.occluders.push(Occluder::Flat { corners: shape.corners() });
                 self.exact.push(ExactShape::Facet(shape));

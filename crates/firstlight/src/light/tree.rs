@@ -104,8 +104,7 @@ impl LightTree {
             // Split at the median along the longest axis; equal centers by index
             let none = (Vec3::INFINITY, Vec3::NEG_INFINITY);
             let (low, high) = lights.iter().fold(none, |(a, b), light| (a.min(light.center), b.max(light.center)));
-            let size = high - low;
-            let axis = if size.x >= size.y && size.x >= size.z { 0 } else { 1 + usize::from(size.z > size.y) };
+            let axis = (high - low).max_position();
             let half = lights.len() / 2;
             lights.select_nth_unstable_by(half, |a, b| {
                 a.center[axis].total_cmp(&b.center[axis]).then(a.index.cmp(&b.index))

@@ -6,14 +6,14 @@
 use arrayvec::ArrayVec;
 use fearless_simd::Level;
 
-use super::occluders::{OccluderList, ShadowMesh};
+use super::occluders::OccluderList;
 use super::shaft::{Horizon, Shaft};
 use super::target::{LightHull, Target};
 use super::{Viewpoint, Visibility};
 use crate::accel::Aabb;
 use crate::ids::LightId;
 use crate::math::{DVec3, ErrorBound, Vec3};
-use crate::scene::{Listed, Opacity, Placed, PlacedTarget, Scene};
+use crate::scene::{Listed, Opacity, Placed, PlacedTarget, Scene, ShadowMesh};
 use crate::shape::{Parallelogram, PlaneSide, Solid, Sphere};
 
 /// A set of receivers, and the listed shapes that may occlude lights from them. Keeps its memory.
@@ -187,10 +187,7 @@ impl ClusterVisibility {
                 let Some(mesh) = ShadowMesh::of(&scene.geometry, *source, target.light) else { return true };
                 let mut triangles = mesh.mesh.tree.leaf(*leaf);
                 triangles.all(|(triangle, corners)| {
-                    let corners = corners.map(|q| match mesh.placement {
-                        Some(placement) => placement.world_from_object.transform_point3(q.as_dvec3()),
-                        None => q.as_dvec3(),
-                    });
+                    let corners = corners.map(|q| mesh.in_world(q));
                     let edge = (corners[1] - corners[0]).length().max((corners[2] - corners[0]).length());
                     !mesh.casts(triangle) || corners.iter().all(|q| is_below(*q, edge * 1e-6))
                 })
@@ -218,7 +215,7 @@ impl ClusterVisibility {
         if let Solid::Plane(plane) = solid {
             let (p, n) = plane.place();
             let p = world.transform_point3(p);
-            let n = (placed.placement.object_from_world.matrix3.transpose() * n).normalize_or_zero();
+            let n = placed.placement.normal(n).normalize_or_zero();
             let height = |q: Vec3| n.dot(q.as_dvec3() - p);
             let margin = f64::from(self.room);
             let reach = n.abs().dot(half.as_dvec3()) + margin;

@@ -3,12 +3,11 @@
 use fearless_simd::{Level, f32x16, prelude::*};
 
 use super::Viewpoint;
-use super::occluders::ShadowMesh;
 use super::target::{LightSeen, SampleBlock, Target};
 use super::view::ShadowView;
 use crate::accel::{RayPacket16, dispatch_all};
 use crate::math::{LANES, ShadowRay, UNIT_ROUNDOFF, Vec3, least_and_most};
-use crate::scene::{Scene, ShadowRays};
+use crate::scene::{Scene, ShadowMesh, ShadowRays};
 use crate::shape::{SeenParts, SeenTriangle};
 
 impl ShadowView {
@@ -203,14 +202,9 @@ fn by_kernel<S: Simd>(
         || {
             let Some(mesh) = ShadowMesh::of(&scene.geometry, triangle.source, target.light) else { return 0 };
             let from = [point.ray(target.end(), Vec3::ZERO, true)];
-            let mut shadows = shadow_rays(simd, &from, point, block);
-            if let Some(placement) = mesh.placement {
-                for lane in (0..LANES).filter(|lane| unsure >> lane & 1 == 1) {
-                    let line = placement.line(shadows.rays.o(lane), shadows.rays.d(lane));
-                    shadows.rays.set(lane, line.o.as_vec3(), line.d.as_vec3());
-                }
-            }
-            mesh.mesh.tree.meets(simd, &shadows.rays, &shadows.t_end, triangle, unsure)
+            let shadows = shadow_rays(simd, &from, point, block);
+            let own = mesh.own_rays(&shadows.rays, unsure);
+            mesh.mesh.tree.meets(simd, own.as_ref().unwrap_or(&shadows.rays), &shadows.t_end, triangle, unsure)
         },
     )
 }

@@ -127,7 +127,7 @@ impl VisibilityResolver {
 fn split(points: &[Viewpoint], part: &mut [u32]) -> usize {
     let bounds = part.iter().fold(Aabb::EMPTY, |bounds, k| bounds.with(points[*k as usize].start));
     let size = bounds.max - bounds.min;
-    let axis = if size.x >= size.y && size.x >= size.z { 0 } else { 1 + usize::from(size.z > size.y) };
+    let axis = size.max_position();
     let middle = bounds.min[axis] + size[axis] * 0.5;
     let mut left = 0;
     for i in 0..part.len() {

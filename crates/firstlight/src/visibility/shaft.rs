@@ -16,7 +16,7 @@ use fearless_simd::{f32x8, prelude::*};
 use super::Viewpoint;
 use super::target::LightHull;
 use crate::accel::{Aabb, BEAM_PAD, BoxNode};
-use crate::math::{DVec3, Vec3};
+use crate::math::{DVec3, ErrorBound, Vec3};
 use crate::shape::Placement;
 
 /// The half-space n.x >= `least`, which holds all rays that carry light to the points.
@@ -50,9 +50,8 @@ pub(crate) struct TreeShaft {
     /// low plane.
     lines: [[Line; 2]; 3],
     s_max: f32,
-    n: Vec3,
-    least: f32,
-    has_horizon: bool,
+    /// The normal of the horizon that all points share, and the least height over it.
+    horizon: Option<(Vec3, f32)>,
 }
 
 /// A linear bound on s: plane x `r` + `c`.
@@ -108,10 +107,7 @@ impl Shaft {
     /// The same shaft in the object space of `placement`.
     pub fn in_object(&self, placement: &Placement, hull: &LightHull) -> Shaft {
         let m = &placement.object_from_world;
-        let size = |v: Vec3| {
-            let (a, v) = (&m.matrix3, v.as_dvec3());
-            a.x_axis.abs() * v.x + a.y_axis.abs() * v.y + a.z_axis.abs() * v.z
-        };
+        let size = |v: Vec3| placement.error_in_object(ErrorBound(v));
         let Aabb { min, max } = self.points;
         let middle = (min.as_dvec3() + max.as_dvec3()) * 0.5;
         let (center, half) = (m.transform_point3(middle), size((max - min) * 0.5) * (1.0 + 1e-6));
@@ -157,19 +153,11 @@ impl Shaft {
             let high = Line { r, c: -(from + pad) * r, enters: d > 0.0 };
             [low, high]
         };
-        let (n, mut lowest) = (self.horizon.map_or(Vec3::ZERO, |h| h.n), f32::NEG_INFINITY);
-        if let Some(horizon) = &self.horizon {
-            let below = horizon.least - horizon.n.as_dvec3().dot(center.as_dvec3());
-            let n = n.abs();
-            lowest = below as f32 - (n.x + n.y + n.z) * (2.0 * pad);
-        }
-        TreeShaft {
-            lines: [line(0), line(1), line(2)],
-            s_max: self.s_max,
-            n,
-            least: lowest,
-            has_horizon: self.horizon.is_some(),
-        }
+        let horizon = self.horizon.map(|Horizon { n, least }| {
+            let below = least - n.as_dvec3().dot(center.as_dvec3());
+            (n, below as f32 - (n.x.abs() + n.y.abs() + n.z.abs()) * (2.0 * pad))
+        });
+        TreeShaft { lines: [line(0), line(1), line(2)], s_max: self.s_max, horizon }
     }
 
     /// Whether a box intersects the shaft, in f64 and with `room` as the only padding.
@@ -227,11 +215,11 @@ impl TreeShaft {
             }
         }
         let mut met = enter.simd_le(leave);
-        if self.has_horizon {
-            let top = |axis: usize| &planes[axis][usize::from(self.n[axis] >= 0.0)];
-            let height = f32x8::load_array_ref(simd, top(0)) * self.n.x;
-            let height = line(top(2), self.n.z, line(top(1), self.n.y, height));
-            met &= height.simd_ge(self.least);
+        if let Some((n, least)) = self.horizon {
+            let top = |axis: usize| &planes[axis][usize::from(n[axis] >= 0.0)];
+            let height = f32x8::load_array_ref(simd, top(0)) * n.x;
+            let height = line(top(2), n.z, line(top(1), n.y, height));
+            met &= height.simd_ge(least);
         }
         (met.to_bitmask() as u32, enter)
     }

@@ -3,12 +3,12 @@
 use fearless_simd::{Level, Simd};
 
 use super::Viewpoint;
-use super::occluders::{MeshNumber, OccluderList, ShadowMesh};
+use super::occluders::OccluderList;
 use super::shaft::Shaft;
 use super::target::{LightSeen, Target};
 use crate::accel::{Aabb, dispatch_all};
-use crate::math::{DVec3, UNIT_ROUNDOFF, Vec3};
-use crate::scene::{PlacedTarget, Scene};
+use crate::math::{DVec3, ErrorBound, UNIT_ROUNDOFF, Vec3};
+use crate::scene::{PlacedTarget, Scene, ShadowMesh};
 use crate::shape::{Cover, DiskShadow, Eye, ParallelogramShadow, Placement, SeenTriangle, SphereShadow, TOGETHER};
 
 /// How much of a light is visible from a point.
@@ -198,7 +198,7 @@ impl ShadowView {
             rest = &rest[count..];
             if let Some(mesh) = ShadowMesh::of(&scene.geometry, source, target.light) {
                 let eye = eye(&mesh, light, point);
-                if classify_leaves(simd, &mesh, &eye, &leaves, source, point.but.of(source), &mut self.triangles) {
+                if classify_leaves(simd, &mesh, &eye, &leaves, point.but.of(source), &mut self.triangles) {
                     hidden = true;
                     break;
                 }
@@ -217,7 +217,6 @@ fn classify_leaves<S: Simd>(
     mesh: &ShadowMesh,
     eye: &Eye,
     leaves: &[u32],
-    source: MeshNumber,
     but: u32,
     seen: &mut Vec<SeenTriangle>,
 ) -> bool {
@@ -226,7 +225,7 @@ fn classify_leaves<S: Simd>(
         || {
             for four in leaves.chunks(TOGETHER) {
                 let casts = |triangle| triangle != but && mesh.casts(triangle);
-                if mesh.mesh.tree.look(simd, eye, four, source, &casts, seen) {
+                if mesh.mesh.tree.look(simd, eye, four, mesh.source, &casts, seen) {
                     return true;
                 }
             }
@@ -265,10 +264,7 @@ fn eye(mesh: &ShadowMesh, light: &LightSeen, point: &Viewpoint) -> Eye {
     let Some(placement) = mesh.placement else { return own };
     let m = &placement.object_from_world.matrix3;
     let way = |v: Vec3| (*m * v.as_dvec3()).as_vec3();
-    let size = |v: Vec3| {
-        let v = v.abs().as_dvec3();
-        m.x_axis.abs() * v.x + m.y_axis.abs() * v.y + m.z_axis.abs() * v.z
-    };
+    let size = |v: Vec3| placement.error_in_object(ErrorBound(v.abs()));
     let sizes: DVec3 = size(light.l) + size(light.axes[0]) + size(light.axes[1]) + size(light.axes[2]);
     let seen = LightSeen::new(way(light.l), light.axes.map(way), light.finite);
     let upright = placement.world_from_object.matrix3.transpose();
@@ -289,7 +285,7 @@ fn eye(mesh: &ShadowMesh, light: &LightSeen, point: &Viewpoint) -> Eye {
 /// computed from the numbers that the intersection with the plane uses.
 fn stays_before(placement: &Placement, on: DVec3, n: DVec3, light: &LightSeen, point: &Viewpoint) -> bool {
     let height = n.dot(placement.line(point.start, light.l).o - on);
-    let across = placement.object_from_world.matrix3.transpose() * n;
+    let across = placement.normal(n);
     let reach: f64 = light.axes.iter().map(|a| across.dot(a.as_dvec3()).abs()).sum();
     let room = across.abs().element_sum() * f64::from(light.longest) * 1e-6;
     let middle = across.dot(light.l.as_dvec3()) * height.signum();

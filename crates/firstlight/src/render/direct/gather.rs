@@ -8,8 +8,8 @@ use crate::ids::LightId;
 use crate::material::ShadingPoint;
 use crate::math::{DVec3, Facet, LANES};
 use crate::render::Counts;
-use crate::scene::Scene;
-use crate::visibility::{ShadowMesh, ShadowView, Shaft, Target, Viewpoint, Visibility};
+use crate::scene::{Scene, ShadowMesh};
+use crate::visibility::{ShadowView, Shaft, Target, Viewpoint, Visibility};
 
 /// The most triangles that a light is evaluated past, seen from one ray.
 const FEW_TRIANGLES: usize = 6;
@@ -191,8 +191,7 @@ fn rises(scene: &Scene, place: &Viewpoint, source: u32, leaf: u32) -> bool {
     let Some(mesh) = ShadowMesh::of(&scene.geometry, source, LightId(0)) else { return true };
     mesh.mesh.tree.leaf(leaf).any(|(_, corners)| {
         corners.iter().any(|q| {
-            let q = mesh.placement.map_or(q.as_dvec3(), |at| at.world_from_object.transform_point3(q.as_dvec3()));
-            let way = q - place.p.as_dvec3();
+            let way = mesh.in_world(*q) - place.p.as_dvec3();
             let room = way.abs().max_element() * 1e-6 + f64::from(place.error.0.max_element());
             place.horizon.as_dvec3().dot(way) > room
         })
