@@ -3,12 +3,12 @@
 use fearless_simd::{Level, f32x16, prelude::*};
 
 use super::Viewpoint;
-use super::target::{LightSeen, SampleBlock, Target};
+use super::target::{SampleBlock, Target};
 use super::view::ShadowView;
 use crate::accel::{RayPacket16, dispatch_all};
 use crate::math::{LANES, ShadowRay, UNIT_ROUNDOFF, Vec3, least_and_most};
 use crate::scene::{Scene, ShadowMesh, ShadowRays};
-use crate::shape::{SeenParts, SeenTriangle};
+use crate::shape::{LightSeen, SeenParts, SeenTriangle};
 
 impl ShadowView {
     /// Fills [`hidden`](Self::hidden) with the samples that triangles, solids and point sets hide, and those that are

@@ -7,6 +7,7 @@ use crate::ids::LightId;
 use crate::light::{AreaShape, Light, LightKind, PointBlock, Points};
 use crate::math::{Axes, DMat3, DVec3, LANES, LightEnd, Vec3, least_and_most};
 use crate::scene::Scene;
+use crate::shape::LightSeen;
 
 /// An oriented box around a light: the points `center` + u `axes[0]` + v `axes[1]` + w `axes[2]`, each of u, v, w from
 /// -1 to 1. For a light that is infinitely far away, its direction `center`.
@@ -20,24 +21,6 @@ pub(crate) struct LightHull {
     pub is_ball: bool,
     /// The unit normal of a flat light; 0 for all others.
     pub plane: Vec3,
-}
-
-/// A light relative to one point: the vectors `l` + u `axes[0]` + v `axes[1]` + w `axes[2]` from the point to its box.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct LightSeen {
-    pub l: Vec3,
-    pub axes: [Vec3; 3],
-    /// An upper bound of the largest coordinate of any of the vectors.
-    pub longest: f32,
-    /// A lower bound of the largest coordinate of each of the vectors.
-    pub shortest: f32,
-    pub finite: bool,
-    /// See [`LightHull::plane`].
-    pub plane: Vec3,
-    /// The axes along which projections of occluders are bounded; those of a sphere face the point.
-    pub frame: [Vec3; 3],
-    /// The distance of the center of a sphere, in radii.
-    pub radii: Option<f32>,
 }
 
 /// Sixteen samples of a light, by their coordinates along the axes of its box. Lanes without a sample repeat one.
@@ -237,23 +220,6 @@ impl BlockBounds {
             }
         }
         bounds
-    }
-}
-
-impl LightSeen {
-    #[inline(always)]
-    pub fn new(l: Vec3, axes: [Vec3; 3], finite: bool) -> Self {
-        let reach = axes[0].abs() + axes[1].abs() + axes[2].abs();
-        let longest = (l.abs() + reach).max_element() * (1.0 + 4.0 * f32::EPSILON);
-        let shortest = ((l.abs() - reach).max_element() - longest * (4.0 * f32::EPSILON)).max(0.0);
-        LightSeen { l, axes, longest, shortest, finite, plane: Vec3::ZERO, frame: axes, radii: None }
-    }
-
-    /// The range of f.w over the vectors w to the light, without rounding: its center and half its length.
-    #[inline(always)]
-    pub fn range(&self, f: Vec3) -> (f32, f32) {
-        let [a, b, c] = self.axes;
-        (f.dot(self.l), f.dot(a).abs() + f.dot(b).abs() + f.dot(c).abs())
     }
 }
 

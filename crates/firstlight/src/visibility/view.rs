@@ -5,11 +5,13 @@ use fearless_simd::{Level, Simd};
 use super::Viewpoint;
 use super::occluders::OccluderList;
 use super::shaft::Shaft;
-use super::target::{LightSeen, Target};
+use super::target::Target;
 use crate::accel::{Aabb, dispatch_all};
 use crate::math::{DVec3, ErrorBound, UNIT_ROUNDOFF, Vec3};
 use crate::scene::{PlacedTarget, Scene, ShadowMesh};
-use crate::shape::{Cover, DiskShadow, Eye, ParallelogramShadow, Placement, SeenTriangle, SphereShadow, TOGETHER};
+use crate::shape::{
+    Cover, DiskShadow, Eye, LightSeen, ParallelogramShadow, Placement, SeenTriangle, SphereShadow, TOGETHER,
+};
 
 /// How much of a light is visible from a point.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -86,7 +88,7 @@ impl ShadowView {
             if shadow.is_below(point.horizon) {
                 continue;
             }
-            match shadow.covers(light.l, &light.axes, light.longest, light.finite) {
+            match shadow.covers(&light) {
                 Cover::Nothing => {}
                 Cover::All => return Visibility::None,
                 Cover::Some => self.spheres.push(shadow),
@@ -97,7 +99,7 @@ impl ShadowView {
             if shadow.is_one_sided(*side) {
                 continue;
             }
-            match shadow.covers(light.l, &light.axes, light.longest, light.finite) {
+            match shadow.covers(&light) {
                 Cover::Nothing => {}
                 Cover::All => return Visibility::None,
                 Cover::Some => self.flats.push(shadow),
@@ -105,7 +107,7 @@ impl ShadowView {
         }
         for disk in &occluders.disks {
             let shadow = scene.occluders.disks[*disk as usize].shape.shadow(point.p, point.error);
-            match shadow.covers(light.l, &light.axes, light.longest, light.finite) {
+            match shadow.covers(&light) {
                 Cover::Nothing => {}
                 Cover::All => return Visibility::None,
                 Cover::Some => self.disks.push(shadow),
@@ -248,19 +250,8 @@ fn eye(mesh: &ShadowMesh, light: &LightSeen, point: &Viewpoint) -> Eye {
     };
     let short = 32.0 * UNIT_ROUNDOFF * 1.01 * part + 8.0 * UNIT_ROUNDOFF;
     let short = if short < 0.5 { 1.0 / (1.0 - short) * (1.0 + 8.0 * UNIT_ROUNDOFF) } else { f32::INFINITY };
-    let own = Eye {
-        o: point.start,
-        error: point.error.0.as_dvec3(),
-        l: light.l,
-        axes: light.axes,
-        frame: light.frame,
-        radii: light.radii,
-        longest: light.longest,
-        shortest: light.shortest,
-        short,
-        finite: light.finite,
-        horizons: [point.horizon, point.ns],
-    };
+    let (error, horizons) = (point.error.0.as_dvec3(), [point.horizon, point.ns]);
+    let own = Eye { o: point.start, error, light: *light, short, horizons };
     let Some(placement) = mesh.placement else { return own };
     let m = &placement.object_from_world.matrix3;
     let way = |v: Vec3| (*m * v.as_dvec3()).as_vec3();
@@ -271,11 +262,13 @@ fn eye(mesh: &ShadowMesh, light: &LightSeen, point: &Viewpoint) -> Eye {
     Eye {
         o: placement.line(point.start, light.l).o.as_vec3(),
         error: placement.error_in_object(point.error),
-        l: seen.l,
-        axes: seen.axes,
-        frame: light.frame.map(way),
-        longest: (sizes.max_element() * 1.0001) as f32,
-        shortest: seen.shortest * 0.9999,
+        light: LightSeen {
+            frame: light.frame.map(way),
+            radii: light.radii,
+            longest: (sizes.max_element() * 1.0001) as f32,
+            shortest: seen.shortest * 0.9999,
+            ..seen
+        },
         horizons: own.horizons.map(|n| (upright * n.as_dvec3()).as_vec3()),
         ..own
     }
